@@ -1,0 +1,1 @@
+//! Radar odometry as cooperating processes.

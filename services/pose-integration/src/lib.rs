@@ -1,0 +1,56 @@
+//! Composes motions to poses, with their covariances, and journals each before anybody hears of it.
+
+mod compose;
+pub mod journal;
+
+use gyre_messages::{Item, MotionHeader, PoseHeader, flag};
+use gyre_stage::{Launch, Sink, StageError, Statistics, clock, sink};
+
+pub use compose::compose;
+use journal::Journal;
+
+/// The stage's name.
+pub const NAME: &str = "pose-integration";
+
+/// Runs the stage until it is told to stop.
+pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
+    let path = journal::path(&launch.manifest.out);
+    let (journal, records) = Journal::open(&path).map_err(|error| StageError::Input(error.to_string()))?;
+    let mut integration = Integration { journal, records, last: None };
+    sink::run(launch, &mut integration)
+}
+
+struct Integration {
+    journal: Journal,
+    /// What the journal held at the start.
+    records: Vec<PoseHeader>,
+    last: Option<PoseHeader>,
+}
+
+impl Sink for Integration {
+    fn restore(&mut self, count: usize) -> Result<(Vec<PoseHeader>, bool), StageError> {
+        let mut poses = std::mem::take(&mut self.records);
+        let ended = poses.pop_if(|last| last.item.is(flag::END)).is_some();
+        self.last = poses.last().copied();
+        poses.drain(..poses.len().saturating_sub(count));
+        Ok((poses, ended))
+    }
+
+    fn integrate(&mut self, motion: &MotionHeader) -> Result<PoseHeader, StageError> {
+        let mut pose = compose(self.last.as_ref(), motion);
+        pose.item.hop(gyre_messages::Stage::PoseIntegration).finished_ns = clock::now_ns();
+        self.write(&pose)?;
+        self.last = Some(pose);
+        Ok(pose)
+    }
+
+    fn end(&mut self, item: &Item) -> Result<(), StageError> {
+        self.write(&PoseHeader { item: Item { flags: flag::END, ..*item }, ..PoseHeader::default() })
+    }
+}
+
+impl Integration {
+    fn write(&mut self, pose: &PoseHeader) -> Result<(), StageError> {
+        self.journal.append(pose).map_err(|error| StageError::Input(error.to_string()))
+    }
+}

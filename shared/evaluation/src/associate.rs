@@ -1,0 +1,305 @@
+//! Which pose of the estimate is held against which pose of the truth.
+
+use serde::Serialize;
+
+use crate::{EvaluationError, MatchedPoses, Pose, Side, matched::require_poses};
+
+/// Poses, and their stamps where they have any.
+#[derive(Debug, Clone, Copy)]
+pub struct Trajectory<'a> {
+    /// One stamp a pose, ns, never running backwards. Not looked at in association by index.
+    pub stamps_ns: &'a [i64],
+    /// Poses of the sensor in one fixed frame.
+    pub poses: &'a [Pose],
+}
+
+impl<'a> Trajectory<'a> {
+    /// Poses with stamps.
+    pub fn new(stamps_ns: &'a [i64], poses: &'a [Pose]) -> Self {
+        Self { stamps_ns, poses }
+    }
+
+    /// Poses without stamps, as in KITTI files: for association by index.
+    pub fn untimed(poses: &'a [Pose]) -> Self {
+        Self { stamps_ns: &[], poses }
+    }
+}
+
+/// How counterparts are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(tag = "by", rename_all = "snake_case")]
+pub enum Association {
+    /// The truth is interpolated at the estimate's stamps: positions linearly, yaw the shorter way round.
+    Time {
+        /// Widest gap between two stamps of the truth that is interpolated across, ns.
+        max_gap_ns: i64,
+    },
+    /// Pose `k` belongs to pose `k`; the longer list is cut to the shorter.
+    Index,
+}
+
+impl Default for Association {
+    /// By time, across gaps of up to 1 s.
+    fn default() -> Self {
+        Self::Time { max_gap_ns: 1_000_000_000 }
+    }
+}
+
+/// How much of the trajectories the comparison covers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(tag = "by", rename_all = "snake_case")]
+pub enum Coverage {
+    /// Associated by time.
+    Time {
+        /// Estimated poses with a counterpart.
+        matched: usize,
+        /// Estimated poses before the truth's first or after its last stamp: left out.
+        outside_span: usize,
+        /// Estimated poses in gaps of the truth wider than allowed: left out.
+        in_gaps: usize,
+        /// The widest gap allowed, ns.
+        max_gap_ns: i64,
+    },
+    /// Associated by index.
+    Index {
+        /// Estimated poses with a counterpart.
+        matched: usize,
+        /// Estimated poses beyond the truth's end: left out.
+        estimate_surplus: usize,
+        /// True poses beyond the estimate's end: left out.
+        truth_surplus: usize,
+    },
+}
+
+impl Coverage {
+    /// Estimated poses with a counterpart.
+    pub fn matched(&self) -> usize {
+        match *self {
+            Coverage::Time { matched, .. } | Coverage::Index { matched, .. } => matched,
+        }
+    }
+
+    /// Estimated poses without one.
+    pub fn left_out(&self) -> usize {
+        match *self {
+            Coverage::Time { outside_span, in_gaps, .. } => outside_span + in_gaps,
+            Coverage::Index { estimate_surplus, .. } => estimate_surplus,
+        }
+    }
+}
+
+/// Finds the counterpart of each estimated pose, and says how many have none.
+///
+/// # Errors
+/// [`EvaluationError`] where poses are none (NaN, no rotation), stamps are missing or run backwards (by time only), or fewer than
+/// two poses have a counterpart.
+pub fn associate(
+    estimate: Trajectory<'_>,
+    truth: Trajectory<'_>,
+    association: Association,
+) -> Result<(MatchedPoses, Coverage), EvaluationError> {
+    require_poses(Side::Estimate, estimate.poses)?;
+    require_poses(Side::Truth, truth.poses)?;
+    match association {
+        Association::Time { max_gap_ns } => by_time(estimate, truth, max_gap_ns),
+        Association::Index => by_index(estimate.poses, truth.poses),
+    }
+}
+
+fn by_index(estimate: &[Pose], truth: &[Pose]) -> Result<(MatchedPoses, Coverage), EvaluationError> {
+    let matched = estimate.len().min(truth.len());
+    if matched < 2 {
+        return Err(EvaluationError::TooFew { matched, estimate: estimate.len(), truth: truth.len() });
+    }
+    let coverage =
+        Coverage::Index { matched, estimate_surplus: estimate.len() - matched, truth_surplus: truth.len() - matched };
+    Ok((MatchedPoses::new(estimate[..matched].to_vec(), truth[..matched].to_vec())?, coverage))
+}
+
+fn by_time(
+    estimate: Trajectory<'_>,
+    truth: Trajectory<'_>,
+    max_gap_ns: i64,
+) -> Result<(MatchedPoses, Coverage), EvaluationError> {
+    let estimate_ns = require_stamps(Side::Estimate, &estimate)?;
+    let truth_ns = require_stamps(Side::Truth, &truth)?;
+    let (mut kept, mut counterparts) = (Vec::new(), Vec::new());
+    let (mut outside_span, mut in_gaps) = (0, 0);
+    for (&stamp_ns, pose) in estimate.stamps_ns.iter().zip(estimate.poses) {
+        match truth_at(truth, stamp_ns, max_gap_ns) {
+            At::Pose(counterpart) => {
+                kept.push(*pose);
+                counterparts.push(counterpart);
+            }
+            At::Outside => outside_span += 1,
+            At::Gap => in_gaps += 1,
+        }
+    }
+    let matched = kept.len();
+    if matched == 0
+        && in_gaps == 0
+        && let (Some(estimate_ns), Some(truth_ns)) = (estimate_ns, truth_ns)
+    {
+        return Err(EvaluationError::NoOverlap { estimate_ns, truth_ns });
+    }
+    if matched < 2 {
+        return Err(EvaluationError::TooFew { matched, estimate: estimate.poses.len(), truth: truth.poses.len() });
+    }
+    let coverage = Coverage::Time { matched, outside_span, in_gaps, max_gap_ns };
+    Ok((MatchedPoses::new(kept, counterparts)?, coverage))
+}
+
+/// The span of the stamps, `None` where there are none; refuses a wrong count and time that runs backwards.
+fn require_stamps(side: Side, trajectory: &Trajectory<'_>) -> Result<Option<(i64, i64)>, EvaluationError> {
+    let (stamps, poses) = (trajectory.stamps_ns, trajectory.poses.len());
+    if stamps.len() != poses {
+        return Err(EvaluationError::StampCount { side, poses, stamps: stamps.len() });
+    }
+    if let Some(k) = stamps.windows(2).position(|w| w[1] < w[0]) {
+        return Err(EvaluationError::Backwards { side, index: k + 1, previous_ns: stamps[k], stamp_ns: stamps[k + 1] });
+    }
+    Ok(stamps.first().copied().zip(stamps.last().copied()))
+}
+
+/// What the truth knows about one instant.
+enum At {
+    Pose(Pose),
+    Outside,
+    Gap,
+}
+
+/// The truth at `stamp_ns`. A stamp that the truth has itself is never in a gap.
+fn truth_at(truth: Trajectory<'_>, stamp_ns: i64, max_gap_ns: i64) -> At {
+    let after = truth.stamps_ns.partition_point(|&t| t <= stamp_ns);
+    let Some(before) = after.checked_sub(1) else { return At::Outside };
+    if truth.stamps_ns[before] == stamp_ns {
+        return At::Pose(truth.poses[before]);
+    }
+    let Some(&after_ns) = truth.stamps_ns.get(after) else { return At::Outside };
+    // i128: hostile stamps may lie further apart than an i64 can hold
+    let since = |t: i64| i128::from(t) - i128::from(truth.stamps_ns[before]);
+    if since(after_ns) > i128::from(max_gap_ns) {
+        return At::Gap;
+    }
+    let share = since(stamp_ns) as f64 / since(after_ns) as f64;
+    At::Pose(interpolate(&truth.poses[before], &truth.poses[after], share))
+}
+
+/// Position on the straight line between, yaw the shorter way round; `share` 0 is `from`, 1 is `to`.
+fn interpolate(from: &Pose, to: &Pose, share: f64) -> Pose {
+    let position = from.translation.vector.lerp(&to.translation.vector, share);
+    let turn = from.rotation.rotation_to(&to.rotation).powf(share);
+    Pose::from_parts(position.into(), turn * from.rotation)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::pose;
+    use std::f64::consts::PI;
+
+    const SECOND: i64 = 1_000_000_000;
+
+    fn line(n: usize) -> Vec<Pose> {
+        (0..n).map(|k| pose(k as f64, 0.0, 0.0)).collect()
+    }
+
+    fn seconds(s: &[f64]) -> Vec<i64> {
+        s.iter().map(|s| (s * SECOND as f64) as i64).collect()
+    }
+
+    #[test]
+    fn the_truth_is_interpolated_across_the_turn_of_the_yaw() {
+        let truth = [pose(0.0, 0.0, PI - 0.1), pose(4.0, 2.0, -PI + 0.3)];
+        let (matched, _) = associate(
+            Trajectory::new(&seconds(&[10.0, 10.25, 11.0]), &line(3)),
+            Trajectory::new(&seconds(&[10.0, 11.0]), &truth),
+            Association::default(),
+        )
+        .unwrap();
+        let between = matched.truth()[1];
+        assert!((between.translation.vector - nalgebra::Vector2::new(1.0, 0.5)).norm() < 1e-12);
+        assert!((between.rotation.angle() - PI).abs() < 1e-9);
+        assert_eq!(matched.truth()[2], truth[1]);
+    }
+
+    #[test]
+    fn poses_outside_the_span_and_in_gaps_are_left_out_and_counted() {
+        let (matched, coverage) = associate(
+            Trajectory::new(&seconds(&[-0.5, 0.0, 0.5, 1.0, 2.5, 4.0, 4.1]), &line(7)),
+            Trajectory::new(&seconds(&[0.0, 1.0, 4.0]), &line(3)),
+            Association::default(),
+        )
+        .unwrap();
+        let max_gap_ns = SECOND;
+        assert_eq!(coverage, Coverage::Time { matched: 4, outside_span: 2, in_gaps: 1, max_gap_ns });
+        assert_eq!((coverage.matched(), coverage.left_out()), (4, 3));
+        let used: Vec<f64> = matched.estimate().iter().map(|p| p.translation.x).collect();
+        assert_eq!(used, [1.0, 2.0, 3.0, 5.0]);
+    }
+
+    #[test]
+    fn index_association_cuts_to_the_shorter_and_says_so() {
+        let (matched, coverage) =
+            associate(Trajectory::untimed(&line(3)), Trajectory::untimed(&line(5)), Association::Index).unwrap();
+        assert_eq!(coverage, Coverage::Index { matched: 3, estimate_surplus: 0, truth_surplus: 2 });
+        assert_eq!(matched.len(), 3);
+    }
+
+    #[test]
+    fn trajectories_of_different_times_are_refused_with_both_spans() {
+        let error = associate(
+            Trajectory::new(&seconds(&[1.0, 2.0]), &line(2)),
+            Trajectory::new(&seconds(&[10.0, 12.5]), &line(2)),
+            Association::default(),
+        )
+        .unwrap_err();
+        let message = error.to_string();
+        assert!(message.contains("1.000 s to 2.000 s against 10.000 s to 12.500 s"), "{message}");
+    }
+
+    #[test]
+    fn one_common_instant_is_too_few() {
+        let error = associate(
+            Trajectory::new(&seconds(&[1.0, 2.0]), &line(2)),
+            Trajectory::new(&seconds(&[2.0, 3.0]), &line(2)),
+            Association::default(),
+        );
+        assert_eq!(error.unwrap_err(), EvaluationError::TooFew { matched: 1, estimate: 2, truth: 2 });
+    }
+
+    #[test]
+    fn stamps_that_run_backwards_or_are_missing_are_refused() {
+        let good = seconds(&[0.0, 1.0, 2.0]);
+        let error = |estimate: &[i64], truth: &[i64]| {
+            let (e, t) = (line(3), line(3));
+            associate(Trajectory::new(estimate, &e), Trajectory::new(truth, &t), Association::default()).unwrap_err()
+        };
+        assert_eq!(
+            error(&good, &[0, 7, 5]),
+            EvaluationError::Backwards { side: Side::Truth, index: 2, previous_ns: 7, stamp_ns: 5 }
+        );
+        assert_eq!(error(&good[..2], &good), EvaluationError::StampCount { side: Side::Estimate, poses: 3, stamps: 2 });
+    }
+
+    #[test]
+    fn stamps_at_the_ends_of_the_clock_do_not_overflow() {
+        let (matched, _) = associate(
+            Trajectory::new(&[i64::MIN, 0, i64::MAX], &line(3)),
+            Trajectory::new(&[i64::MIN, i64::MAX], &line(2)),
+            Association::Time { max_gap_ns: i64::MAX },
+        )
+        .unwrap();
+        assert_eq!(matched.len(), 2);
+    }
+
+    #[test]
+    fn empty_trajectories_are_refused() {
+        let empty = Trajectory::untimed(&[]);
+        for association in [Association::default(), Association::Index] {
+            let error = associate(empty, empty, association).unwrap_err();
+            assert_eq!(error, EvaluationError::TooFew { matched: 0, estimate: 0, truth: 0 });
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! Absolute trajectory error: how far positions lie from the truth after the best SE(2) alignment.
+
+use serde::{Serialize, Serializer};
+
+use crate::{MatchedPoses, Pose};
+
+/// Absolute trajectory error after SE(2) alignment.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Ate {
+    /// Root of the mean squared distance, m: the usual figure.
+    pub rmse_m: f64,
+    /// Mean distance, m.
+    pub mean_m: f64,
+    /// Largest distance, m.
+    pub max_m: f64,
+    /// The alignment: maps poses of the estimate's fixed frame into the truth's.
+    #[serde(serialize_with = "serialize_isometry")]
+    pub truth_from_estimate: Pose,
+}
+
+/// Measures the distances between the positions of the truth and of the aligned estimate.
+pub fn ate(matched: &MatchedPoses) -> Ate {
+    let truth_from_estimate = align(matched);
+    let distances = || matched.iter().map(|(e, t)| distance_m(&truth_from_estimate, e, t));
+    let n = matched.len() as f64;
+    Ate {
+        rmse_m: (distances().map(|d| d * d).sum::<f64>() / n).sqrt(),
+        mean_m: distances().sum::<f64>() / n,
+        max_m: distances().fold(0.0, f64::max),
+        truth_from_estimate,
+    }
+}
+
+/// The rigid motion, without scale, that brings the estimate's positions nearest to the truth's in the sense of least
+/// squares. Headings take no part. Where the positions leave the rotation open (all in one place), it is none.
+pub fn align(matched: &MatchedPoses) -> Pose {
+    align_positions(matched.estimate(), matched.truth())
+}
+
+/// RMSE (m) of the positions `estimate` against `truth`, equally long and not empty, after their alignment.
+pub(crate) fn aligned_rmse_m(estimate: &[Pose], truth: &[Pose]) -> f64 {
+    let truth_from_estimate = align_positions(estimate, truth);
+    let square = |(e, t)| distance_m(&truth_from_estimate, e, t).powi(2);
+    (estimate.iter().zip(truth).map(square).sum::<f64>() / truth.len() as f64).sqrt()
+}
+
+/// Closed form in the plane: the angle that maximises sum(t . R e) over centred positions is
+/// atan2(sum of cross products, sum of dot products).
+fn align_positions(estimate: &[Pose], truth: &[Pose]) -> Pose {
+    let (e0, t0) = (centroid(estimate), centroid(truth));
+    let (mut cross, mut dot) = (0.0, 0.0);
+    for (e, t) in estimate.iter().zip(truth) {
+        let (e, t) = (e.translation.vector - e0, t.translation.vector - t0);
+        cross += e.perp(&t);
+        dot += e.dot(&t);
+    }
+    let rotation = nalgebra::UnitComplex::new(cross.atan2(dot));
+    Pose::from_parts((t0 - rotation * e0).into(), rotation)
+}
+
+fn centroid(poses: &[Pose]) -> nalgebra::Vector2<f64> {
+    poses.iter().map(|p| p.translation.vector).sum::<nalgebra::Vector2<f64>>() / poses.len() as f64
+}
+
+fn distance_m(truth_from_estimate: &Pose, estimate: &Pose, truth: &Pose) -> f64 {
+    let aligned = truth_from_estimate * nalgebra::Point2::from(estimate.translation.vector);
+    (aligned.coords - truth.translation.vector).norm()
+}
+
+/// As `{ x_m, y_m, yaw_rad }`.
+fn serialize_isometry<S: Serializer>(pose: &Pose, serializer: S) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Planar {
+        x_m: f64,
+        y_m: f64,
+        yaw_rad: f64,
+    }
+    Planar { x_m: pose.translation.x, y_m: pose.translation.y, yaw_rad: pose.rotation.angle() }.serialize(serializer)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::pose;
+
+    #[test]
+    fn two_points_too_far_apart_share_the_excess() {
+        let at = |x| pose(x, 0.0, 0.0);
+        let matched = MatchedPoses::new(vec![at(10.0), at(14.0)], vec![at(-1.0), at(1.0)]).unwrap();
+        let ate = ate(&matched);
+        assert_eq!((ate.rmse_m, ate.mean_m, ate.max_m), (1.0, 1.0, 1.0));
+        assert_eq!(ate.truth_from_estimate, at(-12.0));
+    }
+
+    #[test]
+    fn an_estimate_that_stands_still_is_moved_but_not_turned() {
+        let truth: Vec<_> = (0..5).map(|k| pose(f64::from(k), 3.0, 1.0)).collect();
+        let matched = MatchedPoses::new(vec![Pose::identity(); 5], truth).unwrap();
+        assert_eq!(align(&matched), pose(2.0, 3.0, 0.0));
+        assert!((ate(&matched).rmse_m - 2f64.sqrt()).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,110 @@
+//! An evaluation as a person reads it.
+
+use std::fmt;
+
+use crate::{Coverage, Evaluation, Kitti, Rpe, Seg};
+
+impl fmt::Display for Evaluation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "association   {}", self.coverage)?;
+        writeln!(f, "axes          {}", self.axes)?;
+        writeln!(f, "path          {:.2} m, estimated {:.2} m", self.path_m, self.estimated_path_m)?;
+        match &self.kitti {
+            Some(kitti) => writeln!(f, "KITTI         {kitti}")?,
+            None => writeln!(f, "KITTI         none: {}", self.why_no_kitti())?,
+        }
+        match &self.seg {
+            Some(seg) => writeln!(f, "seg           {seg}")?,
+            None => writeln!(f, "seg           none: {TOO_SHORT}")?,
+        }
+        let ate = &self.ate;
+        writeln!(
+            f,
+            "ATE           {:.3} m rmse, {:.3} m mean, {:.3} m max, after SE(2) alignment",
+            ate.rmse_m, ate.mean_m, ate.max_m
+        )?;
+        match &self.rpe {
+            Some(rpe) => write!(f, "per pair      {rpe}")?,
+            None => write!(f, "per pair      none: the truth has no heading")?,
+        }
+        if f.alternate() { self.fmt_lengths(f) } else { Ok(()) }
+    }
+}
+
+const TOO_SHORT: &str = "no stretch of the path exceeds 100 m";
+
+impl Evaluation {
+    fn why_no_kitti(&self) -> String {
+        if self.axes.truth_lacks_heading {
+            "the truth has no heading; believe ATE and seg".to_owned()
+        } else {
+            format!("{TOO_SHORT}; see the errors per pair")
+        }
+    }
+
+    /// A line for each length that has stretches.
+    fn fmt_lengths(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Some(seg) = &self.seg else { return Ok(()) };
+        write!(f, "\n\n  length  stretches  translation    rotation     seg")?;
+        write!(f, "\n       m                        %   deg/100 m       %")?;
+        for (k, length) in seg.by_length.iter().enumerate() {
+            write!(f, "\n{:8.0} {:10}", length.length_m, length.stretches)?;
+            match self.kitti.as_ref().and_then(|kitti| kitti.by_length.get(k)) {
+                Some(kitti) => write!(f, " {:12.4} {:11.4}", kitti.translation_percent, kitti.rotation_deg_per_100m)?,
+                None => write!(f, " {:>12} {:>11}", "-", "-")?,
+            }
+            write!(f, " {:7.4}", length.percent)?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Coverage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let all = self.matched() + self.left_out();
+        match *self {
+            Coverage::Time { matched, outside_span, in_gaps, max_gap_ns } => write!(
+                f,
+                "by time: {matched} of {all} estimated poses; left out: {outside_span} outside the truth's span, \
+                 {in_gaps} in its gaps beyond {} s",
+                max_gap_ns as f64 * 1e-9
+            ),
+            Coverage::Index { matched, estimate_surplus, truth_surplus } => {
+                write!(f, "by index: {matched} of {all} estimated poses")?;
+                match (estimate_surplus, truth_surplus) {
+                    (0, 0) => write!(f, ", as many as the truth has"),
+                    (0, cut) => write!(f, "; the truth was cut by its last {cut}"),
+                    (cut, _) => write!(f, "; the estimate was cut by its last {cut}"),
+                }
+            }
+        }
+    }
+}
+
+impl fmt::Display for Kitti {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{:.5} % translation, {:.5} deg/100 m ({:.4} deg/km) rotation; {} stretches, step {}",
+            self.translation_percent, self.rotation_deg_per_100m, self.rotation_deg_per_km, self.stretches, self.step
+        )
+    }
+}
+
+impl fmt::Display for Seg {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.4} % of the length, each stretch aligned by itself", self.percent)
+    }
+}
+
+impl fmt::Display for Rpe {
+    /// Two lines, the second indented as the rows of an evaluation are.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "translation {:.4} m rmse, {:.4} m mean", self.translation_rmse_m, self.translation_mean_m)?;
+        if let Some(ratio) = self.forward_ratio {
+            write!(f, "; forward sum {ratio:.4} of the truth's")?;
+        }
+        let (rmse, mean, pairs) = (self.rotation_rmse_deg, self.rotation_mean_deg, self.pairs.len());
+        write!(f, "\n{:14}rotation {rmse:.4} deg rmse, {mean:.4} deg mean; {pairs} pairs", "")
+    }
+}

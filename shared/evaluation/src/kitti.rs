@@ -1,0 +1,109 @@
+//! The KITTI odometry errors: drift of translation and rotation over stretches of 100 to 800 m.
+
+use std::num::NonZeroUsize;
+
+use nalgebra::Complex;
+use serde::Serialize;
+
+use crate::{
+    MatchedPoses, Pose,
+    stretches::{PerLength, Stretch, stretches},
+};
+
+/// KITTI odometry errors, means over all stretches of all lengths.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Kitti {
+    /// Translation error, % of the nominal length.
+    pub translation_percent: f64,
+    /// Rotation error, degrees per 100 m.
+    pub rotation_deg_per_100m: f64,
+    /// The same in degrees per km, as the KITTI site's "deg/m" times 1000.
+    pub rotation_deg_per_km: f64,
+    /// Number of stretches in the means.
+    pub stretches: usize,
+    /// Poses between the starts of stretches.
+    pub step: NonZeroUsize,
+    /// The means of each length that has stretches, short lengths first.
+    pub by_length: Vec<KittiLength>,
+}
+
+/// KITTI errors of the stretches of one nominal length.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct KittiLength {
+    /// Nominal length, m.
+    pub length_m: f64,
+    /// Translation error, % of the nominal length.
+    pub translation_percent: f64,
+    /// Rotation error, degrees per 100 m.
+    pub rotation_deg_per_100m: f64,
+    /// Number of stretches in the means.
+    pub stretches: usize,
+}
+
+/// Measures the drift over every stretch that begins at every `step`-th pose; `None` where the path has no stretch
+/// beyond 100 m. No alignment: only motions within a stretch are compared.
+///
+/// `step` is 10 in the development kit (1 s of its lidar at 10 Hz); radar papers use 10 or 4 (1 s at 4 Hz).
+pub fn kitti(matched: &MatchedPoses, step: NonZeroUsize) -> Option<Kitti> {
+    let mut errors = PerLength::new();
+    for stretch in stretches(&matched.distance_m(), step) {
+        errors.add(stretch.length, stretch_error(matched, stretch));
+    }
+    let ([translation_percent, rotation_deg_per_100m], stretches) = errors.mean()?;
+    Some(Kitti {
+        translation_percent,
+        rotation_deg_per_100m,
+        rotation_deg_per_km: 10.0 * rotation_deg_per_100m,
+        stretches,
+        step,
+        by_length: errors.means().map(length_mean).collect(),
+    })
+}
+
+/// Translation error (%) and rotation error (deg/100 m) of one stretch.
+fn stretch_error(matched: &MatchedPoses, stretch: Stretch) -> [f64; 2] {
+    let estimated = Motion::within(matched.estimate(), stretch);
+    let error = estimated.to(&Motion::within(matched.truth(), stretch));
+    let per_100m = 100.0 / stretch.length_m();
+    [error.translation.norm() * per_100m, error.angle_rad().to_degrees() * per_100m]
+}
+
+/// A planar rigid motion in complex numbers: x -> rotation x + translation.
+///
+/// It is inverted by true division, not by conjugation, and its angle is an arc cosine, because the development kit
+/// inverts matrices and takes their trace. That matters in the fifth decimal of published figures only: files hold
+/// rotations to six decimals, so their length is 1 to six decimals too.
+struct Motion {
+    rotation: Complex<f64>,
+    translation: Complex<f64>,
+}
+
+impl Motion {
+    fn of(pose: &Pose) -> Self {
+        Self { rotation: *pose.rotation.complex(), translation: Complex::new(pose.translation.x, pose.translation.y) }
+    }
+
+    /// inverse(first) last.
+    fn within(poses: &[Pose], stretch: Stretch) -> Self {
+        Self::of(&poses[stretch.first]).to(&Self::of(&poses[stretch.last]))
+    }
+
+    /// inverse(self) other.
+    fn to(&self, other: &Self) -> Self {
+        Self {
+            rotation: other.rotation / self.rotation,
+            translation: (other.translation - self.translation) / self.rotation,
+        }
+    }
+
+    /// acos((trace - 1) / 2) of the rotation as a 3 x 3 matrix, whose trace is 1 + 2 cos.
+    fn angle_rad(&self) -> f64 {
+        self.rotation.re.clamp(-1.0, 1.0).acos()
+    }
+}
+
+fn length_mean(
+    (length_m, [translation_percent, rotation_deg_per_100m], stretches): (f64, [f64; 2], usize),
+) -> KittiLength {
+    KittiLength { length_m, translation_percent, rotation_deg_per_100m, stretches }
+}

@@ -1,0 +1,114 @@
+//! What all plots share: a fine grid of coordinates, a palette, a header with title, caption and legend.
+
+use plotters::{coord::Shift, prelude::*, style::text_anchor};
+
+use super::PlotError;
+
+/// An area of the SVG.
+pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+/// plotters places SVG points on whole pixels, which makes curves jagged. So everything is drawn this much larger,
+/// and the document shows it smaller.
+const FINENESS: u32 = 8;
+
+/// The estimate, and errors in general.
+pub const ESTIMATE: RGBColor = RGBColor(0, 98, 178);
+/// The truth.
+pub const TRUTH: RGBColor = RGBColor(120, 124, 130);
+/// Marks on top of lines.
+pub const MARK: RGBColor = RGBColor(213, 94, 0);
+/// Text.
+pub const INK: RGBColor = RGBColor(34, 38, 44);
+/// Text of less weight.
+pub const QUIET: RGBColor = RGBColor(96, 102, 110);
+/// Grid lines.
+pub const GRID: RGBColor = RGBColor(226, 229, 233);
+
+/// Height of the header, px.
+pub const HEADER: u32 = 84;
+
+/// A length in px of the shown document as units of the canvas.
+pub fn px(length: f64) -> u32 {
+    (length * f64::from(FINENESS)).round() as u32
+}
+
+/// A font of `size` px. The SVG back end divides sizes by 1.24; this undoes it.
+pub fn font(size: f64, colour: RGBColor) -> TextStyle<'static> {
+    ("sans-serif", 1.24 * size * f64::from(FINENESS)).into_font().color(&colour)
+}
+
+/// A line of `width` px.
+pub fn line(colour: RGBColor, width: f64) -> ShapeStyle {
+    colour.stroke_width(px(width))
+}
+
+/// Draws on a white document of `size` px and returns it.
+pub fn document(size: (u32, u32), draw: impl FnOnce(&Area<'_>) -> Result<(), PlotError>) -> Result<String, PlotError> {
+    let fine = (size.0 * FINENESS, size.1 * FINENESS);
+    let mut svg = String::new();
+    {
+        let area = SVGBackend::with_string(&mut svg, fine).into_drawing_area();
+        area.fill(&WHITE).map_err(drawing)?;
+        draw(&area)?;
+        area.present().map_err(drawing)?;
+    }
+    let as_drawn = format!("<svg width=\"{}\" height=\"{}\"", fine.0, fine.1);
+    let as_shown =
+        format!("<svg width=\"{}\" height=\"{}\" stroke-linejoin=\"round\" stroke-linecap=\"round\"", size.0, size.1);
+    Ok(svg.replacen(&as_drawn, &as_shown, 1))
+}
+
+/// One entry of a legend.
+pub struct Entry {
+    pub label: &'static str,
+    pub symbol: Symbol,
+}
+
+/// How a legend shows its entry.
+pub enum Symbol {
+    Line(ShapeStyle),
+    /// A dot of [`MARK`]'s colour.
+    Dot,
+}
+
+/// Title, caption below it, legend on the right.
+pub fn header(area: &Area<'_>, title: &str, caption: &str, legend: &[Entry]) -> Result<(), PlotError> {
+    let at = |x: f64, y: f64| (px(x) as i32, px(y) as i32);
+    area.draw(&Text::new(title.to_owned(), at(24.0, 18.0), font(20.0, INK))).map_err(drawing)?;
+    area.draw(&Text::new(caption.to_owned(), at(24.0, 48.0), font(14.0, QUIET))).map_err(drawing)?;
+    let label = font(14.0, INK).pos(text_anchor::Pos::new(text_anchor::HPos::Left, text_anchor::VPos::Center));
+    let width = f64::from(area.dim_in_pixel().0) / f64::from(FINENESS);
+    let mut x = width - 24.0 - legend.iter().map(entry_width).sum::<f64>();
+    for entry in legend {
+        match entry.symbol {
+            Symbol::Line(style) => area.draw(&PathElement::new([at(x, 28.0), at(x + 26.0, 28.0)], style)),
+            Symbol::Dot => area.draw(&dot(at(x + 18.0, 28.0))),
+        }
+        .map_err(drawing)?;
+        area.draw(&Text::new(entry.label, at(x + 33.0, 28.0), label.clone())).map_err(drawing)?;
+        x += entry_width(entry);
+    }
+    Ok(())
+}
+
+/// A mark at one place.
+pub fn dot<C>(at: C) -> Circle<C, u32> {
+    Circle::new(at, px(6.0), MARK.filled())
+}
+
+/// A tick's number without needless zeros.
+pub fn number(value: &f64) -> String {
+    let text = format!("{value:.3}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
+/// Room for an entry, px; a letter of a 14 px sans-serif font is about half as wide as it is high.
+fn entry_width(entry: &Entry) -> f64 {
+    33.0 + 7.6 * entry.label.len() as f64 + 14.0
+}
+
+/// The drawing library's error in ours.
+pub fn drawing<E: std::error::Error + Send + Sync>(error: DrawingAreaErrorKind<E>) -> PlotError {
+    PlotError::Draw(error.to_string())
+}

@@ -1,0 +1,145 @@
+//! The trajectory seen from above.
+
+use plotters::prelude::*;
+
+use super::{PlotError, canvas::*};
+use crate::{
+    MatchedPoses, Pose, Side, ate,
+    matched::{path_m, require_poses},
+};
+
+/// Largest plotting area, px.
+const LARGEST: (f64, f64) = (900.0, 720.0);
+/// Smallest plotting area, px, however thin the path: the header needs the width.
+const SMALLEST: (f64, f64) = (600.0, 260.0);
+/// Room for labels left of, and below, the plotting area; margin around all but the header, px.
+const LEFT: u32 = 84;
+const BELOW: u32 = 48;
+const MARGIN: u32 = 20;
+/// Free border around the paths, as a share of the larger extent.
+const BORDER: f64 = 0.06;
+/// Smallest extent shown, m.
+const LEAST_EXTENT_M: f64 = 1.0;
+
+/// The plot as an SVG document. With `matched`, its aligned estimate is drawn over its truth; `estimate` alone, in its
+/// own frame, without.
+///
+/// # Errors
+/// [`PlotError::Empty`], [`PlotError::Poses`] where a pose is none, [`PlotError::Draw`].
+pub fn trajectory_svg(estimate: &[Pose], matched: Option<&MatchedPoses>) -> Result<String, PlotError> {
+    require_poses(Side::Estimate, estimate)?;
+    let scene = Scene::new(estimate, matched);
+    let view = View::around(scene.estimate.iter().chain(scene.truth.iter().flatten())).ok_or(PlotError::Empty)?;
+    let size = (view.width_px + LEFT + 2 * MARGIN, view.height_px + BELOW + HEADER + MARGIN);
+    document(size, |area| {
+        header(area, scene.title, &scene.caption, &scene.legend())?;
+        draw(area, &scene, &view)
+    })
+}
+
+/// What is drawn, positions in m.
+struct Scene {
+    estimate: Vec<(f64, f64)>,
+    truth: Option<Vec<(f64, f64)>>,
+    title: &'static str,
+    caption: String,
+}
+
+impl Scene {
+    fn new(estimate: &[Pose], matched: Option<&MatchedPoses>) -> Self {
+        let Some(matched) = matched else {
+            let caption = format!("{} poses, {:.1} m", estimate.len(), path_m(estimate));
+            return Self { estimate: positions(estimate), truth: None, title: "Trajectory", caption };
+        };
+        let ate = ate(matched);
+        let aligned: Vec<_> = matched.estimate().iter().map(|p| ate.truth_from_estimate * p).collect();
+        Self {
+            estimate: positions(&aligned),
+            truth: Some(positions(matched.truth())),
+            title: "Trajectory against ground truth",
+            caption: format!("estimate moved onto the truth by SE(2) alignment; ATE {:.2} m rmse", ate.rmse_m),
+        }
+    }
+
+    fn legend(&self) -> Vec<Entry> {
+        let mut legend = vec![Entry { label: "estimate", symbol: Symbol::Line(line(ESTIMATE, 2.0)) }];
+        if self.truth.is_some() {
+            legend.insert(0, Entry { label: "truth", symbol: Symbol::Line(line(TRUTH, 4.0)) });
+        }
+        legend.push(Entry { label: "start", symbol: Symbol::Dot });
+        legend
+    }
+}
+
+fn positions(poses: &[Pose]) -> Vec<(f64, f64)> {
+    poses.iter().map(|p| (p.translation.x, p.translation.y)).collect()
+}
+
+/// The part of the plane that is shown, at the same scale both ways.
+struct View {
+    x_m: (f64, f64),
+    y_m: (f64, f64),
+    width_px: u32,
+    height_px: u32,
+}
+
+impl View {
+    /// Shows all `points`; `None` where there are none.
+    fn around<'a>(points: impl Iterator<Item = &'a (f64, f64)>) -> Option<Self> {
+        let grow = |b: [f64; 4], p: &(f64, f64)| [b[0].min(p.0), b[1].max(p.0), b[2].min(p.1), b[3].max(p.1)];
+        let [left, right, low, high] = points.fold(None, |b, p| Some(grow(b.unwrap_or([p.0, p.0, p.1, p.1]), p)))?;
+        let border = BORDER * (right - left).max(high - low).max(LEAST_EXTENT_M);
+        let (width_m, height_m) = (right - left + 2.0 * border, high - low + 2.0 * border);
+        let px_per_m = (LARGEST.0 / width_m).min(LARGEST.1 / height_m);
+        let shown = |extent_m: f64, smallest: f64| (extent_m * px_per_m).max(smallest).round();
+        let (width, height) = (shown(width_m, SMALLEST.0), shown(height_m, SMALLEST.1));
+        let about = |from: f64, to: f64, px: f64| {
+            let (centre, half) = (0.5 * (from + to), 0.5 * px / px_per_m);
+            (centre - half, centre + half)
+        };
+        Some(Self {
+            x_m: about(left, right, width),
+            y_m: about(low, high, height),
+            width_px: width as u32,
+            height_px: height as u32,
+        })
+    }
+}
+
+fn draw(area: &Area<'_>, scene: &Scene, view: &View) -> Result<(), PlotError> {
+    let below_header = area.split_vertically(px(f64::from(HEADER))).1;
+    let mut chart = ChartBuilder::on(&below_header)
+        .margin_left(px(f64::from(MARGIN)))
+        .margin_right(px(f64::from(MARGIN)))
+        .margin_bottom(px(f64::from(MARGIN)))
+        .set_label_area_size(LabelAreaPosition::Left, px(f64::from(LEFT)))
+        .set_label_area_size(LabelAreaPosition::Bottom, px(f64::from(BELOW)))
+        .build_cartesian_2d(view.x_m.0..view.x_m.1, view.y_m.0..view.y_m.1)
+        .map_err(drawing)?;
+    // about one tick in 90 px, on both axes alike
+    let ticks = |px: u32| (px / 90).max(2) as usize;
+    chart
+        .configure_mesh()
+        .max_light_lines(0)
+        .bold_line_style(line(GRID, 1.0))
+        .axis_style(line(QUIET, 1.0))
+        .set_all_tick_mark_size(px(5.0))
+        .x_labels(ticks(view.width_px))
+        .y_labels(ticks(view.height_px))
+        .x_label_formatter(&number)
+        .y_label_formatter(&number)
+        .label_style(font(14.0, INK))
+        .axis_desc_style(font(15.0, INK))
+        .x_desc("x (m)")
+        .y_desc("y (m)")
+        .draw()
+        .map_err(drawing)?;
+    if let Some(truth) = &scene.truth {
+        chart.draw_series(LineSeries::new(truth.iter().copied(), line(TRUTH, 4.0))).map_err(drawing)?;
+    }
+    chart.draw_series(LineSeries::new(scene.estimate.iter().copied(), line(ESTIMATE, 2.0))).map_err(drawing)?;
+    if let Some(&start) = scene.estimate.first() {
+        chart.draw_series([dot(start)]).map_err(drawing)?;
+    }
+    Ok(())
+}

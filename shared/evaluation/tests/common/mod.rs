@@ -1,0 +1,37 @@
+//! Drives for tests.
+#![allow(dead_code)] // no test uses all of it
+
+use gyre_evaluation::Pose;
+use proptest::prelude::*;
+
+/// The pose (x, y, yaw).
+pub fn pose(x_m: f64, y_m: f64, yaw_rad: f64) -> Pose {
+    Pose::new(nalgebra::Vector2::new(x_m, y_m), yaw_rad)
+}
+
+/// Chains motions from `start`.
+pub fn chain(start: Pose, motions: impl IntoIterator<Item = Pose>) -> Vec<Pose> {
+    let mut here = start;
+    let mut poses = vec![here];
+    for motion in motions {
+        here *= motion;
+        poses.push(here);
+    }
+    poses
+}
+
+/// A drive of `n` motions of 2.37 m (no stretch ends on a whole number of them) with bends that repeat every `bend` motions, more to the left.
+pub fn drive(n: usize, bend: f64) -> Vec<Pose> {
+    let turn = |k: usize| 0.03 * (k as f64 * std::f64::consts::TAU / bend).sin() + 0.003;
+    chain(pose(7.0, -3.0, 0.4), (0..n).map(|k| pose(2.37, 0.0, turn(k))))
+}
+
+/// The size and bends of any [`drive`] between 150 m and 1.2 km.
+pub fn any_drive() -> impl Strategy<Value = (usize, f64)> {
+    (60usize..480, 40.0..200.0)
+}
+
+/// Any planar motion within a few kilometres.
+pub fn any_pose() -> impl Strategy<Value = Pose> {
+    (-3000.0..3000.0, -3000.0..3000.0, -3.2..3.2).prop_map(|(x, y, yaw)| pose(x, y, yaw))
+}

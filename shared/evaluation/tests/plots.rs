@@ -1,0 +1,88 @@
+//! The SVG documents.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::{drive, pose};
+use gyre_evaluation::{
+    Association, Evaluation, Options, PlotError, Pose, Trajectory, evaluate,
+    plot::{errors_svg, trajectory_svg},
+    plot_errors, plot_trajectory,
+};
+
+fn evaluation(n: usize) -> Evaluation {
+    let truth = drive(n, 120.0);
+    let moved_by = pose(50.0, 20.0, 1.0);
+    let estimate: Vec<_> = truth.iter().map(|p| moved_by * p).collect();
+    let options = Options { association: Association::Index, ..Options::default() };
+    evaluate(Trajectory::untimed(&estimate), Trajectory::untimed(&truth), &options).unwrap()
+}
+
+/// The points of the polylines with `colour`, in canvas units.
+fn polyline(svg: &str, colour: &str) -> Vec<(f64, f64)> {
+    let line =
+        svg.lines().filter(|l| l.starts_with("<polyline") && l.contains(colour)).max_by_key(|l| l.len()).unwrap();
+    let points = line.split("points=\"").nth(1).unwrap().split('"').next().unwrap();
+    let point = |p: &str| {
+        let (x, y) = p.split_once(',').unwrap();
+        (x.parse().unwrap(), y.parse().unwrap())
+    };
+    points.split_whitespace().map(point).collect()
+}
+
+const ESTIMATE: &str = "#0062B2";
+const TRUTH: &str = "#787C82";
+
+#[test]
+fn axes_are_equal_and_y_points_up() {
+    for side in [(30.0, 30.0), (400.0, 3.0), (2.0, 900.0)] {
+        let corners = [(0.0, 0.0), (side.0, 0.0), (side.0, side.1)].map(|(x, y)| pose(x, y, 0.0));
+        let points = polyline(&trajectory_svg(&corners, None).unwrap(), ESTIMATE);
+        let (right, up) = (points[1].0 - points[0].0, points[1].1 - points[2].1);
+        assert!((right / side.0 - up / side.1).abs() * side.0.min(side.1) < 2.5, "{side:?}: {right} {up}");
+    }
+}
+
+#[test]
+fn an_estimate_in_another_frame_is_drawn_on_its_truth() {
+    let e = evaluation(200);
+    let svg = trajectory_svg(e.matched.estimate(), Some(&e.matched)).unwrap();
+    let (estimate, truth) = (polyline(&svg, ESTIMATE), polyline(&svg, TRUTH));
+    assert_eq!(estimate.len(), truth.len());
+    assert!(estimate.iter().zip(&truth).all(|(a, b)| (a.0 - b.0).abs() <= 1.0 && (a.1 - b.1).abs() <= 1.0));
+    assert!(svg.contains("SE(2) alignment") && svg.contains("start") && svg.contains("truth"));
+}
+
+#[test]
+fn long_paths_plot_errors_over_length_and_short_ones_over_pairs() {
+    let long = errors_svg(&evaluation(400)).unwrap();
+    assert!(long.contains("stretch length (m)") && long.contains("rotation (deg/100 m)"));
+    let short = errors_svg(&evaluation(20)).unwrap();
+    assert!(short.contains("distance travelled (m)") && short.contains("too short"));
+}
+
+#[test]
+fn nothing_to_draw_and_unwritable_files_are_errors() {
+    assert!(matches!(trajectory_svg(&[], None), Err(PlotError::Empty)));
+    let lost = std::path::Path::new("no-such-folder/plot.svg");
+    assert!(matches!(plot_trajectory(lost, &drive(5, 10.0), None), Err(PlotError::Write { .. })));
+    assert!(matches!(plot_errors(lost, &evaluation(50)), Err(PlotError::Write { .. })));
+    let (a, b) = (drive(5, 10.0), drive(6, 10.0));
+    assert!(matches!(plot_trajectory(lost, &a, Some(&b)), Err(PlotError::Poses(_))));
+    let nowhere = [pose(f64::NAN, 0.0, 0.0)];
+    assert!(matches!(plot_trajectory(lost, &nowhere, None), Err(PlotError::Poses(_))));
+}
+
+#[test]
+fn a_single_pose_and_a_standing_radar_are_drawn() {
+    assert!(trajectory_svg(&[Pose::identity()], None).is_ok());
+    assert!(trajectory_svg(&[Pose::identity(); 9], None).is_ok());
+}
+
+#[test]
+fn paths_far_from_the_origin_and_of_any_extent_are_drawn() {
+    for extent in [1e-9, 1.0, 1e4, 1e9] {
+        let far = [pose(1e9 - extent, -1e9, 0.0), pose(1e9, extent - 1e9, 0.0)];
+        assert!(trajectory_svg(&far, None).unwrap().contains("<polyline"));
+    }
+}

@@ -1,0 +1,188 @@
+//! What holds of the metrics for any drive.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::num::NonZeroUsize;
+
+use common::{any_drive, any_pose, chain, drive, pose};
+use gyre_evaluation::{
+    Association, Evaluation, MatchedPoses, Options, Pose, STRETCH_LENGTHS_M, Trajectory, align, ate, evaluate, kitti,
+    rpe, seg,
+};
+use proptest::prelude::*;
+
+/// What an arc cosine near 1 makes of rounding, degrees: the square root of some hundred ulps.
+const ARC_COSINE_DEG: f64 = 3e-5;
+
+fn step(step: usize) -> NonZeroUsize {
+    NonZeroUsize::new(step).unwrap()
+}
+
+fn matched(estimate: &[Pose], truth: &[Pose]) -> MatchedPoses {
+    MatchedPoses::new(estimate.to_vec(), truth.to_vec()).unwrap()
+}
+
+/// Motions between neighbours, each passed through `change`, chained anew.
+fn rechained(poses: &[Pose], change: impl Fn(usize, Pose) -> Pose) -> Vec<Pose> {
+    let motions = poses.windows(2).enumerate().map(|(k, w)| change(k, w[0].inv_mul(&w[1])));
+    chain(poses[0], motions.collect::<Vec<_>>())
+}
+
+/// Slow, plain KITTI: walks to each end and uses 3 x 3 matrices. Translation %, deg/100 m, count.
+fn kitti_by_walking(estimate: &[Pose], truth: &[Pose], step: usize) -> (f64, f64, usize) {
+    let (mut translation, mut rotation, mut n) = (0.0, 0.0, 0);
+    for first in (0..truth.len()).step_by(step) {
+        for length in STRETCH_LENGTHS_M {
+            let (mut travelled, mut last) = (0.0, first);
+            while travelled <= length && last + 1 < truth.len() {
+                travelled += (truth[last + 1].translation.vector - truth[last].translation.vector).norm();
+                last += 1;
+            }
+            if travelled <= length {
+                continue;
+            }
+            let motion = |p: &[Pose]| p[first].to_homogeneous().try_inverse().unwrap() * p[last].to_homogeneous();
+            let error = motion(estimate).try_inverse().unwrap() * motion(truth);
+            translation += error[(0, 2)].hypot(error[(1, 2)]) / length;
+            rotation += error[(1, 0)].atan2(error[(0, 0)]).abs() / length;
+            n += 1;
+        }
+    }
+    (100.0 * translation / n as f64, 100.0 * rotation.to_degrees() / n as f64, n)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(48) })]
+
+    #[test]
+    fn a_moved_copy_has_no_error((n, bend) in any_drive(), moved_by in any_pose()) {
+        let truth = drive(n, bend);
+        let estimate: Vec<_> = truth.iter().map(|p| moved_by * p).collect();
+        let m = matched(&estimate, &truth);
+        prop_assert!(ate(&m).max_m < 1e-8);
+        prop_assert!(seg(&m, step(5)).unwrap().percent < 1e-8);
+        let (kitti, rpe) = (kitti(&m, step(5)).unwrap(), rpe(&m));
+        prop_assert!(kitti.translation_percent < 1e-8 && kitti.rotation_deg_per_100m < ARC_COSINE_DEG);
+        prop_assert!(rpe.translation_rmse_m < 1e-8 && rpe.rotation_rmse_deg < 1e-8);
+    }
+
+    #[test]
+    fn the_alignment_undoes_the_motion_of_a_copy((n, bend) in any_drive(), moved_by in any_pose()) {
+        let truth = drive(n, bend);
+        let estimate: Vec<_> = truth.iter().map(|p| moved_by * p).collect();
+        let round_trip = align(&matched(&estimate, &truth)) * moved_by;
+        prop_assert!(round_trip.translation.vector.norm() < 1e-7);
+        prop_assert!(round_trip.rotation.angle().abs() < 1e-10);
+    }
+
+    #[test]
+    fn no_nearby_rigid_motion_aligns_better((n, bend) in any_drive(), by in any_pose(), dx in -0.5..0.5, dy in -0.5..0.5, turn in -0.02..0.02) {
+        let truth = drive(n, bend);
+        let estimate: Vec<_> = truth.iter().enumerate()
+            .map(|(k, p)| by * pose((k as f64).sin(), (3.0 * k as f64).cos(), 0.0) * p).collect();
+        let m = matched(&estimate, &truth);
+        let best = ate(&m);
+        let other = pose(dx, dy, turn) * best.truth_from_estimate;
+        let square = |(e, t): (&Pose, &Pose)| ((other * e).translation.vector - t.translation.vector).norm_squared();
+        let rmse = (m.iter().map(square).sum::<f64>() / m.len() as f64).sqrt();
+        prop_assert!(rmse >= best.rmse_m - 1e-9);
+    }
+
+    #[test]
+    fn kitti_equals_the_plain_walk((n, bend) in any_drive(), every in 1usize..12, scale in 0.95..1.05, bias in -0.002..0.002) {
+        let truth = drive(n, bend);
+        let estimate = rechained(&truth, |k, m| pose(
+            scale * m.translation.x, 0.1 * (k as f64).sin(), m.rotation.angle() + bias));
+        let fast = kitti(&matched(&estimate, &truth), step(every)).unwrap();
+        let (translation, rotation, stretches) = kitti_by_walking(&estimate, &truth, every);
+        prop_assert!((fast.translation_percent - translation).abs() < 1e-8);
+        prop_assert!((fast.rotation_deg_per_100m - rotation).abs() < ARC_COSINE_DEG);
+        prop_assert_eq!(fast.stretches, stretches);
+        let weighted = |value: fn(&kitti::KittiLength) -> f64| fast.by_length.iter()
+            .map(|l| value(l) * l.stretches as f64).sum::<f64>() / fast.stretches as f64;
+        prop_assert!((weighted(|l| l.translation_percent) - translation).abs() < 1e-8);
+        prop_assert!((weighted(|l| l.rotation_deg_per_100m) - rotation).abs() < ARC_COSINE_DEG);
+    }
+
+    #[test]
+    fn a_scale_error_on_a_straight_is_the_translation_error(percent in -5.0..5.0f64) {
+        // steps of 1/8 m are exact in binary, so each stretch ends 1/8 m beyond its length
+        let line = |scale: f64| (0..8000).map(|k| pose(0.125 * f64::from(k) * scale, 0.0, 0.0)).collect::<Vec<_>>();
+        let m = matched(&line(1.0 + percent / 100.0), &line(1.0));
+        let result = kitti(&m, step(100)).unwrap();
+        for l in &result.by_length {
+            let expected = percent.abs() * (l.length_m + 0.125) / l.length_m;
+            prop_assert!((l.translation_percent - expected).abs() < 1e-9);
+        }
+        prop_assert!(result.rotation_deg_per_100m < 1e-12);
+        prop_assert!((rpe(&m).forward_ratio.unwrap() - (1.0 + percent / 100.0)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_steady_yaw_drift_is_the_rotation_error(deg_per_100m in -3.0..3.0f64) {
+        let truth: Vec<_> = (0..4000).map(|k| pose(0.25 * f64::from(k), 0.0, 0.0)).collect();
+        let per_step = (deg_per_100m / 400.0).to_radians();
+        let estimate = rechained(&truth, |_, m| m * Pose::rotation(per_step));
+        let result = kitti(&matched(&estimate, &truth), step(40)).unwrap();
+        for l in &result.by_length {
+            let expected = deg_per_100m.abs() * (l.length_m + 0.25) / l.length_m;
+            prop_assert!((l.rotation_deg_per_100m - expected).abs() < ARC_COSINE_DEG);
+        }
+        prop_assert!((result.rotation_deg_per_km - 10.0 * result.rotation_deg_per_100m).abs() < 1e-12);
+    }
+
+    #[test]
+    fn seg_and_ate_do_not_look_at_headings((n, bend) in any_drive(), bias in -3.0..3.0) {
+        let truth = drive(n, bend);
+        let noisy = rechained(&truth, |k, m| m * Pose::rotation(0.001 * (k as f64).sin()));
+        let turned: Vec<_> = noisy.iter().map(|p| p * Pose::rotation(bias)).collect();
+        let (a, b) = (matched(&noisy, &truth), matched(&turned, &truth));
+        prop_assert_eq!(seg(&a, step(7)), seg(&b, step(7)));
+        prop_assert_eq!(ate(&a), ate(&b));
+    }
+
+    #[test]
+    fn a_mirrored_copy_is_found_and_judged_like_the_original((n, bend) in any_drive(), moved_by in any_pose(), bias in -0.0005..0.0005) {
+        let truth = drive(n, bend);
+        let estimate = rechained(&truth, |_, m| m * Pose::rotation(bias));
+        let mirrored: Vec<_> = estimate.iter()
+            .map(|p| moved_by * pose(p.translation.x, -p.translation.y, -p.rotation.angle())).collect();
+        let judge = |estimate: &[Pose]| {
+            let options = Options { association: Association::Index, ..Options::default() };
+            evaluate(Trajectory::untimed(estimate), Trajectory::untimed(&truth), &options).unwrap()
+        };
+        let (plain, found): (Evaluation, Evaluation) = (judge(&estimate), judge(&mirrored));
+        prop_assert!(!plain.axes.y_negated && !plain.axes.heading_negated);
+        prop_assert!(found.axes.y_negated && found.axes.heading_negated);
+        prop_assert!((plain.ate.rmse_m - found.ate.rmse_m).abs() < 1e-7);
+        let translation = |e: &Evaluation| e.kitti.as_ref().unwrap().translation_percent;
+        prop_assert!((translation(&plain) - translation(&found)).abs() < 1e-7);
+    }
+}
+
+#[test]
+fn interpolation_finds_a_finer_truth_at_the_estimates_stamps() {
+    let truth = drive(300, 100.0);
+    let truth_ns: Vec<i64> = (0..301).map(|k| k * 250_000_000).collect();
+    let (estimate, estimate_ns): (Vec<_>, Vec<_>) =
+        truth.iter().zip(&truth_ns).step_by(2).map(|(p, t)| (*p, *t)).unzip();
+    let evaluation =
+        evaluate(Trajectory::new(&estimate_ns, &estimate), Trajectory::new(&truth_ns, &truth), &Options::default())
+            .unwrap();
+    assert_eq!(evaluation.coverage.matched(), 151);
+    assert!(evaluation.ate.max_m < 1e-9);
+}
+
+#[test]
+fn a_path_below_100_m_says_so_and_keeps_the_errors_per_pair() {
+    let truth = drive(30, 50.0);
+    let estimate = rechained(&truth, |_, m| m * pose(0.1, 0.0, 0.0));
+    let options = Options { association: Association::Index, ..Options::default() };
+    let evaluation = evaluate(Trajectory::untimed(&estimate), Trajectory::untimed(&truth), &options).unwrap();
+    assert!(evaluation.kitti.is_none() && evaluation.seg.is_none());
+    assert!((evaluation.rpe.as_ref().unwrap().translation_rmse_m - 0.1).abs() < 1e-9);
+    let table = evaluation.to_string();
+    assert!(table.contains("no stretch of the path exceeds 100 m; see the errors per pair"), "{table}");
+    assert!(table.contains("translation 0.1000 m rmse"), "{table}");
+}

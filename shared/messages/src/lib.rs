@@ -1,0 +1,37 @@
+//! What Gyre's processes say to each other.
+//!
+//! Each message is a fixed header and a slice of 64-byte aligned elements, on a topic of its own:
+//!
+//! | topic | header | payload |
+//! |---|---|---|
+//! | `scan` | [`ScanHeader`] | the sweep's bytes, in [`ByteBlock`]s |
+//! | `masked` | [`MaskedHeader`] | one or two rasters, in [`FloatBlock`]s |
+//! | `rotation` | [`RotationHeader`] | empty (later: the polar spectrum) |
+//! | `motion` | [`MotionHeader`] | empty |
+//! | `pose` | [`PoseHeader`] | empty |
+//!
+//! All of them start with an [`Item`]: which scan this is, what it follows, and when each process had it.
+//! A type's name carries its version, so that two builds that disagree refuse each other instead of misreading.
+
+// Sharing a type between processes is a promise that the compiler cannot check; each `unsafe impl` here says why it holds.
+#![allow(unsafe_code)]
+
+mod block;
+mod item;
+mod limits;
+mod masked;
+mod motion;
+mod pose;
+mod rotation;
+mod scan;
+mod topic;
+
+pub use block::{ByteBlock, FloatBlock};
+pub use item::{Hop, Hops, Item, Stage, flag};
+pub use limits::{Footprint, Limits, MAX_NODES, TopicSizes, Window, WindowError};
+pub use masked::{Masked, MaskedHeader, Pair, mask_kind};
+pub use motion::{Motion, MotionEstimate, MotionHeader};
+pub use pose::{Pose, PoseHeader};
+pub use rotation::{Rotation, RotationEstimate, RotationHeader};
+pub use scan::{Scan, ScanHeader};
+pub use topic::{Header, Message, TOPICS};

@@ -1,0 +1,191 @@
+//! The window, and from it every queue, history and segment: memory is bounded and known before the first scan.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::{ByteBlock, FloatBlock, MaskedHeader, MotionHeader, PoseHeader, RotationHeader, ScanHeader, TOPICS};
+
+/// Processes that may open a topic at once; one that just died counts until it has been cleaned up.
+pub const MAX_NODES: usize = 16;
+/// Samples that a reader may hold: the scan before, the one at hand, one in passing.
+const BORROWED: usize = 3;
+/// Samples that a publisher fills at once.
+const LOANED: usize = 1;
+/// What the transport puts before each sample, and rounding, bytes.
+const SAMPLE_OVERHEAD: usize = 192;
+
+/// How many scans may be on their way, and what the stages look back at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Window {
+    /// Most scans between admission and their pose (W).
+    pub scans: usize,
+    /// Motion compensation of scan k uses the motion of scan k - lag (L); 0 where there is none.
+    pub lag: usize,
+    /// Scans before k that the work on k needs, along the longest path (LB).
+    pub look_back: usize,
+    /// Scans that the source keeps for a live masking stage; 0 in lossless mode.
+    pub live_depth: usize,
+}
+
+/// A window that cannot work.
+#[derive(Debug, Error, PartialEq, Eq)]
+pub enum WindowError {
+    /// Too small or too large.
+    #[error("run.window is {0}, but it must be at least 1 and at most 64 scans")]
+    Scans(usize),
+    /// The transport counts lags in a small ring.
+    #[error("masking.lag is {0}, but it must be at most 16 scans")]
+    Lag(usize),
+}
+
+/// Sizes of one topic's queues.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TopicSizes {
+    /// Samples that a publisher keeps for readers that come later.
+    pub history: usize,
+    /// Samples that wait in a reader's queue.
+    pub buffer: usize,
+    /// Samples that a reader may hold.
+    pub borrowed: usize,
+    /// Samples that the publisher may fill at once.
+    pub loaned: usize,
+    /// Readers.
+    pub subscribers: usize,
+}
+
+impl TopicSizes {
+    /// Samples in the publisher's segment.
+    pub fn chunks(&self) -> usize {
+        self.subscribers * (self.buffer + self.borrowed) + self.history + self.loaned
+    }
+}
+
+impl Window {
+    /// Checks the limits.
+    pub fn validate(&self) -> Result<(), WindowError> {
+        if !(1..=64).contains(&self.scans) {
+            return Err(WindowError::Scans(self.scans));
+        }
+        if self.lag > 16 {
+            return Err(WindowError::Lag(self.lag));
+        }
+        Ok(())
+    }
+
+    /// Sizes of a topic's queues. A restarted reader first gets the history, and what was already past it can still
+    /// finish and let `scans` new ones in: so a queue is longer than the history by the window.
+    pub fn sizes(&self, topic: &str) -> TopicSizes {
+        let data = self.scans + self.look_back;
+        let feedback = data + self.scans + self.lag + 1;
+        let (history, subscribers) = match topic {
+            "scan" => (data, 1),
+            "masked" => (data, 2),
+            "rotation" => (data, 1),
+            "motion" => (feedback, 2),
+            _ => (feedback, 3),
+        };
+        let sizes = TopicSizes { history, buffer: history + self.scans, borrowed: BORROWED, loaned: LOANED, subscribers };
+        match topic {
+            "scan" if self.live_depth > 0 => {
+                let depth = self.live_depth.max(data);
+                TopicSizes { history: depth, buffer: depth, borrowed: depth + 1, ..sizes }
+            }
+            _ => sizes,
+        }
+    }
+}
+
+/// The largest message of each kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Limits {
+    /// Bytes of a scan's image.
+    pub scan_bytes: usize,
+    /// Cells of one raster.
+    pub raster_cells: usize,
+    /// Rasters in a `masked` message: 1 or 2.
+    pub rasters: usize,
+}
+
+impl Limits {
+    /// Longest payload of a topic, in its elements.
+    pub fn elements(&self, topic: &str) -> usize {
+        match topic {
+            "scan" => ByteBlock::count(self.scan_bytes),
+            "masked" => self.rasters * FloatBlock::count(self.raster_cells),
+            _ => 1,
+        }
+    }
+
+    fn sample_bytes(&self, topic: &str) -> usize {
+        let header = match topic {
+            "scan" => size_of::<ScanHeader>(),
+            "masked" => size_of::<MaskedHeader>(),
+            "rotation" => size_of::<RotationHeader>(),
+            "motion" => size_of::<MotionHeader>(),
+            _ => size_of::<PoseHeader>(),
+        };
+        SAMPLE_OVERHEAD + header + self.elements(topic) * 64
+    }
+}
+
+/// How much shared memory a run needs.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Footprint {
+    /// Bytes of each topic's segment when all of it is in use, by topic.
+    pub segments: Vec<(&'static str, usize)>,
+}
+
+impl Footprint {
+    /// The footprint of a window and its largest messages.
+    pub fn new(window: &Window, limits: &Limits) -> Self {
+        let segment = |topic| (topic, window.sizes(topic).chunks() * limits.sample_bytes(topic));
+        Self { segments: TOPICS.map(segment).to_vec() }
+    }
+
+    /// Bytes of all segments.
+    pub fn total(&self) -> usize {
+        self.segments.iter().map(|(_, bytes)| bytes).sum()
+    }
+}
+
+impl fmt::Display for Footprint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.1} MB of shared memory at most (", self.total() as f64 / 1e6)?;
+        for (i, (topic, bytes)) in self.segments.iter().enumerate() {
+            write!(f, "{}{topic} {:.1}", if i == 0 { "" } else { ", " }, *bytes as f64 / 1e6)?;
+        }
+        write!(f, ")")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WINDOW: Window = Window { scans: 4, lag: 2, look_back: 1, live_depth: 0 };
+
+    #[test]
+    fn queues_hold_the_history_and_a_window_more() {
+        let scan = WINDOW.sizes("scan");
+        assert_eq!((scan.history, scan.buffer, scan.chunks()), (5, 9, 18));
+        let masked = WINDOW.sizes("masked");
+        assert_eq!(masked.chunks(), 30);
+        let pose = WINDOW.sizes("pose");
+        assert_eq!((pose.history, pose.buffer), (12, 16));
+    }
+
+    #[test]
+    fn the_footprint_of_oxford_at_255_is_what_was_measured_with_such_sizes() {
+        let limits = Limits { scan_bytes: 400 * 3779, raster_cells: 255 * 255, rasters: 2 };
+        let total = Footprint::new(&WINDOW, &limits).total();
+        assert!((42_000_000..46_000_000).contains(&total), "{total}");
+    }
+
+    #[test]
+    fn a_window_of_nothing_is_refused() {
+        assert_eq!(Window { scans: 0, ..WINDOW }.validate(), Err(WindowError::Scans(0)));
+        assert!(WINDOW.validate().is_ok());
+    }
+}

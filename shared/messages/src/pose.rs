@@ -1,0 +1,32 @@
+//! `pose`: where the vehicle is, and the credit that lets a new scan in.
+
+use bytemuck::{Pod, Zeroable};
+use iceoryx2::prelude::ZeroCopySend;
+
+use crate::{FloatBlock, Item, MotionEstimate, topic::message};
+
+message! {
+    /// The trajectory's newest pose. Its `seq` is the credit that admits scan `seq + W`.
+    Pose, "pose", PoseHeader, FloatBlock
+}
+
+/// A pose in the frame of the first scan, with the motion that led to it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
+#[type_name("gyre_pose_header_v1")]
+pub struct PoseHeader {
+    /// Which scan this is.
+    pub item: Item,
+    /// The motion from the scan before.
+    pub motion: MotionEstimate,
+    /// Forward, m.
+    pub x_m: f64,
+    /// To the left, m.
+    pub y_m: f64,
+    /// Counter-clockwise, rad, in (-pi, pi].
+    pub yaw_rad: f64,
+    /// Covariance of (x, y, yaw) in the frame of the first scan; upper triangle by rows.
+    pub covariance: [f64; 6],
+    /// Counts corrections of the whole trajectory (loop closing); 0 as long as poses are motions composed.
+    pub trajectory_version: u64,
+}

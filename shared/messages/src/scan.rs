@@ -1,0 +1,118 @@
+//! `scan`: one sweep as the sensor gave it.
+
+use bytemuck::Zeroable;
+use gyre_radar::{MAX_AZIMUTHS, PolarScan, ScanSlot, Sense, SweepGeometry};
+use iceoryx2::prelude::ZeroCopySend;
+
+use crate::{ByteBlock, Item, topic::message};
+
+message! {
+    /// A sweep: the power of azimuth `a` at range bin `b` is byte `first_byte + a * stride + b` of the payload.
+    Scan, "scan", ScanHeader, ByteBlock
+}
+
+/// A sweep's geometry and the angle and time of each azimuth, as measured.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Zeroable, ZeroCopySend)]
+#[type_name("gyre_scan_header_v1")]
+pub struct ScanHeader {
+    /// Which scan this is.
+    pub item: Item,
+    /// Rows.
+    pub azimuths: u32,
+    /// Range bins of a row.
+    pub bins: u32,
+    /// Bytes from one row's first bin to the next row's.
+    pub stride: u32,
+    /// The first row's first bin.
+    pub first_byte: u32,
+    /// Metres a range bin.
+    pub range_resolution_m: f32,
+    /// Bin `b`'s centre is at `(b + 0.5) * range_resolution_m + range_offset_m`.
+    pub range_offset_m: f32,
+    /// 1 where azimuths grow clockwise seen from above, else 0.
+    pub clockwise: u32,
+    /// Unused, zero.
+    pub reserved: u32,
+    /// Time of each row, ns since 1970.
+    pub azimuth_stamp_ns: [i64; MAX_AZIMUTHS],
+    /// Angle of each row from straight ahead, radians in [0, 2 pi).
+    pub azimuth_rad: [f32; MAX_AZIMUTHS],
+    /// What is known of each row: see `gyre_radar::scan::flag`.
+    pub azimuth_flags: [u8; MAX_AZIMUTHS],
+}
+
+impl Default for ScanHeader {
+    fn default() -> Self {
+        Self::zeroed()
+    }
+}
+
+impl ScanHeader {
+    /// The scan in this header and its payload's bytes; `None` where they do not fit each other.
+    pub fn view<'a>(&'a self, bytes: &'a [u8]) -> Option<PolarScan<'a>> {
+        let geometry = self.geometry();
+        let last_byte = geometry.first_byte.checked_add(geometry.stride.checked_mul(geometry.azimuths.checked_sub(1)?)?)?;
+        let fits = geometry.azimuths <= MAX_AZIMUTHS && last_byte.checked_add(geometry.bins)? <= bytes.len();
+        fits.then(|| PolarScan {
+            geometry,
+            bytes,
+            azimuth_rad: &self.azimuth_rad[..geometry.azimuths],
+            stamp_ns: &self.azimuth_stamp_ns[..geometry.azimuths],
+            flags: &self.azimuth_flags[..geometry.azimuths],
+        })
+    }
+
+    /// Where a reader of files puts a scan: this header's tables and the payload's bytes.
+    pub fn slot<'a>(&'a mut self, bytes: &'a mut [u8]) -> ScanSlot<'a> {
+        ScanSlot {
+            bytes,
+            azimuth_rad: &mut self.azimuth_rad,
+            stamp_ns: &mut self.azimuth_stamp_ns,
+            flags: &mut self.azimuth_flags,
+        }
+    }
+
+    /// Notes what the reader said of the scan that it put into the slot.
+    pub fn set_geometry(&mut self, geometry: &SweepGeometry) {
+        self.azimuths = geometry.azimuths as u32;
+        self.bins = geometry.bins as u32;
+        self.stride = geometry.stride as u32;
+        self.first_byte = geometry.first_byte as u32;
+        self.range_resolution_m = geometry.range_resolution_m;
+        self.range_offset_m = geometry.range_offset_m;
+        self.clockwise = (geometry.sense == Sense::Clockwise).into();
+        self.reserved = 0;
+        self.item.stamp_ns = geometry.stamp_ns;
+    }
+
+    fn geometry(&self) -> SweepGeometry {
+        SweepGeometry {
+            azimuths: self.azimuths as usize,
+            bins: self.bins as usize,
+            stride: self.stride as usize,
+            first_byte: self.first_byte as usize,
+            range_resolution_m: self.range_resolution_m,
+            range_offset_m: self.range_offset_m,
+            sense: if self.clockwise == 1 { Sense::Clockwise } else { Sense::CounterClockwise },
+            stamp_ns: self.item.stamp_ns,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_header_that_promises_more_than_its_payload_is_refused() {
+        let mut header = ScanHeader { azimuths: 4, bins: 10, stride: 21, first_byte: 11, ..ScanHeader::default() };
+        let bytes = [7; 4 * 21];
+        assert_eq!(header.view(&bytes).map(|scan| scan.row(3).len()), Some(10));
+        assert!(header.view(&bytes[1..]).is_none());
+        header.azimuths = 0;
+        assert!(header.view(&bytes).is_none());
+        header.azimuths = u32::MAX;
+        assert!(header.view(&bytes).is_none());
+    }
+}

@@ -1,0 +1,114 @@
+//! How long one raster takes, on one thread: medians for an Oxford scan (the first under `GYRE_DATA`), or one of its size that is
+//! made up, at three sizes, both samplings, with and without the sweep's motion undone.
+//!
+//! `cargo run --release -p gyre-radar --example raster_bench`
+
+use gyre_radar::raster::{RasterConfig, Rasteriser, Sampling, Twist};
+use gyre_radar::scan::{OwnedScan, ScanLimits, Sense, SweepGeometry};
+use std::error::Error;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+const AZIMUTHS: usize = 400;
+const BINS: usize = 3768;
+const METADATA: usize = 11;
+const FLOOR: u8 = 60;
+const REPETITIONS: usize = 301;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut scan = made_up_scan();
+    match oxford_image()? {
+        Some(path) => {
+            println!("scan: Oxford, 400 x 3768");
+            read_png(&path, &mut scan)?;
+        }
+        None => println!("scan: made up, 400 x 3768 (GYRE_DATA is not set)"),
+    }
+    println!("{:>5} {:>7} {:>9} {:>10} {:>14}", "n", "cell m", "sampling", "plain ms", "compensated ms");
+    for (n, cell_m) in [(127, 0.8), (255, 0.8), (255, 0.4), (511, 0.4)] {
+        for sampling in [Sampling::Averaged, Sampling::Bilinear] {
+            let config = RasterConfig {
+                n,
+                cell_m,
+                sampling,
+                ..RasterConfig::default()
+            };
+            let twist = Twist {
+                vx_mps: 9.5,
+                vy_mps: 0.1,
+                yaw_rate_radps: 0.3,
+            };
+            let plain = median_ms(&config, &scan, None)?;
+            let compensated = median_ms(&config, &scan, Some(twist))?;
+            let sampling = format!("{sampling:?}");
+            println!("{n:>5} {cell_m:>7} {sampling:>9} {plain:>10.3} {compensated:>14.3}");
+        }
+    }
+    Ok(())
+}
+
+fn median_ms(config: &RasterConfig, scan: &OwnedScan, twist: Option<Twist>) -> Result<f64, Box<dyn Error>> {
+    let mut rasteriser = Rasteriser::new(config)?;
+    let mut raster = vec![0.0; config.n * config.n];
+    let mut times = Vec::<Duration>::with_capacity(REPETITIONS);
+    for _ in 0..REPETITIONS {
+        let start = Instant::now();
+        rasteriser.rasterise(&scan.view(), FLOOR, twist, &mut raster)?;
+        times.push(start.elapsed());
+    }
+    times.sort_unstable();
+    Ok(times[REPETITIONS / 2].as_secs_f64() * 1e3)
+}
+
+/// Noise at the level of a real scan's, with a wall now and then.
+fn made_up_scan() -> OwnedScan {
+    let stride = BINS + METADATA;
+    let mut scan = OwnedScan::with_limits(ScanLimits {
+        bytes: AZIMUTHS * stride,
+        azimuths: AZIMUTHS,
+    });
+    scan.geometry = SweepGeometry {
+        azimuths: AZIMUTHS,
+        bins: BINS,
+        stride,
+        first_byte: METADATA,
+        range_resolution_m: 0.0438,
+        range_offset_m: 0.0,
+        sense: Sense::Clockwise,
+        stamp_ns: 0,
+    };
+    let mut state = 1u32;
+    for (index, power) in scan.bytes.iter_mut().enumerate() {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        *power = 40 + (state >> 26) as u8 + if index % 911 < 20 { 100 } else { 0 };
+    }
+    for azimuth in 0..AZIMUTHS {
+        scan.azimuth_rad[azimuth] = (14 * azimuth + 13) as f32 * std::f32::consts::TAU / 5600.0;
+        scan.stamp_ns[azimuth] = 625_000 * (azimuth as i64 - AZIMUTHS as i64 / 2);
+    }
+    scan
+}
+
+fn oxford_image() -> Result<Option<PathBuf>, Box<dyn Error>> {
+    let Some(data) = std::env::var_os("GYRE_DATA") else {
+        return Ok(None);
+    };
+    let folder = PathBuf::from(data).join("oxford-2019-01-10-14-36-48/radar");
+    let mut images = std::fs::read_dir(folder)?
+        .map(|entry| entry.map(|entry| entry.path()))
+        .collect::<Result<Vec<_>, _>>()?;
+    images.sort();
+    Ok(images.into_iter().find(|path| path.extension().is_some_and(|e| e == "png")))
+}
+
+fn read_png(path: &PathBuf, scan: &mut OwnedScan) -> Result<(), Box<dyn Error>> {
+    let mut reader = png::Decoder::new(BufReader::new(File::open(path)?)).read_info()?;
+    let expected = scan.bytes.len();
+    if reader.output_buffer_size() != Some(expected) {
+        return Err(format!("{} does not hold 400 x 3779 bytes", path.display()).into());
+    }
+    reader.next_frame(&mut scan.bytes)?;
+    Ok(())
+}

@@ -1,0 +1,75 @@
+//! A recording of radar scans on disk, whatever its format.
+
+use std::path::Path;
+
+use crate::error::{OpenError, ReadError};
+use crate::options::{DatasetOptions, Format};
+use crate::png_image::ImageSize;
+use crate::scan::{ScanLimits, ScanSlot, SweepGeometry};
+use crate::{boreas, detect, fomo, mulran, oxford, radiate};
+
+/// The scans of one recording, in the order of their times.
+///
+/// A scan that cannot be read gives an error and leaves the others readable.
+pub trait Dataset: Send {
+    /// The form of its files.
+    fn format(&self) -> Format;
+
+    /// Scans.
+    fn len(&self) -> usize;
+
+    /// Whether there is no scan; `open` refuses such a folder.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// What memory one scan needs: from the first image's header; every image must have its size.
+    fn limits(&self) -> ScanLimits;
+
+    /// Columns and rows of the images as stored.
+    fn image_size(&self) -> ImageSize;
+
+    /// Whether the images are stored with range downwards, and turned by [`Dataset::read`].
+    fn on_their_side(&self) -> bool {
+        false
+    }
+
+    /// The file of a scan; an empty path past the end.
+    fn file(&self, index: usize) -> &Path;
+
+    /// The scan's time (middle of the sweep on the sensor's clock), ns since 1970, as far as it is known without decoding.
+    fn nominal_stamp_ns(&self, index: usize) -> Option<i64>;
+
+    /// The time that was logged for the scan (file name or list of stamps), ns since 1970, before anything was made of it.
+    fn logged_stamp_ns(&self, index: usize) -> Option<i64>;
+
+    /// One sentence: what the stamps mean, and how the middle of the sweep was obtained.
+    fn stamp_meaning(&self) -> &'static str;
+
+    /// Encoder counts a turn, where azimuths come from an encoder.
+    fn encoder_counts(&self) -> Option<u16>;
+
+    /// What the reader noticed when it opened the dataset, and what it made of that: whole sentences.
+    fn notes(&self) -> &[String];
+
+    /// Decodes a scan into `slot`, whose slices are at least as long as [`Dataset::limits`] say.
+    fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError>;
+}
+
+/// Opens the dataset at `root`: the folder that holds the radar's folder, or the folder of images itself.
+///
+/// The format is detected unless `options` names it.
+pub fn open(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
+    options.check()?;
+    let found = detect::locate(root, options.format)?;
+    Ok(match found.format {
+        Format::Oxford => Box::new(oxford::open(found, options)?),
+        Format::Oord => Box::new(oxford::open_oord(found, options)?),
+        Format::Boreas => Box::new(boreas::open(found, options)?),
+        Format::BoreasRt => Box::new(boreas::open_road_trip(found, options)?),
+        Format::Mulran => Box::new(mulran::MulranPolar::open(found, options)?),
+        Format::MulranOxfordForm => Box::new(mulran::open_oxford_form(found, options)?),
+        Format::Radiate => Box::new(radiate::Radiate::open(found, options)?),
+        Format::Fomo => Box::new(fomo::open(found, options)?),
+    })
+}

@@ -1,0 +1,31 @@
+//! FoMo: `navtech/<us>.png`, Oxford's columns, an encoder of 5595 counts by its kit.
+
+use crate::detect::Found;
+use crate::error::OpenError;
+use crate::first_look::NamedBy;
+use crate::navtech_png::ByteTen;
+use crate::navtech_scans::{NavtechScans, Profile, ScanTime};
+use crate::options::{AzimuthSource, DatasetOptions, Format};
+
+/// Metres a range bin.
+pub const RANGE_RESOLUTION_M: f32 = 0.0438;
+/// Encoder counts a turn.
+pub const ENCODER_COUNTS: u16 = 5595;
+
+const STAMPS: &str =
+    "Files are named by the time of the sweep's first row; a scan's time is half-way between its first and last row's stamps.";
+
+pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<NavtechScans, OpenError> {
+    NavtechScans::open(found, options, |_| Profile {
+        format: Format::Fomo,
+        range_resolution_m: RANGE_RESOLUTION_M,
+        range_offset_m: 0.0,
+        encoder_counts: ENCODER_COUNTS,
+        azimuth_source: AzimuthSource::Encoder,
+        scan_time: ScanTime::Halfway,
+        smooth_stamps: false,
+        byte_ten: ByteTen::Unused,
+        named_by: NamedBy::Start,
+        stamp_meaning: STAMPS,
+    })
+}

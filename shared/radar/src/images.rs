@@ -1,0 +1,91 @@
+//! The images of a dataset: which files, in which order, how large.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::error::{OpenError, ReadError};
+use crate::png_image::{self, ImageReader, ImageSize};
+use crate::stamp;
+
+/// Images that are tried for one that can be read, when the first ones are damaged.
+const FIRST_TRIES: usize = 8;
+
+/// Image files in the order of their numbers, all of the first one's size.
+#[derive(Debug)]
+pub(crate) struct Images {
+    files: Vec<PathBuf>,
+    pub(crate) size: ImageSize,
+    pub(crate) reader: ImageReader,
+}
+
+impl Images {
+    /// Lists `folder` and reads the size from the first image whose header can be read.
+    pub(crate) fn open(folder: &Path) -> Result<Self, OpenError> {
+        let files = list_png(folder)?;
+        let Some(first) = files.first() else {
+            return Err(OpenError::NoImages { path: folder.to_owned() });
+        };
+        let size = png_image::read_size(first)
+            .or_else(|error| files.iter().take(FIRST_TRIES).find_map(|f| png_image::read_size(f).ok()).ok_or(error))?;
+        Ok(Self { files, size, reader: ImageReader::default() })
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.files.len()
+    }
+
+    /// The file of a scan; an empty path past the end.
+    pub(crate) fn file(&self, index: usize) -> &Path {
+        self.files.get(index).map_or(Path::new(""), PathBuf::as_path)
+    }
+
+    pub(crate) fn files(&self) -> &[PathBuf] {
+        &self.files
+    }
+
+    /// The number that a file is named by.
+    pub(crate) fn number(&self, index: usize) -> Option<i64> {
+        file_number(self.file(index))
+    }
+
+    /// The time that a file is named by, ns.
+    pub(crate) fn name_stamp_ns(&self, index: usize) -> Option<i64> {
+        self.number(index).and_then(stamp::to_ns)
+    }
+
+    pub(crate) fn decode(&mut self, index: usize, pixels: &mut [u8]) -> Result<(), ReadError> {
+        let len = self.files.len();
+        let path = self.files.get(index).ok_or(ReadError::NoSuchScan { index, len })?;
+        self.reader.decode(path, self.size, pixels)
+    }
+
+    /// The first image that can be decoded, with its index.
+    pub(crate) fn first_readable(&mut self) -> Option<(usize, Vec<u8>)> {
+        let mut pixels = vec![0; self.size.bytes()];
+        let index = (0..self.len().min(FIRST_TRIES)).find(|i| self.decode(*i, &mut pixels).is_ok())?;
+        Some((index, pixels))
+    }
+}
+
+/// The PNG files of a folder: numbered ones by number, then the others by name.
+pub(crate) fn list_png(folder: &Path) -> Result<Vec<PathBuf>, OpenError> {
+    let io_error = |source| OpenError::Io { path: folder.to_owned(), source };
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).map_err(io_error)? {
+        let path = entry.map_err(io_error)?.path();
+        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) && path.is_file() {
+            files.push(path);
+        }
+    }
+    files.sort_by_cached_key(|path| (file_number(path).unwrap_or(i64::MAX), path.clone()));
+    Ok(files)
+}
+
+/// Whether a folder is there and holds a PNG.
+pub(crate) fn has_png(folder: &Path) -> bool {
+    folder.is_dir() && list_png(folder).is_ok_and(|files| !files.is_empty())
+}
+
+fn file_number(path: &Path) -> Option<i64> {
+    path.file_stem()?.to_str()?.parse().ok()
+}

@@ -1,0 +1,218 @@
+//! The columns that Navtech's drivers put before the powers of each row: stamp, encoder count, one byte of flags.
+
+use std::path::Path;
+
+use crate::error::ReadError;
+use crate::options::AzimuthSource;
+use crate::png_image::ImageSize;
+use crate::scan::flag;
+use crate::stamp;
+
+/// Bytes before the first power of a row.
+pub(crate) const METADATA_BYTES: usize = 11;
+/// Share of neighbouring rows that must differ in byte 10 for it to be the chirp's direction.
+const ALTERNATING_SHARE: f64 = 0.9;
+/// Longest time that one sweep may take, s. The slowest scanning radars turn once in 2 s.
+const LONGEST_SWEEP_S: f64 = 5.0;
+
+/// What one row says of itself.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RowMetadata {
+    /// Bytes 0 to 7, little-endian: time since 1970, us or ns.
+    pub(crate) stamp: i64,
+    /// Bytes 8 and 9, little-endian: the encoder's count.
+    pub(crate) count: u16,
+    /// Byte 10: validity, chirp direction or nothing.
+    pub(crate) byte_ten: u8,
+}
+
+impl RowMetadata {
+    fn parse(row: &[u8]) -> Self {
+        let mut stamp = [0; 8];
+        stamp.copy_from_slice(&row[..8]);
+        Self { stamp: i64::from_le_bytes(stamp), count: u16::from_le_bytes([row[8], row[9]]), byte_ten: row[10] }
+    }
+}
+
+/// The metadata of each row of an image that is wider than [`METADATA_BYTES`].
+pub(crate) fn rows(pixels: &[u8], size: ImageSize) -> impl Iterator<Item = RowMetadata> + '_ {
+    pixels.chunks_exact(size.width).take(size.height).map(RowMetadata::parse)
+}
+
+/// Whether byte 10 goes to and fro between 0 and 255 from row to row: then it is the chirp's direction, not validity.
+pub(crate) fn chirps_alternate(bytes_ten: impl Iterator<Item = u8>) -> bool {
+    let (mut pairs, mut changes, mut last) = (0_usize, 0_usize, None);
+    for byte in bytes_ten {
+        if !matches!(byte, 0 | 255) {
+            return false;
+        }
+        if let Some(last) = last.replace(byte) {
+            pairs += 1;
+            changes += usize::from(last != byte);
+        }
+    }
+    pairs > 0 && changes as f64 >= ALTERNATING_SHARE * pairs as f64
+}
+
+/// What byte 10 means where it does not alternate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ByteTen {
+    /// 255: measured; else filled in from the neighbours.
+    Validity,
+    /// Nothing.
+    Unused,
+}
+
+/// Flags of each row, see [`flag`].
+pub(crate) fn fill_flags(pixels: &[u8], size: ImageSize, meaning: ByteTen, flags: &mut [u8]) {
+    let chirps = chirps_alternate(rows(pixels, size).map(|row| row.byte_ten));
+    for (row, into) in rows(pixels, size).zip(flags) {
+        *into = match (chirps, meaning, row.byte_ten) {
+            (true, _, 255) => flag::MEASURED | flag::CHIRP_KNOWN | flag::CHIRP_UP,
+            (true, _, _) => flag::MEASURED | flag::CHIRP_KNOWN,
+            (false, ByteTen::Validity, byte) if byte != 255 => 0,
+            _ => flag::MEASURED,
+        };
+    }
+}
+
+/// Angle of each row in `[0, 2 pi)`; refuses rows that are not one sweep.
+pub(crate) fn fill_azimuths(
+    path: &Path,
+    pixels: &[u8],
+    size: ImageSize,
+    source: AzimuthSource,
+    counts: u16,
+    azimuth_rad: &mut [f32],
+) -> Result<(), ReadError> {
+    if source == AzimuthSource::Uniform {
+        fill_uniform(&mut azimuth_rad[..size.height]);
+        return Ok(());
+    }
+    check_order(path, rows(pixels, size).map(|row| row.count), counts)?;
+    let step = std::f64::consts::TAU / f64::from(counts);
+    for (row, into) in rows(pixels, size).zip(azimuth_rad) {
+        *into = (f64::from(row.count % counts) * step) as f32;
+    }
+    Ok(())
+}
+
+/// Row `i` of `n` at `2 pi i / n`.
+pub(crate) fn fill_uniform(azimuth_rad: &mut [f32]) {
+    let step = std::f64::consts::TAU / azimuth_rad.len() as f64;
+    for (row, into) in azimuth_rad.iter_mut().enumerate() {
+        *into = (row as f64 * step) as f32;
+    }
+}
+
+/// The counts of a sweep grow, but for at most one step past zero, and make at most one turn.
+fn check_order(path: &Path, row_counts: impl Iterator<Item = u16>, counts: u16) -> Result<(), ReadError> {
+    let (mut first, mut last, mut wrapped) = (0, None, false);
+    for (row, count) in row_counts.enumerate() {
+        if count > counts {
+            return Err(ReadError::EncoderCount { path: path.to_owned(), row, count, counts });
+        }
+        let count = count % counts;
+        match last.replace(count) {
+            None => first = count,
+            Some(previous) => {
+                let wraps = count < previous;
+                let lapped = (wrapped || wraps) && count >= first;
+                if count == previous || lapped || (wraps && wrapped) {
+                    return Err(ReadError::AzimuthOrder { path: path.to_owned(), row, count, previous });
+                }
+                wrapped |= wraps;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Time of each row as logged, ns; refuses what is no time, and times that are not those of one sweep.
+pub(crate) fn fill_stamps(path: &Path, pixels: &[u8], size: ImageSize, stamp_ns: &mut [i64]) -> Result<(), ReadError> {
+    for (row, (metadata, into)) in rows(pixels, size).zip(stamp_ns.iter_mut()).enumerate() {
+        let ns = stamp::to_ns(metadata.stamp);
+        *into = ns.ok_or_else(|| ReadError::StampYear { path: path.to_owned(), row, value: metadata.stamp })?;
+    }
+    let span_s = (stamp_ns[size.height - 1] - stamp_ns[0]) as f64 * 1e-9;
+    if !(0.0..=LONGEST_SWEEP_S).contains(&span_s) {
+        return Err(ReadError::SweepTime { path: path.to_owned(), span_s });
+    }
+    Ok(())
+}
+
+/// Replaces times that came in bursts (a packet's rows share a time of receipt) by the line through them over the azimuth,
+/// laid so that the middle of the sweep keeps its time: half-way between the first and the last row's stamps.
+pub(crate) fn smooth_stamps(azimuth_rad: &[f32], stamp_ns: &mut [i64]) {
+    let n = stamp_ns.len();
+    if n < 2 {
+        return;
+    }
+    let middle_ns = stamp::middle(stamp_ns[0], stamp_ns[n - 1]);
+    let angle = |row: usize| sweep_angle(azimuth_rad[0], azimuth_rad[row]);
+    let mean_angle = (0..n).map(angle).sum::<f64>() / n as f64;
+    let (mut up, mut across) = (0.0, 0.0);
+    for (row, stamp) in stamp_ns.iter().enumerate() {
+        let from_mean = angle(row) - mean_angle;
+        up += from_mean * (stamp - middle_ns) as f64;
+        across += from_mean * from_mean;
+    }
+    let ns_per_rad = up / across;
+    let middle_angle = angle(n - 1) / 2.0;
+    for (row, stamp) in stamp_ns.iter_mut().enumerate() {
+        *stamp = middle_ns + ((angle(row) - middle_angle) * ns_per_rad).round() as i64;
+    }
+}
+
+/// How far the sweep has come from its first azimuth, rad.
+fn sweep_angle(first_rad: f32, azimuth_rad: f32) -> f64 {
+    (f64::from(azimuth_rad) - f64::from(first_rad)).rem_euclid(std::f64::consts::TAU)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use proptest::prelude::*;
+
+    fn ordered(counts: &[u16]) -> Result<(), ReadError> {
+        check_order(Path::new("scan.png"), counts.iter().copied(), 5600)
+    }
+
+    #[test]
+    fn a_sweep_may_wrap_once_and_not_overlap_itself() {
+        assert!(ordered(&[13, 27, 5599]).is_ok());
+        assert!(ordered(&[5000, 5599, 0, 4999]).is_ok());
+        assert!(ordered(&[5000, 5600, 14]).is_ok());
+        assert!(matches!(ordered(&[5000, 0, 5000]), Err(ReadError::AzimuthOrder { row: 2, .. })));
+        assert!(matches!(ordered(&[5000, 10, 20, 15]), Err(ReadError::AzimuthOrder { row: 3, .. })));
+        assert!(matches!(ordered(&[10, 20, 15]), Err(ReadError::AzimuthOrder { row: 2, .. })));
+        assert!(matches!(ordered(&[10, 10]), Err(ReadError::AzimuthOrder { row: 1, count: 10, previous: 10, .. })));
+        assert!(matches!(ordered(&[10, 5601]), Err(ReadError::EncoderCount { row: 1, count: 5601, .. })));
+    }
+
+    #[test]
+    fn alternation_is_told_from_validity() {
+        assert!(chirps_alternate([0, 255, 0, 255, 0].into_iter()));
+        assert!(!chirps_alternate([255; 6].into_iter()));
+        assert!(!chirps_alternate([0; 6].into_iter()));
+        assert!(!chirps_alternate([255, 255, 0, 255, 255, 255, 0].into_iter()));
+        assert!(!chirps_alternate([0, 1, 0, 1].into_iter()));
+        assert!(!chirps_alternate(std::iter::empty()));
+    }
+
+    proptest! {
+        #[test]
+        fn smoothing_an_even_sweep_changes_nothing(start in 0_u16..5600, step in 10_u16..15, period in 1_000_000_i64..3_000_000) {
+            let n = 300_usize;
+            let angle = |i: usize| (usize::from(start) + i * usize::from(step)) % 5600;
+            let azimuth: Vec<f32> = (0..n).map(|i| (angle(i) as f64 * std::f64::consts::TAU / 5600.0) as f32).collect();
+            let even: Vec<i64> = (0..n).map(|i| 1_547_131_046_000_000_000 + i as i64 * period).collect();
+            let mut stamps = even.clone();
+            smooth_stamps(&azimuth, &mut stamps);
+            for (smooth, even) in stamps.iter().zip(&even) {
+                prop_assert!((smooth - even).abs() < 1_000, "{}", smooth - even);
+            }
+        }
+    }
+}

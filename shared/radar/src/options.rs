@@ -1,0 +1,136 @@
+//! What a configuration may say about a dataset.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::OpenError;
+
+/// A dataset's form of files, named in configurations in kebab case (`boreas-rt`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Format {
+    /// Oxford Radar RobotCar.
+    Oxford,
+    /// Oxford Offroad Radar Dataset.
+    Oord,
+    /// Boreas.
+    Boreas,
+    /// Boreas Road Trip.
+    BoreasRt,
+    /// MulRan as recorded: images on their side, no metadata.
+    Mulran,
+    /// MulRan converted to Oxford's columns.
+    MulranOxfordForm,
+    /// RADIATE.
+    Radiate,
+    /// FoMo.
+    Fomo,
+}
+
+impl Format {
+    /// All formats, in the order of preference where two fit equally.
+    pub const ALL: [Self; 8] = [
+        Self::Oxford,
+        Self::Oord,
+        Self::Boreas,
+        Self::BoreasRt,
+        Self::Mulran,
+        Self::MulranOxfordForm,
+        Self::Radiate,
+        Self::Fomo,
+    ];
+
+    /// The name used in configurations.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Oxford => "oxford",
+            Self::Oord => "oord",
+            Self::Boreas => "boreas",
+            Self::BoreasRt => "boreas-rt",
+            Self::Mulran => "mulran",
+            Self::MulranOxfordForm => "mulran-oxford-form",
+            Self::Radiate => "radiate",
+            Self::Fomo => "fomo",
+        }
+    }
+}
+
+impl fmt::Display for Format {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// Where the angle of an azimuth comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum AzimuthSource {
+    /// The encoder's count in each row.
+    Encoder,
+    /// The row's number: row `i` of `n` at `2 pi i / n`.
+    Uniform,
+}
+
+/// How to read a dataset. Every key may be left out; the defaults are the format's own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DatasetOptions {
+    /// The form of files. Default: detected from the folder, else from the first image.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub format: Option<Format>,
+    /// Metres a range bin. Default: Oxford, OORD and FoMo 0.0438, Boreas 0.0596 (0.04381 from 2021-09-21), Boreas-RT 0.04381,
+    /// MulRan 200/3360, RADIATE 100/576.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range_resolution_m: Option<f32>,
+    /// Metres to add to every range. Default: Boreas and Boreas-RT -0.31, all others 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range_offset_m: Option<f32>,
+    /// Where the azimuths come from. Default: `encoder`; `uniform` for OORD, whose encoder columns are not to be trusted, and for
+    /// images without metadata (RADIATE, MulRan as recorded), which know no other.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub azimuth_source: Option<AzimuthSource>,
+    /// Encoder counts a turn. Default: FoMo 5595, all others 5600.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub encoder_counts: Option<u16>,
+}
+
+impl DatasetOptions {
+    /// Refuses values that no radar has.
+    pub(crate) fn check(&self) -> Result<(), OpenError> {
+        let resolution_ok = self.range_resolution_m.is_none_or(|r| (1e-3..=10.0).contains(&r));
+        let offset_ok = self.range_offset_m.is_none_or(|o| (-100.0..=100.0).contains(&o));
+        let counts_ok = self.encoder_counts.is_none_or(|c| c >= 16);
+        if !resolution_ok {
+            return Err(self.refused("range_resolution_m", self.range_resolution_m, "it must be from 0.001 to 10 m"));
+        }
+        if !offset_ok {
+            return Err(self.refused("range_offset_m", self.range_offset_m, "it must be from -100 to 100 m"));
+        }
+        if !counts_ok {
+            return Err(self.refused("encoder_counts", self.encoder_counts, "an encoder has at least 16 counts a turn"));
+        }
+        Ok(())
+    }
+
+    /// Refuses what needs an encoder, for images that have none.
+    pub(crate) fn check_without_encoder(&self, format: Format) -> Result<(), OpenError> {
+        let options = Self { format: Some(format), ..*self };
+        if self.encoder_counts.is_some() {
+            return Err(options.refused("encoder_counts", self.encoder_counts, "its images carry no encoder counts"));
+        }
+        if self.azimuth_source == Some(AzimuthSource::Encoder) {
+            return Err(options.refused("azimuth_source", Some("encoder"), "its images carry no encoder counts"));
+        }
+        Ok(())
+    }
+
+    fn refused(&self, key: &'static str, value: Option<impl fmt::Display>, reason: &'static str) -> OpenError {
+        OpenError::BadOption {
+            key,
+            value: value.map(|v| v.to_string()).unwrap_or_default(),
+            format: self.format.map_or("any".to_owned(), |f| f.to_string()),
+            reason,
+        }
+    }
+}

@@ -1,0 +1,153 @@
+//! Grey PNG images, decoded straight into the caller's memory.
+
+use std::fmt;
+use std::fs::File;
+use std::io::{self, Cursor, Read};
+use std::path::Path;
+
+use crate::error::ReadError;
+
+/// Most bytes of one image: 1024 azimuths of 32,768 range bins and their metadata.
+const MAX_IMAGE_BYTES: u64 = 1024 * (32_768 + 11);
+/// Signature, and the header chunk up to the interlace method.
+const HEADER_BYTES: usize = 29;
+const SIGNATURE: [u8; 8] = [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n'];
+/// What the decoder may take beside the image: rows, tables, chunks of text.
+const DECODER_BYTES: usize = 4 << 20;
+
+/// Pixels of an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct ImageSize {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
+
+impl ImageSize {
+    /// Bytes of the image: one a pixel.
+    pub fn bytes(self) -> usize {
+        self.width * self.height
+    }
+}
+
+impl fmt::Display for ImageSize {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} columns x {} rows", self.width, self.height)
+    }
+}
+
+/// The size of a PNG from its first bytes alone.
+pub(crate) fn read_size(path: &Path) -> Result<ImageSize, ReadError> {
+    let mut header = [0; HEADER_BYTES];
+    let mut file = File::open(path).map_err(|e| io_error(path, e))?;
+    let mut filled = 0;
+    while filled < HEADER_BYTES {
+        match file.read(&mut header[filled..]) {
+            Ok(0) => break,
+            Ok(n) => filled += n,
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(io_error(path, e)),
+        }
+    }
+    parse_header(path, &header[..filled])
+}
+
+/// Size from the header chunk; refuses other pixels than 8-bit grey, and images that no radar makes.
+fn parse_header(path: &Path, bytes: &[u8]) -> Result<ImageSize, ReadError> {
+    let shown = bytes.len().min(SIGNATURE.len());
+    if bytes[..shown] != SIGNATURE[..shown] {
+        return Err(ReadError::NotPng { path: path.to_owned() });
+    }
+    let Some(header) = bytes.get(..HEADER_BYTES) else {
+        return Err(ReadError::Truncated { path: path.to_owned(), bytes: bytes.len() });
+    };
+    if &header[12..16] != b"IHDR" {
+        return Err(ReadError::NotPng { path: path.to_owned() });
+    }
+    let word = |at: usize| u32::from_be_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]]);
+    check_pixels(path, header[24], header[25])?;
+    check_size(path, u64::from(word(16)), u64::from(word(20)))
+}
+
+fn check_pixels(path: &Path, bits: u8, colour: u8) -> Result<(), ReadError> {
+    if bits == 8 && colour == 0 {
+        return Ok(());
+    }
+    let colour = match colour {
+        0 => "grey",
+        2 => "colour",
+        3 => "palette",
+        4 => "grey and alpha",
+        6 => "colour and alpha",
+        _ => "unknown",
+    };
+    Err(ReadError::WrongPixels { path: path.to_owned(), actual: format!("{bits}-bit {colour}") })
+}
+
+fn check_size(path: &Path, width: u64, height: u64) -> Result<ImageSize, ReadError> {
+    let bytes = width.saturating_mul(height);
+    if bytes == 0 {
+        return Err(ReadError::Damaged { path: path.to_owned(), reason: "its header says that it has no pixels".to_owned() });
+    }
+    if bytes > MAX_IMAGE_BYTES {
+        return Err(ReadError::TooLarge { path: path.to_owned(), actual: bytes, limit: MAX_IMAGE_BYTES });
+    }
+    Ok(ImageSize { width: width as usize, height: height as usize })
+}
+
+/// Decodes one image after the other; keeps the memory for the file's bytes.
+#[derive(Debug, Default)]
+pub(crate) struct ImageReader {
+    file: Vec<u8>,
+}
+
+impl ImageReader {
+    /// Decodes `path`, which must be of size `expected`, into the first `expected.bytes()` of `pixels`, row by row.
+    pub(crate) fn decode(&mut self, path: &Path, expected: ImageSize, pixels: &mut [u8]) -> Result<(), ReadError> {
+        self.load(path)?;
+        let actual = parse_header(path, &self.file[..self.file.len().min(HEADER_BYTES)])?;
+        if actual != expected {
+            return Err(ReadError::WrongSize { path: path.to_owned(), actual, expected });
+        }
+        let room = pixels.len();
+        let pixels = pixels.get_mut(..expected.bytes()).ok_or(ReadError::SlotTooSmall {
+            what: "bytes",
+            needed: expected.bytes(),
+            actual: room,
+        })?;
+        self.inflate(pixels).map_err(|e| self.decoding_error(path, e))
+    }
+
+    fn load(&mut self, path: &Path) -> Result<(), ReadError> {
+        let file = File::open(path).map_err(|e| io_error(path, e))?;
+        self.file.clear();
+        // One byte more than is accepted tells a file of exactly that size from a larger one.
+        file.take(MAX_IMAGE_BYTES + 1).read_to_end(&mut self.file).map_err(|e| io_error(path, e))?;
+        if self.file.len() as u64 > MAX_IMAGE_BYTES {
+            return Err(ReadError::TooLarge { path: path.to_owned(), actual: self.file.len() as u64, limit: MAX_IMAGE_BYTES });
+        }
+        Ok(())
+    }
+
+    fn inflate(&self, pixels: &mut [u8]) -> Result<(), png::DecodingError> {
+        let limits = png::Limits { bytes: DECODER_BYTES };
+        let mut decoder = png::Decoder::new_with_limits(Cursor::new(self.file.as_slice()), limits);
+        decoder.set_ignore_text_chunk(true);
+        decoder.set_ignore_iccp_chunk(true);
+        decoder.read_info()?.next_frame(pixels).map(|_| ())
+    }
+
+    fn decoding_error(&self, path: &Path, error: png::DecodingError) -> ReadError {
+        match error {
+            png::DecodingError::IoError(e) if e.kind() == io::ErrorKind::UnexpectedEof => {
+                ReadError::Truncated { path: path.to_owned(), bytes: self.file.len() }
+            }
+            other => ReadError::Damaged { path: path.to_owned(), reason: other.to_string() },
+        }
+    }
+}
+
+fn io_error(path: &Path, source: io::Error) -> ReadError {
+    ReadError::Io { path: path.to_owned(), source }
+}

@@ -1,0 +1,176 @@
+//! RADIATE: `Navtech_Polar/<frame>.png`, 576 rows of range x 400 columns of azimuth, and `Navtech_Polar.txt` with times.
+//!
+//! The times are `seconds.nanoseconds` with the nanoseconds' leading zeros left out, and they are the host's times of receipt: after
+//! a stall they come late by up to 1.4 s while the antenna turns evenly. The sensor's clock is rebuilt from them.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::dataset::Dataset;
+use crate::detect::Found;
+use crate::error::{OpenError, ReadError};
+use crate::options::{DatasetOptions, Format};
+use crate::png_image::ImageSize;
+use crate::scan::{ScanLimits, ScanSlot, SweepGeometry};
+use crate::sensor_clock::SensorClock;
+use crate::sideways::{SidewaysScans, mean_after_start_ns};
+use crate::stamp::{self, SECOND_NS};
+
+/// Full range of the images, m.
+const RANGE_M: f32 = 100.0;
+/// The radar turns four times a second; bounds within which its period is looked for, ns.
+const PERIOD_NS: std::ops::RangeInclusive<f64> = 0.2e9..=0.3e9;
+
+const STAMPS: &str = "Logged stamps are the host's times of receipt; the sensor's clock is the even series that touches them from below, \
+                      columns are spread evenly over its period, and a scan's time is their mean.";
+
+/// The scans of a RADIATE sequence.
+#[derive(Debug)]
+pub(crate) struct Radiate {
+    scans: SidewaysScans,
+    /// Frame number and time of receipt of each scan.
+    received: Vec<(i64, i64)>,
+    clock: SensorClock,
+    notes: Vec<String>,
+}
+
+impl Radiate {
+    pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<Self, OpenError> {
+        let list = found.folder.with_extension("txt");
+        let (stamps, unpadded) = read_stamps(&list)?;
+        let (scans, mut notes) = SidewaysScans::open(found, options, |bins| RANGE_M / bins as f32)?;
+        let received = (0..scans.images.len()).map(|i| receipt(&scans, i, &stamps, &list)).collect::<Result<Vec<_>, _>>()?;
+        let path = || scans.images.file(0).to_owned();
+        let clock = SensorClock::below(&received, PERIOD_NS).ok_or_else(|| OpenError::NoImages { path: path() })?;
+        if unpadded > 0 {
+            notes.push(format!(
+                "{unpadded} of {} stamps in {} write their nanoseconds without leading zeros (.5 means 5 ns): they are read as integers; \
+                 as decimals, time would jump to and fro.",
+                stamps.len(),
+                file_name(&list)
+            ));
+        }
+        if stamps.len() > received.len() {
+            notes.push(format!("{} lists {} scans, and {} images are there.", file_name(&list), stamps.len(), received.len()));
+        }
+        Ok(Self { scans, received, clock, notes })
+    }
+
+    fn start_ns(&self, index: usize) -> Option<i64> {
+        self.received.get(index).map(|(frame, _)| self.clock.start_ns(*frame))
+    }
+
+    fn period_ns(&self) -> i64 {
+        self.clock.period.round() as i64
+    }
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+/// Frame number and time of receipt of an image.
+fn receipt(scans: &SidewaysScans, index: usize, stamps: &BTreeMap<i64, i64>, list: &Path) -> Result<(i64, i64), OpenError> {
+    let image = scans.images.file(index);
+    let missing = || {
+        let reason = format!("no time for {}; every image needs a line `Frame: <number> Time: <seconds>.<nanoseconds>`", file_name(image));
+        OpenError::Text { path: list.to_owned(), line: 0, reason }
+    };
+    let frame = scans.images.number(index).ok_or_else(missing)?;
+    stamps.get(&frame).map(|ns| (frame, *ns)).ok_or_else(missing)
+}
+
+/// Times by frame number, and how many of them leave out leading zeros.
+fn read_stamps(path: &PathBuf) -> Result<(BTreeMap<i64, i64>, usize), OpenError> {
+    let text = fs::read_to_string(path).map_err(|source| OpenError::Io { path: path.clone(), source })?;
+    let (mut stamps, mut unpadded) = (BTreeMap::new(), 0);
+    for (line, content) in text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty()) {
+        let (frame, ns, digits) = parse_line(content).ok_or_else(|| OpenError::Text {
+            path: path.clone(),
+            line: line + 1,
+            reason: format!("{content:?} is not `Frame: <number> Time: <seconds>.<nanoseconds>` of the years 2015 to 2040"),
+        })?;
+        unpadded += usize::from(digits < 9);
+        stamps.insert(frame, ns);
+    }
+    Ok((stamps, unpadded))
+}
+
+/// `Frame: 000248 Time: 1549986609.260809657`: number, ns, digits after the dot.
+fn parse_line(line: &str) -> Option<(i64, i64, usize)> {
+    let mut words = line.split_whitespace();
+    let (frame, number, time, value) = (words.next()?, words.next()?, words.next()?, words.next()?);
+    let (seconds, nanoseconds) = value.split_once('.')?;
+    let ns: i64 = nanoseconds.parse().ok().filter(|ns| (0..SECOND_NS).contains(ns))?;
+    let stamp = seconds.parse::<i64>().ok()?.checked_mul(SECOND_NS)?.checked_add(ns)?;
+    let labelled = frame == "Frame:" && time == "Time:" && stamp::plausible(stamp);
+    labelled.then_some((number.parse().ok()?, stamp, nanoseconds.len()))
+}
+
+impl Dataset for Radiate {
+    fn format(&self) -> Format {
+        Format::Radiate
+    }
+
+    fn len(&self) -> usize {
+        self.scans.images.len()
+    }
+
+    fn limits(&self) -> ScanLimits {
+        self.scans.limits()
+    }
+
+    fn image_size(&self) -> ImageSize {
+        self.scans.images.size
+    }
+
+    fn on_their_side(&self) -> bool {
+        self.scans.on_their_side()
+    }
+
+    fn file(&self, index: usize) -> &Path {
+        self.scans.images.file(index)
+    }
+
+    fn nominal_stamp_ns(&self, index: usize) -> Option<i64> {
+        self.start_ns(index).map(|start| start + mean_after_start_ns(self.period_ns(), self.scans.azimuths()))
+    }
+
+    fn logged_stamp_ns(&self, index: usize) -> Option<i64> {
+        self.received.get(index).map(|(_, ns)| *ns)
+    }
+
+    fn stamp_meaning(&self) -> &'static str {
+        STAMPS
+    }
+
+    fn encoder_counts(&self) -> Option<u16> {
+        None
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {
+        let start_ns = self.start_ns(index).ok_or(ReadError::NoSuchScan { index, len: self.len() })?;
+        let period_ns = self.period_ns();
+        self.scans.read(index, slot, start_ns, period_ns)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn nanoseconds_without_leading_zeros_are_integers() {
+        assert_eq!(parse_line("Frame: 000243 Time: 1549986608.1533537"), Some((243, 1_549_986_608_001_533_537, 7)));
+        assert_eq!(parse_line("Frame: 1 Time: 1549986608.0"), Some((1, 1_549_986_608_000_000_000, 1)));
+        for bad in ["Frame: 1 Time: 1549986608", "Frame: 1 Time: 1549986608.1234567890", "Frame: x Time: 1549986608.1", "Frame: 1 Time: 12.5", ""] {
+            assert_eq!(parse_line(bad), None, "{bad}");
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! From a bearing to the azimuth measured there, and when.
+
+use super::RasterError;
+use crate::scan::{MAX_AZIMUTHS, PolarScan};
+use std::f64::consts::TAU;
+
+/// Nodes a turn: ten between Navtech's azimuths. Between nodes the table is linear, so that it errs only next to a
+/// measured azimuth, by less than `azimuths / (4 NODES)` of the change in spacing there.
+pub(super) const NODES: usize = 4096;
+
+/// How far an azimuth may lie behind the one before it, turns: the encoder's jitter, or a sweep that ends past its start.
+const BACKLASH: f64 = 0.1;
+
+/// Rows and times over the turn that starts at the first azimuth, at bearings `k / NODES`.
+#[derive(Debug)]
+pub(super) struct BearingTable {
+    /// Bearing of the first azimuth, turns in `[0, 1)`.
+    pub start: f32,
+    /// Fractional azimuth, `[0, azimuths]`; `azimuths` is the first one again.
+    pub row: Box<[f32; NODES + 1]>,
+    /// Seconds from the scan's stamp.
+    pub time_s: Box<[f32; NODES + 1]>,
+    /// Bearings of the azimuths from the first one on, turns, never falling, with 1 at the end.
+    bearings: Vec<f64>,
+}
+
+impl BearingTable {
+    pub fn new() -> Self {
+        Self {
+            start: 0.0,
+            row: Box::new([0.0; NODES + 1]),
+            time_s: Box::new([0.0; NODES + 1]),
+            bearings: Vec::with_capacity(MAX_AZIMUTHS + 1),
+        }
+    }
+
+    /// Takes the azimuths and stamps of a scan that has at least one azimuth.
+    pub fn measure(&mut self, scan: &PolarScan<'_>) -> Result<(), RasterError> {
+        let azimuths = &scan.azimuth_rad[..scan.geometry.azimuths];
+        if let Some(index) = azimuths.iter().position(|azimuth| !azimuth.is_finite()) {
+            let value = azimuths[index];
+            return Err(RasterError::Azimuth { index, value });
+        }
+        let first = azimuths.first().copied().unwrap_or(0.0);
+        self.start = (f64::from(first) / TAU).rem_euclid(1.0) as f32;
+        if self.start >= 1.0 {
+            self.start = 0.0; // just below a whole turn, rounded up
+        }
+        self.unwrap(azimuths);
+        self.fill_nodes(scan);
+        Ok(())
+    }
+
+    fn unwrap(&mut self, azimuths: &[f32]) {
+        self.bearings.clear();
+        let (mut unwrapped, mut furthest) = (0.0f64, 0.0f64);
+        let mut before = azimuths.first().copied().unwrap_or(0.0);
+        for &azimuth in azimuths {
+            let step = (f64::from(azimuth) - f64::from(before)) / TAU;
+            unwrapped += (step + BACKLASH).rem_euclid(1.0) - BACKLASH;
+            furthest = furthest.max(unwrapped).min(1.0);
+            self.bearings.push(furthest);
+            before = azimuth;
+        }
+        self.bearings.push(1.0);
+    }
+
+    fn fill_nodes(&mut self, scan: &PolarScan<'_>) {
+        let last = scan.geometry.azimuths - 1;
+        let seconds = |azimuth: usize| seconds_from_stamp(scan, azimuth.min(last));
+        let mut below = 0;
+        for node in 0..=NODES {
+            let bearing = node as f64 / NODES as f64;
+            while below < last && self.bearings[below + 1] <= bearing {
+                below += 1;
+            }
+            let gap = self.bearings[below + 1] - self.bearings[below];
+            let past = bearing - self.bearings[below];
+            let share = if gap > 0.0 { (past / gap).clamp(0.0, 1.0) } else { 0.0 };
+            // Past the last azimuth its time holds: the first one's, a sweep earlier, is no neighbour.
+            let (earlier, later) = (seconds(below), seconds(below + 1));
+            self.row[node] = (below as f64 + share) as f32;
+            self.time_s[node] = (earlier + share * (later - earlier)) as f32;
+        }
+    }
+}
+
+/// Seconds from the scan's stamp to an azimuth's.
+pub(super) fn seconds_from_stamp(scan: &PolarScan<'_>, azimuth: usize) -> f64 {
+    let nanoseconds = scan.stamp_ns[azimuth].saturating_sub(scan.geometry.stamp_ns);
+    nanoseconds as f64 * 1e-9
+}

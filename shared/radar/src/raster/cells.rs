@@ -1,0 +1,102 @@
+//! Where the raster's cells are.
+
+use crate::scan::Sense;
+use std::f32::consts::SQRT_2;
+use std::f64::consts::TAU;
+
+/// Cells that the loops take together.
+pub(super) const BLOCK: usize = 32;
+
+/// One number for each cell of a block.
+pub(super) type Block<T> = [T; BLOCK];
+
+/// The centres of all cells, Cartesian and polar, in a frame whose second axis `z` points to where azimuths grow:
+/// y for sensors that turn counter-clockwise, -y for the others. So nothing further on asks for the sense.
+/// Rows are padded to whole blocks with cells at the sensor.
+#[derive(Debug)]
+pub(super) struct Cells {
+    n: usize,
+    cell_m: f32,
+    sense: Sense,
+    /// Metres along `z` of each column.
+    z_m: Vec<Block<f32>>,
+    /// Turns from straight ahead toward `z`, `[0, 1]`, row by row.
+    bearing: Vec<Block<f32>>,
+    /// Metres from the sensor, row by row.
+    range_m: Vec<Block<f32>>,
+    /// Range of the corners, metres.
+    pub furthest_m: f32,
+}
+
+/// One row of the raster.
+pub(super) struct CellRow<'a> {
+    /// Metres ahead, the same for the whole row.
+    pub x_m: f32,
+    /// See [`Cells`]; all three have as many blocks.
+    pub z_m: &'a [Block<f32>],
+    pub bearing: &'a [Block<f32>],
+    pub range_m: &'a [Block<f32>],
+}
+
+impl Cells {
+    pub fn new(n: usize, cell_m: f32, sense: Sense) -> Self {
+        let blocks = n.div_ceil(BLOCK);
+        let mut cells = Self {
+            n,
+            cell_m,
+            sense,
+            z_m: vec![[0.0; BLOCK]; blocks],
+            bearing: vec![[0.0; BLOCK]; n * blocks],
+            range_m: vec![[0.0; BLOCK]; n * blocks],
+            furthest_m: 0.5 * (n as f32 - 1.0) * cell_m * SQRT_2,
+        };
+        cells.compute();
+        cells
+    }
+
+    /// Turns the frame to the scan's sense; a dataset has one, so this computes at most once.
+    pub fn look_in(&mut self, sense: Sense) {
+        if self.sense != sense {
+            self.sense = sense;
+            self.compute();
+        }
+    }
+
+    /// Blocks of a row.
+    pub fn blocks(&self) -> usize {
+        self.z_m.len()
+    }
+
+    pub fn row(&self, index: usize) -> CellRow<'_> {
+        let blocks = index * self.blocks()..(index + 1) * self.blocks();
+        CellRow {
+            x_m: self.offset_m(index) as f32,
+            z_m: &self.z_m,
+            bearing: &self.bearing[blocks.clone()],
+            range_m: &self.range_m[blocks],
+        }
+    }
+
+    /// Metres from the sensor to the centre of a row (ahead) or column (left).
+    fn offset_m(&self, index: usize) -> f64 {
+        (0.5 * (self.n as f64 - 1.0) - index as f64) * f64::from(self.cell_m)
+    }
+
+    fn compute(&mut self) {
+        let side = match self.sense {
+            Sense::Clockwise => -1.0,
+            Sense::CounterClockwise => 1.0,
+        };
+        for row in 0..self.n {
+            let x = self.offset_m(row);
+            for column in 0..self.n {
+                let z = side * self.offset_m(column);
+                let (block, k) = (column / BLOCK, column % BLOCK);
+                let of_row = row * self.blocks() + block;
+                self.z_m[block][k] = z as f32;
+                self.bearing[of_row][k] = (z.atan2(x) / TAU).rem_euclid(1.0) as f32;
+                self.range_m[of_row][k] = x.hypot(z) as f32;
+            }
+        }
+    }
+}

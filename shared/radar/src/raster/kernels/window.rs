@@ -1,0 +1,225 @@
+//! Averaging along range, one azimuth at a time.
+
+use multiversion::multiversion;
+
+/// A sample's unit: 1/256 of the scan's. The largest mean, 255, just fits a u16.
+pub const UNIT: u32 = 256;
+
+/// Pieces that a window spans at least, if it has as many bins.
+const PIECES_A_WINDOW: f32 = 4.0;
+
+/// The most bins in a piece: its sum must fit a u16.
+const MAX_BINS_A_PIECE: usize = 128;
+
+/// Weights of a mean over a stretch of range, as fixed-point numbers.
+///
+/// The bins come in *pieces*, sums of 1, 2, 4, ... bins. The window's middle pieces count in full, one more on each side in part.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Window {
+    /// A power of two.
+    pub bins_a_piece: usize,
+    /// Pieces that count in full; odd.
+    full: usize,
+    /// 65536 UNIT over the window's length in bins.
+    full_weight: u32,
+    /// The same times the share of the outer two.
+    part_weight: u32,
+}
+
+impl Window {
+    /// A window of so many bins; less than one counts as one.
+    pub fn new(bins: f32) -> Self {
+        let bins = f64::from(bins.max(1.0));
+        let mut bins_a_piece = 1;
+        while bins_a_piece < MAX_BINS_A_PIECE && bins >= (2 * bins_a_piece) as f64 * f64::from(PIECES_A_WINDOW) {
+            bins_a_piece *= 2;
+        }
+        let beside_middle = 0.5 * (bins / bins_a_piece as f64 - 1.0);
+        let weight = 65536.0 * f64::from(UNIT) / bins;
+        // Rounded down, so that a window of 255s cannot overflow.
+        Self {
+            bins_a_piece,
+            full: 2 * beside_middle as usize + 1,
+            full_weight: weight as u32,
+            part_weight: (weight * beside_middle.fract()) as u32,
+        }
+    }
+
+    /// Pieces on either side of the middle one.
+    pub fn reach(&self) -> usize {
+        self.full / 2 + 1
+    }
+}
+
+/// Writes the sums of pieces of the powers above the floor; `above_floor` is room for them.
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+pub fn sum_pieces(powers: &[u8], floor: u8, bins_a_piece: usize, above_floor: &mut [u8], pieces: &mut [u16]) {
+    let above_floor = &mut above_floor[..powers.len()];
+    for (above, &power) in above_floor.iter_mut().zip(powers) {
+        *above = power.saturating_sub(floor);
+    }
+    match bins_a_piece {
+        1 => sum_each(above_floor, pieces, |[a]: [u8; 1]| u16::from(a)),
+        2 => sum_each(above_floor, pieces, sum_2),
+        4 => sum_each(above_floor, pieces, sum_4),
+        _ => sum_long(above_floor, bins_a_piece, pieces),
+    }
+}
+
+/// Written as arithmetic on whole words, which compilers vectorise where they do not see through sums of bytes.
+#[inline(always)]
+fn sum_2(bytes: [u8; 2]) -> u16 {
+    let word = u16::from_le_bytes(bytes);
+    (word & 0xff) + (word >> 8)
+}
+
+#[inline(always)]
+fn sum_4(bytes: [u8; 4]) -> u16 {
+    let word = u32::from_le_bytes(bytes);
+    let pairs = (word & 0x00ff_00ff) + ((word >> 8) & 0x00ff_00ff);
+    (pairs + (pairs >> 16)) as u16
+}
+
+#[inline(always)]
+fn sum_each<const BINS: usize>(bins: &[u8], pieces: &mut [u16], sum: impl Fn([u8; BINS]) -> u16) {
+    let (whole, rest) = bins.as_chunks::<BINS>();
+    for (piece, bins) in pieces.iter_mut().zip(whole) {
+        *piece = sum(*bins);
+    }
+    if let (false, Some(last)) = (rest.is_empty(), pieces.get_mut(whole.len())) {
+        *last = rest.iter().map(|&bin| u16::from(bin)).sum();
+    }
+}
+
+#[inline(always)]
+fn sum_long(bins: &[u8], bins_a_piece: usize, pieces: &mut [u16]) {
+    for (piece, bins) in pieces.iter_mut().zip(bins.chunks(bins_a_piece)) {
+        let (whole, rest) = bins.as_chunks::<4>();
+        let rest: u16 = rest.iter().map(|&bin| u16::from(bin)).sum();
+        *piece = rest + whole.iter().map(|&bins| sum_4(bins)).sum::<u16>();
+    }
+}
+
+/// Columns that are averaged together, so that their sums stay in registers.
+const BLOCK: usize = 32;
+
+/// Writes the window's mean at each column; column `c` is centred on `pieces[c + window.reach()]`.
+/// Needs `out.len() + 2 * window.reach()` pieces.
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+pub fn average(pieces: &[u16], window: &Window, out: &mut [u16]) {
+    let (blocks, rest) = out.as_chunks_mut::<BLOCK>();
+    let done = blocks.len() * BLOCK;
+    for (block, first) in blocks.iter_mut().zip((0..).step_by(BLOCK)) {
+        *block = average_block(&pieces[first..], window);
+    }
+    for (mean, first) in rest.iter_mut().zip(done..) {
+        *mean = average_block::<1>(&pieces[first..], window)[0];
+    }
+}
+
+#[inline(always)]
+fn average_block<const COLUMNS: usize>(pieces: &[u16], window: &Window) -> [u16; COLUMNS] {
+    let mut full = [0u32; COLUMNS];
+    for shift in 1..=window.full {
+        add(&mut full, &pieces[shift..]);
+    }
+    let mut parts = [0u32; COLUMNS];
+    add(&mut parts, pieces);
+    add(&mut parts, &pieces[window.full + 1..]);
+    let mut means = [0; COLUMNS];
+    for ((mean, full), part) in means.iter_mut().zip(full).zip(parts) {
+        *mean = ((full * window.full_weight + part * window.part_weight + 0x8000) >> 16) as u16;
+    }
+    means
+}
+
+#[inline(always)]
+fn add<const COLUMNS: usize>(sums: &mut [u32; COLUMNS], pieces: &[u16]) {
+    for (sum, &piece) in sums.iter_mut().zip(&pieces[..COLUMNS]) {
+        *sum += u32::from(piece);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// The mean over the bins of `[centre - width / 2, centre + width / 2]`, ends in part, nothing outside of the scan.
+    fn direct_mean(bins: &[u8], floor: u8, centre: f64, width: f64) -> f64 {
+        let (start, end) = (centre - 0.5 * width, centre + 0.5 * width);
+        let covered = |bin: usize| ((bin + 1) as f64).min(end) - (bin as f64).max(start);
+        let sum: f64 = (0..bins.len())
+            .map(|bin| covered(bin).max(0.0) * f64::from(bins[bin].saturating_sub(floor)))
+            .sum();
+        sum / width
+    }
+
+    /// Where ends of windows fall inside of a piece, its bins count alike.
+    fn evened(bins: &[u8], floor: u8, bins_a_piece: usize) -> Vec<f64> {
+        let above = |bin: &u8| f64::from(bin.saturating_sub(floor));
+        bins.chunks(bins_a_piece)
+            .flat_map(|piece| vec![piece.iter().map(above).sum::<f64>() / bins_a_piece as f64; bins_a_piece])
+            .collect()
+    }
+
+    fn means(bins: &[u8], floor: u8, window: &Window) -> Vec<u16> {
+        let reach = window.reach();
+        let count = bins.len().div_ceil(window.bins_a_piece);
+        let mut pieces = vec![0; count + 2 * reach];
+        let mut room = vec![0; bins.len()];
+        sum_pieces(bins, floor, window.bins_a_piece, &mut room, &mut pieces[reach..reach + count]);
+        let mut out = vec![0; count];
+        average(&pieces, window, &mut out);
+        out
+    }
+
+    proptest! {
+        #[test]
+        fn mean_equals_direct_mean(
+            bins in proptest::collection::vec(0u8..=255, 1..600), floor in 0u8..120, width in 0.1..300.0f32,
+        ) {
+            let window = Window::new(width);
+            let width = f64::from(width.max(1.0));
+            let evened = evened(&bins, floor, window.bins_a_piece);
+            for (piece, mean) in means(&bins, floor, &window).into_iter().enumerate() {
+                let centre = (piece as f64 + 0.5) * window.bins_a_piece as f64;
+                let (start, end) = (centre - 0.5 * width, centre + 0.5 * width);
+                let covered = |bin: usize| (((bin + 1) as f64).min(end) - (bin as f64).max(start)).max(0.0);
+                let expected = evened.iter().enumerate().map(|(bin, power)| power * covered(bin)).sum::<f64>() / width;
+                let got = f64::from(mean) / f64::from(UNIT);
+                prop_assert!((got - expected).abs() < 0.02, "piece {piece}: {got} for {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn ends_inside_a_piece_change_the_mean_of_a_real_profile_little() {
+        let bins: Vec<u8> = (0..3768u32).map(|bin| (60 + (bin * 7919 % 61) + 90 * u32::from(bin % 211 < 9)) as u8).collect();
+        let window = Window::new(18.26);
+        let worst = means(&bins, 60, &window).into_iter().enumerate().map(|(piece, mean)| {
+            let centre = (piece as f64 + 0.5) * window.bins_a_piece as f64;
+            (f64::from(mean) / f64::from(UNIT) - direct_mean(&bins, 60, centre, 18.26)).abs()
+        });
+        assert!(worst.fold(0.0, f64::max) < 5.0);
+    }
+
+    #[test]
+    fn a_window_of_the_brightest_bins_does_not_overflow() {
+        for width in [1.0, 2.5, 18.26, 127.9, 1e3, 1e5] {
+            let window = Window::new(width);
+            let bins = vec![255; 3 * width as usize + 2 * window.bins_a_piece];
+            let means = means(&bins, 0, &window);
+            let middle = f64::from(means[means.len() / 2]) / f64::from(UNIT);
+            assert!((middle - 255.0).abs() < 2.0, "width {width}: {middle}");
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! A twist as the loops over cells use it.
+
+use super::RasterError;
+use super::bearing_table::seconds_from_stamp;
+use super::twist::Twist;
+use crate::scan::{PolarScan, Sense};
+
+/// The furthest that a compensated sensor may turn between the scan's stamp and any azimuth, radians.
+pub const MAX_TURN_RAD: f64 = 2.0;
+
+/// The furthest that it may travel in that time, metres.
+pub const MAX_TRAVEL_M: f64 = 1e4;
+
+/// A sensor's motion within the sweep, in the frame of [`super::cells::Cells`].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SweepMotion {
+    vx_mps: f32,
+    vz_mps: f32,
+    half_yaw_rate_radps: f32,
+    /// No azimuth was measured further than this from where the sensor stood at the scan's stamp, metres.
+    pub travel_m: f32,
+}
+
+impl SweepMotion {
+    pub fn new(twist: Twist, scan: &PolarScan<'_>) -> Result<Self, RasterError> {
+        let longest_s = (0..scan.geometry.azimuths)
+            .map(|azimuth| seconds_from_stamp(scan, azimuth).abs())
+            .fold(0.0, f64::max);
+        let turn_rad = (twist.yaw_rate_radps * longest_s).abs();
+        let travel_m = twist.speed_mps() * longest_s;
+        if !(turn_rad <= MAX_TURN_RAD && travel_m <= MAX_TRAVEL_M) {
+            return Err(RasterError::Twist {
+                twist,
+                turn_rad,
+                travel_m,
+            });
+        }
+        let seen = match scan.geometry.sense {
+            Sense::Clockwise => twist.mirrored(),
+            Sense::CounterClockwise => twist,
+        };
+        Ok(Self {
+            vx_mps: seen.vx_mps as f32,
+            vz_mps: seen.vy_mps as f32,
+            half_yaw_rate_radps: (0.5 * seen.yaw_rate_radps) as f32,
+            travel_m: travel_m as f32,
+        })
+    }
+
+    /// A point, given in the frame at the scan's stamp, in the sensor's frame `t_s` seconds later: exp(twist t)^-1 p.
+    ///
+    /// With R the turn by half of the yaw, the pose at t is (R d, R R), where d is the arc drawn straight to its
+    /// chord; so its inverse takes p to R' (R' p - d).
+    #[inline(always)]
+    pub fn in_sensor(&self, x: f32, z: f32, t_s: f32) -> (f32, f32) {
+        let half = self.half_yaw_rate_radps * t_s;
+        let (sinc, cos) = sinc_cos(half);
+        let (sin, chord_s) = (half * sinc, t_s * sinc);
+        let (x, z) = (cos * x + sin * z, cos * z - sin * x);
+        let (x, z) = (x - self.vx_mps * chord_s, z - self.vz_mps * chord_s);
+        (cos * x + sin * z, cos * z - sin * x)
+    }
+}
+
+/// (sin x / x, cos x), right to 1e-6 for |x| <= MAX_TURN_RAD / 2: the first terms of their series.
+#[inline(always)]
+fn sinc_cos(x: f32) -> (f32, f32) {
+    let s = x * x;
+    let sinc = 1.0 + s * (-1.0 / 6.0 + s * (1.0 / 120.0 + s * (-1.0 / 5040.0 + s / 362_880.0)));
+    let cos = 1.0 + s * (-0.5 + s * (1.0 / 24.0 + s * (-1.0 / 720.0 + s * (1.0 / 40_320.0))));
+    (sinc, cos)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn sinc_and_cosine_hold_over_the_permitted_turn(x in -1.0..1.0f32) {
+            let (sinc, cos) = sinc_cos(x);
+            let x = f64::from(x);
+            prop_assert!((f64::from(sinc) * x - x.sin()).abs() < 1e-6);
+            prop_assert!((f64::from(cos) - x.cos()).abs() < 1e-6);
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! Images without metadata that lie on their side: rows are range (the first is the nearest), columns azimuth from straight ahead.
+
+use crate::detect::Found;
+use crate::error::{OpenError, ReadError};
+use crate::images::Images;
+use crate::navtech_png::fill_uniform;
+use crate::navtech_scans::check_room;
+use crate::options::{DatasetOptions, Format};
+use crate::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, Sense, SweepGeometry, flag};
+
+/// Pixels of a square that is turned at once: a cache line wide, so that neither side is walked through memory pixel by pixel.
+const BLOCK: usize = 64;
+
+/// Such images, and the memory to turn them. An image that is wider than high counts as upright: rows are azimuth.
+#[derive(Debug)]
+pub(crate) struct SidewaysScans {
+    pub(crate) images: Images,
+    pub(crate) range_resolution_m: f32,
+    range_offset_m: f32,
+    scratch: Vec<u8>,
+}
+
+impl SidewaysScans {
+    /// `metres_a_bin` gives the format's resolution from the number of range bins.
+    pub(crate) fn open(
+        found: Found,
+        options: &DatasetOptions,
+        metres_a_bin: impl FnOnce(usize) -> f32,
+    ) -> Result<(Self, Vec<String>), OpenError> {
+        let Found { format, images, mut notes, .. } = found;
+        options.check_without_encoder(format)?;
+        let mut scans = Self { images, range_resolution_m: 0.0, range_offset_m: options.range_offset_m.unwrap_or(0.0), scratch: Vec::new() };
+        scans.check_shape(format)?;
+        scans.range_resolution_m = options.range_resolution_m.unwrap_or_else(|| metres_a_bin(scans.bins()));
+        if scans.on_their_side() {
+            scans.scratch = vec![0; scans.images.size.bytes()];
+            let size = scans.images.size;
+            notes.push(format!(
+                "Images lie on their side ({} rows of range x {} columns of azimuth): each is turned on reading.",
+                size.height, size.width
+            ));
+        }
+        Ok((scans, notes))
+    }
+
+    fn check_shape(&self, format: Format) -> Result<(), OpenError> {
+        if (2..=MAX_AZIMUTHS).contains(&self.azimuths()) {
+            return Ok(());
+        }
+        let reason = format!("it needs 2 to {MAX_AZIMUTHS} azimuths along its shorter side");
+        Err(OpenError::WrongImage { path: self.images.file(0).to_owned(), actual: self.images.size, format, reason })
+    }
+
+    pub(crate) fn on_their_side(&self) -> bool {
+        self.images.size.height > self.images.size.width
+    }
+
+    pub(crate) fn azimuths(&self) -> usize {
+        self.images.size.height.min(self.images.size.width)
+    }
+
+    pub(crate) fn bins(&self) -> usize {
+        self.images.size.height.max(self.images.size.width)
+    }
+
+    pub(crate) fn limits(&self) -> ScanLimits {
+        ScanLimits { bytes: self.images.size.bytes(), azimuths: self.azimuths() }
+    }
+
+    /// Reads a scan whose sweep starts at `start_ns` and takes `period_ns`; its time is the mean of its azimuths'.
+    pub(crate) fn read(
+        &mut self,
+        index: usize,
+        slot: ScanSlot<'_>,
+        start_ns: i64,
+        period_ns: i64,
+    ) -> Result<SweepGeometry, ReadError> {
+        let (azimuths, bins) = (self.azimuths(), self.bins());
+        check_room("bytes", azimuths * bins, slot.bytes.len())?;
+        check_room("azimuths", azimuths, slot.azimuth_rad.len())?;
+        check_room("stamps", azimuths, slot.stamp_ns.len())?;
+        check_room("flags", azimuths, slot.flags.len())?;
+        if self.on_their_side() {
+            self.images.decode(index, &mut self.scratch)?;
+            transpose(&self.scratch, azimuths, &mut slot.bytes[..azimuths * bins]);
+        } else {
+            self.images.decode(index, slot.bytes)?;
+        }
+        fill_uniform(&mut slot.azimuth_rad[..azimuths]);
+        slot.flags[..azimuths].fill(flag::MEASURED);
+        for (column, stamp) in slot.stamp_ns[..azimuths].iter_mut().enumerate() {
+            *stamp = start_ns + period_ns * column as i64 / azimuths as i64;
+        }
+        Ok(self.geometry(start_ns + mean_after_start_ns(period_ns, azimuths)))
+    }
+
+    fn geometry(&self, stamp_ns: i64) -> SweepGeometry {
+        SweepGeometry {
+            azimuths: self.azimuths(),
+            bins: self.bins(),
+            stride: self.bins(),
+            first_byte: 0,
+            range_resolution_m: self.range_resolution_m,
+            range_offset_m: self.range_offset_m,
+            sense: Sense::Clockwise,
+            stamp_ns,
+        }
+    }
+}
+
+/// Mean time of `azimuths` columns spread evenly over a period, from the first.
+pub(crate) fn mean_after_start_ns(period_ns: i64, azimuths: usize) -> i64 {
+    let n = azimuths as i64;
+    period_ns * (n - 1) / (2 * n)
+}
+
+/// `to[column][row] = from[row][column]`, for `from` of `columns` columns and `to` of the same size.
+fn transpose(from: &[u8], columns: usize, to: &mut [u8]) {
+    let rows = from.len() / columns;
+    for top in (0..rows).step_by(BLOCK) {
+        let bottom = (top + BLOCK).min(rows);
+        for left in (0..columns).step_by(BLOCK) {
+            for column in left..(left + BLOCK).min(columns) {
+                let line = &mut to[column * rows + top..column * rows + bottom];
+                for (row, into) in (top..bottom).zip(line) {
+                    *into = from[row * columns + column];
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn transposing_equals_the_direct_sum_of_indices(rows in 1_usize..150, columns in 1_usize..150) {
+            let from: Vec<u8> = (0..rows * columns).map(|i| (i * 7 % 251) as u8).collect();
+            let mut to = vec![0; from.len()];
+            transpose(&from, columns, &mut to);
+            for row in 0..rows {
+                for column in 0..columns {
+                    prop_assert_eq!(to[column * rows + row], from[row * columns + column]);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! Times as datasets write them: integers of s, ms, us or ns since 1970, and decimal seconds.
+
+/// Nanoseconds of a second.
+pub(crate) const SECOND_NS: i64 = 1_000_000_000;
+
+/// 2015-01-01 and 2041-01-01, s since 1970: no recording is older, and none can be younger.
+const YEARS_S: std::ops::Range<i64> = 1_420_070_400..2_240_611_200;
+
+/// Whether a time in ns lies in the years 2015 to 2040.
+pub(crate) fn plausible(stamp_ns: i64) -> bool {
+    YEARS_S.contains(&stamp_ns.div_euclid(SECOND_NS))
+}
+
+/// A stamp in ns, whatever its unit was: the years 2015 to 2040 do not overlap in s, ms, us and ns.
+pub(crate) fn to_ns(raw: i64) -> Option<i64> {
+    [1, 1_000, 1_000_000, SECOND_NS].into_iter().filter_map(|unit| raw.checked_mul(unit)).find(|ns| plausible(*ns))
+}
+
+/// Decimal seconds as ns, exactly: `12.5` is 12,500,000,000. Exponents are accepted and go through `f64`.
+pub(crate) fn parse_seconds(text: &str) -> Option<i64> {
+    let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
+    let digits = |t: &str| t.bytes().all(|b| b.is_ascii_digit());
+    let unsigned = whole.strip_prefix('-').unwrap_or(whole);
+    if unsigned.is_empty() || !digits(unsigned) || !digits(fraction) {
+        return rounded_ns(text.parse().ok()?);
+    }
+    let sign = if whole.starts_with('-') { -1 } else { 1 };
+    let seconds: i64 = unsigned.parse().ok()?;
+    let nanoseconds = format!("{fraction:0<9}").get(..9)?.parse::<i64>().ok()?;
+    seconds.checked_mul(SECOND_NS)?.checked_add(nanoseconds).map(|ns| sign * ns)
+}
+
+fn rounded_ns(seconds: f64) -> Option<i64> {
+    let ns = seconds * 1e9;
+    (ns.is_finite() && ns.abs() < 9.2e18).then_some(ns.round() as i64)
+}
+
+/// `a + b / 2` without overflow: the middle of two times.
+pub(crate) fn middle(first_ns: i64, last_ns: i64) -> i64 {
+    first_ns + (last_ns - first_ns) / 2
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn the_unit_follows_from_the_size() {
+        for raw in [1_547_131_046, 1_547_131_046_000, 1_547_131_046_000_000, 1_547_131_046_000_000_000] {
+            assert_eq!(to_ns(raw), Some(1_547_131_046_000_000_000), "{raw}");
+        }
+        for raw in [0, -1, 586, 1_000_000_000, i64::MAX, i64::MIN] {
+            assert_eq!(to_ns(raw), None, "{raw}");
+        }
+    }
+
+    #[test]
+    fn decimal_seconds_keep_every_nanosecond() {
+        assert_eq!(parse_seconds("1549986606.800100001"), Some(1_549_986_606_800_100_001));
+        assert_eq!(parse_seconds("0"), Some(0));
+        assert_eq!(parse_seconds("-1.5"), Some(-1_500_000_000));
+        assert_eq!(parse_seconds("1.5e3"), Some(1_500_000_000_000));
+        assert_eq!(parse_seconds("1.1234567899"), Some(1_123_456_789));
+        for bad in ["", "nan", "inf", "1.2.3", "x", "1e300"] {
+            assert_eq!(parse_seconds(bad), None, "{bad}");
+        }
+    }
+}

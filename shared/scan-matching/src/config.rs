@@ -1,0 +1,257 @@
+//! What a search can be told. Every key has a default; an impossible value names itself.
+
+use serde::{Deserialize, Serialize};
+
+/// A value that no search can be built from.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{section}.{key} = {actual}: expected {expected}")]
+pub struct ConfigError {
+    /// Section of the configuration: `rotation` or `translation`.
+    pub section: &'static str,
+    /// Key within the section.
+    pub key: &'static str,
+    /// The value as given.
+    pub actual: String,
+    /// What would have been accepted.
+    pub expected: &'static str,
+}
+
+/// How the two polar spectra are compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum RotationForm {
+    /// Circular correlation along the angle, summed over radii (Weston et al., Eq. 7).
+    #[default]
+    #[serde(rename = "eq7")]
+    Eq7,
+    /// Mean over all radial shifts (Weston et al., Algorithm 1, line 14), which is the correlation of
+    /// the two profiles summed over the radius.
+    #[serde(rename = "line14")]
+    ProfileMean,
+}
+
+/// What is taken of a spectrum's modulus.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Magnitude {
+    /// The modulus itself: the strongest structure decides.
+    Linear,
+    /// ln(1 + modulus / mean modulus of the band), so that many weak directions count beside one strong street.
+    #[default]
+    Log,
+}
+
+/// Weight over the raster before the rotation's transform.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Window {
+    /// No weight. For rasters that already end in zeros.
+    None,
+    /// Product of two Hann windows (Weston et al., Algorithm 1, line 5).
+    Hann,
+    /// Hann window of the range: alike in all directions, so it adds none of its own to the spectrum.
+    #[default]
+    RadialHann,
+}
+
+/// How a peak is placed between samples.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Peak {
+    /// A Gaussian over a pedestal, the lowest of the neighbouring samples: off by up to 0.02 of a step.
+    #[default]
+    Gaussian,
+    /// Parabola through three samples of each axis: off by up to 0.1 of a step on narrow peaks.
+    Parabola,
+    /// Mean of all positions within reach, weighted with exp(temperature z), where z is the score less
+    /// the highest score, over the scores' standard deviation (Weston et al., Algorithm 1, lines 15 and 19).
+    SoftArgmax {
+        /// Inverse width of the weight; 2 for the angle and 1 for the shift in the paper.
+        temperature: f64,
+    },
+}
+
+/// What makes up for an overlap that shrinks as the shift grows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Overlap {
+    /// Nothing: the correlation as it is, biased toward zero shift.
+    None,
+    /// Divide by the share of cells that overlap.
+    Area,
+    /// Divide by the energy that each raster has within the overlap, which makes every value a
+    /// correlation coefficient of what both scans see.
+    #[default]
+    Energy,
+}
+
+/// Configuration of [`RotationSearch`](crate::RotationSearch): section `[rotation]`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RotationConfig {
+    /// `eq7` or `line14`.
+    pub form: RotationForm,
+    /// `linear` or `log`.
+    pub magnitude: Magnitude,
+    /// Keep only the phase of the polar spectra's own transform (Checchin et al., Eq. 6).
+    pub phase_only: bool,
+    /// `none`, `hann` or `radial_hann`.
+    pub window: Window,
+    /// Lower end of the band, cycles a cell. What is longer than 20 cells says little about the angle and is ruled
+    /// by the range's fall-off, which does not turn with the scene.
+    pub band_low: f64,
+    /// Upper end of the band, cycles a cell; below 0.5.
+    pub band_high: f64,
+    /// Samples of the angle over half a turn. Products of small primes are fast; 733 (the paper) costs six times more.
+    pub angles: usize,
+    /// Samples of the radius over the band; left out: about one a frequency bin.
+    pub radii: Option<usize>,
+    /// Largest angle searched to either side, degrees; at most 90.
+    pub reach_deg: f64,
+    /// How the peak is placed between samples.
+    pub peak: Peak,
+    /// Factor on the variance that the peak's curvature gives, calibrated where the truth is known.
+    pub variance_scale: f64,
+}
+
+impl Default for RotationConfig {
+    fn default() -> Self {
+        Self {
+            form: RotationForm::default(),
+            magnitude: Magnitude::default(),
+            phase_only: false,
+            window: Window::default(),
+            band_low: 0.05,
+            band_high: 0.45,
+            angles: 576,
+            radii: None,
+            reach_deg: 20.0,
+            peak: Peak::default(),
+            variance_scale: 1.0,
+        }
+    }
+}
+
+/// Configuration of [`TranslationSearch`](crate::TranslationSearch): section `[translation]`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TranslationConfig {
+    /// Largest shift searched along each axis, m.
+    pub reach_m: f64,
+    /// Keep only the phase of the cross-spectrum (Checchin et al., Eq. 6).
+    pub phase_only: bool,
+    /// What makes up for the shrinking overlap; without effect where `phase_only`.
+    pub overlap: Overlap,
+    /// How the peak is placed between cells.
+    pub peak: Peak,
+    /// Also try the angle half a turn away and keep the better match: magnitude spectra cannot tell the two apart.
+    pub half_turn: bool,
+    /// Factor on the covariance that the peak's curvature gives, calibrated where the truth is known.
+    pub variance_scale: f64,
+}
+
+impl Default for TranslationConfig {
+    fn default() -> Self {
+        Self {
+            reach_m: 12.0,
+            phase_only: false,
+            overlap: Overlap::default(),
+            peak: Peak::default(),
+            half_turn: false,
+            variance_scale: 1.0,
+        }
+    }
+}
+
+impl RotationConfig {
+    /// The search as Weston et al. print it in Algorithm 1, its slips put right.
+    pub fn weston() -> Self {
+        Self {
+            form: RotationForm::ProfileMean,
+            magnitude: Magnitude::Linear,
+            window: Window::Hann,
+            angles: 733,
+            band_low: 0.01,
+            band_high: 0.35,
+            peak: Peak::Parabola,
+            ..Self::default()
+        }
+    }
+
+    /// Phase correlation in (rho, theta) at radial shift 0 (Checchin et al., Algorithm 1, lines 6 to 8).
+    pub fn checchin() -> Self {
+        Self { magnitude: Magnitude::Linear, phase_only: true, ..Self::default() }
+    }
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The first key that no search can be built from.
+    pub fn validate(&self) -> Result<(), ConfigError> {
+        let check = |good, key, actual: &dyn ToString, expected| accept(good, "rotation", key, actual, expected);
+        check(
+            self.band_low >= 0.0 && self.band_low < self.band_high,
+            "band_low",
+            &self.band_low,
+            "at least 0 and below band_high",
+        )?;
+        check(self.band_high < 0.5, "band_high", &self.band_high, "cycles a cell, below 0.5")?;
+        check((16..=1 << 14).contains(&self.angles), "angles", &self.angles, "16 to 16384")?;
+        let radii = self.radii.unwrap_or(2);
+        check((2..=1 << 13).contains(&radii), "radii", &radii, "2 to 8192")?;
+        check(self.reach_deg > 0.0 && self.reach_deg <= 90.0, "reach_deg", &self.reach_deg, "above 0, at most 90")?;
+        check(positive(self.variance_scale), "variance_scale", &self.variance_scale, "a positive number")?;
+        check(self.peak.is_valid(), "peak.soft_argmax.temperature", &self.peak.temperature(), "a positive number")
+    }
+}
+
+impl TranslationConfig {
+    /// The search as Weston et al. print it in Algorithm 1: no normalisation of the overlap.
+    pub fn weston() -> Self {
+        Self { overlap: Overlap::None, peak: Peak::Parabola, ..Self::default() }
+    }
+
+    /// Phase correlation in (x, y) (Checchin et al., Algorithm 1, lines 10 to 13).
+    pub fn checchin() -> Self {
+        Self { phase_only: true, ..Self::default() }
+    }
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The first key that no search can be built from.
+    pub fn validate(&self) -> Result<(), ConfigError> {
+        let check = |good, key, actual: &dyn ToString, expected| accept(good, "translation", key, actual, expected);
+        check(positive(self.reach_m), "reach_m", &self.reach_m, "metres, above 0")?;
+        check(positive(self.variance_scale), "variance_scale", &self.variance_scale, "a positive number")?;
+        check(self.peak.is_valid(), "peak.soft_argmax.temperature", &self.peak.temperature(), "a positive number")
+    }
+}
+
+impl Peak {
+    /// The temperature, where the peak has one; 1 otherwise.
+    fn temperature(&self) -> f64 {
+        match *self {
+            Peak::SoftArgmax { temperature } => temperature,
+            _ => 1.0,
+        }
+    }
+
+    fn is_valid(&self) -> bool {
+        positive(self.temperature())
+    }
+}
+
+fn positive(value: f64) -> bool {
+    value.is_finite() && value > 0.0
+}
+
+/// Refuses `actual` unless it is `good`.
+pub(crate) fn accept(
+    good: bool,
+    section: &'static str,
+    key: &'static str,
+    actual: &dyn ToString,
+    expected: &'static str,
+) -> Result<(), ConfigError> {
+    if good { Ok(()) } else { Err(ConfigError { section, key, actual: actual.to_string(), expected }) }
+}

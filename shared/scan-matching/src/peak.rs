@@ -1,0 +1,197 @@
+//! Peaks between samples: where a sampled correlation has its maximum, how high and how sharp it is there.
+//!
+//! A parabola through three samples is pulled toward the middle one, by up to 0.1 of a step where the peak is narrow.
+//! Correlations of scatterers that a radar smears are nearer to Gaussians over a pedestal, whose logarithm is a parabola.
+
+use nalgebra::{Matrix2, Vector2};
+
+use crate::config::Peak;
+
+/// Samples on each side of the highest one that a fit looks at.
+pub(crate) const SUPPORT: usize = 3;
+
+/// A fit leaves the highest sample by no more than this, in samples.
+const FARTHEST: f64 = 0.75;
+
+/// The pedestal lies below the lowest sample by this share of the range, so that its logarithm exists.
+const BELOW_LOWEST: f64 = 0.05;
+
+/// Maximum along one axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct LinePeak {
+    /// Place, in samples from the highest one.
+    pub offset: f64,
+    /// Fitted height.
+    pub value: f64,
+    /// Second derivative there, a squared sample.
+    pub curvature: f64,
+}
+
+/// Maximum in the plane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PlanePeak {
+    /// Place (row, column), in samples from the highest one.
+    pub offset: Vector2<f64>,
+    /// Fitted height.
+    pub value: f64,
+    /// Second derivatives there, a squared sample.
+    pub hessian: Matrix2<f64>,
+}
+
+/// The maximum next to the highest sample, `sample(0)`, of a line.
+pub(crate) fn line_peak(kind: Peak, sample: impl Fn(isize) -> f64) -> LinePeak {
+    let near = [sample(-1), sample(0), sample(1)];
+    if kind == Peak::Parabola {
+        return line_parabola(near);
+    }
+    let reach = SUPPORT as isize;
+    let level = pedestal((-reach..=reach).map(&sample), near[1]);
+    let log = line_parabola(near.map(|v| (v - level).ln()));
+    if !(log.curvature < 0.0) {
+        return line_parabola(near);
+    }
+    let height = log.value.exp();
+    LinePeak { offset: log.offset, value: level + height, curvature: height * log.curvature }
+}
+
+/// The maximum next to the highest sample, `sample(0, 0)`, of a plane.
+pub(crate) fn plane_peak(kind: Peak, sample: impl Fn(isize, isize) -> f64) -> PlanePeak {
+    let near = std::array::from_fn(|i| std::array::from_fn(|j| sample(i as isize - 1, j as isize - 1)));
+    if kind == Peak::Parabola {
+        return plane_parabola(near);
+    }
+    let reach = SUPPORT as isize;
+    let level = pedestal((-reach..=reach).flat_map(|i| (-reach..=reach).map(move |j| (i, j))).map(|(i, j)| sample(i, j)), near[1][1]);
+    match paraboloid(near.map(|row: [f64; 3]| row.map(|v| (v - level).ln()))) {
+        Some(log) => {
+            let height = log.value.exp();
+            PlanePeak { offset: log.offset, value: level + height, hessian: log.hessian * height }
+        }
+        None => plane_parabola(near),
+    }
+}
+
+/// What a Gaussian peak of height `highest` stands on, from the samples around it.
+fn pedestal(around: impl Iterator<Item = f64>, highest: f64) -> f64 {
+    let lowest = around.fold(highest, f64::min);
+    lowest - BELOW_LOWEST * (highest - lowest)
+}
+
+fn line_parabola([a, b, c]: [f64; 3]) -> LinePeak {
+    let curvature = a - 2.0 * b + c;
+    let offset = if curvature < 0.0 { (0.5 * (a - c) / curvature).clamp(-FARTHEST, FARTHEST) } else { 0.0 };
+    LinePeak { offset, value: b - 0.25 * (a - c) * offset, curvature }
+}
+
+/// One parabola through three samples of each axis; the corners give the cross term.
+fn plane_parabola(near: [[f64; 3]; 3]) -> PlanePeak {
+    let down = line_parabola([near[0][1], near[1][1], near[2][1]]);
+    let right = line_parabola(near[1]);
+    let cross = 0.25 * (near[2][2] - near[2][0] - near[0][2] + near[0][0]);
+    PlanePeak {
+        offset: Vector2::new(down.offset, right.offset),
+        value: down.value + right.value - near[1][1],
+        hessian: Matrix2::new(down.curvature, cross, cross, right.curvature),
+    }
+}
+
+/// Maximum of the paraboloid that fits nine samples best; `None` where it has none nearby.
+fn paraboloid(near: [[f64; 3]; 3]) -> Option<PlanePeak> {
+    let sum = |weight: fn(f64, f64) -> f64| -> f64 {
+        (0..9).map(|k| weight((k / 3) as f64 - 1.0, (k % 3) as f64 - 1.0) * near[k / 3][k % 3]).sum()
+    };
+    let gradient = Vector2::new(sum(|i, _| i), sum(|_, j| j)) / 6.0;
+    let cross = sum(|i, j| i * j) / 4.0;
+    let hessian = Matrix2::new(sum(|i, _| 3.0 * i * i - 2.0) / 3.0, cross, cross, sum(|_, j| 3.0 * j * j - 2.0) / 3.0);
+    let mean = sum(|i, j| 5.0 - 3.0 * (i * i + j * j)) / 9.0;
+    let offset = hessian.try_inverse()? * -gradient;
+    let summit = hessian[(0, 0)] < 0.0 && hessian.determinant() > 0.0 && offset.amax() <= FARTHEST;
+    summit.then(|| PlanePeak { offset, value: mean + 0.5 * gradient.dot(&offset), hessian })
+}
+
+/// Weighted mean of positions, their scores normalised as [`Peak::SoftArgmax`] says.
+///
+/// `scored` gives (position, score) and is walked twice; `highest` is the largest score.
+pub(crate) fn soft_argmax<const D: usize>(
+    temperature: f64,
+    highest: f64,
+    scored: impl Iterator<Item = ([f64; D], f64)> + Clone,
+) -> [f64; D] {
+    let (count, sum, squares) = scored
+        .clone()
+        .fold((0.0, 0.0, 0.0), |(n, s, q), (_, c)| (n + 1.0, s + (c - highest), q + (c - highest).powi(2)));
+    let deviation = (squares / count - (sum / count).powi(2)).max(0.0).sqrt();
+    let (mut mean, mut total) = ([0.0; D], 0.0);
+    for (position, score) in scored {
+        let z = if deviation > 0.0 { (score - highest) / deviation } else { 0.0 };
+        let weight = (temperature * z).exp();
+        total += weight;
+        mean.iter_mut().zip(position).for_each(|(m, p)| *m += weight * p);
+    }
+    mean.map(|m| m / total)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A Gaussian of deviation `width` over a broad hill, the shape of a real correlation.
+    fn bump(t: f64, width: f64) -> f64 {
+        0.4 * (-0.5 * (t / width).powi(2)).exp() + 0.6 * (-0.5 * (t / 9.0).powi(2)).exp()
+    }
+
+    #[test]
+    fn gaussian_peak_is_placed_to_a_fiftieth_of_a_step_whatever_its_width() {
+        for width in [0.6, 0.8, 1.0, 1.5, 2.0] {
+            for k in -5..=5 {
+                let at = f64::from(k) / 10.0;
+                let peak = line_peak(Peak::Gaussian, |j| bump(j as f64 - at, width));
+                assert!((peak.offset - at).abs() < 0.02, "{width} {at}: {peak:?}");
+                assert!((peak.value - 1.0).abs() < 0.03, "{width} {at}: {peak:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn parabola_is_farther_off_on_a_narrow_peak() {
+        let off = |kind| (line_peak(kind, |j| bump(j as f64 - 0.3, 0.8)).offset - 0.3).abs();
+        assert!(off(Peak::Parabola) > 3.0 * off(Peak::Gaussian));
+    }
+
+    #[test]
+    fn curvature_is_the_second_derivative_at_the_summit() {
+        let peak = line_peak(Peak::Gaussian, |j| 3.0 + (-0.5 * (j as f64 / 1.3).powi(2)).exp());
+        assert!((peak.curvature * 1.69 + 1.0).abs() < 0.05, "{peak:?}");
+    }
+
+    #[test]
+    fn elongated_peak_keeps_its_orientation() {
+        let f = |u: f64, v: f64| (-0.5 * ((u + v) / 2.5).powi(2) - 0.5 * ((u - v) / 1.2).powi(2)).exp();
+        for (kind, tolerance) in [(Peak::Gaussian, 0.02), (Peak::Parabola, 0.2)] {
+            let peak = plane_peak(kind, |i, j| f(i as f64 - 0.3, j as f64 + 0.2));
+            assert!((peak.offset - Vector2::new(0.3, -0.2)).amax() < tolerance, "{kind:?} {peak:?}");
+            let want = Matrix2::new(-0.85, 0.53, 0.53, -0.85);
+            assert!((peak.hessian - want).amax() < 0.25, "{kind:?} {peak:?}");
+        }
+    }
+
+    #[test]
+    fn samples_without_a_peak_stay_where_they_are() {
+        for kind in [Peak::Gaussian, Peak::Parabola] {
+            for level in [0.0, 1.0, f64::NAN] {
+                assert_eq!(line_peak(kind, |_| level).offset, 0.0);
+                assert_eq!(plane_peak(kind, |_, _| level).offset, Vector2::zeros());
+            }
+        }
+    }
+
+    #[test]
+    fn soft_argmax_does_not_change_when_scores_are_scaled() {
+        let at = |scale: f64| {
+            let scored = (-20..=20).map(move |k| ([f64::from(k)], scale * bump(f64::from(k) / 2.0 - 0.4, 1.0)));
+            soft_argmax(8.0, scale * bump(0.1, 1.0), scored)[0]
+        };
+        assert!((at(1.0) - at(1000.0)).abs() < 1e-9);
+        assert!((at(1.0) - 0.8).abs() < 0.2, "{}", at(1.0));
+    }
+}

@@ -1,0 +1,111 @@
+//! Magnitude spectra on a polar grid.
+//!
+//! f(x) ~ g(R x + t) leaves |F(k)| = |G(R k)|: a turn of the raster turns its magnitude spectrum, a shift does nothing.
+//! With k = rho (cos theta, sin theta) along the raster's x and y axes, P_f(theta) = P_g(theta + turn).
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+
+use crate::config::{Magnitude, RotationConfig};
+use crate::fft::Columns;
+use crate::kernels;
+
+/// Where one polar sample lies among the magnitudes: the lower of its four neighbours and the weights toward the others.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    index: u32,
+    along_row: f32,
+    along_column: f32,
+}
+
+/// The magnitudes of the band, and the polar grid over them.
+pub(crate) struct PolarGrid {
+    kind: Magnitude,
+    /// Frequency bins kept on each side of zero.
+    bins: usize,
+    /// Column c holds column frequency c; its element k row frequency k - bins.
+    magnitude: Vec<f32>,
+    table: Vec<Sample>,
+    pub angles: usize,
+    pub radii: usize,
+}
+
+impl PolarGrid {
+    /// The grid over a spectrum of `size` a side, of a raster of `n` a side.
+    ///
+    /// theta_k = -pi/2 + k pi / angles: no angle is counted twice (the paper's Linspace counts both ends).
+    pub fn new(n: usize, size: usize, config: &RotationConfig) -> Self {
+        let (low, high) = (config.band_low, config.band_high);
+        let radii = config.radii.unwrap_or(((high - low) * n as f64).ceil() as usize).max(2);
+        let bins = (high * size as f64).floor() as usize + 1;
+        let sample = |r: usize, k: usize| {
+            let rho = (low + (high - low) * r as f64 / (radii - 1) as f64) * size as f64;
+            let theta = -FRAC_PI_2 + k as f64 * PI / config.angles as f64;
+            Sample::at(rho * theta.cos(), rho * theta.sin(), bins)
+        };
+        Self {
+            kind: config.magnitude,
+            bins,
+            magnitude: vec![0.0; (bins + 1) * (2 * bins + 1)],
+            table: (0..radii).flat_map(|r| (0..config.angles).map(move |k| sample(r, k))).collect(),
+            angles: config.angles,
+            radii,
+        }
+    }
+
+    /// Columns of the spectrum that the grid looks at.
+    pub fn columns(bins_high: f64, size: usize) -> usize {
+        ((bins_high * size as f64).floor() as usize + 2).min(size / 2 + 1)
+    }
+
+    /// Takes the magnitudes of the band from a spectrum.
+    pub fn load(&mut self, spectrum: &Columns) {
+        let stride = 2 * self.bins + 1;
+        for (c, out) in self.magnitude.chunks_exact_mut(stride).enumerate() {
+            let column = spectrum.column(c);
+            kernels::modulus(&column[column.len() - self.bins..], &mut out[..self.bins]);
+            kernels::modulus(&column[..=self.bins], &mut out[self.bins..]);
+        }
+        if self.kind == Magnitude::Log {
+            compress(&mut self.magnitude);
+        }
+    }
+
+    /// Writes the samples of radius `r` over half a turn.
+    pub fn ring(&self, r: usize, out: &mut [f32]) {
+        let stride = 2 * self.bins + 1;
+        let samples = &self.table[r * self.angles..][..self.angles];
+        sample_ring(&self.magnitude, stride, samples, out);
+    }
+}
+
+impl Sample {
+    /// The sample at row frequency `u` and column frequency `v`, in bins; a real image has the same at (-u, -v).
+    fn at(u: f64, v: f64, bins: usize) -> Self {
+        let (u, v) = if v < 0.0 { (-u, -v) } else { (u, v) };
+        let row = (u + bins as f64).clamp(0.0, 2.0 * bins as f64);
+        let (i, j) = ((row.floor() as usize).min(2 * bins - 1), (v.floor() as usize).min(bins - 1));
+        Self {
+            index: (j * (2 * bins + 1) + i) as u32,
+            along_row: (v - j as f64) as f32,
+            along_column: (row - i as f64) as f32,
+        }
+    }
+}
+
+/// ln(1 + m / mean): the same for every gain of the radar.
+fn compress(magnitude: &mut [f32]) {
+    let mean = magnitude.iter().sum::<f32>() / magnitude.len() as f32;
+    let scale = if mean > 0.0 { mean.recip() } else { 0.0 };
+    kernels::log1p_scaled(magnitude, scale);
+}
+
+fn sample_ring(magnitude: &[f32], stride: usize, samples: &[Sample], out: &mut [f32]) {
+    for (value, s) in out.iter_mut().zip(samples) {
+        let at = s.index as usize;
+        let (left, right) = (&magnitude[at..at + 2], &magnitude[at + stride..at + stride + 2]);
+        let a = left[0] + s.along_column * (left[1] - left[0]);
+        let b = right[0] + s.along_column * (right[1] - right[0]);
+        *value = a + s.along_row * (b - a);
+    }
+}

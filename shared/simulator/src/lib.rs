@@ -1,0 +1,43 @@
+//! A small honest radar simulator for demonstrations and tests.
+//!
+//! A vehicle with a spinning radar drives around a block of a procedural town; what comes out is a dataset
+//! in Oxford Radar RobotCar's layout with exact ground truth. In the order in which the data come about:
+//!
+//! - [`config`]: what to simulate,
+//! - [`path`]: where the sensor is at any instant,
+//! - [`town`], [`traffic`]: what stands and what moves around it,
+//! - [`world`], [`occlusion`]: how that reflects, and what hides what,
+//! - [`sensor`], [`receiver`]: what a sweep measures of it,
+//! - [`simulator`]: one scan at a time, with its exact pose,
+//! - [`oxford_writer`]: the dataset on disk.
+//!
+//! ```
+//! use gyre_simulator::{SimulationConfig, Simulator};
+//!
+//! let simulator = Simulator::new(&SimulationConfig { scans: 2, ..SimulationConfig::default() })?;
+//! let first = simulator.render_scan(0);
+//! assert_eq!(first.scan.view().geometry.azimuths, 400);
+//! let motion = simulator.pose(0).inverse() * simulator.pose(1);
+//! assert!(motion.translation.x > 1.0, "metres ahead in a quarter of a second");
+//! # Ok::<(), gyre_simulator::SimulatorError>(())
+//! ```
+
+pub mod config;
+pub mod error;
+pub mod occlusion;
+pub mod oxford_writer;
+pub mod path;
+pub mod receiver;
+pub mod sensor;
+pub mod simulator;
+pub mod town;
+pub mod traffic;
+pub mod world;
+
+pub use config::SimulationConfig;
+pub use error::SimulatorError;
+pub use oxford_writer::{Summary, write_dataset};
+pub use path::{BlockLoop, ConstantTwist, Trajectory};
+pub use sensor::{Sensor, SweepTime};
+pub use simulator::{SimulatedScan, Simulator};
+pub use world::{Body, World};

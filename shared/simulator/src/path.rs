@@ -1,0 +1,232 @@
+//! How the sensor moves: a pose for every instant.
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use nalgebra::{Isometry2, Point2, Vector2};
+
+/// A motion that is continuous in time.
+pub trait Trajectory: Sync {
+    /// Pose of the sensor (x forward, y left, yaw counter-clockwise) in the world at `time_s` seconds after the start.
+    fn pose(&self, time_s: f64) -> Isometry2<f64>;
+}
+
+/// A sensor that keeps its velocity and its turn rate, from the world's origin at time zero.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ConstantTwist {
+    /// Metres a second ahead.
+    pub forward_m_s: f64,
+    /// Metres a second to the left.
+    pub left_m_s: f64,
+    /// Radians a second, counter-clockwise.
+    pub yaw_rad_s: f64,
+}
+
+impl Trajectory for ConstantTwist {
+    fn pose(&self, time_s: f64) -> Isometry2<f64> {
+        let yaw = self.yaw_rad_s * time_s;
+        // The exponential of a planar twist: sin(a)/a and (1 - cos(a))/a, with their limits at a = 0.
+        let (along, across) =
+            if yaw.abs() < 1e-9 { (1.0, 0.5 * yaw) } else { (yaw.sin() / yaw, (1.0 - yaw.cos()) / yaw) };
+        let (x, y) = (self.forward_m_s * time_s, self.left_m_s * time_s);
+        Isometry2::new(Vector2::new(along * x - across * y, across * x + along * y), yaw)
+    }
+}
+
+/// Length of a bend by 90 degrees, metres of path.
+const BEND_M: f64 = 20.0;
+/// Share of a bend over which the curvature rises, and again falls: no vehicle turns its wheels at once.
+const RAMP: f64 = 0.25;
+/// Braking and accelerating along the path, metres a second squared.
+const LONGITUDINAL_M_S2: f64 = 2.5;
+/// Metres of path between two nodes of the table.
+const STEP_M: f64 = 0.01;
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    time_s: f64,
+    x_m: f64,
+    y_m: f64,
+    heading_rad: f64,
+}
+
+/// A drive around a rectangular block, counter-clockwise, with rounded corners that are taken more slowly.
+///
+/// The world's origin is the block's centre; the drive starts in the middle of the side at negative y, towards positive x.
+#[derive(Clone, Debug)]
+pub struct BlockLoop {
+    nodes: Vec<Node>,
+    lap_s: f64,
+    lap_m: f64,
+}
+
+impl BlockLoop {
+    /// A loop along the centre lines of four streets: `length_m` along x by `width_m` along y, each at least 30 m.
+    pub fn new(length_m: f64, width_m: f64, speed_m_s: f64, lateral_acceleration_m_s2: f64) -> Self {
+        let footprint = bend_footprint();
+        let straights = [length_m - 2.0 * footprint, width_m - 2.0 * footprint].map(|s| s.max(0.0));
+        let lap_m = 2.0 * (straights[0] + straights[1]) + 4.0 * BEND_M;
+        let count = (lap_m / STEP_M).ceil() as usize;
+        let step = lap_m / count as f64;
+        let headings: Vec<f64> = (0..=count).map(|i| heading_at(i as f64 * step, &straights)).collect();
+        let speeds = speeds(&headings, step, speed_m_s, lateral_acceleration_m_s2);
+        let nodes = integrate(&headings, &speeds, step, -width_m / 2.0);
+        let lap_s = nodes[count].time_s;
+        Self { nodes, lap_s, lap_m }
+    }
+
+    /// Time of one lap, seconds.
+    pub fn lap_s(&self) -> f64 {
+        self.lap_s
+    }
+
+    /// Length of one lap, metres.
+    pub fn lap_m(&self) -> f64 {
+        self.lap_m
+    }
+
+    /// Distance from a point of the world to the nearest point of the path, metres (to 0.25 m).
+    pub fn clearance_m(&self, point: Point2<f64>) -> f64 {
+        self.nodes
+            .iter()
+            .step_by(25)
+            .map(|node| (node.x_m - point.x).hypot(node.y_m - point.y))
+            .fold(f64::INFINITY, f64::min)
+    }
+}
+
+impl Trajectory for BlockLoop {
+    fn pose(&self, time_s: f64) -> Isometry2<f64> {
+        let time = time_s.rem_euclid(self.lap_s);
+        let next = self.nodes.partition_point(|node| node.time_s <= time).clamp(1, self.nodes.len() - 1);
+        let (a, b) = (self.nodes[next - 1], self.nodes[next]);
+        let share = (time - a.time_s) / (b.time_s - a.time_s);
+        let between = |from: f64, to: f64| from + share * (to - from);
+        Isometry2::new(
+            Vector2::new(between(a.x_m, b.x_m), between(a.y_m, b.y_m)),
+            between(a.heading_rad, b.heading_rad),
+        )
+    }
+}
+
+/// Heading gained after `share` of a bend: the integral of a trapezoid of curvature, from 0 to 90 degrees.
+fn bend_heading(share: f64) -> f64 {
+    let rising = |u: f64| u * u / (2.0 * RAMP);
+    let area = 1.0 - RAMP;
+    let gained = if share < RAMP {
+        rising(share)
+    } else if share > 1.0 - RAMP {
+        area - rising(1.0 - share)
+    } else {
+        share - RAMP / 2.0
+    };
+    FRAC_PI_2 * gained / area
+}
+
+/// How far before a corner its bend begins, metres.
+fn bend_footprint() -> f64 {
+    let count = (BEND_M / STEP_M) as usize;
+    let step = BEND_M / count as f64;
+    (0..count).map(|i| step * bend_heading((i as f64 + 0.5) / count as f64).cos()).sum()
+}
+
+/// Heading after `distance_m` of a lap: half a straight, bend, straight, bend, ..., half a straight.
+fn heading_at(distance_m: f64, straights_m: &[f64; 2]) -> f64 {
+    let mut left = distance_m - straights_m[0] / 2.0;
+    for corner in 0..4 {
+        if left <= 0.0 {
+            return f64::from(corner) * FRAC_PI_2;
+        }
+        if left < BEND_M {
+            return f64::from(corner) * FRAC_PI_2 + bend_heading(left / BEND_M);
+        }
+        left -= BEND_M + straights_m[(corner as usize + 1) % 2];
+    }
+    TAU
+}
+
+/// Speed at each node: as fast as the bends allow, with gentle braking and accelerating, the same each lap.
+fn speeds(headings: &[f64], step: f64, cruise: f64, lateral: f64) -> Vec<f64> {
+    let limit = |pair: &[f64]| cruise.min((lateral * step / (pair[1] - pair[0]).max(1e-12)).sqrt());
+    let mut speeds: Vec<f64> = headings.windows(2).map(limit).collect();
+    let count = speeds.len();
+    let reach = |from: f64| (from * from + 2.0 * LONGITUDINAL_M_S2 * step).sqrt();
+    for i in 0..2 * count {
+        let (here, next) = (i % count, (i + 1) % count);
+        speeds[next] = speeds[next].min(reach(speeds[here]));
+    }
+    for i in (0..2 * count).rev() {
+        let (here, next) = (i % count, (i + 1) % count);
+        speeds[here] = speeds[here].min(reach(speeds[next]));
+    }
+    speeds
+}
+
+fn integrate(headings: &[f64], speeds: &[f64], step: f64, start_y_m: f64) -> Vec<Node> {
+    let mut node = Node { time_s: 0.0, x_m: 0.0, y_m: start_y_m, heading_rad: headings[0] };
+    let mut nodes = vec![node];
+    for (pair, speed) in headings.windows(2).zip(speeds) {
+        let middle = 0.5 * (pair[0] + pair[1]);
+        node.time_s += step / speed;
+        node.x_m += step * middle.cos();
+        node.y_m += step * middle.sin();
+        node.heading_rad = pair[1];
+        nodes.push(node);
+    }
+    nodes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn default_loop() -> BlockLoop {
+        BlockLoop::new(48.0, 34.0, 9.5, 5.0)
+    }
+
+    #[test]
+    fn loop_closes_after_one_lap() {
+        let path = default_loop();
+        let (start, end) = (path.pose(0.0), path.nodes[path.nodes.len() - 1]);
+        assert!((start.translation.x - end.x_m).abs() < 1e-4, "{end:?}");
+        assert!((start.translation.y - end.y_m).abs() < 1e-4, "{end:?}");
+        assert!((end.heading_rad - TAU).abs() < 1e-9);
+    }
+
+    #[test]
+    fn loop_is_longer_than_the_shortest_kitti_stretch() {
+        let path = default_loop();
+        assert!(path.lap_m() > 115.0, "{}", path.lap_m());
+    }
+
+    #[test]
+    fn pose_moves_along_its_heading_and_never_jumps() {
+        let path = default_loop();
+        for i in 0..3000 {
+            let time = f64::from(i) * 0.01;
+            let motion = path.pose(time).inverse() * path.pose(time + 0.01);
+            assert!(motion.translation.x > 0.04 && motion.translation.x < 0.0951, "{time}: {motion}");
+            assert!(motion.translation.y.abs() < 1e-3, "{time}: {motion}");
+            assert!(motion.rotation.angle() > -1e-9 && motion.rotation.angle() < 0.01, "{time}: {motion}");
+        }
+    }
+
+    #[test]
+    fn bends_respect_the_lateral_acceleration() {
+        let path = default_loop();
+        for pair in path.nodes.windows(2) {
+            let dt = pair[1].time_s - pair[0].time_s;
+            let speed = (pair[1].x_m - pair[0].x_m).hypot(pair[1].y_m - pair[0].y_m) / dt;
+            let yaw_rate = (pair[1].heading_rad - pair[0].heading_rad) / dt;
+            assert!(speed * yaw_rate < 5.01, "{} m/s2", speed * yaw_rate);
+        }
+    }
+
+    #[test]
+    fn constant_twist_turns_on_a_circle() {
+        let twist = ConstantTwist { forward_m_s: 3.0, left_m_s: 0.0, yaw_rad_s: FRAC_PI_2 };
+        let quarter = twist.pose(1.0);
+        let radius = 3.0 / FRAC_PI_2;
+        assert!((quarter.translation.x - radius).abs() < 1e-12 && (quarter.translation.y - radius).abs() < 1e-12);
+        assert!((quarter.rotation.angle() - FRAC_PI_2).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,124 @@
+//! What a radar can see: scatterers that reflect, walls that hide.
+
+use nalgebra::{Isometry2, Point2, Vector2};
+
+use crate::occlusion::WallGrid;
+
+/// The body of a thing that belongs to nothing larger.
+pub const NO_BODY: u32 = 0;
+
+/// Which way a scatterer reflects.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Aspect {
+    /// The same to all sides: posts, leaves, corners of cars.
+    AllRound,
+    /// To one side: power falls with the cosine of the angle from `normal`, raised to `sharpness`
+    /// (1 to 2: rough walls; 300: a smooth panel that flashes within some degrees).
+    Facing {
+        /// Unit vector, world frame.
+        normal: Vector2<f64>,
+        /// Exponent of the cosine.
+        sharpness: f64,
+    },
+}
+
+impl Aspect {
+    /// Share of the power that goes towards `direction`, a unit vector from the scatterer to the sensor: 0 to 1.
+    pub fn gain(&self, direction: Vector2<f64>) -> f64 {
+        match *self {
+            Self::AllRound => 1.0,
+            Self::Facing { normal, sharpness } => normal.dot(&direction).max(0.0).powf(sharpness),
+        }
+    }
+}
+
+/// A point that reflects.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scatterer {
+    /// Where, world frame, metres.
+    pub position: Point2<f64>,
+    /// Radar cross-section, square metres.
+    pub cross_section_m2: f64,
+    /// Which way it reflects.
+    pub aspect: Aspect,
+    /// What it is a part of: walls of the same body do not hide it. [`NO_BODY`] where it stands alone.
+    pub body: u32,
+}
+
+/// A straight wall that lets a part of the power through.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wall {
+    /// One end, world frame, metres.
+    pub from: Point2<f64>,
+    /// The other end.
+    pub to: Point2<f64>,
+    /// Share of the power that passes, there and back: 0 (nothing) to 1.
+    pub transmission: f64,
+    /// What it is a part of.
+    pub body: u32,
+}
+
+impl Scatterer {
+    /// The same scatterer on a body that stands at `pose`.
+    pub fn moved(&self, pose: &Isometry2<f64>) -> Self {
+        let aspect = match self.aspect {
+            Aspect::AllRound => Aspect::AllRound,
+            Aspect::Facing { normal, sharpness } => Aspect::Facing { normal: pose * normal, sharpness },
+        };
+        Self { position: pose * self.position, aspect, ..*self }
+    }
+}
+
+impl Wall {
+    /// The same wall on a body that stands at `pose`.
+    pub fn moved(&self, pose: &Isometry2<f64>) -> Self {
+        Self { from: pose * self.from, to: pose * self.to, ..*self }
+    }
+}
+
+/// A thing made of scatterers and walls.
+#[derive(Clone, Debug, Default)]
+pub struct Body {
+    /// What reflects.
+    pub scatterers: Vec<Scatterer>,
+    /// What hides.
+    pub walls: Vec<Wall>,
+}
+
+impl Body {
+    /// Adds all of another body.
+    pub fn extend(&mut self, other: Body) {
+        self.scatterers.extend(other.scatterers);
+        self.walls.extend(other.walls);
+    }
+}
+
+/// All that stands still around the sensor, ready to be looked at.
+#[derive(Clone, Debug)]
+pub struct World {
+    scatterers: Vec<Scatterer>,
+    walls: WallGrid,
+}
+
+impl World {
+    /// A world of these scatterers and walls.
+    pub fn new(content: Body) -> Self {
+        Self { scatterers: content.scatterers, walls: WallGrid::new(content.walls) }
+    }
+
+    /// All that reflects.
+    pub fn scatterers(&self) -> &[Scatterer] {
+        &self.scatterers
+    }
+
+    /// All that hides.
+    pub fn walls(&self) -> &[Wall] {
+        self.walls.walls()
+    }
+
+    /// Share of the power that passes between two points, there and back; walls of `body` count for nothing.
+    /// Stops with a value below `negligible` as soon as so little is left.
+    pub fn transmission(&self, from: Point2<f64>, to: Point2<f64>, body: u32, negligible: f64) -> f64 {
+        self.walls.transmission(from, to, body, negligible)
+    }
+}

@@ -1,0 +1,88 @@
+//! The motions that masking compensates the sweep with: by id, never by time.
+//!
+//! A motion comes twice: from translation-search as soon as it is known, and with its pose once that is journalled. Both say
+//! the same; whichever is first will do. After a restart those before the last pose come from the journal, those after it from
+//! translation-search, which works them out anew.
+
+use std::collections::VecDeque;
+
+use gyre_messages::{Item, Motion, MotionEstimate, Pose, flag};
+
+use crate::{Launch, StageError, reader::Port, services::Listener};
+
+/// Motions kept: more than any window and lag can ask for.
+const KEPT: usize = 256;
+
+/// See the module.
+pub(crate) struct Feedback {
+    motions: Port<Motion>,
+    poses: Port<Pose>,
+    known: VecDeque<(u64, Option<MotionEstimate>)>,
+    sync: Option<Item>,
+    newest_pose: Option<u64>,
+}
+
+impl Feedback {
+    pub(crate) fn open(launch: &Launch) -> Result<Self, StageError> {
+        Ok(Self {
+            motions: Port::open(&launch.node)?,
+            poses: Port::open(&launch.node)?,
+            known: VecDeque::with_capacity(KEPT + 1),
+            sync: None,
+            newest_pose: None,
+        })
+    }
+
+    /// Takes in all that has come.
+    pub(crate) fn update(&mut self) -> Result<(), StageError> {
+        while let Some(received) = self.motions.receive()? {
+            self.learn(received.item(), &received.header().motion);
+        }
+        while let Some(received) = self.poses.receive()? {
+            let (item, header) = (*received.item(), received.header());
+            if item.is(flag::END) {
+                continue;
+            }
+            if !item.is(flag::BASE) {
+                self.learn(&item, &header.motion);
+                self.newest_pose = self.newest_pose.max(Some(item.seq));
+            }
+            if item.is(flag::SYNC) {
+                self.sync = Some(item);
+            }
+        }
+        Ok(())
+    }
+
+    fn learn(&mut self, item: &Item, motion: &MotionEstimate) {
+        if item.is(flag::END) || self.known.iter().any(|(seq, _)| *seq == item.seq) {
+            return;
+        }
+        // Where the chain starts there is no motion.
+        let motion = (!item.is(flag::BREAK)).then_some(*motion);
+        let place = self.known.partition_point(|(seq, _)| *seq < item.seq);
+        self.known.insert(place, (item.seq, motion));
+        if self.known.len() > KEPT {
+            self.known.pop_front();
+        }
+    }
+
+    /// The motion of item `seq`: `None` as long as it is not known, `Some(None)` where the chain starts.
+    pub(crate) fn motion(&self, seq: u64) -> Option<Option<MotionEstimate>> {
+        self.known.iter().rev().find(|(known, _)| *known == seq).map(|(_, motion)| *motion)
+    }
+
+    /// Where the trajectory stood when its keeper said so: `None` until then.
+    pub(crate) fn sync(&self) -> Option<&Item> {
+        self.sync.as_ref()
+    }
+
+    /// The newest pose's item; `None` before the first.
+    pub(crate) fn newest_pose(&self) -> Option<u64> {
+        self.newest_pose
+    }
+
+    pub(crate) fn listeners(&self) -> [&Listener; 2] {
+        [self.motions.listener(), self.poses.listener()]
+    }
+}

@@ -1,0 +1,234 @@
+//! What masking waits for: a scan, and the motion that its sweep's distortion is undone with.
+//!
+//! *Lossless*: scans in order, each once. *Live*: the newest scan wins; what was dropped is the gap in the source's count. Live
+//! masking numbers the scans that it admits, so that all that follows is lossless again.
+
+use std::collections::VecDeque;
+
+use gyre_messages::{Item, MotionEstimate, Scan, flag};
+
+use crate::{
+    Launch, StageError,
+    feedback::Feedback,
+    inputs::{Inputs, Turn},
+    reader::{Port, Reader, Received},
+    services::Listener,
+};
+
+/// See the module.
+pub struct Scans {
+    intake: Intake,
+    feedback: Feedback,
+    lag: u64,
+    /// The motion for the scan at hand.
+    motion: Option<MotionEstimate>,
+}
+
+enum Intake {
+    Lossless(InOrder),
+    Live(NewestWins),
+}
+
+/// A scan to mask.
+pub struct ScanView<'a> {
+    /// The scan.
+    pub scan: &'a Received<Scan>,
+    /// The motion of the scan `lag` before it; `None` where there was none.
+    pub motion: Option<MotionEstimate>,
+}
+
+impl Inputs for Scans {
+    type View<'a> = ScanView<'a>;
+
+    fn open(launch: &Launch) -> Result<Self, StageError> {
+        let feedback = Feedback::open(launch)?;
+        let window = launch.manifest.window;
+        let intake = match launch.manifest.live {
+            false => Intake::Lossless(InOrder {
+                reader: Reader::open(&launch.node, None)?,
+                look_back: window.look_back as u64,
+                flowing: false,
+            }),
+            true => Intake::Live(NewestWins {
+                port: Port::open(&launch.node)?,
+                queue: VecDeque::with_capacity(window.live_depth + 2),
+                window: window.scans as u64,
+                chain: None,
+            }),
+        };
+        Ok(Self { intake, feedback, lag: window.lag as u64, motion: None })
+    }
+
+    fn turn(&mut self) -> Result<Turn, StageError> {
+        self.feedback.update()?;
+        // Where the trajectory stands decides which scans are still wanted, and in live mode where the chain goes on.
+        let Some(sync) = self.feedback.sync().copied() else { return Ok(Turn::Wait) };
+        let newest = self.feedback.newest_pose();
+        let turn = match &mut self.intake {
+            Intake::Lossless(intake) => intake.turn(newest)?,
+            Intake::Live(intake) => intake.turn(&sync, newest)?,
+        };
+        match turn {
+            Turn::Process(item, _) if !self.find_motion(item.seq) => Ok(Turn::Wait),
+            turn => Ok(turn),
+        }
+    }
+
+    fn view(&self) -> Option<ScanView<'_>> {
+        let scan = match &self.intake {
+            Intake::Lossless(intake) => intake.reader.current(),
+            Intake::Live(intake) => intake.queue.front(),
+        };
+        Some(ScanView { scan: scan?, motion: self.motion })
+    }
+
+    fn advance(&mut self) {
+        match &mut self.intake {
+            Intake::Lossless(intake) => intake.reader.release(),
+            Intake::Live(intake) => intake.advance(),
+        }
+    }
+
+    fn listeners(&self) -> Vec<&Listener> {
+        let [motions, poses] = self.feedback.listeners();
+        let scans = match &self.intake {
+            Intake::Lossless(intake) => intake.reader.listener(),
+            Intake::Live(intake) => intake.port.listener(),
+        };
+        vec![scans, motions, poses]
+    }
+
+    fn duplicates(&self) -> u64 {
+        match &self.intake {
+            Intake::Lossless(intake) => intake.reader.duplicates(),
+            Intake::Live(_) => 0,
+        }
+    }
+}
+
+impl Scans {
+    /// Looks up the motion that scan `seq` is compensated with; false as long as it is still to come.
+    fn find_motion(&mut self, seq: u64) -> bool {
+        let asked = if self.lag == 0 { None } else { seq.checked_sub(self.lag) };
+        let found = asked.map_or(Some(None), |seq| self.feedback.motion(seq));
+        self.motion = found.flatten();
+        found.is_some()
+    }
+}
+
+struct InOrder {
+    reader: Reader<Scan>,
+    look_back: u64,
+    /// From the first scan that was wanted on, none is skipped: that would leave a hole in what we send.
+    flowing: bool,
+}
+
+impl InOrder {
+    fn turn(&mut self, newest_pose: Option<u64>) -> Result<Turn, StageError> {
+        let Some(head) = self.reader.head()? else { return Ok(Turn::Wait) };
+        let (item, received_ns) = (*head.item(), head.received_ns);
+        if item.is(flag::END) {
+            return Ok(Turn::End(item));
+        }
+        let had = newest_pose.is_some_and(|newest| item.seq + self.look_back <= newest);
+        if had && !self.flowing {
+            return Ok(Turn::Keep);
+        }
+        self.flowing = true;
+        Ok(Turn::Process(item, received_ns))
+    }
+}
+
+struct NewestWins {
+    port: Port<Scan>,
+    /// The scan at hand and, behind it, what came since; at the start the source's history.
+    queue: VecDeque<Received<Scan>>,
+    window: u64,
+    chain: Option<Chain>,
+}
+
+/// Where the numbering goes on.
+#[derive(Clone, Copy)]
+struct Chain {
+    next: u64,
+    previous_scan: Option<u64>,
+    /// The source's count at the scan before: a restarted source sends again what it had sent after the last pose.
+    published: Option<u64>,
+    /// The scan in front was processed before the restart: the others need it once more, as the one before.
+    again: bool,
+}
+
+impl NewestWins {
+    fn turn(&mut self, sync: &Item, newest_pose: Option<u64>) -> Result<Turn, StageError> {
+        while let Some(received) = self.port.receive()? {
+            if self.chain.is_some_and(|chain| chain.had(received.item())) {
+                continue;
+            }
+            self.queue.push_back(received);
+            if self.chain.is_some_and(|chain| !chain.again) {
+                self.drop_all_but_the_newest();
+            }
+        }
+        if self.queue.is_empty() {
+            return Ok(Turn::Wait);
+        }
+        let chain = self.chain.unwrap_or_else(|| self.resume(sync));
+        self.chain = Some(chain);
+        if !chain.again {
+            self.drop_all_but_the_newest();
+        }
+        let Some(front) = self.queue.front() else { return Ok(Turn::Wait) };
+        let item = chain.number(front.item());
+        let admitted = newest_pose.map_or(item.seq < self.window, |newest| item.seq <= newest + self.window);
+        Ok(match () {
+            () if item.is(flag::END) => Turn::End(item),
+            () if admitted => Turn::Process(item, front.received_ns),
+            () => Turn::Wait,
+        })
+    }
+
+    /// Where the chain goes on after a start: with the last pose's scan if the source still has it, else with a break.
+    fn resume(&mut self, sync: &Item) -> Chain {
+        if sync.is(flag::BASE) {
+            return Chain { next: 0, previous_scan: None, published: None, again: false };
+        }
+        match self.queue.iter().position(|received| received.item().scan == sync.scan) {
+            Some(place) => {
+                self.queue.drain(..place);
+                Chain { next: sync.seq, previous_scan: Some(sync.previous_scan), published: None, again: true }
+            }
+            None => Chain { next: sync.seq + 1, previous_scan: None, published: None, again: false },
+        }
+    }
+
+    fn drop_all_but_the_newest(&mut self) {
+        while self.queue.len() > 1 && !self.queue[1].item().is(flag::END) {
+            self.queue.pop_front();
+        }
+    }
+
+    fn advance(&mut self) {
+        let done = self.queue.pop_front();
+        if let (Some(chain), Some(done)) = (&mut self.chain, done) {
+            let (scan, published) = (done.item().scan, done.item().published);
+            *chain = Chain { next: chain.next + 1, previous_scan: Some(scan), published: Some(published), again: false };
+        }
+    }
+}
+
+impl Chain {
+    fn had(&self, item: &Item) -> bool {
+        !item.is(flag::END) && self.published.is_some_and(|published| item.published <= published)
+    }
+
+    /// The item's place in the chain of motions.
+    fn number(&self, item: &Item) -> Item {
+        let start = if self.previous_scan.is_none() { flag::BREAK } else { 0 };
+        Item {
+            seq: self.next,
+            previous_scan: self.previous_scan.unwrap_or(item.scan),
+            flags: (item.flags & flag::END) | start,
+            ..*item
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! The transport's services: created once by the supervisor with the window's sizes, opened by everybody else.
+//!
+//! Stages never say a size, so no restart finds a service gone or of another size.
+
+use gyre_messages::{MAX_NODES, Masked, Message, Motion, Pose, Rotation, Scan, Window};
+use iceoryx2::{
+    prelude::{Config, NodeBuilder, NodeName, ServiceName, SignalHandlingMode, ipc},
+    service::port_factory::{event, publish_subscribe},
+};
+
+use crate::StageError;
+
+pub(crate) type Ipc = ipc::Service;
+pub(crate) type Node = iceoryx2::node::Node<Ipc>;
+pub(crate) type Topic<M> = publish_subscribe::PortFactory<Ipc, [<M as Message>::Element], <M as Message>::Header>;
+pub(crate) type Event = event::PortFactory<Ipc>;
+pub(crate) type Listener = iceoryx2::port::listener::Listener<Ipc>;
+pub(crate) type Notifier = iceoryx2::port::notifier::Notifier<Ipc>;
+
+/// Ports of an event beyond those in use: a listener that was killed half made can cost a place until the run ends.
+const AIR: usize = 6;
+
+/// A node of this run. `name` shows in the transport's own tools.
+pub(crate) fn node(config: &Config, name: &str) -> Result<Node, StageError> {
+    let name = NodeName::new(name).map_err(|e| StageError::transport("name the node", e))?;
+    NodeBuilder::new()
+        .name(&name)
+        .config(config)
+        .signal_handling_mode(SignalHandlingMode::Disabled)
+        .create::<Ipc>()
+        .map_err(|e| StageError::transport("join the run", e))
+}
+
+/// All services of a run. Whoever holds this keeps them alive.
+pub(crate) struct Services {
+    _topics: (Topic<Scan>, Topic<Masked>, Topic<Rotation>, Topic<Motion>, Topic<Pose>),
+    _events: Vec<Event>,
+}
+
+impl Services {
+    /// Creates them.
+    pub(crate) fn create(node: &Node, window: &Window) -> Result<Self, StageError> {
+        let mut events = Vec::new();
+        for topic in gyre_messages::TOPICS {
+            let readers = window.sizes(topic).subscribers;
+            events.push(create_event(node, &data_event(topic), readers, 1)?);
+            events.push(create_event(node, &hello_event(topic), 1, readers)?);
+        }
+        let topics = (
+            create_topic::<Scan>(node, window)?,
+            create_topic::<Masked>(node, window)?,
+            create_topic::<Rotation>(node, window)?,
+            create_topic::<Motion>(node, window)?,
+            create_topic::<Pose>(node, window)?,
+        );
+        Ok(Self { _topics: topics, _events: events })
+    }
+}
+
+/// Name of the event that a topic's publisher wakes its readers with.
+pub(crate) fn data_event(topic: &str) -> String {
+    format!("{topic}_data")
+}
+
+/// Name of the event that a new reader greets the publisher with.
+pub(crate) fn hello_event(topic: &str) -> String {
+    format!("{topic}_hello")
+}
+
+fn service_name(name: &str) -> Result<ServiceName, StageError> {
+    ServiceName::new(name).map_err(|e| StageError::transport(format!("name the service {name}"), e))
+}
+
+fn create_topic<M: Message>(node: &Node, window: &Window) -> Result<Topic<M>, StageError> {
+    let sizes = window.sizes(M::TOPIC);
+    node.service_builder(&service_name(M::TOPIC)?)
+        .publish_subscribe::<[M::Element]>()
+        .user_header::<M::Header>()
+        .enable_safe_overflow(true)
+        .history_size(sizes.history)
+        .subscriber_max_buffer_size(sizes.buffer)
+        .subscriber_max_borrowed_samples(sizes.borrowed)
+        .max_publishers(1)
+        .max_subscribers(sizes.subscribers)
+        .max_nodes(MAX_NODES)
+        .create()
+        .map_err(|e| StageError::transport(format!("create the topic {}", M::TOPIC), e))
+}
+
+fn create_event(node: &Node, name: &str, listeners: usize, notifiers: usize) -> Result<Event, StageError> {
+    node.service_builder(&service_name(name)?)
+        .event()
+        .max_listeners(listeners + AIR)
+        .max_notifiers(notifiers + AIR)
+        .max_nodes(MAX_NODES)
+        .event_id_max_value(1)
+        .create()
+        .map_err(|e| StageError::transport(format!("create the event {name}"), e))
+}
+
+/// Opens a topic that the supervisor created.
+pub(crate) fn open_topic<M: Message>(node: &Node) -> Result<Topic<M>, StageError> {
+    node.service_builder(&service_name(M::TOPIC)?)
+        .publish_subscribe::<[M::Element]>()
+        .user_header::<M::Header>()
+        .open()
+        .map_err(|e| StageError::transport(format!("open the topic {}", M::TOPIC), e))
+}
+
+pub(crate) fn listener(node: &Node, event: &str) -> Result<Listener, StageError> {
+    open_event(node, event)?
+        .listener_builder()
+        .create()
+        .map_err(|e| StageError::transport(format!("listen to {event}"), e))
+}
+
+pub(crate) fn notifier(node: &Node, event: &str) -> Result<Notifier, StageError> {
+    open_event(node, event)?
+        .notifier_builder()
+        .create()
+        .map_err(|e| StageError::transport(format!("notify {event}"), e))
+}
+
+fn open_event(node: &Node, name: &str) -> Result<Event, StageError> {
+    node.service_builder(&service_name(name)?)
+        .event()
+        .open()
+        .map_err(|e| StageError::transport(format!("open the event {name}"), e))
+}

@@ -1,0 +1,102 @@
+//! The loop of the last stage: it alone owns state, and journals before it publishes.
+
+use gyre_messages::{Header, Item, Motion, MotionHeader, Pose, PoseHeader, Stage, flag};
+
+use crate::{Launch, StageError, Statistics, allocations, clock, reader::Reader, wake, writer::Writer};
+
+/// What keeps the trajectory.
+pub trait Sink {
+    /// The last poses that the journal holds, oldest first, at most `count`; then whether the stream had ended.
+    fn restore(&mut self, count: usize) -> Result<(Vec<PoseHeader>, bool), StageError>;
+    /// Adds a motion, and returns its pose once that is safely journalled.
+    fn integrate(&mut self, motion: &MotionHeader) -> Result<PoseHeader, StageError>;
+    /// Notes the end of the stream, safely.
+    fn end(&mut self, item: &Item) -> Result<(), StageError>;
+}
+
+/// Runs the sink until SIGTERM.
+pub fn run(launch: &Launch, sink: &mut impl Sink) -> Result<Statistics, StageError> {
+    let poses = Writer::<Pose>::open(&launch.node, &launch.manifest)?;
+    let (restored, ended) = sink.restore(launch.manifest.window.sizes("pose").history)?;
+    publish_again(&poses, &restored)?;
+    let next = restored.last().map_or(0, |pose| pose.item.seq + 1);
+    let mut integration = Integration { sink, poses, ended, statistics: Statistics::default() };
+    if ended {
+        integration.publish_end(restored.last().map(|pose| pose.item).unwrap_or_default())?;
+    }
+    let mut motions = Reader::<Motion>::open(&launch.node, Some(next))?;
+    integration.drain(&mut motions)?;
+    loop {
+        let woken = launch.signals.wait(&[motions.listener(), integration.poses.listener()], wake::NET)?;
+        integration.statistics.wakes += 1;
+        if woken.stop {
+            integration.statistics.duplicates = motions.duplicates();
+            return Ok(integration.statistics);
+        }
+        integration.poses.greet()?;
+        if integration.drain(&mut motions)? && woken.timed_out {
+            integration.statistics.wakes_caught_late += 1;
+        }
+    }
+}
+
+/// What came before: the source learns from the last one where to go on, masking learns motions that no one else remembers.
+fn publish_again(poses: &Writer<Pose>, restored: &[PoseHeader]) -> Result<(), StageError> {
+    let base = PoseHeader { item: Item { flags: flag::BASE | flag::SYNC, ..Item::default() }, ..PoseHeader::default() };
+    let Some((last, earlier)) = restored.split_last() else { return publish(poses, base) };
+    for pose in earlier {
+        publish(poses, *pose)?;
+    }
+    publish(poses, PoseHeader { item: Item { flags: last.item.flags | flag::SYNC, ..last.item }, ..*last })
+}
+
+fn publish(poses: &Writer<Pose>, pose: PoseHeader) -> Result<(), StageError> {
+    let mut draft = poses.loan()?;
+    *draft.header() = pose;
+    poses.send(draft, Stage::PoseIntegration)
+}
+
+struct Integration<'a, S: Sink> {
+    sink: &'a mut S,
+    poses: Writer<Pose>,
+    ended: bool,
+    statistics: Statistics,
+}
+
+impl<S: Sink> Integration<'_, S> {
+    fn drain(&mut self, motions: &mut Reader<Motion>) -> Result<bool, StageError> {
+        let mut progressed = false;
+        while !self.ended {
+            let Some(received) = motions.head()? else { break };
+            let mut motion = *received.header();
+            match motion.item.is(flag::END) {
+                true => {
+                    self.sink.end(&motion.item)?;
+                    self.publish_end(motion.item)?;
+                    self.ended = true;
+                }
+                false => {
+                    motion.item.hop(Stage::PoseIntegration).received_ns = received.received_ns;
+                    self.integrate(motion)?;
+                }
+            }
+            motions.release();
+            progressed = true;
+        }
+        Ok(progressed)
+    }
+
+    fn integrate(&mut self, mut motion: MotionHeader) -> Result<(), StageError> {
+        let (started_ns, allocated) = (clock::now_ns(), allocations::so_far());
+        motion.item.hop(Stage::PoseIntegration).started_ns = started_ns;
+        let pose = self.sink.integrate(&motion)?;
+        self.statistics.record(allocations::so_far() - allocated, clock::now_ns() - started_ns);
+        publish(&self.poses, pose)
+    }
+
+    fn publish_end(&mut self, item: Item) -> Result<(), StageError> {
+        let mut draft = self.poses.loan()?;
+        *draft.header().item_mut() = Item { flags: flag::END, ..item };
+        self.poses.send(draft, Stage::PoseIntegration)
+    }
+}

@@ -1,0 +1,263 @@
+//! The loop of the first stage: it admits a scan when the window has room and, if so told, when its time has come.
+
+use std::time::Duration;
+
+use gyre_messages::{Hop, Item, Pose, Scan, ScanHeader, Stage, flag};
+
+use crate::{
+    Launch, StageError, Statistics, allocations, clock,
+    reader::Port,
+    wake,
+    writer::{Draft, Writer},
+};
+
+/// What has scans to give, by number from 0.
+pub trait Source {
+    /// How many there are.
+    fn len(&self) -> usize;
+
+    /// Whether there are none.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// When scan `index` is complete on the sensor's clock, ns since 1970, as far as can be told without reading it.
+    fn complete_ns(&self, index: usize) -> Option<i64>;
+
+    /// Reads scan `index` into shared memory; the error is one sentence that says why it cannot be used.
+    fn read(&mut self, index: usize, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<(), String>;
+}
+
+/// Runs the source until SIGTERM.
+pub fn run(launch: &Launch, source: &mut impl Source) -> Result<Statistics, StageError> {
+    let credit = Credit { poses: Port::open(&launch.node)?, newest: None, sync: None };
+    let scans = Writer::open(&launch.node, &launch.manifest)?;
+    let mut playback = Playback { launch, source, credit, scans, statistics: Statistics::default() };
+    let Some(position) = playback.wait_for_start()? else { return Ok(playback.statistics) };
+    playback.play(position)?;
+    Ok(playback.statistics)
+}
+
+/// What the poses say: how far the run is.
+struct Credit {
+    poses: Port<Pose>,
+    newest: Option<u64>,
+    sync: Option<Item>,
+}
+
+impl Credit {
+    fn update(&mut self) -> Result<(), StageError> {
+        while let Some(pose) = self.poses.receive()? {
+            let item = pose.item();
+            if item.is(flag::SYNC) {
+                self.sync = Some(*item);
+            }
+            if !item.is(flag::BASE) && !item.is(flag::END) {
+                self.newest = self.newest.max(Some(item.seq));
+            }
+        }
+        Ok(())
+    }
+
+    fn admits(&self, seq: u64, window: u64) -> bool {
+        self.newest.map_or(seq < window, |newest| seq <= newest + window)
+    }
+}
+
+/// Where playing goes on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Position {
+    /// The next scan to read.
+    index: usize,
+    /// Its number among those published.
+    seq: u64,
+    /// The scan published before it.
+    previous: Option<u64>,
+}
+
+impl Position {
+    /// Starts at the last pose's scan, or the one before it where a mask looks at two: the others need them as the ones before.
+    fn resume(sync: &Item, look_back: usize) -> Self {
+        if sync.is(flag::BASE) || (look_back > 1 && sync.seq == 0) {
+            return Self::default();
+        }
+        match look_back > 1 && !sync.is(flag::BREAK) {
+            true => Self { index: sync.previous_scan as usize, seq: sync.seq - 1, previous: None },
+            false => Self {
+                index: sync.scan as usize,
+                seq: sync.seq,
+                previous: (!sync.is(flag::BREAK)).then_some(sync.previous_scan),
+            },
+        }
+    }
+
+    fn published(&mut self) {
+        self.previous = Some(self.index as u64);
+        self.index += 1;
+        self.seq += 1;
+    }
+
+    fn item(&self) -> Item {
+        // A resumed chain is not broken: its first item is one that the others have had.
+        let start = if self.seq == 0 { flag::BREAK } else { 0 };
+        let scan = self.index as u64;
+        Item { seq: self.seq, published: self.seq, scan, previous_scan: self.previous.unwrap_or(scan), flags: start, ..Item::default() }
+    }
+}
+
+struct Playback<'a, S: Source> {
+    launch: &'a Launch,
+    source: &'a mut S,
+    credit: Credit,
+    scans: Writer<Scan>,
+    statistics: Statistics,
+}
+
+/// A scan's time, sensor to run: `due = start + (complete - first) / rate`.
+#[derive(Clone, Copy)]
+struct Tempo {
+    rate: f64,
+    start_ns: i64,
+    first_ns: i64,
+}
+
+impl Tempo {
+    fn due_ns(&self, complete_ns: i64) -> i64 {
+        self.start_ns + ((complete_ns - self.first_ns) as f64 / self.rate) as i64
+    }
+}
+
+impl<S: Source> Playback<'_, S> {
+    /// Waits until the trajectory's keeper has said where it stands; `None` when told to stop before that.
+    fn wait_for_start(&mut self) -> Result<Option<Position>, StageError> {
+        loop {
+            self.credit.update()?;
+            if let Some(sync) = self.credit.sync {
+                return Ok(Some(Position::resume(&sync, self.launch.manifest.window.look_back)));
+            }
+            if self.sleep(wake::NET)? {
+                return Ok(None);
+            }
+        }
+    }
+
+    fn play(&mut self, mut position: Position) -> Result<(), StageError> {
+        let mut tempo = None;
+        while let Some(draft) = self.next_readable(&mut position)? {
+            if tempo.is_none() {
+                tempo = self.tempo(position.index);
+            }
+            if !self.admit(draft, &position, tempo)? {
+                return Ok(());
+            }
+            position.published();
+            if self.launch.manifest.live {
+                self.skip_what_is_past(&mut position, tempo);
+            }
+        }
+        self.end(&position)?;
+        while !self.sleep(wake::NET)? {}
+        Ok(())
+    }
+
+    /// Reads ahead: the next scan is in shared memory before it is asked for. `None` at the end of the recording.
+    fn next_readable(&mut self, position: &mut Position) -> Result<Option<Draft<Scan>>, StageError> {
+        let mut draft = self.scans.loan()?;
+        while position.index < self.source.len() {
+            let (started_ns, allocated) = (clock::now_ns(), allocations::so_far());
+            let (header, bytes) = draft.parts();
+            match self.source.read(position.index, header, bytes) {
+                Ok(()) => {
+                    let finished_ns = clock::now_ns();
+                    self.statistics.record(allocations::so_far() - allocated, finished_ns - started_ns);
+                    let stamp_ns = header.item.stamp_ns;
+                    header.item = Item { stamp_ns, ..position.item() };
+                    *header.item.hop(Stage::RadarReplay) =
+                        Hop { received_ns: started_ns, started_ns, finished_ns, published_ns: 0 };
+                    return Ok(Some(draft));
+                }
+                Err(reason) => {
+                    self.statistics.unreadable += 1;
+                    tracing::warn!(scan = position.index, "skipped: {reason}");
+                    position.index += 1;
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// Publishes a scan when there is room and its time has come; false when told to stop before that.
+    fn admit(&mut self, mut draft: Draft<Scan>, position: &Position, tempo: Option<Tempo>) -> Result<bool, StageError> {
+        let due_ns = tempo.and_then(|tempo| Some(tempo.due_ns(self.source.complete_ns(position.index)?)));
+        loop {
+            self.credit.update()?;
+            let wait = due_ns.map_or(Duration::ZERO, clock::until);
+            let room = self.launch.manifest.live || self.credit.admits(position.seq, self.launch.manifest.window.scans as u64);
+            if room && wait.is_zero() {
+                draft.header().item.due_ns = due_ns.unwrap_or_else(clock::now_ns);
+                self.scans.send(draft, Stage::RadarReplay)?;
+                return Ok(true);
+            }
+            let limit = if room { wait.min(wake::NET) } else { wake::NET };
+            if self.sleep(limit)? {
+                return Ok(false);
+            }
+        }
+    }
+
+    /// A radar does not wait: what it saw while this process was not there has been missed.
+    fn skip_what_is_past(&mut self, position: &mut Position, tempo: Option<Tempo>) {
+        let Some(tempo) = tempo else { return };
+        let now_ns = clock::now_ns();
+        let period_behind = |index| Some(tempo.due_ns(self.source.complete_ns(index + 1)?) < now_ns);
+        while position.index + 1 < self.source.len() && period_behind(position.index) == Some(true) {
+            position.index += 1;
+            position.seq += 1;
+        }
+    }
+
+    fn tempo(&self, index: usize) -> Option<Tempo> {
+        let rate = self.launch.manifest.rate?;
+        Some(Tempo { rate, start_ns: clock::now_ns(), first_ns: self.source.complete_ns(index)? })
+    }
+
+    fn end(&mut self, position: &Position) -> Result<(), StageError> {
+        let mut draft = self.scans.loan()?;
+        draft.header().item = Item { flags: flag::END, ..position.item() };
+        self.scans.send(draft, Stage::RadarReplay)
+    }
+
+    /// Sleeps, and answers readers that have come; true when told to stop.
+    fn sleep(&mut self, limit: Duration) -> Result<bool, StageError> {
+        let woken = self.launch.signals.wait(&[self.credit.poses.listener(), self.scans.listener()], limit)?;
+        self.statistics.wakes += 1;
+        self.scans.greet()?;
+        Ok(woken.stop)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_restart_begins_with_the_last_poses_scan() {
+        let sync = Item { seq: 9, scan: 12, previous_scan: 10, ..Item::default() };
+        assert_eq!(Position::resume(&sync, 1), Position { index: 12, seq: 9, previous: Some(10) });
+        assert_eq!(Position::resume(&sync, 2), Position { index: 10, seq: 8, previous: None });
+        let base = Item { flags: flag::BASE, ..sync };
+        assert_eq!(Position::resume(&base, 1), Position::default());
+    }
+
+    #[test]
+    fn only_the_very_first_scan_starts_a_chain() {
+        assert!(Position::default().item().is(flag::BREAK));
+        assert!(!Position { index: 12, seq: 9, previous: None }.item().is(flag::BREAK));
+    }
+
+    #[test]
+    fn tempo_stretches_the_sensors_clock() {
+        let tempo = Tempo { rate: 4.0, start_ns: 1000, first_ns: 500 };
+        assert_eq!(tempo.due_ns(500 + 4000), 2000);
+    }
+}
