@@ -1,2 +1,43 @@
-//! stub
-fn main() {}
+//! `gyre`: radar odometry as cooperating processes, on the command line.
+//!
+//! Reading order: [`cli`], then [`run`] (what `gyre run` does, in a page), [`configuration`], [`results`].
+
+mod cli;
+mod configuration;
+mod evaluate;
+mod inspect;
+mod latency;
+mod odometry;
+mod preflight;
+mod progress;
+mod results;
+mod run;
+mod simulate;
+mod stage;
+mod summary;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use cli::{Command, Gyre};
+
+/// A sentence for the person at the terminal.
+type Failure = Box<dyn std::error::Error + Send + Sync>;
+
+fn main() -> ExitCode {
+    let result = match Gyre::parse().command {
+        Command::Stage { name } => return stage::run(&name),
+        Command::Run(arguments) => run::run(&arguments),
+        Command::Inspect(arguments) => inspect::inspect(&arguments),
+        Command::Evaluate(arguments) => evaluate::evaluate(&arguments),
+        Command::Simulate(arguments) => simulate::simulate(&arguments),
+    };
+    match result {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("gyre: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}

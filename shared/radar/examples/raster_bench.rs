@@ -1,14 +1,13 @@
-//! How long one raster takes, on one thread: medians for an Oxford scan (the first under `GYRE_DATA`), or one of its size that is
-//! made up, at three sizes, both samplings, with and without the sweep's motion undone.
+//! How long one raster takes, on one thread: medians for an Oxford scan (the first under `GYRE_DATA`), or one of its
+//! size that is made up, at three sizes, both samplings, with and without the sweep's motion undone.
 //!
 //! `cargo run --release -p gyre-radar --example raster_bench`
 
-use gyre_radar::raster::{RasterConfig, Rasteriser, Sampling, Twist};
-use gyre_radar::scan::{OwnedScan, ScanLimits, Sense, SweepGeometry};
+use gyre_radar::{
+    DatasetOptions, OwnedScan, RasterConfig, Rasteriser, Sampling, ScanLimits, Sense, SweepGeometry, Twist,
+};
 use std::error::Error;
-use std::fs::File;
-use std::io::BufReader;
-use std::path::PathBuf;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 const AZIMUTHS: usize = 400;
@@ -18,28 +17,16 @@ const FLOOR: u8 = 60;
 const REPETITIONS: usize = 301;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut scan = made_up_scan();
-    match oxford_image()? {
-        Some(path) => {
-            println!("scan: Oxford, 400 x 3768");
-            read_png(&path, &mut scan)?;
-        }
-        None => println!("scan: made up, 400 x 3768 (GYRE_DATA is not set)"),
-    }
+    let (scan, origin) = match oxford_scan()? {
+        Some(scan) => (scan, "Oxford"),
+        None => (made_up_scan(), "made up (GYRE_DATA is not set)"),
+    };
+    println!("one thread; scan: {origin}, {} x {}", scan.geometry.azimuths, scan.geometry.bins);
     println!("{:>5} {:>7} {:>9} {:>10} {:>14}", "n", "cell m", "sampling", "plain ms", "compensated ms");
     for (n, cell_m) in [(127, 0.8), (255, 0.8), (255, 0.4), (511, 0.4)] {
         for sampling in [Sampling::Averaged, Sampling::Bilinear] {
-            let config = RasterConfig {
-                n,
-                cell_m,
-                sampling,
-                ..RasterConfig::default()
-            };
-            let twist = Twist {
-                vx_mps: 9.5,
-                vy_mps: 0.1,
-                yaw_rate_radps: 0.3,
-            };
+            let config = RasterConfig { n, cell_m, sampling, ..RasterConfig::default() };
+            let twist = Twist { vx_mps: 9.5, vy_mps: 0.1, yaw_rate_radps: 0.3 };
             let plain = median_ms(&config, &scan, None)?;
             let compensated = median_ms(&config, &scan, Some(twist))?;
             let sampling = format!("{sampling:?}");
@@ -65,10 +52,7 @@ fn median_ms(config: &RasterConfig, scan: &OwnedScan, twist: Option<Twist>) -> R
 /// Noise at the level of a real scan's, with a wall now and then.
 fn made_up_scan() -> OwnedScan {
     let stride = BINS + METADATA;
-    let mut scan = OwnedScan::with_limits(ScanLimits {
-        bytes: AZIMUTHS * stride,
-        azimuths: AZIMUTHS,
-    });
+    let mut scan = OwnedScan::with_limits(ScanLimits { bytes: AZIMUTHS * stride, azimuths: AZIMUTHS });
     scan.geometry = SweepGeometry {
         azimuths: AZIMUTHS,
         bins: BINS,
@@ -91,24 +75,11 @@ fn made_up_scan() -> OwnedScan {
     scan
 }
 
-fn oxford_image() -> Result<Option<PathBuf>, Box<dyn Error>> {
-    let Some(data) = std::env::var_os("GYRE_DATA") else {
-        return Ok(None);
-    };
-    let folder = PathBuf::from(data).join("oxford-2019-01-10-14-36-48/radar");
-    let mut images = std::fs::read_dir(folder)?
-        .map(|entry| entry.map(|entry| entry.path()))
-        .collect::<Result<Vec<_>, _>>()?;
-    images.sort();
-    Ok(images.into_iter().find(|path| path.extension().is_some_and(|e| e == "png")))
-}
-
-fn read_png(path: &PathBuf, scan: &mut OwnedScan) -> Result<(), Box<dyn Error>> {
-    let mut reader = png::Decoder::new(BufReader::new(File::open(path)?)).read_info()?;
-    let expected = scan.bytes.len();
-    if reader.output_buffer_size() != Some(expected) {
-        return Err(format!("{} does not hold 400 x 3779 bytes", path.display()).into());
-    }
-    reader.next_frame(&mut scan.bytes)?;
-    Ok(())
+fn oxford_scan() -> Result<Option<OwnedScan>, Box<dyn Error>> {
+    let Some(data) = std::env::var_os("GYRE_DATA") else { return Ok(None) };
+    let folder = Path::new(&data).join("oxford-2019-01-10-14-36-48");
+    let mut dataset = gyre_radar::open(&folder, &DatasetOptions::default())?;
+    let mut scan = OwnedScan::with_limits(dataset.limits());
+    scan.geometry = dataset.read(0, scan.slot())?;
+    Ok(Some(scan))
 }

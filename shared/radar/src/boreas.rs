@@ -12,7 +12,7 @@ use crate::navtech_scans::{NavtechScans, Profile, ScanTime};
 use crate::options::{AzimuthSource, DatasetOptions, Format};
 use crate::stamp::SECOND_NS;
 
-/// Metres a range bin before [`NEW_FIRMWARE_NS`].
+/// Metres a range bin before 2021-09-21, when the radar's firmware was changed.
 pub const OLD_RANGE_RESOLUTION_M: f32 = 0.0596;
 /// Metres a range bin since then, and in Boreas Road Trip.
 pub const NEW_RANGE_RESOLUTION_M: f32 = 0.04381;
@@ -21,8 +21,7 @@ pub const RANGE_OFFSET_M: f32 = -0.31;
 /// 2021-09-21 00:00 UTC: the radar's firmware was changed.
 const NEW_FIRMWARE_NS: i64 = 1_632_182_400 * SECOND_NS;
 
-const STAMPS: &str =
-    "Files are named by the time of azimuth n/2 - 1, the sweep's middle; that row's stamp is the scan's time, as in the ground truth.";
+const STAMPS: &str = "Files are named by the time of azimuth n/2 - 1, the sweep's middle; that row's stamp is the scan's time, as in the ground truth.";
 
 pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<NavtechScans, OpenError> {
     NavtechScans::open(found, options, |look| profile(Format::Boreas, resolution_by_date(look)))

@@ -23,7 +23,10 @@ pub(crate) struct Found {
 const LAYOUTS: [(Format, &[&str]); 8] = [
     (Format::Radiate, &["Navtech_Polar"]),
     (Format::Oord, &["Navtech_CTS350-X_Radar"]),
-    (Format::MulranOxfordForm, &["polar_oxford_form", "radar/polar_oxford_form", "sensor_data/radar/polar_oxford_form"]),
+    (
+        Format::MulranOxfordForm,
+        &["polar_oxford_form", "radar/polar_oxford_form", "sensor_data/radar/polar_oxford_form"],
+    ),
     (Format::Mulran, &["sensor_data/radar/polar", "radar/polar", "polar"]),
     (Format::Fomo, &["navtech"]),
     (Format::Oxford, &["radar"]),
@@ -54,7 +57,9 @@ fn check_folder(root: &Path) -> Result<(), OpenError> {
 
 /// The folder that holds the images: one of the layouts', else the root.
 fn find_folder(root: &Path, forced: Option<Format>) -> Result<PathBuf, OpenError> {
-    let known = || LAYOUTS.iter().filter(|(f, _)| forced.is_none_or(|forced| forced == *f)).flat_map(|(_, folders)| folders.iter());
+    let known = || {
+        LAYOUTS.iter().filter(|(f, _)| forced.is_none_or(|forced| forced == *f)).flat_map(|(_, folders)| folders.iter())
+    };
     let mut candidates = known().map(|folder| root.join(folder));
     if let Some(folder) = candidates.clone().find(|folder| has_png(folder)) {
         return Ok(folder);
@@ -79,7 +84,8 @@ fn find_folder(root: &Path, forced: Option<Format>) -> Result<PathBuf, OpenError
 /// The format that a folder's name and its neighbours leave no doubt of.
 fn by_layout(root: &Path, folder: &Path) -> Option<Format> {
     let name = folder.file_name()?.to_str()?;
-    let beside = |file: &str| root.join(file).exists() || folder.parent().is_some_and(|parent| parent.join(file).exists());
+    let beside =
+        |file: &str| root.join(file).exists() || folder.parent().is_some_and(|parent| parent.join(file).exists());
     match name {
         "Navtech_Polar" => Some(Format::Radiate),
         "Navtech_CTS350-X_Radar" => Some(Format::Oord),
@@ -101,7 +107,9 @@ fn by_image(root: &Path, folder: &Path, images: &mut Images) -> Result<(Format, 
         let without_metadata = images.size.height > images.size.width && images.name_stamp_ns(0).is_some();
         return match without_metadata {
             true => Ok((Format::Mulran, vec![decided(Format::Mulran, "images on their side, named by times")])),
-            false => Err(unknown("bear no stamps in their first 8 columns, lie beside no list of stamps, and are not named by times")),
+            false => Err(unknown(
+                "bear no stamps in their first 8 columns, lie beside no list of stamps, and are not named by times",
+            )),
         };
     };
     let boreas_folders = ["applanix", "calib"].iter().any(|f| root.join(f).is_dir());
@@ -132,7 +140,10 @@ fn evidence(look: &FirstLook) -> String {
     format!("{} range bins, {named}{chirps}{unit}", look.bins())
 }
 
-/// How well a format fits; formats without metadata columns not at all.
+/// Of formats that no image can be told by.
+const NEVER: i32 = -100;
+
+/// How well a format fits; formats without metadata columns, and OORD, which differs from Oxford in its folders only, not at all.
 fn score(format: Format, look: &FirstLook, boreas_folders: bool) -> i32 {
     let (bins, named, chirps): (&[usize], NamedBy, bool) = match format {
         Format::Oxford => (&[3768], NamedBy::Start, false),
@@ -140,7 +151,7 @@ fn score(format: Format, look: &FirstLook, boreas_folders: bool) -> i32 {
         Format::BoreasRt => (&[6848], NamedBy::Middle, true),
         Format::Fomo => (&[6848], NamedBy::Start, false),
         Format::MulranOxfordForm => (&[3360], NamedBy::End, false),
-        Format::Oord | Format::Mulran | Format::Radiate => return i32::MIN,
+        Format::Oord | Format::Mulran | Format::Radiate => return NEVER,
     };
     let boreas = matches!(format, Format::Boreas | Format::BoreasRt);
     let by_name = look.named_by().map_or(0, |by| if by == named { 2 } else { -2 });

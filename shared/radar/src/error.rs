@@ -161,7 +161,9 @@ pub enum ReadError {
         actual: usize,
     },
     /// An encoder count that the encoder cannot give.
-    #[error("{path}, row {row}: encoder count {count} is above the encoder's {counts} counts a turn; set `encoder_counts`, or `azimuth_source = \"uniform\"`")]
+    #[error(
+        "{path}, row {row}: encoder count {count} is above the encoder's {counts} counts a turn; set `encoder_counts`, or `azimuth_source = \"uniform\"`"
+    )]
     EncoderCount {
         /// The file.
         path: PathBuf,
@@ -173,7 +175,9 @@ pub enum ReadError {
         counts: u16,
     },
     /// An azimuth that does not follow the one before.
-    #[error("{path}, row {row}: azimuth does not grow (encoder count {count} after {previous}); the rows are not one sweep")]
+    #[error(
+        "{path}, row {row}: azimuth does not grow (encoder count {count} after {previous}); the rows are not one sweep"
+    )]
     AzimuthOrder {
         /// The file.
         path: PathBuf,
@@ -185,7 +189,9 @@ pub enum ReadError {
         previous: u16,
     },
     /// A stamp that is no time at which a radar ran.
-    #[error("{path}, row {row}: stamp {value} is not in the years 2015 to 2040 in s, ms, us or ns; the first 11 bytes of a row are not what they should be")]
+    #[error(
+        "{path}, row {row}: stamp {value} is not in the years 2015 to 2040 in s, ms, us or ns; the first 11 bytes of a row are not what they should be"
+    )]
     StampYear {
         /// The file.
         path: PathBuf,
@@ -195,7 +201,9 @@ pub enum ReadError {
         value: i64,
     },
     /// Stamps that jump within a sweep.
-    #[error("{path}: its first and last rows are {span_s:.3} s apart, which is not one sweep; the clock was set in between")]
+    #[error(
+        "{path}: its first and last rows are {span_s:.3} s apart, which is not one sweep; the clock was set in between"
+    )]
     SweepTime {
         /// The file.
         path: PathBuf,

@@ -86,7 +86,7 @@ impl FirstLook {
     /// Which of the rows' times the file is named by; `None` where its name is no time or near none of them.
     pub(crate) fn named_by(&self) -> Option<NamedBy> {
         let (name, last) = (self.name_ns?, self.rows.len() - 1);
-        let rows = [(NamedBy::Start, 0), (NamedBy::Middle, (last + 1) / 2 - 1), (NamedBy::End, last)];
+        let rows = [(NamedBy::Start, 0), (NamedBy::Middle, self.rows.len() / 2 - 1), (NamedBy::End, last)];
         let distance = |row| Some((self.row_ns(row)? - name).abs());
         let (by, near) = rows.into_iter().filter_map(|(by, row)| Some((by, distance(row)?))).min_by_key(|(_, d)| *d)?;
         (near <= SAME_TIME_NS).then_some(by)
@@ -105,7 +105,7 @@ impl FirstLook {
         let step = self.rows[1].count.checked_sub(self.rows[0].count)?;
         let even = self.rows.windows(2).all(|w| w[1].count.checked_sub(w[0].count) == Some(step));
         let (first, last) = (self.rows[0].count, self.rows[self.rows.len() - 1].count);
-        let seam = (first + counts).checked_sub(last)?;
+        let seam = first.checked_add(counts)?.checked_sub(last)?;
         even.then_some((step, seam))
     }
 }

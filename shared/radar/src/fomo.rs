@@ -12,8 +12,7 @@ pub const RANGE_RESOLUTION_M: f32 = 0.0438;
 /// Encoder counts a turn.
 pub const ENCODER_COUNTS: u16 = 5595;
 
-const STAMPS: &str =
-    "Files are named by the time of the sweep's first row; a scan's time is half-way between its first and last row's stamps.";
+const STAMPS: &str = "Files are named by the time of the sweep's first row; a scan's time is half-way between its first and last row's stamps.";
 
 pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<NavtechScans, OpenError> {
     NavtechScans::open(found, options, |_| Profile {

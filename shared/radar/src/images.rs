@@ -39,10 +39,6 @@ impl Images {
         self.files.get(index).map_or(Path::new(""), PathBuf::as_path)
     }
 
-    pub(crate) fn files(&self) -> &[PathBuf] {
-        &self.files
-    }
-
     /// The number that a file is named by.
     pub(crate) fn number(&self, index: usize) -> Option<i64> {
         file_number(self.file(index))

@@ -13,11 +13,10 @@ use crate::options::{AzimuthSource, DatasetOptions, Format};
 use crate::png_image::ImageSize;
 use crate::scan::{ScanLimits, ScanSlot, SweepGeometry};
 use crate::sideways::{SidewaysScans, mean_after_start_ns};
+use crate::stamp;
 
 /// Metres a range bin: 200 m over 3360 bins.
 pub const RANGE_RESOLUTION_M: f32 = 200.0 / 3360.0;
-/// The antenna turns four times a second, ns.
-const USUAL_PERIOD_NS: i64 = 250_000_000;
 
 const STAMPS: &str = "Files are named by the end of the sweep; a scan's time is half a turn earlier, a turn being the time since the \
                       file before, and columns are spread evenly over the turn.";
@@ -52,9 +51,7 @@ impl MulranPolar {
     pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<Self, OpenError> {
         let (scans, notes) = SidewaysScans::open(found, options, |_| RANGE_RESOLUTION_M)?;
         let end_ns = (0..scans.images.len()).map(|index| end_ns(&scans, index)).collect::<Result<Vec<_>, _>>()?;
-        let mut intervals: Vec<i64> = end_ns.windows(2).map(|w| w[1] - w[0]).collect();
-        intervals.sort_unstable();
-        let period_ns = intervals.get(intervals.len() / 2).copied().unwrap_or(USUAL_PERIOD_NS);
+        let period_ns = stamp::usual_interval(end_ns.iter().copied());
         Ok(Self { scans, end_ns, period_ns, notes })
     }
 

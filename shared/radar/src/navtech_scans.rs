@@ -13,9 +13,6 @@ use crate::png_image::ImageSize;
 use crate::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, Sense, SweepGeometry};
 use crate::stamp;
 
-/// A turn of the antenna where the files do not tell, ns: these radars turn four times a second.
-const USUAL_PERIOD_NS: i64 = 250_000_000;
-
 /// How a scan's time follows from its rows'.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ScanTime {
@@ -72,7 +69,7 @@ impl NavtechScans {
         let look = FirstLook::take(&mut images);
         let profile = profile(look.as_ref()).with(options);
         notes.extend(look.iter().flat_map(|look| observations(look, &profile)));
-        let period_ns = usual_interval_ns(&images);
+        let period_ns = stamp::usual_interval((0..images.len()).filter_map(|i| images.name_stamp_ns(i)));
         Ok(Self { images, profile, period_ns, notes })
     }
 
@@ -118,21 +115,19 @@ fn check_shape(images: &Images, format: Format) -> Result<(), OpenError> {
     Err(OpenError::WrongImage { path: images.file(0).to_owned(), actual: images.size, format, reason })
 }
 
-/// Median time between the names of neighbouring files.
-fn usual_interval_ns(images: &Images) -> i64 {
-    let names: Vec<i64> = (0..images.len()).filter_map(|i| images.name_stamp_ns(i)).collect();
-    let mut intervals: Vec<i64> = names.windows(2).map(|w| w[1] - w[0]).collect();
-    intervals.sort_unstable();
-    intervals.get(intervals.len() / 2).copied().unwrap_or(USUAL_PERIOD_NS)
-}
-
 /// What is worth saying about the first image.
 fn observations(look: &FirstLook, profile: &Profile) -> Vec<String> {
     let named = look.named_by().filter(|by| *by != profile.named_by).map(|by| {
         let (format, usual) = (profile.format, profile.named_by.words());
-        format!("The files are named by {}, while {format} files are named by {usual}: the format may be another one.", by.words())
+        format!(
+            "The files are named by {}, while {format} files are named by {usual}: the format may be another one.",
+            by.words()
+        )
     });
-    [note_bursts(look, profile), note_byte_ten(look, profile), note_encoder(look, profile), named].into_iter().flatten().collect()
+    [note_bursts(look, profile), note_byte_ten(look, profile), note_encoder(look, profile), named]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 fn note_bursts(look: &FirstLook, profile: &Profile) -> Option<String> {
@@ -152,13 +147,17 @@ fn note_byte_ten(look: &FirstLook, profile: &Profile) -> Option<String> {
     if look.chirps_alternate() {
         return Some("Byte 10 alternates from row to row: it is the chirp's direction (255 up, 0 down), not validity; no row is dropped for it.".to_owned());
     }
-    (look.byte_ten_is_zero() && profile.byte_ten == ByteTen::Unused)
-        .then(|| "Byte 10 is 0 in every row: it says nothing about validity or chirps, and all rows count as measured.".to_owned())
+    (look.byte_ten_is_zero() && profile.byte_ten == ByteTen::Unused).then(|| {
+        "Byte 10 is 0 in every row: it says nothing about validity or chirps, and all rows count as measured."
+            .to_owned()
+    })
 }
 
 fn note_encoder(look: &FirstLook, profile: &Profile) -> Option<String> {
     if profile.azimuth_source == AzimuthSource::Uniform {
-        return Some("Azimuths are taken as even steps from straight ahead; the encoder columns are not used.".to_owned());
+        return Some(
+            "Azimuths are taken as even steps from straight ahead; the encoder columns are not used.".to_owned(),
+        );
     }
     let counts = profile.encoder_counts;
     let (step, seam) = look.encoder_step(counts)?;
@@ -225,7 +224,14 @@ impl Dataset for NavtechScans {
         self.images.decode(index, slot.bytes)?;
         let (size, path, profile) = (self.images.size, self.images.file(index), &self.profile);
         let (azimuth_rad, stamp_ns) = (&mut slot.azimuth_rad[..size.height], &mut slot.stamp_ns[..size.height]);
-        navtech_png::fill_azimuths(path, slot.bytes, size, profile.azimuth_source, profile.encoder_counts, azimuth_rad)?;
+        navtech_png::fill_azimuths(
+            path,
+            slot.bytes,
+            size,
+            profile.azimuth_source,
+            profile.encoder_counts,
+            azimuth_rad,
+        )?;
         navtech_png::fill_stamps(path, slot.bytes, size, stamp_ns)?;
         navtech_png::fill_flags(slot.bytes, size, profile.byte_ten, slot.flags);
         let scan_ns = self.scan_time_ns(stamp_ns);

@@ -108,7 +108,11 @@ impl DatasetOptions {
             return Err(self.refused("range_offset_m", self.range_offset_m, "it must be from -100 to 100 m"));
         }
         if !counts_ok {
-            return Err(self.refused("encoder_counts", self.encoder_counts, "an encoder has at least 16 counts a turn"));
+            return Err(self.refused(
+                "encoder_counts",
+                self.encoder_counts,
+                "an encoder has at least 16 counts a turn",
+            ));
         }
         Ok(())
     }

@@ -88,7 +88,10 @@ fn check_pixels(path: &Path, bits: u8, colour: u8) -> Result<(), ReadError> {
 fn check_size(path: &Path, width: u64, height: u64) -> Result<ImageSize, ReadError> {
     let bytes = width.saturating_mul(height);
     if bytes == 0 {
-        return Err(ReadError::Damaged { path: path.to_owned(), reason: "its header says that it has no pixels".to_owned() });
+        return Err(ReadError::Damaged {
+            path: path.to_owned(),
+            reason: "its header says that it has no pixels".to_owned(),
+        });
     }
     if bytes > MAX_IMAGE_BYTES {
         return Err(ReadError::TooLarge { path: path.to_owned(), actual: bytes, limit: MAX_IMAGE_BYTES });
@@ -125,7 +128,11 @@ impl ImageReader {
         // One byte more than is accepted tells a file of exactly that size from a larger one.
         file.take(MAX_IMAGE_BYTES + 1).read_to_end(&mut self.file).map_err(|e| io_error(path, e))?;
         if self.file.len() as u64 > MAX_IMAGE_BYTES {
-            return Err(ReadError::TooLarge { path: path.to_owned(), actual: self.file.len() as u64, limit: MAX_IMAGE_BYTES });
+            return Err(ReadError::TooLarge {
+                path: path.to_owned(),
+                actual: self.file.len() as u64,
+                limit: MAX_IMAGE_BYTES,
+            });
         }
         Ok(())
     }

@@ -40,7 +40,8 @@ impl Radiate {
         let list = found.folder.with_extension("txt");
         let (stamps, unpadded) = read_stamps(&list)?;
         let (scans, mut notes) = SidewaysScans::open(found, options, |bins| RANGE_M / bins as f32)?;
-        let received = (0..scans.images.len()).map(|i| receipt(&scans, i, &stamps, &list)).collect::<Result<Vec<_>, _>>()?;
+        let received =
+            (0..scans.images.len()).map(|i| receipt(&scans, i, &stamps, &list)).collect::<Result<Vec<_>, _>>()?;
         let path = || scans.images.file(0).to_owned();
         let clock = SensorClock::below(&received, PERIOD_NS).ok_or_else(|| OpenError::NoImages { path: path() })?;
         if unpadded > 0 {
@@ -52,7 +53,12 @@ impl Radiate {
             ));
         }
         if stamps.len() > received.len() {
-            notes.push(format!("{} lists {} scans, and {} images are there.", file_name(&list), stamps.len(), received.len()));
+            notes.push(format!(
+                "{} lists {} scans, and {} images are there.",
+                file_name(&list),
+                stamps.len(),
+                received.len()
+            ));
         }
         Ok(Self { scans, received, clock, notes })
     }
@@ -71,10 +77,18 @@ fn file_name(path: &Path) -> String {
 }
 
 /// Frame number and time of receipt of an image.
-fn receipt(scans: &SidewaysScans, index: usize, stamps: &BTreeMap<i64, i64>, list: &Path) -> Result<(i64, i64), OpenError> {
+fn receipt(
+    scans: &SidewaysScans,
+    index: usize,
+    stamps: &BTreeMap<i64, i64>,
+    list: &Path,
+) -> Result<(i64, i64), OpenError> {
     let image = scans.images.file(index);
     let missing = || {
-        let reason = format!("no time for {}; every image needs a line `Frame: <number> Time: <seconds>.<nanoseconds>`", file_name(image));
+        let reason = format!(
+            "no time for {}; every image needs a line `Frame: <number> Time: <seconds>.<nanoseconds>`",
+            file_name(image)
+        );
         OpenError::Text { path: list.to_owned(), line: 0, reason }
     };
     let frame = scans.images.number(index).ok_or_else(missing)?;
@@ -89,7 +103,9 @@ fn read_stamps(path: &PathBuf) -> Result<(BTreeMap<i64, i64>, usize), OpenError>
         let (frame, ns, digits) = parse_line(content).ok_or_else(|| OpenError::Text {
             path: path.clone(),
             line: line + 1,
-            reason: format!("{content:?} is not `Frame: <number> Time: <seconds>.<nanoseconds>` of the years 2015 to 2040"),
+            reason: format!(
+                "{content:?} is not `Frame: <number> Time: <seconds>.<nanoseconds>` of the years 2015 to 2040"
+            ),
         })?;
         unpadded += usize::from(digits < 9);
         stamps.insert(frame, ns);
@@ -169,7 +185,13 @@ mod tests {
     fn nanoseconds_without_leading_zeros_are_integers() {
         assert_eq!(parse_line("Frame: 000243 Time: 1549986608.1533537"), Some((243, 1_549_986_608_001_533_537, 7)));
         assert_eq!(parse_line("Frame: 1 Time: 1549986608.0"), Some((1, 1_549_986_608_000_000_000, 1)));
-        for bad in ["Frame: 1 Time: 1549986608", "Frame: 1 Time: 1549986608.1234567890", "Frame: x Time: 1549986608.1", "Frame: 1 Time: 12.5", ""] {
+        for bad in [
+            "Frame: 1 Time: 1549986608",
+            "Frame: 1 Time: 1549986608.1234567890",
+            "Frame: x Time: 1549986608.1",
+            "Frame: 1 Time: 12.5",
+            "",
+        ] {
             assert_eq!(parse_line(bad), None, "{bad}");
         }
     }

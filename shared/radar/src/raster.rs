@@ -7,8 +7,8 @@
 //! In the order of the work:
 //! 1. `bearing_table`: from an angle to the fractional azimuth measured there, and to the time of measuring;
 //! 2. `polar_image`: the powers above the floor, averaged along range over what one cell covers;
-//! 3. `kernels::locate`: each cell's place in the polar image, seen from where [`Twist`] puts the sensor, and the mean of the four
-//!    samples around it.
+//! 3. `kernels::locate`: each cell's place in the polar image, seen from where [`Twist`] puts the sensor, and the
+//!    mean of the four samples around it.
 
 mod bearing_table;
 mod cells;
@@ -39,8 +39,9 @@ pub const MAX_CELLS_A_SIDE: usize = 4096;
 #[serde(rename_all = "kebab-case")]
 pub enum Sampling {
     /// The mean of the range bins that one cell covers, bilinear between azimuths: no aliasing where bins are finer
-    /// than cells. The polar image is kept in steps of a quarter of a cell at most, so a target narrower than
-    /// that may move by an eighth of a cell.
+    /// than cells. Bins are taken together by 2, 4, ... up to an eighth of that depth, so a single bright bin may move
+    /// by a sixteenth of a cell. Azimuths are not averaged: near the sensor, where several fall into one cell, that
+    /// changed no trajectory.
     #[default]
     Averaged,
     /// Bilinear between the four nearest measurements: one point of the scan stands for the whole cell.
@@ -59,16 +60,13 @@ pub struct RasterConfig {
     pub minimum_range_m: f32,
     /// How a cell's value comes from the range bins: `averaged` or `bilinear`.
     pub sampling: Sampling,
+    /// What `averaged` takes the mean over: a depth of so many cells. A little more than 1 smooths.
+    pub averaged_cells: f32,
 }
 
 impl Default for RasterConfig {
     fn default() -> Self {
-        Self {
-            n: 255,
-            cell_m: 0.8,
-            minimum_range_m: 2.0,
-            sampling: Sampling::Averaged,
-        }
+        Self { n: 255, cell_m: 0.8, minimum_range_m: 2.0, sampling: Sampling::Averaged, averaged_cells: 1.0 }
     }
 }
 
@@ -87,6 +85,9 @@ impl RasterConfig {
         }
         if !(self.minimum_range_m >= 0.0 && self.minimum_range_m.is_finite()) {
             return setting("minimum_range_m", self.minimum_range_m.into(), "0 or more");
+        }
+        if !(0.1..=10.0).contains(&self.averaged_cells) {
+            return setting("averaged_cells", self.averaged_cells.into(), "0.1 to 10");
         }
         Ok(())
     }
@@ -153,8 +154,8 @@ pub enum RasterError {
     },
 }
 
-/// Makes rasters of scans, one after the other. All memory that depends on the raster is set aside by [`Rasteriser::new`],
-/// all that depends on the scan's size by the first scan of that size.
+/// Makes rasters of scans, one after the other. All memory that depends on the raster is set aside by
+/// [`Rasteriser::new`], all that depends on the scan's size by the first scan of that size.
 #[derive(Debug)]
 pub struct Rasteriser {
     config: RasterConfig,
@@ -172,7 +173,7 @@ impl Rasteriser {
     pub fn new(config: &RasterConfig) -> Result<Self, RasterError> {
         config.validate()?;
         let window_m = match config.sampling {
-            Sampling::Averaged => config.cell_m,
+            Sampling::Averaged => config.cell_m * config.averaged_cells,
             Sampling::Bilinear => 0.0,
         };
         let cells = Cells::new(config.n, config.cell_m, Sense::Clockwise);
@@ -197,8 +198,8 @@ impl Rasteriser {
     /// What no azimuth or bin covers is zero; a scan without azimuths or bins gives zeros. Between the last azimuth
     /// and the first, as between all others, the powers are interpolated.
     ///
-    /// # Errors
-    /// A wrong length of `out`, a scan that contradicts itself, a twist that is not finite or turns too far. `out` is untouched then.
+    /// # Errors A wrong length of `out`, a scan that contradicts itself, a twist that is not finite or turns too far.
+    /// `out` is untouched then.
     pub fn rasterise(
         &mut self,
         scan: &PolarScan<'_>,
@@ -244,10 +245,7 @@ impl Rasteriser {
     fn check(&self, scan: &PolarScan<'_>, out: &[f32]) -> Result<(), RasterError> {
         let expected = self.config.n * self.config.n;
         if out.len() != expected {
-            return Err(RasterError::OutputLength {
-                expected,
-                actual: out.len(),
-            });
+            return Err(RasterError::OutputLength { expected, actual: out.len() });
         }
         check_scan(scan)
     }
@@ -263,9 +261,7 @@ fn check_scan(scan: &PolarScan<'_>) -> Result<(), RasterError> {
     at_least("table of stamps", scan.stamp_ns.len(), geometry.azimuths)?;
     if geometry.azimuths > 0 {
         let last_row = (geometry.azimuths - 1).saturating_mul(geometry.stride);
-        let bytes = last_row
-            .saturating_add(geometry.first_byte)
-            .saturating_add(geometry.bins);
+        let bytes = last_row.saturating_add(geometry.first_byte).saturating_add(geometry.bins);
         at_least("image", scan.bytes.len(), bytes)?;
     }
     check_number("number of azimuths", geometry.azimuths as f64, 0.0..=MAX_AZIMUTHS as f64)?;

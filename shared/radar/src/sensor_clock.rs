@@ -1,5 +1,8 @@
 //! The sensor's even clock, from times at which a host received its scans.
 
+/// No scan is farther from the first, ns: a century. It keeps absurd frame numbers from overflowing.
+const FARTHEST_NS: i64 = 3_155_760_000_000_000_000;
+
 /// Scan `number` starts at `start_ns + period_ns * number`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SensorClock {
@@ -18,8 +21,10 @@ impl SensorClock {
     /// optimum is the edge of the points' lower convex hull over their mean number. `None` without points.
     pub(crate) fn below(received: &[(i64, i64)], period: std::ops::RangeInclusive<f64>) -> Option<Self> {
         let &(first_number, origin_ns) = received.first()?;
-        let points: Vec<(f64, f64)> =
-            received.iter().map(|(number, ns)| ((number - first_number) as f64, (ns - origin_ns) as f64)).collect();
+        let points: Vec<(f64, f64)> = received
+            .iter()
+            .map(|(number, ns)| (*number as f64 - first_number as f64, (ns - origin_ns) as f64))
+            .collect();
         let mean = points.iter().map(|p| p.0).sum::<f64>() / points.len() as f64;
         let slope = slope_over(&lower_hull(&points), mean).unwrap_or((period.start() + period.end()) / 2.0);
         let slope = slope.clamp(*period.start(), *period.end());
@@ -29,7 +34,8 @@ impl SensorClock {
 
     /// Start of a scan's sweep, ns since 1970.
     pub(crate) fn start_ns(&self, number: i64) -> i64 {
-        self.origin_ns + (self.start + self.period * number as f64).round() as i64
+        let after = (self.start + self.period * number as f64).round() as i64;
+        self.origin_ns + after.clamp(-FARTHEST_NS, FARTHEST_NS)
     }
 }
 
@@ -88,7 +94,8 @@ mod tests {
     #[test]
     fn an_even_clock_is_found_through_stalls() {
         let late = |k: i64| if (30..36).contains(&k) { 1_400 - (k - 30) * 230 } else { k * 7 % 5 };
-        let received: Vec<_> = (0..100).map(|k| (k, 1_549_986_607_000_000_000 + k * 250_020_000 + late(k) * 1_000_000)).collect();
+        let received: Vec<_> =
+            (0..100).map(|k| (k, 1_549_986_607_000_000_000 + k * 250_020_000 + late(k) * 1_000_000)).collect();
         let clock = SensorClock::below(&received, BOUNDS).unwrap();
         assert!((clock.period - 250_020_000.0).abs() < 20_000.0, "{}", clock.period);
         assert!((clock.start_ns(33) - received[0].1 - 33 * 250_020_000).abs() < 1_000_000);

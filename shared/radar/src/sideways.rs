@@ -29,7 +29,12 @@ impl SidewaysScans {
     ) -> Result<(Self, Vec<String>), OpenError> {
         let Found { format, images, mut notes, .. } = found;
         options.check_without_encoder(format)?;
-        let mut scans = Self { images, range_resolution_m: 0.0, range_offset_m: options.range_offset_m.unwrap_or(0.0), scratch: Vec::new() };
+        let mut scans = Self {
+            images,
+            range_resolution_m: 0.0,
+            range_offset_m: options.range_offset_m.unwrap_or(0.0),
+            scratch: Vec::new(),
+        };
         scans.check_shape(format)?;
         scans.range_resolution_m = options.range_resolution_m.unwrap_or_else(|| metres_a_bin(scans.bins()));
         if scans.on_their_side() {

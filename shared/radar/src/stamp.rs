@@ -6,6 +6,13 @@ pub(crate) const SECOND_NS: i64 = 1_000_000_000;
 /// 2015-01-01 and 2041-01-01, s since 1970: no recording is older, and none can be younger.
 const YEARS_S: std::ops::Range<i64> = 1_420_070_400..2_240_611_200;
 
+/// Times are read up to 140 years from 1970, so that no difference of two of them overflows.
+const FARTHEST_NS: i64 = i64::MAX / 2;
+/// Turns that an antenna may need, ns; what lies outside is a gap, or no time at all.
+const TURN_NS: std::ops::Range<i64> = 10_000_000..10_000_000_000;
+/// A turn of the antenna where the files do not tell, ns: these radars turn four times a second.
+const USUAL_TURN_NS: i64 = 250_000_000;
+
 /// Whether a time in ns lies in the years 2015 to 2040.
 pub(crate) fn plausible(stamp_ns: i64) -> bool {
     YEARS_S.contains(&stamp_ns.div_euclid(SECOND_NS))
@@ -27,15 +34,23 @@ pub(crate) fn parse_seconds(text: &str) -> Option<i64> {
     let sign = if whole.starts_with('-') { -1 } else { 1 };
     let seconds: i64 = unsigned.parse().ok()?;
     let nanoseconds = format!("{fraction:0<9}").get(..9)?.parse::<i64>().ok()?;
-    seconds.checked_mul(SECOND_NS)?.checked_add(nanoseconds).map(|ns| sign * ns)
+    seconds.checked_mul(SECOND_NS)?.checked_add(nanoseconds).filter(|ns| *ns <= FARTHEST_NS).map(|ns| sign * ns)
 }
 
 fn rounded_ns(seconds: f64) -> Option<i64> {
     let ns = seconds * 1e9;
-    (ns.is_finite() && ns.abs() < 9.2e18).then_some(ns.round() as i64)
+    (ns.abs() <= FARTHEST_NS as f64).then_some(ns.round() as i64)
 }
 
-/// `a + b / 2` without overflow: the middle of two times.
+/// Median time between neighbouring scans, of those that can be one turn.
+pub(crate) fn usual_interval(stamps: impl Iterator<Item = i64>) -> i64 {
+    let stamps: Vec<i64> = stamps.collect();
+    let mut intervals: Vec<i64> = stamps.windows(2).map(|w| w[1] - w[0]).filter(|ns| TURN_NS.contains(ns)).collect();
+    intervals.sort_unstable();
+    intervals.get(intervals.len() / 2).copied().unwrap_or(USUAL_TURN_NS)
+}
+
+/// The middle of two times.
 pub(crate) fn middle(first_ns: i64, last_ns: i64) -> i64 {
     first_ns + (last_ns - first_ns) / 2
 }
@@ -62,7 +77,7 @@ mod tests {
         assert_eq!(parse_seconds("-1.5"), Some(-1_500_000_000));
         assert_eq!(parse_seconds("1.5e3"), Some(1_500_000_000_000));
         assert_eq!(parse_seconds("1.1234567899"), Some(1_123_456_789));
-        for bad in ["", "nan", "inf", "1.2.3", "x", "1e300"] {
+        for bad in ["", "nan", "inf", "1.2.3", "x", "1e300", "9999999999", "-9999999999", "1e10"] {
             assert_eq!(parse_seconds(bad), None, "{bad}");
         }
     }

@@ -109,7 +109,8 @@ pub struct RotationConfig {
     pub reach_deg: f64,
     /// How the peak is placed between samples.
     pub peak: Peak,
-    /// Factor on the variance that the peak's curvature gives, calibrated where the truth is known.
+    /// Variance = this x (1 - score) / curvature of the peak. The curvature gives the shape alone; the factor, about
+    /// one over the number of independent samples, is calibrated on real scans with known motions.
     pub variance_scale: f64,
 }
 
@@ -126,7 +127,7 @@ impl Default for RotationConfig {
             radii: None,
             reach_deg: 20.0,
             peak: Peak::default(),
-            variance_scale: 1.0,
+            variance_scale: 0.08,
         }
     }
 }
@@ -145,7 +146,7 @@ pub struct TranslationConfig {
     pub peak: Peak,
     /// Also try the angle half a turn away and keep the better match: magnitude spectra cannot tell the two apart.
     pub half_turn: bool,
-    /// Factor on the covariance that the peak's curvature gives, calibrated where the truth is known.
+    /// Covariance = this x (1 - score) x inverse curvature of the peak, calibrated as the angle's.
     pub variance_scale: f64,
 }
 
@@ -157,7 +158,7 @@ impl Default for TranslationConfig {
             overlap: Overlap::default(),
             peak: Peak::default(),
             half_turn: false,
-            variance_scale: 1.0,
+            variance_scale: 0.015,
         }
     }
 }
@@ -254,4 +255,38 @@ pub(crate) fn accept(
     expected: &'static str,
 ) -> Result<(), ConfigError> {
     if good { Ok(()) } else { Err(ConfigError { section, key, actual: actual.to_string(), expected }) }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_section_of_a_few_keys_leaves_the_rest_at_its_default() {
+        let text = "form = \"line14\"\nangles = 733\npeak = { soft_argmax = { temperature = 2.0 } }";
+        let config: RotationConfig = toml::from_str(text).unwrap();
+        let peak = Peak::SoftArgmax { temperature: 2.0 };
+        let want = RotationConfig { form: RotationForm::ProfileMean, angles: 733, peak, ..RotationConfig::default() };
+        assert_eq!(config, want);
+        let written = toml::to_string(&want).unwrap();
+        assert_eq!(toml::from_str::<RotationConfig>(&written).unwrap(), want);
+    }
+
+    #[test]
+    fn unknown_keys_are_refused() {
+        assert!(toml::from_str::<RotationConfig>("angels = 720").unwrap_err().to_string().contains("angels"));
+        assert!(toml::from_str::<TranslationConfig>("reach = 3.0").unwrap_err().to_string().contains("reach"));
+        assert!(toml::from_str::<TranslationConfig>("peak = { soft_argmax = { t = 1.0 } }").is_err());
+    }
+
+    #[test]
+    fn defaults_and_both_papers_are_valid() {
+        for config in [RotationConfig::default(), RotationConfig::weston(), RotationConfig::checchin()] {
+            config.validate().unwrap();
+        }
+        for config in [TranslationConfig::default(), TranslationConfig::weston(), TranslationConfig::checchin()] {
+            config.validate().unwrap();
+        }
+    }
 }

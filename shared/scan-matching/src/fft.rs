@@ -8,6 +8,8 @@ use std::sync::Arc;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use rustfft::{Fft, FftDirection, FftPlanner, num_complex::Complex32};
 
+use crate::kernels;
+
 /// Rows that are transposed together: their complex values of one column fill a cache line.
 const BLOCK: usize = 8;
 
@@ -18,14 +20,14 @@ pub fn fast_size(least: usize) -> usize {
     let cost = |n: usize| n as f64 * if only_factors(n, &[2, 3]) { 1.0 } else { 1.25 };
     let least = least.max(8);
     (least..=2 * least)
-        .filter(|&n| n % 2 == 0 && only_factors(n, &[2, 3, 5, 11]))
+        .filter(|&n| n.is_multiple_of(2) && only_factors(n, &[2, 3, 5, 11]))
         .min_by(|&a, &b| cost(a).total_cmp(&cost(b)))
         .unwrap_or(least.next_power_of_two())
 }
 
 fn only_factors(n: usize, factors: &[usize]) -> bool {
     let rest = factors.iter().fold(n, |mut n, &f| {
-        while n % f == 0 {
+        while n.is_multiple_of(f) {
             n /= f;
         }
         n
@@ -54,6 +56,11 @@ impl Columns {
 
     pub fn column_mut(&mut self, c: usize) -> &mut [Complex32] {
         &mut self.data[c * self.stride..][..self.len]
+    }
+
+    /// The first `count` columns, gaps between them included.
+    fn first_mut(&mut self, count: usize) -> &mut [Complex32] {
+        &mut self.data[..count * self.stride]
     }
 
     pub fn count(&self) -> usize {
@@ -164,7 +171,7 @@ pub(crate) struct PairSpectrum {
     real: Vec<f32>,
     /// Spectrum of first + i second; after [`cross`](Self::cross) the cross-spectrum in columns 0 to size / 2.
     plane: Columns,
-    /// The first half of a column that is its own mirror image, kept while it is overwritten.
+    /// The column of the opposite frequency: columns 0 and size / 2 are their own, and are overwritten as they are read.
     mirror: Vec<Complex32>,
 }
 
@@ -209,20 +216,22 @@ impl PairSpectrum {
         self.columns.columns(&mut self.plane, self.size);
     }
 
-    /// Turns the pair's spectrum into `finish(second x conj(first))`, column by column.
+    /// Turns the pair's spectrum into second x conj(first), column by column.
     ///
     /// With Z = F + iG of two real images, F and G fall apart by Z(k) and Z(-k):
     /// G conj(F) = Im(Z(k) Z(-k)) / 2 - i (|Z(k)|^2 - |Z(-k)|^2) / 4.
-    pub fn cross(&mut self, finish: impl Fn(Complex32) -> Complex32) {
+    pub fn cross(&mut self) {
         for c in 0..=self.size / 2 {
             self.mirror.copy_from_slice(self.plane.column((self.size - c) % self.size));
-            let column = self.plane.column_mut(c);
-            let (head, tail) = (self.mirror[0], self.mirror[1..].iter().rev());
-            for (z, &m) in column.iter_mut().zip(std::iter::once(&head).chain(tail)) {
-                let cross = Complex32::new(0.5 * (*z * m).im, 0.25 * (m.norm_sqr() - z.norm_sqr()));
-                *z = finish(cross);
-            }
+            let (head, tail) = self.plane.column_mut(c).split_at_mut(1);
+            kernels::cross_of_pair(head, &self.mirror[..1]);
+            kernels::cross_of_pair(tail, &self.mirror[1..]);
         }
+    }
+
+    /// The cross-spectrum, as [`cross`](Self::cross) left it.
+    pub fn cross_spectrum_mut(&mut self) -> &mut [Complex32] {
+        self.plane.first_mut(self.size / 2 + 1)
     }
 
     /// Back to the image domain: calls `take(r, row)` for each r of `rows`, with the whole row `rows[r]`, not scaled.
@@ -237,6 +246,74 @@ impl PairSpectrum {
                 let done = self.inverse_row.process_with_scratch(half, &mut self.real, &mut self.row.scratch);
                 debug_assert!(done.is_ok(), "lengths are those of the plan");
                 take(b * BLOCK + r, &self.real);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn fast_sizes_have_small_factors_and_waste_little() {
+        for least in 2..3000 {
+            let size = fast_size(least);
+            assert!(size >= least && size.is_multiple_of(2) && only_factors(size, &[2, 3, 5, 11]), "{least}: {size}");
+            assert!(size * 3 <= least * 4 || least < 16, "{least}: {size}");
+        }
+        assert_eq!([fast_size(255), fast_size(288), fast_size(511), fast_size(544)], [256, 288, 512, 576]);
+    }
+
+    #[test]
+    fn real_spectrum_equals_a_direct_sum() {
+        let (n, size, kept) = (11, 16, 5);
+        let image: Vec<f32> = (0..n * n).map(|k| ((k * 29) % 13) as f32).collect();
+        let mut spectrum = RealSpectrum::new(size, kept);
+        spectrum.forward(n, |r, out| out[..n].copy_from_slice(&image[r * n..(r + 1) * n]));
+        for c in 0..kept {
+            for k in 0..size {
+                let direct: Complex32 = (0..n * n)
+                    .map(|i| {
+                        let turns = ((i / n) * k + (i % n) * c) as f32 / size as f32;
+                        Complex32::from_polar(image[i], -std::f32::consts::TAU * turns)
+                    })
+                    .sum();
+                assert!((spectrum.plane.column(c)[k] - direct).norm() < 0.01, "{c} {k}");
+            }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn pair_correlation_equals_its_direct_sum(
+            n in 4_usize..14,
+            values in prop::collection::vec(0.0_f32..1.0, 2 * 14 * 14),
+        ) {
+            let (f, g) = values.split_at(14 * 14);
+            let reach = (n / 2) as isize;
+            let mut pair = PairSpectrum::new(fast_size(n + reach as usize));
+            let size = pair.size() as isize;
+            let rows: Vec<usize> = (-reach..=reach).map(|s| s.rem_euclid(size) as usize).collect();
+            pair.forward(n, |r, out| {
+                (0..n).for_each(|k| out[k] = Complex32::new(f[r * n + k], g[r * n + k]));
+            });
+            pair.cross();
+            let mut found = Vec::new();
+            pair.inverse(&rows, |_, row| found.extend(rows.iter().map(|&c| row[c] / (size * size) as f32)));
+            for (k, &value) in found.iter().enumerate() {
+                let (down, right) = ((k / rows.len()) as isize - reach, (k % rows.len()) as isize - reach);
+                let inside = |v: isize| (0..n as isize).contains(&v);
+                let direct: f32 = (0..n * n)
+                    .filter_map(|i| {
+                        let (row, col) = ((i / n) as isize + down, (i % n) as isize + right);
+                        (inside(row) && inside(col)).then(|| f[i] * g[row as usize * n + col as usize])
+                    })
+                    .sum();
+                prop_assert!((value - direct).abs() < 1e-3, "{down} {right}: {value} {direct}");
             }
         }
     }

@@ -1,38 +1,120 @@
 //! The inner loops, compiled for several vector units; the one that the processor has is picked at run time.
 
+// Bilinear lookups read at computed places. A checked read keeps the compiler from working on more than one sample
+// at a time, which triples the time of the image rotation. Every place is clamped to the image right before it is read.
+#![allow(unsafe_code)]
+
 use multiversion::multiversion;
 use rustfft::num_complex::Complex32;
 
-/// Bilinear values along a straight line through an n-wide image.
+/// Partial sums kept beside each other, so that a sum can be vectorised.
+const LANES: usize = 16;
+
+/// Where a sample lies among four neighbours: the first of them and the weights toward the others.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Bilinear {
+    /// Index of the first neighbour; the others are 1, a row, and a row and 1 behind it.
+    pub at: u32,
+    /// Weight toward the neighbour 1 behind.
+    pub along: f32,
+    /// Weight toward the neighbours a row behind.
+    pub across: f32,
+}
+
+impl Bilinear {
+    /// The value of an image with rows of `stride`.
+    ///
+    /// # Safety
+    /// `at + stride + 1` must lie in the image.
+    #[inline(always)]
+    unsafe fn value(self, image: &[f32], stride: usize) -> f32 {
+        let at = self.at as usize;
+        // SAFETY: the caller's promise; the other three places are smaller.
+        let [a, b, c, d] = [at, at + 1, at + stride, at + stride + 1].map(|k| unsafe { *image.get_unchecked(k) });
+        let first = a + self.along * (b - a);
+        let second = c + self.along * (d - c);
+        first + self.across * (second - first)
+    }
+}
+
+/// Bilinear values along a straight line through a square image of `n` a side.
 ///
 /// `start` and `step` are (row, column) in cells. The caller keeps the line within the image; a sample that rounding
 /// puts outside is moved to the edge.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
 pub(crate) fn bilinear_line(image: &[f32], n: usize, start: [f64; 2], step: [f64; 2], out: &mut [f32]) {
-    let last = (n - 2) as i32;
+    assert!((2..1 << 15).contains(&n) && image.len() >= n * n && out.len() < 1 << 15);
+    let last = (n - 2) as f32;
     let [row, col] = start.map(|s| s as f32);
     let [row_step, col_step] = step.map(|s| s as f32);
     for (k, value) in out.iter_mut().enumerate() {
-        let (u, v) = (row + k as f32 * row_step, col + k as f32 * col_step);
-        let (i, j) = ((u as i32).clamp(0, last), (v as i32).clamp(0, last));
-        let (a, b) = (u - i as f32, v - j as f32);
-        let at = i as usize * n + j as usize;
-        let (Some(upper), Some(lower)) = (image.get(at..at + 2), image.get(at + n..at + n + 2)) else { continue };
-        let top = upper[0] + b * (upper[1] - upper[0]);
-        let bottom = lower[0] + b * (lower[1] - lower[0]);
-        *value = top + a * (bottom - top);
+        let k = k as i32 as f32;
+        let (u, v) = (row + k * row_step, col + k * col_step);
+        // SAFETY: `max` and `min` leave a number in 0..=n - 2 whatever u and v are, NaN included. The checked conversion
+        // takes longer than all the rest.
+        let [i, j] = [u, v].map(|w| unsafe { w.max(0.0).min(last).to_int_unchecked::<i32>() });
+        let sample = Bilinear { at: (i * n as i32 + j) as u32, along: v - j as f32, across: u - i as f32 };
+        // SAFETY: i and j are at most n - 2, and the image has n x n cells.
+        *value = unsafe { sample.value(image, n) };
+    }
+}
+
+/// Bilinear values at the places of a table, in an image with rows of `stride`.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+pub(crate) fn bilinear_table(image: &[f32], stride: usize, table: &[Bilinear], out: &mut [f32]) {
+    assert!(image.len() >= stride + 2 && image.len() < 1 << 31);
+    let last = (image.len() - stride - 2) as u32;
+    for (value, &sample) in out.iter_mut().zip(table) {
+        let sample = Bilinear { at: sample.at.min(last), ..sample };
+        // SAFETY: `at` is at most the image's length less stride + 2.
+        *value = unsafe { sample.value(image, stride) };
+    }
+}
+
+/// Row times window; what is not finite counts as zero.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+pub(crate) fn weigh(row: &[f32], window: &[f32], out: &mut [f32]) {
+    for ((o, &v), &w) in out.iter_mut().zip(row).zip(window) {
+        *o = if v.is_finite() { v * w } else { 0.0 };
+    }
+}
+
+/// A copy in which what is not finite is zero.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+pub(crate) fn finite_copy(from: &[f32], to: &mut [f32]) {
+    for (t, &v) in to.iter_mut().zip(from) {
+        *t = if v.is_finite() { v } else { 0.0 };
     }
 }
 
 /// Adds the square of each value to `sums`; returns the sum of the squares.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
 pub(crate) fn add_squares(row: &[f32], sums: &mut [f32]) -> f32 {
-    let mut total = 0.0;
-    for (sum, &v) in sums.iter_mut().zip(row) {
-        *sum += v * v;
-        total += v * v;
+    let mut lanes = [0.0; LANES];
+    let (mut values, mut sums) = (row.chunks_exact(LANES), sums.chunks_exact_mut(LANES));
+    for (v, sum) in values.by_ref().zip(sums.by_ref()) {
+        for k in 0..LANES {
+            sum[k] += v[k] * v[k];
+            lanes[k] += v[k] * v[k];
+        }
     }
-    total
+    for (k, (&v, sum)) in values.remainder().iter().zip(sums.into_remainder()).enumerate() {
+        *sum += v * v;
+        lanes[k] += v * v;
+    }
+    lanes.iter().sum()
+}
+
+/// Sum of |z|^2.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+pub(crate) fn energy(values: &[Complex32]) -> f32 {
+    let mut lanes = [0.0; LANES];
+    for chunk in values.chunks(LANES) {
+        for (lane, z) in lanes.iter_mut().zip(chunk) {
+            *lane += z.re * z.re + z.im * z.im;
+        }
+    }
+    lanes.iter().sum()
 }
 
 /// |z| of each value.
@@ -40,6 +122,25 @@ pub(crate) fn add_squares(row: &[f32], sums: &mut [f32]) -> f32 {
 pub(crate) fn modulus(spectrum: &[Complex32], out: &mut [f32]) {
     for (m, z) in out.iter_mut().zip(spectrum) {
         *m = (z.re * z.re + z.im * z.im).sqrt();
+    }
+}
+
+/// cross += g conj(f)
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+pub(crate) fn add_cross(f: &[Complex32], g: &[Complex32], cross: &mut [Complex32]) {
+    for ((c, f), g) in cross.iter_mut().zip(f).zip(g) {
+        c.re += g.re * f.re + g.im * f.im;
+        c.im += g.im * f.re - g.re * f.im;
+    }
+}
+
+/// Im(z m) / 2 - i (|z|^2 - |m|^2) / 4 in place of z, where `mirror` holds m in reverse order.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+pub(crate) fn cross_of_pair(column: &mut [Complex32], mirror: &[Complex32]) {
+    for (z, m) in column.iter_mut().zip(mirror.iter().rev()) {
+        let re = 0.5 * (z.re * m.im + z.im * m.re);
+        let im = 0.25 * (m.re * m.re + m.im * m.im - z.re * z.re - z.im * z.im);
+        *z = Complex32::new(re, im);
     }
 }
 
@@ -76,5 +177,22 @@ mod tests {
             let x = (k as f32 * 0.001).exp();
             assert!((ln(x) - x.ln()).abs() <= 2e-6 * x.ln().max(0.1), "{x}");
         }
+    }
+
+    #[test]
+    fn squares_are_added_over_rows_that_are_no_multiple_of_the_lanes() {
+        let row: Vec<f32> = (0..37).map(|k| k as f32).collect();
+        let mut sums = vec![1.0; 37];
+        assert_eq!(add_squares(&row, &mut sums), 16206.0);
+        assert!(sums.iter().zip(&row).all(|(s, v)| *s == 1.0 + v * v));
+    }
+
+    #[test]
+    fn places_outside_of_the_image_are_moved_inside() {
+        let image = [1.0; 25];
+        let mut out = [0.0; 5];
+        bilinear_line(&image, 5, [f64::NAN, -1e30], [1e30, f64::NAN], &mut out);
+        bilinear_table(&image, 5, &[Bilinear { at: u32::MAX, along: 0.5, across: 0.5 }; 5], &mut out);
+        assert_eq!(out, [1.0; 5]);
     }
 }

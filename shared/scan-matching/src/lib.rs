@@ -6,7 +6,7 @@
 //!
 //! # Layout, in the order of the data
 //! - `window`, `fft`, `polar`: a raster's magnitude spectrum on a polar grid;
-//! - `rotation`: [`RotationSearch`], the angle;
+//! - `spectrum`: [`PolarSpectrum`], what is kept of a scan; `rotation`: [`RotationSearch`], the angle;
 //! - `warp`: the earlier raster turned by it;
 //! - `translation`: [`TranslationSearch`], the shift and the whole motion; `overlap` normalises its scores;
 //! - `peak`: maxima between samples; `whiten`: phase-only correlation; `kernels`: inner loops.
@@ -24,11 +24,12 @@
 //! let mut translation = TranslationSearch::new(n, cell_m, &TranslationConfig::default())?;
 //! let (mut earlier_spectrum, mut later_spectrum) = (rotation.new_spectrum(), rotation.new_spectrum());
 //!
-//! // A reflector 20 cells ahead comes nearer by two cells: the sensor drove 1.6 m.
-//! let mut earlier = vec![0.0_f32; n * n];
-//! let mut later = earlier.clone();
-//! earlier[(63 - 20) * n + 63] = 1.0;
-//! later[(63 - 18) * n + 63] = 1.0;
+//! // Everything comes nearer by two cells: the sensor drove 1.6 m ahead.
+//! let (mut earlier, mut later) = (vec![0.0_f32; n * n], vec![0.0_f32; n * n]);
+//! for (row, col) in [(30, 40), (41, 75), (48, 52), (70, 90), (85, 33), (92, 61)] {
+//!     earlier[row * n + col] = 1.0;
+//!     later[(row + 2) * n + col] = 1.0;
+//! }
 //!
 //! rotation.spectrum(&earlier, &mut earlier_spectrum)?;
 //! rotation.spectrum(&later, &mut later_spectrum)?;
@@ -46,6 +47,7 @@ mod overlap;
 mod peak;
 mod polar;
 mod rotation;
+mod spectrum;
 mod translation;
 mod warp;
 mod whiten;
@@ -53,7 +55,8 @@ mod window;
 
 pub use config::{ConfigError, Magnitude, Overlap, Peak, RotationConfig, RotationForm, TranslationConfig, Window};
 pub use fft::fast_size;
-pub use rotation::{PolarSpectrum, RotationEstimate, RotationRunnerUp, RotationSearch};
+pub use rotation::{RotationEstimate, RotationRunnerUp, RotationSearch};
+pub use spectrum::PolarSpectrum;
 pub use translation::{MotionEstimate, MotionRunnerUp, TranslationSearch};
 
 /// A slice of another length than the search was planned for.

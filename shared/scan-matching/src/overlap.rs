@@ -80,7 +80,7 @@ impl OverlapEnergy {
             let row = if corner / 2 == TOP { a - 1 } else { n - a };
             let mut along = 0.0;
             for b in 1..side {
-                let col = if corner % 2 == 0 { b - 1 } else { n - b };
+                let col = if corner & 1 == 0 { b - 1 } else { n - b };
                 along += f64::from(raster[row * n + col]).powi(2);
                 sums[a * side + b] = sums[(a - 1) * side + b] + along;
             }

@@ -5,18 +5,9 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-
 use crate::config::{Magnitude, RotationConfig};
 use crate::fft::Columns;
-use crate::kernels;
-
-/// Where one polar sample lies among the magnitudes: the lower of its four neighbours and the weights toward the others.
-#[derive(Debug, Clone, Copy)]
-struct Sample {
-    index: u32,
-    along_row: f32,
-    along_column: f32,
-}
+use crate::kernels::{self, Bilinear};
 
 /// The magnitudes of the band, and the polar grid over them.
 pub(crate) struct PolarGrid {
@@ -25,7 +16,8 @@ pub(crate) struct PolarGrid {
     bins: usize,
     /// Column c holds column frequency c; its element k row frequency k - bins.
     magnitude: Vec<f32>,
-    table: Vec<Sample>,
+    /// Where each polar sample lies among the magnitudes, radius after radius.
+    table: Vec<Bilinear>,
     pub angles: usize,
     pub radii: usize,
 }
@@ -41,7 +33,7 @@ impl PolarGrid {
         let sample = |r: usize, k: usize| {
             let rho = (low + (high - low) * r as f64 / (radii - 1) as f64) * size as f64;
             let theta = -FRAC_PI_2 + k as f64 * PI / config.angles as f64;
-            Sample::at(rho * theta.cos(), rho * theta.sin(), bins)
+            sample_at(rho * theta.cos(), rho * theta.sin(), bins)
         };
         Self {
             kind: config.magnitude,
@@ -74,23 +66,16 @@ impl PolarGrid {
     /// Writes the samples of radius `r` over half a turn.
     pub fn ring(&self, r: usize, out: &mut [f32]) {
         let stride = 2 * self.bins + 1;
-        let samples = &self.table[r * self.angles..][..self.angles];
-        sample_ring(&self.magnitude, stride, samples, out);
+        kernels::bilinear_table(&self.magnitude, stride, &self.table[r * self.angles..][..self.angles], out);
     }
 }
 
-impl Sample {
-    /// The sample at row frequency `u` and column frequency `v`, in bins; a real image has the same at (-u, -v).
-    fn at(u: f64, v: f64, bins: usize) -> Self {
-        let (u, v) = if v < 0.0 { (-u, -v) } else { (u, v) };
-        let row = (u + bins as f64).clamp(0.0, 2.0 * bins as f64);
-        let (i, j) = ((row.floor() as usize).min(2 * bins - 1), (v.floor() as usize).min(bins - 1));
-        Self {
-            index: (j * (2 * bins + 1) + i) as u32,
-            along_row: (v - j as f64) as f32,
-            along_column: (row - i as f64) as f32,
-        }
-    }
+/// The sample at row frequency `u` and column frequency `v`, in bins; a real image has the same at (-u, -v).
+fn sample_at(u: f64, v: f64, bins: usize) -> Bilinear {
+    let (u, v) = if v < 0.0 { (-u, -v) } else { (u, v) };
+    let row = (u + bins as f64).clamp(0.0, 2.0 * bins as f64);
+    let (i, j) = ((row.floor() as usize).min(2 * bins - 1), (v.floor() as usize).min(bins - 1));
+    Bilinear { at: (j * (2 * bins + 1) + i) as u32, along: (row - i as f64) as f32, across: (v - j as f64) as f32 }
 }
 
 /// ln(1 + m / mean): the same for every gain of the radar.
@@ -98,14 +83,4 @@ fn compress(magnitude: &mut [f32]) {
     let mean = magnitude.iter().sum::<f32>() / magnitude.len() as f32;
     let scale = if mean > 0.0 { mean.recip() } else { 0.0 };
     kernels::log1p_scaled(magnitude, scale);
-}
-
-fn sample_ring(magnitude: &[f32], stride: usize, samples: &[Sample], out: &mut [f32]) {
-    for (value, s) in out.iter_mut().zip(samples) {
-        let at = s.index as usize;
-        let (left, right) = (&magnitude[at..at + 2], &magnitude[at + stride..at + stride + 2]);
-        let a = left[0] + s.along_column * (left[1] - left[0]);
-        let b = right[0] + s.along_column * (right[1] - right[0]);
-        *value = a + s.along_row * (b - a);
-    }
 }

@@ -11,57 +11,12 @@ use crate::config::{ConfigError, Peak, RotationConfig, RotationForm, accept};
 use crate::fft::{RealSpectrum, fast_size};
 use crate::peak::{line_peak, soft_argmax};
 use crate::polar::PolarGrid;
+use crate::spectrum::PolarSpectrum;
 use crate::whiten::Whitening;
-use crate::{ShapeError, expect_shape, window};
+use crate::{ShapeError, expect_shape, kernels, window};
 
 /// Half width of the neighbourhood in which a second maximum is still the same peak, radians.
 const SAME_PEAK_RAD: f64 = 2.0 * PI / 180.0;
-
-/// The polar magnitude spectrum of one scan, transformed along the angle: all that a rotation search needs of it.
-///
-/// Row after row of `harmonics()` values, one row a radius (a single one for `line14`). Harmonic 0, the mean over
-/// the angle, is zero.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PolarSpectrum {
-    harmonics: usize,
-    data: Vec<Complex32>,
-    energy: f64,
-}
-
-impl PolarSpectrum {
-    /// Number of harmonics a radius: `angles / 2 + 1`.
-    pub fn harmonics(&self) -> usize {
-        self.harmonics
-    }
-
-    /// Number of radii.
-    pub fn radii(&self) -> usize {
-        self.data.len() / self.harmonics
-    }
-
-    /// The spectrum, radius after radius.
-    pub fn as_slice(&self) -> &[Complex32] {
-        &self.data
-    }
-
-    /// Takes over a spectrum that [`as_slice`](Self::as_slice) gave elsewhere.
-    ///
-    /// # Errors
-    /// Where the length differs.
-    pub fn copy_from_slice(&mut self, data: &[Complex32]) -> Result<(), ShapeError> {
-        expect_shape("polar spectrum", data.len(), self.data.len())?;
-        self.data.copy_from_slice(data);
-        self.measure();
-        Ok(())
-    }
-
-    /// Energy over all angles and radii, each harmonic above 0 standing for its mirror image too.
-    fn measure(&mut self) {
-        let sum = |row: &[Complex32]| row.iter().map(|z| z.norm_sqr()).sum::<f32>();
-        let energy: f64 = self.data.chunks_exact(self.harmonics).map(|row| f64::from(sum(row))).sum();
-        self.energy = if energy.is_finite() { energy } else { 0.0 };
-    }
-}
 
 /// Another angle that matches nearly as well.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -142,9 +97,7 @@ impl RotationSearch {
 
     /// An empty spectrum of this search's shape, to be filled by [`spectrum`](Self::spectrum).
     pub fn new_spectrum(&self) -> PolarSpectrum {
-        let harmonics = self.grid.angles / 2 + 1;
-        let rows = if self.config.form == RotationForm::Eq7 { self.grid.radii } else { 1 };
-        PolarSpectrum { harmonics, data: vec![Complex32::default(); rows * harmonics], energy: 0.0 }
+        PolarSpectrum::new(self.grid.angles, self.profiles())
     }
 
     /// One scan's polar magnitude spectrum; keep it, the next pair needs it again.
@@ -155,7 +108,7 @@ impl RotationSearch {
     /// Where `raster` or `out` is not of this search's shape.
     pub fn spectrum(&mut self, raster: &[f32], out: &mut PolarSpectrum) -> Result<(), ShapeError> {
         expect_shape("raster", raster.len(), self.n * self.n)?;
-        self.check(out)?;
+        out.expect(self.grid.angles, self.profiles())?;
         self.magnitudes(raster); // lines 5 to 10
         match self.config.form {
             RotationForm::Eq7 => self.transform_rings(out), // lines 11 and 13
@@ -174,13 +127,9 @@ impl RotationSearch {
     ///
     /// # Errors
     /// Where a spectrum is not of this search's shape.
-    pub fn search(
-        &mut self,
-        later: &PolarSpectrum,
-        earlier: &PolarSpectrum,
-    ) -> Result<RotationEstimate, ShapeError> {
-        self.check(later)?;
-        self.check(earlier)?;
+    pub fn search(&mut self, later: &PolarSpectrum, earlier: &PolarSpectrum) -> Result<RotationEstimate, ShapeError> {
+        later.expect(self.grid.angles, self.profiles())?;
+        earlier.expect(self.grid.angles, self.profiles())?;
         let energy = (later.energy * earlier.energy).sqrt();
         if !(energy.is_finite() && energy > 0.0) {
             return Ok(self.no_match());
@@ -189,10 +138,9 @@ impl RotationSearch {
         Ok(self.estimate())
     }
 
-    fn check(&self, spectrum: &PolarSpectrum) -> Result<(), ShapeError> {
-        let rows = if self.config.form == RotationForm::Eq7 { self.grid.radii } else { 1 };
-        expect_shape("harmonics of a polar spectrum", spectrum.harmonics, self.grid.angles / 2 + 1)?;
-        expect_shape("polar spectrum", spectrum.data.len(), rows * spectrum.harmonics)
+    /// Profiles along the angle that are compared: one a radius, or one for all.
+    fn profiles(&self) -> usize {
+        if self.config.form == RotationForm::Eq7 { self.grid.radii } else { 1 }
     }
 
     /// Window, transform, modulus, band (Weston et al., Algorithm 1, lines 5 to 10).
@@ -200,14 +148,15 @@ impl RotationSearch {
         let (n, window) = (self.n, &self.window);
         self.transform.forward(n, |r, out| {
             let row = r * n..(r + 1) * n;
-            weigh(&raster[row.clone()], &window[row], out);
+            kernels::weigh(&raster[row.clone()], &window[row], out);
         });
         self.grid.load(&self.transform.plane);
     }
 
     /// One transform along the angle for each radius (Weston et al., Eq. 7).
     fn transform_rings(&mut self, out: &mut PolarSpectrum) {
-        for (r, row) in out.data.chunks_exact_mut(out.harmonics).enumerate() {
+        let harmonics = out.harmonics();
+        for (r, row) in out.data.chunks_exact_mut(harmonics).enumerate() {
             self.grid.ring(r, &mut self.ring);
             let done = self.forward.process_with_scratch(&mut self.ring, row, &mut self.scratch);
             debug_assert!(done.is_ok(), "lengths are those of the plan");
@@ -230,19 +179,17 @@ impl RotationSearch {
     /// C[m] = sum over r of G[m, r] conj(F[m, r]), back to angles, as correlation coefficients.
     fn correlate(&mut self, later: &PolarSpectrum, earlier: &PolarSpectrum, energy: f64) {
         self.cross.fill(Complex32::default());
-        let rows = later.data.chunks_exact(later.harmonics).zip(earlier.data.chunks_exact(later.harmonics));
+        let rows = later.data.chunks_exact(self.cross.len()).zip(earlier.data.chunks_exact(self.cross.len()));
         for (f, g) in rows {
-            accumulate(f, g, &mut self.cross);
+            kernels::add_cross(f, g, &mut self.cross);
         }
-        if self.grid.angles % 2 == 0 {
-            if let Some(nyquist) = self.cross.last_mut() {
-                nyquist.im = 0.0;
-            }
+        // The highest harmonic of an even number of angles is real but for rounding, and the inverse insists on it.
+        if let (true, Some(highest)) = (self.grid.angles.is_multiple_of(2), self.cross.last_mut()) {
+            highest.im = 0.0;
         }
         let done = self.inverse.process_with_scratch(&mut self.cross, &mut self.correlation, &mut self.scratch);
         debug_assert!(done.is_ok(), "lengths are those of the plan");
-        // Each harmonic but 0 counts twice in the inverse and once in the energy.
-        let scale = (0.5 / energy) as f32;
+        let scale = energy.recip() as f32;
         self.correlation.iter_mut().for_each(|c| *c *= scale);
     }
 
@@ -254,9 +201,11 @@ impl RotationSearch {
     fn estimate(&self) -> RotationEstimate {
         let step = PI / self.grid.angles as f64;
         let within = -self.reach..=self.reach;
-        let Some(best) = within.clone().filter(|&k| self.at(k).is_finite()).max_by(|&a, &b| {
-            self.at(a).total_cmp(&self.at(b)).then(b.abs().cmp(&a.abs()))
-        }) else {
+        let Some(best) = within
+            .clone()
+            .filter(|&k| self.at(k).is_finite())
+            .max_by(|&a, &b| self.at(a).total_cmp(&self.at(b)).then(b.abs().cmp(&a.abs())))
+        else {
             return self.no_match();
         };
         let peak = line_peak(self.config.peak, |j| self.at(best + j));
@@ -300,16 +249,76 @@ impl RotationSearch {
     }
 }
 
-/// Row times window; what is not finite counts as zero.
-fn weigh(row: &[f32], window: &[f32], out: &mut [f32]) {
-    for ((o, &v), &w) in out.iter_mut().zip(row).zip(window) {
-        *o = if v.is_finite() { v * w } else { 0.0 };
-    }
-}
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use proptest::prelude::*;
 
-/// cross += g conj(f)
-fn accumulate(f: &[Complex32], g: &[Complex32], cross: &mut [Complex32]) {
-    for ((c, f), g) in cross.iter_mut().zip(f).zip(g) {
-        *c += g * f.conj();
+    use super::*;
+
+    const N: usize = 24;
+
+    /// The polar magnitudes of a raster, ring by ring, each less its mean.
+    fn rings(search: &mut RotationSearch, raster: &[f32]) -> Vec<Vec<f64>> {
+        search.magnitudes(raster);
+        let mut ring = vec![0.0; search.grid.angles];
+        let radii = 0..search.grid.radii;
+        let mut all: Vec<Vec<f64>> = radii
+            .map(|r| {
+                search.grid.ring(r, &mut ring);
+                ring.iter().map(|&v| f64::from(v)).collect()
+            })
+            .collect();
+        if search.config.form == RotationForm::ProfileMean {
+            all = vec![(0..ring.len()).map(|k| all.iter().map(|ring| ring[k]).sum()).collect()];
+        }
+        for ring in &mut all {
+            let mean = ring.iter().sum::<f64>() / ring.len() as f64;
+            ring.iter_mut().for_each(|v| *v -= mean);
+        }
+        all
+    }
+
+    /// sum over r and k of P_g[r, k + m] P_f[r, k], as a correlation coefficient.
+    fn direct(f: &[Vec<f64>], g: &[Vec<f64>], m: usize) -> f64 {
+        let energy = |p: &[Vec<f64>]| p.iter().flatten().map(|v| v * v).sum::<f64>();
+        let along = |f: &[f64], g: &[f64]| (0..f.len()).map(|k| f[k] * g[(k + m) % f.len()]).sum::<f64>();
+        let sum: f64 = f.iter().zip(g).map(|(f, g)| along(f, g)).sum();
+        sum / (energy(f) * energy(g)).sqrt()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn both_forms_equal_their_direct_sums(
+            f in prop::collection::vec(0.0_f32..10.0, N * N),
+            g in prop::collection::vec(0.0_f32..10.0, N * N),
+            angles in 30_usize..45,
+            profile in any::<bool>(),
+        ) {
+            let form = if profile { RotationForm::ProfileMean } else { RotationForm::Eq7 };
+            let config = RotationConfig { form, angles, ..RotationConfig::default() };
+            let mut search = RotationSearch::new(N, &config).unwrap();
+            let (mut later, mut earlier) = (search.new_spectrum(), search.new_spectrum());
+            search.spectrum(&f, &mut later).unwrap();
+            search.spectrum(&g, &mut earlier).unwrap();
+            search.search(&later, &earlier).unwrap();
+            let (f, g) = (rings(&mut search, &f), rings(&mut search, &g));
+            for m in 0..angles {
+                prop_assert!((search.at(m as isize) - direct(&f, &g, m)).abs() < 1e-4, "{m}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_spectrum_taken_over_elsewhere_gives_the_same_angle() {
+        let mut search = RotationSearch::new(N, &RotationConfig::default()).unwrap();
+        let (mut one, mut other) = (search.new_spectrum(), search.new_spectrum());
+        let raster: Vec<f32> = (0..N * N).map(|k| ((k * 31) % 17) as f32).collect();
+        search.spectrum(&raster, &mut one).unwrap();
+        other.copy_from_slice(one.as_slice()).unwrap();
+        assert_eq!(one, other);
+        let estimate = search.search(&one, &other).unwrap();
+        assert!(estimate.angle_rad.abs() < 1e-6 && (estimate.score - 1.0).abs() < 1e-3, "{estimate:?}");
     }
 }

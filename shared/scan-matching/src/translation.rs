@@ -9,7 +9,7 @@ use crate::overlap::OverlapEnergy;
 use crate::peak::{PlanePeak, SUPPORT, plane_peak, soft_argmax};
 use crate::rotation::RotationEstimate;
 use crate::warp::Rotation;
-use crate::{ShapeError, expect_shape, whiten};
+use crate::{ShapeError, expect_shape, kernels, whiten};
 
 /// Half width of the neighbourhood in which a second maximum is still the same peak, cells.
 const SAME_PEAK_CELLS: isize = 3;
@@ -111,7 +111,7 @@ impl TranslationSearch {
     ) -> Result<MotionEstimate, ShapeError> {
         expect_shape("later raster", later.len(), self.n * self.n)?;
         expect_shape("earlier raster", earlier.len(), self.n * self.n)?;
-        finite_copy(later, &mut self.later);
+        kernels::finite_copy(later, &mut self.later);
         self.later_energy.measure(&self.later);
         let straight = self.at_angle(earlier, rotation.angle_rad, rotation.variance_rad2);
         if !self.config.half_turn {
@@ -156,13 +156,9 @@ impl TranslationSearch {
                 z.im = g;
             }
         });
+        self.transform.cross();
         if self.config.phase_only {
-            self.transform.cross(|mut z| {
-                whiten::to_unit(&mut z); // Checchin et al., Eq. 6
-                z
-            });
-        } else {
-            self.transform.cross(|z| z);
+            self.transform.cross_spectrum_mut().iter_mut().for_each(whiten::to_unit); // Checchin et al., Eq. 6
         }
         self.read_scores(energy);
     }
@@ -232,9 +228,8 @@ impl TranslationSearch {
 
     fn runner_up(&self, best: (isize, isize)) -> Option<((isize, isize), f64)> {
         let apart = |(i, j): (isize, isize)| (i - best.0).abs().max((j - best.1).abs()) > SAME_PEAK_CELLS;
-        let summit = |(i, j): (isize, isize), score: f64| {
-            (-1..=1).all(|a| (-1..=1).all(|b| self.at(i + a, j + b) <= score))
-        };
+        let summit =
+            |(i, j): (isize, isize), score: f64| (-1..=1).all(|a| (-1..=1).all(|b| self.at(i + a, j + b) <= score));
         let mut second: Option<((isize, isize), f64)> = None;
         for (shift, score) in self.scored() {
             if second.is_none_or(|(_, s)| score > s) && apart(shift) && summit(shift, score) {
@@ -275,7 +270,9 @@ impl TranslationSearch {
         let scale = self.config.variance_scale * (1.0 - score).max(1e-6) * self.cell_m.powi(2);
         let guess = self.config.reach_m.powi(2) / 3.0;
         match (-hessian).try_inverse() {
-            Some(shape) if shape.trace() > 0.0 && shape.determinant() > 0.0 && shape.trace() * scale < guess => shape * scale,
+            Some(shape) if shape.trace() > 0.0 && shape.determinant() > 0.0 && shape.trace() * scale < guess => {
+                shape * scale
+            }
             _ => Matrix2::identity() * guess,
         }
     }
@@ -323,10 +320,4 @@ fn opposite(angle_rad: f64) -> f64 {
 fn area_share(n: usize, down: isize, right: isize) -> f64 {
     let along = |s: isize| 1.0 - s.unsigned_abs() as f64 / n as f64;
     along(down) * along(right)
-}
-
-fn finite_copy(from: &[f32], to: &mut [f32]) {
-    for (t, &v) in to.iter_mut().zip(from) {
-        *t = if v.is_finite() { v } else { 0.0 };
-    }
 }

@@ -6,7 +6,7 @@ use crate::SimulatorError;
 
 /// What to simulate. Every key has a default, and unknown keys are refused.
 ///
-/// One configuration gives one dataset, byte for byte.
+/// One configuration gives one dataset, byte for byte (for one build on one kind of machine: sines and logarithms are the system's).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SimulationConfig {

@@ -27,8 +27,7 @@ impl WallGrid {
         let highest = ends().fold(Point2::new(0.0, 0.0), |a: Point2<f64>, b| a.sup(&b));
         let cells = |from: f64, to: f64| ((to - from) / CELL_M) as usize + 1;
         let (columns, rows) = (cells(lowest.x, highest.x), cells(lowest.y, highest.y));
-        let mut grid =
-            Self { walls, corner: lowest, columns, rows, cell_start: vec![0], cell_walls: Vec::new() };
+        let mut grid = Self { walls, corner: lowest, columns, rows, cell_start: vec![0], cell_walls: Vec::new() };
         grid.sort();
         grid
     }
@@ -118,7 +117,8 @@ impl CellWalk {
     fn new(grid: &WallGrid, from: Point2<f64>, to: Point2<f64>) -> Self {
         let start = (from - grid.corner) / CELL_M;
         let way = (to - from) / CELL_M;
-        let mut walk = Self { cell: [0; 2], step: [0; 2], next: [f64::INFINITY; 2], stride: [f64::INFINITY; 2], done: false };
+        let mut walk =
+            Self { cell: [0; 2], step: [0; 2], next: [f64::INFINITY; 2], stride: [f64::INFINITY; 2], done: false };
         for axis in 0..2 {
             let floor = start[axis].floor();
             walk.cell[axis] = floor as i64;

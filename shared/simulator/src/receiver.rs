@@ -79,7 +79,8 @@ fn response_at(sub_bin: usize) -> [f32; TAPS] {
 
 /// Spectrum of a Hann window, 1 at its peak, `cells` resolution cells away.
 fn hann_response(cells: f64) -> f64 {
-    let sinc = |u: f64| if u.abs() < 1e-9 { 1.0 } else { (std::f64::consts::PI * u).sin() / (std::f64::consts::PI * u) };
+    let sinc =
+        |u: f64| if u.abs() < 1e-9 { 1.0 } else { (std::f64::consts::PI * u).sin() / (std::f64::consts::PI * u) };
     sinc(cells) + 0.5 * (sinc(cells - 1.0) + sinc(cells + 1.0))
 }
 

@@ -42,6 +42,8 @@ const BEAM_CUT_RAD: f64 = 2.0 * BEAM_RAD;
 const RADAR_CONSTANT: f64 = 1.5e10;
 /// Range below which the fall-off flattens, metres: the antenna looks over what is near, the receiver filters it.
 const NEAR_M: f64 = 15.0;
+/// Nothing reflects nearer than this, metres: it would be inside the radar.
+const NEAREST_M: f64 = 0.5;
 /// Mean power of the receiver's noise.
 const NOISE_POWER: f64 = 1.9;
 /// Phase noise: share of an azimuth's total echo power that raises the floor in all its bins.
@@ -229,11 +231,15 @@ fn fall_off(range_m: f64) -> f64 {
 fn echo(scatterer: &Scatterer, world: &World, movers: &Body, from: Point2<f64>) -> Option<Echo> {
     let way = from - scatterer.position;
     let range_m = way.norm();
-    let in_the_open = scatterer.cross_section_m2 * scatterer.aspect.gain(way / range_m);
-    let negligible = NEGLIGIBLE_POWER / (in_the_open * fall_off(range_m));
-    if !(negligible < 1.0) || range_m > BINS as f64 * RANGE_RESOLUTION_M {
+    if !(NEAREST_M..BINS as f64 * RANGE_RESOLUTION_M).contains(&range_m) {
         return None;
     }
+    let in_the_open = scatterer.cross_section_m2 * scatterer.aspect.gain(way / range_m);
+    let received = in_the_open * fall_off(range_m);
+    if received <= NEGLIGIBLE_POWER {
+        return None;
+    }
+    let negligible = NEGLIGIBLE_POWER / received;
     let mut passed = world.transmission(from, scatterer.position, scatterer.body, negligible);
     for wall in movers.walls.iter().filter(|wall| wall.body != scatterer.body) {
         if occlusion::crossing(from, -way, wall).is_some() {

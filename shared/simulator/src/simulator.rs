@@ -101,8 +101,7 @@ impl Simulator {
         // Stream 0 built the town.
         rng.set_stream(index as u64 + 1);
         let movers = |time_s: f64| self.traffic.at(&self.path, time_s);
-        scan.geometry =
-            sensor.sweep(&self.world, &movers, &self.path, self.time(index), &mut rng, &mut scan.slot());
+        scan.geometry = sensor.sweep(&self.world, &movers, &self.path, self.time(index), &mut rng, &mut scan.slot());
     }
 }
 

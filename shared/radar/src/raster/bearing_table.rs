@@ -8,7 +8,8 @@ use std::f64::consts::TAU;
 /// measured azimuth, by less than `azimuths / (4 NODES)` of the change in spacing there.
 pub(super) const NODES: usize = 4096;
 
-/// How far an azimuth may lie behind the one before it, turns: the encoder's jitter, or a sweep that ends past its start.
+/// How far an azimuth may lie behind the one before it, turns: the encoder's jitter, or a sweep that ends past its
+/// start.
 const BACKLASH: f64 = 0.1;
 
 /// Rows and times over the turn that starts at the first azimuth, at bearings `k / NODES`.
@@ -89,4 +90,62 @@ impl BearingTable {
 pub(super) fn seconds_from_stamp(scan: &PolarScan<'_>, azimuth: usize) -> f64 {
     let nanoseconds = scan.stamp_ns[azimuth].saturating_sub(scan.geometry.stamp_ns);
     nanoseconds as f64 * 1e-9
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::scan::{OwnedScan, ScanLimits};
+
+    /// A scan that has nothing but azimuths (degrees) and times (seconds).
+    fn measured(azimuths: &[(f32, f64)]) -> BearingTable {
+        let mut scan = OwnedScan::with_limits(ScanLimits { bytes: 0, azimuths: azimuths.len() });
+        scan.geometry.azimuths = azimuths.len();
+        for (i, &(degrees, time_s)) in azimuths.iter().enumerate() {
+            scan.azimuth_rad[i] = degrees.to_radians();
+            scan.stamp_ns[i] = (time_s * 1e9) as i64;
+        }
+        let mut table = BearingTable::new();
+        table.measure(&scan.view()).unwrap();
+        table
+    }
+
+    fn near(table: &[f32; NODES + 1], degrees_past_start: f64) -> f32 {
+        table[(degrees_past_start / 360.0 * NODES as f64).round() as usize]
+    }
+
+    #[test]
+    fn rows_and_times_follow_uneven_azimuths_across_north() {
+        let table = measured(&[(300.0, 0.0), (350.0, 0.1), (20.0, 0.15), (200.0, 0.4)]);
+        assert!((table.start - 300.0 / 360.0).abs() < 1e-6);
+        for (past, row, time_s) in [(0.0, 0.0, 0.0), (50.0, 1.0, 0.1), (65.0, 1.5, 0.125), (170.0, 2.5, 0.275)] {
+            assert!((near(&table.row, past) - row).abs() < 2e-3, "{past}");
+            assert!((near(&table.time_s, past) - time_s).abs() < 2e-4, "{past}");
+        }
+    }
+
+    #[test]
+    fn between_last_and_first_azimuth_rows_go_on_and_time_holds() {
+        let table = measured(&[(10.0, 0.0), (130.0, 0.1), (250.0, 0.2)]);
+        assert!((near(&table.row, 300.0) - 2.5).abs() < 2e-3);
+        assert_eq!(near(&table.time_s, 300.0), 0.2);
+        assert_eq!(table.row[NODES], 3.0);
+    }
+
+    #[test]
+    fn an_encoder_that_steps_back_costs_no_more_than_that_row() {
+        let table = measured(&[(0.0, 0.0), (359.9, 0.1), (90.0, 0.2), (89.0, 0.3), (180.0, 0.4)]);
+        assert!((near(&table.row, 45.0) - 1.5).abs() < 2e-2);
+        assert!((near(&table.row, 135.5) - 3.5).abs() < 2e-2);
+        assert!((near(&table.row, 270.0) - 4.5).abs() < 2e-2);
+    }
+
+    #[test]
+    fn a_sweep_that_ends_past_its_start_ends_at_its_start() {
+        let table = measured(&[(5.0, 0.0), (125.0, 0.1), (245.0, 0.2), (5.5, 0.3)]);
+        assert!((near(&table.row, 180.0) - 1.5).abs() < 2e-3);
+        assert!((near(&table.row, 300.0) - 2.5).abs() < 2e-3);
+        assert!(table.row.iter().all(|&row| row <= 4.0));
+    }
 }

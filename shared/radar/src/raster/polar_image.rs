@@ -4,8 +4,8 @@
 use super::kernels::window::{self, Window};
 use crate::scan::{PolarScan, SweepGeometry};
 
-/// Row-major samples, in units of 1/256 of the scan's power: one row an azimuth and the first one again at the end, with empty columns at
-/// both sides. Bilinear sampling is the same with a window of one bin.
+/// Row-major samples, in units of 1/256 of the scan's power: one row an azimuth and the first one again at the end,
+/// with empty columns at both sides. Bilinear sampling is the same with a window of one bin.
 #[derive(Debug)]
 pub(super) struct PolarImage {
     window_m: f32,
@@ -58,13 +58,7 @@ impl Layout {
 impl PolarImage {
     /// `window_m`: metres of range that a sample is the mean of; less than a bin counts as one bin.
     pub fn new(window_m: f32) -> Self {
-        Self {
-            window_m,
-            layout: Layout::default(),
-            samples: Vec::new(),
-            pieces: Vec::new(),
-            above_floor: Vec::new(),
-        }
+        Self { window_m, layout: Layout::default(), samples: Vec::new(), pieces: Vec::new(), above_floor: Vec::new() }
     }
 
     /// Takes the scan's powers out to `furthest_m`; columns beyond hold nothing of use.

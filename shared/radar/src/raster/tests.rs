@@ -1,0 +1,7 @@
+#![allow(clippy::unwrap_used)]
+
+mod compensation;
+mod placement;
+mod reading;
+mod robustness;
+mod scene;

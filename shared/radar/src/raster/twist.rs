@@ -22,11 +22,7 @@ impl Twist {
         // log of SE(2): the chord, turned back by half the turn, stretched to its arc.
         let stretch = 1.0 / sinc(half);
         let arc = UnitComplex::new(-half) * motion.translation.vector * (stretch / dt_s);
-        Self {
-            vx_mps: arc.x,
-            vy_mps: arc.y,
-            yaw_rate_radps: yaw / dt_s,
-        }
+        Self { vx_mps: arc.x, vy_mps: arc.y, yaw_rate_radps: yaw / dt_s }
     }
 
     /// The pose after `t_s` seconds in the frame at second 0: exp(twist t). Negative times are the past.
@@ -39,11 +35,7 @@ impl Twist {
 
     /// The same motion seen in a mirror, x forward and y right.
     pub(super) fn mirrored(&self) -> Self {
-        Self {
-            vx_mps: self.vx_mps,
-            vy_mps: -self.vy_mps,
-            yaw_rate_radps: -self.yaw_rate_radps,
-        }
+        Self { vx_mps: self.vx_mps, vy_mps: -self.vy_mps, yaw_rate_radps: -self.yaw_rate_radps }
     }
 
     pub(super) fn speed_mps(&self) -> f64 {
@@ -52,24 +44,14 @@ impl Twist {
 }
 
 fn sinc(x: f64) -> f64 {
-    if x.abs() < 1e-4 {
-        1.0 - x * x / 6.0
-    } else {
-        x.sin() / x
-    }
+    if x.abs() < 1e-4 { 1.0 - x * x / 6.0 } else { x.sin() / x }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use approx_eq::close;
     use proptest::prelude::*;
-
-    mod approx_eq {
-        pub fn close(a: f64, b: f64) -> bool {
-            (a - b).abs() <= 1e-9 * (1.0 + a.abs().max(b.abs()))
-        }
-    }
+    use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
     fn difference(a: &Isometry2<f64>, b: &Isometry2<f64>) -> f64 {
         let between = a.inverse() * b;
@@ -99,10 +81,10 @@ mod tests {
     #[test]
     fn a_quarter_circle_is_driven_on_its_arc() {
         let radius = 10.0;
-        let motion = Isometry2::new(Vector2::new(radius, radius), std::f64::consts::FRAC_PI_2);
+        let motion = Isometry2::new(Vector2::new(radius, radius), FRAC_PI_2);
         let twist = Twist::from_motion(&motion, 2.0);
-        assert!(close(twist.vx_mps, radius * std::f64::consts::FRAC_PI_4));
+        assert!((twist.vx_mps - radius * FRAC_PI_4).abs() < 1e-12);
         assert!(twist.vy_mps.abs() < 1e-12);
-        assert!(close(twist.yaw_rate_radps, std::f64::consts::FRAC_PI_4));
+        assert!((twist.yaw_rate_radps - FRAC_PI_4).abs() < 1e-12);
     }
 }

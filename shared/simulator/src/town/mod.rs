@@ -13,9 +13,9 @@ use rand_chacha::ChaCha8Rng;
 
 pub(crate) use street::car;
 
+use crate::SimulationConfig;
 use crate::path::BlockLoop;
 use crate::world::{Body, NO_BODY, World};
-use crate::SimulationConfig;
 
 /// From a street's centre to the fronts of its houses, metres.
 const HALF_STREET_M: f64 = 9.0;

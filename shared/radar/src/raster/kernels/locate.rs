@@ -39,19 +39,11 @@ pub struct Taps {
 
 impl Taps {
     /// Before anything is located.
-    pub const NONE: Self = Self {
-        sample: [0; BLOCK],
-        along_range: [0.0; BLOCK],
-        along_azimuth: [0.0; BLOCK],
-    };
+    pub const NONE: Self = Self { sample: [0; BLOCK], along_range: [0.0; BLOCK], along_azimuth: [0.0; BLOCK] };
 }
 
 /// Taps of a row of cells seen by a sensor that stands.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 pub fn locate(cells: &CellRow, lookup: &Lookup, taps: &mut [Taps]) {
     let places = cells.bearing.iter().zip(cells.range_m);
     for ((bearing, range_m), taps) in places.zip(taps) {
@@ -60,12 +52,9 @@ pub fn locate(cells: &CellRow, lookup: &Lookup, taps: &mut [Taps]) {
     }
 }
 
-/// Taps of a row of cells seen by a sensor that moves: where it stood depends on when it looked, and that on where it stood.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
+/// Taps of a row of cells seen by a sensor that moves: where it stood depends on when it looked, and that on where it
+/// stood.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 pub fn locate_moving(cells: &CellRow, motion: &SweepMotion, lookup: &Lookup, taps: &mut [Taps]) {
     let start = lookup.bearings.start;
     let places = cells.bearing.iter().zip(cells.z_m);
@@ -131,8 +120,8 @@ fn interpolate(table: &[f32; NODES + 1], turns: f32) -> f32 {
     below + (place - node as f32) * (above - below)
 }
 
-/// The whole number below `value`, or, at a whole number, that or the one before: what interpolates alike.
-/// For values in `[0, 2^22]`; it never leaves `[0, 2^23)`. A cast takes ten times longer, since it minds overflow and NaN.
+/// The whole number below `value`, or, at a whole number, that or the one before: what interpolates alike. For values
+/// in `[0, 2^22]`; it never leaves `[0, 2^23)`. A cast takes ten times longer, since it minds overflow and NaN.
 #[inline(always)]
 fn whole_below(value: f32) -> i32 {
     const MANTISSA: u32 = (1 << 23) - 1;
@@ -148,7 +137,7 @@ fn turns(x: f32, z: f32) -> f32 {
         0.159_154_83,
         -0.053_046_122,
         0.031_745_944,
-        -0.022_136_269,
+        -0.022_136_27,
         0.015_346_03,
         -0.008_898_718,
         0.003_479_594,

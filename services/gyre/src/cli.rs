@@ -1,0 +1,101 @@
+//! The command line.
+
+use std::{num::NonZeroUsize, path::PathBuf};
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::configuration::Rate;
+
+/// Radar odometry as cooperating processes over shared memory.
+///
+/// Turns the scans of a spinning FMCW radar into motion and a trajectory.
+#[derive(Debug, Parser)]
+#[command(version, about)]
+pub struct Gyre {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run the whole pipeline on a recording, and write a trajectory.
+    Run(RunArguments),
+    /// Run one process of a run (what `gyre run` starts).
+    Stage {
+        /// radar-replay, masking, rotation-search, translation-search or pose-integration.
+        name: String,
+    },
+    /// Say what a dataset is, and what looks wrong with it.
+    Inspect(InspectArguments),
+    /// Judge a trajectory by ground truth.
+    Evaluate(EvaluateArguments),
+    /// Write a simulated recording in Oxford's format.
+    Simulate(SimulateArguments),
+}
+
+#[derive(Debug, Args)]
+pub struct RunArguments {
+    /// The configuration, a TOML file.
+    pub configuration: PathBuf,
+    /// The dataset's folder (source.data).
+    #[arg(long)]
+    pub data: Option<PathBuf>,
+    /// Where the results go. Default: out/<name of the configuration>.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// How fast to play: realtime, max, or a factor (run.rate).
+    #[arg(long)]
+    pub rate: Option<Rate>,
+    /// Override a key, as in masking.kind=none; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Forget an unfinished run in --out instead of going on with it.
+    #[arg(long)]
+    pub fresh: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct InspectArguments {
+    /// The dataset's folder.
+    pub path: PathBuf,
+    /// A trajectory of this dataset (TUM), to find out whether each ground truth's clock agrees.
+    #[arg(long)]
+    pub trajectory: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct EvaluateArguments {
+    /// The trajectory to judge: TUM, KITTI, or a dataset's own form.
+    #[arg(long)]
+    pub estimate: PathBuf,
+    /// The ground truth: TUM, KITTI, Oxford radar_odometry.csv, Boreas radar_poses.csv, MulRan global_pose.csv.
+    #[arg(long)]
+    pub ground_truth: PathBuf,
+    /// Poses between the starts of the stretches that are measured.
+    #[arg(long, default_value = "10")]
+    pub step: NonZeroUsize,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+    /// Write trajectory.svg and errors.svg here.
+    #[arg(long)]
+    pub plots: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct SimulateArguments {
+    /// The configuration, whose section [simulation] is used; its defaults without one.
+    pub configuration: Option<PathBuf>,
+    /// Where to write the recording.
+    #[arg(long)]
+    pub out: PathBuf,
+    /// How many scans (simulation.scans).
+    #[arg(long)]
+    pub scans: Option<usize>,
+    /// Seed (simulation.seed).
+    #[arg(long)]
+    pub seed: Option<u64>,
+}

@@ -1,0 +1,278 @@
+//! The configuration of a run: read strictly, overridden key by key, written back as it was resolved.
+
+mod rate;
+mod strict;
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use gyre_masking::MaskingConfig;
+use gyre_messages::{Stage, Window};
+use gyre_radar::raster::RasterConfig;
+use gyre_radar_replay::SourceConfig;
+use gyre_scan_matching::{RotationConfig, TranslationConfig};
+use gyre_simulator::SimulationConfig;
+use gyre_stage::supervise::{RestartPolicy, StagePlan};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+pub use rate::Rate;
+
+/// A run, section by section. Every key has a default.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Configuration {
+    /// How to run.
+    pub run: RunConfig,
+    /// What to play.
+    pub source: SourceConfig,
+    /// A recording to be generated and played, instead of `source.data`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub simulation: Option<SimulationConfig>,
+    /// The Cartesian rasters.
+    pub raster: RasterConfig,
+    /// What to take out of them.
+    pub masking: MaskingConfig,
+    /// The search for the rotation.
+    pub rotation: RotationConfig,
+    /// The search for the translation.
+    pub translation: TranslationConfig,
+    /// Stages that are started or restarted differently, by name.
+    pub stages: BTreeMap<String, StageConfig>,
+}
+
+/// The section `[run]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RunConfig {
+    /// `lossless`: every scan is processed, the source waits. `live`: the newest scan wins. Default `lossless`.
+    pub mode: Mode,
+    /// Most scans between admission and their pose. More than the free cores buys nothing and costs latency. Default 4.
+    pub window: usize,
+    /// `max`, `realtime` or a factor. Default `max`; live mode needs another.
+    pub rate: Rate,
+    /// Start all stages again when no pose has come for so long, s; 0: never. Default 60.
+    pub stall_timeout_s: f64,
+    /// Ground truth to judge the result by. Default: what lies in the dataset's folder.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ground_truth: Option<PathBuf>,
+}
+
+/// What happens when scans come faster than they can be processed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mode {
+    /// The source waits.
+    Lossless,
+    /// The newest scan wins.
+    Live,
+}
+
+/// A section `[stages.NAME]`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct StageConfig {
+    /// Program and arguments of another program that stands in for the stage. Default: `gyre stage NAME`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub command: Vec<String>,
+    /// When to give up on it.
+    pub restart: RestartPolicy,
+}
+
+impl Default for RunConfig {
+    fn default() -> Self {
+        Self { mode: Mode::Lossless, window: 4, rate: Rate::Max, stall_timeout_s: 60.0, ground_truth: None }
+    }
+}
+
+/// Why a configuration does not do.
+#[derive(Debug, Error)]
+pub enum ConfigurationError {
+    /// The file cannot be read.
+    #[error("cannot read the configuration {path}: {source}")]
+    Unreadable {
+        /// Which file.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// The file is not TOML.
+    #[error("{path}: {reason}")]
+    Syntax {
+        /// Which file.
+        path: PathBuf,
+        /// Where and what.
+        reason: String,
+    },
+    /// A key that nobody knows.
+    #[error("[{section}] has no key `{key}`{suggestion}")]
+    UnknownKey {
+        /// In which section.
+        section: String,
+        /// The key.
+        key: String,
+        /// The nearest right one.
+        suggestion: String,
+    },
+    /// A value that a key cannot have.
+    #[error("[{section}]: {reason}")]
+    Value {
+        /// In which section.
+        section: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// `--set` without a key and a value.
+    #[error("--set {0}: expected section.key=value, as in masking.kind=none")]
+    Override(String),
+}
+
+impl Configuration {
+    /// Reads a configuration and overrides keys of it with `section.key=value` sentences.
+    pub fn read(path: &Path, overrides: &[String]) -> Result<Self, ConfigurationError> {
+        let unreadable = |source| ConfigurationError::Unreadable { path: path.to_owned(), source };
+        let text = fs::read_to_string(path).map_err(unreadable)?;
+        let parsed: Result<toml::Table, _> = text.parse();
+        let mut table = parsed.map_err(|error| ConfigurationError::Syntax {
+            path: path.to_owned(),
+            reason: error.to_string().trim().replace('\n', "; "),
+        })?;
+        for sentence in overrides {
+            strict::set(&mut table, sentence)?;
+        }
+        let configuration = Self::from_table(table)?;
+        configuration.validate()?;
+        Ok(configuration)
+    }
+
+    fn from_table(mut table: toml::Table) -> Result<Self, ConfigurationError> {
+        let configuration = Self {
+            run: strict::section(&mut table, "run")?,
+            source: strict::section(&mut table, "source")?,
+            simulation: match table.contains_key("simulation") {
+                true => Some(strict::section(&mut table, "simulation")?),
+                false => None,
+            },
+            raster: strict::section(&mut table, "raster")?,
+            masking: strict::section(&mut table, "masking")?,
+            rotation: strict::section(&mut table, "rotation")?,
+            translation: strict::section(&mut table, "translation")?,
+            stages: strict::sections(&mut table, "stages", &Stage::ALL.map(Stage::name))?,
+        };
+        let known = ["run", "source", "simulation", "raster", "masking", "rotation", "translation", "stages"];
+        match table.keys().next() {
+            None => Ok(configuration),
+            Some(key) => Err(strict::unknown("the configuration", key, &known)),
+        }
+    }
+
+    fn validate(&self) -> Result<(), ConfigurationError> {
+        let value = |section: &str, reason: String| ConfigurationError::Value { section: section.to_owned(), reason };
+        self.raster.validate().map_err(|e| value("raster", e.to_string()))?;
+        self.rotation.validate().map_err(|e| value("rotation", e.to_string()))?;
+        self.translation.validate().map_err(|e| value("translation", e.to_string()))?;
+        self.window(None).validate().map_err(|e| value("run", e.to_string()))?;
+        if self.masking.compensate && self.masking.lag == 0 {
+            return Err(value("masking", "lag is 0, but a scan's own motion is not known yet: it must be 1 or more".to_owned()));
+        }
+        if self.run.mode == Mode::Live && self.run.rate == Rate::Max {
+            return Err(value("run", "mode `live` needs a radar's pace: set rate to `realtime` or a factor".to_owned()));
+        }
+        if !(self.run.stall_timeout_s >= 0.0 && self.run.stall_timeout_s.is_finite()) {
+            return Err(value("run", format!("stall_timeout_s is {}, but must be 0 or more", self.run.stall_timeout_s)));
+        }
+        Ok(())
+    }
+
+    /// How much may be on its way. In live mode the source keeps what comes within a second, the time of a restart.
+    pub fn window(&self, period: Option<Duration>) -> Window {
+        let live_depth = match (self.run.mode, self.run.rate.factor()) {
+            (Mode::Live, Some(rate)) => {
+                let period_s = period.map_or(0.25, |period| period.as_secs_f64()) / rate;
+                (1.0 / period_s.max(0.01)).ceil() as usize + self.run.window + 1
+            }
+            _ => 0,
+        };
+        Window { scans: self.run.window, lag: self.masking.feedback_lag(), look_back: 1, live_depth }
+    }
+
+    /// The processes to start: `gyre stage NAME`, or what the configuration says instead.
+    pub fn stage_plans(&self, gyre: &Path) -> Vec<StagePlan> {
+        let plan = |stage: Stage| {
+            let name = stage.name();
+            let own = self.stages.get(name).cloned().unwrap_or_default();
+            let ours = || vec![gyre.to_string_lossy().into_owned(), "stage".to_owned(), name.to_owned()];
+            let command = if own.command.is_empty() { ours() } else { own.command };
+            StagePlan { name: name.to_owned(), command, restart: own.restart }
+        };
+        Stage::ALL.map(plan).to_vec()
+    }
+
+    /// The text of the resolved configuration: a run from it repeats this run.
+    pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
+        toml::to_string_pretty(self)
+    }
+
+    /// Whether a run begun with `other` can be continued with this: all that the result depends on is the same.
+    pub fn continues(&self, other: &toml::Table) -> bool {
+        let of = |table: &toml::Table| {
+            let mut table = table.clone();
+            table.remove("stages");
+            if let Some(run) = table.get_mut("run").and_then(|run| run.as_table_mut()) {
+                run.retain(|key, _| !["rate", "window", "stall_timeout_s", "ground_truth"].contains(&key.as_str()));
+            }
+            table
+        };
+        toml::Table::try_from(self).is_ok_and(|table| of(&table) == of(other))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn from(text: &str) -> Result<Configuration, ConfigurationError> {
+        let configuration = Configuration::from_table(text.parse().unwrap())?;
+        configuration.validate()?;
+        Ok(configuration)
+    }
+
+    #[test]
+    fn an_unknown_key_names_itself_and_the_nearest_right_one() {
+        let error = from("[masking]\ntreshold = 3").unwrap_err().to_string();
+        assert_eq!(error, "[masking] has no key `treshold`; did you mean `threshold`?");
+        let error = from("[maskin]\nkind = 'none'").unwrap_err().to_string();
+        assert_eq!(error, "[the configuration] has no key `maskin`; did you mean `masking`?");
+        let error = from("[stages.maskin]\ncommand = ['x']").unwrap_err().to_string();
+        assert_eq!(error, "[stages] has no key `maskin`; did you mean `masking`?");
+    }
+
+    #[test]
+    fn impossible_values_are_refused() {
+        for (text, part) in [
+            ("[run]\nwindow = 0", "window"),
+            ("[raster]\nn = 0", "raster.n"),
+            ("[masking]\nlag = 0", "lag"),
+            ("[masking]\nthreshold = 300", "300"),
+            ("[run]\nmode = 'live'", "rate"),
+            ("[run]\nrate = -1", "rate"),
+        ] {
+            let error = from(text).unwrap_err().to_string();
+            assert!(error.contains(part), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_resolved_configuration_repeats_itself() {
+        let configuration = from("[run]\nrate = 4\n[source]\ndata = '/data'\n[stages.masking]\ncommand = ['mine']").unwrap();
+        let text = configuration.to_toml().unwrap();
+        assert_eq!(from(&text).unwrap(), configuration);
+        assert!(configuration.continues(&text.parse().unwrap()));
+        let other = from("[masking]\nkind = 'none'").unwrap();
+        assert!(!other.continues(&text.parse().unwrap()));
+    }
+}

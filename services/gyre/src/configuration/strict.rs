@@ -1,0 +1,94 @@
+//! Reading TOML so that a slip of the pen is told, not ignored.
+
+use std::collections::BTreeMap;
+
+use serde::de::DeserializeOwned;
+use toml::{Table, Value};
+
+use super::ConfigurationError;
+
+/// Names less alike than this are no suggestion.
+const ALIKE: f64 = 0.75;
+
+/// Takes a section out of the table; its defaults where it is missing.
+pub fn section<T: DeserializeOwned>(table: &mut Table, name: &str) -> Result<T, ConfigurationError> {
+    let value = table.remove(name).unwrap_or_else(|| Table::new().into());
+    read(name, value)
+}
+
+/// Takes a section of sections out of the table, each of which must have one of the names in `known`.
+pub fn sections<T: DeserializeOwned>(
+    table: &mut Table,
+    name: &str,
+    known: &[&str],
+) -> Result<BTreeMap<String, T>, ConfigurationError> {
+    let sections: BTreeMap<String, Value> = section(table, name)?;
+    if let Some(key) = sections.keys().find(|key| !known.contains(&key.as_str())) {
+        return Err(unknown(name, key, known));
+    }
+    sections.into_iter().map(|(key, value)| Ok((key.clone(), read(&format!("{name}.{key}"), value)?))).collect()
+}
+
+/// The error for a key that nobody knows.
+pub fn unknown(section: &str, key: &str, known: &[&str]) -> ConfigurationError {
+    let alike = |name: &&str| (strsim::jaro_winkler(key, name) * 1e6) as u64;
+    let nearest = known.iter().copied().max_by_key(alike);
+    let nearest = nearest.filter(|name| strsim::jaro_winkler(key, name) > ALIKE);
+    let suggestion = match nearest {
+        Some(name) => format!("; did you mean `{name}`?"),
+        None => format!("; it knows {}", known.join(", ")),
+    };
+    ConfigurationError::UnknownKey { section: section.to_owned(), key: key.to_owned(), suggestion }
+}
+
+/// Sets a key by a sentence `section.key=value`; the value is TOML, or else a plain string.
+pub fn set(table: &mut Table, sentence: &str) -> Result<(), ConfigurationError> {
+    let refused = || ConfigurationError::Override(sentence.to_owned());
+    let (path, value) = sentence.split_once('=').ok_or_else(refused)?;
+    let value = value_of(value.trim());
+    let mut keys: Vec<&str> = path.trim().split('.').collect();
+    let last = keys.pop().filter(|key| !key.is_empty() && !keys.is_empty()).ok_or_else(refused)?;
+    let mut place = table;
+    for key in keys {
+        place = place.entry(key).or_insert_with(|| Table::new().into()).as_table_mut().ok_or_else(refused)?;
+    }
+    place.insert(last.to_owned(), value);
+    Ok(())
+}
+
+fn value_of(text: &str) -> Value {
+    let parsed = format!("value = {text}").parse::<Table>().ok();
+    parsed.and_then(|mut table| table.remove("value")).unwrap_or_else(|| Value::String(text.to_owned()))
+}
+
+fn read<T: DeserializeOwned>(section: &str, value: Value) -> Result<T, ConfigurationError> {
+    value.try_into().map_err(|error: toml::de::Error| match unknown_field(error.message()) {
+        Some((key, known)) => unknown(section, key, &known),
+        None => ConfigurationError::Value { section: section.to_owned(), reason: error.to_string().trim().replace('\n', " ") },
+    })
+}
+
+/// The key and the known ones, from serde's own words: unknown field `x`, expected one of `a`, `b`.
+fn unknown_field(message: &str) -> Option<(&str, Vec<&str>)> {
+    let quoted = message.strip_prefix("unknown field")?;
+    let mut names = quoted.split('`').skip(1).step_by(2);
+    Some((names.next()?, names.collect()))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn overrides_are_toml_values_or_plain_strings() {
+        let mut table = Table::new();
+        for sentence in ["masking.kind=none", "raster.n = 127", "stages.masking.command=['a', 'b']"] {
+            set(&mut table, sentence).unwrap();
+        }
+        assert_eq!(table["masking"]["kind"].as_str(), Some("none"));
+        assert_eq!(table["raster"]["n"].as_integer(), Some(127));
+        assert_eq!(table["stages"]["masking"]["command"][1].as_str(), Some("b"));
+        assert!(set(&mut table, "n=3").is_err() && set(&mut table, "masking").is_err());
+    }
+}

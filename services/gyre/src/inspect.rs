@@ -1,0 +1,18 @@
+//! `gyre inspect`: what a dataset is.
+
+use std::process::ExitCode;
+
+use gyre_radar::{DatasetOptions, ground_truth::read_trajectory};
+
+use crate::{Failure, cli::InspectArguments};
+
+/// Prints what a dataset is and what looks wrong with it.
+pub fn inspect(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
+    let trajectory = arguments.trajectory.as_deref().map(read_trajectory).transpose()?;
+    let report = gyre_radar::inspect::inspect(&arguments.path, &DatasetOptions::default(), trajectory.as_ref())?;
+    match arguments.json {
+        true => println!("{}", serde_json::to_string_pretty(&report)?),
+        false => println!("{report}"),
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,1 +1,0 @@
-//! Radar odometry as cooperating processes.

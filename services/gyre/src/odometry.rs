@@ -1,0 +1,61 @@
+//! `odometry.csv` and the trajectory, from the journal.
+
+use std::fmt::Write;
+
+use gyre_messages::{PoseHeader, flag};
+use gyre_radar::Trajectory;
+use nalgebra::{Isometry2, Vector2};
+
+const HEADER: &str = "seq,scan,previous_scan,stamp_ns,interval_ns,x_m,y_m,yaw_rad,\
+    cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,score,runner_up_score,\
+    rotation_rad,rotation_variance_rad2,rotation_score,rotation_runner_up_rad,rotation_runner_up_score\n";
+
+/// One row a motion, in fixed decimals: the same scans and configuration give the same bytes. Where the chain of motions starts
+/// there is no row.
+pub fn csv(poses: &[PoseHeader]) -> String {
+    let mut text = String::from(HEADER);
+    for pose in poses.iter().filter(|pose| !pose.item.is(flag::BREAK)) {
+        let (item, motion, rotation) = (&pose.item, &pose.motion, &pose.motion.rotation);
+        let _ = write!(text, "{},{},{},{},{}", item.seq, item.scan, item.previous_scan, item.stamp_ns, motion.interval_ns);
+        for value in [motion.x_m, motion.y_m, motion.yaw_rad] {
+            let _ = write!(text, ",{value:.9}");
+        }
+        for value in motion.covariance {
+            let _ = write!(text, ",{value:.12}");
+        }
+        let (angle, runner_up) = (rotation.angle_rad, rotation.runner_up_rad);
+        let _ = write!(text, ",{:.9},{:.9},{angle:.9}", motion.score, motion.runner_up_score);
+        let _ = write!(text, ",{:.12},{:.9}", rotation.variance_rad2, rotation.score);
+        let _ = writeln!(text, ",{runner_up:.9},{:.9}", rotation.runner_up_score);
+    }
+    text
+}
+
+/// The poses with the scans' times.
+pub fn trajectory(poses: &[PoseHeader]) -> Trajectory {
+    let pose = |pose: &PoseHeader| Isometry2::new(Vector2::new(pose.x_m, pose.y_m), pose.yaw_rad);
+    Trajectory {
+        stamp_ns: Some(poses.iter().map(|pose| pose.item.stamp_ns).collect()),
+        poses: poses.iter().map(pose).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gyre_messages::{Item, MotionEstimate};
+
+    use super::*;
+
+    #[test]
+    fn a_row_a_motion_with_as_many_fields_as_the_header() {
+        let pose = |seq, flags| PoseHeader {
+            item: Item { seq, flags, ..Item::default() },
+            motion: MotionEstimate { x_m: 1.5, ..MotionEstimate::default() },
+            ..PoseHeader::default()
+        };
+        let text = csv(&[pose(0, flag::BREAK), pose(1, 0), pose(2, 0)]);
+        let fields: Vec<usize> = text.lines().map(|line| line.split(',').count()).collect();
+        assert_eq!(fields, [21, 21, 21]);
+        assert!(text.contains(",1.500000000,"));
+    }
+}

@@ -1,0 +1,87 @@
+//! What must hold before the first process is started.
+
+use std::{path::Path, time::Duration};
+
+use gyre_messages::{Footprint, Limits, Window};
+use gyre_radar::dataset::{self, Dataset};
+use thiserror::Error;
+
+use crate::configuration::Configuration;
+
+const SHARED_MEMORY: &str = "/dev/shm";
+
+/// Why a run cannot start.
+#[derive(Debug, Error)]
+pub enum PreflightError {
+    /// Nothing to play.
+    #[error("no dataset is named: give its folder with --data, or as source.data in the configuration")]
+    NoData,
+    /// One scan makes no motion.
+    #[error("{path} has {scans} scan{}: a motion is between two, so there is nothing to run; `gyre inspect` shows what is there", if *scans == 1 { "" } else { "s" })]
+    TooFew {
+        /// The dataset.
+        path: String,
+        /// What it has.
+        scans: usize,
+    },
+    /// The segments would not fit.
+    #[error(
+        "shared memory at /dev/shm has {free_mb:.1} MB free, but the run needs {footprint}: enlarge it (containers: --shm-size), \
+         or lower run.window or raster.n"
+    )]
+    SharedMemory {
+        /// What is there.
+        free_mb: f64,
+        /// What it takes.
+        footprint: Footprint,
+    },
+    /// It cannot even be asked.
+    #[error("cannot use shared memory at /dev/shm: {0}")]
+    NoSharedMemory(rustix::io::Errno),
+}
+
+/// What the dataset and the machine allow.
+pub struct Preflight {
+    pub scans: usize,
+    pub window: Window,
+    pub limits: Limits,
+    pub footprint: Footprint,
+}
+
+/// Looks at the dataset and at the machine.
+pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure> {
+    let source = &configuration.source;
+    if source.data.as_os_str().is_empty() {
+        return Err(PreflightError::NoData.into());
+    }
+    let dataset = dataset::open(&source.data, &source.options())?;
+    let scans = dataset.len().saturating_sub(source.first).min(source.scans.unwrap_or(usize::MAX));
+    if scans < 2 {
+        return Err(PreflightError::TooFew { path: source.data.display().to_string(), scans }.into());
+    }
+    let window = configuration.window(period(dataset.as_ref()));
+    let limits = Limits {
+        scan_bytes: dataset.limits().bytes,
+        raster_cells: configuration.raster.n * configuration.raster.n,
+        rasters: 1,
+    };
+    let footprint = Footprint::new(&window, &limits);
+    check_shared_memory(&footprint)?;
+    Ok(Preflight { scans, window, limits, footprint })
+}
+
+fn period(dataset: &dyn Dataset) -> Option<Duration> {
+    let last = dataset.len().checked_sub(1).filter(|last| *last > 0)?;
+    let span_ns = dataset.nominal_stamp_ns(last)? - dataset.nominal_stamp_ns(0)?;
+    Some(Duration::from_nanos((span_ns.max(0) as u64) / last as u64))
+}
+
+/// Writing to a full tmpfs kills a process without a word, so see to it before.
+fn check_shared_memory(footprint: &Footprint) -> Result<(), PreflightError> {
+    let there = rustix::fs::statvfs(Path::new(SHARED_MEMORY)).map_err(PreflightError::NoSharedMemory)?;
+    let free = there.f_bavail as f64 * there.f_frsize as f64;
+    match free >= footprint.total() as f64 {
+        true => Ok(()),
+        false => Err(PreflightError::SharedMemory { free_mb: free / 1e6, footprint: footprint.clone() }),
+    }
+}

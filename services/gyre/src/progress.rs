@@ -1,0 +1,102 @@
+//! What a person sees while a run goes on: a bar on a terminal, plain lines elsewhere.
+
+use std::{
+    io::IsTerminal,
+    time::{Duration, Instant},
+};
+
+use gyre_messages::{Footprint, PoseHeader};
+use gyre_stage::{clock, supervise::Event};
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// Between two plain lines.
+const EVERY: Duration = Duration::from_secs(2);
+
+/// See the module.
+pub struct Progress {
+    bar: Option<ProgressBar>,
+    scans: usize,
+    done: u64,
+    dropped: u64,
+    last_published: Option<u64>,
+    since: Option<(Instant, u64)>,
+    last_line: Instant,
+}
+
+impl Progress {
+    /// A run of `scans` scans, of which `resumed` are in the journal already.
+    pub fn new(scans: usize, resumed: usize, footprint: &Footprint) -> Self {
+        let bar = std::io::stderr().is_terminal().then(|| {
+            let style = ProgressStyle::with_template("{bar:32} {pos}/{len} scans  {msg}").unwrap_or_else(|_| ProgressStyle::default_bar());
+            ProgressBar::new(scans as u64).with_style(style)
+        });
+        let progress = Self {
+            bar,
+            scans,
+            done: resumed as u64,
+            dropped: 0,
+            last_published: None,
+            since: None,
+            last_line: Instant::now(),
+        };
+        progress.say(&footprint.to_string());
+        if resumed > 0 {
+            progress.say(&format!("going on after {resumed} scans"));
+        }
+        progress
+    }
+
+    /// Shows what happened.
+    pub fn show(&mut self, event: &Event<'_>) {
+        match event {
+            Event::Started { stage, pid } => self.say(&format!("{stage:20} pid {pid}")),
+            Event::Pose(pose) => self.pose(pose),
+            Event::Died { stage, death } => {
+                let words = death.last_words.as_ref().map_or(String::new(), |words| format!(" ({words})"));
+                self.say(&format!("{stage} died by {}{words}", death.how));
+            }
+            Event::Restarted { everybody: false } => self.say("started it again"),
+            Event::Restarted { everybody: true } => self.say("started all stages again, from the journal"),
+            Event::Stalled => self.say("no pose for too long: starting all stages again, from the journal"),
+        }
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+
+    fn pose(&mut self, pose: &PoseHeader) {
+        let published = pose.item.published;
+        let gap = self.last_published.map_or(published, |last| published.saturating_sub(last + 1));
+        if self.done == 0 || self.last_published.is_some() {
+            self.dropped += gap;
+        }
+        self.last_published = Some(published);
+        self.done = pose.item.seq + 1;
+        let (since, first) = *self.since.get_or_insert((Instant::now(), self.done));
+        let rate = (self.done - first) as f64 / since.elapsed().as_secs_f64().max(1e-9);
+        let lag_ms = (clock::now_ns() - pose.item.due_ns) as f64 * 1e-6;
+        let message = format!("{rate:.1} scans/s  lag {lag_ms:.0} ms  dropped {}", self.dropped);
+        match &self.bar {
+            Some(bar) => {
+                bar.set_position(self.done + self.dropped);
+                bar.set_message(message);
+            }
+            None if self.last_line.elapsed() >= EVERY => {
+                self.last_line = Instant::now();
+                eprintln!("{}/{} scans  {message}", self.done, self.scans);
+            }
+            None => {}
+        }
+    }
+
+    fn say(&self, line: &str) {
+        match &self.bar {
+            Some(bar) => bar.println(line),
+            None => eprintln!("{line}"),
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! What a run leaves in `--out`: all of it made from the journal, so a run that was cut short leaves the same files.
+
+use std::{fs, path::Path, time::Duration};
+
+use gyre_evaluation::{Evaluation, Options, plot_errors, plot_trajectory};
+use gyre_messages::{Footprint, PoseHeader, flag};
+use gyre_radar::{
+    Trajectory,
+    ground_truth::{find_ground_truth, read_trajectory, write_tum},
+};
+use gyre_stage::supervise::Report;
+
+use crate::{
+    Failure,
+    configuration::Configuration,
+    evaluate, odometry,
+    latency::Latency,
+    summary::{Counts, Summary},
+};
+
+/// This session of a run.
+pub struct Session<'a> {
+    /// Scans in the recording.
+    pub scans: usize,
+    /// Poses that were in the journal before.
+    pub resumed: usize,
+    /// How long it took.
+    pub wall: Duration,
+    /// Shared memory.
+    pub footprint: &'a Footprint,
+}
+
+/// Writes all files, and returns what the person at the terminal should read.
+pub fn write(
+    configuration: &Configuration,
+    out: &Path,
+    session: &Session<'_>,
+    records: &[PoseHeader],
+    report: Option<&Report>,
+) -> Result<Summary, Failure> {
+    let end = records.last().filter(|last| last.item.is(flag::END));
+    let poses = &records[..records.len() - usize::from(end.is_some())];
+    let trajectory = odometry::trajectory(poses);
+    save(out, "odometry.csv", odometry::csv(poses))?;
+    let mut tum = Vec::new();
+    write_tum(&trajectory, &mut tum)?;
+    save(out, "trajectory.tum", tum)?;
+    let evaluation = judge(configuration, &trajectory);
+    draw(out, &trajectory, evaluation.as_ref())?;
+    let latency = Latency::of(&poses[session.resumed.min(poses.len())..]);
+    save(out, "latency.json", serde_json::to_string_pretty(&latency)?)?;
+    let counts = Counts::of(poses, end);
+    let summary = Summary::new(configuration, out, session, counts, latency, evaluation, report);
+    save(out, "summary.json", serde_json::to_string_pretty(&summary)?)?;
+    Ok(summary)
+}
+
+/// Judges the trajectory by the dataset's ground truth, where there is one that fits.
+fn judge(configuration: &Configuration, trajectory: &Trajectory) -> Option<Evaluation> {
+    let given = configuration.run.ground_truth.clone();
+    let path = given.or_else(|| find_ground_truth(&configuration.source.data))?;
+    let judged = read_trajectory(&path)
+        .map_err(|error| error.to_string())
+        .and_then(|truth| evaluate::judge(trajectory, &truth, Options::default()).map_err(|error| error.to_string()));
+    judged.inspect_err(|reason| eprintln!("not judged by {}: {reason}", path.display())).ok()
+}
+
+fn draw(out: &Path, trajectory: &Trajectory, evaluation: Option<&Evaluation>) -> Result<(), Failure> {
+    let picture = out.join("trajectory.svg");
+    match evaluation {
+        Some(evaluation) => {
+            plot_trajectory(&picture, evaluation.matched.estimate(), Some(evaluation.matched.truth()))?;
+            plot_errors(&out.join("errors.svg"), evaluation)?;
+        }
+        None if trajectory.poses.is_empty() => {}
+        None => plot_trajectory(&picture, &trajectory.poses, None)?,
+    }
+    Ok(())
+}
+
+fn save(out: &Path, name: &str, text: impl AsRef<[u8]>) -> Result<(), Failure> {
+    let path = out.join(name);
+    fs::write(&path, text).map_err(|error| format!("cannot write {}: {error}", path.display()).into())
+}

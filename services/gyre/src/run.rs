@@ -1,0 +1,164 @@
+//! `gyre run`: prepares a run, supervises it, writes its results.
+
+use std::{
+    env, fs,
+    os::unix::process::CommandExt,
+    path::{Path, PathBuf},
+    process::{Command, ExitCode},
+    time::{Duration, Instant},
+};
+
+use gyre_messages::flag;
+use gyre_pose_integration::journal;
+use gyre_stage::{
+    Manifest,
+    run::RunRoot,
+    supervise::{Ending, Plan, SuperviseError, supervise},
+};
+
+use crate::{
+    Failure,
+    cli::RunArguments,
+    configuration::{Configuration, Mode},
+    preflight,
+    progress::Progress,
+    results::{self, Session},
+    simulate,
+};
+
+/// What the shell calls a program that was interrupted.
+const INTERRUPTED: u8 = 130;
+
+/// Runs the pipeline and writes what came of it, however it ended.
+pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
+    let out = results_directory(arguments)?;
+    let configuration = resolve(arguments, &out)?;
+    let checked = preflight::check(&configuration)?;
+    let root = RunRoot::take(&out)?;
+    let resumed = prepare(&configuration, &out, arguments.fresh)?;
+    let manifest = Manifest {
+        prefix: root.prefix(),
+        root: root.path().to_owned(),
+        out: out.clone(),
+        window: checked.window,
+        limits: checked.limits,
+        live: configuration.run.mode == Mode::Live,
+        rate: configuration.run.rate.factor(),
+    };
+    let resolved = configuration.to_toml()?;
+    write(&out.join("config.toml"), &resolved)?;
+    manifest.write(&resolved)?;
+
+    let plan = Plan {
+        manifest,
+        stages: configuration.stage_plans(&env::current_exe()?),
+        stall_timeout: Some(configuration.run.stall_timeout_s).filter(|s| *s > 0.0).map(Duration::from_secs_f64),
+    };
+    let mut progress = Progress::new(checked.scans, resumed, &checked.footprint);
+    let started = Instant::now();
+    let report = supervise(&plan, &mut |event| progress.show(&event));
+    progress.finish();
+    drop(root);
+    if let Err(SuperviseError::TransportStuck) = report {
+        return start_over();
+    }
+    let session = Session { scans: checked.scans, resumed, wall: started.elapsed(), footprint: &checked.footprint };
+    finish(&configuration, &out, &session, report)
+}
+
+/// Writes the results; a failure of the run is told after them, for nothing computed so far is lost.
+fn finish(
+    configuration: &Configuration,
+    out: &Path,
+    session: &Session<'_>,
+    report: Result<gyre_stage::supervise::Report, SuperviseError>,
+) -> Result<ExitCode, Failure> {
+    let poses = journal::read(&journal::path(out))?;
+    let summary = results::write(configuration, out, session, &poses, report.as_ref().ok());
+    let report = report.map_err(|failure| match poses.len() {
+        0 => failure.to_string(),
+        kept => format!("{failure}; {kept} poses are kept in {}, the same command goes on from there", out.display()),
+    })?;
+    println!("{}", summary?);
+    Ok(match report.ending {
+        Ending::Complete => ExitCode::SUCCESS,
+        Ending::Interrupted => ExitCode::from(INTERRUPTED),
+    })
+}
+
+fn results_directory(arguments: &RunArguments) -> Result<PathBuf, Failure> {
+    let name = arguments.configuration.file_stem().unwrap_or_default();
+    let out = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(name));
+    fs::create_dir_all(out.join("log")).map_err(|error| format!("cannot write to {}: {error}", out.display()))?;
+    Ok(out.canonicalize()?)
+}
+
+/// The configuration with all that the command line says, and the recording generated if it is to be.
+fn resolve(arguments: &RunArguments, out: &Path) -> Result<Configuration, Failure> {
+    let mut configuration = Configuration::read(&arguments.configuration, &overrides(arguments))?;
+    if let Some(simulation) = configuration.simulation.clone().filter(|_| arguments.data.is_none()) {
+        configuration.source.data = out.join("recording");
+        generate_once(&simulation, &configuration.source.data)?;
+    }
+    // So that the resolved configuration repeats the run from anywhere. What does not exist is told by the reader.
+    if let Ok(absolute) = configuration.source.data.canonicalize() {
+        configuration.source.data = absolute;
+    }
+    Ok(configuration)
+}
+
+fn overrides(arguments: &RunArguments) -> Vec<String> {
+    let data = arguments.data.iter().map(|data| format!("source.data={}", data.display()));
+    let rate = arguments.rate.iter().map(|rate| format!("run.rate='{rate}'"));
+    arguments.set.iter().cloned().chain(data).chain(rate).collect()
+}
+
+fn generate_once(simulation: &gyre_simulator::SimulationConfig, recording: &Path) -> Result<(), Failure> {
+    let made_by = recording.join("simulation.toml");
+    let wanted = toml::to_string(simulation)?;
+    if fs::read_to_string(&made_by).is_ok_and(|found| found == wanted) {
+        return Ok(());
+    }
+    if recording.exists() {
+        fs::remove_dir_all(recording)?;
+    }
+    simulate::generate(simulation, recording)?;
+    write(&made_by, &wanted)
+}
+
+/// Goes on with an unfinished run of the same configuration, else begins anew; returns the poses that are there already.
+fn prepare(configuration: &Configuration, out: &Path, fresh: bool) -> Result<usize, Failure> {
+    let journal = journal::path(out);
+    let poses = journal::read(&journal)?;
+    let complete = poses.last().is_some_and(|last| last.item.is(flag::END));
+    if poses.is_empty() || complete || fresh {
+        for file in [journal, out.join("log.jsonl")] {
+            let _ = fs::remove_file(file);
+        }
+        return Ok(0);
+    }
+    let same = fs::read_to_string(out.join("config.toml"))
+        .ok()
+        .and_then(|text| text.parse::<toml::Table>().ok())
+        .is_some_and(|begun| configuration.continues(&begun));
+    match same {
+        true => Ok(poses.len()),
+        false => Err(format!(
+            "{} holds an unfinished run of another configuration ({} poses): choose another --out, or give it up with --fresh",
+            out.display(),
+            poses.len()
+        )
+        .into()),
+    }
+}
+
+/// The transport hangs on what a dead process left. All of that is gone now; the same command resumes from the journal.
+fn start_over() -> Result<ExitCode, Failure> {
+    eprintln!("gyre: the transport did not finish cleaning up after a dead process; starting over from the journal");
+    let failed = Command::new(env::current_exe()?).args(env::args_os().skip(1).filter(|a| a != "--fresh")).exec();
+    Err(format!("cannot start over: {failed}").into())
+}
+
+fn write(path: &Path, text: &str) -> Result<(), Failure> {
+    fs::write(path, text).map_err(|error| format!("cannot write {}: {error}", path.display()).into())
+}

@@ -1,0 +1,202 @@
+//! `summary.json`, and the same as a table.
+
+use std::{collections::BTreeMap, fmt, fs, path::Path, thread};
+
+use gyre_evaluation::Evaluation;
+use gyre_messages::{Footprint, PoseHeader, Stage, flag};
+use gyre_stage::{
+    Statistics,
+    supervise::{Ending, Report},
+};
+use serde::Serialize;
+
+use crate::{
+    configuration::{Configuration, Mode, Rate},
+    latency::{Latency, Percentiles},
+    results::Session,
+};
+
+/// Where each scan went.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Counts {
+    /// Scans that the source published.
+    pub published: u64,
+    /// Scans with a pose.
+    pub processed: u64,
+    /// Scans published and not processed: what live mode dropped.
+    pub dropped: u64,
+    /// Scans that could not be read.
+    pub unreadable: u64,
+    /// Places where the chain of motions starts anew, after the first.
+    pub breaks: u64,
+}
+
+impl Counts {
+    /// From the poses and the end of the stream, if it came to that.
+    pub fn of(poses: &[PoseHeader], end: Option<&PoseHeader>) -> Self {
+        let last = poses.last();
+        let published = end.map(|end| end.item.published).or(last.map(|last| last.item.published + 1)).unwrap_or(0);
+        let seen = end.map(|end| end.item.scan).or(last.map(|last| last.item.scan + 1)).unwrap_or(0);
+        let processed = poses.len() as u64;
+        let starts = poses.iter().filter(|pose| pose.item.is(flag::BREAK)).count() as u64;
+        Self {
+            published,
+            processed,
+            dropped: published.saturating_sub(processed),
+            unreadable: seen.saturating_sub(published),
+            breaks: starts.saturating_sub(1),
+        }
+    }
+}
+
+/// All that is worth knowing of a run.
+#[derive(Debug, Serialize)]
+pub struct Summary {
+    version: &'static str,
+    machine: Machine,
+    out: String,
+    data: String,
+    /// `None`: the run failed.
+    ending: Option<Ending>,
+    mode: Mode,
+    rate: Rate,
+    window: usize,
+    scans_in_recording: usize,
+    resumed_after: usize,
+    #[serde(flatten)]
+    counts: Counts,
+    wall_s: f64,
+    scans_per_s: f64,
+    shared_memory: Footprint,
+    restarts: BTreeMap<String, usize>,
+    recovery_ms: Vec<f64>,
+    /// What each stage counted in its last life.
+    stages: BTreeMap<String, Statistics>,
+    latency: Latency,
+    evaluation: Option<Evaluation>,
+}
+
+#[derive(Debug, Serialize)]
+struct Machine {
+    processor: String,
+    cores: usize,
+}
+
+impl Machine {
+    fn this() -> Self {
+        let model = |text: String| {
+            let line = text.lines().find(|line| line.starts_with("model name"))?;
+            Some(line.split_once(':')?.1.trim().to_owned())
+        };
+        let processor = fs::read_to_string("/proc/cpuinfo").ok().and_then(model);
+        Self {
+            processor: processor.unwrap_or_else(|| std::env::consts::ARCH.to_owned()),
+            cores: thread::available_parallelism().map_or(1, usize::from),
+        }
+    }
+}
+
+impl Summary {
+    /// Puts it together.
+    pub fn new(
+        configuration: &Configuration,
+        out: &Path,
+        session: &Session<'_>,
+        counts: Counts,
+        latency: Latency,
+        evaluation: Option<Evaluation>,
+        report: Option<&Report>,
+    ) -> Self {
+        let wall_s = session.wall.as_secs_f64();
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            machine: Machine::this(),
+            out: out.display().to_string(),
+            data: configuration.source.data.display().to_string(),
+            ending: report.map(|report| report.ending),
+            mode: configuration.run.mode,
+            rate: configuration.run.rate,
+            window: configuration.run.window,
+            scans_in_recording: session.scans,
+            resumed_after: session.resumed,
+            counts,
+            wall_s,
+            scans_per_s: latency.scans as f64 / wall_s,
+            shared_memory: session.footprint.clone(),
+            restarts: report.map(|report| report.restarts.clone()).unwrap_or_default(),
+            recovery_ms: report.into_iter().flat_map(|r| &r.recovery).map(|time| time.as_secs_f64() * 1e3).collect(),
+            stages: report.map(|report| report.statistics.clone()).unwrap_or_default(),
+            latency,
+            evaluation,
+        }
+    }
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let c = &self.counts;
+        let ending = match self.ending {
+            Some(Ending::Complete) => "complete",
+            Some(Ending::Interrupted) => "interrupted: the same command goes on from here",
+            None => "failed",
+        };
+        writeln!(f, "\n{ending}: {} of {} scans in {:.1} s, {:.1} scans/s", c.processed, self.scans_in_recording, self.wall_s, self.scans_per_s)?;
+        writeln!(f, "published {}  dropped {}  unreadable {}  breaks {}", c.published, c.dropped, c.unreadable, c.breaks)?;
+        if !self.restarts.is_empty() {
+            let restarts: Vec<_> = self.restarts.iter().map(|(stage, times)| format!("{stage} {times}")).collect();
+            let recovery: Vec<_> = self.recovery_ms.iter().map(|ms| format!("{ms:.0}")).collect();
+            writeln!(f, "restarts {}  recovered after {} ms", restarts.join(", "), recovery.join(", "))?;
+        }
+        self.latency_table(f)?;
+        if let Some(evaluation) = &self.evaluation {
+            writeln!(f, "\n{evaluation}")?;
+        }
+        write!(f, "\nresults in {}: odometry.csv, trajectory.tum, trajectory.svg, latency.json, summary.json", self.out)
+    }
+}
+
+impl Summary {
+    fn latency_table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "\n{:22}{:>10}{:>10}{:>10}{:>10}   busy   allocations", "latency, us", "p50", "p90", "p99", "max")?;
+        row(f, "sensor to pose", &self.latency.sensor_to_pose)?;
+        writeln!(f)?;
+        for stage in Stage::ALL {
+            let Some(hop) = self.latency.stages.get(stage.name()) else { continue };
+            if let Some(transport) = &hop.transport {
+                row(f, "  transport", transport)?;
+                writeln!(f)?;
+            }
+            row(f, stage.name(), &hop.work)?;
+            write!(f, "{:6.0} %", hop.busy * 100.0)?;
+            match self.stages.get(stage.name()) {
+                Some(statistics) => writeln!(f, "{:14}", statistics.allocations_after_five)?,
+                None => writeln!(f)?,
+            }
+        }
+        let bound_by = self.latency.bound_by.unwrap_or("nothing");
+        write!(f, "bounded by {bound_by}; two or more stages busy at once {:.0} % of the time", self.latency.overlap * 100.0)?;
+        writeln!(f, "; allocations: in `process` after its first five items")
+    }
+}
+
+fn row(f: &mut fmt::Formatter<'_>, name: &str, p: &Percentiles) -> fmt::Result {
+    write!(f, "{name:22}{:10.0}{:10.0}{:10.0}{:10.0}", p.p50_us, p.p90_us, p.p99_us, p.max_us)
+}
+
+#[cfg(test)]
+mod tests {
+    use gyre_messages::Item;
+
+    use super::*;
+
+    #[test]
+    fn every_scan_is_accounted_for() {
+        let pose = |seq, published, scan| PoseHeader {
+            item: Item { seq, published, scan, ..Item::default() },
+            ..PoseHeader::default()
+        };
+        let end = pose(3, 9, 10);
+        let counts = Counts::of(&[pose(0, 0, 0), pose(1, 3, 3), pose(2, 7, 8)], Some(&end));
+        assert_eq!(counts, Counts { published: 9, processed: 3, dropped: 6, unreadable: 1, breaks: 0 });
+    }
+}

@@ -1,0 +1,194 @@
+//! Trajectories on disk: the ground truth of each dataset, and the pose files that tools exchange.
+
+mod boreas;
+mod kitti;
+mod mulran;
+mod oxford;
+mod tum;
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+pub use kitti::write_kitti;
+pub use tum::write_tum;
+
+use crate::trajectory::Trajectory;
+
+/// Where datasets keep their ground truth, below the root; the first that is there is taken.
+const PLACES: [&str; 9] = [
+    "ground_truth.tum",
+    "gt/radar_odometry.csv",
+    "radar_odometry.csv",
+    "applanix/radar_poses.csv",
+    "global_pose.csv",
+    "ground_truth.txt",
+    "gt.txt",
+    "gt/gt.txt",
+    "gt.tum",
+];
+
+/// A trajectory that cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum TrajectoryError {
+    /// A file that the system would not give.
+    #[error("cannot read the trajectory {path}: {source}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// Content of no known form.
+    #[error(
+        "{path} is no trajectory that Gyre reads (Oxford radar_odometry.csv, Boreas radar_poses.csv, MulRan global_pose.csv, TUM, KITTI): {reason}"
+    )]
+    Unknown {
+        /// The file.
+        path: PathBuf,
+        /// What was found.
+        reason: String,
+    },
+    /// A line that is not what its form demands.
+    #[error("{path}, line {line}: {reason}")]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong.
+        reason: String,
+    },
+}
+
+/// What is wrong with a line (from 1); the file's path is added by the caller.
+#[derive(Debug)]
+struct LineError {
+    line: usize,
+    reason: String,
+}
+
+/// The form of a trajectory's file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TrajectoryFormat {
+    /// Oxford's `radar_odometry.csv`: motions between scans, chained from identity.
+    OxfordCsv,
+    /// Boreas' `radar_poses.csv`.
+    BoreasCsv,
+    /// MulRan's `global_pose.csv`: the vehicle's poses, moved to the radar.
+    MulranCsv,
+    /// `seconds x y z qx qy qz qw`.
+    Tum,
+    /// Rows of a 3 x 4 matrix, no times; x and y span the plane.
+    Kitti,
+}
+
+/// Reads a trajectory of any known form, told by its first line of content, and converts it to REP-103.
+pub fn read_trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
+    let text = fs::read_to_string(path).map_err(|source| TrajectoryError::Io { path: path.to_owned(), source })?;
+    let format = detect(&text).map_err(|reason| TrajectoryError::Unknown { path: path.to_owned(), reason })?;
+    parse(&text, format).map_err(|LineError { line, reason }| TrajectoryError::Line {
+        path: path.to_owned(),
+        line,
+        reason,
+    })
+}
+
+/// The first file below a dataset's root that ground truth is usually kept in; the folder of images itself will do as root.
+pub fn find_ground_truth(root: &Path) -> Option<PathBuf> {
+    let above = root
+        .file_name()
+        .and_then(|n| n.to_str())
+        .is_some_and(|n| ["radar", "Navtech_Polar", "navtech", "polar"].contains(&n));
+    let roots = [Some(root), root.parent().filter(|_| above)];
+    roots.into_iter().flatten().flat_map(|root| PLACES.iter().map(|p| root.join(p))).find(|path| path.is_file())
+}
+
+fn parse(text: &str, format: TrajectoryFormat) -> Result<Trajectory, LineError> {
+    match format {
+        TrajectoryFormat::OxfordCsv => oxford::parse(text),
+        TrajectoryFormat::BoreasCsv => boreas::parse(text),
+        TrajectoryFormat::MulranCsv => mulran::parse(text),
+        TrajectoryFormat::Tum => tum::parse(text),
+        TrajectoryFormat::Kitti => kitti::parse(text),
+    }
+}
+
+fn detect(text: &str) -> Result<TrajectoryFormat, String> {
+    let (_, first) = lines(text).next().ok_or("it is empty")?;
+    let commas = first.split(',').count();
+    let words = first.split_whitespace().count();
+    match (commas, words) {
+        _ if first.contains("destination_timestamp") => Ok(TrajectoryFormat::OxfordCsv),
+        _ if first.contains("GPSTime") => Ok(TrajectoryFormat::BoreasCsv),
+        (13, _) => Ok(TrajectoryFormat::MulranCsv),
+        (1, 8) => Ok(TrajectoryFormat::Tum),
+        (1, 12 | 13) => Ok(TrajectoryFormat::Kitti),
+        _ => Err(format!("its first line has {} columns", commas.max(words))),
+    }
+}
+
+/// Lines with content, numbered from 1; `#` starts a comment.
+fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    text.lines().enumerate().map(|(i, l)| (i + 1, l.trim())).filter(|(_, l)| !l.is_empty() && !l.starts_with('#'))
+}
+
+/// `N` finite numbers.
+fn numbers<'a, const N: usize>(line: usize, fields: impl Iterator<Item = &'a str>) -> Result<[f64; N], LineError> {
+    let (mut values, mut count) = ([0.0; N], 0);
+    for field in fields {
+        let value = field.trim().parse::<f64>().ok().filter(|v| v.is_finite());
+        let value = value.ok_or_else(|| LineError { line, reason: format!("{field:?} is not a number") })?;
+        if let Some(into) = values.get_mut(count) {
+            *into = value;
+        }
+        count += 1;
+    }
+    match count {
+        _ if count == N => Ok(values),
+        _ => Err(LineError { line, reason: format!("{count} columns where {N} are expected") }),
+    }
+}
+
+/// The columns of a csv by name, in the order asked for.
+fn columns<const N: usize>(header: &str, names: [&str; N]) -> Result<[usize; N], LineError> {
+    let mut found = [0; N];
+    for (into, name) in found.iter_mut().zip(names) {
+        let position = header.split(',').position(|h| h.trim() == name);
+        *into = position.ok_or_else(|| LineError { line: 1, reason: format!("the header has no column {name}") })?;
+    }
+    Ok(found)
+}
+
+/// A field of a csv's row.
+fn field(line: usize, row: &str, column: usize) -> Result<&str, LineError> {
+    row.split(',')
+        .nth(column)
+        .map(str::trim)
+        .ok_or_else(|| LineError { line, reason: format!("column {} is missing", column + 1) })
+}
+
+fn number(line: usize, row: &str, column: usize) -> Result<f64, LineError> {
+    numbers::<1>(line, std::iter::once(field(line, row, column)?)).map(|[v]| v)
+}
+
+/// An integer stamp of any unit, ns since 1970.
+fn stamp_field(line: usize, row: &str, column: usize) -> Result<i64, LineError> {
+    let text = field(line, row, column)?;
+    let stamp = text.parse().ok().and_then(crate::stamp::to_ns);
+    stamp.ok_or_else(|| LineError {
+        line,
+        reason: format!("stamp {text:?} is not an integer time of the years 2015 to 2040"),
+    })
+}
+
+/// Refuses times that run backwards.
+fn check_growing(line: usize, stamps: &[i64], next: i64) -> Result<(), LineError> {
+    match stamps.last() {
+        Some(last) if next < *last => {
+            let back_s = (last - next) as f64 * 1e-9;
+            Err(LineError { line, reason: format!("time runs backwards by {back_s:.6} s") })
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,66 @@
+//! Oxford's `radar_odometry.csv`: each row is the newer scan's pose (source) in the older one's frame (destination), x forward,
+//! y right, yaw clockwise; stamps are at mid-sweep.
+
+use nalgebra::{Isometry2, Vector2};
+
+use super::{LineError, columns, lines, number, stamp_field};
+use crate::trajectory::{Trajectory, mirrored};
+
+/// One row.
+struct Motion {
+    line: usize,
+    from_ns: i64,
+    to_ns: i64,
+    /// The newer scan in the older one's frame, REP-103.
+    motion: Isometry2<f64>,
+}
+
+/// Chains the motions from identity. Rows may come in any order; a gap between them is an error.
+pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
+    let mut motions = parse_rows(text)?;
+    motions.sort_by_key(|m| m.from_ns);
+    let Some(first) = motions.first() else {
+        return Err(LineError { line: 1, reason: "there is a header and no motion".to_owned() });
+    };
+    let (mut stamps, mut poses) = (vec![first.from_ns], vec![Isometry2::identity()]);
+    let (mut now_ns, mut pose) = (first.from_ns, Isometry2::identity());
+    for m in &motions {
+        check_chain(m, now_ns)?;
+        (now_ns, pose) = (m.to_ns, pose * m.motion);
+        stamps.push(now_ns);
+        poses.push(pose);
+    }
+    Ok(Trajectory { stamp_ns: Some(stamps), poses })
+}
+
+fn parse_rows(text: &str) -> Result<Vec<Motion>, LineError> {
+    let mut rows = lines(text);
+    let header = rows.next().map(|(_, header)| header).unwrap_or_default();
+    let names = ["source_timestamp", "destination_timestamp", "x", "y", "yaw"];
+    let [source, destination, x, y, yaw] = columns(header, names)?;
+    rows.map(|(line, row)| {
+        let position = Vector2::new(number(line, row, x)?, number(line, row, y)?);
+        let motion = mirrored(Isometry2::new(position, number(line, row, yaw)?));
+        Ok(Motion {
+            line,
+            from_ns: stamp_field(line, row, destination)?,
+            to_ns: stamp_field(line, row, source)?,
+            motion,
+        })
+    })
+    .collect()
+}
+
+fn check_chain(m: &Motion, now_ns: i64) -> Result<(), LineError> {
+    let error = |reason| Err(LineError { line: m.line, reason });
+    if m.to_ns <= m.from_ns {
+        return error("the source scan must be newer than the destination scan".to_owned());
+    }
+    if m.from_ns != now_ns {
+        let gap_s = (m.from_ns - now_ns) as f64 * 1e-9;
+        return error(format!(
+            "this motion starts {gap_s:.6} s after the one before it ended: the chain has a gap or an overlap"
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,139 @@
+//! What looks wrong with a dataset, in sentences.
+
+use super::{Chirps, Report, TimingReport, TruthReport};
+use crate::options::{DatasetOptions, Format};
+
+/// Scans that are named one by one; more are counted.
+const NAMED: usize = 8;
+
+pub(super) fn list(report: &Report, notes: &[String], options: &DatasetOptions) -> Vec<String> {
+    let mut found = notes.to_vec();
+    found.extend(resolution(report, options));
+    match &report.timing {
+        Some(timing) => found.extend(times(timing)),
+        None => found.push("The files are not named by times: scans have the times of their rows only.".to_owned()),
+    }
+    found.extend(rows(report));
+    found.extend(scans(report));
+    match report.truths.as_slice() {
+        [] => found.push("No ground truth was found: a result can be run, not judged.".to_owned()),
+        truths => found.extend(truths.iter().flat_map(|truth| truth_sentences(truth, report))),
+    }
+    found
+}
+
+fn resolution(report: &Report, options: &DatasetOptions) -> Option<String> {
+    let oxford = matches!(report.format, Format::Oxford | Format::Oord) && options.range_resolution_m.is_none();
+    oxford.then(|| {
+        format!(
+            "Range resolution is taken as {} m: the dataset's own kit says 0.0432 m, with which paths come out more than 1 % short.",
+            report.range_resolution_m
+        )
+    })
+}
+
+fn times(timing: &TimingReport) -> impl Iterator<Item = String> {
+    let worst = timing.stalls.iter().map(|s| s.late_s).fold(0.0, f64::max);
+    let stalls = (!timing.stalls.is_empty()).then(|| {
+        let places = some(timing.stalls.iter().map(|s| format!("{} ({:.2} s)", s.scan, s.late_s)));
+        format!(
+            "The host stalled {}, by up to {worst:.2} s, and caught up while the antenna turned evenly: logged stamps are late from scans {places}.",
+            times_word(timing.stalls.len())
+        )
+    });
+    let gaps = (!timing.gaps.is_empty()).then(|| {
+        let places = some(timing.gaps.iter().map(|g| format!("{} ({} missing)", g.scan, g.missing)));
+        let missing = if timing.missing_scans == 1 {
+            "1 scan is".to_owned()
+        } else {
+            format!("{} scans are", timing.missing_scans)
+        };
+        format!("{missing} missing, before scans {places}.")
+    });
+    let backwards = (!timing.backwards.is_empty()).then(|| {
+        format!("Logged time runs backwards at scans {}.", some(timing.backwards.iter().map(ToString::to_string)))
+    });
+    [stalls, gaps, backwards].into_iter().flatten()
+}
+
+fn times_word(n: usize) -> String {
+    if n == 1 { "once".to_owned() } else { format!("{n} times") }
+}
+
+fn rows(report: &Report) -> impl Iterator<Item = String> {
+    let rows = &report.rows;
+    let percent = |n: u64| 100.0 * n as f64 / rows.rows.max(1) as f64;
+    let invented = (rows.not_measured > 0).then(|| {
+        format!(
+            "{} of {} rows ({:.2} %) were not measured but filled in from their neighbours.",
+            rows.not_measured,
+            rows.rows,
+            percent(rows.not_measured)
+        )
+    });
+    let lost = (rows.lost > 0).then(|| format!("{} rows are lost: the azimuth jumps over them.", rows.lost));
+    let chirps =
+        (rows.chirps == Chirps::Mixed).then(|| "Some scans say the chirps' directions and some do not.".to_owned());
+    let ringing = (rows.ringing_bins > 0).then(|| {
+        format!(
+            "Range bins 0 to {} (to {:.1} m) are the sensor's own ringing: alike in all directions, and brighter than the scene; keep the minimum range above that.",
+            rows.ringing_bins - 1,
+            rows.ringing_bins as f32 * report.range_resolution_m + report.range_offset_m
+        )
+    });
+    [invented, lost, chirps, ringing].into_iter().flatten()
+}
+
+fn scans(report: &Report) -> impl Iterator<Item = String> {
+    let single = (report.scans == 1).then(|| "There is one scan only, and a motion needs two.".to_owned());
+    let unreadable = (!report.unreadable.is_empty()).then(|| {
+        let first = report.unreadable.first().map(|u| u.error.clone()).unwrap_or_default();
+        let places = some(report.unreadable.iter().map(|u| u.scan.to_string()));
+        format!(
+            "{} of {} scans read cannot be used (scans {places}): {first}.",
+            report.unreadable.len(),
+            report.scans_read
+        )
+    });
+    [single, unreadable].into_iter().flatten()
+}
+
+fn truth_sentences(truth: &TruthReport, report: &Report) -> Vec<String> {
+    let name = truth.file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    if let Some(error) = &truth.error {
+        return vec![format!("Ground truth cannot be read: {error}.")];
+    }
+    let heading = (!truth.has_heading && truth.poses > 1).then(|| format!("{name} has positions only, no headings."));
+    let timeless = truth.span_ns.is_none().then(|| format!("{name} has no times: it can be compared by index only."));
+    let covered = truth
+        .scans_covered
+        .filter(|n| *n < report.scans)
+        .map(|n| format!("{name} covers {n} of {} scans.", report.scans));
+    [heading, timeless, covered, clock_sentence(truth, &name)].into_iter().flatten().collect()
+}
+
+fn clock_sentence(truth: &TruthReport, name: &str) -> Option<String> {
+    let clock = truth.clock.as_ref()?;
+    if !clock.is_convincing() {
+        return Some(format!(
+            "{name} moves unlike the given trajectory at any offset within 10 s: its clock cannot be judged."
+        ));
+    }
+    let mirrored =
+        if clock.mirrored { " and it is mirrored (turns left where the trajectory turns right)" } else { "" };
+    match (clock.agrees(), clock.late_s > 0.0) {
+        (true, _) if clock.mirrored => Some(format!("{name}'s clock agrees{mirrored}.")),
+        (true, _) => None,
+        (false, late) => {
+            let word = if late { "late" } else { "early" };
+            Some(format!("{name} is {:.2} s {word} against the given trajectory{mirrored}.", clock.late_s.abs()))
+        }
+    }
+}
+
+/// The first few, and how many more.
+fn some(items: impl ExactSizeIterator<Item = String>) -> String {
+    let more = items.len().saturating_sub(NAMED);
+    let named = items.take(NAMED).collect::<Vec<_>>().join(", ");
+    if more == 0 { named } else { format!("{named} and {more} more") }
+}

@@ -1,0 +1,141 @@
+//! Rows of the scans: measured or not, lost, chirps, the encoder's steps, and ringing near the sensor.
+
+use serde::Serialize;
+
+use crate::scan::{PolarScan, Sense, flag};
+
+/// Scans whose powers are summed to find the ringing; more would tell nothing new.
+const POWER_SCANS: usize = 40;
+/// Ringing is brighter than the mean of all powers by this factor ...
+const RINGING_BRIGHTNESS: f64 = 1.5;
+/// ... and nearly the same in all directions at all times: its deviation is at most this share of its mean.
+const RINGING_VARIATION: f64 = 0.3;
+/// Bins in a row that must not ring for the ringing to have ended.
+const QUIET_BINS: usize = 3;
+
+/// What the rows say of the chirps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Chirps {
+    /// Nothing.
+    Unknown,
+    /// Rising and falling in turn.
+    Alternating,
+    /// Known in some scans and not in others.
+    Mixed,
+}
+
+/// Rows of all scans that were read.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RowsReport {
+    /// All rows.
+    pub rows: u64,
+    /// Rows that were filled in from their neighbours.
+    pub not_measured: u64,
+    /// Rows that are not there: places where the azimuth makes more than one step.
+    pub lost: u64,
+    /// What the rows say of the chirps.
+    pub chirps: Chirps,
+    /// Median step from azimuth to azimuth, degrees.
+    pub step_deg: f64,
+    /// Least and greatest first azimuth, degrees.
+    pub first_azimuth_deg: (f64, f64),
+    /// Range bins from the sensor outwards that hold its ringing.
+    pub ringing_bins: usize,
+}
+
+/// Collects [`RowsReport`] from scan after scan.
+#[derive(Default)]
+pub(super) struct Survey {
+    scans: usize,
+    with_chirps: usize,
+    rows: u64,
+    not_measured: u64,
+    lost: u64,
+    steps_rad: Vec<f64>,
+    first_rad: Option<(f32, f32)>,
+    power_rows: u64,
+    /// Sum and sum of squares of each bin's powers.
+    power: Vec<(u64, u64)>,
+}
+
+impl Survey {
+    pub(super) fn add(&mut self, scan: &PolarScan<'_>) {
+        self.scans += 1;
+        self.rows += scan.flags.len() as u64;
+        self.not_measured += scan.flags.iter().filter(|f| *f & flag::MEASURED == 0).count() as u64;
+        self.with_chirps += usize::from(scan.flags.iter().any(|f| f & flag::CHIRP_KNOWN != 0));
+        self.add_azimuths(scan);
+        if self.scans <= POWER_SCANS {
+            self.add_powers(scan);
+        }
+    }
+
+    fn add_azimuths(&mut self, scan: &PolarScan<'_>) {
+        let Some(&first) = scan.azimuth_rad.first() else { return };
+        let (least, most) = self.first_rad.unwrap_or((first, first));
+        self.first_rad = Some((least.min(first), most.max(first)));
+        let steps: Vec<f64> = steps_rad(scan).collect();
+        let usual = median(&steps);
+        self.lost += steps.iter().map(|s| ((s / usual).round() as u64).saturating_sub(1)).sum::<u64>();
+        self.steps_rad.push(usual);
+    }
+
+    fn add_powers(&mut self, scan: &PolarScan<'_>) {
+        self.power.resize(scan.geometry.bins.max(self.power.len()), (0, 0));
+        self.power_rows += scan.geometry.azimuths as u64;
+        for azimuth in 0..scan.geometry.azimuths {
+            for (sum, power) in self.power.iter_mut().zip(scan.row(azimuth)) {
+                let power = u64::from(*power);
+                sum.0 += power;
+                sum.1 += power * power;
+            }
+        }
+    }
+
+    pub(super) fn report(&self) -> RowsReport {
+        let (least, most) = self.first_rad.unwrap_or_default();
+        RowsReport {
+            rows: self.rows,
+            not_measured: self.not_measured,
+            lost: self.lost,
+            chirps: match self.with_chirps {
+                0 => Chirps::Unknown,
+                n if n == self.scans => Chirps::Alternating,
+                _ => Chirps::Mixed,
+            },
+            step_deg: median(&self.steps_rad).to_degrees(),
+            first_azimuth_deg: (f64::from(least).to_degrees(), f64::from(most).to_degrees()),
+            ringing_bins: self.ringing_bins(),
+        }
+    }
+
+    fn ringing_bins(&self) -> usize {
+        let rows = self.power_rows.max(1) as f64;
+        let overall =
+            self.power.iter().map(|(sum, _)| *sum as f64).sum::<f64>() / (rows * self.power.len().max(1) as f64);
+        let rings = |(sum, squares): &(u64, u64)| {
+            let mean = *sum as f64 / rows;
+            let deviation = (*squares as f64 / rows - mean * mean).max(0.0).sqrt();
+            mean > RINGING_BRIGHTNESS * overall && deviation <= RINGING_VARIATION * mean
+        };
+        let quiet = self.power.windows(QUIET_BINS).position(|bins| !bins.iter().any(rings));
+        quiet.unwrap_or(0)
+    }
+}
+
+/// Steps from azimuth to azimuth, the seam included, positive in the sense of rotation.
+fn steps_rad<'a>(scan: &PolarScan<'a>) -> impl Iterator<Item = f64> + 'a {
+    let sign = if scan.geometry.sense == Sense::Clockwise { 1.0 } else { -1.0 };
+    let next = scan.azimuth_rad.iter().cycle().skip(1);
+    scan.azimuth_rad
+        .iter()
+        .zip(next)
+        .map(move |(a, b)| (sign * (f64::from(*b) - f64::from(*a))).rem_euclid(std::f64::consts::TAU))
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}

@@ -1,0 +1,79 @@
+//! The raster of a moving sensor shows the scene from the middle of the sweep.
+
+use super::scene::{Sensor, miss_cells, raster};
+use crate::raster::{RasterConfig, Sampling, Twist};
+use crate::scan::Sense;
+use nalgebra::Point2;
+use proptest::prelude::*;
+
+const SIGMA_M: f64 = 1.0;
+
+fn polar(range_m: f64, bearing_rad: f64) -> Point2<f64> {
+    Point2::new(range_m * bearing_rad.cos(), range_m * bearing_rad.sin())
+}
+
+/// Scatterers all around but for the seam, which a moving sensor sees twice or not at all.
+fn places() -> Vec<Point2<f64>> {
+    let ranges = [25.0, 60.0, 12.0, 80.0, 40.0, 70.0, 18.0];
+    let bearings = (1..8).map(|k| f64::from(k) * std::f64::consts::FRAC_PI_4);
+    ranges.into_iter().zip(bearings).map(|(range, bearing)| polar(range, bearing)).collect()
+}
+
+fn worst_miss(config: &RasterConfig, sensor: &Sensor, undo: Option<Twist>) -> f64 {
+    let places = places();
+    let raster = raster(config, &sensor.measure(&places, SIGMA_M), undo);
+    let misses = places.iter().map(|place| miss_cells(config, &raster, place, 4.0 * SIGMA_M));
+    misses.fold(0.0, f64::max)
+}
+
+#[test]
+fn scatterers_lie_where_they_are_at_mid_sweep_only_if_the_motion_is_undone() {
+    let twist = Twist { vx_mps: 15.0, vy_mps: -0.4, yaw_rate_radps: 0.5 };
+    for sense in [Sense::Clockwise, Sense::CounterClockwise] {
+        for sampling in [Sampling::Averaged, Sampling::Bilinear] {
+            let sensor = Sensor { twist, sense, ..Sensor::navtech() };
+            let config = RasterConfig { sampling, ..RasterConfig::default() };
+            let undone = worst_miss(&config, &sensor, Some(twist));
+            let left = worst_miss(&config, &sensor, None);
+            assert!(undone < 0.03, "{sense:?} {sampling:?}: {undone}");
+            assert!(left > 1.0, "{sense:?} {sampling:?}: {left}");
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+    #[test]
+    fn any_motion_of_a_vehicle_is_undone(
+        vx in -20.0..30.0f64, vy in -3.0..3.0f64, yaw_rate in -1.5..1.5f64, clockwise: bool,
+    ) {
+        let twist = Twist { vx_mps: vx, vy_mps: vy, yaw_rate_radps: yaw_rate };
+        let sense = if clockwise { Sense::Clockwise } else { Sense::CounterClockwise };
+        let sensor = Sensor { twist, sense, ..Sensor::navtech() };
+        let miss = worst_miss(&RasterConfig::default(), &sensor, Some(twist));
+        prop_assert!(miss < 0.06, "{miss}");
+    }
+}
+
+#[test]
+fn stamps_are_believed_where_they_come_in_bursts() {
+    let twist = Twist { vx_mps: 20.0, vy_mps: 0.0, yaw_rate_radps: 0.3 };
+    let mut sensor = Sensor { twist, ..Sensor::navtech() };
+    for (azimuth, time_s) in sensor.time_s.iter_mut().enumerate() {
+        *time_s = 0.25 * ((azimuth / 8 * 8) as f64 / 400.0 - 0.5) + 1e-5 * (azimuth % 8) as f64;
+    }
+    let miss = worst_miss(&RasterConfig::default(), &sensor, Some(twist));
+    assert!(miss < 0.1, "{miss}");
+}
+
+#[test]
+fn standing_still_changes_nothing() {
+    let sensor = Sensor::navtech();
+    let config = RasterConfig::default();
+    let scan = sensor.measure(&places(), SIGMA_M);
+    let plain = raster(&config, &scan, None);
+    let standing = raster(&config, &scan, Some(Twist::default()));
+    for (plain, standing) in plain.iter().zip(&standing) {
+        assert!((plain - standing).abs() < 0.05, "{plain} {standing}");
+    }
+}

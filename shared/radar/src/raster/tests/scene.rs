@@ -1,0 +1,121 @@
+//! Scans drawn exactly: what a sensor that may move measures of soft scatterers.
+
+use crate::raster::{RasterConfig, Rasteriser, Twist};
+use crate::scan::{OwnedScan, ScanLimits, Sense, SweepGeometry};
+use nalgebra::Point2;
+use std::f64::consts::TAU;
+
+/// Bytes before each row, so that rows do not start at byte 0.
+const METADATA: usize = 11;
+pub const STAMP_NS: i64 = 1_547_131_046_353_776_000;
+
+/// A sensor, and how it moves while it sweeps.
+#[derive(Clone, Debug)]
+pub struct Sensor {
+    pub azimuth_rad: Vec<f32>,
+    /// Seconds from the scan's stamp.
+    pub time_s: Vec<f64>,
+    pub bins: usize,
+    pub range_resolution_m: f32,
+    pub range_offset_m: f32,
+    pub sense: Sense,
+    pub twist: Twist,
+}
+
+impl Sensor {
+    /// 400 even azimuths in 0.25 s, the first one encoder step past straight ahead, 160 m.
+    pub fn navtech() -> Self {
+        let count = 400;
+        Self {
+            azimuth_rad: (0..count).map(|i| ((14 * i + 13) as f64 / 5600.0 * TAU) as f32).collect(),
+            time_s: (0..count).map(|i| 0.25 * ((f64::from(i) + 0.5) / f64::from(count) - 0.5)).collect(),
+            bins: 3650,
+            range_resolution_m: 0.0438,
+            range_offset_m: 0.0,
+            sense: Sense::Clockwise,
+            twist: Twist::default(),
+        }
+    }
+
+    /// An empty scan.
+    pub fn scan(&self) -> OwnedScan {
+        let azimuths = self.azimuth_rad.len();
+        let stride = METADATA + self.bins;
+        let mut scan = OwnedScan::with_limits(ScanLimits { bytes: azimuths * stride, azimuths });
+        scan.geometry = SweepGeometry {
+            azimuths,
+            bins: self.bins,
+            stride,
+            first_byte: METADATA,
+            range_resolution_m: self.range_resolution_m,
+            range_offset_m: self.range_offset_m,
+            sense: self.sense,
+            stamp_ns: STAMP_NS,
+        };
+        scan.azimuth_rad.copy_from_slice(&self.azimuth_rad);
+        let stamps = self.time_s.iter().map(|time_s| STAMP_NS + (time_s * 1e9).round() as i64);
+        scan.stamp_ns = stamps.collect();
+        scan
+    }
+
+    /// The scan of bells of height 200 and the given sigma about points of the frame at the scan's stamp.
+    pub fn measure(&self, scatterers: &[Point2<f64>], sigma_m: f64) -> OwnedScan {
+        let mut scan = self.scan();
+        let first_centre_m = 0.5 * f64::from(self.range_resolution_m) + f64::from(self.range_offset_m);
+        for (azimuth, row) in scan.bytes.chunks_exact_mut(METADATA + self.bins).enumerate() {
+            row[..METADATA].fill(255);
+            let seen_from = self.twist.pose_at(self.time_s[azimuth]).inverse();
+            let look = self.look(azimuth);
+            for scatterer in scatterers.iter().map(|scatterer| seen_from * scatterer) {
+                for (bin, power) in row[METADATA..].iter_mut().enumerate() {
+                    let range_m = first_centre_m + bin as f64 * f64::from(self.range_resolution_m);
+                    let distance_sq = (scatterer.coords - look * range_m).norm_squared();
+                    let bell = 200.0 * (-0.5 * distance_sq / (sigma_m * sigma_m)).exp();
+                    *power = power.saturating_add(bell.round() as u8);
+                }
+            }
+        }
+        scan
+    }
+
+    /// The direction of an azimuth, x forward and y left.
+    fn look(&self, azimuth: usize) -> nalgebra::Vector2<f64> {
+        let angle = f64::from(self.azimuth_rad[azimuth]);
+        match self.sense {
+            Sense::Clockwise => nalgebra::Vector2::new(angle.cos(), -angle.sin()),
+            Sense::CounterClockwise => nalgebra::Vector2::new(angle.cos(), angle.sin()),
+        }
+    }
+}
+
+/// The raster of a scan, no floor.
+pub fn raster(config: &RasterConfig, scan: &OwnedScan, twist: Option<Twist>) -> Vec<f32> {
+    let mut raster = vec![f32::NAN; config.n * config.n];
+    let mut rasteriser = Rasteriser::new(config).unwrap();
+    rasteriser.rasterise(&scan.view(), 0, twist, &mut raster).unwrap();
+    raster
+}
+
+/// A cell's centre, metres ahead and to the left.
+pub fn centre_m(config: &RasterConfig, row: usize, column: usize) -> Point2<f64> {
+    let middle = 0.5 * (config.n as f64 - 1.0);
+    let cell_m = f64::from(config.cell_m);
+    Point2::new((middle - row as f64) * cell_m, (middle - column as f64) * cell_m)
+}
+
+/// How many cells the raster's centroid within `reach_m` of `expected` lies from it. Infinite where the raster is dark
+/// there.
+pub fn miss_cells(config: &RasterConfig, raster: &[f32], expected: &Point2<f64>, reach_m: f64) -> f64 {
+    let (mut sum, mut moment) = (0.0, nalgebra::Vector2::zeros());
+    for (cell, &power) in raster.iter().enumerate() {
+        let offset = centre_m(config, cell / config.n, cell % config.n) - expected;
+        if offset.norm() <= reach_m {
+            sum += f64::from(power);
+            moment += offset * f64::from(power);
+        }
+    }
+    if sum < 200.0 {
+        return f64::INFINITY;
+    }
+    (moment / sum).norm() / f64::from(config.cell_m)
+}

@@ -1,0 +1,84 @@
+//! Poses along a drive, in the plane.
+
+use nalgebra::{Isometry2, Vector2};
+
+/// Poses of the sensor, REP-103 (x forward, y left, yaw counter-clockwise; m, rad), in a world frame that its source chose.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Trajectory {
+    /// Time of each pose, ns (since 1970 in recordings), never decreasing; `None` where the source knows no times.
+    pub stamp_ns: Option<Vec<i64>>,
+    /// The sensor in the world: as many as stamps.
+    pub poses: Vec<Isometry2<f64>>,
+}
+
+impl Trajectory {
+    /// Poses.
+    pub fn len(&self) -> usize {
+        self.poses.len()
+    }
+
+    /// Whether there is no pose.
+    pub fn is_empty(&self) -> bool {
+        self.poses.is_empty()
+    }
+
+    /// Sum of the steps between poses, m.
+    pub fn path_length_m(&self) -> f64 {
+        self.poses.windows(2).map(|w| (w[1].translation.vector - w[0].translation.vector).norm()).sum()
+    }
+
+    /// Whether the poses have headings, rather than one filled-in value for all.
+    pub fn has_heading(&self) -> bool {
+        self.poses.windows(2).any(|w| w[0].rotation != w[1].rotation)
+    }
+
+    /// First and last time, ns.
+    pub fn span_ns(&self) -> Option<(i64, i64)> {
+        let stamps = self.stamp_ns.as_ref()?;
+        Some((*stamps.first()?, *stamps.last()?))
+    }
+
+    /// The pose at a time: on the straight line between its neighbours, the angle likewise. `None` outside the span.
+    pub fn at(&self, stamp_ns: i64) -> Option<Isometry2<f64>> {
+        let stamps = self.stamp_ns.as_ref()?;
+        let after = stamps.partition_point(|s| *s < stamp_ns);
+        let (b, to) = (self.poses.get(after)?, *stamps.get(after)?);
+        if to == stamp_ns {
+            return Some(*b);
+        }
+        let (a, from) = (self.poses.get(after.checked_sub(1)?)?, stamps[after - 1]);
+        let share = (stamp_ns - from) as f64 / (to - from) as f64;
+        let position = a.translation.vector.lerp(&b.translation.vector, share);
+        Some(Isometry2::new(position, a.rotation.angle() + share * (b.rotation * a.rotation.inverse()).angle()))
+    }
+}
+
+/// A pose in the plane from the first two rows of a row-major 3 x 4 matrix; the heading is that of the x axis.
+pub(crate) fn planar(matrix: &[f64; 12]) -> Isometry2<f64> {
+    Isometry2::new(Vector2::new(matrix[3], matrix[7]), matrix[4].atan2(matrix[0]))
+}
+
+/// The same pose with y and yaw the other way round: from y right and clockwise to REP-103, in both frames.
+pub(crate) fn mirrored(pose: Isometry2<f64>) -> Isometry2<f64> {
+    Isometry2::new(Vector2::new(pose.translation.x, -pose.translation.y), -pose.rotation.angle())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn between_poses_the_angle_takes_the_short_way() {
+        let pose = |x: f64, yaw: f64| Isometry2::new(Vector2::new(x, 0.0), yaw);
+        let trajectory =
+            Trajectory { stamp_ns: Some(vec![0, 100]), poses: vec![pose(0.0, PI - 0.1), pose(2.0, -PI + 0.1)] };
+        let middle = trajectory.at(50).unwrap();
+        assert!((middle.translation.x - 1.0).abs() < 1e-12);
+        assert!((middle.rotation.angle().abs() - PI).abs() < 1e-9, "{}", middle.rotation.angle());
+        assert_eq!(trajectory.at(100).unwrap(), trajectory.poses[1]);
+        assert_eq!(trajectory.at(0).unwrap(), trajectory.poses[0]);
+        assert!(trajectory.at(101).is_none() && trajectory.at(-1).is_none());
+    }
+}

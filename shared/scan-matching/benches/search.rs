@@ -1,0 +1,150 @@
+//! Times of the search on this machine, one thread, medians: the transforms that no search of this form avoids, each
+//! step, and the whole beside the peer in PyTorch.
+//!
+//! `cargo bench -p gyre-scan-matching`; with `GYRE_PEER_PYTHON` (an interpreter with torch) and `GYRE_PEER` (the path
+//! of `fmbym_torch.py`) set, the peer runs between two passes of ours and the ratios are printed.
+#![allow(clippy::unwrap_used)]
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+
+use std::hint::black_box;
+use std::process::Command;
+use std::time::Instant;
+
+use common::{Motion, pair};
+use gyre_scan_matching::{RotationConfig, RotationSearch, TranslationConfig, TranslationSearch, fast_size};
+use realfft::RealFftPlanner;
+use rustfft::FftPlanner;
+use rustfft::num_complex::Complex32;
+
+const SIZES: [usize; 3] = [127, 255, 511];
+const REACH_M: f64 = 12.0;
+const PASSES: usize = 101;
+const BURN_IN: usize = 10;
+
+fn main() {
+    let peer = [("GYRE_PEER_PYTHON"), ("GYRE_PEER")].map(std::env::var);
+    floor();
+    let ours = steps();
+    if let [Ok(python), Ok(script)] = peer {
+        beside_peer(&python, &script, &ours);
+    } else {
+        println!("\npeer: skipped, GYRE_PEER_PYTHON and GYRE_PEER are not set");
+    }
+}
+
+/// Median of many passes, ms.
+fn median_ms(mut work: impl FnMut()) -> f64 {
+    (0..BURN_IN).for_each(|_| work());
+    let mut times: Vec<f64> = (0..PASSES)
+        .map(|_| {
+            let start = Instant::now();
+            work();
+            start.elapsed().as_secs_f64() * 1e3
+        })
+        .collect();
+    times.sort_by(f64::total_cmp);
+    times[PASSES / 2]
+}
+
+/// `count` complex transforms of `size`.
+fn complex_ms(size: usize, count: usize) -> f64 {
+    let fft = FftPlanner::<f32>::new().plan_fft_forward(size);
+    let data: Vec<Complex32> = (0..size).map(|k| Complex32::new(k as f32, 1.0)).collect();
+    let mut work = data.clone();
+    let mut scratch = vec![Complex32::default(); fft.get_inplace_scratch_len()];
+    median_ms(|| {
+        for _ in 0..count {
+            work.copy_from_slice(&data);
+            fft.process_with_scratch(black_box(&mut work), &mut scratch);
+        }
+    })
+}
+
+/// `count` real transforms of `size`.
+fn real_ms(size: usize, count: usize) -> f64 {
+    let fft = RealFftPlanner::<f32>::new().plan_fft_forward(size);
+    let (mut work, mut out, mut scratch) = (fft.make_input_vec(), fft.make_output_vec(), fft.make_scratch_vec());
+    median_ms(|| {
+        for _ in 0..count {
+            work.fill(1.0);
+            fft.process_with_scratch(black_box(&mut work), &mut out, &mut scratch).unwrap();
+        }
+    })
+}
+
+/// The bare one-dimensional transforms that each size needs, without a transpose, a copy or a lookup between them.
+fn floor() {
+    println!(
+        "floor: transforms alone, ms\n{:>5} {:>11} {:>9} {:>13} {:>9} {:>9}",
+        "n", "2-D, scan", "rings", "2-D, pair", "inverse", "sum"
+    );
+    let config = RotationConfig::default();
+    for n in SIZES {
+        let (size, cells) = (fast_size(n), cell_m(n));
+        let radii = ((config.band_high - config.band_low) * n as f64).ceil() as usize;
+        let reach = (REACH_M / cells) as usize + 3;
+        let padded = fast_size(n + reach);
+        let scan = real_ms(size, n) + complex_ms(size, (config.band_high * size as f64) as usize + 2);
+        let rings = real_ms(config.angles, radii);
+        let both = complex_ms(padded, n + padded);
+        let back = complex_ms(padded, padded / 2 + 1) + real_ms(padded, 2 * reach + 1);
+        println!("{n:5} {scan:11.3} {rings:9.3} {both:13.3} {back:9.3} {:9.3}", scan + rings + both + back);
+    }
+}
+
+/// The same area at every size: 102 m a side, the paper's 0.4 m at 255.
+fn cell_m(n: usize) -> f64 {
+    0.4 * 255.0 / n as f64
+}
+
+/// Times of each step; returns the totals.
+fn steps() -> [f64; 3] {
+    println!("\nsearch: reach 20 deg and {REACH_M} m, earlier spectrum kept, ms");
+    println!("{:>5} {:>7} {:>9} {:>9} {:>12} {:>9}", "n", "cell", "spectrum", "angle", "translation", "total");
+    SIZES.map(|n| {
+        let (cell, motion) = (cell_m(n), Motion::degrees(2.5, 0.1, 3.0));
+        let (earlier, later) = pair(n, cell, motion, 1);
+        let mut rotation = RotationSearch::new(n, &RotationConfig::default()).unwrap();
+        let config = TranslationConfig { reach_m: REACH_M, ..TranslationConfig::default() };
+        let mut translation = TranslationSearch::new(n, cell, &config).unwrap();
+        let (mut f, mut g) = (rotation.new_spectrum(), rotation.new_spectrum());
+        rotation.spectrum(&earlier, &mut g).unwrap();
+        let spectrum = median_ms(|| rotation.spectrum(black_box(&later), &mut f).unwrap());
+        let angle = median_ms(|| _ = black_box(rotation.search(&f, &g).unwrap()));
+        let estimate = rotation.search(&f, &g).unwrap();
+        let shift = median_ms(|| _ = black_box(translation.search(&later, &earlier, &estimate).unwrap()));
+        let total = median_ms(|| {
+            rotation.spectrum(black_box(&later), &mut f).unwrap();
+            let estimate = rotation.search(&f, &g).unwrap();
+            black_box(translation.search(&later, &earlier, &estimate).unwrap());
+        });
+        println!("{n:5} {cell:7.3} {spectrum:9.3} {angle:9.3} {shift:12.3} {total:9.3}");
+        total
+    })
+}
+
+/// Runs the peer's searches and prints how many times longer they take.
+fn beside_peer(python: &str, script: &str, ours: &[f64; 3]) {
+    let output = Command::new(python)
+        .args([script, "--only", "f-raw,f-raw-eq7", "--sizes", "127,255,511", "--threads", "1"])
+        .output();
+    let text = match output {
+        Ok(done) if done.status.success() => String::from_utf8_lossy(&done.stdout).into_owned(),
+        Ok(done) => return println!("\npeer failed: {}", String::from_utf8_lossy(&done.stderr)),
+        Err(error) => return println!("\npeer could not be started: {error}"),
+    };
+    println!(
+        "\npeer (PyTorch, one thread, median), ours and the ratio\n{:>5} {:>12} {:>9} {:>9} {:>7}",
+        "n", "row", "peer ms", "ours ms", "ratio"
+    );
+    for line in text.lines() {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let [n, row, "median", peer, ..] = words.as_slice() else { continue };
+        let (Ok(n), Ok(peer)) = (n.parse::<usize>(), peer.parse::<f64>()) else { continue };
+        if let Some(ours) = SIZES.iter().position(|&size| size == n).map(|k| ours[k]) {
+            println!("{n:5} {row:>12} {peer:9.2} {ours:9.3} {:7.1}", peer / ours);
+        }
+    }
+}

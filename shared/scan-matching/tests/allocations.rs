@@ -1,0 +1,49 @@
+//! After construction the searches allocate nothing.
+#![allow(clippy::unwrap_used, unsafe_code)]
+
+mod common;
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+use common::{Motion, pair};
+use gyre_scan_matching::{RotationConfig, RotationSearch, TranslationConfig, TranslationSearch};
+
+thread_local! {
+    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+// SAFETY: hands every call on to the system's allocator.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.with(|count| count.set(count.get() + 1));
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+#[test]
+fn searches_allocate_nothing_after_construction() {
+    let (n, cell_m) = (127, 0.8);
+    let (earlier, later) = pair(n, cell_m, Motion::degrees(2.0, 1.0, 5.0), 1);
+    for phase_only in [false, true] {
+        let mut rotation = RotationSearch::new(n, &RotationConfig { phase_only, ..RotationConfig::default() }).unwrap();
+        let config = TranslationConfig { phase_only, half_turn: true, ..TranslationConfig::default() };
+        let mut translation = TranslationSearch::new(n, cell_m, &config).unwrap();
+        let (mut f, mut g) = (rotation.new_spectrum(), rotation.new_spectrum());
+        let before = ALLOCATIONS.with(Cell::get);
+        rotation.spectrum(&earlier, &mut g).unwrap();
+        rotation.spectrum(&later, &mut f).unwrap();
+        let angle = rotation.search(&f, &g).unwrap();
+        translation.search(&later, &earlier, &angle).unwrap();
+        assert_eq!(ALLOCATIONS.with(Cell::get), before, "phase_only {phase_only}");
+    }
+}

@@ -1,0 +1,99 @@
+//! Generated scenes: blurred scatterers whose places are known before and after a motion.
+#![allow(dead_code)]
+
+use gyre_scan_matching::{
+    MotionEstimate, RotationConfig, RotationEstimate, RotationSearch, TranslationConfig, TranslationSearch,
+};
+
+/// Pose of the later scan's frame in the earlier scan's frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motion {
+    pub x: f64,
+    pub y: f64,
+    pub yaw: f64,
+}
+
+impl Motion {
+    pub fn degrees(x: f64, y: f64, yaw_deg: f64) -> Self {
+        Self { x, y, yaw: yaw_deg.to_radians() }
+    }
+
+    /// A point of the earlier frame, seen from the later one: x = R^T (x' - t), Eq. 1 the other way round.
+    pub fn seen_from_later(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let ((s, c), dx, dy) = (self.yaw.sin_cos(), x - self.x, y - self.y);
+        [c * dx + s * dy, -s * dx + c * dy]
+    }
+}
+
+/// A small generator of repeatable numbers in 0..1 (splitmix64).
+pub struct Numbers(pub u64);
+
+impl Numbers {
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    pub fn within(&mut self, limit: f64) -> f64 {
+        limit * (2.0 * self.next() - 1.0)
+    }
+}
+
+/// Places (m) and strengths of scatterers within `radius_m` of the earlier sensor.
+pub fn scatterers(count: usize, radius_m: f64, seed: u64) -> Vec<([f64; 2], f64)> {
+    let mut numbers = Numbers(seed);
+    let mut place = || loop {
+        let p = [numbers.within(radius_m), numbers.within(radius_m)];
+        if p[0].hypot(p[1]) < radius_m {
+            return (p, 0.3 + numbers.next());
+        }
+    };
+    (0..count).map(|_| place()).collect()
+}
+
+/// Draws scatterers as Gaussians of `blur` cells, row 0 far ahead, column 0 far left.
+pub fn draw(points: impl Iterator<Item = ([f64; 2], f64)>, n: usize, cell_m: f64, blur: f64) -> Vec<f32> {
+    let mut raster = vec![0.0; n * n];
+    let (middle, reach) = ((n - 1) as f64 / 2.0, (5.0 * blur).ceil() as isize);
+    for ([x, y], strength) in points {
+        let (row, col) = (middle - x / cell_m, middle - y / cell_m);
+        for i in row.round() as isize - reach..=row.round() as isize + reach {
+            for j in col.round() as isize - reach..=col.round() as isize + reach {
+                if (0..n as isize).contains(&i) && (0..n as isize).contains(&j) {
+                    let r2 = (i as f64 - row).powi(2) + (j as f64 - col).powi(2);
+                    raster[i as usize * n + j as usize] += (strength * (-0.5 * r2 / blur.powi(2)).exp()) as f32;
+                }
+            }
+        }
+    }
+    raster
+}
+
+/// The earlier and the later raster of a scene with 150 scatterers, around the sensor and beyond the raster's edge.
+pub fn pair(n: usize, cell_m: f64, motion: Motion, seed: u64) -> (Vec<f32>, Vec<f32>) {
+    let scene = scatterers(150, 0.75 * n as f64 * cell_m, seed);
+    let earlier = draw(scene.iter().copied(), n, cell_m, 1.2);
+    let later = draw(scene.iter().map(|&(p, s)| (motion.seen_from_later(p), s)), n, cell_m, 1.2);
+    (earlier, later)
+}
+
+/// Both searches over one pair.
+pub fn search(
+    n: usize,
+    cell_m: f64,
+    configs: &(RotationConfig, TranslationConfig),
+    earlier: &[f32],
+    later: &[f32],
+) -> (RotationEstimate, MotionEstimate) {
+    let mut rotation = RotationSearch::new(n, &configs.0).unwrap();
+    let mut translation = TranslationSearch::new(n, cell_m, &configs.1).unwrap();
+    let (mut f, mut g) = (rotation.new_spectrum(), rotation.new_spectrum());
+    rotation.spectrum(earlier, &mut g).unwrap();
+    rotation.spectrum(later, &mut f).unwrap();
+    let angle = rotation.search(&f, &g).unwrap();
+    let motion = translation.search(later, earlier, &angle).unwrap();
+    (angle, motion)
+}

@@ -1,0 +1,185 @@
+//! A generated dataset: repeatable, in Oxford's conventions, and readable by the reader for real data.
+#![allow(clippy::unwrap_used)]
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use gyre_radar::{DatasetOptions, Format, OwnedScan};
+use gyre_simulator::sensor::{AZIMUTHS, METADATA_BYTES, STRIDE};
+use gyre_simulator::{SimulationConfig, Simulator, SimulatorError, write_dataset};
+use nalgebra::{Isometry2, Vector2};
+
+fn config(scans: usize) -> SimulationConfig {
+    SimulationConfig { scans, ..SimulationConfig::default() }
+}
+
+fn generate(config: &SimulationConfig) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    write_dataset(config, folder.path(), &mut |_, _| {}).unwrap();
+    folder
+}
+
+fn all_files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if path.is_dir() {
+            files.extend(all_files(&path).into_iter().map(|(below, bytes)| (format!("{name}/{below}"), bytes)));
+        } else {
+            files.insert(name, fs::read(&path).unwrap());
+        }
+    }
+    files
+}
+
+#[test]
+fn same_configuration_writes_the_same_bytes() {
+    let (first, second) = (generate(&config(4)), generate(&config(4)));
+    assert_eq!(all_files(first.path()), all_files(second.path()));
+    assert_eq!(all_files(first.path()).len(), 4 + 2);
+}
+
+#[test]
+fn another_seed_measures_another_town() {
+    let simulator = |seed| Simulator::new(&SimulationConfig { seed, ..config(1) }).unwrap();
+    assert_ne!(simulator(1).render_scan(0).scan.bytes, simulator(2).render_scan(0).scan.bytes);
+}
+
+#[test]
+fn scan_does_not_depend_on_the_scans_rendered_before_it() {
+    let simulator = Simulator::new(&config(3)).unwrap();
+    let alone = simulator.render_scan(2).scan.bytes;
+    let mut sensor = simulator.sensor();
+    let mut scan = gyre_simulator::simulator::empty_scan();
+    for index in 0..3 {
+        simulator.render_into(index, &mut sensor, &mut scan);
+    }
+    assert_eq!(scan.bytes, alone);
+}
+
+#[test]
+fn progress_counts_every_scan_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut seen = Vec::new();
+    let summary = write_dataset(&config(3), folder.path(), &mut |done, total| seen.push((done, total))).unwrap();
+    assert_eq!(seen, [(1, 3), (2, 3), (3, 3)]);
+    assert_eq!(summary.scans, 3);
+    assert!((summary.duration_s - 0.5).abs() < 1e-9 && summary.path_m > 2.0, "{summary:?}");
+}
+
+#[test]
+fn stamps_and_encoder_grow_evenly_through_scan_and_dataset() {
+    let simulator = Simulator::new(&config(2)).unwrap();
+    let mut last_stamp = i64::MIN;
+    for index in 0..2 {
+        let scan = simulator.render_scan(index).scan;
+        for azimuth in 0..AZIMUTHS {
+            let row = &scan.bytes[azimuth * STRIDE..][..METADATA_BYTES];
+            let stamp = i64::from_le_bytes(row[..8].try_into().unwrap());
+            let encoder = u16::from_le_bytes([row[8], row[9]]);
+            assert!(stamp > last_stamp);
+            assert_eq!(usize::from(encoder), 13 + 14 * azimuth);
+            assert_eq!(row[10], 255);
+            assert_eq!(scan.stamp_ns[azimuth], stamp * 1000);
+            last_stamp = stamp;
+        }
+    }
+}
+
+#[test]
+fn reader_for_real_data_reads_what_was_rendered() {
+    let folder = generate(&config(2));
+    let simulator = Simulator::new(&config(2)).unwrap();
+    let mut dataset = gyre_radar::open(folder.path(), &DatasetOptions::default()).unwrap();
+    assert_eq!((dataset.format(), dataset.len()), (Format::Oxford, 2));
+    for index in 0..2 {
+        let mut read = OwnedScan::with_limits(dataset.limits());
+        read.geometry = dataset.read(index, read.slot()).unwrap();
+        let rendered = simulator.render_scan(index).scan;
+        let (read, rendered) = (read.view(), rendered.view());
+        assert_eq!(read.geometry.stamp_ns / 1000, rendered.geometry.stamp_ns / 1000);
+        assert_eq!(read.geometry.range_resolution_m, rendered.geometry.range_resolution_m);
+        for azimuth in 0..AZIMUTHS {
+            assert_eq!(read.row(azimuth), rendered.row(azimuth));
+            assert!((read.azimuth_rad[azimuth] - rendered.azimuth_rad[azimuth]).abs() < 1e-5);
+            // The reader spreads stamps along the sweep, which ours are already, to the microsecond.
+            assert!((read.stamp_ns[azimuth] - rendered.stamp_ns[azimuth]).abs() < 2_000);
+        }
+    }
+}
+
+/// One row of `gt/radar_odometry.csv`.
+struct Row {
+    stamps: [i64; 2],
+    images: [i64; 2],
+    motion: Isometry2<f64>,
+}
+
+fn rows(folder: &Path) -> Vec<Row> {
+    let text = fs::read_to_string(folder.join("gt/radar_odometry.csv")).unwrap();
+    let mut lines = text.lines();
+    assert_eq!(
+        lines.next().unwrap(),
+        "source_timestamp,destination_timestamp,x,y,z,roll,pitch,yaw,source_radar_timestamp,destination_radar_timestamp"
+    );
+    let row = |line: &str| {
+        let fields: Vec<&str> = line.split(',').collect();
+        let whole = |i: usize| fields[i].parse::<i64>().unwrap();
+        let real = |i: usize| fields[i].parse::<f64>().unwrap();
+        // From y right, yaw clockwise to y left, yaw counter-clockwise.
+        let motion = Isometry2::new(Vector2::new(real(2), -real(3)), -real(7));
+        Row { stamps: [whole(0), whole(1)], images: [whole(8), whole(9)], motion }
+    };
+    lines.map(row).collect()
+}
+
+#[test]
+fn chain_of_csv_motions_equals_the_poses_of_the_path() {
+    let folder = generate(&config(12));
+    let simulator = Simulator::new(&config(12)).unwrap();
+    let mut pose = simulator.pose(0);
+    let rows = rows(folder.path());
+    assert_eq!(rows.len(), 11);
+    for (index, row) in rows.iter().enumerate() {
+        pose *= row.motion;
+        let error = pose.inverse() * simulator.pose(index + 1);
+        assert!(error.translation.vector.norm() < 1e-6 && error.rotation.angle().abs() < 1e-7, "row {index}: {error}");
+        assert!(row.motion.translation.x > 0.0, "forward is positive");
+    }
+    let turn = pose.rotation.angle() - simulator.pose(0).rotation.angle();
+    assert!(turn > 0.5, "the loop turns left: {turn} rad");
+}
+
+#[test]
+fn csv_names_images_by_sweep_start_and_motions_by_sweep_middle() {
+    let folder = generate(&config(3));
+    let listed = fs::read_to_string(folder.path().join("radar.timestamps")).unwrap();
+    let names: Vec<i64> = listed.lines().map(|line| line.strip_suffix(" 1").unwrap().parse().unwrap()).collect();
+    for (index, row) in rows(folder.path()).iter().enumerate() {
+        assert_eq!(row.images, [names[index + 1], names[index]], "source is the newer scan");
+        for (stamp, image) in row.stamps.iter().zip(row.images) {
+            let half_sweep_us = 250_000 * 399 / 400 / 2;
+            assert_eq!(stamp - image, half_sweep_us);
+            assert!(folder.path().join(format!("radar/{image}.png")).exists());
+        }
+    }
+}
+
+#[test]
+fn folder_with_scans_of_another_drive_is_refused() {
+    let folder = generate(&config(3));
+    let refused = write_dataset(&config(2), folder.path(), &mut |_, _| {});
+    assert!(matches!(refused, Err(SimulatorError::OutputInUse { .. })), "{refused:?}");
+    write_dataset(&config(3), folder.path(), &mut |_, _| {}).expect("the same drive again");
+}
+
+#[test]
+fn impossible_configuration_names_its_key() {
+    let refused = |config: SimulationConfig| Simulator::new(&config).unwrap_err().to_string();
+    assert!(refused(config(0)).contains("`scans`"));
+    assert!(refused(SimulationConfig { speed_m_s: f64::NAN, ..config(1) }).contains("`speed_m_s`"));
+    let unknown = toml::from_str::<SimulationConfig>("scanz = 3").unwrap_err().to_string();
+    assert!(unknown.contains("scanz"), "{unknown}");
+}

@@ -1,0 +1,159 @@
+//! What a sweep sees of known scenes: where a point comes out, what a wall hides, how powers are distributed.
+#![allow(clippy::unwrap_used)]
+
+use std::f64::consts::TAU;
+
+use gyre_radar::{DatasetOptions, OwnedScan};
+use gyre_simulator::sensor::{AZIMUTHS, BINS, METADATA_BYTES, RANGE_RESOLUTION_M, STRIDE, azimuth_rad};
+use gyre_simulator::simulator::empty_scan;
+use gyre_simulator::world::{Aspect, NO_BODY, Scatterer, Wall};
+use gyre_simulator::{Body, ConstantTwist, Sensor, SimulationConfig, Simulator, SweepTime, Trajectory, World};
+use nalgebra::Point2;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+/// Ringing fills the first bins; no point is put there.
+const FIRST_FREE_BIN: usize = 80;
+
+fn point(x: f64, y: f64) -> Scatterer {
+    Scatterer { position: Point2::new(x, y), cross_section_m2: 30.0, aspect: Aspect::AllRound, body: NO_BODY }
+}
+
+fn sweep(content: Body, trajectory: &dyn Trajectory, doppler_shift_s: f64) -> OwnedScan {
+    let time = SweepTime { start_us: 1_500_000_000_000_000, period_us: 250_000, epoch_us: 1_500_000_000_000_000 };
+    let mut scan = empty_scan();
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let mut sensor = Sensor::new(doppler_shift_s);
+    scan.geometry =
+        sensor.sweep(&World::new(content), &|_| Body::default(), trajectory, time, &mut rng, &mut scan.slot());
+    scan
+}
+
+fn row(scan: &OwnedScan, azimuth: usize) -> &[u8] {
+    &scan.bytes[azimuth * STRIDE + METADATA_BYTES..(azimuth + 1) * STRIDE]
+}
+
+/// Azimuth and bin of the strongest power, each the middle of the plateau that rounding leaves.
+fn brightest(scan: &OwnedScan) -> (usize, f64, u8) {
+    let best = |azimuth: usize| row(scan, azimuth)[FIRST_FREE_BIN..].iter().copied().max().unwrap_or(0);
+    let azimuth = (0..AZIMUTHS).max_by_key(|&azimuth| best(azimuth)).unwrap();
+    let top = best(azimuth);
+    let bins: Vec<usize> = (FIRST_FREE_BIN..BINS).filter(|&bin| row(scan, azimuth)[bin] == top).collect();
+    (azimuth, bins.iter().sum::<usize>() as f64 / bins.len() as f64, top)
+}
+
+/// The azimuth that points best at a world point when it is measured, and the range from there.
+fn expected(trajectory: &dyn Trajectory, target: Point2<f64>) -> (usize, f64) {
+    let seen = |azimuth: usize| {
+        let time_s = (250_000 * azimuth as i64 / AZIMUTHS as i64) as f64 * 1e-6;
+        let local = trajectory.pose(time_s).inverse_transform_point(&target);
+        let off = (-local.y).atan2(local.x) - azimuth_rad(azimuth);
+        (off - TAU * (off / TAU).round(), local.coords.norm())
+    };
+    let azimuth = (0..AZIMUTHS).min_by(|&a, &b| seen(a).0.abs().total_cmp(&seen(b).0.abs())).unwrap();
+    (azimuth, seen(azimuth).1)
+}
+
+/// None of the points lies near the sweep's seam ahead: a vehicle that turns meets those twice, or never.
+#[test]
+fn point_comes_out_where_the_moving_sensor_met_it() {
+    let motions = [
+        ConstantTwist::default(),
+        ConstantTwist { forward_m_s: 12.0, left_m_s: 0.0, yaw_rad_s: 0.0 },
+        ConstantTwist { forward_m_s: 9.0, left_m_s: 0.5, yaw_rad_s: -0.9 },
+    ];
+    for motion in motions {
+        for (x, y) in [(20.0, 10.0), (15.0, -25.0), (-30.0, 4.0), (-12.0, -9.0), (60.0, -20.0), (3.0, 90.0)] {
+            let scan = sweep(Body { scatterers: vec![point(x, y)], walls: vec![] }, &motion, 0.0);
+            let (azimuth, bin, _) = brightest(&scan);
+            let (wanted, range_m) = expected(&motion, Point2::new(x, y));
+            let apart = (azimuth as i64 - wanted as i64).rem_euclid(AZIMUTHS as i64);
+            assert!(apart <= 1 || apart == AZIMUTHS as i64 - 1, "({x}, {y}) {motion:?}: {azimuth} for {wanted}");
+            let error_m = (bin + 0.5) * RANGE_RESOLUTION_M - range_m;
+            assert!(error_m.abs() < 0.07, "({x}, {y}) {motion:?}: {error_m} m off {range_m} m");
+        }
+    }
+}
+
+#[test]
+fn point_to_the_right_lies_at_a_quarter_turn() {
+    let scan = sweep(Body { scatterers: vec![point(0.0, -20.0)], walls: vec![] }, &ConstantTwist::default(), 0.0);
+    let (azimuth, _, _) = brightest(&scan);
+    assert!((99..=100).contains(&azimuth), "clockwise from ahead: {azimuth}");
+}
+
+#[test]
+fn closing_speed_lengthens_the_range_ahead_and_shortens_it_behind() {
+    let motion = ConstantTwist { forward_m_s: 10.0, left_m_s: 0.0, yaw_rad_s: 0.0 };
+    for (x, sign) in [(30.0, 1.0), (-30.0, -1.0)] {
+        let at =
+            |shift: f64| brightest(&sweep(Body { scatterers: vec![point(x, 6.0)], walls: vec![] }, &motion, shift)).1;
+        let moved_m = (at(0.049) - at(0.0)) * RANGE_RESOLUTION_M;
+        assert!((moved_m - sign * 0.48).abs() < 0.06, "{x}: {moved_m} m");
+    }
+}
+
+#[test]
+fn wall_hides_a_part_of_what_is_behind_it_and_nothing_before_it() {
+    let wall = |x: f64| Wall { from: Point2::new(x, -5.0), to: Point2::new(x, 5.0), transmission: 0.01, body: 1 };
+    let power = |walls: Vec<Wall>| {
+        brightest(&sweep(Body { scatterers: vec![point(30.0, 0.0)], walls }, &ConstantTwist::default(), 0.0)).2
+    };
+    let open = i32::from(power(vec![]));
+    let hidden = open - i32::from(power(vec![wall(20.0)]));
+    // 20 dB in steps of half a decibel, and the noise that rides on it.
+    assert!((36..=44).contains(&hidden), "{hidden} counts");
+    assert!((open - i32::from(power(vec![wall(40.0)]))).abs() <= 2);
+}
+
+#[test]
+fn empty_world_holds_noise_and_ringing_alone() {
+    let scan = sweep(Body::default(), &ConstantTwist::default(), 0.0);
+    let far = (0..AZIMUTHS).flat_map(|azimuth| &row(&scan, azimuth)[2500..]).map(|&power| f64::from(power));
+    let mean = far.clone().sum::<f64>() / far.clone().count() as f64;
+    assert!((3.0..8.0).contains(&mean), "mean {mean}");
+    assert!(far.fold(0.0, f64::max) < 40.0);
+    let ringing = row(&scan, 0)[..30].iter().map(|&power| f64::from(power)).sum::<f64>() / 30.0;
+    assert!(ringing > 25.0, "{ringing}");
+}
+
+/// Mean power, and the share of bins above 60.
+fn statistics(scans: &[OwnedScan]) -> (f64, f64) {
+    let powers = || scans.iter().flat_map(|scan| (0..scan.geometry.azimuths).flat_map(|a| scan.view().row(a)));
+    let count = powers().count() as f64;
+    let mean = powers().map(|&power| f64::from(power)).sum::<f64>() / count;
+    (mean, powers().filter(|&&power| power > 60).count() as f64 / count)
+}
+
+fn simulated() -> Vec<OwnedScan> {
+    let simulator = Simulator::new(&SimulationConfig::default()).unwrap();
+    [0, 20, 40].map(|index| simulator.render_scan(index).scan).to_vec()
+}
+
+#[test]
+fn powers_are_distributed_as_in_a_town() {
+    let (mean, bright) = statistics(&simulated());
+    assert!((6.0..22.0).contains(&mean), "mean {mean}");
+    assert!((0.008..0.045).contains(&bright), "share above 60: {bright}");
+}
+
+#[test]
+fn powers_resemble_real_oxford_scans() {
+    let Some(data) = std::env::var_os("GYRE_DATA") else {
+        println!("skipped: GYRE_DATA is not set");
+        return;
+    };
+    let folder = std::path::Path::new(&data).join("oxford-2019-01-10-14-36-48");
+    let mut dataset = gyre_radar::open(&folder, &DatasetOptions::default()).unwrap();
+    let real: Vec<OwnedScan> = (0..3)
+        .map(|index| {
+            let mut scan = OwnedScan::with_limits(dataset.limits());
+            scan.geometry = dataset.read(index, scan.slot()).unwrap();
+            scan
+        })
+        .collect();
+    let (real, ours) = (statistics(&real), statistics(&simulated()));
+    println!("mean power and share above 60: real {real:?}, simulated {ours:?}");
+    assert!((0.5..2.0).contains(&(ours.0 / real.0)), "means {ours:?} and {real:?}");
+    assert!((0.5..2.0).contains(&(ours.1 / real.1)), "shares above 60 {ours:?} and {real:?}");
+}
