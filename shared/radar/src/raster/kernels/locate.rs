@@ -7,7 +7,8 @@ use super::window::UNIT;
 use multiversion::multiversion;
 use std::array::from_fn;
 
-/// From a cell's bearing to the time, to the place, to the bearing there: the second step moves it by millimetres.
+/// From a cell's bearing to the time, to the place, to the bearing there. After the second step a cell 12 m away is
+/// centimetres off at 30 m/s, and others less.
 const FIXED_POINT_STEPS: usize = 2;
 
 /// What cells are looked up in.

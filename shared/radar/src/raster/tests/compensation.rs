@@ -42,16 +42,18 @@ fn scatterers_lie_where_they_are_at_mid_sweep_only_if_the_motion_is_undone() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(16))]
+    #![proptest_config(ProptestConfig::with_cases(200))]
     #[test]
     fn any_motion_of_a_vehicle_is_undone(
-        vx in -20.0..30.0f64, vy in -3.0..3.0f64, yaw_rate in -1.5..1.5f64, clockwise: bool,
+        vx in -20.0..30.0f64, vy in -3.0..3.0f64, yaw_rate in -1.0..1.0f64, clockwise: bool,
     ) {
-        let twist = Twist { vx_mps: vx, vy_mps: vy, yaw_rate_radps: yaw_rate };
+        // Tyres hold some 8 m/s^2 sideways.
+        let yaw_rate_radps = yaw_rate * (8.0 / vx.abs()).min(1.0);
+        let twist = Twist { vx_mps: vx, vy_mps: vy, yaw_rate_radps };
         let sense = if clockwise { Sense::Clockwise } else { Sense::CounterClockwise };
         let sensor = Sensor { twist, sense, ..Sensor::navtech() };
         let miss = worst_miss(&RasterConfig::default(), &sensor, Some(twist));
-        prop_assert!(miss < 0.06, "{miss}");
+        prop_assert!(miss < 0.05, "{miss}");
     }
 }
 
