@@ -176,13 +176,22 @@ impl Configuration {
         self.translation.validate().map_err(|e| value("translation", e.to_string()))?;
         self.window(None).validate().map_err(|e| value("run", e.to_string()))?;
         if self.masking.compensate && self.masking.lag == 0 {
-            return Err(value("masking", "lag is 0, but a scan's own motion is not known yet: it must be 1 or more".to_owned()));
+            return Err(value(
+                "masking",
+                "lag is 0, but a scan's own motion is not known yet: it must be 1 or more".to_owned(),
+            ));
         }
         if self.run.mode == Mode::Live && self.run.rate == Rate::Max {
-            return Err(value("run", "mode `live` needs a radar's pace: set rate to `realtime` or a factor".to_owned()));
+            return Err(value(
+                "run",
+                "mode `live` needs a radar's pace: set rate to `realtime` or a factor".to_owned(),
+            ));
         }
         if !(self.run.stall_timeout_s >= 0.0 && self.run.stall_timeout_s.is_finite()) {
-            return Err(value("run", format!("stall_timeout_s is {}, but must be 0 or more", self.run.stall_timeout_s)));
+            return Err(value(
+                "run",
+                format!("stall_timeout_s is {}, but must be 0 or more", self.run.stall_timeout_s),
+            ));
         }
         Ok(())
     }
@@ -222,7 +231,7 @@ impl Configuration {
             let mut table = table.clone();
             table.remove("stages");
             if let Some(run) = table.get_mut("run").and_then(|run| run.as_table_mut()) {
-                run.retain(|key, _| !["rate", "window", "stall_timeout_s", "ground_truth"].contains(&key.as_str()));
+                run.retain(|key, _| !["rate", "window", "stall_timeout_s", "ground_truth"].contains(&key));
             }
             table
         };
@@ -268,7 +277,8 @@ mod tests {
 
     #[test]
     fn a_resolved_configuration_repeats_itself() {
-        let configuration = from("[run]\nrate = 4\n[source]\ndata = '/data'\n[stages.masking]\ncommand = ['mine']").unwrap();
+        let configuration =
+            from("[run]\nrate = 4\n[source]\ndata = '/data'\n[stages.masking]\ncommand = ['mine']").unwrap();
         let text = configuration.to_toml().unwrap();
         assert_eq!(from(&text).unwrap(), configuration);
         assert!(configuration.continues(&text.parse().unwrap()));

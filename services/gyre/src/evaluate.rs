@@ -5,7 +5,7 @@ use std::{fs, process::ExitCode};
 use gyre_evaluation::{Association, Evaluation, EvaluationError, Options, plot_errors, plot_trajectory};
 use gyre_radar::{Trajectory, ground_truth::read_trajectory};
 
-use crate::{Failure, cli::EvaluateArguments};
+use crate::{Failure, cli::EvaluateArguments, print};
 
 /// Prints how well an estimate fits the truth, as a table or as JSON, and draws both.
 pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
@@ -13,8 +13,8 @@ pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
     let truth = read_trajectory(&arguments.ground_truth)?;
     let evaluation = judge(&estimate, &truth, Options { step: arguments.step, ..Options::default() })?;
     match arguments.json {
-        true => println!("{}", serde_json::to_string_pretty(&evaluation)?),
-        false => println!("{evaluation:#}"),
+        true => print::line(serde_json::to_string_pretty(&evaluation)?)?,
+        false => print::line(format_args!("{evaluation:#}"))?,
     }
     if let Some(directory) = &arguments.plots {
         fs::create_dir_all(directory).map_err(|error| format!("cannot make {}: {error}", directory.display()))?;

@@ -119,7 +119,12 @@ mod tests {
     fn pose(due_ns: i64) -> PoseHeader {
         let hop = |k: i64| {
             let received_ns = due_ns + k * 10_000;
-            Hop { received_ns, started_ns: received_ns + 1000, finished_ns: received_ns + 6000, published_ns: received_ns + 7000 }
+            Hop {
+                received_ns,
+                started_ns: received_ns + 1000,
+                finished_ns: received_ns + 6000,
+                published_ns: received_ns + 7000,
+            }
         };
         let hops = [hop(0), hop(1), hop(2), hop(3), hop(4)];
         PoseHeader { item: Item { due_ns, hops, ..Item::default() }, ..PoseHeader::default() }

@@ -9,6 +9,7 @@ mod inspect;
 mod latency;
 mod odometry;
 mod preflight;
+mod print;
 mod progress;
 mod results;
 mod run;

@@ -16,7 +16,8 @@ pub fn csv(poses: &[PoseHeader]) -> String {
     let mut text = String::from(HEADER);
     for pose in poses.iter().filter(|pose| !pose.item.is(flag::BREAK)) {
         let (item, motion, rotation) = (&pose.item, &pose.motion, &pose.motion.rotation);
-        let _ = write!(text, "{},{},{},{},{}", item.seq, item.scan, item.previous_scan, item.stamp_ns, motion.interval_ns);
+        let _ =
+            write!(text, "{},{},{},{},{}", item.seq, item.scan, item.previous_scan, item.stamp_ns, motion.interval_ns);
         for value in [motion.x_m, motion.y_m, motion.yaw_rad] {
             let _ = write!(text, ",{value:.9}");
         }

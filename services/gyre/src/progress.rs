@@ -27,7 +27,8 @@ impl Progress {
     /// A run of `scans` scans, of which `resumed` are in the journal already.
     pub fn new(scans: usize, resumed: usize, footprint: &Footprint) -> Self {
         let bar = std::io::stderr().is_terminal().then(|| {
-            let style = ProgressStyle::with_template("{bar:32} {pos}/{len} scans  {msg}").unwrap_or_else(|_| ProgressStyle::default_bar());
+            let style = ProgressStyle::with_template("{bar:32} {pos}/{len} scans  {msg}")
+                .unwrap_or_else(|_| ProgressStyle::default_bar());
             ProgressBar::new(scans as u64).with_style(style)
         });
         let progress = Self {

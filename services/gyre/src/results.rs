@@ -13,8 +13,9 @@ use gyre_stage::supervise::Report;
 use crate::{
     Failure,
     configuration::Configuration,
-    evaluate, odometry,
+    evaluate,
     latency::Latency,
+    odometry,
     summary::{Counts, Summary},
 };
 

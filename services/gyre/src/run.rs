@@ -20,7 +20,7 @@ use crate::{
     Failure,
     cli::RunArguments,
     configuration::{Configuration, Mode},
-    preflight,
+    preflight, print,
     progress::Progress,
     results::{self, Session},
     simulate,
@@ -79,7 +79,7 @@ fn finish(
         0 => failure.to_string(),
         kept => format!("{failure}; {kept} poses are kept in {}, the same command goes on from there", out.display()),
     })?;
-    println!("{}", summary?);
+    print::line(summary?)?;
     Ok(match report.ending {
         Ending::Complete => ExitCode::SUCCESS,
         Ending::Interrupted => ExitCode::from(INTERRUPTED),

@@ -140,8 +140,16 @@ impl fmt::Display for Summary {
             Some(Ending::Interrupted) => "interrupted: the same command goes on from here",
             None => "failed",
         };
-        writeln!(f, "\n{ending}: {} of {} scans in {:.1} s, {:.1} scans/s", c.processed, self.scans_in_recording, self.wall_s, self.scans_per_s)?;
-        writeln!(f, "published {}  dropped {}  unreadable {}  breaks {}", c.published, c.dropped, c.unreadable, c.breaks)?;
+        writeln!(
+            f,
+            "\n{ending}: {} of {} scans in {:.1} s, {:.1} scans/s",
+            c.processed, self.scans_in_recording, self.wall_s, self.scans_per_s
+        )?;
+        writeln!(
+            f,
+            "published {}  dropped {}  unreadable {}  breaks {}",
+            c.published, c.dropped, c.unreadable, c.breaks
+        )?;
         if !self.restarts.is_empty() {
             let restarts: Vec<_> = self.restarts.iter().map(|(stage, times)| format!("{stage} {times}")).collect();
             let recovery: Vec<_> = self.recovery_ms.iter().map(|ms| format!("{ms:.0}")).collect();
@@ -174,7 +182,11 @@ impl Summary {
             }
         }
         let bound_by = self.latency.bound_by.unwrap_or("nothing");
-        write!(f, "bounded by {bound_by}; two or more stages busy at once {:.0} % of the time", self.latency.overlap * 100.0)?;
+        write!(
+            f,
+            "bounded by {bound_by}; two or more stages busy at once {:.0} % of the time",
+            self.latency.overlap * 100.0
+        )?;
         writeln!(f, "; allocations: in `process` after its first five items")
     }
 }

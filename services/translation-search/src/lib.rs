@@ -1,6 +1,6 @@
 //! Finds the translation between consecutive scans once their rotation is known (Weston et al., Eq. 8).
 
-use gyre_messages::{Masked, MotionEstimate, Motion, Pair, Rotation, RotationEstimate};
+use gyre_messages::{Masked, Motion, MotionEstimate, Pair, Rotation, RotationEstimate};
 use gyre_radar::raster::RasterConfig;
 use gyre_scan_matching::{ConfigError, ShapeError, TranslationConfig, TranslationSearch};
 use gyre_stage::{
@@ -55,7 +55,11 @@ impl Stage for Translations {
     type Output = Motion;
     const HOP: gyre_messages::Stage = gyre_messages::Stage::TranslationSearch;
 
-    fn process(&mut self, input: JoinedView<'_, Masked, Rotation>, output: &mut Draft<Motion>) -> Result<(), StageError> {
+    fn process(
+        &mut self,
+        input: JoinedView<'_, Masked, Rotation>,
+        output: &mut Draft<Motion>,
+    ) -> Result<(), StageError> {
         let current = input.current;
         let before = input.before.map(|before| (before.header(), before.values()));
         let pair = current.header().pair(current.values(), before);

@@ -9,7 +9,7 @@ pub mod flag {
     pub const END: u32 = 1;
     /// The chain of motions starts here: there is no scan before this one to compare with.
     pub const BREAK: u32 = 2;
-    /// On `pose`: this is where the trajectory stands now (the last of those published again after a start).
+    /// On `pose`: this is where the trajectory stands now. All have it but those published again after a restart, save the last.
     pub const SYNC: u32 = 4;
     /// On `pose`: the trajectory is still empty, begin with the first scan.
     pub const BASE: u32 = 8;

@@ -86,7 +86,8 @@ impl Window {
             "motion" => (feedback, 2),
             _ => (feedback, 3),
         };
-        let sizes = TopicSizes { history, buffer: history + self.scans, borrowed: BORROWED, loaned: LOANED, subscribers };
+        let sizes =
+            TopicSizes { history, buffer: history + self.scans, borrowed: BORROWED, loaned: LOANED, subscribers };
         match topic {
             "scan" if self.live_depth > 0 => {
                 let depth = self.live_depth.max(data);

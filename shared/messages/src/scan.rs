@@ -52,7 +52,8 @@ impl ScanHeader {
     /// The scan in this header and its payload's bytes; `None` where they do not fit each other.
     pub fn view<'a>(&'a self, bytes: &'a [u8]) -> Option<PolarScan<'a>> {
         let geometry = self.geometry();
-        let last_byte = geometry.first_byte.checked_add(geometry.stride.checked_mul(geometry.azimuths.checked_sub(1)?)?)?;
+        let last_byte =
+            geometry.first_byte.checked_add(geometry.stride.checked_mul(geometry.azimuths.checked_sub(1)?)?)?;
         let fits = geometry.azimuths <= MAX_AZIMUTHS && last_byte.checked_add(geometry.bins)? <= bytes.len();
         fits.then(|| PolarScan {
             geometry,

@@ -41,7 +41,7 @@ pub enum Sampling {
     /// The mean of the range bins that one cell covers, bilinear between azimuths: no aliasing where bins are finer
     /// than cells. Bins are taken together by 2, 4, ... up to an eighth of that depth, so a single bright bin may move
     /// by a sixteenth of a cell. Azimuths are not averaged: near the sensor, where several fall into one cell, that
-    /// changed no trajectory.
+    /// made no trajectory better.
     #[default]
     Averaged,
     /// Bilinear between the four nearest measurements: one point of the scan stands for the whole cell.

@@ -1,6 +1,6 @@
 //! Poses along a drive, in the plane.
 
-use nalgebra::{Isometry2, Vector2};
+use nalgebra::{Complex, Isometry2, Translation2, Unit, UnitComplex, Vector2};
 
 /// Poses of the sensor, REP-103 (x forward, y left, yaw counter-clockwise; m, rad), in a world frame that its source chose.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -54,8 +54,16 @@ impl Trajectory {
 }
 
 /// A pose in the plane from the first two rows of a row-major 3 x 4 matrix; the heading is that of the x axis.
+///
+/// Cosine and sine stay as they were written where they fit each other: published KITTI figures come from matrices rounded to six
+/// decimals, and putting those right changes the fifth decimal of the result.
 pub(crate) fn planar(matrix: &[f64; 12]) -> Isometry2<f64> {
-    Isometry2::new(Vector2::new(matrix[3], matrix[7]), matrix[4].atan2(matrix[0]))
+    let (cos, sin) = (matrix[0], matrix[4]);
+    let rotation = match (cos.hypot(sin) - 1.0).abs() < 1e-4 {
+        true => Unit::new_unchecked(Complex::new(cos, sin)),
+        false => UnitComplex::new(sin.atan2(cos)),
+    };
+    Isometry2::from_parts(Translation2::new(matrix[3], matrix[7]), rotation)
 }
 
 /// The same pose with y and yaw the other way round: from y right and clockwise to REP-103, in both frames.

@@ -33,10 +33,11 @@ pub enum RotationForm {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Magnitude {
-    /// The modulus itself: the strongest structure decides.
-    Linear,
-    /// ln(1 + modulus / mean modulus of the band), so that many weak directions count beside one strong street.
+    /// The modulus itself.
     #[default]
+    Linear,
+    /// ln(1 + modulus / mean modulus of the band): weak structure counts beside strong, and so does noise. Helps where
+    /// the band reaches down to the lowest frequencies, which tower above the rest.
     Log,
 }
 
@@ -127,7 +128,7 @@ impl Default for RotationConfig {
             radii: None,
             reach_deg: 20.0,
             peak: Peak::default(),
-            variance_scale: 0.08,
+            variance_scale: 0.12,
         }
     }
 }

@@ -8,7 +8,9 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum StageError {
     /// Started by hand.
-    #[error("{stage} is one process of a run and finds it through GYRE_RUN, which is not set: start it with `gyre run CONFIG`")]
+    #[error(
+        "{stage} is one process of a run and finds it through GYRE_RUN, which is not set: start it with `gyre run CONFIG`"
+    )]
     NoRun {
         /// Which stage.
         stage: String,

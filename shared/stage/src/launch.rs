@@ -78,11 +78,8 @@ pub fn main(name: &str, work: impl FnOnce(&Launch) -> Result<Statistics, StageEr
 /// All processes append to one `log.jsonl`, a line an event.
 fn start_log(manifest: &Manifest, name: &str) -> Result<(), StageError> {
     let path = manifest.out.join("log.jsonl");
-    let file = OpenOptions::new()
-        .append(true)
-        .create(true)
-        .open(&path)
-        .map_err(|source| StageError::File { path, source })?;
+    let file =
+        OpenOptions::new().append(true).create(true).open(&path).map_err(|source| StageError::File { path, source })?;
     let filter = tracing_subscriber::EnvFilter::try_from_env("GYRE_LOG").unwrap_or_else(|_| "info".into());
     let log = tracing_subscriber::fmt().json().with_env_filter(filter).with_writer(Mutex::new(file));
     // A second log in one process (tests) keeps the first.

@@ -61,7 +61,9 @@ impl Manifest {
         );
         let manifest = serde_json::to_string_pretty(self)
             .map_err(|error| StageError::Configuration(format!("cannot write the run's manifest: {error}")))?;
-        for (name, text) in [("manifest.json", manifest.as_str()), ("config.toml", configuration), ("iox.toml", &transport)] {
+        for (name, text) in
+            [("manifest.json", manifest.as_str()), ("config.toml", configuration), ("iox.toml", &transport)]
+        {
             let path = self.root.join(name);
             fs::write(&path, text).map_err(|source| StageError::File { path, source })?;
         }
@@ -71,7 +73,8 @@ impl Manifest {
     /// The transport's configuration: names and paths of this run alone, and nobody but the supervisor cleans up.
     pub(crate) fn transport(&self) -> Result<Config, StageError> {
         let mut config = Config::default();
-        config.global.prefix = FileName::new(self.prefix.as_bytes()).map_err(|e| StageError::transport("name the run", e))?;
+        config.global.prefix =
+            FileName::new(self.prefix.as_bytes()).map_err(|e| StageError::transport("name the run", e))?;
         let root = format!("{}/", self.root.display());
         let root = TransportPath::new(root.as_bytes()).map_err(|e| StageError::transport("use the run's root", e))?;
         config.global.set_root_path(&root);

@@ -211,7 +211,8 @@ impl NewestWins {
         let done = self.queue.pop_front();
         if let (Some(chain), Some(done)) = (&mut self.chain, done) {
             let (scan, published) = (done.item().scan, done.item().published);
-            *chain = Chain { next: chain.next + 1, previous_scan: Some(scan), published: Some(published), again: false };
+            *chain =
+                Chain { next: chain.next + 1, previous_scan: Some(scan), published: Some(published), again: false };
         }
     }
 }

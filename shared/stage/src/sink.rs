@@ -47,7 +47,13 @@ fn publish_again(poses: &Writer<Pose>, restored: &[PoseHeader]) -> Result<(), St
     for pose in earlier {
         publish(poses, *pose)?;
     }
-    publish(poses, PoseHeader { item: Item { flags: last.item.flags | flag::SYNC, ..last.item }, ..*last })
+    publish(poses, standing(*last))
+}
+
+/// Marks a pose as where the trajectory stands. The earlier ones of those published again are not: a source that took one of them
+/// for the last would send more than its readers have room for.
+fn standing(pose: PoseHeader) -> PoseHeader {
+    PoseHeader { item: Item { flags: pose.item.flags | flag::SYNC, ..pose.item }, ..pose }
 }
 
 fn publish(poses: &Writer<Pose>, pose: PoseHeader) -> Result<(), StageError> {
@@ -91,7 +97,7 @@ impl<S: Sink> Integration<'_, S> {
         motion.item.hop(Stage::PoseIntegration).started_ns = started_ns;
         let pose = self.sink.integrate(&motion)?;
         self.statistics.record(allocations::so_far() - allocated, clock::now_ns() - started_ns);
-        publish(&self.poses, pose)
+        publish(&self.poses, standing(pose))
     }
 
     fn publish_end(&mut self, item: Item) -> Result<(), StageError> {

@@ -101,7 +101,14 @@ impl Position {
         // A resumed chain is not broken: its first item is one that the others have had.
         let start = if self.seq == 0 { flag::BREAK } else { 0 };
         let scan = self.index as u64;
-        Item { seq: self.seq, published: self.seq, scan, previous_scan: self.previous.unwrap_or(scan), flags: start, ..Item::default() }
+        Item {
+            seq: self.seq,
+            published: self.seq,
+            scan,
+            previous_scan: self.previous.unwrap_or(scan),
+            flags: start,
+            ..Item::default()
+        }
     }
 }
 
@@ -192,7 +199,8 @@ impl<S: Source> Playback<'_, S> {
         loop {
             self.credit.update()?;
             let wait = due_ns.map_or(Duration::ZERO, clock::until);
-            let room = self.launch.manifest.live || self.credit.admits(position.seq, self.launch.manifest.window.scans as u64);
+            let room =
+                self.launch.manifest.live || self.credit.admits(position.seq, self.launch.manifest.window.scans as u64);
             if room && wait.is_zero() {
                 draft.header().item.due_ns = due_ns.unwrap_or_else(clock::now_ns);
                 self.scans.send(draft, Stage::RadarReplay)?;

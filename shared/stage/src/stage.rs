@@ -19,7 +19,11 @@ pub trait Stage {
     const HOP: gyre_messages::Stage;
 
     /// Works on borrowed shared memory and writes into a loaned sample: header (but its item) and payload.
-    fn process(&mut self, input: <Self::Inputs as Inputs>::View<'_>, output: &mut Draft<Self::Output>) -> Result<(), StageError>;
+    fn process(
+        &mut self,
+        input: <Self::Inputs as Inputs>::View<'_>,
+        output: &mut Draft<Self::Output>,
+    ) -> Result<(), StageError>;
 }
 
 /// Runs a stage until SIGTERM.

@@ -17,7 +17,7 @@ use gyre_messages::{Header, Pose, PoseHeader, flag};
 use iceoryx2::prelude::{Config, FilePath, SemanticString};
 
 use crate::{
-    Statistics, StageError, clock,
+    StageError, Statistics, clock,
     reader::Port,
     services::{self, Node, Services},
     wake::{self, Signals},

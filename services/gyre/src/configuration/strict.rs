@@ -64,7 +64,10 @@ fn value_of(text: &str) -> Value {
 fn read<T: DeserializeOwned>(section: &str, value: Value) -> Result<T, ConfigurationError> {
     value.try_into().map_err(|error: toml::de::Error| match unknown_field(error.message()) {
         Some((key, known)) => unknown(section, key, &known),
-        None => ConfigurationError::Value { section: section.to_owned(), reason: error.to_string().trim().replace('\n', " ") },
+        None => ConfigurationError::Value {
+            section: section.to_owned(),
+            reason: error.to_string().trim().replace('\n', " "),
+        },
     })
 }
 

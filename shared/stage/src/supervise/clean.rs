@@ -4,15 +4,7 @@
 //! can leave a shared-memory file of no length, and whoever opens that waits for ever; or a tag of no content, and cleaning
 //! fails for ever. Both are removed first. What has not been seen yet is caught by a time limit.
 
-use std::{
-    collections::HashSet,
-    fs,
-    os::unix::fs::PermissionsExt,
-    path::Path,
-    sync::mpsc,
-    thread,
-    time::Duration,
-};
+use std::{collections::HashSet, fs, os::unix::fs::PermissionsExt, path::Path, sync::mpsc, thread, time::Duration};
 
 use iceoryx2::{
     node::NodeView,
@@ -31,7 +23,11 @@ type TransportNode = iceoryx2::node::Node<services::Ipc>;
 
 /// Removes all that dead processes of the run left in the transport. It must be done before one is started again:
 /// then there is room for exactly one publisher a topic, and old and new samples never mix.
-pub(super) fn after_the_dead(manifest: &Manifest, transport: &Config, nobody_lives: bool) -> Result<(), SuperviseError> {
+pub(super) fn after_the_dead(
+    manifest: &Manifest,
+    transport: &Config,
+    nobody_lives: bool,
+) -> Result<(), SuperviseError> {
     let (manifest, transport) = (manifest.clone(), transport.clone());
     let (done, finished) = mpsc::channel();
     // A thread, for if it hangs nothing can end it.
@@ -120,7 +116,9 @@ mod tests {
     #[test]
     fn only_empty_files_of_dead_ports_are_removed() {
         let directory = tempfile::tempdir().unwrap();
-        for (name, content) in [("run_1_2.connection", ""), ("run_3_4.connection", ""), ("run_1_5.data", "x"), ("other_1", "")] {
+        for (name, content) in
+            [("run_1_2.connection", ""), ("run_3_4.connection", ""), ("run_1_5.data", "x"), ("other_1", "")]
+        {
             fs::write(directory.path().join(name), content).unwrap();
         }
         unlink_empty_files(directory.path(), "run_", |name| name.contains("_1_"));

@@ -42,7 +42,7 @@ fn scatterers_lie_where_they_are_at_mid_sweep_only_if_the_motion_is_undone() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(200))]
+    #![proptest_config(ProptestConfig::with_cases(16))]
     #[test]
     fn any_motion_of_a_vehicle_is_undone(
         vx in -20.0..30.0f64, vy in -3.0..3.0f64, yaw_rate in -1.0..1.0f64, clockwise: bool,

@@ -1,0 +1,13 @@
+//! Printing to whoever reads, as long as they do.
+
+use std::{fmt::Display, io::Write};
+
+use crate::Failure;
+
+/// Prints a line. A reader that has seen enough (`gyre inspect ... | head`) is no error.
+pub fn line(text: impl Display) -> Result<(), Failure> {
+    match writeln!(std::io::stdout(), "{text}") {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(()),
+    }
+}
