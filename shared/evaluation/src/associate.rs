@@ -168,8 +168,14 @@ enum At {
     Gap,
 }
 
+/// Stamps are written in microseconds: what lies so far beyond an end of the truth's span lies on it.
+const ROUNDING_NS: u64 = 1_000;
+
 /// The truth at `stamp_ns`. A stamp that the truth has itself is never in a gap.
 fn truth_at(truth: Trajectory<'_>, stamp_ns: i64, max_gap_ns: i64) -> At {
+    let ends = truth.stamps_ns.first().into_iter().chain(truth.stamps_ns.last());
+    let end = ends.copied().find(|end| stamp_ns.abs_diff(*end) <= ROUNDING_NS);
+    let stamp_ns = end.unwrap_or(stamp_ns);
     let after = truth.stamps_ns.partition_point(|&t| t <= stamp_ns);
     let Some(before) = after.checked_sub(1) else { return At::Outside };
     if truth.stamps_ns[before] == stamp_ns {
@@ -237,6 +243,16 @@ mod tests {
         assert_eq!((coverage.matched(), coverage.left_out()), (4, 3));
         let used: Vec<f64> = matched.estimate().iter().map(|p| p.translation.x).collect();
         assert_eq!(used, [1.0, 2.0, 3.0, 5.0]);
+    }
+
+    #[test]
+    fn a_stamp_rounded_beyond_an_end_of_the_truth_counts_as_that_end() {
+        let (truth, estimate) = (line(2), line(3));
+        let found = |stamps: [i64; 3]| {
+            let estimate = Trajectory::new(&stamps, &estimate);
+            associate(estimate, Trajectory::new(&[5_000, 9_000], &truth), Association::default()).unwrap().1.left_out()
+        };
+        assert_eq!((found([4_500, 7_000, 9_999]), found([3_000, 7_000, 9_000])), (0, 1));
     }
 
     #[test]
