@@ -35,7 +35,7 @@ pub enum WindowError {
     /// Too small or too large.
     #[error("run.window is {0}, but it must be at least 1 and at most 64 scans")]
     Scans(usize),
-    /// The transport counts lags in a small ring.
+    /// So far back the motions are not kept.
     #[error("masking.lag is {0}, but it must be at most 16 scans")]
     Lag(usize),
 }
@@ -72,6 +72,12 @@ impl Window {
             return Err(WindowError::Lag(self.lag));
         }
         Ok(())
+    }
+
+    /// Whether item `seq` may be on its way when `newest_pose` is the last one finished.
+    pub fn admits(&self, seq: u64, newest_pose: Option<u64>) -> bool {
+        let scans = self.scans as u64;
+        newest_pose.map_or(seq < scans, |newest| seq <= newest.saturating_add(scans))
     }
 
     /// Sizes of a topic's queues. A restarted reader first gets the history, and what was already past it can still
@@ -182,6 +188,13 @@ mod tests {
         let limits = Limits { scan_bytes: 400 * 3779, raster_cells: 255 * 255, rasters: 2 };
         let total = Footprint::new(&WINDOW, &limits).total();
         assert!((42_000_000..46_000_000).contains(&total), "{total}");
+    }
+
+    #[test]
+    fn a_pose_is_the_credit_for_one_more_scan() {
+        assert!(WINDOW.admits(3, None) && !WINDOW.admits(4, None));
+        assert!(WINDOW.admits(4, Some(0)) && !WINDOW.admits(5, Some(0)));
+        assert!(WINDOW.admits(u64::MAX, Some(u64::MAX)));
     }
 
     #[test]

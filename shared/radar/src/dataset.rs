@@ -1,12 +1,28 @@
 //! A recording of radar scans on disk, whatever its format.
 
+mod boreas;
+mod detect;
+mod error;
+mod first_look;
+mod fomo;
+mod images;
+mod mulran;
+mod navtech_png;
+mod navtech_scans;
+mod options;
+mod oxford;
+mod png_image;
+mod radiate;
+mod sensor_clock;
+mod sideways;
+pub(crate) mod stamp;
+
 use std::path::Path;
 
-use crate::error::{OpenError, ReadError};
-use crate::options::{DatasetOptions, Format};
-use crate::png_image::ImageSize;
 use crate::scan::{ScanLimits, ScanSlot, SweepGeometry};
-use crate::{boreas, detect, fomo, mulran, oxford, radiate};
+pub use error::{OpenError, ReadError};
+pub use options::{AzimuthSource, DatasetOptions, Format};
+pub use png_image::ImageSize;
 
 /// The scans of one recording, in the order of their times.
 ///

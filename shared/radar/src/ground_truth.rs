@@ -175,7 +175,7 @@ fn number(line: usize, row: &str, column: usize) -> Result<f64, LineError> {
 /// An integer stamp of any unit, ns since 1970.
 fn stamp_field(line: usize, row: &str, column: usize) -> Result<i64, LineError> {
     let text = field(line, row, column)?;
-    let stamp = text.parse().ok().and_then(crate::stamp::to_ns);
+    let stamp = text.parse().ok().and_then(crate::dataset::stamp::to_ns);
     stamp.ok_or_else(|| LineError {
         line,
         reason: format!("stamp {text:?} is not an integer time of the years 2015 to 2040"),

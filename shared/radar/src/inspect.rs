@@ -16,10 +16,10 @@ pub use rows::{Chirps, RowsReport};
 pub use timing::{Gap, Stall, TimingReport};
 pub use truth::TruthReport;
 
+use crate::dataset::ImageSize;
+use crate::dataset::OpenError;
 use crate::dataset::{Dataset, open};
-use crate::error::OpenError;
-use crate::options::{DatasetOptions, Format};
-use crate::png_image::ImageSize;
+use crate::dataset::{DatasetOptions, Format};
 use crate::scan::OwnedScan;
 use crate::trajectory::Trajectory;
 

@@ -8,10 +8,12 @@ use std::{
 };
 
 use serde::de::DeserializeOwned;
+use tracing::span::EnteredSpan;
 
 use crate::{
     Manifest, StageError, Statistics, run,
     services::{self, Node},
+    statistics,
     wake::Signals,
 };
 
@@ -25,6 +27,7 @@ pub struct Launch {
     pub signals: Signals,
     configuration: toml::Table,
     pub(crate) node: Node,
+    _log: EnteredSpan,
 }
 
 impl Launch {
@@ -32,7 +35,7 @@ impl Launch {
     pub fn from_environment(name: &str) -> Result<Self, StageError> {
         let root = std::env::var_os(run::ENVIRONMENT).ok_or_else(|| StageError::NoRun { stage: name.to_owned() })?;
         let manifest = Manifest::read(&PathBuf::from(root))?;
-        start_log(&manifest, name)?;
+        let log = start_log(&manifest, name)?;
         let path = manifest.root.join("config.toml");
         let text = fs::read_to_string(&path).map_err(|source| StageError::File { path: path.clone(), source })?;
         let configuration = text
@@ -40,7 +43,7 @@ impl Launch {
             .map_err(|error: toml::de::Error| StageError::Manifest { path, reason: error.message().to_owned() })?;
         let signals = Signals::install()?;
         let node = services::node(&manifest.transport()?, name)?;
-        Ok(Self { name: name.to_owned(), manifest, signals, configuration, node })
+        Ok(Self { name: name.to_owned(), manifest, signals, configuration, node, _log: log })
     }
 
     /// A section of the run's configuration; its defaults where the section is missing.
@@ -52,7 +55,7 @@ impl Launch {
     }
 
     fn leave_statistics(&self, statistics: &Statistics) -> Result<(), StageError> {
-        let path = self.manifest.root.join(format!("{}-{}.statistics.json", self.name, std::process::id()));
+        let path = self.manifest.root.join(statistics::file_name(&self.name));
         let text = serde_json::to_string(statistics).map_err(|e| StageError::Configuration(e.to_string()))?;
         fs::write(&path, text).map_err(|source| StageError::File { path, source })
     }
@@ -75,8 +78,8 @@ pub fn main(name: &str, work: impl FnOnce(&Launch) -> Result<Statistics, StageEr
     }
 }
 
-/// All processes append to one `log.jsonl`, a line an event.
-fn start_log(manifest: &Manifest, name: &str) -> Result<(), StageError> {
+/// All processes append to one `log.jsonl`, a line an event. Each line names its process while what is returned lives.
+fn start_log(manifest: &Manifest, name: &str) -> Result<EnteredSpan, StageError> {
     let path = manifest.out.join("log.jsonl");
     let file =
         OpenOptions::new().append(true).create(true).open(&path).map_err(|source| StageError::File { path, source })?;
@@ -84,6 +87,5 @@ fn start_log(manifest: &Manifest, name: &str) -> Result<(), StageError> {
     let log = tracing_subscriber::fmt().json().with_env_filter(filter).with_writer(Mutex::new(file));
     // A second log in one process (tests) keeps the first.
     let _ = log.try_init();
-    let _entered = tracing::info_span!("stage", name).entered();
-    Ok(())
+    Ok(tracing::error_span!("process", stage = name).entered())
 }

@@ -117,14 +117,15 @@ impl<M: Message> Reader<M> {
     /// The item before the one at hand, while the chain is unbroken.
     pub fn before(&self) -> Option<&Received<M>> {
         let (before, head) = (self.before.as_ref()?, self.head.as_ref()?);
-        let follows = before.item().seq + 1 == head.item().seq && !head.item().is(gyre_messages::flag::BREAK);
+        let follows =
+            head.item().seq.checked_sub(1) == Some(before.item().seq) && !head.item().is(gyre_messages::flag::BREAK);
         follows.then_some(before)
     }
 
     /// Done with the item at hand: it becomes the one before.
     pub fn advance(&mut self) {
         if let Some(head) = self.head.take() {
-            self.next = Some(head.item().seq + 1);
+            self.next = Some(head.item().seq.saturating_add(1));
             self.before = Some(head);
         }
     }

@@ -5,7 +5,6 @@
 
 use std::{
     fs::{self, File},
-    os::unix::fs::MetadataExt,
     path::{Path, PathBuf},
 };
 
@@ -112,19 +111,15 @@ pub enum RootError {
 impl RunRoot {
     /// Takes the place of the run that writes to `out`; removes first what dead runs left.
     pub fn take(out: &Path) -> Result<Self, RootError> {
-        sweep_dead_runs();
         let name = format!("gyre{:010x}", hash(out.as_os_str().as_encoded_bytes()) & 0xff_ffff_ffff);
         let path = Path::new(RUNS).join(&name);
         let unusable = |source| RootError::Unusable { path: path.clone(), source };
-        loop {
-            fs::create_dir_all(&path).map_err(unusable)?;
-            let Some(lock) = try_lock(&path).map_err(unusable)? else {
-                return Err(RootError::Busy(out.to_owned()));
-            };
-            // Between making the directory and locking it, another run's sweep may have taken it for dead.
-            if same_file(&lock, &path.join("owner.lock")) {
-                return Ok(Self { name, path, _lock: lock });
-            }
+        let _alone = lock_all_runs().map_err(unusable)?;
+        sweep_dead_runs();
+        fs::create_dir_all(&path).map_err(unusable)?;
+        match try_lock(&path).map_err(unusable)? {
+            Some(lock) => Ok(Self { name, path, _lock: lock }),
+            None => Err(RootError::Busy(out.to_owned())),
         }
     }
 
@@ -141,6 +136,7 @@ impl RunRoot {
 
 impl Drop for RunRoot {
     fn drop(&mut self) {
+        let _alone = lock_all_runs();
         remove_run(&self.name);
     }
 }
@@ -154,11 +150,12 @@ fn try_lock(root: &Path) -> std::io::Result<Option<File>> {
     }
 }
 
-fn same_file(file: &File, path: &Path) -> bool {
-    match (file.metadata(), fs::metadata(path)) {
-        (Ok(a), Ok(b)) => a.ino() == b.ino(),
-        _ => false,
-    }
+/// One supervisor at a time makes and removes runs, for some milliseconds: else one that is just being made, and has no owner
+/// yet, could be taken for dead.
+fn lock_all_runs() -> std::io::Result<File> {
+    let place = File::open(SHARED_MEMORY)?;
+    flock(&place, FlockOperation::LockExclusive)?;
+    Ok(place)
 }
 
 /// Removes what runs left whose supervisor was killed: their locks are free.

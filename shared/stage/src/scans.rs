@@ -5,7 +5,7 @@
 
 use std::collections::VecDeque;
 
-use gyre_messages::{Item, MotionEstimate, Scan, flag};
+use gyre_messages::{Item, MotionEstimate, Scan, Window, flag};
 
 use crate::{
     Launch, StageError,
@@ -44,15 +44,11 @@ impl Inputs for Scans {
         let feedback = Feedback::open(launch)?;
         let window = launch.manifest.window;
         let intake = match launch.manifest.live {
-            false => Intake::Lossless(InOrder {
-                reader: Reader::open(&launch.node, None)?,
-                look_back: window.look_back as u64,
-                flowing: false,
-            }),
+            false => Intake::Lossless(InOrder { reader: Reader::open(&launch.node, None)?, window, flowing: false }),
             true => Intake::Live(NewestWins {
                 port: Port::open(&launch.node)?,
                 queue: VecDeque::with_capacity(window.live_depth + 2),
-                window: window.scans as u64,
+                window,
                 chain: None,
             }),
         };
@@ -118,7 +114,7 @@ impl Scans {
 
 struct InOrder {
     reader: Reader<Scan>,
-    look_back: u64,
+    window: Window,
     /// From the first scan that was wanted on, none is skipped: that would leave a hole in what we send.
     flowing: bool,
 }
@@ -130,7 +126,8 @@ impl InOrder {
         if item.is(flag::END) {
             return Ok(Turn::End(item));
         }
-        let had = newest_pose.is_some_and(|newest| item.seq + self.look_back <= newest);
+        let look_back = self.window.look_back as u64;
+        let had = newest_pose.is_some_and(|newest| item.seq.saturating_add(look_back) <= newest);
         if had && !self.flowing {
             return Ok(Turn::Keep);
         }
@@ -143,7 +140,7 @@ struct NewestWins {
     port: Port<Scan>,
     /// The scan at hand and, behind it, what came since; at the start the source's history.
     queue: VecDeque<Received<Scan>>,
-    window: u64,
+    window: Window,
     chain: Option<Chain>,
 }
 
@@ -179,11 +176,11 @@ impl NewestWins {
         }
         let Some(front) = self.queue.front() else { return Ok(Turn::Wait) };
         let item = chain.number(front.item());
-        let admitted = newest_pose.map_or(item.seq < self.window, |newest| item.seq <= newest + self.window);
         Ok(match () {
+            // The end of the stream takes a place in every history as any item does, so it waits for its place too.
+            () if !self.window.admits(item.seq, newest_pose) => Turn::Wait,
             () if item.is(flag::END) => Turn::End(item),
-            () if admitted => Turn::Process(item, front.received_ns),
-            () => Turn::Wait,
+            () => Turn::Process(item, front.received_ns),
         })
     }
 
@@ -197,7 +194,7 @@ impl NewestWins {
                 self.queue.drain(..place);
                 Chain { next: sync.seq, previous_scan: Some(sync.previous_scan), published: None, again: true }
             }
-            None => Chain { next: sync.seq + 1, previous_scan: None, published: None, again: false },
+            None => Chain { next: sync.seq.saturating_add(1), previous_scan: None, published: None, again: false },
         }
     }
 
@@ -211,8 +208,8 @@ impl NewestWins {
         let done = self.queue.pop_front();
         if let (Some(chain), Some(done)) = (&mut self.chain, done) {
             let (scan, published) = (done.item().scan, done.item().published);
-            *chain =
-                Chain { next: chain.next + 1, previous_scan: Some(scan), published: Some(published), again: false };
+            let next = chain.next.saturating_add(1);
+            *chain = Chain { next, previous_scan: Some(scan), published: Some(published), again: false };
         }
     }
 }

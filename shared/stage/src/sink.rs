@@ -19,7 +19,7 @@ pub fn run(launch: &Launch, sink: &mut impl Sink) -> Result<Statistics, StageErr
     let poses = Writer::<Pose>::open(&launch.node, &launch.manifest)?;
     let (restored, ended) = sink.restore(launch.manifest.window.sizes("pose").history)?;
     publish_again(&poses, &restored)?;
-    let next = restored.last().map_or(0, |pose| pose.item.seq + 1);
+    let next = restored.last().map_or(0, |pose| pose.item.seq.saturating_add(1));
     let mut integration = Integration { sink, poses, ended, statistics: Statistics::default() };
     if ended {
         integration.publish_end(restored.last().map(|pose| pose.item).unwrap_or_default())?;
@@ -27,7 +27,7 @@ pub fn run(launch: &Launch, sink: &mut impl Sink) -> Result<Statistics, StageErr
     let mut motions = Reader::<Motion>::open(&launch.node, Some(next))?;
     integration.drain(&mut motions)?;
     loop {
-        let woken = launch.signals.wait(&[motions.listener(), integration.poses.listener()], wake::NET)?;
+        let woken = launch.signals.wait(&[motions.listener()], Some(integration.poses.listener()), wake::NET)?;
         integration.statistics.wakes += 1;
         if woken.stop {
             integration.statistics.duplicates = motions.duplicates();

@@ -58,10 +58,6 @@ impl Credit {
         }
         Ok(())
     }
-
-    fn admits(&self, seq: u64, window: u64) -> bool {
-        self.newest.map_or(seq < window, |newest| seq <= newest + window)
-    }
 }
 
 /// Where playing goes on.
@@ -69,8 +65,8 @@ impl Credit {
 struct Position {
     /// The next scan to read.
     index: usize,
-    /// Its number among those published.
-    seq: u64,
+    /// Its number among those published. In live mode that is not its number in the chain, which masking gives.
+    published: u64,
     /// The scan published before it.
     previous: Option<u64>,
 }
@@ -78,32 +74,37 @@ struct Position {
 impl Position {
     /// Starts at the last pose's scan, or the one before it where a mask looks at two: the others need them as the ones before.
     fn resume(sync: &Item, look_back: usize) -> Self {
-        if sync.is(flag::BASE) || (look_back > 1 && sync.seq == 0) {
+        if sync.is(flag::BASE) || (look_back > 1 && sync.published == 0) {
             return Self::default();
         }
         match look_back > 1 && !sync.is(flag::BREAK) {
-            true => Self { index: sync.previous_scan as usize, seq: sync.seq - 1, previous: None },
+            true => Self { index: sync.previous_scan as usize, published: sync.published - 1, previous: None },
             false => Self {
                 index: sync.scan as usize,
-                seq: sync.seq,
+                published: sync.published,
                 previous: (!sync.is(flag::BREAK)).then_some(sync.previous_scan),
             },
         }
     }
 
-    fn published(&mut self) {
+    fn advance(&mut self) {
         self.previous = Some(self.index as u64);
+        self.miss();
+    }
+
+    /// The sensor has seen this one, but nobody will.
+    fn miss(&mut self) {
         self.index += 1;
-        self.seq += 1;
+        self.published = self.published.saturating_add(1);
     }
 
     fn item(&self) -> Item {
         // A resumed chain is not broken: its first item is one that the others have had.
-        let start = if self.seq == 0 { flag::BREAK } else { 0 };
+        let start = if self.published == 0 { flag::BREAK } else { 0 };
         let scan = self.index as u64;
         Item {
-            seq: self.seq,
-            published: self.seq,
+            seq: self.published,
+            published: self.published,
             scan,
             previous_scan: self.previous.unwrap_or(scan),
             flags: start,
@@ -130,7 +131,7 @@ struct Tempo {
 
 impl Tempo {
     fn due_ns(&self, complete_ns: i64) -> i64 {
-        self.start_ns + ((complete_ns - self.first_ns) as f64 / self.rate) as i64
+        self.start_ns.saturating_add((complete_ns.saturating_sub(self.first_ns) as f64 / self.rate) as i64)
     }
 }
 
@@ -138,12 +139,14 @@ impl<S: Source> Playback<'_, S> {
     /// Waits until the trajectory's keeper has said where it stands; `None` when told to stop before that.
     fn wait_for_start(&mut self) -> Result<Option<Position>, StageError> {
         loop {
+            // Sleep first: the keeper hands over its last poses one by one and wakes us when all are there. Who looks earlier
+            // can take one of them for the last, and then sends more than its readers have room for.
+            if self.sleep(wake::NET)? {
+                return Ok(None);
+            }
             self.credit.update()?;
             if let Some(sync) = self.credit.sync {
                 return Ok(Some(Position::resume(&sync, self.launch.manifest.window.look_back)));
-            }
-            if self.sleep(wake::NET)? {
-                return Ok(None);
             }
         }
     }
@@ -157,13 +160,15 @@ impl<S: Source> Playback<'_, S> {
             if !self.admit(draft, &position, tempo)? {
                 return Ok(());
             }
-            position.published();
+            position.advance();
             if self.launch.manifest.live {
                 self.skip_what_is_past(&mut position, tempo);
             }
         }
-        self.end(&position)?;
-        while !self.sleep(wake::NET)? {}
+        if self.wait_for_turn(position.published, None)? {
+            self.end(&position)?;
+            while !self.sleep(wake::NET)? {}
+        }
         Ok(())
     }
 
@@ -196,14 +201,22 @@ impl<S: Source> Playback<'_, S> {
     /// Publishes a scan when there is room and its time has come; false when told to stop before that.
     fn admit(&mut self, mut draft: Draft<Scan>, position: &Position, tempo: Option<Tempo>) -> Result<bool, StageError> {
         let due_ns = tempo.and_then(|tempo| Some(tempo.due_ns(self.source.complete_ns(position.index)?)));
+        let turn = self.wait_for_turn(position.published, due_ns)?;
+        if turn {
+            draft.header().item.due_ns = due_ns.unwrap_or_else(clock::now_ns);
+            self.scans.send(draft, Stage::RadarReplay)?;
+        }
+        Ok(turn)
+    }
+
+    /// Waits until the window has room for item `seq` and its time has come; false when told to stop before that.
+    fn wait_for_turn(&mut self, seq: u64, due_ns: Option<i64>) -> Result<bool, StageError> {
+        let (live, window) = (self.launch.manifest.live, self.launch.manifest.window);
         loop {
             self.credit.update()?;
             let wait = due_ns.map_or(Duration::ZERO, clock::until);
-            let room =
-                self.launch.manifest.live || self.credit.admits(position.seq, self.launch.manifest.window.scans as u64);
+            let room = live || window.admits(seq, self.credit.newest);
             if room && wait.is_zero() {
-                draft.header().item.due_ns = due_ns.unwrap_or_else(clock::now_ns);
-                self.scans.send(draft, Stage::RadarReplay)?;
                 return Ok(true);
             }
             let limit = if room { wait.min(wake::NET) } else { wake::NET };
@@ -219,8 +232,7 @@ impl<S: Source> Playback<'_, S> {
         let now_ns = clock::now_ns();
         let period_behind = |index| Some(tempo.due_ns(self.source.complete_ns(index + 1)?) < now_ns);
         while position.index + 1 < self.source.len() && period_behind(position.index) == Some(true) {
-            position.index += 1;
-            position.seq += 1;
+            position.miss();
         }
     }
 
@@ -237,7 +249,7 @@ impl<S: Source> Playback<'_, S> {
 
     /// Sleeps, and answers readers that have come; true when told to stop.
     fn sleep(&mut self, limit: Duration) -> Result<bool, StageError> {
-        let woken = self.launch.signals.wait(&[self.credit.poses.listener(), self.scans.listener()], limit)?;
+        let woken = self.launch.signals.wait(&[self.credit.poses.listener()], Some(self.scans.listener()), limit)?;
         self.statistics.wakes += 1;
         self.scans.greet()?;
         Ok(woken.stop)
@@ -250,17 +262,24 @@ mod tests {
 
     #[test]
     fn a_restart_begins_with_the_last_poses_scan() {
-        let sync = Item { seq: 9, scan: 12, previous_scan: 10, ..Item::default() };
-        assert_eq!(Position::resume(&sync, 1), Position { index: 12, seq: 9, previous: Some(10) });
-        assert_eq!(Position::resume(&sync, 2), Position { index: 10, seq: 8, previous: None });
+        let sync = Item { seq: 9, published: 9, scan: 12, previous_scan: 10, ..Item::default() };
+        assert_eq!(Position::resume(&sync, 1), Position { index: 12, published: 9, previous: Some(10) });
+        assert_eq!(Position::resume(&sync, 2), Position { index: 10, published: 8, previous: None });
         let base = Item { flags: flag::BASE, ..sync };
         assert_eq!(Position::resume(&base, 1), Position::default());
     }
 
     #[test]
+    fn a_restart_in_live_mode_goes_on_with_the_sources_own_count() {
+        let sync = Item { seq: 9, published: 31, scan: 40, previous_scan: 37, ..Item::default() };
+        let position = Position::resume(&sync, 1);
+        assert_eq!((position.index, position.item().published), (40, 31));
+    }
+
+    #[test]
     fn only_the_very_first_scan_starts_a_chain() {
         assert!(Position::default().item().is(flag::BREAK));
-        assert!(!Position { index: 12, seq: 9, previous: None }.item().is(flag::BREAK));
+        assert!(!Position { index: 12, published: 9, previous: None }.item().is(flag::BREAK));
     }
 
     #[test]

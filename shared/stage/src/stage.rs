@@ -33,9 +33,7 @@ pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<Statistics, Stage
     let mut flow = Flow { stage, inputs, output, last_sent: None, ended: false, statistics: Statistics::default() };
     flow.drain()?;
     loop {
-        let mut listeners = flow.inputs.listeners();
-        listeners.push(flow.output.listener());
-        let woken = launch.signals.wait(&listeners, wake::NET)?;
+        let woken = launch.signals.wait(&flow.inputs.listeners(), Some(flow.output.listener()), wake::NET)?;
         flow.statistics.wakes += 1;
         if woken.stop {
             flow.statistics.duplicates = flow.inputs.duplicates();
@@ -88,6 +86,7 @@ impl<S: Stage> Flow<'_, S> {
     }
 
     fn end(&mut self, item: Item) -> Result<(), StageError> {
+        self.promise(&item)?;
         self.ended = true;
         let mut draft = self.output.loan()?;
         *draft.header().item_mut() = Item { flags: flag::END, ..item };
@@ -102,9 +101,9 @@ impl<S: Stage> Flow<'_, S> {
 
     /// What a stage sends is consecutive: a hole in its history would kill each reader that is restarted on it.
     fn promise(&self, item: &Item) -> Result<(), StageError> {
-        match self.last_sent {
-            Some(last) if item.seq != last + 1 => {
-                Err(StageError::BrokenPromise { topic: S::Output::TOPIC, expected: last + 1, got: item.seq })
+        match self.last_sent.map(|last| last.saturating_add(1)) {
+            Some(expected) if item.seq != expected => {
+                Err(StageError::BrokenPromise { topic: S::Output::TOPIC, expected, got: item.seq })
             }
             _ => Ok(()),
         }

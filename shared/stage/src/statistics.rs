@@ -23,6 +23,11 @@ pub struct Statistics {
     pub busy_ns: u64,
 }
 
+/// Where a stage leaves them, in the run's root: its last life's are what counts.
+pub(crate) fn file_name(stage: &str) -> String {
+    format!("{stage}.statistics.json")
+}
+
 /// Items that may allocate: the first few grow what is then kept.
 pub(crate) const WARM_UP: u64 = 5;
 

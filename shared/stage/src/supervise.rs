@@ -20,6 +20,7 @@ use crate::{
     StageError, Statistics, clock,
     reader::Port,
     services::{self, Node, Services},
+    statistics,
     wake::{self, Signals},
 };
 use child::Child;
@@ -37,8 +38,8 @@ pub fn supervise(plan: &Plan, observe: &mut dyn FnMut(Event<'_>)) -> Result<Repo
     let mut supervisor = Supervisor::new(plan, signals, observe)?;
     let ending = supervisor.start().and_then(|()| supervisor.watch());
     supervisor.stop()?;
-    let statistics = statistics(plan)?;
-    Ok(Report { ending: ending?, restarts: supervisor.restarts, recovery: supervisor.recovery, statistics })
+    let (restarts, recovery) = (supervisor.restarts, supervisor.recovery);
+    Ok(Report { ending: ending?, restarts, recovery, statistics: statistics(plan) })
 }
 
 struct Supervisor<'a> {
@@ -104,7 +105,7 @@ impl<'a> Supervisor<'a> {
     fn watch(&mut self) -> Result<Ending, SuperviseError> {
         self.last_progress = Instant::now();
         loop {
-            let woken = self.signals.wait(&[self.poses.listener()], wake::NET)?;
+            let woken = self.signals.wait(&[self.poses.listener()], None, wake::NET)?;
             if woken.stop {
                 return Ok(Ending::Interrupted);
             }
@@ -157,7 +158,7 @@ impl<'a> Supervisor<'a> {
             *self.restarts.entry(child.name().to_owned()).or_default() += 1;
         }
         if !backoff.is_zero() {
-            self.signals.wait(&[], backoff)?;
+            self.signals.wait(&[], None, backoff)?;
         }
         let again: Vec<usize> = if everybody { self.generation(dead) } else { dead.to_vec() };
         self.restart(&again, died_ns)?;
@@ -203,7 +204,7 @@ impl<'a> Supervisor<'a> {
         self.children.iter().for_each(Child::ask_to_end);
         let patience = Instant::now() + PATIENCE;
         while Instant::now() < patience && !self.children.iter_mut().all(Child::has_ended) {
-            self.signals.wait(&[], wake::NET)?;
+            self.signals.wait(&[], None, wake::NET)?;
         }
         self.children.iter_mut().for_each(Child::kill);
         Ok(())
@@ -231,19 +232,10 @@ fn use_as_global(path: &std::path::Path) -> Result<(), StageError> {
 }
 
 /// What the stages left of themselves at their orderly ends, by name.
-fn statistics(plan: &Plan) -> Result<BTreeMap<String, Statistics>, StageError> {
-    let mut statistics = BTreeMap::new();
-    for stage in &plan.stages {
-        let prefix = format!("{}-", stage.name);
-        let files = fs::read_dir(&plan.manifest.root)
-            .map_err(|source| StageError::File { path: plan.manifest.root.clone(), source })?;
-        for file in files.flatten() {
-            let name = file.file_name().to_string_lossy().into_owned();
-            if name.starts_with(&prefix) && name.ends_with(".statistics.json") {
-                let life = fs::read_to_string(file.path()).ok().and_then(|text| serde_json::from_str(&text).ok());
-                statistics.extend(life.map(|life: Statistics| (stage.name.clone(), life)));
-            }
-        }
-    }
-    Ok(statistics)
+fn statistics(plan: &Plan) -> BTreeMap<String, Statistics> {
+    let left = |stage: &StagePlan| {
+        let text = fs::read_to_string(plan.manifest.root.join(statistics::file_name(&stage.name))).ok()?;
+        Some((stage.name.clone(), serde_json::from_str(&text).ok()?))
+    };
+    plan.stages.iter().filter_map(left).collect()
 }

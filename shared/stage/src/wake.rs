@@ -4,6 +4,7 @@
 //! limit after which the queues are looked at all the same; what that net catches is counted.
 
 use std::{
+    cell::Cell,
     io::Read,
     os::{
         fd::{AsFd, BorrowedFd},
@@ -12,16 +13,14 @@ use std::{
     time::Duration,
 };
 
-use iceoryx2::prelude::{FileDescriptorBased, ipc};
+use iceoryx2::prelude::FileDescriptorBased;
 use rustix::{
     event::{PollFd, PollFlags, Timespec, poll},
     io::Errno,
 };
 use signal_hook::{consts, low_level::pipe};
 
-use crate::StageError;
-
-type Listener = iceoryx2::port::listener::Listener<ipc::Service>;
+use crate::{StageError, services::Listener};
 
 /// The longest sleep.
 pub const NET: Duration = Duration::from_millis(200);
@@ -31,12 +30,14 @@ pub const NET: Duration = Duration::from_millis(200);
 pub struct Signals {
     stop: UnixStream,
     child: UnixStream,
+    /// A request to stop is never forgotten, whoever slept when it came.
+    stopped: Cell<bool>,
 }
 
 /// What ended a sleep.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Woken {
-    /// SIGTERM or SIGINT has come.
+    /// SIGTERM, SIGINT or SIGHUP has come, now or earlier.
     pub stop: bool,
     /// A child process has ended.
     pub child: bool,
@@ -45,7 +46,7 @@ pub struct Woken {
 }
 
 impl Signals {
-    /// From here on SIGTERM, SIGINT and SIGCHLD wake the process instead of ending it.
+    /// From here on SIGTERM, SIGINT, SIGHUP and SIGCHLD wake the process instead of ending it.
     pub fn install() -> Result<Self, StageError> {
         let failed = |error: std::io::Error| StageError::transport("install the signal handlers", error);
         let (stop, stop_end) = UnixStream::pair().map_err(failed)?;
@@ -53,30 +54,39 @@ impl Signals {
         for socket in [&stop, &child] {
             socket.set_nonblocking(true).map_err(failed)?;
         }
-        pipe::register(consts::SIGTERM, stop_end.try_clone().map_err(failed)?).map_err(failed)?;
-        pipe::register(consts::SIGINT, stop_end).map_err(failed)?;
+        for signal in [consts::SIGTERM, consts::SIGINT, consts::SIGHUP] {
+            pipe::register(signal, stop_end.try_clone().map_err(failed)?).map_err(failed)?;
+        }
         pipe::register(consts::SIGCHLD, child_end).map_err(failed)?;
-        Ok(Self { stop, child })
+        Ok(Self { stop, child, stopped: Cell::new(false) })
     }
 
     /// Sleeps until one of the listeners is notified, a signal comes or `limit` is over, whichever is first.
-    /// The notifications are consumed: look at all queues afterwards.
-    pub fn wait(&self, listeners: &[&Listener], limit: Duration) -> Result<Woken, StageError> {
+    /// The notifications of `data` are consumed: look at all queues afterwards. A notification of `hello` is left for
+    /// [`Writer::greet`](crate::writer::Writer::greet), to be called next.
+    pub(crate) fn wait(
+        &self,
+        data: &[&Listener],
+        hello: Option<&Listener>,
+        limit: Duration,
+    ) -> Result<Woken, StageError> {
         let mut polled: Vec<PollFd<'_>> = vec![
             PollFd::from_borrowed_fd(self.stop.as_fd(), PollFlags::IN),
             PollFd::from_borrowed_fd(self.child.as_fd(), PollFlags::IN),
         ];
-        polled.extend(listeners.iter().map(|listener| PollFd::from_borrowed_fd(descriptor(listener), PollFlags::IN)));
+        let listeners = data.iter().copied().chain(hello);
+        polled.extend(listeners.map(|listener| PollFd::from_borrowed_fd(descriptor(listener), PollFlags::IN)));
         let limit = Timespec { tv_sec: limit.as_secs() as i64, tv_nsec: i64::from(limit.subsec_nanos()) };
         let ready = match poll(&mut polled, Some(&limit)) {
             Ok(ready) => ready,
             Err(Errno::INTR) => 1,
             Err(error) => return Err(StageError::transport("wait", error)),
         };
-        for listener in listeners {
+        for listener in data {
             listener.try_wait(|_| ()).map_err(|e| StageError::transport("read notifications", e))?;
         }
-        Ok(Woken { stop: drain(&self.stop), child: drain(&self.child), timed_out: ready == 0 })
+        self.stopped.set(drain(&self.stop) || self.stopped.get());
+        Ok(Woken { stop: self.stopped.get(), child: drain(&self.child), timed_out: ready == 0 })
     }
 }
 

@@ -62,12 +62,19 @@ impl<M: Message> Writer<M> {
         self.notify()
     }
 
-    /// Hands the history to readers that have come since the last call.
+    /// Hands the history to readers that have come since the last call, and wakes them.
+    ///
+    /// Without a newcomer nobody is woken: who is woken greets, so greetings would go around for ever.
     pub fn greet(&self) -> Result<(), StageError> {
+        let mut newcomer = false;
+        self.hello
+            .try_wait(|_| newcomer = true)
+            .map_err(|e| StageError::transport(format!("hear the readers of {}", M::TOPIC), e))?;
+        // In any case, for a greeting can be lost; its reader then finds the history when its own wait is over.
         self.publisher
             .update_connections()
             .map_err(|e| StageError::transport(format!("connect the readers of {}", M::TOPIC), e))?;
-        self.notify()
+        if newcomer { self.notify() } else { Ok(()) }
     }
 
     /// What new readers greet with.

@@ -4,7 +4,7 @@
 use std::io::{self, Write};
 
 use super::{LineError, check_growing, lines, numbers};
-use crate::stamp;
+use crate::dataset::stamp;
 use crate::trajectory::{Trajectory, mirrored, planar};
 
 pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {

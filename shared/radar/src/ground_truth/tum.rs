@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use nalgebra::{Isometry2, Vector2};
 
 use super::{LineError, check_growing, lines, numbers};
-use crate::stamp;
+use crate::dataset::stamp;
 use crate::trajectory::Trajectory;
 
 pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {

@@ -1,7 +1,7 @@
 //! What looks wrong with a dataset, in sentences.
 
 use super::{Chirps, Report, TimingReport, TruthReport};
-use crate::options::{DatasetOptions, Format};
+use crate::dataset::{DatasetOptions, Format};
 
 /// Scans that are named one by one; more are counted.
 const NAMED: usize = 8;

@@ -3,12 +3,12 @@
 //! `radar/<us>.png`, 400 azimuths x (11 + 3768), named by the start of the sweep; azimuths clockwise from ahead.
 //! OORD keeps the images in `Navtech_CTS350-X_Radar/`, and its encoder columns are not to be trusted.
 
-use crate::detect::Found;
-use crate::error::OpenError;
-use crate::first_look::NamedBy;
-use crate::navtech_png::ByteTen;
-use crate::navtech_scans::{NavtechScans, Profile, ScanTime};
-use crate::options::{AzimuthSource, DatasetOptions, Format};
+use super::detect::Found;
+use super::error::OpenError;
+use super::first_look::NamedBy;
+use super::navtech_png::ByteTen;
+use super::navtech_scans::{NavtechScans, Profile, ScanTime};
+use super::options::{AzimuthSource, DatasetOptions, Format};
 
 /// Metres a range bin. The dataset's own kit says 0.0432, with which paths come out 1.4 % short of the ground truth.
 pub const RANGE_RESOLUTION_M: f32 = 0.0438;

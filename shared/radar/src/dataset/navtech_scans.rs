@@ -2,16 +2,16 @@
 
 use std::path::Path;
 
-use crate::dataset::Dataset;
-use crate::detect::Found;
-use crate::error::{OpenError, ReadError};
-use crate::first_look::{FirstLook, NamedBy};
-use crate::images::Images;
-use crate::navtech_png::{self, ByteTen, METADATA_BYTES};
-use crate::options::{AzimuthSource, DatasetOptions, Format};
-use crate::png_image::ImageSize;
+use super::Dataset;
+use super::detect::Found;
+use super::error::{OpenError, ReadError};
+use super::first_look::{FirstLook, NamedBy};
+use super::images::Images;
+use super::navtech_png::{self, ByteTen, METADATA_BYTES};
+use super::options::{AzimuthSource, DatasetOptions, Format};
+use super::png_image::ImageSize;
+use super::stamp;
 use crate::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, Sense, SweepGeometry};
-use crate::stamp;
 
 /// How a scan's time follows from its rows'.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::OpenError;
+use super::error::OpenError;
 
 /// A dataset's form of files, named in configurations in kebab case (`boreas-rt`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]

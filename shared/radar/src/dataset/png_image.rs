@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{self, Cursor, Read};
 use std::path::Path;
 
-use crate::error::ReadError;
+use super::error::ReadError;
 
 /// Most bytes of one image: 1024 azimuths of 32,768 range bins and their metadata.
 const MAX_IMAGE_BYTES: u64 = 1024 * (32_768 + 11);

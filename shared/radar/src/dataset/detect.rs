@@ -3,10 +3,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::error::OpenError;
-use crate::first_look::{FirstLook, NamedBy};
-use crate::images::{Images, has_png};
-use crate::options::Format;
+use super::error::OpenError;
+use super::first_look::{FirstLook, NamedBy};
+use super::images::{Images, has_png};
+use super::options::Format;
 
 /// A dataset that was found, before its format's reader takes over.
 #[derive(Debug)]

@@ -4,13 +4,13 @@
 //! not turn quite evenly, so that the encoder is to be believed. A bin lies at `bin * resolution - 0.31 m`; whether its near edge
 //! or its centre is meant is not said, and half a bin (0.02 m) is below what the offset is known to.
 
-use crate::detect::Found;
-use crate::error::OpenError;
-use crate::first_look::{FirstLook, NamedBy};
-use crate::navtech_png::ByteTen;
-use crate::navtech_scans::{NavtechScans, Profile, ScanTime};
-use crate::options::{AzimuthSource, DatasetOptions, Format};
-use crate::stamp::SECOND_NS;
+use super::detect::Found;
+use super::error::OpenError;
+use super::first_look::{FirstLook, NamedBy};
+use super::navtech_png::ByteTen;
+use super::navtech_scans::{NavtechScans, Profile, ScanTime};
+use super::options::{AzimuthSource, DatasetOptions, Format};
+use super::stamp::SECOND_NS;
 
 /// Metres a range bin before 2021-09-21, when the radar's firmware was changed.
 pub const OLD_RANGE_RESOLUTION_M: f32 = 0.0596;

@@ -1,9 +1,9 @@
 //! What one image with Navtech's columns says of its dataset, before anything is decided.
 
-use crate::images::Images;
-use crate::navtech_png::{METADATA_BYTES, RowMetadata, chirps_alternate, rows};
-use crate::png_image::ImageSize;
-use crate::stamp;
+use super::images::Images;
+use super::navtech_png::{METADATA_BYTES, RowMetadata, chirps_alternate, rows};
+use super::png_image::ImageSize;
+use super::stamp;
 
 /// How near the time in a file's name must be to a row's to count as that row's, ns.
 const SAME_TIME_NS: i64 = 5_000_000;

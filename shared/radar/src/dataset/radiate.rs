@@ -7,15 +7,15 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::dataset::Dataset;
-use crate::detect::Found;
-use crate::error::{OpenError, ReadError};
-use crate::options::{DatasetOptions, Format};
-use crate::png_image::ImageSize;
+use super::Dataset;
+use super::detect::Found;
+use super::error::{OpenError, ReadError};
+use super::options::{DatasetOptions, Format};
+use super::png_image::ImageSize;
+use super::sensor_clock::SensorClock;
+use super::sideways::{SidewaysScans, mean_after_start_ns};
+use super::stamp::{self, SECOND_NS};
 use crate::scan::{ScanLimits, ScanSlot, SweepGeometry};
-use crate::sensor_clock::SensorClock;
-use crate::sideways::{SidewaysScans, mean_after_start_ns};
-use crate::stamp::{self, SECOND_NS};
 
 /// Full range of the images, m.
 const RANGE_M: f32 = 100.0;

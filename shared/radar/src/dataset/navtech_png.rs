@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use crate::error::ReadError;
-use crate::options::AzimuthSource;
-use crate::png_image::ImageSize;
+use super::error::ReadError;
+use super::options::AzimuthSource;
+use super::png_image::ImageSize;
+use super::stamp;
 use crate::scan::flag;
-use crate::stamp;
 
 /// Bytes before the first power of a row.
 pub(crate) const METADATA_BYTES: usize = 11;

@@ -1,11 +1,11 @@
 //! FoMo: `navtech/<us>.png`, Oxford's columns, an encoder of 5595 counts by its kit.
 
-use crate::detect::Found;
-use crate::error::OpenError;
-use crate::first_look::NamedBy;
-use crate::navtech_png::ByteTen;
-use crate::navtech_scans::{NavtechScans, Profile, ScanTime};
-use crate::options::{AzimuthSource, DatasetOptions, Format};
+use super::detect::Found;
+use super::error::OpenError;
+use super::first_look::NamedBy;
+use super::navtech_png::ByteTen;
+use super::navtech_scans::{NavtechScans, Profile, ScanTime};
+use super::options::{AzimuthSource, DatasetOptions, Format};
 
 /// Metres a range bin.
 pub const RANGE_RESOLUTION_M: f32 = 0.0438;

@@ -3,17 +3,17 @@
 
 use std::path::Path;
 
-use crate::dataset::Dataset;
-use crate::detect::Found;
-use crate::error::{OpenError, ReadError};
-use crate::first_look::NamedBy;
-use crate::navtech_png::ByteTen;
-use crate::navtech_scans::{NavtechScans, Profile, ScanTime};
-use crate::options::{AzimuthSource, DatasetOptions, Format};
-use crate::png_image::ImageSize;
+use super::Dataset;
+use super::detect::Found;
+use super::error::{OpenError, ReadError};
+use super::first_look::NamedBy;
+use super::navtech_png::ByteTen;
+use super::navtech_scans::{NavtechScans, Profile, ScanTime};
+use super::options::{AzimuthSource, DatasetOptions, Format};
+use super::png_image::ImageSize;
+use super::sideways::{SidewaysScans, mean_after_start_ns};
+use super::stamp;
 use crate::scan::{ScanLimits, ScanSlot, SweepGeometry};
-use crate::sideways::{SidewaysScans, mean_after_start_ns};
-use crate::stamp;
 
 /// Metres a range bin: 200 m over 3360 bins.
 pub const RANGE_RESOLUTION_M: f32 = 200.0 / 3360.0;

@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::error::{OpenError, ReadError};
-use crate::png_image::{self, ImageReader, ImageSize};
-use crate::stamp;
+use super::error::{OpenError, ReadError};
+use super::png_image::{self, ImageReader, ImageSize};
+use super::stamp;
 
 /// Images that are tried for one that can be read, when the first ones are damaged.
 const FIRST_TRIES: usize = 8;

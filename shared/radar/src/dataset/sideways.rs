@@ -1,11 +1,11 @@
 //! Images without metadata that lie on their side: rows are range (the first is the nearest), columns azimuth from straight ahead.
 
-use crate::detect::Found;
-use crate::error::{OpenError, ReadError};
-use crate::images::Images;
-use crate::navtech_png::fill_uniform;
-use crate::navtech_scans::check_room;
-use crate::options::{DatasetOptions, Format};
+use super::detect::Found;
+use super::error::{OpenError, ReadError};
+use super::images::Images;
+use super::navtech_png::fill_uniform;
+use super::navtech_scans::check_room;
+use super::options::{DatasetOptions, Format};
 use crate::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, Sense, SweepGeometry, flag};
 
 /// Pixels of a square that is turned at once: a cache line wide, so that neither side is walked through memory pixel by pixel.

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use crate::options::Format;
-use crate::png_image::ImageSize;
+use super::options::Format;
+use super::png_image::ImageSize;
 
 /// A dataset that cannot be opened at all.
 #[derive(Debug, thiserror::Error)]

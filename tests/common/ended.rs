@@ -1,0 +1,65 @@
+//! What a command said, and how it ended.
+
+use std::process::{Command, ExitStatus};
+
+/// A run that is over, or another command.
+#[derive(Clone, Debug)]
+pub struct Ended {
+    /// How.
+    pub status: ExitStatus,
+    /// What it printed.
+    pub stdout: String,
+    /// What it told the person at the terminal.
+    pub stderr: String,
+}
+
+impl Ended {
+    /// Runs a command that ends by itself.
+    pub fn of(mut command: Command) -> Self {
+        let output = command.env("RUST_BACKTRACE", "1").output().unwrap();
+        let text = |bytes| String::from_utf8(bytes).unwrap();
+        Self { status: output.status, stdout: text(output.stdout), stderr: text(output.stderr) }
+    }
+
+    /// Its exit code; `None` when a signal ended it.
+    pub fn code(&self) -> Option<i32> {
+        self.status.code()
+    }
+
+    /// Asserts that it ended well, without a word of panic.
+    pub fn succeeded(&self) -> &Self {
+        assert!(self.status.success(), "{}\n{}", self.status, self.stderr);
+        self.assert_calm();
+        self
+    }
+
+    /// Asserts that it said one sentence with all of these words, nothing else, and failed.
+    pub fn refused_with(&self, words: &[&str]) -> &Self {
+        assert_eq!(self.stderr.lines().count(), 1, "more than one sentence:\n{}", self.stderr);
+        assert_eq!(self.stdout, "");
+        self.failed_with(words)
+    }
+
+    /// Asserts that its last words were one sentence with all of these words, and that it failed.
+    pub fn failed_with(&self, words: &[&str]) -> &Self {
+        assert_eq!(self.code(), Some(1), "{}", self.stderr);
+        self.assert_calm();
+        let sentence = sentence_of(&self.stderr);
+        assert!(!sentence.is_empty(), "no sentence begins with `gyre: `:\n{}", self.stderr);
+        for word in words {
+            assert!(sentence.contains(word), "`{word}` is not in: {sentence}");
+        }
+        self
+    }
+
+    fn assert_calm(&self) {
+        for text in [&self.stdout, &self.stderr] {
+            assert!(!text.contains("panicked") && !text.contains("backtrace"), "{text}");
+        }
+    }
+}
+
+/// The last line, if it is what the program says of itself; else nothing.
+pub fn sentence_of(stderr: &str) -> &str {
+    stderr.lines().last().and_then(|line| line.strip_prefix("gyre: ")).unwrap_or_default()
+}

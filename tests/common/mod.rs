@@ -1,0 +1,193 @@
+//! What the whole-pipeline tests share: a [`Run`] is a `gyre run` command with results of its own, [`Running`] is one that goes
+//! on, [`Ended`] is what it said. Every run that ends is checked to have left nothing behind.
+
+// Each test binary uses its own part of this.
+#![allow(dead_code, clippy::unwrap_used)]
+
+mod ended;
+mod leftovers;
+pub mod odometry;
+mod processes;
+pub mod recording;
+mod running;
+
+use std::{
+    ffi::OsStr,
+    fs::{self, File},
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+    sync::{Arc, OnceLock},
+};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+pub use ended::{Ended, sentence_of};
+pub use leftovers::assert_nothing_left;
+pub use processes::{Pid, cpu_time, send};
+pub use running::Running;
+
+/// The stages in the order of the stream.
+pub const STAGES: [&str; 5] = ["radar-replay", "masking", "rotation-search", "translation-search", "pose-integration"];
+
+/// Small rasters: the tests are about processes.
+const CONFIGURATION: &str = "[raster]\nn = 127\ncell_m = 0.8\n";
+
+/// The program under test.
+pub fn gyre() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_gyre"))
+}
+
+/// A folder of real data; says so and returns `None` where there is none.
+pub fn real_data(folder: &str) -> Option<PathBuf> {
+    match std::env::var_os("GYRE_DATA") {
+        Some(data) => Some(Path::new(&data).join(folder)),
+        None => {
+            println!("skipped: GYRE_DATA is not set");
+            None
+        }
+    }
+}
+
+/// A `gyre run` command: start it as often as you like, it has the same results directory each time.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// Holds the configuration, the results and what the run says.
+    folder: Arc<TempDir>,
+    out: PathBuf,
+    configuration: PathBuf,
+    arguments: Vec<String>,
+}
+
+impl Run {
+    /// A run of the small recording, as fast as it goes.
+    pub fn of_recording() -> Self {
+        Self::configured(CONFIGURATION).data(recording::small())
+    }
+
+    /// A run of this configuration text.
+    pub fn configured(text: &str) -> Self {
+        let folder = tempfile::Builder::new().prefix("gyre-test-").tempdir().unwrap();
+        let configuration = folder.path().join("test.toml");
+        fs::write(&configuration, text).unwrap();
+        let out = folder.path().join("out");
+        Self { folder: Arc::new(folder), out, configuration, arguments: Vec::new() }
+    }
+
+    /// A run of this configuration file.
+    pub fn of_file(configuration: &Path) -> Self {
+        Self { configuration: configuration.to_owned(), ..Self::configured("") }
+    }
+
+    /// The same with `--data`.
+    pub fn data(self, folder: &Path) -> Self {
+        self.argument("--data", folder.to_str().unwrap())
+    }
+
+    /// The same with `--rate`.
+    pub fn rate(self, rate: &str) -> Self {
+        self.argument("--rate", rate)
+    }
+
+    /// The same with `--set`.
+    pub fn set(self, sentence: &str) -> Self {
+        self.argument("--set", sentence)
+    }
+
+    /// The same with its results in `out`.
+    pub fn into(mut self, out: &Path) -> Self {
+        self.out = out.to_owned();
+        self
+    }
+
+    /// The same with another option.
+    pub fn argument(mut self, option: &str, value: &str) -> Self {
+        self.arguments.extend([option.to_owned(), value.to_owned()]);
+        self
+    }
+
+    /// The same with an option that has no value.
+    pub fn option(mut self, option: &str) -> Self {
+        self.arguments.push(option.to_owned());
+        self
+    }
+
+    /// The same with an executable shell script for a stage; `{gyre}` in it stands for the program under test.
+    pub fn stage_script(self, stage: &str, script: &str) -> Self {
+        use std::os::unix::fs::PermissionsExt;
+        let path = self.folder.path().join(format!("{stage}.sh"));
+        let script = script.replace("{gyre}", env!("CARGO_BIN_EXE_gyre"));
+        fs::write(&path, format!("#!/bin/sh\n{script}\n")).unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+        let command = format!("stages.{stage}.command=['{}']", path.display());
+        self.set(&command)
+    }
+
+    /// A place for the test's own files that goes with the run.
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Where its results are.
+    pub fn out(&self) -> &Path {
+        &self.out
+    }
+
+    /// The command line.
+    pub fn command(&self) -> Command {
+        let mut command = gyre();
+        command.arg("run").arg(&self.configuration).args(&self.arguments).arg("--out").arg(&self.out);
+        command
+    }
+
+    /// Starts it.
+    pub fn start(&self) -> Running {
+        self.start_as(self.command())
+    }
+
+    /// Starts it by another command that becomes it, a shell's `exec` for instance.
+    pub fn start_as(&self, mut command: Command) -> Running {
+        let file = |name| File::create(self.folder.path().join(name)).unwrap();
+        command.stdin(Stdio::null()).stdout(file("stdout.txt")).stderr(file("stderr.txt"));
+        // A backtrace in what a person reads would go unnoticed without this.
+        command.env("RUST_BACKTRACE", "1").env_remove("GYRE_LOG");
+        Running::new(self.clone(), command.spawn().unwrap())
+    }
+
+    /// Starts it and waits until it ends.
+    pub fn finish(&self) -> Ended {
+        self.start().finish()
+    }
+
+    /// Starts it, waits until it ends well, and returns its `odometry.csv`.
+    pub fn complete(&self) -> String {
+        self.finish().succeeded();
+        self.odometry()
+    }
+
+    /// Its `odometry.csv`.
+    pub fn odometry(&self) -> String {
+        self.result("odometry.csv")
+    }
+
+    /// Its `summary.json`.
+    pub fn summary(&self) -> Value {
+        serde_json::from_str(&self.result("summary.json")).unwrap()
+    }
+
+    /// A file of its results.
+    pub fn result(&self, name: impl AsRef<Path>) -> String {
+        let path = self.out.join(name);
+        fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+    }
+
+    fn said(&self, name: impl AsRef<OsStr>) -> String {
+        fs::read_to_string(self.folder.path().join(name.as_ref())).unwrap()
+    }
+}
+
+/// `odometry.csv` of the small recording when nothing disturbs the run.
+pub fn undisturbed() -> &'static str {
+    static ODOMETRY: OnceLock<String> = OnceLock::new();
+    ODOMETRY.get_or_init(|| Run::of_recording().complete())
+}

@@ -1,0 +1,30 @@
+//! Reading `odometry.csv`.
+
+/// What a row says of its place in the chain of motions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Row {
+    /// Number in the chain.
+    pub seq: u64,
+    /// The scan.
+    pub scan: u64,
+    /// The scan that it was compared with.
+    pub previous_scan: u64,
+}
+
+/// The rows below the header.
+pub fn rows(csv: &str) -> Vec<Row> {
+    let row = |line: &str| {
+        let mut fields = line.split(',').map(|field| field.parse().unwrap_or(u64::MAX));
+        let mut next = || fields.next().unwrap_or(u64::MAX);
+        Row { seq: next(), scan: next(), previous_scan: next() }
+    };
+    csv.lines().skip(1).map(row).collect()
+}
+
+/// Asserts that each motion begins where the one before ended.
+pub fn assert_unbroken(rows: &[Row]) {
+    for pair in rows.windows(2) {
+        assert_eq!(pair[1].previous_scan, pair[0].scan, "{pair:?}");
+        assert_eq!(pair[1].seq, pair[0].seq + 1, "{pair:?}");
+    }
+}

@@ -1,0 +1,66 @@
+//! Looking at processes through /proc.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use rustix::process::{Signal, kill_process};
+
+/// A process id.
+pub type Pid = u32;
+
+/// Sends a signal. That the process is gone already is no error.
+pub fn send(pid: Pid, signal: Signal) {
+    if let Some(pid) = rustix::process::Pid::from_raw(pid as i32) {
+        let _ = kill_process(pid, signal);
+    }
+}
+
+/// The time that a process has spent computing.
+pub fn cpu_time(pid: Pid) -> Duration {
+    let stat = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap();
+    // After the name in brackets: state, ppid, ...; utime and stime are the 14th and 15th of all, in hundredths of a second.
+    let fields: Vec<&str> = stat.rsplit_once(") ").unwrap().1.split(' ').collect();
+    let ticks: u64 = fields[11].parse::<u64>().unwrap() + fields[12].parse::<u64>().unwrap();
+    Duration::from_millis(ticks * 10)
+}
+
+/// The living stages among a supervisor's children, by name.
+pub fn stages_of(supervisor: Pid) -> BTreeMap<String, Pid> {
+    let ours = |pid: &Pid| parent_and_state(*pid).is_some_and(|(parent, state)| parent == supervisor && state != 'Z');
+    pids().filter(ours).filter_map(|pid| Some((stage_name(pid)?, pid))).collect()
+}
+
+/// Processes of the run at `root`, by what their environment says.
+pub fn of_run(root: &Path) -> Vec<Pid> {
+    let mark = format!("GYRE_RUN={}", root.display());
+    let ours = |pid: &Pid| {
+        let environment = fs::read(format!("/proc/{pid}/environ")).unwrap_or_default();
+        environment.split(|byte| *byte == 0).any(|variable| variable == mark.as_bytes())
+    };
+    pids().filter(ours).collect()
+}
+
+fn pids() -> impl Iterator<Item = Pid> {
+    let entries = fs::read_dir("/proc").unwrap();
+    entries.filter_map(|entry| entry.ok()?.file_name().to_str()?.parse().ok())
+}
+
+fn parent_and_state(pid: Pid) -> Option<(Pid, char)> {
+    let stat = fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
+    let mut fields = stat.rsplit_once(") ")?.1.split(' ');
+    let state = fields.next()?.chars().next()?;
+    Some((fields.next()?.parse().ok()?, state))
+}
+
+/// `gyre stage NAME`, or a script that is named after the stage.
+fn stage_name(pid: Pid) -> Option<String> {
+    let line = fs::read(format!("/proc/{pid}/cmdline")).ok()?;
+    let last = line.split(|byte| *byte == 0).rfind(|word| !word.is_empty())?;
+    let path = PathBuf::from(String::from_utf8_lossy(last).into_owned());
+    let name = path.file_stem()?.to_string_lossy().into_owned();
+    super::STAGES.contains(&name.as_str()).then_some(name)
+}

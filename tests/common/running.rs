@@ -1,0 +1,146 @@
+//! A run that goes on: what to wait for, and how to disturb it.
+
+use std::{
+    collections::BTreeMap,
+    process::{Child, ExitStatus},
+    thread,
+    time::{Duration, Instant},
+};
+
+use gyre_pose_integration::journal;
+use rustix::process::Signal;
+
+use super::{
+    Ended, Pid, Run, STAGES, leftovers,
+    processes::{self, send},
+};
+
+/// A run of the small recording takes a second or two; so much more only on a machine that does a lot besides.
+const LIMIT: Duration = Duration::from_secs(90);
+/// Between two looks at what happens.
+const LOOK: Duration = Duration::from_millis(2);
+
+/// See the module. Dropped before its end, it is killed.
+pub struct Running {
+    run: Run,
+    child: Child,
+}
+
+impl Running {
+    pub(super) fn new(run: Run, child: Child) -> Self {
+        Self { run, child }
+    }
+
+    /// The supervisor.
+    pub fn pid(&self) -> Pid {
+        self.child.id()
+    }
+
+    /// The living stages by name.
+    pub fn stages(&self) -> BTreeMap<String, Pid> {
+        processes::stages_of(self.pid())
+    }
+
+    /// Waits until all five live.
+    pub fn await_stages(&mut self) -> BTreeMap<String, Pid> {
+        self.until("five stages", |running| Some(running.stages()).filter(|stages| stages.len() == STAGES.len()))
+    }
+
+    /// Waits until a stage lives, and returns at once.
+    pub fn await_stage(&mut self, name: &str) -> Pid {
+        self.until(name, |running| running.stages().get(name).copied())
+    }
+
+    /// Waits until a stage lives as another process than `not`.
+    pub fn await_other_stage(&mut self, name: &str, not: Pid) -> Pid {
+        self.until(name, |running| running.stages().get(name).copied().filter(|pid| *pid != not))
+    }
+
+    /// Waits until so many poses are journalled.
+    pub fn await_poses(&mut self, poses: usize) -> &mut Self {
+        self.until("poses", |running| (running.poses() >= poses).then_some(()));
+        self
+    }
+
+    /// Poses in the journal.
+    pub fn poses(&self) -> usize {
+        journal::read(&journal::path(self.run.out())).map_or(0, |poses| poses.len())
+    }
+
+    /// What the run takes of shared memory.
+    pub fn shared_memory_bytes(&self) -> u64 {
+        leftovers::bytes(self.run.out())
+    }
+
+    /// `kill -9` of a stage, which must live.
+    pub fn kill(&self, stage: &str) -> &Self {
+        let stages = self.stages();
+        send(*stages.get(stage).unwrap_or_else(|| panic!("{stage} is not among {stages:?}")), Signal::KILL);
+        self
+    }
+
+    /// A signal to the supervisor alone.
+    pub fn signal(&self, signal: Signal) -> &Self {
+        send(self.pid(), signal);
+        self
+    }
+
+    /// What the environment of each of its stages says.
+    pub fn mark(&self) -> String {
+        format!("GYRE_RUN={}", leftovers::root(self.run.out()).display())
+    }
+
+    /// Waits until the run ends, and asserts that it leaves nothing behind.
+    pub fn finish(mut self) -> Ended {
+        let status = self.wait();
+        leftovers::assert_nothing_left(self.run.out());
+        Ended { status, stdout: self.run.said("stdout.txt"), stderr: self.run.said("stderr.txt") }
+    }
+
+    /// `kill -9` of the supervisor; returns when its stages have followed it.
+    pub fn kill_supervisor(mut self) {
+        send(self.pid(), Signal::KILL);
+        self.wait();
+        let root = leftovers::root(self.run.out());
+        let patience = Instant::now() + Duration::from_secs(5);
+        while !processes::of_run(&root).is_empty() {
+            assert!(Instant::now() < patience, "stages outlive their supervisor: {:?}", processes::of_run(&root));
+            thread::sleep(LOOK);
+        }
+    }
+
+    fn wait(&mut self) -> ExitStatus {
+        let since = Instant::now();
+        loop {
+            if let Some(status) = self.child.try_wait().unwrap() {
+                return status;
+            }
+            assert!(since.elapsed() < LIMIT, "it does not end:\n{}", self.run.said("stderr.txt"));
+            thread::sleep(LOOK);
+        }
+    }
+
+    fn until<T>(&mut self, what: &str, mut look: impl FnMut(&Self) -> Option<T>) -> T {
+        let since = Instant::now();
+        loop {
+            if let Some(seen) = look(self) {
+                return seen;
+            }
+            let ended = self.child.try_wait().unwrap();
+            let said = || self.run.said("stderr.txt");
+            assert!(ended.is_none(), "it ended before there were {what}:\n{}", said());
+            assert!(since.elapsed() < LIMIT, "waited in vain for {what}:\n{}", said());
+            thread::sleep(LOOK);
+        }
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        if self.child.try_wait().is_ok_and(|status| status.is_none()) {
+            let _ = self.child.kill();
+            let _ = self.child.wait();
+            leftovers::remove(self.run.out());
+        }
+    }
+}

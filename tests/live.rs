@@ -1,0 +1,98 @@
+//! Live mode: a radar does not wait, so a slow stage sheds load, in one place, counted to the scan.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::{
+    Run,
+    odometry::{self, Row},
+    recording,
+};
+use serde_json::Value;
+
+/// The recording's period is 250 ms; played at this rate it is 60 ms and a bit.
+const RATE: &str = "4";
+/// One and a half of that.
+const SLOW_MASKING_MS: u64 = 94;
+
+fn live() -> Run {
+    Run::of_recording().rate(RATE).set("run.mode=live").set(&format!("masking.stress_delay_ms={SLOW_MASKING_MS}"))
+}
+
+/// Asserts that each scan is where it belongs: played, and then either in the chain or dropped.
+fn assert_exact(summary: &Value, rows: &[Row]) {
+    let count = |key: &str| summary[key].as_u64().unwrap();
+    assert_eq!(count("published"), recording::SCANS as u64, "{summary}");
+    assert_eq!(count("unreadable"), 0);
+    // A motion has a row, and each chain starts with a scan that has none.
+    let chains = count("breaks") + 1;
+    assert_eq!(count("processed"), rows.len() as u64 + chains, "{summary}");
+    assert_eq!(count("processed") + count("dropped"), count("published"));
+    assert!(count("dropped") > 0, "masking is too slow for every scan: {summary}");
+    assert_eq!(rows.last().unwrap().scan, recording::SCANS as u64 - 1, "the last scan is nobody's to drop");
+}
+
+/// Scans that the chain stepped over.
+fn stepped_over(rows: &[Row]) -> u64 {
+    rows.iter().map(|row| row.scan - row.previous_scan - 1).sum::<u64>() + rows[0].previous_scan
+}
+
+#[test]
+fn slow_masking_drops_scans_and_the_chain_does_not_break() {
+    let run = live();
+    let rows = odometry::rows(&run.complete());
+    let summary = run.summary();
+    assert_exact(&summary, &rows);
+    odometry::assert_unbroken(&rows);
+    assert_eq!(summary["breaks"], 0);
+    assert_eq!(summary["dropped"], stepped_over(&rows));
+    assert_eq!(summary["stages"]["radar-replay"]["processed"], summary["published"]);
+    assert_eq!(summary["stages"]["masking"]["processed"], summary["processed"]);
+}
+
+#[test]
+fn a_stage_behind_masking_can_die_and_the_chain_does_not_break() {
+    for stage in ["rotation-search", "translation-search", "pose-integration"] {
+        let run = live();
+        let mut running = run.start();
+        running.await_poses(5).kill(stage);
+        running.finish().succeeded();
+        let (summary, rows) = (run.summary(), odometry::rows(&run.odometry()));
+        assert_eq!(summary["restarts"][stage], 1);
+        assert_exact(&summary, &rows);
+        odometry::assert_unbroken(&rows);
+        assert_eq!(summary["dropped"], stepped_over(&rows), "{stage}");
+    }
+}
+
+#[test]
+fn masking_can_die_and_every_scan_is_still_accounted_for() {
+    let run = live();
+    let mut running = run.start();
+    running.await_poses(5).kill("masking");
+    running.finish().succeeded();
+    let (summary, rows) = (run.summary(), odometry::rows(&run.odometry()));
+    assert_eq!(summary["restarts"]["masking"], 1);
+    assert_exact(&summary, &rows);
+}
+
+#[test]
+fn the_source_can_die_and_every_scan_is_still_accounted_for() {
+    let run = live();
+    let mut running = run.start();
+    running.await_poses(5).kill("radar-replay");
+    running.finish().succeeded();
+    let (summary, rows) = (run.summary(), odometry::rows(&run.odometry()));
+    assert_eq!(summary["restarts"]["radar-replay"], 1);
+    assert_exact(&summary, &rows);
+}
+
+#[test]
+fn a_pipeline_that_keeps_up_drops_nothing_and_finds_what_lossless_finds() {
+    let run = Run::of_recording().rate("1.5").set("run.mode=live").set("source.scans=12");
+    let lossless = Run::of_recording().set("source.scans=12").complete();
+    let live = run.complete();
+    assert_eq!(run.summary()["dropped"], 0);
+    assert_eq!(live, lossless);
+}

@@ -1,0 +1,232 @@
+//! `gyre run` as a whole: five processes, the same result every time, whatever interrupts it.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::{collections::BTreeSet, fs};
+
+use common::{Ended, Run, STAGES, assert_nothing_left, odometry, recording, undisturbed};
+use rustix::process::Signal;
+
+/// Slow enough to be disturbed in the middle: the recording's six seconds in one.
+const MODERATE: &str = "6";
+const MIDDLE: usize = recording::SCANS / 3;
+
+#[test]
+fn five_processes_of_their_own_are_there_while_it_runs() {
+    let mut running = Run::of_recording().rate(MODERATE).start();
+    let stages = running.await_stages();
+    assert_eq!(stages.keys().map(String::as_str).collect::<BTreeSet<_>>(), BTreeSet::from(STAGES));
+    let pids: BTreeSet<_> = stages.values().copied().chain([running.pid()]).collect();
+    assert_eq!(pids.len(), 6, "{stages:?}");
+    for pid in stages.values() {
+        let environment = fs::read(format!("/proc/{pid}/environ")).unwrap();
+        assert!(
+            String::from_utf8_lossy(&environment).contains(&running.mark()),
+            "the run's place is named after --out"
+        );
+    }
+    running.finish().succeeded();
+}
+
+#[test]
+fn all_results_are_there_and_each_motion_has_a_row() {
+    let run = Run::of_recording();
+    let rows = odometry::rows(&run.complete());
+    assert_eq!(rows.len(), recording::SCANS - 1);
+    assert_eq!((rows[0].scan, rows[0].previous_scan), (1, 0));
+    odometry::assert_unbroken(&rows);
+    for (file, part) in [
+        ("trajectory.tum", "154713240"),
+        ("trajectory.svg", "<svg"),
+        ("errors.svg", "<svg"),
+        ("latency.json", "sensor_to_pose"),
+        ("config.toml", "[masking]"),
+        ("log.jsonl", ""),
+    ] {
+        assert!(run.result(file).contains(part), "{file}");
+    }
+    assert_eq!(run.result("trajectory.tum").lines().filter(|line| !line.starts_with('#')).count(), recording::SCANS);
+    assert!(run.out().join("journal/poses.journal").is_file());
+    for stage in STAGES {
+        assert_eq!(run.result(format!("log/{stage}.txt")), "", "{stage} complains");
+    }
+}
+
+#[test]
+fn the_summary_accounts_for_every_scan() {
+    let run = Run::of_recording();
+    run.complete();
+    let summary = run.summary();
+    for (key, value) in
+        [("published", recording::SCANS), ("processed", recording::SCANS), ("scans_in_recording", recording::SCANS)]
+    {
+        assert_eq!(summary[key], value, "{key}");
+    }
+    for key in ["dropped", "unreadable", "breaks", "resumed_after"] {
+        assert_eq!(summary[key], 0, "{key}");
+    }
+    assert_eq!(summary["ending"], "complete");
+    assert_eq!(summary["restarts"].as_object().unwrap().len(), 0);
+    for stage in STAGES {
+        assert_eq!(summary["stages"][stage]["processed"], recording::SCANS, "{stage}");
+    }
+}
+
+#[test]
+fn the_trajectory_follows_the_ground_truth() {
+    let run = Run::of_recording();
+    run.complete();
+    let evaluation = &run.summary()["evaluation"];
+    let (path, error) = (evaluation["path_m"].as_f64().unwrap(), evaluation["ate"]["rmse_m"].as_f64().unwrap());
+    assert!(path > 40.0 && error < 0.02 * path, "{error} m over {path} m");
+}
+
+#[test]
+fn a_repetition_gives_the_same_bytes() {
+    let run = Run::of_recording();
+    assert_eq!(run.complete(), undisturbed());
+    assert_eq!(run.complete(), undisturbed(), "in the same folder");
+}
+
+#[test]
+fn the_rate_does_not_change_the_result() {
+    assert_eq!(Run::of_recording().rate("12").complete(), undisturbed());
+}
+
+#[test]
+fn the_window_does_not_change_the_result() {
+    for window in [1, 2, 8] {
+        let odometry = Run::of_recording().set(&format!("run.window={window}")).complete();
+        assert_eq!(odometry, undisturbed(), "window {window}");
+    }
+}
+
+#[test]
+fn the_resolved_configuration_repeats_the_run() {
+    let run = Run::of_recording().set("masking.threshold=70").set("rotation.magnitude=log");
+    let odometry = run.complete();
+    assert_ne!(odometry, undisturbed());
+    assert_eq!(Run::of_file(&run.out().join("config.toml")).complete(), odometry);
+}
+
+#[test]
+fn the_resolved_configuration_plays_the_data_that_were_named_instead_of_a_simulation() {
+    let run = Run::configured("[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 3\nseed = 5\n");
+    let run = run.data(recording::small());
+    assert_eq!(run.complete(), undisturbed());
+    assert_eq!(Run::of_file(&run.out().join("config.toml")).complete(), undisturbed());
+}
+
+#[test]
+fn a_simulation_is_generated_and_judged() {
+    let run = Run::configured("[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 4\n");
+    assert_eq!(odometry::rows(&run.complete()).len(), 3);
+    assert!(run.summary()["evaluation"]["rpe"].is_object());
+}
+
+#[test]
+fn an_interrupt_leaves_nothing_and_the_same_command_goes_on() {
+    stopped_by(Signal::INT);
+}
+
+#[test]
+fn a_termination_leaves_nothing_and_the_same_command_goes_on() {
+    stopped_by(Signal::TERM);
+}
+
+fn stopped_by(signal: Signal) {
+    let run = Run::of_recording().rate(MODERATE);
+    let mut running = run.start();
+    running.await_poses(MIDDLE).signal(signal);
+    let ended = running.finish();
+    assert_eq!(ended.code(), Some(130), "{}", ended.stderr);
+    assert!(ended.stdout.contains("the same command goes on"), "{}", ended.stdout);
+    let summary = run.summary();
+    assert_eq!(summary["ending"], "interrupted");
+    let processed = summary["processed"].as_u64().unwrap();
+    assert!((MIDDLE as u64..recording::SCANS as u64).contains(&processed), "{processed}");
+    assert_resumes(&run, processed);
+}
+
+/// The command of a run that was cut short after `poses` poses or more goes on from there to the undisturbed result.
+fn assert_resumes(run: &Run, poses: u64) {
+    assert_eq!(run.complete(), undisturbed());
+    let resumed_after = run.summary()["resumed_after"].as_u64().unwrap();
+    assert!(resumed_after >= poses, "after {resumed_after}, not {poses}");
+}
+
+#[test]
+fn an_interrupt_while_the_stages_start_leaves_nothing() {
+    let run = Run::of_recording().rate(MODERATE);
+    for stage in STAGES {
+        let mut running = run.start();
+        running.await_stage(stage);
+        running.signal(Signal::INT);
+        assert_eq!(running.finish().code(), Some(130), "{stage}");
+    }
+    assert_eq!(run.complete(), undisturbed());
+}
+
+#[test]
+fn stages_die_with_their_supervisor_and_the_same_command_goes_on() {
+    let run = Run::of_recording().rate(MODERATE);
+    let mut running = run.start();
+    running.await_poses(MIDDLE);
+    running.kill_supervisor();
+    assert_resumes(&run, MIDDLE as u64);
+}
+
+#[test]
+fn a_run_goes_on_at_another_rate_and_window() {
+    let run = Run::of_recording();
+    interrupted(&run.clone().rate(MODERATE));
+    assert_resumes(&run.set("run.window=2"), MIDDLE as u64);
+}
+
+fn interrupted(run: &Run) {
+    let mut running = run.start();
+    running.await_poses(MIDDLE).signal(Signal::INT);
+    assert_eq!(running.finish().code(), Some(130));
+}
+
+#[test]
+fn an_unfinished_run_of_another_configuration_is_refused() {
+    let run = Run::of_recording().rate(MODERATE);
+    interrupted(&run);
+    let other = run.clone().set("masking.threshold=70");
+    other.finish().refused_with(&["unfinished run of another configuration", "--out", "--fresh"]);
+    assert_ne!(other.option("--fresh").complete(), undisturbed());
+    assert_eq!(run.complete(), undisturbed(), "a complete run is begun anew");
+}
+
+#[test]
+fn two_runs_at_once_do_not_disturb_each_other() {
+    let runs = [Run::of_recording().rate(MODERATE), Run::of_recording().set("masking.kind=none")];
+    let alone = runs[1].complete();
+    let [slow, fast] = runs.each_ref().map(Run::start);
+    fast.finish().succeeded();
+    slow.finish().succeeded();
+    assert_eq!(runs[0].odometry(), undisturbed());
+    assert_eq!(runs[1].odometry(), alone);
+}
+
+#[test]
+fn a_second_run_into_the_same_results_is_refused() {
+    let run = Run::of_recording().rate(MODERATE);
+    let mut running = run.start();
+    running.await_stages();
+    let second = Run::of_recording().into(run.out());
+    Ended::of(second.command()).refused_with(&["another run is writing to", "--out"]);
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn a_stage_may_have_a_command_of_its_own() {
+    let run = Run::of_recording().stage_script("masking", "touch $0.ran; exec '{gyre}' stage masking");
+    assert_eq!(run.complete(), undisturbed());
+    assert!(run.folder().join("masking.sh.ran").is_file());
+    assert_nothing_left(run.out());
+}

@@ -1,0 +1,88 @@
+//! Real scans (`GYRE_DATA`) through the whole pipeline, with the accuracy that is to be kept.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::path::{Path, PathBuf};
+
+use common::{Ended, Run, odometry, real_data};
+use serde_json::Value;
+
+fn configuration(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs").join(name)
+}
+
+fn figure(json: &Value, path: &str) -> f64 {
+    let value = json.pointer(path).unwrap_or_else(|| panic!("no {path} in {json:#}"));
+    value.as_f64().unwrap_or_else(|| panic!("{path} is {value}"))
+}
+
+#[test]
+fn oxford_turns_and_drives_as_its_ground_truth_says() {
+    let Some(data) = real_data("oxford-2019-01-10-14-36-48") else { return };
+    let run = Run::of_file(&configuration("oxford.toml")).data(&data);
+    assert_eq!(odometry::rows(&run.complete()).len(), 10);
+    let summary = run.summary();
+    let rotation_deg = figure(&summary, "/evaluation/rpe/rotation_rmse_deg");
+    let forward = figure(&summary, "/evaluation/rpe/forward_ratio");
+    println!("rotation {rotation_deg:.3} deg a pair, forward {forward:.4} of the truth");
+    assert!(rotation_deg <= 0.13 && (forward - 1.0).abs() <= 0.01, "{rotation_deg} deg, {forward}");
+}
+
+#[test]
+fn radiate_stays_within_the_drift_of_the_yardstick() {
+    let Some(data) = real_data("radiate-2019-02-12") else { return };
+    let run = Run::of_file(&configuration("radiate.toml")).data(&data);
+    assert_eq!(odometry::rows(&run.complete()).len(), 465);
+    let summary = run.summary();
+    for (path, most) in [
+        ("/evaluation/kitti/translation_percent", 2.9),
+        ("/evaluation/kitti/rotation_deg_per_100m", 1.05),
+        ("/evaluation/ate/rmse_m", 7.4),
+        ("/evaluation/seg/percent", 0.66),
+    ] {
+        let value = figure(&summary, path);
+        println!("{path} {value:.3}");
+        assert!(value <= most, "{path} is {value}, more than {most}");
+    }
+}
+
+#[test]
+fn fog_without_ground_truth_is_run_all_the_same() {
+    let Some(data) = real_data("radiate-tiny_foggy") else { return };
+    let run = Run::of_file(&configuration("radiate.toml")).data(&data);
+    assert_eq!(odometry::rows(&run.complete()).len(), 17);
+    assert!(run.summary()["evaluation"].is_null());
+}
+
+#[test]
+fn a_sample_of_one_scan_is_refused_with_the_reason() {
+    let Some(data) = real_data("samples") else { return };
+    for sample in ["boreas-rt-2024-12-03", "fomo-2025-10-14"] {
+        let run = Run::configured("").data(&data.join(sample));
+        run.finish().refused_with(&[sample, "has 1 scan:", "a motion is between two"]);
+    }
+}
+
+#[test]
+fn published_kitti_figures_are_reproduced() {
+    let Some(golden) = real_data("golden") else { return };
+    let evaluate = |estimate: &Path, truth: &Path, step: &str| {
+        let mut command = common::gyre();
+        command.args(["evaluate", "--json", "--step", step, "--estimate"]).arg(estimate);
+        command.arg("--ground-truth").arg(truth);
+        let json: Value = serde_json::from_str(&Ended::of(command).succeeded().stdout).unwrap();
+        let figures = ["/kitti/translation_percent", "/kitti/rotation_deg_per_100m"];
+        figures.map(|path| format!("{:.5}", figure(&json, path)))
+    };
+    let metric = golden.join("kitti-metric");
+    for (step, figures) in
+        [("10", ["1.16688", "0.34558"]), ("4", ["1.16084", "0.34663"]), ("1", ["1.16168", "0.34696"])]
+    {
+        assert_eq!(evaluate(&metric.join("estimate.txt"), &metric.join("ground_truth.txt"), step), figures);
+    }
+    let truth = golden.join("../trajectories/oxford-2019-01-10-11-46-21.radar_odometry.csv");
+    let chain = evaluate(&golden.join("csv-chain/estimate.txt"), &truth, "10");
+    assert_eq!(chain, ["1.22286", "0.39305"]);
+}

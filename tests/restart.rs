@@ -1,0 +1,134 @@
+//! `kill -9` of stages: each is started again, and the result is the undisturbed run's, byte for byte.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::{Run, Running, STAGES, odometry, recording, send, undisturbed};
+use rustix::process::Signal;
+use serde_json::Value;
+
+/// The recording's six seconds in one.
+const MODERATE: &str = "6";
+const MIDDLE: usize = recording::SCANS / 3;
+
+/// Disturbs a run once it is in its middle, and asserts that this changes nothing but the count of restarts of `stages`.
+fn survives(stages: &[&str], disturb: impl FnOnce(&mut Running)) {
+    let run = Run::of_recording().rate(MODERATE);
+    let mut running = run.start();
+    disturb(&mut running);
+    let ended = running.finish();
+    ended.succeeded();
+    assert_eq!(run.odometry(), undisturbed(), "{}", ended.stderr);
+    let summary = run.summary();
+    assert_eq!(summary["published"], recording::SCANS);
+    for stage in STAGES {
+        let times = summary["restarts"].get(stage).and_then(Value::as_u64).unwrap_or(0);
+        assert_eq!(times > 0, stages.contains(&stage), "{stage}: {}\n{}", summary["restarts"], ended.stderr);
+    }
+}
+
+fn survives_the_death_of(stage: &str) {
+    survives(&[stage], |running| {
+        running.await_poses(MIDDLE).kill(stage);
+    });
+}
+
+#[test]
+fn a_killed_radar_replay_goes_on() {
+    survives_the_death_of("radar-replay");
+}
+
+#[test]
+fn a_killed_masking_goes_on() {
+    survives_the_death_of("masking");
+}
+
+#[test]
+fn a_killed_rotation_search_goes_on() {
+    survives_the_death_of("rotation-search");
+}
+
+#[test]
+fn a_killed_translation_search_goes_on() {
+    survives_the_death_of("translation-search");
+}
+
+#[test]
+fn a_killed_pose_integration_goes_on() {
+    survives_the_death_of("pose-integration");
+}
+
+#[test]
+fn two_stages_killed_at_once_go_on() {
+    survives(&["masking", "translation-search"], |running| {
+        running.await_poses(MIDDLE).kill("masking").kill("translation-search");
+    });
+}
+
+#[test]
+fn all_stages_killed_at_once_go_on() {
+    survives(&STAGES, |running| {
+        let stages = running.await_stages();
+        running.await_poses(MIDDLE);
+        stages.values().for_each(|pid| send(*pid, Signal::KILL));
+    });
+}
+
+#[test]
+fn a_stage_killed_again_after_each_few_poses_goes_on() {
+    survives(&["rotation-search"], |running| {
+        for poses in [4, 9, 14] {
+            running.await_poses(poses).kill("rotation-search");
+        }
+    });
+}
+
+#[test]
+fn a_stage_killed_in_the_first_milliseconds_of_its_life_goes_on() {
+    for stage in STAGES {
+        survives(&[stage], |running| {
+            let first = running.await_stage(stage);
+            send(first, Signal::KILL);
+        });
+    }
+}
+
+#[test]
+fn a_restart_killed_in_the_first_milliseconds_of_its_life_goes_on() {
+    survives(&["rotation-search"], |running| {
+        let first = running.await_poses(MIDDLE).await_stage("rotation-search");
+        send(first, Signal::KILL);
+        let second = running.await_other_stage("rotation-search", first);
+        send(second, Signal::KILL);
+    });
+}
+
+#[test]
+fn a_stage_that_always_dies_is_given_up_with_its_last_words() {
+    let run = Run::of_recording()
+        .stage_script("masking", "echo 'the mask is on fire' >&2; exit 7")
+        .set("stages.masking.restart={limit = 2, backoff_ms = 10}");
+    let ended = run.finish();
+    ended.failed_with(&["masking died 3 times", "exit code 7", "the mask is on fire", "giving up"]);
+    assert_eq!(ended.stderr.matches("started it again").count() + ended.stderr.matches("started all").count(), 2);
+}
+
+#[test]
+fn a_stage_that_would_fail_the_same_way_again_is_given_up_at_once() {
+    let run = Run::of_recording().stage_script("masking", "echo 'masking: no licence' >&2; exit 2");
+    let ended = run.finish();
+    ended.failed_with(&["masking: no licence"]);
+    assert!(!ended.stderr.contains("started it again"), "{}", ended.stderr);
+}
+
+#[test]
+fn what_was_computed_before_giving_up_is_kept_and_the_same_command_goes_on() {
+    let run = Run::of_recording().rate(MODERATE).set("stages.masking.restart.limit=0");
+    let mut running = run.start();
+    running.await_poses(MIDDLE).kill("masking");
+    let ended = running.finish();
+    ended.failed_with(&["masking died", "signal 9", "poses are kept", "the same command goes on"]);
+    assert!(odometry::rows(&run.odometry()).len() + 1 >= MIDDLE);
+    assert_eq!(run.complete(), undisturbed());
+}
