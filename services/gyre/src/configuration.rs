@@ -12,7 +12,7 @@ use std::{
 
 use gyre_masking::MaskingConfig;
 use gyre_messages::{Stage, Window};
-use gyre_radar::raster::RasterConfig;
+use gyre_radar::{DatasetOptions, RasterConfig};
 use gyre_radar_replay::SourceConfig;
 use gyre_scan_matching::{RotationConfig, TranslationConfig};
 use gyre_simulator::SimulationConfig;
@@ -29,6 +29,8 @@ pub struct Configuration {
     pub run: RunConfig,
     /// What to play.
     pub source: SourceConfig,
+    /// How to read it.
+    pub dataset: DatasetOptions,
     /// A recording to be generated and played, instead of `source.data`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub simulation: Option<SimulationConfig>,
@@ -152,6 +154,7 @@ impl Configuration {
         let configuration = Self {
             run: strict::section(&mut table, "run")?,
             source: strict::section(&mut table, "source")?,
+            dataset: strict::section(&mut table, "dataset")?,
             simulation: match table.contains_key("simulation") {
                 true => Some(strict::section(&mut table, "simulation")?),
                 false => None,
@@ -162,7 +165,8 @@ impl Configuration {
             translation: strict::section(&mut table, "translation")?,
             stages: strict::sections(&mut table, "stages", &Stage::ALL.map(Stage::name))?,
         };
-        let known = ["run", "source", "simulation", "raster", "masking", "rotation", "translation", "stages"];
+        let known =
+            ["run", "source", "dataset", "simulation", "raster", "masking", "rotation", "translation", "stages"];
         match table.keys().next() {
             None => Ok(configuration),
             Some(key) => Err(strict::unknown("the configuration", key, &known)),

@@ -3,7 +3,7 @@
 use std::{path::Path, time::Duration};
 
 use gyre_messages::{Footprint, Limits, Window};
-use gyre_radar::dataset::{self, Dataset};
+use gyre_radar::Dataset;
 use thiserror::Error;
 
 use crate::configuration::Configuration;
@@ -54,7 +54,7 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
     if source.data.as_os_str().is_empty() {
         return Err(PreflightError::NoData.into());
     }
-    let dataset = dataset::open(&source.data, &source.options())?;
+    let dataset = gyre_radar::open(&source.data, &configuration.dataset)?;
     let scans = dataset.len().saturating_sub(source.first).min(source.scans.unwrap_or(usize::MAX));
     if scans < 2 {
         return Err(PreflightError::TooFew { path: source.data.display().to_string(), scans }.into());

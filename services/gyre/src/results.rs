@@ -16,20 +16,8 @@ use crate::{
     evaluate,
     latency::Latency,
     odometry,
-    summary::{Counts, Summary},
+    summary::{Counts, Session, Summary},
 };
-
-/// This session of a run.
-pub struct Session<'a> {
-    /// Scans in the recording.
-    pub scans: usize,
-    /// Poses that were in the journal before.
-    pub resumed: usize,
-    /// How long it took.
-    pub wall: Duration,
-    /// Shared memory.
-    pub footprint: &'a Footprint,
-}
 
 /// Writes all files, and returns what the person at the terminal should read.
 pub fn write(

@@ -22,8 +22,8 @@ use crate::{
     configuration::{Configuration, Mode},
     preflight, print,
     progress::Progress,
-    results::{self, Session},
-    simulate,
+    results, simulate,
+    summary::Session,
 };
 
 /// What the shell calls a program that was interrupted.

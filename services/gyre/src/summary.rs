@@ -13,8 +13,19 @@ use serde::Serialize;
 use crate::{
     configuration::{Configuration, Mode, Rate},
     latency::{Latency, Percentiles},
-    results::Session,
 };
+
+/// This session of a run.
+pub struct Session<'a> {
+    /// Scans in the recording.
+    pub scans: usize,
+    /// Poses that were in the journal before.
+    pub resumed: usize,
+    /// How long it took.
+    pub wall: Duration,
+    /// Shared memory.
+    pub footprint: &'a Footprint,
+}
 
 /// Where each scan went.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]

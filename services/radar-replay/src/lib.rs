@@ -3,7 +3,7 @@
 mod config;
 
 use gyre_messages::ScanHeader;
-use gyre_radar::dataset::{self, Dataset};
+use gyre_radar::{Dataset, DatasetOptions, OpenError};
 use gyre_stage::{Launch, Source, StageError, Statistics, source};
 
 pub use config::SourceConfig;
@@ -14,7 +14,8 @@ pub const NAME: &str = "radar-replay";
 /// Runs the stage until it is told to stop.
 pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
     let config: SourceConfig = launch.section("source")?;
-    let mut replay = Replay::open(&config).map_err(|error| StageError::Input(error.to_string()))?;
+    let options: DatasetOptions = launch.section("dataset")?;
+    let mut replay = Replay::open(&config, &options).map_err(|error| StageError::Input(error.to_string()))?;
     source::run(launch, &mut replay)
 }
 
@@ -28,8 +29,8 @@ pub struct Replay {
 
 impl Replay {
     /// Opens the dataset that `config` names.
-    pub fn open(config: &SourceConfig) -> Result<Self, gyre_radar::OpenError> {
-        let dataset = dataset::open(&config.data, &config.options())?;
+    pub fn open(config: &SourceConfig, options: &DatasetOptions) -> Result<Self, OpenError> {
+        let dataset = gyre_radar::open(&config.data, options)?;
         let first = config.first.min(dataset.len());
         let scans = config.scans.unwrap_or(usize::MAX).min(dataset.len() - first);
         let half_period_ns = median_period_ns(dataset.as_ref()) / 2;
