@@ -1,9 +1,9 @@
 //! What a run leaves in `--out`: all of it made from the journal, so a run that was cut short leaves the same files.
 
-use std::{fs, path::Path, time::Duration};
+use std::{fs, path::Path};
 
 use gyre_evaluation::{Evaluation, Options, plot_errors, plot_trajectory};
-use gyre_messages::{Footprint, PoseHeader, flag};
+use gyre_messages::{PoseHeader, flag};
 use gyre_radar::{
     Trajectory,
     ground_truth::{find_ground_truth, read_trajectory, write_tum},

@@ -1,6 +1,6 @@
 //! `summary.json`, and the same as a table.
 
-use std::{collections::BTreeMap, fmt, fs, path::Path, thread};
+use std::{collections::BTreeMap, fmt, fs, path::Path, thread, time::Duration};
 
 use gyre_evaluation::Evaluation;
 use gyre_messages::{Footprint, PoseHeader, Stage, flag};

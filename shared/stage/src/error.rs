@@ -9,7 +9,7 @@ use thiserror::Error;
 pub enum StageError {
     /// Started by hand.
     #[error(
-        "{stage} is one process of a run and finds it through GYRE_RUN, which is not set: start it with `gyre run CONFIG`"
+        "this is one process of a run, and GYRE_RUN, which names the run, is not set: start it with `gyre run CONFIG`"
     )]
     NoRun {
         /// Which stage.
