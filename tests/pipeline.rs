@@ -4,7 +4,7 @@
 
 mod common;
 
-use std::{collections::BTreeSet, fs};
+use std::{collections::BTreeSet, fs, process::Command, thread, time::Duration};
 
 use common::{Ended, Run, STAGES, assert_nothing_left, odometry, recording, undisturbed};
 use rustix::process::Signal;
@@ -170,12 +170,40 @@ fn an_interrupt_while_the_stages_start_leaves_nothing() {
 }
 
 #[test]
+fn an_interrupt_at_any_moment_of_the_start_leaves_nothing() {
+    let run = Run::of_recording().rate(MODERATE);
+    for delay_ms in 0..25 {
+        let running = run.start();
+        thread::sleep(Duration::from_millis(2 * delay_ms));
+        running.signal(Signal::INT);
+        // Before there is anything to clean up, the signal may simply end the process.
+        assert!(matches!(running.finish().code(), Some(130) | None), "after {} ms", 2 * delay_ms);
+    }
+}
+
+#[test]
 fn stages_die_with_their_supervisor_and_the_same_command_goes_on() {
     let run = Run::of_recording().rate(MODERATE);
     let mut running = run.start();
     running.await_poses(MIDDLE);
     running.kill_supervisor();
     assert_resumes(&run, MIDDLE as u64);
+}
+
+#[test]
+fn a_supervisor_killed_again_and_again_loses_nothing() {
+    let run = Run::of_recording().rate(MODERATE);
+    for stage in ["radar-replay", "pose-integration"] {
+        let mut running = run.start();
+        running.await_stage(stage);
+        running.kill_supervisor();
+    }
+    for poses in [1, 5, 6, 12, 20] {
+        let mut running = run.start();
+        running.await_poses(poses);
+        running.kill_supervisor();
+    }
+    assert_resumes(&run, 20);
 }
 
 #[test]
@@ -229,4 +257,35 @@ fn a_stage_may_have_a_command_of_its_own() {
     assert_eq!(run.complete(), undisturbed());
     assert!(run.folder().join("masking.sh.ran").is_file());
     assert_nothing_left(run.out());
+}
+
+#[test]
+fn a_command_that_keeps_a_shell_in_between_leaves_nothing() {
+    let run = Run::of_recording().stage_script("masking", "'{gyre}' stage masking; exit $?");
+    assert_eq!(run.complete(), undisturbed());
+}
+
+#[test]
+fn a_reader_that_has_seen_enough_does_not_stop_the_run() {
+    let run = Run::of_recording();
+    let mut shell = Command::new("sh");
+    let own = run.command();
+    // Both outputs are pipes that nobody reads.
+    shell.args(["-c", "\"$@\" 2>&1 | true", "sh"]).arg(own.get_program()).args(own.get_args());
+    run.start_as(shell).finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn data_in_a_folder_with_any_name_are_played() {
+    let run = Run::of_recording();
+    for name in ["2019-01-10", "1e5", "true", "it's a \"drive\""] {
+        let link = run.folder().join(name);
+        std::os::unix::fs::symlink(recording::small(), &link).unwrap();
+        let named = Run::of_recording_named(name);
+        let mut command = named.command();
+        command.current_dir(run.folder());
+        named.start_as(command).finish().succeeded();
+        assert_eq!(named.odometry(), undisturbed(), "{name}");
+    }
 }

@@ -105,6 +105,53 @@ fn a_restart_killed_in_the_first_milliseconds_of_its_life_goes_on() {
 }
 
 #[test]
+fn a_stage_killed_when_all_poses_are_there_does_not_take_them_back() {
+    for stage in STAGES {
+        let run = Run::of_recording();
+        let mut running = run.start();
+        let pid = running.await_stage(stage);
+        running.await_poses_or_end(recording::SCANS);
+        send(pid, Signal::KILL);
+        running.finish().succeeded();
+        assert_eq!(run.odometry(), undisturbed(), "{stage}");
+    }
+}
+
+#[test]
+fn a_stage_that_somebody_else_asks_to_end_is_started_again() {
+    survives(&["translation-search"], |running| {
+        let pid = running.await_poses(MIDDLE).await_stage("translation-search");
+        send(pid, Signal::TERM);
+    });
+}
+
+#[test]
+fn a_stage_that_hangs_is_noticed_and_all_are_started_again() {
+    let run = Run::of_recording().rate(MODERATE).set("run.stall_timeout_s=2");
+    let mut running = run.start();
+    let pid = running.await_poses(MIDDLE).await_stage("rotation-search");
+    send(pid, Signal::STOP);
+    let ended = running.finish();
+    ended.succeeded();
+    assert!(ended.stderr.contains("no pose for too long"), "{}", ended.stderr);
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn a_source_killed_behind_an_unreadable_scan_still_counts_it() {
+    let recording = recording::copy(16);
+    recording::truncate(&recording::images(recording.path())[4], 100_000);
+    let run = Run::of_recording_named(recording.path().to_str().unwrap());
+    let alone = run.complete();
+    let run = Run::of_recording_named(recording.path().to_str().unwrap()).rate(MODERATE);
+    let mut running = run.start();
+    running.await_poses(9).kill("radar-replay");
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), alone);
+    assert_eq!((&run.summary()["published"], &run.summary()["unreadable"]), (&15.into(), &1.into()));
+}
+
+#[test]
 fn a_stage_that_always_dies_is_given_up_with_its_last_words() {
     let run = Run::of_recording()
         .stage_script("masking", "echo 'the mask is on fire' >&2; exit 7")

@@ -60,6 +60,6 @@ impl Ended {
 }
 
 /// The last line, if it is what the program says of itself; else nothing.
-pub fn sentence_of(stderr: &str) -> &str {
+fn sentence_of(stderr: &str) -> &str {
     stderr.lines().last().and_then(|line| line.strip_prefix("gyre: ")).unwrap_or_default()
 }

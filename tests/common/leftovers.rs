@@ -20,9 +20,9 @@ pub fn root(out: &Path) -> PathBuf {
 /// Asserts that no process, shared-memory file or temporary file of the run that wrote to `out` is there.
 pub fn assert_nothing_left(out: &Path) {
     let root = root(out);
-    assert_eq!(processes::of_run(&root), [], "processes of {}", root.display());
+    assert_eq!(processes::of_run(&root), Vec::<processes::Pid>::new(), "processes of {}", root.display());
     assert!(!root.exists(), "{} is still there: {:?}", root.display(), files_in(&root));
-    assert_eq!(shared_memory_of(&root), [""; 0]);
+    assert_eq!(shared_memory_of(&root), Vec::<String>::new());
     let transport = std::env::temp_dir().join("iceoryx2");
     assert!(!names_below(&transport).iter().any(|path| is_of(path, &root)), "in {}", transport.display());
 }

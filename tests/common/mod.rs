@@ -2,7 +2,7 @@
 //! on, [`Ended`] is what it said. Every run that ends is checked to have left nothing behind.
 
 // Each test binary uses its own part of this.
-#![allow(dead_code, clippy::unwrap_used)]
+#![allow(dead_code, unused_imports, clippy::unwrap_used)]
 
 mod ended;
 mod leftovers;
@@ -22,7 +22,7 @@ use std::{
 use serde_json::Value;
 use tempfile::TempDir;
 
-pub use ended::{Ended, sentence_of};
+pub use ended::Ended;
 pub use leftovers::assert_nothing_left;
 pub use processes::{Pid, cpu_time, send};
 pub use running::Running;
@@ -62,7 +62,12 @@ pub struct Run {
 impl Run {
     /// A run of the small recording, as fast as it goes.
     pub fn of_recording() -> Self {
-        Self::configured(CONFIGURATION).data(recording::small())
+        Self::of_recording_named(recording::small().to_str().unwrap())
+    }
+
+    /// The same where the recording goes by another name.
+    pub fn of_recording_named(name: &str) -> Self {
+        Self::configured(CONFIGURATION).argument("--data", name)
     }
 
     /// A run of this configuration text.

@@ -62,6 +62,13 @@ impl Running {
         self
     }
 
+    /// Waits until so many poses are journalled, or the run is over.
+    pub fn await_poses_or_end(&mut self, poses: usize) {
+        while self.poses() < poses && self.child.try_wait().unwrap().is_none() {
+            thread::sleep(LOOK);
+        }
+    }
+
     /// Poses in the journal.
     pub fn poses(&self) -> usize {
         journal::read(&journal::path(self.run.out())).map_or(0, |poses| poses.len())

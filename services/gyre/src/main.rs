@@ -37,7 +37,7 @@ fn main() -> ExitCode {
     match result {
         Ok(code) => code,
         Err(error) => {
-            eprintln!("gyre: {error}");
+            print::note(format_args!("gyre: {error}"));
             ExitCode::FAILURE
         }
     }

@@ -11,3 +11,8 @@ pub fn line(text: impl Display) -> Result<(), Failure> {
         _ => Ok(()),
     }
 }
+
+/// Tells the person at the terminal something on the way. A run does not end because nobody listens any more.
+pub fn note(text: impl Display) {
+    let _ = writeln!(std::io::stderr(), "{text}");
+}

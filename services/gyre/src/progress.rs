@@ -9,6 +9,8 @@ use gyre_messages::{Footprint, PoseHeader};
 use gyre_stage::{clock, supervise::Event};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::print;
+
 /// Between two plain lines.
 const EVERY: Duration = Duration::from_secs(2);
 
@@ -88,7 +90,7 @@ impl Progress {
             }
             None if self.last_line.elapsed() >= EVERY => {
                 self.last_line = Instant::now();
-                eprintln!("{}/{} scans  {message}", self.done, self.scans);
+                print::note(format_args!("{}/{} scans  {message}", self.done, self.scans));
             }
             None => {}
         }
@@ -97,7 +99,7 @@ impl Progress {
     fn say(&self, line: &str) {
         match &self.bar {
             Some(bar) => bar.println(line),
-            None => eprintln!("{line}"),
+            None => print::note(line),
         }
     }
 }

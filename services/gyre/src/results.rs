@@ -15,7 +15,7 @@ use crate::{
     configuration::Configuration,
     evaluate,
     latency::Latency,
-    odometry,
+    odometry, print,
     summary::{Counts, Session, Summary},
 };
 
@@ -46,12 +46,15 @@ pub fn write(
 
 /// Judges the trajectory by the dataset's ground truth, where there is one that fits.
 fn judge(configuration: &Configuration, trajectory: &Trajectory) -> Option<Evaluation> {
+    if trajectory.poses.len() < 2 {
+        return None;
+    }
     let given = configuration.run.ground_truth.clone();
     let path = given.or_else(|| find_ground_truth(&configuration.source.data))?;
     let judged = read_trajectory(&path)
         .map_err(|error| error.to_string())
         .and_then(|truth| evaluate::judge(trajectory, &truth, Options::default()).map_err(|error| error.to_string()));
-    judged.inspect_err(|reason| eprintln!("not judged by {}: {reason}", path.display())).ok()
+    judged.inspect_err(|reason| print::note(format_args!("not judged by {}: {reason}", path.display()))).ok()
 }
 
 fn draw(out: &Path, trajectory: &Trajectory, evaluation: Option<&Evaluation>) -> Result<(), Failure> {

@@ -14,6 +14,7 @@ use gyre_stage::{
     Manifest,
     run::RunRoot,
     supervise::{Ending, Plan, SuperviseError, supervise},
+    wake::Signals,
 };
 
 use crate::{
@@ -34,6 +35,7 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     let out = results_directory(arguments)?;
     let configuration = resolve(arguments, &out)?;
     let checked = preflight::check(&configuration)?;
+    let signals = Signals::install()?;
     let root = RunRoot::take(&out)?;
     let resumed = prepare(&configuration, &out, arguments.fresh)?;
     let manifest = Manifest {
@@ -52,11 +54,11 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     let plan = Plan {
         manifest,
         stages: configuration.stage_plans(&env::current_exe()?),
-        stall_timeout: Some(configuration.run.stall_timeout_s).filter(|s| *s > 0.0).map(Duration::from_secs_f64),
+        stall_timeout: stall_timeout(configuration.run.stall_timeout_s),
     };
     let mut progress = Progress::new(checked.scans, resumed, &checked.footprint);
     let started = Instant::now();
-    let report = supervise(&plan, &mut |event| progress.show(&event));
+    let report = supervise(&plan, signals, &mut |event| progress.show(&event));
     progress.finish();
     drop(root);
     if let Err(SuperviseError::TransportStuck) = report {
@@ -79,11 +81,26 @@ fn finish(
         0 => failure.to_string(),
         kept => format!("{failure}; {kept} poses are kept in {}, the same command goes on from there", out.display()),
     })?;
+    let read = poses.iter().filter(|pose| !pose.item.is(flag::END)).count();
+    if report.ending == Ending::Complete && read < 2 {
+        return Err(format!(
+            "only {read} of the {} scans of {} can be read, and a motion is between two: {} says what is wrong with them",
+            session.scans,
+            configuration.source.data.display(),
+            out.join("log.jsonl").display()
+        )
+        .into());
+    }
     print::line(summary?)?;
     Ok(match report.ending {
         Ending::Complete => ExitCode::SUCCESS,
         Ending::Interrupted => ExitCode::from(INTERRUPTED),
     })
+}
+
+/// `None`: wait for ever.
+fn stall_timeout(seconds: f64) -> Option<Duration> {
+    Duration::try_from_secs_f64(seconds).ok().filter(|limit| !limit.is_zero())
 }
 
 fn results_directory(arguments: &RunArguments) -> Result<PathBuf, Failure> {
@@ -96,7 +113,10 @@ fn results_directory(arguments: &RunArguments) -> Result<PathBuf, Failure> {
 /// The configuration with all that the command line says, and the recording generated if it is to be.
 fn resolve(arguments: &RunArguments, out: &Path) -> Result<Configuration, Failure> {
     let mut configuration = Configuration::read(&arguments.configuration, &overrides(arguments))?;
-    if let Some(simulation) = configuration.simulation.clone().filter(|_| arguments.data.is_none()) {
+    if arguments.data.is_some() {
+        configuration.simulation = None;
+    }
+    if let Some(simulation) = configuration.simulation.clone() {
         configuration.source.data = out.join("recording");
         generate_once(&simulation, &configuration.source.data)?;
     }
@@ -108,7 +128,9 @@ fn resolve(arguments: &RunArguments, out: &Path) -> Result<Configuration, Failur
 }
 
 fn overrides(arguments: &RunArguments) -> Vec<String> {
-    let data = arguments.data.iter().map(|data| format!("source.data={}", data.display()));
+    // Quoted, for a folder may be called 2019-01-10 or 7.
+    let quoted = |data: &PathBuf| toml::Value::from(data.to_string_lossy().into_owned());
+    let data = arguments.data.iter().map(|data| format!("source.data={}", quoted(data)));
     let rate = arguments.rate.iter().map(|rate| format!("run.rate='{rate}'"));
     arguments.set.iter().cloned().chain(data).chain(rate).collect()
 }
@@ -154,7 +176,7 @@ fn prepare(configuration: &Configuration, out: &Path, fresh: bool) -> Result<usi
 
 /// The transport hangs on what a dead process left. All of that is gone now; the same command resumes from the journal.
 fn start_over() -> Result<ExitCode, Failure> {
-    eprintln!("gyre: the transport did not finish cleaning up after a dead process; starting over from the journal");
+    print::note("gyre: the transport did not finish cleaning up after a dead process; starting over from the journal");
     let failed = Command::new(env::current_exe()?).args(env::args_os().skip(1).filter(|a| a != "--fresh")).exec();
     Err(format!("cannot start over: {failed}").into())
 }

@@ -33,6 +33,8 @@ pub mod source;
 pub mod stage;
 mod statistics;
 pub mod supervise;
+#[cfg(test)]
+mod tests;
 pub mod wake;
 pub mod writer;
 

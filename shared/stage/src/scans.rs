@@ -166,10 +166,7 @@ impl NewestWins {
                 self.drop_all_but_the_newest();
             }
         }
-        if self.queue.is_empty() {
-            return Ok(Turn::Wait);
-        }
-        let chain = self.chain.unwrap_or_else(|| self.resume(sync));
+        let Some(chain) = self.chain.or_else(|| self.resume(sync)) else { return Ok(Turn::Wait) };
         self.chain = Some(chain);
         if !chain.again {
             self.drop_all_but_the_newest();
@@ -184,18 +181,13 @@ impl NewestWins {
         })
     }
 
-    /// Where the chain goes on after a start: with the last pose's scan if the source still has it, else with a break.
-    fn resume(&mut self, sync: &Item) -> Chain {
-        if sync.is(flag::BASE) {
-            return Chain { next: 0, previous_scan: None, published: None, again: false };
+    /// Where the chain goes on after a start; `None` as long as only scans from before the last pose's have come. A source that was
+    /// restarted as well sends them again, and one whose history is just being handed over is not through with them.
+    fn resume(&mut self, sync: &Item) -> Option<Chain> {
+        while self.queue.front().is_some_and(|front| Chain::is_past(front.item(), sync)) {
+            self.queue.pop_front();
         }
-        match self.queue.iter().position(|received| received.item().scan == sync.scan) {
-            Some(place) => {
-                self.queue.drain(..place);
-                Chain { next: sync.seq, previous_scan: Some(sync.previous_scan), published: None, again: true }
-            }
-            None => Chain { next: sync.seq.saturating_add(1), previous_scan: None, published: None, again: false },
-        }
+        Some(Chain::resume(self.queue.front()?.item(), sync))
     }
 
     fn drop_all_but_the_newest(&mut self) {
@@ -215,6 +207,22 @@ impl NewestWins {
 }
 
 impl Chain {
+    /// Whether a scan comes before the last pose's.
+    fn is_past(item: &Item, sync: &Item) -> bool {
+        !sync.is(flag::BASE) && !item.is(flag::END) && item.published < sync.published
+    }
+
+    /// Goes on with the last pose's scan if the source still has it, else with a break.
+    fn resume(front: &Item, sync: &Item) -> Self {
+        match () {
+            () if sync.is(flag::BASE) => Self { next: 0, previous_scan: None, published: None, again: false },
+            () if front.published == sync.published && !front.is(flag::END) => {
+                Self { next: sync.seq, previous_scan: Some(sync.previous_scan), published: None, again: true }
+            }
+            () => Self { next: sync.seq.saturating_add(1), previous_scan: None, published: None, again: false },
+        }
+    }
+
     fn had(&self, item: &Item) -> bool {
         !item.is(flag::END) && self.published.is_some_and(|published| item.published <= published)
     }
@@ -228,5 +236,38 @@ impl Chain {
             flags: (item.flags & flag::END) | start,
             ..*item
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sync() -> Item {
+        Item { seq: 9, scan: 40, previous_scan: 37, published: 31, ..Item::default() }
+    }
+
+    fn scan(published: u64) -> Item {
+        Item { seq: published, published, scan: published + 9, ..Item::default() }
+    }
+
+    #[test]
+    fn the_chain_goes_on_with_the_last_poses_scan_under_its_old_number() {
+        let item = Chain::resume(&scan(31), &sync()).number(&scan(31));
+        assert_eq!((item.seq, item.scan, item.previous_scan, item.flags), (9, 40, 37, 0));
+    }
+
+    #[test]
+    fn a_chain_whose_last_scan_is_gone_starts_anew_with_the_next_number() {
+        let item = Chain::resume(&scan(35), &sync()).number(&scan(35));
+        assert_eq!((item.seq, item.previous_scan), (10, item.scan));
+        assert!(item.is(flag::BREAK));
+    }
+
+    #[test]
+    fn scans_from_before_the_last_pose_never_start_a_chain() {
+        assert!(Chain::is_past(&scan(30), &sync()) && !Chain::is_past(&scan(31), &sync()));
+        assert!(!Chain::is_past(&scan(0), &Item { flags: flag::BASE, ..sync() }));
+        assert!(!Chain::is_past(&Item { flags: flag::END, ..scan(0) }, &sync()));
     }
 }

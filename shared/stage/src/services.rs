@@ -33,7 +33,11 @@ pub(crate) fn node(config: &Config, name: &str) -> Result<Node, StageError> {
 
 /// All services of a run. Whoever holds this keeps them alive.
 pub(crate) struct Services {
-    _topics: (Topic<Scan>, Topic<Masked>, Topic<Rotation>, Topic<Motion>, Topic<Pose>),
+    _scan: Topic<Scan>,
+    _masked: Topic<Masked>,
+    _rotation: Topic<Rotation>,
+    _motion: Topic<Motion>,
+    _pose: Topic<Pose>,
     _events: Vec<Event>,
 }
 
@@ -46,14 +50,14 @@ impl Services {
             events.push(create_event(node, &data_event(topic), readers, 1)?);
             events.push(create_event(node, &hello_event(topic), 1, readers)?);
         }
-        let topics = (
-            create_topic::<Scan>(node, window)?,
-            create_topic::<Masked>(node, window)?,
-            create_topic::<Rotation>(node, window)?,
-            create_topic::<Motion>(node, window)?,
-            create_topic::<Pose>(node, window)?,
-        );
-        Ok(Self { _topics: topics, _events: events })
+        Ok(Self {
+            _scan: create_topic::<Scan>(node, window)?,
+            _masked: create_topic::<Masked>(node, window)?,
+            _rotation: create_topic::<Rotation>(node, window)?,
+            _motion: create_topic::<Motion>(node, window)?,
+            _pose: create_topic::<Pose>(node, window)?,
+            _events: events,
+        })
     }
 }
 

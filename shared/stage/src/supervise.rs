@@ -31,10 +31,12 @@ pub use plan::{Ending, Event, Plan, Report, RestartPolicy, StagePlan, SuperviseE
 /// Time that stages have to end by themselves before they are killed.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// Runs all stages of `plan` until the stream ends, a signal asks to stop, or nothing helps any more.
-pub fn supervise(plan: &Plan, observe: &mut dyn FnMut(Event<'_>)) -> Result<Report, SuperviseError> {
+/// Runs all stages of `plan` until the stream ends, one of `signals` asks to stop, or nothing helps any more.
+///
+/// The signals are to be installed before the run's place in shared memory is taken: else one that comes in between would end
+/// the process with nobody left to clean up.
+pub fn supervise(plan: &Plan, signals: Signals, observe: &mut dyn FnMut(Event<'_>)) -> Result<Report, SuperviseError> {
     iceoryx2::prelude::set_log_level(iceoryx2::prelude::LogLevel::Fatal);
-    let signals = Signals::install()?;
     let mut supervisor = Supervisor::new(plan, signals, observe)?;
     let ending = supervisor.start().and_then(|()| supervisor.watch());
     supervisor.stop()?;

@@ -103,3 +103,24 @@ fn drain(mut socket: &UnixStream) -> bool {
     }
     any
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::io::Write;
+
+    use super::*;
+
+    #[test]
+    fn a_request_to_stop_is_not_forgotten_by_the_next_sleep() {
+        let (stop, mut signal) = UnixStream::pair().unwrap();
+        let (child, _open) = UnixStream::pair().unwrap();
+        [&stop, &child].iter().for_each(|socket| socket.set_nonblocking(true).unwrap());
+        let signals = Signals { stop, child, stopped: Cell::new(false) };
+        let short = Duration::from_millis(1);
+        assert!(!signals.wait(&[], None, short).unwrap().stop);
+        signal.write_all(&[0]).unwrap();
+        assert!(signals.wait(&[], None, short).unwrap().stop);
+        assert!(signals.wait(&[], None, short).unwrap().stop);
+    }
+}

@@ -9,7 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use rustix::process::{Pid, Signal, getpid, getppid, kill_process, set_parent_process_death_signal};
+use rustix::process::{Pid, Signal, getpid, getppid, kill_process_group, set_parent_process_death_signal};
 
 use super::{StagePlan, SuperviseError};
 use crate::{Manifest, StageError, run};
@@ -81,6 +81,10 @@ impl Child {
     pub(super) fn has_ended(&mut self) -> bool {
         if self.status.is_none() {
             self.status = self.process.try_wait().ok().flatten();
+            if self.status.is_some() {
+                // What it has started, where its command is a shell for instance, ends with it.
+                self.signal(Signal::KILL);
+            }
         }
         self.status.is_some()
     }
@@ -117,16 +121,23 @@ impl Child {
     }
 
     pub(super) fn ask_to_end(&self) {
-        if let (None, Some(pid)) = (self.status, Pid::from_raw(self.process.id() as i32)) {
-            // It may have ended this moment: then there is nobody to ask.
-            let _ = kill_process(pid, Signal::TERM);
+        if self.status.is_none() {
+            self.signal(Signal::TERM);
         }
     }
 
     pub(super) fn kill(&mut self) {
         if self.status.is_none() {
-            let _ = self.process.kill();
+            self.signal(Signal::KILL);
             self.status = self.process.wait().ok();
+        }
+    }
+
+    /// Sends a signal to its process group.
+    fn signal(&self, signal: Signal) {
+        if let Some(group) = Pid::from_raw(self.process.id() as i32) {
+            // All may have ended this moment: then there is nobody to tell.
+            let _ = kill_process_group(group, signal);
         }
     }
 

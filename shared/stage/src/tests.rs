@@ -1,0 +1,69 @@
+//! The transport's promises that everything else here is built on, each tried with real shared memory.
+
+#![allow(clippy::unwrap_used)]
+
+mod hand_over;
+mod wake_up;
+mod zero_copy;
+
+use gyre_messages::{Item, Limits, Message, Pose, Stage, Window};
+use tempfile::TempDir;
+
+use crate::{
+    Manifest,
+    reader::Reader,
+    run::RunRoot,
+    services::{self, Node, Services},
+    writer::Writer,
+};
+
+const WINDOW: Window = Window { scans: 2, lag: 1, look_back: 1, live_depth: 0 };
+
+/// A run without processes: its services, and nodes for whoever joins. Two of them never meet.
+struct Run {
+    manifest: Manifest,
+    _services: Services,
+    _supervisor: Node,
+    // Last: removes all that is left of the run.
+    _root: RunRoot,
+    _out: TempDir,
+}
+
+impl Run {
+    fn new() -> Self {
+        let out = tempfile::tempdir().unwrap();
+        let root = RunRoot::take(out.path()).unwrap();
+        let manifest = Manifest {
+            prefix: root.prefix(),
+            root: root.path().to_owned(),
+            out: out.path().to_owned(),
+            window: WINDOW,
+            limits: Limits { scan_bytes: 1000, raster_cells: 100, rasters: 1 },
+            live: false,
+            rate: None,
+        };
+        manifest.write("").unwrap();
+        let supervisor = node(&manifest);
+        let services = Services::create(&supervisor, &manifest.window).unwrap();
+        Self { manifest, _services: services, _supervisor: supervisor, _root: root, _out: out }
+    }
+}
+
+fn node(manifest: &Manifest) -> Node {
+    services::node(&manifest.transport().unwrap(), "test").unwrap()
+}
+
+fn writer<M: Message>(manifest: &Manifest) -> Writer<M> {
+    Writer::open(&node(manifest), manifest).unwrap()
+}
+
+fn reader<M: Message>(manifest: &Manifest, next: Option<u64>) -> Reader<M> {
+    Reader::open(&node(manifest), next).unwrap()
+}
+
+/// A pose is the smallest message.
+fn send(poses: &Writer<Pose>, seq: u64, flags: u32) {
+    let mut draft = poses.loan().unwrap();
+    draft.header().item = Item { seq, flags, ..Item::default() };
+    poses.send(draft, Stage::PoseIntegration).unwrap();
+}

@@ -1,0 +1,95 @@
+//! A payload is read where it was written: two processes, one piece of memory.
+
+use std::{
+    env, fs,
+    io::{BufRead, BufReader},
+    process::{Child, Command, Stdio},
+};
+
+use gyre_messages::{Item, Masked, Stage};
+
+use super::{Run, reader, writer};
+use crate::{Manifest, run, wake::Signals};
+
+const RASTER: usize = 96;
+
+/// Where an address lies: in which file, how far from its start, and with which rights.
+#[derive(Debug, PartialEq)]
+struct Place {
+    inode: u64,
+    offset: u64,
+    path: String,
+    rights: String,
+}
+
+fn place_of<T>(values: &[T]) -> Place {
+    let address = values.as_ptr() as u64;
+    let maps = fs::read_to_string("/proc/self/maps").unwrap();
+    let hex = |text: &str| u64::from_str_radix(text, 16).unwrap();
+    let found = maps.lines().find_map(|line| {
+        let fields: Vec<&str> = line.split_whitespace().collect();
+        let (start, end) = fields[0].split_once('-').unwrap();
+        (hex(start)..hex(end)).contains(&address).then(|| Place {
+            inode: fields[4].parse().unwrap(),
+            offset: address - hex(start) + hex(fields[2]),
+            path: fields.get(5).unwrap_or(&"").to_string(),
+            rights: fields[1].to_owned(),
+        })
+    });
+    found.unwrap()
+}
+
+fn value(cell: usize) -> f32 {
+    cell as f32 * 0.5
+}
+
+/// The publishing process: this test again, started by the test below.
+#[test]
+fn publisher() {
+    let Some(root) = env::var_os(run::ENVIRONMENT) else { return };
+    let manifest = Manifest::read(root.as_ref()).unwrap();
+    let masked = writer::<Masked>(&manifest);
+    let mut draft = masked.loan().unwrap();
+    draft.header().item = Item { seq: 7, ..Item::default() };
+    let cells = draft.values::<f32>();
+    cells.iter_mut().enumerate().for_each(|(cell, v)| *v = value(cell));
+    let place = place_of(cells);
+    masked.send(draft, Stage::Masking).unwrap();
+    println!("\nWROTE {} {} {} {}", place.inode, place.offset, place.path, place.rights);
+    // Lives until its reader is through.
+    let _ = std::io::stdin().lines().next();
+}
+
+fn start_publisher(manifest: &Manifest) -> Child {
+    Command::new(env::current_exe().unwrap())
+        .args(["--exact", "tests::zero_copy::publisher", "--nocapture"])
+        .env(run::ENVIRONMENT, &manifest.root)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap()
+}
+
+#[test]
+fn a_reader_in_another_process_sees_the_publishers_own_memory() {
+    let run = Run::new();
+    let signals = Signals::install().unwrap();
+    let mut masked = reader::<Masked>(&run.manifest, None);
+    let mut child = start_publisher(&run.manifest);
+    let mut said = BufReader::new(child.stdout.take().unwrap()).lines().map_while(Result::ok);
+    let wrote = said.find(|line| line.starts_with("WROTE")).unwrap();
+    while masked.head().unwrap().is_none() {
+        let woken = signals.wait(&[masked.listener()], None, std::time::Duration::from_secs(5)).unwrap();
+        assert!(!woken.timed_out);
+    }
+    let received = masked.current().unwrap();
+    let cells = &received.values::<f32>()[..RASTER];
+    assert!(cells.iter().enumerate().all(|(cell, v)| *v == value(cell)));
+    let place = place_of(cells);
+    assert_eq!(wrote, format!("WROTE {} {} {} rw-s", place.inode, place.offset, place.path));
+    assert!(place.path.starts_with(&format!("/dev/shm/{}", run.manifest.prefix)) && place.path.ends_with(".data"));
+    assert_eq!(place.rights, "r--s", "a reader cannot damage its input");
+    assert_eq!(cells.as_ptr() as usize % 64, 0, "fit for vector registers");
+    drop(child.stdin.take());
+    assert!(child.wait().unwrap().success());
+}
