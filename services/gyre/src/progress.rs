@@ -78,10 +78,10 @@ impl Progress {
             self.dropped += gap;
         }
         self.last_published = Some(published);
-        self.done = pose.item.seq + 1;
+        self.done = pose.item.seq.saturating_add(1);
         let (since, first) = *self.since.get_or_insert((Instant::now(), self.done));
         let rate = (self.done - first) as f64 / since.elapsed().as_secs_f64().max(1e-9);
-        let lag_ms = (clock::now_ns() - pose.item.due_ns) as f64 * 1e-6;
+        let lag_ms = clock::now_ns().saturating_sub(pose.item.due_ns) as f64 * 1e-6;
         let message = format!("{rate:.1} scans/s  lag {lag_ms:.0} ms  dropped {}", self.dropped);
         match &self.bar {
             Some(bar) => {

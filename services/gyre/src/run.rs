@@ -148,13 +148,17 @@ fn generate_once(simulation: &gyre_simulator::SimulationConfig, recording: &Path
     write(&made_by, &wanted)
 }
 
+/// What tells a run that is through with everything: its results are written last.
+const LAST_RESULT: &str = "summary.json";
+
 /// Goes on with an unfinished run of the same configuration, else begins anew; returns the poses that are there already.
 fn prepare(configuration: &Configuration, out: &Path, fresh: bool) -> Result<usize, Failure> {
     let journal = journal::path(out);
     let poses = journal::read(&journal)?;
-    let complete = poses.last().is_some_and(|last| last.item.is(flag::END));
+    let ended = poses.last().is_some_and(|last| last.item.is(flag::END));
+    let complete = ended && out.join(LAST_RESULT).exists();
     if poses.is_empty() || complete || fresh {
-        for file in [journal, out.join("log.jsonl")] {
+        for file in [journal, out.join("log.jsonl"), out.join(LAST_RESULT)] {
             let _ = fs::remove_file(file);
         }
         return Ok(0);

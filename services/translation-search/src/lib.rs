@@ -66,7 +66,8 @@ impl Stage for Translations {
         let pair = pair.ok_or_else(|| current.malformed("its rasters do not fit their headers"))?;
         let motion = self.next(pair, input.other.header().rotation);
         let motion = motion.map_err(|error| current.malformed(error.to_string()))?;
-        let interval_ns = input.before.map_or(0, |before| current.item().stamp_ns - before.item().stamp_ns);
+        let interval_ns =
+            input.before.map_or(0, |before| current.item().stamp_ns.saturating_sub(before.item().stamp_ns));
         output.header().motion = MotionEstimate { interval_ns, ..motion };
         Ok(())
     }

@@ -4,7 +4,9 @@
 //! faster than on a disk. It holds the manifest, the resolved configuration and the transport's sockets, and goes with the run.
 
 use std::{
-    fs::{self, File},
+    fs::{self, File, Permissions},
+    io::ErrorKind,
+    os::unix::fs::PermissionsExt,
     path::{Path, PathBuf},
 };
 
@@ -20,6 +22,9 @@ use crate::StageError;
 pub const ENVIRONMENT: &str = "GYRE_RUN";
 const RUNS: &str = "/dev/shm/gyre";
 const SHARED_MEMORY: &str = "/dev/shm";
+/// Anybody's runs may be in it, and nobody removes another's.
+const FOR_ALL_USERS: u32 = 0o1777;
+const FOR_THE_OWNER: u32 = 0o700;
 
 /// What a process must know of its run.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -116,7 +121,8 @@ impl RunRoot {
         let unusable = |source| RootError::Unusable { path: path.clone(), source };
         let _alone = lock_all_runs().map_err(unusable)?;
         sweep_dead_runs();
-        fs::create_dir_all(&path).map_err(unusable)?;
+        make_directory(Path::new(RUNS), FOR_ALL_USERS).map_err(unusable)?;
+        make_directory(&path, FOR_THE_OWNER).map_err(unusable)?;
         match try_lock(&path).map_err(unusable)? {
             Some(lock) => Ok(Self { name, path, _lock: lock }),
             None => Err(RootError::Busy(out.to_owned())),
@@ -138,6 +144,15 @@ impl Drop for RunRoot {
     fn drop(&mut self) {
         let _alone = lock_all_runs();
         remove_run(&self.name);
+    }
+}
+
+/// Makes a directory, if it is not there yet, with just these permissions.
+fn make_directory(path: &Path, mode: u32) -> std::io::Result<()> {
+    match fs::create_dir(path) {
+        Ok(()) => fs::set_permissions(path, Permissions::from_mode(mode)),
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => Ok(()),
+        Err(error) => Err(error),
     }
 }
 

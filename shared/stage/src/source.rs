@@ -21,7 +21,8 @@ pub trait Source {
         self.len() == 0
     }
 
-    /// When scan `index` is complete on the sensor's clock, ns since 1970, as far as can be told without reading it.
+    /// When scan `index` is complete on the sensor's clock, ns since 1970, as far as can be told without reading it. Where it
+    /// cannot, live mode does not know which scans a source that was away has missed, and plays them late.
     fn complete_ns(&self, index: usize) -> Option<i64>;
 
     /// Reads scan `index` into shared memory; the error is one sentence that says why it cannot be used.
@@ -153,11 +154,10 @@ impl<S: Source> Playback<'_, S> {
 
     fn play(&mut self, mut position: Position) -> Result<(), StageError> {
         let mut tempo = None;
-        while let Some(draft) = self.next_readable(&mut position)? {
-            if tempo.is_none() {
-                tempo = self.tempo(position.index);
-            }
-            if !self.admit(draft, &position, tempo)? {
+        while let Some(mut draft) = self.next_readable(&mut position)? {
+            let complete_ns = complete_ns(draft.header());
+            let tempo = *tempo.get_or_insert_with(|| self.tempo(complete_ns));
+            if !self.admit(draft, &position, tempo.map(|tempo| tempo.due_ns(complete_ns)))? {
                 return Ok(());
             }
             position.advance();
@@ -199,8 +199,7 @@ impl<S: Source> Playback<'_, S> {
     }
 
     /// Publishes a scan when there is room and its time has come; false when told to stop before that.
-    fn admit(&mut self, mut draft: Draft<Scan>, position: &Position, tempo: Option<Tempo>) -> Result<bool, StageError> {
-        let due_ns = tempo.and_then(|tempo| Some(tempo.due_ns(self.source.complete_ns(position.index)?)));
+    fn admit(&mut self, mut draft: Draft<Scan>, position: &Position, due_ns: Option<i64>) -> Result<bool, StageError> {
         let turn = self.wait_for_turn(position.published, due_ns)?;
         if turn {
             draft.header().item.due_ns = due_ns.unwrap_or_else(clock::now_ns);
@@ -236,9 +235,9 @@ impl<S: Source> Playback<'_, S> {
         }
     }
 
-    fn tempo(&self, index: usize) -> Option<Tempo> {
-        let rate = self.launch.manifest.rate?;
-        Some(Tempo { rate, start_ns: clock::now_ns(), first_ns: self.source.complete_ns(index)? })
+    /// The pace from a first scan on; `None`: as fast as the window admits.
+    fn tempo(&self, first_ns: i64) -> Option<Tempo> {
+        Some(Tempo { rate: self.launch.manifest.rate?, start_ns: clock::now_ns(), first_ns })
     }
 
     fn end(&mut self, position: &Position) -> Result<(), StageError> {
@@ -254,6 +253,12 @@ impl<S: Source> Playback<'_, S> {
         self.scans.greet()?;
         Ok(woken.stop)
     }
+}
+
+/// When the sweep was complete on the sensor's clock: the time of its last azimuth.
+fn complete_ns(header: &ScanHeader) -> i64 {
+    let stamps = header.azimuth_stamp_ns.iter().take(header.azimuths as usize);
+    stamps.copied().max().unwrap_or(header.item.stamp_ns)
 }
 
 #[cfg(test)]
