@@ -121,8 +121,10 @@ fn resolve(arguments: &RunArguments, out: &Path) -> Result<Configuration, Failur
         generate_once(&simulation, &configuration.source.data)?;
     }
     // So that the resolved configuration repeats the run from anywhere. What does not exist is told by the reader.
-    if let Ok(absolute) = configuration.source.data.canonicalize() {
-        configuration.source.data = absolute;
+    for path in [Some(&mut configuration.source.data), configuration.run.ground_truth.as_mut()].into_iter().flatten() {
+        if let Ok(absolute) = path.canonicalize() {
+            *path = absolute;
+        }
     }
     Ok(configuration)
 }
@@ -158,8 +160,10 @@ fn prepare(configuration: &Configuration, out: &Path, fresh: bool) -> Result<usi
     let ended = poses.last().is_some_and(|last| last.item.is(flag::END));
     let complete = ended && out.join(LAST_RESULT).exists();
     if poses.is_empty() || complete || fresh {
-        for file in [journal, out.join("log.jsonl"), out.join(LAST_RESULT)] {
-            let _ = fs::remove_file(file);
+        let _ = fs::remove_file(journal);
+        // A new run may have no truth to be drawn against: nothing of the earlier one must look like its own.
+        for result in [LAST_RESULT, "log.jsonl", "odometry.csv", "trajectory.tum", "trajectory.svg", "errors.svg"] {
+            let _ = fs::remove_file(out.join(result));
         }
         return Ok(0);
     }

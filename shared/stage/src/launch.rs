@@ -7,6 +7,7 @@ use std::{
     sync::Mutex,
 };
 
+use rustix::process::{Signal, set_parent_process_death_signal};
 use serde::de::DeserializeOwned;
 use tracing::span::EnteredSpan;
 
@@ -34,6 +35,8 @@ impl Launch {
     /// Joins the run that [`run::ENVIRONMENT`] names.
     pub fn from_environment(name: &str) -> Result<Self, StageError> {
         let root = std::env::var_os(run::ENVIRONMENT).ok_or_else(|| StageError::NoRun { stage: name.to_owned() })?;
+        // Where a shell stands between us and the supervisor, this takes us down with the shell.
+        let _ = set_parent_process_death_signal(Some(Signal::KILL));
         let manifest = Manifest::read(&PathBuf::from(root))?;
         let log = start_log(&manifest, name)?;
         let path = manifest.root.join("config.toml");

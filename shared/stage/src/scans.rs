@@ -56,6 +56,10 @@ impl Inputs for Scans {
     }
 
     fn turn(&mut self) -> Result<Turn, StageError> {
+        match &mut self.intake {
+            Intake::Lossless(intake) => drop(intake.reader.head()?),
+            Intake::Live(intake) => intake.take()?,
+        }
         self.feedback.update()?;
         // Where the trajectory stands decides which scans are still wanted, and in live mode where the chain goes on.
         let Some(sync) = self.feedback.sync().copied() else { return Ok(Turn::Wait) };
@@ -156,7 +160,8 @@ struct Chain {
 }
 
 impl NewestWins {
-    fn turn(&mut self, sync: &Item, newest_pose: Option<u64>) -> Result<Turn, StageError> {
+    /// Takes what has come.
+    fn take(&mut self) -> Result<(), StageError> {
         while let Some(received) = self.port.receive()? {
             if self.chain.is_some_and(|chain| chain.had(received.item())) {
                 continue;
@@ -166,6 +171,10 @@ impl NewestWins {
                 self.drop_all_but_the_newest();
             }
         }
+        Ok(())
+    }
+
+    fn turn(&mut self, sync: &Item, newest_pose: Option<u64>) -> Result<Turn, StageError> {
         let Some(chain) = self.chain.or_else(|| self.resume(sync)) else { return Ok(Turn::Wait) };
         self.chain = Some(chain);
         if !chain.again {

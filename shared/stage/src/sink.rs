@@ -33,7 +33,9 @@ pub fn run(launch: &Launch, sink: &mut impl Sink) -> Result<Statistics, StageErr
             integration.statistics.duplicates = motions.duplicates();
             return Ok(integration.statistics);
         }
-        integration.poses.greet()?;
+        if woken.may_have_newcomers() {
+            integration.poses.greet()?;
+        }
         if integration.drain(&mut motions)? && woken.timed_out {
             integration.statistics.wakes_caught_late += 1;
         }

@@ -31,7 +31,7 @@ pub trait Source {
 
 /// Runs the source until SIGTERM.
 pub fn run(launch: &Launch, source: &mut impl Source) -> Result<Statistics, StageError> {
-    let credit = Credit { poses: Port::open(&launch.node)?, newest: None, sync: None };
+    let credit = Credit { poses: Port::open(&launch.node)?, newest: None, published: None, sync: None };
     let scans = Writer::open(&launch.node, &launch.manifest)?;
     let mut playback = Playback { launch, source, credit, scans, statistics: Statistics::default() };
     let Some(position) = playback.wait_for_start()? else { return Ok(playback.statistics) };
@@ -43,6 +43,8 @@ pub fn run(launch: &Launch, source: &mut impl Source) -> Result<Statistics, Stag
 struct Credit {
     poses: Port<Pose>,
     newest: Option<u64>,
+    /// The newest pose's number among the scans published.
+    published: Option<u64>,
     sync: Option<Item>,
 }
 
@@ -55,6 +57,7 @@ impl Credit {
             }
             if !item.is(flag::BASE) && !item.is(flag::END) {
                 self.newest = self.newest.max(Some(item.seq));
+                self.published = self.published.max(Some(item.published));
             }
         }
         Ok(())
@@ -161,8 +164,13 @@ impl<S: Source> Playback<'_, S> {
                 return Ok(());
             }
             position.advance();
-            if self.launch.manifest.live {
-                self.skip_what_is_past(&mut position, tempo);
+            if let Some(tempo) = tempo {
+                if self.launch.manifest.live {
+                    self.skip_what_is_past(&mut position, tempo);
+                }
+                if !self.let_pass(&position, tempo)? {
+                    return Ok(());
+                }
             }
         }
         if self.wait_for_turn(position.published, None)? {
@@ -226,12 +234,29 @@ impl<S: Source> Playback<'_, S> {
     }
 
     /// A radar does not wait: what it saw while this process was not there has been missed.
-    fn skip_what_is_past(&mut self, position: &mut Position, tempo: Option<Tempo>) {
-        let Some(tempo) = tempo else { return };
+    fn skip_what_is_past(&mut self, position: &mut Position, tempo: Tempo) {
         let now_ns = clock::now_ns();
         let period_behind = |index| Some(tempo.due_ns(self.source.complete_ns(index + 1)?) < now_ns);
         while position.index + 1 < self.source.len() && period_behind(position.index) == Some(true) {
             position.miss();
+        }
+    }
+
+    /// Reading a recording is work that a radar does not make: while there is time, leave the processors to the scan on its way.
+    /// Returns at its pose, or half-way to the next scan; false when told to stop before that.
+    fn let_pass(&mut self, position: &Position, tempo: Tempo) -> Result<bool, StageError> {
+        let Some(complete_ns) = self.source.complete_ns(position.index) else { return Ok(true) };
+        let until_ns = clock::now_ns() + (clock::until(tempo.due_ns(complete_ns)) / 2).as_nanos() as i64;
+        let sent = position.published.saturating_sub(1);
+        loop {
+            self.credit.update()?;
+            let wait = clock::until(until_ns);
+            if wait.is_zero() || self.credit.published >= Some(sent) {
+                return Ok(true);
+            }
+            if self.sleep(wait.min(wake::NET))? {
+                return Ok(false);
+            }
         }
     }
 
@@ -250,7 +275,9 @@ impl<S: Source> Playback<'_, S> {
     fn sleep(&mut self, limit: Duration) -> Result<bool, StageError> {
         let woken = self.launch.signals.wait(&[self.credit.poses.listener()], Some(self.scans.listener()), limit)?;
         self.statistics.wakes += 1;
-        self.scans.greet()?;
+        if woken.may_have_newcomers() {
+            self.scans.greet()?;
+        }
         Ok(woken.stop)
     }
 }

@@ -39,7 +39,9 @@ pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<Statistics, Stage
             flow.statistics.duplicates = flow.inputs.duplicates();
             return Ok(flow.statistics);
         }
-        flow.output.greet()?;
+        if woken.may_have_newcomers() {
+            flow.output.greet()?;
+        }
         if flow.drain()? && woken.timed_out {
             flow.statistics.wakes_caught_late += 1;
         }

@@ -41,8 +41,17 @@ pub struct Woken {
     pub stop: bool,
     /// A child process has ended.
     pub child: bool,
+    /// A reader has greeted.
+    pub hello: bool,
     /// Nothing came: the limit was reached.
     pub timed_out: bool,
+}
+
+impl Woken {
+    /// Whether readers may have come: one has greeted, or its greeting may have been lost.
+    pub fn may_have_newcomers(&self) -> bool {
+        self.hello || self.timed_out
+    }
 }
 
 impl Signals {
@@ -63,30 +72,33 @@ impl Signals {
 
     /// Sleeps until one of the listeners is notified, a signal comes or `limit` is over, whichever is first.
     /// The notifications of `data` are consumed: look at all queues afterwards. A notification of `hello` is left for
-    /// [`Writer::greet`](crate::writer::Writer::greet), to be called next.
+    /// [`Writer::greet`](crate::writer::Writer::greet), to be called when [`Woken::may_have_newcomers`] says so.
     pub(crate) fn wait(
         &self,
         data: &[&Listener],
         hello: Option<&Listener>,
         limit: Duration,
     ) -> Result<Woken, StageError> {
-        let mut polled: Vec<PollFd<'_>> = vec![
-            PollFd::from_borrowed_fd(self.stop.as_fd(), PollFlags::IN),
-            PollFd::from_borrowed_fd(self.child.as_fd(), PollFlags::IN),
-        ];
-        let listeners = data.iter().copied().chain(hello);
-        polled.extend(listeners.map(|listener| PollFd::from_borrowed_fd(descriptor(listener), PollFlags::IN)));
+        let mut polled = vec![self.stop.as_fd(), self.child.as_fd()];
+        polled.extend(data.iter().copied().chain(hello).map(descriptor));
+        let mut polled: Vec<_> = polled.into_iter().map(|fd| PollFd::from_borrowed_fd(fd, PollFlags::IN)).collect();
         let limit = Timespec { tv_sec: limit.as_secs() as i64, tv_nsec: i64::from(limit.subsec_nanos()) };
-        let ready = match poll(&mut polled, Some(&limit)) {
-            Ok(ready) => ready,
-            Err(Errno::INTR) => 1,
+        let timed_out = match poll(&mut polled, Some(&limit)) {
+            Ok(ready) => ready == 0,
+            Err(Errno::INTR) => false,
             Err(error) => return Err(StageError::transport("wait", error)),
         };
+        // Only what is ready is read: each call less is a message taken sooner.
+        let mut ready = polled.iter().map(|polled| !polled.revents().is_empty());
+        let mut next = || ready.next().unwrap_or(false);
+        let (stop, child) = (next() && drain(&self.stop), next() && drain(&self.child));
         for listener in data {
-            listener.try_wait(|_| ()).map_err(|e| StageError::transport("read notifications", e))?;
+            if next() {
+                listener.try_wait(|_| ()).map_err(|e| StageError::transport("read notifications", e))?;
+            }
         }
-        self.stopped.set(drain(&self.stop) || self.stopped.get());
-        Ok(Woken { stop: self.stopped.get(), child: drain(&self.child), timed_out: ready == 0 })
+        self.stopped.set(stop || self.stopped.get());
+        Ok(Woken { stop: self.stopped.get(), child, hello: next(), timed_out })
     }
 }
 
