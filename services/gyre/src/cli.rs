@@ -40,7 +40,7 @@ pub struct RunArguments {
     /// The dataset's folder (source.data).
     #[arg(long)]
     pub data: Option<PathBuf>,
-    /// Where the results go. Default: out/<name of the configuration>.
+    /// Where the results go. Default: `out/NAME`, NAME being the configuration's.
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// How fast to play: realtime, max, or a factor (run.rate).
@@ -87,7 +87,7 @@ pub struct EvaluateArguments {
 
 #[derive(Debug, Args)]
 pub struct SimulateArguments {
-    /// The configuration, whose section [simulation] is used; its defaults without one.
+    /// The configuration, whose section `[simulation]` is used; its defaults without one.
     pub configuration: Option<PathBuf>,
     /// Where to write the recording.
     #[arg(long)]

@@ -107,7 +107,7 @@ pub enum SuperviseError {
     #[error(transparent)]
     Stage(#[from] StageError),
     /// A command cannot be started.
-    #[error("cannot start {stage} with `{command}`: {source}; see [{stage}] command in the configuration")]
+    #[error("cannot start {stage} with `{command}`: {source}; see [stages.{stage}] command in the configuration")]
     Spawn {
         /// Which stage.
         stage: String,
