@@ -60,11 +60,12 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     let started = Instant::now();
     let report = supervise(&plan, signals, &mut |event| progress.show(&event));
     progress.finish();
-    drop(root);
     if let Err(SuperviseError::TransportStuck) = report {
+        drop(root);
         return start_over();
     }
     let session = Session { scans: checked.scans, resumed, wall: started.elapsed(), footprint: &checked.footprint };
+    // The run keeps its place until its results are written: no other may begin to write them meanwhile.
     finish(&configuration, &out, &session, report)
 }
 
