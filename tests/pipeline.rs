@@ -41,6 +41,7 @@ fn all_results_are_there_and_each_motion_has_a_row() {
         ("trajectory.tum", "154713240"),
         ("trajectory.svg", "<svg"),
         ("errors.svg", "<svg"),
+        ("bands.svg", "<svg"),
         ("latency.json", "sensor_to_pose"),
         ("config.toml", "[masking]"),
         ("log.jsonl", ""),

@@ -62,5 +62,5 @@ fn stage_name(pid: Pid) -> Option<String> {
     let last = line.split(|byte| *byte == 0).rfind(|word| !word.is_empty())?;
     let path = PathBuf::from(String::from_utf8_lossy(last).into_owned());
     let name = path.file_stem()?.to_string_lossy().into_owned();
-    super::STAGES.contains(&name.as_str()).then_some(name)
+    (super::STAGES.contains(&name.as_str()) || name == "joint-search").then_some(name)
 }

@@ -80,9 +80,21 @@ pub struct EvaluateArguments {
     /// Print JSON.
     #[arg(long)]
     pub json: bool,
-    /// Write trajectory.svg and errors.svg here.
+    /// Write trajectory.svg, errors.svg and, where there are covariances, bands.svg here.
     #[arg(long)]
     pub plots: Option<PathBuf>,
+    /// The motions whose covariances are judged. Default: the odometry.csv beside the estimate, if it has the same stamps.
+    #[arg(long)]
+    pub odometry: Option<PathBuf>,
+    /// How many motions make the stretches over which covariances are judged.
+    #[arg(long, value_delimiter = ',', default_value = "1,4,16,64")]
+    pub nees_lengths: Vec<NonZeroUsize>,
+    /// Standard deviation of the ground truth's x and y, m: added to the covariances that are judged.
+    #[arg(long, default_value = "0", value_parser = sigma)]
+    pub truth_sigma_m: f64,
+    /// Standard deviation of the ground truth's heading, degrees.
+    #[arg(long, default_value = "0", value_parser = sigma)]
+    pub truth_sigma_deg: f64,
 }
 
 #[derive(Debug, Args)]
@@ -98,4 +110,10 @@ pub struct SimulateArguments {
     /// Seed (simulation.seed).
     #[arg(long)]
     pub seed: Option<u64>,
+}
+
+/// A standard deviation: a number, not below zero.
+fn sigma(text: &str) -> Result<f64, String> {
+    let sigma = text.parse().ok().filter(|sigma: &f64| sigma.is_finite() && *sigma >= 0.0);
+    sigma.ok_or_else(|| "a number of at least 0 is needed".to_owned())
 }

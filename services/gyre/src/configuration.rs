@@ -14,7 +14,7 @@ use gyre_masking::MaskingConfig;
 use gyre_messages::{Stage, Window};
 use gyre_radar::{DatasetOptions, RasterConfig};
 use gyre_radar_replay::SourceConfig;
-use gyre_scan_matching::{RotationConfig, TranslationConfig};
+use gyre_scan_matching::{ExhaustiveConfig, RotationConfig, TranslationConfig};
 use gyre_simulator::SimulationConfig;
 use gyre_stage::supervise::{RestartPolicy, StagePlan};
 use serde::{Deserialize, Serialize};
@@ -38,10 +38,14 @@ pub struct Configuration {
     pub raster: RasterConfig,
     /// What to take out of them.
     pub masking: MaskingConfig,
+    /// Which search.
+    pub search: SearchConfig,
     /// The search for the rotation.
     pub rotation: RotationConfig,
     /// The search for the translation.
     pub translation: TranslationConfig,
+    /// The search for both together.
+    pub exhaustive: ExhaustiveConfig,
     /// Stages that are started or restarted differently, by name.
     pub stages: BTreeMap<String, StageConfig>,
 }
@@ -61,6 +65,36 @@ pub struct RunConfig {
     /// Ground truth to judge the result by. Default: what lies in the dataset's folder.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ground_truth: Option<PathBuf>,
+}
+
+/// The section `[search]`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SearchConfig {
+    /// `decoupled`: rotation, then translation, in two processes. `exhaustive`: both together, in one. Default `decoupled`.
+    pub kind: SearchKind,
+}
+
+/// How a motion is searched for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SearchKind {
+    /// By rotation-search and translation-search.
+    #[default]
+    Decoupled,
+    /// By joint-search.
+    Exhaustive,
+}
+
+impl SearchKind {
+    /// Whether a run with this search has the stage.
+    fn has(self, stage: Stage) -> bool {
+        match stage {
+            Stage::RotationSearch | Stage::TranslationSearch => self == Self::Decoupled,
+            Stage::JointSearch => self == Self::Exhaustive,
+            _ => true,
+        }
+    }
 }
 
 /// What happens when scans come faster than they can be processed.
@@ -161,12 +195,25 @@ impl Configuration {
             },
             raster: strict::section(&mut table, "raster")?,
             masking: strict::section(&mut table, "masking")?,
+            search: strict::section(&mut table, "search")?,
             rotation: strict::section(&mut table, "rotation")?,
             translation: strict::section(&mut table, "translation")?,
+            exhaustive: strict::section(&mut table, "exhaustive")?,
             stages: strict::sections(&mut table, "stages", &Stage::ALL.map(Stage::name))?,
         };
-        let known =
-            ["run", "source", "dataset", "simulation", "raster", "masking", "rotation", "translation", "stages"];
+        let known = [
+            "run",
+            "source",
+            "dataset",
+            "simulation",
+            "raster",
+            "masking",
+            "search",
+            "rotation",
+            "translation",
+            "exhaustive",
+            "stages",
+        ];
         match table.keys().next() {
             None => Ok(configuration),
             Some(key) => Err(strict::unknown("the configuration", key, &known)),
@@ -178,6 +225,7 @@ impl Configuration {
         self.raster.validate().map_err(|e| value("raster", e.to_string()))?;
         self.rotation.validate().map_err(|e| value("rotation", e.to_string()))?;
         self.translation.validate().map_err(|e| value("translation", e.to_string()))?;
+        self.exhaustive.validate().map_err(|e| value("exhaustive", e.to_string()))?;
         self.window(None).validate().map_err(|e| value("run", e.to_string()))?;
         if let Some(simulation) = &self.simulation {
             simulation.validate().map_err(|e| value("simulation", e.to_string()))?;
@@ -225,7 +273,7 @@ impl Configuration {
             let command = if own.command.is_empty() { ours() } else { own.command };
             StagePlan { name: name.to_owned(), command, restart: own.restart }
         };
-        Stage::ALL.map(plan).to_vec()
+        Stage::ALL.into_iter().filter(|stage| self.search.kind.has(*stage)).map(plan).collect()
     }
 
     /// The text of the resolved configuration: a run from it repeats this run.
@@ -284,6 +332,17 @@ mod tests {
             let error = from(text).unwrap_err().to_string();
             assert!(error.contains(part), "{text}: {error}");
         }
+    }
+
+    #[test]
+    fn one_line_chooses_the_search() {
+        let names = |text: &str| -> Vec<String> {
+            from(text).unwrap().stage_plans(Path::new("gyre")).into_iter().map(|plan| plan.name).collect()
+        };
+        let halves = ["radar-replay", "masking", "rotation-search", "translation-search", "pose-integration"];
+        assert_eq!(names(""), halves);
+        let joint = ["radar-replay", "masking", "joint-search", "pose-integration"];
+        assert_eq!(names("[search]\nkind = 'exhaustive'"), joint);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use gyre_messages::{PoseHeader, Stage};
+use gyre_messages::{Hop, PoseHeader, Stage};
 use serde::Serialize;
 
 /// Percentiles of a duration, microseconds.
@@ -60,7 +60,7 @@ impl Latency {
     pub fn of(poses: &[PoseHeader]) -> Self {
         let finished = |pose: &PoseHeader| pose.item.hops[Stage::PoseIntegration as usize].finished_ns;
         let span_ns = span(poses);
-        let stages: BTreeMap<_, _> = Stage::ALL.map(|stage| (stage.name(), hop(poses, stage, span_ns))).into();
+        let stages = hops(poses, span_ns);
         let busiest = stages.iter().max_by(|a, b| a.1.busy.total_cmp(&b.1.busy));
         Self {
             scans: poses.len(),
@@ -72,11 +72,24 @@ impl Latency {
     }
 }
 
-fn hop(poses: &[PoseHeader], stage: Stage, span_ns: i64) -> HopLatency {
-    let place = stage as usize;
-    let hops = || poses.iter().map(move |pose| pose.item.hops[place]);
-    let transport = place.checked_sub(1).map(|before| {
-        let crossing = |pose: &PoseHeader| pose.item.hops[place].received_ns - pose.item.hops[before].published_ns;
+/// The hops of the stages that the run has: those of the others stayed zero.
+fn hops(poses: &[PoseHeader], span_ns: i64) -> BTreeMap<&'static str, HopLatency> {
+    let passed = |stage: &Stage| poses.iter().any(|pose| pose.item.hops[*stage as usize] != Hop::default());
+    let mut before = None;
+    let mut stages = BTreeMap::new();
+    for stage in Stage::ALL.into_iter().filter(passed) {
+        stages.insert(stage.name(), hop(poses, before, stage, span_ns));
+        before = Some(stage);
+    }
+    stages
+}
+
+fn hop(poses: &[PoseHeader], before: Option<Stage>, stage: Stage, span_ns: i64) -> HopLatency {
+    let hops = || poses.iter().map(move |pose| pose.item.hops[stage as usize]);
+    let transport = before.map(|before| {
+        let crossing = |pose: &PoseHeader| {
+            pose.item.hops[stage as usize].received_ns - pose.item.hops[before as usize].published_ns
+        };
         Percentiles::of(poses.iter().map(crossing))
     });
     let busy_ns: i64 = hops().map(|hop| hop.finished_ns - hop.started_ns).sum();
@@ -126,7 +139,7 @@ mod tests {
                 published_ns: received_ns + 7000,
             }
         };
-        let hops = [hop(0), hop(1), hop(2), hop(3), hop(4)];
+        let hops = [hop(0), hop(1), hop(2), hop(3), Hop::default(), hop(4)];
         PoseHeader { item: Item { due_ns, hops, ..Item::default() }, ..PoseHeader::default() }
     }
 

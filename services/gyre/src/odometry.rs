@@ -1,10 +1,15 @@
 //! `odometry.csv` and the trajectory, from the journal.
 
+mod read;
+
 use std::fmt::Write;
 
+use gyre_evaluation::{Motion, UncertainMotion};
 use gyre_messages::{PoseHeader, flag};
 use gyre_radar::Trajectory;
-use nalgebra::{Isometry2, Vector2};
+use nalgebra::{Isometry2, Matrix3, Vector2};
+
+pub use read::read;
 
 const HEADER: &str = "seq,scan,previous_scan,stamp_ns,interval_ns,x_m,y_m,yaw_rad,\
     cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,score,runner_up_score,\
@@ -39,6 +44,20 @@ pub fn trajectory(poses: &[PoseHeader]) -> Trajectory {
         stamp_ns: Some(poses.iter().map(|pose| pose.item.stamp_ns).collect()),
         poses: poses.iter().map(pose).collect(),
     }
+}
+
+/// The motions with their times and covariances. Where the chain starts there is none.
+pub fn motions(poses: &[PoseHeader]) -> Vec<Motion> {
+    let motion = |pose: &PoseHeader| {
+        let (to_ns, motion) = (pose.item.stamp_ns, &pose.motion);
+        let [xx, xy, xyaw, yy, yyaw, yawyaw] = motion.covariance;
+        let estimate = UncertainMotion {
+            motion: Isometry2::new(Vector2::new(motion.x_m, motion.y_m), motion.yaw_rad),
+            covariance: Matrix3::new(xx, xy, xyaw, xy, yy, yyaw, xyaw, yyaw, yawyaw),
+        };
+        Motion { from_ns: to_ns.saturating_sub(motion.interval_ns), to_ns, estimate }
+    };
+    poses.iter().filter(|pose| !pose.item.is(flag::BREAK)).map(motion).collect()
 }
 
 #[cfg(test)]

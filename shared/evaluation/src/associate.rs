@@ -150,7 +150,7 @@ fn by_time(
 }
 
 /// The span of the stamps, `None` where there are none; refuses a wrong count and time that runs backwards.
-fn require_stamps(side: Side, trajectory: &Trajectory<'_>) -> Result<Option<(i64, i64)>, EvaluationError> {
+pub(crate) fn require_stamps(side: Side, trajectory: &Trajectory<'_>) -> Result<Option<(i64, i64)>, EvaluationError> {
     let (stamps, poses) = (trajectory.stamps_ns, trajectory.poses.len());
     if stamps.len() != poses {
         return Err(EvaluationError::StampCount { side, poses, stamps: stamps.len() });
@@ -162,7 +162,7 @@ fn require_stamps(side: Side, trajectory: &Trajectory<'_>) -> Result<Option<(i64
 }
 
 /// What the truth knows about one instant.
-enum At {
+pub(crate) enum At {
     Pose(Pose),
     Outside,
     Gap,
@@ -172,7 +172,7 @@ enum At {
 const ROUNDING_NS: u64 = 1_000;
 
 /// The truth at `stamp_ns`. A stamp that the truth has itself is never in a gap.
-fn truth_at(truth: Trajectory<'_>, stamp_ns: i64, max_gap_ns: i64) -> At {
+pub(crate) fn truth_at(truth: Trajectory<'_>, stamp_ns: i64, max_gap_ns: i64) -> At {
     let ends = truth.stamps_ns.first().into_iter().chain(truth.stamps_ns.last());
     let end = ends.copied().find(|end| stamp_ns.abs_diff(*end) <= ROUNDING_NS);
     let stamp_ns = end.unwrap_or(stamp_ns);

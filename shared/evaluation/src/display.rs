@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::{Coverage, Evaluation, Kitti, Rpe, Seg};
+use crate::{Coverage, Evaluation, Kitti, Nees, NeesFigures, NeesLength, Rpe, Seg, TruthSigma};
 
 impl fmt::Display for Evaluation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -106,5 +106,53 @@ impl fmt::Display for Rpe {
         }
         let (rmse, mean, pairs) = (self.rotation_rmse_deg, self.rotation_mean_deg, self.pairs.len());
         write!(f, "\n{:14}rotation {rmse:.4} deg rmse, {mean:.4} deg mean; {pairs} pairs", "")
+    }
+}
+
+impl fmt::Display for Nees {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "covariance    {} motions; left out: {} without truth, ", self.motions, self.without_truth)?;
+        writeln!(f, "{} without covariance; truth: {}", self.without_covariance, self.truth_sigma)?;
+        writeln!(f, "{:14}mean normalised error squared over its expectation (1: honest, more: overconfident)", "")?;
+        writeln!(f, "{:14}[where 95 % of honest, independent ones lie]  share outside the 95 % region", "")?;
+        write!(
+            f,
+            "\n{:>8}{:>10}{:>11}{:>16}{:>32}{:>25}",
+            "motions", "half", "stretches", "pose", "translation", "yaw"
+        )?;
+        self.by_length.iter().try_for_each(|length| length.fmt(f))
+    }
+}
+
+impl fmt::Display for NeesLength {
+    /// Lines that begin with a line break: all stretches, and each half.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let halves =
+            [("all", Some(&self.all)), ("first", self.first_half.as_ref()), ("second", self.second_half.as_ref())];
+        for (half, figures) in halves {
+            let Some(figures) = figures else { continue };
+            write!(f, "\n{:8}{half:>10}{figures}", self.motions)?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for TruthSigma {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self == Self::default() {
+            true => write!(f, "taken as exact"),
+            false => write!(f, "sigma {} m, {:.3} deg", self.position_m, self.yaw_rad.to_degrees()),
+        }
+    }
+}
+
+impl fmt::Display for NeesFigures {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:11}", self.stretches)?;
+        for figure in [self.pose, self.translation, self.yaw] {
+            let [low, high] = figure.honest_range;
+            write!(f, "{:8.2} [{low:.2}, {high:.2}]{:6.1} %", figure.ratio, figure.outside_percent)?;
+        }
+        Ok(())
     }
 }

@@ -102,6 +102,43 @@ pub enum EvaluationError {
         /// Poses of the truth.
         truth: usize,
     },
+    /// The numbers of a motion are NaN, infinite, or further than any vehicle drives.
+    #[error("motion {index} is none: ({x_m} m, {y_m} m, {yaw_rad} rad)")]
+    NotAMotion {
+        /// Its index, from 0.
+        index: usize,
+        /// Its x, m.
+        x_m: f64,
+        /// Its y, m.
+        y_m: f64,
+        /// Its yaw, rad.
+        yaw_rad: f64,
+    },
+    /// A motion does not end after it begins, or begins before the one before has ended.
+    #[error("the motions run backwards at motion {index}: from {from_ns} ns to {to_ns} ns, after {previous_ns} ns")]
+    MotionBackwards {
+        /// Its index, from 0.
+        index: usize,
+        /// End of the motion before, ns; for the first motion its own beginning.
+        previous_ns: i64,
+        /// Its earlier stamp, ns.
+        from_ns: i64,
+        /// Its later stamp, ns.
+        to_ns: i64,
+    },
+    /// Covariances cannot be judged: there is not one motion with truth and covariance.
+    #[error(
+        "none of {motions} motions can be judged: {without_truth} without ground truth at both ends (same clock?), \
+         {without_covariance} without a positive definite covariance"
+    )]
+    NoMotionJudged {
+        /// Motions given.
+        motions: usize,
+        /// Motions without truth at both ends.
+        without_truth: usize,
+        /// Motions without a positive definite covariance.
+        without_covariance: usize,
+    },
 }
 
 fn span_s(span_ns: &(i64, i64)) -> String {

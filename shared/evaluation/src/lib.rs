@@ -1,4 +1,4 @@
-//! How well a planar trajectory fits its ground truth: KITTI, ATE, RPE and seg, and plots of them.
+//! How well a planar trajectory fits its ground truth: KITTI, ATE, RPE and seg, NEES of its covariances, and plots of them.
 //!
 //! Pure mathematics on slices of poses and stamps; files are read elsewhere. Poses are
 //! [`nalgebra::Isometry2<f64>`] ([`Pose`]), each the pose of the sensor in some fixed frame (REP-103: x forward, y left,
@@ -9,7 +9,9 @@
 //! - [`mod@associate`]: which pose of the estimate is held against which pose of the truth;
 //! - [`mirror`]: axes that run the other way, found and undone;
 //! - [`mod@ate`], [`mod@kitti`], [`mod@seg`], [`mod@rpe`]: one metric each, on [`MatchedPoses`];
-//! - [`plot`]: trajectory and errors as SVG.
+//! - [`motions`]: reported motions with covariances, each beside its truth;
+//! - [`mod@nees`], [`mod@bands`]: whether these covariances are honest, as figures and over time;
+//! - [`plot`]: trajectory, errors and bands as SVG.
 //!
 //! ```
 //! use gyre_evaluation::{Association, Options, Pose, Trajectory, evaluate};
@@ -26,11 +28,16 @@
 
 pub mod associate;
 pub mod ate;
+pub mod bands;
+mod chi_square;
+mod covariance;
 mod display;
 mod error;
 pub mod kitti;
 mod matched;
 pub mod mirror;
+pub mod motions;
+pub mod nees;
 pub mod plot;
 pub mod report;
 pub mod rpe;
@@ -39,11 +46,15 @@ mod stretches;
 
 pub use associate::{Association, Coverage, Trajectory, associate};
 pub use ate::{Ate, align, ate};
+pub use bands::{BandSample, Bands, bands};
+pub use covariance::{TruthSigma, UncertainMotion};
 pub use error::{EvaluationError, Side};
 pub use kitti::{Kitti, kitti};
 pub use matched::MatchedPoses;
 pub use mirror::{Axes, HeadingFault};
-pub use plot::{PlotError, plot_errors, plot_trajectory};
+pub use motions::{JudgedMotions, Motion};
+pub use nees::{Nees, NeesFigure, NeesFigures, NeesLength, NeesOptions, nees};
+pub use plot::{PlotError, plot_bands, plot_errors, plot_trajectory};
 pub use report::{Evaluation, Options, evaluate};
 pub use rpe::{PairError, Rpe, rpe};
 pub use seg::{Seg, seg};

@@ -15,7 +15,8 @@ pub mod flag {
     pub const BASE: u32 = 8;
 }
 
-/// The processes that a scan passes, in order: the index of each one's [`Hop`].
+/// The processes that a scan can pass, in order: the index of each one's [`Hop`]. A run has either the two halves of the
+/// search or the joint one; the hops of those it has not stay zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(usize)]
 pub enum Stage {
@@ -27,18 +28,28 @@ pub enum Stage {
     RotationSearch = 2,
     /// Finds the translation.
     TranslationSearch = 3,
+    /// Finds both together.
+    JointSearch = 4,
     /// Composes the motions.
-    PoseIntegration = 4,
+    PoseIntegration = 5,
 }
 
 impl Stage {
     /// All of them, in the order of the stream.
-    pub const ALL: [Self; 5] =
-        [Self::RadarReplay, Self::Masking, Self::RotationSearch, Self::TranslationSearch, Self::PoseIntegration];
+    pub const ALL: [Self; 6] = [
+        Self::RadarReplay,
+        Self::Masking,
+        Self::RotationSearch,
+        Self::TranslationSearch,
+        Self::JointSearch,
+        Self::PoseIntegration,
+    ];
 
     /// The name used in configurations, on the command line and in results.
     pub fn name(self) -> &'static str {
-        ["radar-replay", "masking", "rotation-search", "translation-search", "pose-integration"][self as usize]
+        let names =
+            ["radar-replay", "masking", "rotation-search", "translation-search", "joint-search", "pose-integration"];
+        names[self as usize]
     }
 }
 
@@ -63,7 +74,7 @@ pub type Hops = [Hop; Stage::ALL.len()];
 /// Which scan a message is about, what it follows, and when each process had it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_item_v1")]
+#[type_name("gyre_item_v2")]
 pub struct Item {
     /// Number in the chain of motions: consecutive, from 0. All rules of the hand-over count in it.
     pub seq: u64,
@@ -104,6 +115,6 @@ mod tests {
     #[test]
     fn sizes_are_part_of_the_wire_format() {
         assert_eq!(size_of::<Hop>(), 32);
-        assert_eq!(size_of::<Item>(), 56 + 5 * 32);
+        assert_eq!(size_of::<Item>(), 56 + 6 * 32);
     }
 }

@@ -22,7 +22,7 @@ pub mod mask_kind {
 /// A raster's geometry and how it was made.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_masked_header_v1")]
+#[type_name("gyre_masked_header_v2")]
 pub struct MaskedHeader {
     /// Which scan this is.
     pub item: Item,

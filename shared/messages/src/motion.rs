@@ -36,7 +36,7 @@ pub struct MotionEstimate {
 /// See [`MotionEstimate`].
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_motion_header_v1")]
+#[type_name("gyre_motion_header_v2")]
 pub struct MotionHeader {
     /// Which scan this is.
     pub item: Item,

@@ -13,7 +13,7 @@ message! {
 /// A pose in the frame of the first scan, with the motion that led to it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_pose_header_v1")]
+#[type_name("gyre_pose_header_v2")]
 pub struct PoseHeader {
     /// Which scan this is.
     pub item: Item,

@@ -30,7 +30,7 @@ pub struct RotationEstimate {
 /// See [`RotationEstimate`].
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_rotation_header_v1")]
+#[type_name("gyre_rotation_header_v2")]
 pub struct RotationHeader {
     /// Which scan this is.
     pub item: Item,

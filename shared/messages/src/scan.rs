@@ -14,7 +14,7 @@ message! {
 /// A sweep's geometry and the angle and time of each azimuth, as measured.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Zeroable, ZeroCopySend)]
-#[type_name("gyre_scan_header_v1")]
+#[type_name("gyre_scan_header_v2")]
 pub struct ScanHeader {
     /// Which scan this is.
     pub item: Item,

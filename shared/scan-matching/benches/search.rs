@@ -13,13 +13,18 @@ use std::process::Command;
 use std::time::Instant;
 
 use common::{Motion, pair};
-use gyre_scan_matching::{RotationConfig, RotationSearch, TranslationConfig, TranslationSearch, fast_size};
+use gyre_scan_matching::{
+    ExhaustiveConfig, ExhaustiveSearch, Overlap, RotationConfig, RotationSearch, TranslationConfig, TranslationSearch,
+    fast_size,
+};
 use realfft::RealFftPlanner;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex32;
 
 const SIZES: [usize; 3] = [127, 255, 511];
 const REACH_M: f64 = 12.0;
+/// Angles that the peer's `raw` tries.
+const PEER_ROTATIONS: f64 = 31.0;
 const PASSES: usize = 101;
 const BURN_IN: usize = 10;
 
@@ -27,8 +32,9 @@ fn main() {
     let peer = [("GYRE_PEER_PYTHON"), ("GYRE_PEER")].map(std::env::var);
     floor();
     let ours = steps();
+    let candidate = candidates();
     if let [Ok(python), Ok(script)] = peer {
-        beside_peer(&python, &script, &ours);
+        beside_peer(&python, &script, &ours, &candidate);
     } else {
         println!("\npeer: skipped, GYRE_PEER_PYTHON and GYRE_PEER are not set");
     }
@@ -125,10 +131,37 @@ fn steps() -> [f64; 3] {
     })
 }
 
-/// Runs the peer's searches and prints how many times longer they take.
-fn beside_peer(python: &str, script: &str, ours: &[f64; 3]) {
+/// Times of the exhaustive search; returns those of one angle.
+fn candidates() -> [f64; 3] {
+    println!("\nexhaustive search: reach 15 deg in steps of 1 deg and {REACH_M} m, ms");
+    println!(
+        "{:>5} {:>7} {:>9} {:>9} {:>13} {:>12}",
+        "n", "angles", "total", "an angle", "at transforms", "unnormalised"
+    );
+    SIZES.map(|n| {
+        let (cell, motion) = (cell_m(n), Motion::degrees(2.5, 0.1, 3.0));
+        let (earlier, later) = pair(n, cell, motion, 1);
+        let time = |config: &ExhaustiveConfig| {
+            let mut search = ExhaustiveSearch::new(n, cell, config).unwrap();
+            let total = median_ms(|| _ = black_box(search.search(black_box(&later), &earlier).unwrap()));
+            (total, total / search.candidates() as f64)
+        };
+        let default = ExhaustiveConfig { reach_m: REACH_M, ..ExhaustiveConfig::default() };
+        let (total, one) = time(&default);
+        let (_, bare) = time(&ExhaustiveConfig { overlap: Overlap::None, ..default.clone() });
+        // Two angles share a transform: the rows of one, all columns there and back, the rows within reach.
+        let reach = (REACH_M / cell) as usize + 3;
+        let size = fast_size(n + reach);
+        let floor = complex_ms(size, n + 2 * size + 2 * reach + 1) / 2.0;
+        println!("{n:5} {:7} {total:9.2} {one:9.3} {floor:13.3} {bare:12.3}", 31);
+        one
+    })
+}
+
+/// Runs the peer's searches and prints how many times longer they take: the exhaustive one an angle.
+fn beside_peer(python: &str, script: &str, ours: &[f64; 3], candidate: &[f64; 3]) {
     let output = Command::new(python)
-        .args([script, "--only", "f-raw,f-raw-eq7", "--sizes", "127,255,511", "--threads", "1"])
+        .args([script, "--only", "f-raw,f-raw-eq7,raw", "--sizes", "127,255,511", "--threads", "1"])
         .output();
     let text = match output {
         Ok(done) if done.status.success() => String::from_utf8_lossy(&done.stdout).into_owned(),
@@ -136,15 +169,19 @@ fn beside_peer(python: &str, script: &str, ours: &[f64; 3]) {
         Err(error) => return println!("\npeer could not be started: {error}"),
     };
     println!(
-        "\npeer (PyTorch, one thread, median), ours and the ratio\n{:>5} {:>12} {:>9} {:>9} {:>7}",
+        "\npeer (PyTorch, one thread, median), ours and the ratio\n{:>5} {:>13} {:>9} {:>9} {:>7}",
         "n", "row", "peer ms", "ours ms", "ratio"
     );
     for line in text.lines() {
         let words: Vec<&str> = line.split_whitespace().collect();
         let [n, row, "median", peer, ..] = words.as_slice() else { continue };
         let (Ok(n), Ok(peer)) = (n.parse::<usize>(), peer.parse::<f64>()) else { continue };
+        let (row, peer, ours) = match *row {
+            "raw" => ("raw, an angle", peer / PEER_ROTATIONS, candidate),
+            other => (other, peer, ours),
+        };
         if let Some(ours) = SIZES.iter().position(|&size| size == n).map(|k| ours[k]) {
-            println!("{n:5} {row:>12} {peer:9.2} {ours:9.3} {:7.1}", peer / ours);
+            println!("{n:5} {row:>13} {peer:9.2} {ours:9.3} {:7.1}", peer / ours);
         }
     }
 }

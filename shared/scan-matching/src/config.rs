@@ -2,11 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::peak::SUPPORT;
+
 /// A value that no search can be built from.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{section}.{key} = {actual}: expected {expected}")]
 pub struct ConfigError {
-    /// Section of the configuration: `rotation` or `translation`.
+    /// Section of the configuration: `rotation`, `translation` or `exhaustive`.
     pub section: &'static str,
     /// Key within the section.
     pub key: &'static str,
@@ -243,7 +245,7 @@ impl Peak {
     }
 }
 
-fn positive(value: f64) -> bool {
+pub(crate) fn positive(value: f64) -> bool {
     value.is_finite() && value > 0.0
 }
 
@@ -256,6 +258,16 @@ pub(crate) fn accept(
     expected: &'static str,
 ) -> Result<(), ConfigError> {
     if good { Ok(()) } else { Err(ConfigError { section, key, actual: actual.to_string(), expected }) }
+}
+
+/// Cells of the largest shift of a search over rasters of `n` x `n` cells of `cell_m` metres.
+pub(crate) fn reach_cells(n: usize, cell_m: f64, section: &'static str, reach_m: f64) -> Result<usize, ConfigError> {
+    accept((16..=8192).contains(&n), "raster", "n", &n, "16 to 8192 cells a side")?;
+    accept(cell_m.is_finite() && cell_m > 0.0, "raster", "cell_m", &cell_m, "metres, above 0")?;
+    let reach = (reach_m / cell_m + 1e-9).floor();
+    let fits = reach >= 1.0 && reach <= (n / 2 - SUPPORT) as f64;
+    accept(fits, section, "reach_m", &reach_m, "at least one cell, less than half the raster")?;
+    Ok(reach as usize)
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use rustfft::{Fft, FftDirection, FftPlanner, num_complex::Complex32};
 use crate::kernels;
 
 /// Rows that are transposed together: their complex values of one column fill a cache line.
-const BLOCK: usize = 8;
+pub(crate) const BLOCK: usize = 8;
 
 /// The fastest even transform size of at least `least`, among products of small primes.
 ///
@@ -76,17 +76,17 @@ impl Columns {
         }
     }
 
-    /// Reads the first `width` values of the rows named in `rows` into `block`, row after row.
-    fn read_rows(&self, rows: &[usize], block: &mut [Complex32], width: usize) {
+    /// Reads the first `width` values of some rows into `block`, row after row.
+    pub fn read_rows(&self, rows: impl Iterator<Item = usize> + Clone, block: &mut [Complex32], width: usize) {
         for (c, column) in self.data.chunks_exact(self.stride).take(width).enumerate() {
-            for (r, &row) in rows.iter().enumerate() {
+            for (r, row) in rows.clone().enumerate() {
                 block[r * width + c] = column[row];
             }
         }
     }
 
     /// Sets rows `first..` of every column to zero.
-    fn clear_from(&mut self, first: usize) {
+    pub fn clear_from(&mut self, first: usize) {
         for column in self.data.chunks_exact_mut(self.stride) {
             column[first..].fill(Complex32::default());
         }
@@ -94,22 +94,60 @@ impl Columns {
 }
 
 /// One-dimensional complex transform with its scratch.
-struct Transform {
+pub(crate) struct Transform {
     fft: Arc<dyn Fft<f32>>,
     scratch: Vec<Complex32>,
 }
 
 impl Transform {
-    fn new(planner: &mut FftPlanner<f32>, size: usize, direction: FftDirection) -> Self {
+    pub fn new(planner: &mut FftPlanner<f32>, size: usize, direction: FftDirection) -> Self {
         let fft = planner.plan_fft(size, direction);
-        let scratch = vec![Complex32::default(); fft.get_inplace_scratch_len()];
-        Self { fft, scratch }
+        let scratch = fft.get_inplace_scratch_len().max(fft.get_immutable_scratch_len());
+        Self { fft, scratch: vec![Complex32::default(); scratch] }
+    }
+
+    /// Transforms a line into another place.
+    pub fn line_into(&mut self, line: &[Complex32], out: &mut [Complex32]) {
+        self.fft.process_immutable_with_scratch(line, out, &mut self.scratch);
+    }
+
+    /// Transforms a line, or several that lie behind each other.
+    pub fn lines(&mut self, lines: &mut [Complex32]) {
+        self.fft.process_with_scratch(lines, &mut self.scratch);
     }
 
     /// Transforms the first `count` columns.
     fn columns(&mut self, plane: &mut Columns, count: usize) {
         for c in 0..count {
-            self.fft.process_with_scratch(plane.column_mut(c), &mut self.scratch);
+            self.lines(plane.column_mut(c));
+        }
+    }
+}
+
+/// First pass of a complex transform: along the rows that are not zero.
+pub(crate) struct RowPass {
+    row: Transform,
+    block: Vec<Complex32>,
+}
+
+impl RowPass {
+    pub fn new(planner: &mut FftPlanner<f32>, size: usize) -> Self {
+        let row = Transform::new(planner, size, FftDirection::Forward);
+        Self { row, block: vec![Complex32::default(); BLOCK * size] }
+    }
+
+    /// Transforms `rows` rows into the first ones of `plane`; `fill(r, row)` writes the start of row r, the rest is zero.
+    pub fn forward(&mut self, plane: &mut Columns, rows: usize, mut fill: impl FnMut(usize, &mut [Complex32])) {
+        let size = plane.len;
+        for first in (0..rows).step_by(BLOCK) {
+            let some = BLOCK.min(rows - first);
+            let block = &mut self.block[..some * size];
+            block.fill(Complex32::default());
+            for (r, row) in block.chunks_exact_mut(size).enumerate() {
+                fill(first + r, row);
+            }
+            self.row.lines(block);
+            plane.write_rows(first, some, block, size);
         }
     }
 }
@@ -163,11 +201,12 @@ impl RealSpectrum {
 /// Spectra of two real square images by one complex transform, and the way back for some rows.
 pub(crate) struct PairSpectrum {
     size: usize,
-    row: Transform,
+    rows: RowPass,
     columns: Transform,
     inverse_columns: Transform,
     inverse_row: Arc<dyn ComplexToReal<f32>>,
     block: Vec<Complex32>,
+    scratch: Vec<Complex32>,
     real: Vec<f32>,
     /// Spectrum of first + i second; after [`cross`](Self::cross) the cross-spectrum in columns 0 to size / 2.
     plane: Columns,
@@ -180,15 +219,14 @@ impl PairSpectrum {
     pub fn new(size: usize) -> Self {
         let mut planner = FftPlanner::new();
         let inverse_row = RealFftPlanner::new().plan_fft_inverse(size);
-        let mut row = Transform::new(&mut planner, size, FftDirection::Forward);
-        row.scratch.resize(row.scratch.len().max(inverse_row.get_scratch_len()), Complex32::default());
         Self {
             size,
-            row,
+            rows: RowPass::new(&mut planner, size),
             columns: Transform::new(&mut planner, size, FftDirection::Forward),
             inverse_columns: Transform::new(&mut planner, size, FftDirection::Inverse),
+            scratch: inverse_row.make_scratch_vec(),
             inverse_row,
-            block: vec![Complex32::default(); BLOCK * size],
+            block: vec![Complex32::default(); BLOCK * (size / 2 + 1)],
             real: vec![0.0; size],
             plane: Columns::new(size, size),
             mirror: vec![Complex32::default(); size],
@@ -201,17 +239,8 @@ impl PairSpectrum {
     }
 
     /// Transforms `rows` rows; `fill(r, row)` writes first + i second to the start of row r, the rest is zero.
-    pub fn forward(&mut self, rows: usize, mut fill: impl FnMut(usize, &mut [Complex32])) {
-        for first in (0..rows).step_by(BLOCK) {
-            let some = BLOCK.min(rows - first);
-            let block = &mut self.block[..some * self.size];
-            block.fill(Complex32::default());
-            for (r, row) in block.chunks_exact_mut(self.size).enumerate() {
-                fill(first + r, row);
-            }
-            self.row.fft.process_with_scratch(block, &mut self.row.scratch);
-            self.plane.write_rows(first, some, block, self.size);
-        }
+    pub fn forward(&mut self, rows: usize, fill: impl FnMut(usize, &mut [Complex32])) {
+        self.rows.forward(&mut self.plane, rows, fill);
         self.plane.clear_from(rows);
         self.columns.columns(&mut self.plane, self.size);
     }
@@ -239,11 +268,11 @@ impl PairSpectrum {
         let width = self.size / 2 + 1;
         self.inverse_columns.columns(&mut self.plane, width);
         for (b, some) in rows.chunks(BLOCK).enumerate() {
-            self.plane.read_rows(some, &mut self.block, width);
+            self.plane.read_rows(some.iter().copied(), &mut self.block, width);
             for (r, half) in self.block.chunks_exact_mut(width).take(some.len()).enumerate() {
                 half[0].im = 0.0;
                 half[width - 1].im = 0.0;
-                let done = self.inverse_row.process_with_scratch(half, &mut self.real, &mut self.row.scratch);
+                let done = self.inverse_row.process_with_scratch(half, &mut self.real, &mut self.scratch);
                 debug_assert!(done.is_ok(), "lengths are those of the plan");
                 take(b * BLOCK + r, &self.real);
             }

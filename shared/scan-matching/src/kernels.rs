@@ -10,6 +10,9 @@ use rustfft::num_complex::Complex32;
 /// Partial sums kept beside each other, so that a sum can be vectorised.
 const LANES: usize = 16;
 
+/// Where less than this share of two rasters overlaps, a score says nothing and is zero.
+pub(crate) const LEAST_SHARE: f64 = 1e-3;
+
 /// Where a sample lies among four neighbours: the first of them and the weights toward the others.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Bilinear {
@@ -134,6 +137,22 @@ pub(crate) fn add_cross(f: &[Complex32], g: &[Complex32], cross: &mut [Complex32
     }
 }
 
+/// g + i h.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+pub(crate) fn interleave(g: &[f32], h: &[f32], out: &mut [Complex32]) {
+    for ((z, &g), &h) in out.iter_mut().zip(g).zip(h) {
+        *z = Complex32::new(g, h);
+    }
+}
+
+/// z *= w
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+pub(crate) fn multiply(column: &mut [Complex32], by: &[Complex32]) {
+    for (z, w) in column.iter_mut().zip(by) {
+        *z = Complex32::new(z.re * w.re - z.im * w.im, z.re * w.im + z.im * w.re);
+    }
+}
+
 /// Im(z m) / 2 - i (|z|^2 - |m|^2) / 4 in place of z, where `mirror` holds m in reverse order.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
 pub(crate) fn cross_of_pair(column: &mut [Complex32], mirror: &[Complex32]) {
@@ -141,6 +160,15 @@ pub(crate) fn cross_of_pair(column: &mut [Complex32], mirror: &[Complex32]) {
         let re = 0.5 * (z.re * m.im + z.im * m.re);
         let im = 0.25 * (m.re * m.re + m.im * m.im - z.re * z.re - z.im * z.im);
         *z = Complex32::new(re, im);
+    }
+}
+
+/// Divides each score by the share of `energy` that both rasters have left in the overlap; `f` is in reverse order.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+pub(crate) fn divide_by_share(scores: &mut [f32], f: &[f64], g: &[f64], energy: f64) {
+    for ((score, &f), &g) in scores.iter_mut().zip(f.iter().rev()).zip(g) {
+        let share = (f * g).sqrt() / energy;
+        *score = if share > LEAST_SHARE { (f64::from(*score) / share) as f32 } else { 0.0 };
     }
 }
 

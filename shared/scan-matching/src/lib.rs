@@ -8,8 +8,10 @@
 //! - `window`, `fft`, `polar`: a raster's magnitude spectrum on a polar grid;
 //! - `spectrum`: [`PolarSpectrum`], what is kept of a scan; `rotation`: [`RotationSearch`], the angle;
 //! - `warp`: the earlier raster turned by it;
-//! - `translation`: [`TranslationSearch`], the shift and the whole motion; `overlap` normalises its scores;
-//! - `peak`: maxima between samples; `whiten`: phase-only correlation; `kernels`: inner loops.
+//! - `translation`: [`TranslationSearch`], the shift and the whole motion; `scores`: one a shift; `overlap` normalises them;
+//! - `exhaustive`: [`ExhaustiveSearch`], all three unknowns at once, angle by angle; `correlate`: its transforms;
+//! - `peak`: maxima between samples; `covariance`: what their shapes say; `whiten`: phase-only correlation; `kernels`:
+//!   inner loops.
 //!
 //! # Frames
 //! x forward, y left, yaw counter-clockwise; metres and radians. A raster is n x n `f32`, row after row, row 0 far
@@ -41,12 +43,16 @@
 //! ```
 
 mod config;
+mod correlate;
+mod covariance;
+mod exhaustive;
 mod fft;
 mod kernels;
 mod overlap;
 mod peak;
 mod polar;
 mod rotation;
+mod scores;
 mod spectrum;
 mod translation;
 mod warp;
@@ -54,6 +60,7 @@ mod whiten;
 mod window;
 
 pub use config::{ConfigError, Magnitude, Overlap, Peak, RotationConfig, RotationForm, TranslationConfig, Window};
+pub use exhaustive::{ExhaustiveConfig, ExhaustiveSearch, JointEstimate};
 pub use fft::fast_size;
 pub use rotation::{RotationEstimate, RotationRunnerUp, RotationSearch};
 pub use spectrum::PolarSpectrum;

@@ -11,10 +11,12 @@ pub(crate) struct OverlapEnergy {
     reach: usize,
     rows: Vec<f32>,
     columns: Vec<f32>,
-    /// Sums over a x b cells of each corner (top or bottom, left or right), a and b up to `reach`.
-    corners: [Vec<f64>; 4],
     /// Sums over the first (last) k rows (columns).
     edges: [Vec<f64>; 4],
+    /// Sums over b columns of the rows of one corner so far.
+    corner: Vec<f64>,
+    /// What is left after each shift (down, right), row after row from the most negative on.
+    left: Vec<f64>,
     total: f64,
 }
 
@@ -31,8 +33,9 @@ impl OverlapEnergy {
             reach,
             rows: vec![0.0; n],
             columns: vec![0.0; n],
-            corners: std::array::from_fn(|_| vec![0.0; side * side]),
             edges: std::array::from_fn(|_| vec![0.0; side]),
+            corner: vec![0.0; side],
+            left: vec![0.0; (2 * reach + 1).pow(2)],
             total: 0.0,
         }
     }
@@ -68,34 +71,39 @@ impl OverlapEnergy {
             self.edges[LEFT][k + 1] = self.edges[LEFT][k] + f64::from(self.columns[k]);
             self.edges[RIGHT][k + 1] = self.edges[RIGHT][k] + f64::from(self.columns[n - 1 - k]);
         }
-        for corner in 0..4 {
-            self.measure_corner(corner, raster);
+        for (vertical, horizontal) in [(TOP, LEFT), (TOP, RIGHT), (BOTTOM, LEFT), (BOTTOM, RIGHT)] {
+            self.measure_corner(vertical, horizontal, raster);
         }
     }
 
-    fn measure_corner(&mut self, corner: usize, raster: &[f32]) {
-        let (n, side) = (self.n, self.reach + 1);
-        let sums = &mut self.corners[corner];
-        for a in 1..side {
-            let row = if corner / 2 == TOP { a - 1 } else { n - a };
+    /// Fills in what is left after the shifts that cost cells at two of the edges: a rows and b columns fall out, and
+    /// the a x b cells of the corner are in both.
+    fn measure_corner(&mut self, vertical: usize, horizontal: usize, raster: &[f32]) {
+        let (n, side, middle) = (self.n, self.reach + 1, self.left.len() / 2);
+        let (rows, columns) = (&self.edges[vertical], &self.edges[horizontal]);
+        self.corner.fill(0.0);
+        for (a, &above) in rows.iter().enumerate().take(side) {
+            let row = if vertical == TOP { a.wrapping_sub(1) } else { n - a };
+            let down = a * (2 * side - 1);
+            let line = if vertical == TOP { middle + down } else { middle - down };
             let mut along = 0.0;
-            for b in 1..side {
-                let col = if corner & 1 == 0 { b - 1 } else { n - b };
-                along += f64::from(raster[row * n + col]).powi(2);
-                sums[a * side + b] = sums[(a - 1) * side + b] + along;
+            for (b, &beside) in columns.iter().enumerate().take(side) {
+                if a > 0 && b > 0 {
+                    let col = if horizontal == LEFT { b - 1 } else { n - b };
+                    along += f64::from(raster[row * n + col]).powi(2);
+                    self.corner[b] += along;
+                }
+                let lost = above + beside - self.corner[b];
+                let place = if horizontal == LEFT { line + b } else { line - b };
+                self.left[place] = (self.total - lost).max(0.0);
             }
         }
     }
 
-    /// Energy that is left when `down` rows fall out at the top (at the bottom where negative), and `right` columns
-    /// at the left (at the right where negative).
-    pub fn left_after(&self, down: isize, right: isize) -> f64 {
-        let (a, b) = (down.unsigned_abs(), right.unsigned_abs());
-        let vertical = if down >= 0 { TOP } else { BOTTOM };
-        let horizontal = if right >= 0 { LEFT } else { RIGHT };
-        let corner = 2 * vertical + (horizontal - LEFT);
-        let lost = self.edges[vertical][a] + self.edges[horizontal][b] - self.corners[corner][a * (self.reach + 1) + b];
-        (self.total - lost).max(0.0)
+    /// Energy that is left after each shift (down, right) of up to `reach` cells, row after row from the most negative
+    /// on: `down` rows fall out at the top (at the bottom where negative), `right` columns at the left (at the right).
+    pub fn left(&self) -> &[f64] {
+        &self.left
     }
 }
 
@@ -120,7 +128,7 @@ mod tests {
                     .filter(|k| kept(k / n, down) && kept(k % n, right))
                     .map(|k| f64::from(raster[k]).powi(2))
                     .sum();
-                let got = energy.left_after(down, right);
+                let got = energy.left()[((down + 5) * 11 + right + 5) as usize];
                 assert!((got - direct).abs() <= 1e-6 * direct, "{down} {right}: {got} {direct}");
             }
         }

@@ -6,6 +6,8 @@ pub(crate) struct Rotation {
     n: usize,
     cos: f64,
     sin: f64,
+    /// Added to each place that is looked up, down and to the right, cells.
+    offset: f64,
 }
 
 /// The columns of one row that stay inside the raster, and where they come from.
@@ -23,7 +25,12 @@ struct Span {
 impl Rotation {
     pub fn new(n: usize, angle_rad: f64) -> Self {
         let (sin, cos) = angle_rad.sin_cos();
-        Self { n, cos, sin }
+        Self { n, cos, sin, offset: 0.0 }
+    }
+
+    /// The same, but each place that is looked up lies `offset` cells farther down and to the right.
+    pub fn with_offset(self, offset: f64) -> Self {
+        Self { offset, ..self }
     }
 
     /// Row `r` of g'(x) = g(R x); zero where R x lies outside of g (Weston et al., Algorithm 1, line 16).
@@ -48,8 +55,8 @@ impl Rotation {
         let last = (self.n - 1) as f64;
         let middle = last / 2.0;
         let u = r as f64 - middle;
-        let row = middle + self.cos * u + self.sin * middle;
-        let col = middle + self.sin * u - self.cos * middle;
+        let row = middle + self.offset + self.cos * u + self.sin * middle;
+        let col = middle + self.offset + self.sin * u - self.cos * middle;
         let (row_step, col_step) = (-self.sin, self.cos);
         let (a, b) = inside(row, row_step, last);
         let (c, d) = inside(col, col_step, last);

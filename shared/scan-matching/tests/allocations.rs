@@ -7,7 +7,9 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use common::{Motion, pair};
-use gyre_scan_matching::{RotationConfig, RotationSearch, TranslationConfig, TranslationSearch};
+use gyre_scan_matching::{
+    ExhaustiveConfig, ExhaustiveSearch, RotationConfig, RotationSearch, TranslationConfig, TranslationSearch,
+};
 
 thread_local! {
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
@@ -46,4 +48,8 @@ fn searches_allocate_nothing_after_construction() {
         translation.search(&later, &earlier, &angle).unwrap();
         assert_eq!(ALLOCATIONS.with(Cell::get), before, "phase_only {phase_only}");
     }
+    let mut exhaustive = ExhaustiveSearch::new(n, cell_m, &ExhaustiveConfig::default()).unwrap();
+    let before = ALLOCATIONS.with(Cell::get);
+    exhaustive.search(&later, &earlier).unwrap();
+    assert_eq!(ALLOCATIONS.with(Cell::get), before, "exhaustive");
 }

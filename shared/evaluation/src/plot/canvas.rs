@@ -67,6 +67,8 @@ pub struct Entry {
 /// How a legend shows its entry.
 pub enum Symbol {
     Line(ShapeStyle),
+    /// A filled area.
+    Area(RGBColor),
     /// A dot of [`MARK`]'s colour.
     Dot,
 }
@@ -82,6 +84,7 @@ pub fn header(area: &Area<'_>, title: &str, caption: &str, legend: &[Entry]) -> 
     for entry in legend {
         match entry.symbol {
             Symbol::Line(style) => area.draw(&PathElement::new([at(x, 28.0), at(x + 26.0, 28.0)], style)),
+            Symbol::Area(colour) => area.draw(&Rectangle::new([at(x, 21.0), at(x + 26.0, 35.0)], colour.filled())),
             Symbol::Dot => area.draw(&dot(at(x + 18.0, 28.0))),
         }
         .map_err(drawing)?;

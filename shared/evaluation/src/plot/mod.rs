@@ -1,7 +1,8 @@
-//! Trajectories and errors as SVG, readable on paper and in a browser.
+//! Trajectories, errors and their bands as SVG, readable on paper and in a browser.
 //!
 //! Text stays text (drawn by the viewer's sans-serif font): nothing needs fonts when it is built or run.
 
+mod bands;
 mod canvas;
 mod errors;
 mod trajectory;
@@ -11,10 +12,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
+pub use bands::bands_svg;
 pub use errors::errors_svg;
 pub use trajectory::trajectory_svg;
 
-use crate::{Evaluation, EvaluationError, MatchedPoses, Pose};
+use crate::{Bands, Evaluation, EvaluationError, MatchedPoses, Pose};
 
 /// Why a plot was not made.
 #[derive(Debug, thiserror::Error)]
@@ -61,6 +63,15 @@ pub fn plot_trajectory(path: &Path, estimate: &[Pose], truth: Option<&[Pose]>) -
 /// [`PlotError`]: neither kind of error is there (a truth without heading), a file that cannot be written.
 pub fn plot_errors(path: &Path, evaluation: &Evaluation) -> Result<(), PlotError> {
     write(path, &errors_svg(evaluation)?)
+}
+
+/// Draws the error of the composed poses over time into an SVG file, x, y and yaw, each within its band of 3 standard
+/// deviations.
+///
+/// # Errors
+/// [`PlotError`]: no pose has truth, a file that cannot be written.
+pub fn plot_bands(path: &Path, bands: &Bands) -> Result<(), PlotError> {
+    write(path, &bands_svg(bands)?)
 }
 
 fn write(path: &Path, svg: &str) -> Result<(), PlotError> {

@@ -1,0 +1,187 @@
+//! Reported motions beside the truth's poses at the same times.
+
+use crate::{
+    EvaluationError, Pose, Side, Trajectory, UncertainMotion,
+    associate::{At, require_stamps, truth_at},
+    matched::require_poses,
+};
+
+/// A motion as an odometry reports it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motion {
+    /// Time of the earlier frame, ns.
+    pub from_ns: i64,
+    /// Time of the later frame, ns.
+    pub to_ns: i64,
+    /// The later frame in the earlier.
+    pub estimate: UncertainMotion,
+}
+
+/// Motions in unbroken chains, with the truth at every joint that has one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JudgedMotions {
+    pub(crate) chains: Vec<Chain>,
+    /// Motions given.
+    pub motions: usize,
+    /// Motions without truth at both ends.
+    pub without_truth: usize,
+    /// Motions without a positive definite covariance: left out, and the chain ends there.
+    pub without_covariance: usize,
+}
+
+/// `n` motions, each beginning where the one before ended, and their `n + 1` joints.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Chain {
+    pub motions: Vec<UncertainMotion>,
+    pub stamps_ns: Vec<i64>,
+    pub truth: Vec<Option<Pose>>,
+}
+
+impl JudgedMotions {
+    /// Looks up the truth, interpolated across gaps of up to `max_gap_ns`, at both ends of each motion.
+    ///
+    /// # Errors
+    /// [`EvaluationError::NotAMotion`] and [`EvaluationError::MotionBackwards`] for what no odometry reports, the errors of
+    /// [`associate()`](crate::associate()) that concern the truth, and [`EvaluationError::NoMotionJudged`] where no motion has both
+    /// truth and covariance.
+    pub fn new(motions: &[Motion], truth: Trajectory<'_>, max_gap_ns: i64) -> Result<Self, EvaluationError> {
+        require_poses(Side::Truth, truth.poses)?;
+        require_stamps(Side::Truth, &truth)?;
+        require_motions(motions)?;
+        let at = |stamp_ns| match truth_at(truth, stamp_ns, max_gap_ns) {
+            At::Pose(pose) => Some(pose),
+            At::Outside | At::Gap => None,
+        };
+        let mut judged = Self { chains: Vec::new(), motions: motions.len(), without_truth: 0, without_covariance: 0 };
+        for motion in motions {
+            let (from, to) = (at(motion.from_ns), at(motion.to_ns));
+            judged.without_truth += usize::from(from.is_none() || to.is_none());
+            match motion.estimate.has_covariance() {
+                true => judged.add(motion, from, to),
+                false => judged.without_covariance += 1,
+            }
+        }
+        judged.require_some()
+    }
+
+    /// Adds a motion to the last chain, or, where it does not join, to a new one.
+    fn add(&mut self, motion: &Motion, from: Option<Pose>, to: Option<Pose>) {
+        match self.chains.last_mut().filter(|chain| chain.stamps_ns.last() == Some(&motion.from_ns)) {
+            Some(chain) => {
+                chain.motions.push(motion.estimate);
+                chain.stamps_ns.push(motion.to_ns);
+                chain.truth.push(to);
+            }
+            None => self.chains.push(Chain {
+                motions: vec![motion.estimate],
+                stamps_ns: vec![motion.from_ns, motion.to_ns],
+                truth: vec![from, to],
+            }),
+        }
+    }
+
+    fn require_some(self) -> Result<Self, EvaluationError> {
+        let both_ends = |chain: &Chain| chain.truth.windows(2).any(|w| w[0].is_some() && w[1].is_some());
+        match self.chains.iter().any(both_ends) {
+            true => Ok(self),
+            false => Err(EvaluationError::NoMotionJudged {
+                motions: self.motions,
+                without_truth: self.without_truth,
+                without_covariance: self.without_covariance,
+            }),
+        }
+    }
+
+    /// First and last time of the chains, ns.
+    pub(crate) fn span_ns(&self) -> (i64, i64) {
+        let first = self.chains.first().and_then(|chain| chain.stamps_ns.first());
+        let last = self.chains.last().and_then(|chain| chain.stamps_ns.last());
+        (first.copied().unwrap_or_default(), last.copied().unwrap_or_default())
+    }
+}
+
+impl Chain {
+    /// The motions from joint `first` on, composed one after the other: to joint `first + 1`, `first + 2`, ...
+    pub fn composed(&self, first: usize) -> impl Iterator<Item = UncertainMotion> + '_ {
+        self.motions[first..].iter().scan(UncertainMotion::standing(), |so_far, motion| {
+            *so_far = so_far.then(motion);
+            Some(*so_far)
+        })
+    }
+
+    /// The true motion between two joints, where both have truth.
+    pub fn true_motion(&self, first: usize, last: usize) -> Option<Pose> {
+        Some(self.truth[first]?.inv_mul(&self.truth[last]?))
+    }
+}
+
+fn require_motions(motions: &[Motion]) -> Result<(), EvaluationError> {
+    let mut previous_ns = motions.first().map_or(0, |first| first.from_ns);
+    for (index, &Motion { from_ns, to_ns, estimate: UncertainMotion { motion, .. } }) in motions.iter().enumerate() {
+        if require_poses(Side::Estimate, &[motion]).is_err() {
+            let (x_m, y_m, yaw_rad) = (motion.translation.x, motion.translation.y, motion.rotation.angle());
+            return Err(EvaluationError::NotAMotion { index, x_m, y_m, yaw_rad });
+        }
+        if from_ns < previous_ns || to_ns <= from_ns {
+            return Err(EvaluationError::MotionBackwards { index, previous_ns, from_ns, to_ns });
+        }
+        previous_ns = to_ns;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use nalgebra::Matrix3;
+
+    use super::*;
+    use crate::pose;
+
+    const MS: i64 = 1_000_000;
+
+    fn motion(from_ms: i64, to_ms: i64, variance: f64) -> Motion {
+        let estimate = UncertainMotion { motion: pose(1.0, 0.0, 0.0), covariance: Matrix3::identity() * variance };
+        Motion { from_ns: from_ms * MS, to_ns: to_ms * MS, estimate }
+    }
+
+    /// With a truth that is at x = t at t ms, interpolated across up to 20 ms.
+    fn judged(motions: &[Motion], truth_ms: &[i64]) -> Result<JudgedMotions, EvaluationError> {
+        let poses: Vec<_> = truth_ms.iter().map(|&t| pose(t as f64, 0.0, 0.0)).collect();
+        let stamps: Vec<_> = truth_ms.iter().map(|t| t * MS).collect();
+        JudgedMotions::new(motions, Trajectory::new(&stamps, &poses), 20 * MS)
+    }
+
+    #[test]
+    fn chains_end_where_motions_do_not_join_and_at_a_motion_without_covariance() {
+        let motions =
+            [motion(0, 10, 1.0), motion(10, 20, 1.0), motion(30, 40, 1.0), motion(40, 50, 0.0), motion(50, 60, 1.0)];
+        let found = judged(&motions, &[0, 20, 40, 60]).unwrap();
+        let joints: Vec<_> =
+            found.chains.iter().map(|chain| chain.stamps_ns.iter().map(|t| t / MS).collect::<Vec<_>>()).collect();
+        assert_eq!(joints, [vec![0, 10, 20], vec![30, 40], vec![50, 60]]);
+        assert_eq!((found.motions, found.without_truth, found.without_covariance), (5, 0, 1));
+        assert_eq!(found.span_ns(), (0, 60 * MS));
+    }
+
+    #[test]
+    fn a_chain_goes_on_across_a_gap_of_the_truth() {
+        let motions = [0, 10, 20, 30].map(|t| motion(t, t + 10, 1.0));
+        let found = judged(&motions, &[0, 10, 40]).unwrap();
+        assert_eq!((found.chains.len(), found.without_truth), (1, 3));
+        assert_eq!(found.chains[0].true_motion(0, 4), Some(pose(40.0, 0.0, 0.0)));
+        assert_eq!(found.chains[0].true_motion(1, 2), None);
+    }
+
+    #[test]
+    fn what_cannot_be_judged_is_an_error_that_says_why() {
+        let none = judged(&[motion(0, 10, 0.0), motion(100, 110, 1.0)], &[0, 10]).unwrap_err();
+        assert_eq!(none, EvaluationError::NoMotionJudged { motions: 2, without_truth: 1, without_covariance: 1 });
+        assert!(matches!(judged(&[], &[0, 10]), Err(EvaluationError::NoMotionJudged { motions: 0, .. })));
+        let backwards = judged(&[motion(0, 10, 1.0), motion(9, 19, 1.0)], &[0, 10]);
+        assert!(matches!(backwards, Err(EvaluationError::MotionBackwards { index: 1, .. })));
+        let mut broken = motion(0, 10, 1.0);
+        broken.estimate.motion.translation.x = f64::NAN;
+        assert!(matches!(judged(&[broken], &[0, 10]), Err(EvaluationError::NotAMotion { index: 0, .. })));
+    }
+}

@@ -1,0 +1,158 @@
+//! Normalised error squared: whether the errors of motions are as large as their covariances say.
+
+use std::num::NonZeroUsize;
+
+use nalgebra::{Matrix2, Matrix3, Vector3};
+use serde::Serialize;
+
+use crate::{JudgedMotions, TruthSigma, chi_square::quantile, motions::Chain};
+
+/// How to judge covariances.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NeesOptions {
+    /// Numbers of motions that are composed into one stretch.
+    pub lengths: Vec<NonZeroUsize>,
+    /// How uncertain the truth itself is: its share is added to each covariance.
+    pub truth_sigma: TruthSigma,
+}
+
+impl Default for NeesOptions {
+    /// 1, 4, 16 and 64 motions; an exact truth.
+    fn default() -> Self {
+        let lengths = [1, 4, 16, 64].into_iter().filter_map(NonZeroUsize::new).collect();
+        Self { lengths, truth_sigma: TruthSigma::default() }
+    }
+}
+
+/// How honest the covariances are. `Display` is a table.
+///
+/// The error of a stretch of motions is e = (x, y, yaw) of the estimate less those of the truth, along the axes of the
+/// stretch's first frame; P is the covariance composed over the stretch, plus the truth's own. The normalised error squared
+/// e' inv(P) e of an honest covariance has a chi-square distribution, whose expectation is its degrees of freedom: 3, or 2 for
+/// the translation alone, or 1 for the yaw. Stretches of one length share no motion.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Nees {
+    /// Motions given.
+    pub motions: usize,
+    /// Motions left out because the truth is missing at an end.
+    pub without_truth: usize,
+    /// Motions left out because their covariance is missing or not positive definite.
+    pub without_covariance: usize,
+    /// What was taken as the truth's own uncertainty.
+    pub truth_sigma: TruthSigma,
+    /// The lengths that any chain of motions has, in the order given.
+    pub by_length: Vec<NeesLength>,
+}
+
+/// The figures of stretches of one length.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NeesLength {
+    /// Motions in a stretch.
+    pub motions: usize,
+    /// All stretches.
+    pub all: NeesFigures,
+    /// Those that begin in the first half of the time.
+    pub first_half: Option<NeesFigures>,
+    /// Those that begin in the second half.
+    pub second_half: Option<NeesFigures>,
+}
+
+/// The figures of a set of stretches.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NeesFigures {
+    /// Number of stretches.
+    pub stretches: usize,
+    /// x, y and yaw together.
+    pub pose: NeesFigure,
+    /// x and y.
+    pub translation: NeesFigure,
+    /// Yaw.
+    pub yaw: NeesFigure,
+}
+
+/// Mean normalised error squared against its expectation.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct NeesFigure {
+    /// The mean divided by its expectation. Above 1 the covariances promise too much, below 1 too little.
+    pub ratio: f64,
+    /// Where 95 % of the ratios of honest covariances lie, if errors are Gaussian and independent from stretch to stretch.
+    pub honest_range: [f64; 2],
+    /// Share of the stretches whose error lies outside the covariance's 95 % region, %.
+    pub outside_percent: f64,
+}
+
+/// Probability within a region, and of an honest ratio within its range.
+const CONFIDENCE: f64 = 0.95;
+
+/// Degrees of freedom of pose, translation and yaw.
+const FREEDOMS: [usize; 3] = [3, 2, 1];
+
+/// Measures the honesty of single motions and of longer stretches.
+///
+/// The truth's noise dominates short stretches where it is not told (`truth_sigma`); long ones are few.
+pub fn nees(judged: &JudgedMotions, options: &NeesOptions) -> Nees {
+    let (from_ns, to_ns) = judged.span_ns();
+    let middle_ns = from_ns.midpoint(to_ns);
+    let of_length = |&length: &NonZeroUsize| {
+        let samples: Vec<_> =
+            judged.chains.iter().flat_map(|chain| stretches(chain, length, options.truth_sigma)).collect();
+        let (first, second) = samples.split_at(samples.partition_point(|sample| sample.from_ns < middle_ns));
+        Some(NeesLength {
+            motions: length.get(),
+            all: figures(&samples)?,
+            first_half: figures(first),
+            second_half: figures(second),
+        })
+    };
+    Nees {
+        motions: judged.motions,
+        without_truth: judged.without_truth,
+        without_covariance: judged.without_covariance,
+        truth_sigma: options.truth_sigma,
+        by_length: options.lengths.iter().filter_map(of_length).collect(),
+    }
+}
+
+/// One stretch.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    from_ns: i64,
+    /// Normalised error squared of pose, translation and yaw.
+    squared: [f64; 3],
+}
+
+/// The stretches of `length` motions, one after the other, that have truth at both ends.
+fn stretches(chain: &Chain, length: NonZeroUsize, sigma: TruthSigma) -> impl Iterator<Item = Sample> + '_ {
+    let length = length.get();
+    let starts = (0..chain.motions.len()).step_by(length).filter(move |first| chain.motions.len() - first >= length);
+    starts.filter_map(move |first| {
+        let truth = chain.true_motion(first, first + length)?;
+        let stretch = chain.composed(first).nth(length - 1)?;
+        let squared = normalised(&stretch.error(&truth), &(stretch.covariance + sigma.of_motion(&truth)))?;
+        Some(Sample { from_ns: chain.stamps_ns[first], squared })
+    })
+}
+
+/// e' inv(P) e of pose, translation and yaw; `None` where P is not positive definite.
+fn normalised(error: &Vector3<f64>, covariance: &Matrix3<f64>) -> Option<[f64; 3]> {
+    let pose = error.dot(&covariance.cholesky()?.solve(error));
+    let position: Matrix2<f64> = covariance.fixed_view::<2, 2>(0, 0).into_owned();
+    let translation = error.xy().dot(&position.cholesky()?.solve(&error.xy()));
+    Some([pose, translation, error.z * error.z / covariance[(2, 2)]])
+}
+
+fn figures(samples: &[Sample]) -> Option<NeesFigures> {
+    let of = |part: usize| {
+        let (n, freedom) = (samples.len(), FREEDOMS[part]);
+        let values = || samples.iter().map(|sample| sample.squared[part]);
+        let limit = quantile(CONFIDENCE, freedom);
+        let expected = (n * freedom) as f64;
+        let tail = 0.5 * (1.0 - CONFIDENCE);
+        NeesFigure {
+            ratio: values().sum::<f64>() / expected,
+            honest_range: [tail, 1.0 - tail].map(|p| quantile(p, n * freedom) / expected),
+            outside_percent: 100.0 * values().filter(|&value| value > limit).count() as f64 / n as f64,
+        }
+    };
+    (!samples.is_empty()).then(|| NeesFigures { stretches: samples.len(), pose: of(0), translation: of(1), yaw: of(2) })
+}

@@ -1,0 +1,141 @@
+//! Errors over time with the bands that the covariance promises.
+
+use std::ops::Range;
+
+use plotters::{coord::types::RangedCoordf64, prelude::*};
+
+use super::{PlotError, canvas::*};
+use crate::{BandSample, Bands, TruthSigma};
+
+/// Size of the document, px: the header, and three panels of equal height of which the last carries the time axis.
+const SIZE: (u32, u32) = (900, HEADER + 3 * PANEL + TIME_AXIS);
+const PANEL: u32 = 220;
+const TIME_AXIS: u32 = 56;
+/// Half the width of a band, in standard deviations.
+const SIGMAS: f64 = 3.0;
+/// Free room above and below, as a share of the largest value.
+const HEADROOM: f64 = 0.08;
+/// A band: the estimate's colour, faint.
+const BAND: RGBColor = RGBColor(205, 226, 243);
+
+/// The plot as an SVG document: x, y and yaw over time, each error within its band of 3 standard deviations.
+///
+/// # Errors
+/// [`PlotError::Empty`] where no chain has a pose with truth after its first, [`PlotError::Draw`].
+pub fn bands_svg(bands: &Bands) -> Result<String, PlotError> {
+    let last = bands.chains.iter().flatten().map(|sample| sample.time_s).reduce(f64::max).ok_or(PlotError::Empty)?;
+    let legend = [
+        Entry { label: "estimate less truth", symbol: Symbol::Line(line(ESTIMATE, 2.0)) },
+        Entry { label: "3 sigma either way", symbol: Symbol::Area(BAND) },
+    ];
+    let panels = [
+        Panel::new(bands, "x (m)", 0, 1.0),
+        Panel::new(bands, "y (m)", 1, 1.0),
+        Panel::new(bands, "yaw (deg)", 2, 1f64.to_degrees()),
+    ];
+    document(SIZE, |area| {
+        header(area, "Error over time, and the covariance's band", &caption(bands), &legend)?;
+        let mut rest = area.split_vertically(px(f64::from(HEADER))).1;
+        for (index, panel) in panels.iter().enumerate() {
+            let (this, below) = rest.split_vertically(px(f64::from(PANEL)));
+            let is_last = index + 1 == panels.len();
+            draw_panel(if is_last { &rest } else { &this }, panel, 0.0..last, is_last)?;
+            rest = below;
+        }
+        Ok(())
+    })
+}
+
+fn caption(bands: &Bands) -> String {
+    let [x, y, yaw] = bands.inside_percent(SIGMAS);
+    let inside =
+        format!("aligned with the truth at the start; within the band: x {x:.0} %, y {y:.0} %, yaw {yaw:.0} %");
+    match bands.truth_sigma {
+        sigma if sigma == TruthSigma::default() => inside,
+        sigma => format!("{inside}; truth: {sigma}"),
+    }
+}
+
+/// One of the three diagrams.
+struct Panel {
+    y_desc: &'static str,
+    chains: Vec<Vec<Point>>,
+}
+
+/// Error and half the band's width, in the panel's unit.
+#[derive(Clone, Copy)]
+struct Point {
+    time_s: f64,
+    error: f64,
+    band: f64,
+}
+
+impl Panel {
+    /// The panel of one part (x, y, yaw) of the error, in a unit of which `scale` make one SI unit.
+    fn new(bands: &Bands, y_desc: &'static str, part: usize, scale: f64) -> Self {
+        let point = |s: &BandSample| Point {
+            time_s: s.time_s,
+            error: scale * s.error[part],
+            band: SIGMAS * scale * s.sigma[part],
+        };
+        Self { y_desc, chains: bands.chains.iter().map(|chain| chain.iter().map(point).collect()).collect() }
+    }
+
+    /// Symmetric about zero, with all errors and bands in it.
+    fn range(&self) -> Range<f64> {
+        let largest = self.chains.iter().flatten().map(|p| p.error.abs().max(p.band)).fold(0.0, f64::max);
+        let top = if largest > 1e-9 { (1.0 + HEADROOM) * largest } else { 1.0 };
+        -top..top
+    }
+}
+
+fn draw_panel(area: &Area<'_>, panel: &Panel, time_s: Range<f64>, with_time_axis: bool) -> Result<(), PlotError> {
+    let mut builder = ChartBuilder::on(area);
+    builder
+        .margin_left(px(20.0))
+        .margin_right(px(20.0))
+        .margin_bottom(px(16.0))
+        .set_label_area_size(LabelAreaPosition::Left, px(84.0));
+    if with_time_axis {
+        builder.set_label_area_size(LabelAreaPosition::Bottom, px(f64::from(TIME_AXIS)));
+    }
+    let mut chart = builder.build_cartesian_2d(time_s.clone(), panel.range()).map_err(drawing)?;
+    for chain in &panel.chains {
+        chart.draw_series([band(chain)]).map_err(drawing)?;
+    }
+    draw_mesh(&mut chart, panel.y_desc, with_time_axis)?;
+    chart.draw_series(LineSeries::new([(time_s.start, 0.0), (time_s.end, 0.0)], line(TRUTH, 1.0))).map_err(drawing)?;
+    for chain in &panel.chains {
+        let errors = chain.iter().map(|p| (p.time_s, p.error));
+        chart.draw_series(LineSeries::new(errors, line(ESTIMATE, 2.0))).map_err(drawing)?;
+    }
+    Ok(())
+}
+
+type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+
+fn draw_mesh(chart: &mut Chart<'_, '_>, y_desc: &str, with_time_axis: bool) -> Result<(), PlotError> {
+    let mut mesh = chart.configure_mesh();
+    mesh.max_light_lines(0)
+        .bold_line_style(line(GRID, 1.0))
+        .axis_style(line(QUIET, 1.0))
+        .set_all_tick_mark_size(px(5.0))
+        .x_label_formatter(&number)
+        .y_label_formatter(&number)
+        .x_labels(10)
+        .y_labels(5)
+        .label_style(font(14.0, INK))
+        .axis_desc_style(font(15.0, INK))
+        .y_desc(y_desc);
+    if with_time_axis {
+        mesh.x_desc("time (s)");
+    }
+    mesh.draw().map_err(drawing)
+}
+
+/// The area between both limits.
+fn band(chain: &[Point]) -> Polygon<(f64, f64)> {
+    let upper = chain.iter().map(|p| (p.time_s, p.band));
+    let lower = chain.iter().rev().map(|p| (p.time_s, -p.band));
+    Polygon::new(upper.chain(lower).collect::<Vec<_>>(), BAND.filled())
+}

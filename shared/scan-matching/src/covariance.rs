@@ -1,0 +1,44 @@
+//! Covariances from the shapes of peaks.
+
+use nalgebra::{Matrix2, Matrix3, Rotation2, Vector2};
+
+/// (1 - score) over the peak's curvature, scaled, m^2; never more than `guess`, what is known without a match.
+///
+/// `hessian` holds the second derivatives of the score, a squared cell.
+pub(crate) fn shift_covariance(
+    variance_scale: f64,
+    score: f64,
+    hessian: &Matrix2<f64>,
+    cell_m: f64,
+    guess: f64,
+) -> Matrix2<f64> {
+    let scale = variance_scale * (1.0 - score).max(1e-6) * cell_m.powi(2);
+    match (-hessian).try_inverse() {
+        Some(shape) if shape.trace() > 0.0 && shape.determinant() > 0.0 && shape.trace() * scale < guess => {
+            shape * scale
+        }
+        _ => Matrix2::identity() * guess,
+    }
+}
+
+/// Covariance of (x, y, yaw) from that of the shift along the later scan's axes where the angle is known, the angle's
+/// variance, and how x and y follow the angle, m/rad.
+pub(crate) fn motion_covariance(
+    turn: &Rotation2<f64>,
+    shift: Matrix2<f64>,
+    follows: Vector2<f64>,
+    variance_rad2: f64,
+) -> Matrix3<f64> {
+    let placed = turn.matrix() * shift * turn.matrix().transpose();
+    let mut covariance = Matrix3::zeros();
+    covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&(placed + follows * follows.transpose() * variance_rad2));
+    covariance.fixed_view_mut::<2, 1>(0, 2).copy_from(&(follows * variance_rad2));
+    covariance.fixed_view_mut::<1, 2>(2, 0).copy_from(&(follows.transpose() * variance_rad2));
+    covariance[(2, 2)] = variance_rad2;
+    covariance
+}
+
+/// Variance of a uniform guess within `reach` to either side.
+pub(crate) fn guess(reach: f64) -> f64 {
+    reach.powi(2) / 3.0
+}

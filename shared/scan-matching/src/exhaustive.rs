@@ -1,0 +1,343 @@
+//! All three unknowns at once: every angle of a grid, each with its whole correlation over the shifts.
+
+mod config;
+
+use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
+
+use nalgebra::{Matrix3, Rotation2, Vector2};
+
+use crate::config::{ConfigError, Overlap, Peak, reach_cells};
+use crate::correlate::KeptCorrelation;
+use crate::covariance::{guess, motion_covariance, shift_covariance};
+use crate::fft::fast_size;
+use crate::overlap::OverlapEnergy;
+use crate::peak::{LinePeak, PlanePeak, line_peak};
+use crate::rotation::{RotationEstimate, RotationRunnerUp};
+use crate::scores::{Scores, Shift};
+use crate::translation::{MotionEstimate, MotionRunnerUp};
+use crate::warp::Rotation;
+use crate::{ShapeError, expect_shape, kernels};
+
+use config::AngleGrid;
+pub use config::ExhaustiveConfig;
+
+/// Where angles are compared, rasters are read off their cells' centres by this, in cells, down and to the right.
+///
+/// Reading between cells blurs: along each axis by 1 - 2 a (1 - a) (1 - cos w) in power, with a the place between two cells.
+/// A turn goes through all a evenly, so a (1 - a) is 1/6 on average, but a turn by zero would not blur at all, and match
+/// otherwise than its neighbours: the peak would be pushed off zero. With (3 - sqrt 3) / 6, a (1 - a) = 1/6 there too.
+/// The delay of such a reading is a for long waves only, so the shift is taken from rasters read without.
+const OFFSET: f64 = 0.211_324_865_405_187_1;
+
+/// The motion between two scans, and its angle apart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointEstimate {
+    /// The angle; its runner-up is the next highest local maximum over the angles.
+    pub rotation: RotationEstimate,
+    /// The whole motion; its runner-up is another shift at the same angle, or another angle's best, whichever is higher.
+    pub motion: MotionEstimate,
+}
+
+/// Finds angle and shift together by trying every angle (Masking by Moving; `raw` in Weston et al., Table III).
+///
+/// For each angle of the grid the earlier raster g is turned and correlated with the later one, f, at all shifts within
+/// reach. The peak over the angles is placed between them by a fit, and the correlation is computed once more at that
+/// angle for the shift. Two angles share a complex transform, f's spectrum is computed once a pair, and only the shifts
+/// within reach are transformed back.
+///
+/// The covariance is the inverse of the score's curvature in (x, y, yaw), scaled: the curvature over the shifts at the
+/// best angle, the curvature over the angles of the best score at each, and how the best shift follows the angle.
+///
+/// Planned once for rasters of n x n cells; nothing is allocated afterwards.
+pub struct ExhaustiveSearch {
+    n: usize,
+    cell_m: f64,
+    config: ExhaustiveConfig,
+    angles: AngleGrid,
+    correlation: KeptCorrelation,
+    /// f and g with what is not finite set to zero.
+    later: Vec<f32>,
+    earlier: Vec<f32>,
+    later_energy: OverlapEnergy,
+    /// Two angles at a time.
+    turned: [Turned; 2],
+    /// The best of each angle.
+    candidates: Vec<Candidate>,
+}
+
+/// The earlier raster at one angle, and how well each shift of it matches.
+struct Turned {
+    raster: Vec<f32>,
+    energy: OverlapEnergy,
+    scores: Scores,
+}
+
+/// The best match at one angle: no score above zero, no match.
+#[derive(Debug, Clone, Copy, Default)]
+struct Candidate {
+    score: f64,
+    /// (x, y) of the motion, m.
+    place: Vector2<f64>,
+}
+
+/// The peak in all three unknowns.
+struct Found {
+    prior_rad: f64,
+    /// The angle of the grid next to it.
+    best: usize,
+    angle_rad: f64,
+    over_angles: LinePeak,
+    /// The highest score at `angle_rad`, and the peak beside it in cells (down, right).
+    highest: Shift,
+    shift: Vector2<f64>,
+    over_shifts: PlanePeak,
+}
+
+impl ExhaustiveSearch {
+    /// Plans a search over rasters of `n` x `n` cells of `cell_m` metres.
+    ///
+    /// # Errors
+    /// A configuration that no search can be built from: also a reach of more than half the raster.
+    pub fn new(n: usize, cell_m: f64, config: &ExhaustiveConfig) -> Result<Self, ConfigError> {
+        config.validate()?;
+        let reach = reach_cells(n, cell_m, "exhaustive", config.reach_m)?;
+        let size = fast_size(Scores::least_size(n, reach));
+        let energy = || OverlapEnergy::new(n, Scores::around(reach));
+        let turned = || Turned { raster: vec![0.0; n * n], energy: energy(), scores: Scores::new(n, reach, size) };
+        let (angles, turned) = (config.angles(), [turned(), turned()]);
+        Ok(Self {
+            n,
+            cell_m,
+            config: config.clone(),
+            angles,
+            correlation: KeptCorrelation::new(n, size, turned[0].scores.wrapped()),
+            later: vec![0.0; n * n],
+            earlier: vec![0.0; n * n],
+            later_energy: energy(),
+            turned,
+            candidates: vec![Candidate::default(); angles.count],
+        })
+    }
+
+    /// Angles that are tried for each pair, the last look at the best one not counted.
+    pub fn candidates(&self) -> usize {
+        self.angles.count
+    }
+
+    /// The motion between two rasters.
+    ///
+    /// Rasters are n x n, row 0 far ahead, column 0 far left. Values that are not finite count as zero.
+    ///
+    /// # Errors
+    /// Where a raster is not of this search's shape.
+    pub fn search(&mut self, later: &[f32], earlier: &[f32]) -> Result<JointEstimate, ShapeError> {
+        self.search_around(later, earlier, 0.0)
+    }
+
+    /// The motion between two rasters whose angle is near `prior_rad`: the grid's middle lies there.
+    ///
+    /// # Errors
+    /// As [`search`](Self::search).
+    pub fn search_around(
+        &mut self,
+        later: &[f32],
+        earlier: &[f32],
+        prior_rad: f64,
+    ) -> Result<JointEstimate, ShapeError> {
+        expect_shape("later raster", later.len(), self.n * self.n)?;
+        expect_shape("earlier raster", earlier.len(), self.n * self.n)?;
+        kernels::finite_copy(later, &mut self.later);
+        kernels::finite_copy(earlier, &mut self.earlier);
+        self.later_energy.measure(&self.later);
+        self.turned[0].energy.measure(&self.earlier);
+        let energy = (self.later_energy.total() * self.turned[0].energy.total()).sqrt();
+        if !(energy.is_finite() && energy > 0.0) {
+            return Ok(self.no_match(prior_rad));
+        }
+        self.correlation.keep(&self.later);
+        self.try_all(prior_rad, energy);
+        Ok(self.look_closer(prior_rad, energy).map_or(self.no_match(prior_rad), |found| self.estimate(&found)))
+    }
+
+    /// The best match at every angle of the grid.
+    fn try_all(&mut self, prior_rad: f64, energy: f64) {
+        for first in (0..self.angles.count).step_by(2) {
+            let count = (self.angles.count - first).min(2);
+            let angles = [0, 1].map(|k| prior_rad + self.angles.angle((first + k) as f64));
+            self.score(angles, count, OFFSET, energy);
+            for (k, turned) in self.turned.iter().take(count).enumerate() {
+                self.candidates[first + k] = turned.best(self.config.peak, angles[k], self.cell_m);
+            }
+        }
+    }
+
+    /// Scores of all shifts at the first `count` of two angles.
+    fn score(&mut self, angles: [f64; 2], count: usize, offset: f64, energy: f64) {
+        for (k, turned) in self.turned.iter_mut().enumerate() {
+            if k < count {
+                turned.turn(&self.earlier, self.n, angles[k], offset, self.config.overlap);
+            } else {
+                // What is left there from before would still show in the last bits of the other.
+                turned.raster.fill(0.0);
+            }
+        }
+        let [g, h] = &mut self.turned;
+        let scale = (self.correlation.scale() / energy) as f32;
+        self.correlation.correlate([&g.raster, &h.raster], |r, row| {
+            g.scores.fill(r, row, |z| z.re * scale);
+            if count == 2 {
+                h.scores.fill(r, row, |z| z.im * scale);
+            }
+        });
+        for turned in self.turned.iter_mut().take(count) {
+            turned.scores.normalise(self.config.overlap, &self.later_energy, &turned.energy, energy);
+        }
+    }
+
+    /// Places the peak between the angles, and looks at the shifts there.
+    fn look_closer(&mut self, prior_rad: f64, energy: f64) -> Option<Found> {
+        let best = self.best()?;
+        let over_angles = self.angle_peak(best);
+        let angle_rad = prior_rad + self.angles.angle(best as f64 + over_angles.offset);
+        self.score([angle_rad; 2], 1, 0.0, energy);
+        let scores = &self.turned[0].scores;
+        let highest = scores.highest()?;
+        let over_shifts = scores.peak(self.config.peak, highest);
+        let shift = scores.place(self.config.peak, highest, &over_shifts);
+        Some(Found { prior_rad, best, angle_rad, over_angles, highest, shift, over_shifts })
+    }
+
+    /// The angle with the highest score.
+    fn best(&self) -> Option<usize> {
+        let best = (0..self.angles.count).reduce(|best, k| if self.at(k) > self.at(best) { k } else { best })?;
+        (self.at(best) > 0.0).then_some(best)
+    }
+
+    fn at(&self, k: usize) -> f64 {
+        self.candidates[k].score
+    }
+
+    /// The peak over the angles next to the best one; at the end of an open grid the best one itself.
+    fn angle_peak(&self, best: usize) -> LinePeak {
+        if !self.angles.is_inner(best) {
+            return LinePeak { offset: 0.0, value: self.at(best), curvature: 0.0 };
+        }
+        line_peak(self.config.peak, |by| self.at(self.angles.beside(best, by)))
+    }
+
+    /// The next highest local maximum over the angles.
+    fn angle_runner_up(&self, best: usize) -> Option<usize> {
+        let summit = |k: usize| (-1..=1).all(|by| self.at(self.angles.beside(k, by)) <= self.at(k));
+        let others = (0..self.angles.count).filter(|&k| !self.angles.are_close(best, k) && summit(k));
+        others.filter(|&k| self.at(k) > 0.0).reduce(|second, k| if self.at(k) > self.at(second) { k } else { second })
+    }
+
+    fn estimate(&self, found: &Found) -> JointEstimate {
+        let score = found.over_shifts.value.min(1.0);
+        let second = self.angle_runner_up(found.best);
+        let rotation = RotationEstimate {
+            angle_rad: wrapped(found.angle_rad),
+            variance_rad2: self.angle_variance(score, found.over_angles.curvature),
+            score,
+            runner_up: second.map(|k| RotationRunnerUp { angle_rad: self.angle(found, k), score: self.at(k) }),
+        };
+        let turn = Rotation2::new(found.angle_rad);
+        let place = translation(found.angle_rad, found.shift, self.cell_m);
+        let guess = guess(self.config.reach_m);
+        let hessian = &found.over_shifts.hessian;
+        let spread = shift_covariance(self.config.variance_scale, score, hessian, self.cell_m, guess);
+        let motion = MotionEstimate {
+            x_m: place.x,
+            y_m: place.y,
+            yaw_rad: rotation.angle_rad,
+            covariance: motion_covariance(&turn, spread, self.follows(found), rotation.variance_rad2),
+            score,
+            runner_up: self.runner_up(found, second),
+            half_turn: false,
+        };
+        JointEstimate { rotation, motion }
+    }
+
+    /// (1 - score) over the curvature of the best scores along the angle, scaled as the shift's: the angle's variance
+    /// whatever the shift is.
+    fn angle_variance(&self, score: f64, curvature: f64) -> f64 {
+        let variance = -self.config.variance_scale * (1.0 - score).max(1e-6) / curvature * self.angles.step.powi(2);
+        if variance > 0.0 { variance.min(self.angles.guess()) } else { self.angles.guess() }
+    }
+
+    /// How x and y follow the angle along the ridge of the scores, m/rad, from the best shifts at the angles beside.
+    fn follows(&self, found: &Found) -> Vector2<f64> {
+        let beside = [-1, 1].map(|by| self.angles.beside(found.best, by));
+        if !self.angles.is_inner(found.best) || beside.iter().any(|&k| self.at(k) <= 0.0) {
+            return Vector2::zeros();
+        }
+        let [before, after] = beside.map(|k| self.candidates[k].place);
+        let slope = (after - before) / (2.0 * self.angles.step);
+        // No cell is farther from the sensor: what seems to be moves on to another peak.
+        let farthest = self.n as f64 * self.cell_m * FRAC_1_SQRT_2;
+        if slope.norm() <= farthest { slope } else { Vector2::zeros() }
+    }
+
+    fn runner_up(&self, found: &Found, other_angle: Option<usize>) -> Option<MotionRunnerUp> {
+        let at = |place: Vector2<f64>, score| MotionRunnerUp { x_m: place.x, y_m: place.y, score };
+        let here = self.turned[0].scores.runner_up(found.highest).map(|((i, j), score)| {
+            at(translation(found.angle_rad, Vector2::new(i as f64, j as f64), self.cell_m), score)
+        });
+        let there = other_angle.map(|k| at(self.candidates[k].place, self.at(k)));
+        match (here, there) {
+            (Some(here), Some(there)) => Some(if there.score > here.score { there } else { here }),
+            (one, other) => one.or(other),
+        }
+    }
+
+    /// The k-th angle, within (-pi, pi].
+    fn angle(&self, found: &Found, k: usize) -> f64 {
+        wrapped(found.prior_rad + self.angles.angle(k as f64))
+    }
+
+    fn no_match(&self, prior_rad: f64) -> JointEstimate {
+        let (guess, angle_rad, variance_rad2) = (guess(self.config.reach_m), wrapped(prior_rad), self.angles.guess());
+        JointEstimate {
+            rotation: RotationEstimate { angle_rad, variance_rad2, score: 0.0, runner_up: None },
+            motion: MotionEstimate {
+                x_m: 0.0,
+                y_m: 0.0,
+                yaw_rad: angle_rad,
+                covariance: Matrix3::from_diagonal(&[guess, guess, variance_rad2].into()),
+                score: 0.0,
+                runner_up: None,
+                half_turn: false,
+            },
+        }
+    }
+}
+
+impl Turned {
+    /// g'(x) = g(R x + o), so that f(x) ~ g'(x + R^T (t - o)); and its energy where it is asked for.
+    fn turn(&mut self, earlier: &[f32], n: usize, angle_rad: f64, offset: f64, overlap: Overlap) {
+        let rotation = Rotation::new(n, angle_rad).with_offset(offset);
+        self.raster.chunks_exact_mut(n).enumerate().for_each(|(r, row)| rotation.row(earlier, r, row));
+        if overlap == Overlap::Energy {
+            self.energy.measure(&self.raster);
+        }
+    }
+
+    /// The best match of a raster that was turned with [`OFFSET`].
+    fn best(&self, kind: Peak, angle_rad: f64, cell_m: f64) -> Candidate {
+        let Some(highest) = self.scores.highest() else { return Candidate::default() };
+        let peak = self.scores.peak(kind, highest);
+        let place = translation(angle_rad, self.scores.place(kind, highest, &peak), cell_m);
+        Candidate { score: peak.value, place: place - Vector2::repeat(OFFSET * cell_m) }
+    }
+}
+
+/// t = R t' with t' the shift along the raster's axes, cells: rows run backward, columns to the right.
+fn translation(angle_rad: f64, shift: Vector2<f64>, cell_m: f64) -> Vector2<f64> {
+    Rotation2::new(angle_rad) * shift * -cell_m
+}
+
+/// Within (-pi, pi].
+fn wrapped(angle_rad: f64) -> f64 {
+    let turned = angle_rad.rem_euclid(TAU);
+    if turned > PI { turned - TAU } else { turned }
+}

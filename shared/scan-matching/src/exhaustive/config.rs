@@ -1,0 +1,151 @@
+//! What the exhaustive search can be told.
+
+use std::f64::consts::{PI, TAU};
+
+use serde::{Deserialize, Serialize};
+
+use crate::config::{ConfigError, Overlap, Peak, accept, positive};
+
+/// Configuration of [`ExhaustiveSearch`](crate::ExhaustiveSearch): section `[exhaustive]`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ExhaustiveConfig {
+    /// Largest angle searched to either side, degrees; 180 is the whole circle.
+    pub reach_deg: f64,
+    /// From one angle to the next, degrees. The cost grows as its inverse.
+    pub step_deg: f64,
+    /// Largest shift searched along each axis, m.
+    pub reach_m: f64,
+    /// What makes up for the shrinking overlap. `none` and `area` compare the angles by their bare correlations, as in
+    /// MbyM: turning blurs, so unturned rasters have the advantage. `energy` compares correlation coefficients.
+    pub overlap: Overlap,
+    /// How the peak is placed between angles and between cells: `gaussian` or `parabola`.
+    pub peak: Peak,
+    /// Covariance = this x (1 - score) x inverse curvature of the peak in all three unknowns.
+    pub variance_scale: f64,
+}
+
+impl Default for ExhaustiveConfig {
+    fn default() -> Self {
+        Self {
+            reach_deg: 15.0,
+            step_deg: 1.0,
+            reach_m: 12.0,
+            overlap: Overlap::default(),
+            peak: Peak::default(),
+            variance_scale: 0.015,
+        }
+    }
+}
+
+impl ExhaustiveConfig {
+    /// MbyM's search as it is compared with in Weston et al.: bare correlations.
+    pub fn mbym() -> Self {
+        Self { overlap: Overlap::None, peak: Peak::Parabola, ..Self::default() }
+    }
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The first key that no search can be built from.
+    pub fn validate(&self) -> Result<(), ConfigError> {
+        let check = |good, key, actual: &dyn ToString, expected| accept(good, "exhaustive", key, actual, expected);
+        check(self.reach_deg > 0.0 && self.reach_deg <= 180.0, "reach_deg", &self.reach_deg, "above 0, at most 180")?;
+        check(
+            self.step_deg >= 0.01 && self.step_deg <= self.reach_deg,
+            "step_deg",
+            &self.step_deg,
+            "0.01 to reach_deg",
+        )?;
+        check(positive(self.reach_m), "reach_m", &self.reach_m, "metres, above 0")?;
+        let fitted = !matches!(self.peak, Peak::SoftArgmax { .. });
+        check(fitted, "peak", &"soft_argmax", "gaussian or parabola")?;
+        check(positive(self.variance_scale), "variance_scale", &self.variance_scale, "a positive number")
+    }
+
+    pub(super) fn angles(&self) -> AngleGrid {
+        let (reach, step) = (self.reach_deg.to_radians(), self.step_deg.to_radians());
+        if self.reach_deg >= 180.0 {
+            let count = (TAU / step).ceil() as usize;
+            return AngleGrid { first: -PI, step: TAU / count as f64, count, circle: true };
+        }
+        let side = (reach / step + 1e-9).floor();
+        AngleGrid { first: -side * step, step, count: 2 * side as usize + 1, circle: false }
+    }
+}
+
+/// Evenly spaced angles about zero, radians.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct AngleGrid {
+    first: f64,
+    pub step: f64,
+    pub count: usize,
+    /// Whether the last angle is the first one's neighbour.
+    circle: bool,
+}
+
+impl AngleGrid {
+    /// The angle `k` steps, whole or not, from the first one.
+    pub fn angle(&self, k: f64) -> f64 {
+        self.first + k * self.step
+    }
+
+    /// The angle `by` steps from the k-th; at the ends of an open grid the last one again.
+    pub fn beside(&self, k: usize, by: isize) -> usize {
+        let (place, count) = (k as isize + by, self.count as isize);
+        (if self.circle { place.rem_euclid(count) } else { place.clamp(0, count - 1) }) as usize
+    }
+
+    /// Whether the k-th angle has a neighbour on both sides.
+    pub fn is_inner(&self, k: usize) -> bool {
+        self.circle || (k > 0 && k + 1 < self.count)
+    }
+
+    /// Whether two angles are the same or neighbours.
+    pub fn are_close(&self, a: usize, b: usize) -> bool {
+        (-1..=1).any(|by| self.beside(a, by) == b)
+    }
+
+    /// Variance of an angle of which nothing more is known than that it is on the grid.
+    pub fn guess(&self) -> f64 {
+        (0.5 * self.step * self.count as f64).powi(2) / 3.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn the_default_has_thirty_one_angles_zero_among_them() {
+        let grid = ExhaustiveConfig::default().angles();
+        assert_eq!(grid.count, 31);
+        assert!((grid.angle(0.0).to_degrees() + 15.0).abs() < 1e-9 && grid.angle(15.0).abs() < 1e-9);
+        assert!(!grid.is_inner(0) && grid.is_inner(1) && !grid.is_inner(30));
+        assert_eq!((grid.beside(30, 2), grid.beside(0, -1)), (30, 0));
+    }
+
+    #[test]
+    fn the_whole_circle_closes() {
+        let grid = ExhaustiveConfig { reach_deg: 180.0, step_deg: 7.0, ..Default::default() }.angles();
+        assert_eq!(grid.count, 52);
+        assert!((grid.angle(52.0) - grid.angle(0.0) - TAU).abs() < 1e-12);
+        assert!(grid.is_inner(0) && grid.are_close(0, 51));
+    }
+
+    #[test]
+    fn impossible_values_name_their_key() {
+        let refused = |config: ExhaustiveConfig| config.validate().unwrap_err().to_string();
+        let default = ExhaustiveConfig::default;
+        assert!(refused(ExhaustiveConfig { reach_deg: 181.0, ..default() }).starts_with("exhaustive.reach_deg = 181"));
+        assert!(refused(ExhaustiveConfig { step_deg: f64::NAN, ..default() }).contains("step_deg"));
+        assert!(refused(ExhaustiveConfig { step_deg: 16.0, ..default() }).contains("step_deg"));
+        assert!(refused(ExhaustiveConfig { reach_m: 0.0, ..default() }).contains("reach_m"));
+        let soft = Peak::SoftArgmax { temperature: 1.0 };
+        assert!(refused(ExhaustiveConfig { peak: soft, ..default() }).contains("gaussian or parabola"));
+        ExhaustiveConfig::mbym().validate().unwrap();
+        let written = toml::to_string(&ExhaustiveConfig::mbym()).unwrap();
+        assert_eq!(toml::from_str::<ExhaustiveConfig>(&written).unwrap(), ExhaustiveConfig::mbym());
+    }
+}

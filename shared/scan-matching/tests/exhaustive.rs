@@ -1,0 +1,248 @@
+//! The exhaustive search: against direct sums, against drawn motions, and what it refuses.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::{Motion, Numbers, draw, pair};
+use gyre_scan_matching::{ExhaustiveConfig, ExhaustiveSearch, JointEstimate, Overlap, Peak};
+use proptest::prelude::*;
+
+fn search(n: usize, cell_m: f64, config: &ExhaustiveConfig, earlier: &[f32], later: &[f32]) -> JointEstimate {
+    ExhaustiveSearch::new(n, cell_m, config).unwrap().search(later, earlier).unwrap()
+}
+
+/// Errors (m, m, degrees).
+fn errors(found: &JointEstimate, motion: Motion) -> [f64; 3] {
+    let turn = (found.motion.yaw_rad - motion.yaw + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU);
+    [found.motion.x_m - motion.x, found.motion.y_m - motion.y, (turn - std::f64::consts::PI).to_degrees()]
+}
+
+/// g at (row, col), bilinear; zero outside.
+fn value(g: &[f32], n: usize, row: f64, col: f64) -> f64 {
+    let last = (n - 1) as f64 + 1e-9;
+    if !(0.0..=last).contains(&row) || !(0.0..=last).contains(&col) {
+        return 0.0;
+    }
+    let (i, j) = ((row.floor() as usize).min(n - 2), (col.floor() as usize).min(n - 2));
+    let (a, b) = (row - i as f64, col - j as f64);
+    let [p, q, r, s] = [(i, j), (i, j + 1), (i + 1, j), (i + 1, j + 1)].map(|(i, j)| f64::from(g[i * n + j]));
+    (1.0 - a) * ((1.0 - b) * p + b * q) + a * ((1.0 - b) * r + b * s)
+}
+
+/// R x + o, as (row, col).
+fn looked_up(n: usize, [row, col]: [isize; 2], (angle_rad, o): (f64, f64)) -> (f64, f64) {
+    let ((sin, cos), middle) = (angle_rad.sin_cos(), (n - 1) as f64 / 2.0);
+    let (u, v) = (row as f64 - middle, col as f64 - middle);
+    (middle + o + cos * u - sin * v, middle + o + sin * u + cos * v)
+}
+
+/// Sum of f(x) g(R (x + s) + o) over the cells of f, s by whole cells.
+fn direct_sum(f: &[f32], g: &[f32], n: usize, turn: (f64, f64), [down, right]: [isize; 2]) -> f64 {
+    let inside = |v: isize| (0..n as isize).contains(&v);
+    (0..n * n)
+        .filter_map(|k| {
+            let (row, col) = ((k / n) as isize + down, (k % n) as isize + right);
+            let at = looked_up(n, [row, col], turn);
+            (inside(row) && inside(col)).then(|| f64::from(f[k]) * value(g, n, at.0, at.1))
+        })
+        .sum()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+    #[test]
+    fn the_best_of_all_angles_and_shifts_is_that_of_the_direct_sums(
+        n in 20_usize..25,
+        g in prop::collection::vec(0.0_f32..1.0, 24 * 24),
+        prior_deg in -170.0_f64..170.0,
+        (k, down, right) in (-1..=1, -3_isize..=3, -3_isize..=3),
+    ) {
+        // Angles of 9 degrees, shifts of up to 3 cells of 1 m. f is g seen after one of these motions.
+        let g: Vec<f32> = g[..n * n].iter().map(|v| v.powi(4)).collect();
+        let angle = |k: i32| (prior_deg + 9.0 * f64::from(k)).to_radians();
+        let moved = |at: usize| {
+            let x = [(at / n) as isize + down, (at % n) as isize + right];
+            let (row, col) = looked_up(n, x, (angle(k), 0.0));
+            value(&g, n, row, col) as f32
+        };
+        let f: Vec<f32> = (0..n * n).map(moved).collect();
+        let config = ExhaustiveConfig {
+            reach_deg: 18.0,
+            step_deg: 9.0,
+            reach_m: 3.0,
+            overlap: Overlap::None,
+            peak: Peak::Parabola,
+            ..Default::default()
+        };
+        let mut exhaustive = ExhaustiveSearch::new(n, 1.0, &config).unwrap();
+        let found = exhaustive.search_around(&f, &g, prior_deg.to_radians()).unwrap().motion;
+        // Angles are compared by rasters read between the cells, all alike blurred.
+        let all = (-2..=2).flat_map(|k| (-3..=3).flat_map(move |i| (-3..=3).map(move |j| (k, [i, j]))));
+        let summed = all.map(|(k, s)| (k, s, direct_sum(&f, &g, n, (angle(k), 0.2113), s)));
+        let (best, [i, j], _) = summed.max_by(|a, b| a.2.total_cmp(&b.2)).unwrap();
+        let turn = nalgebra::Rotation2::new(angle(best));
+        let place = turn * nalgebra::Vector2::new(i as f64, j as f64) * -1.0;
+        let off = [found.x_m - place.x, found.y_m - place.y];
+        let turned = nalgebra::Rotation2::new(found.yaw_rad).rotation_to(&turn).angle().to_degrees();
+        prop_assert!(off[0].hypot(off[1]) < 1.3 && turned.abs() < 7.0, "{found:?}: {best} {i} {j}");
+    }
+}
+
+/// A turn by nothing does not blur: where that showed, the peak would flee from zero.
+#[test]
+fn small_angles_are_not_pushed_off_zero() {
+    let config = ExhaustiveConfig { reach_deg: 3.0, step_deg: 0.25, ..Default::default() };
+    let mut slopes = Vec::new();
+    for seed in 0..6 {
+        // A new scene of speckles a cell wide, which blurring changes most.
+        let found = |yaw_deg: f64| {
+            let motion = Motion::degrees(1.2, 0.4, yaw_deg);
+            let scene = common::scatterers(1500, 60.0, 70 + seed);
+            let earlier = draw(scene.iter().copied(), 127, 0.8, 0.6);
+            let later = draw(scene.iter().map(|&(p, s)| (motion.seen_from_later(p), s)), 127, 0.8, 0.6);
+            search(127, 0.8, &config, &earlier, &later).motion
+        };
+        let (left, right) = (found(0.1), found(-0.1));
+        slopes.push((left.yaw_rad - right.yaw_rad).to_degrees() / 0.2);
+        assert!((left.x_m - 1.2).abs() < 0.1 && (left.y_m - 0.4).abs() < 0.1, "{left:?}");
+    }
+    let mean = slopes.iter().sum::<f64>() / slopes.len() as f64;
+    assert!((mean - 1.0).abs() < 0.15, "{slopes:?}");
+}
+
+#[test]
+fn three_points_give_their_motion_back() {
+    let points = [[15.0, 3.0], [-4.0, 12.0], [-9.0, -14.0]];
+    for motion in [Motion::degrees(2.0, 1.0, 12.0), Motion::degrees(-1.5, 2.5, -9.0), Motion::degrees(3.0, 0.0, 0.0)] {
+        let earlier = draw(points.iter().map(|&p| (p, 1.0)), 101, 0.5, 1.2);
+        let later = draw(points.iter().map(|&p| (motion.seen_from_later(p), 1.0)), 101, 0.5, 1.2);
+        let found = search(101, 0.5, &ExhaustiveConfig::default(), &earlier, &later);
+        let [dx, dy, dyaw] = errors(&found, motion);
+        assert!(dx.abs() < 0.05 && dy.abs() < 0.05 && dyaw.abs() < 0.3, "{motion:?}: {found:?}");
+        assert_eq!(found.rotation.angle_rad, found.motion.yaw_rad);
+    }
+}
+
+#[test]
+fn motions_within_reach_are_found_to_a_fraction_of_a_cell() {
+    let (n, cell_m, mut numbers) = (127, 0.8, Numbers(11));
+    for config in [ExhaustiveConfig::default(), ExhaustiveConfig::mbym()] {
+        let mut squares = [0.0; 3];
+        for k in 0..16 {
+            let motion = Motion::degrees(numbers.within(9.0), numbers.within(9.0), numbers.within(14.0));
+            let (earlier, later) = pair(n, cell_m, motion, 300 + k);
+            let found = search(n, cell_m, &config, &earlier, &later);
+            errors(&found, motion).iter().zip(&mut squares).for_each(|(e, sum)| *sum += e * e / 16.0);
+        }
+        let rms = squares.map(f64::sqrt);
+        println!("{:?}: RMS {rms:?} (m, m, deg)", config.overlap);
+        assert!(rms[0] < 0.15 * cell_m && rms[1] < 0.15 * cell_m && rms[2] < 0.2, "{:?}: {rms:?}", config.overlap);
+    }
+}
+
+#[test]
+fn the_whole_circle_is_searched_where_it_is_asked_for() {
+    let config = ExhaustiveConfig { reach_deg: 180.0, step_deg: 2.0, ..Default::default() };
+    for yaw in [179.5, -179.5, 90.0, -133.0] {
+        let motion = Motion::degrees(2.0, -1.0, yaw);
+        let (earlier, later) = pair(97, 0.8, motion, 5);
+        let found = search(97, 0.8, &config, &earlier, &later);
+        let [dx, dy, dyaw] = errors(&found, motion);
+        assert!(dx.abs() < 0.2 && dy.abs() < 0.2 && dyaw.abs() < 0.5, "{yaw}: {found:?}");
+        assert!(found.motion.yaw_rad.abs() <= std::f64::consts::PI, "{yaw}: {found:?}");
+    }
+}
+
+#[test]
+fn a_prior_moves_the_middle_of_the_angles() {
+    let motion = Motion::degrees(1.0, 2.0, 130.0);
+    let (earlier, later) = pair(127, 0.8, motion, 9);
+    let config = ExhaustiveConfig { reach_deg: 3.0, ..Default::default() };
+    let mut exhaustive = ExhaustiveSearch::new(127, 0.8, &config).unwrap();
+    assert_eq!(exhaustive.candidates(), 7);
+    let found = exhaustive.search_around(&later, &earlier, 128.4_f64.to_radians()).unwrap();
+    let [dx, dy, dyaw] = errors(&found, motion);
+    assert!(dx.abs() < 0.2 && dy.abs() < 0.2 && dyaw.abs() < 0.2, "{found:?}");
+}
+
+#[test]
+fn an_angle_at_the_end_of_the_grid_stays_there_and_is_not_trusted() {
+    let (earlier, later) = pair(127, 0.8, Motion::degrees(0.0, 0.0, 4.0), 9);
+    let config = ExhaustiveConfig { reach_deg: 3.0, ..Default::default() };
+    let found = search(127, 0.8, &config, &earlier, &later);
+    assert!((found.motion.yaw_rad.to_degrees() - 3.0).abs() < 1e-9, "{found:?}");
+    assert!(found.rotation.variance_rad2.sqrt().to_degrees() > 1.0, "{found:?}");
+}
+
+#[test]
+fn the_covariance_knows_that_the_scene_behind_the_lever_moves_with_the_angle() {
+    // All structure 15 m ahead and 4 m to the left: x and y follow the angle by -J centre.
+    let scene: Vec<_> = common::scatterers(40, 6.0, 3).iter().map(|&([x, y], s)| ([x + 15.0, y + 4.0], s)).collect();
+    let raster = draw(scene.iter().copied(), 101, 0.5, 1.2);
+    let covariance = search(101, 0.5, &ExhaustiveConfig::default(), &raster, &raster).motion.covariance;
+    let slope = [covariance[(0, 2)], covariance[(1, 2)]].map(|c| c / covariance[(2, 2)]);
+    assert!((slope[0] - 4.0).abs() < 2.0 && (slope[1] + 15.0).abs() < 2.0, "{slope:?}");
+    assert!(covariance.symmetric_eigenvalues().min() > 0.0, "{covariance}");
+}
+
+#[test]
+fn two_matches_are_both_reported() {
+    let earlier = draw([([10.0, -3.0], 1.0), ([10.0, 3.0], 0.7)].into_iter(), 101, 0.5, 1.0);
+    let found = search(101, 0.5, &ExhaustiveConfig::default(), &earlier, &earlier);
+    let second = found.motion.runner_up.unwrap();
+    assert!(second.score < found.motion.score && found.motion.score > 0.95, "{found:?}");
+}
+
+#[test]
+fn rasters_without_a_match_give_no_motion_and_a_wide_covariance() {
+    let (earlier, later) = pair(65, 0.8, Motion::degrees(1.0, 0.0, 2.0), 1);
+    let empty = vec![0.0; 65 * 65];
+    for (f, g) in [(&empty, &empty), (&later, &empty), (&empty, &earlier)] {
+        let found = search(65, 0.8, &ExhaustiveConfig::default(), g, f);
+        assert_eq!((found.motion.x_m, found.motion.yaw_rad, found.motion.score), (0.0, 0.0, 0.0));
+        assert!(found.rotation.variance_rad2.sqrt().to_degrees() > 5.0 && found.motion.covariance[(0, 0)] > 10.0);
+    }
+}
+
+#[test]
+fn no_value_of_a_cell_makes_a_result_that_is_no_number() {
+    let (earlier, later) = pair(65, 0.8, Motion::degrees(1.0, 0.0, 2.0), 1);
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN, 1e-45, -3.0] {
+        for count in [1, 7, 65 * 65] {
+            let mut raster = later.clone();
+            raster.iter_mut().step_by((65 * 65_usize).div_ceil(count)).for_each(|v| *v = bad);
+            for config in [ExhaustiveConfig::default(), ExhaustiveConfig::mbym()] {
+                for (f, g) in [(&raster, &earlier), (&earlier, &raster), (&raster, &raster)] {
+                    let JointEstimate { motion, rotation } = search(65, 0.8, &config, g, f);
+                    let numbers = [rotation.angle_rad, rotation.variance_rad2, motion.x_m, motion.y_m, motion.score];
+                    let all = numbers.iter().chain(motion.covariance.iter());
+                    assert!(all.clone().all(|v| v.is_finite()), "{bad} {count}: {motion:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn rasters_of_another_size_and_impossible_reaches_are_refused() {
+    let config = ExhaustiveConfig::default();
+    let mut exhaustive = ExhaustiveSearch::new(65, 0.8, &config).unwrap();
+    let error = exhaustive.search(&[0.0; 65 * 65], &[0.0; 7]).unwrap_err();
+    assert_eq!(error.to_string(), "earlier raster has 7 values: expected 4225");
+    assert!(exhaustive.search(&[], &[0.0; 65 * 65]).unwrap_err().to_string().starts_with("later raster has 0"));
+    let error = ExhaustiveSearch::new(65, 0.8, &ExhaustiveConfig { reach_m: 30.0, ..config.clone() }).err().unwrap();
+    assert!(error.to_string().starts_with("exhaustive.reach_m = 30: expected"), "{error}");
+    assert!(ExhaustiveSearch::new(3, 0.8, &config).is_err() && ExhaustiveSearch::new(65, f64::NAN, &config).is_err());
+}
+
+#[test]
+fn results_repeat_to_the_last_bit_whatever_was_searched_before() {
+    let (earlier, later) = pair(97, 0.8, Motion::degrees(2.0, -1.0, 5.0), 2);
+    let fresh = search(97, 0.8, &ExhaustiveConfig::default(), &earlier, &later);
+    let mut used = ExhaustiveSearch::new(97, 0.8, &ExhaustiveConfig::default()).unwrap();
+    let bright = vec![5.0; 97 * 97];
+    for (f, g) in [(&bright, &later), (&later, &bright), (&earlier, &later)] {
+        used.search(f, g).unwrap();
+    }
+    assert_eq!(used.search(&later, &earlier).unwrap(), fresh);
+}

@@ -1,0 +1,49 @@
+//! The exhaustive search by four processes, joint-search in place of the two halves: the same result every time.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::{collections::BTreeSet, path::Path};
+
+use common::{Run, odometry};
+use serde_json::Value;
+
+const JOINT: &str = "joint-search";
+const STAGES: [&str; 4] = ["radar-replay", "masking", JOINT, "pose-integration"];
+const SCANS: usize = 64;
+
+/// The demo with another search.
+fn demo() -> Run {
+    let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/demo.toml");
+    Run::of_file(&demo).set("search.kind=exhaustive")
+}
+
+#[test]
+fn four_processes_give_the_same_bytes_again_though_one_is_killed() {
+    let first = demo().rate("max");
+    let undisturbed = first.complete();
+    let summary = first.summary();
+    let rows = odometry::rows(&undisturbed);
+    assert_eq!(rows.len(), SCANS - 1);
+    odometry::assert_unbroken(&rows);
+    let names = |object: &Value| object.as_object().unwrap().keys().cloned().collect::<BTreeSet<_>>();
+    let stages = BTreeSet::from(STAGES.map(str::to_owned));
+    assert_eq!(names(&summary["stages"]), stages);
+    assert_eq!(names(&summary["latency"]["stages"]), stages, "stages that the run has not have no latency");
+    assert_eq!(summary["stages"][JOINT]["allocations_after_five"], 0);
+    let path = summary["evaluation"]["path_m"].as_f64().unwrap();
+    let error = summary["evaluation"]["ate"]["rmse_m"].as_f64().unwrap();
+    assert!(path > 100.0 && error < 0.02 * path, "{error} m over {path} m");
+
+    let again = demo().rate("8").data(&first.out().join("recording"));
+    let mut running = again.start();
+    for poses in [SCANS / 4, SCANS / 2] {
+        running.await_poses(poses).kill(JOINT);
+    }
+    let ended = running.finish();
+    ended.succeeded();
+    assert_eq!(again.odometry(), undisturbed, "{}", ended.stderr);
+    let summary = again.summary();
+    assert_eq!((&summary["restarts"][JOINT], summary["recovery_ms"].as_array().unwrap().len()), (&Value::from(2), 2));
+}
