@@ -1,8 +1,10 @@
-//! What can go wrong when a dataset is generated.
+//! What can go wrong when a dataset is generated or spoilt.
 
 use std::path::PathBuf;
 
-/// Why a simulation could not be set up or written.
+use gyre_radar::{OpenError, ReadError};
+
+/// Why a dataset could not be set up or written.
 #[derive(Debug, thiserror::Error)]
 pub enum SimulatorError {
     /// A key of [`crate::SimulationConfig`] has a value that cannot be simulated.
@@ -15,10 +17,10 @@ pub enum SimulatorError {
         /// What would do.
         expected: String,
     },
-    /// The output folder holds scans of another dataset; a mixture of both would be read as one.
-    #[error("{} holds `{other}`, which this simulation would not write: give an empty folder", folder.display())]
+    /// The output folder holds what is of another dataset; a mixture of both would be read as one.
+    #[error("{} holds `{other}`, which is not of this dataset: give an empty folder", folder.display())]
     OutputInUse {
-        /// The folder of images.
+        /// The folder.
         folder: PathBuf,
         /// The first file that does not belong.
         other: String,
@@ -31,6 +33,20 @@ pub enum SimulatorError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// A folder could not be listed.
+    #[error("cannot list {}: {source}", folder.display())]
+    List {
+        /// The folder.
+        folder: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The recording that is to be spoilt is none.
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    /// A scan that is to be spoilt cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
     /// An image could not be encoded.
     #[error("cannot encode {}: {source}", path.display())]
     Encode {

@@ -9,7 +9,8 @@
 //! - [`world`], [`occlusion`]: how that reflects, and what hides what,
 //! - [`sensor`], [`receiver`]: what a sweep measures of it,
 //! - [`simulator`]: one scan at a time, with its exact pose,
-//! - [`oxford_writer`]: the dataset on disk.
+//! - [`oxford_writer`]: the dataset on disk,
+//! - [`faults`]: the same, or a real one, spoilt on purpose.
 //!
 //! ```
 //! use gyre_simulator::{SimulationConfig, Simulator};
@@ -24,6 +25,8 @@
 
 pub mod config;
 pub mod error;
+pub mod faults;
+mod image;
 pub mod occlusion;
 pub mod oxford_writer;
 pub mod path;
@@ -36,6 +39,7 @@ pub mod world;
 
 pub use config::SimulationConfig;
 pub use error::SimulatorError;
+pub use faults::{Fault, FaultPlan, write_faulty};
 pub use oxford_writer::{Summary, write_dataset};
 pub use path::{BlockLoop, ConstantTwist, Trajectory};
 pub use sensor::{Sensor, SweepTime};

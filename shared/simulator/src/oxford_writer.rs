@@ -4,12 +4,12 @@
 //! `gt/radar_odometry.csv`: for each scan but the first its pose in the frame of the one before, at the middles
 //! of the sweeps, x forward, **y right, yaw clockwise**.
 
-use std::fs::{self, File};
-use std::io::{BufWriter, Write as _};
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
+use crate::image::write_image;
 use crate::sensor::{AZIMUTHS, STRIDE};
 use crate::simulator::{Simulator, empty_scan};
 use crate::{SimulationConfig, SimulatorError};
@@ -151,24 +151,9 @@ fn work(simulator: &Simulator, folder: &Path, next: &AtomicUsize, results: &mpsc
             return;
         }
         simulator.render_into(index, &mut sensor, &mut scan);
-        let written = write_image(&folder.join(image_name(simulator, index)), &scan.bytes);
+        let written = write_image(&folder.join(image_name(simulator, index)), STRIDE, AZIMUTHS, &scan.bytes);
         if results.send(written).is_err() {
             return;
         }
     }
-}
-
-/// An 8-bit grey PNG, one row an azimuth, compressed fast rather than well.
-fn write_image(path: &Path, bytes: &[u8]) -> Result<(), SimulatorError> {
-    let encoding = |source| SimulatorError::Encode { path: path.to_owned(), source };
-    let file = File::create(path).map_err(SimulatorError::write(path))?;
-    let mut buffer = BufWriter::new(file);
-    let mut encoder = png::Encoder::new(&mut buffer, STRIDE as u32, AZIMUTHS as u32);
-    encoder.set_color(png::ColorType::Grayscale);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(png::Compression::Fast);
-    let mut writer = encoder.write_header().map_err(encoding)?;
-    writer.write_image_data(bytes).map_err(encoding)?;
-    writer.finish().map_err(encoding)?;
-    buffer.flush().map_err(SimulatorError::write(path))
 }
