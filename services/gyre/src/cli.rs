@@ -3,6 +3,8 @@
 use std::{num::NonZeroUsize, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand};
+use gyre_evaluation::Part;
+use gyre_simulator::Fault;
 
 use crate::configuration::Rate;
 
@@ -31,6 +33,8 @@ pub enum Command {
     Evaluate(EvaluateArguments),
     /// Write a simulated recording in Oxford's format.
     Simulate(SimulateArguments),
+    /// Write a copy of a recording with some scans spoilt, to see what an odometry makes of them.
+    Spoil(SpoilArguments),
 }
 
 #[derive(Debug, Args)]
@@ -89,6 +93,10 @@ pub struct EvaluateArguments {
     /// How many motions make the stretches over which covariances are judged.
     #[arg(long, value_delimiter = ',', default_value = "1,4,16,64")]
     pub nees_lengths: Vec<NonZeroUsize>,
+    /// The part of the drive whose covariances are judged: all, or from A to B percent of its time as in 0..50. Scales that are set
+    /// on one part can be shown on another.
+    #[arg(long, value_name = "A..B", default_value = "all", value_parser = part)]
+    pub nees_part: Part,
     /// Standard deviation of the ground truth's x and y, m: added to the covariances that are judged.
     #[arg(long, default_value = "0", value_parser = sigma)]
     pub truth_sigma_m: f64,
@@ -112,8 +120,54 @@ pub struct SimulateArguments {
     pub seed: Option<u64>,
 }
 
+#[derive(Debug, Args)]
+pub struct SpoilArguments {
+    /// The dataset's folder. The copy has links to it, and needs it.
+    pub path: PathBuf,
+    /// What is done: noise, later (the powers of the scan ten later), turned (by a quarter), half-blank, dropped.
+    #[arg(long)]
+    pub fault: Fault,
+    /// Every so-manyth scan is spoilt, never the first.
+    #[arg(long, default_value = "20")]
+    pub every: NonZeroUsize,
+    /// Seed of the noise.
+    #[arg(long, default_value = "1")]
+    pub seed: u64,
+    /// Where to write the copy: an empty folder.
+    #[arg(long)]
+    pub out: PathBuf,
+}
+
 /// A standard deviation: a number, not below zero.
 fn sigma(text: &str) -> Result<f64, String> {
     let sigma = text.parse().ok().filter(|sigma: &f64| sigma.is_finite() && *sigma >= 0.0);
     sigma.ok_or_else(|| "a number of at least 0 is needed".to_owned())
+}
+
+/// `all`, or `A..B` in percent.
+fn part(text: &str) -> Result<Part, String> {
+    let share = |percent: &str| percent.parse::<f64>().ok().map(|percent| percent / 100.0);
+    let range = || {
+        let (from, to) = text.split_once("..")?;
+        Part::new(share(from)?, share(to)?)
+    };
+    match text {
+        "all" => Ok(Part::ALL),
+        _ => range().ok_or_else(|| "`all` or a range of percent from 0..100 is needed, as in 0..50".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_are_all_or_a_range_of_percent() {
+        assert_eq!(part("all"), Ok(Part::ALL));
+        assert_eq!(part("0..100"), Ok(Part::ALL));
+        assert_eq!(part("12.5..50").ok(), Part::new(0.125, 0.5));
+        for text in ["", "half", "50", "50..", "60..50", "0..101", "nan..50"] {
+            assert!(part(text).is_err(), "{text}");
+        }
+    }
 }

@@ -1,15 +1,16 @@
 //! `gyre evaluate`: a trajectory judged by ground truth.
 
-use std::{fs, path::Path, process::ExitCode};
+use std::{fs, process::ExitCode};
 
-use gyre_evaluation::{
-    Association, Bands, Coverage, Evaluation, EvaluationError, JudgedMotions, Motion, Nees, NeesOptions, Options,
-    TruthSigma, bands, nees, plot_bands, plot_errors, plot_trajectory,
-};
+use gyre_evaluation::{Evaluation, JudgedMotions, Motion, NeesOptions, Options, TruthSigma};
 use gyre_radar::{Trajectory, ground_truth::read_trajectory};
-use serde::Serialize;
 
-use crate::{Failure, cli::EvaluateArguments, odometry, print};
+use crate::{
+    Failure,
+    cli::EvaluateArguments,
+    judgement::{Judgement, judge, judge_motions},
+    odometry, print,
+};
 
 /// Prints how well an estimate fits the truth, as a table or as JSON, and draws both.
 pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
@@ -17,57 +18,22 @@ pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
     let truth = read_trajectory(&arguments.ground_truth)?;
     let evaluation = judge(&estimate, &truth, Options { step: arguments.step, ..Options::default() })?;
     let motions = judged_motions(arguments, &estimate, &truth, &evaluation)?;
-    let truth_sigma =
-        TruthSigma { position_m: arguments.truth_sigma_m, yaw_rad: arguments.truth_sigma_deg.to_radians() };
-    let options = NeesOptions { lengths: arguments.nees_lengths.clone(), truth_sigma };
-    let nees = motions.as_ref().map(|motions| nees(motions, &options));
-    show(arguments.json, &evaluation, nees)?;
+    let judgement = Judgement::new(evaluation, motions.as_ref(), &nees_options(arguments));
+    match arguments.json {
+        true => print::line(serde_json::to_string_pretty(&judgement)?)?,
+        false => print::line(format_args!("{judgement:#}"))?,
+    }
     if let Some(directory) = &arguments.plots {
         fs::create_dir_all(directory).map_err(|error| format!("cannot make {}: {error}", directory.display()))?;
-        let bands = motions.map(|motions| bands(&motions, truth_sigma));
-        draw(directory, &evaluation, bands.as_ref())?;
+        judgement.draw(directory)?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// Compares by time where both have stamps, else pose by pose.
-pub fn judge(estimate: &Trajectory, truth: &Trajectory, options: Options) -> Result<Evaluation, EvaluationError> {
-    match (&estimate.stamp_ns, &truth.stamp_ns) {
-        (Some(_), Some(_)) => gyre_evaluation::evaluate(timed(estimate), timed(truth), &options),
-        _ => {
-            let options = Options { association: Association::Index, ..options };
-            gyre_evaluation::evaluate(untimed(estimate), untimed(truth), &options)
-        }
-    }
-}
-
-/// Holds motions against the truth by which the trajectory that they make was judged.
-pub fn judge_motions(
-    motions: &[Motion],
-    truth: &Trajectory,
-    evaluation: &Evaluation,
-) -> Result<JudgedMotions, Failure> {
-    let Coverage::Time { max_gap_ns, .. } = evaluation.coverage else {
-        return Err("covariances are judged by time, and estimate or ground truth has no stamps".into());
-    };
-    let axes = &evaluation.axes;
-    if axes.truth_lacks_heading || axes.y_negated || axes.heading_negated {
-        return Err("covariances need a ground truth with heading and with axes as the estimate's".into());
-    }
-    Ok(JudgedMotions::new(motions, timed(truth), max_gap_ns)?)
-}
-
-/// Draws all there is: trajectory, errors where the truth has heading, bands where there are covariances.
-pub fn draw(directory: &Path, evaluation: &Evaluation, bands: Option<&Bands>) -> Result<(), Failure> {
-    let matched = &evaluation.matched;
-    plot_trajectory(&directory.join("trajectory.svg"), matched.estimate(), Some(matched.truth()))?;
-    if evaluation.rpe.is_some() {
-        plot_errors(&directory.join("errors.svg"), evaluation)?;
-    }
-    if let Some(bands) = bands {
-        plot_bands(&directory.join("bands.svg"), bands)?;
-    }
-    Ok(())
+fn nees_options(arguments: &EvaluateArguments) -> NeesOptions {
+    let truth_sigma =
+        TruthSigma { position_m: arguments.truth_sigma_m, yaw_rad: arguments.truth_sigma_deg.to_radians() };
+    NeesOptions { lengths: arguments.nees_lengths.clone(), truth_sigma }
 }
 
 /// The motions of the odometry that was named, or of the one beside the estimate if it fits.
@@ -77,15 +43,16 @@ fn judged_motions(
     truth: &Trajectory,
     evaluation: &Evaluation,
 ) -> Result<Option<JudgedMotions>, Failure> {
+    let judge = |motions: &[Motion]| judge_motions(arguments.nees_part.of(motions), truth, evaluation);
     if let Some(path) = &arguments.odometry {
-        return judge_motions(&odometry::read(path)?, truth, evaluation).map(Some);
+        return judge(&odometry::read(path)?).map(Some);
     }
     let beside = arguments.estimate.with_file_name("odometry.csv");
     if !beside.is_file() {
         return Ok(None);
     }
     let judged = odometry::read(&beside).and_then(|motions| match has_stamps(estimate, &motions) {
-        true => judge_motions(&motions, truth, evaluation),
+        true => judge(&motions),
         false => Err("its stamps are not the estimate's".into()),
     });
     let note = |reason: &Failure| print::note(format_args!("{} is not judged: {reason}", beside.display()));
@@ -102,31 +69,6 @@ fn has_stamps(trajectory: &Trajectory, motions: &[Motion]) -> bool {
         let next = stamps.partition_point(|stamp| *stamp < motion.to_ns.saturating_sub(ROUNDING_NS));
         stamps.get(next).is_some_and(|stamp| *stamp <= motion.to_ns.saturating_add(ROUNDING_NS))
     })
-}
-
-/// What is printed as JSON.
-#[derive(Serialize)]
-struct Judgement<'a> {
-    #[serde(flatten)]
-    evaluation: &'a Evaluation,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    nees: Option<Nees>,
-}
-
-fn show(json: bool, evaluation: &Evaluation, nees: Option<Nees>) -> Result<(), Failure> {
-    if json {
-        return print::line(serde_json::to_string_pretty(&Judgement { evaluation, nees })?);
-    }
-    print::line(format_args!("{evaluation:#}"))?;
-    nees.map_or(Ok(()), |nees| print::line(format_args!("\n{nees}")))
-}
-
-fn timed(trajectory: &Trajectory) -> gyre_evaluation::Trajectory<'_> {
-    gyre_evaluation::Trajectory::new(trajectory.stamp_ns.as_deref().unwrap_or_default(), &trajectory.poses)
-}
-
-fn untimed(trajectory: &Trajectory) -> gyre_evaluation::Trajectory<'_> {
-    gyre_evaluation::Trajectory::untimed(&trajectory.poses)
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ mod cli;
 mod configuration;
 mod evaluate;
 mod inspect;
+mod judgement;
 mod latency;
 mod odometry;
 mod preflight;
@@ -14,6 +15,7 @@ mod progress;
 mod results;
 mod run;
 mod simulate;
+mod spoil;
 mod stage;
 mod summary;
 
@@ -33,6 +35,7 @@ fn main() -> ExitCode {
         Command::Inspect(arguments) => inspect::inspect(&arguments),
         Command::Evaluate(arguments) => evaluate::evaluate(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
+        Command::Spoil(arguments) => spoil::spoil(&arguments),
     };
     match result {
         Ok(code) => code,

@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use gyre_evaluation::{Evaluation, Options, TruthSigma, bands, plot_trajectory};
+use gyre_evaluation::{NeesOptions, Options, plot_trajectory};
 use gyre_messages::{PoseHeader, flag};
 use gyre_radar::{
     Trajectory,
@@ -13,7 +13,7 @@ use gyre_stage::supervise::Report;
 use crate::{
     Failure,
     configuration::Configuration,
-    evaluate,
+    judgement::{Judgement, judge, judge_motions},
     latency::Latency,
     odometry, print,
     summary::{Counts, Session, Summary},
@@ -34,46 +34,36 @@ pub fn write(
     let mut tum = Vec::new();
     write_tum(&trajectory, &mut tum)?;
     save(out, "trajectory.tum", tum)?;
-    let judged = judge(configuration, &trajectory);
-    draw(out, poses, &trajectory, judged.as_ref())?;
+    let judgement = judged(configuration, poses, &trajectory);
+    draw(out, &trajectory, judgement.as_ref())?;
     let latency = Latency::of(&poses[session.resumed.min(poses.len())..]);
     save(out, "latency.json", serde_json::to_string_pretty(&latency)?)?;
     let counts = Counts::of(poses, end);
-    let evaluation = judged.map(|judged| judged.evaluation);
-    let summary = Summary::new(configuration, out, session, counts, latency, evaluation, report);
+    let summary = Summary::new(configuration, out, session, counts, latency, judgement, report);
     save(out, "summary.json", serde_json::to_string_pretty(&summary)?)?;
     Ok(summary)
 }
 
-/// A trajectory's ground truth, and how well it fits.
-struct Judged {
-    truth: Trajectory,
-    evaluation: Evaluation,
-}
-
-/// Judges the trajectory by the dataset's ground truth, where there is one that fits.
-fn judge(configuration: &Configuration, trajectory: &Trajectory) -> Option<Judged> {
-    if trajectory.poses.len() < 2 {
+/// Judges the trajectory and its covariances by the dataset's ground truth, where there is one that fits.
+fn judged(configuration: &Configuration, poses: &[PoseHeader], trajectory: &Trajectory) -> Option<Judgement> {
+    if poses.len() < 2 {
         return None;
     }
     let given = configuration.run.ground_truth.clone();
     let path = given.or_else(|| find_ground_truth(&configuration.source.data))?;
-    let by = |truth: Trajectory| match evaluate::judge(trajectory, &truth, Options::default()) {
-        Ok(evaluation) => Ok(Judged { truth, evaluation }),
-        Err(error) => Err(error.to_string()),
+    let by = |truth: Trajectory| -> Result<Judgement, Failure> {
+        let evaluation = judge(trajectory, &truth, Options::default())?;
+        let motions = judge_motions(&odometry::motions(poses), &truth, &evaluation)
+            .inspect_err(|reason| print::note(format_args!("no NEES and no bands.svg: {reason}")));
+        Ok(Judgement::new(evaluation, motions.ok().as_ref(), &NeesOptions::default()))
     };
-    let judged = read_trajectory(&path).map_err(|error| error.to_string()).and_then(by);
+    let judged = read_trajectory(&path).map_err(Failure::from).and_then(by);
     judged.inspect_err(|reason| print::note(format_args!("not judged by {}: {reason}", path.display()))).ok()
 }
 
-fn draw(out: &Path, poses: &[PoseHeader], trajectory: &Trajectory, judged: Option<&Judged>) -> Result<(), Failure> {
-    match judged {
-        Some(Judged { truth, evaluation }) => {
-            let motions = evaluate::judge_motions(&odometry::motions(poses), truth, evaluation)
-                .inspect_err(|reason| print::note(format_args!("no bands.svg: {reason}")));
-            let bands = motions.ok().map(|motions| bands(&motions, TruthSigma::default()));
-            evaluate::draw(out, evaluation, bands.as_ref())
-        }
+fn draw(out: &Path, trajectory: &Trajectory, judgement: Option<&Judgement>) -> Result<(), Failure> {
+    match judgement {
+        Some(judgement) => judgement.draw(out),
         None if trajectory.poses.is_empty() => Ok(()),
         None => Ok(plot_trajectory(&out.join("trajectory.svg"), &trajectory.poses, None)?),
     }

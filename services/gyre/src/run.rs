@@ -163,7 +163,9 @@ fn prepare(configuration: &Configuration, out: &Path, fresh: bool) -> Result<usi
     if poses.is_empty() || complete || fresh {
         let _ = fs::remove_file(journal);
         // A new run may have no truth to be drawn against: nothing of the earlier one must look like its own.
-        for result in [LAST_RESULT, "log.jsonl", "odometry.csv", "trajectory.tum", "trajectory.svg", "errors.svg"] {
+        for result in
+            [LAST_RESULT, "log.jsonl", "odometry.csv", "trajectory.tum", "trajectory.svg", "errors.svg", "bands.svg"]
+        {
             let _ = fs::remove_file(out.join(result));
         }
         return Ok(0);

@@ -2,7 +2,6 @@
 
 use std::{collections::BTreeMap, fmt, fs, path::Path, thread, time::Duration};
 
-use gyre_evaluation::Evaluation;
 use gyre_messages::{Footprint, PoseHeader, Stage, flag};
 use gyre_stage::{
     Statistics,
@@ -12,6 +11,7 @@ use serde::Serialize;
 
 use crate::{
     configuration::{Configuration, Mode, Rate},
+    judgement::Judgement,
     latency::{Latency, Percentiles},
 };
 
@@ -38,6 +38,8 @@ pub struct Counts {
     pub dropped: u64,
     /// Scans that could not be read.
     pub unreadable: u64,
+    /// Scans that the recording lacks, by the gaps in its times.
+    pub missing: u64,
     /// Places where the chain of motions starts anew, after the first.
     pub breaks: u64,
 }
@@ -55,9 +57,21 @@ impl Counts {
             processed,
             dropped: published.saturating_sub(processed),
             unreadable: seen.saturating_sub(published),
+            missing: missing(poses),
             breaks: starts.saturating_sub(1),
         }
     }
+}
+
+/// How many scans more fit between the scans of each motion than their numbers say.
+fn missing(poses: &[PoseHeader]) -> u64 {
+    let turns = |pose: &PoseHeader| pose.item.scan.saturating_sub(pose.item.previous_scan).max(1);
+    let motions = || poses.iter().filter(|pose| !pose.item.is(flag::BREAK));
+    let mut periods: Vec<i64> = motions().map(|pose| pose.motion.interval_ns / turns(pose) as i64).collect();
+    periods.sort_unstable();
+    let Some(&period) = periods.get(periods.len() / 2).filter(|period| **period > 0) else { return 0 };
+    let fit = |pose: &PoseHeader| (pose.motion.interval_ns as f64 / period as f64).round() as u64;
+    motions().map(|pose| fit(pose).saturating_sub(turns(pose))).sum()
 }
 
 /// All that is worth knowing of a run.
@@ -84,7 +98,8 @@ pub struct Summary {
     /// What each stage counted in its last life.
     stages: BTreeMap<String, Statistics>,
     latency: Latency,
-    evaluation: Option<Evaluation>,
+    /// As `gyre evaluate --json` prints it.
+    evaluation: Option<Judgement>,
 }
 
 #[derive(Debug, Serialize)]
@@ -115,7 +130,7 @@ impl Summary {
         session: &Session<'_>,
         counts: Counts,
         latency: Latency,
-        evaluation: Option<Evaluation>,
+        evaluation: Option<Judgement>,
         report: Option<&Report>,
     ) -> Self {
         let wall_s = session.wall.as_secs_f64();
@@ -158,8 +173,8 @@ impl fmt::Display for Summary {
         )?;
         writeln!(
             f,
-            "published {}  dropped {}  unreadable {}  breaks {}",
-            c.published, c.dropped, c.unreadable, c.breaks
+            "published {}  dropped {}  unreadable {}  missing {}  breaks {}",
+            c.published, c.dropped, c.unreadable, c.missing, c.breaks
         )?;
         if !self.restarts.is_empty() {
             let restarts: Vec<_> = self.restarts.iter().map(|(stage, times)| format!("{stage} {times}")).collect();
@@ -208,7 +223,7 @@ fn row(f: &mut fmt::Formatter<'_>, name: &str, p: &Percentiles) -> fmt::Result {
 
 #[cfg(test)]
 mod tests {
-    use gyre_messages::Item;
+    use gyre_messages::{Item, MotionEstimate};
 
     use super::*;
 
@@ -220,6 +235,20 @@ mod tests {
         };
         let end = pose(3, 9, 10);
         let counts = Counts::of(&[pose(0, 0, 0), pose(1, 3, 3), pose(2, 7, 8)], Some(&end));
-        assert_eq!(counts, Counts { published: 9, processed: 3, dropped: 6, unreadable: 1, breaks: 0 });
+        assert_eq!(counts, Counts { published: 9, processed: 3, dropped: 6, unreadable: 1, ..Counts::default() });
+    }
+
+    #[test]
+    fn scans_that_the_recording_lacks_show_in_its_times_and_skipped_ones_do_not_count() {
+        let pose = |scan, previous_scan, interval_ms: i64| PoseHeader {
+            item: Item { scan, previous_scan, flags: if scan == 0 { flag::BREAK } else { 0 }, ..Item::default() },
+            motion: MotionEstimate { interval_ns: interval_ms * 1_000_000, ..MotionEstimate::default() },
+            ..PoseHeader::default()
+        };
+        let mut poses = vec![pose(0, 0, 0), pose(1, 0, 251), pose(2, 1, 249), pose(4, 2, 500), pose(5, 4, 250)];
+        assert_eq!(missing(&poses), 0);
+        poses.extend([pose(6, 5, 500), pose(8, 6, 1_000)]);
+        assert_eq!(missing(&poses), 1 + 2);
+        assert_eq!(missing(&poses[..1]), 0);
     }
 }

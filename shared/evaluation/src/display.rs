@@ -110,6 +110,7 @@ impl fmt::Display for Rpe {
 }
 
 impl fmt::Display for Nees {
+    /// A table of all stretches; the alternate form has lines for each half of the time, too.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "covariance    {} motions; left out: {} without truth, ", self.motions, self.without_truth)?;
         writeln!(f, "{} without covariance; truth: {}", self.without_covariance, self.truth_sigma)?;
@@ -125,12 +126,12 @@ impl fmt::Display for Nees {
 }
 
 impl fmt::Display for NeesLength {
-    /// Lines that begin with a line break: all stretches, and each half.
+    /// Lines that begin with a line break: all stretches, and in the alternate form each half.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let halves =
-            [("all", Some(&self.all)), ("first", self.first_half.as_ref()), ("second", self.second_half.as_ref())];
-        for (half, figures) in halves {
-            let Some(figures) = figures else { continue };
+        write!(f, "\n{:8}{:>10}{}", self.motions, "all", self.all)?;
+        let halves = [("first", &self.first_half), ("second", &self.second_half)];
+        let halves = if f.alternate() { &halves[..] } else { &[] };
+        for (half, figures) in halves.iter().filter_map(|(half, figures)| Some((half, figures.as_ref()?))) {
             write!(f, "\n{:8}{half:>10}{figures}", self.motions)?;
         }
         Ok(())

@@ -9,7 +9,7 @@
 //! - [`mod@associate`]: which pose of the estimate is held against which pose of the truth;
 //! - [`mirror`]: axes that run the other way, found and undone;
 //! - [`mod@ate`], [`mod@kitti`], [`mod@seg`], [`mod@rpe`]: one metric each, on [`MatchedPoses`];
-//! - [`motions`]: reported motions with covariances, each beside its truth;
+//! - [`motions`]: reported motions with covariances, all or those of a part, each beside its truth;
 //! - [`mod@nees`], [`mod@bands`]: whether these covariances are honest, as figures and over time;
 //! - [`plot`]: trajectory, errors and bands as SVG.
 //!
@@ -52,7 +52,7 @@ pub use error::{EvaluationError, Side};
 pub use kitti::{Kitti, kitti};
 pub use matched::MatchedPoses;
 pub use mirror::{Axes, HeadingFault};
-pub use motions::{JudgedMotions, Motion};
+pub use motions::{JudgedMotions, Motion, Part};
 pub use nees::{Nees, NeesFigure, NeesFigures, NeesLength, NeesOptions, nees};
 pub use plot::{PlotError, plot_bands, plot_errors, plot_trajectory};
 pub use report::{Evaluation, Options, evaluate};

@@ -17,6 +17,37 @@ pub struct Motion {
     pub estimate: UncertainMotion,
 }
 
+/// A part of a drive: shares of the time from the first motion's beginning to the last one's end. What is calibrated on one part
+/// is shown on another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Part {
+    from: f64,
+    to: f64,
+}
+
+impl Part {
+    /// The whole drive.
+    pub const ALL: Self = Self { from: 0.0, to: 1.0 };
+
+    /// From one share of the time to another; `None` unless 0 <= `from` < `to` <= 1.
+    pub fn new(from: f64, to: f64) -> Option<Self> {
+        (0.0 <= from && from < to && to <= 1.0).then_some(Self { from, to })
+    }
+
+    /// The motions, given in the order of their times, that begin within this part: those of adjoining parts share none and leave
+    /// none out.
+    pub fn of<'m>(&self, motions: &'m [Motion]) -> &'m [Motion] {
+        let (Some(first), Some(last)) = (motions.first(), motions.last()) else { return motions };
+        let duration_ns = last.to_ns.saturating_sub(first.from_ns) as f64;
+        let before = |share: f64| {
+            motions
+                .partition_point(|motion| (motion.from_ns.saturating_sub(first.from_ns) as f64) < share * duration_ns)
+        };
+        // motions that do not run in order have no parts; whoever judges them says so
+        motions.get(before(self.from)..before(self.to)).unwrap_or(motions)
+    }
+}
+
 /// Motions in unbroken chains, with the truth at every joint that has one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JudgedMotions {
@@ -171,6 +202,19 @@ mod tests {
         assert_eq!((found.chains.len(), found.without_truth), (1, 3));
         assert_eq!(found.chains[0].true_motion(0, 4), Some(pose(40.0, 0.0, 0.0)));
         assert_eq!(found.chains[0].true_motion(1, 2), None);
+    }
+
+    #[test]
+    fn adjoining_parts_share_no_motion_and_leave_none_out() {
+        let motions = [0, 10, 20, 30, 45].map(|t| motion(t, t + 10, 1.0));
+        let starts =
+            |from, to| Part::new(from, to).unwrap().of(&motions).iter().map(|m| m.from_ns / MS).collect::<Vec<_>>();
+        assert_eq!((starts(0.0, 0.5), starts(0.5, 1.0)), (vec![0, 10, 20], vec![30, 45]));
+        assert_eq!(Part::ALL.of(&motions), motions);
+        assert_eq!(starts(0.4, 0.5), Vec::<i64>::new());
+        for (from, to) in [(0.5, 0.5), (0.6, 0.5), (-0.1, 0.5), (0.0, 1.1), (f64::NAN, 1.0)] {
+            assert_eq!(Part::new(from, to), None);
+        }
     }
 
     #[test]

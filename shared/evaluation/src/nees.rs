@@ -24,7 +24,7 @@ impl Default for NeesOptions {
     }
 }
 
-/// How honest the covariances are. `Display` is a table.
+/// How honest the covariances are. `Display` is a table, the alternate form a longer one.
 ///
 /// The error of a stretch of motions is e = (x, y, yaw) of the estimate less those of the truth, along the axes of the
 /// stretch's first frame; P is the covariance composed over the stretch, plus the truth's own. The normalised error squared

@@ -1,0 +1,91 @@
+//! A trajectory held against ground truth, as `gyre run` and `gyre evaluate` both report it: how far off it is, and how honest its
+//! covariances are.
+
+use std::{fmt, path::Path};
+
+use gyre_evaluation::{
+    Association, Bands, Coverage, Evaluation, EvaluationError, JudgedMotions, Motion, Nees, NeesOptions, Options,
+    bands, nees, plot_bands, plot_errors, plot_trajectory,
+};
+use gyre_radar::Trajectory;
+use serde::Serialize;
+
+use crate::Failure;
+
+/// As JSON the evaluation with `nees` beside its figures. `Display` is a table, the alternate form a longer one.
+#[derive(Debug, Serialize)]
+pub struct Judgement {
+    #[serde(flatten)]
+    evaluation: Evaluation,
+    /// `None`: there are no covariances, or the truth cannot judge them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    nees: Option<Nees>,
+    #[serde(skip)]
+    bands: Option<Bands>,
+}
+
+impl Judgement {
+    /// Adds what the motions' covariances are worth.
+    pub fn new(evaluation: Evaluation, motions: Option<&JudgedMotions>, options: &NeesOptions) -> Self {
+        let nees = motions.map(|motions| nees(motions, options));
+        let bands = motions.map(|motions| bands(motions, options.truth_sigma));
+        Self { evaluation, nees, bands }
+    }
+
+    /// Draws all there is: trajectory, errors where the truth has heading, bands where there are covariances.
+    pub fn draw(&self, directory: &Path) -> Result<(), Failure> {
+        let matched = &self.evaluation.matched;
+        plot_trajectory(&directory.join("trajectory.svg"), matched.estimate(), Some(matched.truth()))?;
+        if self.evaluation.rpe.is_some() {
+            plot_errors(&directory.join("errors.svg"), &self.evaluation)?;
+        }
+        if let Some(bands) = &self.bands {
+            plot_bands(&directory.join("bands.svg"), bands)?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Judgement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.evaluation.fmt(f)?;
+        let Some(nees) = &self.nees else { return Ok(()) };
+        write!(f, "\n\n")?;
+        nees.fmt(f)
+    }
+}
+
+/// Compares by time where both have stamps, else pose by pose.
+pub fn judge(estimate: &Trajectory, truth: &Trajectory, options: Options) -> Result<Evaluation, EvaluationError> {
+    match (&estimate.stamp_ns, &truth.stamp_ns) {
+        (Some(_), Some(_)) => gyre_evaluation::evaluate(timed(estimate), timed(truth), &options),
+        _ => {
+            let options = Options { association: Association::Index, ..options };
+            gyre_evaluation::evaluate(untimed(estimate), untimed(truth), &options)
+        }
+    }
+}
+
+/// Holds motions against the truth by which the trajectory that they make was judged.
+pub fn judge_motions(
+    motions: &[Motion],
+    truth: &Trajectory,
+    evaluation: &Evaluation,
+) -> Result<JudgedMotions, Failure> {
+    let Coverage::Time { max_gap_ns, .. } = evaluation.coverage else {
+        return Err("covariances are judged by time, and estimate or ground truth has no stamps".into());
+    };
+    let axes = &evaluation.axes;
+    if axes.truth_lacks_heading || axes.y_negated || axes.heading_negated {
+        return Err("covariances need a ground truth with heading and with axes as the estimate's".into());
+    }
+    Ok(JudgedMotions::new(motions, timed(truth), max_gap_ns)?)
+}
+
+fn timed(trajectory: &Trajectory) -> gyre_evaluation::Trajectory<'_> {
+    gyre_evaluation::Trajectory::new(trajectory.stamp_ns.as_deref().unwrap_or_default(), &trajectory.poses)
+}
+
+fn untimed(trajectory: &Trajectory) -> gyre_evaluation::Trajectory<'_> {
+    gyre_evaluation::Trajectory::untimed(&trajectory.poses)
+}
