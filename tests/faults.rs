@@ -126,3 +126,16 @@ fn a_spoilt_scan_is_a_scan_all_the_same() {
     assert_eq!(odometry::rows(&run.complete()).len(), recording::SCANS - 1);
     assert_eq!((&run.summary()["missing"], &run.summary()["unreadable"]), (&Value::from(0), &Value::from(0)));
 }
+
+#[test]
+fn what_cannot_be_spoilt_is_told_in_a_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    let spoil = |data: &Path, out: &str| {
+        let mut command = gyre();
+        command.arg("spoil").arg(data).args(["--fault", "noise", "--out"]).arg(folder.path().join(out));
+        Ended::of(command)
+    };
+    spoil(&folder.path().join("none"), "new").refused_with(&["none", "no such folder"]);
+    spoilt_small(folder.path(), "turned");
+    spoil(recording::small(), "turned").refused_with(&["turned holds", "give an empty folder"]);
+}

@@ -85,6 +85,20 @@ fn the_trajectory_follows_the_ground_truth() {
 }
 
 #[test]
+fn a_run_without_truth_leaves_no_judgement_of_an_earlier_one() {
+    let judged = Run::of_recording();
+    judged.complete();
+    let copy = recording::copy(recording::SCANS);
+    fs::remove_dir_all(copy.path().join("gt")).unwrap();
+    let unjudged = Run::of_recording_named(copy.path().to_str().unwrap()).into(judged.out());
+    unjudged.complete();
+    assert!(unjudged.summary()["evaluation"].is_null());
+    for plot in ["errors.svg", "bands.svg"] {
+        assert!(!judged.out().join(plot).exists(), "{plot}");
+    }
+}
+
+#[test]
 fn a_repetition_gives_the_same_bytes() {
     let run = Run::of_recording();
     assert_eq!(run.complete(), undisturbed());

@@ -116,8 +116,8 @@ pub fn write_faulty(source: &Path, out: &Path, plan: &FaultPlan) -> Result<Vec<u
     let hits: Vec<usize> = plan.hits(dataset.len()).collect();
     let spoilt: BTreeSet<OsString> =
         hits.iter().filter_map(|&i| Some(dataset.file(i).file_name()?.to_owned())).collect();
-    let images = dataset.file(0).parent().and_then(|folder| folder.strip_prefix(&source).ok()).unwrap_or(Path::new(""));
-    let images = images.to_owned();
+    let folder = dataset.file(0).parent().unwrap_or(&source);
+    let images = folder.strip_prefix(&source).unwrap_or(Path::new("")).to_owned();
     require_empty(out)?;
     link_around(&source, out, &images, &spoilt)?;
     if plan.fault != Fault::Dropped {
