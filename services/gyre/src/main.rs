@@ -7,6 +7,7 @@ mod configuration;
 mod evaluate;
 mod inspect;
 mod latency;
+mod machine;
 mod odometry;
 mod preflight;
 mod print;
@@ -16,6 +17,7 @@ mod run;
 mod simulate;
 mod stage;
 mod summary;
+mod tables;
 
 use std::process::ExitCode;
 
@@ -32,6 +34,7 @@ fn main() -> ExitCode {
         Command::Run(arguments) => run::run(&arguments),
         Command::Inspect(arguments) => inspect::inspect(&arguments),
         Command::Evaluate(arguments) => evaluate::evaluate(&arguments),
+        Command::Tables(arguments) => tables::tables(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
     };
     match result {
