@@ -45,6 +45,8 @@ impl Peer {
         let mut command = Command::new(&self.python);
         command.arg(&self.script).args(["--threads", "1", "--sizes", &n.to_string()]);
         command.args(["--passes", &passes.to_string(), "--rotations", &angles.to_string(), "--json"]).arg(report);
+        // What an earlier run left must not pass for this one's.
+        let _ = fs::remove_file(report);
         let output = command.output().map_err(|error| failed(format!("cannot be started: {error}")))?;
         if !output.status.success() {
             let told = String::from_utf8_lossy(&output.stderr);

@@ -120,7 +120,7 @@ mod tests {
         for (name, file) in [("raw", "mbym.toml"), ("f-raw, line 14", "fast-mbym.toml")] {
             let of_file = Configuration::read(&configs.join(file), &[]).unwrap();
             let mut radiate = Configuration::read(&configs.join("radiate.toml"), &row(name).changes()).unwrap();
-            radiate.dataset = of_file.dataset.clone();
+            radiate.dataset = of_file.dataset;
             assert_eq!(radiate, of_file, "{name}");
         }
     }

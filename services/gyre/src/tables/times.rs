@@ -81,12 +81,12 @@ pub fn measure(
     out: &Path,
 ) -> Result<Times, Failure> {
     let scans = sequence.scans(SCANS)?;
-    let mut timers = Vec::new();
-    for &n in sizes {
-        let of_line = |line: &Line| line.row.map(|row| Timer::new(sequence, row, n, &scans)).transpose();
-        let timed: Result<Vec<_>, Failure> = lines(Figures::has_times).iter().map(of_line).collect();
-        timers.push((n, timed?));
-    }
+    let at_size = |&n: &usize| {
+        let timed = |line: Line| Ok((line, line.row.map(|row| Timer::new(sequence, row, n, &scans)).transpose()?));
+        let timed: Result<Vec<_>, Failure> = lines(Figures::has_times).into_iter().map(timed).collect();
+        Ok((n, timed?))
+    };
+    let sizes: Result<Vec<_>, Failure> = sizes.iter().map(at_size).collect();
     let angles = sequence.configuration(&[])?.exhaustive.candidates();
     let both = 2 * passes;
     let mut times = Times {
@@ -96,20 +96,19 @@ pub fn measure(
         peer_torch: None,
         lines: Vec::new(),
     };
-    for (n, mut timers) in timers {
-        half(&mut timers, passes)?;
+    for (n, mut timed) in sizes? {
+        half(&mut timed, passes)?;
         let report = out.join(format!("peer-{n}.json"));
         let theirs = peer.map(|peer| peer.time(n, both, angles, &report)).transpose()?;
-        half(&mut timers, passes)?;
-        let lines = lines(Figures::has_times).into_iter().zip(timers);
-        times.lines.extend(lines.map(|(line, timer)| TimeLine::new(n, &line, timer, theirs.as_ref())));
+        half(&mut timed, passes)?;
+        times.lines.extend(timed.into_iter().map(|(line, timer)| TimeLine::new(n, &line, timer, theirs.as_ref())));
         times.peer_torch = theirs.map(|theirs| theirs.torch);
     }
     Ok(times)
 }
 
-fn half(timers: &mut [Option<Timer>], passes: usize) -> Result<(), ShapeError> {
-    timers.iter_mut().flatten().try_for_each(|timer| timer.half(passes))
+fn half(timed: &mut [(Line, Option<Timer>)], passes: usize) -> Result<(), ShapeError> {
+    timed.iter_mut().filter_map(|(_, timer)| timer.as_mut()).try_for_each(|timer| timer.half(passes))
 }
 
 impl TimeLine {
@@ -130,7 +129,8 @@ impl TimeLine {
 /// From the raster of a scan (the sequence number is the first argument) and that of the scan before to a motion.
 type Search = Box<dyn FnMut(u64, Pair<'_>) -> Result<MotionEstimate, ShapeError>>;
 
-/// The search of a configuration, as its stages do it. A scan's spectrum is kept for the next pair.
+/// The search of a configuration, as its stages do it between masking and the pose. A scan's spectrum is kept for the next
+/// pair.
 fn search(configuration: &Configuration) -> Result<Search, ConfigError> {
     let raster = &configuration.raster;
     Ok(match configuration.search.kind {
