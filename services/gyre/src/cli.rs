@@ -31,6 +31,8 @@ pub enum Command {
     Inspect(InspectArguments),
     /// Judge a trajectory by ground truth.
     Evaluate(EvaluateArguments),
+    /// Print the papers' tables for this machine: times of the searches, and the accuracy that they reach.
+    Tables(TablesArguments),
     /// Write a simulated recording in Oxford's format.
     Simulate(SimulateArguments),
     /// Write a copy of a recording with some scans spoilt, to see what an odometry makes of them.
@@ -103,6 +105,31 @@ pub struct EvaluateArguments {
     /// Standard deviation of the ground truth's heading, degrees.
     #[arg(long, default_value = "0", value_parser = sigma)]
     pub truth_sigma_deg: f64,
+}
+
+#[derive(Debug, Args)]
+pub struct TablesArguments {
+    /// A sequence's configuration; one for each --data, in the same order.
+    #[arg(long = "config", required = true)]
+    pub configurations: Vec<PathBuf>,
+    /// A sequence's folder; may be repeated. Times are measured on scans of the first.
+    #[arg(long, required = true)]
+    pub data: Vec<PathBuf>,
+    /// Where tables.md, tables.json and all runs go.
+    #[arg(long, default_value = "out/tables")]
+    pub out: PathBuf,
+    /// Rasters' sides whose times are measured, cells.
+    #[arg(long, value_delimiter = ',', default_value = "127,255,511")]
+    pub sizes: Vec<usize>,
+    /// Timed passes of each search, once before the peer and once after it.
+    #[arg(long, default_value = "25")]
+    pub passes: NonZeroUsize,
+    /// A Python interpreter with torch: the peer is timed between the two.
+    #[arg(long, requires = "peer_script")]
+    pub peer: Option<PathBuf>,
+    /// The peer's program.
+    #[arg(long, requires = "peer")]
+    pub peer_script: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

@@ -8,6 +8,7 @@ mod evaluate;
 mod inspect;
 mod judgement;
 mod latency;
+mod machine;
 mod odometry;
 mod preflight;
 mod print;
@@ -18,6 +19,7 @@ mod simulate;
 mod spoil;
 mod stage;
 mod summary;
+mod tables;
 
 use std::process::ExitCode;
 
@@ -34,6 +36,7 @@ fn main() -> ExitCode {
         Command::Run(arguments) => run::run(&arguments),
         Command::Inspect(arguments) => inspect::inspect(&arguments),
         Command::Evaluate(arguments) => evaluate::evaluate(&arguments),
+        Command::Tables(arguments) => tables::tables(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Spoil(arguments) => spoil::spoil(&arguments),
     };

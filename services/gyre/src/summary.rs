@@ -1,6 +1,6 @@
 //! `summary.json`, and the same as a table.
 
-use std::{collections::BTreeMap, fmt, fs, path::Path, thread, time::Duration};
+use std::{collections::BTreeMap, fmt, path::Path, time::Duration};
 
 use gyre_messages::{Footprint, PoseHeader, Stage, flag};
 use gyre_stage::{
@@ -13,6 +13,7 @@ use crate::{
     configuration::{Configuration, Mode, Rate},
     judgement::Judgement,
     latency::{Latency, Percentiles},
+    machine::Machine,
 };
 
 /// This session of a run.
@@ -100,26 +101,6 @@ pub struct Summary {
     latency: Latency,
     /// As `gyre evaluate --json` prints it.
     evaluation: Option<Judgement>,
-}
-
-#[derive(Debug, Serialize)]
-struct Machine {
-    processor: String,
-    cores: usize,
-}
-
-impl Machine {
-    fn this() -> Self {
-        let model = |text: String| {
-            let line = text.lines().find(|line| line.starts_with("model name"))?;
-            Some(line.split_once(':')?.1.trim().to_owned())
-        };
-        let processor = fs::read_to_string("/proc/cpuinfo").ok().and_then(model);
-        Self {
-            processor: processor.unwrap_or_else(|| std::env::consts::ARCH.to_owned()),
-            cores: thread::available_parallelism().map_or(1, usize::from),
-        }
-    }
 }
 
 impl Summary {

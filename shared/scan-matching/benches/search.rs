@@ -1,15 +1,11 @@
-//! Times of the search on this machine, one thread, medians: the transforms that no search of this form avoids, each
-//! step, and the whole beside the peer in PyTorch.
-//!
-//! `cargo bench -p gyre-scan-matching`; with `GYRE_PEER_PYTHON` (an interpreter with torch) and `GYRE_PEER` (the path
-//! of `fmbym_torch.py`) set, the peer runs between two passes of ours and the ratios are printed.
+//! Times of the search on this machine, one thread, medians: the transforms that no search of this form avoids, and each
+//! step. `gyre tables` has the whole beside the papers and a peer.
 #![allow(clippy::unwrap_used)]
 
 #[path = "../tests/common/mod.rs"]
 mod common;
 
 use std::hint::black_box;
-use std::process::Command;
 use std::time::Instant;
 
 use common::{Motion, pair};
@@ -23,21 +19,13 @@ use rustfft::num_complex::Complex32;
 
 const SIZES: [usize; 3] = [127, 255, 511];
 const REACH_M: f64 = 12.0;
-/// Angles that the peer's `raw` tries.
-const PEER_ROTATIONS: f64 = 31.0;
 const PASSES: usize = 101;
 const BURN_IN: usize = 10;
 
 fn main() {
-    let peer = [("GYRE_PEER_PYTHON"), ("GYRE_PEER")].map(std::env::var);
     floor();
-    let ours = steps();
-    let candidate = candidates();
-    if let [Ok(python), Ok(script)] = peer {
-        beside_peer(&python, &script, &ours, &candidate);
-    } else {
-        println!("\npeer: skipped, GYRE_PEER_PYTHON and GYRE_PEER are not set");
-    }
+    steps();
+    candidates();
 }
 
 /// Median of many passes, ms.
@@ -105,11 +93,11 @@ fn cell_m(n: usize) -> f64 {
     0.4 * 255.0 / n as f64
 }
 
-/// Times of each step; returns the totals.
-fn steps() -> [f64; 3] {
+/// Times of each step.
+fn steps() {
     println!("\nsearch: reach 20 deg and {REACH_M} m, earlier spectrum kept, ms");
     println!("{:>5} {:>7} {:>9} {:>9} {:>12} {:>9}", "n", "cell", "spectrum", "angle", "translation", "total");
-    SIZES.map(|n| {
+    for n in SIZES {
         let (cell, motion) = (cell_m(n), Motion::degrees(2.5, 0.1, 3.0));
         let (earlier, later) = pair(n, cell, motion, 1);
         let mut rotation = RotationSearch::new(n, &RotationConfig::default()).unwrap();
@@ -127,18 +115,17 @@ fn steps() -> [f64; 3] {
             black_box(translation.search(&later, &earlier, &estimate).unwrap());
         });
         println!("{n:5} {cell:7.3} {spectrum:9.3} {angle:9.3} {shift:12.3} {total:9.3}");
-        total
-    })
+    }
 }
 
-/// Times of the exhaustive search; returns those of one angle.
-fn candidates() -> [f64; 3] {
+/// Times of the exhaustive search.
+fn candidates() {
     println!("\nexhaustive search: reach 15 deg in steps of 1 deg and {REACH_M} m, ms");
     println!(
         "{:>5} {:>7} {:>9} {:>9} {:>13} {:>12}",
         "n", "angles", "total", "an angle", "at transforms", "unnormalised"
     );
-    SIZES.map(|n| {
+    for n in SIZES {
         let (cell, motion) = (cell_m(n), Motion::degrees(2.5, 0.1, 3.0));
         let (earlier, later) = pair(n, cell, motion, 1);
         let time = |config: &ExhaustiveConfig| {
@@ -153,35 +140,6 @@ fn candidates() -> [f64; 3] {
         let reach = (REACH_M / cell) as usize + 3;
         let size = fast_size(n + reach);
         let floor = complex_ms(size, n + 2 * size + 2 * reach + 1) / 2.0;
-        println!("{n:5} {:7} {total:9.2} {one:9.3} {floor:13.3} {bare:12.3}", 31);
-        one
-    })
-}
-
-/// Runs the peer's searches and prints how many times longer they take: the exhaustive one an angle.
-fn beside_peer(python: &str, script: &str, ours: &[f64; 3], candidate: &[f64; 3]) {
-    let output = Command::new(python)
-        .args([script, "--only", "f-raw,f-raw-eq7,raw", "--sizes", "127,255,511", "--threads", "1"])
-        .output();
-    let text = match output {
-        Ok(done) if done.status.success() => String::from_utf8_lossy(&done.stdout).into_owned(),
-        Ok(done) => return println!("\npeer failed: {}", String::from_utf8_lossy(&done.stderr)),
-        Err(error) => return println!("\npeer could not be started: {error}"),
-    };
-    println!(
-        "\npeer (PyTorch, one thread, median), ours and the ratio\n{:>5} {:>13} {:>9} {:>9} {:>7}",
-        "n", "row", "peer ms", "ours ms", "ratio"
-    );
-    for line in text.lines() {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        let [n, row, "median", peer, ..] = words.as_slice() else { continue };
-        let (Ok(n), Ok(peer)) = (n.parse::<usize>(), peer.parse::<f64>()) else { continue };
-        let (row, peer, ours) = match *row {
-            "raw" => ("raw, an angle", peer / PEER_ROTATIONS, candidate),
-            other => (other, peer, ours),
-        };
-        if let Some(ours) = SIZES.iter().position(|&size| size == n).map(|k| ours[k]) {
-            println!("{n:5} {row:>13} {peer:9.2} {ours:9.3} {:7.1}", peer / ours);
-        }
+        println!("{n:5} {:7} {total:9.2} {one:9.3} {floor:13.3} {bare:12.3}", default.candidates());
     }
 }

@@ -63,6 +63,11 @@ impl ExhaustiveConfig {
         check(positive(self.variance_scale), "variance_scale", &self.variance_scale, "a positive number")
     }
 
+    /// Number of angles that are tried.
+    pub fn candidates(&self) -> usize {
+        self.angles().count
+    }
+
     pub(super) fn angles(&self) -> AngleGrid {
         let (reach, step) = (self.reach_deg.to_radians(), self.step_deg.to_radians());
         if self.reach_deg >= 180.0 {

@@ -1,0 +1,80 @@
+//! On what and when something was measured.
+
+use std::{
+    fmt, fs, thread,
+    time::{SystemTime, UNIX_EPOCH},
+};
+
+use serde::Serialize;
+
+/// A computer, as far as it matters to times.
+#[derive(Debug, Serialize)]
+pub struct Machine {
+    /// The processor's model.
+    pub processor: String,
+    /// Hardware threads that this process may use.
+    pub cores: usize,
+}
+
+impl Machine {
+    /// The one that this program runs on.
+    pub fn this() -> Self {
+        let model = |text: String| {
+            let line = text.lines().find(|line| line.starts_with("model name"))?;
+            Some(line.split_once(':')?.1.trim().to_owned())
+        };
+        let processor = fs::read_to_string("/proc/cpuinfo").ok().and_then(model);
+        Self {
+            processor: processor.unwrap_or_else(|| std::env::consts::ARCH.to_owned()),
+            cores: thread::available_parallelism().map_or(1, usize::from),
+        }
+    }
+}
+
+impl fmt::Display for Machine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}, {} core{}", self.processor, self.cores, if self.cores == 1 { "" } else { "s" })
+    }
+}
+
+/// Today's date (UTC) as `2024-02-29`.
+pub fn today() -> String {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    date(since.as_secs() / 86_400)
+}
+
+/// The Gregorian date of a day counted from 1970-01-01: years begin in March here, so that a leap day is a year's last.
+fn date(day: u64) -> String {
+    const DAYS_TO_1970: u64 = 719_468; // from March 1 of the year 0
+    const CYCLE: u64 = 146_097; // days of 400 years
+    let day = day + DAYS_TO_1970;
+    let (cycle, of_cycle) = (day / CYCLE, day % CYCLE);
+    let year = (of_cycle - of_cycle / 1_460 + of_cycle / 36_524 - of_cycle / 146_096) / 365;
+    let of_year = of_cycle - (365 * year + year / 4 - year / 100);
+    let from_march = (5 * of_year + 2) / 153;
+    let (month, next) = if from_march < 10 { (from_march + 3, 0) } else { (from_march - 9, 1) };
+    format!("{:04}-{month:02}-{:02}", cycle * 400 + year + next, of_year - (153 * from_march + 2) / 5 + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn days_become_dates_leap_days_included() {
+        for (day, expected) in [
+            (0, "1970-01-01"),
+            (58, "1970-02-28"),
+            (59, "1970-03-01"),
+            (11_016, "2000-02-29"),
+            (17_940, "2019-02-13"),
+            (19_782, "2024-02-29"),
+            (19_783, "2024-03-01"),
+            (20_088, "2024-12-31"),
+            (47_540, "2100-02-28"),
+            (47_541, "2100-03-01"),
+        ] {
+            assert_eq!(date(day), expected, "{day}");
+        }
+    }
+}

@@ -1,0 +1,227 @@
+//! The tables as Markdown.
+
+use std::fmt::Write;
+
+use super::{
+    Tables,
+    accuracy::{Accuracies, Accuracy, AccuracyLine},
+    times::{Median, TimeLine, Times},
+};
+
+/// Both tables with all that is needed to read and to repeat them.
+pub(super) fn of(tables: &Tables) -> String {
+    let commit = tables.commit.map(|commit| format!(" ({commit})")).unwrap_or_default();
+    let mut text = format!(
+        "# Table III by gyre {}{commit}\n\n{}; {}\n\n```sh\n{}\n```\n\nThe papers' figures: {}.\n\n",
+        tables.version, tables.machine, tables.date, tables.command, tables.papers
+    );
+    text += &times(&tables.times);
+    for sequence in &tables.accuracy {
+        text += &accuracies(sequence);
+    }
+    text
+}
+
+fn times(times: &Times) -> String {
+    let header =
+        ["n", "cell m", "row", "ms", "Hz", "peer ms", "peer Hz", "peer / ours", "paper Hz, laptop", "paper Hz, Jetson"];
+    let mut text = format!("## IIIa: time of a search\n\n{}", table(&header, times.lines.iter().map(time_line)));
+    let _ = writeln!(
+        text,
+        "\nms: for a scan, one thread, median of {} passes over {} scans of {}, the earlier scan's spectrum kept as in a \
+         run, rasters ready. {}{}Paper: a Core i7 at 2.9 GHz; a Jetson Nano with its GPU. -: not given there, or not \
+         there here (learned masks).",
+        times.passes,
+        times.scans,
+        times.data,
+        halves(times),
+        peer(times),
+    );
+    let angles = times.lines.iter().filter_map(|line| Some((line, line.ours?)));
+    let an_angle: Vec<String> = angles.filter_map(|(line, ours)| an_angle(line, &ours)).collect();
+    if !an_angle.is_empty() {
+        let _ = writeln!(text, "\nAn angle of the exhaustive searches, ms: {}.", an_angle.join("; "));
+    }
+    text
+}
+
+/// How quiet the machine was.
+fn halves(times: &Times) -> String {
+    let drift = |ours: Median| (ours.halves_ms[1] / ours.halves_ms[0] - 1.0).abs();
+    let most = times.lines.iter().filter_map(|line| line.ours).map(drift).filter(|drift| drift.is_finite());
+    let most = most.fold(0.0, f64::max);
+    format!("The two halves of the passes differ by at most {:.0} %. ", most * 100.0)
+}
+
+fn peer(times: &Times) -> String {
+    let torch = times.peer_torch.as_ref();
+    let text = torch.map(|torch| {
+        format!(
+            "Peer: PyTorch {torch}, one thread, on noise, its median, between the two halves; it transforms both scans \
+             of each pair and tries as many angles. "
+        )
+    });
+    text.unwrap_or_default()
+}
+
+fn time_line(line: &TimeLine) -> Vec<String> {
+    let ms = line.ours.map(|ours| ours.ms);
+    let hz = |ms: Option<f64>| number(ms.map(|ms| 1e3 / ms), 1);
+    let [laptop, jetson] = line.paper_hz.map(|hz| number(hz, 1));
+    let (ours, peer) = (number(ms, 3), number(line.peer_ms, 2));
+    let ratio = number(line.peer_over_ours, 1);
+    let cell = number(line.ours.map(|ours| ours.cell_m.into()), 2);
+    vec![line.n.to_string(), cell, line.row.to_owned(), ours, hz(ms), peer, hz(line.peer_ms), ratio, laptop, jetson]
+}
+
+fn an_angle(line: &TimeLine, ours: &Median) -> Option<String> {
+    let angles = ours.angles? as f64;
+    let peer = line.peer_ms.map(|ms| format!(" (peer {:.3})", ms / angles)).unwrap_or_default();
+    Some(format!("{} at {}: {:.3}{peer}", line.row, line.n, ours.ms / angles))
+}
+
+fn accuracies(sequence: &Accuracies) -> String {
+    let header = [
+        "row",
+        "KITTI %",
+        "deg/100 m",
+        "deg/km",
+        "ATE m",
+        "seg %",
+        "deg a scan",
+        "forward",
+        "masking ms",
+        "search ms",
+        "scans/s",
+        "paper %",
+        "paper deg/km",
+    ];
+    let mut text = format!("\n## IIIb: accuracy on {}\n\n", sequence.data);
+    text += &table(&header, sequence.lines.iter().map(accuracy_line));
+    let ours = || sequence.lines.iter().filter_map(|line| line.ours.as_ref());
+    text += "\ndeg a scan: rotation error of single motions, RMS. forward: estimated over true distance. ms: median work of \
+             the stages in the running pipeline. Paper: its test drives of Oxford Radar RobotCar at this raster's size.";
+    text += &truth(ours().next());
+    text += "\n\n```sh\n";
+    for accuracy in ours() {
+        text = text + &accuracy.command + "\n";
+    }
+    text + "```\n"
+}
+
+/// What the ground truth does not allow.
+fn truth(accuracy: Option<&Accuracy>) -> String {
+    match accuracy.map(|accuracy| (accuracy.path_m, accuracy.seg_percent)) {
+        Some((None, _)) => " There is no ground truth that fits.".to_owned(),
+        Some((Some(path_m), None)) => format!(" The truth is {path_m:.0} m long: KITTI and seg need more than 100 m."),
+        _ => String::new(),
+    }
+}
+
+fn accuracy_line(line: &AccuracyLine) -> Vec<String> {
+    let figure = |of: fn(&Accuracy) -> Option<f64>, decimals| number(line.ours.as_ref().and_then(of), decimals);
+    let [translation, rotation] = line.paper;
+    vec![
+        line.row.to_owned(),
+        figure(|a| a.translation_percent, 2),
+        figure(|a| a.rotation_deg_per_100m, 2),
+        figure(|a| a.rotation_deg_per_km, 2),
+        figure(|a| a.ate_m, 2),
+        figure(|a| a.seg_percent, 2),
+        figure(|a| a.pair_rotation_deg, 3),
+        figure(|a| a.forward_ratio, 4),
+        figure(|a| Some(a.masking_ms), 2),
+        figure(|a| Some(a.search_ms), 2),
+        figure(|a| a.scans_per_s, 0),
+        number(translation, 2),
+        number(rotation, 2),
+    ]
+}
+
+/// A figure in fixed decimals; `-` where there is none.
+fn number(value: Option<f64>, decimals: usize) -> String {
+    value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))
+}
+
+fn table(header: &[&str], lines: impl Iterator<Item = Vec<String>>) -> String {
+    let mut text = format!("| {} |\n|{}\n", header.join(" | "), "---|".repeat(header.len()));
+    for line in lines {
+        let _ = writeln!(text, "| {} |", line.join(" | "));
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::Machine;
+
+    fn accuracy(path_m: Option<f64>, seg_percent: Option<f64>) -> Accuracy {
+        Accuracy {
+            command: "gyre run it".to_owned(),
+            n: 255,
+            path_m,
+            translation_percent: seg_percent.map(|_| 2.125),
+            rotation_deg_per_100m: seg_percent.map(|_| 0.75),
+            rotation_deg_per_km: seg_percent.map(|_| 7.5),
+            ate_m: path_m.map(|_| 1.5),
+            seg_percent,
+            pair_rotation_deg: Some(0.1),
+            forward_ratio: None,
+            masking_ms: 2.0,
+            search_ms: 0.75,
+            scans_per_s: Some(120.4),
+        }
+    }
+
+    #[test]
+    fn a_line_has_ours_the_peers_and_the_papers_figures() {
+        let ours = Median { cell_m: 0.4, angles: None, ms: 0.5, halves_ms: [0.5, 0.55] };
+        let line = |ours: Option<Median>| TimeLine {
+            n: 255,
+            row: "f-raw",
+            ours,
+            peer_ms: Some(20.0),
+            peer_over_ours: ours.map(|ours| 20.0 / ours.ms),
+            paper_hz: [Some(58.2), None],
+        };
+        let cells = ["255", "0.40", "f-raw", "0.500", "2000.0", "20.00", "50.0", "40.0", "58.2", "-"];
+        assert_eq!(time_line(&line(Some(ours))), cells);
+        assert_eq!(time_line(&line(None))[3..8], ["-", "-", "20.00", "50.0", "-"]);
+        let joint = Median { angles: Some(31), ms: 6.2, ..ours };
+        assert_eq!(an_angle(&line(None), &joint).as_deref(), Some("f-raw at 255: 0.200 (peer 0.645)"));
+        assert_eq!(an_angle(&line(None), &ours), None);
+    }
+
+    #[test]
+    fn every_line_of_a_table_has_as_many_cells_as_its_header() {
+        let ours = Some(accuracy(Some(885.0), Some(0.5)));
+        let line = |ours| AccuracyLine { row: "raw", ours, paper: [Some(6.39), Some(20.87)] };
+        let sequence = Accuracies {
+            configuration: "c.toml".to_owned(),
+            data: "drive".to_owned(),
+            lines: vec![line(ours), line(None)],
+        };
+        let times = Times { data: "drive".to_owned(), scans: 8, passes: 50, peer_torch: None, lines: Vec::new() };
+        let machine = Machine { processor: "A".to_owned(), cores: 2 };
+        let (date, command) = ("2024-02-29".to_owned(), "gyre tables".to_owned());
+        let accuracy = vec![sequence];
+        let tables =
+            Tables { version: "1.0", commit: Some("abc"), machine, date, command, times, accuracy, papers: "P" };
+        let text = of(&tables);
+        assert!(text.starts_with("# Table III by gyre 1.0 (abc)\n\nA, 2 cores; 2024-02-29\n"), "{text}");
+        assert!(
+            text.contains("| raw | 2.12 | 0.75 | 7.50 | 1.50 | 0.50 | 0.100 | - | 2.00 | 0.75 | 120 | 6.39 | 20.87 |")
+        );
+        assert!(text.contains("```sh\ngyre run it\n```"), "{text}");
+        let cells: Vec<usize> = text.lines().filter(|l| l.starts_with('|')).map(|l| l.matches('|').count()).collect();
+        assert_eq!(cells, [11, 11, 14, 14, 14, 14]);
+    }
+
+    #[test]
+    fn a_truth_that_is_too_short_or_missing_is_told() {
+        assert!(truth(Some(&accuracy(Some(22.4), None))).contains("22 m long"));
+        assert!(truth(Some(&accuracy(None, None))).contains("no ground truth"));
+        assert_eq!(truth(Some(&accuracy(Some(885.0), Some(0.5)))), "");
+    }
+}

@@ -1,0 +1,156 @@
+//! The rows of both tables: to add one, add a line to [`ROWS`].
+
+use crate::tables::papers::{FIGURES, Figures};
+
+/// A way to find motions: what it changes in a sequence's own configuration.
+#[derive(Debug)]
+pub struct Row {
+    /// What it is called.
+    pub name: &'static str,
+    /// The papers' row that it stands for.
+    pub paper: Option<&'static str>,
+    /// The peer's row that does the same.
+    pub peer: Option<&'static str>,
+    /// `--set` sentences, group by group.
+    changes: &'static [&'static [&'static str]],
+}
+
+/// All rows that this program can measure.
+pub static ROWS: [Row; 5] = [
+    Row::of_papers("raw", "raw", "raw", &[PAPERS_RASTER, RAW]),
+    Row::of_papers("f-raw, line 14", "f-raw", "f-raw", &[PAPERS_RASTER, F_RAW, &["rotation.form=line14"]]),
+    Row::of_papers("f-raw, Eq. 7", "f-raw", "f-raw-eq7", &[PAPERS_RASTER, F_RAW, &["rotation.form=eq7"]]),
+    Row::of_gyre("Gyre, every angle", &[&["search.kind=exhaustive"]]),
+    Row::of_gyre("Gyre", &[]),
+];
+
+/// No mask, no compensation, 102 m a side.
+const PAPERS_RASTER: &[&str] =
+    &["raster.n=255", "raster.cell_m=0.4", "raster.sampling=bilinear", "masking.kind=none", "masking.compensate=false"];
+
+/// As `configs/mbym.toml`.
+const RAW: &[&str] = &["search.kind=exhaustive", "exhaustive.overlap=none", "exhaustive.peak=parabola"];
+
+/// As `configs/fast-mbym.toml`, but for the form.
+const F_RAW: &[&str] = &[
+    "rotation.window=hann",
+    "rotation.band_low=0.01",
+    "rotation.band_high=0.35",
+    "rotation.angles=733",
+    "rotation.radii=127",
+    "rotation.peak=parabola",
+    "translation.overlap=none",
+    "translation.peak=parabola",
+];
+
+impl Row {
+    const fn of_papers(
+        name: &'static str,
+        paper: &'static str,
+        peer: &'static str,
+        changes: &'static [&'static [&'static str]],
+    ) -> Self {
+        Self { name, paper: Some(paper), peer: Some(peer), changes }
+    }
+
+    const fn of_gyre(name: &'static str, changes: &'static [&'static [&'static str]]) -> Self {
+        Self { name, paper: None, peer: None, changes }
+    }
+
+    /// What it changes, as sentences `section.key=value`.
+    pub fn changes(&self) -> Vec<String> {
+        self.changes.iter().copied().flatten().map(|sentence| (*sentence).to_owned()).collect()
+    }
+
+    /// Its name as that of a folder.
+    pub fn folder(&self) -> String {
+        let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' };
+        let mut name: String = self.name.chars().map(plain).collect();
+        while name.contains("--") {
+            name = name.replace("--", "-");
+        }
+        name
+    }
+}
+
+/// A line of a table: a row of ours, a row of the papers, or both.
+#[derive(Clone, Copy, Debug)]
+pub struct Line {
+    /// What stands in front.
+    pub name: &'static str,
+    /// Ours; `None` where this program has nothing of the kind.
+    pub row: Option<&'static Row>,
+    /// The papers'.
+    pub figures: Option<&'static Figures>,
+    /// The peer's row.
+    pub peer: Option<&'static str>,
+}
+
+/// The papers' rows that stand in a table, in their order and with ours beside them; then those that are ours alone.
+pub fn lines(stands: impl Fn(&Figures) -> bool) -> Vec<Line> {
+    let with = |row: &'static Row, figures| Line { name: row.name, row: Some(row), figures, peer: row.peer };
+    let mut lines = Vec::new();
+    for figures in FIGURES.iter().filter(|figures| stands(figures)) {
+        let before = lines.len();
+        let same = ROWS.iter().filter(|row| row.paper == Some(figures.row));
+        lines.extend(same.map(|row| with(row, Some(figures))));
+        if lines.len() == before {
+            lines.push(Line { name: figures.row, row: None, figures: Some(figures), peer: Some(figures.row) });
+        }
+    }
+    lines.extend(ROWS.iter().filter(|row| row.paper.is_none()).map(|row| with(row, None)));
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::{collections::BTreeSet, path::Path};
+
+    use super::*;
+    use crate::configuration::Configuration;
+
+    fn row(name: &str) -> &'static Row {
+        ROWS.iter().find(|row| row.name == name).unwrap()
+    }
+
+    #[test]
+    fn the_papers_rows_are_the_papers_configurations() {
+        let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
+        for (name, file) in [("raw", "mbym.toml"), ("f-raw, line 14", "fast-mbym.toml")] {
+            let of_file = Configuration::read(&configs.join(file), &[]).unwrap();
+            let mut radiate = Configuration::read(&configs.join("radiate.toml"), &row(name).changes()).unwrap();
+            radiate.dataset = of_file.dataset;
+            assert_eq!(radiate, of_file, "{name}");
+        }
+    }
+
+    #[test]
+    fn every_row_has_a_folder_of_its_own() {
+        let folders: BTreeSet<String> = ROWS.iter().map(Row::folder).collect();
+        assert_eq!(folders.len(), ROWS.len());
+        assert_eq!(row("f-raw, Eq. 7").folder(), "f-raw-eq-7");
+    }
+
+    #[test]
+    fn lines_follow_the_papers_and_end_with_ours() {
+        let names = |lines: Vec<Line>| lines.iter().map(|line| (line.name, line.row.is_some())).collect::<Vec<_>>();
+        let times = names(lines(Figures::has_times));
+        let common = [("raw", true), ("f-raw, line 14", true), ("f-raw, Eq. 7", true)];
+        assert_eq!(times[0], ("mask", false));
+        assert_eq!(times[1..4], common);
+        assert_eq!(times[4..6], [("mbym", false), ("f-mbym", false)]);
+        let drift = names(lines(Figures::has_drift));
+        assert_eq!(drift[..3], common);
+        assert_eq!(drift[3], ("mbym (2019)", false));
+        assert_eq!(drift.last(), Some(&("Gyre", true)));
+    }
+
+    #[test]
+    fn papers_figures_are_given_at_their_three_sizes_only() {
+        let f_mbym = lines(Figures::has_times).into_iter().find(|line| line.name == "f-mbym").unwrap();
+        let figures = f_mbym.figures.unwrap();
+        assert_eq!((figures.hz(255), figures.drift(255)), ([Some(20.6), Some(6.6)], [Some(2.01), Some(6.3)]));
+        assert_eq!((figures.hz(128), figures.drift(0)), ([None; 2], [None; 2]));
+    }
+}

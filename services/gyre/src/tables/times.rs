@@ -1,0 +1,226 @@
+//! Table IIIa: how long each search takes for a pair of scans, on one thread of this process.
+
+use std::{hint::black_box, path::Path, time::Instant};
+
+use gyre_joint_search::Motions;
+use gyre_masking::Masker;
+use gyre_messages::{MotionEstimate, Pair};
+use gyre_radar::OwnedScan;
+use gyre_rotation_search::Rotations;
+use gyre_scan_matching::{ConfigError, ShapeError};
+use gyre_translation_search::Translations;
+use serde::Serialize;
+
+use super::{
+    Sequence,
+    papers::Figures,
+    peer::{Peer, PeerTimes},
+    rows::{Line, Row, lines},
+};
+use crate::{
+    Failure,
+    configuration::{Configuration, SearchKind},
+};
+
+/// Scans of the sequence whose searches are timed, in turn.
+const SCANS: usize = 8;
+/// Untimed passes before each half.
+const BURN_IN: usize = 5;
+
+/// The table and how it was measured.
+#[derive(Debug, Serialize)]
+pub struct Times {
+    /// The sequence's folder.
+    pub data: String,
+    /// Its scans that were searched.
+    pub scans: usize,
+    /// Timed passes of each search, before the peer and after it together.
+    pub passes: usize,
+    /// The peer's version of PyTorch.
+    pub peer_torch: Option<String>,
+    /// Lines, size by size.
+    pub lines: Vec<TimeLine>,
+}
+
+/// A row at one size.
+#[derive(Debug, Serialize)]
+pub struct TimeLine {
+    /// Cells a side.
+    pub n: usize,
+    /// The row.
+    pub row: &'static str,
+    /// What this program takes; `None` where it has no such row.
+    pub ours: Option<Median>,
+    /// The peer's median, ms.
+    pub peer_ms: Option<f64>,
+    /// How many times longer the peer takes.
+    pub peer_over_ours: Option<f64>,
+    /// The paper's rates on a laptop and on a Jetson, Hz.
+    pub paper_hz: [Option<f64>; 2],
+}
+
+/// A median time.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Median {
+    /// Metres a cell.
+    pub cell_m: f32,
+    /// Angles that were tried, where all are.
+    pub angles: Option<usize>,
+    /// Of all passes, ms.
+    pub ms: f64,
+    /// Of the passes before and after the peer's, ms: alike on a quiet machine.
+    pub halves_ms: [f64; 2],
+}
+
+/// Times all rows at all `sizes` on scans of `sequence`: `passes` passes, then the peer, then as many passes again.
+pub fn measure(
+    sequence: &Sequence,
+    sizes: &[usize],
+    passes: usize,
+    peer: Option<&Peer>,
+    out: &Path,
+) -> Result<Times, Failure> {
+    let scans = sequence.scans(SCANS)?;
+    let at_size = |&n: &usize| {
+        let timed = |line: Line| Ok((line, line.row.map(|row| Timer::new(sequence, row, n, &scans)).transpose()?));
+        let timed: Result<Vec<_>, Failure> = lines(Figures::has_times).into_iter().map(timed).collect();
+        Ok((n, timed?))
+    };
+    let sizes: Result<Vec<_>, Failure> = sizes.iter().map(at_size).collect();
+    let angles = sequence.configuration(&[])?.exhaustive.candidates();
+    let both = 2 * passes;
+    let mut times = Times {
+        data: sequence.data.display().to_string(),
+        scans: scans.len(),
+        passes: both,
+        peer_torch: None,
+        lines: Vec::new(),
+    };
+    for (n, mut timed) in sizes? {
+        half(&mut timed, passes)?;
+        let report = out.join(format!("peer-{n}.json"));
+        let theirs = peer.map(|peer| peer.time(n, both, angles, &report)).transpose()?;
+        half(&mut timed, passes)?;
+        times.lines.extend(timed.into_iter().map(|(line, timer)| TimeLine::new(n, &line, timer, theirs.as_ref())));
+        times.peer_torch = theirs.map(|theirs| theirs.torch);
+    }
+    Ok(times)
+}
+
+fn half(timed: &mut [(Line, Option<Timer>)], passes: usize) -> Result<(), ShapeError> {
+    timed.iter_mut().filter_map(|(_, timer)| timer.as_mut()).try_for_each(|timer| timer.half(passes))
+}
+
+impl TimeLine {
+    fn new(n: usize, line: &Line, timer: Option<Timer>, peer: Option<&PeerTimes>) -> Self {
+        let ours = timer.map(|timer| timer.median());
+        let peer_ms = line.peer.and_then(|row| peer?.median_ms(n, row));
+        Self {
+            n,
+            row: line.name,
+            ours,
+            peer_ms,
+            peer_over_ours: ours.and_then(|ours| Some(peer_ms? / ours.ms)),
+            paper_hz: line.figures.map_or([None; 2], |figures| figures.hz(n)),
+        }
+    }
+}
+
+/// From the raster of a scan (the sequence number is the first argument) and that of the scan before to a motion.
+type Search = Box<dyn FnMut(u64, Pair<'_>) -> Result<MotionEstimate, ShapeError>>;
+
+/// The search of a configuration, as its stages do it between masking and the pose. A scan's spectrum is kept for the next
+/// pair.
+fn search(configuration: &Configuration) -> Result<Search, ConfigError> {
+    let raster = &configuration.raster;
+    Ok(match configuration.search.kind {
+        SearchKind::Decoupled => {
+            let mut rotations = Rotations::new(raster.n, &configuration.rotation)?;
+            let mut translations = Translations::new(raster, &configuration.translation)?;
+            Box::new(move |seq, pair| translations.next(pair, rotations.next(seq, pair, false)?))
+        }
+        SearchKind::Exhaustive => {
+            let mut motions = Motions::new(raster, &configuration.exhaustive)?;
+            Box::new(move |_, pair| motions.next(pair))
+        }
+    })
+}
+
+/// The search of one row on rasters of one size, and how long it took.
+struct Timer {
+    cell_m: f32,
+    angles: Option<usize>,
+    search: Search,
+    rasters: Vec<Vec<f32>>,
+    seq: u64,
+    halves_ms: [Vec<f64>; 2],
+}
+
+impl Timer {
+    /// The same area at every size: that of the row's own configuration.
+    fn new(sequence: &Sequence, row: &Row, n: usize, scans: &[OwnedScan]) -> Result<Self, Failure> {
+        let mut configuration = sequence.configuration(&row.changes())?;
+        let raster = &mut configuration.raster;
+        raster.cell_m *= raster.n as f32 / n as f32;
+        raster.n = n;
+        let fails = |reason: &dyn std::error::Error| format!("{} at {n} cells a side: {reason}", row.name);
+        let mut masker = Masker::new(raster, &configuration.masking).map_err(|error| fails(&error))?;
+        let mut rasters = vec![vec![0.0; n * n]; scans.len()];
+        for (scan, raster) in scans.iter().zip(&mut rasters) {
+            masker.mask(&scan.view(), None, raster).map_err(|error| fails(&error))?;
+        }
+        let exhaustive = configuration.search.kind == SearchKind::Exhaustive;
+        Ok(Self {
+            cell_m: configuration.raster.cell_m,
+            angles: exhaustive.then(|| configuration.exhaustive.candidates()),
+            search: search(&configuration).map_err(|error| fails(&error))?,
+            rasters,
+            seq: 0,
+            halves_ms: [Vec::new(), Vec::new()],
+        })
+    }
+
+    /// Times `passes` passes: those of the first half, then those of the second.
+    fn half(&mut self, passes: usize) -> Result<(), ShapeError> {
+        for _ in 0..BURN_IN {
+            self.pass()?;
+        }
+        let times: Result<Vec<f64>, ShapeError> = (0..passes).map(|_| self.pass()).collect();
+        let half = usize::from(!self.halves_ms[0].is_empty());
+        self.halves_ms[half] = times?;
+        Ok(())
+    }
+
+    /// Searches the motion of the next pair; the time it took, ms.
+    fn pass(&mut self) -> Result<f64, ShapeError> {
+        self.seq += 1;
+        let raster = |seq: u64| self.rasters[seq as usize % self.rasters.len()].as_slice();
+        let pair = Pair { later: raster(self.seq), earlier: Some(raster(self.seq - 1)) };
+        let start = Instant::now();
+        black_box((self.search)(self.seq, black_box(pair))?);
+        Ok(start.elapsed().as_secs_f64() * 1e3)
+    }
+
+    fn median(self) -> Median {
+        let halves_ms = [0, 1].map(|half| median(self.halves_ms[half].clone()));
+        Median { cell_m: self.cell_m, angles: self.angles, ms: median(self.halves_ms.concat()), halves_ms }
+    }
+}
+
+/// The upper median; 0 of nothing.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_is_the_one_in_the_middle() {
+        assert_eq!(median(vec![9.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median(vec![4.0, 1.0]), 4.0);
+        assert_eq!(median(Vec::new()), 0.0);
+    }
+}

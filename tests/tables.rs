@@ -1,0 +1,101 @@
+//! `gyre tables` as a whole: a small simulated drive, real runs, and a peer that only pretends.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::{fs, path::Path, process::Command};
+
+use common::{Ended, gyre, recording};
+use serde_json::Value;
+use tempfile::TempDir;
+
+const SIZE: usize = 63;
+const ROWS: [&str; 5] = ["raw", "f-raw, line 14", "f-raw, Eq. 7", "Gyre, every angle", "Gyre"];
+
+/// Writes what a peer writes, to the file that follows `--json`: 80 ms for each search, whatever it is told.
+const PEER: &str = r#"
+echo "$@" > "$(dirname "$0")/told.txt"
+while [ "$1" != --json ]; do shift; done
+echo '{"torch": "0.0", "threads": 1, "rows": [
+  {"n": 63, "row": "mask", "median_ms": 5.0}, {"n": 63, "row": "raw", "median_ms": 80.0},
+  {"n": 63, "row": "f-raw", "median_ms": 80.0}, {"n": 63, "row": "f-raw-eq7", "median_ms": 80.0}]}' > "$2"
+"#;
+
+fn folder() -> TempDir {
+    let folder = tempfile::Builder::new().prefix("gyre-tables-").tempdir().unwrap();
+    fs::write(folder.path().join("small.toml"), "[raster]\nn = 127\ncell_m = 0.8\n").unwrap();
+    fs::write(folder.path().join("peer.sh"), PEER).unwrap();
+    folder
+}
+
+/// `gyre tables` of the small recording, with little to time.
+fn tables(folder: &Path) -> Command {
+    let mut command = gyre();
+    command.current_dir(folder).args(["tables", "--config", "small.toml", "--out", "out", "--passes", "1", "--data"]);
+    command.arg(recording::small());
+    command
+}
+
+fn line<'a>(lines: &'a Value, row: &str) -> &'a Value {
+    lines.as_array().unwrap().iter().find(|line| line["row"] == row).unwrap_or_else(|| panic!("no {row} in {lines:#}"))
+}
+
+#[test]
+fn both_tables_are_filled_and_their_commands_repeat_the_runs() {
+    let folder = folder();
+    let mut command = tables(folder.path());
+    command.args(["--sizes", &SIZE.to_string(), "--peer", "sh", "--peer-script", "peer.sh"]);
+    let ended = Ended::of(command);
+    ended.succeeded();
+    let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
+    assert_eq!(read("out/tables.md"), ended.stdout);
+    let json: Value = serde_json::from_str(&read("out/tables.json")).unwrap();
+
+    let times = &json["times"]["lines"];
+    for row in ROWS {
+        assert!(line(times, row)["ours"]["ms"].as_f64().unwrap() > 0.0, "{row}");
+    }
+    let f_raw = line(times, "f-raw, line 14");
+    assert_eq!(f_raw["peer_ms"], 80.0);
+    let ratio = f_raw["peer_over_ours"].as_f64().unwrap() * f_raw["ours"]["ms"].as_f64().unwrap();
+    assert!((ratio - 80.0).abs() < 1e-9, "{ratio}");
+    assert_eq!((&line(times, "mask")["ours"], &line(times, "mask")["peer_ms"]), (&Value::Null, &Value::from(5.0)));
+    assert_eq!(read("told.txt").trim(), "--threads 1 --sizes 63 --passes 2 --rotations 31 --json out/peer-63.json");
+
+    let accuracy = &json["accuracy"][0]["lines"];
+    for row in ROWS {
+        let ours = &line(accuracy, row)["ours"];
+        let [path, ate, search] = ["path_m", "ate_m", "search_ms"].map(|key| ours[key].as_f64().unwrap());
+        assert!(path > 40.0 && ate < 0.05 * path && search > 0.0, "{row}: {ours:#}");
+    }
+    assert_eq!(line(accuracy, "f-raw, Eq. 7")["paper"][0], 8.46);
+    repeats(folder.path(), line(accuracy, "f-raw, line 14")["ours"]["command"].as_str().unwrap());
+}
+
+/// Asserts that a command of the table, in another folder for its results, gives what it gave in the table.
+fn repeats(folder: &Path, command: &str) {
+    let words: Vec<&str> = command.split(' ').collect();
+    let out = words[1 + words.iter().position(|word| *word == "--out").unwrap()];
+    let mut again = gyre();
+    again.current_dir(folder).args(words[1..].iter().map(|word| if *word == out { "again" } else { word }));
+    Ended::of(again).succeeded();
+    let odometry = |out: &str| fs::read_to_string(folder.join(out).join("odometry.csv")).unwrap();
+    assert_eq!(odometry(out), odometry("again"));
+}
+
+#[test]
+fn what_cannot_be_measured_is_refused_before_anything_is() {
+    let folder = folder();
+    let refused = |arguments: &[&str], words: &[&str]| {
+        let mut command = tables(folder.path());
+        command.args(arguments);
+        Ended::of(command).refused_with(words);
+    };
+    let data = recording::small().to_str().unwrap();
+    refused(&["--data", "/elsewhere"], &["1 --config but 2 --data"]);
+    refused(&["--config", "small.toml", "--data", data], &["would write to the same folder"]);
+    refused(&["--sizes", "63,8"], &["raw at 8 cells a side", "16 to 8192"]);
+    let failing = ["--sizes", "63", "--peer", "sh", "--peer-script", "none.sh"];
+    refused(&failing, &["the peer none.sh failed: ", "none.sh"]);
+}
