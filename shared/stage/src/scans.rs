@@ -5,7 +5,7 @@
 
 use std::collections::VecDeque;
 
-use gyre_messages::{Item, MotionEstimate, Scan, Window, flag};
+use gyre_messages::{Item, Scan, SearchedMotion, Window, flag};
 
 use crate::{
     Launch, StageError,
@@ -21,7 +21,7 @@ pub struct Scans {
     feedback: Feedback,
     lag: u64,
     /// The motion for the scan at hand.
-    motion: Option<MotionEstimate>,
+    motion: Option<SearchedMotion>,
 }
 
 enum Intake {
@@ -34,7 +34,7 @@ pub struct ScanView<'a> {
     /// The scan.
     pub scan: &'a Received<Scan>,
     /// The motion of the scan `lag` before it; `None` where there was none.
-    pub motion: Option<MotionEstimate>,
+    pub motion: Option<SearchedMotion>,
 }
 
 impl Inputs for Scans {

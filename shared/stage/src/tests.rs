@@ -40,6 +40,7 @@ impl Run {
             window: WINDOW,
             limits: Limits { scan_bytes: 1000, raster_cells: 100, rasters: 1 },
             live: false,
+            refines: false,
             rate: None,
         };
         manifest.write("").unwrap();
