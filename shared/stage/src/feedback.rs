@@ -9,7 +9,11 @@ use std::collections::VecDeque;
 
 use gyre_messages::{Item, Motion, Pose, SearchedMotion, flag};
 
-use crate::{Launch, StageError, reader::Port, services::Listener};
+use crate::{
+    StageError,
+    reader::Port,
+    services::{Listener, Node},
+};
 
 /// Motions kept: more than any window and lag can ask for.
 const KEPT: usize = 256;
@@ -24,10 +28,10 @@ pub(crate) struct Feedback {
 }
 
 impl Feedback {
-    pub(crate) fn open(launch: &Launch) -> Result<Self, StageError> {
+    pub(crate) fn open(node: &Node) -> Result<Self, StageError> {
         Ok(Self {
-            motions: Port::open(&launch.node)?,
-            poses: Port::open(&launch.node)?,
+            motions: Port::open(node)?,
+            poses: Port::open(node)?,
             known: VecDeque::with_capacity(KEPT + 1),
             sync: None,
             newest_pose: None,

@@ -41,7 +41,7 @@ impl Inputs for Scans {
     type View<'a> = ScanView<'a>;
 
     fn open(launch: &Launch) -> Result<Self, StageError> {
-        let feedback = Feedback::open(launch)?;
+        let feedback = Feedback::open(&launch.node)?;
         let window = launch.manifest.window;
         let intake = match launch.manifest.live {
             false => Intake::Lossless(InOrder { reader: Reader::open(&launch.node, None)?, window, flowing: false }),

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod feedback;
 mod hand_over;
 mod wake_up;
 mod zero_copy;
