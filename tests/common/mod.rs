@@ -27,7 +27,7 @@ pub use leftovers::assert_nothing_left;
 pub use processes::{Pid, cpu_time, send};
 pub use running::Running;
 
-/// The stages in the order of the stream.
+/// The stages of a run that neither searches jointly nor refines, in the order of the stream.
 pub const STAGES: [&str; 5] = ["radar-replay", "masking", "rotation-search", "translation-search", "pose-integration"];
 
 /// Small rasters: the tests are about processes.

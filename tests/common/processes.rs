@@ -7,6 +7,7 @@ use std::{
     time::Duration,
 };
 
+use gyre_messages::Stage;
 use rustix::process::{Signal, kill_process};
 
 /// A process id.
@@ -62,5 +63,5 @@ fn stage_name(pid: Pid) -> Option<String> {
     let last = line.split(|byte| *byte == 0).rfind(|word| !word.is_empty())?;
     let path = PathBuf::from(String::from_utf8_lossy(last).into_owned());
     let name = path.file_stem()?.to_string_lossy().into_owned();
-    (super::STAGES.contains(&name.as_str()) || name == "joint-search").then_some(name)
+    Stage::ALL.iter().any(|stage| stage.name() == name).then_some(name)
 }

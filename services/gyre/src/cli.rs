@@ -24,7 +24,7 @@ pub enum Command {
     Run(RunArguments),
     /// Run one process of a run (what `gyre run` starts).
     Stage {
-        /// radar-replay, masking, rotation-search, translation-search or pose-integration.
+        /// radar-replay, masking, rotation-search, translation-search, joint-search, refinement or pose-integration.
         name: String,
     },
     /// Say what a dataset is, and what looks wrong with it.

@@ -14,6 +14,7 @@ use gyre_masking::MaskingConfig;
 use gyre_messages::{Stage, Window};
 use gyre_radar::{DatasetOptions, RasterConfig};
 use gyre_radar_replay::SourceConfig;
+use gyre_refinement::{RefinementConfig, RefinementKind};
 use gyre_scan_matching::{ExhaustiveConfig, RotationConfig, TranslationConfig};
 use gyre_simulator::SimulationConfig;
 use gyre_stage::supervise::{RestartPolicy, StagePlan};
@@ -46,6 +47,8 @@ pub struct Configuration {
     pub translation: TranslationConfig,
     /// The search for both together.
     pub exhaustive: ExhaustiveConfig,
+    /// What becomes of the motion that was found.
+    pub refinement: RefinementConfig,
     /// Stages that are started or restarted differently, by name.
     pub stages: BTreeMap<String, StageConfig>,
 }
@@ -84,17 +87,6 @@ pub enum SearchKind {
     Decoupled,
     /// By joint-search.
     Exhaustive,
-}
-
-impl SearchKind {
-    /// Whether a run with this search has the stage.
-    fn has(self, stage: Stage) -> bool {
-        match stage {
-            Stage::RotationSearch | Stage::TranslationSearch => self == Self::Decoupled,
-            Stage::JointSearch => self == Self::Exhaustive,
-            _ => true,
-        }
-    }
 }
 
 /// What happens when scans come faster than they can be processed.
@@ -199,6 +191,7 @@ impl Configuration {
             rotation: strict::section(&mut table, "rotation")?,
             translation: strict::section(&mut table, "translation")?,
             exhaustive: strict::section(&mut table, "exhaustive")?,
+            refinement: strict::section(&mut table, "refinement")?,
             stages: strict::sections(&mut table, "stages", &Stage::ALL.map(Stage::name))?,
         };
         let known = [
@@ -212,6 +205,7 @@ impl Configuration {
             "rotation",
             "translation",
             "exhaustive",
+            "refinement",
             "stages",
         ];
         match table.keys().next() {
@@ -264,6 +258,16 @@ impl Configuration {
         Window { scans: self.run.window, lag: self.masking.feedback_lag(), look_back: 1, live_depth }
     }
 
+    /// Whether the run has this stage.
+    pub fn has(&self, stage: Stage) -> bool {
+        match stage {
+            Stage::RotationSearch | Stage::TranslationSearch => self.search.kind == SearchKind::Decoupled,
+            Stage::JointSearch => self.search.kind == SearchKind::Exhaustive,
+            Stage::Refinement => self.refinement.kind == RefinementKind::LocalMap,
+            Stage::RadarReplay | Stage::Masking | Stage::PoseIntegration => true,
+        }
+    }
+
     /// The processes to start: `gyre stage NAME`, or what the configuration says instead.
     pub fn stage_plans(&self, gyre: &Path) -> Vec<StagePlan> {
         let plan = |stage: Stage| {
@@ -273,7 +277,7 @@ impl Configuration {
             let command = if own.command.is_empty() { ours() } else { own.command };
             StagePlan { name: name.to_owned(), command, restart: own.restart }
         };
-        Stage::ALL.into_iter().filter(|stage| self.search.kind.has(*stage)).map(plan).collect()
+        Stage::ALL.into_iter().filter(|stage| self.has(*stage)).map(plan).collect()
     }
 
     /// The text of the resolved configuration: a run from it repeats this run.
@@ -335,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn one_line_chooses_the_search() {
+    fn one_line_chooses_the_search_and_another_the_refinement() {
         let names = |text: &str| -> Vec<String> {
             from(text).unwrap().stage_plans(Path::new("gyre")).into_iter().map(|plan| plan.name).collect()
         };
@@ -343,6 +347,8 @@ mod tests {
         assert_eq!(names(""), halves);
         let joint = ["radar-replay", "masking", "joint-search", "pose-integration"];
         assert_eq!(names("[search]\nkind = 'exhaustive'"), joint);
+        let refined = ["radar-replay", "masking", "joint-search", "refinement", "pose-integration"];
+        assert_eq!(names("[search]\nkind = 'exhaustive'\n[refinement]\nkind = 'local-map'"), refined);
     }
 
     #[test]

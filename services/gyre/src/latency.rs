@@ -139,7 +139,7 @@ mod tests {
                 published_ns: received_ns + 7000,
             }
         };
-        let hops = [hop(0), hop(1), hop(2), hop(3), Hop::default(), hop(4)];
+        let hops = [hop(0), hop(1), hop(2), hop(3), Hop::default(), Hop::default(), hop(4)];
         PoseHeader { item: Item { due_ns, hops, ..Item::default() }, ..PoseHeader::default() }
     }
 

@@ -5,7 +5,7 @@ mod read;
 use std::fmt::Write;
 
 use gyre_evaluation::{Motion, UncertainMotion};
-use gyre_messages::{PoseHeader, flag};
+use gyre_messages::{PoseHeader, Refinement, flag, hypothesis, outcome};
 use gyre_radar::Trajectory;
 use nalgebra::{Isometry2, Matrix3, Vector2};
 
@@ -13,7 +13,8 @@ pub use read::read;
 
 const HEADER: &str = "seq,scan,previous_scan,stamp_ns,interval_ns,x_m,y_m,yaw_rad,\
     cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,score,runner_up_score,\
-    rotation_rad,rotation_variance_rad2,rotation_score,rotation_runner_up_rad,rotation_runner_up_score\n";
+    rotation_rad,rotation_variance_rad2,rotation_score,rotation_runner_up_rad,rotation_runner_up_score,\
+    searched_x_m,searched_y_m,searched_yaw_rad,outcome,hypothesis,overlap,support\n";
 
 /// One row a motion, in fixed decimals: the same scans and configuration give the same bytes. Where the chain of motions starts
 /// there is no row.
@@ -32,9 +33,35 @@ pub fn csv(poses: &[PoseHeader]) -> String {
         let (angle, runner_up) = (rotation.angle_rad, rotation.runner_up_rad);
         let _ = write!(text, ",{:.9},{:.9},{angle:.9}", motion.score, motion.runner_up_score);
         let _ = write!(text, ",{:.12},{:.9}", rotation.variance_rad2, rotation.score);
-        let _ = writeln!(text, ",{runner_up:.9},{:.9}", rotation.runner_up_score);
+        let _ = write!(text, ",{runner_up:.9},{:.9}", rotation.runner_up_score);
+        for value in motion.searched {
+            let _ = write!(text, ",{value:.9}");
+        }
+        let refinement = &motion.refinement;
+        let _ = write!(text, ",{},{}", outcome_name(refinement), hypothesis_name(refinement));
+        let _ = writeln!(text, ",{:.9},{:.9}", refinement.overlap, refinement.support);
     }
     text
+}
+
+fn outcome_name(refinement: &Refinement) -> &'static str {
+    match refinement.outcome {
+        outcome::SEARCHED => "searched",
+        outcome::REFINED => "refined",
+        outcome::WEAK => "weak",
+        outcome::PREDICTED => "predicted",
+        _ => "unknown",
+    }
+}
+
+fn hypothesis_name(refinement: &Refinement) -> &'static str {
+    match refinement.hypothesis {
+        hypothesis::NONE => "none",
+        hypothesis::PREDICTION => "prediction",
+        hypothesis::SEARCH => "search",
+        hypothesis::RUNNER_UP => "runner-up",
+        _ => "unknown",
+    }
 }
 
 /// The poses with the scans' times.
@@ -70,12 +97,22 @@ mod tests {
     fn a_row_a_motion_with_as_many_fields_as_the_header() {
         let pose = |seq, flags| PoseHeader {
             item: Item { seq, flags, ..Item::default() },
-            motion: MotionEstimate { x_m: 1.5, ..MotionEstimate::default() },
+            motion: MotionEstimate {
+                x_m: 1.5,
+                searched: [1.25, 0.0, 0.0],
+                refinement: Refinement {
+                    outcome: outcome::REFINED,
+                    hypothesis: hypothesis::RUNNER_UP,
+                    ..Refinement::default()
+                },
+                ..MotionEstimate::default()
+            },
             ..PoseHeader::default()
         };
         let text = csv(&[pose(0, flag::BREAK), pose(1, 0), pose(2, 0)]);
         let fields: Vec<usize> = text.lines().map(|line| line.split(',').count()).collect();
-        assert_eq!(fields, [21, 21, 21]);
+        assert_eq!(fields, [28, 28, 28]);
         assert!(text.contains(",1.500000000,"));
+        assert!(text.ends_with(",1.250000000,0.000000000,0.000000000,refined,runner-up,0.000000000,0.000000000\n"));
     }
 }

@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use gyre_evaluation::{NeesOptions, Options, plot_trajectory};
-use gyre_messages::{PoseHeader, flag};
+use gyre_messages::{PoseHeader, Stage, flag};
 use gyre_radar::{
     Trajectory,
     ground_truth::{find_ground_truth, read_trajectory, write_tum},
@@ -16,7 +16,7 @@ use crate::{
     judgement::{Judgement, judge, judge_motions},
     latency::Latency,
     odometry, print,
-    summary::{Counts, Session, Summary},
+    summary::{Counts, MotionCounts, Session, Summary},
 };
 
 /// Writes all files, and returns what the person at the terminal should read.
@@ -38,7 +38,8 @@ pub fn write(
     draw(out, &trajectory, judgement.as_ref())?;
     let latency = Latency::of(&poses[session.resumed.min(poses.len())..]);
     save(out, "latency.json", serde_json::to_string_pretty(&latency)?)?;
-    let counts = Counts::of(poses, end);
+    let motions = configuration.has(Stage::Refinement).then(|| MotionCounts::of(poses));
+    let counts = Counts { motions, ..Counts::of(poses, end) };
     let summary = Summary::new(configuration, out, session, counts, latency, judgement, report);
     save(out, "summary.json", serde_json::to_string_pretty(&summary)?)?;
     Ok(summary)

@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::flag;
+use gyre_messages::{Stage, flag};
 use gyre_pose_integration::journal;
 use gyre_stage::{
     Manifest,
@@ -45,6 +45,7 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
         window: checked.window,
         limits: checked.limits,
         live: configuration.run.mode == Mode::Live,
+        refines: configuration.has(Stage::Refinement),
         rate: configuration.run.rate.factor(),
     };
     let resolved = configuration.to_toml()?;

@@ -13,6 +13,7 @@ pub fn run(name: &str) -> ExitCode {
         gyre_rotation_search::NAME => gyre_rotation_search::run,
         gyre_translation_search::NAME => gyre_translation_search::run,
         gyre_joint_search::NAME => gyre_joint_search::run,
+        gyre_refinement::NAME => gyre_refinement::run,
         gyre_pose_integration::NAME => gyre_pose_integration::run,
         _ => {
             eprintln!("gyre: there is no stage `{name}`; there are {}", Stage::ALL.map(Stage::name).join(", "));

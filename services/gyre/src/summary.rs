@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, fmt, path::Path, time::Duration};
 
-use gyre_messages::{Footprint, PoseHeader, Stage, flag};
+use gyre_messages::{Footprint, PoseHeader, Stage, flag, hypothesis, outcome};
 use gyre_stage::{
     Statistics,
     supervise::{Ending, Report},
@@ -43,6 +43,41 @@ pub struct Counts {
     pub missing: u64,
     /// Places where the chain of motions starts anew, after the first.
     pub breaks: u64,
+    /// `None`: the run refines no motions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub motions: Option<MotionCounts>,
+}
+
+/// What became of the motions that were found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct MotionCounts {
+    /// Refined.
+    pub refined: u64,
+    /// Kept with a wider covariance, for want of support.
+    pub weak: u64,
+    /// Replaced by the motion before, for nothing fitted.
+    pub predicted: u64,
+    /// Weak or predicted: those that the odometry doubted and did something about.
+    pub doubtful: u64,
+    /// Refined ones that started from something else than the motion before.
+    pub second_hypothesis: u64,
+}
+
+impl MotionCounts {
+    /// From the poses.
+    pub fn of(poses: &[PoseHeader]) -> Self {
+        let with = |outcome| poses.iter().map(|pose| pose.motion.refinement).filter(move |r| r.outcome == outcome);
+        let count = |outcome| with(outcome).count() as u64;
+        let second = with(outcome::REFINED).filter(|r| r.hypothesis != hypothesis::PREDICTION);
+        let (weak, predicted) = (count(outcome::WEAK), count(outcome::PREDICTED));
+        Self {
+            refined: count(outcome::REFINED),
+            weak,
+            predicted,
+            doubtful: weak + predicted,
+            second_hypothesis: second.count() as u64,
+        }
+    }
 }
 
 impl Counts {
@@ -60,6 +95,7 @@ impl Counts {
             unreadable: seen.saturating_sub(published),
             missing: missing(poses),
             breaks: starts.saturating_sub(1),
+            motions: None,
         }
     }
 }
@@ -157,6 +193,13 @@ impl fmt::Display for Summary {
             "published {}  dropped {}  unreadable {}  missing {}  breaks {}",
             c.published, c.dropped, c.unreadable, c.missing, c.breaks
         )?;
+        if let Some(m) = &c.motions {
+            writeln!(
+                f,
+                "motions refined {} ({} by a second hypothesis)  weak {}  predicted {}",
+                m.refined, m.second_hypothesis, m.weak, m.predicted
+            )?;
+        }
         if !self.restarts.is_empty() {
             let restarts: Vec<_> = self.restarts.iter().map(|(stage, times)| format!("{stage} {times}")).collect();
             let recovery: Vec<_> = self.recovery_ms.iter().map(|ms| format!("{ms:.0}")).collect();
@@ -204,7 +247,7 @@ fn row(f: &mut fmt::Formatter<'_>, name: &str, p: &Percentiles) -> fmt::Result {
 
 #[cfg(test)]
 mod tests {
-    use gyre_messages::{Item, MotionEstimate};
+    use gyre_messages::{Item, MotionEstimate, Refinement};
 
     use super::*;
 
@@ -217,6 +260,25 @@ mod tests {
         let end = pose(3, 9, 10);
         let counts = Counts::of(&[pose(0, 0, 0), pose(1, 3, 3), pose(2, 7, 8)], Some(&end));
         assert_eq!(counts, Counts { published: 9, processed: 3, dropped: 6, unreadable: 1, ..Counts::default() });
+    }
+
+    #[test]
+    fn weak_and_predicted_motions_are_doubtful() {
+        let pose = |(outcome, hypothesis)| {
+            let refinement = Refinement { outcome, hypothesis, ..Refinement::default() };
+            PoseHeader { motion: MotionEstimate { refinement, ..MotionEstimate::default() }, ..PoseHeader::default() }
+        };
+        let poses = [
+            (outcome::SEARCHED, hypothesis::NONE),
+            (outcome::REFINED, hypothesis::PREDICTION),
+            (outcome::REFINED, hypothesis::SEARCH),
+            (outcome::REFINED, hypothesis::RUNNER_UP),
+            (outcome::WEAK, hypothesis::SEARCH),
+            (outcome::PREDICTED, hypothesis::NONE),
+        ];
+        let counts = MotionCounts::of(&poses.map(pose));
+        let expected = MotionCounts { refined: 3, weak: 1, predicted: 1, doubtful: 2, second_hypothesis: 2 };
+        assert_eq!(counts, expected);
     }
 
     #[test]

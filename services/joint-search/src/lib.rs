@@ -1,7 +1,7 @@
 //! Finds rotation and translation between consecutive scans together, by trying every angle (Masking by Moving; `raw` in
 //! Weston et al., Table III). It stands in for both halves of the decoupled search.
 
-use gyre_messages::{Masked, Motion, MotionEstimate, Pair, RotationEstimate};
+use gyre_messages::{Masked, Motion, MotionEstimate, Pair, Refinement, RotationEstimate};
 use gyre_radar::raster::RasterConfig;
 use gyre_scan_matching::{ConfigError, ExhaustiveConfig, ExhaustiveSearch, ShapeError};
 use gyre_stage::{
@@ -47,6 +47,8 @@ impl Motions {
             score: motion.score,
             runner_up_score: motion.runner_up.map_or(0.0, |runner_up| runner_up.score),
             rotation: wire(&found.rotation),
+            searched: [motion.x_m, motion.y_m, motion.yaw_rad],
+            refinement: Refinement::default(),
         })
     }
 }

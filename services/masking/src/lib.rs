@@ -4,7 +4,7 @@ mod config;
 
 use std::time::Duration;
 
-use gyre_messages::{Masked, MotionEstimate, mask_kind};
+use gyre_messages::{Masked, SearchedMotion, mask_kind};
 use gyre_radar::{
     PolarScan,
     raster::{RasterConfig, Rasteriser, Twist},
@@ -47,7 +47,7 @@ impl Masker {
     pub fn mask(
         &mut self,
         scan: &PolarScan<'_>,
-        motion: Option<&MotionEstimate>,
+        motion: Option<&SearchedMotion>,
         cells: &mut [f32],
     ) -> Result<Option<Twist>, gyre_radar::raster::RasterError> {
         let floor = self.config.floor();
@@ -91,7 +91,7 @@ impl Stage for Masker {
     }
 }
 
-fn twist_of(motion: &MotionEstimate) -> Twist {
+fn twist_of(motion: &SearchedMotion) -> Twist {
     let pose = Isometry2::new(Vector2::new(motion.x_m, motion.y_m), motion.yaw_rad);
     Twist::from_motion(&pose, motion.interval_ns as f64 * 1e-9)
 }

@@ -13,7 +13,7 @@ use gyre_messages::PoseHeader;
 use thiserror::Error;
 
 /// What a journal starts with; the number is the version of its records.
-const MAGIC: [u8; 16] = *b"gyre journal v2\n";
+const MAGIC: [u8; 16] = *b"gyre journal v3\n";
 const POSE: usize = size_of::<PoseHeader>();
 const RECORD: usize = POSE + 8;
 

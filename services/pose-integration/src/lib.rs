@@ -3,7 +3,7 @@
 mod compose;
 pub mod journal;
 
-use gyre_messages::{Item, MotionHeader, PoseHeader, flag};
+use gyre_messages::{Item, Motion, MotionHeader, PoseHeader, Refined, flag};
 use gyre_stage::{Launch, Sink, StageError, Statistics, clock, sink};
 
 pub use compose::compose;
@@ -17,7 +17,10 @@ pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
     let path = journal::path(&launch.manifest.out);
     let (journal, records) = Journal::open(&path).map_err(|error| StageError::Input(error.to_string()))?;
     let mut integration = Integration { journal, records, last: None };
-    sink::run(launch, &mut integration)
+    match launch.manifest.refines {
+        true => sink::run::<Refined>(launch, &mut integration),
+        false => sink::run::<Motion>(launch, &mut integration),
+    }
 }
 
 struct Integration {

@@ -1,6 +1,6 @@
 //! Finds the translation between consecutive scans once their rotation is known (Weston et al., Eq. 8).
 
-use gyre_messages::{Masked, Motion, MotionEstimate, Pair, Rotation, RotationEstimate};
+use gyre_messages::{Masked, Motion, MotionEstimate, Pair, Refinement, Rotation, RotationEstimate};
 use gyre_radar::raster::RasterConfig;
 use gyre_scan_matching::{ConfigError, ShapeError, TranslationConfig, TranslationSearch};
 use gyre_stage::{
@@ -46,6 +46,8 @@ impl Translations {
             score: found.score,
             runner_up_score: found.runner_up.map_or(0.0, |runner_up| runner_up.score),
             rotation,
+            searched: [found.x_m, found.y_m, found.yaw_rad],
+            refinement: Refinement::default(),
         })
     }
 }

@@ -16,7 +16,7 @@ pub mod flag {
 }
 
 /// The processes that a scan can pass, in order: the index of each one's [`Hop`]. A run has either the two halves of the
-/// search or the joint one; the hops of those it has not stay zero.
+/// search or the joint one, and refinement or not; the hops of those it has not stay zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(usize)]
 pub enum Stage {
@@ -30,25 +30,35 @@ pub enum Stage {
     TranslationSearch = 3,
     /// Finds both together.
     JointSearch = 4,
+    /// Refines the motion against what was seen before.
+    Refinement = 5,
     /// Composes the motions.
-    PoseIntegration = 5,
+    PoseIntegration = 6,
 }
 
 impl Stage {
     /// All of them, in the order of the stream.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::RadarReplay,
         Self::Masking,
         Self::RotationSearch,
         Self::TranslationSearch,
         Self::JointSearch,
+        Self::Refinement,
         Self::PoseIntegration,
     ];
 
     /// The name used in configurations, on the command line and in results.
     pub fn name(self) -> &'static str {
-        let names =
-            ["radar-replay", "masking", "rotation-search", "translation-search", "joint-search", "pose-integration"];
+        let names = [
+            "radar-replay",
+            "masking",
+            "rotation-search",
+            "translation-search",
+            "joint-search",
+            "refinement",
+            "pose-integration",
+        ];
         names[self as usize]
     }
 }
@@ -74,7 +84,7 @@ pub type Hops = [Hop; Stage::ALL.len()];
 /// Which scan a message is about, what it follows, and when each process had it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_item_v2")]
+#[type_name("gyre_item_v3")]
 pub struct Item {
     /// Number in the chain of motions: consecutive, from 0. All rules of the hand-over count in it.
     pub seq: u64,
@@ -115,6 +125,6 @@ mod tests {
     #[test]
     fn sizes_are_part_of_the_wire_format() {
         assert_eq!(size_of::<Hop>(), 32);
-        assert_eq!(size_of::<Item>(), 56 + 6 * 32);
+        assert_eq!(size_of::<Item>(), 56 + 7 * 32);
     }
 }

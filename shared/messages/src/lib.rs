@@ -8,6 +8,7 @@
 //! | `masked` | [`MaskedHeader`] | one or two rasters, in [`FloatBlock`]s |
 //! | `rotation` | [`RotationHeader`] | empty (later: the polar spectrum) |
 //! | `motion` | [`MotionHeader`] | empty |
+//! | `refined` | [`MotionHeader`] | empty |
 //! | `pose` | [`PoseHeader`] | empty |
 //!
 //! All of them start with an [`Item`]: which scan this is, what it follows, and when each process had it.
@@ -22,6 +23,7 @@ mod limits;
 mod masked;
 mod motion;
 mod pose;
+mod refined;
 mod rotation;
 mod scan;
 mod topic;
@@ -30,8 +32,9 @@ pub use block::{ByteBlock, FloatBlock};
 pub use item::{Hop, Hops, Item, Stage, flag};
 pub use limits::{Footprint, Limits, MAX_NODES, TopicSizes, Window, WindowError};
 pub use masked::{Masked, MaskedHeader, Pair, mask_kind};
-pub use motion::{Motion, MotionEstimate, MotionHeader};
+pub use motion::{Motion, MotionEstimate, MotionHeader, SearchedMotion};
 pub use pose::{Pose, PoseHeader};
+pub use refined::{Refined, Refinement, hypothesis, outcome};
 pub use rotation::{Rotation, RotationEstimate, RotationHeader};
 pub use scan::{Scan, ScanHeader};
 pub use topic::{Header, Message, TOPICS};

@@ -3,13 +3,17 @@
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-use crate::{FloatBlock, Item, topic::message};
+use crate::{
+    FloatBlock, Item,
+    topic::{header, message},
+};
 
 message! {
     /// One raster where the mask depends on one scan alone; two (this scan, then the scan before, each as this
     /// pair's mask leaves it) where the mask looked at both. The second starts at the next whole block.
     Masked, "masked", MaskedHeader, FloatBlock
 }
+header!(MaskedHeader);
 
 /// Values of [`MaskedHeader::mask`].
 pub mod mask_kind {
@@ -22,7 +26,7 @@ pub mod mask_kind {
 /// A raster's geometry and how it was made.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_masked_header_v2")]
+#[type_name("gyre_masked_header_v3")]
 pub struct MaskedHeader {
     /// Which scan this is.
     pub item: Item,

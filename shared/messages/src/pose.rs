@@ -3,17 +3,21 @@
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-use crate::{FloatBlock, Item, MotionEstimate, topic::message};
+use crate::{
+    FloatBlock, Item, MotionEstimate,
+    topic::{header, message},
+};
 
 message! {
     /// The trajectory's newest pose. Its `seq` is the credit that admits scan `seq + W`.
     Pose, "pose", PoseHeader, FloatBlock
 }
+header!(PoseHeader);
 
 /// A pose in the frame of the first scan, with the motion that led to it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_pose_header_v2")]
+#[type_name("gyre_pose_header_v3")]
 pub struct PoseHeader {
     /// Which scan this is.
     pub item: Item,

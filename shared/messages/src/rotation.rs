@@ -3,12 +3,16 @@
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-use crate::{FloatBlock, Item, topic::message};
+use crate::{
+    FloatBlock, Item,
+    topic::{header, message},
+};
 
 message! {
     /// The rotation of this scan against the one before.
     Rotation, "rotation", RotationHeader, FloatBlock
 }
+header!(RotationHeader);
 
 /// An angle and how much to trust it.
 #[repr(C)]
@@ -30,7 +34,7 @@ pub struct RotationEstimate {
 /// See [`RotationEstimate`].
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_rotation_header_v2")]
+#[type_name("gyre_rotation_header_v3")]
 pub struct RotationHeader {
     /// Which scan this is.
     pub item: Item,

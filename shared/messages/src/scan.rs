@@ -4,17 +4,21 @@ use bytemuck::Zeroable;
 use gyre_radar::{MAX_AZIMUTHS, PolarScan, ScanSlot, Sense, SweepGeometry};
 use iceoryx2::prelude::ZeroCopySend;
 
-use crate::{ByteBlock, Item, topic::message};
+use crate::{
+    ByteBlock, Item,
+    topic::{header, message},
+};
 
 message! {
     /// A sweep: the power of azimuth `a` at range bin `b` is byte `first_byte + a * stride + b` of the payload.
     Scan, "scan", ScanHeader, ByteBlock
 }
+header!(ScanHeader);
 
 /// A sweep's geometry and the angle and time of each azimuth, as measured.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Zeroable, ZeroCopySend)]
-#[type_name("gyre_scan_header_v2")]
+#[type_name("gyre_scan_header_v3")]
 pub struct ScanHeader {
     /// Which scan this is.
     pub item: Item,

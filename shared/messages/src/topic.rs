@@ -8,7 +8,7 @@ use iceoryx2::prelude::ZeroCopySend;
 use crate::item::Item;
 
 /// All topics, in the order of the stream.
-pub const TOPICS: [&str; 5] = ["scan", "masked", "rotation", "motion", "pose"];
+pub const TOPICS: [&str; 6] = ["scan", "masked", "rotation", "motion", "refined", "pose"];
 
 /// A fixed header that starts with an [`Item`].
 pub trait Header: ZeroCopySend + Default + Debug + 'static {
@@ -39,7 +39,13 @@ macro_rules! message {
             type Header = $header;
             type Element = $element;
         }
+    };
+}
+pub(crate) use message;
 
+/// Apart from [`message!`], for two messages may have the same header.
+macro_rules! header {
+    ($header:ty) => {
         impl $crate::Header for $header {
             fn item(&self) -> &$crate::Item {
                 &self.item
@@ -50,4 +56,4 @@ macro_rules! message {
         }
     };
 }
-pub(crate) use message;
+pub(crate) use header;

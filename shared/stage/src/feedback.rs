@@ -1,14 +1,19 @@
 //! The motions that masking compensates the sweep with: by id, never by time.
 //!
-//! A motion comes twice: from translation-search as soon as it is known, and with its pose once that is journalled. Both say
-//! the same; whichever is first will do. After a restart those before the last pose come from the journal, those after it from
-//! translation-search, which works them out anew.
+//! A motion comes twice: from the search as soon as it is known, and with its pose once that is journalled. Whichever is first
+//! will do only if both say the same, and a refined motion is not what the search said. So all that is learnt here is the motion
+//! as searched, which refinement passes on unchanged. After a restart those before the last pose come from the journal, those
+//! after it from the search, which works them out anew.
 
 use std::collections::VecDeque;
 
-use gyre_messages::{Item, Motion, MotionEstimate, Pose, flag};
+use gyre_messages::{Item, Motion, Pose, SearchedMotion, flag};
 
-use crate::{Launch, StageError, reader::Port, services::Listener};
+use crate::{
+    StageError,
+    reader::Port,
+    services::{Listener, Node},
+};
 
 /// Motions kept: more than any window and lag can ask for.
 const KEPT: usize = 256;
@@ -17,16 +22,16 @@ const KEPT: usize = 256;
 pub(crate) struct Feedback {
     motions: Port<Motion>,
     poses: Port<Pose>,
-    known: VecDeque<(u64, Option<MotionEstimate>)>,
+    known: VecDeque<(u64, Option<SearchedMotion>)>,
     sync: Option<Item>,
     newest_pose: Option<u64>,
 }
 
 impl Feedback {
-    pub(crate) fn open(launch: &Launch) -> Result<Self, StageError> {
+    pub(crate) fn open(node: &Node) -> Result<Self, StageError> {
         Ok(Self {
-            motions: Port::open(&launch.node)?,
-            poses: Port::open(&launch.node)?,
+            motions: Port::open(node)?,
+            poses: Port::open(node)?,
             known: VecDeque::with_capacity(KEPT + 1),
             sync: None,
             newest_pose: None,
@@ -36,7 +41,7 @@ impl Feedback {
     /// Takes in all that has come.
     pub(crate) fn update(&mut self) -> Result<(), StageError> {
         while let Some(received) = self.motions.receive()? {
-            self.learn(received.item(), &received.header().motion);
+            self.learn(received.item(), received.header().motion.as_searched());
         }
         while let Some(received) = self.poses.receive()? {
             let (item, header) = (*received.item(), received.header());
@@ -44,7 +49,7 @@ impl Feedback {
                 continue;
             }
             if !item.is(flag::BASE) {
-                self.learn(&item, &header.motion);
+                self.learn(&item, header.motion.as_searched());
                 self.newest_pose = self.newest_pose.max(Some(item.seq));
             }
             if item.is(flag::SYNC) {
@@ -54,12 +59,12 @@ impl Feedback {
         Ok(())
     }
 
-    fn learn(&mut self, item: &Item, motion: &MotionEstimate) {
+    fn learn(&mut self, item: &Item, motion: SearchedMotion) {
         if item.is(flag::END) || self.known.iter().any(|(seq, _)| *seq == item.seq) {
             return;
         }
         // Where the chain starts there is no motion.
-        let motion = (!item.is(flag::BREAK)).then_some(*motion);
+        let motion = (!item.is(flag::BREAK)).then_some(motion);
         let place = self.known.partition_point(|(seq, _)| *seq < item.seq);
         self.known.insert(place, (item.seq, motion));
         if self.known.len() > KEPT {
@@ -68,7 +73,7 @@ impl Feedback {
     }
 
     /// The motion of item `seq`: `None` as long as it is not known, `Some(None)` where the chain starts.
-    pub(crate) fn motion(&self, seq: u64) -> Option<Option<MotionEstimate>> {
+    pub(crate) fn motion(&self, seq: u64) -> Option<Option<SearchedMotion>> {
         self.known.iter().rev().find(|(known, _)| *known == seq).map(|(_, motion)| *motion)
     }
 

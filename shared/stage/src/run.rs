@@ -41,6 +41,8 @@ pub struct Manifest {
     pub limits: Limits,
     /// Whether the newest scan wins; else every scan is processed.
     pub live: bool,
+    /// Whether the run has a refinement: then poses are made of `refined`, else of `motion`.
+    pub refines: bool,
     /// How fast to play a recording: scans' own time divided by this; `None`: as fast as they are asked for.
     pub rate: Option<f64>,
 }

@@ -5,7 +5,7 @@
 
 use std::collections::VecDeque;
 
-use gyre_messages::{Item, MotionEstimate, Scan, Window, flag};
+use gyre_messages::{Item, Scan, SearchedMotion, Window, flag};
 
 use crate::{
     Launch, StageError,
@@ -21,7 +21,7 @@ pub struct Scans {
     feedback: Feedback,
     lag: u64,
     /// The motion for the scan at hand.
-    motion: Option<MotionEstimate>,
+    motion: Option<SearchedMotion>,
 }
 
 enum Intake {
@@ -34,14 +34,14 @@ pub struct ScanView<'a> {
     /// The scan.
     pub scan: &'a Received<Scan>,
     /// The motion of the scan `lag` before it; `None` where there was none.
-    pub motion: Option<MotionEstimate>,
+    pub motion: Option<SearchedMotion>,
 }
 
 impl Inputs for Scans {
     type View<'a> = ScanView<'a>;
 
     fn open(launch: &Launch) -> Result<Self, StageError> {
-        let feedback = Feedback::open(launch)?;
+        let feedback = Feedback::open(&launch.node)?;
         let window = launch.manifest.window;
         let intake = match launch.manifest.live {
             false => Intake::Lossless(InOrder { reader: Reader::open(&launch.node, None)?, window, flowing: false }),

@@ -2,7 +2,7 @@
 //!
 //! Stages never say a size, so no restart finds a service gone or of another size.
 
-use gyre_messages::{MAX_NODES, Masked, Message, Motion, Pose, Rotation, Scan, Window};
+use gyre_messages::{MAX_NODES, Masked, Message, Motion, Pose, Refined, Rotation, Scan, Window};
 use iceoryx2::{
     prelude::{Config, NodeBuilder, NodeName, ServiceName, SignalHandlingMode, ipc},
     service::port_factory::{event, publish_subscribe},
@@ -37,6 +37,7 @@ pub(crate) struct Services {
     _masked: Topic<Masked>,
     _rotation: Topic<Rotation>,
     _motion: Topic<Motion>,
+    _refined: Topic<Refined>,
     _pose: Topic<Pose>,
     _events: Vec<Event>,
 }
@@ -55,6 +56,7 @@ impl Services {
             _masked: create_topic::<Masked>(node, window)?,
             _rotation: create_topic::<Rotation>(node, window)?,
             _motion: create_topic::<Motion>(node, window)?,
+            _refined: create_topic::<Refined>(node, window)?,
             _pose: create_topic::<Pose>(node, window)?,
             _events: events,
         })

@@ -1,6 +1,6 @@
 //! The loop of the last stage: it alone owns state, and journals before it publishes.
 
-use gyre_messages::{Header, Item, Motion, MotionHeader, Pose, PoseHeader, Stage, flag};
+use gyre_messages::{Header, Item, Message, MotionHeader, Pose, PoseHeader, Stage, flag};
 
 use crate::{Launch, StageError, Statistics, allocations, clock, reader::Reader, wake, writer::Writer};
 
@@ -14,8 +14,8 @@ pub trait Sink {
     fn end(&mut self, item: &Item) -> Result<(), StageError>;
 }
 
-/// Runs the sink until SIGTERM.
-pub fn run(launch: &Launch, sink: &mut impl Sink) -> Result<Statistics, StageError> {
+/// Runs the sink on the motions of topic `M` until SIGTERM.
+pub fn run<M: Message<Header = MotionHeader>>(launch: &Launch, sink: &mut impl Sink) -> Result<Statistics, StageError> {
     let poses = Writer::<Pose>::open(&launch.node, &launch.manifest)?;
     let (restored, ended) = sink.restore(launch.manifest.window.sizes("pose").history)?;
     publish_again(&poses, &restored)?;
@@ -24,7 +24,7 @@ pub fn run(launch: &Launch, sink: &mut impl Sink) -> Result<Statistics, StageErr
     if ended {
         integration.publish_end(restored.last().map(|pose| pose.item).unwrap_or_default())?;
     }
-    let mut motions = Reader::<Motion>::open(&launch.node, Some(next))?;
+    let mut motions = Reader::<M>::open(&launch.node, Some(next))?;
     integration.drain(&mut motions)?;
     loop {
         let woken = launch.signals.wait(&[motions.listener()], Some(integration.poses.listener()), wake::NET)?;
@@ -72,7 +72,7 @@ struct Integration<'a, S: Sink> {
 }
 
 impl<S: Sink> Integration<'_, S> {
-    fn drain(&mut self, motions: &mut Reader<Motion>) -> Result<bool, StageError> {
+    fn drain<M: Message<Header = MotionHeader>>(&mut self, motions: &mut Reader<M>) -> Result<bool, StageError> {
         let mut progressed = false;
         while !self.ended {
             let Some(received) = motions.head()? else { break };

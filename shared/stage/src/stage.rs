@@ -15,7 +15,7 @@ pub trait Stage {
     type Inputs: Inputs;
     /// What it sends.
     type Output: Message;
-    /// Which of the five it is, or stands in for.
+    /// Which of the processes it is, or stands in for.
     const HOP: gyre_messages::Stage;
 
     /// Works on borrowed shared memory and writes into a loaned sample: header (but its item) and payload.

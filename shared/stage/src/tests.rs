@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod feedback;
 mod hand_over;
 mod wake_up;
 mod zero_copy;
@@ -40,6 +41,7 @@ impl Run {
             window: WINDOW,
             limits: Limits { scan_bytes: 1000, raster_cells: 100, rasters: 1 },
             live: false,
+            refines: false,
             rate: None,
         };
         manifest.write("").unwrap();
