@@ -10,6 +10,7 @@
 //! - `warp`: the earlier raster turned by it;
 //! - `translation`: [`TranslationSearch`], the shift and the whole motion; `scores`: one a shift; `overlap` normalises them;
 //! - `exhaustive`: [`ExhaustiveSearch`], all three unknowns at once, angle by angle; `correlate`: its transforms;
+//! - `refinement`: [`Refinement`], the motion below a cell, against a map of the last keyframes;
 //! - `peak`: maxima between samples; `covariance`: what their shapes say; `whiten`: phase-only correlation; `kernels`:
 //!   inner loops.
 //!
@@ -51,6 +52,7 @@ mod kernels;
 mod overlap;
 mod peak;
 mod polar;
+mod refinement;
 mod rotation;
 mod scores;
 mod spectrum;
@@ -62,6 +64,10 @@ mod window;
 pub use config::{ConfigError, Magnitude, Overlap, Peak, RotationConfig, RotationForm, TranslationConfig, Window};
 pub use exhaustive::{ExhaustiveConfig, ExhaustiveSearch, JointEstimate};
 pub use fft::fast_size;
+pub use refinement::{
+    Anchor,
+    Hypothesis, Keyframe, Memory, Outcome, Refined, Refinement, RefinementConfig, RefinementKind, ScanPoint,
+};
 pub use rotation::{RotationEstimate, RotationRunnerUp, RotationSearch};
 pub use spectrum::PolarSpectrum;
 pub use translation::{MotionEstimate, MotionRunnerUp, TranslationSearch};

@@ -1,0 +1,223 @@
+//! One level of the local map: keyframes' images on the world's grid, and their mean.
+//!
+//! A keyframe is drawn once, from its own points at its own pose, and never resampled: what is resampled again and again
+//! smears, and a map that smears along the way driven pulls the next scan after it.
+
+use multiversion::multiversion;
+use nalgebra::{Isometry2, Point2};
+
+use super::sweep::Placed;
+
+/// A Gaussian of one cell, at 0 to 3 cells.
+const BLUR: [f32; 4] = [0.399_050_3, 0.242_036_2, 0.054_005_58, 0.004_433_048];
+const BLUR_REACH: usize = 3;
+/// A cell that a keyframe is sure of.
+pub(super) const FULL: f32 = 255.0;
+
+/// What one keyframe saw, on a square of the world's grid: 0 where nothing, up to 255.
+#[derive(Debug, Clone)]
+pub(super) struct Image {
+    /// The world's cell (x, y) at the image's first value.
+    pub corner: [i64; 2],
+    /// Rows of equal x, growing with x; within a row growing with y.
+    pub cells: Vec<u8>,
+}
+
+/// The mean of the keyframes' images.
+#[derive(Debug)]
+pub(super) struct Level {
+    /// Metres a cell.
+    pub cell_m: f64,
+    /// Cells a side.
+    pub n: usize,
+    corner: [i64; 2],
+    /// Sum of the images.
+    sum: Vec<f32>,
+    images: usize,
+    drawing: Vec<f32>,
+    blurred: Vec<f32>,
+}
+
+/// Where a pose lies on a level, and the level's values.
+pub(super) struct Lookup<'a> {
+    /// Sums of values; divide by `full`.
+    pub sum: &'a [f32],
+    pub n: usize,
+    /// What a cell that all keyframes are sure of has.
+    pub full: f32,
+    /// Cells a metre.
+    pub per_m: f32,
+    /// World coordinates of cell (0, 0)'s place in the array, m.
+    pub origin: [f64; 2],
+}
+
+impl Level {
+    pub fn new(cell_m: f64, reach_m: f64) -> Self {
+        let n = 2 * (reach_m / cell_m).ceil() as usize + 1;
+        let cells = || vec![0.0; n * n];
+        Self { cell_m, n, corner: [0; 2], sum: cells(), images: 0, drawing: cells(), blurred: cells() }
+    }
+
+    pub fn new_image(&self) -> Image {
+        Image { corner: [0; 2], cells: vec![0; self.n * self.n] }
+    }
+
+    /// Draws a keyframe: splats, blurs, and saturates.
+    ///
+    /// The saturation m / (m + mean) lets a cell say at most "something is here": without it bright clutter, and what moves
+    /// along with the vehicle, outweighs the thousand faint returns that hold the motion.
+    pub fn draw(&mut self, points: &Placed, pose: &Isometry2<f64>, image: &mut Image) {
+        let half = (self.n / 2) as i64;
+        image.corner = [pose.translation.x, pose.translation.y].map(|v| (v / self.cell_m).floor() as i64 - half);
+        self.splat(points, pose, image.corner);
+        blur(&self.drawing, &mut self.blurred, 1);
+        blur(&self.blurred, &mut self.drawing, self.n);
+        let (sum, squares) = moments(&self.drawing);
+        let mean = if sum > 0.0 { squares / sum } else { 1.0 };
+        saturate(&self.drawing, mean as f32, &mut image.cells);
+    }
+
+    fn splat(&mut self, points: &Placed, pose: &Isometry2<f64>, corner: [i64; 2]) {
+        self.drawing.fill(0.0);
+        let (n, per_m) = (self.n, 1.0 / self.cell_m);
+        let inside = BLUR_REACH as f64..(n - BLUR_REACH - 2) as f64;
+        for ((&x, &y), &weight) in points.x_m.iter().zip(&points.y_m).zip(&points.weight) {
+            let at = pose * Point2::new(f64::from(x), f64::from(y));
+            let (u, v) = (at.x * per_m - corner[0] as f64, at.y * per_m - corner[1] as f64);
+            if !(inside.contains(&u) && inside.contains(&v)) {
+                continue;
+            }
+            let (i, j) = (u as usize, v as usize);
+            let (across, along) = ((u - i as f64) as f32, (v - j as f64) as f32);
+            let first = i * n + j;
+            self.drawing[first] += weight * (1.0 - across) * (1.0 - along);
+            self.drawing[first + 1] += weight * (1.0 - across) * along;
+            self.drawing[first + n] += weight * across * (1.0 - along);
+            self.drawing[first + n + 1] += weight * across * along;
+        }
+    }
+
+    /// Makes this the map of these images, about the last of them. Sums of whole numbers: exact in any order.
+    pub fn stack<'a>(&mut self, images: impl Iterator<Item = &'a Image> + Clone) {
+        self.sum.fill(0.0);
+        self.images = 0;
+        let Some(newest) = images.clone().last() else { return };
+        self.corner = newest.corner;
+        for image in images {
+            self.images += 1;
+            let [down, right] = [image.corner[0] - self.corner[0], image.corner[1] - self.corner[1]];
+            let n = self.n as i64;
+            let (first_col, last_col) = (right.max(0), (right + n).min(n));
+            if first_col >= last_col {
+                continue;
+            }
+            for row in down.max(0)..(down + n).min(n) {
+                let to = (row * n + first_col) as usize..(row * n + last_col) as usize;
+                let from = ((row - down) * n + first_col - right) as usize;
+                let from = &image.cells[from..from + to.len()];
+                self.sum[to].iter_mut().zip(from).for_each(|(sum, cell)| *sum += f32::from(*cell));
+            }
+        }
+    }
+
+    pub fn lookup(&self) -> Lookup<'_> {
+        Lookup {
+            sum: &self.sum,
+            n: self.n,
+            full: FULL * self.images.max(1) as f32,
+            per_m: (1.0 / self.cell_m) as f32,
+            origin: self.corner.map(|cell| cell as f64 * self.cell_m),
+        }
+    }
+}
+
+/// One pass of the blur along an axis. What lies within the blur's reach of the array's ends stays zero; the caller draws
+/// nothing there.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+fn blur(from: &[f32], to: &mut [f32], stride: usize) {
+    let margin = BLUR_REACH * stride;
+    let count = from.len() - 2 * margin;
+    let at = |steps: usize| &from[steps * stride..][..count];
+    let (a, b, c, d, e, f, g) = (at(0), at(1), at(2), at(3), at(4), at(5), at(6));
+    let inner = &mut to[margin..][..count];
+    for k in 0..count {
+        inner[k] = BLUR[0] * d[k] + BLUR[1] * (c[k] + e[k]) + BLUR[2] * (b[k] + f[k]) + BLUR[3] * (a[k] + g[k]);
+    }
+}
+
+/// Sum and sum of squares, in lanes.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+fn moments(values: &[f32]) -> (f64, f64) {
+    let (chunks, rest) = values.as_chunks::<16>();
+    let (mut sums, mut squares) = ([0.0_f32; 16], [0.0_f32; 16]);
+    for chunk in chunks {
+        for lane in 0..16 {
+            sums[lane] += chunk[lane];
+            squares[lane] += chunk[lane] * chunk[lane];
+        }
+    }
+    let total = |lanes: [f32; 16], rest: f32| lanes.iter().map(|v| f64::from(*v)).sum::<f64>() + f64::from(rest);
+    (total(sums, rest.iter().sum()), total(squares, rest.iter().map(|v| v * v).sum()))
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+fn saturate(values: &[f32], mean: f32, cells: &mut [u8]) {
+    for (cell, value) in cells.iter_mut().zip(values) {
+        *cell = (FULL * value / (value + mean) + 0.5) as u8;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector2;
+
+    use super::*;
+
+    fn points(places: &[[f32; 2]]) -> Placed {
+        Placed {
+            x_m: places.iter().map(|p| p[0]).collect(),
+            y_m: places.iter().map(|p| p[1]).collect(),
+            weight: vec![1.0; places.len()],
+        }
+    }
+
+    fn brightest(level: &Level) -> [f64; 2] {
+        let lookup = level.lookup();
+        let brightest = (0..lookup.sum.len()).max_by(|a, b| lookup.sum[*a].total_cmp(&lookup.sum[*b])).unwrap_or(0);
+        [brightest / level.n, brightest % level.n].map(|k| k as f64 * level.cell_m).into_iter().zip(lookup.origin)
+            .map(|(at, origin)| at + origin).collect::<Vec<_>>().try_into().unwrap_or([f64::NAN; 2])
+    }
+
+    #[test]
+    fn the_same_place_seen_from_two_poses_falls_into_one_cell() {
+        let mut level = Level::new(0.5, 20.0);
+        let (mut first, mut second) = (level.new_image(), level.new_image());
+        level.draw(&points(&[[6.0, 2.0]]), &Isometry2::identity(), &mut first);
+        let pose = Isometry2::new(Vector2::new(3.0, 1.0), std::f64::consts::FRAC_PI_2);
+        let seen = pose.inverse() * Point2::new(6.0, 2.0);
+        level.draw(&points(&[[seen.x as f32, seen.y as f32]]), &pose, &mut second);
+        level.stack([&first, &second].into_iter());
+        assert_eq!(brightest(&level), [6.0, 2.0]);
+        let peak = level.lookup().sum.iter().copied().fold(0.0, f32::max);
+        assert!((peak / level.lookup().full - 0.79).abs() < 0.02, "{peak}: peak over mean is 0.159 over 0.0796, less the blur's");
+    }
+
+    #[test]
+    fn a_blur_keeps_the_sum() {
+        let mut level = Level::new(1.0, 20.0);
+        let mut image = level.new_image();
+        level.draw(&points(&[[0.3, 0.4], [7.7, -8.2]]), &Isometry2::identity(), &mut image);
+        let (sum, _) = moments(&level.drawing);
+        assert!((sum - 2.0).abs() < 1e-5, "{sum}");
+    }
+
+    #[test]
+    fn what_is_out_of_reach_is_left_out() {
+        let mut level = Level::new(1.0, 20.0);
+        let mut image = level.new_image();
+        level.draw(&points(&[[25.0, 0.0], [f32::NAN, 0.0], [0.0, -1e30]]), &Isometry2::identity(), &mut image);
+        assert!(image.cells.iter().all(|cell| *cell == 0));
+        level.stack([&image].into_iter());
+        assert!(level.lookup().sum.iter().all(|sum| *sum == 0.0));
+    }
+}

@@ -1,0 +1,102 @@
+//! A scan's points, put where they were in the middle of its sweep.
+
+use multiversion::multiversion;
+use nalgebra::Vector3;
+
+/// A point of a scan, as the sensor saw it: `[x_m, y_m, time_s, weight, doppler_s]`.
+///
+/// x forward and y left in the sensor's frame at the moment it was measured; that moment from the middle of the sweep;
+/// what the point counts, above 0 and at most 1; and by how much its range is too short for each m/s of approach.
+pub type ScanPoint = [f32; 5];
+
+/// Points in the frame of the sweep's middle, as three columns.
+#[derive(Debug, Default)]
+pub(super) struct Placed {
+    pub x_m: Vec<f32>,
+    pub y_m: Vec<f32>,
+    pub weight: Vec<f32>,
+}
+
+impl Placed {
+    pub fn with_capacity(points: usize) -> Self {
+        let column = || Vec::with_capacity(points);
+        Self { x_m: column(), y_m: column(), weight: column() }
+    }
+
+    /// Undoes the sweep's distortion by a constant velocity (m/s, m/s, rad/s) of the sensor in its own frame.
+    pub fn place(&mut self, points: &[ScanPoint], velocity: &Vector3<f64>) {
+        for column in [&mut self.x_m, &mut self.y_m, &mut self.weight] {
+            column.clear();
+            column.resize(points.len(), 0.0);
+        }
+        place(points, velocity.map(|v| v as f32).into(), &mut self.x_m, &mut self.y_m, &mut self.weight);
+    }
+
+    pub fn total_weight(&self) -> f64 {
+        self.weight.iter().map(|w| f64::from(*w)).sum()
+    }
+}
+
+/// The sensor's pose at time t on its arc is the chord (v t), turned by half the angle, and the turn by the whole angle.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+fn place(points: &[ScanPoint], [vx, vy, rate]: [f32; 3], x_m: &mut [f32], y_m: &mut [f32], weight: &mut [f32]) {
+    let places = x_m.iter_mut().zip(y_m).zip(weight);
+    for (&[x, y, t, w, doppler], ((x_m, y_m), weight)) in points.iter().zip(places) {
+        // Range shift by Doppler along the line of sight u: r + doppler (u . v); x + (u . v) u doppler.
+        let toward = doppler * (x * vx + y * vy) / (x * x + y * y).max(1e-6);
+        let (x, y) = (x + toward * x, y + toward * y);
+        let (sin, cos) = sin_cos(rate * t);
+        let (half_sin, half_cos) = sin_cos(0.5 * rate * t);
+        let (ahead, aside) = (vx * t, vy * t);
+        *x_m = half_cos * ahead - half_sin * aside + cos * x - sin * y;
+        *y_m = half_sin * ahead + half_cos * aside + sin * x + cos * y;
+        *weight = w;
+    }
+}
+
+/// Sine and cosine by their series: to 2e-6 within half a radian, which a vehicle turns in no sweep.
+#[inline(always)]
+fn sin_cos(a: f32) -> (f32, f32) {
+    let s = a * a;
+    (a * (1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0))), 1.0 - s / 2.0 * (1.0 - s / 12.0 * (1.0 - s / 30.0)))
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Isometry2, Point2, Vector2};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn a_point_lies_where_the_sensor_on_its_arc_saw_it(
+            v in prop::array::uniform2(-20.0_f64..20.0), rate in -2.0_f64..2.0, t in -0.125_f64..0.125,
+            at in prop::array::uniform2(-90.0_f64..90.0),
+        ) {
+            let mut placed = Placed::default();
+            placed.place(&[[at[0] as f32, at[1] as f32, t as f32, 0.5, 0.0]], &Vector3::new(v[0], v[1], rate));
+            // The arc in a thousand straight steps, each taken along the heading in its middle.
+            let (steps, mut pose) = (1000, Isometry2::identity());
+            let dt = t / f64::from(steps);
+            for _ in 0..steps {
+                let half = Isometry2::rotation(0.5 * rate * dt);
+                pose = pose * half * Isometry2::new(Vector2::new(v[0], v[1]) * dt, 0.0) * half;
+            }
+            let expected = pose * Point2::new(at[0], at[1]);
+            // The chord is taken as long as the arc: off by the turn squared over 24.
+            let slack = 1e-3 + (v[0].hypot(v[1]) * t.abs()) * (rate * t).powi(2) / 20.0;
+            prop_assert!((f64::from(placed.x_m[0]) - expected.x).abs() < slack);
+            prop_assert!((f64::from(placed.y_m[0]) - expected.y).abs() < slack);
+        }
+    }
+
+    #[test]
+    fn what_comes_nearer_was_seen_too_near() {
+        let mut placed = Placed::default();
+        let ahead_and_aside = [[30.0, 0.0, 0.0, 1.0, 0.05], [0.0, 30.0, 0.0, 1.0, 0.05], [-30.0, 0.0, 0.0, 1.0, 0.05]];
+        placed.place(&ahead_and_aside, &Vector3::new(10.0, 0.0, 0.0));
+        assert_eq!(placed.x_m, [30.5, 0.0, -29.5]);
+        assert_eq!(placed.y_m, [0.0, 30.0, 0.0]);
+    }
+}
