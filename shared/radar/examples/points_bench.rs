@@ -33,12 +33,13 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 fn first_scans(folder: &Path) -> Result<Vec<OwnedScan>, Box<dyn Error>> {
     let mut dataset = gyre_radar::open(folder, &DatasetOptions::default())?;
+    let count = SCANS.min(dataset.len());
     let read = |index| {
         let mut scan = OwnedScan::with_limits(dataset.limits());
         scan.geometry = dataset.read(index, scan.slot())?;
         Ok(scan)
     };
-    (0..SCANS.min(dataset.len())).map(read).collect()
+    (0..count).map(read).collect()
 }
 
 /// Medians of the number of points and of the time.

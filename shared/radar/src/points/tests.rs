@@ -124,11 +124,9 @@ fn places() -> Vec<Point2<f64>> {
 #[test]
 fn a_moving_sensors_points_are_where_the_scatterers_are_once_motion_and_doppler_are_undone() {
     let twist = Twist { vx_mps: 18.0, vy_mps: -0.4, yaw_rate_radps: 0.4 };
-    for (sense, chirps_alternate, range_resolution_m) in [
-        (Sense::Clockwise, false, 0.0438),
-        (Sense::CounterClockwise, false, 0.1736),
-        (Sense::Clockwise, true, 0.0438),
-    ] {
+    for (sense, chirps_alternate, range_resolution_m) in
+        [(Sense::Clockwise, false, 0.0438), (Sense::CounterClockwise, false, 0.1736), (Sense::Clockwise, true, 0.0438)]
+    {
         let sensor = Sensor {
             twist,
             sense,

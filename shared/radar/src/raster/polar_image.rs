@@ -61,7 +61,14 @@ impl Layout {
 impl PolarImage {
     /// `window_m`: metres of range that a sample is the mean of; less than a bin counts as one bin.
     pub fn new(window_m: f32) -> Self {
-        Self { window_m, layout: Layout::default(), samples: Vec::new(), pieces: Vec::new(), above_floor: Vec::new(), measured: Vec::new() }
+        Self {
+            window_m,
+            layout: Layout::default(),
+            samples: Vec::new(),
+            pieces: Vec::new(),
+            above_floor: Vec::new(),
+            measured: Vec::new(),
+        }
     }
 
     /// Takes the scan's powers out to `furthest_m`; columns beyond hold nothing of use. With a `motion` the columns are
