@@ -12,7 +12,7 @@ use std::{
 
 use gyre_masking::MaskingConfig;
 use gyre_messages::{Stage, Window};
-use gyre_radar::{DatasetOptions, RasterConfig};
+use gyre_radar::{DatasetOptions, PointsConfig, RasterConfig};
 use gyre_radar_replay::SourceConfig;
 use gyre_refinement::{RefinementConfig, RefinementKind};
 use gyre_scan_matching::{ExhaustiveConfig, RotationConfig, TranslationConfig};
@@ -37,6 +37,8 @@ pub struct Configuration {
     pub simulation: Option<SimulationConfig>,
     /// The Cartesian rasters.
     pub raster: RasterConfig,
+    /// The sparse points beside them.
+    pub points: PointsConfig,
     /// What to take out of them.
     pub masking: MaskingConfig,
     /// Which search.
@@ -186,6 +188,7 @@ impl Configuration {
                 false => None,
             },
             raster: strict::section(&mut table, "raster")?,
+            points: strict::section(&mut table, "points")?,
             masking: strict::section(&mut table, "masking")?,
             search: strict::section(&mut table, "search")?,
             rotation: strict::section(&mut table, "rotation")?,
@@ -200,6 +203,7 @@ impl Configuration {
             "dataset",
             "simulation",
             "raster",
+            "points",
             "masking",
             "search",
             "rotation",
@@ -217,6 +221,7 @@ impl Configuration {
     fn validate(&self) -> Result<(), ConfigurationError> {
         let value = |section: &str, reason: String| ConfigurationError::Value { section: section.to_owned(), reason };
         self.raster.validate().map_err(|e| value("raster", e.to_string()))?;
+        self.points.validate().map_err(|e| value("points", e.to_string()))?;
         self.rotation.validate().map_err(|e| value("rotation", e.to_string()))?;
         self.translation.validate().map_err(|e| value("translation", e.to_string()))?;
         self.exhaustive.validate().map_err(|e| value("exhaustive", e.to_string()))?;
@@ -327,6 +332,7 @@ mod tests {
         for (text, part) in [
             ("[run]\nwindow = 0", "window"),
             ("[raster]\nn = 0", "raster.n"),
+            ("[points]\ncapacity = 70000", "points.capacity"),
             ("[masking]\nlag = 0", "lag"),
             ("[masking]\nthreshold = 300", "300"),
             ("[run]\nmode = 'live'", "rate"),

@@ -64,6 +64,7 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
         scan_bytes: dataset.limits().bytes,
         raster_cells: configuration.raster.n * configuration.raster.n,
         rasters: 1,
+        points: configuration.points.capacity,
     };
     let footprint = Footprint::new(&window, &limits);
     check_shared_memory(&footprint)?;

@@ -1,13 +1,13 @@
-//! Rasterises each scan, undoes its sweep's distortion, and masks what would mislead the search.
+//! Rasterises each scan, undoes its sweep's distortion, masks what would mislead the search, and picks the sparse points out.
 
 mod config;
 
 use std::time::Duration;
 
-use gyre_messages::{Masked, SearchedMotion, mask_kind};
+use gyre_messages::{FloatBlock, Masked, SearchedMotion, mask_kind};
 use gyre_radar::{
-    PolarScan,
-    raster::{RasterConfig, Rasteriser, Twist},
+    Point, PointExtractor, PointsConfig, PointsError, PolarScan, ScanError,
+    raster::{RasterConfig, RasterError, Rasteriser, Twist},
 };
 use gyre_stage::{
     Launch, Stage, StageError, Statistics,
@@ -16,6 +16,7 @@ use gyre_stage::{
     writer::Draft,
 };
 use nalgebra::{Isometry2, Vector2};
+use thiserror::Error;
 
 pub use config::{MaskKind, MaskingConfig};
 
@@ -25,22 +26,45 @@ pub const NAME: &str = "masking";
 /// Runs the stage until it is told to stop.
 pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
+    let points: PointsConfig = launch.section("points")?;
     let masking: MaskingConfig = launch.section("masking")?;
-    let mut masker = Masker::new(&raster, &masking).map_err(|error| StageError::Configuration(error.to_string()))?;
+    let mut masker =
+        Masker::new(&raster, &points, &masking).map_err(|error| StageError::Configuration(error.to_string()))?;
     stage::run(launch, &mut masker)
 }
 
-/// Makes masked rasters of scans.
+/// Makes masked rasters and sparse points of scans. Both start above the same floor. What a mask makes of a return is its
+/// factor: on the power in a raster's cell, on the weight of a point.
 pub struct Masker {
     raster: RasterConfig,
     config: MaskingConfig,
     rasteriser: Rasteriser,
+    points: PointExtractor,
+}
+
+/// Settings that nothing can be masked with.
+#[derive(Debug, Error)]
+pub enum MaskerError {
+    /// The rasters'.
+    #[error(transparent)]
+    Raster(#[from] RasterError),
+    /// The points'.
+    #[error(transparent)]
+    Points(#[from] PointsError),
 }
 
 impl Masker {
-    /// Plans the rasters.
-    pub fn new(raster: &RasterConfig, config: &MaskingConfig) -> Result<Self, gyre_radar::raster::RasterError> {
-        Ok(Self { raster: raster.clone(), config: config.clone(), rasteriser: Rasteriser::new(raster)? })
+    /// Plans the rasters and the points.
+    ///
+    /// # Errors
+    /// The first setting that is out of its bounds.
+    pub fn new(raster: &RasterConfig, points: &PointsConfig, config: &MaskingConfig) -> Result<Self, MaskerError> {
+        Ok(Self {
+            raster: raster.clone(),
+            config: config.clone(),
+            rasteriser: Rasteriser::new(raster)?,
+            points: PointExtractor::new(points)?,
+        })
     }
 
     /// Masks one scan into `cells`, row 0 far ahead. Returns the velocity that its sweep's distortion was undone with.
@@ -49,18 +73,26 @@ impl Masker {
         scan: &PolarScan<'_>,
         motion: Option<&SearchedMotion>,
         cells: &mut [f32],
-    ) -> Result<Option<Twist>, gyre_radar::raster::RasterError> {
+    ) -> Result<Option<Twist>, RasterError> {
         let floor = self.config.floor();
         if let Some(twist) = motion.filter(|_| self.config.compensate).map(twist_of) {
             match self.rasteriser.rasterise(scan, floor, Some(twist), cells) {
                 Ok(()) => return Ok(Some(twist)),
                 // A motion that no vehicle makes is a wrong match: better no compensation than that.
-                Err(gyre_radar::raster::RasterError::Twist { .. }) => {}
+                Err(RasterError::Twist { .. }) => {}
                 Err(error) => return Err(error),
             }
         }
         self.rasteriser.rasterise(scan, floor, None, cells)?;
         Ok(None)
+    }
+
+    /// Writes the scan's points to the start of `out`, and returns how many there are: see [`PointExtractor::extract`].
+    ///
+    /// # Errors
+    /// A scan that contradicts itself.
+    pub fn points(&mut self, scan: &PolarScan<'_>, out: &mut [Point]) -> Result<usize, ScanError> {
+        self.points.extract(scan, self.config.floor(), out)
     }
 }
 
@@ -73,8 +105,12 @@ impl Stage for Masker {
         let scan = input.scan.header().view(input.scan.values());
         let scan = scan.ok_or_else(|| input.scan.malformed("its payload is shorter than its header says"))?;
         let (header, values) = output.parts::<f32>();
-        let cells = &mut values[..self.raster.n * self.raster.n];
-        let twist = self.mask(&scan, input.motion.as_ref(), cells).map_err(|e| input.scan.malformed(e.to_string()))?;
+        let cells = self.raster.n * self.raster.n;
+        let (raster, points) = values.split_at_mut(FloatBlock::count(cells) * FloatBlock::LEN);
+        let twist = self.mask(&scan, input.motion.as_ref(), &mut raster[..cells]);
+        let twist = twist.map_err(|e| input.scan.malformed(e.to_string()))?;
+        let points = self.points(&scan, points.as_chunks_mut().0).map_err(|e| input.scan.malformed(e.to_string()))?;
+        header.points = points as u32;
         header.n = self.raster.n as u32;
         header.rasters = 1;
         header.cell_m = self.raster.cell_m;

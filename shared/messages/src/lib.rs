@@ -5,7 +5,7 @@
 //! | topic | header | payload |
 //! |---|---|---|
 //! | `scan` | [`ScanHeader`] | the sweep's bytes, in [`ByteBlock`]s |
-//! | `masked` | [`MaskedHeader`] | one or two rasters, in [`FloatBlock`]s |
+//! | `masked` | [`MaskedHeader`] | one or two rasters and the scan's points, in [`FloatBlock`]s |
 //! | `rotation` | [`RotationHeader`] | empty (later: the polar spectrum) |
 //! | `motion` | [`MotionHeader`] | empty |
 //! | `refined` | [`MotionHeader`] | empty |

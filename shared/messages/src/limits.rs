@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use gyre_radar::Point;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -116,6 +117,8 @@ pub struct Limits {
     pub raster_cells: usize,
     /// Rasters in a `masked` message: 1 or 2.
     pub rasters: usize,
+    /// Points in a `masked` message.
+    pub points: usize,
 }
 
 impl Limits {
@@ -123,7 +126,10 @@ impl Limits {
     pub fn elements(&self, topic: &str) -> usize {
         match topic {
             "scan" => ByteBlock::count(self.scan_bytes),
-            "masked" => self.rasters * FloatBlock::count(self.raster_cells),
+            "masked" => {
+                let points = FloatBlock::count(self.points * size_of::<Point>() / size_of::<f32>());
+                self.rasters * FloatBlock::count(self.raster_cells) + points
+            }
             _ => 1,
         }
     }
@@ -188,7 +194,7 @@ mod tests {
 
     #[test]
     fn the_footprint_of_oxford_at_255_is_what_was_measured_with_such_sizes() {
-        let limits = Limits { scan_bytes: 400 * 3779, raster_cells: 255 * 255, rasters: 2 };
+        let limits = Limits { scan_bytes: 400 * 3779, raster_cells: 255 * 255, rasters: 2, points: 0 };
         let total = Footprint::new(&WINDOW, &limits).total();
         // 42.9 MB with two readers of `masked`; the third has twelve rasters of 0.52 MB more.
         assert!((48_000_000..52_000_000).contains(&total), "{total}");

@@ -1,6 +1,7 @@
-//! `masked`: Cartesian rasters with what would mislead the search taken out.
+//! `masked`: Cartesian rasters with what would mislead the search taken out, and the scan's sparse points.
 
 use bytemuck::{Pod, Zeroable};
+use gyre_radar::Point;
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
@@ -10,7 +11,8 @@ use crate::{
 
 message! {
     /// One raster where the mask depends on one scan alone; two (this scan, then the scan before, each as this
-    /// pair's mask leaves it) where the mask looked at both. The second starts at the next whole block.
+    /// pair's mask leaves it) where the mask looked at both. The second starts at the next whole block, and at the next
+    /// after the last raster this scan's points.
     Masked, "masked", MaskedHeader, FloatBlock
 }
 header!(MaskedHeader);
@@ -42,6 +44,10 @@ pub struct MaskedHeader {
     pub twist: [f32; 3],
     /// 1 where the sweep's distortion was undone.
     pub compensated: u32,
+    /// Points behind the rasters, see [`MaskedHeader::points`].
+    pub points: u32,
+    /// Unused, zero.
+    pub reserved: u32,
 }
 
 impl MaskedHeader {
@@ -50,11 +56,18 @@ impl MaskedHeader {
         self.n as usize * self.n as usize
     }
 
+    /// The scan's points, each `[x_m, y_m, time_s, weight, doppler_s]`: see `gyre_radar::Point`. `None` where the payload
+    /// is shorter than the header says.
+    pub fn points<'a>(&self, values: &'a [f32]) -> Option<&'a [Point]> {
+        let first = (self.rasters as usize).checked_mul(raster_values(self.cells()))?;
+        values.get(first..)?.as_chunks().0.get(..self.points as usize)
+    }
+
     /// The rasters to compare: this scan's, and that of the scan before, which is the second one here where the mask looked
     /// at both, else the first one there. `None` where a payload is shorter than its header says.
     pub fn pair<'a>(&self, values: &'a [f32], before: Option<(&Self, &'a [f32])>) -> Option<Pair<'a>> {
         let later = values.get(..self.cells())?;
-        let second = FloatBlock::count(self.cells()) * FloatBlock::LEN;
+        let second = raster_values(self.cells());
         let earlier = match before {
             None => None,
             Some(_) if self.rasters == 2 => Some(values.get(second..second + self.cells())?),
@@ -63,6 +76,11 @@ impl MaskedHeader {
         };
         Some(Pair { later, earlier })
     }
+}
+
+/// Values from one raster's start to that of what follows it.
+fn raster_values(cells: usize) -> usize {
+    FloatBlock::count(cells) * FloatBlock::LEN
 }
 
 /// Two rasters of the same size.
@@ -88,5 +106,17 @@ mod tests {
         assert_eq!(earlier(&two).map(|raster| (raster.len(), raster[0])), Some((9, 1.0)));
         assert!(one.pair(&now, None).is_some_and(|pair| pair.earlier.is_none()));
         assert!(one.pair(&now[..8], None).is_none());
+    }
+
+    #[test]
+    fn points_start_at_the_block_behind_the_last_raster() {
+        let values: Vec<f32> = (0..48).map(|value| value as f32).collect();
+        let one = MaskedHeader { n: 3, rasters: 1, points: 2, ..MaskedHeader::default() };
+        let expected = [[16.0, 17.0, 18.0, 19.0, 20.0], [21.0, 22.0, 23.0, 24.0, 25.0]];
+        assert_eq!(one.points(&values), Some(expected.as_slice()));
+        let two = MaskedHeader { rasters: 2, ..one };
+        assert_eq!(two.points(&values).map(|points| points[0][0]), Some(32.0));
+        assert_eq!(MaskedHeader { points: 4, ..two }.points(&values), None);
+        assert_eq!(MaskedHeader { rasters: u32::MAX, n: u32::MAX, ..one }.points(&values), None);
     }
 }

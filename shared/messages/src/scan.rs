@@ -36,8 +36,8 @@ pub struct ScanHeader {
     pub range_offset_m: f32,
     /// 1 where azimuths grow clockwise seen from above, else 0.
     pub clockwise: u32,
-    /// Unused, zero.
-    pub reserved: u32,
+    /// Metres to add to a range for each m/s of approach, 0 where it is not known: see [`SweepGeometry::doppler_s`].
+    pub doppler_s: f32,
     /// Time of each row, ns since 1970.
     pub azimuth_stamp_ns: [i64; MAX_AZIMUTHS],
     /// Angle of each row from straight ahead, radians in [0, 2 pi).
@@ -87,7 +87,7 @@ impl ScanHeader {
         self.range_resolution_m = geometry.range_resolution_m;
         self.range_offset_m = geometry.range_offset_m;
         self.clockwise = (geometry.sense == Sense::Clockwise).into();
-        self.reserved = 0;
+        self.doppler_s = geometry.doppler_s;
         self.item.stamp_ns = geometry.stamp_ns;
     }
 
@@ -99,6 +99,7 @@ impl ScanHeader {
             first_byte: self.first_byte as usize,
             range_resolution_m: self.range_resolution_m,
             range_offset_m: self.range_offset_m,
+            doppler_s: self.doppler_s,
             sense: if self.clockwise == 1 { Sense::Clockwise } else { Sense::CounterClockwise },
             stamp_ns: self.item.stamp_ns,
         }

@@ -60,6 +60,7 @@ fn made_up_scan() -> OwnedScan {
         first_byte: METADATA,
         range_resolution_m: 0.0438,
         range_offset_m: 0.0,
+        doppler_s: 0.0,
         sense: Sense::Clockwise,
         stamp_ns: 0,
     };

@@ -4,12 +4,14 @@
 //! - [`scan`]: one sweep in the sensor's own grid, borrowed for reading or for filling;
 //! - [`mod@dataset`]: recordings on disk behind one trait, a file each format;
 //! - [`raster`]: from a sweep to a Cartesian raster, the sweep's motion undone;
+//! - [`points`]: from a sweep to the returns that stand out;
 //! - [`mod@ground_truth`]: trajectories of others, converted to REP-103;
 //! - [`mod@inspect`]: what a recording is, and what looks wrong with it.
 
 pub mod dataset;
 pub mod ground_truth;
 pub mod inspect;
+pub mod points;
 pub mod raster;
 pub mod scan;
 pub mod trajectory;
@@ -17,6 +19,7 @@ pub mod trajectory;
 pub use dataset::{AzimuthSource, Dataset, DatasetOptions, Format, ImageSize, OpenError, ReadError, open};
 pub use ground_truth::{TrajectoryError, find_ground_truth, read_trajectory, write_kitti, write_tum};
 pub use inspect::{Report, inspect};
+pub use points::{Point, PointExtractor, PointsConfig, PointsError};
 pub use raster::{RasterConfig, RasterError, Rasteriser, Sampling, Twist};
-pub use scan::{MAX_AZIMUTHS, OwnedScan, PolarScan, ScanLimits, ScanSlot, Sense, SweepGeometry};
+pub use scan::{MAX_AZIMUTHS, OwnedScan, PolarScan, ScanError, ScanLimits, ScanSlot, Sense, SweepGeometry};
 pub use trajectory::Trajectory;

@@ -18,15 +18,14 @@ mod sweep_motion;
 mod twist;
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
-use crate::scan::{MAX_AZIMUTHS, PolarScan, Sense, SweepGeometry};
+use crate::scan::{PolarScan, ScanError, Sense, SweepGeometry};
 use bearing_table::BearingTable;
 use cells::Cells;
 use kernels::locate::{self, Lookup, Taps};
 use polar_image::PolarImage;
 use serde::{Deserialize, Serialize};
-use std::ops::RangeInclusive;
 use sweep_motion::SweepMotion;
 pub use sweep_motion::{MAX_TRAVEL_M, MAX_TURN_RAD};
 pub use twist::Twist;
@@ -114,34 +113,9 @@ pub enum RasterError {
         /// What was given.
         actual: usize,
     },
-    /// One of the scan's slices is shorter than its geometry says.
-    #[error("the scan's {what} has {actual} elements, its geometry asks for {expected}")]
-    ScanLength {
-        /// Which slice.
-        what: &'static str,
-        /// What the geometry asks for.
-        expected: usize,
-        /// What is there.
-        actual: usize,
-    },
-    /// One of the geometry's numbers is impossible.
-    #[error("the scan's {what} is {value}, expected {} to {}", bounds.start(), bounds.end())]
-    Geometry {
-        /// Which number.
-        what: &'static str,
-        /// Its value.
-        value: f64,
-        /// What it may be.
-        bounds: RangeInclusive<f64>,
-    },
-    /// An azimuth is not a finite angle.
-    #[error("azimuth {index} of the scan is at {value} rad")]
-    Azimuth {
-        /// Which row.
-        index: usize,
-        /// Its angle.
-        value: f32,
-    },
+    /// The scan contradicts itself.
+    #[error(transparent)]
+    Scan(#[from] ScanError),
     /// The motion to undo is not finite, or goes further than [`MAX_TURN_RAD`] or [`MAX_TRAVEL_M`].
     #[error("no sensor turns by {turn_rad} rad and travels {travel_m} m within half a sweep (twist {twist:?})")]
     Twist {
@@ -194,7 +168,8 @@ impl Rasteriser {
     /// Writes the raster of `scan` to `out`: `n * n` values, power above `floor`, 0 to `255 - floor`.
     ///
     /// With a `twist` the raster shows the scene from where the sensor stood at `scan.geometry.stamp_ns`: each cell
-    /// is looked up where the sensor was when it looked there, by the azimuths' own stamps.
+    /// is looked up where the sensor was when it looked there, by the azimuths' own stamps, and Doppler's shift of the
+    /// ranges is undone where the scan knows it.
     /// What no azimuth or bin covers is zero; a scan without azimuths or bins gives zeros. Between the last azimuth
     /// and the first, as between all others, the powers are interpolated.
     ///
@@ -213,10 +188,10 @@ impl Rasteriser {
             return Ok(());
         }
         let motion = twist.map(|twist| SweepMotion::new(twist, scan)).transpose()?;
-        self.bearings.measure(scan)?;
+        self.bearings.measure(scan);
         self.cells.look_in(scan.geometry.sense);
         let travel_m = motion.as_ref().map_or(0.0, |motion| motion.travel_m);
-        self.polar.fill(scan, floor, self.cells.furthest_m + travel_m);
+        self.polar.fill(scan, floor, self.cells.furthest_m + travel_m, motion.as_ref());
         self.sample(&scan.geometry, motion.as_ref(), out);
         Ok(())
     }
@@ -247,32 +222,6 @@ impl Rasteriser {
         if out.len() != expected {
             return Err(RasterError::OutputLength { expected, actual: out.len() });
         }
-        check_scan(scan)
-    }
-}
-
-fn check_scan(scan: &PolarScan<'_>) -> Result<(), RasterError> {
-    let geometry = &scan.geometry;
-    let at_least = |what, actual, expected| match actual >= expected {
-        true => Ok(()),
-        false => Err(RasterError::ScanLength { what, expected, actual }),
-    };
-    at_least("azimuth table", scan.azimuth_rad.len(), geometry.azimuths)?;
-    at_least("table of stamps", scan.stamp_ns.len(), geometry.azimuths)?;
-    if geometry.azimuths > 0 {
-        let last_row = (geometry.azimuths - 1).saturating_mul(geometry.stride);
-        let bytes = last_row.saturating_add(geometry.first_byte).saturating_add(geometry.bins);
-        at_least("image", scan.bytes.len(), bytes)?;
-    }
-    check_number("number of azimuths", geometry.azimuths as f64, 0.0..=MAX_AZIMUTHS as f64)?;
-    check_number("number of bins", geometry.bins as f64, 0.0..=1e6)?;
-    check_number("range resolution in metres", geometry.range_resolution_m.into(), 1e-3..=1e3)?;
-    check_number("range offset in metres", geometry.range_offset_m.into(), -1e4..=1e4)
-}
-
-fn check_number(what: &'static str, value: f64, bounds: RangeInclusive<f64>) -> Result<(), RasterError> {
-    match bounds.contains(&value) {
-        true => Ok(()),
-        false => Err(RasterError::Geometry { what, value, bounds }),
+        Ok(scan.check()?)
     }
 }

@@ -3,6 +3,10 @@
 //! The bytes live wherever the caller keeps them (usually shared memory): [`PolarScan`] borrows them for reading,
 //! [`ScanSlot`] borrows them for a reader of files to fill.
 
+mod check;
+
+pub use check::ScanError;
+
 /// Most azimuths in one sweep. Navtech's radars measure 400, some 800.
 pub const MAX_AZIMUTHS: usize = 1024;
 
@@ -43,6 +47,10 @@ pub struct SweepGeometry {
     pub range_resolution_m: f32,
     /// Metres to add to a bin's range: bin `b`'s centre is at `(b + 0.5) * range_resolution_m + range_offset_m`.
     pub range_offset_m: f32,
+    /// Metres to add to a range for each m/s at which the sensor approaches what it looks at (Doppler's shift of a chirp),
+    /// 0 where it is not known. What approaches reads too near with a rising chirp, so this is positive there, and
+    /// negative with a falling one; azimuths that say which chirp they used take their sign from that.
+    pub doppler_s: f32,
     /// Which way the azimuths grow.
     pub sense: Sense,
     /// The scan's time, ns since 1970: the middle of the sweep on the sensor's clock, unless the reader says otherwise.
@@ -71,7 +79,22 @@ impl<'a> PolarScan<'a> {
         &self.bytes[first..first + self.geometry.bins]
     }
 
-    /// Range of a bin's centre in metres; fractions of a bin are welcome.
+    /// Seconds from the scan's stamp to an azimuth's.
+    pub fn time_s(&self, azimuth: usize) -> f64 {
+        self.stamp_ns[azimuth].saturating_sub(self.geometry.stamp_ns) as f64 * 1e-9
+    }
+
+    /// [`SweepGeometry::doppler_s`] of one azimuth, its sign by the azimuth's chirp where that is known.
+    pub fn doppler_s(&self, azimuth: usize) -> f32 {
+        let shift_s = self.geometry.doppler_s;
+        match self.flags[azimuth] & (flag::CHIRP_KNOWN | flag::CHIRP_UP) {
+            0 | flag::CHIRP_UP => shift_s,
+            flag::CHIRP_KNOWN => -shift_s.abs(),
+            _ => shift_s.abs(),
+        }
+    }
+
+    /// Range of a bin's centre in metres, Doppler's shift included; fractions of a bin are welcome.
     pub fn range_m(&self, bin: f32) -> f32 {
         (bin + 0.5) * self.geometry.range_resolution_m + self.geometry.range_offset_m
     }
@@ -125,6 +148,7 @@ impl OwnedScan {
                 first_byte: 0,
                 range_resolution_m: 0.0,
                 range_offset_m: 0.0,
+                doppler_s: 0.0,
                 sense: Sense::Clockwise,
                 stamp_ns: 0,
             },

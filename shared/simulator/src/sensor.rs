@@ -273,6 +273,7 @@ fn geometry(time: SweepTime) -> SweepGeometry {
         first_byte: METADATA_BYTES,
         range_resolution_m: RANGE_RESOLUTION_M as f32,
         range_offset_m: 0.0,
+        doppler_s: 0.0,
         sense: Sense::Clockwise,
         stamp_ns: (time.start_us + time.stamp_us(AZIMUTHS - 1)) * 500,
     }

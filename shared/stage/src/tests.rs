@@ -39,7 +39,7 @@ impl Run {
             root: root.path().to_owned(),
             out: out.path().to_owned(),
             window: WINDOW,
-            limits: Limits { scan_bytes: 1000, raster_cells: 100, rasters: 1 },
+            limits: Limits { scan_bytes: 1000, raster_cells: 100, rasters: 1, points: 0 },
             live: false,
             refines: false,
             rate: None,

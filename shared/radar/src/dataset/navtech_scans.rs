@@ -53,6 +53,7 @@ impl Profile {
 pub(crate) struct NavtechScans {
     images: Images,
     profile: Profile,
+    doppler_s: f32,
     period_ns: i64,
     notes: Vec<String>,
 }
@@ -70,7 +71,7 @@ impl NavtechScans {
         let profile = profile(look.as_ref()).with(options);
         notes.extend(look.iter().flat_map(|look| observations(look, &profile)));
         let period_ns = stamp::usual_interval((0..images.len()).filter_map(|i| images.name_stamp_ns(i)));
-        Ok(Self { images, profile, period_ns, notes })
+        Ok(Self { images, profile, doppler_s: options.doppler_s, period_ns, notes })
     }
 
     fn check_slot(&self, slot: &ScanSlot<'_>) -> Result<(), ReadError> {
@@ -245,6 +246,7 @@ impl Dataset for NavtechScans {
             first_byte: METADATA_BYTES,
             range_resolution_m: profile.range_resolution_m,
             range_offset_m: profile.range_offset_m,
+            doppler_s: self.doppler_s,
             sense: Sense::Clockwise,
             stamp_ns: scan_ns,
         })

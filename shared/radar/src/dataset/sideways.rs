@@ -17,6 +17,7 @@ pub(crate) struct SidewaysScans {
     pub(crate) images: Images,
     pub(crate) range_resolution_m: f32,
     range_offset_m: f32,
+    doppler_s: f32,
     scratch: Vec<u8>,
 }
 
@@ -33,6 +34,7 @@ impl SidewaysScans {
             images,
             range_resolution_m: 0.0,
             range_offset_m: options.range_offset_m.unwrap_or(0.0),
+            doppler_s: options.doppler_s,
             scratch: Vec::new(),
         };
         scans.check_shape(format)?;
@@ -107,6 +109,7 @@ impl SidewaysScans {
             first_byte: 0,
             range_resolution_m: self.range_resolution_m,
             range_offset_m: self.range_offset_m,
+            doppler_s: self.doppler_s,
             sense: Sense::Clockwise,
             stamp_ns,
         }

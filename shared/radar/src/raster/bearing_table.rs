@@ -1,6 +1,5 @@
 //! From a bearing to the azimuth measured there, and when.
 
-use super::RasterError;
 use crate::scan::{MAX_AZIMUTHS, PolarScan};
 use std::f64::consts::TAU;
 
@@ -35,13 +34,9 @@ impl BearingTable {
         }
     }
 
-    /// Takes the azimuths and stamps of a scan that has at least one azimuth.
-    pub fn measure(&mut self, scan: &PolarScan<'_>) -> Result<(), RasterError> {
+    /// Takes the azimuths and stamps of a scan that has at least one azimuth and passed its check.
+    pub fn measure(&mut self, scan: &PolarScan<'_>) {
         let azimuths = &scan.azimuth_rad[..scan.geometry.azimuths];
-        if let Some(index) = azimuths.iter().position(|azimuth| !azimuth.is_finite()) {
-            let value = azimuths[index];
-            return Err(RasterError::Azimuth { index, value });
-        }
         let first = azimuths.first().copied().unwrap_or(0.0);
         self.start = (f64::from(first) / TAU).rem_euclid(1.0) as f32;
         if self.start >= 1.0 {
@@ -49,7 +44,6 @@ impl BearingTable {
         }
         self.unwrap(azimuths);
         self.fill_nodes(scan);
-        Ok(())
     }
 
     fn unwrap(&mut self, azimuths: &[f32]) {
@@ -68,7 +62,7 @@ impl BearingTable {
 
     fn fill_nodes(&mut self, scan: &PolarScan<'_>) {
         let last = scan.geometry.azimuths - 1;
-        let seconds = |azimuth: usize| seconds_from_stamp(scan, azimuth.min(last));
+        let seconds = |azimuth: usize| scan.time_s(azimuth.min(last));
         let mut below = 0;
         for node in 0..=NODES {
             let bearing = node as f64 / NODES as f64;
@@ -86,15 +80,8 @@ impl BearingTable {
     }
 }
 
-/// Seconds from the scan's stamp to an azimuth's.
-pub(super) fn seconds_from_stamp(scan: &PolarScan<'_>, azimuth: usize) -> f64 {
-    let nanoseconds = scan.stamp_ns[azimuth].saturating_sub(scan.geometry.stamp_ns);
-    nanoseconds as f64 * 1e-9
-}
-
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::scan::{OwnedScan, ScanLimits};
 
@@ -107,7 +94,7 @@ mod tests {
             scan.stamp_ns[i] = (time_s * 1e9) as i64;
         }
         let mut table = BearingTable::new();
-        table.measure(&scan.view()).unwrap();
+        table.measure(&scan.view());
         table
     }
 

@@ -1,7 +1,6 @@
 //! A twist as the loops over cells use it.
 
 use super::RasterError;
-use super::bearing_table::seconds_from_stamp;
 use super::twist::Twist;
 use crate::scan::{PolarScan, Sense};
 
@@ -23,8 +22,7 @@ pub(super) struct SweepMotion {
 
 impl SweepMotion {
     pub fn new(twist: Twist, scan: &PolarScan<'_>) -> Result<Self, RasterError> {
-        let longest_s =
-            (0..scan.geometry.azimuths).map(|azimuth| seconds_from_stamp(scan, azimuth).abs()).fold(0.0, f64::max);
+        let longest_s = (0..scan.geometry.azimuths).map(|azimuth| scan.time_s(azimuth).abs()).fold(0.0, f64::max);
         let turn_rad = (twist.yaw_rate_radps * longest_s).abs();
         let travel_m = twist.speed_mps() * longest_s;
         if !(turn_rad <= MAX_TURN_RAD && travel_m <= MAX_TRAVEL_M) {
@@ -40,6 +38,17 @@ impl SweepMotion {
             half_yaw_rate_radps: (0.5 * seen.yaw_rate_radps) as f32,
             travel_m: travel_m as f32,
         })
+    }
+
+    /// Speed toward what the sensor looks at, m/s.
+    pub fn approach_mps(&self, azimuth_rad: f32) -> f32 {
+        let (sin, cos) = azimuth_rad.sin_cos();
+        self.vx_mps * cos + self.vz_mps * sin
+    }
+
+    /// The largest speed toward anything, m/s.
+    pub fn speed_mps(&self) -> f32 {
+        self.vx_mps.hypot(self.vz_mps)
     }
 
     /// A point, given in the frame at the scan's stamp, in the sensor's frame `t_s` seconds later: exp(twist t)^-1 p.

@@ -4,4 +4,4 @@ mod compensation;
 mod placement;
 mod reading;
 mod robustness;
-mod scene;
+pub(crate) mod scene;

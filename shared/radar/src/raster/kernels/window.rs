@@ -142,6 +142,20 @@ fn sums<const COLUMNS: usize>(pieces: &[u16], terms: usize, spacing: usize) -> [
     sums
 }
 
+/// Moves samples by so many columns toward the end, linear between columns; where nothing comes from is zero.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+pub fn shift(samples: &[u16], by: f32, out: &mut [u16]) {
+    let whole = (-by).floor();
+    let share = ((-by - whole) * UNIT as f32) as u32;
+    let first = (-whole).max(0.0) as usize;
+    let from = whole.max(0.0) as usize;
+    out.fill(0);
+    let pairs = samples.get(from..).unwrap_or_default().iter().zip(samples.get(from + 1..).unwrap_or_default());
+    for (out, (&near, &far)) in out.get_mut(first..).unwrap_or_default().iter_mut().zip(pairs) {
+        *out = ((u32::from(near) * (UNIT - share) + u32::from(far) * share) / UNIT) as u16;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -183,6 +197,25 @@ mod tests {
                 let expected = direct_mean(&bins, floor, bins_a_piece, centre, width);
                 let got = f64::from(mean) / f64::from(UNIT);
                 prop_assert!((got - expected).abs() < 0.02, "piece {piece}: {got} for {expected}");
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn shifted_samples_equal_the_line_between_their_neighbours(
+            samples in proptest::collection::vec(0u16..=65280, 2..200), by in -250.0..250.0f32,
+        ) {
+            let mut out = vec![1; samples.len()];
+            shift(&samples, by, &mut out);
+            let at = |column: f32| samples.get(column as usize).map_or(0.0, |&sample| f32::from(sample));
+            for (column, &got) in out.iter().enumerate() {
+                let place = column as f32 - by;
+                let inside = place.floor() >= 0.0 && place.floor() + 1.0 < samples.len() as f32;
+                let share = place - place.floor();
+                let expected = if inside { at(place) * (1.0 - share) + at(place + 1.0) * share } else { 0.0 };
+                // The share is a whole number of 256ths.
+                prop_assert!((f32::from(got) - expected).abs() <= 1.0 + 65280.0 / 255.0, "{column}: {got} for {expected}");
             }
         }
     }

@@ -58,6 +58,37 @@ proptest! {
 }
 
 #[test]
+fn dopplers_shift_is_undone_chirp_by_chirp() {
+    let twist = Twist { vx_mps: 20.0, vy_mps: 0.5, yaw_rate_radps: 0.3 };
+    for (sense, chirps_alternate, doppler_s) in
+        [(Sense::Clockwise, false, 0.042), (Sense::CounterClockwise, false, -0.042), (Sense::Clockwise, true, 0.049)]
+    {
+        let sensor = Sensor { twist, sense, doppler_s, chirps_alternate, ..Sensor::navtech() };
+        for config in [
+            RasterConfig::default(),
+            RasterConfig { cell_m: 0.4, n: 511, ..RasterConfig::default() },
+            RasterConfig { sampling: Sampling::Bilinear, ..RasterConfig::default() },
+        ] {
+            let miss = worst_miss(&config, &sensor, Some(twist));
+            assert!(miss < 0.05, "{sense:?} {chirps_alternate} {config:?}: {miss}");
+        }
+    }
+}
+
+#[test]
+fn dopplers_shift_moves_scatterers_where_it_is_not_known() {
+    let twist = Twist { vx_mps: 20.0, vy_mps: 0.0, yaw_rate_radps: 0.0 };
+    let sensor = Sensor { twist, doppler_s: 0.042, ..Sensor::navtech() };
+    let config = RasterConfig::default();
+    let mut scan = sensor.measure(&places(), SIGMA_M);
+    scan.geometry.doppler_s = 0.0;
+    let place = polar(12.0, 3.0 * std::f64::consts::FRAC_PI_4);
+    let miss = miss_cells(&config, &raster(&config, &scan, Some(twist)), &place, 4.0 * SIGMA_M);
+    let expected = 0.042 * 20.0 * std::f64::consts::FRAC_1_SQRT_2 / f64::from(config.cell_m);
+    assert!((miss - expected).abs() < 0.05, "{miss} for {expected}");
+}
+
+#[test]
 fn stamps_are_believed_where_they_come_in_bursts() {
     let twist = Twist { vx_mps: 20.0, vy_mps: 0.0, yaw_rate_radps: 0.3 };
     let mut sensor = Sensor { twist, ..Sensor::navtech() };

@@ -2,7 +2,7 @@
 
 use super::scene::{STAMP_NS, Sensor, raster};
 use crate::raster::{RasterConfig, RasterError, Rasteriser, Sampling, Twist};
-use crate::scan::{OwnedScan, Sense};
+use crate::scan::{OwnedScan, ScanError, Sense};
 use nalgebra::Point2;
 use proptest::prelude::*;
 use serde::Deserialize;
@@ -51,13 +51,16 @@ fn scan_that_is_shorter_than_its_geometry_is_refused() {
     let mut scan = sensor(4, 10).scan();
     scan.geometry.bins = 11;
     let refused = try_raster(&scan, None).unwrap_err();
-    assert!(matches!(refused, RasterError::ScanLength { what: "image", expected: 85, actual: 84 }), "{refused}");
+    assert!(
+        matches!(refused, RasterError::Scan(ScanError::Length { what: "image", expected: 85, actual: 84 })),
+        "{refused}"
+    );
     let mut view = scan.view();
     view.stamp_ns = &[];
     let refused = Rasteriser::new(&small()).unwrap().rasterise(&view, 0, None, &mut [0.0; 1089]);
-    assert!(matches!(refused, Err(RasterError::ScanLength { what: "table of stamps", .. })));
+    assert!(matches!(refused, Err(RasterError::Scan(ScanError::Length { what: "table of stamps", .. }))));
     scan.geometry.stride = usize::MAX;
-    assert!(matches!(try_raster(&scan, None), Err(RasterError::ScanLength { what: "image", .. })));
+    assert!(matches!(try_raster(&scan, None), Err(RasterError::Scan(ScanError::Length { what: "image", .. }))));
 }
 
 #[test]
@@ -65,11 +68,14 @@ fn impossible_numbers_are_refused() {
     for resolution_m in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         let mut scan = sensor(4, 10).scan();
         scan.geometry.range_resolution_m = resolution_m;
-        assert!(matches!(try_raster(&scan, None), Err(RasterError::Geometry { .. })), "{resolution_m}");
+        assert!(
+            matches!(try_raster(&scan, None), Err(RasterError::Scan(ScanError::Geometry { .. }))),
+            "{resolution_m}"
+        );
     }
     let mut scan = sensor(4, 10).scan();
     scan.azimuth_rad[2] = f32::NAN;
-    assert!(matches!(try_raster(&scan, None), Err(RasterError::Azimuth { index: 2, .. })));
+    assert!(matches!(try_raster(&scan, None), Err(RasterError::Scan(ScanError::Azimuth { index: 2, .. }))));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Scans drawn exactly: what a sensor that may move measures of soft scatterers.
 
 use crate::raster::{RasterConfig, Rasteriser, Twist};
-use crate::scan::{OwnedScan, ScanLimits, Sense, SweepGeometry};
+use crate::scan::{OwnedScan, ScanLimits, Sense, SweepGeometry, flag};
 use nalgebra::Point2;
 use std::f64::consts::TAU;
 
@@ -18,6 +18,9 @@ pub struct Sensor {
     pub bins: usize,
     pub range_resolution_m: f32,
     pub range_offset_m: f32,
+    pub doppler_s: f32,
+    /// Every second azimuth's chirp falls, and the scan says so.
+    pub chirps_alternate: bool,
     pub sense: Sense,
     pub twist: Twist,
 }
@@ -32,6 +35,8 @@ impl Sensor {
             bins: 3650,
             range_resolution_m: 0.0438,
             range_offset_m: 0.0,
+            doppler_s: 0.0,
+            chirps_alternate: false,
             sense: Sense::Clockwise,
             twist: Twist::default(),
         }
@@ -49,12 +54,16 @@ impl Sensor {
             first_byte: METADATA,
             range_resolution_m: self.range_resolution_m,
             range_offset_m: self.range_offset_m,
+            doppler_s: self.doppler_s,
             sense: self.sense,
             stamp_ns: STAMP_NS,
         };
         scan.azimuth_rad.copy_from_slice(&self.azimuth_rad);
         let stamps = self.time_s.iter().map(|time_s| STAMP_NS + (time_s * 1e9).round() as i64);
         scan.stamp_ns = stamps.collect();
+        for (azimuth, flags) in scan.flags.iter_mut().enumerate() {
+            *flags = flag::MEASURED | self.chirp(azimuth);
+        }
         scan
     }
 
@@ -66,9 +75,13 @@ impl Sensor {
             row[..METADATA].fill(255);
             let seen_from = self.twist.pose_at(self.time_s[azimuth]).inverse();
             let look = self.look(azimuth);
+            let approach_mps = look.dot(&nalgebra::Vector2::new(self.twist.vx_mps, self.twist.vy_mps));
+            let falls = self.chirp(azimuth) == flag::CHIRP_KNOWN;
+            let reads_too_near_m = f64::from(if falls { -self.doppler_s } else { self.doppler_s }) * approach_mps;
             for scatterer in scatterers.iter().map(|scatterer| seen_from * scatterer) {
                 for (bin, power) in row[METADATA..].iter_mut().enumerate() {
-                    let range_m = first_centre_m + bin as f64 * f64::from(self.range_resolution_m);
+                    let read_m = first_centre_m + bin as f64 * f64::from(self.range_resolution_m);
+                    let range_m = read_m + reads_too_near_m;
                     let distance_sq = (scatterer.coords - look * range_m).norm_squared();
                     let bell = 200.0 * (-0.5 * distance_sq / (sigma_m * sigma_m)).exp();
                     *power = power.saturating_add(bell.round() as u8);
@@ -76,6 +89,14 @@ impl Sensor {
             }
         }
         scan
+    }
+
+    fn chirp(&self, azimuth: usize) -> u8 {
+        match (self.chirps_alternate, azimuth % 2) {
+            (false, _) => 0,
+            (true, 0) => flag::CHIRP_KNOWN | flag::CHIRP_UP,
+            (true, _) => flag::CHIRP_KNOWN,
+        }
     }
 
     /// The direction of an azimuth, x forward and y left.

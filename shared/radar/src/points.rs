@@ -1,0 +1,192 @@
+//! Polar scan to sparse points: the returns that stand out, where the sensor saw them.
+//!
+//! A point is a range cell above the floor that no azimuth beside it outshines within the antenna's beam: a scatterer
+//! lights several azimuths up, and only the one that looked straight at it tells its bearing. Nothing is compared along
+//! range, so that a wall seen at a slant stays whole.
+//!
+//! In the order of the work: `RangeCells` sums the bins of each range cell, `peaks` finds the maxima across azimuths,
+//! and [`PointExtractor`] places the strongest of them.
+
+mod peaks;
+mod range_cells;
+
+#[cfg(test)]
+mod tests;
+
+use crate::scan::{PolarScan, ScanError, Sense};
+use peaks::{Beam, Peak};
+use range_cells::RangeCells;
+use serde::{Deserialize, Serialize};
+
+/// One return: `[x_m, y_m, time_s, weight, doppler_s]`.
+///
+/// - `x_m`, `y_m`: where it is in the sensor's own frame at the moment when its azimuth was measured, metres, x forward
+///   and y left. Neither the sweep's motion nor Doppler's shift is undone.
+/// - `time_s`: that moment, seconds from the scan's stamp.
+/// - `weight`: power above the floor over [`PointsConfig::weight_cap`], in `(0, 1]`.
+/// - `doppler_s`: metres to add to the range for each m/s at which the sensor approaches the point
+///   ([`PolarScan::doppler_s`]). With `u` the direction to the point and `v` the sensor's velocity, the point truly lay
+///   at `(x, y) + doppler_s (u . v) u`.
+pub type Point = [f32; 5];
+
+/// The most points that may be asked for.
+pub const MAX_POINTS: usize = 65_536;
+
+/// Which returns become points: the section `[points]` of a configuration.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PointsConfig {
+    /// A return must be the brightest at its range within so many degrees on either side, to the nearest azimuth.
+    /// Default 2.7: three azimuths of 0.9.
+    pub beam_deg: f32,
+    /// Bins finer than this are averaged to cells of about this depth, metres: a whole number of bins. Default 0.17.
+    pub range_cell_m: f32,
+    /// What is nearer than this is the vehicle's own reflections. Metres. Default 5.
+    pub min_range_m: f32,
+    /// What is further than this is left out. Metres. Default 95.
+    pub max_range_m: f32,
+    /// Power above the floor from which on a point counts in full. Default 60.
+    pub weight_cap: f32,
+    /// The most points of a scan; where there are more, the weakest are left out. 0: none are looked for. Default 8192.
+    pub capacity: usize,
+}
+
+impl Default for PointsConfig {
+    fn default() -> Self {
+        Self {
+            beam_deg: 2.7,
+            range_cell_m: 0.17,
+            min_range_m: 5.0,
+            max_range_m: 95.0,
+            weight_cap: 60.0,
+            capacity: 8192,
+        }
+    }
+}
+
+/// A setting out of its bounds.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("points.{key} is {value}, but must be {bounds}")]
+pub struct PointsError {
+    /// The setting.
+    pub key: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// What it may be.
+    pub bounds: &'static str,
+}
+
+impl PointsConfig {
+    /// Whether points can be found so.
+    ///
+    /// # Errors
+    /// The first setting that is out of its bounds.
+    pub fn validate(&self) -> Result<(), PointsError> {
+        let setting = |fits: bool, key, value: f32, bounds| match fits {
+            true => Ok(()),
+            false => Err(PointsError { key, value: value.into(), bounds }),
+        };
+        setting((0.0..=45.0).contains(&self.beam_deg), "beam_deg", self.beam_deg, "0 to 45")?;
+        setting((1e-3..=10.0).contains(&self.range_cell_m), "range_cell_m", self.range_cell_m, "0.001 to 10")?;
+        setting((0.0..=1e4).contains(&self.min_range_m), "min_range_m", self.min_range_m, "0 to 10000")?;
+        let beyond = self.max_range_m > self.min_range_m && self.max_range_m <= 1e4;
+        setting(beyond, "max_range_m", self.max_range_m, "more than min_range_m, at most 10000")?;
+        setting((1.0..=255.0).contains(&self.weight_cap), "weight_cap", self.weight_cap, "1 to 255")?;
+        setting(self.capacity <= MAX_POINTS, "capacity", self.capacity as f32, "at most 65536")
+    }
+}
+
+/// Finds the points of scans, one scan after the other. All memory is set aside by the first scan of a size.
+#[derive(Debug)]
+pub struct PointExtractor {
+    config: PointsConfig,
+    cells: RangeCells,
+    beam: Beam,
+    /// Peaks by power, while the weakest are left out.
+    counts: Vec<u32>,
+}
+
+impl PointExtractor {
+    /// An extractor that has seen no scan yet.
+    ///
+    /// # Errors
+    /// See [`PointsConfig::validate`].
+    pub fn new(config: &PointsConfig) -> Result<Self, PointsError> {
+        config.validate()?;
+        Ok(Self {
+            config: config.clone(),
+            cells: RangeCells::default(),
+            beam: Beam::new(config.beam_deg.to_radians()),
+            counts: Vec::with_capacity(range_cells::MAX_POWER + 1),
+        })
+    }
+
+    /// Writes the points of `scan` whose power is above `floor` to the start of `out`, azimuth by azimuth and outward.
+    /// Returns how many there are: at most [`PointsConfig::capacity`] and `out.len()`. Azimuths that were not measured
+    /// give none and outshine none.
+    ///
+    /// # Errors
+    /// A scan that contradicts itself; `out` is untouched then.
+    pub fn extract(&mut self, scan: &PolarScan<'_>, floor: u8, out: &mut [Point]) -> Result<usize, ScanError> {
+        scan.check()?;
+        let room = out.len().min(self.config.capacity);
+        if room == 0 {
+            return Ok(0);
+        }
+        self.cells.measure(scan, floor, &self.config);
+        let peaks = self.beam.peaks(scan, &self.cells);
+        let weakest = weakest_that_fits(peaks, room, &mut self.counts);
+        let cap = self.config.weight_cap * self.cells.bins_a_cell() as f32;
+        let mut count = 0;
+        for peaks in peaks.chunk_by(|a, b| a.azimuth == b.azimuth) {
+            let view = View::of(scan, usize::from(peaks[0].azimuth));
+            for peak in peaks.iter().filter(|peak| peak.power >= weakest) {
+                out[count] = view.point(self.cells.centre_m(peak.cell), (f32::from(peak.power) / cap).min(1.0));
+                count += 1;
+            }
+        }
+        Ok(count)
+    }
+}
+
+/// The lowest power that at most `room` peaks reach.
+fn weakest_that_fits(peaks: &[Peak], room: usize, counts: &mut Vec<u32>) -> i16 {
+    if peaks.len() <= room {
+        return 1;
+    }
+    counts.clear();
+    counts.resize(range_cells::MAX_POWER + 1, 0);
+    for peak in peaks {
+        counts[peak.power as usize] += 1;
+    }
+    let mut left = room as u32;
+    let mut weakest = range_cells::MAX_POWER;
+    while weakest > 0 && counts[weakest] <= left {
+        left -= counts[weakest];
+        weakest -= 1;
+    }
+    weakest as i16 + 1
+}
+
+/// What the points of one azimuth have in common.
+struct View {
+    /// Toward where the azimuth looks, x forward and y left.
+    look: [f32; 2],
+    time_s: f32,
+    doppler_s: f32,
+}
+
+impl View {
+    fn of(scan: &PolarScan<'_>, azimuth: usize) -> Self {
+        let (sin, cos) = scan.azimuth_rad[azimuth].sin_cos();
+        let left = match scan.geometry.sense {
+            Sense::Clockwise => -sin,
+            Sense::CounterClockwise => sin,
+        };
+        Self { look: [cos, left], time_s: scan.time_s(azimuth) as f32, doppler_s: scan.doppler_s(azimuth) }
+    }
+
+    fn point(&self, range_m: f32, weight: f32) -> Point {
+        [range_m * self.look[0], range_m * self.look[1], self.time_s, weight, self.doppler_s]
+    }
+}

@@ -1,0 +1,84 @@
+//! Cells that no azimuth beside them outshines.
+
+use super::range_cells::RangeCells;
+use crate::scan::PolarScan;
+use std::f32::consts::{PI, TAU};
+
+/// Cells that are looked through together.
+const BLOCK: usize = 16;
+
+/// A cell that became a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Peak {
+    pub azimuth: u16,
+    pub cell: u32,
+    /// In the units of [`RangeCells`].
+    pub power: i16,
+}
+
+/// How far a return shines into the azimuths beside it.
+#[derive(Debug)]
+pub(super) struct Beam {
+    half_width_rad: f32,
+    /// One azimuth's powers, 0 where a neighbour is brighter.
+    row: Vec<i16>,
+    found: Vec<Peak>,
+}
+
+impl Beam {
+    pub fn new(half_width_rad: f32) -> Self {
+        Self { half_width_rad, row: Vec::new(), found: Vec::new() }
+    }
+
+    /// The cells of all azimuths, in order, that have power and are as bright as any within the beam.
+    pub fn peaks(&mut self, scan: &PolarScan<'_>, cells: &RangeCells) -> &[Peak] {
+        let azimuths = scan.geometry.azimuths;
+        self.found.clear();
+        // All that could be found: so no later scan of this size allocates. Untouched memory costs nothing.
+        self.found.reserve(azimuths * cells.cells());
+        for azimuth in 0..azimuths {
+            let Some(powers) = cells.lit(azimuth) else { continue };
+            self.row.clear();
+            self.row.extend_from_slice(powers);
+            for neighbour in neighbours(scan, azimuth, self.half_width_rad) {
+                if let Some(powers) = cells.lit(neighbour) {
+                    outshine(&mut self.row, powers);
+                }
+            }
+            collect(&self.row, azimuth as u16, &mut self.found);
+        }
+        &self.found
+    }
+}
+
+/// The azimuths within a half width on either side, across the sweep's seam too, each once. Half of an even spacing more
+/// is allowed, for antennas do not turn evenly.
+fn neighbours(scan: &PolarScan<'_>, azimuth: usize, half_width_rad: f32) -> impl Iterator<Item = usize> {
+    let azimuths = scan.geometry.azimuths;
+    let furthest_rad = half_width_rad + 0.5 * TAU / azimuths as f32;
+    let (centre_rad, bearings) = (scan.azimuth_rad[azimuth], scan.azimuth_rad);
+    let within = move |&other: &usize| {
+        let turn = bearings[other] - centre_rad;
+        ((turn + PI).rem_euclid(TAU) - PI).abs() <= furthest_rad
+    };
+    let later = (1..=azimuths / 2).map(move |step| (azimuth + step) % azimuths).take_while(within);
+    let earlier = (1..=(azimuths - 1) / 2).map(move |step| (azimuth + azimuths - step) % azimuths).take_while(within);
+    later.chain(earlier)
+}
+
+fn outshine(row: &mut [i16], neighbour: &[i16]) {
+    for (power, &beside) in row.iter_mut().zip(neighbour) {
+        *power = if beside > *power { 0 } else { *power };
+    }
+}
+
+fn collect(row: &[i16], azimuth: u16, found: &mut Vec<Peak>) {
+    for (block, powers) in row.chunks(BLOCK).enumerate() {
+        if powers.iter().fold(0, |any, power| any | power) == 0 {
+            continue;
+        }
+        for (k, &power) in powers.iter().enumerate().filter(|(_, power)| **power > 0) {
+            found.push(Peak { azimuth, cell: (block * BLOCK + k) as u32, power });
+        }
+    }
+}

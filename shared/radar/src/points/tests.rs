@@ -1,0 +1,227 @@
+#![allow(clippy::unwrap_used)]
+
+use super::{Point, PointExtractor, PointsConfig};
+use crate::raster::Twist;
+use crate::raster::tests::scene::Sensor;
+use crate::scan::{OwnedScan, ScanError, Sense, flag};
+use nalgebra::{Point2, Vector2};
+use proptest::prelude::*;
+
+const UNSET: Point = [f32::NAN; 5];
+
+fn extract(config: &PointsConfig, scan: &OwnedScan, floor: u8) -> Vec<Point> {
+    let mut out = vec![UNSET; config.capacity];
+    let count = PointExtractor::new(config).unwrap().extract(&scan.view(), floor, &mut out).unwrap();
+    assert!(out[count..].iter().flatten().all(|value| value.is_nan()), "only points are written");
+    out.truncate(count);
+    out
+}
+
+/// The points by their definition: every cell of every azimuth against all azimuths.
+fn direct(config: &PointsConfig, scan: &OwnedScan, floor: u8) -> Vec<Point> {
+    let view = scan.view();
+    let geometry = &view.geometry;
+    let depth = (config.range_cell_m / geometry.range_resolution_m).round().max(1.0) as usize;
+    let measured = |azimuth: usize| view.flags[azimuth] & flag::MEASURED != 0;
+    let power = |azimuth: usize, cell: usize| {
+        let sum: i32 = view.row(azimuth)[cell * depth..][..depth].iter().map(|&bin| i32::from(bin)).sum();
+        (sum - i32::from(floor) * depth as i32).max(0)
+    };
+    let beside = |a: usize, b: usize| {
+        let turn = (view.azimuth_rad[a] - view.azimuth_rad[b]).to_degrees().rem_euclid(360.0);
+        turn.min(360.0 - turn) <= config.beam_deg + 180.0 / geometry.azimuths as f32
+    };
+    let mut points = Vec::new();
+    for azimuth in (0..geometry.azimuths).filter(|&azimuth| measured(azimuth)) {
+        for cell in 0..geometry.bins / depth {
+            let range_m = view.range_m((cell * depth) as f32 + 0.5 * (depth as f32 - 1.0));
+            let here = power(azimuth, cell);
+            let rivals = (0..geometry.azimuths).filter(|&other| measured(other) && beside(azimuth, other));
+            let outshone = rivals.map(|other| power(other, cell)).any(|there| there > here);
+            if here == 0 || outshone || !(config.min_range_m..=config.max_range_m).contains(&range_m) {
+                continue;
+            }
+            let (sin, cos) = view.azimuth_rad[azimuth].sin_cos();
+            let left = if geometry.sense == Sense::Clockwise { -sin } else { sin };
+            let weight = (here as f32 / depth as f32 / config.weight_cap).min(1.0);
+            let time_s = (view.stamp_ns[azimuth] - geometry.stamp_ns) as f32 * 1e-9;
+            points.push([range_m * cos, range_m * left, time_s, weight, view.doppler_s(azimuth)]);
+        }
+    }
+    points
+}
+
+/// Noise of azimuths that wobble, one in ten of them not measured.
+fn noise(azimuths: usize, bins: usize, range_resolution_m: f32, seed: u32) -> OwnedScan {
+    let mut state = seed;
+    let mut random = move || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        state >> 24
+    };
+    let turn = std::f32::consts::TAU / azimuths as f32;
+    let mut scan = Sensor {
+        azimuth_rad: (0..azimuths).map(|i| (i as f32 + random() as f32 / 1024.0) * turn).collect(),
+        time_s: (0..azimuths).map(|i| 1e-3 * (i as f64 - 10.0)).collect(),
+        bins,
+        range_resolution_m,
+        range_offset_m: -0.31,
+        doppler_s: 0.049,
+        chirps_alternate: seed.is_multiple_of(2),
+        sense: if seed.is_multiple_of(3) { Sense::Clockwise } else { Sense::CounterClockwise },
+        ..Sensor::navtech()
+    }
+    .scan();
+    scan.bytes.fill_with(|| random() as u8);
+    for flags in scan.flags.iter_mut().filter(|_| random() < 26) {
+        *flags &= !flag::MEASURED;
+    }
+    scan
+}
+
+fn assert_alike(got: &[Point], expected: &[Point]) {
+    assert_eq!(got.len(), expected.len());
+    for (got, expected) in got.iter().zip(expected) {
+        let near = got.iter().zip(expected).all(|(got, expected)| (got - expected).abs() < 1e-4);
+        assert!(near, "{got:?} for {expected:?}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    #[test]
+    fn points_are_those_of_the_definition(
+        azimuths in 1usize..90, bins in 1usize..300, resolution_m in 0.03..0.4f32, seed: u32, floor in 40u8..255,
+        beam_deg in 0.0..20.0f32, (min_range_m, depth_m) in (0.0..20.0f32, 1.0..40.0f32),
+    ) {
+        let scan = noise(azimuths, bins, resolution_m, seed);
+        let max_range_m = min_range_m + depth_m;
+        let config = PointsConfig { beam_deg, min_range_m, max_range_m, capacity: 60_000, ..PointsConfig::default() };
+        assert_alike(&extract(&config, &scan, floor), &direct(&config, &scan, floor));
+    }
+
+    #[test]
+    fn where_there_are_too_many_the_strongest_stay(seed: u32, capacity in 0usize..400) {
+        let scan = noise(40, 200, 0.17, seed);
+        let all = PointsConfig { weight_cap: 255.0, ..PointsConfig::default() };
+        let config = PointsConfig { capacity, ..all.clone() };
+        let (all, few) = (extract(&all, &scan, 100), extract(&config, &scan, 100));
+        prop_assert!(few.len() <= capacity);
+        let weakest = few.iter().map(|point| point[3]).fold(1.0, f32::min);
+        let stay = |point: &&Point| !few.is_empty() && point[3] >= weakest;
+        prop_assert_eq!(&all.iter().filter(stay).copied().collect::<Vec<_>>(), &few);
+        // One step of power lower would be too many.
+        let next = all.iter().map(|point| point[3]).filter(|&weight| few.is_empty() || weight < weakest).fold(0.0, f32::max);
+        prop_assert!(all.len() <= capacity || all.iter().filter(|point| point[3] >= next).count() > capacity);
+    }
+}
+
+/// Scatterers all around but for the seam, which a moving sensor sees twice or not at all.
+fn places() -> Vec<Point2<f64>> {
+    let polar = |k: u32| (f64::from(k) * std::f64::consts::FRAC_PI_4, 10.0 + 11.0 * f64::from(k));
+    (1..8).map(polar).map(|(bearing, range)| Point2::new(range * bearing.cos(), range * bearing.sin())).collect()
+}
+
+#[test]
+fn a_moving_sensors_points_are_where_the_scatterers_are_once_motion_and_doppler_are_undone() {
+    let twist = Twist { vx_mps: 18.0, vy_mps: -0.4, yaw_rate_radps: 0.4 };
+    for (sense, chirps_alternate, range_resolution_m) in
+        [(Sense::Clockwise, false, 0.0438), (Sense::CounterClockwise, false, 0.1736), (Sense::Clockwise, true, 0.0438)]
+    {
+        let sensor = Sensor {
+            twist,
+            sense,
+            chirps_alternate,
+            range_resolution_m,
+            bins: (100.0 / range_resolution_m) as usize,
+            range_offset_m: -0.31,
+            doppler_s: 0.045,
+            ..Sensor::navtech()
+        };
+        let points = extract(&PointsConfig::default(), &sensor.measure(&places(), 0.5), 30);
+        let placed: Vec<_> = points.iter().map(|point| place(point, &twist)).collect();
+        for scatterer in places() {
+            let near = placed.iter().zip(&points).filter(|(place, _)| (*place - scatterer).norm() < 4.0);
+            let (sum, moment) = near.fold((0.0, Vector2::zeros()), |(sum, moment), (place, point)| {
+                (sum + f64::from(point[3]), moment + (place - scatterer) * f64::from(point[3]))
+            });
+            // A bearing is known to half an azimuth, a range to a tenth of a cell.
+            let miss = moment / sum;
+            let along = miss.dot(&scatterer.coords.normalize()).abs();
+            assert!(along < 0.03, "{sense:?} {chirps_alternate}: {scatterer} missed by {along} m along range");
+            assert!(miss.norm() < 0.05 + 0.5 * 0.9f64.to_radians() * scatterer.coords.norm(), "{scatterer}: {miss}");
+        }
+    }
+}
+
+/// Where a point lies in the frame at the scan's stamp.
+fn place(point: &Point, twist: &Twist) -> Point2<f64> {
+    let [x, y, time_s, _, doppler_s] = point.map(f64::from);
+    let look = Vector2::new(x, y).normalize();
+    let shift_m = doppler_s * look.dot(&Vector2::new(twist.vx_mps, twist.vy_mps));
+    twist.pose_at(time_s) * Point2::from(Vector2::new(x, y) + look * shift_m)
+}
+
+#[test]
+fn a_scatterer_on_the_seam_is_seen_once() {
+    let mut scan = Sensor { bins: 500, range_resolution_m: 0.1736, ..Sensor::navtech() }.scan();
+    for (azimuth, power) in [(398, 100), (399, 180), (0, 150), (1, 90)] {
+        let geometry = scan.geometry;
+        scan.bytes[geometry.first_byte + azimuth * geometry.stride + 100] = power;
+    }
+    let points = extract(&PointsConfig::default(), &scan, 60);
+    assert_eq!(points.len(), 1);
+    assert_eq!((points[0][2], points[0][3]), ((scan.view().time_s(399)) as f32, 1.0));
+}
+
+#[test]
+fn two_azimuths_that_are_equally_bright_both_stay() {
+    let mut scan = Sensor { bins: 500, range_resolution_m: 0.1736, ..Sensor::navtech() }.scan();
+    for azimuth in [20, 21] {
+        let geometry = scan.geometry;
+        scan.bytes[geometry.first_byte + azimuth * geometry.stride + 100] = 90;
+    }
+    let points = extract(&PointsConfig::default(), &scan, 60);
+    assert_eq!(points.iter().map(|point| point[3]).collect::<Vec<_>>(), [0.5, 0.5]);
+}
+
+#[test]
+fn nothing_remains_of_the_scan_before() {
+    let scans = [noise(90, 300, 0.05, 1), noise(40, 200, 0.3, 2), noise(90, 300, 0.05, 3)];
+    let config = PointsConfig { capacity: 200, ..PointsConfig::default() };
+    let mut extractor = PointExtractor::new(&config).unwrap();
+    let mut out = vec![UNSET; 200];
+    for scan in scans.iter().chain(&scans) {
+        let count = extractor.extract(&scan.view(), 120, &mut out).unwrap();
+        assert_eq!(out[..count], extract(&config, scan, 120));
+    }
+}
+
+#[test]
+fn scans_of_almost_nothing_have_no_points_and_contradictory_ones_are_refused() {
+    for (azimuths, bins) in [(1, 0), (1, 1), (1, 500), (2, 2)] {
+        let mut scan = noise(azimuths, bins, 0.0438, 4);
+        assert!(extract(&PointsConfig::default(), &scan, 255).is_empty());
+        scan.bytes.fill(255);
+        extract(&PointsConfig::default(), &scan, 0);
+    }
+    let mut scan = noise(4, 10, 0.1, 5);
+    scan.geometry.bins = 11;
+    let refused = PointExtractor::new(&PointsConfig::default()).unwrap().extract(&scan.view(), 0, &mut [UNSET]);
+    assert!(matches!(refused, Err(ScanError::Length { what: "image", .. })));
+}
+
+#[test]
+fn settings_out_of_bounds_are_refused_by_name() {
+    let default = PointsConfig::default;
+    for (name, config) in [
+        ("beam_deg", PointsConfig { beam_deg: f32::NAN, ..default() }),
+        ("range_cell_m", PointsConfig { range_cell_m: 0.0, ..default() }),
+        ("min_range_m", PointsConfig { min_range_m: -1.0, ..default() }),
+        ("max_range_m", PointsConfig { max_range_m: 5.0, ..default() }),
+        ("weight_cap", PointsConfig { weight_cap: 0.0, ..default() }),
+        ("capacity", PointsConfig { capacity: 100_000, ..default() }),
+    ] {
+        let refused = PointExtractor::new(&config).unwrap_err();
+        assert!(refused.to_string().starts_with(&format!("points.{name} is ")), "{refused}");
+    }
+}

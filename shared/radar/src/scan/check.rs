@@ -1,0 +1,78 @@
+//! Whether a scan is what its geometry says.
+
+use super::{MAX_AZIMUTHS, PolarScan};
+use std::ops::RangeInclusive;
+
+/// How a scan contradicts itself.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ScanError {
+    /// One of the scan's slices is shorter than its geometry says.
+    #[error("the scan's {what} has {actual} elements, its geometry asks for {expected}")]
+    Length {
+        /// Which slice.
+        what: &'static str,
+        /// What the geometry asks for.
+        expected: usize,
+        /// What is there.
+        actual: usize,
+    },
+    /// One of the geometry's numbers is impossible.
+    #[error("the scan's {what} is {value}, expected {} to {}", bounds.start(), bounds.end())]
+    Geometry {
+        /// Which number.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it may be.
+        bounds: RangeInclusive<f64>,
+    },
+    /// An azimuth is not a finite angle.
+    #[error("azimuth {index} of the scan is at {value} rad")]
+    Azimuth {
+        /// Which row.
+        index: usize,
+        /// Its angle.
+        value: f32,
+    },
+}
+
+impl PolarScan<'_> {
+    /// Whether all that the geometry promises is there, and no number is impossible.
+    ///
+    /// # Errors
+    /// The first contradiction.
+    pub fn check(&self) -> Result<(), ScanError> {
+        let geometry = &self.geometry;
+        check_length("azimuth table", self.azimuth_rad.len(), geometry.azimuths)?;
+        check_length("table of stamps", self.stamp_ns.len(), geometry.azimuths)?;
+        check_length("table of flags", self.flags.len(), geometry.azimuths)?;
+        if geometry.azimuths > 0 {
+            let last_row = (geometry.azimuths - 1).saturating_mul(geometry.stride);
+            let bytes = last_row.saturating_add(geometry.first_byte).saturating_add(geometry.bins);
+            check_length("image", self.bytes.len(), bytes)?;
+        }
+        check_number("number of azimuths", geometry.azimuths as f64, 0.0..=MAX_AZIMUTHS as f64)?;
+        check_number("number of bins", geometry.bins as f64, 0.0..=1e6)?;
+        check_number("range resolution in metres", geometry.range_resolution_m.into(), 1e-3..=1e3)?;
+        check_number("range offset in metres", geometry.range_offset_m.into(), -1e4..=1e4)?;
+        check_number("Doppler shift in seconds", geometry.doppler_s.into(), -1.0..=1.0)?;
+        match self.azimuth_rad[..geometry.azimuths].iter().position(|azimuth| !azimuth.is_finite()) {
+            Some(index) => Err(ScanError::Azimuth { index, value: self.azimuth_rad[index] }),
+            None => Ok(()),
+        }
+    }
+}
+
+fn check_length(what: &'static str, actual: usize, expected: usize) -> Result<(), ScanError> {
+    match actual >= expected {
+        true => Ok(()),
+        false => Err(ScanError::Length { what, expected, actual }),
+    }
+}
+
+fn check_number(what: &'static str, value: f64, bounds: RangeInclusive<f64>) -> Result<(), ScanError> {
+    match bounds.contains(&value) {
+        true => Ok(()),
+        false => Err(ScanError::Geometry { what, value, bounds }),
+    }
+}
