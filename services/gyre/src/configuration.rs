@@ -14,8 +14,7 @@ use gyre_masking::MaskingConfig;
 use gyre_messages::{Stage, Window};
 use gyre_radar::{DatasetOptions, PointsConfig, RasterConfig};
 use gyre_radar_replay::SourceConfig;
-use gyre_refinement::{RefinementConfig, RefinementKind};
-use gyre_scan_matching::{ExhaustiveConfig, RotationConfig, TranslationConfig};
+use gyre_scan_matching::{ExhaustiveConfig, RefinementConfig, RefinementKind, RotationConfig, TranslationConfig};
 use gyre_simulator::SimulationConfig;
 use gyre_stage::supervise::{RestartPolicy, StagePlan};
 use serde::{Deserialize, Serialize};
@@ -225,6 +224,7 @@ impl Configuration {
         self.rotation.validate().map_err(|e| value("rotation", e.to_string()))?;
         self.translation.validate().map_err(|e| value("translation", e.to_string()))?;
         self.exhaustive.validate().map_err(|e| value("exhaustive", e.to_string()))?;
+        self.refinement.validate().map_err(|e| value("refinement", e.to_string()))?;
         self.window(None).validate().map_err(|e| value("run", e.to_string()))?;
         if let Some(simulation) = &self.simulation {
             simulation.validate().map_err(|e| value("simulation", e.to_string()))?;

@@ -59,7 +59,7 @@ fn hypothesis_name(refinement: &Refinement) -> &'static str {
         hypothesis::NONE => "none",
         hypothesis::PREDICTION => "prediction",
         hypothesis::SEARCH => "search",
-        hypothesis::RUNNER_UP => "runner-up",
+        hypothesis::FAN => "fan",
         _ => "unknown",
     }
 }
@@ -102,7 +102,7 @@ mod tests {
                 searched: [1.25, 0.0, 0.0],
                 refinement: Refinement {
                     outcome: outcome::REFINED,
-                    hypothesis: hypothesis::RUNNER_UP,
+                    hypothesis: hypothesis::FAN,
                     ..Refinement::default()
                 },
                 ..MotionEstimate::default()
@@ -113,6 +113,6 @@ mod tests {
         let fields: Vec<usize> = text.lines().map(|line| line.split(',').count()).collect();
         assert_eq!(fields, [28, 28, 28]);
         assert!(text.contains(",1.500000000,"));
-        assert!(text.ends_with(",1.250000000,0.000000000,0.000000000,refined,runner-up,0.000000000,0.000000000\n"));
+        assert!(text.ends_with(",1.250000000,0.000000000,0.000000000,refined,fan,0.000000000,0.000000000\n"));
     }
 }

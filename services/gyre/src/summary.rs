@@ -272,7 +272,7 @@ mod tests {
             (outcome::SEARCHED, hypothesis::NONE),
             (outcome::REFINED, hypothesis::PREDICTION),
             (outcome::REFINED, hypothesis::SEARCH),
-            (outcome::REFINED, hypothesis::RUNNER_UP),
+            (outcome::REFINED, hypothesis::FAN),
             (outcome::WEAK, hypothesis::SEARCH),
             (outcome::PREDICTED, hypothesis::NONE),
         ];

@@ -1,28 +1,49 @@
-//! Refines the motions that the search found. For now it passes them through.
+//! Refines the motions that the search found against a map of the last keyframes.
 
-mod config;
+pub mod checkpoint;
 
-use gyre_messages::{Masked, Motion, Refined};
+use gyre_messages::{
+    Item, Masked, MaskedHeader, Motion, MotionEstimate, Refined, Refinement as Record, flag, hypothesis, outcome,
+};
+use gyre_radar::PointsConfig;
+use gyre_scan_matching::{Hypothesis, Outcome, Refinement, RefinementConfig, ScanPoint};
 use gyre_stage::{
     Launch, Stage, StageError, Statistics,
     inputs::{Joined, JoinedView},
+    reader::Received,
     stage,
     writer::Draft,
 };
+use nalgebra::{Isometry2, Vector2};
 
-pub use config::{RefinementConfig, RefinementKind};
+use checkpoint::{Checkpoint, CheckpointError};
 
 /// The stage's name.
 pub const NAME: &str = "refinement";
 
 /// Runs the stage until it is told to stop.
 pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
-    stage::run(launch, &mut PassThrough)
+    let points: PointsConfig = launch.section("points")?;
+    let config: RefinementConfig = launch.section("refinement")?;
+    let refinement =
+        Refinement::new(&config, points.capacity).map_err(|error| StageError::Configuration(error.to_string()))?;
+    let manifest = &launch.manifest;
+    let path = checkpoint::path(&manifest.out);
+    let window = manifest.window.scans + manifest.window.look_back;
+    let checkpoint =
+        Checkpoint::open(&path, window, config.keyframes, refinement.keyframe_cells()).map_err(unusable)?;
+    stage::run(launch, &mut Refiner { refinement, checkpoint, next: None })
 }
 
-struct PassThrough;
+/// The stage: the refinement, and the file that keeps what it knows.
+struct Refiner {
+    refinement: Refinement,
+    checkpoint: Checkpoint,
+    /// The item that what the refinement knows is for; `None` after a start.
+    next: Option<u64>,
+}
 
-impl Stage for PassThrough {
+impl Stage for Refiner {
     type Inputs = Joined<Masked, Motion>;
     type Output = Refined;
     const HOP: gyre_messages::Stage = gyre_messages::Stage::Refinement;
@@ -32,7 +53,72 @@ impl Stage for PassThrough {
         input: JoinedView<'_, Masked, Motion>,
         output: &mut Draft<Refined>,
     ) -> Result<(), StageError> {
-        output.header().motion = input.other.header().motion;
+        let item = *input.current.item();
+        let motion = input.other.header().motion;
+        self.stand_before(&item)?;
+        output.header().motion = match input.before {
+            Some(before) if !item.is(flag::BREAK) => {
+                refine(&mut self.refinement, item.seq, points(input.current)?, points(before)?, &motion)
+            }
+            _ => motion,
+        };
+        self.next = Some(item.seq.saturating_add(1));
+        self.checkpoint.write(item.seq, &self.refinement).map_err(unusable)
+    }
+}
+
+impl Refiner {
+    /// Makes the refinement know what it has to before this item.
+    fn stand_before(&mut self, item: &Item) -> Result<(), StageError> {
+        if item.is(flag::BREAK) {
+            self.checkpoint.forget_from(item.seq);
+            self.refinement.start();
+        } else if self.next != Some(item.seq) {
+            self.checkpoint.restore(item.seq.saturating_sub(1), &mut self.refinement).map_err(unusable)?;
+        }
         Ok(())
     }
+}
+
+/// The motion as it is after refinement. The search's own findings stay in it.
+pub fn refine(
+    refinement: &mut Refinement,
+    seq: u64,
+    later: &[ScanPoint],
+    earlier: &[ScanPoint],
+    motion: &MotionEstimate,
+) -> MotionEstimate {
+    let searched = Isometry2::new(Vector2::new(motion.x_m, motion.y_m), motion.yaw_rad);
+    let refined = refinement.next(seq, later, earlier, &searched, motion.interval_ns as f64 * 1e-9);
+    let c = &refined.covariance;
+    MotionEstimate {
+        x_m: refined.motion.translation.x,
+        y_m: refined.motion.translation.y,
+        yaw_rad: refined.motion.rotation.angle(),
+        covariance: [c[(0, 0)], c[(0, 1)], c[(0, 2)], c[(1, 1)], c[(1, 2)], c[(2, 2)]],
+        refinement: Record {
+            outcome: match refined.outcome {
+                Outcome::Refined => outcome::REFINED,
+                Outcome::Weak => outcome::WEAK,
+                Outcome::Predicted => outcome::PREDICTED,
+            },
+            hypothesis: match refined.hypothesis {
+                Hypothesis::Prediction => hypothesis::PREDICTION,
+                Hypothesis::Search => hypothesis::SEARCH,
+                Hypothesis::Fan => hypothesis::FAN,
+            },
+            overlap: refined.overlap,
+            support: refined.support,
+        },
+        ..*motion
+    }
+}
+
+fn points(masked: &Received<Masked>) -> Result<&[ScanPoint], StageError> {
+    let header: &MaskedHeader = masked.header();
+    header.points(masked.values()).ok_or_else(|| masked.malformed("its points do not fit its header"))
+}
+
+fn unusable(error: CheckpointError) -> StageError {
+    StageError::Input(error.to_string())
 }

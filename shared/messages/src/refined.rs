@@ -30,8 +30,8 @@ pub mod hypothesis {
     pub const PREDICTION: u32 = 1;
     /// The search's motion.
     pub const SEARCH: u32 = 2;
-    /// The search's next best motion.
-    pub const RUNNER_UP: u32 = 3;
+    /// The motion before, turned to one side: tried when nothing else fitted.
+    pub const FAN: u32 = 3;
 }
 
 /// What the refinement made of a motion; all zero where there was none.
@@ -43,8 +43,8 @@ pub struct Refinement {
     pub outcome: u32,
     /// What the accepted motion was refined from: see [`hypothesis`].
     pub hypothesis: u32,
-    /// Share of the scan that the map explains, 0 to 1.
+    /// Mean of the map under the scan's points, 0 to 1; 1 where all keyframes saw something wherever the scan did.
     pub overlap: f64,
-    /// Weight of what the motion rests on.
+    /// Weight of the scan's points, as a share of what is usual.
     pub support: f64,
 }

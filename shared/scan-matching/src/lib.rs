@@ -65,8 +65,7 @@ pub use config::{ConfigError, Magnitude, Overlap, Peak, RotationConfig, Rotation
 pub use exhaustive::{ExhaustiveConfig, ExhaustiveSearch, JointEstimate};
 pub use fft::fast_size;
 pub use refinement::{
-    Anchor,
-    Hypothesis, Keyframe, Memory, Outcome, Refined, Refinement, RefinementConfig, RefinementKind, ScanPoint,
+    Anchor, Hypothesis, Keyframe, Memory, Outcome, Refined, Refinement, RefinementConfig, RefinementKind, ScanPoint,
 };
 pub use rotation::{RotationEstimate, RotationRunnerUp, RotationSearch};
 pub use spectrum::PolarSpectrum;

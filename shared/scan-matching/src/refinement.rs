@@ -139,6 +139,11 @@ impl Refinement {
         self.keyframes.iter()
     }
 
+    /// Cells of a keyframe's images together.
+    pub fn keyframe_cells(&self) -> usize {
+        self.keyframes.cells()
+    }
+
     /// Goes on where another one stood: `load` fills the next keyframe, oldest first, and says whether there was one.
     pub fn restore(&mut self, memory: Memory, mut load: impl FnMut(&mut Keyframe) -> bool) {
         self.keyframes.clear();

@@ -117,10 +117,9 @@ impl RefinementConfig {
         ] {
             check(positive(value), key, &value, "a positive number")?;
         }
-        for (key, value) in [
-            ("yaw_variance_per_m", self.yaw_variance_per_m),
-            ("shift_variance_per_m", self.shift_variance_per_m),
-        ] {
+        for (key, value) in
+            [("yaw_variance_per_m", self.yaw_variance_per_m), ("shift_variance_per_m", self.shift_variance_per_m)]
+        {
             check(value >= 0.0 && value.is_finite(), key, &value, "0 or more")?;
         }
         Ok(())

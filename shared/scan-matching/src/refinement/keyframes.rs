@@ -46,9 +46,15 @@ impl Keyframes {
     pub fn new(config: &RefinementConfig) -> Self {
         let level = |cell_m| Level::new(cell_m, config.reach_m);
         let (fine, coarse) = (level(config.cell_m), level(config.cell_m * config.coarse));
-        let keyframe = Keyframe { id: 0, pose: Isometry2::identity(), fine: fine.new_image(), coarse: coarse.new_image() };
+        let keyframe =
+            Keyframe { id: 0, pose: Isometry2::identity(), fine: fine.new_image(), coarse: coarse.new_image() };
         let count = config.keyframes;
         Self { fine, coarse, used: VecDeque::with_capacity(count), spare: vec![keyframe; count] }
+    }
+
+    /// Cells of a keyframe's images together.
+    pub fn cells(&self) -> usize {
+        self.fine.n.pow(2) + self.coarse.n.pow(2)
     }
 
     pub fn is_empty(&self) -> bool {

@@ -184,8 +184,14 @@ mod tests {
     fn brightest(level: &Level) -> [f64; 2] {
         let lookup = level.lookup();
         let brightest = (0..lookup.sum.len()).max_by(|a, b| lookup.sum[*a].total_cmp(&lookup.sum[*b])).unwrap_or(0);
-        [brightest / level.n, brightest % level.n].map(|k| k as f64 * level.cell_m).into_iter().zip(lookup.origin)
-            .map(|(at, origin)| at + origin).collect::<Vec<_>>().try_into().unwrap_or([f64::NAN; 2])
+        [brightest / level.n, brightest % level.n]
+            .map(|k| k as f64 * level.cell_m)
+            .into_iter()
+            .zip(lookup.origin)
+            .map(|(at, origin)| at + origin)
+            .collect::<Vec<_>>()
+            .try_into()
+            .unwrap_or([f64::NAN; 2])
     }
 
     #[test]
@@ -199,7 +205,10 @@ mod tests {
         level.stack([&first, &second].into_iter());
         assert_eq!(brightest(&level), [6.0, 2.0]);
         let peak = level.lookup().sum.iter().copied().fold(0.0, f32::max);
-        assert!((peak / level.lookup().full - 0.79).abs() < 0.02, "{peak}: peak over mean is 0.159 over 0.0796, less the blur's");
+        assert!(
+            (peak / level.lookup().full - 0.79).abs() < 0.02,
+            "{peak}: peak over mean is 0.159 over 0.0796, less the blur's"
+        );
     }
 
     #[test]

@@ -123,7 +123,8 @@ impl Memory {
 
     /// Makes `pose` the newest anchor. One that it cannot have come from was wrong and goes.
     fn anchor(&mut self, pose: Isometry2<f64>, interval_s: f64, config: &RefinementConfig) {
-        let right = self.anchors.iter().flatten().find(|anchor| anchor.reaches(&pose, interval_s, 1.0, config)).copied();
+        let right =
+            self.anchors.iter().flatten().find(|anchor| anchor.reaches(&pose, interval_s, 1.0, config)).copied();
         let velocity = match &right {
             Some(anchor) => anchor.velocity.lerp(&anchor.velocity_to(&pose, interval_s), INERTIA),
             None => self.velocity_to(&pose, interval_s),
