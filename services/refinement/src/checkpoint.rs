@@ -20,6 +20,10 @@ use thiserror::Error;
 const MAGIC: [u8; 16] = *b"gyre map v1     ";
 /// Slots beyond those that a window needs.
 const AIR: usize = 8;
+/// The largest window: the file's shape is the same for all of them, so that a run goes on with another one.
+const LARGEST_WINDOW: usize = 66;
+/// States in the ring.
+const STATES: usize = 2 * LARGEST_WINDOW + AIR;
 /// Words of a state's slot: the item, the number of keyframes and the oldest one's number; the memory; the check word.
 const STATE_WORDS: usize = 3 + MEMORY_WORDS + 1;
 const STATE_BYTES: usize = STATE_WORDS * 8;
@@ -54,8 +58,8 @@ pub enum CheckpointError {
 pub struct Checkpoint {
     path: PathBuf,
     file: File,
-    /// States in the ring.
-    states: usize,
+    /// Keyframes that are kept; slots beyond them stay empty.
+    kept: usize,
     /// The keyframe in each slot of the other ring; `None` where there is none.
     keyframes: Vec<Option<u64>>,
     /// Bytes of a keyframe's slot; the buffer for one.
@@ -75,10 +79,10 @@ impl Checkpoint {
             std::fs::create_dir_all(directory).map_err(failed)?;
         }
         let file = OpenOptions::new().create(true).truncate(false).read(true).write(true).open(path).map_err(failed)?;
-        let states = 2 * window + AIR;
-        let keyframes = vec![None; most + 2 * window + AIR];
+        let slots = |window: usize| most + 2 * window + AIR;
+        let (kept, keyframes) = (slots(window.min(LARGEST_WINDOW)), vec![None; slots(LARGEST_WINDOW)]);
         let slot = vec![0; KEYFRAME_WORDS * 8 + cells];
-        let mut checkpoint = Self { path: path.to_owned(), file, states, keyframes, slot };
+        let mut checkpoint = Self { path: path.to_owned(), file, kept, keyframes, slot };
         checkpoint.begin().map_err(failed)?;
         Ok(checkpoint)
     }
@@ -101,18 +105,18 @@ impl Checkpoint {
     fn head(&self) -> [u8; HEAD_BYTES] {
         let mut head = [0; HEAD_BYTES];
         head[..16].copy_from_slice(&MAGIC);
-        for (k, number) in [self.states, self.keyframes.len(), self.slot.len()].into_iter().enumerate() {
+        for (k, number) in [STATES, self.keyframes.len(), self.slot.len()].into_iter().enumerate() {
             head[16 + 8 * k..24 + 8 * k].copy_from_slice(&(number as u64).to_le_bytes());
         }
         head
     }
 
     fn state_at(&self, item: u64) -> u64 {
-        HEAD_BYTES as u64 + item % self.states as u64 * STATE_BYTES as u64
+        HEAD_BYTES as u64 + item % STATES as u64 * STATE_BYTES as u64
     }
 
     fn keyframe_at(&self, slot: usize) -> u64 {
-        (HEAD_BYTES + self.states * STATE_BYTES + slot * self.slot.len()) as u64
+        (HEAD_BYTES + STATES * STATE_BYTES + slot * self.slot.len()) as u64
     }
 
     /// Writes what is known after `item`: first the keyframes that are new, then the state that speaks of them.
@@ -134,11 +138,12 @@ impl Checkpoint {
         self.file.write_all_at(&state, self.state_at(item)).map_err(failed)
     }
 
-    /// An empty slot, or that of the oldest keyframe.
+    /// An empty slot, or that of the oldest keyframe where as many are kept as a restart can ask for.
     fn free_slot(&self) -> usize {
-        (0..self.keyframes.len())
-            .min_by_key(|slot| self.keyframes[*slot].map_or(0, |id| id.saturating_add(1)))
-            .unwrap_or(0)
+        let used = self.keyframes.iter().flatten().count();
+        let empty = self.keyframes.iter().position(Option::is_none).filter(|_| used < self.kept);
+        let oldest = || (0..self.keyframes.len()).filter(|slot| self.keyframes[*slot].is_some()).min_by_key(|slot| self.keyframes[*slot]);
+        empty.or_else(oldest).unwrap_or(0)
     }
 
     /// Leaves out the keyframes from `item` on: they are from a life that is being repeated, perhaps with other scans.

@@ -297,9 +297,8 @@ impl Refinement {
         // From the world's axes into those of the frame before.
         let turn = self.memory.pose.rotation.inverse().to_rotation_matrix().to_homogeneous();
         let shape = turn * inverse * turn.transpose() * (self.config.variance_scale * mean_squared_residual);
-        let moved_m = (found.pose.translation.vector - self.memory.pose.translation.vector).norm();
-        let (shift, yaw) = (self.config.shift_variance_per_m * moved_m, self.config.yaw_variance_per_m * moved_m);
-        let covariance = shape + Matrix3::from_diagonal(&Vector3::new(shift, shift, yaw));
+        let yaw = self.config.yaw_sigma_deg.to_radians().powi(2);
+        let covariance = shape + Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, yaw));
         covariance.iter().all(|v| v.is_finite()).then_some(covariance)
     }
 

@@ -42,12 +42,10 @@ pub struct RefinementConfig {
     pub search_agrees_deg: f64,
     /// After so many scans in a row that matched nothing, the map begins anew.
     pub patience: u32,
-    /// Covariance = this x mean squared residual x inverse information matrix, ...
+    /// Covariance = this x mean squared residual x inverse information matrix ...
     pub variance_scale: f64,
-    /// ... and for each metre driven this much is added to the variance of the heading, rad^2/m ...
-    pub yaw_variance_per_m: f64,
-    /// ... and this much to that of x and y, m^2/m.
-    pub shift_variance_per_m: f64,
+    /// ... and this standard deviation of the heading besides, degrees: no antenna turns quite evenly.
+    pub yaw_sigma_deg: f64,
 }
 
 /// What follows the search.
@@ -68,7 +66,7 @@ impl Default for RefinementConfig {
             keyframes: 10,
             keyframe_distance_m: 1.5,
             keyframe_angle_deg: 3.0,
-            cell_m: 0.5,
+            cell_m: 0.4,
             reach_m: 100.0,
             coarse: 3.0,
             acceleration_mps2: 6.0,
@@ -81,9 +79,8 @@ impl Default for RefinementConfig {
             search_agrees_deg: 6.0,
             least_support: 0.6,
             patience: 5,
-            variance_scale: 1.0,
-            yaw_variance_per_m: 0.0,
-            shift_variance_per_m: 0.0,
+            variance_scale: 0.6,
+            yaw_sigma_deg: 0.19,
         }
     }
 }
@@ -117,11 +114,6 @@ impl RefinementConfig {
         ] {
             check(positive(value), key, &value, "a positive number")?;
         }
-        for (key, value) in
-            [("yaw_variance_per_m", self.yaw_variance_per_m), ("shift_variance_per_m", self.shift_variance_per_m)]
-        {
-            check(value >= 0.0 && value.is_finite(), key, &value, "0 or more")?;
-        }
-        Ok(())
+        check((0.0..=90.0).contains(&self.yaw_sigma_deg), "yaw_sigma_deg", &self.yaw_sigma_deg, "0 to 90")
     }
 }
