@@ -15,6 +15,10 @@ pub struct MaskingConfig {
     /// Which motion to undo it with: that of the scan so many scans before, at least 1. With 2 or more the stages overlap
     /// across scans. Default 2.
     pub lag: usize,
+    /// Undo Doppler's shift in the rasters too, with the same motion, where the scan knows it. At constant speed the shift
+    /// cancels between rasters; undone, it cancels only between scans that both know their motion, and a motion seems
+    /// too short by the whole shift where compensation sets in. Default false.
+    pub undo_doppler: bool,
     /// Wait so long over each scan, ms: to see what happens under load. Default 0.
     pub stress_delay_ms: u64,
 }
@@ -31,7 +35,14 @@ pub enum MaskKind {
 
 impl Default for MaskingConfig {
     fn default() -> Self {
-        Self { kind: MaskKind::Threshold, threshold: 60, compensate: true, lag: 2, stress_delay_ms: 0 }
+        Self {
+            kind: MaskKind::Threshold,
+            threshold: 60,
+            compensate: true,
+            lag: 2,
+            undo_doppler: false,
+            stress_delay_ms: 0,
+        }
     }
 }
 

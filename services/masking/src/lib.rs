@@ -2,6 +2,9 @@
 
 mod config;
 
+#[cfg(test)]
+mod tests;
+
 use std::time::Duration;
 
 use gyre_messages::{FloatBlock, Masked, SearchedMotion, mask_kind};
@@ -75,15 +78,19 @@ impl Masker {
         cells: &mut [f32],
     ) -> Result<Option<Twist>, RasterError> {
         let floor = self.config.floor();
+        let mut scan = *scan;
+        if !self.config.undo_doppler {
+            scan.geometry.doppler_s = 0.0;
+        }
         if let Some(twist) = motion.filter(|_| self.config.compensate).map(twist_of) {
-            match self.rasteriser.rasterise(scan, floor, Some(twist), cells) {
+            match self.rasteriser.rasterise(&scan, floor, Some(twist), cells) {
                 Ok(()) => return Ok(Some(twist)),
                 // A motion that no vehicle makes is a wrong match: better no compensation than that.
                 Err(RasterError::Twist { .. }) => {}
                 Err(error) => return Err(error),
             }
         }
-        self.rasteriser.rasterise(scan, floor, None, cells)?;
+        self.rasteriser.rasterise(&scan, floor, None, cells)?;
         Ok(None)
     }
 

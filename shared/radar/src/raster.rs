@@ -6,7 +6,7 @@
 //!
 //! In the order of the work:
 //! 1. `bearing_table`: from an angle to the fractional azimuth measured there, and to the time of measuring;
-//! 2. `polar_image`: the powers above the floor, averaged along range over what one cell covers;
+//! 2. `polar_image`: the powers above the floor, averaged along range over what one cell covers, at their true ranges;
 //! 3. `kernels::locate`: each cell's place in the polar image, seen from where [`Twist`] puts the sensor, and the
 //!    mean of the four samples around it.
 

@@ -313,6 +313,7 @@ fn impossible_options_are_refused() {
         DatasetOptions { range_resolution_m: Some(0.0), ..none },
         DatasetOptions { range_resolution_m: Some(f32::NAN), ..none },
         DatasetOptions { range_offset_m: Some(f32::INFINITY), ..none },
+        DatasetOptions { doppler_s: Some(f32::NAN), ..none },
         DatasetOptions { encoder_counts: Some(0), ..none },
         DatasetOptions { encoder_counts: Some(5600), ..none },
         DatasetOptions { azimuth_source: Some(AzimuthSource::Encoder), ..none },
@@ -320,9 +321,11 @@ fn impossible_options_are_refused() {
     for options in cases {
         assert!(matches!(open(root.path(), &options), Err(OpenError::BadOption { .. })), "{options:?}");
     }
-    let options = DatasetOptions { range_resolution_m: Some(1.5), range_offset_m: Some(-0.5), ..none };
+    let options =
+        DatasetOptions { range_resolution_m: Some(1.5), range_offset_m: Some(-0.5), doppler_s: Some(0.04), ..none };
     let scan = read(open(root.path(), &options).unwrap().as_mut(), 0).unwrap();
     assert_eq!((scan.geometry.range_resolution_m, scan.geometry.range_offset_m), (1.5, -0.5));
+    assert_eq!(scan.geometry.doppler_s, 0.04);
 }
 
 #[test]

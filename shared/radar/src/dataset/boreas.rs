@@ -43,6 +43,7 @@ fn profile(format: Format, range_resolution_m: f32) -> Profile {
         format,
         range_resolution_m,
         range_offset_m: RANGE_OFFSET_M,
+        doppler_s: 0.0,
         encoder_counts: 5600,
         azimuth_source: AzimuthSource::Encoder,
         scan_time: ScanTime::MiddleRow,

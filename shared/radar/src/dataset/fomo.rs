@@ -19,6 +19,7 @@ pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<NavtechScan
         format: Format::Fomo,
         range_resolution_m: RANGE_RESOLUTION_M,
         range_offset_m: 0.0,
+        doppler_s: 0.0,
         encoder_counts: ENCODER_COUNTS,
         azimuth_source: AzimuthSource::Encoder,
         scan_time: ScanTime::Halfway,

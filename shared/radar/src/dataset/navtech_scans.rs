@@ -28,6 +28,7 @@ pub(crate) struct Profile {
     pub(crate) format: Format,
     pub(crate) range_resolution_m: f32,
     pub(crate) range_offset_m: f32,
+    pub(crate) doppler_s: f32,
     pub(crate) encoder_counts: u16,
     pub(crate) azimuth_source: AzimuthSource,
     pub(crate) scan_time: ScanTime,
@@ -42,6 +43,7 @@ impl Profile {
     fn with(mut self, options: &DatasetOptions) -> Self {
         self.range_resolution_m = options.range_resolution_m.unwrap_or(self.range_resolution_m);
         self.range_offset_m = options.range_offset_m.unwrap_or(self.range_offset_m);
+        self.doppler_s = options.doppler_s.unwrap_or(self.doppler_s);
         self.encoder_counts = options.encoder_counts.unwrap_or(self.encoder_counts);
         self.azimuth_source = options.azimuth_source.unwrap_or(self.azimuth_source);
         self
@@ -53,7 +55,6 @@ impl Profile {
 pub(crate) struct NavtechScans {
     images: Images,
     profile: Profile,
-    doppler_s: f32,
     period_ns: i64,
     notes: Vec<String>,
 }
@@ -71,7 +72,7 @@ impl NavtechScans {
         let profile = profile(look.as_ref()).with(options);
         notes.extend(look.iter().flat_map(|look| observations(look, &profile)));
         let period_ns = stamp::usual_interval((0..images.len()).filter_map(|i| images.name_stamp_ns(i)));
-        Ok(Self { images, profile, doppler_s: options.doppler_s, period_ns, notes })
+        Ok(Self { images, profile, period_ns, notes })
     }
 
     fn check_slot(&self, slot: &ScanSlot<'_>) -> Result<(), ReadError> {
@@ -246,7 +247,7 @@ impl Dataset for NavtechScans {
             first_byte: METADATA_BYTES,
             range_resolution_m: profile.range_resolution_m,
             range_offset_m: profile.range_offset_m,
-            doppler_s: self.doppler_s,
+            doppler_s: profile.doppler_s,
             sense: Sense::Clockwise,
             stamp_ns: scan_ns,
         })

@@ -89,7 +89,8 @@ pub struct DatasetOptions {
     /// Metres to add to a range for each m/s at which the sensor approaches what it looks at, see
     /// [`SweepGeometry::doppler_s`](crate::SweepGeometry::doppler_s): 0.04 for the older Navtechs, negative where their chirps
     /// fall, 0.049 for those whose chirps alternate. Default: 0, not known.
-    pub doppler_s: f32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub doppler_s: Option<f32>,
     /// Where the azimuths come from. Default: `encoder`; `uniform` for OORD, whose encoder columns are not to be trusted, and for
     /// images without metadata (RADIATE, MulRan as recorded), which know no other.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -104,7 +105,7 @@ impl DatasetOptions {
     pub(crate) fn check(&self) -> Result<(), OpenError> {
         let resolution_ok = self.range_resolution_m.is_none_or(|r| (1e-3..=10.0).contains(&r));
         let offset_ok = self.range_offset_m.is_none_or(|o| (-100.0..=100.0).contains(&o));
-        let doppler_ok = (-1.0..=1.0).contains(&self.doppler_s);
+        let doppler_ok = self.doppler_s.is_none_or(|d| (-1.0..=1.0).contains(&d));
         let counts_ok = self.encoder_counts.is_none_or(|c| c >= 16);
         if !resolution_ok {
             return Err(self.refused("range_resolution_m", self.range_resolution_m, "it must be from 0.001 to 10 m"));
@@ -113,7 +114,7 @@ impl DatasetOptions {
             return Err(self.refused("range_offset_m", self.range_offset_m, "it must be from -100 to 100 m"));
         }
         if !doppler_ok {
-            return Err(self.refused("doppler_s", Some(self.doppler_s), "it must be from -1 to 1 s"));
+            return Err(self.refused("doppler_s", self.doppler_s, "it must be from -1 to 1 s"));
         }
         if !counts_ok {
             return Err(self.refused(

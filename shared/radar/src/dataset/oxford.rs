@@ -29,6 +29,7 @@ fn profile(format: Format, azimuth_source: AzimuthSource) -> Profile {
         format,
         range_resolution_m: RANGE_RESOLUTION_M,
         range_offset_m: 0.0,
+        doppler_s: 0.0,
         encoder_counts: 5600,
         azimuth_source,
         scan_time: ScanTime::Halfway,

@@ -34,7 +34,7 @@ impl SidewaysScans {
             images,
             range_resolution_m: 0.0,
             range_offset_m: options.range_offset_m.unwrap_or(0.0),
-            doppler_s: options.doppler_s,
+            doppler_s: options.doppler_s.unwrap_or(0.0),
             scratch: Vec::new(),
         };
         scans.check_shape(format)?;
