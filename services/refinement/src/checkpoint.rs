@@ -142,7 +142,11 @@ impl Checkpoint {
     fn free_slot(&self) -> usize {
         let used = self.keyframes.iter().flatten().count();
         let empty = self.keyframes.iter().position(Option::is_none).filter(|_| used < self.kept);
-        let oldest = || (0..self.keyframes.len()).filter(|slot| self.keyframes[*slot].is_some()).min_by_key(|slot| self.keyframes[*slot]);
+        let oldest = || {
+            (0..self.keyframes.len())
+                .filter(|slot| self.keyframes[*slot].is_some())
+                .min_by_key(|slot| self.keyframes[*slot])
+        };
         empty.or_else(oldest).unwrap_or(0)
     }
 

@@ -164,7 +164,8 @@ impl Timer {
         raster.cell_m *= raster.n as f32 / n as f32;
         raster.n = n;
         let fails = |reason: &dyn std::error::Error| format!("{} at {n} cells a side: {reason}", row.name);
-        let mut masker = Masker::new(raster, &configuration.points, &configuration.masking).map_err(|error| fails(&error))?;
+        let mut masker =
+            Masker::new(raster, &configuration.points, &configuration.masking).map_err(|error| fails(&error))?;
         let mut rasters = vec![vec![0.0; n * n]; scans.len()];
         for (scan, raster) in scans.iter().zip(&mut rasters) {
             masker.mask(&scan.view(), None, raster).map_err(|error| fails(&error))?;
