@@ -2,6 +2,7 @@
 
 mod boreas;
 mod detect;
+mod eccentricity;
 mod error;
 mod first_look;
 mod fomo;

@@ -44,6 +44,7 @@ fn profile(format: Format, range_resolution_m: f32) -> Profile {
         range_resolution_m,
         range_offset_m: RANGE_OFFSET_M,
         doppler_s: 0.0,
+        azimuth_eccentricity_rad: 0.0,
         encoder_counts: 5600,
         azimuth_source: AzimuthSource::Encoder,
         scan_time: ScanTime::MiddleRow,

@@ -20,6 +20,7 @@ pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<NavtechScan
         range_resolution_m: RANGE_RESOLUTION_M,
         range_offset_m: 0.0,
         doppler_s: 0.0,
+        azimuth_eccentricity_rad: 0.0,
         encoder_counts: ENCODER_COUNTS,
         azimuth_source: AzimuthSource::Encoder,
         scan_time: ScanTime::Halfway,

@@ -29,6 +29,7 @@ pub(crate) fn open_oxford_form(found: Found, options: &DatasetOptions) -> Result
         range_resolution_m: RANGE_RESOLUTION_M,
         range_offset_m: 0.0,
         doppler_s: 0.0,
+        azimuth_eccentricity_rad: 0.0,
         encoder_counts: 5600,
         azimuth_source: AzimuthSource::Encoder,
         scan_time: ScanTime::Halfway,

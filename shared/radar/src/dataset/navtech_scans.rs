@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::Dataset;
 use super::detect::Found;
+use super::eccentricity;
 use super::error::{OpenError, ReadError};
 use super::first_look::{FirstLook, NamedBy};
 use super::images::Images;
@@ -29,6 +30,7 @@ pub(crate) struct Profile {
     pub(crate) range_resolution_m: f32,
     pub(crate) range_offset_m: f32,
     pub(crate) doppler_s: f32,
+    pub(crate) azimuth_eccentricity_rad: f32,
     pub(crate) encoder_counts: u16,
     pub(crate) azimuth_source: AzimuthSource,
     pub(crate) scan_time: ScanTime,
@@ -44,6 +46,7 @@ impl Profile {
         self.range_resolution_m = options.range_resolution_m.unwrap_or(self.range_resolution_m);
         self.range_offset_m = options.range_offset_m.unwrap_or(self.range_offset_m);
         self.doppler_s = options.doppler_s.unwrap_or(self.doppler_s);
+        self.azimuth_eccentricity_rad = options.azimuth_eccentricity_rad;
         self.encoder_counts = options.encoder_counts.unwrap_or(self.encoder_counts);
         self.azimuth_source = options.azimuth_source.unwrap_or(self.azimuth_source);
         self
@@ -240,6 +243,7 @@ impl Dataset for NavtechScans {
         if profile.smooth_stamps {
             navtech_png::smooth_stamps(azimuth_rad, stamp_ns);
         }
+        eccentricity::correct(azimuth_rad, profile.azimuth_eccentricity_rad);
         Ok(SweepGeometry {
             azimuths: size.height,
             bins: size.width - METADATA_BYTES,

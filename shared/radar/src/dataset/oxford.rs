@@ -30,6 +30,7 @@ fn profile(format: Format, azimuth_source: AzimuthSource) -> Profile {
         range_resolution_m: RANGE_RESOLUTION_M,
         range_offset_m: 0.0,
         doppler_s: 0.0,
+        azimuth_eccentricity_rad: 0.0,
         encoder_counts: 5600,
         azimuth_source,
         scan_time: ScanTime::Halfway,

@@ -1,6 +1,7 @@
 //! Images without metadata that lie on their side: rows are range (the first is the nearest), columns azimuth from straight ahead.
 
 use super::detect::Found;
+use super::eccentricity;
 use super::error::{OpenError, ReadError};
 use super::images::Images;
 use super::navtech_png::fill_uniform;
@@ -18,6 +19,7 @@ pub(crate) struct SidewaysScans {
     pub(crate) range_resolution_m: f32,
     range_offset_m: f32,
     doppler_s: f32,
+    azimuth_eccentricity_rad: f32,
     scratch: Vec<u8>,
 }
 
@@ -35,6 +37,7 @@ impl SidewaysScans {
             range_resolution_m: 0.0,
             range_offset_m: options.range_offset_m.unwrap_or(0.0),
             doppler_s: options.doppler_s.unwrap_or(0.0),
+            azimuth_eccentricity_rad: options.azimuth_eccentricity_rad,
             scratch: Vec::new(),
         };
         scans.check_shape(format)?;
@@ -94,6 +97,7 @@ impl SidewaysScans {
             self.images.decode(index, slot.bytes)?;
         }
         fill_uniform(&mut slot.azimuth_rad[..azimuths]);
+        eccentricity::correct(&mut slot.azimuth_rad[..azimuths], self.azimuth_eccentricity_rad);
         slot.flags[..azimuths].fill(flag::MEASURED);
         for (column, stamp) in slot.stamp_ns[..azimuths].iter_mut().enumerate() {
             *stamp = start_ns + period_ns * column as i64 / azimuths as i64;

@@ -66,7 +66,7 @@ impl Default for RefinementConfig {
             keyframes: 10,
             keyframe_distance_m: 1.5,
             keyframe_angle_deg: 3.0,
-            cell_m: 0.4,
+            cell_m: 0.3,
             reach_m: 100.0,
             coarse: 3.0,
             acceleration_mps2: 6.0,
@@ -79,7 +79,7 @@ impl Default for RefinementConfig {
             search_agrees_deg: 6.0,
             least_support: 0.6,
             patience: 5,
-            variance_scale: 0.6,
+            variance_scale: 0.7,
             yaw_sigma_deg: 0.19,
         }
     }
