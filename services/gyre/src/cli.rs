@@ -118,6 +118,10 @@ pub struct TablesArguments {
     /// Where tables.md, tables.json and all runs go.
     #[arg(long, default_value = "out/tables")]
     pub out: PathBuf,
+    /// Also run with each of these changes alone, as in masking.threshold=50,70: what the choice is worth among its
+    /// neighbours; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE,...")]
+    pub vary: Vec<String>,
     /// Rasters' sides whose times are measured, cells.
     #[arg(long, value_delimiter = ',', default_value = "127,255,511")]
     pub sizes: Vec<usize>,

@@ -3,6 +3,7 @@
 //! - [`rows`]: what is compared, and what each row changes in a configuration;
 //! - [`papers`]: the paper's figures;
 //! - [`times`] (Table IIIa) and [`peer`]; [`accuracy`] (Table IIIb): the measurements;
+//! - [`variations`]: what single changes do to the shipped configuration;
 //! - [`markdown`]: the tables as text.
 
 mod accuracy;
@@ -11,6 +12,7 @@ mod papers;
 mod peer;
 mod rows;
 mod times;
+mod variations;
 
 use std::{
     env, fs,
@@ -31,6 +33,7 @@ use crate::{
 use accuracy::Accuracies;
 use peer::Peer;
 use times::Times;
+use variations::Variations;
 
 /// All of it: `tables.json`.
 #[derive(Debug, Serialize)]
@@ -46,6 +49,8 @@ struct Tables {
     times: Times,
     /// Table IIIb, sequence by sequence.
     accuracy: Vec<Accuracies>,
+    /// What `--vary` asked for, sequence by sequence.
+    variations: Vec<Variations>,
     /// Where the paper's figures are from.
     papers: &'static str,
 }
@@ -53,6 +58,11 @@ struct Tables {
 /// Measures, prints and writes both tables.
 pub fn tables(arguments: &TablesArguments) -> Result<ExitCode, Failure> {
     let sequences = sequences(arguments)?;
+    let changes = variations::changes(&arguments.vary)?;
+    let varied = if changes.is_empty() { &[] } else { sequences.as_slice() };
+    for change in &changes {
+        sequences[0].configuration(std::slice::from_ref(change))?;
+    }
     let out = &arguments.out;
     fs::create_dir_all(out).map_err(|error| format!("cannot write to {}: {error}", out.display()))?;
     let peer = Peer::new(arguments.peer.as_deref(), arguments.peer_script.as_deref());
@@ -66,6 +76,10 @@ pub fn tables(arguments: &TablesArguments) -> Result<ExitCode, Failure> {
         accuracy: sequences
             .iter()
             .map(|sequence| accuracy::measure(sequence, &out.join(&sequence.name)))
+            .collect::<Result<_, _>>()?,
+        variations: varied
+            .iter()
+            .map(|sequence| variations::measure(sequence, &changes, &out.join(&sequence.name)))
             .collect::<Result<_, _>>()?,
         papers: papers::SOURCE,
     };

@@ -13,7 +13,7 @@ use serde_json::Value;
 use super::{
     Sequence, command,
     papers::Figures,
-    rows::{Line, Row, lines},
+    rows::{Line, lines},
 };
 use crate::{Failure, print};
 
@@ -74,7 +74,7 @@ pub struct Accuracy {
 /// Runs every row on `sequence`, each into a folder of its own below `out`.
 pub fn measure(sequence: &Sequence, out: &Path) -> Result<Accuracies, Failure> {
     let measured = |line: Line| {
-        let ours = line.row.map(|row| run(sequence, row, &out.join(row.folder()))).transpose()?;
+        let ours = line.row.map(|row| run(sequence, row.name, &row.changes(), &out.join(row.folder()))).transpose()?;
         let n = match &ours {
             Some(ours) => ours.n,
             None => sequence.configuration(&[])?.raster.n,
@@ -90,11 +90,11 @@ pub fn measure(sequence: &Sequence, out: &Path) -> Result<Accuracies, Failure> {
     })
 }
 
-/// Runs one row as a person would, by `gyre run`, and reads what it left.
-fn run(sequence: &Sequence, row: &Row, out: &Path) -> Result<Accuracy, Failure> {
-    let n = sequence.configuration(&row.changes())?.raster.n;
-    let arguments = sequence.run_arguments(&row.changes(), out);
-    print::note(format_args!("{}: {}", sequence.name, row.name));
+/// Runs a sequence with changes as a person would, by `gyre run`, and reads what it left.
+pub(super) fn run(sequence: &Sequence, name: &str, changes: &[String], out: &Path) -> Result<Accuracy, Failure> {
+    let n = sequence.configuration(changes)?.raster.n;
+    let arguments = sequence.run_arguments(changes, out);
+    print::note(format_args!("{}: {name}", sequence.name));
     let status = Command::new(env::current_exe()?)
         .args(&arguments)
         .stdout(Stdio::null())

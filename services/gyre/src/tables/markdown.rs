@@ -6,6 +6,7 @@ use super::{
     Tables,
     accuracy::{Accuracies, Accuracy, AccuracyLine},
     times::{Median, TimeLine, Times},
+    variations::{Variation, Variations},
 };
 
 /// Both tables with all that is needed to read and to repeat them.
@@ -18,6 +19,9 @@ pub(super) fn of(tables: &Tables) -> String {
     text += &times(&tables.times);
     for sequence in &tables.accuracy {
         text += &accuracies(sequence);
+    }
+    for sequence in &tables.variations {
+        text += &variations(sequence);
     }
     text
 }
@@ -109,6 +113,24 @@ fn accuracies(sequence: &Accuracies) -> String {
     text + "```\n"
 }
 
+fn variations(sequence: &Variations) -> String {
+    let header = ["change", "KITTI %", "deg/100 m", "ATE m", "seg %", "search ms"];
+    let figures = |name: &str, figures: [Option<f64>; 4], ms: Option<f64>| {
+        let [translation, rotation, ate, seg] = figures;
+        let cells = [number(translation, 2), number(rotation, 2), number(ate, 2), number(seg, 3), number(ms, 2)];
+        std::iter::once(name.to_owned()).chain(cells).collect::<Vec<_>>()
+    };
+    let line = |line: &Variation| {
+        let (name, a) = (if line.change.is_empty() { "as it is" } else { &line.change }, &line.accuracy);
+        let errors = [a.translation_percent, a.rotation_deg_per_100m, a.ate_m, a.seg_percent];
+        figures(name, errors, Some(a.search_ms))
+    };
+    let m = &sequence.median;
+    let median = [m.translation_percent, m.rotation_deg_per_100m, m.ate_m, m.seg_percent];
+    let lines = sequence.lines.iter().map(line).chain([figures("median of the changes", median, None)]);
+    format!("\n## One change at a time on {}\n\n{}", sequence.data, table(&header, lines))
+}
+
 /// What the ground truth does not allow.
 fn truth(accuracy: Option<&Accuracy>) -> String {
     match accuracy.map(|accuracy| (accuracy.path_m, accuracy.seg_percent)) {
@@ -154,7 +176,7 @@ fn table(header: &[&str], lines: impl Iterator<Item = Vec<String>>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::machine::Machine;
+    use crate::{machine::Machine, tables::variations::Medians};
 
     fn accuracy(path_m: Option<f64>, seg_percent: Option<f64>) -> Accuracy {
         Accuracy {
@@ -205,9 +227,22 @@ mod tests {
         let times = Times { data: "drive".to_owned(), scans: 8, passes: 50, peer_torch: None, lines: Vec::new() };
         let machine = Machine { processor: "A".to_owned(), cores: 2 };
         let (date, command) = ("2024-02-29".to_owned(), "gyre tables".to_owned());
-        let accuracy = vec![sequence];
-        let tables =
-            Tables { version: "1.0", commit: Some("abc"), machine, date, command, times, accuracy, papers: "P" };
+        let sequences = vec![sequence];
+        let one_change = Variation { change: "a.b=1".to_owned(), accuracy: accuracy(Some(885.0), Some(0.5)) };
+        let none =
+            Medians { translation_percent: None, rotation_deg_per_100m: None, ate_m: Some(1.5), seg_percent: None };
+        let variations = vec![Variations { data: "drive".to_owned(), lines: vec![one_change], median: none }];
+        let tables = Tables {
+            version: "1.0",
+            commit: Some("abc"),
+            machine,
+            date,
+            command,
+            times,
+            accuracy: sequences,
+            variations,
+            papers: "P",
+        };
         let text = of(&tables);
         assert!(text.starts_with("# Table III by gyre 1.0 (abc)\n\nA, 2 cores; 2024-02-29\n"), "{text}");
         assert!(
@@ -215,7 +250,10 @@ mod tests {
         );
         assert!(text.contains("```sh\ngyre run it\n```"), "{text}");
         let cells: Vec<usize> = text.lines().filter(|l| l.starts_with('|')).map(|l| l.matches('|').count()).collect();
-        assert_eq!(cells, [11, 11, 14, 14, 14, 14]);
+        assert!(text.contains(
+            "| a.b=1 | 2.12 | 0.75 | 1.50 | 0.500 | 0.75 |\n| median of the changes | - | - | 1.50 | - | - |"
+        ));
+        assert_eq!(cells, [11, 11, 14, 14, 14, 14, 7, 7, 7, 7]);
     }
 
     #[test]
