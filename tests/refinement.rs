@@ -7,7 +7,7 @@ mod common;
 
 use std::{collections::BTreeSet, fs, thread, time::Duration};
 
-use common::{Ended, Pid, Run, Running, STAGES, odometry, recording, send, undisturbed};
+use common::{Ended, Pid, Run, Running, STAGES, recording, send, undisturbed};
 use rustix::process::Signal;
 use serde_json::Value;
 
