@@ -87,7 +87,6 @@ fn assert_counted(fault: Fault, clean: &Outcome, faulty: &Outcome) {
 }
 
 #[test]
-#[ignore = "a search from scan to scan has no way round a spoilt scan"]
 fn no_fault_leads_a_real_drive_astray_and_each_is_counted() {
     let Some(data) = real_data("radiate-2019-02-12") else { return };
     let clean = Outcome::of(&data, 0);

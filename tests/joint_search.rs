@@ -1,4 +1,4 @@
-//! The exhaustive search by four processes, joint-search in place of the two halves: the same result every time.
+//! The exhaustive search by five processes, joint-search in place of the two halves: the same result every time.
 
 #![allow(clippy::unwrap_used)]
 
@@ -10,7 +10,7 @@ use common::{Run, odometry};
 use serde_json::Value;
 
 const JOINT: &str = "joint-search";
-const STAGES: [&str; 4] = ["radar-replay", "masking", JOINT, "pose-integration"];
+const STAGES: [&str; 5] = ["radar-replay", "masking", JOINT, "refinement", "pose-integration"];
 const SCANS: usize = 64;
 
 /// The demo with another search.
@@ -20,7 +20,7 @@ fn demo() -> Run {
 }
 
 #[test]
-fn four_processes_give_the_same_bytes_again_though_one_is_killed() {
+fn five_processes_give_the_same_bytes_again_though_one_is_killed() {
     let first = demo().rate("max");
     let undisturbed = first.complete();
     let summary = first.summary();

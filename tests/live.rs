@@ -54,7 +54,7 @@ fn slow_masking_drops_scans_and_the_chain_does_not_break() {
 #[test]
 fn a_stage_behind_masking_can_die_and_the_chain_does_not_break() {
     for stage in ["rotation-search", "translation-search", "refinement", "pose-integration"] {
-        let run = live().set("refinement.kind=local-map");
+        let run = live();
         let mut running = run.start();
         running.await_poses(5).kill(stage);
         running.finish().succeeded();

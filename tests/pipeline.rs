@@ -1,4 +1,4 @@
-//! `gyre run` as a whole: five processes, the same result every time, whatever interrupts it.
+//! `gyre run` as a whole: six processes, the same result every time, whatever interrupts it.
 
 #![allow(clippy::unwrap_used)]
 
@@ -14,12 +14,12 @@ const MODERATE: &str = "6";
 const MIDDLE: usize = recording::SCANS / 3;
 
 #[test]
-fn five_processes_of_their_own_are_there_while_it_runs() {
+fn six_processes_of_their_own_are_there_while_it_runs() {
     let mut running = Run::of_recording().rate(MODERATE).start();
     let stages = running.await_stages();
     assert_eq!(stages.keys().map(String::as_str).collect::<BTreeSet<_>>(), BTreeSet::from(STAGES));
     let pids: BTreeSet<_> = stages.values().copied().chain([running.pid()]).collect();
-    assert_eq!(pids.len(), 6, "{stages:?}");
+    assert_eq!(pids.len(), STAGES.len() + 1, "{stages:?}");
     for pid in stages.values() {
         let environment = fs::read(format!("/proc/{pid}/environ")).unwrap();
         assert!(
@@ -49,7 +49,9 @@ fn all_results_are_there_and_each_motion_has_a_row() {
         assert!(run.result(file).contains(part), "{file}");
     }
     assert_eq!(run.result("trajectory.tum").lines().filter(|line| !line.starts_with('#')).count(), recording::SCANS);
-    assert!(run.out().join("journal/poses.journal").is_file());
+    for state in ["poses.journal", "refinement.map"] {
+        assert!(run.out().join("journal").join(state).is_file(), "{state}");
+    }
     for stage in STAGES {
         assert_eq!(run.result(format!("log/{stage}.txt")), "", "{stage} complains");
     }

@@ -1,43 +1,32 @@
-//! The sixth process: refinement between the search and the poses, and its death.
+//! Refinement, the process between the search and the poses: what it changes, what it leaves alone, and its death while it
+//! writes its map.
 
 #![allow(clippy::unwrap_used)]
 
 mod common;
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, fs, thread, time::Duration};
 
-use common::{Ended, Run, Running, STAGES, odometry, recording, send, undisturbed};
+use common::{Ended, Pid, Run, Running, STAGES, recording, send, undisturbed};
 use rustix::process::Signal;
 use serde_json::Value;
 
 const REFINEMENT: &str = "refinement";
+const MAP: &str = "journal/refinement.map";
 /// What the search says of a motion.
 const SEARCHED: [&str; 5] = ["searched_x_m", "searched_y_m", "searched_yaw_rad", "score", "runner_up_score"];
+const MOTION: [&str; 3] = ["x_m", "y_m", "yaw_rad"];
 /// The recording's six seconds in one.
 const MODERATE: &str = "6";
 const MIDDLE: usize = recording::SCANS / 3;
 
-fn refining() -> Run {
-    Run::of_recording().set("refinement.kind=local-map")
+fn without() -> Run {
+    Run::of_recording().set("refinement.kind=none")
 }
 
-fn six_stages() -> BTreeSet<String> {
-    STAGES.into_iter().chain([REFINEMENT]).map(str::to_owned).collect()
-}
-
-/// The same run again, disturbed once it is in its middle: the result is the same to the byte.
-fn survives(undisturbed: &str, run: &Run, disturb: impl FnOnce(&mut Running)) {
-    let mut running = run.start();
-    running.await_poses(MIDDLE);
-    disturb(&mut running);
-    let ended = running.finish();
-    ended.succeeded();
-    assert_eq!(run.odometry(), undisturbed, "{}", ended.stderr);
-    assert_eq!(run.summary()["published"], recording::SCANS);
-}
-
-fn restarted(run: &Run) -> BTreeSet<String> {
-    run.summary()["restarts"].as_object().unwrap().keys().cloned().collect()
+/// A map so small that its keyframes' slots are used again within the recording.
+fn with_small_map() -> Run {
+    Run::of_recording().set("refinement.keyframes=2").set("run.window=1")
 }
 
 /// Columns of an `odometry.csv`, by their names.
@@ -51,122 +40,168 @@ fn columns(csv: &str, names: &[&str]) -> Vec<Vec<String>> {
     csv.lines().skip(1).map(row).collect()
 }
 
-#[test]
-fn six_processes_give_each_motion_a_row_and_a_place_in_the_summary() {
-    let run = refining();
-    let rows = odometry::rows(&run.complete());
-    assert_eq!(rows.len(), recording::SCANS - 1);
-    odometry::assert_unbroken(&rows);
-    let summary = run.summary();
-    let names = |object: &Value| object.as_object().unwrap().keys().cloned().collect::<BTreeSet<_>>();
-    assert_eq!(names(&summary["stages"]), six_stages());
-    assert_eq!(names(&summary["latency"]["stages"]), six_stages());
-    assert_eq!(summary["stages"][REFINEMENT]["allocations_after_five"], 0);
-    let counts = BTreeSet::from(["refined", "weak", "predicted", "doubtful", "second_hypothesis"].map(str::to_owned));
-    assert_eq!(names(&summary["motions"]), counts);
+fn names(object: &Value) -> BTreeSet<String> {
+    object.as_object().unwrap().keys().cloned().collect()
 }
 
+// What it changes.
+
 #[test]
-fn a_run_that_does_not_refine_counts_no_refined_motions() {
+fn each_motion_is_counted_by_how_its_refinement_ended() {
     let run = Run::of_recording();
-    run.complete();
-    assert!(run.summary().get("motions").is_none());
+    let outcomes: Vec<String> = columns(&run.complete(), &["outcome"]).concat();
+    let summary = run.summary();
+    assert_eq!(names(&summary["stages"]), BTreeSet::from(STAGES.map(str::to_owned)));
+    assert_eq!(names(&summary["latency"]["stages"]), BTreeSet::from(STAGES.map(str::to_owned)));
+    let motions = &summary["motions"];
+    for outcome in ["refined", "weak", "predicted"] {
+        assert_eq!(motions[outcome], outcomes.iter().filter(|word| *word == outcome).count(), "{outcome}");
+    }
+    assert!(motions["refined"].as_u64().unwrap() > recording::SCANS as u64 / 2, "{motions}");
+    assert_eq!(outcomes.len(), recording::SCANS - 1);
 }
 
 #[test]
-fn motions_that_are_passed_through_are_those_of_a_run_without() {
-    assert_eq!(refining().complete(), undisturbed());
+fn a_run_that_does_not_refine_has_neither_the_process_nor_its_map_nor_its_counts() {
+    let run = without();
+    let odometry = run.complete();
+    let summary = run.summary();
+    assert!(summary.get("motions").is_none());
+    assert!(!names(&summary["stages"]).contains(REFINEMENT));
+    assert!(!run.out().join(MAP).exists());
+    assert_eq!(columns(&odometry, &MOTION), columns(&odometry, &SEARCHED[..3]), "what was searched is the motion");
+    assert!(columns(&odometry, &["outcome"]).concat().iter().all(|outcome| outcome == "searched"));
 }
 
 /// Masking undoes the sweep with searched motions, so the search sees the same rasters whether its motions are refined or not.
 #[test]
 fn refining_changes_nothing_for_the_search() {
-    assert_eq!(columns(&refining().complete(), &SEARCHED), columns(undisturbed(), &SEARCHED));
-    let motions = columns(undisturbed(), &["x_m", "y_m", "yaw_rad"]);
-    assert_eq!(
-        motions,
-        columns(undisturbed(), &SEARCHED[..3]),
-        "without a refinement, what was searched is the motion"
-    );
+    let alone = without().complete();
+    assert_eq!(columns(undisturbed(), &SEARCHED), columns(&alone, &SEARCHED));
+    assert_ne!(columns(undisturbed(), &MOTION), columns(&alone, &MOTION));
 }
 
 #[test]
-fn neither_window_nor_rate_changes_refined_motions() {
-    let alone = refining().complete();
-    for window in [1, 2, 8] {
-        assert_eq!(refining().set(&format!("run.window={window}")).complete(), alone, "window {window}");
-    }
-    assert_eq!(refining().rate("12").complete(), alone);
-}
-
-#[test]
-fn a_killed_refinement_is_started_again_alone() {
-    let alone = refining().complete();
-    let run = refining().rate(MODERATE);
-    survives(&alone, &run, |running| {
-        running.kill(REFINEMENT);
-    });
-    assert_eq!(restarted(&run), BTreeSet::from([REFINEMENT.to_owned()]));
-}
-
-#[test]
-fn a_refinement_killed_again_after_each_few_poses_goes_on() {
-    let alone = refining().complete();
-    let run = refining().rate(MODERATE);
-    survives(&alone, &run, |running| {
-        for poses in [MIDDLE, MIDDLE + 4, MIDDLE + 8] {
-            running.await_poses(poses).kill(REFINEMENT);
-        }
-    });
-    assert_eq!(restarted(&run), BTreeSet::from([REFINEMENT.to_owned()]));
-}
-
-#[test]
-fn refinement_and_a_neighbour_killed_at_once_go_on() {
-    let alone = refining().complete();
-    for neighbour in ["translation-search", "pose-integration", "masking"] {
-        let run = refining().rate(MODERATE);
-        survives(&alone, &run, |running| {
-            running.kill(neighbour).kill(REFINEMENT);
-        });
-        assert_eq!(restarted(&run), BTreeSet::from([REFINEMENT, neighbour].map(str::to_owned)), "{neighbour}");
-    }
-}
-
-#[test]
-fn six_processes_killed_at_once_go_on() {
-    let alone = refining().complete();
-    let run = refining().rate(MODERATE);
-    survives(&alone, &run, |running| {
-        running.stages().values().for_each(|pid| send(*pid, Signal::KILL));
-    });
-    assert_eq!(restarted(&run), six_stages());
-}
-
-#[test]
-fn an_interrupted_run_goes_on_refining() {
-    let alone = refining().complete();
-    let run = refining().rate(MODERATE);
-    let mut running = run.start();
-    running.await_poses(MIDDLE).signal(Signal::INT);
-    assert_eq!(running.finish().code(), Some(130));
-    assert_eq!(run.complete(), alone);
-}
-
-#[test]
-fn an_unfinished_run_is_not_continued_with_another_refinement() {
-    let run = refining().rate(MODERATE);
-    let mut running = run.start();
-    running.await_poses(MIDDLE).signal(Signal::INT);
-    running.finish();
-    let other = Run::of_recording().into(run.out());
-    Ended::of(other.command()).refused_with(&["unfinished run of another configuration"]);
+fn refined_motions_are_nearer_to_the_truth() {
+    let error = |run: Run| {
+        run.complete();
+        run.summary()["evaluation"]["ate"]["rmse_m"].as_f64().unwrap()
+    };
+    let (refined, searched) = (error(Run::of_recording()), error(without()));
+    assert!(refined < searched, "{refined} m refined, {searched} m as searched");
 }
 
 #[test]
 fn joint_search_is_refined_as_well() {
-    let run = refining().set("search.kind=exhaustive");
-    let without = Run::of_recording().set("search.kind=exhaustive").complete();
+    let run = Run::of_recording().set("search.kind=exhaustive");
+    let without = without().set("search.kind=exhaustive").complete();
     assert_eq!(columns(&run.complete(), &SEARCHED), columns(&without, &SEARCHED));
-    assert_eq!(run.summary()["stages"].as_object().unwrap().len(), 5);
+    assert_eq!(run.summary()["stages"].as_object().unwrap().len(), STAGES.len() - 1);
+}
+
+// Its death.
+
+/// The run is disturbed once it is in its middle: the result is that of one that was not, to the byte.
+fn survives(run: &Run, undisturbed: &str, disturb: impl FnOnce(&mut Running)) {
+    let run = run.clone().rate(MODERATE);
+    let mut running = run.start();
+    running.await_poses(MIDDLE);
+    disturb(&mut running);
+    let ended = running.finish();
+    ended.succeeded();
+    assert_eq!(run.odometry(), undisturbed, "{}", ended.stderr);
+    assert_eq!(run.summary()["published"], recording::SCANS);
+}
+
+#[test]
+fn refinement_and_a_neighbour_killed_at_once_go_on() {
+    for neighbour in ["translation-search", "pose-integration", "masking"] {
+        let run = Run::of_recording();
+        survives(&run, undisturbed(), |running| {
+            running.kill(neighbour).kill(REFINEMENT);
+        });
+        assert_eq!(names(&run.summary()["restarts"]), BTreeSet::from([REFINEMENT, neighbour].map(str::to_owned)));
+    }
+}
+
+/// The recording's vehicle makes nearly every scan a keyframe, so deaths this dense meet keyframes and states half written.
+#[test]
+fn refinement_killed_at_any_moment_of_many_lives_goes_on() {
+    for run in [Run::of_recording(), with_small_map()] {
+        let alone = run.clone().into(&run.folder().join("alone")).complete();
+        let run = run.set("stages.refinement.restart.limit=1000");
+        survives(&run, &alone, |running| {
+            let mut last: Pid = 0;
+            for delay_us in (0..16).map(|k| 2_500 * k) {
+                last = running.await_other_stage(REFINEMENT, last);
+                thread::sleep(Duration::from_micros(delay_us));
+                send(last, Signal::KILL);
+            }
+        });
+        assert!(run.summary()["restarts"][REFINEMENT].as_u64().unwrap() > 3, "{}", run.summary()["restarts"]);
+    }
+}
+
+#[test]
+fn refinement_killed_after_each_pose_goes_on() {
+    let run = with_small_map();
+    let alone = run.clone().into(&run.folder().join("alone")).complete();
+    let run = run.rate("3").set("stages.refinement.restart.limit=1000");
+    let mut running = run.start();
+    for poses in 1..recording::SCANS {
+        running.await_poses_or_end(poses);
+        if let Some(pid) = running.stages().get(REFINEMENT) {
+            send(*pid, Signal::KILL);
+        }
+    }
+    let ended = running.finish();
+    ended.succeeded();
+    assert_eq!(run.odometry(), alone, "{}", ended.stderr);
+}
+
+#[test]
+fn a_supervisor_killed_again_and_again_does_not_confuse_the_map() {
+    let run = with_small_map();
+    let alone = run.clone().into(&run.folder().join("alone")).complete();
+    let slowly = run.clone().rate(MODERATE);
+    for poses in [1, 2, 7, 8, 15, 20] {
+        let mut running = slowly.start();
+        running.await_poses(poses);
+        running.kill_supervisor();
+    }
+    assert_eq!(run.complete(), alone);
+}
+
+// Its map.
+
+/// Interrupts a run in its middle.
+fn interrupted() -> Run {
+    let run = Run::of_recording();
+    let mut running = run.clone().rate(MODERATE).start();
+    running.await_poses(MIDDLE).signal(Signal::INT);
+    assert_eq!(running.finish().code(), Some(130));
+    run
+}
+
+#[test]
+fn an_unfinished_run_is_not_continued_with_another_refinement() {
+    let run = interrupted();
+    for other in [without(), Run::of_recording().set("refinement.keyframes=3")] {
+        Ended::of(other.into(run.out()).command()).refused_with(&["unfinished run of another configuration"]);
+    }
+}
+
+#[test]
+fn a_map_that_was_lost_or_damaged_is_told_and_the_run_can_be_begun_anew() {
+    let run = interrupted();
+    let map = run.out().join(MAP);
+    let whole = fs::read(&map).unwrap();
+    let flipped: Vec<u8> = whole.iter().enumerate().map(|(k, byte)| if k > 100 { !byte } else { *byte }).collect();
+    for damaged in [&[][..], &whole[..100], b"dear diary", &flipped] {
+        fs::write(&map, damaged).unwrap();
+        let ended = run.finish();
+        ended.failed_with(&["refinement.map", "does not hold what the refinement knew", "--fresh"]);
+        assert!(!ended.stderr.contains("started it again"), "{}", ended.stderr);
+    }
+    assert_eq!(run.option("--fresh").complete(), undisturbed());
 }

@@ -55,6 +55,11 @@ fn a_killed_translation_search_goes_on() {
 }
 
 #[test]
+fn a_killed_refinement_goes_on() {
+    survives_the_death_of("refinement");
+}
+
+#[test]
 fn a_killed_pose_integration_goes_on() {
     survives_the_death_of("pose-integration");
 }

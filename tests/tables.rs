@@ -11,7 +11,8 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 const SIZE: usize = 63;
-const ROWS: [&str; 5] = ["raw", "f-raw, line 14", "f-raw, Eq. 7", "Gyre, every angle", "Gyre"];
+const ROWS: [&str; 7] =
+    ["raw", "f-raw, line 14", "f-raw, Eq. 7", "Gyre, every angle", "Gyre, search alone", "Gyre, refined", "Gyre"];
 
 /// Writes what a peer writes, to the file that follows `--json`: 80 ms for each search, whatever it is told.
 const PEER: &str = r#"

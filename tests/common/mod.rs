@@ -27,8 +27,9 @@ pub use leftovers::assert_nothing_left;
 pub use processes::{Pid, cpu_time, send};
 pub use running::Running;
 
-/// The stages of a run that neither searches jointly nor refines, in the order of the stream.
-pub const STAGES: [&str; 5] = ["radar-replay", "masking", "rotation-search", "translation-search", "pose-integration"];
+/// The stages of a run that does not search jointly, in the order of the stream.
+pub const STAGES: [&str; 6] =
+    ["radar-replay", "masking", "rotation-search", "translation-search", "refinement", "pose-integration"];
 
 /// Small rasters: the tests are about processes.
 const CONFIGURATION: &str = "[raster]\nn = 127\ncell_m = 0.8\n";

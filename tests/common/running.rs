@@ -41,9 +41,9 @@ impl Running {
         processes::stages_of(self.pid())
     }
 
-    /// Waits until all five live.
+    /// Waits until all of [`STAGES`] live.
     pub fn await_stages(&mut self) -> BTreeMap<String, Pid> {
-        self.until("five stages", |running| Some(running.stages()).filter(|stages| stages.len() == STAGES.len()))
+        self.until("six stages", |running| Some(running.stages()).filter(|stages| stages.len() == STAGES.len()))
     }
 
     /// Waits until a stage lives, and returns at once.

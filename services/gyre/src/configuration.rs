@@ -229,6 +229,11 @@ impl Configuration {
         if let Some(simulation) = &self.simulation {
             simulation.validate().map_err(|e| value("simulation", e.to_string()))?;
         }
+        if self.has(Stage::Refinement) && self.points.capacity == 0 {
+            let reason =
+                "points.capacity is 0, but a refinement of kind `local-map` matches points: it must be 1 or more";
+            return Err(value("points", reason.to_owned()));
+        }
         if self.masking.compensate && self.masking.lag == 0 {
             return Err(value(
                 "masking",
@@ -333,6 +338,8 @@ mod tests {
             ("[run]\nwindow = 0", "window"),
             ("[raster]\nn = 0", "raster.n"),
             ("[points]\ncapacity = 70000", "points.capacity"),
+            ("[points]\ncapacity = 0", "points.capacity is 0"),
+            ("[refinement]\nkeyframes = 0", "refinement.keyframes"),
             ("[masking]\nlag = 0", "lag"),
             ("[masking]\nthreshold = 300", "300"),
             ("[run]\nmode = 'live'", "rate"),
@@ -349,12 +356,16 @@ mod tests {
         let names = |text: &str| -> Vec<String> {
             from(text).unwrap().stage_plans(Path::new("gyre")).into_iter().map(|plan| plan.name).collect()
         };
-        let halves = ["radar-replay", "masking", "rotation-search", "translation-search", "pose-integration"];
-        assert_eq!(names(""), halves);
-        let joint = ["radar-replay", "masking", "joint-search", "pose-integration"];
-        assert_eq!(names("[search]\nkind = 'exhaustive'"), joint);
-        let refined = ["radar-replay", "masking", "joint-search", "refinement", "pose-integration"];
-        assert_eq!(names("[search]\nkind = 'exhaustive'\n[refinement]\nkind = 'local-map'"), refined);
+        let (source, halves) = (["radar-replay", "masking"], ["rotation-search", "translation-search"]);
+        let (joint, refined, searched) = (["joint-search"], ["refinement", "pose-integration"], ["pose-integration"]);
+        assert_eq!(names(""), [&source[..], &halves, &refined].concat());
+        assert_eq!(names("[refinement]\nkind = 'none'"), [&source[..], &halves, &searched].concat());
+        let exhaustive = "[search]\nkind = 'exhaustive'\n";
+        assert_eq!(names(exhaustive), [&source[..], &joint, &refined].concat());
+        assert_eq!(
+            names(&format!("{exhaustive}[refinement]\nkind = 'none'")),
+            [&source[..], &joint, &searched].concat()
+        );
     }
 
     #[test]

@@ -10,6 +10,7 @@ use std::{
 
 use gyre_messages::{Stage, flag};
 use gyre_pose_integration::journal;
+use gyre_refinement::checkpoint;
 use gyre_stage::{
     Manifest,
     run::RunRoot,
@@ -162,7 +163,9 @@ fn prepare(configuration: &Configuration, out: &Path, fresh: bool) -> Result<usi
     let ended = poses.last().is_some_and(|last| last.item.is(flag::END));
     let complete = ended && out.join(LAST_RESULT).exists();
     if poses.is_empty() || complete || fresh {
-        let _ = fs::remove_file(journal);
+        for state in [journal, checkpoint::path(out)] {
+            let _ = fs::remove_file(state);
+        }
         // A new run may have no truth to be drawn against: nothing of the earlier one must look like its own.
         for result in
             [LAST_RESULT, "log.jsonl", "odometry.csv", "trajectory.tum", "trajectory.svg", "errors.svg", "bands.svg"]

@@ -1,4 +1,4 @@
-//! The journal: the only state of a run. A file of poses, each with its motion and a check word.
+//! The journal: all that a run's results are made from. A file of poses, each with its motion and a check word.
 //!
 //! One `write` a record. A record that was cut short by a death is found by its check word and cut off; what was in it had
 //! not been published yet. (A loss of power may take more: the operating system writes to the disk when it likes.)

@@ -5,6 +5,9 @@
 //! rings of fixed slots, one of states and one of keyframes, as long as any restart can ask for; it does not grow. A slot cut
 //! short by a death is found by its check word; what it was for had not been published.
 
+#[cfg(test)]
+mod tests;
+
 use std::{
     fs::{File, OpenOptions},
     io,
@@ -119,23 +122,48 @@ impl Checkpoint {
         (HEAD_BYTES + STATES * STATE_BYTES + slot * self.slot.len()) as u64
     }
 
-    /// Writes what is known after `item`: first the keyframes that are new, then the state that speaks of them.
+    /// Writes what is known after `item`: first the keyframes that are new, then the state that speaks of them. Where the file
+    /// says the same already, an earlier life is being repeated and nothing is written: what that life knew later may still
+    /// be asked for. Where it says otherwise, what it says of later items is of no use any more.
     pub fn write(&mut self, item: u64, refinement: &Refinement) -> Result<(), CheckpointError> {
-        let failed = |source| CheckpointError::File { path: self.path.clone(), source };
         let (mut count, mut oldest) = (0_u64, u64::MAX);
         for keyframe in refinement.keyframes() {
             (count, oldest) = (count + 1, oldest.min(keyframe.id));
         }
+        let state = encode_state([item, count, oldest], refinement.memory());
+        if self.read_state(item).is_some_and(|found| found == state) {
+            return Ok(());
+        }
+        let result = self.forget_from(item).and_then(|()| self.write_new(item, oldest, refinement));
+        let result = result.and_then(|()| self.file.write_all_at(&state, self.state_at(item)));
+        result.map_err(|source| CheckpointError::File { path: self.path.clone(), source })
+    }
+
+    fn write_new(&mut self, item: u64, oldest: u64, refinement: &Refinement) -> io::Result<()> {
         for keyframe in refinement.keyframes() {
-            if !self.keyframes.contains(&Some(keyframe.id)) {
-                let slot = self.free_slot();
-                self.keyframes[slot] = Some(keyframe.id);
-                encode_keyframe(keyframe, &mut self.slot);
-                self.file.write_all_at(&self.slot, self.keyframe_at(slot)).map_err(failed)?;
+            let known = self.keyframes.iter().position(|slot| *slot == Some(keyframe.id));
+            // A map begins with the scan before the item at hand, seen in the light of this one.
+            let begun = keyframe.id == oldest && keyframe.id.checked_add(1) == Some(item);
+            if known.is_some() && !begun {
+                continue;
+            }
+            let slot = known.unwrap_or_else(|| self.free_slot());
+            self.keyframes[slot] = Some(keyframe.id);
+            encode_keyframe(keyframe, &mut self.slot);
+            self.file.write_all_at(&self.slot, self.keyframe_at(slot))?;
+        }
+        Ok(())
+    }
+
+    /// Leaves out the keyframes from `item` on.
+    fn forget_from(&mut self, item: u64) -> io::Result<()> {
+        for slot in 0..self.keyframes.len() {
+            if self.keyframes[slot].is_some_and(|id| id >= item) {
+                self.file.write_all_at(&NO_CHECK_WORD, self.keyframe_at(slot))?;
+                self.keyframes[slot] = None;
             }
         }
-        let state = encode_state([item, count, oldest], refinement.memory());
-        self.file.write_all_at(&state, self.state_at(item)).map_err(failed)
+        Ok(())
     }
 
     /// An empty slot, or that of the oldest keyframe where as many are kept as a restart can ask for.
@@ -150,24 +178,17 @@ impl Checkpoint {
         empty.or_else(oldest).unwrap_or(0)
     }
 
-    /// Leaves out the keyframes from `item` on: they are from a life that is being repeated, perhaps with other scans.
-    pub fn forget_from(&mut self, item: u64) {
-        self.keyframes.iter_mut().for_each(|slot| *slot = slot.filter(|id| *id < item));
-    }
-
     /// Makes the refinement what it was after `item`.
     pub fn restore(&mut self, item: u64, refinement: &mut Refinement) -> Result<(), CheckpointError> {
-        self.forget_from(item.saturating_add(1));
         let missing = || CheckpointError::Missing { path: self.path.clone(), item: item.saturating_add(1) };
-        let mut state = [0; STATE_BYTES];
-        self.file.read_exact_at(&mut state, self.state_at(item)).map_err(|_| missing())?;
+        let state = self.read_state(item).ok_or_else(missing)?;
         let ([found, count, oldest], memory) = decode_state(&state).ok_or_else(missing)?;
         if found != item {
             return Err(missing());
         }
         let mut wanted: Vec<(u64, usize)> = (0..self.keyframes.len())
             .filter_map(|slot| self.keyframes[slot].map(|id| (id, slot)))
-            .filter(|(id, _)| *id >= oldest)
+            .filter(|(id, _)| (oldest..=item).contains(id))
             .collect();
         wanted.sort_unstable();
         let places: Vec<u64> = wanted.iter().map(|(_, slot)| self.keyframe_at(*slot)).collect();
@@ -179,6 +200,12 @@ impl Checkpoint {
             })
         });
         if refinement.keyframes().count() as u64 == count { Ok(()) } else { Err(missing()) }
+    }
+
+    /// What lies in an item's slot; `None` where the file ends before it.
+    fn read_state(&self, item: u64) -> Option<[u8; STATE_BYTES]> {
+        let mut state = [0; STATE_BYTES];
+        self.file.read_exact_at(&mut state, self.state_at(item)).ok().map(|()| state)
     }
 
     /// The number of the keyframe in a slot, if it is whole.
@@ -193,6 +220,8 @@ impl Checkpoint {
 }
 
 const HEAD_BYTES: usize = 16 + 3 * 8;
+/// What the slot of no keyframe begins with.
+const NO_CHECK_WORD: [u8; 8] = [0; 8];
 
 fn word(bytes: &[u8], k: usize) -> u64 {
     bytes[8 * k..].first_chunk().map_or(0, |word| u64::from_le_bytes(*word))

@@ -71,7 +71,6 @@ impl Refiner {
     /// Makes the refinement know what it has to before this item.
     fn stand_before(&mut self, item: &Item) -> Result<(), StageError> {
         if item.is(flag::BREAK) {
-            self.checkpoint.forget_from(item.seq);
             self.refinement.start();
         } else if self.next != Some(item.seq) {
             self.checkpoint.restore(item.seq.saturating_sub(1), &mut self.refinement).map_err(unusable)?;

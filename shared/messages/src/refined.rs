@@ -16,7 +16,7 @@ pub mod outcome {
     pub const SEARCHED: u32 = 0;
     /// Refined.
     pub const REFINED: u32 = 1;
-    /// There was little to go by: the motion is kept, but with a wider covariance, and its scan stays out of the map.
+    /// Refined with little to go by: the motion is kept, its scan stays out of the map.
     pub const WEAK: u32 = 2;
     /// Nothing fitted: the motion before goes on.
     pub const PREDICTED: u32 = 3;

@@ -147,13 +147,13 @@ mod tests {
         let work = |p50_us: f64| json!({ "work": { "p50_us": p50_us, "p90_us": 1e6 } });
         let stages = json!({
             "radar-replay": work(9000.0), "masking": work(2000.0), "rotation-search": work(250.0),
-            "translation-search": work(500.0), "pose-integration": work(7.0)
+            "translation-search": work(500.0), "refinement": work(1500.0), "pose-integration": work(7.0)
         });
         let rpe = json!({ "rotation_rmse_deg": 0.25, "forward_ratio": null });
         let evaluation = json!({ "path_m": 22.0, "kitti": null, "ate": { "rmse_m": 0.5 }, "seg": null, "rpe": rpe });
         let summary = json!({ "scans_per_s": 120.5, "latency": { "stages": stages }, "evaluation": evaluation });
         let accuracy = Accuracy::new("x".to_owned(), 255, &summary);
-        assert_eq!((accuracy.masking_ms, accuracy.search_ms, accuracy.scans_per_s), (2.0, 0.75, Some(120.5)));
+        assert_eq!((accuracy.masking_ms, accuracy.search_ms, accuracy.scans_per_s), (2.0, 2.25, Some(120.5)));
         assert_eq!((accuracy.path_m, accuracy.ate_m, accuracy.pair_rotation_deg), (Some(22.0), Some(0.5), Some(0.25)));
         assert_eq!((accuracy.translation_percent, accuracy.seg_percent, accuracy.forward_ratio), (None, None, None));
     }

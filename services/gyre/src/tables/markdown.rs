@@ -33,7 +33,7 @@ fn times(times: &Times) -> String {
     let _ = writeln!(
         text,
         "\nms: for a scan, one thread, median of {} passes over {} scans of {}, the earlier scan's spectrum kept as in a \
-         run, rasters ready. {}{}Paper: a Core i7 at 2.9 GHz; a Jetson Nano with its GPU. -: not given there, or not \
+         run, rasters and points ready. The rows that refine do so at every size with the same points. {}{}Paper: a Core i7 at 2.9 GHz; a Jetson Nano with its GPU. -: not given there, or not \
          there here (learned masks).",
         times.passes,
         times.scans,

@@ -16,17 +16,32 @@ pub struct Row {
 }
 
 /// All rows that this program can measure.
-pub static ROWS: [Row; 5] = [
+pub static ROWS: [Row; 7] = [
     Row::of_papers("raw", "raw", "raw", &[PAPERS_RASTER, RAW]),
     Row::of_papers("f-raw, line 14", "f-raw", "f-raw", &[PAPERS_RASTER, F_RAW, &["rotation.form=line14"]]),
     Row::of_papers("f-raw, Eq. 7", "f-raw", "f-raw-eq7", &[PAPERS_RASTER, F_RAW, &["rotation.form=eq7"]]),
-    Row::of_gyre("Gyre, every angle", &[&["search.kind=exhaustive"]]),
+    Row::of_gyre("Gyre, every angle", &[&["search.kind=exhaustive"], SEARCH_ALONE]),
+    Row::of_gyre("Gyre, search alone", &[SEARCH_ALONE]),
+    Row::of_gyre("Gyre, refined", &[LAST_KEYFRAME]),
     Row::of_gyre("Gyre", &[]),
 ];
 
-/// No mask, no compensation, 102 m a side.
-const PAPERS_RASTER: &[&str] =
-    &["raster.n=255", "raster.cell_m=0.4", "raster.sampling=bilinear", "masking.kind=none", "masking.compensate=false"];
+/// Two scans and no more: the motion is the search's.
+const SEARCH_ALONE: &[&str] = &["refinement.kind=none"];
+
+/// Refined, but against the last keyframe instead of a map.
+const LAST_KEYFRAME: &[&str] = &["refinement.keyframes=1"];
+
+/// No mask, no compensation, no refinement, 102 m a side.
+const PAPERS_RASTER: &[&str] = &[
+    "raster.n=255",
+    "raster.cell_m=0.4",
+    "raster.sampling=bilinear",
+    "points.capacity=0",
+    "masking.kind=none",
+    "masking.compensate=false",
+    "refinement.kind=none",
+];
 
 /// As `configs/mbym.toml`.
 const RAW: &[&str] = &["search.kind=exhaustive", "exhaustive.overlap=none", "exhaustive.peak=parabola"];

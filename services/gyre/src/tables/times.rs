@@ -1,13 +1,14 @@
-//! Table IIIa: how long each search takes for a pair of scans, on one thread of this process.
+//! Table IIIa: how long each search takes for a pair of scans, refinement included where a row has it, on one thread of this
+//! process.
 
 use std::{hint::black_box, path::Path, time::Instant};
 
 use gyre_joint_search::Motions;
 use gyre_masking::Masker;
 use gyre_messages::{MotionEstimate, Pair};
-use gyre_radar::OwnedScan;
+use gyre_radar::{OwnedScan, Point};
 use gyre_rotation_search::Rotations;
-use gyre_scan_matching::{ConfigError, ShapeError};
+use gyre_scan_matching::{ConfigError, Refinement, RefinementKind, ShapeError};
 use gyre_translation_search::Translations;
 use serde::Serialize;
 
@@ -146,11 +147,47 @@ fn search(configuration: &Configuration) -> Result<Search, ConfigError> {
     })
 }
 
+/// The refinement of a configuration, with the points and the times of the scans.
+struct Refiner {
+    refinement: Refinement,
+    points: Vec<Vec<Point>>,
+    stamps_ns: Vec<i64>,
+}
+
+impl Refiner {
+    /// `None` where the configuration refines nothing.
+    fn new(configuration: &Configuration, masker: &mut Masker, scans: &[OwnedScan]) -> Result<Option<Self>, Failure> {
+        if configuration.refinement.kind == RefinementKind::None {
+            return Ok(None);
+        }
+        let capacity = configuration.points.capacity;
+        let mut points = vec![vec![Point::default(); capacity]; scans.len()];
+        for (scan, points) in scans.iter().zip(&mut points) {
+            let found = masker.points(&scan.view(), points)?;
+            points.truncate(found);
+        }
+        let refinement = Refinement::new(&configuration.refinement, capacity)?;
+        let stamps_ns = scans.iter().map(|scan| scan.geometry.stamp_ns).collect();
+        Ok(Some(Self { refinement, points, stamps_ns }))
+    }
+
+    /// Refines the motion from scan `later - 1` to scan `later`. Nobody drove from the last scan to the first: a chain starts
+    /// there.
+    fn next(&mut self, seq: u64, later: usize, motion: &MotionEstimate) {
+        let Some(earlier) = later.checked_sub(1) else { return self.refinement.start() };
+        let interval_ns = self.stamps_ns[later].saturating_sub(self.stamps_ns[earlier]);
+        let motion = MotionEstimate { interval_ns, ..*motion };
+        let (later, earlier) = (&self.points[later], &self.points[earlier]);
+        black_box(gyre_refinement::refine(&mut self.refinement, seq, later, earlier, &motion));
+    }
+}
+
 /// The search of one row on rasters of one size, and how long it took.
 struct Timer {
     cell_m: f32,
     angles: Option<usize>,
     search: Search,
+    refiner: Option<Refiner>,
     rasters: Vec<Vec<f32>>,
     seq: u64,
     halves_ms: [Vec<f64>; 2],
@@ -170,11 +207,13 @@ impl Timer {
         for (scan, raster) in scans.iter().zip(&mut rasters) {
             masker.mask(&scan.view(), None, raster).map_err(|error| fails(&error))?;
         }
+        let refiner = Refiner::new(&configuration, &mut masker, scans).map_err(|error| fails(&*error))?;
         let exhaustive = configuration.search.kind == SearchKind::Exhaustive;
         Ok(Self {
             cell_m: configuration.raster.cell_m,
             angles: exhaustive.then(|| configuration.exhaustive.candidates()),
             search: search(&configuration).map_err(|error| fails(&error))?,
+            refiner,
             rasters,
             seq: 0,
             halves_ms: [Vec::new(), Vec::new()],
@@ -192,13 +231,17 @@ impl Timer {
         Ok(())
     }
 
-    /// Searches the motion of the next pair; the time it took, ms.
+    /// Searches, and refines where the row does, the motion of the next pair; the time it took, ms.
     fn pass(&mut self) -> Result<f64, ShapeError> {
         self.seq += 1;
-        let raster = |seq: u64| self.rasters[seq as usize % self.rasters.len()].as_slice();
-        let pair = Pair { later: raster(self.seq), earlier: Some(raster(self.seq - 1)) };
+        let scan = |seq: u64| seq as usize % self.rasters.len();
+        let (later, earlier) = (scan(self.seq), scan(self.seq - 1));
+        let pair = Pair { later: &self.rasters[later], earlier: Some(&self.rasters[earlier]) };
         let start = Instant::now();
-        black_box((self.search)(self.seq, black_box(pair))?);
+        let motion = black_box((self.search)(self.seq, black_box(pair))?);
+        if let Some(refiner) = &mut self.refiner {
+            refiner.next(self.seq, later, &motion);
+        }
         Ok(start.elapsed().as_secs_f64() * 1e3)
     }
 
