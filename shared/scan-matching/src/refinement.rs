@@ -29,6 +29,8 @@ use sweep::Placed;
 /// Most steps of a descent on the coarse map, and on the fine one.
 const COARSE_STEPS: usize = 10;
 const FINE_STEPS: usize = 6;
+/// On the coarse map one point in so many will do.
+const COARSE_POINTS: usize = 3;
 /// How often the points are placed anew, by the motion just found, and matched on the fine map.
 const FINE_ROUNDS: usize = 2;
 /// Starts nearer to each other than this share a valley: coarse cells, and rad.
@@ -205,6 +207,7 @@ impl Refinement {
             None => self.memory.velocity_to(&query.searched, query.interval_s),
         };
         self.placed.place(query.points, &velocity);
+        self.placed.thin(COARSE_POINTS);
         let coarse = self.keyframes.coarse();
         let mut best: Option<(Hypothesis, Match, bool)> = None;
         for (k, (hypothesis, start)) in starts.iter().enumerate() {

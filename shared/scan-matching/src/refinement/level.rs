@@ -32,7 +32,7 @@ pub(super) struct Level {
     pub n: usize,
     corner: [i64; 2],
     /// Sum of the images.
-    sum: Vec<f32>,
+    sum: Vec<u16>,
     images: usize,
     drawing: Vec<f32>,
     blurred: Vec<f32>,
@@ -41,7 +41,7 @@ pub(super) struct Level {
 /// Where a pose lies on a level, and the level's values.
 pub(super) struct Lookup<'a> {
     /// Sums of values; divide by `full`.
-    pub sum: &'a [f32],
+    pub sum: &'a [u16],
     pub n: usize,
     /// What a cell that all keyframes are sure of has.
     pub full: f32,
@@ -55,7 +55,7 @@ impl Level {
     pub fn new(cell_m: f64, reach_m: f64) -> Self {
         let n = 2 * (reach_m / cell_m).ceil() as usize + 1;
         let cells = || vec![0.0; n * n];
-        Self { cell_m, n, corner: [0; 2], sum: cells(), images: 0, drawing: cells(), blurred: cells() }
+        Self { cell_m, n, corner: [0; 2], sum: vec![0; n * n], images: 0, drawing: cells(), blurred: cells() }
     }
 
     pub fn new_image(&self) -> Image {
@@ -99,7 +99,7 @@ impl Level {
 
     /// Makes this the map of these images, about the last of them. Sums of whole numbers: exact in any order.
     pub fn stack<'a>(&mut self, images: impl Iterator<Item = &'a Image> + Clone) {
-        self.sum.fill(0.0);
+        self.sum.fill(0);
         self.images = 0;
         let Some(newest) = images.clone().last() else { return };
         self.corner = newest.corner;
@@ -115,7 +115,7 @@ impl Level {
                 let to = (row * n + first_col) as usize..(row * n + last_col) as usize;
                 let from = ((row - down) * n + first_col - right) as usize;
                 let from = &image.cells[from..from + to.len()];
-                self.sum[to].iter_mut().zip(from).for_each(|(sum, cell)| *sum += f32::from(*cell));
+                add(from, &mut self.sum[to]);
             }
         }
     }
@@ -160,11 +160,24 @@ fn moments(values: &[f32]) -> (f64, f64) {
     (total(sums, rest.iter().sum()), total(squares, rest.iter().map(|v| v * v).sum()))
 }
 
+/// Most cells saw nothing; sixteen of them at once are passed over.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
 fn saturate(values: &[f32], mean: f32, cells: &mut [u8]) {
-    for (cell, value) in cells.iter_mut().zip(values) {
-        *cell = (FULL * value / (value + mean) + 0.5) as u8;
+    for (cells, values) in cells.chunks_mut(16).zip(values.chunks(16)) {
+        if values.iter().all(|value| *value == 0.0) {
+            cells.fill(0);
+            continue;
+        }
+        for (cell, value) in cells.iter_mut().zip(values) {
+            *cell = (FULL * value / (value + mean) + 0.5) as u8;
+        }
     }
+}
+
+/// At most 64 images of at most 255: no sum is too large.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+fn add(cells: &[u8], sum: &mut [u16]) {
+    sum.iter_mut().zip(cells).for_each(|(sum, cell)| *sum += u16::from(*cell));
 }
 
 #[cfg(test)]
@@ -183,7 +196,7 @@ mod tests {
 
     fn brightest(level: &Level) -> [f64; 2] {
         let lookup = level.lookup();
-        let brightest = (0..lookup.sum.len()).max_by(|a, b| lookup.sum[*a].total_cmp(&lookup.sum[*b])).unwrap_or(0);
+        let brightest = (0..lookup.sum.len()).max_by_key(|k| (lookup.sum[*k], std::cmp::Reverse(*k))).unwrap_or(0);
         [brightest / level.n, brightest % level.n]
             .map(|k| k as f64 * level.cell_m)
             .into_iter()
@@ -204,7 +217,7 @@ mod tests {
         level.draw(&points(&[[seen.x as f32, seen.y as f32]]), &pose, &mut second);
         level.stack([&first, &second].into_iter());
         assert_eq!(brightest(&level), [6.0, 2.0]);
-        let peak = level.lookup().sum.iter().copied().fold(0.0, f32::max);
+        let peak = f32::from(level.lookup().sum.iter().copied().max().unwrap_or(0));
         assert!(
             (peak / level.lookup().full - 0.79).abs() < 0.02,
             "{peak}: peak over mean is 0.159 over 0.0796, less the blur's"
@@ -227,6 +240,6 @@ mod tests {
         level.draw(&points(&[[25.0, 0.0], [f32::NAN, 0.0], [0.0, -1e30]]), &Isometry2::identity(), &mut image);
         assert!(image.cells.iter().all(|cell| *cell == 0));
         level.stack([&image].into_iter());
-        assert!(level.lookup().sum.iter().all(|sum| *sum == 0.0));
+        assert!(level.lookup().sum.iter().all(|sum| *sum == 0));
     }
 }

@@ -122,6 +122,7 @@ fn sum_block<'a>(map: &Lookup<'a>, x_m: &[f32], y_m: &[f32], weight: &[f32], pla
         else {
             continue;
         };
+        let [a, b, c, d] = [a, b, c, d].map(f32::from);
         let (upper, lower) = (a + along * (b - a), c + along * (d - c));
         let m = value * (upper + across * (lower - upper));
         let jx = slope * (lower - upper);

@@ -32,6 +32,15 @@ impl Placed {
         place(points, velocity.map(|v| v as f32).into(), &mut self.x_m, &mut self.y_m, &mut self.weight);
     }
 
+    /// Leaves only one point in `step`.
+    pub fn thin(&mut self, step: usize) {
+        for column in [&mut self.x_m, &mut self.y_m, &mut self.weight] {
+            let count = column.len().div_ceil(step);
+            (0..count).for_each(|k| column[k] = column[k * step]);
+            column.truncate(count);
+        }
+    }
+
     pub fn total_weight(&self) -> f64 {
         self.weight.iter().map(|w| f64::from(*w)).sum()
     }
