@@ -30,7 +30,7 @@ fn wall() -> OwnedScan {
 fn wall_ahead_m(config: &MaskingConfig) -> f32 {
     let raster = RasterConfig { n: 401, cell_m: 0.25, ..RasterConfig::default() };
     let mut masker = Masker::new(&raster, &PointsConfig::default(), config).unwrap();
-    let motion = MotionEstimate { x_m: 5.0, interval_ns: 250_000_000, ..MotionEstimate::default() };
+    let motion = SearchedMotion { x_m: 5.0, y_m: 0.0, yaw_rad: 0.0, interval_ns: 250_000_000 };
     let mut cells = vec![0.0; 401 * 401];
     assert!(masker.mask(&wall().view(), Some(&motion), &mut cells).unwrap().is_some());
     let ahead = (0..200).map(|row| (cells[row * 401 + 200], (200 - row) as f32 * 0.25));
