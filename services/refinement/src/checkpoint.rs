@@ -62,6 +62,8 @@ pub struct Checkpoint {
     kept: usize,
     /// The keyframe in each slot of the other ring; `None` where there is none.
     keyframes: Vec<Option<u64>>,
+    /// Slots left out of it whose keyframes are still in the file.
+    forgotten: Vec<usize>,
     /// Bytes of a keyframe's slot; the buffer for one.
     slot: Vec<u8>,
 }
@@ -82,7 +84,7 @@ impl Checkpoint {
         let slots = |window: usize| most + 2 * window + AIR;
         let (kept, keyframes) = (slots(window.min(LARGEST_WINDOW)), vec![None; slots(LARGEST_WINDOW)]);
         let slot = vec![0; KEYFRAME_WORDS * 8 + cells];
-        let mut checkpoint = Self { path: path.to_owned(), file, kept, keyframes, slot };
+        let mut checkpoint = Self { path: path.to_owned(), file, kept, keyframes, forgotten: Vec::new(), slot };
         checkpoint.begin().map_err(failed)?;
         Ok(checkpoint)
     }
@@ -121,6 +123,7 @@ impl Checkpoint {
 
     /// Writes what is known after `item`: first the keyframes that are new, then the state that speaks of them.
     pub fn write(&mut self, item: u64, refinement: &Refinement) -> Result<(), CheckpointError> {
+        self.wipe_forgotten().map_err(|source| CheckpointError::File { path: self.path.clone(), source })?;
         let failed = |source| CheckpointError::File { path: self.path.clone(), source };
         let (mut count, mut oldest) = (0_u64, u64::MAX);
         for keyframe in refinement.keyframes() {
@@ -152,7 +155,19 @@ impl Checkpoint {
 
     /// Leaves out the keyframes from `item` on: they are from a life that is being repeated, perhaps with other scans.
     pub fn forget_from(&mut self, item: u64) {
-        self.keyframes.iter_mut().for_each(|slot| *slot = slot.filter(|id| *id < item));
+        for (slot, keyframe) in self.keyframes.iter_mut().enumerate() {
+            if keyframe.take_if(|id| *id >= item).is_some() {
+                self.forgotten.push(slot);
+            }
+        }
+    }
+
+    /// Makes the forgotten slots unsound: the next to open the file would take their keyframes for this life's.
+    fn wipe_forgotten(&mut self) -> io::Result<()> {
+        while let Some(slot) = self.forgotten.pop() {
+            self.file.write_all_at(&[0; 8], self.keyframe_at(slot))?;
+        }
+        Ok(())
     }
 
     /// Makes the refinement what it was after `item`.
