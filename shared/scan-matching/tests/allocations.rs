@@ -6,7 +6,7 @@ mod common;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use common::{Motion, pair};
+use common::{Motion, pair, scenes};
 use gyre_scan_matching::{
     ExhaustiveConfig, ExhaustiveSearch, RotationConfig, RotationSearch, TranslationConfig, TranslationSearch,
 };
@@ -52,4 +52,19 @@ fn searches_allocate_nothing_after_construction() {
     let before = ALLOCATIONS.with(Cell::get);
     exhaustive.search(&later, &earlier).unwrap();
     assert_eq!(ALLOCATIONS.with(Cell::get), before, "exhaustive");
+}
+
+#[test]
+fn the_refinement_allocates_nothing_after_construction() {
+    let drive = scenes::Drive::steady(10.0, 4.0, 40);
+    let mut scans = scenes::scans(&scenes::town([[-100.0, 200.0]; 2], 1), &drive, &scenes::Sensor::default());
+    scans[20..30].iter_mut().for_each(Vec::clear); // loses its map, and begins anew
+    let mut refinement = scenes::refinement();
+    let before = ALLOCATIONS.with(Cell::get);
+    for k in 0..scans.len() - 1 {
+        refinement.next(k as u64 + 1, &scans[k + 1], &scans[k], &scenes::searched(&drive, k), scenes::SWEEP_S);
+    }
+    refinement.start();
+    refinement.next(1, &scans[1], &scans[0], &scenes::searched(&drive, 0), scenes::SWEEP_S);
+    assert_eq!(ALLOCATIONS.with(Cell::get), before);
 }

@@ -146,3 +146,147 @@ fn sum_block<'a>(map: &Lookup<'a>, x_m: &[f32], y_m: &[f32], weight: &[f32], pla
     }
     sums
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Point2;
+    use proptest::prelude::*;
+
+    use super::{
+        super::level::{Image, Level},
+        *,
+    };
+
+    const CELL_M: f64 = 0.5;
+
+    fn placed(points: &[[f64; 2]]) -> Placed {
+        Placed {
+            x_m: points.iter().map(|p| p[0] as f32).collect(),
+            y_m: points.iter().map(|p| p[1] as f32).collect(),
+            weight: (0..points.len()).map(|k| 0.2 + 0.1 * (k % 8) as f32).collect(),
+        }
+    }
+
+    /// A map of two keyframes: all points, and every second one a little aside.
+    fn map(points: &[[f64; 2]]) -> Level {
+        let mut level = Level::new(CELL_M, 20.0);
+        let mut draw = |points: &[[f64; 2]], pose: &Isometry2<f64>| -> Image {
+            let mut image = level.new_image();
+            level.draw(&placed(points), pose, &mut image);
+            image
+        };
+        let images = [
+            draw(points, &Isometry2::identity()),
+            draw(
+                &points.iter().step_by(2).copied().collect::<Vec<_>>(),
+                &Isometry2::new(Vector2::new(0.3, -0.2), 0.01),
+            ),
+        ];
+        level.stack(images.iter());
+        level
+    }
+
+    fn points(count: std::ops::Range<usize>) -> impl Strategy<Value = Vec<[f64; 2]>> {
+        prop::collection::vec(prop::array::uniform2(-14.0_f64..14.0), count)
+    }
+
+    fn pose(shift_m: f64, turn: f64) -> impl Strategy<Value = Isometry2<f64>> {
+        (prop::array::uniform2(-shift_m..shift_m), -turn..turn).prop_map(|(at, yaw)| Isometry2::new(at.into(), yaw))
+    }
+
+    /// The pose, moved along one of its three unknowns.
+    fn moved(pose: &Isometry2<f64>, unknown: usize, by: f64) -> Isometry2<f64> {
+        let step = Vector3::ith(unknown, by);
+        Isometry2::new(pose.translation.vector + step.xy(), pose.rotation.angle() + step.z)
+    }
+
+    /// Whether a point is so far from its cell's edges that the steps of the differences do not leave it.
+    fn inside_a_cell(pose: &Isometry2<f64>, [x, y]: &[f64; 2]) -> bool {
+        (pose * Point2::new(*x, *y)).coords.iter().all(|v| {
+            let share = (v / CELL_M).rem_euclid(1.0);
+            (0.1..0.9).contains(&share)
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn slope_and_information_are_those_of_the_cost(world in points(20..200), pose in pose(1.0, 0.2)) {
+            const STEPS: [f64; 3] = [0.02, 0.02, 0.001];
+            let level = map(&world);
+            let lookup = level.lookup();
+            let kept: Vec<[f64; 2]> = world.iter().filter(|p| inside_a_cell(&pose, p)).copied().collect();
+            let all = placed(&kept);
+            let (mut downhill, mut information) = (Vector3::zeros(), Matrix3::zeros());
+            for k in 0..kept.len() {
+                let one = Placed { x_m: vec![all.x_m[k]], y_m: vec![all.y_m[k]], weight: vec![all.weight[k]] };
+                let at = |unknown: usize, by: f64| linearise(&lookup, &one, &moved(&pose, unknown, by));
+                let difference = |value: fn(&Normal) -> f64| Vector3::from_fn(|unknown, _| {
+                    let step = STEPS[unknown];
+                    (value(&at(unknown, step)) - value(&at(unknown, -step))) / (2.0 * step)
+                });
+                downhill -= 0.5 * difference(|normal| normal.cost);
+                let slope = difference(|normal| normal.overlap);
+                information += slope * slope.transpose() / f64::from(one.weight[0]);
+            }
+            let normal = linearise(&lookup, &all, &pose);
+            // A turn's lever is up to 20 m.
+            let lever = Vector3::new(1.0, 1.0, 20.0);
+            let scale = kept.len() as f64;
+            for i in 0..3 {
+                prop_assert!((normal.downhill[i] - downhill[i]).abs() < 2e-3 * scale * lever[i], "{normal:?} {downhill}");
+                for j in 0..3 {
+                    let (actual, expected) = (normal.information[(i, j)], information[(i, j)]);
+                    prop_assert!((actual - expected).abs() < 4e-3 * scale * lever[i] * lever[j], "{i} {j}: {actual} {expected}");
+                }
+            }
+        }
+
+        #[test]
+        fn cost_and_overlap_are_sums_over_the_points(world in points(1..200), pose in pose(30.0, 3.0)) {
+            let level = map(&world);
+            let (lookup, all) = (level.lookup(), placed(&world));
+            let (mut cost, mut overlap) = (0.0, 0.0);
+            for k in 0..world.len() {
+                let one = Placed { x_m: vec![all.x_m[k]], y_m: vec![all.y_m[k]], weight: vec![all.weight[k]] };
+                let normal = linearise(&lookup, &one, &pose);
+                let (w, m) = (f64::from(all.weight[k]), normal.overlap / f64::from(all.weight[k]));
+                prop_assert!((0.0..=1.0).contains(&m));
+                prop_assert!((normal.cost - w * (1.0 - m).powi(2)).abs() < 1e-6);
+                (cost, overlap) = (cost + normal.cost, overlap + normal.overlap);
+            }
+            let normal = linearise(&lookup, &all, &pose);
+            prop_assert!((normal.cost - cost).abs() < 1e-4 && (normal.overlap - overlap).abs() < 1e-4);
+        }
+
+        #[test]
+        fn a_descent_never_raises_the_cost(world in points(5..200), start in pose(3.0, 0.5)) {
+            let level = map(&world);
+            let (lookup, points) = (level.lookup(), placed(&world));
+            let mut cost = linearise(&lookup, &points, &start).cost;
+            for iterations in 0..12 {
+                let found = register(&lookup, &points, &start, iterations);
+                prop_assert!(found.normal.cost <= cost, "{} after {cost} at step {iterations}", found.normal.cost);
+                prop_assert_eq!(linearise(&lookup, &points, &found.pose).cost, found.normal.cost);
+                cost = found.normal.cost;
+            }
+        }
+
+        #[test]
+        fn points_slide_back_to_where_they_were_drawn(world in points(60..200), start in pose(0.35, 0.02)) {
+            let mut level = Level::new(CELL_M, 20.0);
+            let (points, mut image) = (placed(&world), level.new_image());
+            level.draw(&points, &Isometry2::identity(), &mut image);
+            level.stack(std::iter::once(&image));
+            let found = register(&level.lookup(), &points, &start, 30).pose;
+            prop_assert!(found.translation.vector.norm() < 0.15 && found.rotation.angle().abs() < 0.015, "{found}");
+        }
+    }
+
+    #[test]
+    fn an_empty_map_or_scan_leaves_the_start() {
+        let start = Isometry2::new(Vector2::new(1.0, 2.0), 0.3);
+        let (empty, full) = (Level::new(CELL_M, 20.0), map(&[[1.0, 2.0], [-3.0, 4.0]]));
+        assert_eq!(register(&empty.lookup(), &placed(&[[1.0, 2.0]]), &start, 10).pose, start);
+        assert_eq!(register(&full.lookup(), &placed(&[]), &start, 10).pose, start);
+    }
+}

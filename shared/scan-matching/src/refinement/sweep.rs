@@ -59,7 +59,8 @@ fn place(points: &[ScanPoint], [vx, vy, rate]: [f32; 3], x_m: &mut [f32], y_m: &
         let (ahead, aside) = (vx * t, vy * t);
         *x_m = half_cos * ahead - half_sin * aside + cos * x - sin * y;
         *y_m = half_sin * ahead + half_cos * aside + sin * x + cos * y;
-        *weight = w;
+        // What is no number counts nothing.
+        *weight = if w > 0.0 { w.min(1.0) } else { 0.0 };
     }
 }
 

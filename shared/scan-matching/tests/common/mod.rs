@@ -1,6 +1,8 @@
 //! Generated scenes: blurred scatterers whose places are known before and after a motion.
 #![allow(dead_code)]
 
+pub mod scenes;
+
 use gyre_scan_matching::{
     MotionEstimate, RotationConfig, RotationEstimate, RotationSearch, TranslationConfig, TranslationSearch,
 };

@@ -1,0 +1,272 @@
+//! What was published can be gone on from, bit for bit, whatever happened to the process or to the newest slots.
+#![allow(clippy::unwrap_used)]
+
+use std::{fs, path::Path};
+
+use gyre_refinement::checkpoint::{self, Checkpoint, CheckpointError};
+use gyre_scan_matching::{Memory, Refinement, RefinementConfig, ScanPoint};
+use nalgebra::{Isometry2, Vector2};
+
+const WINDOW: usize = 8;
+const INTERVAL_S: f64 = 0.25;
+const STEP_M: f64 = 1.0;
+
+/// A small map: a file of a few hundred kilobytes.
+fn config() -> RefinementConfig {
+    RefinementConfig {
+        cell_m: 1.0,
+        reach_m: 40.0,
+        keyframes: 4,
+        keyframe_distance_m: 1.5,
+        ..RefinementConfig::default()
+    }
+}
+
+fn refinement() -> Refinement {
+    Refinement::new(&config(), 512).unwrap()
+}
+
+fn open_with(path: &Path, config: &RefinementConfig, window: usize) -> Checkpoint {
+    let cells = Refinement::new(config, 512).unwrap().keyframe_cells();
+    Checkpoint::open(path, window, config.keyframes, cells).unwrap()
+}
+
+fn open(path: &Path) -> Checkpoint {
+    open_with(path, &config(), WINDOW)
+}
+
+/// What a drive of a metre a scan sees of a world.
+fn scan(world: u64, item: u64) -> Vec<ScanPoint> {
+    let spread = |k: u64, salt: u64| {
+        let mixed = (k + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15 ^ salt ^ world << 40);
+        (mixed ^ mixed >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 40
+    };
+    let share = |k: u64, salt: u64| spread(k, salt) as f64 / f64::from(1 << 24);
+    let place = |k: u64| [300.0 * share(k, 1) - 50.0 - STEP_M * item as f64, 60.0 * share(k, 7) - 30.0];
+    let visible = (0..1500).map(place).filter(|[x, y]| x.hypot(*y) < 35.0);
+    visible.map(|[x, y]| [x as f32, y as f32, 0.0, 0.7, 0.0]).take(512).collect()
+}
+
+/// Refines item by item, each written before the next, as the stage does.
+fn live(refinement: &mut Refinement, checkpoint: &mut Checkpoint, world: u64, items: std::ops::Range<u64>) {
+    for item in items {
+        step(refinement, world, item);
+        checkpoint.write(item, refinement).unwrap();
+    }
+}
+
+fn step(refinement: &mut Refinement, world: u64, item: u64) {
+    let searched = Isometry2::new(Vector2::new(STEP_M, 0.0), 0.0);
+    refinement.next(item, &scan(world, item), &scan(world, item - 1), &searched, INTERVAL_S);
+}
+
+/// All that a refinement knows, in bits.
+fn known(refinement: &Refinement) -> Vec<u64> {
+    let pose = |p: &Isometry2<f64>| [p.translation.x, p.translation.y, p.rotation.re, p.rotation.im].map(f64::to_bits);
+    let memory: &Memory = refinement.memory();
+    let mut words = pose(&memory.pose).to_vec();
+    for anchor in &memory.anchors {
+        words.push(anchor.is_some().into());
+        if let Some(anchor) = anchor {
+            words.extend(pose(&anchor.pose));
+            words.extend(anchor.velocity.iter().chain([&anchor.age_s]).map(|v| v.to_bits()));
+        }
+    }
+    words.extend([memory.usual_overlap, memory.usual_weight].map(f64::to_bits));
+    words.extend([memory.doubtful, memory.unmatched].map(u64::from));
+    for keyframe in refinement.keyframes() {
+        words.push(keyframe.id);
+        words.extend(pose(&keyframe.pose));
+        for (corner, cells) in keyframe.images() {
+            words.extend(corner.iter().map(|v| *v as u64));
+            words.extend(cells.iter().map(|v| u64::from(*v)));
+        }
+    }
+    words
+}
+
+/// What is known after each of the items 0, 1, ... of one life; nothing after item 0, at which the chain begins.
+fn history(world: u64, items: u64) -> Vec<Vec<u64>> {
+    let mut refinement = refinement();
+    let mut history = vec![known(&refinement)];
+    for item in 1..items {
+        step(&mut refinement, world, item);
+        history.push(known(&refinement));
+    }
+    history
+}
+
+fn restored(path: &Path, item: u64) -> Result<Vec<u64>, CheckpointError> {
+    let mut refinement = refinement();
+    open(path).restore(item, &mut refinement).map(|()| known(&refinement))
+}
+
+/// A folder, and the file of a life of so many items in it.
+fn lived(items: u64) -> (tempfile::TempDir, std::path::PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = checkpoint::path(folder.path());
+    live(&mut refinement(), &mut open(&path), 1, 1..items);
+    (folder, path)
+}
+
+#[test]
+fn every_item_of_the_last_window_is_restored_bit_for_bit() {
+    const ITEMS: u64 = 60;
+    let history = history(1, ITEMS);
+    for items in [3, 9, 20, ITEMS] {
+        let (_folder, path) = lived(items);
+        for item in items.saturating_sub(2 * WINDOW as u64).max(1)..items {
+            assert_eq!(restored(&path, item).unwrap(), history[item as usize], "item {item} of {items}");
+        }
+    }
+}
+
+#[test]
+fn a_restored_life_goes_on_as_if_it_had_not_ended() {
+    let history = history(1, 40);
+    let (_folder, path) = lived(25);
+    for item in [17, 22, 24] {
+        let (mut refinement, mut checkpoint) = (refinement(), open(&path));
+        checkpoint.restore(item, &mut refinement).unwrap();
+        live(&mut refinement, &mut checkpoint, 1, item + 1..40);
+        assert_eq!(known(&refinement), history[39], "from item {item}");
+    }
+}
+
+#[test]
+fn a_file_cut_short_loses_only_what_was_written_last() {
+    let (_folder, path) = lived(4);
+    let before = fs::read(&path).unwrap();
+    // Item 4 makes a keyframe, whose slot is at the file's end.
+    let mut refinement = refinement();
+    let mut checkpoint = open(&path);
+    checkpoint.restore(3, &mut refinement).unwrap();
+    live(&mut refinement, &mut checkpoint, 1, 4..6);
+    let after = fs::read(&path).unwrap();
+    assert!(after.len() > before.len());
+    let history = history(1, 6);
+    for length in [after.len() - 1, (before.len() + after.len()) / 2, before.len() + 1, before.len()] {
+        fs::write(&path, &after[..length]).unwrap();
+        for item in 1..4 {
+            assert_eq!(restored(&path, item).unwrap(), history[item as usize], "item {item}, {length} bytes");
+        }
+        assert!(matches!(restored(&path, 5), Err(CheckpointError::Missing { item: 6, .. })), "{length} bytes");
+    }
+}
+
+#[test]
+fn flipped_bytes_in_the_newest_slots_lose_only_those() {
+    let history = history(1, 31);
+    let (_folder, path) = lived(30);
+    let before = fs::read(&path).unwrap();
+    let (mut refinement, mut checkpoint) = (refinement(), open(&path));
+    checkpoint.restore(29, &mut refinement).unwrap();
+    live(&mut refinement, &mut checkpoint, 1, 30..31);
+    let after = fs::read(&path).unwrap();
+    let changed: Vec<usize> = (0..after.len()).filter(|at| before.get(*at) != Some(&after[*at])).collect();
+    assert!(!changed.is_empty());
+    for at in changed.iter().step_by(changed.len() / 12 + 1).chain(changed.last()) {
+        let mut torn = after.clone();
+        torn[*at] ^= 0x10;
+        fs::write(&path, &torn).unwrap();
+        assert!(restored(&path, 30).is_err(), "byte {at}");
+        for item in 15..30 {
+            assert_eq!(restored(&path, item).unwrap(), history[item as usize], "item {item}, byte {at}");
+        }
+    }
+}
+
+#[test]
+fn the_file_of_another_configuration_is_begun_anew() {
+    let (_folder, path) = lived(20);
+    let other = RefinementConfig { cell_m: 2.0, ..config() };
+    let mut refinement = Refinement::new(&other, 512).unwrap();
+    let mut checkpoint = open_with(&path, &other, WINDOW);
+    assert!(checkpoint.restore(19, &mut refinement).is_err());
+    live(&mut refinement, &mut checkpoint, 1, 1..10);
+    let mut again = Refinement::new(&other, 512).unwrap();
+    open_with(&path, &other, WINDOW).restore(9, &mut again).unwrap();
+    assert_eq!(known(&again), known(&refinement));
+    assert!(restored(&path, 9).is_err(), "and the other way round");
+}
+
+#[test]
+fn another_window_goes_on_with_the_same_file() {
+    let history = history(1, 30);
+    let (_folder, path) = lived(30);
+    for window in [2, 20, 66] {
+        let mut refinement = refinement();
+        open_with(&path, &config(), window).restore(25, &mut refinement).unwrap();
+        assert_eq!(known(&refinement), history[25], "window {window}");
+    }
+}
+
+#[test]
+fn an_item_that_is_not_there_is_named_in_one_sentence() {
+    let (_folder, path) = lived(10);
+    let expected = |item: u64| {
+        format!(
+            "{} does not hold what the refinement knew before item {item}: begin again with --fresh",
+            path.display()
+        )
+    };
+    for item in [10, 149, 1000] {
+        assert_eq!(restored(&path, item).unwrap_err().to_string(), expected(item + 1));
+    }
+    assert_eq!(restored(&path, u64::MAX).unwrap_err().to_string(), expected(u64::MAX));
+    fs::remove_file(&path).unwrap();
+    assert_eq!(restored(&path, 5).unwrap_err().to_string(), expected(6));
+}
+
+#[test]
+fn a_repeated_life_overwrites_the_numbers_of_the_one_before() {
+    let (_folder, path) = lived(21);
+    let (mut refinement, mut checkpoint) = (refinement(), open(&path));
+    checkpoint.restore(14, &mut refinement).unwrap();
+    live(&mut refinement, &mut checkpoint, 2, 15..21);
+    assert_eq!(restored(&path, 20).unwrap(), known(&refinement));
+    assert_ne!(known(&refinement), history(1, 21)[20]);
+}
+
+#[test]
+fn keyframes_of_a_repeated_life_stay_out_of_the_next_ones_map() {
+    let (_folder, path) = lived(8);
+    let (mut refinement, mut checkpoint) = (refinement(), open(&path));
+    checkpoint.restore(2, &mut refinement).unwrap();
+    for item in 3..8 {
+        // This time the vehicle stands, and makes no keyframes.
+        refinement.next(item, &scan(1, 2), &scan(1, 2), &Isometry2::identity(), INTERVAL_S);
+        checkpoint.write(item, &refinement).unwrap();
+    }
+    assert!(refinement.keyframes().all(|keyframe| keyframe.id < 3));
+    assert_eq!(restored(&path, 7).unwrap(), known(&refinement));
+}
+
+#[test]
+fn a_chain_that_begins_again_leaves_the_one_before_out() {
+    let (_folder, path) = lived(21);
+    let (mut refinement, mut checkpoint) = (refinement(), open(&path));
+    checkpoint.forget_from(15);
+    refinement.start();
+    checkpoint.write(15, &refinement).unwrap();
+    assert_eq!(restored(&path, 15).unwrap(), history(1, 1)[0]);
+    live(&mut refinement, &mut checkpoint, 2, 16..21);
+    assert_eq!(restored(&path, 20).unwrap(), known(&refinement));
+}
+
+#[test]
+fn the_file_stops_growing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = checkpoint::path(folder.path());
+    let (mut refinement, mut checkpoint) = (refinement(), open(&path));
+    let mut length = |items: std::ops::Range<u64>| {
+        live(&mut refinement, &mut checkpoint, 1, items);
+        fs::metadata(&path).unwrap().len()
+    };
+    // A keyframe every other item.
+    let first = length(1..100);
+    assert_eq!(first, length(100..220));
+    let slots = (config().keyframes + 2 * WINDOW + 8) as u64;
+    let keyframe = self::refinement().keyframe_cells() as u64 + 80;
+    assert!(first < 40_000 + slots * keyframe, "{first} bytes");
+}

@@ -1,0 +1,269 @@
+//! Generated point scans with exact truth: what a sensor that turns clockwise sees of reflectors in the plane on its way.
+
+use gyre_scan_matching::{Refined, Refinement, RefinementConfig, ScanPoint};
+use nalgebra::{Isometry2, Point2, Vector2, Vector3};
+
+use super::Numbers;
+
+/// Of a sweep, and from one scan to the next, s.
+pub const SWEEP_S: f64 = 0.25;
+/// What the sensor sees, m.
+const VISIBLE_M: std::ops::RangeInclusive<f64> = 5.0..=95.0;
+/// Points that a scan may have.
+pub const CAPACITY: usize = 4096;
+
+/// A line that gives a number of points to each scan, each time at other places along it. A post has no length.
+#[derive(Debug, Clone, Copy)]
+pub struct Reflector {
+    pub from: Vector2<f64>,
+    pub along: Vector2<f64>,
+    /// m/s; nonzero for traffic.
+    pub velocity: Vector2<f64>,
+    pub points: usize,
+}
+
+/// Four walls about `middle`, turned, each with a number of points.
+pub fn rectangle(
+    middle: [f64; 2],
+    [length, width]: [f64; 2],
+    yaw: f64,
+    velocity: [f64; 2],
+    points: usize,
+) -> [Reflector; 4] {
+    let pose = Isometry2::new(middle.into(), yaw);
+    let corner = |k: usize| {
+        let (ahead, aside) = [(0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5)][k % 4];
+        (pose * Point2::new(ahead * length, aside * width)).coords
+    };
+    std::array::from_fn(|k| Reflector {
+        from: corner(k),
+        along: corner(k + 1) - corner(k),
+        velocity: velocity.into(),
+        points,
+    })
+}
+
+/// A car that drives along x.
+pub fn car(middle: [f64; 2], speed_mps: f64) -> [Reflector; 4] {
+    rectangle(middle, [4.5, 1.8], 0.0, [speed_mps, 0.0], 6)
+}
+
+pub fn wall(from: [f64; 2], to: [f64; 2], points: usize) -> Reflector {
+    let from = Vector2::from(from);
+    Reflector { from, along: Vector2::from(to) - from, velocity: Vector2::zeros(), points }
+}
+
+pub fn post(at: [f64; 2]) -> Reflector {
+    wall(at, at, 1)
+}
+
+/// Posts all over an area `[from, to]` of x and y, one on every `area_m2`.
+pub fn posts([x, y]: [[f64; 2]; 2], area_m2: f64, seed: u64) -> Vec<Reflector> {
+    let mut numbers = Numbers(seed);
+    let count = ((x[1] - x[0]) * (y[1] - y[0]) / area_m2) as usize;
+    let mut within = |[from, to]: [f64; 2]| from + (to - from) * numbers.next();
+    (0..count).map(|_| post([within(x), within(y)])).collect()
+}
+
+/// Houses and posts all over an area: some 800 points a scan.
+pub fn town(area: [[f64; 2]; 2], seed: u64) -> Vec<Reflector> {
+    let mut numbers = Numbers(seed);
+    let houses = posts(area, 1000.0, seed + 1).into_iter().flat_map(|place| {
+        let size = [8.0 + 8.0 * numbers.next(), 6.0 + 4.0 * numbers.next()];
+        rectangle(place.from.into(), size, numbers.within(0.3), [0.0; 2], 5)
+    });
+    houses.chain(posts(area, 100.0, seed + 2)).collect()
+}
+
+/// The same with left and right exchanged.
+pub fn mirrored(scene: &[Reflector]) -> Vec<Reflector> {
+    let mirror = |v: Vector2<f64>| Vector2::new(v.x, -v.y);
+    let mirrored = |r: &Reflector| Reflector {
+        from: mirror(r.from),
+        along: mirror(r.along),
+        velocity: mirror(r.velocity),
+        points: r.points,
+    };
+    scene.iter().map(mirrored).collect()
+}
+
+/// A way that accelerates or turns, not both.
+#[derive(Debug, Clone, Copy)]
+pub struct Drive {
+    pub speed_mps: f64,
+    pub acceleration_mps2: f64,
+    pub yaw_rate: f64,
+    pub scans: usize,
+}
+
+impl Drive {
+    pub fn steady(speed_mps: f64, yaw_rate_deg: f64, scans: usize) -> Self {
+        Self { speed_mps, acceleration_mps2: 0.0, yaw_rate: yaw_rate_deg.to_radians(), scans }
+    }
+
+    pub fn speed(&self, time_s: f64) -> f64 {
+        self.speed_mps + self.acceleration_mps2 * time_s
+    }
+
+    pub fn length_m(&self, time_s: f64) -> f64 {
+        (self.speed_mps + 0.5 * self.acceleration_mps2 * time_s) * time_s
+    }
+
+    /// Pose of scan `k` in the first one's frame.
+    pub fn pose(&self, k: usize) -> Isometry2<f64> {
+        let time_s = k as f64 * SWEEP_S;
+        arc(self.length_m(time_s), self.yaw_rate * time_s)
+    }
+
+    pub fn driven_m(&self) -> f64 {
+        self.length_m((self.scans - 1) as f64 * SWEEP_S)
+    }
+}
+
+/// The motion along an arc of this length that turns by this angle.
+fn arc(length: f64, turn: f64) -> Isometry2<f64> {
+    let (sin, cos) = turn.sin_cos();
+    let [ahead, aside] = if turn.abs() < 1e-9 { [1.0, 0.5 * turn] } else { [sin / turn, (1.0 - cos) / turn] };
+    Isometry2::new(Vector2::new(ahead, aside) * length, turn)
+}
+
+/// What the sensor does to the ranges.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Sensor {
+    /// Standard deviation of the ranges, m.
+    pub noise_m: f64,
+    /// Left in the ranges, m.
+    pub offset_m: f64,
+    /// Ranges are too short by this for each m/s of approach, s.
+    pub doppler_s: f64,
+    /// Whether the points say so.
+    pub hides_doppler: bool,
+    pub seed: u64,
+}
+
+impl Sensor {
+    /// Scan `k` of a drive. The velocity stays the same during the sweep.
+    pub fn scan(&self, scene: &[Reflector], drive: &Drive, k: usize) -> Vec<ScanPoint> {
+        let mut numbers = Numbers(self.seed << 32 | k as u64);
+        let middle_s = k as f64 * SWEEP_S;
+        let (pose, speed) = (drive.pose(k), drive.speed(middle_s));
+        let mut points = Vec::with_capacity(CAPACITY);
+        for reflector in scene {
+            for _ in 0..reflector.points {
+                let place = reflector.from + reflector.along * numbers.next();
+                let weight = 0.3 + 0.7 * numbers.next();
+                // Twelve even numbers' sum is as good as normal.
+                let normal = (0..12).map(|_| numbers.next()).sum::<f64>() - 6.0;
+                let sensor = |t: f64| pose * arc(speed * t, drive.yaw_rate * t);
+                let seen = |t: f64| sensor(t).inverse() * Point2::from(place + reflector.velocity * (middle_s + t));
+                let Some(time_s) = swept(seen) else { continue };
+                let at = seen(time_s).coords;
+                if !VISIBLE_M.contains(&at.norm()) {
+                    continue;
+                }
+                let approach = Vector2::new(speed, 0.0) - sensor(time_s).rotation.inverse() * reflector.velocity;
+                let sight = at.normalize();
+                let shift = self.noise_m * normal + self.offset_m - self.doppler_s * sight.dot(&approach);
+                let told = if self.hides_doppler { 0.0 } else { self.doppler_s };
+                let at = at + sight * shift;
+                points.push([at.x, at.y, time_s, weight, told].map(|v| v as f32));
+            }
+        }
+        points
+    }
+}
+
+/// When the beam, clockwise from straight ahead, meets what is `seen` at a place at each time: s from the middle of the sweep.
+/// `None` for what crosses the seam.
+fn swept(seen: impl Fn(f64) -> Point2<f64>) -> Option<f64> {
+    let meets = |t: f64| {
+        let at = seen(t);
+        let share = (-at.y).atan2(at.x).rem_euclid(std::f64::consts::TAU) / std::f64::consts::TAU;
+        SWEEP_S * (share - 0.5)
+    };
+    let time_s = (0..20).fold(0.0, |t, _| meets(t));
+    ((meets(time_s) - time_s).abs() < 1e-9).then_some(time_s)
+}
+
+/// What a refinement made of a drive.
+pub struct Run {
+    pub drive: Drive,
+    /// Motion from scan k to k + 1.
+    pub refined: Vec<Refined>,
+}
+
+/// How far off a run ended, and its worst motion.
+#[derive(Debug, Clone, Copy)]
+pub struct Errors {
+    /// Degrees counter-clockwise for each 100 m.
+    pub drift_deg: f64,
+    /// Degrees counter-clockwise at the end.
+    pub yaw_deg: f64,
+    /// Distance from the true place at the end, m.
+    pub shift_m: f64,
+    pub worst_m: f64,
+    pub worst_deg: f64,
+}
+
+impl Run {
+    pub fn errors(&self) -> Errors {
+        self.errors_from(0)
+    }
+
+    /// Of the motions from scan `first` on.
+    pub fn errors_from(&self, first: usize) -> Errors {
+        let (mut pose, mut worst_m, mut worst_deg) = (self.drive.pose(first), 0.0_f64, 0.0_f64);
+        for k in first..self.refined.len() {
+            let motion = self.refined[k].motion;
+            let off = true_motion(&self.drive, k).inv_mul(&motion);
+            worst_m = worst_m.max(off.translation.vector.norm());
+            worst_deg = worst_deg.max(off.rotation.angle().to_degrees().abs());
+            pose *= motion;
+        }
+        let off = self.drive.pose(self.refined.len()).inv_mul(&pose);
+        let yaw_deg = off.rotation.angle().to_degrees();
+        let drift_deg = 100.0 * yaw_deg / (self.drive.driven_m() - self.drive.length_m(first as f64 * SWEEP_S));
+        Errors { drift_deg, yaw_deg, shift_m: off.translation.vector.norm(), worst_m, worst_deg }
+    }
+}
+
+fn true_motion(drive: &Drive, k: usize) -> Isometry2<f64> {
+    drive.pose(k).inv_mul(&drive.pose(k + 1))
+}
+
+/// The true motion to scan k + 1 as a search finds it, a quarter of a metre and half a degree off.
+pub fn searched(drive: &Drive, k: usize) -> Isometry2<f64> {
+    let mut numbers = Numbers(0x5ea2c4 + k as u64);
+    let off = Vector3::from_fn(|_, _| numbers.within(1.0));
+    true_motion(drive, k) * Isometry2::new(off.xy() * 0.25, off.z * 0.5_f64.to_radians())
+}
+
+/// The scans of a drive.
+pub fn scans(scene: &[Reflector], drive: &Drive, sensor: &Sensor) -> Vec<Vec<ScanPoint>> {
+    (0..drive.scans).map(|k| sensor.scan(scene, drive, k)).collect()
+}
+
+pub fn refinement() -> Refinement {
+    Refinement::new(&RefinementConfig::default(), CAPACITY).unwrap()
+}
+
+/// Refines the motions between these scans of a drive.
+pub fn refine(drive: &Drive, scans: &[Vec<ScanPoint>]) -> Run {
+    let mut refinement = refinement();
+    Run { drive: *drive, refined: refine_on(&mut refinement, drive, scans, 0..scans.len() - 1) }
+}
+
+/// The motions from each scan `k` of a range to the one after.
+pub fn refine_on(
+    refinement: &mut Refinement,
+    drive: &Drive,
+    scans: &[Vec<ScanPoint>],
+    range: std::ops::Range<usize>,
+) -> Vec<Refined> {
+    range.map(|k| refinement.next(k as u64 + 1, &scans[k + 1], &scans[k], &searched(drive, k), SWEEP_S)).collect()
+}
+
+/// Both in one.
+pub fn run(scene: &[Reflector], drive: &Drive, sensor: &Sensor) -> Run {
+    refine(drive, &scans(scene, drive, sensor))
+}
