@@ -246,7 +246,6 @@ fn keyframes_of_a_repeated_life_stay_out_of_the_next_ones_map() {
 fn a_chain_that_begins_again_leaves_the_one_before_out() {
     let (_folder, path) = lived(21);
     let (mut refinement, mut checkpoint) = (refinement(), open(&path));
-    checkpoint.forget_from(15);
     refinement.start();
     checkpoint.write(15, &refinement).unwrap();
     assert_eq!(restored(&path, 15).unwrap(), history(1, 1)[0]);

@@ -273,8 +273,8 @@ impl Refinement {
         let velocity = self.memory.velocity_to(&pose, query.interval_s);
         self.memory.go_on(pose, outcome, [overlap, weight], query.interval_s, &self.config);
         if self.memory.unmatched >= self.config.patience {
+            // The next scan is compared with this one alone, and the one after that with the next, until two are alike.
             self.keyframes.clear();
-            self.memory = Memory { pose, ..Memory::default() };
         } else if outcome == Outcome::Refined && self.keyframes.is_far(&pose, &self.config) {
             self.draw(id, query.points, &pose, &velocity);
         }
