@@ -39,6 +39,8 @@ const SAME_VALLEY: (f64, f64) = (0.5, 0.035);
 const CLEARLY_BETTER: f64 = 1.02;
 /// What has been doubted so many times in a row is how things are now.
 const MOST_DOUBTFUL: u32 = 2;
+/// By how much the covariance of a weak match is wider.
+const WEAK_SPREAD: f64 = 4.0;
 /// Turns of the prediction that are tried when nothing else fits, rad.
 const FAN: [f64; 4] = [-0.1, 0.1, -0.2, 0.2];
 
@@ -263,7 +265,10 @@ impl Refinement {
         let weight = self.placed.total_weight();
         let before = self.memory.pose;
         let (outcome, pose, covariance) = match self.covariance(&found, weight) {
-            Some(covariance) if believed => (self.outcome(query, candidate), found.pose, covariance),
+            Some(covariance) if believed => match self.outcome(query, candidate) {
+                Outcome::Weak => (Outcome::Weak, found.pose, covariance * WEAK_SPREAD),
+                firm => (firm, found.pose, covariance),
+            },
             _ => {
                 let [prediction, _] = self.memory.foretell(query.interval_s);
                 (Outcome::Predicted, prediction, memory::unmatched_covariance(query.interval_s, &self.config))

@@ -15,6 +15,8 @@ const LEAST_DAMPING: f64 = 1e-4;
 const MOST_DAMPING: f64 = 1e4;
 /// Points whose sums are kept in single precision.
 const BLOCK: usize = 64;
+/// Points that are worked on side by side.
+const LANES: usize = 16;
 
 /// Where a descent ended.
 #[derive(Debug, Clone, Copy)]
@@ -103,48 +105,77 @@ struct Place {
 /// Cost, overlap, the slope's 3 and the information's 6 sums.
 const SUMS: usize = 11;
 
+/// A value a point.
+type Lanes = [f32; LANES];
+
+/// What a block of points adds. Points left over are filled up with some of no weight.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
 fn sum_block<'a>(map: &Lookup<'a>, x_m: &[f32], y_m: &[f32], weight: &[f32], place: &Place) -> [f32; SUMS] {
     let (value, slope, last) = (1.0 / map.full, map.per_m / map.full, (map.n - 2) as f32);
-    let mut sums = [0.0_f32; SUMS];
-    for ((&x, &y), &w) in x_m.iter().zip(y_m).zip(weight) {
-        let (rx, ry) = (place.cos * x - place.sin * y, place.sin * x + place.cos * y);
-        let (u, v) = (rx * map.per_m + place.at[0], ry * map.per_m + place.at[1]);
-        if !(u >= 0.0 && v >= 0.0 && u < last && v < last) {
-            sums[0] += w;
-            continue;
+    let mut sums = [[0.0_f32; LANES]; SUMS];
+    for ((x_m, y_m), weight) in x_m.chunks(LANES).zip(y_m.chunks(LANES)).zip(weight.chunks(LANES)) {
+        let [x, y, w] = [x_m, y_m, weight].map(filled_up);
+        let mut rotated = [[0.0; LANES]; 2];
+        let (mut across, mut along, mut inside, mut first) = ([0.0; LANES], [0.0; LANES], [0.0; LANES], [0; LANES]);
+        for k in 0..LANES {
+            let (rx, ry) = (place.cos * x[k] - place.sin * y[k], place.sin * x[k] + place.cos * y[k]);
+            let (u, v) = (rx * map.per_m + place.at[0], ry * map.per_m + place.at[1]);
+            // A point outside, or nowhere, reads a cell inside and does not count.
+            let (cell_u, cell_v) = (u.max(0.0).min(last) as i32, v.max(0.0).min(last) as i32);
+            inside[k] = f32::from(u8::from((u >= 0.0) & (v >= 0.0) & (u < last) & (v < last)));
+            (across[k], along[k]) = (u - cell_u as f32, v - cell_v as f32);
+            first[k] = cell_u * map.n as i32 + cell_v;
+            (rotated[0][k], rotated[1][k]) = (rx, ry);
         }
-        let (i, j) = (u as u32 as usize, v as u32 as usize);
-        let (across, along) = (u - i as f32, v - j as f32);
-        let first = i * map.n + j;
-        let (Some(&[a, b]), Some(&[c, d])) =
-            (map.sum[first..].first_chunk(), map.sum.get(first + map.n..).and_then(|row| row.first_chunk()))
-        else {
-            continue;
-        };
-        let [a, b, c, d] = [a, b, c, d].map(f32::from);
-        let (upper, lower) = (a + along * (b - a), c + along * (d - c));
-        let m = value * (upper + across * (lower - upper));
-        let jx = slope * (lower - upper);
-        let jy = slope * ((b - a) + across * ((d - c) - (b - a)));
-        let jt = jy * rx - jx * ry;
-        let (missing, wx, wy, wt) = (1.0 - m, w * jx, w * jy, w * jt);
-        let terms = [
-            w * missing * missing,
-            w * m,
-            wx * missing,
-            wy * missing,
-            wt * missing,
-            wx * jx,
-            wx * jy,
-            wx * jt,
-            wy * jy,
-            wy * jt,
-            wt * jt,
-        ];
-        sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+        let [a, b, c, d] = corners(map, &first);
+        for k in 0..LANES {
+            let (upper, lower) = (a[k] + along[k] * (b[k] - a[k]), c[k] + along[k] * (d[k] - c[k]));
+            let (left, right) = (a[k] + across[k] * (c[k] - a[k]), b[k] + across[k] * (d[k] - b[k]));
+            let seen = |term: f32| if inside[k] > 0.0 { term } else { 0.0 };
+            let m = seen(value * (upper + across[k] * (lower - upper)));
+            let (jx, jy) = (seen(slope * (lower - upper)), seen(slope * (right - left)));
+            let jt = seen(jy * rotated[0][k] - jx * rotated[1][k]);
+            let (missing, wx, wy, wt) = (1.0 - m, w[k] * jx, w[k] * jy, w[k] * jt);
+            sums[0][k] += w[k] * missing * missing;
+            sums[1][k] += w[k] * m;
+            sums[2][k] += wx * missing;
+            sums[3][k] += wy * missing;
+            sums[4][k] += wt * missing;
+            sums[5][k] += wx * jx;
+            sums[6][k] += wx * jy;
+            sums[7][k] += wx * jt;
+            sums[8][k] += wy * jy;
+            sums[9][k] += wy * jt;
+            sums[10][k] += wt * jt;
+        }
     }
-    sums
+    sums.map(|lanes| lanes.iter().sum())
+}
+
+#[inline(always)]
+fn filled_up(column: &[f32]) -> Lanes {
+    let mut lanes = [0.0; LANES];
+    lanes[..column.len()].copy_from_slice(column);
+    lanes
+}
+
+/// The map at the four corners about each point: the first, the one beside it, and those a row on.
+#[inline(always)]
+fn corners(map: &Lookup<'_>, first: &[i32; LANES]) -> [Lanes; 4] {
+    let mut corners = [[0.0; LANES]; 4];
+    for (k, first) in first.iter().enumerate() {
+        let first = *first as usize;
+        let ([a, b], [c, d]) = (two(&map.sum[first..]), two(&map.sum[first + map.n..]));
+        for (corner, value) in corners.iter_mut().zip([a, b, c, d]) {
+            corner[k] = f32::from(value);
+        }
+    }
+    corners
+}
+
+#[inline(always)]
+fn two(values: &[u16]) -> [u16; 2] {
+    [values[0], values[1]]
 }
 
 #[cfg(test)]
