@@ -104,8 +104,9 @@ fn mirrored_points_give_the_mirrored_motion() {
     apart.sort_by(f64::total_cmp);
     let mean = sums.iter().sum::<f64>() / sums.len() as f64;
     println!("after five scans {apart:.6?} m apart; yaw at the end {sums:.3?} degrees, mean {mean:.3}");
-    // Rounding alone tells them apart, which grows, in some scenes sooner, to what any error of the points grows to.
-    assert!(apart[2] < 1e-3, "{apart:?}");
+    // Rounding alone tells them apart: it ends a descent a step sooner or later (1 mm, 1 mm at 50 m), and that grows, in some
+    // scenes sooner, to what any error of the points grows to.
+    assert!(apart[2] < 0.02, "{apart:?}");
     assert!(mean.abs() < 0.15, "{sums:?}");
 }
 

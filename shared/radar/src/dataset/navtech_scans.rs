@@ -46,7 +46,7 @@ impl Profile {
         self.range_resolution_m = options.range_resolution_m.unwrap_or(self.range_resolution_m);
         self.range_offset_m = options.range_offset_m.unwrap_or(self.range_offset_m);
         self.doppler_s = options.doppler_s.unwrap_or(self.doppler_s);
-        self.azimuth_eccentricity_rad = options.azimuth_eccentricity_rad;
+        self.azimuth_eccentricity_rad = options.azimuth_eccentricity_rad.unwrap_or(self.azimuth_eccentricity_rad);
         self.encoder_counts = options.encoder_counts.unwrap_or(self.encoder_counts);
         self.azimuth_source = options.azimuth_source.unwrap_or(self.azimuth_source);
         self

@@ -93,7 +93,8 @@ pub struct DatasetOptions {
     pub doppler_s: Option<f32>,
     /// The encoder's eccentricity, rad: the antenna looks this times the cosine of the azimuth further than the encoder says.
     /// One radar's own, found by driving a road to and fro; 2.5e-3 is a tenth of a millimetre. Default 0, not known.
-    pub azimuth_eccentricity_rad: f32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub azimuth_eccentricity_rad: Option<f32>,
     /// Where the azimuths come from. Default: `encoder`; `uniform` for OORD, whose encoder columns are not to be trusted, and for
     /// images without metadata (RADIATE, MulRan as recorded), which know no other.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -109,7 +110,7 @@ impl DatasetOptions {
         let resolution_ok = self.range_resolution_m.is_none_or(|r| (1e-3..=10.0).contains(&r));
         let offset_ok = self.range_offset_m.is_none_or(|o| (-100.0..=100.0).contains(&o));
         let doppler_ok = self.doppler_s.is_none_or(|d| (-1.0..=1.0).contains(&d));
-        let eccentricity_ok = (-0.1..=0.1).contains(&self.azimuth_eccentricity_rad);
+        let eccentricity_ok = self.azimuth_eccentricity_rad.is_none_or(|e| (-0.1..=0.1).contains(&e));
         let counts_ok = self.encoder_counts.is_none_or(|c| c >= 16);
         if !resolution_ok {
             return Err(self.refused("range_resolution_m", self.range_resolution_m, "it must be from 0.001 to 10 m"));
@@ -121,7 +122,7 @@ impl DatasetOptions {
             return Err(self.refused("doppler_s", self.doppler_s, "it must be from -1 to 1 s"));
         }
         if !eccentricity_ok {
-            let actual = Some(self.azimuth_eccentricity_rad);
+            let actual = self.azimuth_eccentricity_rad;
             return Err(self.refused("azimuth_eccentricity_rad", actual, "it must be from -0.1 to 0.1 rad"));
         }
         if !counts_ok {

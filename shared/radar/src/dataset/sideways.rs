@@ -37,7 +37,7 @@ impl SidewaysScans {
             range_resolution_m: 0.0,
             range_offset_m: options.range_offset_m.unwrap_or(0.0),
             doppler_s: options.doppler_s.unwrap_or(0.0),
-            azimuth_eccentricity_rad: options.azimuth_eccentricity_rad,
+            azimuth_eccentricity_rad: options.azimuth_eccentricity_rad.unwrap_or(0.0),
             scratch: Vec::new(),
         };
         scans.check_shape(format)?;
