@@ -43,7 +43,7 @@ pub struct PointsConfig {
     pub range_cell_m: f32,
     /// What is nearer than this is the vehicle's own reflections. Metres. Default 5.
     pub min_range_m: f32,
-    /// What is further than this is left out. Metres. Default 95.
+    /// What is further than this is left out: the beam is metres wide there, and azimuths are noise. Metres. Default 80.
     pub max_range_m: f32,
     /// Power above the floor from which on a point counts in full. Default 60.
     pub weight_cap: f32,
@@ -57,7 +57,7 @@ impl Default for PointsConfig {
             beam_deg: 2.7,
             range_cell_m: 0.17,
             min_range_m: 5.0,
-            max_range_m: 95.0,
+            max_range_m: 80.0,
             weight_cap: 60.0,
             capacity: 8192,
         }

@@ -137,7 +137,8 @@ fn a_moving_sensors_points_are_where_the_scatterers_are_once_motion_and_doppler_
             doppler_s: 0.045,
             ..Sensor::navtech()
         };
-        let points = extract(&PointsConfig::default(), &sensor.measure(&places(), 0.5), 30);
+        let all = PointsConfig { max_range_m: 95.0, ..PointsConfig::default() };
+        let points = extract(&all, &sensor.measure(&places(), 0.5), 30);
         let placed: Vec<_> = points.iter().map(|point| place(point, &twist)).collect();
         for scatterer in places() {
             let near = placed.iter().zip(&points).filter(|(place, _)| (*place - scatterer).norm() < 4.0);

@@ -67,7 +67,7 @@ impl Default for RefinementConfig {
             keyframe_distance_m: 1.5,
             keyframe_angle_deg: 3.0,
             cell_m: 0.3,
-            reach_m: 100.0,
+            reach_m: 85.0,
             coarse: 3.0,
             acceleration_mps2: 6.0,
             yaw_acceleration_degps2: 90.0,
