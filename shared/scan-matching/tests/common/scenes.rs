@@ -244,7 +244,8 @@ pub fn scans(scene: &[Reflector], drive: &Drive, sensor: &Sensor) -> Vec<Vec<Sca
 }
 
 pub fn refinement() -> Refinement {
-    Refinement::new(&RefinementConfig::default(), CAPACITY).unwrap()
+    let config = RefinementConfig { reach_m: VISIBLE_M.end() + 10.0, ..RefinementConfig::default() };
+    Refinement::new(&config, CAPACITY).unwrap()
 }
 
 /// Refines the motions between these scans of a drive.
