@@ -113,7 +113,7 @@ impl Accuracy {
     fn new(command: String, n: usize, summary: &Value) -> Self {
         let figure = |path: &str| summary.pointer(path).and_then(Value::as_f64);
         let work_ms = |stage: Stage| {
-            let median_us = figure(&format!("/latency/stages/{}/work/p50_us", stage.name()));
+            let median_us = figure(&["/latency/stages", stage.name(), "work", "p50_us"].join("/"));
             median_us.unwrap_or(0.0) * 1e-3
         };
         let around = [Stage::RadarReplay, Stage::Masking, Stage::PoseIntegration];
