@@ -61,7 +61,7 @@ fn a_standing_vehicle_stays_where_it_is() {
 }
 
 #[test]
-fn yaw_drifts_to_neither_side_where_things_stand_on_one_side_only() {
+fn yaw_drifts_little_where_things_stand_on_one_side_only() {
     let mut sums = [0.0; 2];
     for seed in SEEDS {
         let scene = one_sided(seed);

@@ -100,19 +100,3 @@ fn what_an_earlier_life_made_of_other_scans_is_of_no_use() {
         }
     }
 }
-
-#[test]
-fn a_file_does_not_grow_and_another_window_can_read_it() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("map");
-    Life::begin(&path).items(0..3 * STATES as u64, 1.0);
-    let bytes = std::fs::metadata(&path).unwrap().len();
-    Life::begin(&path).items(3 * STATES as u64..4 * STATES as u64, 1.0);
-    assert_eq!(std::fs::metadata(&path).unwrap().len(), bytes);
-    let mut wider = Life::begin(&path);
-    wider.checkpoint =
-        Checkpoint::open(&path, LARGEST_WINDOW, config().keyframes, wider.refinement.keyframe_cells()).unwrap();
-    assert!(wider.checkpoint.restore(4 * STATES as u64 - 1, &mut wider.refinement).is_ok());
-    let old = wider.checkpoint.restore(5, &mut wider.refinement).unwrap_err().to_string();
-    assert!(old.contains("before item 6"), "{old}");
-}
