@@ -162,7 +162,7 @@ fn an_impossible_value_is_told_with_what_is_possible() {
         ("[refinement]\njitter_m = nan", ["refinement.jitter_m = NaN", "positive"]),
         ("[dataset]\nformat = 'oxfort'", ["oxfort", "oxford"]),
         ("[simulation]\nscans = 0", ["simulation", "scans"]),
-        ("[simulation]\nspeed_m_s = 1e9", ["speed_m_s", "40"]),
+        ("[simulation.drive]\nspeed_m_s = 1e9", ["speed_m_s", "40"]),
         ("[stages.masking]\nrestart = { limit = -1 }", ["masking", "-1"]),
         ("[stages.masking]\nrestart = { window_s = -1.0 }", ["stages.masking", "window_s is -1"]),
         ("[run]\nstall_timeout_s = inf", ["stall_timeout_s is inf", "0 or more"]),

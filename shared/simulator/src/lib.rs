@@ -4,7 +4,8 @@
 //! in Oxford Radar RobotCar's layout with exact ground truth. In the order in which the data come about:
 //!
 //! - [`config`]: what to simulate,
-//! - [`path`]: where the sensor is at any instant,
+//! - [`drive`], [`trajectory`]: which way is taken, and where the sensor is at any instant,
+//! - [`streets`]: the ways through the town,
 //! - [`town`], [`traffic`]: what stands and what moves around it,
 //! - [`world`], [`occlusion`]: how that reflects, and what hides what,
 //! - [`sensor`], [`receiver`]: what a sweep measures of it,
@@ -24,24 +25,29 @@
 //! ```
 
 pub mod config;
+pub mod drive;
 pub mod error;
 pub mod faults;
 mod image;
 pub mod occlusion;
 pub mod oxford_writer;
-pub mod path;
+pub mod profile;
 pub mod receiver;
 pub mod sensor;
 pub mod simulator;
+pub mod streets;
 pub mod town;
 pub mod traffic;
+pub mod trajectory;
 pub mod world;
 
 pub use config::SimulationConfig;
 pub use error::SimulatorError;
 pub use faults::{Fault, FaultPlan, write_faulty};
 pub use oxford_writer::{Summary, write_dataset};
-pub use path::{BlockLoop, ConstantTwist, Trajectory};
+pub use profile::{Profile, Sampling};
 pub use sensor::{Sensor, SweepTime};
 pub use simulator::{SimulatedScan, Simulator};
-pub use world::{Body, World};
+pub use streets::{Street, Streets};
+pub use trajectory::{BlockLoop, ConstantTwist, Trajectory};
+pub use world::{Body, Movers, Moving, World};

@@ -164,7 +164,7 @@ mod tests {
         let wall = |i: u32, rng: &mut ChaCha8Rng| {
             let from = point(rng);
             let to = from + Vector2::new(rng.random_range(-15.0..15.0), rng.random_range(-15.0..15.0));
-            Wall { from, to, transmission: 0.5, body: i % 7 }
+            Wall { from, to, transmission: 0.5, mirror: 0.0, body: i % 7 }
         };
         let walls: Vec<Wall> = (0..120).map(|i| wall(i, &mut rng)).collect();
         let grid = WallGrid::new(walls.clone());

@@ -25,8 +25,6 @@ pub struct Summary {
     pub path_m: f64,
     /// Time from the first scan to the last, seconds.
     pub duration_s: f64,
-    /// Length of one lap of the loop, metres.
-    pub lap_m: f64,
 }
 
 /// Generates the dataset of `config` in the folder `out`, and calls `progress(done, total)` after each scan.
@@ -59,7 +57,6 @@ fn summary(simulator: &Simulator, out: &Path) -> Summary {
         scans: simulator.scans(),
         path_m: (0..last).map(step_m).sum(),
         duration_s: (simulator.time(last).start_us - simulator.time(0).start_us) as f64 * 1e-6,
-        lap_m: simulator.path().lap_m(),
     }
 }
 

@@ -1,13 +1,16 @@
 //! One scan at a time, from memory to memory: the simulator without files.
 
+use std::sync::Arc;
+
 use gyre_radar::{OwnedScan, ScanLimits};
 use nalgebra::Isometry2;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::path::{BlockLoop, Trajectory};
 use crate::sensor::{self, Sensor, SweepTime};
+use crate::streets::Streets;
 use crate::traffic::Traffic;
+use crate::trajectory::Trajectory;
 use crate::world::World;
 use crate::{SimulationConfig, SimulatorError, town};
 
@@ -16,14 +19,14 @@ use crate::{SimulationConfig, SimulatorError, town};
 const EPOCH_US: i64 = 1_547_132_400_000_000;
 
 /// A drive through a town, ready to be measured. Shared freely between threads.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Simulator {
     scans: usize,
     seed: u64,
     period_us: i64,
     doppler_shift_s: f64,
-    path: BlockLoop,
-    world: World,
+    trajectory: Arc<dyn Trajectory>,
+    world: Arc<World>,
     traffic: Traffic,
 }
 
@@ -40,20 +43,17 @@ impl Simulator {
     /// Builds the town and the drive. Fails where the configuration makes no sense.
     pub fn new(config: &SimulationConfig) -> Result<Self, SimulatorError> {
         config.validate()?;
-        let path = BlockLoop::new(
-            config.block_length_m,
-            config.block_width_m,
-            config.speed_m_s,
-            config.lateral_acceleration_m_s2,
-        );
+        let trajectory: Arc<dyn Trajectory> = config.drive.trajectory(config.seed)?.into();
+        let drive_s = config.scans as f64 * config.sensor.period_s;
+        let streets = Streets::driven(trajectory.as_ref(), drive_s.min(100.0), 0.0);
         Ok(Self {
             scans: config.scans,
             seed: config.seed,
-            period_us: (config.period_s * 1e6).round() as i64,
-            doppler_shift_s: config.doppler_shift_s,
-            world: town::build(config, &path),
-            traffic: Traffic::new(config.traffic, config.seed),
-            path,
+            period_us: (config.sensor.period_s * 1e6).round() as i64,
+            doppler_shift_s: config.sensor.doppler_shift_s,
+            world: Arc::new(World::new(town::build(&config.drive, &streets, config.seed))),
+            traffic: Traffic::new(&config.traffic, trajectory.clone(), config.seed),
+            trajectory,
         })
     }
 
@@ -63,8 +63,8 @@ impl Simulator {
     }
 
     /// The drive.
-    pub fn path(&self) -> &BlockLoop {
-        &self.path
+    pub fn trajectory(&self) -> &dyn Trajectory {
+        self.trajectory.as_ref()
     }
 
     /// The town.
@@ -80,7 +80,7 @@ impl Simulator {
     /// Pose of the sensor in the world at the middle of scan `index`.
     pub fn pose(&self, index: usize) -> Isometry2<f64> {
         let time = self.time(index);
-        self.path.pose(time.trajectory_s(time.middle_us()))
+        self.trajectory.pose(time.trajectory_s(time.middle_us()))
     }
 
     /// A radar as configured, for [`Simulator::render_into`].
@@ -100,8 +100,8 @@ impl Simulator {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         // Stream 0 built the town.
         rng.set_stream(index as u64 + 1);
-        let movers = |time_s: f64| self.traffic.at(&self.path, time_s);
-        scan.geometry = sensor.sweep(&self.world, &movers, &self.path, self.time(index), &mut rng, &mut scan.slot());
+        let (world, trajectory) = (self.world.as_ref(), self.trajectory.as_ref());
+        scan.geometry = sensor.sweep(world, &self.traffic, trajectory, self.time(index), &mut rng, &mut scan.slot());
     }
 }
 

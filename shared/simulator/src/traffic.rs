@@ -1,14 +1,18 @@
 //! Other vehicles on the loop: they move, and so must not be mistaken for the town.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
-use nalgebra::Isometry2;
+use nalgebra::{Isometry2, Point2, Vector2};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
 
-use crate::path::{BlockLoop, Trajectory};
+use crate::SimulatorError;
+use crate::config::within;
 use crate::town;
-use crate::world::{Body, Scatterer, Wall};
+use crate::trajectory::Trajectory;
+use crate::world::{Body, Movers, Moving};
 
 /// Seconds between vehicles that drive the same way.
 const HEADWAY_S: f64 = 1.9;
@@ -19,43 +23,67 @@ const ONCOMING_PACE: f64 = 0.85;
 /// Bodies of vehicles are numbered from here; the town has fewer.
 const FIRST_BODY: u32 = 1 << 24;
 
-/// Vehicles that drive round the loop.
-#[derive(Clone, Debug, Default)]
+/// How much moves: the section `[simulation.traffic]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TrafficConfig {
+    /// Other vehicles on the way, every second one towards us.
+    pub vehicles: usize,
+}
+
+impl Default for TrafficConfig {
+    fn default() -> Self {
+        Self { vehicles: 4 }
+    }
+}
+
+impl TrafficConfig {
+    /// Refuses what cannot be simulated, naming the key.
+    pub fn validate(&self) -> Result<(), SimulatorError> {
+        within("traffic.vehicles", self.vehicles as f64, 0.0, 20.0)
+    }
+}
+
+/// Vehicles on the way that the sensor takes.
+#[derive(Clone)]
 pub struct Traffic {
+    trajectory: Arc<dyn Trajectory>,
     vehicles: Vec<Body>,
 }
 
 impl Traffic {
     /// So many vehicles: the first follows, the second comes towards us, the third drives ahead, and so on.
-    pub fn new(count: usize, seed: u64) -> Self {
+    pub fn new(config: &TrafficConfig, trajectory: Arc<dyn Trajectory>, seed: u64) -> Self {
         let vehicle = |index: usize| {
             let mut rng = ChaCha8Rng::seed_from_u64(seed ^ (0x7261_6666_6963 + index as u64));
             town::car(FIRST_BODY + index as u32, &mut rng)
         };
-        Self { vehicles: (0..count).map(vehicle).collect() }
-    }
-
-    /// All vehicles' scatterers and walls at one instant, world frame.
-    pub fn at(&self, path: &BlockLoop, time_s: f64) -> Body {
-        let mut all = Body::default();
-        for (index, vehicle) in self.vehicles.iter().enumerate() {
-            let pose = vehicle_pose(path, index, time_s);
-            all.scatterers.extend(vehicle.scatterers.iter().map(|s: &Scatterer| s.moved(&pose)));
-            all.walls.extend(vehicle.walls.iter().map(|w: &Wall| w.moved(&pose)));
-        }
-        all
+        Self { trajectory, vehicles: (0..config.vehicles).map(vehicle).collect() }
     }
 }
 
-fn vehicle_pose(path: &BlockLoop, index: usize, time_s: f64) -> Isometry2<f64> {
+impl Movers for Traffic {
+    fn visit(&self, time_s: f64, centre: Point2<f64>, reach_m: f64, see: &mut dyn FnMut(Moving<'_>)) {
+        let half_s = 0.5e-3;
+        for (index, body) in self.vehicles.iter().enumerate() {
+            let at = |time_s: f64| vehicle_pose(self.trajectory.as_ref(), index, time_s);
+            let pose = at(time_s);
+            let way = at(time_s + half_s).translation.vector - at(time_s - half_s).translation.vector;
+            if (pose.translation.vector - centre.coords).norm() < reach_m {
+                see(Moving { body, pose, velocity: way / (2.0 * half_s) });
+            }
+        }
+    }
+}
+
+fn vehicle_pose(path: &dyn Trajectory, index: usize, time_s: f64) -> Isometry2<f64> {
     let place = (index / 4 + 1) as f64;
     match index % 4 {
         0 => path.pose(time_s - HEADWAY_S * place),
         2 => path.pose(time_s + HEADWAY_S * place),
         _ => {
-            let meeting = path.lap_s() * (0.35 + 0.3 * index as f64);
-            let lane = Isometry2::new(nalgebra::Vector2::new(0.0, -ONCOMING_LANE_M), PI);
-            path.pose(meeting - ONCOMING_PACE * time_s) * lane
+            let lane = Isometry2::new(Vector2::new(0.0, -ONCOMING_LANE_M), PI);
+            path.pose(10.0 * index as f64 - ONCOMING_PACE * time_s) * lane
         }
     }
 }
@@ -63,6 +91,7 @@ fn vehicle_pose(path: &BlockLoop, index: usize, time_s: f64) -> Isometry2<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::trajectory::BlockLoop;
 
     #[test]
     fn follower_keeps_its_distance_and_oncoming_traffic_its_lane() {

@@ -54,6 +54,8 @@ pub struct Wall {
     pub to: Point2<f64>,
     /// Share of the power that passes, there and back: 0 (nothing) to 1.
     pub transmission: f64,
+    /// Share of the power that it mirrors: 0 (rough) to 1 (a sheet of metal).
+    pub mirror: f64,
     /// What it is a part of.
     pub body: u32,
 }
@@ -91,6 +93,28 @@ impl Body {
         self.scatterers.extend(other.scatterers);
         self.walls.extend(other.walls);
     }
+}
+
+/// A body on its way.
+#[derive(Clone, Copy, Debug)]
+pub struct Moving<'a> {
+    /// What it is made of, in its own frame (x ahead); its number is its own among all movers and the town.
+    pub body: &'a Body,
+    /// Where its frame is in the world at the time asked for.
+    pub pose: Isometry2<f64>,
+    /// Velocity of that frame in the world, metres a second.
+    pub velocity: Vector2<f64>,
+}
+
+/// What moves around the sensor.
+pub trait Movers: Send + Sync {
+    /// Shows all bodies within `reach_m` of `centre` at a time of the drive, always in the same order.
+    fn visit(&self, time_s: f64, centre: Point2<f64>, reach_m: f64, see: &mut dyn FnMut(Moving<'_>));
+}
+
+/// Nothing moves.
+impl Movers for () {
+    fn visit(&self, _: f64, _: Point2<f64>, _: f64, _: &mut dyn FnMut(Moving<'_>)) {}
 }
 
 /// All that stands still around the sensor, ready to be looked at.

@@ -177,9 +177,10 @@ fn folder_with_scans_of_another_drive_is_refused() {
 
 #[test]
 fn impossible_configuration_names_its_key() {
-    let refused = |config: SimulationConfig| Simulator::new(&config).unwrap_err().to_string();
+    let refused = |config: SimulationConfig| Simulator::new(&config).err().unwrap().to_string();
     assert!(refused(config(0)).contains("`scans`"));
-    assert!(refused(SimulationConfig { speed_m_s: f64::NAN, ..config(1) }).contains("`speed_m_s`"));
+    let drive = gyre_simulator::drive::DriveConfig { speed_m_s: f64::NAN, ..Default::default() };
+    assert!(refused(SimulationConfig { drive, ..config(1) }).contains("speed_m_s`"));
     let unknown = toml::from_str::<SimulationConfig>("scanz = 3").unwrap_err().to_string();
     assert!(unknown.contains("scanz"), "{unknown}");
 }

@@ -24,8 +24,7 @@ fn sweep(content: Body, trajectory: &dyn Trajectory, doppler_shift_s: f64) -> Ow
     let mut scan = empty_scan();
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let mut sensor = Sensor::new(doppler_shift_s);
-    scan.geometry =
-        sensor.sweep(&World::new(content), &|_| Body::default(), trajectory, time, &mut rng, &mut scan.slot());
+    scan.geometry = sensor.sweep(&World::new(content), &(), trajectory, time, &mut rng, &mut scan.slot());
     scan
 }
 
@@ -95,7 +94,8 @@ fn closing_speed_lengthens_the_range_ahead_and_shortens_it_behind() {
 
 #[test]
 fn wall_hides_a_part_of_what_is_behind_it_and_nothing_before_it() {
-    let wall = |x: f64| Wall { from: Point2::new(x, -5.0), to: Point2::new(x, 5.0), transmission: 0.01, body: 1 };
+    let wall =
+        |x: f64| Wall { from: Point2::new(x, -5.0), to: Point2::new(x, 5.0), transmission: 0.01, mirror: 0.0, body: 1 };
     let power = |walls: Vec<Wall>| {
         brightest(&sweep(Body { scatterers: vec![point(30.0, 0.0)], walls }, &ConstantTwist::default(), 0.0)).2
     };

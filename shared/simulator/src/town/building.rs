@@ -63,7 +63,7 @@ impl Planner<'_> {
 
     fn facade(&mut self, facade: &Facade) {
         let Facade { from, to, body, .. } = *facade;
-        self.content.walls.push(Wall { from, to, transmission: WALL_TRANSMISSION, body });
+        self.content.walls.push(Wall { from, to, transmission: WALL_TRANSMISSION, mirror: 0.0, body });
         self.rough_wall(facade);
         self.interior(facade);
         self.frames(facade);
@@ -130,7 +130,7 @@ impl Planner<'_> {
         }
         let body = self.next_body();
         let (from, to) = (edge.at(at, -0.5), edge.at(at + width, -0.5));
-        self.content.walls.push(Wall { from, to, transmission: FENCE_TRANSMISSION, body });
+        self.content.walls.push(Wall { from, to, transmission: FENCE_TRANSMISSION, mirror: 0.0, body });
         for along in stations(&mut self.rng, width, 0.2, 0.6) {
             let cross_section_m2 = spread(&mut self.rng, 0.3, 5.0);
             let position = edge.at(at + along, -0.5);

@@ -13,9 +13,9 @@ use rand_chacha::ChaCha8Rng;
 
 pub(crate) use street::car;
 
-use crate::SimulationConfig;
-use crate::path::BlockLoop;
-use crate::world::{Body, NO_BODY, World};
+use crate::drive::DriveConfig;
+use crate::streets::Streets;
+use crate::world::{Body, NO_BODY};
 
 /// From a street's centre to the fronts of its houses, metres.
 const HALF_STREET_M: f64 = 9.0;
@@ -51,25 +51,25 @@ impl Edge {
 
 /// Puts the town together.
 struct Planner<'a> {
-    path: &'a BlockLoop,
+    streets: &'a Streets,
     rng: ChaCha8Rng,
     content: Body,
     last_body: u32,
 }
 
 /// The town around a loop; the same for the same seed.
-pub fn build(config: &SimulationConfig, path: &BlockLoop) -> World {
-    let mut rng = ChaCha8Rng::seed_from_u64(config.seed);
+pub fn build(config: &DriveConfig, streets: &Streets, seed: u64) -> Body {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(TOWN_STREAM);
     let columns = street_lines(config.block_length_m / 2.0, &mut rng);
     let rows = street_lines(config.block_width_m / 2.0, &mut rng);
-    let mut planner = Planner { path, rng, content: Body::default(), last_body: NO_BODY };
+    let mut planner = Planner { streets, rng, content: Body::default(), last_body: NO_BODY };
     for x in columns.windows(2) {
         for y in rows.windows(2) {
             planner.block([x[0], x[1]], [y[0], y[1]]);
         }
     }
-    World::new(planner.content)
+    planner.content
 }
 
 /// Centre lines of parallel streets, ascending: the loop's two at `-half` and `half`, and more to both sides.
@@ -122,27 +122,30 @@ fn inset(span: [f64; 2]) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::path::Trajectory;
+    use crate::trajectory::{BlockLoop, Trajectory};
+    use crate::world::World;
 
-    fn town(seed: u64) -> (BlockLoop, World) {
-        let config = SimulationConfig { seed, ..SimulationConfig::default() };
+    fn town(seed: u64) -> (BlockLoop, Streets, World) {
+        let config = DriveConfig::default();
         let path = BlockLoop::new(config.block_length_m, config.block_width_m, config.speed_m_s, 5.0);
-        let world = build(&config, &path);
-        (path, world)
+        let streets = Streets::driven(&path, path.lap_s(), 1.0);
+        let world = World::new(build(&config, &streets, seed));
+        (path, streets, world)
     }
 
     #[test]
     fn same_seed_builds_the_same_town_and_another_seed_another() {
-        assert_eq!(town(3).1.scatterers(), town(3).1.scatterers());
-        assert_ne!(town(3).1.scatterers(), town(4).1.scatterers());
+        assert_eq!(town(3).2.scatterers(), town(3).2.scatterers());
+        assert_ne!(town(3).2.scatterers(), town(4).2.scatterers());
     }
 
     #[test]
     fn road_is_free_along_the_whole_loop() {
         for seed in 0..5 {
-            let (path, world) = town(seed);
-            let nearest = world.scatterers().iter().map(|s| path.clearance_m(s.position)).fold(f64::INFINITY, f64::min);
-            assert!(nearest > 1.2, "seed {seed}: something stands {nearest} m beside the path");
+            let (path, streets, world) = town(seed);
+            let nearest =
+                world.scatterers().iter().map(|s| streets.clearance_m(s.position, 9.0)).fold(f64::INFINITY, f64::min);
+            assert!(nearest > 0.2, "seed {seed}: something stands {nearest} m beside the road");
             for i in 0..200 {
                 let way = |time: f64| Point2::from(path.pose(time).translation.vector);
                 let (from, to) = (way(f64::from(i) * 0.1), way(f64::from(i) * 0.1 + 0.1));
@@ -153,7 +156,7 @@ mod tests {
 
     #[test]
     fn town_is_as_dense_as_a_town() {
-        let (_, world) = town(1);
+        let world = town(1).2;
         assert!((20_000..200_000).contains(&world.scatterers().len()), "{}", world.scatterers().len());
         assert!((1_000..20_000).contains(&world.walls().len()), "{}", world.walls().len());
     }

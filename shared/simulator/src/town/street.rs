@@ -47,7 +47,7 @@ impl Planner<'_> {
     }
 
     fn is_free(&self, place: Point2<f64>) -> bool {
-        self.path.clearance_m(place) > CLEARANCE_M
+        self.streets.clearance_m(place, CLEARANCE_M) >= CLEARANCE_M
     }
 
     /// A lamp post: pole, foot and door, close together.
@@ -116,7 +116,13 @@ pub(crate) fn car(body: u32, rng: &mut impl Rng) -> Body {
         }
     }
     // Either diagonal stands for the whole outline: whatever passes the car crosses one at least.
-    let diagonal = |from: Point2<f64>, to: Point2<f64>| Wall { from, to, transmission: CAR_TRANSMISSION.sqrt(), body };
+    let diagonal = |from: Point2<f64>, to: Point2<f64>| Wall {
+        from,
+        to,
+        transmission: CAR_TRANSMISSION.sqrt(),
+        mirror: 0.0,
+        body,
+    };
     car.walls = vec![diagonal(corners[0], corners[2]), diagonal(corners[1], corners[3])];
     car
 }

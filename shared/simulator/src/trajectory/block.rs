@@ -1,36 +1,10 @@
-//! How the sensor moves: a pose for every instant.
+//! Round a block of houses, for ever.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use nalgebra::{Isometry2, Point2, Vector2};
+use nalgebra::{Isometry2, Vector2};
 
-/// A motion that is continuous in time.
-pub trait Trajectory: Sync {
-    /// Pose of the sensor (x forward, y left, yaw counter-clockwise) in the world at `time_s` seconds after the start.
-    fn pose(&self, time_s: f64) -> Isometry2<f64>;
-}
-
-/// A sensor that keeps its velocity and its turn rate, from the world's origin at time zero.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ConstantTwist {
-    /// Metres a second ahead.
-    pub forward_m_s: f64,
-    /// Metres a second to the left.
-    pub left_m_s: f64,
-    /// Radians a second, counter-clockwise.
-    pub yaw_rad_s: f64,
-}
-
-impl Trajectory for ConstantTwist {
-    fn pose(&self, time_s: f64) -> Isometry2<f64> {
-        let yaw = self.yaw_rad_s * time_s;
-        // The exponential of a planar twist: sin(a)/a and (1 - cos(a))/a, with their limits at a = 0.
-        let (along, across) =
-            if yaw.abs() < 1e-9 { (1.0, 0.5 * yaw) } else { (yaw.sin() / yaw, (1.0 - yaw.cos()) / yaw) };
-        let (x, y) = (self.forward_m_s * time_s, self.left_m_s * time_s);
-        Isometry2::new(Vector2::new(along * x - across * y, across * x + along * y), yaw)
-    }
-}
+use super::Trajectory;
 
 /// Length of a bend by 90 degrees, metres of path.
 const BEND_M: f64 = 20.0;
@@ -82,15 +56,6 @@ impl BlockLoop {
     /// Length of one lap, metres.
     pub fn lap_m(&self) -> f64 {
         self.lap_m
-    }
-
-    /// Distance from a point of the world to the nearest point of the path, metres (to 0.25 m).
-    pub fn clearance_m(&self, point: Point2<f64>) -> f64 {
-        self.nodes
-            .iter()
-            .step_by(25)
-            .map(|node| (node.x_m - point.x).hypot(node.y_m - point.y))
-            .fold(f64::INFINITY, f64::min)
     }
 }
 
@@ -219,14 +184,5 @@ mod tests {
             let yaw_rate = (pair[1].heading_rad - pair[0].heading_rad) / dt;
             assert!(speed * yaw_rate < 5.01, "{} m/s2", speed * yaw_rate);
         }
-    }
-
-    #[test]
-    fn constant_twist_turns_on_a_circle() {
-        let twist = ConstantTwist { forward_m_s: 3.0, left_m_s: 0.0, yaw_rad_s: FRAC_PI_2 };
-        let quarter = twist.pose(1.0);
-        let radius = 3.0 / FRAC_PI_2;
-        assert!((quarter.translation.x - radius).abs() < 1e-12 && (quarter.translation.y - radius).abs() < 1e-12);
-        assert!((quarter.rotation.angle() - FRAC_PI_2).abs() < 1e-12);
     }
 }

@@ -1,0 +1,204 @@
+//! The streets of a town: centre lines with a width, and how far from them a place is.
+
+use nalgebra::{Isometry2, Point2, Vector2};
+
+use crate::trajectory::Trajectory;
+
+/// Metres a side of a cell of the index.
+const CELL_M: f64 = 20.0;
+/// Metres between the points of a street that follows a drive.
+const STEP_M: f64 = 2.0;
+
+/// A street, as a line of points that are some metres apart.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Street {
+    /// The middle of the carriageway, world frame, metres: at least two points.
+    pub centre: Vec<Point2<f64>>,
+    /// From the middle of the carriageway to its kerbs, metres.
+    pub half_width_m: f64,
+    /// Whether the drive takes it; the others run on from it through the town.
+    pub driven: bool,
+}
+
+/// Where a place lies beside the street that is nearest to it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Nearest {
+    /// Number of the street.
+    pub street: usize,
+    /// Metres along the street's centre line.
+    pub along_m: f64,
+    /// Metres from the centre line, to either side.
+    pub offset_m: f64,
+    /// Metres from the kerb: below zero on the carriageway.
+    pub clearance_m: f64,
+}
+
+impl Street {
+    /// Length of the centre line, metres.
+    pub fn length_m(&self) -> f64 {
+        self.centre.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum()
+    }
+
+    /// A place on the centre line and the street's direction there, x along it.
+    pub fn at(&self, along_m: f64) -> Isometry2<f64> {
+        let mut left_m = along_m;
+        let mut pose = Isometry2::identity();
+        for ends in self.centre.windows(2) {
+            let way = ends[1] - ends[0];
+            let length_m = way.norm();
+            let share = if length_m > 0.0 { left_m / length_m } else { 0.0 };
+            pose = Isometry2::new(ends[0].coords + way * share, way.y.atan2(way.x));
+            if share <= 1.0 {
+                break;
+            }
+            left_m -= length_m;
+        }
+        pose
+    }
+}
+
+/// All streets of a town.
+#[derive(Clone, Debug, Default)]
+pub struct Streets {
+    streets: Vec<Street>,
+    corner: Point2<f64>,
+    columns: usize,
+    rows: usize,
+    /// In each cell the pieces (street, first point, metres along the street) that touch it.
+    cells: Vec<Vec<Piece>>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Piece {
+    street: u32,
+    point: u32,
+    along_m: f64,
+}
+
+impl Streets {
+    /// A network of these streets.
+    pub fn new(streets: Vec<Street>) -> Self {
+        let points = || streets.iter().flat_map(|street| &street.centre);
+        let lowest = points().fold(Point2::new(f64::MAX, f64::MAX), |a, b| a.inf(b));
+        let highest = points().fold(Point2::new(f64::MIN, f64::MIN), |a, b| a.sup(b));
+        let cells = |from: f64, to: f64| ((to - from).max(0.0) / CELL_M) as usize + 1;
+        let (columns, rows) = (cells(lowest.x, highest.x), cells(lowest.y, highest.y));
+        let cells = vec![Vec::new(); columns * rows];
+        let mut network = Self { streets, corner: lowest, columns, rows, cells };
+        network.sort();
+        network
+    }
+
+    /// The single street that a drive takes, from its start to its end or for `at_most_s`.
+    pub fn driven(trajectory: &dyn Trajectory, at_most_s: f64, half_width_m: f64) -> Self {
+        let duration_s = trajectory.duration_s().min(at_most_s);
+        let place = |time_s: f64| Point2::from(trajectory.pose(time_s).translation.vector);
+        let mut centre = vec![place(0.0)];
+        for step in 1..=(duration_s / 0.05) as usize {
+            let here = place(0.05 * step as f64);
+            if centre.last().is_some_and(|last| (here - last).norm() >= STEP_M) {
+                centre.push(here);
+            }
+        }
+        centre.push(place(duration_s) + trajectory.pose(duration_s) * Vector2::new(0.1, 0.0));
+        Self::new(vec![Street { centre, half_width_m, driven: true }])
+    }
+
+    /// The streets, by their numbers.
+    pub fn streets(&self) -> &[Street] {
+        &self.streets
+    }
+
+    /// What is nearest of the streets whose kerb is less than `within_m` away; `None` where there is none.
+    pub fn nearest(&self, place: Point2<f64>, within_m: f64) -> Option<Nearest> {
+        let widest = self.streets.iter().map(|street| street.half_width_m).fold(0.0, f64::max);
+        let reach = Vector2::repeat(within_m + widest);
+        let [first, last] = [place - reach, place + reach].map(|p| (p - self.corner) / CELL_M);
+        let span = |from: f64, to: f64, end: usize| {
+            let from = from.floor().max(0.0) as usize;
+            from..((to.floor() + 1.0).clamp(0.0, end as f64) as usize).max(from)
+        };
+        let mut best: Option<Nearest> = None;
+        for row in span(first.y, last.y, self.rows) {
+            for column in span(first.x, last.x, self.columns) {
+                for piece in &self.cells[row * self.columns + column] {
+                    let found = self.beside(piece, place);
+                    let nearer = best.is_none_or(|best| found.clearance_m < best.clearance_m);
+                    if nearer && found.clearance_m < within_m {
+                        best = Some(found);
+                    }
+                }
+            }
+        }
+        best
+    }
+
+    /// Metres from the nearest kerb, below zero on a carriageway, at most `within_m`.
+    pub fn clearance_m(&self, place: Point2<f64>, within_m: f64) -> f64 {
+        self.nearest(place, within_m).map_or(within_m, |nearest| nearest.clearance_m)
+    }
+
+    fn beside(&self, piece: &Piece, place: Point2<f64>) -> Nearest {
+        let street = &self.streets[piece.street as usize];
+        let (from, to) = (street.centre[piece.point as usize], street.centre[piece.point as usize + 1]);
+        let way = to - from;
+        let share = ((place - from).dot(&way) / way.norm_squared().max(1e-12)).clamp(0.0, 1.0);
+        let offset_m = (place - (from + way * share)).norm();
+        Nearest {
+            street: piece.street as usize,
+            along_m: piece.along_m + share * way.norm(),
+            offset_m,
+            clearance_m: offset_m - street.half_width_m,
+        }
+    }
+
+    fn sort(&mut self) {
+        for (number, street) in self.streets.iter().enumerate() {
+            let mut along_m = 0.0;
+            for (point, ends) in street.centre.windows(2).enumerate() {
+                let piece = Piece { street: number as u32, point: point as u32, along_m };
+                along_m += (ends[1] - ends[0]).norm();
+                let cell = |p: Point2<f64>| (p - self.corner).map(|v| (v / CELL_M) as usize);
+                let (low, high) = (cell(ends[0].inf(&ends[1])), cell(ends[0].sup(&ends[1])));
+                for row in low.y..=high.y {
+                    for column in low.x..=high.x {
+                        self.cells[row * self.columns + column].push(piece);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::f64::consts::FRAC_PI_2;
+
+    use super::*;
+    use crate::trajectory::BlockLoop;
+
+    #[test]
+    fn a_place_beside_a_bent_street_is_found_at_its_distance() {
+        let centre = [(0.0, 0.0), (100.0, 0.0), (100.0, 50.0)].map(|(x, y)| Point2::new(x, y)).to_vec();
+        let streets = Streets::new(vec![Street { centre, half_width_m: 4.0, driven: true }]);
+        let nearest = streets.nearest(Point2::new(40.0, -7.0), 50.0).unwrap();
+        assert_eq!((nearest.along_m, nearest.offset_m, nearest.clearance_m), (40.0, 7.0, 3.0));
+        assert_eq!(streets.nearest(Point2::new(94.0, 30.0), 50.0).unwrap().along_m, 130.0);
+        assert_eq!(streets.clearance_m(Point2::new(40.0, 1.0), 5.0), -3.0);
+        assert_eq!(streets.clearance_m(Point2::new(-400.0, 300.0), 5.0), 5.0);
+        let bend = streets.streets()[0].at(130.0);
+        assert!((bend.translation.vector - Vector2::new(100.0, 30.0)).norm() < 1e-9);
+        assert!((bend.rotation.angle() - FRAC_PI_2).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_drive_stays_on_its_street() {
+        let path = BlockLoop::new(48.0, 34.0, 9.5, 5.0);
+        let streets = Streets::driven(&path, path.lap_s(), 4.0);
+        for i in 0..300 {
+            let place = Point2::from(path.pose(f64::from(i) * 0.05).translation.vector);
+            assert!(streets.clearance_m(place, 10.0) < -3.5);
+        }
+    }
+}
