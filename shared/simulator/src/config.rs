@@ -4,8 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::SimulatorError;
 use crate::drive::DriveConfig;
-use crate::sensor::SensorConfig;
+use crate::sensor::{Effects, SensorConfig};
 use crate::traffic::TrafficConfig;
+use crate::weather::WeatherConfig;
 
 /// What to simulate. Every key has a default, and unknown keys are refused.
 ///
@@ -23,6 +24,11 @@ pub struct SimulationConfig {
     pub traffic: TrafficConfig,
     /// What measures.
     pub sensor: SensorConfig,
+    /// What makes scans hard.
+    pub effects: Effects,
+    /// What the weather is like, and from when on. Default: clear.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub weather: Vec<WeatherConfig>,
 }
 
 impl Default for SimulationConfig {
@@ -33,6 +39,8 @@ impl Default for SimulationConfig {
             drive: DriveConfig::default(),
             traffic: TrafficConfig::default(),
             sensor: SensorConfig::default(),
+            effects: Effects::default(),
+            weather: Vec::new(),
         }
     }
 }
@@ -43,7 +51,8 @@ impl SimulationConfig {
         within("scans", self.scans as f64, 1.0, 100_000.0)?;
         self.drive.validate()?;
         self.traffic.validate()?;
-        self.sensor.validate()
+        self.sensor.validate()?;
+        self.weather.iter().try_for_each(WeatherConfig::validate)
     }
 }
 

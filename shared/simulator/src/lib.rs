@@ -8,7 +8,8 @@
 //! - [`streets`]: the ways through the town,
 //! - [`town`], [`traffic`]: what stands and what moves around it,
 //! - [`world`], [`occlusion`]: how that reflects, and what hides what,
-//! - [`sensor`], [`receiver`]: what a sweep measures of it,
+//! - [`profile`]: the radars, [`weather`]: rain, fog and snow,
+//! - [`sensor`]: what a sweep measures of it,
 //! - [`simulator`]: one scan at a time, with its exact pose,
 //! - [`oxford_writer`]: the dataset on disk,
 //! - [`faults`]: the same, or a real one, spoilt on purpose.
@@ -32,13 +33,13 @@ mod image;
 pub mod occlusion;
 pub mod oxford_writer;
 pub mod profile;
-pub mod receiver;
 pub mod sensor;
 pub mod simulator;
 pub mod streets;
 pub mod town;
 pub mod traffic;
 pub mod trajectory;
+pub mod weather;
 pub mod world;
 
 pub use config::SimulationConfig;
@@ -46,7 +47,7 @@ pub use error::SimulatorError;
 pub use faults::{Fault, FaultPlan, write_faulty};
 pub use oxford_writer::{Summary, write_dataset};
 pub use profile::{Profile, Sampling};
-pub use sensor::{Sensor, SweepTime};
+pub use sensor::{Effects, Scene, Sensor, SensorConfig, SweepTime};
 pub use simulator::{SimulatedScan, Simulator};
 pub use streets::{Street, Streets};
 pub use trajectory::{BlockLoop, ConstantTwist, Trajectory};

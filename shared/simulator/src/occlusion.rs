@@ -77,9 +77,28 @@ impl WallGrid {
         passed
     }
 
+    /// Shows all walls between two points; see [`crate::World::walls_between`].
+    pub fn between(&self, from: Point2<f64>, to: Point2<f64>, see: &mut impl FnMut(u32, &Wall, f64)) {
+        let mut walk = CellWalk::new(self, from, to);
+        let mut entered = 0.0;
+        while let Some((column, row, left)) = walk.next_cell() {
+            for &index in self.cell(column, row).map_or(&[][..], |cell| self.walls_in(cell)) {
+                let wall = &self.walls[index as usize];
+                // A wall lies in several cells, but is crossed in one of them only.
+                if let Some(share) = crossing(from, to - from, wall).filter(|share| (entered..left).contains(share)) {
+                    see(index, wall, share);
+                }
+            }
+            entered = left;
+        }
+    }
+
+    fn walls_in(&self, cell: usize) -> &[u32] {
+        &self.cell_walls[self.cell_start[cell] as usize..self.cell_start[cell + 1] as usize]
+    }
+
     fn crossed(&self, cell: usize, from: Point2<f64>, way: Vector2<f64>, body: u32, span: std::ops::Range<f64>) -> f64 {
-        let range = self.cell_start[cell] as usize..self.cell_start[cell + 1] as usize;
-        self.cell_walls[range]
+        self.walls_in(cell)
             .iter()
             .map(|&index| &self.walls[index as usize])
             .filter(|wall| body == NO_BODY || wall.body != body)

@@ -10,8 +10,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
 use crate::image::write_image;
-use crate::sensor::{AZIMUTHS, STRIDE};
-use crate::simulator::{Simulator, empty_scan};
+use gyre_radar::OwnedScan;
+
+use crate::simulator::Simulator;
 use crate::{SimulationConfig, SimulatorError};
 
 /// What was written.
@@ -141,14 +142,19 @@ fn write_images(
 }
 
 fn work(simulator: &Simulator, folder: &Path, next: &AtomicUsize, results: &mpsc::Sender<Result<(), SimulatorError>>) {
-    let (mut sensor, mut scan) = (simulator.sensor(), empty_scan());
+    let (mut sensor, mut scan) = (simulator.sensor(), OwnedScan::with_limits(simulator.limits()));
     loop {
         let index = next.fetch_add(1, Ordering::Relaxed);
         if index >= simulator.scans() {
             return;
         }
-        simulator.render_into(index, &mut sensor, &mut scan);
-        let written = write_image(&folder.join(image_name(simulator, index)), STRIDE, AZIMUTHS, &scan.bytes);
+        simulator.render_into(index, &mut sensor, &mut scan.slot());
+        let written = write_image(
+            &folder.join(image_name(simulator, index)),
+            simulator.sampling().stride(),
+            simulator.sampling().azimuths,
+            &scan.bytes,
+        );
         if results.send(written).is_err() {
             return;
         }

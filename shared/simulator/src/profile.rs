@@ -1,6 +1,11 @@
 //! The radars that can be simulated: what their data sheets, their recordings and the literature say of them.
 
+use std::f64::consts::TAU;
+
 use serde::{Deserialize, Serialize};
+
+/// Bytes before each azimuth's bins: stamp, encoder, validity or chirp, as in Oxford's files.
+pub const METADATA_BYTES: usize = 11;
 
 /// A radar by its name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -55,6 +60,74 @@ pub struct Sampling {
     pub doppler_s: f64,
 }
 
+/// How a radar transmits and receives.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Receiver {
+    /// Carrier, GHz.
+    pub carrier_ghz: f64,
+    /// Width of the beam at half power, there and back, radians.
+    pub beam_rad: f64,
+    /// Range resolution of the window: between two independent cells, metres.
+    pub cell_m: f64,
+    /// Power received from 1 m2 at 1 m if there were no near field, in the receiver's units.
+    pub constant: f64,
+    /// Range below which the fall-off flattens, metres: the antenna looks over what is near, the receiver filters it.
+    pub near_m: f64,
+    /// Power at which the receiver saturates, in its units.
+    pub full_scale: f32,
+    /// Whether powers are sent as whole numbers of its unit.
+    pub whole_powers: bool,
+    /// Mean power between echoes by range: (m, dB above the unit), to be interpolated. Noise, and the diffuse rest of ground
+    /// and many-fold echoes.
+    pub floor_db: &'static [(f64, f64)],
+    /// The same of the transmitter's ringing in the first metres.
+    pub ringing_db: &'static [(f64, f64)],
+}
+
+impl Receiver {
+    /// Wavelength of the carrier, metres.
+    pub fn wavelength_m(&self) -> f64 {
+        0.299_792_458 / self.carrier_ghz
+    }
+}
+
+impl Sampling {
+    /// Radians from one azimuth to the next.
+    pub fn step_rad(&self) -> f64 {
+        f64::from(self.encoder_step) * TAU / f64::from(self.encoder_counts)
+    }
+
+    /// Encoder count at an azimuth.
+    pub fn encoder_count(&self, azimuth: usize) -> u16 {
+        self.encoder_first + self.encoder_step * azimuth as u16
+    }
+
+    /// Angle of an azimuth as reported, radians clockwise from straight ahead.
+    pub fn azimuth_rad(&self, azimuth: usize) -> f64 {
+        f64::from(self.encoder_count(azimuth)) * TAU / f64::from(self.encoder_counts)
+    }
+
+    /// Bytes of an azimuth: metadata, then powers.
+    pub fn stride(&self) -> usize {
+        METADATA_BYTES + self.bins
+    }
+
+    /// The bin, with fractions, in which a range falls.
+    pub fn bin(&self, range_m: f64) -> f64 {
+        (range_m - self.range_offset_m) / self.range_resolution_m - 0.5
+    }
+
+    /// The range of a bin's middle, metres.
+    pub fn range_m(&self, bin: f64) -> f64 {
+        (bin + 0.5) * self.range_resolution_m + self.range_offset_m
+    }
+
+    /// The farthest range, metres.
+    pub fn reach_m(&self) -> f64 {
+        self.range_m(self.bins as f64)
+    }
+}
+
 impl Profile {
     /// All of them.
     pub const ALL: [Self; 5] = [Self::Cts350xOxford, Self::Cts350xRadiate, Self::Cir204h, Self::Ras6, Self::K2pi];
@@ -104,4 +177,86 @@ impl Profile {
             },
         }
     }
+
+    /// How it transmits and receives.
+    pub fn receiver(self) -> Receiver {
+        let oxford = Receiver {
+            carrier_ghz: 76.5,
+            beam_rad: 1.27f64.to_radians(),
+            cell_m: 0.24,
+            constant: 1.5e10,
+            near_m: 15.0,
+            full_scale: 1.0e7,
+            whole_powers: true,
+            floor_db: &OXFORD_FLOOR,
+            ringing_db: &OXFORD_RINGING,
+        };
+        match self {
+            Self::Cts350xOxford => oxford,
+            Self::Cts350xRadiate => Receiver {
+                constant: 1.3e11,
+                full_scale: 2.0e8,
+                whole_powers: false,
+                floor_db: &RADIATE_FLOOR,
+                ringing_db: &RADIATE_RINGING,
+                ..oxford
+            },
+            // No scan of it at hand: Oxford's, with the longer cell of its smaller bandwidth.
+            Self::Cir204h => Receiver { cell_m: 0.33, constant: 3.0e10, ..oxford },
+            Self::Ras6 => Receiver {
+                constant: 1.3e11,
+                full_scale: 1.0e8,
+                floor_db: &RAS6_FLOOR,
+                ringing_db: &RAS6_RINGING,
+                ..oxford
+            },
+            // 24 GHz, a beam of 3 degrees; nothing nearer than 3 m, so no ringing.
+            Self::K2pi => Receiver {
+                carrier_ghz: 24.0,
+                beam_rad: 2.6f64.to_radians(),
+                cell_m: 0.75,
+                constant: 2.0e9,
+                near_m: 10.0,
+                whole_powers: false,
+                floor_db: &K2PI_FLOOR,
+                ringing_db: &[],
+                ..oxford
+            },
+        }
+    }
 }
+
+/// Floors are means over all azimuths of real scans: an exponential distribution put through their lower third at each range.
+const OXFORD_FLOOR: [(f64, f64); 9] = [
+    (2.5, 3.0),
+    (4.0, 4.0),
+    (8.0, 5.5),
+    (13.0, 7.0),
+    (40.0, 7.0),
+    (60.0, 6.2),
+    (98.0, 5.0),
+    (140.0, 3.7),
+    (165.0, 3.7),
+];
+const OXFORD_RINGING: [(f64, f64); 8] =
+    [(0.2, 19.7), (0.6, 22.2), (0.8, 24.2), (1.0, 23.7), (1.25, 19.7), (1.5, 15.2), (2.0, 11.2), (2.7, 2.0)];
+const RADIATE_FLOOR: [(f64, f64); 8] =
+    [(4.0, 12.0), (6.0, 11.2), (10.0, 11.2), (17.0, 12.5), (35.0, 13.2), (60.0, 12.5), (80.0, 12.0), (100.0, 11.0)];
+const RADIATE_RINGING: [(f64, f64); 7] =
+    [(0.2, 29.5), (1.5, 29.0), (1.75, 26.0), (2.0, 24.0), (2.5, 18.5), (3.0, 16.5), (4.0, 6.0)];
+const RAS6_FLOOR: [(f64, f64); 11] = [
+    (3.0, 19.5),
+    (6.0, 20.0),
+    (13.0, 22.0),
+    (20.0, 22.0),
+    (40.0, 19.8),
+    (60.0, 17.5),
+    (98.0, 14.7),
+    (140.0, 13.0),
+    (200.0, 12.0),
+    (250.0, 11.4),
+    (300.0, 10.2),
+];
+const RAS6_RINGING: [(f64, f64); 8] =
+    [(0.2, 39.5), (0.8, 42.0), (1.0, 41.7), (1.25, 37.7), (1.5, 34.5), (2.0, 28.0), (2.5, 22.0), (3.5, 10.0)];
+const K2PI_FLOOR: [(f64, f64); 2] = [(3.0, 8.0), (100.0, 6.0)];

@@ -2,15 +2,15 @@
 
 use std::sync::Arc;
 
-use gyre_radar::{OwnedScan, ScanLimits};
+use gyre_radar::{OwnedScan, ScanLimits, ScanSlot, SweepGeometry};
 use nalgebra::Isometry2;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 
-use crate::sensor::{self, Sensor, SweepTime};
+use crate::profile::Sampling;
+use crate::sensor::{Scene, Sensor, SweepTime};
 use crate::streets::Streets;
 use crate::traffic::Traffic;
 use crate::trajectory::Trajectory;
+use crate::weather::WeatherConfig;
 use crate::world::World;
 use crate::{SimulationConfig, SimulatorError, town};
 
@@ -21,10 +21,8 @@ const EPOCH_US: i64 = 1_547_132_400_000_000;
 /// A drive through a town, ready to be measured. Shared freely between threads.
 #[derive(Clone)]
 pub struct Simulator {
-    scans: usize,
-    seed: u64,
-    period_us: i64,
-    doppler_shift_s: f64,
+    config: SimulationConfig,
+    sampling: Sampling,
     trajectory: Arc<dyn Trajectory>,
     world: Arc<World>,
     traffic: Traffic,
@@ -44,22 +42,31 @@ impl Simulator {
     pub fn new(config: &SimulationConfig) -> Result<Self, SimulatorError> {
         config.validate()?;
         let trajectory: Arc<dyn Trajectory> = config.drive.trajectory(config.seed)?.into();
-        let drive_s = config.scans as f64 * config.sensor.period_s;
+        let sampling = config.sensor.sampling();
+        let drive_s = config.scans as f64 * sampling.period_us as f64 * 1e-6;
         let streets = Streets::driven(trajectory.as_ref(), drive_s.min(100.0), 0.0);
         Ok(Self {
-            scans: config.scans,
-            seed: config.seed,
-            period_us: (config.sensor.period_s * 1e6).round() as i64,
-            doppler_shift_s: config.sensor.doppler_shift_s,
+            config: config.clone(),
+            sampling,
             world: Arc::new(World::new(town::build(&config.drive, &streets, config.seed))),
             traffic: Traffic::new(&config.traffic, trajectory.clone(), config.seed),
             trajectory,
         })
     }
 
+    /// What is simulated.
+    pub fn config(&self) -> &SimulationConfig {
+        &self.config
+    }
+
+    /// How the radar samples.
+    pub fn sampling(&self) -> &Sampling {
+        &self.sampling
+    }
+
     /// Scans in the dataset; more can be rendered.
     pub fn scans(&self) -> usize {
-        self.scans
+        self.config.scans
     }
 
     /// The drive.
@@ -74,7 +81,8 @@ impl Simulator {
 
     /// When scan `index` is taken.
     pub fn time(&self, index: usize) -> SweepTime {
-        SweepTime { start_us: EPOCH_US + self.period_us * index as i64, period_us: self.period_us, epoch_us: EPOCH_US }
+        let Sampling { period_us, azimuths, .. } = self.sampling;
+        SweepTime { start_us: EPOCH_US + period_us * index as i64, period_us, azimuths, epoch_us: EPOCH_US }
     }
 
     /// Pose of the sensor in the world at the middle of scan `index`.
@@ -85,27 +93,30 @@ impl Simulator {
 
     /// A radar as configured, for [`Simulator::render_into`].
     pub fn sensor(&self) -> Sensor {
-        Sensor::new(self.doppler_shift_s)
+        Sensor::new(&self.config.sensor, &self.config.effects)
+    }
+
+    /// What memory one scan needs.
+    pub fn limits(&self) -> ScanLimits {
+        ScanLimits { bytes: self.sampling.azimuths * self.sampling.stride(), azimuths: self.sampling.azimuths }
     }
 
     /// Measures scan `index`: the same bytes whenever and on whatever thread it is called.
     pub fn render_scan(&self, index: usize) -> SimulatedScan {
-        let mut scan = empty_scan();
-        self.render_into(index, &mut self.sensor(), &mut scan);
+        let mut scan = OwnedScan::with_limits(self.limits());
+        scan.geometry = self.render_into(index, &mut self.sensor(), &mut scan.slot());
         SimulatedScan { scan, pose: self.pose(index) }
     }
 
-    /// Measures scan `index` into memory that is used again; see [`empty_scan`].
-    pub fn render_into(&self, index: usize, sensor: &mut Sensor, scan: &mut OwnedScan) {
-        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
-        // Stream 0 built the town.
-        rng.set_stream(index as u64 + 1);
-        let (world, trajectory) = (self.world.as_ref(), self.trajectory.as_ref());
-        scan.geometry = sensor.sweep(world, &self.traffic, trajectory, self.time(index), &mut rng, &mut scan.slot());
+    /// Measures scan `index` into memory that is used again, at least as much as [`Simulator::limits`] say.
+    pub fn render_into(&self, index: usize, sensor: &mut Sensor, slot: &mut ScanSlot<'_>) -> SweepGeometry {
+        let time = self.time(index);
+        let scene = Scene {
+            world: &self.world,
+            movers: &self.traffic,
+            trajectory: self.trajectory.as_ref(),
+            weather: WeatherConfig::at(&self.config.weather, time.trajectory_s(time.start_us)),
+        };
+        sensor.sweep(scene, time, self.config.seed, index as u64, slot)
     }
-}
-
-/// A scan with room for one sweep.
-pub fn empty_scan() -> OwnedScan {
-    OwnedScan::with_limits(ScanLimits { bytes: sensor::AZIMUTHS * sensor::STRIDE, azimuths: sensor::AZIMUTHS })
 }

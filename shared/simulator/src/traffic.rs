@@ -63,7 +63,7 @@ impl Traffic {
 }
 
 impl Movers for Traffic {
-    fn visit(&self, time_s: f64, centre: Point2<f64>, reach_m: f64, see: &mut dyn FnMut(Moving<'_>)) {
+    fn visit<'a>(&'a self, time_s: f64, centre: Point2<f64>, reach_m: f64, see: &mut dyn FnMut(Moving<'a>)) {
         let half_s = 0.5e-3;
         for (index, body) in self.vehicles.iter().enumerate() {
             let at = |time_s: f64| vehicle_pose(self.trajectory.as_ref(), index, time_s);

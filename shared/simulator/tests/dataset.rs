@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use gyre_radar::{DatasetOptions, Format, OwnedScan};
-use gyre_simulator::sensor::{AZIMUTHS, METADATA_BYTES, STRIDE};
+use gyre_simulator::profile::METADATA_BYTES;
 use gyre_simulator::{SimulationConfig, Simulator, SimulatorError, write_dataset};
 use nalgebra::{Isometry2, Vector2};
 

@@ -3,33 +3,60 @@
 
 use std::f64::consts::TAU;
 
-use gyre_radar::{DatasetOptions, OwnedScan};
-use gyre_simulator::sensor::{AZIMUTHS, BINS, METADATA_BYTES, RANGE_RESOLUTION_M, STRIDE, azimuth_rad};
-use gyre_simulator::simulator::empty_scan;
+use gyre_radar::{DatasetOptions, OwnedScan, ScanLimits};
+use gyre_simulator::profile::{METADATA_BYTES, Profile, Sampling};
+use gyre_simulator::weather::WeatherConfig;
 use gyre_simulator::world::{Aspect, NO_BODY, Scatterer, Wall};
-use gyre_simulator::{Body, ConstantTwist, Sensor, SimulationConfig, Simulator, SweepTime, Trajectory, World};
+use gyre_simulator::{
+    Body, ConstantTwist, Effects, Scene, Sensor, SensorConfig, SimulationConfig, Simulator, SweepTime, Trajectory,
+    World,
+};
 use nalgebra::Point2;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 
 /// Ringing fills the first bins; no point is put there.
 const FIRST_FREE_BIN: usize = 80;
+const AZIMUTHS: usize = 400;
+
+fn sampling() -> Sampling {
+    Profile::Cts350xOxford.sampling()
+}
+
+fn azimuth_rad(azimuth: usize) -> f64 {
+    sampling().azimuth_rad(azimuth)
+}
 
 fn point(x: f64, y: f64) -> Scatterer {
     Scatterer { position: Point2::new(x, y), cross_section_m2: 30.0, aspect: Aspect::AllRound, body: NO_BODY }
 }
 
-fn sweep(content: Body, trajectory: &dyn Trajectory, doppler_shift_s: f64) -> OwnedScan {
-    let time = SweepTime { start_us: 1_500_000_000_000_000, period_us: 250_000, epoch_us: 1_500_000_000_000_000 };
-    let mut scan = empty_scan();
-    let mut rng = ChaCha8Rng::seed_from_u64(7);
-    let mut sensor = Sensor::new(doppler_shift_s);
-    scan.geometry = sensor.sweep(&World::new(content), &(), trajectory, time, &mut rng, &mut scan.slot());
+/// Without what would move or hide a single point; see `sweep_with`.
+fn quiet() -> Effects {
+    Effects { encoder_wobble: false, dropped_azimuths: false, interference: false, ..Effects::ALL }
+}
+
+fn sweep(content: Body, trajectory: &dyn Trajectory, doppler_s: f64) -> OwnedScan {
+    let config = SensorConfig { doppler_s: Some(doppler_s), ..SensorConfig::default() };
+    sweep_with(content, trajectory, &config, &quiet(), WeatherConfig::default())
+}
+
+fn sweep_with(
+    content: Body,
+    trajectory: &dyn Trajectory,
+    config: &SensorConfig,
+    effects: &Effects,
+    weather: WeatherConfig,
+) -> OwnedScan {
+    let Sampling { azimuths, period_us, .. } = config.sampling();
+    let time = SweepTime { start_us: 1_500_000_000_000_000, period_us, azimuths, epoch_us: 1_500_000_000_000_000 };
+    let mut scan = OwnedScan::with_limits(ScanLimits { bytes: azimuths * config.sampling().stride(), azimuths });
+    let scene = Scene { world: &World::new(content), movers: &(), trajectory, weather };
+    scan.geometry = Sensor::new(config, effects).sweep(scene, time, 7, 0, &mut scan.slot());
     scan
 }
 
 fn row(scan: &OwnedScan, azimuth: usize) -> &[u8] {
-    &scan.bytes[azimuth * STRIDE + METADATA_BYTES..(azimuth + 1) * STRIDE]
+    let stride = scan.geometry.stride;
+    &scan.bytes[azimuth * stride + METADATA_BYTES..(azimuth + 1) * stride]
 }
 
 /// Azimuth and bin of the strongest power, each the middle of the plateau that rounding leaves.
@@ -37,7 +64,7 @@ fn brightest(scan: &OwnedScan) -> (usize, f64, u8) {
     let best = |azimuth: usize| row(scan, azimuth)[FIRST_FREE_BIN..].iter().copied().max().unwrap_or(0);
     let azimuth = (0..AZIMUTHS).max_by_key(|&azimuth| best(azimuth)).unwrap();
     let top = best(azimuth);
-    let bins: Vec<usize> = (FIRST_FREE_BIN..BINS).filter(|&bin| row(scan, azimuth)[bin] == top).collect();
+    let bins: Vec<usize> = (FIRST_FREE_BIN..sampling().bins).filter(|&bin| row(scan, azimuth)[bin] == top).collect();
     (azimuth, bins.iter().sum::<usize>() as f64 / bins.len() as f64, top)
 }
 
@@ -68,7 +95,7 @@ fn point_comes_out_where_the_moving_sensor_met_it() {
             let (wanted, range_m) = expected(&motion, Point2::new(x, y));
             let apart = (azimuth as i64 - wanted as i64).rem_euclid(AZIMUTHS as i64);
             assert!(apart <= 1 || apart == AZIMUTHS as i64 - 1, "({x}, {y}) {motion:?}: {azimuth} for {wanted}");
-            let error_m = (bin + 0.5) * RANGE_RESOLUTION_M - range_m;
+            let error_m = sampling().range_m(bin) - range_m;
             assert!(error_m.abs() < 0.07, "({x}, {y}) {motion:?}: {error_m} m off {range_m} m");
         }
     }
@@ -82,12 +109,12 @@ fn point_to_the_right_lies_at_a_quarter_turn() {
 }
 
 #[test]
-fn closing_speed_lengthens_the_range_ahead_and_shortens_it_behind() {
+fn closing_speed_shortens_the_range_ahead_and_lengthens_it_behind() {
     let motion = ConstantTwist { forward_m_s: 10.0, left_m_s: 0.0, yaw_rad_s: 0.0 };
-    for (x, sign) in [(30.0, 1.0), (-30.0, -1.0)] {
+    for (x, sign) in [(30.0, -1.0), (-30.0, 1.0)] {
         let at =
             |shift: f64| brightest(&sweep(Body { scatterers: vec![point(x, 6.0)], walls: vec![] }, &motion, shift)).1;
-        let moved_m = (at(0.049) - at(0.0)) * RANGE_RESOLUTION_M;
+        let moved_m = (at(0.049) - at(0.0)) * sampling().range_resolution_m;
         assert!((moved_m - sign * 0.48).abs() < 0.06, "{x}: {moved_m} m");
     }
 }
@@ -109,7 +136,7 @@ fn wall_hides_a_part_of_what_is_behind_it_and_nothing_before_it() {
 #[test]
 fn empty_world_holds_noise_and_ringing_alone() {
     let scan = sweep(Body::default(), &ConstantTwist::default(), 0.0);
-    let far = (0..AZIMUTHS).flat_map(|azimuth| &row(&scan, azimuth)[2500..]).map(|&power| f64::from(power));
+    let far = (0..AZIMUTHS).flat_map(|azimuth| &row(&scan, azimuth)[2800..]).map(|&power| f64::from(power));
     let mean = far.clone().sum::<f64>() / far.clone().count() as f64;
     assert!((3.0..8.0).contains(&mean), "mean {mean}");
     assert!(far.fold(0.0, f64::max) < 40.0);

@@ -1,0 +1,78 @@
+//! The antenna's pattern, there and back.
+
+/// Side lobes, there and back: dB below the middle of the beam at so many half-power widths beside it.
+///
+/// The envelope measured on Oxford's, RADIATE's and Boreas-RT's scans: medians of the azimuths beside isolated strong echoes.
+const SIDE_LOBES: [(f64, f64); 7] =
+    [(0.0, -27.0), (2.1, -29.0), (2.8, -39.0), (3.5, -44.0), (4.2, -47.0), (5.6, -52.0), (8.0, -58.0)];
+/// Entries of the table for one half-power width.
+const STEPS: f64 = 64.0;
+/// Half-power widths to each side that the table spans.
+const REACH: f64 = 8.0;
+
+/// Amplitude that an echo arrives with, by the angle at which it stands beside the beam's middle (two-way).
+#[derive(Clone, Debug)]
+pub struct Antenna {
+    /// Entries a radian.
+    scale: f64,
+    amplitudes: Vec<f32>,
+}
+
+impl Antenna {
+    /// An antenna whose two-way power falls to one half at `width_rad / 2` beside its middle.
+    pub fn new(width_rad: f64, side_lobes: bool) -> Self {
+        let power = |widths: f64| {
+            // One half at half a width.
+            let main_db = -12.04 * widths * widths;
+            let db = if side_lobes { main_db.max(side_lobe_db(widths)) } else { main_db };
+            10f64.powf(db / 10.0)
+        };
+        let entries = (REACH * STEPS) as usize + 1;
+        let amplitudes = (0..entries).map(|i| power(i as f64 / STEPS).sqrt() as f32).collect();
+        Self { scale: STEPS / width_rad, amplitudes }
+    }
+
+    /// Amplitude gain `off_rad` beside the middle; 0 far beside it.
+    pub fn gain(&self, off_rad: f64) -> f64 {
+        let at = (off_rad.abs() * self.scale) as usize;
+        self.amplitudes.get(at).copied().map_or(0.0, f64::from)
+    }
+
+    /// The angle beyond which the amplitude gain stays below `least`, radians.
+    pub fn reach_rad(&self, least: f64) -> f64 {
+        let beyond = self.amplitudes.partition_point(|&gain| f64::from(gain) >= least);
+        beyond as f64 / self.scale
+    }
+}
+
+fn side_lobe_db(widths: f64) -> f64 {
+    let next = SIDE_LOBES.partition_point(|lobe| lobe.0 <= widths).clamp(1, SIDE_LOBES.len() - 1);
+    let ((x0, y0), (x1, y1)) = (SIDE_LOBES[next - 1], SIDE_LOBES[next]);
+    y0 + (y1 - y0) * (widths - x0) / (x1 - x0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn power_falls_to_one_half_at_half_the_width_and_ever_further() {
+        for side_lobes in [false, true] {
+            let antenna = Antenna::new(0.03, side_lobes);
+            assert_eq!(antenna.gain(0.0), 1.0);
+            assert!((antenna.gain(-0.015).powi(2) - 0.5).abs() < 0.01);
+            assert!(antenna.amplitudes.windows(2).all(|pair| pair[1] <= pair[0]));
+            assert_eq!(antenna.gain(3.0), 0.0);
+        }
+    }
+
+    #[test]
+    fn nothing_is_heard_beyond_its_reach() {
+        let antenna = Antenna::new(0.03, true);
+        for least in [0.5, 0.05, 0.005, 0.0001] {
+            let reach = antenna.reach_rad(least);
+            assert!(antenna.gain(reach - 1e-3) >= least || reach > 0.23);
+            assert!(antenna.gain(reach + 1e-9) < least);
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! Which radar: the section `[simulation.sensor]`.
+
+use serde::{Deserialize, Serialize};
+
+use crate::SimulatorError;
+use crate::config::within;
+use crate::profile::{Profile, Sampling};
+
+/// Which radar measures, and in what this one differs from its kind.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SensorConfig {
+    /// Which radar. Default `cts350x-oxford`.
+    pub profile: Profile,
+    /// Time of one sweep, seconds. Default: the radar's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub period_s: Option<f64>,
+    /// Metres to add to a bin's range. Default: the radar's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range_offset_m: Option<f64>,
+    /// Metres of range that a closing speed of 1 m/s shifts an echo by; 0 for a radar without the effect. Default: the radar's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub doppler_s: Option<f64>,
+    /// How far the encoder's disc is off its axis, radians: the beam stands at `azimuth + eccentricity * cos(azimuth)`, what
+    /// `dataset.azimuth_eccentricity_rad` puts right. Default 0.
+    pub azimuth_eccentricity_rad: f64,
+}
+
+impl Default for SensorConfig {
+    fn default() -> Self {
+        Self {
+            profile: Profile::default(),
+            period_s: None,
+            range_offset_m: None,
+            doppler_s: None,
+            azimuth_eccentricity_rad: 0.0,
+        }
+    }
+}
+
+impl SensorConfig {
+    /// Refuses what cannot be simulated, naming the key.
+    pub fn validate(&self) -> Result<(), SimulatorError> {
+        within("sensor.period_s", self.period_s.unwrap_or(1.0), 0.05, 2.0)?;
+        within("sensor.range_offset_m", self.range_offset_m.unwrap_or(0.0), -5.0, 5.0)?;
+        within("sensor.doppler_s", self.doppler_s.unwrap_or(0.0), -0.5, 0.5)?;
+        within("sensor.azimuth_eccentricity_rad", self.azimuth_eccentricity_rad, -0.05, 0.05)
+    }
+
+    /// How it samples.
+    pub fn sampling(&self) -> Sampling {
+        let kind = self.profile.sampling();
+        Sampling {
+            period_us: self.period_s.map_or(kind.period_us, |period_s| (period_s * 1e6).round() as i64),
+            range_offset_m: self.range_offset_m.unwrap_or(kind.range_offset_m),
+            doppler_s: self.doppler_s.unwrap_or(kind.doppler_s),
+            ..kind
+        }
+    }
+}

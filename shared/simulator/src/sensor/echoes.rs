@@ -1,0 +1,106 @@
+//! What a sweep can see: everything that reflects, with the amplitude that size, aspect, cover, range and air leave of it.
+
+use nalgebra::{Point2, Vector2};
+
+use super::Air;
+use super::effects::Effects;
+use super::skyline::Skyline;
+use super::stations::{Station, Stations};
+use crate::profile::Receiver;
+use crate::world::{Moving, NO_BODY, Scatterer, World};
+
+/// Echoes with less power than this are not worth adding.
+pub(super) const NEGLIGIBLE_POWER: f64 = 0.05;
+/// Nothing reflects nearer than this, metres: it would be inside the radar.
+const NEAREST_M: f64 = 0.5;
+
+/// Something visible.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Echo {
+    /// Where it is at the middle of the sweep, world frame.
+    pub position: Point2<f64>,
+    /// How it moves, metres a second, world frame.
+    pub velocity: Vector2<f64>,
+    /// Amplitude in the middle of the beam: the root of the power received.
+    pub amplitude: f64,
+    /// When the beam passes it, in azimuths with fractions.
+    pub azimuth: f64,
+}
+
+impl Echo {
+    /// Where it is when the sensor is at a station.
+    pub fn place(&self, station: &Station) -> Point2<f64> {
+        self.position + self.velocity * station.time_s
+    }
+}
+
+/// What looking needs to know.
+pub(super) struct View<'a> {
+    pub stations: &'a Stations,
+    pub skyline: &'a Skyline,
+    pub receiver: &'a Receiver,
+    pub air: &'a Air,
+    pub effects: &'a Effects,
+    pub reach_m: f64,
+}
+
+impl View<'_> {
+    /// Collects all that stands.
+    pub fn standing(&self, world: &World, echoes: &mut Vec<Echo>) {
+        let centre = self.stations.middle().position;
+        for scatterer in world.around(centre, self.reach_m).flatten() {
+            self.look(scatterer, scatterer.position, Vector2::zeros(), echoes);
+        }
+    }
+
+    /// Collects all that moves.
+    pub fn moving(&self, moving: &[Moving<'_>], echoes: &mut Vec<Echo>) {
+        for mover in moving {
+            for scatterer in &mover.body.scatterers {
+                let there = scatterer.moved(&mover.pose);
+                self.look(&there, there.position, mover.velocity, echoes);
+            }
+        }
+    }
+
+    /// Adds a scatterer's echo for each time that the beam passes it, if there is enough of it.
+    fn look(&self, scatterer: &Scatterer, position: Point2<f64>, velocity: Vector2<f64>, echoes: &mut Vec<Echo>) {
+        let range_m = (position - self.stations.middle().position).norm();
+        if scatterer.cross_section_m2 * self.received((range_m - 5.0).max(NEAREST_M)) < NEGLIGIBLE_POWER {
+            return;
+        }
+        let place = |station: &Station| position + velocity * station.time_s;
+        self.stations.passings(place, |azimuth| {
+            let station = self.stations.at(azimuth.round() as i64);
+            if let Some(amplitude) = self.amplitude(scatterer, place(station), station, azimuth) {
+                echoes.push(Echo { position, velocity, amplitude, azimuth });
+            }
+        });
+    }
+
+    fn amplitude(&self, scatterer: &Scatterer, place: Point2<f64>, from: &Station, azimuth: f64) -> Option<f64> {
+        let way = from.position - place;
+        let range_m = way.norm();
+        if !(NEAREST_M..self.reach_m).contains(&range_m) {
+            return None;
+        }
+        let aspect =
+            if self.effects.aspect { scatterer.aspect.gain(way / range_m) } else { scatterer.aspect.mean_gain() };
+        let in_the_open = scatterer.cross_section_m2 * aspect * self.received(range_m);
+        if in_the_open < NEGLIGIBLE_POWER {
+            return None;
+        }
+        let body = if self.effects.aspect { scatterer.body } else { NO_BODY };
+        let passed = match self.effects.occlusion {
+            true => f64::from(self.skyline.transmission(azimuth, range_m, body)),
+            false => 1.0,
+        };
+        (in_the_open * passed > NEGLIGIBLE_POWER).then(|| (in_the_open * passed).sqrt())
+    }
+
+    /// Power received from 1 m2 at a range: the radar equation, its fourth power tamed near by, and what the air takes.
+    pub fn received(&self, range_m: f64) -> f64 {
+        let spread = range_m * range_m + self.receiver.near_m * self.receiver.near_m;
+        self.receiver.constant / (spread * spread) * self.air.passed(range_m)
+    }
+}
