@@ -147,7 +147,7 @@ fn work(simulator: &Simulator, folder: &Path, next: &AtomicUsize, results: &mpsc
         if index >= simulator.scans() {
             return;
         }
-        simulator.render_into(index, &mut sensor, &mut scan);
+        simulator.render_into(index, &mut sensor, &mut scan.slot());
         let written = write_image(&folder.join(image_name(simulator, index)), STRIDE, AZIMUTHS, &scan.bytes);
         if results.send(written).is_err() {
             return;

@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use gyre_radar::{OwnedScan, ScanLimits};
+use gyre_radar::{OwnedScan, ScanLimits, ScanSlot, SweepGeometry};
 use nalgebra::Isometry2;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
+use crate::profile::{Profile, Sampling};
 use crate::sensor::{self, Sensor, SweepTime};
 use crate::streets::Streets;
 use crate::traffic::Traffic;
@@ -88,20 +89,32 @@ impl Simulator {
         Sensor::new(self.doppler_shift_s)
     }
 
+    /// What memory a scan needs.
+    pub fn limits(&self) -> ScanLimits {
+        let Sampling { azimuths, bins, .. } = self.sampling();
+        ScanLimits { bytes: azimuths * (sensor::METADATA_BYTES + bins), azimuths }
+    }
+
+    /// How the radar samples what it sees.
+    pub fn sampling(&self) -> Sampling {
+        let doppler_s = self.doppler_shift_s;
+        Sampling { range_offset_m: 0.0, period_us: self.period_us, doppler_s, ..Profile::default().sampling() }
+    }
+
     /// Measures scan `index`: the same bytes whenever and on whatever thread it is called.
     pub fn render_scan(&self, index: usize) -> SimulatedScan {
         let mut scan = empty_scan();
-        self.render_into(index, &mut self.sensor(), &mut scan);
+        scan.geometry = self.render_into(index, &mut self.sensor(), &mut scan.slot());
         SimulatedScan { scan, pose: self.pose(index) }
     }
 
-    /// Measures scan `index` into memory that is used again; see [`empty_scan`].
-    pub fn render_into(&self, index: usize, sensor: &mut Sensor, scan: &mut OwnedScan) {
+    /// Measures scan `index` into memory of the caller's, at least as long as [`Simulator::limits`] say, and says how it lies there.
+    pub fn render_into(&self, index: usize, sensor: &mut Sensor, slot: &mut ScanSlot<'_>) -> SweepGeometry {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         // Stream 0 built the town.
         rng.set_stream(index as u64 + 1);
         let (world, trajectory) = (self.world.as_ref(), self.trajectory.as_ref());
-        scan.geometry = sensor.sweep(world, &self.traffic, trajectory, self.time(index), &mut rng, &mut scan.slot());
+        sensor.sweep(world, &self.traffic, trajectory, self.time(index), &mut rng, slot)
     }
 }
 

@@ -54,7 +54,7 @@ fn scan_does_not_depend_on_the_scans_rendered_before_it() {
     let mut sensor = simulator.sensor();
     let mut scan = gyre_simulator::simulator::empty_scan();
     for index in 0..3 {
-        simulator.render_into(index, &mut sensor, &mut scan);
+        simulator.render_into(index, &mut sensor, &mut scan.slot());
     }
     assert_eq!(scan.bytes, alone);
 }
