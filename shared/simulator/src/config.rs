@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::SimulatorError;
 use crate::drive::DriveConfig;
+use crate::output::OutputConfig;
 use crate::sensor::SensorConfig;
 use crate::traffic::TrafficConfig;
 
@@ -23,6 +24,8 @@ pub struct SimulationConfig {
     pub traffic: TrafficConfig,
     /// What measures.
     pub sensor: SensorConfig,
+    /// In which form the scans come out.
+    pub output: OutputConfig,
 }
 
 impl Default for SimulationConfig {
@@ -33,6 +36,7 @@ impl Default for SimulationConfig {
             drive: DriveConfig::default(),
             traffic: TrafficConfig::default(),
             sensor: SensorConfig::default(),
+            output: OutputConfig::default(),
         }
     }
 }

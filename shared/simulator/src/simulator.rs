@@ -45,8 +45,8 @@ impl Simulator {
     pub fn new(config: &SimulationConfig) -> Result<Self, SimulatorError> {
         config.validate()?;
         let trajectory: Arc<dyn Trajectory> = config.drive.trajectory(config.seed)?.into();
-        let drive_s = config.scans as f64 * config.sensor.period_s;
-        let streets = Streets::driven(trajectory.as_ref(), drive_s.min(100.0), 0.0);
+        // Not as far as the scans go: more of them must find the same town.
+        let streets = Streets::driven(trajectory.as_ref(), trajectory.duration_s().min(100.0), 0.0);
         Ok(Self {
             scans: config.scans,
             seed: config.seed,

@@ -38,7 +38,7 @@ fn all_files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 fn same_configuration_writes_the_same_bytes() {
     let (first, second) = (generate(&config(4)), generate(&config(4)));
     assert_eq!(all_files(first.path()), all_files(second.path()));
-    assert_eq!(all_files(first.path()).len(), 4 + 2);
+    assert_eq!(all_files(first.path()).len(), 4 + 5);
 }
 
 #[test]
@@ -64,7 +64,7 @@ fn progress_counts_every_scan_once() {
     let folder = tempfile::tempdir().unwrap();
     let mut seen = Vec::new();
     let summary = write_dataset(&config(3), folder.path(), &mut |done, total| seen.push((done, total))).unwrap();
-    assert_eq!(seen, [(1, 3), (2, 3), (3, 3)]);
+    assert_eq!(seen, [(0, 3), (1, 3), (2, 3), (3, 3)]);
     assert_eq!(summary.scans, 3);
     assert!((summary.duration_s - 0.5).abs() < 1e-9 && summary.path_m > 2.0, "{summary:?}");
 }
