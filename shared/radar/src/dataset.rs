@@ -6,6 +6,7 @@ mod eccentricity;
 mod error;
 mod first_look;
 mod fomo;
+mod image_source;
 mod images;
 mod mulran;
 mod navtech_png;
@@ -22,6 +23,7 @@ use std::path::Path;
 
 use crate::scan::{ScanLimits, ScanSlot, SweepGeometry};
 pub use error::{OpenError, ReadError};
+pub use image_source::ImageSource;
 pub use options::{AzimuthSource, DatasetOptions, Format};
 pub use png_image::ImageSize;
 
@@ -78,7 +80,16 @@ pub trait Dataset: Send {
 /// The format is detected unless `options` names it.
 pub fn open(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
     options.check()?;
-    let found = detect::locate(root, options.format)?;
+    read_as_found(detect::locate(root, options.format)?, options)
+}
+
+/// Opens a recording that lies on no disk: in its own format, unless `options` name another.
+pub fn open_source(source: Box<dyn ImageSource>, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
+    options.check()?;
+    read_as_found(detect::Found::source(source, options.format)?, options)
+}
+
+fn read_as_found(found: detect::Found, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
     Ok(match found.format {
         Format::Oxford => Box::new(oxford::open(found, options)?),
         Format::Oord => Box::new(oxford::open_oord(found, options)?),

@@ -16,7 +16,9 @@ pub mod raster;
 pub mod scan;
 pub mod trajectory;
 
-pub use dataset::{AzimuthSource, Dataset, DatasetOptions, Format, ImageSize, OpenError, ReadError, open};
+pub use dataset::{
+    AzimuthSource, Dataset, DatasetOptions, Format, ImageSize, ImageSource, OpenError, ReadError, open, open_source,
+};
 pub use ground_truth::{TrajectoryError, find_ground_truth, read_trajectory, write_kitti, write_tum};
 pub use inspect::{Report, inspect};
 pub use points::{Point, PointExtractor, PointsConfig, PointsError};

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::SimulatorError;
 use crate::drive::DriveConfig;
+use crate::output::OutputConfig;
 use crate::sensor::{Effects, SensorConfig};
 use crate::traffic::TrafficConfig;
 use crate::weather::WeatherConfig;
@@ -29,6 +30,8 @@ pub struct SimulationConfig {
     /// What the weather is like, and from when on. Default: clear.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub weather: Vec<WeatherConfig>,
+    /// In which form the scans come out.
+    pub output: OutputConfig,
 }
 
 impl Default for SimulationConfig {
@@ -41,6 +44,7 @@ impl Default for SimulationConfig {
             sensor: SensorConfig::default(),
             effects: Effects::default(),
             weather: Vec::new(),
+            output: OutputConfig::default(),
         }
     }
 }

@@ -25,6 +25,24 @@ pub enum SimulatorError {
         /// The first file that does not belong.
         other: String,
     },
+    /// The output folder holds a recording of another configuration.
+    #[error("{} holds a recording of another configuration (its simulation.toml says which): give another folder", folder.display())]
+    OtherRecording {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// An image that is to be kept is not the one that would be written.
+    #[error("{} is not what would be written now: another build made it, or it was changed; give another folder", path.display())]
+    OtherImage {
+        /// The image.
+        path: PathBuf,
+    },
+    /// Two at once would mix.
+    #[error("another process is writing to {}: wait for it, or give another folder", folder.display())]
+    Busy {
+        /// The folder.
+        folder: PathBuf,
+    },
     /// A file or folder could not be written.
     #[error("cannot write {}: {source}", path.display())]
     Write {

@@ -185,9 +185,8 @@ fn write_spoilt(
     if dataset.on_their_side() {
         scan.bytes = transposed(&powers, geometry.bins);
     }
-    let size = dataset.image_size();
     let path = folder.join(dataset.file(index).file_name().unwrap_or_default());
-    write_image(&path, size.width, size.height, &scan.bytes)
+    write_image(&path, dataset.image_size(), &scan.bytes, &mut Vec::new())
 }
 
 fn read(dataset: &mut dyn Dataset, index: usize) -> Result<OwnedScan, SimulatorError> {

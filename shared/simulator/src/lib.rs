@@ -1,7 +1,7 @@
 //! A small honest radar simulator for demonstrations and tests.
 //!
-//! A vehicle with a spinning radar drives around a block of a procedural town; what comes out is a dataset
-//! in Oxford Radar RobotCar's layout with exact ground truth. In the order in which the data come about:
+//! A vehicle with a spinning radar drives through a procedural town; what comes out is a recording in Oxford's, Boreas' or RADIATE's
+//! form with exact ground truth, on a disk or straight into a pipeline. In the order in which the data come about:
 //!
 //! - [`config`]: what to simulate,
 //! - [`drive`], [`trajectory`]: which way is taken, and where the sensor is at any instant,
@@ -11,7 +11,8 @@
 //! - [`profile`]: the radars, [`weather`]: rain, fog and snow,
 //! - [`sensor`]: what a sweep measures of it,
 //! - [`simulator`]: one scan at a time, with its exact pose,
-//! - [`oxford_writer`]: the dataset on disk,
+//! - [`output`], [`recording`], [`truth`]: the drive as a recording of a dataset's form,
+//! - [`writer`]: that on a disk,
 //! - [`faults`]: the same, or a real one, spoilt on purpose.
 //!
 //! ```
@@ -30,25 +31,31 @@ pub mod drive;
 pub mod error;
 pub mod faults;
 mod image;
+mod layout;
 pub mod occlusion;
-pub mod oxford_writer;
+pub mod output;
 pub mod profile;
+pub mod recording;
 pub mod sensor;
 pub mod simulator;
 pub mod streets;
 pub mod town;
 pub mod traffic;
 pub mod trajectory;
+pub mod truth;
 pub mod weather;
 pub mod world;
+pub mod writer;
 
 pub use config::SimulationConfig;
 pub use error::SimulatorError;
 pub use faults::{Fault, FaultPlan, write_faulty};
-pub use oxford_writer::{Summary, write_dataset};
+pub use output::{HostStamps, OutputFormat};
 pub use profile::{Profile, Sampling};
+pub use recording::{Recording, Renderer};
 pub use sensor::{Effects, Scene, Sensor, SensorConfig, SweepTime};
 pub use simulator::{SimulatedScan, Simulator};
 pub use streets::{Street, Streets};
 pub use trajectory::{BlockLoop, ConstantTwist, Trajectory};
 pub use world::{Body, Movers, Moving, World};
+pub use writer::{Summary, write_dataset, write_dataset_on};

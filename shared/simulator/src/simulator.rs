@@ -43,8 +43,8 @@ impl Simulator {
         config.validate()?;
         let trajectory: Arc<dyn Trajectory> = config.drive.trajectory(config.seed)?.into();
         let sampling = config.sensor.sampling();
-        let drive_s = config.scans as f64 * sampling.period_us as f64 * 1e-6;
-        let streets = Streets::driven(trajectory.as_ref(), drive_s.min(100.0), 0.0);
+        // Not as far as the scans go: more of them must find the same town.
+        let streets = Streets::driven(trajectory.as_ref(), trajectory.duration_s().min(100.0), 0.0);
         Ok(Self {
             config: config.clone(),
             sampling,

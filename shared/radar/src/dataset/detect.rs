@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::error::OpenError;
 use super::first_look::{FirstLook, NamedBy};
+use super::image_source::ImageSource;
 use super::images::{Images, has_png};
 use super::options::Format;
 
@@ -17,6 +18,17 @@ pub(crate) struct Found {
     pub(crate) images: Images,
     /// How the format was decided, where that is worth saying.
     pub(crate) notes: Vec<String>,
+    /// The list of stamps, where it lies in no file.
+    pub(crate) stamps: Option<String>,
+}
+
+impl Found {
+    /// A recording that lies in no folder.
+    pub(crate) fn source(source: Box<dyn ImageSource>, forced: Option<Format>) -> Result<Self, OpenError> {
+        let format = forced.unwrap_or(source.format());
+        let (folder, stamps) = (source.folder(), source.stamps());
+        Ok(Self { format, folder, images: Images::of(source)?, notes: Vec::new(), stamps })
+    }
 }
 
 /// Where each format keeps its images, below the root.
@@ -43,7 +55,7 @@ pub(crate) fn locate(root: &Path, forced: Option<Format>) -> Result<Found, OpenE
         Some(format) => (format, Vec::new()),
         None => by_image(root, &folder, &mut images)?,
     };
-    Ok(Found { format, folder, images, notes })
+    Ok(Found { format, folder, images, notes, stamps: None })
 }
 
 fn check_folder(root: &Path) -> Result<(), OpenError> {

@@ -1,21 +1,35 @@
 //! The images of a dataset: which files, in which order, how large.
 
+use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::error::{OpenError, ReadError};
+use super::image_source::ImageSource;
 use super::png_image::{self, ImageReader, ImageSize};
 use super::stamp;
 
 /// Images that are tried for one that can be read, when the first ones are damaged.
 const FIRST_TRIES: usize = 8;
 
-/// Image files in the order of their numbers, all of the first one's size.
+/// Images in the order of their numbers, all of the first one's size.
 #[derive(Debug)]
 pub(crate) struct Images {
     files: Vec<PathBuf>,
     pub(crate) size: ImageSize,
-    pub(crate) reader: ImageReader,
+    origin: Origin,
+}
+
+/// Where an image's pixels come from.
+enum Origin {
+    Files(ImageReader),
+    Source(Box<dyn ImageSource>),
+}
+
+impl fmt::Debug for Origin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if matches!(self, Self::Files(_)) { "Files" } else { "Source" })
+    }
 }
 
 impl Images {
@@ -27,7 +41,16 @@ impl Images {
         };
         let size = png_image::read_size(first)
             .or_else(|error| files.iter().take(FIRST_TRIES).find_map(|f| png_image::read_size(f).ok()).ok_or(error))?;
-        Ok(Self { files, size, reader: ImageReader::default() })
+        Ok(Self { files, size, origin: Origin::Files(ImageReader::default()) })
+    }
+
+    /// Images that lie in no folder.
+    pub(crate) fn of(source: Box<dyn ImageSource>) -> Result<Self, OpenError> {
+        let (files, size) = (source.files(), source.size());
+        match files.is_empty() {
+            true => Err(OpenError::NoImages { path: source.folder() }),
+            false => Ok(Self { files, size, origin: Origin::Source(source) }),
+        }
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -52,7 +75,15 @@ impl Images {
     pub(crate) fn decode(&mut self, index: usize, pixels: &mut [u8]) -> Result<(), ReadError> {
         let len = self.files.len();
         let path = self.files.get(index).ok_or(ReadError::NoSuchScan { index, len })?;
-        self.reader.decode(path, self.size, pixels)
+        let (room, needed) = (pixels.len(), self.size.bytes());
+        let pixels = pixels.get_mut(..needed).ok_or(ReadError::SlotTooSmall { what: "bytes", needed, actual: room })?;
+        match &mut self.origin {
+            Origin::Files(reader) => reader.decode(path, self.size, pixels),
+            Origin::Source(source) => {
+                source.draw(index, pixels);
+                Ok(())
+            }
+        }
     }
 
     /// The first image that can be decoded, with its index.

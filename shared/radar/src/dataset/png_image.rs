@@ -106,19 +106,13 @@ pub(crate) struct ImageReader {
 }
 
 impl ImageReader {
-    /// Decodes `path`, which must be of size `expected`, into the first `expected.bytes()` of `pixels`, row by row.
+    /// Decodes `path`, which must be of size `expected`, into `pixels`, `expected.bytes()` of them, row by row.
     pub(crate) fn decode(&mut self, path: &Path, expected: ImageSize, pixels: &mut [u8]) -> Result<(), ReadError> {
         self.load(path)?;
         let actual = parse_header(path, &self.file[..self.file.len().min(HEADER_BYTES)])?;
         if actual != expected {
             return Err(ReadError::WrongSize { path: path.to_owned(), actual, expected });
         }
-        let room = pixels.len();
-        let pixels = pixels.get_mut(..expected.bytes()).ok_or(ReadError::SlotTooSmall {
-            what: "bytes",
-            needed: expected.bytes(),
-            actual: room,
-        })?;
         self.inflate(pixels).map_err(|e| self.decoding_error(path, e))
     }
 

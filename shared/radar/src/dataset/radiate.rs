@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::Dataset;
 use super::detect::Found;
@@ -38,7 +38,9 @@ pub(crate) struct Radiate {
 impl Radiate {
     pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<Self, OpenError> {
         let list = found.folder.with_extension("txt");
-        let (stamps, unpadded) = read_stamps(&list)?;
+        let io_error = |source| OpenError::Io { path: list.clone(), source };
+        let text = found.stamps.clone().map_or_else(|| fs::read_to_string(&list).map_err(io_error), Ok)?;
+        let (stamps, unpadded) = parse_stamps(&list, &text)?;
         let (scans, mut notes) = SidewaysScans::open(found, options, |bins| RANGE_M / bins as f32)?;
         let received =
             (0..scans.images.len()).map(|i| receipt(&scans, i, &stamps, &list)).collect::<Result<Vec<_>, _>>()?;
@@ -96,12 +98,11 @@ fn receipt(
 }
 
 /// Times by frame number, and how many of them leave out leading zeros.
-fn read_stamps(path: &PathBuf) -> Result<(BTreeMap<i64, i64>, usize), OpenError> {
-    let text = fs::read_to_string(path).map_err(|source| OpenError::Io { path: path.clone(), source })?;
+fn parse_stamps(path: &Path, text: &str) -> Result<(BTreeMap<i64, i64>, usize), OpenError> {
     let (mut stamps, mut unpadded) = (BTreeMap::new(), 0);
     for (line, content) in text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty()) {
         let (frame, ns, digits) = parse_line(content).ok_or_else(|| OpenError::Text {
-            path: path.clone(),
+            path: path.to_owned(),
             line: line + 1,
             reason: format!(
                 "{content:?} is not `Frame: <number> Time: <seconds>.<nanoseconds>` of the years 2015 to 2040"

@@ -1,0 +1,119 @@
+//! RADIATE: `Navtech_Polar/000001.png`, range downwards and azimuth to the right, no metadata; and `Navtech_Polar.txt` with the times
+//! at which the host received the scans. There is no truth of its own form that could be exact: `ground_truth.tum` stands in.
+
+use std::fmt::Write as _;
+
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::output::HostStamps;
+use crate::{Simulator, SimulatorError};
+
+pub(crate) const FOLDER: &str = "Navtech_Polar";
+
+/// Periods among which a reader looks for the sensor's clock, microseconds.
+const PERIODS_US: std::ops::RangeInclusive<i64> = 200_000..=300_000;
+/// Scans in which the host stalls once: seven times in 466 scans of a recording.
+const STALL_EVERY: usize = 64;
+/// How long it stalls, seconds.
+const STALL_S: std::ops::Range<f64> = 0.3..1.4;
+/// Time from scan to scan when it catches up, microseconds.
+const CATCH_UP_US: i64 = 5_000;
+
+/// Refuses radars that this format's readers cannot know.
+pub(crate) fn check(simulator: &Simulator) -> Result<(), SimulatorError> {
+    let sampling = simulator.sampling();
+    match PERIODS_US.contains(&sampling.period_us) && sampling.bins > sampling.azimuths {
+        true => Ok(()),
+        false => Err(SimulatorError::Config {
+            key: "output.format",
+            value: "radiate".to_owned(),
+            expected: format!(
+                "another one for {} azimuths x {} bins in {} us: its readers know radars of more bins than azimuths and of 0.2 to 0.3 s a turn",
+                sampling.azimuths, sampling.bins, sampling.period_us
+            ),
+        }),
+    }
+}
+
+pub(crate) fn file_name(index: usize) -> String {
+    format!("{:06}.png", index + 1)
+}
+
+/// The scan's time, nanoseconds since 1970: the mean of its columns', spread evenly over a turn.
+pub(crate) fn stamp_ns(simulator: &Simulator, index: usize) -> i64 {
+    let (time, azimuths) = (simulator.time(index), simulator.sampling().azimuths as i64);
+    time.start_us * 1000 + time.period_us * 1000 * (azimuths - 1) / (2 * azimuths)
+}
+
+/// `Navtech_Polar.txt`: nanoseconds stand behind the dot *without leading zeros*.
+pub(crate) fn stamps(simulator: &Simulator, host: HostStamps, seed: u64) -> String {
+    let mut text = String::new();
+    for index in 0..simulator.scans() {
+        let received_us = simulator.time(index).start_us + delay_us(simulator, host, seed, index);
+        let (seconds, rest_us) = (received_us / 1_000_000, received_us % 1_000_000);
+        let _ = writeln!(text, "Frame: {:06} Time: {seconds}.{}", index + 1, rest_us * 1000);
+    }
+    text
+}
+
+/// How late the host is with a scan, microseconds; the least delay there is counts as none.
+fn delay_us(simulator: &Simulator, host: HostStamps, seed: u64, index: usize) -> i64 {
+    if host == HostStamps::Even {
+        return 0;
+    }
+    let block = index / STALL_EVERY;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    // From the far end: scans count their streams from the near one.
+    rng.set_stream(u64::MAX - block as u64);
+    let begins = block * STALL_EVERY + rng.random_range(8..STALL_EVERY / 2);
+    let ends_us = simulator.time(begins).start_us + (rng.random_range(STALL_S) * 1e6) as i64;
+    let Some(waited) = index.checked_sub(begins) else { return 0 };
+    let handed_over_us = ends_us + waited as i64 * CATCH_UP_US;
+    (handed_over_us - simulator.time(index).start_us).max(0)
+}
+
+/// Lays rows of `stride` bytes on their side: `into[bin][azimuth] = rows[azimuth][first_byte + bin]`.
+pub(crate) fn lay_on_side(rows: &[u8], stride: usize, first_byte: usize, into: &mut [u8]) {
+    let azimuths = rows.len() / stride;
+    // Rows by eights: each line of the image is then written in runs.
+    for (group, rows) in rows.chunks(8 * stride).enumerate() {
+        for (bin, line) in into.chunks_exact_mut(azimuths).enumerate() {
+            for (row, to) in rows.chunks_exact(stride).zip(&mut line[8 * group..]) {
+                *to = row[first_byte + bin];
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::SimulationConfig;
+
+    #[test]
+    fn a_host_that_stalls_is_late_by_up_to_its_stall_and_never_hands_over_backwards() {
+        let simulator = Simulator::new(&SimulationConfig { scans: 400, ..SimulationConfig::default() }).unwrap();
+        let late: Vec<i64> = (0..400).map(|i| delay_us(&simulator, HostStamps::Stalling, 3, i)).collect();
+        let received: Vec<i64> = (0..400).map(|i| simulator.time(i).start_us + late[i]).collect();
+        assert!(received.windows(2).all(|w| w[0] < w[1]));
+        let worst = late.iter().copied().max().unwrap();
+        assert!((600_000..1_400_000).contains(&worst), "{worst}");
+        let on_time = late.iter().filter(|late| **late == 0).count();
+        assert!((330..396).contains(&on_time), "{on_time}");
+    }
+
+    #[test]
+    fn laying_on_side_is_a_transposition_without_the_metadata() {
+        let (azimuths, bins, first) = (21, 13, 2);
+        let rows: Vec<u8> = (0..azimuths * (bins + first)).map(|i| (i * 7 % 251) as u8).collect();
+        let mut into = vec![0; azimuths * bins];
+        lay_on_side(&rows, bins + first, first, &mut into);
+        for azimuth in 0..azimuths {
+            for bin in 0..bins {
+                assert_eq!(into[bin * azimuths + azimuth], rows[azimuth * (bins + first) + first + bin]);
+            }
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! A recording on disk: written on all processors, the same bytes whatever their number, and gone on with where it was cut short.
+
+mod resume;
+
+use std::fs::{self, File};
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc;
+
+use gyre_radar::ImageSource as _;
+
+use crate::image::{write_image, write_whole};
+use crate::recording::Recording;
+use crate::{SimulationConfig, SimulatorError};
+
+pub use resume::MADE_BY;
+
+/// What was written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Summary {
+    /// The dataset's folder.
+    pub folder: PathBuf,
+    /// Scans in it.
+    pub scans: usize,
+    /// Those of them that were there already.
+    pub kept: usize,
+    /// Length of the path from the first scan to the last, metres (as a chain of straight motions).
+    pub path_m: f64,
+    /// Time from the first scan to the last, seconds.
+    pub duration_s: f64,
+}
+
+/// [`write_dataset_on`] all processors.
+pub fn write_dataset(
+    config: &SimulationConfig,
+    out: &Path,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<Summary, SimulatorError> {
+    write_dataset_on(std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN), config, out, progress)
+}
+
+/// Writes the recording of `config` to the folder `out` on `threads` threads, and calls `progress(done, total)` as it grows.
+///
+/// The files are the same, byte for byte, for the same configuration and any number of threads. What an earlier call with the same
+/// configuration left is kept, be it cut short or of fewer scans; of that the first and the last image are compared with what would be
+/// written now.
+///
+/// # Errors
+/// [`SimulatorError`] where `out` holds another recording or images of unknown origin, another process writes to it, or it cannot be
+/// written.
+pub fn write_dataset_on(
+    threads: NonZeroUsize,
+    config: &SimulationConfig,
+    out: &Path,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<Summary, SimulatorError> {
+    let recording = Recording::new(config)?;
+    let images = out.join(recording.image_folder());
+    fs::create_dir_all(&images).map_err(SimulatorError::write(&images))?;
+    let _alone = lock(out)?;
+    let missing = resume::missing(&recording, config, out)?;
+    write_whole(&out.join(MADE_BY), resume::made_by(&recording, config)?.as_bytes())?;
+    write_side_files(&recording, out)?;
+    let kept = recording.scans() - missing.len();
+    progress(kept, recording.scans());
+    let mut written = |done| progress(kept + done, recording.scans());
+    write_images(&recording, &missing, threads.get(), &images, &mut written)?;
+    Ok(summary(&recording, out, kept))
+}
+
+/// The folder for this process alone, until what is returned is dropped.
+fn lock(folder: &Path) -> Result<File, SimulatorError> {
+    let handle = File::open(folder).map_err(SimulatorError::write(folder))?;
+    match handle.try_lock() {
+        Ok(()) => Ok(handle),
+        Err(fs::TryLockError::WouldBlock) => Err(SimulatorError::Busy { folder: folder.to_owned() }),
+        Err(fs::TryLockError::Error(source)) => Err(SimulatorError::Write { path: folder.to_owned(), source }),
+    }
+}
+
+fn summary(recording: &Recording, out: &Path, kept: usize) -> Summary {
+    let simulator = recording.simulator();
+    let last = simulator.scans() - 1;
+    let step_m = |i: usize| (simulator.pose(i).inverse() * simulator.pose(i + 1)).translation.vector.norm();
+    Summary {
+        folder: out.to_owned(),
+        scans: simulator.scans(),
+        kept,
+        path_m: (0..last).map(step_m).sum(),
+        duration_s: (simulator.time(last).start_us - simulator.time(0).start_us) as f64 * 1e-6,
+    }
+}
+
+fn write_side_files(recording: &Recording, out: &Path) -> Result<(), SimulatorError> {
+    for (name, bytes) in recording.side_files() {
+        let path = out.join(name);
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder).map_err(SimulatorError::write(folder))?;
+        }
+        write_whole(&path, &bytes)?;
+    }
+    Ok(())
+}
+
+/// Renders and writes the scans in `missing`, each thread taking the next one that nobody has taken.
+fn write_images(
+    recording: &Recording,
+    missing: &[usize],
+    threads: usize,
+    folder: &Path,
+    progress: &mut dyn FnMut(usize),
+) -> Result<(), SimulatorError> {
+    let next = AtomicUsize::new(0);
+    let (sender, results) = mpsc::channel();
+    std::thread::scope(|scope| {
+        for _ in 0..threads.min(missing.len()) {
+            let (sender, next) = (sender.clone(), &next);
+            scope.spawn(move || work(recording, folder, missing, next, &sender));
+        }
+        drop(sender);
+        let mut outcome = Ok(());
+        for (done, result) in results.iter().enumerate() {
+            if result.is_err() && outcome.is_ok() {
+                // Nobody takes another scan; those under way end.
+                next.store(missing.len(), Ordering::Relaxed);
+                outcome = result;
+            }
+            progress(done + 1);
+        }
+        outcome
+    })
+}
+
+fn work(
+    recording: &Recording,
+    folder: &Path,
+    missing: &[usize],
+    next: &AtomicUsize,
+    results: &mpsc::Sender<Result<(), SimulatorError>>,
+) {
+    let (mut renderer, size) = (recording.renderer(), recording.image_size());
+    let (mut pixels, mut encoded) = (vec![0; size.bytes()], Vec::new());
+    while let Some(&index) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
+        renderer.draw(index, &mut pixels);
+        let written = write_image(&folder.join(recording.image_name(index)), size, &pixels, &mut encoded);
+        if results.send(written).is_err() {
+            return;
+        }
+    }
+}

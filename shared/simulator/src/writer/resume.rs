@@ -1,0 +1,102 @@
+//! Whether a folder may be gone on with, and what it lacks.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io::ErrorKind;
+use std::path::Path;
+
+use gyre_radar::ImageSource as _;
+
+use crate::image::{PART, encode};
+use crate::recording::Recording;
+use crate::{SimulationConfig, SimulatorError};
+
+/// The file that says what made a recording: its configuration.
+pub const MADE_BY: &str = "simulation.toml";
+
+/// Content of [`MADE_BY`].
+pub(super) fn made_by(recording: &Recording, config: &SimulationConfig) -> Result<String, SimulatorError> {
+    let options = to_toml(&recording.dataset_options())?;
+    let options: String = options.lines().map(|line| format!("#   {line}\n")).collect();
+    let text = to_toml(config)?;
+    Ok(format!(
+        "# A simulated recording. Read with these keys of [dataset] it is true to its radar:\n{options}\n{text}"
+    ))
+}
+
+fn to_toml(value: &impl serde::Serialize) -> Result<String, SimulatorError> {
+    toml::to_string(value).map_err(|error| SimulatorError::Config {
+        key: "simulation",
+        value: error.to_string(),
+        expected: "something that can be written as TOML".to_owned(),
+    })
+}
+
+/// The scans that `out` lacks; refuses a folder that would become a mixture.
+pub(super) fn missing(
+    recording: &Recording,
+    config: &SimulationConfig,
+    out: &Path,
+) -> Result<Vec<usize>, SimulatorError> {
+    let folder = out.join(recording.image_folder());
+    let names: Vec<String> = (0..recording.scans()).map(|index| recording.image_name(index)).collect();
+    let there = images(&folder)?;
+    let made_by_this = made_by_this(config, out)?;
+    let ours: BTreeSet<&str> = names.iter().map(String::as_str).collect();
+    if let Some(other) = there.iter().find(|name| !made_by_this || !ours.contains(name.as_str())) {
+        return Err(SimulatorError::OutputInUse { folder, other: other.clone() });
+    }
+    let (kept, missing): (Vec<usize>, Vec<usize>) = (0..names.len()).partition(|&i| there.contains(&names[i]));
+    let ends = kept.first().into_iter().chain(kept.last().filter(|_| kept.len() > 1));
+    ends.copied().try_for_each(|index| require_same(recording, index, &folder.join(&names[index])))?;
+    Ok(missing)
+}
+
+/// The complete images; what was begun and not completed is removed.
+fn images(folder: &Path) -> Result<BTreeSet<String>, SimulatorError> {
+    let listing = |source| SimulatorError::List { folder: folder.to_owned(), source };
+    let mut names = BTreeSet::new();
+    for entry in fs::read_dir(folder).map_err(listing)? {
+        let entry = entry.map_err(listing)?;
+        match entry.path().extension().is_some_and(|extension| extension == PART) {
+            true => fs::remove_file(entry.path()).map_err(SimulatorError::write(&entry.path()))?,
+            false => _ = names.insert(entry.file_name().to_string_lossy().into_owned()),
+        }
+    }
+    Ok(names)
+}
+
+/// Whether `out` was made by `config`, but for how many scans and how they are played; false where nothing says what made it.
+fn made_by_this(config: &SimulationConfig, out: &Path) -> Result<bool, SimulatorError> {
+    let path = out.join(MADE_BY);
+    let text = match fs::read_to_string(&path) {
+        Ok(text) => text,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(false),
+        Err(source) => return Err(SimulatorError::Write { path, source }),
+    };
+    let found: Option<SimulationConfig> = toml::from_str(&text).ok();
+    match found.is_some_and(|found| same_scans(&found) == same_scans(config)) {
+        true => Ok(true),
+        false => Err(SimulatorError::OtherRecording { folder: out.to_owned() }),
+    }
+}
+
+/// The configuration without what the content of a scan does not depend on.
+fn same_scans(config: &SimulationConfig) -> SimulationConfig {
+    let mut config = SimulationConfig { scans: 1, ..config.clone() };
+    config.output.store = false;
+    config
+}
+
+/// Another build may render otherwise, and an image may have been changed.
+fn require_same(recording: &Recording, index: usize, path: &Path) -> Result<(), SimulatorError> {
+    let size = recording.image_size();
+    let (mut pixels, mut encoded) = (vec![0; size.bytes()], Vec::new());
+    recording.renderer().draw(index, &mut pixels);
+    encode(size, &pixels, &mut encoded).map_err(|source| SimulatorError::Encode { path: path.to_owned(), source })?;
+    let found = fs::read(path).map_err(SimulatorError::write(path))?;
+    match found == encoded {
+        true => Ok(()),
+        false => Err(SimulatorError::OtherImage { path: path.to_owned() }),
+    }
+}
