@@ -31,6 +31,7 @@ pub mod drive;
 pub mod error;
 pub mod faults;
 mod image;
+mod interpolate;
 mod layout;
 pub mod occlusion;
 pub mod output;

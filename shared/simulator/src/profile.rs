@@ -69,9 +69,11 @@ pub struct Receiver {
     pub beam_rad: f64,
     /// Range resolution of the window: between two independent cells, metres.
     pub cell_m: f64,
-    /// Power received from 1 m2 at 1 m if there were no near field, in the receiver's units.
+    /// Power received from 1 m2 is this over the fourth power of range far away, in the receiver's units.
     pub constant: f64,
-    /// Range below which the fall-off flattens, metres: the antenna looks over what is near, the receiver filters it.
+    /// Range below which it falls with the square only, metres: an FMCW receiver filters low beat frequencies.
+    pub filter_m: f64,
+    /// Range below which it does not fall at all, metres: the antenna looks over what is near.
     pub near_m: f64,
     /// Power at which the receiver saturates, in its units.
     pub full_scale: f32,
@@ -85,6 +87,12 @@ pub struct Receiver {
 }
 
 impl Receiver {
+    /// Power received from 1 m2 at a range.
+    pub fn sensitivity(&self, range_m: f64) -> f64 {
+        let square = range_m * range_m;
+        self.constant / ((square + self.near_m * self.near_m) * (square + self.filter_m * self.filter_m))
+    }
+
     /// Wavelength of the carrier, metres.
     pub fn wavelength_m(&self) -> f64 {
         0.299_792_458 / self.carrier_ghz
@@ -184,8 +192,9 @@ impl Profile {
             carrier_ghz: 76.5,
             beam_rad: 1.27f64.to_radians(),
             cell_m: 0.24,
-            constant: 1.5e10,
-            near_m: 15.0,
+            constant: 7.0e10,
+            filter_m: 60.0,
+            near_m: 8.0,
             full_scale: 1.0e7,
             whole_powers: true,
             floor_db: &OXFORD_FLOOR,
@@ -194,7 +203,7 @@ impl Profile {
         match self {
             Self::Cts350xOxford => oxford,
             Self::Cts350xRadiate => Receiver {
-                constant: 1.3e11,
+                constant: 6.0e11,
                 full_scale: 2.0e8,
                 whole_powers: false,
                 floor_db: &RADIATE_FLOOR,
@@ -202,9 +211,9 @@ impl Profile {
                 ..oxford
             },
             // No scan of it at hand: Oxford's, with the longer cell of its smaller bandwidth.
-            Self::Cir204h => Receiver { cell_m: 0.33, constant: 3.0e10, ..oxford },
+            Self::Cir204h => Receiver { cell_m: 0.33, constant: 1.4e11, ..oxford },
             Self::Ras6 => Receiver {
-                constant: 1.3e11,
+                constant: 6.0e11,
                 full_scale: 1.0e8,
                 floor_db: &RAS6_FLOOR,
                 ringing_db: &RAS6_RINGING,
@@ -215,8 +224,8 @@ impl Profile {
                 carrier_ghz: 24.0,
                 beam_rad: 2.6f64.to_radians(),
                 cell_m: 0.75,
-                constant: 2.0e9,
-                near_m: 10.0,
+                constant: 1.0e10,
+                filter_m: 40.0,
                 whole_powers: false,
                 floor_db: &K2PI_FLOOR,
                 ringing_db: &[],

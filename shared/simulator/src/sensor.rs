@@ -7,7 +7,7 @@
 //! - `echoes`, `ghosts`: what can be seen, directly and mirrored, and how strongly; `air`: what the weather takes,
 //! - `antenna`: how much of it each azimuth's beam takes in,
 //! - `spectrum`: what range processing and quantisation make of it,
-//! - `noise`: all that no echo explains,
+//! - `carrier`: what turns with the radar, its ringing and its vehicle; `noise`: all that no echo explains,
 //! - `effects`: each of these on or off.
 //!
 //! Echoes are summed as complex amplitudes with the phase of their true path, so that scatterers in one resolution
@@ -15,6 +15,7 @@
 
 mod air;
 mod antenna;
+mod carrier;
 mod config;
 mod echoes;
 pub mod effects;
@@ -34,6 +35,7 @@ use rand_distr::StandardNormal;
 
 use self::air::Air;
 use self::antenna::Antenna;
+use self::carrier::Carrier;
 pub use self::config::SensorConfig;
 use self::echoes::{Echo, NEGLIGIBLE_POWER, View};
 pub use self::effects::Effects;
@@ -100,12 +102,14 @@ pub struct Scene<'a> {
 #[derive(Clone, Debug)]
 pub struct Sensor {
     config: SensorConfig,
+    seed: u64,
     effects: Effects,
     sampling: Sampling,
     receiver: Receiver,
     antenna: Antenna,
     spectrum: RangeSpectrum,
     noise: Noise,
+    carrier: Carrier,
     stations: Stations,
     skyline: Skyline,
     echoes: Vec<Echo>,
@@ -116,14 +120,16 @@ pub struct Sensor {
 }
 
 impl Sensor {
-    /// A radar that has seen nothing yet.
-    pub fn new(config: &SensorConfig, effects: &Effects) -> Self {
+    /// A radar that has seen nothing yet. All its randomness comes from `seed`.
+    pub fn new(config: &SensorConfig, effects: &Effects, seed: u64) -> Self {
         let (sampling, receiver) = (config.sampling(), config.profile.receiver());
         let spectrum = RangeSpectrum::new(sampling.bins, sampling.range_resolution_m, &receiver);
         Self {
             antenna: Antenna::new(receiver.beam_rad, effects.side_lobes),
             noise: Noise::new(&sampling, &receiver, effects, &spectrum),
+            carrier: Carrier::new(&sampling, &receiver, effects, &spectrum, seed),
             spectrum,
+            seed,
             stations: Stations::default(),
             skyline: Skyline::default(),
             echoes: Vec::new(),
@@ -144,16 +150,9 @@ impl Sensor {
 
     /// Measures one sweep into `slot` and says how it lies there: rows of [`METADATA_BYTES`], then powers, as in an Oxford image.
     ///
-    /// All randomness comes from `seed` and `index`, the number of the scan.
-    pub fn sweep(
-        &mut self,
-        scene: Scene<'_>,
-        time: SweepTime,
-        seed: u64,
-        index: u64,
-        slot: &mut ScanSlot<'_>,
-    ) -> SweepGeometry {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    /// Its randomness comes from the radar's seed and `index`, the number of the scan.
+    pub fn sweep(&mut self, scene: Scene<'_>, time: SweepTime, index: u64, slot: &mut ScanSlot<'_>) -> SweepGeometry {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         rng.set_stream(index + 1);
         self.look_around(scene, time, &mut rng);
         for azimuth in 0..self.sampling.azimuths {
@@ -258,14 +257,15 @@ impl Sensor {
             }
             self.noise.note(measured_m, amplitude * amplitude);
         }
-        self.noise.add(&mut self.spectrum, azimuth, self.effects.phase_noise, rng);
+        self.carrier.add(&mut self.spectrum, azimuth);
+        self.noise.add(&mut self.spectrum, azimuth, rng);
     }
 
     fn doppler_s(&self, azimuth: usize) -> f64 {
         match self.sampling.chirp {
             Chirp::Rising => self.sampling.doppler_s,
             Chirp::Falling => -self.sampling.doppler_s,
-            Chirp::Alternating if azimuth % 2 == 0 => self.sampling.doppler_s,
+            Chirp::Alternating if azimuth.is_multiple_of(2) => self.sampling.doppler_s,
             Chirp::Alternating => -self.sampling.doppler_s,
         }
     }
@@ -275,7 +275,9 @@ impl Sensor {
         let row = &mut slot.bytes[azimuth * stride..(azimuth + 1) * stride];
         let (stamp_us, encoder) = (time.stamp_us(azimuth), self.sampling.encoder_count(azimuth));
         let (state, flags) = match self.sampling.chirp {
-            Chirp::Alternating if azimuth % 2 == 0 => (255, flag::MEASURED | flag::CHIRP_KNOWN | flag::CHIRP_UP),
+            Chirp::Alternating if azimuth.is_multiple_of(2) => {
+                (255, flag::MEASURED | flag::CHIRP_KNOWN | flag::CHIRP_UP)
+            }
             Chirp::Alternating => (0, flag::MEASURED | flag::CHIRP_KNOWN),
             _ => (255, flag::MEASURED),
         };

@@ -93,7 +93,7 @@ impl Simulator {
 
     /// A radar as configured, for [`Simulator::render_into`].
     pub fn sensor(&self) -> Sensor {
-        Sensor::new(&self.config.sensor, &self.config.effects)
+        Sensor::new(&self.config.sensor, &self.config.effects, self.config.seed)
     }
 
     /// What memory one scan needs.
@@ -117,6 +117,6 @@ impl Simulator {
             trajectory: self.trajectory.as_ref(),
             weather: WeatherConfig::at(&self.config.weather, time.trajectory_s(time.start_us)),
         };
-        sensor.sweep(scene, time, self.config.seed, index as u64, slot)
+        sensor.sweep(scene, time, index as u64, slot)
     }
 }

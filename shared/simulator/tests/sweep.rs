@@ -50,7 +50,7 @@ fn sweep_with(
     let time = SweepTime { start_us: 1_500_000_000_000_000, period_us, azimuths, epoch_us: 1_500_000_000_000_000 };
     let mut scan = OwnedScan::with_limits(ScanLimits { bytes: azimuths * config.sampling().stride(), azimuths });
     let scene = Scene { world: &World::new(content), movers: &(), trajectory, weather };
-    scan.geometry = Sensor::new(config, effects).sweep(scene, time, 7, 0, &mut scan.slot());
+    scan.geometry = Sensor::new(config, effects, 7).sweep(scene, time, 0, &mut scan.slot());
     scan
 }
 

@@ -1,5 +1,7 @@
 //! The antenna's pattern, there and back.
 
+use crate::interpolate::interpolate;
+
 /// Side lobes, there and back: dB below the middle of the beam at so many half-power widths beside it.
 ///
 /// The envelope measured on Oxford's, RADIATE's and Boreas-RT's scans: medians of the azimuths beside isolated strong echoes.
@@ -24,7 +26,8 @@ impl Antenna {
         let power = |widths: f64| {
             // One half at half a width.
             let main_db = -12.04 * widths * widths;
-            let db = if side_lobes { main_db.max(side_lobe_db(widths)) } else { main_db };
+            let db =
+                if side_lobes { main_db.max(interpolate(&SIDE_LOBES, widths).unwrap_or(main_db)) } else { main_db };
             10f64.powf(db / 10.0)
         };
         let entries = (REACH * STEPS) as usize + 1;
@@ -43,12 +46,6 @@ impl Antenna {
         let beyond = self.amplitudes.partition_point(|&gain| f64::from(gain) >= least);
         beyond as f64 / self.scale
     }
-}
-
-fn side_lobe_db(widths: f64) -> f64 {
-    let next = SIDE_LOBES.partition_point(|lobe| lobe.0 <= widths).clamp(1, SIDE_LOBES.len() - 1);
-    let ((x0, y0), (x1, y1)) = (SIDE_LOBES[next - 1], SIDE_LOBES[next]);
-    y0 + (y1 - y0) * (widths - x0) / (x1 - x0)
 }
 
 #[cfg(test)]

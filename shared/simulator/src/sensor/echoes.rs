@@ -98,9 +98,8 @@ impl View<'_> {
         (in_the_open * passed > NEGLIGIBLE_POWER).then(|| (in_the_open * passed).sqrt())
     }
 
-    /// Power received from 1 m2 at a range: the radar equation, its fourth power tamed near by, and what the air takes.
+    /// Power received from 1 m2 at a range: the fourth power of range, and the receiver's gain, which rises with it.
     pub fn received(&self, range_m: f64) -> f64 {
-        let spread = range_m * range_m + self.receiver.near_m * self.receiver.near_m;
-        self.receiver.constant / (spread * spread) * self.air.passed(range_m)
+        self.receiver.sensitivity(range_m) * self.air.passed(range_m)
     }
 }

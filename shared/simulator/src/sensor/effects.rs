@@ -20,6 +20,8 @@ pub struct Effects {
     pub multipath: bool,
     /// Strong echoes raise the noise in all bins of their azimuth (phase noise), most of all around them: streaks.
     pub phase_noise: bool,
+    /// Echoes bounce on between houses: a tail like noise behind what is strong, longest down a street.
+    pub reverberation: bool,
     /// The transmitter rings in the first bins.
     pub ringing: bool,
     /// The vehicle's own roof and rear reflect.
@@ -55,6 +57,7 @@ impl Effects {
             occlusion: on,
             multipath: on,
             phase_noise: on,
+            reverberation: on,
             ringing: on,
             own_vehicle: on,
             noise: on,

@@ -1,9 +1,11 @@
-//! All power that no echo explains: the receiver's noise, ringing, weather, phase noise, lines, other radars.
+//! All power that no single echo explains: the receiver's noise, weather, phase noise, reverberation, lines, other radars.
 
 use rand::Rng;
+use rand_distr::StandardNormal;
 
 use super::effects::Effects;
 use super::spectrum::{NOISE_OVERLAP, RangeSpectrum};
+use crate::interpolate::interpolate;
 use crate::profile::{Receiver, Sampling};
 
 /// Metres a cell of the coarse profile of power from which phase noise is reckoned.
@@ -12,8 +14,14 @@ const COARSE_M: f64 = 2.0;
 /// (the lower fifth of an azimuth's powers rises with their sum).
 const SKIRT: f64 = 1.0e-6;
 /// How much more of it there is at the echo itself, and the distance at which that falls to one half, metres.
-const SKIRT_PEAK: f64 = 50.0;
+const SKIRT_PEAK: f64 = 100.0;
 const SKIRT_WIDTH_M: f64 = 1.5;
+/// Echoes bounce on between houses: so much of an echo's power, falling exponentially over so many metres behind it. The first
+/// is what is behind a front (rooms, eaves, what stands close by), the second a whole street.
+const TAIL: [(f64, f64); 2] = [(6.0e-4, 1.5), (2.5e-6, 45.0)];
+/// How much that differs from one direction to the next, standard deviation, dB, and how wide a direction is.
+const LIVELINESS_DB: f64 = 5.0;
+const LIVELY_AZIMUTHS: usize = 4;
 /// Spurious lines: range as a share of the farthest, and power in units of the floor there.
 const LINES: [(f64, f64); 4] = [(0.069, 0.5), (0.164, 0.6), (0.37, 0.9), (0.55, 0.7)];
 /// Times a scan that another radar is heard, on average.
@@ -44,7 +52,11 @@ pub(super) struct Noise {
     /// Power of echoes in each coarse cell of the azimuth at hand, and the noise that it brings there.
     echoes: Vec<f64>,
     raised: Vec<f64>,
+    /// Share of an echo's power that is phase noise so many coarse cells beside it, and that reverberates so many behind it.
     skirt: Vec<f64>,
+    tail: Vec<f64>,
+    /// By how much each azimuth's surroundings reverberate more or less than usual.
+    liveliness: Vec<f64>,
     bursts: Vec<Burst>,
     snow: bool,
 }
@@ -53,7 +65,10 @@ impl Noise {
     pub fn new(sampling: &Sampling, receiver: &Receiver, effects: &Effects, spectrum: &RangeSpectrum) -> Self {
         let (cells, spacing) = spectrum.noise_cells();
         let range_m = |cell: usize| sampling.range_m(cell as f64 * spacing).max(0.0);
-        let mut floor: Vec<f64> = (0..cells).map(|cell| floor_power(range_m(cell), receiver, effects)).collect();
+        let power = |db: f64| 10f64.powf(db / 10.0);
+        let floor_at =
+            |cell: usize| interpolate(receiver.floor_db, range_m(cell)).filter(|_| effects.noise).map_or(0.0, power);
+        let mut floor: Vec<f64> = (0..cells).map(floor_at).collect();
         if effects.spurious_lines {
             for (share, power) in LINES {
                 let cell = (share * cells as f64) as usize;
@@ -62,13 +77,17 @@ impl Noise {
         }
         let coarse = (sampling.reach_m() / COARSE_M) as usize + 2;
         let skirt_at = |i: usize| SKIRT * (1.0 + SKIRT_PEAK / (1.0 + (i as f64 * COARSE_M / SKIRT_WIDTH_M).powi(2)));
+        let tail_at =
+            |i: usize| TAIL.iter().map(|(share, length_m)| share * (-(i as f64) * COARSE_M / length_m).exp()).sum();
         Self {
             floor,
             clutter: vec![0.0; cells],
             coarse_of: (0..cells).map(|cell| (range_m(cell) / COARSE_M) as usize).collect(),
             echoes: vec![0.0; coarse],
             raised: vec![0.0; coarse],
-            skirt: (0..coarse).map(skirt_at).collect(),
+            skirt: (0..coarse).map(|i| if effects.phase_noise { skirt_at(i) } else { 0.0 }).collect(),
+            tail: (0..coarse).map(|i| if effects.reverberation { tail_at(i) } else { 0.0 }).collect(),
+            liveliness: vec![1.0; sampling.azimuths],
             bursts: Vec::new(),
             snow: false,
         }
@@ -89,6 +108,7 @@ impl Noise {
             *power = clutter(sampling.range_m(cell as f64 * spacing).max(0.5));
         }
         self.snow = snow;
+        self.draw_liveliness(rng);
         self.bursts.clear();
         // A Poisson process, one exponential gap after another.
         let mut at = -(1.0 - rng.random::<f64>()).ln();
@@ -115,11 +135,8 @@ impl Noise {
     }
 
     /// Adds complex Gaussian noise to the spectrum of an azimuth: exponentially distributed power about its mean.
-    pub fn add(&mut self, spectrum: &mut RangeSpectrum, azimuth: usize, phase_noise: bool, rng: &mut impl Rng) {
-        self.raised.fill(0.0);
-        if phase_noise {
-            self.spread_skirts();
-        }
+    pub fn add(&mut self, spectrum: &mut RangeSpectrum, azimuth: usize, rng: &mut impl Rng) {
+        self.spread_echoes(self.liveliness[azimuth]);
         let heard = |burst: &&Burst| (burst.first..burst.first + burst.azimuths).contains(&azimuth);
         let burst = 1.0 + self.bursts.iter().filter(heard).map(|burst| burst.strength).sum::<f64>();
         let (_, spacing) = spectrum.noise_cells();
@@ -136,37 +153,23 @@ impl Noise {
         }
     }
 
-    fn spread_skirts(&mut self) {
+    fn spread_echoes(&mut self, liveliness: f64) {
+        self.raised.fill(0.0);
         for (from, &power) in self.echoes.iter().enumerate().filter(|(_, power)| **power > 0.0) {
             for (to, raised) in self.raised.iter_mut().enumerate() {
                 *raised += power * self.skirt[from.abs_diff(to)];
             }
+            for (raised, tail) in self.raised[from..].iter_mut().zip(&self.tail) {
+                *raised += liveliness * power * tail;
+            }
         }
     }
-}
 
-fn floor_power(range_m: f64, receiver: &Receiver, effects: &Effects) -> f64 {
-    let power = |on: bool, table: &[(f64, f64)], beyond: f64| match on {
-        true => interpolate(table, range_m, beyond).map_or(0.0, |db| 10f64.powf(db / 10.0)),
-        false => 0.0,
-    };
-    power(effects.noise, receiver.floor_db, f64::INFINITY)
-        + power(effects.ringing, receiver.ringing_db, receiver.ringing_db.last().map_or(0.0, |last| last.0))
-}
-
-/// Between the entries of a table; the first one's value before it, the last one's behind it, nothing beyond `end`.
-fn interpolate(table: &[(f64, f64)], at: f64, end: f64) -> Option<f64> {
-    let (first, last) = (table.first()?, table.last()?);
-    if at > end {
-        return None;
-    }
-    let next = table.partition_point(|entry| entry.0 <= at);
-    Some(match next {
-        0 => first.1,
-        _ if next == table.len() => last.1,
-        _ => {
-            let ((x0, y0), (x1, y1)) = (table[next - 1], table[next]);
-            y0 + (y1 - y0) * (at - x0) / (x1 - x0)
+    /// Log-normal numbers, each for a few azimuths in a row.
+    fn draw_liveliness(&mut self, rng: &mut impl Rng) {
+        for group in self.liveliness.chunks_mut(LIVELY_AZIMUTHS) {
+            let db: f64 = LIVELINESS_DB * rng.sample::<f64, _>(StandardNormal);
+            group.fill(10f64.powf(db / 10.0));
         }
-    })
+    }
 }
