@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::SimulatorError;
 use crate::drive::DriveConfig;
 use crate::sensor::SensorConfig;
+use crate::town::TownConfig;
 use crate::traffic::TrafficConfig;
 
 /// What to simulate. Every key has a default, and unknown keys are refused.
@@ -19,6 +20,8 @@ pub struct SimulationConfig {
     pub seed: u64,
     /// Which way the vehicle takes.
     pub drive: DriveConfig,
+    /// What lines the streets.
+    pub town: TownConfig,
     /// What moves besides.
     pub traffic: TrafficConfig,
     /// What measures.
@@ -31,6 +34,7 @@ impl Default for SimulationConfig {
             scans: 64,
             seed: 1,
             drive: DriveConfig::default(),
+            town: TownConfig::default(),
             traffic: TrafficConfig::default(),
             sensor: SensorConfig::default(),
         }
@@ -42,6 +46,7 @@ impl SimulationConfig {
     pub fn validate(&self) -> Result<(), SimulatorError> {
         within("scans", self.scans as f64, 1.0, 100_000.0)?;
         self.drive.validate()?;
+        self.town.validate()?;
         self.traffic.validate()?;
         self.sensor.validate()
     }
