@@ -6,6 +6,7 @@ use crate::SimulatorError;
 use crate::drive::DriveConfig;
 use crate::output::OutputConfig;
 use crate::sensor::{Effects, SensorConfig};
+use crate::town::TownConfig;
 use crate::traffic::TrafficConfig;
 use crate::weather::WeatherConfig;
 
@@ -21,6 +22,8 @@ pub struct SimulationConfig {
     pub seed: u64,
     /// Which way the vehicle takes.
     pub drive: DriveConfig,
+    /// What lines the streets.
+    pub town: TownConfig,
     /// What moves besides.
     pub traffic: TrafficConfig,
     /// What measures.
@@ -40,6 +43,7 @@ impl Default for SimulationConfig {
             scans: 64,
             seed: 1,
             drive: DriveConfig::default(),
+            town: TownConfig::default(),
             traffic: TrafficConfig::default(),
             sensor: SensorConfig::default(),
             effects: Effects::default(),
@@ -54,6 +58,7 @@ impl SimulationConfig {
     pub fn validate(&self) -> Result<(), SimulatorError> {
         within("scans", self.scans as f64, 1.0, 100_000.0)?;
         self.drive.validate()?;
+        self.town.validate()?;
         self.traffic.validate()?;
         self.sensor.validate()?;
         self.weather.iter().try_for_each(WeatherConfig::validate)

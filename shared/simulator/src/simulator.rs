@@ -7,7 +7,7 @@ use nalgebra::Isometry2;
 
 use crate::profile::Sampling;
 use crate::sensor::{Scene, Sensor, SweepTime};
-use crate::streets::Streets;
+use crate::streets::{Keep, Streets};
 use crate::traffic::Traffic;
 use crate::trajectory::Trajectory;
 use crate::weather::WeatherConfig;
@@ -44,11 +44,12 @@ impl Simulator {
         let trajectory: Arc<dyn Trajectory> = config.drive.trajectory(config.seed)?.into();
         let sampling = config.sensor.sampling();
         // Not as far as the scans go: more of them must find the same town.
-        let streets = Streets::driven(trajectory.as_ref(), trajectory.duration_s().min(100.0), 0.0);
+        let streets =
+            Streets::along(trajectory.as_ref(), trajectory.duration_s().min(100.0), Keep::default(), config.seed);
         Ok(Self {
             config: config.clone(),
             sampling,
-            world: Arc::new(World::new(town::build(&config.drive, &streets, config.seed))),
+            world: Arc::new(World::new(town::build(&config.town, &streets, config.seed))),
             traffic: Traffic::new(&config.traffic, trajectory.clone(), config.seed),
             trajectory,
         })

@@ -1,145 +1,138 @@
-//! Houses: walls that hide what is behind them, made of scatterers that a radar sees as a facade.
-//!
-//! A facade is rough wall (many weak scatterers, whose echoes interfere: speckle), window frames, pipes and
-//! recesses (fewer and stronger, each with its own direction), smooth panels that flash when seen at a right angle,
-//! and two corners, the brightest to all sides. Cross-sections are chosen so that the histogram of received powers
-//! comes near the one of real scans in a town.
+//! Buildings: an outline, closed by facades, with the corners that a radar sees best.
 
-use nalgebra::{Point2, Rotation2, Vector2};
-use rand::Rng;
+use nalgebra::{Point2, Vector2};
 
-use super::random::{spread, stations};
-use super::{Edge, Planner};
-use crate::world::{Aspect, NO_BODY, Scatterer, Wall};
+use super::facade::{Facade, Material, right_of};
+use super::site::Site;
 
-/// Power that passes one wall of a house, there and back.
-const WALL_TRANSMISSION: f64 = 0.1;
-/// Power that passes a fence, there and back.
-const FENCE_TRANSMISSION: f64 = 0.5;
-/// Depth of a house, metres.
-const DEPTH_M: std::ops::Range<f64> = 8.0..12.0;
-
-/// One wall of a house as the radar sees it from outside.
-struct Facade {
-    from: Point2<f64>,
-    to: Point2<f64>,
-    body: u32,
-    /// Factor on the number of details: 1 towards the street, less on sides and backs.
-    detail: f64,
+/// The form of a building on the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Form {
+    Plain,
+    /// With a wing at the back.
+    Angle,
+    /// With a part of the front set back.
+    Stepped,
+    /// A nave with a tower before it.
+    Church,
 }
 
-impl Planner<'_> {
-    /// Houses from one end of the edge to the other, or (not `whole`) between the houses round its corners.
-    pub(super) fn row_of_houses(&mut self, edge: &Edge, whole: bool) {
-        let margin = if whole { 0.0 } else { DEPTH_M.end };
-        let end = edge.length_m - margin;
-        let mut at = margin;
-        while end - at > 6.0 {
-            let frontage = self.rng.random_range(8.0..18.0f64).min(end - at);
-            self.house(edge, at, frontage);
-            at += frontage;
-            if self.rng.random_bool(0.35) {
-                let gap = self.rng.random_range(2.5..6.0f64).min((end - at).max(0.0));
-                self.gap(edge, at, gap);
-                at += gap;
+/// Room for a building in its site's frame: x along the street, y away from it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Room {
+    pub x: f64,
+    pub y: f64,
+    pub width_m: f64,
+    pub depth_m: f64,
+}
+
+/// A building to be put up.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Building {
+    pub room: Room,
+    pub form: Form,
+    pub front: Material,
+    pub rest: Material,
+    /// How much there is to see of its front; see [`Facade::detail`].
+    pub detail: f64,
+    /// Metres between the balconies on its front; none at 0.
+    pub balconies_m: f64,
+}
+
+/// Factor on the detail of sides and backs.
+const BEHIND: f64 = 0.4;
+
+impl Room {
+    /// The corners of a form in this room, counter-clockwise from the front's left. `share` says where it is divided.
+    fn outline(&self, form: Form, share: f64) -> Vec<Point2<f64>> {
+        let (w, d) = (self.width_m, self.depth_m);
+        let (cut, step) = (w * share, (0.25 * d).min(3.0));
+        let corners: &[(f64, f64)] = match form {
+            Form::Plain => &[(0.0, 0.0), (w, 0.0), (w, d), (0.0, d)],
+            Form::Angle => &[(0.0, 0.0), (w, 0.0), (w, 0.55 * d), (cut, 0.55 * d), (cut, d), (0.0, d)],
+            Form::Stepped => &[(0.0, step), (cut, step), (cut, 0.0), (w, 0.0), (w, d), (0.0, d)],
+            Form::Church => {
+                let (left, right) = (0.35 * w, 0.65 * w);
+                &[(0.0, 6.0), (left, 6.0), (left, 0.0), (right, 0.0), (right, 6.0), (w, 6.0), (w, d), (0.0, d)]
+            }
+        };
+        corners.iter().map(|(x, y)| Point2::new(self.x + x, self.y + y)).collect()
+    }
+}
+
+impl Site<'_> {
+    pub(super) fn building(&mut self, building: &Building) {
+        let body = self.body();
+        let share = self.between(0.3, 0.7);
+        let inside_m = (0.4 * building.room.width_m.min(building.room.depth_m)).min(6.0);
+        let outline = building.room.outline(building.form, share);
+        let corner = |index: usize| outline[index % outline.len()];
+        for index in 0..outline.len() {
+            let (before, from, to) = (corner(index + outline.len() - 1), corner(index), corner(index + 1));
+            let to_street = right_of(to - from).y < -0.5;
+            let (material, share) = if to_street { (building.front, 1.0) } else { (building.rest, BEHIND) };
+            let detail = share * building.detail;
+            self.facade(&Facade { from, to, material, detail, inside_m, body });
+            self.corner(before, from, to, detail, body);
+            if to_street && building.balconies_m > 0.0 {
+                self.balconies(from, to, building.balconies_m, body);
             }
         }
     }
 
-    fn house(&mut self, edge: &Edge, at: f64, frontage: f64) {
-        let setback = if self.rng.random_bool(0.5) { 0.0 } else { self.rng.random_range(0.3..2.0) };
-        let depth = self.rng.random_range(DEPTH_M).min(edge.half_block_m);
-        if depth < setback + 1.0 {
-            return;
-        }
-        let body = self.next_body();
-        let corners = [(at, -setback), (at + frontage, -setback), (at + frontage, -depth), (at, -depth)]
-            .map(|(along, out)| edge.at(along, out));
-        for side in 0..4 {
-            let detail = if side == 0 { 1.0 } else { 0.3 };
-            self.facade(&Facade { from: corners[side], to: corners[(side + 1) % 4], body, detail });
+    /// A corner sticking out scatters its edge to all sides; two walls that meet inwards send back what enters.
+    fn corner(&mut self, before: Point2<f64>, at: Point2<f64>, after: Point2<f64>, detail: f64, body: u32) {
+        let (arriving, leaving) = (at - before, after - at);
+        if arriving.perp(&leaving) > 0.0 {
+            self.point(at, 3.0 * detail, 5.0, body);
+        } else {
+            self.facing(at, right_of(arriving) + right_of(leaving), 2.0, 25.0, body);
         }
     }
 
-    fn facade(&mut self, facade: &Facade) {
-        let Facade { from, to, body, .. } = *facade;
-        self.content.walls.push(Wall { from, to, transmission: WALL_TRANSMISSION, mirror: 0.0, body });
-        self.rough_wall(facade);
-        self.interior(facade);
-        self.frames(facade);
-        self.panels(facade);
-        let cross_section_m2 = spread(&mut self.rng, 8.0, 4.0);
-        self.add(Scatterer { position: from, cross_section_m2, aspect: Aspect::AllRound, body: facade.body });
-    }
-
-    fn rough_wall(&mut self, facade: &Facade) {
-        for (position, normal) in self.places(facade, 0.1, 0.35, 0.15) {
-            let cross_section_m2 = spread(&mut self.rng, 0.08, 4.0);
-            let aspect = Aspect::Facing { normal, sharpness: 1.5 };
-            self.add(Scatterer { position, cross_section_m2, aspect, body: facade.body });
+    /// Floor, rail and wall: two right angles each.
+    fn balconies(&mut self, from: Point2<f64>, to: Point2<f64>, every_m: f64, body: u32) {
+        let along = (to - from).normalize();
+        let outward = right_of(along);
+        for index in 0..((to - from).norm() / every_m) as usize {
+            let place = from + along * ((index as f64 + 0.3) * every_m);
+            for side in [-1.0, 1.0] {
+                self.facing(place + along * side, outward + along * (0.6 * side), 4.0, 6.0, body);
+            }
+            self.point(place + outward * 1.2, 0.6, 4.0, body);
         }
     }
 
-    /// Window reveals, rooms behind the glass, eaves and roofs: what smears a facade out over range.
-    fn interior(&mut self, facade: &Facade) {
-        for (position, normal) in self.places(facade, 0.15, 0.6, 0.05) {
-            let depth_m = -1.2 * (1.0 - self.rng.random::<f64>()).ln();
-            let position = position - normal * depth_m.min(6.0);
-            let cross_section_m2 = spread(&mut self.rng, 0.2, 6.0);
-            let aspect = Aspect::Facing { normal, sharpness: 1.5 };
-            self.add(Scatterer { position, cross_section_m2, aspect, body: facade.body });
+    /// A bus stop: glass to the back and the sides, a metal frame.
+    pub(super) fn shelter(&mut self) {
+        let body = self.body();
+        let corners = [(-1.8, 0.0), (-1.8, 1.2), (1.8, 1.2), (1.8, 0.0)].map(|(x, y)| Point2::new(x, y));
+        let glass = super::site::Screen { transmission: 0.4, mirror: 0.4 };
+        for ends in corners.windows(2) {
+            self.wall(ends[0], ends[1], glass, body);
+        }
+        for place in corners {
+            self.point(place, 1.5, 4.0, body);
+        }
+        for side in [-1.0, 1.0] {
+            self.facing(Point2::new(1.7 * side, 1.1), Vector2::new(-side, -1.0), 2.0, 20.0, body);
         }
     }
+}
 
-    fn frames(&mut self, facade: &Facade) {
-        for (position, normal) in self.places(facade, 0.4, 2.0, 0.3) {
-            let turn = self.rng.random_range(-1.0..1.0);
-            let normal = Rotation2::new(turn) * normal;
-            let cross_section_m2 = spread(&mut self.rng, 4.0, 6.0);
-            let sharpness = self.rng.random_range(2.0..25.0);
-            let aspect = Aspect::Facing { normal, sharpness };
-            self.add(Scatterer { position, cross_section_m2, aspect, body: facade.body });
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn outlines_run_counter_clockwise_inside_their_room() {
+        let room = Room { x: 2.0, y: 1.0, width_m: 20.0, depth_m: 16.0 };
+        for form in [Form::Plain, Form::Angle, Form::Stepped, Form::Church] {
+            let outline = room.outline(form, 0.4);
+            let next = |i: usize| outline[(i + 1) % outline.len()];
+            let area: f64 = outline.iter().enumerate().map(|(i, p)| p.coords.perp(&next(i).coords) / 2.0).sum();
+            assert!((0.5 * 320.0..=320.0).contains(&area), "{form:?}: {area} m²");
+            assert!(outline.iter().all(|p| (2.0..=22.0).contains(&p.x) && (1.0..=17.0).contains(&p.y)));
         }
-    }
-
-    fn panels(&mut self, facade: &Facade) {
-        for (position, normal) in self.places(facade, 1.5, 4.0, 0.05) {
-            let cross_section_m2 = spread(&mut self.rng, 60.0, 5.0);
-            let aspect = Aspect::Facing { normal, sharpness: 250.0 };
-            self.add(Scatterer { position, cross_section_m2, aspect, body: facade.body });
-        }
-    }
-
-    /// Random places on a facade, `least..most` metres apart, up to `relief` metres out of the wall, with its normal.
-    fn places(&mut self, facade: &Facade, least: f64, most: f64, relief: f64) -> Vec<(Point2<f64>, Vector2<f64>)> {
-        let way = facade.to - facade.from;
-        let length = way.norm();
-        let along = way / length;
-        let normal = Vector2::new(along.y, -along.x);
-        let distances = stations(&mut self.rng, length, least / facade.detail, most / facade.detail);
-        distances
-            .into_iter()
-            .map(|at| (facade.from + along * at + normal * self.rng.random_range(0.0..relief), normal))
-            .collect()
-    }
-
-    /// What closes the gap between two houses: a fence, or nothing.
-    fn gap(&mut self, edge: &Edge, at: f64, width: f64) {
-        if width < 1.0 || self.rng.random_bool(0.4) {
-            return;
-        }
-        let body = self.next_body();
-        let (from, to) = (edge.at(at, -0.5), edge.at(at + width, -0.5));
-        self.content.walls.push(Wall { from, to, transmission: FENCE_TRANSMISSION, mirror: 0.0, body });
-        for along in stations(&mut self.rng, width, 0.2, 0.6) {
-            let cross_section_m2 = spread(&mut self.rng, 0.3, 5.0);
-            let position = edge.at(at + along, -0.5);
-            self.add(Scatterer { position, cross_section_m2, aspect: Aspect::AllRound, body });
-        }
-    }
-
-    pub(super) fn add(&mut self, scatterer: Scatterer) {
-        debug_assert!(scatterer.body != NO_BODY || scatterer.aspect == Aspect::AllRound);
-        self.content.scatterers.push(scatterer);
     }
 }

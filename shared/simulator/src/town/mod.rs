@@ -1,163 +1,180 @@
-//! A procedural town: blocks of houses on a grid of streets around the vehicle's loop.
+//! A procedural town along any network of streets.
 //!
-//! The streets of the loop run on through the town, so that the radar looks along them as far as it reaches. Each
-//! block's edge is lined with houses (with gaps and fences between), each kerb with lamp posts, trees and parked cars.
+//! Each side of a street is divided into stretches, each stretch into pieces of land by what its district holds
+//! ([`TownConfig::character`]): houses wall to wall, houses in gardens, halls, lawns, car parks, fields. A second row
+//! behind fills what is seen through gaps. Land is taken once, and only where it is clear of all streets. Between land
+//! and carriageway stand posts, signs, trees and parked cars.
+//!
+//! What stands somewhere depends on the seed, on the place, and on the streets near by, and on nothing else: a drive
+//! that goes on for longer, or comes back, finds the same town.
 
+mod boundary;
 mod building;
+mod config;
+mod district;
+mod facade;
+mod frontage;
+mod kerb;
+mod land;
+mod plot;
 mod random;
-mod street;
+mod site;
+#[cfg(test)]
+mod tests;
+mod vehicle;
 
-use nalgebra::{Point2, Vector2};
-use rand::{Rng, SeedableRng};
+use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-pub(crate) use street::car;
+pub use config::{Character, TownConfig};
+pub(crate) use vehicle::car;
 
-use crate::drive::DriveConfig;
 use crate::streets::Streets;
-use crate::world::{Body, NO_BODY};
+use crate::world::Body;
+use district::{District, Use};
+use frontage::{Frontage, Line};
+use kerb::{BAYS_M, Kerb};
+use land::{Lot, Register};
+use plot::Plot;
+use random::generator;
+use site::{Built, Site};
 
-/// From a street's centre to the fronts of its houses, metres.
-const HALF_STREET_M: f64 = 9.0;
-/// How far beyond the loop the town goes on, metres: as far as the radar reaches.
-const OUTSKIRTS_M: f64 = 165.0;
-/// Between a parked car or post and the path, metres.
-const CLEARANCE_M: f64 = 3.0;
-/// The town's stream of random numbers; scans use the ones after it.
-const TOWN_STREAM: u64 = 0;
+/// Metres of a street whose land is divided at a time: what obstructs one stretch does not shift the next.
+const STRETCH_M: f64 = 72.0;
+/// Land is at least this far from all kerbs, metres.
+const CLEAR_M: f64 = 1.2;
+/// Metres to go on where land cannot be built on.
+const SKIP_M: f64 = 2.0;
+/// Narrower rests of a stretch stay empty, metres.
+const LEAST_WIDTH_M: f64 = 4.0;
+/// Shares of the intended depth that are tried until a piece of land is free.
+const DEPTHS: [f64; 3] = [1.0, 0.6, 0.35];
+/// How much there is to see of buildings behind the first row, where that is 1.
+const DETAIL_BEHIND: f64 = 0.5;
 
-/// An edge of a block: a line of house fronts with the street on its right-hand side.
-#[derive(Clone, Copy, Debug)]
-struct Edge {
-    start: Point2<f64>,
-    /// Unit vector along the edge.
-    along: Vector2<f64>,
-    length_m: f64,
-    /// From here to the middle of the block, metres: no house is deeper.
-    half_block_m: f64,
+/// The town along these streets; the same for the same seed.
+pub fn build(config: &TownConfig, streets: &Streets, seed: u64) -> Body {
+    Planner::plan(config, streets, seed).built.content
 }
 
-impl Edge {
-    /// Unit vector towards the street.
-    fn outward(&self) -> Vector2<f64> {
-        Vector2::new(self.along.y, -self.along.x)
-    }
+#[derive(Clone, Copy, PartialEq)]
+enum Row {
+    First,
+    Second,
+}
 
-    /// A point `along` metres down the edge and `out` metres into the street.
-    fn at(&self, along: f64, out: f64) -> Point2<f64> {
-        self.start + self.along * along + self.outward() * out
-    }
+/// A part of one side of a street.
+struct Stretch<'a> {
+    frontage: Frontage<'a>,
+    district: District,
+    key: u64,
+    from_m: f64,
+    to_m: f64,
+    /// From the kerb to the land, metres.
+    pavement_m: f64,
+    bays: bool,
+    /// Of the land along the street, metres.
+    depth_m: f64,
 }
 
 /// Puts the town together.
 struct Planner<'a> {
+    config: &'a TownConfig,
     streets: &'a Streets,
-    rng: ChaCha8Rng,
-    content: Body,
-    last_body: u32,
+    seed: u64,
+    register: Register,
+    built: Built,
 }
 
-/// The town around a loop; the same for the same seed.
-pub fn build(config: &DriveConfig, streets: &Streets, seed: u64) -> Body {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    rng.set_stream(TOWN_STREAM);
-    let columns = street_lines(config.block_length_m / 2.0, &mut rng);
-    let rows = street_lines(config.block_width_m / 2.0, &mut rng);
-    let mut planner = Planner { streets, rng, content: Body::default(), last_body: NO_BODY };
-    for x in columns.windows(2) {
-        for y in rows.windows(2) {
-            planner.block([x[0], x[1]], [y[0], y[1]]);
+impl<'a> Planner<'a> {
+    fn plan(config: &'a TownConfig, streets: &'a Streets, seed: u64) -> Self {
+        let lines: Vec<Line> = streets.streets().iter().map(Line::new).collect();
+        let mut planner = Self { config, streets, seed, register: Register::default(), built: Built::default() };
+        // First rows before second ones, and driven streets before others: what is seen best is not built over.
+        for row in [Row::First, Row::Second] {
+            for driven in [true, false] {
+                planner.line(&lines, row, driven);
+            }
         }
-    }
-    planner.content
-}
-
-/// Centre lines of parallel streets, ascending: the loop's two at `-half` and `half`, and more to both sides.
-fn street_lines(half: f64, rng: &mut ChaCha8Rng) -> Vec<f64> {
-    let mut lines = vec![-half, half];
-    let end = half + OUTSKIRTS_M;
-    while lines[lines.len() - 1] < end {
-        lines.push(lines[lines.len() - 1] + rng.random_range(50.0..85.0));
-    }
-    while lines[0] > -end {
-        lines.insert(0, lines[0] - rng.random_range(50.0..85.0));
-    }
-    lines
-}
-
-impl Planner<'_> {
-    fn next_body(&mut self) -> u32 {
-        self.last_body += 1;
-        self.last_body
+        planner
     }
 
-    /// Lines the four edges of the block between four streets, given by their centre lines.
-    fn block(&mut self, x: [f64; 2], y: [f64; 2]) {
-        let (x, y) = (inset(x), inset(y));
-        let (length, width) = (x[1] - x[0], y[1] - y[0]);
-        let edge = |corner: (f64, f64), along: (f64, f64), length_m: f64, depth: f64| Edge {
-            start: Point2::new(corner.0, corner.1),
-            along: Vector2::new(along.0, along.1),
-            length_m,
-            half_block_m: depth / 2.0,
-        };
-        let edges = [
-            edge((x[0], y[0]), (1.0, 0.0), length, width),
-            edge((x[1], y[0]), (0.0, 1.0), width, length),
-            edge((x[1], y[1]), (-1.0, 0.0), length, width),
-            edge((x[0], y[1]), (0.0, -1.0), width, length),
-        ];
-        for (index, edge) in edges.iter().enumerate() {
-            // The long rows of houses turn the corners; the others begin behind them.
-            self.row_of_houses(edge, index % 2 == 0);
-            self.kerb(edge);
-        }
-    }
-}
-
-fn inset(span: [f64; 2]) -> [f64; 2] {
-    [span[0] + HALF_STREET_M, span[1] - HALF_STREET_M]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::trajectory::{BlockLoop, Trajectory};
-    use crate::world::World;
-
-    fn town(seed: u64) -> (BlockLoop, Streets, World) {
-        let config = DriveConfig::default();
-        let path = BlockLoop::new(config.block_length_m, config.block_width_m, config.speed_m_s, 5.0);
-        let streets = Streets::driven(&path, path.lap_s(), 1.0);
-        let world = World::new(build(&config, &streets, seed));
-        (path, streets, world)
-    }
-
-    #[test]
-    fn same_seed_builds_the_same_town_and_another_seed_another() {
-        assert_eq!(town(3).2.scatterers(), town(3).2.scatterers());
-        assert_ne!(town(3).2.scatterers(), town(4).2.scatterers());
-    }
-
-    #[test]
-    fn road_is_free_along_the_whole_loop() {
-        for seed in 0..5 {
-            let (path, streets, world) = town(seed);
-            let nearest =
-                world.scatterers().iter().map(|s| streets.clearance_m(s.position, 9.0)).fold(f64::INFINITY, f64::min);
-            assert!(nearest > 0.2, "seed {seed}: something stands {nearest} m beside the road");
-            for i in 0..200 {
-                let way = |time: f64| Point2::from(path.pose(time).translation.vector);
-                let (from, to) = (way(f64::from(i) * 0.1), way(f64::from(i) * 0.1 + 0.1));
-                assert_eq!(world.transmission(from, to, NO_BODY, 0.0), 1.0, "seed {seed}: a wall across the road");
+    /// Builds along all streets that are driven, or all others.
+    fn line(&mut self, lines: &[Line], row: Row, driven: bool) {
+        for (street, line) in lines.iter().enumerate() {
+            if self.streets.streets()[street].driven != driven {
+                continue;
+            }
+            for frontage in Frontage::sides(self.streets, street, line) {
+                for number in 0..(frontage.length_m() / STRETCH_M).ceil() as u64 {
+                    let stretch = self.stretch(frontage, number);
+                    self.row(&stretch, row);
+                    if row == Row::First {
+                        self.kerb(&stretch);
+                    }
+                }
             }
         }
     }
 
-    #[test]
-    fn town_is_as_dense_as_a_town() {
-        let world = town(1).2;
-        assert!((20_000..200_000).contains(&world.scatterers().len()), "{}", world.scatterers().len());
-        assert!((1_000..20_000).contains(&world.walls().len()), "{}", world.walls().len());
+    fn stretch<'l>(&self, frontage: Frontage<'l>, number: u64) -> Stretch<'l> {
+        let from_m = number as f64 * STRETCH_M;
+        let district = District::at(self.config.character, self.seed, frontage.place(from_m + STRETCH_M / 2.0, 10.0));
+        let key = random::hash(&[self.seed, frontage.key(), number]);
+        let mut rng = generator(&[key]);
+        let (bays, _) = district.kerb_shares();
+        let bays = rng.random_bool(bays);
+        let pavement_m = rng.random_range(1.8..3.4) + if bays { BAYS_M } else { 0.0 };
+        let (least_m, most_m) = district.depth_m();
+        let depth_m = rng.random_range(least_m..most_m);
+        let to_m = (from_m + STRETCH_M).min(frontage.length_m());
+        Stretch { frontage, district, key, from_m, to_m, pavement_m, bays, depth_m }
+    }
+
+    /// Divides a stretch and builds on its pieces, one after the other.
+    fn row(&mut self, stretch: &Stretch<'_>, row: Row) {
+        let mut rng = generator(&[stretch.key, 1 + row as u64]);
+        let mut at_m = stretch.from_m;
+        while at_m + LEAST_WIDTH_M < stretch.to_m {
+            let kind = stretch.district.draw(row == Row::First, &mut rng);
+            let (least_m, most_m) = kind.width_m();
+            let width_m = rng.random_range(least_m..most_m).min(stretch.to_m - at_m);
+            let key: u64 = rng.random();
+            let claimed = if width_m < least_m { None } else { self.claim(stretch, row, kind, at_m, width_m) };
+            match claimed {
+                Some(lot) => {
+                    self.plot(&lot, kind, row, generator(&[key]));
+                    at_m += width_m;
+                }
+                None => at_m += SKIP_M,
+            }
+        }
+    }
+
+    /// Takes the land for a use from a station on, as deep as it is free.
+    fn claim(&mut self, stretch: &Stretch<'_>, row: Row, kind: Use, at_m: f64, width_m: f64) -> Option<Lot> {
+        let out_m = stretch.pavement_m + if row == Row::First { 0.0 } else { stretch.depth_m };
+        let middle_m = at_m + width_m / 2.0;
+        if !stretch.frontage.owns(middle_m, stretch.frontage.place(middle_m, stretch.pavement_m)) {
+            return None;
+        }
+        DEPTHS.iter().map(|share| share * stretch.depth_m).filter(|depth_m| *depth_m >= kind.least_depth_m()).find_map(
+            |depth_m| {
+                let lot = stretch.frontage.lot(at_m, width_m, out_m, depth_m)?;
+                (lot.is_clear(self.streets, CLEAR_M) && self.register.take(&lot)).then_some(lot)
+            },
+        )
+    }
+
+    fn plot(&mut self, lot: &Lot, kind: Use, row: Row, rng: ChaCha8Rng) {
+        let site = Site { built: &mut self.built, pose: lot.pose, rng };
+        let detail = if row == Row::First { 1.0 } else { DETAIL_BEHIND };
+        Plot { site, config: self.config, width_m: lot.width_m, depth_m: lot.depth_m, detail }.build(kind);
+    }
+
+    fn kerb(&mut self, stretch: &Stretch<'_>) {
+        let Stretch { frontage, district, from_m, to_m, pavement_m, bays, key, .. } = *stretch;
+        let rng = generator(&[key, 3]);
+        Kerb { frontage, config: self.config, district, from_m, to_m, pavement_m, bays, rng }.furnish(&mut self.built);
     }
 }

@@ -1,8 +1,28 @@
 //! Random quantities that the town is made of.
+//!
+//! Nothing is drawn from one long stream: each thing has a generator of its own, seeded by what and where it is.
+//! So a place looks the same whatever else is built, before or after it.
 
 use std::f64::consts::TAU;
 
-use rand::Rng;
+use nalgebra::Point2;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Mixes keys to a number that looks random (the finalizer of SplitMix64, Steele et al. 2014, a key at a time).
+pub fn hash(keys: &[u64]) -> u64 {
+    keys.iter().fold(0x9e37_79b9_7f4a_7c15, |state, key| {
+        let mut mixed = (state ^ key).wrapping_add(0x9e37_79b9_7f4a_7c15);
+        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        mixed ^ (mixed >> 31)
+    })
+}
+
+/// The generator of the thing with these keys.
+pub fn generator(keys: &[u64]) -> ChaCha8Rng {
+    ChaCha8Rng::seed_from_u64(hash(keys))
+}
 
 /// A standard normal number (Box and Muller).
 pub fn normal(rng: &mut impl Rng) -> f64 {
@@ -24,4 +44,40 @@ pub fn stations(rng: &mut impl Rng, end: f64, least: f64, most: f64) -> Vec<f64>
         at += rng.random_range(least..most);
     }
     all
+}
+
+/// A smooth random function of place, 0 to 1, that changes over about `cell_m` metres.
+pub fn smooth(key: u64, place: Point2<f64>, cell_m: f64) -> f64 {
+    let scaled = place / cell_m;
+    let (column, row) = (scaled.x.floor(), scaled.y.floor());
+    let ease = |t: f64| t * t * (3.0 - 2.0 * t);
+    let (along, across) = (ease(scaled.x - column), ease(scaled.y - row));
+    let corner = |x: i64, y: i64| {
+        let mixed = hash(&[key, (column as i64 + x) as u64, (row as i64 + y) as u64]);
+        (mixed >> 11) as f64 / (1u64 << 53) as f64
+    };
+    let below = corner(0, 0) + along * (corner(1, 0) - corner(0, 0));
+    let above = corner(0, 1) + along * (corner(1, 1) - corner(0, 1));
+    below + across * (above - below)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn smooth_function_has_no_steps_and_fills_its_range() {
+        let at = |i: i32| smooth(7, Point2::new(f64::from(i), 0.3 * f64::from(i) - 500.0), 100.0);
+        let values: Vec<f64> = (-5000..5000).map(at).collect();
+        assert!(values.windows(2).all(|pair| (pair[1] - pair[0]).abs() < 0.04));
+        assert!(values.iter().any(|v| *v < 0.15) && values.iter().any(|v| *v > 0.85));
+    }
+
+    #[test]
+    fn neighbouring_keys_give_unlike_generators() {
+        let mut firsts: Vec<u64> = (0..1000).map(|key| generator(&[1, key]).random::<u64>() >> 40).collect();
+        firsts.sort_unstable();
+        firsts.dedup();
+        assert!(firsts.len() > 995, "{}", firsts.len());
+    }
 }

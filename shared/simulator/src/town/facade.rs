@@ -1,0 +1,160 @@
+//! Facades: what a radar sees of a wall.
+//!
+//! Real scans show a row of houses as short bright pieces and dots with gaps between. So a facade is made of bays a
+//! few metres wide, each with a strength of its own: rough wall (many weak scatterers, whose echoes interfere), and in
+//! some of them windows (reveals that look along the street, a pane that flashes at a right angle, a room behind that
+//! smears the echo over range), doors (a recess: two walls and the ground, bright over a wide angle) and drain pipes.
+//! Cross-sections are fitted to the histogram of real scans' powers.
+
+use nalgebra::{Point2, Rotation2, Vector2};
+use rand::Rng;
+
+use super::random::{normal, stations};
+use super::site::{Screen, Site};
+
+/// What a wall is made of.
+///
+/// What mirrors follows from the relative permittivities of ITU-R P.2040 at normal incidence (brick 3.9: 0.11,
+/// concrete 5.2: 0.15, glass 6.3: 0.19 for each surface, wood 2.0: 0.03), less what roughness scatters, more for
+/// coated panes. What passes is larger than through the material alone: windows pass more, and in a plane the radar
+/// cannot look over anything.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Material {
+    Brick,
+    /// Concrete or rendered walls with large windows: flats, offices.
+    Concrete,
+    /// Shop and office fronts.
+    Glass,
+    /// Barns, halls and garage doors.
+    Metal,
+    Timber,
+}
+
+impl Material {
+    fn screen(self) -> Screen {
+        let (transmission, mirror) = match self {
+            Self::Brick => (0.03, 0.08),
+            Self::Concrete => (0.02, 0.12),
+            Self::Glass => (0.08, 0.5),
+            Self::Metal => (0.003, 0.6),
+            Self::Timber => (0.3, 0.03),
+        };
+        Screen { transmission, mirror }
+    }
+
+    /// Factor on the roughness, and the shares of bays with a window, a door and a drain pipe.
+    fn bays(self) -> (f64, [f64; 3]) {
+        match self {
+            Self::Brick => (1.0, [0.45, 0.12, 0.16]),
+            Self::Concrete => (0.7, [0.6, 0.08, 0.1]),
+            Self::Glass => (0.3, [0.9, 0.1, 0.03]),
+            Self::Metal => (0.4, [0.0, 0.12, 0.1]),
+            Self::Timber => (0.5, [0.0, 0.05, 0.0]),
+        }
+    }
+}
+
+/// One wall, seen from its outside.
+pub(super) struct Facade {
+    /// The wall's ends in the site's frame; outside is to the right of the way from the first to the second.
+    pub from: Point2<f64>,
+    pub to: Point2<f64>,
+    pub material: Material,
+    /// How much there is to see: 1 towards a street, less on sides and backs.
+    pub detail: f64,
+    /// From the wall to the end of the rooms behind it, metres.
+    pub inside_m: f64,
+    pub body: u32,
+}
+
+/// A part of a facade with a strength of its own.
+struct Bay {
+    from: Point2<f64>,
+    along: Vector2<f64>,
+    outward: Vector2<f64>,
+    width_m: f64,
+    strength: f64,
+    material: Material,
+    body: u32,
+}
+
+impl Bay {
+    fn at(&self, along_m: f64, out_m: f64) -> Point2<f64> {
+        self.from + self.along * along_m + self.outward * out_m
+    }
+}
+
+/// Unit vector to the right of a way.
+pub(super) fn right_of(way: Vector2<f64>) -> Vector2<f64> {
+    Vector2::new(way.y, -way.x).try_normalize(1e-9).unwrap_or_else(Vector2::x)
+}
+
+impl Site<'_> {
+    pub(super) fn facade(&mut self, facade: &Facade) {
+        let way = facade.to - facade.from;
+        let length_m = way.norm();
+        self.wall(facade.from, facade.to, facade.material.screen(), facade.body);
+        let mut at_m = 0.0;
+        while at_m + 0.5 < length_m {
+            let width_m = self.between(1.5, 4.5).min(length_m - at_m);
+            let along = way / length_m;
+            let strength = facade.detail * 10f64.powf(0.6 * normal(&mut self.rng));
+            let from = facade.from + along * at_m;
+            let (material, body) = (facade.material, facade.body);
+            let bay = Bay { from, along, outward: right_of(way), width_m, strength, material, body };
+            self.bay(&bay, facade);
+            at_m += width_m;
+        }
+    }
+
+    fn bay(&mut self, bay: &Bay, facade: &Facade) {
+        let (roughness, [window, door, pipe]) = bay.material.bays();
+        self.rough_wall(bay, roughness, facade.detail);
+        if self.chance(window) {
+            self.window(bay, facade);
+        }
+        if self.chance(door) {
+            self.door(bay);
+        }
+        if self.chance(pipe) {
+            let at = self.between(0.0, bay.width_m);
+            self.point(bay.at(at, 0.08), 1.2 * bay.strength, 4.0, bay.body);
+        }
+    }
+
+    fn rough_wall(&mut self, bay: &Bay, roughness: f64, detail: f64) {
+        for at in stations(&mut self.rng, bay.width_m, 0.1 / detail, 0.35 / detail) {
+            let place = bay.at(at, self.rng.random_range(0.0..0.15));
+            self.facing(place, bay.outward, 1.5, 0.1 * roughness * bay.strength, bay.body);
+        }
+    }
+
+    /// Reveals to both sides, a pane, and what is behind it.
+    fn window(&mut self, bay: &Bay, facade: &Facade) {
+        let half_m = self.between(0.3, 0.8).min(bay.width_m / 2.0);
+        let middle_m = self.between(half_m, bay.width_m - half_m);
+        for side in [-1.0, 1.0] {
+            let way = Rotation2::new(side * self.rng.random_range(0.5..1.3)) * bay.outward;
+            let sharpness = self.rng.random_range(2.0..14.0);
+            self.facing(bay.at(middle_m + side * half_m, 0.05), way, sharpness, 2.5 * bay.strength, bay.body);
+        }
+        // Panes do not hang quite parallel to their wall.
+        let way = Rotation2::new(0.02 * normal(&mut self.rng)) * bay.outward;
+        let pane_m2 = if bay.material == Material::Glass { 160.0 } else { 40.0 };
+        self.facing(bay.at(middle_m, 0.0), way, 250.0, pane_m2, bay.body);
+        for _ in 0..(2.5 * facade.detail).round() as usize {
+            let depth_m = -1.2 * (1.0 - self.rng.random::<f64>()).ln();
+            let place = bay.at(middle_m + self.rng.random_range(-half_m..half_m), -depth_m.min(facade.inside_m));
+            self.facing(place, bay.outward, 1.5, 0.25 * bay.strength, bay.body);
+        }
+    }
+
+    /// A recess: its jambs and steps make right angles that look back wherever they are seen from.
+    fn door(&mut self, bay: &Bay) {
+        let at = self.between(0.0, bay.width_m);
+        for side in [-1.0, 1.0] {
+            let way = bay.outward + bay.along * side;
+            self.facing(bay.at(at + 0.45 * side, -0.1), way, 3.0, 5.0 * bay.strength, bay.body);
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! One side of a street: where its kerb runs, and the land beyond it.
+
+use nalgebra::{Isometry2, Point2, Vector2};
+
+use super::land::Lot;
+use super::random::hash;
+use crate::streets::{Street, Streets};
+
+/// Metres between the nodes of a street's line.
+const NODE_M: f64 = 2.0;
+/// Metres before and behind a station over which its direction is taken: a driven line wavers.
+const TANGENT_M: f64 = 5.0;
+/// How far from its station, along the street, the nearest point of a street may be for a place to be the station's.
+const OWN_M: f64 = 8.0;
+
+/// The middle of a street's carriageway, by metres along it.
+pub(super) struct Line {
+    /// Places, [`NODE_M`] apart along the street.
+    nodes: Vec<Point2<f64>>,
+    length_m: f64,
+    /// What the street's random numbers come from: where it begins. Its number among the streets may change as the
+    /// network grows, and its end as the drive does.
+    key: u64,
+}
+
+impl Line {
+    pub(super) fn new(street: &Street) -> Self {
+        let mut nodes = vec![street.centre[0]];
+        let mut passed_m = 0.0;
+        for ends in street.centre.windows(2) {
+            let (way, length_m) = (ends[1] - ends[0], (ends[1] - ends[0]).norm());
+            while nodes.len() as f64 * NODE_M <= passed_m + length_m {
+                nodes.push(ends[0] + way * ((nodes.len() as f64 * NODE_M - passed_m) / length_m));
+            }
+            passed_m += length_m;
+        }
+        let cell = |metres: f64| (4.0 * metres).round() as i64 as u64;
+        let (start, next) = (nodes[0], nodes[nodes.len().min(5) - 1]);
+        let key = hash(&[cell(start.x), cell(start.y), cell(next.x), cell(next.y)]);
+        Self { length_m: (nodes.len() - 1) as f64 * NODE_M, nodes, key }
+    }
+
+    fn centre(&self, along_m: f64) -> Point2<f64> {
+        let at = (along_m / NODE_M).clamp(0.0, (self.nodes.len() - 1) as f64);
+        let node = (at as usize).min(self.nodes.len().saturating_sub(2));
+        let next = self.nodes[(node + 1).min(self.nodes.len() - 1)];
+        self.nodes[node] + (next - self.nodes[node]) * (at - node as f64)
+    }
+
+    /// Unit vector along the street.
+    fn direction(&self, along_m: f64) -> Vector2<f64> {
+        let way = self.centre(along_m + TANGENT_M) - self.centre(along_m - TANGENT_M);
+        way.try_normalize(1e-6).unwrap_or_else(Vector2::x)
+    }
+}
+
+/// One side of a street.
+#[derive(Clone, Copy)]
+pub(super) struct Frontage<'a> {
+    streets: &'a Streets,
+    line: &'a Line,
+    street: usize,
+    half_width_m: f64,
+    /// 1 to the left of the street's direction, -1 to the right.
+    side: f64,
+}
+
+impl<'a> Frontage<'a> {
+    /// Both sides of a street.
+    pub(super) fn sides(streets: &'a Streets, street: usize, line: &'a Line) -> [Self; 2] {
+        let half_width_m = streets.streets()[street].half_width_m;
+        [1.0, -1.0].map(|side| Self { streets, line, street, half_width_m, side })
+    }
+
+    pub(super) fn length_m(&self) -> f64 {
+        self.line.length_m
+    }
+
+    /// What the random numbers of both sides come from.
+    pub(super) fn street_key(&self) -> u64 {
+        self.line.key
+    }
+
+    /// Share of a regular distance by which this side's things are shifted against the other's.
+    pub(super) fn phase(&self) -> f64 {
+        if self.side > 0.0 { 0.0 } else { 0.5 }
+    }
+
+    /// What this side's random numbers come from.
+    pub(super) fn key(&self) -> u64 {
+        self.line.key ^ u64::from(self.side < 0.0)
+    }
+
+    /// A place `out_m` metres beyond the kerb.
+    pub(super) fn place(&self, along_m: f64, out_m: f64) -> Point2<f64> {
+        let direction = self.line.direction(along_m);
+        let left = Vector2::new(-direction.y, direction.x);
+        self.line.centre(along_m) + left * (self.side * (self.half_width_m + out_m))
+    }
+
+    /// A frame `out_m` metres beyond the kerb: x along it, y away from the street.
+    pub(super) fn frame(&self, along_m: f64, out_m: f64) -> Isometry2<f64> {
+        let along = self.line.direction(along_m) * self.side;
+        Isometry2::new(self.place(along_m, out_m).coords, along.y.atan2(along.x))
+    }
+
+    /// Whether a place is this side's to furnish: no other street, and no other part of this one, is nearer.
+    pub(super) fn owns(&self, along_m: f64, place: Point2<f64>) -> bool {
+        let nearest = self.streets.nearest(place, 30.0);
+        nearest.is_some_and(|found| found.street == self.street && (found.along_m - along_m).abs() < OWN_M)
+    }
+
+    /// Whether a place is at least `metres` from all kerbs.
+    pub(super) fn is_clear(&self, place: Point2<f64>, metres: f64) -> bool {
+        self.streets.clearance_m(place, metres) >= metres
+    }
+
+    /// The largest rectangle with its front along the kerb between two stations, `out_m` metres beyond it; none where
+    /// the street bends too sharply. It may lie on other streets.
+    pub(super) fn lot(&self, along_m: f64, width_m: f64, out_m: f64, depth_m: f64) -> Option<Lot> {
+        let [front, back] = [out_m, out_m + depth_m].map(|out| {
+            let (from, to) = (self.place(along_m, out), self.place(along_m + width_m, out));
+            if self.side > 0.0 { (from, to) } else { (to, from) }
+        });
+        let way = (front.1 - front.0).try_normalize(1e-6)?;
+        let usable_m = (front.1 - front.0).norm().min((back.1 - back.0).dot(&way));
+        if usable_m < 0.6 * width_m {
+            return None;
+        }
+        let origin = nalgebra::center(&front.0, &front.1) - way * (usable_m / 2.0);
+        let pose = Isometry2::new(origin.coords, way.y.atan2(way.x));
+        Some(Lot { pose, width_m: usable_m, depth_m })
+    }
+}

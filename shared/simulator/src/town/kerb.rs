@@ -1,0 +1,231 @@
+//! What stands between a street and the land along it: posts, signs, trees, parked cars, barriers.
+//!
+//! A post is a metal cylinder, 2π r h² / λ at a right angle (Knott, Shaeffer, Tuley: Radar Cross Section), of whose height
+//! only the first Fresnel zone counts: r = 0.08 m and h = 0.2 m at 20 m make 5 m². A sign is a flat plate, 4π A² / λ², in
+//! the same zone some thousand square metres, of which hardly one hangs upright enough to show half.
+
+use nalgebra::{Point2, Rotation2, Vector2};
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+
+use super::boundary::Boundary;
+use super::config::TownConfig;
+use super::district::District;
+use super::frontage::Frontage;
+use super::random::{hash, normal};
+use super::site::{Built, Site};
+use super::vehicle::CAR_HALF_M;
+use crate::world::NO_BODY;
+
+/// From the kerb to posts and signs, metres.
+const POSTS_OUT_M: f64 = 0.5;
+/// From the kerb to the middle of parked cars: they stand in bays beside the carriageway, metres.
+const CARS_OUT_M: f64 = 1.25;
+/// Width of the bays of parked cars, metres.
+pub(super) const BAYS_M: f64 = 2.4;
+/// Nothing reaches nearer to any kerb than this, metres.
+const FREE_M: f64 = 0.2;
+
+/// A stretch of one side of a street.
+pub(super) struct Kerb<'a> {
+    pub frontage: Frontage<'a>,
+    pub config: &'a TownConfig,
+    pub district: District,
+    /// Where it begins and ends, metres along the street.
+    pub from_m: f64,
+    pub to_m: f64,
+    /// From the kerb to the land beyond, bays included, metres.
+    pub pavement_m: f64,
+    /// Whether there are bays for cars.
+    pub bays: bool,
+    pub rng: ChaCha8Rng,
+}
+
+impl Kerb<'_> {
+    pub(super) fn furnish(&mut self, built: &mut Built) {
+        let (_, trees) = self.district.kerb_shares();
+        self.lamp_posts(built);
+        self.signs(built);
+        if self.bays {
+            self.parked_cars(built);
+        }
+        if self.rng.random_bool((trees * self.config.trees).min(1.0)) {
+            self.trees(built);
+        }
+        self.occasional(built);
+        self.ground(built);
+    }
+
+    /// Where posts stand: behind the bays, if there are any.
+    fn posts_out_m(&self) -> f64 {
+        POSTS_OUT_M + if self.bays { BAYS_M } else { 0.0 }
+    }
+
+    /// A site at a station, if the place is this kerb's and free.
+    fn site<'s>(&mut self, along_m: f64, out_m: f64, free_m: f64, built: &'s mut Built) -> Option<Site<'s>> {
+        let pose = self.frontage.frame(along_m, out_m);
+        let place = Point2::from(pose.translation.vector);
+        let ours = self.frontage.owns(along_m, place) && self.frontage.is_clear(place, free_m);
+        let rng = super::random::generator(&[self.rng.random()]);
+        ours.then_some(Site { built, pose, rng })
+    }
+
+    /// Whether no corner of a rectangle in the frame of a station reaches over a kerb.
+    fn has_room(&self, along_m: f64, out_m: f64, x: [f64; 2], y: [f64; 2]) -> bool {
+        let frame = self.frontage.frame(along_m, out_m);
+        let corners = x.into_iter().flat_map(|x| y.map(|y| Point2::new(x, y)));
+        corners.into_iter().all(|corner| self.frontage.is_clear(frame * corner, 0.1))
+    }
+
+    /// At regular distances along the whole street, by turns to its left and right.
+    fn lamp_posts(&mut self, built: &mut Built) {
+        let every_m = 40.0 + (hash(&[self.frontage.street_key()]) % 25) as f64;
+        let first = (self.from_m / every_m - self.frontage.phase()).ceil();
+        let mut along_m = (first + self.frontage.phase()) * every_m;
+        while along_m < self.to_m {
+            let out_m = self.posts_out_m();
+            if let Some(mut site) = self.site(along_m, out_m, FREE_M, built) {
+                site.post(Point2::origin());
+            }
+            along_m += every_m;
+        }
+    }
+
+    fn signs(&mut self, built: &mut Built) {
+        let every_m = if self.district == District::Country { 90.0 } else { 28.0 };
+        self.along(0.2 * every_m, 1.8 * every_m, |kerb, along_m| {
+            let out_m = kerb.posts_out_m();
+            if let Some(mut site) = kerb.site(along_m, out_m, FREE_M, built) {
+                site.sign();
+            }
+        });
+    }
+
+    fn trees(&mut self, built: &mut Built) {
+        let every_m = self.rng.random_range(7.0..13.0);
+        let out_m = self.posts_out_m() + 0.6;
+        self.along(every_m, every_m + 1.0, |kerb, along_m| {
+            if let Some(mut site) = kerb.site(along_m, out_m, 1.0, built) {
+                site.tree(Point2::origin(), 0.55);
+            }
+        });
+    }
+
+    fn parked_cars(&mut self, built: &mut Built) {
+        self.along(5.4, 6.6, |kerb, along_m| {
+            if !kerb.rng.random_bool(kerb.config.parked_cars) {
+                return;
+            }
+            let (length, width) = (CAR_HALF_M.0 + 0.2, CAR_HALF_M.1);
+            if !kerb.has_room(along_m, CARS_OUT_M, [-length, length], [-width, width]) {
+                return;
+            }
+            if let Some(mut site) = kerb.site(along_m, CARS_OUT_M, FREE_M, built) {
+                site.parked_car(Point2::origin(), 0.0);
+            }
+        });
+    }
+
+    /// Bollards, a bus stop, railings, a crash barrier: each on few stretches.
+    fn occasional(&mut self, built: &mut Built) {
+        let (urban, open) = match self.district {
+            District::City => (1.0, 0.0),
+            District::Suburb | District::Campus => (0.5, 0.3),
+            District::Country => (0.05, 1.0),
+        };
+        if self.rng.random_bool(0.12 * urban) {
+            self.bollards(built);
+        }
+        if self.rng.random_bool(0.1 * urban) {
+            self.bus_stop(built);
+        }
+        if self.rng.random_bool(0.1 * urban) {
+            self.rail(Boundary::Railing, built);
+        }
+        if self.rng.random_bool(0.12 * open) {
+            self.rail(Boundary::Barrier, built);
+        }
+    }
+
+    fn bollards(&mut self, built: &mut Built) {
+        let out_m = self.posts_out_m();
+        let (from_m, every_m) = (self.rng.random_range(self.from_m..self.to_m), self.rng.random_range(1.5..2.5));
+        for along_m in (0..12).map(|index| from_m + f64::from(index) * every_m) {
+            if along_m < self.to_m
+                && let Some(mut site) = self.site(along_m, out_m, FREE_M, built)
+            {
+                site.point(Point2::origin(), 0.8, 3.0, NO_BODY);
+            }
+        }
+    }
+
+    fn bus_stop(&mut self, built: &mut Built) {
+        let along_m = self.rng.random_range(self.from_m..self.to_m);
+        // Open to the street, its back at the land's edge.
+        let out_m = self.pavement_m - 1.3;
+        if out_m > POSTS_OUT_M
+            && self.has_room(along_m, out_m, [-1.8, 1.8], [0.0, 1.2])
+            && let Some(mut site) = self.site(along_m, out_m, POSTS_OUT_M, built)
+        {
+            site.shelter();
+        }
+    }
+
+    /// A rail along the kerb, in pieces that follow its bends.
+    fn rail(&mut self, kind: Boundary, built: &mut Built) {
+        let out_m = self.posts_out_m();
+        let mut along_m = self.from_m;
+        while along_m + 4.0 <= self.to_m {
+            let end = self.frontage.place(along_m + 4.0, out_m);
+            let free = self.frontage.is_clear(end, FREE_M) && self.frontage.owns(along_m + 4.0, end);
+            if let Some(mut site) = self.site(along_m, out_m, FREE_M, built)
+                && free
+            {
+                let end = site.pose.inverse_transform_point(&end);
+                site.boundary(kind, Point2::origin(), end);
+            }
+            along_m += 4.0;
+        }
+    }
+
+    /// Kerb stones, drains, grass and litter between the carriageway and the land: weak, and everywhere.
+    fn ground(&mut self, built: &mut Built) {
+        self.along(2.0, 6.0, |kerb, along_m| {
+            let middle_m = kerb.pavement_m / 2.0;
+            let Some(mut site) = kerb.site(along_m, middle_m, middle_m - 0.1, built) else { return };
+            for _ in 0..6 {
+                let (x, y) = (site.rng.random_range(-2.0..2.0), site.rng.random_range(-1.0..1.0) * (middle_m - 0.3));
+                if kerb.frontage.is_clear(site.pose * Point2::new(x, y), 0.05) {
+                    site.point(Point2::new(x, y), 0.02, 6.0, NO_BODY);
+                }
+            }
+        });
+    }
+
+    /// Calls for stations with random distances between `least_m` and `most_m` along the stretch.
+    fn along(&mut self, least_m: f64, most_m: f64, mut call: impl FnMut(&mut Self, f64)) {
+        let mut along_m = self.from_m + self.rng.random_range(0.0..most_m);
+        while along_m < self.to_m {
+            call(self, along_m);
+            along_m += self.rng.random_range(least_m..most_m);
+        }
+    }
+}
+
+impl Site<'_> {
+    /// A lamp post: pole, foot and door, close together.
+    pub(super) fn post(&mut self, place: Point2<f64>) {
+        for median_m2 in [3.0, 1.0, 0.5] {
+            self.cloud(place, 1, 0.1, 0.2, median_m2);
+        }
+    }
+
+    /// A pole with a plate against the traffic, whose bends and brackets reflect to all sides.
+    fn sign(&mut self) {
+        let body = self.body();
+        let turn = Rotation2::new(0.08 * normal(&mut self.rng));
+        let against = if self.chance(0.8) { -1.0 } else { 1.0 };
+        self.point(Point2::origin(), 1.5, 3.0, body);
+        self.facing(Point2::new(0.05 * against, 0.0), turn * Vector2::new(against, 0.0), 400.0, 150.0, body);
+    }
+}

@@ -1,0 +1,280 @@
+//! What stands on a piece of land, by its use.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use nalgebra::{Point2, Vector2};
+
+use super::boundary::Boundary;
+use super::building::{Building, Form, Room};
+use super::config::TownConfig;
+use super::district::Use;
+use super::facade::Material;
+use super::site::Site;
+
+/// Between a house and the side of its land where it has neighbours, metres.
+const PARTY_M: f64 = 0.03;
+
+/// A piece of land, from the street (`y` = 0) backwards; what is built on it stays inside.
+pub(super) struct Plot<'a, 's> {
+    pub site: Site<'s>,
+    pub config: &'a TownConfig,
+    pub width_m: f64,
+    pub depth_m: f64,
+    /// How much there is to see of its buildings: 1 along a street, less behind.
+    pub detail: f64,
+}
+
+impl Plot<'_, '_> {
+    pub(super) fn build(&mut self, kind: Use) {
+        match kind {
+            Use::Terrace => self.terrace(),
+            Use::Detached => self.detached(),
+            Use::Flats => self.flats(),
+            Use::Hall => self.hall(),
+            Use::Church => self.church(),
+            Use::Green => self.green(),
+            Use::CarPark => self.car_park(),
+            Use::Field => self.field(),
+            Use::Farm => self.farm(),
+            Use::Alley => self.alley(),
+            Use::Yards => self.yards(0.5),
+        }
+    }
+
+    fn at(&self, x: f64, y: f64) -> Point2<f64> {
+        Point2::new(x.clamp(0.0, self.width_m), y.clamp(0.0, self.depth_m))
+    }
+
+    fn house(&mut self, room: Room, form: Form, front: Material, rest: Material) {
+        self.site.building(&Building { room, form, front, rest, detail: self.detail, balconies_m: 0.0 });
+    }
+
+    /// A boundary across the plot, `y` metres from the street, with a gap for a gate.
+    fn across(&mut self, kind: Boundary, y: f64) {
+        let gate_m = self.site.between(1.0, (self.width_m - 4.0).max(1.0));
+        let [left, gate, beyond, right] = [0.3, gate_m, gate_m + 3.2, self.width_m - 0.3].map(|x| self.at(x, y));
+        self.site.boundary(kind, left, gate);
+        if beyond.x < right.x {
+            self.site.boundary(kind, beyond, right);
+        }
+    }
+
+    /// A boundary along the plot's left side, from `y` to its back.
+    fn aside(&mut self, kind: Boundary, y: f64) {
+        let (from, to) = (self.at(0.1, y + 0.2), self.at(0.1, self.depth_m - 0.2));
+        if from.y < to.y {
+            self.site.boundary(kind, from, to);
+        }
+    }
+
+    /// So many trees for a thousand square metres, from `y` to the back.
+    fn trees(&mut self, y: f64, per_1000_m2: f64) {
+        let area_m2 = self.width_m * (self.depth_m - y).max(0.0);
+        let wanted = per_1000_m2 * 1e-3 * area_m2 * self.config.trees;
+        let count = wanted as usize + usize::from(self.site.chance(wanted.fract()));
+        for _ in 0..count {
+            let (x, y) = (self.site.between(1.6, self.width_m - 1.6), self.site.between(y + 1.6, self.depth_m - 1.6));
+            let place = self.at(x, y);
+            self.site.tree(place, 1.5);
+        }
+    }
+
+    fn clutter(&mut self, y: f64, per_m2: f64, median_m2: f64) {
+        let size = Vector2::new(self.width_m, self.depth_m - y);
+        self.site.clutter(Point2::new(0.0, y), size, per_m2, median_m2);
+    }
+
+    fn terrace(&mut self) {
+        let setback_m = if self.site.chance(0.6) { 0.0 } else { self.site.between(0.3, 1.5) };
+        let depth_m = self.site.between(9.0, 13.0).min(self.depth_m - setback_m);
+        let room = Room { x: PARTY_M, y: setback_m, width_m: self.width_m - 2.0 * PARTY_M, depth_m };
+        let form = match self.site.between(0.0, 1.0) {
+            ..0.55 => Form::Plain,
+            ..0.75 => Form::Stepped,
+            _ => Form::Angle,
+        };
+        let front = match self.site.between(0.0, 1.0) {
+            ..0.68 => Material::Brick,
+            ..0.8 => Material::Concrete,
+            _ => Material::Glass,
+        };
+        self.house(room, form, front, Material::Brick);
+        self.yards(setback_m + depth_m);
+    }
+
+    /// What is behind houses: a wall to the neighbour and at the back, a shed, bins.
+    fn yards(&mut self, y: f64) {
+        if self.depth_m - y < 3.0 {
+            return;
+        }
+        let kind = if self.site.chance(0.6) { Boundary::Wall } else { Boundary::Fence };
+        self.aside(kind, y);
+        self.across(kind, self.depth_m - 0.3);
+        if self.depth_m - y > 5.0 && self.site.chance(0.4) {
+            let room = Room { x: 0.5, y: self.depth_m - 3.2, width_m: 2.5, depth_m: 2.0 };
+            self.house(room, Form::Plain, Material::Timber, Material::Timber);
+        }
+        self.trees(y, 2.0);
+        self.clutter(y, 0.06, 0.06);
+    }
+
+    fn detached(&mut self) {
+        let garden_m = self.site.between(4.0, 8.0);
+        let front = match self.site.between(0.0, 1.0) {
+            ..0.35 => Some(Boundary::Hedge),
+            ..0.6 => Some(Boundary::Wall),
+            ..0.8 => Some(Boundary::Fence),
+            ..0.87 => Some(Boundary::Railing),
+            _ => None,
+        };
+        if let Some(kind) = front {
+            self.across(kind, 0.5);
+        }
+        let width_m = self.site.between(6.5, 10.5).min(self.width_m - 4.4);
+        let depth_m = self.site.between(7.0, 10.0);
+        let form = if self.site.chance(0.5) { Form::Stepped } else { Form::Angle };
+        self.house(Room { x: 1.0, y: garden_m, width_m, depth_m }, form, Material::Brick, Material::Brick);
+        self.drive(1.0 + width_m + 0.3, garden_m);
+        self.aside(Boundary::Fence, garden_m);
+        self.across(Boundary::Fence, self.depth_m - 0.4);
+        self.trees(garden_m + depth_m + 1.0, 5.0);
+        self.clutter(0.5, 0.04, 0.03);
+    }
+
+    /// A garage beside the house, and perhaps a car before it.
+    fn drive(&mut self, x: f64, garden_m: f64) {
+        let y = garden_m + self.site.between(1.0, 3.0);
+        if self.site.chance(0.6) {
+            self.house(Room { x, y, width_m: 2.8, depth_m: 5.5 }, Form::Plain, Material::Metal, Material::Brick);
+        }
+        if garden_m > 5.0 && self.site.chance(self.config.parked_cars) {
+            let place = self.at(x + 1.4, y - 2.6);
+            self.site.parked_car(place, FRAC_PI_2);
+        }
+    }
+
+    fn flats(&mut self) {
+        let setback_m = self.site.between(3.0, 7.0);
+        let depth_m = self.site.between(11.0, 15.0).min(self.depth_m - setback_m);
+        let room = Room { x: 1.5, y: setback_m, width_m: self.width_m - 3.0, depth_m };
+        let form = if self.site.chance(0.5) { Form::Plain } else { Form::Stepped };
+        let (front, rest, detail) = (Material::Concrete, Material::Concrete, self.detail);
+        self.site.building(&Building { room, form, front, rest, detail, balconies_m: 3.6 });
+        let front = if self.site.chance(0.5) { Boundary::Railing } else { Boundary::Hedge };
+        self.across(front, 0.6);
+        self.parking(setback_m + depth_m + 4.0);
+        self.clutter(0.5, 0.02, 0.03);
+    }
+
+    fn hall(&mut self) {
+        let setback_m = self.site.between(4.0, (0.4 * self.depth_m).max(4.5));
+        let depth_m = (self.depth_m - setback_m) * self.site.between(0.6, 0.95);
+        let room = Room { x: 2.0, y: setback_m, width_m: self.width_m - 4.0, depth_m };
+        let form = match self.site.between(0.0, 1.0) {
+            ..0.35 => Form::Plain,
+            ..0.7 => Form::Angle,
+            _ => Form::Stepped,
+        };
+        let (front, rest) = match self.site.between(0.0, 1.0) {
+            ..0.4 => (Material::Glass, Material::Concrete),
+            ..0.7 => (Material::Brick, Material::Concrete),
+            _ => (Material::Metal, Material::Metal),
+        };
+        self.house(room, form, front, rest);
+        if setback_m > 9.0 {
+            self.row_of_cars(2.9);
+        }
+        self.trees(0.0, 1.0);
+    }
+
+    fn church(&mut self) {
+        let room = Room { x: 5.0, y: 5.0, width_m: self.width_m - 10.0, depth_m: (self.depth_m - 6.0).min(34.0) };
+        self.house(room, Form::Church, Material::Brick, Material::Brick);
+        let front = if self.site.chance(0.5) { Boundary::Railing } else { Boundary::Wall };
+        self.across(front, 0.4);
+        // Gravestones.
+        self.clutter(1.0, 0.05, 0.15);
+    }
+
+    fn green(&mut self) {
+        match self.site.between(0.0, 1.0) {
+            ..0.3 => self.across(Boundary::Railing, 0.5),
+            ..0.6 => self.across(Boundary::Hedge, 0.8),
+            _ => {}
+        }
+        self.trees(1.0, 9.0);
+        self.clutter(0.5, 0.05, 0.02);
+    }
+
+    fn car_park(&mut self) {
+        match self.site.between(0.0, 1.0) {
+            ..0.3 => self.across(Boundary::Wall, 0.4),
+            ..0.5 => self.across(Boundary::Hedge, 0.8),
+            ..0.7 => self.across(Boundary::Barrier, 0.4),
+            _ => {}
+        }
+        self.parking(4.0);
+        for x in [0.25, 0.75] {
+            let place = self.at(self.width_m * x, self.depth_m / 2.0);
+            self.site.post(place);
+        }
+    }
+
+    /// Rows of parked cars from `y` to the back, with lanes between.
+    fn parking(&mut self, y: f64) {
+        let mut row = y;
+        let mut pair = 5.0;
+        while row < self.depth_m - 2.5 {
+            self.row_of_cars(row);
+            row += pair;
+            pair = 16.0 - pair;
+        }
+    }
+
+    /// Cars side by side, `y` metres from the street.
+    fn row_of_cars(&mut self, y: f64) {
+        for bay in 1..(self.width_m / 2.5) as usize {
+            if self.site.chance(0.8 * self.config.parked_cars) {
+                let place = self.at(2.5 * bay as f64, y);
+                let heading_rad = if self.site.chance(0.5) { FRAC_PI_2 } else { -FRAC_PI_2 };
+                self.site.parked_car(place, heading_rad);
+            }
+        }
+    }
+
+    fn field(&mut self) {
+        match self.site.between(0.0, 1.0) {
+            ..0.45 => self.across(Boundary::Hedge, 1.0),
+            ..0.7 => self.across(Boundary::Wire, 0.6),
+            ..0.78 => self.across(Boundary::Wall, 0.6),
+            _ => {}
+        }
+        if self.site.chance(0.4) {
+            let kind = if self.site.chance(0.6) { Boundary::Hedge } else { Boundary::Wire };
+            self.aside(kind, 2.0);
+        }
+        let wooded = if self.site.chance(0.2) { 12.0 } else { 0.8 };
+        self.trees(1.0, wooded);
+        self.clutter(1.0, 0.03, 0.008);
+    }
+
+    fn farm(&mut self) {
+        let wide_m = self.width_m - 20.0;
+        let house = Room { x: 3.0, y: 6.0, width_m: 11.0, depth_m: 9.0 };
+        self.house(house, Form::Angle, Material::Brick, Material::Brick);
+        let barn = Room { x: 18.0, y: 9.0, width_m: wide_m, depth_m: (self.depth_m - 12.0).min(20.0) };
+        self.house(barn, Form::Plain, Material::Metal, Material::Metal);
+        self.across(Boundary::Wall, 0.6);
+        let place = self.at(15.0, 4.0);
+        self.site.parked_car(place, PI / 3.0);
+        self.clutter(2.0, 0.05, 0.1);
+    }
+
+    fn alley(&mut self) {
+        if self.site.chance(0.4) {
+            let (from, to) = (self.at(0.1, 1.0), self.at(self.width_m - 0.1, 1.0));
+            self.site.boundary(Boundary::Fence, from, to);
+        }
+        self.clutter(0.5, 0.1, 0.1);
+    }
+}

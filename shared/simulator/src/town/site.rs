@@ -1,0 +1,82 @@
+//! A building site: where things are put together in a frame of their own.
+
+use nalgebra::{Isometry2, Point2, Vector2};
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+
+use super::random::{normal, spread};
+use crate::world::{Aspect, Body, NO_BODY, Scatterer, Wall};
+
+/// What has been built, and the number of the last body.
+#[derive(Default)]
+pub(super) struct Built {
+    pub content: Body,
+    last_body: u32,
+}
+
+/// A place with a frame, whose things are drawn from a generator of its own. All coordinates are in that frame.
+pub(super) struct Site<'a> {
+    pub built: &'a mut Built,
+    pub pose: Isometry2<f64>,
+    pub rng: ChaCha8Rng,
+}
+
+/// How much of the power a wall lets through, there and back, and how much it mirrors.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Screen {
+    pub transmission: f64,
+    pub mirror: f64,
+}
+
+impl Site<'_> {
+    /// A number for a new body.
+    pub(super) fn body(&mut self) -> u32 {
+        self.built.last_body += 1;
+        self.built.last_body
+    }
+
+    pub(super) fn chance(&mut self, share: f64) -> bool {
+        self.rng.random_bool(share.clamp(0.0, 1.0))
+    }
+
+    pub(super) fn between(&mut self, least: f64, most: f64) -> f64 {
+        if least < most { self.rng.random_range(least..most) } else { least }
+    }
+
+    /// A scatterer that reflects to all sides, of `median_m2` with a spread of `deviation_db`.
+    pub(super) fn point(&mut self, place: Point2<f64>, median_m2: f64, deviation_db: f64, body: u32) {
+        self.push(place, median_m2, deviation_db, Aspect::AllRound, body);
+    }
+
+    /// A scatterer that reflects towards `way` (any length): see [`Aspect::Facing`].
+    pub(super) fn facing(&mut self, place: Point2<f64>, way: Vector2<f64>, sharpness: f64, median_m2: f64, body: u32) {
+        let normal = self.pose * way.try_normalize(1e-9).unwrap_or_else(Vector2::x);
+        self.push(place, median_m2, 5.0, Aspect::Facing { normal, sharpness }, body);
+    }
+
+    fn push(&mut self, place: Point2<f64>, median_m2: f64, deviation_db: f64, aspect: Aspect, body: u32) {
+        let cross_section_m2 = spread(&mut self.rng, median_m2, deviation_db);
+        self.built.content.scatterers.push(Scatterer { position: self.pose * place, cross_section_m2, aspect, body });
+    }
+
+    pub(super) fn wall(&mut self, from: Point2<f64>, to: Point2<f64>, screen: Screen, body: u32) {
+        let Screen { transmission, mirror } = screen;
+        let (from, to) = (self.pose * from, self.pose * to);
+        self.built.content.walls.push(Wall { from, to, transmission, mirror, body });
+    }
+
+    /// Scatterers of no body around a place: normally distributed, and never further than `reach_m` in x or y.
+    pub(super) fn cloud(&mut self, place: Point2<f64>, count: usize, deviation_m: f64, reach_m: f64, median_m2: f64) {
+        for _ in 0..count {
+            let offset = Vector2::from_fn(|_, _| (deviation_m * normal(&mut self.rng)).clamp(-reach_m, reach_m));
+            self.point(place + offset, median_m2, 4.0, NO_BODY);
+        }
+    }
+
+    /// Puts a finished body, given around its own origin, at a pose.
+    pub(super) fn place(&mut self, body: &Body, pose: &Isometry2<f64>) {
+        let pose = self.pose * pose;
+        self.built.content.scatterers.extend(body.scatterers.iter().map(|s| s.moved(&pose)));
+        self.built.content.walls.extend(body.walls.iter().map(|w| w.moved(&pose)));
+    }
+}
