@@ -73,7 +73,7 @@ pub struct Receiver {
     pub constant: f64,
     /// Range below which it falls with the square only, metres: an FMCW receiver filters low beat frequencies.
     pub filter_m: f64,
-    /// Range below which it does not fall at all, metres: the antenna looks over what is near.
+    /// Range below which it rises with the square, metres: the antenna on the roof looks over what is near.
     pub near_m: f64,
     /// Power at which the receiver saturates, in its units.
     pub full_scale: f32,
@@ -90,7 +90,8 @@ impl Receiver {
     /// Power received from 1 m2 at a range.
     pub fn sensitivity(&self, range_m: f64) -> f64 {
         let square = range_m * range_m;
-        self.constant / ((square + self.near_m * self.near_m) * (square + self.filter_m * self.filter_m))
+        let under_beam = (self.near_m * self.near_m / square).powi(2);
+        self.constant / (square * (square + self.filter_m * self.filter_m) * (1.0 + under_beam))
     }
 
     /// Wavelength of the carrier, metres.
@@ -192,9 +193,9 @@ impl Profile {
             carrier_ghz: 76.5,
             beam_rad: 1.27f64.to_radians(),
             cell_m: 0.24,
-            constant: 7.0e10,
+            constant: 3.0e11,
             filter_m: 60.0,
-            near_m: 8.0,
+            near_m: 4.0,
             full_scale: 1.0e7,
             whole_powers: true,
             floor_db: &OXFORD_FLOOR,
@@ -203,7 +204,7 @@ impl Profile {
         match self {
             Self::Cts350xOxford => oxford,
             Self::Cts350xRadiate => Receiver {
-                constant: 6.0e11,
+                constant: 2.7e12,
                 full_scale: 2.0e8,
                 whole_powers: false,
                 floor_db: &RADIATE_FLOOR,
@@ -211,9 +212,9 @@ impl Profile {
                 ..oxford
             },
             // No scan of it at hand: Oxford's, with the longer cell of its smaller bandwidth.
-            Self::Cir204h => Receiver { cell_m: 0.33, constant: 1.4e11, ..oxford },
+            Self::Cir204h => Receiver { cell_m: 0.33, constant: 3.0e11, ..oxford },
             Self::Ras6 => Receiver {
-                constant: 6.0e11,
+                constant: 2.7e12,
                 full_scale: 1.0e8,
                 floor_db: &RAS6_FLOOR,
                 ringing_db: &RAS6_RINGING,
@@ -224,7 +225,7 @@ impl Profile {
                 carrier_ghz: 24.0,
                 beam_rad: 2.6f64.to_radians(),
                 cell_m: 0.75,
-                constant: 1.0e10,
+                constant: 2.0e10,
                 filter_m: 40.0,
                 whole_powers: false,
                 floor_db: &K2PI_FLOOR,
@@ -235,37 +236,15 @@ impl Profile {
     }
 }
 
-/// Floors are means over all azimuths of real scans: an exponential distribution put through their lower third at each range.
-const OXFORD_FLOOR: [(f64, f64); 9] = [
-    (2.5, 3.0),
-    (4.0, 4.0),
-    (8.0, 5.5),
-    (13.0, 7.0),
-    (40.0, 7.0),
-    (60.0, 6.2),
-    (98.0, 5.0),
-    (140.0, 3.7),
-    (165.0, 3.7),
-];
+/// Floors are those of azimuths in which nothing stands, in real scans; K2Pi's is made up.
+const OXFORD_FLOOR: [(f64, f64); 4] = [(2.5, 2.5), (5.0, 3.7), (60.0, 3.7), (150.0, 3.2)];
 const OXFORD_RINGING: [(f64, f64); 8] =
     [(0.2, 19.7), (0.6, 22.2), (0.8, 24.2), (1.0, 23.7), (1.25, 19.7), (1.5, 15.2), (2.0, 11.2), (2.7, 2.0)];
-const RADIATE_FLOOR: [(f64, f64); 8] =
-    [(4.0, 12.0), (6.0, 11.2), (10.0, 11.2), (17.0, 12.5), (35.0, 13.2), (60.0, 12.5), (80.0, 12.0), (100.0, 11.0)];
+const RADIATE_FLOOR: [(f64, f64); 2] = [(5.0, 10.0), (100.0, 9.6)];
 const RADIATE_RINGING: [(f64, f64); 7] =
     [(0.2, 29.5), (1.5, 29.0), (1.75, 26.0), (2.0, 24.0), (2.5, 18.5), (3.0, 16.5), (4.0, 6.0)];
-const RAS6_FLOOR: [(f64, f64); 11] = [
-    (3.0, 19.5),
-    (6.0, 20.0),
-    (13.0, 22.0),
-    (20.0, 22.0),
-    (40.0, 19.8),
-    (60.0, 17.5),
-    (98.0, 14.7),
-    (140.0, 13.0),
-    (200.0, 12.0),
-    (250.0, 11.4),
-    (300.0, 10.2),
-];
+const RAS6_FLOOR: [(f64, f64); 7] =
+    [(3.0, 17.0), (55.0, 16.0), (90.0, 14.1), (115.0, 13.6), (150.0, 13.1), (225.0, 11.6), (300.0, 10.2)];
 const RAS6_RINGING: [(f64, f64); 8] =
     [(0.2, 39.5), (0.8, 42.0), (1.0, 41.7), (1.25, 37.7), (1.5, 34.5), (2.0, 28.0), (2.5, 22.0), (3.5, 10.0)];
 const K2PI_FLOOR: [(f64, f64); 2] = [(3.0, 8.0), (100.0, 6.0)];

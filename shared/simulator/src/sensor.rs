@@ -5,13 +5,14 @@
 //! - `stations`: where the sensor is at each azimuth, and when its beam passes a place,
 //! - `skyline`: rays to all sides, and the walls that each passes,
 //! - `echoes`, `ghosts`: what can be seen, directly and mirrored, and how strongly; `air`: what the weather takes,
-//! - `antenna`: how much of it each azimuth's beam takes in,
+//! - `elevation`: how much of each the beam has, being a few degrees high; `antenna`: how much of it each azimuth's beam takes in,
 //! - `spectrum`: what range processing and quantisation make of it,
 //! - `carrier`: what turns with the radar, its ringing and its vehicle; `noise`: all that no echo explains,
 //! - `effects`: each of these on or off.
 //!
 //! Echoes are summed as complex amplitudes with the phase of their true path, so that scatterers in one resolution
-//! cell interfere (speckle), and do so differently from the next pose. Not modelled: elevation, ways that bounce once.
+//! cell interfere (speckle), and do so differently from the next pose. Not modelled: heights other than by chance, ways
+//! that bounce once.
 
 mod air;
 mod antenna;
@@ -19,6 +20,7 @@ mod carrier;
 mod config;
 mod echoes;
 pub mod effects;
+mod elevation;
 mod ghosts;
 mod noise;
 mod skyline;
@@ -39,6 +41,7 @@ use self::carrier::Carrier;
 pub use self::config::SensorConfig;
 use self::echoes::{Echo, NEGLIGIBLE_POWER, View};
 pub use self::effects::Effects;
+use self::elevation::Nodding;
 use self::noise::Noise;
 use self::skyline::Skyline;
 use self::spectrum::RangeSpectrum;
@@ -110,6 +113,7 @@ pub struct Sensor {
     spectrum: RangeSpectrum,
     noise: Noise,
     carrier: Carrier,
+    nodding: Nodding,
     stations: Stations,
     skyline: Skyline,
     echoes: Vec<Echo>,
@@ -128,6 +132,7 @@ impl Sensor {
             antenna: Antenna::new(receiver.beam_rad, effects.side_lobes),
             noise: Noise::new(&sampling, &receiver, effects, &spectrum),
             carrier: Carrier::new(&sampling, &receiver, effects, &spectrum, seed),
+            nodding: Nodding::new(seed),
             spectrum,
             seed,
             stations: Stations::default(),
@@ -185,6 +190,8 @@ impl Sensor {
             receiver: &self.receiver,
             air: &air,
             effects: &self.effects,
+            nodding: &self.nodding,
+            middle_s,
             reach_m,
         };
         self.echoes.clear();

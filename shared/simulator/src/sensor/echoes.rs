@@ -4,6 +4,7 @@ use nalgebra::{Point2, Vector2};
 
 use super::Air;
 use super::effects::Effects;
+use super::elevation::{Nodding, lit};
 use super::skyline::Skyline;
 use super::stations::{Station, Stations};
 use crate::profile::Receiver;
@@ -41,6 +42,8 @@ pub(super) struct View<'a> {
     pub receiver: &'a Receiver,
     pub air: &'a Air,
     pub effects: &'a Effects,
+    pub nodding: &'a Nodding,
+    pub middle_s: f64,
     pub reach_m: f64,
 }
 
@@ -86,7 +89,8 @@ impl View<'_> {
         }
         let aspect =
             if self.effects.aspect { scatterer.aspect.gain(way / range_m) } else { scatterer.aspect.mean_gain() };
-        let in_the_open = scatterer.cross_section_m2 * aspect * self.received(range_m);
+        let in_the_open =
+            scatterer.cross_section_m2 * aspect * self.received(range_m) * self.lit(scatterer, range_m, from, azimuth);
         if in_the_open < NEGLIGIBLE_POWER {
             return None;
         }
@@ -96,6 +100,15 @@ impl View<'_> {
             false => 1.0,
         };
         (in_the_open * passed > NEGLIGIBLE_POWER).then(|| (in_the_open * passed).sqrt())
+    }
+
+    /// Share of the power that the beam has at a scatterer's height.
+    fn lit(&self, scatterer: &Scatterer, range_m: f64, from: &Station, azimuth: f64) -> f64 {
+        if !self.effects.elevation {
+            return 1.0;
+        }
+        let azimuth_rad = azimuth * self.stations.step_rad();
+        lit(scatterer.position, range_m, self.nodding.lift_rad(self.middle_s + from.time_s, azimuth_rad))
     }
 
     /// Power received from 1 m2 at a range: the fourth power of range, and the receiver's gain, which rises with it.

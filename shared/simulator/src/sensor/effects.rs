@@ -14,6 +14,8 @@ pub struct Effects {
     pub speckle: bool,
     /// Smooth and tilted surfaces reflect into some directions only; off: all reflect to all sides.
     pub aspect: bool,
+    /// The beam is a few degrees high and the vehicle nods, so that what is lit comes and goes.
+    pub elevation: bool,
     /// Walls hide what is behind them.
     pub occlusion: bool,
     /// Metal and glass fronts mirror strong reflectors to where nothing is.
@@ -54,6 +56,7 @@ impl Effects {
             side_lobes: on,
             speckle: on,
             aspect: on,
+            elevation: on,
             occlusion: on,
             multipath: on,
             phase_noise: on,

@@ -18,10 +18,10 @@ const SKIRT_PEAK: f64 = 100.0;
 const SKIRT_WIDTH_M: f64 = 1.5;
 /// Echoes bounce on between houses: so much of an echo's power, falling exponentially over so many metres behind it. The first
 /// is what is behind a front (rooms, eaves, what stands close by), the second a whole street.
-const TAIL: [(f64, f64); 2] = [(6.0e-4, 1.5), (2.5e-6, 45.0)];
+const TAIL: [(f64, f64); 3] = [(1.0e-3, 1.5), (2.0e-5, 10.0), (5.0e-6, 50.0)];
 /// How much that differs from one direction to the next, standard deviation, dB, and how wide a direction is.
-const LIVELINESS_DB: f64 = 5.0;
-const LIVELY_AZIMUTHS: usize = 4;
+const LIVELINESS_DB: f64 = 10.0;
+const LIVELY_AZIMUTHS: usize = 7;
 /// Spurious lines: range as a share of the farthest, and power in units of the floor there.
 const LINES: [(f64, f64); 4] = [(0.069, 0.5), (0.164, 0.6), (0.37, 0.9), (0.55, 0.7)];
 /// Times a scan that another radar is heard, on average.
@@ -165,11 +165,15 @@ impl Noise {
         }
     }
 
-    /// Log-normal numbers, each for a few azimuths in a row.
+    /// Log-normal numbers round the sweep, smooth over some azimuths.
     fn draw_liveliness(&mut self, rng: &mut impl Rng) {
-        for group in self.liveliness.chunks_mut(LIVELY_AZIMUTHS) {
-            let db: f64 = LIVELINESS_DB * rng.sample::<f64, _>(StandardNormal);
-            group.fill(10f64.powf(db / 10.0));
+        let knots = self.liveliness.len().div_ceil(LIVELY_AZIMUTHS);
+        let knots: Vec<f64> = (0..knots).map(|_| LIVELINESS_DB * rng.sample::<f64, _>(StandardNormal)).collect();
+        for (azimuth, liveliness) in self.liveliness.iter_mut().enumerate() {
+            let (knot, share) = (azimuth / LIVELY_AZIMUTHS, azimuth % LIVELY_AZIMUTHS);
+            let share = share as f64 / LIVELY_AZIMUTHS as f64;
+            let db = knots[knot] * (1.0 - share) + knots[(knot + 1) % knots.len()] * share;
+            *liveliness = 10f64.powf(db / 10.0);
         }
     }
 }

@@ -1,0 +1,93 @@
+//! The third dimension, as far as a plane world needs it: the beam is a few degrees high, and the vehicle pitches and rolls.
+//!
+//! Each scatterer stands for a column of a facade, a trunk or a car, lit at one height. What is near shows a small part of its
+//! column; and as the vehicle nods, another one. So returns come and go from scan to scan.
+
+use std::f64::consts::{LN_2, TAU};
+
+use nalgebra::Point2;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+/// Height of the beam at half power, there and back, radians: 1.8 degrees one way, widened downwards.
+const BEAM_HEIGHT_RAD: f64 = 0.052;
+/// Heights of scatterers about the radar's, metres: this much up or down.
+const HEIGHT_M: f64 = 1.1;
+/// Nodding of a car on its springs, standard deviation, radians.
+const NODDING_RAD: f64 = 0.005;
+/// Its frequencies, hertz.
+const NODDING_HZ: std::ops::Range<f64> = 0.7..2.2;
+/// Oscillations that it is made of, for each axis.
+const OSCILLATIONS: usize = 4;
+
+#[derive(Clone, Copy, Debug)]
+struct Oscillation {
+    amplitude_rad: f64,
+    frequency_hz: f64,
+    phase: f64,
+}
+
+/// How the vehicle pitches and rolls.
+#[derive(Clone, Debug)]
+pub(super) struct Nodding {
+    pitch: [Oscillation; OSCILLATIONS],
+    roll: [Oscillation; OSCILLATIONS],
+}
+
+impl Nodding {
+    /// A vehicle's; one seed is one drive.
+    pub fn new(seed: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(u64::MAX - 1);
+        let mut oscillation = || Oscillation {
+            amplitude_rad: NODDING_RAD * (2.0 / OSCILLATIONS as f64).sqrt() * rng.sample::<f64, _>(StandardNormal),
+            frequency_hz: rng.random_range(NODDING_HZ),
+            phase: rng.random_range(0.0..TAU),
+        };
+        Self { pitch: std::array::from_fn(|_| oscillation()), roll: std::array::from_fn(|_| oscillation()) }
+    }
+
+    /// How far the beam points up at an azimuth (clockwise from ahead) and a time, radians.
+    pub fn lift_rad(&self, time_s: f64, azimuth_rad: f64) -> f64 {
+        let sum = |all: &[Oscillation]| -> f64 {
+            all.iter().map(|o| o.amplitude_rad * (TAU * o.frequency_hz * time_s + o.phase).sin()).sum()
+        };
+        sum(&self.pitch) * azimuth_rad.cos() + sum(&self.roll) * azimuth_rad.sin()
+    }
+}
+
+/// Share of the power that a scatterer gets from a beam that points up by `lift_rad`.
+pub(super) fn lit(place: Point2<f64>, range_m: f64, lift_rad: f64) -> f64 {
+    let off = (height_m(place) / range_m - lift_rad) / BEAM_HEIGHT_RAD;
+    (-4.0 * LN_2 * off * off).exp()
+}
+
+/// The height of what stands at a place, metres above the radar: as good as random, and always the same.
+fn height_m(place: Point2<f64>) -> f64 {
+    // The finaliser of SplitMix64 (Steele et al. 2014) over both coordinates' bits.
+    let mut bits = place.x.to_bits() ^ place.y.to_bits().rotate_left(32);
+    bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    HEIGHT_M * (((bits ^ (bits >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn heights_fill_their_span_evenly() {
+        let heights: Vec<f64> = (0..10_000).map(|i| height_m(Point2::new(f64::from(i) * 0.1, 7.0))).collect();
+        let mean = heights.iter().sum::<f64>() / 1e4;
+        let spread = (heights.iter().map(|h| h * h).sum::<f64>() / 1e4).sqrt();
+        assert!(mean.abs() < 0.05 && (spread - HEIGHT_M / 3f64.sqrt()).abs() < 0.05, "{mean} {spread}");
+    }
+
+    #[test]
+    fn a_beam_that_points_up_loses_what_is_far_and_keeps_what_is_high() {
+        let place = (0..10_000).map(|i| Point2::new(f64::from(i), 0.0)).find(|p| height_m(*p) > 1.03).unwrap_or_default();
+        assert!(lit(place, 1e4, 0.0) > 0.99 && lit(place, 1e4, 0.05) < 0.1);
+        assert!(lit(place, 21.0, 0.05) > 0.9 && lit(place, 10.0, 0.0) < 0.01);
+    }
+}
