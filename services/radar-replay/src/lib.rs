@@ -1,12 +1,16 @@
-//! Plays a recorded dataset onto the `scan` topic, each image decoded where its readers will find it.
+//! Plays a recorded dataset onto the `scan` topic, each image decoded where its readers will find it; or a simulated drive, each
+//! image rendered while those before it are on their way, read as it would be read from a disk.
 
 mod config;
+mod render_ahead;
 
 use gyre_messages::ScanHeader;
 use gyre_radar::{Dataset, DatasetOptions, OpenError};
+use gyre_simulator::{Recording, SimulationConfig};
 use gyre_stage::{Launch, Source, StageError, Statistics, source};
 
 pub use config::SourceConfig;
+use render_ahead::RenderAhead;
 
 /// The stage's name.
 pub const NAME: &str = "radar-replay";
@@ -15,8 +19,28 @@ pub const NAME: &str = "radar-replay";
 pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
     let config: SourceConfig = launch.section("source")?;
     let options: DatasetOptions = launch.section("dataset")?;
-    let mut replay = Replay::open(&config, &options).map_err(|error| StageError::Input(error.to_string()))?;
-    source::run(launch, &mut replay)
+    let input = |error: &dyn std::error::Error| StageError::Input(error.to_string());
+    let dataset = match streamed(launch)? {
+        Some(simulation) => {
+            let recording = Recording::new(&simulation).map_err(|error| input(&error))?;
+            open_simulation(recording, &options)
+        }
+        None => gyre_radar::open(&config.data, &options),
+    };
+    source::run(launch, &mut Replay::of(dataset.map_err(|error| input(&error))?, &config))
+}
+
+/// The simulation to play, if it is not to be read from where it was stored.
+fn streamed(launch: &Launch) -> Result<Option<SimulationConfig>, StageError> {
+    match launch.has_section("simulation") {
+        true => launch.section("simulation").map(|simulation: SimulationConfig| Some(simulation).filter(|s| !s.output.store)),
+        false => Ok(None),
+    }
+}
+
+/// A simulated drive as a dataset that lies on no disk.
+pub fn open_simulation(recording: Recording, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
+    gyre_radar::open_source(Box::new(RenderAhead::new(recording)), options)
 }
 
 /// A part of a dataset.
@@ -28,13 +52,12 @@ pub struct Replay {
 }
 
 impl Replay {
-    /// Opens the dataset that `config` names.
-    pub fn open(config: &SourceConfig, options: &DatasetOptions) -> Result<Self, OpenError> {
-        let dataset = gyre_radar::open(&config.data, options)?;
+    /// The part of a dataset that `config` names.
+    pub fn of(dataset: Box<dyn Dataset>, config: &SourceConfig) -> Self {
         let first = config.first.min(dataset.len());
         let scans = config.scans.unwrap_or(usize::MAX).min(dataset.len() - first);
         let half_period_ns = median_period_ns(dataset.as_ref()) / 2;
-        Ok(Self { dataset, first, scans, half_period_ns })
+        Self { dataset, first, scans, half_period_ns }
     }
 }
 

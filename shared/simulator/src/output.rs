@@ -1,5 +1,6 @@
 //! In which form the scans come out: the section `[simulation.output]`.
 
+use gyre_radar::Format;
 use serde::{Deserialize, Serialize};
 
 /// In which form the scans come out.
@@ -26,6 +27,18 @@ pub enum OutputFormat {
     Boreas,
     /// RADIATE: images on their side, without metadata. Fits radars that turn four times a second and begin straight ahead.
     Radiate,
+}
+
+impl OutputFormat {
+    /// The one that is read as `format`; `None` where there is none.
+    pub fn read_as(format: Format) -> Option<Self> {
+        match format {
+            Format::Oxford => Some(Self::Oxford),
+            Format::Boreas | Format::BoreasRt => Some(Self::Boreas),
+            Format::Radiate => Some(Self::Radiate),
+            Format::Oord | Format::Mulran | Format::MulranOxfordForm | Format::Fomo => None,
+        }
+    }
 }
 
 /// How a host receives scans.
