@@ -15,7 +15,7 @@ use gyre_messages::{Stage, Window};
 use gyre_radar::{DatasetOptions, PointsConfig, RasterConfig};
 use gyre_radar_replay::SourceConfig;
 use gyre_scan_matching::{ExhaustiveConfig, RefinementConfig, RefinementKind, RotationConfig, TranslationConfig};
-use gyre_simulator::SimulationConfig;
+use gyre_simulator::{OutputFormat, SimulationConfig};
 use gyre_stage::supervise::{RestartPolicy, StagePlan};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -31,7 +31,7 @@ pub struct Configuration {
     pub source: SourceConfig,
     /// How to read it.
     pub dataset: DatasetOptions,
-    /// A recording to be generated and played, instead of `source.data`.
+    /// A drive to be simulated and played, instead of `source.data`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub simulation: Option<SimulationConfig>,
     /// The Cartesian rasters.
@@ -165,10 +165,19 @@ impl Configuration {
         let unreadable = |source| ConfigurationError::Unreadable { path: path.to_owned(), source };
         let text = fs::read_to_string(path).map_err(unreadable)?;
         let parsed: Result<toml::Table, _> = text.parse();
-        let mut table = parsed.map_err(|error| ConfigurationError::Syntax {
+        let table = parsed.map_err(|error| ConfigurationError::Syntax {
             path: path.to_owned(),
             reason: error.to_string().trim().replace('\n', "; "),
         })?;
+        Self::resolve(table, overrides)
+    }
+
+    /// A configuration of nothing but `section.key=value` sentences.
+    pub fn of_overrides(overrides: &[String]) -> Result<Self, ConfigurationError> {
+        Self::resolve(toml::Table::new(), overrides)
+    }
+
+    fn resolve(mut table: toml::Table, overrides: &[String]) -> Result<Self, ConfigurationError> {
         for sentence in overrides {
             strict::set(&mut table, sentence)?;
         }
@@ -178,7 +187,7 @@ impl Configuration {
     }
 
     fn from_table(mut table: toml::Table) -> Result<Self, ConfigurationError> {
-        let configuration = Self {
+        let mut configuration = Self {
             run: strict::section(&mut table, "run")?,
             source: strict::section(&mut table, "source")?,
             dataset: strict::section(&mut table, "dataset")?,
@@ -196,6 +205,10 @@ impl Configuration {
             refinement: strict::section(&mut table, "refinement")?,
             stages: strict::sections(&mut table, "stages", &Stage::ALL.map(Stage::name))?,
         };
+        let format = configuration.dataset.format.and_then(OutputFormat::read_as);
+        if let Some(simulation) = &mut configuration.simulation {
+            simulation.output.format = simulation.output.format.or(format);
+        }
         let known = [
             "run",
             "source",
@@ -228,6 +241,11 @@ impl Configuration {
         self.window(None).validate().map_err(|e| value("run", e.to_string()))?;
         if let Some(simulation) = &self.simulation {
             simulation.validate().map_err(|e| value("simulation", e.to_string()))?;
+            let written = simulation.output.format.unwrap_or_default();
+            if let Some(read) = self.dataset.format.filter(|read| OutputFormat::read_as(*read) != Some(written)) {
+                let reason = format!("output.format is {written}, which is not read as dataset.format = \"{read}\"");
+                return Err(value("simulation", reason));
+            }
         }
         if self.has(Stage::Refinement) && self.points.capacity == 0 {
             let reason =
@@ -266,6 +284,19 @@ impl Configuration {
             _ => 0,
         };
         Window { scans: self.run.window, lag: self.masking.feedback_lag(), look_back: 1, live_depth }
+    }
+
+    /// The simulation that is played without being stored, if that is what is played.
+    pub fn streamed(&self) -> Option<&SimulationConfig> {
+        self.simulation.as_ref().filter(|simulation| !simulation.output.store)
+    }
+
+    /// What is played, in words.
+    pub fn data(&self) -> String {
+        match self.streamed() {
+            Some(_) => "a simulation".to_owned(),
+            None => self.source.data.display().to_string(),
+        }
     }
 
     /// Whether the run has this stage.
@@ -345,10 +376,19 @@ mod tests {
             ("[run]\nmode = 'live'", "rate"),
             ("[run]\nrate = -1", "rate"),
             ("[simulation]\nscans = 0", "scans"),
+            ("[simulation]\noutput.format = 'boreas'\n[dataset]\nformat = 'oxford'", "output.format is boreas"),
+            ("[simulation]\n[dataset]\nformat = 'fomo'", "fomo"),
         ] {
             let error = from(text).unwrap_err().to_string();
             assert!(error.contains(part), "{text}: {error}");
         }
+    }
+
+    #[test]
+    fn a_simulation_has_the_form_that_the_dataset_is_read_in() {
+        let format = |text: &str| from(text).unwrap().simulation.unwrap().output.format;
+        assert_eq!(format("[simulation]\n[dataset]\nformat = 'boreas-rt'"), Some(OutputFormat::Boreas));
+        assert_eq!(format("[simulation]"), None);
     }
 
     #[test]

@@ -33,7 +33,9 @@ pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
 /// The simulation to play, if it is not to be read from where it was stored.
 fn streamed(launch: &Launch) -> Result<Option<SimulationConfig>, StageError> {
     match launch.has_section("simulation") {
-        true => launch.section("simulation").map(|simulation: SimulationConfig| Some(simulation).filter(|s| !s.output.store)),
+        true => launch
+            .section("simulation")
+            .map(|simulation: SimulationConfig| Some(simulation).filter(|s| !s.output.store)),
         false => Ok(None),
     }
 }
