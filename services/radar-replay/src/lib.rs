@@ -20,14 +20,21 @@ pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
     let config: SourceConfig = launch.section("source")?;
     let options: DatasetOptions = launch.section("dataset")?;
     let input = |error: &dyn std::error::Error| StageError::Input(error.to_string());
-    let dataset = match streamed(launch)? {
+    let simulation = streamed(launch)?;
+    let dataset = match &simulation {
         Some(simulation) => {
-            let recording = Recording::new(&simulation).map_err(|error| input(&error))?;
+            let recording = Recording::new(simulation).map_err(|error| input(&error))?;
             open_simulation(recording, &options)
         }
         None => gyre_radar::open(&config.data, &options),
     };
-    source::run(launch, &mut Replay::of(dataset.map_err(|error| input(&error))?, &config))
+    let dataset = dataset.map_err(|error| input(&error))?;
+    let mut replay = Replay { passes_by: simulation.is_none(), ..Replay::of(dataset, &config) };
+    let statistics = source::run(launch, &mut replay)?;
+    if statistics.slipped_ns > 0 {
+        tracing::warn!(slipped_s = statistics.slipped_ns as f64 * 1e-9, "the simulation did not keep up with the rate");
+    }
+    Ok(statistics)
 }
 
 /// The simulation to play, if it is not to be read from where it was stored.
@@ -51,6 +58,7 @@ pub struct Replay {
     first: usize,
     scans: usize,
     half_period_ns: i64,
+    passes_by: bool,
 }
 
 impl Replay {
@@ -59,7 +67,7 @@ impl Replay {
         let first = config.first.min(dataset.len());
         let scans = config.scans.unwrap_or(usize::MAX).min(dataset.len() - first);
         let half_period_ns = median_period_ns(dataset.as_ref()) / 2;
-        Self { dataset, first, scans, half_period_ns }
+        Self { dataset, first, scans, half_period_ns, passes_by: true }
     }
 }
 
@@ -71,6 +79,11 @@ impl Source for Replay {
     /// A scan's stamp is the middle of its sweep; it is complete half a turn later.
     fn complete_ns(&self, index: usize) -> Option<i64> {
         Some(self.dataset.nominal_stamp_ns(self.first + index)? + self.half_period_ns)
+    }
+
+    /// A simulated sweep is complete when it is rendered, and not before.
+    fn passes_by(&self) -> bool {
+        self.passes_by
     }
 
     fn read(&mut self, index: usize, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<(), String> {
