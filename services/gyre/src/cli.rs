@@ -4,7 +4,7 @@ use std::{num::NonZeroUsize, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand};
 use gyre_evaluation::Part;
-use gyre_simulator::Fault;
+use gyre_simulator::{Fault, OutputFormat};
 
 use crate::configuration::Rate;
 
@@ -33,7 +33,7 @@ pub enum Command {
     Evaluate(EvaluateArguments),
     /// Print the papers' tables for this machine: times of the searches, and the accuracy that they reach.
     Tables(TablesArguments),
-    /// Write a simulated recording in Oxford's format.
+    /// Write a simulated recording, or go on with one.
     Simulate(SimulateArguments),
     /// Write a copy of a recording with some scans spoilt, to see what an odometry makes of them.
     Spoil(SpoilArguments),
@@ -140,15 +140,27 @@ pub struct TablesArguments {
 pub struct SimulateArguments {
     /// The configuration, whose section `[simulation]` is used; its defaults without one.
     pub configuration: Option<PathBuf>,
-    /// Where to write the recording.
+    /// Where to write the recording. What an earlier call with the same configuration left there is kept and completed.
     #[arg(long)]
     pub out: PathBuf,
     /// How many scans (simulation.scans).
     #[arg(long)]
     pub scans: Option<usize>,
+    /// Drive along this file: TUM, KITTI, Oxford radar_odometry.csv, Boreas radar_poses.csv.
+    #[arg(long, value_name = "FILE")]
+    pub trajectory: Option<PathBuf>,
     /// Seed (simulation.seed).
     #[arg(long)]
     pub seed: Option<u64>,
+    /// Whose form of files: oxford, boreas or radiate (simulation.output.format).
+    #[arg(long)]
+    pub format: Option<OutputFormat>,
+    /// Threads to render on. Default: all processors. The files are the same whatever their number.
+    #[arg(long)]
+    pub threads: Option<NonZeroUsize>,
+    /// Override a key, as in simulation.drive.speed_m_s=5; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
 }
 
 #[derive(Debug, Args)]

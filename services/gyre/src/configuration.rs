@@ -15,7 +15,7 @@ use gyre_messages::{Stage, Window};
 use gyre_radar::{DatasetOptions, PointsConfig, RasterConfig};
 use gyre_radar_replay::SourceConfig;
 use gyre_scan_matching::{ExhaustiveConfig, RefinementConfig, RefinementKind, RotationConfig, TranslationConfig};
-use gyre_simulator::SimulationConfig;
+use gyre_simulator::{OutputFormat, SimulationConfig};
 use gyre_stage::supervise::{RestartPolicy, StagePlan};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -31,7 +31,7 @@ pub struct Configuration {
     pub source: SourceConfig,
     /// How to read it.
     pub dataset: DatasetOptions,
-    /// A recording to be generated and played, instead of `source.data`.
+    /// A drive to be simulated and played, instead of `source.data`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub simulation: Option<SimulationConfig>,
     /// The Cartesian rasters.
@@ -165,10 +165,19 @@ impl Configuration {
         let unreadable = |source| ConfigurationError::Unreadable { path: path.to_owned(), source };
         let text = fs::read_to_string(path).map_err(unreadable)?;
         let parsed: Result<toml::Table, _> = text.parse();
-        let mut table = parsed.map_err(|error| ConfigurationError::Syntax {
+        let table = parsed.map_err(|error| ConfigurationError::Syntax {
             path: path.to_owned(),
             reason: error.to_string().trim().replace('\n', "; "),
         })?;
+        Self::resolve(table, overrides)
+    }
+
+    /// A configuration of nothing but `section.key=value` sentences.
+    pub fn of_overrides(overrides: &[String]) -> Result<Self, ConfigurationError> {
+        Self::resolve(toml::Table::new(), overrides)
+    }
+
+    fn resolve(mut table: toml::Table, overrides: &[String]) -> Result<Self, ConfigurationError> {
         for sentence in overrides {
             strict::set(&mut table, sentence)?;
         }
@@ -178,7 +187,7 @@ impl Configuration {
     }
 
     fn from_table(mut table: toml::Table) -> Result<Self, ConfigurationError> {
-        let configuration = Self {
+        let mut configuration = Self {
             run: strict::section(&mut table, "run")?,
             source: strict::section(&mut table, "source")?,
             dataset: strict::section(&mut table, "dataset")?,
@@ -196,6 +205,10 @@ impl Configuration {
             refinement: strict::section(&mut table, "refinement")?,
             stages: strict::sections(&mut table, "stages", &Stage::ALL.map(Stage::name))?,
         };
+        let format = configuration.dataset.format.and_then(OutputFormat::read_as);
+        if let Some(simulation) = &mut configuration.simulation {
+            simulation.output.format = simulation.output.format.or(format);
+        }
         let known = [
             "run",
             "source",
@@ -228,6 +241,11 @@ impl Configuration {
         self.window(None).validate().map_err(|e| value("run", e.to_string()))?;
         if let Some(simulation) = &self.simulation {
             simulation.validate().map_err(|e| value("simulation", e.to_string()))?;
+            let written = simulation.output.format.unwrap_or_default();
+            if let Some(read) = self.dataset.format.filter(|read| OutputFormat::read_as(*read) != Some(written)) {
+                let reason = format!("output.format is {written}, which is not read as dataset.format = \"{read}\"");
+                return Err(value("simulation", reason));
+            }
         }
         if self.has(Stage::Refinement) && self.points.capacity == 0 {
             let reason =
@@ -266,6 +284,19 @@ impl Configuration {
             _ => 0,
         };
         Window { scans: self.run.window, lag: self.masking.feedback_lag(), look_back: 1, live_depth }
+    }
+
+    /// The simulation that is played without being stored, if that is what is played.
+    pub fn streamed(&self) -> Option<&SimulationConfig> {
+        self.simulation.as_ref().filter(|simulation| !simulation.output.store)
+    }
+
+    /// What is played, in words.
+    pub fn data(&self) -> String {
+        match self.streamed() {
+            Some(_) => "a simulation".to_owned(),
+            None => self.source.data.display().to_string(),
+        }
     }
 
     /// Whether the run has this stage.
@@ -312,72 +343,4 @@ impl Configuration {
 }
 
 #[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-
-    fn from(text: &str) -> Result<Configuration, ConfigurationError> {
-        let configuration = Configuration::from_table(text.parse().unwrap())?;
-        configuration.validate()?;
-        Ok(configuration)
-    }
-
-    #[test]
-    fn an_unknown_key_names_itself_and_the_nearest_right_one() {
-        let error = from("[masking]\ntreshold = 3").unwrap_err().to_string();
-        assert_eq!(error, "[masking] has no key `treshold`; did you mean `threshold`?");
-        let error = from("[maskin]\nkind = 'none'").unwrap_err().to_string();
-        assert_eq!(error, "[the configuration] has no key `maskin`; did you mean `masking`?");
-        let error = from("[stages.maskin]\ncommand = ['x']").unwrap_err().to_string();
-        assert_eq!(error, "[stages] has no key `maskin`; did you mean `masking`?");
-    }
-
-    #[test]
-    fn impossible_values_are_refused() {
-        for (text, part) in [
-            ("[run]\nwindow = 0", "window"),
-            ("[raster]\nn = 0", "raster.n"),
-            ("[points]\ncapacity = 70000", "points.capacity"),
-            ("[points]\ncapacity = 0", "points.capacity is 0"),
-            ("[refinement]\nkeyframes = 0", "refinement.keyframes"),
-            ("[masking]\nlag = 0", "lag"),
-            ("[masking]\nthreshold = 300", "300"),
-            ("[run]\nmode = 'live'", "rate"),
-            ("[run]\nrate = -1", "rate"),
-            ("[simulation]\nscans = 0", "scans"),
-        ] {
-            let error = from(text).unwrap_err().to_string();
-            assert!(error.contains(part), "{text}: {error}");
-        }
-    }
-
-    #[test]
-    fn one_line_chooses_the_search_and_another_the_refinement() {
-        let names = |text: &str| -> Vec<String> {
-            from(text).unwrap().stage_plans(Path::new("gyre")).into_iter().map(|plan| plan.name).collect()
-        };
-        let (source, halves) = (["radar-replay", "masking"], ["rotation-search", "translation-search"]);
-        let (joint, refined, searched) = (["joint-search"], ["refinement", "pose-integration"], ["pose-integration"]);
-        assert_eq!(names(""), [&source[..], &halves, &refined].concat());
-        assert_eq!(names("[refinement]\nkind = 'none'"), [&source[..], &halves, &searched].concat());
-        let exhaustive = "[search]\nkind = 'exhaustive'\n";
-        assert_eq!(names(exhaustive), [&source[..], &joint, &refined].concat());
-        assert_eq!(
-            names(&format!("{exhaustive}[refinement]\nkind = 'none'")),
-            [&source[..], &joint, &searched].concat()
-        );
-    }
-
-    #[test]
-    fn a_resolved_configuration_repeats_itself() {
-        let configuration = from(
-            "[run]\nrate = 4\n[source]\ndata = '/data'\n[raster]\ncell_m = 0.8\n[stages.masking]\ncommand = ['mine']",
-        )
-        .unwrap();
-        let text = configuration.to_toml().unwrap();
-        assert_eq!(from(&text).unwrap(), configuration);
-        assert!(configuration.continues(&text.parse().unwrap()));
-        let other = from("[masking]\nkind = 'none'").unwrap();
-        assert!(!other.continues(&text.parse().unwrap()));
-    }
-}
+mod tests;

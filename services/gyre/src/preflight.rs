@@ -4,6 +4,7 @@ use std::{path::Path, time::Duration};
 
 use gyre_messages::{Footprint, Limits, Window};
 use gyre_radar::Dataset;
+use gyre_simulator::Recording;
 use thiserror::Error;
 
 use crate::configuration::Configuration;
@@ -14,7 +15,9 @@ const SHARED_MEMORY: &str = "/dev/shm";
 #[derive(Debug, Error)]
 pub enum PreflightError {
     /// Nothing to play.
-    #[error("no dataset is named: give its folder with --data, or as source.data in the configuration")]
+    #[error(
+        "no dataset is named: give its folder with --data, or as source.data in the configuration, or have one simulated by a section [simulation]"
+    )]
     NoData,
     /// One scan makes no motion.
     #[error("{path} has {scans} scan{}: a motion is between two, so there is nothing to run; `gyre inspect` shows what is there", if *scans == 1 { "" } else { "s" })]
@@ -46,18 +49,17 @@ pub struct Preflight {
     pub window: Window,
     pub limits: Limits,
     pub footprint: Footprint,
+    /// `ground_truth.tum` of a simulation that is played without being stored.
+    pub truth: Option<Vec<u8>>,
 }
 
 /// Looks at the dataset and at the machine.
 pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure> {
     let source = &configuration.source;
-    if source.data.as_os_str().is_empty() {
-        return Err(PreflightError::NoData.into());
-    }
-    let dataset = gyre_radar::open(&source.data, &configuration.dataset)?;
+    let (dataset, truth) = open(configuration)?;
     let scans = dataset.len().saturating_sub(source.first).min(source.scans.unwrap_or(usize::MAX));
     if scans < 2 {
-        return Err(PreflightError::TooFew { path: source.data.display().to_string(), scans }.into());
+        return Err(PreflightError::TooFew { path: configuration.data(), scans }.into());
     }
     let window = configuration.window(period(dataset.as_ref()));
     let limits = Limits {
@@ -68,7 +70,21 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
     };
     let footprint = Footprint::new(&window, &limits);
     check_shared_memory(&footprint)?;
-    Ok(Preflight { scans, window, limits, footprint })
+    Ok(Preflight { scans, window, limits, footprint, truth })
+}
+
+/// What is to be played, and the truth about it where no file says it.
+fn open(configuration: &Configuration) -> Result<(Box<dyn Dataset>, Option<Vec<u8>>), crate::Failure> {
+    let (data, options) = (&configuration.source.data, &configuration.dataset);
+    if let Some(simulation) = configuration.streamed() {
+        let recording = Recording::new(simulation)?;
+        let truth = recording.ground_truth_tum();
+        return Ok((gyre_radar_replay::open_simulation(recording, options)?, Some(truth)));
+    }
+    match data.as_os_str().is_empty() {
+        true => Err(PreflightError::NoData.into()),
+        false => Ok((gyre_radar::open(data, options)?, None)),
+    }
 }
 
 fn period(dataset: &dyn Dataset) -> Option<Duration> {

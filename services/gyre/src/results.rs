@@ -19,6 +19,9 @@ use crate::{
     summary::{Counts, MotionCounts, Session, Summary},
 };
 
+/// The truth about a simulation that is played without being stored.
+pub const SIMULATED_TRUTH: &str = "ground_truth.tum";
+
 /// Writes all files, and returns what the person at the terminal should read.
 pub fn write(
     configuration: &Configuration,
@@ -34,7 +37,7 @@ pub fn write(
     let mut tum = Vec::new();
     write_tum(&trajectory, &mut tum)?;
     save(out, "trajectory.tum", tum)?;
-    let judgement = judged(configuration, poses, &trajectory);
+    let judgement = judged(configuration, out, poses, &trajectory);
     draw(out, &trajectory, judgement.as_ref())?;
     let latency = Latency::of(&poses[session.resumed.min(poses.len())..]);
     save(out, "latency.json", serde_json::to_string_pretty(&latency)?)?;
@@ -46,12 +49,18 @@ pub fn write(
 }
 
 /// Judges the trajectory and its covariances by the dataset's ground truth, where there is one that fits.
-fn judged(configuration: &Configuration, poses: &[PoseHeader], trajectory: &Trajectory) -> Option<Judgement> {
+fn judged(
+    configuration: &Configuration,
+    out: &Path,
+    poses: &[PoseHeader],
+    trajectory: &Trajectory,
+) -> Option<Judgement> {
     if poses.len() < 2 {
         return None;
     }
     let given = configuration.run.ground_truth.clone();
-    let path = given.or_else(|| find_ground_truth(&configuration.source.data))?;
+    let simulated = || configuration.streamed().map(|_| out.join(SIMULATED_TRUTH));
+    let path = given.or_else(simulated).or_else(|| find_ground_truth(&configuration.source.data))?;
     let by = |truth: Trajectory| -> Result<Judgement, Failure> {
         let evaluation = judge(trajectory, &truth, Options::default())?;
         let motions = judge_motions(&odometry::motions(poses), &truth, &evaluation)

@@ -39,6 +39,9 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     let signals = Signals::install()?;
     let root = RunRoot::take(&out)?;
     let resumed = prepare(&configuration, &out, arguments.fresh)?;
+    if let Some(truth) = &checked.truth {
+        write(&out.join(results::SIMULATED_TRUTH), truth)?;
+    }
     let manifest = Manifest {
         prefix: root.prefix(),
         root: root.path().to_owned(),
@@ -89,7 +92,7 @@ fn finish(
         return Err(format!(
             "only {read} of the {} scans of {} can be read, and a motion is between two: {} says what is wrong with them",
             session.scans,
-            configuration.source.data.display(),
+            configuration.data(),
             out.join("log.jsonl").display()
         )
         .into());
@@ -113,15 +116,17 @@ fn results_directory(arguments: &RunArguments) -> Result<PathBuf, Failure> {
     Ok(out.canonicalize()?)
 }
 
-/// The configuration with all that the command line says, and the recording generated if it is to be.
+/// The configuration with all that the command line says, and the recording written if there is to be one.
 fn resolve(arguments: &RunArguments, out: &Path) -> Result<Configuration, Failure> {
     let mut configuration = Configuration::read(&arguments.configuration, &overrides(arguments))?;
     if arguments.data.is_some() {
         configuration.simulation = None;
     }
-    if let Some(simulation) = configuration.simulation.clone() {
-        configuration.source.data = out.join("recording");
-        generate_once(&simulation, &configuration.source.data)?;
+    if let Some(simulation) = &configuration.simulation {
+        configuration.source.data = match simulation.output.store {
+            true => simulate::store(simulation, &out.join("recording"))?,
+            false => PathBuf::new(),
+        };
     }
     // So that the resolved configuration repeats the run from anywhere. What does not exist is told by the reader.
     for path in [Some(&mut configuration.source.data), configuration.run.ground_truth.as_mut()].into_iter().flatten() {
@@ -140,21 +145,19 @@ fn overrides(arguments: &RunArguments) -> Vec<String> {
     arguments.set.iter().cloned().chain(data).chain(rate).collect()
 }
 
-fn generate_once(simulation: &gyre_simulator::SimulationConfig, recording: &Path) -> Result<(), Failure> {
-    let made_by = recording.join("simulation.toml");
-    let wanted = toml::to_string(simulation)?;
-    if fs::read_to_string(&made_by).is_ok_and(|found| found == wanted) {
-        return Ok(());
-    }
-    if recording.exists() {
-        fs::remove_dir_all(recording)?;
-    }
-    simulate::generate(simulation, recording)?;
-    write(&made_by, &wanted)
-}
-
 /// What tells a run that is through with everything: its results are written last.
 const LAST_RESULT: &str = "summary.json";
+/// What a new run begins without.
+const RESULTS: [&str; 8] = [
+    LAST_RESULT,
+    results::SIMULATED_TRUTH,
+    "log.jsonl",
+    "odometry.csv",
+    "trajectory.tum",
+    "trajectory.svg",
+    "errors.svg",
+    "bands.svg",
+];
 
 /// Goes on with an unfinished run of the same configuration, else begins anew; returns the poses that are there already.
 fn prepare(configuration: &Configuration, out: &Path, fresh: bool) -> Result<usize, Failure> {
@@ -167,9 +170,7 @@ fn prepare(configuration: &Configuration, out: &Path, fresh: bool) -> Result<usi
             let _ = fs::remove_file(state);
         }
         // A new run may have no truth to be drawn against: nothing of the earlier one must look like its own.
-        for result in
-            [LAST_RESULT, "log.jsonl", "odometry.csv", "trajectory.tum", "trajectory.svg", "errors.svg", "bands.svg"]
-        {
+        for result in RESULTS {
             let _ = fs::remove_file(out.join(result));
         }
         return Ok(0);
@@ -196,6 +197,6 @@ fn start_over() -> Result<ExitCode, Failure> {
     Err(format!("cannot start over: {failed}").into())
 }
 
-fn write(path: &Path, text: &str) -> Result<(), Failure> {
+fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<(), Failure> {
     fs::write(path, text).map_err(|error| format!("cannot write {}: {error}", path.display()).into())
 }

@@ -1,30 +1,88 @@
 //! `gyre simulate`: a recording that nobody had to drive for.
 
-use std::{io::IsTerminal, path::Path, process::ExitCode};
+use std::{
+    fs,
+    io::IsTerminal,
+    num::NonZeroUsize,
+    path::{Path, PathBuf},
+    process::ExitCode,
+    thread::available_parallelism,
+    time::Instant,
+};
 
-use gyre_simulator::{SimulationConfig, write_dataset};
-use indicatif::ProgressBar;
+use gyre_simulator::{SimulationConfig, SimulatorError, Summary, write_dataset_on};
+use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::{Failure, cli::SimulateArguments, configuration::Configuration, print};
 
-/// Writes a simulated recording.
+/// The key of the file along which to drive.
+const TRAJECTORY_KEY: &str = "simulation.drive.file";
+
+/// Writes a simulated recording, or goes on with it.
 pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
-    let read = |path: &std::path::PathBuf| Configuration::read(path, &[]);
-    let configuration = arguments.configuration.as_ref().map(read).transpose()?;
-    let mut simulation = configuration.and_then(|configuration| configuration.simulation).unwrap_or_default();
-    simulation.scans = arguments.scans.unwrap_or(simulation.scans);
-    simulation.seed = arguments.seed.unwrap_or(simulation.seed);
-    generate(&simulation, &arguments.out)?;
-    print::line(format_args!("wrote {} scans to {}", simulation.scans, arguments.out.display()))?;
+    let overrides = overrides(arguments);
+    let configuration = match &arguments.configuration {
+        Some(path) => Configuration::read(path, &overrides),
+        None => Configuration::of_overrides(&overrides),
+    }?;
+    let started = Instant::now();
+    let threads = arguments.threads.or(available_parallelism().ok()).unwrap_or(NonZeroUsize::MIN);
+    let summary = write(threads, &configuration.simulation.unwrap_or_default(), &arguments.out)?;
+    let (written, wall_s) = (summary.scans - summary.kept, started.elapsed().as_secs_f64());
+    let kept = if summary.kept > 0 { format!(", {} were there already", summary.kept) } else { String::new() };
+    print::line(format_args!(
+        "wrote {written} scans to {} in {wall_s:.1} s ({:.1} scans/s{kept}): {} scans, {:.0} m, {:.0} s",
+        arguments.out.display(),
+        written as f64 / wall_s,
+        summary.scans,
+        summary.path_m,
+        summary.duration_s,
+    ))?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// Generates a recording, with a progress bar on a terminal.
-pub fn generate(simulation: &SimulationConfig, out: &Path) -> Result<(), Failure> {
-    let bar =
-        if std::io::stderr().is_terminal() { ProgressBar::new(simulation.scans as u64) } else { ProgressBar::hidden() };
-    bar.set_message("simulating");
-    write_dataset(simulation, out, &mut |done, _| bar.set_position(done as u64))?;
+/// What the command line says besides the configuration, as `section.key=value`.
+fn overrides(arguments: &SimulateArguments) -> Vec<String> {
+    let quoted = |path: &PathBuf| toml::Value::from(path.to_string_lossy().into_owned());
+    let scans = arguments.scans.map(|scans| format!("simulation.scans={scans}"));
+    let seed = arguments.seed.map(|seed| format!("simulation.seed={seed}"));
+    let format = arguments.format.map(|format| format!("simulation.output.format={format}"));
+    let trajectory = arguments.trajectory.as_ref().map(|file| format!("{TRAJECTORY_KEY}={}", quoted(file)));
+    arguments.set.iter().cloned().chain([scans, seed, format, trajectory].into_iter().flatten()).collect()
+}
+
+/// Writes the recording of a run to `out`, whatever an earlier run left there.
+pub fn store(simulation: &SimulationConfig, out: &Path) -> Result<PathBuf, Failure> {
+    let threads = available_parallelism().unwrap_or(NonZeroUsize::MIN);
+    let summary = match write(threads, simulation, out) {
+        Err(
+            SimulatorError::OutputInUse { .. }
+            | SimulatorError::OtherRecording { .. }
+            | SimulatorError::OtherImage { .. },
+        ) => {
+            fs::remove_dir_all(out)?;
+            write(threads, simulation, out)
+        }
+        result => result,
+    }?;
+    Ok(summary.folder)
+}
+
+/// Writes a recording, with a progress bar on a terminal.
+fn write(threads: NonZeroUsize, simulation: &SimulationConfig, out: &Path) -> Result<Summary, SimulatorError> {
+    let bar = if std::io::stderr().is_terminal() { ProgressBar::new(0) } else { ProgressBar::hidden() };
+    if let Ok(style) = ProgressStyle::with_template("simulating {wide_bar} {pos}/{len} scans, {per_sec}, {eta} left") {
+        bar.set_style(style);
+    }
+    let summary = write_dataset_on(threads, simulation, out, &mut |done, total| {
+        if bar.length() != Some(total as u64) {
+            bar.set_length(total as u64);
+            // What was there already says nothing about the pace.
+            bar.set_position(done as u64);
+            bar.reset_eta();
+        }
+        bar.set_position(done as u64);
+    });
     bar.finish_and_clear();
-    Ok(())
+    summary
 }

@@ -155,7 +155,7 @@ impl Summary {
             version: env!("CARGO_PKG_VERSION"),
             machine: Machine::this(),
             out: out.display().to_string(),
-            data: configuration.source.data.display().to_string(),
+            data: configuration.data(),
             ending: report.map(|report| report.ending),
             mode: configuration.run.mode,
             rate: configuration.run.rate,

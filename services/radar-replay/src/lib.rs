@@ -1,12 +1,16 @@
-//! Plays a recorded dataset onto the `scan` topic, each image decoded where its readers will find it.
+//! Plays a recorded dataset onto the `scan` topic, each image decoded where its readers will find it; or a simulated drive, each
+//! image rendered while those before it are on their way, read as it would be read from a disk.
 
 mod config;
+mod render_ahead;
 
 use gyre_messages::ScanHeader;
 use gyre_radar::{Dataset, DatasetOptions, OpenError};
+use gyre_simulator::{Recording, SimulationConfig};
 use gyre_stage::{Launch, Source, StageError, Statistics, source};
 
 pub use config::SourceConfig;
+use render_ahead::RenderAhead;
 
 /// The stage's name.
 pub const NAME: &str = "radar-replay";
@@ -15,8 +19,37 @@ pub const NAME: &str = "radar-replay";
 pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
     let config: SourceConfig = launch.section("source")?;
     let options: DatasetOptions = launch.section("dataset")?;
-    let mut replay = Replay::open(&config, &options).map_err(|error| StageError::Input(error.to_string()))?;
-    source::run(launch, &mut replay)
+    let input = |error: &dyn std::error::Error| StageError::Input(error.to_string());
+    let simulation = streamed(launch)?;
+    let dataset = match &simulation {
+        Some(simulation) => {
+            let recording = Recording::new(simulation).map_err(|error| input(&error))?;
+            open_simulation(recording, &options)
+        }
+        None => gyre_radar::open(&config.data, &options),
+    };
+    let dataset = dataset.map_err(|error| input(&error))?;
+    let mut replay = Replay { passes_by: simulation.is_none(), ..Replay::of(dataset, &config) };
+    let statistics = source::run(launch, &mut replay)?;
+    if statistics.slipped_ns > 0 {
+        tracing::warn!(slipped_s = statistics.slipped_ns as f64 * 1e-9, "the simulation did not keep up with the rate");
+    }
+    Ok(statistics)
+}
+
+/// The simulation to play, if it is not to be read from where it was stored.
+fn streamed(launch: &Launch) -> Result<Option<SimulationConfig>, StageError> {
+    match launch.has_section("simulation") {
+        true => launch
+            .section("simulation")
+            .map(|simulation: SimulationConfig| Some(simulation).filter(|s| !s.output.store)),
+        false => Ok(None),
+    }
+}
+
+/// A simulated drive as a dataset that lies on no disk.
+pub fn open_simulation(recording: Recording, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
+    gyre_radar::open_source(Box::new(RenderAhead::new(recording)), options)
 }
 
 /// A part of a dataset.
@@ -25,16 +58,16 @@ pub struct Replay {
     first: usize,
     scans: usize,
     half_period_ns: i64,
+    passes_by: bool,
 }
 
 impl Replay {
-    /// Opens the dataset that `config` names.
-    pub fn open(config: &SourceConfig, options: &DatasetOptions) -> Result<Self, OpenError> {
-        let dataset = gyre_radar::open(&config.data, options)?;
+    /// The part of a dataset that `config` names.
+    pub fn of(dataset: Box<dyn Dataset>, config: &SourceConfig) -> Self {
         let first = config.first.min(dataset.len());
         let scans = config.scans.unwrap_or(usize::MAX).min(dataset.len() - first);
         let half_period_ns = median_period_ns(dataset.as_ref()) / 2;
-        Ok(Self { dataset, first, scans, half_period_ns })
+        Self { dataset, first, scans, half_period_ns, passes_by: true }
     }
 }
 
@@ -46,6 +79,11 @@ impl Source for Replay {
     /// A scan's stamp is the middle of its sweep; it is complete half a turn later.
     fn complete_ns(&self, index: usize) -> Option<i64> {
         Some(self.dataset.nominal_stamp_ns(self.first + index)? + self.half_period_ns)
+    }
+
+    /// A simulated sweep is complete when it is rendered, and not before.
+    fn passes_by(&self) -> bool {
+        self.passes_by
     }
 
     fn read(&mut self, index: usize, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<(), String> {

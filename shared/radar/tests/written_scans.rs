@@ -43,6 +43,38 @@ fn written_powers_come_back() {
 }
 
 #[test]
+fn a_radar_of_another_encoder_and_period_is_read_with_options_alone() {
+    let root = folder();
+    let turn_us = 1_000_000;
+    for start in [START_US, START_US + turn_us, START_US + 2 * turn_us] {
+        let sweep = Sweep {
+            rows: 120,
+            bins: 162,
+            first_count: 0,
+            step: 30,
+            start,
+            row_interval: turn_us / 120,
+            ..Sweep::default()
+        };
+        sweep.write(&root.path().join(format!("radar/{start}.png")));
+    }
+    fs::write(root.path().join("radar.timestamps"), "").unwrap();
+    let options = DatasetOptions {
+        range_resolution_m: Some(0.6),
+        range_offset_m: Some(3.0),
+        encoder_counts: Some(3600),
+        ..DatasetOptions::default()
+    };
+    let mut dataset = open(root.path(), &options).unwrap();
+    let scan = read(dataset.as_mut(), 1).unwrap();
+    assert_eq!((scan.geometry.azimuths, scan.geometry.bins), (120, 162));
+    assert!((scan.view().range_m(161.0) - 99.9).abs() < 1e-3);
+    assert!((scan.azimuth_rad[90] - 0.75 * TAU).abs() < 1e-6);
+    assert!((scan.geometry.stamp_ns - dataset.nominal_stamp_ns(1).unwrap()).abs() < 1_000_000);
+    assert_eq!(scan.geometry.stamp_ns / 1000, START_US + turn_us + 119 * (turn_us / 120) / 2);
+}
+
+#[test]
 fn sideways_powers_come_back_turned() {
     let root = folder();
     write_radiate(root.path(), 4);

@@ -1,5 +1,9 @@
 //! In which form the scans come out: the section `[simulation.output]`.
 
+use std::fmt;
+use std::str::FromStr;
+
+use gyre_radar::Format;
 use serde::{Deserialize, Serialize};
 
 /// In which form the scans come out.
@@ -26,6 +30,45 @@ pub enum OutputFormat {
     Boreas,
     /// RADIATE: images on their side, without metadata. Fits radars that turn four times a second and begin straight ahead.
     Radiate,
+}
+
+impl fmt::Display for OutputFormat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for OutputFormat {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let known = || Self::ALL.map(Self::name).join(", ");
+        Self::ALL.into_iter().find(|format| format.name() == name).ok_or_else(|| format!("it is one of {}", known()))
+    }
+}
+
+impl OutputFormat {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Oxford, Self::Boreas, Self::Radiate];
+
+    /// The name in configurations and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Oxford => "oxford",
+            Self::Boreas => "boreas",
+            Self::Radiate => "radiate",
+        }
+    }
+
+    /// The one that is read as `format`; `None` where there is none.
+    pub fn read_as(format: Format) -> Option<Self> {
+        match format {
+            Format::Oxford => Some(Self::Oxford),
+            Format::Boreas | Format::BoreasRt => Some(Self::Boreas),
+            Format::Radiate => Some(Self::Radiate),
+            Format::Oord | Format::Mulran | Format::MulranOxfordForm | Format::Fomo => None,
+        }
+    }
 }
 
 /// How a host receives scans.

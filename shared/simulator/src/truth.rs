@@ -27,7 +27,7 @@ fn pose_at(simulator: &Simulator, index: usize, stamp_ns: i64) -> Isometry2<f64>
 /// `azimuth_poses.npy` as bytes.
 pub(crate) fn azimuth_poses_npy(simulator: &Simulator) -> Vec<u8> {
     let (scans, azimuths) = (simulator.scans(), simulator.sampling().azimuths);
-    let mut bytes = npy_header(&[scans, azimuths, 4]);
+    let mut bytes = npy_header(scans, azimuths);
     bytes.reserve(scans * azimuths * 4 * size_of::<f64>());
     for index in 0..scans {
         let time = simulator.time(index);
@@ -43,9 +43,8 @@ pub(crate) fn azimuth_poses_npy(simulator: &Simulator) -> Vec<u8> {
 }
 
 /// Magic, version 1.0, the header's length, and a Python dictionary padded to a multiple of 64 bytes.
-fn npy_header(shape: &[usize]) -> Vec<u8> {
-    let shape: String = shape.iter().map(|n| format!("{n}, ")).collect();
-    let dictionary = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}), }}", shape.trim_end());
+fn npy_header(scans: usize, azimuths: usize) -> Vec<u8> {
+    let dictionary = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({scans}, {azimuths}, 4), }}");
     let before = 10;
     let padded = (before + dictionary.len() + 1).next_multiple_of(64) - before;
     let mut header = b"\x93NUMPY\x01\x00".to_vec();

@@ -57,6 +57,11 @@ impl Launch {
         })
     }
 
+    /// Whether the run's configuration has a section.
+    pub fn has_section(&self, section: &str) -> bool {
+        self.configuration.contains_key(section)
+    }
+
     fn leave_statistics(&self, statistics: &Statistics) -> Result<(), StageError> {
         let path = self.manifest.root.join(statistics::file_name(&self.name));
         let text = serde_json::to_string(statistics).map_err(|e| StageError::Configuration(e.to_string()))?;

@@ -25,6 +25,9 @@ pub trait Source {
     /// cannot, live mode does not know which scans a source that was away has missed, and plays them late.
     fn complete_ns(&self, index: usize) -> Option<i64>;
 
+    /// Whether scans pass by in live mode while this process is busy or away, as a radar's do.
+    fn passes_by(&self) -> bool;
+
     /// Reads scan `index` into shared memory; the error is one sentence that says why it cannot be used.
     fn read(&mut self, index: usize, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<(), String>;
 }
@@ -134,6 +137,13 @@ struct Tempo {
 }
 
 impl Tempo {
+    /// Moves on to now where a scan is late already; returns by how much, ns.
+    fn slip(&mut self, complete_ns: i64) -> u64 {
+        let late_ns = clock::now_ns().saturating_sub(self.due_ns(complete_ns)).max(0);
+        self.start_ns = self.start_ns.saturating_add(late_ns);
+        late_ns as u64
+    }
+
     fn due_ns(&self, complete_ns: i64) -> i64 {
         self.start_ns.saturating_add((complete_ns.saturating_sub(self.first_ns) as f64 / self.rate) as i64)
     }
@@ -159,13 +169,16 @@ impl<S: Source> Playback<'_, S> {
         let mut tempo = None;
         while let Some(mut draft) = self.next_readable(&mut position)? {
             let complete_ns = complete_ns(draft.header());
-            let tempo = *tempo.get_or_insert_with(|| self.tempo(complete_ns));
+            let tempo = tempo.get_or_insert_with(|| self.tempo(complete_ns));
+            if let Some(tempo) = tempo.as_mut().filter(|_| self.launch.manifest.live && !self.source.passes_by()) {
+                self.statistics.slipped_ns += tempo.slip(complete_ns);
+            }
             if !self.admit(draft, &position, tempo.map(|tempo| tempo.due_ns(complete_ns)))? {
                 return Ok(());
             }
             position.advance();
-            if let Some(tempo) = tempo {
-                if self.launch.manifest.live {
+            if let Some(tempo) = *tempo {
+                if self.launch.manifest.live && self.source.passes_by() {
                     self.skip_what_is_past(&mut position, tempo);
                 }
                 if !self.let_pass(&position, tempo)? {
@@ -318,5 +331,14 @@ mod tests {
     fn tempo_stretches_the_sensors_clock() {
         let tempo = Tempo { rate: 4.0, start_ns: 1000, first_ns: 500 };
         assert_eq!(tempo.due_ns(500 + 4000), 2000);
+    }
+
+    #[test]
+    fn tempo_slips_by_what_a_scan_is_late_and_by_no_more() {
+        let start_ns = clock::now_ns() - 1_000_000_000;
+        let mut tempo = Tempo { rate: 1.0, start_ns, first_ns: 0 };
+        assert!(tempo.slip(500_000_000) >= 500_000_000);
+        assert!(tempo.due_ns(500_000_000) <= clock::now_ns());
+        assert_eq!(tempo.slip(10_000_000_000), 0);
     }
 }

@@ -19,6 +19,8 @@ pub struct Statistics {
     pub wakes_caught_late: u64,
     /// Scans that could not be read and were left out (the source).
     pub unreadable: u64,
+    /// By how much a simulation in live mode fell behind the rate, for it is not rendered as fast, ns (the source).
+    pub slipped_ns: u64,
     /// Time spent in `process`, ns.
     pub busy_ns: u64,
 }
