@@ -1,21 +1,24 @@
-//! Draws streets, drive and a moment of traffic: `cargo run --release -p gyre-simulator --example plan -- OUT.svg [TRAJECTORY|- [SEED [left|right]]]`.
+//! Draws streets, drive and a moment of traffic: `cargo run --release -p gyre-simulator --example plan -- OUT.svg [TRAJECTORY|town|campus|block [SEED [left|right]]]`.
 
 use std::fmt::Write as _;
-use std::path::Path;
 
-use gyre_simulator::streets::Keep;
-use gyre_simulator::trajectory::recorded::{Excerpt, read};
-use gyre_simulator::{BlockLoop, Streets, Trajectory};
+use gyre_simulator::drive::{DriveConfig, DriveKind};
+use gyre_simulator::{Keep, Streets, Trajectory};
 use nalgebra::Point2;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let out = arguments.first().ok_or("usage: plan OUT.svg [TRAJECTORY|- [SEED [left|right]]]")?;
+    let out = arguments.first().ok_or("usage: plan OUT.svg [TRAJECTORY|town|campus|block [SEED [left|right]]]")?;
     let seed = arguments.get(2).map_or(Ok(1), |seed| seed.parse())?;
-    let drive: Box<dyn Trajectory> = match arguments.get(1).filter(|path| *path != "-") {
-        Some(path) => Box::new(read(Path::new(path), Excerpt::default())?),
-        None => Box::new(BlockLoop::new(40.0, 32.0, 9.5, 5.0)),
+    let kind = match arguments.get(1).map(String::as_str) {
+        None | Some("block") => DriveConfig::default(),
+        Some("campus") => DriveConfig::campus(),
+        Some("town") => {
+            DriveConfig { kind: DriveKind::Town, length_m: 8000.0, speed_m_s: 13.9, ..DriveConfig::default() }
+        }
+        Some(file) => DriveConfig::along_file(file.into()),
     };
+    let drive = kind.trajectory(seed)?;
     let duration_s = drive.duration_s().min(60.0 * 60.0);
     let keep = if arguments.get(3).is_some_and(|keep| keep == "right") { Keep::Right } else { Keep::Left };
     let started = std::time::Instant::now();
