@@ -23,7 +23,7 @@ pub(super) enum Boundary {
     Barrier,
 }
 
-/// How a boundary is made. Hedges: Weissberger's decay of 1.55 dB a metre of foliage at 77 GHz, both ways.
+/// How a boundary is made. All are lower than a radar on a roof, which sees what is higher behind. Hedges: Weissberger's decay of 1.55 dB a metre of foliage at 77 GHz, both ways.
 struct Make {
     screen: Screen,
     /// Metres between its posts; none at 0.
@@ -46,12 +46,12 @@ impl Boundary {
             Make { screen, posts_m, post_m2, filling_m, filling_m2, thickness_m, flash_m2 }
         };
         match self {
-            Self::Hedge => make(0.4, 0.0, (0.0, 0.0), (0.45, 0.08), 0.4, 0.0),
-            Self::Fence => make(0.5, 0.03, (1.8, 0.4), (0.8, 0.08), 0.03, 3.0),
-            Self::Railing => make(0.8, 0.1, (2.0, 0.8), (0.6, 0.12), 0.02, 2.0),
-            Self::Wall => make(0.3, 0.08, (0.0, 0.0), (0.5, 0.08), 0.05, 10.0),
+            Self::Hedge => make(0.5, 0.0, (0.0, 0.0), (0.45, 0.08), 0.4, 0.0),
+            Self::Fence => make(0.6, 0.03, (1.8, 0.4), (0.8, 0.08), 0.03, 3.0),
+            Self::Railing => make(0.9, 0.1, (2.4, 1.5), (0.6, 0.12), 0.02, 2.0),
+            Self::Wall => make(0.5, 0.08, (0.0, 0.0), (0.5, 0.08), 0.05, 10.0),
             Self::Wire => make(0.97, 0.0, (3.0, 0.4), (2.0, 0.02), 0.02, 0.0),
-            Self::Barrier => make(0.6, 0.5, (2.0, 1.5), (1.0, 0.1), 0.02, 60.0),
+            Self::Barrier => make(0.8, 0.5, (2.0, 1.5), (1.0, 0.1), 0.02, 60.0),
         }
     }
 }
@@ -97,7 +97,7 @@ impl Site<'_> {
         self.cloud(place, 1, 0.1, 0.2, 1.5);
         self.cloud(place, 9, crown_m, reach_m, 0.15);
         let half = Vector2::new(crown_m.min(reach_m), 0.0);
-        let crown = Screen { transmission: 0.6, mirror: 0.0 };
+        let crown = Screen { transmission: 0.8, mirror: 0.0 };
         self.wall(place - half, place + half, crown, NO_BODY);
         self.wall(place - half.yx(), place + half.yx(), crown, NO_BODY);
     }
