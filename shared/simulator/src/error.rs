@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use gyre_radar::{OpenError, ReadError};
+use gyre_radar::{OpenError, ReadError, TrajectoryError};
 
 /// Why a dataset could not be set up or written.
 #[derive(Debug, thiserror::Error)]
@@ -16,6 +16,17 @@ pub enum SimulatorError {
         value: String,
         /// What would do.
         expected: String,
+    },
+    /// The trajectory to drive along cannot be read.
+    #[error(transparent)]
+    Trajectory(#[from] TrajectoryError),
+    /// A trajectory that can be read cannot be driven.
+    #[error("cannot drive along {}: {reason}", path.display())]
+    Drive {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
     },
     /// The output folder holds what is of another dataset; a mixture of both would be read as one.
     #[error("{} holds `{other}`, which is not of this dataset: give an empty folder", folder.display())]

@@ -48,6 +48,6 @@ pub use oxford_writer::{Summary, write_dataset};
 pub use profile::{Profile, Sampling};
 pub use sensor::{Sensor, SweepTime};
 pub use simulator::{SimulatedScan, Simulator};
-pub use streets::{Street, Streets};
-pub use trajectory::{BlockLoop, ConstantTwist, Trajectory};
+pub use streets::{Keep, Street, Streets};
+pub use trajectory::{BlockLoop, ConstantTwist, TimedPoses, Trajectory};
 pub use world::{Body, Movers, Moving, World};

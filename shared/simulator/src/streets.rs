@@ -1,11 +1,20 @@
 //! The streets of a town: centre lines with a width, and how far from them a place is.
 
+mod along;
+mod lines;
+mod merge;
+mod side;
+
 use nalgebra::{Isometry2, Point2, Vector2};
+
+pub use along::{Keep, LANE_M};
 
 use crate::trajectory::Trajectory;
 
-/// Metres a side of a cell of the index.
+/// Metres a side of a cell of the index, in towns of a usual size.
 const CELL_M: f64 = 20.0;
+/// No index has many more cells; a town that is larger has larger ones.
+const MOST_CELLS: f64 = 1e6;
 /// Metres between the points of a street that follows a drive.
 const STEP_M: f64 = 2.0;
 
@@ -61,17 +70,24 @@ impl Street {
 #[derive(Clone, Debug, Default)]
 pub struct Streets {
     streets: Vec<Street>,
+    widest_half_m: f64,
     corner: Point2<f64>,
+    cell_m: f64,
     columns: usize,
     rows: usize,
-    /// In each cell the pieces (street, first point, metres along the street) that touch it.
-    cells: Vec<Vec<Piece>>,
+    /// Where each cell's pieces begin in `pieces`, and the end of the last.
+    starts: Vec<u32>,
+    pieces: Vec<Piece>,
 }
 
+/// A straight piece of a street.
 #[derive(Clone, Copy, Debug)]
 struct Piece {
     street: u32,
-    point: u32,
+    half_width_m: f64,
+    from: Point2<f64>,
+    way: Vector2<f64>,
+    length_m: f64,
     along_m: f64,
 }
 
@@ -81,10 +97,12 @@ impl Streets {
         let points = || streets.iter().flat_map(|street| &street.centre);
         let lowest = points().fold(Point2::new(f64::MAX, f64::MAX), |a, b| a.inf(b));
         let highest = points().fold(Point2::new(f64::MIN, f64::MIN), |a, b| a.sup(b));
-        let cells = |from: f64, to: f64| ((to - from).max(0.0) / CELL_M) as usize + 1;
-        let (columns, rows) = (cells(lowest.x, highest.x), cells(lowest.y, highest.y));
-        let cells = vec![Vec::new(); columns * rows];
-        let mut network = Self { streets, corner: lowest, columns, rows, cells };
+        let size = if points().next().is_some() { highest - lowest } else { Vector2::zeros() };
+        let cell_m = CELL_M.max((size.x * size.y / MOST_CELLS).sqrt()).max((size.x + size.y) / MOST_CELLS);
+        let [columns, rows] = [size.x, size.y].map(|extent| (extent / cell_m) as usize + 1);
+        let widest_half_m = streets.iter().map(|street| street.half_width_m).fold(0.0, f64::max);
+        let (starts, pieces) = (Vec::new(), Vec::new());
+        let mut network = Self { streets, widest_half_m, corner: lowest, cell_m, columns, rows, starts, pieces };
         network.sort();
         network
     }
@@ -111,9 +129,11 @@ impl Streets {
 
     /// What is nearest of the streets whose kerb is less than `within_m` away; `None` where there is none.
     pub fn nearest(&self, place: Point2<f64>, within_m: f64) -> Option<Nearest> {
-        let widest = self.streets.iter().map(|street| street.half_width_m).fold(0.0, f64::max);
-        let reach = Vector2::repeat(within_m + widest);
-        let [first, last] = [place - reach, place + reach].map(|p| (p - self.corner) / CELL_M);
+        if self.pieces.is_empty() {
+            return None;
+        }
+        let reach = Vector2::repeat(within_m + self.widest_half_m);
+        let [first, last] = [place - reach, place + reach].map(|p| (p - self.corner) / self.cell_m);
         let span = |from: f64, to: f64, end: usize| {
             let from = from.floor().max(0.0) as usize;
             from..((to.floor() + 1.0).clamp(0.0, end as f64) as usize).max(from)
@@ -121,12 +141,9 @@ impl Streets {
         let mut best: Option<Nearest> = None;
         for row in span(first.y, last.y, self.rows) {
             for column in span(first.x, last.x, self.columns) {
-                for piece in &self.cells[row * self.columns + column] {
-                    let found = self.beside(piece, place);
-                    let nearer = best.is_none_or(|best| found.clearance_m < best.clearance_m);
-                    if nearer && found.clearance_m < within_m {
-                        best = Some(found);
-                    }
+                for piece in self.cell(row * self.columns + column) {
+                    let least_m = best.map_or(within_m, |best| best.clearance_m);
+                    best = piece.nearer(place, least_m).or(best);
                 }
             }
         }
@@ -138,35 +155,51 @@ impl Streets {
         self.nearest(place, within_m).map_or(within_m, |nearest| nearest.clearance_m)
     }
 
-    fn beside(&self, piece: &Piece, place: Point2<f64>) -> Nearest {
-        let street = &self.streets[piece.street as usize];
-        let (from, to) = (street.centre[piece.point as usize], street.centre[piece.point as usize + 1]);
-        let way = to - from;
-        let share = ((place - from).dot(&way) / way.norm_squared().max(1e-12)).clamp(0.0, 1.0);
-        let offset_m = (place - (from + way * share)).norm();
-        Nearest {
-            street: piece.street as usize,
-            along_m: piece.along_m + share * way.norm(),
-            offset_m,
-            clearance_m: offset_m - street.half_width_m,
-        }
+    fn cell(&self, cell: usize) -> &[Piece] {
+        &self.pieces[self.starts[cell] as usize..self.starts[cell + 1] as usize]
     }
 
+    /// Sorts all pieces into the cells that they may touch, in the order of the streets.
     fn sort(&mut self) {
+        let mut found: Vec<(usize, Piece)> = Vec::new();
         for (number, street) in self.streets.iter().enumerate() {
             let mut along_m = 0.0;
-            for (point, ends) in street.centre.windows(2).enumerate() {
-                let piece = Piece { street: number as u32, point: point as u32, along_m };
-                along_m += (ends[1] - ends[0]).norm();
-                let cell = |p: Point2<f64>| (p - self.corner).map(|v| (v / CELL_M) as usize);
+            for ends in street.centre.windows(2) {
+                let way = ends[1] - ends[0];
+                let (street, half_width_m) = (number as u32, street.half_width_m);
+                let piece = Piece { street, half_width_m, from: ends[0], way, length_m: way.norm(), along_m };
+                along_m += piece.length_m;
+                let cell = |p: Point2<f64>| (p - self.corner).map(|v| (v / self.cell_m) as usize);
                 let (low, high) = (cell(ends[0].inf(&ends[1])), cell(ends[0].sup(&ends[1])));
                 for row in low.y..=high.y {
-                    for column in low.x..=high.x {
-                        self.cells[row * self.columns + column].push(piece);
-                    }
+                    found.extend((low.x..=high.x).map(|column| (row * self.columns + column, piece)));
                 }
             }
         }
+        found.sort_by_key(|(cell, _)| *cell);
+        let before = |cell: usize| found.partition_point(|(c, _)| *c < cell) as u32;
+        self.starts = (0..=self.columns * self.rows).map(before).collect();
+        self.pieces = found.into_iter().map(|(_, piece)| piece).collect();
+    }
+}
+
+impl Piece {
+    /// Where a place lies beside the piece, if its kerb is less than `least_m` away.
+    fn nearer(&self, place: Point2<f64>, least_m: f64) -> Option<Nearest> {
+        let off = place - self.from;
+        let share = (off.dot(&self.way) / (self.length_m * self.length_m).max(1e-12)).clamp(0.0, 1.0);
+        let apart = (off - self.way * share).norm_squared();
+        let reach_m = least_m + self.half_width_m;
+        if reach_m <= 0.0 || apart >= reach_m * reach_m {
+            return None;
+        }
+        let offset_m = apart.sqrt();
+        Some(Nearest {
+            street: self.street as usize,
+            along_m: self.along_m + share * self.length_m,
+            offset_m,
+            clearance_m: offset_m - self.half_width_m,
+        })
     }
 }
 

@@ -1,11 +1,15 @@
 //! How the sensor moves: a pose for every instant.
 
 mod block;
+pub mod recorded;
+pub mod spline;
+mod timed_poses;
 mod twist;
 
 use nalgebra::{Isometry2, Vector2};
 
 pub use block::BlockLoop;
+pub use timed_poses::{MEASURED_HZ, TimedPoses};
 pub use twist::ConstantTwist;
 
 /// A motion that is continuous in time.

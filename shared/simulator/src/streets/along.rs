@@ -1,0 +1,97 @@
+//! Streets laid along a drive, with side streets: the town's plan where only the drive is known.
+
+use nalgebra::Point2;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+use super::lines::{Line, simplified};
+use super::merge::{WayPoint, driven_lines, way};
+use super::side::side_lines;
+use super::{Street, Streets};
+use crate::trajectory::Trajectory;
+
+/// Width of a lane, metres: a vehicle drives half of it beside the middle of its street.
+pub const LANE_M: f64 = 3.2;
+/// Room that the carriageway leaves beside the middle of the driven vehicle, metres.
+const BESIDE_VEHICLE_M: f64 = 1.3;
+/// How often it is looked whether the carriageway holds the vehicle, seconds.
+const PASS_S: f64 = 0.05;
+/// Deviation that a street's line may have from the points that were driven, metres.
+const TOLERANCE_M: f64 = 0.1;
+/// The stream of random numbers that streets are drawn with.
+const STREET_STREAM: u64 = 1 << 40;
+/// Width of side streets, metres, from narrow residential ones to collectors.
+const SIDE_WIDTH_M: std::ops::Range<f64> = 5.0..8.0;
+
+/// The side of the road that traffic keeps to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Keep {
+    /// As in Britain, where Oxford's and RADIATE's recordings were made.
+    #[default]
+    Left,
+    /// As in most other countries.
+    Right,
+}
+
+impl Streets {
+    /// The streets along the first `duration_s` of a drive, and side streets that branch off them, the same for the same seed.
+    ///
+    /// The driven vehicle keeps to its lane; what it drives twice, in either direction and some metres beside, is one
+    /// street. The carriageways hold it everywhere with 1.3 m to spare from its middle.
+    pub fn along(trajectory: &dyn Trajectory, duration_s: f64, keep: Keep, seed: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(STREET_STREAM);
+        let duration_s = trajectory.duration_s().min(duration_s);
+        let way = way(trajectory, duration_s, keep);
+        let lines = driven_lines(&way);
+        let speeds = mean_speeds(&lines, &way);
+        let sides = side_lines(&lines, &mut rng);
+        let drawn = |line: &Line, half_width_m: f64, driven: bool| {
+            let centre = simplified(line, TOLERANCE_M);
+            Street { centre, half_width_m, driven }
+        };
+        let mut streets = Vec::with_capacity(lines.len() + sides.len());
+        for (line, speed_m_s) in lines.iter().zip(speeds) {
+            streets.push(drawn(line, driven_width_m(speed_m_s, &mut rng) / 2.0, true));
+        }
+        widen(&mut streets, trajectory, duration_s);
+        for line in &sides {
+            streets.push(drawn(line, rng.random_range(SIDE_WIDTH_M) / 2.0, false));
+        }
+        Self::new(streets)
+    }
+}
+
+/// Width of a street on which one drives so fast: 6 m where slow, beyond 10 m on main roads.
+fn driven_width_m(speed_m_s: f64, rng: &mut impl Rng) -> f64 {
+    (3.5 + 0.65 * speed_m_s).clamp(6.0, 11.0) + rng.random_range(0.0..2.5)
+}
+
+/// Mean speed on each line where the vehicle moved, metres a second.
+fn mean_speeds(lines: &[Line], way: &[WayPoint]) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0.0); lines.len()];
+    let carriageway = |line: &Line| Street { centre: line.clone(), half_width_m: 0.0, driven: true };
+    let network = Streets::new(lines.iter().map(carriageway).collect());
+    for ends in way.windows(2) {
+        let speed_m_s = (ends[1].vehicle - ends[0].vehicle).norm() / (ends[1].time_s - ends[0].time_s).max(1e-3);
+        if let Some(nearest) = network.nearest(ends[0].centre, 12.0) {
+            let (sum, count) = &mut sums[nearest.street];
+            (*sum, *count) = (*sum + speed_m_s, *count + 1.0);
+        }
+    }
+    sums.into_iter().map(|(sum, count)| if count > 0.0 { sum / count } else { 0.0 }).collect()
+}
+
+/// Widens streets that do not hold the vehicle.
+fn widen(streets: &mut [Street], trajectory: &dyn Trajectory, duration_s: f64) {
+    let network = Streets::new(streets.to_vec());
+    for step in 0..=(duration_s / PASS_S) as usize {
+        let place = Point2::from(trajectory.pose(step as f64 * PASS_S).translation.vector);
+        if let Some(nearest) = network.nearest(place, 20.0) {
+            let street = &mut streets[nearest.street];
+            street.half_width_m = street.half_width_m.max(nearest.offset_m + BESIDE_VEHICLE_M);
+        }
+    }
+}

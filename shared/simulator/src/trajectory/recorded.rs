@@ -1,0 +1,80 @@
+//! A drive that somebody drove: trajectories from files.
+
+use std::path::Path;
+
+use gyre_radar::read_trajectory;
+use nalgebra::{Isometry2, Point2};
+
+use super::timed_poses::{MEASURED_HZ, TimedPoses};
+use crate::SimulatorError;
+
+/// What to take of a file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Excerpt {
+    /// Where to begin, seconds after the file's first pose.
+    pub from_s: f64,
+    /// How much at most, seconds.
+    pub for_s: f64,
+    /// Poses a second in a file without times.
+    pub rate_hz: f64,
+}
+
+impl Default for Excerpt {
+    fn default() -> Self {
+        Self { from_s: 0.0, for_s: f64::INFINITY, rate_hz: 4.0 }
+    }
+}
+
+/// The drive of a file of any form that [`gyre_radar::read_trajectory`] knows, in the frame of the excerpt's first pose.
+///
+/// It passes within 5 cm of 95 % of a real drive's poses and within 10 cm of 99 % (what is left is their noise), and stands still before its start and after its end.
+pub fn read(path: &Path, excerpt: Excerpt) -> Result<TimedPoses, SimulatorError> {
+    let poses = timed(path, excerpt.rate_hz)?;
+    let refuse = |reason: String| SimulatorError::Drive { path: path.to_owned(), reason };
+    let end_s = excerpt.from_s + excerpt.for_s;
+    let within: Vec<_> = poses.iter().filter(|(s, _)| (excerpt.from_s..=end_s).contains(s)).collect();
+    let [(start_s, origin), _, ..] = within[..] else {
+        let last_s = poses.last().map_or(0.0, |(s, _)| *s);
+        return Err(refuse(format!("it has less than two poses from {} s on; it lasts {last_s:.1} s", excerpt.from_s)));
+    };
+    let into_world = origin.inverse();
+    let moved: Vec<_> = within.iter().map(|(s, pose)| (s - start_s, into_world * pose)).collect();
+    let ahead = share_ahead(&moved);
+    if ahead < 0.5 {
+        let share = 100.0 * ahead;
+        return Err(refuse(format!(
+            "only {share:.0} % of its way lead ahead (x forward, y left): is it another frame?"
+        )));
+    }
+    Ok(TimedPoses::new(&moved, MEASURED_HZ))
+}
+
+/// All poses with their seconds after the first; of poses with the same stamp the first.
+fn timed(path: &Path, rate_hz: f64) -> Result<Vec<(f64, Isometry2<f64>)>, SimulatorError> {
+    let read = read_trajectory(path)?;
+    let seconds = |index: usize| match &read.stamp_ns {
+        Some(stamps) => (stamps[index] - stamps[0]) as f64 * 1e-9,
+        None => index as f64 / rate_hz,
+    };
+    let mut poses: Vec<(f64, Isometry2<f64>)> =
+        read.poses.iter().enumerate().map(|(index, pose)| (seconds(index), *pose)).collect();
+    poses.dedup_by(|later, kept| later.0 <= kept.0);
+    Ok(poses)
+}
+
+/// Share of a way that leads along x of the body, within 45 degrees; 1 where there is no way to speak of.
+fn share_ahead(poses: &[(f64, Isometry2<f64>)]) -> f64 {
+    let (mut ahead_m, mut all_m) = (0.0, 0.0);
+    let mut from = poses[0].1;
+    for (_, pose) in poses {
+        let step = from.inverse_transform_point(&Point2::from(pose.translation.vector));
+        let length_m = step.coords.norm();
+        if length_m < 0.5 {
+            continue;
+        }
+        all_m += length_m;
+        ahead_m += if step.x > step.y.abs() { length_m } else { 0.0 };
+        from = *pose;
+    }
+    if all_m > 5.0 { ahead_m / all_m } else { 1.0 }
+}

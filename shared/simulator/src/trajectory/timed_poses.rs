@@ -1,0 +1,99 @@
+//! A drive that is known at some instants only, made continuous.
+
+use std::f64::consts::{PI, TAU};
+
+use nalgebra::{Isometry2, Vector2};
+
+use super::Trajectory;
+use super::spline::{Sample, UniformSpline};
+
+/// What a drive known at some instants is smoothed with: what changes faster than so many times a second is measuring
+/// noise rather than a car.
+pub const MEASURED_HZ: f64 = 0.7;
+/// As long as a vehicle stays within so many metres, for [`STAND_S`] at least, it stands.
+const STAND_M: f64 = 0.05;
+/// And within so many radians.
+const STAND_RAD: f64 = 0.01;
+/// See [`STAND_M`].
+const STAND_S: f64 = 1.5;
+/// How much more the instants of a stand count: no smoothing may make the vehicle creep.
+const STAND_WEIGHT: f64 = 30.0;
+
+/// A drive through poses at given instants, its derivatives continuous up to the fourth.
+#[derive(Clone, Debug)]
+pub struct TimedPoses {
+    curve: UniformSpline<3>,
+    duration_s: f64,
+}
+
+impl TimedPoses {
+    /// A drive close to `poses`, whose times ascend (seconds from zero), without what is faster than `cutoff_hz`.
+    ///
+    /// Where the poses hardly differ for a while, the vehicle stands.
+    pub fn new(poses: &[(f64, Isometry2<f64>)], cutoff_hz: f64) -> Self {
+        let mut samples = unwrapped(poses);
+        hold_stands(&mut samples);
+        let duration_s = samples.last().map_or(0.0, |last| last.at);
+        let spacing_s = duration_s / (samples.len().max(2) - 1) as f64;
+        let step_s = spacing_s.clamp(0.02, 0.5 / cutoff_hz);
+        Self { curve: UniformSpline::fit(&samples, step_s, cutoff_hz), duration_s }
+    }
+}
+
+impl Trajectory for TimedPoses {
+    fn pose(&self, time_s: f64) -> Isometry2<f64> {
+        let [x, y, yaw] = self.curve.value(time_s.clamp(0.0, self.duration_s));
+        Isometry2::new(Vector2::new(x, y), yaw)
+    }
+
+    fn duration_s(&self) -> f64 {
+        self.duration_s
+    }
+
+    fn velocity(&self, time_s: f64) -> Vector2<f64> {
+        if !(0.0..=self.duration_s).contains(&time_s) {
+            return Vector2::zeros();
+        }
+        let [x, y, _] = self.curve.slope(time_s);
+        Vector2::new(x, y)
+    }
+}
+
+/// Poses as x, y and a yaw that does not jump.
+fn unwrapped(poses: &[(f64, Isometry2<f64>)]) -> Vec<Sample<3>> {
+    let mut yaw = 0.0;
+    let sample = |(at, pose): &(f64, Isometry2<f64>)| {
+        yaw += (pose.rotation.angle() - yaw + PI).rem_euclid(TAU) - PI;
+        Sample { at: *at, value: [pose.translation.x, pose.translation.y, yaw], weight: 1.0 }
+    };
+    poses.iter().map(sample).collect()
+}
+
+/// Gives all samples of a stand one pose, their median.
+fn hold_stands(samples: &mut [Sample<3>]) {
+    let mut first = 0;
+    while first < samples.len() {
+        let origin = samples[first];
+        let near = |s: &Sample<3>| {
+            let off: [f64; 3] = std::array::from_fn(|d| s.value[d] - origin.value[d]);
+            off[0].hypot(off[1]) < STAND_M && off[2].abs() < STAND_RAD
+        };
+        let count = samples[first..].iter().take_while(|s| near(s)).count().max(1);
+        let stand = &mut samples[first..first + count];
+        if stand[count - 1].at - origin.at < STAND_S {
+            first += 1;
+            continue;
+        }
+        let value = std::array::from_fn(|d| median(stand.iter().map(|s| s.value[d])));
+        for sample in stand {
+            *sample = Sample { value, weight: STAND_WEIGHT, ..*sample };
+        }
+        first += count;
+    }
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut all: Vec<f64> = values.collect();
+    all.sort_by(f64::total_cmp);
+    all[all.len() / 2]
+}
