@@ -8,7 +8,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use crate::sensor::{self, Sensor, SweepTime};
-use crate::streets::Streets;
+use crate::streets::{Keep, Streets};
 use crate::traffic::Traffic;
 use crate::trajectory::Trajectory;
 use crate::world::World;
@@ -17,6 +17,9 @@ use crate::{SimulationConfig, SimulatorError, town};
 /// Stamp of the first azimuth of the first scan, microseconds since 1970 (2019-01-10 15:00 UTC): readers
 /// of recordings check that a year is plausible, and the same configuration has to give the same files.
 const EPOCH_US: i64 = 1_547_132_400_000_000;
+
+/// A drive without an end has repeated itself by then, seconds.
+const ENDLESS_S: f64 = 100.0;
 
 /// A drive through a town, ready to be measured. Shared freely between threads.
 #[derive(Clone)]
@@ -44,8 +47,10 @@ impl Simulator {
     pub fn new(config: &SimulationConfig) -> Result<Self, SimulatorError> {
         config.validate()?;
         let trajectory: Arc<dyn Trajectory> = config.drive.trajectory(config.seed)?.into();
-        let drive_s = config.scans as f64 * config.sensor.period_s;
-        let streets = Streets::driven(trajectory.as_ref(), drive_s.min(100.0), 4.0);
+        // Of the whole drive, however many scans are wanted: they are to see the same town.
+        let duration_s = trajectory.duration_s();
+        let duration_s = if duration_s.is_finite() { duration_s } else { ENDLESS_S };
+        let streets = Streets::along(trajectory.as_ref(), duration_s, Keep::default(), config.seed);
         Ok(Self {
             scans: config.scans,
             seed: config.seed,

@@ -4,9 +4,12 @@ use nalgebra::{Point2, Vector2};
 use rand::Rng;
 
 use super::facade::right_of;
-use super::random::stations;
+use super::random::{smooth, stations};
 use super::site::{Screen, Site};
 use crate::world::NO_BODY;
+
+/// Metres over which the edge of undergrowth comes and goes.
+const RAGGED_M: f64 = 9.0;
 
 /// What divides land.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,12 +105,25 @@ impl Site<'_> {
         self.wall(place - half.yx(), place + half.yx(), crown, NO_BODY);
     }
 
-    /// Bushes, sheds' corners, bins, roughness: weak things all over a piece of land.
+    /// Bushes, bins, roughness: weak things all over a piece of land.
     pub(super) fn clutter(&mut self, from: Point2<f64>, size: Vector2<f64>, per_m2: f64, median_m2: f64) {
-        let count = (size.x * size.y * per_m2).max(0.0) as usize;
-        for _ in 0..count {
+        for _ in 0..(size.x * size.y * per_m2).max(0.0) as usize {
             let share = Vector2::from_fn(|_, _| self.rng.random::<f64>());
             self.point(from + size.component_mul(&share), median_m2, 6.0, NO_BODY);
+        }
+    }
+
+    /// Undergrowth: a patch with a ragged edge that fades out.
+    pub(super) fn undergrowth(&mut self, from: Point2<f64>, size: Vector2<f64>, per_m2: f64, median_m2: f64) {
+        let key = self.rng.random();
+        for _ in 0..(size.x * size.y * per_m2).max(0.0) as usize {
+            let share = Vector2::from_fn(|_, _| self.rng.random::<f64>());
+            let place = from + size.component_mul(&share);
+            let from_middle = 2.0 * share - Vector2::repeat(1.0);
+            let cover = 1.5 * smooth(key, place, RAGGED_M) + 0.2 - from_middle.norm_squared();
+            if cover > 0.0 {
+                self.point(place, median_m2 * cover, 6.0, NO_BODY);
+            }
         }
     }
 }

@@ -33,9 +33,9 @@ pub(super) enum Material {
 impl Material {
     fn screen(self) -> Screen {
         let (transmission, mirror) = match self {
-            Self::Brick => (0.03, 0.08),
-            Self::Concrete => (0.02, 0.12),
-            Self::Glass => (0.08, 0.5),
+            Self::Brick => (0.1, 0.08),
+            Self::Concrete => (0.06, 0.12),
+            Self::Glass => (0.12, 0.5),
             Self::Metal => (0.003, 0.6),
             Self::Timber => (0.3, 0.03),
         };
@@ -119,9 +119,9 @@ impl Site<'_> {
     }
 
     fn rough_wall(&mut self, bay: &Bay, roughness: f64, facade: &Facade) {
-        for at in stations(&mut self.rng, bay.width_m, 0.12 / facade.detail, 0.4 / facade.detail) {
+        for at in stations(&mut self.rng, bay.width_m, 0.1 / facade.detail, 0.35 / facade.detail) {
             let place = bay.at(at, self.rng.random_range(0.0..0.15));
-            self.facing(place, bay.outward, 1.5, 0.1 * roughness * bay.strength, facade.body);
+            self.facing(place, bay.outward, 1.5, 0.15 * roughness * bay.strength, facade.body);
         }
     }
 

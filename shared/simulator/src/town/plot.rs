@@ -113,12 +113,12 @@ impl Plot<'_, '_> {
         self.site.clutter(Point2::new(0.0, y), size, per_m2, median_m2);
     }
 
-    /// Grass and undergrowth; a share of `rough` rises towards the street, or is so rough, that all of it is seen.
+    /// Grass, and on a share of plots undergrowth that reflects as a whole.
     fn ground(&mut self, rough: f64) {
+        self.clutter(0.5, 0.04, 0.02);
         if self.site.chance(rough) {
-            self.clutter(0.5, 0.8, 0.02);
-        } else {
-            self.clutter(0.5, 0.04, 0.02);
+            let size = Vector2::new(self.width_m, self.depth_m - 0.5);
+            self.site.undergrowth(Point2::new(0.0, 0.5), size, 1.2, 0.05);
         }
     }
 
