@@ -7,7 +7,7 @@ use nalgebra::Isometry2;
 
 use crate::profile::Sampling;
 use crate::sensor::{Scene, Sensor, SweepTime};
-use crate::streets::{Keep, Streets};
+use crate::streets::Streets;
 use crate::traffic::Traffic;
 use crate::trajectory::Trajectory;
 use crate::weather::WeatherConfig;
@@ -17,6 +17,9 @@ use crate::{SimulationConfig, SimulatorError, town};
 /// Stamp of the first azimuth of the first scan, microseconds since 1970 (2019-01-10 15:00 UTC): readers
 /// of recordings check that a year is plausible, and the same configuration has to give the same files.
 const EPOCH_US: i64 = 1_547_132_400_000_000;
+
+/// A drive without an end has repeated itself by then, seconds.
+const ENDLESS_S: f64 = 100.0;
 
 /// A drive through a town, ready to be measured. Shared freely between threads.
 #[derive(Clone)]
@@ -43,9 +46,10 @@ impl Simulator {
         config.validate()?;
         let trajectory: Arc<dyn Trajectory> = config.drive.trajectory(config.seed)?.into();
         let sampling = config.sensor.sampling();
-        // Not as far as the scans go: more of them must find the same town.
-        let streets =
-            Streets::along(trajectory.as_ref(), trajectory.duration_s().min(100.0), Keep::default(), config.seed);
+        // Of the whole drive, however many scans are wanted: they are to see the same town.
+        let duration_s = trajectory.duration_s();
+        let duration_s = if duration_s.is_finite() { duration_s } else { ENDLESS_S };
+        let streets = Streets::along(trajectory.as_ref(), duration_s, config.drive.keep, config.seed);
         Ok(Self {
             config: config.clone(),
             sampling,

@@ -4,9 +4,12 @@ use nalgebra::{Point2, Vector2};
 use rand::Rng;
 
 use super::facade::right_of;
-use super::random::stations;
+use super::random::{smooth, stations};
 use super::site::{Screen, Site};
 use crate::world::NO_BODY;
+
+/// Metres over which the edge of undergrowth comes and goes.
+const RAGGED_M: f64 = 9.0;
 
 /// What divides land.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,7 +26,7 @@ pub(super) enum Boundary {
     Barrier,
 }
 
-/// How a boundary is made. Hedges: Weissberger's decay of 1.55 dB a metre of foliage at 77 GHz, both ways.
+/// How a boundary is made. All are lower than a radar on a roof, which sees what is higher behind. Hedges: Weissberger's decay of 1.55 dB a metre of foliage at 77 GHz, both ways.
 struct Make {
     screen: Screen,
     /// Metres between its posts; none at 0.
@@ -46,12 +49,12 @@ impl Boundary {
             Make { screen, posts_m, post_m2, filling_m, filling_m2, thickness_m, flash_m2 }
         };
         match self {
-            Self::Hedge => make(0.4, 0.0, (0.0, 0.0), (0.45, 0.08), 0.4, 0.0),
-            Self::Fence => make(0.5, 0.03, (1.8, 0.4), (0.8, 0.08), 0.03, 3.0),
-            Self::Railing => make(0.8, 0.1, (2.0, 0.8), (0.6, 0.12), 0.02, 2.0),
-            Self::Wall => make(0.3, 0.08, (0.0, 0.0), (0.5, 0.08), 0.05, 10.0),
+            Self::Hedge => make(0.5, 0.0, (0.0, 0.0), (0.45, 0.08), 0.4, 0.0),
+            Self::Fence => make(0.6, 0.03, (1.8, 0.4), (0.8, 0.08), 0.03, 3.0),
+            Self::Railing => make(0.9, 0.1, (2.4, 1.5), (0.6, 0.12), 0.02, 2.0),
+            Self::Wall => make(0.5, 0.08, (0.0, 0.0), (0.5, 0.08), 0.05, 10.0),
             Self::Wire => make(0.97, 0.0, (3.0, 0.4), (2.0, 0.02), 0.02, 0.0),
-            Self::Barrier => make(0.6, 0.5, (2.0, 1.5), (1.0, 0.1), 0.02, 60.0),
+            Self::Barrier => make(0.8, 0.5, (2.0, 1.5), (1.0, 0.1), 0.02, 60.0),
         }
     }
 }
@@ -97,17 +100,30 @@ impl Site<'_> {
         self.cloud(place, 1, 0.1, 0.2, 1.5);
         self.cloud(place, 9, crown_m, reach_m, 0.15);
         let half = Vector2::new(crown_m.min(reach_m), 0.0);
-        let crown = Screen { transmission: 0.6, mirror: 0.0 };
+        let crown = Screen { transmission: 0.8, mirror: 0.0 };
         self.wall(place - half, place + half, crown, NO_BODY);
         self.wall(place - half.yx(), place + half.yx(), crown, NO_BODY);
     }
 
-    /// Bushes, sheds' corners, bins, roughness: weak things all over a piece of land.
+    /// Bushes, bins, roughness: weak things all over a piece of land.
     pub(super) fn clutter(&mut self, from: Point2<f64>, size: Vector2<f64>, per_m2: f64, median_m2: f64) {
-        let count = (size.x * size.y * per_m2).max(0.0) as usize;
-        for _ in 0..count {
+        for _ in 0..(size.x * size.y * per_m2).max(0.0) as usize {
             let share = Vector2::from_fn(|_, _| self.rng.random::<f64>());
             self.point(from + size.component_mul(&share), median_m2, 6.0, NO_BODY);
+        }
+    }
+
+    /// Undergrowth: a patch with a ragged edge that fades out.
+    pub(super) fn undergrowth(&mut self, from: Point2<f64>, size: Vector2<f64>, per_m2: f64, median_m2: f64) {
+        let key = self.rng.random();
+        for _ in 0..(size.x * size.y * per_m2).max(0.0) as usize {
+            let share = Vector2::from_fn(|_, _| self.rng.random::<f64>());
+            let place = from + size.component_mul(&share);
+            let from_middle = 2.0 * share - Vector2::repeat(1.0);
+            let cover = 1.5 * smooth(key, place, RAGGED_M) + 0.2 - from_middle.norm_squared();
+            if cover > 0.0 {
+                self.point(place, median_m2 * cover, 6.0, NO_BODY);
+            }
         }
     }
 }

@@ -65,6 +65,7 @@ impl Site<'_> {
         let body = self.body();
         let share = self.between(0.3, 0.7);
         let inside_m = (0.4 * building.room.width_m.min(building.room.depth_m)).min(6.0);
+        let bay_m = self.between(2.2, 3.8);
         let outline = building.room.outline(building.form, share);
         let corner = |index: usize| outline[index % outline.len()];
         for index in 0..outline.len() {
@@ -72,7 +73,7 @@ impl Site<'_> {
             let to_street = right_of(to - from).y < -0.5;
             let (material, share) = if to_street { (building.front, 1.0) } else { (building.rest, BEHIND) };
             let detail = share * building.detail;
-            self.facade(&Facade { from, to, material, detail, inside_m, body });
+            self.facade(&Facade { from, to, material, detail, bay_m, inside_m, body });
             self.corner(before, from, to, detail, body);
             if to_street && building.balconies_m > 0.0 {
                 self.balconies(from, to, building.balconies_m, body);
@@ -84,7 +85,7 @@ impl Site<'_> {
     fn corner(&mut self, before: Point2<f64>, at: Point2<f64>, after: Point2<f64>, detail: f64, body: u32) {
         let (arriving, leaving) = (at - before, after - at);
         if arriving.perp(&leaving) > 0.0 {
-            self.point(at, 3.0 * detail, 5.0, body);
+            self.facing(at, right_of(arriving) + right_of(leaving), 0.5, 3.0 * detail, body);
         } else {
             self.facing(at, right_of(arriving) + right_of(leaving), 2.0, 25.0, body);
         }
@@ -99,7 +100,7 @@ impl Site<'_> {
             for side in [-1.0, 1.0] {
                 self.facing(place + along * side, outward + along * (0.6 * side), 4.0, 6.0, body);
             }
-            self.point(place + outward * 1.2, 0.6, 4.0, body);
+            self.facing(place + outward * 1.2, outward, 0.5, 0.8, body);
         }
     }
 

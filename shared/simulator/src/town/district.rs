@@ -70,13 +70,13 @@ impl District {
     fn uses(self, first_row: bool) -> &'static [(Use, f64)] {
         match (self, first_row) {
             (Self::City, true) => &[
-                (Use::Terrace, 0.78),
+                (Use::Terrace, 0.75),
                 (Use::Flats, 0.06),
                 (Use::Hall, 0.03),
                 (Use::Green, 0.03),
                 (Use::CarPark, 0.02),
                 (Use::Church, 0.02),
-                (Use::Alley, 0.06),
+                (Use::Alley, 0.09),
             ],
             (Self::City, false) => &[(Use::Yards, 0.6), (Use::Terrace, 0.25), (Use::Hall, 0.15)],
             (Self::Suburb, true) => &[

@@ -1,8 +1,8 @@
 //! Facades: what a radar sees of a wall.
 //!
-//! Real scans show a row of houses as short bright pieces and dots with gaps between. So a facade is made of bays a
-//! few metres wide, each with a strength of its own: rough wall (many weak scatterers, whose echoes interfere), and in
-//! some of them windows (reveals that look along the street, a pane that flashes at a right angle, a room behind that
+//! Real scans show a row of houses as short bright pieces and dots with gaps between. So a facade is made of regular
+//! bays, each with a strength of its own: rough wall (many weak scatterers, whose echoes interfere), relief between
+//! the bays that makes rows of beads along a street, and in some of them windows (reveals that look along the street, a pane that flashes at a right angle, a room behind that
 //! smears the echo over range), doors (a recess: two walls and the ground, bright over a wide angle) and drain pipes.
 //! Cross-sections are fitted to the histogram of real scans' powers.
 
@@ -33,9 +33,9 @@ pub(super) enum Material {
 impl Material {
     fn screen(self) -> Screen {
         let (transmission, mirror) = match self {
-            Self::Brick => (0.03, 0.08),
-            Self::Concrete => (0.02, 0.12),
-            Self::Glass => (0.08, 0.5),
+            Self::Brick => (0.1, 0.08),
+            Self::Concrete => (0.06, 0.12),
+            Self::Glass => (0.12, 0.5),
             Self::Metal => (0.003, 0.6),
             Self::Timber => (0.3, 0.03),
         };
@@ -62,6 +62,8 @@ pub(super) struct Facade {
     pub material: Material,
     /// How much there is to see: 1 towards a street, less on sides and backs.
     pub detail: f64,
+    /// Metres between the middles of its windows.
+    pub bay_m: f64,
     /// From the wall to the end of the rooms behind it, metres.
     pub inside_m: f64,
     pub body: u32,
@@ -74,8 +76,6 @@ struct Bay {
     outward: Vector2<f64>,
     width_m: f64,
     strength: f64,
-    material: Material,
-    body: u32,
 }
 
 impl Bay {
@@ -94,67 +94,63 @@ impl Site<'_> {
         let way = facade.to - facade.from;
         let length_m = way.norm();
         self.wall(facade.from, facade.to, facade.material.screen(), facade.body);
-        let mut at_m = 0.0;
-        while at_m + 0.5 < length_m {
-            let width_m = self.between(1.5, 4.5).min(length_m - at_m);
-            let along = way / length_m;
-            let strength = facade.detail * 10f64.powf(0.6 * normal(&mut self.rng));
-            let from = facade.from + along * at_m;
-            let (material, body) = (facade.material, facade.body);
-            let bay = Bay { from, along, outward: right_of(way), width_m, strength, material, body };
-            self.bay(&bay, facade);
-            at_m += width_m;
+        let (along, outward) = (way / length_m, right_of(way));
+        let bays = (length_m / facade.bay_m).round().max(1.0);
+        let width_m = length_m / bays;
+        for number in 0..bays as usize {
+            let from = facade.from + along * (number as f64 * width_m);
+            let strength = facade.detail * 10f64.powf(0.5 * normal(&mut self.rng));
+            self.bay(&Bay { from, along, outward, width_m, strength }, facade);
         }
     }
 
     fn bay(&mut self, bay: &Bay, facade: &Facade) {
-        let (roughness, [window, door, pipe]) = bay.material.bays();
-        self.rough_wall(bay, roughness, facade.detail);
+        let (roughness, [window, door, pipe]) = facade.material.bays();
+        self.rough_wall(bay, roughness, facade);
         if self.chance(window) {
             self.window(bay, facade);
         }
         if self.chance(door) {
-            self.door(bay);
+            self.door(bay, facade.body);
         }
-        if self.chance(pipe) {
-            let at = self.between(0.0, bay.width_m);
-            self.point(bay.at(at, 0.08), 1.2 * bay.strength, 4.0, bay.body);
-        }
+        // Pilasters, gutters, the joints of panels: at every bay's side, seen along the street from far away.
+        let relief_m2 = if self.chance(pipe) { 3.0 } else { 0.8 };
+        self.facing(bay.at(0.0, 0.1), bay.outward, 0.4, relief_m2 * bay.strength, facade.body);
     }
 
-    fn rough_wall(&mut self, bay: &Bay, roughness: f64, detail: f64) {
-        for at in stations(&mut self.rng, bay.width_m, 0.1 / detail, 0.35 / detail) {
+    fn rough_wall(&mut self, bay: &Bay, roughness: f64, facade: &Facade) {
+        for at in stations(&mut self.rng, bay.width_m, 0.1 / facade.detail, 0.35 / facade.detail) {
             let place = bay.at(at, self.rng.random_range(0.0..0.15));
-            self.facing(place, bay.outward, 1.5, 0.1 * roughness * bay.strength, bay.body);
+            self.facing(place, bay.outward, 1.5, 0.15 * roughness * bay.strength, facade.body);
         }
     }
 
     /// Reveals to both sides, a pane, and what is behind it.
     fn window(&mut self, bay: &Bay, facade: &Facade) {
         let half_m = self.between(0.3, 0.8).min(bay.width_m / 2.0);
-        let middle_m = self.between(half_m, bay.width_m - half_m);
+        let middle_m = bay.width_m / 2.0;
         for side in [-1.0, 1.0] {
-            let way = Rotation2::new(side * self.rng.random_range(0.5..1.3)) * bay.outward;
-            let sharpness = self.rng.random_range(2.0..14.0);
-            self.facing(bay.at(middle_m + side * half_m, 0.05), way, sharpness, 2.5 * bay.strength, bay.body);
+            let way = Rotation2::new(side * self.rng.random_range(0.7..1.4)) * bay.outward;
+            let sharpness = self.rng.random_range(2.0..10.0);
+            self.facing(bay.at(middle_m + side * half_m, 0.05), way, sharpness, 6.0 * bay.strength, facade.body);
         }
         // Panes do not hang quite parallel to their wall.
         let way = Rotation2::new(0.02 * normal(&mut self.rng)) * bay.outward;
-        let pane_m2 = if bay.material == Material::Glass { 160.0 } else { 40.0 };
-        self.facing(bay.at(middle_m, 0.0), way, 250.0, pane_m2, bay.body);
-        for _ in 0..(2.5 * facade.detail).round() as usize {
-            let depth_m = -1.2 * (1.0 - self.rng.random::<f64>()).ln();
+        let pane_m2 = if facade.material == Material::Glass { 160.0 } else { 40.0 };
+        self.facing(bay.at(middle_m, 0.0), way, 250.0, pane_m2, facade.body);
+        for _ in 0..(4.0 * facade.detail).round() as usize {
+            let depth_m = -1.8 * (1.0 - self.rng.random::<f64>()).ln();
             let place = bay.at(middle_m + self.rng.random_range(-half_m..half_m), -depth_m.min(facade.inside_m));
-            self.facing(place, bay.outward, 1.5, 0.25 * bay.strength, bay.body);
+            self.facing(place, bay.outward, 1.5, 0.3 * bay.strength, facade.body);
         }
     }
 
     /// A recess: its jambs and steps make right angles that look back wherever they are seen from.
-    fn door(&mut self, bay: &Bay) {
+    fn door(&mut self, bay: &Bay, body: u32) {
         let at = self.between(0.0, bay.width_m);
         for side in [-1.0, 1.0] {
             let way = bay.outward + bay.along * side;
-            self.facing(bay.at(at + 0.45 * side, -0.1), way, 3.0, 5.0 * bay.strength, bay.body);
+            self.facing(bay.at(at + 0.45 * side, -0.1), way, 3.0, 5.0 * bay.strength, body);
         }
     }
 }

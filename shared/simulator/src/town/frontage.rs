@@ -36,7 +36,7 @@ impl Line {
         }
         let cell = |metres: f64| (4.0 * metres).round() as i64 as u64;
         let (start, next) = (nodes[0], nodes[nodes.len().min(5) - 1]);
-        let key = hash(&[cell(start.x), cell(start.y), cell(next.x), cell(next.y)]);
+        let key = hash(&[cell(start.x), cell(start.y), cell(next.x / 4.0), cell(next.y / 4.0)]);
         Self { length_m: (nodes.len() - 1) as f64 * NODE_M, nodes, key }
     }
 

@@ -193,10 +193,10 @@ impl Kerb<'_> {
         self.along(2.0, 6.0, |kerb, along_m| {
             let middle_m = kerb.pavement_m / 2.0;
             let Some(mut site) = kerb.site(along_m, middle_m, middle_m - 0.1, built) else { return };
-            for _ in 0..6 {
+            for _ in 0..5 {
                 let (x, y) = (site.rng.random_range(-2.0..2.0), site.rng.random_range(-1.0..1.0) * (middle_m - 0.3));
                 if kerb.frontage.is_clear(site.pose * Point2::new(x, y), 0.05) {
-                    site.point(Point2::new(x, y), 0.02, 6.0, NO_BODY);
+                    site.point(Point2::new(x, y), 0.01, 6.0, NO_BODY);
                 }
             }
         });

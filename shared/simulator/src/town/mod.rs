@@ -134,6 +134,7 @@ impl<'a> Planner<'a> {
     /// Divides a stretch and builds on its pieces, one after the other.
     fn row(&mut self, stretch: &Stretch<'_>, row: Row) {
         let mut rng = generator(&[stretch.key, 1 + row as u64]);
+        let detail = if row == Row::First { 1.0 } else { DETAIL_BEHIND };
         let mut at_m = stretch.from_m;
         while at_m + LEAST_WIDTH_M < stretch.to_m {
             let kind = stretch.district.draw(row == Row::First, &mut rng);
@@ -143,7 +144,7 @@ impl<'a> Planner<'a> {
             let claimed = if width_m < least_m { None } else { self.claim(stretch, row, kind, at_m, width_m) };
             match claimed {
                 Some(lot) => {
-                    self.plot(&lot, kind, row, generator(&[key]));
+                    self.plot(&lot, kind, stretch.key ^ row as u64, detail, generator(&[key]));
                     at_m += width_m;
                 }
                 None => at_m += SKIP_M,
@@ -166,10 +167,9 @@ impl<'a> Planner<'a> {
         )
     }
 
-    fn plot(&mut self, lot: &Lot, kind: Use, row: Row, rng: ChaCha8Rng) {
+    fn plot(&mut self, lot: &Lot, kind: Use, row_key: u64, detail: f64, rng: ChaCha8Rng) {
         let site = Site { built: &mut self.built, pose: lot.pose, rng };
-        let detail = if row == Row::First { 1.0 } else { DETAIL_BEHIND };
-        Plot { site, config: self.config, width_m: lot.width_m, depth_m: lot.depth_m, detail }.build(kind);
+        Plot { site, config: self.config, width_m: lot.width_m, depth_m: lot.depth_m, row_key, detail }.build(kind);
     }
 
     fn kerb(&mut self, stretch: &Stretch<'_>) {

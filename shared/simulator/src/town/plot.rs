@@ -3,12 +3,15 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::{Point2, Vector2};
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
 
 use super::boundary::Boundary;
 use super::building::{Building, Form, Room};
 use super::config::TownConfig;
 use super::district::Use;
 use super::facade::Material;
+use super::random::generator;
 use super::site::Site;
 
 /// Between a house and the side of its land where it has neighbours, metres.
@@ -20,8 +23,34 @@ pub(super) struct Plot<'a, 's> {
     pub config: &'a TownConfig,
     pub width_m: f64,
     pub depth_m: f64,
+    /// What the plots of a stretch draw in common from.
+    pub row_key: u64,
     /// How much there is to see of its buildings: 1 along a street, less behind.
     pub detail: f64,
+}
+
+/// What the houses of a terrace have in common.
+struct TerraceStyle {
+    setback_m: f64,
+    front: Material,
+    /// What stands before the houses.
+    before: Option<Boundary>,
+}
+
+impl TerraceStyle {
+    fn draw(rng: &mut ChaCha8Rng) -> Self {
+        let front = match rng.random::<f64>() {
+            ..0.7 => Material::Brick,
+            ..0.82 => Material::Concrete,
+            _ => Material::Glass,
+        };
+        match rng.random::<f64>() {
+            ..0.5 => Self { setback_m: 0.0, front, before: None },
+            ..0.65 => Self { setback_m: rng.random_range(0.3..1.0), front, before: None },
+            ..0.88 => Self { setback_m: rng.random_range(1.5..3.0), front, before: Some(Boundary::Railing) },
+            _ => Self { setback_m: rng.random_range(1.5..3.0), front, before: Some(Boundary::Wall) },
+        }
+    }
 }
 
 impl Plot<'_, '_> {
@@ -84,22 +113,34 @@ impl Plot<'_, '_> {
         self.site.clutter(Point2::new(0.0, y), size, per_m2, median_m2);
     }
 
+    /// Grass, and on a share of plots undergrowth that reflects as a whole.
+    fn ground(&mut self, rough: f64) {
+        self.clutter(0.5, 0.04, 0.02);
+        if self.site.chance(rough) {
+            let size = Vector2::new(self.width_m, self.depth_m - 0.5);
+            self.site.undergrowth(Point2::new(0.0, 0.5), size, 1.2, 0.05);
+        }
+    }
+
+    /// A house of a row that was built together: most of them share setback and material.
     fn terrace(&mut self) {
-        let setback_m = if self.site.chance(0.6) { 0.0 } else { self.site.between(0.3, 1.5) };
-        let depth_m = self.site.between(9.0, 13.0).min(self.depth_m - setback_m);
-        let room = Room { x: PARTY_M, y: setback_m, width_m: self.width_m - 2.0 * PARTY_M, depth_m };
+        let style = TerraceStyle::draw(&mut if self.site.chance(0.75) {
+            generator(&[self.row_key])
+        } else {
+            generator(&[self.site.rng.random()])
+        });
+        let depth_m = self.site.between(9.0, 13.0).min(self.depth_m - style.setback_m);
+        let room = Room { x: PARTY_M, y: style.setback_m, width_m: self.width_m - 2.0 * PARTY_M, depth_m };
         let form = match self.site.between(0.0, 1.0) {
-            ..0.55 => Form::Plain,
+            ..0.6 => Form::Plain,
             ..0.75 => Form::Stepped,
             _ => Form::Angle,
         };
-        let front = match self.site.between(0.0, 1.0) {
-            ..0.68 => Material::Brick,
-            ..0.8 => Material::Concrete,
-            _ => Material::Glass,
-        };
-        self.house(room, form, front, Material::Brick);
-        self.yards(setback_m + depth_m);
+        self.house(room, form, style.front, Material::Brick);
+        if let Some(kind) = style.before {
+            self.across(kind, 0.2);
+        }
+        self.yards(style.setback_m + depth_m);
     }
 
     /// What is behind houses: a wall to the neighbour and at the back, a shed, bins.
@@ -203,7 +244,7 @@ impl Plot<'_, '_> {
             _ => {}
         }
         self.trees(1.0, 9.0);
-        self.clutter(0.5, 0.05, 0.02);
+        self.ground(0.4);
     }
 
     fn car_park(&mut self) {
@@ -255,7 +296,7 @@ impl Plot<'_, '_> {
         }
         let wooded = if self.site.chance(0.2) { 12.0 } else { 0.8 };
         self.trees(1.0, wooded);
-        self.clutter(1.0, 0.03, 0.008);
+        self.ground(0.3);
     }
 
     fn farm(&mut self) {

@@ -9,8 +9,8 @@ use crate::world::{Aspect, Body, Scatterer, Wall};
 
 /// Half a car's length and width, metres.
 pub(super) const CAR_HALF_M: (f64, f64) = (2.15, 0.9);
-/// Power that passes a car (through its windows and below it), there and back.
-const CAR_TRANSMISSION: f64 = 0.6;
+/// Power that passes a car (through its windows, below it, above it to what is higher), there and back.
+const CAR_TRANSMISSION: f64 = 0.8;
 
 /// A car around its own origin, x ahead: bright corners, wheels and plates, and sides that hide what is behind.
 ///
