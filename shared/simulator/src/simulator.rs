@@ -45,14 +45,15 @@ impl Simulator {
         config.validate()?;
         let trajectory: Arc<dyn Trajectory> = config.drive.trajectory(config.seed)?.into();
         let drive_s = config.scans as f64 * config.sensor.period_s;
-        let streets = Streets::driven(trajectory.as_ref(), drive_s.min(100.0), 0.0);
+        let keep = config.drive.keep;
+        let streets = Streets::along(trajectory.as_ref(), drive_s, keep, config.seed);
         Ok(Self {
             scans: config.scans,
             seed: config.seed,
             period_us: (config.sensor.period_s * 1e6).round() as i64,
             doppler_shift_s: config.sensor.doppler_shift_s,
             world: Arc::new(World::new(town::build(&config.drive, &streets, config.seed))),
-            traffic: Traffic::new(&config.traffic, trajectory.clone(), config.seed),
+            traffic: Traffic::new(&config.traffic, trajectory.clone(), drive_s, &streets, keep, config.seed),
             trajectory,
         })
     }
