@@ -1,8 +1,8 @@
 //! A small honest radar simulator for demonstrations and tests.
 //!
-//! A vehicle with a spinning radar drives through a procedural town, around a block, at random or along a recorded
-//! trajectory; what comes out is a dataset
-//! in Oxford Radar RobotCar's layout with exact ground truth. In the order in which the data come about:
+//! A vehicle with a spinning radar drives through a procedural town: around a block, at random, or along a recorded
+//! trajectory. What comes out is a dataset in Oxford Radar RobotCar's layout with exact ground truth. In the order in which
+//! the data come about:
 //!
 //! - [`config`]: what to simulate,
 //! - [`drive`], [`trajectory`]: which way is taken, and where the sensor is at any instant,

@@ -18,6 +18,9 @@ use crate::{SimulationConfig, SimulatorError, town};
 /// of recordings check that a year is plausible, and the same configuration has to give the same files.
 const EPOCH_US: i64 = 1_547_132_400_000_000;
 
+/// How much of a drive without end is looked at to lay streets, seconds; and its traffic is made for multiples of this.
+const ENDLESS_S: f64 = 600.0;
+
 /// A drive through a town, ready to be measured. Shared freely between threads.
 #[derive(Clone)]
 pub struct Simulator {
@@ -44,16 +47,21 @@ impl Simulator {
     pub fn new(config: &SimulationConfig) -> Result<Self, SimulatorError> {
         config.validate()?;
         let trajectory: Arc<dyn Trajectory> = config.drive.trajectory(config.seed)?.into();
-        let drive_s = config.scans as f64 * config.sensor.period_s;
+        // Streets and traffic of a drive do not depend on how many scans are taken of it.
+        let taken_s = config.scans as f64 * config.sensor.period_s;
+        let [laid_s, lively_s] = match trajectory.duration_s() {
+            whole_s if whole_s.is_finite() => [whole_s; 2],
+            _ => [ENDLESS_S, (taken_s / ENDLESS_S).ceil() * ENDLESS_S],
+        };
         let keep = config.drive.keep;
-        let streets = Streets::along(trajectory.as_ref(), drive_s, keep, config.seed);
+        let streets = Streets::along(trajectory.as_ref(), laid_s, keep, config.seed);
         Ok(Self {
             scans: config.scans,
             seed: config.seed,
             period_us: (config.sensor.period_s * 1e6).round() as i64,
             doppler_shift_s: config.sensor.doppler_shift_s,
             world: Arc::new(World::new(town::build(&config.drive, &streets, config.seed))),
-            traffic: Traffic::new(&config.traffic, trajectory.clone(), drive_s, &streets, keep, config.seed),
+            traffic: Traffic::new(&config.traffic, trajectory.clone(), lively_s, &streets, keep, config.seed),
             trajectory,
         })
     }

@@ -11,7 +11,7 @@ mod track;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use nalgebra::{Isometry2, Point2};
+use nalgebra::{Isometry2, Point2, Vector2};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -132,16 +132,13 @@ impl Traffic {
 
 impl Movers for Traffic {
     fn visit(&self, time_s: f64, centre: Point2<f64>, reach_m: f64, see: &mut dyn FnMut(Moving<'_>)) {
-        let half_s = 1e-3;
         let own = self.trajectory.pose(time_s);
         for actor in self.actors.iter().filter(|actor| actor.is_shown(time_s)) {
-            let at = |time_s: f64| actor.track.pose(&self.way, time_s);
-            let Some(pose) = at(time_s) else { continue };
+            let Some(pose) = actor.track.pose(&self.way, time_s) else { continue };
             if (pose.translation.vector - centre.coords).norm() >= reach_m || actor.runs_into(&own, &pose) {
                 continue;
             }
-            let (before, after) = (at(time_s - half_s).unwrap_or(pose), at(time_s + half_s).unwrap_or(pose));
-            let velocity = (after.translation.vector - before.translation.vector) / (2.0 * half_s);
+            let velocity = actor.velocity(&self.way, time_s, &pose);
             see(Moving { body: &actor.body, pose, velocity });
         }
     }
@@ -150,6 +147,16 @@ impl Movers for Traffic {
 impl Actor {
     fn is_shown(&self, time_s: f64) -> bool {
         (self.shown_s[0]..=self.shown_s[1]).contains(&time_s)
+    }
+
+    /// Metres a second in the world, from where it is a millisecond before and after; off by less than 0.1 mm/s.
+    fn velocity(&self, way: &OwnWay, time_s: f64, pose: &Isometry2<f64>) -> Vector2<f64> {
+        let half_s = 1e-3;
+        let [before, after] = [time_s - half_s, time_s + half_s].map(|time_s| self.track.pose(way, time_s));
+        // One side is missing in the instant in which it appears or leaves.
+        let sides = f64::from(u8::from(before.is_some()) + u8::from(after.is_some()));
+        let [from, to] = [before.unwrap_or(*pose), after.unwrap_or(*pose)];
+        (to.translation.vector - from.translation.vector) / (sides.max(1.0) * half_s)
     }
 
     /// Whether it would be inside the driven vehicle: where the way turns back on itself no lane is its own.

@@ -22,6 +22,8 @@ const BETWEEN_M: f64 = 2.5;
 const LONGEST: usize = 3;
 /// Length of a side street that is driven, metres.
 const PATH_M: f64 = 120.0;
+/// Nobody comes out of a shorter street, metres.
+const SHORTEST_M: f64 = 30.0;
 /// How near to the junction's middle others must not be while somebody crosses, metres, and for how long, seconds.
 const CLEAR_M: f64 = 9.0;
 const CLEAR_S: f64 = 5.0;
@@ -48,12 +50,12 @@ pub fn add(crowd: &mut Crowd, streets: &Streets, way: &OwnWay, keep: Keep, share
 }
 
 fn junctions(streets: &Streets) -> impl Iterator<Item = Junction<'_>> {
-    let sides = || streets.streets().iter().filter(|street| !street.driven);
+    let sides = || streets.streets().iter().filter(|street| !street.driven && street.length_m() > SHORTEST_M);
     sides().map(move |from| {
         let place = from.centre[0];
         let nearest = streets.streets().iter().filter(|s| s.driven);
         let near = |s: &&Street| s.centre.windows(2).any(|ends| segment_distance_m(ends, place) < 1.0);
-        let kerb_m = nearest.filter(near).map(|s| s.half_width_m).fold(3.0, f64::max);
+        let kerb_m = nearest.filter(near).map(|s| s.half_width_m).fold(3.0, f64::max).min(SHORTEST_M / 2.0);
         let across = |s: &&Street| {
             let opposite = direction(s).dot(&direction(from)) < -0.8;
             opposite && (s.centre[0] - place).norm() < 4.0

@@ -1,8 +1,6 @@
 #![allow(clippy::unwrap_used)]
 use std::collections::BTreeMap;
 
-use nalgebra::Vector2;
-
 use super::*;
 use crate::trajectory::{BlockLoop, TownDrive};
 
@@ -161,4 +159,24 @@ fn asking_is_cheap() {
         traffic.actors.len(),
         started.elapsed().as_secs_f64() * 250.0
     );
+}
+
+#[test]
+fn queues_at_crossroads_wait_for_the_vehicle_and_then_cross() {
+    let (mut waiting, mut crossing) = (0, 0);
+    for seed in 1..=3 {
+        let (drive, traffic) = town(seed, &TrafficConfig::default());
+        for actor in traffic.actors.iter() {
+            let Track::Crossing(vehicle) = &actor.track else { continue };
+            waiting += 1;
+            let off_m = |time_s: f64| {
+                let pose = actor.track.pose(&traffic.way, time_s)?;
+                Some((pose.translation.vector - drive.pose(time_s).translation.vector).norm())
+            };
+            crossing += usize::from(vehicle.until_s + 5.0 < actor.shown_s[1]);
+            let nearest_m = (0..100).filter_map(|i| off_m(vehicle.from_s + f64::from(i))).fold(f64::MAX, f64::min);
+            assert!(nearest_m > 3.0, "a vehicle comes out {nearest_m} m from the driven one");
+        }
+    }
+    assert!(waiting > 30 && crossing > 10, "{crossing} of {waiting} cross");
 }
