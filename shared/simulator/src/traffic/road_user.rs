@@ -2,9 +2,10 @@
 //!
 //! Cross-sections are of the order that is published: 1 to 100 m² for a car by its aspect, some 100 m² and more for the flat
 //! sides of lorries (Skolnik, *Introduction to Radar Systems*, gives 100 m² for a car, 200 m² for a pickup lorry, 2 m² for a
-//! bicycle, 1 m² for a man at microwaves); about -8 dBm² for a pedestrian at 76 GHz (Yamada et al., EuMC 2005), and some
-//! decibels more for a cyclist (Belgiovane and Chen, EuCAP 2017). How much passes follows from the sensor's height: from a
-//! roof it looks over cars, not over buses.
+//! bicycle, 1 m² for a man at microwaves); about -8 dBm² for a pedestrian at 76 GHz (Yamada et al., EuMC 2005; measured
+//! from all sides by Fortuny-Guasch and Chareau, JRC report EUR 25762, 2013); some decibels more for a cyclist (Belgiovane
+//! and Chen, IEEE T-ITS 2017). How much passes is an assumption that follows from the sensor's height: from a roof it looks
+//! over cars, not over buses. Limbs and wheels that move within a body (micro-Doppler) are left out.
 
 use nalgebra::{Point2, Rotation2, Vector2};
 use rand::Rng;
