@@ -18,8 +18,8 @@ use crate::{SimulationConfig, SimulatorError, town};
 /// of recordings check that a year is plausible, and the same configuration has to give the same files.
 const EPOCH_US: i64 = 1_547_132_400_000_000;
 
-/// A drive without an end has repeated itself by then, seconds.
-const ENDLESS_S: f64 = 100.0;
+/// How much of a drive without end is looked at to lay streets, seconds; and its traffic is made for multiples of this.
+const ENDLESS_S: f64 = 600.0;
 
 /// A drive through a town, ready to be measured. Shared freely between threads.
 #[derive(Clone)]
@@ -46,15 +46,19 @@ impl Simulator {
         config.validate()?;
         let trajectory: Arc<dyn Trajectory> = config.drive.trajectory(config.seed)?.into();
         let sampling = config.sensor.sampling();
-        // Of the whole drive, however many scans are wanted: they are to see the same town.
-        let duration_s = trajectory.duration_s();
-        let duration_s = if duration_s.is_finite() { duration_s } else { ENDLESS_S };
-        let streets = Streets::along(trajectory.as_ref(), duration_s, config.drive.keep, config.seed);
+        // Streets, town and traffic of a drive do not depend on how many scans are taken of it.
+        let taken_s = config.scans as f64 * sampling.period_us as f64 * 1e-6;
+        let [laid_s, lively_s] = match trajectory.duration_s() {
+            whole_s if whole_s.is_finite() => [whole_s; 2],
+            _ => [ENDLESS_S, (taken_s / ENDLESS_S).ceil() * ENDLESS_S],
+        };
+        let keep = config.drive.keep;
+        let streets = Streets::along(trajectory.as_ref(), laid_s, keep, config.seed);
         Ok(Self {
             config: config.clone(),
             sampling,
             world: Arc::new(World::new(town::build(&config.town, &streets, config.seed))),
-            traffic: Traffic::new(&config.traffic, trajectory.clone(), config.seed),
+            traffic: Traffic::new(&config.traffic, trajectory.clone(), lively_s, &streets, keep, config.seed),
             trajectory,
         })
     }

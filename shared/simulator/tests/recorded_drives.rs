@@ -101,6 +101,10 @@ fn files_that_cannot_be_driven_are_refused_by_name() {
     assert!(refused.contains("sideways.tum") && refused.contains("0 % of its way"), "{refused}");
     let beyond = read(&sideways, Excerpt { from_s: 900.0, ..Excerpt::default() }).unwrap_err().to_string();
     assert!(beyond.contains("less than two poses"), "{beyond}");
+    let jumping = folder.path().join("jumping.tum");
+    std::fs::write(&jumping, "1600000000.0 0 0 0 0 0 0 1\n1600000001.0 5e5 0 0 0 0 0 1\n").unwrap();
+    let refused = read(&jumping, Excerpt::default()).unwrap_err().to_string();
+    assert!(refused.contains("jumps by 500000.0 m within 1.000 s"), "{refused}");
     let missing = read(Path::new("nowhere.csv"), Excerpt::default()).unwrap_err().to_string();
     assert!(missing.contains("nowhere.csv"), "{missing}");
 }

@@ -127,15 +127,12 @@ fn real_drives_get_streets_quickly() {
         let started = Instant::now();
         let sum: f64 = places.iter().map(|place| streets.clearance_m(*place, 9.0)).sum();
         let lookup_ns = started.elapsed().as_nanos() as f64 / f64::from(asked);
-        let widths: Vec<f64> =
-            streets.streets().iter().filter(|s| s.driven).map(|s| (s.half_width_m * 20.0).round() / 10.0).collect();
         println!(
             "{name}: {built:?}, {} streets, {:.0} m driven, {:.0} m aside, {lookup_ns:.0} ns a lookup ({sum:.0})",
             streets.streets().len(),
             length_m(&streets, true),
             length_m(&streets, false)
         );
-        println!("{widths:?}");
         let worst = worst_clearance(&drive, drive.duration_s(), &streets);
         assert!(worst < -1.2, "{worst}");
         assert!(built.as_secs_f64() < 2.0);

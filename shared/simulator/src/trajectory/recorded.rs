@@ -8,6 +8,11 @@ use nalgebra::{Isometry2, Point2};
 use super::TimedPoses;
 use crate::SimulatorError;
 
+/// No vehicle is faster, metres a second.
+const FASTEST_M_S: f64 = 90.0;
+/// Nor stands without a pose for longer, seconds.
+const LONGEST_PAUSE_S: f64 = 3600.0;
+
 /// What to take of a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Excerpt {
@@ -37,6 +42,7 @@ pub fn read(path: &Path, excerpt: Excerpt) -> Result<TimedPoses, SimulatorError>
         let last_s = poses.last().map_or(0.0, |(s, _)| *s);
         return Err(refuse(format!("it has less than two poses from {} s on; it lasts {last_s:.1} s", excerpt.from_s)));
     };
+    check_steps(&within).map_err(refuse)?;
     let into_world = origin.inverse();
     let moved: Vec<_> = within.iter().map(|(s, pose)| (s - start_s, into_world * pose)).collect();
     let ahead = share_ahead(&moved);
@@ -47,6 +53,21 @@ pub fn read(path: &Path, excerpt: Excerpt) -> Result<TimedPoses, SimulatorError>
         )));
     }
     Ok(TimedPoses::measured(&moved))
+}
+
+/// Refuses what no vehicle does: jumps, and pauses of many hours.
+fn check_steps(poses: &[&(f64, Isometry2<f64>)]) -> Result<(), String> {
+    for pair in poses.windows(2) {
+        let ((from_s, from), (to_s, to)) = (pair[0], pair[1]);
+        let (seconds, metres) = (to_s - from_s, (to.translation.vector - from.translation.vector).norm());
+        if metres > FASTEST_M_S * seconds + 1.0 {
+            return Err(format!("it jumps by {metres:.1} m within {seconds:.3} s, {from_s:.3} s after its start"));
+        }
+        if seconds > LONGEST_PAUSE_S {
+            return Err(format!("it pauses for {seconds:.0} s, {from_s:.3} s after its start"));
+        }
+    }
+    Ok(())
 }
 
 /// All poses with their seconds after the first; of poses with the same stamp the first.

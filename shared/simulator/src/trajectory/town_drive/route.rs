@@ -1,6 +1,7 @@
 //! Which junctions a drive passes, one after the other.
 
 use std::collections::VecDeque;
+use std::collections::btree_map::{BTreeMap, Entry};
 
 use rand::Rng;
 
@@ -100,7 +101,7 @@ impl Drive<'_> {
     /// The way with the fewest streets from the second of two junctions, coming from the first, to where `arrived` (given
     /// the last two junctions) without turning round; empty where there is none.
     fn shortest(&self, from: (usize, usize), arrived: impl Fn(usize, usize) -> bool) -> Vec<usize> {
-        let mut came_from = std::collections::BTreeMap::from([(from, None)]);
+        let mut came_from = BTreeMap::from([(from, None)]);
         let mut open = VecDeque::from([from]);
         while let Some(state) = open.pop_front() {
             if arrived(state.0, state.1) {
@@ -116,8 +117,8 @@ impl Drive<'_> {
             }
             for next in self.plan.neighbours[state.1].iter().filter(|next| **next != state.0) {
                 let next = (state.1, *next);
-                if !came_from.contains_key(&next) {
-                    came_from.insert(next, Some(state));
+                if let Entry::Vacant(unseen) = came_from.entry(next) {
+                    unseen.insert(Some(state));
                     open.push_back(next);
                 }
             }

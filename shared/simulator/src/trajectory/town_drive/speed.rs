@@ -17,6 +17,8 @@ const REST_S: f64 = 3.0;
 const STEP_M: f64 = 0.25;
 /// The distance driven is averaged over these spans, one after the other, seconds: acceleration changes that gradually.
 const GRADUAL_S: [f64; 2] = [0.9, 0.6];
+/// Twice the least mean speed between two nodes, metres a second.
+const CREEP_M_S: f64 = 0.1;
 /// Seconds between the instants that are averaged.
 const FINE_S: f64 = 0.05;
 
@@ -84,7 +86,8 @@ fn timed(speeds: &[f64], waits_s: &[f64]) -> Vec<f64> {
         let at_m = node as f64 * STEP_M;
         fill(at_m, until_s, at_m, until_s + waits_s[node]);
         until_s += waits_s[node];
-        let takes_s = 2.0 * STEP_M / (pair[0] + pair[1]);
+        // Where one stands at both ends, as where a wait meets the end of the drive, one creeps between.
+        let takes_s = 2.0 * STEP_M / (pair[0] + pair[1]).max(CREEP_M_S);
         fill(at_m, until_s, at_m + STEP_M, until_s + takes_s);
         until_s += takes_s;
     }
