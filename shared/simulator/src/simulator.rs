@@ -103,7 +103,7 @@ impl Simulator {
     /// Measures scan `index` into memory that is used again; see [`empty_scan`].
     pub fn render_into(&self, index: usize, sensor: &mut Sensor, scan: &mut OwnedScan) {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
-        // Stream 0 built the town.
+        // A stream of its own for each scan.
         rng.set_stream(index as u64 + 1);
         let (world, trajectory) = (self.world.as_ref(), self.trajectory.as_ref());
         scan.geometry = sensor.sweep(world, &self.traffic, trajectory, self.time(index), &mut rng, &mut scan.slot());
