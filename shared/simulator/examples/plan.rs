@@ -1,28 +1,64 @@
-//! Draws streets, drive and a moment of traffic: `cargo run --release -p gyre-simulator --example plan -- OUT.svg [TRAJECTORY|- [SEED [left|right]]]`.
+//! Draws streets, drive and moments of traffic: `cargo run --release -p gyre-simulator --example plan -- OUT.svg [TRAJECTORY|town|campus|block [SEED [left|right]]]`.
 
 use std::fmt::Write as _;
-use std::path::Path;
+use std::sync::Arc;
 
-use gyre_simulator::streets::Keep;
-use gyre_simulator::trajectory::recorded::{Excerpt, read};
-use gyre_simulator::{BlockLoop, Streets, Trajectory};
+use gyre_simulator::drive::{DriveConfig, DriveKind};
+use gyre_simulator::traffic::{Traffic, TrafficConfig};
+use gyre_simulator::{Keep, Movers, Streets, Trajectory};
 use nalgebra::Point2;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let out = arguments.first().ok_or("usage: plan OUT.svg [TRAJECTORY|- [SEED [left|right]]]")?;
+    let out = arguments.first().ok_or("usage: plan OUT.svg [TRAJECTORY|town|campus|block [SEED [left|right]]]")?;
     let seed = arguments.get(2).map_or(Ok(1), |seed| seed.parse())?;
-    let drive: Box<dyn Trajectory> = match arguments.get(1).filter(|path| *path != "-") {
-        Some(path) => Box::new(read(Path::new(path), Excerpt::default())?),
-        None => Box::new(BlockLoop::new(40.0, 32.0, 9.5, 5.0)),
+    let kind = match arguments.get(1).map(String::as_str) {
+        None | Some("block") => DriveConfig::default(),
+        Some("campus") => DriveConfig::campus(),
+        Some("town") => {
+            DriveConfig { kind: DriveKind::Town, length_m: 8000.0, speed_m_s: 13.9, ..DriveConfig::default() }
+        }
+        Some(file) => DriveConfig::along_file(file.into()),
     };
+    let drive = kind.trajectory(seed)?;
     let duration_s = drive.duration_s().min(60.0 * 60.0);
     let keep = if arguments.get(3).is_some_and(|keep| keep == "right") { Keep::Right } else { Keep::Left };
     let started = std::time::Instant::now();
     let streets = Streets::along(drive.as_ref(), duration_s, keep, seed);
     println!("{} streets in {:.3} s", streets.streets().len(), started.elapsed().as_secs_f64());
-    std::fs::write(out, svg(drive.as_ref(), duration_s, &streets)?)?;
+    let mut drawing = svg(drive.as_ref(), duration_s, &streets)?;
+    let started = std::time::Instant::now();
+    let drive: Arc<dyn Trajectory> = drive.into();
+    let traffic = Traffic::new(&TrafficConfig::default(), drive.clone(), duration_s, &streets, keep, seed);
+    println!("traffic in {:.3} s", started.elapsed().as_secs_f64());
+    let moments = (duration_s / 60.0) as usize;
+    for moment in 1..=moments.max(1) {
+        add_moment(&mut drawing, &traffic, drive.as_ref(), duration_s * moment as f64 / (moments + 1) as f64)?;
+    }
+    drawing.push_str("</g></svg>");
+    std::fs::write(out, drawing)?;
     Ok(())
+}
+
+/// Adds the vehicle and all that moves around it at a time: a dot for each scatterer, a line for each second of way.
+fn add_moment(svg: &mut String, traffic: &Traffic, drive: &dyn Trajectory, time_s: f64) -> std::fmt::Result {
+    let own = drive.pose(time_s).translation;
+    write!(svg, "<circle cx='{:.2}' cy='{:.2}' r='2' fill='red'/>", own.x, own.y)?;
+    let mut result = Ok(());
+    traffic.visit(time_s, Point2::from(own.vector), 165.0, &mut |mover| {
+        let at = mover.pose.translation.vector;
+        let ahead = at + mover.velocity;
+        result = result.and(write!(
+            svg,
+            "<path stroke='green' stroke-width='.4' d='M{:.2} {:.2}L{:.2} {:.2}'/>",
+            at.x, at.y, ahead.x, ahead.y
+        ));
+        for scatterer in &mover.body.scatterers {
+            let place = mover.pose * scatterer.position;
+            result = result.and(write!(svg, "<circle cx='{:.2}' cy='{:.2}' r='.3' fill='blue'/>", place.x, place.y));
+        }
+    });
+    result
 }
 
 fn svg(drive: &dyn Trajectory, duration_s: f64, streets: &Streets) -> Result<String, std::fmt::Error> {
@@ -48,6 +84,6 @@ fn svg(drive: &dyn Trajectory, duration_s: f64, streets: &Streets) -> Result<Str
         let at = drive.pose(step as f64 * 0.25).translation;
         write!(svg, "{:.2},{:.2} ", at.x, at.y)?;
     }
-    svg.push_str("'/></g></svg>");
+    svg.push_str("'/>");
     Ok(svg)
 }

@@ -14,7 +14,7 @@ use crate::traffic::TrafficConfig;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SimulationConfig {
-    /// Scans to generate. The vehicle keeps circling the block for as long as they last.
+    /// Scans to generate. Round a block the vehicle keeps circling as long as they last; where another drive ends, it stands.
     pub scans: usize,
     /// Where all randomness comes from: the town, the speckle, the noise.
     pub seed: u64,

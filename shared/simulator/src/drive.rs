@@ -1,47 +1,154 @@
 //! Which way the vehicle takes: the section `[simulation.drive]`.
 
+use std::path::PathBuf;
+
 use serde::{Deserialize, Serialize};
 
 use crate::SimulatorError;
 use crate::config::within;
-use crate::trajectory::{BlockLoop, Trajectory};
+use crate::streets::Keep;
+use crate::trajectory::recorded::{self, Excerpt};
+use crate::trajectory::{BlockLoop, TownDrive, Trajectory};
+
+/// Where a drive comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum DriveKind {
+    /// Round a block of houses, for ever.
+    #[default]
+    Block,
+    /// A random drive through a town.
+    Town,
+    /// A drive that was driven and recorded.
+    File,
+}
 
 /// Which way the vehicle takes, and how fast.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DriveConfig {
-    /// Length of the block that the vehicle circles, from street centre to street centre, metres along x.
+    /// `block`, `town` or `file`. The keys below that another kind names have no effect.
+    pub kind: DriveKind,
+    /// The side of the road that traffic keeps to: `left` or `right`.
+    pub keep: Keep,
+    /// `block`: its length, from street centre to street centre, metres along x.
     pub block_length_m: f64,
-    /// Width of that block, metres along y.
+    /// `block`: its width, metres along y.
     pub block_width_m: f64,
-    /// Speed on straights, metres a second.
+    /// `block` and `town`: speed on straights, metres a second; in a town on its fastest streets.
     pub speed_m_s: f64,
-    /// Sideways acceleration at which bends are taken, metres a second squared: it sets the speed in them.
-    pub lateral_acceleration_m_s2: f64,
+    /// `block` and `town`: sideways acceleration at which bends are taken, metres a second squared. It sets the speed in
+    /// them. By default 5 round a block and 2.2 in a town.
+    pub lateral_acceleration_m_s2: Option<f64>,
+    /// `town`: length of the drive, metres.
+    pub length_m: f64,
+    /// `file`: the trajectory, of any form that [`gyre_radar::read_trajectory`] knows.
+    pub file: Option<PathBuf>,
+    /// `file`: where to begin, seconds after its first pose.
+    pub from_s: f64,
+    /// `file`: how much of it to drive at most, seconds; all by default.
+    pub for_s: Option<f64>,
+    /// `file`: poses a second where the file has no times (KITTI's form).
+    pub rate_hz: f64,
 }
 
 impl Default for DriveConfig {
     fn default() -> Self {
-        Self { block_length_m: 40.0, block_width_m: 32.0, speed_m_s: 9.5, lateral_acceleration_m_s2: 5.0 }
+        Self {
+            kind: DriveKind::Block,
+            keep: Keep::Left,
+            block_length_m: 40.0,
+            block_width_m: 32.0,
+            speed_m_s: 9.5,
+            lateral_acceleration_m_s2: None,
+            length_m: 1000.0,
+            file: None,
+            from_s: 0.0,
+            for_s: None,
+            rate_hz: 4.0,
+        }
     }
 }
 
 impl DriveConfig {
+    /// A drive along a recorded trajectory.
+    pub fn along_file(file: PathBuf) -> Self {
+        Self { kind: DriveKind::File, file: Some(file), ..Self::default() }
+    }
+
+    /// The shape of the first experiment of Checchin et al., "Radar scan matching SLAM using the Fourier-Mellin transform"
+    /// (2010): 1135 m of campus at 0 to 25 km/h.
+    pub fn campus() -> Self {
+        Self { kind: DriveKind::Town, keep: Keep::Right, speed_m_s: 25.0 / 3.6, length_m: 1135.0, ..Self::default() }
+    }
+
     /// Refuses what cannot be driven, naming the key.
     pub fn validate(&self) -> Result<(), SimulatorError> {
         within("drive.block_length_m", self.block_length_m, 30.0, 400.0)?;
         within("drive.block_width_m", self.block_width_m, 30.0, 400.0)?;
         within("drive.speed_m_s", self.speed_m_s, 0.5, 40.0)?;
-        within("drive.lateral_acceleration_m_s2", self.lateral_acceleration_m_s2, 0.1, 20.0)
+        within("drive.lateral_acceleration_m_s2", self.lateral_acceleration_m_s2.unwrap_or(1.0), 0.1, 20.0)?;
+        within("drive.length_m", self.length_m, 300.0, 100_000.0)?;
+        within("drive.from_s", self.from_s, 0.0, 1e6)?;
+        within("drive.for_s", self.for_s.unwrap_or(1.0), 1.0, 1e6)?;
+        within("drive.rate_hz", self.rate_hz, 0.1, 100.0)?;
+        if self.kind == DriveKind::File && self.file.is_none() {
+            let expected = "the path of a trajectory where `drive.kind` is \"file\"".to_owned();
+            return Err(SimulatorError::Config { key: "drive.file", value: "missing".to_owned(), expected });
+        }
+        Ok(())
     }
 
-    /// The drive; all its randomness comes from `seed`.
-    pub fn trajectory(&self, _seed: u64) -> Result<Box<dyn Trajectory>, SimulatorError> {
-        Ok(Box::new(BlockLoop::new(
-            self.block_length_m,
-            self.block_width_m,
-            self.speed_m_s,
-            self.lateral_acceleration_m_s2,
-        )))
+    /// The drive; all its randomness comes from `seed`. Fails where its file cannot be read or driven.
+    pub fn trajectory(&self, seed: u64) -> Result<Box<dyn Trajectory>, SimulatorError> {
+        let lateral_acceleration_m_s2 = |default| self.lateral_acceleration_m_s2.unwrap_or(default);
+        Ok(match (self.kind, &self.file) {
+            (DriveKind::File, Some(file)) => {
+                let for_s = self.for_s.unwrap_or(f64::INFINITY);
+                Box::new(recorded::read(file, Excerpt { from_s: self.from_s, for_s, rate_hz: self.rate_hz })?)
+            }
+            (DriveKind::Town, _) => Box::new(
+                TownDrive {
+                    length_m: self.length_m,
+                    speed_m_s: self.speed_m_s,
+                    lateral_acceleration_m_s2: lateral_acceleration_m_s2(2.2),
+                    keep: self.keep,
+                }
+                .trajectory(seed),
+            ),
+            (DriveKind::Block | DriveKind::File, _) => Box::new(BlockLoop::new(
+                self.block_length_m,
+                self.block_width_m,
+                self.speed_m_s,
+                lateral_acceleration_m_s2(5.0),
+            )),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn file_kind_without_a_file_or_with_a_missing_one_is_refused_by_name() {
+        let none = DriveConfig { kind: DriveKind::File, ..DriveConfig::default() };
+        assert!(none.validate().unwrap_err().to_string().contains("`drive.file` is missing"));
+        let missing = DriveConfig::along_file("nowhere/poses.tum".into());
+        missing.validate().unwrap();
+        let refused = missing.trajectory(1).err().unwrap().to_string();
+        assert!(refused.contains("nowhere/poses.tum"), "{refused}");
+    }
+
+    #[test]
+    fn kinds_are_read_from_a_configuration() {
+        let config: DriveConfig = toml::from_str("kind = \"town\"\nlength_m = 500.0\nkeep = \"right\"").unwrap();
+        assert_eq!((config.kind, config.keep), (DriveKind::Town, Keep::Right));
+        let drive = config.trajectory(1).unwrap();
+        assert!((30.0..400.0).contains(&drive.duration_s()), "{} s", drive.duration_s());
+        assert_eq!(drive.pose(20.0), config.trajectory(1).unwrap().pose(20.0));
+        assert_ne!(drive.pose(20.0), config.trajectory(2).unwrap().pose(20.0));
+        assert!(toml::from_str::<DriveConfig>("kind = \"boat\"").is_err());
     }
 }

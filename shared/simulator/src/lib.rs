@@ -1,6 +1,7 @@
 //! A small honest radar simulator for demonstrations and tests.
 //!
-//! A vehicle with a spinning radar drives around a block of a procedural town; what comes out is a dataset
+//! A vehicle with a spinning radar drives through a procedural town, around a block, at random or along a recorded
+//! trajectory; what comes out is a dataset
 //! in Oxford Radar RobotCar's layout with exact ground truth. In the order in which the data come about:
 //!
 //! - [`config`]: what to simulate,

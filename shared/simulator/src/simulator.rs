@@ -8,7 +8,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use crate::sensor::{self, Sensor, SweepTime};
-use crate::streets::{Keep, Streets};
+use crate::streets::Streets;
 use crate::traffic::Traffic;
 use crate::trajectory::Trajectory;
 use crate::world::World;
@@ -48,16 +48,17 @@ impl Simulator {
         config.validate()?;
         let trajectory: Arc<dyn Trajectory> = config.drive.trajectory(config.seed)?.into();
         // Of the whole drive, however many scans are wanted: they are to see the same town.
-        let duration_s = trajectory.duration_s();
-        let duration_s = if duration_s.is_finite() { duration_s } else { ENDLESS_S };
-        let streets = Streets::along(trajectory.as_ref(), duration_s, Keep::default(), config.seed);
+        let ends_s = Some(trajectory.duration_s()).filter(|duration_s| duration_s.is_finite());
+        let drive_s = ends_s.unwrap_or(ENDLESS_S.max(config.scans as f64 * config.sensor.period_s));
+        let keep = config.drive.keep;
+        let streets = Streets::along(trajectory.as_ref(), ends_s.unwrap_or(ENDLESS_S), keep, config.seed);
         Ok(Self {
             scans: config.scans,
             seed: config.seed,
             period_us: (config.sensor.period_s * 1e6).round() as i64,
             doppler_shift_s: config.sensor.doppler_shift_s,
             world: Arc::new(World::new(town::build(&config.town, &streets, config.seed))),
-            traffic: Traffic::new(&config.traffic, trajectory.clone(), config.seed),
+            traffic: Traffic::new(&config.traffic, trajectory.clone(), drive_s, &streets, keep, config.seed),
             trajectory,
         })
     }

@@ -1,108 +1,304 @@
-//! Other vehicles on the loop: they move, and so must not be mistaken for the town.
+//! Other road users: they move, and so must not be mistaken for the town.
+//!
+//! Each one's place is a function of time alone, so that any instant can be asked for in any order. Those in the driven
+//! vehicle's lane are tied to its progress and never come nearer than vehicles stand in a queue; the others keep off it.
 
-use std::f64::consts::PI;
+mod crossings;
+mod own_way;
+mod road_user;
+mod track;
+
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use nalgebra::{Isometry2, Point2, Vector2};
-use rand::SeedableRng;
+use nalgebra::{Isometry2, Point2};
+use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use crate::SimulatorError;
 use crate::config::within;
-use crate::town;
+use crate::streets::{Keep, LANE_M, Streets};
 use crate::trajectory::Trajectory;
 use crate::world::{Body, Movers, Moving};
+use own_way::OwnWay;
+use road_user::Kind;
+use track::{Beside, Gap, Lane, Oncoming, Track};
 
-/// Seconds between vehicles that drive the same way.
-const HEADWAY_S: f64 = 1.9;
-/// How far to the right the oncoming lane is, metres (traffic keeps left).
-const ONCOMING_LANE_M: f64 = 3.2;
-/// Oncoming vehicles' speed as a share of ours, so that they are met elsewhere each lap.
-const ONCOMING_PACE: f64 = 0.85;
-/// Bodies of vehicles are numbered from here; the town has fewer.
-const FIRST_BODY: u32 = 1 << 24;
+/// Bodies of road users are numbered from here; the town has fewer.
+pub const FIRST_BODY: u32 = 1 << 24;
+/// The stream of random numbers that traffic is drawn with.
+const TRAFFIC_STREAM: u64 = 1 << 42;
+/// Half of the driven vehicle's length and width, metres, with the sensor in its middle.
+const OWN_HALF_M: (f64, f64) = (2.2, 0.9);
+/// Between vehicles that stand in a queue, metres.
+const QUEUE_M: f64 = 2.5;
+/// Least time between oncoming vehicles, seconds, and how early or late each may run.
+const HEADWAY_S: f64 = 2.4;
+const DRIFT_S: f64 = 0.4;
+/// Length of the way in which one vehicle overtakes at a density of 20 vehicles a kilometre, metres.
+const OVERTAKING_M: f64 = 1200.0;
+/// Metres between bus stops with a bus.
+const BUS_STOP_M: f64 = 700.0;
+/// How many vehicles are followed in the own lane, ahead and behind, at most.
+const MOST_IN_LANE: usize = 6;
 
 /// How much moves: the section `[simulation.traffic]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrafficConfig {
-    /// Other vehicles on the way, every second one towards us.
-    pub vehicles: usize,
+    /// Motor vehicles on a kilometre of each lane. Zero: none, not even in side streets.
+    pub vehicles_per_km: f64,
+    /// Spread of their speeds, as a share: how much gaps and pace vary.
+    pub speed_spread: f64,
+    /// Cyclists that are overtaken on a kilometre.
+    pub cyclists_per_km: f64,
+    /// Pedestrians on the pavements of a kilometre.
+    pub pedestrians_per_km: f64,
 }
 
 impl Default for TrafficConfig {
     fn default() -> Self {
-        Self { vehicles: 4 }
+        Self { vehicles_per_km: 20.0, speed_spread: 0.3, cyclists_per_km: 3.0, pedestrians_per_km: 25.0 }
     }
 }
 
 impl TrafficConfig {
+    /// An empty road.
+    pub fn none() -> Self {
+        Self { vehicles_per_km: 0.0, cyclists_per_km: 0.0, pedestrians_per_km: 0.0, ..Self::default() }
+    }
+
     /// Refuses what cannot be simulated, naming the key.
     pub fn validate(&self) -> Result<(), SimulatorError> {
-        within("traffic.vehicles", self.vehicles as f64, 0.0, 20.0)
+        within("traffic.vehicles_per_km", self.vehicles_per_km, 0.0, 80.0)?;
+        within("traffic.speed_spread", self.speed_spread, 0.0, 0.8)?;
+        within("traffic.cyclists_per_km", self.cyclists_per_km, 0.0, 50.0)?;
+        within("traffic.pedestrians_per_km", self.pedestrians_per_km, 0.0, 500.0)
     }
 }
 
-/// Vehicles on the way that the sensor takes.
+/// All road users but the driven vehicle.
 #[derive(Clone)]
 pub struct Traffic {
     trajectory: Arc<dyn Trajectory>,
-    vehicles: Vec<Body>,
+    way: Arc<OwnWay>,
+    actors: Arc<Vec<Actor>>,
+}
+
+/// A road user.
+#[derive(Debug)]
+struct Actor {
+    body: Body,
+    half_m: (f64, f64),
+    /// From when until when it can be around, seconds.
+    shown_s: [f64; 2],
+    track: Track,
+}
+
+/// Road users with numbers of their own.
+#[derive(Debug, Default)]
+struct Crowd {
+    actors: Vec<Actor>,
 }
 
 impl Traffic {
-    /// So many vehicles: the first follows, the second comes towards us, the third drives ahead, and so on.
-    pub fn new(config: &TrafficConfig, trajectory: Arc<dyn Trajectory>, seed: u64) -> Self {
-        let vehicle = |index: usize| {
-            let mut rng = ChaCha8Rng::seed_from_u64(seed ^ (0x7261_6666_6963 + index as u64));
-            town::car(FIRST_BODY + index as u32, &mut rng)
-        };
-        Self { trajectory, vehicles: (0..config.vehicles).map(vehicle).collect() }
+    /// The traffic around the first `duration_s` of a drive, the same for the same seed.
+    pub fn new(
+        config: &TrafficConfig,
+        trajectory: Arc<dyn Trajectory>,
+        duration_s: f64,
+        streets: &Streets,
+        keep: Keep,
+        seed: u64,
+    ) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(TRAFFIC_STREAM);
+        let way = OwnWay::new(trajectory.as_ref(), duration_s, streets, keep);
+        let mut crowd = Crowd::default();
+        if config.vehicles_per_km > 0.0 {
+            crowd.own_lane(config, &mut rng);
+            crowd.overtaking(config, &way, &mut rng);
+            crowd.oncoming(config, &way, &mut rng);
+            crowd.bus_stops(&way, &mut rng);
+            let share = (config.vehicles_per_km / 40.0).min(0.8);
+            crossings::add(&mut crowd, streets, &way, keep, share, &mut rng);
+        }
+        crowd.cyclists(config, &way, &mut rng);
+        crowd.pedestrians(config, &way, &mut rng);
+        Self { trajectory, way: Arc::new(way), actors: Arc::new(crowd.actors) }
     }
 }
 
 impl Movers for Traffic {
     fn visit(&self, time_s: f64, centre: Point2<f64>, reach_m: f64, see: &mut dyn FnMut(Moving<'_>)) {
-        let half_s = 0.5e-3;
-        for (index, body) in self.vehicles.iter().enumerate() {
-            let at = |time_s: f64| vehicle_pose(self.trajectory.as_ref(), index, time_s);
-            let pose = at(time_s);
-            let way = at(time_s + half_s).translation.vector - at(time_s - half_s).translation.vector;
-            if (pose.translation.vector - centre.coords).norm() < reach_m {
-                see(Moving { body, pose, velocity: way / (2.0 * half_s) });
+        let half_s = 1e-3;
+        let own = self.trajectory.pose(time_s);
+        for actor in self.actors.iter().filter(|actor| actor.is_shown(time_s)) {
+            let at = |time_s: f64| actor.track.pose(&self.way, time_s);
+            let Some(pose) = at(time_s) else { continue };
+            if (pose.translation.vector - centre.coords).norm() >= reach_m || actor.runs_into(&own, &pose) {
+                continue;
+            }
+            let (before, after) = (at(time_s - half_s).unwrap_or(pose), at(time_s + half_s).unwrap_or(pose));
+            let velocity = (after.translation.vector - before.translation.vector) / (2.0 * half_s);
+            see(Moving { body: &actor.body, pose, velocity });
+        }
+    }
+}
+
+impl Actor {
+    fn is_shown(&self, time_s: f64) -> bool {
+        (self.shown_s[0]..=self.shown_s[1]).contains(&time_s)
+    }
+
+    /// Whether it would be inside the driven vehicle: where the way turns back on itself no lane is its own.
+    fn runs_into(&self, own: &Isometry2<f64>, pose: &Isometry2<f64>) -> bool {
+        let seen = own.inverse() * pose;
+        let (cosine, sine) = (seen.rotation.cos_angle().abs(), seen.rotation.sin_angle().abs());
+        let length_m = OWN_HALF_M.0 + self.half_m.0 * cosine + self.half_m.1 * sine;
+        let width_m = OWN_HALF_M.1 + self.half_m.1 * cosine + self.half_m.0 * sine;
+        seen.translation.x.abs() < length_m && seen.translation.y.abs() < width_m
+    }
+}
+
+impl Crowd {
+    fn add(&mut self, kind: Kind, shown_s: [f64; 2], track: Track, rng: &mut ChaCha8Rng) {
+        let body = kind.body(FIRST_BODY + self.actors.len() as u32, rng);
+        self.actors.push(Actor { body, half_m: kind.half_m(), shown_s, track });
+    }
+
+    /// Vehicles ahead and behind: each follows the next one, with gaps that grow and shrink along the way.
+    fn own_lane(&mut self, config: &TrafficConfig, rng: &mut ChaCha8Rng) {
+        let mean_m = 1000.0 / config.vehicles_per_km;
+        let count = ((200.0 / mean_m).ceil() as usize).clamp(1, MOST_IN_LANE);
+        for ahead in [true, false] {
+            let mut gaps: Vec<Gap> = Vec::new();
+            let mut next_half_m = OWN_HALF_M.0;
+            for _ in 0..count {
+                let kind = Kind::motorised(rng);
+                let period_m = rng.random_range(350.0..1500.0);
+                // At most so much faster or slower than the next one.
+                let most_m = config.speed_spread * period_m / (0.5 * TAU);
+                let least_m = next_half_m + kind.half_m().0 + QUEUE_M;
+                let more_m = (2.0 * mean_m * rng.random_range(0.3..1.7)).min(most_m);
+                gaps.push(Gap { least_m, more_m, period_m, phase: rng.random_range(0.0..TAU) });
+                next_half_m = kind.half_m().0;
+                self.add(kind, [f64::NEG_INFINITY, f64::INFINITY], Track::Lane { ahead, gaps: gaps.clone() }, rng);
             }
         }
     }
-}
 
-fn vehicle_pose(path: &dyn Trajectory, index: usize, time_s: f64) -> Isometry2<f64> {
-    let place = (index / 4 + 1) as f64;
-    match index % 4 {
-        0 => path.pose(time_s - HEADWAY_S * place),
-        2 => path.pose(time_s + HEADWAY_S * place),
-        _ => {
-            let lane = Isometry2::new(Vector2::new(0.0, -ONCOMING_LANE_M), PI);
-            path.pose(10.0 * index as f64 - ONCOMING_PACE * time_s) * lane
+    fn overtaking(&mut self, config: &TrafficConfig, way: &OwnWay, rng: &mut ChaCha8Rng) {
+        let mean_m = OVERTAKING_M * 20.0 / config.vehicles_per_km;
+        for at_m in places(way, mean_m, rng) {
+            let kind = if rng.random_bool(0.8) { Kind::Car } else { Kind::Van };
+            let beside = Beside {
+                at_m,
+                at_s: 0.0,
+                share: 1.0 + config.speed_spread.max(0.1) * rng.random_range(0.8..1.6),
+                speed_m_s: 0.0,
+                lane: Lane::Inwards(LANE_M - 0.3),
+            };
+            self.along(kind, beside, way, rng);
         }
     }
+
+    /// Those in the other lane, but for those who would meet somebody overtaking.
+    fn oncoming(&mut self, config: &TrafficConfig, way: &OwnWay, rng: &mut ChaCha8Rng) {
+        let whole_s = way.clock_s(f64::INFINITY);
+        let mean_m_s = (way.length_m() + 600.0) / whole_s;
+        let mean_s = (1000.0 / config.vehicles_per_km / mean_m_s).max(1.2 * HEADWAY_S);
+        let overtaking: Vec<Track> = self.actors.iter().map(|actor| actor.track.clone()).collect();
+        let mut enters_s = -whole_s - 60.0;
+        while enters_s < way.duration_s() + 60.0 {
+            enters_s += HEADWAY_S - (mean_s - HEADWAY_S) * (1.0 - rng.random::<f64>()).ln();
+            let kind = Kind::motorised(rng);
+            // Longer vehicles keep longer headways.
+            enters_s += (kind.half_m().0 - 2.0).max(0.0) / mean_m_s;
+            let vehicle = Oncoming {
+                enters_s,
+                drift_s: DRIFT_S * (config.speed_spread / 0.3).min(1.5) * rng.random::<f64>(),
+                period_m: rng.random_range(80.0..300.0),
+                phase: rng.random_range(0.0..TAU),
+            };
+            let track = Track::Oncoming(vehicle);
+            let shown_s = meeting(&track, way);
+            if shown_s[0] < shown_s[1] && !overtaking.iter().any(|other| meets(&track, other, way, shown_s)) {
+                self.add(kind, shown_s, track, rng);
+            }
+        }
+    }
+
+    /// Buses that stand in lay-bys.
+    fn bus_stops(&mut self, way: &OwnWay, rng: &mut ChaCha8Rng) {
+        for at_m in places(way, BUS_STOP_M, rng) {
+            let beyond_m = Kind::Bus.half_m().1 + 0.3;
+            let lane = if rng.random_bool(0.5) { Lane::OwnKerb(beyond_m) } else { Lane::OtherKerb(beyond_m) };
+            self.along(Kind::Bus, Beside { at_m, at_s: 0.0, share: 0.0, speed_m_s: 0.0, lane }, way, rng);
+        }
+    }
+
+    fn cyclists(&mut self, config: &TrafficConfig, way: &OwnWay, rng: &mut ChaCha8Rng) {
+        for at_m in places(way, 1000.0 / config.cyclists_per_km.max(1e-3), rng) {
+            let share = rng.random_range(0.35..0.6);
+            let lane = Lane::OwnKerb(-0.5);
+            self.along(Kind::Cyclist, Beside { at_m, at_s: 0.0, share, speed_m_s: 0.0, lane }, way, rng);
+        }
+    }
+
+    fn pedestrians(&mut self, config: &TrafficConfig, way: &OwnWay, rng: &mut ChaCha8Rng) {
+        for at_m in places(way, 1000.0 / config.pedestrians_per_km.max(1e-3), rng) {
+            let beyond_m = rng.random_range(0.6..1.8);
+            let lane = if rng.random_bool(0.5) { Lane::OwnKerb(beyond_m) } else { Lane::OtherKerb(beyond_m) };
+            let speed_m_s = rng.random_range(0.9..1.7) * if rng.random_bool(0.5) { 1.0 } else { -1.0 };
+            let beside = Beside { at_m, at_s: way.time_at(at_m), share: 0.0, speed_m_s, lane };
+            self.along(Kind::Pedestrian, beside, way, rng);
+        }
+    }
+
+    /// Adds somebody who is around while the vehicle is within reach of where it meets them.
+    fn along(&mut self, kind: Kind, beside: Beside, way: &OwnWay, rng: &mut ChaCha8Rng) {
+        let reach_m = way.reach_m() / (1.0 - beside.share).abs();
+        let shown_s = [-1.0, 1.0].map(|sign| way.time_at(beside.at_m + sign * (reach_m + 1.0)));
+        self.add(kind, [shown_s[0] - 1.0, shown_s[1] + 1.0], Track::Beside(beside), rng);
+    }
+}
+
+/// Places along the way with random distances of some mean, metres.
+fn places(way: &OwnWay, mean_m: f64, rng: &mut ChaCha8Rng) -> Vec<f64> {
+    let mut all = Vec::new();
+    let mut at_m = mean_m * rng.random::<f64>();
+    while at_m < way.length_m() {
+        all.push(at_m);
+        at_m += mean_m * rng.random_range(0.3..1.7);
+    }
+    all
+}
+
+/// When an oncoming vehicle is within reach: the distance to it falls all the time.
+fn meeting(track: &Track, way: &OwnWay) -> [f64; 2] {
+    let apart_m = |time_s: f64| track.along_m(way, time_s) - way.progress_m(time_s);
+    [way.reach_m(), -way.reach_m()].map(|wanted_m| {
+        let (mut low_s, mut high_s) = (0.0, way.duration_s());
+        while high_s - low_s > 0.25 {
+            let middle_s = 0.5 * (low_s + high_s);
+            if apart_m(middle_s) > wanted_m { low_s = middle_s } else { high_s = middle_s }
+        }
+        0.5 * (low_s + high_s)
+    })
+}
+
+/// Whether two tracks meet in the lane of oncoming traffic.
+fn meets(oncoming: &Track, other: &Track, way: &OwnWay, shown_s: [f64; 2]) -> bool {
+    let Track::Beside(_) = other else { return false };
+    let count = ((shown_s[1] - shown_s[0]) / 0.25) as usize;
+    (0..=count).map(|i| shown_s[0] + 0.25 * i as f64).any(|time_s| {
+        let overtaking_m = other.along_m(way, time_s);
+        let near = (overtaking_m - way.progress_m(time_s)).abs() < way.reach_m();
+        near && (oncoming.along_m(way, time_s) - overtaking_m).abs() < 14.0
+    })
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::trajectory::BlockLoop;
-
-    #[test]
-    fn follower_keeps_its_distance_and_oncoming_traffic_its_lane() {
-        let path = BlockLoop::new(48.0, 34.0, 9.5, 5.0);
-        for i in 0..400 {
-            let time = f64::from(i) * 0.1;
-            let own = path.pose(time);
-            let follower = own.inverse() * vehicle_pose(&path, 0, time);
-            assert!((9.0..20.0).contains(&follower.translation.vector.norm()), "{follower}");
-            let oncoming = own.inverse() * vehicle_pose(&path, 1, time);
-            assert!(oncoming.translation.vector.norm() > 3.0, "at {time} s: {oncoming}");
-        }
-    }
-}
+mod tests;

@@ -4,12 +4,14 @@ mod block;
 pub mod recorded;
 pub mod spline;
 mod timed_poses;
+mod town_drive;
 mod twist;
 
 use nalgebra::{Isometry2, Vector2};
 
 pub use block::BlockLoop;
-pub use timed_poses::{MEASURED_HZ, TimedPoses};
+pub use timed_poses::TimedPoses;
+pub use town_drive::TownDrive;
 pub use twist::ConstantTwist;
 
 /// A motion that is continuous in time.

@@ -5,7 +5,7 @@ use std::path::Path;
 use gyre_radar::read_trajectory;
 use nalgebra::{Isometry2, Point2};
 
-use super::timed_poses::{MEASURED_HZ, TimedPoses};
+use super::TimedPoses;
 use crate::SimulatorError;
 
 /// What to take of a file.
@@ -46,7 +46,7 @@ pub fn read(path: &Path, excerpt: Excerpt) -> Result<TimedPoses, SimulatorError>
             "only {share:.0} % of its way lead ahead (x forward, y left): is it another frame?"
         )));
     }
-    Ok(TimedPoses::new(&moved, MEASURED_HZ))
+    Ok(TimedPoses::measured(&moved))
 }
 
 /// All poses with their seconds after the first; of poses with the same stamp the first.

@@ -9,9 +9,9 @@ use super::spline::{Sample, UniformSpline};
 
 /// What a drive known at some instants is smoothed with: what changes faster than so many times a second is measuring
 /// noise rather than a car.
-pub const MEASURED_HZ: f64 = 0.7;
+const MEASURED_HZ: f64 = 0.7;
 /// As long as a vehicle stays within so many metres, for [`STAND_S`] at least, it stands.
-const STAND_M: f64 = 0.05;
+const STAND_M: f64 = 0.04;
 /// And within so many radians.
 const STAND_RAD: f64 = 0.01;
 /// See [`STAND_M`].
@@ -28,15 +28,24 @@ pub struct TimedPoses {
 
 impl TimedPoses {
     /// A drive close to `poses`, whose times ascend (seconds from zero), without what is faster than `cutoff_hz`.
-    ///
-    /// Where the poses hardly differ for a while, the vehicle stands.
     pub fn new(poses: &[(f64, Isometry2<f64>)], cutoff_hz: f64) -> Self {
+        Self::smooth(&unwrapped(poses), cutoff_hz)
+    }
+
+    /// A drive close to poses that were measured, and so are off by some centimetres.
+    ///
+    /// Where they hardly differ for a while, the vehicle stands.
+    pub fn measured(poses: &[(f64, Isometry2<f64>)]) -> Self {
         let mut samples = unwrapped(poses);
         hold_stands(&mut samples);
+        Self::smooth(&samples, MEASURED_HZ)
+    }
+
+    fn smooth(samples: &[Sample<3>], cutoff_hz: f64) -> Self {
         let duration_s = samples.last().map_or(0.0, |last| last.at);
         let spacing_s = duration_s / (samples.len().max(2) - 1) as f64;
         let step_s = spacing_s.clamp(0.02, 0.5 / cutoff_hz);
-        Self { curve: UniformSpline::fit(&samples, step_s, cutoff_hz), duration_s }
+        Self { curve: UniformSpline::fit(samples, step_s, cutoff_hz), duration_s }
     }
 }
 

@@ -1,0 +1,130 @@
+//! What cars, vans, lorries, buses, cyclists and pedestrians look like to a radar at 77 GHz.
+//!
+//! Cross-sections are of the order that is published: 1 to 100 m² for a car by its aspect, some 100 m² and more for the flat
+//! sides of lorries (Skolnik, *Introduction to Radar Systems*, gives 100 m² for a car, 200 m² for a pickup lorry, 2 m² for a
+//! bicycle, 1 m² for a man at microwaves); about -8 dBm² for a pedestrian at 76 GHz (Yamada et al., EuMC 2005), and some
+//! decibels more for a cyclist (Belgiovane and Chen, EuCAP 2017). How much passes follows from the sensor's height: from a
+//! roof it looks over cars, not over buses.
+
+use nalgebra::{Point2, Rotation2, Vector2};
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+
+use crate::town;
+use crate::world::{Aspect, Body, Scatterer, Wall};
+
+/// A kind of road user.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    Car,
+    Van,
+    Lorry,
+    Bus,
+    Cyclist,
+    Pedestrian,
+}
+
+/// A box on wheels.
+struct Shape {
+    half_m: (f64, f64),
+    /// Median cross-section of an edge, seen from all sides, and of one of the panels between, seen at a right angle, m².
+    edge_m2: f64,
+    panel_m2: f64,
+    /// Share of the power that passes, there and back.
+    transmission: f64,
+}
+
+impl Kind {
+    /// Half of length and width, metres.
+    pub fn half_m(self) -> (f64, f64) {
+        match self {
+            Self::Car => (2.15, 0.9),
+            Self::Van => (2.75, 1.0),
+            Self::Lorry => (4.6, 1.25),
+            Self::Bus => (5.8, 1.27),
+            Self::Cyclist => (0.9, 0.3),
+            Self::Pedestrian => (0.25, 0.3),
+        }
+    }
+
+    /// A motor vehicle as they come in a town: mostly cars.
+    pub fn motorised(rng: &mut impl Rng) -> Self {
+        match rng.random_range(0..100) {
+            0..74 => Self::Car,
+            74..89 => Self::Van,
+            89..95 => Self::Lorry,
+            _ => Self::Bus,
+        }
+    }
+
+    /// The body of one of its kind around its own origin, x ahead.
+    pub fn body(self, number: u32, rng: &mut ChaCha8Rng) -> Body {
+        let half_m = self.half_m();
+        match self {
+            Self::Car => town::car(number, rng),
+            Self::Van => Shape { half_m, edge_m2: 3.0, panel_m2: 15.0, transmission: 0.2 }.body(number, rng),
+            Self::Lorry => Shape { half_m, edge_m2: 6.0, panel_m2: 40.0, transmission: 0.05 }.body(number, rng),
+            Self::Bus => Shape { half_m, edge_m2: 5.0, panel_m2: 40.0, transmission: 0.05 }.body(number, rng),
+            Self::Cyclist => cloud(number, half_m, 5, 0.2, rng),
+            Self::Pedestrian => cloud(number, half_m, 2, 0.1, rng),
+        }
+    }
+}
+
+impl Shape {
+    fn body(&self, number: u32, rng: &mut ChaCha8Rng) -> Body {
+        let (length, width) = self.half_m;
+        let corners =
+            [(length, width), (length, -width), (-length, -width), (-length, width)].map(|(x, y)| Point2::new(x, y));
+        let mut body = Body::default();
+        for side in 0..4 {
+            let (from, to) = (corners[side], corners[(side + 1) % 4]);
+            let cross_section_m2 = spread(rng, self.edge_m2, 4.0);
+            body.scatterers.push(Scatterer {
+                position: from,
+                cross_section_m2,
+                aspect: Aspect::AllRound,
+                body: number,
+            });
+            self.panels(&mut body, from, to, number, rng);
+        }
+        let transmission = self.transmission.sqrt();
+        // Whatever passes the outline crosses one diagonal at least, and half of it both.
+        let diagonal =
+            |a: usize, b: usize| Wall { from: corners[a], to: corners[b], transmission, mirror: 0.0, body: number };
+        body.walls = vec![diagonal(0, 2), diagonal(1, 3)];
+        body
+    }
+
+    /// A panel about every metre: flat, hence bright at a right angle, but never quite even.
+    fn panels(&self, body: &mut Body, from: Point2<f64>, to: Point2<f64>, number: u32, rng: &mut ChaCha8Rng) {
+        let way = to - from;
+        let outward = Vector2::new(-way.y, way.x).normalize();
+        let count = way.norm().ceil() as usize;
+        for panel in 0..count {
+            let position = from + way * ((panel as f64 + rng.random_range(0.2..0.8)) / count as f64);
+            let normal = Rotation2::new(rng.random_range(-0.15..0.15)) * outward;
+            let aspect = Aspect::Facing { normal, sharpness: rng.random_range(10.0..120.0) };
+            let cross_section_m2 = spread(rng, self.panel_m2, 5.0);
+            body.scatterers.push(Scatterer { position, cross_section_m2, aspect, body: number });
+        }
+    }
+}
+
+/// Weak scatterers all round; a person hides next to nothing.
+fn cloud(number: u32, half_m: (f64, f64), count: usize, median_m2: f64, rng: &mut ChaCha8Rng) -> Body {
+    let mut body = Body::default();
+    for _ in 0..count {
+        let position = Point2::new(rng.random_range(-half_m.0..half_m.0), rng.random_range(-half_m.1..half_m.1));
+        let cross_section_m2 = spread(rng, median_m2, 3.0);
+        body.scatterers.push(Scatterer { position, cross_section_m2, aspect: Aspect::AllRound, body: number });
+    }
+    body
+}
+
+/// A log-normal number about `median`, one standard deviation given in decibels.
+fn spread(rng: &mut ChaCha8Rng, median: f64, deviation_db: f64) -> f64 {
+    // The sum of twelve uniform numbers is near enough to a normal one, and never far out.
+    let normal = (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
+    median * 10f64.powf(deviation_db * normal / 10.0)
+}
