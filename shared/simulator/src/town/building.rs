@@ -3,7 +3,7 @@
 use nalgebra::{Point2, Vector2};
 
 use super::facade::{Facade, Material, right_of};
-use super::site::Site;
+use super::site::{Screen, Site};
 
 /// The form of a building on the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -108,7 +108,7 @@ impl Site<'_> {
     pub(super) fn shelter(&mut self) {
         let body = self.body();
         let corners = [(-1.8, 0.0), (-1.8, 1.2), (1.8, 1.2), (1.8, 0.0)].map(|(x, y)| Point2::new(x, y));
-        let glass = super::site::Screen { transmission: 0.4, mirror: 0.4 };
+        let glass = Screen { transmission: 0.4, mirror: 0.4 };
         for ends in corners.windows(2) {
             self.wall(ends[0], ends[1], glass, body);
         }

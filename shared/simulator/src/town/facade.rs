@@ -114,7 +114,7 @@ impl Site<'_> {
             self.door(bay, facade.body);
         }
         // Pilasters, gutters, the joints of panels: at every bay's side, seen along the street from far away.
-        let relief_m2 = if self.chance(pipe) { 3.0 } else { 0.8 };
+        let relief_m2 = if self.chance(pipe) { 5.0 } else { 1.6 };
         self.facing(bay.at(0.0, 0.1), bay.outward, 0.4, relief_m2 * bay.strength, facade.body);
     }
 
@@ -132,7 +132,7 @@ impl Site<'_> {
         for side in [-1.0, 1.0] {
             let way = Rotation2::new(side * self.rng.random_range(0.7..1.4)) * bay.outward;
             let sharpness = self.rng.random_range(2.0..10.0);
-            self.facing(bay.at(middle_m + side * half_m, 0.05), way, sharpness, 6.0 * bay.strength, facade.body);
+            self.facing(bay.at(middle_m + side * half_m, 0.05), way, sharpness, 10.0 * bay.strength, facade.body);
         }
         // Panes do not hang quite parallel to their wall.
         let way = Rotation2::new(0.02 * normal(&mut self.rng)) * bay.outward;

@@ -129,6 +129,6 @@ impl<'a> Frontage<'a> {
         }
         let origin = nalgebra::center(&front.0, &front.1) - way * (usable_m / 2.0);
         let pose = Isometry2::new(origin.coords, way.y.atan2(way.x));
-        Some(Lot { pose, width_m: usable_m, depth_m })
+        Some(Lot { pose, width_m: usable_m, frontage_m: width_m, depth_m })
     }
 }

@@ -12,7 +12,7 @@ use super::boundary::Boundary;
 use super::config::TownConfig;
 use super::district::District;
 use super::frontage::Frontage;
-use super::random::{hash, normal};
+use super::random::{generator, hash, normal};
 use super::site::{Built, Site};
 use super::vehicle::CAR_HALF_M;
 use crate::world::NO_BODY;
@@ -23,6 +23,8 @@ const POSTS_OUT_M: f64 = 0.5;
 const CARS_OUT_M: f64 = 1.25;
 /// Width of the bays of parked cars, metres.
 pub(super) const BAYS_M: f64 = 2.4;
+/// Length of a piece of a rail, metres.
+const RAIL_M: f64 = 4.0;
 /// Nothing reaches nearer to any kerb than this, metres.
 const FREE_M: f64 = 0.2;
 
@@ -49,7 +51,7 @@ impl Kerb<'_> {
         if self.bays {
             self.parked_cars(built);
         }
-        if self.rng.random_bool((trees * self.config.trees).min(1.0)) {
+        if self.rng.random_bool((trees * self.config.trees).clamp(0.0, 1.0)) {
             self.trees(built);
         }
         self.occasional(built);
@@ -66,15 +68,16 @@ impl Kerb<'_> {
         let pose = self.frontage.frame(along_m, out_m);
         let place = Point2::from(pose.translation.vector);
         let ours = self.frontage.owns(along_m, place) && self.frontage.is_clear(place, free_m);
-        let rng = super::random::generator(&[self.rng.random()]);
+        let rng = generator(&[self.rng.random()]);
         ours.then_some(Site { built, pose, rng })
     }
 
-    /// Whether no corner of a rectangle in the frame of a station reaches over a kerb.
-    fn has_room(&self, along_m: f64, out_m: f64, x: [f64; 2], y: [f64; 2]) -> bool {
+    /// Whether a rectangle in the frame of a station, of half a length along the kerb and between two distances from the
+    /// frame's origin, reaches over no kerb.
+    fn has_room(&self, along_m: f64, out_m: f64, half_m: f64, y: [f64; 2]) -> bool {
         let frame = self.frontage.frame(along_m, out_m);
-        let corners = x.into_iter().flat_map(|x| y.map(|y| Point2::new(x, y)));
-        corners.into_iter().all(|corner| self.frontage.is_clear(frame * corner, 0.1))
+        let is_clear = |x: f64, y: f64| self.frontage.is_clear(frame * Point2::new(x, y), 0.1);
+        [-1.0, -0.5, 0.0, 0.5, 1.0].into_iter().all(|share| y.into_iter().all(|y| is_clear(half_m * share, y)))
     }
 
     /// At regular distances along the whole street, by turns to its left and right.
@@ -113,11 +116,11 @@ impl Kerb<'_> {
 
     fn parked_cars(&mut self, built: &mut Built) {
         self.along(5.4, 6.6, |kerb, along_m| {
-            if !kerb.rng.random_bool(kerb.config.parked_cars) {
+            if !kerb.rng.random_bool(kerb.config.parked_cars.clamp(0.0, 1.0)) {
                 return;
             }
             let (length, width) = (CAR_HALF_M.0 + 0.2, CAR_HALF_M.1);
-            if !kerb.has_room(along_m, CARS_OUT_M, [-length, length], [-width, width]) {
+            if !kerb.has_room(along_m, CARS_OUT_M, length, [-width, width]) {
                 return;
             }
             if let Some(mut site) = kerb.site(along_m, CARS_OUT_M, FREE_M, built) {
@@ -164,7 +167,7 @@ impl Kerb<'_> {
         // Open to the street, its back at the land's edge.
         let out_m = self.pavement_m - 1.3;
         if out_m > POSTS_OUT_M
-            && self.has_room(along_m, out_m, [-1.8, 1.8], [0.0, 1.2])
+            && self.has_room(along_m, out_m, 1.8, [0.0, 1.2])
             && let Some(mut site) = self.site(along_m, out_m, POSTS_OUT_M, built)
         {
             site.shelter();
@@ -175,16 +178,17 @@ impl Kerb<'_> {
     fn rail(&mut self, kind: Boundary, built: &mut Built) {
         let out_m = self.posts_out_m();
         let mut along_m = self.from_m;
-        while along_m + 4.0 <= self.to_m {
-            let end = self.frontage.place(along_m + 4.0, out_m);
-            let free = self.frontage.is_clear(end, FREE_M) && self.frontage.owns(along_m + 4.0, end);
+        while along_m + RAIL_M <= self.to_m {
+            let [from, to] = [0.0, RAIL_M].map(|more_m| self.frontage.place(along_m + more_m, out_m));
+            let is_clear = |step: i32| self.frontage.is_clear(from + (to - from) * (0.25 * f64::from(step)), FREE_M);
+            let free = (0..=4).all(is_clear) && self.frontage.owns(along_m + RAIL_M, to);
             if let Some(mut site) = self.site(along_m, out_m, FREE_M, built)
                 && free
             {
-                let end = site.pose.inverse_transform_point(&end);
+                let end = site.pose.inverse_transform_point(&to);
                 site.boundary(kind, Point2::origin(), end);
             }
-            along_m += 4.0;
+            along_m += RAIL_M;
         }
     }
 

@@ -20,6 +20,8 @@ pub(super) struct Lot {
     pub pose: Isometry2<f64>,
     /// Along the front, metres.
     pub width_m: f64,
+    /// Of the street that it lies along, metres: more than its width in bends to its side.
+    pub frontage_m: f64,
     /// Away from the street, metres.
     pub depth_m: f64,
 }
@@ -100,7 +102,7 @@ mod tests {
     use super::*;
 
     fn lot(x: f64, y: f64, turn: f64) -> Lot {
-        Lot { pose: Isometry2::new(Vector2::new(x, y), turn), width_m: 10.0, depth_m: 30.0 }
+        Lot { pose: Isometry2::new(Vector2::new(x, y), turn), width_m: 10.0, frontage_m: 10.0, depth_m: 30.0 }
     }
 
     #[test]

@@ -47,6 +47,8 @@ const CLEAR_M: f64 = 1.2;
 const SKIP_M: f64 = 2.0;
 /// Narrower rests of a stretch stay empty, metres.
 const LEAST_WIDTH_M: f64 = 4.0;
+/// Uses that are drawn for a place before it is given up.
+const DRAWS: usize = 3;
 /// Shares of the intended depth that are tried until a piece of land is free.
 const DEPTHS: [f64; 3] = [1.0, 0.6, 0.35];
 /// How much there is to see of buildings behind the first row, where that is 1.
@@ -137,19 +139,21 @@ impl<'a> Planner<'a> {
         let detail = if row == Row::First { 1.0 } else { DETAIL_BEHIND };
         let mut at_m = stretch.from_m;
         while at_m + LEAST_WIDTH_M < stretch.to_m {
-            let kind = stretch.district.draw(row == Row::First, &mut rng);
-            let (least_m, most_m) = kind.width_m();
-            let width_m = rng.random_range(least_m..most_m).min(stretch.to_m - at_m);
-            let key: u64 = rng.random();
-            let claimed = if width_m < least_m { None } else { self.claim(stretch, row, kind, at_m, width_m) };
-            match claimed {
-                Some(lot) => {
-                    self.plot(&lot, kind, stretch.key ^ row as u64, detail, generator(&[key]));
-                    at_m += width_m;
-                }
-                None => at_m += SKIP_M,
+            let claimed = (0..DRAWS).find_map(|_| self.draw(stretch, row, at_m, &mut rng));
+            if let Some((kind, lot)) = claimed {
+                self.plot(&lot, kind, stretch.key ^ row as u64, detail, generator(&[rng.random()]));
             }
+            at_m += claimed.map_or(SKIP_M, |(_, lot)| lot.frontage_m);
         }
+    }
+
+    /// Draws a use, and takes land for it if there is enough from a station on.
+    fn draw(&mut self, stretch: &Stretch<'_>, row: Row, at_m: f64, rng: &mut ChaCha8Rng) -> Option<(Use, Lot)> {
+        let kind = stretch.district.draw(row == Row::First, rng);
+        let (least_m, most_m) = kind.width_m();
+        let width_m = rng.random_range(least_m..most_m).min(stretch.to_m - at_m);
+        let lot = if width_m < least_m { None } else { self.claim(stretch, row, kind, at_m, width_m) };
+        lot.map(|lot| (kind, lot))
     }
 
     /// Takes the land for a use from a station on, as deep as it is free.

@@ -294,7 +294,7 @@ impl Plot<'_, '_> {
             let kind = if self.site.chance(0.6) { Boundary::Hedge } else { Boundary::Wire };
             self.aside(kind, 2.0);
         }
-        let wooded = if self.site.chance(0.2) { 12.0 } else { 0.8 };
+        let wooded = if self.site.chance(0.2) { 12.0 } else { 1.5 };
         self.trees(1.0, wooded);
         self.ground(0.3);
     }
