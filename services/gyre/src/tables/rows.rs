@@ -26,6 +26,12 @@ pub static ROWS: [Row; 7] = [
     Row::of_gyre("Gyre", &[]),
 ];
 
+/// The row of Fast-MbyM's own form.
+pub static PLAIN: &Row = &ROWS[1];
+
+/// The row of a sequence's own configuration.
+pub static SHIPPED: &Row = &ROWS[6];
+
 /// Two scans and no more: the motion is the search's.
 const SEARCH_ALONE: &[&str] = &["refinement.kind=none"];
 
