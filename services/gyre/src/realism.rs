@@ -15,7 +15,7 @@ use std::{
 };
 
 use gyre_masking::MaskingConfig;
-use gyre_realism::{Comparison, MeterConfig, RangeGrid, Recording, compare, picture::Picture, plot::curves};
+use gyre_realism::{Comparison, Measured, MeterConfig, RangeGrid, Recording, compare, picture::Picture, plot::curves};
 use serde::Serialize;
 
 use crate::{Failure, cli::RealismArguments, print};
@@ -42,6 +42,8 @@ struct Report {
 /// A recording and how it was measured.
 #[derive(Debug, Serialize)]
 struct Subject {
+    /// `sim`, `real` or `other`.
+    role: &'static str,
     /// Its folder.
     data: PathBuf,
     /// Its configuration; `None`: the one that ships for its format.
@@ -49,7 +51,7 @@ struct Subject {
     /// Whose motions aligned its consecutive scans.
     aligned: Aligned,
     /// What it is like.
-    recording: Recording,
+    measured: Measured,
 }
 
 /// Measures the recordings, compares them, and writes tables, plots and pictures.
@@ -63,11 +65,12 @@ pub fn realism(arguments: &RealismArguments) -> Result<ExitCode, Failure> {
     let config = MeterConfig { grid, threshold, cell_m: CELL_M };
     let subjects = sources.iter_mut().map(|source| measure(source, config, arguments));
     let subjects = subjects.collect::<Result<Vec<_>, Failure>>()?;
-    let recordings: Vec<&Recording> = subjects.iter().map(|subject| &subject.recording).collect();
+    let recordings: Vec<&Recording> = subjects.iter().map(|subject| &subject.measured.whole).collect();
     for (name, svg) in curves(&recordings)? {
         save(&out.join(format!("{name}.svg")), &svg)?;
     }
-    let comparison = compare(recordings[0], recordings[1], recordings.get(2).copied());
+    let comparison =
+        compare(&subjects[0].measured, &subjects[1].measured, subjects.get(2).map(|other| &other.measured));
     let report = Report { version: env!("CARGO_PKG_VERSION"), grid, cell_m: CELL_M, subjects, comparison };
     let text = markdown::of(&report);
     save(&out.join("realism.json"), &serde_json::to_string_pretty(&report)?)?;
@@ -93,10 +96,9 @@ fn measure(source: &mut Source, config: MeterConfig, arguments: &RealismArgument
     let searches = Searches::run(source, arguments.search_scans)?;
     print::note(format_args!("{}: statistics", source.role));
     draw(source, &arguments.out)?;
-    let (statistics, aligned) = source.measure(config, arguments.scans.get(), &searches)?;
-    let recording = Recording { name: source.name(), statistics, plain: searches.plain, refined: searches.refined };
+    let (measured, aligned) = source.measure(config, arguments.scans.get(), &searches)?;
     let configuration = source.configuration_file.clone();
-    Ok(Subject { data: source.data.clone(), configuration, aligned, recording })
+    Ok(Subject { role: source.role, data: source.data.clone(), configuration, aligned, measured })
 }
 
 /// One scan for the eye, from above and as measured.

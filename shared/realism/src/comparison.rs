@@ -5,10 +5,12 @@
 
 use serde::Serialize;
 
-use crate::{Change, Curve, Recording, SearchErrors};
+use crate::{Change, Curve, Measured, Recording, SearchErrors};
 
-/// Added to both shares before they are compared, so that a share of nothing has a ratio too: one bin in a million.
+/// Added to both shares before they are compared, so that a share of nothing has a ratio too.
 const SHARE_FLOOR: f64 = 1e-6;
+/// The same for saturated bins: a few of them are chance.
+const SATURATED_FLOOR: f64 = 1e-5;
 /// Ranges at which the mean power is shown, m.
 const SHOWN_RANGES_M: [f64; 2] = [10.0, 80.0];
 
@@ -32,6 +34,10 @@ pub struct Row {
     pub distance: &'static str,
     /// As it reads for the simulated, the real and the other real recording; `None` where it is not known.
     pub values: [Option<String>; 3],
+    /// From one half of the real recording to its other half: less than this means nothing.
+    pub within_real: Option<f64>,
+    /// From one half of the other real recording to its other half.
+    pub within_other: Option<f64>,
     /// From the simulated to the real recording.
     pub sim_real: Option<f64>,
     /// From the real recording to the other.
@@ -41,14 +47,21 @@ pub struct Row {
 }
 
 /// Compares `sim` with `real`, and `real` with another real recording.
-pub fn compare(sim: &Recording, real: &Recording, other: Option<&Recording>) -> Comparison {
+pub fn compare(sim: &Measured, real: &Measured, other: Option<&Measured>) -> Comparison {
     let row = |statistic: &Statistic| {
-        let sim_real = (statistic.between)(sim, real);
-        let real_other = other.and_then(|other| (statistic.between)(real, other));
+        let between = |a: &Measured, b: &Measured| (statistic.between)(&a.whole, &b.whole);
+        let within = |measured: &Measured| {
+            let [first, second] = measured.halves.as_ref()?;
+            (statistic.between)(first, second)
+        };
+        let sim_real = between(sim, real);
+        let real_other = other.and_then(|other| between(real, other));
         Row {
             statistic: statistic.name,
             distance: statistic.distance,
-            values: [Some(sim), Some(real), other].map(|recording| (statistic.shown)(recording?)),
+            values: [Some(sim), Some(real), other].map(|measured| (statistic.shown)(&measured?.whole)),
+            within_real: within(real),
+            within_other: other.and_then(within),
             sim_real,
             real_other,
             closer: sim_real.zip(real_other).map(|(sim_real, real_other)| sim_real < real_other),
@@ -109,7 +122,7 @@ static STATISTICS: [Statistic; 14] = [
         name: "share of saturated bins",
         distance: LOG_RATIO,
         shown: |recording| Some(format!("{:.1e}", recording.statistics.saturated_share)),
-        between: |a, b| by(a, b, |recording| Some(recording.statistics.saturated_share), share_ratio),
+        between: |a, b| by(a, b, |recording| Some(recording.statistics.saturated_share), saturated_ratio),
     },
     Statistic {
         name: "share above the threshold",
@@ -182,6 +195,10 @@ fn log_ratio(a: f64, b: f64) -> f64 {
 
 fn share_ratio(a: f64, b: f64) -> f64 {
     log_ratio(a + SHARE_FLOOR, b + SHARE_FLOOR)
+}
+
+fn saturated_ratio(a: f64, b: f64) -> f64 {
+    log_ratio(a + SATURATED_FLOOR, b + SATURATED_FLOOR)
 }
 
 /// Over as much of the range as both have.

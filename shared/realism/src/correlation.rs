@@ -1,10 +1,11 @@
 //! Over which distance powers are alike, in range and in azimuth, apart from what is usual at their range.
 
 use gyre_radar::PolarScan;
+use multiversion::multiversion;
 use serde::Serialize;
 
-/// Longest lag in range, cells.
-const RANGE_LAGS: usize = 64;
+/// Longest lag in range, m.
+const RANGE_LAG_M: f32 = 12.0;
 /// Longest lag in azimuth: this part of a turn.
 const TURN_PART: usize = 8;
 
@@ -18,9 +19,12 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// The lag at which it first falls to 1/e, on the straight line between its values; `None` where it never does.
+    /// The lag at which it first falls to a half, on the straight line between its values; `None` where it never does.
+    ///
+    /// A half rather than 1/e: streets and streaks give the curve a long flat tail, on which 1/e lies, and where it is crossed there
+    /// differs from one half of a drive to the other by a third.
     pub fn length(&self) -> Option<f64> {
-        let level = (-1f64).exp();
+        let level = 0.5;
         let after = self.values.iter().position(|value| *value <= level)?;
         let (above, below) = (self.values[after.checked_sub(1)?], self.values[after]);
         Some((after as f64 - (below - level) / (below - above)) * self.step)
@@ -46,7 +50,7 @@ impl Products {
         let (azimuths, cells) = (scan.geometry.azimuths, scan.geometry.bins);
         if self.azimuths == 0 {
             self.azimuths = azimuths;
-            self.range = vec![0; RANGE_LAGS.min(cells)];
+            self.range = vec![0; range_lags(scan).min(cells)];
             self.azimuth = vec![0; azimuths.div_ceil(TURN_PART)];
         }
         for azimuth in 0..azimuths {
@@ -79,6 +83,11 @@ impl Products {
     }
 }
 
+/// Lags up to the longest, 0 among them.
+fn range_lags(scan: &PolarScan<'_>) -> usize {
+    (RANGE_LAG_M / scan.geometry.range_resolution_m) as usize + 1
+}
+
 /// Covariances over the first of them. Where all powers at a range are the same, what is left of rounding is no variance.
 fn curve(covariances: Vec<f64>, step: f64) -> Curve {
     match covariances.first().copied() {
@@ -91,8 +100,17 @@ fn curve(covariances: Vec<f64>, step: f64) -> Curve {
 
 /// Sum of the products over the shorter of both.
 fn dot(a: &[u8], b: &[u8]) -> u64 {
-    // Fewer products of two bytes than overflow a u32.
-    const SAFE: usize = 1 << 16;
-    let part = |(a, b): (&[u8], &[u8])| a.iter().zip(b).map(|(a, b)| u32::from(*a) * u32::from(*b)).sum::<u32>();
-    a.chunks(SAFE).zip(b.chunks(SAFE)).map(|chunks| u64::from(part(chunks))).sum()
+    // Fewer products of two bytes than overflow an i32.
+    const SAFE: usize = 1 << 15;
+    a.chunks(SAFE).zip(b.chunks(SAFE)).map(|(a, b)| dot_part(a, b) as u64).sum()
+}
+
+/// The same of few enough for the sum to fit.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn dot_part(a: &[u8], b: &[u8]) -> i32 {
+    let mut sum = 0;
+    for (a, b) in a.iter().zip(b) {
+        sum += i32::from(*a) * i32::from(*b);
+    }
+    sum
 }

@@ -33,5 +33,5 @@ pub use grid::{RangeGrid, Resampler};
 pub use histogram::Histogram;
 pub use meter::{Meter, MeterConfig};
 pub use ranges::PowerByRange;
-pub use statistics::{Recording, SearchErrors, Statistics};
+pub use statistics::{Measured, Recording, SearchErrors, Statistics};
 pub use streaks::Streaks;

@@ -35,8 +35,9 @@ impl Picture {
         let range_m = scan.geometry.bins as f32 * scan.geometry.range_resolution_m;
         let n = 2 * (range_m / cell_m) as usize + 1;
         let config = RasterConfig { n, cell_m, minimum_range_m: 0.0, ..RasterConfig::default() };
-        let mut cells = vec![0.0; n.saturating_mul(n)];
-        Rasteriser::new(&config)?.rasterise(scan, 0, None, &mut cells)?;
+        let mut rasteriser = Rasteriser::new(&config)?;
+        let mut cells = vec![0.0; n * n];
+        rasteriser.rasterise(scan, 0, None, &mut cells)?;
         Ok(Self { width: n, height: n, pixels: cells.into_iter().map(|power| power.round() as u8).collect() })
     }
 

@@ -11,13 +11,15 @@ use crate::Recording;
 const SIZE: (u32, u32) = (900, 480);
 /// Colours, recording by recording.
 const COLOURS: [RGBColor; 3] = [ESTIMATE, INK, MARK];
+/// What stands for them in the legend.
+const LABELS: [&str; 3] = ["simulated", "real", "other real"];
 /// Decades of shares that are drawn: less than this is a bin in a scan or none at all.
 const LEAST_LOG_SHARE: f64 = -6.0;
 
 /// A diagram's name, as that of a file, and its SVG document.
 pub type Drawing = (&'static str, String);
 
-/// The curves of up to three recordings, laid over each other: the histogram, the mean power against range, both autocorrelations.
+/// The curves of a simulated, a real and, if it is there, another real recording, laid over each other: the histogram, the mean power against range, both autocorrelations.
 ///
 /// # Errors
 /// [`PlotError::Draw`].
@@ -86,11 +88,8 @@ impl Diagram {
         let curves: Vec<Vec<(f64, f64)>> = recordings.iter().map(|recording| (self.points)(recording)).collect();
         let all = || curves.iter().flatten();
         let (x, y) = (range(all().map(|point| point.0)), range(all().map(|point| point.1)));
-        let entry = |(recording, colour): (&&'_ Recording, RGBColor)| (recording.name.clone(), colour);
-        let labels: Vec<(String, RGBColor)> = recordings.iter().zip(COLOURS).map(entry).collect();
-        let symbol = |colour| Symbol::Line(line(colour, 2.0));
-        let legend: Vec<Entry<'_>> =
-            labels.iter().map(|(label, colour)| Entry { label, symbol: symbol(*colour) }).collect();
+        let entry = |((_, label), colour)| Entry { label, symbol: Symbol::Line(line(colour, 2.0)) };
+        let legend: Vec<Entry<'_>> = recordings.iter().zip(LABELS).zip(COLOURS).map(entry).collect();
         document(SIZE, |area| {
             header(area, self.title, &caption(recordings), &legend)?;
             let below_header = area.split_vertically(px(f64::from(HEADER))).1;
@@ -146,6 +145,7 @@ fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
 fn caption(recordings: &[&Recording]) -> String {
     let Some(first) = recordings.first() else { return String::new() };
     let grid = first.statistics.grid;
-    let scans: Vec<String> = recordings.iter().map(|recording| recording.statistics.scans.to_string()).collect();
-    format!("cells of {:.4} m up to {:.1} m; {} scans", grid.resolution_m, grid.range_m(), scans.join(", "))
+    let scans = |recording: &&Recording| format!("{} scans of {}", recording.statistics.scans, recording.name);
+    let scans: Vec<String> = recordings.iter().map(scans).collect();
+    format!("{}; cells of {:.4} m up to {:.1} m", scans.join(", "), grid.resolution_m, grid.range_m())
 }

@@ -4,7 +4,17 @@ use serde::Serialize;
 
 use crate::{Change, Curve, Histogram, RangeGrid, Streaks};
 
-/// All that was measured of a recording.
+/// A recording as a whole, and its halves: how far apart these are is what a distance owes to chance and to the streets driven.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Measured {
+    /// All of it.
+    pub whole: Recording,
+    /// Its first and its second half; `None` where it has too few scans.
+    #[serde(skip)]
+    pub halves: Option<[Recording; 2]>,
+}
+
+/// All that was measured of a recording, or of a half.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Recording {
     /// What it is called.

@@ -20,7 +20,7 @@ pub fn of(report: &Report) -> String {
     let _ = writeln!(
         text,
         "Powers averaged over {:.4} m of range up to {:.1} m, the coarsest and the shortest of the recordings'; saturation and levels \
-         in the sensors' own bins; consecutive scans compared in cells of {} m.\n",
+         in the sensors' own bins; consecutive scans compared in cells of {} m; `within` is between a recording's halves.\n",
         grid.resolution_m,
         grid.range_m(),
         report.cell_m
@@ -31,12 +31,12 @@ pub fn of(report: &Report) -> String {
 }
 
 fn compared(text: &mut String, report: &Report) {
-    let names = report.subjects.iter().map(|subject| subject.recording.name.clone());
+    let names = names(report);
     let judged = report.subjects.len() > 2;
     let mut headings: Vec<String> = std::iter::once("statistic".to_owned()).chain(names).collect();
-    headings.extend(["distance", "sim-real"].map(str::to_owned));
+    headings.extend(["distance", "within real", "sim-real"].map(str::to_owned));
     if judged {
-        headings.extend(["real-other", "sim is"].map(str::to_owned));
+        headings.extend(["real-other", "within other", "sim is"].map(str::to_owned));
     }
     row(text, &headings);
     row(text, &vec!["---".to_owned(); headings.len()]);
@@ -48,14 +48,18 @@ fn compared(text: &mut String, report: &Report) {
     }
 }
 
+fn names(report: &Report) -> impl Iterator<Item = String> {
+    report.subjects.iter().map(|subject| format!("{}: {}", subject.role, subject.measured.whole.name))
+}
+
 fn cells(line: &Row, recordings: usize) -> Vec<String> {
     let number = |distance: Option<f64>| distance.map_or("-".to_owned(), |distance| format!("{distance:.3}"));
     let values = line.values.iter().take(recordings).map(|value| value.clone().unwrap_or_else(|| "-".to_owned()));
     let mut cells: Vec<String> = std::iter::once(line.statistic.to_owned()).chain(values).collect();
-    cells.extend([line.distance.to_owned(), number(line.sim_real)]);
+    cells.extend([line.distance.to_owned(), number(line.within_real), number(line.sim_real)]);
     if recordings > 2 {
         let verdict = line.closer.map_or("-", |closer| if closer { "closer" } else { "farther" });
-        cells.extend([number(line.real_other), verdict.to_owned()]);
+        cells.extend([number(line.real_other), number(line.within_other), verdict.to_owned()]);
     }
     cells
 }
@@ -63,10 +67,9 @@ fn cells(line: &Row, recordings: usize) -> Vec<String> {
 /// What each recording is like: what a sensor's profile can be set by.
 fn characters(text: &mut String, report: &Report) {
     let _ = writeln!(text, "\n## What each is like\n");
-    let names = report.subjects.iter().map(|subject| subject.recording.name.clone());
-    row(text, &std::iter::once(String::new()).chain(names).collect::<Vec<_>>());
+    row(text, &std::iter::once(String::new()).chain(names(report)).collect::<Vec<_>>());
     row(text, &vec!["---".to_owned(); report.subjects.len() + 1]);
-    let recordings = || report.subjects.iter().map(|subject| &subject.recording);
+    let recordings = || report.subjects.iter().map(|subject| &subject.measured.whole);
     let mut line = |name: String, of: &dyn Fn(&Recording) -> String| {
         row(text, &std::iter::once(name).chain(recordings().map(of)).collect::<Vec<_>>());
     };

@@ -7,7 +7,7 @@ use gyre_radar::{
 };
 use gyre_realism::SearchErrors;
 
-use super::recording::Source;
+use super::recording::{Part, Source};
 use crate::{
     Failure,
     judgement::judge,
@@ -23,25 +23,45 @@ use crate::{
 pub struct Searches {
     /// Ground truth with times and headings.
     pub truth: Option<Trajectory>,
-    /// What the shipped configuration makes of the scans.
-    pub odometry: Option<Trajectory>,
-    /// Errors of the search in the paper's form; `None` without truth.
-    pub plain: Option<SearchErrors>,
-    /// Errors of the shipped configuration; `None` without truth.
-    pub refined: Option<SearchErrors>,
+    /// What the search makes of the scans in the paper's form.
+    pub plain: Option<Trajectory>,
+    /// What the shipped configuration makes of them.
+    pub refined: Option<Trajectory>,
 }
 
 impl Searches {
     /// Runs both on the recording's first `scans` scans, or neither if there are no two.
     pub fn run(source: &Source, scans: usize) -> Result<Self, Failure> {
         let truth = truth(source);
-        if source.scans().min(scans) < 2 {
+        let scans = source.scans().min(scans);
+        if scans < 2 {
             return Ok(Self { truth, ..Self::default() });
         }
-        let plain = run(source, PLAIN, scans)?;
-        let refined = run(source, SHIPPED, scans)?;
-        let errors = |odometry: &Trajectory| errors(odometry, truth.as_ref()?, source);
-        Ok(Self { plain: errors(&plain), refined: errors(&refined), odometry: Some(refined), truth })
+        let plain = Some(run(source, PLAIN, scans)?);
+        let refined = Some(run(source, SHIPPED, scans)?);
+        Ok(Self { truth, plain, refined })
+    }
+
+    /// What both keep in a part of their time.
+    pub fn part(&self, part: Part) -> Self {
+        let of = |trajectory: &Option<Trajectory>| trajectory.as_ref().map(|trajectory| part.of_trajectory(trajectory));
+        Self { truth: self.truth.clone(), plain: of(&self.plain), refined: of(&self.refined) }
+    }
+
+    /// Errors of a trajectory that was found; `None` without truth that fits.
+    pub fn errors(&self, found: &Option<Trajectory>) -> Option<SearchErrors> {
+        let judged = judge(found.as_ref()?, self.truth.as_ref()?, Options::default())
+            .inspect_err(|error| print::note(format_args!("not compared with the truth: {error}")))
+            .ok()?;
+        let rpe = judged.rpe.as_ref()?;
+        Some(SearchErrors {
+            motions: rpe.pairs.len(),
+            path_m: judged.path_m,
+            translation_rmse_m: rpe.translation_rmse_m,
+            rotation_rmse_deg: rpe.rotation_rmse_deg,
+            ate_m: judged.ate.rmse_m,
+            seg_percent: judged.seg.as_ref().map(|seg| seg.percent),
+        })
     }
 }
 
@@ -58,20 +78,4 @@ fn run(source: &Source, row: &Row, scans: usize) -> Result<Trajectory, Failure> 
     let out = source.runs.join(row.folder());
     accuracy::run(&source.sequence, row.name, &changes, &out)?;
     Ok(read_trajectory(&out.join("trajectory.tum"))?)
-}
-
-fn errors(odometry: &Trajectory, truth: &Trajectory, source: &Source) -> Option<SearchErrors> {
-    let evaluation = judge(odometry, truth, Options::default());
-    let judged = evaluation
-        .inspect_err(|error| print::note(format_args!("{}: not compared with the truth: {error}", source.role)))
-        .ok()?;
-    let rpe = judged.rpe.as_ref()?;
-    Some(SearchErrors {
-        motions: rpe.pairs.len(),
-        path_m: judged.path_m,
-        translation_rmse_m: rpe.translation_rmse_m,
-        rotation_rmse_deg: rpe.rotation_rmse_deg,
-        ate_m: judged.ate.rmse_m,
-        seg_percent: judged.seg.as_ref().map(|seg| seg.percent),
-    })
 }

@@ -7,7 +7,7 @@ use std::{
 };
 
 use gyre_radar::{Dataset, DatasetOptions, Format, OwnedScan, Trajectory};
-use gyre_realism::{Meter, MeterConfig, Statistics};
+use gyre_realism::{Measured, Meter, MeterConfig, Recording, Statistics};
 use nalgebra::Isometry2;
 use serde::Serialize;
 
@@ -16,6 +16,8 @@ use crate::{Failure, print, tables::Sequence};
 
 /// Consecutive scans that are measured in a row.
 const RUN: usize = 8;
+/// A recording with fewer scans is not halved.
+const LEAST_HALVED: usize = 6;
 /// Stamps this close to a trajectory's end are its end, ns: files round.
 const ROUNDING_NS: u64 = 1_000_000;
 
@@ -30,7 +32,17 @@ pub struct Source {
     pub sequence: Sequence,
     /// The folder of all that is run on it.
     pub runs: PathBuf,
+    /// The scans that its configuration plays.
+    played: Range<usize>,
     dataset: Box<dyn Dataset>,
+}
+
+/// What of a recording is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    Whole,
+    FirstHalf,
+    SecondHalf,
 }
 
 /// Pairs of consecutive scans that were aligned by each.
@@ -57,35 +69,38 @@ impl Source {
             }
         };
         let sequence = Sequence::new(&file, data);
-        let dataset = gyre_radar::open(data, &sequence.configuration(&[])?.dataset)?;
+        let resolved = sequence.configuration(&[])?;
+        let dataset = gyre_radar::open(data, &resolved.dataset)?;
+        let first = resolved.source.first.min(dataset.len());
+        let played = first..first.saturating_add(resolved.source.scans.unwrap_or(usize::MAX)).min(dataset.len());
         let configuration_file = configuration.map(Path::to_owned);
-        Ok(Self { role, data: data.to_owned(), configuration_file, sequence, runs, dataset })
+        Ok(Self { role, data: data.to_owned(), configuration_file, sequence, runs, played, dataset })
     }
 
     /// What it is called in tables.
     pub fn name(&self) -> String {
         let resolved = self.data.canonicalize().unwrap_or_else(|_| self.data.clone());
-        format!("{}: {}", self.role, resolved.file_name().unwrap_or_default().to_string_lossy())
+        resolved.file_name().unwrap_or_default().to_string_lossy().into_owned()
     }
 
-    /// Scans that it has.
+    /// Scans that its configuration plays.
     pub fn scans(&self) -> usize {
-        self.dataset.len()
+        self.played.len()
     }
 
     /// The first scan that can be read.
     pub fn first_scan(&mut self) -> Result<OwnedScan, Failure> {
-        self.scan_from(0)
+        self.scan_from(self.played.start)
     }
 
     /// The scan half-way through, or the next one that can be read.
     pub fn middle_scan(&mut self) -> Result<OwnedScan, Failure> {
-        self.scan_from(self.scans() / 2)
+        self.scan_from(self.played.start + self.scans() / 2)
     }
 
     fn scan_from(&mut self, first: usize) -> Result<OwnedScan, Failure> {
         let mut scan = OwnedScan::with_limits(self.dataset.limits());
-        let found = (first..self.scans()).any(|index| self.read(index, &mut scan));
+        let found = (first..self.played.end).any(|index| self.read(index, &mut scan));
         match found {
             true => Ok(scan),
             false => Err(format!("{}: no scan from number {first} on can be read", self.data.display()).into()),
@@ -102,9 +117,41 @@ impl Source {
         read.is_ok()
     }
 
-    /// Measures at most `most` scans, each with its motion since the one before it where that is known.
+    /// Measures at most `most` scans of the whole recording, and as many of each half.
     pub fn measure(
         &mut self,
+        config: MeterConfig,
+        most: usize,
+        searches: &Searches,
+    ) -> Result<(Measured, Aligned), Failure> {
+        let (whole, aligned) = self.measure_part(Part::Whole, config, most, searches)?;
+        let halves = match self.scans() {
+            ..LEAST_HALVED => None,
+            _ => Some([
+                self.measure_part(Part::FirstHalf, config, most, &searches.part(Part::FirstHalf))?.0,
+                self.measure_part(Part::SecondHalf, config, most, &searches.part(Part::SecondHalf))?.0,
+            ]),
+        };
+        Ok((Measured { whole, halves }, aligned))
+    }
+
+    fn measure_part(
+        &mut self,
+        part: Part,
+        config: MeterConfig,
+        most: usize,
+        searches: &Searches,
+    ) -> Result<(Recording, Aligned), Failure> {
+        let scans = part.of(self.played.clone());
+        let (statistics, aligned) = self.statistics(scans, config, most, searches)?;
+        let (plain, refined) = (searches.errors(&searches.plain), searches.errors(&searches.refined));
+        Ok((Recording { name: self.name(), statistics, plain, refined }, aligned))
+    }
+
+    /// Statistics of at most `most` of these scans, each with its motion since the one before it where that is known.
+    fn statistics(
+        &mut self,
+        scans: Range<usize>,
         config: MeterConfig,
         most: usize,
         searches: &Searches,
@@ -112,9 +159,9 @@ impl Source {
         let mut meter = Meter::new(config)?;
         let mut aligned = Aligned::default();
         let mut scan = OwnedScan::with_limits(self.dataset.limits());
-        for run in runs(self.scans(), most) {
+        for run in runs(scans.len(), most) {
             let mut before_ns = None;
-            for index in run {
+            for index in scans.start + run.start..scans.start + run.end {
                 if !self.read(index, &mut scan) {
                     before_ns = None;
                     continue;
@@ -130,6 +177,28 @@ impl Source {
     }
 }
 
+impl Part {
+    /// The scans of it.
+    fn of(self, scans: Range<usize>) -> Range<usize> {
+        let middle = scans.start + scans.len() / 2;
+        match self {
+            Self::Whole => scans,
+            Self::FirstHalf => scans.start..middle,
+            Self::SecondHalf => middle..scans.end,
+        }
+    }
+
+    /// The poses of it.
+    pub fn of_trajectory(self, trajectory: &Trajectory) -> Trajectory {
+        let poses = self.of(0..trajectory.len());
+        let stamps = trajectory.stamp_ns.as_ref();
+        Trajectory {
+            stamp_ns: stamps.map(|stamps| stamps[poses.clone()].to_vec()),
+            poses: trajectory.poses[poses].to_vec(),
+        }
+    }
+}
+
 impl Searches {
     /// The motion from one time to another, by the truth if it can, else by the refined odometry.
     fn motion(&self, from_ns: i64, to_ns: i64, aligned: &mut Aligned) -> Option<Isometry2<f64>> {
@@ -138,7 +207,7 @@ impl Searches {
             aligned.by_truth += 1;
             return Some(motion);
         }
-        let motion = by(&self.odometry)?;
+        let motion = by(&self.refined)?;
         aligned.by_odometry += 1;
         Some(motion)
     }
