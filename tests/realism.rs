@@ -44,7 +44,8 @@ fn a_recording_is_closer_to_itself_than_another_is_in_all_that_is_measured() {
     let folder = folder();
     let small = recording::small().to_str().unwrap();
     let configs = ["--sim-config", "small.toml", "--real-config", "small.toml", "--between-config", "small.toml"];
-    let ended = realism(folder.path(), &[&[small, small, "--between", "other"], &configs[..]].concat());
+    let arguments = [small, small, "--between", "other", "--scans", "8"];
+    let ended = realism(folder.path(), &[&arguments, &configs[..]].concat());
     ended.succeeded();
     let report = report(folder.path());
     for row in rows(&report).iter().filter(|row| !row["values"][0].is_null()) {
@@ -63,7 +64,7 @@ fn a_recording_is_closer_to_itself_than_another_is_in_all_that_is_measured() {
         assert!(folder.path().join(format!("out/{role}{kind}")).is_file(), "{role}{kind}");
     }
     let subject = |index: usize| &report["subjects"][index];
-    assert_eq!(subject(0)["aligned"]["by_truth"], recording::SCANS - 1);
+    assert_eq!(subject(0)["aligned"]["by_truth"], 7);
     assert_eq!(subject(2)["measured"]["whole"]["statistics"]["scans"], 8);
 }
 
@@ -124,7 +125,8 @@ fn one_drive_is_closer_to_itself_than_to_another() {
     part("first.toml", "scans = 233");
     part("second.toml", "first = 233");
     let [radiate, oxford] = [&radiate, &oxford].map(|path| path.to_str().unwrap());
-    let configs = ["--sim-config", "first.toml", "--real-config", "second.toml", "--search-scans", "0"];
+    let configs =
+        ["--sim-config", "first.toml", "--real-config", "second.toml", "--search-scans", "0", "--scans", "32"];
     let ended = realism(folder.path(), &[&[radiate, radiate, "--between", oxford], &configs[..]].concat());
     ended.succeeded();
     let report = report(folder.path());

@@ -21,8 +21,8 @@ pub struct Curve {
 impl Curve {
     /// The lag at which it first falls to a half, on the straight line between its values; `None` where it never does.
     ///
-    /// A half rather than 1/e: streets and streaks give the curve a long flat tail, on which 1/e lies, and where it is crossed there
-    /// differs from one half of a drive to the other by a third.
+    /// A half rather than 1/e: streets and streaks give the curve a long flat tail, and there 1/e lies. In range it is crossed
+    /// at 2.5 to 4.4 m on real drives that have 1.2 to 1.4 m at a half.
     pub fn length(&self) -> Option<f64> {
         let level = 0.5;
         let after = self.values.iter().position(|value| *value <= level)?;
@@ -108,9 +108,10 @@ fn dot(a: &[u8], b: &[u8]) -> u64 {
 /// The same of few enough for the sum to fit.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 fn dot_part(a: &[u8], b: &[u8]) -> i32 {
-    let mut sum = 0;
+    let mut sum = 0i32;
     for (a, b) in a.iter().zip(b) {
-        sum += i32::from(*a) * i32::from(*b);
+        // Wrapping, for development builds check every sum, and then no two are added at once.
+        sum = sum.wrapping_add(i32::from(*a) * i32::from(*b));
     }
     sum
 }

@@ -82,8 +82,10 @@ impl Meter {
     /// Measures a scan. `motion` is its pose in the frame of the scan added before it, if that is the scan before it in the recording
     /// and the motion is known.
     ///
+    /// A motion that no sensor makes is a wrong one: the scan is then not compared.
+    ///
     /// # Errors
-    /// A scan that contradicts itself counts nothing; one with an impossible motion is only not compared.
+    /// A scan that contradicts itself; it counts nothing.
     pub fn add(&mut self, scan: &PolarScan<'_>, motion: Option<&Isometry2<f64>>) -> Result<(), MeterError> {
         self.before.resample(scan)?;
         std::mem::swap(&mut self.now, &mut self.before);
@@ -102,7 +104,10 @@ impl Meter {
         self.streaks.add(&scan);
         self.scans += 1;
         match motion {
-            Some(motion) if self.scans > 1 => Ok(self.change.add(&self.before.scan(), &scan, motion)?),
+            Some(motion) if self.scans > 1 => match self.change.add(&self.before.scan(), &scan, motion) {
+                Err(RasterError::Twist { .. }) => Ok(()),
+                compared => Ok(compared?),
+            },
             _ => Ok(()),
         }
     }

@@ -6,7 +6,7 @@ mod common;
 
 use common::*;
 use gyre_radar::OwnedScan;
-use gyre_realism::{ChangeMeter, Curve};
+use gyre_realism::{ChangeMeter, Curve, Meter};
 use nalgebra::{Isometry2, Point2, Vector2};
 use proptest::prelude::*;
 
@@ -124,6 +124,18 @@ fn a_drive_is_undone_by_its_motion_and_by_no_other() {
         let wrong = change(&one, &two, &wrong);
         assert!(wrong.correlation < 0.4 && wrong.unmatched_share > 0.2, "{wrong:?}");
     }
+}
+
+#[test]
+fn a_motion_that_no_sensor_makes_is_not_compared() {
+    let standing = |_: f64| Isometry2::identity();
+    let mut meter = Meter::new(CONFIG).unwrap();
+    for index in 0..3 {
+        let motion = Isometry2::new(Vector2::new(if index == 1 { f64::NAN } else { 0.0 }, 0.0), 0.0);
+        meter.add(&posts(&town(3), index, standing).view(), Some(&motion)).unwrap();
+    }
+    let statistics = meter.finish().unwrap();
+    assert_eq!((statistics.scans, statistics.change.unwrap().pairs), (3, 1));
 }
 
 #[test]

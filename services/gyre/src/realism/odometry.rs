@@ -42,15 +42,10 @@ impl Searches {
         Ok(Self { truth, plain, refined })
     }
 
-    /// What both keep in a part of their time.
-    pub fn part(&self, part: Part) -> Self {
-        let of = |trajectory: &Option<Trajectory>| trajectory.as_ref().map(|trajectory| part.of_trajectory(trajectory));
-        Self { truth: self.truth.clone(), plain: of(&self.plain), refined: of(&self.refined) }
-    }
-
-    /// Errors of a trajectory that was found; `None` without truth that fits.
-    pub fn errors(&self, found: &Option<Trajectory>) -> Option<SearchErrors> {
-        let judged = judge(found.as_ref()?, self.truth.as_ref()?, Options::default())
+    /// Errors of a part of a trajectory that was found; `None` without truth that fits.
+    pub fn errors(&self, found: &Option<Trajectory>, part: Part) -> Option<SearchErrors> {
+        let found = part.of_trajectory(found.as_ref()?);
+        let judged = judge(&found, self.truth.as_ref()?, Options::default())
             .inspect_err(|error| print::note(format_args!("not compared with the truth: {error}")))
             .ok()?;
         let rpe = judged.rpe.as_ref()?;

@@ -128,8 +128,8 @@ impl Source {
         let halves = match self.scans() {
             ..LEAST_HALVED => None,
             _ => Some([
-                self.measure_part(Part::FirstHalf, config, most, &searches.part(Part::FirstHalf))?.0,
-                self.measure_part(Part::SecondHalf, config, most, &searches.part(Part::SecondHalf))?.0,
+                self.measure_part(Part::FirstHalf, config, most, searches)?.0,
+                self.measure_part(Part::SecondHalf, config, most, searches)?.0,
             ]),
         };
         Ok((Measured { whole, halves }, aligned))
@@ -144,7 +144,7 @@ impl Source {
     ) -> Result<(Recording, Aligned), Failure> {
         let scans = part.of(self.played.clone());
         let (statistics, aligned) = self.statistics(scans, config, most, searches)?;
-        let (plain, refined) = (searches.errors(&searches.plain), searches.errors(&searches.refined));
+        let (plain, refined) = (searches.errors(&searches.plain, part), searches.errors(&searches.refined, part));
         Ok((Recording { name: self.name(), statistics, plain, refined }, aligned))
     }
 
@@ -252,10 +252,11 @@ mod tests {
 
     #[test]
     fn runs_cover_a_short_recording_and_spread_over_a_long_one() {
-        assert_eq!(runs(11, 64), [0..11]);
-        assert_eq!(runs(100, 16), [0..8, 92..100]);
-        assert_eq!(runs(100, 8), [0..8]);
-        assert_eq!(runs(100, 3), [0..3]);
+        let ends = |scans, most| runs(scans, most).iter().map(|run| (run.start, run.end)).collect::<Vec<_>>();
+        assert_eq!(ends(11, 64), [(0, 11)]);
+        assert_eq!(ends(100, 16), [(0, 8), (92, 100)]);
+        assert_eq!(ends(100, 8), [(0, 8)]);
+        assert_eq!(ends(100, 3), [(0, 3)]);
         let spread = runs(466, 64);
         assert_eq!((spread.len(), spread[0].clone(), spread[7].clone()), (8, 0..8, 458..466));
         assert!(spread.windows(2).all(|pair| pair[0].end <= pair[1].start));

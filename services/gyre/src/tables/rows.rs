@@ -147,6 +147,12 @@ mod tests {
     }
 
     #[test]
+    fn the_rows_with_names_of_their_own_are_those_meant() {
+        assert_eq!((PLAIN.name, SHIPPED.name), ("f-raw, line 14", "Gyre"));
+        assert!(SHIPPED.changes().is_empty());
+    }
+
+    #[test]
     fn every_row_has_a_folder_of_its_own() {
         let folders: BTreeSet<String> = ROWS.iter().map(Row::folder).collect();
         assert_eq!(folders.len(), ROWS.len());
