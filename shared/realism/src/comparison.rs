@@ -46,6 +46,15 @@ pub struct Row {
     pub closer: Option<bool>,
 }
 
+impl Row {
+    /// Whether the simulated recording is no farther from the real one than halves of one real recording are from each other: two
+    /// real recordings may be closer still, by chance.
+    pub fn is_within_chance(&self) -> bool {
+        let chance = [self.within_real, self.within_other].into_iter().flatten().reduce(f64::max);
+        self.sim_real.zip(chance).is_some_and(|(distance, chance)| distance <= chance)
+    }
+}
+
 /// Compares `sim` with `real`, and `real` with another real recording.
 pub fn compare(sim: &Measured, real: &Measured, other: Option<&Measured>) -> Comparison {
     let row = |statistic: &Statistic| {

@@ -68,13 +68,14 @@ fn distances_have_the_units_that_they_name() {
 fn the_nearer_recording_is_closer_and_what_is_not_known_is_not_judged() {
     let (real, mut near, far) = (recording(1, 0, 0.1), recording(2, 2, 0.11), recording(3, 40, 0.5));
     near.plain = None;
-    let halves = Some([recording(1, 0, 0.1), recording(1, 1, 0.1)]);
+    let halves = Some([recording(1, 0, 0.1), recording(1, 1, 0.2)]);
     let real = Measured { whole: real, halves };
     let comparison = compare(&whole(near), &real, Some(&whole(far)));
     let row = |name: &str| comparison.rows.iter().find(|row| row.statistic == name).unwrap();
     assert_eq!(row("histogram of power").closer, Some(true));
     let within = row("histogram of power").within_real.unwrap();
     assert!((within - 1.0).abs() < 1e-9 && row("histogram of power").within_other.is_none(), "{within}");
+    assert!(!row("histogram of power").is_within_chance() && row("next scan: correlation").is_within_chance());
     assert_eq!(row("refined search: translation of a motion").closer, Some(true));
     let plain = row("plain search: translation of a motion");
     assert_eq!((plain.closer, plain.sim_real, &plain.values[0]), (None, None, &None));

@@ -20,7 +20,8 @@ pub fn of(report: &Report) -> String {
     let _ = writeln!(
         text,
         "Powers averaged over {:.4} m of range up to {:.1} m, the coarsest and the shortest of the recordings'; saturation and levels \
-         in the sensors' own bins; consecutive scans compared in cells of {} m; `within` is between a recording's halves.\n",
+         in the sensors' own bins; consecutive scans compared in cells of {} m; `within` is between a recording's halves, \
+         and what is no more than that is chance.\n",
         grid.resolution_m,
         grid.range_m(),
         report.cell_m
@@ -58,7 +59,12 @@ fn cells(line: &Row, recordings: usize) -> Vec<String> {
     let mut cells: Vec<String> = std::iter::once(line.statistic.to_owned()).chain(values).collect();
     cells.extend([line.distance.to_owned(), number(line.within_real), number(line.sim_real)]);
     if recordings > 2 {
-        let verdict = line.closer.map_or("-", |closer| if closer { "closer" } else { "farther" });
+        let verdict = match line.closer {
+            None => "-",
+            Some(true) => "closer",
+            Some(false) if line.is_within_chance() => "farther, within chance",
+            Some(false) => "farther",
+        };
         cells.extend([number(line.real_other), number(line.within_other), verdict.to_owned()]);
     }
     cells
