@@ -13,7 +13,7 @@ const SHARES: [f64; 7] = [0.1, 0.25, 0.5, 0.75, 0.9, 0.99, 0.999];
 /// Lowest powers that are listed.
 const LOWEST_LEVELS: usize = 12;
 
-/// The comparison, then what each recording is like.
+/// What each recording is like, then how they compare.
 pub fn of(report: &Report) -> String {
     let mut text = String::from("# Realism\n\n");
     let grid = report.grid;
@@ -26,12 +26,13 @@ pub fn of(report: &Report) -> String {
         grid.range_m(),
         report.cell_m
     );
-    compared(&mut text, report);
     characters(&mut text, report);
+    compared(&mut text, report);
     text
 }
 
 fn compared(text: &mut String, report: &Report) {
+    let _ = writeln!(text, "\n## How they compare\n");
     let names = names(report);
     let judged = report.subjects.len() > 2;
     let mut headings: Vec<String> = std::iter::once("statistic".to_owned()).chain(names).collect();
@@ -72,7 +73,7 @@ fn cells(line: &Row, recordings: usize) -> Vec<String> {
 
 /// What each recording is like: what a sensor's profile can be set by.
 fn characters(text: &mut String, report: &Report) {
-    let _ = writeln!(text, "\n## What each is like\n");
+    let _ = writeln!(text, "## What each is like\n");
     row(text, &std::iter::once(String::new()).chain(names(report)).collect::<Vec<_>>());
     row(text, &vec!["---".to_owned(); report.subjects.len() + 1]);
     let recordings = || report.subjects.iter().map(|subject| &subject.measured.whole);
