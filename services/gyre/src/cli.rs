@@ -33,6 +33,8 @@ pub enum Command {
     Evaluate(EvaluateArguments),
     /// Print the papers' tables for this machine: times of the searches, and the accuracy that they reach.
     Tables(TablesArguments),
+    /// Measure how like real scans simulated ones are.
+    Realism(RealismArguments),
     /// Write a simulated recording, or go on with one.
     Simulate(SimulateArguments),
     /// Write a copy of a recording with some scans spoilt, to see what an odometry makes of them.
@@ -134,6 +136,38 @@ pub struct TablesArguments {
     /// The peer's program.
     #[arg(long, requires = "peer")]
     pub peer_script: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct RealismArguments {
+    /// The simulated recording's folder.
+    pub sim: PathBuf,
+    /// The real recording's folder.
+    pub real: PathBuf,
+    /// Another real recording: says of each statistic whether SIM is closer to REAL than this one is.
+    #[arg(long, value_name = "OTHER")]
+    pub between: Option<PathBuf>,
+    /// SIM's configuration. Default, for each recording: the one that ships for its format.
+    #[arg(long, value_name = "FILE")]
+    pub sim_config: Option<PathBuf>,
+    /// REAL's configuration.
+    #[arg(long, value_name = "FILE")]
+    pub real_config: Option<PathBuf>,
+    /// OTHER's configuration.
+    #[arg(long, value_name = "FILE", requires = "between")]
+    pub between_config: Option<PathBuf>,
+    /// Where realism.md, realism.json, plots, pictures and the odometries' runs go.
+    #[arg(long, default_value = "out/realism")]
+    pub out: PathBuf,
+    /// Scans whose statistics are taken, at most: runs of consecutive ones, evenly spread over the recording.
+    #[arg(long, default_value = "64")]
+    pub scans: NonZeroUsize,
+    /// Scans that the odometries are run on, at most, from the first on; 0: run none.
+    #[arg(long, default_value = "512")]
+    pub search_scans: usize,
+    /// Power above which something is there. Default: masking's.
+    #[arg(long)]
+    pub threshold: Option<u8>,
 }
 
 #[derive(Debug, Args)]

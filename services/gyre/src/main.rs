@@ -13,6 +13,7 @@ mod odometry;
 mod preflight;
 mod print;
 mod progress;
+mod realism;
 mod results;
 mod run;
 mod simulate;
@@ -37,6 +38,7 @@ fn main() -> ExitCode {
         Command::Inspect(arguments) => inspect::inspect(&arguments),
         Command::Evaluate(arguments) => evaluate::evaluate(&arguments),
         Command::Tables(arguments) => tables::tables(&arguments),
+        Command::Realism(arguments) => realism::realism(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Spoil(arguments) => spoil::spoil(&arguments),
     };

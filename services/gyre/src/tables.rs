@@ -6,11 +6,11 @@
 //! - [`variations`]: what single changes do to the shipped configuration;
 //! - [`markdown`]: the tables as text.
 
-mod accuracy;
+pub(crate) mod accuracy;
 mod markdown;
 mod papers;
 mod peer;
-mod rows;
+pub(crate) mod rows;
 mod times;
 mod variations;
 
@@ -92,7 +92,7 @@ pub fn tables(arguments: &TablesArguments) -> Result<ExitCode, Failure> {
 
 /// A sequence that was named on the command line.
 #[derive(Debug)]
-struct Sequence {
+pub(crate) struct Sequence {
     /// The configuration's and the folder's names: the results' folder.
     name: String,
     file: PathBuf,
@@ -119,7 +119,7 @@ fn sequences(arguments: &TablesArguments) -> Result<Vec<Sequence>, Failure> {
 }
 
 impl Sequence {
-    fn new(file: &Path, data: &Path) -> Self {
+    pub(crate) fn new(file: &Path, data: &Path) -> Self {
         // `recordings/.` and the like have names only once they are resolved.
         let resolved = data.canonicalize().unwrap_or_else(|_| data.to_owned());
         let folder = resolved.file_name().unwrap_or_default().to_string_lossy();
@@ -128,7 +128,7 @@ impl Sequence {
     }
 
     /// Its configuration with a row's changes.
-    fn configuration(&self, changes: &[String]) -> Result<Configuration, Failure> {
+    pub(crate) fn configuration(&self, changes: &[String]) -> Result<Configuration, Failure> {
         Ok(Configuration::read(&self.file, changes)?)
     }
 

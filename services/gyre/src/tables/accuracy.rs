@@ -91,7 +91,7 @@ pub fn measure(sequence: &Sequence, out: &Path) -> Result<Accuracies, Failure> {
 }
 
 /// Runs a sequence with changes as a person would, by `gyre run`, and reads what it left.
-pub(super) fn run(sequence: &Sequence, name: &str, changes: &[String], out: &Path) -> Result<Accuracy, Failure> {
+pub(crate) fn run(sequence: &Sequence, name: &str, changes: &[String], out: &Path) -> Result<Accuracy, Failure> {
     let n = sequence.configuration(changes)?.raster.n;
     let arguments = sequence.run_arguments(changes, out);
     print::note(format_args!("{}: {name}", sequence.name));

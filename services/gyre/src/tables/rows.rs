@@ -26,6 +26,12 @@ pub static ROWS: [Row; 7] = [
     Row::of_gyre("Gyre", &[]),
 ];
 
+/// The row of Fast-MbyM's own form.
+pub static PLAIN: &Row = &ROWS[1];
+
+/// The row of a sequence's own configuration.
+pub static SHIPPED: &Row = &ROWS[6];
+
 /// Two scans and no more: the motion is the search's.
 const SEARCH_ALONE: &[&str] = &["refinement.kind=none"];
 
@@ -138,6 +144,12 @@ mod tests {
             radiate.dataset = of_file.dataset;
             assert_eq!(radiate, of_file, "{name}");
         }
+    }
+
+    #[test]
+    fn the_rows_with_names_of_their_own_are_those_meant() {
+        assert_eq!((PLAIN.name, SHIPPED.name), ("f-raw, line 14", "Gyre"));
+        assert!(SHIPPED.changes().is_empty());
     }
 
     #[test]

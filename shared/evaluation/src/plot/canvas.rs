@@ -43,6 +43,9 @@ pub fn line(colour: RGBColor, width: f64) -> ShapeStyle {
 }
 
 /// Draws on a white document of `size` px and returns it.
+///
+/// # Errors
+/// [`PlotError::Draw`], or what `draw` returns.
 pub fn document(size: (u32, u32), draw: impl FnOnce(&Area<'_>) -> Result<(), PlotError>) -> Result<String, PlotError> {
     let fine = (size.0 * FINENESS, size.1 * FINENESS);
     let mut svg = String::new();
@@ -59,13 +62,16 @@ pub fn document(size: (u32, u32), draw: impl FnOnce(&Area<'_>) -> Result<(), Plo
 }
 
 /// One entry of a legend.
-pub struct Entry {
-    pub label: &'static str,
+pub struct Entry<'a> {
+    /// What it says.
+    pub label: &'a str,
+    /// What stands before it.
     pub symbol: Symbol,
 }
 
 /// How a legend shows its entry.
 pub enum Symbol {
+    /// A stretch of a line.
     Line(ShapeStyle),
     /// A filled area.
     Area(RGBColor),
@@ -74,7 +80,10 @@ pub enum Symbol {
 }
 
 /// Title, caption below it, legend on the right.
-pub fn header(area: &Area<'_>, title: &str, caption: &str, legend: &[Entry]) -> Result<(), PlotError> {
+///
+/// # Errors
+/// [`PlotError::Draw`].
+pub fn header(area: &Area<'_>, title: &str, caption: &str, legend: &[Entry<'_>]) -> Result<(), PlotError> {
     let at = |x: f64, y: f64| (px(x) as i32, px(y) as i32);
     area.draw(&Text::new(title.to_owned(), at(24.0, 18.0), font(20.0, INK))).map_err(drawing)?;
     area.draw(&Text::new(caption.to_owned(), at(24.0, 48.0), font(14.0, QUIET))).map_err(drawing)?;
@@ -88,7 +97,7 @@ pub fn header(area: &Area<'_>, title: &str, caption: &str, legend: &[Entry]) -> 
             Symbol::Dot => area.draw(&dot(at(x + 18.0, 28.0))),
         }
         .map_err(drawing)?;
-        area.draw(&Text::new(entry.label, at(x + 33.0, 28.0), label.clone())).map_err(drawing)?;
+        area.draw(&Text::new(entry.label.to_owned(), at(x + 33.0, 28.0), label.clone())).map_err(drawing)?;
         x += entry_width(entry);
     }
     Ok(())
@@ -107,7 +116,7 @@ pub fn number(value: &f64) -> String {
 }
 
 /// Room for an entry, px; a letter of a 14 px sans-serif font is about half as wide as it is high.
-fn entry_width(entry: &Entry) -> f64 {
+fn entry_width(entry: &Entry<'_>) -> f64 {
     33.0 + 7.6 * entry.label.len() as f64 + 14.0
 }
 

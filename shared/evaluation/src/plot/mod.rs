@@ -3,7 +3,7 @@
 //! Text stays text (drawn by the viewer's sans-serif font): nothing needs fonts when it is built or run.
 
 mod bands;
-mod canvas;
+pub mod canvas;
 mod errors;
 mod trajectory;
 

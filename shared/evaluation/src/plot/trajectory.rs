@@ -61,7 +61,7 @@ impl Scene {
         }
     }
 
-    fn legend(&self) -> Vec<Entry> {
+    fn legend(&self) -> Vec<Entry<'static>> {
         let mut legend = vec![Entry { label: "estimate", symbol: Symbol::Line(line(ESTIMATE, 2.0)) }];
         if self.truth.is_some() {
             legend.insert(0, Entry { label: "truth", symbol: Symbol::Line(line(TRUTH, 4.0)) });

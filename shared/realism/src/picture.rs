@@ -1,0 +1,68 @@
+//! Scans for the eye.
+
+use std::{fs::File, io::BufWriter, path::Path};
+
+use gyre_radar::{PolarScan, RasterConfig, RasterError, Rasteriser};
+use thiserror::Error;
+
+/// A grey picture: powers as they are, 0 black.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Picture {
+    /// Pixels a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Row by row.
+    pub pixels: Vec<u8>,
+}
+
+/// Why a picture was not written.
+#[derive(Debug, Error)]
+#[error("cannot write the picture {path}: {source}", path = path.display())]
+pub struct PictureError {
+    /// The file.
+    path: std::path::PathBuf,
+    /// Why.
+    source: png::EncodingError,
+}
+
+impl Picture {
+    /// A scan from above, its whole range: ahead is up, left is left. Pixels of `cell_m`, so that several have the same scale.
+    ///
+    /// # Errors
+    /// A scan that contradicts itself, a scale at which it would have more than 4096 pixels a side.
+    pub fn from_above(scan: &PolarScan<'_>, cell_m: f32) -> Result<Self, RasterError> {
+        let range_m = scan.geometry.bins as f32 * scan.geometry.range_resolution_m;
+        let n = 2 * (range_m / cell_m) as usize + 1;
+        let config = RasterConfig { n, cell_m, minimum_range_m: 0.0, ..RasterConfig::default() };
+        let mut rasteriser = Rasteriser::new(&config)?;
+        let mut cells = vec![0.0; n * n];
+        rasteriser.rasterise(scan, 0, None, &mut cells)?;
+        Ok(Self { width: n, height: n, pixels: cells.into_iter().map(|power| power.round() as u8).collect() })
+    }
+
+    /// A scan as it was measured: a row an azimuth, range to the right.
+    pub fn as_measured(scan: &PolarScan<'_>) -> Self {
+        let height = scan.geometry.azimuths;
+        let pixels = (0..height).flat_map(|azimuth| scan.row(azimuth)).copied().collect();
+        Self { width: scan.geometry.bins, height, pixels }
+    }
+
+    /// Writes it as PNG.
+    ///
+    /// # Errors
+    /// [`PictureError`] names the file.
+    pub fn write(&self, path: &Path) -> Result<(), PictureError> {
+        self.encode(path).map_err(|source| PictureError { path: path.to_owned(), source })
+    }
+
+    fn encode(&self, path: &Path) -> Result<(), png::EncodingError> {
+        let file = BufWriter::new(File::create(path)?);
+        let mut encoder = png::Encoder::new(file, self.width as u32, self.height as u32);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_depth(png::BitDepth::Eight);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&self.pixels)?;
+        writer.finish()
+    }
+}
