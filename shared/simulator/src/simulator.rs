@@ -7,7 +7,7 @@ use nalgebra::Isometry2;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::profile::{Profile, Sampling};
+use crate::profile::{Chirp, Profile, Sampling};
 use crate::sensor::{self, Sensor, SweepTime};
 use crate::streets::Streets;
 use crate::traffic::Traffic;
@@ -97,8 +97,10 @@ impl Simulator {
 
     /// How the radar samples what it sees.
     pub fn sampling(&self) -> Sampling {
-        let doppler_s = self.doppler_shift_s;
-        Sampling { range_offset_m: 0.0, period_us: self.period_us, doppler_s, ..Profile::default().sampling() }
+        let (period_us, doppler_s) = (self.period_us, self.doppler_shift_s);
+        // What approaches is measured too far.
+        let chirp = Chirp::Falling;
+        Sampling { range_offset_m: 0.0, period_us, chirp, doppler_s, ..Profile::default().sampling() }
     }
 
     /// Measures scan `index`: the same bytes whenever and on whatever thread it is called.
