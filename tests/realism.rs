@@ -18,7 +18,12 @@ const PICTURES: [&str; 2] = [".png", "-as-measured.png"];
 /// A folder with `other`, a drive through another town, and the configuration that simulated recordings are read with.
 fn folder() -> TempDir {
     let folder = tempfile::Builder::new().prefix("gyre-realism-").tempdir().unwrap();
-    let config = SimulationConfig { scans: 8, seed: 7, traffic: gyre_simulator::traffic::TrafficConfig::none(), ..SimulationConfig::default() };
+    let config = SimulationConfig {
+        scans: 8,
+        seed: 7,
+        traffic: gyre_simulator::traffic::TrafficConfig::none(),
+        ..SimulationConfig::default()
+    };
     write_dataset(&config, &folder.path().join("other"), &mut |_, _| ()).unwrap();
     fs::write(folder.path().join("small.toml"), "[raster]\nn = 127\ncell_m = 0.8\n").unwrap();
     folder

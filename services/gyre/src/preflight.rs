@@ -56,7 +56,7 @@ pub struct Preflight {
 /// Looks at the dataset and at the machine.
 pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure> {
     let source = &configuration.source;
-    let (dataset, truth) = open(configuration)?;
+    let Played { dataset, truth } = open(configuration)?;
     let scans = dataset.len().saturating_sub(source.first).min(source.scans.unwrap_or(usize::MAX));
     if scans < 2 {
         return Err(PreflightError::TooFew { path: configuration.data(), scans }.into());
@@ -73,17 +73,22 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
     Ok(Preflight { scans, window, limits, footprint, truth })
 }
 
-/// What is to be played, and the truth about it where no file says it.
-fn open(configuration: &Configuration) -> Result<(Box<dyn Dataset>, Option<Vec<u8>>), crate::Failure> {
+/// What is to be played.
+struct Played {
+    dataset: Box<dyn Dataset>,
+    truth: Option<Vec<u8>>,
+}
+
+fn open(configuration: &Configuration) -> Result<Played, crate::Failure> {
     let (data, options) = (&configuration.source.data, &configuration.dataset);
     if let Some(simulation) = configuration.streamed() {
         let recording = Recording::new(simulation)?;
-        let truth = recording.ground_truth_tum();
-        return Ok((gyre_radar_replay::open_simulation(recording, options)?, Some(truth)));
+        let truth = Some(recording.ground_truth_tum());
+        return Ok(Played { dataset: gyre_radar_replay::open_simulation(recording, options)?, truth });
     }
     match data.as_os_str().is_empty() {
         true => Err(PreflightError::NoData.into()),
-        false => Ok((gyre_radar::open(data, options)?, None)),
+        false => Ok(Played { dataset: gyre_radar::open(data, options)?, truth: None }),
     }
 }
 

@@ -15,6 +15,9 @@ use render_ahead::RenderAhead;
 /// The stage's name.
 pub const NAME: &str = "radar-replay";
 
+/// A simulation that fell behind by less kept up, seconds.
+const WORTH_SAYING_S: f64 = 0.01;
+
 /// Runs the stage until it is told to stop.
 pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
     let config: SourceConfig = launch.section("source")?;
@@ -31,8 +34,9 @@ pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
     let dataset = dataset.map_err(|error| input(&error))?;
     let mut replay = Replay { passes_by: simulation.is_none(), ..Replay::of(dataset, &config) };
     let statistics = source::run(launch, &mut replay)?;
-    if statistics.slipped_ns > 0 {
-        tracing::warn!(slipped_s = statistics.slipped_ns as f64 * 1e-9, "the simulation did not keep up with the rate");
+    let slipped_s = statistics.slipped_ns as f64 * 1e-9;
+    if slipped_s > WORTH_SAYING_S {
+        tracing::warn!(slipped_s, "the simulation did not keep up with the rate");
     }
     Ok(statistics)
 }
