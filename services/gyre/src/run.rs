@@ -122,7 +122,12 @@ fn resolve(arguments: &RunArguments, out: &Path) -> Result<Configuration, Failur
     if arguments.data.is_some() {
         configuration.simulation = None;
     }
-    if let Some(simulation) = &configuration.simulation {
+    if let Some(simulation) = &mut configuration.simulation {
+        if let Some(file) = &mut simulation.drive.file {
+            *file = file.canonicalize().unwrap_or_else(|_| file.clone());
+        }
+        // A simulated radar knows itself.
+        configuration.dataset = configuration.dataset.or(&simulation.dataset_options());
         configuration.source.data = match simulation.output.store {
             true => simulate::store(simulation, &out.join("recording"))?,
             false => PathBuf::new(),

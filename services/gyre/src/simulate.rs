@@ -15,9 +15,6 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::{Failure, cli::SimulateArguments, configuration::Configuration, print};
 
-/// The key of the file along which to drive.
-const TRAJECTORY_KEY: &str = "simulation.drive.file";
-
 /// Writes a simulated recording, or goes on with it.
 pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
     let overrides = overrides(arguments);
@@ -47,8 +44,9 @@ fn overrides(arguments: &SimulateArguments) -> Vec<String> {
     let scans = arguments.scans.map(|scans| format!("simulation.scans={scans}"));
     let seed = arguments.seed.map(|seed| format!("simulation.seed={seed}"));
     let format = arguments.format.map(|format| format!("simulation.output.format={format}"));
-    let trajectory = arguments.trajectory.as_ref().map(|file| format!("{TRAJECTORY_KEY}={}", quoted(file)));
-    arguments.set.iter().cloned().chain([scans, seed, format, trajectory].into_iter().flatten()).collect()
+    let file = arguments.trajectory.as_ref().map(|file| format!("simulation.drive.file={}", quoted(file)));
+    let kind = file.is_some().then(|| "simulation.drive.kind=file".to_owned());
+    arguments.set.iter().cloned().chain([scans, seed, format, kind, file].into_iter().flatten()).collect()
 }
 
 /// Writes the recording of a run to `out`, whatever an earlier run left there.

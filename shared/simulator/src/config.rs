@@ -1,10 +1,12 @@
 //! What to simulate.
 
+use gyre_radar::DatasetOptions;
 use serde::{Deserialize, Serialize};
 
 use crate::SimulatorError;
 use crate::drive::DriveConfig;
-use crate::output::OutputConfig;
+use crate::output::{OutputConfig, OutputFormat};
+use crate::profile::Chirp;
 use crate::sensor::{Effects, SensorConfig};
 use crate::town::TownConfig;
 use crate::traffic::TrafficConfig;
@@ -62,6 +64,24 @@ impl SimulationConfig {
         self.traffic.validate()?;
         self.sensor.validate()?;
         self.weather.iter().try_for_each(WeatherConfig::validate)
+    }
+
+    /// How a reader of its scans is to read them, so that ranges and angles come out as they were.
+    pub fn dataset_options(&self) -> DatasetOptions {
+        let sampling = self.sensor.sampling();
+        let doppler_s = match sampling.chirp {
+            Chirp::Falling => -sampling.doppler_s,
+            Chirp::Rising | Chirp::Alternating => sampling.doppler_s,
+        };
+        let with_encoder = self.output.format != Some(OutputFormat::Radiate);
+        DatasetOptions {
+            range_resolution_m: Some(sampling.range_resolution_m as f32),
+            range_offset_m: Some(sampling.range_offset_m as f32),
+            doppler_s: Some(doppler_s as f32),
+            azimuth_eccentricity_rad: Some(self.sensor.azimuth_eccentricity_rad as f32),
+            encoder_counts: with_encoder.then_some(sampling.encoder_counts),
+            ..DatasetOptions::default()
+        }
     }
 }
 

@@ -49,19 +49,7 @@ impl Recording {
 
     /// How a reader is to read it so that ranges and angles come out as they were: this is what the radar knows of itself.
     pub fn dataset_options(&self) -> DatasetOptions {
-        let sampling = self.simulator.sampling();
-        let doppler_s = match sampling.chirp {
-            Chirp::Falling => -sampling.doppler_s,
-            Chirp::Rising | Chirp::Alternating => sampling.doppler_s,
-        };
-        DatasetOptions {
-            format: Some(self.format()),
-            range_resolution_m: Some(sampling.range_resolution_m as f32),
-            range_offset_m: Some(sampling.range_offset_m as f32),
-            doppler_s: Some(doppler_s as f32),
-            encoder_counts: (self.output != OutputFormat::Radiate).then_some(sampling.encoder_counts),
-            ..DatasetOptions::default()
-        }
+        DatasetOptions { format: Some(self.format()), ..self.simulator.config().dataset_options() }
     }
 
     /// Scans.

@@ -135,6 +135,20 @@ impl DatasetOptions {
         Ok(())
     }
 
+    /// These options, and `other`'s where these say nothing.
+    #[must_use]
+    pub fn or(self, other: &Self) -> Self {
+        Self {
+            format: self.format.or(other.format),
+            range_resolution_m: self.range_resolution_m.or(other.range_resolution_m),
+            range_offset_m: self.range_offset_m.or(other.range_offset_m),
+            doppler_s: self.doppler_s.or(other.doppler_s),
+            azimuth_eccentricity_rad: self.azimuth_eccentricity_rad.or(other.azimuth_eccentricity_rad),
+            azimuth_source: self.azimuth_source.or(other.azimuth_source),
+            encoder_counts: self.encoder_counts.or(other.encoder_counts),
+        }
+    }
+
     /// Refuses what needs an encoder, for images that have none.
     pub(crate) fn check_without_encoder(&self, format: Format) -> Result<(), OpenError> {
         let options = Self { format: Some(format), ..*self };
