@@ -108,7 +108,7 @@ impl View<'_> {
             return 1.0;
         }
         let azimuth_rad = azimuth * self.stations.step_rad();
-        lit(scatterer.position, range_m, self.nodding.lift_rad(self.middle_s + from.time_s, azimuth_rad))
+        lit(scatterer.position, scatterer.cross_section_m2, range_m, self.nodding.lift_rad(self.middle_s + from.time_s, azimuth_rad))
     }
 
     /// Power received from 1 m2 at a range: the fourth power of range, and the receiver's gain, which rises with it.

@@ -11,11 +11,13 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 /// Height of the beam at half power, there and back, radians: 1.8 degrees one way, widened downwards.
-const BEAM_HEIGHT_RAD: f64 = 0.052;
+const BEAM_HEIGHT_RAD: f64 = 0.045;
 /// Heights of scatterers about the radar's, metres: this much up or down.
-const HEIGHT_M: f64 = 1.1;
+const HEIGHT_M: f64 = 1.6;
+/// Cross-section of what is half a spot and half an upright, square metres.
+const UPRIGHT_M2: f64 = 4.0;
 /// Nodding of a car on its springs, standard deviation, radians.
-const NODDING_RAD: f64 = 0.005;
+const NODDING_RAD: f64 = 0.008;
 /// Its frequencies, hertz.
 const NODDING_HZ: std::ops::Range<f64> = 0.7..2.2;
 /// Oscillations that it is made of, for each axis.
@@ -57,10 +59,13 @@ impl Nodding {
     }
 }
 
-/// Share of the power that a scatterer gets from a beam that points up by `lift_rad`.
-pub(super) fn lit(place: Point2<f64>, range_m: f64, lift_rad: f64) -> f64 {
+/// Share of the power that a scatterer gets from a beam that points up by `lift_rad`. What is strong stands upright (posts,
+/// corners) and is lit at some height in any case.
+pub(super) fn lit(place: Point2<f64>, cross_section_m2: f64, range_m: f64, lift_rad: f64) -> f64 {
     let off = (height_m(place) / range_m - lift_rad) / BEAM_HEIGHT_RAD;
-    (-4.0 * LN_2 * off * off).exp()
+    let spot = (-4.0 * LN_2 * off * off).exp();
+    let upright = cross_section_m2 / (cross_section_m2 + UPRIGHT_M2);
+    spot + (1.0 - spot) * upright
 }
 
 /// The height of what stands at a place, metres above the radar: as good as random, and always the same.
@@ -87,8 +92,8 @@ mod tests {
     #[test]
     fn a_beam_that_points_up_loses_what_is_far_and_keeps_what_is_high() {
         let place =
-            (0..10_000).map(|i| Point2::new(f64::from(i), 0.0)).find(|p| height_m(*p) > 1.03).unwrap_or_default();
-        assert!(lit(place, 1e4, 0.0) > 0.99 && lit(place, 1e4, 0.05) < 0.1);
-        assert!(lit(place, 21.0, 0.05) > 0.9 && lit(place, 10.0, 0.0) < 0.01);
+            (0..10_000).map(|i| Point2::new(f64::from(i), 0.0)).find(|p| height_m(*p) > 0.97 * HEIGHT_M).unwrap_or_default();
+        assert!(lit(place, 0.1, 1e4, 0.0) > 0.99 && lit(place, 0.1, 1e4, 0.05) < 0.1);
+        assert!(lit(place, 0.1, HEIGHT_M / 0.05, 0.05) > 0.9 && lit(place, 0.1, 10.0, 0.0) < 0.05);
     }
 }

@@ -18,9 +18,9 @@ const SKIRT_PEAK: f64 = 100.0;
 const SKIRT_WIDTH_M: f64 = 1.5;
 /// Echoes bounce on between houses: so much of an echo's power, falling exponentially over so many metres behind it. The first
 /// is what is behind a front (rooms, eaves, what stands close by), the second a whole street.
-const TAIL: [(f64, f64); 3] = [(1.0e-3, 1.5), (2.0e-5, 10.0), (5.0e-6, 50.0)];
+const TAIL: [(f64, f64); 3] = [(1.0e-3, 1.5), (1.2e-5, 10.0), (3.0e-6, 50.0)];
 /// How much that differs from one direction to the next, standard deviation, dB, and how wide a direction is.
-const LIVELINESS_DB: f64 = 10.0;
+const LIVELINESS_DB: f64 = 11.0;
 const LIVELY_AZIMUTHS: usize = 7;
 /// Spurious lines: range as a share of the farthest, and power in units of the floor there.
 const LINES: [(f64, f64); 4] = [(0.069, 0.5), (0.164, 0.6), (0.37, 0.9), (0.55, 0.7)];

@@ -32,7 +32,7 @@ pub fn normal(rng: &mut impl Rng) -> f64 {
 
 /// A log-normal number: `median`, times or divided by a spread given in decibels (one standard deviation).
 pub fn spread(rng: &mut impl Rng, median: f64, deviation_db: f64) -> f64 {
-    median * 10f64.powf(deviation_db * normal(rng) / 10.0)
+    median * 10f64.powf(1.35 * deviation_db * normal(rng) / 10.0)
 }
 
 /// Distances along a line with random gaps between `least` and `most`, beginning with such a gap, all below `end`.
