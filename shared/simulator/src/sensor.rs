@@ -175,7 +175,9 @@ impl Sensor {
     fn look_around(&mut self, scene: Scene<'_>, time: SweepTime, rng: &mut ChaCha8Rng) {
         let wobble_rad = if self.effects.encoder_wobble { self.config.azimuth_eccentricity_rad } else { 0.0 };
         let moving = self.effects.sweep_motion;
-        self.stations.follow(scene.trajectory, time, &self.sampling, moving, |azimuth| wobble_rad * azimuth.cos());
+        let error_rad = |azimuth_rad: f64| wobble_rad * azimuth_rad.cos();
+        let lift_rad = |time_s, azimuth_rad| self.nodding.lift_rad(time_s, azimuth_rad);
+        self.stations.follow(scene.trajectory, time, &self.sampling, moving, error_rad, lift_rad);
         let middle_s = time.trajectory_s(time.middle_us());
         let centre = self.stations.middle().position;
         let reach_m = self.sampling.reach_m();
@@ -190,8 +192,6 @@ impl Sensor {
             receiver: &self.receiver,
             air: &air,
             effects: &self.effects,
-            nodding: &self.nodding,
-            middle_s,
             reach_m,
         };
         self.echoes.clear();
@@ -200,11 +200,12 @@ impl Sensor {
         if self.effects.multipath {
             view.ghosts(scene.world, &mut self.echoes);
         }
+        // Always as many random numbers, so that no effect changes another's; those of bursts, which vary, come last.
+        let jitter_rad = if self.effects.encoder_wobble { ENCODER_JITTER_RAD } else { 0.0 };
+        self.jitter_rad.iter_mut().for_each(|jitter| *jitter = jitter_rad * rng.sample::<f64, _>(StandardNormal));
         let clutter = |range_m: f64| air.clutter_m2(range_m, view.receiver) * view.received(range_m);
         let (snow, interference) = (weather.snow_mm_h > 0.0, self.effects.interference);
         self.noise.begin_sweep(&self.sampling, &self.spectrum, interference, snow, clutter, rng);
-        let jitter_rad = if self.effects.encoder_wobble { ENCODER_JITTER_RAD } else { 0.0 };
-        self.jitter_rad.iter_mut().for_each(|jitter| *jitter = jitter_rad * rng.sample::<f64, _>(StandardNormal));
         self.light();
     }
 
@@ -323,7 +324,7 @@ impl Sensor {
             first_byte: METADATA_BYTES,
             range_resolution_m: range_resolution_m as f32,
             range_offset_m: range_offset_m as f32,
-            doppler_s: self.sampling.doppler_s as f32,
+            doppler_s: self.doppler_s(0) as f32,
             sense: Sense::Clockwise,
             stamp_ns: (time.start_us + time.stamp_us(azimuths - 1)) * 500,
         }

@@ -2,7 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Which of a real radar's effects are simulated. All are on by default; the gallery in the crate's folder shows each on and off.
+/// Which of a real radar's effects are simulated. All are on by default. `gallery/README.md` in the crate's folder shows each off
+/// and on, with its source.
+///
+/// Each has random numbers of its own: switching one changes nothing of the others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Effects {

@@ -86,7 +86,8 @@ mod tests {
 
     #[test]
     fn a_beam_that_points_up_loses_what_is_far_and_keeps_what_is_high() {
-        let place = (0..10_000).map(|i| Point2::new(f64::from(i), 0.0)).find(|p| height_m(*p) > 1.03).unwrap_or_default();
+        let place =
+            (0..10_000).map(|i| Point2::new(f64::from(i), 0.0)).find(|p| height_m(*p) > 1.03).unwrap_or_default();
         assert!(lit(place, 1e4, 0.0) > 0.99 && lit(place, 1e4, 0.05) < 0.1);
         assert!(lit(place, 21.0, 0.05) > 0.9 && lit(place, 10.0, 0.0) < 0.01);
     }

@@ -42,7 +42,6 @@ impl Skyline {
             self.starts.push(first);
             let azimuth = ray as f64 / RAYS as f64 - MARGIN as f64;
             let station = stations.at(azimuth.floor() as i64);
-            // A ray looks where the azimuths say, wherever the encoder's errors turn the beam.
             let turned = azimuth.fract().rem_euclid(1.0) * stations.step_rad();
             let way = Rotation2::new(-turned) * station.beam * reach_m;
             self.cast_ray(world, moving, station, way, reach_m);
