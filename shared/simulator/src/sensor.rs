@@ -28,6 +28,7 @@ pub mod spectrum;
 mod stations;
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use gyre_radar::scan::flag;
 use gyre_radar::{ScanSlot, Sense, SweepGeometry};
@@ -117,6 +118,8 @@ pub struct Sensor {
     stations: Stations,
     skyline: Skyline,
     echoes: Vec<Echo>,
+    /// The azimuths whose beams take in each echo.
+    spans: Vec<Range<usize>>,
     /// Echoes by azimuth: those of azimuth `a` are `lit[starts[a]..starts[a + 1]]`.
     starts: Vec<usize>,
     lit: Vec<u32>,
@@ -138,6 +141,7 @@ impl Sensor {
             stations: Stations::default(),
             skyline: Skyline::default(),
             echoes: Vec::new(),
+            spans: Vec::new(),
             starts: Vec::new(),
             lit: Vec::new(),
             jitter_rad: vec![0.0; sampling.azimuths],
@@ -219,28 +223,30 @@ impl Sensor {
             let (first, last) = ((echo.azimuth - reach).ceil(), (echo.azimuth + reach).floor());
             (first.max(0.0) as usize)..((last + 1.0).clamp(0.0, azimuths as f64) as usize)
         };
+        self.spans.clear();
+        self.spans.extend(self.echoes.iter().map(span));
         self.starts.clear();
         self.starts.resize(azimuths + 1, 0);
-        for echo in &self.echoes {
-            span(echo).for_each(|azimuth| self.starts[azimuth + 1] += 1);
+        self.spans.iter().cloned().flatten().for_each(|azimuth| self.starts[azimuth] += 1);
+        let mut end = 0;
+        for start in &mut self.starts {
+            end += *start;
+            *start = end;
         }
-        for azimuth in 0..azimuths {
-            self.starts[azimuth + 1] += self.starts[azimuth];
-        }
-        let mut next = self.starts.clone();
         self.lit.clear();
-        self.lit.resize(self.starts[azimuths], 0);
-        for (number, echo) in self.echoes.iter().enumerate() {
-            for azimuth in span(echo) {
-                self.lit[next[azimuth]] = number as u32;
-                next[azimuth] += 1;
+        self.lit.resize(end, 0);
+        // From the last one on, so that each azimuth's end comes down to its start.
+        for (number, span) in self.spans.iter().enumerate().rev() {
+            for azimuth in span.clone() {
+                self.starts[azimuth] -= 1;
+                self.lit[self.starts[azimuth]] = number as u32;
             }
         }
     }
 
     /// Fills the spectrum with what one azimuth receives.
     fn measure(&mut self, azimuth: usize, rng: &mut ChaCha8Rng) {
-        let station = *self.stations.at(azimuth as i64);
+        let station = *self.stations.at(azimuth as f64);
         let doppler_s = if self.effects.doppler { self.doppler_s(azimuth) } else { 0.0 };
         let wavelength_m = self.receiver.wavelength_m();
         self.spectrum.clear();

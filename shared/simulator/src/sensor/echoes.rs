@@ -72,7 +72,7 @@ impl View<'_> {
         }
         let place = |station: &Station| position + velocity * station.time_s;
         self.stations.passings(place, |azimuth| {
-            let station = self.stations.at(azimuth.round() as i64);
+            let station = self.stations.at(azimuth);
             if let Some(amplitude) = self.amplitude(scatterer, place(station), station, azimuth) {
                 echoes.push(Echo { position, velocity, amplitude, azimuth });
             }

@@ -44,7 +44,7 @@ impl View<'_> {
         self.stations.passings(
             |_: &Station| position,
             |azimuth| {
-                let station = self.stations.at(azimuth.round() as i64);
+                let station = self.stations.at(azimuth);
                 let way = position - station.position;
                 let Some(share) = crossing(station.position, way, wall) else { return };
                 let range_m = way.norm();

@@ -158,11 +158,12 @@ impl Noise {
     fn spread_echoes(&mut self, liveliness: f64) {
         self.raised.fill(0.0);
         for (from, &power) in self.echoes.iter().enumerate().filter(|(_, power)| **power > 0.0) {
-            for (to, raised) in self.raised.iter_mut().enumerate() {
-                *raised += power * self.skirt[from.abs_diff(to)];
+            let (before, behind) = self.raised.split_at_mut(from);
+            for (raised, skirt) in before.iter_mut().rev().zip(&self.skirt[1..]) {
+                *raised += power * skirt;
             }
-            for (raised, tail) in self.raised[from..].iter_mut().zip(&self.tail) {
-                *raised += liveliness * power * tail;
+            for ((raised, skirt), tail) in behind.iter_mut().zip(&self.skirt).zip(&self.tail) {
+                *raised += power * (skirt + liveliness * tail);
             }
         }
     }

@@ -75,15 +75,19 @@ impl Stations {
         }
     }
 
-    /// The sensor at an azimuth, `-MARGIN..azimuths + MARGIN`; the nearest one beyond.
-    pub fn at(&self, azimuth: i64) -> &Station {
-        let index = (azimuth + MARGIN as i64).clamp(0, self.all.len() as i64 - 1);
-        &self.all[index as usize]
+    /// The sensor at the azimuth nearest to this one, of `-MARGIN..azimuths + MARGIN`.
+    pub fn at(&self, azimuth: f64) -> &Station {
+        &self.all[self.index(azimuth)]
+    }
+
+    fn index(&self, azimuth: f64) -> usize {
+        // What is below zero becomes zero.
+        ((azimuth + MARGIN as f64 + 0.5) as usize).min(self.all.len() - 1)
     }
 
     /// The sensor at the middle of the sweep.
     pub fn middle(&self) -> &Station {
-        self.at(self.azimuths as i64 / 2)
+        self.at((self.azimuths / 2) as f64)
     }
 
     /// Azimuths of the sweep.
@@ -116,12 +120,12 @@ impl Stations {
 
     /// Goes to where the beam is expected to pass, looks again from there, and so on.
     fn passing(&self, guess: f64, place: &impl Fn(&Station) -> Point2<f64>) -> f64 {
-        let turn = self.azimuths as f64;
         let mut azimuth = guess;
         for _ in 0..4 {
-            let at = azimuth.round();
-            let seen = self.bearing(self.at(at as i64), place);
-            let next = seen + turn * ((at - seen) / turn).round();
+            let index = self.index(azimuth);
+            let station = &self.all[index];
+            let way = place(station) - station.position;
+            let next = index as f64 - MARGIN as f64 - angle(station.beam, way) / self.step_rad;
             if (next - azimuth).abs() < 0.05 {
                 return next;
             }
@@ -135,4 +139,11 @@ impl Stations {
         let way = place(station) - station.position;
         (station.heading_rad - way.y.atan2(way.x) - self.first_rad).rem_euclid(TAU) / self.step_rad
     }
+}
+
+/// Angle from one direction to another, radians counter-clockwise.
+fn angle(from: Vector2<f64>, to: Vector2<f64>) -> f64 {
+    let (across, along) = (from.perp(&to), from.dot(&to));
+    // The tangent of a small angle is the angle, and much faster.
+    if across.abs() < 0.1 * along { across / along } else { across.atan2(along) }
 }
