@@ -83,7 +83,7 @@ fn profiles() -> Result<Exhibit, SimulatorError> {
         ],
     )
     .words(
-        "A whole turn in the town, all effects on, up to 165 m or as far as the radar reaches (100 m for RADIATE's and K2Pi).",
+        "A whole turn in the town, all effects on but those that strike by chance, up to 165 m or as far as the radar reaches (100 m for RADIATE's and K2Pi).",
         "data sheets and recordings; Checchin et al. 2010 for K2Pi, whose floor is made up",
     ))
 }

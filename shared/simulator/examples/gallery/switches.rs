@@ -52,7 +52,7 @@ fn doppler() -> Exhibit {
     Exhibit::switched(("Doppler", "doppler"), &shot, &frame, |e| &mut e.doppler).words(
         "A ring of posts 30 m around a car at 25 m/s, azimuths from ahead (top) to the right, behind and the left: what it drives \
          towards reads 1 m too near, what it leaves as much too far. (All azimuths are measured from one place.)",
-        "Burnett, Schoellig and Barfoot 2021, Eq. 1; the factor is the radar's carrier over its sweep rate",
+        "Burnett, Schoellig and Barfoot 2021; the factor is the radar's carrier over its sweep rate",
     )
 }
 
@@ -73,7 +73,7 @@ fn encoder_wobble() -> Exhibit {
     Exhibit::switched(("Encoder wobble", "encoder_wobble"), &shot, &frame, |e| &mut e.encoder_wobble).words(
         "Posts behind the car, 30 azimuths of the sweep: the encoder's disc is 0.05 rad off its axis (far more than in any recording), \
          so all stand three azimuths from where they are; and its counts jitter.",
-        "the first harmonic found in real sweeps, which `dataset.azimuth_eccentricity_rad` undoes",
+        "the first harmonic of an encoder's error, 0.0025 rad on RADIATE's radar; `dataset.azimuth_eccentricity_rad` undoes it",
     )
 }
 
@@ -170,10 +170,10 @@ fn own_vehicle() -> Exhibit {
 }
 
 fn noise() -> Exhibit {
-    let shot = Shot::drawn(scenes::lattice(12.0, 90.0, 0.01));
-    let frame = Frame::map(95.0).shades(2.0, 54.0);
+    let shot = Shot::drawn(scenes::lattice(8.0, 56.0, 0.03));
+    let frame = Frame::map(60.0).shades(2.0, 50.0);
     Exhibit::switched(("Noise", "noise"), &shot, &frame, |e| &mut e.noise).words(
-        "Posts 12 m apart: receiver noise, and what ground and many-fold echoes leave everywhere, drown the faint ones.",
+        "Posts 8 m apart: receiver noise, and what ground and many-fold echoes leave everywhere, drown the faint ones.",
         "powers of azimuths in which nothing stands, in Oxford's, RADIATE's and Boreas-RT's scans",
     )
 }
@@ -188,7 +188,7 @@ fn spurious_lines() -> Exhibit {
     let pictures = vec![("off", picture(false)), ("on", picture(true))];
     Exhibit::of("Spurious lines", pictures).switch("spurious_lines").words(
         "The mean of 16 scans of an empty place, 50 to 70 m: clocks and power supplies in the radar draw a faint line at a fixed range.",
-        "lines that stay in the mean of a real drive's scans",
+        "common in FMCW receivers; how many, where and how strong is made up",
     )
 }
 
@@ -207,29 +207,29 @@ fn interference() -> Exhibit {
     let shot = Shot { index, ..shot };
     Exhibit::switched(("Interference", "interference"), &shot, &frame, |e| &mut e.interference).words(
         "56 azimuths of a sweep in which another radar was heard, which happens in about every second one: it raises the noise of one to four azimuths.",
-        "Brooker 2007, Mutual Interference of Millimeter-Wave Radar Systems",
+        "Brooker 2007, Mutual Interference of Millimeter-Wave Radar Systems; how often and how strong is made up",
     )
 }
 
 fn dropped_azimuths() -> Exhibit {
-    let shot = Shot::drawn(scenes::scattered(15.0..30.0, 400, 0.5));
+    let shot = Shot::drawn(scenes::scattered(15.0..24.0, 400, 0.5));
     let scan = |index, dropped_azimuths| {
         Shot { index, effects: Effects { dropped_azimuths, ..shot.effects }, ..shot.clone() }.scan()
     };
     // The first scan that lost an azimuth, and which.
     let lost = |index| Some((index, scan(index, true).flags.iter().position(|flags| *flags == 0)?));
     let (index, azimuth) = (0..SCANS).find_map(lost).unwrap_or_default();
-    let first = azimuth as f64 - 8.0;
-    let frame = Frame::polar(first..first + 16.0, 15.0..30.0);
+    let first = azimuth as f64 - 6.0;
+    let frame = Frame::polar(first..first + 12.0, 15.0..24.0);
     let picture = |dropped| {
         let scan = scan(index, dropped);
         frame
             .picture(std::slice::from_ref(&scan))
-            .with_margin(|row| scan.flags[first as usize + row * 16 / frame.size.1] != 0)
+            .with_margin(|row| scan.flags[first as usize + row * 12 / frame.size.1] != 0)
     };
     Exhibit::of("Dropped azimuths", vec![("off", picture(false)), ("on", picture(true))]).switch("dropped_azimuths").words(
-        "16 azimuths of a field of posts; the strip at the left is white where they were measured. One is lost, is filled in by the mean of its \
+        "12 azimuths of a field of posts; the strip at the left is white where they were measured. One is lost, is filled in by the mean of its \
          neighbours, and says so.",
-        "the validity byte of Oxford's format",
+        "the validity byte of Oxford's format; how often is made up",
     )
 }
