@@ -15,6 +15,9 @@
 //! - [`writer`]: that on a disk,
 //! - [`faults`]: the same, or a real one, spoilt on purpose.
 //!
+//! What each effect of the sensor looks like, off and on, is in `gallery/README.md` in the crate's folder, which
+//! `cargo run --release -p gyre-simulator --example gallery` draws.
+//!
 //! ```
 //! use gyre_simulator::{SimulationConfig, Simulator};
 //!

@@ -6,6 +6,9 @@ use crate::world::{NO_BODY, Wall};
 
 /// Metres a side of a cell: a few walls in each, some ten cells on the way to most scatterers.
 const CELL_M: f64 = 5.0;
+/// The grid begins so far before the first wall: no round number, since a wall that lies along the edge of a cell is not met from the
+/// cell beside it.
+const MARGIN_M: f64 = 1.618_034;
 
 /// Walls sorted into the cells that they touch.
 #[derive(Clone, Debug)]
@@ -23,7 +26,7 @@ impl WallGrid {
     /// Sorts the walls.
     pub fn new(walls: Vec<Wall>) -> Self {
         let ends = || walls.iter().flat_map(|wall| [wall.from, wall.to]);
-        let lowest = ends().fold(Point2::new(0.0, 0.0), |a: Point2<f64>, b| a.inf(&b));
+        let lowest = ends().fold(Point2::new(0.0, 0.0), |a: Point2<f64>, b| a.inf(&b)) - Vector2::repeat(MARGIN_M);
         let highest = ends().fold(Point2::new(0.0, 0.0), |a: Point2<f64>, b| a.sup(&b));
         let cells = |from: f64, to: f64| ((to - from) / CELL_M) as usize + 1;
         let (columns, rows) = (cells(lowest.x, highest.x), cells(lowest.y, highest.y));
@@ -197,6 +200,30 @@ mod tests {
             hits += count;
         }
         assert!(hits > 500, "the walls are dense enough to test something: {hits}");
+    }
+
+    #[test]
+    fn walls_along_the_axes_at_round_places_hide_from_both_sides() {
+        for at in [-20.0, -5.0, 0.0, 5.0, 10.0] {
+            for (from, to) in
+                [((at, -15.0), (at, 15.0)), ((-15.0, at), (15.0, at))].map(|(a, b)| (point_at(a), point_at(b)))
+            {
+                let grid = WallGrid::new(vec![Wall { from, to, transmission: 0.5, mirror: 0.0, body: 1 }]);
+                let across = Vector2::new((to - from).y, (to - from).x) + Vector2::new(0.7, 0.7);
+                let middle = nalgebra::center(&from, &to);
+                for way in [across, -across] {
+                    assert_eq!(
+                        grid.transmission(middle - way, middle + way, NO_BODY, 0.0),
+                        0.5,
+                        "{from} to {to}, {way}"
+                    );
+                }
+            }
+        }
+    }
+
+    fn point_at((x, y): (f64, f64)) -> Point2<f64> {
+        Point2::new(x, y)
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! - `stations`: where the sensor is at each azimuth, and when its beam passes a place,
 //! - `skyline`: rays to all sides, and the walls that each passes,
 //! - `echoes`, `ghosts`: what can be seen, directly and mirrored, and how strongly; `air`: what the weather takes,
+//! - `scintillation`: how they flicker as they are passed,
 //! - `elevation`: how much of each the beam has, being a few degrees high; `antenna`: how much of it each azimuth's beam takes in,
 //! - `spectrum`: what range processing and quantisation make of it,
 //! - `carrier`: what turns with the radar, its ringing and its vehicle; `noise`: all that no echo explains,
@@ -23,11 +24,14 @@ pub mod effects;
 mod elevation;
 mod ghosts;
 mod noise;
+mod place_hash;
+mod scintillation;
 mod skyline;
 pub mod spectrum;
 mod stations;
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use gyre_radar::scan::flag;
 use gyre_radar::{ScanSlot, Sense, SweepGeometry};
@@ -117,6 +121,8 @@ pub struct Sensor {
     stations: Stations,
     skyline: Skyline,
     echoes: Vec<Echo>,
+    /// The azimuths whose beams take in each echo.
+    spans: Vec<Range<usize>>,
     /// Echoes by azimuth: those of azimuth `a` are `lit[starts[a]..starts[a + 1]]`.
     starts: Vec<usize>,
     lit: Vec<u32>,
@@ -138,6 +144,7 @@ impl Sensor {
             stations: Stations::default(),
             skyline: Skyline::default(),
             echoes: Vec::new(),
+            spans: Vec::new(),
             starts: Vec::new(),
             lit: Vec::new(),
             jitter_rad: vec![0.0; sampling.azimuths],
@@ -175,7 +182,9 @@ impl Sensor {
     fn look_around(&mut self, scene: Scene<'_>, time: SweepTime, rng: &mut ChaCha8Rng) {
         let wobble_rad = if self.effects.encoder_wobble { self.config.azimuth_eccentricity_rad } else { 0.0 };
         let moving = self.effects.sweep_motion;
-        self.stations.follow(scene.trajectory, time, &self.sampling, moving, |azimuth| wobble_rad * azimuth.cos());
+        let error_rad = |azimuth_rad: f64| wobble_rad * azimuth_rad.cos();
+        let lift_rad = |time_s, azimuth_rad| self.nodding.lift_rad(time_s, azimuth_rad);
+        self.stations.follow(scene.trajectory, time, &self.sampling, moving, error_rad, lift_rad);
         let middle_s = time.trajectory_s(time.middle_us());
         let centre = self.stations.middle().position;
         let reach_m = self.sampling.reach_m();
@@ -190,8 +199,6 @@ impl Sensor {
             receiver: &self.receiver,
             air: &air,
             effects: &self.effects,
-            nodding: &self.nodding,
-            middle_s,
             reach_m,
         };
         self.echoes.clear();
@@ -200,11 +207,12 @@ impl Sensor {
         if self.effects.multipath {
             view.ghosts(scene.world, &mut self.echoes);
         }
+        // Always as many random numbers, so that no effect changes another's; those of bursts, which vary, come last.
+        let jitter_rad = if self.effects.encoder_wobble { ENCODER_JITTER_RAD } else { 0.0 };
+        self.jitter_rad.iter_mut().for_each(|jitter| *jitter = jitter_rad * rng.sample::<f64, _>(StandardNormal));
         let clutter = |range_m: f64| air.clutter_m2(range_m, view.receiver) * view.received(range_m);
         let (snow, interference) = (weather.snow_mm_h > 0.0, self.effects.interference);
         self.noise.begin_sweep(&self.sampling, &self.spectrum, interference, snow, clutter, rng);
-        let jitter_rad = if self.effects.encoder_wobble { ENCODER_JITTER_RAD } else { 0.0 };
-        self.jitter_rad.iter_mut().for_each(|jitter| *jitter = jitter_rad * rng.sample::<f64, _>(StandardNormal));
         self.light();
     }
 
@@ -218,28 +226,30 @@ impl Sensor {
             let (first, last) = ((echo.azimuth - reach).ceil(), (echo.azimuth + reach).floor());
             (first.max(0.0) as usize)..((last + 1.0).clamp(0.0, azimuths as f64) as usize)
         };
+        self.spans.clear();
+        self.spans.extend(self.echoes.iter().map(span));
         self.starts.clear();
         self.starts.resize(azimuths + 1, 0);
-        for echo in &self.echoes {
-            span(echo).for_each(|azimuth| self.starts[azimuth + 1] += 1);
+        self.spans.iter().cloned().flatten().for_each(|azimuth| self.starts[azimuth] += 1);
+        let mut end = 0;
+        for start in &mut self.starts {
+            end += *start;
+            *start = end;
         }
-        for azimuth in 0..azimuths {
-            self.starts[azimuth + 1] += self.starts[azimuth];
-        }
-        let mut next = self.starts.clone();
         self.lit.clear();
-        self.lit.resize(self.starts[azimuths], 0);
-        for (number, echo) in self.echoes.iter().enumerate() {
-            for azimuth in span(echo) {
-                self.lit[next[azimuth]] = number as u32;
-                next[azimuth] += 1;
+        self.lit.resize(end, 0);
+        // From the last one on, so that each azimuth's end comes down to its start.
+        for (number, span) in self.spans.iter().enumerate().rev() {
+            for azimuth in span.clone() {
+                self.starts[azimuth] -= 1;
+                self.lit[self.starts[azimuth]] = number as u32;
             }
         }
     }
 
     /// Fills the spectrum with what one azimuth receives.
     fn measure(&mut self, azimuth: usize, rng: &mut ChaCha8Rng) {
-        let station = *self.stations.at(azimuth as i64);
+        let station = *self.stations.at(azimuth as f64);
         let doppler_s = if self.effects.doppler { self.doppler_s(azimuth) } else { 0.0 };
         let wavelength_m = self.receiver.wavelength_m();
         self.spectrum.clear();
@@ -323,7 +333,7 @@ impl Sensor {
             first_byte: METADATA_BYTES,
             range_resolution_m: range_resolution_m as f32,
             range_offset_m: range_offset_m as f32,
-            doppler_s: self.sampling.doppler_s as f32,
+            doppler_s: self.doppler_s(0) as f32,
             sense: Sense::Clockwise,
             stamp_ns: (time.start_us + time.stamp_us(azimuths - 1)) * 500,
         }

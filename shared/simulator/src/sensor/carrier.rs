@@ -18,6 +18,8 @@ const SMOOTH_AZIMUTHS: usize = 12;
 const FALLING_DB: f64 = 4.0;
 /// Parts of the vehicle that show: roof rails, racks, the tail, all behind the radar.
 const PARTS: usize = 10;
+/// Where their random numbers begin, so that they are the same with and without ringing.
+const PARTS_AT_WORD: u128 = 1 << 32;
 /// How far behind they are, metres, and how far to either side of straight behind, radians.
 const PARTS_M: std::ops::Range<f64> = 1.5..7.0;
 const PARTS_RAD: std::ops::Range<f64> = -0.7..0.7;
@@ -53,6 +55,7 @@ impl Carrier {
             carrier.ring(sampling, receiver, spectrum, &mut rng);
         }
         if effects.own_vehicle {
+            rng.set_word_pos(PARTS_AT_WORD);
             (0..PARTS).for_each(|_| carrier.part(sampling, receiver, &mut rng));
         }
         carrier

@@ -4,7 +4,8 @@ use nalgebra::{Point2, Vector2};
 
 use super::Air;
 use super::effects::Effects;
-use super::elevation::{Nodding, lit};
+use super::elevation::lit;
+use super::scintillation::scintillation;
 use super::skyline::Skyline;
 use super::stations::{Station, Stations};
 use crate::profile::Receiver;
@@ -42,8 +43,6 @@ pub(super) struct View<'a> {
     pub receiver: &'a Receiver,
     pub air: &'a Air,
     pub effects: &'a Effects,
-    pub nodding: &'a Nodding,
-    pub middle_s: f64,
     pub reach_m: f64,
 }
 
@@ -74,7 +73,7 @@ impl View<'_> {
         }
         let place = |station: &Station| position + velocity * station.time_s;
         self.stations.passings(place, |azimuth| {
-            let station = self.stations.at(azimuth.round() as i64);
+            let station = self.stations.at(azimuth);
             if let Some(amplitude) = self.amplitude(scatterer, place(station), station, azimuth) {
                 echoes.push(Echo { position, velocity, amplitude, azimuth });
             }
@@ -87,28 +86,37 @@ impl View<'_> {
         if !(NEAREST_M..self.reach_m).contains(&range_m) {
             return None;
         }
-        let aspect =
-            if self.effects.aspect { scatterer.aspect.gain(way / range_m) } else { scatterer.aspect.mean_gain() };
-        let in_the_open =
-            scatterer.cross_section_m2 * aspect * self.received(range_m) * self.lit(scatterer, range_m, from, azimuth);
+        let in_the_open = self.cross_section_m2(scatterer, way / range_m)
+            * self.received(range_m)
+            * self.lit(scatterer, range_m, from);
         if in_the_open < NEGLIGIBLE_POWER {
             return None;
         }
         let body = if self.effects.aspect { scatterer.body } else { NO_BODY };
-        let passed = match self.effects.occlusion {
-            true => f64::from(self.skyline.transmission(azimuth, range_m, body)),
-            false => 1.0,
-        };
+        let passed = self.transmission(azimuth, range_m, body);
         (in_the_open * passed > NEGLIGIBLE_POWER).then(|| (in_the_open * passed).sqrt())
     }
 
-    /// Share of the power that the beam has at a scatterer's height.
-    fn lit(&self, scatterer: &Scatterer, range_m: f64, from: &Station, azimuth: f64) -> f64 {
-        if !self.effects.elevation {
-            return 1.0;
+    /// Cross-section that a scatterer shows towards `direction`, a unit vector, square metres.
+    pub fn cross_section_m2(&self, scatterer: &Scatterer, direction: Vector2<f64>) -> f64 {
+        let aspect = &scatterer.aspect;
+        let facing = if self.effects.aspect { aspect.gain(direction) } else { aspect.mean_gain() };
+        let flicker = if self.effects.scintillation { scintillation(scatterer.position, direction) } else { 1.0 };
+        scatterer.cross_section_m2 * facing * flicker
+    }
+
+    /// Share of the power that walls let through to a thing of `body`, there and back.
+    pub fn transmission(&self, azimuth: f64, range_m: f64, body: u32) -> f64 {
+        if self.effects.occlusion { f64::from(self.skyline.transmission(azimuth, range_m, body)) } else { 1.0 }
+    }
+
+    /// Share of the power that the beam has at a scatterer's height, seen over a way of `range_m`.
+    pub fn lit(&self, scatterer: &Scatterer, range_m: f64, from: &Station) -> f64 {
+        if self.effects.elevation {
+            lit(scatterer.position, scatterer.cross_section_m2, range_m, from.lift_rad)
+        } else {
+            1.0
         }
-        let azimuth_rad = azimuth * self.stations.step_rad();
-        lit(scatterer.position, scatterer.cross_section_m2, range_m, self.nodding.lift_rad(self.middle_s + from.time_s, azimuth_rad))
     }
 
     /// Power received from 1 m2 at a range: the fourth power of range, and the receiver's gain, which rises with it.

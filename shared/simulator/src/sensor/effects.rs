@@ -2,7 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Which of a real radar's effects are simulated. All are on by default; the gallery in the crate's folder shows each on and off.
+/// Which of a real radar's effects are simulated. All are on by default. `gallery/README.md` in the crate's folder shows each off
+/// and on, with its source.
+///
+/// Each has random numbers of its own: switching one changes nothing of the others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Effects {
@@ -14,6 +17,8 @@ pub struct Effects {
     pub speckle: bool,
     /// Smooth and tilted surfaces reflect into some directions only; off: all reflect to all sides.
     pub aspect: bool,
+    /// What reflects has lobes of its own, and flickers as it is passed.
+    pub scintillation: bool,
     /// The beam is a few degrees high and the vehicle nods, so that what is lit comes and goes.
     pub elevation: bool,
     /// Walls hide what is behind them.
@@ -56,6 +61,7 @@ impl Effects {
             side_lobes: on,
             speckle: on,
             aspect: on,
+            scintillation: on,
             elevation: on,
             occlusion: on,
             multipath: on,

@@ -10,6 +10,8 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
+use super::place_hash::place_hash;
+
 /// Height of the beam at half power, there and back, radians: 1.8 degrees one way, widened downwards.
 const BEAM_HEIGHT_RAD: f64 = 0.045;
 /// Heights of scatterers about the radar's, metres: this much up or down.
@@ -70,11 +72,7 @@ pub(super) fn lit(place: Point2<f64>, cross_section_m2: f64, range_m: f64, lift_
 
 /// The height of what stands at a place, metres above the radar: as good as random, and always the same.
 fn height_m(place: Point2<f64>) -> f64 {
-    // The finaliser of SplitMix64 (Steele et al. 2014) over both coordinates' bits.
-    let mut bits = place.x.to_bits() ^ place.y.to_bits().rotate_left(32);
-    bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    HEIGHT_M * (((bits ^ (bits >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0)
+    HEIGHT_M * (2.0 * place_hash(place, 0) - 1.0)
 }
 
 #[cfg(test)]
@@ -91,8 +89,10 @@ mod tests {
 
     #[test]
     fn a_beam_that_points_up_loses_what_is_far_and_keeps_what_is_high() {
-        let place =
-            (0..10_000).map(|i| Point2::new(f64::from(i), 0.0)).find(|p| height_m(*p) > 0.97 * HEIGHT_M).unwrap_or_default();
+        let place = (0..10_000)
+            .map(|i| Point2::new(f64::from(i), 0.0))
+            .find(|p| height_m(*p) > 0.97 * HEIGHT_M)
+            .unwrap_or_default();
         assert!(lit(place, 0.1, 1e4, 0.0) > 0.99 && lit(place, 0.1, 1e4, 0.05) < 0.1);
         assert!(lit(place, 0.1, HEIGHT_M / 0.05, 0.05) > 0.9 && lit(place, 0.1, 10.0, 0.0) < 0.05);
     }

@@ -44,19 +44,21 @@ impl View<'_> {
         self.stations.passings(
             |_: &Station| position,
             |azimuth| {
-                let station = self.stations.at(azimuth.round() as i64);
+                let station = self.stations.at(azimuth);
                 let way = position - station.position;
                 let Some(share) = crossing(station.position, way, wall) else { return };
                 let range_m = way.norm();
                 let bounce = station.position + way * share;
-                let aspect = of.aspect.gain((bounce - of.position) / (bounce - of.position).norm());
-                let bright = of.cross_section_m2 * aspect * wall.mirror * wall.mirror * self.received(range_m);
+                let cross_section_m2 = self.cross_section_m2(of, (bounce - of.position).normalize());
+                let mirrored = cross_section_m2 * wall.mirror * wall.mirror * self.lit(of, range_m, station);
+                let bright = mirrored * self.received(range_m);
                 let negligible = NEGLIGIBLE_POWER / bright;
                 if range_m > self.reach_m || negligible >= 1.0 {
                     return;
                 }
-                let out = f64::from(self.skyline.transmission(azimuth, share * range_m, wall.body));
-                let passed = out * world.transmission(bounce, of.position, wall.body, negligible);
+                let out = self.transmission(azimuth, share * range_m, wall.body);
+                let on = || world.transmission(bounce, of.position, wall.body, negligible);
+                let passed = if self.effects.occlusion { out * on() } else { out };
                 if passed > negligible {
                     let amplitude = (bright * passed).sqrt();
                     echoes.push(Echo { position, velocity: Vector2::zeros(), amplitude, azimuth });

@@ -43,8 +43,10 @@ struct Burst {
 /// Noise of one sweep.
 #[derive(Clone, Debug)]
 pub(super) struct Noise {
-    /// Mean power in each noise cell without any echo.
+    /// Mean power of the receiver's noise in each noise cell.
     floor: Vec<f64>,
+    /// How many times that is there without any echo: once, and more where there is a line.
+    steady: Vec<f64>,
     /// Mean power of rain, fog and snow in each noise cell, as received.
     clutter: Vec<f64>,
     /// Noise cell to coarse cell.
@@ -66,13 +68,11 @@ impl Noise {
         let (cells, spacing) = spectrum.noise_cells();
         let range_m = |cell: usize| sampling.range_m(cell as f64 * spacing).max(0.0);
         let power = |db: f64| 10f64.powf(db / 10.0);
-        let floor_at =
-            |cell: usize| interpolate(receiver.floor_db, range_m(cell)).filter(|_| effects.noise).map_or(0.0, power);
-        let mut floor: Vec<f64> = (0..cells).map(floor_at).collect();
+        let floor_at = |cell: usize| interpolate(receiver.floor_db, range_m(cell)).map_or(0.0, power);
+        let mut steady = vec![if effects.noise { 1.0 } else { 0.0 }; cells];
         if effects.spurious_lines {
             for (share, power) in LINES {
-                let cell = (share * cells as f64) as usize;
-                floor[cell] *= 1.0 + power;
+                steady[(share * cells as f64) as usize] += power;
             }
         }
         let coarse = (sampling.reach_m() / COARSE_M) as usize + 2;
@@ -80,7 +80,8 @@ impl Noise {
         let tail_at =
             |i: usize| TAIL.iter().map(|(share, length_m)| share * (-(i as f64) * COARSE_M / length_m).exp()).sum();
         Self {
-            floor,
+            floor: (0..cells).map(floor_at).collect(),
+            steady,
             clutter: vec![0.0; cells],
             coarse_of: (0..cells).map(|cell| (range_m(cell) / COARSE_M) as usize).collect(),
             echoes: vec![0.0; coarse],
@@ -134,46 +135,56 @@ impl Noise {
         }
     }
 
-    /// Adds complex Gaussian noise to the spectrum of an azimuth: exponentially distributed power about its mean.
+    /// Adds all of it to the spectrum of an azimuth.
     pub fn add(&mut self, spectrum: &mut RangeSpectrum, azimuth: usize, rng: &mut impl Rng) {
         self.spread_echoes(self.liveliness[azimuth]);
         let heard = |burst: &&Burst| (burst.first..burst.first + burst.azimuths).contains(&azimuth);
-        let burst = 1.0 + self.bursts.iter().filter(heard).map(|burst| burst.strength).sum::<f64>();
+        let burst = self.bursts.iter().filter(heard).map(|burst| burst.strength).sum::<f64>();
         let (_, spacing) = spectrum.noise_cells();
         for (cell, floor) in self.floor.iter().enumerate() {
-            let mut clutter = self.clutter[cell];
-            if self.snow && clutter > 0.0 {
+            let clutter = if self.snow { 0.0 } else { self.clutter[cell] };
+            let mean = floor * (self.steady[cell] + burst) + clutter + self.raised[self.coarse_of[cell]];
+            add_gaussian(spectrum, cell as f64 * spacing, mean, rng);
+        }
+        if self.snow {
+            for (cell, clutter) in self.clutter.iter().enumerate() {
                 // Flakes come in clumps: power that is spread exponentially about a mean that itself is.
-                clutter *= -(1.0 - rng.random::<f64>()).ln();
+                let clump = -(1.0 - rng.random::<f64>()).ln();
+                add_gaussian(spectrum, cell as f64 * spacing, clump * clutter, rng);
             }
-            let mean = (floor * burst + clutter + self.raised[self.coarse_of[cell]]) as f32 / NOISE_OVERLAP;
-            let amplitude = (-mean * (1.0 - rng.random::<f32>()).ln()).sqrt();
-            let (sine, cosine) = (std::f32::consts::TAU * rng.random::<f32>()).sin_cos();
-            spectrum.add(cell as f64 * spacing, amplitude * cosine, amplitude * sine);
         }
     }
 
     fn spread_echoes(&mut self, liveliness: f64) {
         self.raised.fill(0.0);
         for (from, &power) in self.echoes.iter().enumerate().filter(|(_, power)| **power > 0.0) {
-            for (to, raised) in self.raised.iter_mut().enumerate() {
-                *raised += power * self.skirt[from.abs_diff(to)];
+            let (before, behind) = self.raised.split_at_mut(from);
+            for (raised, skirt) in before.iter_mut().rev().zip(&self.skirt[1..]) {
+                *raised += power * skirt;
             }
-            for (raised, tail) in self.raised[from..].iter_mut().zip(&self.tail) {
-                *raised += liveliness * power * tail;
+            for ((raised, skirt), tail) in behind.iter_mut().zip(&self.skirt).zip(&self.tail) {
+                *raised += power * (skirt + liveliness * tail);
             }
         }
     }
 
-    /// Log-normal numbers round the sweep, smooth over some azimuths.
+    /// Log-normal numbers round the sweep, smooth over some azimuths and where it closes.
     fn draw_liveliness(&mut self, rng: &mut impl Rng) {
-        let knots = self.liveliness.len().div_ceil(LIVELY_AZIMUTHS);
-        let knots: Vec<f64> = (0..knots).map(|_| LIVELINESS_DB * rng.sample::<f64, _>(StandardNormal)).collect();
+        let azimuths = self.liveliness.len();
+        let count = azimuths.div_ceil(LIVELY_AZIMUTHS);
+        let knots: Vec<f64> = (0..count).map(|_| LIVELINESS_DB * rng.sample::<f64, _>(StandardNormal)).collect();
         for (azimuth, liveliness) in self.liveliness.iter_mut().enumerate() {
-            let (knot, share) = (azimuth / LIVELY_AZIMUTHS, azimuth % LIVELY_AZIMUTHS);
-            let share = share as f64 / LIVELY_AZIMUTHS as f64;
-            let db = knots[knot] * (1.0 - share) + knots[(knot + 1) % knots.len()] * share;
+            let at = (azimuth * count) as f64 / azimuths as f64;
+            let (knot, share) = (at as usize, at.fract());
+            let db = knots[knot] * (1.0 - share) + knots[(knot + 1) % count] * share;
             *liveliness = 10f64.powf(db / 10.0);
         }
     }
+}
+
+/// Adds one cell's complex Gaussian noise, of so much power on average in each bin.
+fn add_gaussian(spectrum: &mut RangeSpectrum, bin: f64, mean: f64, rng: &mut impl Rng) {
+    let deviation = (mean as f32 / (2.0 * NOISE_OVERLAP)).sqrt();
+    let (real, imaginary): (f32, f32) = (rng.sample(StandardNormal), rng.sample(StandardNormal));
+    spectrum.add(bin, deviation * real, deviation * imaginary);
 }

@@ -41,8 +41,7 @@ impl Skyline {
             let first = self.passed.len();
             self.starts.push(first);
             let azimuth = ray as f64 / RAYS as f64 - MARGIN as f64;
-            let station = stations.at(azimuth.floor() as i64);
-            // A ray looks where the azimuths say, wherever the encoder's errors turn the beam.
+            let station = stations.at(azimuth.floor());
             let turned = azimuth.fract().rem_euclid(1.0) * stations.step_rad();
             let way = Rotation2::new(-turned) * station.beam * reach_m;
             self.cast_ray(world, moving, station, way, reach_m);
@@ -88,8 +87,9 @@ impl Skyline {
 
     /// The walls on the ray nearest to an azimuth, nearest first.
     pub fn ray(&self, azimuth: f64) -> &[Passed] {
-        let ray = ((azimuth + MARGIN as f64) * RAYS as f64).round() as i64;
-        let ray = ray.clamp(0, self.starts.len() as i64 - 2) as usize;
+        // What is below zero becomes zero.
+        let ray = ((azimuth + MARGIN as f64) * RAYS as f64 + 0.5) as usize;
+        let ray = ray.min(self.starts.len() - 2);
         &self.passed[self.starts[ray]..self.starts[ray + 1]]
     }
 

@@ -88,7 +88,7 @@ impl RangeSpectrum {
         if !(0.0..self.bins as f64).contains(&bin) {
             return None;
         }
-        let steps = (bin * SUB_BINS as f64).round() as usize;
+        let steps = (bin * SUB_BINS as f64 + 0.5) as usize;
         Some((steps % SUB_BINS, steps / SUB_BINS + self.pad() - self.taps / 2))
     }
 
@@ -121,9 +121,13 @@ fn hann_response(cells: f64) -> f64 {
 /// nothing between.
 pub fn counts(power: f32, full_scale: f32, whole_powers: bool) -> u8 {
     let compressed = power / (1.0 + power / full_scale);
-    let power = if whole_powers { compressed.round() } else { compressed };
-    (6.020_6 * log2(power.max(1.0)) + 0.4) as u8
+    let power = if whole_powers { (compressed + NO_FRACTIONS) - NO_FRACTIONS } else { compressed };
+    (6.020_6 * log2(power.max(1.0)) - 0.1 + NO_FRACTIONS).to_bits() as u8
 }
+
+/// A sum with this has no bits left for a fraction, so it is rounded, and its last byte is the whole number: without calls or casts that
+/// look at each number alone, the loop over bins runs several at once.
+const NO_FRACTIONS: f32 = 8_388_608.0;
 
 /// Logarithm of a number of at least 1, to 1e-4: by arithmetic alone, so that all machines agree on it.
 fn log2(value: f32) -> f32 {

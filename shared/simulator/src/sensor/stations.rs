@@ -16,11 +16,13 @@ pub(super) const MARGIN: usize = 16;
 pub(super) struct Station {
     pub position: Point2<f64>,
     pub velocity: Vector2<f64>,
-    /// Heading, radians.
-    pub yaw_rad: f64,
+    /// Where the beam would stand at azimuth zero, radians: the heading, less the encoder's error here.
+    pub heading_rad: f64,
     /// Unit vector along the beam, world frame.
     pub beam: Vector2<f64>,
-    /// Time since the middle of the sweep, seconds.
+    /// How far the beam points up, radians.
+    pub lift_rad: f64,
+    /// Time since the middle of the sweep, seconds; zero at all azimuths where they are all measured then.
     pub time_s: f64,
 }
 
@@ -34,7 +36,8 @@ pub(super) struct Stations {
 }
 
 impl Stations {
-    /// Follows a sweep. `error_rad` says by how much the beam stands to the right of an azimuth as reported.
+    /// Follows a sweep. `error_rad` says by how much the beam stands to the right of an azimuth as reported, `lift_rad` by how much
+    /// it points up at a time on the trajectory, seconds, and an azimuth.
     pub fn follow(
         &mut self,
         trajectory: &dyn Trajectory,
@@ -42,6 +45,7 @@ impl Stations {
         sampling: &Sampling,
         moving: bool,
         error_rad: impl Fn(f64) -> f64,
+        lift_rad: impl Fn(f64, f64) -> f64,
     ) {
         let middle_s = time.trajectory_s(time.middle_us());
         self.azimuths = sampling.azimuths;
@@ -50,28 +54,40 @@ impl Stations {
         self.all.clear();
         for index in 0..sampling.azimuths + 2 * MARGIN {
             let azimuth = index as f64 - MARGIN as f64;
-            let time_s = time.trajectory_s(time.start_us) - middle_s
-                + azimuth * time.period_us as f64 * 1e-6 / sampling.azimuths as f64;
-            let pose = trajectory.pose(middle_s + if moving { time_s } else { 0.0 });
-            let velocity = trajectory.velocity(middle_s + if moving { time_s } else { 0.0 });
+            let since_start_s = azimuth * time.period_us as f64 * 1e-6 / sampling.azimuths as f64;
+            let time_s = if moving { time.trajectory_s(time.start_us) - middle_s + since_start_s } else { 0.0 };
+            let pose = trajectory.pose(middle_s + time_s);
+            let velocity = trajectory.velocity(middle_s + time_s);
             let azimuth_rad = self.first_rad + azimuth * self.step_rad;
             // Azimuths grow clockwise, angles counter-clockwise.
-            let angle = pose.rotation.angle() - azimuth_rad - error_rad(azimuth_rad);
-            let beam = Vector2::new(angle.cos(), angle.sin());
+            let heading_rad = pose.rotation.angle() - error_rad(azimuth_rad);
+            let (sine, cosine) = (heading_rad - azimuth_rad).sin_cos();
             let position = Point2::from(pose.translation.vector);
-            self.all.push(Station { position, velocity, yaw_rad: pose.rotation.angle(), beam, time_s });
+            let lift_rad = lift_rad(middle_s + time_s, azimuth_rad);
+            self.all.push(Station {
+                position,
+                velocity,
+                heading_rad,
+                beam: Vector2::new(cosine, sine),
+                lift_rad,
+                time_s,
+            });
         }
     }
 
-    /// The sensor at an azimuth, `-MARGIN..azimuths + MARGIN`; the nearest one beyond.
-    pub fn at(&self, azimuth: i64) -> &Station {
-        let index = (azimuth + MARGIN as i64).clamp(0, self.all.len() as i64 - 1);
-        &self.all[index as usize]
+    /// The sensor at the azimuth nearest to this one, of `-MARGIN..azimuths + MARGIN`.
+    pub fn at(&self, azimuth: f64) -> &Station {
+        &self.all[self.index(azimuth)]
+    }
+
+    fn index(&self, azimuth: f64) -> usize {
+        // What is below zero becomes zero.
+        ((azimuth + MARGIN as f64 + 0.5) as usize).min(self.all.len() - 1)
     }
 
     /// The sensor at the middle of the sweep.
     pub fn middle(&self) -> &Station {
-        self.at(self.azimuths as i64 / 2)
+        self.at((self.azimuths / 2) as f64)
     }
 
     /// Azimuths of the sweep.
@@ -104,12 +120,12 @@ impl Stations {
 
     /// Goes to where the beam is expected to pass, looks again from there, and so on.
     fn passing(&self, guess: f64, place: &impl Fn(&Station) -> Point2<f64>) -> f64 {
-        let turn = self.azimuths as f64;
         let mut azimuth = guess;
         for _ in 0..4 {
-            let at = azimuth.round();
-            let seen = self.bearing(self.at(at as i64), place);
-            let next = seen + turn * ((at - seen) / turn).round();
+            let index = self.index(azimuth);
+            let station = &self.all[index];
+            let way = place(station) - station.position;
+            let next = index as f64 - MARGIN as f64 - angle(station.beam, way) / self.step_rad;
             if (next - azimuth).abs() < 0.05 {
                 return next;
             }
@@ -121,6 +137,13 @@ impl Stations {
     /// Bearing in azimuths, clockwise from the first one, of a thing as seen from a station.
     fn bearing(&self, station: &Station, place: &impl Fn(&Station) -> Point2<f64>) -> f64 {
         let way = place(station) - station.position;
-        (station.yaw_rad - way.y.atan2(way.x) - self.first_rad).rem_euclid(TAU) / self.step_rad
+        (station.heading_rad - way.y.atan2(way.x) - self.first_rad).rem_euclid(TAU) / self.step_rad
     }
+}
+
+/// Angle from one direction to another, radians counter-clockwise.
+fn angle(from: Vector2<f64>, to: Vector2<f64>) -> f64 {
+    let (across, along) = (from.perp(&to), from.dot(&to));
+    // The tangent of a small angle is the angle, and much faster.
+    if across.abs() < 0.1 * along { across / along } else { across.atan2(along) }
 }

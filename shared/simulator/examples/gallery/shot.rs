@@ -1,0 +1,98 @@
+//! What a radar is pointed at, and the scan that comes of it.
+
+use std::sync::Arc;
+
+use gyre_radar::{OwnedScan, ScanLimits};
+use gyre_simulator::profile::Profile;
+use gyre_simulator::weather::WeatherConfig;
+use gyre_simulator::{
+    Body, ConstantTwist, Effects, Movers, Scene, Sensor, SensorConfig, SimulationConfig, Simulator, SimulatorError,
+    SweepTime, Trajectory, World,
+};
+use nalgebra::Isometry2;
+
+const SEED: u64 = 1;
+const EPOCH_US: i64 = 1_547_132_400_000_000;
+
+/// A scene, a radar in it, and when it looks.
+#[derive(Clone)]
+pub struct Shot {
+    pub world: Arc<World>,
+    pub movers: Arc<dyn Movers>,
+    pub trajectory: Arc<dyn Trajectory>,
+    pub weather: WeatherConfig,
+    pub sensor: SensorConfig,
+    pub effects: Effects,
+    /// Number of the scan.
+    pub index: u64,
+}
+
+/// The drive of a simulator.
+struct Drive(Simulator);
+
+impl Trajectory for Drive {
+    fn pose(&self, time_s: f64) -> Isometry2<f64> {
+        self.0.trajectory().pose(time_s)
+    }
+}
+
+impl Shot {
+    /// Oxford's radar at rest in a drawn scene, with noise and no other effect.
+    pub fn drawn(scene: Body) -> Self {
+        Self {
+            world: Arc::new(World::new(scene)),
+            movers: Arc::new(()),
+            trajectory: Arc::new(ConstantTwist::default()),
+            weather: WeatherConfig::default(),
+            sensor: SensorConfig::default(),
+            effects: Effects { noise: true, ..Effects::NONE },
+            index: 0,
+        }
+    }
+
+    /// A radar under way through the town, with all effects but those that strike by chance.
+    pub fn town(profile: Profile) -> Result<Self, SimulatorError> {
+        let simulator = Simulator::new(&SimulationConfig { seed: SEED, ..SimulationConfig::default() })?;
+        Ok(Self {
+            world: Arc::new(simulator.world().clone()),
+            trajectory: Arc::new(Drive(simulator)),
+            sensor: SensorConfig { profile, ..SensorConfig::default() },
+            effects: Effects { interference: false, dropped_azimuths: false, ..Effects::ALL },
+            ..Self::drawn(Body::default())
+        })
+    }
+
+    /// The same at a steady speed, metres a second ahead and radians a second to the left.
+    pub fn driving(self, forward_m_s: f64, yaw_rad_s: f64) -> Self {
+        Self { trajectory: Arc::new(ConstantTwist { forward_m_s, left_m_s: 0.0, yaw_rad_s }), ..self }
+    }
+
+    /// The same with another radar.
+    pub fn with(self, profile: Profile) -> Self {
+        Self { sensor: SensorConfig { profile, ..self.sensor }, ..self }
+    }
+
+    /// The scan.
+    pub fn scan(&self) -> OwnedScan {
+        let sampling = self.sensor.sampling();
+        let (azimuths, period_us) = (sampling.azimuths, sampling.period_us);
+        let mut scan = OwnedScan::with_limits(ScanLimits { bytes: azimuths * sampling.stride(), azimuths });
+        // The middle of the first sweep is the trajectory's time zero: a drawn scene is seen from where it is drawn.
+        let start_us = EPOCH_US + period_us * self.index as i64 - period_us / 2;
+        let time = SweepTime { start_us, period_us, azimuths, epoch_us: EPOCH_US };
+        let scene = Scene {
+            world: &self.world,
+            movers: self.movers.as_ref(),
+            trajectory: self.trajectory.as_ref(),
+            weather: self.weather,
+        };
+        let mut sensor = Sensor::new(&self.sensor, &self.effects, SEED);
+        scan.geometry = sensor.sweep(scene, time, self.index, &mut scan.slot());
+        scan
+    }
+
+    /// This scan and those that follow, so many in all.
+    pub fn scans(&self, count: u64) -> Vec<OwnedScan> {
+        (self.index..self.index + count).map(|index| Self { index, ..self.clone() }.scan()).collect()
+    }
+}

@@ -1,0 +1,109 @@
+//! Weather, traffic, and the host that receives.
+
+use std::sync::Arc;
+
+use gyre_radar::ImageSource;
+use gyre_simulator::output::OutputConfig;
+use gyre_simulator::profile::Profile;
+use gyre_simulator::weather::WeatherConfig;
+use gyre_simulator::{Body, HostStamps, OutputFormat, Recording, SimulationConfig, SimulatorError};
+
+use crate::exhibit::Exhibit;
+use crate::picture::{BLACK, Frame, Picture};
+use crate::scenes;
+use crate::shot::Shot;
+
+pub fn exhibits() -> Result<Vec<Exhibit>, SimulatorError> {
+    Ok(vec![rain(), fog(), snow(), traffic(), host_stamps()?])
+}
+
+fn weather(title: &'static str, weather: WeatherConfig, shot: Shot, frame: &Frame) -> Exhibit {
+    Exhibit::switched((title, "weather"), &Shot { weather, ..shot }, frame, |e| &mut e.weather)
+}
+
+fn rain() -> Exhibit {
+    let shot = Shot::drawn(scenes::lattice(12.0, 90.0, 10.0));
+    let heavy = WeatherConfig { rain_mm_h: 25.0, ..WeatherConfig::default() };
+    weather("Rain", heavy, shot, &Frame::map(95.0).shades(12.0, 70.0)).words(
+        "Posts 12 m apart in a cloudburst of 25 mm/h: drops send back echoes of their own nearby, and what is far loses 2.3 dB per 100 m of range.",
+        "ITU-R P.838-3 (attenuation); Currie, Dyer and Hayes 1975 (reflectivity)",
+    )
+}
+
+fn fog() -> Exhibit {
+    let mut rings = Body::default();
+    for range_m in [60.0f64, 100.0, 140.0, 180.0, 220.0, 260.0, 295.0] {
+        rings.extend(scenes::ring(range_m, 300, 2.0 * (range_m / 300.0).powi(4)));
+    }
+    let shot = Shot::drawn(rings).with(Profile::Ras6);
+    let thick = WeatherConfig { fog_g_m3: 3.0, ..WeatherConfig::default() };
+    weather("Fog", thick, shot, &Frame::polar(0.0..100.0, 50.0..300.0).shades(26.0, 64.0)).words(
+        "Rings of posts as bright as each other, 60 to 300 m around a RAS6, in fog of 3 g/m³, six times what leaves 50 m of sight: a radar \
+         hardly minds. The far ones lose up to 8 dB.",
+        "ITU-R P.840",
+    )
+}
+
+fn snow() -> Exhibit {
+    let shot = Shot::drawn(scenes::lattice(8.0, 40.0, 1.0));
+    let heavy = WeatherConfig { snow_mm_h: 8.0, ..WeatherConfig::default() };
+    weather("Snow", heavy, shot, &Frame::map(42.0).shades(BLACK, 60.0)).words(
+        "Posts 8 m apart in heavy snow, 8 mm/h of water: flakes come in clumps, so its echoes are spottier than rain's; snow on the radome takes its share.",
+        "middle values of a literature that varies widely",
+    )
+}
+
+fn traffic() -> Exhibit {
+    let mut shot = Shot::drawn(scenes::lattice(8.0, 24.0, 2.0));
+    shot.movers = Arc::new(scenes::Passing::new(12.0));
+    let frame = Frame::map(26.0);
+    let mut picture = |index| {
+        shot.index = index;
+        frame.picture(&[shot.scan()])
+    };
+    Exhibit::of("Traffic", vec![("one scan", picture(0)), ("1 s later", picture(4))]).words(
+        "A car passes at 12 m/s between posts that stand: it moves within a sweep, and from one to the next.",
+        "bodies of scatterers with a velocity; the town's follow its streets",
+    )
+}
+
+/// How late a scan was received after the first, beyond even spacing, seconds.
+fn delays_s(host_stamps: HostStamps) -> Result<Vec<f64>, SimulatorError> {
+    let output = OutputConfig { format: Some(OutputFormat::Radiate), host_stamps, ..OutputConfig::default() };
+    let mut config = SimulationConfig { scans: 240, output, ..SimulationConfig::default() };
+    config.sensor.profile = Profile::Cts350xRadiate;
+    let recording = Recording::new(&config)?;
+    let received_s: Vec<f64> = recording.renderer().stamps().unwrap_or_default().lines().filter_map(received).collect();
+    let period_s = recording.simulator().sampling().period_us as f64 * 1e-6;
+    Ok(received_s.iter().enumerate().map(|(i, at)| at - received_s[0] - i as f64 * period_s).collect())
+}
+
+/// `Frame: 000001 Time: 1547132400.250000000`, the nanoseconds without leading zeros.
+fn received(line: &str) -> Option<f64> {
+    let (seconds, nanoseconds) = line.rsplit(' ').next()?.split_once('.')?;
+    Some(seconds.parse::<f64>().ok()? + nanoseconds.parse::<f64>().ok()? * 1e-9)
+}
+
+fn host_stamps() -> Result<Exhibit, SimulatorError> {
+    let plot = |delays_s: Vec<f64>| {
+        const SECONDS_HIGH: f64 = 1.5;
+        Picture::of((240, 80), |column, row| {
+            let height = (79 - row) as f64 / 80.0 * SECONDS_HIGH;
+            let bar = delays_s.get(column).is_some_and(|delay| height <= *delay + 0.02);
+            if bar {
+                1.0
+            } else if row % 26 == 0 {
+                0.2
+            } else {
+                0.0
+            }
+        })
+    };
+    let pictures =
+        vec![("even", plot(delays_s(HostStamps::Even)?)), ("stalling", plot(delays_s(HostStamps::Stalling)?))];
+    Ok(Exhibit::of("Host stamps", pictures).words(
+        "How late the host receives each of 240 scans, up to 1.5 s: now and then it stalls and then catches up, while the sensor turns evenly. \
+         RADIATE's format logs these times (`output.host_stamps`).",
+        "RADIATE's recordings: seven stalls in 466 scans",
+    ))
+}

@@ -1,0 +1,235 @@
+//! Every switch of `Effects`, off and on.
+
+use std::f64::consts::PI;
+
+use gyre_simulator::profile::Profile;
+use gyre_simulator::{Body, Effects, SensorConfig};
+
+use crate::exhibit::Exhibit;
+use crate::picture::{BLACK, Frame};
+use crate::scenes;
+use crate::shot::Shot;
+
+/// Scans in which to look for what strikes by chance.
+const SCANS: u64 = 50;
+
+pub fn exhibits() -> Vec<Exhibit> {
+    vec![
+        sweep_motion(),
+        doppler(),
+        doppler_of_alternating_chirps(),
+        encoder_wobble(),
+        side_lobes(),
+        elevation(),
+        aspect(),
+        occlusion(),
+        multipath(),
+        speckle(),
+        phase_noise(),
+        reverberation(),
+        ringing(),
+        own_vehicle(),
+        noise(),
+        spurious_lines(),
+        interference(),
+        dropped_azimuths(),
+    ]
+}
+
+fn sweep_motion() -> Exhibit {
+    let shot = Shot::drawn(scenes::courtyard(30.0)).driving(15.0, 1.2);
+    Exhibit::switched(("Motion within a sweep", "sweep_motion"), &shot, &Frame::map(45.0), |e| &mut e.sweep_motion)
+        .words(
+            "A square courtyard from a car that drives at 15 m/s and turns left at 1.2 rad/s: each azimuth is measured from its own \
+             pose, so the square is bent and does not close ahead, where the sweep begins and ends.",
+            "Burnett, Schoellig and Barfoot 2021, on motion distortion of spinning radars",
+        )
+}
+
+fn doppler() -> Exhibit {
+    let shot = Shot::drawn(scenes::ring(30.0, 250, 4.0)).driving(25.0, 0.0);
+    let frame = Frame::polar(0.0..400.0, 27.0..33.0);
+    Exhibit::switched(("Doppler", "doppler"), &shot, &frame, |e| &mut e.doppler).words(
+        "A ring of posts 30 m around a car at 25 m/s, azimuths from ahead (top) to the right, behind and the left: what it drives \
+         towards reads 1 m too near, what it leaves as much too far. (All azimuths are measured from one place.)",
+        "Burnett, Schoellig and Barfoot 2021; the factor is the radar's carrier over its sweep rate",
+    )
+}
+
+fn doppler_of_alternating_chirps() -> Exhibit {
+    let shot = Shot::drawn(scenes::ring(30.0, 250, 4.0)).driving(25.0, 0.0).with(Profile::Ras6);
+    let frame = Frame::polar(-15.0..15.0, 27.0..33.0).shades(20.0, 110.0);
+    Exhibit::switched(("Doppler of alternating chirps", "doppler"), &shot, &frame, |e| &mut e.doppler).words(
+        "The same ahead, by a RAS6: rising and falling chirps by turns shift it to and fro, which gives the car's speed away.",
+        "the form of Boreas-RT's and FoMo's recordings",
+    )
+}
+
+fn encoder_wobble() -> Exhibit {
+    let behind = [(12.0, 0.0), (20.0, 0.06), (28.0, -0.06), (36.0, 0.0)].map(|(range_m, side)| (range_m, PI + side));
+    let mut shot = Shot::drawn(scenes::posts_at(behind, 50.0));
+    shot.sensor = SensorConfig { azimuth_eccentricity_rad: 0.05, ..shot.sensor };
+    let frame = Frame::polar(185.0..215.0, 8.0..40.0);
+    Exhibit::switched(("Encoder wobble", "encoder_wobble"), &shot, &frame, |e| &mut e.encoder_wobble).words(
+        "Posts behind the car, 30 azimuths of the sweep: the encoder's disc is 0.05 rad off its axis (far more than in any recording), \
+         so all stand three azimuths from where they are; and its counts jitter.",
+        "the first harmonic of an encoder's error, 0.0025 rad on RADIATE's radar; `dataset.azimuth_eccentricity_rad` undoes it",
+    )
+}
+
+fn side_lobes() -> Exhibit {
+    let shot = Shot::drawn(scenes::posts_at([(40.0, PI / 2.0)], 2000.0));
+    let frame = Frame::polar(78.0..118.0, 35.0..45.0).shades(0.0, 120.0);
+    Exhibit::switched(("Side lobes", "side_lobes"), &shot, &frame, |e| &mut e.side_lobes).words(
+        "A corner reflector of 2000 m² at 40 m, 40 azimuths about it: lobes beside the beam show it at ever fainter power.",
+        "the envelope beside isolated strong echoes in Oxford's, RADIATE's and Boreas-RT's scans",
+    )
+}
+
+fn elevation() -> Exhibit {
+    let shot = Shot::drawn(scenes::lattice(3.0, 21.0, 0.1));
+    let frame = Frame::map(22.0).shades(30.0, 90.0);
+    Exhibit::switched(("Beam height and nodding", "elevation"), &shot, &frame, |e| &mut e.elevation).words(
+        "Equal posts 3 m apart: the beam is three degrees high and the car nods on its springs, so what is near is lit by chance.",
+        "the data sheet's 1.8 degrees, widened downwards; how returns come and go between consecutive real scans",
+    )
+}
+
+fn aspect() -> Exhibit {
+    let shot = Shot::drawn(scenes::panels(14.0, 60.0));
+    Exhibit::switched(("Aspect", "aspect"), &shot, &Frame::map(45.0), |e| &mut e.aspect).words(
+        "A wall of smooth panels on the left: where it is met at a right angle it flashes, elsewhere it reflects past the sensor.",
+        "a cosine's power about the surface's normal (Phong 1975), as for specular and rough facets in radar",
+    )
+}
+
+fn occlusion() -> Exhibit {
+    let shot = Shot::drawn(scenes::walls_among_posts());
+    Exhibit::switched(("Occlusion", "occlusion"), &shot, &Frame::map(45.0), |e| &mut e.occlusion).words(
+        "Two walls among posts: they throw shadows. What a wall lets through is its own: here 40 dB less.",
+        "ITU-R P.2040 for what building materials let through",
+    )
+}
+
+fn multipath() -> Exhibit {
+    let mut shot = Shot::drawn(scenes::metal_wall());
+    shot.effects.occlusion = true;
+    Exhibit::switched(("Multipath ghosts", "multipath"), &shot, &Frame::map(32.0), |e| &mut e.multipath).words(
+        "A sheet of metal on the left with three posts before it: each has a mirror image behind the sheet, where nothing is.",
+        "image theory; Kraus et al. 2020 on ghosts of automotive radars; ITU-R P.2040 for what facades mirror",
+    )
+}
+
+fn speckle() -> Exhibit {
+    let shot = Shot::drawn(scenes::scattered(19.6..20.4, 8000, 0.005));
+    let frame = Frame::polar(70.0..130.0, 17.0..23.0).shades(20.0, 100.0);
+    Exhibit::switched(("Speckle", "speckle"), &shot, &frame, |e| &mut e.speckle).words(
+        "A rough wall that bends round the sensor, many scatterers to a resolution cell: their echoes interfere, and break it into bright and dark.",
+        "Goodman 2007 (fully developed speckle: powers exponentially distributed)",
+    )
+}
+
+fn phase_noise() -> Exhibit {
+    let shot = Shot::drawn(scenes::posts_at([(30.0, PI / 2.0), (60.0, PI / 2.0 + 0.2)], 3000.0));
+    let frame = Frame::polar(70.0..140.0, 0.0..165.0).shades(0.0, 80.0);
+    Exhibit::switched(("Phase noise", "phase_noise"), &shot, &frame, |e| &mut e.phase_noise).words(
+        "Two corner reflectors: each raises the noise of its whole azimuth, 60 dB below itself and more close by. In town: saturation streaks.",
+        "the lower fifth of an azimuth's powers against their sum, in Oxford's and RADIATE's scans",
+    )
+}
+
+fn reverberation() -> Exhibit {
+    let mut front = scenes::rough_wall((15.0, -12.0), (15.0, 12.0), 6.0);
+    front.extend(scenes::posts_at([(25.0, 0.9), (30.0, -0.9)], 300.0));
+    let mut shot = Shot::drawn(front);
+    shot.effects.speckle = true;
+    let frame = Frame::polar(-80.0..80.0, 0.0..120.0).shades(0.0, 80.0);
+    Exhibit::switched(("Reverberation", "reverberation"), &shot, &frame, |e| &mut e.reverberation).words(
+        "A front ahead and a strong post to either side: echoes bounce on between houses, and leave a tail behind what is strong that differs \
+         from one direction to the next.",
+        "mean power behind fronts and down streets in Oxford's and RADIATE's scans",
+    )
+}
+
+fn ringing() -> Exhibit {
+    let shot = Shot::drawn(Body::default());
+    let frame = Frame::polar(0.0..400.0, 0.0..10.0).shades(0.0, 60.0);
+    Exhibit::switched(("Ringing", "ringing"), &shot, &frame, |e| &mut e.ringing).words(
+        "The first 10 m of an empty place: the transmitter rings in the first three, the same in every scan.",
+        "mean power of the first bins of real scans, profile by profile",
+    )
+}
+
+fn own_vehicle() -> Exhibit {
+    let shot = Shot::drawn(Body::default());
+    let frame = Frame::map(9.0).shades(0.0, 80.0);
+    Exhibit::switched(("Own vehicle", "own_vehicle"), &shot, &frame, |e| &mut e.own_vehicle).words(
+        "The first 9 m of an empty place: roof rails, racks and the tail behind the radar, which turn with it.",
+        "what stays put in all scans of a real drive",
+    )
+}
+
+fn noise() -> Exhibit {
+    let shot = Shot::drawn(scenes::lattice(8.0, 56.0, 0.03));
+    let frame = Frame::map(60.0).shades(2.0, 50.0);
+    Exhibit::switched(("Noise", "noise"), &shot, &frame, |e| &mut e.noise).words(
+        "Posts 8 m apart: receiver noise, and what ground and many-fold echoes leave everywhere, drown the faint ones.",
+        "powers of azimuths in which nothing stands, in Oxford's, RADIATE's and Boreas-RT's scans",
+    )
+}
+
+fn spurious_lines() -> Exhibit {
+    let mut shot = Shot::drawn(Body::default());
+    let frame = Frame::polar(0.0..400.0, 50.0..70.0).shades(0.0, 18.0);
+    let mut picture = |on| {
+        shot.effects.spurious_lines = on;
+        frame.picture(&shot.scans(16))
+    };
+    let pictures = vec![("off", picture(false)), ("on", picture(true))];
+    Exhibit::of("Spurious lines", pictures).switch("spurious_lines").words(
+        "The mean of 16 scans of an empty place, 50 to 70 m: clocks and power supplies in the radar draw a faint line at a fixed range.",
+        "common in FMCW receivers; how many, where and how strong is made up",
+    )
+}
+
+fn interference() -> Exhibit {
+    let shot = Shot::drawn(scenes::lattice(12.0, 90.0, 10.0));
+    let scan =
+        |index, interference| Shot { index, effects: Effects { interference, ..shot.effects }, ..shot.clone() }.scan();
+    // The first scan with a burst, and where that is.
+    let heard = |index| {
+        let (off, on) = (scan(index, false), scan(index, true));
+        Some((index, (0..400).find(|azimuth| off.view().row(*azimuth) != on.view().row(*azimuth))?))
+    };
+    let (index, azimuth) = (0..SCANS).find_map(heard).unwrap_or_default();
+    let first = azimuth as f64 - 25.0;
+    let frame = Frame::polar(first..first + 56.0, 0.0..165.0).shades(BLACK, 60.0);
+    let shot = Shot { index, ..shot };
+    Exhibit::switched(("Interference", "interference"), &shot, &frame, |e| &mut e.interference).words(
+        "56 azimuths of a sweep in which another radar was heard, which happens in about every second one: it raises the noise of one to four azimuths.",
+        "Brooker 2007, Mutual Interference of Millimeter-Wave Radar Systems; how often and how strong is made up",
+    )
+}
+
+fn dropped_azimuths() -> Exhibit {
+    let shot = Shot::drawn(scenes::scattered(15.0..24.0, 400, 0.5));
+    let scan = |index, dropped_azimuths| {
+        Shot { index, effects: Effects { dropped_azimuths, ..shot.effects }, ..shot.clone() }.scan()
+    };
+    // The first scan that lost an azimuth, and which.
+    let lost = |index| Some((index, scan(index, true).flags.iter().position(|flags| *flags == 0)?));
+    let (index, azimuth) = (0..SCANS).find_map(lost).unwrap_or_default();
+    let first = azimuth as f64 - 6.0;
+    let frame = Frame::polar(first..first + 12.0, 15.0..24.0);
+    let picture = |dropped| {
+        let scan = scan(index, dropped);
+        frame
+            .picture(std::slice::from_ref(&scan))
+            .with_margin(|row| scan.flags[first as usize + row * 12 / frame.size.1] != 0)
+    };
+    Exhibit::of("Dropped azimuths", vec![("off", picture(false)), ("on", picture(true))]).switch("dropped_azimuths").words(
+        "12 azimuths of a field of posts; the strip at the left is white where they were measured. One is lost, is filled in by the mean of its \
+         neighbours, and says so.",
+        "the validity byte of Oxford's format; how often is made up",
+    )
+}

@@ -1,0 +1,70 @@
+//! What the antenna makes of a point: its beam, side lobes, height; and the range window.
+
+use gyre_simulator::Effects;
+use gyre_simulator::profile::Profile;
+
+use crate::scene::{Setup, db, mean_db, peak_db, post, power};
+
+#[test]
+fn without_effects_only_the_points_response_is_left() {
+    let setup = Setup::of(vec![post(20.0, 100.0, 3.0)], Effects::NONE);
+    let scan = setup.scan();
+    let (azimuths, bins) = (97..=103, setup.bins(18.9..21.1));
+    for azimuth in 0..400 {
+        for (bin, count) in scan.view().row(azimuth).iter().enumerate() {
+            let inside = azimuths.contains(&azimuth) && bins.contains(&bin);
+            assert!(*count == 0 || inside, "azimuth {azimuth}, bin {bin}: {count}");
+        }
+    }
+    let (top, wanted) = (peak_db(&scan, 100, bins), setup.received_db(3.0, 20.0));
+    // 6e5 of a full scale of 1e7 are compressed by a quarter of a decibel.
+    assert!((top - wanted + 0.25).abs() < 0.4, "{top} dB for {wanted} dB");
+}
+
+#[test]
+fn a_point_falls_by_6_db_one_resolution_cell_beside_it() {
+    for profile in [Profile::Cts350xOxford, Profile::Cir204h, Profile::Ras6] {
+        let setup = Setup::of(vec![post(20.0, 100.0, 0.1)], Effects::NONE).with(profile);
+        let (sampling, cell_m) = (setup.sampling(), setup.receiver().cell_m);
+        let range_m = sampling.range_m(sampling.bin(20.0).round());
+        let setup = Setup::of(vec![post(range_m, 100.0, 0.1)], Effects::NONE).with(profile);
+        let scan = setup.scan();
+        let at = |range_m: f64| db(power(scan.view().row(100)[sampling.bin(range_m).round() as usize]));
+        for side_m in [-cell_m, cell_m] {
+            let fall_db = at(range_m) - at(range_m + side_m);
+            assert!((fall_db - 6.0).abs() < 1.6, "{profile:?}, {side_m} m: {fall_db} dB");
+        }
+    }
+}
+
+#[test]
+fn side_lobes_are_44_db_down_three_and_a_half_widths_beside_a_point() {
+    let measured = |side_lobes| {
+        let setup = Setup::of(vec![post(40.0, 100.0, 20.0)], Effects { side_lobes, ..Effects::NONE });
+        let (scan, bins) = (setup.scan(), setup.bins(39.0..41.0));
+        // Five azimuths of 0.9 degrees are 3.54 beams of 1.27 degrees.
+        [95, 105].map(|azimuth| setup.received_db(20.0, 40.0) - peak_db(&scan, azimuth, bins.clone()))
+    };
+    assert!(measured(true).iter().all(|down_db| (down_db - 44.2).abs() < 1.0), "{:?}", measured(true));
+    assert!(measured(false).iter().all(|down_db| *down_db > 58.0), "{:?}", measured(false));
+}
+
+#[test]
+fn a_beam_three_degrees_high_lights_a_quarter_of_what_stands_ten_metres_away() {
+    let posts = || (0..400).step_by(5).map(|azimuth| post(10.0, azimuth as f64, 0.05)).collect();
+    let measured = |elevation| {
+        let setup = Setup::of(posts(), Effects { elevation, ..Effects::NONE });
+        let at = setup.sampling().bin(10.0).round() as usize;
+        let scans = setup.scans(8);
+        let changed = (0..400).step_by(5).filter(|azimuth| {
+            let counts = scans.iter().map(|scan| scan.view().row(*azimuth)[at]);
+            counts.clone().max() != counts.min()
+        });
+        (mean_db(&scans, (0..400).step_by(5), at..at + 1), changed.count())
+    };
+    let (flat, high) = (measured(false), measured(true));
+    // The mean of 16^-(h / 0.52 m)^2 over heights up to 1.1 m: 0.25.
+    assert!((high.0 - flat.0 + 6.0).abs() < 1.2, "{high:?} and {flat:?}");
+    assert_eq!(flat.1, 0, "nothing changes from scan to scan");
+    assert!(high.1 > 60, "most posts come and go: {}", high.1);
+}

@@ -1,0 +1,126 @@
+//! Noise of every kind, by its mean power.
+
+use gyre_simulator::profile::Profile;
+use gyre_simulator::{ConstantTwist, Effects};
+
+use crate::scene::{Setup, mean_db, post, powers};
+
+const EVERYWHERE: std::ops::Range<usize> = 0..400;
+
+#[test]
+fn noise_has_the_profiles_floor_and_exponential_power() {
+    let setup = Setup { effects: Effects { noise: true, ..Effects::NONE }, ..Setup::default() };
+    let setup = setup.with(Profile::Cts350xRadiate);
+    let scans = setup.scans(2);
+    let bins = setup.bins(40.0..60.0);
+    let mean = mean_db(&scans, EVERYWHERE, bins.clone());
+    // Tabulated: 10.0 dB at 5 m, 9.6 dB at 100 m.
+    assert!((mean - 9.8).abs() < 0.3, "{mean} dB");
+    let below = |share_db: f64| {
+        let rows = scans.iter().flat_map(|scan| powers(scan)).map(|row| &row[bins.clone()]);
+        let counts: Vec<u8> = rows.flatten().copied().collect();
+        let limit = 2.0 * (9.8 + share_db);
+        counts.iter().filter(|count| f64::from(**count) < limit).count() as f64 / counts.len() as f64
+    };
+    // Of an exponential distribution 1 - 1/e lies below the mean, 1 - exp(-0.2) below a fifth of it.
+    assert!((below(0.0) - 0.632).abs() < 0.03, "{}", below(0.0));
+    assert!((below(-7.0) - 0.181).abs() < 0.03, "{}", below(-7.0));
+}
+
+#[test]
+fn whole_powers_leave_gaps_in_the_counts() {
+    let found = |profile| {
+        let setup = Setup { effects: Effects { noise: true, ..Effects::NONE }, ..Setup::default() }.with(profile);
+        let scan = setup.scan();
+        let mut found = [false; 256];
+        powers(&scan).into_iter().flatten().for_each(|count| found[usize::from(*count)] = true);
+        found
+    };
+    let (whole, fine) = (found(Profile::Cts350xOxford), found(Profile::Cts350xRadiate));
+    // Powers 1, 2, 3, 4, 5, 6.
+    for count in 0..16 {
+        assert_eq!(whole[count], [0, 6, 9, 12, 14, 15].contains(&count), "{count}");
+        assert!(fine[count], "{count}");
+    }
+}
+
+#[test]
+fn phase_noise_of_an_echo_lies_60_db_below_it_in_far_bins_of_its_azimuth() {
+    let measured = |phase_noise| {
+        let setup = Setup::of(vec![post(30.0, 100.0, 2000.0)], Effects { phase_noise, ..Effects::NONE });
+        let (scans, far) = (setup.scans(4), setup.bins(100.0..160.0));
+        let below = |azimuth| setup.received_db(2000.0, 30.0) - mean_db(&scans, [azimuth], far.clone());
+        [below(100), below(101), below(110)]
+    };
+    let [there, beside, elsewhere] = measured(true);
+    assert!((there - 60.0).abs() < 1.0, "{there} dB");
+    // One azimuth of 0.9 degrees beside it a beam of 1.27 degrees has 6 dB less.
+    assert!((beside - 66.0).abs() < 1.2, "{beside} dB");
+    assert!(elsewhere > 80.0 && measured(false)[0] > 80.0);
+}
+
+#[test]
+fn reverberation_trails_what_is_strong_and_never_leads_it() {
+    let azimuths = || (3..400).step_by(7);
+    let setup = |reverberation| {
+        let posts = azimuths().map(|azimuth| post(31.0, azimuth as f64, 2000.0)).collect();
+        Setup::of(posts, Effects { reverberation, ..Effects::NONE })
+    };
+    let on = setup(true);
+    let scans = on.scans(4);
+    for row in scans.iter().flat_map(|scan| powers(scan)) {
+        assert!(row[on.bins(5.0..27.0)].iter().all(|count| *count == 0));
+    }
+    let rows = scans.iter().flat_map(|scan| azimuths().map(move |azimuth| (scan, azimuth)));
+    let mut tails: Vec<f64> =
+        rows.map(|(scan, azimuth)| mean_db(std::slice::from_ref(scan), [azimuth], on.bins(50.2..51.8))).collect();
+    tails.sort_by(f64::total_cmp);
+    let below = on.received_db(2000.0, 31.0) - tails[tails.len() / 2];
+    // 20 m behind an echo: 2e-5 exp(-2) + 5e-6 exp(-0.4), half of all directions more, half less.
+    assert!((below - 52.2).abs() < 2.5, "{below} dB");
+    let off = setup(false).scan();
+    assert!(powers(&off).iter().all(|row| row[on.bins(35.0..160.0)].iter().all(|count| *count == 0)));
+}
+
+#[test]
+fn ringing_fills_the_first_metres_with_the_same_bytes_in_every_scan() {
+    let setup = |ringing| Setup { effects: Effects { ringing, ..Effects::NONE }, ..Setup::default() };
+    let scans = setup(true).scans(2);
+    assert_eq!(powers(&scans[0]), powers(&scans[1]));
+    // Ranges by the bin: 0.7 to 1.0 m, 23.7 dB or so; differing by 3 dB round the sweep lifts the mean by one.
+    let level = mean_db(&scans[..1], EVERYWHERE, 16..23);
+    assert!((level - 25.0).abs() < 1.5, "{level} dB");
+    assert!(powers(&scans[0]).iter().all(|row| row[90..].iter().all(|count| *count == 0)));
+    assert!(powers(&setup(false).scan()).into_iter().flatten().all(|count| *count == 0));
+}
+
+#[test]
+fn the_own_vehicle_is_behind_the_radar_whichever_way_it_heads() {
+    let setup = |own_vehicle| Setup { effects: Effects { own_vehicle, ..Effects::NONE }, ..Setup::default() };
+    let turning = ConstantTwist { forward_m_s: 5.0, left_m_s: 0.0, yaw_rad_s: 1.0 };
+    let scans = Setup { trajectory: &turning, ..setup(true) }.scans(4);
+    let parked = setup(true).scan();
+    assert!(scans.iter().all(|scan| powers(scan) == powers(&parked)));
+    let near = setup(true).bins(0.5..8.0);
+    for (azimuth, row) in powers(&parked).into_iter().enumerate() {
+        // 0.7 rad to either side of straight behind, and a beam.
+        let behind = (150..=250).contains(&azimuth);
+        assert!(row.iter().enumerate().all(|(bin, count)| *count == 0 || behind && near.contains(&bin)));
+    }
+    let parts = powers(&parked).into_iter().filter(|row| row.iter().any(|count| *count > 25)).count();
+    assert!(parts > 10, "{parts} azimuths");
+    assert!(powers(&setup(false).scan()).into_iter().flatten().all(|count| *count == 0));
+}
+
+#[test]
+fn spurious_lines_stand_at_their_ranges_with_or_without_noise() {
+    let setup = Setup { effects: Effects { spurious_lines: true, ..Effects::NONE }, ..Setup::default() };
+    let setup = setup.with(Profile::Cts350xRadiate);
+    let scans = setup.scans(4);
+    let lit: Vec<usize> = (0..576).filter(|bin| mean_db(&scans, EVERYWHERE, *bin..*bin + 1) > 3.0).collect();
+    let lines = lit.chunk_by(|a, b| b - a == 1).count();
+    assert_eq!(lines, 4, "{lit:?}");
+    // At 37% of 100 m: 0.9 of the floor, 9.9 dB, of which a cell has two thirds in its own bin.
+    let line = (200..226).map(|bin| mean_db(&scans, EVERYWHERE, bin..bin + 1)).fold(0.0, f64::max);
+    assert!((line - 7.6).abs() < 0.8, "{line} dB");
+}
