@@ -193,7 +193,7 @@ impl Profile {
             carrier_ghz: 76.5,
             beam_rad: 1.27f64.to_radians(),
             cell_m: 0.24,
-            constant: 2.0e11,
+            constant: 1.6e11,
             filter_m: 60.0,
             near_m: 4.0,
             full_scale: 1.0e7,
@@ -204,7 +204,7 @@ impl Profile {
         match self {
             Self::Cts350xOxford => oxford,
             Self::Cts350xRadiate => Receiver {
-                constant: 1.8e12,
+                constant: 1.5e12,
                 full_scale: 2.0e8,
                 whole_powers: false,
                 floor_db: &RADIATE_FLOOR,
@@ -212,9 +212,9 @@ impl Profile {
                 ..oxford
             },
             // No scan of it at hand: Oxford's, with the longer cell of its smaller bandwidth.
-            Self::Cir204h => Receiver { cell_m: 0.33, constant: 2.0e11, ..oxford },
+            Self::Cir204h => Receiver { cell_m: 0.33, constant: 1.6e11, ..oxford },
             Self::Ras6 => Receiver {
-                constant: 1.8e12,
+                constant: 1.5e12,
                 full_scale: 1.0e8,
                 floor_db: &RAS6_FLOOR,
                 ringing_db: &RAS6_RINGING,

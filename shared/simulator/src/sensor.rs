@@ -8,6 +8,7 @@
 //! - `scintillation`: how they flicker as they are passed,
 //! - `elevation`: how much of each the beam has, being a few degrees high; `antenna`: how much of it each azimuth's beam takes in,
 //! - `spectrum`: what range processing and quantisation make of it,
+//! - `ground`: what the road and the fields send back,
 //! - `carrier`: what turns with the radar, its ringing and its vehicle; `noise`: all that no echo explains,
 //! - `effects`: each of these on or off.
 //!
@@ -23,6 +24,7 @@ mod echoes;
 pub mod effects;
 mod elevation;
 mod ghosts;
+mod ground;
 mod noise;
 mod place_hash;
 mod scintillation;
@@ -253,7 +255,13 @@ impl Sensor {
         let doppler_s = if self.effects.doppler { self.doppler_s(azimuth) } else { 0.0 };
         let wavelength_m = self.receiver.wavelength_m();
         self.spectrum.clear();
-        self.noise.begin_azimuth();
+        self.noise.begin_azimuth(|range_m| {
+            if !self.effects.ground {
+                return 0.0;
+            }
+            let passed = if self.effects.occlusion { self.skyline.open(azimuth, range_m) } else { 1.0 };
+            f64::from(passed) * ground::ground_power(station.position + station.beam * range_m, range_m, &self.receiver)
+        });
         for lit in self.starts[azimuth]..self.starts[azimuth + 1] {
             let echo = &self.echoes[self.lit[lit] as usize];
             let way = echo.place(&station) - station.position;

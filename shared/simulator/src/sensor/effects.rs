@@ -33,6 +33,8 @@ pub struct Effects {
     pub ringing: bool,
     /// The vehicle's own roof and rear reflect.
     pub own_vehicle: bool,
+    /// Road, verges and fields send back a little, in patches.
+    pub ground: bool,
     /// Receiver noise, and the diffuse rest of ground and many-fold echoes that falls with range.
     pub noise: bool,
     /// Faint lines at fixed ranges, from clocks and power supplies inside the radar.
@@ -69,6 +71,7 @@ impl Effects {
             reverberation: on,
             ringing: on,
             own_vehicle: on,
+            ground: on,
             noise: on,
             spurious_lines: on,
             interference: on,

@@ -1,4 +1,4 @@
-//! All power that no single echo explains: the receiver's noise, weather, phase noise, reverberation, lines, other radars.
+//! All power that no single echo explains: the receiver's noise, ground, weather, phase noise, reverberation, lines, other radars.
 
 use rand::Rng;
 use rand_distr::StandardNormal;
@@ -18,10 +18,10 @@ const SKIRT_PEAK: f64 = 100.0;
 const SKIRT_WIDTH_M: f64 = 1.5;
 /// Echoes bounce on between houses: so much of an echo's power, falling exponentially over so many metres behind it. The first
 /// is what is behind a front (rooms, eaves, what stands close by), the second a whole street.
-const TAIL: [(f64, f64); 3] = [(1.0e-3, 1.5), (1.2e-5, 10.0), (3.0e-6, 50.0)];
+const TAIL: [(f64, f64); 3] = [(2.0e-3, 1.5), (2.0e-5, 10.0), (2.5e-6, 50.0)];
 /// How much that differs from one direction to the next, standard deviation, dB, and how wide a direction is.
 const LIVELINESS_DB: f64 = 11.0;
-const LIVELY_AZIMUTHS: usize = 7;
+const LIVELY_AZIMUTHS: usize = 11;
 /// Spurious lines: range as a share of the farthest, and power in units of the floor there.
 const LINES: [(f64, f64); 4] = [(0.069, 0.5), (0.164, 0.6), (0.37, 0.9), (0.55, 0.7)];
 /// Times a scan that another radar is heard, on average.
@@ -49,6 +49,8 @@ pub(super) struct Noise {
     steady: Vec<f64>,
     /// Mean power of rain, fog and snow in each noise cell, as received.
     clutter: Vec<f64>,
+    /// Mean power of the ground in each coarse cell of the azimuth at hand.
+    ground: Vec<f64>,
     /// Noise cell to coarse cell.
     coarse_of: Vec<usize>,
     /// Power of echoes in each coarse cell of the azimuth at hand, and the noise that it brings there.
@@ -83,6 +85,7 @@ impl Noise {
             floor: (0..cells).map(floor_at).collect(),
             steady,
             clutter: vec![0.0; cells],
+            ground: vec![0.0; coarse],
             coarse_of: (0..cells).map(|cell| (range_m(cell) / COARSE_M) as usize).collect(),
             echoes: vec![0.0; coarse],
             raised: vec![0.0; coarse],
@@ -123,9 +126,12 @@ impl Noise {
         }
     }
 
-    /// Forgets the azimuth before.
-    pub fn begin_azimuth(&mut self) {
+    /// Forgets the azimuth before. `ground` gives the power from a resolution cell of the ground at a range.
+    pub fn begin_azimuth(&mut self, ground: impl Fn(f64) -> f64) {
         self.echoes.fill(0.0);
+        for (cell, power) in self.ground.iter_mut().enumerate() {
+            *power = ground((cell as f64 + 0.5) * COARSE_M);
+        }
     }
 
     /// Notes an echo's power.
@@ -143,7 +149,8 @@ impl Noise {
         let (_, spacing) = spectrum.noise_cells();
         for (cell, floor) in self.floor.iter().enumerate() {
             let clutter = if self.snow { 0.0 } else { self.clutter[cell] };
-            let mean = floor * (self.steady[cell] + burst) + clutter + self.raised[self.coarse_of[cell]];
+            let coarse = self.coarse_of[cell];
+            let mean = floor * (self.steady[cell] + burst) + clutter + self.ground[coarse] + self.raised[coarse];
             add_gaussian(spectrum, cell as f64 * spacing, mean, rng);
         }
         if self.snow {

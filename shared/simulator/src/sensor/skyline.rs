@@ -85,6 +85,11 @@ impl Skyline {
             .product()
     }
 
+    /// Share of the power, there and back, that passes to a range along the middle of an azimuth's beam.
+    pub fn open(&self, azimuth: usize, range_m: f64) -> f32 {
+        self.transmission(azimuth as f64, range_m, NO_BODY)
+    }
+
     /// The walls on the ray nearest to an azimuth, nearest first.
     pub fn ray(&self, azimuth: f64) -> &[Passed] {
         // What is below zero becomes zero.
