@@ -191,7 +191,7 @@ impl Profile {
     pub fn receiver(self) -> Receiver {
         let oxford = Receiver {
             carrier_ghz: 76.5,
-            beam_rad: 1.27f64.to_radians(),
+            beam_rad: 1.1f64.to_radians(),
             cell_m: 0.24,
             constant: 1.6e11,
             filter_m: 60.0,
@@ -204,7 +204,7 @@ impl Profile {
         match self {
             Self::Cts350xOxford => oxford,
             Self::Cts350xRadiate => Receiver {
-                constant: 1.5e12,
+                constant: 6.0e11,
                 full_scale: 2.0e8,
                 whole_powers: false,
                 floor_db: &RADIATE_FLOOR,

@@ -215,6 +215,10 @@ impl Sensor {
         let clutter = |range_m: f64| air.clutter_m2(range_m, view.receiver) * view.received(range_m);
         let (snow, interference) = (weather.snow_mm_h > 0.0, self.effects.interference);
         self.noise.begin_sweep(&self.sampling, &self.spectrum, interference, snow, clutter, rng);
+        let middle = *self.stations.middle();
+        let heard =
+            |echo: &Echo| (echo.azimuth, (echo.position - middle.position).norm(), echo.amplitude * echo.amplitude);
+        self.noise.listen_around(self.echoes.iter().map(heard));
         self.light();
     }
 

@@ -5,8 +5,8 @@ use crate::interpolate::interpolate;
 /// Side lobes, there and back: dB below the middle of the beam at so many half-power widths beside it.
 ///
 /// The envelope measured on Oxford's, RADIATE's and Boreas-RT's scans: medians of the azimuths beside isolated strong echoes.
-const SIDE_LOBES: [(f64, f64); 7] =
-    [(0.0, -27.0), (2.1, -29.0), (2.8, -39.0), (3.5, -44.0), (4.2, -47.0), (5.6, -52.0), (8.0, -58.0)];
+const SIDE_LOBES: [(f64, f64); 8] =
+    [(1.0, -11.5), (1.64, -20.5), (2.45, -29.5), (3.27, -37.5), (4.1, -42.5), (4.9, -46.0), (6.5, -52.0), (8.0, -57.0)];
 /// Entries of the table for one half-power width.
 const STEPS: f64 = 64.0;
 /// Half-power widths to each side that the table spans.

@@ -16,9 +16,11 @@ const SKIRT: f64 = 1.0e-6;
 /// How much more of it there is at the echo itself, and the distance at which that falls to one half, metres.
 const SKIRT_PEAK: f64 = 100.0;
 const SKIRT_WIDTH_M: f64 = 1.5;
-/// Echoes bounce on between houses: so much of an echo's power, falling exponentially over so many metres behind it. The first
-/// is what is behind a front (rooms, eaves, what stands close by), the second a whole street.
-const TAIL: [(f64, f64); 3] = [(2.0e-3, 1.5), (2.0e-5, 10.0), (2.5e-6, 50.0)];
+/// Echoes bounce on: so much of an echo's power, falling exponentially over so many metres behind it. First what is behind a
+/// front (rooms, eaves, what stands close by), then a whole street, which a beam hears from some azimuths to either side.
+const TAIL: [(f64, f64); 2] = [(2.0e-3, 1.5), (2.0e-5, 10.0)];
+const STREET: (f64, f64) = (2.5e-6, 50.0);
+const STREET_AZIMUTHS: usize = 4;
 /// How much that differs from one direction to the next, standard deviation, dB, and how wide a direction is.
 const LIVELINESS_DB: f64 = 11.0;
 const LIVELY_AZIMUTHS: usize = 11;
@@ -56,9 +58,15 @@ pub(super) struct Noise {
     /// Power of echoes in each coarse cell of the azimuth at hand, and the noise that it brings there.
     echoes: Vec<f64>,
     raised: Vec<f64>,
-    /// Share of an echo's power that is phase noise so many coarse cells beside it, and that reverberates so many behind it.
+    /// Power of echoes in each coarse cell of all azimuths, one azimuth after the other; and its mean over those that a street's
+    /// reverberation comes from.
+    around: Vec<f64>,
+    street: Vec<f64>,
+    /// Share of an echo's power that is phase noise so many coarse cells beside it, and that reverberates so many behind it,
+    /// at the front and along the street.
     skirt: Vec<f64>,
     tail: Vec<f64>,
+    street_tail: Vec<f64>,
     /// By how much each azimuth's surroundings reverberate more or less than usual.
     liveliness: Vec<f64>,
     bursts: Vec<Burst>,
@@ -79,8 +87,8 @@ impl Noise {
         }
         let coarse = (sampling.reach_m() / COARSE_M) as usize + 2;
         let skirt_at = |i: usize| SKIRT * (1.0 + SKIRT_PEAK / (1.0 + (i as f64 * COARSE_M / SKIRT_WIDTH_M).powi(2)));
-        let tail_at =
-            |i: usize| TAIL.iter().map(|(share, length_m)| share * (-(i as f64) * COARSE_M / length_m).exp()).sum();
+        let behind = |i: usize, (share, length_m): (f64, f64)| share * (-(i as f64) * COARSE_M / length_m).exp();
+        let on = if effects.reverberation { 1.0 } else { 0.0 };
         Self {
             floor: (0..cells).map(floor_at).collect(),
             steady,
@@ -90,7 +98,10 @@ impl Noise {
             echoes: vec![0.0; coarse],
             raised: vec![0.0; coarse],
             skirt: (0..coarse).map(|i| if effects.phase_noise { skirt_at(i) } else { 0.0 }).collect(),
-            tail: (0..coarse).map(|i| if effects.reverberation { tail_at(i) } else { 0.0 }).collect(),
+            tail: (0..coarse).map(|i| on * TAIL.map(|tail| behind(i, tail)).iter().sum::<f64>()).collect(),
+            street_tail: (0..coarse).map(|i| on * behind(i, STREET)).collect(),
+            around: vec![0.0; coarse * sampling.azimuths],
+            street: vec![0.0; coarse * sampling.azimuths],
             liveliness: vec![1.0; sampling.azimuths],
             bursts: Vec::new(),
             snow: false,
@@ -126,6 +137,27 @@ impl Noise {
         }
     }
 
+    /// Settles what a sweep's echoes are, (azimuth, range in metres, power) each.
+    pub fn listen_around(&mut self, echoes: impl Iterator<Item = (f64, f64, f64)>) {
+        let (coarse, azimuths) = (self.echoes.len(), self.liveliness.len());
+        self.around.fill(0.0);
+        for (azimuth, range_m, power) in echoes {
+            let (azimuth, cell) = (azimuth.round() as i64, (range_m.max(0.0) / COARSE_M) as usize);
+            if cell < coarse {
+                self.around[azimuth.rem_euclid(azimuths as i64) as usize * coarse + cell] += power;
+            }
+        }
+        self.street.fill(0.0);
+        for azimuth in 0..azimuths {
+            let from = &self.around[azimuth * coarse..(azimuth + 1) * coarse];
+            for beside in 0..=2 * STREET_AZIMUTHS {
+                let to = (azimuth + azimuths + beside - STREET_AZIMUTHS) % azimuths;
+                let to = &mut self.street[to * coarse..(to + 1) * coarse];
+                to.iter_mut().zip(from).for_each(|(to, from)| *to += from / (2 * STREET_AZIMUTHS + 1) as f64);
+            }
+        }
+    }
+
     /// Forgets the azimuth before. `ground` gives the power from a resolution cell of the ground at a range.
     pub fn begin_azimuth(&mut self, ground: impl Fn(f64) -> f64) {
         self.echoes.fill(0.0);
@@ -143,7 +175,7 @@ impl Noise {
 
     /// Adds all of it to the spectrum of an azimuth.
     pub fn add(&mut self, spectrum: &mut RangeSpectrum, azimuth: usize, rng: &mut impl Rng) {
-        self.spread_echoes(self.liveliness[azimuth]);
+        self.spread_echoes(azimuth);
         let heard = |burst: &&Burst| (burst.first..burst.first + burst.azimuths).contains(&azimuth);
         let burst = self.bursts.iter().filter(heard).map(|burst| burst.strength).sum::<f64>();
         let (_, spacing) = spectrum.noise_cells();
@@ -162,8 +194,16 @@ impl Noise {
         }
     }
 
-    fn spread_echoes(&mut self, liveliness: f64) {
+    fn spread_echoes(&mut self, azimuth: usize) {
+        let (liveliness, coarse) = (self.liveliness[azimuth], self.echoes.len());
         self.raised.fill(0.0);
+        for (from, &power) in
+            self.street[azimuth * coarse..][..coarse].iter().enumerate().filter(|(_, power)| **power > 0.0)
+        {
+            for (raised, tail) in self.raised[from..].iter_mut().zip(&self.street_tail) {
+                *raised += liveliness * power * tail;
+            }
+        }
         for (from, &power) in self.echoes.iter().enumerate().filter(|(_, power)| **power > 0.0) {
             let (before, behind) = self.raised.split_at_mut(from);
             for (raised, skirt) in before.iter_mut().rev().zip(&self.skirt[1..]) {
