@@ -10,6 +10,7 @@ use super::effects::Effects;
 use super::spectrum::{NOISE_OVERLAP, RangeSpectrum};
 use crate::interpolate::interpolate;
 use crate::profile::{Chirp, Receiver, Sampling};
+use crate::stream::Stream;
 
 /// How ringing differs from azimuth to azimuth, standard deviation, dB, and over how many azimuths it changes.
 const UNEVEN_DB: f64 = 3.0;
@@ -48,8 +49,7 @@ impl Carrier {
         spectrum: &RangeSpectrum,
         seed: u64,
     ) -> Self {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        rng.set_stream(u64::MAX);
+        let mut rng = Stream::Carrier.generator(seed);
         let mut carrier = Self { azimuths: vec![Vec::new(); sampling.azimuths] };
         if effects.ringing {
             carrier.ring(sampling, receiver, spectrum, &mut rng);
