@@ -42,6 +42,7 @@ pub mod profile;
 pub mod recording;
 pub mod sensor;
 pub mod simulator;
+mod stream;
 pub mod streets;
 pub mod town;
 pub mod traffic;

@@ -79,8 +79,7 @@ pub struct Receiver {
     pub full_scale: f32,
     /// Whether powers are sent as whole numbers of its unit.
     pub whole_powers: bool,
-    /// Mean power between echoes by range: (m, dB above the unit), to be interpolated. Noise, and the diffuse rest of ground
-    /// and many-fold echoes.
+    /// Mean power of the receiver's noise by range: (m, dB above the unit), to be interpolated.
     pub floor_db: &'static [(f64, f64)],
     /// The same of the transmitter's ringing in the first metres.
     pub ringing_db: &'static [(f64, f64)],

@@ -37,7 +37,7 @@ use std::ops::Range;
 
 use gyre_radar::scan::flag;
 use gyre_radar::{ScanSlot, Sense, SweepGeometry};
-use rand::{Rng, SeedableRng};
+use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
@@ -53,11 +53,12 @@ use self::skyline::Skyline;
 use self::spectrum::RangeSpectrum;
 use self::stations::Stations;
 use crate::profile::{Chirp, METADATA_BYTES, Receiver, Sampling};
+use crate::stream::Stream;
 use crate::trajectory::Trajectory;
 use crate::weather::WeatherConfig;
 use crate::world::{Movers, Moving, World};
 
-/// Random numbers are drawn from a stream of their own in each scan, and from a part of their own in each azimuth.
+/// Each azimuth has a part of its own of a scan's random numbers.
 const WORDS_AN_AZIMUTH: u128 = 1 << 24;
 /// Share of azimuths that are lost.
 const DROPPED: f64 = 0.002;
@@ -166,8 +167,7 @@ impl Sensor {
     ///
     /// Its randomness comes from the radar's seed and `index`, the number of the scan.
     pub fn sweep(&mut self, scene: Scene<'_>, time: SweepTime, index: u64, slot: &mut ScanSlot<'_>) -> SweepGeometry {
-        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
-        rng.set_stream(index + 1);
+        let mut rng = Stream::Scan(index).generator(self.seed);
         self.look_around(scene, time, &mut rng);
         for azimuth in 0..self.sampling.azimuths {
             rng.set_word_pos((azimuth as u128 + 1) * WORDS_AN_AZIMUTH);

@@ -12,12 +12,13 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use nalgebra::{Isometry2, Point2, Vector2};
-use rand::{Rng, SeedableRng};
+use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use crate::SimulatorError;
 use crate::config::within;
+use crate::stream::Stream;
 use crate::streets::{Keep, LANE_M, Streets};
 use crate::trajectory::Trajectory;
 use crate::world::{Body, Movers, Moving};
@@ -27,8 +28,6 @@ use track::{Beside, Gap, Lane, Oncoming, Track};
 
 /// Bodies of road users are numbered from here; the town has fewer.
 pub const FIRST_BODY: u32 = 1 << 24;
-/// The stream of random numbers that traffic is drawn with.
-const TRAFFIC_STREAM: u64 = 1 << 42;
 /// Half of the driven vehicle's length and width, metres, with the sensor in its middle.
 const OWN_HALF_M: (f64, f64) = (2.2, 0.9);
 /// Between vehicles that stand in a queue, metres.
@@ -112,8 +111,7 @@ impl Traffic {
         keep: Keep,
         seed: u64,
     ) -> Self {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        rng.set_stream(TRAFFIC_STREAM);
+        let mut rng = Stream::Traffic.generator(seed);
         let way = OwnWay::new(trajectory.as_ref(), duration_s, streets, keep);
         let mut crowd = Crowd::default();
         if config.vehicles_per_km > 0.0 {

@@ -33,11 +33,13 @@ fn rain() -> Exhibit {
 fn fog() -> Exhibit {
     let mut rings = Body::default();
     for range_m in [60.0f64, 100.0, 140.0, 180.0, 220.0, 260.0, 295.0] {
-        rings.extend(scenes::ring(range_m, 300, 2.0 * (range_m / 300.0).powi(4)));
+        // What range takes, but for the receiver's filter of near ones.
+        let taken = range_m.powi(2) * (range_m.powi(2) + 60f64.powi(2)) / 300f64.powi(4);
+        rings.extend(scenes::ring(range_m, 300, 80.0 * taken));
     }
     let shot = Shot::drawn(rings).with(Profile::Ras6);
     let thick = WeatherConfig { fog_g_m3: 3.0, ..WeatherConfig::default() };
-    weather("Fog", thick, shot, &Frame::polar(0.0..100.0, 50.0..300.0).shades(26.0, 64.0)).words(
+    weather("Fog", thick, shot, &Frame::polar(0.0..100.0, 50.0..300.0).shades(30.0, 70.0)).words(
         "Rings of posts as bright as each other, 60 to 300 m around a RAS6, in fog of 3 g/m³, six times what leaves 50 m of sight: a radar \
          hardly minds. The far ones lose up to 8 dB.",
         "ITU-R P.840",
@@ -47,7 +49,7 @@ fn fog() -> Exhibit {
 fn snow() -> Exhibit {
     let shot = Shot::drawn(scenes::lattice(8.0, 40.0, 1.0));
     let heavy = WeatherConfig { snow_mm_h: 8.0, ..WeatherConfig::default() };
-    weather("Snow", heavy, shot, &Frame::map(42.0).shades(BLACK, 60.0)).words(
+    weather("Snow", heavy, shot, &Frame::map(42.0).shades(BLACK, 40.0)).words(
         "Posts 8 m apart in heavy snow, 8 mm/h of water: flakes come in clumps, so its echoes are spottier than rain's; snow on the radome takes its share.",
         "middle values of a literature that varies widely",
     )

@@ -1,12 +1,13 @@
 //! Every switch of `Effects`, off and on.
 
 use std::f64::consts::PI;
+use std::ops::Range;
 
 use gyre_simulator::profile::Profile;
 use gyre_simulator::{Body, Effects, SensorConfig};
 
 use crate::exhibit::Exhibit;
-use crate::picture::{BLACK, Frame};
+use crate::picture::{BLACK, Frame, Picture};
 use crate::scenes;
 use crate::shot::Shot;
 
@@ -22,6 +23,7 @@ pub fn exhibits() -> Vec<Exhibit> {
         side_lobes(),
         elevation(),
         aspect(),
+        scintillation(),
         occlusion(),
         multipath(),
         speckle(),
@@ -29,6 +31,7 @@ pub fn exhibits() -> Vec<Exhibit> {
         reverberation(),
         ringing(),
         own_vehicle(),
+        ground(),
         noise(),
         spurious_lines(),
         interference(),
@@ -87,10 +90,13 @@ fn side_lobes() -> Exhibit {
 }
 
 fn elevation() -> Exhibit {
-    let shot = Shot::drawn(scenes::lattice(3.0, 21.0, 0.1));
+    let mut posts = scenes::lattice(3.0, 21.0, 0.1);
+    posts.extend(scenes::ring(15.0, 8, 20.0));
+    let shot = Shot::drawn(posts);
     let frame = Frame::map(22.0).shades(30.0, 90.0);
     Exhibit::switched(("Beam height and nodding", "elevation"), &shot, &frame, |e| &mut e.elevation).words(
-        "Equal posts 3 m apart: the beam is three degrees high and the car nods on its springs, so what is near is lit by chance.",
+        "Faint posts 3 m apart, and eight strong ones round the car: the beam is a few degrees high and the car nods on its springs, so what is near \
+         is lit by chance. What is strong stands upright, and is lit at one height or another.",
         "the data sheet's 1.8 degrees, widened downwards; how returns come and go between consecutive real scans",
     )
 }
@@ -100,6 +106,33 @@ fn aspect() -> Exhibit {
     Exhibit::switched(("Aspect", "aspect"), &shot, &Frame::map(45.0), |e| &mut e.aspect).words(
         "A wall of smooth panels on the left: where it is met at a right angle it flashes, elsewhere it reflects past the sensor.",
         "a cosine's power about the surface's normal (Phong 1975), as for specular and rough facets in radar",
+    )
+}
+
+fn scintillation() -> Exhibit {
+    const SCANS: usize = 140;
+    const METRES: Range<f64> = 4.0..28.0;
+    // As bright as each other, nearly.
+    let post = |y: f64| scenes::post(8.75, y, 0.02 * y * y);
+    let posts = [6.0, 10.0, 14.0, 18.0, 22.0].map(post).to_vec();
+    let mut shot = Shot::drawn(Body { scatterers: posts, walls: vec![] }).driving(0.5, 0.0);
+    let mut picture = |on| {
+        shot.effects.scintillation = on;
+        let (scans, sampling) = (shot.scans(SCANS as u64), shot.sensor.sampling());
+        let bin = |column: usize| {
+            sampling.bin(METRES.start + (METRES.end - METRES.start) * column as f64 / 240.0).max(0.0) as usize
+        };
+        Picture::of((240, SCANS), |column, row| {
+            // The half turn to the left, which holds the posts.
+            let rows = (200..400).map(|azimuth| &scans[row].view().row(azimuth)[bin(column)..=bin(column + 1)]);
+            (f64::from(rows.flatten().copied().max().unwrap_or_default()) - 80.0) / 45.0
+        })
+    };
+    let pictures = vec![("off", picture(false)), ("on", picture(true))];
+    Exhibit::of("Scintillation", pictures).switch("scintillation").words(
+        "Five posts to the left, passed at 0.5 m/s: a row for each of 140 scans, range to the right. A post is some wavelengths large and \
+         has lobes of its own, so it flickers, and faster the nearer it is passed.",
+        "Swerling 1960, Probability of Detection for Fluctuating Targets (his first case); how returns come and go between consecutive real scans",
     )
 }
 
@@ -155,7 +188,7 @@ fn ringing() -> Exhibit {
     let shot = Shot::drawn(Body::default());
     let frame = Frame::polar(0.0..400.0, 0.0..10.0).shades(0.0, 60.0);
     Exhibit::switched(("Ringing", "ringing"), &shot, &frame, |e| &mut e.ringing).words(
-        "The first 10 m of an empty place: the transmitter rings in the first three, the same in every scan.",
+        "The first 10 m of an empty place: the transmitter rings in the first three, much alike in neighbouring azimuths and the same in every scan.",
         "mean power of the first bins of real scans, profile by profile",
     )
 }
@@ -169,11 +202,29 @@ fn own_vehicle() -> Exhibit {
     )
 }
 
+fn ground() -> Exhibit {
+    let mut front = scenes::rough_wall((3.0, -20.0), (15.0, -20.0), 1.0);
+    front.walls.push(scenes::wall((3.0, -20.0), (15.0, -20.0), 1e-4, 0.0));
+    let shot = Shot::drawn(front);
+    let frame = Frame::map(40.0).shades(2.0, 22.0);
+    let picture = |ground, occlusion| {
+        let effects = Effects { ground, occlusion, ..shot.effects };
+        frame.picture(&Shot { effects, ..shot.clone() }.scans(16))
+    };
+    let pictures =
+        vec![("off", picture(false, true)), ("on", picture(true, true)), ("on, occlusion off", picture(true, false))];
+    Exhibit::of("Ground", pictures).switch("ground").words(
+        "The mean of 16 scans of open country with one front, to the right: road, verges and fields send back a little, in patches that \
+         belong to the place; none from behind the front, unless nothing hides anything.",
+        "diffuse power between echoes in Oxford's and RADIATE's scans; how large patches are is made up",
+    )
+}
+
 fn noise() -> Exhibit {
     let shot = Shot::drawn(scenes::lattice(8.0, 56.0, 0.03));
     let frame = Frame::map(60.0).shades(2.0, 50.0);
     Exhibit::switched(("Noise", "noise"), &shot, &frame, |e| &mut e.noise).words(
-        "Posts 8 m apart: receiver noise, and what ground and many-fold echoes leave everywhere, drown the faint ones.",
+        "Posts 8 m apart: the receiver's noise is everywhere, and drowns the faint ones.",
         "powers of azimuths in which nothing stands, in Oxford's, RADIATE's and Boreas-RT's scans",
     )
 }

@@ -3,10 +3,10 @@
 
 use std::fmt::Write as _;
 
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::Rng;
 
 use crate::output::HostStamps;
+use crate::stream::Stream;
 use crate::{Simulator, SimulatorError};
 
 pub(crate) const FOLDER: &str = "Navtech_Polar";
@@ -63,9 +63,7 @@ fn delay_us(simulator: &Simulator, host: HostStamps, seed: u64, index: usize) ->
         return 0;
     }
     let block = index / STALL_EVERY;
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    // From the far end: scans count their streams from the near one.
-    rng.set_stream(u64::MAX - block as u64);
+    let mut rng = Stream::Stall(block as u64).generator(seed);
     let begins = block * STALL_EVERY + rng.random_range(8..STALL_EVERY / 2);
     let ends_us = simulator.time(begins).start_us + (rng.random_range(STALL_S) * 1e6) as i64;
     let Some(waited) = index.checked_sub(begins) else { return 0 };

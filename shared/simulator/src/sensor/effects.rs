@@ -35,7 +35,7 @@ pub struct Effects {
     pub own_vehicle: bool,
     /// Road, verges and fields send back a little, in patches.
     pub ground: bool,
-    /// Receiver noise, and the diffuse rest of ground and many-fold echoes that falls with range.
+    /// The receiver's own noise, the same in all azimuths.
     pub noise: bool,
     /// Faint lines at fixed ranges, from clocks and power supplies inside the radar.
     pub spurious_lines: bool,

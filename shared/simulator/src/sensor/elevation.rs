@@ -6,11 +6,11 @@
 use std::f64::consts::{LN_2, TAU};
 
 use nalgebra::Point2;
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::Rng;
 use rand_distr::StandardNormal;
 
 use super::place_hash::place_hash;
+use crate::stream::Stream;
 
 /// Height of the beam at half power, there and back, radians: 1.8 degrees one way, widened downwards.
 const BEAM_HEIGHT_RAD: f64 = 0.045;
@@ -42,8 +42,7 @@ pub(super) struct Nodding {
 impl Nodding {
     /// A vehicle's; one seed is one drive.
     pub fn new(seed: u64) -> Self {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        rng.set_stream(u64::MAX - 1);
+        let mut rng = Stream::Nodding.generator(seed);
         let mut oscillation = || Oscillation {
             amplitude_rad: NODDING_RAD * (2.0 / OSCILLATIONS as f64).sqrt() * rng.sample::<f64, _>(StandardNormal),
             frequency_hz: rng.random_range(NODDING_HZ),

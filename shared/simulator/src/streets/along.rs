@@ -1,14 +1,14 @@
 //! Streets laid along a drive, with side streets: the town's plan where only the drive is known.
 
 use nalgebra::Point2;
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 use super::lines::{Line, simplified};
 use super::merge::{WayPoint, driven_lines, way};
 use super::side::side_lines;
 use super::{Street, Streets};
+use crate::stream::Stream;
 use crate::trajectory::Trajectory;
 
 /// Width of a lane, metres: a vehicle drives half of it beside the middle of its street.
@@ -19,8 +19,6 @@ const BESIDE_VEHICLE_M: f64 = 1.3;
 const PASS_S: f64 = 0.05;
 /// Deviation that a street's line may have from the points that were driven, metres.
 const TOLERANCE_M: f64 = 0.1;
-/// The stream of random numbers that streets are drawn with.
-const STREET_STREAM: u64 = 1 << 40;
 /// Width of side streets, metres, from narrow residential ones to collectors.
 const SIDE_WIDTH_M: std::ops::Range<f64> = 5.0..8.0;
 
@@ -41,8 +39,7 @@ impl Streets {
     /// The driven vehicle keeps to its lane; what it drives twice, in either direction and some metres beside, is one
     /// street. The carriageways hold it everywhere with 1.3 m to spare from its middle.
     pub fn along(trajectory: &dyn Trajectory, duration_s: f64, keep: Keep, seed: u64) -> Self {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        rng.set_stream(STREET_STREAM);
+        let mut rng = Stream::Streets.generator(seed);
         let duration_s = trajectory.duration_s().min(duration_s);
         let way = way(trajectory, duration_s, keep);
         let lines = driven_lines(&way);

@@ -6,15 +6,12 @@ mod route;
 mod speed;
 
 use nalgebra::{Isometry2, Point2};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 
 use super::TimedPoses;
 use super::spline::{Sample, UniformSpline};
+use crate::stream::Stream;
 use crate::streets::Keep;
 
-/// The stream of random numbers that drives are drawn with.
-const DRIVE_STREAM: u64 = 1 << 41;
 /// Seconds between the poses that the drive is computed at.
 const STEP_S: f64 = 0.1;
 /// What changes faster than so many times a second is smoothed away: less than any car turns its wheels.
@@ -41,8 +38,7 @@ impl TownDrive {
     /// It comes back to its first streets and takes them once more, has driven some streets in both directions by then,
     /// and ends standing. Streets cross at junctions only; parallel ones are 50 m apart or more. Its start is the origin.
     pub fn trajectory(&self, seed: u64) -> TimedPoses {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        rng.set_stream(DRIVE_STREAM);
+        let mut rng = Stream::Drive.generator(seed);
         let town = plan::Plan::new(self.length_m, &mut rng);
         let route = route::route(&town, self.length_m, &mut rng);
         let lane = lane::lane(&town, &route, self.keep);

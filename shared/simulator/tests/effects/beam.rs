@@ -40,20 +40,20 @@ fn a_point_falls_by_6_db_one_resolution_cell_beside_it() {
 #[test]
 fn side_lobes_are_44_db_down_three_and_a_half_widths_beside_a_point() {
     let measured = |side_lobes| {
-        let setup = Setup::of(vec![post(40.0, 100.0, 20.0)], Effects { side_lobes, ..Effects::NONE });
+        let setup = Setup::of(vec![post(40.0, 100.0, 200.0)], Effects { side_lobes, ..Effects::NONE });
         let (scan, bins) = (setup.scan(), setup.bins(39.0..41.0));
         // Five azimuths of 0.9 degrees are 3.54 beams of 1.27 degrees.
-        [95, 105].map(|azimuth| setup.received_db(20.0, 40.0) - peak_db(&scan, azimuth, bins.clone()))
+        [95, 105].map(|azimuth| setup.received_db(200.0, 40.0) - peak_db(&scan, azimuth, bins.clone()))
     };
     assert!(measured(true).iter().all(|down_db| (down_db - 44.2).abs() < 1.0), "{:?}", measured(true));
     assert!(measured(false).iter().all(|down_db| *down_db > 58.0), "{:?}", measured(false));
 }
 
 #[test]
-fn a_beam_three_degrees_high_lights_a_quarter_of_what_stands_ten_metres_away() {
-    let posts = || (0..400).step_by(5).map(|azimuth| post(10.0, azimuth as f64, 0.05)).collect();
-    let measured = |elevation| {
-        let setup = Setup::of(posts(), Effects { elevation, ..Effects::NONE });
+fn a_flat_beam_misses_most_of_what_is_faint_and_near_and_little_of_what_is_strong() {
+    let measured = |cross_section_m2, elevation| {
+        let posts = (0..400).step_by(5).map(|azimuth| post(10.0, azimuth as f64, cross_section_m2)).collect();
+        let setup = Setup::of(posts, Effects { elevation, ..Effects::NONE });
         let at = setup.sampling().bin(10.0).round() as usize;
         let scans = setup.scans(8);
         let changed = (0..400).step_by(5).filter(|azimuth| {
@@ -62,9 +62,10 @@ fn a_beam_three_degrees_high_lights_a_quarter_of_what_stands_ten_metres_away() {
         });
         (mean_db(&scans, (0..400).step_by(5), at..at + 1), changed.count())
     };
-    let (flat, high) = (measured(false), measured(true));
-    // The mean of 16^-(h / 0.52 m)^2 over heights up to 1.1 m: 0.25.
-    assert!((high.0 - flat.0 + 6.0).abs() < 1.2, "{high:?} and {flat:?}");
-    assert_eq!(flat.1, 0, "nothing changes from scan to scan");
-    assert!(high.1 > 60, "most posts come and go: {}", high.1);
+    let (plane, faint) = (measured(0.05, false), measured(0.05, true));
+    assert!((3.0..12.0).contains(&(plane.0 - faint.0)), "{plane:?} and {faint:?}");
+    assert_eq!(plane.1, 0, "nothing changes from scan to scan");
+    assert!(faint.1 > 25, "many posts come and go: {}", faint.1);
+    let strong_db = measured(5.0, false).0 - measured(5.0, true).0;
+    assert!(strong_db < plane.0 - faint.0 - 2.0, "what stands upright is lit at some height: {strong_db} dB");
 }

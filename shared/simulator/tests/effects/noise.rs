@@ -45,17 +45,17 @@ fn whole_powers_leave_gaps_in_the_counts() {
 }
 
 #[test]
-fn phase_noise_of_an_echo_lies_60_db_below_it_in_far_bins_of_its_azimuth() {
+fn phase_noise_of_an_echo_lies_some_60_db_below_it_in_far_bins_of_its_azimuth() {
     let measured = |phase_noise| {
-        let setup = Setup::of(vec![post(30.0, 100.0, 2000.0)], Effects { phase_noise, ..Effects::NONE });
+        let setup = Setup::of(vec![post(30.0, 100.0, 2e4)], Effects { phase_noise, ..Effects::NONE });
         let (scans, far) = (setup.scans(4), setup.bins(100.0..160.0));
-        let below = |azimuth| setup.received_db(2000.0, 30.0) - mean_db(&scans, [azimuth], far.clone());
+        let below = |azimuth| setup.received_db(2e4, 30.0) - mean_db(&scans, [azimuth], far.clone());
         [below(100), below(101), below(110)]
     };
     let [there, beside, elsewhere] = measured(true);
-    assert!((there - 60.0).abs() < 1.0, "{there} dB");
+    assert!((there - 60.0).abs() < 5.0, "{there} dB");
     // One azimuth of 0.9 degrees beside it a beam of 1.27 degrees has 6 dB less.
-    assert!((beside - 66.0).abs() < 1.2, "{beside} dB");
+    assert!((beside - there - 6.0).abs() < 1.2, "{beside} dB and {there} dB");
     assert!(elsewhere > 80.0 && measured(false)[0] > 80.0);
 }
 
@@ -63,7 +63,7 @@ fn phase_noise_of_an_echo_lies_60_db_below_it_in_far_bins_of_its_azimuth() {
 fn reverberation_trails_what_is_strong_and_never_leads_it() {
     let azimuths = || (3..400).step_by(7);
     let setup = |reverberation| {
-        let posts = azimuths().map(|azimuth| post(31.0, azimuth as f64, 2000.0)).collect();
+        let posts = azimuths().map(|azimuth| post(31.0, azimuth as f64, 2e4)).collect();
         Setup::of(posts, Effects { reverberation, ..Effects::NONE })
     };
     let on = setup(true);
@@ -71,13 +71,19 @@ fn reverberation_trails_what_is_strong_and_never_leads_it() {
     for row in scans.iter().flat_map(|scan| powers(scan)) {
         assert!(row[on.bins(5.0..27.0)].iter().all(|count| *count == 0));
     }
-    let rows = scans.iter().flat_map(|scan| azimuths().map(move |azimuth| (scan, azimuth)));
-    let mut tails: Vec<f64> =
-        rows.map(|(scan, azimuth)| mean_db(std::slice::from_ref(scan), [azimuth], on.bins(50.2..51.8))).collect();
-    tails.sort_by(f64::total_cmp);
-    let below = on.received_db(2000.0, 31.0) - tails[tails.len() / 2];
-    // 20 m behind an echo: 2e-5 exp(-2) + 5e-6 exp(-0.4), half of all directions more, half less.
-    assert!((below - 52.2).abs() < 2.5, "{below} dB");
+    // How far below the echo its tail is so many metres behind it: in the liveliest, the middle and the deadest of ten directions.
+    let below_db = |behind_m: f64| {
+        let rows = scans.iter().flat_map(|scan| azimuths().map(move |azimuth| (scan, azimuth)));
+        let bins = on.bins(30.2 + behind_m..31.8 + behind_m);
+        let mut tails: Vec<f64> =
+            rows.map(|(scan, azimuth)| mean_db(std::slice::from_ref(scan), [azimuth], bins.clone())).collect();
+        tails.sort_by(f64::total_cmp);
+        [9, 5, 1].map(|tenths| on.received_db(2e4, 31.0) - tails[tails.len() * tenths / 10])
+    };
+    let [near, middle, far] = [6.0, 20.0, 60.0].map(below_db);
+    assert!(near[1] + 2.0 < middle[1] && middle[1] + 2.0 < far[1], "{near:?}, {middle:?}, {far:?} dB");
+    assert!((45.0..65.0).contains(&middle[1]), "{middle:?} dB");
+    assert!(middle[2] - middle[0] > 10.0, "directions differ: {middle:?} dB");
     let off = setup(false).scan();
     assert!(powers(&off).iter().all(|row| row[on.bins(35.0..160.0)].iter().all(|count| *count == 0)));
 }
@@ -87,11 +93,31 @@ fn ringing_fills_the_first_metres_with_the_same_bytes_in_every_scan() {
     let setup = |ringing| Setup { effects: Effects { ringing, ..Effects::NONE }, ..Setup::default() };
     let scans = setup(true).scans(2);
     assert_eq!(powers(&scans[0]), powers(&scans[1]));
-    // Ranges by the bin: 0.7 to 1.0 m, 23.7 dB or so; differing by 3 dB round the sweep lifts the mean by one.
-    let level = mean_db(&scans[..1], EVERYWHERE, 16..23);
-    assert!((level - 25.0).abs() < 1.5, "{level} dB");
+    let (range_resolution_m, tabulated) =
+        (setup(true).sampling().range_resolution_m, setup(true).receiver().ringing_db);
+    for (range_m, tabulated_db) in tabulated.iter().filter(|(_, db)| *db > 15.0) {
+        let bin = (range_m / range_resolution_m) as usize;
+        let level = mean_db(&scans[..1], EVERYWHERE, bin.saturating_sub(2)..bin + 3);
+        // Neighbours ring alike, so a turn has only some ten independent values.
+        assert!((level - tabulated_db).abs() < 4.5, "{level} dB for {tabulated_db} dB at {range_m} m");
+    }
     assert!(powers(&scans[0]).iter().all(|row| row[90..].iter().all(|count| *count == 0)));
     assert!(powers(&setup(false).scan()).into_iter().flatten().all(|count| *count == 0));
+}
+
+#[test]
+fn ringing_changes_smoothly_from_azimuth_to_azimuth_and_where_the_turn_closes() {
+    let scan = Setup { effects: Effects { ringing: true, ..Effects::NONE }, ..Setup::default() }.scan();
+    let rows = powers(&scan);
+    // Decibels by which azimuths so many apart differ, on average over all bins up to 1.3 m.
+    let apart_db = |azimuth: usize, apart: usize| {
+        let (one, other) = (&rows[azimuth][..30], &rows[(azimuth + apart) % 400][..30]);
+        let counts = one.iter().zip(other).map(|(a, b)| f64::from(a.abs_diff(*b)));
+        counts.sum::<f64>() / 60.0
+    };
+    let mean = |apart| (0..400).map(|azimuth| apart_db(azimuth, apart)).sum::<f64>() / 400.0;
+    assert!(2.0 * mean(1) < mean(100), "{} dB and {} dB", mean(1), mean(100));
+    assert!(apart_db(399, 1) < 0.8 * mean(100), "{} dB", apart_db(399, 1));
 }
 
 #[test]
