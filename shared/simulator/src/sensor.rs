@@ -4,7 +4,7 @@
 //!
 //! - `stations`: where the sensor is at each azimuth, and when its beam passes a place,
 //! - `skyline`: rays to all sides, and the walls that each passes,
-//! - `echoes`, `ghosts`: what can be seen, directly and mirrored, and how strongly; `air`: what the weather takes,
+//! - `echoes`, `highlights`, `ghosts`: what can be seen, directly, as a gliding spot on a wall, and mirrored, and how strongly; `air`: what the weather takes,
 //! - `scintillation`: how they flicker as they are passed,
 //! - `elevation`: how much of each the beam has, being a few degrees high; `antenna`: how much of it each azimuth's beam takes in,
 //! - `spectrum`: what range processing and quantisation make of it,
@@ -25,8 +25,9 @@ pub mod effects;
 mod elevation;
 mod ghosts;
 mod ground;
+mod highlights;
 mod noise;
-mod place_hash;
+mod place_noise;
 mod scintillation;
 mod skyline;
 pub mod spectrum;
@@ -206,6 +207,9 @@ impl Sensor {
         self.echoes.clear();
         view.standing(scene.world, &mut self.echoes);
         view.moving(&movers, &mut self.echoes);
+        if self.effects.highlights {
+            view.highlights(scene.world, &mut self.echoes);
+        }
         if self.effects.multipath {
             view.ghosts(scene.world, &mut self.echoes);
         }
@@ -214,6 +218,7 @@ impl Sensor {
         self.jitter_rad.iter_mut().for_each(|jitter| *jitter = jitter_rad * rng.sample::<f64, _>(StandardNormal));
         let clutter = |range_m: f64| air.clutter_m2(range_m, view.receiver) * view.received(range_m);
         let (snow, interference) = (weather.snow_mm_h > 0.0, self.effects.interference);
+        self.noise.feel_surroundings(&self.stations, rng);
         self.noise.begin_sweep(&self.sampling, &self.spectrum, interference, snow, clutter, rng);
         let middle = *self.stations.middle();
         let heard =

@@ -17,6 +17,8 @@ pub struct Effects {
     pub speckle: bool,
     /// Smooth and tilted surfaces reflect into some directions only; off: all reflect to all sides.
     pub aspect: bool,
+    /// Smooth walls shine where they face the sensor squarely: a spot that glides along with it.
+    pub highlights: bool,
     /// What reflects has lobes of its own, and flickers as it is passed.
     pub scintillation: bool,
     /// The beam is a few degrees high and the vehicle nods, so that what is lit comes and goes.
@@ -63,6 +65,7 @@ impl Effects {
             side_lobes: on,
             speckle: on,
             aspect: on,
+            highlights: on,
             scintillation: on,
             elevation: on,
             occlusion: on,

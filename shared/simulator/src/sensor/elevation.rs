@@ -9,7 +9,7 @@ use nalgebra::Point2;
 use rand::Rng;
 use rand_distr::StandardNormal;
 
-use super::place_hash::place_hash;
+use super::place_noise::place_hash;
 use crate::stream::Stream;
 
 /// Height of the beam at half power, there and back, radians: 1.8 degrees one way, widened downwards.

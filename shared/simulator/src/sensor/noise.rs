@@ -1,10 +1,14 @@
 //! All power that no single echo explains: the receiver's noise, ground, weather, phase noise, reverberation, lines, other radars.
 
+use std::f64::consts::TAU;
+
 use rand::Rng;
 use rand_distr::StandardNormal;
 
 use super::effects::Effects;
+use super::place_noise::smooth_noise;
 use super::spectrum::{NOISE_OVERLAP, RangeSpectrum};
+use super::stations::Stations;
 use crate::interpolate::interpolate;
 use crate::profile::{Receiver, Sampling};
 
@@ -21,9 +25,12 @@ const SKIRT_WIDTH_M: f64 = 1.5;
 const TAIL: [(f64, f64); 2] = [(2.0e-3, 1.5), (2.0e-5, 10.0)];
 const STREET: (f64, f64) = (2.5e-6, 50.0);
 const STREET_AZIMUTHS: usize = 4;
-/// How much that differs from one direction to the next, standard deviation, dB, and how wide a direction is.
-const LIVELINESS_DB: f64 = 11.0;
-const LIVELY_AZIMUTHS: usize = 11;
+/// How much that differs from one direction to the next, standard deviation, dB; how many directions there are, and over how
+/// many metres of the way it changes.
+const LIVELINESS_DB: f64 = 8.0;
+const STIRRED_DB: f64 = 7.0;
+const LIVELY_SECTORS: u64 = 60;
+const LIVELY_M: f64 = 4.0;
 /// Spurious lines: range as a share of the farthest, and power in units of the floor there.
 const LINES: [(f64, f64); 4] = [(0.069, 0.5), (0.164, 0.6), (0.37, 0.9), (0.55, 0.7)];
 /// Times a scan that another radar is heard, on average.
@@ -123,7 +130,6 @@ impl Noise {
             *power = clutter(sampling.range_m(cell as f64 * spacing).max(0.5));
         }
         self.snow = snow;
-        self.draw_liveliness(rng);
         self.bursts.clear();
         // A Poisson process, one exponential gap after another.
         let mut at = -(1.0 - rng.random::<f64>()).ln();
@@ -134,6 +140,23 @@ impl Noise {
                 strength: 10f64.powf(rng.random_range(BURST_DB) / 10.0),
             });
             at -= (1.0 - rng.random::<f64>()).ln();
+        }
+    }
+
+    /// Settles how much each direction reverberates: log-normal numbers that belong to the place and the world's directions.
+    /// Leaves stir and doors open: a part of it is new in each sweep.
+    pub fn feel_surroundings(&mut self, stations: &Stations, rng: &mut impl Rng) {
+        let stirred: Vec<f64> =
+            (0..LIVELY_SECTORS).map(|_| STIRRED_DB * rng.sample::<f64, _>(StandardNormal)).collect();
+        for (azimuth, liveliness) in self.liveliness.iter_mut().enumerate() {
+            let station = stations.at(azimuth as f64);
+            let sector = station.beam.y.atan2(station.beam.x).rem_euclid(TAU) / TAU * LIVELY_SECTORS as f64;
+            let (first, share) = (sector as u64 % LIVELY_SECTORS, sector.fract());
+            let db = |sector: u64| {
+                LIVELINESS_DB * smooth_noise(station.position, LIVELY_M, sector) + stirred[sector as usize]
+            };
+            let both = db(first) * (1.0 - share) + db((first + 1) % LIVELY_SECTORS) * share;
+            *liveliness = 10f64.powf(both / 10.0);
         }
     }
 
@@ -212,19 +235,6 @@ impl Noise {
             for ((raised, skirt), tail) in behind.iter_mut().zip(&self.skirt).zip(&self.tail) {
                 *raised += power * (skirt + liveliness * tail);
             }
-        }
-    }
-
-    /// Log-normal numbers round the sweep, smooth over some azimuths and where it closes.
-    fn draw_liveliness(&mut self, rng: &mut impl Rng) {
-        let azimuths = self.liveliness.len();
-        let count = azimuths.div_ceil(LIVELY_AZIMUTHS);
-        let knots: Vec<f64> = (0..count).map(|_| LIVELINESS_DB * rng.sample::<f64, _>(StandardNormal)).collect();
-        for (azimuth, liveliness) in self.liveliness.iter_mut().enumerate() {
-            let at = (azimuth * count) as f64 / azimuths as f64;
-            let (knot, share) = (at as usize, at.fract());
-            let db = knots[knot] * (1.0 - share) + knots[(knot + 1) % count] * share;
-            *liveliness = 10f64.powf(db / 10.0);
         }
     }
 }

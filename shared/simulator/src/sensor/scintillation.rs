@@ -4,10 +4,10 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Point2, Vector2};
 
-use super::place_hash::place_hash;
+use super::place_noise::place_hash;
 
-/// Angle over which a scatterer's lobes change, radians: half a wavelength over its size, here some ten centimetres.
-const LOBE_RAD: f64 = 0.02;
+/// Angle over which a scatterer's lobes change, radians: half a wavelength over its size, here some fifteen centimetres.
+const LOBE_RAD: f64 = 0.012;
 
 /// Factor on the cross-section of what stands at `place`, seen from `direction` (a unit vector): exponentially distributed
 /// over directions with a mean near 1 (Swerling's first case), smooth from one to the next.
