@@ -108,7 +108,8 @@ impl View<'_> {
             return 1.0;
         }
         let azimuth_rad = azimuth * self.stations.step_rad();
-        lit(scatterer.position, range_m, self.nodding.lift_rad(self.middle_s + from.time_s, azimuth_rad))
+        let lift_rad = self.nodding.lift_rad(self.middle_s + from.time_s, azimuth_rad);
+        lit(scatterer.position, range_m, lift_rad, self.receiver.beam_height_rad)
     }
 
     /// Power received from 1 m2 at a range: the fourth power of range, and the receiver's gain, which rises with it.

@@ -10,8 +10,6 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-/// Height of the beam at half power, there and back, radians: 1.8 degrees one way, widened downwards.
-const BEAM_HEIGHT_RAD: f64 = 0.052;
 /// Heights of scatterers about the radar's, metres: this much up or down.
 const HEIGHT_M: f64 = 1.1;
 /// Nodding of a car on its springs, standard deviation, radians.
@@ -57,9 +55,9 @@ impl Nodding {
     }
 }
 
-/// Share of the power that a scatterer gets from a beam that points up by `lift_rad`.
-pub(super) fn lit(place: Point2<f64>, range_m: f64, lift_rad: f64) -> f64 {
-    let off = (height_m(place) / range_m - lift_rad) / BEAM_HEIGHT_RAD;
+/// Share of the power that a scatterer gets from a beam of a height that points up by `lift_rad`.
+pub(super) fn lit(place: Point2<f64>, range_m: f64, lift_rad: f64, beam_height_rad: f64) -> f64 {
+    let off = (height_m(place) / range_m - lift_rad) / beam_height_rad;
     (-4.0 * LN_2 * off * off).exp()
 }
 
@@ -88,7 +86,8 @@ mod tests {
     fn a_beam_that_points_up_loses_what_is_far_and_keeps_what_is_high() {
         let place =
             (0..10_000).map(|i| Point2::new(f64::from(i), 0.0)).find(|p| height_m(*p) > 1.03).unwrap_or_default();
-        assert!(lit(place, 1e4, 0.0) > 0.99 && lit(place, 1e4, 0.05) < 0.1);
-        assert!(lit(place, 21.0, 0.05) > 0.9 && lit(place, 10.0, 0.0) < 0.01);
+        assert!(lit(place, 1e4, 0.0, 0.052) > 0.99 && lit(place, 1e4, 0.05, 0.052) < 0.1);
+        assert!(lit(place, 21.0, 0.05, 0.052) > 0.9 && lit(place, 10.0, 0.0, 0.052) < 0.01);
+        assert!(lit(place, 10.0, 0.0, 0.25) > 0.5, "a fan lights it");
     }
 }
