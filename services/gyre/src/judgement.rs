@@ -20,6 +20,9 @@ pub struct Judgement {
     /// `None`: there are no covariances, or the truth cannot judge them.
     #[serde(skip_serializing_if = "Option::is_none")]
     nees: Option<Nees>,
+    /// Share of the poses whose error in x, y, yaw is within three standard deviations of what their covariance says, %.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    within_3_sigma_percent: Option<[f64; 3]>,
     #[serde(skip)]
     bands: Option<Bands>,
 }
@@ -29,7 +32,8 @@ impl Judgement {
     pub fn new(evaluation: Evaluation, motions: Option<&JudgedMotions>, options: &NeesOptions) -> Self {
         let nees = motions.map(|motions| nees(motions, options));
         let bands = motions.map(|motions| bands(motions, options.truth_sigma));
-        Self { evaluation, nees, bands }
+        let within_3_sigma_percent = bands.as_ref().map(|bands| bands.inside_percent(3.0));
+        Self { evaluation, nees, within_3_sigma_percent, bands }
     }
 
     /// Draws all there is: trajectory, errors where the truth has heading, bands where there are covariances.
@@ -49,6 +53,9 @@ impl Judgement {
 impl fmt::Display for Judgement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.evaluation.fmt(f)?;
+        if let Some([x, y, yaw]) = self.within_3_sigma_percent {
+            write!(f, "\nwithin        3 sigma of the pose: x {x:.0} %, y {y:.0} %, yaw {yaw:.0} %")?;
+        }
         let Some(nees) = &self.nees else { return Ok(()) };
         write!(f, "\n\n")?;
         nees.fmt(f)

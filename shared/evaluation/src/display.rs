@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::{Coverage, Evaluation, Kitti, Nees, NeesFigures, NeesLength, Rpe, Seg, TruthSigma};
+use crate::{Coverage, EndError, Evaluation, Kitti, Nees, NeesFigures, NeesLength, Rpe, Seg, TruthSigma};
 
 impl fmt::Display for Evaluation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -23,6 +23,9 @@ impl fmt::Display for Evaluation {
             "ATE           {:.3} m rmse, {:.3} m mean, {:.3} m max, after SE(2) alignment",
             ate.rmse_m, ate.mean_m, ate.max_m
         )?;
+        if let Some(end) = &self.end {
+            writeln!(f, "end           {end}")?;
+        }
         match &self.rpe {
             Some(rpe) => write!(f, "per pair      {rpe}")?,
             None => write!(f, "per pair      none: the truth has no heading")?,
@@ -94,6 +97,16 @@ impl fmt::Display for Kitti {
 impl fmt::Display for Seg {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:.4} % of the length, each stretch aligned by itself", self.percent)
+    }
+}
+
+impl fmt::Display for EndError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.2} m off", self.position_m)?;
+        if let Some(percent) = self.percent {
+            write!(f, ", {percent:.2} % of the path")?;
+        }
+        write!(f, ", heading {:.2} deg; the first poses on each other", self.heading_deg)
     }
 }
 

@@ -8,7 +8,7 @@
 //! - [`report`]: [`evaluate`] is the whole method, one line a step;
 //! - [`mod@associate`]: which pose of the estimate is held against which pose of the truth;
 //! - [`mirror`]: axes that run the other way, found and undone;
-//! - [`mod@ate`], [`mod@kitti`], [`mod@seg`], [`mod@rpe`]: one metric each, on [`MatchedPoses`];
+//! - [`mod@ate`], [`mod@kitti`], [`mod@seg`], [`mod@end`], [`mod@rpe`]: one metric each, on [`MatchedPoses`];
 //! - [`motions`]: reported motions with covariances, all or those of a part, each beside its truth;
 //! - [`mod@nees`], [`mod@bands`]: whether these covariances are honest, as figures and over time;
 //! - [`plot`]: trajectory, errors and bands as SVG.
@@ -32,6 +32,7 @@ pub mod bands;
 mod chi_square;
 mod covariance;
 mod display;
+pub mod end;
 mod error;
 pub mod kitti;
 mod matched;
@@ -48,6 +49,7 @@ pub use associate::{Association, Coverage, Trajectory, associate};
 pub use ate::{Ate, align, ate};
 pub use bands::{BandSample, Bands, bands};
 pub use covariance::{TruthSigma, UncertainMotion};
+pub use end::{EndError, end_error};
 pub use error::{EvaluationError, Side};
 pub use kitti::{Kitti, kitti};
 pub use matched::MatchedPoses;

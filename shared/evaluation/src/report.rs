@@ -5,8 +5,8 @@ use std::num::NonZeroUsize;
 use serde::Serialize;
 
 use crate::{
-    Association, Ate, Axes, Coverage, EvaluationError, Kitti, MatchedPoses, Rpe, Seg, Trajectory, associate, ate,
-    kitti, mirror::resolve_axes, rpe, seg,
+    Association, Ate, Axes, Coverage, EndError, EvaluationError, Kitti, MatchedPoses, Rpe, Seg, Trajectory, associate,
+    ate, end_error, kitti, mirror::resolve_axes, rpe, seg,
 };
 
 /// How to evaluate.
@@ -42,6 +42,8 @@ pub struct Evaluation {
     pub ate: Ate,
     /// Shape of stretches of 100 to 800 m; `None` for a shorter path.
     pub seg: Option<Seg>,
+    /// How far off the last pose is; `None` for a truth without heading.
+    pub end: Option<EndError>,
     /// Errors of single motions; `None` for a truth without heading.
     pub rpe: Option<Rpe>,
     /// What was compared, the estimate in the truth's handedness but not aligned; for plots, not serialised.
@@ -69,6 +71,7 @@ pub fn evaluate(
         kitti: has_heading.then(|| kitti(&matched, options.step)).flatten(),
         ate: ate(&matched),
         seg: seg(&matched, options.step),
+        end: has_heading.then(|| end_error(&matched)),
         rpe: has_heading.then(|| rpe(&matched)),
         matched,
     })

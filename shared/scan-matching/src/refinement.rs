@@ -204,18 +204,15 @@ impl Refinement {
 
     /// Descends from each start on the coarse map, and from the best of them on the fine one.
     fn best_of(&mut self, query: &Query<'_>, starts: &[(Hypothesis, Isometry2<f64>)]) -> Candidate {
-        let velocity = match &self.memory.anchors[0] {
-            Some(anchor) => anchor.velocity,
-            None => self.memory.velocity_to(&query.searched, query.interval_s),
-        };
-        self.placed.place(query.points, &velocity);
-        self.placed.thin(COARSE_POINTS);
         let coarse = self.keyframes.coarse();
         let mut best: Option<(Hypothesis, Match, bool)> = None;
         for (k, (hypothesis, start)) in starts.iter().enumerate() {
             if starts[..k].iter().any(|(_, other)| self.in_one_valley(start, other)) {
                 continue;
             }
+            // By the start's own motion: in a sweep of a second, that of the scan before is ten degrees off where a turn begins.
+            self.placed.place(query.points, &self.memory.velocity_to(start, query.interval_s));
+            self.placed.thin(COARSE_POINTS);
             let found = register(&coarse, &self.placed, start, COARSE_STEPS);
             let allowed = self.memory.allows(&found.pose, query.interval_s, 1.0, &self.config);
             let better = best.is_none_or(|(_, best, best_allowed)| match (allowed, best_allowed) {

@@ -67,6 +67,8 @@ pub struct Receiver {
     pub carrier_ghz: f64,
     /// Width of the beam at half power, there and back, radians.
     pub beam_rad: f64,
+    /// Height of the beam at half power, there and back, radians.
+    pub beam_height_rad: f64,
     /// Range resolution of the window: between two independent cells, metres.
     pub cell_m: f64,
     /// Power received from 1 m2 is this over the fourth power of range far away, in the receiver's units.
@@ -170,7 +172,8 @@ impl Profile {
                 doppler_s: 0.0505,
                 ..oxford
             },
-            // 3 degrees are 46.67 counts of 5600; 3600 counts divide evenly.
+            // Checchin et al. 2010, Table 1; 3600 counts are its angular precision of 0.1 degrees. What Doppler's effect shifts
+            // a range by depends on the chirp's duration, which is not told: 0 until `sensor.doppler_s` says otherwise.
             Self::K2pi => Sampling {
                 azimuths: 120,
                 bins: 162,
@@ -191,6 +194,8 @@ impl Profile {
         let oxford = Receiver {
             carrier_ghz: 76.5,
             beam_rad: 1.1f64.to_radians(),
+            // 1.8 degrees one way, widened downwards.
+            beam_height_rad: 0.045,
             cell_m: 0.24,
             constant: 1.6e11,
             filter_m: 60.0,
@@ -219,11 +224,15 @@ impl Profile {
                 ringing_db: &RAS6_RINGING,
                 ..oxford
             },
-            // 24 GHz, a beam of 3 degrees; nothing nearer than 3 m, so no ringing.
+            // Checchin et al. 2010, Table 1: 24 GHz, an angular resolution of 3 degrees, 250 MHz, which is 0.6 m. A gain of 20 dB
+            // with so narrow a beam makes a fan: 20 degrees high one way, assumed. Assumed are the sensitivity, by which 1 m2 at
+            // 100 m, the end of its range, stands 16 dB above the floor, its filter and its floor. Nothing is nearer than 3 m,
+            // so no ringing shows.
             Self::K2pi => Receiver {
                 carrier_ghz: 24.0,
-                beam_rad: 2.6f64.to_radians(),
-                cell_m: 0.75,
+                beam_rad: 3.0f64.to_radians(),
+                beam_height_rad: 0.25,
+                cell_m: 0.6,
                 constant: 2.0e10,
                 filter_m: 40.0,
                 whole_powers: false,
@@ -235,7 +244,7 @@ impl Profile {
     }
 }
 
-/// Floors are those of azimuths in which nothing stands, in real scans; K2Pi's is made up.
+/// Floors are those of azimuths in which nothing stands, in real scans; K2Pi's is assumed.
 const OXFORD_FLOOR: [(f64, f64); 4] = [(2.5, 2.5), (5.0, 3.7), (60.0, 3.7), (150.0, 3.2)];
 const OXFORD_RINGING: [(f64, f64); 8] =
     [(0.2, 19.7), (0.6, 22.2), (0.8, 24.2), (1.0, 23.7), (1.25, 19.7), (1.5, 15.2), (2.0, 11.2), (2.7, 2.0)];

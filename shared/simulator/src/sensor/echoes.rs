@@ -113,7 +113,7 @@ impl View<'_> {
     /// Share of the power that the beam has at a scatterer's height, seen over a way of `range_m`.
     pub fn lit(&self, scatterer: &Scatterer, range_m: f64, from: &Station) -> f64 {
         if self.effects.elevation {
-            lit(scatterer.position, scatterer.cross_section_m2, range_m, from.lift_rad)
+            lit(scatterer.position, scatterer.cross_section_m2, range_m, from.lift_rad, self.receiver.beam_height_rad)
         } else {
             1.0
         }

@@ -12,8 +12,6 @@ use rand_distr::StandardNormal;
 use super::place_noise::place_hash;
 use crate::stream::Stream;
 
-/// Height of the beam at half power, there and back, radians: 1.8 degrees one way, widened downwards.
-const BEAM_HEIGHT_RAD: f64 = 0.045;
 /// Heights of scatterers about the radar's, metres: this much up or down.
 const HEIGHT_M: f64 = 1.6;
 /// Cross-section of what is half a spot and half an upright, square metres.
@@ -60,10 +58,10 @@ impl Nodding {
     }
 }
 
-/// Share of the power that a scatterer gets from a beam that points up by `lift_rad`. What is strong stands upright (posts,
+/// Share of the power that a scatterer gets from a beam of a height that points up by `lift_rad`. What is strong stands upright (posts,
 /// corners) and is lit at some height in any case.
-pub(super) fn lit(place: Point2<f64>, cross_section_m2: f64, range_m: f64, lift_rad: f64) -> f64 {
-    let off = (height_m(place) / range_m - lift_rad) / BEAM_HEIGHT_RAD;
+pub(super) fn lit(place: Point2<f64>, cross_section_m2: f64, range_m: f64, lift_rad: f64, beam_height_rad: f64) -> f64 {
+    let off = (height_m(place) / range_m - lift_rad) / beam_height_rad;
     let spot = (-4.0 * LN_2 * off * off).exp();
     let upright = cross_section_m2 / (cross_section_m2 + UPRIGHT_M2);
     spot + (1.0 - spot) * upright
@@ -92,7 +90,8 @@ mod tests {
             .map(|i| Point2::new(f64::from(i), 0.0))
             .find(|p| height_m(*p) > 0.97 * HEIGHT_M)
             .unwrap_or_default();
-        assert!(lit(place, 0.1, 1e4, 0.0) > 0.99 && lit(place, 0.1, 1e4, 0.05) < 0.1);
-        assert!(lit(place, 0.1, HEIGHT_M / 0.05, 0.05) > 0.9 && lit(place, 0.1, 10.0, 0.0) < 0.05);
+        assert!(lit(place, 0.1, 1e4, 0.0, 0.045) > 0.99 && lit(place, 0.1, 1e4, 0.05, 0.045) < 0.1);
+        assert!(lit(place, 0.1, HEIGHT_M / 0.05, 0.05, 0.045) > 0.9 && lit(place, 0.1, 10.0, 0.0, 0.045) < 0.05);
+        assert!(lit(place, 0.1, 10.0, 0.0, 0.25) > 0.3, "a fan lights it");
     }
 }

@@ -1,0 +1,44 @@
+//! A radar that takes a second for a turn (Checchin et al. 2010), simulated, with real processes: the shipped configuration and the
+//! paper's algorithm on the first minute of the same drive, bends included.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::path::Path;
+
+use common::{Run, odometry};
+use serde_json::Value;
+
+const SCANS: usize = 60;
+/// Measured over some 200 m each: 0.7, 0.7 and 0.5 m off by the shipped configuration, 12.4, 10.3 and 2.9 m by the paper's.
+const SEEDS: [u32; 3] = [1, 2, 3];
+
+/// What a configuration makes of a drive: its evaluation.
+fn evaluation(configuration: &str, seed: u32) -> Value {
+    let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
+    let run = Run::of_file(&configs.join(configuration)).rate("max");
+    let run = run.set(&format!("simulation.scans={SCANS}")).set(&format!("simulation.seed={seed}"));
+    let rows = odometry::rows(&run.complete());
+    assert_eq!(rows.len(), SCANS - 1);
+    odometry::assert_unbroken(&rows);
+    assert!(run.out().join("bands.svg").exists());
+    run.summary()["evaluation"].clone()
+}
+
+#[test]
+fn the_shipped_configuration_ends_within_a_hundredth_and_the_papers_does_not_come_near() {
+    let (mut shipped_m, mut papers_m) = (0.0, 0.0);
+    for seed in SEEDS {
+        let [shipped, papers] = ["k2pi.toml", "k2pi-checchin.toml"].map(|file| evaluation(file, seed));
+        let percent = shipped["end"]["percent"].as_f64().unwrap();
+        println!("seed {seed}: shipped {}, paper's {}", shipped["end"], papers["end"]);
+        assert!(shipped["path_m"].as_f64().unwrap() > 150.0 && percent < 1.0, "seed {seed}: {}", shipped["end"]);
+        assert!(
+            shipped["within_3_sigma_percent"].as_array().unwrap().iter().all(|share| share.as_f64().unwrap() > 80.0)
+        );
+        shipped_m += shipped["end"]["position_m"].as_f64().unwrap();
+        papers_m += papers["end"]["position_m"].as_f64().unwrap();
+    }
+    assert!(papers_m > 3.0 * shipped_m, "{papers_m} m in sum by the paper's, {shipped_m} m by the shipped one");
+}
