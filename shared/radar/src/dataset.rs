@@ -18,6 +18,7 @@ mod radiate;
 mod sensor_clock;
 mod sideways;
 pub(crate) mod stamp;
+mod told;
 
 use std::path::Path;
 
@@ -77,10 +78,12 @@ pub trait Dataset: Send {
 
 /// Opens the dataset at `root`: the folder that holds the radar's folder, or the folder of images itself.
 ///
-/// The format is detected unless `options` names it.
+/// The format is detected unless `options` names it. What `options` leave open is taken from a `dataset.toml` in the folder, if
+/// there is one: the recording's word on itself.
 pub fn open(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
+    let options = options.or(&told::options(root)?);
     options.check()?;
-    read_as_found(detect::locate(root, options.format)?, options)
+    read_as_found(detect::locate(root, options.format)?, &options)
 }
 
 /// Opens a recording that lies on no disk: in its own format, unless `options` name another.

@@ -60,7 +60,8 @@ pub fn write_dataset_on(
     fs::create_dir_all(&images).map_err(SimulatorError::write(&images))?;
     let _alone = lock(out)?;
     let missing = resume::missing(&recording, config, out)?;
-    write_whole(&out.join(MADE_BY), resume::made_by(&recording, config)?.as_bytes())?;
+    write_whole(&out.join(MADE_BY), resume::made_by(config)?.as_bytes())?;
+    write_whole(&out.join(resume::TOLD), resume::told(&recording)?.as_bytes())?;
     write_side_files(&recording, out)?;
     let kept = recording.scans() - missing.len();
     progress(kept, recording.scans());

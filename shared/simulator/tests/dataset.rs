@@ -39,7 +39,7 @@ fn all_files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 fn same_configuration_writes_the_same_bytes() {
     let (first, second) = (generate(&config(4)), generate(&config(4)));
     assert_eq!(all_files(first.path()), all_files(second.path()));
-    assert_eq!(all_files(first.path()).len(), 4 + 5);
+    assert_eq!(all_files(first.path()).len(), 4 + 6);
 }
 
 #[test]

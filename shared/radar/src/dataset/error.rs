@@ -64,6 +64,14 @@ pub enum OpenError {
         /// The system's reason.
         source: std::io::Error,
     },
+    /// A `dataset.toml` that cannot be understood.
+    #[error("{path} should say how the recording is to be read, with the keys of [dataset]: {reason}")]
+    Told {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// The first image cannot serve: it says how large all scans are.
     #[error("the first image does not say how large the scans are: {0}")]
     FirstImage(#[from] ReadError),

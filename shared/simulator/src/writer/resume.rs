@@ -14,14 +14,17 @@ use crate::{SimulationConfig, SimulatorError};
 /// The file that says what made a recording: its configuration.
 pub const MADE_BY: &str = "simulation.toml";
 
+/// The file that says how to read it; see [`gyre_radar::open`].
+pub(super) const TOLD: &str = "dataset.toml";
+
 /// Content of [`MADE_BY`].
-pub(super) fn made_by(recording: &Recording, config: &SimulationConfig) -> Result<String, SimulatorError> {
-    let options = to_toml(&recording.dataset_options())?;
-    let options: String = options.lines().map(|line| format!("#   {line}\n")).collect();
-    let text = to_toml(config)?;
-    Ok(format!(
-        "# A simulated recording. Read with these keys of [dataset] it is true to its radar:\n{options}\n{text}"
-    ))
+pub(super) fn made_by(config: &SimulationConfig) -> Result<String, SimulatorError> {
+    Ok(format!("# What made this recording.\n{}", to_toml(config)?))
+}
+
+/// Content of [`TOLD`]: how to read it so that it is true to its radar.
+pub(super) fn told(recording: &Recording) -> Result<String, SimulatorError> {
+    to_toml(&recording.dataset_options())
 }
 
 fn to_toml(value: &impl serde::Serialize) -> Result<String, SimulatorError> {
