@@ -82,6 +82,14 @@ pub fn metal_wall() -> Body {
     all
 }
 
+/// A faint long front of glass to the left, with three posts before it.
+pub fn glass_front() -> Body {
+    let mut all = rough_wall((-60.0, 14.0), (60.0, 14.0), 0.005);
+    all.walls.push(wall((-60.0, 14.0), (60.0, 14.0), 0.1, 0.4));
+    all.scatterers.extend([post(21.0, 9.0, 5.0), post(7.0, 9.0, 5.0), post(-9.0, 9.0, 5.0)]);
+    all
+}
+
 /// Two houses' fronts among posts.
 pub fn walls_among_posts() -> Body {
     let mut all = lattice(5.0, 45.0, 5.0);

@@ -23,6 +23,7 @@ pub fn exhibits() -> Vec<Exhibit> {
         side_lobes(),
         elevation(),
         aspect(),
+        highlights(),
         scintillation(),
         occlusion(),
         multipath(),
@@ -106,6 +107,28 @@ fn aspect() -> Exhibit {
     Exhibit::switched(("Aspect", "aspect"), &shot, &Frame::map(45.0), |e| &mut e.aspect).words(
         "A wall of smooth panels on the left: where it is met at a right angle it flashes, elsewhere it reflects past the sensor.",
         "a cosine's power about the surface's normal (Phong 1975), as for specular and rough facets in radar",
+    )
+}
+
+fn highlights() -> Exhibit {
+    /// Scans in which it drives 15 m.
+    const LATER: u64 = 4;
+    let shot = Shot::drawn(scenes::glass_front()).driving(15.0, 0.0);
+    let frame = Frame::map(32.0);
+    let picture = |highlights, index| {
+        let effects = Effects { highlights, ..shot.effects };
+        frame.picture(&[Shot { effects, index, ..shot.clone() }.scan()])
+    };
+    let pictures = vec![
+        ("off", picture(false, 0)),
+        ("off, 15 m on", picture(false, LATER)),
+        ("on", picture(true, 0)),
+        ("on, 15 m on", picture(true, LATER)),
+    ];
+    Exhibit::of("Highlights", pictures).switch("highlights").words(
+        "A glass front along the left side, with three posts before it, from two places 15 m apart: the posts stay behind, but the spot where the \
+         front faces the radar squarely has glided along with it.",
+        "Knott, Shaeffer and Tuley, Radar Cross Section, on large flat plates; how smooth walls are is made up",
     )
 }
 

@@ -89,7 +89,7 @@ fn the_same_patches_are_seen_from_two_poses() {
         brightness_db(&scans, places().map(|place| from.inverse_transform_point(&place)))
     };
     let [first, second] = poses.map(|pose| seen(pose, pose));
-    assert!(correlation(&first, &second) > 0.8, "{}", correlation(&first, &second));
     let elsewhere = seen(Isometry2::translation(1000.0, 0.0), poses[0]);
-    assert!(correlation(&first, &elsewhere) < 0.6, "{}", correlation(&first, &elsewhere));
+    let (same, other) = (correlation(&first, &second), correlation(&first, &elsewhere));
+    assert!(same > 0.5 && same > other + 0.3, "{same}, and {other} elsewhere");
 }

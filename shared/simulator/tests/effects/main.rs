@@ -6,6 +6,7 @@ mod chance;
 mod documentation;
 mod echoes;
 mod ground;
+mod highlights;
 mod motion;
 mod noise;
 mod scene;
