@@ -74,6 +74,35 @@ fn both_tables_are_filled_and_their_commands_repeat_the_runs() {
     repeats(folder.path(), line(accuracy, "f-raw, line 14")["ours"]["command"].as_str().unwrap());
 }
 
+#[test]
+fn a_ladder_leads_from_the_papers_form_to_each_sequences_own_configuration_side_by_side() {
+    let folder = folder();
+    fs::write(folder.path().join("wide.toml"), "[raster]\nn = 127\ncell_m = 1.0\n").unwrap();
+    let mut command = tables(folder.path());
+    command.args(["--ladder", "--no-table-iii", "--config", "wide.toml", "--data"]).arg(recording::small());
+    let ended = Ended::of(command);
+    ended.succeeded();
+    assert!(!ended.stdout.contains("## III"), "{}", ended.stdout);
+    let json = fs::read_to_string(folder.path().join("out/tables.json")).unwrap();
+    let json: Value = serde_json::from_str(&json).unwrap();
+    let [small, wide] = [0, 1].map(|sequence| json["ladders"][sequence]["lines"].as_array().unwrap());
+    assert_eq!((small.len(), wide.len()), (9, 9));
+    for (index, step) in small.iter().chain(wide).enumerate() {
+        let [path, ate] = ["path_m", "ate_m"].map(|key| step["accuracy"][key].as_f64().unwrap());
+        assert!(path > 40.0 && ate < 0.05 * path, "{index}: {step:#}");
+    }
+    let ate = |step: &Value| step["accuracy"]["ate_m"].clone();
+    // The same raster up to the step to their own.
+    assert_eq!(small[..3].iter().map(ate).collect::<Vec<_>>(), wide[..3].iter().map(ate).collect::<Vec<_>>());
+    assert_ne!(ate(&small[3]), ate(&wide[3]));
+    let own = small[8]["accuracy"]["command"].as_str().unwrap();
+    assert!(!own.contains("--set"), "{own}");
+    for (index, step) in small.iter().enumerate() {
+        let line = format!("| {} {} | - | - |", index + 1, step["step"].as_str().unwrap());
+        assert!(ended.stdout.lines().any(|printed| printed.starts_with(&line)), "{line}: {}", ended.stdout);
+    }
+}
+
 /// Asserts that a command of the table, in another folder for its results, gives what it gave in the table.
 fn repeats(folder: &Path, command: &str) {
     let words: Vec<&str> = command.split(' ').collect();

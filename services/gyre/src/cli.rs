@@ -124,6 +124,12 @@ pub struct TablesArguments {
     /// neighbours; may be repeated.
     #[arg(long, value_name = "KEY=VALUE,...")]
     pub vary: Vec<String>,
+    /// Also run each step from the paper's form to the configuration as it is, each with those before it.
+    #[arg(long)]
+    pub ladder: bool,
+    /// Leave Table III out, times and accuracy: only what --ladder and --vary ask for.
+    #[arg(long)]
+    pub no_table_iii: bool,
     /// Rasters' sides whose times are measured, cells.
     #[arg(long, value_delimiter = ',', default_value = "127,255,511")]
     pub sizes: Vec<usize>,

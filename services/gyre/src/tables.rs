@@ -4,9 +4,11 @@
 //! - [`papers`]: the paper's figures;
 //! - [`times`] (Table IIIa) and [`peer`]; [`accuracy`] (Table IIIb): the measurements;
 //! - [`variations`]: what single changes do to the shipped configuration;
+//! - [`ladder`]: the steps from the paper's form to it;
 //! - [`markdown`]: the tables as text.
 
 pub(crate) mod accuracy;
+mod ladder;
 mod markdown;
 mod papers;
 mod peer;
@@ -31,6 +33,7 @@ use crate::{
     print,
 };
 use accuracy::Accuracies;
+use ladder::Ladder;
 use peer::Peer;
 use times::Times;
 use variations::Variations;
@@ -45,12 +48,14 @@ struct Tables {
     /// UTC.
     date: String,
     command: String,
-    /// Table IIIa.
-    times: Times,
+    /// Table IIIa, unless `--no-table-iii` leaves it out.
+    times: Option<Times>,
     /// Table IIIb, sequence by sequence.
     accuracy: Vec<Accuracies>,
     /// What `--vary` asked for, sequence by sequence.
     variations: Vec<Variations>,
+    /// What `--ladder` asked for, sequence by sequence.
+    ladders: Vec<Ladder>,
     /// Where the paper's figures are from.
     papers: &'static str,
 }
@@ -59,7 +64,8 @@ struct Tables {
 pub fn tables(arguments: &TablesArguments) -> Result<ExitCode, Failure> {
     let sequences = sequences(arguments)?;
     let changes = variations::changes(&arguments.vary)?;
-    let varied = if changes.is_empty() { &[] } else { sequences.as_slice() };
+    let where_asked = |asked: bool| if asked { sequences.as_slice() } else { &[] };
+    let table_iii = !arguments.no_table_iii;
     for change in &changes {
         sequences[0].configuration(std::slice::from_ref(change))?;
     }
@@ -72,14 +78,21 @@ pub fn tables(arguments: &TablesArguments) -> Result<ExitCode, Failure> {
         machine: Machine::this(),
         date: today(),
         command: command(env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned())),
-        times: times::measure(&sequences[0], &arguments.sizes, arguments.passes.get(), peer.as_ref(), out)?,
-        accuracy: sequences
+        times: where_asked(table_iii)
+            .first()
+            .map(|first| times::measure(first, &arguments.sizes, arguments.passes.get(), peer.as_ref(), out))
+            .transpose()?,
+        accuracy: where_asked(table_iii)
             .iter()
             .map(|sequence| accuracy::measure(sequence, &out.join(&sequence.name)))
             .collect::<Result<_, _>>()?,
-        variations: varied
+        variations: where_asked(!changes.is_empty())
             .iter()
             .map(|sequence| variations::measure(sequence, &changes, &out.join(&sequence.name)))
+            .collect::<Result<_, _>>()?,
+        ladders: where_asked(arguments.ladder)
+            .iter()
+            .map(|sequence| ladder::measure(sequence, &out.join(&sequence.name)))
             .collect::<Result<_, _>>()?,
         papers: papers::SOURCE,
     };

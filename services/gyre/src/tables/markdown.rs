@@ -5,6 +5,7 @@ use std::fmt::Write;
 use super::{
     Tables,
     accuracy::{Accuracies, Accuracy, AccuracyLine},
+    ladder::{Ladder, Step},
     times::{Median, TimeLine, Times},
     variations::{Variation, Variations},
 };
@@ -13,17 +14,17 @@ use super::{
 pub(super) fn of(tables: &Tables) -> String {
     let commit = tables.commit.map(|commit| format!(" ({commit})")).unwrap_or_default();
     let mut text = format!(
-        "# Table III by gyre {}{commit}\n\n{}; {}\n\n```sh\n{}\n```\n\nThe papers' figures: {}.\n\n",
+        "# Tables by gyre {}{commit}\n\n{}; {}\n\n```sh\n{}\n```\n\nThe papers' figures: {}.\n\n",
         tables.version, tables.machine, tables.date, tables.command, tables.papers
     );
-    text += &times(&tables.times);
+    text += &tables.times.as_ref().map(times).unwrap_or_default();
     for sequence in &tables.accuracy {
         text += &accuracies(sequence);
     }
     for sequence in &tables.variations {
         text += &variations(sequence);
     }
-    text
+    text + &ladders(&tables.ladders)
 }
 
 fn times(times: &Times) -> String {
@@ -131,6 +132,29 @@ fn variations(sequence: &Variations) -> String {
     format!("\n## One change at a time on {}\n\n{}", sequence.data, table(&header, lines))
 }
 
+/// The sequences' ladders side by side.
+fn ladders(sequences: &[Ladder]) -> String {
+    let Some(first) = sequences.first() else { return String::new() };
+    let mut header = vec!["step"];
+    sequences.iter().for_each(|_| header.extend(["KITTI %", "deg/100 m", "ATE m", "seg %"]));
+    let errors = |step: &Step| {
+        let a = &step.accuracy;
+        let [translation, rotation] = [a.translation_percent, a.rotation_deg_per_100m].map(|error| number(error, 2));
+        [translation, rotation, number(a.ate_m, 2), number(a.seg_percent, 3)]
+    };
+    let line = |(index, step): (usize, &Step)| {
+        let all = sequences.iter().flat_map(|sequence| errors(&sequence.lines[index]));
+        std::iter::once(format!("{} {}", index + 1, step.step)).chain(all).collect::<Vec<_>>()
+    };
+    let data: Vec<&str> = sequences.iter().map(|sequence| sequence.data.as_str()).collect();
+    let lines = first.lines.iter().enumerate().map(line);
+    format!(
+        "\n## Ladder\n\nEach step with those before it. From the left: {}.\n\n{}",
+        data.join(", then "),
+        table(&header, lines)
+    )
+}
+
 /// What the ground truth does not allow.
 fn truth(accuracy: Option<&Accuracy>) -> String {
     match accuracy.map(|accuracy| (accuracy.path_m, accuracy.seg_percent)) {
@@ -232,19 +256,25 @@ mod tests {
         let none =
             Medians { translation_percent: None, rotation_deg_per_100m: None, ate_m: Some(1.5), seg_percent: None };
         let variations = vec![Variations { data: "drive".to_owned(), lines: vec![one_change], median: none }];
+        let ladder = |seg| Ladder {
+            configuration: "c.toml".to_owned(),
+            data: "drive".to_owned(),
+            lines: vec![Step { step: "Eq. 7", accuracy: accuracy(Some(885.0), seg) }],
+        };
         let tables = Tables {
             version: "1.0",
             commit: Some("abc"),
             machine,
             date,
             command,
-            times,
+            times: Some(times),
             accuracy: sequences,
             variations,
+            ladders: vec![ladder(Some(0.5)), ladder(None)],
             papers: "P",
         };
         let text = of(&tables);
-        assert!(text.starts_with("# Table III by gyre 1.0 (abc)\n\nA, 2 cores; 2024-02-29\n"), "{text}");
+        assert!(text.starts_with("# Tables by gyre 1.0 (abc)\n\nA, 2 cores; 2024-02-29\n"), "{text}");
         assert!(
             text.contains("| raw | 2.12 | 0.75 | 7.50 | 1.50 | 0.50 | 0.100 | - | 2.00 | 0.75 | 120 | 6.39 | 20.87 |")
         );
@@ -253,7 +283,9 @@ mod tests {
         assert!(text.contains(
             "| a.b=1 | 2.12 | 0.75 | 1.50 | 0.500 | 0.75 |\n| median of the changes | - | - | 1.50 | - | - |"
         ));
-        assert_eq!(cells, [11, 11, 14, 14, 14, 14, 7, 7, 7, 7]);
+        assert!(text.contains("From the left: drive, then drive.\n"), "{text}");
+        assert!(text.contains("| 1 Eq. 7 | 2.12 | 0.75 | 1.50 | 0.500 | - | - | 1.50 | - |\n"), "{text}");
+        assert_eq!(cells, [11, 11, 14, 14, 14, 14, 7, 7, 7, 7, 10, 10, 10]);
     }
 
     #[test]

@@ -53,7 +53,7 @@ const PAPERS_RASTER: &[&str] = &[
 const RAW: &[&str] = &["search.kind=exhaustive", "exhaustive.overlap=none", "exhaustive.peak=parabola"];
 
 /// As `configs/fast-mbym.toml`, but for the form.
-const F_RAW: &[&str] = &[
+pub const F_RAW: &[&str] = &[
     "rotation.window=hann",
     "rotation.band_low=0.01",
     "rotation.band_high=0.35",
@@ -85,13 +85,18 @@ impl Row {
 
     /// Its name as that of a folder.
     pub fn folder(&self) -> String {
-        let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' };
-        let mut name: String = self.name.chars().map(plain).collect();
-        while name.contains("--") {
-            name = name.replace("--", "-");
-        }
-        name
+        folder(self.name)
     }
+}
+
+/// A name as that of a folder.
+pub fn folder(name: &str) -> String {
+    let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' };
+    let mut name: String = name.chars().map(plain).collect();
+    while name.contains("--") {
+        name = name.replace("--", "-");
+    }
+    name
 }
 
 /// A line of a table: a row of ours, a row of the papers, or both.
