@@ -36,7 +36,7 @@ fn five_processes_give_the_same_bytes_again_though_one_is_killed() {
     let error = summary["evaluation"]["ate"]["rmse_m"].as_f64().unwrap();
     assert!(path > 100.0 && error < 0.02 * path, "{error} m over {path} m");
 
-    let again = demo().rate("8").data(&first.out().join("recording"));
+    let again = demo().rate("8");
     let mut running = again.start();
     for poses in [SCANS / 4, SCANS / 2] {
         running.await_poses(poses).kill(JOINT);
