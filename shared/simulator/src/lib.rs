@@ -1,4 +1,4 @@
-//! A small honest radar simulator for demonstrations and tests.
+//! Simulated drives: towns, traffic, weather, and spinning FMCW radars that are fitted to real ones.
 //!
 //! A vehicle with a spinning radar drives through a procedural town; what comes out is a recording in Oxford's, Boreas' or RADIATE's
 //! form with exact ground truth, on a disk or straight into a pipeline. In the order in which the data come about:
