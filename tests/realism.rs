@@ -78,6 +78,7 @@ fn one_scan_and_a_recording_without_truth_have_what_can_be_had() {
     let folder = folder();
     let single = recording::copy(1);
     fs::remove_dir_all(folder.path().join("other/gt")).unwrap();
+    fs::remove_file(folder.path().join("other/ground_truth.tum")).unwrap();
     let configs = ["--sim-config", "small.toml", "--real-config", "small.toml"];
     realism(folder.path(), &[&[single.path().to_str().unwrap(), "other"], &configs[..]].concat()).succeeded();
     let report = report(folder.path());

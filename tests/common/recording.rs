@@ -25,7 +25,7 @@ pub fn copy(scans: usize) -> TempDir {
     for name in ["radar", "gt"] {
         fs::create_dir(folder.path().join(name)).unwrap();
     }
-    for file in ["radar.timestamps", "gt/radar_odometry.csv"] {
+    for file in ["radar.timestamps", "dataset.toml", "gt/radar_odometry.csv"] {
         fs::copy(small().join(file), folder.path().join(file)).unwrap();
     }
     for image in images(small()).iter().take(scans) {
