@@ -104,30 +104,7 @@ impl Diagram {
         x: Range<f64>,
         y: Range<f64>,
     ) -> Result<(), PlotError> {
-        let mut chart = ChartBuilder::on(area)
-            .margin_left(px(20.0))
-            .margin_right(px(20.0))
-            .margin_bottom(px(16.0))
-            .set_label_area_size(LabelAreaPosition::Left, px(84.0))
-            .set_label_area_size(LabelAreaPosition::Bottom, px(46.0))
-            .build_cartesian_2d(x, y)
-            .map_err(drawing)?;
-        chart
-            .configure_mesh()
-            .max_light_lines(0)
-            .bold_line_style(line(GRID, 1.0))
-            .axis_style(line(QUIET, 1.0))
-            .set_all_tick_mark_size(px(5.0))
-            .x_label_formatter(&number)
-            .y_label_formatter(&number)
-            .x_labels(10)
-            .y_labels(6)
-            .label_style(font(14.0, INK))
-            .axis_desc_style(font(15.0, INK))
-            .x_desc(self.x_desc)
-            .y_desc(self.y_desc)
-            .draw()
-            .map_err(drawing)?;
+        let mut chart = chart(area, x, y, [self.x_desc, self.y_desc])?;
         for (curve, colour) in curves.iter().zip(COLOURS) {
             chart.draw_series(LineSeries::new(curve.iter().copied(), line(colour, 2.0))).map_err(drawing)?;
         }

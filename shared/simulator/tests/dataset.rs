@@ -1,10 +1,12 @@
 //! A generated dataset: repeatable, in Oxford's conventions, and readable by the reader for real data.
 #![allow(clippy::unwrap_used)]
 
-use std::collections::BTreeMap;
+mod common;
+
 use std::fs;
 use std::path::Path;
 
+use common::all_files;
 use gyre_radar::scan::flag;
 use gyre_radar::{DatasetOptions, Format, OwnedScan};
 use gyre_simulator::profile::METADATA_BYTES;
@@ -19,20 +21,6 @@ fn generate(config: &SimulationConfig) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     write_dataset(config, folder.path(), &mut |_, _| {}).unwrap();
     folder
-}
-
-fn all_files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    let mut files = BTreeMap::new();
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        let name = path.file_name().unwrap().to_string_lossy().into_owned();
-        if path.is_dir() {
-            files.extend(all_files(&path).into_iter().map(|(below, bytes)| (format!("{name}/{below}"), bytes)));
-        } else {
-            files.insert(name, fs::read(&path).unwrap());
-        }
-    }
-    files
 }
 
 #[test]

@@ -1,11 +1,14 @@
 //! Recordings of each format: written, read back by the readers for real data, cut short, gone on with, and played without a disk.
 #![allow(clippy::unwrap_used)]
 
+mod common;
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
+use common::all_files;
 use gyre_radar::{Dataset, DatasetOptions, Format, OwnedScan, find_ground_truth, inspect, read_trajectory};
 use gyre_simulator::output::OutputConfig;
 use gyre_simulator::{
@@ -155,20 +158,6 @@ fn azimuth_poses_are_an_array_that_numpy_reads() {
         let expected = [time_s, pose.translation.x, pose.translation.y, pose.rotation.angle()];
         assert_eq!(values[(scan * 400 + azimuth) * 4..][..4], expected);
     }
-}
-
-fn all_files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    let mut files = BTreeMap::new();
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        let name = path.file_name().unwrap().to_string_lossy().into_owned();
-        if path.is_dir() {
-            files.extend(all_files(&path).into_iter().map(|(below, bytes)| (format!("{name}/{below}"), bytes)));
-        } else {
-            files.insert(name, fs::read(&path).unwrap());
-        }
-    }
-    files
 }
 
 #[test]

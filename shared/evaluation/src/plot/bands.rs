@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use plotters::{coord::types::RangedCoordf64, prelude::*};
+use plotters::prelude::*;
 
 use super::{PlotError, canvas::*};
 use crate::{BandSample, Bands, TruthSigma};
@@ -111,8 +111,6 @@ fn draw_panel(area: &Area<'_>, panel: &Panel, time_s: Range<f64>, with_time_axis
     }
     Ok(())
 }
-
-type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
 fn draw_mesh(chart: &mut Chart<'_, '_>, y_desc: &str, with_time_axis: bool) -> Result<(), PlotError> {
     let mut mesh = chart.configure_mesh();

@@ -1,11 +1,20 @@
 //! What all plots share: a fine grid of coordinates, a palette, a header with title, caption and legend.
 
-use plotters::{coord::Shift, prelude::*, style::text_anchor};
+use std::ops::Range;
+
+use plotters::{
+    coord::{Shift, types::RangedCoordf64},
+    prelude::*,
+    style::text_anchor,
+};
 
 use super::PlotError;
 
 /// An area of the SVG.
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+/// A diagram with two axes.
+pub type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
 /// plotters places SVG points on whole pixels, which makes curves jagged. So everything is drawn this much larger,
 /// and the document shows it smaller.
@@ -40,6 +49,43 @@ pub fn font(size: f64, colour: RGBColor) -> TextStyle<'static> {
 /// A line of `width` px.
 pub fn line(colour: RGBColor, width: f64) -> ShapeStyle {
     colour.stroke_width(px(width))
+}
+
+/// An empty diagram with its axes and what stands beside them.
+///
+/// # Errors
+/// [`PlotError::Draw`].
+pub fn chart<'a, 'b>(
+    area: &Area<'b>,
+    x: Range<f64>,
+    y: Range<f64>,
+    [x_desc, y_desc]: [&str; 2],
+) -> Result<Chart<'a, 'b>, PlotError> {
+    let mut chart = ChartBuilder::on(area)
+        .margin_left(px(20.0))
+        .margin_right(px(20.0))
+        .margin_bottom(px(16.0))
+        .set_label_area_size(LabelAreaPosition::Left, px(84.0))
+        .set_label_area_size(LabelAreaPosition::Bottom, px(46.0))
+        .build_cartesian_2d(x, y)
+        .map_err(drawing)?;
+    chart
+        .configure_mesh()
+        .max_light_lines(0)
+        .bold_line_style(line(GRID, 1.0))
+        .axis_style(line(QUIET, 1.0))
+        .set_all_tick_mark_size(px(5.0))
+        .x_label_formatter(&number)
+        .y_label_formatter(&number)
+        .x_labels(10)
+        .y_labels(5)
+        .label_style(font(14.0, INK))
+        .axis_desc_style(font(15.0, INK))
+        .x_desc(x_desc)
+        .y_desc(y_desc)
+        .draw()
+        .map_err(drawing)?;
+    Ok(chart)
 }
 
 /// Draws on a white document of `size` px and returns it.

@@ -102,30 +102,7 @@ fn draw_panel(area: &Area<'_>, panel: &Panel) -> Result<(), PlotError> {
     let largest = panel.values.iter().map(|v| v.1).fold(0.0, f64::max);
     // an estimate without any error still gets an axis
     let top = if largest > 1e-9 { (1.0 + HEADROOM) * largest } else { 1.0 };
-    let mut chart = ChartBuilder::on(area)
-        .margin_left(px(20.0))
-        .margin_right(px(20.0))
-        .margin_bottom(px(16.0))
-        .set_label_area_size(LabelAreaPosition::Left, px(84.0))
-        .set_label_area_size(LabelAreaPosition::Bottom, px(46.0))
-        .build_cartesian_2d(panel.x.clone(), 0.0..top)
-        .map_err(drawing)?;
-    chart
-        .configure_mesh()
-        .max_light_lines(0)
-        .bold_line_style(line(GRID, 1.0))
-        .axis_style(line(QUIET, 1.0))
-        .set_all_tick_mark_size(px(5.0))
-        .x_label_formatter(&number)
-        .y_label_formatter(&number)
-        .x_labels(10)
-        .y_labels(5)
-        .label_style(font(14.0, INK))
-        .axis_desc_style(font(15.0, INK))
-        .x_desc(panel.x_desc)
-        .y_desc(panel.y_desc)
-        .draw()
-        .map_err(drawing)?;
+    let mut chart = chart(area, panel.x.clone(), 0.0..top, [panel.x_desc, panel.y_desc])?;
     if let Some(mean) = panel.mean {
         let ends = [(panel.x.start, mean), (panel.x.end, mean)];
         chart.draw_series(DashedLineSeries::new(ends, px(6.0), px(5.0), line(MARK, 1.5))).map_err(drawing)?;

@@ -71,7 +71,7 @@ impl View<'_> {
 /// The mirrors that fill most of the view, by the number of rays that meet them first.
 fn mirrors(world: &World, skyline: &Skyline, azimuths: usize) -> Vec<Wall> {
     let mut rays: BTreeMap<u32, u32> = BTreeMap::new();
-    for (_, first) in skyline.first_walls(azimuths) {
+    for first in skyline.first_walls(azimuths) {
         if world.walls().get(first.wall as usize).is_some_and(|wall| wall.mirror >= LEAST_MIRROR) {
             *rays.entry(first.wall).or_default() += 1;
         }

@@ -20,7 +20,7 @@ impl View<'_> {
     /// Collects the highlights of all walls that are met first by a ray.
     pub fn highlights(&self, world: &World, echoes: &mut Vec<Echo>) {
         let numbers: BTreeSet<u32> =
-            self.skyline.first_walls(self.stations.azimuths()).map(|(_, first)| first.wall).collect();
+            self.skyline.first_walls(self.stations.azimuths()).map(|first| first.wall).collect();
         for wall in numbers.into_iter().filter_map(|number| world.walls().get(number as usize)) {
             self.highlight(wall, echoes);
         }

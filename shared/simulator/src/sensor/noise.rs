@@ -25,17 +25,18 @@ const SKIRT_WIDTH_M: f64 = 1.5;
 const TAIL: [(f64, f64); 2] = [(2.0e-3, 1.5), (2.0e-5, 10.0)];
 const STREET: (f64, f64) = (2.5e-6, 50.0);
 const STREET_AZIMUTHS: usize = 4;
-/// How much that differs from one direction to the next, standard deviation, dB; how many directions there are, and over how
-/// many metres of the way it changes.
+/// How much that differs from one direction to the next, standard deviation, dB: what belongs to the place, and what is new in each
+/// sweep.
 const LIVELINESS_DB: f64 = 8.0;
 const STIRRED_DB: f64 = 7.0;
+/// Directions that differ, and over how many metres of the way each changes.
 const LIVELY_SECTORS: u64 = 60;
 const LIVELY_M: f64 = 4.0;
 /// Spurious lines: range as a share of the farthest, and power in units of the floor there.
 const LINES: [(f64, f64); 4] = [(0.069, 0.5), (0.164, 0.6), (0.37, 0.9), (0.55, 0.7)];
 /// Times a scan that another radar is heard, on average.
 const BURSTS_A_SCAN: f64 = 0.6;
-/// Most azimuths that one burst lasts.
+/// Azimuths that one burst lasts.
 const BURST_AZIMUTHS: std::ops::RangeInclusive<usize> = 1..=4;
 /// How far bursts stand above the floor, dB.
 const BURST_DB: std::ops::Range<f64> = 3.0..22.0;

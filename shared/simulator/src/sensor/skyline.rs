@@ -99,11 +99,8 @@ impl Skyline {
     }
 
     /// The first walls of all rays of the sweep proper.
-    pub fn first_walls(&self, azimuths: usize) -> impl Iterator<Item = (f64, &Passed)> {
+    pub fn first_walls(&self, azimuths: usize) -> impl Iterator<Item = &Passed> {
         let rays = MARGIN * RAYS..(azimuths + MARGIN) * RAYS;
-        rays.filter_map(|ray| {
-            let first = self.passed[self.starts[ray]..self.starts[ray + 1]].first()?;
-            Some((ray as f64 / RAYS as f64 - MARGIN as f64, first))
-        })
+        rays.filter_map(|ray| self.passed[self.starts[ray]..self.starts[ray + 1]].first())
     }
 }
