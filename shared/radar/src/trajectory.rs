@@ -51,6 +51,24 @@ impl Trajectory {
         let position = a.translation.vector.lerp(&b.translation.vector, share);
         Some(Isometry2::new(position, a.rotation.angle() + share * (b.rotation * a.rotation.inverse()).angle()))
     }
+
+    /// As [`Trajectory::at`]; times that miss the span by no more than `tolerance_ns` are its ends, for files round.
+    pub fn near(&self, stamp_ns: i64, tolerance_ns: u64) -> Option<Isometry2<f64>> {
+        let (first, last) = self.span_ns()?;
+        let within = stamp_ns.clamp(first, last);
+        self.at(within).filter(|_| within.abs_diff(stamp_ns) <= tolerance_ns)
+    }
+
+    /// Time between the poses around a time, ns: 0 at a pose, `None` outside the span.
+    pub fn gap_ns(&self, stamp_ns: i64) -> Option<u64> {
+        let stamps = self.stamp_ns.as_ref()?;
+        let after = stamps.partition_point(|s| *s < stamp_ns);
+        let to = *stamps.get(after)?;
+        if to == stamp_ns {
+            return Some(0);
+        }
+        Some(to.abs_diff(stamps[after.checked_sub(1)?]))
+    }
 }
 
 /// A pose in the plane from the first two rows of a row-major 3 x 4 matrix; the heading is that of the x axis.
