@@ -16,7 +16,7 @@
 //! nor those of the next `masking.lag`. At run time an unreadable scan breaks no chain; here it does, so that any two neighbours of
 //! one number are consecutive scans.
 //!
-//! - [`recordings`]: what is read, and its truth;
+//! - [`recordings`]: what is read, and its truth; [`scans`]: reading ahead;
 //! - [`preparation`]: from scans to records;
 //! - [`record`], [`npy`]: how they are written;
 //! - [`provenance`]: `pairs.toml`, which says what they were made of.
@@ -26,46 +26,56 @@ mod preparation;
 mod provenance;
 mod record;
 mod recordings;
+mod scans;
 
 use std::{
     fmt, fs,
+    io::IsTerminal,
     path::{Path, PathBuf},
     process::ExitCode,
     time::Instant,
 };
 
 use gyre_radar::OwnedScan;
+use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::{Failure, cli::ExportPairsArguments, configuration::Configuration, print};
 use npy::NpyWriter;
 use preparation::Preparation;
 use provenance::{Provenance, Sequence};
 use record::Record;
-use recordings::Recording;
+use recordings::{Origin, Recording};
 
 /// Writes the records of all recordings, and what they were made of.
 pub fn export_pairs(arguments: &ExportPairsArguments) -> Result<ExitCode, Failure> {
     let out = &arguments.out;
-    if out.extension().is_none_or(|extension| extension != "npy") {
-        return Err(format!("--out {} must name a file that ends in .npy", out.display()).into());
-    }
+    provenance::check_place(out)?;
     let configurations = recordings::configurations(arguments)?;
     let recordings = configurations.iter().map(Recording::open).collect::<Result<Vec<_>, _>>()?;
-    let common = &configurations[0];
     let started = Instant::now();
-    let mut export = Export::begin(common, out)?;
-    for mut recording in recordings {
-        export.recording(&mut recording)?;
+    let mut export = Export::begin(&configurations[0], out)?;
+    let bar = progress_bar(recordings.iter().map(|recording| recording.played.len()).sum());
+    for recording in recordings {
+        export.recording(recording, &bar)?;
     }
-    let (written, bytes) = export.finish(common)?;
+    bar.finish_and_clear();
+    let counts = export.finish(&configurations[0])?;
     let wall_s = started.elapsed().as_secs_f64();
     print::line(format_args!(
-        "wrote {written} to {} ({:.1} MB) in {wall_s:.1} s, {:.0} scans/s",
+        "wrote {counts} to {} ({:.1} MB) in {wall_s:.1} s, {:.0} scans/s",
         out.display(),
-        bytes as f64 * 1e-6,
-        written.scans as f64 / wall_s
+        fs::metadata(out)?.len() as f64 * 1e-6,
+        counts.scans as f64 / wall_s
     ))?;
     Ok(ExitCode::SUCCESS)
+}
+
+fn progress_bar(scans: usize) -> ProgressBar {
+    let bar = if std::io::stderr().is_terminal() { ProgressBar::new(scans as u64) } else { ProgressBar::hidden() };
+    if let Ok(style) = ProgressStyle::with_template("exporting {wide_bar} {pos}/{len} scans, {per_sec}, {eta} left") {
+        bar.set_style(style);
+    }
+    bar
 }
 
 /// What was written and what was not.
@@ -98,27 +108,30 @@ impl Export {
     }
 
     /// Appends a recording's scans. One that gives none is refused: it, or its truth, is not what was meant.
-    fn recording(&mut self, recording: &mut Recording) -> Result<(), Failure> {
+    fn recording(&mut self, recording: Recording, bar: &ProgressBar) -> Result<(), Failure> {
+        let Recording { mut dataset, played, origin } = recording;
+        let (before, scans) = (self.counts, played.len());
         self.preparation.begin();
-        let before = self.counts;
-        let mut scan = OwnedScan::with_limits(recording.dataset.limits());
-        for index in recording.played.clone() {
-            match recording.dataset.read(index, scan.slot()) {
-                Ok(geometry) => {
-                    scan.geometry = geometry;
-                    self.scan(recording, index, &scan)?;
-                }
+        scans::for_each_scan(dataset.as_mut(), played, |index, read| {
+            bar.inc(1);
+            match read {
+                Ok(scan) => self.scan(&origin, index, scan)?,
                 Err(error) => self.leave_out(&error),
             }
-        }
-        match self.counts.scans - before.scans {
-            0 => Err(recording.gives_nothing(self.counts.without_truth - before.without_truth)),
+            Ok(())
+        })?;
+        let (data, truth) = (&origin.data, origin.truth.path.display());
+        match (self.counts.scans - before.scans, self.counts.without_truth - before.without_truth) {
+            (0, 0) => Err(format!("{data}: none of its {scans} scans can be read").into()),
+            (0, read) => {
+                Err(format!("{data}: {truth} has no pose at the time of any of its {read} readable scans").into())
+            }
             _ => Ok(()),
         }
     }
 
-    fn scan(&mut self, recording: &Recording, index: usize, scan: &OwnedScan) -> Result<(), Failure> {
-        let Some(pose) = recording.truth.pose(scan.geometry.stamp_ns) else {
+    fn scan(&mut self, origin: &Origin, index: usize, scan: &OwnedScan) -> Result<(), Failure> {
+        let Some(pose) = origin.truth.pose(scan.geometry.stamp_ns) else {
             self.counts.without_truth += 1;
             self.preparation.begin();
             return Ok(());
@@ -128,13 +141,13 @@ impl Export {
         match self.preparation.next(&scan.view(), pose, number) {
             Ok(record) => record.encode(&mut self.encoded),
             Err(error) => {
-                self.leave_out(&format_args!("scan {index} of {}: {error}", recording.data));
+                self.leave_out(&format_args!("scan {index} of {}: {error}", origin.data));
                 return Ok(());
             }
         }
         self.file.append(&self.encoded).map_err(cannot_write(&self.out))?;
         if begins {
-            self.sequences.push(Sequence::new(number, recording, index));
+            self.sequences.push(Sequence::new(number, origin, index));
         }
         if let Some(sequence) = self.sequences.last_mut() {
             sequence.scans += 1;
@@ -149,14 +162,13 @@ impl Export {
         self.preparation.begin();
     }
 
-    /// Gives the files their names; returns what is in them, and the bytes of `pairs.npy`.
-    fn finish(self, configuration: &Configuration) -> Result<(Counts, u64), Failure> {
-        let beside = self.out.with_extension("toml");
-        let provenance = toml::to_string_pretty(&Provenance::new(configuration, &self.sequences))?;
-        fs::write(&beside, provenance).map_err(cannot_write(&beside))?;
+    /// Writes what the file was made of, and gives it its name.
+    fn finish(self, configuration: &Configuration) -> Result<Counts, Failure> {
+        let beside = provenance::place(&self.out);
+        let text = Provenance::new(configuration, &self.sequences).to_toml()?;
+        fs::write(&beside, text).map_err(cannot_write(&beside))?;
         self.file.finish().map_err(cannot_write(&self.out))?;
-        let bytes = fs::metadata(&self.out).map_err(cannot_write(&self.out))?.len();
-        Ok((Counts { sequences: self.sequences.len(), ..self.counts }, bytes))
+        Ok(Counts { sequences: self.sequences.len(), ..self.counts })
     }
 }
 

@@ -107,4 +107,14 @@ mod tests {
         assert_eq!(trajectory.at(0).unwrap(), trajectory.poses[0]);
         assert!(trajectory.at(101).is_none() && trajectory.at(-1).is_none());
     }
+
+    #[test]
+    fn near_an_end_is_the_end_and_gaps_are_as_wide_as_the_poses_are_apart() {
+        let poses = [1.0, 2.0, 4.0].map(|x| Isometry2::new(Vector2::new(x, 0.0), 0.0)).to_vec();
+        let trajectory = Trajectory { stamp_ns: Some(vec![0, 100, 150]), poses };
+        let x = |stamp_ns| trajectory.near(stamp_ns, 5).map(|pose| pose.translation.x);
+        assert_eq!([x(-6), x(-5), x(50), x(155), x(156)], [None, Some(1.0), Some(1.5), Some(4.0), None]);
+        let gaps = [-1, 0, 1, 100, 101, 150, 151].map(|stamp_ns| trajectory.gap_ns(stamp_ns));
+        assert_eq!(gaps, [None, Some(0), Some(100), Some(0), Some(50), Some(0), None]);
+    }
 }

@@ -1,6 +1,9 @@
 //! `pairs.toml`: what `pairs.npy` was made of.
 
-use std::path::PathBuf;
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 use gyre_masking::MaskingConfig;
 use gyre_radar::{DatasetOptions, Format, RasterConfig};
@@ -8,8 +11,34 @@ use gyre_scan_matching::{RotationConfig, TranslationConfig};
 use gyre_simulator::SimulationConfig;
 use serde::Serialize;
 
-use super::recordings::Recording;
-use crate::configuration::Configuration;
+use super::recordings::Origin;
+use crate::{Failure, configuration::Configuration};
+
+/// The file's first line; a file with another is somebody else's.
+const FIRST_LINE: &str = "# What the .npy file of this name was made of, by gyre export-pairs.\n";
+
+/// Where it is written.
+pub fn place(pairs: &Path) -> PathBuf {
+    pairs.with_extension("toml")
+}
+
+/// Refuses a name that is no `.npy` file's, or beside which another file is in the way: a configuration, say.
+pub fn check_place(pairs: &Path) -> Result<(), Failure> {
+    if pairs.extension().is_none_or(|extension| extension != "npy") {
+        return Err(format!("--out {}: the file's name must end in .npy", pairs.display()).into());
+    }
+    let beside = place(pairs);
+    match fs::read(&beside) {
+        Ok(text) if !text.starts_with(FIRST_LINE.as_bytes()) => {
+            let (beside, pairs) = (beside.display(), pairs.display());
+            Err(format!(
+                "{beside} would be overwritten to say what {pairs} is made of, but is no export's: choose another --out"
+            )
+            .into())
+        }
+        _ => Ok(()),
+    }
+}
 
 /// All that the file depends on.
 #[derive(Serialize)]
@@ -72,17 +101,22 @@ impl<'a> Provenance<'a> {
             sequences,
         }
     }
+
+    /// The file's text.
+    pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
+        Ok(format!("{FIRST_LINE}{}", toml::to_string_pretty(self)?))
+    }
 }
 
 impl Sequence {
     /// One that begins with a recording's scan `first_scan`, empty.
-    pub fn new(sequence: u32, recording: &Recording, first_scan: usize) -> Self {
+    pub fn new(sequence: u32, origin: &Origin, first_scan: usize) -> Self {
         Self {
             sequence,
-            name: recording.name(),
-            source: recording.data.clone(),
-            format: recording.dataset.format(),
-            ground_truth: recording.truth.path.clone(),
+            name: origin.name(),
+            source: origin.data.clone(),
+            format: origin.format,
+            ground_truth: origin.truth.path.clone(),
             first_scan,
             scans: 0,
         }
