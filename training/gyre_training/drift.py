@@ -59,8 +59,8 @@ def drift(scans: Scans, found: np.ndarray, pairs: np.ndarray) -> Drift:
     single = between(true, found)
     share, turn = errors.mean(0) if len(errors) else (np.nan, np.nan)
     return Drift(
-        100 * share,
-        np.degrees(turn) * 100,
+        float(100 * share),
+        float(100 * np.degrees(turn)),
         float(np.linalg.norm(single[:, :2], axis=1).mean()),
         float(np.degrees(np.abs(single[:, 2])).mean()),
     )
@@ -73,7 +73,7 @@ def split(sequence: np.ndarray) -> list[np.ndarray]:
 @torch.no_grad()
 def motions(scans: Scans, pairs: np.ndarray, network: nn.Module | None, match: nn.Module, batch: int = 16) -> np.ndarray:
     """Motions (k, 3) between the scans as the network (where there is one) masks them, by the highest peaks."""
-    device = next((p.device for p in network.parameters()), None) if network else torch.device("cpu")
+    device = match.rotation.window.device if hasattr(match, "rotation") else torch.device("cpu")
     found = []
     for k in range(0, len(pairs), batch):
         part = scans.batch(pairs[k : k + batch]).to(device)

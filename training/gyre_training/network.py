@@ -15,12 +15,15 @@ class NetworkConfig:
     """A U-Net over `inputs` scans (2: the later and the earlier one; 1: each on its own).
 
     `widths` are the features of the levels, each half the size of the one before. With `shrink` of 2 the masks are
-    computed at half the resolution and enlarged. `separable` blocks filter each feature on its own, then mix them.
+    computed at half the resolution and enlarged. With `fold` of 4 each square of 4 x 4 cells becomes one cell of 16
+    features, and so many features become the masks of such a square: all that is fine is kept, but every convolution is
+    done on a sixteenth of the cells. `separable` blocks filter each feature on its own, then mix them.
     """
 
     inputs: int = 2
     widths: tuple[int, ...] = (8, 16, 32, 64, 128, 256)
     shrink: int = 1
+    fold: int = 1
     separable: bool = False
 
     def to_dict(self) -> dict:
@@ -54,20 +57,31 @@ class MaskNetwork(nn.Module):
         super().__init__()
         self.config = config
         widths, separable = config.widths, config.separable
-        pairs = zip((config.inputs, *widths), widths)
+        folded = config.inputs * config.fold**2
+        pairs = zip((folded, *widths), widths)
         self.encoder = nn.ModuleList(block(i, o, separable) for i, o in pairs)
         pairs = zip(reversed(widths[1:]), reversed(widths[:-1]))
         self.decoder = nn.ModuleList(block(i + o, o, separable) for i, o in pairs)
-        self.masks = nn.Conv2d(widths[0], config.inputs, 3, padding=1)
+        self.masks = nn.Conv2d(widths[0], folded, 3, padding=1)
 
     def forward(self, scans: Tensor) -> Tensor:
         return torch.sigmoid(self.logits(scans))
 
     def logits(self, scans: Tensor) -> Tensor:
         """What the sigmoid is taken of."""
-        size, x = scans.shape[-2:], scans / FULL_SCALE
-        if self.config.shrink > 1:
-            x = F.avg_pool2d(x, self.config.shrink)
+        x, size, config = scans / FULL_SCALE, scans.shape[-2:], self.config
+        if config.shrink > 1:
+            x = F.avg_pool2d(x, config.shrink)
+        if config.fold > 1:
+            x = F.pixel_unshuffle(F.pad(x, (0, -x.shape[-1] % config.fold, 0, -x.shape[-2] % config.fold)), config.fold)
+        x = self.masks(self._features(x))
+        if config.fold > 1:
+            x = F.pixel_shuffle(x, config.fold)
+        if config.shrink > 1:
+            return F.interpolate(x, size=size, mode="bilinear", align_corners=False)
+        return x[..., : size[0], : size[1]]
+
+    def _features(self, x: Tensor) -> Tensor:
         skips = []
         for encode in self.encoder:
             x = encode(F.max_pool2d(x, 2) if skips else x)
@@ -78,9 +92,6 @@ class MaskNetwork(nn.Module):
             # Odd sizes are halved downward, so the way back goes to the skip's own size.
             x = F.interpolate(x, size=skip.shape[-2:], mode="bilinear", align_corners=False)
             x = decode(torch.cat([x, skip], 1))
-        x = self.masks(x)
-        if self.config.shrink > 1:
-            x = F.interpolate(x, size=size, mode="bilinear", align_corners=False)
         return x
 
     def masked(self, later: Tensor, earlier: Tensor) -> tuple[Tensor, Tensor]:

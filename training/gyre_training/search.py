@@ -130,6 +130,12 @@ class RotationSearch(nn.Module):
         """The angle, radians: (batch,)."""
         return (self.config.soft.weights(scores) * self.shifts).sum(1) * self.step
 
+    def local(self, scores: Tensor) -> Tensor:
+        """The angle at the highest peak by a parabola, radians, with gradients: (batch,)."""
+        best = scores.detach()[:, 1:-1].argmax(1) + 1
+        near = scores.gather(1, best[:, None] + torch.arange(-1, 2, device=scores.device))
+        return (self.shifts[best] + parabola(near)) * self.step
+
     def hard(self, scores: Tensor) -> Tensor:
         """The angle at the highest peak, radians: (batch,)."""
         best = scores[:, 1:-1].argmax(1) + 1
@@ -188,12 +194,23 @@ class TranslationSearch(nn.Module):
         shifts = self.shifts[self.within].to(weights)
         return torch.stack([(weights.sum(2) * shifts).sum(1), (weights.sum(1) * shifts).sum(1)], 1)
 
+    def local(self, scores: Tensor) -> Tensor:
+        """The shift (down, right) at the highest peak by a parabola along each axis, cells, with gradients: (batch, 2)."""
+        best = self._highest(scores.detach())
+        steps, every = torch.arange(-1, 2, device=scores.device), torch.arange(len(scores), device=scores.device)[:, None]
+        down = scores[every, best[:, :1] + steps, best[:, 1:]]
+        right = scores[every, best[:, :1], best[:, 1:] + steps]
+        return best - self.around + torch.stack([parabola(down), parabola(right)], 1)
+
+    def _highest(self, scores: Tensor) -> Tensor:
+        """Where the highest score within reach stands (row, column): (batch, 2)."""
+        inner = scores[:, self.within][:, :, self.within]
+        best = inner.flatten(1).argmax(1)
+        return torch.stack([best // inner.shape[1], best % inner.shape[1]], 1) + SUPPORT
+
     def hard(self, scores: Tensor) -> Tensor:
         """The shift (down, right) at the highest peak, cells: (batch, 2)."""
-        inner = scores[:, self.within][:, :, self.within]
-        side = inner.shape[1]
-        best = inner.flatten(1).argmax(1)
-        best = torch.stack([best // side, best % side], 1) + SUPPORT
+        best = self._highest(scores)
         offsets = [plane_peak(self.config.peak, s, i, j) for s, (i, j) in zip(scores.double(), best.tolist(), strict=True)]
         return best - self.around + torch.stack(offsets).to(scores.device)
 
@@ -217,6 +234,14 @@ class ScanMatch(nn.Module):
         angles = self.rotation.soft(self.rotation.correlation(later, earlier))
         turned = self.translation.turned(earlier, angles)
         return self.translation.motion(self.translation.soft(self.translation.correlation(later, turned)), angles)
+
+    def soft_and_local(self, later: Tensor, earlier: Tensor) -> tuple[Tensor, Tensor]:
+        """The motion by soft peaks, and by parabolas at the highest ones, both with gradients: (batch, 3) each."""
+        rotation = self.rotation.correlation(later, earlier)
+        angles = self.rotation.soft(rotation)
+        scores = self.translation.correlation(later, self.translation.turned(earlier, angles))
+        local = self.translation.motion(self.translation.local(scores), self.rotation.local(rotation))
+        return self.translation.motion(self.translation.soft(scores), angles), local
 
     @torch.no_grad()
     def hard(self, later: Tensor, earlier: Tensor) -> Tensor:
@@ -296,6 +321,12 @@ def line_peak(kind: str, samples: Tensor) -> Tensor:
         near = (near - (lowest - 0.05 * (highest - lowest))).log()
     a, b, c = near.unbind(1)
     return torch.nan_to_num(0.5 * (a - c) / (a - 2 * b + c)).clamp(-FARTHEST, FARTHEST)
+
+
+def parabola(near: Tensor) -> Tensor:
+    """The summit of the parabola through three samples (batch, 3), the middle one the highest."""
+    a, b, c = near.unbind(1)
+    return (0.5 * (a - c) / (a - 2 * b + c).clamp_max(-1e-9)).clamp(-FARTHEST, FARTHEST)
 
 
 def plane_peak(kind: str, scores: Tensor, i: int, j: int) -> Tensor:
