@@ -59,8 +59,8 @@ def drift(scans: Scans, found: np.ndarray, pairs: np.ndarray) -> Drift:
     single = between(true, found)
     share, turn = errors.mean(0) if len(errors) else (np.nan, np.nan)
     return Drift(
-        100 * share,
-        np.degrees(turn) * 100,
+        float(100 * share),
+        float(100 * np.degrees(turn)),
         float(np.linalg.norm(single[:, :2], axis=1).mean()),
         float(np.degrees(np.abs(single[:, 2])).mean()),
     )
