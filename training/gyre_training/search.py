@@ -143,6 +143,22 @@ class RotationSearch(nn.Module):
         return (self.shifts[best] + offset) * self.step
 
 
+# How far outside of a raster, in cells, a place may lie that is still looked up: as far as rounding carries one.
+EDGE_CELLS = 1e-6
+
+
+def turn(middle: Tensor, angles: Tensor) -> tuple[Tensor, Tensor]:
+    """R x, down and right of the middle, of all cells x: each (angles, n, n)."""
+    cos, sin = torch.cos(angles)[:, None, None], torch.sin(angles)[:, None, None]
+    u, v = middle[:, None], middle[None, :]
+    return cos * u - sin * v, sin * u + cos * v
+
+
+def sampled(rasters: Tensor, grid: Tensor) -> Tensor:
+    """Bilinear, (k, channels, n, n). What lies up to a cell outside would otherwise be blended with zeros."""
+    return F.grid_sample(rasters, grid, align_corners=True, padding_mode="border")
+
+
 class TranslationSearch(nn.Module):
     """The shift between two scans whose angle is known (lines 16 to 21)."""
 
@@ -160,20 +176,31 @@ class TranslationSearch(nn.Module):
 
     def turned(self, rasters: Tensor, angles: Tensor) -> Tensor:
         """g'(x) = g(R x), zero where R x lies outside of g (line 16)."""
-        cos, sin = torch.cos(angles)[:, None, None], torch.sin(angles)[:, None, None]
-        u, v = self.middle[:, None], self.middle[None, :]
-        half = (self.n - 1) / 2
-        grid = torch.stack([(sin * u + cos * v) / half, (cos * u - sin * v) / half], -1)
-        # `grid_sample` would blend what lies up to a cell outside with zeros.
-        inside = grid.detach().abs().amax(-1) <= 1 + 1e-6
-        return F.grid_sample(rasters[:, None], grid, align_corners=True, padding_mode="border")[:, 0] * inside
+        grid, inside = self.places(angles)
+        return sampled(rasters[:, None], grid)[:, 0] * inside
+
+    def places(self, angles: Tensor) -> tuple[Tensor, Tensor]:
+        """R x of each cell x as `grid_sample` wants it, (angles, n, n, 2), and whether it lies inside, (angles, n, n)."""
+        u, v = turn(self.middle, angles)
+        with torch.no_grad():
+            # In double and with Gyre's own slack: at angles near zero a whole row lies on the edge, and counts or does not.
+            farthest = torch.maximum(*(t.abs() for t in turn(self.middle.double(), angles.double())))
+            inside = farthest <= (self.n - 1) / 2 + EDGE_CELLS
+        return torch.stack([v, u], -1) / ((self.n - 1) / 2), inside
+
+    def spectra(self, rasters: Tensor) -> Tensor:
+        """Half spectra of rasters (..., n, n) with room for the shifts; the rows of zeros are not transformed."""
+        return torch.fft.fft(torch.fft.rfft(rasters, n=self.size), n=self.size, dim=-2)
+
+    def products(self, cross: Tensor) -> Tensor:
+        """Cross spectra back to sums of products at the shifts: only the rows that are looked at are transformed back."""
+        near = self.shifts % self.size
+        rows = torch.fft.ifft(cross, dim=-2)[..., near, :]
+        return torch.fft.irfft(rows, n=self.size)[..., near]
 
     def correlation(self, later: Tensor, turned: Tensor) -> Tensor:
         """Scores of all shifts (down, right): (batch, shifts, shifts) (lines 17 and 18)."""
-        s = (self.size, self.size)
-        cross = torch.fft.rfft2(turned, s=s) * torch.fft.rfft2(later, s=s).conj()
-        near = self.shifts % self.size
-        scores = torch.fft.irfft2(cross, s=s)[:, near][:, :, near]
+        scores = self.products(self.spectra(turned) * self.spectra(later).conj())
         if self.config.overlap == "energy":
             return scores / (self._left(later, 1) * self._left(turned, -1) + 1e-12).sqrt()
         energy = later.square().sum((1, 2)) * turned.square().sum((1, 2))
@@ -259,20 +286,16 @@ class ExhaustiveMatch(nn.Module):
         self.translation = TranslationSearch(n, cell_m, config)
         count = int(reach_deg / step_deg + 1e-9)
         angles = torch.arange(-count, count + 1) * math.radians(step_deg)
-        self.register_buffer("angles", angles, persistent=False)
+        grid, inside = self.translation.places(angles)
+        for name, value in {"angles": angles, "grid": grid, "inside": inside}.items():
+            self.register_buffer(name, value, persistent=False)
 
     def _scores(self, later: Tensor, earlier: Tensor) -> Tensor:
-        """(batch, angles, shifts, shifts)."""
-        batch, count = len(later), len(self.angles)
-        turned = self.translation.turned(earlier.repeat_interleave(count, 0), self.angles.repeat(batch))
-        return self._correlation(later, turned.view(batch, count, *later.shape[1:]))
-
-    def _correlation(self, later: Tensor, turned: Tensor) -> Tensor:
-        s, near = (self.translation.size,) * 2, self.translation.shifts % self.translation.size
-        cross = torch.fft.rfft2(turned, s=s) * torch.fft.rfft2(later, s=s).conj()[:, None]
-        scores = torch.fft.irfft2(cross, s=s)[:, :, near][..., near]
-        energy = later.square().sum((1, 2)) * turned[:, turned.shape[1] // 2].square().sum((1, 2))
-        return scores / (energy + 1e-12).sqrt()[:, None, None, None]
+        """Sums of products, (batch, angles, shifts, shifts): a factor common to all is nothing to either kind of peak."""
+        search = self.translation
+        # The batch as channels: all scans are turned by the same angles, so one set of places serves them all.
+        turned = sampled(earlier.expand(len(self.angles), *earlier.shape), self.grid) * self.inside[:, None]
+        return search.products(search.spectra(turned) * search.spectra(later).conj()).transpose(0, 1)
 
     def forward(self, later: Tensor, earlier: Tensor) -> Tensor:
         """The motion by soft peaks over all three unknowns: (batch, 3)."""
