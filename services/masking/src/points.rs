@@ -57,7 +57,13 @@ impl Frame {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
+    use gyre_radar::{
+        OwnedScan, PointExtractor, PointsConfig, RasterConfig, ScanLimits, Sense, SweepGeometry,
+        raster::Rasteriser,
+        scan::flag,
+    };
 
     const FRAME: Frame = Frame { n: 5, cell_m: 2.0, twist: None, doppler_undone: false };
 
@@ -95,6 +101,55 @@ mod tests {
         let quarter = std::f64::consts::FRAC_PI_2 / 0.1;
         let turning = Frame { twist: Some(Twist { vx_mps: 0.0, vy_mps: 0.0, yaw_rate_radps: quarter }), ..FRAME };
         assert_eq!(factor(turning, (2, 0), [4.0, 0.0, 0.1, 0.0]), 0.5);
+    }
+
+    const AZIMUTHS: usize = 400;
+    const BINS: usize = 500;
+
+    /// A return in every twentieth azimuth, at ranges from 15 to 80 m, seen within 0.25 s.
+    fn spots(sense: Sense) -> OwnedScan {
+        let mut scan = OwnedScan::with_limits(ScanLimits { bytes: AZIMUTHS * BINS, azimuths: AZIMUTHS });
+        let sizes = SweepGeometry { azimuths: AZIMUTHS, bins: BINS, stride: BINS, ..scan.geometry };
+        scan.geometry = SweepGeometry { range_resolution_m: 0.175, doppler_s: 0.05, sense, ..sizes };
+        for azimuth in 0..AZIMUTHS {
+            scan.azimuth_rad[azimuth] = azimuth as f32 * std::f32::consts::TAU / AZIMUTHS as f32;
+            scan.stamp_ns[azimuth] = (azimuth as i64 - AZIMUTHS as i64 / 2) * 625_000;
+            scan.flags[azimuth] = flag::MEASURED;
+        }
+        for azimuth in (5..AZIMUTHS).step_by(20) {
+            scan.bytes[azimuth * BINS + 90 + azimuth * 7 % 360..][..6].fill(200);
+        }
+        scan
+    }
+
+    /// The share of a scan's points that lie, by `frame`, where the raster made with `twist` has power.
+    fn share_that_meets(twist: Twist, sense: Sense, frame: Frame) -> f32 {
+        let scan = spots(sense);
+        let config = RasterConfig { n: frame.n, cell_m: frame.cell_m, ..RasterConfig::default() };
+        let mut raster = vec![0.0; frame.n * frame.n];
+        Rasteriser::new(&config).unwrap().rasterise(&scan.view(), 60, Some(twist), &mut raster).unwrap();
+        let mut points = vec![[0.0; 5]; 8192];
+        let config = PointsConfig { max_range_m: 100.0, ..PointsConfig::default() };
+        let count = PointExtractor::new(&config).unwrap().extract(&scan.view(), 60, &mut points).unwrap();
+        assert!(count >= 100, "{count}");
+        let lit: Vec<f32> = raster.iter().map(|power| f32::from(*power > 10.0)).collect();
+        let mut weighed = points[..count].to_vec();
+        frame.weigh(&lit, &mut weighed);
+        weighed.iter().filter(|point| point[3] > 0.0).count() as f32 / count as f32
+    }
+
+    #[test]
+    fn points_lie_where_the_raster_has_their_power() {
+        let twist = Twist { vx_mps: 25.0, vy_mps: 1.0, yaw_rate_radps: 0.6 };
+        let moving = Frame { n: 401, cell_m: 0.5, twist: Some(twist), doppler_undone: true };
+        for sense in [Sense::Clockwise, Sense::CounterClockwise] {
+            let share = share_that_meets(twist, sense, moving);
+            assert!(share > 0.99, "{share}");
+            for other in [Frame { doppler_undone: false, ..moving }, Frame { twist: None, ..moving }] {
+                let share = share_that_meets(twist, sense, other);
+                assert!(share < 0.8, "{share} for {other:?}");
+            }
+        }
     }
 
     #[test]
