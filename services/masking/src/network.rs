@@ -110,8 +110,7 @@ impl Network {
         if masks.len() != self.masks.len() {
             return Err(NetworkError::Run(format!("{} values instead of {}", masks.len(), self.masks.len())));
         }
-        // `max` comes first, for it makes 0 of what is no number.
-        self.masks.iter_mut().zip(masks).for_each(|(kept, mask)| *kept = mask.max(0.0).min(1.0));
+        self.masks.iter_mut().zip(masks).for_each(|(kept, mask)| *kept = factor(*mask));
         Ok(&self.masks)
     }
 
@@ -119,6 +118,11 @@ impl Network {
     pub fn masks(&self) -> &[f32] {
         &self.masks
     }
+}
+
+/// From 0 to 1, and 0 for what is no number.
+fn factor(mask: f32) -> f32 {
+    if mask > 0.0 { mask.min(1.0) } else { 0.0 }
 }
 
 /// One scan after the other, the same bits each time.
@@ -181,4 +185,22 @@ fn sentence(message: &str) -> String {
         None => message,
     };
     said.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn factors_are_from_0_to_1() {
+        let masks = [0.25, -0.1, 1.1, f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+        assert_eq!(masks.map(factor), [0.25, 0.0, 1.0, 0.0, 1.0, 0.0]);
+    }
+
+    #[test]
+    fn what_onnx_runtime_says_is_one_line_without_its_own_source() {
+        let said = "Load failed:/onnxruntime_src/core/graph.cc:46 void check(int, bool) Opset 99 is (still)\nnew. ";
+        assert_eq!(sentence(said), "Opset 99 is (still) new.");
+        assert_eq!(sentence("Protobuf\n  parsing failed."), "Protobuf parsing failed.");
+    }
 }

@@ -60,8 +60,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use gyre_radar::{
-        OwnedScan, PointExtractor, PointsConfig, RasterConfig, ScanLimits, Sense, SweepGeometry,
-        raster::Rasteriser,
+        OwnedScan, PointExtractor, PointsConfig, RasterConfig, ScanLimits, Sense, SweepGeometry, raster::Rasteriser,
         scan::flag,
     };
 

@@ -5,8 +5,8 @@
 mod common;
 
 use common::{
-    CELLS, N, assert_masked, card, learned, masker, masks_by_hand, raster, runtime_is_installed, scan, sweep, unlearned,
-    unmasked,
+    CELLS, N, assert_masked, card, learned, masker, masks_by_hand, raster, runtime_is_installed, scan, sweep,
+    unlearned, unmasked,
 };
 use gyre_masking::{MaskingConfig, Sweep, network::Network};
 use gyre_messages::MaskedHeader;
