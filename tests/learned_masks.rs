@@ -179,7 +179,7 @@ fn a_run_that_was_killed_as_a_whole_goes_on_with_a_network_that_looks_at_two_sca
     let undisturbed = masked_by(TWO_SCANS).complete();
     let run = masked_by(TWO_SCANS).rate("6");
     // After the very first pose too, where there is no scan before the last one.
-    for poses in [1, MIDDLE, 2 * MIDDLE] {
+    for poses in (1..recording::SCANS).step_by(3) {
         let mut running = run.start();
         running.await_poses(poses);
         running.kill_supervisor();

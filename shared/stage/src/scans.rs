@@ -140,6 +140,13 @@ fn looks_at_two(window: &Window) -> bool {
     window.look_back > 1
 }
 
+/// Whether a starting masking is to send nothing for an item: its readers have had it, or it lacks its own scan before, and what
+/// came of it would not be what was sent for it the first time.
+fn serves_only_as_before(window: &Window, item: &Item, newest_pose: Option<u64>, has_before: bool) -> bool {
+    let had = newest_pose.is_some_and(|newest| item.seq.saturating_add(window.look_back as u64) <= newest);
+    had || (looks_at_two(window) && !has_before && !item.is(flag::BREAK))
+}
+
 struct InOrder {
     reader: Reader<Scan>,
     window: Window,
@@ -154,10 +161,7 @@ impl InOrder {
         if item.is(flag::END) {
             return Ok(Turn::End(item));
         }
-        let look_back = self.window.look_back as u64;
-        let had = newest_pose.is_some_and(|newest| item.seq.saturating_add(look_back) <= newest);
-        let lacks_one = looks_at_two(&self.window) && self.before().is_none() && !item.is(flag::BREAK);
-        if (had || lacks_one) && !self.flowing {
+        if !self.flowing && serves_only_as_before(&self.window, &item, newest_pose, self.before().is_some()) {
             return Ok(Turn::Keep);
         }
         self.flowing = true;
@@ -313,6 +317,18 @@ mod tests {
 
     fn scan(published: u64) -> Item {
         Item { seq: published, published, scan: published + 9, ..Item::default() }
+    }
+
+    #[test]
+    fn a_starting_masking_begins_with_the_last_poses_scan_and_the_scan_before_it_where_masks_look_at_two() {
+        let window = |look_back| Window { scans: 4, lag: 2, look_back, live_depth: 0 };
+        let kept = |look_back, published, has_before| {
+            serves_only_as_before(&window(look_back), &scan(published), Some(9), has_before)
+        };
+        assert!(kept(1, 8, false) && !kept(1, 9, false));
+        assert!(kept(2, 7, true) && kept(2, 8, false) && !kept(2, 9, true));
+        let first = Item { flags: flag::BREAK, ..scan(0) };
+        assert!(!serves_only_as_before(&window(2), &first, None, false));
     }
 
     #[test]
