@@ -136,7 +136,7 @@ impl Card {
         let unreadable = |source| ModelError::Unreadable { what: "card", path: path.to_owned(), source };
         let text = fs::read_to_string(path).map_err(unreadable)?;
         let card: Self =
-            toml::from_str(&text).map_err(|error| not_a_card(error.to_string().trim().replace('\n', "; ")))?;
+            toml::from_str(&text).map_err(|error| not_a_card(error.message().trim().replace('\n', "; ")))?;
         if !(1..=2).contains(&card.model.inputs) {
             return Err(not_a_card(format!("model.inputs is {}, but must be 1 or 2", card.model.inputs)));
         }

@@ -50,6 +50,18 @@ pub enum NetworkError {
         /// What ONNX Runtime said.
         reason: String,
     },
+    /// ONNX Runtime does not know the model's operators.
+    #[error(
+        "{path} has operators of version {opset}, and this ONNX Runtime knows them up to {known}: export it again with opset={known}, or use a newer ONNX Runtime"
+    )]
+    Opset {
+        /// The model's file.
+        path: PathBuf,
+        /// What its card says.
+        opset: u32,
+        /// The newest version that would do.
+        known: String,
+    },
     /// The model is not a mask, or not one for these rasters.
     #[error("{path} {has}, but a mask of its card's sizes must have the one {expected}: export it again")]
     Interface {
@@ -83,9 +95,7 @@ impl Network {
         let model = Model::read(config, raster)?;
         let environment = runtime::open(&runtime::find(config.runtime.as_deref())?)?;
         let mut builder = builder(&environment, config)?;
-        let refused =
-            |error: ort::Error| NetworkError::Load { path: model.file.clone(), reason: sentence(error.message()) };
-        let session = builder.commit_from_memory(&model.bytes).map_err(refused)?;
+        let session = builder.commit_from_memory(&model.bytes).map_err(|error| refused(&model, error.message()))?;
         let shape = [1, model.card.model.inputs, raster.n, raster.n];
         check("takes", INPUT, session.inputs(), shape, &model)?;
         check("gives", OUTPUT, session.outputs(), shape, &model)?;
@@ -178,13 +188,25 @@ fn describe(tensor: &Outlet) -> String {
     }
 }
 
+/// Why ONNX Runtime does not load the model.
+fn refused(model: &Model, message: &str) -> NetworkError {
+    let path = model.file.clone();
+    match message.split_once("ai.onnx is till opset ") {
+        Some((_, known)) => {
+            let known = known.trim_end().trim_end_matches('.').to_owned();
+            NetworkError::Opset { path, opset: model.card.model.opset, known }
+        }
+        None => NetworkError::Load { path, reason: sentence(message) },
+    }
+}
+
 /// What ONNX Runtime said, as one line and without the place in its own source that it said it from.
 fn sentence(message: &str) -> String {
     let said = match message.split_once("/onnxruntime_src/") {
         Some((_, place)) => place.split_once(") ").map_or(place, |(_, said)| said),
         None => message,
     };
-    said.split_whitespace().collect::<Vec<_>>().join(" ")
+    said.trim_end_matches(['.', '\n']).split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]
@@ -199,8 +221,9 @@ mod tests {
 
     #[test]
     fn what_onnx_runtime_says_is_one_line_without_its_own_source() {
-        let said = "Load failed:/onnxruntime_src/core/graph.cc:46 void check(int, bool) Opset 99 is (still)\nnew. ";
-        assert_eq!(sentence(said), "Opset 99 is (still) new.");
-        assert_eq!(sentence("Protobuf\n  parsing failed."), "Protobuf parsing failed.");
+        let said =
+            "Load failed:/onnxruntime_src/core/graph.cc:46 void check(int, bool) Opset 99 is (still)\nnew. Or not.\n";
+        assert_eq!(sentence(said), "Opset 99 is (still) new. Or not");
+        assert_eq!(sentence("Protobuf\n  parsing failed."), "Protobuf parsing failed");
     }
 }

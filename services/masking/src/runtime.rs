@@ -2,6 +2,7 @@
 
 use std::{
     env,
+    error::Error as _,
     ffi::OsString,
     fs,
     path::{Path, PathBuf},
@@ -131,7 +132,11 @@ pub fn open(path: &Path) -> Result<Environment, RuntimeError> {
     let unusable = |reason: String| RuntimeError::Unusable { path: path.to_owned(), reason };
     let builder = ort::init_from(path).map_err(|error| match error {
         LoadDynamicError::BadVersion { version_str, path } => RuntimeError::TooOld { path, version: version_str },
-        LoadDynamicError::Dlopen { error, .. } => unusable(error.to_string()),
+        LoadDynamicError::Dlopen { error, .. } => {
+            let reason = error.source().map_or_else(|| error.to_string(), ToString::to_string);
+            // The system's linker names the file first.
+            unusable(reason.trim_start_matches(&format!("{}: ", path.display())).to_owned())
+        }
         LoadDynamicError::MissingApi { .. } => unusable("it does not have ONNX Runtime's functions".to_owned()),
         LoadDynamicError::InvalidVersionString => unusable("its version is not text".to_owned()),
     })?;
