@@ -37,6 +37,8 @@ pub enum Command {
     Realism(RealismArguments),
     /// Write a simulated recording, or go on with one.
     Simulate(SimulateArguments),
+    /// Write rasters with their true poses into one memory-mappable file, to train masks on.
+    ExportPairs(ExportPairsArguments),
     /// Write a copy of a recording with some scans spoilt, to see what an odometry makes of them.
     Spoil(SpoilArguments),
 }
@@ -199,6 +201,24 @@ pub struct SimulateArguments {
     #[arg(long)]
     pub threads: Option<NonZeroUsize>,
     /// Override a key, as in simulation.drive.speed_m_s=5; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+pub struct ExportPairsArguments {
+    /// The configuration, a TOML file: its raster, masking, rotation and translation.
+    pub configuration: PathBuf,
+    /// A recording's folder; may be repeated. Default: the configuration's simulation, or its source.data.
+    #[arg(long)]
+    pub data: Vec<PathBuf>,
+    /// The file to write, NAME.npy; NAME.toml beside it says what it was made of.
+    #[arg(long)]
+    pub out: PathBuf,
+    /// The recording's ground truth (run.ground_truth). Default: what lies in its folder.
+    #[arg(long, value_name = "FILE")]
+    pub ground_truth: Option<PathBuf>,
+    /// Override a key, as in raster.n=127; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
 }

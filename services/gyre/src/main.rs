@@ -5,6 +5,7 @@
 mod cli;
 mod configuration;
 mod evaluate;
+mod export_pairs;
 mod inspect;
 mod judgement;
 mod latency;
@@ -40,6 +41,7 @@ fn main() -> ExitCode {
         Command::Tables(arguments) => tables::tables(&arguments),
         Command::Realism(arguments) => realism::realism(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
+        Command::ExportPairs(arguments) => export_pairs::export_pairs(&arguments),
         Command::Spoil(arguments) => spoil::spoil(&arguments),
     };
     match result {

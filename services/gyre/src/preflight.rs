@@ -76,12 +76,14 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
 }
 
 /// What is to be played.
-struct Played {
-    dataset: Box<dyn Dataset>,
-    truth: Option<Vec<u8>>,
+pub struct Played {
+    pub dataset: Box<dyn Dataset>,
+    /// `ground_truth.tum` of a simulation that is played without being stored.
+    pub truth: Option<Vec<u8>>,
 }
 
-fn open(configuration: &Configuration) -> Result<Played, crate::Failure> {
+/// Opens what is to be played: a recording, or a simulation.
+pub fn open(configuration: &Configuration) -> Result<Played, crate::Failure> {
     let (data, options) = (&configuration.source.data, &configuration.dataset);
     if let Some(simulation) = configuration.streamed() {
         let recording = Recording::new(simulation)?;

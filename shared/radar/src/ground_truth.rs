@@ -86,8 +86,13 @@ pub enum TrajectoryFormat {
 /// Reads a trajectory of any known form, told by its first line of content, and converts it to REP-103.
 pub fn read_trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
     let text = fs::read_to_string(path).map_err(|source| TrajectoryError::Io { path: path.to_owned(), source })?;
-    let format = detect(&text).map_err(|reason| TrajectoryError::Unknown { path: path.to_owned(), reason })?;
-    parse(&text, format).map_err(|LineError { line, reason }| TrajectoryError::Line {
+    parse_trajectory(&text, path)
+}
+
+/// As [`read_trajectory`], of a text that need not lie on a disk; `path` is what errors call it.
+pub fn parse_trajectory(text: &str, path: &Path) -> Result<Trajectory, TrajectoryError> {
+    let format = detect(text).map_err(|reason| TrajectoryError::Unknown { path: path.to_owned(), reason })?;
+    parse(text, format).map_err(|LineError { line, reason }| TrajectoryError::Line {
         path: path.to_owned(),
         line,
         reason,

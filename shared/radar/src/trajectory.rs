@@ -51,6 +51,24 @@ impl Trajectory {
         let position = a.translation.vector.lerp(&b.translation.vector, share);
         Some(Isometry2::new(position, a.rotation.angle() + share * (b.rotation * a.rotation.inverse()).angle()))
     }
+
+    /// As [`Trajectory::at`]; times that miss the span by no more than `tolerance_ns` are its ends, for files round.
+    pub fn near(&self, stamp_ns: i64, tolerance_ns: u64) -> Option<Isometry2<f64>> {
+        let (first, last) = self.span_ns()?;
+        let within = stamp_ns.clamp(first, last);
+        self.at(within).filter(|_| within.abs_diff(stamp_ns) <= tolerance_ns)
+    }
+
+    /// Time between the poses around a time, ns: 0 at a pose, `None` outside the span.
+    pub fn gap_ns(&self, stamp_ns: i64) -> Option<u64> {
+        let stamps = self.stamp_ns.as_ref()?;
+        let after = stamps.partition_point(|s| *s < stamp_ns);
+        let to = *stamps.get(after)?;
+        if to == stamp_ns {
+            return Some(0);
+        }
+        Some(to.abs_diff(stamps[after.checked_sub(1)?]))
+    }
 }
 
 /// A pose in the plane from the first two rows of a row-major 3 x 4 matrix; the heading is that of the x axis.
@@ -88,5 +106,15 @@ mod tests {
         assert_eq!(trajectory.at(100).unwrap(), trajectory.poses[1]);
         assert_eq!(trajectory.at(0).unwrap(), trajectory.poses[0]);
         assert!(trajectory.at(101).is_none() && trajectory.at(-1).is_none());
+    }
+
+    #[test]
+    fn near_an_end_is_the_end_and_gaps_are_as_wide_as_the_poses_are_apart() {
+        let poses = [1.0, 2.0, 4.0].map(|x| Isometry2::new(Vector2::new(x, 0.0), 0.0)).to_vec();
+        let trajectory = Trajectory { stamp_ns: Some(vec![0, 100, 150]), poses };
+        let x = |stamp_ns| trajectory.near(stamp_ns, 5).map(|pose| pose.translation.x);
+        assert_eq!([x(-6), x(-5), x(50), x(155), x(156)], [None, Some(1.0), Some(1.5), Some(4.0), None]);
+        let gaps = [-1, 0, 1, 100, 101, 150, 151].map(|stamp_ns| trajectory.gap_ns(stamp_ns));
+        assert_eq!(gaps, [None, Some(0), Some(100), Some(0), Some(50), Some(0), None]);
     }
 }

@@ -214,11 +214,7 @@ impl Searches {
 }
 
 fn motion(trajectory: &Trajectory, from_ns: i64, to_ns: i64) -> Option<Isometry2<f64>> {
-    let (first, last) = trajectory.span_ns()?;
-    let at = |stamp_ns: i64| {
-        let end = [first, last].into_iter().find(|end| stamp_ns.abs_diff(*end) <= ROUNDING_NS);
-        trajectory.at(end.unwrap_or(stamp_ns))
-    };
+    let at = |stamp_ns| trajectory.near(stamp_ns, ROUNDING_NS);
     Some(at(from_ns)?.inverse() * at(to_ns)?)
 }
 

@@ -1,0 +1,91 @@
+"""The command line."""
+
+import argparse
+from pathlib import Path
+
+import torch
+
+from . import recipe as recipes
+from .drift import drift, motions
+from .export import OnnxMasks
+from .model import publish
+from .pairs import Scans
+from .search import ScanMatch
+from .train import Trainer, trained
+from .worlds import export_pairs, find_gyre, simulate
+
+
+def run(arguments: list[str]) -> None:
+    parser = argparse.ArgumentParser(prog="python -m gyre_training", description="Trains Gyre's masks.")
+    parser.add_argument("--threads", type=int, help="threads of PyTorch; all by default")
+    parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
+    commands = parser.add_subparsers(required=True)
+    add_reproduce(commands)
+    add_train(commands)
+    add_drift(commands)
+    options = parser.parse_args(arguments)
+    if options.threads:
+        torch.set_num_threads(options.threads)
+    options.run(options)
+
+
+def add_reproduce(commands) -> None:
+    command = commands.add_parser("reproduce", help="all from nothing: worlds, pairs, training, ONNX file and card")
+    command.add_argument("recipe", type=Path, nargs="+")
+    command.add_argument("--work", type=Path, default=Path("out/training"), help="worlds, pairs and runs; kept")
+    command.add_argument("--models", type=Path, default=Path("out/models"), help="where the model goes")
+    command.add_argument("--gyre", type=Path, help="the program; by default the project's build")
+    command.set_defaults(run=reproduce)
+
+
+def reproduce(options: argparse.Namespace) -> None:
+    gyre, work = find_gyre(options.gyre), options.work.resolve()
+    simulate(gyre, work / "worlds")
+    for path in options.recipe:
+        recipe = recipes.read(path)
+        pairs = work / "pairs" / recipe.raster
+        export_pairs(gyre, work / "worlds", recipe.configuration, pairs)
+        folder = train_recipe(recipe, pairs, work, options.device)
+        publish(recipe, folder, pairs, options.models)
+
+
+def add_train(commands) -> None:
+    command = commands.add_parser("train", help="train a recipe on pairs that are there, or go on with it")
+    command.add_argument("recipe", type=Path)
+    command.add_argument("--pairs", type=Path, required=True, help="folder with train.npy and validation.npy")
+    command.add_argument("--out", type=Path, required=True)
+    command.set_defaults(run=train)
+
+
+def train(options: argparse.Namespace) -> None:
+    train_recipe(recipes.read(options.recipe), options.pairs, options.out, options.device)
+
+
+def train_recipe(recipe: recipes.Recipe, pairs: Path, work: Path, device: str) -> Path:
+    """Trains; returns the run's folder."""
+    scans, validation = (Scans(pairs / f"{split}.npy") for split in ("train", "validation"))
+    search = recipes.search_of(scans.settings, recipe.temperature)
+    initial = work / "runs" / recipe.initial / "best.pt" if recipe.initial else None
+    folder = work / "runs" / recipe.name
+    Trainer(folder, scans, validation, recipe.network, search, recipe.training, device, initial).run()
+    return folder
+
+
+def add_drift(commands) -> None:
+    command = commands.add_parser("drift", help="drift of checkpoints and ONNX files, and without masks")
+    command.add_argument("checkpoint", type=Path, nargs="*")
+    command.add_argument("--pairs", type=Path, required=True, help="a file of scans")
+    command.set_defaults(run=show_drift)
+
+
+def show_drift(options: argparse.Namespace) -> None:
+    scans = Scans(options.pairs)
+    pairs = scans.pairs(1)
+    match = ScanMatch(scans.n, scans.cell_m, recipes.search_of(scans.settings)).to(options.device)
+    for path in [None, *options.checkpoint]:
+        network = masks_of(path, options.device) if path else None
+        print(f"{path or 'without masks'}: {drift(scans, motions(scans, pairs, network, match), pairs)}", flush=True)
+
+
+def masks_of(path: Path, device: str):
+    return OnnxMasks(path) if path.suffix == ".onnx" else trained(path).to(device)

@@ -1,0 +1,107 @@
+"""The masking networks: Weston et al., Table II, and lighter ones of the same shape."""
+
+from dataclasses import asdict, dataclass
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+# Rasters hold powers above a floor, 0 to 255.
+FULL_SCALE = 255.0
+
+
+@dataclass(frozen=True)
+class NetworkConfig:
+    """A U-Net over `inputs` scans (2: the later and the earlier one; 1: each on its own).
+
+    `widths` are the features of the levels, each half the size of the one before. With `shrink` of 2 the masks are
+    computed at half the resolution and enlarged. With `fold` of 4 each square of 4 x 4 cells becomes one cell of 16
+    features, and so many features become the masks of such a square: all that is fine is kept, but every convolution is
+    done on a sixteenth of the cells. `separable` blocks filter each feature on its own, then mix them.
+    """
+
+    inputs: int = 2
+    widths: tuple[int, ...] = (8, 16, 32, 64, 128, 256)
+    shrink: int = 1
+    fold: int = 1
+    separable: bool = False
+
+    def to_dict(self) -> dict:
+        return asdict(self) | {"widths": list(self.widths)}
+
+    @staticmethod
+    def from_dict(values: dict) -> "NetworkConfig":
+        return NetworkConfig(**values | {"widths": tuple(values["widths"])})
+
+
+def convolution(inputs: int, outputs: int, separable: bool) -> nn.Module:
+    """3 x 3, batch norm, ReLU."""
+    if separable and inputs >= 8:
+        layers = [
+            nn.Conv2d(inputs, inputs, 3, padding=1, groups=inputs, bias=False),
+            nn.Conv2d(inputs, outputs, 1, bias=False),
+        ]
+    else:
+        layers = [nn.Conv2d(inputs, outputs, 3, padding=1, bias=False)]
+    return nn.Sequential(*layers, nn.BatchNorm2d(outputs), nn.ReLU(inplace=True))
+
+
+def block(inputs: int, outputs: int, separable: bool) -> nn.Module:
+    return nn.Sequential(convolution(inputs, outputs, separable), convolution(outputs, outputs, separable))
+
+
+class MaskNetwork(nn.Module):
+    """Masks of scans, Eq. 9: (batch, inputs, n, n) of powers to the same shape of factors between 0 and 1."""
+
+    def __init__(self, config: NetworkConfig = NetworkConfig()):
+        super().__init__()
+        self.config = config
+        widths, separable = config.widths, config.separable
+        folded = config.inputs * config.fold**2
+        pairs = zip((folded, *widths), widths)
+        self.encoder = nn.ModuleList(block(i, o, separable) for i, o in pairs)
+        pairs = zip(reversed(widths[1:]), reversed(widths[:-1]))
+        self.decoder = nn.ModuleList(block(i + o, o, separable) for i, o in pairs)
+        self.masks = nn.Conv2d(widths[0], folded, 3, padding=1)
+
+    def forward(self, scans: Tensor) -> Tensor:
+        return torch.sigmoid(self.logits(scans))
+
+    def logits(self, scans: Tensor) -> Tensor:
+        """What the sigmoid is taken of."""
+        x, size, config = scans / FULL_SCALE, scans.shape[-2:], self.config
+        if config.shrink > 1:
+            x = F.avg_pool2d(x, config.shrink)
+        if config.fold > 1:
+            x = F.pixel_unshuffle(F.pad(x, (0, -x.shape[-1] % config.fold, 0, -x.shape[-2] % config.fold)), config.fold)
+        x = self.masks(self._features(x))
+        if config.fold > 1:
+            x = F.pixel_shuffle(x, config.fold)
+        if config.shrink > 1:
+            return F.interpolate(x, size=size, mode="bilinear", align_corners=False)
+        return x[..., : size[0], : size[1]]
+
+    def _features(self, x: Tensor) -> Tensor:
+        skips = []
+        for encode in self.encoder:
+            x = encode(F.max_pool2d(x, 2) if skips else x)
+            skips.append(x)
+        skips.pop()
+        for decode in self.decoder:
+            skip = skips.pop()
+            # Odd sizes are halved downward, so the way back goes to the skip's own size.
+            x = F.interpolate(x, size=skip.shape[-2:], mode="bilinear", align_corners=False)
+            x = decode(torch.cat([x, skip], 1))
+        return x
+
+    def masked(self, later: Tensor, earlier: Tensor) -> tuple[Tensor, Tensor]:
+        """Both scans (batch, n, n) as their masks leave them (Eq. 10)."""
+        scans = torch.stack([later, earlier], 1)
+        if self.config.inputs == 1:
+            masks = self(scans.flatten(0, 1)[:, None]).view_as(scans)
+        else:
+            masks = self(scans)
+        return tuple((scans * masks).unbind(1))
+
+    def parameters_count(self) -> int:
+        return sum(parameter.numel() for parameter in self.parameters())

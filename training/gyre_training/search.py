@@ -1,0 +1,363 @@
+"""ScanMatch (Weston et al., Algorithm 1), differentiable, batch by batch.
+
+Frames and signs are those of Gyre's own search: rasters are (batch, n, n), row 0 far ahead, column 0 far left; a motion
+(x, y, yaw) is the pose of the later scan's frame in the earlier one's, metres and radians, y to the left and yaw
+counter-clockwise. With u, v the cells down and right of the middle, x = -u and y = -v.
+
+The slips of Algorithm 1 are put right: a correlation has a conjugate (lines 13 and 18), no angle and no shift is counted
+twice (lines 2 to 4), and padding reaches only as far as the shifts that are looked at (line 17).
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+
+@dataclass(frozen=True)
+class SoftArgmax:
+    """Mean of all positions, weighted with exp(temperature * score), of scores less their mean and over their largest
+    magnitude: so a temperature means the same for any raster (lines 15 and 19)."""
+
+    temperature: float = 48.0
+
+    def weights(self, scores: Tensor) -> Tensor:
+        """(batch, positions) -> (batch, positions), each row summing to 1."""
+        scores = scores - scores.mean(1, keepdim=True)
+        largest = scores.abs().amax(1, keepdim=True).clamp_min(1e-20)
+        return torch.softmax(self.temperature * scores / largest, 1)
+
+
+@dataclass(frozen=True)
+class SearchConfig:
+    """What a search looks at; the names are those of Gyre's sections `[rotation]` and `[translation]`."""
+
+    form: str = "eq7"
+    window: str = "hann"
+    band_low: float = 0.01
+    band_high: float = 0.35
+    angles: int = 733
+    radii: int = 127
+    reach_deg: float = 20.0
+    reach_m: float = 12.0
+    overlap: str = "none"
+    peak: str = "parabola"
+    soft: SoftArgmax = field(default_factory=SoftArgmax)
+
+    @staticmethod
+    def paper(form: str = "line14") -> "SearchConfig":
+        """As the papers print it: `configs/fast-mbym.toml`."""
+        return SearchConfig(form=form)
+
+    @staticmethod
+    def product(n: int) -> "SearchConfig":
+        """Gyre's defaults."""
+        radii = math.ceil((0.45 - 0.05) * n)
+        return SearchConfig("eq7", "radial_hann", 0.05, 0.45, 576, radii, overlap="energy", peak="gaussian")
+
+
+def fast_size(n: int) -> int:
+    """The least even size of at least `n` whose only prime factors are 2, 3 and 5."""
+    size = n + n % 2
+    while True:
+        rest = size
+        for prime in (2, 3, 5):
+            while rest % prime == 0:
+                rest //= prime
+        if rest == 1:
+            return size
+        size += 2
+
+
+def window(kind: str, n: int) -> Tensor:
+    """Weights of an n x n raster before its transform (line 5)."""
+    t = torch.arange(n, dtype=torch.float64) - (n - 1) / 2
+    half = (n + 1) / 2
+
+    def hann(t: Tensor) -> Tensor:
+        return torch.where(t.abs() < half, 0.5 + 0.5 * torch.cos(math.pi * t / half), 0.0)
+
+    if kind == "hann":
+        return (hann(t)[:, None] * hann(t)[None, :]).float()
+    if kind == "radial_hann":
+        return hann(torch.hypot(t[:, None], t[None, :])).float()
+    return torch.ones(n, n)
+
+
+class RotationSearch(nn.Module):
+    """The angle between two scans from their magnitude spectra (lines 5 to 15)."""
+
+    def __init__(self, n: int, config: SearchConfig):
+        super().__init__()
+        self.config, self.size = config, fast_size(n)
+        self.register_buffer("window", window(config.window, n), persistent=False)
+        grid, self.rows, self.columns = self._polar_grid()
+        self.register_buffer("grid", grid, persistent=False)
+        self.step = math.pi / config.angles
+        reach = int(math.radians(config.reach_deg) / self.step)
+        self.register_buffer("shifts", torch.arange(-reach, reach + 1), persistent=False)
+
+    def _polar_grid(self) -> tuple[Tensor, int, int]:
+        """Where the polar samples lie among the magnitudes of the band, as `grid_sample` wants it (line 11)."""
+        config = self.config
+        bins = int(config.band_high * self.size) + 1
+        rho = torch.linspace(config.band_low, config.band_high, config.radii, dtype=torch.float64) * self.size
+        theta = -math.pi / 2 + torch.arange(config.angles, dtype=torch.float64) * (math.pi / config.angles)
+        u, v = rho[:, None] * torch.cos(theta), rho[:, None] * torch.sin(theta)
+        u, v = torch.where(v < 0, -u, u), v.abs()  # a real image has the same magnitude at (-u, -v)
+        return torch.stack([2 * v / bins - 1, u / bins], -1)[None].float(), bins, bins + 1
+
+    def spectra(self, rasters: Tensor) -> Tensor:
+        """Polar magnitudes, transformed along the angle: (batch, profiles, angles // 2 + 1)."""
+        plane = torch.fft.rfft2(rasters * self.window, s=(self.size, self.size))[..., : self.columns]
+        plane = torch.cat([plane[:, -self.rows :], plane[:, : self.rows + 1]], 1)
+        # The root has no slope at zero: what is added lies far below a raster's rounding.
+        magnitude = (plane.real.square() + plane.imag.square() + 1e-12).sqrt()
+        grid = self.grid.expand(len(rasters), -1, -1, -1)
+        polar = F.grid_sample(magnitude[:, None], grid, align_corners=True, padding_mode="border")[:, 0]
+        if self.config.form == "line14":
+            polar = polar.sum(1, keepdim=True)  # the mean over all radial shifts is that of the summed profiles
+        return torch.fft.rfft(polar - polar.mean(2, keepdim=True), dim=2)
+
+    def correlation(self, later: Tensor, earlier: Tensor) -> Tensor:
+        """Scores of all angles within reach: (batch, angles) (Eq. 7, or line 14)."""
+        cross = (self.spectra(earlier) * self.spectra(later).conj()).sum(1)
+        return torch.fft.irfft(cross, n=self.config.angles, dim=1)[:, self.shifts % self.config.angles]
+
+    def soft(self, scores: Tensor) -> Tensor:
+        """The angle, radians: (batch,)."""
+        return (self.config.soft.weights(scores) * self.shifts).sum(1) * self.step
+
+    def local(self, scores: Tensor) -> Tensor:
+        """The angle at the highest peak by a parabola, radians, with gradients: (batch,)."""
+        best = scores.detach()[:, 1:-1].argmax(1) + 1
+        near = scores.gather(1, best[:, None] + torch.arange(-1, 2, device=scores.device))
+        return (self.shifts[best] + parabola(near)) * self.step
+
+    def hard(self, scores: Tensor) -> Tensor:
+        """The angle at the highest peak, radians: (batch,)."""
+        best = scores[:, 1:-1].argmax(1) + 1
+        offset = line_peak(self.config.peak, around(scores, best, len(self.shifts)))
+        return (self.shifts[best] + offset) * self.step
+
+
+class TranslationSearch(nn.Module):
+    """The shift between two scans whose angle is known (lines 16 to 21)."""
+
+    def __init__(self, n: int, cell_m: float, config: SearchConfig):
+        super().__init__()
+        self.n, self.cell_m, self.config = n, cell_m, config
+        self.reach = int(config.reach_m / cell_m + 1e-9)
+        self.around = self.reach + SUPPORT
+        self.size = fast_size(n + self.around)
+        shifts = torch.arange(-self.around, self.around + 1)
+        self.register_buffer("shifts", shifts, persistent=False)
+        self.register_buffer("within", shifts.abs() <= self.reach, persistent=False)
+        middle = torch.arange(n, dtype=torch.float32) - (n - 1) / 2
+        self.register_buffer("middle", middle, persistent=False)
+
+    def turned(self, rasters: Tensor, angles: Tensor) -> Tensor:
+        """g'(x) = g(R x), zero where R x lies outside of g (line 16)."""
+        cos, sin = torch.cos(angles)[:, None, None], torch.sin(angles)[:, None, None]
+        u, v = self.middle[:, None], self.middle[None, :]
+        half = (self.n - 1) / 2
+        grid = torch.stack([(sin * u + cos * v) / half, (cos * u - sin * v) / half], -1)
+        # `grid_sample` would blend what lies up to a cell outside with zeros.
+        inside = grid.detach().abs().amax(-1) <= 1 + 1e-6
+        return F.grid_sample(rasters[:, None], grid, align_corners=True, padding_mode="border")[:, 0] * inside
+
+    def correlation(self, later: Tensor, turned: Tensor) -> Tensor:
+        """Scores of all shifts (down, right): (batch, shifts, shifts) (lines 17 and 18)."""
+        s = (self.size, self.size)
+        cross = torch.fft.rfft2(turned, s=s) * torch.fft.rfft2(later, s=s).conj()
+        near = self.shifts % self.size
+        scores = torch.fft.irfft2(cross, s=s)[:, near][:, :, near]
+        if self.config.overlap == "energy":
+            return scores / (self._left(later, 1) * self._left(turned, -1) + 1e-12).sqrt()
+        energy = later.square().sum((1, 2)) * turned.square().sum((1, 2))
+        return scores / (energy + 1e-12).sqrt()[:, None, None]
+
+    def _left(self, rasters: Tensor, sign: int) -> Tensor:
+        """Energy of each raster in what is left of it after each shift, from its sums over rectangles."""
+        sums = F.pad(rasters.double().square().cumsum(1).cumsum(2), (1, 0, 1, 0))
+        low = (-sign * self.shifts).clamp_min(0)
+        high = self.n - (sign * self.shifts).clamp_min(0)
+        rows = sums[:, high] - sums[:, low]
+        return (rows[:, :, high] - rows[:, :, low]).clamp_min(0).to(rasters.dtype)
+
+    def soft(self, scores: Tensor) -> Tensor:
+        """The shift (down, right), cells: (batch, 2)."""
+        scores = scores[:, self.within][:, :, self.within]
+        weights = self.config.soft.weights(scores.flatten(1)).view_as(scores)
+        shifts = self.shifts[self.within].to(weights)
+        return torch.stack([(weights.sum(2) * shifts).sum(1), (weights.sum(1) * shifts).sum(1)], 1)
+
+    def local(self, scores: Tensor) -> Tensor:
+        """The shift (down, right) at the highest peak by a parabola along each axis, cells, with gradients: (batch, 2)."""
+        best = self._highest(scores.detach())
+        steps, every = torch.arange(-1, 2, device=scores.device), torch.arange(len(scores), device=scores.device)[:, None]
+        down = scores[every, best[:, :1] + steps, best[:, 1:]]
+        right = scores[every, best[:, :1], best[:, 1:] + steps]
+        return best - self.around + torch.stack([parabola(down), parabola(right)], 1)
+
+    def _highest(self, scores: Tensor) -> Tensor:
+        """Where the highest score within reach stands (row, column): (batch, 2)."""
+        inner = scores[:, self.within][:, :, self.within]
+        best = inner.flatten(1).argmax(1)
+        return torch.stack([best // inner.shape[1], best % inner.shape[1]], 1) + SUPPORT
+
+    def hard(self, scores: Tensor) -> Tensor:
+        """The shift (down, right) at the highest peak, cells: (batch, 2)."""
+        best = self._highest(scores)
+        offsets = [plane_peak(self.config.peak, s, i, j) for s, (i, j) in zip(scores.double(), best.tolist(), strict=True)]
+        return best - self.around + torch.stack(offsets).to(scores.device)
+
+    def motion(self, shift: Tensor, angles: Tensor) -> Tensor:
+        """t = R t' (lines 20 and 21): (batch, 3) of x, y, yaw."""
+        x, y = (shift * -self.cell_m).unbind(1)
+        cos, sin = torch.cos(angles), torch.sin(angles)
+        return torch.stack([cos * x - sin * y, sin * x + cos * y, angles], 1)
+
+
+class ScanMatch(nn.Module):
+    """Algorithm 1: the motion between masked scans."""
+
+    def __init__(self, n: int, cell_m: float, config: SearchConfig):
+        super().__init__()
+        self.rotation = RotationSearch(n, config)
+        self.translation = TranslationSearch(n, cell_m, config)
+
+    def forward(self, later: Tensor, earlier: Tensor) -> Tensor:
+        """The motion by soft peaks, with gradients: (batch, 3)."""
+        angles = self.rotation.soft(self.rotation.correlation(later, earlier))
+        turned = self.translation.turned(earlier, angles)
+        return self.translation.motion(self.translation.soft(self.translation.correlation(later, turned)), angles)
+
+    def soft_and_local(self, later: Tensor, earlier: Tensor) -> tuple[Tensor, Tensor]:
+        """The motion by soft peaks, and by parabolas at the highest ones, both with gradients: (batch, 3) each."""
+        rotation = self.rotation.correlation(later, earlier)
+        angles = self.rotation.soft(rotation)
+        scores = self.translation.correlation(later, self.translation.turned(earlier, angles))
+        local = self.translation.motion(self.translation.local(scores), self.rotation.local(rotation))
+        return self.translation.motion(self.translation.soft(scores), angles), local
+
+    @torch.no_grad()
+    def hard(self, later: Tensor, earlier: Tensor) -> Tensor:
+        """The motion by the highest peaks, as Gyre finds it: (batch, 3)."""
+        angles = self.rotation.hard(self.rotation.correlation(later, earlier)).float()
+        turned = self.translation.turned(earlier, angles)
+        return self.translation.motion(self.translation.hard(self.translation.correlation(later, turned)), angles)
+
+
+class ExhaustiveMatch(nn.Module):
+    """MbyM's search: every angle of a grid, each with all shifts (Barnes et al. 2019; `raw` in Weston et al.)."""
+
+    def __init__(self, n: int, cell_m: float, config: SearchConfig, reach_deg: float = 15.0, step_deg: float = 1.0):
+        super().__init__()
+        self.translation = TranslationSearch(n, cell_m, config)
+        count = int(reach_deg / step_deg + 1e-9)
+        angles = torch.arange(-count, count + 1) * math.radians(step_deg)
+        self.register_buffer("angles", angles, persistent=False)
+
+    def _scores(self, later: Tensor, earlier: Tensor) -> Tensor:
+        """(batch, angles, shifts, shifts)."""
+        batch, count = len(later), len(self.angles)
+        turned = self.translation.turned(earlier.repeat_interleave(count, 0), self.angles.repeat(batch))
+        return self._correlation(later, turned.view(batch, count, *later.shape[1:]))
+
+    def _correlation(self, later: Tensor, turned: Tensor) -> Tensor:
+        s, near = (self.translation.size,) * 2, self.translation.shifts % self.translation.size
+        cross = torch.fft.rfft2(turned, s=s) * torch.fft.rfft2(later, s=s).conj()[:, None]
+        scores = torch.fft.irfft2(cross, s=s)[:, :, near][..., near]
+        energy = later.square().sum((1, 2)) * turned[:, turned.shape[1] // 2].square().sum((1, 2))
+        return scores / (energy + 1e-12).sqrt()[:, None, None, None]
+
+    def forward(self, later: Tensor, earlier: Tensor) -> Tensor:
+        """The motion by soft peaks over all three unknowns: (batch, 3)."""
+        within, shifts = self.translation.within, self.translation.shifts
+        scores = self._scores(later, earlier)[:, :, within][..., within]
+        weights = self.translation.config.soft.weights(scores.flatten(1)).view_as(scores)
+        angles = (weights.sum((2, 3)) * self.angles).sum(1)
+        near = shifts[within].to(weights)
+        # A shift is one of g turned by its own angle: x and y are weighed, not shifts.
+        u, v = near[:, None].expand(len(near), -1), near[None, :].expand(len(near), -1)
+        x, y = (-self.translation.cell_m * s for s in (u, v))
+        cos, sin = torch.cos(self.angles)[:, None, None], torch.sin(self.angles)[:, None, None]
+        x, y = (weights * (cos * x - sin * y)).sum((1, 2, 3)), (weights * (sin * x + cos * y)).sum((1, 2, 3))
+        return torch.stack([x, y, angles], 1)
+
+    @torch.no_grad()
+    def hard(self, later: Tensor, earlier: Tensor) -> Tensor:
+        """The motion by the highest peak: (batch, 3)."""
+        scores = self._scores(later, earlier)
+        best = scores[:, :, self.translation.within][..., self.translation.within].amax((2, 3))
+        k = best[:, 1:-1].argmax(1) + 1
+        offset = line_peak("parabola", around(best, k, best.shape[1]))
+        angles = (self.angles[k] + offset * (self.angles[1] - self.angles[0])).float()
+        turned = self.translation.turned(earlier, angles)
+        return self.translation.motion(self.translation.hard(self.translation.correlation(later, turned)), angles)
+
+
+# Samples on each side of the highest one that a fit looks at, and how far from it a fit may end.
+SUPPORT = 3
+FARTHEST = 0.75
+
+
+def around(scores: Tensor, best: Tensor, count: int) -> Tensor:
+    """The samples within SUPPORT of the best one, the ends repeated: (batch, 2 SUPPORT + 1), double."""
+    at = best[:, None] + torch.arange(-SUPPORT, SUPPORT + 1, device=best.device)
+    return scores.gather(1, at.clamp(0, count - 1)).double()
+
+
+def line_peak(kind: str, samples: Tensor) -> Tensor:
+    """The maximum's place beside the middle sample: a parabola through three, or one through the logarithm above a
+    pedestal, which is a Gaussian."""
+    near = samples[:, SUPPORT - 1 : SUPPORT + 2]
+    if kind == "gaussian":
+        highest = near[:, 1:2]
+        lowest = torch.minimum(samples.amin(1, keepdim=True), highest)
+        near = (near - (lowest - 0.05 * (highest - lowest))).log()
+    a, b, c = near.unbind(1)
+    return torch.nan_to_num(0.5 * (a - c) / (a - 2 * b + c)).clamp(-FARTHEST, FARTHEST)
+
+
+def parabola(near: Tensor) -> Tensor:
+    """The summit of the parabola through three samples (batch, 3), the middle one the highest."""
+    a, b, c = near.unbind(1)
+    return (0.5 * (a - c) / (a - 2 * b + c).clamp_max(-1e-9)).clamp(-FARTHEST, FARTHEST)
+
+
+def plane_peak(kind: str, scores: Tensor, i: int, j: int) -> Tensor:
+    """The maximum's place (down, right) beside the sample (i, j)."""
+    near = scores[i - 1 : i + 2, j - 1 : j + 2]
+    parabolas = torch.cat([line_peak_of_three(near[:, 1]), line_peak_of_three(near[1])])
+    if kind != "gaussian":
+        return parabolas
+    wide = scores[i - SUPPORT : i + SUPPORT + 1, j - SUPPORT : j + SUPPORT + 1]
+    lowest = wide.min()
+    fit = paraboloid((near - (lowest - 0.05 * (near[1, 1] - lowest))).log())
+    return parabolas if fit is None else fit
+
+
+def line_peak_of_three(near: Tensor) -> Tensor:
+    """The summit of the parabola through three samples."""
+    a, b, c = near
+    curvature = a - 2 * b + c
+    return (0.5 * (a - c) / curvature).clamp(-FARTHEST, FARTHEST)[None] if curvature < 0 else torch.zeros(1).double()
+
+
+def paraboloid(near: Tensor) -> Tensor | None:
+    """The summit of the paraboloid that fits nine samples best, where it has one nearby."""
+    steps = torch.tensor([-1.0, 0.0, 1.0], dtype=torch.float64)
+    i, j = steps[:, None], steps[None, :]
+    gradient = torch.stack([(near * i).sum(), (near * j).sum()]) / 6
+    cross = (near * i * j).sum() / 4
+    down, right = (near * (3 * i * i - 2)).sum() / 3, (near * (3 * j * j - 2)).sum() / 3
+    determinant = down * right - cross * cross
+    if not (down < 0 and determinant > 0):
+        return None
+    offset = torch.stack([cross * gradient[1] - right * gradient[0], cross * gradient[0] - down * gradient[1]])
+    offset = offset / determinant
+    return offset if offset.abs().max() <= FARTHEST else None
