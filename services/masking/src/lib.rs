@@ -1,5 +1,4 @@
 //! Rasterises each scan, undoes its sweep's distortion, masks what would mislead the search, and picks the sparse points out.
-
 //!
 //! Reading order: [`Masker`], then `rasters` (what comes before any network), `learned` and [`network`] (the network's masks),
 //! `points`; [`model`] and [`runtime`] say which networks there are and who computes them.
@@ -116,16 +115,18 @@ impl Masker {
     /// [`MaskedHeader::raster_values`]. Returns the velocity that the sweep's distortion was undone with.
     ///
     /// # Errors
-    /// A scan that contradicts itself, a network that fails.
+    /// A scan that contradicts itself, no room for a raster, a network that fails.
     pub fn mask(
         &mut self,
         sweep: &Sweep<'_>,
         before: Option<&Sweep<'_>>,
         out: &mut [f32],
     ) -> Result<Option<Twist>, MaskError> {
-        match &mut self.learned {
-            Some(learned) => learned.mask(&mut self.rasters, sweep, before, out),
-            None => Ok(self.rasters.make(sweep, &mut out[..self.raster.n * self.raster.n])?),
+        let (cells, actual) = (self.raster.n * self.raster.n, out.len());
+        match (&mut self.learned, out.get_mut(..cells)) {
+            (_, None) => Err(RasterError::OutputLength { expected: cells, actual }.into()),
+            (None, Some(raster)) => Ok(self.rasters.make(sweep, raster)?),
+            (Some(learned), Some(_)) => learned.mask(&mut self.rasters, sweep, before, out),
         }
     }
 
