@@ -238,7 +238,7 @@ impl Configuration {
         self.translation.validate().map_err(|e| value("translation", e.to_string()))?;
         self.exhaustive.validate().map_err(|e| value("exhaustive", e.to_string()))?;
         self.refinement.validate().map_err(|e| value("refinement", e.to_string()))?;
-        self.window(None).validate().map_err(|e| value("run", e.to_string()))?;
+        self.window(None, 1).validate().map_err(|e| value("run", e.to_string()))?;
         if let Some(simulation) = &self.simulation {
             simulation.validate().map_err(|e| value("simulation", e.to_string()))?;
             let written = simulation.output.format.unwrap_or_default();
@@ -252,12 +252,7 @@ impl Configuration {
                 "points.capacity is 0, but a refinement of kind `local-map` matches points: it must be 1 or more";
             return Err(value("points", reason.to_owned()));
         }
-        if self.masking.compensate && self.masking.lag == 0 {
-            return Err(value(
-                "masking",
-                "lag is 0, but a scan's own motion is not known yet: it must be 1 or more".to_owned(),
-            ));
-        }
+        self.masking.validate().map_err(|e| value("masking", e.to_string()))?;
         if self.run.mode == Mode::Live && self.run.rate == Rate::Max {
             return Err(value(
                 "run",
@@ -274,8 +269,9 @@ impl Configuration {
         })
     }
 
-    /// How much may be on its way. In live mode the source keeps what comes within a second, the time of a restart.
-    pub fn window(&self, period: Option<Duration>) -> Window {
+    /// How much may be on its way, with masks that look at so many scans. In live mode the source keeps what comes within a
+    /// second, the time of a restart.
+    pub fn window(&self, period: Option<Duration>, scans_a_mask: usize) -> Window {
         let live_depth = match (self.run.mode, self.run.rate.factor()) {
             (Mode::Live, Some(rate)) => {
                 let period_s = period.map_or(0.25, |period| period.as_secs_f64()) / rate;
@@ -283,7 +279,7 @@ impl Configuration {
             }
             _ => 0,
         };
-        Window { scans: self.run.window, lag: self.masking.feedback_lag(), look_back: 1, live_depth }
+        Window { scans: self.run.window, lag: self.masking.feedback_lag(), look_back: scans_a_mask, live_depth }
     }
 
     /// The simulation that is played without being stored, if that is what is played.

@@ -2,6 +2,7 @@
 
 use std::{path::Path, time::Duration};
 
+use gyre_masking::Masker;
 use gyre_messages::{Footprint, Limits, Window};
 use gyre_radar::Dataset;
 use gyre_simulator::Recording;
@@ -61,11 +62,12 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
     if scans < 2 {
         return Err(PreflightError::TooFew { path: configuration.data(), scans }.into());
     }
-    let window = configuration.window(period(dataset.as_ref()));
+    let masker = Masker::new(&configuration.raster, &configuration.points, &configuration.masking)?;
+    let window = configuration.window(period(dataset.as_ref()), masker.rasters());
     let limits = Limits {
         scan_bytes: dataset.limits().bytes,
         raster_cells: configuration.raster.n * configuration.raster.n,
-        rasters: 1,
+        rasters: masker.rasters(),
         points: configuration.points.capacity,
     };
     let footprint = Footprint::new(&window, &limits);

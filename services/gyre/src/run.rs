@@ -133,6 +133,7 @@ fn resolve(arguments: &RunArguments, out: &Path) -> Result<Configuration, Failur
             false => PathBuf::new(),
         };
     }
+    configuration.masking.resolve()?;
     // So that the resolved configuration repeats the run from anywhere. What does not exist is told by the reader.
     for path in [Some(&mut configuration.source.data), configuration.run.ground_truth.as_mut()].into_iter().flatten() {
         if let Ok(absolute) = path.canonicalize() {

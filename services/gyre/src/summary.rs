@@ -2,6 +2,7 @@
 
 use std::{collections::BTreeMap, fmt, path::Path, time::Duration};
 
+use gyre_masking::{MaskKind, MaskingConfig};
 use gyre_messages::{Footprint, PoseHeader, Stage, flag, hypothesis, outcome};
 use gyre_stage::{
     Statistics,
@@ -111,6 +112,24 @@ fn missing(poses: &[PoseHeader]) -> u64 {
     motions().map(|pose| fit(pose).saturating_sub(turns(pose))).sum()
 }
 
+/// The network that makes the masks.
+#[derive(Debug, Serialize)]
+struct Mask {
+    /// Its card.
+    model: String,
+    /// Its file's SHA-256.
+    sha256: String,
+}
+
+impl Mask {
+    /// From a resolved configuration.
+    fn of(masking: &MaskingConfig) -> Option<Self> {
+        let (model, sha256) = (masking.model.as_ref()?, masking.sha256.as_ref()?);
+        let mask = Self { model: model.display().to_string(), sha256: sha256.clone() };
+        (masking.kind == MaskKind::Learned).then_some(mask)
+    }
+}
+
 /// All that is worth knowing of a run.
 #[derive(Debug, Serialize)]
 pub struct Summary {
@@ -123,6 +142,9 @@ pub struct Summary {
     mode: Mode,
     rate: Rate,
     window: usize,
+    /// `None`: no network makes the masks.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mask: Option<Mask>,
     scans_in_recording: usize,
     resumed_after: usize,
     #[serde(flatten)]
@@ -160,6 +182,7 @@ impl Summary {
             mode: configuration.run.mode,
             rate: configuration.run.rate,
             window: configuration.run.window,
+            mask: Mask::of(&configuration.masking),
             scans_in_recording: session.scans,
             resumed_after: session.resumed,
             counts,

@@ -32,7 +32,9 @@ fn wall_ahead_m(config: &MaskingConfig) -> f32 {
     let mut masker = Masker::new(&raster, &PointsConfig::default(), config).unwrap();
     let motion = SearchedMotion { x_m: 5.0, y_m: 0.0, yaw_rad: 0.0, interval_ns: 250_000_000 };
     let mut cells = vec![0.0; 401 * 401];
-    assert!(masker.mask(&wall().view(), Some(&motion), &mut cells).unwrap().is_some());
+    let wall = wall();
+    let sweep = Sweep { number: 0, scan: wall.view(), motion: Some(motion) };
+    assert!(masker.mask(&sweep, None, &mut cells).unwrap().is_some());
     let ahead = (0..200).map(|row| (cells[row * 401 + 200], (200 - row) as f32 * 0.25));
     let (sum, moment) = ahead.fold((0.0, 0.0), |(sum, moment), (power, x_m)| (sum + power, moment + power * x_m));
     moment / sum
@@ -52,7 +54,7 @@ fn points_start_above_the_masks_floor() {
         let points = PointsConfig { capacity: 20_000, ..PointsConfig::default() };
         let mut masker = Masker::new(&RasterConfig::default(), &points, config).unwrap();
         let mut out = vec![[0.0; 5]; points.capacity];
-        let count = masker.points(&wall().view(), &mut out).unwrap();
+        let count = masker.points(&wall().view(), None, &mut out).unwrap();
         (count, out[0][3])
     };
     assert_eq!(count(&MaskingConfig::default()), (20 * AZIMUTHS, 40.0 / 60.0));

@@ -101,7 +101,7 @@ impl Window {
         match topic {
             "scan" if self.live_depth > 0 => {
                 let depth = self.live_depth.max(data);
-                TopicSizes { history: depth, buffer: depth, borrowed: depth + 1, ..sizes }
+                TopicSizes { history: depth, buffer: depth, borrowed: depth + self.look_back, ..sizes }
             }
             _ => sizes,
         }

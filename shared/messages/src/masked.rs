@@ -23,6 +23,8 @@ pub mod mask_kind {
     pub const NONE: u32 = 0;
     /// Power below a threshold counts as nothing.
     pub const THRESHOLD: u32 = 1;
+    /// Besides, a network weighed each cell.
+    pub const LEARNED: u32 = 2;
 }
 
 /// A raster's geometry and how it was made.
@@ -56,10 +58,15 @@ impl MaskedHeader {
         self.n as usize * self.n as usize
     }
 
+    /// Values from one raster's start to that of what follows it, for rasters of so many cells.
+    pub fn raster_values(cells: usize) -> usize {
+        FloatBlock::count(cells) * FloatBlock::LEN
+    }
+
     /// The scan's points, each `[x_m, y_m, time_s, weight, doppler_s]`: see `gyre_radar::Point`. `None` where the payload
     /// is shorter than the header says.
     pub fn points<'a>(&self, values: &'a [f32]) -> Option<&'a [Point]> {
-        let first = (self.rasters as usize).checked_mul(raster_values(self.cells()))?;
+        let first = (self.rasters as usize).checked_mul(Self::raster_values(self.cells()))?;
         values.get(first..)?.as_chunks().0.get(..self.points as usize)
     }
 
@@ -67,7 +74,7 @@ impl MaskedHeader {
     /// at both, else the first one there. `None` where a payload is shorter than its header says.
     pub fn pair<'a>(&self, values: &'a [f32], before: Option<(&Self, &'a [f32])>) -> Option<Pair<'a>> {
         let later = values.get(..self.cells())?;
-        let second = raster_values(self.cells());
+        let second = Self::raster_values(self.cells());
         let earlier = match before {
             None => None,
             Some(_) if self.rasters == 2 => Some(values.get(second..second + self.cells())?),
@@ -76,11 +83,6 @@ impl MaskedHeader {
         };
         Some(Pair { later, earlier })
     }
-}
-
-/// Values from one raster's start to that of what follows it.
-fn raster_values(cells: usize) -> usize {
-    FloatBlock::count(cells) * FloatBlock::LEN
 }
 
 /// Two rasters of the same size.

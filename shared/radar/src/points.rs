@@ -23,7 +23,8 @@ use serde::{Deserialize, Serialize};
 /// - `x_m`, `y_m`: where it is in the sensor's own frame at the moment when its azimuth was measured, metres, x forward
 ///   and y left. Neither the sweep's motion nor Doppler's shift is undone.
 /// - `time_s`: that moment, seconds from the scan's stamp.
-/// - `weight`: power above the floor over [`PointsConfig::weight_cap`], in `(0, 1]`.
+/// - `weight`: power above the floor over [`PointsConfig::weight_cap`], in `(0, 1]`. A learned mask multiplies it by
+///   its own factor afterwards, which may be 0.
 /// - `doppler_s`: metres to add to the range for each m/s at which the sensor approaches the point
 ///   ([`PolarScan::doppler_s`]). With `u` the direction to the point and `v` the sensor's velocity, the point truly lay
 ///   at `(x, y) + doppler_s (u . v) u`.

@@ -19,9 +19,9 @@ use crate::{
 pub struct Scans {
     intake: Intake,
     feedback: Feedback,
-    lag: u64,
-    /// The motion for the scan at hand.
-    motion: Option<SearchedMotion>,
+    window: Window,
+    /// The motion for the scan at hand, and that for the one before.
+    motions: [Option<SearchedMotion>; 2],
 }
 
 enum Intake {
@@ -34,6 +34,16 @@ pub struct ScanView<'a> {
     /// The scan.
     pub scan: &'a Received<Scan>,
     /// The motion of the scan `lag` before it; `None` where there was none.
+    pub motion: Option<SearchedMotion>,
+    /// The scan before, where the run's masks look at two; `None` where the chain starts.
+    pub before: Option<ScanBefore<'a>>,
+}
+
+/// The scan before the one to mask.
+pub struct ScanBefore<'a> {
+    /// The scan.
+    pub scan: &'a Received<Scan>,
+    /// The motion that was its own when it was masked.
     pub motion: Option<SearchedMotion>,
 }
 
@@ -48,11 +58,12 @@ impl Inputs for Scans {
             true => Intake::Live(NewestWins {
                 port: Port::open(&launch.node)?,
                 queue: VecDeque::with_capacity(window.live_depth + 2),
+                before: None,
                 window,
                 chain: None,
             }),
         };
-        Ok(Self { intake, feedback, lag: window.lag as u64, motion: None })
+        Ok(Self { intake, feedback, window, motions: [None; 2] })
     }
 
     fn turn(&mut self) -> Result<Turn, StageError> {
@@ -69,22 +80,24 @@ impl Inputs for Scans {
             Intake::Live(intake) => intake.turn(&sync, newest)?,
         };
         match turn {
-            Turn::Process(item, _) if !self.find_motion(item.seq) => Ok(Turn::Wait),
+            Turn::Process(item, _) if !self.find_motions(item.seq) => Ok(Turn::Wait),
             turn => Ok(turn),
         }
     }
 
     fn view(&self) -> Option<ScanView<'_>> {
-        let scan = match &self.intake {
-            Intake::Lossless(intake) => intake.reader.current(),
-            Intake::Live(intake) => intake.queue.front(),
+        let (scan, before) = match &self.intake {
+            Intake::Lossless(intake) => (intake.reader.current(), intake.before()),
+            Intake::Live(intake) => (intake.queue.front(), intake.before()),
         };
-        Some(ScanView { scan: scan?, motion: self.motion })
+        let [motion, motion_before] = self.motions;
+        let before = before.map(|scan| ScanBefore { scan, motion: motion_before });
+        Some(ScanView { scan: scan?, motion, before })
     }
 
     fn advance(&mut self) {
         match &mut self.intake {
-            Intake::Lossless(intake) => intake.reader.release(),
+            Intake::Lossless(intake) => intake.advance(),
             Intake::Live(intake) => intake.advance(),
         }
     }
@@ -107,13 +120,31 @@ impl Inputs for Scans {
 }
 
 impl Scans {
-    /// Looks up the motion that scan `seq` is compensated with; false as long as it is still to come.
-    fn find_motion(&mut self, seq: u64) -> bool {
-        let asked = if self.lag == 0 { None } else { seq.checked_sub(self.lag) };
-        let found = asked.map_or(Some(None), |seq| self.feedback.motion(seq));
-        self.motion = found.flatten();
-        found.is_some()
+    /// Looks up the motions that scan `seq` and the one before are compensated with; false as long as one is still to come.
+    fn find_motions(&mut self, seq: u64) -> bool {
+        let before = if looks_at_two(&self.window) { seq.checked_sub(1) } else { None };
+        let found = [Some(seq), before].map(|seq| seq.map_or(Some(None), |seq| self.motion_for(seq)));
+        self.motions = found.map(Option::flatten);
+        found.iter().all(Option::is_some)
     }
+
+    /// The motion for scan `seq`, by number alone, so that it is the same one after a restart.
+    fn motion_for(&self, seq: u64) -> Option<Option<SearchedMotion>> {
+        let asked = if self.window.lag == 0 { None } else { seq.checked_sub(self.window.lag as u64) };
+        asked.map_or(Some(None), |seq| self.feedback.motion(seq))
+    }
+}
+
+/// Whether a mask needs the scan before: what looks back at it looks back at one more.
+fn looks_at_two(window: &Window) -> bool {
+    window.look_back > 1
+}
+
+/// Whether a starting masking is to send nothing for an item: its readers have had it, or it lacks its own scan before, and what
+/// came of it would not be what was sent for it the first time.
+fn serves_only_as_before(window: &Window, item: &Item, newest_pose: Option<u64>, has_before: bool) -> bool {
+    let had = newest_pose.is_some_and(|newest| item.seq.saturating_add(window.look_back as u64) <= newest);
+    had || (looks_at_two(window) && !has_before && !item.is(flag::BREAK))
 }
 
 struct InOrder {
@@ -130,13 +161,22 @@ impl InOrder {
         if item.is(flag::END) {
             return Ok(Turn::End(item));
         }
-        let look_back = self.window.look_back as u64;
-        let had = newest_pose.is_some_and(|newest| item.seq.saturating_add(look_back) <= newest);
-        if had && !self.flowing {
+        if !self.flowing && serves_only_as_before(&self.window, &item, newest_pose, self.before().is_some()) {
             return Ok(Turn::Keep);
         }
         self.flowing = true;
         Ok(Turn::Process(item, received_ns))
+    }
+
+    fn before(&self) -> Option<&Received<Scan>> {
+        self.reader.before()
+    }
+
+    fn advance(&mut self) {
+        match looks_at_two(&self.window) {
+            true => self.reader.advance(),
+            false => self.reader.release(),
+        }
     }
 }
 
@@ -144,6 +184,8 @@ struct NewestWins {
     port: Port<Scan>,
     /// The scan at hand and, behind it, what came since; at the start the source's history.
     queue: VecDeque<Received<Scan>>,
+    /// The scan before, where masks look at two.
+    before: Option<Received<Scan>>,
     window: Window,
     chain: Option<Chain>,
 }
@@ -194,7 +236,10 @@ impl NewestWins {
     /// restarted as well sends them again, and one whose history is just being handed over is not through with them.
     fn resume(&mut self, sync: &Item) -> Option<Chain> {
         while self.queue.front().is_some_and(|front| Chain::is_past(front.item(), sync)) {
-            self.queue.pop_front();
+            let past = self.queue.pop_front().filter(|past| past.item().scan == sync.previous_scan);
+            if past.is_some() {
+                self.keep(past);
+            }
         }
         Some(Chain::resume(self.queue.front()?.item(), sync))
     }
@@ -207,10 +252,24 @@ impl NewestWins {
 
     fn advance(&mut self) {
         let done = self.queue.pop_front();
-        if let (Some(chain), Some(done)) = (&mut self.chain, done) {
+        if let (Some(chain), Some(done)) = (&mut self.chain, &done) {
             let (scan, published) = (done.item().scan, done.item().published);
             let next = chain.next.saturating_add(1);
             *chain = Chain { next, previous_scan: Some(scan), published: Some(published), again: false };
+        }
+        self.keep(done);
+    }
+
+    /// The scan that the one at hand follows. The source may have lost it when all were started again; then a mask makes do
+    /// without, as it does where the chain starts.
+    fn before(&self) -> Option<&Received<Scan>> {
+        let previous = self.chain?.previous_scan;
+        self.before.as_ref().filter(|before| Some(before.item().scan) == previous)
+    }
+
+    fn keep(&mut self, done: Option<Received<Scan>>) {
+        if looks_at_two(&self.window) {
+            self.before = done;
         }
     }
 }
@@ -258,6 +317,18 @@ mod tests {
 
     fn scan(published: u64) -> Item {
         Item { seq: published, published, scan: published + 9, ..Item::default() }
+    }
+
+    #[test]
+    fn a_starting_masking_begins_with_the_last_poses_scan_and_the_scan_before_it_where_masks_look_at_two() {
+        let window = |look_back| Window { scans: 4, lag: 2, look_back, live_depth: 0 };
+        let kept = |look_back, published, has_before| {
+            serves_only_as_before(&window(look_back), &scan(published), Some(9), has_before)
+        };
+        assert!(kept(1, 8, false) && !kept(1, 9, false));
+        assert!(kept(2, 7, true) && kept(2, 8, false) && !kept(2, 9, true));
+        let first = Item { flags: flag::BREAK, ..scan(0) };
+        assert!(!serves_only_as_before(&window(2), &first, None, false));
     }
 
     #[test]

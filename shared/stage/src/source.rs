@@ -160,7 +160,9 @@ impl<S: Source> Playback<'_, S> {
             }
             self.credit.update()?;
             if let Some(sync) = self.credit.sync {
-                return Ok(Some(Position::resume(&sync, self.launch.manifest.window.look_back)));
+                // In live mode numbers do not tell how far back the scan before is; masking does without.
+                let look_back = if self.launch.manifest.live { 1 } else { self.launch.manifest.window.look_back };
+                return Ok(Some(Position::resume(&sync, look_back)));
             }
         }
     }

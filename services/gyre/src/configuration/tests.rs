@@ -26,6 +26,8 @@ fn impossible_values_are_refused() {
         ("[points]\ncapacity = 0", "points.capacity is 0"),
         ("[refinement]\nkeyframes = 0", "refinement.keyframes"),
         ("[masking]\nlag = 0", "lag"),
+        ("[masking]\nthreads = 65", "threads is 65"),
+        ("[masking]\nprovider = 'npu'", "npu"),
         ("[masking]\nthreshold = 300", "300"),
         ("[run]\nmode = 'live'", "rate"),
         ("[run]\nrate = -1", "rate"),

@@ -3,9 +3,9 @@
 
 use std::collections::VecDeque;
 
-use gyre_masking::{Masker, MaskerError};
+use gyre_masking::{MaskError, MaskKind, Masker, MaskerError, Sweep};
 use gyre_messages::SearchedMotion;
-use gyre_radar::{PolarScan, RasterError};
+use gyre_radar::PolarScan;
 use gyre_scan_matching::{ConfigError, PolarSpectrum, RotationSearch, ShapeError, TranslationSearch};
 use half::{f16, slice::HalfFloatSliceExt};
 use nalgebra::Isometry2;
@@ -17,6 +17,11 @@ use crate::configuration::Configuration;
 /// Settings that nothing can be prepared with.
 #[derive(Debug, Error)]
 pub enum SettingError {
+    /// A network is to mask what networks are to be trained on.
+    #[error(
+        "masking.kind is `learned`, but masks are learnt from what no network has masked: set it to `threshold` or `none`"
+    )]
+    Learned,
     /// Masking's.
     #[error(transparent)]
     Masker(#[from] MaskerError),
@@ -30,7 +35,7 @@ pub enum SettingError {
 pub enum PreparationError {
     /// It makes no raster.
     #[error(transparent)]
-    Raster(#[from] RasterError),
+    Mask(#[from] MaskError),
     /// Its raster cannot be searched.
     #[error(transparent)]
     Shape(#[from] ShapeError),
@@ -70,6 +75,9 @@ impl Preparation {
     /// The first setting that is out of its bounds.
     pub fn new(configuration: &Configuration) -> Result<Self, SettingError> {
         let (raster, masking) = (&configuration.raster, &configuration.masking);
+        if masking.kind == MaskKind::Learned {
+            return Err(SettingError::Learned);
+        }
         let rotation = RotationSearch::new(raster.n, &configuration.rotation)?;
         let cells = raster.n * raster.n;
         let view = || View { cells: vec![0.0; cells], spectrum: rotation.new_spectrum() };
@@ -106,7 +114,8 @@ impl Preparation {
         pose: Isometry2<f64>,
         sequence: u32,
     ) -> Result<Record<'_>, PreparationError> {
-        let twist = self.masker.mask(scan, self.known_motion().as_ref(), &mut self.later.cells)?;
+        let sweep = Sweep { number: 0, scan: *scan, motion: self.known_motion() };
+        let twist = self.masker.mask(&sweep, None, &mut self.later.cells)?;
         // What is learnt from is the file, so what is searched is what the file says.
         self.rounded.convert_from_f32_slice(&self.later.cells);
         self.rounded.convert_to_f32_slice(&mut self.later.cells);

@@ -4,7 +4,7 @@
 use std::{hint::black_box, path::Path, time::Instant};
 
 use gyre_joint_search::Motions;
-use gyre_masking::Masker;
+use gyre_masking::{Masker, Sweep};
 use gyre_messages::{MotionEstimate, Pair};
 use gyre_radar::{OwnedScan, Point};
 use gyre_rotation_search::Rotations;
@@ -156,17 +156,15 @@ struct Refiner {
 
 impl Refiner {
     /// `None` where the configuration refines nothing.
-    fn new(configuration: &Configuration, masker: &mut Masker, scans: &[OwnedScan]) -> Result<Option<Self>, Failure> {
+    fn new(
+        configuration: &Configuration,
+        points: Vec<Vec<Point>>,
+        scans: &[OwnedScan],
+    ) -> Result<Option<Self>, ConfigError> {
         if configuration.refinement.kind == RefinementKind::None {
             return Ok(None);
         }
-        let capacity = configuration.points.capacity;
-        let mut points = vec![vec![Point::default(); capacity]; scans.len()];
-        for (scan, points) in scans.iter().zip(&mut points) {
-            let found = masker.points(&scan.view(), points)?;
-            points.truncate(found);
-        }
-        let refinement = Refinement::new(&configuration.refinement, capacity)?;
+        let refinement = Refinement::new(&configuration.refinement, configuration.points.capacity)?;
         let stamps_ns = scans.iter().map(|scan| scan.geometry.stamp_ns).collect();
         Ok(Some(Self { refinement, points, stamps_ns }))
     }
@@ -204,10 +202,14 @@ impl Timer {
         let mut masker =
             Masker::new(raster, &configuration.points, &configuration.masking).map_err(|error| fails(&error))?;
         let mut rasters = vec![vec![0.0; n * n]; scans.len()];
-        for (scan, raster) in scans.iter().zip(&mut rasters) {
-            masker.mask(&scan.view(), None, raster).map_err(|error| fails(&error))?;
+        let mut points = vec![vec![Point::default(); configuration.points.capacity]; scans.len()];
+        for (number, scan) in scans.iter().enumerate() {
+            let sweep = Sweep { number: number as u64, scan: scan.view(), motion: None };
+            let twist = masker.mask(&sweep, None, &mut rasters[number]).map_err(|error| fails(&error))?;
+            let found = masker.points(&sweep.scan, twist, &mut points[number]).map_err(|error| fails(&error))?;
+            points[number].truncate(found);
         }
-        let refiner = Refiner::new(&configuration, &mut masker, scans).map_err(|error| fails(&*error))?;
+        let refiner = Refiner::new(&configuration, points, scans).map_err(|error| fails(&error))?;
         let exhaustive = configuration.search.kind == SearchKind::Exhaustive;
         Ok(Self {
             cell_m: configuration.raster.cell_m,

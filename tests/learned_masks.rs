@@ -1,0 +1,291 @@
+//! Learned masks in a whole run: restarts change nothing, and what does not fit is refused before anything starts.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use common::{Run, Running, STAGES, odometry, recording, send, undisturbed};
+use gyre_masking::{MaskKind, Masker, MaskingConfig, Sweep, runtime};
+use gyre_messages::{MaskedHeader, Pair};
+use gyre_radar::{DatasetOptions, OwnedScan, PointsConfig, RasterConfig};
+use gyre_rotation_search::Rotations;
+use gyre_scan_matching::{RotationConfig, TranslationConfig};
+use gyre_translation_search::Translations;
+use rustix::process::Signal;
+
+const MIDDLE: usize = recording::SCANS / 3;
+const ONE_SCAN: &str = "single-127";
+const TWO_SCANS: &str = "pair-127";
+
+fn card(model: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../masking/tests/models").join(model).with_extension("toml")
+}
+
+/// A run of the small recording with a learned mask.
+fn masked_by(model: &str) -> Run {
+    learned(Run::of_recording(), &card(model))
+}
+
+fn learned(run: Run, card: &Path) -> Run {
+    run.set("masking.kind=learned").set(&format!("masking.model='{}'", card.display()))
+}
+
+fn runtime_is_installed() -> bool {
+    let found = runtime::find(None).is_ok();
+    if !found {
+        println!("skipped: ONNX Runtime is not installed");
+    }
+    found
+}
+
+/// Disturbs a run with this model once it is in its middle, and asserts that this changes nothing.
+fn survives(model: &str, disturb: impl Fn(&mut Running)) {
+    let undisturbed = masked_by(model).complete();
+    let run = masked_by(model).rate("6");
+    let mut running = run.start();
+    running.await_poses(MIDDLE);
+    disturb(&mut running);
+    let ended = running.finish();
+    ended.succeeded();
+    assert_eq!(run.odometry(), undisturbed, "{model}: {}", ended.stderr);
+    assert_ne!(run.summary()["restarts"], serde_json::json!({}));
+}
+
+#[test]
+fn a_network_changes_the_motions_and_the_run_says_which_one_it_was() {
+    if !runtime_is_installed() {
+        return;
+    }
+    for model in [ONE_SCAN, TWO_SCANS] {
+        let run = masked_by(model);
+        assert_ne!(run.complete(), undisturbed());
+        assert_eq!(run.odometry(), masked_by(model).complete());
+        odometry::assert_unbroken(&odometry::rows(&run.odometry()));
+        let (said, resolved) =
+            (run.summary()["mask"].clone(), run.result("config.toml").parse::<toml::Table>().unwrap());
+        assert_eq!(said["model"], card(model).canonicalize().unwrap().to_str().unwrap());
+        assert_eq!(said["sha256"], resolved["masking"]["sha256"].as_str().unwrap());
+    }
+}
+
+/// The motions that the stages' libraries find in the small recording with this mask and no process: x, y, yaw.
+fn motions_by_hand(masking: &MaskingConfig) -> Vec<[f64; 3]> {
+    let raster = RasterConfig { n: 127, cell_m: 0.8, ..RasterConfig::default() };
+    let mut dataset = gyre_radar::open(recording::small(), &DatasetOptions::default()).unwrap();
+    let mut masker = Masker::new(&raster, &PointsConfig::default(), masking).unwrap();
+    let mut rotations = Rotations::new(raster.n, &RotationConfig::default()).unwrap();
+    let mut translations = Translations::new(&raster, &TranslationConfig::default()).unwrap();
+    let scans = (0..recording::SCANS).map(|index| {
+        let mut scan = OwnedScan::with_limits(dataset.limits());
+        scan.geometry = dataset.read(index, scan.slot()).unwrap();
+        scan
+    });
+    let scans: Vec<OwnedScan> = scans.collect();
+    let sweep = |number: usize| Sweep { number: number as u64, scan: scans[number].view(), motion: None };
+    let second = MaskedHeader::raster_values(raster.n * raster.n);
+    let mut rasters = vec![0.0; 2 * second];
+    let motion = |later: usize| {
+        masker.mask(&sweep(later), Some(&sweep(later - 1)), &mut rasters).unwrap();
+        let earlier = Some(&rasters[second..][..raster.n * raster.n]);
+        let pair = Pair { later: &rasters[..raster.n * raster.n], earlier };
+        let motion = translations.next(pair, rotations.next(later as u64, pair, true).unwrap()).unwrap();
+        [motion.x_m, motion.y_m, motion.yaw_rad]
+    };
+    (1..recording::SCANS).map(motion).collect()
+}
+
+#[test]
+fn the_search_compares_both_scans_as_the_network_of_this_pair_masks_them() {
+    if !runtime_is_installed() {
+        return;
+    }
+    let run = masked_by(TWO_SCANS).set("masking.compensate=false").set("refinement.kind=none");
+    let (csv, masking) = (run.complete(), MaskingConfig { compensate: false, ..MaskingConfig::default() });
+    let model = Some(card(TWO_SCANS));
+    let expected = motions_by_hand(&MaskingConfig { kind: MaskKind::Learned, model, ..masking });
+    let columns: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
+    let places = ["x_m", "y_m", "yaw_rad"].map(|name| columns.iter().position(|column| *column == name).unwrap());
+    for (row, expected) in csv.lines().skip(1).zip(&expected) {
+        let fields: Vec<&str> = row.split(',').collect();
+        let found: [f64; 3] = places.map(|place| fields[place].parse().unwrap());
+        assert!(
+            found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-6),
+            "{row}: {expected:?}"
+        );
+    }
+    assert_eq!(csv.lines().count(), recording::SCANS);
+}
+
+#[test]
+fn a_killed_masking_goes_on_with_a_network_that_looks_at_one_scan() {
+    if runtime_is_installed() {
+        survives(ONE_SCAN, |running| {
+            running.kill("masking");
+        });
+    }
+}
+
+#[test]
+fn a_killed_masking_goes_on_with_a_network_that_looks_at_two_scans() {
+    if runtime_is_installed() {
+        survives(TWO_SCANS, |running| {
+            running.kill("masking");
+        });
+    }
+}
+
+#[test]
+fn any_killed_stage_goes_on_with_a_network_that_looks_at_two_scans() {
+    if !runtime_is_installed() {
+        return;
+    }
+    for stage in STAGES {
+        survives(TWO_SCANS, |running| {
+            running.kill(stage);
+        });
+    }
+}
+
+#[test]
+fn source_and_masking_killed_at_once_go_on_with_a_network_that_looks_at_two_scans() {
+    if runtime_is_installed() {
+        survives(TWO_SCANS, |running| {
+            running.kill("radar-replay").kill("masking");
+        });
+    }
+}
+
+#[test]
+fn masking_killed_again_after_each_few_poses_goes_on_with_a_network_that_looks_at_two_scans() {
+    if runtime_is_installed() {
+        survives(TWO_SCANS, |running| {
+            for poses in [MIDDLE, MIDDLE + 4, MIDDLE + 8] {
+                running.await_poses(poses).kill("masking");
+            }
+        });
+    }
+}
+
+#[test]
+fn a_run_that_was_killed_as_a_whole_goes_on_with_a_network_that_looks_at_two_scans() {
+    if !runtime_is_installed() {
+        return;
+    }
+    let undisturbed = masked_by(TWO_SCANS).complete();
+    let run = masked_by(TWO_SCANS).rate("6");
+    // After the very first pose too, where there is no scan before the last one.
+    for poses in (1..recording::SCANS).step_by(3) {
+        let mut running = run.start();
+        running.await_poses(poses);
+        running.kill_supervisor();
+    }
+    assert_eq!(run.complete(), undisturbed);
+}
+
+#[test]
+fn an_unreadable_scan_between_two_is_stepped_over_by_a_restart() {
+    if !runtime_is_installed() {
+        return;
+    }
+    let recording = recording::copy(16);
+    recording::truncate(&recording::images(recording.path())[6], 100_000);
+    let run = || learned(Run::of_recording_named(recording.path().to_str().unwrap()), &card(TWO_SCANS));
+    let alone = run().complete();
+    for poses in [6, 7, 8] {
+        let run = run().rate("6");
+        let mut running = run.start();
+        let stages = running.await_stages();
+        running.await_poses(poses);
+        stages.values().for_each(|pid| send(*pid, Signal::KILL));
+        running.finish().succeeded();
+        assert_eq!(run.odometry(), alone, "killed after {poses} poses");
+    }
+}
+
+#[test]
+fn a_live_run_survives_the_death_of_masking_with_a_network_that_looks_at_two_scans() {
+    if !runtime_is_installed() {
+        return;
+    }
+    for stages in [&["masking"][..], &["radar-replay"], &["masking", "radar-replay"]] {
+        let run = masked_by(TWO_SCANS).rate("4").set("run.mode=live").set("masking.stress_delay_ms=94");
+        let mut running = run.start();
+        running.await_poses(5);
+        for stage in stages {
+            running.kill(stage);
+        }
+        running.finish().succeeded();
+        let (summary, count) = (run.summary(), |key: &str| run.summary()[key].as_u64().unwrap());
+        assert_eq!(count("processed") + count("dropped"), count("published"), "{stages:?}: {summary}");
+        assert!(count("dropped") > 0 && count("breaks") <= 1, "{stages:?}: {summary}");
+    }
+}
+
+#[test]
+fn gyre_allocates_nothing_for_a_scan_but_what_onnx_runtimes_binding_does() {
+    if !runtime_is_installed() {
+        return;
+    }
+    const OF_THE_BINDING: u64 = 3;
+    for model in [ONE_SCAN, TWO_SCANS] {
+        let run = masked_by(model);
+        run.complete();
+        let stages = &run.summary()["stages"];
+        let scans = recording::SCANS as u64 - 5;
+        assert_eq!(stages["masking"]["allocations_after_five"], OF_THE_BINDING * scans, "{}", stages["masking"]);
+        assert_eq!(stages["refinement"]["allocations_after_five"], 0);
+    }
+}
+
+#[test]
+fn a_mask_that_cannot_be_made_is_refused_before_anything_starts() {
+    let refused = |run: Run, words: &[&str]| {
+        run.finish().refused_with(words);
+        assert!(!run.out().join("journal").exists(), "before anything starts");
+    };
+    refused(Run::of_recording().set("masking.kind=learned"), &["masking.model does not name a model"]);
+    refused(masked_by(ONE_SCAN).set("masking.threads=0"), &["[masking]", "threads is 0", "1 to 64"]);
+    refused(masked_by(ONE_SCAN).set("masking.runtime=/no/such"), &["masking.runtime is /no/such", runtime::INSTALL]);
+    if runtime_is_installed() {
+        refused(masked_by("single-31"), &["raster.n is 127", "single-31.toml is for 31", "set raster.n = 31"]);
+        refused(masked_by("opset-99").set("raster.n=31"), &["opset-99.onnx has operators of version 99"]);
+    }
+}
+
+#[test]
+fn without_onnx_runtime_the_command_that_installs_it_is_told_and_other_masks_still_work() {
+    let run = masked_by(ONE_SCAN);
+    let without = |run: &Run| {
+        let mut command = run.command();
+        command.env("ORT_DYLIB_PATH", "/no/such/libonnxruntime.so");
+        run.start_as(command).finish()
+    };
+    without(&run).refused_with(&["ORT_DYLIB_PATH is /no/such/libonnxruntime.so", runtime::INSTALL]);
+    without(&Run::of_recording()).succeeded();
+}
+
+#[test]
+fn an_unfinished_run_does_not_go_on_with_another_model() {
+    if !runtime_is_installed() {
+        return;
+    }
+    let models = tempfile::tempdir().unwrap();
+    let ours = models.path().join("mask.toml");
+    let install = |name: &str| {
+        fs::copy(card(name), &ours).unwrap();
+        let file = card(name).with_extension("onnx");
+        fs::copy(&file, models.path().join(file.file_name().unwrap())).unwrap();
+    };
+    install(ONE_SCAN);
+    let run = learned(Run::of_recording(), &ours).rate("6");
+    let mut running = run.start();
+    running.await_poses(MIDDLE);
+    running.kill_supervisor();
+    install(TWO_SCANS);
+    run.finish().refused_with(&["unfinished run of another configuration", "--fresh"]);
+}
