@@ -22,6 +22,7 @@ def run(arguments: list[str]) -> None:
     commands = parser.add_subparsers(required=True)
     add_reproduce(commands)
     add_train(commands)
+    add_publish(commands)
     add_drift(commands)
     options = parser.parse_args(arguments)
     if options.threads:
@@ -69,6 +70,21 @@ def train_recipe(recipe: recipes.Recipe, pairs: Path, work: Path, device: str) -
     folder = work / "runs" / recipe.name
     Trainer(folder, scans, validation, recipe.network, search, recipe.training, device, initial).run()
     return folder
+
+
+def add_publish(commands) -> None:
+    command = commands.add_parser("publish", help="write the model of a finished training")
+    command.add_argument("recipe", type=Path, nargs="+")
+    command.add_argument("--pairs", type=Path, required=True, help="folder of folders with pairs, one a raster")
+    command.add_argument("--work", type=Path, default=Path("out/training"), help="folder with runs/")
+    command.add_argument("--models", type=Path, default=Path("models"))
+    command.set_defaults(run=publish_runs)
+
+
+def publish_runs(options: argparse.Namespace) -> None:
+    for path in options.recipe:
+        recipe = recipes.read(path)
+        publish(recipe, options.work / "runs" / recipe.name, options.pairs / recipe.raster, options.models)
 
 
 def add_drift(commands) -> None:

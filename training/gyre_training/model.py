@@ -7,7 +7,7 @@ from pathlib import Path
 import torch
 
 from . import card
-from .export import OPSET, export
+from .export import OPSET, export, quantise
 from .pairs import Scans
 from .recipe import Recipe
 from .train import load, trained
@@ -18,7 +18,10 @@ def publish(recipe: Recipe, folder: Path, pairs: Path, models: Path) -> Path:
     network, scans = trained(folder / "best.pt"), Scans(pairs / "train.npy")
     path = models / f"{recipe.name}.onnx"
     export(network, scans.n, path)
-    about = {"network": network.config.to_dict(), "training": provenance(recipe, folder, scans)}
+    if recipe.integers:
+        quantise(path, scans, path)
+    numbers = "8-bit integers" if recipe.integers else "32-bit floats"
+    about = {"network": network.config.to_dict() | {"numbers": numbers}, "training": provenance(recipe, folder, scans)}
     card.write(path, network.config.inputs, OPSET, network.parameters_count(), scans.settings, about)
     print(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB)", flush=True)
     return path

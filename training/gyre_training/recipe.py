@@ -23,8 +23,10 @@ class Recipe:
     network: NetworkConfig
     training: TrainingConfig
     temperature: float = SoftArgmax.temperature
+    # The recipe whose network this one begins with.
     initial: str | None = None
-    teacher: str | None = None
+    # Whether the model computes in 8-bit integers.
+    integers: bool = False
 
     @property
     def configuration(self) -> Path:
