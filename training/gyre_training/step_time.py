@@ -22,7 +22,7 @@ from torch import nn
 
 from .network import MaskNetwork
 from .search import ExhaustiveMatch, ScanMatch, SearchConfig
-from .train import loss
+from .train import pose_error
 
 MIB = 1 << 20
 # A raster's side in the papers, m: 127 cells of 0.8, 255 of 0.4, 511 of 0.2.
@@ -106,7 +106,8 @@ class Training:
     def step(self) -> float:
         """Seconds."""
         began = self._now()
-        value = loss(self.match(*self.network.masked(*self.scans)), self.motion, 1.0)
+        found = self.match(*self.network.masked(*self.scans))
+        value = pose_error(found, self.motion, 1.0).sum(1).mean()  # Eq. 12
         self.optimiser.zero_grad(set_to_none=True)
         value.backward()
         self.optimiser.step()

@@ -10,8 +10,9 @@ import pytest
 
 from gyre_training.drift import motions
 from gyre_training.pairs import Scans
-from gyre_training.recipe import HOME, PROJECT, search_of
+from gyre_training.recipe import HOME, search_of
 from gyre_training.search import ScanMatch
+from gyre_training.worlds import find_gyre
 
 WORLD = "\n[simulation]\nscans = 11\nseed = 7\n"
 RASTERS = {
@@ -27,10 +28,10 @@ def gyre() -> Path:
     """The program: what GYRE names, or what cargo has built."""
     if "GYRE" in os.environ:
         return Path(os.environ["GYRE"])
-    built = [path for kind in ("release", "debug") if (path := PROJECT / "target" / kind / "gyre").exists()]
-    if not built:
-        pytest.skip("no gyre: build it with `cargo build --release`, or name it in GYRE")
-    return built[0]
+    try:
+        return find_gyre(None)
+    except SystemExit as missing:
+        pytest.skip(f"{missing}, or in GYRE")
 
 
 @pytest.mark.parametrize("name,overrides", RASTERS.values(), ids=RASTERS)

@@ -8,7 +8,7 @@ import torch
 from gyre_training import train
 from gyre_training.network import NetworkConfig
 from gyre_training.search import SearchConfig
-from gyre_training.train import Trainer, TrainingConfig, load, loss, trained
+from gyre_training.train import Trainer, TrainingConfig, load, pose_error, trained
 from scenes import drive
 
 NETWORK = NetworkConfig(widths=(4, 8))
@@ -98,4 +98,4 @@ def test_masks_learn(scans, tmp_path):
 
 def test_a_radian_counts_as_its_weight_says():
     found, true = torch.tensor([[1.0, -2.0, 0.1], [0.0, 0.0, 0.0]]), torch.zeros(2, 3)
-    assert torch.isclose(loss(found, true, 30.0), torch.tensor((1 + 2 + 3) / 2))
+    assert torch.allclose(pose_error(found, true, 30.0), torch.tensor([[1.0, 2.0, 3.0], [0.0, 0.0, 0.0]]))
