@@ -41,7 +41,7 @@ def step_times(measurements: list[Measurement], limit_mib: float, path: Path) ->
         timed = [one for one in ours if one.fits]
         (line,) = time.plot([one.batch for one in timed], [one.step_s for one in timed], "o-", label=method)
         known = [one for one in ours if one.memory_mib]
-        memory.plot([one.batch for one in known], [one.memory_mib / 1024 for one in known], "-", color=line.get_color(), label=method)
+        memory.plot([one.batch for one in known], [one.memory_mib / 1024 for one in known], "-", color=line.get_color())
         for one in known:
             memory.plot(one.batch, one.memory_mib / 1024, "o" if one.fits else "x", color=line.get_color())
     memory.axhline(limit_mib / 1024, color="0.4", linestyle="--", linewidth=1)
@@ -67,7 +67,8 @@ def training_log(folder: Path) -> Path:
     drift.plot(epochs, columns["translation_percent"], ".-", label="translation, %")
     drift.plot(epochs, columns["rotation_deg_per_100m"], ".-", label="rotation, deg/100 m")
     best = min(range(len(rows)), key=columns["translation_percent"].__getitem__)
-    drift.plot(epochs[best], columns["translation_percent"][best], "o", fillstyle="none", color="black", label=f"epoch {epochs[best]:.0f} is kept")
+    kept = {"label": f"epoch {epochs[best]:.0f} is kept", "color": "black", "fillstyle": "none"}
+    drift.plot(epochs[best], columns["translation_percent"][best], "o", **kept)
     drift.set_ylim(bottom=0)
     drift.legend()
     rate.plot(epochs, columns["learning_rate"], ".-")

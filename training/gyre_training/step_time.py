@@ -205,7 +205,8 @@ def table(measurements: list[Measurement], limit_mib: float) -> str:
     lines = [f"{'batch':>6}" + "".join(f"{method:>24}" for method in METHODS)]
     for batch in sorted({one.batch for one in measurements}):
         lines.append(f"{batch:>6}" + "".join(f"{cell(cells.get((batch, method))):>24}" for method in METHODS))
-    return "\n".join(lines + [f"within {limit_mib / 1024:g} GiB:"] + [against(cells, other) for other in METHODS if other != "f-mbym"])
+    beside = [against(cells, other) for other in METHODS if other != "f-mbym"]
+    return "\n".join([*lines, f"within {limit_mib / 1024:g} GiB:", *beside])
 
 
 def cell(one: Measurement | None) -> str:
@@ -250,12 +251,16 @@ def run(options: argparse.Namespace) -> None:
     print(table(measurements, limit_mib))
 
 
+def numbers(text: str) -> list[int]:
+    return [int(one) for one in text.split(",")]
+
+
 def register(commands) -> None:
     """Adds `step-time`; whether blocks are computed again, and where, are options of all commands."""
     command = commands.add_parser("step-time", help="time and memory of a training step against the batch, f-mbym beside mbym")
     command.add_argument("--n", type=int, default=255, help="cells of a raster's side")
     batches = [1 << k for k in range(11)]
-    command.add_argument("--batches", type=lambda text: [int(b) for b in text.split(",")], default=batches, help="1,2,4,... by default")
+    command.add_argument("--batches", type=numbers, default=batches, help="1,2,4,... by default")
     command.add_argument("--memory-gib", type=float, default=4.0, help="a batch that takes more does not fit")
     command.add_argument("--steps", type=int, default=5, help="steps of which the median is taken")
     command.add_argument("--out", type=Path, default=Path("step-time"))
