@@ -6,6 +6,7 @@ from pathlib import Path
 import torch
 
 from . import recipe as recipes
+from . import step_time
 from .drift import drift, motions
 from .export import OnnxMasks
 from .model import publish
@@ -19,11 +20,14 @@ def run(arguments: list[str]) -> None:
     parser = argparse.ArgumentParser(prog="python -m gyre_training", description="Trains Gyre's masks.")
     parser.add_argument("--threads", type=int, help="threads of PyTorch; all by default")
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
+    parser.add_argument("--checkpoint", action="store_true", help="train in less memory and more time, to the same weights")
     commands = parser.add_subparsers(required=True)
     add_reproduce(commands)
     add_train(commands)
     add_publish(commands)
     add_drift(commands)
+    add_plot(commands)
+    step_time.register(commands)
     options = parser.parse_args(arguments)
     if options.threads:
         torch.set_num_threads(options.threads)
@@ -46,7 +50,7 @@ def reproduce(options: argparse.Namespace) -> None:
         recipe = recipes.read(path)
         pairs = work / "pairs" / recipe.raster
         export_pairs(gyre, work / "worlds", recipe.configuration, pairs)
-        folder = train_recipe(recipe, pairs, work, options.device)
+        folder = train_recipe(recipe, pairs, work, options)
         publish(recipe, folder, pairs, options.models)
 
 
@@ -59,16 +63,18 @@ def add_train(commands) -> None:
 
 
 def train(options: argparse.Namespace) -> None:
-    train_recipe(recipes.read(options.recipe), options.pairs, options.out, options.device)
+    train_recipe(recipes.read(options.recipe), options.pairs, options.out, options)
 
 
-def train_recipe(recipe: recipes.Recipe, pairs: Path, work: Path, device: str) -> Path:
+def train_recipe(recipe: recipes.Recipe, pairs: Path, work: Path, options: argparse.Namespace) -> Path:
     """Trains; returns the run's folder."""
     scans, validation = (Scans(pairs / f"{split}.npy") for split in ("train", "validation"))
     search = recipes.search_of(scans.settings, recipe.temperature)
     initial = work / "runs" / recipe.initial / "best.pt" if recipe.initial else None
     folder = work / "runs" / recipe.name
-    Trainer(folder, scans, validation, recipe.network, search, recipe.training, device, initial).run()
+    trainer = Trainer(folder, scans, validation, recipe.network, search, recipe.training, options.device, initial)
+    trainer.network.checkpoint = options.checkpoint
+    trainer.run()
     return folder
 
 
@@ -105,3 +111,16 @@ def show_drift(options: argparse.Namespace) -> None:
 
 def masks_of(path: Path, device: str):
     return OnnxMasks(path) if path.suffix == ".onnx" else trained(path).to(device)
+
+
+def add_plot(commands) -> None:
+    command = commands.add_parser("plot", help="draw a training's log.csv")
+    command.add_argument("folder", type=Path, nargs="+", help="a training's folder")
+    command.set_defaults(run=plot)
+
+
+def plot(options: argparse.Namespace) -> None:
+    from .plots import training_log  # matplotlib takes a second to load
+
+    for folder in options.folder:
+        print(training_log(folder))

@@ -73,7 +73,7 @@ def split(sequence: np.ndarray) -> list[np.ndarray]:
 @torch.no_grad()
 def motions(scans: Scans, pairs: np.ndarray, network: nn.Module | None, match: nn.Module, batch: int = 16) -> np.ndarray:
     """Motions (k, 3) between the scans as the network (where there is one) masks them, by the highest peaks."""
-    device = match.rotation.window.device if hasattr(match, "rotation") else torch.device("cpu")
+    device = next(match.buffers()).device
     found = []
     for k in range(0, len(pairs), batch):
         part = scans.batch(pairs[k : k + batch]).to(device)

@@ -1,0 +1,62 @@
+import csv
+
+import pytest
+
+from gyre_training.plots import step_times, training_log
+from gyre_training.step_time import METHODS, Measurement, Memory, Setting, against, compare, table
+
+
+def test_what_is_taken_and_given_back_counts_in_the_peak():
+    memory = Memory("cpu")
+    taken = b"\1" * (64 << 20)
+    del taken
+    assert 63 < memory.peak() < 80
+
+
+def test_a_batch_is_measured_in_turn_and_one_that_passes_the_limit_says_so():
+    settings = [Setting(method, 67, 2, True, "cpu", 1) for method in METHODS]
+    fast, slow, near = compare(settings, steps=2, limit_mib=60.0)
+    assert fast.fits and fast.step_s > 0 and 2 < fast.memory_mib < 60
+    assert not slow.fits and slow.step_s is None and slow.memory_mib > 60
+    assert fast.memory_mib < near.memory_mib < slow.memory_mib
+
+
+def test_a_process_that_fails_for_another_reason_is_no_measurement():
+    with pytest.raises(RuntimeError, match="n=63"):
+        # The deepest level of 63 cells is one, of which a batch of one has no variance.
+        compare([Setting("f-mbym", 63, 1, False, "cpu", 1)], steps=1, limit_mib=1e6)
+
+
+MEASURED = [
+    *(Measurement("f-mbym", b, True, 0.1 * b, 70.0 * b) for b in (1, 2, 4, 8, 16, 32)),
+    Measurement("f-mbym", 64, False),
+    *(Measurement("mbym", b, True, 0.6 * b, 560.0 * b) for b in (1, 2, 4)),
+    Measurement("mbym", 8, False, None, 4500.0),
+]
+
+
+def test_ratios_are_of_equal_batches_and_of_the_largest_that_fit():
+    cells = {(one.batch, one.method): one for one in MEASURED}
+    line = against(cells, "mbym")
+    assert "8 times the batch (32 to 4)" in line and "6.0 (1), 6.0 (2), 6.0 (4)" in line and "8.0 (4)" in line
+    assert "fits no batch" in against(cells, "mbym-near")
+    assert "passed: 4500 MiB" in table(MEASURED, 4096.0)
+
+
+def test_plots_are_the_same_file_twice(tmp_path):
+    for name in ("a.svg", "b.svg"):
+        step_times(MEASURED, 4096.0, tmp_path / name)
+    first = (tmp_path / "a.svg").read_text()
+    assert first == (tmp_path / "b.svg").read_text()
+    assert all(word in first for word in ("f-mbym", "peak memory, GiB", "training step, s"))
+
+
+def test_a_log_is_drawn_with_the_epoch_that_was_kept(tmp_path):
+    rows = [{"epoch": k, "loss": 1 / (k + 1), "translation_percent": t, "rotation_deg_per_100m": 1.0, "learning_rate": 1e-3}
+            for k, t in enumerate((4.0, 2.0, 3.0))]
+    with (tmp_path / "log.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    drawn = training_log(tmp_path).read_text()
+    assert all(word in drawn for word in ("epoch 1 is kept", "validation drift", "learning rate"))

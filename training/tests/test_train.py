@@ -1,0 +1,101 @@
+import csv
+import itertools
+from pathlib import Path
+
+import pytest
+import torch
+
+from gyre_training import train
+from gyre_training.network import NetworkConfig
+from gyre_training.search import SearchConfig
+from gyre_training.train import Trainer, TrainingConfig, load, pose_error, trained
+from scenes import drive
+
+NETWORK = NetworkConfig(widths=(4, 8))
+SEARCH = SearchConfig(angles=60, radii=10, reach_m=8.0)
+CONFIG = TrainingConfig(batch=2, epochs=2, epoch_pairs=8)
+
+
+class CutOff(Exception):
+    """Stands for a power cut."""
+
+
+@pytest.fixture
+def scans(tmp_path):
+    return drive(tmp_path / "train.npy", 20), drive(tmp_path / "validation.npy", 19, seed=2)
+
+
+def trainer(folder: Path, scans, **changes) -> Trainer:
+    return Trainer(folder, *scans, NETWORK, SEARCH, TrainingConfig(**vars(CONFIG) | changes))
+
+
+def cut_off(trainer: Trainer, monkeypatch, after: int) -> None:
+    """Trains, and stops dead in the step after `after` more."""
+    learn, done = trainer._learn, itertools.count()
+
+    def until(*arguments):
+        if next(done) == after:
+            raise CutOff
+        return learn(*arguments)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(trainer, "_learn", until)
+        with pytest.raises(CutOff):
+            trainer.run()
+
+
+def rows(folder: Path) -> list[dict]:
+    with (folder / "log.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_training_that_is_cut_off_ends_with_the_same_weights(scans, tmp_path, monkeypatch):
+    whole = trainer(tmp_path / "whole", scans)
+    whole.run()
+    # A minute passes at each look at the clock: every step is saved.
+    clock = itertools.count(0.0, 61.0)
+    monkeypatch.setattr(train.time, "time", lambda: next(clock))
+    cut_off(trainer(tmp_path / "cut", scans), monkeypatch, after=3)  # within the first epoch
+    cut_off(trainer(tmp_path / "cut", scans), monkeypatch, after=3)  # within the second
+    again = trainer(tmp_path / "cut", scans)
+    assert again.step == 6
+    again.run()
+    assert again.step == whole.step == 8
+    for name in ("last.pt", "best.pt"):
+        a, b = load(tmp_path / "whole" / name), load(tmp_path / "cut" / name)
+        assert a["step"] == b["step"] and a["best"] == b["best"]
+        for key, weights in a["network"].items():
+            assert torch.equal(weights, b["network"][key]), (name, key)
+    for a, b in zip(rows(tmp_path / "whole"), rows(tmp_path / "cut"), strict=True):
+        # The loss of an epoch that was cut off is that of its last part alone.
+        assert {**a, "seconds": 0, "loss": 0} == {**b, "seconds": 0, "loss": 0}
+
+
+def test_work_since_the_last_save_is_done_again(scans, tmp_path, monkeypatch):
+    trainer(tmp_path / "whole", scans).run()
+    cut_off(trainer(tmp_path / "cut", scans), monkeypatch, after=6)  # saved at the end of the first epoch alone
+    again = trainer(tmp_path / "cut", scans)
+    assert again.step == 4
+    again.run()
+    a, b = (load(tmp_path / name / "last.pt")["network"] for name in ("whole", "cut"))
+    assert all(torch.equal(a[key], b[key]) for key in a)
+
+
+def test_a_folder_of_another_training_is_refused(scans, tmp_path):
+    trainer(tmp_path / "run", scans)._save("last.pt")
+    with pytest.raises(SystemExit, match="holds another training"):
+        trainer(tmp_path / "run", scans, seed=2)
+
+
+def test_masks_learn(scans, tmp_path):
+    training = trainer(tmp_path / "run", scans, epochs=30, learning_rate=1e-2, augment=False)
+    training.run()
+    losses = [float(row["loss"]) for row in rows(tmp_path / "run")]
+    assert sum(losses[-5:]) < 0.7 * sum(losses[:5]), losses
+    masks = trained(tmp_path / "run" / "best.pt")(scans[0].rasters([0, 1])[None])
+    assert masks.shape == (1, 2, 32, 32) and 0 <= masks.min() and masks.max() <= 1
+
+
+def test_a_radian_counts_as_its_weight_says():
+    found, true = torch.tensor([[1.0, -2.0, 0.1], [0.0, 0.0, 0.0]]), torch.zeros(2, 3)
+    assert torch.allclose(pose_error(found, true, 30.0), torch.tensor([[1.0, 2.0, 3.0], [0.0, 0.0, 0.0]]))
