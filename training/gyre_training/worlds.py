@@ -5,17 +5,9 @@ import subprocess
 import tomllib
 from pathlib import Path
 
-import numpy as np
-
-from .card import toml
 from .recipe import HOME, PROJECT
 
 SPLITS = ("train", "validation", "test")
-
-# How wrong a reader of a real radar is about its ranges (m) and its encoder (rad), at most. A network that has learnt from perfectly
-# known radars alone leans on what is near, which such errors turn most.
-RANGE_OFFSET_ERROR_M = 0.25
-ECCENTRICITY_ERROR_RAD = 0.0015
 
 
 def find_gyre(given: Path | None) -> Path:
@@ -31,27 +23,7 @@ def simulate(gyre: Path, folder: Path) -> None:
     """Renders every world of `worlds/` that `folder` does not hold already; one that is cut off goes on."""
     for split in SPLITS:
         for world in sorted((HOME / "worlds" / split).glob("*.toml")):
-            recording = folder / split / world.stem
-            call(gyre, "simulate", world, "--out", recording, "--format", "oxford", *trajectory(world))
-            if split != "test":
-                miscalibrate(recording / "dataset.toml", seed_of(world))
-
-
-def seed_of(world: Path) -> int:
-    return tomllib.loads(world.read_text())["simulation"]["seed"]
-
-
-def miscalibrate(options: Path, seed: int) -> None:
-    """Lets the reader of a recording be a little wrong about the radar, as one is about real ones; always by the same."""
-    values, kept = tomllib.loads(options.read_text()), options.with_name("dataset.exact.toml")
-    exact = tomllib.loads(kept.read_text()) if kept.exists() else values
-    kept.write_text("".join(f"{key} = {toml(value)}\n" for key, value in exact.items()))
-    offset, eccentricity = np.random.default_rng([seed, 0xCA1]).uniform(-1, 1, 2)
-    wrong = exact | {
-        "range_offset_m": round(exact["range_offset_m"] + RANGE_OFFSET_ERROR_M * offset, 3),
-        "azimuth_eccentricity_rad": round(exact["azimuth_eccentricity_rad"] + ECCENTRICITY_ERROR_RAD * eccentricity, 5),
-    }
-    options.write_text("".join(f"{key} = {toml(value)}\n" for key, value in wrong.items()))
+            call(gyre, "simulate", world, "--out", folder / split / world.stem, "--format", "oxford", *trajectory(world))
 
 
 def trajectory(world: Path) -> list[str | Path]:

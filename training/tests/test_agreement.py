@@ -18,7 +18,7 @@ WORLD = "\n[simulation]\nscans = 11\nseed = 7\n"
 RASTERS = {
     "papers, Eq. 7": ("paper-127", []),
     "papers, line 14": ("paper-127", ["rotation.form=line14"]),
-    "Gyre's default": ("product-255", []),
+    "Gyre's default": ("gyre-255", []),
     # 250 = 2 5^3 is a size that Gyre's transforms pass over.
     "another size": ("paper-127", ["raster.n=250", "raster.cell_m=0.4"]),
 }
