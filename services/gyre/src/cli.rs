@@ -31,6 +31,8 @@ pub enum Command {
     Inspect(InspectArguments),
     /// Judge a trajectory by ground truth.
     Evaluate(EvaluateArguments),
+    /// Draw what the mask keeps of scans.
+    Masks(MasksArguments),
     /// Print the papers' tables for this machine: times of the searches, and the accuracy that they reach.
     Tables(TablesArguments),
     /// Measure how like real scans simulated ones are.
@@ -109,6 +111,27 @@ pub struct EvaluateArguments {
     /// Standard deviation of the ground truth's heading, degrees.
     #[arg(long, default_value = "0", value_parser = sigma)]
     pub truth_sigma_deg: f64,
+}
+
+#[derive(Debug, Args)]
+pub struct MasksArguments {
+    /// The configuration, a TOML file: its raster, masking and search.
+    pub configuration: PathBuf,
+    /// The recording's folder. Default: the configuration's simulation, or its source.data.
+    #[arg(long)]
+    pub data: Option<PathBuf>,
+    /// Where masks.png and a scan-NUMBER.png for each go.
+    #[arg(long, default_value = "out/masks")]
+    pub out: PathBuf,
+    /// Numbers of the scans to draw. Default: eight, evenly spread.
+    #[arg(long, value_delimiter = ',')]
+    pub scans: Vec<usize>,
+    /// Draw every so-manyth scan.
+    #[arg(long, conflicts_with = "scans")]
+    pub every: Option<NonZeroUsize>,
+    /// Override a key, as in masking.kind=threshold; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
 }
 
 #[derive(Debug, Args)]

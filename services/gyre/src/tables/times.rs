@@ -3,13 +3,10 @@
 
 use std::{hint::black_box, path::Path, time::Instant};
 
-use gyre_joint_search::Motions;
 use gyre_masking::{Masker, Sweep};
 use gyre_messages::{MotionEstimate, Pair};
 use gyre_radar::{OwnedScan, Point};
-use gyre_rotation_search::Rotations;
 use gyre_scan_matching::{ConfigError, Refinement, RefinementKind, ShapeError};
-use gyre_translation_search::Translations;
 use serde::Serialize;
 
 use super::{
@@ -21,6 +18,7 @@ use super::{
 use crate::{
     Failure,
     configuration::{Configuration, SearchKind},
+    search::{Search, search},
 };
 
 /// Scans of the sequence whose searches are timed, in turn.
@@ -127,26 +125,6 @@ impl TimeLine {
     }
 }
 
-/// From the raster of a scan (the sequence number is the first argument) and that of the scan before to a motion.
-type Search = Box<dyn FnMut(u64, Pair<'_>) -> Result<MotionEstimate, ShapeError>>;
-
-/// The search of a configuration, as its stages do it between masking and the pose. A scan's spectrum is kept for the next
-/// pair.
-fn search(configuration: &Configuration) -> Result<Search, ConfigError> {
-    let raster = &configuration.raster;
-    Ok(match configuration.search.kind {
-        SearchKind::Decoupled => {
-            let mut rotations = Rotations::new(raster.n, &configuration.rotation)?;
-            let mut translations = Translations::new(raster, &configuration.translation)?;
-            Box::new(move |seq, pair| translations.next(pair, rotations.next(seq, pair, false)?))
-        }
-        SearchKind::Exhaustive => {
-            let mut motions = Motions::new(raster, &configuration.exhaustive)?;
-            Box::new(move |_, pair| motions.next(pair))
-        }
-    })
-}
-
 /// The refinement of a configuration, with the points and the times of the scans.
 struct Refiner {
     refinement: Refinement,
@@ -214,7 +192,7 @@ impl Timer {
         Ok(Self {
             cell_m: configuration.raster.cell_m,
             angles: exhaustive.then(|| configuration.exhaustive.candidates()),
-            search: search(&configuration).map_err(|error| fails(&error))?,
+            search: search(&configuration, masker.rasters()).map_err(|error| fails(&error))?,
             refiner,
             rasters,
             seq: 0,
