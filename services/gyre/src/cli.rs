@@ -145,6 +145,10 @@ pub struct TablesArguments {
     /// Where tables.md, tables.json and all runs go.
     #[arg(long, default_value = "out/tables")]
     pub out: PathBuf,
+    /// The folder of the learned masks: f-mbym-N.toml and mbym-N.toml for rasters of N cells a side, product-255.toml for Gyre's
+    /// own rows. A row whose model is not there is left out, and so it is said.
+    #[arg(long, default_value = "models")]
+    pub models: PathBuf,
     /// Also run with each of these changes alone, as in masking.threshold=50,70: what the choice is worth among its
     /// neighbours; may be repeated.
     #[arg(long, value_name = "KEY=VALUE,...")]
