@@ -7,6 +7,7 @@ mod common;
 use std::{fs, path::Path, process::Command};
 
 use common::{Ended, gyre, recording};
+use gyre_masking::runtime;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -22,6 +23,26 @@ echo '{"torch": "0.0", "threads": 1, "rows": [
   {"n": 63, "row": "mask", "median_ms": 5.0}, {"n": 63, "row": "raw", "median_ms": 80.0},
   {"n": 63, "row": "f-raw", "median_ms": 80.0}, {"n": 63, "row": "f-raw-eq7", "median_ms": 80.0}]}' > "$2"
 "#;
+
+/// Puts a model of the tests of masking into a folder's `models`.
+fn install(folder: &Path, fixture: &str, name: &str) {
+    let (from, to) = (Path::new(env!("CARGO_MANIFEST_DIR")).join("../masking/tests/models"), folder.join("models"));
+    fs::create_dir_all(&to).unwrap();
+    fs::copy(from.join(format!("{fixture}.onnx")), to.join(format!("{fixture}.onnx"))).unwrap();
+    fs::copy(from.join(format!("{fixture}.toml")), to.join(format!("{name}.toml"))).unwrap();
+}
+
+fn runtime_is_installed() -> bool {
+    let found = runtime::find(None).is_ok();
+    if !found {
+        println!("skipped: ONNX Runtime is not installed");
+    }
+    found
+}
+
+fn read_tables(folder: &Path) -> Value {
+    serde_json::from_str(&fs::read_to_string(folder.join("out/tables.json")).unwrap()).unwrap()
+}
 
 fn folder() -> TempDir {
     let folder = tempfile::Builder::new().prefix("gyre-tables-").tempdir().unwrap();
@@ -51,7 +72,7 @@ fn both_tables_are_filled_and_their_commands_repeat_the_runs() {
     ended.succeeded();
     let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
     assert_eq!(read("out/tables.md"), ended.stdout);
-    let json: Value = serde_json::from_str(&read("out/tables.json")).unwrap();
+    let json = read_tables(folder.path());
 
     let times = &json["times"]["lines"];
     for row in ROWS {
@@ -72,6 +93,88 @@ fn both_tables_are_filled_and_their_commands_repeat_the_runs() {
     }
     assert_eq!(line(accuracy, "f-raw, Eq. 7")["paper"][0], 8.46);
     repeats(folder.path(), line(accuracy, "f-raw, line 14")["ours"]["command"].as_str().unwrap());
+
+    // Without networks there is what the paper and the peer say, and what is missing.
+    for row in ["mbym", "f-mbym, Eq. 7"] {
+        assert_eq!(line(accuracy, row)["ours"], Value::Null);
+        assert!(line(times, row)["ours"].is_null() && line(times, row)["paper_hz"].is_array());
+    }
+    for lines in [times, accuracy] {
+        assert!(!lines.as_array().unwrap().iter().any(|line| line["row"] == "Gyre, masked"), "{lines:#}");
+    }
+    let stdout = &ended.stdout;
+    assert!(
+        stdout.contains("Left out. mask at 63; mbym at 63; f-mbym, Eq. 7 at 63: there is no models/f-mbym-63.toml. "),
+        "{stdout}"
+    );
+    assert!(stdout.contains("Left out. mbym; f-mbym, Eq. 7: there is no models/f-mbym-255.toml. "), "{stdout}");
+    assert!(
+        stdout.contains("Gyre, search alone, masked; Gyre, masked: there is no models/gyre-255.toml.\n"),
+        "{stdout}"
+    );
+}
+
+#[test]
+fn masked_rows_are_timed_and_run_with_the_networks_that_there_are() {
+    if !runtime_is_installed() {
+        return;
+    }
+    let folder = folder();
+    for (fixture, name) in [("pair-127", "f-mbym-127"), ("pair-255", "f-mbym-255"), ("single-127", "gyre-255")] {
+        install(folder.path(), fixture, name);
+    }
+    let mut command = tables(folder.path());
+    command.args(["--sizes", "127,31"]);
+    let ended = Ended::of(command);
+    ended.succeeded();
+    let json = read_tables(folder.path());
+    let masked = ["mbym", "f-mbym, Eq. 7", "Gyre, search alone, masked", "Gyre, masked"];
+
+    let times = &json["times"]["lines"];
+    for row in masked.iter().chain(&["mask", "mask, default"]) {
+        let ours = &line(times, row)["ours"];
+        assert!(ours["ms"].as_f64().unwrap() > 0.0 && (ours["cell_m"].as_f64().unwrap() - 0.8).abs() < 1e-6, "{row}");
+    }
+    let ms = |row: &str| line(times, row)["ours"]["ms"].as_f64().unwrap();
+    assert!(ms("mask") < ms("mbym"), "{times:#}");
+    assert!(line(times, "mbym")["ours"]["angles"].is_null());
+    let stdout = &ended.stdout;
+    assert!(stdout.contains("mbym at 127: models/f-mbym-127.toml (there is no models/mbym-127.toml)"), "{stdout}");
+    assert!(stdout.contains("models/gyre-255.toml is for 127"), "{stdout}");
+
+    let accuracy = &json["accuracy"][0]["lines"];
+    for row in masked {
+        let ours = &line(accuracy, row)["ours"];
+        assert!(ours["masking_ms"].as_f64().unwrap() > 0.0, "{row}: {ours:#}");
+        assert_ne!(ours["ate_m"], line(accuracy, "Gyre, search alone")["ours"]["ate_m"], "{row}");
+    }
+    for row in ["f-mbym, Eq. 7", "Gyre, masked"] {
+        repeats(folder.path(), line(accuracy, row)["ours"]["command"].as_str().unwrap());
+    }
+}
+
+#[test]
+fn a_ladder_has_a_learned_mask_where_the_network_fits_the_raster() {
+    if !runtime_is_installed() {
+        return;
+    }
+    let folder = folder();
+    install(folder.path(), "single-127", "gyre-255");
+    fs::write(folder.path().join("wide.toml"), "[raster]\nn = 127\ncell_m = 1.0\n").unwrap();
+    let mut command = tables(folder.path());
+    command.args(["--ladder", "--no-table-iii", "--config", "wide.toml", "--data"]).arg(recording::small());
+    let ended = Ended::of(command);
+    ended.succeeded();
+    let json = read_tables(folder.path());
+    let [small, wide] = [0, 1].map(|sequence| json["ladders"][sequence]["lines"].as_array().unwrap());
+    assert_eq!((small.len(), wide.len()), (10, 9));
+    assert_eq!(small[5]["step"], "learned mask");
+    assert_ne!(small[5]["accuracy"]["ate_m"], small[4]["accuracy"]["ate_m"]);
+    let mask_of = |step: &Value| step["accuracy"]["command"].as_str().unwrap().contains("masking.kind=learned");
+    assert_eq!(small.iter().map(mask_of).collect::<Vec<_>>(), [[false; 5], [true; 5]].concat());
+    let line = ended.stdout.lines().find(|line| line.starts_with("| 6 learned mask |")).unwrap();
+    assert!(line.ends_with("| - | - | - | - |"), "{line}");
+    assert!(ended.stdout.contains("no learned mask, for raster.cell_m is 1"), "{}", ended.stdout);
 }
 
 #[test]
@@ -83,8 +186,7 @@ fn a_ladder_leads_from_the_papers_form_to_each_sequences_own_configuration_side_
     let ended = Ended::of(command);
     ended.succeeded();
     assert!(!ended.stdout.contains("## III"), "{}", ended.stdout);
-    let json = fs::read_to_string(folder.path().join("out/tables.json")).unwrap();
-    let json: Value = serde_json::from_str(&json).unwrap();
+    let json = read_tables(folder.path());
     let [small, wide] = [0, 1].map(|sequence| json["ladders"][sequence]["lines"].as_array().unwrap());
     assert_eq!((small.len(), wide.len()), (9, 9));
     for (index, step) in small.iter().chain(wide).enumerate() {

@@ -31,6 +31,8 @@ pub enum Command {
     Inspect(InspectArguments),
     /// Judge a trajectory by ground truth.
     Evaluate(EvaluateArguments),
+    /// Draw what the mask keeps of scans.
+    Masks(MasksArguments),
     /// Print the papers' tables for this machine: times of the searches, and the accuracy that they reach.
     Tables(TablesArguments),
     /// Measure how like real scans simulated ones are.
@@ -112,6 +114,27 @@ pub struct EvaluateArguments {
 }
 
 #[derive(Debug, Args)]
+pub struct MasksArguments {
+    /// The configuration, a TOML file: its raster, masking and search.
+    pub configuration: PathBuf,
+    /// The recording's folder. Default: the configuration's simulation, or its source.data.
+    #[arg(long)]
+    pub data: Option<PathBuf>,
+    /// Where masks.png and a scan-NUMBER.png for each go.
+    #[arg(long, default_value = "out/masks")]
+    pub out: PathBuf,
+    /// Numbers of the scans to draw. Default: eight, evenly spread.
+    #[arg(long, value_delimiter = ',')]
+    pub scans: Vec<usize>,
+    /// Draw every so-manyth scan.
+    #[arg(long, conflicts_with = "scans")]
+    pub every: Option<NonZeroUsize>,
+    /// Override a key, as in masking.kind=threshold; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+}
+
+#[derive(Debug, Args)]
 pub struct TablesArguments {
     /// A sequence's configuration; one for each --data, in the same order.
     #[arg(long = "config", required = true)]
@@ -122,6 +145,10 @@ pub struct TablesArguments {
     /// Where tables.md, tables.json and all runs go.
     #[arg(long, default_value = "out/tables")]
     pub out: PathBuf,
+    /// The folder of the learned masks: f-mbym-N.toml and mbym-N.toml for rasters of N cells a side, gyre-255.toml for Gyre's
+    /// own rows. A row whose model is not there is left out, and so it is said.
+    #[arg(long, default_value = "models")]
+    pub models: PathBuf,
     /// Also run with each of these changes alone, as in masking.threshold=50,70: what the choice is worth among its
     /// neighbours; may be repeated.
     #[arg(long, value_name = "KEY=VALUE,...")]

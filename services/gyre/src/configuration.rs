@@ -6,6 +6,7 @@ mod strict;
 use std::{
     collections::BTreeMap,
     fs,
+    ops::Range,
     path::{Path, PathBuf},
     time::Duration,
 };
@@ -285,6 +286,27 @@ impl Configuration {
     /// The simulation that is played without being stored, if that is what is played.
     pub fn streamed(&self) -> Option<&SimulationConfig> {
         self.simulation.as_ref().filter(|simulation| !simulation.output.store)
+    }
+
+    /// The same with this recording, or with its simulation streamed whether or not a run would store it: to look at the scans
+    /// without a run. What is streamed is to the byte what would be stored.
+    #[must_use]
+    pub fn streaming(mut self, data: Option<&Path>) -> Self {
+        if let Some(data) = data {
+            self.simulation = None;
+            self.source.data = data.to_owned();
+        }
+        if let Some(simulation) = &mut self.simulation {
+            simulation.output.store = false;
+            self.dataset = self.dataset.or(&simulation.dataset_options());
+        }
+        self
+    }
+
+    /// The scans that are played of so many.
+    pub fn played(&self, scans: usize) -> Range<usize> {
+        let first = self.source.first.min(scans);
+        first..first.saturating_add(self.source.scans.unwrap_or(usize::MAX)).min(scans)
     }
 
     /// What is played, in words.

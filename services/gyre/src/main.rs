@@ -10,6 +10,7 @@ mod inspect;
 mod judgement;
 mod latency;
 mod machine;
+mod masks;
 mod odometry;
 mod preflight;
 mod print;
@@ -17,6 +18,7 @@ mod progress;
 mod realism;
 mod results;
 mod run;
+mod search;
 mod simulate;
 mod spoil;
 mod stage;
@@ -38,6 +40,7 @@ fn main() -> ExitCode {
         Command::Run(arguments) => run::run(&arguments),
         Command::Inspect(arguments) => inspect::inspect(&arguments),
         Command::Evaluate(arguments) => evaluate::evaluate(&arguments),
+        Command::Masks(arguments) => masks::masks(&arguments),
         Command::Tables(arguments) => tables::tables(&arguments),
         Command::Realism(arguments) => realism::realism(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),

@@ -56,9 +56,8 @@ pub struct Preflight {
 
 /// Looks at the dataset and at the machine.
 pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure> {
-    let source = &configuration.source;
     let Played { dataset, truth } = open(configuration)?;
-    let scans = dataset.len().saturating_sub(source.first).min(source.scans.unwrap_or(usize::MAX));
+    let scans = configuration.played(dataset.len()).len();
     if scans < 2 {
         return Err(PreflightError::TooFew { path: configuration.data(), scans }.into());
     }

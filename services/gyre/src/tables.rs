@@ -1,7 +1,7 @@
 //! `gyre tables`: Fast-MbyM's Table III for this machine, the paper's figures and a peer's beside ours.
 //!
 //! - [`rows`]: what is compared, and what each row changes in a configuration;
-//! - [`papers`]: the paper's figures;
+//! - [`papers`]: the paper's figures; [`models`]: the networks;
 //! - [`times`] (Table IIIa) and [`peer`]; [`accuracy`] (Table IIIb): the measurements;
 //! - [`variations`]: what single changes do to the shipped configuration;
 //! - [`ladder`]: the steps from the paper's form to it;
@@ -10,6 +10,7 @@
 pub(crate) mod accuracy;
 mod ladder;
 mod markdown;
+mod models;
 mod papers;
 mod peer;
 pub(crate) mod rows;
@@ -34,6 +35,7 @@ use crate::{
 };
 use accuracy::Accuracies;
 use ladder::Ladder;
+use models::Models;
 use peer::Peer;
 use times::Times;
 use variations::Variations;
@@ -71,6 +73,7 @@ pub fn tables(arguments: &TablesArguments) -> Result<ExitCode, Failure> {
     }
     let out = &arguments.out;
     fs::create_dir_all(out).map_err(|error| format!("cannot write to {}: {error}", out.display()))?;
+    let models = Models::new(&arguments.models);
     let peer = Peer::new(arguments.peer.as_deref(), arguments.peer_script.as_deref());
     let tables = Tables {
         version: env!("CARGO_PKG_VERSION"),
@@ -80,11 +83,11 @@ pub fn tables(arguments: &TablesArguments) -> Result<ExitCode, Failure> {
         command: command(env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned())),
         times: where_asked(table_iii)
             .first()
-            .map(|first| times::measure(first, &arguments.sizes, arguments.passes.get(), peer.as_ref(), out))
+            .map(|first| times::measure(first, &arguments.sizes, arguments.passes.get(), &models, peer.as_ref(), out))
             .transpose()?,
         accuracy: where_asked(table_iii)
             .iter()
-            .map(|sequence| accuracy::measure(sequence, &out.join(&sequence.name)))
+            .map(|sequence| accuracy::measure(sequence, &models, &out.join(&sequence.name)))
             .collect::<Result<_, _>>()?,
         variations: where_asked(!changes.is_empty())
             .iter()
@@ -92,7 +95,7 @@ pub fn tables(arguments: &TablesArguments) -> Result<ExitCode, Failure> {
             .collect::<Result<_, _>>()?,
         ladders: where_asked(arguments.ladder)
             .iter()
-            .map(|sequence| ladder::measure(sequence, &out.join(&sequence.name)))
+            .map(|sequence| ladder::measure(sequence, &models, &out.join(&sequence.name)))
             .collect::<Result<_, _>>()?,
         papers: papers::SOURCE,
     };

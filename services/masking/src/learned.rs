@@ -33,9 +33,14 @@ impl Learned {
         self.network.scans()
     }
 
-    /// The mask of the scan that [`Learned::mask`] had last: `n * n` factors from 0 to 1.
+    /// What the network made of the scan that [`Learned::mask`] had last, and of the one before: `n * n` factors from 0 to 1 each.
+    pub fn masks(&self) -> &[f32] {
+        self.network.masks()
+    }
+
+    /// The first of [`Learned::masks`].
     pub fn mask_of_scan(&self) -> &[f32] {
-        &self.network.masks()[..self.cells]
+        &self.masks()[..self.cells]
     }
 
     /// Writes the masked raster to the start of `out`, and where the network looks at two scans that of the scan before behind it

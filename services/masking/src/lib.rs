@@ -143,11 +143,25 @@ impl Masker {
     ) -> Result<usize, ScanError> {
         let count = self.points.extract(scan, self.config.floor(), out)?;
         if let Some(learned) = self.learned.as_ref().filter(|_| self.config.points) {
-            let RasterConfig { n, cell_m, .. } = self.raster;
-            let frame = Frame { n, cell_m, twist, doppler_undone: self.config.undo_doppler };
-            frame.weigh(learned.mask_of_scan(), &mut out[..count]);
+            self.frame(twist).weigh(learned.mask_of_scan(), &mut out[..count]);
         }
         Ok(count)
+    }
+
+    /// What the network made of the scan that [`Masker::mask`] had last: `n * n` factors from 0 to 1, and behind them, where it
+    /// looks at two scans, those of the scan before. `None` without a network.
+    pub fn factors(&self) -> Option<&[f32]> {
+        self.learned.as_ref().map(Learned::masks)
+    }
+
+    /// The cell of a raster compensated by `twist` that a point of the scan lies in, row by row; `None` outside of the raster.
+    pub fn cell_of(&self, point: &Point, twist: Option<Twist>) -> Option<usize> {
+        self.frame(twist).cell_of(point)
+    }
+
+    fn frame(&self, twist: Option<Twist>) -> Frame {
+        let RasterConfig { n, cell_m, .. } = self.raster;
+        Frame { n, cell_m, twist, doppler_undone: self.config.undo_doppler }
     }
 
     fn write_header(&self, header: &mut MaskedHeader, twist: Option<Twist>, points: usize) {

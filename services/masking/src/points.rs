@@ -1,7 +1,7 @@
 //! A mask on the sparse points.
 
 use gyre_radar::{Point, raster::Twist};
-use nalgebra::Point2;
+use nalgebra::{Isometry2, Point2};
 
 /// How a scan's raster was made, as far as it tells where a point lies in it.
 #[derive(Clone, Copy, Debug)]
@@ -22,15 +22,26 @@ impl Frame {
     pub fn weigh(&self, mask: &[f32], points: &mut [Point]) {
         // The points of an azimuth have one time.
         for points in points.chunk_by_mut(|a, b| a[2] == b[2]) {
-            let [.., time_s, _, _] = points[0];
-            let sensor = self.twist.map(|twist| twist.pose_at(time_s.into()));
+            let sensor = self.sensor_at(&points[0]);
             for point in points {
-                let [x_m, y_m, _, _, doppler_s] = *point;
-                let seen = self.approached(Point2::new(f64::from(x_m), f64::from(y_m)), doppler_s.into());
-                let place = sensor.map_or(seen, |sensor| sensor * seen);
-                point[3] *= self.cell(place).map_or(1.0, |cell| mask[cell]);
+                point[3] *= self.cell_seen_from(sensor, point).map_or(1.0, |cell| mask[cell]);
             }
         }
+    }
+
+    /// The cell that a point lies in, row by row; `None` outside of the raster.
+    pub fn cell_of(&self, point: &Point) -> Option<usize> {
+        self.cell_seen_from(self.sensor_at(point), point)
+    }
+
+    /// Where the sensor was in the raster's frame when it saw the point.
+    fn sensor_at(&self, [.., time_s, _, _]: &Point) -> Option<Isometry2<f64>> {
+        self.twist.map(|twist| twist.pose_at((*time_s).into()))
+    }
+
+    fn cell_seen_from(&self, sensor: Option<Isometry2<f64>>, &[x_m, y_m, _, _, doppler_s]: &Point) -> Option<usize> {
+        let seen = self.approached(Point2::new(f64::from(x_m), f64::from(y_m)), doppler_s.into());
+        self.cell(sensor.map_or(seen, |sensor| sensor * seen))
     }
 
     /// Where a point is with Doppler's shift undone, if it is undone: see [`Point`].

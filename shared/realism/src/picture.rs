@@ -53,16 +53,28 @@ impl Picture {
     /// # Errors
     /// [`PictureError`] names the file.
     pub fn write(&self, path: &Path) -> Result<(), PictureError> {
-        self.encode(path).map_err(|source| PictureError { path: path.to_owned(), source })
+        encode(path, [self.width, self.height], png::ColorType::Grayscale, &self.pixels)
     }
+}
 
-    fn encode(&self, path: &Path) -> Result<(), png::EncodingError> {
+/// Writes rows of red, green and blue as PNG.
+///
+/// # Errors
+/// [`PictureError`] names the file.
+pub fn write_rgb(path: &Path, width: usize, pixels: &[[u8; 3]]) -> Result<(), PictureError> {
+    let size = [width, pixels.len() / width.max(1)];
+    encode(path, size, png::ColorType::Rgb, pixels.as_flattened())
+}
+
+fn encode(path: &Path, [width, height]: [usize; 2], color: png::ColorType, bytes: &[u8]) -> Result<(), PictureError> {
+    let written = || {
         let file = BufWriter::new(File::create(path)?);
-        let mut encoder = png::Encoder::new(file, self.width as u32, self.height as u32);
-        encoder.set_color(png::ColorType::Grayscale);
+        let mut encoder = png::Encoder::new(file, width as u32, height as u32);
+        encoder.set_color(color);
         encoder.set_depth(png::BitDepth::Eight);
         let mut writer = encoder.write_header()?;
-        writer.write_image_data(&self.pixels)?;
+        writer.write_image_data(bytes)?;
         writer.finish()
-    }
+    };
+    written().map_err(|source| PictureError { path: path.to_owned(), source })
 }

@@ -46,12 +46,7 @@ pub fn configurations(arguments: &ExportPairsArguments) -> Result<Vec<Configurat
     let mut common = Configuration::read(&arguments.configuration, &arguments.set)?;
     common.run.ground_truth = arguments.ground_truth.clone().or(common.run.ground_truth);
     if arguments.data.is_empty() {
-        if let Some(simulation) = &mut common.simulation {
-            // What is streamed is to the byte what would be stored.
-            simulation.output.store = false;
-            common.dataset = common.dataset.or(&simulation.dataset_options());
-        }
-        return Ok(vec![common]);
+        return Ok(vec![common.streaming(None)]);
     }
     if let (Some(truth), recordings @ 2..) = (&common.run.ground_truth, arguments.data.len()) {
         let truth = truth.display();
@@ -60,13 +55,7 @@ pub fn configurations(arguments: &ExportPairsArguments) -> Result<Vec<Configurat
         )
         .into());
     }
-    common.simulation = None;
-    let of = |data: &PathBuf| {
-        let mut own = common.clone();
-        own.source.data = data.clone();
-        own
-    };
-    Ok(arguments.data.iter().map(of).collect())
+    Ok(arguments.data.iter().map(|data| common.clone().streaming(Some(data))).collect())
 }
 
 impl Recording {
@@ -76,9 +65,7 @@ impl Recording {
     /// What cannot be read, or has no truth to train with.
     pub fn open(configuration: &Configuration) -> Result<Self, Failure> {
         let preflight::Played { dataset, truth } = preflight::open(configuration)?;
-        let source = &configuration.source;
-        let first = source.first.min(dataset.len());
-        let played = first..first.saturating_add(source.scans.unwrap_or(usize::MAX)).min(dataset.len());
+        let played = configuration.played(dataset.len());
         let truth = match (truth, &configuration.run.ground_truth) {
             (Some(tum), None) => Truth::simulated(&tum),
             _ => Truth::read(configuration),

@@ -71,8 +71,7 @@ impl Source {
         let sequence = Sequence::new(&file, data);
         let resolved = sequence.configuration(&[])?;
         let dataset = gyre_radar::open(data, &resolved.dataset)?;
-        let first = resolved.source.first.min(dataset.len());
-        let played = first..first.saturating_add(resolved.source.scans.unwrap_or(usize::MAX)).min(dataset.len());
+        let played = resolved.played(dataset.len());
         let configuration_file = configuration.map(Path::to_owned);
         Ok(Self { role, data: data.to_owned(), configuration_file, sequence, runs, played, dataset })
     }

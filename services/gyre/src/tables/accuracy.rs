@@ -12,8 +12,8 @@ use serde_json::Value;
 
 use super::{
     Sequence, command,
-    papers::Figures,
-    rows::{Line, lines},
+    models::{Model, Models, Note, note},
+    rows::{Line, Row, Table, lines},
 };
 use crate::{Failure, print};
 
@@ -26,6 +26,8 @@ pub struct Accuracies {
     pub data: String,
     /// Row by row.
     pub lines: Vec<AccuracyLine>,
+    /// Why rows are left out.
+    pub left_out: Vec<Note>,
 }
 
 /// A row.
@@ -33,7 +35,9 @@ pub struct Accuracies {
 pub struct AccuracyLine {
     /// The row.
     pub row: &'static str,
-    /// What it came to here; `None` where this program has no such row.
+    /// The network that masked.
+    pub model: Option<Model>,
+    /// What it came to here; `None` where this program has no such row, or not the network for it.
     pub ours: Option<Accuracy>,
     /// The paper's KITTI errors at this raster's size, on other sequences: %, and degrees per km.
     pub paper: [Option<f64>; 2],
@@ -72,22 +76,49 @@ pub struct Accuracy {
 }
 
 /// Runs every row on `sequence`, each into a folder of its own below `out`.
-pub fn measure(sequence: &Sequence, out: &Path) -> Result<Accuracies, Failure> {
-    let measured = |line: Line| {
-        let ours = line.row.map(|row| run(sequence, row.name, &row.changes(), &out.join(row.folder()))).transpose()?;
-        let n = match &ours {
-            Some(ours) => ours.n,
-            None => sequence.configuration(&[])?.raster.n,
+pub fn measure(sequence: &Sequence, models: &Models, out: &Path) -> Result<Accuracies, Failure> {
+    let (mut measured, mut left_out) = (Vec::new(), Vec::new());
+    for line in lines(Table::Drift) {
+        let (row, model) = match line.row.map(|row| model(sequence, row, models)).transpose()?.unwrap_or(Ok(None)) {
+            Ok(model) => (line.row, model),
+            Err(reason) => {
+                note(&mut left_out, reason, line.name.to_owned());
+                (None, None)
+            }
         };
-        let paper = line.figures.map_or([None; 2], |figures| figures.drift(n));
-        Ok(AccuracyLine { row: line.name, ours, paper })
-    };
-    let lines: Result<Vec<_>, Failure> = lines(Figures::has_drift).into_iter().map(measured).collect();
+        if row.is_some() || line.figures.is_some() {
+            measured.push(measure_line(sequence, &line, row, model, out)?);
+        }
+    }
     Ok(Accuracies {
         configuration: sequence.file.display().to_string(),
         data: sequence.data.display().to_string(),
-        lines: lines?,
+        lines: measured,
+        left_out,
     })
+}
+
+/// The network of a row, if it has one; else why it cannot be used.
+fn model(sequence: &Sequence, row: &Row, models: &Models) -> Result<Result<Option<Model>, String>, Failure> {
+    let raster = sequence.configuration(&row.changes())?.raster;
+    Ok(row.mask.as_ref().map(|mask| models.find(mask, raster.n, Some(raster.cell_m))).transpose())
+}
+
+fn measure_line(
+    sequence: &Sequence,
+    line: &Line,
+    row: Option<&Row>,
+    model: Option<Model>,
+    out: &Path,
+) -> Result<AccuracyLine, Failure> {
+    let run = |row: &Row| run(sequence, row.name, &row.changes_with(model.as_ref()), &out.join(row.folder()));
+    let ours = row.map(run).transpose()?;
+    let n = match &ours {
+        Some(ours) => ours.n,
+        None => sequence.configuration(&[])?.raster.n,
+    };
+    let paper = line.figures.map_or([None; 2], |figures| figures.drift(n));
+    Ok(AccuracyLine { row: line.name, model, ours, paper })
 }
 
 /// Runs a sequence with changes as a person would, by `gyre run`, and reads what it left.

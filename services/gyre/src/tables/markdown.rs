@@ -5,7 +5,8 @@ use std::fmt::Write;
 use super::{
     Tables,
     accuracy::{Accuracies, Accuracy, AccuracyLine},
-    ladder::{Ladder, Step},
+    ladder::{Ladder, Step, steps},
+    models::{Model, Note, note},
     times::{Median, TimeLine, Times},
     variations::{Variation, Variations},
 };
@@ -34,8 +35,9 @@ fn times(times: &Times) -> String {
     let _ = writeln!(
         text,
         "\nms: for a scan, one thread, median of {} passes over {} scans of {}, the earlier scan's spectrum kept as in a \
-         run, rasters and points ready. The rows that refine do so at every size with the same points. {}{}Paper: a Core i7 at 2.9 GHz; a Jetson Nano with its GPU. -: not given there, or not \
-         there here (learned masks).",
+         run (not where a mask looks at both), rasters and points ready. The rows that mask include the mask; mask: that alone. \
+         The rows that refine do so at every size with the same points. {}{}Paper: a Core i7 at 2.9 GHz; a Jetson Nano with \
+         its GPU. -: not given there, or not there here.",
         times.passes,
         times.scans,
         times.data,
@@ -47,7 +49,27 @@ fn times(times: &Times) -> String {
     if !an_angle.is_empty() {
         let _ = writeln!(text, "\nAn angle of the exhaustive searches, ms: {}.", an_angle.join("; "));
     }
-    text
+    let masked =
+        times.lines.iter().filter_map(|line| Some((line.model.as_ref()?, format!("{} at {}", line.row, line.n))));
+    text + &masks(masked) + &left_out(&times.left_out)
+}
+
+/// Which network masked which rows.
+fn masks<'a>(masked: impl Iterator<Item = (&'a Model, String)>) -> String {
+    let mut notes = Vec::new();
+    masked.for_each(|(model, row)| note(&mut notes, model.to_string(), row));
+    paragraph("Masks", &notes)
+}
+
+fn left_out(notes: &[Note]) -> String {
+    paragraph("Left out", notes)
+}
+
+/// What is noted, each with its rows; nothing of nothing.
+fn paragraph(title: &str, notes: &[Note]) -> String {
+    let sentences = notes.iter().map(|note| format!("{}: {}", note.rows.join("; "), note.what));
+    let sentences: Vec<String> = sentences.collect();
+    if sentences.is_empty() { String::new() } else { format!("\n{title}. {}.\n", sentences.join(". ")) }
 }
 
 /// How quiet the machine was.
@@ -107,7 +129,10 @@ fn accuracies(sequence: &Accuracies) -> String {
     text += "\ndeg a scan: rotation error of single motions, RMS. forward: estimated over true distance. ms: median work of \
              the stages in the running pipeline. Paper: its test drives of Oxford Radar RobotCar at this raster's size.";
     text += &truth(ours().next());
-    text += "\n\n```sh\n";
+    text += "\n";
+    text += &masks(sequence.lines.iter().filter_map(|line| Some((line.model.as_ref()?, line.row.to_owned()))));
+    text += &left_out(&sequence.left_out);
+    text += "\n```sh\n";
     for accuracy in ours() {
         text = text + &accuracy.command + "\n";
     }
@@ -132,27 +157,43 @@ fn variations(sequence: &Variations) -> String {
     format!("\n## One change at a time on {}\n\n{}", sequence.data, table(&header, lines))
 }
 
-/// The sequences' ladders side by side.
+/// The sequences' ladders side by side; a step that one has not is empty there.
 fn ladders(sequences: &[Ladder]) -> String {
-    let Some(first) = sequences.first() else { return String::new() };
+    if sequences.is_empty() {
+        return String::new();
+    }
     let mut header = vec!["step"];
     sequences.iter().for_each(|_| header.extend(["KITTI %", "deg/100 m", "ATE m", "seg %"]));
-    let errors = |step: &Step| {
-        let a = &step.accuracy;
-        let [translation, rotation] = [a.translation_percent, a.rotation_deg_per_100m].map(|error| number(error, 2));
-        [translation, rotation, number(a.ate_m, 2), number(a.seg_percent, 3)]
-    };
-    let line = |(index, step): (usize, &Step)| {
-        let all = sequences.iter().flat_map(|sequence| errors(&sequence.lines[index]));
-        std::iter::once(format!("{} {}", index + 1, step.step)).chain(all).collect::<Vec<_>>()
+    let climbed = |step: &str| sequences.iter().any(|sequence| sequence.step(step).is_some());
+    let line = |(index, step): (usize, &'static str)| {
+        let all = sequences.iter().flat_map(|sequence| step_errors(sequence.step(step)));
+        std::iter::once(format!("{} {step}", index + 1)).chain(all).collect::<Vec<_>>()
     };
     let data: Vec<&str> = sequences.iter().map(|sequence| sequence.data.as_str()).collect();
-    let lines = first.lines.iter().enumerate().map(line);
+    let lines = steps().filter(|step| climbed(step)).enumerate().map(line);
+    let mut notes = Vec::new();
+    for sequence in sequences {
+        let reason = sequence.left_out.as_ref().map(|reason| format!("no learned mask, for {reason}"));
+        reason.into_iter().for_each(|reason| note(&mut notes, reason, sequence.data.clone()));
+    }
+    let masked = sequences.iter().filter_map(|sequence| Some((sequence.model.as_ref()?, sequence.data.clone())));
     format!(
-        "\n## Ladder\n\nEach step with those before it. From the left: {}.\n\n{}",
+        "\n## Ladder\n\nEach step with those before it. From the left: {}.\n\n{}{}{}",
         data.join(", then "),
-        table(&header, lines)
+        table(&header, lines),
+        masks(masked),
+        left_out(&notes)
     )
+}
+
+fn step_errors(step: Option<&Step>) -> [String; 4] {
+    let error = |of: fn(&Accuracy) -> Option<f64>, decimals| number(step.and_then(|step| of(&step.accuracy)), decimals);
+    [
+        error(|a| a.translation_percent, 2),
+        error(|a| a.rotation_deg_per_100m, 2),
+        error(|a| a.ate_m, 2),
+        error(|a| a.seg_percent, 3),
+    ]
 }
 
 /// What the ground truth does not allow.
@@ -226,6 +267,7 @@ mod tests {
         let line = |ours: Option<Median>| TimeLine {
             n: 255,
             row: "f-raw",
+            model: None,
             ours,
             peer_ms: Some(20.0),
             peer_over_ours: ours.map(|ours| 20.0 / ours.ms),
@@ -242,13 +284,28 @@ mod tests {
     #[test]
     fn every_line_of_a_table_has_as_many_cells_as_its_header() {
         let ours = Some(accuracy(Some(885.0), Some(0.5)));
-        let line = |ours| AccuracyLine { row: "raw", ours, paper: [Some(6.39), Some(20.87)] };
+        let model = Model { card: "m/n.toml".into(), cell_m: 0.4, instead_of: Some("m/o.toml".into()) };
+        let line = |ours: Option<Accuracy>| AccuracyLine {
+            row: "raw",
+            model: ours.as_ref().map(|_| model.clone()),
+            ours,
+            paper: [Some(6.39), Some(20.87)],
+        };
+        let missing = || vec![Note { what: "there is none".to_owned(), rows: vec!["a".to_owned(), "b".to_owned()] }];
         let sequence = Accuracies {
             configuration: "c.toml".to_owned(),
             data: "drive".to_owned(),
             lines: vec![line(ours), line(None)],
+            left_out: missing(),
         };
-        let times = Times { data: "drive".to_owned(), scans: 8, passes: 50, peer_torch: None, lines: Vec::new() };
+        let times = Times {
+            data: "drive".to_owned(),
+            scans: 8,
+            passes: 50,
+            peer_torch: None,
+            lines: Vec::new(),
+            left_out: missing(),
+        };
         let machine = Machine { processor: "A".to_owned(), cores: 2 };
         let (date, command) = ("2024-02-29".to_owned(), "gyre tables".to_owned());
         let sequences = vec![sequence];
@@ -260,6 +317,8 @@ mod tests {
             configuration: "c.toml".to_owned(),
             data: "drive".to_owned(),
             lines: vec![Step { step: "Eq. 7", accuracy: accuracy(Some(885.0), seg) }],
+            model: None,
+            left_out: Some("it rains".to_owned()),
         };
         let tables = Tables {
             version: "1.0",
@@ -285,6 +344,9 @@ mod tests {
         ));
         assert!(text.contains("From the left: drive, then drive.\n"), "{text}");
         assert!(text.contains("| 1 Eq. 7 | 2.12 | 0.75 | 1.50 | 0.500 | - | - | 1.50 | - |\n"), "{text}");
+        assert_eq!(text.matches("Left out. a; b: there is none.\n").count(), 2, "{text}");
+        assert!(text.contains("\nMasks. raw: m/n.toml (there is no m/o.toml).\n"), "{text}");
+        assert!(text.contains("\nLeft out. drive; drive: no learned mask, for it rains.\n"), "{text}");
         assert_eq!(cells, [11, 11, 14, 14, 14, 14, 7, 7, 7, 7, 10, 10, 10]);
     }
 

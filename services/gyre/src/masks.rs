@@ -1,0 +1,109 @@
+//! `gyre masks`: what the mask keeps of a scan, for the eye.
+//!
+//! - [`chain`]: scans masked one after the other as in a run;
+//! - [`exposure`]: what became of one of them, and its figures;
+//! - [`drawing`]: that as a picture.
+
+mod chain;
+mod drawing;
+mod exposure;
+
+use std::{fs, ops::Range, process::ExitCode};
+
+use crate::{
+    Failure,
+    cli::MasksArguments,
+    configuration::Configuration,
+    preflight::{self, Played},
+    print,
+};
+use chain::Chain;
+use drawing::Canvas;
+
+/// Scans that are drawn where nobody says which; and on the overview, at most.
+const FEW: usize = 8;
+/// The picture of several scans.
+const OVERVIEW: &str = "masks.png";
+
+/// Draws the chosen scans, and prints a line on each.
+pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
+    let configuration = Configuration::read(&arguments.configuration, &arguments.set)?;
+    let configuration = configuration.streaming(arguments.data.as_deref());
+    let Played { dataset, .. } = preflight::open(&configuration)?;
+    let chosen = choose(arguments, configuration.played(dataset.len()), &configuration.data())?;
+    let mut chain = Chain::new(&configuration, dataset)?;
+    let out = &arguments.out;
+    fs::create_dir_all(out).map_err(|error| format!("cannot write to {}: {error}", out.display()))?;
+    print::line(exposure::HEADER)?;
+    let (mut overview, apart) = (Vec::new(), chosen.len().div_ceil(FEW));
+    for (index, number) in chosen.into_iter().enumerate() {
+        let Some(exposure) = chain.expose(number)? else { continue };
+        print::line(exposure.line())?;
+        let picture = Canvas::of(&exposure);
+        picture.write(&out.join(format!("scan-{number:06}.png")))?;
+        if index % apart == 0 {
+            overview.push(picture);
+        }
+    }
+    if overview.is_empty() {
+        return Err(format!("{}: none of the chosen scans can be read", configuration.data()).into());
+    }
+    Canvas::stack(&overview).write(&out.join(OVERVIEW))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The numbers of the scans to draw, in their order, each once.
+fn choose(arguments: &MasksArguments, played: Range<usize>, data: &str) -> Result<Vec<usize>, Failure> {
+    if played.is_empty() {
+        return Err(format!("{data} has no scans to draw").into());
+    }
+    if let Some(number) = arguments.scans.iter().find(|number| !played.contains(number)) {
+        let (first, last) = (played.start, played.end - 1);
+        return Err(format!(
+            "--scans {number}: the scans of {data} that are played have the numbers {first} to {last}"
+        )
+        .into());
+    }
+    let mut chosen = arguments.scans.clone();
+    if chosen.is_empty() {
+        let every = arguments.every.map_or(played.len().div_ceil(FEW), usize::from);
+        chosen = played.step_by(every).collect();
+    }
+    chosen.sort_unstable();
+    chosen.dedup();
+    Ok(chosen)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use clap::Parser;
+
+    use super::*;
+    use crate::cli::{Command, Gyre};
+
+    fn chosen(options: &str, played: Range<usize>) -> Result<Vec<usize>, Failure> {
+        let words = ["gyre", "masks", "c.toml"].into_iter().chain(options.split_whitespace());
+        match Gyre::try_parse_from(words)?.command {
+            Command::Masks(arguments) => choose(&arguments, played, "drive"),
+            other => Err(format!("{other:?}").into()),
+        }
+    }
+
+    #[test]
+    fn scans_are_chosen_by_number_by_step_or_evenly() {
+        assert_eq!(chosen("--scans 7,3,7", 0..10).unwrap(), [3, 7]);
+        assert_eq!(chosen("--every 4", 2..12).unwrap(), [2, 6, 10]);
+        assert_eq!(chosen("", 0..3).unwrap(), [0, 1, 2]);
+        assert_eq!(chosen("", 10..26).unwrap(), [10, 12, 14, 16, 18, 20, 22, 24]);
+    }
+
+    #[test]
+    fn scans_that_are_not_played_are_refused() {
+        let refused = |options, played| chosen(options, played).unwrap_err().to_string();
+        let sentence = "--scans 20: the scans of drive that are played have the numbers 10 to 19";
+        assert_eq!(refused("--scans 10,20", 10..20), sentence);
+        assert_eq!(refused("", 5..5), "drive has no scans to draw");
+        assert!(chosen("--every 0", 0..9).is_err() && chosen("--every 2 --scans 1", 0..9).is_err());
+    }
+}
