@@ -35,8 +35,8 @@ def run(arguments: list[str]) -> None:
 
 
 def add_reproduce(commands) -> None:
-    command = commands.add_parser("reproduce", help="all from nothing: worlds, pairs, training, ONNX file and card")
-    command.add_argument("recipe", type=Path, nargs="+")
+    command = commands.add_parser("reproduce", help="all from nothing: worlds, pairs, training (also of what it begins with), ONNX file and card")
+    command.add_argument("recipe", type=Path)
     command.add_argument("--work", type=Path, default=Path("out/training"), help="worlds, pairs and runs; kept")
     command.add_argument("--models", type=Path, default=Path("out/models"), help="where the model goes")
     command.add_argument("--gyre", type=Path, help="the program; by default the project's build")
@@ -46,12 +46,11 @@ def add_reproduce(commands) -> None:
 def reproduce(options: argparse.Namespace) -> None:
     gyre, work = find_gyre(options.gyre), options.work.resolve()
     simulate(gyre, work / "worlds")
-    for path in options.recipe:
-        recipe = recipes.read(path)
+    for recipe in recipes.lineage(options.recipe):
         pairs = work / "pairs" / recipe.raster
         export_pairs(gyre, work / "worlds", recipe.configuration, pairs)
         folder = train_recipe(recipe, pairs, work, options)
-        publish(recipe, folder, pairs, options.models)
+    publish(recipe, folder, pairs, options.models)
 
 
 def add_train(commands) -> None:

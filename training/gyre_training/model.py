@@ -1,7 +1,6 @@
 """From a finished training to a model that Gyre runs."""
 
 import csv
-import platform
 from pathlib import Path
 
 import torch
@@ -37,6 +36,7 @@ def provenance(recipe: Recipe, folder: Path, scans: Scans) -> dict:
     return {
         "command": f"python -m gyre_training reproduce training/recipes/{recipe.name}.toml",
         "data": "simulated only: training/worlds/train",
+        "initial": recipe.initial or "",
         "scans": len(scans.records),
         "seed": training["seed"],
         "batch": training["batch"],
@@ -46,8 +46,6 @@ def provenance(recipe: Recipe, folder: Path, scans: Scans) -> dict:
         "validation_translation_percent": float(best["translation_percent"]),
         "validation_rotation_deg_per_100m": float(best["rotation_deg_per_100m"]),
         "minutes": round(float(rows[-1]["seconds"]) / 60, 1),
-        "machine": f"{platform.machine()}, {torch.get_num_threads()} threads of a CPU"
-        if not torch.cuda.is_available()
-        else torch.cuda.get_device_name(),
+        "machine": state["machine"],
         "torch": torch.__version__,
     }

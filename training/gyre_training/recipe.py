@@ -55,3 +55,10 @@ def read(path: Path) -> Recipe:
         training=TrainingConfig(**training, sampling=sampling),
         **values,
     )
+
+
+def lineage(path: Path) -> list[Recipe]:
+    """A recipe after those that it begins with, the first one first."""
+    recipe = read(path)
+    before = lineage(path.with_name(f"{recipe.initial}.toml")) if recipe.initial else []
+    return [*before, recipe]

@@ -52,7 +52,7 @@ class SearchConfig:
         return SearchConfig(form=form)
 
     @staticmethod
-    def product(n: int) -> "SearchConfig":
+    def gyre(n: int) -> "SearchConfig":
         """Gyre's defaults."""
         radii = math.ceil((0.45 - 0.05) * n)
         return SearchConfig("eq7", "radial_hann", 0.05, 0.45, 576, radii, overlap="energy", peak="gaussian")
@@ -343,33 +343,27 @@ def line_peak(kind: str, samples: Tensor) -> Tensor:
         highest = near[:, 1:2]
         lowest = torch.minimum(samples.amin(1, keepdim=True), highest)
         near = (near - (lowest - 0.05 * (highest - lowest))).log()
-    a, b, c = near.unbind(1)
-    return torch.nan_to_num(0.5 * (a - c) / (a - 2 * b + c)).clamp(-FARTHEST, FARTHEST)
+    return parabola(near)
 
 
 def parabola(near: Tensor) -> Tensor:
-    """The summit of the parabola through three samples (batch, 3), the middle one the highest."""
-    a, b, c = near.unbind(1)
-    return (0.5 * (a - c) / (a - 2 * b + c).clamp_max(-1e-9)).clamp(-FARTHEST, FARTHEST)
+    """The summit of the parabola through three samples (..., 3), beside the middle one; at it where there is none."""
+    a, b, c = near.unbind(-1)
+    curvature = a - 2 * b + c
+    offset = (0.5 * (a - c) / curvature.clamp_max(-1e-12)).clamp(-FARTHEST, FARTHEST)
+    return torch.where(curvature < 0, offset, 0.0)
 
 
 def plane_peak(kind: str, scores: Tensor, i: int, j: int) -> Tensor:
     """The maximum's place (down, right) beside the sample (i, j)."""
     near = scores[i - 1 : i + 2, j - 1 : j + 2]
-    parabolas = torch.cat([line_peak_of_three(near[:, 1]), line_peak_of_three(near[1])])
+    parabolas = parabola(torch.stack([near[:, 1], near[1]]))
     if kind != "gaussian":
         return parabolas
     wide = scores[i - SUPPORT : i + SUPPORT + 1, j - SUPPORT : j + SUPPORT + 1]
     lowest = wide.min()
     fit = paraboloid((near - (lowest - 0.05 * (near[1, 1] - lowest))).log())
     return parabolas if fit is None else fit
-
-
-def line_peak_of_three(near: Tensor) -> Tensor:
-    """The summit of the parabola through three samples."""
-    a, b, c = near
-    curvature = a - 2 * b + c
-    return (0.5 * (a - c) / curvature).clamp(-FARTHEST, FARTHEST)[None] if curvature < 0 else torch.zeros(1).double()
 
 
 def paraboloid(near: Tensor) -> Tensor | None:

@@ -21,6 +21,7 @@ import torch
 from torch import nn
 
 from .network import MaskNetwork
+from .recipe import HOME
 from .search import ExhaustiveMatch, ScanMatch, SearchConfig
 from .train import pose_error
 
@@ -142,7 +143,9 @@ class Worker:
     def __init__(self, setting: Setting):
         self.setting = setting
         command = [sys.executable, "-m", "gyre_training.step_time", json.dumps(asdict(setting))]
-        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+        # Found from anywhere, whether the package is installed or not.
+        self.process = subprocess.Popen(command, cwd=HOME, **pipes)
 
     def step(self) -> tuple[float, float] | None:
         """Seconds and MiB; None where there was not enough memory."""

@@ -2,6 +2,7 @@
 
 import csv
 import math
+import platform
 import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -180,6 +181,7 @@ class Trainer:
             "step": self.step,
             "seconds": self.seconds + (now - began if began else 0.0),
             "best": self.best,
+            "machine": machine(self.device),
             "meaning": self.meaning,
         }
         path = self.folder / name
@@ -197,6 +199,14 @@ class Trainer:
         self.network.load_state_dict(state["network"])
         self.optimiser.load_state_dict(state["optimiser"])
         self.step, self.seconds, self.best = state["step"], state["seconds"], state["best"]
+
+
+def machine(device: torch.device) -> str:
+    """Whom a training's time is the time of."""
+    if device.type == "cuda":
+        return torch.cuda.get_device_name(device)
+    threads = torch.get_num_threads()
+    return f"{platform.machine()}, {threads} thread{'s' if threads > 1 else ''}"
 
 
 def load(path: Path) -> dict:

@@ -6,7 +6,7 @@ import torch
 from gyre_training.search import ExhaustiveMatch, RotationSearch, ScanMatch, SearchConfig, SoftArgmax, TranslationSearch
 from scenes import scene
 
-CONFIGS = {"line 14": SearchConfig.paper(), "Eq. 7": SearchConfig.paper("eq7"), "product": SearchConfig.product(127)}
+CONFIGS = {"line 14": SearchConfig.paper(), "Eq. 7": SearchConfig.paper("eq7"), "Gyre": SearchConfig.gyre(127)}
 MOTIONS = [(0.0, 0.0, 0.0), (3.1, 0.0, 0.0), (2.0, -1.4, 0.05), (-4.3, 0.7, -0.12), (0.3, 5.2, 0.2)]
 
 
