@@ -9,10 +9,12 @@ def write(path: Path, inputs: int, opset: int, parameters: int, settings: dict, 
     """Writes the card of the ONNX file at `path`. `settings` are those of the rasters, as Gyre resolved them."""
     content = path.read_bytes()
     model = {"file": path.name, "sha256": hashlib.sha256(content).hexdigest(), "bytes": len(content)}
+    masking = settings["masking"]
+    floor = 0 if masking["kind"] == "none" else masking["threshold"]
     sections = {
         "model": model | {"inputs": inputs, "opset": opset, "parameters": parameters},
         "raster": settings["raster"],
-        "masking": {key: settings["masking"][key] for key in ("kind", "threshold", "compensate")},
+        "masking": {"floor": floor, "compensate": masking["compensate"]},
         **provenance,
     }
     path.with_suffix(".toml").write_text("\n".join(section(name, values) for name, values in sections.items()))

@@ -6,7 +6,7 @@ from pathlib import Path
 import torch
 
 from . import recipe as recipes
-from . import step_time
+from . import compare, step_time
 from .drift import drift, motions
 from .export import OnnxMasks
 from .model import publish
@@ -27,6 +27,7 @@ def run(arguments: list[str]) -> None:
     add_publish(commands)
     add_drift(commands)
     add_plot(commands)
+    compare.register(commands)
     step_time.register(commands)
     options = parser.parse_args(arguments)
     if options.threads:

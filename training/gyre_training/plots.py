@@ -16,6 +16,7 @@ matplotlib.rcParams |= {"svg.hashsalt": "gyre", "svg.fonttype": "none", "axes.gr
 from matplotlib import pyplot  # noqa: E402
 
 if TYPE_CHECKING:
+    from .compare import Contender
     from .step_time import Measurement
 
 PANEL_INCHES = (4.6, 3.4)
@@ -53,6 +54,26 @@ def step_times(measurements: list[Measurement], limit_mib: float, path: Path) ->
         axes.set_xlabel("batch")
         axes.set_ylabel(label)
     time.legend()
+    save(figure, path)
+
+
+def speed_and_drift(contenders: Sequence[Contender], path: Path) -> None:
+    """Drift against the time of a mask: hollow in floats, full in integers, a line between the two of one network."""
+    figure, axes = panels(2)
+    for name in dict.fromkeys(one.name for one in contenders):
+        ours = [one for one in contenders if one.name == name]
+        for panel, error in zip(axes, ("translation_percent", "rotation_deg_per_100m")):
+            places = [(one.pair_ms, getattr(one.drift, error)) for one in ours]
+            (line,) = panel.plot(*zip(*places), "-", linewidth=1, label=name)
+            for one, place in zip(ours, places):
+                panel.plot(*place, "o", color=line.get_color(), fillstyle="full" if one.numbers == "integers" else "none")
+    for panel, label in zip(axes, ("translation, %", "rotation, deg/100 m")):
+        panel.set_xscale("log")
+        panel.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        panel.set_ylim(bottom=0)
+        panel.set_xlabel("masks of a pair, ms on one thread")
+        panel.set_ylabel(label)
+    axes[0].legend()
     save(figure, path)
 
 

@@ -60,4 +60,5 @@ def test_a_card_says_which_file_it_is_of(tmp_path):
     read = tomllib.loads(path.with_suffix(".toml").read_text())
     assert read["model"]["sha256"] == hashlib.sha256(b"a network").hexdigest()
     assert (read["model"]["file"], read["model"]["inputs"], read["raster"]["n"]) == ("network.onnx", 2, 31)
+    assert read["masking"] == {"floor": 0, "compensate": False}
     assert read["training"] == {"data": 'a "world"', "widths": [4, 8]}

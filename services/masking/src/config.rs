@@ -29,8 +29,10 @@ pub struct MaskingConfig {
     pub threads: usize,
     /// Who computes it: `cpu`, or one that Gyre was built for: `cuda`, `tensorrt`, `openvino`. Default `cpu`.
     pub provider: Provider,
-    /// Weigh the sparse points by the network's mask too. Default true.
-    pub points: bool,
+    /// A sparse point's weight is multiplied by the network's mask to the power of this: 0, the mask says nothing of points;
+    /// 1, it counts as it does in the rasters. A point's weight is its power compressed, so its mask is to be compressed
+    /// too: in full it makes the faintest lone returns weigh the most. Default 0.5.
+    pub point_exponent: f32,
     /// Undo the distortion that the vehicle's motion puts into a sweep. Default true.
     pub compensate: bool,
     /// Which motion to undo it with: that of the scan so many scans before, at least 1. With 2 or more the stages overlap
@@ -83,11 +85,14 @@ impl fmt::Display for Provider {
 }
 
 /// A setting out of its bounds.
-#[derive(Debug, Error, PartialEq, Eq)]
+#[derive(Debug, Error, PartialEq)]
 pub enum MaskingConfigError {
     /// No threads, or absurdly many.
     #[error("threads is {0}, but must be 1 to 64")]
     Threads(usize),
+    /// What no mask is raised to.
+    #[error("point_exponent is {0}, but must be 0 to 4")]
+    PointExponent(f32),
     /// A scan's own motion is not known yet when it is masked.
     #[error("lag is 0, but a scan's own motion is not known yet: it must be 1 or more")]
     Lag,
@@ -103,7 +108,7 @@ impl Default for MaskingConfig {
             runtime: None,
             threads: 1,
             provider: Provider::Cpu,
-            points: true,
+            point_exponent: 0.5,
             compensate: true,
             lag: 2,
             undo_doppler: false,
@@ -120,6 +125,9 @@ impl MaskingConfig {
     pub fn validate(&self) -> Result<(), MaskingConfigError> {
         match () {
             () if !(1..=64).contains(&self.threads) => Err(MaskingConfigError::Threads(self.threads)),
+            () if !(0.0..=4.0).contains(&self.point_exponent) => {
+                Err(MaskingConfigError::PointExponent(self.point_exponent))
+            }
             () if self.compensate && self.lag == 0 => Err(MaskingConfigError::Lag),
             () => Ok(()),
         }

@@ -131,7 +131,8 @@ impl Masker {
     }
 
     /// Writes the scan's points to the start of `out`, and returns how many there are: see [`PointExtractor::extract`]. A
-    /// network's mask weighs them, if so configured: that of the scan that [`Masker::mask`] had last, compensated by `twist`.
+    /// network's mask weighs them by [`MaskingConfig::point_exponent`]: that of the scan that [`Masker::mask`] had last,
+    /// compensated by `twist`.
     ///
     /// # Errors
     /// A scan that contradicts itself.
@@ -142,8 +143,8 @@ impl Masker {
         out: &mut [Point],
     ) -> Result<usize, ScanError> {
         let count = self.points.extract(scan, self.config.floor(), out)?;
-        if let Some(learned) = self.learned.as_ref().filter(|_| self.config.points) {
-            self.frame(twist).weigh(learned.mask_of_scan(), &mut out[..count]);
+        if let Some(learned) = self.learned.as_ref().filter(|_| self.config.point_exponent > 0.0) {
+            self.frame(twist).weigh(learned.mask_of_scan(), self.config.point_exponent, &mut out[..count]);
         }
         Ok(count)
     }

@@ -1,11 +1,11 @@
 //! A model and its card: which file, for which rasters, made how.
 
 use std::{
-    fs, io,
+    fmt, fs, io,
     path::{Path, PathBuf},
 };
 
-use gyre_radar::raster::RasterConfig;
+use gyre_radar::{RasterConfig, Sampling};
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use thiserror::Error;
@@ -19,6 +19,9 @@ pub struct Card {
     pub model: NetworkFacts,
     /// The rasters that it was trained on.
     pub raster: RasterFacts,
+    /// How they came about. A card may leave it open.
+    #[serde(default)]
+    pub masking: MaskingFacts,
 }
 
 /// The section `[model]` of a card.
@@ -43,6 +46,17 @@ pub struct RasterFacts {
     pub n: usize,
     /// Metres a cell.
     pub cell_m: f32,
+    /// How a cell's value came from the bins.
+    pub sampling: Option<Sampling>,
+}
+
+/// The section `[masking]` of a card: what was done before the network looked at a raster.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+pub struct MaskingFacts {
+    /// Power that counted as nothing.
+    pub floor: Option<u8>,
+    /// Whether the sweep's distortion was undone.
+    pub compensate: Option<bool>,
 }
 
 /// A model whose file is as its card says, and whose card suits the run.
@@ -149,6 +163,22 @@ impl Card {
             _ => Ok(card),
         }
     }
+}
+
+impl Card {
+    /// What the network was not trained for, though it runs: its masks are worth less then.
+    pub fn unlike_training(&self, masking: &MaskingConfig, raster: &RasterConfig) -> Vec<String> {
+        let differences = [
+            unlike("masking.threshold", self.masking.floor, masking.floor()),
+            unlike("masking.compensate", self.masking.compensate, masking.compensate),
+            unlike("raster.sampling", self.raster.sampling, raster.sampling),
+        ];
+        differences.into_iter().flatten().collect()
+    }
+}
+
+fn unlike<T: PartialEq + fmt::Display>(key: &str, trained: Option<T>, here: T) -> Option<String> {
+    trained.filter(|trained| *trained != here).map(|trained| format!("{key} is {here} instead of {trained}"))
 }
 
 impl Model {

@@ -17,14 +17,14 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
-    /// Multiplies each point's weight by the mask (`n * n` factors) at the cell that the point lies in. What lies outside of
-    /// the raster keeps its weight.
-    pub fn weigh(&self, mask: &[f32], points: &mut [Point]) {
+    /// Multiplies each point's weight by the mask (`n * n` factors) at the cell that the point lies in, raised to `exponent`.
+    /// What lies outside of the raster keeps its weight.
+    pub fn weigh(&self, mask: &[f32], exponent: f32, points: &mut [Point]) {
         // The points of an azimuth have one time.
         for points in points.chunk_by_mut(|a, b| a[2] == b[2]) {
             let sensor = self.sensor_at(&points[0]);
             for point in points {
-                point[3] *= self.cell_seen_from(sensor, point).map_or(1.0, |cell| mask[cell]);
+                point[3] *= self.cell_seen_from(sensor, point).map_or(1.0, |cell| mask[cell].powf(exponent));
             }
         }
     }
@@ -82,7 +82,7 @@ mod tests {
         let mut mask = [1.0; 25];
         mask[row * 5 + column] = 0.5;
         let mut points = [[x_m, y_m, time_s, 1.0, doppler_s]];
-        frame.weigh(&mask, &mut points);
+        frame.weigh(&mask, 1.0, &mut points);
         points[0][3]
     }
 
@@ -97,9 +97,16 @@ mod tests {
     fn a_point_outside_of_the_raster_keeps_its_weight() {
         for place in [[5.1, 0.0], [-5.1, 0.0], [0.0, 5.1], [0.0, -5.1], [f32::NAN, 0.0]] {
             let mut points = [[place[0], place[1], 0.0, 0.7, 0.0]];
-            FRAME.weigh(&[0.0; 25], &mut points);
+            FRAME.weigh(&[0.0; 25], 1.0, &mut points);
             assert_eq!(points[0][3], 0.7, "{place:?}");
         }
+    }
+
+    #[test]
+    fn the_exponent_compresses_the_mask() {
+        let mut points = [[0.0, 0.0, 0.0, 0.8, 0.0]];
+        FRAME.weigh(&[0.25; 25], 0.5, &mut points);
+        assert_eq!(points[0][3], 0.4);
     }
 
     #[test]
@@ -144,7 +151,7 @@ mod tests {
         assert!(count >= 100, "{count}");
         let lit: Vec<f32> = raster.iter().map(|power| f32::from(*power > 10.0)).collect();
         let mut weighed = points[..count].to_vec();
-        frame.weigh(&lit, &mut weighed);
+        frame.weigh(&lit, 1.0, &mut weighed);
         weighed.iter().filter(|point| point[3] > 0.0).count() as f32 / count as f32
     }
 

@@ -121,7 +121,7 @@ fn points_are_weighed_by_the_masks_of_their_cells() {
     };
     for (model, scans) in [("single-31", 1), ("pair-31", 2)] {
         let weighed = points(&learned(&card(model)));
-        let plain = points(&MaskingConfig { points: false, ..learned(&card(model)) });
+        let plain = points(&MaskingConfig { point_exponent: 0.0, ..learned(&card(model)) });
         assert_eq!(plain, points(&unlearned()));
         assert_eq!(weighed.len(), plain.len());
         let mask = &masks_by_hand(&vec![unmasked(&sweep); scans])[0];
@@ -130,7 +130,7 @@ fn points_are_weighed_by_the_masks_of_their_cells() {
         for (weighed, plain) in weighed.iter().zip(&plain) {
             let (row, column) = (index(plain[0]), index(plain[1]));
             let is_inside = row.min(column) >= 0.0 && row.max(column) < N as f32;
-            let factor = if is_inside { mask[row as usize * N + column as usize] } else { 1.0 };
+            let factor = if is_inside { mask[row as usize * N + column as usize].sqrt() } else { 1.0 };
             assert!((weighed[3] - factor * plain[3]).abs() < 1e-5, "{weighed:?}, {plain:?}");
             inside += usize::from(is_inside);
         }

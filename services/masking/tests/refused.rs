@@ -10,8 +10,8 @@ use std::{
 };
 
 use common::{card, learned, raster, runtime_is_installed};
-use gyre_masking::{MaskingConfig, Provider, network::Network, runtime::INSTALL};
-use gyre_radar::RasterConfig;
+use gyre_masking::{MaskingConfig, Provider, model::Card, network::Network, runtime::INSTALL};
+use gyre_radar::{RasterConfig, Sampling};
 use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
@@ -159,4 +159,25 @@ fn a_provider_that_is_not_built_in_is_told_with_the_feature_that_has_it() {
         let config = MaskingConfig { provider, ..learned(&card("single-31")) };
         refused(&config, &raster(), &[feature, &format!("--features {feature}"), "`cpu`"]);
     }
+}
+
+// What is not refused, but told.
+
+#[test]
+fn what_the_network_was_not_trained_for_is_named() {
+    let card = |training: &str| {
+        let (_folder, path) = changed("single-31", "[training]", &format!("[masking]\n{training}\n[training]"));
+        Card::read(&learned(&path)).unwrap()
+    };
+    let config = learned(Path::new(""));
+    let other = RasterConfig { sampling: Sampling::Bilinear, ..raster() };
+    assert!(card("").unlike_training(&config, &other).is_empty());
+    assert!(card("floor = 20\ncompensate = true").unlike_training(&config, &raster()).is_empty());
+    assert_eq!(
+        card("floor = 0\ncompensate = false").unlike_training(&config, &raster()),
+        ["masking.threshold is 20 instead of 0", "masking.compensate is true instead of false"]
+    );
+    let (_folder, path) = changed("single-31", "cell_m = 0.8", "cell_m = 0.8\nsampling = \"averaged\"");
+    let card = Card::read(&learned(&path)).unwrap();
+    assert_eq!(card.unlike_training(&config, &other), ["raster.sampling is bilinear instead of averaged"]);
 }

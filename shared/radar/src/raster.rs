@@ -21,6 +21,7 @@ mod twist;
 pub(crate) mod tests;
 
 use crate::scan::{PolarScan, ScanError, Sense, SweepGeometry};
+use std::fmt;
 use bearing_table::BearingTable;
 use cells::Cells;
 use kernels::locate::{self, Lookup, Taps};
@@ -45,6 +46,15 @@ pub enum Sampling {
     Averaged,
     /// Bilinear between the four nearest measurements: one point of the scan stands for the whole cell.
     Bilinear,
+}
+
+impl fmt::Display for Sampling {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Averaged => "averaged",
+            Self::Bilinear => "bilinear",
+        })
+    }
 }
 
 /// What raster to make: the section `[raster]` of a configuration.

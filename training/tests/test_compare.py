@@ -1,0 +1,24 @@
+from pathlib import Path
+
+from gyre_training import cli
+from gyre_training.network import NetworkConfig
+from gyre_training.search import SearchConfig
+from gyre_training.train import Trainer, TrainingConfig
+from scenes import drive
+
+
+def test_networks_are_compared_in_floats_and_integers(tmp_path: Path):
+    (tmp_path / "pairs").mkdir()
+    splits = [drive(tmp_path / "pairs" / f"{split}.npy", 70, seed=seed) for seed, split in enumerate(("train", "test"))]
+    for split in ("train", "test"):
+        with (tmp_path / "pairs" / f"{split}.toml").open("a") as settings:
+            settings.write('[rotation]\nangles = 60\nband_low = 0.01\nband_high = 0.35\nradii = 10\n[translation]\noverlap = "none"\nreach_m = 8.0\n')
+    for name, network in {"both": NetworkConfig(widths=(4, 8)), "one": NetworkConfig(inputs=1, widths=(8, 16), fold=4)}.items():
+        search = SearchConfig(angles=60, radii=10, reach_m=8.0)
+        Trainer(tmp_path / name, *splits, network, search, TrainingConfig(batch=2, epochs=1, epoch_pairs=4)).run()
+    runs = [str(tmp_path / name) for name in ("both", "one")]
+    cli.run(["compare", *runs, "--pairs", str(tmp_path / "pairs"), "--out", str(tmp_path / "out")])
+    rows = (tmp_path / "out" / "compare.md").read_text().splitlines()[2:]
+    assert [row.split(" | ")[:2] for row in rows[1:]] == [[f"| {name}", numbers] for name in ("both", "one") for numbers in ("floats", "integers")]
+    assert all(float(value) > 0 for row in rows[1:] for value in row.strip("|").split("|")[3:])
+    assert (tmp_path / "out" / "compare.svg").stat().st_size > 1000
