@@ -7,6 +7,7 @@ import torch
 
 from . import recipe as recipes
 from . import compare, step_time
+from .distil import Distiller
 from .drift import drift, motions
 from .export import OnnxMasks
 from .model import publish
@@ -70,12 +71,21 @@ def train_recipe(recipe: recipes.Recipe, pairs: Path, work: Path, options: argpa
     """Trains; returns the run's folder."""
     scans, validation = (Scans(pairs / f"{split}.npy") for split in ("train", "validation"))
     search = recipes.search_of(scans.settings, recipe.temperature)
-    initial = work / "runs" / recipe.initial / "best.pt" if recipe.initial else None
-    folder = work / "runs" / recipe.name
-    trainer = Trainer(folder, scans, validation, recipe.network, search, recipe.training, options.device, initial)
+    runs = work / "runs"
+    initial = runs / recipe.initial / "best.pt" if recipe.initial else None
+    common = scans, validation, recipe.network, search
+    if recipe.teacher:
+        folder, teacher = runs / f"{recipe.name}-distilled", runs / recipe.teacher / "best.pt"
+        finish(Distiller(teacher, folder, *common, recipe.distillation, options.device, initial), options)
+        initial = folder / "best.pt"
+    folder = runs / recipe.name
+    finish(Trainer(folder, *common, recipe.training, options.device, initial), options)
+    return folder
+
+
+def finish(trainer: Trainer, options: argparse.Namespace) -> None:
     trainer.network.checkpoint = options.checkpoint
     trainer.run()
-    return folder
 
 
 def add_publish(commands) -> None:

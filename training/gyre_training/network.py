@@ -111,11 +111,13 @@ class MaskNetwork(nn.Module):
     def masked(self, later: Tensor, earlier: Tensor) -> tuple[Tensor, Tensor]:
         """Both scans (batch, n, n) as their masks leave them (Eq. 10)."""
         scans = torch.stack([later, earlier], 1)
+        return tuple((scans * torch.sigmoid(self.logits_of_pairs(scans))).unbind(1))
+
+    def logits_of_pairs(self, scans: Tensor) -> Tensor:
+        """`logits` of (batch, 2, n, n), whether the network looks at both scans at once or at each on its own."""
         if self.config.inputs == 1:
-            masks = self(scans.flatten(0, 1)[:, None]).view_as(scans)
-        else:
-            masks = self(scans)
-        return tuple((scans * masks).unbind(1))
+            return self.logits(scans.flatten(0, 1)[:, None]).view_as(scans)
+        return self.logits(scans)
 
     def parameters_count(self) -> int:
         return sum(parameter.numel() for parameter in self.parameters())

@@ -25,6 +25,9 @@ class Recipe:
     temperature: float = SoftArgmax.temperature
     # The recipe whose network this one begins with.
     initial: str | None = None
+    # The recipe whose masks the network learns first, and how.
+    teacher: str | None = None
+    distillation: TrainingConfig = TrainingConfig()
     # Whether the model computes in 8-bit integers.
     integers: bool = False
 
@@ -46,19 +49,20 @@ def search_of(settings: dict, temperature: float = SoftArgmax.temperature) -> Se
 def read(path: Path) -> Recipe:
     """A recipe; keys that it does not know are refused by name."""
     values = tomllib.loads(path.read_text())
-    training = values.pop("training", {})
+    training, distillation = values.pop("training", {}), values.pop("distillation", {})
     sampling = Sampling(**training.pop("sampling", {}))
     network = values.pop("network", {})
     return Recipe(
         name=path.stem,
         network=NetworkConfig.from_dict({"widths": NetworkConfig.widths} | network),
         training=TrainingConfig(**training, sampling=sampling),
+        distillation=TrainingConfig(**distillation, sampling=sampling),
         **values,
     )
 
 
 def lineage(path: Path) -> list[Recipe]:
-    """A recipe after those that it begins with, the first one first."""
+    """A recipe after those that it builds upon, the first one first."""
     recipe = read(path)
-    before = lineage(path.with_name(f"{recipe.initial}.toml")) if recipe.initial else []
-    return [*before, recipe]
+    before = [lineage(path.with_name(f"{name}.toml")) for name in (recipe.teacher, recipe.initial) if name]
+    return list({one.name: one for one in [*sum(before, []), recipe]}.values())

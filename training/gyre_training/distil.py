@@ -1,0 +1,27 @@
+"""Distillation: a network learns another one's masks, before the search teaches it."""
+
+from pathlib import Path
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor
+
+from .pairs import Batch
+from .train import Trainer, trained
+
+
+class Distiller(Trainer):
+    """A training whose loss is how far the masks are from those of a teacher. A pose tells three numbers a pair, a teacher
+    one for each cell: what takes the search hours to teach takes minutes."""
+
+    def __init__(self, teacher: Path, *arguments, **options):
+        super().__init__(*arguments, **options)
+        self.teacher = trained(teacher).to(self.device)
+
+    def loss(self, batch: Batch) -> Tensor:
+        """Cross entropy, each cell weighed by its power: a mask of nothing does not matter."""
+        scans = torch.stack([batch.later, batch.earlier], 1)
+        with torch.no_grad():
+            masks = torch.sigmoid(self.teacher.logits_of_pairs(scans))
+        power = scans / scans.mean((2, 3), keepdim=True).clamp(min=1e-6)
+        return F.binary_cross_entropy_with_logits(self.network.logits_of_pairs(scans), masks, power)
