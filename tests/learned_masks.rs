@@ -9,7 +9,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use common::{Run, Running, STAGES, odometry, recording, send, undisturbed};
+use common::{Run, Running, STAGES, odometry, recording, runtime_is_installed, send, undisturbed};
 use gyre_masking::{MaskKind, Masker, MaskingConfig, Sweep, runtime};
 use gyre_messages::{MaskedHeader, Pair};
 use gyre_radar::{DatasetOptions, OwnedScan, PointsConfig, RasterConfig};
@@ -28,19 +28,7 @@ fn card(model: &str) -> PathBuf {
 
 /// A run of the small recording with a learned mask.
 fn masked_by(model: &str) -> Run {
-    learned(Run::of_recording(), &card(model))
-}
-
-fn learned(run: Run, card: &Path) -> Run {
-    run.set("masking.kind=learned").set(&format!("masking.model='{}'", card.display()))
-}
-
-fn runtime_is_installed() -> bool {
-    let found = runtime::find(None).is_ok();
-    if !found {
-        println!("skipped: ONNX Runtime is not installed");
-    }
-    found
+    Run::of_recording().masked_by(&card(model))
 }
 
 /// Disturbs a run with this model once it is in its middle, and asserts that this changes nothing.
@@ -194,7 +182,7 @@ fn an_unreadable_scan_between_two_is_stepped_over_by_a_restart() {
     }
     let recording = recording::copy(16);
     recording::truncate(&recording::images(recording.path())[6], 100_000);
-    let run = || learned(Run::of_recording_named(recording.path().to_str().unwrap()), &card(TWO_SCANS));
+    let run = || Run::of_recording_named(recording.path().to_str().unwrap()).masked_by(&card(TWO_SCANS));
     let alone = run().complete();
     for poses in [6, 7, 8] {
         let run = run().rate("6");
@@ -282,7 +270,7 @@ fn an_unfinished_run_does_not_go_on_with_another_model() {
         fs::copy(&file, models.path().join(file.file_name().unwrap())).unwrap();
     };
     install(ONE_SCAN);
-    let run = learned(Run::of_recording(), &ours).rate("6");
+    let run = Run::of_recording().masked_by(&ours).rate("6");
     let mut running = run.start();
     running.await_poses(MIDDLE);
     running.kill_supervisor();

@@ -6,7 +6,7 @@ mod common;
 
 use std::path::{Path, PathBuf};
 
-use common::{Ended, Run, odometry, real_data};
+use common::{Ended, Run, odometry, real_data, runtime_is_installed};
 use serde_json::Value;
 
 fn configuration(name: &str) -> PathBuf {
@@ -45,6 +45,38 @@ fn radiate_drifts_less_than_cfear_2() {
         let value = figure(&summary, path);
         println!("{path} {value:.3}");
         assert!(value <= most, "{path} is {value}, more than {most}");
+    }
+}
+
+/// Translation (%), rotation (deg/100 m), ATE (m) and seg (%) of a run.
+fn drift(run: &Run) -> [f64; 4] {
+    run.complete();
+    let summary = run.summary();
+    ["kitti/translation_percent", "kitti/rotation_deg_per_100m", "ate/rmse_m", "seg/percent"]
+        .map(|path| figure(&summary, &format!("/evaluation/{path}")))
+}
+
+fn masked(run: Run, model: &str) -> Run {
+    run.masked_by(&configuration("../models").join(model))
+}
+
+#[test]
+fn masks_help_on_scans_of_a_kind_that_they_have_never_seen() {
+    let Some(data) = real_data("radiate-2019-02-12") else { return };
+    if !runtime_is_installed() {
+        return;
+    }
+    let run = |file: &str| Run::of_file(&configuration(file)).data(&data);
+    let papers = || run("f-mbym.toml").set("dataset.format=radiate").set("dataset.range_offset_m=-0.15");
+    let pairs = [
+        ("the paper's form", papers().set("masking.kind=none"), masked(papers(), "light-255.toml"), 0.6),
+        ("Gyre", run("radiate.toml"), masked(run("radiate.toml"), "gyre-255.toml"), 1.03),
+    ];
+    for (name, without, with, most) in pairs {
+        let [without, with] = [drift(&without), drift(&with)];
+        println!("{name}: {without:.3?} without a mask, {with:.3?} with it");
+        let worse = with.iter().zip(&without).find(|(with, without)| **with > most * **without);
+        assert!(worse.is_none(), "{name}: {worse:?}");
     }
 }
 

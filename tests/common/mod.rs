@@ -50,6 +50,15 @@ pub fn real_data(folder: &str) -> Option<PathBuf> {
     }
 }
 
+/// Whether networks can be computed here; says so where not.
+pub fn runtime_is_installed() -> bool {
+    let found = gyre_masking::runtime::find(None).is_ok();
+    if !found {
+        println!("skipped: ONNX Runtime is not installed");
+    }
+    found
+}
+
 /// A `gyre run` command: start it as often as you like, it has the same results directory each time.
 #[derive(Clone, Debug)]
 pub struct Run {
@@ -98,6 +107,11 @@ impl Run {
     /// The same with `--set`.
     pub fn set(self, sentence: &str) -> Self {
         self.argument("--set", sentence)
+    }
+
+    /// Masks with the network of this card.
+    pub fn masked_by(self, card: &Path) -> Self {
+        self.set("masking.kind=learned").set(&format!("masking.model='{}'", card.display()))
     }
 
     /// The same with its results in `out`.

@@ -21,12 +21,12 @@ mod twist;
 pub(crate) mod tests;
 
 use crate::scan::{PolarScan, ScanError, Sense, SweepGeometry};
-use std::fmt;
 use bearing_table::BearingTable;
 use cells::Cells;
 use kernels::locate::{self, Lookup, Taps};
 use polar_image::PolarImage;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 use sweep_motion::SweepMotion;
 pub use sweep_motion::{MAX_TRAVEL_M, MAX_TURN_RAD};
 pub use twist::Twist;
