@@ -121,7 +121,16 @@ fn a_network_weighs_one_scan_or_both_of_a_pair_and_the_points() {
         // The first one of the chain stands for its own scan before.
         let ended = masks(
             folder.path(),
-            &["--scans", "0,20", "--set", &kind, "--set", &model, "--set", "masking.threshold=20"],
+            // The whole mask: by its root no point of this model has a factor below 0.5.
+            &[
+                "--scans=0,20",
+                "--set",
+                &kind,
+                "--set",
+                &model,
+                "--set=masking.threshold=20",
+                "--set=masking.point_exponent=1",
+            ],
         );
         let figures = figures(ended.succeeded());
         assert_eq!((figures[0][0], figures[1][0]), (0.0, 20.0));
