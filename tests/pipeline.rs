@@ -194,7 +194,8 @@ fn an_interrupt_at_any_moment_of_the_start_leaves_nothing() {
         thread::sleep(Duration::from_millis(2 * delay_ms));
         running.signal(Signal::INT);
         // Before there is anything to clean up, the signal may simply end the process.
-        assert!(matches!(running.finish().code(), Some(130) | None), "after {} ms", 2 * delay_ms);
+        let ended = running.finish();
+        assert!(matches!(ended.code(), Some(130) | None), "after {} ms: {ended:?}", 2 * delay_ms);
     }
 }
 
