@@ -67,7 +67,9 @@ fn masks_help_on_scans_of_a_kind_that_they_have_never_seen() {
         return;
     }
     let run = |file: &str| Run::of_file(&configuration(file)).data(&data);
-    let papers = || run("f-mbym.toml").set("dataset.format=radiate").set("dataset.range_offset_m=-0.15");
+    // What radiate.toml says of the sensor.
+    let sensor = ["format='radiate'", "range_offset_m=-0.15", "azimuth_eccentricity_rad=0.0025", "doppler_s=0.042"];
+    let papers = || sensor.iter().fold(run("f-mbym.toml"), |run, fact| run.set(&format!("dataset.{fact}")));
     let pairs = [
         ("the paper's form", papers().set("masking.kind=none"), masked(papers(), "light-255.toml"), 0.6),
         ("Gyre", run("radiate.toml"), masked(run("radiate.toml"), "gyre-255.toml"), 1.03),

@@ -11,8 +11,8 @@ from .train import Trainer, trained
 
 
 class Distiller(Trainer):
-    """A training whose loss is how far the masks are from those of a teacher. A pose tells three numbers a pair, a teacher
-    one for each cell: what takes the search hours to teach takes minutes."""
+    """A training whose loss is how far the masks are from those of a teacher: a pose tells three numbers a pair, a teacher
+    one for each cell."""
 
     def __init__(self, teacher: Path, *arguments, **options):
         super().__init__(*arguments, **options)
