@@ -14,7 +14,7 @@ def write(path: Path, inputs: int, opset: int, parameters: int, settings: dict, 
     sections = {
         "model": model | {"inputs": inputs, "opset": opset, "parameters": parameters},
         "raster": settings["raster"],
-        "masking": {"floor": floor, "compensate": masking["compensate"]},
+        "masking": {"floor": floor, "compensate": masking["compensate"], "undo_doppler": masking["undo_doppler"]},
         **provenance,
     }
     path.with_suffix(".toml").write_text("\n".join(section(name, values) for name, values in sections.items()))

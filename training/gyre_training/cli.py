@@ -39,10 +39,18 @@ def run(arguments: list[str]) -> None:
 def add_reproduce(commands) -> None:
     command = commands.add_parser("reproduce", help="all from nothing: worlds, pairs, training (also of what it begins with), ONNX file and card")
     command.add_argument("recipe", type=Path)
-    command.add_argument("--work", type=Path, default=Path("out/training"), help="worlds, pairs and runs; kept")
-    command.add_argument("--models", type=Path, default=Path("out/models"), help="where the model goes")
+    add_work(command)
+    add_models(command)
     command.add_argument("--gyre", type=Path, help="the program; by default the project's build")
     command.set_defaults(run=reproduce)
+
+
+def add_work(command) -> None:
+    command.add_argument("--work", type=Path, default=Path("out/training"), help="has worlds/, pairs/RASTER/ and runs/NAME/; kept")
+
+
+def add_models(command) -> None:
+    command.add_argument("--models", type=Path, default=Path("out/models"), help="where the model goes")
 
 
 def reproduce(options: argparse.Namespace) -> None:
@@ -58,19 +66,19 @@ def reproduce(options: argparse.Namespace) -> None:
 def add_train(commands) -> None:
     command = commands.add_parser("train", help="train a recipe on pairs that are there, or go on with it")
     command.add_argument("recipe", type=Path)
-    command.add_argument("--pairs", type=Path, required=True, help="folder with train.npy and validation.npy")
-    command.add_argument("--out", type=Path, required=True)
+    add_work(command)
     command.set_defaults(run=train)
 
 
 def train(options: argparse.Namespace) -> None:
-    train_recipe(recipes.read(options.recipe), options.pairs, options.out, options)
+    recipe = recipes.read(options.recipe)
+    train_recipe(recipe, options.work / "pairs" / recipe.raster, options.work, options)
 
 
 def train_recipe(recipe: recipes.Recipe, pairs: Path, work: Path, options: argparse.Namespace) -> Path:
     """Trains; returns the run's folder."""
     scans, validation = (Scans(pairs / f"{split}.npy") for split in ("train", "validation"))
-    search = recipes.search_of(scans.settings, recipe.temperature)
+    search = recipes.search_of(scans.settings)
     runs = work / "runs"
     initial = runs / recipe.initial / "best.pt" if recipe.initial else None
     common = scans, validation, recipe.network, search
@@ -91,27 +99,27 @@ def finish(trainer: Trainer, options: argparse.Namespace) -> None:
 def add_publish(commands) -> None:
     command = commands.add_parser("publish", help="write the model of a finished training")
     command.add_argument("recipe", type=Path, nargs="+")
-    command.add_argument("--pairs", type=Path, required=True, help="folder of folders with pairs, one a raster")
-    command.add_argument("--work", type=Path, default=Path("out/training"), help="folder with runs/")
-    command.add_argument("--models", type=Path, default=Path("models"))
+    add_work(command)
+    add_models(command)
     command.set_defaults(run=publish_runs)
 
 
 def publish_runs(options: argparse.Namespace) -> None:
     for path in options.recipe:
         recipe = recipes.read(path)
-        publish(recipe, options.work / "runs" / recipe.name, options.pairs / recipe.raster, options.models)
+        work: Path = options.work
+        publish(recipe, work / "runs" / recipe.name, work / "pairs" / recipe.raster, options.models)
 
 
 def add_drift(commands) -> None:
     command = commands.add_parser("drift", help="drift of checkpoints and ONNX files, and without masks")
     command.add_argument("checkpoint", type=Path, nargs="*")
-    command.add_argument("--pairs", type=Path, required=True, help="a file of scans")
+    command.add_argument("--scans", type=Path, required=True, help="a file of gyre export-pairs")
     command.set_defaults(run=show_drift)
 
 
 def show_drift(options: argparse.Namespace) -> None:
-    scans = Scans(options.pairs)
+    scans = Scans(options.scans)
     pairs = scans.pairs(1)
     match = ScanMatch(scans.n, scans.cell_m, recipes.search_of(scans.settings)).to(options.device)
     for path in [None, *options.checkpoint]:

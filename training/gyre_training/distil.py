@@ -7,7 +7,7 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from .pairs import Batch
-from .train import Trainer, trained
+from .train import Trainer, fingerprint, trained
 
 
 class Distiller(Trainer):
@@ -15,8 +15,12 @@ class Distiller(Trainer):
     one for each cell."""
 
     def __init__(self, teacher: Path, *arguments, **options):
+        self.teacher, self.taught_by = trained(teacher), fingerprint(teacher)
         super().__init__(*arguments, **options)
-        self.teacher = trained(teacher).to(self.device)
+        self.teacher.to(self.device)
+
+    def others(self) -> dict[str, str]:
+        return {"teacher": self.taught_by}
 
     def loss(self, batch: Batch) -> Tensor:
         """Cross entropy, each cell weighed by its power: a mask of nothing does not matter."""

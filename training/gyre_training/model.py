@@ -3,13 +3,12 @@
 import csv
 from pathlib import Path
 
-import torch
-
 from . import card
 from .export import OPSET, export, quantise
 from .pairs import Scans
 from .recipe import Recipe
 from .train import load, trained
+from .worlds import followed, worlds_of
 
 
 def publish(recipe: Recipe, folder: Path, pairs: Path, models: Path) -> Path:
@@ -33,19 +32,27 @@ def provenance(recipe: Recipe, folder: Path, scans: Scans) -> dict:
         rows = list(csv.DictReader(file))
     best = min(rows, key=lambda row: float(row["translation_percent"]))
     training = state["meaning"]["training"]
+    chosen = ("seed", "batch", "epochs", "epoch_pairs", "learning_rate", "angle_weight", "local_weight")
     return {
         "command": f"python -m gyre_training reproduce training/recipes/{recipe.name}.toml",
-        "data": "simulated only: training/worlds/train",
+        "data": data(scans),
+        "trajectories": sorted({file for world in worlds_of("train") if (file := followed(world))}),
+        "gyre": " ".join(filter(None, (scans.settings["version"], scans.settings.get("commit")))),
         "initial": recipe.initial or "",
+        "teacher": recipe.teacher or "",
         "scans": len(scans.records),
-        "seed": training["seed"],
-        "batch": training["batch"],
-        "epochs": training["epochs"],
-        "epoch_pairs": training["epoch_pairs"],
+        **{key: training[key] for key in chosen},
         "best_epoch": int(best["epoch"]),
         "validation_translation_percent": float(best["translation_percent"]),
         "validation_rotation_deg_per_100m": float(best["rotation_deg_per_100m"]),
         "minutes": round(float(rows[-1]["seconds"]) / 60, 1),
         "machine": state["machine"],
-        "torch": torch.__version__,
+        "torch": state["torch"],
     }
+
+
+def data(scans: Scans) -> str:
+    """What the scans are of. Simulated ones are known by their worlds' names."""
+    names = [sequence["name"] for sequence in scans.settings["sequences"]]
+    others = sorted(set(names) - {world.stem for world in worlds_of("train")})
+    return f"recordings: {', '.join(others)}" if others else "simulated only: training/worlds/train"

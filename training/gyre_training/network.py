@@ -8,6 +8,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from .checkpoint import recomputed
+from .polar import to_polar, to_raster
 
 # Rasters hold powers above a floor, 0 to 255.
 FULL_SCALE = 255.0
@@ -20,7 +21,8 @@ class NetworkConfig:
     `widths` are the features of the levels, each half the size of the one before. With `shrink` of 2 the masks are
     computed at half the resolution and enlarged. With `fold` of 4 each square of 4 x 4 cells becomes one cell of 16
     features, and so many features become the masks of such a square: all that is fine is kept, but every convolution is
-    done on a sixteenth of the cells. `separable` blocks filter each feature on its own, then mix them.
+    done on a sixteenth of the cells. `separable` blocks filter each feature on its own, then mix them. A `polar` network
+    sees azimuth and range instead of x and y.
     """
 
     inputs: int = 2
@@ -28,6 +30,7 @@ class NetworkConfig:
     shrink: int = 1
     fold: int = 1
     separable: bool = False
+    polar: bool = False
 
     def to_dict(self) -> dict:
         return asdict(self) | {"widths": list(self.widths)}
@@ -81,7 +84,10 @@ class MaskNetwork(nn.Module):
 
     def logits(self, scans: Tensor) -> Tensor:
         """What the sigmoid is taken of."""
-        x, size, config = scans / FULL_SCALE, scans.shape[-2:], self.config
+        x, size, config = scans / FULL_SCALE, scans.shape[-1], self.config
+        if config.polar:
+            x = to_polar(x)
+        inner = x.shape[-2:]
         if config.shrink > 1:
             x = F.avg_pool2d(x, config.shrink)
         if config.fold > 1:
@@ -90,8 +96,9 @@ class MaskNetwork(nn.Module):
         if config.fold > 1:
             x = F.pixel_shuffle(x, config.fold)
         if config.shrink > 1:
-            return F.interpolate(x, size=size, mode="bilinear", align_corners=False)
-        return x[..., : size[0], : size[1]]
+            x = F.interpolate(x, size=inner, mode="bilinear", align_corners=False)
+        x = x[..., : inner[0], : inner[1]]
+        return to_raster(x, size) if config.polar else x
 
     def _features(self, x: Tensor) -> Tensor:
         skips = []

@@ -1,5 +1,7 @@
 """Pairs of scans with their true motions, from the file that `gyre export-pairs` writes."""
 
+import hashlib
+import json
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,6 +42,14 @@ class Scans:
         self.cell_m = float(self.settings["raster"]["cell_m"])
         self.sequence = np.array(self.records["sequence"])
         self.pose = np.array(self.records["pose"])
+
+    def fingerprint(self) -> str:
+        """What tells this file from others: its poses, some of its rasters, and what they are meant to be."""
+        meant = {key: value for key, value in self.settings.items() if key not in ("sequences", "version", "commit")}
+        digest = hashlib.sha256(json.dumps(meant, sort_keys=True, default=str).encode())
+        digest.update(self.pose.tobytes())
+        digest.update(self.records[:: max(1, len(self.records) // 16)].tobytes())
+        return digest.hexdigest()
 
     def pairs(self, step: int) -> np.ndarray:
         """Indices (k, 2) of the earlier and the later of scans that are `step` apart in the same sequence."""

@@ -15,19 +15,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-
-@dataclass(frozen=True)
-class SoftArgmax:
-    """Mean of all positions, weighted with exp(temperature * score), of scores less their mean and over their largest
-    magnitude: so a temperature means the same for any raster (lines 15 and 19)."""
-
-    temperature: float = 48.0
-
-    def weights(self, scores: Tensor) -> Tensor:
-        """(batch, positions) -> (batch, positions), each row summing to 1."""
-        scores = scores - scores.mean(1, keepdim=True)
-        largest = scores.abs().amax(1, keepdim=True).clamp_min(1e-20)
-        return torch.softmax(self.temperature * scores / largest, 1)
+from .peaks import SUPPORT, SoftArgmax, around, line_peak, parabola, plane_peak
 
 
 @dataclass(frozen=True)
@@ -45,17 +33,6 @@ class SearchConfig:
     overlap: str = "none"
     peak: str = "parabola"
     soft: SoftArgmax = field(default_factory=SoftArgmax)
-
-    @staticmethod
-    def paper(form: str = "line14") -> "SearchConfig":
-        """As the papers print it: `configs/fast-mbym.toml`."""
-        return SearchConfig(form=form)
-
-    @staticmethod
-    def gyre(n: int) -> "SearchConfig":
-        """Gyre's defaults."""
-        radii = math.ceil((0.45 - 0.05) * n)
-        return SearchConfig("eq7", "radial_hann", 0.05, 0.45, 576, radii, overlap="energy", peak="gaussian")
 
 
 def fast_size(least: int) -> int:
@@ -277,105 +254,3 @@ class ScanMatch(nn.Module):
         angles = self.rotation.hard(self.rotation.correlation(later, earlier)).float()
         turned = self.translation.turned(earlier, angles)
         return self.translation.motion(self.translation.hard(self.translation.correlation(later, turned)), angles)
-
-
-class ExhaustiveMatch(nn.Module):
-    """MbyM's search: every angle of a grid, each with all shifts (Barnes et al. 2019; `raw` in Weston et al.)."""
-
-    def __init__(self, n: int, cell_m: float, config: SearchConfig, reach_deg: float = 15.0, step_deg: float = 1.0):
-        super().__init__()
-        self.translation = TranslationSearch(n, cell_m, config)
-        count = int(reach_deg / step_deg + 1e-9)
-        angles = torch.arange(-count, count + 1) * math.radians(step_deg)
-        grid, inside = self.translation.places(angles)
-        for name, value in {"angles": angles, "grid": grid, "inside": inside}.items():
-            self.register_buffer(name, value, persistent=False)
-
-    def _scores(self, later: Tensor, earlier: Tensor) -> Tensor:
-        """Sums of products, (batch, angles, shifts, shifts): a factor common to all is nothing to either kind of peak."""
-        search = self.translation
-        # The batch as channels: all scans are turned by the same angles, so one set of places serves them all.
-        turned = sampled(earlier.expand(len(self.angles), *earlier.shape), self.grid) * self.inside[:, None]
-        return search.products(search.spectra(turned) * search.spectra(later).conj()).transpose(0, 1)
-
-    def forward(self, later: Tensor, earlier: Tensor) -> Tensor:
-        """The motion by soft peaks over all three unknowns: (batch, 3)."""
-        within, shifts = self.translation.within, self.translation.shifts
-        scores = self._scores(later, earlier)[:, :, within][..., within]
-        weights = self.translation.config.soft.weights(scores.flatten(1)).view_as(scores)
-        angles = (weights.sum((2, 3)) * self.angles).sum(1)
-        near = shifts[within].to(weights)
-        # A shift is one of g turned by its own angle: x and y are weighed, not shifts.
-        u, v = near[:, None].expand(len(near), -1), near[None, :].expand(len(near), -1)
-        x, y = (-self.translation.cell_m * s for s in (u, v))
-        cos, sin = torch.cos(self.angles)[:, None, None], torch.sin(self.angles)[:, None, None]
-        x, y = (weights * (cos * x - sin * y)).sum((1, 2, 3)), (weights * (sin * x + cos * y)).sum((1, 2, 3))
-        return torch.stack([x, y, angles], 1)
-
-    @torch.no_grad()
-    def hard(self, later: Tensor, earlier: Tensor) -> Tensor:
-        """The motion by the highest peak: (batch, 3)."""
-        scores = self._scores(later, earlier)
-        best = scores[:, :, self.translation.within][..., self.translation.within].amax((2, 3))
-        k = best[:, 1:-1].argmax(1) + 1
-        offset = line_peak("parabola", around(best, k, best.shape[1]))
-        angles = (self.angles[k] + offset * (self.angles[1] - self.angles[0])).float()
-        turned = self.translation.turned(earlier, angles)
-        return self.translation.motion(self.translation.hard(self.translation.correlation(later, turned)), angles)
-
-
-# Samples on each side of the highest one that a fit looks at, and how far from it a fit may end.
-SUPPORT = 3
-FARTHEST = 0.75
-
-
-def around(scores: Tensor, best: Tensor, count: int) -> Tensor:
-    """The samples within SUPPORT of the best one, the ends repeated: (batch, 2 SUPPORT + 1), double."""
-    at = best[:, None] + torch.arange(-SUPPORT, SUPPORT + 1, device=best.device)
-    return scores.gather(1, at.clamp(0, count - 1)).double()
-
-
-def line_peak(kind: str, samples: Tensor) -> Tensor:
-    """The maximum's place beside the middle sample: a parabola through three, or one through the logarithm above a
-    pedestal, which is a Gaussian."""
-    near = samples[:, SUPPORT - 1 : SUPPORT + 2]
-    if kind == "gaussian":
-        highest = near[:, 1:2]
-        lowest = torch.minimum(samples.amin(1, keepdim=True), highest)
-        near = (near - (lowest - 0.05 * (highest - lowest))).log()
-    return parabola(near)
-
-
-def parabola(near: Tensor) -> Tensor:
-    """The summit of the parabola through three samples (..., 3), beside the middle one; at it where there is none."""
-    a, b, c = near.unbind(-1)
-    curvature = a - 2 * b + c
-    offset = (0.5 * (a - c) / curvature.clamp_max(-1e-12)).clamp(-FARTHEST, FARTHEST)
-    return torch.where(curvature < 0, offset, 0.0)
-
-
-def plane_peak(kind: str, scores: Tensor, i: int, j: int) -> Tensor:
-    """The maximum's place (down, right) beside the sample (i, j)."""
-    near = scores[i - 1 : i + 2, j - 1 : j + 2]
-    parabolas = parabola(torch.stack([near[:, 1], near[1]]))
-    if kind != "gaussian":
-        return parabolas
-    wide = scores[i - SUPPORT : i + SUPPORT + 1, j - SUPPORT : j + SUPPORT + 1]
-    lowest = wide.min()
-    fit = paraboloid((near - (lowest - 0.05 * (near[1, 1] - lowest))).log())
-    return parabolas if fit is None else fit
-
-
-def paraboloid(near: Tensor) -> Tensor | None:
-    """The summit of the paraboloid that fits nine samples best, where it has one nearby."""
-    steps = torch.tensor([-1.0, 0.0, 1.0], dtype=torch.float64)
-    i, j = steps[:, None], steps[None, :]
-    gradient = torch.stack([(near * i).sum(), (near * j).sum()]) / 6
-    cross = (near * i * j).sum() / 4
-    down, right = (near * (3 * i * i - 2)).sum() / 3, (near * (3 * j * j - 2)).sum() / 3
-    determinant = down * right - cross * cross
-    if not (down < 0 and determinant > 0):
-        return None
-    offset = torch.stack([cross * gradient[1] - right * gradient[0], cross * gradient[0] - down * gradient[1]])
-    offset = offset / determinant
-    return offset if offset.abs().max() <= FARTHEST else None

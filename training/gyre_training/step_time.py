@@ -22,7 +22,8 @@ from torch import nn
 
 from .network import MaskNetwork
 from .recipe import HOME
-from .search import ExhaustiveMatch, ScanMatch, SearchConfig
+from .exhaustive import ExhaustiveMatch
+from .search import ScanMatch, SearchConfig
 from .train import pose_error
 
 MIB = 1 << 20

@@ -1,6 +1,7 @@
 """Training: Adam on the error of the pose that the search finds in the masked scans (Weston et al., Eq. 12)."""
 
 import csv
+import hashlib
 import math
 import platform
 import time
@@ -14,7 +15,8 @@ from torch import Tensor, nn
 from .drift import Drift, drift, motions
 from .network import MaskNetwork, NetworkConfig
 from .pairs import Batch, Sampling, Scans, augmented
-from .search import ExhaustiveMatch, ScanMatch, SearchConfig
+from .exhaustive import ExhaustiveMatch
+from .search import ScanMatch, SearchConfig
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ def pose_error(found: Tensor, true: Tensor, angle_weight: float) -> Tensor:
     return (found - true).abs() * torch.tensor([1.0, 1.0, angle_weight], device=true.device)
 
 
-# What is farther off is another peak, cells and radians.
+# What is farther off, along each axis by itself, is another peak: cells and radians.
 SAME_PEAK_CELLS, SAME_PEAK_RAD = 1.5, math.radians(1.5)
 
 
@@ -74,9 +76,20 @@ class Trainer:
         self.match = match(scans.n, scans.cell_m, search).to(self.device)
         self.optimiser = torch.optim.Adam(self.network.parameters(), lr=config.learning_rate)
         self.pairs = config.sampling.pairs(scans, config.seed)
-        self.step, self.seconds, self.best = 0, 0.0, math.inf
-        self.meaning = {"network": network.to_dict(), "search": asdict(search), "training": asdict(config)}
+        if not config.steps_an_epoch():
+            raise SystemExit(f"an epoch of {config.epoch_pairs} pairs has no batch of {config.batch}")
+        self.step, self.seconds, self.best, self.skipped = 0, 0.0, math.inf, 0
+        self.meaning = {
+            "network": network.to_dict(),
+            "search": asdict(search),
+            "training": asdict(config),
+            "learns_from": {"pairs": scans.fingerprint(), "initial": fingerprint(initial)} | self.others(),
+        }
         self._resume()
+
+    def others(self) -> dict[str, str]:
+        """What else the training learns from."""
+        return {}
 
     @property
     def steps(self) -> int:
@@ -108,7 +121,8 @@ class Trainer:
             self.step += 1
             if k == first + 20:
                 self._announce((time.time() - began) / 21)
-            if time.time() - saved > 60:
+            # Not after an epoch's last step: who goes on from there would miss its validation.
+            if time.time() - saved > 60 and k + 1 < config.steps_an_epoch():
                 saved = self._save("last.pt", began)
         self.seconds += time.time() - began
         self._finish_epoch(epoch, float(np.mean(losses)))
@@ -124,6 +138,8 @@ class Trainer:
         norm = nn.utils.clip_grad_norm_(self.network.parameters(), self.config.clip)
         if torch.isfinite(norm):
             self.optimiser.step()
+        else:
+            self.skipped += 1
         return float(value.detach())
 
     def loss(self, batch: Batch) -> Tensor:
@@ -155,8 +171,10 @@ class Trainer:
             self.best = result.translation_percent
             self._save("best.pt")
         self._save("last.pt")
+        skipped = f", {self.skipped} steps without a finite gradient" if self.skipped else ""
+        self.skipped = 0
         print(f"epoch {epoch}: loss {mean_loss:.4f}, validation {result}{' *' if better else ''}, "
-              f"{self.seconds / 60:.1f} min", flush=True)
+              f"{self.seconds / 60:.1f} min{skipped}", flush=True)
 
     def _announce(self, step_s: float) -> None:
         left = (self.steps - self.step) * step_s
@@ -182,6 +200,7 @@ class Trainer:
             "seconds": self.seconds + (now - began if began else 0.0),
             "best": self.best,
             "machine": machine(self.device),
+            "torch": str(torch.__version__),
             "meaning": self.meaning,
         }
         path = self.folder / name
@@ -194,11 +213,31 @@ class Trainer:
         if not path.exists():
             return
         state = load(path)
-        if state["meaning"] != self.meaning:
+        if filled(state["meaning"], DEFAULTS) != self.meaning:
             raise SystemExit(f"{self.folder} holds another training: give another folder, or delete it")
         self.network.load_state_dict(state["network"])
         self.optimiser.load_state_dict(state["optimiser"])
         self.step, self.seconds, self.best = state["step"], state["seconds"], state["best"]
+
+
+# What a checkpoint does not say was not there to be chosen when it was written.
+DEFAULTS = {"network": NetworkConfig().to_dict(), "search": asdict(SearchConfig()), "training": asdict(TrainingConfig())}
+
+
+def filled(values: dict, defaults: dict) -> dict:
+    """The values, and what they lack of the defaults, section by section."""
+    inner = {key: filled(value, defaults.get(key, {})) for key, value in values.items() if isinstance(value, dict)}
+    return defaults | values | inner
+
+
+def fingerprint(checkpoint: Path | None) -> str:
+    """What tells a checkpoint's network from others."""
+    if not checkpoint:
+        return ""
+    digest = hashlib.sha256()
+    for weights in load(checkpoint)["network"].values():
+        digest.update(weights.numpy().tobytes())
+    return digest.hexdigest()
 
 
 def machine(device: torch.device) -> str:
@@ -211,6 +250,8 @@ def machine(device: torch.device) -> str:
 
 def load(path: Path) -> dict:
     """A checkpoint."""
+    if not path.exists():
+        raise SystemExit(f"there is no {path}: train the recipe of that name first")
     return torch.load(path, map_location="cpu", weights_only=True)
 
 

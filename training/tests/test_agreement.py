@@ -39,7 +39,8 @@ def test_hard_peaks_are_those_of_gyre(name, overrides, tmp_path):
     configuration, out = tmp_path / "world.toml", tmp_path / "pairs.npy"
     configuration.write_text((HOME / "rasters" / f"{name}.toml").read_text() + WORLD)
     sets = [argument for override in overrides for argument in ("--set", override)]
-    subprocess.run([gyre(), "export-pairs", configuration, "--out", out, *sets], check=True, capture_output=True)
+    done = subprocess.run([gyre(), "export-pairs", configuration, "--out", out, *sets], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
     scans = Scans(out)
     pairs = scans.pairs(1)
     assert len(pairs) == 10

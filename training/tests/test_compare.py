@@ -12,7 +12,7 @@ def test_networks_are_compared_in_floats_and_integers(tmp_path: Path):
     splits = [drive(tmp_path / "pairs" / f"{split}.npy", 70, seed=seed) for seed, split in enumerate(("train", "test"))]
     for split in ("train", "test"):
         with (tmp_path / "pairs" / f"{split}.toml").open("a") as settings:
-            settings.write('[rotation]\nangles = 60\nband_low = 0.01\nband_high = 0.35\nradii = 10\n[translation]\noverlap = "none"\nreach_m = 8.0\n')
+            settings.write('[rotation]\npeak = "parabola"\nangles = 60\nband_low = 0.01\nband_high = 0.35\nradii = 10\n[translation]\npeak = "parabola"\noverlap = "none"\nreach_m = 8.0\n')
     for name, network in {"both": NetworkConfig(widths=(4, 8)), "one": NetworkConfig(inputs=1, widths=(8, 16), fold=4)}.items():
         search = SearchConfig(angles=60, radii=10, reach_m=8.0)
         Trainer(tmp_path / name, *splits, network, search, TrainingConfig(batch=2, epochs=1, epoch_pairs=4)).run()

@@ -15,6 +15,7 @@ NETWORKS = {
     "half the resolution": NetworkConfig(inputs=2, widths=(4, 8), shrink=2),
     "one scan, folded": NetworkConfig(inputs=1, widths=(8, 16), fold=4),
     "separable": NetworkConfig(inputs=1, widths=(8, 16), separable=True),
+    "polar, folded": NetworkConfig(inputs=1, widths=(8, 16), fold=4, polar=True),
 }
 
 
@@ -55,10 +56,10 @@ def test_integers_change_masks_a_little(config, scans, tmp_path):
 def test_a_card_says_which_file_it_is_of(tmp_path):
     path = tmp_path / "network.onnx"
     path.write_bytes(b"a network")
-    settings = {"raster": {"n": 31, "cell_m": 0.8}, "masking": {"kind": "none", "threshold": 60, "compensate": False}}
+    settings = {"raster": {"n": 31, "cell_m": 0.8}, "masking": {"kind": "none", "threshold": 60, "compensate": False, "undo_doppler": True}}
     card.write(path, 2, OPSET, 17, settings, {"training": {"data": 'a "world"', "widths": [4, 8]}})
     read = tomllib.loads(path.with_suffix(".toml").read_text())
     assert read["model"]["sha256"] == hashlib.sha256(b"a network").hexdigest()
     assert (read["model"]["file"], read["model"]["inputs"], read["raster"]["n"]) == ("network.onnx", 2, 31)
-    assert read["masking"] == {"floor": 0, "compensate": False}
+    assert read["masking"] == {"floor": 0, "compensate": False, "undo_doppler": True}
     assert read["training"] == {"data": 'a "world"', "widths": [4, 8]}

@@ -5,8 +5,9 @@ import pytest
 import torch
 
 from gyre_training.drift import chain
+from gyre_training.exhaustive import ExhaustiveMatch
 from gyre_training.pairs import Batch, Sampling, augmented, between, inverse, mirror
-from gyre_training.search import ExhaustiveMatch, SearchConfig
+from gyre_training.search import SearchConfig
 from scenes import scene, write
 
 

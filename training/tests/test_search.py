@@ -3,10 +3,13 @@ import math
 import pytest
 import torch
 
-from gyre_training.search import ExhaustiveMatch, RotationSearch, ScanMatch, SearchConfig, SoftArgmax, TranslationSearch
+from gyre_training.exhaustive import ExhaustiveMatch
+from gyre_training.peaks import SoftArgmax
+from gyre_training.search import RotationSearch, ScanMatch, SearchConfig, TranslationSearch
 from scenes import scene
 
-CONFIGS = {"line 14": SearchConfig.paper(), "Eq. 7": SearchConfig.paper("eq7"), "Gyre": SearchConfig.gyre(127)}
+GYRE = SearchConfig("eq7", "radial_hann", 0.05, 0.45, 576, 51, overlap="energy", peak="gaussian")
+CONFIGS = {"line 14": SearchConfig(form="line14"), "Eq. 7": SearchConfig(), "Gyre": GYRE}
 MOTIONS = [(0.0, 0.0, 0.0), (3.1, 0.0, 0.0), (2.0, -1.4, 0.05), (-4.3, 0.7, -0.12), (0.3, 5.2, 0.2)]
 
 

@@ -81,10 +81,37 @@ def test_work_since_the_last_save_is_done_again(scans, tmp_path, monkeypatch):
     assert all(torch.equal(a[key], b[key]) for key in a)
 
 
+def test_an_epoch_that_is_cut_off_in_its_validation_is_validated_again(scans, tmp_path, monkeypatch):
+    trainer(tmp_path / "whole", scans).run()
+    cut, clock = trainer(tmp_path / "cut", scans), itertools.count(0.0, 61.0)
+    with monkeypatch.context() as patch:
+        patch.setattr(train.time, "time", lambda: next(clock))
+        patch.setattr(cut, "validate", lambda: (_ for _ in ()).throw(CutOff))
+        with pytest.raises(CutOff):
+            cut.run()
+    trainer(tmp_path / "cut", scans).run()
+    # The time and the loss of an epoch that was cut off are those of its last part.
+    both = [[{**row, "seconds": 0, "loss": 0} for row in rows(tmp_path / name)] for name in ("whole", "cut")]
+    assert both[0] == both[1] and len(both[0]) == 2
+
+
 def test_a_folder_of_another_training_is_refused(scans, tmp_path):
+    trainer(tmp_path / "other", scans, seed=3)._save("best.pt")
     trainer(tmp_path / "run", scans)._save("last.pt")
+    trainer(tmp_path / "run", scans)
+    initial = {"initial": tmp_path / "other" / "best.pt"}
+    for scans, changes, options in [(scans, {"seed": 2}, {}), (scans, {}, initial), (scans[::-1], {}, {})]:
+        with pytest.raises(SystemExit, match="holds another training"):
+            Trainer(tmp_path / "run", *scans, NETWORK, SEARCH, TrainingConfig(**vars(CONFIG) | changes), **options)
+
+
+def test_a_run_from_before_there_was_a_key_goes_on(scans, tmp_path):
+    run = trainer(tmp_path / "run", scans)
+    del run.meaning["training"]["clip"], run.meaning["network"]["polar"], run.meaning["training"]["sampling"]["reach_m"]
+    run._save("last.pt")
+    trainer(tmp_path / "run", scans)
     with pytest.raises(SystemExit, match="holds another training"):
-        trainer(tmp_path / "run", scans, seed=2)
+        trainer(tmp_path / "run", scans, clip=2.0)
 
 
 def test_masks_learn(scans, tmp_path):

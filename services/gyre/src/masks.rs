@@ -32,6 +32,7 @@ pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
     let Played { dataset, .. } = preflight::open(&configuration)?;
     let chosen = choose(arguments, configuration.played(dataset.len()), &configuration.data())?;
     let mut chain = Chain::new(&configuration, dataset)?;
+    preflight::warn_of_training(&configuration)?;
     let out = &arguments.out;
     fs::create_dir_all(out).map_err(|error| format!("cannot write to {}: {error}", out.display()))?;
     print::line(exposure::HEADER)?;

@@ -2,13 +2,13 @@
 
 use std::{path::Path, time::Duration};
 
-use gyre_masking::Masker;
+use gyre_masking::{MaskKind, Masker, model::Card};
 use gyre_messages::{Footprint, Limits, Window};
 use gyre_radar::Dataset;
 use gyre_simulator::Recording;
 use thiserror::Error;
 
-use crate::configuration::Configuration;
+use crate::{configuration::Configuration, print};
 
 const SHARED_MEMORY: &str = "/dev/shm";
 
@@ -72,6 +72,22 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
     let footprint = Footprint::new(&window, &limits);
     check_shared_memory(&footprint)?;
     Ok(Preflight { scans, window, limits, footprint, truth })
+}
+
+/// Tells where a configuration differs from what its network was trained for.
+pub fn warn_of_training(configuration: &Configuration) -> Result<(), crate::Failure> {
+    let Configuration { masking, raster, .. } = configuration;
+    if masking.kind == MaskKind::Learned {
+        let unlike = Card::read(masking)?.unlike_training(masking, raster);
+        if let (false, Some(card)) = (unlike.is_empty(), &masking.model) {
+            print::note(format!(
+                "the masks of {} may be worth less than they were made for: {}",
+                card.display(),
+                unlike.join(", ")
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// What is to be played.

@@ -8,7 +8,6 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_masking::{MaskKind, model::Card};
 use gyre_messages::{Stage, flag};
 use gyre_pose_integration::journal;
 use gyre_refinement::checkpoint;
@@ -135,7 +134,7 @@ fn resolve(arguments: &RunArguments, out: &Path) -> Result<Configuration, Failur
         };
     }
     configuration.masking.resolve()?;
-    warn_of_training(&configuration)?;
+    preflight::warn_of_training(&configuration)?;
     // So that the resolved configuration repeats the run from anywhere. What does not exist is told by the reader.
     for path in [Some(&mut configuration.source.data), configuration.run.ground_truth.as_mut()].into_iter().flatten() {
         if let Ok(absolute) = path.canonicalize() {
@@ -143,22 +142,6 @@ fn resolve(arguments: &RunArguments, out: &Path) -> Result<Configuration, Failur
         }
     }
     Ok(configuration)
-}
-
-/// Tells where the run differs from what its network was trained for.
-fn warn_of_training(configuration: &Configuration) -> Result<(), Failure> {
-    let Configuration { masking, raster, .. } = configuration;
-    if masking.kind == MaskKind::Learned {
-        let unlike = Card::read(masking)?.unlike_training(masking, raster);
-        if let (false, Some(card)) = (unlike.is_empty(), &masking.model) {
-            print::note(format!(
-                "the masks of {} may be worth less than they were made for: {}",
-                card.display(),
-                unlike.join(", ")
-            ));
-        }
-    }
-    Ok(())
 }
 
 fn overrides(arguments: &RunArguments) -> Vec<String> {

@@ -35,8 +35,6 @@ pub struct NetworkFacts {
     pub inputs: usize,
     /// Version of the operators.
     pub opset: u32,
-    /// Trained numbers.
-    pub parameters: u64,
 }
 
 /// The section `[raster]` of a card.
@@ -48,6 +46,10 @@ pub struct RasterFacts {
     pub cell_m: f32,
     /// How a cell's value came from the bins.
     pub sampling: Option<Sampling>,
+    /// Metres around the radar that were left out.
+    pub minimum_range_m: Option<f32>,
+    /// Width, in cells, of what [`Sampling::Averaged`] averaged over.
+    pub averaged_cells: Option<f32>,
 }
 
 /// The section `[masking]` of a card: what was done before the network looked at a raster.
@@ -57,6 +59,8 @@ pub struct MaskingFacts {
     pub floor: Option<u8>,
     /// Whether the sweep's distortion was undone.
     pub compensate: Option<bool>,
+    /// Whether Doppler's shift of ranges was undone.
+    pub undo_doppler: Option<bool>,
 }
 
 /// A model whose file is as its card says, and whose card suits the run.
@@ -155,7 +159,7 @@ impl Card {
             return Err(not_a_card(format!("model.inputs is {}, but must be 1 or 2", card.model.inputs)));
         }
         match &config.sha256 {
-            Some(expected) if *expected != card.model.sha256 => Err(ModelError::OtherModel {
+            Some(expected) if !expected.eq_ignore_ascii_case(&card.model.sha256) => Err(ModelError::OtherModel {
                 path: path.to_owned(),
                 expected: expected.clone(),
                 actual: card.model.sha256,
@@ -168,10 +172,16 @@ impl Card {
 impl Card {
     /// What the network was not trained for, though it runs: its masks are worth less then.
     pub fn unlike_training(&self, masking: &MaskingConfig, raster: &RasterConfig) -> Vec<String> {
+        let averaged = raster.sampling == Sampling::Averaged;
         let differences = [
             unlike("masking.threshold", self.masking.floor, masking.floor()),
             unlike("masking.compensate", self.masking.compensate, masking.compensate),
+            unlike("masking.undo_doppler", self.masking.undo_doppler, masking.undo_doppler),
+            unlike("raster.minimum_range_m", self.raster.minimum_range_m, raster.minimum_range_m),
             unlike("raster.sampling", self.raster.sampling, raster.sampling),
+            averaged
+                .then(|| unlike("raster.averaged_cells", self.raster.averaged_cells, raster.averaged_cells))
+                .flatten(),
         ];
         differences.into_iter().flatten().collect()
     }

@@ -108,15 +108,16 @@ fn library_at(path: &Path) -> Option<PathBuf> {
     PLACES.iter().find_map(|place| {
         let files = fs::read_dir(path.join(place)).ok()?.flatten().map(|file| file.path());
         // The newest, where several versions lie side by side.
-        files.filter(|file| is_library(file)).max()
+        files.filter_map(|file| Some((version(&file)?, file))).max().map(|(_, file)| file)
     })
 }
 
-/// `libonnxruntime.so`, or with a version behind it.
-fn is_library(file: &Path) -> bool {
-    let name = file.file_name().and_then(|name| name.to_str());
-    let version = name.and_then(|name| name.strip_prefix(LIBRARY));
-    version.is_some_and(|version| version.chars().all(|c| c == '.' || c.is_ascii_digit()))
+/// The version behind `libonnxruntime.so`; none of its numbers where there is none.
+fn version(file: &Path) -> Option<Vec<u32>> {
+    let behind = file.file_name()?.to_str()?.strip_prefix(LIBRARY)?;
+    let mut numbers = behind.split('.');
+    numbers.next().filter(|between| between.is_empty())?;
+    numbers.map(|number| number.parse().ok()).collect()
 }
 
 /// Opens the library. A process has one: later calls return what the first one that succeeded opened.
@@ -187,6 +188,15 @@ mod tests {
         assert!(error.contains("masking.runtime is /no/such"), "{error}");
         let error = find_in(None, Some("/no/such".into()), &installed_in).unwrap_err().to_string();
         assert!(error.contains("ORT_DYLIB_PATH is /no/such") && error.contains(INSTALL), "{error}");
+    }
+
+    #[test]
+    fn the_newest_of_several_is_taken_and_nothing_that_is_no_library() {
+        let (folder, newest) = folder_with("libonnxruntime.so.1.31.1");
+        for other in ["libonnxruntime.so", "libonnxruntime.so.1.9.0", "libonnxruntime.so9", "libonnxruntime.so.2.txt"] {
+            fs::write(folder.path().join(other), "").unwrap();
+        }
+        assert_eq!(find_in(Some(folder.path()), None, &[]).unwrap(), newest);
     }
 
     #[test]

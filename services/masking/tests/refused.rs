@@ -9,7 +9,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use common::{card, learned, raster, runtime_is_installed};
+use common::{CELLS, card, learned, raster, runtime_is_installed};
 use gyre_masking::{MaskingConfig, Provider, model::Card, network::Network, runtime::INSTALL};
 use gyre_radar::{RasterConfig, Sampling};
 use sha2::{Digest, Sha256};
@@ -138,6 +138,19 @@ fn a_model_that_takes_something_else_than_its_card_says_is_told() {
     refused(&learned(&card), &raster(), &words);
 }
 
+#[test]
+fn factors_that_are_no_numbers_are_no_mask() {
+    if !runtime_is_installed() {
+        return;
+    }
+    let mut network = Network::load(&learned(&card("single-31")), &raster()).unwrap();
+    let mut cells = vec![1.0; CELLS];
+    assert!(network.run(&cells).is_ok());
+    cells[CELLS / 2] = f32::NAN;
+    let sentence = network.run(&cells).unwrap_err().to_string();
+    assert!(sentence.contains("9 of 961 factors are no numbers") && sentence.contains("`cpu`"), "{sentence}");
+}
+
 // Who computes it.
 
 #[test]
@@ -177,7 +190,14 @@ fn what_the_network_was_not_trained_for_is_named() {
         card("floor = 0\ncompensate = false").unlike_training(&config, &raster()),
         ["masking.threshold is 20 instead of 0", "masking.compensate is true instead of false"]
     );
-    let (_folder, path) = changed("single-31", "cell_m = 0.8", "cell_m = 0.8\nsampling = \"averaged\"");
+    assert_eq!(
+        card("undo_doppler = false").unlike_training(&config, &raster()),
+        ["masking.undo_doppler is true instead of false"]
+    );
+    let facts = "cell_m = 0.8\nsampling = \"averaged\"\naveraged_cells = 2.0\nminimum_range_m = 3.0";
+    let (_folder, path) = changed("single-31", "cell_m = 0.8", facts);
     let card = Card::read(&learned(&path)).unwrap();
-    assert_eq!(card.unlike_training(&config, &other), ["raster.sampling is bilinear instead of averaged"]);
+    let nearer = "raster.minimum_range_m is 2 instead of 3";
+    assert_eq!(card.unlike_training(&config, &raster()), [nearer, "raster.averaged_cells is 1 instead of 2"]);
+    assert_eq!(card.unlike_training(&config, &other), [nearer, "raster.sampling is bilinear instead of averaged"]);
 }

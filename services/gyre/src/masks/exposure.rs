@@ -11,7 +11,7 @@ use crate::configuration::Configuration;
 /// Above the lines of [`Exposure::line`].
 pub const HEADER: &str = "  scan   power %   above floor %   cells %   points %      m/s    deg/s";
 
-/// From this factor on a cell or a point counts as kept.
+/// Above this factor a cell or a point counts as kept.
 const KEPT: f32 = 0.5;
 
 /// A scan and its mask.
