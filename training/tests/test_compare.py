@@ -1,6 +1,10 @@
 from pathlib import Path
 
+import pytest
+import torch
+
 from gyre_training import cli
+from gyre_training.compare import EverySecond
 from gyre_training.network import NetworkConfig
 from gyre_training.search import SearchConfig
 from gyre_training.train import Trainer, TrainingConfig
@@ -19,6 +23,18 @@ def test_networks_are_compared_in_floats_and_integers(tmp_path: Path):
     runs = [str(tmp_path / name) for name in ("both", "one")]
     cli.run(["compare", *runs, "--pairs", str(tmp_path / "pairs"), "--out", str(tmp_path / "out")])
     rows = (tmp_path / "out" / "compare.md").read_text().splitlines()[2:]
-    assert [row.split(" | ")[:2] for row in rows[1:]] == [[f"| {name}", numbers] for name in ("both", "one") for numbers in ("floats", "integers")]
-    assert all(float(value) > 0 for row in rows[1:] for value in row.strip("|").split("|")[3:])
+    expected = [(name, numbers) for name in ("both", "one") for numbers in ("floats", "integers")]
+    expected.append(("one, every second scan", "integers"))
+    assert [tuple(row.strip("| ").split(" | ")[:2]) for row in rows[1:]] == expected
+    assert all(float(value) > 0 for row in rows[1:] for value in row.strip("|").split("|")[4:])
     assert (tmp_path / "out" / "compare.svg").stat().st_size > 1000
+
+
+@pytest.mark.parametrize("pairs", [6, 5])
+def test_every_second_scans_mask_serves_the_scan_after_it(pairs):
+    scans = torch.arange(1.0, pairs + 2)[:, None, None].expand(-1, 2, 2)
+    masks = EverySecond(lambda given: 10 ** given)  # tells whose mask it is
+    later, earlier = masks.masked(scans[1:], scans[:-1])
+    whose = [int(torch.log10(masked[0, 0] / scan[0, 0]).round()) for masked, scan in zip(later, scans[1:])]
+    assert whose == [1, 3, 3, 5, 5, 7][:pairs]
+    assert [int(torch.log10(masked[0, 0] / scan[0, 0]).round()) for masked, scan in zip(earlier, scans)] == [1, 1, 3, 3, 5, 5][:pairs]
