@@ -301,7 +301,9 @@ impl Refinement {
         let mean_squared_residual = found.normal.cost / weight;
         // From the world's axes into those of the frame before.
         let turn = self.memory.pose.rotation.inverse().to_rotation_matrix().to_homogeneous();
-        let shape = turn * inverse * turn.transpose() * (self.config.variance_scale * mean_squared_residual);
+        // If each point weighed half as much, as under a mask, the information would be half of what it was, and the match the same.
+        let scale = self.config.variance_scale * self.placed.mean_weight() * mean_squared_residual;
+        let shape = turn * inverse * turn.transpose() * scale;
         let yaw = self.config.yaw_sigma_deg.to_radians().powi(2);
         let covariance = shape + Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, yaw));
         covariance.iter().all(|v| v.is_finite()).then_some(covariance)

@@ -42,7 +42,7 @@ pub struct RefinementConfig {
     pub search_agrees_deg: f64,
     /// After so many scans in a row that matched nothing, the map begins anew.
     pub patience: u32,
-    /// Covariance = this x mean squared residual x inverse information matrix ...
+    /// Covariance = this x mean weight of the points x mean squared residual x inverse information matrix ...
     pub variance_scale: f64,
     /// ... and this standard deviation of the heading besides, degrees: no antenna turns quite evenly.
     pub yaw_sigma_deg: f64,

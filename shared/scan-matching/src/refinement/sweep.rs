@@ -44,6 +44,11 @@ impl Placed {
     pub fn total_weight(&self) -> f64 {
         self.weight.iter().map(|w| f64::from(*w)).sum()
     }
+
+    /// Of the weights, each counted as often as it weighs.
+    pub fn mean_weight(&self) -> f64 {
+        self.weight.iter().map(|w| f64::from(*w).powi(2)).sum::<f64>() / self.total_weight()
+    }
 }
 
 /// The sensor's pose at time t on its arc is the chord (v t), turned by half the angle, and the turn by the whole angle.
