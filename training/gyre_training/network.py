@@ -8,6 +8,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from .checkpoint import recomputed
+from .exchange import symmetrise
 from .polar import to_polar, to_raster
 
 # Rasters hold powers above a floor, 0 to 255.
@@ -22,7 +23,7 @@ class NetworkConfig:
     computed at half the resolution and enlarged. With `fold` of 4 each square of 4 x 4 cells becomes one cell of 16
     features, and so many features become the masks of such a square: all that is fine is kept, but every convolution is
     done on a sixteenth of the cells. `separable` blocks filter each feature on its own, then mix them. A `polar` network
-    sees azimuth and range instead of x and y.
+    sees azimuth and range instead of x and y. Networks of two scans treat both alike (`exchange.py`).
     """
 
     inputs: int = 2
@@ -31,6 +32,10 @@ class NetworkConfig:
     fold: int = 1
     separable: bool = False
     polar: bool = False
+
+    def __post_init__(self):
+        if self.inputs == 2 and any(width % 2 for width in self.widths):
+            raise ValueError(f"a network of two scans has half of its features for each: widths {self.widths} must be even")
 
     def to_dict(self) -> dict:
         return asdict(self) | {"widths": list(self.widths)}
@@ -76,6 +81,7 @@ class MaskNetwork(nn.Module):
         pairs = zip(reversed(widths[1:]), reversed(widths[:-1]))
         self.decoder = nn.ModuleList(block(i + o, o, separable) for i, o in pairs)
         self.masks = nn.Conv2d(widths[0], folded, 3, padding=1)
+        self.symmetrise()
         # A place's features beside each other: a third faster on a CPU.
         self.to(memory_format=torch.channels_last)
 
@@ -125,6 +131,18 @@ class MaskNetwork(nn.Module):
         if self.config.inputs == 1:
             return self.logits(scans.flatten(0, 1)[:, None]).view_as(scans)
         return self.logits(scans)
+
+    def symmetrise(self) -> None:
+        """Of two scans neither is preferred: to be called after each change of the weights."""
+        if self.config.inputs == 1:
+            return
+        widths = self.config.widths
+        folded = self.masks.out_channels
+        for encode, inputs in zip(self.encoder, (folded, *widths)):
+            symmetrise(encode, [inputs])
+        for decode, above, skipped in zip(self.decoder, reversed(widths[1:]), reversed(widths[:-1])):
+            symmetrise(decode, [above, skipped])
+        symmetrise(self.masks, [widths[0]])
 
     def parameters_count(self) -> int:
         return sum(parameter.numel() for parameter in self.parameters())

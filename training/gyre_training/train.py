@@ -138,6 +138,7 @@ class Trainer:
         norm = nn.utils.clip_grad_norm_(self.network.parameters(), self.config.clip)
         if torch.isfinite(norm):
             self.optimiser.step()
+            self.network.symmetrise()
         else:
             self.skipped += 1
         return float(value.detach())

@@ -1,5 +1,6 @@
 import copy
 
+import pytest
 import torch
 
 from gyre_training.network import MaskNetwork, NetworkConfig
@@ -36,3 +37,30 @@ def test_computing_again_keeps_less_for_the_way_back():
         return sum(kept.values()) if masks.requires_grad else 0
 
     assert kept_bytes(True) < 0.35 * kept_bytes(False)
+
+
+@pytest.mark.parametrize("changes", [{}, {"separable": True, "widths": (8, 16, 32)}, {"fold": 2}, {"shrink": 2}])
+def test_exchanging_the_scans_exchanges_the_masks(changes):
+    torch.manual_seed(1)
+    network = MaskNetwork(NetworkConfig(**{"widths": (4, 8, 16)} | changes))
+    for tensor in network.state_dict().values():
+        if tensor.is_floating_point():
+            tensor.add_(0.2 * (torch.rand_like(tensor) - 0.5))
+    scans = torch.tensor([255.0, 25.0])[:, None, None] * torch.rand(3, 2, 31, 31)
+    with torch.no_grad():
+        for _ in range(20):  # batch norm learns what it is given
+            network(scans)
+        free = network.eval().logits(scans)
+        assert not torch.allclose(network.logits(scans.flip(1)), free.flip(1), atol=1e-3)
+        network.symmetrise()
+        tied = network.logits(scans)
+        assert torch.allclose(network.logits(scans.flip(1)), tied.flip(1), atol=1e-5)
+        network.symmetrise()
+        assert torch.equal(network.logits(scans), tied)
+    assert not torch.allclose(tied[:, 0], tied[:, 1], atol=1e-4)
+
+
+def test_a_width_without_halves_is_refused():
+    with pytest.raises(ValueError, match="must be even"):
+        NetworkConfig(widths=(4, 7))
+    NetworkConfig(inputs=1, widths=(4, 7))
