@@ -2,7 +2,7 @@
 
 So what the masks do to a motion changes its sign with the order of the scans, and is nothing on average while the vehicle
 stands. A network that is free to tell the later scan from the earlier one learns to turn each motion by a hundredth of a degree or
-so, always the same way: half the drift of a drive that stands often."""
+so, always the same way, and a vehicle that waits turns on and on."""
 
 from collections.abc import Sequence
 

@@ -20,12 +20,12 @@ def test_a_network_learns_its_teachers_masks(tmp_path: Path):
         teacher.network.masks.weight.mul_(10)  # one with opinions
     teacher._save("best.pt")
     best = tmp_path / "teacher" / "best.pt"
-    student = NetworkConfig(widths=(8, 16))
-    config = TrainingConfig(batch=4, epochs=2, epoch_pairs=160, learning_rate=1e-2)
+    student = NetworkConfig(inputs=1, widths=(8, 16))
+    config = TrainingConfig(batch=4, epochs=4, epoch_pairs=160, learning_rate=1e-2)
     learning = Distiller(best, tmp_path / "student", *scans, student, SEARCH, config)
     before = masks_apart(learning.network.eval(), trained(best), scans[1])
     learning.run()
-    assert masks_apart(learning.network.eval(), trained(best), scans[1]) < 0.85 * before
+    assert masks_apart(learning.network.eval(), trained(best), scans[1]) < 0.9 * before  # it cannot see the other scan
     assert set(load(tmp_path / "student" / "best.pt")["network"]) == set(learning.network.state_dict())
 
 

@@ -201,6 +201,20 @@ fn covariances_are_symmetric_and_positive_definite() {
     }
 }
 
+/// As under a mask: less weight on every point tells nothing less.
+#[test]
+fn what_all_points_weigh_changes_neither_motions_nor_covariances() {
+    let drive = straight();
+    let whole = scans(&town(AROUND, 1), &drive, &NOISY);
+    let lighter =
+        whole.iter().map(|scan| scan.iter().map(|&[x, y, t, w, d]| [x, y, t, 0.25 * w, d]).collect()).collect();
+    let [whole, lighter] = [whole, lighter].map(|scans| refine_on(&mut refinement(), &drive, &scans, 0..20));
+    for (a, b) in whole.iter().zip(&lighter) {
+        assert!((a.motion.translation.vector - b.motion.translation.vector).norm() < 1e-3, "{} {}", a.motion, b.motion);
+        assert!((a.covariance - b.covariance).norm() < 0.01 * a.covariance.norm(), "{} {}", a.covariance, b.covariance);
+    }
+}
+
 /// Hedges along a way, a metre deep. Points that lie on top of what was drawn, like those of walls without depth, have no
 /// slope: of such a corridor the information matrix says nothing true.
 #[test]
