@@ -74,6 +74,7 @@ class MaskNetwork(nn.Module):
         super().__init__()
         self.config = config
         self.checkpoint = False  # while training: less memory, more time
+        self.mixed_precision = False  # while training: features in bfloat16
         widths, separable = config.widths, config.separable
         folded = config.inputs * config.fold**2
         pairs = zip((folded, *widths), widths)
@@ -90,6 +91,12 @@ class MaskNetwork(nn.Module):
 
     def logits(self, scans: Tensor) -> Tensor:
         """What the sigmoid is taken of."""
+        if not (self.mixed_precision and self.training):
+            return self._logits(scans)
+        with torch.autocast(scans.device.type, torch.bfloat16):
+            return self._logits(scans).float()
+
+    def _logits(self, scans: Tensor) -> Tensor:
         x, size, config = scans / FULL_SCALE, scans.shape[-1], self.config
         if config.polar:
             x = to_polar(x)
@@ -137,8 +144,7 @@ class MaskNetwork(nn.Module):
         if self.config.inputs == 1:
             return
         widths = self.config.widths
-        folded = self.masks.out_channels
-        for encode, inputs in zip(self.encoder, (folded, *widths)):
+        for encode, inputs in zip(self.encoder, (self.masks.out_channels, *widths)):
             symmetrise(encode, [inputs])
         for decode, above, skipped in zip(self.decoder, reversed(widths[1:]), reversed(widths[:-1])):
             symmetrise(decode, [above, skipped])

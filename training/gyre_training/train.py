@@ -32,6 +32,8 @@ class TrainingConfig:
     clip: float = 1.0
     angle_weight: float = 1.0
     exhaustive: bool = False
+    # The network's features in bfloat16: two thirds of a step's time on processors that compute with it, more on others.
+    mixed_precision: bool = False
     augment: bool = True
     # What the error of the highest peak's own place counts beside that of the soft peak, where it is the right peak (0 in
     # the papers). A soft peak is sharp enough to choose among peaks only where it is blind to fractions of a cell.
@@ -70,6 +72,7 @@ class Trainer:
         folder.mkdir(parents=True, exist_ok=True)
         torch.manual_seed(config.seed)
         self.network = MaskNetwork(network).to(self.device)
+        self.network.mixed_precision = config.mixed_precision
         if initial:
             self.network.load_state_dict(load(initial)["network"])
         match = ExhaustiveMatch if config.exhaustive else ScanMatch

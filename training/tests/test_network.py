@@ -6,10 +6,27 @@ import torch
 from gyre_training.network import MaskNetwork, NetworkConfig
 
 
-def test_computing_again_changes_neither_gradients_nor_running_means():
+def test_mixed_precision_keeps_masks_gradients_and_weights_but_for_rounding():
+    torch.manual_seed(1)
+    exact = MaskNetwork(NetworkConfig(widths=(4, 8, 16))).train()
+    mixed = copy.deepcopy(exact)
+    mixed.mixed_precision = True
+    scans = 255 * torch.rand(3, 2, 32, 32)
+    for network in (exact, mixed):
+        (network(scans) * scans).square().mean().backward()
+    a, b = (torch.cat([weights.grad.flatten() for weights in network.parameters()]) for network in (exact, mixed))
+    assert b.dtype == torch.float32 and torch.cosine_similarity(a, b, dim=0) > 0.95
+    assert 0 < (exact.logits(scans) - mixed.logits(scans)).abs().max() < 0.1
+    mixed.load_state_dict(exact.state_dict())
+    assert torch.equal(exact.eval()(scans), mixed.eval()(scans))  # as it is used, it is exact
+
+
+@pytest.mark.parametrize("mixed_precision", [False, True])
+def test_computing_again_changes_neither_gradients_nor_running_means(mixed_precision):
     torch.manual_seed(1)
     # 31 cells: odd sizes at every level.
     kept = MaskNetwork(NetworkConfig(widths=(4, 8, 16))).train()
+    kept.mixed_precision = mixed_precision
     again = copy.deepcopy(kept)
     again.checkpoint = True
     scans = 255 * torch.rand(3, 2, 31, 31)
