@@ -12,6 +12,7 @@ from .drift import drift, motions
 from .export import OnnxMasks
 from .model import publish
 from .pairs import Scans
+from .plots import training_log
 from .search import ScanMatch
 from .train import Trainer, trained
 from .worlds import export_pairs, find_gyre, simulate
@@ -138,7 +139,5 @@ def add_plot(commands) -> None:
 
 
 def plot(options: argparse.Namespace) -> None:
-    from .plots import training_log  # matplotlib takes a second to load
-
     for folder in options.folder:
         print(training_log(folder))

@@ -30,9 +30,9 @@ def provenance(recipe: Recipe, folder: Path, scans: Scans) -> dict:
     state = load(folder / "best.pt")
     with (folder / "log.csv").open() as file:
         rows = list(csv.DictReader(file))
-    best = min(rows, key=lambda row: float(row["translation_percent"]))
+    best = next(row for row in rows if int(row["step"]) == state["step"])
     training = state["meaning"]["training"]
-    chosen = ("seed", "batch", "epochs", "epoch_pairs", "learning_rate", "angle_weight", "local_weight")
+    chosen = ("seed", "batch", "epochs", "epoch_pairs", "learning_rate", "angle_weight", "local_weight", "mixed_precision")
     return {
         "command": f"python -m gyre_training reproduce training/recipes/{recipe.name}.toml",
         "data": data(scans),

@@ -15,6 +15,8 @@ matplotlib.rcParams |= {"svg.hashsalt": "gyre", "svg.fonttype": "none", "axes.gr
 
 from matplotlib import pyplot  # noqa: E402
 
+from .train import load  # noqa: E402
+
 if TYPE_CHECKING:
     from .compare import Contender
     from .step_time import Measurement
@@ -87,9 +89,10 @@ def training_log(folder: Path) -> Path:
     loss.plot(epochs, columns["loss"], ".-")
     drift.plot(epochs, columns["translation_percent"], ".-", label="translation, %")
     drift.plot(epochs, columns["rotation_deg_per_100m"], ".-", label="rotation, deg/100 m")
-    best = min(range(len(rows)), key=columns["translation_percent"].__getitem__)
-    kept = {"label": f"epoch {epochs[best]:.0f} is kept", "color": "black", "fillstyle": "none"}
-    drift.plot(epochs[best], columns["translation_percent"][best], "o", **kept)
+    if (folder / "best.pt").exists():
+        best = columns["step"].index(load(folder / "best.pt")["step"])
+        kept = {"label": f"epoch {epochs[best]:.0f} is kept", "color": "black", "fillstyle": "none"}
+        drift.plot(epochs[best], columns["translation_percent"][best], "o", **kept)
     drift.set_ylim(bottom=0)
     drift.legend()
     rate.plot(epochs, columns["learning_rate"], ".-")

@@ -49,6 +49,9 @@ def pose_error(found: Tensor, true: Tensor, angle_weight: float) -> Tensor:
     return (found - true).abs() * torch.tensor([1.0, 1.0, angle_weight], device=true.device)
 
 
+# Epochs count from this part of a training on: before it the learning rate is high, and the epoch that looks best is a lucky one.
+SETTLED = 0.8
+
 # What is farther off, along each axis by itself, is another peak: cells and radians.
 SAME_PEAK_CELLS, SAME_PEAK_RAD = 1.5, math.radians(1.5)
 
@@ -99,7 +102,7 @@ class Trainer:
         return self.config.epochs * self.config.steps_an_epoch()
 
     def run(self) -> None:
-        """Trains to the end, an epoch at a time; the best epoch by validation drift is kept in `best.pt`."""
+        """Trains to the end, an epoch at a time; the best of the last epochs by validation drift is kept in `best.pt`."""
         print(f"{self.network.parameters_count()} parameters, {len(self.pairs)} pairs, {self.steps} steps of "
               f"{self.config.batch}; at step {self.step}", flush=True)
         while self.step < self.steps:
@@ -170,7 +173,7 @@ class Trainer:
         row = {"epoch": epoch, "step": self.step, "seconds": round(self.seconds, 1), "loss": round(mean_loss, 5)}
         row |= {key: round(value, 5) for key, value in asdict(result).items()}
         self._log(row | {"learning_rate": f"{self.learning_rate():.3g}"})
-        better = result.translation_percent < self.best
+        better = self.step > SETTLED * self.steps and result.translation_percent < self.best
         if better:
             self.best = result.translation_percent
             self._save("best.pt")

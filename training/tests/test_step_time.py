@@ -2,6 +2,8 @@ import csv
 
 import pytest
 
+import torch
+
 from gyre_training.plots import step_times, training_log
 from gyre_training.step_time import METHODS, Measurement, Memory, Setting, against, compare, table
 
@@ -52,8 +54,9 @@ def test_plots_are_the_same_file_twice(tmp_path):
 
 
 def test_a_log_is_drawn_with_the_epoch_that_was_kept(tmp_path):
-    rows = [{"epoch": k, "loss": 1 / (k + 1), "translation_percent": t, "rotation_deg_per_100m": 1.0, "learning_rate": 1e-3}
-            for k, t in enumerate((4.0, 2.0, 3.0))]
+    rows = [{"epoch": k, "step": 10 * (k + 1), "loss": 1 / (k + 1), "translation_percent": t, "rotation_deg_per_100m": 1.0, "learning_rate": 1e-3}
+            for k, t in enumerate((2.0, 3.0, 4.0))]
+    torch.save({"step": 20}, tmp_path / "best.pt")
     with (tmp_path / "log.csv").open("w", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]))
         writer.writeheader()

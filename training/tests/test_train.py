@@ -6,6 +6,7 @@ import pytest
 import torch
 
 from gyre_training import train
+from gyre_training.drift import Drift
 from gyre_training.network import NetworkConfig
 from gyre_training.search import SearchConfig
 from gyre_training.train import Trainer, TrainingConfig, load, pose_error, trained
@@ -121,6 +122,14 @@ def test_masks_learn(scans, tmp_path):
     assert sum(losses[-5:]) < 0.7 * sum(losses[:5]), losses
     masks = trained(tmp_path / "run" / "best.pt")(scans[0].rasters([0, 1])[None])
     assert masks.shape == (1, 2, 32, 32) and 0 <= masks.min() and masks.max() <= 1
+
+
+def test_an_epoch_counts_once_the_learning_rate_has_fallen(scans, tmp_path, monkeypatch):
+    training = trainer(tmp_path / "run", scans, epochs=10, epoch_pairs=2)
+    drifts = iter([0.1, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0, 0.2, 1.0, 2.0])
+    monkeypatch.setattr(training, "validate", lambda: Drift(next(drifts), 1.0, 1.0, 1.0))
+    training.run()
+    assert load(tmp_path / "run" / "best.pt")["step"] == 9
 
 
 def test_a_radian_counts_as_its_weight_says():
