@@ -1,7 +1,6 @@
 import csv
 
 import pytest
-
 import torch
 
 from gyre_training.plots import step_times, training_log
