@@ -14,6 +14,7 @@ matplotlib.use("svg")
 matplotlib.rcParams |= {"svg.hashsalt": "gyre", "svg.fonttype": "none", "axes.grid": True, "grid.alpha": 0.3, "font.size": 9}
 
 from matplotlib import pyplot  # noqa: E402
+from matplotlib.ticker import LogLocator, NullFormatter  # noqa: E402
 
 from .train import load  # noqa: E402
 
@@ -70,12 +71,12 @@ def speed_and_drift(contenders: Sequence[Contender], path: Path) -> None:
             for one, place in zip(ours, places):
                 panel.plot(*place, "o", color=line.get_color(), fillstyle="full" if one.numbers == "integers" else "none")
     for panel, label in zip(axes, ("translation, %", "rotation, deg/100 m")):
-        panel.set_xscale("log")
-        panel.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
-        panel.set_ylim(bottom=0)
-        panel.set_xlabel("masks of a pair, ms on one thread")
-        panel.set_ylabel(label)
-    axes[0].legend()
+        panel.set(xscale="log", yscale="log", xlabel="masks of a pair, ms on one thread", ylabel=label)
+        for axis in (panel.xaxis, panel.yaxis):
+            axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            axis.set_major_formatter(lambda value, _: f"{value:g}")
+            axis.set_minor_formatter(NullFormatter())
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside right upper")
     save(figure, path)
 
 
