@@ -21,12 +21,16 @@ fn configured(text: &str) -> Ended {
 
 #[test]
 fn no_data_are_named() {
-    Run::configured("").finish().refused_with(&["--data", "source.data"]);
+    Run::configured("")
+        .finish()
+        .refused_with(&["--data", "source.data"]);
 }
 
 #[test]
 fn the_data_are_missing() {
-    run_of(Path::new("/nowhere/at/all")).finish().refused_with(&["/nowhere/at/all", "no such folder"]);
+    run_of(Path::new("/nowhere/at/all"))
+        .finish()
+        .refused_with(&["/nowhere/at/all", "no such folder"]);
 }
 
 #[test]
@@ -34,27 +38,38 @@ fn the_data_are_a_file() {
     let run = Run::configured("");
     let file = run.folder().join("scan.png");
     fs::write(&file, "").unwrap();
-    run.data(&file).finish().refused_with(&["scan.png is a file", "folder"]);
+    run.data(&file)
+        .finish()
+        .refused_with(&["scan.png is a file", "folder"]);
 }
 
 #[test]
 fn the_folder_is_empty() {
     let folder = tempfile::tempdir().unwrap();
-    run_of(folder.path()).finish().refused_with(&[folder.path().to_str().unwrap(), "no PNG images"]);
+    run_of(folder.path())
+        .finish()
+        .refused_with(&[folder.path().to_str().unwrap(), "no PNG images"]);
 }
 
 #[test]
 fn the_folder_holds_other_things() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("notes.txt"), "buy milk").unwrap();
-    run_of(folder.path()).finish().refused_with(&["not a dataset that Gyre knows", "no PNG images"]);
+    run_of(folder.path())
+        .finish()
+        .refused_with(&["not a dataset that Gyre knows", "no PNG images"]);
 }
 
 #[test]
 fn one_scan_makes_no_motion() {
     let recording = recording::copy(1);
-    run_of(recording.path()).finish().refused_with(&["has 1 scan:", "a motion is between two"]);
-    Run::of_recording().set("source.first=23").finish().refused_with(&["has 1 scan:", "a motion is between two"]);
+    run_of(recording.path())
+        .finish()
+        .refused_with(&["has 1 scan:", "a motion is between two"]);
+    Run::of_recording()
+        .set("source.first=23")
+        .finish()
+        .refused_with(&["has 1 scan:", "a motion is between two"]);
 }
 
 #[test]
@@ -63,7 +78,9 @@ fn an_image_that_is_no_image_is_told() {
     for image in recording::images(recording.path()) {
         recording::truncate(&image, 0);
     }
-    run_of(recording.path()).finish().refused_with(&["first image", ".png"]);
+    run_of(recording.path())
+        .finish()
+        .refused_with(&["first image", ".png"]);
 }
 
 #[test]
@@ -72,7 +89,9 @@ fn a_dataset_of_truncated_images_alone_is_told() {
     for image in recording::images(recording.path()) {
         recording::truncate(&image, 5000);
     }
-    run_of(recording.path()).finish().failed_with(&["only 0 of the 3 scans", "log.jsonl"]);
+    run_of(recording.path())
+        .finish()
+        .failed_with(&["only 0 of the 3 scans", "log.jsonl"]);
 }
 
 // A bad scan among good ones.
@@ -85,15 +104,28 @@ fn skips(bad: usize, reason: &str, spoil: impl FnOnce(&Path)) {
     run.finish().succeeded();
     let summary = run.summary();
     assert_eq!(
-        (&summary["published"], &summary["processed"], &summary["unreadable"]),
+        (
+            &summary["published"],
+            &summary["processed"],
+            &summary["unreadable"]
+        ),
         (&7.into(), &7.into(), &1.into())
     );
-    assert_eq!((&summary["dropped"], &summary["breaks"]), (&0.into(), &0.into()));
+    assert_eq!(
+        (&summary["dropped"], &summary["breaks"]),
+        (&0.into(), &0.into())
+    );
     let rows = odometry::rows(&run.odometry());
     odometry::assert_unbroken(&rows);
-    assert!(rows.len() == 6 && rows.iter().all(|row| row.scan != bad as u64), "{rows:?}");
+    assert!(
+        rows.len() == 6 && rows.iter().all(|row| row.scan != bad as u64),
+        "{rows:?}"
+    );
     let log = run.result("log.jsonl");
-    let told = log.lines().filter(|line| line.contains("WARN") && line.contains(reason)).count();
+    let told = log
+        .lines()
+        .filter(|line| line.contains("WARN") && line.contains(reason))
+        .count();
     assert_eq!(told, 1, "{log}");
 }
 
@@ -119,25 +151,35 @@ fn a_truncated_last_image_is_skipped() {
 
 #[test]
 fn an_image_of_another_size_is_skipped() {
-    skips(4, "the dataset's first image is", |image| recording::resize(image, 1000, 400));
+    skips(4, "the dataset's first image is", |image| {
+        recording::resize(image, 1000, 400)
+    });
 }
 
 #[test]
 fn an_image_on_its_side_is_skipped_and_called_so() {
-    skips(4, "rotated by 90 degrees", |image| recording::resize(image, 400, 3779));
+    skips(4, "rotated by 90 degrees", |image| {
+        recording::resize(image, 400, 3779)
+    });
 }
 
 // Configuration.
 
 #[test]
 fn an_unknown_key_is_named_with_the_nearest_right_one() {
-    configured("[masking]\ntreshold = 3").refused_with(&["[masking]", "`treshold`", "did you mean `threshold`?"]);
+    configured("[masking]\ntreshold = 3").refused_with(&[
+        "[masking]",
+        "`treshold`",
+        "did you mean `threshold`?",
+    ]);
 }
 
 #[test]
 fn an_unknown_section_is_named_with_the_nearest_right_one() {
-    configured("[rotatoin]\nform = 'eq7'").refused_with(&["`rotatoin`", "did you mean `rotation`?"]);
-    configured("[stages.maskin]\ncommand = ['x']").refused_with(&["`maskin`", "did you mean `masking`?"]);
+    configured("[rotatoin]\nform = 'eq7'")
+        .refused_with(&["`rotatoin`", "did you mean `rotation`?"]);
+    configured("[stages.maskin]\ncommand = ['x']")
+        .refused_with(&["`maskin`", "did you mean `masking`?"]);
 }
 
 #[test]
@@ -153,19 +195,49 @@ fn an_impossible_value_is_told_with_what_is_possible() {
         ("[masking]\nthreshold = 300", ["[masking]", "300"]),
         ("[masking]\nlag = 99", ["masking.lag is 99", "16"]),
         ("[rotation]\nband_high = 7.0", ["rotation", "band_high"]),
-        ("[points]\ncapacity = 0", ["points.capacity is 0", "1 or more"]),
-        ("[refinement]\nkind = 'global-map'", ["global-map", "local-map"]),
-        ("[refinement]\nkeyframes = 0", ["refinement.keyframes = 0", "1 to 64"]),
-        ("[refinement]\ncell_m = -0.4", ["refinement.cell_m = -0.4", "0.05 to 10"]),
-        ("[refinement]\nreach_m = 1.0", ["refinement.reach_m = 1", "8 to 1000 cells"]),
-        ("[refinement]\nleast_overlap = 1.5", ["refinement.least_overlap = 1.5", "0 to 1"]),
-        ("[refinement]\njitter_m = nan", ["refinement.jitter_m = NaN", "positive"]),
+        (
+            "[points]\ncapacity = 0",
+            ["points.capacity is 0", "1 or more"],
+        ),
+        (
+            "[refinement]\nkind = 'global-map'",
+            ["global-map", "local-map"],
+        ),
+        (
+            "[refinement]\nkeyframes = 0",
+            ["refinement.keyframes = 0", "1 to 64"],
+        ),
+        (
+            "[refinement]\ncell_m = -0.4",
+            ["refinement.cell_m = -0.4", "0.05 to 10"],
+        ),
+        (
+            "[refinement]\nreach_m = 1.0",
+            ["refinement.reach_m = 1", "8 to 1000 cells"],
+        ),
+        (
+            "[refinement]\nleast_overlap = 1.5",
+            ["refinement.least_overlap = 1.5", "0 to 1"],
+        ),
+        (
+            "[refinement]\njitter_m = nan",
+            ["refinement.jitter_m = NaN", "positive"],
+        ),
         ("[dataset]\nformat = 'oxfort'", ["oxfort", "oxford"]),
         ("[simulation]\nscans = 0", ["simulation", "scans"]),
         ("[simulation.drive]\nspeed_m_s = 1e9", ["speed_m_s", "40"]),
-        ("[stages.masking]\nrestart = { limit = -1 }", ["masking", "-1"]),
-        ("[stages.masking]\nrestart = { window_s = -1.0 }", ["stages.masking", "window_s is -1"]),
-        ("[run]\nstall_timeout_s = inf", ["stall_timeout_s is inf", "0 or more"]),
+        (
+            "[stages.masking]\nrestart = { limit = -1 }",
+            ["masking", "-1"],
+        ),
+        (
+            "[stages.masking]\nrestart = { window_s = -1.0 }",
+            ["stages.masking", "window_s is -1"],
+        ),
+        (
+            "[run]\nstall_timeout_s = inf",
+            ["stall_timeout_s is inf", "0 or more"],
+        ),
     ] {
         let ended = configured(text);
         assert_ne!(ended.code(), Some(0), "accepted: {text}");
@@ -175,7 +247,9 @@ fn an_impossible_value_is_told_with_what_is_possible() {
 
 #[test]
 fn a_time_longer_than_any_run_is_no_limit() {
-    let run = Run::of_recording().set("run.stall_timeout_s=1e300").set("stages.masking.restart.window_s=1e300");
+    let run = Run::of_recording()
+        .set("run.stall_timeout_s=1e300")
+        .set("stages.masking.restart.window_s=1e300");
     run.finish().succeeded();
 }
 
@@ -188,15 +262,27 @@ fn a_value_of_the_wrong_type_is_told_with_its_section() {
 #[test]
 fn an_override_without_key_or_value_is_told() {
     for sentence in ["masking", "threshold=3", "=", "masking.threshold"] {
-        Run::of_recording().set(sentence).finish().refused_with(&["--set", sentence, "section.key=value"]);
+        Run::of_recording().set(sentence).finish().refused_with(&[
+            "--set",
+            sentence,
+            "section.key=value",
+        ]);
     }
-    Run::of_recording().set("masking.treshold=3").finish().refused_with(&["did you mean `threshold`?"]);
-    Run::of_recording().set("masking.threshold=300").finish().refused_with(&["300"]);
+    Run::of_recording()
+        .set("masking.treshold=3")
+        .finish()
+        .refused_with(&["did you mean `threshold`?"]);
+    Run::of_recording()
+        .set("masking.threshold=300")
+        .finish()
+        .refused_with(&["300"]);
 }
 
 #[test]
 fn a_missing_configuration_is_told() {
-    Run::of_file(Path::new("no/such.toml")).finish().refused_with(&["no/such.toml", "No such file"]);
+    Run::of_file(Path::new("no/such.toml"))
+        .finish()
+        .refused_with(&["no/such.toml", "No such file"]);
 }
 
 #[test]
@@ -208,7 +294,11 @@ fn a_configuration_that_is_not_toml_is_told_with_the_place() {
 fn a_bad_rate_on_the_command_line_is_told() {
     let ended = Run::of_recording().rate("fast").finish();
     assert_eq!(ended.code(), Some(2), "{}", ended.stderr);
-    assert!(ended.stderr.contains("--rate") && ended.stderr.contains("`realtime`"), "{}", ended.stderr);
+    assert!(
+        ended.stderr.contains("--rate") && ended.stderr.contains("`realtime`"),
+        "{}",
+        ended.stderr
+    );
 }
 
 // The machine.
@@ -216,8 +306,10 @@ fn a_bad_rate_on_the_command_line_is_told() {
 #[test]
 fn a_stage_command_that_does_not_exist_is_told() {
     for stage in STAGES {
-        let run = Run::of_recording().set(&format!("stages.{stage}.command=['/no/such/program', 'x']"));
-        run.finish().failed_with(&["cannot start", stage, "/no/such/program x", "No such file"]);
+        let run =
+            Run::of_recording().set(&format!("stages.{stage}.command=['/no/such/program', 'x']"));
+        run.finish()
+            .failed_with(&["cannot start", stage, "/no/such/program x", "No such file"]);
     }
 }
 
@@ -231,7 +323,11 @@ fn an_unknown_stage_and_a_stage_without_a_run_are_told() {
     stage("maskin").refused_with(&["`maskin`", "masking"]);
     let ended = stage("masking");
     assert_eq!(ended.code(), Some(2));
-    assert!(ended.stderr.lines().count() == 1 && ended.stderr.contains("gyre run"), "{}", ended.stderr);
+    assert!(
+        ended.stderr.lines().count() == 1 && ended.stderr.contains("gyre run"),
+        "{}",
+        ended.stderr
+    );
 }
 
 #[test]
@@ -239,25 +335,41 @@ fn results_that_cannot_be_written_are_told() {
     let run = Run::of_recording();
     let file = run.folder().join("file");
     fs::write(&file, "").unwrap();
-    run.into(&file.join("out")).finish().refused_with(&["cannot write to", "file/out"]);
+    run.into(&file.join("out"))
+        .finish()
+        .refused_with(&["cannot write to", "file/out"]);
 }
 
 #[test]
 fn a_journal_of_another_program_is_told() {
     let run = Run::of_recording();
     fs::create_dir_all(run.out().join("journal")).unwrap();
-    fs::write(run.out().join("journal/poses.journal"), "dear diary, today I drove around the block").unwrap();
-    run.finish().refused_with(&["poses.journal", "not a journal", "--out"]);
+    fs::write(
+        run.out().join("journal/poses.journal"),
+        "dear diary, today I drove around the block",
+    )
+    .unwrap();
+    run.finish()
+        .refused_with(&["poses.journal", "not a journal", "--out"]);
 }
 
 /// The command of `run` with a small or no shared memory of its own; `None` where the system does not permit that.
 fn with_shared_memory(run: &Run, options: &str) -> Option<Command> {
     let unshare = |script: &str| {
         let mut command = Command::new("unshare");
-        command.args(["--mount", "sh", "-c", &format!("mount -t tmpfs -o {options} tmpfs /dev/shm && {script}"), "sh"]);
+        command.args([
+            "--mount",
+            "sh",
+            "-c",
+            &format!("mount -t tmpfs -o {options} tmpfs /dev/shm && {script}"),
+            "sh",
+        ]);
         command
     };
-    if !unshare("true").output().is_ok_and(|output| output.status.success()) {
+    if !unshare("true")
+        .output()
+        .is_ok_and(|output| output.status.success())
+    {
         println!("skipped: a mount namespace of its own is not permitted here");
         return None;
     }
@@ -270,25 +382,48 @@ fn with_shared_memory(run: &Run, options: &str) -> Option<Command> {
 #[test]
 fn too_little_shared_memory_is_told_with_the_need_before_the_first_scan() {
     let run = Run::of_recording();
-    let Some(command) = with_shared_memory(&run, "size=1m") else { return };
+    let Some(command) = with_shared_memory(&run, "size=1m") else {
+        return;
+    };
     let ended = run.start_as(command).finish();
-    ended.refused_with(&["/dev/shm has 1.0 MB free", "the run needs", "MB of shared memory", "--shm-size"]);
+    ended.refused_with(&[
+        "/dev/shm has 1.0 MB free",
+        "the run needs",
+        "MB of shared memory",
+        "--shm-size",
+    ]);
     assert!(!run.out().join("journal").exists(), "before the first scan");
 }
 
 #[test]
 fn shared_memory_that_cannot_be_written_is_told() {
     let run = Run::of_recording();
-    let Some(command) = with_shared_memory(&run, "ro,size=1g") else { return };
-    run.start_as(command).finish().refused_with(&["/dev/shm", "writable tmpfs"]);
+    let Some(command) = with_shared_memory(&run, "ro,size=1g") else {
+        return;
+    };
+    run.start_as(command)
+        .finish()
+        .refused_with(&["/dev/shm", "writable tmpfs"]);
 }
 
 #[test]
 fn just_enough_shared_memory_suffices() {
     let run = Run::of_recording();
-    let Some(small) = with_shared_memory(&run, "size=1m") else { return };
+    let Some(small) = with_shared_memory(&run, "size=1m") else {
+        return;
+    };
     let said = run.start_as(small).finish().stderr;
-    let needed: f64 = said.split("needs ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    let needed: f64 = said
+        .split("needs ")
+        .nth(1)
+        .unwrap()
+        .split(' ')
+        .next()
+        .unwrap()
+        .parse()
+        .unwrap();
     let size = format!("size={}k", (needed * 1e6 / 1024.0) as u64 + 200);
-    run.start_as(with_shared_memory(&run, &size).unwrap()).finish().succeeded();
+    run.start_as(with_shared_memory(&run, &size).unwrap())
+        .finish()
+        .succeeded();
 }

@@ -24,8 +24,13 @@ fn run() -> Run {
 /// `gyre evaluate` on its trajectory.
 fn evaluate(run: &Run) -> Command {
     let mut command = gyre();
-    command.arg("evaluate").arg("--estimate").arg(run.out().join("trajectory.tum"));
-    command.arg("--ground-truth").arg(recording::small().join("gt/radar_odometry.csv"));
+    command
+        .arg("evaluate")
+        .arg("--estimate")
+        .arg(run.out().join("trajectory.tum"));
+    command
+        .arg("--ground-truth")
+        .arg(recording::small().join("gt/radar_odometry.csv"));
     command
 }
 
@@ -47,26 +52,41 @@ fn odometry(run: &Run, change: impl FnOnce(String) -> String) -> PathBuf {
 }
 
 fn figure(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("{value} is no number"))
 }
 
 #[test]
 fn a_table_and_all_plots_come_of_an_odometry() {
     let run = run();
     let plots = run.folder().join("new/plots");
-    let command = with(with(evaluate(&run), "--odometry", run.out().join("odometry.csv")), "--plots", &plots);
+    let command = with(
+        with(evaluate(&run), "--odometry", run.out().join("odometry.csv")),
+        "--plots",
+        &plots,
+    );
     let ended = Ended::of(command);
     let table = &ended.succeeded().stdout;
     let rows_of = |motions: &str| {
         let row = |line: &&str| line.split_whitespace().take(2).eq([motions, "all"]);
         table.lines().filter(row).count()
     };
-    assert_eq!(["1", "4", "16", "64"].map(rows_of), [1, 1, 1, 0], "23 motions have no stretch of 64:\n{table}");
+    assert_eq!(
+        ["1", "4", "16", "64"].map(rows_of),
+        [1, 1, 1, 0],
+        "23 motions have no stretch of 64:\n{table}"
+    );
     for word in ["ATE", "covariance    23 motions", "first", "second"] {
         assert!(table.contains(word), "{word} is not in:\n{table}");
     }
     for plot in ["trajectory.svg", "errors.svg", "bands.svg"] {
-        assert!(fs::read_to_string(plots.join(plot)).unwrap().contains("<svg"), "{plot}");
+        assert!(
+            fs::read_to_string(plots.join(plot))
+                .unwrap()
+                .contains("<svg"),
+            "{plot}"
+        );
     }
 }
 
@@ -74,7 +94,14 @@ fn a_table_and_all_plots_come_of_an_odometry() {
 fn a_run_reports_the_same_as_its_evaluation() {
     let run = Run::of_recording();
     let ended = run.finish();
-    assert!(ended.succeeded().stdout.contains("covariance    23 motions"), "{}", ended.stdout);
+    assert!(
+        ended
+            .succeeded()
+            .stdout
+            .contains("covariance    23 motions"),
+        "{}",
+        ended.stdout
+    );
     let (reported, evaluated) = (&run.summary()["evaluation"], json(evaluate(&run)));
     for place in [
         "/ate/rmse_m",
@@ -83,9 +110,13 @@ fn a_run_reports_the_same_as_its_evaluation() {
         "/nees/by_length/1/second_half/yaw/ratio",
         "/nees/by_length/2/all/translation/ratio",
     ] {
-        let [reported, evaluated] = [reported, &evaluated].map(|json| figure(json.pointer(place).unwrap()));
+        let [reported, evaluated] =
+            [reported, &evaluated].map(|json| figure(json.pointer(place).unwrap()));
         // files have so many decimals
-        assert!((reported / evaluated - 1.0).abs() < 1e-3, "{place}: {reported} and {evaluated}");
+        assert!(
+            (reported / evaluated - 1.0).abs() < 1e-3,
+            "{place}: {reported} and {evaluated}"
+        );
     }
 }
 
@@ -95,12 +126,23 @@ fn two_halves_of_a_drive_are_judged_apart() {
     let whole = json(evaluate(&run));
     let half = |part| json(with(evaluate(&run), "--nees-part", part));
     let halves = [half("0..50"), half("50..100")];
-    let motions = halves.each_ref().map(|half| half["nees"]["motions"].as_u64().unwrap());
+    let motions = halves
+        .each_ref()
+        .map(|half| half["nees"]["motions"].as_u64().unwrap());
     assert_eq!(motions.iter().sum::<u64>(), recording::SCANS as u64 - 1);
     for (half, name) in halves.iter().zip(["first_half", "second_half"]) {
-        assert_eq!(half["ate"], whole["ate"], "the trajectory is judged as a whole");
-        let [alone, beside] = [&half["nees"]["by_length"][0]["all"], &whole["nees"]["by_length"][0][name]];
-        assert!((figure(&alone["pose"]["ratio"]) - figure(&beside["pose"]["ratio"])).abs() < 1e-9, "{name}");
+        assert_eq!(
+            half["ate"], whole["ate"],
+            "the trajectory is judged as a whole"
+        );
+        let [alone, beside] = [
+            &half["nees"]["by_length"][0]["all"],
+            &whole["nees"]["by_length"][0][name],
+        ];
+        assert!(
+            (figure(&alone["pose"]["ratio"]) - figure(&beside["pose"]["ratio"])).abs() < 1e-9,
+            "{name}"
+        );
     }
 }
 
@@ -113,23 +155,44 @@ fn an_odometry_with_a_column_missing_or_damaged_is_refused_in_a_sentence() {
     let missing = odometry(&run, |text| text.replacen("cov_yyaw", "spread", 1));
     refused(&missing, &["changed.csv", "no column cov_yyaw"]);
     let damaged = odometry(&run, |text| {
-        let x_m = text.lines().nth(1).and_then(|row| row.split(',').nth(5)).unwrap();
+        let x_m = text
+            .lines()
+            .nth(1)
+            .and_then(|row| row.split(',').nth(5))
+            .unwrap();
         text.replacen(x_m, "far", 1)
     });
     refused(&damaged, &["changed.csv, line 2", "\"far\" is no number"]);
     let cut = odometry(&run, |text| text[..text.len() - 30].to_owned());
     refused(&cut, &["changed.csv, line 24", "fields, 28 in the header"]);
     refused(&run.out().join("none.csv"), &["cannot read", "none.csv"]);
-    refused(&run.out().join("trajectory.tum"), &["trajectory.tum is no odometry.csv"]);
+    refused(
+        &run.out().join("trajectory.tum"),
+        &["trajectory.tum is no odometry.csv"],
+    );
 }
 
 #[test]
 fn an_odometry_of_another_drive_beside_the_trajectory_is_left_out_with_a_word() {
     let run = run();
-    fs::write(run.out().join("odometry.csv"), run.odometry().replace(",154713", ",154714")).unwrap();
+    fs::write(
+        run.out().join("odometry.csv"),
+        run.odometry().replace(",154713", ",154714"),
+    )
+    .unwrap();
     let ended = Ended::of(evaluate(&run));
-    assert!(!ended.succeeded().stdout.contains("covariance"), "{}", ended.stdout);
-    assert!(ended.stderr.contains("odometry.csv is not judged: its stamps are not the estimate's"), "{}", ended.stderr);
+    assert!(
+        !ended.succeeded().stdout.contains("covariance"),
+        "{}",
+        ended.stdout
+    );
+    assert!(
+        ended
+            .stderr
+            .contains("odometry.csv is not judged: its stamps are not the estimate's"),
+        "{}",
+        ended.stderr
+    );
 }
 
 #[test]

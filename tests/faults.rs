@@ -24,7 +24,11 @@ const FARTHER: f64 = 1.2;
 /// Every 20th scan is spoilt, or every tenth dropped.
 fn plan(fault: Fault) -> FaultPlan {
     let every = if fault == Fault::Dropped { 10 } else { 20 };
-    FaultPlan { fault, every: NonZeroUsize::new(every).unwrap(), seed: 1 }
+    FaultPlan {
+        fault,
+        every: NonZeroUsize::new(every).unwrap(),
+        seed: 1,
+    }
 }
 
 /// What came of a drive.
@@ -37,13 +41,22 @@ struct Outcome {
 
 impl Outcome {
     fn of(data: &Path, spoilt: usize) -> Self {
-        let configuration = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/radiate.toml");
+        let configuration =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/radiate.toml");
         let run = Run::of_file(&configuration).data(data).rate("max");
         run.complete();
         let summary = run.summary();
         let figure = |place| summary.pointer(place).and_then(Value::as_f64).unwrap();
-        let (ate_m, seg_percent) = (figure("/evaluation/ate/rmse_m"), figure("/evaluation/seg/percent"));
-        Self { spoilt, ate_m, seg_percent, summary }
+        let (ate_m, seg_percent) = (
+            figure("/evaluation/ate/rmse_m"),
+            figure("/evaluation/seg/percent"),
+        );
+        Self {
+            spoilt,
+            ate_m,
+            seg_percent,
+            summary,
+        }
     }
 
     fn with(fault: Fault, data: &Path) -> Self {
@@ -58,16 +71,29 @@ impl Outcome {
     }
 
     fn row(&self, name: &str, clean: &Self) -> String {
-        let count = |place| self.count(place).map_or("-".to_owned(), |count| count.to_string());
+        let count = |place| {
+            self.count(place)
+                .map_or("-".to_owned(), |count| count.to_string())
+        };
         let counts = ["/processed", "/unreadable", MISSING, "/breaks", DOUBTED].map(count);
         let counts: String = counts.iter().map(|count| format!("{count:>11}")).collect();
-        let Self { spoilt, ate_m, seg_percent, .. } = self;
-        format!("{name:12}{spoilt:6}{ate_m:9.2}{:8.2}{seg_percent:8.2}{counts}", ate_m / clean.ate_m)
+        let Self {
+            spoilt,
+            ate_m,
+            seg_percent,
+            ..
+        } = self;
+        format!(
+            "{name:12}{spoilt:6}{ate_m:9.2}{:8.2}{seg_percent:8.2}{counts}",
+            ate_m / clean.ate_m
+        )
     }
 }
 
 fn print_table(clean: &Outcome, faulty: &[(Fault, Outcome)]) {
-    println!("fault       spoilt    ATE m   ratio   seg %  processed unreadable    missing     breaks    doubted");
+    println!(
+        "fault       spoilt    ATE m   ratio   seg %  processed unreadable    missing     breaks    doubted"
+    );
     println!("{}", clean.row("none", clean));
     for (fault, outcome) in faulty {
         println!("{}", outcome.row(fault.name(), clean));
@@ -76,8 +102,16 @@ fn print_table(clean: &Outcome, faulty: &[(Fault, Outcome)]) {
 
 /// Asserts that each spoilt scan has added at least one to the count that its fault belongs to.
 fn assert_counted(fault: Fault, clean: &Outcome, faulty: &Outcome) {
-    let place = if fault == Fault::Dropped { MISSING } else { DOUBTED };
-    let count = |outcome: &Outcome| outcome.count(place).unwrap_or_else(|| panic!("the summary has no {place}"));
+    let place = if fault == Fault::Dropped {
+        MISSING
+    } else {
+        DOUBTED
+    };
+    let count = |outcome: &Outcome| {
+        outcome
+            .count(place)
+            .unwrap_or_else(|| panic!("the summary has no {place}"))
+    };
     let (before, after) = (count(clean), count(faulty));
     assert!(
         after >= before + faulty.spoilt as u64,
@@ -88,12 +122,19 @@ fn assert_counted(fault: Fault, clean: &Outcome, faulty: &Outcome) {
 
 #[test]
 fn no_fault_leads_a_real_drive_astray_and_each_is_counted() {
-    let Some(data) = real_data("radiate-2019-02-12") else { return };
+    let Some(data) = real_data("radiate-2019-02-12") else {
+        return;
+    };
     let clean = Outcome::of(&data, 0);
     let faulty = Fault::ALL.map(|fault| (fault, Outcome::with(fault, &data)));
     print_table(&clean, &faulty);
     for (fault, outcome) in &faulty {
-        assert!(outcome.ate_m <= FARTHER * clean.ate_m, "{fault}: {} m, {} m without", outcome.ate_m, clean.ate_m);
+        assert!(
+            outcome.ate_m <= FARTHER * clean.ate_m,
+            "{fault}: {} m, {} m without",
+            outcome.ate_m,
+            clean.ate_m
+        );
         assert_counted(*fault, &clean, outcome);
     }
 }
@@ -102,9 +143,20 @@ fn no_fault_leads_a_real_drive_astray_and_each_is_counted() {
 fn spoilt_small(folder: &Path, fault: &str) -> PathBuf {
     let out = folder.join(fault);
     let mut command = gyre();
-    command.arg("spoil").arg(recording::small()).args(["--every", "10", "--fault", fault, "--out"]).arg(&out);
+    command
+        .arg("spoil")
+        .arg(recording::small())
+        .args(["--every", "10", "--fault", fault, "--out"])
+        .arg(&out);
     let ended = Ended::of(command);
-    assert!(ended.succeeded().stdout.contains(&format!("with {fault} in 2 scans: 10 20")), "{}", ended.stdout);
+    assert!(
+        ended
+            .succeeded()
+            .stdout
+            .contains(&format!("with {fault} in 2 scans: 10 20")),
+        "{}",
+        ended.stdout
+    );
     out
 }
 
@@ -123,7 +175,10 @@ fn a_spoilt_scan_is_a_scan_all_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let run = Run::of_recording_named(spoilt_small(folder.path(), "noise").to_str().unwrap());
     assert_eq!(odometry::rows(&run.complete()).len(), recording::SCANS - 1);
-    assert_eq!((&run.summary()["missing"], &run.summary()["unreadable"]), (&Value::from(0), &Value::from(0)));
+    assert_eq!(
+        (&run.summary()["missing"], &run.summary()["unreadable"]),
+        (&Value::from(0), &Value::from(0))
+    );
 }
 
 #[test]
@@ -131,7 +186,11 @@ fn what_cannot_be_spoilt_is_told_in_a_sentence() {
     let folder = tempfile::tempdir().unwrap();
     let spoil = |data: &Path, out: &str| {
         let mut command = gyre();
-        command.arg("spoil").arg(data).args(["--fault", "noise", "--out"]).arg(folder.path().join(out));
+        command
+            .arg("spoil")
+            .arg(data)
+            .args(["--fault", "noise", "--out"])
+            .arg(folder.path().join(out));
         Ended::of(command)
     };
     spoil(&folder.path().join("none"), "new").refused_with(&["none", "no such folder"]);

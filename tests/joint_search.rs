@@ -10,7 +10,13 @@ use common::{Run, odometry};
 use serde_json::Value;
 
 const JOINT: &str = "joint-search";
-const STAGES: [&str; 5] = ["radar-replay", "masking", JOINT, "refinement", "pose-integration"];
+const STAGES: [&str; 5] = [
+    "radar-replay",
+    "masking",
+    JOINT,
+    "refinement",
+    "pose-integration",
+];
 const SCANS: usize = 64;
 
 /// The demo with another search.
@@ -27,14 +33,28 @@ fn five_processes_give_the_same_bytes_again_though_one_is_killed() {
     let rows = odometry::rows(&undisturbed);
     assert_eq!(rows.len(), SCANS - 1);
     odometry::assert_unbroken(&rows);
-    let names = |object: &Value| object.as_object().unwrap().keys().cloned().collect::<BTreeSet<_>>();
+    let names = |object: &Value| {
+        object
+            .as_object()
+            .unwrap()
+            .keys()
+            .cloned()
+            .collect::<BTreeSet<_>>()
+    };
     let stages = BTreeSet::from(STAGES.map(str::to_owned));
     assert_eq!(names(&summary["stages"]), stages);
-    assert_eq!(names(&summary["latency"]["stages"]), stages, "stages that the run has not have no latency");
+    assert_eq!(
+        names(&summary["latency"]["stages"]),
+        stages,
+        "stages that the run has not have no latency"
+    );
     assert_eq!(summary["stages"][JOINT]["allocations_after_five"], 0);
     let path = summary["evaluation"]["path_m"].as_f64().unwrap();
     let error = summary["evaluation"]["ate"]["rmse_m"].as_f64().unwrap();
-    assert!(path > 100.0 && error < 0.02 * path, "{error} m over {path} m");
+    assert!(
+        path > 100.0 && error < 0.02 * path,
+        "{error} m over {path} m"
+    );
 
     let again = demo().rate("8");
     let mut running = again.start();
@@ -45,5 +65,11 @@ fn five_processes_give_the_same_bytes_again_though_one_is_killed() {
     ended.succeeded();
     assert_eq!(again.odometry(), undisturbed, "{}", ended.stderr);
     let summary = again.summary();
-    assert_eq!((&summary["restarts"][JOINT], summary["recovery_ms"].as_array().unwrap().len()), (&Value::from(2), 2));
+    assert_eq!(
+        (
+            &summary["restarts"][JOINT],
+            summary["recovery_ms"].as_array().unwrap().len()
+        ),
+        (&Value::from(2), 2)
+    );
 }

@@ -18,7 +18,9 @@ const SEEDS: [u32; 3] = [1, 2, 3];
 fn evaluation(configuration: &str, seed: u32) -> Value {
     let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
     let run = Run::of_file(&configs.join(configuration)).rate("max");
-    let run = run.set(&format!("simulation.scans={SCANS}")).set(&format!("simulation.seed={seed}"));
+    let run = run
+        .set(&format!("simulation.scans={SCANS}"))
+        .set(&format!("simulation.seed={seed}"));
     let rows = odometry::rows(&run.complete());
     assert_eq!(rows.len(), SCANS - 1);
     odometry::assert_unbroken(&rows);
@@ -30,15 +32,30 @@ fn evaluation(configuration: &str, seed: u32) -> Value {
 fn the_shipped_configuration_ends_within_a_hundredth_and_the_papers_does_not_come_near() {
     let (mut shipped_m, mut papers_m) = (0.0, 0.0);
     for seed in SEEDS {
-        let [shipped, papers] = ["k2pi.toml", "k2pi-checchin.toml"].map(|file| evaluation(file, seed));
+        let [shipped, papers] =
+            ["k2pi.toml", "k2pi-checchin.toml"].map(|file| evaluation(file, seed));
         let percent = shipped["end"]["percent"].as_f64().unwrap();
-        println!("seed {seed}: shipped {}, paper's {}", shipped["end"], papers["end"]);
-        assert!(shipped["path_m"].as_f64().unwrap() > 150.0 && percent < 1.0, "seed {seed}: {}", shipped["end"]);
+        println!(
+            "seed {seed}: shipped {}, paper's {}",
+            shipped["end"], papers["end"]
+        );
         assert!(
-            shipped["within_3_sigma_percent"].as_array().unwrap().iter().all(|share| share.as_f64().unwrap() > 80.0)
+            shipped["path_m"].as_f64().unwrap() > 150.0 && percent < 1.0,
+            "seed {seed}: {}",
+            shipped["end"]
+        );
+        assert!(
+            shipped["within_3_sigma_percent"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .all(|share| share.as_f64().unwrap() > 80.0)
         );
         shipped_m += shipped["end"]["position_m"].as_f64().unwrap();
         papers_m += papers["end"]["position_m"].as_f64().unwrap();
     }
-    assert!(papers_m > 3.0 * shipped_m, "{papers_m} m in sum by the paper's, {shipped_m} m by the shipped one");
+    assert!(
+        papers_m > 3.0 * shipped_m,
+        "{papers_m} m in sum by the paper's, {shipped_m} m by the shipped one"
+    );
 }

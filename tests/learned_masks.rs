@@ -23,7 +23,10 @@ const ONE_SCAN: &str = "single-127";
 const TWO_SCANS: &str = "pair-127";
 
 fn card(model: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../masking/tests/models").join(model).with_extension("toml")
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../masking/tests/models")
+        .join(model)
+        .with_extension("toml")
 }
 
 /// A run of the small recording with a learned mask.
@@ -54,16 +57,28 @@ fn a_network_changes_the_motions_and_the_run_says_which_one_it_was() {
         assert_ne!(run.complete(), undisturbed());
         assert_eq!(run.odometry(), masked_by(model).complete());
         odometry::assert_unbroken(&odometry::rows(&run.odometry()));
-        let (said, resolved) =
-            (run.summary()["mask"].clone(), run.result("config.toml").parse::<toml::Table>().unwrap());
-        assert_eq!(said["model"], card(model).canonicalize().unwrap().to_str().unwrap());
-        assert_eq!(said["sha256"], resolved["masking"]["sha256"].as_str().unwrap());
+        let (said, resolved) = (
+            run.summary()["mask"].clone(),
+            run.result("config.toml").parse::<toml::Table>().unwrap(),
+        );
+        assert_eq!(
+            said["model"],
+            card(model).canonicalize().unwrap().to_str().unwrap()
+        );
+        assert_eq!(
+            said["sha256"],
+            resolved["masking"]["sha256"].as_str().unwrap()
+        );
     }
 }
 
 /// The motions that the stages' libraries find in the small recording with this mask and no process: x, y, yaw.
 fn motions_by_hand(masking: &MaskingConfig) -> Vec<[f64; 3]> {
-    let raster = RasterConfig { n: 127, cell_m: 0.8, ..RasterConfig::default() };
+    let raster = RasterConfig {
+        n: 127,
+        cell_m: 0.8,
+        ..RasterConfig::default()
+    };
     let mut dataset = gyre_radar::open(recording::small(), &DatasetOptions::default()).unwrap();
     let mut masker = Masker::new(&raster, &PointsConfig::default(), masking).unwrap();
     let mut rotations = Rotations::new(raster.n, &RotationConfig::default()).unwrap();
@@ -74,14 +89,25 @@ fn motions_by_hand(masking: &MaskingConfig) -> Vec<[f64; 3]> {
         scan
     });
     let scans: Vec<OwnedScan> = scans.collect();
-    let sweep = |number: usize| Sweep { number: number as u64, scan: scans[number].view(), motion: None };
+    let sweep = |number: usize| Sweep {
+        number: number as u64,
+        scan: scans[number].view(),
+        motion: None,
+    };
     let second = MaskedHeader::raster_values(raster.n * raster.n);
     let mut rasters = vec![0.0; 2 * second];
     let motion = |later: usize| {
-        masker.mask(&sweep(later), Some(&sweep(later - 1)), &mut rasters).unwrap();
+        masker
+            .mask(&sweep(later), Some(&sweep(later - 1)), &mut rasters)
+            .unwrap();
         let earlier = Some(&rasters[second..][..raster.n * raster.n]);
-        let pair = Pair { later: &rasters[..raster.n * raster.n], earlier };
-        let motion = translations.next(pair, rotations.next(later as u64, pair, true).unwrap()).unwrap();
+        let pair = Pair {
+            later: &rasters[..raster.n * raster.n],
+            earlier,
+        };
+        let motion = translations
+            .next(pair, rotations.next(later as u64, pair, true).unwrap())
+            .unwrap();
         [motion.x_m, motion.y_m, motion.yaw_rad]
     };
     (1..recording::SCANS).map(motion).collect()
@@ -92,17 +118,33 @@ fn the_search_compares_both_scans_as_the_network_of_this_pair_masks_them() {
     if !runtime_is_installed() {
         return;
     }
-    let run = masked_by(TWO_SCANS).set("masking.compensate=false").set("refinement.kind=none");
-    let (csv, masking) = (run.complete(), MaskingConfig { compensate: false, ..MaskingConfig::default() });
+    let run = masked_by(TWO_SCANS)
+        .set("masking.compensate=false")
+        .set("refinement.kind=none");
+    let (csv, masking) = (
+        run.complete(),
+        MaskingConfig {
+            compensate: false,
+            ..MaskingConfig::default()
+        },
+    );
     let model = Some(card(TWO_SCANS));
-    let expected = motions_by_hand(&MaskingConfig { kind: MaskKind::Learned, model, ..masking });
+    let expected = motions_by_hand(&MaskingConfig {
+        kind: MaskKind::Learned,
+        model,
+        ..masking
+    });
     let columns: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
-    let places = ["x_m", "y_m", "yaw_rad"].map(|name| columns.iter().position(|column| *column == name).unwrap());
+    let places = ["x_m", "y_m", "yaw_rad"]
+        .map(|name| columns.iter().position(|column| *column == name).unwrap());
     for (row, expected) in csv.lines().skip(1).zip(&expected) {
         let fields: Vec<&str> = row.split(',').collect();
         let found: [f64; 3] = places.map(|place| fields[place].parse().unwrap());
         assert!(
-            found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-6),
+            found
+                .iter()
+                .zip(expected)
+                .all(|(found, expected)| (found - expected).abs() < 1e-6),
             "{row}: {expected:?}"
         );
     }
@@ -182,7 +224,8 @@ fn an_unreadable_scan_between_two_is_stepped_over_by_a_restart() {
     }
     let recording = recording::copy(16);
     recording::truncate(&recording::images(recording.path())[6], 100_000);
-    let run = || Run::of_recording_named(recording.path().to_str().unwrap()).masked_by(&card(TWO_SCANS));
+    let run =
+        || Run::of_recording_named(recording.path().to_str().unwrap()).masked_by(&card(TWO_SCANS));
     let alone = run().complete();
     for poses in [6, 7, 8] {
         let run = run().rate("6");
@@ -200,17 +243,33 @@ fn a_live_run_survives_the_death_of_masking_with_a_network_that_looks_at_two_sca
     if !runtime_is_installed() {
         return;
     }
-    for stages in [&["masking"][..], &["radar-replay"], &["masking", "radar-replay"]] {
-        let run = masked_by(TWO_SCANS).rate("4").set("run.mode=live").set("masking.stress_delay_ms=94");
+    for stages in [
+        &["masking"][..],
+        &["radar-replay"],
+        &["masking", "radar-replay"],
+    ] {
+        let run = masked_by(TWO_SCANS)
+            .rate("4")
+            .set("run.mode=live")
+            .set("masking.stress_delay_ms=94");
         let mut running = run.start();
         running.await_poses(5);
         for stage in stages {
             running.kill(stage);
         }
         running.finish().succeeded();
-        let (summary, count) = (run.summary(), |key: &str| run.summary()[key].as_u64().unwrap());
-        assert_eq!(count("processed") + count("dropped"), count("published"), "{stages:?}: {summary}");
-        assert!(count("dropped") > 0 && count("breaks") <= 1, "{stages:?}: {summary}");
+        let (summary, count) = (run.summary(), |key: &str| {
+            run.summary()[key].as_u64().unwrap()
+        });
+        assert_eq!(
+            count("processed") + count("dropped"),
+            count("published"),
+            "{stages:?}: {summary}"
+        );
+        assert!(
+            count("dropped") > 0 && count("breaks") <= 1,
+            "{stages:?}: {summary}"
+        );
     }
 }
 
@@ -225,7 +284,12 @@ fn gyre_allocates_nothing_for_a_scan_but_what_onnx_runtimes_binding_does() {
         run.complete();
         let stages = &run.summary()["stages"];
         let scans = recording::SCANS as u64 - 5;
-        assert_eq!(stages["masking"]["allocations_after_five"], OF_THE_BINDING * scans, "{}", stages["masking"]);
+        assert_eq!(
+            stages["masking"]["allocations_after_five"],
+            OF_THE_BINDING * scans,
+            "{}",
+            stages["masking"]
+        );
         assert_eq!(stages["refinement"]["allocations_after_five"], 0);
     }
 }
@@ -234,14 +298,36 @@ fn gyre_allocates_nothing_for_a_scan_but_what_onnx_runtimes_binding_does() {
 fn a_mask_that_cannot_be_made_is_refused_before_anything_starts() {
     let refused = |run: Run, words: &[&str]| {
         run.finish().refused_with(words);
-        assert!(!run.out().join("journal").exists(), "before anything starts");
+        assert!(
+            !run.out().join("journal").exists(),
+            "before anything starts"
+        );
     };
-    refused(Run::of_recording().set("masking.kind=learned"), &["masking.model does not name a model"]);
-    refused(masked_by(ONE_SCAN).set("masking.threads=0"), &["[masking]", "threads is 0", "1 to 64"]);
-    refused(masked_by(ONE_SCAN).set("masking.runtime=/no/such"), &["masking.runtime is /no/such", runtime::INSTALL]);
+    refused(
+        Run::of_recording().set("masking.kind=learned"),
+        &["masking.model does not name a model"],
+    );
+    refused(
+        masked_by(ONE_SCAN).set("masking.threads=0"),
+        &["[masking]", "threads is 0", "1 to 64"],
+    );
+    refused(
+        masked_by(ONE_SCAN).set("masking.runtime=/no/such"),
+        &["masking.runtime is /no/such", runtime::INSTALL],
+    );
     if runtime_is_installed() {
-        refused(masked_by("single-31"), &["raster.n is 127", "single-31.toml is for 31", "set raster.n = 31"]);
-        refused(masked_by("opset-99").set("raster.n=31"), &["opset-99.onnx has operators of version 99"]);
+        refused(
+            masked_by("single-31"),
+            &[
+                "raster.n is 127",
+                "single-31.toml is for 31",
+                "set raster.n = 31",
+            ],
+        );
+        refused(
+            masked_by("opset-99").set("raster.n=31"),
+            &["opset-99.onnx has operators of version 99"],
+        );
     }
 }
 
@@ -253,7 +339,10 @@ fn without_onnx_runtime_the_command_that_installs_it_is_told_and_other_masks_sti
         command.env("ORT_DYLIB_PATH", "/no/such/libonnxruntime.so");
         run.start_as(command).finish()
     };
-    without(&run).refused_with(&["ORT_DYLIB_PATH is /no/such/libonnxruntime.so", runtime::INSTALL]);
+    without(&run).refused_with(&[
+        "ORT_DYLIB_PATH is /no/such/libonnxruntime.so",
+        runtime::INSTALL,
+    ]);
     without(&Run::of_recording()).succeeded();
 }
 
@@ -275,5 +364,6 @@ fn an_unfinished_run_does_not_go_on_with_another_model() {
     running.await_poses(MIDDLE);
     running.kill_supervisor();
     install(TWO_SCANS);
-    run.finish().refused_with(&["unfinished run of another configuration", "--fresh"]);
+    run.finish()
+        .refused_with(&["unfinished run of another configuration", "--fresh"]);
 }

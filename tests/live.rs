@@ -17,7 +17,10 @@ const RATE: &str = "4";
 const SLOW_MASKING_MS: u64 = 94;
 
 fn live() -> Run {
-    Run::of_recording().rate(RATE).set("run.mode=live").set(&format!("masking.stress_delay_ms={SLOW_MASKING_MS}"))
+    Run::of_recording()
+        .rate(RATE)
+        .set("run.mode=live")
+        .set(&format!("masking.stress_delay_ms={SLOW_MASKING_MS}"))
 }
 
 /// Asserts that each scan is where it belongs: played, and then either in the chain or dropped.
@@ -29,13 +32,23 @@ fn assert_exact(summary: &Value, rows: &[Row]) {
     let chains = count("breaks") + 1;
     assert_eq!(count("processed"), rows.len() as u64 + chains, "{summary}");
     assert_eq!(count("processed") + count("dropped"), count("published"));
-    assert!(count("dropped") > 0, "masking is too slow for every scan: {summary}");
-    assert_eq!(rows.last().unwrap().scan, recording::SCANS as u64 - 1, "the last scan is nobody's to drop");
+    assert!(
+        count("dropped") > 0,
+        "masking is too slow for every scan: {summary}"
+    );
+    assert_eq!(
+        rows.last().unwrap().scan,
+        recording::SCANS as u64 - 1,
+        "the last scan is nobody's to drop"
+    );
 }
 
 /// Scans that the chain stepped over.
 fn stepped_over(rows: &[Row]) -> u64 {
-    rows.iter().map(|row| row.scan - row.previous_scan - 1).sum::<u64>() + rows[0].previous_scan
+    rows.iter()
+        .map(|row| row.scan - row.previous_scan - 1)
+        .sum::<u64>()
+        + rows[0].previous_scan
 }
 
 #[test]
@@ -47,13 +60,24 @@ fn slow_masking_drops_scans_and_the_chain_does_not_break() {
     odometry::assert_unbroken(&rows);
     assert_eq!(summary["breaks"], 0);
     assert_eq!(summary["dropped"], stepped_over(&rows));
-    assert_eq!(summary["stages"]["radar-replay"]["processed"], summary["published"]);
-    assert_eq!(summary["stages"]["masking"]["processed"], summary["processed"]);
+    assert_eq!(
+        summary["stages"]["radar-replay"]["processed"],
+        summary["published"]
+    );
+    assert_eq!(
+        summary["stages"]["masking"]["processed"],
+        summary["processed"]
+    );
 }
 
 #[test]
 fn a_stage_behind_masking_can_die_and_the_chain_does_not_break() {
-    for stage in ["rotation-search", "translation-search", "refinement", "pose-integration"] {
+    for stage in [
+        "rotation-search",
+        "translation-search",
+        "refinement",
+        "pose-integration",
+    ] {
         let run = live();
         let mut running = run.start();
         running.await_poses(5).kill(stage);
@@ -90,7 +114,10 @@ fn the_source_can_die_and_every_scan_is_still_accounted_for() {
 
 #[test]
 fn a_pipeline_that_keeps_up_drops_nothing_and_finds_what_lossless_finds() {
-    let run = Run::of_recording().rate("1.5").set("run.mode=live").set("source.scans=12");
+    let run = Run::of_recording()
+        .rate("1.5")
+        .set("run.mode=live")
+        .set("source.scans=12");
     let lossless = Run::of_recording().set("source.scans=12").complete();
     let live = run.complete();
     assert_eq!(run.summary()["dropped"], 0);

@@ -23,8 +23,15 @@ const MARGIN: usize = 6;
 const WIDTH: usize = 4 * PANEL + 5 * MARGIN;
 
 fn folder() -> TempDir {
-    let folder = tempfile::Builder::new().prefix("gyre-masks-").tempdir().unwrap();
-    fs::write(folder.path().join("small.toml"), "[raster]\nn = 127\ncell_m = 0.8\n").unwrap();
+    let folder = tempfile::Builder::new()
+        .prefix("gyre-masks-")
+        .tempdir()
+        .unwrap();
+    fs::write(
+        folder.path().join("small.toml"),
+        "[raster]\nn = 127\ncell_m = 0.8\n",
+    )
+    .unwrap();
     folder
 }
 
@@ -35,14 +42,21 @@ fn masks(folder: &Path, arguments: &[&str]) -> Ended {
 
 fn masks_of(data: &Path, folder: &Path, arguments: &[&str]) -> Ended {
     let mut command = gyre();
-    command.current_dir(folder).args(["masks", "small.toml", "--out", "out", "--data"]).arg(data).args(arguments);
+    command
+        .current_dir(folder)
+        .args(["masks", "small.toml", "--out", "out", "--data"])
+        .arg(data)
+        .args(arguments);
     Ended::of(command)
 }
 
 /// The `--set` sentences of a learned mask.
 fn learned(model: &str) -> [String; 2] {
     let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../masking/tests/models");
-    ["masking.kind=learned".to_owned(), format!("masking.model='{}'", models.join(model).display())]
+    [
+        "masking.kind=learned".to_owned(),
+        format!("masking.model='{}'", models.join(model).display()),
+    ]
 }
 
 /// A picture, row by row.
@@ -52,24 +66,40 @@ struct Picture {
 
 impl Picture {
     fn read(path: &Path) -> Self {
-        let mut reader = png::Decoder::new(BufReader::new(File::open(path).unwrap())).read_info().unwrap();
+        let mut reader = png::Decoder::new(BufReader::new(File::open(path).unwrap()))
+            .read_info()
+            .unwrap();
         let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
         let info = reader.next_frame(&mut bytes).unwrap();
-        assert_eq!((info.color_type, info.width as usize), (png::ColorType::Rgb, WIDTH));
-        Self { rows: bytes.chunks(3 * WIDTH).map(|row| row.as_chunks().0.to_vec()).collect() }
+        assert_eq!(
+            (info.color_type, info.width as usize),
+            (png::ColorType::Rgb, WIDTH)
+        );
+        Self {
+            rows: bytes
+                .chunks(3 * WIDTH)
+                .map(|row| row.as_chunks().0.to_vec())
+                .collect(),
+        }
     }
 
     /// The colours of a panel.
     fn colours(&self, row: usize, column: usize) -> BTreeSet<[u8; 3]> {
         let [top, left] = [row, column].map(|place| MARGIN + place * (PANEL + MARGIN));
-        self.rows[top..top + PANEL].iter().flat_map(|row| &row[left..left + PANEL]).copied().collect()
+        self.rows[top..top + PANEL]
+            .iter()
+            .flat_map(|row| &row[left..left + PANEL])
+            .copied()
+            .collect()
     }
 }
 
 /// The names of the pictures in a folder's `out`.
 fn names(folder: &Path) -> Vec<String> {
     let files = fs::read_dir(folder.join("out")).unwrap();
-    let mut names: Vec<String> = files.map(|file| file.unwrap().file_name().into_string().unwrap()).collect();
+    let mut names: Vec<String> = files
+        .map(|file| file.unwrap().file_name().into_string().unwrap())
+        .collect();
     names.sort();
     names
 }
@@ -77,7 +107,12 @@ fn names(folder: &Path) -> Vec<String> {
 /// The table's lines, number by number.
 fn figures(ended: &Ended) -> Vec<Vec<f64>> {
     let figure = |text: &str| text.parse().unwrap_or(f64::NAN);
-    ended.stdout.lines().skip(1).map(|line| line.split_whitespace().map(figure).collect()).collect()
+    ended
+        .stdout
+        .lines()
+        .skip(1)
+        .map(|line| line.split_whitespace().map(figure).collect())
+        .collect()
 }
 
 const BLACK: [u8; 3] = [0; 3];
@@ -88,7 +123,10 @@ fn a_threshold_keeps_or_takes_and_no_mask_keeps_all() {
     let folder = folder();
     let ended = masks(folder.path(), &["--scans", "12,3"]);
     ended.succeeded();
-    assert_eq!(names(folder.path()), ["masks.png", "scan-000003.png", "scan-000012.png"]);
+    assert_eq!(
+        names(folder.path()),
+        ["masks.png", "scan-000003.png", "scan-000012.png"]
+    );
     let picture = |name: &str| Picture::read(&folder.path().join("out").join(name));
     let scan = picture("scan-000003.png");
     assert_eq!(scan.rows.len(), PANEL + 2 * MARGIN);
@@ -98,13 +136,24 @@ fn a_threshold_keeps_or_takes_and_no_mask_keeps_all() {
     assert_eq!(overview.rows.len(), 2 * scan.rows.len());
     assert!(overview.rows[..scan.rows.len()] == scan.rows);
     for line in figures(&ended) {
-        let [power, above_floor, cells, points] = line[1..5] else { panic!("{line:?}") };
-        assert!((1.0..60.0).contains(&power) && (1.0..60.0).contains(&cells), "{line:?}");
+        let [power, above_floor, cells, points] = line[1..5] else {
+            panic!("{line:?}")
+        };
+        assert!(
+            (1.0..60.0).contains(&power) && (1.0..60.0).contains(&cells),
+            "{line:?}"
+        );
         assert_eq!((above_floor, points), (100.0, 100.0));
     }
 
-    let ended = masks(folder.path(), &["--scans", "3", "--set", "masking.kind=none"]);
-    assert_eq!(figures(ended.succeeded())[0][..5], [3.0, 100.0, 100.0, 100.0, 100.0]);
+    let ended = masks(
+        folder.path(),
+        &["--scans", "3", "--set", "masking.kind=none"],
+    );
+    assert_eq!(
+        figures(ended.succeeded())[0][..5],
+        [3.0, 100.0, 100.0, 100.0, 100.0]
+    );
     let scan = picture("scan-000003.png");
     assert_eq!(scan.colours(0, 1), BTreeSet::from([WHITE]));
 }
@@ -135,7 +184,13 @@ fn a_network_weighs_one_scan_or_both_of_a_pair_and_the_points() {
         let figures = figures(ended.succeeded());
         assert_eq!((figures[0][0], figures[1][0]), (0.0, 20.0));
         for line in figures {
-            assert!(line[1..5].iter().all(|percent| (0.1..99.9).contains(percent)) && line[1] < line[2], "{line:?}");
+            assert!(
+                line[1..5]
+                    .iter()
+                    .all(|percent| (0.1..99.9).contains(percent))
+                    && line[1] < line[2],
+                "{line:?}"
+            );
         }
         for name in ["scan-000000.png", "scan-000020.png"] {
             let scan = Picture::read(&folder.path().join("out").join(name));
@@ -153,37 +208,61 @@ fn sweeps_are_undone_by_the_motions_that_a_run_undoes_them_by() {
     let printed = figures(masks(folder.path(), &["--every", "1"]).succeeded());
     assert_eq!(printed.len(), recording::SCANS);
     // Nothing is known two scans before the third.
-    assert!(printed[..3].iter().all(|line| line[5].is_nan()) && printed[3..].iter().all(|line| line[5].is_finite()));
+    assert!(
+        printed[..3].iter().all(|line| line[5].is_nan())
+            && printed[3..].iter().all(|line| line[5].is_finite())
+    );
 
     let csv = Run::of_recording().set("refinement.kind=none").complete();
     let mut lines = csv.lines().map(|line| line.split(',').collect::<Vec<_>>());
     let header = lines.next().unwrap();
-    let places =
-        ["x_m", "y_m", "yaw_rad", "interval_ns"].map(|name| header.iter().position(|column| *column == name).unwrap());
+    let places = ["x_m", "y_m", "yaw_rad", "interval_ns"]
+        .map(|name| header.iter().position(|column| *column == name).unwrap());
     for (row, line) in lines.zip(&printed[3..]) {
         let [x, y, yaw, interval_ns] = places.map(|place| row[place].parse::<f64>().unwrap());
-        let twist = Twist::from_motion(&Isometry2::new(Vector2::new(x, y), yaw), interval_ns * 1e-9);
+        let twist =
+            Twist::from_motion(&Isometry2::new(Vector2::new(x, y), yaw), interval_ns * 1e-9);
         let found = [twist.vx_mps, twist.yaw_rate_radps.to_degrees()];
-        assert!(found.iter().zip(&line[5..]).all(|(run, here)| (run - here).abs() < 0.0051), "{found:?}: {line:?}");
+        assert!(
+            found
+                .iter()
+                .zip(&line[5..])
+                .all(|(run, here)| (run - here).abs() < 0.0051),
+            "{found:?}: {line:?}"
+        );
     }
 
     // Where the scans are far apart those between them are not all looked at: the motions differ by their noise.
     let far_apart = figures(masks(folder.path(), &["--scans", "0,23"]).succeeded());
     let all = &printed[23];
     let near = |figure: usize, most: f64| (far_apart[1][figure] - all[figure]).abs() < most;
-    assert!(near(1, 0.2) && near(3, 0.5) && near(5, 0.5) && near(6, 3.0), "{far_apart:?}: {all:?}");
+    assert!(
+        near(1, 0.2) && near(3, 0.5) && near(5, 0.5) && near(6, 3.0),
+        "{far_apart:?}: {all:?}"
+    );
 }
 
 #[test]
 fn a_simulation_is_drawn_as_it_is_rendered() {
     let folder = folder();
-    let simulated = "[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 5\noutput = { store = true }\n";
+    let simulated =
+        "[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 5\noutput = { store = true }\n";
     fs::write(folder.path().join("simulated.toml"), simulated).unwrap();
     let mut command = gyre();
-    command.current_dir(folder.path()).args(["masks", "simulated.toml", "--every", "2"]);
+    command
+        .current_dir(folder.path())
+        .args(["masks", "simulated.toml", "--every", "2"]);
     Ended::of(command).succeeded();
-    for name in ["masks.png", "scan-000000.png", "scan-000002.png", "scan-000004.png"] {
-        assert!(folder.path().join("out/masks").join(name).is_file(), "{name}");
+    for name in [
+        "masks.png",
+        "scan-000000.png",
+        "scan-000002.png",
+        "scan-000004.png",
+    ] {
+        assert!(
+            folder.path().join("out/masks").join(name).is_file(),
+            "{name}"
+        );
     }
 }
 
@@ -193,7 +272,11 @@ fn what_cannot_be_read_is_left_out_and_told() {
     let spoilt = recording::copy(8);
     recording::truncate(&recording::images(spoilt.path())[4], 100_000);
     let ended = masks_of(spoilt.path(), folder.path(), &["--scans", "4,5"]);
-    assert!(ended.succeeded().stderr.starts_with("left out: "), "{}", ended.stderr);
+    assert!(
+        ended.succeeded().stderr.starts_with("left out: "),
+        "{}",
+        ended.stderr
+    );
     assert_eq!(names(folder.path()), ["masks.png", "scan-000005.png"]);
     let ended = masks_of(spoilt.path(), folder.path(), &["--scans", "4"]);
     ended.failed_with(&["none of the chosen scans can be read"]);
@@ -202,12 +285,18 @@ fn what_cannot_be_read_is_left_out_and_told() {
 #[test]
 fn what_cannot_be_drawn_is_refused() {
     let folder = folder();
-    masks(folder.path(), &["--scans", "3,24"]).refused_with(&["--scans 24", "have the numbers 0 to 23"]);
-    masks(folder.path(), &["--set", "masking.kind=learned"]).refused_with(&["masking.model does not name a model"]);
+    masks(folder.path(), &["--scans", "3,24"])
+        .refused_with(&["--scans 24", "have the numbers 0 to 23"]);
+    masks(folder.path(), &["--set", "masking.kind=learned"])
+        .refused_with(&["masking.model does not name a model"]);
     masks(folder.path(), &["--set", "masking.kind=best"]).refused_with(&["[masking]", "best"]);
     masks_of(Path::new("nowhere"), folder.path(), &[]).refused_with(&["nowhere"]);
     fs::write(folder.path().join("out"), "").unwrap();
     masks(folder.path(), &[]).refused_with(&["cannot write to out"]);
     let both = masks(folder.path(), &["--scans", "1", "--every", "2"]);
-    assert!(both.code() == Some(2) && both.stderr.contains("--every"), "{}", both.stderr);
+    assert!(
+        both.code() == Some(2) && both.stderr.contains("--every"),
+        "{}",
+        both.stderr
+    );
 }

@@ -17,7 +17,10 @@ const MIDDLE: usize = recording::SCANS / 3;
 fn six_processes_of_their_own_are_there_while_it_runs() {
     let mut running = Run::of_recording().rate(MODERATE).start();
     let stages = running.await_stages();
-    assert_eq!(stages.keys().map(String::as_str).collect::<BTreeSet<_>>(), BTreeSet::from(STAGES));
+    assert_eq!(
+        stages.keys().map(String::as_str).collect::<BTreeSet<_>>(),
+        BTreeSet::from(STAGES)
+    );
     let pids: BTreeSet<_> = stages.values().copied().chain([running.pid()]).collect();
     assert_eq!(pids.len(), STAGES.len() + 1, "{stages:?}");
     for pid in stages.values() {
@@ -48,12 +51,22 @@ fn all_results_are_there_and_each_motion_has_a_row() {
     ] {
         assert!(run.result(file).contains(part), "{file}");
     }
-    assert_eq!(run.result("trajectory.tum").lines().filter(|line| !line.starts_with('#')).count(), recording::SCANS);
+    assert_eq!(
+        run.result("trajectory.tum")
+            .lines()
+            .filter(|line| !line.starts_with('#'))
+            .count(),
+        recording::SCANS
+    );
     for state in ["poses.journal", "refinement.map"] {
         assert!(run.out().join("journal").join(state).is_file(), "{state}");
     }
     for stage in STAGES {
-        assert_eq!(run.result(format!("log/{stage}.txt")), "", "{stage} complains");
+        assert_eq!(
+            run.result(format!("log/{stage}.txt")),
+            "",
+            "{stage} complains"
+        );
     }
 }
 
@@ -62,9 +75,11 @@ fn the_summary_accounts_for_every_scan() {
     let run = Run::of_recording();
     run.complete();
     let summary = run.summary();
-    for (key, value) in
-        [("published", recording::SCANS), ("processed", recording::SCANS), ("scans_in_recording", recording::SCANS)]
-    {
+    for (key, value) in [
+        ("published", recording::SCANS),
+        ("processed", recording::SCANS),
+        ("scans_in_recording", recording::SCANS),
+    ] {
         assert_eq!(summary[key], value, "{key}");
     }
     for key in ["dropped", "unreadable", "breaks", "resumed_after"] {
@@ -73,7 +88,11 @@ fn the_summary_accounts_for_every_scan() {
     assert_eq!(summary["ending"], "complete");
     assert_eq!(summary["restarts"].as_object().unwrap().len(), 0);
     for stage in STAGES {
-        assert_eq!(summary["stages"][stage]["processed"], recording::SCANS, "{stage}");
+        assert_eq!(
+            summary["stages"][stage]["processed"],
+            recording::SCANS,
+            "{stage}"
+        );
     }
 }
 
@@ -82,8 +101,14 @@ fn the_trajectory_follows_the_ground_truth() {
     let run = Run::of_recording();
     run.complete();
     let evaluation = &run.summary()["evaluation"];
-    let (path, error) = (evaluation["path_m"].as_f64().unwrap(), evaluation["ate"]["rmse_m"].as_f64().unwrap());
-    assert!(path > 40.0 && error < 0.02 * path, "{error} m over {path} m");
+    let (path, error) = (
+        evaluation["path_m"].as_f64().unwrap(),
+        evaluation["ate"]["rmse_m"].as_f64().unwrap(),
+    );
+    assert!(
+        path > 40.0 && error < 0.02 * path,
+        "{error} m over {path} m"
+    );
 }
 
 #[test]
@@ -115,25 +140,36 @@ fn the_rate_does_not_change_the_result() {
 #[test]
 fn the_window_does_not_change_the_result() {
     for window in [1, 2, 8] {
-        let odometry = Run::of_recording().set(&format!("run.window={window}")).complete();
+        let odometry = Run::of_recording()
+            .set(&format!("run.window={window}"))
+            .complete();
         assert_eq!(odometry, undisturbed(), "window {window}");
     }
 }
 
 #[test]
 fn the_resolved_configuration_repeats_the_run() {
-    let run = Run::of_recording().set("masking.threshold=70").set("rotation.magnitude=log");
+    let run = Run::of_recording()
+        .set("masking.threshold=70")
+        .set("rotation.magnitude=log");
     let odometry = run.complete();
     assert_ne!(odometry, undisturbed());
-    assert_eq!(Run::of_file(&run.out().join("config.toml")).complete(), odometry);
+    assert_eq!(
+        Run::of_file(&run.out().join("config.toml")).complete(),
+        odometry
+    );
 }
 
 #[test]
 fn the_resolved_configuration_plays_the_data_that_were_named_instead_of_a_simulation() {
-    let run = Run::configured("[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 3\nseed = 5\n");
+    let run =
+        Run::configured("[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 3\nseed = 5\n");
     let run = run.data(recording::small());
     assert_eq!(run.complete(), undisturbed());
-    assert_eq!(Run::of_file(&run.out().join("config.toml")).complete(), undisturbed());
+    assert_eq!(
+        Run::of_file(&run.out().join("config.toml")).complete(),
+        undisturbed()
+    );
 }
 
 #[test]
@@ -159,11 +195,18 @@ fn stopped_by(signal: Signal) {
     running.await_poses(MIDDLE).signal(signal);
     let ended = running.finish();
     assert_eq!(ended.code(), Some(130), "{}", ended.stderr);
-    assert!(ended.stdout.contains("the same command goes on"), "{}", ended.stdout);
+    assert!(
+        ended.stdout.contains("the same command goes on"),
+        "{}",
+        ended.stdout
+    );
     let summary = run.summary();
     assert_eq!(summary["ending"], "interrupted");
     let processed = summary["processed"].as_u64().unwrap();
-    assert!((MIDDLE as u64..recording::SCANS as u64).contains(&processed), "{processed}");
+    assert!(
+        (MIDDLE as u64..recording::SCANS as u64).contains(&processed),
+        "{processed}"
+    );
     assert_resumes(&run, processed);
 }
 
@@ -195,7 +238,11 @@ fn an_interrupt_at_any_moment_of_the_start_leaves_nothing() {
         running.signal(Signal::INT);
         // Before there is anything to clean up, the signal may simply end the process.
         let ended = running.finish();
-        assert!(matches!(ended.code(), Some(130) | None), "after {} ms: {ended:?}", 2 * delay_ms);
+        assert!(
+            matches!(ended.code(), Some(130) | None),
+            "after {} ms: {ended:?}",
+            2 * delay_ms
+        );
     }
 }
 
@@ -242,14 +289,25 @@ fn an_unfinished_run_of_another_configuration_is_refused() {
     let run = Run::of_recording().rate(MODERATE);
     interrupted(&run);
     let other = run.clone().set("masking.threshold=70");
-    other.finish().refused_with(&["unfinished run of another configuration", "--out", "--fresh"]);
+    other.finish().refused_with(&[
+        "unfinished run of another configuration",
+        "--out",
+        "--fresh",
+    ]);
     assert_ne!(other.option("--fresh").complete(), undisturbed());
-    assert_eq!(run.complete(), undisturbed(), "a complete run is begun anew");
+    assert_eq!(
+        run.complete(),
+        undisturbed(),
+        "a complete run is begun anew"
+    );
 }
 
 #[test]
 fn two_runs_at_once_do_not_disturb_each_other() {
-    let runs = [Run::of_recording().rate(MODERATE), Run::of_recording().set("masking.kind=none")];
+    let runs = [
+        Run::of_recording().rate(MODERATE),
+        Run::of_recording().set("masking.kind=none"),
+    ];
     let alone = runs[1].complete();
     let [slow, fast] = runs.each_ref().map(Run::start);
     fast.finish().succeeded();
@@ -271,7 +329,8 @@ fn a_second_run_into_the_same_results_is_refused() {
 
 #[test]
 fn a_stage_may_have_a_command_of_its_own() {
-    let run = Run::of_recording().stage_script("masking", "touch $0.ran; exec '{gyre}' stage masking");
+    let run =
+        Run::of_recording().stage_script("masking", "touch $0.ran; exec '{gyre}' stage masking");
     assert_eq!(run.complete(), undisturbed());
     assert!(run.folder().join("masking.sh.ran").is_file());
     assert_nothing_left(run.out());
@@ -289,7 +348,10 @@ fn a_reader_that_has_seen_enough_does_not_stop_the_run() {
     let mut shell = Command::new("sh");
     let own = run.command();
     // Both outputs are pipes that nobody reads.
-    shell.args(["-c", "\"$@\" 2>&1 | true", "sh"]).arg(own.get_program()).args(own.get_args());
+    shell
+        .args(["-c", "\"$@\" 2>&1 | true", "sh"])
+        .arg(own.get_program())
+        .args(own.get_args());
     run.start_as(shell).finish().succeeded();
     assert_eq!(run.odometry(), undisturbed());
 }

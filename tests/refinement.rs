@@ -14,7 +14,13 @@ use serde_json::Value;
 const REFINEMENT: &str = "refinement";
 const MAP: &str = "journal/refinement.map";
 /// What the search says of a motion.
-const SEARCHED: [&str; 5] = ["searched_x_m", "searched_y_m", "searched_yaw_rad", "score", "runner_up_score"];
+const SEARCHED: [&str; 5] = [
+    "searched_x_m",
+    "searched_y_m",
+    "searched_yaw_rad",
+    "score",
+    "runner_up_score",
+];
 const MOTION: [&str; 3] = ["x_m", "y_m", "yaw_rad"];
 /// The recording's six seconds in one.
 const MODERATE: &str = "6";
@@ -26,16 +32,24 @@ fn without() -> Run {
 
 /// A map so small that its keyframes' slots are used again within the recording.
 fn with_small_map() -> Run {
-    Run::of_recording().set("refinement.keyframes=2").set("run.window=1")
+    Run::of_recording()
+        .set("refinement.keyframes=2")
+        .set("run.window=1")
 }
 
 /// Columns of an `odometry.csv`, by their names.
 fn columns(csv: &str, names: &[&str]) -> Vec<Vec<String>> {
     let header: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
-    let places: Vec<usize> = names.iter().map(|name| header.iter().position(|field| field == name).unwrap()).collect();
+    let places: Vec<usize> = names
+        .iter()
+        .map(|name| header.iter().position(|field| field == name).unwrap())
+        .collect();
     let row = |line: &str| {
         let fields: Vec<&str> = line.split(',').collect();
-        places.iter().map(|place| fields[*place].to_owned()).collect()
+        places
+            .iter()
+            .map(|place| fields[*place].to_owned())
+            .collect()
     };
     csv.lines().skip(1).map(row).collect()
 }
@@ -51,13 +65,26 @@ fn each_motion_is_counted_by_how_its_refinement_ended() {
     let run = Run::of_recording();
     let outcomes: Vec<String> = columns(&run.complete(), &["outcome"]).concat();
     let summary = run.summary();
-    assert_eq!(names(&summary["stages"]), BTreeSet::from(STAGES.map(str::to_owned)));
-    assert_eq!(names(&summary["latency"]["stages"]), BTreeSet::from(STAGES.map(str::to_owned)));
+    assert_eq!(
+        names(&summary["stages"]),
+        BTreeSet::from(STAGES.map(str::to_owned))
+    );
+    assert_eq!(
+        names(&summary["latency"]["stages"]),
+        BTreeSet::from(STAGES.map(str::to_owned))
+    );
     let motions = &summary["motions"];
     for outcome in ["refined", "weak", "predicted"] {
-        assert_eq!(motions[outcome], outcomes.iter().filter(|word| *word == outcome).count(), "{outcome}");
+        assert_eq!(
+            motions[outcome],
+            outcomes.iter().filter(|word| *word == outcome).count(),
+            "{outcome}"
+        );
     }
-    assert!(motions["refined"].as_u64().unwrap() > recording::SCANS as u64 / 2, "{motions}");
+    assert!(
+        motions["refined"].as_u64().unwrap() > recording::SCANS as u64 / 2,
+        "{motions}"
+    );
     assert_eq!(outcomes.len(), recording::SCANS - 1);
 }
 
@@ -69,15 +96,27 @@ fn a_run_that_does_not_refine_has_neither_the_process_nor_its_map_nor_its_counts
     assert!(summary.get("motions").is_none());
     assert!(!names(&summary["stages"]).contains(REFINEMENT));
     assert!(!run.out().join(MAP).exists());
-    assert_eq!(columns(&odometry, &MOTION), columns(&odometry, &SEARCHED[..3]), "what was searched is the motion");
-    assert!(columns(&odometry, &["outcome"]).concat().iter().all(|outcome| outcome == "searched"));
+    assert_eq!(
+        columns(&odometry, &MOTION),
+        columns(&odometry, &SEARCHED[..3]),
+        "what was searched is the motion"
+    );
+    assert!(
+        columns(&odometry, &["outcome"])
+            .concat()
+            .iter()
+            .all(|outcome| outcome == "searched")
+    );
 }
 
 /// Masking undoes the sweep with searched motions, so the search sees the same rasters whether its motions are refined or not.
 #[test]
 fn refining_changes_nothing_for_the_search() {
     let alone = without().complete();
-    assert_eq!(columns(undisturbed(), &SEARCHED), columns(&alone, &SEARCHED));
+    assert_eq!(
+        columns(undisturbed(), &SEARCHED),
+        columns(&alone, &SEARCHED)
+    );
     assert_ne!(columns(undisturbed(), &MOTION), columns(&alone, &MOTION));
 }
 
@@ -85,18 +124,29 @@ fn refining_changes_nothing_for_the_search() {
 fn refined_motions_are_nearer_to_the_truth() {
     let error = |run: Run| {
         run.complete();
-        run.summary()["evaluation"]["ate"]["rmse_m"].as_f64().unwrap()
+        run.summary()["evaluation"]["ate"]["rmse_m"]
+            .as_f64()
+            .unwrap()
     };
     let (refined, searched) = (error(Run::of_recording()), error(without()));
-    assert!(refined < searched, "{refined} m refined, {searched} m as searched");
+    assert!(
+        refined < searched,
+        "{refined} m refined, {searched} m as searched"
+    );
 }
 
 #[test]
 fn joint_search_is_refined_as_well() {
     let run = Run::of_recording().set("search.kind=exhaustive");
     let without = without().set("search.kind=exhaustive").complete();
-    assert_eq!(columns(&run.complete(), &SEARCHED), columns(&without, &SEARCHED));
-    assert_eq!(run.summary()["stages"].as_object().unwrap().len(), STAGES.len() - 1);
+    assert_eq!(
+        columns(&run.complete(), &SEARCHED),
+        columns(&without, &SEARCHED)
+    );
+    assert_eq!(
+        run.summary()["stages"].as_object().unwrap().len(),
+        STAGES.len() - 1
+    );
 }
 
 // Its death.
@@ -120,7 +170,10 @@ fn refinement_and_a_neighbour_killed_at_once_go_on() {
         survives(&run, undisturbed(), |running| {
             running.kill(neighbour).kill(REFINEMENT);
         });
-        assert_eq!(names(&run.summary()["restarts"]), BTreeSet::from([REFINEMENT, neighbour].map(str::to_owned)));
+        assert_eq!(
+            names(&run.summary()["restarts"]),
+            BTreeSet::from([REFINEMENT, neighbour].map(str::to_owned))
+        );
     }
 }
 
@@ -138,7 +191,11 @@ fn refinement_killed_at_any_moment_of_many_lives_goes_on() {
                 send(last, Signal::KILL);
             }
         });
-        assert!(run.summary()["restarts"][REFINEMENT].as_u64().unwrap() > 3, "{}", run.summary()["restarts"]);
+        assert!(
+            run.summary()["restarts"][REFINEMENT].as_u64().unwrap() > 3,
+            "{}",
+            run.summary()["restarts"]
+        );
     }
 }
 
@@ -187,7 +244,8 @@ fn interrupted() -> Run {
 fn an_unfinished_run_is_not_continued_with_another_refinement() {
     let run = interrupted();
     for other in [without(), Run::of_recording().set("refinement.keyframes=3")] {
-        Ended::of(other.into(run.out()).command()).refused_with(&["unfinished run of another configuration"]);
+        Ended::of(other.into(run.out()).command())
+            .refused_with(&["unfinished run of another configuration"]);
     }
 }
 
@@ -196,12 +254,24 @@ fn a_map_that_was_lost_or_damaged_is_told_and_the_run_can_be_begun_anew() {
     let run = interrupted();
     let map = run.out().join(MAP);
     let whole = fs::read(&map).unwrap();
-    let flipped: Vec<u8> = whole.iter().enumerate().map(|(k, byte)| if k > 100 { !byte } else { *byte }).collect();
+    let flipped: Vec<u8> = whole
+        .iter()
+        .enumerate()
+        .map(|(k, byte)| if k > 100 { !byte } else { *byte })
+        .collect();
     for damaged in [&[][..], &whole[..100], b"dear diary", &flipped] {
         fs::write(&map, damaged).unwrap();
         let ended = run.finish();
-        ended.failed_with(&["refinement.map", "does not hold what the refinement knew", "--fresh"]);
-        assert!(!ended.stderr.contains("started it again"), "{}", ended.stderr);
+        ended.failed_with(&[
+            "refinement.map",
+            "does not hold what the refinement knew",
+            "--fresh",
+        ]);
+        assert!(
+            !ended.stderr.contains("started it again"),
+            "{}",
+            ended.stderr
+        );
     }
     assert_eq!(run.option("--fresh").complete(), undisturbed());
 }

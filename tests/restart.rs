@@ -23,8 +23,17 @@ fn survives(stages: &[&str], disturb: impl FnOnce(&mut Running)) {
     let summary = run.summary();
     assert_eq!(summary["published"], recording::SCANS);
     for stage in STAGES {
-        let times = summary["restarts"].get(stage).and_then(Value::as_u64).unwrap_or(0);
-        assert_eq!(times > 0, stages.contains(&stage), "{stage}: {}\n{}", summary["restarts"], ended.stderr);
+        let times = summary["restarts"]
+            .get(stage)
+            .and_then(Value::as_u64)
+            .unwrap_or(0);
+        assert_eq!(
+            times > 0,
+            stages.contains(&stage),
+            "{stage}: {}\n{}",
+            summary["restarts"],
+            ended.stderr
+        );
     }
 }
 
@@ -67,7 +76,10 @@ fn a_killed_pose_integration_goes_on() {
 #[test]
 fn two_stages_killed_at_once_go_on() {
     survives(&["masking", "translation-search"], |running| {
-        running.await_poses(MIDDLE).kill("masking").kill("translation-search");
+        running
+            .await_poses(MIDDLE)
+            .kill("masking")
+            .kill("translation-search");
     });
 }
 
@@ -125,20 +137,28 @@ fn a_stage_killed_when_all_poses_are_there_does_not_take_them_back() {
 #[test]
 fn a_stage_that_somebody_else_asks_to_end_is_started_again() {
     survives(&["translation-search"], |running| {
-        let pid = running.await_poses(MIDDLE).await_stage("translation-search");
+        let pid = running
+            .await_poses(MIDDLE)
+            .await_stage("translation-search");
         send(pid, Signal::TERM);
     });
 }
 
 #[test]
 fn a_stage_that_hangs_is_noticed_and_all_are_started_again() {
-    let run = Run::of_recording().rate(MODERATE).set("run.stall_timeout_s=2");
+    let run = Run::of_recording()
+        .rate(MODERATE)
+        .set("run.stall_timeout_s=2");
     let mut running = run.start();
     let pid = running.await_poses(MIDDLE).await_stage("rotation-search");
     send(pid, Signal::STOP);
     let ended = running.finish();
     ended.succeeded();
-    assert!(ended.stderr.contains("no pose for too long"), "{}", ended.stderr);
+    assert!(
+        ended.stderr.contains("no pose for too long"),
+        "{}",
+        ended.stderr
+    );
     assert_eq!(run.odometry(), undisturbed());
 }
 
@@ -153,7 +173,10 @@ fn a_source_killed_behind_an_unreadable_scan_still_counts_it() {
     running.await_poses(9).kill("radar-replay");
     running.finish().succeeded();
     assert_eq!(run.odometry(), alone);
-    assert_eq!((&run.summary()["published"], &run.summary()["unreadable"]), (&15.into(), &1.into()));
+    assert_eq!(
+        (&run.summary()["published"], &run.summary()["unreadable"]),
+        (&15.into(), &1.into())
+    );
 }
 
 #[test]
@@ -162,8 +185,17 @@ fn a_stage_that_always_dies_is_given_up_with_its_last_words() {
         .stage_script("masking", "echo 'the mask is on fire' >&2; exit 7")
         .set("stages.masking.restart={limit = 2, backoff_ms = 10}");
     let ended = run.finish();
-    ended.failed_with(&["masking died 3 times", "exit code 7", "the mask is on fire", "giving up"]);
-    assert_eq!(ended.stderr.matches("started it again").count() + ended.stderr.matches("started all").count(), 2);
+    ended.failed_with(&[
+        "masking died 3 times",
+        "exit code 7",
+        "the mask is on fire",
+        "giving up",
+    ]);
+    assert_eq!(
+        ended.stderr.matches("started it again").count()
+            + ended.stderr.matches("started all").count(),
+        2
+    );
 }
 
 #[test]
@@ -171,16 +203,27 @@ fn a_stage_that_would_fail_the_same_way_again_is_given_up_at_once() {
     let run = Run::of_recording().stage_script("masking", "echo 'masking: no licence' >&2; exit 2");
     let ended = run.finish();
     ended.failed_with(&["masking: no licence"]);
-    assert!(!ended.stderr.contains("started it again"), "{}", ended.stderr);
+    assert!(
+        !ended.stderr.contains("started it again"),
+        "{}",
+        ended.stderr
+    );
 }
 
 #[test]
 fn what_was_computed_before_giving_up_is_kept_and_the_same_command_goes_on() {
-    let run = Run::of_recording().rate(MODERATE).set("stages.masking.restart.limit=0");
+    let run = Run::of_recording()
+        .rate(MODERATE)
+        .set("stages.masking.restart.limit=0");
     let mut running = run.start();
     running.await_poses(MIDDLE).kill("masking");
     let ended = running.finish();
-    ended.failed_with(&["masking died", "signal 9", "poses are kept", "the same command goes on"]);
+    ended.failed_with(&[
+        "masking died",
+        "signal 9",
+        "poses are kept",
+        "the same command goes on",
+    ]);
     assert!(odometry::rows(&run.odometry()).len() + 1 >= MIDDLE);
     assert_eq!(run.complete(), undisturbed());
 }

@@ -25,7 +25,11 @@ fn streamed() -> Run {
 
 fn simulate(out: &Path, options: &[&str]) -> Command {
     let mut command = gyre();
-    command.args(["simulate", "--scans", "12", "--seed", "3"]).args(options).arg("--out").arg(out);
+    command
+        .args(["simulate", "--scans", "12", "--seed", "3"])
+        .args(options)
+        .arg("--out")
+        .arg(out);
     command
 }
 
@@ -40,17 +44,30 @@ fn streamed_and_read_from_a_disk_it_gives_the_same_motions() {
     for options in [
         &["--format", "oxford"][..],
         &["--format", "boreas", "--threads", "1"],
-        &["--format", "radiate", "--set", "simulation.output.host_stamps=stalling"],
+        &[
+            "--format",
+            "radiate",
+            "--set",
+            "simulation.output.host_stamps=stalling",
+        ],
     ] {
         let recording = written(options);
         let set = |run: Run| {
             let run = run.set(&format!("simulation.output.format={}", options[1]));
-            let stamps = if options[1] == "radiate" { "stalling" } else { "even" };
+            let stamps = if options[1] == "radiate" {
+                "stalling"
+            } else {
+                "even"
+            };
             run.set(&format!("simulation.output.host_stamps={stamps}"))
         };
         let odometry = set(streamed()).complete();
         assert_eq!(odometry::rows(&odometry).len(), SCANS - 1);
-        assert_eq!(set(streamed()).data(recording.path()).complete(), odometry, "{options:?}");
+        assert_eq!(
+            set(streamed()).data(recording.path()).complete(),
+            odometry,
+            "{options:?}"
+        );
     }
 }
 
@@ -69,11 +86,23 @@ fn a_stored_run_keeps_its_recording_and_gives_the_same_motions() {
     let run = streamed().set("simulation.output.store=true");
     assert_eq!(run.complete(), streamed().complete());
     assert_eq!(images(&run.out().join("recording")).len(), SCANS);
-    let written = fs::metadata(&images(&run.out().join("recording"))[0]).unwrap().modified().unwrap();
+    let written = fs::metadata(&images(&run.out().join("recording"))[0])
+        .unwrap()
+        .modified()
+        .unwrap();
     run.complete();
-    assert_eq!(fs::metadata(&images(&run.out().join("recording"))[0]).unwrap().modified().unwrap(), written);
+    assert_eq!(
+        fs::metadata(&images(&run.out().join("recording"))[0])
+            .unwrap()
+            .modified()
+            .unwrap(),
+        written
+    );
     // Another drive takes its place.
-    run.clone().set("simulation.seed=4").option("--fresh").complete();
+    run.clone()
+        .set("simulation.seed=4")
+        .option("--fresh")
+        .complete();
     assert_ne!(run.odometry(), streamed().complete());
 }
 
@@ -81,7 +110,10 @@ fn a_stored_run_keeps_its_recording_and_gives_the_same_motions() {
 fn the_resolved_configuration_of_a_streamed_run_repeats_it() {
     let run = streamed();
     let odometry = run.complete();
-    assert_eq!(Run::of_file(&run.out().join("config.toml")).complete(), odometry);
+    assert_eq!(
+        Run::of_file(&run.out().join("config.toml")).complete(),
+        odometry
+    );
 }
 
 #[test]
@@ -124,8 +156,13 @@ fn images(recording: &Path) -> Vec<PathBuf> {
 fn all_files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut files = BTreeMap::new();
     for folder in [folder.to_owned(), folder.join("radar"), folder.join("gt")] {
-        let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_file());
-        files.extend(entries.map(|path| (path.file_name().unwrap().into(), fs::read(path).unwrap())));
+        let entries = fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
+            .filter(|path| path.is_file());
+        files.extend(
+            entries.map(|path| (path.file_name().unwrap().into(), fs::read(path).unwrap())),
+        );
     }
     files
 }
@@ -135,27 +172,48 @@ fn a_simulation_that_was_killed_goes_on_with_what_is_complete() {
     let folder = tempfile::tempdir().unwrap();
     let mut killed = start(folder.path());
     while !folder.path().join("radar").is_dir() || images(folder.path()).len() < 3 {
-        assert!(killed.try_wait().unwrap().is_none(), "it is through before it could be killed");
+        assert!(
+            killed.try_wait().unwrap().is_none(),
+            "it is through before it could be killed"
+        );
         thread::sleep(Duration::from_millis(1));
     }
     common::send(killed.id(), Signal::KILL);
     killed.wait().unwrap();
-    let kept = images(folder.path()).into_iter().filter(|path| path.extension().unwrap() == "png").count();
+    let kept = images(folder.path())
+        .into_iter()
+        .filter(|path| path.extension().unwrap() == "png")
+        .count();
     let ended = Ended::of(simulate(folder.path(), &[]));
-    assert!(ended.stdout.contains(&format!("{kept} were there already")), "{}", ended.stdout);
+    assert!(
+        ended.stdout.contains(&format!("{kept} were there already")),
+        "{}",
+        ended.stdout
+    );
     assert!(all_files(folder.path()) == all_files(written(&["--threads", "5"]).path()));
 }
 
 fn start(out: &Path) -> Child {
     let mut command = simulate(out, &[]);
-    command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    command
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap()
 }
 
 #[test]
 fn a_folder_of_another_recording_is_refused() {
     let recording = written(&[]);
-    let refused = Ended::of(simulate(recording.path(), &["--set", "simulation.drive.speed_m_s=5"]));
+    let refused = Ended::of(simulate(
+        recording.path(),
+        &["--set", "simulation.drive.speed_m_s=5"],
+    ));
     refused.refused_with(&["recording of another configuration", "another folder"]);
     let unknown = Ended::of(simulate(recording.path(), &["--format", "fomo"]));
-    assert!(unknown.stderr.contains("oxford, boreas, radiate"), "{}", unknown.stderr);
+    assert!(
+        unknown.stderr.contains("oxford, boreas, radiate"),
+        "{}",
+        unknown.stderr
+    );
 }

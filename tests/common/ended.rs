@@ -18,7 +18,11 @@ impl Ended {
     pub fn of(mut command: Command) -> Self {
         let output = command.env("RUST_BACKTRACE", "1").output().unwrap();
         let text = |bytes| String::from_utf8(bytes).unwrap();
-        Self { status: output.status, stdout: text(output.stdout), stderr: text(output.stderr) }
+        Self {
+            status: output.status,
+            stdout: text(output.stdout),
+            stderr: text(output.stderr),
+        }
     }
 
     /// Its exit code; `None` when a signal ended it.
@@ -35,7 +39,12 @@ impl Ended {
 
     /// Asserts that it said one sentence with all of these words, nothing else, and failed.
     pub fn refused_with(&self, words: &[&str]) -> &Self {
-        assert_eq!(self.stderr.lines().count(), 1, "more than one sentence:\n{}", self.stderr);
+        assert_eq!(
+            self.stderr.lines().count(),
+            1,
+            "more than one sentence:\n{}",
+            self.stderr
+        );
         assert_eq!(self.stdout, "");
         self.failed_with(words)
     }
@@ -45,7 +54,11 @@ impl Ended {
         assert_eq!(self.code(), Some(1), "{}", self.stderr);
         self.assert_calm();
         let sentence = sentence_of(&self.stderr);
-        assert!(!sentence.is_empty(), "no sentence begins with `gyre: `:\n{}", self.stderr);
+        assert!(
+            !sentence.is_empty(),
+            "no sentence begins with `gyre: `:\n{}",
+            self.stderr
+        );
         for word in words {
             assert!(sentence.contains(word), "`{word}` is not in: {sentence}");
         }
@@ -54,12 +67,19 @@ impl Ended {
 
     fn assert_calm(&self) {
         for text in [&self.stdout, &self.stderr] {
-            assert!(!text.contains("panicked") && !text.contains("backtrace"), "{text}");
+            assert!(
+                !text.contains("panicked") && !text.contains("backtrace"),
+                "{text}"
+            );
         }
     }
 }
 
 /// The last line, if it is what the program says of itself; else nothing.
 fn sentence_of(stderr: &str) -> &str {
-    stderr.lines().last().and_then(|line| line.strip_prefix("gyre: ")).unwrap_or_default()
+    stderr
+        .lines()
+        .last()
+        .and_then(|line| line.strip_prefix("gyre: "))
+        .unwrap_or_default()
 }

@@ -28,8 +28,14 @@ pub use processes::{Pid, cpu_time, send};
 pub use running::Running;
 
 /// The stages of a run that does not search jointly, in the order of the stream.
-pub const STAGES: [&str; 6] =
-    ["radar-replay", "masking", "rotation-search", "translation-search", "refinement", "pose-integration"];
+pub const STAGES: [&str; 6] = [
+    "radar-replay",
+    "masking",
+    "rotation-search",
+    "translation-search",
+    "refinement",
+    "pose-integration",
+];
 
 /// Small rasters: the tests are about processes.
 const CONFIGURATION: &str = "[raster]\nn = 127\ncell_m = 0.8\n";
@@ -82,16 +88,27 @@ impl Run {
 
     /// A run of this configuration text.
     pub fn configured(text: &str) -> Self {
-        let folder = tempfile::Builder::new().prefix("gyre-test-").tempdir().unwrap();
+        let folder = tempfile::Builder::new()
+            .prefix("gyre-test-")
+            .tempdir()
+            .unwrap();
         let configuration = folder.path().join("test.toml");
         fs::write(&configuration, text).unwrap();
         let out = folder.path().join("out");
-        Self { folder: Arc::new(folder), out, configuration, arguments: Vec::new() }
+        Self {
+            folder: Arc::new(folder),
+            out,
+            configuration,
+            arguments: Vec::new(),
+        }
     }
 
     /// A run of this configuration file.
     pub fn of_file(configuration: &Path) -> Self {
-        Self { configuration: configuration.to_owned(), ..Self::configured("") }
+        Self {
+            configuration: configuration.to_owned(),
+            ..Self::configured("")
+        }
     }
 
     /// The same with `--data`.
@@ -111,7 +128,8 @@ impl Run {
 
     /// Masks with the network of this card.
     pub fn masked_by(self, card: &Path) -> Self {
-        self.set("masking.kind=learned").set(&format!("masking.model='{}'", card.display()))
+        self.set("masking.kind=learned")
+            .set(&format!("masking.model='{}'", card.display()))
     }
 
     /// The same with its results in `out`.
@@ -156,7 +174,12 @@ impl Run {
     /// The command line.
     pub fn command(&self) -> Command {
         let mut command = gyre();
-        command.arg("run").arg(&self.configuration).args(&self.arguments).arg("--out").arg(&self.out);
+        command
+            .arg("run")
+            .arg(&self.configuration)
+            .args(&self.arguments)
+            .arg("--out")
+            .arg(&self.out);
         command
     }
 
@@ -168,7 +191,10 @@ impl Run {
     /// Starts it by another command that becomes it, a shell's `exec` for instance.
     pub fn start_as(&self, mut command: Command) -> Running {
         let file = |name| File::create(self.folder.path().join(name)).unwrap();
-        command.stdin(Stdio::null()).stdout(file("stdout.txt")).stderr(file("stderr.txt"));
+        command
+            .stdin(Stdio::null())
+            .stdout(file("stdout.txt"))
+            .stderr(file("stderr.txt"));
         // A backtrace in what a person reads would go unnoticed without this.
         command.env("RUST_BACKTRACE", "1").env_remove("GYRE_LOG");
         Running::new(self.clone(), command.spawn().unwrap())

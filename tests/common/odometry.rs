@@ -14,9 +14,15 @@ pub struct Row {
 /// The rows below the header.
 pub fn rows(csv: &str) -> Vec<Row> {
     let row = |line: &str| {
-        let mut fields = line.split(',').map(|field| field.parse().unwrap_or(u64::MAX));
+        let mut fields = line
+            .split(',')
+            .map(|field| field.parse().unwrap_or(u64::MAX));
         let mut next = || fields.next().unwrap_or(u64::MAX);
-        Row { seq: next(), scan: next(), previous_scan: next() }
+        Row {
+            seq: next(),
+            scan: next(),
+            previous_scan: next(),
+        }
     };
     csv.lines().skip(1).map(row).collect()
 }

@@ -31,8 +31,13 @@ pub fn cpu_time(pid: Pid) -> Duration {
 
 /// The living stages among a supervisor's children, by name.
 pub fn stages_of(supervisor: Pid) -> BTreeMap<String, Pid> {
-    let ours = |pid: &Pid| parent_and_state(*pid).is_some_and(|(parent, state)| parent == supervisor && state != 'Z');
-    pids().filter(ours).filter_map(|pid| Some((stage_name(pid)?, pid))).collect()
+    let ours = |pid: &Pid| {
+        parent_and_state(*pid).is_some_and(|(parent, state)| parent == supervisor && state != 'Z')
+    };
+    pids()
+        .filter(ours)
+        .filter_map(|pid| Some((stage_name(pid)?, pid)))
+        .collect()
 }
 
 /// Processes of the run at `root`, by what their environment says.
@@ -40,7 +45,9 @@ pub fn of_run(root: &Path) -> Vec<Pid> {
     let mark = format!("GYRE_RUN={}", root.display());
     let ours = |pid: &Pid| {
         let environment = fs::read(format!("/proc/{pid}/environ")).unwrap_or_default();
-        environment.split(|byte| *byte == 0).any(|variable| variable == mark.as_bytes())
+        environment
+            .split(|byte| *byte == 0)
+            .any(|variable| variable == mark.as_bytes())
     };
     pids().filter(ours).collect()
 }
@@ -60,8 +67,13 @@ fn parent_and_state(pid: Pid) -> Option<(Pid, char)> {
 /// `gyre stage NAME`, or a script that is named after the stage.
 fn stage_name(pid: Pid) -> Option<String> {
     let line = fs::read(format!("/proc/{pid}/cmdline")).ok()?;
-    let last = line.split(|byte| *byte == 0).rfind(|word| !word.is_empty())?;
+    let last = line
+        .split(|byte| *byte == 0)
+        .rfind(|word| !word.is_empty())?;
     let path = PathBuf::from(String::from_utf8_lossy(last).into_owned());
     let name = path.file_stem()?.to_string_lossy().into_owned();
-    Stage::ALL.iter().any(|stage| stage.name() == name).then_some(name)
+    Stage::ALL
+        .iter()
+        .any(|stage| stage.name() == name)
+        .then_some(name)
 }

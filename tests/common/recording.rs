@@ -21,7 +21,10 @@ pub fn small() -> &'static Path {
 
 /// A copy of the small recording's first `scans` scans, to be spoilt. Its images are links: replace them, don't write into them.
 pub fn copy(scans: usize) -> TempDir {
-    let folder = tempfile::Builder::new().prefix("gyre-recording-").tempdir().unwrap();
+    let folder = tempfile::Builder::new()
+        .prefix("gyre-recording-")
+        .tempdir()
+        .unwrap();
     for name in ["radar", "gt"] {
         fs::create_dir(folder.path().join(name)).unwrap();
     }
@@ -29,7 +32,11 @@ pub fn copy(scans: usize) -> TempDir {
         fs::copy(small().join(file), folder.path().join(file)).unwrap();
     }
     for image in images(small()).iter().take(scans) {
-        std::os::unix::fs::symlink(image, folder.path().join("radar").join(image.file_name().unwrap())).unwrap();
+        std::os::unix::fs::symlink(
+            image,
+            folder.path().join("radar").join(image.file_name().unwrap()),
+        )
+        .unwrap();
     }
     folder
 }
@@ -54,7 +61,9 @@ pub fn resize(image: &Path, width: u32, height: u32) {
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Grayscale);
     let mut writer = encoder.write_header().unwrap();
-    writer.write_image_data(&vec![0; (width * height) as usize]).unwrap();
+    writer
+        .write_image_data(&vec![0; (width * height) as usize])
+        .unwrap();
     writer.finish().unwrap();
     replace(image, &bytes);
 }
@@ -79,7 +88,10 @@ fn simulated(scans: usize) -> PathBuf {
         return recording;
     }
     let _ = fs::remove_dir_all(&recording);
-    let config = SimulationConfig { scans, ..SimulationConfig::default() };
+    let config = SimulationConfig {
+        scans,
+        ..SimulationConfig::default()
+    };
     write_dataset(&config, &recording, &mut |_, _| ()).unwrap();
     fs::write(&made_by, format!("{built:?}")).unwrap();
     recording

@@ -43,7 +43,9 @@ impl Running {
 
     /// Waits until all of [`STAGES`] live.
     pub fn await_stages(&mut self) -> BTreeMap<String, Pid> {
-        self.until("six stages", |running| Some(running.stages()).filter(|stages| stages.len() == STAGES.len()))
+        self.until("six stages", |running| {
+            Some(running.stages()).filter(|stages| stages.len() == STAGES.len())
+        })
     }
 
     /// Waits until a stage lives, and returns at once.
@@ -53,7 +55,13 @@ impl Running {
 
     /// Waits until a stage lives as another process than `not`.
     pub fn await_other_stage(&mut self, name: &str, not: Pid) -> Pid {
-        self.until(name, |running| running.stages().get(name).copied().filter(|pid| *pid != not))
+        self.until(name, |running| {
+            running
+                .stages()
+                .get(name)
+                .copied()
+                .filter(|pid| *pid != not)
+        })
     }
 
     /// Waits until so many poses are journalled.
@@ -82,7 +90,12 @@ impl Running {
     /// `kill -9` of a stage, which must live.
     pub fn kill(&self, stage: &str) -> &Self {
         let stages = self.stages();
-        send(*stages.get(stage).unwrap_or_else(|| panic!("{stage} is not among {stages:?}")), Signal::KILL);
+        send(
+            *stages
+                .get(stage)
+                .unwrap_or_else(|| panic!("{stage} is not among {stages:?}")),
+            Signal::KILL,
+        );
         self
     }
 
@@ -101,7 +114,11 @@ impl Running {
     pub fn finish(mut self) -> Ended {
         let status = self.wait();
         leftovers::assert_nothing_left(self.run.out());
-        Ended { status, stdout: self.run.said("stdout.txt"), stderr: self.run.said("stderr.txt") }
+        Ended {
+            status,
+            stdout: self.run.said("stdout.txt"),
+            stderr: self.run.said("stderr.txt"),
+        }
     }
 
     /// `kill -9` of the supervisor; returns when its stages have followed it.
@@ -111,7 +128,11 @@ impl Running {
         let root = leftovers::root(self.run.out());
         let patience = Instant::now() + Duration::from_secs(5);
         while !processes::of_run(&root).is_empty() {
-            assert!(Instant::now() < patience, "stages outlive their supervisor: {:?}", processes::of_run(&root));
+            assert!(
+                Instant::now() < patience,
+                "stages outlive their supervisor: {:?}",
+                processes::of_run(&root)
+            );
             thread::sleep(LOOK);
         }
     }
@@ -122,7 +143,11 @@ impl Running {
             if let Some(status) = self.child.try_wait().unwrap() {
                 return status;
             }
-            assert!(since.elapsed() < LIMIT, "it does not end:\n{}", self.run.said("stderr.txt"));
+            assert!(
+                since.elapsed() < LIMIT,
+                "it does not end:\n{}",
+                self.run.said("stderr.txt")
+            );
             thread::sleep(LOOK);
         }
     }
@@ -135,8 +160,16 @@ impl Running {
             }
             let ended = self.child.try_wait().unwrap();
             let said = || self.run.said("stderr.txt");
-            assert!(ended.is_none(), "it ended before there were {what}:\n{}", said());
-            assert!(since.elapsed() < LIMIT, "waited in vain for {what}:\n{}", said());
+            assert!(
+                ended.is_none(),
+                "it ended before there were {what}:\n{}",
+                said()
+            );
+            assert!(
+                since.elapsed() < LIMIT,
+                "waited in vain for {what}:\n{}",
+                said()
+            );
             thread::sleep(LOOK);
         }
     }

@@ -270,7 +270,10 @@ pub struct SpoilArguments {
 
 /// A standard deviation: a number, not below zero.
 fn sigma(text: &str) -> Result<f64, String> {
-    let sigma = text.parse().ok().filter(|sigma: &f64| sigma.is_finite() && *sigma >= 0.0);
+    let sigma = text
+        .parse()
+        .ok()
+        .filter(|sigma: &f64| sigma.is_finite() && *sigma >= 0.0);
     sigma.ok_or_else(|| "a number of at least 0 is needed".to_owned())
 }
 
@@ -283,7 +286,9 @@ fn part(text: &str) -> Result<Part, String> {
     };
     match text {
         "all" => Ok(Part::ALL),
-        _ => range().ok_or_else(|| "`all` or a range of percent from 0..100 is needed, as in 0..50".to_owned()),
+        _ => range().ok_or_else(|| {
+            "`all` or a range of percent from 0..100 is needed, as in 0..50".to_owned()
+        }),
     }
 }
 

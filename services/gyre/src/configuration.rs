@@ -15,7 +15,9 @@ use gyre_masking::MaskingConfig;
 use gyre_messages::{Stage, Window};
 use gyre_radar::{DatasetOptions, PointsConfig, RasterConfig};
 use gyre_radar_replay::SourceConfig;
-use gyre_scan_matching::{ExhaustiveConfig, RefinementConfig, RefinementKind, RotationConfig, TranslationConfig};
+use gyre_scan_matching::{
+    ExhaustiveConfig, RefinementConfig, RefinementKind, RotationConfig, TranslationConfig,
+};
 use gyre_simulator::{OutputFormat, SimulationConfig};
 use gyre_stage::supervise::{RestartPolicy, StagePlan};
 use serde::{Deserialize, Serialize};
@@ -114,7 +116,13 @@ pub struct StageConfig {
 
 impl Default for RunConfig {
     fn default() -> Self {
-        Self { mode: Mode::Lossless, window: 4, rate: Rate::Max, stall_timeout_s: 60.0, ground_truth: None }
+        Self {
+            mode: Mode::Lossless,
+            window: 4,
+            rate: Rate::Max,
+            stall_timeout_s: 60.0,
+            ground_truth: None,
+        }
     }
 }
 
@@ -163,7 +171,10 @@ pub enum ConfigurationError {
 impl Configuration {
     /// Reads a configuration and overrides keys of it with `section.key=value` sentences.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, ConfigurationError> {
-        let unreadable = |source| ConfigurationError::Unreadable { path: path.to_owned(), source };
+        let unreadable = |source| ConfigurationError::Unreadable {
+            path: path.to_owned(),
+            source,
+        };
         let text = fs::read_to_string(path).map_err(unreadable)?;
         let parsed: Result<toml::Table, _> = text.parse();
         let table = parsed.map_err(|error| ConfigurationError::Syntax {
@@ -232,41 +243,75 @@ impl Configuration {
     }
 
     fn validate(&self) -> Result<(), ConfigurationError> {
-        let value = |section: &str, reason: String| ConfigurationError::Value { section: section.to_owned(), reason };
-        self.raster.validate().map_err(|e| value("raster", e.to_string()))?;
-        self.points.validate().map_err(|e| value("points", e.to_string()))?;
-        self.rotation.validate().map_err(|e| value("rotation", e.to_string()))?;
-        self.translation.validate().map_err(|e| value("translation", e.to_string()))?;
-        self.exhaustive.validate().map_err(|e| value("exhaustive", e.to_string()))?;
-        self.refinement.validate().map_err(|e| value("refinement", e.to_string()))?;
-        self.window(None, 1).validate().map_err(|e| value("run", e.to_string()))?;
+        let value = |section: &str, reason: String| ConfigurationError::Value {
+            section: section.to_owned(),
+            reason,
+        };
+        self.raster
+            .validate()
+            .map_err(|e| value("raster", e.to_string()))?;
+        self.points
+            .validate()
+            .map_err(|e| value("points", e.to_string()))?;
+        self.rotation
+            .validate()
+            .map_err(|e| value("rotation", e.to_string()))?;
+        self.translation
+            .validate()
+            .map_err(|e| value("translation", e.to_string()))?;
+        self.exhaustive
+            .validate()
+            .map_err(|e| value("exhaustive", e.to_string()))?;
+        self.refinement
+            .validate()
+            .map_err(|e| value("refinement", e.to_string()))?;
+        self.window(None, 1)
+            .validate()
+            .map_err(|e| value("run", e.to_string()))?;
         if let Some(simulation) = &self.simulation {
-            simulation.validate().map_err(|e| value("simulation", e.to_string()))?;
+            simulation
+                .validate()
+                .map_err(|e| value("simulation", e.to_string()))?;
             let written = simulation.output.format.unwrap_or_default();
-            if let Some(read) = self.dataset.format.filter(|read| OutputFormat::read_as(*read) != Some(written)) {
-                let reason = format!("output.format is {written}, which is not read as dataset.format = \"{read}\"");
+            if let Some(read) = self
+                .dataset
+                .format
+                .filter(|read| OutputFormat::read_as(*read) != Some(written))
+            {
+                let reason = format!(
+                    "output.format is {written}, which is not read as dataset.format = \"{read}\""
+                );
                 return Err(value("simulation", reason));
             }
         }
         if self.has(Stage::Refinement) && self.points.capacity == 0 {
-            let reason =
-                "points.capacity is 0, but a refinement of kind `local-map` matches points: it must be 1 or more";
+            let reason = "points.capacity is 0, but a refinement of kind `local-map` matches points: it must be 1 or more";
             return Err(value("points", reason.to_owned()));
         }
-        self.masking.validate().map_err(|e| value("masking", e.to_string()))?;
+        self.masking
+            .validate()
+            .map_err(|e| value("masking", e.to_string()))?;
         if self.run.mode == Mode::Live && self.run.rate == Rate::Max {
             return Err(value(
                 "run",
                 "mode `live` needs a radar's pace: set rate to `realtime` or a factor".to_owned(),
             ));
         }
-        let seconds = |section: &str, key: &str, seconds: f64| match seconds >= 0.0 && seconds.is_finite() {
-            true => Ok(()),
-            false => Err(value(section, format!("{key} is {seconds}, but must be 0 or more"))),
-        };
+        let seconds =
+            |section: &str, key: &str, seconds: f64| match seconds >= 0.0 && seconds.is_finite() {
+                true => Ok(()),
+                false => Err(value(
+                    section,
+                    format!("{key} is {seconds}, but must be 0 or more"),
+                )),
+            };
         seconds("run", "stall_timeout_s", self.run.stall_timeout_s)?;
         self.stages.iter().try_for_each(|(name, stage)| {
-            seconds(&format!("stages.{name}"), "restart.window_s", stage.restart.window_s)
+            seconds(
+                &format!("stages.{name}"),
+                "restart.window_s",
+                stage.restart.window_s,
+            )
         })
     }
 
@@ -280,12 +325,19 @@ impl Configuration {
             }
             _ => 0,
         };
-        Window { scans: self.run.window, lag: self.masking.feedback_lag(), look_back: scans_a_mask, live_depth }
+        Window {
+            scans: self.run.window,
+            lag: self.masking.feedback_lag(),
+            look_back: scans_a_mask,
+            live_depth,
+        }
     }
 
     /// The simulation that is played without being stored, if that is what is played.
     pub fn streamed(&self) -> Option<&SimulationConfig> {
-        self.simulation.as_ref().filter(|simulation| !simulation.output.store)
+        self.simulation
+            .as_ref()
+            .filter(|simulation| !simulation.output.store)
     }
 
     /// The same with this recording, or with its simulation streamed whether or not a run would store it: to look at the scans
@@ -306,7 +358,10 @@ impl Configuration {
     /// The scans that are played of so many.
     pub fn played(&self, scans: usize) -> Range<usize> {
         let first = self.source.first.min(scans);
-        first..first.saturating_add(self.source.scans.unwrap_or(usize::MAX)).min(scans)
+        first
+            ..first
+                .saturating_add(self.source.scans.unwrap_or(usize::MAX))
+                .min(scans)
     }
 
     /// What is played, in words.
@@ -320,7 +375,9 @@ impl Configuration {
     /// Whether the run has this stage.
     pub fn has(&self, stage: Stage) -> bool {
         match stage {
-            Stage::RotationSearch | Stage::TranslationSearch => self.search.kind == SearchKind::Decoupled,
+            Stage::RotationSearch | Stage::TranslationSearch => {
+                self.search.kind == SearchKind::Decoupled
+            }
             Stage::JointSearch => self.search.kind == SearchKind::Exhaustive,
             Stage::Refinement => self.refinement.kind == RefinementKind::LocalMap,
             Stage::RadarReplay | Stage::Masking | Stage::PoseIntegration => true,
@@ -332,11 +389,29 @@ impl Configuration {
         let plan = |stage: Stage| {
             let name = stage.name();
             let own = self.stages.get(name).cloned().unwrap_or_default();
-            let ours = || vec![gyre.to_string_lossy().into_owned(), "stage".to_owned(), name.to_owned()];
-            let command = if own.command.is_empty() { ours() } else { own.command };
-            StagePlan { name: name.to_owned(), command, restart: own.restart }
+            let ours = || {
+                vec![
+                    gyre.to_string_lossy().into_owned(),
+                    "stage".to_owned(),
+                    name.to_owned(),
+                ]
+            };
+            let command = if own.command.is_empty() {
+                ours()
+            } else {
+                own.command
+            };
+            StagePlan {
+                name: name.to_owned(),
+                command,
+                restart: own.restart,
+            }
         };
-        Stage::ALL.into_iter().filter(|stage| self.has(*stage)).map(plan).collect()
+        Stage::ALL
+            .into_iter()
+            .filter(|stage| self.has(*stage))
+            .map(plan)
+            .collect()
     }
 
     /// The text of the resolved configuration: a run from it repeats this run.
@@ -350,13 +425,16 @@ impl Configuration {
             let mut table = table.clone();
             table.remove("stages");
             if let Some(run) = table.get_mut("run").and_then(|run| run.as_table_mut()) {
-                run.retain(|key, _| !["rate", "window", "stall_timeout_s", "ground_truth"].contains(&key));
+                run.retain(|key, _| {
+                    !["rate", "window", "stall_timeout_s", "ground_truth"].contains(&key)
+                });
             }
             table
         };
         // By way of the text, as `other` came: a table made directly has other digits in its f32 values.
         let text = self.to_toml().ok();
-        text.and_then(|text| text.parse().ok()).is_some_and(|table| of(&table) == of(other))
+        text.and_then(|text| text.parse().ok())
+            .is_some_and(|table| of(&table) == of(other))
     }
 }
 

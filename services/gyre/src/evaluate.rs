@@ -16,7 +16,14 @@ use crate::{
 pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
     let estimate = read_trajectory(&arguments.estimate)?;
     let truth = read_trajectory(&arguments.ground_truth)?;
-    let evaluation = judge(&estimate, &truth, Options { step: arguments.step, ..Options::default() })?;
+    let evaluation = judge(
+        &estimate,
+        &truth,
+        Options {
+            step: arguments.step,
+            ..Options::default()
+        },
+    )?;
     let motions = judged_motions(arguments, &estimate, &truth, &evaluation)?;
     let judgement = Judgement::new(evaluation, motions.as_ref(), &nees_options(arguments));
     match arguments.json {
@@ -24,16 +31,22 @@ pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
         false => print::line(format_args!("{judgement:#}"))?,
     }
     if let Some(directory) = &arguments.plots {
-        fs::create_dir_all(directory).map_err(|error| format!("cannot make {}: {error}", directory.display()))?;
+        fs::create_dir_all(directory)
+            .map_err(|error| format!("cannot make {}: {error}", directory.display()))?;
         judgement.draw(directory)?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
 fn nees_options(arguments: &EvaluateArguments) -> NeesOptions {
-    let truth_sigma =
-        TruthSigma { position_m: arguments.truth_sigma_m, yaw_rad: arguments.truth_sigma_deg.to_radians() };
-    NeesOptions { lengths: arguments.nees_lengths.clone(), truth_sigma }
+    let truth_sigma = TruthSigma {
+        position_m: arguments.truth_sigma_m,
+        yaw_rad: arguments.truth_sigma_deg.to_radians(),
+    };
+    NeesOptions {
+        lengths: arguments.nees_lengths.clone(),
+        truth_sigma,
+    }
 }
 
 /// The motions of the odometry that was named, or of the one beside the estimate if it fits.
@@ -43,7 +56,8 @@ fn judged_motions(
     truth: &Trajectory,
     evaluation: &Evaluation,
 ) -> Result<Option<JudgedMotions>, Failure> {
-    let judge = |motions: &[Motion]| judge_motions(arguments.nees_part.of(motions), truth, evaluation);
+    let judge =
+        |motions: &[Motion]| judge_motions(arguments.nees_part.of(motions), truth, evaluation);
     if let Some(path) = &arguments.odometry {
         return judge(&odometry::read(path)?).map(Some);
     }
@@ -55,7 +69,9 @@ fn judged_motions(
         true => judge(&motions),
         false => Err("its stamps are not the estimate's".into()),
     });
-    let note = |reason: &Failure| print::note(format_args!("{} is not judged: {reason}", beside.display()));
+    let note = |reason: &Failure| {
+        print::note(format_args!("{} is not judged: {reason}", beside.display()))
+    };
     Ok(judged.inspect_err(note).ok())
 }
 
@@ -66,8 +82,11 @@ const ROUNDING_NS: i64 = 1_000;
 fn has_stamps(trajectory: &Trajectory, motions: &[Motion]) -> bool {
     let stamps = trajectory.stamp_ns.as_deref().unwrap_or_default();
     motions.iter().all(|motion| {
-        let next = stamps.partition_point(|stamp| *stamp < motion.to_ns.saturating_sub(ROUNDING_NS));
-        stamps.get(next).is_some_and(|stamp| *stamp <= motion.to_ns.saturating_add(ROUNDING_NS))
+        let next =
+            stamps.partition_point(|stamp| *stamp < motion.to_ns.saturating_sub(ROUNDING_NS));
+        stamps
+            .get(next)
+            .is_some_and(|stamp| *stamp <= motion.to_ns.saturating_add(ROUNDING_NS))
     })
 }
 
@@ -80,10 +99,23 @@ mod tests {
     #[test]
     fn an_odometry_fits_where_all_its_motions_end_at_poses_but_for_rounding() {
         let stamps = vec![1_000_000_000, 1_250_000_400, 1_500_000_000];
-        let trajectory = Trajectory { stamp_ns: Some(stamps), poses: Vec::new() };
-        let ends_at = |to_ns| Motion { from_ns: 0, to_ns, estimate: UncertainMotion::standing() };
-        assert!(has_stamps(&trajectory, &[ends_at(1_250_000_000), ends_at(1_500_000_999)]));
-        assert!(!has_stamps(&trajectory, &[ends_at(1_250_000_000), ends_at(1_400_000_000)]));
+        let trajectory = Trajectory {
+            stamp_ns: Some(stamps),
+            poses: Vec::new(),
+        };
+        let ends_at = |to_ns| Motion {
+            from_ns: 0,
+            to_ns,
+            estimate: UncertainMotion::standing(),
+        };
+        assert!(has_stamps(
+            &trajectory,
+            &[ends_at(1_250_000_000), ends_at(1_500_000_999)]
+        ));
+        assert!(!has_stamps(
+            &trajectory,
+            &[ends_at(1_250_000_000), ends_at(1_400_000_000)]
+        ));
         assert!(!has_stamps(&trajectory, &[ends_at(1_500_001_001)]));
         assert!(!has_stamps(&Trajectory::default(), &[ends_at(0)]));
     }

@@ -51,10 +51,18 @@ pub fn export_pairs(arguments: &ExportPairsArguments) -> Result<ExitCode, Failur
     let out = &arguments.out;
     provenance::check_place(out)?;
     let configurations = recordings::configurations(arguments)?;
-    let recordings = configurations.iter().map(Recording::open).collect::<Result<Vec<_>, _>>()?;
+    let recordings = configurations
+        .iter()
+        .map(Recording::open)
+        .collect::<Result<Vec<_>, _>>()?;
     let started = Instant::now();
     let mut export = Export::begin(&configurations[0], out)?;
-    let bar = progress_bar(recordings.iter().map(|recording| recording.played.len()).sum());
+    let bar = progress_bar(
+        recordings
+            .iter()
+            .map(|recording| recording.played.len())
+            .sum(),
+    );
     for recording in recordings {
         export.recording(recording, &bar)?;
     }
@@ -71,8 +79,14 @@ pub fn export_pairs(arguments: &ExportPairsArguments) -> Result<ExitCode, Failur
 }
 
 fn progress_bar(scans: usize) -> ProgressBar {
-    let bar = if std::io::stderr().is_terminal() { ProgressBar::new(scans as u64) } else { ProgressBar::hidden() };
-    if let Ok(style) = ProgressStyle::with_template("exporting {wide_bar} {pos}/{len} scans, {per_sec}, {eta} left") {
+    let bar = if std::io::stderr().is_terminal() {
+        ProgressBar::new(scans as u64)
+    } else {
+        ProgressBar::hidden()
+    };
+    if let Ok(style) = ProgressStyle::with_template(
+        "exporting {wide_bar} {pos}/{len} scans, {per_sec}, {eta} left",
+    ) {
         bar.set_style(style);
     }
     bar
@@ -102,14 +116,26 @@ impl Export {
     fn begin(configuration: &Configuration, out: &Path) -> Result<Self, Failure> {
         let n = configuration.raster.n;
         let preparation = Preparation::new(configuration)?;
-        let file = NpyWriter::create(out, &Record::dtype(n), Record::bytes(n)).map_err(cannot_write(out))?;
+        let file = NpyWriter::create(out, &Record::dtype(n), Record::bytes(n))
+            .map_err(cannot_write(out))?;
         let encoded = Vec::with_capacity(Record::bytes(n));
-        Ok(Self { out: out.to_owned(), file, preparation, sequences: Vec::new(), counts: Counts::default(), encoded })
+        Ok(Self {
+            out: out.to_owned(),
+            file,
+            preparation,
+            sequences: Vec::new(),
+            counts: Counts::default(),
+            encoded,
+        })
     }
 
     /// Appends a recording's scans. One that gives none is refused: it, or its truth, is not what was meant.
     fn recording(&mut self, recording: Recording, bar: &ProgressBar) -> Result<(), Failure> {
-        let Recording { mut dataset, played, origin } = recording;
+        let Recording {
+            mut dataset,
+            played,
+            origin,
+        } = recording;
         let (before, scans) = (self.counts, played.len());
         self.preparation.begin();
         scans::for_each_scan(dataset.as_mut(), played, |index, read| {
@@ -121,11 +147,15 @@ impl Export {
             Ok(())
         })?;
         let (data, truth) = (&origin.data, origin.truth.path.display());
-        match (self.counts.scans - before.scans, self.counts.without_truth - before.without_truth) {
+        match (
+            self.counts.scans - before.scans,
+            self.counts.without_truth - before.without_truth,
+        ) {
             (0, 0) => Err(format!("{data}: none of its {scans} scans can be read").into()),
-            (0, read) => {
-                Err(format!("{data}: {truth} has no pose at the time of any of its {read} readable scans").into())
-            }
+            (0, read) => Err(format!(
+                "{data}: {truth} has no pose at the time of any of its {read} readable scans"
+            )
+            .into()),
             _ => Ok(()),
         }
     }
@@ -145,7 +175,9 @@ impl Export {
                 return Ok(());
             }
         }
-        self.file.append(&self.encoded).map_err(cannot_write(&self.out))?;
+        self.file
+            .append(&self.encoded)
+            .map_err(cannot_write(&self.out))?;
         if begins {
             self.sequences.push(Sequence::new(number, origin, index));
         }
@@ -168,7 +200,10 @@ impl Export {
         let text = Provenance::new(configuration, &self.sequences).to_toml()?;
         fs::write(&beside, text).map_err(cannot_write(&beside))?;
         self.file.finish().map_err(cannot_write(&self.out))?;
-        Ok(Counts { sequences: self.sequences.len(), ..self.counts })
+        Ok(Counts {
+            sequences: self.sequences.len(),
+            ..self.counts
+        })
     }
 }
 
@@ -178,10 +213,22 @@ fn cannot_write(path: &Path) -> impl Fn(std::io::Error) -> Failure {
 
 impl fmt::Display for Counts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { scans, sequences, unreadable, without_truth } = self;
-        write!(f, "{scans} scans in {sequences} sequence{}", if *sequences == 1 { "" } else { "s" })?;
+        let Self {
+            scans,
+            sequences,
+            unreadable,
+            without_truth,
+        } = self;
+        write!(
+            f,
+            "{scans} scans in {sequences} sequence{}",
+            if *sequences == 1 { "" } else { "s" }
+        )?;
         if unreadable + without_truth > 0 {
-            write!(f, " (left out: {unreadable} unreadable, {without_truth} without truth)")?;
+            write!(
+                f,
+                " (left out: {unreadable} unreadable, {without_truth} without truth)"
+            )?;
         }
         Ok(())
     }

@@ -8,8 +8,16 @@ use crate::{Failure, cli::InspectArguments, print};
 
 /// Prints what a dataset is and what looks wrong with it.
 pub fn inspect(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
-    let trajectory = arguments.trajectory.as_deref().map(read_trajectory).transpose()?;
-    let report = gyre_radar::inspect::inspect(&arguments.path, &DatasetOptions::default(), trajectory.as_ref())?;
+    let trajectory = arguments
+        .trajectory
+        .as_deref()
+        .map(read_trajectory)
+        .transpose()?;
+    let report = gyre_radar::inspect::inspect(
+        &arguments.path,
+        &DatasetOptions::default(),
+        trajectory.as_ref(),
+    )?;
     match arguments.json {
         true => print::line(serde_json::to_string_pretty(&report)?)?,
         false => print::line(report)?,

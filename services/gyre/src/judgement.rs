@@ -4,8 +4,8 @@
 use std::{fmt, path::Path};
 
 use gyre_evaluation::{
-    Association, Bands, Coverage, Evaluation, EvaluationError, JudgedMotions, Motion, Nees, NeesOptions, Options,
-    bands, nees, plot_bands, plot_errors, plot_trajectory,
+    Association, Bands, Coverage, Evaluation, EvaluationError, JudgedMotions, Motion, Nees,
+    NeesOptions, Options, bands, nees, plot_bands, plot_errors, plot_trajectory,
 };
 use gyre_radar::Trajectory;
 use serde::Serialize;
@@ -29,17 +29,30 @@ pub struct Judgement {
 
 impl Judgement {
     /// Adds what the motions' covariances are worth.
-    pub fn new(evaluation: Evaluation, motions: Option<&JudgedMotions>, options: &NeesOptions) -> Self {
+    pub fn new(
+        evaluation: Evaluation,
+        motions: Option<&JudgedMotions>,
+        options: &NeesOptions,
+    ) -> Self {
         let nees = motions.map(|motions| nees(motions, options));
         let bands = motions.map(|motions| bands(motions, options.truth_sigma));
         let within_3_sigma_percent = bands.as_ref().map(|bands| bands.inside_percent(3.0));
-        Self { evaluation, nees, within_3_sigma_percent, bands }
+        Self {
+            evaluation,
+            nees,
+            within_3_sigma_percent,
+            bands,
+        }
     }
 
     /// Draws all there is: trajectory, errors where the truth has heading, bands where there are covariances.
     pub fn draw(&self, directory: &Path) -> Result<(), Failure> {
         let matched = &self.evaluation.matched;
-        plot_trajectory(&directory.join("trajectory.svg"), matched.estimate(), Some(matched.truth()))?;
+        plot_trajectory(
+            &directory.join("trajectory.svg"),
+            matched.estimate(),
+            Some(matched.truth()),
+        )?;
         if self.evaluation.rpe.is_some() {
             plot_errors(&directory.join("errors.svg"), &self.evaluation)?;
         }
@@ -54,20 +67,32 @@ impl fmt::Display for Judgement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.evaluation.fmt(f)?;
         if let Some([x, y, yaw]) = self.within_3_sigma_percent {
-            write!(f, "\nwithin        3 sigma of the pose: x {x:.0} %, y {y:.0} %, yaw {yaw:.0} %")?;
+            write!(
+                f,
+                "\nwithin        3 sigma of the pose: x {x:.0} %, y {y:.0} %, yaw {yaw:.0} %"
+            )?;
         }
-        let Some(nees) = &self.nees else { return Ok(()) };
+        let Some(nees) = &self.nees else {
+            return Ok(());
+        };
         write!(f, "\n\n")?;
         nees.fmt(f)
     }
 }
 
 /// Compares by time where both have stamps, else pose by pose.
-pub fn judge(estimate: &Trajectory, truth: &Trajectory, options: Options) -> Result<Evaluation, EvaluationError> {
+pub fn judge(
+    estimate: &Trajectory,
+    truth: &Trajectory,
+    options: Options,
+) -> Result<Evaluation, EvaluationError> {
     match (&estimate.stamp_ns, &truth.stamp_ns) {
         (Some(_), Some(_)) => gyre_evaluation::evaluate(timed(estimate), timed(truth), &options),
         _ => {
-            let options = Options { association: Association::Index, ..options };
+            let options = Options {
+                association: Association::Index,
+                ..options
+            };
             gyre_evaluation::evaluate(untimed(estimate), untimed(truth), &options)
         }
     }
@@ -80,17 +105,24 @@ pub fn judge_motions(
     evaluation: &Evaluation,
 ) -> Result<JudgedMotions, Failure> {
     let Coverage::Time { max_gap_ns, .. } = evaluation.coverage else {
-        return Err("covariances are judged by time, and estimate or ground truth has no stamps".into());
+        return Err(
+            "covariances are judged by time, and estimate or ground truth has no stamps".into(),
+        );
     };
     let axes = &evaluation.axes;
     if axes.truth_lacks_heading || axes.y_negated || axes.heading_negated {
-        return Err("covariances need a ground truth with heading and with axes as the estimate's".into());
+        return Err(
+            "covariances need a ground truth with heading and with axes as the estimate's".into(),
+        );
     }
     Ok(JudgedMotions::new(motions, timed(truth), max_gap_ns)?)
 }
 
 fn timed(trajectory: &Trajectory) -> gyre_evaluation::Trajectory<'_> {
-    gyre_evaluation::Trajectory::new(trajectory.stamp_ns.as_deref().unwrap_or_default(), &trajectory.poses)
+    gyre_evaluation::Trajectory::new(
+        trajectory.stamp_ns.as_deref().unwrap_or_default(),
+        &trajectory.poses,
+    )
 }
 
 fn untimed(trajectory: &Trajectory) -> gyre_evaluation::Trajectory<'_> {

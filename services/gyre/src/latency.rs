@@ -51,20 +51,28 @@ impl Percentiles {
             0 => 0.0,
             n => sorted[((n as f64 * share).ceil() as usize).clamp(1, n) - 1] as f64 * 1e-3,
         };
-        Self { p50_us: at(0.5), p90_us: at(0.9), p99_us: at(0.99), max_us: at(1.0) }
+        Self {
+            p50_us: at(0.5),
+            p90_us: at(0.9),
+            p99_us: at(0.99),
+            max_us: at(1.0),
+        }
     }
 }
 
 impl Latency {
     /// From the stamps of the poses.
     pub fn of(poses: &[PoseHeader]) -> Self {
-        let finished = |pose: &PoseHeader| pose.item.hops[Stage::PoseIntegration as usize].finished_ns;
+        let finished =
+            |pose: &PoseHeader| pose.item.hops[Stage::PoseIntegration as usize].finished_ns;
         let span_ns = span(poses);
         let stages = hops(poses, span_ns);
         let busiest = stages.iter().max_by(|a, b| a.1.busy.total_cmp(&b.1.busy));
         Self {
             scans: poses.len(),
-            sensor_to_pose: Percentiles::of(poses.iter().map(|pose| finished(pose) - pose.item.due_ns)),
+            sensor_to_pose: Percentiles::of(
+                poses.iter().map(|pose| finished(pose) - pose.item.due_ns),
+            ),
             bound_by: busiest.map(|(name, _)| *name),
             overlap: overlap(poses, span_ns),
             stages,
@@ -74,7 +82,11 @@ impl Latency {
 
 /// The hops of the stages that the run has: those of the others stayed zero.
 fn hops(poses: &[PoseHeader], span_ns: i64) -> BTreeMap<&'static str, HopLatency> {
-    let passed = |stage: &Stage| poses.iter().any(|pose| pose.item.hops[*stage as usize] != Hop::default());
+    let passed = |stage: &Stage| {
+        poses
+            .iter()
+            .any(|pose| pose.item.hops[*stage as usize] != Hop::default())
+    };
     let mut before = None;
     let mut stages = BTreeMap::new();
     for stage in Stage::ALL.into_iter().filter(passed) {
@@ -88,7 +100,8 @@ fn hop(poses: &[PoseHeader], before: Option<Stage>, stage: Stage, span_ns: i64) 
     let hops = || poses.iter().map(move |pose| pose.item.hops[stage as usize]);
     let transport = before.map(|before| {
         let crossing = |pose: &PoseHeader| {
-            pose.item.hops[stage as usize].received_ns - pose.item.hops[before as usize].published_ns
+            pose.item.hops[stage as usize].received_ns
+                - pose.item.hops[before as usize].published_ns
         };
         Percentiles::of(poses.iter().map(crossing))
     });
@@ -104,13 +117,18 @@ fn hop(poses: &[PoseHeader], before: Option<Stage>, stage: Stage, span_ns: i64) 
 /// From the first work to the last.
 fn span(poses: &[PoseHeader]) -> i64 {
     let first = poses.iter().map(|pose| pose.item.hops[0].started_ns).min();
-    let last = poses.iter().map(|pose| pose.item.hops[Stage::PoseIntegration as usize].finished_ns).max();
+    let last = poses
+        .iter()
+        .map(|pose| pose.item.hops[Stage::PoseIntegration as usize].finished_ns)
+        .max();
     last.unwrap_or(0) - first.unwrap_or(0)
 }
 
 fn overlap(poses: &[PoseHeader], span_ns: i64) -> f64 {
     let hops = poses.iter().flat_map(|pose| pose.item.hops);
-    let mut edges: Vec<(i64, i32)> = hops.flat_map(|hop| [(hop.started_ns, 1), (hop.finished_ns, -1)]).collect();
+    let mut edges: Vec<(i64, i32)> = hops
+        .flat_map(|hop| [(hop.started_ns, 1), (hop.finished_ns, -1)])
+        .collect();
     edges.sort_unstable();
     let (mut busy, mut since, mut together) = (0, 0, 0);
     for (at, change) in edges {
@@ -139,8 +157,23 @@ mod tests {
                 published_ns: received_ns + 7000,
             }
         };
-        let hops = [hop(0), hop(1), hop(2), hop(3), Hop::default(), Hop::default(), hop(4)];
-        PoseHeader { item: Item { due_ns, hops, ..Item::default() }, ..PoseHeader::default() }
+        let hops = [
+            hop(0),
+            hop(1),
+            hop(2),
+            hop(3),
+            Hop::default(),
+            Hop::default(),
+            hop(4),
+        ];
+        PoseHeader {
+            item: Item {
+                due_ns,
+                hops,
+                ..Item::default()
+            },
+            ..PoseHeader::default()
+        }
     }
 
     #[test]
@@ -156,7 +189,11 @@ mod tests {
     #[test]
     fn scans_a_hop_apart_keep_two_stages_busy_at_once() {
         let latency = Latency::of(&[pose(0), pose(10_000)]);
-        assert!((latency.overlap - 4.0 * 5.0 / 55.0).abs() < 1e-9, "{}", latency.overlap);
+        assert!(
+            (latency.overlap - 4.0 * 5.0 / 55.0).abs() < 1e-9,
+            "{}",
+            latency.overlap
+        );
     }
 
     #[test]

@@ -33,13 +33,21 @@ impl Machine {
 
 impl fmt::Display for Machine {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}, {} core{}", self.processor, self.cores, if self.cores == 1 { "" } else { "s" })
+        write!(
+            f,
+            "{}, {} core{}",
+            self.processor,
+            self.cores,
+            if self.cores == 1 { "" } else { "s" }
+        )
     }
 }
 
 /// Today's date (UTC) as `2024-02-29`.
 pub fn today() -> String {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let since = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .unwrap_or_default();
     date(since.as_secs() / 86_400)
 }
 
@@ -52,8 +60,16 @@ fn date(day: u64) -> String {
     let year = (of_cycle - of_cycle / 1_460 + of_cycle / 36_524 - of_cycle / 146_096) / 365;
     let of_year = of_cycle - (365 * year + year / 4 - year / 100);
     let from_march = (5 * of_year + 2) / 153;
-    let (month, next) = if from_march < 10 { (from_march + 3, 0) } else { (from_march - 9, 1) };
-    format!("{:04}-{month:02}-{:02}", cycle * 400 + year + next, of_year - (153 * from_march + 2) / 5 + 1)
+    let (month, next) = if from_march < 10 {
+        (from_march + 3, 0)
+    } else {
+        (from_march - 9, 1)
+    };
+    format!(
+        "{:04}-{month:02}-{:02}",
+        cycle * 400 + year + next,
+        of_year - (153 * from_march + 2) / 5 + 1
+    )
 }
 
 #[cfg(test)]

@@ -30,15 +30,22 @@ pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
     let configuration = Configuration::read(&arguments.configuration, &arguments.set)?;
     let configuration = configuration.streaming(arguments.data.as_deref());
     let Played { dataset, .. } = preflight::open(&configuration)?;
-    let chosen = choose(arguments, configuration.played(dataset.len()), &configuration.data())?;
+    let chosen = choose(
+        arguments,
+        configuration.played(dataset.len()),
+        &configuration.data(),
+    )?;
     let mut chain = Chain::new(&configuration, dataset)?;
     preflight::warn_of_training(&configuration)?;
     let out = &arguments.out;
-    fs::create_dir_all(out).map_err(|error| format!("cannot write to {}: {error}", out.display()))?;
+    fs::create_dir_all(out)
+        .map_err(|error| format!("cannot write to {}: {error}", out.display()))?;
     print::line(exposure::HEADER)?;
     let (mut overview, apart) = (Vec::new(), chosen.len().div_ceil(FEW));
     for (index, number) in chosen.into_iter().enumerate() {
-        let Some(exposure) = chain.expose(number)? else { continue };
+        let Some(exposure) = chain.expose(number)? else {
+            continue;
+        };
         print::line(exposure.line())?;
         let picture = Canvas::of(&exposure);
         picture.write(&out.join(format!("scan-{number:06}.png")))?;
@@ -47,18 +54,30 @@ pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
         }
     }
     if overview.is_empty() {
-        return Err(format!("{}: none of the chosen scans can be read", configuration.data()).into());
+        return Err(format!(
+            "{}: none of the chosen scans can be read",
+            configuration.data()
+        )
+        .into());
     }
     Canvas::stack(&overview).write(&out.join(OVERVIEW))?;
     Ok(ExitCode::SUCCESS)
 }
 
 /// The numbers of the scans to draw, in their order, each once.
-fn choose(arguments: &MasksArguments, played: Range<usize>, data: &str) -> Result<Vec<usize>, Failure> {
+fn choose(
+    arguments: &MasksArguments,
+    played: Range<usize>,
+    data: &str,
+) -> Result<Vec<usize>, Failure> {
     if played.is_empty() {
         return Err(format!("{data} has no scans to draw").into());
     }
-    if let Some(number) = arguments.scans.iter().find(|number| !played.contains(number)) {
+    if let Some(number) = arguments
+        .scans
+        .iter()
+        .find(|number| !played.contains(number))
+    {
         let (first, last) = (played.start, played.end - 1);
         return Err(format!(
             "--scans {number}: the scans of {data} that are played have the numbers {first} to {last}"
@@ -67,7 +86,9 @@ fn choose(arguments: &MasksArguments, played: Range<usize>, data: &str) -> Resul
     }
     let mut chosen = arguments.scans.clone();
     if chosen.is_empty() {
-        let every = arguments.every.map_or(played.len().div_ceil(FEW), usize::from);
+        let every = arguments
+            .every
+            .map_or(played.len().div_ceil(FEW), usize::from);
         chosen = played.step_by(every).collect();
     }
     chosen.sort_unstable();
@@ -84,7 +105,9 @@ mod tests {
     use crate::cli::{Command, Gyre};
 
     fn chosen(options: &str, played: Range<usize>) -> Result<Vec<usize>, Failure> {
-        let words = ["gyre", "masks", "c.toml"].into_iter().chain(options.split_whitespace());
+        let words = ["gyre", "masks", "c.toml"]
+            .into_iter()
+            .chain(options.split_whitespace());
         match Gyre::try_parse_from(words)?.command {
             Command::Masks(arguments) => choose(&arguments, played, "drive"),
             other => Err(format!("{other:?}").into()),
@@ -96,7 +119,10 @@ mod tests {
         assert_eq!(chosen("--scans 7,3,7", 0..10).unwrap(), [3, 7]);
         assert_eq!(chosen("--every 4", 2..12).unwrap(), [2, 6, 10]);
         assert_eq!(chosen("", 0..3).unwrap(), [0, 1, 2]);
-        assert_eq!(chosen("", 10..26).unwrap(), [10, 12, 14, 16, 18, 20, 22, 24]);
+        assert_eq!(
+            chosen("", 10..26).unwrap(),
+            [10, 12, 14, 16, 18, 20, 22, 24]
+        );
     }
 
     #[test]

@@ -22,8 +22,11 @@ pub fn csv(poses: &[PoseHeader]) -> String {
     let mut text = String::from(HEADER);
     for pose in poses.iter().filter(|pose| !pose.item.is(flag::BREAK)) {
         let (item, motion, rotation) = (&pose.item, &pose.motion, &pose.motion.rotation);
-        let _ =
-            write!(text, "{},{},{},{},{}", item.seq, item.scan, item.previous_scan, item.stamp_ns, motion.interval_ns);
+        let _ = write!(
+            text,
+            "{},{},{},{},{}",
+            item.seq, item.scan, item.previous_scan, item.stamp_ns, motion.interval_ns
+        );
         for value in [motion.x_m, motion.y_m, motion.yaw_rad] {
             let _ = write!(text, ",{value:.9}");
         }
@@ -31,14 +34,27 @@ pub fn csv(poses: &[PoseHeader]) -> String {
             let _ = write!(text, ",{value:.12}");
         }
         let (angle, runner_up) = (rotation.angle_rad, rotation.runner_up_rad);
-        let _ = write!(text, ",{:.9},{:.9},{angle:.9}", motion.score, motion.runner_up_score);
-        let _ = write!(text, ",{:.12},{:.9}", rotation.variance_rad2, rotation.score);
+        let _ = write!(
+            text,
+            ",{:.9},{:.9},{angle:.9}",
+            motion.score, motion.runner_up_score
+        );
+        let _ = write!(
+            text,
+            ",{:.12},{:.9}",
+            rotation.variance_rad2, rotation.score
+        );
         let _ = write!(text, ",{runner_up:.9},{:.9}", rotation.runner_up_score);
         for value in motion.searched {
             let _ = write!(text, ",{value:.9}");
         }
         let refinement = &motion.refinement;
-        let _ = write!(text, ",{},{}", outcome_name(refinement), hypothesis_name(refinement));
+        let _ = write!(
+            text,
+            ",{},{}",
+            outcome_name(refinement),
+            hypothesis_name(refinement)
+        );
         let _ = writeln!(text, ",{:.9},{:.9}", refinement.overlap, refinement.support);
     }
     text
@@ -82,9 +98,17 @@ pub fn motions(poses: &[PoseHeader]) -> Vec<Motion> {
             motion: Isometry2::new(Vector2::new(motion.x_m, motion.y_m), motion.yaw_rad),
             covariance: Matrix3::new(xx, xy, xyaw, xy, yy, yyaw, xyaw, yyaw, yawyaw),
         };
-        Motion { from_ns: to_ns.saturating_sub(motion.interval_ns), to_ns, estimate }
+        Motion {
+            from_ns: to_ns.saturating_sub(motion.interval_ns),
+            to_ns,
+            estimate,
+        }
     };
-    poses.iter().filter(|pose| !pose.item.is(flag::BREAK)).map(motion).collect()
+    poses
+        .iter()
+        .filter(|pose| !pose.item.is(flag::BREAK))
+        .map(motion)
+        .collect()
 }
 
 #[cfg(test)]
@@ -96,7 +120,11 @@ mod tests {
     #[test]
     fn a_row_a_motion_with_as_many_fields_as_the_header() {
         let pose = |seq, flags| PoseHeader {
-            item: Item { seq, flags, ..Item::default() },
+            item: Item {
+                seq,
+                flags,
+                ..Item::default()
+            },
             motion: MotionEstimate {
                 x_m: 1.5,
                 searched: [1.25, 0.0, 0.0],
@@ -113,6 +141,8 @@ mod tests {
         let fields: Vec<usize> = text.lines().map(|line| line.split(',').count()).collect();
         assert_eq!(fields, [28, 28, 28]);
         assert!(text.contains(",1.500000000,"));
-        assert!(text.ends_with(",1.250000000,0.000000000,0.000000000,refined,fan,0.000000000,0.000000000\n"));
+        assert!(text.ends_with(
+            ",1.250000000,0.000000000,0.000000000,refined,fan,0.000000000,0.000000000\n"
+        ));
     }
 }

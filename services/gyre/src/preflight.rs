@@ -59,9 +59,17 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
     let Played { dataset, truth } = open(configuration)?;
     let scans = configuration.played(dataset.len()).len();
     if scans < 2 {
-        return Err(PreflightError::TooFew { path: configuration.data(), scans }.into());
+        return Err(PreflightError::TooFew {
+            path: configuration.data(),
+            scans,
+        }
+        .into());
     }
-    let masker = Masker::new(&configuration.raster, &configuration.points, &configuration.masking)?;
+    let masker = Masker::new(
+        &configuration.raster,
+        &configuration.points,
+        &configuration.masking,
+    )?;
     let window = configuration.window(period(dataset.as_ref()), masker.rasters());
     let limits = Limits {
         scan_bytes: dataset.limits().bytes,
@@ -71,12 +79,20 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
     };
     let footprint = Footprint::new(&window, &limits);
     check_shared_memory(&footprint)?;
-    Ok(Preflight { scans, window, limits, footprint, truth })
+    Ok(Preflight {
+        scans,
+        window,
+        limits,
+        footprint,
+        truth,
+    })
 }
 
 /// Tells where a configuration differs from what its network was trained for.
 pub fn warn_of_training(configuration: &Configuration) -> Result<(), crate::Failure> {
-    let Configuration { masking, raster, .. } = configuration;
+    let Configuration {
+        masking, raster, ..
+    } = configuration;
     if masking.kind == MaskKind::Learned {
         let unlike = Card::read(masking)?.unlike_training(masking, raster);
         if let (false, Some(card)) = (unlike.is_empty(), &masking.model) {
@@ -103,11 +119,17 @@ pub fn open(configuration: &Configuration) -> Result<Played, crate::Failure> {
     if let Some(simulation) = configuration.streamed() {
         let recording = Recording::new(simulation)?;
         let truth = Some(recording.ground_truth_tum());
-        return Ok(Played { dataset: gyre_radar_replay::open_simulation(recording, options)?, truth });
+        return Ok(Played {
+            dataset: gyre_radar_replay::open_simulation(recording, options)?,
+            truth,
+        });
     }
     match data.as_os_str().is_empty() {
         true => Err(PreflightError::NoData.into()),
-        false => Ok(Played { dataset: gyre_radar::open(data, options)?, truth: None }),
+        false => Ok(Played {
+            dataset: gyre_radar::open(data, options)?,
+            truth: None,
+        }),
     }
 }
 
@@ -119,10 +141,14 @@ fn period(dataset: &dyn Dataset) -> Option<Duration> {
 
 /// Writing to a full tmpfs kills a process without a word, so see to it before.
 fn check_shared_memory(footprint: &Footprint) -> Result<(), PreflightError> {
-    let there = rustix::fs::statvfs(Path::new(SHARED_MEMORY)).map_err(PreflightError::NoSharedMemory)?;
+    let there =
+        rustix::fs::statvfs(Path::new(SHARED_MEMORY)).map_err(PreflightError::NoSharedMemory)?;
     let free = there.f_bavail as f64 * there.f_frsize as f64;
     match free >= footprint.total() as f64 {
         true => Ok(()),
-        false => Err(PreflightError::SharedMemory { free_mb: free / 1e6, footprint: footprint.clone() }),
+        false => Err(PreflightError::SharedMemory {
+            free_mb: free / 1e6,
+            footprint: footprint.clone(),
+        }),
     }
 }

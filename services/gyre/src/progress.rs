@@ -55,12 +55,19 @@ impl Progress {
             Event::Started { stage, pid } => self.say(&format!("{stage:20} pid {pid}")),
             Event::Pose(pose) => self.pose(pose),
             Event::Died { stage, death } => {
-                let words = death.last_words.as_ref().map_or(String::new(), |words| format!(" ({words})"));
+                let words = death
+                    .last_words
+                    .as_ref()
+                    .map_or(String::new(), |words| format!(" ({words})"));
                 self.say(&format!("{stage} died by {}{words}", death.how));
             }
             Event::Restarted { everybody: false } => self.say("started it again"),
-            Event::Restarted { everybody: true } => self.say("started all stages again, from the journal"),
-            Event::Stalled => self.say("no pose for too long: starting all stages again, from the journal"),
+            Event::Restarted { everybody: true } => {
+                self.say("started all stages again, from the journal")
+            }
+            Event::Stalled => {
+                self.say("no pose for too long: starting all stages again, from the journal")
+            }
         }
     }
 
@@ -73,7 +80,9 @@ impl Progress {
 
     fn pose(&mut self, pose: &PoseHeader) {
         let published = pose.item.published;
-        let gap = self.last_published.map_or(published, |last| published.saturating_sub(last + 1));
+        let gap = self
+            .last_published
+            .map_or(published, |last| published.saturating_sub(last + 1));
         if self.done == 0 || self.last_published.is_some() {
             self.dropped += gap;
         }
@@ -82,7 +91,10 @@ impl Progress {
         let (since, first) = *self.since.get_or_insert((Instant::now(), self.done));
         let rate = (self.done - first) as f64 / since.elapsed().as_secs_f64().max(1e-9);
         let lag_ms = clock::now_ns().saturating_sub(pose.item.due_ns) as f64 * 1e-6;
-        let message = format!("{rate:.1} scans/s  lag {lag_ms:.0} ms  dropped {}", self.dropped);
+        let message = format!(
+            "{rate:.1} scans/s  lag {lag_ms:.0} ms  dropped {}",
+            self.dropped
+        );
         match &self.bar {
             Some(bar) => {
                 bar.set_position(self.done + self.dropped);
@@ -90,7 +102,10 @@ impl Progress {
             }
             None if self.last_line.elapsed() >= EVERY => {
                 self.last_line = Instant::now();
-                print::note(format_args!("{}/{} scans  {message}", self.done, self.scans));
+                print::note(format_args!(
+                    "{}/{} scans  {message}",
+                    self.done, self.scans
+                ));
             }
             None => {}
         }

@@ -15,7 +15,10 @@ use std::{
 };
 
 use gyre_masking::MaskingConfig;
-use gyre_realism::{Comparison, Measured, MeterConfig, RangeGrid, Recording, compare, picture::Picture, plot::curves};
+use gyre_realism::{
+    Comparison, Measured, MeterConfig, RangeGrid, Recording, compare, picture::Picture,
+    plot::curves,
+};
 use serde::Serialize;
 
 use crate::{Failure, cli::RealismArguments, print};
@@ -58,22 +61,48 @@ struct Subject {
 pub fn realism(arguments: &RealismArguments) -> Result<ExitCode, Failure> {
     let out = &arguments.out;
     let mut sources = sources(arguments)?;
-    let geometries = sources.iter_mut().map(|source| Ok(source.first_scan()?.geometry));
+    let geometries = sources
+        .iter_mut()
+        .map(|source| Ok(source.first_scan()?.geometry));
     let geometries = geometries.collect::<Result<Vec<_>, Failure>>()?;
-    let grid = RangeGrid::common(&geometries).ok_or("the recordings' scans have no range in common")?;
-    let threshold = arguments.threshold.unwrap_or(MaskingConfig::default().threshold);
-    let config = MeterConfig { grid, threshold, cell_m: CELL_M };
-    let subjects = sources.iter_mut().map(|source| measure(source, config, arguments));
+    let grid =
+        RangeGrid::common(&geometries).ok_or("the recordings' scans have no range in common")?;
+    let threshold = arguments
+        .threshold
+        .unwrap_or(MaskingConfig::default().threshold);
+    let config = MeterConfig {
+        grid,
+        threshold,
+        cell_m: CELL_M,
+    };
+    let subjects = sources
+        .iter_mut()
+        .map(|source| measure(source, config, arguments));
     let subjects = subjects.collect::<Result<Vec<_>, Failure>>()?;
-    let recordings: Vec<&Recording> = subjects.iter().map(|subject| &subject.measured.whole).collect();
+    let recordings: Vec<&Recording> = subjects
+        .iter()
+        .map(|subject| &subject.measured.whole)
+        .collect();
     for (name, svg) in curves(&recordings)? {
         save(&out.join(format!("{name}.svg")), &svg)?;
     }
-    let comparison =
-        compare(&subjects[0].measured, &subjects[1].measured, subjects.get(2).map(|other| &other.measured));
-    let report = Report { version: env!("CARGO_PKG_VERSION"), grid, cell_m: CELL_M, subjects, comparison };
+    let comparison = compare(
+        &subjects[0].measured,
+        &subjects[1].measured,
+        subjects.get(2).map(|other| &other.measured),
+    );
+    let report = Report {
+        version: env!("CARGO_PKG_VERSION"),
+        grid,
+        cell_m: CELL_M,
+        subjects,
+        comparison,
+    };
     let text = markdown::of(&report);
-    save(&out.join("realism.json"), &serde_json::to_string_pretty(&report)?)?;
+    save(
+        &out.join("realism.json"),
+        &serde_json::to_string_pretty(&report)?,
+    )?;
     save(&out.join("realism.md"), &text)?;
     print::line(text.trim_end())?;
     Ok(ExitCode::SUCCESS)
@@ -84,7 +113,11 @@ fn sources(arguments: &RealismArguments) -> Result<Vec<Source>, Failure> {
     let named = [
         ("sim", Some(&arguments.sim), &arguments.sim_config),
         ("real", Some(&arguments.real), &arguments.real_config),
-        ("other", arguments.between.as_ref(), &arguments.between_config),
+        (
+            "other",
+            arguments.between.as_ref(),
+            &arguments.between_config,
+        ),
     ];
     let open = |(role, data, configuration): (&'static str, Option<&PathBuf>, &Option<PathBuf>)| {
         data.map(|data| Source::open(role, data, configuration.as_deref(), &arguments.out))
@@ -92,13 +125,23 @@ fn sources(arguments: &RealismArguments) -> Result<Vec<Source>, Failure> {
     named.into_iter().filter_map(open).collect()
 }
 
-fn measure(source: &mut Source, config: MeterConfig, arguments: &RealismArguments) -> Result<Subject, Failure> {
+fn measure(
+    source: &mut Source,
+    config: MeterConfig,
+    arguments: &RealismArguments,
+) -> Result<Subject, Failure> {
     let searches = Searches::run(source, arguments.search_scans)?;
     print::note(format_args!("{}: statistics", source.role));
     draw(source, &arguments.out)?;
     let (measured, aligned) = source.measure(config, arguments.scans.get(), &searches)?;
     let configuration = source.configuration_file.clone();
-    Ok(Subject { role: source.role, data: source.data.clone(), configuration, aligned, measured })
+    Ok(Subject {
+        role: source.role,
+        data: source.data.clone(),
+        configuration,
+        aligned,
+        measured,
+    })
 }
 
 /// One scan for the eye, from above and as measured.
@@ -110,5 +153,6 @@ fn draw(source: &mut Source, out: &Path) -> Result<(), Failure> {
 }
 
 fn save(path: &Path, text: &str) -> Result<(), Failure> {
-    fs::write(path, text).map_err(|error| format!("cannot write {}: {error}", path.display()).into())
+    fs::write(path, text)
+        .map_err(|error| format!("cannot write {}: {error}", path.display()).into())
 }

@@ -41,9 +41,22 @@ pub fn write(
     draw(out, &trajectory, judgement.as_ref())?;
     let latency = Latency::of(&poses[session.resumed.min(poses.len())..]);
     save(out, "latency.json", serde_json::to_string_pretty(&latency)?)?;
-    let motions = configuration.has(Stage::Refinement).then(|| MotionCounts::of(poses));
-    let counts = Counts { motions, ..Counts::of(poses, end) };
-    let summary = Summary::new(configuration, out, session, counts, latency, judgement, report);
+    let motions = configuration
+        .has(Stage::Refinement)
+        .then(|| MotionCounts::of(poses));
+    let counts = Counts {
+        motions,
+        ..Counts::of(poses, end)
+    };
+    let summary = Summary::new(
+        configuration,
+        out,
+        session,
+        counts,
+        latency,
+        judgement,
+        report,
+    );
     save(out, "summary.json", serde_json::to_string_pretty(&summary)?)?;
     Ok(summary)
 }
@@ -60,26 +73,41 @@ fn judged(
     }
     let given = configuration.run.ground_truth.clone();
     let simulated = || configuration.streamed().map(|_| out.join(SIMULATED_TRUTH));
-    let path = given.or_else(simulated).or_else(|| find_ground_truth(&configuration.source.data))?;
+    let path = given
+        .or_else(simulated)
+        .or_else(|| find_ground_truth(&configuration.source.data))?;
     let by = |truth: Trajectory| -> Result<Judgement, Failure> {
         let evaluation = judge(trajectory, &truth, Options::default())?;
         let motions = judge_motions(&odometry::motions(poses), &truth, &evaluation)
             .inspect_err(|reason| print::note(format_args!("no NEES and no bands.svg: {reason}")));
-        Ok(Judgement::new(evaluation, motions.ok().as_ref(), &NeesOptions::default()))
+        Ok(Judgement::new(
+            evaluation,
+            motions.ok().as_ref(),
+            &NeesOptions::default(),
+        ))
     };
     let judged = read_trajectory(&path).map_err(Failure::from).and_then(by);
-    judged.inspect_err(|reason| print::note(format_args!("not judged by {}: {reason}", path.display()))).ok()
+    judged
+        .inspect_err(|reason| {
+            print::note(format_args!("not judged by {}: {reason}", path.display()))
+        })
+        .ok()
 }
 
 fn draw(out: &Path, trajectory: &Trajectory, judgement: Option<&Judgement>) -> Result<(), Failure> {
     match judgement {
         Some(judgement) => judgement.draw(out),
         None if trajectory.poses.is_empty() => Ok(()),
-        None => Ok(plot_trajectory(&out.join("trajectory.svg"), &trajectory.poses, None)?),
+        None => Ok(plot_trajectory(
+            &out.join("trajectory.svg"),
+            &trajectory.poses,
+            None,
+        )?),
     }
 }
 
 fn save(out: &Path, name: &str, text: impl AsRef<[u8]>) -> Result<(), Failure> {
     let path = out.join(name);
-    fs::write(&path, text).map_err(|error| format!("cannot write {}: {error}", path.display()).into())
+    fs::write(&path, text)
+        .map_err(|error| format!("cannot write {}: {error}", path.display()).into())
 }

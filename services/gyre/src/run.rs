@@ -69,7 +69,12 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
         drop(root);
         return start_over();
     }
-    let session = Session { scans: checked.scans, resumed, wall: started.elapsed(), footprint: &checked.footprint };
+    let session = Session {
+        scans: checked.scans,
+        resumed,
+        wall: started.elapsed(),
+        footprint: &checked.footprint,
+    };
     // The run keeps its place until its results are written: no other may begin to write them meanwhile.
     finish(&configuration, &out, &session, report)
 }
@@ -85,7 +90,10 @@ fn finish(
     let summary = results::write(configuration, out, session, &poses, report.as_ref().ok());
     let report = report.map_err(|failure| match poses.len() {
         0 => failure.to_string(),
-        kept => format!("{failure}; {kept} poses are kept in {}, the same command goes on from there", out.display()),
+        kept => format!(
+            "{failure}; {kept} poses are kept in {}, the same command goes on from there",
+            out.display()
+        ),
     })?;
     let read = poses.iter().filter(|pose| !pose.item.is(flag::END)).count();
     if report.ending == Ending::Complete && read < 2 {
@@ -106,13 +114,19 @@ fn finish(
 
 /// `None`: wait for ever.
 fn stall_timeout(seconds: f64) -> Option<Duration> {
-    Duration::try_from_secs_f64(seconds).ok().filter(|limit| !limit.is_zero())
+    Duration::try_from_secs_f64(seconds)
+        .ok()
+        .filter(|limit| !limit.is_zero())
 }
 
 fn results_directory(arguments: &RunArguments) -> Result<PathBuf, Failure> {
     let name = arguments.configuration.file_stem().unwrap_or_default();
-    let out = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(name));
-    fs::create_dir_all(out.join("log")).map_err(|error| format!("cannot write to {}: {error}", out.display()))?;
+    let out = arguments
+        .out
+        .clone()
+        .unwrap_or_else(|| Path::new("out").join(name));
+    fs::create_dir_all(out.join("log"))
+        .map_err(|error| format!("cannot write to {}: {error}", out.display()))?;
     Ok(out.canonicalize()?)
 }
 
@@ -136,7 +150,13 @@ fn resolve(arguments: &RunArguments, out: &Path) -> Result<Configuration, Failur
     configuration.masking.resolve()?;
     preflight::warn_of_training(&configuration)?;
     // So that the resolved configuration repeats the run from anywhere. What does not exist is told by the reader.
-    for path in [Some(&mut configuration.source.data), configuration.run.ground_truth.as_mut()].into_iter().flatten() {
+    for path in [
+        Some(&mut configuration.source.data),
+        configuration.run.ground_truth.as_mut(),
+    ]
+    .into_iter()
+    .flatten()
+    {
         if let Ok(absolute) = path.canonicalize() {
             *path = absolute;
         }
@@ -147,9 +167,21 @@ fn resolve(arguments: &RunArguments, out: &Path) -> Result<Configuration, Failur
 fn overrides(arguments: &RunArguments) -> Vec<String> {
     // Quoted, for a folder may be called 2019-01-10 or 7.
     let quoted = |data: &PathBuf| toml::Value::from(data.to_string_lossy().into_owned());
-    let data = arguments.data.iter().map(|data| format!("source.data={}", quoted(data)));
-    let rate = arguments.rate.iter().map(|rate| format!("run.rate='{rate}'"));
-    arguments.set.iter().cloned().chain(data).chain(rate).collect()
+    let data = arguments
+        .data
+        .iter()
+        .map(|data| format!("source.data={}", quoted(data)));
+    let rate = arguments
+        .rate
+        .iter()
+        .map(|rate| format!("run.rate='{rate}'"));
+    arguments
+        .set
+        .iter()
+        .cloned()
+        .chain(data)
+        .chain(rate)
+        .collect()
 }
 
 /// What tells a run that is through with everything: its results are written last.
@@ -199,11 +231,16 @@ fn prepare(configuration: &Configuration, out: &Path, fresh: bool) -> Result<usi
 
 /// The transport hangs on what a dead process left. All of that is gone now; the same command resumes from the journal.
 fn start_over() -> Result<ExitCode, Failure> {
-    print::note("gyre: the transport did not finish cleaning up after a dead process; starting over from the journal");
-    let failed = Command::new(env::current_exe()?).args(env::args_os().skip(1).filter(|a| a != "--fresh")).exec();
+    print::note(
+        "gyre: the transport did not finish cleaning up after a dead process; starting over from the journal",
+    );
+    let failed = Command::new(env::current_exe()?)
+        .args(env::args_os().skip(1).filter(|a| a != "--fresh"))
+        .exec();
     Err(format!("cannot start over: {failed}").into())
 }
 
 fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<(), Failure> {
-    fs::write(path, text).map_err(|error| format!("cannot write {}: {error}", path.display()).into())
+    fs::write(path, text)
+        .map_err(|error| format!("cannot write {}: {error}", path.display()).into())
 }

@@ -19,7 +19,9 @@ pub fn search(configuration: &Configuration, rasters: usize) -> Result<Search, C
         SearchKind::Decoupled => {
             let mut rotations = Rotations::new(raster.n, &configuration.rotation)?;
             let mut translations = Translations::new(raster, &configuration.translation)?;
-            Box::new(move |seq, pair| translations.next(pair, rotations.next(seq, pair, rasters == 2)?))
+            Box::new(move |seq, pair| {
+                translations.next(pair, rotations.next(seq, pair, rasters == 2)?)
+            })
         }
         SearchKind::Exhaustive => {
             let mut motions = Motions::new(raster, &configuration.exhaustive)?;

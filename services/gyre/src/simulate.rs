@@ -23,10 +23,24 @@ pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
         None => Configuration::of_overrides(&overrides),
     }?;
     let started = Instant::now();
-    let threads = arguments.threads.or(available_parallelism().ok()).unwrap_or(NonZeroUsize::MIN);
-    let summary = write(threads, &configuration.simulation.unwrap_or_default(), &arguments.out)?;
-    let (written, wall_s) = (summary.scans - summary.kept, started.elapsed().as_secs_f64());
-    let kept = if summary.kept > 0 { format!(", {} were there already", summary.kept) } else { String::new() };
+    let threads = arguments
+        .threads
+        .or(available_parallelism().ok())
+        .unwrap_or(NonZeroUsize::MIN);
+    let summary = write(
+        threads,
+        &configuration.simulation.unwrap_or_default(),
+        &arguments.out,
+    )?;
+    let (written, wall_s) = (
+        summary.scans - summary.kept,
+        started.elapsed().as_secs_f64(),
+    );
+    let kept = if summary.kept > 0 {
+        format!(", {} were there already", summary.kept)
+    } else {
+        String::new()
+    };
     print::line(format_args!(
         "wrote {written} scans to {} in {wall_s:.1} s ({:.1} scans/s{kept}): {} scans, {:.0} m, {:.0} s",
         arguments.out.display(),
@@ -41,12 +55,26 @@ pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
 /// What the command line says besides the configuration, as `section.key=value`.
 fn overrides(arguments: &SimulateArguments) -> Vec<String> {
     let quoted = |path: &PathBuf| toml::Value::from(path.to_string_lossy().into_owned());
-    let scans = arguments.scans.map(|scans| format!("simulation.scans={scans}"));
+    let scans = arguments
+        .scans
+        .map(|scans| format!("simulation.scans={scans}"));
     let seed = arguments.seed.map(|seed| format!("simulation.seed={seed}"));
-    let format = arguments.format.map(|format| format!("simulation.output.format={format}"));
-    let file = arguments.trajectory.as_ref().map(|file| format!("simulation.drive.file={}", quoted(file)));
-    let kind = file.is_some().then(|| "simulation.drive.kind=file".to_owned());
-    arguments.set.iter().cloned().chain([scans, seed, format, kind, file].into_iter().flatten()).collect()
+    let format = arguments
+        .format
+        .map(|format| format!("simulation.output.format={format}"));
+    let file = arguments
+        .trajectory
+        .as_ref()
+        .map(|file| format!("simulation.drive.file={}", quoted(file)));
+    let kind = file
+        .is_some()
+        .then(|| "simulation.drive.kind=file".to_owned());
+    arguments
+        .set
+        .iter()
+        .cloned()
+        .chain([scans, seed, format, kind, file].into_iter().flatten())
+        .collect()
 }
 
 /// Writes the recording of a run to `out`, whatever an earlier run left there.
@@ -67,9 +95,19 @@ pub fn store(simulation: &SimulationConfig, out: &Path) -> Result<PathBuf, Failu
 }
 
 /// Writes a recording, with a progress bar on a terminal.
-fn write(threads: NonZeroUsize, simulation: &SimulationConfig, out: &Path) -> Result<Summary, SimulatorError> {
-    let bar = if std::io::stderr().is_terminal() { ProgressBar::new(0) } else { ProgressBar::hidden() };
-    if let Ok(style) = ProgressStyle::with_template("simulating {wide_bar} {pos}/{len} scans, {per_sec}, {eta} left") {
+fn write(
+    threads: NonZeroUsize,
+    simulation: &SimulationConfig,
+    out: &Path,
+) -> Result<Summary, SimulatorError> {
+    let bar = if std::io::stderr().is_terminal() {
+        ProgressBar::new(0)
+    } else {
+        ProgressBar::hidden()
+    };
+    if let Ok(style) = ProgressStyle::with_template(
+        "simulating {wide_bar} {pos}/{len} scans, {per_sec}, {eta} left",
+    ) {
         bar.set_style(style);
     }
     let summary = write_dataset_on(threads, simulation, out, &mut |done, total| {

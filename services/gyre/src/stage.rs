@@ -16,7 +16,10 @@ pub fn run(name: &str) -> ExitCode {
         gyre_refinement::NAME => gyre_refinement::run,
         gyre_pose_integration::NAME => gyre_pose_integration::run,
         _ => {
-            eprintln!("gyre: there is no stage `{name}`; there are {}", Stage::ALL.map(Stage::name).join(", "));
+            eprintln!(
+                "gyre: there is no stage `{name}`; there are {}",
+                Stage::ALL.map(Stage::name).join(", ")
+            );
             return ExitCode::FAILURE;
         }
     };

@@ -67,7 +67,12 @@ pub struct MotionCounts {
 impl MotionCounts {
     /// From the poses.
     pub fn of(poses: &[PoseHeader]) -> Self {
-        let with = |outcome| poses.iter().map(|pose| pose.motion.refinement).filter(move |r| r.outcome == outcome);
+        let with = |outcome| {
+            poses
+                .iter()
+                .map(|pose| pose.motion.refinement)
+                .filter(move |r| r.outcome == outcome)
+        };
         let count = |outcome| with(outcome).count() as u64;
         let second = with(outcome::REFINED).filter(|r| r.hypothesis != hypothesis::PREDICTION);
         let (weak, predicted) = (count(outcome::WEAK), count(outcome::PREDICTED));
@@ -85,10 +90,19 @@ impl Counts {
     /// From the poses and the end of the stream, if it came to that.
     pub fn of(poses: &[PoseHeader], end: Option<&PoseHeader>) -> Self {
         let last = poses.last();
-        let published = end.map(|end| end.item.published).or(last.map(|last| last.item.published + 1)).unwrap_or(0);
-        let seen = end.map(|end| end.item.scan).or(last.map(|last| last.item.scan + 1)).unwrap_or(0);
+        let published = end
+            .map(|end| end.item.published)
+            .or(last.map(|last| last.item.published + 1))
+            .unwrap_or(0);
+        let seen = end
+            .map(|end| end.item.scan)
+            .or(last.map(|last| last.item.scan + 1))
+            .unwrap_or(0);
         let processed = poses.len() as u64;
-        let starts = poses.iter().filter(|pose| pose.item.is(flag::BREAK)).count() as u64;
+        let starts = poses
+            .iter()
+            .filter(|pose| pose.item.is(flag::BREAK))
+            .count() as u64;
         Self {
             published,
             processed,
@@ -103,13 +117,24 @@ impl Counts {
 
 /// How many scans more fit between the scans of each motion than their numbers say.
 fn missing(poses: &[PoseHeader]) -> u64 {
-    let turns = |pose: &PoseHeader| pose.item.scan.saturating_sub(pose.item.previous_scan).max(1);
+    let turns = |pose: &PoseHeader| {
+        pose.item
+            .scan
+            .saturating_sub(pose.item.previous_scan)
+            .max(1)
+    };
     let motions = || poses.iter().filter(|pose| !pose.item.is(flag::BREAK));
-    let mut periods: Vec<i64> = motions().map(|pose| pose.motion.interval_ns / turns(pose) as i64).collect();
+    let mut periods: Vec<i64> = motions()
+        .map(|pose| pose.motion.interval_ns / turns(pose) as i64)
+        .collect();
     periods.sort_unstable();
-    let Some(&period) = periods.get(periods.len() / 2).filter(|period| **period > 0) else { return 0 };
+    let Some(&period) = periods.get(periods.len() / 2).filter(|period| **period > 0) else {
+        return 0;
+    };
     let fit = |pose: &PoseHeader| (pose.motion.interval_ns as f64 / period as f64).round() as u64;
-    motions().map(|pose| fit(pose).saturating_sub(turns(pose))).sum()
+    motions()
+        .map(|pose| fit(pose).saturating_sub(turns(pose)))
+        .sum()
 }
 
 /// The network that makes the masks.
@@ -125,7 +150,10 @@ impl Mask {
     /// From a resolved configuration.
     fn of(masking: &MaskingConfig) -> Option<Self> {
         let (model, sha256) = (masking.model.as_ref()?, masking.sha256.as_ref()?);
-        let mask = Self { model: model.display().to_string(), sha256: sha256.clone() };
+        let mask = Self {
+            model: model.display().to_string(),
+            sha256: sha256.clone(),
+        };
         (masking.kind == MaskKind::Learned).then_some(mask)
     }
 }
@@ -189,9 +217,17 @@ impl Summary {
             wall_s,
             scans_per_s: latency.scans as f64 / wall_s,
             shared_memory: session.footprint.clone(),
-            restarts: report.map(|report| report.restarts.clone()).unwrap_or_default(),
-            recovery_ms: report.into_iter().flat_map(|r| &r.recovery).map(|time| time.as_secs_f64() * 1e3).collect(),
-            stages: report.map(|report| report.statistics.clone()).unwrap_or_default(),
+            restarts: report
+                .map(|report| report.restarts.clone())
+                .unwrap_or_default(),
+            recovery_ms: report
+                .into_iter()
+                .flat_map(|r| &r.recovery)
+                .map(|time| time.as_secs_f64() * 1e3)
+                .collect(),
+            stages: report
+                .map(|report| report.statistics.clone())
+                .unwrap_or_default(),
             latency,
             evaluation,
         }
@@ -224,25 +260,48 @@ impl fmt::Display for Summary {
             )?;
         }
         if !self.restarts.is_empty() {
-            let restarts: Vec<_> = self.restarts.iter().map(|(stage, times)| format!("{stage} {times}")).collect();
-            let recovery: Vec<_> = self.recovery_ms.iter().map(|ms| format!("{ms:.0}")).collect();
-            writeln!(f, "restarts {}  recovered after {} ms", restarts.join(", "), recovery.join(", "))?;
+            let restarts: Vec<_> = self
+                .restarts
+                .iter()
+                .map(|(stage, times)| format!("{stage} {times}"))
+                .collect();
+            let recovery: Vec<_> = self
+                .recovery_ms
+                .iter()
+                .map(|ms| format!("{ms:.0}"))
+                .collect();
+            writeln!(
+                f,
+                "restarts {}  recovered after {} ms",
+                restarts.join(", "),
+                recovery.join(", ")
+            )?;
         }
         self.latency_table(f)?;
         if let Some(evaluation) = &self.evaluation {
             writeln!(f, "\n{evaluation}")?;
         }
-        write!(f, "\nresults in {}: odometry.csv, trajectory.tum, trajectory.svg, latency.json, summary.json", self.out)
+        write!(
+            f,
+            "\nresults in {}: odometry.csv, trajectory.tum, trajectory.svg, latency.json, summary.json",
+            self.out
+        )
     }
 }
 
 impl Summary {
     fn latency_table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "\n{:22}{:>10}{:>10}{:>10}{:>10}   busy   allocations", "latency, us", "p50", "p90", "p99", "max")?;
+        writeln!(
+            f,
+            "\n{:22}{:>10}{:>10}{:>10}{:>10}   busy   allocations",
+            "latency, us", "p50", "p90", "p99", "max"
+        )?;
         row(f, "sensor to pose", &self.latency.sensor_to_pose)?;
         writeln!(f)?;
         for stage in Stage::ALL {
-            let Some(hop) = self.latency.stages.get(stage.name()) else { continue };
+            let Some(hop) = self.latency.stages.get(stage.name()) else {
+                continue;
+            };
             if let Some(transport) = &hop.transport {
                 row(f, "  transport", transport)?;
                 writeln!(f)?;
@@ -265,7 +324,11 @@ impl Summary {
 }
 
 fn row(f: &mut fmt::Formatter<'_>, name: &str, p: &Percentiles) -> fmt::Result {
-    write!(f, "{name:22}{:10.0}{:10.0}{:10.0}{:10.0}", p.p50_us, p.p90_us, p.p99_us, p.max_us)
+    write!(
+        f,
+        "{name:22}{:10.0}{:10.0}{:10.0}{:10.0}",
+        p.p50_us, p.p90_us, p.p99_us, p.max_us
+    )
 }
 
 #[cfg(test)]
@@ -277,19 +340,43 @@ mod tests {
     #[test]
     fn every_scan_is_accounted_for() {
         let pose = |seq, published, scan| PoseHeader {
-            item: Item { seq, published, scan, ..Item::default() },
+            item: Item {
+                seq,
+                published,
+                scan,
+                ..Item::default()
+            },
             ..PoseHeader::default()
         };
         let end = pose(3, 9, 10);
         let counts = Counts::of(&[pose(0, 0, 0), pose(1, 3, 3), pose(2, 7, 8)], Some(&end));
-        assert_eq!(counts, Counts { published: 9, processed: 3, dropped: 6, unreadable: 1, ..Counts::default() });
+        assert_eq!(
+            counts,
+            Counts {
+                published: 9,
+                processed: 3,
+                dropped: 6,
+                unreadable: 1,
+                ..Counts::default()
+            }
+        );
     }
 
     #[test]
     fn weak_and_predicted_motions_are_doubtful() {
         let pose = |(outcome, hypothesis)| {
-            let refinement = Refinement { outcome, hypothesis, ..Refinement::default() };
-            PoseHeader { motion: MotionEstimate { refinement, ..MotionEstimate::default() }, ..PoseHeader::default() }
+            let refinement = Refinement {
+                outcome,
+                hypothesis,
+                ..Refinement::default()
+            };
+            PoseHeader {
+                motion: MotionEstimate {
+                    refinement,
+                    ..MotionEstimate::default()
+                },
+                ..PoseHeader::default()
+            }
         };
         let poses = [
             (outcome::SEARCHED, hypothesis::NONE),
@@ -300,18 +387,38 @@ mod tests {
             (outcome::PREDICTED, hypothesis::NONE),
         ];
         let counts = MotionCounts::of(&poses.map(pose));
-        let expected = MotionCounts { refined: 3, weak: 1, predicted: 1, doubtful: 2, second_hypothesis: 2 };
+        let expected = MotionCounts {
+            refined: 3,
+            weak: 1,
+            predicted: 1,
+            doubtful: 2,
+            second_hypothesis: 2,
+        };
         assert_eq!(counts, expected);
     }
 
     #[test]
     fn scans_that_the_recording_lacks_show_in_its_times_and_skipped_ones_do_not_count() {
         let pose = |scan, previous_scan, interval_ms: i64| PoseHeader {
-            item: Item { scan, previous_scan, flags: if scan == 0 { flag::BREAK } else { 0 }, ..Item::default() },
-            motion: MotionEstimate { interval_ns: interval_ms * 1_000_000, ..MotionEstimate::default() },
+            item: Item {
+                scan,
+                previous_scan,
+                flags: if scan == 0 { flag::BREAK } else { 0 },
+                ..Item::default()
+            },
+            motion: MotionEstimate {
+                interval_ns: interval_ms * 1_000_000,
+                ..MotionEstimate::default()
+            },
             ..PoseHeader::default()
         };
-        let mut poses = vec![pose(0, 0, 0), pose(1, 0, 251), pose(2, 1, 249), pose(4, 2, 500), pose(5, 4, 250)];
+        let mut poses = vec![
+            pose(0, 0, 0),
+            pose(1, 0, 251),
+            pose(2, 1, 249),
+            pose(4, 2, 500),
+            pose(5, 4, 250),
+        ];
         assert_eq!(missing(&poses), 0);
         poses.extend([pose(6, 5, 500), pose(8, 6, 1_000)]);
         assert_eq!(missing(&poses), 1 + 2);

@@ -72,7 +72,8 @@ pub fn tables(arguments: &TablesArguments) -> Result<ExitCode, Failure> {
         sequences[0].configuration(std::slice::from_ref(change))?;
     }
     let out = &arguments.out;
-    fs::create_dir_all(out).map_err(|error| format!("cannot write to {}: {error}", out.display()))?;
+    fs::create_dir_all(out)
+        .map_err(|error| format!("cannot write to {}: {error}", out.display()))?;
     let models = Models::new(&arguments.models);
     let peer = Peer::new(arguments.peer.as_deref(), arguments.peer_script.as_deref());
     let tables = Tables {
@@ -80,10 +81,23 @@ pub fn tables(arguments: &TablesArguments) -> Result<ExitCode, Failure> {
         commit: option_env!("GYRE_COMMIT"),
         machine: Machine::this(),
         date: today(),
-        command: command(env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned())),
+        command: command(
+            env::args_os()
+                .skip(1)
+                .map(|argument| argument.to_string_lossy().into_owned()),
+        ),
         times: where_asked(table_iii)
             .first()
-            .map(|first| times::measure(first, &arguments.sizes, arguments.passes.get(), &models, peer.as_ref(), out))
+            .map(|first| {
+                times::measure(
+                    first,
+                    &arguments.sizes,
+                    arguments.passes.get(),
+                    &models,
+                    peer.as_ref(),
+                    out,
+                )
+            })
             .transpose()?,
         accuracy: where_asked(table_iii)
             .iter()
@@ -100,7 +114,10 @@ pub fn tables(arguments: &TablesArguments) -> Result<ExitCode, Failure> {
         papers: papers::SOURCE,
     };
     let text = markdown::of(&tables);
-    save(&out.join("tables.json"), &serde_json::to_string_pretty(&tables)?)?;
+    save(
+        &out.join("tables.json"),
+        &serde_json::to_string_pretty(&tables)?,
+    )?;
     save(&out.join("tables.md"), &text)?;
     print::line(text.trim_end())?;
     Ok(ExitCode::SUCCESS)
@@ -119,14 +136,23 @@ pub(crate) struct Sequence {
 fn sequences(arguments: &TablesArguments) -> Result<Vec<Sequence>, Failure> {
     let (files, data) = (&arguments.configurations, &arguments.data);
     if files.len() != data.len() {
-        return Err(format!("{} --config but {} --data: give one for one", files.len(), data.len()).into());
+        return Err(format!(
+            "{} --config but {} --data: give one for one",
+            files.len(),
+            data.len()
+        )
+        .into());
     }
     let mut sequences: Vec<Sequence> = Vec::new();
     for (file, data) in files.iter().zip(data) {
         let sequence = Sequence::new(file, data);
         if let Some(other) = sequences.iter().find(|other| other.name == sequence.name) {
             let (one, two) = (other.data.display(), data.display());
-            return Err(format!("{one} and {two} would write to the same folder, {}", sequence.name).into());
+            return Err(format!(
+                "{one} and {two} would write to the same folder, {}",
+                sequence.name
+            )
+            .into());
         }
         sequence.configuration(&[])?;
         sequences.push(sequence);
@@ -139,8 +165,15 @@ impl Sequence {
         // `recordings/.` and the like have names only once they are resolved.
         let resolved = data.canonicalize().unwrap_or_else(|_| data.to_owned());
         let folder = resolved.file_name().unwrap_or_default().to_string_lossy();
-        let name = format!("{}-{folder}", file.file_stem().unwrap_or_default().to_string_lossy());
-        Self { name, file: file.to_owned(), data: data.to_owned() }
+        let name = format!(
+            "{}-{folder}",
+            file.file_stem().unwrap_or_default().to_string_lossy()
+        );
+        Self {
+            name,
+            file: file.to_owned(),
+            data: data.to_owned(),
+        }
     }
 
     /// Its configuration with a row's changes.
@@ -155,7 +188,11 @@ impl Sequence {
             arguments.extend([option.to_owned(), path.display().to_string()]);
         }
         arguments.extend(["--rate", "max", "--fresh"].map(str::to_owned));
-        arguments.extend(changes.iter().flat_map(|change| ["--set".to_owned(), change.clone()]));
+        arguments.extend(
+            changes
+                .iter()
+                .flat_map(|change| ["--set".to_owned(), change.clone()]),
+        );
         arguments
     }
 
@@ -169,9 +206,14 @@ impl Sequence {
             scan.geometry = dataset.read(index, scan.slot()).ok()?;
             Some(scan)
         };
-        let scans: Vec<OwnedScan> = (configuration.source.first..len).filter_map(read).take(most).collect();
+        let scans: Vec<OwnedScan> = (configuration.source.first..len)
+            .filter_map(read)
+            .take(most)
+            .collect();
         match scans.len() {
-            0 | 1 => Err(format!("{} has no two scans that can be read", self.data.display()).into()),
+            0 | 1 => {
+                Err(format!("{} has no two scans that can be read", self.data.display()).into())
+            }
             _ => Ok(scans),
         }
     }
@@ -186,12 +228,18 @@ fn command(arguments: impl IntoIterator<Item = impl AsRef<str>>) -> String {
             false => format!("'{}'", argument.replace('\'', r"'\''")),
         }
     };
-    let words = arguments.into_iter().map(|argument| quoted(argument.as_ref()));
-    std::iter::once("gyre".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
+    let words = arguments
+        .into_iter()
+        .map(|argument| quoted(argument.as_ref()));
+    std::iter::once("gyre".to_owned())
+        .chain(words)
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 fn save(path: &Path, text: &str) -> Result<(), Failure> {
-    fs::write(path, text).map_err(|error| format!("cannot write {}: {error}", path.display()).into())
+    fs::write(path, text)
+        .map_err(|error| format!("cannot write {}: {error}", path.display()).into())
 }
 
 #[cfg(test)]
@@ -200,15 +248,22 @@ mod tests {
 
     #[test]
     fn a_command_can_be_given_to_a_shell() {
-        assert_eq!(command(["run", "a b.toml", "--set", "x=1", "it's"]), r"gyre run 'a b.toml' --set x=1 'it'\''s'");
+        assert_eq!(
+            command(["run", "a b.toml", "--set", "x=1", "it's"]),
+            r"gyre run 'a b.toml' --set x=1 'it'\''s'"
+        );
         assert_eq!(command([""; 1]), "gyre ''");
     }
 
     #[test]
     fn a_run_repeats_the_row_from_the_command_line() {
-        let sequence = Sequence::new(Path::new("configs/oxford.toml"), Path::new("recordings/monday"));
+        let sequence = Sequence::new(
+            Path::new("configs/oxford.toml"),
+            Path::new("recordings/monday"),
+        );
         assert_eq!(sequence.name, "oxford-monday");
-        let arguments = sequence.run_arguments(&["search.kind=exhaustive".to_owned()], Path::new("out/raw"));
+        let arguments =
+            sequence.run_arguments(&["search.kind=exhaustive".to_owned()], Path::new("out/raw"));
         let expected = "gyre run configs/oxford.toml --data recordings/monday --out out/raw --rate max --fresh \
                         --set search.kind=exhaustive";
         assert_eq!(command(arguments), expected);

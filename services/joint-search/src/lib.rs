@@ -18,7 +18,8 @@ pub const NAME: &str = "joint-search";
 pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let exhaustive: ExhaustiveConfig = launch.section("exhaustive")?;
-    let mut search = Motions::new(&raster, &exhaustive).map_err(|e| StageError::Configuration(e.to_string()))?;
+    let mut search =
+        Motions::new(&raster, &exhaustive).map_err(|e| StageError::Configuration(e.to_string()))?;
     stage::run(launch, &mut search)
 }
 
@@ -30,19 +31,30 @@ pub struct Motions {
 impl Motions {
     /// Plans the search.
     pub fn new(raster: &RasterConfig, config: &ExhaustiveConfig) -> Result<Self, ConfigError> {
-        Ok(Self { search: ExhaustiveSearch::new(raster.n, raster.cell_m.into(), config)? })
+        Ok(Self {
+            search: ExhaustiveSearch::new(raster.n, raster.cell_m.into(), config)?,
+        })
     }
 
     /// The motion from the earlier scan to the later one; all zero where the chain starts.
     pub fn next(&mut self, pair: Pair<'_>) -> Result<MotionEstimate, ShapeError> {
-        let Some(earlier) = pair.earlier else { return Ok(MotionEstimate::default()) };
+        let Some(earlier) = pair.earlier else {
+            return Ok(MotionEstimate::default());
+        };
         let found = self.search.search(pair.later, earlier)?;
         let (motion, c) = (&found.motion, &found.motion.covariance);
         Ok(MotionEstimate {
             x_m: motion.x_m,
             y_m: motion.y_m,
             yaw_rad: motion.yaw_rad,
-            covariance: [c[(0, 0)], c[(0, 1)], c[(0, 2)], c[(1, 1)], c[(1, 2)], c[(2, 2)]],
+            covariance: [
+                c[(0, 0)],
+                c[(0, 1)],
+                c[(0, 2)],
+                c[(1, 1)],
+                c[(1, 2)],
+                c[(2, 2)],
+            ],
             interval_ns: 0,
             score: motion.score,
             runner_up_score: motion.runner_up.map_or(0.0, |runner_up| runner_up.score),
@@ -58,15 +70,30 @@ impl Stage for Motions {
     type Output = Motion;
     const HOP: gyre_messages::Stage = gyre_messages::Stage::JointSearch;
 
-    fn process(&mut self, input: PairView<'_, Masked>, output: &mut Draft<Motion>) -> Result<(), StageError> {
+    fn process(
+        &mut self,
+        input: PairView<'_, Masked>,
+        output: &mut Draft<Motion>,
+    ) -> Result<(), StageError> {
         let current = input.current;
-        let before = input.before.map(|before| (before.header(), before.values()));
+        let before = input
+            .before
+            .map(|before| (before.header(), before.values()));
         let pair = current.header().pair(current.values(), before);
         let pair = pair.ok_or_else(|| current.malformed("its rasters do not fit their headers"))?;
-        let motion = self.next(pair).map_err(|error| current.malformed(error.to_string()))?;
-        let interval_ns =
-            input.before.map_or(0, |before| current.item().stamp_ns.saturating_sub(before.item().stamp_ns));
-        output.header().motion = MotionEstimate { interval_ns, ..motion };
+        let motion = self
+            .next(pair)
+            .map_err(|error| current.malformed(error.to_string()))?;
+        let interval_ns = input.before.map_or(0, |before| {
+            current
+                .item()
+                .stamp_ns
+                .saturating_sub(before.item().stamp_ns)
+        });
+        output.header().motion = MotionEstimate {
+            interval_ns,
+            ..motion
+        };
         Ok(())
     }
 }

@@ -124,7 +124,9 @@ impl MaskingConfig {
     /// The first setting that is out of its bounds.
     pub fn validate(&self) -> Result<(), MaskingConfigError> {
         match () {
-            () if !(1..=64).contains(&self.threads) => Err(MaskingConfigError::Threads(self.threads)),
+            () if !(1..=64).contains(&self.threads) => {
+                Err(MaskingConfigError::Threads(self.threads))
+            }
             () if !(0.0..=4.0).contains(&self.point_exponent) => {
                 Err(MaskingConfigError::PointExponent(self.point_exponent))
             }
@@ -142,7 +144,10 @@ impl MaskingConfig {
         if self.kind == MaskKind::Learned {
             self.sha256 = Some(Card::read(self)?.model.sha256);
             self.runtime = Some(runtime::find(self.runtime.as_deref())?);
-            self.model = self.model.take().map(|card| card.canonicalize().unwrap_or(card));
+            self.model = self
+                .model
+                .take()
+                .map(|card| card.canonicalize().unwrap_or(card));
         }
         Ok(())
     }

@@ -24,8 +24,17 @@ impl Learned {
     pub fn load(masking: &MaskingConfig, raster: &RasterConfig) -> Result<Self, NetworkError> {
         let network = Network::load(masking, raster)?;
         let cells = raster.n * raster.n;
-        let pair = if network.scans() == 2 { vec![0.0; 2 * cells] } else { Vec::new() };
-        Ok(Self { network, cells, pair, kept: None })
+        let pair = if network.scans() == 2 {
+            vec![0.0; 2 * cells]
+        } else {
+            Vec::new()
+        };
+        Ok(Self {
+            network,
+            cells,
+            pair,
+            kept: None,
+        })
     }
 
     /// Scans that the network looks at, and rasters that come of them.
@@ -56,15 +65,24 @@ impl Learned {
             let raster = &mut out[..self.cells];
             let twist = rasters.make(sweep, raster)?;
             let mask = self.network.run(raster)?;
-            raster.iter_mut().zip(mask).for_each(|(power, mask)| *power *= mask);
+            raster
+                .iter_mut()
+                .zip(mask)
+                .for_each(|(power, mask)| *power *= mask);
             return Ok(twist);
         }
         let twist = self.fill_pair(rasters, sweep, before)?;
         let masks = self.network.run(&self.pair)?;
         let places = out.chunks_mut(MaskedHeader::raster_values(self.cells));
-        let masked = self.pair.chunks_exact(self.cells).zip(masks.chunks_exact(self.cells));
+        let masked = self
+            .pair
+            .chunks_exact(self.cells)
+            .zip(masks.chunks_exact(self.cells));
         for (place, (raster, mask)) in places.zip(masked) {
-            place.iter_mut().zip(raster.iter().zip(mask)).for_each(|(out, (power, mask))| *out = power * mask);
+            place
+                .iter_mut()
+                .zip(raster.iter().zip(mask))
+                .for_each(|(out, (power, mask))| *out = power * mask);
         }
         self.pair.copy_within(..self.cells, self.cells);
         self.kept = Some(sweep.number);

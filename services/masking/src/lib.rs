@@ -46,8 +46,8 @@ pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let points: PointsConfig = launch.section("points")?;
     let masking: MaskingConfig = launch.section("masking")?;
-    let mut masker =
-        Masker::new(&raster, &points, &masking).map_err(|error| StageError::Configuration(error.to_string()))?;
+    let mut masker = Masker::new(&raster, &points, &masking)
+        .map_err(|error| StageError::Configuration(error.to_string()))?;
     stage::run(launch, &mut masker)
 }
 
@@ -91,7 +91,11 @@ impl Masker {
     ///
     /// # Errors
     /// The first setting that is out of its bounds; a network that cannot be used.
-    pub fn new(raster: &RasterConfig, points: &PointsConfig, config: &MaskingConfig) -> Result<Self, MaskerError> {
+    pub fn new(
+        raster: &RasterConfig,
+        points: &PointsConfig,
+        config: &MaskingConfig,
+    ) -> Result<Self, MaskerError> {
         let learned = match config.kind {
             MaskKind::Learned => Some(Learned::load(config, raster)?),
             MaskKind::None | MaskKind::Threshold => None,
@@ -124,7 +128,11 @@ impl Masker {
     ) -> Result<Option<Twist>, MaskError> {
         let (cells, actual) = (self.raster.n * self.raster.n, out.len());
         match (&mut self.learned, out.get_mut(..cells)) {
-            (_, None) => Err(RasterError::OutputLength { expected: cells, actual }.into()),
+            (_, None) => Err(RasterError::OutputLength {
+                expected: cells,
+                actual,
+            }
+            .into()),
             (None, Some(raster)) => Ok(self.rasters.make(sweep, raster)?),
             (Some(learned), Some(_)) => learned.mask(&mut self.rasters, sweep, before, out),
         }
@@ -143,8 +151,16 @@ impl Masker {
         out: &mut [Point],
     ) -> Result<usize, ScanError> {
         let count = self.points.extract(scan, self.config.floor(), out)?;
-        if let Some(learned) = self.learned.as_ref().filter(|_| self.config.point_exponent > 0.0) {
-            self.frame(twist).weigh(learned.mask_of_scan(), self.config.point_exponent, &mut out[..count]);
+        if let Some(learned) = self
+            .learned
+            .as_ref()
+            .filter(|_| self.config.point_exponent > 0.0)
+        {
+            self.frame(twist).weigh(
+                learned.mask_of_scan(),
+                self.config.point_exponent,
+                &mut out[..count],
+            );
         }
         Ok(count)
     }
@@ -162,7 +178,12 @@ impl Masker {
 
     fn frame(&self, twist: Option<Twist>) -> Frame {
         let RasterConfig { n, cell_m, .. } = self.raster;
-        Frame { n, cell_m, twist, doppler_undone: self.config.undo_doppler }
+        Frame {
+            n,
+            cell_m,
+            twist,
+            doppler_undone: self.config.undo_doppler,
+        }
     }
 
     fn write_header(&self, header: &mut MaskedHeader, twist: Option<Twist>, points: usize) {
@@ -176,7 +197,9 @@ impl Masker {
             MaskKind::Learned => mask_kind::LEARNED,
         };
         header.compensated = twist.is_some().into();
-        header.twist = twist.map_or([0.0; 3], |t| [t.vx_mps as f32, t.vy_mps as f32, t.yaw_rate_radps as f32]);
+        header.twist = twist.map_or([0.0; 3], |t| {
+            [t.vx_mps as f32, t.vy_mps as f32, t.yaw_rate_radps as f32]
+        });
     }
 }
 
@@ -185,12 +208,20 @@ impl Stage for Masker {
     type Output = Masked;
     const HOP: gyre_messages::Stage = gyre_messages::Stage::Masking;
 
-    fn process(&mut self, input: ScanView<'_>, output: &mut Draft<Masked>) -> Result<(), StageError> {
+    fn process(
+        &mut self,
+        input: ScanView<'_>,
+        output: &mut Draft<Masked>,
+    ) -> Result<(), StageError> {
         let sweep = sweep_of(input.scan, input.motion)?;
-        let before = input.before.map(|before| sweep_of(before.scan, before.motion)).transpose()?;
+        let before = input
+            .before
+            .map(|before| sweep_of(before.scan, before.motion))
+            .transpose()?;
         let (header, values) = output.parts::<f32>();
         let cells = self.raster.n * self.raster.n;
-        let (rasters, points) = values.split_at_mut(self.rasters() * MaskedHeader::raster_values(cells));
+        let (rasters, points) =
+            values.split_at_mut(self.rasters() * MaskedHeader::raster_values(cells));
         let twist = self.mask(&sweep, before.as_ref(), rasters);
         let twist = twist.map_err(|e| input.scan.malformed(e.to_string()))?;
         let points = self.points(&sweep.scan, twist, points.as_chunks_mut().0);
@@ -203,8 +234,16 @@ impl Stage for Masker {
     }
 }
 
-fn sweep_of(received: &Received<gyre_messages::Scan>, motion: Option<SearchedMotion>) -> Result<Sweep<'_>, StageError> {
+fn sweep_of(
+    received: &Received<gyre_messages::Scan>,
+    motion: Option<SearchedMotion>,
+) -> Result<Sweep<'_>, StageError> {
     let scan = received.header().view(received.values());
-    let scan = scan.ok_or_else(|| received.malformed("its payload is shorter than its header says"))?;
-    Ok(Sweep { number: received.item().scan, scan, motion })
+    let scan =
+        scan.ok_or_else(|| received.malformed("its payload is shorter than its header says"))?;
+    Ok(Sweep {
+        number: received.item().scan,
+        scan,
+        motion,
+    })
 }

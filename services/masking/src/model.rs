@@ -147,23 +147,40 @@ impl Card {
     /// None is named; the file cannot be read, is no card, or is that of another model than `masking.sha256` says.
     pub fn read(config: &MaskingConfig) -> Result<Self, ModelError> {
         let path = config.model.as_deref().ok_or(ModelError::NotNamed)?;
-        let not_a_card = |reason: String| ModelError::NotACard { path: path.to_owned(), reason };
-        if path.extension().is_some_and(|extension| extension == "onnx") {
-            return Err(not_a_card("it is the model itself; its card is the .toml beside it".to_owned()));
+        let not_a_card = |reason: String| ModelError::NotACard {
+            path: path.to_owned(),
+            reason,
+        };
+        if path
+            .extension()
+            .is_some_and(|extension| extension == "onnx")
+        {
+            return Err(not_a_card(
+                "it is the model itself; its card is the .toml beside it".to_owned(),
+            ));
         }
-        let unreadable = |source| ModelError::Unreadable { what: "card", path: path.to_owned(), source };
+        let unreadable = |source| ModelError::Unreadable {
+            what: "card",
+            path: path.to_owned(),
+            source,
+        };
         let text = fs::read_to_string(path).map_err(unreadable)?;
-        let card: Self =
-            toml::from_str(&text).map_err(|error| not_a_card(error.message().trim().replace('\n', "; ")))?;
+        let card: Self = toml::from_str(&text)
+            .map_err(|error| not_a_card(error.message().trim().replace('\n', "; ")))?;
         if !(1..=2).contains(&card.model.inputs) {
-            return Err(not_a_card(format!("model.inputs is {}, but must be 1 or 2", card.model.inputs)));
+            return Err(not_a_card(format!(
+                "model.inputs is {}, but must be 1 or 2",
+                card.model.inputs
+            )));
         }
         match &config.sha256 {
-            Some(expected) if !expected.eq_ignore_ascii_case(&card.model.sha256) => Err(ModelError::OtherModel {
-                path: path.to_owned(),
-                expected: expected.clone(),
-                actual: card.model.sha256,
-            }),
+            Some(expected) if !expected.eq_ignore_ascii_case(&card.model.sha256) => {
+                Err(ModelError::OtherModel {
+                    path: path.to_owned(),
+                    expected: expected.clone(),
+                    actual: card.model.sha256,
+                })
+            }
             _ => Ok(card),
         }
     }
@@ -175,12 +192,30 @@ impl Card {
         let averaged = raster.sampling == Sampling::Averaged;
         let differences = [
             unlike("masking.threshold", self.masking.floor, masking.floor()),
-            unlike("masking.compensate", self.masking.compensate, masking.compensate),
-            unlike("masking.undo_doppler", self.masking.undo_doppler, masking.undo_doppler),
-            unlike("raster.minimum_range_m", self.raster.minimum_range_m, raster.minimum_range_m),
+            unlike(
+                "masking.compensate",
+                self.masking.compensate,
+                masking.compensate,
+            ),
+            unlike(
+                "masking.undo_doppler",
+                self.masking.undo_doppler,
+                masking.undo_doppler,
+            ),
+            unlike(
+                "raster.minimum_range_m",
+                self.raster.minimum_range_m,
+                raster.minimum_range_m,
+            ),
             unlike("raster.sampling", self.raster.sampling, raster.sampling),
             averaged
-                .then(|| unlike("raster.averaged_cells", self.raster.averaged_cells, raster.averaged_cells))
+                .then(|| {
+                    unlike(
+                        "raster.averaged_cells",
+                        self.raster.averaged_cells,
+                        raster.averaged_cells,
+                    )
+                })
                 .flatten(),
         ];
         differences.into_iter().flatten().collect()
@@ -188,7 +223,9 @@ impl Card {
 }
 
 fn unlike<T: PartialEq + fmt::Display>(key: &str, trained: Option<T>, here: T) -> Option<String> {
-    trained.filter(|trained| *trained != here).map(|trained| format!("{key} is {here} instead of {trained}"))
+    trained
+        .filter(|trained| *trained != here)
+        .map(|trained| format!("{key} is {here} instead of {trained}"))
 }
 
 impl Model {
@@ -201,24 +238,44 @@ impl Model {
         let path = config.model.as_deref().ok_or(ModelError::NotNamed)?;
         check_raster(path, &card.raster, raster)?;
         let file = path.with_file_name(&card.model.file);
-        let bytes =
-            fs::read(&file).map_err(|source| ModelError::Unreadable { what: "file", path: file.clone(), source })?;
+        let bytes = fs::read(&file).map_err(|source| ModelError::Unreadable {
+            what: "file",
+            path: file.clone(),
+            source,
+        })?;
         let actual = hexadecimal(&Sha256::digest(&bytes));
         match actual.eq_ignore_ascii_case(&card.model.sha256) {
             true => Ok(Self { card, file, bytes }),
-            false => Err(ModelError::Checksum { path: file, expected: card.model.sha256, actual }),
+            false => Err(ModelError::Checksum {
+                path: file,
+                expected: card.model.sha256,
+                actual,
+            }),
         }
     }
 }
 
-fn check_raster(path: &Path, trained: &RasterFacts, raster: &RasterConfig) -> Result<(), ModelError> {
-    let differs = |key, expected: f64, actual: f64| ModelError::Raster { key, path: path.to_owned(), expected, actual };
+fn check_raster(
+    path: &Path,
+    trained: &RasterFacts,
+    raster: &RasterConfig,
+) -> Result<(), ModelError> {
+    let differs = |key, expected: f64, actual: f64| ModelError::Raster {
+        key,
+        path: path.to_owned(),
+        expected,
+        actual,
+    };
     if trained.n != raster.n {
         return Err(differs("n", trained.n as f64, raster.n as f64));
     }
     match (trained.cell_m - raster.cell_m).abs() <= 1e-4 * trained.cell_m {
         true => Ok(()),
-        false => Err(differs("cell_m", as_written(trained.cell_m), as_written(raster.cell_m))),
+        false => Err(differs(
+            "cell_m",
+            as_written(trained.cell_m),
+            as_written(raster.cell_m),
+        )),
     }
 }
 

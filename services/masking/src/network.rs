@@ -35,7 +35,9 @@ pub enum NetworkError {
     )]
     NotBuiltIn(Provider),
     /// This machine or this ONNX Runtime cannot do it.
-    #[error("masking.provider is `{provider}`, but ONNX Runtime cannot use it here: {reason}; `cpu` always works")]
+    #[error(
+        "masking.provider is `{provider}`, but ONNX Runtime cannot use it here: {reason}; `cpu` always works"
+    )]
     Provider {
         /// Who was to compute.
         provider: Provider,
@@ -63,7 +65,9 @@ pub enum NetworkError {
         known: String,
     },
     /// The model is not a mask, or not one for these rasters.
-    #[error("{path} {has}, but a mask of its card's sizes must have the one {expected}: export it again")]
+    #[error(
+        "{path} {has}, but a mask of its card's sizes must have the one {expected}: export it again"
+    )]
     Interface {
         /// The model's file.
         path: PathBuf,
@@ -95,11 +99,17 @@ impl Network {
         let model = Model::read(config, raster)?;
         let environment = runtime::open(&runtime::find(config.runtime.as_deref())?)?;
         let mut builder = builder(&environment, config)?;
-        let session = builder.commit_from_memory(&model.bytes).map_err(|error| refused(&model, error.message()))?;
+        let session = builder
+            .commit_from_memory(&model.bytes)
+            .map_err(|error| refused(&model, error.message()))?;
         let shape = [1, model.card.model.inputs, raster.n, raster.n];
         check("takes", INPUT, session.inputs(), shape, &model)?;
         check("gives", OUTPUT, session.outputs(), shape, &model)?;
-        Ok(Self { session, shape, masks: vec![0.0; shape.iter().product()] })
+        Ok(Self {
+            session,
+            shape,
+            masks: vec![0.0; shape.iter().product()],
+        })
     }
 
     /// Scans that it looks at, and masks that it makes of them: 1, or 2 (this scan, then the one before).
@@ -118,9 +128,16 @@ impl Network {
         let outputs = self.session.run(ort::inputs![input]).map_err(failed)?;
         let (_, masks) = outputs[0].try_extract_tensor::<f32>().map_err(failed)?;
         if masks.len() != self.masks.len() {
-            return Err(NetworkError::Run(format!("{} values instead of {}", masks.len(), self.masks.len())));
+            return Err(NetworkError::Run(format!(
+                "{} values instead of {}",
+                masks.len(),
+                self.masks.len()
+            )));
         }
-        self.masks.iter_mut().zip(masks).for_each(|(kept, mask)| *kept = mask.clamp(0.0, 1.0));
+        self.masks
+            .iter_mut()
+            .zip(masks)
+            .for_each(|(kept, mask)| *kept = mask.clamp(0.0, 1.0));
         match self.masks.iter().filter(|mask| mask.is_nan()).count() {
             0 => Ok(&self.masks),
             count => Err(NetworkError::Run(format!(
@@ -138,17 +155,27 @@ impl Network {
 }
 
 /// One scan after the other, the same bits each time.
-fn builder(environment: &Environment, config: &MaskingConfig) -> Result<SessionBuilder, NetworkError> {
+fn builder(
+    environment: &Environment,
+    config: &MaskingConfig,
+) -> Result<SessionBuilder, NetworkError> {
     let providers = execution_providers(config.provider)?;
     let build = || -> ort::Result<SessionBuilder> {
-        let builder = Session::builder(environment)?.with_intra_threads(config.threads)?.with_inter_threads(1)?;
+        let builder = Session::builder(environment)?
+            .with_intra_threads(config.threads)?
+            .with_inter_threads(1)?;
         // The other stages need the processor while there is no scan.
-        Ok(builder.with_intra_op_spinning(false)?.with_deterministic_compute(true)?)
+        Ok(builder
+            .with_intra_op_spinning(false)?
+            .with_deterministic_compute(true)?)
     };
     let builder = build().map_err(|error| NetworkError::Run(sentence(error.message())))?;
     builder
         .with_execution_providers(providers)
-        .map_err(|error| NetworkError::Provider { provider: config.provider, reason: sentence(error.message()) })
+        .map_err(|error| NetworkError::Provider {
+            provider: config.provider,
+            reason: sentence(error.message()),
+        })
 }
 
 fn execution_providers(provider: Provider) -> Result<Vec<ExecutionProviderDispatch>, NetworkError> {
@@ -157,27 +184,46 @@ fn execution_providers(provider: Provider) -> Result<Vec<ExecutionProviderDispat
         #[cfg(feature = "cuda")]
         Provider::Cuda => Ok(vec![ort::ep::CUDA::default().build().error_on_failure()]),
         #[cfg(feature = "tensorrt")]
-        Provider::Tensorrt => Ok(vec![ort::ep::TensorRT::default().build().error_on_failure()]),
+        Provider::Tensorrt => Ok(vec![
+            ort::ep::TensorRT::default().build().error_on_failure(),
+        ]),
         #[cfg(feature = "openvino")]
-        Provider::Openvino => Ok(vec![ort::ep::OpenVINO::default().build().error_on_failure()]),
+        Provider::Openvino => Ok(vec![
+            ort::ep::OpenVINO::default().build().error_on_failure(),
+        ]),
         #[allow(unreachable_patterns, reason = "none is left where all are built in")]
         other => Err(NetworkError::NotBuiltIn(other)),
     }
 }
 
 /// Whether what the session takes or gives is the one tensor that it must be.
-fn check(verb: &str, name: &str, tensors: &[Outlet], shape: [usize; 4], model: &Model) -> Result<(), NetworkError> {
+fn check(
+    verb: &str,
+    name: &str,
+    tensors: &[Outlet],
+    shape: [usize; 4],
+    model: &Model,
+) -> Result<(), NetworkError> {
     let fits = |tensor: &Outlet| match tensor.dtype() {
-        ValueType::Tensor { ty: TensorElementType::Float32, shape: actual, .. } => {
-            tensor.name() == name && actual.iter().copied().eq(shape.map(|size| size as i64))
-        }
+        ValueType::Tensor {
+            ty: TensorElementType::Float32,
+            shape: actual,
+            ..
+        } => tensor.name() == name && actual.iter().copied().eq(shape.map(|size| size as i64)),
         _ => false,
     };
     match tensors {
         [tensor] if fits(tensor) => Ok(()),
         _ => Err(NetworkError::Interface {
             path: model.file.clone(),
-            has: format!("{verb} {}", tensors.iter().map(describe).collect::<Vec<_>>().join(" and ")),
+            has: format!(
+                "{verb} {}",
+                tensors
+                    .iter()
+                    .map(describe)
+                    .collect::<Vec<_>>()
+                    .join(" and ")
+            ),
             expected: format!("`{name}` Float32 {shape:?}"),
         }),
     }
@@ -196,9 +242,16 @@ fn refused(model: &Model, message: &str) -> NetworkError {
     match message.split_once("ai.onnx is till opset ") {
         Some((_, known)) => {
             let known = known.trim_end().trim_end_matches('.').to_owned();
-            NetworkError::Opset { path, opset: model.card.model.opset, known }
+            NetworkError::Opset {
+                path,
+                opset: model.card.model.opset,
+                known,
+            }
         }
-        None => NetworkError::Load { path, reason: sentence(message) },
+        None => NetworkError::Load {
+            path,
+            reason: sentence(message),
+        },
     }
 }
 
@@ -208,7 +261,10 @@ fn sentence(message: &str) -> String {
         Some((_, place)) => place.split_once(") ").map_or(place, |(_, said)| said),
         None => message,
     };
-    said.trim_end_matches(['.', '\n']).split_whitespace().collect::<Vec<_>>().join(" ")
+    said.trim_end_matches(['.', '\n'])
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 #[cfg(test)]
@@ -217,9 +273,11 @@ mod tests {
 
     #[test]
     fn what_onnx_runtime_says_is_one_line_without_its_own_source() {
-        let said =
-            "Load failed:/onnxruntime_src/core/graph.cc:46 void check(int, bool) Opset 99 is (still)\nnew. Or not.\n";
+        let said = "Load failed:/onnxruntime_src/core/graph.cc:46 void check(int, bool) Opset 99 is (still)\nnew. Or not.\n";
         assert_eq!(sentence(said), "Opset 99 is (still) new. Or not");
-        assert_eq!(sentence("Protobuf\n  parsing failed."), "Protobuf parsing failed");
+        assert_eq!(
+            sentence("Protobuf\n  parsing failed."),
+            "Protobuf parsing failed"
+        );
     }
 }

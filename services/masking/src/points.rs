@@ -24,7 +24,9 @@ impl Frame {
         for points in points.chunk_by_mut(|a, b| a[2] == b[2]) {
             let sensor = self.sensor_at(&points[0]);
             for point in points {
-                point[3] *= self.cell_seen_from(sensor, point).map_or(1.0, |cell| mask[cell].powf(exponent));
+                point[3] *= self
+                    .cell_seen_from(sensor, point)
+                    .map_or(1.0, |cell| mask[cell].powf(exponent));
             }
         }
     }
@@ -39,8 +41,15 @@ impl Frame {
         self.twist.map(|twist| twist.pose_at((*time_s).into()))
     }
 
-    fn cell_seen_from(&self, sensor: Option<Isometry2<f64>>, &[x_m, y_m, _, _, doppler_s]: &Point) -> Option<usize> {
-        let seen = self.approached(Point2::new(f64::from(x_m), f64::from(y_m)), doppler_s.into());
+    fn cell_seen_from(
+        &self,
+        sensor: Option<Isometry2<f64>>,
+        &[x_m, y_m, _, _, doppler_s]: &Point,
+    ) -> Option<usize> {
+        let seen = self.approached(
+            Point2::new(f64::from(x_m), f64::from(y_m)),
+            doppler_s.into(),
+        );
         self.cell(sensor.map_or(seen, |sensor| sensor * seen))
     }
 
@@ -60,7 +69,9 @@ impl Frame {
     fn cell(&self, place: Point2<f64>) -> Option<usize> {
         let index = |metres: f64| {
             let index = (0.5 * (self.n as f64 - 1.0) - metres / f64::from(self.cell_m)).round();
-            (0.0..self.n as f64).contains(&index).then_some(index as usize)
+            (0.0..self.n as f64)
+                .contains(&index)
+                .then_some(index as usize)
         };
         Some(index(place.x)? * self.n + index(place.y)?)
     }
@@ -71,14 +82,23 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use gyre_radar::{
-        OwnedScan, PointExtractor, PointsConfig, RasterConfig, ScanLimits, Sense, SweepGeometry, raster::Rasteriser,
-        scan::flag,
+        OwnedScan, PointExtractor, PointsConfig, RasterConfig, ScanLimits, Sense, SweepGeometry,
+        raster::Rasteriser, scan::flag,
     };
 
-    const FRAME: Frame = Frame { n: 5, cell_m: 2.0, twist: None, doppler_undone: false };
+    const FRAME: Frame = Frame {
+        n: 5,
+        cell_m: 2.0,
+        twist: None,
+        doppler_undone: false,
+    };
 
     /// Factors of a point's weight when cell (row, column) alone has the mask 0.5, and all others 1.
-    fn factor(frame: Frame, (row, column): (usize, usize), [x_m, y_m, time_s, doppler_s]: [f32; 4]) -> f32 {
+    fn factor(
+        frame: Frame,
+        (row, column): (usize, usize),
+        [x_m, y_m, time_s, doppler_s]: [f32; 4],
+    ) -> f32 {
         let mut mask = [1.0; 25];
         mask[row * 5 + column] = 0.5;
         let mut points = [[x_m, y_m, time_s, 1.0, doppler_s]];
@@ -95,7 +115,13 @@ mod tests {
 
     #[test]
     fn a_point_outside_of_the_raster_keeps_its_weight() {
-        for place in [[5.1, 0.0], [-5.1, 0.0], [0.0, 5.1], [0.0, -5.1], [f32::NAN, 0.0]] {
+        for place in [
+            [5.1, 0.0],
+            [-5.1, 0.0],
+            [0.0, 5.1],
+            [0.0, -5.1],
+            [f32::NAN, 0.0],
+        ] {
             let mut points = [[place[0], place[1], 0.0, 0.7, 0.0]];
             FRAME.weigh(&[0.0; 25], 1.0, &mut points);
             assert_eq!(points[0][3], 0.7, "{place:?}");
@@ -111,12 +137,23 @@ mod tests {
 
     #[test]
     fn a_point_is_moved_as_its_sweep_was() {
-        let twist = Some(Twist { vx_mps: 10.0, vy_mps: 0.0, yaw_rate_radps: 0.0 });
+        let twist = Some(Twist {
+            vx_mps: 10.0,
+            vy_mps: 0.0,
+            yaw_rate_radps: 0.0,
+        });
         let moving = Frame { twist, ..FRAME };
         assert_eq!(factor(moving, (1, 2), [0.0, 0.0, 0.2, 0.0]), 0.5);
         assert_eq!(factor(moving, (3, 2), [0.0, 0.0, -0.2, 0.0]), 0.5);
         let quarter = std::f64::consts::FRAC_PI_2 / 0.1;
-        let turning = Frame { twist: Some(Twist { vx_mps: 0.0, vy_mps: 0.0, yaw_rate_radps: quarter }), ..FRAME };
+        let turning = Frame {
+            twist: Some(Twist {
+                vx_mps: 0.0,
+                vy_mps: 0.0,
+                yaw_rate_radps: quarter,
+            }),
+            ..FRAME
+        };
         assert_eq!(factor(turning, (2, 0), [4.0, 0.0, 0.1, 0.0]), 0.5);
     }
 
@@ -125,9 +162,22 @@ mod tests {
 
     /// A return in every twentieth azimuth, at ranges from 15 to 80 m, seen within 0.25 s.
     fn spots(sense: Sense) -> OwnedScan {
-        let mut scan = OwnedScan::with_limits(ScanLimits { bytes: AZIMUTHS * BINS, azimuths: AZIMUTHS });
-        let sizes = SweepGeometry { azimuths: AZIMUTHS, bins: BINS, stride: BINS, ..scan.geometry };
-        scan.geometry = SweepGeometry { range_resolution_m: 0.175, doppler_s: 0.05, sense, ..sizes };
+        let mut scan = OwnedScan::with_limits(ScanLimits {
+            bytes: AZIMUTHS * BINS,
+            azimuths: AZIMUTHS,
+        });
+        let sizes = SweepGeometry {
+            azimuths: AZIMUTHS,
+            bins: BINS,
+            stride: BINS,
+            ..scan.geometry
+        };
+        scan.geometry = SweepGeometry {
+            range_resolution_m: 0.175,
+            doppler_s: 0.05,
+            sense,
+            ..sizes
+        };
         for azimuth in 0..AZIMUTHS {
             scan.azimuth_rad[azimuth] = azimuth as f32 * std::f32::consts::TAU / AZIMUTHS as f32;
             scan.stamp_ns[azimuth] = (azimuth as i64 - AZIMUTHS as i64 / 2) * 625_000;
@@ -142,14 +192,30 @@ mod tests {
     /// The share of a scan's points that lie, by `frame`, where the raster made with `twist` has power.
     fn share_that_meets(twist: Twist, sense: Sense, frame: Frame) -> f32 {
         let scan = spots(sense);
-        let config = RasterConfig { n: frame.n, cell_m: frame.cell_m, ..RasterConfig::default() };
+        let config = RasterConfig {
+            n: frame.n,
+            cell_m: frame.cell_m,
+            ..RasterConfig::default()
+        };
         let mut raster = vec![0.0; frame.n * frame.n];
-        Rasteriser::new(&config).unwrap().rasterise(&scan.view(), 60, Some(twist), &mut raster).unwrap();
+        Rasteriser::new(&config)
+            .unwrap()
+            .rasterise(&scan.view(), 60, Some(twist), &mut raster)
+            .unwrap();
         let mut points = vec![[0.0; 5]; 8192];
-        let config = PointsConfig { max_range_m: 100.0, ..PointsConfig::default() };
-        let count = PointExtractor::new(&config).unwrap().extract(&scan.view(), 60, &mut points).unwrap();
+        let config = PointsConfig {
+            max_range_m: 100.0,
+            ..PointsConfig::default()
+        };
+        let count = PointExtractor::new(&config)
+            .unwrap()
+            .extract(&scan.view(), 60, &mut points)
+            .unwrap();
         assert!(count >= 100, "{count}");
-        let lit: Vec<f32> = raster.iter().map(|power| f32::from(*power > 10.0)).collect();
+        let lit: Vec<f32> = raster
+            .iter()
+            .map(|power| f32::from(*power > 10.0))
+            .collect();
         let mut weighed = points[..count].to_vec();
         frame.weigh(&lit, 1.0, &mut weighed);
         weighed.iter().filter(|point| point[3] > 0.0).count() as f32 / count as f32
@@ -157,12 +223,30 @@ mod tests {
 
     #[test]
     fn points_lie_where_the_raster_has_their_power() {
-        let twist = Twist { vx_mps: 25.0, vy_mps: 1.0, yaw_rate_radps: 0.6 };
-        let moving = Frame { n: 401, cell_m: 0.5, twist: Some(twist), doppler_undone: true };
+        let twist = Twist {
+            vx_mps: 25.0,
+            vy_mps: 1.0,
+            yaw_rate_radps: 0.6,
+        };
+        let moving = Frame {
+            n: 401,
+            cell_m: 0.5,
+            twist: Some(twist),
+            doppler_undone: true,
+        };
         for sense in [Sense::Clockwise, Sense::CounterClockwise] {
             let share = share_that_meets(twist, sense, moving);
             assert!(share > 0.99, "{share}");
-            for other in [Frame { doppler_undone: false, ..moving }, Frame { twist: None, ..moving }] {
+            for other in [
+                Frame {
+                    doppler_undone: false,
+                    ..moving
+                },
+                Frame {
+                    twist: None,
+                    ..moving
+                },
+            ] {
                 let share = share_that_meets(twist, sense, other);
                 assert!(share < 0.8, "{share} for {other:?}");
             }
@@ -171,8 +255,16 @@ mod tests {
 
     #[test]
     fn dopplers_shift_is_undone_where_the_raster_is_without_it() {
-        let twist = Some(Twist { vx_mps: 20.0, vy_mps: 0.0, yaw_rate_radps: 0.0 });
-        let [kept, undone] = [false, true].map(|doppler_undone| Frame { twist, doppler_undone, ..FRAME });
+        let twist = Some(Twist {
+            vx_mps: 20.0,
+            vy_mps: 0.0,
+            yaw_rate_radps: 0.0,
+        });
+        let [kept, undone] = [false, true].map(|doppler_undone| Frame {
+            twist,
+            doppler_undone,
+            ..FRAME
+        });
         assert_eq!(factor(kept, (1, 2), [2.0, 0.0, 0.0, 0.1]), 0.5);
         assert_eq!(factor(undone, (0, 2), [2.0, 0.0, 0.0, 0.1]), 0.5);
     }

@@ -40,13 +40,20 @@ impl Rasters {
     }
 
     /// Writes the raster to `cells`, row 0 far ahead. Returns the velocity that the distortion was undone with.
-    pub fn make(&mut self, sweep: &Sweep<'_>, cells: &mut [f32]) -> Result<Option<Twist>, RasterError> {
+    pub fn make(
+        &mut self,
+        sweep: &Sweep<'_>,
+        cells: &mut [f32],
+    ) -> Result<Option<Twist>, RasterError> {
         let mut scan = sweep.scan;
         if !self.undo_doppler {
             scan.geometry.doppler_s = 0.0;
         }
         if let Some(twist) = sweep.motion.filter(|_| self.compensate).map(twist_of) {
-            match self.rasteriser.rasterise(&scan, self.floor, Some(twist), cells) {
+            match self
+                .rasteriser
+                .rasterise(&scan, self.floor, Some(twist), cells)
+            {
                 Ok(()) => return Ok(Some(twist)),
                 // A motion that no vehicle makes is a wrong match: better no compensation than that.
                 Err(RasterError::Twist { .. }) => {}

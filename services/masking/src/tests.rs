@@ -8,7 +8,10 @@ const BINS: usize = 300;
 
 /// A wall all around, 4 m deep, its middle at 40 m.
 fn wall() -> OwnedScan {
-    let mut scan = OwnedScan::with_limits(ScanLimits { bytes: AZIMUTHS * BINS, azimuths: AZIMUTHS });
+    let mut scan = OwnedScan::with_limits(ScanLimits {
+        bytes: AZIMUTHS * BINS,
+        azimuths: AZIMUTHS,
+    });
     scan.geometry = SweepGeometry {
         azimuths: AZIMUTHS,
         bins: BINS,
@@ -28,36 +31,76 @@ fn wall() -> OwnedScan {
 
 /// Mean place of the power straight ahead, metres, seen at 20 m/s.
 fn wall_ahead_m(config: &MaskingConfig) -> f32 {
-    let raster = RasterConfig { n: 401, cell_m: 0.25, ..RasterConfig::default() };
+    let raster = RasterConfig {
+        n: 401,
+        cell_m: 0.25,
+        ..RasterConfig::default()
+    };
     let mut masker = Masker::new(&raster, &PointsConfig::default(), config).unwrap();
-    let motion = SearchedMotion { x_m: 5.0, y_m: 0.0, yaw_rad: 0.0, interval_ns: 250_000_000 };
+    let motion = SearchedMotion {
+        x_m: 5.0,
+        y_m: 0.0,
+        yaw_rad: 0.0,
+        interval_ns: 250_000_000,
+    };
     let mut cells = vec![0.0; 401 * 401];
     let wall = wall();
-    let sweep = Sweep { number: 0, scan: wall.view(), motion: Some(motion) };
+    let sweep = Sweep {
+        number: 0,
+        scan: wall.view(),
+        motion: Some(motion),
+    };
     assert!(masker.mask(&sweep, None, &mut cells).unwrap().is_some());
     let ahead = (0..200).map(|row| (cells[row * 401 + 200], (200 - row) as f32 * 0.25));
-    let (sum, moment) = ahead.fold((0.0, 0.0), |(sum, moment), (power, x_m)| (sum + power, moment + power * x_m));
+    let (sum, moment) = ahead.fold((0.0, 0.0), |(sum, moment), (power, x_m)| {
+        (sum + power, moment + power * x_m)
+    });
     moment / sum
 }
 
 #[test]
 fn rasters_keep_dopplers_shift_unless_it_is_to_be_undone() {
     let kept = wall_ahead_m(&MaskingConfig::default());
-    let undone = wall_ahead_m(&MaskingConfig { undo_doppler: true, ..MaskingConfig::default() });
+    let undone = wall_ahead_m(&MaskingConfig {
+        undo_doppler: true,
+        ..MaskingConfig::default()
+    });
     assert!((kept - 40.0).abs() < 0.1, "{kept}");
-    assert!((undone - kept - 0.04 * 20.0).abs() < 0.02, "{undone}, {kept} with the shift");
+    assert!(
+        (undone - kept - 0.04 * 20.0).abs() < 0.02,
+        "{undone}, {kept} with the shift"
+    );
 }
 
 #[test]
 fn points_start_above_the_masks_floor() {
     let count = |config: &MaskingConfig| {
-        let points = PointsConfig { capacity: 20_000, ..PointsConfig::default() };
+        let points = PointsConfig {
+            capacity: 20_000,
+            ..PointsConfig::default()
+        };
         let mut masker = Masker::new(&RasterConfig::default(), &points, config).unwrap();
         let mut out = vec![[0.0; 5]; points.capacity];
         let count = masker.points(&wall().view(), None, &mut out).unwrap();
         (count, out[0][3])
     };
-    assert_eq!(count(&MaskingConfig::default()), (20 * AZIMUTHS, 40.0 / 60.0));
-    assert_eq!(count(&MaskingConfig { threshold: 100, ..MaskingConfig::default() }).0, 0);
-    assert_eq!(count(&MaskingConfig { kind: MaskKind::None, ..MaskingConfig::default() }), (20 * AZIMUTHS, 1.0));
+    assert_eq!(
+        count(&MaskingConfig::default()),
+        (20 * AZIMUTHS, 40.0 / 60.0)
+    );
+    assert_eq!(
+        count(&MaskingConfig {
+            threshold: 100,
+            ..MaskingConfig::default()
+        })
+        .0,
+        0
+    );
+    assert_eq!(
+        count(&MaskingConfig {
+            kind: MaskKind::None,
+            ..MaskingConfig::default()
+        }),
+        (20 * AZIMUTHS, 1.0)
+    );
 }

@@ -5,8 +5,8 @@
 mod common;
 
 use common::{
-    CELLS, N, assert_masked, card, learned, masker, masks_by_hand, raster, runtime_is_installed, scan, sweep,
-    unlearned, unmasked,
+    CELLS, N, assert_masked, card, learned, masker, masks_by_hand, raster, runtime_is_installed,
+    scan, sweep, unlearned, unmasked,
 };
 use gyre_masking::{MaskingConfig, Sweep, network::Network};
 use gyre_messages::MaskedHeader;
@@ -30,7 +30,11 @@ fn a_raster_is_multiplied_by_the_networks_mask_of_it() {
         let mut out = vec![0.0; CELLS];
         assert!(masker.mask(&sweep, None, &mut out).unwrap().is_some());
         let raster = unmasked(&sweep);
-        assert_masked(&out, &raster, &masks_by_hand(std::slice::from_ref(&raster))[0]);
+        assert_masked(
+            &out,
+            &raster,
+            &masks_by_hand(std::slice::from_ref(&raster))[0],
+        );
     }
 }
 
@@ -62,7 +66,11 @@ fn where_the_chain_starts_a_scan_is_its_own_scan_before() {
     let (mut alone, _) = room();
     masker.mask(&sweep(0, &scan), None, &mut alone).unwrap();
     let raster = unmasked(&sweep(0, &scan));
-    assert_masked(&alone[..CELLS], &raster, &masks_by_hand(&[raster.clone(), raster.clone()])[0]);
+    assert_masked(
+        &alone[..CELLS],
+        &raster,
+        &masks_by_hand(&[raster.clone(), raster.clone()])[0],
+    );
 }
 
 #[test]
@@ -78,7 +86,9 @@ fn a_masker_that_was_started_anew_makes_the_same_bits() {
     old.mask(&first, None, &mut undisturbed).unwrap();
     old.mask(&second, Some(&first), &mut undisturbed).unwrap();
     old.mask(&third, Some(&second), &mut undisturbed).unwrap();
-    masker(&config).mask(&third, Some(&second), &mut restarted).unwrap();
+    masker(&config)
+        .mask(&third, Some(&second), &mut restarted)
+        .unwrap();
     assert_eq!(bits(&undisturbed), bits(&restarted));
 }
 
@@ -93,10 +103,15 @@ fn the_same_scans_give_the_same_bits_with_any_number_of_threads() {
         return;
     }
     let run = |threads| {
-        let config = MaskingConfig { threads, ..learned(&card("single-31")) };
+        let config = MaskingConfig {
+            threads,
+            ..learned(&card("single-31"))
+        };
         let mut network = Network::load(&config, &raster()).unwrap();
         let raster = unmasked(&sweep(0, &scan(0)));
-        let masks: Vec<_> = (0..3).map(|_| bits(network.run(&raster).unwrap())).collect();
+        let masks: Vec<_> = (0..3)
+            .map(|_| bits(network.run(&raster).unwrap()))
+            .collect();
         assert!(masks.windows(2).all(|pair| pair[0] == pair[1]));
         masks.into_iter().next()
     };
@@ -110,7 +125,10 @@ fn points_are_weighed_by_the_masks_of_their_cells() {
         return;
     }
     let scan = scan(1);
-    let sweep = Sweep { motion: None, ..sweep(1, &scan) };
+    let sweep = Sweep {
+        motion: None,
+        ..sweep(1, &scan)
+    };
     let points = |config: &MaskingConfig| {
         let (mut masker, (mut out, _)) = (masker(config), room());
         let twist = masker.mask(&sweep, None, &mut out).unwrap();
@@ -121,7 +139,10 @@ fn points_are_weighed_by_the_masks_of_their_cells() {
     };
     for (model, scans) in [("single-31", 1), ("pair-31", 2)] {
         let weighed = points(&learned(&card(model)));
-        let plain = points(&MaskingConfig { point_exponent: 0.0, ..learned(&card(model)) });
+        let plain = points(&MaskingConfig {
+            point_exponent: 0.0,
+            ..learned(&card(model))
+        });
         assert_eq!(plain, points(&unlearned()));
         assert_eq!(weighed.len(), plain.len());
         let mask = &masks_by_hand(&vec![unmasked(&sweep); scans])[0];
@@ -130,10 +151,21 @@ fn points_are_weighed_by_the_masks_of_their_cells() {
         for (weighed, plain) in weighed.iter().zip(&plain) {
             let (row, column) = (index(plain[0]), index(plain[1]));
             let is_inside = row.min(column) >= 0.0 && row.max(column) < N as f32;
-            let factor = if is_inside { mask[row as usize * N + column as usize].sqrt() } else { 1.0 };
-            assert!((weighed[3] - factor * plain[3]).abs() < 1e-5, "{weighed:?}, {plain:?}");
+            let factor = if is_inside {
+                mask[row as usize * N + column as usize].sqrt()
+            } else {
+                1.0
+            };
+            assert!(
+                (weighed[3] - factor * plain[3]).abs() < 1e-5,
+                "{weighed:?}, {plain:?}"
+            );
             inside += usize::from(is_inside);
         }
-        assert!(inside > 100 && inside < plain.len(), "{inside} of {}", plain.len());
+        assert!(
+            inside > 100 && inside < plain.len(),
+            "{inside} of {}",
+            plain.len()
+        );
     }
 }

@@ -18,8 +18,15 @@ use gyre_radar::RasterConfig;
 
 fn cards() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");
-    let files = fs::read_dir(folder).unwrap().map(|file| file.unwrap().path());
-    files.filter(|file| file.extension().is_some_and(|extension| extension == "toml")).collect()
+    let files = fs::read_dir(folder)
+        .unwrap()
+        .map(|file| file.unwrap().path());
+    files
+        .filter(|file| {
+            file.extension()
+                .is_some_and(|extension| extension == "toml")
+        })
+        .collect()
 }
 
 #[test]
@@ -28,8 +35,14 @@ fn every_card_fits_its_model() {
     assert!(cards.len() >= 4, "{cards:?}");
     for path in cards {
         let config = learned(&path);
-        let Card { raster: trained, .. } = Card::read(&config).unwrap();
-        let raster = RasterConfig { n: trained.n, cell_m: trained.cell_m, ..RasterConfig::default() };
+        let Card {
+            raster: trained, ..
+        } = Card::read(&config).unwrap();
+        let raster = RasterConfig {
+            n: trained.n,
+            cell_m: trained.cell_m,
+            ..RasterConfig::default()
+        };
         let bytes = Model::read(&config, &raster).unwrap().bytes.len();
         assert!(bytes < 9_000_000, "{}: {bytes} bytes", path.display());
         if runtime_is_installed() {

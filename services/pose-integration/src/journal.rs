@@ -54,7 +54,10 @@ pub fn read(path: &Path) -> Result<Vec<PoseHeader>, JournalError> {
     match fs::read(path) {
         Ok(bytes) => records(path, &bytes),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
-        Err(source) => Err(JournalError::File { path: path.to_owned(), source }),
+        Err(source) => Err(JournalError::File {
+            path: path.to_owned(),
+            source,
+        }),
     }
 }
 
@@ -62,7 +65,11 @@ fn records(path: &Path, bytes: &[u8]) -> Result<Vec<PoseHeader>, JournalError> {
     if bytes.len() < MAGIC.len() && MAGIC.starts_with(bytes) {
         return Ok(Vec::new());
     }
-    let records = bytes.strip_prefix(&MAGIC).ok_or_else(|| JournalError::Foreign { path: path.to_owned() })?;
+    let records = bytes
+        .strip_prefix(&MAGIC)
+        .ok_or_else(|| JournalError::Foreign {
+            path: path.to_owned(),
+        })?;
     Ok(records.chunks_exact(RECORD).map_while(decode).collect())
 }
 
@@ -78,12 +85,20 @@ fn check_word(pose: &[u8]) -> [u8; 8] {
 impl Journal {
     /// Opens or begins a journal, cuts off what is not sound, and returns what it holds.
     pub fn open(path: &Path) -> Result<(Self, Vec<PoseHeader>), JournalError> {
-        let failed = |source| JournalError::File { path: path.to_owned(), source };
+        let failed = |source| JournalError::File {
+            path: path.to_owned(),
+            source,
+        };
         if let Some(directory) = path.parent() {
             fs::create_dir_all(directory).map_err(failed)?;
         }
-        let mut file =
-            OpenOptions::new().create(true).truncate(false).read(true).write(true).open(path).map_err(failed)?;
+        let mut file = OpenOptions::new()
+            .create(true)
+            .truncate(false)
+            .read(true)
+            .write(true)
+            .open(path)
+            .map_err(failed)?;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes).map_err(failed)?;
         let records = records(path, &bytes)?;
@@ -92,10 +107,18 @@ impl Journal {
             file = OpenOptions::new().append(true).open(path).map_err(failed)?;
             file.write_all(&MAGIC).map_err(failed)?;
         } else {
-            file.set_len((MAGIC.len() + records.len() * RECORD) as u64).map_err(failed)?;
+            file.set_len((MAGIC.len() + records.len() * RECORD) as u64)
+                .map_err(failed)?;
             file = OpenOptions::new().append(true).open(path).map_err(failed)?;
         }
-        Ok((Self { path: path.to_owned(), file, record: [0; RECORD] }, records))
+        Ok((
+            Self {
+                path: path.to_owned(),
+                file,
+                record: [0; RECORD],
+            },
+            records,
+        ))
     }
 
     /// Appends a pose.
@@ -103,7 +126,12 @@ impl Journal {
         let bytes = bytemuck::bytes_of(pose);
         self.record[..POSE].copy_from_slice(bytes);
         self.record[POSE..].copy_from_slice(&check_word(bytes));
-        self.file.write_all(&self.record).map_err(|source| JournalError::File { path: self.path.clone(), source })
+        self.file
+            .write_all(&self.record)
+            .map_err(|source| JournalError::File {
+                path: self.path.clone(),
+                source,
+            })
     }
 }
 
@@ -115,7 +143,14 @@ mod tests {
     use super::*;
 
     fn pose(seq: u64) -> PoseHeader {
-        PoseHeader { item: Item { seq, ..Item::default() }, x_m: seq as f64, ..PoseHeader::default() }
+        PoseHeader {
+            item: Item {
+                seq,
+                ..Item::default()
+            },
+            x_m: seq as f64,
+            ..PoseHeader::default()
+        }
     }
 
     fn seqs(records: &[PoseHeader]) -> Vec<u64> {
@@ -158,7 +193,10 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("poses.journal");
         fs::write(&path, b"something else altogether").unwrap();
-        assert!(matches!(Journal::open(&path), Err(JournalError::Foreign { .. })));
+        assert!(matches!(
+            Journal::open(&path),
+            Err(JournalError::Foreign { .. })
+        ));
         assert_eq!(fs::read(&path).unwrap(), b"something else altogether");
     }
 }

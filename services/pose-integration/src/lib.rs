@@ -15,8 +15,13 @@ pub const NAME: &str = "pose-integration";
 /// Runs the stage until it is told to stop.
 pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
     let path = journal::path(&launch.manifest.out);
-    let (journal, records) = Journal::open(&path).map_err(|error| StageError::Input(error.to_string()))?;
-    let mut integration = Integration { journal, records, last: None };
+    let (journal, records) =
+        Journal::open(&path).map_err(|error| StageError::Input(error.to_string()))?;
+    let mut integration = Integration {
+        journal,
+        records,
+        last: None,
+    };
     match launch.manifest.refines {
         true => sink::run::<Refined>(launch, &mut integration),
         false => sink::run::<Motion>(launch, &mut integration),
@@ -41,19 +46,29 @@ impl Sink for Integration {
 
     fn integrate(&mut self, motion: &MotionHeader) -> Result<PoseHeader, StageError> {
         let mut pose = compose(self.last.as_ref(), motion);
-        pose.item.hop(gyre_messages::Stage::PoseIntegration).finished_ns = clock::now_ns();
+        pose.item
+            .hop(gyre_messages::Stage::PoseIntegration)
+            .finished_ns = clock::now_ns();
         self.write(&pose)?;
         self.last = Some(pose);
         Ok(pose)
     }
 
     fn end(&mut self, item: &Item) -> Result<(), StageError> {
-        self.write(&PoseHeader { item: Item { flags: flag::END, ..*item }, ..PoseHeader::default() })
+        self.write(&PoseHeader {
+            item: Item {
+                flags: flag::END,
+                ..*item
+            },
+            ..PoseHeader::default()
+        })
     }
 }
 
 impl Integration {
     fn write(&mut self, pose: &PoseHeader) -> Result<(), StageError> {
-        self.journal.append(pose).map_err(|error| StageError::Input(error.to_string()))
+        self.journal
+            .append(pose)
+            .map_err(|error| StageError::Input(error.to_string()))
     }
 }

@@ -32,7 +32,10 @@ pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
         None => gyre_radar::open(&config.data, &options),
     };
     let dataset = dataset.map_err(|error| input(&error))?;
-    let mut replay = Replay { passes_by: simulation.is_none(), ..Replay::of(dataset, &config) };
+    let mut replay = Replay {
+        passes_by: simulation.is_none(),
+        ..Replay::of(dataset, &config)
+    };
     let statistics = source::run(launch, &mut replay)?;
     let slipped_s = statistics.slipped_ns as f64 * 1e-9;
     if slipped_s > WORTH_SAYING_S {
@@ -52,7 +55,10 @@ fn streamed(launch: &Launch) -> Result<Option<SimulationConfig>, StageError> {
 }
 
 /// A simulated drive as a dataset that lies on no disk.
-pub fn open_simulation(recording: Recording, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
+pub fn open_simulation(
+    recording: Recording,
+    options: &DatasetOptions,
+) -> Result<Box<dyn Dataset>, OpenError> {
     gyre_radar::open_source(Box::new(RenderAhead::new(recording)), options)
 }
 
@@ -69,9 +75,18 @@ impl Replay {
     /// The part of a dataset that `config` names.
     pub fn of(dataset: Box<dyn Dataset>, config: &SourceConfig) -> Self {
         let first = config.first.min(dataset.len());
-        let scans = config.scans.unwrap_or(usize::MAX).min(dataset.len() - first);
+        let scans = config
+            .scans
+            .unwrap_or(usize::MAX)
+            .min(dataset.len() - first);
         let half_period_ns = median_period_ns(dataset.as_ref()) / 2;
-        Self { dataset, first, scans, half_period_ns, passes_by: true }
+        Self {
+            dataset,
+            first,
+            scans,
+            half_period_ns,
+            passes_by: true,
+        }
     }
 }
 
@@ -90,7 +105,12 @@ impl Source for Replay {
         self.passes_by
     }
 
-    fn read(&mut self, index: usize, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<(), String> {
+    fn read(
+        &mut self,
+        index: usize,
+        header: &mut ScanHeader,
+        bytes: &mut [u8],
+    ) -> Result<(), String> {
         let read = self.dataset.read(self.first + index, header.slot(bytes));
         header.set_geometry(&read.map_err(|error| error.to_string())?);
         Ok(())

@@ -26,7 +26,11 @@ pub(crate) struct RenderAhead {
 
 impl RenderAhead {
     pub(crate) fn new(recording: Recording) -> Self {
-        Self { renderer: recording.renderer(), crew: None, looked: false }
+        Self {
+            renderer: recording.renderer(),
+            crew: None,
+            looked: false,
+        }
     }
 }
 
@@ -55,7 +59,9 @@ impl ImageSource for RenderAhead {
         if !std::mem::replace(&mut self.looked, true) {
             return self.renderer.draw(index, pixels);
         }
-        self.crew.get_or_insert_with(|| Crew::start(self.renderer.recording(), index)).take(index, pixels);
+        self.crew
+            .get_or_insert_with(|| Crew::start(self.renderer.recording(), index))
+            .take(index, pixels);
     }
 }
 
@@ -101,7 +107,11 @@ impl Queue {
             self.next = index;
         }
         let (wanted, end) = (self.wanted, self.next);
-        while let Some(entry) = self.ready.first_entry().filter(|entry| *entry.key() < wanted) {
+        while let Some(entry) = self
+            .ready
+            .first_entry()
+            .filter(|entry| *entry.key() < wanted)
+        {
             self.spare.push(entry.remove());
         }
         while let Some(entry) = self.ready.last_entry().filter(|entry| *entry.key() >= end) {
@@ -126,7 +136,9 @@ impl Shared {
     }
 
     fn wait<'a>(&self, queue: MutexGuard<'a, Queue>) -> MutexGuard<'a, Queue> {
-        self.changed.wait(queue).unwrap_or_else(PoisonError::into_inner)
+        self.changed
+            .wait(queue)
+            .unwrap_or_else(PoisonError::into_inner)
     }
 
     fn work(&self, mut renderer: Renderer) {
@@ -150,8 +162,16 @@ impl Shared {
 
 impl Crew {
     fn start(recording: &Recording, first: usize) -> Self {
-        let queue = Queue { images: recording.scans(), wanted: first, next: first, ..Queue::default() };
-        let shared = Arc::new(Shared { queue: Mutex::new(queue), changed: Condvar::new() });
+        let queue = Queue {
+            images: recording.scans(),
+            wanted: first,
+            next: first,
+            ..Queue::default()
+        };
+        let shared = Arc::new(Shared {
+            queue: Mutex::new(queue),
+            changed: Condvar::new(),
+        });
         let threads = thread::available_parallelism().map_or(1, |n| n.get());
         let start = |_| {
             let (shared, renderer) = (shared.clone(), recording.renderer());
@@ -161,7 +181,10 @@ impl Crew {
                 shared.work(renderer);
             })
         };
-        Self { threads: (0..threads).map(start).collect(), shared }
+        Self {
+            threads: (0..threads).map(start).collect(),
+            shared,
+        }
     }
 
     /// Copies image `index` to `pixels` as soon as it is rendered.
@@ -200,7 +223,11 @@ mod tests {
 
     #[test]
     fn images_asked_for_in_any_order_are_those_rendered_alone() {
-        let recording = Recording::new(&SimulationConfig { scans: 12, ..SimulationConfig::default() }).unwrap();
+        let recording = Recording::new(&SimulationConfig {
+            scans: 12,
+            ..SimulationConfig::default()
+        })
+        .unwrap();
         let (mut ahead, mut alone) = (RenderAhead::new(recording.clone()), recording.renderer());
         let (mut a, mut b) = (vec![0; ahead.size().bytes()], vec![0; ahead.size().bytes()]);
         for index in [0, 0, 1, 2, 9, 10, 3, 3, 5, 11] {
@@ -212,7 +239,12 @@ mod tests {
 
     #[test]
     fn no_more_is_rendered_than_there_is_room_for() {
-        let mut queue = Queue { images: 100, wanted: 3, next: 3, ..Queue::default() };
+        let mut queue = Queue {
+            images: 100,
+            wanted: 3,
+            next: 3,
+            ..Queue::default()
+        };
         let claimed: Vec<usize> = std::iter::from_fn(|| queue.claim()).collect();
         assert_eq!(claimed, (3..3 + AHEAD).collect::<Vec<_>>());
         for index in claimed {
@@ -222,6 +254,9 @@ mod tests {
         assert_eq!((queue.ready.len(), queue.spare.len()), (AHEAD - 2, 2));
         queue.turn_to(50);
         queue.keep(6, vec![6]);
-        assert_eq!((queue.ready.len(), queue.spare.len(), queue.claim()), (0, AHEAD + 1, Some(50)));
+        assert_eq!(
+            (queue.ready.len(), queue.spare.len(), queue.claim()),
+            (0, AHEAD + 1, Some(50))
+        );
     }
 }

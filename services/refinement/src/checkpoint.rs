@@ -47,7 +47,9 @@ pub enum CheckpointError {
         source: io::Error,
     },
     /// Another version's or another configuration's, or damaged.
-    #[error("{path} does not hold what the refinement knew before item {item}: begin again with --fresh")]
+    #[error(
+        "{path} does not hold what the refinement knew before item {item}: begin again with --fresh"
+    )]
     Missing {
         /// Which file.
         path: PathBuf,
@@ -76,16 +78,39 @@ pub fn path(out: &Path) -> PathBuf {
 
 impl Checkpoint {
     /// Opens or begins the file: for runs with this window, and keyframes of this many cells of which a map has at most `most`.
-    pub fn open(path: &Path, window: usize, most: usize, cells: usize) -> Result<Self, CheckpointError> {
-        let failed = |source| CheckpointError::File { path: path.to_owned(), source };
+    pub fn open(
+        path: &Path,
+        window: usize,
+        most: usize,
+        cells: usize,
+    ) -> Result<Self, CheckpointError> {
+        let failed = |source| CheckpointError::File {
+            path: path.to_owned(),
+            source,
+        };
         if let Some(directory) = path.parent() {
             std::fs::create_dir_all(directory).map_err(failed)?;
         }
-        let file = OpenOptions::new().create(true).truncate(false).read(true).write(true).open(path).map_err(failed)?;
+        let file = OpenOptions::new()
+            .create(true)
+            .truncate(false)
+            .read(true)
+            .write(true)
+            .open(path)
+            .map_err(failed)?;
         let slots = |window: usize| most + 2 * window + AIR;
-        let (kept, keyframes) = (slots(window.min(LARGEST_WINDOW)), vec![None; slots(LARGEST_WINDOW)]);
+        let (kept, keyframes) = (
+            slots(window.min(LARGEST_WINDOW)),
+            vec![None; slots(LARGEST_WINDOW)],
+        );
         let slot = vec![0; KEYFRAME_WORDS * 8 + cells];
-        let mut checkpoint = Self { path: path.to_owned(), file, kept, keyframes, slot };
+        let mut checkpoint = Self {
+            path: path.to_owned(),
+            file,
+            kept,
+            keyframes,
+            slot,
+        };
         checkpoint.begin().map_err(failed)?;
         Ok(checkpoint)
     }
@@ -108,7 +133,10 @@ impl Checkpoint {
     fn head(&self) -> [u8; HEAD_BYTES] {
         let mut head = [0; HEAD_BYTES];
         head[..16].copy_from_slice(&MAGIC);
-        for (k, number) in [STATES, self.keyframes.len(), self.slot.len()].into_iter().enumerate() {
+        for (k, number) in [STATES, self.keyframes.len(), self.slot.len()]
+            .into_iter()
+            .enumerate()
+        {
             head[16 + 8 * k..24 + 8 * k].copy_from_slice(&(number as u64).to_le_bytes());
         }
         head
@@ -134,14 +162,22 @@ impl Checkpoint {
         if self.read_state(item).is_some_and(|found| found == state) {
             return Ok(());
         }
-        let result = self.forget_from(item).and_then(|()| self.write_new(item, oldest, refinement));
+        let result = self
+            .forget_from(item)
+            .and_then(|()| self.write_new(item, oldest, refinement));
         let result = result.and_then(|()| self.file.write_all_at(&state, self.state_at(item)));
-        result.map_err(|source| CheckpointError::File { path: self.path.clone(), source })
+        result.map_err(|source| CheckpointError::File {
+            path: self.path.clone(),
+            source,
+        })
     }
 
     fn write_new(&mut self, item: u64, oldest: u64, refinement: &Refinement) -> io::Result<()> {
         for keyframe in refinement.keyframes() {
-            let known = self.keyframes.iter().position(|slot| *slot == Some(keyframe.id));
+            let known = self
+                .keyframes
+                .iter()
+                .position(|slot| *slot == Some(keyframe.id));
             // A map begins with the scan before the item at hand, seen in the light of this one.
             let begun = keyframe.id == oldest && keyframe.id.checked_add(1) == Some(item);
             if known.is_some() && !begun {
@@ -159,7 +195,8 @@ impl Checkpoint {
     fn forget_from(&mut self, item: u64) -> io::Result<()> {
         for slot in 0..self.keyframes.len() {
             if self.keyframes[slot].is_some_and(|id| id >= item) {
-                self.file.write_all_at(&NO_CHECK_WORD, self.keyframe_at(slot))?;
+                self.file
+                    .write_all_at(&NO_CHECK_WORD, self.keyframe_at(slot))?;
                 self.keyframes[slot] = None;
             }
         }
@@ -169,7 +206,11 @@ impl Checkpoint {
     /// An empty slot, or that of the oldest keyframe where as many are kept as a restart can ask for.
     fn free_slot(&self) -> usize {
         let used = self.keyframes.iter().flatten().count();
-        let empty = self.keyframes.iter().position(Option::is_none).filter(|_| used < self.kept);
+        let empty = self
+            .keyframes
+            .iter()
+            .position(Option::is_none)
+            .filter(|_| used < self.kept);
         let oldest = || {
             (0..self.keyframes.len())
                 .filter(|slot| self.keyframes[*slot].is_some())
@@ -179,8 +220,15 @@ impl Checkpoint {
     }
 
     /// Makes the refinement what it was after `item`.
-    pub fn restore(&mut self, item: u64, refinement: &mut Refinement) -> Result<(), CheckpointError> {
-        let missing = || CheckpointError::Missing { path: self.path.clone(), item: item.saturating_add(1) };
+    pub fn restore(
+        &mut self,
+        item: u64,
+        refinement: &mut Refinement,
+    ) -> Result<(), CheckpointError> {
+        let missing = || CheckpointError::Missing {
+            path: self.path.clone(),
+            item: item.saturating_add(1),
+        };
         let state = self.read_state(item).ok_or_else(missing)?;
         let ([found, count, oldest], memory) = decode_state(&state).ok_or_else(missing)?;
         if found != item {
@@ -191,21 +239,32 @@ impl Checkpoint {
             .filter(|(id, _)| (oldest..=item).contains(id))
             .collect();
         wanted.sort_unstable();
-        let places: Vec<u64> = wanted.iter().map(|(_, slot)| self.keyframe_at(*slot)).collect();
+        let places: Vec<u64> = wanted
+            .iter()
+            .map(|(_, slot)| self.keyframe_at(*slot))
+            .collect();
         let mut places = places.into_iter();
         refinement.restore(memory, |keyframe| {
             let place = places.next();
             place.is_some_and(|at| {
-                self.file.read_exact_at(&mut self.slot, at).is_ok() && decode_keyframe(&self.slot, keyframe)
+                self.file.read_exact_at(&mut self.slot, at).is_ok()
+                    && decode_keyframe(&self.slot, keyframe)
             })
         });
-        if refinement.keyframes().count() as u64 == count { Ok(()) } else { Err(missing()) }
+        if refinement.keyframes().count() as u64 == count {
+            Ok(())
+        } else {
+            Err(missing())
+        }
     }
 
     /// What lies in an item's slot; `None` where the file ends before it.
     fn read_state(&self, item: u64) -> Option<[u8; STATE_BYTES]> {
         let mut state = [0; STATE_BYTES];
-        self.file.read_exact_at(&mut state, self.state_at(item)).ok().map(|()| state)
+        self.file
+            .read_exact_at(&mut state, self.state_at(item))
+            .ok()
+            .map(|()| state)
     }
 
     /// The number of the keyframe in a slot, if it is whole.
@@ -224,7 +283,9 @@ const HEAD_BYTES: usize = 16 + 3 * 8;
 const NO_CHECK_WORD: [u8; 8] = [0; 8];
 
 fn word(bytes: &[u8], k: usize) -> u64 {
-    bytes[8 * k..].first_chunk().map_or(0, |word| u64::from_le_bytes(*word))
+    bytes[8 * k..]
+        .first_chunk()
+        .map_or(0, |word| u64::from_le_bytes(*word))
 }
 
 fn put(bytes: &mut [u8], k: usize, word: u64) {
@@ -241,13 +302,22 @@ fn check_word(bytes: &[u8]) -> u64 {
 }
 
 fn pose_words(pose: &Isometry2<f64>) -> [u64; 4] {
-    [pose.translation.x, pose.translation.y, pose.rotation.re, pose.rotation.im].map(f64::to_bits)
+    [
+        pose.translation.x,
+        pose.translation.y,
+        pose.rotation.re,
+        pose.rotation.im,
+    ]
+    .map(f64::to_bits)
 }
 
 /// Bit for bit, without making the rotation's length one again.
 fn pose_of(words: &[u64]) -> Isometry2<f64> {
     let [x, y, re, im] = [0, 1, 2, 3].map(|k| f64::from_bits(words[k]));
-    Isometry2::from_parts(Translation2::new(x, y), UnitComplex::new_unchecked(Complex::new(re, im)))
+    Isometry2::from_parts(
+        Translation2::new(x, y),
+        UnitComplex::new_unchecked(Complex::new(re, im)),
+    )
 }
 
 fn memory_words(memory: &Memory) -> [u64; MEMORY_WORDS] {
@@ -276,7 +346,11 @@ fn memory_of(words: &[u64; MEMORY_WORDS]) -> Memory {
     let anchor = |k: usize| {
         let words = &words[4 + k * ANCHOR_WORDS..][..ANCHOR_WORDS];
         let [x, y, yaw, age_s] = [5, 6, 7, 8].map(|k| f64::from_bits(words[k]));
-        (words[0] == 1).then(|| Anchor { pose: pose_of(&words[1..5]), velocity: Vector3::new(x, y, yaw), age_s })
+        (words[0] == 1).then(|| Anchor {
+            pose: pose_of(&words[1..5]),
+            velocity: Vector3::new(x, y, yaw),
+            age_s,
+        })
     };
     let rest = &words[4 + 2 * ANCHOR_WORDS..];
     Memory {
@@ -291,7 +365,10 @@ fn memory_of(words: &[u64; MEMORY_WORDS]) -> Memory {
 
 fn encode_state(head: [u64; 3], memory: &Memory) -> [u8; STATE_BYTES] {
     let mut slot = [0; STATE_BYTES];
-    head.into_iter().chain(memory_words(memory)).enumerate().for_each(|(k, value)| put(&mut slot, k + 1, value));
+    head.into_iter()
+        .chain(memory_words(memory))
+        .enumerate()
+        .for_each(|(k, value)| put(&mut slot, k + 1, value));
     let check = check_word(&slot[8..]);
     put(&mut slot, 0, check);
     slot
@@ -304,10 +381,16 @@ fn decode_state(slot: &[u8; STATE_BYTES]) -> Option<([u64; 3], Memory)> {
 
 fn encode_keyframe(keyframe: &Keyframe, slot: &mut [u8]) {
     put(slot, 1, keyframe.id);
-    pose_words(&keyframe.pose).into_iter().enumerate().for_each(|(k, value)| put(slot, k + 2, value));
+    pose_words(&keyframe.pose)
+        .into_iter()
+        .enumerate()
+        .for_each(|(k, value)| put(slot, k + 2, value));
     let mut at = KEYFRAME_WORDS * 8;
     for (level, (corner, cells)) in keyframe.images().into_iter().enumerate() {
-        corner.iter().enumerate().for_each(|(k, value)| put(slot, 6 + 2 * level + k, *value as u64));
+        corner
+            .iter()
+            .enumerate()
+            .for_each(|(k, value)| put(slot, 6 + 2 * level + k, *value as u64));
         slot[at..at + cells.len()].copy_from_slice(cells);
         at += cells.len();
     }

@@ -3,7 +3,8 @@
 pub mod checkpoint;
 
 use gyre_messages::{
-    Item, Masked, MaskedHeader, Motion, MotionEstimate, Refined, Refinement as Record, flag, hypothesis, outcome,
+    Item, Masked, MaskedHeader, Motion, MotionEstimate, Refined, Refinement as Record, flag,
+    hypothesis, outcome,
 };
 use gyre_radar::PointsConfig;
 use gyre_scan_matching::{Hypothesis, Outcome, Refinement, RefinementConfig, ScanPoint};
@@ -25,14 +26,21 @@ pub const NAME: &str = "refinement";
 pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
     let points: PointsConfig = launch.section("points")?;
     let config: RefinementConfig = launch.section("refinement")?;
-    let refinement =
-        Refinement::new(&config, points.capacity).map_err(|error| StageError::Configuration(error.to_string()))?;
+    let refinement = Refinement::new(&config, points.capacity)
+        .map_err(|error| StageError::Configuration(error.to_string()))?;
     let manifest = &launch.manifest;
     let path = checkpoint::path(&manifest.out);
     let window = manifest.window.scans + manifest.window.look_back;
-    let checkpoint =
-        Checkpoint::open(&path, window, config.keyframes, refinement.keyframe_cells()).map_err(unusable)?;
-    stage::run(launch, &mut Refiner { refinement, checkpoint, next: None })
+    let checkpoint = Checkpoint::open(&path, window, config.keyframes, refinement.keyframe_cells())
+        .map_err(unusable)?;
+    stage::run(
+        launch,
+        &mut Refiner {
+            refinement,
+            checkpoint,
+            next: None,
+        },
+    )
 }
 
 /// The stage: the refinement, and the file that keeps what it knows.
@@ -57,13 +65,19 @@ impl Stage for Refiner {
         let motion = input.other.header().motion;
         self.stand_before(&item)?;
         output.header().motion = match input.before {
-            Some(before) if !item.is(flag::BREAK) => {
-                refine(&mut self.refinement, item.seq, points(input.current)?, points(before)?, &motion)
-            }
+            Some(before) if !item.is(flag::BREAK) => refine(
+                &mut self.refinement,
+                item.seq,
+                points(input.current)?,
+                points(before)?,
+                &motion,
+            ),
             _ => motion,
         };
         self.next = Some(item.seq.saturating_add(1));
-        self.checkpoint.write(item.seq, &self.refinement).map_err(unusable)
+        self.checkpoint
+            .write(item.seq, &self.refinement)
+            .map_err(unusable)
     }
 }
 
@@ -73,7 +87,9 @@ impl Refiner {
         if item.is(flag::BREAK) {
             self.refinement.start();
         } else if self.next != Some(item.seq) {
-            self.checkpoint.restore(item.seq.saturating_sub(1), &mut self.refinement).map_err(unusable)?;
+            self.checkpoint
+                .restore(item.seq.saturating_sub(1), &mut self.refinement)
+                .map_err(unusable)?;
         }
         Ok(())
     }
@@ -88,13 +104,26 @@ pub fn refine(
     motion: &MotionEstimate,
 ) -> MotionEstimate {
     let searched = Isometry2::new(Vector2::new(motion.x_m, motion.y_m), motion.yaw_rad);
-    let refined = refinement.next(seq, later, earlier, &searched, motion.interval_ns as f64 * 1e-9);
+    let refined = refinement.next(
+        seq,
+        later,
+        earlier,
+        &searched,
+        motion.interval_ns as f64 * 1e-9,
+    );
     let c = &refined.covariance;
     MotionEstimate {
         x_m: refined.motion.translation.x,
         y_m: refined.motion.translation.y,
         yaw_rad: refined.motion.rotation.angle(),
-        covariance: [c[(0, 0)], c[(0, 1)], c[(0, 2)], c[(1, 1)], c[(1, 2)], c[(2, 2)]],
+        covariance: [
+            c[(0, 0)],
+            c[(0, 1)],
+            c[(0, 2)],
+            c[(1, 1)],
+            c[(1, 2)],
+            c[(2, 2)],
+        ],
         refinement: Record {
             outcome: match refined.outcome {
                 Outcome::Refined => outcome::REFINED,
@@ -115,7 +144,9 @@ pub fn refine(
 
 fn points(masked: &Received<Masked>) -> Result<&[ScanPoint], StageError> {
     let header: &MaskedHeader = masked.header();
-    header.points(masked.values()).ok_or_else(|| masked.malformed("its points do not fit its header"))
+    header
+        .points(masked.values())
+        .ok_or_else(|| masked.malformed("its points do not fit its header"))
 }
 
 fn unusable(error: CheckpointError) -> StageError {

@@ -42,13 +42,26 @@ fn scan(world: u64, item: u64) -> Vec<ScanPoint> {
         (mixed ^ mixed >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 40
     };
     let share = |k: u64, salt: u64| spread(k, salt) as f64 / f64::from(1 << 24);
-    let place = |k: u64| [300.0 * share(k, 1) - 50.0 - STEP_M * item as f64, 60.0 * share(k, 7) - 30.0];
+    let place = |k: u64| {
+        [
+            300.0 * share(k, 1) - 50.0 - STEP_M * item as f64,
+            60.0 * share(k, 7) - 30.0,
+        ]
+    };
     let visible = (0..1500).map(place).filter(|[x, y]| x.hypot(*y) < 35.0);
-    visible.map(|[x, y]| [x as f32, y as f32, 0.0, 0.7, 0.0]).take(512).collect()
+    visible
+        .map(|[x, y]| [x as f32, y as f32, 0.0, 0.7, 0.0])
+        .take(512)
+        .collect()
 }
 
 /// Refines item by item, each written before the next, as the stage does.
-fn live(refinement: &mut Refinement, checkpoint: &mut Checkpoint, world: u64, items: std::ops::Range<u64>) {
+fn live(
+    refinement: &mut Refinement,
+    checkpoint: &mut Checkpoint,
+    world: u64,
+    items: std::ops::Range<u64>,
+) {
     for item in items {
         step(refinement, world, item);
         checkpoint.write(item, refinement).unwrap();
@@ -57,19 +70,39 @@ fn live(refinement: &mut Refinement, checkpoint: &mut Checkpoint, world: u64, it
 
 fn step(refinement: &mut Refinement, world: u64, item: u64) {
     let searched = Isometry2::new(Vector2::new(STEP_M, 0.0), 0.0);
-    refinement.next(item, &scan(world, item), &scan(world, item - 1), &searched, INTERVAL_S);
+    refinement.next(
+        item,
+        &scan(world, item),
+        &scan(world, item - 1),
+        &searched,
+        INTERVAL_S,
+    );
 }
 
 /// All that a refinement knows, in bits.
 fn known(refinement: &Refinement) -> Vec<u64> {
-    let pose = |p: &Isometry2<f64>| [p.translation.x, p.translation.y, p.rotation.re, p.rotation.im].map(f64::to_bits);
+    let pose = |p: &Isometry2<f64>| {
+        [
+            p.translation.x,
+            p.translation.y,
+            p.rotation.re,
+            p.rotation.im,
+        ]
+        .map(f64::to_bits)
+    };
     let memory: &Memory = refinement.memory();
     let mut words = pose(&memory.pose).to_vec();
     for anchor in &memory.anchors {
         words.push(anchor.is_some().into());
         if let Some(anchor) = anchor {
             words.extend(pose(&anchor.pose));
-            words.extend(anchor.velocity.iter().chain([&anchor.age_s]).map(|v| v.to_bits()));
+            words.extend(
+                anchor
+                    .velocity
+                    .iter()
+                    .chain([&anchor.age_s])
+                    .map(|v| v.to_bits()),
+            );
         }
     }
     words.extend([memory.usual_overlap, memory.usual_weight].map(f64::to_bits));
@@ -98,7 +131,9 @@ fn history(world: u64, items: u64) -> Vec<Vec<u64>> {
 
 fn restored(path: &Path, item: u64) -> Result<Vec<u64>, CheckpointError> {
     let mut refinement = refinement();
-    open(path).restore(item, &mut refinement).map(|()| known(&refinement))
+    open(path)
+        .restore(item, &mut refinement)
+        .map(|()| known(&refinement))
 }
 
 /// A folder, and the file of a life of so many items in it.
@@ -116,7 +151,11 @@ fn every_item_of_the_last_window_is_restored_bit_for_bit() {
     for items in [3, 9, 20, ITEMS] {
         let (_folder, path) = lived(items);
         for item in items.saturating_sub(2 * WINDOW as u64).max(1)..items {
-            assert_eq!(restored(&path, item).unwrap(), history[item as usize], "item {item} of {items}");
+            assert_eq!(
+                restored(&path, item).unwrap(),
+                history[item as usize],
+                "item {item} of {items}"
+            );
         }
     }
 }
@@ -145,12 +184,27 @@ fn a_file_cut_short_loses_only_what_was_written_last() {
     let after = fs::read(&path).unwrap();
     assert!(after.len() > before.len());
     let history = history(1, 6);
-    for length in [after.len() - 1, (before.len() + after.len()) / 2, before.len() + 1, before.len()] {
+    for length in [
+        after.len() - 1,
+        (before.len() + after.len()) / 2,
+        before.len() + 1,
+        before.len(),
+    ] {
         fs::write(&path, &after[..length]).unwrap();
         for item in 1..4 {
-            assert_eq!(restored(&path, item).unwrap(), history[item as usize], "item {item}, {length} bytes");
+            assert_eq!(
+                restored(&path, item).unwrap(),
+                history[item as usize],
+                "item {item}, {length} bytes"
+            );
         }
-        assert!(matches!(restored(&path, 5), Err(CheckpointError::Missing { item: 6, .. })), "{length} bytes");
+        assert!(
+            matches!(
+                restored(&path, 5),
+                Err(CheckpointError::Missing { item: 6, .. })
+            ),
+            "{length} bytes"
+        );
     }
 }
 
@@ -163,15 +217,25 @@ fn flipped_bytes_in_the_newest_slots_lose_only_those() {
     checkpoint.restore(29, &mut refinement).unwrap();
     live(&mut refinement, &mut checkpoint, 1, 30..31);
     let after = fs::read(&path).unwrap();
-    let changed: Vec<usize> = (0..after.len()).filter(|at| before.get(*at) != Some(&after[*at])).collect();
+    let changed: Vec<usize> = (0..after.len())
+        .filter(|at| before.get(*at) != Some(&after[*at]))
+        .collect();
     assert!(!changed.is_empty());
-    for at in changed.iter().step_by(changed.len() / 12 + 1).chain(changed.last()) {
+    for at in changed
+        .iter()
+        .step_by(changed.len() / 12 + 1)
+        .chain(changed.last())
+    {
         let mut torn = after.clone();
         torn[*at] ^= 0x10;
         fs::write(&path, &torn).unwrap();
         assert!(restored(&path, 30).is_err(), "byte {at}");
         for item in 15..30 {
-            assert_eq!(restored(&path, item).unwrap(), history[item as usize], "item {item}, byte {at}");
+            assert_eq!(
+                restored(&path, item).unwrap(),
+                history[item as usize],
+                "item {item}, byte {at}"
+            );
         }
     }
 }
@@ -179,13 +243,18 @@ fn flipped_bytes_in_the_newest_slots_lose_only_those() {
 #[test]
 fn the_file_of_another_configuration_is_begun_anew() {
     let (_folder, path) = lived(20);
-    let other = RefinementConfig { cell_m: 2.0, ..config() };
+    let other = RefinementConfig {
+        cell_m: 2.0,
+        ..config()
+    };
     let mut refinement = Refinement::new(&other, 512).unwrap();
     let mut checkpoint = open_with(&path, &other, WINDOW);
     assert!(checkpoint.restore(19, &mut refinement).is_err());
     live(&mut refinement, &mut checkpoint, 1, 1..10);
     let mut again = Refinement::new(&other, 512).unwrap();
-    open_with(&path, &other, WINDOW).restore(9, &mut again).unwrap();
+    open_with(&path, &other, WINDOW)
+        .restore(9, &mut again)
+        .unwrap();
     assert_eq!(known(&again), known(&refinement));
     assert!(restored(&path, 9).is_err(), "and the other way round");
 }
@@ -196,7 +265,9 @@ fn another_window_goes_on_with_the_same_file() {
     let (_folder, path) = lived(30);
     for window in [2, 20, 66] {
         let mut refinement = refinement();
-        open_with(&path, &config(), window).restore(25, &mut refinement).unwrap();
+        open_with(&path, &config(), window)
+            .restore(25, &mut refinement)
+            .unwrap();
         assert_eq!(known(&refinement), history[25], "window {window}");
     }
 }
@@ -211,9 +282,15 @@ fn an_item_that_is_not_there_is_named_in_one_sentence() {
         )
     };
     for item in [10, 149, 1000] {
-        assert_eq!(restored(&path, item).unwrap_err().to_string(), expected(item + 1));
+        assert_eq!(
+            restored(&path, item).unwrap_err().to_string(),
+            expected(item + 1)
+        );
     }
-    assert_eq!(restored(&path, u64::MAX).unwrap_err().to_string(), expected(u64::MAX));
+    assert_eq!(
+        restored(&path, u64::MAX).unwrap_err().to_string(),
+        expected(u64::MAX)
+    );
     fs::remove_file(&path).unwrap();
     assert_eq!(restored(&path, 5).unwrap_err().to_string(), expected(6));
 }
@@ -235,7 +312,13 @@ fn keyframes_of_a_repeated_life_stay_out_of_the_next_ones_map() {
     checkpoint.restore(2, &mut refinement).unwrap();
     for item in 3..8 {
         // This time the vehicle stands, and makes no keyframes.
-        refinement.next(item, &scan(1, 2), &scan(1, 2), &Isometry2::identity(), INTERVAL_S);
+        refinement.next(
+            item,
+            &scan(1, 2),
+            &scan(1, 2),
+            &Isometry2::identity(),
+            INTERVAL_S,
+        );
         checkpoint.write(item, &refinement).unwrap();
     }
     assert!(refinement.keyframes().all(|keyframe| keyframe.id < 3));

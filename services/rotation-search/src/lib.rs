@@ -17,7 +17,8 @@ pub const NAME: &str = "rotation-search";
 pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let rotation: RotationConfig = launch.section("rotation")?;
-    let mut search = Rotations::new(raster.n, &rotation).map_err(|e| StageError::Configuration(e.to_string()))?;
+    let mut search = Rotations::new(raster.n, &rotation)
+        .map_err(|e| StageError::Configuration(e.to_string()))?;
     stage::run(launch, &mut search)
 }
 
@@ -35,11 +36,21 @@ impl Rotations {
     pub fn new(n: usize, config: &RotationConfig) -> Result<Self, ConfigError> {
         let search = RotationSearch::new(n, config)?;
         let (later, earlier) = (search.new_spectrum(), search.new_spectrum());
-        Ok(Self { search, later, earlier, kept: None })
+        Ok(Self {
+            search,
+            later,
+            earlier,
+            kept: None,
+        })
     }
 
     /// The rotation of scan `seq` against the one before; all zero where the chain starts.
-    pub fn next(&mut self, seq: u64, pair: Pair<'_>, own_masks: bool) -> Result<RotationEstimate, ShapeError> {
+    pub fn next(
+        &mut self,
+        seq: u64,
+        pair: Pair<'_>,
+        own_masks: bool,
+    ) -> Result<RotationEstimate, ShapeError> {
         self.search.spectrum(pair.later, &mut self.later)?;
         let mut rotation = RotationEstimate::default();
         if let Some(earlier) = pair.earlier {
@@ -60,13 +71,20 @@ impl Stage for Rotations {
     type Output = Rotation;
     const HOP: gyre_messages::Stage = gyre_messages::Stage::RotationSearch;
 
-    fn process(&mut self, input: PairView<'_, Masked>, output: &mut Draft<Rotation>) -> Result<(), StageError> {
+    fn process(
+        &mut self,
+        input: PairView<'_, Masked>,
+        output: &mut Draft<Rotation>,
+    ) -> Result<(), StageError> {
         let (current, header) = (input.current, input.current.header());
-        let before = input.before.map(|before| (before.header(), before.values()));
+        let before = input
+            .before
+            .map(|before| (before.header(), before.values()));
         let pair = header.pair(current.values(), before);
         let pair = pair.ok_or_else(|| current.malformed("its rasters do not fit their headers"))?;
         let rotation = self.next(header.item.seq, pair, header.rasters == 2);
-        output.header().rotation = rotation.map_err(|error| current.malformed(error.to_string()))?;
+        output.header().rotation =
+            rotation.map_err(|error| current.malformed(error.to_string()))?;
         Ok(())
     }
 }

@@ -17,7 +17,8 @@ pub const NAME: &str = "translation-search";
 pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let translation: TranslationConfig = launch.section("translation")?;
-    let mut search = Translations::new(&raster, &translation).map_err(|e| StageError::Configuration(e.to_string()))?;
+    let mut search = Translations::new(&raster, &translation)
+        .map_err(|e| StageError::Configuration(e.to_string()))?;
     stage::run(launch, &mut search)
 }
 
@@ -29,19 +30,36 @@ pub struct Translations {
 impl Translations {
     /// Plans the search.
     pub fn new(raster: &RasterConfig, config: &TranslationConfig) -> Result<Self, ConfigError> {
-        Ok(Self { search: TranslationSearch::new(raster.n, raster.cell_m.into(), config)? })
+        Ok(Self {
+            search: TranslationSearch::new(raster.n, raster.cell_m.into(), config)?,
+        })
     }
 
     /// The motion from the earlier scan to the later one; all zero where the chain starts.
-    pub fn next(&mut self, pair: Pair<'_>, rotation: RotationEstimate) -> Result<MotionEstimate, ShapeError> {
-        let Some(earlier) = pair.earlier else { return Ok(MotionEstimate::default()) };
-        let found = self.search.search(pair.later, earlier, &searched(&rotation))?;
+    pub fn next(
+        &mut self,
+        pair: Pair<'_>,
+        rotation: RotationEstimate,
+    ) -> Result<MotionEstimate, ShapeError> {
+        let Some(earlier) = pair.earlier else {
+            return Ok(MotionEstimate::default());
+        };
+        let found = self
+            .search
+            .search(pair.later, earlier, &searched(&rotation))?;
         let c = &found.covariance;
         Ok(MotionEstimate {
             x_m: found.x_m,
             y_m: found.y_m,
             yaw_rad: found.yaw_rad,
-            covariance: [c[(0, 0)], c[(0, 1)], c[(0, 2)], c[(1, 1)], c[(1, 2)], c[(2, 2)]],
+            covariance: [
+                c[(0, 0)],
+                c[(0, 1)],
+                c[(0, 2)],
+                c[(1, 1)],
+                c[(1, 2)],
+                c[(2, 2)],
+            ],
             interval_ns: 0,
             score: found.score,
             runner_up_score: found.runner_up.map_or(0.0, |runner_up| runner_up.score),
@@ -63,14 +81,23 @@ impl Stage for Translations {
         output: &mut Draft<Motion>,
     ) -> Result<(), StageError> {
         let current = input.current;
-        let before = input.before.map(|before| (before.header(), before.values()));
+        let before = input
+            .before
+            .map(|before| (before.header(), before.values()));
         let pair = current.header().pair(current.values(), before);
         let pair = pair.ok_or_else(|| current.malformed("its rasters do not fit their headers"))?;
         let motion = self.next(pair, input.other.header().rotation);
         let motion = motion.map_err(|error| current.malformed(error.to_string()))?;
-        let interval_ns =
-            input.before.map_or(0, |before| current.item().stamp_ns.saturating_sub(before.item().stamp_ns));
-        output.header().motion = MotionEstimate { interval_ns, ..motion };
+        let interval_ns = input.before.map_or(0, |before| {
+            current
+                .item()
+                .stamp_ns
+                .saturating_sub(before.item().stamp_ns)
+        });
+        output.header().motion = MotionEstimate {
+            interval_ns,
+            ..motion
+        };
         Ok(())
     }
 }

@@ -21,7 +21,10 @@ impl<'a> Trajectory<'a> {
 
     /// Poses without stamps, as in KITTI files: for association by index.
     pub fn untimed(poses: &'a [Pose]) -> Self {
-        Self { stamps_ns: &[], poses }
+        Self {
+            stamps_ns: &[],
+            poses,
+        }
     }
 }
 
@@ -41,7 +44,9 @@ pub enum Association {
 impl Default for Association {
     /// By time, across gaps of up to 1 s.
     fn default() -> Self {
-        Self::Time { max_gap_ns: 1_000_000_000 }
+        Self::Time {
+            max_gap_ns: 1_000_000_000,
+        }
     }
 }
 
@@ -82,8 +87,14 @@ impl Coverage {
     /// Estimated poses without one.
     pub fn left_out(&self) -> usize {
         match *self {
-            Coverage::Time { outside_span, in_gaps, .. } => outside_span + in_gaps,
-            Coverage::Index { estimate_surplus, .. } => estimate_surplus,
+            Coverage::Time {
+                outside_span,
+                in_gaps,
+                ..
+            } => outside_span + in_gaps,
+            Coverage::Index {
+                estimate_surplus, ..
+            } => estimate_surplus,
         }
     }
 }
@@ -106,14 +117,27 @@ pub fn associate(
     }
 }
 
-fn by_index(estimate: &[Pose], truth: &[Pose]) -> Result<(MatchedPoses, Coverage), EvaluationError> {
+fn by_index(
+    estimate: &[Pose],
+    truth: &[Pose],
+) -> Result<(MatchedPoses, Coverage), EvaluationError> {
     let matched = estimate.len().min(truth.len());
     if matched < 2 {
-        return Err(EvaluationError::TooFew { matched, estimate: estimate.len(), truth: truth.len() });
+        return Err(EvaluationError::TooFew {
+            matched,
+            estimate: estimate.len(),
+            truth: truth.len(),
+        });
     }
-    let coverage =
-        Coverage::Index { matched, estimate_surplus: estimate.len() - matched, truth_surplus: truth.len() - matched };
-    Ok((MatchedPoses::new(estimate[..matched].to_vec(), truth[..matched].to_vec())?, coverage))
+    let coverage = Coverage::Index {
+        matched,
+        estimate_surplus: estimate.len() - matched,
+        truth_surplus: truth.len() - matched,
+    };
+    Ok((
+        MatchedPoses::new(estimate[..matched].to_vec(), truth[..matched].to_vec())?,
+        coverage,
+    ))
 }
 
 fn by_time(
@@ -140,23 +164,47 @@ fn by_time(
         && in_gaps == 0
         && let (Some(estimate_ns), Some(truth_ns)) = (estimate_ns, truth_ns)
     {
-        return Err(EvaluationError::NoOverlap { estimate_ns, truth_ns });
+        return Err(EvaluationError::NoOverlap {
+            estimate_ns,
+            truth_ns,
+        });
     }
     if matched < 2 {
-        return Err(EvaluationError::TooFew { matched, estimate: estimate.poses.len(), truth: truth.poses.len() });
+        return Err(EvaluationError::TooFew {
+            matched,
+            estimate: estimate.poses.len(),
+            truth: truth.poses.len(),
+        });
     }
-    let coverage = Coverage::Time { matched, outside_span, in_gaps, max_gap_ns };
+    let coverage = Coverage::Time {
+        matched,
+        outside_span,
+        in_gaps,
+        max_gap_ns,
+    };
     Ok((MatchedPoses::new(kept, counterparts)?, coverage))
 }
 
 /// The span of the stamps, `None` where there are none; refuses a wrong count and time that runs backwards.
-pub(crate) fn require_stamps(side: Side, trajectory: &Trajectory<'_>) -> Result<Option<(i64, i64)>, EvaluationError> {
+pub(crate) fn require_stamps(
+    side: Side,
+    trajectory: &Trajectory<'_>,
+) -> Result<Option<(i64, i64)>, EvaluationError> {
     let (stamps, poses) = (trajectory.stamps_ns, trajectory.poses.len());
     if stamps.len() != poses {
-        return Err(EvaluationError::StampCount { side, poses, stamps: stamps.len() });
+        return Err(EvaluationError::StampCount {
+            side,
+            poses,
+            stamps: stamps.len(),
+        });
     }
     if let Some(k) = stamps.windows(2).position(|w| w[1] < w[0]) {
-        return Err(EvaluationError::Backwards { side, index: k + 1, previous_ns: stamps[k], stamp_ns: stamps[k + 1] });
+        return Err(EvaluationError::Backwards {
+            side,
+            index: k + 1,
+            previous_ns: stamps[k],
+            stamp_ns: stamps[k + 1],
+        });
     }
     Ok(stamps.first().copied().zip(stamps.last().copied()))
 }
@@ -173,22 +221,36 @@ const ROUNDING_NS: u64 = 1_000;
 
 /// The truth at `stamp_ns`. A stamp that the truth has itself is never in a gap.
 pub(crate) fn truth_at(truth: Trajectory<'_>, stamp_ns: i64, max_gap_ns: i64) -> At {
-    let ends = truth.stamps_ns.first().into_iter().chain(truth.stamps_ns.last());
-    let end = ends.copied().find(|end| stamp_ns.abs_diff(*end) <= ROUNDING_NS);
+    let ends = truth
+        .stamps_ns
+        .first()
+        .into_iter()
+        .chain(truth.stamps_ns.last());
+    let end = ends
+        .copied()
+        .find(|end| stamp_ns.abs_diff(*end) <= ROUNDING_NS);
     let stamp_ns = end.unwrap_or(stamp_ns);
     let after = truth.stamps_ns.partition_point(|&t| t <= stamp_ns);
-    let Some(before) = after.checked_sub(1) else { return At::Outside };
+    let Some(before) = after.checked_sub(1) else {
+        return At::Outside;
+    };
     if truth.stamps_ns[before] == stamp_ns {
         return At::Pose(truth.poses[before]);
     }
-    let Some(&after_ns) = truth.stamps_ns.get(after) else { return At::Outside };
+    let Some(&after_ns) = truth.stamps_ns.get(after) else {
+        return At::Outside;
+    };
     // i128: hostile stamps may lie further apart than an i64 can hold
     let since = |t: i64| i128::from(t) - i128::from(truth.stamps_ns[before]);
     if since(after_ns) > i128::from(max_gap_ns) {
         return At::Gap;
     }
     let share = since(stamp_ns) as f64 / since(after_ns) as f64;
-    At::Pose(interpolate(&truth.poses[before], &truth.poses[after], share))
+    At::Pose(interpolate(
+        &truth.poses[before],
+        &truth.poses[after],
+        share,
+    ))
 }
 
 /// Position on the straight line between, yaw the shorter way round; `share` 0 is `from`, 1 is `to`.
@@ -239,7 +301,15 @@ mod tests {
         )
         .unwrap();
         let max_gap_ns = SECOND;
-        assert_eq!(coverage, Coverage::Time { matched: 4, outside_span: 2, in_gaps: 1, max_gap_ns });
+        assert_eq!(
+            coverage,
+            Coverage::Time {
+                matched: 4,
+                outside_span: 2,
+                in_gaps: 1,
+                max_gap_ns
+            }
+        );
         assert_eq!((coverage.matched(), coverage.left_out()), (4, 3));
         let used: Vec<f64> = matched.estimate().iter().map(|p| p.translation.x).collect();
         assert_eq!(used, [1.0, 2.0, 3.0, 5.0]);
@@ -250,16 +320,37 @@ mod tests {
         let (truth, estimate) = (line(2), line(3));
         let found = |stamps: [i64; 3]| {
             let estimate = Trajectory::new(&stamps, &estimate);
-            associate(estimate, Trajectory::new(&[5_000, 9_000], &truth), Association::default()).unwrap().1.left_out()
+            associate(
+                estimate,
+                Trajectory::new(&[5_000, 9_000], &truth),
+                Association::default(),
+            )
+            .unwrap()
+            .1
+            .left_out()
         };
-        assert_eq!((found([4_500, 7_000, 9_999]), found([3_000, 7_000, 9_000])), (0, 1));
+        assert_eq!(
+            (found([4_500, 7_000, 9_999]), found([3_000, 7_000, 9_000])),
+            (0, 1)
+        );
     }
 
     #[test]
     fn index_association_cuts_to_the_shorter_and_says_so() {
-        let (matched, coverage) =
-            associate(Trajectory::untimed(&line(3)), Trajectory::untimed(&line(5)), Association::Index).unwrap();
-        assert_eq!(coverage, Coverage::Index { matched: 3, estimate_surplus: 0, truth_surplus: 2 });
+        let (matched, coverage) = associate(
+            Trajectory::untimed(&line(3)),
+            Trajectory::untimed(&line(5)),
+            Association::Index,
+        )
+        .unwrap();
+        assert_eq!(
+            coverage,
+            Coverage::Index {
+                matched: 3,
+                estimate_surplus: 0,
+                truth_surplus: 2
+            }
+        );
         assert_eq!(matched.len(), 3);
     }
 
@@ -272,7 +363,10 @@ mod tests {
         )
         .unwrap_err();
         let message = error.to_string();
-        assert!(message.contains("1.000 s to 2.000 s against 10.000 s to 12.500 s"), "{message}");
+        assert!(
+            message.contains("1.000 s to 2.000 s against 10.000 s to 12.500 s"),
+            "{message}"
+        );
     }
 
     #[test]
@@ -282,7 +376,14 @@ mod tests {
             Trajectory::new(&seconds(&[2.0, 3.0]), &line(2)),
             Association::default(),
         );
-        assert_eq!(error.unwrap_err(), EvaluationError::TooFew { matched: 1, estimate: 2, truth: 2 });
+        assert_eq!(
+            error.unwrap_err(),
+            EvaluationError::TooFew {
+                matched: 1,
+                estimate: 2,
+                truth: 2
+            }
+        );
     }
 
     #[test]
@@ -290,13 +391,30 @@ mod tests {
         let good = seconds(&[0.0, 1.0, 2.0]);
         let error = |estimate: &[i64], truth: &[i64]| {
             let (e, t) = (line(3), line(3));
-            associate(Trajectory::new(estimate, &e), Trajectory::new(truth, &t), Association::default()).unwrap_err()
+            associate(
+                Trajectory::new(estimate, &e),
+                Trajectory::new(truth, &t),
+                Association::default(),
+            )
+            .unwrap_err()
         };
         assert_eq!(
             error(&good, &[0, 7, 5]),
-            EvaluationError::Backwards { side: Side::Truth, index: 2, previous_ns: 7, stamp_ns: 5 }
+            EvaluationError::Backwards {
+                side: Side::Truth,
+                index: 2,
+                previous_ns: 7,
+                stamp_ns: 5
+            }
         );
-        assert_eq!(error(&good[..2], &good), EvaluationError::StampCount { side: Side::Estimate, poses: 3, stamps: 2 });
+        assert_eq!(
+            error(&good[..2], &good),
+            EvaluationError::StampCount {
+                side: Side::Estimate,
+                poses: 3,
+                stamps: 2
+            }
+        );
     }
 
     #[test]
@@ -304,7 +422,9 @@ mod tests {
         let (matched, _) = associate(
             Trajectory::new(&[i64::MIN, 0, i64::MAX], &line(3)),
             Trajectory::new(&[i64::MIN, i64::MAX], &line(2)),
-            Association::Time { max_gap_ns: i64::MAX },
+            Association::Time {
+                max_gap_ns: i64::MAX,
+            },
         )
         .unwrap();
         assert_eq!(matched.len(), 2);
@@ -315,7 +435,14 @@ mod tests {
         let empty = Trajectory::untimed(&[]);
         for association in [Association::default(), Association::Index] {
             let error = associate(empty, empty, association).unwrap_err();
-            assert_eq!(error, EvaluationError::TooFew { matched: 0, estimate: 0, truth: 0 });
+            assert_eq!(
+                error,
+                EvaluationError::TooFew {
+                    matched: 0,
+                    estimate: 0,
+                    truth: 0
+                }
+            );
         }
     }
 }

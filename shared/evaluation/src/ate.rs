@@ -21,7 +21,11 @@ pub struct Ate {
 /// Measures the distances between the positions of the truth and of the aligned estimate.
 pub fn ate(matched: &MatchedPoses) -> Ate {
     let truth_from_estimate = align(matched);
-    let distances = || matched.iter().map(|(e, t)| distance_m(&truth_from_estimate, e, t));
+    let distances = || {
+        matched
+            .iter()
+            .map(|(e, t)| distance_m(&truth_from_estimate, e, t))
+    };
     let n = matched.len() as f64;
     Ate {
         rmse_m: (distances().map(|d| d * d).sum::<f64>() / n).sqrt(),
@@ -59,7 +63,11 @@ fn align_positions(estimate: &[Pose], truth: &[Pose]) -> Pose {
 }
 
 fn centroid(poses: &[Pose]) -> nalgebra::Vector2<f64> {
-    poses.iter().map(|p| p.translation.vector).sum::<nalgebra::Vector2<f64>>() / poses.len() as f64
+    poses
+        .iter()
+        .map(|p| p.translation.vector)
+        .sum::<nalgebra::Vector2<f64>>()
+        / poses.len() as f64
 }
 
 fn distance_m(truth_from_estimate: &Pose, estimate: &Pose, truth: &Pose) -> f64 {
@@ -75,7 +83,12 @@ fn serialize_isometry<S: Serializer>(pose: &Pose, serializer: S) -> Result<S::Ok
         y_m: f64,
         yaw_rad: f64,
     }
-    Planar { x_m: pose.translation.x, y_m: pose.translation.y, yaw_rad: pose.rotation.angle() }.serialize(serializer)
+    Planar {
+        x_m: pose.translation.x,
+        y_m: pose.translation.y,
+        yaw_rad: pose.rotation.angle(),
+    }
+    .serialize(serializer)
 }
 
 #[cfg(test)]

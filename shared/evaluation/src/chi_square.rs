@@ -33,8 +33,16 @@ fn cumulative(x: f64, dof: f64, ln_gamma: f64) -> f64 {
 
 /// ln gamma(n / 2), n > 0, by its recurrence.
 fn ln_gamma_half(n: usize) -> f64 {
-    let (first, start) = if n.is_multiple_of(2) { (2, 0.0) } else { (1, 0.5 * PI.ln()) };
-    start + (first..n).step_by(2).map(|k| (0.5 * k as f64).ln()).sum::<f64>()
+    let (first, start) = if n.is_multiple_of(2) {
+        (2, 0.0)
+    } else {
+        (1, 0.5 * PI.ln())
+    };
+    start
+        + (first..n)
+            .step_by(2)
+            .map(|k| (0.5 * k as f64).ln())
+            .sum::<f64>()
 }
 
 #[cfg(test)]
@@ -53,7 +61,11 @@ mod tests {
             (0.975, 100, 129.561197),
         ];
         for (p, dof, expected) in table {
-            assert!((quantile(p, dof) / expected - 1.0).abs() < 1e-6, "{p} {dof}: {}", quantile(p, dof));
+            assert!(
+                (quantile(p, dof) / expected - 1.0).abs() < 1e-6,
+                "{p} {dof}: {}",
+                quantile(p, dof)
+            );
         }
     }
 

@@ -2,13 +2,19 @@
 
 use std::fmt;
 
-use crate::{Coverage, EndError, Evaluation, Kitti, Nees, NeesFigures, NeesLength, Rpe, Seg, TruthSigma};
+use crate::{
+    Coverage, EndError, Evaluation, Kitti, Nees, NeesFigures, NeesLength, Rpe, Seg, TruthSigma,
+};
 
 impl fmt::Display for Evaluation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "association   {}", self.coverage)?;
         writeln!(f, "axes          {}", self.axes)?;
-        writeln!(f, "path          {:.2} m, estimated {:.2} m", self.path_m, self.estimated_path_m)?;
+        writeln!(
+            f,
+            "path          {:.2} m, estimated {:.2} m",
+            self.path_m, self.estimated_path_m
+        )?;
         match &self.kitti {
             Some(kitti) => writeln!(f, "KITTI         {kitti}")?,
             None => writeln!(f, "KITTI         none: {}", self.why_no_kitti())?,
@@ -30,7 +36,11 @@ impl fmt::Display for Evaluation {
             Some(rpe) => write!(f, "per pair      {rpe}")?,
             None => write!(f, "per pair      none: the truth has no heading")?,
         }
-        if f.alternate() { self.fmt_lengths(f) } else { Ok(()) }
+        if f.alternate() {
+            self.fmt_lengths(f)
+        } else {
+            Ok(())
+        }
     }
 }
 
@@ -48,12 +58,19 @@ impl Evaluation {
     /// A line for each length that has stretches.
     fn fmt_lengths(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Some(seg) = &self.seg else { return Ok(()) };
-        write!(f, "\n\n  length  stretches  translation    rotation     seg")?;
+        write!(
+            f,
+            "\n\n  length  stretches  translation    rotation     seg"
+        )?;
         write!(f, "\n       m                        %   deg/100 m       %")?;
         for (k, length) in seg.by_length.iter().enumerate() {
             write!(f, "\n{:8.0} {:10}", length.length_m, length.stretches)?;
             match self.kitti.as_ref().and_then(|kitti| kitti.by_length.get(k)) {
-                Some(kitti) => write!(f, " {:12.4} {:11.4}", kitti.translation_percent, kitti.rotation_deg_per_100m)?,
+                Some(kitti) => write!(
+                    f,
+                    " {:12.4} {:11.4}",
+                    kitti.translation_percent, kitti.rotation_deg_per_100m
+                )?,
                 None => write!(f, " {:>12} {:>11}", "-", "-")?,
             }
             write!(f, " {:7.4}", length.percent)?;
@@ -66,13 +83,22 @@ impl fmt::Display for Coverage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let all = self.matched() + self.left_out();
         match *self {
-            Coverage::Time { matched, outside_span, in_gaps, max_gap_ns } => write!(
+            Coverage::Time {
+                matched,
+                outside_span,
+                in_gaps,
+                max_gap_ns,
+            } => write!(
                 f,
                 "by time: {matched} of {all} estimated poses; left out: {outside_span} outside the truth's span, \
                  {in_gaps} in its gaps beyond {} s",
                 max_gap_ns as f64 * 1e-9
             ),
-            Coverage::Index { matched, estimate_surplus, truth_surplus } => {
+            Coverage::Index {
+                matched,
+                estimate_surplus,
+                truth_surplus,
+            } => {
                 write!(f, "by index: {matched} of {all} estimated poses")?;
                 match (estimate_surplus, truth_surplus) {
                     (0, 0) => write!(f, ", as many as the truth has"),
@@ -89,14 +115,22 @@ impl fmt::Display for Kitti {
         write!(
             f,
             "{:.5} % translation, {:.5} deg/100 m ({:.4} deg/km) rotation; {} stretches, step {}",
-            self.translation_percent, self.rotation_deg_per_100m, self.rotation_deg_per_km, self.stretches, self.step
+            self.translation_percent,
+            self.rotation_deg_per_100m,
+            self.rotation_deg_per_km,
+            self.stretches,
+            self.step
         )
     }
 }
 
 impl fmt::Display for Seg {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:.4} % of the length, each stretch aligned by itself", self.percent)
+        write!(
+            f,
+            "{:.4} % of the length, each stretch aligned by itself",
+            self.percent
+        )
     }
 }
 
@@ -106,29 +140,61 @@ impl fmt::Display for EndError {
         if let Some(percent) = self.percent {
             write!(f, ", {percent:.2} % of the path")?;
         }
-        write!(f, ", heading {:.2} deg; the first poses on each other", self.heading_deg)
+        write!(
+            f,
+            ", heading {:.2} deg; the first poses on each other",
+            self.heading_deg
+        )
     }
 }
 
 impl fmt::Display for Rpe {
     /// Two lines, the second indented as the rows of an evaluation are.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "translation {:.4} m rmse, {:.4} m mean", self.translation_rmse_m, self.translation_mean_m)?;
+        write!(
+            f,
+            "translation {:.4} m rmse, {:.4} m mean",
+            self.translation_rmse_m, self.translation_mean_m
+        )?;
         if let Some(ratio) = self.forward_ratio {
             write!(f, "; forward sum {ratio:.4} of the truth's")?;
         }
-        let (rmse, mean, pairs) = (self.rotation_rmse_deg, self.rotation_mean_deg, self.pairs.len());
-        write!(f, "\n{:14}rotation {rmse:.4} deg rmse, {mean:.4} deg mean; {pairs} pairs", "")
+        let (rmse, mean, pairs) = (
+            self.rotation_rmse_deg,
+            self.rotation_mean_deg,
+            self.pairs.len(),
+        );
+        write!(
+            f,
+            "\n{:14}rotation {rmse:.4} deg rmse, {mean:.4} deg mean; {pairs} pairs",
+            ""
+        )
     }
 }
 
 impl fmt::Display for Nees {
     /// A table of all stretches; the alternate form has lines for each half of the time, too.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "covariance    {} motions; left out: {} without truth, ", self.motions, self.without_truth)?;
-        writeln!(f, "{} without covariance; truth: {}", self.without_covariance, self.truth_sigma)?;
-        writeln!(f, "{:14}mean normalised error squared over its expectation (1: honest, more: overconfident)", "")?;
-        writeln!(f, "{:14}[where 95 % of honest, independent ones lie]  share outside the 95 % region", "")?;
+        write!(
+            f,
+            "covariance    {} motions; left out: {} without truth, ",
+            self.motions, self.without_truth
+        )?;
+        writeln!(
+            f,
+            "{} without covariance; truth: {}",
+            self.without_covariance, self.truth_sigma
+        )?;
+        writeln!(
+            f,
+            "{:14}mean normalised error squared over its expectation (1: honest, more: overconfident)",
+            ""
+        )?;
+        writeln!(
+            f,
+            "{:14}[where 95 % of honest, independent ones lie]  share outside the 95 % region",
+            ""
+        )?;
         write!(
             f,
             "\n{:>8}{:>10}{:>11}{:>16}{:>32}{:>25}",
@@ -144,7 +210,10 @@ impl fmt::Display for NeesLength {
         write!(f, "\n{:8}{:>10}{}", self.motions, "all", self.all)?;
         let halves = [("first", &self.first_half), ("second", &self.second_half)];
         let halves = if f.alternate() { &halves[..] } else { &[] };
-        for (half, figures) in halves.iter().filter_map(|(half, figures)| Some((half, figures.as_ref()?))) {
+        for (half, figures) in halves
+            .iter()
+            .filter_map(|(half, figures)| Some((half, figures.as_ref()?)))
+        {
             write!(f, "\n{:8}{half:>10}{figures}", self.motions)?;
         }
         Ok(())
@@ -155,7 +224,12 @@ impl fmt::Display for TruthSigma {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self == Self::default() {
             true => write!(f, "taken as exact"),
-            false => write!(f, "sigma {} m, {:.3} deg", self.position_m, self.yaw_rad.to_degrees()),
+            false => write!(
+                f,
+                "sigma {} m, {:.3} deg",
+                self.position_m,
+                self.yaw_rad.to_degrees()
+            ),
         }
     }
 }
@@ -165,7 +239,11 @@ impl fmt::Display for NeesFigures {
         write!(f, "{:11}", self.stretches)?;
         for figure in [self.pose, self.translation, self.yaw] {
             let [low, high] = figure.honest_range;
-            write!(f, "{:8.2} [{low:.2}, {high:.2}]{:6.1} %", figure.ratio, figure.outside_percent)?;
+            write!(
+                f,
+                "{:8.2} [{low:.2}, {high:.2}]{:6.1} %",
+                figure.ratio, figure.outside_percent
+            )?;
         }
         Ok(())
     }

@@ -19,13 +19,20 @@ pub struct EndError {
 pub fn end_error(matched: &MatchedPoses) -> EndError {
     let last = matched.len() - 1;
     let (estimate, truth) = (matched.estimate(), matched.truth());
-    let (estimated, actual) = (estimate[0].inv_mul(&estimate[last]), truth[0].inv_mul(&truth[last]));
+    let (estimated, actual) = (
+        estimate[0].inv_mul(&estimate[last]),
+        truth[0].inv_mul(&truth[last]),
+    );
     let position_m = (estimated.translation.vector - actual.translation.vector).norm();
     let path_m = crate::matched::path_m(truth);
     EndError {
         position_m,
         percent: (path_m > 0.0).then(|| 100.0 * position_m / path_m),
-        heading_deg: actual.rotation.rotation_to(&estimated.rotation).angle().to_degrees(),
+        heading_deg: actual
+            .rotation
+            .rotation_to(&estimated.rotation)
+            .angle()
+            .to_degrees(),
     }
 }
 
@@ -37,18 +44,31 @@ mod tests {
 
     #[test]
     fn frames_do_not_matter_and_only_the_ends_do() {
-        let truth = vec![pose(5.0, 5.0, 0.0), pose(15.0, 5.0, 0.0), pose(25.0, 5.0, 0.1)];
+        let truth = vec![
+            pose(5.0, 5.0, 0.0),
+            pose(15.0, 5.0, 0.0),
+            pose(25.0, 5.0, 0.1),
+        ];
         // Begins elsewhere with another heading, strays on the way, and ends 3 m ahead and 4 m to the left.
         let start = pose(-7.0, 2.0, 1.0);
-        let estimate = vec![start, start * pose(99.0, 0.0, 2.0), start * pose(23.0, 4.0, 0.2)];
+        let estimate = vec![
+            start,
+            start * pose(99.0, 0.0, 2.0),
+            start * pose(23.0, 4.0, 0.2),
+        ];
         let end = end_error(&MatchedPoses::new(estimate, truth).unwrap());
-        assert!((end.position_m - 5.0).abs() < 1e-9 && (end.heading_deg - 0.1f64.to_degrees()).abs() < 1e-9);
+        assert!(
+            (end.position_m - 5.0).abs() < 1e-9
+                && (end.heading_deg - 0.1f64.to_degrees()).abs() < 1e-9
+        );
         assert!((end.percent.unwrap() - 25.0).abs() < 1e-9, "of 20 m");
     }
 
     #[test]
     fn a_truth_that_stands_has_no_share() {
-        let end = end_error(&MatchedPoses::new(vec![pose(0.0, 0.0, 0.0); 2], vec![pose(1.0, 1.0, 0.5); 2]).unwrap());
+        let end = end_error(
+            &MatchedPoses::new(vec![pose(0.0, 0.0, 0.0); 2], vec![pose(1.0, 1.0, 0.5); 2]).unwrap(),
+        );
         assert_eq!((end.position_m, end.percent), (0.0, None));
     }
 }

@@ -39,7 +39,9 @@ pub enum EvaluationError {
         y_m: f64,
     },
     /// The rotation of a pose is none: its cosine and sine do not lie on the unit circle.
-    #[error("pose {index} of the {side} has no rotation: its cosine and sine have length {length}, not 1")]
+    #[error(
+        "pose {index} of the {side} has no rotation: its cosine and sine have length {length}, not 1"
+    )]
     NotARotation {
         /// Whose pose.
         side: Side,
@@ -59,7 +61,9 @@ pub enum EvaluationError {
         stamps: usize,
     },
     /// Stamps run backwards.
-    #[error("the stamps of the {side} run backwards at pose {index}: {stamp_ns} ns after {previous_ns} ns")]
+    #[error(
+        "the stamps of the {side} run backwards at pose {index}: {stamp_ns} ns after {previous_ns} ns"
+    )]
     Backwards {
         /// Whose stamps.
         side: Side,
@@ -95,7 +99,9 @@ pub enum EvaluationError {
         truth: usize,
     },
     /// Poses that are to be compared one by one are not equally many.
-    #[error("{estimate} estimated poses cannot be held one by one against {truth} of the ground truth")]
+    #[error(
+        "{estimate} estimated poses cannot be held one by one against {truth} of the ground truth"
+    )]
     LengthMismatch {
         /// Poses of the estimate.
         estimate: usize,
@@ -115,7 +121,9 @@ pub enum EvaluationError {
         yaw_rad: f64,
     },
     /// A motion does not end after it begins, or begins before the one before has ended.
-    #[error("the motions run backwards at motion {index}: from {from_ns} ns to {to_ns} ns, after {previous_ns} ns")]
+    #[error(
+        "the motions run backwards at motion {index}: from {from_ns} ns to {to_ns} ns, after {previous_ns} ns"
+    )]
     MotionBackwards {
         /// Its index, from 0.
         index: usize,
@@ -142,5 +150,9 @@ pub enum EvaluationError {
 }
 
 fn span_s(span_ns: &(i64, i64)) -> String {
-    format!("{:.3} s to {:.3} s", span_ns.0 as f64 * 1e-9, span_ns.1 as f64 * 1e-9)
+    format!(
+        "{:.3} s to {:.3} s",
+        span_ns.0 as f64 * 1e-9,
+        span_ns.1 as f64 * 1e-9
+    )
 }

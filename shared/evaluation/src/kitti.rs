@@ -65,7 +65,10 @@ fn stretch_error(matched: &MatchedPoses, stretch: Stretch) -> [f64; 2] {
     let estimated = Motion::within(matched.estimate(), stretch);
     let error = estimated.to(&Motion::within(matched.truth(), stretch));
     let per_100m = 100.0 / stretch.length_m();
-    [error.translation.norm() * per_100m, error.angle_rad().to_degrees() * per_100m]
+    [
+        error.translation.norm() * per_100m,
+        error.angle_rad().to_degrees() * per_100m,
+    ]
 }
 
 /// A planar rigid motion in complex numbers: x -> rotation x + translation.
@@ -80,7 +83,10 @@ struct Motion {
 
 impl Motion {
     fn of(pose: &Pose) -> Self {
-        Self { rotation: *pose.rotation.complex(), translation: Complex::new(pose.translation.x, pose.translation.y) }
+        Self {
+            rotation: *pose.rotation.complex(),
+            translation: Complex::new(pose.translation.x, pose.translation.y),
+        }
     }
 
     /// inverse(first) last.
@@ -105,5 +111,10 @@ impl Motion {
 fn length_mean(
     (length_m, [translation_percent, rotation_deg_per_100m], stretches): (f64, [f64; 2], usize),
 ) -> KittiLength {
-    KittiLength { length_m, translation_percent, rotation_deg_per_100m, stretches }
+    KittiLength {
+        length_m,
+        translation_percent,
+        rotation_deg_per_100m,
+        stretches,
+    }
 }

@@ -20,10 +20,17 @@ impl MatchedPoses {
     pub fn new(estimate: Vec<Pose>, truth: Vec<Pose>) -> Result<Self, EvaluationError> {
         let (n, m) = (estimate.len(), truth.len());
         if n != m {
-            return Err(EvaluationError::LengthMismatch { estimate: n, truth: m });
+            return Err(EvaluationError::LengthMismatch {
+                estimate: n,
+                truth: m,
+            });
         }
         if n < 2 {
-            return Err(EvaluationError::TooFew { matched: n, estimate: n, truth: m });
+            return Err(EvaluationError::TooFew {
+                matched: n,
+                estimate: n,
+                truth: m,
+            });
         }
         require_poses(Side::Estimate, &estimate)?;
         require_poses(Side::Truth, &truth)?;
@@ -58,12 +65,18 @@ impl MatchedPoses {
             travelled += step;
             travelled
         };
-        std::iter::once(0.0).chain(steps_m(&self.truth)).map(add).collect()
+        std::iter::once(0.0)
+            .chain(steps_m(&self.truth))
+            .map(add)
+            .collect()
     }
 
     /// The same pairs with each estimated pose passed through `change`, which must keep poses valid.
     pub(crate) fn map_estimate(self, change: impl FnMut(&Pose) -> Pose) -> Self {
-        Self { estimate: self.estimate.iter().map(change).collect(), truth: self.truth }
+        Self {
+            estimate: self.estimate.iter().map(change).collect(),
+            truth: self.truth,
+        }
     }
 }
 
@@ -77,12 +90,21 @@ pub(crate) fn require_poses(side: Side, poses: &[Pose]) -> Result<(), Evaluation
         // NaN fails these comparisons
         let within = |v: f64| v.abs() <= LARGEST_COORDINATE_M;
         if !(within(x_m) && within(y_m)) {
-            return Err(EvaluationError::BadPosition { side, index, x_m, y_m });
+            return Err(EvaluationError::BadPosition {
+                side,
+                index,
+                x_m,
+                y_m,
+            });
         }
         let length = pose.rotation.complex().norm();
         let on_circle = (length - 1.0).abs() <= LARGEST_ROUNDING;
         if !on_circle {
-            return Err(EvaluationError::NotARotation { side, index, length });
+            return Err(EvaluationError::NotARotation {
+                side,
+                index,
+                length,
+            });
         }
     }
     Ok(())
@@ -90,7 +112,9 @@ pub(crate) fn require_poses(side: Side, poses: &[Pose]) -> Result<(), Evaluation
 
 /// Lengths of the steps from pose to pose, m.
 fn steps_m(poses: &[Pose]) -> impl Iterator<Item = f64> + '_ {
-    poses.windows(2).map(|w| (w[1].translation.vector - w[0].translation.vector).norm())
+    poses
+        .windows(2)
+        .map(|w| (w[1].translation.vector - w[0].translation.vector).norm())
 }
 
 /// Length of the whole path, m.
@@ -109,11 +133,18 @@ mod tests {
         let still = Pose::identity();
         assert_eq!(
             MatchedPoses::new(vec![still; 3], vec![still; 2]),
-            Err(EvaluationError::LengthMismatch { estimate: 3, truth: 2 })
+            Err(EvaluationError::LengthMismatch {
+                estimate: 3,
+                truth: 2
+            })
         );
         assert_eq!(
             MatchedPoses::new(vec![still], vec![still]),
-            Err(EvaluationError::TooFew { matched: 1, estimate: 1, truth: 1 })
+            Err(EvaluationError::TooFew {
+                matched: 1,
+                estimate: 1,
+                truth: 1
+            })
         );
     }
 
@@ -123,7 +154,14 @@ mod tests {
             let mut poses = vec![Pose::identity(); 3];
             poses[2].translation.x = x;
             let error = MatchedPoses::new(vec![Pose::identity(); 3], poses).unwrap_err();
-            assert!(matches!(error, EvaluationError::BadPosition { side: Side::Truth, index: 2, .. }));
+            assert!(matches!(
+                error,
+                EvaluationError::BadPosition {
+                    side: Side::Truth,
+                    index: 2,
+                    ..
+                }
+            ));
         }
     }
 
@@ -131,17 +169,28 @@ mod tests {
     fn a_rotation_off_the_unit_circle_is_refused_beyond_rounding() {
         let scaled = |length: f64| {
             let rotation = nalgebra::Unit::new_unchecked(nalgebra::Complex::new(0.0, length));
-            MatchedPoses::new(vec![Pose::from_parts(Default::default(), rotation); 2], vec![Pose::identity(); 2])
+            MatchedPoses::new(
+                vec![Pose::from_parts(Default::default(), rotation); 2],
+                vec![Pose::identity(); 2],
+            )
         };
         assert!(scaled(1.0 + 1e-6).is_ok());
-        let refused = EvaluationError::NotARotation { side: Side::Estimate, index: 0, length: 0.5 };
+        let refused = EvaluationError::NotARotation {
+            side: Side::Estimate,
+            index: 0,
+            length: 0.5,
+        };
         assert_eq!(scaled(0.5), Err(refused));
     }
 
     #[test]
     fn distance_adds_up_the_steps_of_the_truth() {
         let at = |x, y| pose(x, y, 0.0);
-        let matched = MatchedPoses::new(vec![at(0.0, 0.0); 3], vec![at(1.0, 1.0), at(4.0, 5.0), at(4.0, 3.0)]).unwrap();
+        let matched = MatchedPoses::new(
+            vec![at(0.0, 0.0); 3],
+            vec![at(1.0, 1.0), at(4.0, 5.0), at(4.0, 3.0)],
+        )
+        .unwrap();
         assert_eq!(matched.distance_m(), [0.0, 5.0, 7.0]);
     }
 }

@@ -65,9 +65,16 @@ const COURSE_STEP_M: f64 = 5.0;
 /// A wrong-handed sensor frame always shows, and a poor estimate is not mirrored because its mirror image happens to
 /// lie a little nearer.
 pub fn resolve_axes(matched: MatchedPoses) -> (MatchedPoses, Axes) {
-    let (estimate_yaw, truth_yaw) = (unwrapped_yaw(matched.estimate()), unwrapped_yaw(matched.truth()));
+    let (estimate_yaw, truth_yaw) = (
+        unwrapped_yaw(matched.estimate()),
+        unwrapped_yaw(matched.truth()),
+    );
     let given_m = aligned_rmse_m(matched.estimate(), matched.truth());
-    let mirror_image: Vec<_> = matched.estimate().iter().map(|p| negate(p, true, true)).collect();
+    let mirror_image: Vec<_> = matched
+        .estimate()
+        .iter()
+        .map(|p| negate(p, true, true))
+        .collect();
     let mirrored_m = aligned_rmse_m(&mirror_image, matched.truth());
     let y = sense(given_m, mirrored_m, LEAST_MISFIT_M);
     let heading = sense(
@@ -80,9 +87,13 @@ pub fn resolve_axes(matched: MatchedPoses) -> (MatchedPoses, Axes) {
         y_negated,
         heading_negated,
         heading_fault: (y_negated != heading_negated).then(|| heading_fault(&matched)),
-        truth_lacks_heading: range(&truth_yaw) < CONSTANT_RAD && range(&estimate_yaw) > LEAST_TURN_RAD,
+        truth_lacks_heading: range(&truth_yaw) < CONSTANT_RAD
+            && range(&estimate_yaw) > LEAST_TURN_RAD,
     };
-    (matched.map_estimate(|p| negate(p, y_negated, heading_negated)), axes)
+    (
+        matched.map_estimate(|p| negate(p, y_negated, heading_negated)),
+        axes,
+    )
 }
 
 /// Whether to negate y and heading, from the votes of both.
@@ -120,7 +131,9 @@ fn negate(pose: &Pose, y: bool, heading: bool) -> Pose {
 /// Yaw of each pose without jumps of a full turn, rad.
 fn unwrapped_yaw(poses: &[Pose]) -> Vec<f64> {
     let mut yaw = poses.first().map_or(0.0, |p| p.rotation.angle());
-    let turns = poses.windows(2).map(|w| w[0].rotation.angle_to(&w[1].rotation));
+    let turns = poses
+        .windows(2)
+        .map(|w| w[0].rotation.angle_to(&w[1].rotation));
     std::iter::once(0.0)
         .chain(turns)
         .map(|turn| {
@@ -132,7 +145,9 @@ fn unwrapped_yaw(poses: &[Pose]) -> Vec<f64> {
 }
 
 fn range(values: &[f64]) -> f64 {
-    let (low, high) = values.iter().fold((f64::MAX, f64::MIN), |(l, h), &v| (l.min(v), h.max(v)));
+    let (low, high) = values
+        .iter()
+        .fold((f64::MAX, f64::MIN), |(l, h), &v| (l.min(v), h.max(v)));
     high - low
 }
 
@@ -145,7 +160,10 @@ fn heading_misfit(estimate: &[f64], truth: &[f64], sign: f64) -> f64 {
 }
 
 fn heading_fault(matched: &MatchedPoses) -> HeadingFault {
-    let (estimate, truth) = (turns_with_path(matched.estimate()), turns_with_path(matched.truth()));
+    let (estimate, truth) = (
+        turns_with_path(matched.estimate()),
+        turns_with_path(matched.truth()),
+    );
     match (estimate < 0.0, truth < 0.0) {
         (true, false) => HeadingFault::Estimate,
         (false, true) => HeadingFault::Truth,
@@ -157,7 +175,9 @@ fn heading_fault(matched: &MatchedPoses) -> HeadingFault {
 fn turns_with_path(poses: &[Pose]) -> f64 {
     let mut kept: Vec<&Pose> = Vec::new();
     for pose in poses {
-        if kept.last().is_none_or(|k| (pose.translation.vector - k.translation.vector).norm() >= COURSE_STEP_M) {
+        if kept.last().is_none_or(|k| {
+            (pose.translation.vector - k.translation.vector).norm() >= COURSE_STEP_M
+        }) {
             kept.push(pose);
         }
     }
@@ -175,17 +195,27 @@ impl fmt::Display for Axes {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match (self.y_negated, self.heading_negated) {
             (false, false) => "as given",
-            (true, true) => "the estimate is mirrored against the truth: its y and yaw were negated",
-            (true, false) => "the estimate's path, but not its heading, is mirrored: its y was negated",
+            (true, true) => {
+                "the estimate is mirrored against the truth: its y and yaw were negated"
+            }
+            (true, false) => {
+                "the estimate's path, but not its heading, is mirrored: its y was negated"
+            }
             (false, true) => "the estimate's heading runs the other way: its yaw was negated",
         })?;
         f.write_str(match self.heading_fault {
             None => "",
             Some(HeadingFault::Estimate) => " (its heading turns against its own path)",
-            Some(HeadingFault::Truth) => " (it is the truth's heading that turns against its own path)",
+            Some(HeadingFault::Truth) => {
+                " (it is the truth's heading that turns against its own path)"
+            }
             Some(HeadingFault::Unclear) => " (whose heading is wrong is unclear)",
         })?;
-        if self.truth_lacks_heading { f.write_str("; the truth has no heading") } else { Ok(()) }
+        if self.truth_lacks_heading {
+            f.write_str("; the truth has no heading")
+        } else {
+            Ok(())
+        }
     }
 }
 
@@ -220,10 +250,26 @@ mod tests {
         for (y, heading) in [(false, false), (true, true), (true, false), (false, true)] {
             let fault = |side| (y != heading).then_some(side);
             let estimate = resolve(with(drive(), y, heading), drive());
-            let expected = Axes { y_negated: y, heading_negated: heading, ..Axes::default() };
-            assert_eq!(estimate, Axes { heading_fault: fault(HeadingFault::Estimate), ..expected });
+            let expected = Axes {
+                y_negated: y,
+                heading_negated: heading,
+                ..Axes::default()
+            };
+            assert_eq!(
+                estimate,
+                Axes {
+                    heading_fault: fault(HeadingFault::Estimate),
+                    ..expected
+                }
+            );
             let truth = resolve(drive(), with(drive(), y, heading));
-            assert_eq!(truth, Axes { heading_fault: fault(HeadingFault::Truth), ..expected });
+            assert_eq!(
+                truth,
+                Axes {
+                    heading_fault: fault(HeadingFault::Truth),
+                    ..expected
+                }
+            );
         }
     }
 
@@ -242,13 +288,22 @@ mod tests {
 
     #[test]
     fn a_poor_estimate_is_not_mirrored_for_a_little_gain() {
-        assert_eq!(decide(sense(20.0, 15.0, 0.01), AxisSense::AsGiven, true), (false, false));
-        assert_eq!(decide(sense(20.0, 15.0, 0.01), AxisSense::Negated, true), (true, true));
+        assert_eq!(
+            decide(sense(20.0, 15.0, 0.01), AxisSense::AsGiven, true),
+            (false, false)
+        );
+        assert_eq!(
+            decide(sense(20.0, 15.0, 0.01), AxisSense::Negated, true),
+            (true, true)
+        );
     }
 
     #[test]
     fn a_truth_of_positions_alone_is_recognised() {
-        let positions = drive().iter().map(|p| pose(p.translation.x, p.translation.y, 0.0)).collect();
+        let positions = drive()
+            .iter()
+            .map(|p| pose(p.translation.x, p.translation.y, 0.0))
+            .collect();
         let axes = resolve(with(drive(), true, true), positions);
         assert!(axes.truth_lacks_heading && axes.y_negated && axes.heading_negated);
         assert_eq!(axes.heading_fault, None);

@@ -37,14 +37,19 @@ impl Part {
     /// The motions, given in the order of their times, that begin within this part: those of adjoining parts share none and leave
     /// none out.
     pub fn of<'m>(&self, motions: &'m [Motion]) -> &'m [Motion] {
-        let (Some(first), Some(last)) = (motions.first(), motions.last()) else { return motions };
+        let (Some(first), Some(last)) = (motions.first(), motions.last()) else {
+            return motions;
+        };
         let duration_ns = last.to_ns.saturating_sub(first.from_ns) as f64;
         let before = |share: f64| {
-            motions
-                .partition_point(|motion| (motion.from_ns.saturating_sub(first.from_ns) as f64) < share * duration_ns)
+            motions.partition_point(|motion| {
+                (motion.from_ns.saturating_sub(first.from_ns) as f64) < share * duration_ns
+            })
         };
         // motions that do not run in order have no parts; whoever judges them says so
-        motions.get(before(self.from)..before(self.to)).unwrap_or(motions)
+        motions
+            .get(before(self.from)..before(self.to))
+            .unwrap_or(motions)
     }
 }
 
@@ -75,7 +80,11 @@ impl JudgedMotions {
     /// [`EvaluationError::NotAMotion`] and [`EvaluationError::MotionBackwards`] for what no odometry reports, the errors of
     /// [`associate()`](crate::associate()) that concern the truth, and [`EvaluationError::NoMotionJudged`] where no motion has both
     /// truth and covariance.
-    pub fn new(motions: &[Motion], truth: Trajectory<'_>, max_gap_ns: i64) -> Result<Self, EvaluationError> {
+    pub fn new(
+        motions: &[Motion],
+        truth: Trajectory<'_>,
+        max_gap_ns: i64,
+    ) -> Result<Self, EvaluationError> {
         require_poses(Side::Truth, truth.poses)?;
         require_stamps(Side::Truth, &truth)?;
         require_motions(motions)?;
@@ -83,7 +92,12 @@ impl JudgedMotions {
             At::Pose(pose) => Some(pose),
             At::Outside | At::Gap => None,
         };
-        let mut judged = Self { chains: Vec::new(), motions: motions.len(), without_truth: 0, without_covariance: 0 };
+        let mut judged = Self {
+            chains: Vec::new(),
+            motions: motions.len(),
+            without_truth: 0,
+            without_covariance: 0,
+        };
         for motion in motions {
             let (from, to) = (at(motion.from_ns), at(motion.to_ns));
             judged.without_truth += usize::from(from.is_none() || to.is_none());
@@ -97,7 +111,11 @@ impl JudgedMotions {
 
     /// Adds a motion to the last chain, or, where it does not join, to a new one.
     fn add(&mut self, motion: &Motion, from: Option<Pose>, to: Option<Pose>) {
-        match self.chains.last_mut().filter(|chain| chain.stamps_ns.last() == Some(&motion.from_ns)) {
+        match self
+            .chains
+            .last_mut()
+            .filter(|chain| chain.stamps_ns.last() == Some(&motion.from_ns))
+        {
             Some(chain) => {
                 chain.motions.push(motion.estimate);
                 chain.stamps_ns.push(motion.to_ns);
@@ -112,7 +130,12 @@ impl JudgedMotions {
     }
 
     fn require_some(self) -> Result<Self, EvaluationError> {
-        let both_ends = |chain: &Chain| chain.truth.windows(2).any(|w| w[0].is_some() && w[1].is_some());
+        let both_ends = |chain: &Chain| {
+            chain
+                .truth
+                .windows(2)
+                .any(|w| w[0].is_some() && w[1].is_some())
+        };
         match self.chains.iter().any(both_ends) {
             true => Ok(self),
             false => Err(EvaluationError::NoMotionJudged {
@@ -125,19 +148,27 @@ impl JudgedMotions {
 
     /// First and last time of the chains, ns.
     pub(crate) fn span_ns(&self) -> (i64, i64) {
-        let first = self.chains.first().and_then(|chain| chain.stamps_ns.first());
+        let first = self
+            .chains
+            .first()
+            .and_then(|chain| chain.stamps_ns.first());
         let last = self.chains.last().and_then(|chain| chain.stamps_ns.last());
-        (first.copied().unwrap_or_default(), last.copied().unwrap_or_default())
+        (
+            first.copied().unwrap_or_default(),
+            last.copied().unwrap_or_default(),
+        )
     }
 }
 
 impl Chain {
     /// The motions from joint `first` on, composed one after the other: to joint `first + 1`, `first + 2`, ...
     pub fn composed(&self, first: usize) -> impl Iterator<Item = UncertainMotion> + '_ {
-        self.motions[first..].iter().scan(UncertainMotion::standing(), |so_far, motion| {
-            *so_far = so_far.then(motion);
-            Some(*so_far)
-        })
+        self.motions[first..]
+            .iter()
+            .scan(UncertainMotion::standing(), |so_far, motion| {
+                *so_far = so_far.then(motion);
+                Some(*so_far)
+            })
     }
 
     /// The true motion between two joints, where both have truth.
@@ -148,13 +179,35 @@ impl Chain {
 
 fn require_motions(motions: &[Motion]) -> Result<(), EvaluationError> {
     let mut previous_ns = motions.first().map_or(0, |first| first.from_ns);
-    for (index, &Motion { from_ns, to_ns, estimate: UncertainMotion { motion, .. } }) in motions.iter().enumerate() {
+    for (
+        index,
+        &Motion {
+            from_ns,
+            to_ns,
+            estimate: UncertainMotion { motion, .. },
+        },
+    ) in motions.iter().enumerate()
+    {
         if require_poses(Side::Estimate, &[motion]).is_err() {
-            let (x_m, y_m, yaw_rad) = (motion.translation.x, motion.translation.y, motion.rotation.angle());
-            return Err(EvaluationError::NotAMotion { index, x_m, y_m, yaw_rad });
+            let (x_m, y_m, yaw_rad) = (
+                motion.translation.x,
+                motion.translation.y,
+                motion.rotation.angle(),
+            );
+            return Err(EvaluationError::NotAMotion {
+                index,
+                x_m,
+                y_m,
+                yaw_rad,
+            });
         }
         if from_ns < previous_ns || to_ns <= from_ns {
-            return Err(EvaluationError::MotionBackwards { index, previous_ns, from_ns, to_ns });
+            return Err(EvaluationError::MotionBackwards {
+                index,
+                previous_ns,
+                from_ns,
+                to_ns,
+            });
         }
         previous_ns = to_ns;
     }
@@ -172,8 +225,15 @@ mod tests {
     const MS: i64 = 1_000_000;
 
     fn motion(from_ms: i64, to_ms: i64, variance: f64) -> Motion {
-        let estimate = UncertainMotion { motion: pose(1.0, 0.0, 0.0), covariance: Matrix3::identity() * variance };
-        Motion { from_ns: from_ms * MS, to_ns: to_ms * MS, estimate }
+        let estimate = UncertainMotion {
+            motion: pose(1.0, 0.0, 0.0),
+            covariance: Matrix3::identity() * variance,
+        };
+        Motion {
+            from_ns: from_ms * MS,
+            to_ns: to_ms * MS,
+            estimate,
+        }
     }
 
     /// With a truth that is at x = t at t ms, interpolated across up to 20 ms.
@@ -185,13 +245,24 @@ mod tests {
 
     #[test]
     fn chains_end_where_motions_do_not_join_and_at_a_motion_without_covariance() {
-        let motions =
-            [motion(0, 10, 1.0), motion(10, 20, 1.0), motion(30, 40, 1.0), motion(40, 50, 0.0), motion(50, 60, 1.0)];
+        let motions = [
+            motion(0, 10, 1.0),
+            motion(10, 20, 1.0),
+            motion(30, 40, 1.0),
+            motion(40, 50, 0.0),
+            motion(50, 60, 1.0),
+        ];
         let found = judged(&motions, &[0, 20, 40, 60]).unwrap();
-        let joints: Vec<_> =
-            found.chains.iter().map(|chain| chain.stamps_ns.iter().map(|t| t / MS).collect::<Vec<_>>()).collect();
+        let joints: Vec<_> = found
+            .chains
+            .iter()
+            .map(|chain| chain.stamps_ns.iter().map(|t| t / MS).collect::<Vec<_>>())
+            .collect();
         assert_eq!(joints, [vec![0, 10, 20], vec![30, 40], vec![50, 60]]);
-        assert_eq!((found.motions, found.without_truth, found.without_covariance), (5, 0, 1));
+        assert_eq!(
+            (found.motions, found.without_truth, found.without_covariance),
+            (5, 0, 1)
+        );
         assert_eq!(found.span_ns(), (0, 60 * MS));
     }
 
@@ -200,19 +271,37 @@ mod tests {
         let motions = [0, 10, 20, 30].map(|t| motion(t, t + 10, 1.0));
         let found = judged(&motions, &[0, 10, 40]).unwrap();
         assert_eq!((found.chains.len(), found.without_truth), (1, 3));
-        assert_eq!(found.chains[0].true_motion(0, 4), Some(pose(40.0, 0.0, 0.0)));
+        assert_eq!(
+            found.chains[0].true_motion(0, 4),
+            Some(pose(40.0, 0.0, 0.0))
+        );
         assert_eq!(found.chains[0].true_motion(1, 2), None);
     }
 
     #[test]
     fn adjoining_parts_share_no_motion_and_leave_none_out() {
         let motions = [0, 10, 20, 30, 45].map(|t| motion(t, t + 10, 1.0));
-        let starts =
-            |from, to| Part::new(from, to).unwrap().of(&motions).iter().map(|m| m.from_ns / MS).collect::<Vec<_>>();
-        assert_eq!((starts(0.0, 0.5), starts(0.5, 1.0)), (vec![0, 10, 20], vec![30, 45]));
+        let starts = |from, to| {
+            Part::new(from, to)
+                .unwrap()
+                .of(&motions)
+                .iter()
+                .map(|m| m.from_ns / MS)
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(
+            (starts(0.0, 0.5), starts(0.5, 1.0)),
+            (vec![0, 10, 20], vec![30, 45])
+        );
         assert_eq!(Part::ALL.of(&motions), motions);
         assert_eq!(starts(0.4, 0.5), Vec::<i64>::new());
-        for (from, to) in [(0.5, 0.5), (0.6, 0.5), (-0.1, 0.5), (0.0, 1.1), (f64::NAN, 1.0)] {
+        for (from, to) in [
+            (0.5, 0.5),
+            (0.6, 0.5),
+            (-0.1, 0.5),
+            (0.0, 1.1),
+            (f64::NAN, 1.0),
+        ] {
             assert_eq!(Part::new(from, to), None);
         }
     }
@@ -220,12 +309,28 @@ mod tests {
     #[test]
     fn what_cannot_be_judged_is_an_error_that_says_why() {
         let none = judged(&[motion(0, 10, 0.0), motion(100, 110, 1.0)], &[0, 10]).unwrap_err();
-        assert_eq!(none, EvaluationError::NoMotionJudged { motions: 2, without_truth: 1, without_covariance: 1 });
-        assert!(matches!(judged(&[], &[0, 10]), Err(EvaluationError::NoMotionJudged { motions: 0, .. })));
+        assert_eq!(
+            none,
+            EvaluationError::NoMotionJudged {
+                motions: 2,
+                without_truth: 1,
+                without_covariance: 1
+            }
+        );
+        assert!(matches!(
+            judged(&[], &[0, 10]),
+            Err(EvaluationError::NoMotionJudged { motions: 0, .. })
+        ));
         let backwards = judged(&[motion(0, 10, 1.0), motion(9, 19, 1.0)], &[0, 10]);
-        assert!(matches!(backwards, Err(EvaluationError::MotionBackwards { index: 1, .. })));
+        assert!(matches!(
+            backwards,
+            Err(EvaluationError::MotionBackwards { index: 1, .. })
+        ));
         let mut broken = motion(0, 10, 1.0);
         broken.estimate.motion.translation.x = f64::NAN;
-        assert!(matches!(judged(&[broken], &[0, 10]), Err(EvaluationError::NotAMotion { index: 0, .. })));
+        assert!(matches!(
+            judged(&[broken], &[0, 10]),
+            Err(EvaluationError::NotAMotion { index: 0, .. })
+        ));
     }
 }

@@ -19,8 +19,14 @@ pub struct NeesOptions {
 impl Default for NeesOptions {
     /// 1, 4, 16 and 64 motions; an exact truth.
     fn default() -> Self {
-        let lengths = [1, 4, 16, 64].into_iter().filter_map(NonZeroUsize::new).collect();
-        Self { lengths, truth_sigma: TruthSigma::default() }
+        let lengths = [1, 4, 16, 64]
+            .into_iter()
+            .filter_map(NonZeroUsize::new)
+            .collect();
+        Self {
+            lengths,
+            truth_sigma: TruthSigma::default(),
+        }
     }
 }
 
@@ -94,9 +100,13 @@ pub fn nees(judged: &JudgedMotions, options: &NeesOptions) -> Nees {
     let (from_ns, to_ns) = judged.span_ns();
     let middle_ns = from_ns.midpoint(to_ns);
     let of_length = |&length: &NonZeroUsize| {
-        let samples: Vec<_> =
-            judged.chains.iter().flat_map(|chain| stretches(chain, length, options.truth_sigma)).collect();
-        let (first, second) = samples.split_at(samples.partition_point(|sample| sample.from_ns < middle_ns));
+        let samples: Vec<_> = judged
+            .chains
+            .iter()
+            .flat_map(|chain| stretches(chain, length, options.truth_sigma))
+            .collect();
+        let (first, second) =
+            samples.split_at(samples.partition_point(|sample| sample.from_ns < middle_ns));
         Some(NeesLength {
             motions: length.get(),
             all: figures(&samples)?,
@@ -122,14 +132,26 @@ struct Sample {
 }
 
 /// The stretches of `length` motions, one after the other, that have truth at both ends.
-fn stretches(chain: &Chain, length: NonZeroUsize, sigma: TruthSigma) -> impl Iterator<Item = Sample> + '_ {
+fn stretches(
+    chain: &Chain,
+    length: NonZeroUsize,
+    sigma: TruthSigma,
+) -> impl Iterator<Item = Sample> + '_ {
     let length = length.get();
-    let starts = (0..chain.motions.len()).step_by(length).filter(move |first| chain.motions.len() - first >= length);
+    let starts = (0..chain.motions.len())
+        .step_by(length)
+        .filter(move |first| chain.motions.len() - first >= length);
     starts.filter_map(move |first| {
         let truth = chain.true_motion(first, first + length)?;
         let stretch = chain.composed(first).nth(length - 1)?;
-        let squared = normalised(&stretch.error(&truth), &(stretch.covariance + sigma.of_motion(&truth)))?;
-        Some(Sample { from_ns: chain.stamps_ns[first], squared })
+        let squared = normalised(
+            &stretch.error(&truth),
+            &(stretch.covariance + sigma.of_motion(&truth)),
+        )?;
+        Some(Sample {
+            from_ns: chain.stamps_ns[first],
+            squared,
+        })
     })
 }
 
@@ -151,8 +173,14 @@ fn figures(samples: &[Sample]) -> Option<NeesFigures> {
         NeesFigure {
             ratio: values().sum::<f64>() / expected,
             honest_range: [tail, 1.0 - tail].map(|p| quantile(p, n * freedom) / expected),
-            outside_percent: 100.0 * values().filter(|&value| value > limit).count() as f64 / n as f64,
+            outside_percent: 100.0 * values().filter(|&value| value > limit).count() as f64
+                / n as f64,
         }
     };
-    (!samples.is_empty()).then(|| NeesFigures { stretches: samples.len(), pose: of(0), translation: of(1), yaw: of(2) })
+    (!samples.is_empty()).then(|| NeesFigures {
+        stretches: samples.len(),
+        pose: of(0),
+        translation: of(1),
+        yaw: of(2),
+    })
 }

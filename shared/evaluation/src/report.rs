@@ -5,8 +5,8 @@ use std::num::NonZeroUsize;
 use serde::Serialize;
 
 use crate::{
-    Association, Ate, Axes, Coverage, EndError, EvaluationError, Kitti, MatchedPoses, Rpe, Seg, Trajectory, associate,
-    ate, end_error, kitti, mirror::resolve_axes, rpe, seg,
+    Association, Ate, Axes, Coverage, EndError, EvaluationError, Kitti, MatchedPoses, Rpe, Seg,
+    Trajectory, associate, ate, end_error, kitti, mirror::resolve_axes, rpe, seg,
 };
 
 /// How to evaluate.
@@ -21,7 +21,10 @@ pub struct Options {
 impl Default for Options {
     /// Step 10, by time.
     fn default() -> Self {
-        Self { step: NonZeroUsize::MIN.saturating_add(9), association: Association::default() }
+        Self {
+            step: NonZeroUsize::MIN.saturating_add(9),
+            association: Association::default(),
+        }
     }
 }
 

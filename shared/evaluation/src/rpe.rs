@@ -105,6 +105,9 @@ mod tests {
     #[test]
     fn standing_still_has_no_forward_ratio() {
         let still = vec![Pose::identity(); 4];
-        assert_eq!(rpe(&MatchedPoses::new(still.clone(), still).unwrap()).forward_ratio, None);
+        assert_eq!(
+            rpe(&MatchedPoses::new(still.clone(), still).unwrap()).forward_ratio,
+            None
+        );
     }
 }

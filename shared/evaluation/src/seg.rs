@@ -46,6 +46,17 @@ pub fn seg(matched: &MatchedPoses, step: NonZeroUsize) -> Option<Seg> {
         errors.add(stretch.length, [100.0 * rmse_m / stretch.length_m()]);
     }
     let ([percent], stretches) = errors.mean()?;
-    let by_length = errors.means().map(|(length_m, [percent], stretches)| SegLength { length_m, percent, stretches });
-    Some(Seg { percent, stretches, step, by_length: by_length.collect() })
+    let by_length = errors
+        .means()
+        .map(|(length_m, [percent], stretches)| SegLength {
+            length_m,
+            percent,
+            stretches,
+        });
+    Some(Seg {
+        percent,
+        stretches,
+        step,
+        by_length: by_length.collect(),
+    })
 }

@@ -24,12 +24,19 @@ impl Stretch {
 /// All stretches that begin at every `step`-th pose and end at the first pose *beyond* the nominal length.
 ///
 /// `distance_m` grows (weakly) from pose to pose. A length that the rest of the path does not exceed is skipped.
-pub(crate) fn stretches(distance_m: &[f64], step: NonZeroUsize) -> impl Iterator<Item = Stretch> + '_ {
+pub(crate) fn stretches(
+    distance_m: &[f64],
+    step: NonZeroUsize,
+) -> impl Iterator<Item = Stretch> + '_ {
     let ends = move |first: usize| {
         (0..STRETCH_LENGTHS_M.len()).filter_map(move |length| {
             let limit = distance_m[first] + STRETCH_LENGTHS_M[length];
             let last = first + distance_m[first..].partition_point(|&d| d <= limit);
-            (last < distance_m.len()).then_some(Stretch { first, last, length })
+            (last < distance_m.len()).then_some(Stretch {
+                first,
+                last,
+                length,
+            })
         })
     };
     (0..distance_m.len()).step_by(step.get()).flat_map(ends)
@@ -44,7 +51,10 @@ pub(crate) struct PerLength<const N: usize> {
 
 impl<const N: usize> PerLength<N> {
     pub fn new() -> Self {
-        Self { sums: [[0.0; N]; STRETCH_LENGTHS_M.len()], counts: [0; STRETCH_LENGTHS_M.len()] }
+        Self {
+            sums: [[0.0; N]; STRETCH_LENGTHS_M.len()],
+            counts: [0; STRETCH_LENGTHS_M.len()],
+        }
     }
 
     pub fn add(&mut self, length: usize, values: [f64; N]) {
@@ -58,7 +68,12 @@ impl<const N: usize> PerLength<N> {
     pub fn mean(&self) -> Option<([f64; N], usize)> {
         let count: usize = self.counts.iter().sum();
         let total = |value: usize| self.sums.iter().map(|s| s[value]).sum::<f64>();
-        (count > 0).then(|| (std::array::from_fn(|value| total(value) / count as f64), count))
+        (count > 0).then(|| {
+            (
+                std::array::from_fn(|value| total(value) / count as f64),
+                count,
+            )
+        })
     }
 
     /// Nominal length (m), mean and count of each length that has stretches.
@@ -66,7 +81,9 @@ impl<const N: usize> PerLength<N> {
         let lengths = STRETCH_LENGTHS_M.iter().zip(&self.sums).zip(&self.counts);
         lengths
             .filter(|(_, count)| **count > 0)
-            .map(|((&length_m, sums), &count)| (length_m, sums.map(|sum| sum / count as f64), count))
+            .map(|((&length_m, sums), &count)| {
+                (length_m, sums.map(|sum| sum / count as f64), count)
+            })
     }
 }
 
@@ -80,7 +97,14 @@ mod tests {
     fn a_stretch_ends_strictly_beyond_its_length() {
         let distance = [0.0, 100.0, 100.0, 101.0];
         let found: Vec<_> = stretches(&distance, EVERY).collect();
-        assert_eq!(found, [Stretch { first: 0, last: 3, length: 0 }]);
+        assert_eq!(
+            found,
+            [Stretch {
+                first: 0,
+                last: 3,
+                length: 0
+            }]
+        );
         assert_eq!(stretches(&[0.0, 100.0], EVERY).count(), 0);
     }
 
@@ -88,8 +112,13 @@ mod tests {
     fn every_length_that_the_path_exceeds_starts_at_every_step() {
         let distance: Vec<f64> = (0..=250).map(f64::from).collect();
         let step = NonZeroUsize::new(50).unwrap_or(EVERY);
-        let found: Vec<_> = stretches(&distance, step).map(|s| (s.first, s.last, s.length)).collect();
-        assert_eq!(found, [(0, 101, 0), (0, 201, 1), (50, 151, 0), (100, 201, 0)]);
+        let found: Vec<_> = stretches(&distance, step)
+            .map(|s| (s.first, s.last, s.length))
+            .collect();
+        assert_eq!(
+            found,
+            [(0, 101, 0), (0, 201, 1), (50, 151, 0), (100, 201, 0)]
+        );
     }
 
     #[test]
@@ -100,6 +129,9 @@ mod tests {
         per_length.add(0, [3.0]);
         per_length.add(2, [8.0]);
         assert_eq!(per_length.mean(), Some(([4.0], 3)));
-        assert_eq!(per_length.means().collect::<Vec<_>>(), [(100.0, [2.0], 2), (300.0, [8.0], 1)]);
+        assert_eq!(
+            per_length.means().collect::<Vec<_>>(),
+            [(100.0, [2.0], 2), (300.0, [8.0], 1)]
+        );
     }
 }

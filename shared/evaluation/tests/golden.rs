@@ -6,7 +6,9 @@ mod common;
 use std::{fs, num::NonZeroUsize, path::PathBuf};
 
 use common::{chain, pose};
-use gyre_evaluation::{Association, Coverage, Evaluation, Kitti, Options, Pose, Trajectory, evaluate};
+use gyre_evaluation::{
+    Association, Coverage, Evaluation, Kitti, Options, Pose, Trajectory, evaluate,
+};
 use nalgebra::{Complex, Unit};
 
 /// The folder of real data; tests return where there is none.
@@ -22,10 +24,20 @@ fn data() -> Option<PathBuf> {
 /// normalised: the fifth decimal of the published figures is that rounding's.
 fn kitti_poses(path: PathBuf) -> Vec<Pose> {
     let parse = |line: &str| {
-        let m: Vec<f64> = line.split_whitespace().map(|v| v.parse().unwrap()).collect();
-        Pose::from_parts([m[3], m[7]].into(), Unit::new_unchecked(Complex::new(m[0], m[4])))
+        let m: Vec<f64> = line
+            .split_whitespace()
+            .map(|v| v.parse().unwrap())
+            .collect();
+        Pose::from_parts(
+            [m[3], m[7]].into(),
+            Unit::new_unchecked(Complex::new(m[0], m[4])),
+        )
     };
-    fs::read_to_string(path).unwrap().lines().map(parse).collect()
+    fs::read_to_string(path)
+        .unwrap()
+        .lines()
+        .map(parse)
+        .collect()
 }
 
 /// Oxford's motions chained from the identity, in their own frame: y right, yaw clockwise.
@@ -39,14 +51,25 @@ fn chained_csv(path: PathBuf) -> Vec<Pose> {
 }
 
 fn by_index(estimate: &[Pose], truth: &[Pose], step: usize) -> Evaluation {
-    let options = Options { step: NonZeroUsize::new(step).unwrap(), association: Association::Index };
-    evaluate(Trajectory::untimed(estimate), Trajectory::untimed(truth), &options).unwrap()
+    let options = Options {
+        step: NonZeroUsize::new(step).unwrap(),
+        association: Association::Index,
+    };
+    evaluate(
+        Trajectory::untimed(estimate),
+        Trajectory::untimed(truth),
+        &options,
+    )
+    .unwrap()
 }
 
 /// Translation % and rotation deg/100 m to five decimals, as published.
 fn five_decimals(kitti: Option<&Kitti>) -> (String, String) {
     let kitti = kitti.unwrap();
-    (format!("{:.5}", kitti.translation_percent), format!("{:.5}", kitti.rotation_deg_per_100m))
+    (
+        format!("{:.5}", kitti.translation_percent),
+        format!("{:.5}", kitti.rotation_deg_per_100m),
+    )
 }
 
 fn figures(translation: &str, rotation: &str) -> (String, String) {
@@ -57,12 +80,21 @@ fn figures(translation: &str, rotation: &str) -> (String, String) {
 fn kitti_metric_case_matches_the_published_figures_at_all_steps() {
     let Some(data) = data() else { return };
     let case = data.join("golden/kitti-metric");
-    let (estimate, truth) = (kitti_poses(case.join("estimate.txt")), kitti_poses(case.join("ground_truth.txt")));
-    for (step, expected) in
-        [(10, figures("1.16688", "0.34558")), (4, figures("1.16084", "0.34663")), (1, figures("1.16168", "0.34696"))]
-    {
+    let (estimate, truth) = (
+        kitti_poses(case.join("estimate.txt")),
+        kitti_poses(case.join("ground_truth.txt")),
+    );
+    for (step, expected) in [
+        (10, figures("1.16688", "0.34558")),
+        (4, figures("1.16084", "0.34663")),
+        (1, figures("1.16168", "0.34696")),
+    ] {
         let evaluation = by_index(&estimate, &truth, step);
-        assert_eq!(five_decimals(evaluation.kitti.as_ref()), expected, "step {step}");
+        assert_eq!(
+            five_decimals(evaluation.kitti.as_ref()),
+            expected,
+            "step {step}"
+        );
         assert!(!evaluation.axes.y_negated && !evaluation.axes.heading_negated);
     }
 }
@@ -71,13 +103,27 @@ fn kitti_metric_case_matches_the_published_figures_at_all_steps() {
 fn chained_csv_case_matches_in_both_handednesses() {
     let Some(data) = data() else { return };
     let estimate = kitti_poses(data.join("golden/csv-chain/estimate.txt"));
-    let y_right = chained_csv(data.join("trajectories/oxford-2019-01-10-11-46-21.radar_odometry.csv"));
-    let y_left: Vec<_> = y_right.iter().map(|p| pose(p.translation.x, -p.translation.y, -p.rotation.angle())).collect();
+    let y_right =
+        chained_csv(data.join("trajectories/oxford-2019-01-10-11-46-21.radar_odometry.csv"));
+    let y_left: Vec<_> = y_right
+        .iter()
+        .map(|p| pose(p.translation.x, -p.translation.y, -p.rotation.angle()))
+        .collect();
     let evaluations = [&y_right, &y_left].map(|truth| by_index(&estimate, truth, 10));
     for evaluation in &evaluations {
-        assert_eq!(five_decimals(evaluation.kitti.as_ref()), figures("1.22286", "0.39305"));
+        assert_eq!(
+            five_decimals(evaluation.kitti.as_ref()),
+            figures("1.22286", "0.39305")
+        );
         assert_eq!(evaluation.axes.y_negated, evaluation.axes.heading_negated);
-        assert!(matches!(evaluation.coverage, Coverage::Index { matched: 8865, estimate_surplus: 0, .. }));
+        assert!(matches!(
+            evaluation.coverage,
+            Coverage::Index {
+                matched: 8865,
+                estimate_surplus: 0,
+                ..
+            }
+        ));
         println!("{evaluation:#}\n");
     }
     let mirrored = evaluations.map(|e| e.axes.y_negated);

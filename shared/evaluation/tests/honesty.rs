@@ -7,8 +7,8 @@ use std::num::NonZeroUsize;
 
 use common::pose;
 use gyre_evaluation::{
-    JudgedMotions, Motion, Nees, NeesFigure, NeesFigures, NeesOptions, Pose, Trajectory, TruthSigma, UncertainMotion,
-    bands, nees, plot::bands_svg,
+    JudgedMotions, Motion, Nees, NeesFigure, NeesFigures, NeesOptions, Pose, Trajectory,
+    TruthSigma, UncertainMotion, bands, nees, plot::bands_svg,
 };
 use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, SeedableRng};
@@ -24,7 +24,10 @@ fn covariance() -> Matrix3<f64> {
 
 fn gaussian(random: &mut impl Rng) -> Vector3<f64> {
     let mut draw = || {
-        let (radius, angle) = ((-2.0 * (1.0 - random.random::<f64>()).ln()).sqrt(), random.random::<f64>());
+        let (radius, angle) = (
+            (-2.0 * (1.0 - random.random::<f64>()).ln()).sqrt(),
+            random.random::<f64>(),
+        );
         radius * (std::f64::consts::TAU * angle).cos()
     };
     Vector3::new(draw(), draw(), draw())
@@ -32,7 +35,11 @@ fn gaussian(random: &mut impl Rng) -> Vector3<f64> {
 
 /// (x, y, yaw) of a pose with an error added along the axes of its frame of reference.
 fn disturbed(truth: &Pose, error: Vector3<f64>) -> Pose {
-    pose(truth.translation.x + error.x, truth.translation.y + error.y, truth.rotation.angle() + error.z)
+    pose(
+        truth.translation.x + error.x,
+        truth.translation.y + error.y,
+        truth.rotation.angle() + error.z,
+    )
 }
 
 /// A winding drive, and motions along it drawn from `covariance()`, which claim `claimed` times that.
@@ -49,16 +56,35 @@ impl Drive {
         let stamps_ns: Vec<_> = (0..truth.len() as i64).map(|k| k * INTERVAL_NS).collect();
         let spread = covariance().cholesky().unwrap().l();
         let motion = |k: usize| {
-            let motion = disturbed(&truth[k].inv_mul(&truth[k + 1]), spread * gaussian(&mut random));
-            let estimate = UncertainMotion { motion, covariance: claimed * covariance() };
-            Motion { from_ns: stamps_ns[k], to_ns: stamps_ns[k + 1], estimate }
+            let motion = disturbed(
+                &truth[k].inv_mul(&truth[k + 1]),
+                spread * gaussian(&mut random),
+            );
+            let estimate = UncertainMotion {
+                motion,
+                covariance: claimed * covariance(),
+            };
+            Motion {
+                from_ns: stamps_ns[k],
+                to_ns: stamps_ns[k + 1],
+                estimate,
+            }
         };
         let motions = (0..motions).map(motion).collect();
-        Self { stamps_ns, truth, motions }
+        Self {
+            stamps_ns,
+            truth,
+            motions,
+        }
     }
 
     fn judged(&self) -> JudgedMotions {
-        JudgedMotions::new(&self.motions, Trajectory::new(&self.stamps_ns, &self.truth), INTERVAL_NS).unwrap()
+        JudgedMotions::new(
+            &self.motions,
+            Trajectory::new(&self.stamps_ns, &self.truth),
+            INTERVAL_NS,
+        )
+        .unwrap()
     }
 
     fn nees(&self) -> Nees {
@@ -75,7 +101,12 @@ fn parts(figures: &NeesFigures) -> [NeesFigure; 3] {
 fn ratios_of_true_covariances_lie_in_the_honest_range_as_often_as_it_says() {
     let (drives, mut honest) = (400, [[0; 3]; 4]);
     for seed in 0..drives {
-        for (length, honest) in Drive::new(640, seed, 1.0).nees().by_length.iter().zip(&mut honest) {
+        for (length, honest) in Drive::new(640, seed, 1.0)
+            .nees()
+            .by_length
+            .iter()
+            .zip(&mut honest)
+        {
             for (figure, honest) in parts(&length.all).iter().zip(honest) {
                 let [low, high] = figure.honest_range;
                 *honest += usize::from(low < figure.ratio && figure.ratio < high);
@@ -83,25 +114,47 @@ fn ratios_of_true_covariances_lie_in_the_honest_range_as_often_as_it_says() {
         }
     }
     let share = |count: usize| 100.0 * count as f64 / drives as f64;
-    assert!(honest.iter().flatten().all(|&count| (92.0..98.0).contains(&share(count))), "{honest:?} of {drives}");
+    assert!(
+        honest
+            .iter()
+            .flatten()
+            .all(|&count| (92.0..98.0).contains(&share(count))),
+        "{honest:?} of {drives}"
+    );
 }
 
 #[test]
 fn a_long_drive_of_true_covariances_has_the_ratio_one_in_each_half() {
     let nees = Drive::new(12_800, 7, 1.0).nees();
-    let stretches: Vec<_> = nees.by_length.iter().map(|length| (length.motions, length.all.stretches)).collect();
+    let stretches: Vec<_> = nees
+        .by_length
+        .iter()
+        .map(|length| (length.motions, length.all.stretches))
+        .collect();
     assert_eq!(stretches, [(1, 12_800), (4, 3_200), (16, 800), (64, 200)]);
     let single = &nees.by_length[0];
-    for figure in [&single.all, single.first_half.as_ref().unwrap(), single.second_half.as_ref().unwrap()].map(parts) {
+    for figure in [
+        &single.all,
+        single.first_half.as_ref().unwrap(),
+        single.second_half.as_ref().unwrap(),
+    ]
+    .map(parts)
+    {
         for figure in figure {
-            assert!((figure.ratio - 1.0).abs() < 0.05 && (figure.outside_percent - 5.0).abs() < 1.0, "{nees}");
+            assert!(
+                (figure.ratio - 1.0).abs() < 0.05 && (figure.outside_percent - 5.0).abs() < 1.0,
+                "{nees}"
+            );
         }
     }
 }
 
 #[test]
 fn twice_the_covariance_is_half_the_ratio() {
-    let (once, twice) = (Drive::new(640, 3, 1.0).nees(), Drive::new(640, 3, 2.0).nees());
+    let (once, twice) = (
+        Drive::new(640, 3, 1.0).nees(),
+        Drive::new(640, 3, 2.0).nees(),
+    );
     for (once, twice) in once.by_length.iter().zip(&twice.by_length) {
         for (once, twice) in parts(&once.all).iter().zip(parts(&twice.all)) {
             assert!((once.ratio / twice.ratio - 2.0).abs() < 1e-9);
@@ -123,15 +176,30 @@ fn a_drift_that_single_motions_hide_shows_in_long_stretches() {
 #[test]
 fn a_noisy_truth_is_forgiven_when_it_is_told() {
     let mut drive = Drive::new(6_400, 5, 1.0);
-    let sigma = TruthSigma { position_m: 0.1, yaw_rad: 0.004 };
+    let sigma = TruthSigma {
+        position_m: 0.1,
+        yaw_rad: 0.004,
+    };
     let scale = Vector3::new(sigma.position_m, sigma.position_m, sigma.yaw_rad);
     let mut random = ChaCha8Rng::seed_from_u64(6);
     for truth in &mut drive.truth {
         *truth = disturbed(truth, gaussian(&mut random).component_mul(&scale));
     }
     let judged = drive.judged();
-    assert!(nees(&judged, &NeesOptions::default()).by_length[0].all.pose.ratio > 5.0);
-    let told = nees(&judged, &NeesOptions { truth_sigma: sigma, ..NeesOptions::default() });
+    assert!(
+        nees(&judged, &NeesOptions::default()).by_length[0]
+            .all
+            .pose
+            .ratio
+            > 5.0
+    );
+    let told = nees(
+        &judged,
+        &NeesOptions {
+            truth_sigma: sigma,
+            ..NeesOptions::default()
+        },
+    );
     for length in &told.by_length {
         // neighbouring stretches share a pose of the truth, so the ratio scatters a little more than the range says
         assert!((length.all.pose.ratio - 1.0).abs() < 0.15, "{told}");
@@ -147,14 +215,20 @@ fn bands_hold_the_errors_of_true_covariances() {
         let share = bands.inside_percent(3.0);
         inside = [0, 1, 2].map(|part| inside[part] + share[part] / drives as f64);
     }
-    assert!(inside.iter().all(|share| (99.2..99.95).contains(share)), "{inside:?}");
+    assert!(
+        inside.iter().all(|share| (99.2..99.95).contains(share)),
+        "{inside:?}"
+    );
 }
 
 #[test]
 fn a_band_starts_at_nothing_and_its_yaw_grows_with_the_root_of_time() {
     let bands = bands(&Drive::new(100, 1, 1.0).judged(), TruthSigma::default());
     let samples = &bands.chains[0];
-    assert_eq!((samples.len(), samples[0].sigma, samples[0].error), (101, Vector3::zeros(), Vector3::zeros()));
+    assert_eq!(
+        (samples.len(), samples[0].sigma, samples[0].error),
+        (101, Vector3::zeros(), Vector3::zeros())
+    );
     assert_eq!(samples[100].time_s, 25.0);
     assert!((samples[100].sigma.z / covariance()[(2, 2)].sqrt() - 10.0).abs() < 1e-9);
 }
@@ -163,8 +237,20 @@ fn a_band_starts_at_nothing_and_its_yaw_grows_with_the_root_of_time() {
 fn stretches_that_no_chain_has_are_left_out() {
     let drive = Drive::new(10, 1, 1.0);
     let lengths = [4, 11].into_iter().filter_map(NonZeroUsize::new).collect();
-    let nees = nees(&drive.judged(), &NeesOptions { lengths, ..NeesOptions::default() });
-    assert_eq!(nees.by_length.iter().map(|l| (l.motions, l.all.stretches)).collect::<Vec<_>>(), [(4, 2)]);
+    let nees = nees(
+        &drive.judged(),
+        &NeesOptions {
+            lengths,
+            ..NeesOptions::default()
+        },
+    );
+    assert_eq!(
+        nees.by_length
+            .iter()
+            .map(|l| (l.motions, l.all.stretches))
+            .collect::<Vec<_>>(),
+        [(4, 2)]
+    );
 }
 
 #[test]

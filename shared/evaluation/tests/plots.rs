@@ -14,15 +14,32 @@ fn evaluation(n: usize) -> Evaluation {
     let truth = drive(n, 120.0);
     let moved_by = pose(50.0, 20.0, 1.0);
     let estimate: Vec<_> = truth.iter().map(|p| moved_by * p).collect();
-    let options = Options { association: Association::Index, ..Options::default() };
-    evaluate(Trajectory::untimed(&estimate), Trajectory::untimed(&truth), &options).unwrap()
+    let options = Options {
+        association: Association::Index,
+        ..Options::default()
+    };
+    evaluate(
+        Trajectory::untimed(&estimate),
+        Trajectory::untimed(&truth),
+        &options,
+    )
+    .unwrap()
 }
 
 /// The points of the polylines with `colour`, in canvas units.
 fn polyline(svg: &str, colour: &str) -> Vec<(f64, f64)> {
-    let line =
-        svg.lines().filter(|l| l.starts_with("<polyline") && l.contains(colour)).max_by_key(|l| l.len()).unwrap();
-    let points = line.split("points=\"").nth(1).unwrap().split('"').next().unwrap();
+    let line = svg
+        .lines()
+        .filter(|l| l.starts_with("<polyline") && l.contains(colour))
+        .max_by_key(|l| l.len())
+        .unwrap();
+    let points = line
+        .split("points=\"")
+        .nth(1)
+        .unwrap()
+        .split('"')
+        .next()
+        .unwrap();
     let point = |p: &str| {
         let (x, y) = p.split_once(',').unwrap();
         (x.parse().unwrap(), y.parse().unwrap())
@@ -39,7 +56,10 @@ fn axes_are_equal_and_y_points_up() {
         let corners = [(0.0, 0.0), (side.0, 0.0), (side.0, side.1)].map(|(x, y)| pose(x, y, 0.0));
         let points = polyline(&trajectory_svg(&corners, None).unwrap(), ESTIMATE);
         let (right, up) = (points[1].0 - points[0].0, points[1].1 - points[2].1);
-        assert!((right / side.0 - up / side.1).abs() * side.0.min(side.1) < 2.5, "{side:?}: {right} {up}");
+        assert!(
+            (right / side.0 - up / side.1).abs() * side.0.min(side.1) < 2.5,
+            "{side:?}: {right} {up}"
+        );
     }
 }
 
@@ -49,7 +69,12 @@ fn an_estimate_in_another_frame_is_drawn_on_its_truth() {
     let svg = trajectory_svg(e.matched.estimate(), Some(&e.matched)).unwrap();
     let (estimate, truth) = (polyline(&svg, ESTIMATE), polyline(&svg, TRUTH));
     assert_eq!(estimate.len(), truth.len());
-    assert!(estimate.iter().zip(&truth).all(|(a, b)| (a.0 - b.0).abs() <= 1.0 && (a.1 - b.1).abs() <= 1.0));
+    assert!(
+        estimate
+            .iter()
+            .zip(&truth)
+            .all(|(a, b)| (a.0 - b.0).abs() <= 1.0 && (a.1 - b.1).abs() <= 1.0)
+    );
     assert!(svg.contains("SE(2) alignment") && svg.contains("start") && svg.contains("truth"));
 }
 
@@ -65,12 +90,24 @@ fn long_paths_plot_errors_over_length_and_short_ones_over_pairs() {
 fn nothing_to_draw_and_unwritable_files_are_errors() {
     assert!(matches!(trajectory_svg(&[], None), Err(PlotError::Empty)));
     let lost = std::path::Path::new("no-such-folder/plot.svg");
-    assert!(matches!(plot_trajectory(lost, &drive(5, 10.0), None), Err(PlotError::Write { .. })));
-    assert!(matches!(plot_errors(lost, &evaluation(50)), Err(PlotError::Write { .. })));
+    assert!(matches!(
+        plot_trajectory(lost, &drive(5, 10.0), None),
+        Err(PlotError::Write { .. })
+    ));
+    assert!(matches!(
+        plot_errors(lost, &evaluation(50)),
+        Err(PlotError::Write { .. })
+    ));
     let (a, b) = (drive(5, 10.0), drive(6, 10.0));
-    assert!(matches!(plot_trajectory(lost, &a, Some(&b)), Err(PlotError::Poses(_))));
+    assert!(matches!(
+        plot_trajectory(lost, &a, Some(&b)),
+        Err(PlotError::Poses(_))
+    ));
     let nowhere = [pose(f64::NAN, 0.0, 0.0)];
-    assert!(matches!(plot_trajectory(lost, &nowhere, None), Err(PlotError::Poses(_))));
+    assert!(matches!(
+        plot_trajectory(lost, &nowhere, None),
+        Err(PlotError::Poses(_))
+    ));
 }
 
 #[test]

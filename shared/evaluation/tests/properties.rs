@@ -7,8 +7,8 @@ use std::num::NonZeroUsize;
 
 use common::{any_drive, any_pose, chain, drive, pose};
 use gyre_evaluation::{
-    Association, Evaluation, MatchedPoses, Options, Pose, STRETCH_LENGTHS_M, Trajectory, align, ate, evaluate, kitti,
-    rpe, seg,
+    Association, Evaluation, MatchedPoses, Options, Pose, STRETCH_LENGTHS_M, Trajectory, align,
+    ate, evaluate, kitti, rpe, seg,
 };
 use proptest::prelude::*;
 
@@ -25,7 +25,10 @@ fn matched(estimate: &[Pose], truth: &[Pose]) -> MatchedPoses {
 
 /// Motions between neighbours, each passed through `change`, chained anew.
 fn rechained(poses: &[Pose], change: impl Fn(usize, Pose) -> Pose) -> Vec<Pose> {
-    let motions = poses.windows(2).enumerate().map(|(k, w)| change(k, w[0].inv_mul(&w[1])));
+    let motions = poses
+        .windows(2)
+        .enumerate()
+        .map(|(k, w)| change(k, w[0].inv_mul(&w[1])));
     chain(poses[0], motions.collect::<Vec<_>>())
 }
 
@@ -36,20 +39,27 @@ fn kitti_by_walking(estimate: &[Pose], truth: &[Pose], step: usize) -> (f64, f64
         for length in STRETCH_LENGTHS_M {
             let (mut travelled, mut last) = (0.0, first);
             while travelled <= length && last + 1 < truth.len() {
-                travelled += (truth[last + 1].translation.vector - truth[last].translation.vector).norm();
+                travelled +=
+                    (truth[last + 1].translation.vector - truth[last].translation.vector).norm();
                 last += 1;
             }
             if travelled <= length {
                 continue;
             }
-            let motion = |p: &[Pose]| p[first].to_homogeneous().try_inverse().unwrap() * p[last].to_homogeneous();
+            let motion = |p: &[Pose]| {
+                p[first].to_homogeneous().try_inverse().unwrap() * p[last].to_homogeneous()
+            };
             let error = motion(estimate).try_inverse().unwrap() * motion(truth);
             translation += error[(0, 2)].hypot(error[(1, 2)]) / length;
             rotation += error[(1, 0)].atan2(error[(0, 0)]).abs() / length;
             n += 1;
         }
     }
-    (100.0 * translation / n as f64, 100.0 * rotation.to_degrees() / n as f64, n)
+    (
+        100.0 * translation / n as f64,
+        100.0 * rotation.to_degrees() / n as f64,
+        n,
+    )
 }
 
 proptest! {
@@ -165,11 +175,18 @@ proptest! {
 fn interpolation_finds_a_finer_truth_at_the_estimates_stamps() {
     let truth = drive(300, 100.0);
     let truth_ns: Vec<i64> = (0..301).map(|k| k * 250_000_000).collect();
-    let (estimate, estimate_ns): (Vec<_>, Vec<_>) =
-        truth.iter().zip(&truth_ns).step_by(2).map(|(p, t)| (*p, *t)).unzip();
-    let evaluation =
-        evaluate(Trajectory::new(&estimate_ns, &estimate), Trajectory::new(&truth_ns, &truth), &Options::default())
-            .unwrap();
+    let (estimate, estimate_ns): (Vec<_>, Vec<_>) = truth
+        .iter()
+        .zip(&truth_ns)
+        .step_by(2)
+        .map(|(p, t)| (*p, *t))
+        .unzip();
+    let evaluation = evaluate(
+        Trajectory::new(&estimate_ns, &estimate),
+        Trajectory::new(&truth_ns, &truth),
+        &Options::default(),
+    )
+    .unwrap();
     assert_eq!(evaluation.coverage.matched(), 151);
     assert!(evaluation.ate.max_m < 1e-9);
 }
@@ -178,11 +195,22 @@ fn interpolation_finds_a_finer_truth_at_the_estimates_stamps() {
 fn a_path_below_100_m_says_so_and_keeps_the_errors_per_pair() {
     let truth = drive(30, 50.0);
     let estimate = rechained(&truth, |_, m| m * pose(0.1, 0.0, 0.0));
-    let options = Options { association: Association::Index, ..Options::default() };
-    let evaluation = evaluate(Trajectory::untimed(&estimate), Trajectory::untimed(&truth), &options).unwrap();
+    let options = Options {
+        association: Association::Index,
+        ..Options::default()
+    };
+    let evaluation = evaluate(
+        Trajectory::untimed(&estimate),
+        Trajectory::untimed(&truth),
+        &options,
+    )
+    .unwrap();
     assert!(evaluation.kitti.is_none() && evaluation.seg.is_none());
     assert!((evaluation.rpe.as_ref().unwrap().translation_rmse_m - 0.1).abs() < 1e-9);
     let table = evaluation.to_string();
-    assert!(table.contains("no stretch of the path exceeds 100 m; see the errors per pair"), "{table}");
+    assert!(
+        table.contains("no stretch of the path exceeds 100 m; see the errors per pair"),
+        "{table}"
+    );
     assert!(table.contains("translation 0.1000 m rmse"), "{table}");
 }

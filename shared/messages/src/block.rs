@@ -56,7 +56,10 @@ mod tests {
     #[test]
     fn blocks_are_one_cache_line() {
         assert_eq!((size_of::<ByteBlock>(), align_of::<ByteBlock>()), (64, 64));
-        assert_eq!((size_of::<FloatBlock>(), align_of::<FloatBlock>()), (64, 64));
+        assert_eq!(
+            (size_of::<FloatBlock>(), align_of::<FloatBlock>()),
+            (64, 64)
+        );
         assert_eq!((ByteBlock::count(64), ByteBlock::count(65)), (1, 2));
     }
 }

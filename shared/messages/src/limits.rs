@@ -6,7 +6,10 @@ use gyre_radar::Point;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::{ByteBlock, FloatBlock, MaskedHeader, MotionHeader, PoseHeader, RotationHeader, ScanHeader, TOPICS};
+use crate::{
+    ByteBlock, FloatBlock, MaskedHeader, MotionHeader, PoseHeader, RotationHeader, ScanHeader,
+    TOPICS,
+};
 
 /// Processes that may open a topic at once; one that just died counts until it has been cleaned up.
 pub const MAX_NODES: usize = 16;
@@ -96,12 +99,22 @@ impl Window {
             "refined" => (feedback, 1),
             _ => (feedback, 3),
         };
-        let sizes =
-            TopicSizes { history, buffer: history + self.scans, borrowed: BORROWED, loaned: LOANED, subscribers };
+        let sizes = TopicSizes {
+            history,
+            buffer: history + self.scans,
+            borrowed: BORROWED,
+            loaned: LOANED,
+            subscribers,
+        };
         match topic {
             "scan" if self.live_depth > 0 => {
                 let depth = self.live_depth.max(data);
-                TopicSizes { history: depth, buffer: depth, borrowed: depth + self.look_back, ..sizes }
+                TopicSizes {
+                    history: depth,
+                    buffer: depth,
+                    borrowed: depth + self.look_back,
+                    ..sizes
+                }
             }
             _ => sizes,
         }
@@ -156,8 +169,15 @@ pub struct Footprint {
 impl Footprint {
     /// The footprint of a window and its largest messages.
     pub fn new(window: &Window, limits: &Limits) -> Self {
-        let segment = |topic| (topic, window.sizes(topic).chunks() * limits.sample_bytes(topic));
-        Self { segments: TOPICS.map(segment).to_vec() }
+        let segment = |topic| {
+            (
+                topic,
+                window.sizes(topic).chunks() * limits.sample_bytes(topic),
+            )
+        };
+        Self {
+            segments: TOPICS.map(segment).to_vec(),
+        }
     }
 
     /// Bytes of all segments.
@@ -168,9 +188,18 @@ impl Footprint {
 
 impl fmt::Display for Footprint {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:.1} MB of shared memory at most (", self.total() as f64 / 1e6)?;
+        write!(
+            f,
+            "{:.1} MB of shared memory at most (",
+            self.total() as f64 / 1e6
+        )?;
         for (i, (topic, bytes)) in self.segments.iter().enumerate() {
-            write!(f, "{}{topic} {:.1}", if i == 0 { "" } else { ", " }, *bytes as f64 / 1e6)?;
+            write!(
+                f,
+                "{}{topic} {:.1}",
+                if i == 0 { "" } else { ", " },
+                *bytes as f64 / 1e6
+            )?;
         }
         write!(f, ")")
     }
@@ -180,7 +209,12 @@ impl fmt::Display for Footprint {
 mod tests {
     use super::*;
 
-    const WINDOW: Window = Window { scans: 4, lag: 2, look_back: 1, live_depth: 0 };
+    const WINDOW: Window = Window {
+        scans: 4,
+        lag: 2,
+        look_back: 1,
+        live_depth: 0,
+    };
 
     #[test]
     fn queues_hold_the_history_and_a_window_more() {
@@ -194,7 +228,12 @@ mod tests {
 
     #[test]
     fn the_footprint_of_oxford_at_255_is_what_was_measured_with_such_sizes() {
-        let limits = Limits { scan_bytes: 400 * 3779, raster_cells: 255 * 255, rasters: 2, points: 0 };
+        let limits = Limits {
+            scan_bytes: 400 * 3779,
+            raster_cells: 255 * 255,
+            rasters: 2,
+            points: 0,
+        };
         let total = Footprint::new(&WINDOW, &limits).total();
         // 42.9 MB with two readers of `masked`; the third has twelve rasters of 0.52 MB more.
         assert!((48_000_000..52_000_000).contains(&total), "{total}");
@@ -209,7 +248,10 @@ mod tests {
 
     #[test]
     fn a_window_of_nothing_is_refused() {
-        assert_eq!(Window { scans: 0, ..WINDOW }.validate(), Err(WindowError::Scans(0)));
+        assert_eq!(
+            Window { scans: 0, ..WINDOW }.validate(),
+            Err(WindowError::Scans(0))
+        );
         assert!(WINDOW.validate().is_ok());
     }
 }

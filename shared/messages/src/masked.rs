@@ -67,12 +67,20 @@ impl MaskedHeader {
     /// is shorter than the header says.
     pub fn points<'a>(&self, values: &'a [f32]) -> Option<&'a [Point]> {
         let first = (self.rasters as usize).checked_mul(Self::raster_values(self.cells()))?;
-        values.get(first..)?.as_chunks().0.get(..self.points as usize)
+        values
+            .get(first..)?
+            .as_chunks()
+            .0
+            .get(..self.points as usize)
     }
 
     /// The rasters to compare: this scan's, and that of the scan before, which is the second one here where the mask looked
     /// at both, else the first one there. `None` where a payload is shorter than its header says.
-    pub fn pair<'a>(&self, values: &'a [f32], before: Option<(&Self, &'a [f32])>) -> Option<Pair<'a>> {
+    pub fn pair<'a>(
+        &self,
+        values: &'a [f32],
+        before: Option<(&Self, &'a [f32])>,
+    ) -> Option<Pair<'a>> {
         let later = values.get(..self.cells())?;
         let second = Self::raster_values(self.cells());
         let earlier = match before {
@@ -100,25 +108,58 @@ mod tests {
 
     #[test]
     fn the_raster_before_comes_from_the_scan_before_unless_the_mask_looked_at_both() {
-        let one = MaskedHeader { n: 3, rasters: 1, ..MaskedHeader::default() };
+        let one = MaskedHeader {
+            n: 3,
+            rasters: 1,
+            ..MaskedHeader::default()
+        };
         let (now, then) = ([1.0; 32], [2.0; 32]);
-        let earlier = |header: &MaskedHeader| header.pair(&now, Some((&one, &then))).and_then(|pair| pair.earlier);
-        assert_eq!(earlier(&one).map(|raster| (raster.len(), raster[0])), Some((9, 2.0)));
+        let earlier = |header: &MaskedHeader| {
+            header
+                .pair(&now, Some((&one, &then)))
+                .and_then(|pair| pair.earlier)
+        };
+        assert_eq!(
+            earlier(&one).map(|raster| (raster.len(), raster[0])),
+            Some((9, 2.0))
+        );
         let two = MaskedHeader { rasters: 2, ..one };
-        assert_eq!(earlier(&two).map(|raster| (raster.len(), raster[0])), Some((9, 1.0)));
-        assert!(one.pair(&now, None).is_some_and(|pair| pair.earlier.is_none()));
+        assert_eq!(
+            earlier(&two).map(|raster| (raster.len(), raster[0])),
+            Some((9, 1.0))
+        );
+        assert!(
+            one.pair(&now, None)
+                .is_some_and(|pair| pair.earlier.is_none())
+        );
         assert!(one.pair(&now[..8], None).is_none());
     }
 
     #[test]
     fn points_start_at_the_block_behind_the_last_raster() {
         let values: Vec<f32> = (0..48).map(|value| value as f32).collect();
-        let one = MaskedHeader { n: 3, rasters: 1, points: 2, ..MaskedHeader::default() };
-        let expected = [[16.0, 17.0, 18.0, 19.0, 20.0], [21.0, 22.0, 23.0, 24.0, 25.0]];
+        let one = MaskedHeader {
+            n: 3,
+            rasters: 1,
+            points: 2,
+            ..MaskedHeader::default()
+        };
+        let expected = [
+            [16.0, 17.0, 18.0, 19.0, 20.0],
+            [21.0, 22.0, 23.0, 24.0, 25.0],
+        ];
         assert_eq!(one.points(&values), Some(expected.as_slice()));
         let two = MaskedHeader { rasters: 2, ..one };
         assert_eq!(two.points(&values).map(|points| points[0][0]), Some(32.0));
         assert_eq!(MaskedHeader { points: 4, ..two }.points(&values), None);
-        assert_eq!(MaskedHeader { rasters: u32::MAX, n: u32::MAX, ..one }.points(&values), None);
+        assert_eq!(
+            MaskedHeader {
+                rasters: u32::MAX,
+                n: u32::MAX,
+                ..one
+            }
+            .points(&values),
+            None
+        );
     }
 }

@@ -58,7 +58,12 @@ impl MotionEstimate {
     /// The motion as the search found it.
     pub fn as_searched(&self) -> SearchedMotion {
         let [x_m, y_m, yaw_rad] = self.searched;
-        SearchedMotion { x_m, y_m, yaw_rad, interval_ns: self.interval_ns }
+        SearchedMotion {
+            x_m,
+            y_m,
+            yaw_rad,
+            interval_ns: self.interval_ns,
+        }
     }
 }
 

@@ -56,9 +56,13 @@ impl ScanHeader {
     /// The scan in this header and its payload's bytes; `None` where they do not fit each other.
     pub fn view<'a>(&'a self, bytes: &'a [u8]) -> Option<PolarScan<'a>> {
         let geometry = self.geometry();
-        let last_byte =
-            geometry.first_byte.checked_add(geometry.stride.checked_mul(geometry.azimuths.checked_sub(1)?)?)?;
-        let fits = geometry.azimuths <= MAX_AZIMUTHS && last_byte.checked_add(geometry.bins)? <= bytes.len();
+        let last_byte = geometry.first_byte.checked_add(
+            geometry
+                .stride
+                .checked_mul(geometry.azimuths.checked_sub(1)?)?,
+        )?;
+        let fits = geometry.azimuths <= MAX_AZIMUTHS
+            && last_byte.checked_add(geometry.bins)? <= bytes.len();
         fits.then(|| PolarScan {
             geometry,
             bytes,
@@ -100,7 +104,11 @@ impl ScanHeader {
             range_resolution_m: self.range_resolution_m,
             range_offset_m: self.range_offset_m,
             doppler_s: self.doppler_s,
-            sense: if self.clockwise == 1 { Sense::Clockwise } else { Sense::CounterClockwise },
+            sense: if self.clockwise == 1 {
+                Sense::Clockwise
+            } else {
+                Sense::CounterClockwise
+            },
             stamp_ns: self.item.stamp_ns,
         }
     }
@@ -112,7 +120,13 @@ mod tests {
 
     #[test]
     fn a_header_that_promises_more_than_its_payload_is_refused() {
-        let mut header = ScanHeader { azimuths: 4, bins: 10, stride: 21, first_byte: 11, ..ScanHeader::default() };
+        let mut header = ScanHeader {
+            azimuths: 4,
+            bins: 10,
+            stride: 21,
+            first_byte: 11,
+            ..ScanHeader::default()
+        };
         let bytes = [7; 4 * 21];
         assert_eq!(header.view(&bytes).map(|scan| scan.row(3).len()), Some(10));
         assert!(header.view(&bytes[1..]).is_none());

@@ -12,7 +12,11 @@ fn main() {
         println!("skipped: GYRE_DATA is not set");
         return;
     };
-    for folder in ["oxford-2019-01-10-14-36-48", "radiate-2019-02-12", "samples/boreas-rt-2024-12-03"] {
+    for folder in [
+        "oxford-2019-01-10-14-36-48",
+        "radiate-2019-02-12",
+        "samples/boreas-rt-2024-12-03",
+    ] {
         if let Err(error) = measure(&root.join(folder)) {
             println!("{folder}: {error}");
         }
@@ -53,8 +57,9 @@ fn decode_alone(path: &Path, file: &mut Vec<u8>, pixels: &mut [u8]) {
     use std::io::Read;
     file.clear();
     let loaded = std::fs::File::open(path).and_then(|mut f| f.read_to_end(file));
-    let decoded =
-        png::Decoder::new(std::io::Cursor::new(file.as_slice())).read_info().and_then(|mut r| r.next_frame(pixels));
+    let decoded = png::Decoder::new(std::io::Cursor::new(file.as_slice()))
+        .read_info()
+        .and_then(|mut r| r.next_frame(pixels));
     if loaded.is_err() || decoded.is_err() {
         println!("{} cannot be decoded", path.display());
     }
@@ -62,5 +67,7 @@ fn decode_alone(path: &Path, file: &mut Vec<u8>, pixels: &mut [u8]) {
 
 fn median_ms(times: &mut [Duration]) -> f64 {
     times.sort_unstable();
-    times.get(times.len() / 2).map_or(f64::NAN, |t| t.as_secs_f64() * 1e3)
+    times
+        .get(times.len() / 2)
+        .map_or(f64::NAN, |t| t.as_secs_f64() * 1e3)
 }

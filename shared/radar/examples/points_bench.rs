@@ -19,10 +19,16 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Ok(());
     };
     println!("one thread; medians over scans");
-    println!("{:>28} {:>12} {:>6} {:>8} {:>8}", "recording", "sweep", "floor", "points", "ms");
+    println!(
+        "{:>28} {:>12} {:>6} {:>8} {:>8}",
+        "recording", "sweep", "floor", "points", "ms"
+    );
     for recording in RECORDINGS {
         let scans = first_scans(&Path::new(&data).join(recording))?;
-        let sweep = format!("{} x {}", scans[0].geometry.azimuths, scans[0].geometry.bins);
+        let sweep = format!(
+            "{} x {}",
+            scans[0].geometry.azimuths, scans[0].geometry.bins
+        );
         for floor in FLOORS {
             let (points, ms) = measure(&scans, floor)?;
             println!("{recording:>28} {sweep:>12} {floor:>6} {points:>8} {ms:>8.3}");

@@ -4,7 +4,8 @@
 //! `cargo run --release -p gyre-radar --example raster_bench`
 
 use gyre_radar::{
-    DatasetOptions, OwnedScan, RasterConfig, Rasteriser, Sampling, ScanLimits, Sense, SweepGeometry, Twist,
+    DatasetOptions, OwnedScan, RasterConfig, Rasteriser, Sampling, ScanLimits, Sense,
+    SweepGeometry, Twist,
 };
 use std::error::Error;
 use std::path::Path;
@@ -21,12 +22,27 @@ fn main() -> Result<(), Box<dyn Error>> {
         Some(scan) => (scan, "Oxford"),
         None => (made_up_scan(), "made up (GYRE_DATA is not set)"),
     };
-    println!("one thread; scan: {origin}, {} x {}", scan.geometry.azimuths, scan.geometry.bins);
-    println!("{:>5} {:>7} {:>9} {:>10} {:>14}", "n", "cell m", "sampling", "plain ms", "compensated ms");
+    println!(
+        "one thread; scan: {origin}, {} x {}",
+        scan.geometry.azimuths, scan.geometry.bins
+    );
+    println!(
+        "{:>5} {:>7} {:>9} {:>10} {:>14}",
+        "n", "cell m", "sampling", "plain ms", "compensated ms"
+    );
     for (n, cell_m) in [(127, 0.8), (255, 0.8), (255, 0.4), (511, 0.4)] {
         for sampling in [Sampling::Averaged, Sampling::Bilinear] {
-            let config = RasterConfig { n, cell_m, sampling, ..RasterConfig::default() };
-            let twist = Twist { vx_mps: 9.5, vy_mps: 0.1, yaw_rate_radps: 0.3 };
+            let config = RasterConfig {
+                n,
+                cell_m,
+                sampling,
+                ..RasterConfig::default()
+            };
+            let twist = Twist {
+                vx_mps: 9.5,
+                vy_mps: 0.1,
+                yaw_rate_radps: 0.3,
+            };
             let plain = median_ms(&config, &scan, None)?;
             let compensated = median_ms(&config, &scan, Some(twist))?;
             let sampling = format!("{sampling:?}");
@@ -36,7 +52,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn median_ms(config: &RasterConfig, scan: &OwnedScan, twist: Option<Twist>) -> Result<f64, Box<dyn Error>> {
+fn median_ms(
+    config: &RasterConfig,
+    scan: &OwnedScan,
+    twist: Option<Twist>,
+) -> Result<f64, Box<dyn Error>> {
     let mut rasteriser = Rasteriser::new(config)?;
     let mut raster = vec![0.0; config.n * config.n];
     let mut times = Vec::<Duration>::with_capacity(REPETITIONS);
@@ -52,7 +72,10 @@ fn median_ms(config: &RasterConfig, scan: &OwnedScan, twist: Option<Twist>) -> R
 /// Noise at the level of a real scan's, with a wall now and then.
 fn made_up_scan() -> OwnedScan {
     let stride = BINS + METADATA;
-    let mut scan = OwnedScan::with_limits(ScanLimits { bytes: AZIMUTHS * stride, azimuths: AZIMUTHS });
+    let mut scan = OwnedScan::with_limits(ScanLimits {
+        bytes: AZIMUTHS * stride,
+        azimuths: AZIMUTHS,
+    });
     scan.geometry = SweepGeometry {
         azimuths: AZIMUTHS,
         bins: BINS,
@@ -77,7 +100,9 @@ fn made_up_scan() -> OwnedScan {
 }
 
 fn oxford_scan() -> Result<Option<OwnedScan>, Box<dyn Error>> {
-    let Some(data) = std::env::var_os("GYRE_DATA") else { return Ok(None) };
+    let Some(data) = std::env::var_os("GYRE_DATA") else {
+        return Ok(None);
+    };
     let folder = Path::new(&data).join("oxford-2019-01-10-14-36-48");
     let mut dataset = gyre_radar::open(&folder, &DatasetOptions::default())?;
     let mut scan = OwnedScan::with_limits(dataset.limits());

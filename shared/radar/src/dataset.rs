@@ -87,12 +87,18 @@ pub fn open(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, O
 }
 
 /// Opens a recording that lies on no disk: in its own format, unless `options` name another.
-pub fn open_source(source: Box<dyn ImageSource>, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
+pub fn open_source(
+    source: Box<dyn ImageSource>,
+    options: &DatasetOptions,
+) -> Result<Box<dyn Dataset>, OpenError> {
     options.check()?;
     read_as_found(detect::Found::source(source, options.format)?, options)
 }
 
-fn read_as_found(found: detect::Found, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
+fn read_as_found(
+    found: detect::Found,
+    options: &DatasetOptions,
+) -> Result<Box<dyn Dataset>, OpenError> {
     Ok(match found.format {
         Format::Oxford => Box::new(oxford::open(found, options)?),
         Format::Oord => Box::new(oxford::open_oord(found, options)?),

@@ -85,13 +85,19 @@ pub enum TrajectoryFormat {
 
 /// Reads a trajectory of any known form, told by its first line of content, and converts it to REP-103.
 pub fn read_trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
-    let text = fs::read_to_string(path).map_err(|source| TrajectoryError::Io { path: path.to_owned(), source })?;
+    let text = fs::read_to_string(path).map_err(|source| TrajectoryError::Io {
+        path: path.to_owned(),
+        source,
+    })?;
     parse_trajectory(&text, path)
 }
 
 /// As [`read_trajectory`], of a text that need not lie on a disk; `path` is what errors call it.
 pub fn parse_trajectory(text: &str, path: &Path) -> Result<Trajectory, TrajectoryError> {
-    let format = detect(text).map_err(|reason| TrajectoryError::Unknown { path: path.to_owned(), reason })?;
+    let format = detect(text).map_err(|reason| TrajectoryError::Unknown {
+        path: path.to_owned(),
+        reason,
+    })?;
     parse(text, format).map_err(|LineError { line, reason }| TrajectoryError::Line {
         path: path.to_owned(),
         line,
@@ -106,7 +112,11 @@ pub fn find_ground_truth(root: &Path) -> Option<PathBuf> {
         .and_then(|n| n.to_str())
         .is_some_and(|n| ["radar", "Navtech_Polar", "navtech", "polar"].contains(&n));
     let roots = [Some(root), root.parent().filter(|_| above)];
-    roots.into_iter().flatten().flat_map(|root| PLACES.iter().map(|p| root.join(p))).find(|path| path.is_file())
+    roots
+        .into_iter()
+        .flatten()
+        .flat_map(|root| PLACES.iter().map(|p| root.join(p)))
+        .find(|path| path.is_file())
 }
 
 fn parse(text: &str, format: TrajectoryFormat) -> Result<Trajectory, LineError> {
@@ -135,15 +145,24 @@ fn detect(text: &str) -> Result<TrajectoryFormat, String> {
 
 /// Lines with content, numbered from 1; `#` starts a comment.
 fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    text.lines().enumerate().map(|(i, l)| (i + 1, l.trim())).filter(|(_, l)| !l.is_empty() && !l.starts_with('#'))
+    text.lines()
+        .enumerate()
+        .map(|(i, l)| (i + 1, l.trim()))
+        .filter(|(_, l)| !l.is_empty() && !l.starts_with('#'))
 }
 
 /// `N` finite numbers.
-fn numbers<'a, const N: usize>(line: usize, fields: impl Iterator<Item = &'a str>) -> Result<[f64; N], LineError> {
+fn numbers<'a, const N: usize>(
+    line: usize,
+    fields: impl Iterator<Item = &'a str>,
+) -> Result<[f64; N], LineError> {
     let (mut values, mut count) = ([0.0; N], 0);
     for field in fields {
         let value = field.trim().parse::<f64>().ok().filter(|v| v.is_finite());
-        let value = value.ok_or_else(|| LineError { line, reason: format!("{field:?} is not a number") })?;
+        let value = value.ok_or_else(|| LineError {
+            line,
+            reason: format!("{field:?} is not a number"),
+        })?;
         if let Some(into) = values.get_mut(count) {
             *into = value;
         }
@@ -151,7 +170,10 @@ fn numbers<'a, const N: usize>(line: usize, fields: impl Iterator<Item = &'a str
     }
     match count {
         _ if count == N => Ok(values),
-        _ => Err(LineError { line, reason: format!("{count} columns where {N} are expected") }),
+        _ => Err(LineError {
+            line,
+            reason: format!("{count} columns where {N} are expected"),
+        }),
     }
 }
 
@@ -160,7 +182,10 @@ fn columns<const N: usize>(header: &str, names: [&str; N]) -> Result<[usize; N],
     let mut found = [0; N];
     for (into, name) in found.iter_mut().zip(names) {
         let position = header.split(',').position(|h| h.trim() == name);
-        *into = position.ok_or_else(|| LineError { line: 1, reason: format!("the header has no column {name}") })?;
+        *into = position.ok_or_else(|| LineError {
+            line: 1,
+            reason: format!("the header has no column {name}"),
+        })?;
     }
     Ok(found)
 }
@@ -170,7 +195,10 @@ fn field(line: usize, row: &str, column: usize) -> Result<&str, LineError> {
     row.split(',')
         .nth(column)
         .map(str::trim)
-        .ok_or_else(|| LineError { line, reason: format!("column {} is missing", column + 1) })
+        .ok_or_else(|| LineError {
+            line,
+            reason: format!("column {} is missing", column + 1),
+        })
 }
 
 fn number(line: usize, row: &str, column: usize) -> Result<f64, LineError> {
@@ -192,7 +220,10 @@ fn check_growing(line: usize, stamps: &[i64], next: i64) -> Result<(), LineError
     match stamps.last() {
         Some(last) if next < *last => {
             let back_s = (last - next) as f64 * 1e-9;
-            Err(LineError { line, reason: format!("time runs backwards by {back_s:.6} s") })
+            Err(LineError {
+                line,
+                reason: format!("time runs backwards by {back_s:.6} s"),
+            })
         }
         _ => Ok(()),
     }

@@ -81,7 +81,11 @@ pub struct Unreadable {
 /// Looks through the dataset at `root`.
 ///
 /// With a `trajectory` whose times are the scans' (an odometry result), the clock of each ground truth with times is compared with it.
-pub fn inspect(root: &Path, options: &DatasetOptions, trajectory: Option<&Trajectory>) -> Result<Report, OpenError> {
+pub fn inspect(
+    root: &Path,
+    options: &DatasetOptions,
+    trajectory: Option<&Trajectory>,
+) -> Result<Report, OpenError> {
     let mut dataset = open(root, options)?;
     let timing = timing::examine(dataset.as_ref());
     let seen = read_scans(dataset.as_mut());
@@ -101,7 +105,9 @@ struct Seen {
 }
 
 fn read_scans(dataset: &mut dyn Dataset) -> Seen {
-    let step = (dataset.len() * dataset.limits().bytes).div_ceil(PIXEL_BUDGET).max(1);
+    let step = (dataset.len() * dataset.limits().bytes)
+        .div_ceil(PIXEL_BUDGET)
+        .max(1);
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let (mut survey, mut unreadable, mut scans_read) = (rows::Survey::default(), Vec::new(), 0);
     for index in (0..dataset.len()).step_by(step) {
@@ -118,10 +124,20 @@ fn read_scans(dataset: &mut dyn Dataset) -> Seen {
             }),
         }
     }
-    Seen { scans_read, rows: survey.report(), unreadable, scan }
+    Seen {
+        scans_read,
+        rows: survey.report(),
+        unreadable,
+        scan,
+    }
 }
 
-fn assemble(root: &Path, dataset: &dyn Dataset, seen: Seen, timing: Option<TimingReport>) -> Report {
+fn assemble(
+    root: &Path,
+    dataset: &dyn Dataset,
+    seen: Seen,
+    timing: Option<TimingReport>,
+) -> Report {
     let geometry = seen.scan.geometry;
     let max_range_m = seen.scan.view().range_m(geometry.bins as f32 - 1.0);
     Report {

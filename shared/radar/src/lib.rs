@@ -17,11 +17,16 @@ pub mod scan;
 pub mod trajectory;
 
 pub use dataset::{
-    AzimuthSource, Dataset, DatasetOptions, Format, ImageSize, ImageSource, OpenError, ReadError, open, open_source,
+    AzimuthSource, Dataset, DatasetOptions, Format, ImageSize, ImageSource, OpenError, ReadError,
+    open, open_source,
 };
-pub use ground_truth::{TrajectoryError, find_ground_truth, read_trajectory, write_kitti, write_tum};
+pub use ground_truth::{
+    TrajectoryError, find_ground_truth, read_trajectory, write_kitti, write_tum,
+};
 pub use inspect::{Report, inspect};
 pub use points::{Point, PointExtractor, PointsConfig, PointsError};
 pub use raster::{RasterConfig, RasterError, Rasteriser, Sampling, Twist};
-pub use scan::{MAX_AZIMUTHS, OwnedScan, PolarScan, ScanError, ScanLimits, ScanSlot, Sense, SweepGeometry};
+pub use scan::{
+    MAX_AZIMUTHS, OwnedScan, PolarScan, ScanError, ScanLimits, ScanSlot, Sense, SweepGeometry,
+};
 pub use trajectory::Trajectory;

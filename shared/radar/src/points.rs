@@ -85,15 +85,49 @@ impl PointsConfig {
     pub fn validate(&self) -> Result<(), PointsError> {
         let setting = |fits: bool, key, value: f32, bounds| match fits {
             true => Ok(()),
-            false => Err(PointsError { key, value: value.into(), bounds }),
+            false => Err(PointsError {
+                key,
+                value: value.into(),
+                bounds,
+            }),
         };
-        setting((0.0..=45.0).contains(&self.beam_deg), "beam_deg", self.beam_deg, "0 to 45")?;
-        setting((1e-3..=10.0).contains(&self.range_cell_m), "range_cell_m", self.range_cell_m, "0.001 to 10")?;
-        setting((0.0..=1e4).contains(&self.min_range_m), "min_range_m", self.min_range_m, "0 to 10000")?;
+        setting(
+            (0.0..=45.0).contains(&self.beam_deg),
+            "beam_deg",
+            self.beam_deg,
+            "0 to 45",
+        )?;
+        setting(
+            (1e-3..=10.0).contains(&self.range_cell_m),
+            "range_cell_m",
+            self.range_cell_m,
+            "0.001 to 10",
+        )?;
+        setting(
+            (0.0..=1e4).contains(&self.min_range_m),
+            "min_range_m",
+            self.min_range_m,
+            "0 to 10000",
+        )?;
         let beyond = self.max_range_m > self.min_range_m && self.max_range_m <= 1e4;
-        setting(beyond, "max_range_m", self.max_range_m, "more than min_range_m, at most 10000")?;
-        setting((1.0..=255.0).contains(&self.weight_cap), "weight_cap", self.weight_cap, "1 to 255")?;
-        setting(self.capacity <= MAX_POINTS, "capacity", self.capacity as f32, "at most 65536")
+        setting(
+            beyond,
+            "max_range_m",
+            self.max_range_m,
+            "more than min_range_m, at most 10000",
+        )?;
+        setting(
+            (1.0..=255.0).contains(&self.weight_cap),
+            "weight_cap",
+            self.weight_cap,
+            "1 to 255",
+        )?;
+        setting(
+            self.capacity <= MAX_POINTS,
+            "capacity",
+            self.capacity as f32,
+            "at most 65536",
+        )
     }
 }
 
@@ -128,7 +162,12 @@ impl PointExtractor {
     ///
     /// # Errors
     /// A scan that contradicts itself; `out` is untouched then.
-    pub fn extract(&mut self, scan: &PolarScan<'_>, floor: u8, out: &mut [Point]) -> Result<usize, ScanError> {
+    pub fn extract(
+        &mut self,
+        scan: &PolarScan<'_>,
+        floor: u8,
+        out: &mut [Point],
+    ) -> Result<usize, ScanError> {
         scan.check()?;
         let room = out.len().min(self.config.capacity);
         if room == 0 {
@@ -142,7 +181,10 @@ impl PointExtractor {
         for peaks in peaks.chunk_by(|a, b| a.azimuth == b.azimuth) {
             let view = View::of(scan, usize::from(peaks[0].azimuth));
             for peak in peaks.iter().filter(|peak| peak.power >= weakest) {
-                out[count] = view.point(self.cells.centre_m(peak.cell), (f32::from(peak.power) / cap).min(1.0));
+                out[count] = view.point(
+                    self.cells.centre_m(peak.cell),
+                    (f32::from(peak.power) / cap).min(1.0),
+                );
                 count += 1;
             }
         }
@@ -184,10 +226,20 @@ impl View {
             Sense::Clockwise => -sin,
             Sense::CounterClockwise => sin,
         };
-        Self { look: [cos, left], time_s: scan.time_s(azimuth) as f32, doppler_s: scan.doppler_s(azimuth) }
+        Self {
+            look: [cos, left],
+            time_s: scan.time_s(azimuth) as f32,
+            doppler_s: scan.doppler_s(azimuth),
+        }
     }
 
     fn point(&self, range_m: f32, weight: f32) -> Point {
-        [range_m * self.look[0], range_m * self.look[1], self.time_s, weight, self.doppler_s]
+        [
+            range_m * self.look[0],
+            range_m * self.look[1],
+            self.time_s,
+            weight,
+            self.doppler_s,
+        ]
     }
 }

@@ -75,7 +75,13 @@ pub struct RasterConfig {
 
 impl Default for RasterConfig {
     fn default() -> Self {
-        Self { n: 255, cell_m: 0.8, minimum_range_m: 2.0, sampling: Sampling::Averaged, averaged_cells: 1.0 }
+        Self {
+            n: 255,
+            cell_m: 0.8,
+            minimum_range_m: 2.0,
+            sampling: Sampling::Averaged,
+            averaged_cells: 1.0,
+        }
     }
 }
 
@@ -127,7 +133,9 @@ pub enum RasterError {
     #[error(transparent)]
     Scan(#[from] ScanError),
     /// The motion to undo is not finite, or goes further than [`MAX_TURN_RAD`] or [`MAX_TRAVEL_M`].
-    #[error("no sensor turns by {turn_rad} rad and travels {travel_m} m within half a sweep (twist {twist:?})")]
+    #[error(
+        "no sensor turns by {turn_rad} rad and travels {travel_m} m within half a sweep (twist {twist:?})"
+    )]
     Twist {
         /// The motion.
         twist: Twist,
@@ -197,11 +205,18 @@ impl Rasteriser {
             out.fill(0.0);
             return Ok(());
         }
-        let motion = twist.map(|twist| SweepMotion::new(twist, scan)).transpose()?;
+        let motion = twist
+            .map(|twist| SweepMotion::new(twist, scan))
+            .transpose()?;
         self.bearings.measure(scan);
         self.cells.look_in(scan.geometry.sense);
         let travel_m = motion.as_ref().map_or(0.0, |motion| motion.travel_m);
-        self.polar.fill(scan, floor, self.cells.furthest_m + travel_m, motion.as_ref());
+        self.polar.fill(
+            scan,
+            floor,
+            self.cells.furthest_m + travel_m,
+            motion.as_ref(),
+        );
         self.sample(&scan.geometry, motion.as_ref(), out);
         Ok(())
     }
@@ -230,7 +245,10 @@ impl Rasteriser {
     fn check(&self, scan: &PolarScan<'_>, out: &[f32]) -> Result<(), RasterError> {
         let expected = self.config.n * self.config.n;
         if out.len() != expected {
-            return Err(RasterError::OutputLength { expected, actual: out.len() });
+            return Err(RasterError::OutputLength {
+                expected,
+                actual: out.len(),
+            });
         }
         Ok(scan.check()?)
     }

@@ -24,12 +24,17 @@ impl Trajectory {
 
     /// Sum of the steps between poses, m.
     pub fn path_length_m(&self) -> f64 {
-        self.poses.windows(2).map(|w| (w[1].translation.vector - w[0].translation.vector).norm()).sum()
+        self.poses
+            .windows(2)
+            .map(|w| (w[1].translation.vector - w[0].translation.vector).norm())
+            .sum()
     }
 
     /// Whether the poses have headings, rather than one filled-in value for all.
     pub fn has_heading(&self) -> bool {
-        self.poses.windows(2).any(|w| w[0].rotation != w[1].rotation)
+        self.poses
+            .windows(2)
+            .any(|w| w[0].rotation != w[1].rotation)
     }
 
     /// First and last time, ns.
@@ -49,14 +54,18 @@ impl Trajectory {
         let (a, from) = (self.poses.get(after.checked_sub(1)?)?, stamps[after - 1]);
         let share = (stamp_ns - from) as f64 / (to - from) as f64;
         let position = a.translation.vector.lerp(&b.translation.vector, share);
-        Some(Isometry2::new(position, a.rotation.angle() + share * (b.rotation * a.rotation.inverse()).angle()))
+        Some(Isometry2::new(
+            position,
+            a.rotation.angle() + share * (b.rotation * a.rotation.inverse()).angle(),
+        ))
     }
 
     /// As [`Trajectory::at`]; times that miss the span by no more than `tolerance_ns` are its ends, for files round.
     pub fn near(&self, stamp_ns: i64, tolerance_ns: u64) -> Option<Isometry2<f64>> {
         let (first, last) = self.span_ns()?;
         let within = stamp_ns.clamp(first, last);
-        self.at(within).filter(|_| within.abs_diff(stamp_ns) <= tolerance_ns)
+        self.at(within)
+            .filter(|_| within.abs_diff(stamp_ns) <= tolerance_ns)
     }
 
     /// Time between the poses around a time, ns: 0 at a pose, `None` outside the span.
@@ -86,7 +95,10 @@ pub(crate) fn planar(matrix: &[f64; 12]) -> Isometry2<f64> {
 
 /// The same pose with y and yaw the other way round: from y right and clockwise to REP-103, in both frames.
 pub(crate) fn mirrored(pose: Isometry2<f64>) -> Isometry2<f64> {
-    Isometry2::new(Vector2::new(pose.translation.x, -pose.translation.y), -pose.rotation.angle())
+    Isometry2::new(
+        Vector2::new(pose.translation.x, -pose.translation.y),
+        -pose.rotation.angle(),
+    )
 }
 
 #[cfg(test)]
@@ -98,11 +110,17 @@ mod tests {
     #[test]
     fn between_poses_the_angle_takes_the_short_way() {
         let pose = |x: f64, yaw: f64| Isometry2::new(Vector2::new(x, 0.0), yaw);
-        let trajectory =
-            Trajectory { stamp_ns: Some(vec![0, 100]), poses: vec![pose(0.0, PI - 0.1), pose(2.0, -PI + 0.1)] };
+        let trajectory = Trajectory {
+            stamp_ns: Some(vec![0, 100]),
+            poses: vec![pose(0.0, PI - 0.1), pose(2.0, -PI + 0.1)],
+        };
         let middle = trajectory.at(50).unwrap();
         assert!((middle.translation.x - 1.0).abs() < 1e-12);
-        assert!((middle.rotation.angle().abs() - PI).abs() < 1e-9, "{}", middle.rotation.angle());
+        assert!(
+            (middle.rotation.angle().abs() - PI).abs() < 1e-9,
+            "{}",
+            middle.rotation.angle()
+        );
         assert_eq!(trajectory.at(100).unwrap(), trajectory.poses[1]);
         assert_eq!(trajectory.at(0).unwrap(), trajectory.poses[0]);
         assert!(trajectory.at(101).is_none() && trajectory.at(-1).is_none());
@@ -110,11 +128,22 @@ mod tests {
 
     #[test]
     fn near_an_end_is_the_end_and_gaps_are_as_wide_as_the_poses_are_apart() {
-        let poses = [1.0, 2.0, 4.0].map(|x| Isometry2::new(Vector2::new(x, 0.0), 0.0)).to_vec();
-        let trajectory = Trajectory { stamp_ns: Some(vec![0, 100, 150]), poses };
+        let poses = [1.0, 2.0, 4.0]
+            .map(|x| Isometry2::new(Vector2::new(x, 0.0), 0.0))
+            .to_vec();
+        let trajectory = Trajectory {
+            stamp_ns: Some(vec![0, 100, 150]),
+            poses,
+        };
         let x = |stamp_ns| trajectory.near(stamp_ns, 5).map(|pose| pose.translation.x);
-        assert_eq!([x(-6), x(-5), x(50), x(155), x(156)], [None, Some(1.0), Some(1.5), Some(4.0), None]);
+        assert_eq!(
+            [x(-6), x(-5), x(50), x(155), x(156)],
+            [None, Some(1.0), Some(1.5), Some(4.0), None]
+        );
         let gaps = [-1, 0, 1, 100, 101, 150, 151].map(|stamp_ns| trajectory.gap_ns(stamp_ns));
-        assert_eq!(gaps, [None, Some(0), Some(100), Some(0), Some(50), Some(0), None]);
+        assert_eq!(
+            gaps,
+            [None, Some(0), Some(100), Some(0), Some(50), Some(0), None]
+        );
     }
 }

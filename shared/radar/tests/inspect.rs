@@ -14,24 +14,37 @@ fn report(folder: &str, trajectory: Option<&Trajectory>) -> Option<Report> {
 }
 
 fn says(report: &Report, words: &[&str]) -> bool {
-    report.oddities.iter().any(|sentence| words.iter().all(|word| sentence.contains(word)))
+    report
+        .oddities
+        .iter()
+        .any(|sentence| words.iter().all(|word| sentence.contains(word)))
 }
 
 #[track_caller]
 fn assert_says(report: &Report, words: &[&str]) {
-    assert!(says(report, words), "nothing of {words:?} in {:#?}", report.oddities);
+    assert!(
+        says(report, words),
+        "nothing of {words:?} in {:#?}",
+        report.oddities
+    );
 }
 
 #[test]
 fn radiate_names_its_stalls_its_stamps_and_its_images() {
-    let Some(report) = report("radiate-2019-02-12", None) else { return };
+    let Some(report) = report("radiate-2019-02-12", None) else {
+        return;
+    };
     let timing = report.timing.as_ref().unwrap();
     assert_eq!((report.scans, report.scans_read), (466, 466));
     assert_eq!(timing.stalls.len(), 7, "{:?}", timing.stalls);
     let worst = timing.stalls.iter().map(|s| s.late_s).fold(0.0, f64::max);
     assert!((1.3..1.5).contains(&worst), "{worst}");
     assert_eq!(timing.missing_scans, 0);
-    assert!((timing.period_s - 0.25002).abs() < 1e-5, "{}", timing.period_s);
+    assert!(
+        (timing.period_s - 0.25002).abs() < 1e-5,
+        "{}",
+        timing.period_s
+    );
     assert_says(&report, &["stalled 7 times"]);
     assert_says(&report, &["without leading zeros"]);
     assert_says(&report, &["on their side", "576"]);
@@ -41,15 +54,28 @@ fn radiate_names_its_stalls_its_stamps_and_its_images() {
 
 #[test]
 fn a_late_truth_is_found_once_a_trajectory_is_given() {
-    let Some(root) = real("radiate-2019-02-12") else { return };
+    let Some(root) = real("radiate-2019-02-12") else {
+        return;
+    };
     let truth = read_trajectory(&root.join("ground_truth.tum")).unwrap();
     // Something like an odometry result: every fifth pose, 4 Hz.
     let every = |n: usize| Trajectory {
-        stamp_ns: truth.stamp_ns.as_ref().map(|s| s.iter().step_by(n).copied().collect()),
+        stamp_ns: truth
+            .stamp_ns
+            .as_ref()
+            .map(|s| s.iter().step_by(n).copied().collect()),
         poses: truth.poses.iter().step_by(n).copied().collect(),
     };
     let report = report("radiate-2019-02-12", Some(&every(5))).unwrap();
-    let clock = |name: &str| report.truths.iter().find(|t| t.file.ends_with(name)).unwrap().clock.unwrap();
+    let clock = |name: &str| {
+        report
+            .truths
+            .iter()
+            .find(|t| t.file.ends_with(name))
+            .unwrap()
+            .clock
+            .unwrap()
+    };
     assert!(clock("ground_truth.tum").agrees());
     let late = clock("gnss_as_logged.tum");
     assert!((1.4..1.7).contains(&late.late_s), "{late:?}");
@@ -59,18 +85,28 @@ fn a_late_truth_is_found_once_a_trajectory_is_given() {
 
 #[test]
 fn tiny_foggy_has_no_truth_and_no_stall() {
-    let Some(report) = report("radiate-tiny_foggy", None) else { return };
-    assert_eq!((report.scans, report.timing.as_ref().unwrap().stalls.len()), (18, 0));
+    let Some(report) = report("radiate-tiny_foggy", None) else {
+        return;
+    };
+    assert_eq!(
+        (report.scans, report.timing.as_ref().unwrap().stalls.len()),
+        (18, 0)
+    );
     assert_says(&report, &["on their side"]);
     assert_says(&report, &["No ground truth"]);
 }
 
 #[test]
 fn oxford_names_its_resolution_and_its_bursts() {
-    let Some(report) = report("oxford-2019-01-10-14-36-48", None) else { return };
+    let Some(report) = report("oxford-2019-01-10-14-36-48", None) else {
+        return;
+    };
     assert_says(&report, &["0.0438 m", "0.0432"]);
     assert_says(&report, &["bursts"]);
-    assert_eq!((report.rows.rows, report.rows.not_measured, report.rows.lost), (4400, 0, 0));
+    assert_eq!(
+        (report.rows.rows, report.rows.not_measured, report.rows.lost),
+        (4400, 0, 0)
+    );
     assert!((report.rows.first_azimuth_deg.0 - 0.836).abs() < 1e-3);
     let truth = &report.truths[0];
     assert_eq!((truth.poses, truth.scans_covered), (11, Some(11)));
@@ -79,12 +115,20 @@ fn oxford_names_its_resolution_and_its_bursts() {
 
 #[test]
 fn boreas_rt_and_fomo_say_what_they_are() {
-    let Some(rt) = report("samples/boreas-rt-2024-12-03", None) else { return };
-    assert_eq!((rt.format.name(), rt.rows.chirps, rt.rows.not_measured), ("boreas-rt", Chirps::Alternating, 0));
+    let Some(rt) = report("samples/boreas-rt-2024-12-03", None) else {
+        return;
+    };
+    assert_eq!(
+        (rt.format.name(), rt.rows.chirps, rt.rows.not_measured),
+        ("boreas-rt", Chirps::Alternating, 0)
+    );
     assert_says(&rt, &["Byte 10 alternates", "chirp"]);
     assert_says(&rt, &["one scan only"]);
     let fomo = report("samples/fomo-2025-10-14", None).unwrap();
-    assert_eq!((fomo.format.name(), fomo.rows.chirps, fomo.rows.not_measured), ("fomo", Chirps::Unknown, 0));
+    assert_eq!(
+        (fomo.format.name(), fomo.rows.chirps, fomo.rows.not_measured),
+        ("fomo", Chirps::Unknown, 0)
+    );
     assert_says(&fomo, &["one scan only"]);
     assert_says(&fomo, &["Byte 10 is 0"]);
     assert_says(&fomo, &["gt.txt", "positions only"]);
@@ -113,7 +157,10 @@ fn gaps_lost_rows_and_damaged_files_are_counted() {
     common::write_png(&files[9], sweep.width(), sweep.rows, &pixels);
     let report = inspect(root.path(), &DatasetOptions::default(), None).unwrap();
     let timing = report.timing.as_ref().unwrap();
-    assert_eq!((report.scans, timing.missing_scans, timing.gaps[0].scan), (11, 1, 4));
+    assert_eq!(
+        (report.scans, timing.missing_scans, timing.gaps[0].scan),
+        (11, 1, 4)
+    );
     assert_eq!((report.unreadable.len(), report.unreadable[0].scan), (1, 6));
     assert_eq!((report.rows.not_measured, report.rows.lost), (4, 1));
     assert_says(&report, &["1 scan is missing, before scans 4"]);
@@ -128,6 +175,15 @@ fn an_untroubled_dataset_has_little_to_tell() {
     write_radiate(root.path(), 9);
     let report = inspect(root.path(), &DatasetOptions::default(), None).unwrap();
     let timing = report.timing.as_ref().unwrap();
-    assert_eq!((timing.stalls.len(), timing.gaps.len(), timing.backwards.len()), (0, 0, 0));
-    assert!(!says(&report, &["stalled"]) && !says(&report, &["lost"]) && report.unreadable.is_empty());
+    assert_eq!(
+        (
+            timing.stalls.len(),
+            timing.gaps.len(),
+            timing.backwards.len()
+        ),
+        (0, 0, 0)
+    );
+    assert!(
+        !says(&report, &["stalled"]) && !says(&report, &["lost"]) && report.unreadable.is_empty()
+    );
 }

@@ -16,8 +16,9 @@ fn opened(folder: &str) -> Option<Box<dyn Dataset>> {
 
 /// The image by another way: the whole of it, as the decoder gives it.
 fn decoded(path: &Path) -> (usize, usize, Vec<u8>) {
-    let mut reader =
-        png::Decoder::new(std::io::BufReader::new(std::fs::File::open(path).unwrap())).read_info().unwrap();
+    let mut reader = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(path).unwrap()))
+        .read_info()
+        .unwrap();
     let (width, height) = (reader.info().width as usize, reader.info().height as usize);
     let mut pixels = vec![0; width * height];
     reader.next_frame(&mut pixels).unwrap();
@@ -30,13 +31,20 @@ fn assert_sweep(scan: &OwnedScan) {
     assert!(view.azimuth_rad.iter().all(|a| (0.0..TAU).contains(a)));
     assert!(view.azimuth_rad.windows(2).all(|w| w[0] < w[1]));
     assert!(view.stamp_ns.windows(2).all(|w| w[0] < w[1]));
-    assert!(view.stamp_ns[0] < view.geometry.stamp_ns && view.geometry.stamp_ns < view.stamp_ns[399]);
+    assert!(
+        view.stamp_ns[0] < view.geometry.stamp_ns && view.geometry.stamp_ns < view.stamp_ns[399]
+    );
 }
 
 #[test]
 fn oxford_scans_decode_in_place_with_true_azimuths() {
-    let Some(mut oxford) = opened("oxford-2019-01-10-14-36-48") else { return };
-    assert_eq!((oxford.format(), oxford.len(), oxford.limits().azimuths), (Format::Oxford, 11, 400));
+    let Some(mut oxford) = opened("oxford-2019-01-10-14-36-48") else {
+        return;
+    };
+    assert_eq!(
+        (oxford.format(), oxford.len(), oxford.limits().azimuths),
+        (Format::Oxford, 11, 400)
+    );
     for index in 0..oxford.len() {
         let scan = read(oxford.as_mut(), index).unwrap();
         assert_sweep(&scan);
@@ -46,37 +54,72 @@ fn oxford_scans_decode_in_place_with_true_azimuths() {
         assert!((scan.azimuth_rad[0] - 13.0 / 5600.0 * TAU).abs() < 1e-6);
         assert!((scan.azimuth_rad[399] - 5599.0 / 5600.0 * TAU).abs() < 1e-6);
         assert!(scan.flags.iter().all(|f| *f == flag::MEASURED));
-        assert_eq!((scan.geometry.range_resolution_m, scan.geometry.bins), (0.0438, 3768));
+        assert_eq!(
+            (scan.geometry.range_resolution_m, scan.geometry.bins),
+            (0.0438, 3768)
+        );
     }
 }
 
 #[test]
 fn oxford_scan_times_are_the_ground_truths() {
-    let Some(mut oxford) = opened("oxford-2019-01-10-14-36-48") else { return };
+    let Some(mut oxford) = opened("oxford-2019-01-10-14-36-48") else {
+        return;
+    };
     let root = real("oxford-2019-01-10-14-36-48").unwrap();
-    let truth = read_trajectory(&root.join("gt/radar_odometry.csv")).unwrap().stamp_ns.unwrap();
+    let truth = read_trajectory(&root.join("gt/radar_odometry.csv"))
+        .unwrap()
+        .stamp_ns
+        .unwrap();
     for (index, truth) in truth.iter().enumerate() {
         let stamp = read(oxford.as_mut(), index).unwrap().geometry.stamp_ns;
-        assert!((stamp - truth).abs() <= 1_000, "scan {index}: {stamp} and {truth}");
+        assert!(
+            (stamp - truth).abs() <= 1_000,
+            "scan {index}: {stamp} and {truth}"
+        );
         let nominal = oxford.nominal_stamp_ns(index).unwrap();
-        assert!((nominal - stamp).abs() < 5_000_000, "scan {index}: {nominal} and {stamp}");
+        assert!(
+            (nominal - stamp).abs() < 5_000_000,
+            "scan {index}: {nominal} and {stamp}"
+        );
     }
 }
 
 #[test]
 fn oxford_row_stamps_are_smooth_and_keep_to_the_sweep() {
-    let Some(mut oxford) = opened("oxford-2019-01-10-14-36-48") else { return };
+    let Some(mut oxford) = opened("oxford-2019-01-10-14-36-48") else {
+        return;
+    };
     let scan = read(oxford.as_mut(), 0).unwrap();
     let intervals: Vec<i64> = scan.stamp_ns.windows(2).map(|w| w[1] - w[0]).collect();
-    assert!(intervals.iter().all(|i| (600_000..660_000).contains(i)), "{intervals:?}");
-    let name: i64 = oxford.file(0).file_stem().unwrap().to_str().unwrap().parse().unwrap();
-    assert!((scan.stamp_ns[0] - name * 1000).abs() < 8_000_000, "{}", scan.stamp_ns[0] - name * 1000);
+    assert!(
+        intervals.iter().all(|i| (600_000..660_000).contains(i)),
+        "{intervals:?}"
+    );
+    let name: i64 = oxford
+        .file(0)
+        .file_stem()
+        .unwrap()
+        .to_str()
+        .unwrap()
+        .parse()
+        .unwrap();
+    assert!(
+        (scan.stamp_ns[0] - name * 1000).abs() < 8_000_000,
+        "{}",
+        scan.stamp_ns[0] - name * 1000
+    );
 }
 
 #[test]
 fn radiate_images_are_turned_and_its_clock_is_even() {
-    let Some(mut radiate) = opened("radiate-2019-02-12") else { return };
-    assert_eq!((radiate.format(), radiate.len(), radiate.on_their_side()), (Format::Radiate, 466, true));
+    let Some(mut radiate) = opened("radiate-2019-02-12") else {
+        return;
+    };
+    assert_eq!(
+        (radiate.format(), radiate.len(), radiate.on_their_side()),
+        (Format::Radiate, 466, true)
+    );
     let mut stamps = Vec::new();
     for index in [0, 100, 330, 465] {
         let scan = read(radiate.as_mut(), index).unwrap();
@@ -88,21 +131,29 @@ fn radiate_images_are_turned_and_its_clock_is_even() {
             assert_eq!(scan.view().row(azimuth), &column[..]);
         }
         assert_eq!(scan.geometry.range_resolution_m, 100.0 / 576.0);
-        assert_eq!(radiate.nominal_stamp_ns(index), Some(scan.geometry.stamp_ns));
+        assert_eq!(
+            radiate.nominal_stamp_ns(index),
+            Some(scan.geometry.stamp_ns)
+        );
         stamps.push((index as f64, scan.geometry.stamp_ns));
     }
     // The yardstick's clock: 1549986607.7092834 s + k * 0.25002 s, and the mean of 400 columns.
     for (index, stamp) in stamps {
         let yardstick = 0.7092834 + index * 0.25002 + 0.25002 * 399.0 / 800.0;
         let found = (stamp - 1_549_986_607_000_000_000) as f64 * 1e-9;
-        assert!((found - yardstick).abs() < 2e-3, "scan {index}: {found} and {yardstick}");
+        assert!(
+            (found - yardstick).abs() < 2e-3,
+            "scan {index}: {found} and {yardstick}"
+        );
     }
 }
 
 #[test]
 fn no_radiate_scan_is_received_before_its_sweep_starts() {
     for folder in ["radiate-2019-02-12", "radiate-tiny_foggy"] {
-        let Some(mut radiate) = opened(folder) else { return };
+        let Some(mut radiate) = opened(folder) else {
+            return;
+        };
         let mut touching = 0;
         for index in 0..radiate.len() {
             let start = read(radiate.as_mut(), index).unwrap().stamp_ns[0];
@@ -116,28 +167,63 @@ fn no_radiate_scan_is_received_before_its_sweep_starts() {
 
 #[test]
 fn boreas_rt_is_told_by_its_chirps() {
-    let Some(mut scans) = opened("samples/boreas-rt-2024-12-03") else { return };
-    assert_eq!((scans.format(), scans.len(), scans.nominal_stamp_ns(0)), (Format::BoreasRt, 1, None));
+    let Some(mut scans) = opened("samples/boreas-rt-2024-12-03") else {
+        return;
+    };
+    assert_eq!(
+        (scans.format(), scans.len(), scans.nominal_stamp_ns(0)),
+        (Format::BoreasRt, 1, None)
+    );
     let scan = read(scans.as_mut(), 0).unwrap();
     assert_sweep(&scan);
-    assert_eq!((scan.geometry.range_resolution_m, scan.geometry.range_offset_m), (0.04381, -0.31));
-    assert_eq!((scan.geometry.bins, scan.geometry.stamp_ns), (6848, scan.stamp_ns[199]));
+    assert_eq!(
+        (
+            scan.geometry.range_resolution_m,
+            scan.geometry.range_offset_m
+        ),
+        (0.04381, -0.31)
+    );
+    assert_eq!(
+        (scan.geometry.bins, scan.geometry.stamp_ns),
+        (6848, scan.stamp_ns[199])
+    );
     let up = flag::MEASURED | flag::CHIRP_KNOWN | flag::CHIRP_UP;
     for (row, flags) in scan.flags.iter().enumerate() {
-        assert_eq!(*flags, if row % 2 == 1 { up } else { flag::MEASURED | flag::CHIRP_KNOWN });
+        assert_eq!(
+            *flags,
+            if row % 2 == 1 {
+                up
+            } else {
+                flag::MEASURED | flag::CHIRP_KNOWN
+            }
+        );
     }
     assert!((scan.azimuth_rad[0] - 7.0 / 5600.0 * TAU).abs() < 1e-6);
 }
 
 #[test]
 fn fomo_is_told_by_its_name_and_keeps_all_rows() {
-    let Some(mut scans) = opened("samples/fomo-2025-10-14") else { return };
-    assert_eq!((scans.format(), scans.len(), scans.encoder_counts()), (Format::Fomo, 1, Some(5595)));
+    let Some(mut scans) = opened("samples/fomo-2025-10-14") else {
+        return;
+    };
+    assert_eq!(
+        (scans.format(), scans.len(), scans.encoder_counts()),
+        (Format::Fomo, 1, Some(5595))
+    );
     let scan = read(scans.as_mut(), 0).unwrap();
     assert_sweep(&scan);
     assert!(scan.flags.iter().all(|f| *f == flag::MEASURED));
-    assert_eq!((scan.geometry.range_resolution_m, scan.geometry.range_offset_m), (0.0438, 0.0));
+    assert_eq!(
+        (
+            scan.geometry.range_resolution_m,
+            scan.geometry.range_offset_m
+        ),
+        (0.0438, 0.0)
+    );
     assert!((scan.azimuth_rad[0] - 7.0 / 5595.0 * TAU).abs() < 1e-6);
     let nominal = scans.nominal_stamp_ns(0).unwrap();
-    assert!((nominal - scan.geometry.stamp_ns).abs() < 1_000_000, "{nominal}");
+    assert!(
+        (nominal - scan.geometry.stamp_ns).abs() < 1_000_000,
+        "{nominal}"
+    );
 }

@@ -6,7 +6,9 @@ mod common;
 use std::fs;
 
 use common::real;
-use gyre_radar::{Trajectory, TrajectoryError, find_ground_truth, read_trajectory, write_kitti, write_tum};
+use gyre_radar::{
+    Trajectory, TrajectoryError, find_ground_truth, read_trajectory, write_kitti, write_tum,
+};
 use nalgebra::{Isometry2, Vector2};
 use proptest::prelude::*;
 
@@ -17,40 +19,70 @@ fn from_text(name: &str, text: &str) -> Result<Trajectory, TrajectoryError> {
     read_trajectory(&path)
 }
 
-const HEADER: &str =
-    "source_timestamp,destination_timestamp,x,y,z,roll,pitch,yaw,source_radar_timestamp,destination_radar_timestamp\n";
+const HEADER: &str = "source_timestamp,destination_timestamp,x,y,z,roll,pitch,yaw,source_radar_timestamp,destination_radar_timestamp\n";
 
 fn row(from: i64, to: i64, x: f64, y: f64, yaw: f64) -> String {
     let us = |t: i64| 1_547_131_046_000_000 + t;
-    format!("{},{},{x},{y},0,0,0,{yaw},{},{}\n", us(to), us(from), us(to), us(from))
+    format!(
+        "{},{},{x},{y},0,0,0,{yaw},{},{}\n",
+        us(to),
+        us(from),
+        us(to),
+        us(from)
+    )
 }
 
 #[test]
 fn oxford_motions_turn_to_rep_103_and_chain_from_identity() {
     // Ahead by 2 m turning right by 90 degrees, then 1 m ahead and 0.5 m to the right. The rows' order does not matter.
     let quarter = std::f64::consts::FRAC_PI_2;
-    let text = [HEADER, &row(250, 500, 1.0, 0.5, 0.0), &row(0, 250, 2.0, 0.0, quarter)].concat();
+    let text = [
+        HEADER,
+        &row(250, 500, 1.0, 0.5, 0.0),
+        &row(0, 250, 2.0, 0.0, quarter),
+    ]
+    .concat();
     let trajectory = from_text("radar_odometry.csv", &text).unwrap();
-    assert_eq!(trajectory.stamp_ns.as_deref().unwrap()[2] - trajectory.stamp_ns.as_deref().unwrap()[0], 500_000);
+    assert_eq!(
+        trajectory.stamp_ns.as_deref().unwrap()[2] - trajectory.stamp_ns.as_deref().unwrap()[0],
+        500_000
+    );
     assert_eq!(trajectory.poses[0], Isometry2::identity());
     assert!((trajectory.poses[1].rotation.angle() + quarter).abs() < 1e-12);
     let last = trajectory.poses[2].translation;
-    assert!((last.x - 1.5).abs() < 1e-12 && (last.y + 1.0).abs() < 1e-12, "{last}");
+    assert!(
+        (last.x - 1.5).abs() < 1e-12 && (last.y + 1.0).abs() < 1e-12,
+        "{last}"
+    );
 }
 
 #[test]
 fn a_gap_in_oxford_motions_is_an_error_with_its_line() {
-    let text = [HEADER, &row(0, 250, 2.0, 0.0, 0.0), &row(500, 750, 1.0, 0.5, 0.0)].concat();
-    let error = from_text("radar_odometry.csv", &text).unwrap_err().to_string();
+    let text = [
+        HEADER,
+        &row(0, 250, 2.0, 0.0, 0.0),
+        &row(500, 750, 1.0, 0.5, 0.0),
+    ]
+    .concat();
+    let error = from_text("radar_odometry.csv", &text)
+        .unwrap_err()
+        .to_string();
     assert!(error.contains("line 3") && error.contains("gap"), "{error}");
 }
 
 #[test]
 fn the_oxford_drive_is_nine_kilometres_and_comes_back() {
-    let Some(root) = real("trajectories") else { return };
-    let trajectory = read_trajectory(&root.join("oxford-2019-01-10-11-46-21.radar_odometry.csv")).unwrap();
+    let Some(root) = real("trajectories") else {
+        return;
+    };
+    let trajectory =
+        read_trajectory(&root.join("oxford-2019-01-10-11-46-21.radar_odometry.csv")).unwrap();
     assert_eq!(trajectory.len(), 8866);
-    assert!((8_900.0..9_200.0).contains(&trajectory.path_length_m()), "{}", trajectory.path_length_m());
+    assert!(
+        (8_900.0..9_200.0).contains(&trajectory.path_length_m()),
+        "{}",
+        trajectory.path_length_m()
+    );
     let golden = read_trajectory(&real("golden/csv-chain").unwrap().join("estimate.txt")).unwrap();
     // The estimate is that of an odometry with y as it lies in its file: the paths' lengths agree, whatever the hand.
     let ratio = golden.path_length_m() / trajectory.path_length_m();
@@ -59,8 +91,11 @@ fn the_oxford_drive_is_nine_kilometres_and_comes_back() {
 
 #[test]
 fn boreas_headings_follow_the_course_over_ground() {
-    let Some(root) = real("trajectories") else { return };
-    let trajectory = read_trajectory(&root.join("boreas-2021-09-02-11-42-radar_poses.csv")).unwrap();
+    let Some(root) = real("trajectories") else {
+        return;
+    };
+    let trajectory =
+        read_trajectory(&root.join("boreas-2021-09-02-11-42-radar_poses.csv")).unwrap();
     assert_eq!(trajectory.len(), 4134);
     let mut slips: Vec<f64> = trajectory
         .poses
@@ -78,13 +113,26 @@ fn boreas_headings_follow_the_course_over_ground() {
 
 #[test]
 fn real_kitti_and_tum_files_are_read() {
-    let Some(root) = real("golden/kitti-metric") else { return };
+    let Some(root) = real("golden/kitti-metric") else {
+        return;
+    };
     for name in ["estimate.txt", "ground_truth.txt"] {
         let trajectory = read_trajectory(&root.join(name)).unwrap();
-        assert_eq!((trajectory.len(), trajectory.stamp_ns.is_none(), trajectory.has_heading()), (4470, true, true));
+        assert_eq!(
+            (
+                trajectory.len(),
+                trajectory.stamp_ns.is_none(),
+                trajectory.has_heading()
+            ),
+            (4470, true, true)
+        );
     }
-    let radiate = read_trajectory(&real("radiate-2019-02-12").unwrap().join("ground_truth.tum")).unwrap();
-    assert_eq!((radiate.len(), radiate.span_ns().unwrap().0), (2362, 1_549_986_606_800_100_000));
+    let radiate =
+        read_trajectory(&real("radiate-2019-02-12").unwrap().join("ground_truth.tum")).unwrap();
+    assert_eq!(
+        (radiate.len(), radiate.span_ns().unwrap().0),
+        (2362, 1_549_986_606_800_100_000)
+    );
     assert!((radiate.poses[0].rotation.angle() - 2.0 * (-0.076_197_180_f64).asin()).abs() < 1e-6);
     let fomo = read_trajectory(&real("samples/fomo-2025-10-14").unwrap().join("gt.txt")).unwrap();
     assert!(!fomo.has_heading() && fomo.len() == 1692);
@@ -106,9 +154,21 @@ fn boreas_odometry_files_are_inverted_and_mirrored() {
     let later = Isometry2::new(Vector2::new(2.0, 0.3), 0.1);
     let m = later.inverse().to_homogeneous();
     let line = |t: i64, m: &nalgebra::Matrix3<f64>| {
-        format!("{t} {} {} 0 {} {} {} 0 {} 0 0 1 0\n", m[(0, 0)], m[(0, 1)], m[(0, 2)], m[(1, 0)], m[(1, 1)], m[(1, 2)])
+        format!(
+            "{t} {} {} 0 {} {} {} 0 {} 0 0 1 0\n",
+            m[(0, 0)],
+            m[(0, 1)],
+            m[(0, 2)],
+            m[(1, 0)],
+            m[(1, 1)],
+            m[(1, 2)]
+        )
     };
-    let text = [line(1_630_597_331_060_160, &nalgebra::Matrix3::identity()), line(1_630_597_331_310_779, &m)].concat();
+    let text = [
+        line(1_630_597_331_060_160, &nalgebra::Matrix3::identity()),
+        line(1_630_597_331_310_779, &m),
+    ]
+    .concat();
     let trajectory = from_text("boreas.txt", &text).unwrap();
     let pose = trajectory.poses[1];
     assert!((pose.translation.x - 2.0).abs() < 1e-12 && (pose.translation.y + 0.3).abs() < 1e-12);
@@ -133,13 +193,21 @@ fn bad_files_are_refused_with_their_line() {
         let error = from_text("a.txt", text).unwrap_err().to_string();
         assert!(error.contains(words), "{text:?}: {error}");
     }
-    assert!(matches!(read_trajectory("/nonexistent/a.tum".as_ref()), Err(TrajectoryError::Io { .. })));
+    assert!(matches!(
+        read_trajectory("/nonexistent/a.tum".as_ref()),
+        Err(TrajectoryError::Io { .. })
+    ));
 }
 
 #[test]
 fn ground_truth_is_found_where_each_dataset_keeps_it() {
-    for place in ["ground_truth.tum", "gt/radar_odometry.csv", "applanix/radar_poses.csv", "global_pose.csv", "gt.txt"]
-    {
+    for place in [
+        "ground_truth.tum",
+        "gt/radar_odometry.csv",
+        "applanix/radar_poses.csv",
+        "global_pose.csv",
+        "gt.txt",
+    ] {
         let root = tempfile::tempdir().unwrap();
         assert_eq!(find_ground_truth(root.path()), None);
         let path = root.path().join(place);
@@ -155,11 +223,16 @@ fn trajectory() -> impl Strategy<Value = Trajectory> {
     let pose = (0_i64..1_000_000_000, -1e4..1e4, -1e4..1e4, -3.1..3.1);
     prop::collection::vec(pose, 1..20).prop_map(|steps| {
         let mut stamp = 1_549_986_607_000_000_000;
-        let mut trajectory = Trajectory { stamp_ns: Some(Vec::new()), poses: Vec::new() };
+        let mut trajectory = Trajectory {
+            stamp_ns: Some(Vec::new()),
+            poses: Vec::new(),
+        };
         for (step, x, y, yaw) in steps {
             stamp += step;
             trajectory.stamp_ns.get_or_insert_default().push(stamp);
-            trajectory.poses.push(Isometry2::new(Vector2::new(x, y), yaw));
+            trajectory
+                .poses
+                .push(Isometry2::new(Vector2::new(x, y), yaw));
         }
         trajectory
     })
@@ -169,7 +242,10 @@ fn assert_close(a: &Trajectory, b: &Trajectory) {
     assert_eq!(a.len(), b.len());
     for (a, b) in a.poses.iter().zip(&b.poses) {
         let apart = a.inverse() * b;
-        assert!((a.translation.vector - b.translation.vector).norm() < 1e-5 && apart.rotation.angle().abs() < 1e-9);
+        assert!(
+            (a.translation.vector - b.translation.vector).norm() < 1e-5
+                && apart.rotation.angle().abs() < 1e-9
+        );
     }
 }
 

@@ -9,7 +9,10 @@ use std::path::Path;
 
 use common::{PERIOD_US, START_US, Sweep, read, write_oxford, write_png, write_radiate};
 use gyre_radar::scan::flag;
-use gyre_radar::{AzimuthSource, Dataset, DatasetOptions, Format, OpenError, OwnedScan, ReadError, ScanLimits, open};
+use gyre_radar::{
+    AzimuthSource, Dataset, DatasetOptions, Format, OpenError, OwnedScan, ReadError, ScanLimits,
+    open,
+};
 use tempfile::TempDir;
 
 fn folder() -> TempDir {
@@ -36,10 +39,19 @@ fn written_powers_come_back() {
     assert_eq!((dataset.format(), dataset.len()), (Format::Oxford, 3));
     let scan = read(dataset.as_mut(), 2).unwrap();
     for row in 0..40 {
-        assert!(scan.view().row(row).iter().enumerate().all(|(bin, p)| *p == Sweep::power(row, bin)));
+        assert!(
+            scan.view()
+                .row(row)
+                .iter()
+                .enumerate()
+                .all(|(bin, p)| *p == Sweep::power(row, bin))
+        );
         assert!((scan.azimuth_rad[row] - (13 + 140 * row) as f32 / 5600.0 * TAU).abs() < 1e-6);
     }
-    assert_eq!(scan.geometry.stamp_ns, (START_US + 2 * PERIOD_US + 39 * PERIOD_US / 40 / 2) * 1000);
+    assert_eq!(
+        scan.geometry.stamp_ns,
+        (START_US + 2 * PERIOD_US + 39 * PERIOD_US / 40 / 2) * 1000
+    );
 }
 
 #[test]
@@ -71,7 +83,10 @@ fn a_radar_of_another_encoder_and_period_is_read_with_options_alone() {
     assert!((scan.view().range_m(161.0) - 99.9).abs() < 1e-3);
     assert!((scan.azimuth_rad[90] - 0.75 * TAU).abs() < 1e-6);
     assert!((scan.geometry.stamp_ns - dataset.nominal_stamp_ns(1).unwrap()).abs() < 1_000_000);
-    assert_eq!(scan.geometry.stamp_ns / 1000, START_US + turn_us + 119 * (turn_us / 120) / 2);
+    assert_eq!(
+        scan.geometry.stamp_ns / 1000,
+        START_US + turn_us + 119 * (turn_us / 120) / 2
+    );
 }
 
 #[test]
@@ -80,9 +95,22 @@ fn sideways_powers_come_back_turned() {
     write_radiate(root.path(), 4);
     let mut dataset = opened(root.path());
     let scan = read(dataset.as_mut(), 3).unwrap();
-    assert_eq!((scan.geometry.azimuths, scan.geometry.bins, scan.geometry.range_resolution_m), (40, 60, 100.0 / 60.0));
+    assert_eq!(
+        (
+            scan.geometry.azimuths,
+            scan.geometry.bins,
+            scan.geometry.range_resolution_m
+        ),
+        (40, 60, 100.0 / 60.0)
+    );
     for azimuth in 0..40 {
-        assert!(scan.view().row(azimuth).iter().enumerate().all(|(bin, p)| *p == Sweep::power(azimuth, bin)));
+        assert!(
+            scan.view()
+                .row(azimuth)
+                .iter()
+                .enumerate()
+                .all(|(bin, p)| *p == Sweep::power(azimuth, bin))
+        );
     }
     assert_eq!(scan.stamp_ns[0], 1_549_986_607_003_000_000 + 750_000_000);
 }
@@ -94,18 +122,35 @@ fn a_damaged_image_in_the_middle_leaves_the_others_readable() {
     let whole = fs::read(&files[1]).unwrap();
     fs::write(&files[1], &whole[..whole.len() / 2]).unwrap();
     write_png(&files[2], 40, 71, &[0; 40 * 71]);
-    Sweep { rows: 39, ..Sweep::default() }.write(&files[3]);
+    Sweep {
+        rows: 39,
+        ..Sweep::default()
+    }
+    .write(&files[3]);
     fs::write(&files[4], b"not a picture").unwrap();
     fs::write(&files[5], b"").unwrap();
     let mut dataset = opened(root.path());
     let mut error = |index| read(dataset.as_mut(), index).err();
     assert!(matches!(error(1), Some(ReadError::Truncated { .. })));
     let (turned, short) = (error(2).unwrap().to_string(), error(3).unwrap().to_string());
-    assert!(turned.contains("40 columns x 71 rows") && turned.ends_with("it lies rotated by 90 degrees"), "{turned}");
-    assert!(short.ends_with("first image is 71 columns x 40 rows"), "{short}");
+    assert!(
+        turned.contains("40 columns x 71 rows")
+            && turned.ends_with("it lies rotated by 90 degrees"),
+        "{turned}"
+    );
+    assert!(
+        short.ends_with("first image is 71 columns x 40 rows"),
+        "{short}"
+    );
     assert!(matches!(error(4), Some(ReadError::NotPng { .. })));
-    assert!(matches!(error(5), Some(ReadError::Truncated { bytes: 0, .. })));
-    assert!(matches!(error(7), Some(ReadError::NoSuchScan { index: 7, len: 7 })));
+    assert!(matches!(
+        error(5),
+        Some(ReadError::Truncated { bytes: 0, .. })
+    ));
+    assert!(matches!(
+        error(7),
+        Some(ReadError::NoSuchScan { index: 7, len: 7 })
+    ));
     assert!(error(0).is_none() && error(6).is_none());
 }
 
@@ -118,7 +163,11 @@ fn every_cut_of_an_image_gives_an_error_and_no_panic() {
     let mut scan = OwnedScan::with_limits(dataset.limits());
     for length in (0..whole.len() - 12).step_by(7) {
         fs::write(&files[1], &whole[..length]).unwrap();
-        assert!(dataset.read(1, scan.slot()).is_err(), "{length} of {} bytes", whole.len());
+        assert!(
+            dataset.read(1, scan.slot()).is_err(),
+            "{length} of {} bytes",
+            whole.len()
+        );
     }
     for place in 0..whole.len() {
         let mut damaged = whole.clone();
@@ -135,7 +184,11 @@ fn other_pixels_than_grey_bytes_are_refused() {
     let file = fs::File::create(&files[1]).unwrap();
     let mut encoder = png::Encoder::new(file, 71, 40);
     encoder.set_color(png::ColorType::Rgb);
-    encoder.write_header().unwrap().write_image_data(&[0; 71 * 40 * 3]).unwrap();
+    encoder
+        .write_header()
+        .unwrap()
+        .write_image_data(&[0; 71 * 40 * 3])
+        .unwrap();
     let error = read(opened(root.path()).as_mut(), 1).unwrap_err();
     assert!(error.to_string().contains("8-bit colour"), "{error}");
 }
@@ -147,7 +200,10 @@ fn a_header_that_promises_too_much_takes_no_memory() {
     let mut bytes = fs::read(&files[0]).unwrap();
     bytes[16..24].copy_from_slice(&[0x7f, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff]);
     fs::write(&files[0], bytes).unwrap();
-    assert!(matches!(refused(root.path()), OpenError::FirstImage(ReadError::TooLarge { .. })));
+    assert!(matches!(
+        refused(root.path()),
+        OpenError::FirstImage(ReadError::TooLarge { .. })
+    ));
 }
 
 #[test]
@@ -158,11 +214,24 @@ fn a_slot_that_is_too_small_is_refused() {
     for path in [root.path().to_owned(), root.path().join("sideways")] {
         let mut dataset = opened(&path);
         let limits = dataset.limits();
-        for small in
-            [ScanLimits { bytes: limits.bytes - 1, ..limits }, ScanLimits { azimuths: limits.azimuths - 1, ..limits }]
-        {
+        for small in [
+            ScanLimits {
+                bytes: limits.bytes - 1,
+                ..limits
+            },
+            ScanLimits {
+                azimuths: limits.azimuths - 1,
+                ..limits
+            },
+        ] {
             let mut scan = OwnedScan::with_limits(small);
-            assert!(matches!(dataset.read(0, scan.slot()), Err(ReadError::SlotTooSmall { .. })), "{small:?}");
+            assert!(
+                matches!(
+                    dataset.read(0, scan.slot()),
+                    Err(ReadError::SlotTooSmall { .. })
+                ),
+                "{small:?}"
+            );
         }
     }
 }
@@ -170,11 +239,41 @@ fn a_slot_that_is_too_small_is_refused() {
 #[test]
 fn rows_that_are_no_sweep_are_refused() {
     let cases: [(Sweep, &str); 5] = [
-        (Sweep { step: 0, ..Sweep::default() }, "azimuth does not grow"),
-        (Sweep { step: 5500, ..Sweep::default() }, "azimuth does not grow"),
-        (Sweep { start: 1_000, ..Sweep::default() }, "years 2015 to 2040"),
-        (Sweep { start: 2_300_000_000_000_000, ..Sweep::default() }, "years 2015 to 2040"),
-        (Sweep { row_interval: 10_000_000, ..Sweep::default() }, "not one sweep"),
+        (
+            Sweep {
+                step: 0,
+                ..Sweep::default()
+            },
+            "azimuth does not grow",
+        ),
+        (
+            Sweep {
+                step: 5500,
+                ..Sweep::default()
+            },
+            "azimuth does not grow",
+        ),
+        (
+            Sweep {
+                start: 1_000,
+                ..Sweep::default()
+            },
+            "years 2015 to 2040",
+        ),
+        (
+            Sweep {
+                start: 2_300_000_000_000_000,
+                ..Sweep::default()
+            },
+            "years 2015 to 2040",
+        ),
+        (
+            Sweep {
+                row_interval: 10_000_000,
+                ..Sweep::default()
+            },
+            "not one sweep",
+        ),
     ];
     for (sweep, words) in cases {
         let root = folder();
@@ -196,11 +295,28 @@ fn an_encoder_of_another_size_is_named_and_can_be_set() {
     }
     write_png(&files[0], sweep.width(), 40, &pixels);
     let error = first_scan(root.path()).unwrap_err();
-    assert!(matches!(error, ReadError::EncoderCount { row: 14, count: 5740, counts: 5600, .. }), "{error}");
-    let options = DatasetOptions { encoder_counts: Some(16400), ..DatasetOptions::default() };
+    assert!(
+        matches!(
+            error,
+            ReadError::EncoderCount {
+                row: 14,
+                count: 5740,
+                counts: 5600,
+                ..
+            }
+        ),
+        "{error}"
+    );
+    let options = DatasetOptions {
+        encoder_counts: Some(16400),
+        ..DatasetOptions::default()
+    };
     let scan = read(open(root.path(), &options).unwrap().as_mut(), 0).unwrap();
     assert!((scan.azimuth_rad[10] - 0.25 * TAU).abs() < 1e-6);
-    let options = DatasetOptions { azimuth_source: Some(AzimuthSource::Uniform), ..DatasetOptions::default() };
+    let options = DatasetOptions {
+        azimuth_source: Some(AzimuthSource::Uniform),
+        ..DatasetOptions::default()
+    };
     let scan = read(open(root.path(), &options).unwrap().as_mut(), 0).unwrap();
     assert!((scan.azimuth_rad[10] - 0.25 * TAU).abs() < 1e-6);
 }
@@ -208,46 +324,89 @@ fn an_encoder_of_another_size_is_named_and_can_be_set() {
 #[test]
 fn byte_ten_is_validity_in_oxford_and_nothing_in_boreas() {
     let root = folder();
-    let sweep = Sweep { byte_ten: |row| if row == 5 { 0 } else { 255 }, ..Sweep::default() };
+    let sweep = Sweep {
+        byte_ten: |row| if row == 5 { 0 } else { 255 },
+        ..Sweep::default()
+    };
     sweep.write(&root.path().join(format!("radar/{START_US}.png")));
     for (format, expected) in [(Format::Oxford, 0), (Format::Boreas, flag::MEASURED)] {
-        let options = DatasetOptions { format: Some(format), ..DatasetOptions::default() };
+        let options = DatasetOptions {
+            format: Some(format),
+            ..DatasetOptions::default()
+        };
         let scan = read(open(root.path(), &options).unwrap().as_mut(), 0).unwrap();
-        assert_eq!((scan.flags[4], scan.flags[5]), (flag::MEASURED, expected), "{format}");
+        assert_eq!(
+            (scan.flags[4], scan.flags[5]),
+            (flag::MEASURED, expected),
+            "{format}"
+        );
     }
 }
 
 #[test]
 fn alternating_chirps_never_count_as_lost_rows() {
     let root = folder();
-    let sweep = Sweep { byte_ten: |row| if row % 2 == 0 { 255 } else { 0 }, ..Sweep::default() };
+    let sweep = Sweep {
+        byte_ten: |row| if row % 2 == 0 { 255 } else { 0 },
+        ..Sweep::default()
+    };
     sweep.write(&root.path().join(format!("radar/{START_US}.png")));
-    let options = DatasetOptions { format: Some(Format::Oxford), ..DatasetOptions::default() };
+    let options = DatasetOptions {
+        format: Some(Format::Oxford),
+        ..DatasetOptions::default()
+    };
     let scan = read(open(root.path(), &options).unwrap().as_mut(), 0).unwrap();
-    assert!(scan.flags.iter().all(|f| f & flag::MEASURED != 0 && f & flag::CHIRP_KNOWN != 0));
-    assert_eq!((scan.flags[0] & flag::CHIRP_UP, scan.flags[1] & flag::CHIRP_UP), (flag::CHIRP_UP, 0));
+    assert!(
+        scan.flags
+            .iter()
+            .all(|f| f & flag::MEASURED != 0 && f & flag::CHIRP_KNOWN != 0)
+    );
+    assert_eq!(
+        (
+            scan.flags[0] & flag::CHIRP_UP,
+            scan.flags[1] & flag::CHIRP_UP
+        ),
+        (flag::CHIRP_UP, 0)
+    );
 }
 
 /// Writes `n` scans into `folder`, named by their `named`th row, stamps in units of `ns_a_unit`.
 fn write_named(folder: &Path, bins: usize, start_us: i64, named: i64, unit: i64) {
     for k in 0..3 {
         let start = (start_us + k * PERIOD_US) * unit;
-        let sweep = Sweep { bins, start, row_interval: PERIOD_US / 40 * unit, ..Sweep::default() };
+        let sweep = Sweep {
+            bins,
+            start,
+            row_interval: PERIOD_US / 40 * unit,
+            ..Sweep::default()
+        };
         sweep.write(&folder.join(format!("{}.png", start + named * sweep.row_interval)));
     }
 }
 
 #[test]
 fn boreas_takes_its_resolution_from_the_date_and_its_time_from_the_middle() {
-    for (start_us, resolution) in [(1_630_000_000_000_000, 0.0596), (1_632_182_400_000_000, 0.04381)] {
+    for (start_us, resolution) in [
+        (1_630_000_000_000_000, 0.0596),
+        (1_632_182_400_000_000, 0.04381),
+    ] {
         let root = folder();
         fs::create_dir(root.path().join("applanix")).unwrap();
         write_named(&root.path().join("radar"), 3360, start_us, 19, 1);
         let mut dataset = opened(root.path());
         assert_eq!(dataset.format(), Format::Boreas);
         let scan = read(dataset.as_mut(), 1).unwrap();
-        assert_eq!((scan.geometry.range_resolution_m, scan.geometry.range_offset_m), (resolution, -0.31));
-        assert_eq!((scan.geometry.stamp_ns, dataset.nominal_stamp_ns(1)), (scan.stamp_ns[19], Some(scan.stamp_ns[19])));
+        assert_eq!(
+            (
+                scan.geometry.range_resolution_m,
+                scan.geometry.range_offset_m
+            ),
+            (resolution, -0.31)
+        );
+        assert_eq!(
+            (scan.geometry.stamp_ns, dataset.nominal_stamp_ns(1)),
+            (scan.stamp_ns[19], Some(scan.stamp_ns[19]))
+        );
     }
 }
 
@@ -268,7 +427,10 @@ fn layouts_and_first_images_tell_the_formats() {
         assert_eq!(dataset.format(), format, "{name:?}: {:?}", dataset.notes());
         let scan = read(dataset.as_mut(), 1).unwrap();
         let error = (dataset.nominal_stamp_ns(1).unwrap() - scan.geometry.stamp_ns).abs();
-        assert!(error < 5_000_000, "{name:?}: nominal time is off by {error} ns");
+        assert!(
+            error < 5_000_000,
+            "{name:?}: nominal time is off by {error} ns"
+        );
     }
 }
 
@@ -278,14 +440,24 @@ fn an_equal_fit_says_what_was_chosen_and_how_to_force_the_other() {
     write_named(root.path(), 60, START_US, 0, 1);
     let dataset = opened(root.path());
     let note = dataset.notes().join(" ");
-    assert!(note.contains("read as oxford") && note.contains("`format = \"fomo\"`"), "{note}");
+    assert!(
+        note.contains("read as oxford") && note.contains("`format = \"fomo\"`"),
+        "{note}"
+    );
 }
 
 #[test]
 fn oord_takes_even_azimuths() {
     let root = folder();
-    let sweep = Sweep { step: 0, ..Sweep::default() };
-    sweep.write(&root.path().join(format!("Navtech_CTS350-X_Radar/{START_US}.png")));
+    let sweep = Sweep {
+        step: 0,
+        ..Sweep::default()
+    };
+    sweep.write(
+        &root
+            .path()
+            .join(format!("Navtech_CTS350-X_Radar/{START_US}.png")),
+    );
     let scan = first_scan(root.path()).unwrap();
     assert!((scan.azimuth_rad[10] - 0.25 * TAU).abs() < 1e-6);
     assert_eq!(scan.geometry.range_resolution_m, 0.0438);
@@ -296,13 +468,26 @@ fn mulran_is_turned_and_its_name_is_the_end_of_the_sweep() {
     let root = folder();
     let end = |k: i64| (START_US + k * PERIOD_US) * 1000;
     for k in 0..3 {
-        write_png(&root.path().join(format!("sensor_data/radar/polar/{}.png", end(k))), 40, 60, &[9; 2400]);
+        write_png(
+            &root
+                .path()
+                .join(format!("sensor_data/radar/polar/{}.png", end(k))),
+            40,
+            60,
+            &[9; 2400],
+        );
     }
     let mut dataset = opened(root.path());
-    assert_eq!((dataset.format(), dataset.on_their_side()), (Format::Mulran, true));
+    assert_eq!(
+        (dataset.format(), dataset.on_their_side()),
+        (Format::Mulran, true)
+    );
     let scan = read(dataset.as_mut(), 2).unwrap();
     assert_eq!((scan.stamp_ns[0], scan.geometry.bins), (end(1), 60));
-    assert!(scan.geometry.stamp_ns < end(2) && dataset.nominal_stamp_ns(2) == Some(scan.geometry.stamp_ns));
+    assert!(
+        scan.geometry.stamp_ns < end(2)
+            && dataset.nominal_stamp_ns(2) == Some(scan.geometry.stamp_ns)
+    );
     assert!((scan.geometry.range_resolution_m - 0.0595238).abs() < 1e-6);
 }
 
@@ -313,27 +498,46 @@ fn radiate_without_its_stamps_says_which_file_is_wrong() {
     let list = root.path().join("Navtech_Polar.txt");
     fs::write(&list, "Frame: 000007 Time: 1549986607.5\n").unwrap();
     let error = refused(root.path()).to_string();
-    assert!(error.contains("Navtech_Polar.txt") && error.contains("000008.png"), "{error}");
+    assert!(
+        error.contains("Navtech_Polar.txt") && error.contains("000008.png"),
+        "{error}"
+    );
     fs::write(&list, "Frame: 000007 Time: 1549986607.5\nnonsense\n").unwrap();
     let error = refused(root.path()).to_string();
     assert!(error.contains("line 2"), "{error}");
     fs::remove_file(&list).unwrap();
-    assert!(matches!(refused(root.path()), OpenError::Io { path, .. } if path.ends_with("Navtech_Polar.txt")));
+    assert!(
+        matches!(refused(root.path()), OpenError::Io { path, .. } if path.ends_with("Navtech_Polar.txt"))
+    );
 }
 
 #[test]
 fn what_is_no_dataset_is_refused_with_a_sentence() {
     let root = folder();
-    assert!(matches!(refused(&root.path().join("nothing")), OpenError::Missing { .. }));
+    assert!(matches!(
+        refused(&root.path().join("nothing")),
+        OpenError::Missing { .. }
+    ));
     assert!(matches!(refused(root.path()), OpenError::NoImages { .. }));
     fs::write(root.path().join("notes.txt"), "hello").unwrap();
     let error = refused(root.path()).to_string();
-    assert!(error.contains("Navtech_Polar") && error.contains("`format`"), "{error}");
-    assert!(matches!(refused(&root.path().join("notes.txt")), OpenError::NotAFolder { .. }));
+    assert!(
+        error.contains("Navtech_Polar") && error.contains("`format`"),
+        "{error}"
+    );
+    assert!(matches!(
+        refused(&root.path().join("notes.txt")),
+        OpenError::NotAFolder { .. }
+    ));
     fs::create_dir(root.path().join("radar")).unwrap();
-    assert!(matches!(refused(root.path()), OpenError::NoImages { path } if path.ends_with("radar")));
+    assert!(
+        matches!(refused(root.path()), OpenError::NoImages { path } if path.ends_with("radar"))
+    );
     write_png(&root.path().join("radar/holiday.png"), 30, 20, &[0; 600]);
-    assert!(matches!(refused(root.path()), OpenError::UnknownLayout { .. }));
+    assert!(matches!(
+        refused(root.path()),
+        OpenError::UnknownLayout { .. }
+    ));
 }
 
 #[test]
@@ -342,21 +546,58 @@ fn impossible_options_are_refused() {
     write_radiate(root.path(), 2);
     let none = DatasetOptions::default();
     let cases = [
-        DatasetOptions { range_resolution_m: Some(0.0), ..none },
-        DatasetOptions { range_resolution_m: Some(f32::NAN), ..none },
-        DatasetOptions { range_offset_m: Some(f32::INFINITY), ..none },
-        DatasetOptions { doppler_s: Some(f32::NAN), ..none },
-        DatasetOptions { encoder_counts: Some(0), ..none },
-        DatasetOptions { encoder_counts: Some(5600), ..none },
-        DatasetOptions { azimuth_source: Some(AzimuthSource::Encoder), ..none },
+        DatasetOptions {
+            range_resolution_m: Some(0.0),
+            ..none
+        },
+        DatasetOptions {
+            range_resolution_m: Some(f32::NAN),
+            ..none
+        },
+        DatasetOptions {
+            range_offset_m: Some(f32::INFINITY),
+            ..none
+        },
+        DatasetOptions {
+            doppler_s: Some(f32::NAN),
+            ..none
+        },
+        DatasetOptions {
+            encoder_counts: Some(0),
+            ..none
+        },
+        DatasetOptions {
+            encoder_counts: Some(5600),
+            ..none
+        },
+        DatasetOptions {
+            azimuth_source: Some(AzimuthSource::Encoder),
+            ..none
+        },
     ];
     for options in cases {
-        assert!(matches!(open(root.path(), &options), Err(OpenError::BadOption { .. })), "{options:?}");
+        assert!(
+            matches!(
+                open(root.path(), &options),
+                Err(OpenError::BadOption { .. })
+            ),
+            "{options:?}"
+        );
     }
-    let options =
-        DatasetOptions { range_resolution_m: Some(1.5), range_offset_m: Some(-0.5), doppler_s: Some(0.04), ..none };
+    let options = DatasetOptions {
+        range_resolution_m: Some(1.5),
+        range_offset_m: Some(-0.5),
+        doppler_s: Some(0.04),
+        ..none
+    };
     let scan = read(open(root.path(), &options).unwrap().as_mut(), 0).unwrap();
-    assert_eq!((scan.geometry.range_resolution_m, scan.geometry.range_offset_m), (1.5, -0.5));
+    assert_eq!(
+        (
+            scan.geometry.range_resolution_m,
+            scan.geometry.range_offset_m
+        ),
+        (1.5, -0.5)
+    );
     assert_eq!(scan.geometry.doppler_s, 0.04);
 }
 
@@ -364,10 +605,19 @@ fn impossible_options_are_refused() {
 fn options_speak_kebab_case_and_refuse_unknown_keys() {
     let options: DatasetOptions =
         serde_json::from_str(r#"{"format": "boreas-rt", "azimuth_source": "uniform"}"#).unwrap();
-    assert_eq!((options.format, options.azimuth_source), (Some(Format::BoreasRt), Some(AzimuthSource::Uniform)));
-    assert_eq!(serde_json::to_string(&DatasetOptions::default()).unwrap(), "{}");
+    assert_eq!(
+        (options.format, options.azimuth_source),
+        (Some(Format::BoreasRt), Some(AzimuthSource::Uniform))
+    );
+    assert_eq!(
+        serde_json::to_string(&DatasetOptions::default()).unwrap(),
+        "{}"
+    );
     assert!(serde_json::from_str::<DatasetOptions>(r#"{"fromat": "oxford"}"#).is_err());
     for format in Format::ALL {
-        assert_eq!(serde_json::to_string(&format).unwrap(), format!("\"{format}\""));
+        assert_eq!(
+            serde_json::to_string(&format).unwrap(),
+            format!("\"{format}\"")
+        );
     }
 }

@@ -36,7 +36,12 @@ impl ChangeMeter {
     pub fn new(range_m: f64, cell_m: f32, threshold: u8) -> Result<Self, RasterError> {
         let half = (range_m / f64::from(cell_m)) as usize;
         let n = 2 * half + 1;
-        let config = RasterConfig { n, cell_m, sampling: Sampling::Averaged, ..RasterConfig::default() };
+        let config = RasterConfig {
+            n,
+            cell_m,
+            sampling: Sampling::Averaged,
+            ..RasterConfig::default()
+        };
         let rasteriser = Rasteriser::new(&config)?;
         let raster = vec![0.0; n * n];
         Ok(Self {
@@ -64,13 +69,17 @@ impl ChangeMeter {
         later: &PolarScan<'_>,
         motion: &Isometry2<f64>,
     ) -> Result<(), RasterError> {
-        let interval_ns = later.geometry.stamp_ns.saturating_sub(earlier.geometry.stamp_ns);
+        let interval_ns = later
+            .geometry
+            .stamp_ns
+            .saturating_sub(earlier.geometry.stamp_ns);
         let twist = Twist::from_motion(motion, interval_ns as f64 * 1e-9);
         let between_ns = earlier.geometry.stamp_ns + interval_ns / 2;
         for (scan, raster) in [(earlier, &mut self.earlier), (later, &mut self.later)] {
             let mut scan = *scan;
             scan.geometry.stamp_ns = between_ns;
-            self.rasteriser.rasterise(&scan, self.threshold, Some(twist), raster)?;
+            self.rasteriser
+                .rasterise(&scan, self.threshold, Some(twist), raster)?;
         }
         let n = self.rasteriser.config().n;
         if let Some(correlation) = correlation(&self.earlier, &self.later, n) {
@@ -126,7 +135,8 @@ fn unmatched(these: &[f32], those: &[f32], n: usize) -> (u64, u64) {
         for column in 0..n {
             if these[row * n + column] > 0.0 {
                 returns += 1;
-                let found = within_one(row).any(|row| within_one(column).any(|column| those[row * n + column] > 0.0));
+                let found = within_one(row)
+                    .any(|row| within_one(column).any(|column| those[row * n + column] > 0.0));
                 unmatched += u64::from(!found);
             }
         }

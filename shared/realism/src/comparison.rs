@@ -50,8 +50,13 @@ impl Row {
     /// Whether the simulated recording is no farther from the real one than halves of one real recording are from each other: two
     /// real recordings may be closer still, by chance.
     pub fn is_within_chance(&self) -> bool {
-        let chance = [self.within_real, self.within_other].into_iter().flatten().reduce(f64::max);
-        self.sim_real.zip(chance).is_some_and(|(distance, chance)| distance <= chance)
+        let chance = [self.within_real, self.within_other]
+            .into_iter()
+            .flatten()
+            .reduce(f64::max);
+        self.sim_real
+            .zip(chance)
+            .is_some_and(|(distance, chance)| distance <= chance)
     }
 }
 
@@ -68,17 +73,24 @@ pub fn compare(sim: &Measured, real: &Measured, other: Option<&Measured>) -> Com
         Row {
             statistic: statistic.name,
             distance: statistic.distance,
-            values: [Some(sim), Some(real), other].map(|measured| (statistic.shown)(&measured?.whole)),
+            values: [Some(sim), Some(real), other]
+                .map(|measured| (statistic.shown)(&measured?.whole)),
             within_real: within(real),
             within_other: other.and_then(within),
             sim_real,
             real_other,
-            closer: sim_real.zip(real_other).map(|(sim_real, real_other)| sim_real < real_other),
+            closer: sim_real
+                .zip(real_other)
+                .map(|(sim_real, real_other)| sim_real < real_other),
         }
     };
     let rows: Vec<Row> = STATISTICS.iter().map(row).collect();
     let verdicts = || rows.iter().filter_map(|row| row.closer);
-    Comparison { closer: verdicts().filter(|closer| *closer).count(), judged: verdicts().count(), rows }
+    Comparison {
+        closer: verdicts().filter(|closer| *closer).count(),
+        judged: verdicts().count(),
+        rows,
+    }
 }
 
 /// How a statistic is shown and compared; `None` where a recording has none or the distance is no number.
@@ -98,7 +110,12 @@ static STATISTICS: [Statistic; 14] = [
         distance: "Wasserstein, counts",
         shown: |recording| {
             let percentile = |share| recording.statistics.histogram.percentile(share);
-            Some(format!("50 %: {}, 90 %: {}, 99 %: {}", percentile(0.5), percentile(0.9), percentile(0.99)))
+            Some(format!(
+                "50 %: {}, 90 %: {}, 99 %: {}",
+                percentile(0.5),
+                percentile(0.9),
+                percentile(0.99)
+            ))
         },
         between: |a, b| finite(a.statistics.histogram.wasserstein(&b.statistics.histogram)),
     },
@@ -119,49 +136,105 @@ static STATISTICS: [Statistic; 14] = [
         name: "correlation length in range",
         distance: LOG_RATIO,
         shown: |recording| shown_length(&recording.statistics.range_correlation, "m"),
-        between: |a, b| by(a, b, |recording| recording.statistics.range_correlation.length(), log_ratio),
+        between: |a, b| {
+            by(
+                a,
+                b,
+                |recording| recording.statistics.range_correlation.length(),
+                log_ratio,
+            )
+        },
     },
     Statistic {
         name: "correlation length in azimuth",
         distance: LOG_RATIO,
         shown: |recording| shown_length(&recording.statistics.azimuth_correlation, "deg"),
-        between: |a, b| by(a, b, |recording| recording.statistics.azimuth_correlation.length(), log_ratio),
+        between: |a, b| {
+            by(
+                a,
+                b,
+                |recording| recording.statistics.azimuth_correlation.length(),
+                log_ratio,
+            )
+        },
     },
     Statistic {
         name: "share of saturated bins",
         distance: LOG_RATIO,
         shown: |recording| Some(format!("{:.1e}", recording.statistics.saturated_share)),
-        between: |a, b| by(a, b, |recording| Some(recording.statistics.saturated_share), saturated_ratio),
+        between: |a, b| {
+            by(
+                a,
+                b,
+                |recording| Some(recording.statistics.saturated_share),
+                saturated_ratio,
+            )
+        },
     },
     Statistic {
         name: "share above the threshold",
         distance: LOG_RATIO,
         shown: |recording| Some(percent(recording.statistics.share_above)),
-        between: |a, b| by(a, b, |recording| Some(recording.statistics.share_above), share_ratio),
+        between: |a, b| {
+            by(
+                a,
+                b,
+                |recording| Some(recording.statistics.share_above),
+                share_ratio,
+            )
+        },
     },
     Statistic {
         name: "next scan: correlation",
         distance: "abs. difference",
         shown: |recording| Some(format!("{:.3}", change(recording)?.correlation)),
-        between: |a, b| by(a, b, |recording| Some(change(recording)?.correlation), |a, b| (a - b).abs()),
+        between: |a, b| {
+            by(
+                a,
+                b,
+                |recording| Some(change(recording)?.correlation),
+                |a, b| (a - b).abs(),
+            )
+        },
     },
     Statistic {
         name: "next scan: returns without counterpart",
         distance: LOG_RATIO,
         shown: |recording| Some(percent(change(recording)?.unmatched_share)),
-        between: |a, b| by(a, b, |recording| Some(change(recording)?.unmatched_share), share_ratio),
+        between: |a, b| {
+            by(
+                a,
+                b,
+                |recording| Some(change(recording)?.unmatched_share),
+                share_ratio,
+            )
+        },
     },
     Statistic {
         name: "plain search: translation of a motion",
         distance: LOG_RATIO,
         shown: |recording| metres(plain(recording)?.translation_rmse_m),
-        between: |a, b| by(a, b, |recording| Some(plain(recording)?.translation_rmse_m), log_ratio),
+        between: |a, b| {
+            by(
+                a,
+                b,
+                |recording| Some(plain(recording)?.translation_rmse_m),
+                log_ratio,
+            )
+        },
     },
     Statistic {
         name: "plain search: rotation of a motion",
         distance: LOG_RATIO,
         shown: |recording| degrees(plain(recording)?.rotation_rmse_deg),
-        between: |a, b| by(a, b, |recording| Some(plain(recording)?.rotation_rmse_deg), log_ratio),
+        between: |a, b| {
+            by(
+                a,
+                b,
+                |recording| Some(plain(recording)?.rotation_rmse_deg),
+                log_ratio,
+            )
+        },
     },
     Statistic {
         name: "plain search: seg",
@@ -173,13 +246,27 @@ static STATISTICS: [Statistic; 14] = [
         name: "refined search: translation of a motion",
         distance: LOG_RATIO,
         shown: |recording| metres(refined(recording)?.translation_rmse_m),
-        between: |a, b| by(a, b, |recording| Some(refined(recording)?.translation_rmse_m), log_ratio),
+        between: |a, b| {
+            by(
+                a,
+                b,
+                |recording| Some(refined(recording)?.translation_rmse_m),
+                log_ratio,
+            )
+        },
     },
     Statistic {
         name: "refined search: rotation of a motion",
         distance: LOG_RATIO,
         shown: |recording| degrees(refined(recording)?.rotation_rmse_deg),
-        between: |a, b| by(a, b, |recording| Some(refined(recording)?.rotation_rmse_deg), log_ratio),
+        between: |a, b| {
+            by(
+                a,
+                b,
+                |recording| Some(refined(recording)?.rotation_rmse_deg),
+                log_ratio,
+            )
+        },
     },
     Statistic {
         name: "refined search: seg",
@@ -190,7 +277,12 @@ static STATISTICS: [Statistic; 14] = [
 ];
 
 /// The distance of a number that both recordings have.
-fn by(a: &Recording, b: &Recording, of: fn(&Recording) -> Option<f64>, distance: fn(f64, f64) -> f64) -> Option<f64> {
+fn by(
+    a: &Recording,
+    b: &Recording,
+    of: fn(&Recording) -> Option<f64>,
+    distance: fn(f64, f64) -> f64,
+) -> Option<f64> {
     finite(distance(of(a)?, of(b)?))
 }
 

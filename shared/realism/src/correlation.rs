@@ -72,14 +72,20 @@ impl Products {
             let usual: f64 = means.iter().zip(&means[lag..]).map(|(a, b)| a * b).sum();
             (*sum as f64 / self.rows as f64 - usual) / pairs as f64
         };
-        curve(self.range.iter().enumerate().map(covariance).collect(), resolution_m)
+        curve(
+            self.range.iter().enumerate().map(covariance).collect(),
+            resolution_m,
+        )
     }
 
     /// The autocorrelation in azimuth, round the whole turn.
     pub fn in_azimuth(&self, means: &[f64]) -> Curve {
         let usual: f64 = means.iter().map(|mean| mean * mean).sum();
         let covariance = |sum: &u64| *sum as f64 / self.rows as f64 - usual;
-        curve(self.azimuth.iter().map(covariance).collect(), 360.0 / self.azimuths as f64)
+        curve(
+            self.azimuth.iter().map(covariance).collect(),
+            360.0 / self.azimuths as f64,
+        )
     }
 }
 
@@ -91,10 +97,17 @@ fn range_lags(scan: &PolarScan<'_>) -> usize {
 /// Covariances over the first of them. Where all powers at a range are the same, what is left of rounding is no variance.
 fn curve(covariances: Vec<f64>, step: f64) -> Curve {
     match covariances.first().copied() {
-        Some(variance) if variance > 1e-9 => {
-            Curve { step, values: covariances.iter().map(|covariance| covariance / variance).collect() }
-        }
-        _ => Curve { step, values: Vec::new() },
+        Some(variance) if variance > 1e-9 => Curve {
+            step,
+            values: covariances
+                .iter()
+                .map(|covariance| covariance / variance)
+                .collect(),
+        },
+        _ => Curve {
+            step,
+            values: Vec::new(),
+        },
     }
 }
 
@@ -102,11 +115,18 @@ fn curve(covariances: Vec<f64>, step: f64) -> Curve {
 fn dot(a: &[u8], b: &[u8]) -> u64 {
     // Fewer products of two bytes than overflow an i32.
     const SAFE: usize = 1 << 15;
-    a.chunks(SAFE).zip(b.chunks(SAFE)).map(|(a, b)| dot_part(a, b) as u64).sum()
+    a.chunks(SAFE)
+        .zip(b.chunks(SAFE))
+        .map(|(a, b)| dot_part(a, b) as u64)
+        .sum()
 }
 
 /// The same of few enough for the sum to fit.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
 fn dot_part(a: &[u8], b: &[u8]) -> i32 {
     let mut sum = 0i32;
     for (a, b) in a.iter().zip(b) {

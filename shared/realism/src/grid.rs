@@ -17,12 +17,18 @@ impl RangeGrid {
     /// The grid that scans of all these kinds can be averaged to: the coarsest resolution over the shortest range. `None` where there
     /// is no scan, or one without bins.
     pub fn common(geometries: &[SweepGeometry]) -> Option<Self> {
-        let resolution_m = geometries.iter().map(|g| g.range_resolution_m).reduce(f32::max)?;
+        let resolution_m = geometries
+            .iter()
+            .map(|g| g.range_resolution_m)
+            .reduce(f32::max)?;
         let range_m = |g: &SweepGeometry| g.bins as f64 * f64::from(g.range_resolution_m);
         let shortest_m = geometries.iter().map(range_m).reduce(f64::min)?;
         // A resolution as f32 must not cost the last cell.
         let cells = (shortest_m / f64::from(resolution_m) + 1e-4) as usize;
-        (cells > 0).then_some(Self { resolution_m, cells })
+        (cells > 0).then_some(Self {
+            resolution_m,
+            cells,
+        })
     }
 
     /// Range of a cell's centre, m.
@@ -54,8 +60,15 @@ pub struct Resampler {
 impl Resampler {
     /// For scans of any size.
     pub fn new(grid: RangeGrid) -> Self {
-        let empty = ScanLimits { bytes: 0, azimuths: 0 };
-        Self { grid, scan: OwnedScan::with_limits(empty), sums: Vec::new() }
+        let empty = ScanLimits {
+            bytes: 0,
+            azimuths: 0,
+        };
+        Self {
+            grid,
+            scan: OwnedScan::with_limits(empty),
+            sums: Vec::new(),
+        }
     }
 
     /// Averages the powers over each cell, a bin that two cells share by its parts, and rounds to whole counts. Azimuths, times and
@@ -74,14 +87,24 @@ impl Resampler {
             ..scan.geometry
         };
         self.scan.azimuth_rad.clear();
-        self.scan.azimuth_rad.extend_from_slice(&scan.azimuth_rad[..azimuths]);
+        self.scan
+            .azimuth_rad
+            .extend_from_slice(&scan.azimuth_rad[..azimuths]);
         self.scan.stamp_ns.clear();
-        self.scan.stamp_ns.extend_from_slice(&scan.stamp_ns[..azimuths]);
+        self.scan
+            .stamp_ns
+            .extend_from_slice(&scan.stamp_ns[..azimuths]);
         self.scan.flags.clear();
         self.scan.flags.extend_from_slice(&scan.flags[..azimuths]);
         self.scan.bytes.resize(azimuths * self.grid.cells, 0);
-        let bins_a_cell = f64::from(self.grid.resolution_m) / f64::from(scan.geometry.range_resolution_m);
-        for (azimuth, cells) in self.scan.bytes.chunks_exact_mut(self.grid.cells).enumerate() {
+        let bins_a_cell =
+            f64::from(self.grid.resolution_m) / f64::from(scan.geometry.range_resolution_m);
+        for (azimuth, cells) in self
+            .scan
+            .bytes
+            .chunks_exact_mut(self.grid.cells)
+            .enumerate()
+        {
             average(scan.row(azimuth), bins_a_cell, &mut self.sums, cells);
         }
         Ok(())

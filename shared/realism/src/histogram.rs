@@ -14,7 +14,9 @@ pub struct Histogram {
 
 impl Default for Histogram {
     fn default() -> Self {
-        Self { counts: vec![0; LEVELS] }
+        Self {
+            counts: vec![0; LEVELS],
+        }
     }
 }
 
@@ -80,7 +82,11 @@ impl Histogram {
 
 /// Mean of the powers counted.
 pub(crate) fn mean(counts: &[u64]) -> f64 {
-    let sum: u64 = counts.iter().zip(0..).map(|(count, power)| count * power).sum();
+    let sum: u64 = counts
+        .iter()
+        .zip(0..)
+        .map(|(count, power)| count * power)
+        .sum();
     sum as f64 / counts.iter().sum::<u64>() as f64
 }
 

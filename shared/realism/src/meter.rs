@@ -86,7 +86,11 @@ impl Meter {
     ///
     /// # Errors
     /// A scan that contradicts itself; it counts nothing.
-    pub fn add(&mut self, scan: &PolarScan<'_>, motion: Option<&Isometry2<f64>>) -> Result<(), MeterError> {
+    pub fn add(
+        &mut self,
+        scan: &PolarScan<'_>,
+        motion: Option<&Isometry2<f64>>,
+    ) -> Result<(), MeterError> {
         self.before.resample(scan)?;
         std::mem::swap(&mut self.now, &mut self.before);
         let own = &scan.geometry;
@@ -104,10 +108,12 @@ impl Meter {
         self.streaks.add(&scan);
         self.scans += 1;
         match motion {
-            Some(motion) if self.scans > 1 => match self.change.add(&self.before.scan(), &scan, motion) {
-                Err(RasterError::Twist { .. }) => Ok(()),
-                compared => Ok(compared?),
-            },
+            Some(motion) if self.scans > 1 => {
+                match self.change.add(&self.before.scan(), &scan, motion) {
+                    Err(RasterError::Twist { .. }) => Ok(()),
+                    compared => Ok(compared?),
+                }
+            }
             _ => Ok(()),
         }
     }
@@ -131,7 +137,9 @@ impl Meter {
             floor: self.powers.percentiles(0.1),
             median_power: self.powers.percentiles(0.5),
             high_power: self.powers.percentiles(0.99),
-            range_correlation: self.products.in_range(&mean_power, grid.resolution_m.into()),
+            range_correlation: self
+                .products
+                .in_range(&mean_power, grid.resolution_m.into()),
             azimuth_correlation: self.products.in_azimuth(&mean_power),
             mean_power,
             streaks: self.streaks.finish(),
@@ -141,7 +149,11 @@ impl Meter {
 }
 
 fn saturated_share(raw: &Histogram) -> f64 {
-    match raw.levels().next_back().and_then(|highest| highest.checked_sub(SATURATED_LEVELS)) {
+    match raw
+        .levels()
+        .next_back()
+        .and_then(|highest| highest.checked_sub(SATURATED_LEVELS))
+    {
         Some(below) => raw.share_above(below),
         None => 0.0,
     }

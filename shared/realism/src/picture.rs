@@ -34,18 +34,34 @@ impl Picture {
     pub fn from_above(scan: &PolarScan<'_>, cell_m: f32) -> Result<Self, RasterError> {
         let range_m = scan.geometry.bins as f32 * scan.geometry.range_resolution_m;
         let n = 2 * (range_m / cell_m) as usize + 1;
-        let config = RasterConfig { n, cell_m, minimum_range_m: 0.0, ..RasterConfig::default() };
+        let config = RasterConfig {
+            n,
+            cell_m,
+            minimum_range_m: 0.0,
+            ..RasterConfig::default()
+        };
         let mut rasteriser = Rasteriser::new(&config)?;
         let mut cells = vec![0.0; n * n];
         rasteriser.rasterise(scan, 0, None, &mut cells)?;
-        Ok(Self { width: n, height: n, pixels: cells.into_iter().map(|power| power.round() as u8).collect() })
+        Ok(Self {
+            width: n,
+            height: n,
+            pixels: cells.into_iter().map(|power| power.round() as u8).collect(),
+        })
     }
 
     /// A scan as it was measured: a row an azimuth, range to the right.
     pub fn as_measured(scan: &PolarScan<'_>) -> Self {
         let height = scan.geometry.azimuths;
-        let pixels = (0..height).flat_map(|azimuth| scan.row(azimuth)).copied().collect();
-        Self { width: scan.geometry.bins, height, pixels }
+        let pixels = (0..height)
+            .flat_map(|azimuth| scan.row(azimuth))
+            .copied()
+            .collect();
+        Self {
+            width: scan.geometry.bins,
+            height,
+            pixels,
+        }
     }
 
     /// Writes it as PNG.
@@ -53,7 +69,12 @@ impl Picture {
     /// # Errors
     /// [`PictureError`] names the file.
     pub fn write(&self, path: &Path) -> Result<(), PictureError> {
-        encode(path, [self.width, self.height], png::ColorType::Grayscale, &self.pixels)
+        encode(
+            path,
+            [self.width, self.height],
+            png::ColorType::Grayscale,
+            &self.pixels,
+        )
     }
 }
 
@@ -66,7 +87,12 @@ pub fn write_rgb(path: &Path, width: usize, pixels: &[[u8; 3]]) -> Result<(), Pi
     encode(path, size, png::ColorType::Rgb, pixels.as_flattened())
 }
 
-fn encode(path: &Path, [width, height]: [usize; 2], color: png::ColorType, bytes: &[u8]) -> Result<(), PictureError> {
+fn encode(
+    path: &Path,
+    [width, height]: [usize; 2],
+    color: png::ColorType,
+    bytes: &[u8],
+) -> Result<(), PictureError> {
     let written = || {
         let file = BufWriter::new(File::create(path)?);
         let mut encoder = png::Encoder::new(file, width as u32, height as u32);
@@ -76,5 +102,8 @@ fn encode(path: &Path, [width, height]: [usize; 2], color: png::ColorType, bytes
         writer.write_image_data(bytes)?;
         writer.finish()
     };
-    written().map_err(|source| PictureError { path: path.to_owned(), source })
+    written().map_err(|source| PictureError {
+        path: path.to_owned(),
+        source,
+    })
 }

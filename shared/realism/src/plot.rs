@@ -24,7 +24,10 @@ pub type Drawing = (&'static str, String);
 /// # Errors
 /// [`PlotError::Draw`].
 pub fn curves(recordings: &[&Recording]) -> Result<Vec<Drawing>, PlotError> {
-    DIAGRAMS.iter().map(|diagram| Ok((diagram.name, diagram.draw(recordings)?))).collect()
+    DIAGRAMS
+        .iter()
+        .map(|diagram| Ok((diagram.name, diagram.draw(recordings)?)))
+        .collect()
 }
 
 struct Diagram {
@@ -51,7 +54,9 @@ static DIAGRAMS: [Diagram; 4] = [
         points: |recording| {
             let statistics = &recording.statistics;
             let cells = statistics.mean_power.iter().enumerate();
-            cells.map(|(cell, power)| (statistics.grid.centre_m(cell), *power)).collect()
+            cells
+                .map(|(cell, power)| (statistics.grid.centre_m(cell), *power))
+                .collect()
         },
     },
     Diagram {
@@ -71,7 +76,12 @@ static DIAGRAMS: [Diagram; 4] = [
 ];
 
 fn points(curve: &crate::Curve) -> Vec<(f64, f64)> {
-    curve.values.iter().enumerate().map(|(lag, value)| (lag as f64 * curve.step, *value)).collect()
+    curve
+        .values
+        .iter()
+        .enumerate()
+        .map(|(lag, value)| (lag as f64 * curve.step, *value))
+        .collect()
 }
 
 /// Powers that do not occur are left out.
@@ -79,17 +89,37 @@ fn log_shares(recording: &Recording) -> Vec<(f64, f64)> {
     let histogram = &recording.statistics.histogram;
     let total = histogram.total() as f64;
     let log_share = |count: &u64| (*count as f64 / total).log10();
-    let shares = histogram.counts().iter().enumerate().map(|(power, count)| (power as f64, log_share(count)));
-    shares.filter(|(_, log_share)| *log_share > LEAST_LOG_SHARE).collect()
+    let shares = histogram
+        .counts()
+        .iter()
+        .enumerate()
+        .map(|(power, count)| (power as f64, log_share(count)));
+    shares
+        .filter(|(_, log_share)| *log_share > LEAST_LOG_SHARE)
+        .collect()
 }
 
 impl Diagram {
     fn draw(&self, recordings: &[&Recording]) -> Result<String, PlotError> {
-        let curves: Vec<Vec<(f64, f64)>> = recordings.iter().map(|recording| (self.points)(recording)).collect();
+        let curves: Vec<Vec<(f64, f64)>> = recordings
+            .iter()
+            .map(|recording| (self.points)(recording))
+            .collect();
         let all = || curves.iter().flatten();
-        let (x, y) = (range(all().map(|point| point.0)), range(all().map(|point| point.1)));
-        let entry = |((_, label), colour)| Entry { label, symbol: Symbol::Line(line(colour, 2.0)) };
-        let legend: Vec<Entry<'_>> = recordings.iter().zip(LABELS).zip(COLOURS).map(entry).collect();
+        let (x, y) = (
+            range(all().map(|point| point.0)),
+            range(all().map(|point| point.1)),
+        );
+        let entry = |((_, label), colour)| Entry {
+            label,
+            symbol: Symbol::Line(line(colour, 2.0)),
+        };
+        let legend: Vec<Entry<'_>> = recordings
+            .iter()
+            .zip(LABELS)
+            .zip(COLOURS)
+            .map(entry)
+            .collect();
         document(SIZE, |area| {
             header(area, self.title, &caption(recordings), &legend)?;
             let below_header = area.split_vertically(px(f64::from(HEADER))).1;
@@ -106,7 +136,9 @@ impl Diagram {
     ) -> Result<(), PlotError> {
         let mut chart = chart(area, x, y, [self.x_desc, self.y_desc])?;
         for (curve, colour) in curves.iter().zip(COLOURS) {
-            chart.draw_series(LineSeries::new(curve.iter().copied(), line(colour, 2.0))).map_err(drawing)?;
+            chart
+                .draw_series(LineSeries::new(curve.iter().copied(), line(colour, 2.0)))
+                .map_err(drawing)?;
         }
         Ok(())
     }
@@ -114,15 +146,26 @@ impl Diagram {
 
 /// From the least to the largest, and a little more than nothing.
 fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
-    let (least, most) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), v| (least.min(v), most.max(v)));
+    let (least, most) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), v| {
+        (least.min(v), most.max(v))
+    });
     if least < most { least..most } else { 0.0..1.0 }
 }
 
 /// What the curves were measured on.
 fn caption(recordings: &[&Recording]) -> String {
-    let Some(first) = recordings.first() else { return String::new() };
+    let Some(first) = recordings.first() else {
+        return String::new();
+    };
     let grid = first.statistics.grid;
-    let scans = |recording: &&Recording| format!("{} scans of {}", recording.statistics.scans, recording.name);
+    let scans = |recording: &&Recording| {
+        format!("{} scans of {}", recording.statistics.scans, recording.name)
+    };
     let scans: Vec<String> = recordings.iter().map(scans).collect();
-    format!("{}; cells of {:.4} m up to {:.1} m", scans.join(", "), grid.resolution_m, grid.range_m())
+    format!(
+        "{}; cells of {:.4} m up to {:.1} m",
+        scans.join(", "),
+        grid.resolution_m,
+        grid.range_m()
+    )
 }

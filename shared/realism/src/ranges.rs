@@ -14,13 +14,19 @@ pub struct PowerByRange {
 impl PowerByRange {
     /// Nothing yet, for scans of so many cells.
     pub fn new(cells: usize) -> Self {
-        Self { counts: vec![0; cells * LEVELS] }
+        Self {
+            counts: vec![0; cells * LEVELS],
+        }
     }
 
     /// Counts a scan's powers. It has the grid's cells.
     pub fn add(&mut self, scan: &PolarScan<'_>) {
         for azimuth in 0..scan.geometry.azimuths {
-            for (power, counts) in scan.row(azimuth).iter().zip(self.counts.chunks_exact_mut(LEVELS)) {
+            for (power, counts) in scan
+                .row(azimuth)
+                .iter()
+                .zip(self.counts.chunks_exact_mut(LEVELS))
+            {
                 counts[usize::from(*power)] += 1;
             }
         }
@@ -40,7 +46,9 @@ impl PowerByRange {
 
     /// The power in each cell that this share of its powers does not exceed.
     pub fn percentiles(&self, share: f64) -> Vec<u8> {
-        self.cells().map(|counts| percentile(counts, share)).collect()
+        self.cells()
+            .map(|counts| percentile(counts, share))
+            .collect()
     }
 
     fn cells(&self) -> impl Iterator<Item = &[u64]> {

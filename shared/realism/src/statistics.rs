@@ -94,7 +94,10 @@ impl Statistics {
     /// Mean of a cell's figure over half a metre either way of a range; `None` beyond the grid.
     pub fn around(&self, range_m: f64, figure: impl Fn(usize) -> f64) -> Option<f64> {
         const HALF_M: f64 = 0.5;
-        let (near, far) = (self.grid.cell_at((range_m - HALF_M).max(0.0))?, self.grid.cell_at(range_m + HALF_M)?);
+        let (near, far) = (
+            self.grid.cell_at((range_m - HALF_M).max(0.0))?,
+            self.grid.cell_at(range_m + HALF_M)?,
+        );
         Some((near..=far).map(figure).sum::<f64>() / (far - near + 1) as f64)
     }
 }

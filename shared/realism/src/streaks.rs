@@ -38,13 +38,19 @@ impl StreakCounter {
     /// Counts those of a scan.
     pub fn add(&mut self, scan: &PolarScan<'_>) {
         self.scan.clear();
-        self.scan.extend((0..scan.geometry.azimuths).map(|azimuth| floor(scan.row(azimuth))));
+        self.scan
+            .extend((0..scan.geometry.azimuths).map(|azimuth| floor(scan.row(azimuth))));
         self.floors.add(&self.scan);
         let mut of_scan = Histogram::default();
         of_scan.add(&self.scan);
         let usual = of_scan.percentile(0.5);
         let is_streak = |floor: u8| floor.saturating_sub(usual) > LIFT;
-        let before = self.scan.last().copied().into_iter().chain(self.scan.iter().copied());
+        let before = self
+            .scan
+            .last()
+            .copied()
+            .into_iter()
+            .chain(self.scan.iter().copied());
         for (floor, before) in self.scan.iter().zip(before) {
             self.streaks += u64::from(is_streak(*floor));
             self.groups += u64::from(is_streak(*floor) && !is_streak(before));
@@ -59,7 +65,8 @@ impl StreakCounter {
             share: ratio(self.streaks, self.floors.total()),
             groups_a_scan: ratio(self.groups, self.scans),
             mean_width: ratio(self.streaks, self.groups),
-            floor_percentiles: [0.05, 0.25, 0.5, 0.75, 0.95, 0.99].map(|share| self.floors.percentile(share)),
+            floor_percentiles: [0.05, 0.25, 0.5, 0.75, 0.95, 0.99]
+                .map(|share| self.floors.percentile(share)),
         }
     }
 }

@@ -5,7 +5,9 @@
 mod common;
 
 use common::*;
-use gyre_realism::{Change, Measured, Recording, SearchErrors, compare, picture::Picture, plot::curves};
+use gyre_realism::{
+    Change, Measured, Recording, SearchErrors, compare, picture::Picture, plot::curves,
+};
 
 /// A recording of noise with a wall, brighter by `gain`, whose searches are `errors` off.
 fn recording(seed: u64, gain: u8, errors: f64) -> Recording {
@@ -14,7 +16,11 @@ fn recording(seed: u64, gain: u8, errors: f64) -> Recording {
     let one = scan(AZIMUTHS, BINS, 0, |azimuth, bin| {
         noise[azimuth * BINS + bin] + gain + if wall(azimuth, bin) { 60 } else { 0 }
     });
-    let change = Change { pairs: 9, correlation: 1.0 - errors, unmatched_share: errors };
+    let change = Change {
+        pairs: 9,
+        correlation: 1.0 - errors,
+        unmatched_share: errors,
+    };
     let errors = SearchErrors {
         motions: 10,
         path_m: 25.0,
@@ -25,11 +31,19 @@ fn recording(seed: u64, gain: u8, errors: f64) -> Recording {
     };
     let mut statistics = measured([&one]);
     statistics.change = Some(change);
-    Recording { name: format!("number {seed}"), statistics, plain: Some(errors), refined: Some(errors) }
+    Recording {
+        name: format!("number {seed}"),
+        statistics,
+        plain: Some(errors),
+        refined: Some(errors),
+    }
 }
 
 fn whole(recording: Recording) -> Measured {
-    Measured { whole: recording, halves: None }
+    Measured {
+        whole: recording,
+        halves: None,
+    }
 }
 
 #[test]
@@ -40,9 +54,20 @@ fn a_recording_is_at_no_distance_from_itself() {
         let known = row.values[0].is_some();
         assert_eq!(row.sim_real, known.then_some(0.0), "{}", row.statistic);
     }
-    assert_eq!(comparison.judged, comparison.rows.iter().filter(|row| row.values[0].is_some()).count());
-    let not_closer: Vec<&str> =
-        comparison.rows.iter().filter(|row| row.closer == Some(false)).map(|row| row.statistic).collect();
+    assert_eq!(
+        comparison.judged,
+        comparison
+            .rows
+            .iter()
+            .filter(|row| row.values[0].is_some())
+            .count()
+    );
+    let not_closer: Vec<&str> = comparison
+        .rows
+        .iter()
+        .filter(|row| row.closer == Some(false))
+        .map(|row| row.statistic)
+        .collect();
     assert!(not_closer.is_empty(), "{not_closer:?}");
 }
 
@@ -50,9 +75,21 @@ fn a_recording_is_at_no_distance_from_itself() {
 fn distances_have_the_units_that_they_name() {
     let (one, other) = (recording(1, 0, 0.1), recording(1, 30, 0.2));
     let comparison = compare(&whole(one), &whole(other), None);
-    let distance = |name: &str| comparison.rows.iter().find(|row| row.statistic == name).unwrap().sim_real.unwrap();
+    let distance = |name: &str| {
+        comparison
+            .rows
+            .iter()
+            .find(|row| row.statistic == name)
+            .unwrap()
+            .sim_real
+            .unwrap()
+    };
     let close = |name: &str, expected: f64| {
-        assert!((distance(name) - expected).abs() < 1e-4, "{name}: {}, not {expected}", distance(name));
+        assert!(
+            (distance(name) - expected).abs() < 1e-4,
+            "{name}: {}, not {expected}",
+            distance(name)
+        );
     };
     close("histogram of power", 30.0);
     close("mean power against range", 30.0);
@@ -66,30 +103,62 @@ fn distances_have_the_units_that_they_name() {
 
 #[test]
 fn the_nearer_recording_is_closer_and_what_is_not_known_is_not_judged() {
-    let (real, mut near, far) = (recording(1, 0, 0.1), recording(2, 2, 0.11), recording(3, 40, 0.5));
+    let (real, mut near, far) = (
+        recording(1, 0, 0.1),
+        recording(2, 2, 0.11),
+        recording(3, 40, 0.5),
+    );
     near.plain = None;
     let halves = Some([recording(1, 0, 0.1), recording(1, 1, 0.2)]);
-    let real = Measured { whole: real, halves };
+    let real = Measured {
+        whole: real,
+        halves,
+    };
     let comparison = compare(&whole(near), &real, Some(&whole(far)));
-    let row = |name: &str| comparison.rows.iter().find(|row| row.statistic == name).unwrap();
+    let row = |name: &str| {
+        comparison
+            .rows
+            .iter()
+            .find(|row| row.statistic == name)
+            .unwrap()
+    };
     assert_eq!(row("histogram of power").closer, Some(true));
     let within = row("histogram of power").within_real.unwrap();
-    assert!((within - 1.0).abs() < 1e-9 && row("histogram of power").within_other.is_none(), "{within}");
-    assert!(!row("histogram of power").is_within_chance() && row("next scan: correlation").is_within_chance());
-    assert_eq!(row("refined search: translation of a motion").closer, Some(true));
+    assert!(
+        (within - 1.0).abs() < 1e-9 && row("histogram of power").within_other.is_none(),
+        "{within}"
+    );
+    assert!(
+        !row("histogram of power").is_within_chance()
+            && row("next scan: correlation").is_within_chance()
+    );
+    assert_eq!(
+        row("refined search: translation of a motion").closer,
+        Some(true)
+    );
     let plain = row("plain search: translation of a motion");
-    assert_eq!((plain.closer, plain.sim_real, &plain.values[0]), (None, None, &None));
+    assert_eq!(
+        (plain.closer, plain.sim_real, &plain.values[0]),
+        (None, None, &None)
+    );
     assert!(plain.real_other.is_some());
 }
 
 #[test]
 fn every_plot_has_a_line_and_a_label_for_each_recording() {
-    let recordings = [recording(1, 0, 0.1), recording(2, 10, 0.1), recording(3, 20, 0.1)];
+    let recordings = [
+        recording(1, 0, 0.1),
+        recording(2, 10, 0.1),
+        recording(3, 20, 0.1),
+    ];
     let three = curves(&recordings.iter().collect::<Vec<_>>()).unwrap();
     let two = curves(&[&recordings[0], &recordings[1]]).unwrap();
     assert_eq!(three.len(), 4);
     for ((name, three), (_, two)) in three.iter().zip(&two) {
-        assert!(three.contains("other real") && !two.contains("other real"), "{name}");
+        assert!(
+            three.contains("other real") && !two.contains("other real"),
+            "{name}"
+        );
         assert!(three.contains("1 scans of number 3"), "{name}");
         let lines = |svg: &str| svg.matches("<polyline").count();
         assert!(lines(three) > lines(two), "{name}");
@@ -111,7 +180,12 @@ fn a_picture_from_above_has_ahead_up_and_left_left() {
         let (row, column) = (100.0 - x_m / 0.5, 100.0 - y_m / 0.5);
         picture.pixels[row as usize * picture.width + column as usize]
     };
-    assert!(at(20.0, 0.0) > 150 && (60..=100).contains(&at(0.0, -30.0)), "{} {}", at(20.0, 0.0), at(0.0, -30.0));
+    assert!(
+        at(20.0, 0.0) > 150 && (60..=100).contains(&at(0.0, -30.0)),
+        "{} {}",
+        at(20.0, 0.0),
+        at(0.0, -30.0)
+    );
     assert_eq!((at(-20.0, 0.0), at(0.0, 30.0)), (0, 0));
     assert!(Picture::from_above(&drawn.view(), 0.001).is_err());
     let measured = Picture::as_measured(&drawn.view());

@@ -18,9 +18,15 @@ fn histogram(powers: &[u8]) -> Histogram {
 fn a_histogram_knows_its_mean_percentiles_and_share_above() {
     let known = histogram(&[0, 0, 10, 20, 60, 61, 100, 200, 200, 255]);
     assert_eq!((known.total(), known.mean()), (10, 90.6));
-    assert_eq!([0.0, 0.2, 0.21, 0.5, 0.9, 1.0].map(|share| known.percentile(share)), [0, 0, 10, 60, 200, 255]);
+    assert_eq!(
+        [0.0, 0.2, 0.21, 0.5, 0.9, 1.0].map(|share| known.percentile(share)),
+        [0, 0, 10, 60, 200, 255]
+    );
     assert_eq!((known.share_above(60), known.share_above(255)), (0.5, 0.0));
-    assert_eq!(known.levels().collect::<Vec<_>>(), [0, 10, 20, 60, 61, 100, 200, 255]);
+    assert_eq!(
+        known.levels().collect::<Vec<_>>(),
+        [0, 10, 20, 60, 61, 100, 200, 255]
+    );
 }
 
 proptest! {
@@ -67,8 +73,15 @@ proptest! {
 #[test]
 fn the_common_grid_is_the_coarsest_over_the_shortest_range() {
     let oxford = scan(1, 3768, 0, |_, _| 0).geometry;
-    let fine = gyre_radar::SweepGeometry { range_resolution_m: 0.0438, ..oxford };
-    let coarse = gyre_radar::SweepGeometry { range_resolution_m: 100.0 / 576.0, bins: 576, ..oxford };
+    let fine = gyre_radar::SweepGeometry {
+        range_resolution_m: 0.0438,
+        ..oxford
+    };
+    let coarse = gyre_radar::SweepGeometry {
+        range_resolution_m: 100.0 / 576.0,
+        bins: 576,
+        ..oxford
+    };
     let grid = RangeGrid::common(&[fine, coarse]).unwrap();
     assert_eq!((grid.resolution_m, grid.cells), (100.0 / 576.0, 576));
     assert_eq!(RangeGrid::common(&[fine]).unwrap().cells, 3768);
@@ -80,11 +93,17 @@ fn the_common_grid_is_the_coarsest_over_the_shortest_range() {
 #[test]
 fn azimuths_and_times_survive_the_common_grid() {
     let drawn = scan(AZIMUTHS, BINS, 3, |_, bin| bin as u8);
-    let mut resampler = Resampler::new(RangeGrid { resolution_m: 2.0 * RESOLUTION_M, cells: BINS / 2 });
+    let mut resampler = Resampler::new(RangeGrid {
+        resolution_m: 2.0 * RESOLUTION_M,
+        cells: BINS / 2,
+    });
     resampler.resample(&drawn.view()).unwrap();
     let resampled = resampler.scan();
     assert!(resampled.check().is_ok());
-    assert_eq!((resampled.azimuth_rad, resampled.stamp_ns), (drawn.view().azimuth_rad, drawn.view().stamp_ns));
+    assert_eq!(
+        (resampled.azimuth_rad, resampled.stamp_ns),
+        (drawn.view().azimuth_rad, drawn.view().stamp_ns)
+    );
     assert_eq!(resampled.geometry.stamp_ns, drawn.geometry.stamp_ns);
     // 0.5 and 2.5 counts: rounded away from zero.
     assert_eq!(resampled.row(7)[..2], [1, 3]);
@@ -92,18 +111,28 @@ fn azimuths_and_times_survive_the_common_grid() {
 
 #[test]
 fn powers_are_known_range_by_range() {
-    let one = scan(AZIMUTHS, BINS, 0, |azimuth, bin| if azimuth < 40 { 100 } else { bin as u8 % 50 });
+    let one = scan(AZIMUTHS, BINS, 0, |azimuth, bin| {
+        if azimuth < 40 { 100 } else { bin as u8 % 50 }
+    });
     let statistics = measured([&one, &one]);
     assert_eq!((statistics.scans, statistics.azimuths), (2, AZIMUTHS));
     let at = |bin: usize| {
-        (statistics.mean_power[bin], statistics.floor[bin], statistics.median_power[bin], statistics.high_power[bin])
+        (
+            statistics.mean_power[bin],
+            statistics.floor[bin],
+            statistics.median_power[bin],
+            statistics.high_power[bin],
+        )
     };
     assert_eq!(at(0), (10.0, 0, 0, 100));
     assert_eq!(at(149), (0.1 * 100.0 + 0.9 * 49.0, 49, 49, 100));
     assert_eq!(statistics.share_above, 0.1);
     // 9.45 to 10.45 m are bins 47 to 52: powers 47, 48, 49, 0, 1 and 2.
     let around = statistics.mean_power_at(9.95).unwrap();
-    assert!((around - (10.0 + 0.9 * 147.0 / 6.0)).abs() < 1e-9, "{around}");
+    assert!(
+        (around - (10.0 + 0.9 * 147.0 / 6.0)).abs() < 1e-9,
+        "{around}"
+    );
     assert_eq!(statistics.mean_power_at(60.0), None);
 }
 
@@ -115,15 +144,19 @@ fn saturated_bins_are_those_that_pile_up_at_the_top() {
         (8..12, 0..25) => 156,
         _ => 20,
     });
-    assert_eq!(measured([&one]).saturated_share, 200.0 / (AZIMUTHS * BINS) as f64);
+    assert_eq!(
+        measured([&one]).saturated_share,
+        200.0 / (AZIMUTHS * BINS) as f64
+    );
 }
 
 #[test]
 fn streaks_are_azimuths_with_a_lifted_floor() {
     let noise = noise(5, 8);
     let lifted = |azimuth: usize| [0, 399, 100, 101, 102, 200].contains(&azimuth);
-    let one =
-        scan(AZIMUTHS, BINS, 0, |azimuth, bin| noise[azimuth * BINS + bin] + if lifted(azimuth) { 15 } else { 0 });
+    let one = scan(AZIMUTHS, BINS, 0, |azimuth, bin| {
+        noise[azimuth * BINS + bin] + if lifted(azimuth) { 15 } else { 0 }
+    });
     // A wall in half of the azimuths, which is no streak.
     let wall = |azimuth: usize, bin: usize| azimuth < 200 && (150..180).contains(&bin);
     let walled = scan(AZIMUTHS, BINS, 1, |azimuth, bin| {
@@ -132,14 +165,23 @@ fn streaks_are_azimuths_with_a_lifted_floor() {
     });
     for drawn in [&one, &walled] {
         let streaks = measured([drawn]).streaks;
-        assert_eq!((streaks.share, streaks.groups_a_scan, streaks.mean_width), (6.0 / 400.0, 3.0, 2.0));
-        assert!(streaks.floor_percentiles[2] < 4 && streaks.floor_percentiles[5] > 14, "{streaks:?}");
+        assert_eq!(
+            (streaks.share, streaks.groups_a_scan, streaks.mean_width),
+            (6.0 / 400.0, 3.0, 2.0)
+        );
+        assert!(
+            streaks.floor_percentiles[2] < 4 && streaks.floor_percentiles[5] > 14,
+            "{streaks:?}"
+        );
     }
 }
 
 #[test]
 fn a_scan_that_contradicts_itself_counts_nothing() {
-    let (good, mut bad) = (scan(AZIMUTHS, BINS, 0, |_, _| 7), scan(AZIMUTHS, BINS, 1, |_, _| 9));
+    let (good, mut bad) = (
+        scan(AZIMUTHS, BINS, 0, |_, _| 7),
+        scan(AZIMUTHS, BINS, 1, |_, _| 9),
+    );
     bad.geometry.stride = 10 * BINS;
     let mut meter = Meter::new(CONFIG).unwrap();
     meter.add(&good.view(), None).unwrap();

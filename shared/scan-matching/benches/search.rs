@@ -10,8 +10,8 @@ use std::time::Instant;
 
 use common::{Motion, pair};
 use gyre_scan_matching::{
-    ExhaustiveConfig, ExhaustiveSearch, Overlap, RotationConfig, RotationSearch, TranslationConfig, TranslationSearch,
-    fast_size,
+    ExhaustiveConfig, ExhaustiveSearch, Overlap, RotationConfig, RotationSearch, TranslationConfig,
+    TranslationSearch, fast_size,
 };
 use realfft::RealFftPlanner;
 use rustfft::FftPlanner;
@@ -59,11 +59,16 @@ fn complex_ms(size: usize, count: usize) -> f64 {
 /// `count` real transforms of `size`.
 fn real_ms(size: usize, count: usize) -> f64 {
     let fft = RealFftPlanner::<f32>::new().plan_fft_forward(size);
-    let (mut work, mut out, mut scratch) = (fft.make_input_vec(), fft.make_output_vec(), fft.make_scratch_vec());
+    let (mut work, mut out, mut scratch) = (
+        fft.make_input_vec(),
+        fft.make_output_vec(),
+        fft.make_scratch_vec(),
+    );
     median_ms(|| {
         for _ in 0..count {
             work.fill(1.0);
-            fft.process_with_scratch(black_box(&mut work), &mut out, &mut scratch).unwrap();
+            fft.process_with_scratch(black_box(&mut work), &mut out, &mut scratch)
+                .unwrap();
         }
     })
 }
@@ -80,11 +85,15 @@ fn floor() {
         let radii = ((config.band_high - config.band_low) * n as f64).ceil() as usize;
         let reach = (REACH_M / cells) as usize + 3;
         let padded = fast_size(n + reach);
-        let scan = real_ms(size, n) + complex_ms(size, (config.band_high * size as f64) as usize + 2);
+        let scan =
+            real_ms(size, n) + complex_ms(size, (config.band_high * size as f64) as usize + 2);
         let rings = real_ms(config.angles, radii);
         let both = complex_ms(padded, n + padded);
         let back = complex_ms(padded, padded / 2 + 1) + real_ms(padded, 2 * reach + 1);
-        println!("{n:5} {scan:11.3} {rings:9.3} {both:13.3} {back:9.3} {:9.3}", scan + rings + both + back);
+        println!(
+            "{n:5} {scan:11.3} {rings:9.3} {both:13.3} {back:9.3} {:9.3}",
+            scan + rings + both + back
+        );
     }
 }
 
@@ -96,19 +105,26 @@ fn cell_m(n: usize) -> f64 {
 /// Times of each step.
 fn steps() {
     println!("\nsearch: reach 20 deg and {REACH_M} m, earlier spectrum kept, ms");
-    println!("{:>5} {:>7} {:>9} {:>9} {:>12} {:>9}", "n", "cell", "spectrum", "angle", "translation", "total");
+    println!(
+        "{:>5} {:>7} {:>9} {:>9} {:>12} {:>9}",
+        "n", "cell", "spectrum", "angle", "translation", "total"
+    );
     for n in SIZES {
         let (cell, motion) = (cell_m(n), Motion::degrees(2.5, 0.1, 3.0));
         let (earlier, later) = pair(n, cell, motion, 1);
         let mut rotation = RotationSearch::new(n, &RotationConfig::default()).unwrap();
-        let config = TranslationConfig { reach_m: REACH_M, ..TranslationConfig::default() };
+        let config = TranslationConfig {
+            reach_m: REACH_M,
+            ..TranslationConfig::default()
+        };
         let mut translation = TranslationSearch::new(n, cell, &config).unwrap();
         let (mut f, mut g) = (rotation.new_spectrum(), rotation.new_spectrum());
         rotation.spectrum(&earlier, &mut g).unwrap();
         let spectrum = median_ms(|| rotation.spectrum(black_box(&later), &mut f).unwrap());
         let angle = median_ms(|| _ = black_box(rotation.search(&f, &g).unwrap()));
         let estimate = rotation.search(&f, &g).unwrap();
-        let shift = median_ms(|| _ = black_box(translation.search(&later, &earlier, &estimate).unwrap()));
+        let shift =
+            median_ms(|| _ = black_box(translation.search(&later, &earlier, &estimate).unwrap()));
         let total = median_ms(|| {
             rotation.spectrum(black_box(&later), &mut f).unwrap();
             let estimate = rotation.search(&f, &g).unwrap();
@@ -130,16 +146,26 @@ fn candidates() {
         let (earlier, later) = pair(n, cell, motion, 1);
         let time = |config: &ExhaustiveConfig| {
             let mut search = ExhaustiveSearch::new(n, cell, config).unwrap();
-            let total = median_ms(|| _ = black_box(search.search(black_box(&later), &earlier).unwrap()));
+            let total =
+                median_ms(|| _ = black_box(search.search(black_box(&later), &earlier).unwrap()));
             (total, total / search.candidates() as f64)
         };
-        let default = ExhaustiveConfig { reach_m: REACH_M, ..ExhaustiveConfig::default() };
+        let default = ExhaustiveConfig {
+            reach_m: REACH_M,
+            ..ExhaustiveConfig::default()
+        };
         let (total, one) = time(&default);
-        let (_, bare) = time(&ExhaustiveConfig { overlap: Overlap::None, ..default.clone() });
+        let (_, bare) = time(&ExhaustiveConfig {
+            overlap: Overlap::None,
+            ..default.clone()
+        });
         // Two angles share a transform: the rows of one, all columns there and back, the rows within reach.
         let reach = (REACH_M / cell) as usize + 3;
         let size = fast_size(n + reach);
         let floor = complex_ms(size, n + 2 * size + 2 * reach + 1) / 2.0;
-        println!("{n:5} {:7} {total:9.2} {one:9.3} {floor:13.3} {bare:12.3}", default.candidates());
+        println!(
+            "{n:5} {:7} {total:9.2} {one:9.3} {floor:13.3} {bare:12.3}",
+            default.candidates()
+        );
     }
 }

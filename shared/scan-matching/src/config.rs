@@ -183,7 +183,11 @@ impl RotationConfig {
 
     /// Phase correlation in (rho, theta) at radial shift 0 (Checchin et al., Algorithm 1, lines 6 to 8).
     pub fn checchin() -> Self {
-        Self { magnitude: Magnitude::Linear, phase_only: true, ..Self::default() }
+        Self {
+            magnitude: Magnitude::Linear,
+            phase_only: true,
+            ..Self::default()
+        }
     }
 
     /// Checks every value.
@@ -191,32 +195,66 @@ impl RotationConfig {
     /// # Errors
     /// The first key that no search can be built from.
     pub fn validate(&self) -> Result<(), ConfigError> {
-        let check = |good, key, actual: &dyn ToString, expected| accept(good, "rotation", key, actual, expected);
+        let check = |good, key, actual: &dyn ToString, expected| {
+            accept(good, "rotation", key, actual, expected)
+        };
         check(
             self.band_low >= 0.0 && self.band_low < self.band_high,
             "band_low",
             &self.band_low,
             "at least 0 and below band_high",
         )?;
-        check(self.band_high < 0.5, "band_high", &self.band_high, "cycles a cell, below 0.5")?;
-        check((16..=1 << 14).contains(&self.angles), "angles", &self.angles, "16 to 16384")?;
+        check(
+            self.band_high < 0.5,
+            "band_high",
+            &self.band_high,
+            "cycles a cell, below 0.5",
+        )?;
+        check(
+            (16..=1 << 14).contains(&self.angles),
+            "angles",
+            &self.angles,
+            "16 to 16384",
+        )?;
         let radii = self.radii.unwrap_or(2);
         check((2..=1 << 13).contains(&radii), "radii", &radii, "2 to 8192")?;
-        check(self.reach_deg > 0.0 && self.reach_deg <= 90.0, "reach_deg", &self.reach_deg, "above 0, at most 90")?;
-        check(positive(self.variance_scale), "variance_scale", &self.variance_scale, "a positive number")?;
-        check(self.peak.is_valid(), "peak.soft_argmax.temperature", &self.peak.temperature(), "a positive number")
+        check(
+            self.reach_deg > 0.0 && self.reach_deg <= 90.0,
+            "reach_deg",
+            &self.reach_deg,
+            "above 0, at most 90",
+        )?;
+        check(
+            positive(self.variance_scale),
+            "variance_scale",
+            &self.variance_scale,
+            "a positive number",
+        )?;
+        check(
+            self.peak.is_valid(),
+            "peak.soft_argmax.temperature",
+            &self.peak.temperature(),
+            "a positive number",
+        )
     }
 }
 
 impl TranslationConfig {
     /// The search as Weston et al. print it in Algorithm 1: no normalisation of the overlap.
     pub fn weston() -> Self {
-        Self { overlap: Overlap::None, peak: Peak::Parabola, ..Self::default() }
+        Self {
+            overlap: Overlap::None,
+            peak: Peak::Parabola,
+            ..Self::default()
+        }
     }
 
     /// Phase correlation in (x, y) (Checchin et al., Algorithm 1, lines 10 to 13).
     pub fn checchin() -> Self {
-        Self { phase_only: true, ..Self::default() }
+        Self {
+            phase_only: true,
+            ..Self::default()
+        }
     }
 
     /// Checks every value.
@@ -224,10 +262,27 @@ impl TranslationConfig {
     /// # Errors
     /// The first key that no search can be built from.
     pub fn validate(&self) -> Result<(), ConfigError> {
-        let check = |good, key, actual: &dyn ToString, expected| accept(good, "translation", key, actual, expected);
-        check(positive(self.reach_m), "reach_m", &self.reach_m, "metres, above 0")?;
-        check(positive(self.variance_scale), "variance_scale", &self.variance_scale, "a positive number")?;
-        check(self.peak.is_valid(), "peak.soft_argmax.temperature", &self.peak.temperature(), "a positive number")
+        let check = |good, key, actual: &dyn ToString, expected| {
+            accept(good, "translation", key, actual, expected)
+        };
+        check(
+            positive(self.reach_m),
+            "reach_m",
+            &self.reach_m,
+            "metres, above 0",
+        )?;
+        check(
+            positive(self.variance_scale),
+            "variance_scale",
+            &self.variance_scale,
+            "a positive number",
+        )?;
+        check(
+            self.peak.is_valid(),
+            "peak.soft_argmax.temperature",
+            &self.peak.temperature(),
+            "a positive number",
+        )
     }
 }
 
@@ -257,16 +312,48 @@ pub(crate) fn accept(
     actual: &dyn ToString,
     expected: &'static str,
 ) -> Result<(), ConfigError> {
-    if good { Ok(()) } else { Err(ConfigError { section, key, actual: actual.to_string(), expected }) }
+    if good {
+        Ok(())
+    } else {
+        Err(ConfigError {
+            section,
+            key,
+            actual: actual.to_string(),
+            expected,
+        })
+    }
 }
 
 /// Cells of the largest shift of a search over rasters of `n` x `n` cells of `cell_m` metres.
-pub(crate) fn reach_cells(n: usize, cell_m: f64, section: &'static str, reach_m: f64) -> Result<usize, ConfigError> {
-    accept((16..=8192).contains(&n), "raster", "n", &n, "16 to 8192 cells a side")?;
-    accept(cell_m.is_finite() && cell_m > 0.0, "raster", "cell_m", &cell_m, "metres, above 0")?;
+pub(crate) fn reach_cells(
+    n: usize,
+    cell_m: f64,
+    section: &'static str,
+    reach_m: f64,
+) -> Result<usize, ConfigError> {
+    accept(
+        (16..=8192).contains(&n),
+        "raster",
+        "n",
+        &n,
+        "16 to 8192 cells a side",
+    )?;
+    accept(
+        cell_m.is_finite() && cell_m > 0.0,
+        "raster",
+        "cell_m",
+        &cell_m,
+        "metres, above 0",
+    )?;
     let reach = (reach_m / cell_m + 1e-9).floor();
     let fits = reach >= 1.0 && reach <= (n / 2 - SUPPORT) as f64;
-    accept(fits, section, "reach_m", &reach_m, "at least one cell, less than half the raster")?;
+    accept(
+        fits,
+        section,
+        "reach_m",
+        &reach_m,
+        "at least one cell, less than half the raster",
+    )?;
     Ok(reach as usize)
 }
 
@@ -277,10 +364,16 @@ mod tests {
 
     #[test]
     fn a_section_of_a_few_keys_leaves_the_rest_at_its_default() {
-        let text = "form = \"line14\"\nangles = 733\npeak = { soft_argmax = { temperature = 2.0 } }";
+        let text =
+            "form = \"line14\"\nangles = 733\npeak = { soft_argmax = { temperature = 2.0 } }";
         let config: RotationConfig = toml::from_str(text).unwrap();
         let peak = Peak::SoftArgmax { temperature: 2.0 };
-        let want = RotationConfig { form: RotationForm::ProfileMean, angles: 733, peak, ..RotationConfig::default() };
+        let want = RotationConfig {
+            form: RotationForm::ProfileMean,
+            angles: 733,
+            peak,
+            ..RotationConfig::default()
+        };
         assert_eq!(config, want);
         let written = toml::to_string(&want).unwrap();
         assert_eq!(toml::from_str::<RotationConfig>(&written).unwrap(), want);
@@ -288,17 +381,37 @@ mod tests {
 
     #[test]
     fn unknown_keys_are_refused() {
-        assert!(toml::from_str::<RotationConfig>("angels = 720").unwrap_err().to_string().contains("angels"));
-        assert!(toml::from_str::<TranslationConfig>("reach = 3.0").unwrap_err().to_string().contains("reach"));
-        assert!(toml::from_str::<TranslationConfig>("peak = { soft_argmax = { t = 1.0 } }").is_err());
+        assert!(
+            toml::from_str::<RotationConfig>("angels = 720")
+                .unwrap_err()
+                .to_string()
+                .contains("angels")
+        );
+        assert!(
+            toml::from_str::<TranslationConfig>("reach = 3.0")
+                .unwrap_err()
+                .to_string()
+                .contains("reach")
+        );
+        assert!(
+            toml::from_str::<TranslationConfig>("peak = { soft_argmax = { t = 1.0 } }").is_err()
+        );
     }
 
     #[test]
     fn defaults_and_both_papers_are_valid() {
-        for config in [RotationConfig::default(), RotationConfig::weston(), RotationConfig::checchin()] {
+        for config in [
+            RotationConfig::default(),
+            RotationConfig::weston(),
+            RotationConfig::checchin(),
+        ] {
             config.validate().unwrap();
         }
-        for config in [TranslationConfig::default(), TranslationConfig::weston(), TranslationConfig::checchin()] {
+        for config in [
+            TranslationConfig::default(),
+            TranslationConfig::weston(),
+            TranslationConfig::checchin(),
+        ] {
             config.validate().unwrap();
         }
     }

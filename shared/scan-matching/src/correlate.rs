@@ -57,7 +57,9 @@ impl KeptCorrelation {
     pub fn keep(&mut self, f: &[f32]) {
         let n = self.n;
         self.rows.forward(&mut self.kept, n, |r, out| {
-            out.iter_mut().zip(&f[r * n..][..n]).for_each(|(z, &f)| z.re = f);
+            out.iter_mut()
+                .zip(&f[r * n..][..n])
+                .for_each(|(z, &f)| z.re = f);
         });
         self.kept.clear_from(n);
         for c in 0..self.size {
@@ -76,17 +78,25 @@ impl KeptCorrelation {
         });
         for c in 0..size {
             // There and back while the column lies in the nearest cache; few of its values are wanted.
-            self.columns.line_into(self.plane.column(c), &mut self.column);
+            self.columns
+                .line_into(self.plane.column(c), &mut self.column);
             kernels::multiply(&mut self.column, self.kept.column(c));
             self.inverse_columns.lines(&mut self.column);
-            self.wanted.column_mut(c).iter_mut().zip(&*self.shifts).for_each(|(z, &row)| *z = self.column[row]);
+            self.wanted
+                .column_mut(c)
+                .iter_mut()
+                .zip(&*self.shifts)
+                .for_each(|(z, &row)| *z = self.column[row]);
         }
         for first in (0..self.shifts.len()).step_by(BLOCK) {
             let some = BLOCK.min(self.shifts.len() - first);
             let block = &mut self.block[..some * size];
             self.wanted.read_rows(first..first + some, block, size);
             self.inverse_row.lines(block);
-            block.chunks_exact(size).enumerate().for_each(|(r, row)| take(first + r, row));
+            block
+                .chunks_exact(size)
+                .enumerate()
+                .for_each(|(r, row)| take(first + r, row));
         }
     }
 }

@@ -14,7 +14,11 @@ pub(crate) fn shift_covariance(
 ) -> Matrix2<f64> {
     let scale = variance_scale * (1.0 - score).max(1e-6) * cell_m.powi(2);
     match (-hessian).try_inverse() {
-        Some(shape) if shape.trace() > 0.0 && shape.determinant() > 0.0 && shape.trace() * scale < guess => {
+        Some(shape)
+            if shape.trace() > 0.0
+                && shape.determinant() > 0.0
+                && shape.trace() * scale < guess =>
+        {
             shape * scale
         }
         _ => Matrix2::identity() * guess,
@@ -31,9 +35,15 @@ pub(crate) fn motion_covariance(
 ) -> Matrix3<f64> {
     let placed = turn.matrix() * shift * turn.matrix().transpose();
     let mut covariance = Matrix3::zeros();
-    covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&(placed + follows * follows.transpose() * variance_rad2));
-    covariance.fixed_view_mut::<2, 1>(0, 2).copy_from(&(follows * variance_rad2));
-    covariance.fixed_view_mut::<1, 2>(2, 0).copy_from(&(follows.transpose() * variance_rad2));
+    covariance
+        .fixed_view_mut::<2, 2>(0, 0)
+        .copy_from(&(placed + follows * follows.transpose() * variance_rad2));
+    covariance
+        .fixed_view_mut::<2, 1>(0, 2)
+        .copy_from(&(follows * variance_rad2));
+    covariance
+        .fixed_view_mut::<1, 2>(2, 0)
+        .copy_from(&(follows.transpose() * variance_rad2));
     covariance[(2, 2)] = variance_rad2;
     covariance
 }

@@ -103,7 +103,11 @@ impl ExhaustiveSearch {
         let reach = reach_cells(n, cell_m, "exhaustive", config.reach_m)?;
         let size = fast_size(Scores::least_size(n, reach));
         let energy = || OverlapEnergy::new(n, Scores::around(reach));
-        let turned = || Turned { raster: vec![0.0; n * n], energy: energy(), scores: Scores::new(n, reach, size) };
+        let turned = || Turned {
+            raster: vec![0.0; n * n],
+            energy: energy(),
+            scores: Scores::new(n, reach, size),
+        };
         let (angles, turned) = (config.angles(), [turned(), turned()]);
         Ok(Self {
             n,
@@ -156,7 +160,9 @@ impl ExhaustiveSearch {
         }
         self.correlation.keep(&self.later);
         self.try_all(prior_rad, energy);
-        Ok(self.look_closer(prior_rad, energy).map_or(self.no_match(prior_rad), |found| self.estimate(&found)))
+        Ok(self
+            .look_closer(prior_rad, energy)
+            .map_or(self.no_match(prior_rad), |found| self.estimate(&found)))
     }
 
     /// The best match at every angle of the grid.
@@ -175,7 +181,13 @@ impl ExhaustiveSearch {
     fn score(&mut self, angles: [f64; 2], count: usize, offset: f64, energy: f64) {
         for (k, turned) in self.turned.iter_mut().enumerate() {
             if k < count {
-                turned.turn(&self.earlier, self.n, angles[k], offset, self.config.overlap);
+                turned.turn(
+                    &self.earlier,
+                    self.n,
+                    angles[k],
+                    offset,
+                    self.config.overlap,
+                );
             } else {
                 // What is left there from before would still show in the last bits of the other.
                 turned.raster.fill(0.0);
@@ -183,14 +195,20 @@ impl ExhaustiveSearch {
         }
         let [g, h] = &mut self.turned;
         let scale = (self.correlation.scale() / energy) as f32;
-        self.correlation.correlate([&g.raster, &h.raster], |r, row| {
-            g.scores.fill(r, row, |z| z.re * scale);
-            if count == 2 {
-                h.scores.fill(r, row, |z| z.im * scale);
-            }
-        });
+        self.correlation
+            .correlate([&g.raster, &h.raster], |r, row| {
+                g.scores.fill(r, row, |z| z.re * scale);
+                if count == 2 {
+                    h.scores.fill(r, row, |z| z.im * scale);
+                }
+            });
         for turned in self.turned.iter_mut().take(count) {
-            turned.scores.normalise(self.config.overlap, &self.later_energy, &turned.energy, energy);
+            turned.scores.normalise(
+                self.config.overlap,
+                &self.later_energy,
+                &turned.energy,
+                energy,
+            );
         }
     }
 
@@ -204,12 +222,21 @@ impl ExhaustiveSearch {
         let highest = scores.highest()?;
         let over_shifts = scores.peak(self.config.peak, highest);
         let shift = scores.place(self.config.peak, highest, &over_shifts);
-        Some(Found { prior_rad, best, angle_rad, over_angles, highest, shift, over_shifts })
+        Some(Found {
+            prior_rad,
+            best,
+            angle_rad,
+            over_angles,
+            highest,
+            shift,
+            over_shifts,
+        })
     }
 
     /// The angle with the highest score.
     fn best(&self) -> Option<usize> {
-        let best = (0..self.angles.count).reduce(|best, k| if self.at(k) > self.at(best) { k } else { best })?;
+        let best = (0..self.angles.count)
+            .reduce(|best, k| if self.at(k) > self.at(best) { k } else { best })?;
         (self.at(best) > 0.0).then_some(best)
     }
 
@@ -220,7 +247,11 @@ impl ExhaustiveSearch {
     /// The peak over the angles next to the best one; at the end of an open grid the best one itself.
     fn angle_peak(&self, best: usize) -> LinePeak {
         if !self.angles.is_inner(best) {
-            return LinePeak { offset: 0.0, value: self.at(best), curvature: 0.0 };
+            return LinePeak {
+                offset: 0.0,
+                value: self.at(best),
+                curvature: 0.0,
+            };
         }
         line_peak(self.config.peak, |by| self.at(self.angles.beside(best, by)))
     }
@@ -228,8 +259,15 @@ impl ExhaustiveSearch {
     /// The next highest local maximum over the angles.
     fn angle_runner_up(&self, best: usize) -> Option<usize> {
         let summit = |k: usize| (-1..=1).all(|by| self.at(self.angles.beside(k, by)) <= self.at(k));
-        let others = (0..self.angles.count).filter(|&k| !self.angles.are_close(best, k) && summit(k));
-        others.filter(|&k| self.at(k) > 0.0).reduce(|second, k| if self.at(k) > self.at(second) { k } else { second })
+        let others =
+            (0..self.angles.count).filter(|&k| !self.angles.are_close(best, k) && summit(k));
+        others.filter(|&k| self.at(k) > 0.0).reduce(|second, k| {
+            if self.at(k) > self.at(second) {
+                k
+            } else {
+                second
+            }
+        })
     }
 
     fn estimate(&self, found: &Found) -> JointEstimate {
@@ -239,18 +277,32 @@ impl ExhaustiveSearch {
             angle_rad: wrapped(found.angle_rad),
             variance_rad2: self.angle_variance(score, found.over_angles.curvature),
             score,
-            runner_up: second.map(|k| RotationRunnerUp { angle_rad: self.angle(found, k), score: self.at(k) }),
+            runner_up: second.map(|k| RotationRunnerUp {
+                angle_rad: self.angle(found, k),
+                score: self.at(k),
+            }),
         };
         let turn = Rotation2::new(found.angle_rad);
         let place = translation(found.angle_rad, found.shift, self.cell_m);
         let guess = guess(self.config.reach_m);
         let hessian = &found.over_shifts.hessian;
-        let spread = shift_covariance(self.config.variance_scale, score, hessian, self.cell_m, guess);
+        let spread = shift_covariance(
+            self.config.variance_scale,
+            score,
+            hessian,
+            self.cell_m,
+            guess,
+        );
         let motion = MotionEstimate {
             x_m: place.x,
             y_m: place.y,
             yaw_rad: rotation.angle_rad,
-            covariance: motion_covariance(&turn, spread, self.follows(found), rotation.variance_rad2),
+            covariance: motion_covariance(
+                &turn,
+                spread,
+                self.follows(found),
+                rotation.variance_rad2,
+            ),
             score,
             runner_up: self.runner_up(found, second),
             half_turn: false,
@@ -261,8 +313,13 @@ impl ExhaustiveSearch {
     /// (1 - score) over the curvature of the best scores along the angle, scaled as the shift's: the angle's variance
     /// whatever the shift is.
     fn angle_variance(&self, score: f64, curvature: f64) -> f64 {
-        let variance = -self.config.variance_scale * (1.0 - score).max(1e-6) / curvature * self.angles.step.powi(2);
-        if variance > 0.0 { variance.min(self.angles.guess()) } else { self.angles.guess() }
+        let variance = -self.config.variance_scale * (1.0 - score).max(1e-6) / curvature
+            * self.angles.step.powi(2);
+        if variance > 0.0 {
+            variance.min(self.angles.guess())
+        } else {
+            self.angles.guess()
+        }
     }
 
     /// How x and y follow the angle along the ridge of the scores, m/rad, from the best shifts at the angles beside.
@@ -275,17 +332,39 @@ impl ExhaustiveSearch {
         let slope = (after - before) / (2.0 * self.angles.step);
         // No cell is farther from the sensor: what seems to be moves on to another peak.
         let farthest = self.n as f64 * self.cell_m * FRAC_1_SQRT_2;
-        if slope.norm() <= farthest { slope } else { Vector2::zeros() }
+        if slope.norm() <= farthest {
+            slope
+        } else {
+            Vector2::zeros()
+        }
     }
 
     fn runner_up(&self, found: &Found, other_angle: Option<usize>) -> Option<MotionRunnerUp> {
-        let at = |place: Vector2<f64>, score| MotionRunnerUp { x_m: place.x, y_m: place.y, score };
-        let here = self.turned[0].scores.runner_up(found.highest).map(|((i, j), score)| {
-            at(translation(found.angle_rad, Vector2::new(i as f64, j as f64), self.cell_m), score)
-        });
+        let at = |place: Vector2<f64>, score| MotionRunnerUp {
+            x_m: place.x,
+            y_m: place.y,
+            score,
+        };
+        let here = self.turned[0]
+            .scores
+            .runner_up(found.highest)
+            .map(|((i, j), score)| {
+                at(
+                    translation(
+                        found.angle_rad,
+                        Vector2::new(i as f64, j as f64),
+                        self.cell_m,
+                    ),
+                    score,
+                )
+            });
         let there = other_angle.map(|k| at(self.candidates[k].place, self.at(k)));
         match (here, there) {
-            (Some(here), Some(there)) => Some(if there.score > here.score { there } else { here }),
+            (Some(here), Some(there)) => Some(if there.score > here.score {
+                there
+            } else {
+                here
+            }),
             (one, other) => one.or(other),
         }
     }
@@ -296,9 +375,18 @@ impl ExhaustiveSearch {
     }
 
     fn no_match(&self, prior_rad: f64) -> JointEstimate {
-        let (guess, angle_rad, variance_rad2) = (guess(self.config.reach_m), wrapped(prior_rad), self.angles.guess());
+        let (guess, angle_rad, variance_rad2) = (
+            guess(self.config.reach_m),
+            wrapped(prior_rad),
+            self.angles.guess(),
+        );
         JointEstimate {
-            rotation: RotationEstimate { angle_rad, variance_rad2, score: 0.0, runner_up: None },
+            rotation: RotationEstimate {
+                angle_rad,
+                variance_rad2,
+                score: 0.0,
+                runner_up: None,
+            },
             motion: MotionEstimate {
                 x_m: 0.0,
                 y_m: 0.0,
@@ -316,7 +404,10 @@ impl Turned {
     /// g'(x) = g(R x + o), so that f(x) ~ g'(x + R^T (t - o)); and its energy where it is asked for.
     fn turn(&mut self, earlier: &[f32], n: usize, angle_rad: f64, offset: f64, overlap: Overlap) {
         let rotation = Rotation::new(n, angle_rad).with_offset(offset);
-        self.raster.chunks_exact_mut(n).enumerate().for_each(|(r, row)| rotation.row(earlier, r, row));
+        self.raster
+            .chunks_exact_mut(n)
+            .enumerate()
+            .for_each(|(r, row)| rotation.row(earlier, r, row));
         if overlap == Overlap::Energy {
             self.energy.measure(&self.raster);
         }
@@ -324,10 +415,15 @@ impl Turned {
 
     /// The best match of a raster that was turned with [`OFFSET`].
     fn best(&self, kind: Peak, angle_rad: f64, cell_m: f64) -> Candidate {
-        let Some(highest) = self.scores.highest() else { return Candidate::default() };
+        let Some(highest) = self.scores.highest() else {
+            return Candidate::default();
+        };
         let peak = self.scores.peak(kind, highest);
         let place = translation(angle_rad, self.scores.place(kind, highest, &peak), cell_m);
-        Candidate { score: peak.value, place: place - Vector2::repeat(OFFSET * cell_m) }
+        Candidate {
+            score: peak.value,
+            place: place - Vector2::repeat(OFFSET * cell_m),
+        }
     }
 }
 

@@ -47,7 +47,11 @@ pub(crate) struct Columns {
 impl Columns {
     pub fn new(count: usize, len: usize) -> Self {
         let stride = (len.div_ceil(BLOCK) | 1) * BLOCK;
-        Self { data: vec![Complex32::default(); count * stride], len, stride }
+        Self {
+            data: vec![Complex32::default(); count * stride],
+            len,
+            stride,
+        }
     }
 
     pub fn column(&self, c: usize) -> &[Complex32] {
@@ -77,7 +81,12 @@ impl Columns {
     }
 
     /// Reads the first `width` values of some rows into `block`, row after row.
-    pub fn read_rows(&self, rows: impl Iterator<Item = usize> + Clone, block: &mut [Complex32], width: usize) {
+    pub fn read_rows(
+        &self,
+        rows: impl Iterator<Item = usize> + Clone,
+        block: &mut [Complex32],
+        width: usize,
+    ) {
         for (c, column) in self.data.chunks_exact(self.stride).take(width).enumerate() {
             for (r, row) in rows.clone().enumerate() {
                 block[r * width + c] = column[row];
@@ -102,13 +111,19 @@ pub(crate) struct Transform {
 impl Transform {
     pub fn new(planner: &mut FftPlanner<f32>, size: usize, direction: FftDirection) -> Self {
         let fft = planner.plan_fft(size, direction);
-        let scratch = fft.get_inplace_scratch_len().max(fft.get_immutable_scratch_len());
-        Self { fft, scratch: vec![Complex32::default(); scratch] }
+        let scratch = fft
+            .get_inplace_scratch_len()
+            .max(fft.get_immutable_scratch_len());
+        Self {
+            fft,
+            scratch: vec![Complex32::default(); scratch],
+        }
     }
 
     /// Transforms a line into another place.
     pub fn line_into(&mut self, line: &[Complex32], out: &mut [Complex32]) {
-        self.fft.process_immutable_with_scratch(line, out, &mut self.scratch);
+        self.fft
+            .process_immutable_with_scratch(line, out, &mut self.scratch);
     }
 
     /// Transforms a line, or several that lie behind each other.
@@ -133,11 +148,19 @@ pub(crate) struct RowPass {
 impl RowPass {
     pub fn new(planner: &mut FftPlanner<f32>, size: usize) -> Self {
         let row = Transform::new(planner, size, FftDirection::Forward);
-        Self { row, block: vec![Complex32::default(); BLOCK * size] }
+        Self {
+            row,
+            block: vec![Complex32::default(); BLOCK * size],
+        }
     }
 
     /// Transforms `rows` rows into the first ones of `plane`; `fill(r, row)` writes the start of row r, the rest is zero.
-    pub fn forward(&mut self, plane: &mut Columns, rows: usize, mut fill: impl FnMut(usize, &mut [Complex32])) {
+    pub fn forward(
+        &mut self,
+        plane: &mut Columns,
+        rows: usize,
+        mut fill: impl FnMut(usize, &mut [Complex32]),
+    ) {
         let size = plane.len;
         for first in (0..rows).step_by(BLOCK) {
             let some = BLOCK.min(rows - first);
@@ -187,7 +210,9 @@ impl RealSpectrum {
             for (r, out) in self.block.chunks_exact_mut(width).take(some).enumerate() {
                 self.real.fill(0.0);
                 fill(first + r, &mut self.real);
-                let done = self.row.process_with_scratch(&mut self.real, out, &mut self.scratch);
+                let done = self
+                    .row
+                    .process_with_scratch(&mut self.real, out, &mut self.scratch);
                 debug_assert!(done.is_ok(), "lengths are those of the plan");
             }
             self.plane.write_rows(first, some, &self.block, width);
@@ -251,7 +276,8 @@ impl PairSpectrum {
     /// G conj(F) = Im(Z(k) Z(-k)) / 2 - i (|Z(k)|^2 - |Z(-k)|^2) / 4.
     pub fn cross(&mut self) {
         for c in 0..=self.size / 2 {
-            self.mirror.copy_from_slice(self.plane.column((self.size - c) % self.size));
+            self.mirror
+                .copy_from_slice(self.plane.column((self.size - c) % self.size));
             let (head, tail) = self.plane.column_mut(c).split_at_mut(1);
             kernels::cross_of_pair(head, &self.mirror[..1]);
             kernels::cross_of_pair(tail, &self.mirror[1..]);
@@ -268,11 +294,19 @@ impl PairSpectrum {
         let width = self.size / 2 + 1;
         self.inverse_columns.columns(&mut self.plane, width);
         for (b, some) in rows.chunks(BLOCK).enumerate() {
-            self.plane.read_rows(some.iter().copied(), &mut self.block, width);
-            for (r, half) in self.block.chunks_exact_mut(width).take(some.len()).enumerate() {
+            self.plane
+                .read_rows(some.iter().copied(), &mut self.block, width);
+            for (r, half) in self
+                .block
+                .chunks_exact_mut(width)
+                .take(some.len())
+                .enumerate()
+            {
                 half[0].im = 0.0;
                 half[width - 1].im = 0.0;
-                let done = self.inverse_row.process_with_scratch(half, &mut self.real, &mut self.scratch);
+                let done =
+                    self.inverse_row
+                        .process_with_scratch(half, &mut self.real, &mut self.scratch);
                 debug_assert!(done.is_ok(), "lengths are those of the plan");
                 take(b * BLOCK + r, &self.real);
             }
@@ -290,10 +324,21 @@ mod tests {
     fn fast_sizes_have_small_factors_and_waste_little() {
         for least in 2..3000 {
             let size = fast_size(least);
-            assert!(size >= least && size.is_multiple_of(2) && only_factors(size, &[2, 3, 5, 11]), "{least}: {size}");
+            assert!(
+                size >= least && size.is_multiple_of(2) && only_factors(size, &[2, 3, 5, 11]),
+                "{least}: {size}"
+            );
             assert!(size * 3 <= least * 4 || least < 16, "{least}: {size}");
         }
-        assert_eq!([fast_size(255), fast_size(288), fast_size(511), fast_size(544)], [256, 288, 512, 576]);
+        assert_eq!(
+            [
+                fast_size(255),
+                fast_size(288),
+                fast_size(511),
+                fast_size(544)
+            ],
+            [256, 288, 512, 576]
+        );
     }
 
     #[test]
@@ -301,7 +346,9 @@ mod tests {
         let (n, size, kept) = (11, 16, 5);
         let image: Vec<f32> = (0..n * n).map(|k| ((k * 29) % 13) as f32).collect();
         let mut spectrum = RealSpectrum::new(size, kept);
-        spectrum.forward(n, |r, out| out[..n].copy_from_slice(&image[r * n..(r + 1) * n]));
+        spectrum.forward(n, |r, out| {
+            out[..n].copy_from_slice(&image[r * n..(r + 1) * n])
+        });
         for c in 0..kept {
             for k in 0..size {
                 let direct: Complex32 = (0..n * n)
@@ -310,7 +357,10 @@ mod tests {
                         Complex32::from_polar(image[i], -std::f32::consts::TAU * turns)
                     })
                     .sum();
-                assert!((spectrum.plane.column(c)[k] - direct).norm() < 0.01, "{c} {k}");
+                assert!(
+                    (spectrum.plane.column(c)[k] - direct).norm() < 0.01,
+                    "{c} {k}"
+                );
             }
         }
     }

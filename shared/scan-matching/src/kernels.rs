@@ -33,7 +33,8 @@ impl Bilinear {
     unsafe fn value(self, image: &[f32], stride: usize) -> f32 {
         let at = self.at as usize;
         // SAFETY: the caller's promise; the other three places are smaller.
-        let [a, b, c, d] = [at, at + 1, at + stride, at + stride + 1].map(|k| unsafe { *image.get_unchecked(k) });
+        let [a, b, c, d] =
+            [at, at + 1, at + stride, at + stride + 1].map(|k| unsafe { *image.get_unchecked(k) });
         let first = a + self.along * (b - a);
         let second = c + self.along * (d - c);
         first + self.across * (second - first)
@@ -44,8 +45,18 @@ impl Bilinear {
 ///
 /// `start` and `step` are (row, column) in cells. The caller keeps the line within the image; a sample that rounding
 /// puts outside is moved to the edge.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
-pub(crate) fn bilinear_line(image: &[f32], n: usize, start: [f64; 2], step: [f64; 2], out: &mut [f32]) {
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
+pub(crate) fn bilinear_line(
+    image: &[f32],
+    n: usize,
+    start: [f64; 2],
+    step: [f64; 2],
+    out: &mut [f32],
+) {
     assert!((2..1 << 15).contains(&n) && image.len() >= n * n && out.len() < 1 << 15);
     let last = (n - 2) as f32;
     let [row, col] = start.map(|s| s as f32);
@@ -56,26 +67,41 @@ pub(crate) fn bilinear_line(image: &[f32], n: usize, start: [f64; 2], step: [f64
         // SAFETY: `max` and `min` leave a number in 0..=n - 2 whatever u and v are, NaN included. The checked conversion
         // takes longer than all the rest.
         let [i, j] = [u, v].map(|w| unsafe { w.max(0.0).min(last).to_int_unchecked::<i32>() });
-        let sample = Bilinear { at: (i * n as i32 + j) as u32, along: v - j as f32, across: u - i as f32 };
+        let sample = Bilinear {
+            at: (i * n as i32 + j) as u32,
+            along: v - j as f32,
+            across: u - i as f32,
+        };
         // SAFETY: i and j are at most n - 2, and the image has n x n cells.
         *value = unsafe { sample.value(image, n) };
     }
 }
 
 /// Bilinear values at the places of a table, in an image with rows of `stride`.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 pub(crate) fn bilinear_table(image: &[f32], stride: usize, table: &[Bilinear], out: &mut [f32]) {
     assert!(image.len() >= stride + 2 && image.len() < 1 << 31);
     let last = (image.len() - stride - 2) as u32;
     for (value, &sample) in out.iter_mut().zip(table) {
-        let sample = Bilinear { at: sample.at.min(last), ..sample };
+        let sample = Bilinear {
+            at: sample.at.min(last),
+            ..sample
+        };
         // SAFETY: `at` is at most the image's length less stride + 2.
         *value = unsafe { sample.value(image, stride) };
     }
 }
 
 /// Row times window; what is not finite counts as zero.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 pub(crate) fn weigh(row: &[f32], window: &[f32], out: &mut [f32]) {
     for ((o, &v), &w) in out.iter_mut().zip(row).zip(window) {
         *o = if v.is_finite() { v * w } else { 0.0 };
@@ -83,7 +109,11 @@ pub(crate) fn weigh(row: &[f32], window: &[f32], out: &mut [f32]) {
 }
 
 /// A copy in which what is not finite is zero.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 pub(crate) fn finite_copy(from: &[f32], to: &mut [f32]) {
     for (t, &v) in to.iter_mut().zip(from) {
         *t = if v.is_finite() { v } else { 0.0 };
@@ -91,7 +121,11 @@ pub(crate) fn finite_copy(from: &[f32], to: &mut [f32]) {
 }
 
 /// Adds the square of each value to `sums`; returns the sum of the squares.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 pub(crate) fn add_squares(row: &[f32], sums: &mut [f32]) -> f32 {
     let mut lanes = [0.0; LANES];
     let (mut values, mut sums) = (row.chunks_exact(LANES), sums.chunks_exact_mut(LANES));
@@ -101,7 +135,12 @@ pub(crate) fn add_squares(row: &[f32], sums: &mut [f32]) -> f32 {
             lanes[k] += v[k] * v[k];
         }
     }
-    for (k, (&v, sum)) in values.remainder().iter().zip(sums.into_remainder()).enumerate() {
+    for (k, (&v, sum)) in values
+        .remainder()
+        .iter()
+        .zip(sums.into_remainder())
+        .enumerate()
+    {
         *sum += v * v;
         lanes[k] += v * v;
     }
@@ -109,7 +148,11 @@ pub(crate) fn add_squares(row: &[f32], sums: &mut [f32]) -> f32 {
 }
 
 /// Sum of |z|^2.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 pub(crate) fn energy(values: &[Complex32]) -> f32 {
     let mut lanes = [0.0; LANES];
     for chunk in values.chunks(LANES) {
@@ -121,7 +164,11 @@ pub(crate) fn energy(values: &[Complex32]) -> f32 {
 }
 
 /// |z| of each value.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 pub(crate) fn modulus(spectrum: &[Complex32], out: &mut [f32]) {
     for (m, z) in out.iter_mut().zip(spectrum) {
         *m = (z.re * z.re + z.im * z.im).sqrt();
@@ -129,7 +176,11 @@ pub(crate) fn modulus(spectrum: &[Complex32], out: &mut [f32]) {
 }
 
 /// cross += g conj(f)
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 pub(crate) fn add_cross(f: &[Complex32], g: &[Complex32], cross: &mut [Complex32]) {
     for ((c, f), g) in cross.iter_mut().zip(f).zip(g) {
         c.re += g.re * f.re + g.im * f.im;
@@ -138,7 +189,11 @@ pub(crate) fn add_cross(f: &[Complex32], g: &[Complex32], cross: &mut [Complex32
 }
 
 /// g + i h.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 pub(crate) fn interleave(g: &[f32], h: &[f32], out: &mut [Complex32]) {
     for ((z, &g), &h) in out.iter_mut().zip(g).zip(h) {
         *z = Complex32::new(g, h);
@@ -146,7 +201,11 @@ pub(crate) fn interleave(g: &[f32], h: &[f32], out: &mut [Complex32]) {
 }
 
 /// z *= w
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 pub(crate) fn multiply(column: &mut [Complex32], by: &[Complex32]) {
     for (z, w) in column.iter_mut().zip(by) {
         *z = Complex32::new(z.re * w.re - z.im * w.im, z.re * w.im + z.im * w.re);
@@ -154,7 +213,11 @@ pub(crate) fn multiply(column: &mut [Complex32], by: &[Complex32]) {
 }
 
 /// Im(z m) / 2 - i (|z|^2 - |m|^2) / 4 in place of z, where `mirror` holds m in reverse order.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 pub(crate) fn cross_of_pair(column: &mut [Complex32], mirror: &[Complex32]) {
     for (z, m) in column.iter_mut().zip(mirror.iter().rev()) {
         let re = 0.5 * (z.re * m.im + z.im * m.re);
@@ -164,16 +227,28 @@ pub(crate) fn cross_of_pair(column: &mut [Complex32], mirror: &[Complex32]) {
 }
 
 /// Divides each score by the share of `energy` that both rasters have left in the overlap; `f` is in reverse order.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 pub(crate) fn divide_by_share(scores: &mut [f32], f: &[f64], g: &[f64], energy: f64) {
     for ((score, &f), &g) in scores.iter_mut().zip(f.iter().rev()).zip(g) {
         let share = (f * g).sqrt() / energy;
-        *score = if share > LEAST_SHARE { (f64::from(*score) / share) as f32 } else { 0.0 };
+        *score = if share > LEAST_SHARE {
+            (f64::from(*score) / share) as f32
+        } else {
+            0.0
+        };
     }
 }
 
 /// ln(1 + scale m) of each value, all at least 0, to 2e-6 relative.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 pub(crate) fn log1p_scaled(values: &mut [f32], scale: f32) {
     for m in values {
         *m = ln(1.0 + scale * *m);
@@ -220,7 +295,16 @@ mod tests {
         let image = [1.0; 25];
         let mut out = [0.0; 5];
         bilinear_line(&image, 5, [f64::NAN, -1e30], [1e30, f64::NAN], &mut out);
-        bilinear_table(&image, 5, &[Bilinear { at: u32::MAX, along: 0.5, across: 0.5 }; 5], &mut out);
+        bilinear_table(
+            &image,
+            5,
+            &[Bilinear {
+                at: u32::MAX,
+                along: 0.5,
+                across: 0.5,
+            }; 5],
+            &mut out,
+        );
         assert_eq!(out, [1.0; 5]);
     }
 }

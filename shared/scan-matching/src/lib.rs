@@ -61,11 +61,14 @@ mod warp;
 mod whiten;
 mod window;
 
-pub use config::{ConfigError, Magnitude, Overlap, Peak, RotationConfig, RotationForm, TranslationConfig, Window};
+pub use config::{
+    ConfigError, Magnitude, Overlap, Peak, RotationConfig, RotationForm, TranslationConfig, Window,
+};
 pub use exhaustive::{ExhaustiveConfig, ExhaustiveSearch, JointEstimate};
 pub use fft::fast_size;
 pub use refinement::{
-    Anchor, Hypothesis, Keyframe, Memory, Outcome, Refined, Refinement, RefinementConfig, RefinementKind, ScanPoint,
+    Anchor, Hypothesis, Keyframe, Memory, Outcome, Refined, Refinement, RefinementConfig,
+    RefinementKind, ScanPoint,
 };
 pub use rotation::{RotationEstimate, RotationRunnerUp, RotationSearch};
 pub use spectrum::PolarSpectrum;
@@ -84,5 +87,13 @@ pub struct ShapeError {
 }
 
 fn expect_shape(what: &'static str, actual: usize, expected: usize) -> Result<(), ShapeError> {
-    if actual == expected { Ok(()) } else { Err(ShapeError { what, actual, expected }) }
+    if actual == expected {
+        Ok(())
+    } else {
+        Err(ShapeError {
+            what,
+            actual,
+            expected,
+        })
+    }
 }

@@ -48,7 +48,10 @@ impl OverlapEnergy {
     /// Centre of the energy, cells down and right of the middle; zero where there is none.
     pub fn centre(&self) -> Vector2<f64> {
         let moment = |sums: &[f32]| -> f64 {
-            sums.iter().enumerate().map(|(k, &e)| (k as f64 - (self.n - 1) as f64 / 2.0) * f64::from(e)).sum()
+            sums.iter()
+                .enumerate()
+                .map(|(k, &e)| (k as f64 - (self.n - 1) as f64 / 2.0) * f64::from(e))
+                .sum()
         };
         if self.total > 0.0 {
             Vector2::new(moment(&self.rows), moment(&self.columns)) / self.total
@@ -83,9 +86,17 @@ impl OverlapEnergy {
         let (rows, columns) = (&self.edges[vertical], &self.edges[horizontal]);
         self.corner.fill(0.0);
         for (a, &above) in rows.iter().enumerate().take(side) {
-            let row = if vertical == TOP { a.wrapping_sub(1) } else { n - a };
+            let row = if vertical == TOP {
+                a.wrapping_sub(1)
+            } else {
+                n - a
+            };
             let down = a * (2 * side - 1);
-            let line = if vertical == TOP { middle + down } else { middle - down };
+            let line = if vertical == TOP {
+                middle + down
+            } else {
+                middle - down
+            };
             let mut along = 0.0;
             for (b, &beside) in columns.iter().enumerate().take(side) {
                 if a > 0 && b > 0 {
@@ -94,7 +105,11 @@ impl OverlapEnergy {
                     self.corner[b] += along;
                 }
                 let lost = above + beside - self.corner[b];
-                let place = if horizontal == LEFT { line + b } else { line - b };
+                let place = if horizontal == LEFT {
+                    line + b
+                } else {
+                    line - b
+                };
                 self.left[place] = (self.total - lost).max(0.0);
             }
         }
@@ -120,7 +135,11 @@ mod tests {
             energy.measure(&raster); // measuring again adds nothing
         }
         let kept = |k: usize, lost: isize| {
-            if lost >= 0 { k >= lost.unsigned_abs() } else { k < n - lost.unsigned_abs() }
+            if lost >= 0 {
+                k >= lost.unsigned_abs()
+            } else {
+                k < n - lost.unsigned_abs()
+            }
         };
         for down in -5..=5 {
             for right in -5..=5 {
@@ -129,7 +148,10 @@ mod tests {
                     .map(|k| f64::from(raster[k]).powi(2))
                     .sum();
                 let got = energy.left()[((down + 5) * 11 + right + 5) as usize];
-                assert!((got - direct).abs() <= 1e-6 * direct, "{down} {right}: {got} {direct}");
+                assert!(
+                    (got - direct).abs() <= 1e-6 * direct,
+                    "{down} {right}: {got} {direct}"
+                );
             }
         }
     }

@@ -51,24 +51,35 @@ pub(crate) fn line_peak(kind: Peak, sample: impl Fn(isize) -> f64) -> LinePeak {
         return line_parabola(near);
     }
     let height = log.value.exp();
-    LinePeak { offset: log.offset, value: level + height, curvature: height * log.curvature }
+    LinePeak {
+        offset: log.offset,
+        value: level + height,
+        curvature: height * log.curvature,
+    }
 }
 
 /// The maximum next to the highest sample, `sample(0, 0)`, of a plane.
 pub(crate) fn plane_peak(kind: Peak, sample: impl Fn(isize, isize) -> f64) -> PlanePeak {
-    let near = std::array::from_fn(|i| std::array::from_fn(|j| sample(i as isize - 1, j as isize - 1)));
+    let near =
+        std::array::from_fn(|i| std::array::from_fn(|j| sample(i as isize - 1, j as isize - 1)));
     if kind == Peak::Parabola {
         return plane_parabola(near);
     }
     let reach = SUPPORT as isize;
     let level = pedestal(
-        (-reach..=reach).flat_map(|i| (-reach..=reach).map(move |j| (i, j))).map(|(i, j)| sample(i, j)),
+        (-reach..=reach)
+            .flat_map(|i| (-reach..=reach).map(move |j| (i, j)))
+            .map(|(i, j)| sample(i, j)),
         near[1][1],
     );
     match paraboloid(near.map(|row: [f64; 3]| row.map(|v| (v - level).ln()))) {
         Some(log) => {
             let height = log.value.exp();
-            PlanePeak { offset: log.offset, value: level + height, hessian: log.hessian * height }
+            PlanePeak {
+                offset: log.offset,
+                value: level + height,
+                hessian: log.hessian * height,
+            }
         }
         None => plane_parabola(near),
     }
@@ -82,8 +93,16 @@ fn pedestal(around: impl Iterator<Item = f64>, highest: f64) -> f64 {
 
 fn line_parabola([a, b, c]: [f64; 3]) -> LinePeak {
     let curvature = a - 2.0 * b + c;
-    let offset = if curvature < 0.0 { (0.5 * (a - c) / curvature).clamp(-FARTHEST, FARTHEST) } else { 0.0 };
-    LinePeak { offset, value: b - 0.25 * (a - c) * offset, curvature }
+    let offset = if curvature < 0.0 {
+        (0.5 * (a - c) / curvature).clamp(-FARTHEST, FARTHEST)
+    } else {
+        0.0
+    };
+    LinePeak {
+        offset,
+        value: b - 0.25 * (a - c) * offset,
+        curvature,
+    }
 }
 
 /// One parabola through three samples of each axis; the corners give the cross term.
@@ -101,15 +120,26 @@ fn plane_parabola(near: [[f64; 3]; 3]) -> PlanePeak {
 /// Maximum of the paraboloid that fits nine samples best; `None` where it has none nearby.
 fn paraboloid(near: [[f64; 3]; 3]) -> Option<PlanePeak> {
     let sum = |weight: fn(f64, f64) -> f64| -> f64 {
-        (0..9).map(|k| weight((k / 3) as f64 - 1.0, (k % 3) as f64 - 1.0) * near[k / 3][k % 3]).sum()
+        (0..9)
+            .map(|k| weight((k / 3) as f64 - 1.0, (k % 3) as f64 - 1.0) * near[k / 3][k % 3])
+            .sum()
     };
     let gradient = Vector2::new(sum(|i, _| i), sum(|_, j| j)) / 6.0;
     let cross = sum(|i, j| i * j) / 4.0;
-    let hessian = Matrix2::new(sum(|i, _| 3.0 * i * i - 2.0) / 3.0, cross, cross, sum(|_, j| 3.0 * j * j - 2.0) / 3.0);
+    let hessian = Matrix2::new(
+        sum(|i, _| 3.0 * i * i - 2.0) / 3.0,
+        cross,
+        cross,
+        sum(|_, j| 3.0 * j * j - 2.0) / 3.0,
+    );
     let mean = sum(|i, j| 5.0 - 3.0 * (i * i + j * j)) / 9.0;
     let offset = hessian.try_inverse()? * -gradient;
     let summit = hessian[(0, 0)] < 0.0 && hessian.determinant() > 0.0 && offset.amax() <= FARTHEST;
-    summit.then(|| PlanePeak { offset, value: mean + 0.5 * gradient.dot(&offset), hessian })
+    summit.then(|| PlanePeak {
+        offset,
+        value: mean + 0.5 * gradient.dot(&offset),
+        hessian,
+    })
 }
 
 /// Weighted mean of positions, their scores normalised as [`Peak::SoftArgmax`] says.
@@ -120,16 +150,22 @@ pub(crate) fn soft_argmax<const D: usize>(
     highest: f64,
     scored: impl Iterator<Item = ([f64; D], f64)> + Clone,
 ) -> [f64; D] {
-    let (count, sum, squares) = scored
-        .clone()
-        .fold((0.0, 0.0, 0.0), |(n, s, q), (_, c)| (n + 1.0, s + (c - highest), q + (c - highest).powi(2)));
+    let (count, sum, squares) = scored.clone().fold((0.0, 0.0, 0.0), |(n, s, q), (_, c)| {
+        (n + 1.0, s + (c - highest), q + (c - highest).powi(2))
+    });
     let deviation = (squares / count - (sum / count).powi(2)).max(0.0).sqrt();
     let (mut mean, mut total) = ([0.0; D], 0.0);
     for (position, score) in scored {
-        let z = if deviation > 0.0 { (score - highest) / deviation } else { 0.0 };
+        let z = if deviation > 0.0 {
+            (score - highest) / deviation
+        } else {
+            0.0
+        };
         let weight = (temperature * z).exp();
         total += weight;
-        mean.iter_mut().zip(position).for_each(|(m, p)| *m += weight * p);
+        mean.iter_mut()
+            .zip(position)
+            .for_each(|(m, p)| *m += weight * p);
     }
     mean.map(|m| m / total)
 }
@@ -163,18 +199,27 @@ mod tests {
 
     #[test]
     fn curvature_is_the_second_derivative_at_the_summit() {
-        let peak = line_peak(Peak::Gaussian, |j| 3.0 + (-0.5 * (j as f64 / 1.3).powi(2)).exp());
+        let peak = line_peak(Peak::Gaussian, |j| {
+            3.0 + (-0.5 * (j as f64 / 1.3).powi(2)).exp()
+        });
         assert!((peak.curvature * 1.69 + 1.0).abs() < 0.05, "{peak:?}");
     }
 
     #[test]
     fn elongated_peak_keeps_its_orientation() {
-        let f = |u: f64, v: f64| (-0.5 * ((u + v) / 2.5).powi(2) - 0.5 * ((u - v) / 1.2).powi(2)).exp();
+        let f =
+            |u: f64, v: f64| (-0.5 * ((u + v) / 2.5).powi(2) - 0.5 * ((u - v) / 1.2).powi(2)).exp();
         for (kind, tolerance) in [(Peak::Gaussian, 0.02), (Peak::Parabola, 0.25)] {
             let peak = plane_peak(kind, |i, j| f(i as f64 - 0.3, j as f64 + 0.2));
-            assert!((peak.offset - Vector2::new(0.3, -0.2)).amax() < tolerance, "{kind:?} {peak:?}");
+            assert!(
+                (peak.offset - Vector2::new(0.3, -0.2)).amax() < tolerance,
+                "{kind:?} {peak:?}"
+            );
             let want = Matrix2::new(-0.85, 0.53, 0.53, -0.85);
-            assert!((peak.hessian - want).amax() < 0.4 && peak.hessian[(0, 1)] > 0.15, "{kind:?} {peak:?}");
+            assert!(
+                (peak.hessian - want).amax() < 0.4 && peak.hessian[(0, 1)] > 0.15,
+                "{kind:?} {peak:?}"
+            );
         }
     }
 
@@ -191,7 +236,8 @@ mod tests {
     #[test]
     fn soft_argmax_does_not_change_when_scores_are_scaled() {
         let at = |scale: f64| {
-            let scored = (-20..=20).map(move |k| ([f64::from(k)], scale * bump(f64::from(k) / 2.0 - 0.4, 1.0)));
+            let scored = (-20..=20)
+                .map(move |k| ([f64::from(k)], scale * bump(f64::from(k) / 2.0 - 0.4, 1.0)));
             soft_argmax(8.0, scale * bump(0.1, 1.0), scored)[0]
         };
         assert!((at(1.0) - at(1000.0)).abs() < 1e-9);

@@ -28,7 +28,10 @@ impl PolarGrid {
     /// theta_k = -pi/2 + k pi / angles: no angle is counted twice (the paper's Linspace counts both ends).
     pub fn new(n: usize, size: usize, config: &RotationConfig) -> Self {
         let (low, high) = (config.band_low, config.band_high);
-        let radii = config.radii.unwrap_or(((high - low) * n as f64).ceil() as usize).max(2);
+        let radii = config
+            .radii
+            .unwrap_or(((high - low) * n as f64).ceil() as usize)
+            .max(2);
         let bins = (high * size as f64).floor() as usize + 1;
         let sample = |r: usize, k: usize| {
             let rho = (low + (high - low) * r as f64 / (radii - 1) as f64) * size as f64;
@@ -39,7 +42,9 @@ impl PolarGrid {
             kind: config.magnitude,
             bins,
             magnitude: vec![0.0; (bins + 1) * (2 * bins + 1)],
-            table: (0..radii).flat_map(|r| (0..config.angles).map(move |k| sample(r, k))).collect(),
+            table: (0..radii)
+                .flat_map(|r| (0..config.angles).map(move |k| sample(r, k)))
+                .collect(),
             angles: config.angles,
             radii,
         }
@@ -66,7 +71,12 @@ impl PolarGrid {
     /// Writes the samples of radius `r` over half a turn.
     pub fn ring(&self, r: usize, out: &mut [f32]) {
         let stride = 2 * self.bins + 1;
-        kernels::bilinear_table(&self.magnitude, stride, &self.table[r * self.angles..][..self.angles], out);
+        kernels::bilinear_table(
+            &self.magnitude,
+            stride,
+            &self.table[r * self.angles..][..self.angles],
+            out,
+        );
     }
 }
 
@@ -74,8 +84,15 @@ impl PolarGrid {
 fn sample_at(u: f64, v: f64, bins: usize) -> Bilinear {
     let (u, v) = if v < 0.0 { (-u, -v) } else { (u, v) };
     let row = (u + bins as f64).clamp(0.0, 2.0 * bins as f64);
-    let (i, j) = ((row.floor() as usize).min(2 * bins - 1), (v.floor() as usize).min(bins - 1));
-    Bilinear { at: (j * (2 * bins + 1) + i) as u32, along: (row - i as f64) as f32, across: (v - j as f64) as f32 }
+    let (i, j) = (
+        (row.floor() as usize).min(2 * bins - 1),
+        (v.floor() as usize).min(bins - 1),
+    );
+    Bilinear {
+        at: (j * (2 * bins + 1) + i) as u32,
+        along: (row - i as f64) as f32,
+        across: (v - j as f64) as f32,
+    }
 }
 
 /// ln(1 + m / mean): the same for every gain of the radar.

@@ -168,7 +168,11 @@ impl Refinement {
     ) -> Refined {
         // Stamps that stand still say nothing about velocities: as if a second had passed.
         let interval_s = if interval_s > 0.0 { interval_s } else { 1.0 };
-        let query = Query { points: later, searched: self.memory.pose * searched, interval_s };
+        let query = Query {
+            points: later,
+            searched: self.memory.pose * searched,
+            interval_s,
+        };
         if self.keyframes.is_empty() {
             self.begin(id.wrapping_sub(1), earlier, &query);
         }
@@ -199,7 +203,11 @@ impl Refinement {
     /// Where to start from; the same place again counts once.
     fn starts(&self, query: &Query<'_>) -> [(Hypothesis, Isometry2<f64>); 3] {
         let [prediction, before] = self.memory.foretell(query.interval_s);
-        [(Hypothesis::Prediction, prediction), (Hypothesis::Search, query.searched), (Hypothesis::Prediction, before)]
+        [
+            (Hypothesis::Prediction, prediction),
+            (Hypothesis::Search, query.searched),
+            (Hypothesis::Prediction, before),
+        ]
     }
 
     /// Descends from each start on the coarse map, and from the best of them on the fine one.
@@ -207,23 +215,36 @@ impl Refinement {
         let coarse = self.keyframes.coarse();
         let mut best: Option<(Hypothesis, Match, bool)> = None;
         for (k, (hypothesis, start)) in starts.iter().enumerate() {
-            if starts[..k].iter().any(|(_, other)| self.in_one_valley(start, other)) {
+            if starts[..k]
+                .iter()
+                .any(|(_, other)| self.in_one_valley(start, other))
+            {
                 continue;
             }
             // By the start's own motion: in a sweep of a second, that of the scan before is ten degrees off where a turn begins.
-            self.placed.place(query.points, &self.memory.velocity_to(start, query.interval_s));
+            self.placed.place(
+                query.points,
+                &self.memory.velocity_to(start, query.interval_s),
+            );
             self.placed.thin(COARSE_POINTS);
             let found = register(&coarse, &self.placed, start, COARSE_STEPS);
-            let allowed = self.memory.allows(&found.pose, query.interval_s, 1.0, &self.config);
+            let allowed = self
+                .memory
+                .allows(&found.pose, query.interval_s, 1.0, &self.config);
             let better = best.is_none_or(|(_, best, best_allowed)| match (allowed, best_allowed) {
-                (true, true) | (false, false) => found.normal.overlap > CLEARLY_BETTER * best.normal.overlap,
+                (true, true) | (false, false) => {
+                    found.normal.overlap > CLEARLY_BETTER * best.normal.overlap
+                }
                 (allowed, _) => allowed,
             });
             if better {
                 best = Some((*hypothesis, found, allowed));
             }
         }
-        let (hypothesis, pose) = best.map_or((Hypothesis::Prediction, self.memory.pose), |(h, m, _)| (h, m.pose));
+        let (hypothesis, pose) = best
+            .map_or((Hypothesis::Prediction, self.memory.pose), |(h, m, _)| {
+                (h, m.pose)
+            });
         let found = self.fine(query, pose);
         self.judge(query, hypothesis, found)
     }
@@ -231,14 +252,18 @@ impl Refinement {
     fn in_one_valley(&self, a: &Isometry2<f64>, b: &Isometry2<f64>) -> bool {
         let apart = a.inv_mul(b);
         let cell_m = self.config.cell_m * self.config.coarse;
-        apart.translation.vector.norm() <= SAME_VALLEY.0 * cell_m && apart.rotation.angle().abs() <= SAME_VALLEY.1
+        apart.translation.vector.norm() <= SAME_VALLEY.0 * cell_m
+            && apart.rotation.angle().abs() <= SAME_VALLEY.1
     }
 
     /// Matches on the fine map, the sweep undone by the motion found so far.
     fn fine(&mut self, query: &Query<'_>, mut pose: Isometry2<f64>) -> Match {
         let fine = self.keyframes.fine();
         let mut round = |pose: &Isometry2<f64>| {
-            self.placed.place(query.points, &self.memory.velocity_to(pose, query.interval_s));
+            self.placed.place(
+                query.points,
+                &self.memory.velocity_to(pose, query.interval_s),
+            );
             register(&fine, &self.placed, pose, FINE_STEPS)
         };
         for _ in 1..FINE_ROUNDS {
@@ -249,16 +274,42 @@ impl Refinement {
 
     fn judge(&self, query: &Query<'_>, hypothesis: Hypothesis, found: Match) -> Candidate {
         let weight = self.placed.total_weight();
-        let overlap = if weight > 0.0 { found.normal.overlap / weight } else { 0.0 };
-        let support = if self.memory.usual_weight > 0.0 { weight / self.memory.usual_weight } else { 1.0 };
-        let fits = overlap > 0.0 && overlap >= self.config.least_overlap * self.memory.usual_overlap;
-        let allowed = self.memory.allows(&found.pose, query.interval_s, support.min(1.0), &self.config);
-        Candidate { hypothesis, found, overlap, support, believed: fits && allowed }
+        let overlap = if weight > 0.0 {
+            found.normal.overlap / weight
+        } else {
+            0.0
+        };
+        let support = if self.memory.usual_weight > 0.0 {
+            weight / self.memory.usual_weight
+        } else {
+            1.0
+        };
+        let fits =
+            overlap > 0.0 && overlap >= self.config.least_overlap * self.memory.usual_overlap;
+        let allowed = self.memory.allows(
+            &found.pose,
+            query.interval_s,
+            support.min(1.0),
+            &self.config,
+        );
+        Candidate {
+            hypothesis,
+            found,
+            overlap,
+            support,
+            believed: fits && allowed,
+        }
     }
 
     /// Takes the candidate, or the prediction where it is not believed, and remembers.
     fn conclude(&mut self, id: u64, query: &Query<'_>, candidate: &Candidate) -> Refined {
-        let Candidate { hypothesis, found, overlap, support, believed } = *candidate;
+        let Candidate {
+            hypothesis,
+            found,
+            overlap,
+            support,
+            believed,
+        } = *candidate;
         let weight = self.placed.total_weight();
         let before = self.memory.pose;
         let (outcome, pose, covariance) = match self.covariance(&found, weight) {
@@ -268,19 +319,40 @@ impl Refinement {
             },
             _ => {
                 let [prediction, _] = self.memory.foretell(query.interval_s);
-                (Outcome::Predicted, prediction, memory::unmatched_covariance(query.interval_s, &self.config))
+                (
+                    Outcome::Predicted,
+                    prediction,
+                    memory::unmatched_covariance(query.interval_s, &self.config),
+                )
             }
         };
-        let hypothesis = if outcome == Outcome::Predicted { Hypothesis::Prediction } else { hypothesis };
+        let hypothesis = if outcome == Outcome::Predicted {
+            Hypothesis::Prediction
+        } else {
+            hypothesis
+        };
         let velocity = self.memory.velocity_to(&pose, query.interval_s);
-        self.memory.go_on(pose, outcome, [overlap, weight], query.interval_s, &self.config);
+        self.memory.go_on(
+            pose,
+            outcome,
+            [overlap, weight],
+            query.interval_s,
+            &self.config,
+        );
         if self.memory.unmatched >= self.config.patience {
             // The next scan is compared with this one alone, and the one after that with the next, until two are alike.
             self.keyframes.clear();
         } else if outcome == Outcome::Refined && self.keyframes.is_far(&pose, &self.config) {
             self.draw(id, query.points, &pose, &velocity);
         }
-        Refined { motion: before.inv_mul(&pose), covariance, overlap, support, outcome, hypothesis }
+        Refined {
+            motion: before.inv_mul(&pose),
+            covariance,
+            overlap,
+            support,
+            outcome,
+            hypothesis,
+        }
     }
 
     /// Whether a match that is believed may be built upon.
@@ -292,7 +364,11 @@ impl Refinement {
         let fits = candidate.overlap >= config.firm_overlap * self.memory.usual_overlap;
         let firm = fits && agrees && candidate.support >= config.least_support;
         let firm = firm || self.memory.doubtful >= MOST_DOUBTFUL;
-        if firm { Outcome::Refined } else { Outcome::Weak }
+        if firm {
+            Outcome::Refined
+        } else {
+            Outcome::Weak
+        }
     }
 
     /// Of the motion, from the information matrix at the match; `None` where the points do not fix it.
@@ -300,16 +376,31 @@ impl Refinement {
         let inverse = found.normal.information.try_inverse()?;
         let mean_squared_residual = found.normal.cost / weight;
         // From the world's axes into those of the frame before.
-        let turn = self.memory.pose.rotation.inverse().to_rotation_matrix().to_homogeneous();
+        let turn = self
+            .memory
+            .pose
+            .rotation
+            .inverse()
+            .to_rotation_matrix()
+            .to_homogeneous();
         // If each point weighed half as much, as under a mask, the information would be half of what it was, and the match the same.
         let scale = self.config.variance_scale * self.placed.mean_weight() * mean_squared_residual;
         let shape = turn * inverse * turn.transpose() * scale;
         let yaw = self.config.yaw_sigma_deg.to_radians().powi(2);
         let covariance = shape + Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, yaw));
-        covariance.iter().all(|v| v.is_finite()).then_some(covariance)
+        covariance
+            .iter()
+            .all(|v| v.is_finite())
+            .then_some(covariance)
     }
 
-    fn draw(&mut self, id: u64, points: &[ScanPoint], pose: &Isometry2<f64>, velocity: &Vector3<f64>) {
+    fn draw(
+        &mut self,
+        id: u64,
+        points: &[ScanPoint],
+        pose: &Isometry2<f64>,
+        velocity: &Vector3<f64>,
+    ) {
         self.placed.place(points, velocity);
         self.keyframes.draw(id, &self.placed, pose);
     }

@@ -68,12 +68,21 @@ impl RotationSearch {
     /// A configuration that no search can be built from, or rasters below 16 cells a side.
     pub fn new(n: usize, config: &RotationConfig) -> Result<Self, ConfigError> {
         config.validate()?;
-        accept((16..=8192).contains(&n), "raster", "n", &n, "16 to 8192 cells a side")?;
+        accept(
+            (16..=8192).contains(&n),
+            "raster",
+            "n",
+            &n,
+            "16 to 8192 cells a side",
+        )?;
         let size = fast_size(n);
         let (angles, harmonics) = (config.angles, config.angles / 2 + 1);
         let grid = PolarGrid::new(n, size, config);
         let mut planner = RealFftPlanner::new();
-        let (forward, inverse) = (planner.plan_fft_forward(angles), planner.plan_fft_inverse(angles));
+        let (forward, inverse) = (
+            planner.plan_fft_forward(angles),
+            planner.plan_fft_inverse(angles),
+        );
         let scratch = forward.get_scratch_len().max(inverse.get_scratch_len());
         let step = PI / angles as f64;
         Ok(Self {
@@ -90,7 +99,8 @@ impl RotationSearch {
             profile: vec![0.0; angles],
             cross: vec![Complex32::default(); harmonics],
             correlation: vec![0.0; angles],
-            reach: ((config.reach_deg.to_radians() / step).floor() as isize).clamp(1, angles as isize / 2),
+            reach: ((config.reach_deg.to_radians() / step).floor() as isize)
+                .clamp(1, angles as isize / 2),
             config: config.clone(),
         })
     }
@@ -127,7 +137,11 @@ impl RotationSearch {
     ///
     /// # Errors
     /// Where a spectrum is not of this search's shape.
-    pub fn search(&mut self, later: &PolarSpectrum, earlier: &PolarSpectrum) -> Result<RotationEstimate, ShapeError> {
+    pub fn search(
+        &mut self,
+        later: &PolarSpectrum,
+        earlier: &PolarSpectrum,
+    ) -> Result<RotationEstimate, ShapeError> {
         later.expect(self.grid.angles, self.profiles())?;
         earlier.expect(self.grid.angles, self.profiles())?;
         let energy = (later.energy * earlier.energy).sqrt();
@@ -140,7 +154,11 @@ impl RotationSearch {
 
     /// Profiles along the angle that are compared: one a radius, or one for all.
     fn profiles(&self) -> usize {
-        if self.config.form == RotationForm::Eq7 { self.grid.radii } else { 1 }
+        if self.config.form == RotationForm::Eq7 {
+            self.grid.radii
+        } else {
+            1
+        }
     }
 
     /// Window, transform, modulus, band (Weston et al., Algorithm 1, lines 5 to 10).
@@ -158,7 +176,9 @@ impl RotationSearch {
         let harmonics = out.harmonics();
         for (r, row) in out.data.chunks_exact_mut(harmonics).enumerate() {
             self.grid.ring(r, &mut self.ring);
-            let done = self.forward.process_with_scratch(&mut self.ring, row, &mut self.scratch);
+            let done = self
+                .forward
+                .process_with_scratch(&mut self.ring, row, &mut self.scratch);
             debug_assert!(done.is_ok(), "lengths are those of the plan");
             row[0] = Complex32::default();
         }
@@ -169,9 +189,14 @@ impl RotationSearch {
         self.profile.fill(0.0);
         for r in 0..self.grid.radii {
             self.grid.ring(r, &mut self.ring);
-            self.profile.iter_mut().zip(&self.ring).for_each(|(sum, v)| *sum += v);
+            self.profile
+                .iter_mut()
+                .zip(&self.ring)
+                .for_each(|(sum, v)| *sum += v);
         }
-        let done = self.forward.process_with_scratch(&mut self.profile, &mut out.data, &mut self.scratch);
+        let done =
+            self.forward
+                .process_with_scratch(&mut self.profile, &mut out.data, &mut self.scratch);
         debug_assert!(done.is_ok(), "lengths are those of the plan");
         out.data[0] = Complex32::default();
     }
@@ -179,7 +204,10 @@ impl RotationSearch {
     /// C[m] = sum over r of G[m, r] conj(F[m, r]), back to angles, as correlation coefficients.
     fn correlate(&mut self, later: &PolarSpectrum, earlier: &PolarSpectrum, energy: f64) {
         self.cross.fill(Complex32::default());
-        let rows = later.data.chunks_exact(self.cross.len()).zip(earlier.data.chunks_exact(self.cross.len()));
+        let rows = later
+            .data
+            .chunks_exact(self.cross.len())
+            .zip(earlier.data.chunks_exact(self.cross.len()));
         for (f, g) in rows {
             kernels::add_cross(f, g, &mut self.cross);
         }
@@ -187,7 +215,11 @@ impl RotationSearch {
         if let (true, Some(highest)) = (self.grid.angles.is_multiple_of(2), self.cross.last_mut()) {
             highest.im = 0.0;
         }
-        let done = self.inverse.process_with_scratch(&mut self.cross, &mut self.correlation, &mut self.scratch);
+        let done = self.inverse.process_with_scratch(
+            &mut self.cross,
+            &mut self.correlation,
+            &mut self.scratch,
+        );
         debug_assert!(done.is_ok(), "lengths are those of the plan");
         let scale = energy.recip() as f32;
         self.correlation.iter_mut().for_each(|c| *c *= scale);
@@ -204,7 +236,11 @@ impl RotationSearch {
         let Some(best) = within
             .clone()
             .filter(|&k| self.at(k).is_finite())
-            .max_by(|&a, &b| self.at(a).total_cmp(&self.at(b)).then(b.abs().cmp(&a.abs())))
+            .max_by(|&a, &b| {
+                self.at(a)
+                    .total_cmp(&self.at(b))
+                    .then(b.abs().cmp(&a.abs()))
+            })
         else {
             return self.no_match();
         };
@@ -231,7 +267,11 @@ impl RotationSearch {
     fn variance(&self, score: f64, curvature: f64) -> f64 {
         let variance = self.config.variance_scale * (1.0 - score).max(1e-6) / -curvature;
         let guess = self.config.reach_deg.to_radians().powi(2) / 3.0;
-        if variance > 0.0 && variance < guess { variance } else { guess }
+        if variance > 0.0 && variance < guess {
+            variance
+        } else {
+            guess
+        }
     }
 
     fn runner_up(&self, best: isize, step: f64) -> Option<RotationRunnerUp> {
@@ -240,12 +280,20 @@ impl RotationSearch {
             .filter(|k| (k - best).abs() > apart)
             .filter(|&k| self.at(k) > self.at(k - 1) && self.at(k) >= self.at(k + 1))
             .max_by(|&a, &b| self.at(a).total_cmp(&self.at(b)))?;
-        Some(RotationRunnerUp { angle_rad: k as f64 * step, score: self.at(k) })
+        Some(RotationRunnerUp {
+            angle_rad: k as f64 * step,
+            score: self.at(k),
+        })
     }
 
     fn no_match(&self) -> RotationEstimate {
         let variance_rad2 = self.config.reach_deg.to_radians().powi(2) / 3.0;
-        RotationEstimate { angle_rad: 0.0, variance_rad2, score: 0.0, runner_up: None }
+        RotationEstimate {
+            angle_rad: 0.0,
+            variance_rad2,
+            score: 0.0,
+            runner_up: None,
+        }
     }
 }
 
@@ -270,7 +318,11 @@ mod tests {
             })
             .collect();
         if search.config.form == RotationForm::ProfileMean {
-            all = vec![(0..ring.len()).map(|k| all.iter().map(|ring| ring[k]).sum()).collect()];
+            all = vec![
+                (0..ring.len())
+                    .map(|k| all.iter().map(|ring| ring[k]).sum())
+                    .collect(),
+            ];
         }
         for ring in &mut all {
             let mean = ring.iter().sum::<f64>() / ring.len() as f64;
@@ -282,7 +334,11 @@ mod tests {
     /// sum over r and k of P_g[r, k + m] P_f[r, k], as a correlation coefficient.
     fn direct(f: &[Vec<f64>], g: &[Vec<f64>], m: usize) -> f64 {
         let energy = |p: &[Vec<f64>]| p.iter().flatten().map(|v| v * v).sum::<f64>();
-        let along = |f: &[f64], g: &[f64]| (0..f.len()).map(|k| f[k] * g[(k + m) % f.len()]).sum::<f64>();
+        let along = |f: &[f64], g: &[f64]| {
+            (0..f.len())
+                .map(|k| f[k] * g[(k + m) % f.len()])
+                .sum::<f64>()
+        };
         let sum: f64 = f.iter().zip(g).map(|(f, g)| along(f, g)).sum();
         sum / (energy(f) * energy(g)).sqrt()
     }
@@ -319,6 +375,9 @@ mod tests {
         other.copy_from_slice(one.as_slice()).unwrap();
         assert_eq!(one, other);
         let estimate = search.search(&one, &other).unwrap();
-        assert!(estimate.angle_rad.abs() < 1e-6 && (estimate.score - 1.0).abs() < 1e-3, "{estimate:?}");
+        assert!(
+            estimate.angle_rad.abs() < 1e-6 && (estimate.score - 1.0).abs() < 1e-3,
+            "{estimate:?}"
+        );
     }
 }

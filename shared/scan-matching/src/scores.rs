@@ -40,8 +40,15 @@ impl Scores {
     /// Scores of n x n rasters, read from transforms of `size` a side.
     pub fn new(n: usize, reach: usize, size: usize) -> Self {
         let around = Self::around(reach) as isize;
-        let wrapped: Arc<[usize]> = (-around..=around).map(|s| s.rem_euclid(size as isize) as usize).collect();
-        Self { n, reach: reach as isize, values: vec![0.0; wrapped.len().pow(2)], wrapped }
+        let wrapped: Arc<[usize]> = (-around..=around)
+            .map(|s| s.rem_euclid(size as isize) as usize)
+            .collect();
+        Self {
+            n,
+            reach: reach as isize,
+            values: vec![0.0; wrapped.len().pow(2)],
+            wrapped,
+        }
     }
 
     /// The transform's row (and column) of each shift, from the most negative one on.
@@ -52,18 +59,29 @@ impl Scores {
     /// Fills row `r` of the scores from the same row of the transform.
     pub fn fill<T: Copy>(&mut self, r: usize, row: &[T], score: impl Fn(T) -> f32) {
         let side = self.wrapped.len();
-        for (value, &column) in self.values[r * side..][..side].iter_mut().zip(&*self.wrapped) {
+        for (value, &column) in self.values[r * side..][..side]
+            .iter_mut()
+            .zip(&*self.wrapped)
+        {
             *value = score(row[column]);
         }
     }
 
     /// Divides by what both rasters have in the overlap. `energy` is what the scores have been divided by so far.
-    pub fn normalise(&mut self, overlap: Overlap, later: &OverlapEnergy, turned: &OverlapEnergy, energy: f64) {
+    pub fn normalise(
+        &mut self,
+        overlap: Overlap,
+        later: &OverlapEnergy,
+        turned: &OverlapEnergy,
+        energy: f64,
+    ) {
         match overlap {
             Overlap::None => {}
             Overlap::Area => self.normalise_area(),
             // A shift of g' by s meets f without its last s rows, and loses its own first s rows.
-            Overlap::Energy => kernels::divide_by_share(&mut self.values, later.left(), turned.left(), energy),
+            Overlap::Energy => {
+                kernels::divide_by_share(&mut self.values, later.left(), turned.left(), energy)
+            }
         }
     }
 
@@ -73,7 +91,11 @@ impl Scores {
         for (k, score) in self.values.iter_mut().enumerate() {
             let (down, right) = ((k / side) as isize - around, (k % side) as isize - around);
             let share = area_share(self.n, down, right);
-            *score = if share > LEAST_SHARE { (f64::from(*score) / share) as f32 } else { 0.0 };
+            *score = if share > LEAST_SHARE {
+                (f64::from(*score) / share) as f32
+            } else {
+                0.0
+            };
         }
     }
 
@@ -109,7 +131,9 @@ impl Scores {
     pub fn place(&self, kind: Peak, best: Shift, peak: &PlanePeak) -> Vector2<f64> {
         match kind {
             Peak::SoftArgmax { temperature } => {
-                let scored = self.scored().map(|((i, j), score)| ([i as f64, j as f64], score));
+                let scored = self
+                    .scored()
+                    .map(|((i, j), score)| ([i as f64, j as f64], score));
                 Vector2::from(soft_argmax(temperature, self.at(best.0, best.1), scored))
             }
             _ => Vector2::new(best.0 as f64, best.1 as f64) + peak.offset,
@@ -119,7 +143,9 @@ impl Scores {
     /// The highest local maximum that is not the best one's own peak.
     pub fn runner_up(&self, best: Shift) -> Option<(Shift, f64)> {
         let apart = |(i, j): Shift| (i - best.0).abs().max((j - best.1).abs()) > SAME_PEAK_CELLS;
-        let summit = |(i, j): Shift, score: f64| (-1..=1).all(|a| (-1..=1).all(|b| self.at(i + a, j + b) <= score));
+        let summit = |(i, j): Shift, score: f64| {
+            (-1..=1).all(|a| (-1..=1).all(|b| self.at(i + a, j + b) <= score))
+        };
         let mut second: Option<(Shift, f64)> = None;
         for (shift, score) in self.scored() {
             if second.is_none_or(|(_, s)| score > s) && apart(shift) && summit(shift, score) {

@@ -18,7 +18,11 @@ pub struct PolarSpectrum {
 
 impl PolarSpectrum {
     pub(crate) fn new(angles: usize, radii: usize) -> Self {
-        Self { angles, data: vec![Complex32::default(); radii * (angles / 2 + 1)], energy: 0.0 }
+        Self {
+            angles,
+            data: vec![Complex32::default(); radii * (angles / 2 + 1)],
+            energy: 0.0,
+        }
     }
 
     /// Refuses a spectrum of another shape.
@@ -58,10 +62,16 @@ impl PolarSpectrum {
     pub(crate) fn measure(&mut self) {
         let harmonics = self.harmonics();
         let alone = |row: &[Complex32]| {
-            if self.angles.is_multiple_of(2) { kernels::energy(&row[harmonics - 1..]) } else { 0.0 }
+            if self.angles.is_multiple_of(2) {
+                kernels::energy(&row[harmonics - 1..])
+            } else {
+                0.0
+            }
         };
         let rows = self.data.chunks_exact(harmonics);
-        let energy: f64 = rows.map(|row| f64::from(2.0 * kernels::energy(row) - alone(row))).sum();
+        let energy: f64 = rows
+            .map(|row| f64::from(2.0 * kernels::energy(row) - alone(row)))
+            .sum();
         self.energy = if energy.is_finite() { energy } else { 0.0 };
     }
 }

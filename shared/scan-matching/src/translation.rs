@@ -105,7 +105,14 @@ impl TranslationSearch {
         }
         let other = opposite(rotation.angle_rad);
         let reversed = self.at_angle(earlier, other, rotation.variance_rad2);
-        Ok(if reversed.score > straight.score { MotionEstimate { half_turn: true, ..reversed } } else { straight })
+        Ok(if reversed.score > straight.score {
+            MotionEstimate {
+                half_turn: true,
+                ..reversed
+            }
+        } else {
+            straight
+        })
     }
 
     /// The motion if the angle is `angle_rad`.
@@ -117,10 +124,18 @@ impl TranslationSearch {
             return self.no_match(angle_rad, variance_rad2);
         }
         self.correlate(energy); // lines 17 and 18
-        let Some(best) = self.scores.highest() else { return self.no_match(angle_rad, variance_rad2) };
+        let Some(best) = self.scores.highest() else {
+            return self.no_match(angle_rad, variance_rad2);
+        };
         let peak = self.scores.peak(self.config.peak, best);
         let shift = self.scores.place(self.config.peak, best, &peak); // line 19
-        self.motion(shift, &peak, self.scores.runner_up(best), angle_rad, variance_rad2) // lines 20 and 21
+        self.motion(
+            shift,
+            &peak,
+            self.scores.runner_up(best),
+            angle_rad,
+            variance_rad2,
+        ) // lines 20 and 21
     }
 
     /// g'(x) = g(R x), so that f(x) ~ g'(x + R^T t).
@@ -128,7 +143,8 @@ impl TranslationSearch {
         let rotation = Rotation::new(self.n, angle_rad);
         for (r, row) in self.turned.chunks_exact_mut(self.n).enumerate() {
             rotation.row(earlier, r, row);
-            row.iter_mut().for_each(|v| *v = if v.is_finite() { *v } else { 0.0 });
+            row.iter_mut()
+                .for_each(|v| *v = if v.is_finite() { *v } else { 0.0 });
         }
     }
 
@@ -144,7 +160,10 @@ impl TranslationSearch {
         });
         self.transform.cross();
         if self.config.phase_only {
-            self.transform.cross_spectrum_mut().iter_mut().for_each(whiten::to_unit); // Checchin et al., Eq. 6
+            self.transform
+                .cross_spectrum_mut()
+                .iter_mut()
+                .for_each(whiten::to_unit); // Checchin et al., Eq. 6
         }
         self.read_scores(energy);
     }
@@ -152,11 +171,22 @@ impl TranslationSearch {
     fn read_scores(&mut self, energy: f64) {
         let size = self.transform.size();
         let cells = (size * size) as f64;
-        let scale = if self.config.phase_only { 1.0 / cells } else { 1.0 / (cells * energy) };
+        let scale = if self.config.phase_only {
+            1.0 / cells
+        } else {
+            1.0 / (cells * energy)
+        };
         let rows = self.scores.wrapped();
-        self.transform.inverse(&rows, |r, row| self.scores.fill(r, row, |value: f32| value * scale as f32));
+        self.transform.inverse(&rows, |r, row| {
+            self.scores.fill(r, row, |value: f32| value * scale as f32)
+        });
         if !self.config.phase_only {
-            self.scores.normalise(self.config.overlap, &self.later_energy, &self.turned_energy, energy);
+            self.scores.normalise(
+                self.config.overlap,
+                &self.later_energy,
+                &self.turned_energy,
+                energy,
+            );
         }
     }
 
@@ -173,7 +203,13 @@ impl TranslationSearch {
         let translation = turn * shift * -self.cell_m;
         let score = peak.value.min(1.0);
         let guess = guess(self.config.reach_m);
-        let spread = shift_covariance(self.config.variance_scale, score, &peak.hessian, self.cell_m, guess);
+        let spread = shift_covariance(
+            self.config.variance_scale,
+            score,
+            &peak.hessian,
+            self.cell_m,
+            guess,
+        );
         MotionEstimate {
             x_m: translation.x,
             y_m: translation.y,
@@ -182,7 +218,11 @@ impl TranslationSearch {
             score,
             runner_up: runner_up.map(|((i, j), score)| {
                 let other = turn * Vector2::new(i as f64, j as f64) * -self.cell_m;
-                MotionRunnerUp { x_m: other.x, y_m: other.y, score }
+                MotionRunnerUp {
+                    x_m: other.x,
+                    y_m: other.y,
+                    score,
+                }
             }),
             half_turn: false,
         }
@@ -212,5 +252,9 @@ impl TranslationSearch {
 /// The angle half a turn away, within (-pi, pi].
 fn opposite(angle_rad: f64) -> f64 {
     use std::f64::consts::PI;
-    if angle_rad > 0.0 { angle_rad - PI } else { angle_rad + PI }
+    if angle_rad > 0.0 {
+        angle_rad - PI
+    } else {
+        angle_rad + PI
+    }
 }

@@ -25,7 +25,12 @@ struct Span {
 impl Rotation {
     pub fn new(n: usize, angle_rad: f64) -> Self {
         let (sin, cos) = angle_rad.sin_cos();
-        Self { n, cos, sin, offset: 0.0 }
+        Self {
+            n,
+            cos,
+            sin,
+            offset: 0.0,
+        }
     }
 
     /// The same, but each place that is looked up lies `offset` cells farther down and to the right.
@@ -42,7 +47,10 @@ impl Rotation {
             crate::kernels::bilinear_line(
                 g,
                 self.n,
-                [span.row + span.first as f64 * span.row_step, span.col + span.first as f64 * span.col_step],
+                [
+                    span.row + span.first as f64 * span.row_step,
+                    span.col + span.first as f64 * span.col_step,
+                ],
                 [span.row_step, span.col_step],
                 &mut out[span.first..span.end],
             );
@@ -62,7 +70,14 @@ impl Rotation {
         let (c, d) = inside(col, col_step, last);
         let first = a.max(c).max(0.0).ceil() as usize;
         let end = (b.min(d).min(last).floor() + 1.0).max(0.0) as usize;
-        Span { first: first.min(self.n), end: end.max(first).min(self.n), row, col, row_step, col_step }
+        Span {
+            first: first.min(self.n),
+            end: end.max(first).min(self.n),
+            row,
+            col,
+            row_step,
+            col_step,
+        }
     }
 }
 
@@ -84,7 +99,9 @@ mod tests {
     fn turned(g: &[f32], n: usize, angle: f64) -> Vec<f32> {
         let rotation = Rotation::new(n, angle);
         let mut out = vec![9.0; n * n];
-        out.chunks_exact_mut(n).enumerate().for_each(|(r, row)| rotation.row(g, r, row));
+        out.chunks_exact_mut(n)
+            .enumerate()
+            .for_each(|(r, row)| rotation.row(g, r, row));
         out
     }
 
@@ -124,7 +141,10 @@ mod tests {
                     let (a, b, at) = (su - i, sv - j, i as usize * n + j as usize);
                     let [p, q, x, y] = [at, at + 1, at + n, at + n + 1].map(|k| f64::from(g[k]));
                     let want = (1.0 - a) * ((1.0 - b) * p + b * q) + a * ((1.0 - b) * x + b * y);
-                    assert!((f64::from(out[r * n + k]) - want).abs() < 0.02, "{degrees} {r} {k}");
+                    assert!(
+                        (f64::from(out[r * n + k]) - want).abs() < 0.02,
+                        "{degrees} {r} {k}"
+                    );
                 }
             }
         }

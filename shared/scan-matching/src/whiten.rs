@@ -7,7 +7,11 @@ use rustfft::{Fft, FftPlanner, num_complex::Complex32};
 /// Unit modulus, phase kept; zero stays zero.
 pub(crate) fn to_unit(z: &mut Complex32) {
     let modulus = z.norm();
-    *z = if modulus > 0.0 && modulus.is_finite() { *z / modulus } else { Complex32::default() };
+    *z = if modulus > 0.0 && modulus.is_finite() {
+        *z / modulus
+    } else {
+        Complex32::default()
+    };
 }
 
 /// Whitens spectra that are already transformed along the angle, also along the radius.
@@ -24,15 +28,24 @@ impl Whitening {
     pub fn new(radii: usize, harmonics: usize) -> Self {
         let fft = FftPlanner::new().plan_fft_forward(radii);
         let scratch = vec![Complex32::default(); fft.get_inplace_scratch_len()];
-        Self { harmonics, fft, column: vec![Complex32::default(); radii], scratch }
+        Self {
+            harmonics,
+            fft,
+            column: vec![Complex32::default(); radii],
+            scratch,
+        }
     }
 
     /// Replaces the spectrum (radius after radius) by the phase of its transform along the radius.
     pub fn apply(&mut self, data: &mut [Complex32]) {
         for h in 1..self.harmonics {
             let radius = data[h..].iter().step_by(self.harmonics);
-            self.column.iter_mut().zip(radius).for_each(|(c, z)| *c = *z);
-            self.fft.process_with_scratch(&mut self.column, &mut self.scratch);
+            self.column
+                .iter_mut()
+                .zip(radius)
+                .for_each(|(c, z)| *c = *z);
+            self.fft
+                .process_with_scratch(&mut self.column, &mut self.scratch);
             self.column.iter_mut().for_each(to_unit);
             let radius = data[h..].iter_mut().step_by(self.harmonics);
             radius.zip(&self.column).for_each(|(z, c)| *z = *c);

@@ -8,7 +8,13 @@ use crate::config::Window;
 pub(crate) fn weights(window: Window, n: usize) -> Vec<f32> {
     let middle = (n - 1) as f64 / 2.0;
     let half = (n as f64 + 1.0) / 2.0;
-    let hann = |t: f64| if t.abs() < half { 0.5 + 0.5 * (PI * t / half).cos() } else { 0.0 };
+    let hann = |t: f64| {
+        if t.abs() < half {
+            0.5 + 0.5 * (PI * t / half).cos()
+        } else {
+            0.0
+        }
+    };
     let at = |row: usize, col: usize| {
         let (u, v) = (row as f64 - middle, col as f64 - middle);
         match window {

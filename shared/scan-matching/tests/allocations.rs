@@ -8,7 +8,8 @@ use std::cell::Cell;
 
 use common::{Motion, pair, scenes};
 use gyre_scan_matching::{
-    ExhaustiveConfig, ExhaustiveSearch, RotationConfig, RotationSearch, TranslationConfig, TranslationSearch,
+    ExhaustiveConfig, ExhaustiveSearch, RotationConfig, RotationSearch, TranslationConfig,
+    TranslationSearch,
 };
 
 thread_local! {
@@ -37,8 +38,19 @@ fn searches_allocate_nothing_after_construction() {
     let (n, cell_m) = (127, 0.8);
     let (earlier, later) = pair(n, cell_m, Motion::degrees(2.0, 1.0, 5.0), 1);
     for phase_only in [false, true] {
-        let mut rotation = RotationSearch::new(n, &RotationConfig { phase_only, ..RotationConfig::default() }).unwrap();
-        let config = TranslationConfig { phase_only, half_turn: true, ..TranslationConfig::default() };
+        let mut rotation = RotationSearch::new(
+            n,
+            &RotationConfig {
+                phase_only,
+                ..RotationConfig::default()
+            },
+        )
+        .unwrap();
+        let config = TranslationConfig {
+            phase_only,
+            half_turn: true,
+            ..TranslationConfig::default()
+        };
         let mut translation = TranslationSearch::new(n, cell_m, &config).unwrap();
         let (mut f, mut g) = (rotation.new_spectrum(), rotation.new_spectrum());
         let before = ALLOCATIONS.with(Cell::get);
@@ -46,7 +58,11 @@ fn searches_allocate_nothing_after_construction() {
         rotation.spectrum(&later, &mut f).unwrap();
         let angle = rotation.search(&f, &g).unwrap();
         translation.search(&later, &earlier, &angle).unwrap();
-        assert_eq!(ALLOCATIONS.with(Cell::get), before, "phase_only {phase_only}");
+        assert_eq!(
+            ALLOCATIONS.with(Cell::get),
+            before,
+            "phase_only {phase_only}"
+        );
     }
     let mut exhaustive = ExhaustiveSearch::new(n, cell_m, &ExhaustiveConfig::default()).unwrap();
     let before = ALLOCATIONS.with(Cell::get);
@@ -57,14 +73,30 @@ fn searches_allocate_nothing_after_construction() {
 #[test]
 fn the_refinement_allocates_nothing_after_construction() {
     let drive = scenes::Drive::steady(10.0, 4.0, 40);
-    let mut scans = scenes::scans(&scenes::town([[-100.0, 200.0]; 2], 1), &drive, &scenes::Sensor::default());
+    let mut scans = scenes::scans(
+        &scenes::town([[-100.0, 200.0]; 2], 1),
+        &drive,
+        &scenes::Sensor::default(),
+    );
     scans[20..30].iter_mut().for_each(Vec::clear); // loses its map, and begins anew
     let mut refinement = scenes::refinement();
     let before = ALLOCATIONS.with(Cell::get);
     for k in 0..scans.len() - 1 {
-        refinement.next(k as u64 + 1, &scans[k + 1], &scans[k], &scenes::searched(&drive, k), scenes::SWEEP_S);
+        refinement.next(
+            k as u64 + 1,
+            &scans[k + 1],
+            &scans[k],
+            &scenes::searched(&drive, k),
+            scenes::SWEEP_S,
+        );
     }
     refinement.start();
-    refinement.next(1, &scans[1], &scans[0], &scenes::searched(&drive, 0), scenes::SWEEP_S);
+    refinement.next(
+        1,
+        &scans[1],
+        &scans[0],
+        &scenes::searched(&drive, 0),
+        scenes::SWEEP_S,
+    );
     assert_eq!(ALLOCATIONS.with(Cell::get), before);
 }

@@ -10,14 +10,24 @@ const CELL_M: f64 = 0.5;
 const N: usize = 101;
 
 fn known_angle(angle_rad: f64) -> RotationEstimate {
-    RotationEstimate { angle_rad, variance_rad2: 1e-6, score: 1.0, runner_up: None }
+    RotationEstimate {
+        angle_rad,
+        variance_rad2: 1e-6,
+        score: 1.0,
+        runner_up: None,
+    }
 }
 
 /// Brightest cell as (x, y) in metres.
 fn brightest(raster: &[f32]) -> [f64; 2] {
-    let k = (0..raster.len()).max_by(|&a, &b| raster[a].total_cmp(&raster[b])).unwrap();
+    let k = (0..raster.len())
+        .max_by(|&a, &b| raster[a].total_cmp(&raster[b]))
+        .unwrap();
     let middle = (N - 1) as f64 / 2.0;
-    [(middle - (k / N) as f64) * CELL_M, (middle - (k % N) as f64) * CELL_M]
+    [
+        (middle - (k / N) as f64) * CELL_M,
+        (middle - (k % N) as f64) * CELL_M,
+    ]
 }
 
 #[test]
@@ -25,15 +35,26 @@ fn a_motion_is_the_later_frame_in_the_earlier_one() {
     // The vehicle drove 3 m ahead and turned 90 degrees to the left. What was 10 m ahead is now 7 m to the right, what
     // was 5 m to the left of the new place is ahead, and the start lies 3 m to the left.
     let motion = Motion::degrees(3.0, 0.0, 90.0);
-    for (before, after) in [([10.0, 0.0], [0.0, -7.0]), ([3.0, 5.0], [5.0, 0.0]), ([0.0, 0.0], [0.0, 3.0])] {
+    for (before, after) in [
+        ([10.0, 0.0], [0.0, -7.0]),
+        ([3.0, 5.0], [5.0, 0.0]),
+        ([0.0, 0.0], [0.0, 3.0]),
+    ] {
         let seen = motion.seen_from_later(before);
-        assert!((seen[0] - after[0]).abs() < 1e-12 && (seen[1] - after[1]).abs() < 1e-12, "{before:?}: {seen:?}");
+        assert!(
+            (seen[0] - after[0]).abs() < 1e-12 && (seen[1] - after[1]).abs() < 1e-12,
+            "{before:?}: {seen:?}"
+        );
     }
 }
 
 #[test]
 fn drawn_points_lie_where_rows_and_columns_say() {
-    for (point, row, col) in [([10.0, 0.0], 30, 50), ([0.0, 10.0], 50, 30), ([-5.0, -20.0], 60, 90)] {
+    for (point, row, col) in [
+        ([10.0, 0.0], 30, 50),
+        ([0.0, 10.0], 50, 30),
+        ([-5.0, -20.0], 60, 90),
+    ] {
         let raster = draw([(point, 1.0)].into_iter(), N, CELL_M, 0.6);
         assert_eq!(raster[row * N + col], 1.0);
         assert_eq!(brightest(&raster), point);
@@ -43,15 +64,33 @@ fn drawn_points_lie_where_rows_and_columns_say() {
 #[test]
 fn three_points_give_their_motion_back() {
     let points = [[15.0, 3.0], [-4.0, 12.0], [-9.0, -14.0]];
-    for motion in [Motion::degrees(2.0, 1.0, 12.0), Motion::degrees(-1.5, 2.5, -9.0), Motion::degrees(3.0, 0.0, 90.0)] {
+    for motion in [
+        Motion::degrees(2.0, 1.0, 12.0),
+        Motion::degrees(-1.5, 2.5, -9.0),
+        Motion::degrees(3.0, 0.0, 90.0),
+    ] {
         let earlier = draw(points.iter().map(|&p| (p, 1.0)), N, CELL_M, 1.2);
-        let later = draw(points.iter().map(|&p| (motion.seen_from_later(p), 1.0)), N, CELL_M, 1.2);
-        let mut translation = TranslationSearch::new(N, CELL_M, &TranslationConfig::default()).unwrap();
-        let found = translation.search(&later, &earlier, &known_angle(motion.yaw)).unwrap();
-        assert!((found.x_m - motion.x).abs() < 0.03 && (found.y_m - motion.y).abs() < 0.03, "{motion:?}: {found:?}");
+        let later = draw(
+            points.iter().map(|&p| (motion.seen_from_later(p), 1.0)),
+            N,
+            CELL_M,
+            1.2,
+        );
+        let mut translation =
+            TranslationSearch::new(N, CELL_M, &TranslationConfig::default()).unwrap();
+        let found = translation
+            .search(&later, &earlier, &known_angle(motion.yaw))
+            .unwrap();
+        assert!(
+            (found.x_m - motion.x).abs() < 0.03 && (found.y_m - motion.y).abs() < 0.03,
+            "{motion:?}: {found:?}"
+        );
         if motion.yaw.abs() < 0.3 {
             let (angle, _) = search(N, CELL_M, &Default::default(), &earlier, &later);
-            assert!((angle.angle_rad - motion.yaw).to_degrees().abs() < 1.0, "{motion:?}: {angle:?}");
+            assert!(
+                (angle.angle_rad - motion.yaw).to_degrees().abs() < 1.0,
+                "{motion:?}: {angle:?}"
+            );
         }
     }
 }
@@ -62,25 +101,40 @@ fn what_leaves_at_one_edge_does_not_come_back_at_the_other() {
     // Around a circle of n cells they would match at a shift of two cells.
     let (earlier, later) = ([[25.0, 0.0]], [[-24.5, 0.0]]);
     let raster = |points: &[[f64; 2]]| draw(points.iter().map(|&p| (p, 1.0)), N, CELL_M, 0.8);
-    let config = TranslationConfig { reach_m: 20.0, ..TranslationConfig::default() };
+    let config = TranslationConfig {
+        reach_m: 20.0,
+        ..TranslationConfig::default()
+    };
     let mut translation = TranslationSearch::new(N, CELL_M, &config).unwrap();
-    let found = translation.search(&raster(&later), &raster(&earlier), &known_angle(0.0)).unwrap();
+    let found = translation
+        .search(&raster(&later), &raster(&earlier), &known_angle(0.0))
+        .unwrap();
     assert!(found.score < 1e-3, "{found:?}");
 }
 
 #[test]
 fn the_scene_behind_the_lever_moves_with_the_angle() {
     // All structure 20 m ahead: an angle that is wrong by e moves it sideways, and the shift makes up for that.
-    let scene: Vec<_> = common::scatterers(40, 6.0, 3).iter().map(|&([x, y], s)| ([x + 15.0, y + 4.0], s)).collect();
+    let scene: Vec<_> = common::scatterers(40, 6.0, 3)
+        .iter()
+        .map(|&([x, y], s)| ([x + 15.0, y + 4.0], s))
+        .collect();
     let raster = draw(scene.iter().copied(), N, CELL_M, 1.2);
     let mut translation = TranslationSearch::new(N, CELL_M, &TranslationConfig::default()).unwrap();
-    let mut at = |e: f64| translation.search(&raster, &raster, &known_angle(e)).unwrap();
+    let mut at = |e: f64| {
+        translation
+            .search(&raster, &raster, &known_angle(e))
+            .unwrap()
+    };
     let (plus, minus, middle) = (at(0.01), at(-0.01), at(0.0));
     let slope = [(plus.x_m - minus.x_m) / 0.02, (plus.y_m - minus.y_m) / 0.02];
     let variance = middle.covariance[(2, 2)];
     for (axis, seen) in slope.into_iter().enumerate() {
         let predicted = middle.covariance[(axis, 2)] / variance;
-        assert!((predicted - seen).abs() < 1.5, "axis {axis}: predicted {predicted}, seen {seen}");
+        assert!(
+            (predicted - seen).abs() < 1.5,
+            "axis {axis}: predicted {predicted}, seen {seen}"
+        );
     }
     assert!(slope[1] < -10.0, "{slope:?}");
     assert!(middle.covariance.symmetric_eigenvalues().min() > 0.0);
@@ -89,9 +143,17 @@ fn the_scene_behind_the_lever_moves_with_the_angle() {
 #[test]
 fn two_matches_are_both_reported() {
     // A scatterer and its double 6 m to the left: matching the one with the other is the runner-up.
-    let earlier = draw([([10.0, -3.0], 1.0), ([10.0, 3.0], 0.7)].into_iter(), N, CELL_M, 1.0);
+    let earlier = draw(
+        [([10.0, -3.0], 1.0), ([10.0, 3.0], 0.7)].into_iter(),
+        N,
+        CELL_M,
+        1.0,
+    );
     let found = search(N, CELL_M, &Default::default(), &earlier, &earlier).1;
     let second = found.runner_up.unwrap();
-    assert!((second.y_m.abs() - 6.0).abs() < 0.6 && second.score < found.score, "{found:?}");
+    assert!(
+        (second.y_m.abs() - 6.0).abs() < 0.6 && second.score < found.score,
+        "{found:?}"
+    );
     assert!((found.score - 1.0).abs() < 0.05, "{found:?}");
 }

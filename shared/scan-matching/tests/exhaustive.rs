@@ -7,14 +7,28 @@ use common::{Motion, Numbers, draw, pair};
 use gyre_scan_matching::{ExhaustiveConfig, ExhaustiveSearch, JointEstimate, Overlap, Peak};
 use proptest::prelude::*;
 
-fn search(n: usize, cell_m: f64, config: &ExhaustiveConfig, earlier: &[f32], later: &[f32]) -> JointEstimate {
-    ExhaustiveSearch::new(n, cell_m, config).unwrap().search(later, earlier).unwrap()
+fn search(
+    n: usize,
+    cell_m: f64,
+    config: &ExhaustiveConfig,
+    earlier: &[f32],
+    later: &[f32],
+) -> JointEstimate {
+    ExhaustiveSearch::new(n, cell_m, config)
+        .unwrap()
+        .search(later, earlier)
+        .unwrap()
 }
 
 /// Errors (m, m, degrees).
 fn errors(found: &JointEstimate, motion: Motion) -> [f64; 3] {
-    let turn = (found.motion.yaw_rad - motion.yaw + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU);
-    [found.motion.x_m - motion.x, found.motion.y_m - motion.y, (turn - std::f64::consts::PI).to_degrees()]
+    let turn = (found.motion.yaw_rad - motion.yaw + std::f64::consts::PI)
+        .rem_euclid(std::f64::consts::TAU);
+    [
+        found.motion.x_m - motion.x,
+        found.motion.y_m - motion.y,
+        (turn - std::f64::consts::PI).to_degrees(),
+    ]
 }
 
 /// g at (row, col), bilinear; zero outside.
@@ -23,9 +37,13 @@ fn value(g: &[f32], n: usize, row: f64, col: f64) -> f64 {
     if !(0.0..=last).contains(&row) || !(0.0..=last).contains(&col) {
         return 0.0;
     }
-    let (i, j) = ((row.floor() as usize).min(n - 2), (col.floor() as usize).min(n - 2));
+    let (i, j) = (
+        (row.floor() as usize).min(n - 2),
+        (col.floor() as usize).min(n - 2),
+    );
     let (a, b) = (row - i as f64, col - j as f64);
-    let [p, q, r, s] = [(i, j), (i, j + 1), (i + 1, j), (i + 1, j + 1)].map(|(i, j)| f64::from(g[i * n + j]));
+    let [p, q, r, s] =
+        [(i, j), (i, j + 1), (i + 1, j), (i + 1, j + 1)].map(|(i, j)| f64::from(g[i * n + j]));
     (1.0 - a) * ((1.0 - b) * p + b * q) + a * ((1.0 - b) * r + b * s)
 }
 
@@ -33,7 +51,10 @@ fn value(g: &[f32], n: usize, row: f64, col: f64) -> f64 {
 fn looked_up(n: usize, [row, col]: [isize; 2], (angle_rad, o): (f64, f64)) -> (f64, f64) {
     let ((sin, cos), middle) = (angle_rad.sin_cos(), (n - 1) as f64 / 2.0);
     let (u, v) = (row as f64 - middle, col as f64 - middle);
-    (middle + o + cos * u - sin * v, middle + o + sin * u + cos * v)
+    (
+        middle + o + cos * u - sin * v,
+        middle + o + sin * u + cos * v,
+    )
 }
 
 /// Sum of f(x) g(R (x + s) + o) over the cells of f, s by whole cells.
@@ -91,7 +112,11 @@ proptest! {
 /// A turn by nothing does not blur: where that showed, the peak would flee from zero.
 #[test]
 fn small_angles_are_not_pushed_off_zero() {
-    let config = ExhaustiveConfig { reach_deg: 3.0, step_deg: 0.25, ..Default::default() };
+    let config = ExhaustiveConfig {
+        reach_deg: 3.0,
+        step_deg: 0.25,
+        ..Default::default()
+    };
     let mut slopes = Vec::new();
     for seed in 0..6 {
         // A new scene of speckles a cell wide, which blurring changes most.
@@ -99,12 +124,20 @@ fn small_angles_are_not_pushed_off_zero() {
             let motion = Motion::degrees(1.2, 0.4, yaw_deg);
             let scene = common::scatterers(1500, 60.0, 70 + seed);
             let earlier = draw(scene.iter().copied(), 127, 0.8, 0.6);
-            let later = draw(scene.iter().map(|&(p, s)| (motion.seen_from_later(p), s)), 127, 0.8, 0.6);
+            let later = draw(
+                scene.iter().map(|&(p, s)| (motion.seen_from_later(p), s)),
+                127,
+                0.8,
+                0.6,
+            );
             search(127, 0.8, &config, &earlier, &later).motion
         };
         let (left, right) = (found(0.1), found(-0.1));
         slopes.push((left.yaw_rad - right.yaw_rad).to_degrees() / 0.2);
-        assert!((left.x_m - 1.2).abs() < 0.1 && (left.y_m - 0.4).abs() < 0.1, "{left:?}");
+        assert!(
+            (left.x_m - 1.2).abs() < 0.1 && (left.y_m - 0.4).abs() < 0.1,
+            "{left:?}"
+        );
     }
     let mean = slopes.iter().sum::<f64>() / slopes.len() as f64;
     assert!((mean - 1.0).abs() < 0.15, "{slopes:?}");
@@ -113,12 +146,24 @@ fn small_angles_are_not_pushed_off_zero() {
 #[test]
 fn three_points_give_their_motion_back() {
     let points = [[15.0, 3.0], [-4.0, 12.0], [-9.0, -14.0]];
-    for motion in [Motion::degrees(2.0, 1.0, 12.0), Motion::degrees(-1.5, 2.5, -9.0), Motion::degrees(3.0, 0.0, 0.0)] {
+    for motion in [
+        Motion::degrees(2.0, 1.0, 12.0),
+        Motion::degrees(-1.5, 2.5, -9.0),
+        Motion::degrees(3.0, 0.0, 0.0),
+    ] {
         let earlier = draw(points.iter().map(|&p| (p, 1.0)), 101, 0.5, 1.2);
-        let later = draw(points.iter().map(|&p| (motion.seen_from_later(p), 1.0)), 101, 0.5, 1.2);
+        let later = draw(
+            points.iter().map(|&p| (motion.seen_from_later(p), 1.0)),
+            101,
+            0.5,
+            1.2,
+        );
         let found = search(101, 0.5, &ExhaustiveConfig::default(), &earlier, &later);
         let [dx, dy, dyaw] = errors(&found, motion);
-        assert!(dx.abs() < 0.05 && dy.abs() < 0.05 && dyaw.abs() < 0.3, "{motion:?}: {found:?}");
+        assert!(
+            dx.abs() < 0.05 && dy.abs() < 0.05 && dyaw.abs() < 0.3,
+            "{motion:?}: {found:?}"
+        );
         assert_eq!(found.rotation.angle_rad, found.motion.yaw_rad);
     }
 }
@@ -129,27 +174,48 @@ fn motions_within_reach_are_found_to_a_fraction_of_a_cell() {
     for config in [ExhaustiveConfig::default(), ExhaustiveConfig::mbym()] {
         let mut squares = [0.0; 3];
         for k in 0..16 {
-            let motion = Motion::degrees(numbers.within(9.0), numbers.within(9.0), numbers.within(14.0));
+            let motion = Motion::degrees(
+                numbers.within(9.0),
+                numbers.within(9.0),
+                numbers.within(14.0),
+            );
             let (earlier, later) = pair(n, cell_m, motion, 300 + k);
             let found = search(n, cell_m, &config, &earlier, &later);
-            errors(&found, motion).iter().zip(&mut squares).for_each(|(e, sum)| *sum += e * e / 16.0);
+            errors(&found, motion)
+                .iter()
+                .zip(&mut squares)
+                .for_each(|(e, sum)| *sum += e * e / 16.0);
         }
         let rms = squares.map(f64::sqrt);
         println!("{:?}: RMS {rms:?} (m, m, deg)", config.overlap);
-        assert!(rms[0] < 0.15 * cell_m && rms[1] < 0.15 * cell_m && rms[2] < 0.2, "{:?}: {rms:?}", config.overlap);
+        assert!(
+            rms[0] < 0.15 * cell_m && rms[1] < 0.15 * cell_m && rms[2] < 0.2,
+            "{:?}: {rms:?}",
+            config.overlap
+        );
     }
 }
 
 #[test]
 fn the_whole_circle_is_searched_where_it_is_asked_for() {
-    let config = ExhaustiveConfig { reach_deg: 180.0, step_deg: 2.0, ..Default::default() };
+    let config = ExhaustiveConfig {
+        reach_deg: 180.0,
+        step_deg: 2.0,
+        ..Default::default()
+    };
     for yaw in [179.5, -179.5, 90.0, -133.0] {
         let motion = Motion::degrees(2.0, -1.0, yaw);
         let (earlier, later) = pair(97, 0.8, motion, 5);
         let found = search(97, 0.8, &config, &earlier, &later);
         let [dx, dy, dyaw] = errors(&found, motion);
-        assert!(dx.abs() < 0.2 && dy.abs() < 0.2 && dyaw.abs() < 0.5, "{yaw}: {found:?}");
-        assert!(found.motion.yaw_rad.abs() <= std::f64::consts::PI, "{yaw}: {found:?}");
+        assert!(
+            dx.abs() < 0.2 && dy.abs() < 0.2 && dyaw.abs() < 0.5,
+            "{yaw}: {found:?}"
+        );
+        assert!(
+            found.motion.yaw_rad.abs() <= std::f64::consts::PI,
+            "{yaw}: {found:?}"
+        );
     }
 }
 
@@ -157,40 +223,76 @@ fn the_whole_circle_is_searched_where_it_is_asked_for() {
 fn a_prior_moves_the_middle_of_the_angles() {
     let motion = Motion::degrees(1.0, 2.0, 130.0);
     let (earlier, later) = pair(127, 0.8, motion, 9);
-    let config = ExhaustiveConfig { reach_deg: 3.0, ..Default::default() };
+    let config = ExhaustiveConfig {
+        reach_deg: 3.0,
+        ..Default::default()
+    };
     let mut exhaustive = ExhaustiveSearch::new(127, 0.8, &config).unwrap();
     assert_eq!(exhaustive.candidates(), 7);
-    let found = exhaustive.search_around(&later, &earlier, 128.4_f64.to_radians()).unwrap();
+    let found = exhaustive
+        .search_around(&later, &earlier, 128.4_f64.to_radians())
+        .unwrap();
     let [dx, dy, dyaw] = errors(&found, motion);
-    assert!(dx.abs() < 0.2 && dy.abs() < 0.2 && dyaw.abs() < 0.2, "{found:?}");
+    assert!(
+        dx.abs() < 0.2 && dy.abs() < 0.2 && dyaw.abs() < 0.2,
+        "{found:?}"
+    );
 }
 
 #[test]
 fn an_angle_at_the_end_of_the_grid_stays_there_and_is_not_trusted() {
     let (earlier, later) = pair(127, 0.8, Motion::degrees(0.0, 0.0, 4.0), 9);
-    let config = ExhaustiveConfig { reach_deg: 3.0, ..Default::default() };
+    let config = ExhaustiveConfig {
+        reach_deg: 3.0,
+        ..Default::default()
+    };
     let found = search(127, 0.8, &config, &earlier, &later);
-    assert!((found.motion.yaw_rad.to_degrees() - 3.0).abs() < 1e-9, "{found:?}");
-    assert!(found.rotation.variance_rad2.sqrt().to_degrees() > 1.0, "{found:?}");
+    assert!(
+        (found.motion.yaw_rad.to_degrees() - 3.0).abs() < 1e-9,
+        "{found:?}"
+    );
+    assert!(
+        found.rotation.variance_rad2.sqrt().to_degrees() > 1.0,
+        "{found:?}"
+    );
 }
 
 #[test]
 fn the_covariance_knows_that_the_scene_behind_the_lever_moves_with_the_angle() {
     // All structure 15 m ahead and 4 m to the left: x and y follow the angle by -J centre.
-    let scene: Vec<_> = common::scatterers(40, 6.0, 3).iter().map(|&([x, y], s)| ([x + 15.0, y + 4.0], s)).collect();
+    let scene: Vec<_> = common::scatterers(40, 6.0, 3)
+        .iter()
+        .map(|&([x, y], s)| ([x + 15.0, y + 4.0], s))
+        .collect();
     let raster = draw(scene.iter().copied(), 101, 0.5, 1.2);
-    let covariance = search(101, 0.5, &ExhaustiveConfig::default(), &raster, &raster).motion.covariance;
+    let covariance = search(101, 0.5, &ExhaustiveConfig::default(), &raster, &raster)
+        .motion
+        .covariance;
     let slope = [covariance[(0, 2)], covariance[(1, 2)]].map(|c| c / covariance[(2, 2)]);
-    assert!((slope[0] - 4.0).abs() < 2.0 && (slope[1] + 15.0).abs() < 2.0, "{slope:?}");
-    assert!(covariance.symmetric_eigenvalues().min() > 0.0, "{covariance}");
+    assert!(
+        (slope[0] - 4.0).abs() < 2.0 && (slope[1] + 15.0).abs() < 2.0,
+        "{slope:?}"
+    );
+    assert!(
+        covariance.symmetric_eigenvalues().min() > 0.0,
+        "{covariance}"
+    );
 }
 
 #[test]
 fn two_matches_are_both_reported() {
-    let earlier = draw([([10.0, -3.0], 1.0), ([10.0, 3.0], 0.7)].into_iter(), 101, 0.5, 1.0);
+    let earlier = draw(
+        [([10.0, -3.0], 1.0), ([10.0, 3.0], 0.7)].into_iter(),
+        101,
+        0.5,
+        1.0,
+    );
     let found = search(101, 0.5, &ExhaustiveConfig::default(), &earlier, &earlier);
     let second = found.motion.runner_up.unwrap();
-    assert!(second.score < found.motion.score && found.motion.score > 0.95, "{found:?}");
+    assert!(
+        second.score < found.motion.score && found.motion.score > 0.95,
+        "{found:?}"
+    );
 }
 
 #[test]
@@ -199,24 +301,50 @@ fn rasters_without_a_match_give_no_motion_and_a_wide_covariance() {
     let empty = vec![0.0; 65 * 65];
     for (f, g) in [(&empty, &empty), (&later, &empty), (&empty, &earlier)] {
         let found = search(65, 0.8, &ExhaustiveConfig::default(), g, f);
-        assert_eq!((found.motion.x_m, found.motion.yaw_rad, found.motion.score), (0.0, 0.0, 0.0));
-        assert!(found.rotation.variance_rad2.sqrt().to_degrees() > 5.0 && found.motion.covariance[(0, 0)] > 10.0);
+        assert_eq!(
+            (found.motion.x_m, found.motion.yaw_rad, found.motion.score),
+            (0.0, 0.0, 0.0)
+        );
+        assert!(
+            found.rotation.variance_rad2.sqrt().to_degrees() > 5.0
+                && found.motion.covariance[(0, 0)] > 10.0
+        );
     }
 }
 
 #[test]
 fn no_value_of_a_cell_makes_a_result_that_is_no_number() {
     let (earlier, later) = pair(65, 0.8, Motion::degrees(1.0, 0.0, 2.0), 1);
-    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN, 1e-45, -3.0] {
+    for bad in [
+        f32::NAN,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+        f32::MAX,
+        f32::MIN,
+        1e-45,
+        -3.0,
+    ] {
         for count in [1, 7, 65 * 65] {
             let mut raster = later.clone();
-            raster.iter_mut().step_by((65 * 65_usize).div_ceil(count)).for_each(|v| *v = bad);
+            raster
+                .iter_mut()
+                .step_by((65 * 65_usize).div_ceil(count))
+                .for_each(|v| *v = bad);
             for config in [ExhaustiveConfig::default(), ExhaustiveConfig::mbym()] {
                 for (f, g) in [(&raster, &earlier), (&earlier, &raster), (&raster, &raster)] {
                     let JointEstimate { motion, rotation } = search(65, 0.8, &config, g, f);
-                    let numbers = [rotation.angle_rad, rotation.variance_rad2, motion.x_m, motion.y_m, motion.score];
+                    let numbers = [
+                        rotation.angle_rad,
+                        rotation.variance_rad2,
+                        motion.x_m,
+                        motion.y_m,
+                        motion.score,
+                    ];
                     let all = numbers.iter().chain(motion.covariance.iter());
-                    assert!(all.clone().all(|v| v.is_finite()), "{bad} {count}: {motion:?}");
+                    assert!(
+                        all.clone().all(|v| v.is_finite()),
+                        "{bad} {count}: {motion:?}"
+                    );
                 }
             }
         }
@@ -228,11 +356,37 @@ fn rasters_of_another_size_and_impossible_reaches_are_refused() {
     let config = ExhaustiveConfig::default();
     let mut exhaustive = ExhaustiveSearch::new(65, 0.8, &config).unwrap();
     let error = exhaustive.search(&[0.0; 65 * 65], &[0.0; 7]).unwrap_err();
-    assert_eq!(error.to_string(), "earlier raster has 7 values: expected 4225");
-    assert!(exhaustive.search(&[], &[0.0; 65 * 65]).unwrap_err().to_string().starts_with("later raster has 0"));
-    let error = ExhaustiveSearch::new(65, 0.8, &ExhaustiveConfig { reach_m: 30.0, ..config.clone() }).err().unwrap();
-    assert!(error.to_string().starts_with("exhaustive.reach_m = 30: expected"), "{error}");
-    assert!(ExhaustiveSearch::new(3, 0.8, &config).is_err() && ExhaustiveSearch::new(65, f64::NAN, &config).is_err());
+    assert_eq!(
+        error.to_string(),
+        "earlier raster has 7 values: expected 4225"
+    );
+    assert!(
+        exhaustive
+            .search(&[], &[0.0; 65 * 65])
+            .unwrap_err()
+            .to_string()
+            .starts_with("later raster has 0")
+    );
+    let error = ExhaustiveSearch::new(
+        65,
+        0.8,
+        &ExhaustiveConfig {
+            reach_m: 30.0,
+            ..config.clone()
+        },
+    )
+    .err()
+    .unwrap();
+    assert!(
+        error
+            .to_string()
+            .starts_with("exhaustive.reach_m = 30: expected"),
+        "{error}"
+    );
+    assert!(
+        ExhaustiveSearch::new(3, 0.8, &config).is_err()
+            && ExhaustiveSearch::new(65, f64::NAN, &config).is_err()
+    );
 }
 
 #[test]

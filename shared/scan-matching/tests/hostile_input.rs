@@ -4,7 +4,9 @@
 mod common;
 
 use common::{Motion, pair, search};
-use gyre_scan_matching::{Peak, RotationConfig, RotationForm, RotationSearch, TranslationConfig, TranslationSearch};
+use gyre_scan_matching::{
+    Peak, RotationConfig, RotationForm, RotationSearch, TranslationConfig, TranslationSearch,
+};
 
 const N: usize = 65;
 const CELL_M: f64 = 0.8;
@@ -12,28 +14,63 @@ const CELL_M: f64 = 0.8;
 #[test]
 fn empty_rasters_give_no_motion_and_a_wide_covariance() {
     let (angle, motion) = search(N, CELL_M, &Default::default(), &[0.0; N * N], &[0.0; N * N]);
-    assert_eq!((angle.angle_rad, angle.score, angle.runner_up), (0.0, 0.0, None));
-    assert_eq!((motion.x_m, motion.y_m, motion.yaw_rad, motion.score), (0.0, 0.0, 0.0, 0.0));
+    assert_eq!(
+        (angle.angle_rad, angle.score, angle.runner_up),
+        (0.0, 0.0, None)
+    );
+    assert_eq!(
+        (motion.x_m, motion.y_m, motion.yaw_rad, motion.score),
+        (0.0, 0.0, 0.0, 0.0)
+    );
     assert!(angle.variance_rad2.sqrt().to_degrees() > 5.0 && motion.covariance[(0, 0)] > 10.0);
 }
 
 #[test]
 fn no_value_of_a_cell_makes_a_result_that_is_no_number() {
     let (earlier, later) = pair(N, CELL_M, Motion::degrees(1.0, 0.0, 2.0), 1);
-    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN, 1e-45, -3.0] {
+    for bad in [
+        f32::NAN,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+        f32::MAX,
+        f32::MIN,
+        1e-45,
+        -3.0,
+    ] {
         for count in [1, 7, N * N] {
             let mut raster = later.clone();
-            raster.iter_mut().step_by((N * N).div_ceil(count)).for_each(|v| *v = bad);
+            raster
+                .iter_mut()
+                .step_by((N * N).div_ceil(count))
+                .for_each(|v| *v = bad);
             for phase_only in [false, true] {
-                let rotation = RotationConfig { phase_only, ..RotationConfig::default() };
-                let configs =
-                    (rotation, TranslationConfig { phase_only, half_turn: true, ..TranslationConfig::default() });
+                let rotation = RotationConfig {
+                    phase_only,
+                    ..RotationConfig::default()
+                };
+                let configs = (
+                    rotation,
+                    TranslationConfig {
+                        phase_only,
+                        half_turn: true,
+                        ..TranslationConfig::default()
+                    },
+                );
                 for (f, g) in [(&raster, &earlier), (&earlier, &raster), (&raster, &raster)] {
                     let (angle, motion) = search(N, CELL_M, &configs, g, f);
-                    let numbers =
-                        [angle.angle_rad, angle.variance_rad2, angle.score, motion.x_m, motion.y_m, motion.score];
+                    let numbers = [
+                        angle.angle_rad,
+                        angle.variance_rad2,
+                        angle.score,
+                        motion.x_m,
+                        motion.y_m,
+                        motion.score,
+                    ];
                     assert!(
-                        numbers.iter().chain(motion.covariance.iter()).all(|v| v.is_finite()),
+                        numbers
+                            .iter()
+                            .chain(motion.covariance.iter())
+                            .all(|v| v.is_finite()),
                         "{bad} {count}: {motion:?}"
                     );
                 }
@@ -48,7 +85,10 @@ fn holes_that_are_not_numbers_cost_little() {
     let (earlier, mut later) = pair(127, 0.4, motion, 8);
     later.iter_mut().step_by(997).for_each(|v| *v = f32::NAN);
     let found = search(127, 0.4, &Default::default(), &earlier, &later).1;
-    assert!((found.x_m - 1.0).abs() < 0.1 && (found.y_m - 0.5).abs() < 0.1, "{found:?}");
+    assert!(
+        (found.x_m - 1.0).abs() < 0.1 && (found.y_m - 0.5).abs() < 0.1,
+        "{found:?}"
+    );
 }
 
 #[test]
@@ -57,23 +97,66 @@ fn rasters_of_another_size_are_refused_with_both_sizes() {
     let mut spectrum = rotation.new_spectrum();
     let error = rotation.spectrum(&[0.0; 7], &mut spectrum).unwrap_err();
     assert_eq!(error.to_string(), "raster has 7 values: expected 4225");
-    let line14 = RotationConfig { form: RotationForm::ProfileMean, ..RotationConfig::default() };
+    let line14 = RotationConfig {
+        form: RotationForm::ProfileMean,
+        ..RotationConfig::default()
+    };
     let mut other = RotationSearch::new(N, &line14).unwrap();
     assert!(other.search(&spectrum, &spectrum).is_err());
 }
 
 #[test]
 fn impossible_configurations_name_the_key() {
-    let rotation = |config: RotationConfig| RotationSearch::new(N, &config).err().unwrap().to_string();
+    let rotation =
+        |config: RotationConfig| RotationSearch::new(N, &config).err().unwrap().to_string();
     let default = RotationConfig::default;
-    assert!(rotation(RotationConfig { band_high: 0.5, ..default() }).starts_with("rotation.band_high = 0.5: expected"));
-    assert!(rotation(RotationConfig { band_low: f64::NAN, ..default() }).contains("band_low"));
-    assert!(rotation(RotationConfig { reach_deg: 91.0, ..default() }).contains("reach_deg"));
-    assert!(rotation(RotationConfig { angles: 0, ..default() }).contains("angles"));
+    assert!(
+        rotation(RotationConfig {
+            band_high: 0.5,
+            ..default()
+        })
+        .starts_with("rotation.band_high = 0.5: expected")
+    );
+    assert!(
+        rotation(RotationConfig {
+            band_low: f64::NAN,
+            ..default()
+        })
+        .contains("band_low")
+    );
+    assert!(
+        rotation(RotationConfig {
+            reach_deg: 91.0,
+            ..default()
+        })
+        .contains("reach_deg")
+    );
+    assert!(
+        rotation(RotationConfig {
+            angles: 0,
+            ..default()
+        })
+        .contains("angles")
+    );
     let cold = Peak::SoftArgmax { temperature: 0.0 };
-    assert!(rotation(RotationConfig { peak: cold, ..default() }).contains("temperature"));
-    let far = TranslationConfig { reach_m: 30.0, ..TranslationConfig::default() };
-    assert!(TranslationSearch::new(N, CELL_M, &far).err().unwrap().to_string().contains("reach_m = 30"));
+    assert!(
+        rotation(RotationConfig {
+            peak: cold,
+            ..default()
+        })
+        .contains("temperature")
+    );
+    let far = TranslationConfig {
+        reach_m: 30.0,
+        ..TranslationConfig::default()
+    };
+    assert!(
+        TranslationSearch::new(N, CELL_M, &far)
+            .err()
+            .unwrap()
+            .to_string()
+            .contains("reach_m = 30")
+    );
     assert!(TranslationSearch::new(N, f64::NAN, &TranslationConfig::default()).is_err());
     assert!(RotationSearch::new(3, &RotationConfig::default()).is_err());
 }

@@ -4,18 +4,30 @@
 mod common;
 
 use common::{Motion, Numbers, draw, pair, search};
-use gyre_scan_matching::{MotionEstimate, Overlap, Peak, RotationConfig, RotationForm, TranslationConfig};
+use gyre_scan_matching::{
+    MotionEstimate, Overlap, Peak, RotationConfig, RotationForm, TranslationConfig,
+};
 
 type Configs = (RotationConfig, TranslationConfig);
 
-fn recovered(n: usize, cell_m: f64, configs: &Configs, motion: Motion, seed: u64) -> MotionEstimate {
+fn recovered(
+    n: usize,
+    cell_m: f64,
+    configs: &Configs,
+    motion: Motion,
+    seed: u64,
+) -> MotionEstimate {
     let (earlier, later) = pair(n, cell_m, motion, seed);
     search(n, cell_m, configs, &earlier, &later).1
 }
 
 /// Errors (m, m, degrees).
 fn errors(found: &MotionEstimate, motion: Motion) -> [f64; 3] {
-    [found.x_m - motion.x, found.y_m - motion.y, (found.yaw_rad - motion.yaw).to_degrees()]
+    [
+        found.x_m - motion.x,
+        found.y_m - motion.y,
+        (found.yaw_rad - motion.yaw).to_degrees(),
+    ]
 }
 
 #[test]
@@ -23,7 +35,11 @@ fn whole_range_of_angles_and_shifts_to_a_fraction_of_a_cell() {
     let (n, cell_m, mut numbers) = (255, 0.4, Numbers(7));
     let (mut worst, mut squares, pairs) = ([0.0_f64; 3], [0.0; 3], 40);
     for k in 0..pairs {
-        let motion = Motion::degrees(numbers.within(8.0), numbers.within(8.0), numbers.within(19.5));
+        let motion = Motion::degrees(
+            numbers.within(8.0),
+            numbers.within(8.0),
+            numbers.within(19.5),
+        );
         let found = recovered(n, cell_m, &Configs::default(), motion, 100 + k);
         for (axis, error) in errors(&found, motion).into_iter().enumerate() {
             worst[axis] = worst[axis].max(error.abs());
@@ -32,13 +48,25 @@ fn whole_range_of_angles_and_shifts_to_a_fraction_of_a_cell() {
     }
     let rms = squares.map(f64::sqrt);
     println!("RMS {rms:?}, worst {worst:?} (m, m, deg)");
-    assert!(rms[0] < 0.1 * cell_m && rms[1] < 0.1 * cell_m && rms[2] < 0.08, "{rms:?}");
-    assert!(worst[0] < 0.5 * cell_m && worst[1] < 0.5 * cell_m && worst[2] < 0.3, "{worst:?}");
+    assert!(
+        rms[0] < 0.1 * cell_m && rms[1] < 0.1 * cell_m && rms[2] < 0.08,
+        "{rms:?}"
+    );
+    assert!(
+        worst[0] < 0.5 * cell_m && worst[1] < 0.5 * cell_m && worst[2] < 0.3,
+        "{worst:?}"
+    );
 }
 
 #[test]
 fn shifts_up_to_the_reach_are_found_in_every_direction() {
-    for (x, y) in [(11.9, 0.0), (-11.9, 0.0), (0.0, 11.9), (0.0, -11.9), (11.6, -11.6)] {
+    for (x, y) in [
+        (11.9, 0.0),
+        (-11.9, 0.0),
+        (0.0, 11.9),
+        (0.0, -11.9),
+        (11.6, -11.6),
+    ] {
         let motion = Motion::degrees(x, y, 0.0);
         let [dx, dy, _] = errors(&recovered(255, 0.4, &Configs::default(), motion, 5), motion);
         assert!(dx.abs() < 0.2 && dy.abs() < 0.2, "{x} {y}: {dx} {dy}");
@@ -48,18 +76,39 @@ fn shifts_up_to_the_reach_are_found_in_every_direction() {
 #[test]
 fn every_form_of_the_search_finds_the_motion() {
     let motion = Motion::degrees(2.3, -0.7, 6.4);
-    let line14 = RotationConfig { form: RotationForm::ProfileMean, ..RotationConfig::default() };
+    let line14 = RotationConfig {
+        form: RotationForm::ProfileMean,
+        ..RotationConfig::default()
+    };
     let soft = Peak::SoftArgmax { temperature: 6.0 };
     let forms: [(&str, Configs, [f64; 2]); 5] = [
         ("default", Configs::default(), [0.1, 0.1]),
-        ("line 14", (line14, TranslationConfig::default()), [0.3, 0.5]),
-        ("Weston et al.", (RotationConfig::weston(), TranslationConfig::weston()), [0.4, 1.0]),
-        ("Checchin et al.", (RotationConfig::checchin(), TranslationConfig::checchin()), [0.4, 1.0]),
+        (
+            "line 14",
+            (line14, TranslationConfig::default()),
+            [0.3, 0.5],
+        ),
+        (
+            "Weston et al.",
+            (RotationConfig::weston(), TranslationConfig::weston()),
+            [0.4, 1.0],
+        ),
+        (
+            "Checchin et al.",
+            (RotationConfig::checchin(), TranslationConfig::checchin()),
+            [0.4, 1.0],
+        ),
         (
             "soft-argmax",
             (
-                RotationConfig { peak: soft, ..RotationConfig::default() },
-                TranslationConfig { peak: soft, ..TranslationConfig::default() },
+                RotationConfig {
+                    peak: soft,
+                    ..RotationConfig::default()
+                },
+                TranslationConfig {
+                    peak: soft,
+                    ..TranslationConfig::default()
+                },
             ),
             [0.4, 1.0],
         ),
@@ -67,7 +116,10 @@ fn every_form_of_the_search_finds_the_motion() {
     for (name, configs, [metres, degrees]) in forms {
         let [dx, dy, dyaw] = errors(&recovered(255, 0.4, &configs, motion, 3), motion);
         println!("{name}: {dx:.3} m, {dy:.3} m, {dyaw:.3} deg");
-        assert!(dx.abs() < metres && dy.abs() < metres && dyaw.abs() < degrees, "{name}: {dx} {dy} {dyaw}");
+        assert!(
+            dx.abs() < metres && dy.abs() < metres && dyaw.abs() < degrees,
+            "{name}: {dx} {dy} {dyaw}"
+        );
     }
 }
 
@@ -76,21 +128,39 @@ fn odd_and_even_rasters_of_any_size() {
     let motion = Motion::degrees(1.1, 0.6, -4.0);
     for n in [97, 127, 128, 200, 511] {
         let [dx, dy, dyaw] = errors(&recovered(n, 0.4, &Configs::default(), motion, 11), motion);
-        assert!(dx.abs() < 0.2 && dy.abs() < 0.2 && dyaw.abs() < 0.5, "{n}: {dx} {dy} {dyaw}");
+        assert!(
+            dx.abs() < 0.2 && dy.abs() < 0.2 && dyaw.abs() < 0.5,
+            "{n}: {dx} {dy} {dyaw}"
+        );
     }
 }
 
 #[test]
 fn half_a_turn_is_resolved_on_request() {
-    let config = TranslationConfig { half_turn: true, ..TranslationConfig::default() };
+    let config = TranslationConfig {
+        half_turn: true,
+        ..TranslationConfig::default()
+    };
     for (yaw, reversed) in [(184.0, true), (172.0, true), (5.0, false)] {
         let motion = Motion::degrees(1.5, 2.0, yaw);
-        let found = recovered(255, 0.4, &(RotationConfig::default(), config.clone()), motion, 21);
+        let found = recovered(
+            255,
+            0.4,
+            &(RotationConfig::default(), config.clone()),
+            motion,
+            21,
+        );
         let dyaw = (found.yaw_rad - motion.yaw).rem_euclid(std::f64::consts::TAU);
         let dyaw = dyaw.min(std::f64::consts::TAU - dyaw);
         assert_eq!(found.half_turn, reversed, "{yaw}");
-        assert!(found.yaw_rad.abs() <= std::f64::consts::PI && dyaw.to_degrees() < 0.3, "{yaw}: {found:?}");
-        assert!((found.x_m - 1.5).abs() < 0.1 && (found.y_m - 2.0).abs() < 0.1, "{yaw}: {found:?}");
+        assert!(
+            found.yaw_rad.abs() <= std::f64::consts::PI && dyaw.to_degrees() < 0.3,
+            "{yaw}: {found:?}"
+        );
+        assert!(
+            (found.x_m - 1.5).abs() < 0.1 && (found.y_m - 2.0).abs() < 0.1,
+            "{yaw}: {found:?}"
+        );
     }
 }
 
@@ -99,13 +169,29 @@ fn half_a_turn_is_resolved_on_request() {
 fn energy_normalisation_removes_the_bias_toward_zero_shift() {
     let (n, cell_m, motion) = (127, 0.4, Motion::degrees(8.0, 0.0, 0.0));
     let mean_error = |overlap: Overlap| {
-        let config = TranslationConfig { overlap, ..TranslationConfig::default() };
+        let config = TranslationConfig {
+            overlap,
+            ..TranslationConfig::default()
+        };
         let errors: Vec<f64> = (0..12)
             .map(|seed| {
                 let scene = common::scatterers(5000, 60.0, 900 + seed);
                 let earlier = draw(scene.iter().copied(), n, cell_m, 2.5);
-                let later = draw(scene.iter().map(|&(p, s)| (motion.seen_from_later(p), s)), n, cell_m, 2.5);
-                search(n, cell_m, &(RotationConfig::default(), config.clone()), &earlier, &later).1.x_m - motion.x
+                let later = draw(
+                    scene.iter().map(|&(p, s)| (motion.seen_from_later(p), s)),
+                    n,
+                    cell_m,
+                    2.5,
+                );
+                search(
+                    n,
+                    cell_m,
+                    &(RotationConfig::default(), config.clone()),
+                    &earlier,
+                    &later,
+                )
+                .1
+                .x_m - motion.x
             })
             .collect();
         errors.iter().sum::<f64>() / errors.len() as f64

@@ -9,7 +9,13 @@ use common::scenes::*;
 use gyre_scan_matching::{Memory, Outcome, Refinement, ScanPoint};
 use nalgebra::{Isometry2, Matrix3, Vector3};
 
-const NOISY: Sensor = Sensor { noise_m: 0.1, offset_m: 0.0, doppler_s: 0.0, hides_doppler: false, seed: 1 };
+const NOISY: Sensor = Sensor {
+    noise_m: 0.1,
+    offset_m: 0.0,
+    doppler_s: 0.0,
+    hides_doppler: false,
+    seed: 1,
+};
 /// What can be seen along [`straight`].
 const AROUND: [[f64; 2]; 2] = [[-120.0, 370.0], [-100.0, 100.0]];
 const SEEDS: [u64; 3] = [1, 11, 21];
@@ -24,7 +30,9 @@ fn one_sided(seed: u64) -> Vec<Reflector> {
 }
 
 fn all_refined(run: &Run) -> bool {
-    run.refined.iter().all(|refined| refined.outcome == Outcome::Refined)
+    run.refined
+        .iter()
+        .all(|refined| refined.outcome == Outcome::Refined)
 }
 
 #[track_caller]
@@ -32,14 +40,27 @@ fn follows(name: &str, run: &Run, yaw_deg: f64, shift_m: f64, worst_deg: f64, wo
     let errors = run.errors();
     println!("{name}: {errors:.3?}");
     assert!(all_refined(run), "{name}");
-    assert!(errors.yaw_deg.abs() < yaw_deg && errors.shift_m < shift_m, "{name}: {errors:.3?}");
-    assert!(errors.worst_deg < worst_deg && errors.worst_m < worst_m, "{name}: {errors:.3?}");
+    assert!(
+        errors.yaw_deg.abs() < yaw_deg && errors.shift_m < shift_m,
+        "{name}: {errors:.3?}"
+    );
+    assert!(
+        errors.worst_deg < worst_deg && errors.worst_m < worst_m,
+        "{name}: {errors:.3?}"
+    );
 }
 
 #[test]
 fn straight_drives_are_followed() {
     for seed in SEEDS {
-        follows("straight", &run(&town(AROUND, seed), &straight(), &NOISY), 0.1, 0.5, 0.06, 0.1);
+        follows(
+            "straight",
+            &run(&town(AROUND, seed), &straight(), &NOISY),
+            0.1,
+            0.5,
+            0.06,
+            0.1,
+        );
     }
 }
 
@@ -48,7 +69,14 @@ fn turns_to_either_side_are_followed() {
     for seed in SEEDS {
         let scene = town([[-150.0, 150.0]; 2], seed);
         for (name, rate) in [("left turn", 20.0), ("right turn", -20.0)] {
-            follows(name, &run(&scene, &Drive::steady(8.0, rate, 101), &NOISY), 0.25, 0.25, 0.08, 0.12);
+            follows(
+                name,
+                &run(&scene, &Drive::steady(8.0, rate, 101), &NOISY),
+                0.25,
+                0.25,
+                0.08,
+                0.12,
+            );
         }
     }
 }
@@ -56,7 +84,14 @@ fn turns_to_either_side_are_followed() {
 #[test]
 fn a_standing_vehicle_stays_where_it_is() {
     for seed in SEEDS {
-        follows("standing", &run(&town(AROUND, seed), &Drive::steady(0.0, 0.0, 101), &NOISY), 0.04, 0.06, 0.1, 0.16);
+        follows(
+            "standing",
+            &run(&town(AROUND, seed), &Drive::steady(0.0, 0.0, 101), &NOISY),
+            0.04,
+            0.06,
+            0.1,
+            0.16,
+        );
     }
 }
 
@@ -65,7 +100,10 @@ fn yaw_drifts_little_where_things_stand_on_one_side_only() {
     let mut sums = [0.0; 2];
     for seed in SEEDS {
         let scene = one_sided(seed);
-        for (sum, (name, scene)) in sums.iter_mut().zip([("left", scene.clone()), ("right", mirrored(&scene))]) {
+        for (sum, (name, scene)) in sums
+            .iter_mut()
+            .zip([("left", scene.clone()), ("right", mirrored(&scene))])
+        {
             let run = run(&scene, &straight(), &NOISY);
             follows(name, &run, 0.55, 1.9, 0.3, 0.4);
             *sum += run.errors().drift_deg / SEEDS.len() as f64;
@@ -77,7 +115,10 @@ fn yaw_drifts_little_where_things_stand_on_one_side_only() {
 
 /// The same motion for a vehicle that has left and right exchanged.
 fn mirror(motion: &Isometry2<f64>) -> Isometry2<f64> {
-    Isometry2::new([motion.translation.x, -motion.translation.y].into(), -motion.rotation.angle())
+    Isometry2::new(
+        [motion.translation.x, -motion.translation.y].into(),
+        -motion.rotation.angle(),
+    )
 }
 
 #[test]
@@ -87,15 +128,26 @@ fn mirrored_points_give_the_mirrored_motion() {
     for seed in 1..6 {
         let scans = scans(&one_sided(seed), &drive, &NOISY);
         let mirror_point = |p: &ScanPoint| [p[0], -p[1], p[2], p[3], p[4]];
-        let mirrored: Vec<Vec<ScanPoint>> = scans.iter().map(|scan| scan.iter().map(mirror_point).collect()).collect();
+        let mirrored: Vec<Vec<ScanPoint>> = scans
+            .iter()
+            .map(|scan| scan.iter().map(mirror_point).collect())
+            .collect();
         let (mut one, mut other) = (refinement(), refinement());
         for k in 0..scans.len() - 1 {
             let (id, searched) = (k as u64 + 1, searched(&drive, k));
             one.next(id, &scans[k + 1], &scans[k], &searched, SWEEP_S);
-            other.next(id, &mirrored[k + 1], &mirrored[k], &mirror(&searched), SWEEP_S);
+            other.next(
+                id,
+                &mirrored[k + 1],
+                &mirrored[k],
+                &mirror(&searched),
+                SWEEP_S,
+            );
             if k == 4 {
                 let between = one.memory().pose.inv_mul(&mirror(&other.memory().pose));
-                apart.push(between.translation.vector.norm() + 50.0 * between.rotation.angle().abs());
+                apart.push(
+                    between.translation.vector.norm() + 50.0 * between.rotation.angle().abs(),
+                );
             }
         }
         let yaw = |refinement: &Refinement| refinement.memory().pose.rotation.angle().to_degrees();
@@ -103,7 +155,9 @@ fn mirrored_points_give_the_mirrored_motion() {
     }
     apart.sort_by(f64::total_cmp);
     let mean = sums.iter().sum::<f64>() / sums.len() as f64;
-    println!("after five scans {apart:.6?} m apart; yaw at the end {sums:.3?} degrees, mean {mean:.3}");
+    println!(
+        "after five scans {apart:.6?} m apart; yaw at the end {sums:.3?} degrees, mean {mean:.3}"
+    );
     // Rounding alone tells them apart: it ends a descent a step sooner or later (1 mm, 1 mm at 50 m), and that grows, in some
     // scenes sooner, to what any error of the points grows to.
     assert!(apart[2] < 0.05, "{apart:?}");
@@ -133,7 +187,10 @@ fn drift_of_offset(points: &[ScanPoint], offset_m: f64) -> f64 {
         let r = x.hypot(y);
         let (cos, sin) = (x / r, y / r);
         let apparent = [-sin, cos].map(|v| v * offset_m * sin / r);
-        for (row, value) in [(Vector3::new(1.0, 0.0, -y), apparent[0]), (Vector3::new(0.0, 1.0, x), apparent[1])] {
+        for (row, value) in [
+            (Vector3::new(1.0, 0.0, -y), apparent[0]),
+            (Vector3::new(0.0, 1.0, x), apparent[1]),
+        ] {
             information += row * row.transpose();
             right += row * value;
         }
@@ -145,7 +202,10 @@ fn drift_of_offset(points: &[ScanPoint], offset_m: f64) -> f64 {
 #[test]
 fn an_offset_left_in_the_ranges_turns_a_one_sided_drive() {
     const OFFSET_M: f64 = 0.3;
-    for (seed, side) in SEEDS.into_iter().flat_map(|seed| [(seed, 1.0), (seed, -1.0)]) {
+    for (seed, side) in SEEDS
+        .into_iter()
+        .flat_map(|seed| [(seed, 1.0), (seed, -1.0)])
+    {
         let scene = posts([AROUND[0], [8.0, 60.0]], 50.0, seed);
         let scene = if side > 0.0 { scene } else { mirrored(&scene) };
         let drift = |offset_m| {
@@ -154,27 +214,48 @@ fn an_offset_left_in_the_ranges_turns_a_one_sided_drive() {
             run.errors().drift_deg
         };
         let caused = 0.5 * (drift(OFFSET_M) - drift(-OFFSET_M));
-        let expected = drift_of_offset(&NOISY.scan(&scene, &straight(), 50), OFFSET_M).to_degrees() * 100.0;
+        let expected =
+            drift_of_offset(&NOISY.scan(&scene, &straight(), 50), OFFSET_M).to_degrees() * 100.0;
         println!("side {side}: {caused:.3}, expected {expected:.3} degrees/100 m");
         assert!(expected * side < 0.0, "away from what is seen too far");
-        assert!((0.4..2.5).contains(&(caused / expected)), "{caused}, expected {expected}");
+        assert!(
+            (0.4..2.5).contains(&(caused / expected)),
+            "{caused}, expected {expected}"
+        );
     }
 }
 
 /// From standing to 20 m/s.
 fn speeding() -> Drive {
-    Drive { speed_mps: 0.0, acceleration_mps2: 2.0, yaw_rate: 0.0, scans: 41 }
+    Drive {
+        speed_mps: 0.0,
+        acceleration_mps2: 2.0,
+        yaw_rate: 0.0,
+        scans: 41,
+    }
 }
 
 #[test]
 fn a_doppler_shift_that_is_told_costs_nothing() {
-    const SHIFTED: Sensor = Sensor { doppler_s: 0.05, ..NOISY };
-    for (seed, drive) in SEEDS.into_iter().flat_map(|seed| [(seed, straight()), (seed, speeding())]) {
+    const SHIFTED: Sensor = Sensor {
+        doppler_s: 0.05,
+        ..NOISY
+    };
+    for (seed, drive) in SEEDS
+        .into_iter()
+        .flat_map(|seed| [(seed, straight()), (seed, speeding())])
+    {
         let scene = town(AROUND, seed);
         let [told, without] = [SHIFTED, NOISY].map(|sensor| run(&scene, &drive, &sensor).errors());
         println!("told {told:.3?}\nwithout {without:.3?}");
-        assert!((told.shift_m - without.shift_m).abs() < 0.3, "{told:?}, unshifted {without:?}");
-        assert!((told.yaw_deg - without.yaw_deg).abs() < 0.1, "{told:?}, unshifted {without:?}");
+        assert!(
+            (told.shift_m - without.shift_m).abs() < 0.3,
+            "{told:?}, unshifted {without:?}"
+        );
+        assert!(
+            (told.yaw_deg - without.yaw_deg).abs() < 0.1,
+            "{told:?}, unshifted {without:?}"
+        );
     }
 }
 
@@ -183,7 +264,17 @@ fn a_doppler_shift_that_is_hidden_spoils_an_accelerating_drive() {
     for seed in SEEDS {
         let scene = town(AROUND, seed);
         let [hidden, told] = [true, false].map(|hides_doppler| {
-            run(&scene, &speeding(), &Sensor { doppler_s: 0.05, hides_doppler, ..NOISY }).errors().shift_m
+            run(
+                &scene,
+                &speeding(),
+                &Sensor {
+                    doppler_s: 0.05,
+                    hides_doppler,
+                    ..NOISY
+                },
+            )
+            .errors()
+            .shift_m
         });
         println!("hidden {hidden:.3} m, told {told:.3} m");
         assert!(hidden > 2.0 * told, "hidden {hidden} m, told {told} m");
@@ -195,7 +286,10 @@ fn covariances_are_symmetric_and_positive_definite() {
     for drive in [straight(), Drive::steady(8.0, 20.0, 41)] {
         for refined in run(&town(AROUND, 1), &drive, &NOISY).refined {
             let covariance = refined.covariance;
-            assert!((covariance - covariance.transpose()).norm() <= 1e-12 * covariance.norm(), "{covariance}");
+            assert!(
+                (covariance - covariance.transpose()).norm() <= 1e-12 * covariance.norm(),
+                "{covariance}"
+            );
             assert!(covariance.cholesky().is_some(), "{covariance}");
         }
     }
@@ -206,12 +300,29 @@ fn covariances_are_symmetric_and_positive_definite() {
 fn what_all_points_weigh_changes_neither_motions_nor_covariances() {
     let drive = straight();
     let whole = scans(&town(AROUND, 1), &drive, &NOISY);
-    let lighter =
-        whole.iter().map(|scan| scan.iter().map(|&[x, y, t, w, d]| [x, y, t, 0.25 * w, d]).collect()).collect();
-    let [whole, lighter] = [whole, lighter].map(|scans| refine_on(&mut refinement(), &drive, &scans, 0..20));
+    let lighter = whole
+        .iter()
+        .map(|scan| {
+            scan.iter()
+                .map(|&[x, y, t, w, d]| [x, y, t, 0.25 * w, d])
+                .collect()
+        })
+        .collect();
+    let [whole, lighter] =
+        [whole, lighter].map(|scans| refine_on(&mut refinement(), &drive, &scans, 0..20));
     for (a, b) in whole.iter().zip(&lighter) {
-        assert!((a.motion.translation.vector - b.motion.translation.vector).norm() < 1e-3, "{} {}", a.motion, b.motion);
-        assert!((a.covariance - b.covariance).norm() < 0.01 * a.covariance.norm(), "{} {}", a.covariance, b.covariance);
+        assert!(
+            (a.motion.translation.vector - b.motion.translation.vector).norm() < 1e-3,
+            "{} {}",
+            a.motion,
+            b.motion
+        );
+        assert!(
+            (a.covariance - b.covariance).norm() < 0.01 * a.covariance.norm(),
+            "{} {}",
+            a.covariance,
+            b.covariance
+        );
     }
 }
 
@@ -219,7 +330,11 @@ fn what_all_points_weigh_changes_neither_motions_nor_covariances() {
 /// slope: of such a corridor the information matrix says nothing true.
 #[test]
 fn a_corridor_leaves_its_axis_uncertain() {
-    let side = |y: f64| (0..4).map(move |k| y + f64::from(k) / 3.0).map(|y| wall([-110.0, y], [130.0, y], 75));
+    let side = |y: f64| {
+        (0..4)
+            .map(move |k| y + f64::from(k) / 3.0)
+            .map(|y| wall([-110.0, y], [130.0, y], 75))
+    };
     let mut scene: Vec<Reflector> = side(9.0).chain(side(-10.0)).collect();
     scene.extend(posts([[-110.0, 130.0], [-9.0, 9.0]], 150.0, 1));
     let drive = Drive::steady(2.0, 0.0, 41);
@@ -227,11 +342,29 @@ fn a_corridor_leaves_its_axis_uncertain() {
     for yaw in [0.0, 0.5, std::f64::consts::FRAC_PI_2] {
         // The covariance is in the vehicle's frame: where the corridor leads in the world does not matter.
         let mut refinement = refinement();
-        refinement.restore(Memory { pose: Isometry2::rotation(yaw), ..Memory::default() }, |_| false);
-        let run = Run { drive, refined: refine_on(&mut refinement, &drive, &scans, 0..40) };
-        let mean = |k: usize| run.refined.iter().map(|refined| refined.covariance[(k, k)]).sum::<f64>() / 40.0;
+        refinement.restore(
+            Memory {
+                pose: Isometry2::rotation(yaw),
+                ..Memory::default()
+            },
+            |_| false,
+        );
+        let run = Run {
+            drive,
+            refined: refine_on(&mut refinement, &drive, &scans, 0..40),
+        };
+        let mean = |k: usize| {
+            run.refined
+                .iter()
+                .map(|refined| refined.covariance[(k, k)])
+                .sum::<f64>()
+                / 40.0
+        };
         let [along, across] = [0, 1].map(|k| mean(k).sqrt());
-        println!("towards {yaw:.1} rad: along {along:.3} m, across {across:.3} m; {:.3?}", run.errors());
+        println!(
+            "towards {yaw:.1} rad: along {along:.3} m, across {across:.3} m; {:.3?}",
+            run.errors()
+        );
         assert!(along > 1.3 * across, "along {along} m, across {across} m");
     }
 }

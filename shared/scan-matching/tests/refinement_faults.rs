@@ -7,27 +7,53 @@ use common::{Numbers, scenes::*};
 use gyre_scan_matching::{Outcome, Refined, Refinement, RefinementConfig, ScanPoint};
 use nalgebra::Isometry2;
 
-const NOISY: Sensor = Sensor { noise_m: 0.1, offset_m: 0.0, doppler_s: 0.0, hides_doppler: false, seed: 1 };
+const NOISY: Sensor = Sensor {
+    noise_m: 0.1,
+    offset_m: 0.0,
+    doppler_s: 0.0,
+    hides_doppler: false,
+    seed: 1,
+};
 
 /// A gentle bend, 60 scans, and what is seen on it.
 fn bend() -> (Drive, Vec<Vec<ScanPoint>>) {
     let drive = Drive::steady(10.0, 4.0, 60);
-    (drive, scans(&town([[-110.0, 250.0], [-110.0, 200.0]], 1), &drive, &NOISY))
+    (
+        drive,
+        scans(&town([[-110.0, 250.0], [-110.0, 200.0]], 1), &drive, &NOISY),
+    )
 }
 
 /// Points that have nothing to do with the scene.
 fn noise(seed: u64) -> Vec<ScanPoint> {
     let mut numbers = Numbers(seed);
-    let mut point = || [numbers.within(65.0), numbers.within(65.0), numbers.within(0.125), 0.65, 0.0];
+    let mut point = || {
+        [
+            numbers.within(65.0),
+            numbers.within(65.0),
+            numbers.within(0.125),
+            0.65,
+            0.0,
+        ]
+    };
     (0..900).map(|_| point().map(|v| v as f32)).collect()
 }
 
 fn bits(refined: &[Refined]) -> Vec<u64> {
     let numbers = |refined: &Refined| {
         let motion = &refined.motion;
-        let pose = [motion.translation.x, motion.translation.y, motion.rotation.re, motion.rotation.im];
-        let mut numbers =
-            [pose.as_slice(), refined.covariance.as_slice(), &[refined.overlap, refined.support]].concat();
+        let pose = [
+            motion.translation.x,
+            motion.translation.y,
+            motion.rotation.re,
+            motion.rotation.im,
+        ];
+        let mut numbers = [
+            pose.as_slice(),
+            refined.covariance.as_slice(),
+            &[refined.overlap, refined.support],
+        ]
+        .concat();
         numbers.push(f64::from(refined.outcome as u8) + 0.1 * f64::from(refined.hypothesis as u8));
         numbers
     };
@@ -51,7 +77,10 @@ fn sane(refined: &Refined) {
 fn a_fault_of_one_scan_passes() {
     let (drive, good) = bend();
     let before = refine(&drive, &good).errors();
-    let turned: Vec<ScanPoint> = good[30].iter().map(|p| [-p[1], p[0], p[2], p[3], p[4]]).collect();
+    let turned: Vec<ScanPoint> = good[30]
+        .iter()
+        .map(|p| [-p[1], p[0], p[2], p[3], p[4]])
+        .collect();
     let half: Vec<ScanPoint> = good[30].iter().filter(|p| p[1] > 0.0).copied().collect();
     let faults = [
         ("noise", noise(1), Outcome::Predicted),
@@ -65,11 +94,22 @@ fn a_fault_of_one_scan_passes() {
         let errors = run.errors();
         println!("{name}: {errors:.3?}, without {before:.3?}");
         for (k, refined) in run.refined.iter().enumerate() {
-            assert_eq!(refined.outcome, if k == 29 { expected } else { Outcome::Refined }, "{name}, scan {}", k + 1);
+            assert_eq!(
+                refined.outcome,
+                if k == 29 { expected } else { Outcome::Refined },
+                "{name}, scan {}",
+                k + 1
+            );
             sane(refined);
         }
-        assert!(errors.shift_m < before.shift_m + 0.1, "{name}: {errors:?}, without {before:?}");
-        assert!(errors.yaw_deg.abs() < before.yaw_deg.abs() + 0.1, "{name}: {errors:?}, without {before:?}");
+        assert!(
+            errors.shift_m < before.shift_m + 0.1,
+            "{name}: {errors:?}, without {before:?}"
+        );
+        assert!(
+            errors.yaw_deg.abs() < before.yaw_deg.abs() + 0.1,
+            "{name}: {errors:?}, without {before:?}"
+        );
     }
 }
 
@@ -89,13 +129,24 @@ fn after_enough_scans_of_noise_the_map_begins_anew() {
         assert!(refinement.keyframes().count() > 0);
         refined.extend(refine_on(&mut refinement, &drive, &scans, last..last + 1));
         assert_eq!(refinement.keyframes().count(), 0);
-        assert!(refined[FIRST..].iter().all(|refined| refined.outcome == Outcome::Predicted));
+        assert!(
+            refined[FIRST..]
+                .iter()
+                .all(|refined| refined.outcome == Outcome::Predicted)
+        );
         refined.extend(refine_on(&mut refinement, &drive, &scans, last + 1..59));
         let run = Run { drive, refined };
         let (whole, after) = (run.errors(), run.errors_from(last + 1 + RECOVERED));
         println!("after {after:.3?}, whole {whole:.3?}");
-        assert!(run.refined[last + 1 + RECOVERED..].iter().all(|refined| refined.outcome == Outcome::Refined));
-        assert!(after.shift_m < 0.3 && after.yaw_deg.abs() < 0.25, "{after:?}");
+        assert!(
+            run.refined[last + 1 + RECOVERED..]
+                .iter()
+                .all(|refined| refined.outcome == Outcome::Refined)
+        );
+        assert!(
+            after.shift_m < 0.3 && after.yaw_deg.abs() < 0.25,
+            "{after:?}"
+        );
         run.refined.iter().for_each(sane);
     }
 }
@@ -107,7 +158,13 @@ fn nothing_that_points_may_hold_makes_a_motion_that_is_no_number() {
         ("none", Vec::new()),
         ("nan", vec![[f32::NAN; 5]; 500]),
         ("infinite", vec![[f32::INFINITY, 1.0, 0.0, 1.0, 0.0]; 500]),
-        ("weightless", good[30].iter().map(|p| [p[0], p[1], p[2], 0.0, p[4]]).collect()),
+        (
+            "weightless",
+            good[30]
+                .iter()
+                .map(|p| [p[0], p[1], p[2], 0.0, p[4]])
+                .collect(),
+        ),
         ("at the sensor", vec![[0.0; 5]; 500]),
     ];
     for (name, fault) in faults {
@@ -119,7 +176,12 @@ fn nothing_that_points_may_hold_makes_a_motion_that_is_no_number() {
             run.refined.iter().for_each(sane);
             if range == (30..31) {
                 assert_eq!(run.refined[29].outcome, Outcome::Predicted, "{name}");
-                assert!(run.refined[30..].iter().all(|refined| refined.outcome == Outcome::Refined), "{name}");
+                assert!(
+                    run.refined[30..]
+                        .iter()
+                        .all(|refined| refined.outcome == Outcome::Refined),
+                    "{name}"
+                );
                 assert!(run.errors().shift_m < 0.4, "{name}: {:?}", run.errors());
             }
         }
@@ -134,7 +196,11 @@ fn a_few_points_that_are_no_numbers_cost_little() {
     let run = refine(&drive, &scans);
     run.refined.iter().for_each(sane);
     assert!(run.errors().shift_m < 0.4, "{:?}", run.errors());
-    assert!(run.refined[32..].iter().all(|refined| refined.outcome == Outcome::Refined));
+    assert!(
+        run.refined[32..]
+            .iter()
+            .all(|refined| refined.outcome == Outcome::Refined)
+    );
 }
 
 #[test]
@@ -143,12 +209,22 @@ fn stamps_that_stand_still_do_no_harm() {
     for interval_s in [0.0, -1.0, f64::NAN] {
         let mut refinement = refinement();
         let mut refined = refine_on(&mut refinement, &drive, &scans, 0..20);
-        refined.push(refinement.next(21, &scans[21], &scans[20], &searched(&drive, 20), interval_s));
+        refined.push(refinement.next(
+            21,
+            &scans[21],
+            &scans[20],
+            &searched(&drive, 20),
+            interval_s,
+        ));
         refined.extend(refine_on(&mut refinement, &drive, &scans, 21..59));
         let run = Run { drive, refined };
         run.refined.iter().for_each(sane);
         println!("interval {interval_s}: {:.3?}", run.errors());
-        assert!(run.errors().shift_m < 0.5, "interval {interval_s}: {:?}", run.errors());
+        assert!(
+            run.errors().shift_m < 0.5,
+            "interval {interval_s}: {:?}",
+            run.errors()
+        );
     }
 }
 
@@ -161,16 +237,23 @@ fn identical_input_gives_identical_bits() {
     let mut again = refinement();
     refine_on(&mut again, &drive, &scans, 10..40);
     again.start();
-    assert_eq!(bits(&once.refined), bits(&refine_on(&mut again, &drive, &scans, 0..59)));
+    assert_eq!(
+        bits(&once.refined),
+        bits(&refine_on(&mut again, &drive, &scans, 0..59))
+    );
 }
 
 /// A refinement that knows what another one does, and has known something else before.
 fn restored(from: &Refinement, mut into: Refinement) -> Refinement {
     let mut keyframes = from.keyframes();
     into.restore(*from.memory(), |to| {
-        let Some(from) = keyframes.next() else { return false };
+        let Some(from) = keyframes.next() else {
+            return false;
+        };
         (to.id, to.pose) = (from.id, from.pose);
-        for ((corner, cells), (from_corner, from_cells)) in to.images_mut().into_iter().zip(from.images()) {
+        for ((corner, cells), (from_corner, from_cells)) in
+            to.images_mut().into_iter().zip(from.images())
+        {
             *corner = *from_corner;
             cells.copy_from_slice(from_cells);
         }
@@ -190,7 +273,11 @@ fn a_restored_refinement_goes_on_bit_for_bit() {
         let mut others = [restored(&one, refinement()), restored(&one, used)];
         let expected = bits(&refine_on(&mut one, &drive, &scans, cut..59));
         for other in &mut others {
-            assert_eq!(bits(&refine_on(other, &drive, &scans, cut..59)), expected, "from scan {cut}");
+            assert_eq!(
+                bits(&refine_on(other, &drive, &scans, cut..59)),
+                expected,
+                "from scan {cut}"
+            );
         }
     }
 }
@@ -202,5 +289,7 @@ fn a_chain_begins_at_the_first_scan_of_any_number() {
     let refined = refinement.next(0, &scans[1], &scans[0], &searched(&drive, 0), SWEEP_S);
     sane(&refined);
     let off = drive.pose(1).inv_mul(&refined.motion);
-    assert!(off.translation.vector.norm() < 0.2 && refinement.memory().pose != Isometry2::identity());
+    assert!(
+        off.translation.vector.norm() < 0.2 && refinement.memory().pose != Isometry2::identity()
+    );
 }

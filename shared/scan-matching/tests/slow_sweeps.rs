@@ -41,7 +41,9 @@ fn scan(posts: &[Point2<f64>], k: usize) -> Vec<ScanPoint> {
             place = pose(k as f64 * SWEEP_S + time_s).inverse_transform_point(post);
             time_s = ((-place.y).atan2(place.x).rem_euclid(TAU) / TAU - 0.5) * SWEEP_S;
         }
-        RANGE_M.contains(&place.coords.norm()).then(|| [place.x as f32, place.y as f32, time_s as f32, 1.0, 0.0])
+        RANGE_M
+            .contains(&place.coords.norm())
+            .then(|| [place.x as f32, place.y as f32, time_s as f32, 1.0, 0.0])
     };
     posts.iter().filter_map(see).collect()
 }
@@ -62,7 +64,10 @@ fn refined(seed: u64) -> Vec<Refined> {
         ..RefinementConfig::default()
     };
     let mut refinement = Refinement::new(&config, 2048).unwrap();
-    let posts: Vec<_> = posts([[-80.0, 130.0], [-120.0, 80.0]], 60.0, seed).iter().map(|p| p.from.into()).collect();
+    let posts: Vec<_> = posts([[-80.0, 130.0], [-120.0, 80.0]], 60.0, seed)
+        .iter()
+        .map(|p| p.from.into())
+        .collect();
     let scans: Vec<_> = (0..SCANS).map(|k| scan(&posts, k)).collect();
     let [x, y, turn] = SEARCH_OFF;
     let next = |k: usize| {
@@ -89,7 +94,11 @@ fn a_bend_that_begins_between_two_scans_is_followed() {
             );
             end *= refined.motion;
         }
-        let shift_m = pose((SCANS - 1) as f64 * SWEEP_S).inv_mul(&end).translation.vector.norm();
+        let shift_m = pose((SCANS - 1) as f64 * SWEEP_S)
+            .inv_mul(&end)
+            .translation
+            .vector
+            .norm();
         println!("seed {seed}: {shift_m:.2} m off at the end");
         assert!(shift_m < 1.2, "seed {seed}: {shift_m:.2} m off at the end");
     }

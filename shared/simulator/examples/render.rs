@@ -16,8 +16,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scans = arguments.get(1).map_or(Ok(20), |scans| scans.parse())?;
     let began = Instant::now();
     let simulator = Simulator::new(&config)?;
-    println!("{} scatterers in {:.2} s", simulator.world().scatterers().len(), began.elapsed().as_secs_f64());
-    let (mut sensor, mut scan) = (simulator.sensor(), OwnedScan::with_limits(simulator.limits()));
+    println!(
+        "{} scatterers in {:.2} s",
+        simulator.world().scatterers().len(),
+        began.elapsed().as_secs_f64()
+    );
+    let (mut sensor, mut scan) = (
+        simulator.sensor(),
+        OwnedScan::with_limits(simulator.limits()),
+    );
     let mut times_ms: Vec<f64> = Vec::new();
     for index in 0..scans {
         let began = Instant::now();
@@ -25,6 +32,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         times_ms.push(began.elapsed().as_secs_f64() * 1e3);
     }
     times_ms.sort_by(f64::total_cmp);
-    println!("{scans} scans: median {:.1} ms, worst {:.1} ms", times_ms[scans / 2], times_ms[scans - 1]);
+    println!(
+        "{scans} scans: median {:.1} ms, worst {:.1} ms",
+        times_ms[scans / 2],
+        times_ms[scans - 1]
+    );
     Ok(())
 }

@@ -86,9 +86,18 @@ impl SimulationConfig {
 }
 
 /// Refuses a value beyond its limits, naming its key.
-pub(crate) fn within(key: &'static str, value: f64, least: f64, most: f64) -> Result<(), SimulatorError> {
+pub(crate) fn within(
+    key: &'static str,
+    value: f64,
+    least: f64,
+    most: f64,
+) -> Result<(), SimulatorError> {
     if (least..=most).contains(&value) {
         return Ok(());
     }
-    Err(SimulatorError::Config { key, value: value.to_string(), expected: format!("between {least} and {most}") })
+    Err(SimulatorError::Config {
+        key,
+        value: value.to_string(),
+        expected: format!("between {least} and {most}"),
+    })
 }

@@ -73,13 +73,23 @@ impl Default for DriveConfig {
 impl DriveConfig {
     /// A drive along a recorded trajectory.
     pub fn along_file(file: PathBuf) -> Self {
-        Self { kind: DriveKind::File, file: Some(file), ..Self::default() }
+        Self {
+            kind: DriveKind::File,
+            file: Some(file),
+            ..Self::default()
+        }
     }
 
     /// The shape of the first experiment of Checchin et al., "Radar scan matching SLAM using the Fourier-Mellin transform"
     /// (2010): 1135 m of campus at 0 to 25 km/h.
     pub fn campus() -> Self {
-        Self { kind: DriveKind::Town, keep: Keep::Right, speed_m_s: 25.0 / 3.6, length_m: 1135.0, ..Self::default() }
+        Self {
+            kind: DriveKind::Town,
+            keep: Keep::Right,
+            speed_m_s: 25.0 / 3.6,
+            length_m: 1135.0,
+            ..Self::default()
+        }
     }
 
     /// Refuses what cannot be driven, naming the key.
@@ -87,14 +97,23 @@ impl DriveConfig {
         within("drive.block_length_m", self.block_length_m, 30.0, 400.0)?;
         within("drive.block_width_m", self.block_width_m, 30.0, 400.0)?;
         within("drive.speed_m_s", self.speed_m_s, 0.5, 40.0)?;
-        within("drive.lateral_acceleration_m_s2", self.lateral_acceleration_m_s2.unwrap_or(1.0), 0.1, 20.0)?;
+        within(
+            "drive.lateral_acceleration_m_s2",
+            self.lateral_acceleration_m_s2.unwrap_or(1.0),
+            0.1,
+            20.0,
+        )?;
         within("drive.length_m", self.length_m, 300.0, 100_000.0)?;
         within("drive.from_s", self.from_s, 0.0, 1e6)?;
         within("drive.for_s", self.for_s.unwrap_or(1.0), 1.0, 1e6)?;
         within("drive.rate_hz", self.rate_hz, 0.1, 100.0)?;
         if self.kind == DriveKind::File && self.file.is_none() {
             let expected = "the path of a trajectory where `drive.kind` is \"file\"".to_owned();
-            return Err(SimulatorError::Config { key: "drive.file", value: "missing".to_owned(), expected });
+            return Err(SimulatorError::Config {
+                key: "drive.file",
+                value: "missing".to_owned(),
+                expected,
+            });
         }
         Ok(())
     }
@@ -105,7 +124,14 @@ impl DriveConfig {
         Ok(match (self.kind, &self.file) {
             (DriveKind::File, Some(file)) => {
                 let for_s = self.for_s.unwrap_or(f64::INFINITY);
-                Box::new(recorded::read(file, Excerpt { from_s: self.from_s, for_s, rate_hz: self.rate_hz })?)
+                Box::new(recorded::read(
+                    file,
+                    Excerpt {
+                        from_s: self.from_s,
+                        for_s,
+                        rate_hz: self.rate_hz,
+                    },
+                )?)
             }
             (DriveKind::Town, _) => Box::new(
                 TownDrive {
@@ -133,8 +159,16 @@ mod tests {
 
     #[test]
     fn file_kind_without_a_file_or_with_a_missing_one_is_refused_by_name() {
-        let none = DriveConfig { kind: DriveKind::File, ..DriveConfig::default() };
-        assert!(none.validate().unwrap_err().to_string().contains("`drive.file` is missing"));
+        let none = DriveConfig {
+            kind: DriveKind::File,
+            ..DriveConfig::default()
+        };
+        assert!(
+            none.validate()
+                .unwrap_err()
+                .to_string()
+                .contains("`drive.file` is missing")
+        );
         let missing = DriveConfig::along_file("nowhere/poses.tum".into());
         missing.validate().unwrap();
         let refused = missing.trajectory(1).err().unwrap().to_string();
@@ -143,10 +177,15 @@ mod tests {
 
     #[test]
     fn kinds_are_read_from_a_configuration() {
-        let config: DriveConfig = toml::from_str("kind = \"town\"\nlength_m = 500.0\nkeep = \"right\"").unwrap();
+        let config: DriveConfig =
+            toml::from_str("kind = \"town\"\nlength_m = 500.0\nkeep = \"right\"").unwrap();
         assert_eq!((config.kind, config.keep), (DriveKind::Town, Keep::Right));
         let drive = config.trajectory(1).unwrap();
-        assert!((30.0..400.0).contains(&drive.duration_s()), "{} s", drive.duration_s());
+        assert!(
+            (30.0..400.0).contains(&drive.duration_s()),
+            "{} s",
+            drive.duration_s()
+        );
         assert_eq!(drive.pose(20.0), config.trajectory(1).unwrap().pose(20.0));
         assert_ne!(drive.pose(20.0), config.trajectory(2).unwrap().pose(20.0));
         assert!(toml::from_str::<DriveConfig>("kind = \"boat\"").is_err());

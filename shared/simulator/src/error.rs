@@ -89,6 +89,9 @@ pub enum SimulatorError {
 impl SimulatorError {
     /// Wraps an input or output error with the path that it is about.
     pub(crate) fn write(path: &std::path::Path) -> impl FnOnce(std::io::Error) -> Self + '_ {
-        move |source| Self::Write { path: path.to_owned(), source }
+        move |source| Self::Write {
+            path: path.to_owned(),
+            source,
+        }
     }
 }

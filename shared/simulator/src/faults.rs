@@ -39,7 +39,13 @@ const LATER: usize = 10;
 
 impl Fault {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::Noise, Self::Later, Self::Turned, Self::HalfBlank, Self::Dropped];
+    pub const ALL: [Self; 5] = [
+        Self::Noise,
+        Self::Later,
+        Self::Turned,
+        Self::HalfBlank,
+        Self::Dropped,
+    ];
 
     /// The name on the command line.
     pub fn name(self) -> &'static str {
@@ -64,7 +70,10 @@ impl FromStr for Fault {
 
     fn from_str(name: &str) -> Result<Self, String> {
         let known = || Self::ALL.map(Self::name).join(", ");
-        Self::ALL.into_iter().find(|fault| fault.name() == name).ok_or_else(|| format!("it is one of {}", known()))
+        Self::ALL
+            .into_iter()
+            .find(|fault| fault.name() == name)
+            .ok_or_else(|| format!("it is one of {}", known()))
     }
 }
 
@@ -110,14 +119,23 @@ impl FaultPlan {
 ///
 /// # Errors
 /// [`SimulatorError`] where `source` cannot be read, `out` is not empty, or the copy cannot be written.
-pub fn write_faulty(source: &Path, out: &Path, plan: &FaultPlan) -> Result<Vec<usize>, SimulatorError> {
+pub fn write_faulty(
+    source: &Path,
+    out: &Path,
+    plan: &FaultPlan,
+) -> Result<Vec<usize>, SimulatorError> {
     let source = source.canonicalize().unwrap_or_else(|_| source.to_owned());
     let mut dataset = gyre_radar::open(&source, &DatasetOptions::default())?;
     let hits: Vec<usize> = plan.hits(dataset.len()).collect();
-    let spoilt: BTreeSet<OsString> =
-        hits.iter().filter_map(|&i| Some(dataset.file(i).file_name()?.to_owned())).collect();
+    let spoilt: BTreeSet<OsString> = hits
+        .iter()
+        .filter_map(|&i| Some(dataset.file(i).file_name()?.to_owned()))
+        .collect();
     let folder = dataset.file(0).parent().unwrap_or(&source);
-    let images = folder.strip_prefix(&source).unwrap_or(Path::new("")).to_owned();
+    let images = folder
+        .strip_prefix(&source)
+        .unwrap_or(Path::new(""))
+        .to_owned();
     require_empty(out)?;
     link_around(&source, out, &images, &spoilt)?;
     if plan.fault != Fault::Dropped {
@@ -131,9 +149,10 @@ pub fn write_faulty(source: &Path, out: &Path, plan: &FaultPlan) -> Result<Vec<u
 fn require_empty(folder: &Path) -> Result<(), SimulatorError> {
     fs::create_dir_all(folder).map_err(SimulatorError::write(folder))?;
     match entries(folder)?.into_iter().min() {
-        Some(other) => {
-            Err(SimulatorError::OutputInUse { folder: folder.to_owned(), other: other.to_string_lossy().into_owned() })
-        }
+        Some(other) => Err(SimulatorError::OutputInUse {
+            folder: folder.to_owned(),
+            other: other.to_string_lossy().into_owned(),
+        }),
         None => Ok(()),
     }
 }
@@ -142,11 +161,19 @@ fn entries(folder: &Path) -> Result<Vec<OsString>, SimulatorError> {
     let name = |entry: std::io::Result<fs::DirEntry>| entry.map(|entry| entry.file_name());
     fs::read_dir(folder)
         .and_then(|entries| entries.map(name).collect())
-        .map_err(|source| SimulatorError::List { folder: folder.to_owned(), source })
+        .map_err(|source| SimulatorError::List {
+            folder: folder.to_owned(),
+            source,
+        })
 }
 
 /// Links all of `source` into `out`, folders as a whole, but for the folders that lead to `images`, and in there but for `spoilt`.
-fn link_around(source: &Path, out: &Path, images: &Path, spoilt: &BTreeSet<OsString>) -> Result<(), SimulatorError> {
+fn link_around(
+    source: &Path,
+    out: &Path,
+    images: &Path,
+    spoilt: &BTreeSet<OsString>,
+) -> Result<(), SimulatorError> {
     let (mut here, mut there) = (source.to_owned(), out.to_owned());
     for next in images {
         link_all(&here, &there, |name| name != next)?;
@@ -157,7 +184,11 @@ fn link_around(source: &Path, out: &Path, images: &Path, spoilt: &BTreeSet<OsStr
     link_all(&here, &there, |name| !spoilt.contains(name))
 }
 
-fn link_all(here: &Path, there: &Path, wanted: impl Fn(&OsStr) -> bool) -> Result<(), SimulatorError> {
+fn link_all(
+    here: &Path,
+    there: &Path,
+    wanted: impl Fn(&OsStr) -> bool,
+) -> Result<(), SimulatorError> {
     for name in entries(here)?.iter().filter(|name| wanted(name)) {
         let link = there.join(name);
         symlink(here.join(name), &link).map_err(SimulatorError::write(&link))?;
@@ -198,9 +229,15 @@ fn read(dataset: &mut dyn Dataset, index: usize) -> Result<OwnedScan, SimulatorE
 /// All rows' powers, without what stands between them.
 fn powers_of(scan: &OwnedScan) -> Vec<u8> {
     let view = scan.view();
-    (0..view.geometry.azimuths).flat_map(|azimuth| view.row(azimuth)).copied().collect()
+    (0..view.geometry.azimuths)
+        .flat_map(|azimuth| view.row(azimuth))
+        .copied()
+        .collect()
 }
 
 fn transposed(rows: &[u8], columns: usize) -> Vec<u8> {
-    (0..columns).flat_map(|column| rows.iter().skip(column).step_by(columns)).copied().collect()
+    (0..columns)
+        .flat_map(|column| rows.iter().skip(column).step_by(columns))
+        .copied()
+        .collect()
 }

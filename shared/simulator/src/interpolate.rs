@@ -21,7 +21,17 @@ mod tests {
     fn values_between_before_and_behind_the_entries() {
         let table = [(1.0, 10.0), (3.0, 30.0), (4.0, 0.0)];
         let found = [-5.0, 1.0, 2.0, 3.5, 4.0, 99.0].map(|at| interpolate(&table, at));
-        assert_eq!(found, [Some(10.0), Some(10.0), Some(20.0), Some(15.0), Some(0.0), Some(0.0)]);
+        assert_eq!(
+            found,
+            [
+                Some(10.0),
+                Some(10.0),
+                Some(20.0),
+                Some(15.0),
+                Some(0.0),
+                Some(0.0)
+            ]
+        );
         assert_eq!(interpolate(&[], 1.0), None);
     }
 }

@@ -26,11 +26,19 @@ impl WallGrid {
     /// Sorts the walls.
     pub fn new(walls: Vec<Wall>) -> Self {
         let ends = || walls.iter().flat_map(|wall| [wall.from, wall.to]);
-        let lowest = ends().fold(Point2::new(0.0, 0.0), |a: Point2<f64>, b| a.inf(&b)) - Vector2::repeat(MARGIN_M);
+        let lowest = ends().fold(Point2::new(0.0, 0.0), |a: Point2<f64>, b| a.inf(&b))
+            - Vector2::repeat(MARGIN_M);
         let highest = ends().fold(Point2::new(0.0, 0.0), |a: Point2<f64>, b| a.sup(&b));
         let cells = |from: f64, to: f64| ((to - from) / CELL_M) as usize + 1;
         let (columns, rows) = (cells(lowest.x, highest.x), cells(lowest.y, highest.y));
-        let mut grid = Self { walls, corner: lowest, columns, rows, cell_start: vec![0], cell_walls: Vec::new() };
+        let mut grid = Self {
+            walls,
+            corner: lowest,
+            columns,
+            rows,
+            cell_start: vec![0],
+            cell_walls: Vec::new(),
+        };
         grid.sort();
         grid
     }
@@ -57,12 +65,19 @@ impl WallGrid {
     }
 
     fn cell(&self, column: i64, row: i64) -> Option<usize> {
-        let inside = (0..self.columns as i64).contains(&column) && (0..self.rows as i64).contains(&row);
+        let inside =
+            (0..self.columns as i64).contains(&column) && (0..self.rows as i64).contains(&row);
         inside.then(|| row as usize * self.columns + column as usize)
     }
 
     /// Share of the power that passes between two points; see [`crate::World::transmission`].
-    pub fn transmission(&self, from: Point2<f64>, to: Point2<f64>, body: u32, negligible: f64) -> f64 {
+    pub fn transmission(
+        &self,
+        from: Point2<f64>,
+        to: Point2<f64>,
+        body: u32,
+        negligible: f64,
+    ) -> f64 {
         let mut passed = 1.0;
         let mut walk = CellWalk::new(self, from, to);
         let mut entered = 0.0;
@@ -81,14 +96,24 @@ impl WallGrid {
     }
 
     /// Shows all walls between two points; see [`crate::World::walls_between`].
-    pub fn between(&self, from: Point2<f64>, to: Point2<f64>, see: &mut impl FnMut(u32, &Wall, f64)) {
+    pub fn between(
+        &self,
+        from: Point2<f64>,
+        to: Point2<f64>,
+        see: &mut impl FnMut(u32, &Wall, f64),
+    ) {
         let mut walk = CellWalk::new(self, from, to);
         let mut entered = 0.0;
         while let Some((column, row, left)) = walk.next_cell() {
-            for &index in self.cell(column, row).map_or(&[][..], |cell| self.walls_in(cell)) {
+            for &index in self
+                .cell(column, row)
+                .map_or(&[][..], |cell| self.walls_in(cell))
+            {
                 let wall = &self.walls[index as usize];
                 // A wall lies in several cells, but is crossed in one of them only.
-                if let Some(share) = crossing(from, to - from, wall).filter(|share| (entered..left).contains(share)) {
+                if let Some(share) =
+                    crossing(from, to - from, wall).filter(|share| (entered..left).contains(share))
+                {
                     see(index, wall, share);
                 }
             }
@@ -100,7 +125,14 @@ impl WallGrid {
         &self.cell_walls[self.cell_start[cell] as usize..self.cell_start[cell + 1] as usize]
     }
 
-    fn crossed(&self, cell: usize, from: Point2<f64>, way: Vector2<f64>, body: u32, span: std::ops::Range<f64>) -> f64 {
+    fn crossed(
+        &self,
+        cell: usize,
+        from: Point2<f64>,
+        way: Vector2<f64>,
+        body: u32,
+        span: std::ops::Range<f64>,
+    ) -> f64 {
         self.walls_in(cell)
             .iter()
             .map(|&index| &self.walls[index as usize])
@@ -139,15 +171,24 @@ impl CellWalk {
     fn new(grid: &WallGrid, from: Point2<f64>, to: Point2<f64>) -> Self {
         let start = (from - grid.corner) / CELL_M;
         let way = (to - from) / CELL_M;
-        let mut walk =
-            Self { cell: [0; 2], step: [0; 2], next: [f64::INFINITY; 2], stride: [f64::INFINITY; 2], done: false };
+        let mut walk = Self {
+            cell: [0; 2],
+            step: [0; 2],
+            next: [f64::INFINITY; 2],
+            stride: [f64::INFINITY; 2],
+            done: false,
+        };
         for axis in 0..2 {
             let floor = start[axis].floor();
             walk.cell[axis] = floor as i64;
             if way[axis] != 0.0 {
                 walk.step[axis] = if way[axis] > 0.0 { 1 } else { -1 };
                 walk.stride[axis] = 1.0 / way[axis].abs();
-                let to_side = if way[axis] > 0.0 { floor + 1.0 - start[axis] } else { start[axis] - floor };
+                let to_side = if way[axis] > 0.0 {
+                    floor + 1.0 - start[axis]
+                } else {
+                    start[axis] - floor
+                };
                 walk.next[axis] = to_side * walk.stride[axis];
             }
         }
@@ -185,8 +226,15 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let wall = |i: u32, rng: &mut ChaCha8Rng| {
             let from = point(rng);
-            let to = from + Vector2::new(rng.random_range(-15.0..15.0), rng.random_range(-15.0..15.0));
-            Wall { from, to, transmission: 0.5, mirror: 0.0, body: i % 7 }
+            let to =
+                from + Vector2::new(rng.random_range(-15.0..15.0), rng.random_range(-15.0..15.0));
+            Wall {
+                from,
+                to,
+                transmission: 0.5,
+                mirror: 0.0,
+                body: i % 7,
+            }
         };
         let walls: Vec<Wall> = (0..120).map(|i| wall(i, &mut rng)).collect();
         let grid = WallGrid::new(walls.clone());
@@ -199,16 +247,25 @@ mod tests {
             assert_eq!(found, count, "{from} to {to}");
             hits += count;
         }
-        assert!(hits > 500, "the walls are dense enough to test something: {hits}");
+        assert!(
+            hits > 500,
+            "the walls are dense enough to test something: {hits}"
+        );
     }
 
     #[test]
     fn walls_along_the_axes_at_round_places_hide_from_both_sides() {
         for at in [-20.0, -5.0, 0.0, 5.0, 10.0] {
-            for (from, to) in
-                [((at, -15.0), (at, 15.0)), ((-15.0, at), (15.0, at))].map(|(a, b)| (point_at(a), point_at(b)))
+            for (from, to) in [((at, -15.0), (at, 15.0)), ((-15.0, at), (15.0, at))]
+                .map(|(a, b)| (point_at(a), point_at(b)))
             {
-                let grid = WallGrid::new(vec![Wall { from, to, transmission: 0.5, mirror: 0.0, body: 1 }]);
+                let grid = WallGrid::new(vec![Wall {
+                    from,
+                    to,
+                    transmission: 0.5,
+                    mirror: 0.0,
+                    body: 1,
+                }]);
                 let across = Vector2::new((to - from).y, (to - from).x) + Vector2::new(0.7, 0.7);
                 let middle = nalgebra::center(&from, &to);
                 for way in [across, -across] {
@@ -229,6 +286,14 @@ mod tests {
     #[test]
     fn nothing_hides_in_an_empty_world() {
         let grid = WallGrid::new(Vec::new());
-        assert_eq!(grid.transmission(Point2::new(-3.0, 2.0), Point2::new(90.0, -70.0), NO_BODY, 0.0), 1.0);
+        assert_eq!(
+            grid.transmission(
+                Point2::new(-3.0, 2.0),
+                Point2::new(90.0, -70.0),
+                NO_BODY,
+                0.0
+            ),
+            1.0
+        );
     }
 }

@@ -43,7 +43,10 @@ impl FromStr for OutputFormat {
 
     fn from_str(name: &str) -> Result<Self, String> {
         let known = || Self::ALL.map(Self::name).join(", ");
-        Self::ALL.into_iter().find(|format| format.name() == name).ok_or_else(|| format!("it is one of {}", known()))
+        Self::ALL
+            .into_iter()
+            .find(|format| format.name() == name)
+            .ok_or_else(|| format!("it is one of {}", known()))
     }
 }
 

@@ -140,7 +140,13 @@ impl Sampling {
 
 impl Profile {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::Cts350xOxford, Self::Cts350xRadiate, Self::Cir204h, Self::Ras6, Self::K2pi];
+    pub const ALL: [Self; 5] = [
+        Self::Cts350xOxford,
+        Self::Cts350xRadiate,
+        Self::Cir204h,
+        Self::Ras6,
+        Self::K2pi,
+    ];
 
     /// How it samples.
     pub fn sampling(self) -> Sampling {
@@ -158,12 +164,19 @@ impl Profile {
         };
         match self {
             Self::Cts350xOxford => oxford,
-            Self::Cts350xRadiate => {
-                Sampling { bins: 576, range_resolution_m: 100.0 / 576.0, encoder_first: 0, ..oxford }
-            }
-            Self::Cir204h => {
-                Sampling { bins: 3360, range_resolution_m: 0.0596, range_offset_m: -0.31, doppler_s: 0.049, ..oxford }
-            }
+            Self::Cts350xRadiate => Sampling {
+                bins: 576,
+                range_resolution_m: 100.0 / 576.0,
+                encoder_first: 0,
+                ..oxford
+            },
+            Self::Cir204h => Sampling {
+                bins: 3360,
+                range_resolution_m: 0.0596,
+                range_offset_m: -0.31,
+                doppler_s: 0.049,
+                ..oxford
+            },
             Self::Ras6 => Sampling {
                 bins: 6848,
                 range_resolution_m: 0.043_81,
@@ -216,7 +229,11 @@ impl Profile {
                 ..oxford
             },
             // No scan of it at hand: Oxford's, with the longer cell of its smaller bandwidth.
-            Self::Cir204h => Receiver { cell_m: 0.33, constant: 1.6e11, ..oxford },
+            Self::Cir204h => Receiver {
+                cell_m: 0.33,
+                constant: 1.6e11,
+                ..oxford
+            },
             Self::Ras6 => Receiver {
                 constant: 1.5e12,
                 full_scale: 1.0e8,
@@ -246,13 +263,43 @@ impl Profile {
 
 /// Floors are those of azimuths in which nothing stands, in real scans; K2Pi's is assumed.
 const OXFORD_FLOOR: [(f64, f64); 4] = [(2.5, 2.5), (5.0, 3.7), (60.0, 3.7), (150.0, 3.2)];
-const OXFORD_RINGING: [(f64, f64); 8] =
-    [(0.2, 19.7), (0.6, 22.2), (0.8, 24.2), (1.0, 23.7), (1.25, 19.7), (1.5, 15.2), (2.0, 11.2), (2.7, 2.0)];
+const OXFORD_RINGING: [(f64, f64); 8] = [
+    (0.2, 19.7),
+    (0.6, 22.2),
+    (0.8, 24.2),
+    (1.0, 23.7),
+    (1.25, 19.7),
+    (1.5, 15.2),
+    (2.0, 11.2),
+    (2.7, 2.0),
+];
 const RADIATE_FLOOR: [(f64, f64); 2] = [(5.0, 10.0), (100.0, 9.6)];
-const RADIATE_RINGING: [(f64, f64); 7] =
-    [(0.2, 29.5), (1.5, 29.0), (1.75, 26.0), (2.0, 24.0), (2.5, 18.5), (3.0, 16.5), (4.0, 6.0)];
-const RAS6_FLOOR: [(f64, f64); 7] =
-    [(3.0, 17.0), (55.0, 16.0), (90.0, 14.1), (115.0, 13.6), (150.0, 13.1), (225.0, 11.6), (300.0, 10.2)];
-const RAS6_RINGING: [(f64, f64); 8] =
-    [(0.2, 39.5), (0.8, 42.0), (1.0, 41.7), (1.25, 37.7), (1.5, 34.5), (2.0, 28.0), (2.5, 22.0), (3.5, 10.0)];
+const RADIATE_RINGING: [(f64, f64); 7] = [
+    (0.2, 29.5),
+    (1.5, 29.0),
+    (1.75, 26.0),
+    (2.0, 24.0),
+    (2.5, 18.5),
+    (3.0, 16.5),
+    (4.0, 6.0),
+];
+const RAS6_FLOOR: [(f64, f64); 7] = [
+    (3.0, 17.0),
+    (55.0, 16.0),
+    (90.0, 14.1),
+    (115.0, 13.6),
+    (150.0, 13.1),
+    (225.0, 11.6),
+    (300.0, 10.2),
+];
+const RAS6_RINGING: [(f64, f64); 8] = [
+    (0.2, 39.5),
+    (0.8, 42.0),
+    (1.0, 41.7),
+    (1.25, 37.7),
+    (1.5, 34.5),
+    (2.0, 28.0),
+    (2.5, 22.0),
+    (3.5, 10.0),
+];
 const K2PI_FLOOR: [(f64, f64); 2] = [(3.0, 8.0), (100.0, 6.0)];

@@ -29,7 +29,12 @@ impl Recording {
         if output == OutputFormat::Radiate {
             radiate::check(&simulator)?;
         }
-        Ok(Self { simulator, output, host: config.output.host_stamps, seed: config.seed })
+        Ok(Self {
+            simulator,
+            output,
+            host: config.output.host_stamps,
+            seed: config.seed,
+        })
     }
 
     /// What is recorded.
@@ -41,7 +46,9 @@ impl Recording {
     pub fn format(&self) -> Format {
         match self.output {
             OutputFormat::Oxford => Format::Oxford,
-            OutputFormat::Boreas if self.simulator.sampling().chirp == Chirp::Alternating => Format::BoreasRt,
+            OutputFormat::Boreas if self.simulator.sampling().chirp == Chirp::Alternating => {
+                Format::BoreasRt
+            }
             OutputFormat::Boreas => Format::Boreas,
             OutputFormat::Radiate => Format::Radiate,
         }
@@ -49,7 +56,10 @@ impl Recording {
 
     /// How a reader is to read it so that ranges and angles come out as they were: this is what the radar knows of itself.
     pub fn dataset_options(&self) -> DatasetOptions {
-        DatasetOptions { format: Some(self.format()), ..self.simulator.config().dataset_options() }
+        DatasetOptions {
+            format: Some(self.format()),
+            ..self.simulator.config().dataset_options()
+        }
     }
 
     /// Scans.
@@ -79,8 +89,14 @@ impl Recording {
     pub fn image_size(&self) -> ImageSize {
         let sampling = self.simulator.sampling();
         match self.output {
-            OutputFormat::Radiate => ImageSize { width: sampling.azimuths, height: sampling.bins },
-            _ => ImageSize { width: METADATA_BYTES + sampling.bins, height: sampling.azimuths },
+            OutputFormat::Radiate => ImageSize {
+                width: sampling.azimuths,
+                height: sampling.bins,
+            },
+            _ => ImageSize {
+                width: METADATA_BYTES + sampling.bins,
+                height: sampling.azimuths,
+            },
         }
     }
 
@@ -88,7 +104,9 @@ impl Recording {
     pub fn stamp_ns(&self, index: usize) -> i64 {
         let time = self.simulator.time(index);
         match self.output {
-            OutputFormat::Oxford => (time.start_us + time.stamp_us(self.simulator.sampling().azimuths - 1)) * 500,
+            OutputFormat::Oxford => {
+                (time.start_us + time.stamp_us(self.simulator.sampling().azimuths - 1)) * 500
+            }
             OutputFormat::Boreas => boreas::stamp_us(&self.simulator, index) * 1000,
             OutputFormat::Radiate => radiate::stamp_ns(&self.simulator, index),
         }
@@ -96,7 +114,12 @@ impl Recording {
 
     /// `ground_truth.tum`: the poses at the scans' times.
     pub fn ground_truth_tum(&self) -> Vec<u8> {
-        truth::ground_truth_tum(&self.simulator, (0..self.scans()).map(|index| self.stamp_ns(index)).collect())
+        truth::ground_truth_tum(
+            &self.simulator,
+            (0..self.scans())
+                .map(|index| self.stamp_ns(index))
+                .collect(),
+        )
     }
 
     /// All that lies beside the images.
@@ -104,23 +127,36 @@ impl Recording {
         let mut files = match self.output {
             OutputFormat::Oxford => oxford::side_files(&self.simulator),
             OutputFormat::Boreas => boreas::side_files(&self.simulator),
-            OutputFormat::Radiate => {
-                self.stamps().map(|text| ("Navtech_Polar.txt".into(), text.into_bytes())).into_iter().collect()
-            }
+            OutputFormat::Radiate => self
+                .stamps()
+                .map(|text| ("Navtech_Polar.txt".into(), text.into_bytes()))
+                .into_iter()
+                .collect(),
         };
         files.push(("ground_truth.tum".into(), self.ground_truth_tum()));
-        files.push(("azimuth_poses.npy".into(), truth::azimuth_poses_npy(&self.simulator)));
+        files.push((
+            "azimuth_poses.npy".into(),
+            truth::azimuth_poses_npy(&self.simulator),
+        ));
         files
     }
 
     fn stamps(&self) -> Option<String> {
-        (self.output == OutputFormat::Radiate).then(|| radiate::stamps(&self.simulator, self.host, self.seed))
+        (self.output == OutputFormat::Radiate)
+            .then(|| radiate::stamps(&self.simulator, self.host, self.seed))
     }
 
     /// A radar of one's own for this drive; several may measure at the same time.
     pub fn renderer(&self) -> Renderer {
-        let (sensor, scan) = (self.simulator.sensor(), OwnedScan::with_limits(self.simulator.limits()));
-        Renderer { recording: self.clone(), sensor, scan }
+        let (sensor, scan) = (
+            self.simulator.sensor(),
+            OwnedScan::with_limits(self.simulator.limits()),
+        );
+        Renderer {
+            recording: self.clone(),
+            sensor,
+            scan,
+        }
     }
 }
 
@@ -153,7 +189,9 @@ impl ImageSource for Renderer {
 
     fn files(&self) -> Vec<PathBuf> {
         let folder = self.folder();
-        (0..self.recording.scans()).map(|index| folder.join(self.recording.image_name(index))).collect()
+        (0..self.recording.scans())
+            .map(|index| folder.join(self.recording.image_name(index)))
+            .collect()
     }
 
     fn stamps(&self) -> Option<String> {
@@ -165,12 +203,21 @@ impl ImageSource for Renderer {
         let simulator = &self.recording.simulator;
         match self.recording.output {
             OutputFormat::Radiate => {
-                let geometry = simulator.render_into(index, &mut self.sensor, &mut self.scan.slot());
-                radiate::lay_on_side(&self.scan.bytes, geometry.stride, geometry.first_byte, pixels);
+                let geometry =
+                    simulator.render_into(index, &mut self.sensor, &mut self.scan.slot());
+                radiate::lay_on_side(
+                    &self.scan.bytes,
+                    geometry.stride,
+                    geometry.first_byte,
+                    pixels,
+                );
             }
             // Their images are what a sweep is rendered as.
             OutputFormat::Oxford | OutputFormat::Boreas => {
-                let mut slot = ScanSlot { bytes: pixels, ..self.scan.slot() };
+                let mut slot = ScanSlot {
+                    bytes: pixels,
+                    ..self.scan.slot()
+                };
                 simulator.render_into(index, &mut self.sensor, &mut slot);
             }
         }

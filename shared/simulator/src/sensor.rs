@@ -167,7 +167,13 @@ impl Sensor {
     /// Measures one sweep into `slot` and says how it lies there: rows of [`METADATA_BYTES`], then powers, as in an Oxford image.
     ///
     /// Its randomness comes from the radar's seed and `index`, the number of the scan.
-    pub fn sweep(&mut self, scene: Scene<'_>, time: SweepTime, index: u64, slot: &mut ScanSlot<'_>) -> SweepGeometry {
+    pub fn sweep(
+        &mut self,
+        scene: Scene<'_>,
+        time: SweepTime,
+        index: u64,
+        slot: &mut ScanSlot<'_>,
+    ) -> SweepGeometry {
         let mut rng = Stream::Scan(index).generator(self.seed);
         self.look_around(scene, time, &mut rng);
         for azimuth in 0..self.sampling.azimuths {
@@ -183,18 +189,36 @@ impl Sensor {
 
     /// Lists all that the sweep sees.
     fn look_around(&mut self, scene: Scene<'_>, time: SweepTime, rng: &mut ChaCha8Rng) {
-        let wobble_rad = if self.effects.encoder_wobble { self.config.azimuth_eccentricity_rad } else { 0.0 };
+        let wobble_rad = if self.effects.encoder_wobble {
+            self.config.azimuth_eccentricity_rad
+        } else {
+            0.0
+        };
         let moving = self.effects.sweep_motion;
         let error_rad = |azimuth_rad: f64| wobble_rad * azimuth_rad.cos();
         let lift_rad = |time_s, azimuth_rad| self.nodding.lift_rad(time_s, azimuth_rad);
-        self.stations.follow(scene.trajectory, time, &self.sampling, moving, error_rad, lift_rad);
+        self.stations.follow(
+            scene.trajectory,
+            time,
+            &self.sampling,
+            moving,
+            error_rad,
+            lift_rad,
+        );
         let middle_s = time.trajectory_s(time.middle_us());
         let centre = self.stations.middle().position;
         let reach_m = self.sampling.reach_m();
         let mut movers: Vec<Moving<'_>> = Vec::new();
-        scene.movers.visit(middle_s, centre, reach_m, &mut |mover| movers.push(mover));
-        self.skyline.cast(scene.world, &movers, &self.stations, reach_m);
-        let weather = if self.effects.weather { scene.weather } else { WeatherConfig::default() };
+        scene
+            .movers
+            .visit(middle_s, centre, reach_m, &mut |mover| movers.push(mover));
+        self.skyline
+            .cast(scene.world, &movers, &self.stations, reach_m);
+        let weather = if self.effects.weather {
+            scene.weather
+        } else {
+            WeatherConfig::default()
+        };
         let air = Air::new(&weather, self.receiver.carrier_ghz);
         let view = View {
             stations: &self.stations,
@@ -214,15 +238,34 @@ impl Sensor {
             view.ghosts(scene.world, &mut self.echoes);
         }
         // Always as many random numbers, so that no effect changes another's; those of bursts, which vary, come last.
-        let jitter_rad = if self.effects.encoder_wobble { ENCODER_JITTER_RAD } else { 0.0 };
-        self.jitter_rad.iter_mut().for_each(|jitter| *jitter = jitter_rad * rng.sample::<f64, _>(StandardNormal));
-        let clutter = |range_m: f64| air.clutter_m2(range_m, view.receiver) * view.received(range_m);
+        let jitter_rad = if self.effects.encoder_wobble {
+            ENCODER_JITTER_RAD
+        } else {
+            0.0
+        };
+        self.jitter_rad
+            .iter_mut()
+            .for_each(|jitter| *jitter = jitter_rad * rng.sample::<f64, _>(StandardNormal));
+        let clutter =
+            |range_m: f64| air.clutter_m2(range_m, view.receiver) * view.received(range_m);
         let (snow, interference) = (weather.snow_mm_h > 0.0, self.effects.interference);
         self.noise.feel_surroundings(&self.stations, rng);
-        self.noise.begin_sweep(&self.sampling, &self.spectrum, interference, snow, clutter, rng);
+        self.noise.begin_sweep(
+            &self.sampling,
+            &self.spectrum,
+            interference,
+            snow,
+            clutter,
+            rng,
+        );
         let middle = *self.stations.middle();
-        let heard =
-            |echo: &Echo| (echo.azimuth, (echo.position - middle.position).norm(), echo.amplitude * echo.amplitude);
+        let heard = |echo: &Echo| {
+            (
+                echo.azimuth,
+                (echo.position - middle.position).norm(),
+                echo.amplitude * echo.amplitude,
+            )
+        };
         self.noise.listen_around(self.echoes.iter().map(heard));
         self.light();
     }
@@ -232,16 +275,26 @@ impl Sensor {
         let azimuths = self.sampling.azimuths;
         let step_rad = self.stations.step_rad();
         let span = |echo: &Echo| {
-            let reach = self.antenna.reach_rad((NEGLIGIBLE_POWER.sqrt() / echo.amplitude).min(1.0)) / step_rad;
+            let reach = self
+                .antenna
+                .reach_rad((NEGLIGIBLE_POWER.sqrt() / echo.amplitude).min(1.0))
+                / step_rad;
             let reach = reach.min(stations::MARGIN as f64);
-            let (first, last) = ((echo.azimuth - reach).ceil(), (echo.azimuth + reach).floor());
+            let (first, last) = (
+                (echo.azimuth - reach).ceil(),
+                (echo.azimuth + reach).floor(),
+            );
             (first.max(0.0) as usize)..((last + 1.0).clamp(0.0, azimuths as f64) as usize)
         };
         self.spans.clear();
         self.spans.extend(self.echoes.iter().map(span));
         self.starts.clear();
         self.starts.resize(azimuths + 1, 0);
-        self.spans.iter().cloned().flatten().for_each(|azimuth| self.starts[azimuth] += 1);
+        self.spans
+            .iter()
+            .cloned()
+            .flatten()
+            .for_each(|azimuth| self.starts[azimuth] += 1);
         let mut end = 0;
         for start in &mut self.starts {
             end += *start;
@@ -261,22 +314,36 @@ impl Sensor {
     /// Fills the spectrum with what one azimuth receives.
     fn measure(&mut self, azimuth: usize, rng: &mut ChaCha8Rng) {
         let station = *self.stations.at(azimuth as f64);
-        let doppler_s = if self.effects.doppler { self.doppler_s(azimuth) } else { 0.0 };
+        let doppler_s = if self.effects.doppler {
+            self.doppler_s(azimuth)
+        } else {
+            0.0
+        };
         let wavelength_m = self.receiver.wavelength_m();
         self.spectrum.clear();
         self.noise.begin_azimuth(|range_m| {
             if !self.effects.ground {
                 return 0.0;
             }
-            let passed = if self.effects.occlusion { self.skyline.open(azimuth, range_m) } else { 1.0 };
-            f64::from(passed) * ground::ground_power(station.position + station.beam * range_m, range_m, &self.receiver)
+            let passed = if self.effects.occlusion {
+                self.skyline.open(azimuth, range_m)
+            } else {
+                1.0
+            };
+            f64::from(passed)
+                * ground::ground_power(
+                    station.position + station.beam * range_m,
+                    range_m,
+                    &self.receiver,
+                )
         });
         for lit in self.starts[azimuth]..self.starts[azimuth + 1] {
             let echo = &self.echoes[self.lit[lit] as usize];
             let way = echo.place(&station) - station.position;
             let range_m = way.norm();
             // Small angles: the tangent will do.
-            let off_rad = station.beam.perp(&way) / station.beam.dot(&way) + self.jitter_rad[azimuth];
+            let off_rad =
+                station.beam.perp(&way) / station.beam.dot(&way) + self.jitter_rad[azimuth];
             let amplitude = echo.amplitude * self.antenna.gain(off_rad);
             let approach_m_s = (station.velocity - echo.velocity).dot(&way) / range_m;
             // What approaches reads too near with a rising chirp.
@@ -285,7 +352,8 @@ impl Sensor {
             if self.effects.speckle {
                 // There and back: two wavelengths of phase for each wavelength of range.
                 let (sine, cosine) = (TAU * (2.0 * range_m / wavelength_m).fract()).sin_cos();
-                self.spectrum.add(bin, (amplitude * cosine) as f32, (amplitude * sine) as f32);
+                self.spectrum
+                    .add(bin, (amplitude * cosine) as f32, (amplitude * sine) as f32);
             } else {
                 self.spectrum.add_power(bin, (amplitude * amplitude) as f32);
             }
@@ -334,7 +402,8 @@ impl Sensor {
             }
             for byte in METADATA_BYTES..stride {
                 let at = |azimuth: usize| u16::from(slot.bytes[azimuth * stride + byte]);
-                slot.bytes[azimuth * stride + byte] = ((at(azimuth - 1) + at(azimuth + 1)) / 2) as u8;
+                slot.bytes[azimuth * stride + byte] =
+                    ((at(azimuth - 1) + at(azimuth + 1)) / 2) as u8;
             }
             slot.bytes[azimuth * stride + METADATA_BYTES - 1] = 0;
             slot.flags[azimuth] = 0;
@@ -342,7 +411,13 @@ impl Sensor {
     }
 
     fn geometry(&self, time: SweepTime) -> SweepGeometry {
-        let Sampling { azimuths, bins, range_resolution_m, range_offset_m, .. } = self.sampling;
+        let Sampling {
+            azimuths,
+            bins,
+            range_resolution_m,
+            range_offset_m,
+            ..
+        } = self.sampling;
         SweepGeometry {
             azimuths,
             bins,

@@ -58,7 +58,14 @@ impl Simulator {
             config: config.clone(),
             sampling,
             world: Arc::new(World::new(town::build(&config.town, &streets, config.seed))),
-            traffic: Traffic::new(&config.traffic, trajectory.clone(), lively_s, &streets, keep, config.seed),
+            traffic: Traffic::new(
+                &config.traffic,
+                trajectory.clone(),
+                lively_s,
+                &streets,
+                keep,
+                config.seed,
+            ),
             trajectory,
         })
     }
@@ -90,8 +97,17 @@ impl Simulator {
 
     /// When scan `index` is taken.
     pub fn time(&self, index: usize) -> SweepTime {
-        let Sampling { period_us, azimuths, .. } = self.sampling;
-        SweepTime { start_us: EPOCH_US + period_us * index as i64, period_us, azimuths, epoch_us: EPOCH_US }
+        let Sampling {
+            period_us,
+            azimuths,
+            ..
+        } = self.sampling;
+        SweepTime {
+            start_us: EPOCH_US + period_us * index as i64,
+            period_us,
+            azimuths,
+            epoch_us: EPOCH_US,
+        }
     }
 
     /// Pose of the sensor in the world at the middle of scan `index`.
@@ -107,18 +123,29 @@ impl Simulator {
 
     /// What memory one scan needs.
     pub fn limits(&self) -> ScanLimits {
-        ScanLimits { bytes: self.sampling.azimuths * self.sampling.stride(), azimuths: self.sampling.azimuths }
+        ScanLimits {
+            bytes: self.sampling.azimuths * self.sampling.stride(),
+            azimuths: self.sampling.azimuths,
+        }
     }
 
     /// Measures scan `index`: the same bytes whenever and on whatever thread it is called.
     pub fn render_scan(&self, index: usize) -> SimulatedScan {
         let mut scan = OwnedScan::with_limits(self.limits());
         scan.geometry = self.render_into(index, &mut self.sensor(), &mut scan.slot());
-        SimulatedScan { scan, pose: self.pose(index) }
+        SimulatedScan {
+            scan,
+            pose: self.pose(index),
+        }
     }
 
     /// Measures scan `index` into memory that is used again, at least as much as [`Simulator::limits`] say.
-    pub fn render_into(&self, index: usize, sensor: &mut Sensor, slot: &mut ScanSlot<'_>) -> SweepGeometry {
+    pub fn render_into(
+        &self,
+        index: usize,
+        sensor: &mut Sensor,
+        slot: &mut ScanSlot<'_>,
+    ) -> SweepGeometry {
         let time = self.time(index);
         let scene = Scene {
             world: &self.world,

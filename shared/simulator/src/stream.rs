@@ -54,7 +54,13 @@ mod tests {
     fn no_two_things_share_a_stream() {
         // 100 000 scans are the most that a configuration may ask for.
         let counted = (0..100_000).flat_map(|i| [Stream::Scan(i), Stream::Stall(i)]);
-        let single = [Stream::Streets, Stream::Drive, Stream::Traffic, Stream::Nodding, Stream::Carrier];
+        let single = [
+            Stream::Streets,
+            Stream::Drive,
+            Stream::Traffic,
+            Stream::Nodding,
+            Stream::Carrier,
+        ];
         let numbers: BTreeSet<u64> = counted.chain(single).map(Stream::number).collect();
         assert_eq!(numbers.len(), 200_005);
     }

@@ -45,7 +45,10 @@ pub struct Nearest {
 impl Street {
     /// Length of the centre line, metres.
     pub fn length_m(&self) -> f64 {
-        self.centre.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum()
+        self.centre
+            .windows(2)
+            .map(|ends| (ends[1] - ends[0]).norm())
+            .sum()
     }
 
     /// A place on the centre line and the street's direction there, x along it.
@@ -55,7 +58,11 @@ impl Street {
         for ends in self.centre.windows(2) {
             let way = ends[1] - ends[0];
             let length_m = way.norm();
-            let share = if length_m > 0.0 { left_m / length_m } else { 0.0 };
+            let share = if length_m > 0.0 {
+                left_m / length_m
+            } else {
+                0.0
+            };
             pose = Isometry2::new(ends[0].coords + way * share, way.y.atan2(way.x));
             if share <= 1.0 {
                 break;
@@ -97,12 +104,30 @@ impl Streets {
         let points = || streets.iter().flat_map(|street| &street.centre);
         let lowest = points().fold(Point2::new(f64::MAX, f64::MAX), |a, b| a.inf(b));
         let highest = points().fold(Point2::new(f64::MIN, f64::MIN), |a, b| a.sup(b));
-        let size = if points().next().is_some() { highest - lowest } else { Vector2::zeros() };
-        let cell_m = CELL_M.max((size.x * size.y / MOST_CELLS).sqrt()).max((size.x + size.y) / MOST_CELLS);
+        let size = if points().next().is_some() {
+            highest - lowest
+        } else {
+            Vector2::zeros()
+        };
+        let cell_m = CELL_M
+            .max((size.x * size.y / MOST_CELLS).sqrt())
+            .max((size.x + size.y) / MOST_CELLS);
         let [columns, rows] = [size.x, size.y].map(|extent| (extent / cell_m) as usize + 1);
-        let widest_half_m = streets.iter().map(|street| street.half_width_m).fold(0.0, f64::max);
+        let widest_half_m = streets
+            .iter()
+            .map(|street| street.half_width_m)
+            .fold(0.0, f64::max);
         let (starts, pieces) = (Vec::new(), Vec::new());
-        let mut network = Self { streets, widest_half_m, corner: lowest, cell_m, columns, rows, starts, pieces };
+        let mut network = Self {
+            streets,
+            widest_half_m,
+            corner: lowest,
+            cell_m,
+            columns,
+            rows,
+            starts,
+            pieces,
+        };
         network.sort();
         network
     }
@@ -114,12 +139,19 @@ impl Streets {
         let mut centre = vec![place(0.0)];
         for step in 1..=(duration_s / 0.05) as usize {
             let here = place(0.05 * step as f64);
-            if centre.last().is_some_and(|last| (here - last).norm() >= STEP_M) {
+            if centre
+                .last()
+                .is_some_and(|last| (here - last).norm() >= STEP_M)
+            {
                 centre.push(here);
             }
         }
         centre.push(place(duration_s) + trajectory.pose(duration_s) * Vector2::new(0.1, 0.0));
-        Self::new(vec![Street { centre, half_width_m, driven: true }])
+        Self::new(vec![Street {
+            centre,
+            half_width_m,
+            driven: true,
+        }])
     }
 
     /// The streets, by their numbers.
@@ -152,7 +184,8 @@ impl Streets {
 
     /// Metres from the nearest kerb, below zero on a carriageway, at most `within_m`.
     pub fn clearance_m(&self, place: Point2<f64>, within_m: f64) -> f64 {
-        self.nearest(place, within_m).map_or(within_m, |nearest| nearest.clearance_m)
+        self.nearest(place, within_m)
+            .map_or(within_m, |nearest| nearest.clearance_m)
     }
 
     fn cell(&self, cell: usize) -> &[Piece] {
@@ -167,12 +200,21 @@ impl Streets {
             for ends in street.centre.windows(2) {
                 let way = ends[1] - ends[0];
                 let (street, half_width_m) = (number as u32, street.half_width_m);
-                let piece = Piece { street, half_width_m, from: ends[0], way, length_m: way.norm(), along_m };
+                let piece = Piece {
+                    street,
+                    half_width_m,
+                    from: ends[0],
+                    way,
+                    length_m: way.norm(),
+                    along_m,
+                };
                 along_m += piece.length_m;
                 let cell = |p: Point2<f64>| (p - self.corner).map(|v| (v / self.cell_m) as usize);
                 let (low, high) = (cell(ends[0].inf(&ends[1])), cell(ends[0].sup(&ends[1])));
                 for row in low.y..=high.y {
-                    found.extend((low.x..=high.x).map(|column| (row * self.columns + column, piece)));
+                    found.extend(
+                        (low.x..=high.x).map(|column| (row * self.columns + column, piece)),
+                    );
                 }
             }
         }
@@ -187,7 +229,8 @@ impl Piece {
     /// Where a place lies beside the piece, if its kerb is less than `least_m` away.
     fn nearer(&self, place: Point2<f64>, least_m: f64) -> Option<Nearest> {
         let off = place - self.from;
-        let share = (off.dot(&self.way) / (self.length_m * self.length_m).max(1e-12)).clamp(0.0, 1.0);
+        let share =
+            (off.dot(&self.way) / (self.length_m * self.length_m).max(1e-12)).clamp(0.0, 1.0);
         let apart = (off - self.way * share).norm_squared();
         let reach_m = least_m + self.half_width_m;
         if reach_m <= 0.0 || apart >= reach_m * reach_m {
@@ -213,11 +256,26 @@ mod tests {
 
     #[test]
     fn a_place_beside_a_bent_street_is_found_at_its_distance() {
-        let centre = [(0.0, 0.0), (100.0, 0.0), (100.0, 50.0)].map(|(x, y)| Point2::new(x, y)).to_vec();
-        let streets = Streets::new(vec![Street { centre, half_width_m: 4.0, driven: true }]);
+        let centre = [(0.0, 0.0), (100.0, 0.0), (100.0, 50.0)]
+            .map(|(x, y)| Point2::new(x, y))
+            .to_vec();
+        let streets = Streets::new(vec![Street {
+            centre,
+            half_width_m: 4.0,
+            driven: true,
+        }]);
         let nearest = streets.nearest(Point2::new(40.0, -7.0), 50.0).unwrap();
-        assert_eq!((nearest.along_m, nearest.offset_m, nearest.clearance_m), (40.0, 7.0, 3.0));
-        assert_eq!(streets.nearest(Point2::new(94.0, 30.0), 50.0).unwrap().along_m, 130.0);
+        assert_eq!(
+            (nearest.along_m, nearest.offset_m, nearest.clearance_m),
+            (40.0, 7.0, 3.0)
+        );
+        assert_eq!(
+            streets
+                .nearest(Point2::new(94.0, 30.0), 50.0)
+                .unwrap()
+                .along_m,
+            130.0
+        );
         assert_eq!(streets.clearance_m(Point2::new(40.0, 1.0), 5.0), -3.0);
         assert_eq!(streets.clearance_m(Point2::new(-400.0, 300.0), 5.0), 5.0);
         let bend = streets.streets()[0].at(130.0);

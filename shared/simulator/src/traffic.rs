@@ -58,14 +58,24 @@ pub struct TrafficConfig {
 
 impl Default for TrafficConfig {
     fn default() -> Self {
-        Self { vehicles_per_km: 20.0, speed_spread: 0.3, cyclists_per_km: 3.0, pedestrians_per_km: 25.0 }
+        Self {
+            vehicles_per_km: 20.0,
+            speed_spread: 0.3,
+            cyclists_per_km: 3.0,
+            pedestrians_per_km: 25.0,
+        }
     }
 }
 
 impl TrafficConfig {
     /// An empty road.
     pub fn none() -> Self {
-        Self { vehicles_per_km: 0.0, cyclists_per_km: 0.0, pedestrians_per_km: 0.0, ..Self::default() }
+        Self {
+            vehicles_per_km: 0.0,
+            cyclists_per_km: 0.0,
+            pedestrians_per_km: 0.0,
+            ..Self::default()
+        }
     }
 
     /// Refuses what cannot be simulated, naming the key.
@@ -73,7 +83,12 @@ impl TrafficConfig {
         within("traffic.vehicles_per_km", self.vehicles_per_km, 0.0, 80.0)?;
         within("traffic.speed_spread", self.speed_spread, 0.0, 0.8)?;
         within("traffic.cyclists_per_km", self.cyclists_per_km, 0.0, 50.0)?;
-        within("traffic.pedestrians_per_km", self.pedestrians_per_km, 0.0, 500.0)
+        within(
+            "traffic.pedestrians_per_km",
+            self.pedestrians_per_km,
+            0.0,
+            500.0,
+        )
     }
 }
 
@@ -124,20 +139,38 @@ impl Traffic {
         }
         crowd.cyclists(config, &way, &mut rng);
         crowd.pedestrians(config, &way, &mut rng);
-        Self { trajectory, way: Arc::new(way), actors: Arc::new(crowd.actors) }
+        Self {
+            trajectory,
+            way: Arc::new(way),
+            actors: Arc::new(crowd.actors),
+        }
     }
 }
 
 impl Movers for Traffic {
-    fn visit<'a>(&'a self, time_s: f64, centre: Point2<f64>, reach_m: f64, see: &mut dyn FnMut(Moving<'a>)) {
+    fn visit<'a>(
+        &'a self,
+        time_s: f64,
+        centre: Point2<f64>,
+        reach_m: f64,
+        see: &mut dyn FnMut(Moving<'a>),
+    ) {
         let own = self.trajectory.pose(time_s);
         for actor in self.actors.iter().filter(|actor| actor.is_shown(time_s)) {
-            let Some(pose) = actor.track.pose(&self.way, time_s) else { continue };
-            if (pose.translation.vector - centre.coords).norm() >= reach_m || actor.runs_into(&own, &pose) {
+            let Some(pose) = actor.track.pose(&self.way, time_s) else {
+                continue;
+            };
+            if (pose.translation.vector - centre.coords).norm() >= reach_m
+                || actor.runs_into(&own, &pose)
+            {
                 continue;
             }
             let velocity = actor.velocity(&self.way, time_s, &pose);
-            see(Moving { body: &actor.body, pose, velocity });
+            see(Moving {
+                body: &actor.body,
+                pose,
+                velocity,
+            });
         }
     }
 }
@@ -150,7 +183,8 @@ impl Actor {
     /// Metres a second in the world, from where it is a millisecond before and after; off by less than 0.1 mm/s.
     fn velocity(&self, way: &OwnWay, time_s: f64, pose: &Isometry2<f64>) -> Vector2<f64> {
         let half_s = 1e-3;
-        let [before, after] = [time_s - half_s, time_s + half_s].map(|time_s| self.track.pose(way, time_s));
+        let [before, after] =
+            [time_s - half_s, time_s + half_s].map(|time_s| self.track.pose(way, time_s));
         // One side is missing in the instant in which it appears or leaves.
         let sides = f64::from(u8::from(before.is_some()) + u8::from(after.is_some()));
         let [from, to] = [before.unwrap_or(*pose), after.unwrap_or(*pose)];
@@ -160,7 +194,10 @@ impl Actor {
     /// Whether it would be inside the driven vehicle: where the way turns back on itself no lane is its own.
     fn runs_into(&self, own: &Isometry2<f64>, pose: &Isometry2<f64>) -> bool {
         let seen = own.inverse() * pose;
-        let (cosine, sine) = (seen.rotation.cos_angle().abs(), seen.rotation.sin_angle().abs());
+        let (cosine, sine) = (
+            seen.rotation.cos_angle().abs(),
+            seen.rotation.sin_angle().abs(),
+        );
         let length_m = OWN_HALF_M.0 + self.half_m.0 * cosine + self.half_m.1 * sine;
         let width_m = OWN_HALF_M.1 + self.half_m.1 * cosine + self.half_m.0 * sine;
         seen.translation.x.abs() < length_m && seen.translation.y.abs() < width_m
@@ -170,7 +207,12 @@ impl Actor {
 impl Crowd {
     fn add(&mut self, kind: Kind, shown_s: [f64; 2], track: Track, rng: &mut ChaCha8Rng) {
         let body = kind.body(FIRST_BODY + self.actors.len() as u32, rng);
-        self.actors.push(Actor { body, half_m: kind.half_m(), shown_s, track });
+        self.actors.push(Actor {
+            body,
+            half_m: kind.half_m(),
+            shown_s,
+            track,
+        });
     }
 
     /// Vehicles ahead and behind: each follows the next one, with gaps that grow and shrink along the way.
@@ -187,9 +229,22 @@ impl Crowd {
                 let most_m = config.speed_spread * period_m / (0.5 * TAU);
                 let least_m = next_half_m + kind.half_m().0 + QUEUE_M;
                 let more_m = (2.0 * mean_m * rng.random_range(0.3..1.7)).min(most_m);
-                gaps.push(Gap { least_m, more_m, period_m, phase: rng.random_range(0.0..TAU) });
+                gaps.push(Gap {
+                    least_m,
+                    more_m,
+                    period_m,
+                    phase: rng.random_range(0.0..TAU),
+                });
                 next_half_m = kind.half_m().0;
-                self.add(kind, [f64::NEG_INFINITY, f64::INFINITY], Track::Lane { ahead, gaps: gaps.clone() }, rng);
+                self.add(
+                    kind,
+                    [f64::NEG_INFINITY, f64::INFINITY],
+                    Track::Lane {
+                        ahead,
+                        gaps: gaps.clone(),
+                    },
+                    rng,
+                );
             }
         }
     }
@@ -197,7 +252,11 @@ impl Crowd {
     fn overtaking(&mut self, config: &TrafficConfig, way: &OwnWay, rng: &mut ChaCha8Rng) {
         let mean_m = OVERTAKING_M * 20.0 / config.vehicles_per_km;
         for at_m in places(way, mean_m, rng) {
-            let kind = if rng.random_bool(0.8) { Kind::Car } else { Kind::Van };
+            let kind = if rng.random_bool(0.8) {
+                Kind::Car
+            } else {
+                Kind::Van
+            };
             let beside = Beside {
                 at_m,
                 at_s: 0.0,
@@ -214,7 +273,11 @@ impl Crowd {
         let whole_s = way.clock_s(f64::INFINITY);
         let mean_m_s = (way.length_m() + 600.0) / whole_s;
         let mean_s = (1000.0 / config.vehicles_per_km / mean_m_s).max(1.2 * HEADWAY_S);
-        let overtaking: Vec<Track> = self.actors.iter().map(|actor| actor.track.clone()).collect();
+        let overtaking: Vec<Track> = self
+            .actors
+            .iter()
+            .map(|actor| actor.track.clone())
+            .collect();
         let mut enters_s = -whole_s - 60.0;
         while enters_s < way.duration_s() + 60.0 {
             enters_s += HEADWAY_S - (mean_s - HEADWAY_S) * (1.0 - rng.random::<f64>()).ln();
@@ -229,7 +292,11 @@ impl Crowd {
             };
             let track = Track::Oncoming(vehicle);
             let shown_s = meeting(&track, way);
-            if shown_s[0] < shown_s[1] && !overtaking.iter().any(|other| meets(&track, other, way, shown_s)) {
+            if shown_s[0] < shown_s[1]
+                && !overtaking
+                    .iter()
+                    .any(|other| meets(&track, other, way, shown_s))
+            {
                 self.add(kind, shown_s, track, rng);
             }
         }
@@ -239,8 +306,23 @@ impl Crowd {
     fn bus_stops(&mut self, way: &OwnWay, rng: &mut ChaCha8Rng) {
         for at_m in places(way, BUS_STOP_M, rng) {
             let beyond_m = Kind::Bus.half_m().1 + 0.3;
-            let lane = if rng.random_bool(0.5) { Lane::OwnKerb(beyond_m) } else { Lane::OtherKerb(beyond_m) };
-            self.along(Kind::Bus, Beside { at_m, at_s: 0.0, share: 0.0, speed_m_s: 0.0, lane }, way, rng);
+            let lane = if rng.random_bool(0.5) {
+                Lane::OwnKerb(beyond_m)
+            } else {
+                Lane::OtherKerb(beyond_m)
+            };
+            self.along(
+                Kind::Bus,
+                Beside {
+                    at_m,
+                    at_s: 0.0,
+                    share: 0.0,
+                    speed_m_s: 0.0,
+                    lane,
+                },
+                way,
+                rng,
+            );
         }
     }
 
@@ -248,16 +330,38 @@ impl Crowd {
         for at_m in places(way, 1000.0 / config.cyclists_per_km.max(1e-3), rng) {
             let share = rng.random_range(0.35..0.6);
             let lane = Lane::OwnKerb(-0.5);
-            self.along(Kind::Cyclist, Beside { at_m, at_s: 0.0, share, speed_m_s: 0.0, lane }, way, rng);
+            self.along(
+                Kind::Cyclist,
+                Beside {
+                    at_m,
+                    at_s: 0.0,
+                    share,
+                    speed_m_s: 0.0,
+                    lane,
+                },
+                way,
+                rng,
+            );
         }
     }
 
     fn pedestrians(&mut self, config: &TrafficConfig, way: &OwnWay, rng: &mut ChaCha8Rng) {
         for at_m in places(way, 1000.0 / config.pedestrians_per_km.max(1e-3), rng) {
             let beyond_m = rng.random_range(0.6..1.8);
-            let lane = if rng.random_bool(0.5) { Lane::OwnKerb(beyond_m) } else { Lane::OtherKerb(beyond_m) };
-            let speed_m_s = rng.random_range(0.9..1.7) * if rng.random_bool(0.5) { 1.0 } else { -1.0 };
-            let beside = Beside { at_m, at_s: way.time_at(at_m), share: 0.0, speed_m_s, lane };
+            let lane = if rng.random_bool(0.5) {
+                Lane::OwnKerb(beyond_m)
+            } else {
+                Lane::OtherKerb(beyond_m)
+            };
+            let speed_m_s =
+                rng.random_range(0.9..1.7) * if rng.random_bool(0.5) { 1.0 } else { -1.0 };
+            let beside = Beside {
+                at_m,
+                at_s: way.time_at(at_m),
+                share: 0.0,
+                speed_m_s,
+                lane,
+            };
             self.along(Kind::Pedestrian, beside, way, rng);
         }
     }
@@ -266,7 +370,12 @@ impl Crowd {
     fn along(&mut self, kind: Kind, beside: Beside, way: &OwnWay, rng: &mut ChaCha8Rng) {
         let reach_m = way.reach_m() / (1.0 - beside.share).abs();
         let shown_s = [-1.0, 1.0].map(|sign| way.time_at(beside.at_m + sign * (reach_m + 1.0)));
-        self.add(kind, [shown_s[0] - 1.0, shown_s[1] + 1.0], Track::Beside(beside), rng);
+        self.add(
+            kind,
+            [shown_s[0] - 1.0, shown_s[1] + 1.0],
+            Track::Beside(beside),
+            rng,
+        );
     }
 }
 
@@ -288,7 +397,11 @@ fn meeting(track: &Track, way: &OwnWay) -> [f64; 2] {
         let (mut low_s, mut high_s) = (0.0, way.duration_s());
         while high_s - low_s > 0.25 {
             let middle_s = 0.5 * (low_s + high_s);
-            if apart_m(middle_s) > wanted_m { low_s = middle_s } else { high_s = middle_s }
+            if apart_m(middle_s) > wanted_m {
+                low_s = middle_s
+            } else {
+                high_s = middle_s
+            }
         }
         0.5 * (low_s + high_s)
     })
@@ -296,13 +409,17 @@ fn meeting(track: &Track, way: &OwnWay) -> [f64; 2] {
 
 /// Whether two tracks meet in the lane of oncoming traffic.
 fn meets(oncoming: &Track, other: &Track, way: &OwnWay, shown_s: [f64; 2]) -> bool {
-    let Track::Beside(_) = other else { return false };
+    let Track::Beside(_) = other else {
+        return false;
+    };
     let count = ((shown_s[1] - shown_s[0]) / 0.25) as usize;
-    (0..=count).map(|i| shown_s[0] + 0.25 * i as f64).any(|time_s| {
-        let overtaking_m = other.along_m(way, time_s);
-        let near = (overtaking_m - way.progress_m(time_s)).abs() < way.reach_m();
-        near && (oncoming.along_m(way, time_s) - overtaking_m).abs() < 14.0
-    })
+    (0..=count)
+        .map(|i| shown_s[0] + 0.25 * i as f64)
+        .any(|time_s| {
+            let overtaking_m = other.along_m(way, time_s);
+            let near = (overtaking_m - way.progress_m(time_s)).abs() < way.reach_m();
+            near && (oncoming.along_m(way, time_s) - overtaking_m).abs() < 14.0
+        })
 }
 
 #[cfg(test)]

@@ -29,6 +29,8 @@ pub trait Trajectory: Send + Sync {
     /// Velocity of the sensor in the world at a time, metres a second.
     fn velocity(&self, time_s: f64) -> Vector2<f64> {
         let half_s = 0.5e-3;
-        (self.pose(time_s + half_s).translation.vector - self.pose(time_s - half_s).translation.vector) / (2.0 * half_s)
+        (self.pose(time_s + half_s).translation.vector
+            - self.pose(time_s - half_s).translation.vector)
+            / (2.0 * half_s)
     }
 }

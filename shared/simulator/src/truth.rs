@@ -12,16 +12,28 @@ use crate::Simulator;
 
 /// `ground_truth.tum` as bytes. `stamps_ns` are the scans' times.
 pub(crate) fn ground_truth_tum(simulator: &Simulator, stamps_ns: Vec<i64>) -> Vec<u8> {
-    let poses = stamps_ns.iter().enumerate().map(|(index, ns)| pose_at(simulator, index, *ns)).collect();
+    let poses = stamps_ns
+        .iter()
+        .enumerate()
+        .map(|(index, ns)| pose_at(simulator, index, *ns))
+        .collect();
     let mut text = Vec::new();
     // Writing to memory cannot fail, and there are stamps.
-    let _ = gyre_radar::write_tum(&Trajectory { stamp_ns: Some(stamps_ns), poses }, &mut text);
+    let _ = gyre_radar::write_tum(
+        &Trajectory {
+            stamp_ns: Some(stamps_ns),
+            poses,
+        },
+        &mut text,
+    );
     text
 }
 
 fn pose_at(simulator: &Simulator, index: usize, stamp_ns: i64) -> Isometry2<f64> {
     let epoch_ns = simulator.time(index).epoch_us * 1000;
-    simulator.trajectory().pose((stamp_ns - epoch_ns) as f64 * 1e-9)
+    simulator
+        .trajectory()
+        .pose((stamp_ns - epoch_ns) as f64 * 1e-9)
 }
 
 /// `azimuth_poses.npy` as bytes.
@@ -34,7 +46,12 @@ pub(crate) fn azimuth_poses_npy(simulator: &Simulator) -> Vec<u8> {
         for azimuth in 0..azimuths {
             let time_s = time.trajectory_s(time.stamp_us(azimuth));
             let pose = simulator.trajectory().pose(time_s);
-            for value in [time_s, pose.translation.x, pose.translation.y, pose.rotation.angle()] {
+            for value in [
+                time_s,
+                pose.translation.x,
+                pose.translation.y,
+                pose.rotation.angle(),
+            ] {
                 bytes.extend(value.to_le_bytes());
             }
         }
@@ -44,7 +61,8 @@ pub(crate) fn azimuth_poses_npy(simulator: &Simulator) -> Vec<u8> {
 
 /// Magic, version 1.0, the header's length, and a Python dictionary padded to a multiple of 64 bytes.
 fn npy_header(scans: usize, azimuths: usize) -> Vec<u8> {
-    let dictionary = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({scans}, {azimuths}, 4), }}");
+    let dictionary =
+        format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({scans}, {azimuths}, 4), }}");
     let before = 10;
     let padded = (before + dictionary.len() + 1).next_multiple_of(64) - before;
     let mut header = b"\x93NUMPY\x01\x00".to_vec();

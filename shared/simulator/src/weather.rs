@@ -35,14 +35,20 @@ impl WeatherConfig {
     /// The weather that holds at a time of the drive: clear where none has begun.
     pub fn at(all: &[Self], time_s: f64) -> Self {
         let begun = all.iter().filter(|weather| weather.from_s <= time_s);
-        begun.max_by(|a, b| a.from_s.total_cmp(&b.from_s)).copied().unwrap_or_default()
+        begun
+            .max_by(|a, b| a.from_s.total_cmp(&b.from_s))
+            .copied()
+            .unwrap_or_default()
     }
 
     /// Attenuation one way, decibels a metre, at a carrier frequency.
     pub fn attenuation_db_m(&self, carrier_ghz: f64) -> f64 {
         // P.838-3, horizontal polarisation: 24 GHz and 77 GHz; between the two nothing is simulated.
-        let (k, alpha, fog_db_km, snow) =
-            if carrier_ghz > 50.0 { (1.13, 0.717, 4.6, 0.6) } else { (0.142, 1.01, 0.5, 0.05) };
+        let (k, alpha, fog_db_km, snow) = if carrier_ghz > 50.0 {
+            (1.13, 0.717, 4.6, 0.6)
+        } else {
+            (0.142, 1.01, 0.5, 0.05)
+        };
         let rain = k * self.rain_mm_h.powf(alpha);
         (rain + fog_db_km * self.fog_g_m3 + snow * self.snow_mm_h) / 1000.0
     }
@@ -54,7 +60,11 @@ impl WeatherConfig {
 
     /// Backscattering cross-section of a cubic metre of air, square metres.
     pub fn reflectivity_m2_m3(&self, carrier_ghz: f64) -> f64 {
-        let (a, b) = if carrier_ghz > 50.0 { (4.2e-5, 1.1) } else { (2.0e-7, 1.6) };
+        let (a, b) = if carrier_ghz > 50.0 {
+            (4.2e-5, 1.1)
+        } else {
+            (2.0e-7, 1.6)
+        };
         let wet = |rate: f64| if rate > 0.0 { a * rate.powf(b) } else { 0.0 };
         wet(self.rain_mm_h) + 0.35 * wet(self.snow_mm_h) + 2.0e-7 * self.fog_g_m3
     }
@@ -66,8 +76,16 @@ mod tests {
 
     #[test]
     fn what_began_last_holds() {
-        let rain = WeatherConfig { from_s: 10.0, rain_mm_h: 5.0, ..Default::default() };
-        let fog = WeatherConfig { from_s: 60.0, fog_g_m3: 0.3, ..Default::default() };
+        let rain = WeatherConfig {
+            from_s: 10.0,
+            rain_mm_h: 5.0,
+            ..Default::default()
+        };
+        let fog = WeatherConfig {
+            from_s: 60.0,
+            fog_g_m3: 0.3,
+            ..Default::default()
+        };
         let all = [fog, rain];
         assert_eq!(WeatherConfig::at(&all, 5.0), WeatherConfig::default());
         assert_eq!(WeatherConfig::at(&all, 10.0), rain);
@@ -76,10 +94,24 @@ mod tests {
 
     #[test]
     fn heavy_rain_takes_ten_decibels_a_kilometre_at_77_ghz_and_clear_air_nothing() {
-        let rain = WeatherConfig { rain_mm_h: 25.0, ..Default::default() };
-        assert!((9.0..14.0).contains(&(rain.attenuation_db_m(76.5) * 1000.0)), "{}", rain.attenuation_db_m(76.5));
+        let rain = WeatherConfig {
+            rain_mm_h: 25.0,
+            ..Default::default()
+        };
+        assert!(
+            (9.0..14.0).contains(&(rain.attenuation_db_m(76.5) * 1000.0)),
+            "{}",
+            rain.attenuation_db_m(76.5)
+        );
         assert!(rain.attenuation_db_m(24.0) < 0.5 * rain.attenuation_db_m(76.5));
         let clear = WeatherConfig::default();
-        assert_eq!([clear.attenuation_db_m(76.5), clear.radome_db(), clear.reflectivity_m2_m3(76.5)], [0.0; 3]);
+        assert_eq!(
+            [
+                clear.attenuation_db_m(76.5),
+                clear.radome_db(),
+                clear.reflectivity_m2_m3(76.5)
+            ],
+            [0.0; 3]
+        );
     }
 }

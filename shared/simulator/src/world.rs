@@ -36,7 +36,9 @@ impl Aspect {
     pub fn mean_gain(&self) -> f64 {
         match *self {
             Self::AllRound => 1.0,
-            Self::Facing { sharpness, .. } => 1.0 / (std::f64::consts::TAU * (sharpness + 0.64)).sqrt(),
+            Self::Facing { sharpness, .. } => {
+                1.0 / (std::f64::consts::TAU * (sharpness + 0.64)).sqrt()
+            }
         }
     }
 }
@@ -74,16 +76,27 @@ impl Scatterer {
     pub fn moved(&self, pose: &Isometry2<f64>) -> Self {
         let aspect = match self.aspect {
             Aspect::AllRound => Aspect::AllRound,
-            Aspect::Facing { normal, sharpness } => Aspect::Facing { normal: pose * normal, sharpness },
+            Aspect::Facing { normal, sharpness } => Aspect::Facing {
+                normal: pose * normal,
+                sharpness,
+            },
         };
-        Self { position: pose * self.position, aspect, ..*self }
+        Self {
+            position: pose * self.position,
+            aspect,
+            ..*self
+        }
     }
 }
 
 impl Wall {
     /// The same wall on a body that stands at `pose`.
     pub fn moved(&self, pose: &Isometry2<f64>) -> Self {
-        Self { from: pose * self.from, to: pose * self.to, ..*self }
+        Self {
+            from: pose * self.from,
+            to: pose * self.to,
+            ..*self
+        }
     }
 }
 
@@ -118,14 +131,23 @@ pub struct Moving<'a> {
 impl Moving<'_> {
     /// Where its frame is `time_s` seconds later. Turning is left out: a sweep is short.
     pub fn pose_after(&self, time_s: f64) -> Isometry2<f64> {
-        Isometry2::from_parts((self.pose.translation.vector + self.velocity * time_s).into(), self.pose.rotation)
+        Isometry2::from_parts(
+            (self.pose.translation.vector + self.velocity * time_s).into(),
+            self.pose.rotation,
+        )
     }
 }
 
 /// What moves around the sensor.
 pub trait Movers: Send + Sync {
     /// Shows all bodies within `reach_m` of `centre` at a time of the drive, always in the same order.
-    fn visit<'a>(&'a self, time_s: f64, centre: Point2<f64>, reach_m: f64, see: &mut dyn FnMut(Moving<'a>));
+    fn visit<'a>(
+        &'a self,
+        time_s: f64,
+        centre: Point2<f64>,
+        reach_m: f64,
+        see: &mut dyn FnMut(Moving<'a>),
+    );
 }
 
 /// Nothing moves.
@@ -152,7 +174,10 @@ pub struct World {
 impl World {
     /// A world of these scatterers and walls.
     pub fn new(content: Body) -> Self {
-        let Body { mut scatterers, walls } = content;
+        let Body {
+            mut scatterers,
+            walls,
+        } = content;
         let places = || scatterers.iter().map(|scatterer| scatterer.position);
         let origin = Point2::origin();
         let corner = places().fold(origin, |a, b| a.inf(&b));
@@ -170,7 +195,14 @@ impl World {
         for index in 1..tile_start.len() {
             tile_start[index] += tile_start[index - 1];
         }
-        Self { scatterers, corner, columns, rows, tile_start, walls: WallGrid::new(walls) }
+        Self {
+            scatterers,
+            corner,
+            columns,
+            rows,
+            tile_start,
+            walls: WallGrid::new(walls),
+        }
     }
 
     /// All that reflects.
@@ -184,7 +216,10 @@ impl World {
         let high = (place - self.corner).add_scalar(reach_m) / TILE_M;
         let span = |low: f64, high: f64, end: usize| {
             let clamp = |v: f64| v.floor().clamp(-1.0, end as f64);
-            (clamp(low).max(0.0) as usize, (clamp(high) + 1.0).clamp(0.0, end as f64) as usize)
+            (
+                clamp(low).max(0.0) as usize,
+                (clamp(high) + 1.0).clamp(0.0, end as f64) as usize,
+            )
         };
         let (first, end) = span(low.x, high.x, self.columns);
         let (top, bottom) = span(low.y, high.y, self.rows);
@@ -202,12 +237,23 @@ impl World {
 
     /// Share of the power that passes between two points, there and back; walls of `body` count for nothing.
     /// Stops with a value below `negligible` as soon as so little is left.
-    pub fn transmission(&self, from: Point2<f64>, to: Point2<f64>, body: u32, negligible: f64) -> f64 {
+    pub fn transmission(
+        &self,
+        from: Point2<f64>,
+        to: Point2<f64>,
+        body: u32,
+        negligible: f64,
+    ) -> f64 {
         self.walls.transmission(from, to, body, negligible)
     }
 
     /// Shows the walls between two points, each once: its number in [`World::walls`], and the share of the way to it.
-    pub fn walls_between(&self, from: Point2<f64>, to: Point2<f64>, see: &mut impl FnMut(u32, &Wall, f64)) {
+    pub fn walls_between(
+        &self,
+        from: Point2<f64>,
+        to: Point2<f64>,
+        see: &mut impl FnMut(u32, &Wall, f64),
+    ) {
         self.walls.between(from, to, see);
     }
 }
@@ -219,14 +265,26 @@ mod tests {
     #[test]
     fn all_that_is_near_is_among_what_is_around() {
         let at = |i: i32, j: i32| Point2::new(f64::from(i) * 7.3 - 90.0, f64::from(j) * 9.1 - 40.0);
-        let scatterer =
-            |position| Scatterer { position, cross_section_m2: 1.0, aspect: Aspect::AllRound, body: NO_BODY };
-        let scatterers = (0..40).flat_map(|i| (0..20).map(move |j| scatterer(at(i, j)))).collect();
-        let world = World::new(Body { scatterers, walls: vec![] });
+        let scatterer = |position| Scatterer {
+            position,
+            cross_section_m2: 1.0,
+            aspect: Aspect::AllRound,
+            body: NO_BODY,
+        };
+        let scatterers = (0..40)
+            .flat_map(|i| (0..20).map(move |j| scatterer(at(i, j))))
+            .collect();
+        let world = World::new(Body {
+            scatterers,
+            walls: vec![],
+        });
         assert_eq!(world.scatterers().len(), 800);
-        for (place, reach_m) in
-            [((0.0, 0.0), 30.0), ((-300.0, 20.0), 250.0), ((190.0, 130.0), 5.0), ((0.0, 900.0), 9.0)]
-        {
+        for (place, reach_m) in [
+            ((0.0, 0.0), 30.0),
+            ((-300.0, 20.0), 250.0),
+            ((190.0, 130.0), 5.0),
+            ((0.0, 900.0), 9.0),
+        ] {
             let place = Point2::new(place.0, place.1);
             let near = |s: &&Scatterer| (s.position - place).norm() <= reach_m;
             let found = world.around(place, reach_m).flatten().filter(near).count();

@@ -37,7 +37,12 @@ pub fn write_dataset(
     out: &Path,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<Summary, SimulatorError> {
-    write_dataset_on(std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN), config, out, progress)
+    write_dataset_on(
+        std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN),
+        config,
+        out,
+        progress,
+    )
 }
 
 /// Writes the recording of `config` to the folder `out` on `threads` threads, and calls `progress(done, total)` as it grows.
@@ -61,7 +66,10 @@ pub fn write_dataset_on(
     let _alone = lock(out)?;
     let missing = resume::missing(&recording, config, out)?;
     write_whole(&out.join(MADE_BY), resume::made_by(config)?.as_bytes())?;
-    write_whole(&out.join(resume::TOLD), resume::told(&recording)?.as_bytes())?;
+    write_whole(
+        &out.join(resume::TOLD),
+        resume::told(&recording)?.as_bytes(),
+    )?;
     write_side_files(&recording, out)?;
     let kept = recording.scans() - missing.len();
     progress(kept, recording.scans());
@@ -75,15 +83,25 @@ fn lock(folder: &Path) -> Result<File, SimulatorError> {
     let handle = File::open(folder).map_err(SimulatorError::write(folder))?;
     match handle.try_lock() {
         Ok(()) => Ok(handle),
-        Err(fs::TryLockError::WouldBlock) => Err(SimulatorError::Busy { folder: folder.to_owned() }),
-        Err(fs::TryLockError::Error(source)) => Err(SimulatorError::Write { path: folder.to_owned(), source }),
+        Err(fs::TryLockError::WouldBlock) => Err(SimulatorError::Busy {
+            folder: folder.to_owned(),
+        }),
+        Err(fs::TryLockError::Error(source)) => Err(SimulatorError::Write {
+            path: folder.to_owned(),
+            source,
+        }),
     }
 }
 
 fn summary(recording: &Recording, out: &Path, kept: usize) -> Summary {
     let simulator = recording.simulator();
     let last = simulator.scans() - 1;
-    let step_m = |i: usize| (simulator.pose(i).inverse() * simulator.pose(i + 1)).translation.vector.norm();
+    let step_m = |i: usize| {
+        (simulator.pose(i).inverse() * simulator.pose(i + 1))
+            .translation
+            .vector
+            .norm()
+    };
     Summary {
         folder: out.to_owned(),
         scans: simulator.scans(),
@@ -144,7 +162,12 @@ fn work(
     let (mut pixels, mut encoded) = (vec![0; size.bytes()], Vec::new());
     while let Some(&index) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
         renderer.draw(index, &mut pixels);
-        let written = write_image(&folder.join(recording.image_name(index)), size, &pixels, &mut encoded);
+        let written = write_image(
+            &folder.join(recording.image_name(index)),
+            size,
+            &pixels,
+            &mut encoded,
+        );
         if results.send(written).is_err() {
             return;
         }

@@ -14,7 +14,10 @@ use gyre_simulator::{SimulationConfig, Simulator, SimulatorError, write_dataset}
 use nalgebra::{Isometry2, Vector2};
 
 fn config(scans: usize) -> SimulationConfig {
-    SimulationConfig { scans, ..SimulationConfig::default() }
+    SimulationConfig {
+        scans,
+        ..SimulationConfig::default()
+    }
 }
 
 fn generate(config: &SimulationConfig) -> tempfile::TempDir {
@@ -33,7 +36,10 @@ fn same_configuration_writes_the_same_bytes() {
 #[test]
 fn another_seed_measures_another_town() {
     let simulator = |seed| Simulator::new(&SimulationConfig { seed, ..config(1) }).unwrap();
-    assert_ne!(simulator(1).render_scan(0).scan.bytes, simulator(2).render_scan(0).scan.bytes);
+    assert_ne!(
+        simulator(1).render_scan(0).scan.bytes,
+        simulator(2).render_scan(0).scan.bytes
+    );
 }
 
 #[test]
@@ -52,10 +58,16 @@ fn scan_does_not_depend_on_the_scans_rendered_before_it() {
 fn progress_counts_every_scan_once() {
     let folder = tempfile::tempdir().unwrap();
     let mut seen = Vec::new();
-    let summary = write_dataset(&config(3), folder.path(), &mut |done, total| seen.push((done, total))).unwrap();
+    let summary = write_dataset(&config(3), folder.path(), &mut |done, total| {
+        seen.push((done, total))
+    })
+    .unwrap();
     assert_eq!(seen, [(0, 3), (1, 3), (2, 3), (3, 3)]);
     assert_eq!(summary.scans, 3);
-    assert!((summary.duration_s - 0.5).abs() < 1e-9 && summary.path_m > 2.0, "{summary:?}");
+    assert!(
+        (summary.duration_s - 0.5).abs() < 1e-9 && summary.path_m > 2.0,
+        "{summary:?}"
+    );
 }
 
 #[test]
@@ -89,8 +101,14 @@ fn reader_for_real_data_reads_what_was_rendered() {
         read.geometry = dataset.read(index, read.slot()).unwrap();
         let rendered = simulator.render_scan(index).scan;
         let (read, rendered) = (read.view(), rendered.view());
-        assert_eq!(read.geometry.stamp_ns / 1000, rendered.geometry.stamp_ns / 1000);
-        assert_eq!(read.geometry.range_resolution_m, rendered.geometry.range_resolution_m);
+        assert_eq!(
+            read.geometry.stamp_ns / 1000,
+            rendered.geometry.stamp_ns / 1000
+        );
+        assert_eq!(
+            read.geometry.range_resolution_m,
+            rendered.geometry.range_resolution_m
+        );
         for azimuth in 0..400 {
             assert_eq!(read.row(azimuth), rendered.row(azimuth));
             assert!((read.azimuth_rad[azimuth] - rendered.azimuth_rad[azimuth]).abs() < 1e-5);
@@ -120,7 +138,11 @@ fn rows(folder: &Path) -> Vec<Row> {
         let real = |i: usize| fields[i].parse::<f64>().unwrap();
         // From y right, yaw clockwise to y left, yaw counter-clockwise.
         let motion = Isometry2::new(Vector2::new(real(2), -real(3)), -real(7));
-        Row { stamps: [whole(0), whole(1)], images: [whole(8), whole(9)], motion }
+        Row {
+            stamps: [whole(0), whole(1)],
+            images: [whole(8), whole(9)],
+            motion,
+        }
     };
     lines.map(row).collect()
 }
@@ -135,7 +157,10 @@ fn chain_of_csv_motions_equals_the_poses_of_the_path() {
     for (index, row) in rows.iter().enumerate() {
         pose *= row.motion;
         let error = pose.inverse() * simulator.pose(index + 1);
-        assert!(error.translation.vector.norm() < 1e-6 && error.rotation.angle().abs() < 1e-7, "row {index}: {error}");
+        assert!(
+            error.translation.vector.norm() < 1e-6 && error.rotation.angle().abs() < 1e-7,
+            "row {index}: {error}"
+        );
         assert!(row.motion.translation.x > 0.0, "forward is positive");
     }
     let turn = pose.rotation.angle() - simulator.pose(0).rotation.angle();
@@ -146,9 +171,16 @@ fn chain_of_csv_motions_equals_the_poses_of_the_path() {
 fn csv_names_images_by_sweep_start_and_motions_by_sweep_middle() {
     let folder = generate(&config(3));
     let listed = fs::read_to_string(folder.path().join("radar.timestamps")).unwrap();
-    let names: Vec<i64> = listed.lines().map(|line| line.strip_suffix(" 1").unwrap().parse().unwrap()).collect();
+    let names: Vec<i64> = listed
+        .lines()
+        .map(|line| line.strip_suffix(" 1").unwrap().parse().unwrap())
+        .collect();
     for (index, row) in rows(folder.path()).iter().enumerate() {
-        assert_eq!(row.images, [names[index + 1], names[index]], "source is the newer scan");
+        assert_eq!(
+            row.images,
+            [names[index + 1], names[index]],
+            "source is the newer scan"
+        );
         for (stamp, image) in row.stamps.iter().zip(row.images) {
             let half_sweep_us = 250_000 * 399 / 400 / 2;
             assert_eq!(stamp - image, half_sweep_us);
@@ -161,7 +193,10 @@ fn csv_names_images_by_sweep_start_and_motions_by_sweep_middle() {
 fn folder_with_scans_of_another_drive_is_refused() {
     let folder = generate(&config(3));
     let refused = write_dataset(&config(2), folder.path(), &mut |_, _| {});
-    assert!(matches!(refused, Err(SimulatorError::OutputInUse { .. })), "{refused:?}");
+    assert!(
+        matches!(refused, Err(SimulatorError::OutputInUse { .. })),
+        "{refused:?}"
+    );
     write_dataset(&config(3), folder.path(), &mut |_, _| {}).expect("the same drive again");
 }
 
@@ -169,8 +204,13 @@ fn folder_with_scans_of_another_drive_is_refused() {
 fn impossible_configuration_names_its_key() {
     let refused = |config: SimulationConfig| Simulator::new(&config).err().unwrap().to_string();
     assert!(refused(config(0)).contains("`scans`"));
-    let drive = gyre_simulator::drive::DriveConfig { speed_m_s: f64::NAN, ..Default::default() };
+    let drive = gyre_simulator::drive::DriveConfig {
+        speed_m_s: f64::NAN,
+        ..Default::default()
+    };
     assert!(refused(SimulationConfig { drive, ..config(1) }).contains("speed_m_s`"));
-    let unknown = toml::from_str::<SimulationConfig>("scanz = 3").unwrap_err().to_string();
+    let unknown = toml::from_str::<SimulationConfig>("scanz = 3")
+        .unwrap_err()
+        .to_string();
     assert!(unknown.contains("scanz"), "{unknown}");
 }

@@ -6,7 +6,9 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 
 use gyre_radar::{DatasetOptions, OwnedScan};
-use gyre_simulator::{Fault, FaultPlan, SimulationConfig, SimulatorError, write_dataset, write_faulty};
+use gyre_simulator::{
+    Fault, FaultPlan, SimulationConfig, SimulatorError, write_dataset, write_faulty,
+};
 use tempfile::TempDir;
 
 const SCANS: usize = 24;
@@ -18,21 +20,42 @@ fn radiate() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let images = folder.path().join("Navtech_Polar");
     fs::create_dir(&images).unwrap();
-    let stamp = |k: usize| format!("Frame: {:06} Time: {}.{:09}\n", k + 7, 1_549_986_600 + k / 4, k % 4 * 250_000_000);
-    fs::write(folder.path().join("Navtech_Polar.txt"), (0..SCANS).map(stamp).collect::<String>()).unwrap();
+    let stamp = |k: usize| {
+        format!(
+            "Frame: {:06} Time: {}.{:09}\n",
+            k + 7,
+            1_549_986_600 + k / 4,
+            k % 4 * 250_000_000
+        )
+    };
+    fs::write(
+        folder.path().join("Navtech_Polar.txt"),
+        (0..SCANS).map(stamp).collect::<String>(),
+    )
+    .unwrap();
     fs::write(folder.path().join("ground_truth.tum"), "1 0 0 0 0 0 0 1\n").unwrap();
     for k in 0..SCANS {
         let file = fs::File::create(images.join(format!("{:06}.png", k + 7))).unwrap();
         let mut encoder = png::Encoder::new(file, AZIMUTHS as u32, BINS as u32);
         encoder.set_color(png::ColorType::Grayscale);
-        let pixels: Vec<u8> = (0..AZIMUTHS * BINS).map(|i| (i * 7 + k * 31) as u8).collect();
-        encoder.write_header().unwrap().write_image_data(&pixels).unwrap();
+        let pixels: Vec<u8> = (0..AZIMUTHS * BINS)
+            .map(|i| (i * 7 + k * 31) as u8)
+            .collect();
+        encoder
+            .write_header()
+            .unwrap()
+            .write_image_data(&pixels)
+            .unwrap();
     }
     folder
 }
 
 fn plan(fault: Fault, every: usize) -> FaultPlan {
-    FaultPlan { fault, every: NonZeroUsize::new(every).unwrap(), seed: 1 }
+    FaultPlan {
+        fault,
+        every: NonZeroUsize::new(every).unwrap(),
+        seed: 1,
+    }
 }
 
 fn spoilt(source: &Path, plan: &FaultPlan) -> (TempDir, Vec<usize>) {
@@ -53,7 +76,9 @@ fn scans(folder: &Path) -> Vec<OwnedScan> {
 }
 
 fn rows(scan: &OwnedScan) -> Vec<&[u8]> {
-    (0..scan.geometry.azimuths).map(|azimuth| scan.view().row(azimuth)).collect()
+    (0..scan.geometry.azimuths)
+        .map(|azimuth| scan.view().row(azimuth))
+        .collect()
 }
 
 #[test]
@@ -63,11 +88,22 @@ fn scans_that_are_not_of_the_plan_are_links_to_the_recordings_own() {
         let (copy, hits) = spoilt(source.path(), &plan(fault, 5));
         assert_eq!(hits, [5, 10, 15, 20], "never the first");
         assert!(copy.path().join("ground_truth.tum").is_symlink());
-        for (k, (before, after)) in scans(source.path()).iter().zip(&scans(copy.path())).enumerate() {
+        for (k, (before, after)) in scans(source.path())
+            .iter()
+            .zip(&scans(copy.path()))
+            .enumerate()
+        {
             let image = copy.path().join(format!("Navtech_Polar/{:06}.png", k + 7));
             assert_eq!(image.is_symlink(), !hits.contains(&k));
-            assert_eq!(before.bytes != after.bytes, hits.contains(&k), "{fault} {k}");
-            assert_eq!((before.geometry, &before.stamp_ns), (after.geometry, &after.stamp_ns));
+            assert_eq!(
+                before.bytes != after.bytes,
+                hits.contains(&k),
+                "{fault} {k}"
+            );
+            assert_eq!(
+                (before.geometry, &before.stamp_ns),
+                (after.geometry, &after.stamp_ns)
+            );
         }
     }
 }
@@ -78,7 +114,10 @@ fn a_turned_scan_begins_a_quarter_later() {
     let (copy, _) = spoilt(source.path(), &plan(Fault::Turned, 5));
     let (before, after) = (scans(source.path()), scans(copy.path()));
     for azimuth in 0..AZIMUTHS {
-        assert_eq!(rows(&after[5])[azimuth], rows(&before[5])[(azimuth + AZIMUTHS / 4) % AZIMUTHS]);
+        assert_eq!(
+            rows(&after[5])[azimuth],
+            rows(&before[5])[(azimuth + AZIMUTHS / 4) % AZIMUTHS]
+        );
     }
 }
 
@@ -87,8 +126,15 @@ fn half_of_a_half_blank_scan_is_blank_and_the_other_half_as_it_was() {
     let source = radiate();
     let (copy, _) = spoilt(source.path(), &plan(Fault::HalfBlank, 5));
     let (before, after) = (scans(source.path()), scans(copy.path()));
-    assert!(rows(&after[10])[..AZIMUTHS / 2].iter().all(|row| row.iter().all(|power| *power == 0)));
-    assert_eq!(rows(&after[10])[AZIMUTHS / 2..], rows(&before[10])[AZIMUTHS / 2..]);
+    assert!(
+        rows(&after[10])[..AZIMUTHS / 2]
+            .iter()
+            .all(|row| row.iter().all(|power| *power == 0))
+    );
+    assert_eq!(
+        rows(&after[10])[AZIMUTHS / 2..],
+        rows(&before[10])[AZIMUTHS / 2..]
+    );
 }
 
 #[test]
@@ -112,13 +158,30 @@ fn dropped_scans_are_gone_and_the_others_keep_their_times() {
         before.remove(*hit);
     }
     assert_eq!(after.len(), SCANS - 2);
-    assert!(before.iter().zip(&after).all(|(b, a)| b.bytes == a.bytes && b.stamp_ns == a.stamp_ns));
+    assert!(
+        before
+            .iter()
+            .zip(&after)
+            .all(|(b, a)| b.bytes == a.bytes && b.stamp_ns == a.stamp_ns)
+    );
 }
 
 #[test]
 fn noise_is_the_same_for_the_same_seed_and_another_for_each_scan() {
     let source = radiate();
-    let noise = |seed| scans(spoilt(source.path(), &FaultPlan { seed, ..plan(Fault::Noise, 5) }).0.path());
+    let noise = |seed| {
+        scans(
+            spoilt(
+                source.path(),
+                &FaultPlan {
+                    seed,
+                    ..plan(Fault::Noise, 5)
+                },
+            )
+            .0
+            .path(),
+        )
+    };
     let (once, again, other) = (noise(1), noise(1), noise(2));
     assert!(once.iter().zip(&again).all(|(a, b)| a.bytes == b.bytes));
     assert_ne!(once[5].bytes, other[5].bytes);
@@ -128,12 +191,22 @@ fn noise_is_the_same_for_the_same_seed_and_another_for_each_scan() {
 #[test]
 fn what_stands_before_an_oxford_row_is_kept() {
     let source = tempfile::tempdir().unwrap();
-    write_dataset(&SimulationConfig { scans: 3, ..SimulationConfig::default() }, source.path(), &mut |_, _| ())
-        .unwrap();
+    write_dataset(
+        &SimulationConfig {
+            scans: 3,
+            ..SimulationConfig::default()
+        },
+        source.path(),
+        &mut |_, _| (),
+    )
+    .unwrap();
     let (copy, hits) = spoilt(source.path(), &plan(Fault::Noise, 2));
     assert_eq!(hits, [2]);
     let (before, after) = (&scans(source.path())[2], &scans(copy.path())[2]);
-    assert_eq!((&before.stamp_ns, &before.azimuth_rad), (&after.stamp_ns, &after.azimuth_rad));
+    assert_eq!(
+        (&before.stamp_ns, &before.azimuth_rad),
+        (&after.stamp_ns, &after.azimuth_rad)
+    );
     assert_ne!(rows(before), rows(after));
 }
 
@@ -142,8 +215,14 @@ fn a_folder_that_holds_something_is_refused() {
     let source = radiate();
     let (copy, _) = spoilt(source.path(), &plan(Fault::Noise, 5));
     let again = write_faulty(source.path(), copy.path(), &plan(Fault::Noise, 5));
-    assert!(matches!(again, Err(SimulatorError::OutputInUse { other, .. }) if other == "Navtech_Polar"));
-    let none = write_faulty(&source.path().join("none"), &copy.path().join("new"), &plan(Fault::Noise, 5));
+    assert!(
+        matches!(again, Err(SimulatorError::OutputInUse { other, .. }) if other == "Navtech_Polar")
+    );
+    let none = write_faulty(
+        &source.path().join("none"),
+        &copy.path().join("new"),
+        &plan(Fault::Noise, 5),
+    );
     assert!(matches!(none, Err(SimulatorError::Open(_))));
 }
 
@@ -152,5 +231,8 @@ fn faults_go_by_their_names() {
     for fault in Fault::ALL {
         assert_eq!(fault.name().parse(), Ok(fault));
     }
-    assert_eq!("rain".parse::<Fault>().unwrap_err(), "it is one of noise, later, turned, half-blank, dropped");
+    assert_eq!(
+        "rain".parse::<Fault>().unwrap_err(),
+        "it is one of noise, later, turned, half-blank, dropped"
+    );
 }

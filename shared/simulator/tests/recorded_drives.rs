@@ -25,9 +25,14 @@ fn real_files() -> Vec<PathBuf> {
 /// Sorted magnitudes of a quantity over the drive; its n-th derivative by differences 50 ms apart.
 fn derivative(drive: &dyn Trajectory, order: usize, of: &dyn Fn(f64) -> [f64; 2]) -> Vec<f64> {
     let step = 0.05;
-    let mut values: Vec<[f64; 2]> = (0..(drive.duration_s() / step) as usize).map(|i| of(i as f64 * step)).collect();
+    let mut values: Vec<[f64; 2]> = (0..(drive.duration_s() / step) as usize)
+        .map(|i| of(i as f64 * step))
+        .collect();
     for _ in 0..order {
-        values = values.windows(2).map(|w| [0, 1].map(|d| (w[1][d] - w[0][d]) / step)).collect();
+        values = values
+            .windows(2)
+            .map(|w| [0, 1].map(|d| (w[1][d] - w[0][d]) / step))
+            .collect();
     }
     let mut sizes: Vec<f64> = values.iter().map(|v| v[0].hypot(v[1])).collect();
     sizes.sort_by(f64::total_cmp);
@@ -41,7 +46,12 @@ fn real_drives_pass_near_their_poses() {
         let drive = read(&path, Excerpt::default()).unwrap();
         let loaded = started.elapsed();
         let given = read_trajectory(&path).unwrap();
-        let seconds = |i: usize| given.stamp_ns.as_ref().map_or(i as f64 * 0.25, |s| (s[i] - s[0]) as f64 * 1e-9);
+        let seconds = |i: usize| {
+            given
+                .stamp_ns
+                .as_ref()
+                .map_or(i as f64 * 0.25, |s| (s[i] - s[0]) as f64 * 1e-9)
+        };
         let origin = given.poses[0].inverse();
         let mut off: Vec<(f64, f64)> = (0..given.len())
             .map(|i| (origin * given.poses[i]).inverse() * drive.pose(seconds(i)))
@@ -50,8 +60,18 @@ fn real_drives_pass_near_their_poses() {
         off.sort_by(|a, b| a.0.total_cmp(&b.0));
         let at = |share: f64| off[((off.len() - 1) as f64 * share) as usize].0;
         let turn = off.iter().map(|o| o.1).fold(0.0, f64::max);
-        println!("{}: loaded in {loaded:?}, off by {:.3} m (95 %), {:.3} m (most)", path.display(), at(0.95), at(1.0));
-        assert!(at(0.95) < 0.05 && at(0.99) < 0.1 && at(1.0) < 0.3 && turn < 0.01, "{} {} {turn}", at(0.99), at(1.0));
+        println!(
+            "{}: loaded in {loaded:?}, off by {:.3} m (95 %), {:.3} m (most)",
+            path.display(),
+            at(0.95),
+            at(1.0)
+        );
+        assert!(
+            at(0.95) < 0.05 && at(0.99) < 0.1 && at(1.0) < 0.3 && turn < 0.01,
+            "{} {} {turn}",
+            at(0.99),
+            at(1.0)
+        );
         assert!(loaded.as_secs_f64() < 0.5);
     }
 }
@@ -61,28 +81,54 @@ fn real_drives_are_what_a_car_does() {
     for path in real_files() {
         let drive = read(&path, Excerpt::default()).unwrap();
         let velocity = |time: f64| drive.velocity(time).into();
-        let heading = |time: f64| [drive.pose(time).rotation.cos_angle(), drive.pose(time).rotation.sin_angle()];
-        let share = |sorted: &[f64], share: f64| sorted[((sorted.len() - 1) as f64 * share) as usize];
-        let (acceleration, jerk) = (derivative(&drive, 1, &velocity), derivative(&drive, 2, &velocity));
+        let heading = |time: f64| {
+            [
+                drive.pose(time).rotation.cos_angle(),
+                drive.pose(time).rotation.sin_angle(),
+            ]
+        };
+        let share =
+            |sorted: &[f64], share: f64| sorted[((sorted.len() - 1) as f64 * share) as usize];
+        let (acceleration, jerk) = (
+            derivative(&drive, 1, &velocity),
+            derivative(&drive, 2, &velocity),
+        );
         let yaw_rate = derivative(&drive, 1, &heading);
-        assert!(share(&acceleration, 0.99) < 3.0 && share(&acceleration, 1.0) < 5.0, "m/s2");
+        assert!(
+            share(&acceleration, 0.99) < 3.0 && share(&acceleration, 1.0) < 5.0,
+            "m/s2"
+        );
         assert!(share(&jerk, 0.99) < 4.0 && share(&jerk, 1.0) < 12.0, "m/s3");
         assert!(share(&yaw_rate, 1.0) < 0.9, "rad/s");
         let ahead = |i: usize| {
             let time = i as f64 * 0.1;
             (drive.pose(time).rotation.inverse() * drive.velocity(time)).x
         };
-        let ahead: Vec<f64> = (0..(drive.duration_s() * 10.0) as usize).map(ahead).collect();
-        let still = ahead.iter().filter(|speed| speed.abs() < 0.01).count() as f64 / ahead.len() as f64;
+        let ahead: Vec<f64> = (0..(drive.duration_s() * 10.0) as usize)
+            .map(ahead)
+            .collect();
+        let still =
+            ahead.iter().filter(|speed| speed.abs() < 0.01).count() as f64 / ahead.len() as f64;
         assert!(ahead.iter().all(|speed| *speed > -0.4), "drives backwards");
-        assert!(still > 0.08, "these drives wait at lights, but stand only {still}");
+        assert!(
+            still > 0.08,
+            "these drives wait at lights, but stand only {still}"
+        );
     }
 }
 
 #[test]
 fn excerpt_starts_at_the_origin_and_stands_before_and_after() {
     for path in real_files() {
-        let drive = read(&path, Excerpt { from_s: 300.0, for_s: 60.0, ..Excerpt::default() }).unwrap();
+        let drive = read(
+            &path,
+            Excerpt {
+                from_s: 300.0,
+                for_s: 60.0,
+                ..Excerpt::default()
+            },
+        )
+        .unwrap();
         assert!((59.0..=60.0).contains(&drive.duration_s()));
         assert!(drive.pose(0.0).translation.vector.norm() < 0.1);
         assert_eq!(drive.pose(-5.0), drive.pose(0.0));
@@ -98,13 +144,33 @@ fn files_that_cannot_be_driven_are_refused_by_name() {
     let line = |i: u32| format!("{}.0 0 {} 0 0 0 0 1\n", 1_600_000_000 + i, 5 * i);
     std::fs::write(&sideways, (0..50).map(line).collect::<String>()).unwrap();
     let refused = read(&sideways, Excerpt::default()).unwrap_err().to_string();
-    assert!(refused.contains("sideways.tum") && refused.contains("0 % of its way"), "{refused}");
-    let beyond = read(&sideways, Excerpt { from_s: 900.0, ..Excerpt::default() }).unwrap_err().to_string();
+    assert!(
+        refused.contains("sideways.tum") && refused.contains("0 % of its way"),
+        "{refused}"
+    );
+    let beyond = read(
+        &sideways,
+        Excerpt {
+            from_s: 900.0,
+            ..Excerpt::default()
+        },
+    )
+    .unwrap_err()
+    .to_string();
     assert!(beyond.contains("less than two poses"), "{beyond}");
     let jumping = folder.path().join("jumping.tum");
-    std::fs::write(&jumping, "1600000000.0 0 0 0 0 0 0 1\n1600000001.0 5e5 0 0 0 0 0 1\n").unwrap();
+    std::fs::write(
+        &jumping,
+        "1600000000.0 0 0 0 0 0 0 1\n1600000001.0 5e5 0 0 0 0 0 1\n",
+    )
+    .unwrap();
     let refused = read(&jumping, Excerpt::default()).unwrap_err().to_string();
-    assert!(refused.contains("jumps by 500000.0 m within 1.000 s"), "{refused}");
-    let missing = read(Path::new("nowhere.csv"), Excerpt::default()).unwrap_err().to_string();
+    assert!(
+        refused.contains("jumps by 500000.0 m within 1.000 s"),
+        "{refused}"
+    );
+    let missing = read(Path::new("nowhere.csv"), Excerpt::default())
+        .unwrap_err()
+        .to_string();
     assert!(missing.contains("nowhere.csv"), "{missing}");
 }

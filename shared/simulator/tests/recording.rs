@@ -9,18 +9,32 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 
 use common::all_files;
-use gyre_radar::{Dataset, DatasetOptions, Format, OwnedScan, find_ground_truth, inspect, read_trajectory};
+use gyre_radar::{
+    Dataset, DatasetOptions, Format, OwnedScan, find_ground_truth, inspect, read_trajectory,
+};
 use gyre_simulator::output::OutputConfig;
 use gyre_simulator::{
-    HostStamps, OutputFormat, Recording, SimulationConfig, SimulatorError, Summary, write_dataset, write_dataset_on,
+    HostStamps, OutputFormat, Recording, SimulationConfig, SimulatorError, Summary, write_dataset,
+    write_dataset_on,
 };
 use nalgebra::Isometry2;
 
-const FORMATS: [OutputFormat; 3] = [OutputFormat::Oxford, OutputFormat::Boreas, OutputFormat::Radiate];
+const FORMATS: [OutputFormat; 3] = [
+    OutputFormat::Oxford,
+    OutputFormat::Boreas,
+    OutputFormat::Radiate,
+];
 
 fn config(format: OutputFormat, scans: usize) -> SimulationConfig {
-    let output = OutputConfig { format: Some(format), ..OutputConfig::default() };
-    SimulationConfig { scans, output, ..SimulationConfig::default() }
+    let output = OutputConfig {
+        format: Some(format),
+        ..OutputConfig::default()
+    };
+    SimulationConfig {
+        scans,
+        output,
+        ..SimulationConfig::default()
+    }
 }
 
 fn write(config: &SimulationConfig, out: &Path) -> Result<Summary, SimulatorError> {
@@ -35,7 +49,10 @@ fn written(config: &SimulationConfig) -> tempfile::TempDir {
 
 /// What the radar knows of itself, but not which format it is: that is to be found.
 fn options(recording: &Recording) -> DatasetOptions {
-    DatasetOptions { format: None, ..recording.dataset_options() }
+    DatasetOptions {
+        format: None,
+        ..recording.dataset_options()
+    }
 }
 
 fn read(dataset: &mut dyn Dataset, index: usize) -> OwnedScan {
@@ -52,11 +69,20 @@ fn each_format_is_detected_and_read_back_as_it_was_rendered() {
         let mut dataset = gyre_radar::open(folder.path(), &options(&recording)).unwrap();
         assert_eq!((dataset.format(), dataset.len()), (recording.format(), 3));
         for index in 0..3 {
-            let (read, rendered) = (read(dataset.as_mut(), index), recording.simulator().render_scan(index).scan);
+            let (read, rendered) = (
+                read(dataset.as_mut(), index),
+                recording.simulator().render_scan(index).scan,
+            );
             assert_same_measurement(&recording, &read, &rendered);
-            assert!((read.geometry.stamp_ns - recording.stamp_ns(index)).abs() <= 1000, "{format:?}");
+            assert!(
+                (read.geometry.stamp_ns - recording.stamp_ns(index)).abs() <= 1000,
+                "{format:?}"
+            );
             let nominal_ns = dataset.nominal_stamp_ns(index).unwrap();
-            assert!((nominal_ns - recording.stamp_ns(index)).abs() < 1_000_000, "{format:?}: {nominal_ns}");
+            assert!(
+                (nominal_ns - recording.stamp_ns(index)).abs() < 1_000_000,
+                "{format:?}: {nominal_ns}"
+            );
         }
     }
 }
@@ -68,10 +94,16 @@ fn assert_same_measurement(recording: &Recording, read: &OwnedScan, rendered: &O
     assert!((a.range_resolution_m - b.range_resolution_m).abs() < 1e-6);
     let without_encoder = recording.format() == Format::Radiate;
     // Without an encoder the first azimuth counts as straight ahead.
-    let first_rad = if without_encoder { rendered.azimuth_rad[0] } else { 0.0 };
+    let first_rad = if without_encoder {
+        rendered.azimuth_rad[0]
+    } else {
+        0.0
+    };
     for azimuth in 0..a.azimuths {
         assert_eq!(read.row(azimuth), rendered.row(azimuth));
-        assert!((read.azimuth_rad[azimuth] + first_rad - rendered.azimuth_rad[azimuth]).abs() < 1e-5);
+        assert!(
+            (read.azimuth_rad[azimuth] + first_rad - rendered.azimuth_rad[azimuth]).abs() < 1e-5
+        );
         assert!((read.stamp_ns[azimuth] - rendered.stamp_ns[azimuth]).abs() < 2_000);
         // Only Oxford's form says which azimuths were filled in.
         let told = recording.format() == Format::Oxford;
@@ -84,7 +116,10 @@ fn each_format_says_where_the_sensor_was() {
     for format in FORMATS {
         let config = config(format, 8);
         let (folder, recording) = (written(&config), Recording::new(&config).unwrap());
-        assert_eq!(find_ground_truth(folder.path()), Some(folder.path().join("ground_truth.tum")));
+        assert_eq!(
+            find_ground_truth(folder.path()),
+            Some(folder.path().join("ground_truth.tum"))
+        );
         let own = match format {
             OutputFormat::Oxford => Some("gt/radar_odometry.csv"),
             OutputFormat::Boreas => Some("applanix/radar_poses.csv"),
@@ -96,8 +131,12 @@ fn each_format_says_where_the_sensor_was() {
             assert_eq!(stamps.len(), 8);
             let start = truth.poses[0];
             for (index, pose) in truth.poses.iter().enumerate() {
-                assert!((stamps[index] - recording.stamp_ns(index)).abs() <= 1000, "{file}: scan {index}");
-                let expected = pose_at(&recording, stamps[0]).inverse() * pose_at(&recording, stamps[index]);
+                assert!(
+                    (stamps[index] - recording.stamp_ns(index)).abs() <= 1000,
+                    "{file}: scan {index}"
+                );
+                let expected =
+                    pose_at(&recording, stamps[0]).inverse() * pose_at(&recording, stamps[index]);
                 let error = (start.inverse() * pose).inverse() * expected;
                 assert!(error.translation.vector.norm() < 1e-5, "{file}: {error}");
                 assert!(error.rotation.angle().abs() < 1e-7, "{file}: {error}");
@@ -108,7 +147,10 @@ fn each_format_says_where_the_sensor_was() {
 
 fn pose_at(recording: &Recording, stamp_ns: i64) -> Isometry2<f64> {
     let epoch_ns = recording.simulator().time(0).epoch_us * 1000;
-    recording.simulator().trajectory().pose((stamp_ns - epoch_ns) as f64 * 1e-9)
+    recording
+        .simulator()
+        .trajectory()
+        .pose((stamp_ns - epoch_ns) as f64 * 1e-9)
 }
 
 #[test]
@@ -116,7 +158,9 @@ fn nothing_looks_wrong_to_an_inspection_of_any_format() {
     for format in FORMATS {
         let config = config(format, 4);
         let (folder, recording) = (written(&config), Recording::new(&config).unwrap());
-        let report = inspect(folder.path(), &options(&recording), None).unwrap().to_string();
+        let report = inspect(folder.path(), &options(&recording), None)
+            .unwrap()
+            .to_string();
         assert!(report.contains(recording.format().name()), "{report}");
         assert!(report.contains("ground_truth.tum"), "{report}");
     }
@@ -129,7 +173,9 @@ fn a_host_that_stalls_shifts_the_logged_times_and_not_the_sensors_clock() {
     let recording = Recording::new(&config).unwrap();
     let source = Box::new(recording.renderer());
     let dataset = gyre_radar::open_source(source, &recording.dataset_options()).unwrap();
-    let late_ns = |index: usize| dataset.logged_stamp_ns(index).unwrap() - dataset.nominal_stamp_ns(index).unwrap();
+    let late_ns = |index: usize| {
+        dataset.logged_stamp_ns(index).unwrap() - dataset.nominal_stamp_ns(index).unwrap()
+    };
     assert!((0..40).map(late_ns).max().unwrap() > 150_000_000);
     for index in 0..40 {
         let error_ns = dataset.nominal_stamp_ns(index).unwrap() - recording.stamp_ns(index);
@@ -146,16 +192,26 @@ fn azimuth_poses_are_an_array_that_numpy_reads() {
     let header = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
     assert_eq!(header % 64, 0);
     let dictionary = String::from_utf8(bytes[10..header].to_vec()).unwrap();
-    assert!(dictionary.contains("'shape': (2, 400, 4)") && dictionary.ends_with('\n'), "{dictionary}");
-    let values: Vec<f64> =
-        bytes[header..].chunks_exact(8).map(|value| f64::from_le_bytes(value.try_into().unwrap())).collect();
+    assert!(
+        dictionary.contains("'shape': (2, 400, 4)") && dictionary.ends_with('\n'),
+        "{dictionary}"
+    );
+    let values: Vec<f64> = bytes[header..]
+        .chunks_exact(8)
+        .map(|value| f64::from_le_bytes(value.try_into().unwrap()))
+        .collect();
     assert_eq!(values.len(), 2 * 400 * 4);
     for (scan, azimuth) in [(0, 0), (0, 399), (1, 17)] {
         let simulator = recording.simulator();
         let time = simulator.time(scan);
         let time_s = time.trajectory_s(time.stamp_us(azimuth));
         let pose = simulator.trajectory().pose(time_s);
-        let expected = [time_s, pose.translation.x, pose.translation.y, pose.rotation.angle()];
+        let expected = [
+            time_s,
+            pose.translation.x,
+            pose.translation.y,
+            pose.rotation.angle(),
+        ];
         assert_eq!(values[(scan * 400 + azimuth) * 4..][..4], expected);
     }
 }
@@ -165,7 +221,13 @@ fn the_number_of_threads_does_not_change_a_byte() {
     let config = config(OutputFormat::Oxford, 7);
     let on = |threads| {
         let folder = tempfile::tempdir().unwrap();
-        write_dataset_on(NonZeroUsize::new(threads).unwrap(), &config, folder.path(), &mut |_, _| {}).unwrap();
+        write_dataset_on(
+            NonZeroUsize::new(threads).unwrap(),
+            &config,
+            folder.path(),
+            &mut |_, _| {},
+        )
+        .unwrap();
         all_files(folder.path())
     };
     let alone = on(1);
@@ -177,7 +239,9 @@ fn what_was_cut_short_is_kept_and_completed() {
     let config = config(OutputFormat::Boreas, 6);
     let whole = written(&config);
     let cut = written(&config);
-    let images = fs::read_dir(cut.path().join("radar")).unwrap().map(|entry| entry.unwrap().path());
+    let images = fs::read_dir(cut.path().join("radar"))
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
     let images: BTreeMap<_, _> = images.map(|path| (path.clone(), path)).collect();
     let images: Vec<_> = images.into_values().collect();
     // One is missing, one was under way, and all else is there.
@@ -186,10 +250,16 @@ fn what_was_cut_short_is_kept_and_completed() {
     fs::remove_file(cut.path().join("ground_truth.tum")).unwrap();
     let untouched = fs::metadata(&images[1]).unwrap().modified().unwrap();
     let mut seen = Vec::new();
-    let summary = write_dataset(&config, cut.path(), &mut |done, total| seen.push((done, total))).unwrap();
+    let summary = write_dataset(&config, cut.path(), &mut |done, total| {
+        seen.push((done, total))
+    })
+    .unwrap();
     assert_eq!((summary.scans, summary.kept), (6, 4));
     assert_eq!(seen, [(4, 6), (5, 6), (6, 6)]);
-    assert_eq!(fs::metadata(&images[1]).unwrap().modified().unwrap(), untouched);
+    assert_eq!(
+        fs::metadata(&images[1]).unwrap().modified().unwrap(),
+        untouched
+    );
     assert!(all_files(cut.path()) == all_files(whole.path()));
 }
 
@@ -199,7 +269,10 @@ fn a_recording_grows_to_more_scans() {
         let folder = written(&config(format, 3));
         let summary = write(&config(format, 5), folder.path()).unwrap();
         assert_eq!((summary.scans, summary.kept), (5, 3));
-        assert!(all_files(folder.path()) == all_files(written(&config(format, 5)).path()), "{format:?}");
+        assert!(
+            all_files(folder.path()) == all_files(written(&config(format, 5)).path()),
+            "{format:?}"
+        );
     }
 }
 
@@ -208,27 +281,52 @@ fn a_folder_of_another_origin_is_refused_and_left_as_it_is() {
     let original = config(OutputFormat::Oxford, 3);
     let folder = written(&original);
     let before = all_files(folder.path());
-    let other_seed = SimulationConfig { seed: 9, ..original.clone() };
-    assert!(matches!(write(&other_seed, folder.path()), Err(SimulatorError::OtherRecording { .. })));
-    let fewer = SimulationConfig { scans: 2, ..original.clone() };
-    assert!(matches!(write(&fewer, folder.path()), Err(SimulatorError::OutputInUse { .. })));
+    let other_seed = SimulationConfig {
+        seed: 9,
+        ..original.clone()
+    };
+    assert!(matches!(
+        write(&other_seed, folder.path()),
+        Err(SimulatorError::OtherRecording { .. })
+    ));
+    let fewer = SimulationConfig {
+        scans: 2,
+        ..original.clone()
+    };
+    assert!(matches!(
+        write(&fewer, folder.path()),
+        Err(SimulatorError::OutputInUse { .. })
+    ));
     assert!(all_files(folder.path()) == before);
     let unnamed = tempfile::tempdir().unwrap();
     fs::create_dir(unnamed.path().join("radar")).unwrap();
-    fs::write(unnamed.path().join("radar/1547132400000000.png"), "someone's").unwrap();
-    assert!(matches!(write(&original, unnamed.path()), Err(SimulatorError::OutputInUse { .. })));
+    fs::write(
+        unnamed.path().join("radar/1547132400000000.png"),
+        "someone's",
+    )
+    .unwrap();
+    assert!(matches!(
+        write(&original, unnamed.path()),
+        Err(SimulatorError::OutputInUse { .. })
+    ));
 }
 
 #[test]
 fn an_image_that_would_come_out_otherwise_is_told() {
     let config = config(OutputFormat::Oxford, 3);
     let folder = written(&config);
-    let first = folder.path().join("radar").join(Recording::new(&config).unwrap().image_name(0));
+    let first = folder
+        .path()
+        .join("radar")
+        .join(Recording::new(&config).unwrap().image_name(0));
     let mut bytes = fs::read(&first).unwrap();
     *bytes.last_mut().unwrap() ^= 1;
     fs::write(&first, bytes).unwrap();
     let refused = write(&config, folder.path());
-    assert!(matches!(&refused, Err(SimulatorError::OtherImage { path }) if *path == first), "{refused:?}");
+    assert!(
+        matches!(&refused, Err(SimulatorError::OtherImage { path }) if *path == first),
+        "{refused:?}"
+    );
 }
 
 #[test]
@@ -244,8 +342,14 @@ fn played_without_a_disk_it_is_what_it_is_read_from_one() {
         for index in [2, 0, 1] {
             let (a, b) = (read(disk.as_mut(), index), read(memory.as_mut(), index));
             assert_eq!(a.geometry, b.geometry);
-            assert!(a.bytes == b.bytes && a.azimuth_rad == b.azimuth_rad && a.stamp_ns == b.stamp_ns, "{format:?}");
-            assert_eq!((disk.nominal_stamp_ns(index), a.flags), (memory.nominal_stamp_ns(index), b.flags));
+            assert!(
+                a.bytes == b.bytes && a.azimuth_rad == b.azimuth_rad && a.stamp_ns == b.stamp_ns,
+                "{format:?}"
+            );
+            assert_eq!(
+                (disk.nominal_stamp_ns(index), a.flags),
+                (memory.nominal_stamp_ns(index), b.flags)
+            );
         }
     }
 }

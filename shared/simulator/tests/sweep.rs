@@ -8,8 +8,8 @@ use gyre_simulator::profile::{METADATA_BYTES, Profile, Sampling};
 use gyre_simulator::weather::WeatherConfig;
 use gyre_simulator::world::{Aspect, NO_BODY, Scatterer, Wall};
 use gyre_simulator::{
-    Body, ConstantTwist, Effects, Scene, Sensor, SensorConfig, SimulationConfig, Simulator, SweepTime, Trajectory,
-    World,
+    Body, ConstantTwist, Effects, Scene, Sensor, SensorConfig, SimulationConfig, Simulator,
+    SweepTime, Trajectory, World,
 };
 use nalgebra::Point2;
 
@@ -26,17 +26,36 @@ fn azimuth_rad(azimuth: usize) -> f64 {
 }
 
 fn point(x: f64, y: f64) -> Scatterer {
-    Scatterer { position: Point2::new(x, y), cross_section_m2: 30.0, aspect: Aspect::AllRound, body: NO_BODY }
+    Scatterer {
+        position: Point2::new(x, y),
+        cross_section_m2: 30.0,
+        aspect: Aspect::AllRound,
+        body: NO_BODY,
+    }
 }
 
 /// Without what would move or hide a single point; see `sweep_with`.
 fn quiet() -> Effects {
-    Effects { encoder_wobble: false, dropped_azimuths: false, interference: false, ..Effects::ALL }
+    Effects {
+        encoder_wobble: false,
+        dropped_azimuths: false,
+        interference: false,
+        ..Effects::ALL
+    }
 }
 
 fn sweep(content: Body, trajectory: &dyn Trajectory, doppler_s: f64) -> OwnedScan {
-    let config = SensorConfig { doppler_s: Some(doppler_s), ..SensorConfig::default() };
-    sweep_with(content, trajectory, &config, &quiet(), WeatherConfig::default())
+    let config = SensorConfig {
+        doppler_s: Some(doppler_s),
+        ..SensorConfig::default()
+    };
+    sweep_with(
+        content,
+        trajectory,
+        &config,
+        &quiet(),
+        WeatherConfig::default(),
+    )
 }
 
 fn sweep_with(
@@ -46,10 +65,27 @@ fn sweep_with(
     effects: &Effects,
     weather: WeatherConfig,
 ) -> OwnedScan {
-    let Sampling { azimuths, period_us, .. } = config.sampling();
-    let time = SweepTime { start_us: 1_500_000_000_000_000, period_us, azimuths, epoch_us: 1_500_000_000_000_000 };
-    let mut scan = OwnedScan::with_limits(ScanLimits { bytes: azimuths * config.sampling().stride(), azimuths });
-    let scene = Scene { world: &World::new(content), movers: &(), trajectory, weather };
+    let Sampling {
+        azimuths,
+        period_us,
+        ..
+    } = config.sampling();
+    let time = SweepTime {
+        start_us: 1_500_000_000_000_000,
+        period_us,
+        azimuths,
+        epoch_us: 1_500_000_000_000_000,
+    };
+    let mut scan = OwnedScan::with_limits(ScanLimits {
+        bytes: azimuths * config.sampling().stride(),
+        azimuths,
+    });
+    let scene = Scene {
+        world: &World::new(content),
+        movers: &(),
+        trajectory,
+        weather,
+    };
     scan.geometry = Sensor::new(config, effects, 7).sweep(scene, time, 0, &mut scan.slot());
     scan
 }
@@ -61,11 +97,23 @@ fn row(scan: &OwnedScan, azimuth: usize) -> &[u8] {
 
 /// Azimuth and bin of the strongest power, each the middle of the plateau that rounding leaves.
 fn brightest(scan: &OwnedScan) -> (usize, f64, u8) {
-    let best = |azimuth: usize| row(scan, azimuth)[FIRST_FREE_BIN..].iter().copied().max().unwrap_or(0);
+    let best = |azimuth: usize| {
+        row(scan, azimuth)[FIRST_FREE_BIN..]
+            .iter()
+            .copied()
+            .max()
+            .unwrap_or(0)
+    };
     let azimuth = (0..AZIMUTHS).max_by_key(|&azimuth| best(azimuth)).unwrap();
     let top = best(azimuth);
-    let bins: Vec<usize> = (FIRST_FREE_BIN..sampling().bins).filter(|&bin| row(scan, azimuth)[bin] == top).collect();
-    (azimuth, bins.iter().sum::<usize>() as f64 / bins.len() as f64, top)
+    let bins: Vec<usize> = (FIRST_FREE_BIN..sampling().bins)
+        .filter(|&bin| row(scan, azimuth)[bin] == top)
+        .collect();
+    (
+        azimuth,
+        bins.iter().sum::<usize>() as f64 / bins.len() as f64,
+        top,
+    )
 }
 
 /// The azimuth that points best at a world point when it is measured, and the range from there.
@@ -76,7 +124,9 @@ fn expected(trajectory: &dyn Trajectory, target: Point2<f64>) -> (usize, f64) {
         let off = (-local.y).atan2(local.x) - azimuth_rad(azimuth);
         (off - TAU * (off / TAU).round(), local.coords.norm())
     };
-    let azimuth = (0..AZIMUTHS).min_by(|&a, &b| seen(a).0.abs().total_cmp(&seen(b).0.abs())).unwrap();
+    let azimuth = (0..AZIMUTHS)
+        .min_by(|&a, &b| seen(a).0.abs().total_cmp(&seen(b).0.abs()))
+        .unwrap();
     (azimuth, seen(azimuth).1)
 }
 
@@ -85,35 +135,86 @@ fn expected(trajectory: &dyn Trajectory, target: Point2<f64>) -> (usize, f64) {
 fn point_comes_out_where_the_moving_sensor_met_it() {
     let motions = [
         ConstantTwist::default(),
-        ConstantTwist { forward_m_s: 12.0, left_m_s: 0.0, yaw_rad_s: 0.0 },
-        ConstantTwist { forward_m_s: 9.0, left_m_s: 0.5, yaw_rad_s: -0.9 },
+        ConstantTwist {
+            forward_m_s: 12.0,
+            left_m_s: 0.0,
+            yaw_rad_s: 0.0,
+        },
+        ConstantTwist {
+            forward_m_s: 9.0,
+            left_m_s: 0.5,
+            yaw_rad_s: -0.9,
+        },
     ];
     for motion in motions {
-        for (x, y) in [(20.0, 10.0), (15.0, -25.0), (-30.0, 4.0), (-12.0, -9.0), (60.0, -20.0), (3.0, 90.0)] {
-            let scan = sweep(Body { scatterers: vec![point(x, y)], walls: vec![] }, &motion, 0.0);
+        for (x, y) in [
+            (20.0, 10.0),
+            (15.0, -25.0),
+            (-30.0, 4.0),
+            (-12.0, -9.0),
+            (60.0, -20.0),
+            (3.0, 90.0),
+        ] {
+            let scan = sweep(
+                Body {
+                    scatterers: vec![point(x, y)],
+                    walls: vec![],
+                },
+                &motion,
+                0.0,
+            );
             let (azimuth, bin, _) = brightest(&scan);
             let (wanted, range_m) = expected(&motion, Point2::new(x, y));
             let apart = (azimuth as i64 - wanted as i64).rem_euclid(AZIMUTHS as i64);
-            assert!(apart <= 1 || apart == AZIMUTHS as i64 - 1, "({x}, {y}) {motion:?}: {azimuth} for {wanted}");
+            assert!(
+                apart <= 1 || apart == AZIMUTHS as i64 - 1,
+                "({x}, {y}) {motion:?}: {azimuth} for {wanted}"
+            );
             let error_m = sampling().range_m(bin) - range_m;
-            assert!(error_m.abs() < 0.07, "({x}, {y}) {motion:?}: {error_m} m off {range_m} m");
+            assert!(
+                error_m.abs() < 0.07,
+                "({x}, {y}) {motion:?}: {error_m} m off {range_m} m"
+            );
         }
     }
 }
 
 #[test]
 fn point_to_the_right_lies_at_a_quarter_turn() {
-    let scan = sweep(Body { scatterers: vec![point(0.0, -20.0)], walls: vec![] }, &ConstantTwist::default(), 0.0);
+    let scan = sweep(
+        Body {
+            scatterers: vec![point(0.0, -20.0)],
+            walls: vec![],
+        },
+        &ConstantTwist::default(),
+        0.0,
+    );
     let (azimuth, _, _) = brightest(&scan);
-    assert!((99..=100).contains(&azimuth), "clockwise from ahead: {azimuth}");
+    assert!(
+        (99..=100).contains(&azimuth),
+        "clockwise from ahead: {azimuth}"
+    );
 }
 
 #[test]
 fn closing_speed_shortens_the_range_ahead_and_lengthens_it_behind() {
-    let motion = ConstantTwist { forward_m_s: 10.0, left_m_s: 0.0, yaw_rad_s: 0.0 };
+    let motion = ConstantTwist {
+        forward_m_s: 10.0,
+        left_m_s: 0.0,
+        yaw_rad_s: 0.0,
+    };
     for (x, sign) in [(30.0, -1.0), (-30.0, 1.0)] {
-        let at =
-            |shift: f64| brightest(&sweep(Body { scatterers: vec![point(x, 6.0)], walls: vec![] }, &motion, shift)).1;
+        let at = |shift: f64| {
+            brightest(&sweep(
+                Body {
+                    scatterers: vec![point(x, 6.0)],
+                    walls: vec![],
+                },
+                &motion,
+                shift,
+            ))
+            .1
+        };
         let moved_m = (at(0.049) - at(0.0)) * sampling().range_resolution_m;
         assert!((moved_m - sign * 0.48).abs() < 0.06, "{x}: {moved_m} m");
     }
@@ -121,12 +222,28 @@ fn closing_speed_shortens_the_range_ahead_and_lengthens_it_behind() {
 
 #[test]
 fn wall_hides_a_part_of_what_is_behind_it_and_nothing_before_it() {
-    let wall =
-        |x: f64| Wall { from: Point2::new(x, -5.0), to: Point2::new(x, 5.0), transmission: 0.01, mirror: 0.0, body: 1 };
+    let wall = |x: f64| Wall {
+        from: Point2::new(x, -5.0),
+        to: Point2::new(x, 5.0),
+        transmission: 0.01,
+        mirror: 0.0,
+        body: 1,
+    };
     let power = |walls: Vec<Wall>| {
-        let scan = sweep(Body { scatterers: vec![point(30.0, 0.0)], walls }, &ConstantTwist::default(), 0.0);
+        let scan = sweep(
+            Body {
+                scatterers: vec![point(30.0, 0.0)],
+                walls,
+            },
+            &ConstantTwist::default(),
+            0.0,
+        );
         let bin = sampling().bin(30.0) as usize;
-        [0, 399].into_iter().flat_map(|azimuth| row(&scan, azimuth)[bin - 5..bin + 6].to_vec()).max().unwrap()
+        [0, 399]
+            .into_iter()
+            .flat_map(|azimuth| row(&scan, azimuth)[bin - 5..bin + 6].to_vec())
+            .max()
+            .unwrap()
     };
     let open = i32::from(power(vec![]));
     let hidden = open - i32::from(power(vec![wall(20.0)]));
@@ -138,25 +255,40 @@ fn wall_hides_a_part_of_what_is_behind_it_and_nothing_before_it() {
 #[test]
 fn empty_world_holds_noise_and_ringing_alone() {
     let scan = sweep(Body::default(), &ConstantTwist::default(), 0.0);
-    let far = (0..AZIMUTHS).flat_map(|azimuth| &row(&scan, azimuth)[2800..]).map(|&power| f64::from(power));
+    let far = (0..AZIMUTHS)
+        .flat_map(|azimuth| &row(&scan, azimuth)[2800..])
+        .map(|&power| f64::from(power));
     let mean = far.clone().sum::<f64>() / far.clone().count() as f64;
     assert!((3.0..8.0).contains(&mean), "mean {mean}");
     assert!(far.fold(0.0, f64::max) < 40.0);
-    let ringing = row(&scan, 0)[..30].iter().map(|&power| f64::from(power)).sum::<f64>() / 30.0;
+    let ringing = row(&scan, 0)[..30]
+        .iter()
+        .map(|&power| f64::from(power))
+        .sum::<f64>()
+        / 30.0;
     assert!(ringing > 25.0, "{ringing}");
 }
 
 /// Mean power, and the share of bins above 60.
 fn statistics(scans: &[OwnedScan]) -> (f64, f64) {
-    let powers = || scans.iter().flat_map(|scan| (0..scan.geometry.azimuths).flat_map(|a| scan.view().row(a)));
+    let powers = || {
+        scans
+            .iter()
+            .flat_map(|scan| (0..scan.geometry.azimuths).flat_map(|a| scan.view().row(a)))
+    };
     let count = powers().count() as f64;
     let mean = powers().map(|&power| f64::from(power)).sum::<f64>() / count;
-    (mean, powers().filter(|&&power| power > 60).count() as f64 / count)
+    (
+        mean,
+        powers().filter(|&&power| power > 60).count() as f64 / count,
+    )
 }
 
 fn simulated() -> Vec<OwnedScan> {
     let simulator = Simulator::new(&SimulationConfig::default()).unwrap();
-    [0, 20, 40].map(|index| simulator.render_scan(index).scan).to_vec()
+    [0, 20, 40]
+        .map(|index| simulator.render_scan(index).scan)
+        .to_vec()
 }
 
 #[test]
@@ -183,6 +315,12 @@ fn powers_resemble_real_oxford_scans() {
         .collect();
     let (real, ours) = (statistics(&real), statistics(&simulated()));
     println!("mean power and share above 60: real {real:?}, simulated {ours:?}");
-    assert!((0.5..2.0).contains(&(ours.0 / real.0)), "means {ours:?} and {real:?}");
-    assert!((0.5..2.0).contains(&(ours.1 / real.1)), "shares above 60 {ours:?} and {real:?}");
+    assert!(
+        (0.5..2.0).contains(&(ours.0 / real.0)),
+        "means {ours:?} and {real:?}"
+    );
+    assert!(
+        (0.5..2.0).contains(&(ours.1 / real.1)),
+        "shares above 60 {ours:?} and {real:?}"
+    );
 }

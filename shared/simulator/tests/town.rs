@@ -19,11 +19,18 @@ fn free_town(drive: &dyn Trajectory, duration_s: f64, seed: u64) -> World {
     let streets = Streets::along(drive, duration_s, Keep::Left, seed);
     let world = World::new(town::build(&TownConfig::default(), &streets, seed));
     for scatterer in world.scatterers() {
-        assert!(streets.clearance_m(scatterer.position, 1.0) > 0.0, "seed {seed}: {scatterer:?}");
+        assert!(
+            streets.clearance_m(scatterer.position, 1.0) > 0.0,
+            "seed {seed}: {scatterer:?}"
+        );
     }
     for step in 0..(duration_s / 0.5) as usize {
         let [from, to] = [0.0, 0.5].map(|later| place(drive, 0.5 * step as f64 + later));
-        assert_eq!(world.transmission(from, to, NO_BODY, 0.0), 1.0, "seed {seed}: a wall across the drive at {from}");
+        assert_eq!(
+            world.transmission(from, to, NO_BODY, 0.0),
+            1.0,
+            "seed {seed}: a wall across the drive at {from}"
+        );
     }
     world
 }
@@ -33,7 +40,11 @@ fn a_loop_of_streets_is_free() {
     let drive = BlockLoop::new(90.0, 60.0, 9.5, 5.0);
     for seed in 0..6 {
         let world = free_town(&drive, drive.lap_s(), seed);
-        assert!(world.scatterers().len() > 4_000, "seed {seed}: {}", world.scatterers().len());
+        assert!(
+            world.scatterers().len() > 4_000,
+            "seed {seed}: {}",
+            world.scatterers().len()
+        );
     }
 }
 
@@ -44,18 +55,34 @@ fn real_drives_are_free_and_their_towns_of_a_size_that_can_be_rendered() {
         return;
     };
     let trajectories = std::path::Path::new(&data).join("trajectories");
-    for file in ["oxford-2019-01-10-11-46-21.radar_odometry.csv", "boreas-2021-09-02-11-42-radar_poses.csv"] {
+    for file in [
+        "oxford-2019-01-10-11-46-21.radar_odometry.csv",
+        "boreas-2021-09-02-11-42-radar_poses.csv",
+    ] {
         let drive = read(&trajectories.join(file), Excerpt::default()).unwrap();
         for seed in 1..4 {
             let world = free_town(&drive, drive.duration_s(), seed);
             let all = world.scatterers().len();
-            assert!((200_000..2_000_000).contains(&all), "{file}, seed {seed}: {all} scatterers");
+            assert!(
+                (200_000..2_000_000).contains(&all),
+                "{file}, seed {seed}: {all} scatterers"
+            );
             let near = |time_s: f64| {
                 let centre = place(&drive, time_s);
-                world.scatterers().iter().filter(|s| (s.position - centre).norm() < REACH_M).count()
+                world
+                    .scatterers()
+                    .iter()
+                    .filter(|s| (s.position - centre).norm() < REACH_M)
+                    .count()
             };
-            let most = (0..20).map(|share| near(drive.duration_s() * f64::from(share) / 20.0)).max().unwrap();
-            assert!((20_000..75_000).contains(&most), "{file}, seed {seed}: {most} scatterers in sight");
+            let most = (0..20)
+                .map(|share| near(drive.duration_s() * f64::from(share) / 20.0))
+                .max()
+                .unwrap();
+            assert!(
+                (20_000..75_000).contains(&most),
+                "{file}, seed {seed}: {most} scatterers in sight"
+            );
             println!("{file}, seed {seed}: {all} scatterers, at most {most} in sight");
         }
     }

@@ -75,7 +75,10 @@ impl StageError {
 
     /// A failure of the transport.
     pub(crate) fn transport(action: impl Into<String>, reason: impl Debug) -> Self {
-        Self::Transport { action: action.into(), reason: format!("{reason:?}") }
+        Self::Transport {
+            action: action.into(),
+            reason: format!("{reason:?}"),
+        }
     }
 
     /// What the process exits with.

@@ -74,7 +74,11 @@ impl Feedback {
 
     /// The motion of item `seq`: `None` as long as it is not known, `Some(None)` where the chain starts.
     pub(crate) fn motion(&self, seq: u64) -> Option<Option<SearchedMotion>> {
-        self.known.iter().rev().find(|(known, _)| *known == seq).map(|(_, motion)| *motion)
+        self.known
+            .iter()
+            .rev()
+            .find(|(known, _)| *known == seq)
+            .map(|(_, motion)| *motion)
     }
 
     /// Where the trajectory stood when its keeper said so: `None` until then.

@@ -59,17 +59,24 @@ impl<M: Message> Inputs for Pairs<M> {
     type View<'a> = PairView<'a, M>;
 
     fn open(launch: &Launch) -> Result<Self, StageError> {
-        Ok(Self { reader: Reader::open(&launch.node, None)? })
+        Ok(Self {
+            reader: Reader::open(&launch.node, None)?,
+        })
     }
 
     fn turn(&mut self) -> Result<Turn, StageError> {
-        let Some(head) = self.reader.head()? else { return Ok(Turn::Wait) };
+        let Some(head) = self.reader.head()? else {
+            return Ok(Turn::Wait);
+        };
         let (item, received_ns) = (*head.item(), head.received_ns);
         Ok(turn_of(&item, self.reader.before().is_some(), received_ns))
     }
 
     fn view(&self) -> Option<PairView<'_, M>> {
-        Some(PairView { current: self.reader.current()?, before: self.reader.before() })
+        Some(PairView {
+            current: self.reader.current()?,
+            before: self.reader.before(),
+        })
     }
 
     fn advance(&mut self) {
@@ -105,12 +112,17 @@ impl<A: Message, B: Message> Inputs for Joined<A, B> {
     type View<'a> = JoinedView<'a, A, B>;
 
     fn open(launch: &Launch) -> Result<Self, StageError> {
-        Ok(Self { pairs: Reader::open(&launch.node, None)?, other: Reader::open(&launch.node, None)? })
+        Ok(Self {
+            pairs: Reader::open(&launch.node, None)?,
+            other: Reader::open(&launch.node, None)?,
+        })
     }
 
     fn turn(&mut self) -> Result<Turn, StageError> {
         loop {
-            let (Some(a), Some(b)) = (self.pairs.head()?, self.other.head()?) else { return Ok(Turn::Wait) };
+            let (Some(a), Some(b)) = (self.pairs.head()?, self.other.head()?) else {
+                return Ok(Turn::Wait);
+            };
             let (item, other) = (*a.item(), *b.item());
             let received_ns = a.received_ns.max(b.received_ns);
             if item.seq < other.seq {
@@ -118,7 +130,10 @@ impl<A: Message, B: Message> Inputs for Joined<A, B> {
             }
             if item.seq == other.seq {
                 // The later input's stamps tell the item's way here.
-                let item = Item { hops: other.hops, ..item };
+                let item = Item {
+                    hops: other.hops,
+                    ..item
+                };
                 return Ok(turn_of(&item, self.pairs.before().is_some(), received_ns));
             }
             // After a restart the other topic's history may reach further back; its items alone are of no use.
@@ -127,7 +142,11 @@ impl<A: Message, B: Message> Inputs for Joined<A, B> {
     }
 
     fn view(&self) -> Option<JoinedView<'_, A, B>> {
-        Some(JoinedView { current: self.pairs.current()?, before: self.pairs.before(), other: self.other.current()? })
+        Some(JoinedView {
+            current: self.pairs.current()?,
+            before: self.pairs.before(),
+            other: self.other.current()?,
+        })
     }
 
     fn advance(&mut self) {
@@ -165,12 +184,21 @@ mod tests {
 
     #[test]
     fn an_item_without_the_one_before_is_only_kept_unless_the_chain_starts_there() {
-        let item = Item { seq: 7, ..Item::default() };
+        let item = Item {
+            seq: 7,
+            ..Item::default()
+        };
         assert_eq!(turn_of(&item, false, 1), Turn::Keep);
         assert_eq!(turn_of(&item, true, 1), Turn::Process(item, 1));
-        let start = Item { flags: flag::BREAK, ..item };
+        let start = Item {
+            flags: flag::BREAK,
+            ..item
+        };
         assert_eq!(turn_of(&start, false, 1), Turn::Process(start, 1));
-        let end = Item { flags: flag::END, ..item };
+        let end = Item {
+            flags: flag::END,
+            ..item
+        };
         assert_eq!(turn_of(&end, true, 1), Turn::End(end));
     }
 }

@@ -34,26 +34,48 @@ pub struct Launch {
 impl Launch {
     /// Joins the run that [`run::ENVIRONMENT`] names.
     pub fn from_environment(name: &str) -> Result<Self, StageError> {
-        let root = std::env::var_os(run::ENVIRONMENT).ok_or_else(|| StageError::NoRun { stage: name.to_owned() })?;
+        let root = std::env::var_os(run::ENVIRONMENT).ok_or_else(|| StageError::NoRun {
+            stage: name.to_owned(),
+        })?;
         // Where a shell stands between us and the supervisor, this takes us down with the shell.
         let _ = set_parent_process_death_signal(Some(Signal::KILL));
         let manifest = Manifest::read(&PathBuf::from(root))?;
         let log = start_log(&manifest, name)?;
         let path = manifest.root.join("config.toml");
-        let text = fs::read_to_string(&path).map_err(|source| StageError::File { path: path.clone(), source })?;
-        let configuration = text
-            .parse()
-            .map_err(|error: toml::de::Error| StageError::Manifest { path, reason: error.message().to_owned() })?;
+        let text = fs::read_to_string(&path).map_err(|source| StageError::File {
+            path: path.clone(),
+            source,
+        })?;
+        let configuration =
+            text.parse()
+                .map_err(|error: toml::de::Error| StageError::Manifest {
+                    path,
+                    reason: error.message().to_owned(),
+                })?;
         let signals = Signals::install()?;
         let node = services::node(&manifest.transport()?, name)?;
-        Ok(Self { name: name.to_owned(), manifest, signals, configuration, node, _log: log })
+        Ok(Self {
+            name: name.to_owned(),
+            manifest,
+            signals,
+            configuration,
+            node,
+            _log: log,
+        })
     }
 
     /// A section of the run's configuration; its defaults where the section is missing.
     pub fn section<T: DeserializeOwned>(&self, section: &str) -> Result<T, StageError> {
-        let table = self.configuration.get(section).cloned().unwrap_or_else(|| toml::Table::new().into());
+        let table = self
+            .configuration
+            .get(section)
+            .cloned()
+            .unwrap_or_else(|| toml::Table::new().into());
         table.try_into().map_err(|error: toml::de::Error| {
-            StageError::Configuration(format!("[{section}] in the configuration: {}", error.message()))
+            StageError::Configuration(format!(
+                "[{section}] in the configuration: {}",
+                error.message()
+            ))
         })
     }
 
@@ -64,7 +86,8 @@ impl Launch {
 
     fn leave_statistics(&self, statistics: &Statistics) -> Result<(), StageError> {
         let path = self.manifest.root.join(statistics::file_name(&self.name));
-        let text = serde_json::to_string(statistics).map_err(|e| StageError::Configuration(e.to_string()))?;
+        let text = serde_json::to_string(statistics)
+            .map_err(|e| StageError::Configuration(e.to_string()))?;
         fs::write(&path, text).map_err(|source| StageError::File { path, source })
     }
 }
@@ -89,10 +112,17 @@ pub fn main(name: &str, work: impl FnOnce(&Launch) -> Result<Statistics, StageEr
 /// All processes append to one `log.jsonl`, a line an event. Each line names its process while what is returned lives.
 fn start_log(manifest: &Manifest, name: &str) -> Result<EnteredSpan, StageError> {
     let path = manifest.out.join("log.jsonl");
-    let file =
-        OpenOptions::new().append(true).create(true).open(&path).map_err(|source| StageError::File { path, source })?;
-    let filter = tracing_subscriber::EnvFilter::try_from_env("GYRE_LOG").unwrap_or_else(|_| "info".into());
-    let log = tracing_subscriber::fmt().json().with_env_filter(filter).with_writer(Mutex::new(file));
+    let file = OpenOptions::new()
+        .append(true)
+        .create(true)
+        .open(&path)
+        .map_err(|source| StageError::File { path, source })?;
+    let filter =
+        tracing_subscriber::EnvFilter::try_from_env("GYRE_LOG").unwrap_or_else(|_| "info".into());
+    let log = tracing_subscriber::fmt()
+        .json()
+        .with_env_filter(filter)
+        .with_writer(Mutex::new(file));
     // A second log in one process (tests) keeps the first.
     let _ = log.try_init();
     Ok(tracing::error_span!("process", stage = name).entered())

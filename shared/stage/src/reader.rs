@@ -37,7 +37,11 @@ impl<M: Message> Received<M> {
 
     /// An error that names this message.
     pub fn malformed(&self, reason: impl Into<String>) -> StageError {
-        StageError::Malformed { topic: M::TOPIC, seq: self.item().seq, reason: reason.into() }
+        StageError::Malformed {
+            topic: M::TOPIC,
+            seq: self.item().seq,
+            reason: reason.into(),
+        }
     }
 }
 
@@ -57,17 +61,29 @@ impl<M: Message> Port<M> {
             .map_err(|e| StageError::transport(format!("subscribe to {}", M::TOPIC), e))?;
         let data = services::listener(node, &services::data_event(M::TOPIC))?;
         let hello = services::notifier(node, &services::hello_event(M::TOPIC))?;
-        hello.notify().map_err(|e| StageError::transport(format!("greet the publisher of {}", M::TOPIC), e))?;
-        Ok(Self { subscriber, data, _hello: hello })
+        hello.notify().map_err(|e| {
+            StageError::transport(format!("greet the publisher of {}", M::TOPIC), e)
+        })?;
+        Ok(Self {
+            subscriber,
+            data,
+            _hello: hello,
+        })
     }
 
     /// The next message in the queue.
     pub fn receive(&self) -> Result<Option<Received<M>>, StageError> {
         match self.subscriber.receive() {
-            Ok(sample) => Ok(sample.map(|sample| Received { sample, received_ns: clock::now_ns() })),
+            Ok(sample) => Ok(sample.map(|sample| Received {
+                sample,
+                received_ns: clock::now_ns(),
+            })),
             // What a dead publisher left still fills our hands: give something back first, then ask again.
             Err(ReceiveError::ExceedsMaxBorrows) => Ok(None),
-            Err(error) => Err(StageError::transport(format!("receive {}", M::TOPIC), error)),
+            Err(error) => Err(StageError::transport(
+                format!("receive {}", M::TOPIC),
+                error,
+            )),
         }
     }
 
@@ -89,19 +105,31 @@ pub struct Reader<M: Message> {
 impl<M: Message> Reader<M> {
     /// Opens the topic; `next` is the first item wanted, or whatever comes first.
     pub(crate) fn open(node: &Node, next: Option<u64>) -> Result<Self, StageError> {
-        Ok(Self { port: Port::open(node)?, next, head: None, before: None, duplicates: 0 })
+        Ok(Self {
+            port: Port::open(node)?,
+            next,
+            head: None,
+            before: None,
+            duplicates: 0,
+        })
     }
 
     /// The item at hand, taken from the queue if need be. Items that were had before are skipped;
     /// one that is missing breaks the window's promise.
     pub fn head(&mut self) -> Result<Option<&Received<M>>, StageError> {
         while self.head.is_none() {
-            let Some(received) = self.port.receive()? else { break };
+            let Some(received) = self.port.receive()? else {
+                break;
+            };
             let got = received.item().seq;
             match self.next {
                 Some(next) if got < next => self.duplicates += 1,
                 Some(next) if got > next => {
-                    return Err(StageError::BrokenPromise { topic: M::TOPIC, expected: next, got });
+                    return Err(StageError::BrokenPromise {
+                        topic: M::TOPIC,
+                        expected: next,
+                        got,
+                    });
                 }
                 _ => self.head = Some(received),
             }
@@ -117,8 +145,8 @@ impl<M: Message> Reader<M> {
     /// The item before the one at hand, while the chain is unbroken.
     pub fn before(&self) -> Option<&Received<M>> {
         let (before, head) = (self.before.as_ref()?, self.head.as_ref()?);
-        let follows =
-            head.item().seq.checked_sub(1) == Some(before.item().seq) && !head.item().is(gyre_messages::flag::BREAK);
+        let follows = head.item().seq.checked_sub(1) == Some(before.item().seq)
+            && !head.item().is(gyre_messages::flag::BREAK);
         follows.then_some(before)
     }
 

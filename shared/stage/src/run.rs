@@ -51,7 +51,10 @@ impl Manifest {
     /// Reads the manifest of the run at `root`.
     pub fn read(root: &Path) -> Result<Self, StageError> {
         let path = root.join("manifest.json");
-        let failed = |reason: String| StageError::Manifest { path: path.clone(), reason };
+        let failed = |reason: String| StageError::Manifest {
+            path: path.clone(),
+            reason,
+        };
         let text = fs::read_to_string(&path).map_err(|error| failed(error.to_string()))?;
         serde_json::from_str(&text).map_err(|error| failed(error.to_string()))
     }
@@ -65,11 +68,14 @@ impl Manifest {
             self.root.display(),
             self.prefix
         );
-        let manifest = serde_json::to_string_pretty(self)
-            .map_err(|error| StageError::Configuration(format!("cannot write the run's manifest: {error}")))?;
-        for (name, text) in
-            [("manifest.json", manifest.as_str()), ("config.toml", configuration), ("iox.toml", &transport)]
-        {
+        let manifest = serde_json::to_string_pretty(self).map_err(|error| {
+            StageError::Configuration(format!("cannot write the run's manifest: {error}"))
+        })?;
+        for (name, text) in [
+            ("manifest.json", manifest.as_str()),
+            ("config.toml", configuration),
+            ("iox.toml", &transport),
+        ] {
             let path = self.root.join(name);
             fs::write(&path, text).map_err(|source| StageError::File { path, source })?;
         }
@@ -79,10 +85,11 @@ impl Manifest {
     /// The transport's configuration: names and paths of this run alone, and nobody but the supervisor cleans up.
     pub(crate) fn transport(&self) -> Result<Config, StageError> {
         let mut config = Config::default();
-        config.global.prefix =
-            FileName::new(self.prefix.as_bytes()).map_err(|e| StageError::transport("name the run", e))?;
+        config.global.prefix = FileName::new(self.prefix.as_bytes())
+            .map_err(|e| StageError::transport("name the run", e))?;
         let root = format!("{}/", self.root.display());
-        let root = TransportPath::new(root.as_bytes()).map_err(|e| StageError::transport("use the run's root", e))?;
+        let root = TransportPath::new(root.as_bytes())
+            .map_err(|e| StageError::transport("use the run's root", e))?;
         config.global.set_root_path(&root);
         config.global.node.cleanup_dead_nodes_on_creation = false;
         config.global.node.cleanup_dead_nodes_on_destruction = false;
@@ -106,7 +113,9 @@ pub enum RootError {
     #[error("another run is writing to {0}: wait for it, or choose another --out")]
     Busy(PathBuf),
     /// Shared memory cannot be used.
-    #[error("cannot use {path} for the run's shared memory: {source}; Gyre needs a writable tmpfs at /dev/shm")]
+    #[error(
+        "cannot use {path} for the run's shared memory: {source}; Gyre needs a writable tmpfs at /dev/shm"
+    )]
     Unusable {
         /// Which path.
         path: PathBuf,
@@ -118,15 +127,25 @@ pub enum RootError {
 impl RunRoot {
     /// Takes the place of the run that writes to `out`; removes first what dead runs left.
     pub fn take(out: &Path) -> Result<Self, RootError> {
-        let name = format!("gyre{:010x}", hash(out.as_os_str().as_encoded_bytes()) & 0xff_ffff_ffff);
+        let name = format!(
+            "gyre{:010x}",
+            hash(out.as_os_str().as_encoded_bytes()) & 0xff_ffff_ffff
+        );
         let path = Path::new(RUNS).join(&name);
-        let unusable = |source| RootError::Unusable { path: path.clone(), source };
+        let unusable = |source| RootError::Unusable {
+            path: path.clone(),
+            source,
+        };
         let _alone = lock_all_runs().map_err(unusable)?;
         sweep_dead_runs();
         make_directory(Path::new(RUNS), FOR_ALL_USERS).map_err(unusable)?;
         make_directory(&path, FOR_THE_OWNER).map_err(unusable)?;
         match try_lock(&path).map_err(unusable)? {
-            Some(lock) => Ok(Self { name, path, _lock: lock }),
+            Some(lock) => Ok(Self {
+                name,
+                path,
+                _lock: lock,
+            }),
             None => Err(RootError::Busy(out.to_owned())),
         }
     }
@@ -159,7 +178,11 @@ fn make_directory(path: &Path, mode: u32) -> std::io::Result<()> {
 }
 
 fn try_lock(root: &Path) -> std::io::Result<Option<File>> {
-    let file = File::options().create(true).truncate(false).write(true).open(root.join("owner.lock"))?;
+    let file = File::options()
+        .create(true)
+        .truncate(false)
+        .write(true)
+        .open(root.join("owner.lock"))?;
     match flock(&file, FlockOperation::NonBlockingLockExclusive) {
         Ok(()) => Ok(Some(file)),
         Err(rustix::io::Errno::WOULDBLOCK) => Ok(None),
@@ -188,7 +211,9 @@ fn sweep_dead_runs() {
 fn remove_run(name: &str) {
     if let Ok(files) = fs::read_dir(SHARED_MEMORY) {
         let prefix = format!("{name}_");
-        let ours = files.flatten().filter(|file| file.file_name().to_string_lossy().starts_with(&prefix));
+        let ours = files
+            .flatten()
+            .filter(|file| file.file_name().to_string_lossy().starts_with(&prefix));
         ours.for_each(|file| drop(fs::remove_file(file.path())));
     }
     let _ = fs::remove_dir_all(Path::new(RUNS).join(name));
@@ -198,7 +223,9 @@ fn remove_run(name: &str) {
 
 /// FNV-1a: the same name for the same results every time, whatever the build.
 fn hash(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3))
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3)
+    })
 }
 
 #[cfg(test)]

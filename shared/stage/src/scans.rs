@@ -54,7 +54,11 @@ impl Inputs for Scans {
         let feedback = Feedback::open(&launch.node)?;
         let window = launch.manifest.window;
         let intake = match launch.manifest.live {
-            false => Intake::Lossless(InOrder { reader: Reader::open(&launch.node, None)?, window, flowing: false }),
+            false => Intake::Lossless(InOrder {
+                reader: Reader::open(&launch.node, None)?,
+                window,
+                flowing: false,
+            }),
             true => Intake::Live(NewestWins {
                 port: Port::open(&launch.node)?,
                 queue: VecDeque::with_capacity(window.live_depth + 2),
@@ -63,7 +67,12 @@ impl Inputs for Scans {
                 chain: None,
             }),
         };
-        Ok(Self { intake, feedback, window, motions: [None; 2] })
+        Ok(Self {
+            intake,
+            feedback,
+            window,
+            motions: [None; 2],
+        })
     }
 
     fn turn(&mut self) -> Result<Turn, StageError> {
@@ -73,7 +82,9 @@ impl Inputs for Scans {
         }
         self.feedback.update()?;
         // Where the trajectory stands decides which scans are still wanted, and in live mode where the chain goes on.
-        let Some(sync) = self.feedback.sync().copied() else { return Ok(Turn::Wait) };
+        let Some(sync) = self.feedback.sync().copied() else {
+            return Ok(Turn::Wait);
+        };
         let newest = self.feedback.newest_pose();
         let turn = match &mut self.intake {
             Intake::Lossless(intake) => intake.turn(newest)?,
@@ -91,8 +102,15 @@ impl Inputs for Scans {
             Intake::Live(intake) => (intake.queue.front(), intake.before()),
         };
         let [motion, motion_before] = self.motions;
-        let before = before.map(|scan| ScanBefore { scan, motion: motion_before });
-        Some(ScanView { scan: scan?, motion, before })
+        let before = before.map(|scan| ScanBefore {
+            scan,
+            motion: motion_before,
+        });
+        Some(ScanView {
+            scan: scan?,
+            motion,
+            before,
+        })
     }
 
     fn advance(&mut self) {
@@ -122,15 +140,24 @@ impl Inputs for Scans {
 impl Scans {
     /// Looks up the motions that scan `seq` and the one before are compensated with; false as long as one is still to come.
     fn find_motions(&mut self, seq: u64) -> bool {
-        let before = if looks_at_two(&self.window) { seq.checked_sub(1) } else { None };
-        let found = [Some(seq), before].map(|seq| seq.map_or(Some(None), |seq| self.motion_for(seq)));
+        let before = if looks_at_two(&self.window) {
+            seq.checked_sub(1)
+        } else {
+            None
+        };
+        let found =
+            [Some(seq), before].map(|seq| seq.map_or(Some(None), |seq| self.motion_for(seq)));
         self.motions = found.map(Option::flatten);
         found.iter().all(Option::is_some)
     }
 
     /// The motion for scan `seq`, by number alone, so that it is the same one after a restart.
     fn motion_for(&self, seq: u64) -> Option<Option<SearchedMotion>> {
-        let asked = if self.window.lag == 0 { None } else { seq.checked_sub(self.window.lag as u64) };
+        let asked = if self.window.lag == 0 {
+            None
+        } else {
+            seq.checked_sub(self.window.lag as u64)
+        };
         asked.map_or(Some(None), |seq| self.feedback.motion(seq))
     }
 }
@@ -142,8 +169,14 @@ fn looks_at_two(window: &Window) -> bool {
 
 /// Whether a starting masking is to send nothing for an item: its readers have had it, or it lacks its own scan before, and what
 /// came of it would not be what was sent for it the first time.
-fn serves_only_as_before(window: &Window, item: &Item, newest_pose: Option<u64>, has_before: bool) -> bool {
-    let had = newest_pose.is_some_and(|newest| item.seq.saturating_add(window.look_back as u64) <= newest);
+fn serves_only_as_before(
+    window: &Window,
+    item: &Item,
+    newest_pose: Option<u64>,
+    has_before: bool,
+) -> bool {
+    let had = newest_pose
+        .is_some_and(|newest| item.seq.saturating_add(window.look_back as u64) <= newest);
     had || (looks_at_two(window) && !has_before && !item.is(flag::BREAK))
 }
 
@@ -156,12 +189,16 @@ struct InOrder {
 
 impl InOrder {
     fn turn(&mut self, newest_pose: Option<u64>) -> Result<Turn, StageError> {
-        let Some(head) = self.reader.head()? else { return Ok(Turn::Wait) };
+        let Some(head) = self.reader.head()? else {
+            return Ok(Turn::Wait);
+        };
         let (item, received_ns) = (*head.item(), head.received_ns);
         if item.is(flag::END) {
             return Ok(Turn::End(item));
         }
-        if !self.flowing && serves_only_as_before(&self.window, &item, newest_pose, self.before().is_some()) {
+        if !self.flowing
+            && serves_only_as_before(&self.window, &item, newest_pose, self.before().is_some())
+        {
             return Ok(Turn::Keep);
         }
         self.flowing = true;
@@ -217,12 +254,16 @@ impl NewestWins {
     }
 
     fn turn(&mut self, sync: &Item, newest_pose: Option<u64>) -> Result<Turn, StageError> {
-        let Some(chain) = self.chain.or_else(|| self.resume(sync)) else { return Ok(Turn::Wait) };
+        let Some(chain) = self.chain.or_else(|| self.resume(sync)) else {
+            return Ok(Turn::Wait);
+        };
         self.chain = Some(chain);
         if !chain.again {
             self.drop_all_but_the_newest();
         }
-        let Some(front) = self.queue.front() else { return Ok(Turn::Wait) };
+        let Some(front) = self.queue.front() else {
+            return Ok(Turn::Wait);
+        };
         let item = chain.number(front.item());
         Ok(match () {
             // The end of the stream takes a place in every history as any item does, so it waits for its place too.
@@ -235,8 +276,15 @@ impl NewestWins {
     /// Where the chain goes on after a start; `None` as long as only scans from before the last pose's have come. A source that was
     /// restarted as well sends them again, and one whose history is just being handed over is not through with them.
     fn resume(&mut self, sync: &Item) -> Option<Chain> {
-        while self.queue.front().is_some_and(|front| Chain::is_past(front.item(), sync)) {
-            let past = self.queue.pop_front().filter(|past| past.item().scan == sync.previous_scan);
+        while self
+            .queue
+            .front()
+            .is_some_and(|front| Chain::is_past(front.item(), sync))
+        {
+            let past = self
+                .queue
+                .pop_front()
+                .filter(|past| past.item().scan == sync.previous_scan);
             if past.is_some() {
                 self.keep(past);
             }
@@ -255,7 +303,12 @@ impl NewestWins {
         if let (Some(chain), Some(done)) = (&mut self.chain, &done) {
             let (scan, published) = (done.item().scan, done.item().published);
             let next = chain.next.saturating_add(1);
-            *chain = Chain { next, previous_scan: Some(scan), published: Some(published), again: false };
+            *chain = Chain {
+                next,
+                previous_scan: Some(scan),
+                published: Some(published),
+                again: false,
+            };
         }
         self.keep(done);
     }
@@ -264,7 +317,9 @@ impl NewestWins {
     /// without, as it does where the chain starts.
     fn before(&self) -> Option<&Received<Scan>> {
         let previous = self.chain?.previous_scan;
-        self.before.as_ref().filter(|before| Some(before.item().scan) == previous)
+        self.before
+            .as_ref()
+            .filter(|before| Some(before.item().scan) == previous)
     }
 
     fn keep(&mut self, done: Option<Received<Scan>>) {
@@ -283,21 +338,41 @@ impl Chain {
     /// Goes on with the last pose's scan if the source still has it, else with a break.
     fn resume(front: &Item, sync: &Item) -> Self {
         match () {
-            () if sync.is(flag::BASE) => Self { next: 0, previous_scan: None, published: None, again: false },
-            () if front.published == sync.published && !front.is(flag::END) => {
-                Self { next: sync.seq, previous_scan: Some(sync.previous_scan), published: None, again: true }
-            }
-            () => Self { next: sync.seq.saturating_add(1), previous_scan: None, published: None, again: false },
+            () if sync.is(flag::BASE) => Self {
+                next: 0,
+                previous_scan: None,
+                published: None,
+                again: false,
+            },
+            () if front.published == sync.published && !front.is(flag::END) => Self {
+                next: sync.seq,
+                previous_scan: Some(sync.previous_scan),
+                published: None,
+                again: true,
+            },
+            () => Self {
+                next: sync.seq.saturating_add(1),
+                previous_scan: None,
+                published: None,
+                again: false,
+            },
         }
     }
 
     fn had(&self, item: &Item) -> bool {
-        !item.is(flag::END) && self.published.is_some_and(|published| item.published <= published)
+        !item.is(flag::END)
+            && self
+                .published
+                .is_some_and(|published| item.published <= published)
     }
 
     /// The item's place in the chain of motions.
     fn number(&self, item: &Item) -> Item {
-        let start = if self.previous_scan.is_none() { flag::BREAK } else { 0 };
+        let start = if self.previous_scan.is_none() {
+            flag::BREAK
+        } else {
+            0
+        };
         Item {
             seq: self.next,
             previous_scan: self.previous_scan.unwrap_or(item.scan),
@@ -312,29 +387,52 @@ mod tests {
     use super::*;
 
     fn sync() -> Item {
-        Item { seq: 9, scan: 40, previous_scan: 37, published: 31, ..Item::default() }
+        Item {
+            seq: 9,
+            scan: 40,
+            previous_scan: 37,
+            published: 31,
+            ..Item::default()
+        }
     }
 
     fn scan(published: u64) -> Item {
-        Item { seq: published, published, scan: published + 9, ..Item::default() }
+        Item {
+            seq: published,
+            published,
+            scan: published + 9,
+            ..Item::default()
+        }
     }
 
     #[test]
-    fn a_starting_masking_begins_with_the_last_poses_scan_and_the_scan_before_it_where_masks_look_at_two() {
-        let window = |look_back| Window { scans: 4, lag: 2, look_back, live_depth: 0 };
+    fn a_starting_masking_begins_with_the_last_poses_scan_and_the_scan_before_it_where_masks_look_at_two()
+     {
+        let window = |look_back| Window {
+            scans: 4,
+            lag: 2,
+            look_back,
+            live_depth: 0,
+        };
         let kept = |look_back, published, has_before| {
             serves_only_as_before(&window(look_back), &scan(published), Some(9), has_before)
         };
         assert!(kept(1, 8, false) && !kept(1, 9, false));
         assert!(kept(2, 7, true) && kept(2, 8, false) && !kept(2, 9, true));
-        let first = Item { flags: flag::BREAK, ..scan(0) };
+        let first = Item {
+            flags: flag::BREAK,
+            ..scan(0)
+        };
         assert!(!serves_only_as_before(&window(2), &first, None, false));
     }
 
     #[test]
     fn the_chain_goes_on_with_the_last_poses_scan_under_its_old_number() {
         let item = Chain::resume(&scan(31), &sync()).number(&scan(31));
-        assert_eq!((item.seq, item.scan, item.previous_scan, item.flags), (9, 40, 37, 0));
+        assert_eq!(
+            (item.seq, item.scan, item.previous_scan, item.flags),
+            (9, 40, 37, 0)
+        );
     }
 
     #[test]
@@ -347,7 +445,19 @@ mod tests {
     #[test]
     fn scans_from_before_the_last_pose_never_start_a_chain() {
         assert!(Chain::is_past(&scan(30), &sync()) && !Chain::is_past(&scan(31), &sync()));
-        assert!(!Chain::is_past(&scan(0), &Item { flags: flag::BASE, ..sync() }));
-        assert!(!Chain::is_past(&Item { flags: flag::END, ..scan(0) }, &sync()));
+        assert!(!Chain::is_past(
+            &scan(0),
+            &Item {
+                flags: flag::BASE,
+                ..sync()
+            }
+        ));
+        assert!(!Chain::is_past(
+            &Item {
+                flags: flag::END,
+                ..scan(0)
+            },
+            &sync()
+        ));
     }
 }

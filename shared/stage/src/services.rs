@@ -12,7 +12,8 @@ use crate::StageError;
 
 pub(crate) type Ipc = ipc::Service;
 pub(crate) type Node = iceoryx2::node::Node<Ipc>;
-pub(crate) type Topic<M> = publish_subscribe::PortFactory<Ipc, [<M as Message>::Element], <M as Message>::Header>;
+pub(crate) type Topic<M> =
+    publish_subscribe::PortFactory<Ipc, [<M as Message>::Element], <M as Message>::Header>;
 pub(crate) type Event = event::PortFactory<Ipc>;
 pub(crate) type Listener = iceoryx2::port::listener::Listener<Ipc>;
 pub(crate) type Notifier = iceoryx2::port::notifier::Notifier<Ipc>;
@@ -93,7 +94,12 @@ fn create_topic<M: Message>(node: &Node, window: &Window) -> Result<Topic<M>, St
         .map_err(|e| StageError::transport(format!("create the topic {}", M::TOPIC), e))
 }
 
-fn create_event(node: &Node, name: &str, listeners: usize, notifiers: usize) -> Result<Event, StageError> {
+fn create_event(
+    node: &Node,
+    name: &str,
+    listeners: usize,
+    notifiers: usize,
+) -> Result<Event, StageError> {
     node.service_builder(&service_name(name)?)
         .event()
         .max_listeners(listeners + AIR)

@@ -2,7 +2,9 @@
 
 use gyre_messages::{Header, Item, Message, MotionHeader, Pose, PoseHeader, Stage, flag};
 
-use crate::{Launch, StageError, Statistics, allocations, clock, reader::Reader, wake, writer::Writer};
+use crate::{
+    Launch, StageError, Statistics, allocations, clock, reader::Reader, wake, writer::Writer,
+};
 
 /// What keeps the trajectory.
 pub trait Sink {
@@ -15,19 +17,33 @@ pub trait Sink {
 }
 
 /// Runs the sink on the motions of topic `M` until SIGTERM.
-pub fn run<M: Message<Header = MotionHeader>>(launch: &Launch, sink: &mut impl Sink) -> Result<Statistics, StageError> {
+pub fn run<M: Message<Header = MotionHeader>>(
+    launch: &Launch,
+    sink: &mut impl Sink,
+) -> Result<Statistics, StageError> {
     let poses = Writer::<Pose>::open(&launch.node, &launch.manifest)?;
     let (restored, ended) = sink.restore(launch.manifest.window.sizes("pose").history)?;
     publish_again(&poses, &restored)?;
-    let next = restored.last().map_or(0, |pose| pose.item.seq.saturating_add(1));
-    let mut integration = Integration { sink, poses, ended, statistics: Statistics::default() };
+    let next = restored
+        .last()
+        .map_or(0, |pose| pose.item.seq.saturating_add(1));
+    let mut integration = Integration {
+        sink,
+        poses,
+        ended,
+        statistics: Statistics::default(),
+    };
     if ended {
         integration.publish_end(restored.last().map(|pose| pose.item).unwrap_or_default())?;
     }
     let mut motions = Reader::<M>::open(&launch.node, Some(next))?;
     integration.drain(&mut motions)?;
     loop {
-        let woken = launch.signals.wait(&[motions.listener()], Some(integration.poses.listener()), wake::NET)?;
+        let woken = launch.signals.wait(
+            &[motions.listener()],
+            Some(integration.poses.listener()),
+            wake::NET,
+        )?;
         integration.statistics.wakes += 1;
         if woken.stop {
             integration.statistics.duplicates = motions.duplicates();
@@ -44,8 +60,16 @@ pub fn run<M: Message<Header = MotionHeader>>(launch: &Launch, sink: &mut impl S
 
 /// What came before: the source learns from the last one where to go on, masking learns motions that no one else remembers.
 fn publish_again(poses: &Writer<Pose>, restored: &[PoseHeader]) -> Result<(), StageError> {
-    let base = PoseHeader { item: Item { flags: flag::BASE | flag::SYNC, ..Item::default() }, ..PoseHeader::default() };
-    let Some((last, earlier)) = restored.split_last() else { return publish(poses, base) };
+    let base = PoseHeader {
+        item: Item {
+            flags: flag::BASE | flag::SYNC,
+            ..Item::default()
+        },
+        ..PoseHeader::default()
+    };
+    let Some((last, earlier)) = restored.split_last() else {
+        return publish(poses, base);
+    };
     for pose in earlier {
         publish(poses, *pose)?;
     }
@@ -55,7 +79,13 @@ fn publish_again(poses: &Writer<Pose>, restored: &[PoseHeader]) -> Result<(), St
 /// Marks a pose as where the trajectory stands. The earlier ones of those published again are not: a source that took one of them
 /// for the last would send more than its readers have room for.
 fn standing(pose: PoseHeader) -> PoseHeader {
-    PoseHeader { item: Item { flags: pose.item.flags | flag::SYNC, ..pose.item }, ..pose }
+    PoseHeader {
+        item: Item {
+            flags: pose.item.flags | flag::SYNC,
+            ..pose.item
+        },
+        ..pose
+    }
 }
 
 fn publish(poses: &Writer<Pose>, pose: PoseHeader) -> Result<(), StageError> {
@@ -72,10 +102,15 @@ struct Integration<'a, S: Sink> {
 }
 
 impl<S: Sink> Integration<'_, S> {
-    fn drain<M: Message<Header = MotionHeader>>(&mut self, motions: &mut Reader<M>) -> Result<bool, StageError> {
+    fn drain<M: Message<Header = MotionHeader>>(
+        &mut self,
+        motions: &mut Reader<M>,
+    ) -> Result<bool, StageError> {
         let mut progressed = false;
         while !self.ended {
-            let Some(received) = motions.head()? else { break };
+            let Some(received) = motions.head()? else {
+                break;
+            };
             let mut motion = *received.header();
             match motion.item.is(flag::END) {
                 true => {
@@ -98,13 +133,19 @@ impl<S: Sink> Integration<'_, S> {
         let (started_ns, allocated) = (clock::now_ns(), allocations::so_far());
         motion.item.hop(Stage::PoseIntegration).started_ns = started_ns;
         let pose = self.sink.integrate(&motion)?;
-        self.statistics.record(allocations::so_far() - allocated, clock::now_ns() - started_ns);
+        self.statistics.record(
+            allocations::so_far() - allocated,
+            clock::now_ns() - started_ns,
+        );
         publish(&self.poses, standing(pose))
     }
 
     fn publish_end(&mut self, item: Item) -> Result<(), StageError> {
         let mut draft = self.poses.loan()?;
-        *draft.header().item_mut() = Item { flags: flag::END, ..item };
+        *draft.header().item_mut() = Item {
+            flags: flag::END,
+            ..item
+        };
         self.poses.send(draft, Stage::PoseIntegration)
     }
 }

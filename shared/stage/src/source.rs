@@ -29,15 +29,33 @@ pub trait Source {
     fn passes_by(&self) -> bool;
 
     /// Reads scan `index` into shared memory; the error is one sentence that says why it cannot be used.
-    fn read(&mut self, index: usize, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<(), String>;
+    fn read(
+        &mut self,
+        index: usize,
+        header: &mut ScanHeader,
+        bytes: &mut [u8],
+    ) -> Result<(), String>;
 }
 
 /// Runs the source until SIGTERM.
 pub fn run(launch: &Launch, source: &mut impl Source) -> Result<Statistics, StageError> {
-    let credit = Credit { poses: Port::open(&launch.node)?, newest: None, published: None, sync: None };
+    let credit = Credit {
+        poses: Port::open(&launch.node)?,
+        newest: None,
+        published: None,
+        sync: None,
+    };
     let scans = Writer::open(&launch.node, &launch.manifest)?;
-    let mut playback = Playback { launch, source, credit, scans, statistics: Statistics::default() };
-    let Some(position) = playback.wait_for_start()? else { return Ok(playback.statistics) };
+    let mut playback = Playback {
+        launch,
+        source,
+        credit,
+        scans,
+        statistics: Statistics::default(),
+    };
+    let Some(position) = playback.wait_for_start()? else {
+        return Ok(playback.statistics);
+    };
     playback.play(position)?;
     Ok(playback.statistics)
 }
@@ -85,7 +103,11 @@ impl Position {
             return Self::default();
         }
         match look_back > 1 && !sync.is(flag::BREAK) {
-            true => Self { index: sync.previous_scan as usize, published: sync.published - 1, previous: None },
+            true => Self {
+                index: sync.previous_scan as usize,
+                published: sync.published - 1,
+                previous: None,
+            },
             false => Self {
                 index: sync.scan as usize,
                 published: sync.published,
@@ -139,13 +161,16 @@ struct Tempo {
 impl Tempo {
     /// Moves on to now where a scan is late already; returns by how much, ns.
     fn slip(&mut self, complete_ns: i64) -> u64 {
-        let late_ns = clock::now_ns().saturating_sub(self.due_ns(complete_ns)).max(0);
+        let late_ns = clock::now_ns()
+            .saturating_sub(self.due_ns(complete_ns))
+            .max(0);
         self.start_ns = self.start_ns.saturating_add(late_ns);
         late_ns as u64
     }
 
     fn due_ns(&self, complete_ns: i64) -> i64 {
-        self.start_ns.saturating_add((complete_ns.saturating_sub(self.first_ns) as f64 / self.rate) as i64)
+        self.start_ns
+            .saturating_add((complete_ns.saturating_sub(self.first_ns) as f64 / self.rate) as i64)
     }
 }
 
@@ -161,7 +186,11 @@ impl<S: Source> Playback<'_, S> {
             self.credit.update()?;
             if let Some(sync) = self.credit.sync {
                 // In live mode numbers do not tell how far back the scan before is; masking does without.
-                let look_back = if self.launch.manifest.live { 1 } else { self.launch.manifest.window.look_back };
+                let look_back = if self.launch.manifest.live {
+                    1
+                } else {
+                    self.launch.manifest.window.look_back
+                };
                 return Ok(Some(Position::resume(&sync, look_back)));
             }
         }
@@ -172,10 +201,17 @@ impl<S: Source> Playback<'_, S> {
         while let Some(mut draft) = self.next_readable(&mut position)? {
             let complete_ns = complete_ns(draft.header());
             let tempo = tempo.get_or_insert_with(|| self.tempo(complete_ns));
-            if let Some(tempo) = tempo.as_mut().filter(|_| self.launch.manifest.live && !self.source.passes_by()) {
+            if let Some(tempo) = tempo
+                .as_mut()
+                .filter(|_| self.launch.manifest.live && !self.source.passes_by())
+            {
                 self.statistics.slipped_ns += tempo.slip(complete_ns);
             }
-            if !self.admit(draft, &position, tempo.map(|tempo| tempo.due_ns(complete_ns)))? {
+            if !self.admit(
+                draft,
+                &position,
+                tempo.map(|tempo| tempo.due_ns(complete_ns)),
+            )? {
                 return Ok(());
             }
             position.advance();
@@ -196,7 +232,10 @@ impl<S: Source> Playback<'_, S> {
     }
 
     /// Reads ahead: the next scan is in shared memory before it is asked for. `None` at the end of the recording.
-    fn next_readable(&mut self, position: &mut Position) -> Result<Option<Draft<Scan>>, StageError> {
+    fn next_readable(
+        &mut self,
+        position: &mut Position,
+    ) -> Result<Option<Draft<Scan>>, StageError> {
         let mut draft = self.scans.loan()?;
         while position.index < self.source.len() {
             let (started_ns, allocated) = (clock::now_ns(), allocations::so_far());
@@ -204,11 +243,19 @@ impl<S: Source> Playback<'_, S> {
             match self.source.read(position.index, header, bytes) {
                 Ok(()) => {
                     let finished_ns = clock::now_ns();
-                    self.statistics.record(allocations::so_far() - allocated, finished_ns - started_ns);
+                    self.statistics
+                        .record(allocations::so_far() - allocated, finished_ns - started_ns);
                     let stamp_ns = header.item.stamp_ns;
-                    header.item = Item { stamp_ns, ..position.item() };
-                    *header.item.hop(Stage::RadarReplay) =
-                        Hop { received_ns: started_ns, started_ns, finished_ns, published_ns: 0 };
+                    header.item = Item {
+                        stamp_ns,
+                        ..position.item()
+                    };
+                    *header.item.hop(Stage::RadarReplay) = Hop {
+                        received_ns: started_ns,
+                        started_ns,
+                        finished_ns,
+                        published_ns: 0,
+                    };
                     return Ok(Some(draft));
                 }
                 Err(reason) => {
@@ -222,7 +269,12 @@ impl<S: Source> Playback<'_, S> {
     }
 
     /// Publishes a scan when there is room and its time has come; false when told to stop before that.
-    fn admit(&mut self, mut draft: Draft<Scan>, position: &Position, due_ns: Option<i64>) -> Result<bool, StageError> {
+    fn admit(
+        &mut self,
+        mut draft: Draft<Scan>,
+        position: &Position,
+        due_ns: Option<i64>,
+    ) -> Result<bool, StageError> {
         let turn = self.wait_for_turn(position.published, due_ns)?;
         if turn {
             draft.header().item.due_ns = due_ns.unwrap_or_else(clock::now_ns);
@@ -251,8 +303,10 @@ impl<S: Source> Playback<'_, S> {
     /// A radar does not wait: what it saw while this process was not there has been missed.
     fn skip_what_is_past(&mut self, position: &mut Position, tempo: Tempo) {
         let now_ns = clock::now_ns();
-        let period_behind = |index| Some(tempo.due_ns(self.source.complete_ns(index + 1)?) < now_ns);
-        while position.index + 1 < self.source.len() && period_behind(position.index) == Some(true) {
+        let period_behind =
+            |index| Some(tempo.due_ns(self.source.complete_ns(index + 1)?) < now_ns);
+        while position.index + 1 < self.source.len() && period_behind(position.index) == Some(true)
+        {
             position.miss();
         }
     }
@@ -260,8 +314,11 @@ impl<S: Source> Playback<'_, S> {
     /// Reading a recording is work that a radar does not make: while there is time, leave the processors to the scan on its way.
     /// Returns at its pose, or half-way to the next scan; false when told to stop before that.
     fn let_pass(&mut self, position: &Position, tempo: Tempo) -> Result<bool, StageError> {
-        let Some(complete_ns) = self.source.complete_ns(position.index) else { return Ok(true) };
-        let until_ns = clock::now_ns() + (clock::until(tempo.due_ns(complete_ns)) / 2).as_nanos() as i64;
+        let Some(complete_ns) = self.source.complete_ns(position.index) else {
+            return Ok(true);
+        };
+        let until_ns =
+            clock::now_ns() + (clock::until(tempo.due_ns(complete_ns)) / 2).as_nanos() as i64;
         let sent = position.published.saturating_sub(1);
         loop {
             self.credit.update()?;
@@ -277,18 +334,29 @@ impl<S: Source> Playback<'_, S> {
 
     /// The pace from a first scan on; `None`: as fast as the window admits.
     fn tempo(&self, first_ns: i64) -> Option<Tempo> {
-        Some(Tempo { rate: self.launch.manifest.rate?, start_ns: clock::now_ns(), first_ns })
+        Some(Tempo {
+            rate: self.launch.manifest.rate?,
+            start_ns: clock::now_ns(),
+            first_ns,
+        })
     }
 
     fn end(&mut self, position: &Position) -> Result<(), StageError> {
         let mut draft = self.scans.loan()?;
-        draft.header().item = Item { flags: flag::END, ..position.item() };
+        draft.header().item = Item {
+            flags: flag::END,
+            ..position.item()
+        };
         self.scans.send(draft, Stage::RadarReplay)
     }
 
     /// Sleeps, and answers readers that have come; true when told to stop.
     fn sleep(&mut self, limit: Duration) -> Result<bool, StageError> {
-        let woken = self.launch.signals.wait(&[self.credit.poses.listener()], Some(self.scans.listener()), limit)?;
+        let woken = self.launch.signals.wait(
+            &[self.credit.poses.listener()],
+            Some(self.scans.listener()),
+            limit,
+        )?;
         self.statistics.wakes += 1;
         if woken.may_have_newcomers() {
             self.scans.greet()?;
@@ -299,7 +367,10 @@ impl<S: Source> Playback<'_, S> {
 
 /// When the sweep was complete on the sensor's clock: the time of its last azimuth.
 fn complete_ns(header: &ScanHeader) -> i64 {
-    let stamps = header.azimuth_stamp_ns.iter().take(header.azimuths as usize);
+    let stamps = header
+        .azimuth_stamp_ns
+        .iter()
+        .take(header.azimuths as usize);
     stamps.copied().max().unwrap_or(header.item.stamp_ns)
 }
 
@@ -309,16 +380,45 @@ mod tests {
 
     #[test]
     fn a_restart_begins_with_the_last_poses_scan() {
-        let sync = Item { seq: 9, published: 9, scan: 12, previous_scan: 10, ..Item::default() };
-        assert_eq!(Position::resume(&sync, 1), Position { index: 12, published: 9, previous: Some(10) });
-        assert_eq!(Position::resume(&sync, 2), Position { index: 10, published: 8, previous: None });
-        let base = Item { flags: flag::BASE, ..sync };
+        let sync = Item {
+            seq: 9,
+            published: 9,
+            scan: 12,
+            previous_scan: 10,
+            ..Item::default()
+        };
+        assert_eq!(
+            Position::resume(&sync, 1),
+            Position {
+                index: 12,
+                published: 9,
+                previous: Some(10)
+            }
+        );
+        assert_eq!(
+            Position::resume(&sync, 2),
+            Position {
+                index: 10,
+                published: 8,
+                previous: None
+            }
+        );
+        let base = Item {
+            flags: flag::BASE,
+            ..sync
+        };
         assert_eq!(Position::resume(&base, 1), Position::default());
     }
 
     #[test]
     fn a_restart_in_live_mode_goes_on_with_the_sources_own_count() {
-        let sync = Item { seq: 9, published: 31, scan: 40, previous_scan: 37, ..Item::default() };
+        let sync = Item {
+            seq: 9,
+            published: 31,
+            scan: 40,
+            previous_scan: 37,
+            ..Item::default()
+        };
         let position = Position::resume(&sync, 1);
         assert_eq!((position.index, position.item().published), (40, 31));
     }
@@ -326,19 +426,35 @@ mod tests {
     #[test]
     fn only_the_very_first_scan_starts_a_chain() {
         assert!(Position::default().item().is(flag::BREAK));
-        assert!(!Position { index: 12, published: 9, previous: None }.item().is(flag::BREAK));
+        assert!(
+            !Position {
+                index: 12,
+                published: 9,
+                previous: None
+            }
+            .item()
+            .is(flag::BREAK)
+        );
     }
 
     #[test]
     fn tempo_stretches_the_sensors_clock() {
-        let tempo = Tempo { rate: 4.0, start_ns: 1000, first_ns: 500 };
+        let tempo = Tempo {
+            rate: 4.0,
+            start_ns: 1000,
+            first_ns: 500,
+        };
         assert_eq!(tempo.due_ns(500 + 4000), 2000);
     }
 
     #[test]
     fn tempo_slips_by_what_a_scan_is_late_and_by_no_more() {
         let start_ns = clock::now_ns() - 1_000_000_000;
-        let mut tempo = Tempo { rate: 1.0, start_ns, first_ns: 0 };
+        let mut tempo = Tempo {
+            rate: 1.0,
+            start_ns,
+            first_ns: 0,
+        };
         assert!(tempo.slip(500_000_000) >= 500_000_000);
         assert!(tempo.due_ns(500_000_000) <= clock::now_ns());
         assert_eq!(tempo.slip(10_000_000_000), 0);

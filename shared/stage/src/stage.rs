@@ -30,10 +30,21 @@ pub trait Stage {
 pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<Statistics, StageError> {
     let inputs = S::Inputs::open(launch)?;
     let output = Writer::open(&launch.node, &launch.manifest)?;
-    let mut flow = Flow { stage, inputs, output, last_sent: None, ended: false, statistics: Statistics::default() };
+    let mut flow = Flow {
+        stage,
+        inputs,
+        output,
+        last_sent: None,
+        ended: false,
+        statistics: Statistics::default(),
+    };
     flow.drain()?;
     loop {
-        let woken = launch.signals.wait(&flow.inputs.listeners(), Some(flow.output.listener()), wake::NET)?;
+        let woken = launch.signals.wait(
+            &flow.inputs.listeners(),
+            Some(flow.output.listener()),
+            wake::NET,
+        )?;
         flow.statistics.wakes += 1;
         if woken.stop {
             flow.statistics.duplicates = flow.inputs.duplicates();
@@ -77,11 +88,18 @@ impl<S: Stage> Flow<'_, S> {
     fn process(&mut self, mut item: Item, received_ns: i64) -> Result<(), StageError> {
         self.promise(&item)?;
         let mut draft = self.output.loan()?;
-        let Some(view) = self.inputs.view() else { return Ok(()) };
+        let Some(view) = self.inputs.view() else {
+            return Ok(());
+        };
         let (started_ns, allocated) = (clock::now_ns(), allocations::so_far());
         self.stage.process(view, &mut draft)?;
         let (finished_ns, allocated) = (clock::now_ns(), allocations::so_far() - allocated);
-        *item.hop(S::HOP) = gyre_messages::Hop { received_ns, started_ns, finished_ns, published_ns: 0 };
+        *item.hop(S::HOP) = gyre_messages::Hop {
+            received_ns,
+            started_ns,
+            finished_ns,
+            published_ns: 0,
+        };
         *draft.header().item_mut() = item;
         self.statistics.record(allocated, finished_ns - started_ns);
         self.send(item.seq, draft)
@@ -91,7 +109,10 @@ impl<S: Stage> Flow<'_, S> {
         self.promise(&item)?;
         self.ended = true;
         let mut draft = self.output.loan()?;
-        *draft.header().item_mut() = Item { flags: flag::END, ..item };
+        *draft.header().item_mut() = Item {
+            flags: flag::END,
+            ..item
+        };
         self.send(item.seq, draft)
     }
 
@@ -104,9 +125,11 @@ impl<S: Stage> Flow<'_, S> {
     /// What a stage sends is consecutive: a hole in its history would kill each reader that is restarted on it.
     fn promise(&self, item: &Item) -> Result<(), StageError> {
         match self.last_sent.map(|last| last.saturating_add(1)) {
-            Some(expected) if item.seq != expected => {
-                Err(StageError::BrokenPromise { topic: S::Output::TOPIC, expected, got: item.seq })
-            }
+            Some(expected) if item.seq != expected => Err(StageError::BrokenPromise {
+                topic: S::Output::TOPIC,
+                expected,
+                got: item.seq,
+            }),
             _ => Ok(()),
         }
     }

@@ -35,13 +35,22 @@ const PATIENCE: Duration = Duration::from_secs(2);
 ///
 /// The signals are to be installed before the run's place in shared memory is taken: else one that comes in between would end
 /// the process with nobody left to clean up.
-pub fn supervise(plan: &Plan, signals: Signals, observe: &mut dyn FnMut(Event<'_>)) -> Result<Report, SuperviseError> {
+pub fn supervise(
+    plan: &Plan,
+    signals: Signals,
+    observe: &mut dyn FnMut(Event<'_>),
+) -> Result<Report, SuperviseError> {
     iceoryx2::prelude::set_log_level(iceoryx2::prelude::LogLevel::Fatal);
     let mut supervisor = Supervisor::new(plan, signals, observe)?;
     let ending = supervisor.start().and_then(|()| supervisor.watch());
     supervisor.stop()?;
     let (restarts, recovery) = (supervisor.restarts, supervisor.recovery);
-    Ok(Report { ending: ending?, restarts, recovery, statistics: statistics(plan) })
+    Ok(Report {
+        ending: ending?,
+        restarts,
+        recovery,
+        statistics: statistics(plan),
+    })
 }
 
 struct Supervisor<'a> {
@@ -70,7 +79,11 @@ struct Recovering {
 }
 
 impl<'a> Supervisor<'a> {
-    fn new(plan: &'a Plan, signals: Signals, observe: &'a mut dyn FnMut(Event<'_>)) -> Result<Self, SuperviseError> {
+    fn new(
+        plan: &'a Plan,
+        signals: Signals,
+        observe: &'a mut dyn FnMut(Event<'_>),
+    ) -> Result<Self, SuperviseError> {
         let manifest = &plan.manifest;
         let transport = manifest.transport()?;
         use_as_global(&manifest.root.join("iox.toml"))?;
@@ -98,7 +111,10 @@ impl<'a> Supervisor<'a> {
     fn start(&mut self) -> Result<(), SuperviseError> {
         for stage in &self.plan.stages {
             let child = Child::spawn(stage, &self.plan.manifest)?;
-            (self.observe)(Event::Started { stage: &stage.name, pid: child.pid() });
+            (self.observe)(Event::Started {
+                stage: &stage.name,
+                pid: child.pid(),
+            });
             self.children.push(child);
         }
         Ok(())
@@ -107,17 +123,25 @@ impl<'a> Supervisor<'a> {
     fn watch(&mut self) -> Result<Ending, SuperviseError> {
         self.last_progress = Instant::now();
         loop {
-            let woken = self.signals.wait(&[self.poses.listener()], None, wake::NET)?;
+            let woken = self
+                .signals
+                .wait(&[self.poses.listener()], None, wake::NET)?;
             if woken.stop {
                 return Ok(Ending::Interrupted);
             }
             if self.read_poses()? {
                 return Ok(Ending::Complete);
             }
-            let dead: Vec<usize> = (0..self.children.len()).filter(|i| self.children[*i].has_ended()).collect();
+            let dead: Vec<usize> = (0..self.children.len())
+                .filter(|i| self.children[*i].has_ended())
+                .collect();
             if !dead.is_empty() {
                 self.repair(&dead)?;
-            } else if self.plan.stall_timeout.is_some_and(|limit| self.last_progress.elapsed() > limit) {
+            } else if self
+                .plan
+                .stall_timeout
+                .is_some_and(|limit| self.last_progress.elapsed() > limit)
+            {
                 self.unstall()?;
             }
         }
@@ -130,7 +154,8 @@ impl<'a> Supervisor<'a> {
             if pose.item.is(flag::END) {
                 return Ok(true);
             }
-            let news = !pose.item.is(flag::BASE) && self.newest_pose.is_none_or(|newest| pose.item.seq > newest);
+            let news = !pose.item.is(flag::BASE)
+                && self.newest_pose.is_none_or(|newest| pose.item.seq > newest);
             if news {
                 self.newest_pose = Some(pose.item.seq);
                 self.last_progress = Instant::now();
@@ -150,10 +175,14 @@ impl<'a> Supervisor<'a> {
         for i in dead {
             let child = &mut self.children[*i];
             let death = child.death();
-            (self.observe)(Event::Died { stage: child.name(), death: &death });
+            (self.observe)(Event::Died {
+                stage: child.name(),
+                death: &death,
+            });
             child.may_restart(&death)?;
             everybody |= child.died_without_progress(self.newest_pose);
-            everybody |= self.plan.manifest.live && child.name() == gyre_messages::Stage::Masking.name();
+            everybody |=
+                self.plan.manifest.live && child.name() == gyre_messages::Stage::Masking.name();
             if !death.killed {
                 backoff = backoff.max(child.backoff());
             }
@@ -162,7 +191,11 @@ impl<'a> Supervisor<'a> {
         if !backoff.is_zero() {
             self.signals.wait(&[], None, backoff)?;
         }
-        let again: Vec<usize> = if everybody { self.generation(dead) } else { dead.to_vec() };
+        let again: Vec<usize> = if everybody {
+            self.generation(dead)
+        } else {
+            dead.to_vec()
+        };
         self.restart(&again, died_ns)?;
         (self.observe)(Event::Restarted { everybody });
         Ok(())
@@ -171,7 +204,9 @@ impl<'a> Supervisor<'a> {
     /// Everybody, but a live source that lives: the radar goes on turning.
     fn generation(&self, dead: &[usize]) -> Vec<usize> {
         let source = gyre_messages::Stage::RadarReplay.name();
-        let stays = |i: &usize| self.plan.manifest.live && self.children[*i].name() == source && !dead.contains(i);
+        let stays = |i: &usize| {
+            self.plan.manifest.live && self.children[*i].name() == source && !dead.contains(i)
+        };
         (0..self.children.len()).filter(|i| !stays(i)).collect()
     }
 
@@ -184,8 +219,14 @@ impl<'a> Supervisor<'a> {
         for i in again {
             let child = &mut self.children[*i];
             child.respawn(&self.plan.manifest, self.newest_pose)?;
-            let hop = gyre_messages::Stage::ALL.into_iter().find(|stage| stage.name() == child.name());
-            self.recovering.extend(hop.map(|hop| Recovering { hop, died_ns, started_ns: clock::now_ns() }));
+            let hop = gyre_messages::Stage::ALL
+                .into_iter()
+                .find(|stage| stage.name() == child.name());
+            self.recovering.extend(hop.map(|hop| Recovering {
+                hop,
+                died_ns,
+                started_ns: clock::now_ns(),
+            }));
         }
         self.last_progress = Instant::now();
         Ok(())
@@ -195,7 +236,9 @@ impl<'a> Supervisor<'a> {
     fn unstall(&mut self) -> Result<(), SuperviseError> {
         self.stalls_without_progress += 1;
         if self.stalls_without_progress > 2 {
-            return Err(SuperviseError::Stalled { after: self.plan.stall_timeout.unwrap_or_default() });
+            return Err(SuperviseError::Stalled {
+                after: self.plan.stall_timeout.unwrap_or_default(),
+            });
         }
         (self.observe)(Event::Stalled);
         self.restart(&self.generation(&[]), clock::now_ns())
@@ -214,12 +257,18 @@ impl<'a> Supervisor<'a> {
 }
 
 /// A stage has recovered when a pose comes that its new life has worked on; poses that were on their way do not count.
-fn note_recoveries(pose: &PoseHeader, recovering: &mut Vec<Recovering>, recovery: &mut Vec<Duration>) {
+fn note_recoveries(
+    pose: &PoseHeader,
+    recovering: &mut Vec<Recovering>,
+    recovery: &mut Vec<Duration>,
+) {
     let hops = pose.item().hops;
     recovering.retain(|stage| {
         let back = hops[stage.hop as usize].started_ns > stage.started_ns;
         if back {
-            recovery.push(Duration::from_nanos((clock::now_ns() - stage.died_ns).max(0) as u64));
+            recovery.push(Duration::from_nanos(
+                (clock::now_ns() - stage.died_ns).max(0) as u64,
+            ));
         }
         !back
     });
@@ -227,8 +276,12 @@ fn note_recoveries(pose: &PoseHeader, recovering: &mut Vec<Recovering>, recovery
 
 /// The transport cleans up after half-made nodes by its global configuration, not by the run's: they must be the same.
 fn use_as_global(path: &std::path::Path) -> Result<(), StageError> {
-    let failed = |reason: String| StageError::Manifest { path: path.to_owned(), reason };
-    let file = FilePath::new(path.as_os_str().as_encoded_bytes()).map_err(|e| failed(format!("{e:?}")))?;
+    let failed = |reason: String| StageError::Manifest {
+        path: path.to_owned(),
+        reason,
+    };
+    let file =
+        FilePath::new(path.as_os_str().as_encoded_bytes()).map_err(|e| failed(format!("{e:?}")))?;
     Config::setup_global_config_from_file(&file).map_err(|e| failed(format!("{e:?}")))?;
     Ok(())
 }
@@ -236,7 +289,8 @@ fn use_as_global(path: &std::path::Path) -> Result<(), StageError> {
 /// What the stages left of themselves at their orderly ends, by name.
 fn statistics(plan: &Plan) -> BTreeMap<String, Statistics> {
     let left = |stage: &StagePlan| {
-        let text = fs::read_to_string(plan.manifest.root.join(statistics::file_name(&stage.name))).ok()?;
+        let text =
+            fs::read_to_string(plan.manifest.root.join(statistics::file_name(&stage.name))).ok()?;
         Some((stage.name.clone(), serde_json::from_str(&text).ok()?))
     };
     plan.stages.iter().filter_map(left).collect()

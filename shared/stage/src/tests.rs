@@ -18,7 +18,12 @@ use crate::{
     writer::Writer,
 };
 
-const WINDOW: Window = Window { scans: 2, lag: 1, look_back: 1, live_depth: 0 };
+const WINDOW: Window = Window {
+    scans: 2,
+    lag: 1,
+    look_back: 1,
+    live_depth: 0,
+};
 
 /// A run without processes: its services, and nodes for whoever joins. Two of them never meet.
 struct Run {
@@ -39,7 +44,12 @@ impl Run {
             root: root.path().to_owned(),
             out: out.path().to_owned(),
             window: WINDOW,
-            limits: Limits { scan_bytes: 1000, raster_cells: 100, rasters: 1, points: 0 },
+            limits: Limits {
+                scan_bytes: 1000,
+                raster_cells: 100,
+                rasters: 1,
+                points: 0,
+            },
             live: false,
             refines: false,
             rate: None,
@@ -47,7 +57,13 @@ impl Run {
         manifest.write("").unwrap();
         let supervisor = node(&manifest);
         let services = Services::create(&supervisor, &manifest.window).unwrap();
-        Self { manifest, _services: services, _supervisor: supervisor, _root: root, _out: out }
+        Self {
+            manifest,
+            _services: services,
+            _supervisor: supervisor,
+            _root: root,
+            _out: out,
+        }
     }
 }
 
@@ -66,6 +82,10 @@ fn reader<M: Message>(manifest: &Manifest, next: Option<u64>) -> Reader<M> {
 /// A pose is the smallest message.
 fn send(poses: &Writer<Pose>, seq: u64, flags: u32) {
     let mut draft = poses.loan().unwrap();
-    draft.header().item = Item { seq, flags, ..Item::default() };
+    draft.header().item = Item {
+        seq,
+        flags,
+        ..Item::default()
+    };
     poses.send(draft, Stage::PoseIntegration).unwrap();
 }

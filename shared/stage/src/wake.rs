@@ -57,7 +57,8 @@ impl Woken {
 impl Signals {
     /// From here on SIGTERM, SIGINT, SIGHUP and SIGCHLD wake the process instead of ending it.
     pub fn install() -> Result<Self, StageError> {
-        let failed = |error: std::io::Error| StageError::transport("install the signal handlers", error);
+        let failed =
+            |error: std::io::Error| StageError::transport("install the signal handlers", error);
         let (stop, stop_end) = UnixStream::pair().map_err(failed)?;
         let (child, child_end) = UnixStream::pair().map_err(failed)?;
         for socket in [&stop, &child] {
@@ -67,7 +68,11 @@ impl Signals {
             pipe::register(signal, stop_end.try_clone().map_err(failed)?).map_err(failed)?;
         }
         pipe::register(consts::SIGCHLD, child_end).map_err(failed)?;
-        Ok(Self { stop, child, stopped: Cell::new(false) })
+        Ok(Self {
+            stop,
+            child,
+            stopped: Cell::new(false),
+        })
     }
 
     /// Sleeps until one of the listeners is notified, a signal comes or `limit` is over, whichever is first.
@@ -81,8 +86,14 @@ impl Signals {
     ) -> Result<Woken, StageError> {
         let mut polled = vec![self.stop.as_fd(), self.child.as_fd()];
         polled.extend(data.iter().copied().chain(hello).map(descriptor));
-        let mut polled: Vec<_> = polled.into_iter().map(|fd| PollFd::from_borrowed_fd(fd, PollFlags::IN)).collect();
-        let limit = Timespec { tv_sec: limit.as_secs() as i64, tv_nsec: i64::from(limit.subsec_nanos()) };
+        let mut polled: Vec<_> = polled
+            .into_iter()
+            .map(|fd| PollFd::from_borrowed_fd(fd, PollFlags::IN))
+            .collect();
+        let limit = Timespec {
+            tv_sec: limit.as_secs() as i64,
+            tv_nsec: i64::from(limit.subsec_nanos()),
+        };
         let timed_out = match poll(&mut polled, Some(&limit)) {
             Ok(ready) => ready == 0,
             Err(Errno::INTR) => false,
@@ -94,11 +105,18 @@ impl Signals {
         let (stop, child) = (next() && drain(&self.stop), next() && drain(&self.child));
         for listener in data {
             if next() {
-                listener.try_wait(|_| ()).map_err(|e| StageError::transport("read notifications", e))?;
+                listener
+                    .try_wait(|_| ())
+                    .map_err(|e| StageError::transport("read notifications", e))?;
             }
         }
         self.stopped.set(stop || self.stopped.get());
-        Ok(Woken { stop: self.stopped.get(), child, hello: next(), timed_out })
+        Ok(Woken {
+            stop: self.stopped.get(),
+            child,
+            hello: next(),
+            timed_out,
+        })
     }
 }
 
@@ -127,8 +145,14 @@ mod tests {
     fn a_request_to_stop_is_not_forgotten_by_the_next_sleep() {
         let (stop, mut signal) = UnixStream::pair().unwrap();
         let (child, _open) = UnixStream::pair().unwrap();
-        [&stop, &child].iter().for_each(|socket| socket.set_nonblocking(true).unwrap());
-        let signals = Signals { stop, child, stopped: Cell::new(false) };
+        [&stop, &child]
+            .iter()
+            .for_each(|socket| socket.set_nonblocking(true).unwrap());
+        let signals = Signals {
+            stop,
+            child,
+            stopped: Cell::new(false),
+        };
         let short = Duration::from_millis(1);
         assert!(!signals.wait(&[], None, short).unwrap().stop);
         signal.write_all(&[0]).unwrap();

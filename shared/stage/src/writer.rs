@@ -40,7 +40,12 @@ impl<M: Message> Writer<M> {
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
             .map_err(|e| StageError::transport(format!("publish {}", M::TOPIC), e))?;
-        Ok(Self { hello, data, publisher, elements })
+        Ok(Self {
+            hello,
+            data,
+            publisher,
+            elements,
+        })
     }
 
     /// A message to fill: its header is the default, its payload is whatever lies in the memory.
@@ -50,7 +55,9 @@ impl<M: Message> Writer<M> {
             .loan_slice_uninit(self.elements)
             .map_err(|e| StageError::transport(format!("get memory for {}", M::TOPIC), e))?;
         // SAFETY: the elements are `Pod`, so any bytes that mapped memory holds are valid values.
-        Ok(Draft { sample: unsafe { sample.assume_init() } })
+        Ok(Draft {
+            sample: unsafe { sample.assume_init() },
+        })
     }
 
     /// Hands a message over. The transport copies nothing: readers get its place.
@@ -58,7 +65,10 @@ impl<M: Message> Writer<M> {
         let item = draft.header().item_mut();
         item.pid = std::process::id();
         item.hop(hop).published_ns = clock::now_ns();
-        draft.sample.send().map_err(|e| StageError::transport(format!("send {}", M::TOPIC), e))?;
+        draft
+            .sample
+            .send()
+            .map_err(|e| StageError::transport(format!("send {}", M::TOPIC), e))?;
         self.notify()
     }
 
@@ -71,9 +81,9 @@ impl<M: Message> Writer<M> {
             .try_wait(|_| newcomer = true)
             .map_err(|e| StageError::transport(format!("hear the readers of {}", M::TOPIC), e))?;
         // In any case, for a greeting can be lost; its reader then finds the history when its own wait is over.
-        self.publisher
-            .update_connections()
-            .map_err(|e| StageError::transport(format!("connect the readers of {}", M::TOPIC), e))?;
+        self.publisher.update_connections().map_err(|e| {
+            StageError::transport(format!("connect the readers of {}", M::TOPIC), e)
+        })?;
         if newcomer { self.notify() } else { Ok(()) }
     }
 
@@ -83,7 +93,9 @@ impl<M: Message> Writer<M> {
     }
 
     fn notify(&self) -> Result<(), StageError> {
-        self.data.notify().map_err(|e| StageError::transport(format!("wake the readers of {}", M::TOPIC), e))?;
+        self.data
+            .notify()
+            .map_err(|e| StageError::transport(format!("wake the readers of {}", M::TOPIC), e))?;
         Ok(())
     }
 }
@@ -103,6 +115,9 @@ impl<M: Message> Draft<M> {
     pub fn parts<T: bytemuck::Pod>(&mut self) -> (&mut M::Header, &mut [T]) {
         // SAFETY: header and payload are separate parts of one sample that this draft owns alone.
         let header: *mut M::Header = self.sample.user_header_mut();
-        (unsafe { &mut *header }, bytemuck::cast_slice_mut(self.sample.payload_mut()))
+        (
+            unsafe { &mut *header },
+            bytemuck::cast_slice_mut(self.sample.payload_mut()),
+        )
     }
 }

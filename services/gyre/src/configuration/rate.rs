@@ -32,7 +32,9 @@ impl FromStr for Rate {
             "realtime" => Ok(Self::Factor(1.0)),
             _ => match text.parse() {
                 Ok(factor) if (0.001..=1000.0).contains(&factor) => Ok(Self::Factor(factor)),
-                _ => Err(format!("rate is `{text}`, but must be `max`, `realtime` or a factor from 0.001 to 1000")),
+                _ => Err(format!(
+                    "rate is `{text}`, but must be `max`, `realtime` or a factor from 0.001 to 1000"
+                )),
             },
         }
     }

@@ -11,7 +11,10 @@ use super::ConfigurationError;
 const ALIKE: f64 = 0.75;
 
 /// Takes a section out of the table; its defaults where it is missing.
-pub fn section<T: DeserializeOwned>(table: &mut Table, name: &str) -> Result<T, ConfigurationError> {
+pub fn section<T: DeserializeOwned>(
+    table: &mut Table,
+    name: &str,
+) -> Result<T, ConfigurationError> {
     let value = table.remove(name).unwrap_or_else(|| Table::new().into());
     read(name, value)
 }
@@ -26,7 +29,10 @@ pub fn sections<T: DeserializeOwned>(
     if let Some(key) = sections.keys().find(|key| !known.contains(&key.as_str())) {
         return Err(unknown(name, key, known));
     }
-    sections.into_iter().map(|(key, value)| Ok((key.clone(), read(&format!("{name}.{key}"), value)?))).collect()
+    sections
+        .into_iter()
+        .map(|(key, value)| Ok((key.clone(), read(&format!("{name}.{key}"), value)?)))
+        .collect()
 }
 
 /// The error for a key that nobody knows.
@@ -38,7 +44,11 @@ pub fn unknown(section: &str, key: &str, known: &[&str]) -> ConfigurationError {
         Some(name) => format!("; did you mean `{name}`?"),
         None => format!("; it knows {}", known.join(", ")),
     };
-    ConfigurationError::UnknownKey { section: section.to_owned(), key: key.to_owned(), suggestion }
+    ConfigurationError::UnknownKey {
+        section: section.to_owned(),
+        key: key.to_owned(),
+        suggestion,
+    }
 }
 
 /// Sets a key by a sentence `section.key=value`; the value is TOML, or else a plain string.
@@ -47,10 +57,17 @@ pub fn set(table: &mut Table, sentence: &str) -> Result<(), ConfigurationError> 
     let (path, value) = sentence.split_once('=').ok_or_else(refused)?;
     let value = value_of(value.trim());
     let mut keys: Vec<&str> = path.trim().split('.').collect();
-    let last = keys.pop().filter(|key| !key.is_empty() && !keys.is_empty()).ok_or_else(refused)?;
+    let last = keys
+        .pop()
+        .filter(|key| !key.is_empty() && !keys.is_empty())
+        .ok_or_else(refused)?;
     let mut place = table;
     for key in keys {
-        place = place.entry(key).or_insert_with(|| Table::new().into()).as_table_mut().ok_or_else(refused)?;
+        place = place
+            .entry(key)
+            .or_insert_with(|| Table::new().into())
+            .as_table_mut()
+            .ok_or_else(refused)?;
     }
     place.insert(last.to_owned(), value);
     Ok(())
@@ -58,17 +75,21 @@ pub fn set(table: &mut Table, sentence: &str) -> Result<(), ConfigurationError> 
 
 fn value_of(text: &str) -> Value {
     let parsed = format!("value = {text}").parse::<Table>().ok();
-    parsed.and_then(|mut table| table.remove("value")).unwrap_or_else(|| Value::String(text.to_owned()))
+    parsed
+        .and_then(|mut table| table.remove("value"))
+        .unwrap_or_else(|| Value::String(text.to_owned()))
 }
 
 fn read<T: DeserializeOwned>(section: &str, value: Value) -> Result<T, ConfigurationError> {
-    value.try_into().map_err(|error: toml::de::Error| match unknown_field(error.message()) {
-        Some((key, known)) => unknown(section, key, &known),
-        None => ConfigurationError::Value {
-            section: section.to_owned(),
-            reason: error.to_string().trim().replace('\n', " "),
+    value.try_into().map_err(
+        |error: toml::de::Error| match unknown_field(error.message()) {
+            Some((key, known)) => unknown(section, key, &known),
+            None => ConfigurationError::Value {
+                section: section.to_owned(),
+                reason: error.to_string().trim().replace('\n', " "),
+            },
         },
-    })
+    )
 }
 
 /// The key and the known ones, from serde's own words: unknown field `x`, expected one of `a`, `b`.
@@ -86,7 +107,11 @@ mod tests {
     #[test]
     fn overrides_are_toml_values_or_plain_strings() {
         let mut table = Table::new();
-        for sentence in ["masking.kind=none", "raster.n = 127", "stages.masking.command=['a', 'b']"] {
+        for sentence in [
+            "masking.kind=none",
+            "raster.n = 127",
+            "stages.masking.command=['a', 'b']",
+        ] {
             set(&mut table, sentence).unwrap();
         }
         assert_eq!(table["masking"]["kind"].as_str(), Some("none"));

@@ -10,11 +10,22 @@ fn from(text: &str) -> Result<Configuration, ConfigurationError> {
 #[test]
 fn an_unknown_key_names_itself_and_the_nearest_right_one() {
     let error = from("[masking]\ntreshold = 3").unwrap_err().to_string();
-    assert_eq!(error, "[masking] has no key `treshold`; did you mean `threshold`?");
+    assert_eq!(
+        error,
+        "[masking] has no key `treshold`; did you mean `threshold`?"
+    );
     let error = from("[maskin]\nkind = 'none'").unwrap_err().to_string();
-    assert_eq!(error, "[the configuration] has no key `maskin`; did you mean `masking`?");
-    let error = from("[stages.maskin]\ncommand = ['x']").unwrap_err().to_string();
-    assert_eq!(error, "[stages] has no key `maskin`; did you mean `masking`?");
+    assert_eq!(
+        error,
+        "[the configuration] has no key `maskin`; did you mean `masking`?"
+    );
+    let error = from("[stages.maskin]\ncommand = ['x']")
+        .unwrap_err()
+        .to_string();
+    assert_eq!(
+        error,
+        "[stages] has no key `maskin`; did you mean `masking`?"
+    );
 }
 
 #[test]
@@ -32,7 +43,10 @@ fn impossible_values_are_refused() {
         ("[run]\nmode = 'live'", "rate"),
         ("[run]\nrate = -1", "rate"),
         ("[simulation]\nscans = 0", "scans"),
-        ("[simulation]\noutput.format = 'boreas'\n[dataset]\nformat = 'oxford'", "output.format is boreas"),
+        (
+            "[simulation]\noutput.format = 'boreas'\n[dataset]\nformat = 'oxford'",
+            "output.format is boreas",
+        ),
         ("[simulation]\n[dataset]\nformat = 'fomo'", "fomo"),
     ] {
         let error = from(text).unwrap_err().to_string();
@@ -43,22 +57,43 @@ fn impossible_values_are_refused() {
 #[test]
 fn a_simulation_has_the_form_that_the_dataset_is_read_in() {
     let format = |text: &str| from(text).unwrap().simulation.unwrap().output.format;
-    assert_eq!(format("[simulation]\n[dataset]\nformat = 'boreas-rt'"), Some(OutputFormat::Boreas));
+    assert_eq!(
+        format("[simulation]\n[dataset]\nformat = 'boreas-rt'"),
+        Some(OutputFormat::Boreas)
+    );
     assert_eq!(format("[simulation]"), None);
 }
 
 #[test]
 fn one_line_chooses_the_search_and_another_the_refinement() {
     let names = |text: &str| -> Vec<String> {
-        from(text).unwrap().stage_plans(Path::new("gyre")).into_iter().map(|plan| plan.name).collect()
+        from(text)
+            .unwrap()
+            .stage_plans(Path::new("gyre"))
+            .into_iter()
+            .map(|plan| plan.name)
+            .collect()
     };
-    let (source, halves) = (["radar-replay", "masking"], ["rotation-search", "translation-search"]);
-    let (joint, refined, searched) = (["joint-search"], ["refinement", "pose-integration"], ["pose-integration"]);
+    let (source, halves) = (
+        ["radar-replay", "masking"],
+        ["rotation-search", "translation-search"],
+    );
+    let (joint, refined, searched) = (
+        ["joint-search"],
+        ["refinement", "pose-integration"],
+        ["pose-integration"],
+    );
     assert_eq!(names(""), [&source[..], &halves, &refined].concat());
-    assert_eq!(names("[refinement]\nkind = 'none'"), [&source[..], &halves, &searched].concat());
+    assert_eq!(
+        names("[refinement]\nkind = 'none'"),
+        [&source[..], &halves, &searched].concat()
+    );
     let exhaustive = "[search]\nkind = 'exhaustive'\n";
     assert_eq!(names(exhaustive), [&source[..], &joint, &refined].concat());
-    assert_eq!(names(&format!("{exhaustive}[refinement]\nkind = 'none'")), [&source[..], &joint, &searched].concat());
+    assert_eq!(
+        names(&format!("{exhaustive}[refinement]\nkind = 'none'")),
+        [&source[..], &joint, &searched].concat()
+    );
 }
 
 #[test]

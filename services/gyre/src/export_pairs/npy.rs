@@ -36,8 +36,14 @@ impl NpyWriter {
     pub fn create(path: &Path, dtype: &str, record_bytes: usize) -> io::Result<Self> {
         let partial = path.with_added_extension(PARTIAL);
         let file = BufWriter::with_capacity(BUFFER_BYTES, File::create(&partial)?);
-        let mut writer =
-            Self { file, path: path.to_owned(), partial, dtype: dtype.to_owned(), record_bytes, records: 0 };
+        let mut writer = Self {
+            file,
+            path: path.to_owned(),
+            partial,
+            dtype: dtype.to_owned(),
+            record_bytes,
+            records: 0,
+        };
         writer.file.write_all(&header(dtype, 0))?;
         Ok(writer)
     }
@@ -48,7 +54,11 @@ impl NpyWriter {
     /// A record of another length than was told, as `InvalidInput`, or what the operating system says.
     pub fn append(&mut self, record: &[u8]) -> io::Result<()> {
         if record.len() != self.record_bytes {
-            let reason = format!("a record has {} bytes: expected {}", record.len(), self.record_bytes);
+            let reason = format!(
+                "a record has {} bytes: expected {}",
+                record.len(),
+                self.record_bytes
+            );
             return Err(io::Error::new(io::ErrorKind::InvalidInput, reason));
         }
         self.records += 1;
@@ -77,7 +87,9 @@ impl Drop for NpyWriter {
 
 /// The header of an array of so many records; as long for any number of them.
 fn header(dtype: &str, records: u64) -> Vec<u8> {
-    let dictionary = |records: u64| format!("{{'descr': {dtype}, 'fortran_order': False, 'shape': ({records},), }}");
+    let dictionary = |records: u64| {
+        format!("{{'descr': {dtype}, 'fortran_order': False, 'shape': ({records},), }}")
+    };
     let longest = dictionary(u64::MAX).len() + "\n".len();
     let length = (PREFIX_BYTES + longest).next_multiple_of(ALIGNMENT) - PREFIX_BYTES;
     let mut header = b"\x93NUMPY\x01\x00".to_vec();
@@ -100,8 +112,12 @@ mod tests {
             assert_eq!(header.len(), header_bytes());
             assert_eq!(header.len() % ALIGNMENT, 0);
             assert_eq!(&header[..8], b"\x93NUMPY\x01\x00");
-            assert_eq!(usize::from(u16::from_le_bytes([header[8], header[9]])), header.len() - PREFIX_BYTES);
-            let dictionary = format!("{{'descr': {DTYPE}, 'fortran_order': False, 'shape': ({records},), }}");
+            assert_eq!(
+                usize::from(u16::from_le_bytes([header[8], header[9]])),
+                header.len() - PREFIX_BYTES
+            );
+            let dictionary =
+                format!("{{'descr': {DTYPE}, 'fortran_order': False, 'shape': ({records},), }}");
             let text = std::str::from_utf8(&header[PREFIX_BYTES..]).unwrap();
             assert_eq!(text.trim_end_matches(' ').trim_end(), dictionary);
             assert!(text.ends_with('\n'));

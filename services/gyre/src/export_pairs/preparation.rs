@@ -6,7 +6,9 @@ use std::collections::VecDeque;
 use gyre_masking::{MaskError, MaskKind, Masker, MaskerError, Sweep};
 use gyre_messages::SearchedMotion;
 use gyre_radar::PolarScan;
-use gyre_scan_matching::{ConfigError, PolarSpectrum, RotationSearch, ShapeError, TranslationSearch};
+use gyre_scan_matching::{
+    ConfigError, PolarSpectrum, RotationSearch, ShapeError, TranslationSearch,
+};
 use half::{f16, slice::HalfFloatSliceExt};
 use nalgebra::Isometry2;
 use thiserror::Error;
@@ -80,12 +82,19 @@ impl Preparation {
         }
         let rotation = RotationSearch::new(raster.n, &configuration.rotation)?;
         let cells = raster.n * raster.n;
-        let view = || View { cells: vec![0.0; cells], spectrum: rotation.new_spectrum() };
+        let view = || View {
+            cells: vec![0.0; cells],
+            spectrum: rotation.new_spectrum(),
+        };
         let (later, earlier) = (view(), view());
         Ok(Self {
             masker: Masker::new(raster, &configuration.points, masking)?,
             rotation,
-            translation: TranslationSearch::new(raster.n, raster.cell_m.into(), &configuration.translation)?,
+            translation: TranslationSearch::new(
+                raster.n,
+                raster.cell_m.into(),
+                &configuration.translation,
+            )?,
             lag: masking.feedback_lag(),
             rounded: vec![f16::ZERO; cells],
             later,
@@ -114,7 +123,11 @@ impl Preparation {
         pose: Isometry2<f64>,
         sequence: u32,
     ) -> Result<Record<'_>, PreparationError> {
-        let sweep = Sweep { number: 0, scan: *scan, motion: self.known_motion() };
+        let sweep = Sweep {
+            number: 0,
+            scan: *scan,
+            motion: self.known_motion(),
+        };
         let twist = self.masker.mask(&sweep, None, &mut self.later.cells)?;
         // What is learnt from is the file, so what is searched is what the file says.
         self.rounded.convert_from_f32_slice(&self.later.cells);
@@ -125,9 +138,15 @@ impl Preparation {
         Ok(Record {
             raster: &self.rounded,
             searched: searched.unwrap_or([f64::NAN; 3]),
-            pose: [pose.translation.x, pose.translation.y, pose.rotation.angle()],
+            pose: [
+                pose.translation.x,
+                pose.translation.y,
+                pose.rotation.angle(),
+            ],
             time_s: stamp_ns as f64 * 1e-9,
-            twist: twist.map_or([0.0; 3], |t| [t.vx_mps as f32, t.vy_mps as f32, t.yaw_rate_radps as f32]),
+            twist: twist.map_or([0.0; 3], |t| {
+                [t.vx_mps as f32, t.vy_mps as f32, t.yaw_rate_radps as f32]
+            }),
             sequence,
         })
     }
@@ -152,7 +171,9 @@ impl Preparation {
             return Ok(None);
         }
         let rotation = self.rotation.search(&later.spectrum, &earlier.spectrum)?;
-        let motion = self.translation.search(&later.cells, &earlier.cells, &rotation)?;
+        let motion = self
+            .translation
+            .search(&later.cells, &earlier.cells, &rotation)?;
         Ok(Some([motion.x_m, motion.y_m, motion.yaw_rad]))
     }
 

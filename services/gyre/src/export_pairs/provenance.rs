@@ -25,7 +25,11 @@ pub fn place(pairs: &Path) -> PathBuf {
 /// Refuses a name that is no `.npy` file's, or beside which another file is in the way: a configuration, say.
 pub fn check_place(pairs: &Path) -> Result<(), Failure> {
     if pairs.extension().is_none_or(|extension| extension != "npy") {
-        return Err(format!("--out {}: the file's name must end in .npy", pairs.display()).into());
+        return Err(format!(
+            "--out {}: the file's name must end in .npy",
+            pairs.display()
+        )
+        .into());
     }
     let beside = place(pairs);
     match fs::read(&beside) {

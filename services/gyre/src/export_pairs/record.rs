@@ -65,6 +65,9 @@ mod tests {
         assert_eq!(bytes[..2], [0x00, 0x3c]);
         assert_eq!(bytes[18 + 24..][..8], 1.0_f64.to_le_bytes());
         assert_eq!(bytes[18 + 48..][..8], 4.0_f64.to_le_bytes());
-        assert_eq!(bytes[bytes.len() - 8..], [7.0_f32.to_le_bytes(), 8_u32.to_le_bytes()].concat());
+        assert_eq!(
+            bytes[bytes.len() - 8..],
+            [7.0_f32.to_le_bytes(), 8_u32.to_le_bytes()].concat()
+        );
     }
 }

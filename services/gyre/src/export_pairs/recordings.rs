@@ -55,7 +55,11 @@ pub fn configurations(arguments: &ExportPairsArguments) -> Result<Vec<Configurat
         )
         .into());
     }
-    Ok(arguments.data.iter().map(|data| common.clone().streaming(Some(data))).collect())
+    Ok(arguments
+        .data
+        .iter()
+        .map(|data| common.clone().streaming(Some(data)))
+        .collect())
 }
 
 impl Recording {
@@ -70,8 +74,16 @@ impl Recording {
             (Some(tum), None) => Truth::simulated(&tum),
             _ => Truth::read(configuration),
         }?;
-        let origin = Origin { data: configuration.data(), format: dataset.format(), truth };
-        Ok(Self { dataset, played, origin })
+        let origin = Origin {
+            data: configuration.data(),
+            format: dataset.format(),
+            truth,
+        };
+        Ok(Self {
+            dataset,
+            played,
+            origin,
+        })
     }
 }
 
@@ -80,7 +92,10 @@ impl Origin {
     pub fn name(&self) -> String {
         let folder = Path::new(&self.data).canonicalize().ok();
         let name = folder.as_deref().and_then(Path::file_name);
-        name.map_or_else(|| self.data.clone(), |name| name.to_string_lossy().into_owned())
+        name.map_or_else(
+            || self.data.clone(),
+            |name| name.to_string_lossy().into_owned(),
+        )
     }
 }
 
@@ -94,14 +109,21 @@ impl Truth {
 
     /// The truth that was named, or what lies beside the recording.
     fn read(configuration: &Configuration) -> Result<Self, Failure> {
-        let (named, data) = (configuration.run.ground_truth.clone(), &configuration.source.data);
+        let (named, data) = (
+            configuration.run.ground_truth.clone(),
+            &configuration.source.data,
+        );
         let path = named.or_else(|| find_ground_truth(data)).ok_or_else(|| {
             let data = data.display();
             format!("{data} has no ground truth, and masks are trained by true poses: name it with --ground-truth")
         })?;
         let trajectory = read_trajectory(&path)?;
         let lacks = |what: &str| {
-            Err(format!("{} has no {what}, and masks are trained by poses at the scans' times", path.display()).into())
+            Err(format!(
+                "{} has no {what}, and masks are trained by poses at the scans' times",
+                path.display()
+            )
+            .into())
         };
         match () {
             () if trajectory.span_ns().is_none() => lacks("times"),
@@ -112,8 +134,13 @@ impl Truth {
 
     /// The pose at a time, in the truth's own frame; `None` before the first, after the last, and in gaps.
     pub fn pose(&self, stamp_ns: i64) -> Option<Isometry2<f64>> {
-        let in_gap = self.trajectory.gap_ns(stamp_ns).is_some_and(|gap_ns| gap_ns > WIDEST_GAP_NS);
-        self.trajectory.near(stamp_ns, ROUNDING_NS).filter(|_| !in_gap)
+        let in_gap = self
+            .trajectory
+            .gap_ns(stamp_ns)
+            .is_some_and(|gap_ns| gap_ns > WIDEST_GAP_NS);
+        self.trajectory
+            .near(stamp_ns, ROUNDING_NS)
+            .filter(|_| !in_gap)
     }
 }
 
@@ -126,11 +153,27 @@ mod tests {
     #[test]
     fn poses_are_known_up_to_rounding_and_not_in_gaps() {
         let stamp_ns = Some(vec![1_000_000_000, 2_000_000_000, 3_000_000_001]);
-        let poses = [1.0, 2.0, 3.0].map(|x| Isometry2::new(Vector2::new(x, 0.0), 0.0)).to_vec();
-        let truth = Truth { path: PathBuf::new(), trajectory: Trajectory { stamp_ns, poses } };
+        let poses = [1.0, 2.0, 3.0]
+            .map(|x| Isometry2::new(Vector2::new(x, 0.0), 0.0))
+            .to_vec();
+        let truth = Truth {
+            path: PathBuf::new(),
+            trajectory: Trajectory { stamp_ns, poses },
+        };
         let x = |stamp_ns| truth.pose(stamp_ns).map(|pose| pose.translation.x);
         assert_eq!([x(999_000_000), x(1_500_000_000)], [Some(1.0), Some(1.5)]);
-        assert_eq!([x(2_000_000_000), x(3_000_000_001), x(3_001_000_001)], [Some(2.0), Some(3.0), Some(3.0)]);
-        assert_eq!([x(998_999_999), x(2_000_000_001), x(2_500_000_000), x(3_001_000_002)], [None; 4]);
+        assert_eq!(
+            [x(2_000_000_000), x(3_000_000_001), x(3_001_000_001)],
+            [Some(2.0), Some(3.0), Some(3.0)]
+        );
+        assert_eq!(
+            [
+                x(998_999_999),
+                x(2_000_000_001),
+                x(2_500_000_000),
+                x(3_001_000_002)
+            ],
+            [None; 4]
+        );
     }
 }

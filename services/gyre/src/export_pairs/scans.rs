@@ -31,7 +31,9 @@ pub fn for_each_scan(
         scope.spawn(move || {
             // Either end hangs up when there is nothing more to do.
             for (index, mut scan) in scans.zip(to_fill) {
-                let read = dataset.read(index, scan.slot()).map(|geometry| scan.geometry = geometry);
+                let read = dataset
+                    .read(index, scan.slot())
+                    .map(|geometry| scan.geometry = geometry);
                 if decoded.send((index, scan, read)).is_err() {
                     break;
                 }
@@ -54,7 +56,11 @@ mod tests {
     use super::*;
 
     fn drive() -> Box<dyn Dataset> {
-        let recording = Recording::new(&SimulationConfig { scans: 7, ..SimulationConfig::default() }).unwrap();
+        let recording = Recording::new(&SimulationConfig {
+            scans: 7,
+            ..SimulationConfig::default()
+        })
+        .unwrap();
         let options = recording.dataset_options();
         open_source(Box::new(recording.renderer()), &options).unwrap()
     }
@@ -79,8 +85,15 @@ mod tests {
         let mut shown = 0;
         let failed = for_each_scan(drive().as_mut(), 0..7, |index, _| {
             shown += 1;
-            if index < 2 { Ok(()) } else { Err("enough".into()) }
+            if index < 2 {
+                Ok(())
+            } else {
+                Err("enough".into())
+            }
         });
-        assert_eq!((failed.unwrap_err().to_string().as_str(), shown), ("enough", 3));
+        assert_eq!(
+            (failed.unwrap_err().to_string().as_str(), shown),
+            ("enough", 3)
+        );
     }
 }

@@ -49,7 +49,11 @@ pub struct Link {
 
 impl Link {
     pub fn sweep(&self) -> Sweep<'_> {
-        Sweep { number: self.number as u64, scan: self.scan.view(), motion: self.motion }
+        Sweep {
+            number: self.number as u64,
+            scan: self.scan.view(),
+            motion: self.motion,
+        }
     }
 }
 
@@ -59,11 +63,19 @@ impl Chain {
     /// # Errors
     /// A setting that is out of its bounds, a network that cannot be used.
     pub fn new(configuration: &Configuration, dataset: Box<dyn Dataset>) -> Result<Self, Failure> {
-        let (raster, points, masking) = (&configuration.raster, &configuration.points, &configuration.masking);
+        let (raster, points, masking) = (
+            &configuration.raster,
+            &configuration.points,
+            &configuration.masking,
+        );
         let masker = Masker::new(raster, points, masking)?;
         let room = masker.rasters() * MaskedHeader::raster_values(raster.n * raster.n);
         let scan = OwnedScan::with_limits(dataset.limits());
-        let link = || Link { number: 0, scan: scan.clone(), motion: None };
+        let link = || Link {
+            number: 0,
+            scan: scan.clone(),
+            motion: None,
+        };
         Ok(Self {
             next: configuration.played(dataset.len()).start,
             search: search(configuration, masker.rasters())?,
@@ -90,12 +102,19 @@ impl Chain {
             self.step(before)?;
         }
         self.next = number + 1;
-        let Some(twist) = self.step(number)? else { return Ok(None) };
+        let Some(twist) = self.step(number)? else {
+            return Ok(None);
+        };
         let [now, before] = &self.links;
         // Where the chain starts a scan is its own scan before.
         let before = if self.seq == 1 { now } else { before };
         let scans = &[now, before][..self.masker.rasters()];
-        Ok(Some(self.exposer.expose(&mut self.masker, scans, &self.masked[0], twist)?))
+        Ok(Some(self.exposer.expose(
+            &mut self.masker,
+            scans,
+            &self.masked[0],
+            twist,
+        )?))
     }
 
     /// Masks a scan and finds its motion. `None`: it cannot be read, and the chain steps over it as a run does.
@@ -112,16 +131,37 @@ impl Chain {
         let [now, before] = &mut self.links;
         std::mem::swap(&mut now.scan, &mut self.spare);
         now.number = number;
-        now.motion = if self.motions.len() == self.lag { self.motions.pop_front().flatten() } else { None };
+        now.motion = if self.motions.len() == self.lag {
+            self.motions.pop_front().flatten()
+        } else {
+            None
+        };
         let earlier = (self.seq > 0).then(|| before.sweep());
         let failed = |error: &dyn std::error::Error| format!("scan {number}: {error}");
-        let twist = self.masker.mask(&now.sweep(), earlier.as_ref(), &mut self.masked[0]);
+        let twist = self
+            .masker
+            .mask(&now.sweep(), earlier.as_ref(), &mut self.masked[0]);
         let twist = twist.map_err(|error| failed(&error))?;
-        let pair = pair(&self.masked, self.masker.rasters(), self.exposer.cells(), self.seq == 0);
-        let motion = (self.search)(self.seq, pair).map_err(|error| failed(&error))?.as_searched();
-        let interval_ns = now.scan.geometry.stamp_ns.saturating_sub(before.scan.geometry.stamp_ns);
+        let pair = pair(
+            &self.masked,
+            self.masker.rasters(),
+            self.exposer.cells(),
+            self.seq == 0,
+        );
+        let motion = (self.search)(self.seq, pair)
+            .map_err(|error| failed(&error))?
+            .as_searched();
+        let interval_ns = now
+            .scan
+            .geometry
+            .stamp_ns
+            .saturating_sub(before.scan.geometry.stamp_ns);
         if self.lag > 0 {
-            self.motions.push_back((self.seq > 0).then_some(SearchedMotion { interval_ns, ..motion }));
+            self.motions
+                .push_back((self.seq > 0).then_some(SearchedMotion {
+                    interval_ns,
+                    ..motion
+                }));
         }
         self.seq += 1;
         Ok(Some(twist))
@@ -129,7 +169,19 @@ impl Chain {
 }
 
 /// The rasters to search: where the mask looks at two scans, both are its of this pair.
-fn pair<'a>([masked, masked_before]: &'a [Vec<f32>; 2], rasters: usize, cells: usize, begins: bool) -> Pair<'a> {
-    let earlier = if rasters == 2 { &masked[masked.len() / 2..] } else { masked_before };
-    Pair { later: &masked[..cells], earlier: (!begins).then_some(&earlier[..cells]) }
+fn pair<'a>(
+    [masked, masked_before]: &'a [Vec<f32>; 2],
+    rasters: usize,
+    cells: usize,
+    begins: bool,
+) -> Pair<'a> {
+    let earlier = if rasters == 2 {
+        &masked[masked.len() / 2..]
+    } else {
+        masked_before
+    };
+    Pair {
+        later: &masked[..cells],
+        earlier: (!begins).then_some(&earlier[..cells]),
+    }
 }

@@ -48,10 +48,18 @@ impl Canvas {
         let scale = (SIDE / exposure.n).max(1);
         let step = exposure.n * scale + MARGIN;
         let (width, height) = (4 * step + MARGIN, rows.len() * step + MARGIN);
-        let mut canvas = Self { width, pixels: vec![AROUND; width * height] };
+        let mut canvas = Self {
+            width,
+            pixels: vec![AROUND; width * height],
+        };
         for (row, panels) in rows.iter().enumerate() {
             for (column, panel) in panels.iter().enumerate() {
-                canvas.place(panel, exposure.n, scale, [MARGIN + row * step, MARGIN + column * step]);
+                canvas.place(
+                    panel,
+                    exposure.n,
+                    scale,
+                    [MARGIN + row * step, MARGIN + column * step],
+                );
             }
         }
         canvas.mark_points(exposure, scale, [MARGIN, MARGIN + 3 * step]);
@@ -61,7 +69,14 @@ impl Canvas {
     /// Pictures of one width below each other.
     pub fn stack(pictures: &[Self]) -> Self {
         let width = pictures.first().map_or(0, |picture| picture.width);
-        Self { width, pixels: pictures.iter().flat_map(|picture| &picture.pixels).copied().collect() }
+        Self {
+            width,
+            pixels: pictures
+                .iter()
+                .flat_map(|picture| &picture.pixels)
+                .copied()
+                .collect(),
+        }
     }
 
     /// Writes it as PNG.
@@ -75,7 +90,11 @@ impl Canvas {
     /// Draws `n` x `n` cells, each as a square of `scale` pixels a side.
     fn place(&mut self, cells: &[Colour], n: usize, scale: usize, corner: [usize; 2]) {
         for (cell, colour) in cells.iter().enumerate() {
-            self.square([corner[0] + cell / n * scale, corner[1] + cell % n * scale], scale, *colour);
+            self.square(
+                [corner[0] + cell / n * scale, corner[1] + cell % n * scale],
+                scale,
+                *colour,
+            );
         }
     }
 
@@ -90,7 +109,10 @@ impl Canvas {
         let mut points = exposure.points.clone();
         points.sort_by(|a, b| a.1.total_cmp(&b.1));
         for (cell, factor) in points {
-            let place = [corner[0] + cell / exposure.n * scale, corner[1] + cell % exposure.n * scale];
+            let place = [
+                corner[0] + cell / exposure.n * scale,
+                corner[1] + cell % exposure.n * scale,
+            ];
             self.square(place, scale + 1, colour(factor));
         }
     }
@@ -98,7 +120,9 @@ impl Canvas {
 
 /// The panels of a raster, without the points.
 fn panels(view: &View) -> [Vec<Colour>; 4] {
-    let draw = |cells: &[f32], colour: &dyn Fn(f32) -> Colour| cells.iter().map(|value| colour(*value)).collect();
+    let draw = |cells: &[f32], colour: &dyn Fn(f32) -> Colour| {
+        cells.iter().map(|value| colour(*value)).collect()
+    };
     let brightest = exceeded_by(BRIGHTEST, &view.masked).max(f32::MIN_POSITIVE);
     [
         draw(&view.whole, &|power| colour(power / BRIGHT)),
@@ -138,8 +162,16 @@ mod tests {
     #[test]
     fn colours_run_from_dark_to_bright() {
         assert_eq!((colour(-1.0), colour(0.0)), (COLOURS[0], COLOURS[0]));
-        assert_eq!((colour(0.5), colour(1.0), colour(9.0)), (COLOURS[4], COLOURS[8], COLOURS[8]));
-        let brightness = |share: usize| colour(share as f32 / 16.0).map(u32::from).iter().sum::<u32>();
+        assert_eq!(
+            (colour(0.5), colour(1.0), colour(9.0)),
+            (COLOURS[4], COLOURS[8], COLOURS[8])
+        );
+        let brightness = |share: usize| {
+            colour(share as f32 / 16.0)
+                .map(u32::from)
+                .iter()
+                .sum::<u32>()
+        };
         assert!((0..16).all(|share| brightness(share) < brightness(share + 1)));
     }
 
@@ -147,7 +179,11 @@ mod tests {
     fn the_brightest_colour_goes_to_a_share_of_the_cells() {
         let cells: Vec<f32> = (0..2000).map(|cell| (cell * 7 % 2000) as f32).collect();
         assert_eq!(
-            (exceeded_by(1e-3, &cells), exceeded_by(0.0, &cells), exceeded_by(0.5, &[3.0])),
+            (
+                exceeded_by(1e-3, &cells),
+                exceeded_by(0.0, &cells),
+                exceeded_by(0.5, &[3.0])
+            ),
             (1997.0, 1999.0, 3.0)
         );
     }
@@ -160,10 +196,23 @@ mod tests {
             masked: vec![0.5 * power; 16],
             above_floor: 16.0,
         };
-        let exposure = |views: Vec<View>| Exposure { number: 0, n: 4, views, points: vec![(15, 1.0)], twist: None };
-        let [one, two] = [vec![view(30.0)], vec![view(30.0), view(120.0)]].map(|views| Canvas::of(&exposure(views)));
-        assert_eq!((one.width, one.pixels.len() / one.width), (4 * 256 + 5 * MARGIN, 256 + 2 * MARGIN));
-        assert_eq!((two.width, two.pixels.len() / two.width), (one.width, 2 * 256 + 3 * MARGIN));
+        let exposure = |views: Vec<View>| Exposure {
+            number: 0,
+            n: 4,
+            views,
+            points: vec![(15, 1.0)],
+            twist: None,
+        };
+        let [one, two] = [vec![view(30.0)], vec![view(30.0), view(120.0)]]
+            .map(|views| Canvas::of(&exposure(views)));
+        assert_eq!(
+            (one.width, one.pixels.len() / one.width),
+            (4 * 256 + 5 * MARGIN, 256 + 2 * MARGIN)
+        );
+        assert_eq!(
+            (two.width, two.pixels.len() / two.width),
+            (one.width, 2 * 256 + 3 * MARGIN)
+        );
         let at = |canvas: &Canvas, row: usize, panel: usize| {
             canvas.pixels[row * canvas.width + MARGIN + panel * (256 + MARGIN)]
         };
@@ -175,6 +224,9 @@ mod tests {
         assert_eq!(at(&one, MARGIN - 1, 0), AROUND);
         // The last cell's dot.
         let end = (MARGIN + 255) * one.width + MARGIN + 3 * (256 + MARGIN) + 255;
-        assert_eq!((one.pixels[end], Canvas::stack(&[one]).pixels.len()), (colour(1.0), 268 * 1054));
+        assert_eq!(
+            (one.pixels[end], Canvas::stack(&[one]).pixels.len()),
+            (colour(1.0), 268 * 1054)
+        );
     }
 }

@@ -63,7 +63,10 @@ pub struct Exposer {
 impl Exposer {
     pub fn new(configuration: &Configuration) -> Result<Self, MaskerError> {
         let masker = |kind| {
-            let masking = MaskingConfig { kind, ..configuration.masking.clone() };
+            let masking = MaskingConfig {
+                kind,
+                ..configuration.masking.clone()
+            };
             Masker::new(&configuration.raster, &configuration.points, &masking)
         };
         let floor = configuration.masking.floor();
@@ -71,7 +74,14 @@ impl Exposer {
         Ok(Self {
             n: configuration.raster.n,
             floor,
-            bare: [masker(MaskKind::None)?, masker(if floor == 0 { MaskKind::None } else { MaskKind::Threshold })?],
+            bare: [
+                masker(MaskKind::None)?,
+                masker(if floor == 0 {
+                    MaskKind::None
+                } else {
+                    MaskKind::Threshold
+                })?,
+            ],
             points: [points.clone(), points],
         })
     }
@@ -92,14 +102,28 @@ impl Exposer {
         let places = masked.chunks(MaskedHeader::raster_values(self.cells()));
         let factors = (0..scans.len()).map(|scan| Some(&masker.factors()?[scan * self.cells()..]));
         let factors: Vec<Option<&[f32]>> = factors.collect();
-        let views =
-            scans.iter().zip(places).zip(factors).map(|((scan, masked), factors)| self.view(scan, masked, factors));
+        let views = scans
+            .iter()
+            .zip(places)
+            .zip(factors)
+            .map(|((scan, masked), factors)| self.view(scan, masked, factors));
         let views = views.collect::<Result<_, _>>()?;
         let points = self.points(masker, scans[0], twist)?;
-        Ok(Exposure { number: scans[0].number, n: self.n, views, points, twist })
+        Ok(Exposure {
+            number: scans[0].number,
+            n: self.n,
+            views,
+            points,
+            twist,
+        })
     }
 
-    fn view(&mut self, scan: &Link, masked: &[f32], factors: Option<&[f32]>) -> Result<View, MaskError> {
+    fn view(
+        &mut self,
+        scan: &Link,
+        masked: &[f32],
+        factors: Option<&[f32]>,
+    ) -> Result<View, MaskError> {
         let cells = self.cells();
         let [mut whole, mut above_floor] = [(); 2].map(|()| vec![0.0; cells]);
         for (masker, raster) in self.bare.iter_mut().zip([&mut whole, &mut above_floor]) {
@@ -110,7 +134,12 @@ impl Exposer {
             false => 0.0,
         };
         let mask = (0..cells).map(counts).collect();
-        Ok(View { whole, mask, masked: masked[..cells].to_vec(), above_floor: sum(&above_floor) })
+        Ok(View {
+            whole,
+            mask,
+            masked: masked[..cells].to_vec(),
+            above_floor: sum(&above_floor),
+        })
     }
 
     /// Where the points are, and what the network makes of their weights.
@@ -123,8 +152,14 @@ impl Exposer {
         let [plain, weighed] = &mut self.points;
         let count = self.bare[1].points(&scan.sweep().scan, twist, plain)?;
         masker.points(&scan.sweep().scan, twist, weighed)?;
-        let factor = |(plain, weighed): (&Point, &Point)| Some((masker.cell_of(plain, twist)?, weighed[3] / plain[3]));
-        Ok(plain[..count].iter().zip(weighed.iter()).filter_map(factor).collect())
+        let factor = |(plain, weighed): (&Point, &Point)| {
+            Some((masker.cell_of(plain, twist)?, weighed[3] / plain[3]))
+        };
+        Ok(plain[..count]
+            .iter()
+            .zip(weighed.iter())
+            .filter_map(factor)
+            .collect())
     }
 }
 
@@ -134,11 +169,15 @@ impl Exposure {
         let view = &self.views[0];
         let masked = sum(&view.masked);
         let kept = |factors: &mut dyn Iterator<Item = f32>| {
-            let (kept, all) = factors.fold((0, 0), |(kept, all), factor| (kept + usize::from(factor > KEPT), all + 1));
+            let (kept, all) = factors.fold((0, 0), |(kept, all), factor| {
+                (kept + usize::from(factor > KEPT), all + 1)
+            });
             percent(kept as f64, f64::from(all))
         };
-        let motion =
-            |figure: fn(Twist) -> f64| self.twist.map_or_else(|| "-".to_owned(), |t| format!("{:.2}", figure(t)));
+        let motion = |figure: fn(Twist) -> f64| {
+            self.twist
+                .map_or_else(|| "-".to_owned(), |t| format!("{:.2}", figure(t)))
+        };
         format!(
             "{:6} {:>9} {:>15} {:>9} {:>10} {:>8} {:>8}",
             self.number,
@@ -158,5 +197,9 @@ fn sum(cells: &[f32]) -> f64 {
 
 /// `-` of nothing.
 fn percent(part: f64, whole: f64) -> String {
-    if whole > 0.0 { format!("{:.1}", 100.0 * part / whole) } else { "-".to_owned() }
+    if whole > 0.0 {
+        format!("{:.1}", 100.0 * part / whole)
+    } else {
+        "-".to_owned()
+    }
 }

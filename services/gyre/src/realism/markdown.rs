@@ -35,7 +35,9 @@ fn compared(text: &mut String, report: &Report) {
     let _ = writeln!(text, "\n## How they compare\n");
     let names = names(report);
     let judged = report.subjects.len() > 2;
-    let mut headings: Vec<String> = std::iter::once("statistic".to_owned()).chain(names).collect();
+    let mut headings: Vec<String> = std::iter::once("statistic".to_owned())
+        .chain(names)
+        .collect();
     headings.extend(["distance", "within real", "sim-real"].map(str::to_owned));
     if judged {
         headings.extend(["real-other", "within other", "sim is"].map(str::to_owned));
@@ -46,19 +48,38 @@ fn compared(text: &mut String, report: &Report) {
         row(text, &cells(line, report.subjects.len()));
     }
     if judged {
-        let _ = writeln!(text, "\ncloser in {} of {}", report.comparison.closer, report.comparison.judged);
+        let _ = writeln!(
+            text,
+            "\ncloser in {} of {}",
+            report.comparison.closer, report.comparison.judged
+        );
     }
 }
 
 fn names(report: &Report) -> impl Iterator<Item = String> {
-    report.subjects.iter().map(|subject| format!("{}: {}", subject.role, subject.measured.whole.name))
+    report
+        .subjects
+        .iter()
+        .map(|subject| format!("{}: {}", subject.role, subject.measured.whole.name))
 }
 
 fn cells(line: &Row, recordings: usize) -> Vec<String> {
-    let number = |distance: Option<f64>| distance.map_or("-".to_owned(), |distance| format!("{distance:.3}"));
-    let values = line.values.iter().take(recordings).map(|value| value.clone().unwrap_or_else(|| "-".to_owned()));
-    let mut cells: Vec<String> = std::iter::once(line.statistic.to_owned()).chain(values).collect();
-    cells.extend([line.distance.to_owned(), number(line.within_real), number(line.sim_real)]);
+    let number = |distance: Option<f64>| {
+        distance.map_or("-".to_owned(), |distance| format!("{distance:.3}"))
+    };
+    let values = line
+        .values
+        .iter()
+        .take(recordings)
+        .map(|value| value.clone().unwrap_or_else(|| "-".to_owned()));
+    let mut cells: Vec<String> = std::iter::once(line.statistic.to_owned())
+        .chain(values)
+        .collect();
+    cells.extend([
+        line.distance.to_owned(),
+        number(line.within_real),
+        number(line.sim_real),
+    ]);
     if recordings > 2 {
         let verdict = match line.closer {
             None => "-",
@@ -66,7 +87,11 @@ fn cells(line: &Row, recordings: usize) -> Vec<String> {
             Some(false) if line.is_within_chance() => "farther, within chance",
             Some(false) => "farther",
         };
-        cells.extend([number(line.real_other), number(line.within_other), verdict.to_owned()]);
+        cells.extend([
+            number(line.real_other),
+            number(line.within_other),
+            verdict.to_owned(),
+        ]);
     }
     cells
 }
@@ -74,17 +99,41 @@ fn cells(line: &Row, recordings: usize) -> Vec<String> {
 /// What each recording is like: what a sensor's profile can be set by.
 fn characters(text: &mut String, report: &Report) {
     let _ = writeln!(text, "## What each is like\n");
-    row(text, &std::iter::once(String::new()).chain(names(report)).collect::<Vec<_>>());
+    row(
+        text,
+        &std::iter::once(String::new())
+            .chain(names(report))
+            .collect::<Vec<_>>(),
+    );
     row(text, &vec!["---".to_owned(); report.subjects.len() + 1]);
-    let recordings = || report.subjects.iter().map(|subject| &subject.measured.whole);
-    let mut line = |name: String, of: &dyn Fn(&Recording) -> String| {
-        row(text, &std::iter::once(name).chain(recordings().map(of)).collect::<Vec<_>>());
+    let recordings = || {
+        report
+            .subjects
+            .iter()
+            .map(|subject| &subject.measured.whole)
     };
-    let statistics = |of: fn(&Statistics) -> String| move |recording: &Recording| of(&recording.statistics);
-    line("scans measured".to_owned(), &statistics(|s| s.scans.to_string()));
+    let mut line = |name: String, of: &dyn Fn(&Recording) -> String| {
+        row(
+            text,
+            &std::iter::once(name)
+                .chain(recordings().map(of))
+                .collect::<Vec<_>>(),
+        );
+    };
+    let statistics =
+        |of: fn(&Statistics) -> String| move |recording: &Recording| of(&recording.statistics);
+    line(
+        "scans measured".to_owned(),
+        &statistics(|s| s.scans.to_string()),
+    );
     line(
         "azimuths x bins".to_owned(),
-        &statistics(|s| format!("{} x {} of {:.4} m", s.azimuths, s.sensor_bins, s.sensor_resolution_m)),
+        &statistics(|s| {
+            format!(
+                "{} x {} of {:.4} m",
+                s.azimuths, s.sensor_bins, s.sensor_resolution_m
+            )
+        }),
     );
     line("levels that occur".to_owned(), &statistics(levels));
     line(
@@ -105,49 +154,102 @@ fn characters(text: &mut String, report: &Report) {
         "streaks: share, groups a scan, width".to_owned(),
         &statistics(|s| {
             let streaks = &s.streaks;
-            format!("{:.1} %, {:.1}, {:.1}", 100.0 * streaks.share, streaks.groups_a_scan, streaks.mean_width)
+            format!(
+                "{:.1} %, {:.1}, {:.1}",
+                100.0 * streaks.share,
+                streaks.groups_a_scan,
+                streaks.mean_width
+            )
         }),
     );
-    line("correlation at lags of 1, 2, 4 cells".to_owned(), &statistics(|s| lags(&s.range_correlation.values)));
-    line("correlation at lags of 1, 2, 4 azimuths".to_owned(), &statistics(|s| lags(&s.azimuth_correlation.values)));
-    line("plain search".to_owned(), &|recording| errors(recording.plain.as_ref()));
-    line("refined search".to_owned(), &|recording| errors(recording.refined.as_ref()));
+    line(
+        "correlation at lags of 1, 2, 4 cells".to_owned(),
+        &statistics(|s| lags(&s.range_correlation.values)),
+    );
+    line(
+        "correlation at lags of 1, 2, 4 azimuths".to_owned(),
+        &statistics(|s| lags(&s.azimuth_correlation.values)),
+    );
+    line("plain search".to_owned(), &|recording| {
+        errors(recording.plain.as_ref())
+    });
+    line("refined search".to_owned(), &|recording| {
+        errors(recording.refined.as_ref())
+    });
     let aligned = report.subjects.iter().map(|subject| {
         let aligned = subject.aligned;
-        format!("{} by truth, {} by odometry", aligned.by_truth, aligned.by_odometry)
+        format!(
+            "{} by truth, {} by odometry",
+            aligned.by_truth, aligned.by_odometry
+        )
     });
-    row(text, &std::iter::once("pairs aligned".to_owned()).chain(aligned).collect::<Vec<_>>());
+    row(
+        text,
+        &std::iter::once("pairs aligned".to_owned())
+            .chain(aligned)
+            .collect::<Vec<_>>(),
+    );
 }
 
 fn levels(statistics: &Statistics) -> String {
     let levels = &statistics.levels;
     let lowest = listed(levels.iter().take(LOWEST_LEVELS));
-    format!("{}: {lowest} .. {}", levels.len(), levels.last().copied().unwrap_or(0))
+    format!(
+        "{}: {lowest} .. {}",
+        levels.len(),
+        levels.last().copied().unwrap_or(0)
+    )
 }
 
 fn at_range(statistics: &Statistics, range_m: f64) -> String {
-    let Some(mean) = statistics.mean_power_at(range_m) else { return "-".to_owned() };
-    let percentile = |of: &[u8]| statistics.around(range_m, |cell| f64::from(of[cell])).unwrap_or(f64::NAN);
-    let [floor, median, high] =
-        [&statistics.floor, &statistics.median_power, &statistics.high_power].map(|of| percentile(of));
+    let Some(mean) = statistics.mean_power_at(range_m) else {
+        return "-".to_owned();
+    };
+    let percentile = |of: &[u8]| {
+        statistics
+            .around(range_m, |cell| f64::from(of[cell]))
+            .unwrap_or(f64::NAN)
+    };
+    let [floor, median, high] = [
+        &statistics.floor,
+        &statistics.median_power,
+        &statistics.high_power,
+    ]
+    .map(|of| percentile(of));
     format!("{mean:.1}; {floor:.0}, {median:.0}, {high:.0}")
 }
 
 fn lags(values: &[f64]) -> String {
-    listed([1, 2, 4].map(|lag: usize| values.get(lag).map_or("-".to_owned(), |value| format!("{value:.3}"))))
+    listed([1, 2, 4].map(|lag: usize| {
+        values
+            .get(lag)
+            .map_or("-".to_owned(), |value| format!("{value:.3}"))
+    }))
 }
 
 fn errors(errors: Option<&gyre_realism::SearchErrors>) -> String {
-    let Some(errors) = errors else { return "-".to_owned() };
-    let seg = errors.seg_percent.map_or(String::new(), |seg| format!(", seg {seg:.2} %"));
+    let Some(errors) = errors else {
+        return "-".to_owned();
+    };
+    let seg = errors
+        .seg_percent
+        .map_or(String::new(), |seg| format!(", seg {seg:.2} %"));
     format!(
         "{} motions, {:.0} m: {:.3} m, {:.3} deg, ATE {:.2} m{seg}",
-        errors.motions, errors.path_m, errors.translation_rmse_m, errors.rotation_rmse_deg, errors.ate_m
+        errors.motions,
+        errors.path_m,
+        errors.translation_rmse_m,
+        errors.rotation_rmse_deg,
+        errors.ate_m
     )
 }
 
 fn listed<T: ToString>(values: impl IntoIterator<Item = T>) -> String {
-    values.into_iter().map(|value| value.to_string()).collect::<Vec<_>>().join(", ")
+    values
+        .into_iter()
+        .map(|value| value.to_string())
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 fn row(text: &mut String, cells: &[String]) {

@@ -35,11 +35,18 @@ impl Searches {
         let truth = truth(source);
         let scans = source.scans().min(scans);
         if scans < 2 {
-            return Ok(Self { truth, ..Self::default() });
+            return Ok(Self {
+                truth,
+                ..Self::default()
+            });
         }
         let plain = Some(run(source, PLAIN, scans)?);
         let refined = Some(run(source, SHIPPED, scans)?);
-        Ok(Self { truth, plain, refined })
+        Ok(Self {
+            truth,
+            plain,
+            refined,
+        })
     }
 
     /// Errors of a part of a trajectory that was found; `None` without truth that fits.
@@ -63,7 +70,9 @@ impl Searches {
 fn truth(source: &Source) -> Option<Trajectory> {
     let path = find_ground_truth(&source.data)?;
     let truth = read_trajectory(&path);
-    let truth = truth.inspect_err(|error| print::note(format_args!("not compared with the truth: {error}"))).ok()?;
+    let truth = truth
+        .inspect_err(|error| print::note(format_args!("not compared with the truth: {error}")))
+        .ok()?;
     (truth.stamp_ns.is_some() && truth.has_heading()).then_some(truth)
 }
 

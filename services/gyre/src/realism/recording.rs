@@ -56,9 +56,15 @@ pub struct Aligned {
 
 impl Source {
     /// Opens a recording by its configuration, or by the one that ships for its format.
-    pub fn open(role: &'static str, data: &Path, configuration: Option<&Path>, out: &Path) -> Result<Self, Failure> {
+    pub fn open(
+        role: &'static str,
+        data: &Path,
+        configuration: Option<&Path>,
+        out: &Path,
+    ) -> Result<Self, Failure> {
         let runs = out.join(role);
-        fs::create_dir_all(&runs).map_err(|error| format!("cannot write to {}: {error}", runs.display()))?;
+        fs::create_dir_all(&runs)
+            .map_err(|error| format!("cannot write to {}: {error}", runs.display()))?;
         let file = match configuration {
             Some(file) => file.to_owned(),
             None => {
@@ -73,13 +79,28 @@ impl Source {
         let dataset = gyre_radar::open(data, &resolved.dataset)?;
         let played = resolved.played(dataset.len());
         let configuration_file = configuration.map(Path::to_owned);
-        Ok(Self { role, data: data.to_owned(), configuration_file, sequence, runs, played, dataset })
+        Ok(Self {
+            role,
+            data: data.to_owned(),
+            configuration_file,
+            sequence,
+            runs,
+            played,
+            dataset,
+        })
     }
 
     /// What it is called in tables.
     pub fn name(&self) -> String {
-        let resolved = self.data.canonicalize().unwrap_or_else(|_| self.data.clone());
-        resolved.file_name().unwrap_or_default().to_string_lossy().into_owned()
+        let resolved = self
+            .data
+            .canonicalize()
+            .unwrap_or_else(|_| self.data.clone());
+        resolved
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
     }
 
     /// Scans that its configuration plays.
@@ -102,7 +123,11 @@ impl Source {
         let found = (first..self.played.end).any(|index| self.read(index, &mut scan));
         match found {
             true => Ok(scan),
-            false => Err(format!("{}: no scan from number {first} on can be read", self.data.display()).into()),
+            false => Err(format!(
+                "{}: no scan from number {first} on can be read",
+                self.data.display()
+            )
+            .into()),
         }
     }
 
@@ -127,8 +152,10 @@ impl Source {
         let halves = match self.scans() {
             ..LEAST_HALVED => None,
             _ => Some([
-                self.measure_part(Part::FirstHalf, config, most, searches)?.0,
-                self.measure_part(Part::SecondHalf, config, most, searches)?.0,
+                self.measure_part(Part::FirstHalf, config, most, searches)?
+                    .0,
+                self.measure_part(Part::SecondHalf, config, most, searches)?
+                    .0,
             ]),
         };
         Ok((Measured { whole, halves }, aligned))
@@ -143,8 +170,19 @@ impl Source {
     ) -> Result<(Recording, Aligned), Failure> {
         let scans = part.of(self.played.clone());
         let (statistics, aligned) = self.statistics(scans, config, most, searches)?;
-        let (plain, refined) = (searches.errors(&searches.plain, part), searches.errors(&searches.refined, part));
-        Ok((Recording { name: self.name(), statistics, plain, refined }, aligned))
+        let (plain, refined) = (
+            searches.errors(&searches.plain, part),
+            searches.errors(&searches.refined, part),
+        );
+        Ok((
+            Recording {
+                name: self.name(),
+                statistics,
+                plain,
+                refined,
+            },
+            aligned,
+        ))
     }
 
     /// Statistics of at most `most` of these scans, each with its motion since the one before it where that is known.
@@ -166,12 +204,15 @@ impl Source {
                     continue;
                 }
                 let now_ns = scan.geometry.stamp_ns;
-                let motion = before_ns.and_then(|before_ns| searches.motion(before_ns, now_ns, &mut aligned));
+                let motion = before_ns
+                    .and_then(|before_ns| searches.motion(before_ns, now_ns, &mut aligned));
                 meter.add(&scan.view(), motion.as_ref())?;
                 before_ns = Some(now_ns);
             }
         }
-        let statistics = meter.finish().ok_or_else(|| format!("{} has no scan to measure", self.data.display()))?;
+        let statistics = meter
+            .finish()
+            .ok_or_else(|| format!("{} has no scan to measure", self.data.display()))?;
         Ok((statistics, aligned))
     }
 }
@@ -225,7 +266,9 @@ fn runs(scans: usize, most: usize) -> Vec<Range<usize>> {
     let length = RUN.min(most);
     let count = most / length;
     let start = |run: usize| run * (scans - length) / (count - 1).max(1);
-    (0..count).map(|run| start(run)..start(run) + length).collect()
+    (0..count)
+        .map(|run| start(run)..start(run) + length)
+        .collect()
 }
 
 /// The configuration that ships for a format.
@@ -247,13 +290,21 @@ mod tests {
 
     #[test]
     fn runs_cover_a_short_recording_and_spread_over_a_long_one() {
-        let ends = |scans, most| runs(scans, most).iter().map(|run| (run.start, run.end)).collect::<Vec<_>>();
+        let ends = |scans, most| {
+            runs(scans, most)
+                .iter()
+                .map(|run| (run.start, run.end))
+                .collect::<Vec<_>>()
+        };
         assert_eq!(ends(11, 64), [(0, 11)]);
         assert_eq!(ends(100, 16), [(0, 8), (92, 100)]);
         assert_eq!(ends(100, 8), [(0, 8)]);
         assert_eq!(ends(100, 3), [(0, 3)]);
         let spread = runs(466, 64);
-        assert_eq!((spread.len(), spread[0].clone(), spread[7].clone()), (8, 0..8, 458..466));
+        assert_eq!(
+            (spread.len(), spread[0].clone(), spread[7].clone()),
+            (8, 0..8, 458..466)
+        );
         assert!(spread.windows(2).all(|pair| pair[0].end <= pair[1].start));
         assert!(runs(65, 64).iter().all(|run| run.end <= 65));
     }

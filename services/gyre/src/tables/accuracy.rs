@@ -79,7 +79,12 @@ pub struct Accuracy {
 pub fn measure(sequence: &Sequence, models: &Models, out: &Path) -> Result<Accuracies, Failure> {
     let (mut measured, mut left_out) = (Vec::new(), Vec::new());
     for line in lines(Table::Drift) {
-        let (row, model) = match line.row.map(|row| model(sequence, row, models)).transpose()?.unwrap_or(Ok(None)) {
+        let (row, model) = match line
+            .row
+            .map(|row| model(sequence, row, models))
+            .transpose()?
+            .unwrap_or(Ok(None))
+        {
             Ok(model) => (line.row, model),
             Err(reason) => {
                 note(&mut left_out, reason, line.name.to_owned());
@@ -99,9 +104,17 @@ pub fn measure(sequence: &Sequence, models: &Models, out: &Path) -> Result<Accur
 }
 
 /// The network of a row, if it has one; else why it cannot be used.
-fn model(sequence: &Sequence, row: &Row, models: &Models) -> Result<Result<Option<Model>, String>, Failure> {
+fn model(
+    sequence: &Sequence,
+    row: &Row,
+    models: &Models,
+) -> Result<Result<Option<Model>, String>, Failure> {
     let raster = sequence.configuration(&row.changes())?.raster;
-    Ok(row.mask.as_ref().map(|mask| models.find(mask, raster.n, Some(raster.cell_m))).transpose())
+    Ok(row
+        .mask
+        .as_ref()
+        .map(|mask| models.find(mask, raster.n, Some(raster.cell_m)))
+        .transpose())
 }
 
 fn measure_line(
@@ -111,18 +124,35 @@ fn measure_line(
     model: Option<Model>,
     out: &Path,
 ) -> Result<AccuracyLine, Failure> {
-    let run = |row: &Row| run(sequence, row.name, &row.changes_with(model.as_ref()), &out.join(row.folder()));
+    let run = |row: &Row| {
+        run(
+            sequence,
+            row.name,
+            &row.changes_with(model.as_ref()),
+            &out.join(row.folder()),
+        )
+    };
     let ours = row.map(run).transpose()?;
     let n = match &ours {
         Some(ours) => ours.n,
         None => sequence.configuration(&[])?.raster.n,
     };
     let paper = line.figures.map_or([None; 2], |figures| figures.drift(n));
-    Ok(AccuracyLine { row: line.name, model, ours, paper })
+    Ok(AccuracyLine {
+        row: line.name,
+        model,
+        ours,
+        paper,
+    })
 }
 
 /// Runs a sequence with changes as a person would, by `gyre run`, and reads what it left.
-pub(crate) fn run(sequence: &Sequence, name: &str, changes: &[String], out: &Path) -> Result<Accuracy, Failure> {
+pub(crate) fn run(
+    sequence: &Sequence,
+    name: &str,
+    changes: &[String],
+    out: &Path,
+) -> Result<Accuracy, Failure> {
     let n = sequence.configuration(changes)?.raster.n;
     let arguments = sequence.run_arguments(changes, out);
     print::note(format_args!("{}: {name}", sequence.name));
@@ -135,8 +165,13 @@ pub(crate) fn run(sequence: &Sequence, name: &str, changes: &[String], out: &Pat
         return Err(format!("`{}` did not succeed", command(&arguments)).into());
     }
     let summary = out.join("summary.json");
-    let text = fs::read_to_string(&summary).map_err(|error| format!("cannot read {}: {error}", summary.display()))?;
-    Ok(Accuracy::new(command(&arguments), n, &serde_json::from_str(&text)?))
+    let text = fs::read_to_string(&summary)
+        .map_err(|error| format!("cannot read {}: {error}", summary.display()))?;
+    Ok(Accuracy::new(
+        command(&arguments),
+        n,
+        &serde_json::from_str(&text)?,
+    ))
 }
 
 impl Accuracy {
@@ -148,7 +183,9 @@ impl Accuracy {
             median_us.unwrap_or(0.0) * 1e-3
         };
         let around = [Stage::RadarReplay, Stage::Masking, Stage::PoseIntegration];
-        let search = Stage::ALL.into_iter().filter(|stage| !around.contains(stage));
+        let search = Stage::ALL
+            .into_iter()
+            .filter(|stage| !around.contains(stage));
         Self {
             command,
             n,
@@ -184,8 +221,25 @@ mod tests {
         let evaluation = json!({ "path_m": 22.0, "kitti": null, "ate": { "rmse_m": 0.5 }, "seg": null, "rpe": rpe });
         let summary = json!({ "scans_per_s": 120.5, "latency": { "stages": stages }, "evaluation": evaluation });
         let accuracy = Accuracy::new("x".to_owned(), 255, &summary);
-        assert_eq!((accuracy.masking_ms, accuracy.search_ms, accuracy.scans_per_s), (2.0, 2.25, Some(120.5)));
-        assert_eq!((accuracy.path_m, accuracy.ate_m, accuracy.pair_rotation_deg), (Some(22.0), Some(0.5), Some(0.25)));
-        assert_eq!((accuracy.translation_percent, accuracy.seg_percent, accuracy.forward_ratio), (None, None, None));
+        assert_eq!(
+            (
+                accuracy.masking_ms,
+                accuracy.search_ms,
+                accuracy.scans_per_s
+            ),
+            (2.0, 2.25, Some(120.5))
+        );
+        assert_eq!(
+            (accuracy.path_m, accuracy.ate_m, accuracy.pair_rotation_deg),
+            (Some(22.0), Some(0.5), Some(0.25))
+        );
+        assert_eq!(
+            (
+                accuracy.translation_percent,
+                accuracy.seg_percent,
+                accuracy.forward_ratio
+            ),
+            (None, None, None)
+        );
     }
 }

@@ -41,7 +41,9 @@ pub struct Model {
 impl Models {
     /// Those in a folder.
     pub fn new(folder: &Path) -> Self {
-        Self { folder: folder.to_owned() }
+        Self {
+            folder: folder.to_owned(),
+        }
     }
 
     /// The network for rasters of `n` cells a side, and of `cell_m` metres a cell where that is settled. It has been loaded once.
@@ -51,24 +53,48 @@ impl Models {
     pub fn find(&self, mask: &Mask, n: usize, cell_m: Option<f32>) -> Result<Model, String> {
         let cards = match mask {
             Mask::Product => vec![self.folder.join(PRODUCT)],
-            Mask::OfSize(names) => names.iter().map(|name| self.folder.join(format!("{name}-{n}"))).collect(),
+            Mask::OfSize(names) => names
+                .iter()
+                .map(|name| self.folder.join(format!("{name}-{n}")))
+                .collect(),
         };
-        let cards: Vec<PathBuf> = cards.into_iter().map(|card| card.with_extension("toml")).collect();
+        let cards: Vec<PathBuf> = cards
+            .into_iter()
+            .map(|card| card.with_extension("toml"))
+            .collect();
         let there = cards.iter().find(|card| card.exists());
-        let card = there.ok_or_else(|| format!("there is no {}", cards[cards.len() - 1].display()))?;
-        let masking = MaskingConfig { kind: MaskKind::Learned, model: Some(card.clone()), ..MaskingConfig::default() };
-        let trained = Card::read(&masking).map_err(|error| error.to_string())?.raster;
-        let raster = RasterConfig { n, cell_m: cell_m.unwrap_or(trained.cell_m), ..RasterConfig::default() };
+        let card =
+            there.ok_or_else(|| format!("there is no {}", cards[cards.len() - 1].display()))?;
+        let masking = MaskingConfig {
+            kind: MaskKind::Learned,
+            model: Some(card.clone()),
+            ..MaskingConfig::default()
+        };
+        let trained = Card::read(&masking)
+            .map_err(|error| error.to_string())?
+            .raster;
+        let raster = RasterConfig {
+            n,
+            cell_m: cell_m.unwrap_or(trained.cell_m),
+            ..RasterConfig::default()
+        };
         Network::load(&masking, &raster).map_err(|error| error.to_string())?;
         let instead_of = (card != &cards[0]).then(|| cards[0].clone());
-        Ok(Model { card: card.clone(), cell_m: raster.cell_m, instead_of })
+        Ok(Model {
+            card: card.clone(),
+            cell_m: raster.cell_m,
+            instead_of,
+        })
     }
 }
 
 impl Model {
     /// The `--set` sentences that mask with it.
     pub fn changes(&self) -> [String; 2] {
-        ["masking.kind=learned".to_owned(), format!("masking.model={}", self.card.display())]
+        [
+            "masking.kind=learned".to_owned(),
+            format!("masking.model={}", self.card.display()),
+        ]
     }
 }
 
@@ -101,7 +127,10 @@ pub struct Note {
 pub fn note(notes: &mut Vec<Note>, what: String, row: String) {
     match notes.iter_mut().find(|note| note.what == what) {
         Some(note) => note.rows.push(row),
-        None => notes.push(Note { what, rows: vec![row] }),
+        None => notes.push(Note {
+            what,
+            rows: vec![row],
+        }),
     }
 }
 
@@ -123,9 +152,18 @@ mod tests {
     fn what_is_missing_or_does_not_fit_is_a_sentence() {
         let folder = tempfile::tempdir().unwrap();
         let models = Models::new(folder.path());
-        let reason = models.find(&Mask::OfSize(&["mbym", "f-mbym"]), 127, None).unwrap_err();
-        assert!(reason.starts_with("there is no ") && reason.ends_with("/f-mbym-127.toml"), "{reason}");
-        fs::copy(fixtures().join("single-127.toml"), folder.path().join("gyre-255.toml")).unwrap();
+        let reason = models
+            .find(&Mask::OfSize(&["mbym", "f-mbym"]), 127, None)
+            .unwrap_err();
+        assert!(
+            reason.starts_with("there is no ") && reason.ends_with("/f-mbym-127.toml"),
+            "{reason}"
+        );
+        fs::copy(
+            fixtures().join("single-127.toml"),
+            folder.path().join("gyre-255.toml"),
+        )
+        .unwrap();
         let reason = models.find(&Mask::Product, 255, None).unwrap_err();
         assert!(reason.contains("gyre-255.toml is for 127"), "{reason}");
         let reason = models.find(&Mask::Product, 127, Some(0.4)).unwrap_err();
@@ -141,14 +179,30 @@ mod tests {
             return;
         }
         let models = Models::new(&fixtures());
-        let mut found = models.find(&Mask::OfSize(&["double", "single"]), 127, None).unwrap();
+        let mut found = models
+            .find(&Mask::OfSize(&["double", "single"]), 127, None)
+            .unwrap();
         assert_eq!(found.cell_m, 0.8);
         let told = found.to_string();
-        assert!(told.contains("single-127.toml (there is no ") && told.ends_with("double-127.toml)"), "{told}");
+        assert!(
+            told.contains("single-127.toml (there is no ") && told.ends_with("double-127.toml)"),
+            "{told}"
+        );
         found.card = PathBuf::from("2019-01-10.toml");
-        let masking = Configuration::of_overrides(&found.changes()).unwrap().masking;
-        assert_eq!((masking.kind, masking.model), (MaskKind::Learned, Some(found.card)));
-        assert_eq!(models.find(&Mask::OfSize(&["single"]), 127, Some(0.8)).unwrap().instead_of, None);
+        let masking = Configuration::of_overrides(&found.changes())
+            .unwrap()
+            .masking;
+        assert_eq!(
+            (masking.kind, masking.model),
+            (MaskKind::Learned, Some(found.card))
+        );
+        assert_eq!(
+            models
+                .find(&Mask::OfSize(&["single"]), 127, Some(0.8))
+                .unwrap()
+                .instead_of,
+            None
+        );
     }
 
     #[test]
@@ -157,7 +211,12 @@ mod tests {
         for (what, row) in [("none", "a"), ("old", "b"), ("none", "c")] {
             note(&mut notes, what.to_owned(), row.to_owned());
         }
-        let [first, second] = &notes[..] else { panic!("{notes:?}") };
-        assert_eq!((first.rows.join(" "), second.rows.join(" ")), ("a c".to_owned(), "b".to_owned()));
+        let [first, second] = &notes[..] else {
+            panic!("{notes:?}")
+        };
+        assert_eq!(
+            (first.rows.join(" "), second.rows.join(" ")),
+            ("a c".to_owned(), "b".to_owned())
+        );
     }
 }

@@ -3,7 +3,8 @@
 //! Checchin et al. (2010) print no such table.
 
 /// Where the figures are from.
-pub const SOURCE: &str = "Weston, Gadd, De Martini, Newman, Posner: Fast-MbyM, ICRA 2022, Table III";
+pub const SOURCE: &str =
+    "Weston, Gadd, De Martini, Newman, Posner: Fast-MbyM, ICRA 2022, Table III";
 
 /// The rasters' sides, cells.
 const SIZES: [usize; 3] = [127, 255, 511];
@@ -98,10 +99,16 @@ impl Figures {
 
     /// KITTI errors for rasters of `n` cells a side: %, and degrees per km.
     pub fn drift(&self, n: usize) -> [Option<f64>; 2] {
-        [at(&self.translation_percent, n), at(&self.rotation_deg_per_km, n)]
+        [
+            at(&self.translation_percent, n),
+            at(&self.rotation_deg_per_km, n),
+        ]
     }
 }
 
 fn at(figures: &[Option<f64>; 3], n: usize) -> Option<f64> {
-    SIZES.iter().position(|&size| size == n).and_then(|k| figures[k])
+    SIZES
+        .iter()
+        .position(|&size| size == n)
+        .and_then(|k| figures[k])
 }

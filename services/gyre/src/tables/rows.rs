@@ -24,15 +24,40 @@ pub struct Row {
 
 /// All rows that this program can measure.
 pub static ROWS: [Row; 13] = [
-    Row::of_papers("mask", "mask", "mask", &[PAPERS_RASTER, ALL_IS_SEEN]).masked(OF_FAST_MBYM).alone(),
+    Row::of_papers("mask", "mask", "mask", &[PAPERS_RASTER, ALL_IS_SEEN])
+        .masked(OF_FAST_MBYM)
+        .alone(),
     Row::of_papers("raw", "raw", "raw", &[PAPERS_RASTER, RAW]),
-    Row::of_papers("f-raw, line 14", "f-raw", "f-raw", &[PAPERS_RASTER, F_RAW, &["rotation.form=line14"]]),
-    Row::of_papers("f-raw, Eq. 7", "f-raw", "f-raw-eq7", &[PAPERS_RASTER, F_RAW, EQ_7]),
+    Row::of_papers(
+        "f-raw, line 14",
+        "f-raw",
+        "f-raw",
+        &[PAPERS_RASTER, F_RAW, &["rotation.form=line14"]],
+    ),
+    Row::of_papers(
+        "f-raw, Eq. 7",
+        "f-raw",
+        "f-raw-eq7",
+        &[PAPERS_RASTER, F_RAW, EQ_7],
+    ),
     Row::of_papers("mbym", "mbym", "mbym", &[PAPERS_RASTER, ALL_IS_SEEN, RAW]).masked(OF_MBYM),
-    Row::of_papers("f-mbym, Eq. 7", "f-mbym", "f-mbym", &[PAPERS_RASTER, ALL_IS_SEEN, F_RAW, EQ_7])
-        .masked(OF_FAST_MBYM),
-    Row { peer: Some("mask"), ..Row::of_gyre("mask, default", &[]).masked(Mask::Product).alone() },
-    Row::of_gyre("Gyre, every angle", &[&["search.kind=exhaustive"], SEARCH_ALONE]),
+    Row::of_papers(
+        "f-mbym, Eq. 7",
+        "f-mbym",
+        "f-mbym",
+        &[PAPERS_RASTER, ALL_IS_SEEN, F_RAW, EQ_7],
+    )
+    .masked(OF_FAST_MBYM),
+    Row {
+        peer: Some("mask"),
+        ..Row::of_gyre("mask, default", &[])
+            .masked(Mask::Product)
+            .alone()
+    },
+    Row::of_gyre(
+        "Gyre, every angle",
+        &[&["search.kind=exhaustive"], SEARCH_ALONE],
+    ),
     Row::of_gyre("Gyre, search alone", &[SEARCH_ALONE]),
     Row::of_gyre("Gyre, search alone, masked", &[SEARCH_ALONE]).masked(Mask::Product),
     Row::of_gyre("Gyre, refined", &[LAST_KEYFRAME]),
@@ -74,7 +99,11 @@ const ALL_IS_SEEN: &[&str] = &["masking.threshold=0"];
 const EQ_7: &[&str] = &["rotation.form=eq7"];
 
 /// As `configs/mbym.toml`.
-const RAW: &[&str] = &["search.kind=exhaustive", "exhaustive.overlap=none", "exhaustive.peak=parabola"];
+const RAW: &[&str] = &[
+    "search.kind=exhaustive",
+    "exhaustive.overlap=none",
+    "exhaustive.peak=parabola",
+];
 
 /// As `configs/fast-mbym.toml`, but for the form.
 pub const F_RAW: &[&str] = &[
@@ -95,29 +124,57 @@ impl Row {
         peer: &'static str,
         changes: &'static [&'static [&'static str]],
     ) -> Self {
-        Self { name, paper: Some(paper), peer: Some(peer), mask: None, mask_alone: false, changes }
+        Self {
+            name,
+            paper: Some(paper),
+            peer: Some(peer),
+            mask: None,
+            mask_alone: false,
+            changes,
+        }
     }
 
     const fn of_gyre(name: &'static str, changes: &'static [&'static [&'static str]]) -> Self {
-        Self { name, paper: None, peer: None, mask: None, mask_alone: false, changes }
+        Self {
+            name,
+            paper: None,
+            peer: None,
+            mask: None,
+            mask_alone: false,
+            changes,
+        }
     }
 
     const fn masked(self, mask: Mask) -> Self {
-        Self { mask: Some(mask), ..self }
+        Self {
+            mask: Some(mask),
+            ..self
+        }
     }
 
     const fn alone(self) -> Self {
-        Self { mask_alone: true, ..self }
+        Self {
+            mask_alone: true,
+            ..self
+        }
     }
 
     /// What it changes but for the mask, as sentences `section.key=value`.
     pub fn changes(&self) -> Vec<String> {
-        self.changes.iter().copied().flatten().map(|sentence| (*sentence).to_owned()).collect()
+        self.changes
+            .iter()
+            .copied()
+            .flatten()
+            .map(|sentence| (*sentence).to_owned())
+            .collect()
     }
 
     /// The same with its mask.
     pub fn changes_with(&self, model: Option<&Model>) -> Vec<String> {
-        self.changes().into_iter().chain(model.into_iter().flat_map(Model::changes)).collect()
+        self.changes()
+            .into_iter()
+            .chain(model.into_iter().flat_map(Model::changes))
+            .collect()
     }
 
     /// Its name as that of a folder.
@@ -128,7 +185,13 @@ impl Row {
 
 /// A name as that of a folder.
 pub fn folder(name: &str) -> String {
-    let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' };
+    let plain = |c: char| {
+        if c.is_ascii_alphanumeric() {
+            c.to_ascii_lowercase()
+        } else {
+            '-'
+        }
+    };
     let mut name: String = name.chars().map(plain).collect();
     while name.contains("--") {
         name = name.replace("--", "-");
@@ -169,18 +232,33 @@ impl Table {
 
 /// The papers' rows that stand in a table, in their order and with ours beside them; then those that are ours alone.
 pub fn lines(table: Table) -> Vec<Line> {
-    let with = |row: &'static Row, figures| Line { name: row.name, row: Some(row), figures, peer: row.peer };
+    let with = |row: &'static Row, figures| Line {
+        name: row.name,
+        row: Some(row),
+        figures,
+        peer: row.peer,
+    };
     let mut lines = Vec::new();
     for figures in FIGURES.iter().filter(|figures| table.has(figures)) {
         let before = lines.len();
         let same = ROWS.iter().filter(|row| row.paper == Some(figures.row));
         lines.extend(same.map(|row| with(row, Some(figures))));
         if lines.len() == before {
-            lines.push(Line { name: figures.row, row: None, figures: Some(figures), peer: Some(figures.row) });
+            lines.push(Line {
+                name: figures.row,
+                row: None,
+                figures: Some(figures),
+                peer: Some(figures.row),
+            });
         }
     }
     let searches = |row: &&Row| table == Table::Times || !row.mask_alone;
-    lines.extend(ROWS.iter().filter(|row| row.paper.is_none()).filter(searches).map(|row| with(row, None)));
+    lines.extend(
+        ROWS.iter()
+            .filter(|row| row.paper.is_none())
+            .filter(searches)
+            .map(|row| with(row, None)),
+    );
     lines
 }
 
@@ -201,7 +279,8 @@ mod tests {
         let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
         for (name, file) in [("raw", "mbym.toml"), ("f-raw, line 14", "fast-mbym.toml")] {
             let of_file = Configuration::read(&configs.join(file), &[]).unwrap();
-            let mut radiate = Configuration::read(&configs.join("radiate.toml"), &row(name).changes()).unwrap();
+            let mut radiate =
+                Configuration::read(&configs.join("radiate.toml"), &row(name).changes()).unwrap();
             radiate.dataset = of_file.dataset;
             assert_eq!(radiate, of_file, "{name}");
         }
@@ -209,7 +288,11 @@ mod tests {
 
     #[test]
     fn masked_rows_are_their_counterparts_with_a_mask() {
-        let pairs = [("f-raw, Eq. 7", "f-mbym, Eq. 7"), ("raw", "mbym"), ("Gyre", "Gyre, masked")];
+        let pairs = [
+            ("f-raw, Eq. 7", "f-mbym, Eq. 7"),
+            ("raw", "mbym"),
+            ("Gyre", "Gyre, masked"),
+        ];
         for (plain, masked) in pairs {
             let radiate = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/radiate.toml");
             let with = |changes: Vec<String>| Configuration::read(&radiate, &changes).unwrap();
@@ -219,7 +302,11 @@ mod tests {
             assert!(row(plain).mask.is_none() && row(masked).mask.is_some());
         }
         // With a mask the floor is the threshold.
-        assert!(row("mbym").changes().contains(&"masking.threshold=0".to_owned()));
+        assert!(
+            row("mbym")
+                .changes()
+                .contains(&"masking.threshold=0".to_owned())
+        );
     }
 
     #[test]
@@ -237,24 +324,49 @@ mod tests {
 
     #[test]
     fn lines_follow_the_papers_and_end_with_ours() {
-        let names = |table| lines(table).iter().map(|line| (line.name, line.row.is_some())).collect::<Vec<_>>();
+        let names = |table| {
+            lines(table)
+                .iter()
+                .map(|line| (line.name, line.row.is_some()))
+                .collect::<Vec<_>>()
+        };
         let times = names(Table::Times);
-        let common = [("raw", true), ("f-raw, line 14", true), ("f-raw, Eq. 7", true)];
+        let common = [
+            ("raw", true),
+            ("f-raw, line 14", true),
+            ("f-raw, Eq. 7", true),
+        ];
         assert_eq!(times[0], ("mask", true));
         assert_eq!(times[1..4], common);
-        assert_eq!(times[4..7], [("mbym", true), ("f-mbym, Eq. 7", true), ("mask, default", true)]);
+        assert_eq!(
+            times[4..7],
+            [
+                ("mbym", true),
+                ("f-mbym, Eq. 7", true),
+                ("mask, default", true)
+            ]
+        );
         let drift = names(Table::Drift);
         assert_eq!(drift[..3], common);
         assert_eq!(drift[3], ("mbym (2019)", false));
         assert_eq!(drift.last(), Some(&("Gyre, masked", true)));
-        assert!(!drift.iter().any(|(name, _)| name.starts_with("mask")), "{drift:?}");
+        assert!(
+            !drift.iter().any(|(name, _)| name.starts_with("mask")),
+            "{drift:?}"
+        );
     }
 
     #[test]
     fn papers_figures_are_given_at_their_three_sizes_only() {
-        let f_mbym = lines(Table::Times).into_iter().find(|line| line.name == "f-mbym, Eq. 7").unwrap();
+        let f_mbym = lines(Table::Times)
+            .into_iter()
+            .find(|line| line.name == "f-mbym, Eq. 7")
+            .unwrap();
         let figures = f_mbym.figures.unwrap();
-        assert_eq!((figures.hz(255), figures.drift(255)), ([Some(20.6), Some(6.6)], [Some(2.01), Some(6.3)]));
+        assert_eq!(
+            (figures.hz(255), figures.drift(255)),
+            ([Some(20.6), Some(6.6)], [Some(2.01), Some(6.3)])
+        );
         assert_eq!((figures.hz(128), figures.drift(0)), ([None; 2], [None; 2]));
     }
 }

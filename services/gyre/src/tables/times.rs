@@ -98,9 +98,15 @@ pub fn measure(
     for (n, mut timed) in sizes? {
         half(&mut timed, passes)?;
         let report = out.join(format!("peer-{n}.json"));
-        let theirs = peer.map(|peer| peer.time(n, both, angles, &report)).transpose()?;
+        let theirs = peer
+            .map(|peer| peer.time(n, both, angles, &report))
+            .transpose()?;
         half(&mut timed, passes)?;
-        times.lines.extend(timed.into_iter().map(|(line, timer)| TimeLine::new(n, &line, timer, theirs.as_ref())));
+        times.lines.extend(
+            timed
+                .into_iter()
+                .map(|(line, timer)| TimeLine::new(n, &line, timer, theirs.as_ref())),
+        );
         times.peer_torch = theirs.map(|theirs| theirs.torch);
     }
     Ok(times)
@@ -117,7 +123,10 @@ fn timers(
     let mut timed = Vec::new();
     for line in lines(Table::Times) {
         let mask = line.row.and_then(|row| row.mask.as_ref());
-        let timer = match (line.row, mask.map(|mask| models.find(mask, n, None)).transpose()) {
+        let timer = match (
+            line.row,
+            mask.map(|mask| models.find(mask, n, None)).transpose(),
+        ) {
             (Some(row), Ok(model)) => Some(Timer::new(sequence, row, model, n, scans)?),
             (_, Err(reason)) => {
                 note(left_out, reason, format!("{} at {n}", line.name));
@@ -133,7 +142,10 @@ fn timers(
 }
 
 fn half(timed: &mut [(Line, Option<Timer>)], passes: usize) -> Result<(), Failure> {
-    timed.iter_mut().filter_map(|(_, timer)| timer.as_mut()).try_for_each(|timer| timer.half(passes))
+    timed
+        .iter_mut()
+        .filter_map(|(_, timer)| timer.as_mut())
+        .try_for_each(|timer| timer.half(passes))
 }
 
 impl TimeLine {

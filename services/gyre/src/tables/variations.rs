@@ -49,7 +49,9 @@ pub fn changes(sentences: &[String]) -> Result<Vec<String>, Failure> {
     let mut changes = Vec::new();
     for sentence in sentences {
         let (key, values) = sentence.split_once('=').ok_or_else(|| {
-            format!("--vary {sentence}: expected section.key=value,value, as in masking.threshold=50,70")
+            format!(
+                "--vary {sentence}: expected section.key=value,value, as in masking.threshold=50,70"
+            )
         })?;
         changes.extend(values.split(',').map(|value| format!("{key}={value}")));
     }
@@ -59,30 +61,51 @@ pub fn changes(sentences: &[String]) -> Result<Vec<String>, Failure> {
 /// Runs the sequence once as it is and once with each change, each into a folder of its own below `out`.
 pub fn measure(sequence: &Sequence, changes: &[String], out: &Path) -> Result<Variations, Failure> {
     let run = |change: &str, changes: &[String]| -> Result<Variation, Failure> {
-        let name = if change.is_empty() { "as it is" } else { change };
-        let accuracy = accuracy::run(sequence, name, changes, &out.join(name.replace(['/', ' '], "-")))?;
-        Ok(Variation { change: change.to_owned(), accuracy })
+        let name = if change.is_empty() {
+            "as it is"
+        } else {
+            change
+        };
+        let accuracy = accuracy::run(
+            sequence,
+            name,
+            changes,
+            &out.join(name.replace(['/', ' '], "-")),
+        )?;
+        Ok(Variation {
+            change: change.to_owned(),
+            accuracy,
+        })
     };
     let mut lines = vec![run("", &[])?];
     for change in changes {
         lines.push(run(change, std::slice::from_ref(change))?);
     }
-    let median =
-        |figure: fn(&Accuracy) -> Option<f64>| median(lines[1..].iter().filter_map(|line| figure(&line.accuracy)));
+    let median = |figure: fn(&Accuracy) -> Option<f64>| {
+        median(lines[1..].iter().filter_map(|line| figure(&line.accuracy)))
+    };
     let median = Medians {
         translation_percent: median(|accuracy| accuracy.translation_percent),
         rotation_deg_per_100m: median(|accuracy| accuracy.rotation_deg_per_100m),
         ate_m: median(|accuracy| accuracy.ate_m),
         seg_percent: median(|accuracy| accuracy.seg_percent),
     };
-    Ok(Variations { data: sequence.data.display().to_string(), lines, median })
+    Ok(Variations {
+        data: sequence.data.display().to_string(),
+        lines,
+        median,
+    })
 }
 
 fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
     let upper = *values.get(values.len() / 2)?;
-    Some(if values.len() % 2 == 1 { upper } else { 0.5 * (values[values.len() / 2 - 1] + upper) })
+    Some(if values.len() % 2 == 1 {
+        upper
+    } else {
+        0.5 * (values[values.len() / 2 - 1] + upper)
+    })
 }
 
 #[cfg(test)]
@@ -93,7 +116,11 @@ mod tests {
     #[test]
     fn a_list_of_values_is_a_change_each() {
         let sentences = ["masking.threshold=50,70", "search.kind=exhaustive"].map(str::to_owned);
-        let expected = ["masking.threshold=50", "masking.threshold=70", "search.kind=exhaustive"];
+        let expected = [
+            "masking.threshold=50",
+            "masking.threshold=70",
+            "search.kind=exhaustive",
+        ];
         assert_eq!(changes(&sentences).unwrap(), expected);
         assert!(changes(&["masking.threshold".to_owned()]).is_err());
     }

@@ -7,7 +7,9 @@ use std::path::{Path, PathBuf};
 
 use gyre_masking::{MaskKind, Masker, MaskingConfig, Sweep, runtime};
 use gyre_messages::SearchedMotion;
-use gyre_radar::{OwnedScan, PointsConfig, RasterConfig, ScanLimits, Sense, SweepGeometry, scan::flag};
+use gyre_radar::{
+    OwnedScan, PointsConfig, RasterConfig, ScanLimits, Sense, SweepGeometry, scan::flag,
+};
 
 /// Cells a side of the models that tests compute by hand.
 pub const N: usize = 31;
@@ -19,7 +21,10 @@ const BINS: usize = 200;
 
 /// The card of one of the tests' models: see `models/make.py`.
 pub fn card(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/models").join(name).with_extension("toml")
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/models")
+        .join(name)
+        .with_extension("toml")
 }
 
 /// Whether networks can be computed here; says so where not.
@@ -33,7 +38,11 @@ pub fn runtime_is_installed() -> bool {
 
 /// The rasters that the models with `-31` in their names are for.
 pub fn raster() -> RasterConfig {
-    RasterConfig { n: N, cell_m: 0.8, ..RasterConfig::default() }
+    RasterConfig {
+        n: N,
+        cell_m: 0.8,
+        ..RasterConfig::default()
+    }
 }
 
 /// A learned mask by this model. Power up to 20 counts as nothing.
@@ -49,7 +58,12 @@ pub fn learned(card: &Path) -> MaskingConfig {
 
 /// The same without the network.
 pub fn unlearned() -> MaskingConfig {
-    MaskingConfig { kind: MaskKind::Threshold, threshold: 20, undo_doppler: true, ..MaskingConfig::default() }
+    MaskingConfig {
+        kind: MaskKind::Threshold,
+        threshold: 20,
+        undo_doppler: true,
+        ..MaskingConfig::default()
+    }
 }
 
 /// A masker of small rasters.
@@ -59,7 +73,10 @@ pub fn masker(config: &MaskingConfig) -> Masker {
 
 /// A scan of powers that are all different from their neighbours', another one for each seed.
 pub fn scan(seed: usize) -> OwnedScan {
-    let mut scan = OwnedScan::with_limits(ScanLimits { bytes: AZIMUTHS * BINS, azimuths: AZIMUTHS });
+    let mut scan = OwnedScan::with_limits(ScanLimits {
+        bytes: AZIMUTHS * BINS,
+        azimuths: AZIMUTHS,
+    });
     scan.geometry = SweepGeometry {
         azimuths: AZIMUTHS,
         bins: BINS,
@@ -71,7 +88,8 @@ pub fn scan(seed: usize) -> OwnedScan {
     };
     for azimuth in 0..AZIMUTHS {
         for bin in 0..BINS {
-            scan.bytes[azimuth * BINS + bin] = ((azimuth / 9 * 31 + bin / 5 * 57 + seed * 101) % 251) as u8;
+            scan.bytes[azimuth * BINS + bin] =
+                ((azimuth / 9 * 31 + bin / 5 * 57 + seed * 101) % 251) as u8;
         }
         scan.azimuth_rad[azimuth] = azimuth as f32 * std::f32::consts::TAU / AZIMUTHS as f32;
         scan.stamp_ns[azimuth] = (azimuth as i64 - AZIMUTHS as i64 / 2) * 625_000;
@@ -82,8 +100,17 @@ pub fn scan(seed: usize) -> OwnedScan {
 
 /// The scan as masking has it, while the vehicle drives a bend at 12 m/s.
 pub fn sweep(number: u64, scan: &OwnedScan) -> Sweep<'_> {
-    let motion = SearchedMotion { x_m: 3.0, y_m: 0.1, yaw_rad: 0.05, interval_ns: 250_000_000 };
-    Sweep { number, scan: scan.view(), motion: Some(motion) }
+    let motion = SearchedMotion {
+        x_m: 3.0,
+        y_m: 0.1,
+        yaw_rad: 0.05,
+        interval_ns: 250_000_000,
+    };
+    Sweep {
+        number,
+        scan: scan.view(),
+        motion: Some(motion),
+    }
 }
 
 /// The raster of a sweep before the network.
@@ -99,8 +126,14 @@ pub fn masks_by_hand(rasters: &[Vec<f32>]) -> Vec<Vec<f32>> {
     let kernel = |place: usize| ((place * 5 % 13) as f64 - 6.0) / 64.0;
     let power = |channel: usize, row: isize, column: isize| {
         let inside = |index: isize| (0..N as isize).contains(&index);
-        let cell = |row: isize, column: isize| f64::from(rasters[channel][row as usize * N + column as usize]) / 16.0;
-        if inside(row) && inside(column) { cell(row, column) } else { 0.0 }
+        let cell = |row: isize, column: isize| {
+            f64::from(rasters[channel][row as usize * N + column as usize]) / 16.0
+        };
+        if inside(row) && inside(column) {
+            cell(row, column)
+        } else {
+            0.0
+        }
     };
     let logit = |out: usize, cell: usize| {
         let (row, column) = ((cell / N) as isize, (cell % N) as isize);
@@ -110,15 +143,25 @@ pub fn masks_by_hand(rasters: &[Vec<f32>]) -> Vec<Vec<f32>> {
         });
         out as f64 / 4.0 + 0.125 + taps.sum::<f64>()
     };
-    let mask = |out: usize| (0..CELLS).map(|cell| (1.0 / (1.0 + (-logit(out, cell)).exp())) as f32).collect();
+    let mask = |out: usize| {
+        (0..CELLS)
+            .map(|cell| (1.0 / (1.0 + (-logit(out, cell)).exp())) as f32)
+            .collect()
+    };
     (0..channels).map(mask).collect()
 }
 
 /// Asserts that the values are those of the raster times the mask.
 pub fn assert_masked(actual: &[f32], raster: &[f32], mask: &[f32]) {
-    assert!(raster.iter().filter(|power| **power > 0.0).count() > CELLS / 2, "a raster of nothing tests nothing");
+    assert!(
+        raster.iter().filter(|power| **power > 0.0).count() > CELLS / 2,
+        "a raster of nothing tests nothing"
+    );
     for (cell, (actual, (power, mask))) in actual.iter().zip(raster.iter().zip(mask)).enumerate() {
         let expected = power * mask;
-        assert!((actual - expected).abs() <= 1e-5 * power, "cell {cell}: {actual}, not {expected}");
+        assert!(
+            (actual - expected).abs() <= 1e-5 * power,
+            "cell {cell}: {actual}, not {expected}"
+        );
     }
 }

@@ -11,14 +11,29 @@ const INTERVAL_S: f64 = 0.25;
 
 /// A small map, each scan a keyframe of it: slots are used again every ten scans or so.
 fn config() -> RefinementConfig {
-    RefinementConfig { keyframes: 2, keyframe_distance_m: 0.5, cell_m: 1.0, reach_m: 30.0, ..Default::default() }
+    RefinementConfig {
+        keyframes: 2,
+        keyframe_distance_m: 0.5,
+        cell_m: 1.0,
+        reach_m: 30.0,
+        ..Default::default()
+    }
 }
 
 /// What the vehicle sees of two rows of posts, `metres` along its way.
 fn scan(metres: f64) -> Vec<ScanPoint> {
-    let post = |k: i32| [f64::from(7 * k % 29) * 7.0 - metres % 7.0 - 90.0, f64::from(k % 5 * 4 - 10)];
+    let post = |k: i32| {
+        [
+            f64::from(7 * k % 29) * 7.0 - metres % 7.0 - 90.0,
+            f64::from(k % 5 * 4 - 10),
+        ]
+    };
     let near = |[x, _]: &[f64; 2]| x.abs() < 28.0;
-    (0..60).map(post).filter(near).map(|[x, y]| [x as f32, y as f32, 0.0, 1.0, 0.0]).collect()
+    (0..60)
+        .map(post)
+        .filter(near)
+        .map(|[x, y]| [x as f32, y as f32, 0.0, 1.0, 0.0])
+        .collect()
 }
 
 /// A process of the stage: what it knows, and the file it shares with the processes before and after.
@@ -31,18 +46,33 @@ struct Life {
 impl Life {
     fn begin(path: &Path) -> Self {
         let refinement = Refinement::new(&config(), 100).unwrap();
-        let checkpoint = Checkpoint::open(path, WINDOW, config().keyframes, refinement.keyframe_cells()).unwrap();
-        Self { refinement, checkpoint, next: None }
+        let checkpoint = Checkpoint::open(
+            path,
+            WINDOW,
+            config().keyframes,
+            refinement.keyframe_cells(),
+        )
+        .unwrap();
+        Self {
+            refinement,
+            checkpoint,
+            next: None,
+        }
     }
 
     /// Works through these items of a drive at `speed` metres a scan; the motions, to the bit.
     fn items(&mut self, items: impl IntoIterator<Item = u64>, speed: f64) -> Vec<[u64; 3]> {
-        items.into_iter().map(|item| self.item(item, speed)).collect()
+        items
+            .into_iter()
+            .map(|item| self.item(item, speed))
+            .collect()
     }
 
     fn item(&mut self, item: u64, speed: f64) -> [u64; 3] {
         if self.next != Some(item) && item > 0 {
-            self.checkpoint.restore(item - 1, &mut self.refinement).unwrap();
+            self.checkpoint
+                .restore(item - 1, &mut self.refinement)
+                .unwrap();
         }
         self.next = Some(item + 1);
         let motion = match item.checked_sub(1) {
@@ -53,11 +83,18 @@ impl Life {
             Some(before) => {
                 let [later, earlier] = [item, before].map(|k| scan(k as f64 * speed));
                 let searched = Isometry2::new(Vector2::new(speed, 0.0), 0.0);
-                self.refinement.next(item, &later, &earlier, &searched, INTERVAL_S).motion
+                self.refinement
+                    .next(item, &later, &earlier, &searched, INTERVAL_S)
+                    .motion
             }
         };
         self.checkpoint.write(item, &self.refinement).unwrap();
-        [motion.translation.x, motion.translation.y, motion.rotation.angle()].map(f64::to_bits)
+        [
+            motion.translation.x,
+            motion.translation.y,
+            motion.rotation.angle(),
+        ]
+        .map(f64::to_bits)
     }
 }
 
@@ -76,7 +113,10 @@ fn a_life_goes_on_where_any_life_before_it_stood() {
             for first in (from..=reached + 1).rev() {
                 let motions = Life::begin(&path).items(first..reached + 2, 1.0);
                 let expected = &alone[first as usize..reached as usize + 2];
-                assert_eq!(motions, expected, "from {first}, {reached} reached before, {repeated} of them again");
+                assert_eq!(
+                    motions, expected,
+                    "from {first}, {reached} reached before, {repeated} of them again"
+                );
             }
         }
     }

@@ -23,10 +23,22 @@ const BAND: RGBColor = RGBColor(205, 226, 243);
 /// # Errors
 /// [`PlotError::Empty`] where no chain has a pose with truth after its first, [`PlotError::Draw`].
 pub fn bands_svg(bands: &Bands) -> Result<String, PlotError> {
-    let last = bands.chains.iter().flatten().map(|sample| sample.time_s).reduce(f64::max).ok_or(PlotError::Empty)?;
+    let last = bands
+        .chains
+        .iter()
+        .flatten()
+        .map(|sample| sample.time_s)
+        .reduce(f64::max)
+        .ok_or(PlotError::Empty)?;
     let legend = [
-        Entry { label: "estimate less truth", symbol: Symbol::Line(line(ESTIMATE, 2.0)) },
-        Entry { label: "3 sigma either way", symbol: Symbol::Area(BAND) },
+        Entry {
+            label: "estimate less truth",
+            symbol: Symbol::Line(line(ESTIMATE, 2.0)),
+        },
+        Entry {
+            label: "3 sigma either way",
+            symbol: Symbol::Area(BAND),
+        },
     ];
     let panels = [
         Panel::new(bands, "x (m)", 0, 1.0),
@@ -34,12 +46,22 @@ pub fn bands_svg(bands: &Bands) -> Result<String, PlotError> {
         Panel::new(bands, "yaw (deg)", 2, 1f64.to_degrees()),
     ];
     document(SIZE, |area| {
-        header(area, "Error over time, and the covariance's band", &caption(bands), &legend)?;
+        header(
+            area,
+            "Error over time, and the covariance's band",
+            &caption(bands),
+            &legend,
+        )?;
         let mut rest = area.split_vertically(px(f64::from(HEADER))).1;
         for (index, panel) in panels.iter().enumerate() {
             let (this, below) = rest.split_vertically(px(f64::from(PANEL)));
             let is_last = index + 1 == panels.len();
-            draw_panel(if is_last { &rest } else { &this }, panel, 0.0..last, is_last)?;
+            draw_panel(
+                if is_last { &rest } else { &this },
+                panel,
+                0.0..last,
+                is_last,
+            )?;
             rest = below;
         }
         Ok(())
@@ -48,8 +70,9 @@ pub fn bands_svg(bands: &Bands) -> Result<String, PlotError> {
 
 fn caption(bands: &Bands) -> String {
     let [x, y, yaw] = bands.inside_percent(SIGMAS);
-    let inside =
-        format!("aligned with the truth at the start; within the band: x {x:.0} %, y {y:.0} %, yaw {yaw:.0} %");
+    let inside = format!(
+        "aligned with the truth at the start; within the band: x {x:.0} %, y {y:.0} %, yaw {yaw:.0} %"
+    );
     match bands.truth_sigma {
         sigma if sigma == TruthSigma::default() => inside,
         sigma => format!("{inside}; truth: {sigma}"),
@@ -78,18 +101,39 @@ impl Panel {
             error: scale * s.error[part],
             band: SIGMAS * scale * s.sigma[part],
         };
-        Self { y_desc, chains: bands.chains.iter().map(|chain| chain.iter().map(point).collect()).collect() }
+        Self {
+            y_desc,
+            chains: bands
+                .chains
+                .iter()
+                .map(|chain| chain.iter().map(point).collect())
+                .collect(),
+        }
     }
 
     /// Symmetric about zero, with all errors and bands in it.
     fn range(&self) -> Range<f64> {
-        let largest = self.chains.iter().flatten().map(|p| p.error.abs().max(p.band)).fold(0.0, f64::max);
-        let top = if largest > 1e-9 { (1.0 + HEADROOM) * largest } else { 1.0 };
+        let largest = self
+            .chains
+            .iter()
+            .flatten()
+            .map(|p| p.error.abs().max(p.band))
+            .fold(0.0, f64::max);
+        let top = if largest > 1e-9 {
+            (1.0 + HEADROOM) * largest
+        } else {
+            1.0
+        };
         -top..top
     }
 }
 
-fn draw_panel(area: &Area<'_>, panel: &Panel, time_s: Range<f64>, with_time_axis: bool) -> Result<(), PlotError> {
+fn draw_panel(
+    area: &Area<'_>,
+    panel: &Panel,
+    time_s: Range<f64>,
+    with_time_axis: bool,
+) -> Result<(), PlotError> {
     let mut builder = ChartBuilder::on(area);
     builder
         .margin_left(px(20.0))
@@ -99,20 +143,33 @@ fn draw_panel(area: &Area<'_>, panel: &Panel, time_s: Range<f64>, with_time_axis
     if with_time_axis {
         builder.set_label_area_size(LabelAreaPosition::Bottom, px(f64::from(TIME_AXIS)));
     }
-    let mut chart = builder.build_cartesian_2d(time_s.clone(), panel.range()).map_err(drawing)?;
+    let mut chart = builder
+        .build_cartesian_2d(time_s.clone(), panel.range())
+        .map_err(drawing)?;
     for chain in &panel.chains {
         chart.draw_series([band(chain)]).map_err(drawing)?;
     }
     draw_mesh(&mut chart, panel.y_desc, with_time_axis)?;
-    chart.draw_series(LineSeries::new([(time_s.start, 0.0), (time_s.end, 0.0)], line(TRUTH, 1.0))).map_err(drawing)?;
+    chart
+        .draw_series(LineSeries::new(
+            [(time_s.start, 0.0), (time_s.end, 0.0)],
+            line(TRUTH, 1.0),
+        ))
+        .map_err(drawing)?;
     for chain in &panel.chains {
         let errors = chain.iter().map(|p| (p.time_s, p.error));
-        chart.draw_series(LineSeries::new(errors, line(ESTIMATE, 2.0))).map_err(drawing)?;
+        chart
+            .draw_series(LineSeries::new(errors, line(ESTIMATE, 2.0)))
+            .map_err(drawing)?;
     }
     Ok(())
 }
 
-fn draw_mesh(chart: &mut Chart<'_, '_>, y_desc: &str, with_time_axis: bool) -> Result<(), PlotError> {
+fn draw_mesh(
+    chart: &mut Chart<'_, '_>,
+    y_desc: &str,
+    with_time_axis: bool,
+) -> Result<(), PlotError> {
     let mut mesh = chart.configure_mesh();
     mesh.max_light_lines(0)
         .bold_line_style(line(GRID, 1.0))

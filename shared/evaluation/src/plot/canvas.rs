@@ -14,7 +14,8 @@ use super::PlotError;
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 /// A diagram with two axes.
-pub type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+pub type Chart<'a, 'b> =
+    ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
 /// plotters places SVG points on whole pixels, which makes curves jagged. So everything is drawn this much larger,
 /// and the document shows it smaller.
@@ -43,7 +44,9 @@ pub fn px(length: f64) -> u32 {
 
 /// A font of `size` px. The SVG back end divides sizes by 1.24; this undoes it.
 pub fn font(size: f64, colour: RGBColor) -> TextStyle<'static> {
-    ("sans-serif", 1.24 * size * f64::from(FINENESS)).into_font().color(&colour)
+    ("sans-serif", 1.24 * size * f64::from(FINENESS))
+        .into_font()
+        .color(&colour)
 }
 
 /// A line of `width` px.
@@ -92,7 +95,10 @@ pub fn chart<'a, 'b>(
 ///
 /// # Errors
 /// [`PlotError::Draw`], or what `draw` returns.
-pub fn document(size: (u32, u32), draw: impl FnOnce(&Area<'_>) -> Result<(), PlotError>) -> Result<String, PlotError> {
+pub fn document(
+    size: (u32, u32),
+    draw: impl FnOnce(&Area<'_>) -> Result<(), PlotError>,
+) -> Result<String, PlotError> {
     let fine = (size.0 * FINENESS, size.1 * FINENESS);
     let mut svg = String::new();
     {
@@ -102,8 +108,10 @@ pub fn document(size: (u32, u32), draw: impl FnOnce(&Area<'_>) -> Result<(), Plo
         area.present().map_err(drawing)?;
     }
     let as_drawn = format!("<svg width=\"{}\" height=\"{}\"", fine.0, fine.1);
-    let as_shown =
-        format!("<svg width=\"{}\" height=\"{}\" stroke-linejoin=\"round\" stroke-linecap=\"round\"", size.0, size.1);
+    let as_shown = format!(
+        "<svg width=\"{}\" height=\"{}\" stroke-linejoin=\"round\" stroke-linecap=\"round\"",
+        size.0, size.1
+    );
     Ok(svg.replacen(&as_drawn, &as_shown, 1))
 }
 
@@ -129,21 +137,49 @@ pub enum Symbol {
 ///
 /// # Errors
 /// [`PlotError::Draw`].
-pub fn header(area: &Area<'_>, title: &str, caption: &str, legend: &[Entry<'_>]) -> Result<(), PlotError> {
+pub fn header(
+    area: &Area<'_>,
+    title: &str,
+    caption: &str,
+    legend: &[Entry<'_>],
+) -> Result<(), PlotError> {
     let at = |x: f64, y: f64| (px(x) as i32, px(y) as i32);
-    area.draw(&Text::new(title.to_owned(), at(24.0, 18.0), font(20.0, INK))).map_err(drawing)?;
-    area.draw(&Text::new(caption.to_owned(), at(24.0, 48.0), font(14.0, QUIET))).map_err(drawing)?;
-    let label = font(14.0, INK).pos(text_anchor::Pos::new(text_anchor::HPos::Left, text_anchor::VPos::Center));
+    area.draw(&Text::new(
+        title.to_owned(),
+        at(24.0, 18.0),
+        font(20.0, INK),
+    ))
+    .map_err(drawing)?;
+    area.draw(&Text::new(
+        caption.to_owned(),
+        at(24.0, 48.0),
+        font(14.0, QUIET),
+    ))
+    .map_err(drawing)?;
+    let label = font(14.0, INK).pos(text_anchor::Pos::new(
+        text_anchor::HPos::Left,
+        text_anchor::VPos::Center,
+    ));
     let width = f64::from(area.dim_in_pixel().0) / f64::from(FINENESS);
     let mut x = width - 24.0 - legend.iter().map(entry_width).sum::<f64>();
     for entry in legend {
         match entry.symbol {
-            Symbol::Line(style) => area.draw(&PathElement::new([at(x, 28.0), at(x + 26.0, 28.0)], style)),
-            Symbol::Area(colour) => area.draw(&Rectangle::new([at(x, 21.0), at(x + 26.0, 35.0)], colour.filled())),
+            Symbol::Line(style) => {
+                area.draw(&PathElement::new([at(x, 28.0), at(x + 26.0, 28.0)], style))
+            }
+            Symbol::Area(colour) => area.draw(&Rectangle::new(
+                [at(x, 21.0), at(x + 26.0, 35.0)],
+                colour.filled(),
+            )),
             Symbol::Dot => area.draw(&dot(at(x + 18.0, 28.0))),
         }
         .map_err(drawing)?;
-        area.draw(&Text::new(entry.label.to_owned(), at(x + 33.0, 28.0), label.clone())).map_err(drawing)?;
+        area.draw(&Text::new(
+            entry.label.to_owned(),
+            at(x + 33.0, 28.0),
+            label.clone(),
+        ))
+        .map_err(drawing)?;
         x += entry_width(entry);
     }
     Ok(())
@@ -158,7 +194,11 @@ pub fn dot<C>(at: C) -> Circle<C, u32> {
 pub fn number(value: &f64) -> String {
     let text = format!("{value:.3}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+    if text == "-0" {
+        "0".to_owned()
+    } else {
+        text.to_owned()
+    }
 }
 
 /// Room for an entry, px; a letter of a 14 px sans-serif font is about half as wide as it is high.

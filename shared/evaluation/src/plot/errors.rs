@@ -25,7 +25,11 @@ pub fn errors_svg(evaluation: &Evaluation) -> Result<String, PlotError> {
 
 fn by_length(kitti: &Kitti) -> Result<String, PlotError> {
     let points = |value: fn(&crate::kitti::KittiLength) -> f64| -> Vec<(f64, f64)> {
-        kitti.by_length.iter().map(|l| (l.length_m, value(l))).collect()
+        kitti
+            .by_length
+            .iter()
+            .map(|l| (l.length_m, value(l)))
+            .collect()
     };
     let caption = format!(
         "mean over {} stretches, step {}: {:.2} %, {:.2} deg/100 m (dashed)",
@@ -43,8 +47,16 @@ fn by_length(kitti: &Kitti) -> Result<String, PlotError> {
         "Error over stretch length",
         &caption,
         [
-            panel("translation (%)", points(|l| l.translation_percent), kitti.translation_percent),
-            panel("rotation (deg/100 m)", points(|l| l.rotation_deg_per_100m), kitti.rotation_deg_per_100m),
+            panel(
+                "translation (%)",
+                points(|l| l.translation_percent),
+                kitti.translation_percent,
+            ),
+            panel(
+                "rotation (deg/100 m)",
+                points(|l| l.rotation_deg_per_100m),
+                kitti.rotation_deg_per_100m,
+            ),
         ],
     )
 }
@@ -71,8 +83,16 @@ fn by_pair(rpe: &Rpe) -> Result<String, PlotError> {
         "Error of each pair",
         &caption,
         [
-            panel("translation (m)", points(|p| p.translation_m), rpe.translation_rmse_m),
-            panel("rotation (deg)", points(|p| p.rotation_deg.abs()), rpe.rotation_rmse_deg),
+            panel(
+                "translation (m)",
+                points(|p| p.translation_m),
+                rpe.translation_rmse_m,
+            ),
+            panel(
+                "rotation (deg)",
+                points(|p| p.rotation_deg.abs()),
+                rpe.rotation_rmse_deg,
+            ),
         ],
     )
 }
@@ -101,17 +121,40 @@ fn draw(title: &str, caption: &str, panels: [Panel; 2]) -> Result<String, PlotEr
 fn draw_panel(area: &Area<'_>, panel: &Panel) -> Result<(), PlotError> {
     let largest = panel.values.iter().map(|v| v.1).fold(0.0, f64::max);
     // an estimate without any error still gets an axis
-    let top = if largest > 1e-9 { (1.0 + HEADROOM) * largest } else { 1.0 };
-    let mut chart = chart(area, panel.x.clone(), 0.0..top, [panel.x_desc, panel.y_desc])?;
+    let top = if largest > 1e-9 {
+        (1.0 + HEADROOM) * largest
+    } else {
+        1.0
+    };
+    let mut chart = chart(
+        area,
+        panel.x.clone(),
+        0.0..top,
+        [panel.x_desc, panel.y_desc],
+    )?;
     if let Some(mean) = panel.mean {
         let ends = [(panel.x.start, mean), (panel.x.end, mean)];
-        chart.draw_series(DashedLineSeries::new(ends, px(6.0), px(5.0), line(MARK, 1.5))).map_err(drawing)?;
+        chart
+            .draw_series(DashedLineSeries::new(
+                ends,
+                px(6.0),
+                px(5.0),
+                line(MARK, 1.5),
+            ))
+            .map_err(drawing)?;
     }
-    chart.draw_series(LineSeries::new(panel.values.iter().copied(), line(ESTIMATE, 2.0))).map_err(drawing)?;
+    chart
+        .draw_series(LineSeries::new(
+            panel.values.iter().copied(),
+            line(ESTIMATE, 2.0),
+        ))
+        .map_err(drawing)?;
     // dots while they can be told apart
     if panel.values.len() <= 60 {
         let dot = |&at: &(f64, f64)| Circle::new(at, px(4.0), ESTIMATE.filled());
-        chart.draw_series(panel.values.iter().map(dot)).map_err(drawing)?;
+        chart
+            .draw_series(panel.values.iter().map(dot))
+            .map_err(drawing)?;
     }
     Ok(())
 }

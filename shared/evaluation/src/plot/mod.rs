@@ -48,9 +48,16 @@ pub enum PlotError {
 ///
 /// # Errors
 /// [`PlotError`]: no poses, poses that are none or not equally many, a file that cannot be written.
-pub fn plot_trajectory(path: &Path, estimate: &[Pose], truth: Option<&[Pose]>) -> Result<(), PlotError> {
+pub fn plot_trajectory(
+    path: &Path,
+    estimate: &[Pose],
+    truth: Option<&[Pose]>,
+) -> Result<(), PlotError> {
     let svg = match truth {
-        Some(truth) => trajectory_svg(estimate, Some(&MatchedPoses::new(estimate.to_vec(), truth.to_vec())?))?,
+        Some(truth) => trajectory_svg(
+            estimate,
+            Some(&MatchedPoses::new(estimate.to_vec(), truth.to_vec())?),
+        )?,
         None => trajectory_svg(estimate, None)?,
     };
     write(path, &svg)
@@ -75,5 +82,8 @@ pub fn plot_bands(path: &Path, bands: &Bands) -> Result<(), PlotError> {
 }
 
 fn write(path: &Path, svg: &str) -> Result<(), PlotError> {
-    std::fs::write(path, svg).map_err(|source| PlotError::Write { path: path.to_owned(), source })
+    std::fs::write(path, svg).map_err(|source| PlotError::Write {
+        path: path.to_owned(),
+        source,
+    })
 }

@@ -26,11 +26,18 @@ const LEAST_EXTENT_M: f64 = 1.0;
 ///
 /// # Errors
 /// [`PlotError::Empty`], [`PlotError::Poses`] where a pose is none, [`PlotError::Draw`].
-pub fn trajectory_svg(estimate: &[Pose], matched: Option<&MatchedPoses>) -> Result<String, PlotError> {
+pub fn trajectory_svg(
+    estimate: &[Pose],
+    matched: Option<&MatchedPoses>,
+) -> Result<String, PlotError> {
     require_poses(Side::Estimate, estimate)?;
     let scene = Scene::new(estimate, matched);
-    let view = View::around(scene.estimate.iter().chain(scene.truth.iter().flatten())).ok_or(PlotError::Empty)?;
-    let size = (view.width_px + LEFT + 2 * MARGIN, view.height_px + BELOW + HEADER + MARGIN);
+    let view = View::around(scene.estimate.iter().chain(scene.truth.iter().flatten()))
+        .ok_or(PlotError::Empty)?;
+    let size = (
+        view.width_px + LEFT + 2 * MARGIN,
+        view.height_px + BELOW + HEADER + MARGIN,
+    );
     document(size, |area| {
         header(area, scene.title, &scene.caption, &scene.legend())?;
         draw(area, &scene, &view)
@@ -49,30 +56,57 @@ impl Scene {
     fn new(estimate: &[Pose], matched: Option<&MatchedPoses>) -> Self {
         let Some(matched) = matched else {
             let caption = format!("{} poses, {:.1} m", estimate.len(), path_m(estimate));
-            return Self { estimate: positions(estimate), truth: None, title: "Trajectory", caption };
+            return Self {
+                estimate: positions(estimate),
+                truth: None,
+                title: "Trajectory",
+                caption,
+            };
         };
         let ate = ate(matched);
-        let aligned: Vec<_> = matched.estimate().iter().map(|p| ate.truth_from_estimate * p).collect();
+        let aligned: Vec<_> = matched
+            .estimate()
+            .iter()
+            .map(|p| ate.truth_from_estimate * p)
+            .collect();
         Self {
             estimate: positions(&aligned),
             truth: Some(positions(matched.truth())),
             title: "Trajectory against ground truth",
-            caption: format!("estimate moved onto the truth by SE(2) alignment; ATE {:.2} m rmse", ate.rmse_m),
+            caption: format!(
+                "estimate moved onto the truth by SE(2) alignment; ATE {:.2} m rmse",
+                ate.rmse_m
+            ),
         }
     }
 
     fn legend(&self) -> Vec<Entry<'static>> {
-        let mut legend = vec![Entry { label: "estimate", symbol: Symbol::Line(line(ESTIMATE, 2.0)) }];
+        let mut legend = vec![Entry {
+            label: "estimate",
+            symbol: Symbol::Line(line(ESTIMATE, 2.0)),
+        }];
         if self.truth.is_some() {
-            legend.insert(0, Entry { label: "truth", symbol: Symbol::Line(line(TRUTH, 4.0)) });
+            legend.insert(
+                0,
+                Entry {
+                    label: "truth",
+                    symbol: Symbol::Line(line(TRUTH, 4.0)),
+                },
+            );
         }
-        legend.push(Entry { label: "start", symbol: Symbol::Dot });
+        legend.push(Entry {
+            label: "start",
+            symbol: Symbol::Dot,
+        });
         legend
     }
 }
 
 fn positions(poses: &[Pose]) -> Vec<(f64, f64)> {
-    poses.iter().map(|p| (p.translation.x, p.translation.y)).collect()
+    poses
+        .iter()
+        .map(|p| (p.translation.x, p.translation.y))
+        .collect()
 }
 
 /// The part of the plane that is shown, at the same scale both ways.
@@ -86,8 +120,12 @@ struct View {
 impl View {
     /// Shows all `points`; `None` where there are none.
     fn around<'a>(points: impl Iterator<Item = &'a (f64, f64)>) -> Option<Self> {
-        let grow = |b: [f64; 4], p: &(f64, f64)| [b[0].min(p.0), b[1].max(p.0), b[2].min(p.1), b[3].max(p.1)];
-        let [left, right, low, high] = points.fold(None, |b, p| Some(grow(b.unwrap_or([p.0, p.0, p.1, p.1]), p)))?;
+        let grow = |b: [f64; 4], p: &(f64, f64)| {
+            [b[0].min(p.0), b[1].max(p.0), b[2].min(p.1), b[3].max(p.1)]
+        };
+        let [left, right, low, high] = points.fold(None, |b, p| {
+            Some(grow(b.unwrap_or([p.0, p.0, p.1, p.1]), p))
+        })?;
         let border = BORDER * (right - left).max(high - low).max(LEAST_EXTENT_M);
         let (width_m, height_m) = (right - left + 2.0 * border, high - low + 2.0 * border);
         let px_per_m = (LARGEST.0 / width_m).min(LARGEST.1 / height_m);
@@ -135,9 +173,16 @@ fn draw(area: &Area<'_>, scene: &Scene, view: &View) -> Result<(), PlotError> {
         .draw()
         .map_err(drawing)?;
     if let Some(truth) = &scene.truth {
-        chart.draw_series(LineSeries::new(truth.iter().copied(), line(TRUTH, 4.0))).map_err(drawing)?;
+        chart
+            .draw_series(LineSeries::new(truth.iter().copied(), line(TRUTH, 4.0)))
+            .map_err(drawing)?;
     }
-    chart.draw_series(LineSeries::new(scene.estimate.iter().copied(), line(ESTIMATE, 2.0))).map_err(drawing)?;
+    chart
+        .draw_series(LineSeries::new(
+            scene.estimate.iter().copied(),
+            line(ESTIMATE, 2.0),
+        ))
+        .map_err(drawing)?;
     if let Some(&start) = scene.estimate.first() {
         chart.draw_series([dot(start)]).map_err(drawing)?;
     }

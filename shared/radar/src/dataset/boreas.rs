@@ -24,11 +24,18 @@ const NEW_FIRMWARE_NS: i64 = 1_632_182_400 * SECOND_NS;
 const STAMPS: &str = "Files are named by the time of azimuth n/2 - 1, the sweep's middle; that row's stamp is the scan's time, as in the ground truth.";
 
 pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<NavtechScans, OpenError> {
-    NavtechScans::open(found, options, |look| profile(Format::Boreas, resolution_by_date(look)))
+    NavtechScans::open(found, options, |look| {
+        profile(Format::Boreas, resolution_by_date(look))
+    })
 }
 
-pub(crate) fn open_road_trip(found: Found, options: &DatasetOptions) -> Result<NavtechScans, OpenError> {
-    NavtechScans::open(found, options, |_| profile(Format::BoreasRt, NEW_RANGE_RESOLUTION_M))
+pub(crate) fn open_road_trip(
+    found: Found,
+    options: &DatasetOptions,
+) -> Result<NavtechScans, OpenError> {
+    NavtechScans::open(found, options, |_| {
+        profile(Format::BoreasRt, NEW_RANGE_RESOLUTION_M)
+    })
 }
 
 fn resolution_by_date(look: Option<&FirstLook>) -> f32 {

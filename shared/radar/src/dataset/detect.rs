@@ -24,10 +24,19 @@ pub(crate) struct Found {
 
 impl Found {
     /// A recording that lies in no folder.
-    pub(crate) fn source(source: Box<dyn ImageSource>, forced: Option<Format>) -> Result<Self, OpenError> {
+    pub(crate) fn source(
+        source: Box<dyn ImageSource>,
+        forced: Option<Format>,
+    ) -> Result<Self, OpenError> {
         let format = forced.unwrap_or(source.format());
         let (folder, stamps) = (source.folder(), source.stamps());
-        Ok(Self { format, folder, images: Images::of(source)?, notes: Vec::new(), stamps })
+        Ok(Self {
+            format,
+            folder,
+            images: Images::of(source)?,
+            notes: Vec::new(),
+            stamps,
+        })
     }
 }
 
@@ -37,9 +46,16 @@ const LAYOUTS: [(Format, &[&str]); 8] = [
     (Format::Oord, &["Navtech_CTS350-X_Radar"]),
     (
         Format::MulranOxfordForm,
-        &["polar_oxford_form", "radar/polar_oxford_form", "sensor_data/radar/polar_oxford_form"],
+        &[
+            "polar_oxford_form",
+            "radar/polar_oxford_form",
+            "sensor_data/radar/polar_oxford_form",
+        ],
     ),
-    (Format::Mulran, &["sensor_data/radar/polar", "radar/polar", "polar"]),
+    (
+        Format::Mulran,
+        &["sensor_data/radar/polar", "radar/polar", "polar"],
+    ),
     (Format::Fomo, &["navtech"]),
     (Format::Oxford, &["radar"]),
     (Format::Boreas, &["radar"]),
@@ -55,22 +71,38 @@ pub(crate) fn locate(root: &Path, forced: Option<Format>) -> Result<Found, OpenE
         Some(format) => (format, Vec::new()),
         None => by_image(root, &folder, &mut images)?,
     };
-    Ok(Found { format, folder, images, notes, stamps: None })
+    Ok(Found {
+        format,
+        folder,
+        images,
+        notes,
+        stamps: None,
+    })
 }
 
 fn check_folder(root: &Path) -> Result<(), OpenError> {
     match fs::metadata(root) {
         Ok(entry) if entry.is_dir() => Ok(()),
-        Ok(_) => Err(OpenError::NotAFolder { path: root.to_owned() }),
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Err(OpenError::Missing { path: root.to_owned() }),
-        Err(source) => Err(OpenError::Io { path: root.to_owned(), source }),
+        Ok(_) => Err(OpenError::NotAFolder {
+            path: root.to_owned(),
+        }),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Err(OpenError::Missing {
+            path: root.to_owned(),
+        }),
+        Err(source) => Err(OpenError::Io {
+            path: root.to_owned(),
+            source,
+        }),
     }
 }
 
 /// The folder that holds the images: one of the layouts', else the root.
 fn find_folder(root: &Path, forced: Option<Format>) -> Result<PathBuf, OpenError> {
     let known = || {
-        LAYOUTS.iter().filter(|(f, _)| forced.is_none_or(|forced| forced == *f)).flat_map(|(_, folders)| folders.iter())
+        LAYOUTS
+            .iter()
+            .filter(|(f, _)| forced.is_none_or(|forced| forced == *f))
+            .flat_map(|(_, folders)| folders.iter())
     };
     let mut candidates = known().map(|folder| root.join(folder));
     if let Some(folder) = candidates.clone().find(|folder| has_png(folder)) {
@@ -85,70 +117,125 @@ fn find_folder(root: &Path, forced: Option<Format>) -> Result<PathBuf, OpenError
         return Err(OpenError::NoImages { path: folder });
     }
     if fs::read_dir(root).is_ok_and(|mut entries| entries.next().is_none()) {
-        return Err(OpenError::NoImages { path: root.to_owned() });
+        return Err(OpenError::NoImages {
+            path: root.to_owned(),
+        });
     }
     let mut folders: Vec<&str> = known().copied().collect();
     folders.dedup();
-    let reason = format!("it holds no PNG images itself, and none of the folders {}", folders.join(", "));
-    Err(OpenError::UnknownLayout { path: root.to_owned(), reason })
+    let reason = format!(
+        "it holds no PNG images itself, and none of the folders {}",
+        folders.join(", ")
+    );
+    Err(OpenError::UnknownLayout {
+        path: root.to_owned(),
+        reason,
+    })
 }
 
 /// The format that a folder's name and its neighbours leave no doubt of.
 fn by_layout(root: &Path, folder: &Path) -> Option<Format> {
     let name = folder.file_name()?.to_str()?;
-    let beside =
-        |file: &str| root.join(file).exists() || folder.parent().is_some_and(|parent| parent.join(file).exists());
+    let beside = |file: &str| {
+        root.join(file).exists()
+            || folder
+                .parent()
+                .is_some_and(|parent| parent.join(file).exists())
+    };
     match name {
         "Navtech_Polar" => Some(Format::Radiate),
         "Navtech_CTS350-X_Radar" => Some(Format::Oord),
         "polar_oxford_form" => Some(Format::MulranOxfordForm),
         "polar" => Some(Format::Mulran),
         "navtech" => Some(Format::Fomo),
-        "radar" if beside("radar.timestamps") || beside("gt/radar_odometry.csv") => Some(Format::Oxford),
+        "radar" if beside("radar.timestamps") || beside("gt/radar_odometry.csv") => {
+            Some(Format::Oxford)
+        }
         _ => None,
     }
 }
 
 /// The format that fits the first image best.
-fn by_image(root: &Path, folder: &Path, images: &mut Images) -> Result<(Format, Vec<String>), OpenError> {
+fn by_image(
+    root: &Path,
+    folder: &Path,
+    images: &mut Images,
+) -> Result<(Format, Vec<String>), OpenError> {
     let unknown = |reason: &str| OpenError::UnknownLayout {
         path: folder.to_owned(),
         reason: format!("its images ({}) {reason}", images_size(folder)),
     };
     let Some(look) = FirstLook::take(images).filter(FirstLook::has_stamps) else {
-        let without_metadata = images.size.height > images.size.width && images.name_stamp_ns(0).is_some();
+        let without_metadata =
+            images.size.height > images.size.width && images.name_stamp_ns(0).is_some();
         return match without_metadata {
-            true => Ok((Format::Mulran, vec![decided(Format::Mulran, "images on their side, named by times")])),
+            true => Ok((
+                Format::Mulran,
+                vec![decided(
+                    Format::Mulran,
+                    "images on their side, named by times",
+                )],
+            )),
             false => Err(unknown(
                 "bear no stamps in their first 8 columns, lie beside no list of stamps, and are not named by times",
             )),
         };
     };
     let boreas_folders = ["applanix", "calib"].iter().any(|f| root.join(f).is_dir());
-    let mut scores: Vec<(i32, Format)> = Format::ALL.iter().map(|f| (score(*f, &look, boreas_folders), *f)).collect();
+    let mut scores: Vec<(i32, Format)> = Format::ALL
+        .iter()
+        .map(|f| (score(*f, &look, boreas_folders), *f))
+        .collect();
     scores.sort_by_key(|(score, format)| (-score, *format));
     let (best, format) = scores[0];
-    let equal: Vec<&str> = scores.iter().skip(1).filter(|(s, _)| *s == best).map(|(_, f)| f.name()).collect();
+    let equal: Vec<&str> = scores
+        .iter()
+        .skip(1)
+        .filter(|(s, _)| *s == best)
+        .map(|(_, f)| f.name())
+        .collect();
     let mut note = decided(format, &evidence(&look));
     if !equal.is_empty() {
-        note += &format!(" It fits {} equally: `format = \"{}\"` would force that.", equal.join(" and "), equal[0]);
+        note += &format!(
+            " It fits {} equally: `format = \"{}\"` would force that.",
+            equal.join(" and "),
+            equal[0]
+        );
     }
     Ok((format, vec![note]))
 }
 
 fn images_size(folder: &Path) -> String {
-    Images::open(folder).map(|images| images.size.to_string()).unwrap_or_default()
+    Images::open(folder)
+        .map(|images| images.size.to_string())
+        .unwrap_or_default()
 }
 
 fn decided(format: Format, evidence: &str) -> String {
-    format!("The folder's layout names no dataset; read as {format} from its first image: {evidence}.")
+    format!(
+        "The folder's layout names no dataset; read as {format} from its first image: {evidence}."
+    )
 }
 
 fn evidence(look: &FirstLook) -> String {
-    let named = look.named_by().map_or("a name that is no time of the sweep", NamedBy::words);
-    let named = if look.named_by().is_some() { format!("named by {named}") } else { named.to_owned() };
-    let chirps = if look.chirps_alternate() { ", chirps alternate" } else { "" };
-    let unit = if look.nanoseconds() { ", stamps in ns" } else { "" };
+    let named = look
+        .named_by()
+        .map_or("a name that is no time of the sweep", NamedBy::words);
+    let named = if look.named_by().is_some() {
+        format!("named by {named}")
+    } else {
+        named.to_owned()
+    };
+    let chirps = if look.chirps_alternate() {
+        ", chirps alternate"
+    } else {
+        ""
+    };
+    let unit = if look.nanoseconds() {
+        ", stamps in ns"
+    } else {
+        ""
+    };
     format!("{} range bins, {named}{chirps}{unit}", look.bins())
 }
 
@@ -166,10 +253,20 @@ fn score(format: Format, look: &FirstLook, boreas_folders: bool) -> i32 {
         Format::Oord | Format::Mulran | Format::Radiate => return NEVER,
     };
     let boreas = matches!(format, Format::Boreas | Format::BoreasRt);
-    let by_name = look.named_by().map_or(0, |by| if by == named { 2 } else { -2 });
+    let by_name = look
+        .named_by()
+        .map_or(0, |by| if by == named { 2 } else { -2 });
     let by_bins = if bins.contains(&look.bins()) { 2 } else { 0 };
-    let by_chirps = if look.chirps_alternate() == chirps { 1 } else { -1 };
-    let by_unit = if look.nanoseconds() == (format == Format::MulranOxfordForm) { 0 } else { -3 };
+    let by_chirps = if look.chirps_alternate() == chirps {
+        1
+    } else {
+        -1
+    };
+    let by_unit = if look.nanoseconds() == (format == Format::MulranOxfordForm) {
+        0
+    } else {
+        -3
+    };
     let by_folders = if boreas_folders && boreas { 4 } else { 0 };
     by_name + by_bins + by_chirps + by_unit + by_folders
 }

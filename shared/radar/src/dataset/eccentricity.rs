@@ -27,7 +27,13 @@ mod tests {
         let mut azimuths = [0.0, 0.25 * TAU, 0.5 * TAU, 0.75 * TAU];
         correct(&mut azimuths, -0.01);
         let expected = [TAU - 0.01, 0.25 * TAU, 0.5 * TAU + 0.01, 0.75 * TAU];
-        assert!(azimuths.iter().zip(expected).all(|(a, e)| (a - e).abs() < 1e-6), "{azimuths:?}");
+        assert!(
+            azimuths
+                .iter()
+                .zip(expected)
+                .all(|(a, e)| (a - e).abs() < 1e-6),
+            "{azimuths:?}"
+        );
         let mut tiny = [f32::MIN_POSITIVE];
         correct(&mut tiny, -1e-9);
         assert!((0.0..TAU).contains(&tiny[0]), "{tiny:?}");

@@ -15,19 +15,25 @@ pub enum OpenError {
         path: PathBuf,
     },
     /// A file where a folder must be.
-    #[error("{path} is a file: name the dataset's folder, the one that holds the radar images or their folder")]
+    #[error(
+        "{path} is a file: name the dataset's folder, the one that holds the radar images or their folder"
+    )]
     NotAFolder {
         /// The path that was asked for.
         path: PathBuf,
     },
     /// A folder without radar images.
-    #[error("{path} holds no PNG images: nothing was downloaded or unpacked there, or the path is one level off")]
+    #[error(
+        "{path} holds no PNG images: nothing was downloaded or unpacked there, or the path is one level off"
+    )]
     NoImages {
         /// The folder where the images should be.
         path: PathBuf,
     },
     /// Images or folders of a layout that no reader knows.
-    #[error("{path} is not a dataset that Gyre knows: {reason}; if it is one, say which with `format`")]
+    #[error(
+        "{path} is not a dataset that Gyre knows: {reason}; if it is one, say which with `format`"
+    )]
     UnknownLayout {
         /// The dataset's root.
         path: PathBuf,
@@ -65,7 +71,9 @@ pub enum OpenError {
         source: std::io::Error,
     },
     /// A `dataset.toml` that cannot be understood.
-    #[error("{path} should say how the recording is to be read, with the keys of [dataset]: {reason}")]
+    #[error(
+        "{path} should say how the recording is to be read, with the keys of [dataset]: {reason}"
+    )]
     Told {
         /// The file.
         path: PathBuf,
@@ -115,7 +123,9 @@ pub enum ReadError {
         path: PathBuf,
     },
     /// A file that ends too early.
-    #[error("{path} is cut short: its {bytes} bytes end before the image does; copy or download it again")]
+    #[error(
+        "{path} is cut short: its {bytes} bytes end before the image does; copy or download it again"
+    )]
     Truncated {
         /// The file.
         path: PathBuf,
@@ -221,7 +231,10 @@ pub enum ReadError {
 }
 
 fn turned(actual: &ImageSize, expected: &ImageSize) -> &'static str {
-    if actual.width == expected.height && actual.height == expected.width && actual.width != actual.height {
+    if actual.width == expected.height
+        && actual.height == expected.width
+        && actual.width != actual.height
+    {
         ": it lies rotated by 90 degrees"
     } else {
         ""

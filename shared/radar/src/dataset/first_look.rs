@@ -45,7 +45,11 @@ impl FirstLook {
             return None;
         }
         let (index, pixels) = images.first_readable()?;
-        Some(Self { size, rows: rows(&pixels, size).collect(), name_ns: images.name_stamp_ns(index) })
+        Some(Self {
+            size,
+            rows: rows(&pixels, size).collect(),
+            name_ns: images.name_stamp_ns(index),
+        })
     }
 
     /// Range bins.
@@ -55,12 +59,16 @@ impl FirstLook {
 
     /// Whether every row bears a time at which a radar may have run.
     pub(crate) fn has_stamps(&self) -> bool {
-        self.rows.iter().all(|row| stamp::to_ns(row.stamp).is_some())
+        self.rows
+            .iter()
+            .all(|row| stamp::to_ns(row.stamp).is_some())
     }
 
     /// Whether the rows' stamps are in nanoseconds.
     pub(crate) fn nanoseconds(&self) -> bool {
-        self.rows.first().is_some_and(|row| stamp::plausible(row.stamp))
+        self.rows
+            .first()
+            .is_some_and(|row| stamp::plausible(row.stamp))
     }
 
     /// A row's time, ns.
@@ -86,15 +94,26 @@ impl FirstLook {
     /// Which of the rows' times the file is named by; `None` where its name is no time or near none of them.
     pub(crate) fn named_by(&self) -> Option<NamedBy> {
         let (name, last) = (self.name_ns?, self.rows.len() - 1);
-        let rows = [(NamedBy::Start, 0), (NamedBy::Middle, self.rows.len() / 2 - 1), (NamedBy::End, last)];
+        let rows = [
+            (NamedBy::Start, 0),
+            (NamedBy::Middle, self.rows.len() / 2 - 1),
+            (NamedBy::End, last),
+        ];
         let distance = |row| Some((self.row_ns(row)? - name).abs());
-        let (by, near) = rows.into_iter().filter_map(|(by, row)| Some((by, distance(row)?))).min_by_key(|(_, d)| *d)?;
+        let (by, near) = rows
+            .into_iter()
+            .filter_map(|(by, row)| Some((by, distance(row)?)))
+            .min_by_key(|(_, d)| *d)?;
         (near <= SAME_TIME_NS).then_some(by)
     }
 
     /// Least and most time between neighbouring rows, ns, and the mean.
     pub(crate) fn row_intervals_ns(&self) -> Option<(i64, i64, i64)> {
-        let stamps: Vec<i64> = self.rows.iter().map_while(|row| stamp::to_ns(row.stamp)).collect();
+        let stamps: Vec<i64> = self
+            .rows
+            .iter()
+            .map_while(|row| stamp::to_ns(row.stamp))
+            .collect();
         let intervals = || stamps.windows(2).map(|w| w[1] - w[0]);
         let mean = (stamps.last()? - stamps.first()?) / (stamps.len().max(2) as i64 - 1);
         Some((intervals().min()?, intervals().max()?, mean))
@@ -103,7 +122,10 @@ impl FirstLook {
     /// Encoder counts from row to row where all rows have the same step, and over the seam from the last row to the first.
     pub(crate) fn encoder_step(&self, counts: u16) -> Option<(u16, u16)> {
         let step = self.rows[1].count.checked_sub(self.rows[0].count)?;
-        let even = self.rows.windows(2).all(|w| w[1].count.checked_sub(w[0].count) == Some(step));
+        let even = self
+            .rows
+            .windows(2)
+            .all(|w| w[1].count.checked_sub(w[0].count) == Some(step));
         let (first, last) = (self.rows[0].count, self.rows[self.rows.len() - 1].count);
         let seam = first.checked_add(counts)?.checked_sub(last)?;
         even.then_some((step, seam))

@@ -28,7 +28,11 @@ enum Origin {
 
 impl fmt::Debug for Origin {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(if matches!(self, Self::Files(_)) { "Files" } else { "Source" })
+        f.write_str(if matches!(self, Self::Files(_)) {
+            "Files"
+        } else {
+            "Source"
+        })
     }
 }
 
@@ -37,19 +41,36 @@ impl Images {
     pub(crate) fn open(folder: &Path) -> Result<Self, OpenError> {
         let files = list_png(folder)?;
         let Some(first) = files.first() else {
-            return Err(OpenError::NoImages { path: folder.to_owned() });
+            return Err(OpenError::NoImages {
+                path: folder.to_owned(),
+            });
         };
-        let size = png_image::read_size(first)
-            .or_else(|error| files.iter().take(FIRST_TRIES).find_map(|f| png_image::read_size(f).ok()).ok_or(error))?;
-        Ok(Self { files, size, origin: Origin::Files(ImageReader::default()) })
+        let size = png_image::read_size(first).or_else(|error| {
+            files
+                .iter()
+                .take(FIRST_TRIES)
+                .find_map(|f| png_image::read_size(f).ok())
+                .ok_or(error)
+        })?;
+        Ok(Self {
+            files,
+            size,
+            origin: Origin::Files(ImageReader::default()),
+        })
     }
 
     /// Images that lie in no folder.
     pub(crate) fn of(source: Box<dyn ImageSource>) -> Result<Self, OpenError> {
         let (files, size) = (source.files(), source.size());
         match files.is_empty() {
-            true => Err(OpenError::NoImages { path: source.folder() }),
-            false => Ok(Self { files, size, origin: Origin::Source(source) }),
+            true => Err(OpenError::NoImages {
+                path: source.folder(),
+            }),
+            false => Ok(Self {
+                files,
+                size,
+                origin: Origin::Source(source),
+            }),
         }
     }
 
@@ -59,7 +80,9 @@ impl Images {
 
     /// The file of a scan; an empty path past the end.
     pub(crate) fn file(&self, index: usize) -> &Path {
-        self.files.get(index).map_or(Path::new(""), PathBuf::as_path)
+        self.files
+            .get(index)
+            .map_or(Path::new(""), PathBuf::as_path)
     }
 
     /// The number that a file is named by.
@@ -74,9 +97,16 @@ impl Images {
 
     pub(crate) fn decode(&mut self, index: usize, pixels: &mut [u8]) -> Result<(), ReadError> {
         let len = self.files.len();
-        let path = self.files.get(index).ok_or(ReadError::NoSuchScan { index, len })?;
+        let path = self
+            .files
+            .get(index)
+            .ok_or(ReadError::NoSuchScan { index, len })?;
         let (room, needed) = (pixels.len(), self.size.bytes());
-        let pixels = pixels.get_mut(..needed).ok_or(ReadError::SlotTooSmall { what: "bytes", needed, actual: room })?;
+        let pixels = pixels.get_mut(..needed).ok_or(ReadError::SlotTooSmall {
+            what: "bytes",
+            needed,
+            actual: room,
+        })?;
         match &mut self.origin {
             Origin::Files(reader) => reader.decode(path, self.size, pixels),
             Origin::Source(source) => {
@@ -89,18 +119,26 @@ impl Images {
     /// The first image that can be decoded, with its index.
     pub(crate) fn first_readable(&mut self) -> Option<(usize, Vec<u8>)> {
         let mut pixels = vec![0; self.size.bytes()];
-        let index = (0..self.len().min(FIRST_TRIES)).find(|i| self.decode(*i, &mut pixels).is_ok())?;
+        let index =
+            (0..self.len().min(FIRST_TRIES)).find(|i| self.decode(*i, &mut pixels).is_ok())?;
         Some((index, pixels))
     }
 }
 
 /// The PNG files of a folder: numbered ones by number, then the others by name.
 pub(crate) fn list_png(folder: &Path) -> Result<Vec<PathBuf>, OpenError> {
-    let io_error = |source| OpenError::Io { path: folder.to_owned(), source };
+    let io_error = |source| OpenError::Io {
+        path: folder.to_owned(),
+        source,
+    };
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).map_err(io_error)? {
         let path = entry.map_err(io_error)?.path();
-        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) && path.is_file() {
+        if path
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("png"))
+            && path.is_file()
+        {
             files.push(path);
         }
     }

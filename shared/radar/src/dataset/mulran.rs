@@ -20,10 +20,12 @@ pub const RANGE_RESOLUTION_M: f32 = 200.0 / 3360.0;
 
 const STAMPS: &str = "Files are named by the end of the sweep; a scan's time is half a turn earlier, a turn being the time since the \
                       file before, and columns are spread evenly over the turn.";
-const ROW_STAMPS: &str =
-    "Files are named by the end of the sweep; a scan's time is half-way between its first and last row's stamps.";
+const ROW_STAMPS: &str = "Files are named by the end of the sweep; a scan's time is half-way between its first and last row's stamps.";
 
-pub(crate) fn open_oxford_form(found: Found, options: &DatasetOptions) -> Result<NavtechScans, OpenError> {
+pub(crate) fn open_oxford_form(
+    found: Found,
+    options: &DatasetOptions,
+) -> Result<NavtechScans, OpenError> {
     NavtechScans::open(found, options, |_| Profile {
         format: Format::MulranOxfordForm,
         range_resolution_m: RANGE_RESOLUTION_M,
@@ -52,25 +54,38 @@ pub(crate) struct MulranPolar {
 impl MulranPolar {
     pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<Self, OpenError> {
         let (scans, notes) = SidewaysScans::open(found, options, |_| RANGE_RESOLUTION_M)?;
-        let end_ns = (0..scans.images.len()).map(|index| end_ns(&scans, index)).collect::<Result<Vec<_>, _>>()?;
+        let end_ns = (0..scans.images.len())
+            .map(|index| end_ns(&scans, index))
+            .collect::<Result<Vec<_>, _>>()?;
         let period_ns = stamp::usual_interval(end_ns.iter().copied());
-        Ok(Self { scans, end_ns, period_ns, notes })
+        Ok(Self {
+            scans,
+            end_ns,
+            period_ns,
+            notes,
+        })
     }
 
     /// Start and length of a scan's turn.
     fn turn_ns(&self, index: usize) -> Option<(i64, i64)> {
         let end = *self.end_ns.get(index)?;
         let since = index.checked_sub(1).map(|before| end - self.end_ns[before]);
-        let period = since.filter(|ns| (ns - self.period_ns).abs() < self.period_ns / 5).unwrap_or(self.period_ns);
+        let period = since
+            .filter(|ns| (ns - self.period_ns).abs() < self.period_ns / 5)
+            .unwrap_or(self.period_ns);
         Some((end - period, period))
     }
 }
 
 fn end_ns(scans: &SidewaysScans, index: usize) -> Result<i64, OpenError> {
-    scans.images.name_stamp_ns(index).ok_or_else(|| OpenError::UnknownLayout {
-        path: scans.images.file(index).to_owned(),
-        reason: "a MulRan image is named by its time in ns, of the years 2015 to 2040".to_owned(),
-    })
+    scans
+        .images
+        .name_stamp_ns(index)
+        .ok_or_else(|| OpenError::UnknownLayout {
+            path: scans.images.file(index).to_owned(),
+            reason: "a MulRan image is named by its time in ns, of the years 2015 to 2040"
+                .to_owned(),
+        })
 }
 
 impl Dataset for MulranPolar {
@@ -99,7 +114,8 @@ impl Dataset for MulranPolar {
     }
 
     fn nominal_stamp_ns(&self, index: usize) -> Option<i64> {
-        self.turn_ns(index).map(|(start, period)| start + mean_after_start_ns(period, self.scans.azimuths()))
+        self.turn_ns(index)
+            .map(|(start, period)| start + mean_after_start_ns(period, self.scans.azimuths()))
     }
 
     fn logged_stamp_ns(&self, index: usize) -> Option<i64> {
@@ -119,7 +135,10 @@ impl Dataset for MulranPolar {
     }
 
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {
-        let (start_ns, period_ns) = self.turn_ns(index).ok_or(ReadError::NoSuchScan { index, len: self.len() })?;
+        let (start_ns, period_ns) = self.turn_ns(index).ok_or(ReadError::NoSuchScan {
+            index,
+            len: self.len(),
+        })?;
         self.scans.read(index, slot, start_ns, period_ns)
     }
 }

@@ -30,13 +30,20 @@ impl RowMetadata {
     fn parse(row: &[u8]) -> Self {
         let mut stamp = [0; 8];
         stamp.copy_from_slice(&row[..8]);
-        Self { stamp: i64::from_le_bytes(stamp), count: u16::from_le_bytes([row[8], row[9]]), byte_ten: row[10] }
+        Self {
+            stamp: i64::from_le_bytes(stamp),
+            count: u16::from_le_bytes([row[8], row[9]]),
+            byte_ten: row[10],
+        }
     }
 }
 
 /// The metadata of each row of an image that is wider than [`METADATA_BYTES`].
 pub(crate) fn rows(pixels: &[u8], size: ImageSize) -> impl Iterator<Item = RowMetadata> + '_ {
-    pixels.chunks_exact(size.width).take(size.height).map(RowMetadata::parse)
+    pixels
+        .chunks_exact(size.width)
+        .take(size.height)
+        .map(RowMetadata::parse)
 }
 
 /// Whether byte 10 goes to and fro between 0 and 255 from row to row: then it is the chirp's direction, not validity.
@@ -106,11 +113,20 @@ pub(crate) fn fill_uniform(azimuth_rad: &mut [f32]) {
 }
 
 /// The counts of a sweep grow, but for at most one step past zero, and make at most one turn.
-fn check_order(path: &Path, row_counts: impl Iterator<Item = u16>, counts: u16) -> Result<(), ReadError> {
+fn check_order(
+    path: &Path,
+    row_counts: impl Iterator<Item = u16>,
+    counts: u16,
+) -> Result<(), ReadError> {
     let (mut first, mut last, mut wrapped) = (0, None, false);
     for (row, count) in row_counts.enumerate() {
         if count > counts {
-            return Err(ReadError::EncoderCount { path: path.to_owned(), row, count, counts });
+            return Err(ReadError::EncoderCount {
+                path: path.to_owned(),
+                row,
+                count,
+                counts,
+            });
         }
         let count = count % counts;
         match last.replace(count) {
@@ -119,7 +135,12 @@ fn check_order(path: &Path, row_counts: impl Iterator<Item = u16>, counts: u16) 
                 let wraps = count < previous;
                 let lapped = (wrapped || wraps) && count >= first;
                 if count == previous || lapped || (wraps && wrapped) {
-                    return Err(ReadError::AzimuthOrder { path: path.to_owned(), row, count, previous });
+                    return Err(ReadError::AzimuthOrder {
+                        path: path.to_owned(),
+                        row,
+                        count,
+                        previous,
+                    });
                 }
                 wrapped |= wraps;
             }
@@ -129,14 +150,26 @@ fn check_order(path: &Path, row_counts: impl Iterator<Item = u16>, counts: u16) 
 }
 
 /// Time of each row as logged, ns; refuses what is no time, and times that are not those of one sweep.
-pub(crate) fn fill_stamps(path: &Path, pixels: &[u8], size: ImageSize, stamp_ns: &mut [i64]) -> Result<(), ReadError> {
+pub(crate) fn fill_stamps(
+    path: &Path,
+    pixels: &[u8],
+    size: ImageSize,
+    stamp_ns: &mut [i64],
+) -> Result<(), ReadError> {
     for (row, (metadata, into)) in rows(pixels, size).zip(stamp_ns.iter_mut()).enumerate() {
         let ns = stamp::to_ns(metadata.stamp);
-        *into = ns.ok_or_else(|| ReadError::StampYear { path: path.to_owned(), row, value: metadata.stamp })?;
+        *into = ns.ok_or_else(|| ReadError::StampYear {
+            path: path.to_owned(),
+            row,
+            value: metadata.stamp,
+        })?;
     }
     let span_s = (stamp_ns[size.height - 1] - stamp_ns[0]) as f64 * 1e-9;
     if !(0.0..=LONGEST_SWEEP_S).contains(&span_s) {
-        return Err(ReadError::SweepTime { path: path.to_owned(), span_s });
+        return Err(ReadError::SweepTime {
+            path: path.to_owned(),
+            span_s,
+        });
     }
     Ok(())
 }
@@ -184,11 +217,35 @@ mod tests {
         assert!(ordered(&[13, 27, 5599]).is_ok());
         assert!(ordered(&[5000, 5599, 0, 4999]).is_ok());
         assert!(ordered(&[5000, 5600, 14]).is_ok());
-        assert!(matches!(ordered(&[5000, 0, 5000]), Err(ReadError::AzimuthOrder { row: 2, .. })));
-        assert!(matches!(ordered(&[5000, 10, 20, 15]), Err(ReadError::AzimuthOrder { row: 3, .. })));
-        assert!(matches!(ordered(&[10, 20, 15]), Err(ReadError::AzimuthOrder { row: 2, .. })));
-        assert!(matches!(ordered(&[10, 10]), Err(ReadError::AzimuthOrder { row: 1, count: 10, previous: 10, .. })));
-        assert!(matches!(ordered(&[10, 5601]), Err(ReadError::EncoderCount { row: 1, count: 5601, .. })));
+        assert!(matches!(
+            ordered(&[5000, 0, 5000]),
+            Err(ReadError::AzimuthOrder { row: 2, .. })
+        ));
+        assert!(matches!(
+            ordered(&[5000, 10, 20, 15]),
+            Err(ReadError::AzimuthOrder { row: 3, .. })
+        ));
+        assert!(matches!(
+            ordered(&[10, 20, 15]),
+            Err(ReadError::AzimuthOrder { row: 2, .. })
+        ));
+        assert!(matches!(
+            ordered(&[10, 10]),
+            Err(ReadError::AzimuthOrder {
+                row: 1,
+                count: 10,
+                previous: 10,
+                ..
+            })
+        ));
+        assert!(matches!(
+            ordered(&[10, 5601]),
+            Err(ReadError::EncoderCount {
+                row: 1,
+                count: 5601,
+                ..
+            })
+        ));
     }
 
     #[test]
@@ -196,7 +253,9 @@ mod tests {
         assert!(chirps_alternate([0, 255, 0, 255, 0].into_iter()));
         assert!(!chirps_alternate([255; 6].into_iter()));
         assert!(!chirps_alternate([0; 6].into_iter()));
-        assert!(!chirps_alternate([255, 255, 0, 255, 255, 255, 0].into_iter()));
+        assert!(!chirps_alternate(
+            [255, 255, 0, 255, 255, 255, 0].into_iter()
+        ));
         assert!(!chirps_alternate([0, 1, 0, 1].into_iter()));
         assert!(!chirps_alternate(std::iter::empty()));
     }

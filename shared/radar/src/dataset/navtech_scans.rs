@@ -43,10 +43,14 @@ pub(crate) struct Profile {
 
 impl Profile {
     fn with(mut self, options: &DatasetOptions) -> Self {
-        self.range_resolution_m = options.range_resolution_m.unwrap_or(self.range_resolution_m);
+        self.range_resolution_m = options
+            .range_resolution_m
+            .unwrap_or(self.range_resolution_m);
         self.range_offset_m = options.range_offset_m.unwrap_or(self.range_offset_m);
         self.doppler_s = options.doppler_s.unwrap_or(self.doppler_s);
-        self.azimuth_eccentricity_rad = options.azimuth_eccentricity_rad.unwrap_or(self.azimuth_eccentricity_rad);
+        self.azimuth_eccentricity_rad = options
+            .azimuth_eccentricity_rad
+            .unwrap_or(self.azimuth_eccentricity_rad);
         self.encoder_counts = options.encoder_counts.unwrap_or(self.encoder_counts);
         self.azimuth_source = options.azimuth_source.unwrap_or(self.azimuth_source);
         self
@@ -69,13 +73,24 @@ impl NavtechScans {
         options: &DatasetOptions,
         profile: impl FnOnce(Option<&FirstLook>) -> Profile,
     ) -> Result<Self, OpenError> {
-        let Found { format, mut images, mut notes, .. } = found;
+        let Found {
+            format,
+            mut images,
+            mut notes,
+            ..
+        } = found;
         check_shape(&images, format)?;
         let look = FirstLook::take(&mut images);
         let profile = profile(look.as_ref()).with(options);
         notes.extend(look.iter().flat_map(|look| observations(look, &profile)));
-        let period_ns = stamp::usual_interval((0..images.len()).filter_map(|i| images.name_stamp_ns(i)));
-        Ok(Self { images, profile, period_ns, notes })
+        let period_ns =
+            stamp::usual_interval((0..images.len()).filter_map(|i| images.name_stamp_ns(i)));
+        Ok(Self {
+            images,
+            profile,
+            period_ns,
+            notes,
+        })
     }
 
     fn check_slot(&self, slot: &ScanSlot<'_>) -> Result<(), ReadError> {
@@ -96,14 +111,27 @@ impl NavtechScans {
     /// Time from this scan's name to the next one's, where that can be one turn; else the usual one.
     fn interval_ns(&self, index: usize) -> i64 {
         let name = |i: usize| self.images.name_stamp_ns(i);
-        let next = index.checked_add(1).and_then(name).zip(name(index)).map(|(b, a)| b - a);
-        next.filter(|ns| (ns - self.period_ns).abs() < self.period_ns / 5).unwrap_or(self.period_ns)
+        let next = index
+            .checked_add(1)
+            .and_then(name)
+            .zip(name(index))
+            .map(|(b, a)| b - a);
+        next.filter(|ns| (ns - self.period_ns).abs() < self.period_ns / 5)
+            .unwrap_or(self.period_ns)
     }
 }
 
-pub(crate) fn check_room(what: &'static str, needed: usize, actual: usize) -> Result<(), ReadError> {
+pub(crate) fn check_room(
+    what: &'static str,
+    needed: usize,
+    actual: usize,
+) -> Result<(), ReadError> {
     if actual < needed {
-        return Err(ReadError::SlotTooSmall { what, needed, actual });
+        return Err(ReadError::SlotTooSmall {
+            what,
+            needed,
+            actual,
+        });
     }
     Ok(())
 }
@@ -113,11 +141,18 @@ fn check_shape(images: &Images, format: Format) -> Result<(), OpenError> {
     let reason = if width <= METADATA_BYTES {
         format!("it needs {METADATA_BYTES} columns of metadata before the powers")
     } else if !(2..=MAX_AZIMUTHS).contains(&height) {
-        format!("it needs a row for each azimuth, 2 to {MAX_AZIMUTHS} of them; it may lie on its side")
+        format!(
+            "it needs a row for each azimuth, 2 to {MAX_AZIMUTHS} of them; it may lie on its side"
+        )
     } else {
         return Ok(());
     };
-    Err(OpenError::WrongImage { path: images.file(0).to_owned(), actual: images.size, format, reason })
+    Err(OpenError::WrongImage {
+        path: images.file(0).to_owned(),
+        actual: images.size,
+        format,
+        reason,
+    })
 }
 
 /// What is worth saying about the first image.
@@ -129,15 +164,24 @@ fn observations(look: &FirstLook, profile: &Profile) -> Vec<String> {
             by.words()
         )
     });
-    [note_bursts(look, profile), note_byte_ten(look, profile), note_encoder(look, profile), named]
-        .into_iter()
-        .flatten()
-        .collect()
+    [
+        note_bursts(look, profile),
+        note_byte_ten(look, profile),
+        note_encoder(look, profile),
+        named,
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
 fn note_bursts(look: &FirstLook, profile: &Profile) -> Option<String> {
     let (least, most, mean) = look.row_intervals_ns()?;
-    let made = if profile.smooth_stamps { "replaced by a line over the azimuth" } else { "taken as they are" };
+    let made = if profile.smooth_stamps {
+        "replaced by a line over the azimuth"
+    } else {
+        "taken as they are"
+    };
     (most > 4 * mean.max(1)).then(|| {
         format!(
             "Row stamps come in bursts ({} to {} us apart, {} us on average), as packets are received: they are {made}.",
@@ -186,7 +230,10 @@ impl Dataset for NavtechScans {
     }
 
     fn limits(&self) -> ScanLimits {
-        ScanLimits { bytes: self.images.size.bytes(), azimuths: self.images.size.height }
+        ScanLimits {
+            bytes: self.images.size.bytes(),
+            azimuths: self.images.size.height,
+        }
     }
 
     fn image_size(&self) -> ImageSize {
@@ -217,7 +264,8 @@ impl Dataset for NavtechScans {
     }
 
     fn encoder_counts(&self) -> Option<u16> {
-        (self.profile.azimuth_source == AzimuthSource::Encoder).then_some(self.profile.encoder_counts)
+        (self.profile.azimuth_source == AzimuthSource::Encoder)
+            .then_some(self.profile.encoder_counts)
     }
 
     fn notes(&self) -> &[String] {
@@ -228,7 +276,10 @@ impl Dataset for NavtechScans {
         self.check_slot(&slot)?;
         self.images.decode(index, slot.bytes)?;
         let (size, path, profile) = (self.images.size, self.images.file(index), &self.profile);
-        let (azimuth_rad, stamp_ns) = (&mut slot.azimuth_rad[..size.height], &mut slot.stamp_ns[..size.height]);
+        let (azimuth_rad, stamp_ns) = (
+            &mut slot.azimuth_rad[..size.height],
+            &mut slot.stamp_ns[..size.height],
+        );
         navtech_png::fill_azimuths(
             path,
             slot.bytes,

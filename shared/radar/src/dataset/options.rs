@@ -107,23 +107,41 @@ pub struct DatasetOptions {
 impl DatasetOptions {
     /// Refuses values that no radar has.
     pub(crate) fn check(&self) -> Result<(), OpenError> {
-        let resolution_ok = self.range_resolution_m.is_none_or(|r| (1e-3..=10.0).contains(&r));
-        let offset_ok = self.range_offset_m.is_none_or(|o| (-100.0..=100.0).contains(&o));
+        let resolution_ok = self
+            .range_resolution_m
+            .is_none_or(|r| (1e-3..=10.0).contains(&r));
+        let offset_ok = self
+            .range_offset_m
+            .is_none_or(|o| (-100.0..=100.0).contains(&o));
         let doppler_ok = self.doppler_s.is_none_or(|d| (-1.0..=1.0).contains(&d));
-        let eccentricity_ok = self.azimuth_eccentricity_rad.is_none_or(|e| (-0.1..=0.1).contains(&e));
+        let eccentricity_ok = self
+            .azimuth_eccentricity_rad
+            .is_none_or(|e| (-0.1..=0.1).contains(&e));
         let counts_ok = self.encoder_counts.is_none_or(|c| c >= 16);
         if !resolution_ok {
-            return Err(self.refused("range_resolution_m", self.range_resolution_m, "it must be from 0.001 to 10 m"));
+            return Err(self.refused(
+                "range_resolution_m",
+                self.range_resolution_m,
+                "it must be from 0.001 to 10 m",
+            ));
         }
         if !offset_ok {
-            return Err(self.refused("range_offset_m", self.range_offset_m, "it must be from -100 to 100 m"));
+            return Err(self.refused(
+                "range_offset_m",
+                self.range_offset_m,
+                "it must be from -100 to 100 m",
+            ));
         }
         if !doppler_ok {
             return Err(self.refused("doppler_s", self.doppler_s, "it must be from -1 to 1 s"));
         }
         if !eccentricity_ok {
             let actual = self.azimuth_eccentricity_rad;
-            return Err(self.refused("azimuth_eccentricity_rad", actual, "it must be from -0.1 to 0.1 rad"));
+            return Err(self.refused(
+                "azimuth_eccentricity_rad",
+                actual,
+                "it must be from -0.1 to 0.1 rad",
+            ));
         }
         if !counts_ok {
             return Err(self.refused(
@@ -143,7 +161,9 @@ impl DatasetOptions {
             range_resolution_m: self.range_resolution_m.or(other.range_resolution_m),
             range_offset_m: self.range_offset_m.or(other.range_offset_m),
             doppler_s: self.doppler_s.or(other.doppler_s),
-            azimuth_eccentricity_rad: self.azimuth_eccentricity_rad.or(other.azimuth_eccentricity_rad),
+            azimuth_eccentricity_rad: self
+                .azimuth_eccentricity_rad
+                .or(other.azimuth_eccentricity_rad),
             azimuth_source: self.azimuth_source.or(other.azimuth_source),
             encoder_counts: self.encoder_counts.or(other.encoder_counts),
         }
@@ -151,17 +171,33 @@ impl DatasetOptions {
 
     /// Refuses what needs an encoder, for images that have none.
     pub(crate) fn check_without_encoder(&self, format: Format) -> Result<(), OpenError> {
-        let options = Self { format: Some(format), ..*self };
+        let options = Self {
+            format: Some(format),
+            ..*self
+        };
         if self.encoder_counts.is_some() {
-            return Err(options.refused("encoder_counts", self.encoder_counts, "its images carry no encoder counts"));
+            return Err(options.refused(
+                "encoder_counts",
+                self.encoder_counts,
+                "its images carry no encoder counts",
+            ));
         }
         if self.azimuth_source == Some(AzimuthSource::Encoder) {
-            return Err(options.refused("azimuth_source", Some("encoder"), "its images carry no encoder counts"));
+            return Err(options.refused(
+                "azimuth_source",
+                Some("encoder"),
+                "its images carry no encoder counts",
+            ));
         }
         Ok(())
     }
 
-    fn refused(&self, key: &'static str, value: Option<impl fmt::Display>, reason: &'static str) -> OpenError {
+    fn refused(
+        &self,
+        key: &'static str,
+        value: Option<impl fmt::Display>,
+        reason: &'static str,
+    ) -> OpenError {
         OpenError::BadOption {
             key,
             value: value.map(|v| v.to_string()).unwrap_or_default(),

@@ -17,11 +17,15 @@ const STAMPS: &str = "Files are named by the time of the sweep's first row; a sc
                       last row's stamps, which is also what the ground truth refers to, and rows are spread along it by their azimuth.";
 
 pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<NavtechScans, OpenError> {
-    NavtechScans::open(found, options, |_| profile(Format::Oxford, AzimuthSource::Encoder))
+    NavtechScans::open(found, options, |_| {
+        profile(Format::Oxford, AzimuthSource::Encoder)
+    })
 }
 
 pub(crate) fn open_oord(found: Found, options: &DatasetOptions) -> Result<NavtechScans, OpenError> {
-    NavtechScans::open(found, options, |_| profile(Format::Oord, AzimuthSource::Uniform))
+    NavtechScans::open(found, options, |_| {
+        profile(Format::Oord, AzimuthSource::Uniform)
+    })
 }
 
 fn profile(format: Format, azimuth_source: AzimuthSource) -> Profile {

@@ -57,15 +57,24 @@ pub(crate) fn read_size(path: &Path) -> Result<ImageSize, ReadError> {
 fn parse_header(path: &Path, bytes: &[u8]) -> Result<ImageSize, ReadError> {
     let shown = bytes.len().min(SIGNATURE.len());
     if bytes[..shown] != SIGNATURE[..shown] {
-        return Err(ReadError::NotPng { path: path.to_owned() });
+        return Err(ReadError::NotPng {
+            path: path.to_owned(),
+        });
     }
     let Some(header) = bytes.get(..HEADER_BYTES) else {
-        return Err(ReadError::Truncated { path: path.to_owned(), bytes: bytes.len() });
+        return Err(ReadError::Truncated {
+            path: path.to_owned(),
+            bytes: bytes.len(),
+        });
     };
     if &header[12..16] != b"IHDR" {
-        return Err(ReadError::NotPng { path: path.to_owned() });
+        return Err(ReadError::NotPng {
+            path: path.to_owned(),
+        });
     }
-    let word = |at: usize| u32::from_be_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]]);
+    let word = |at: usize| {
+        u32::from_be_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]])
+    };
     check_pixels(path, header[24], header[25])?;
     check_size(path, u64::from(word(16)), u64::from(word(20)))
 }
@@ -82,7 +91,10 @@ fn check_pixels(path: &Path, bits: u8, colour: u8) -> Result<(), ReadError> {
         6 => "colour and alpha",
         _ => "unknown",
     };
-    Err(ReadError::WrongPixels { path: path.to_owned(), actual: format!("{bits}-bit {colour}") })
+    Err(ReadError::WrongPixels {
+        path: path.to_owned(),
+        actual: format!("{bits}-bit {colour}"),
+    })
 }
 
 fn check_size(path: &Path, width: u64, height: u64) -> Result<ImageSize, ReadError> {
@@ -94,9 +106,16 @@ fn check_size(path: &Path, width: u64, height: u64) -> Result<ImageSize, ReadErr
         });
     }
     if bytes > MAX_IMAGE_BYTES {
-        return Err(ReadError::TooLarge { path: path.to_owned(), actual: bytes, limit: MAX_IMAGE_BYTES });
+        return Err(ReadError::TooLarge {
+            path: path.to_owned(),
+            actual: bytes,
+            limit: MAX_IMAGE_BYTES,
+        });
     }
-    Ok(ImageSize { width: width as usize, height: height as usize })
+    Ok(ImageSize {
+        width: width as usize,
+        height: height as usize,
+    })
 }
 
 /// Decodes one image after the other; keeps the memory for the file's bytes.
@@ -107,20 +126,32 @@ pub(crate) struct ImageReader {
 
 impl ImageReader {
     /// Decodes `path`, which must be of size `expected`, into `pixels`, `expected.bytes()` of them, row by row.
-    pub(crate) fn decode(&mut self, path: &Path, expected: ImageSize, pixels: &mut [u8]) -> Result<(), ReadError> {
+    pub(crate) fn decode(
+        &mut self,
+        path: &Path,
+        expected: ImageSize,
+        pixels: &mut [u8],
+    ) -> Result<(), ReadError> {
         self.load(path)?;
         let actual = parse_header(path, &self.file[..self.file.len().min(HEADER_BYTES)])?;
         if actual != expected {
-            return Err(ReadError::WrongSize { path: path.to_owned(), actual, expected });
+            return Err(ReadError::WrongSize {
+                path: path.to_owned(),
+                actual,
+                expected,
+            });
         }
-        self.inflate(pixels).map_err(|e| self.decoding_error(path, e))
+        self.inflate(pixels)
+            .map_err(|e| self.decoding_error(path, e))
     }
 
     fn load(&mut self, path: &Path) -> Result<(), ReadError> {
         let file = File::open(path).map_err(|e| io_error(path, e))?;
         self.file.clear();
         // One byte more than is accepted tells a file of exactly that size from a larger one.
-        file.take(MAX_IMAGE_BYTES + 1).read_to_end(&mut self.file).map_err(|e| io_error(path, e))?;
+        file.take(MAX_IMAGE_BYTES + 1)
+            .read_to_end(&mut self.file)
+            .map_err(|e| io_error(path, e))?;
         if self.file.len() as u64 > MAX_IMAGE_BYTES {
             return Err(ReadError::TooLarge {
                 path: path.to_owned(),
@@ -132,7 +163,9 @@ impl ImageReader {
     }
 
     fn inflate(&self, pixels: &mut [u8]) -> Result<(), png::DecodingError> {
-        let limits = png::Limits { bytes: DECODER_BYTES };
+        let limits = png::Limits {
+            bytes: DECODER_BYTES,
+        };
         let mut decoder = png::Decoder::new_with_limits(Cursor::new(self.file.as_slice()), limits);
         decoder.set_ignore_text_chunk(true);
         decoder.set_ignore_iccp_chunk(true);
@@ -142,13 +175,22 @@ impl ImageReader {
     fn decoding_error(&self, path: &Path, error: png::DecodingError) -> ReadError {
         match error {
             png::DecodingError::IoError(e) if e.kind() == io::ErrorKind::UnexpectedEof => {
-                ReadError::Truncated { path: path.to_owned(), bytes: self.file.len() }
+                ReadError::Truncated {
+                    path: path.to_owned(),
+                    bytes: self.file.len(),
+                }
             }
-            other => ReadError::Damaged { path: path.to_owned(), reason: other.to_string() },
+            other => ReadError::Damaged {
+                path: path.to_owned(),
+                reason: other.to_string(),
+            },
         }
     }
 }
 
 fn io_error(path: &Path, source: io::Error) -> ReadError {
-    ReadError::Io { path: path.to_owned(), source }
+    ReadError::Io {
+        path: path.to_owned(),
+        source,
+    }
 }

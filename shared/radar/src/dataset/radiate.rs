@@ -38,14 +38,22 @@ pub(crate) struct Radiate {
 impl Radiate {
     pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<Self, OpenError> {
         let list = found.folder.with_extension("txt");
-        let io_error = |source| OpenError::Io { path: list.clone(), source };
-        let text = found.stamps.clone().map_or_else(|| fs::read_to_string(&list).map_err(io_error), Ok)?;
+        let io_error = |source| OpenError::Io {
+            path: list.clone(),
+            source,
+        };
+        let text = found
+            .stamps
+            .clone()
+            .map_or_else(|| fs::read_to_string(&list).map_err(io_error), Ok)?;
         let (stamps, unpadded) = parse_stamps(&list, &text)?;
         let (scans, mut notes) = SidewaysScans::open(found, options, |bins| RANGE_M / bins as f32)?;
-        let received =
-            (0..scans.images.len()).map(|i| receipt(&scans, i, &stamps, &list)).collect::<Result<Vec<_>, _>>()?;
+        let received = (0..scans.images.len())
+            .map(|i| receipt(&scans, i, &stamps, &list))
+            .collect::<Result<Vec<_>, _>>()?;
         let path = || scans.images.file(0).to_owned();
-        let clock = SensorClock::below(&received, PERIOD_NS).ok_or_else(|| OpenError::NoImages { path: path() })?;
+        let clock = SensorClock::below(&received, PERIOD_NS)
+            .ok_or_else(|| OpenError::NoImages { path: path() })?;
         if unpadded > 0 {
             notes.push(format!(
                 "{unpadded} of {} stamps in {} write their nanoseconds without leading zeros (.5 means 5 ns): they are read as integers; \
@@ -62,11 +70,18 @@ impl Radiate {
                 received.len()
             ));
         }
-        Ok(Self { scans, received, clock, notes })
+        Ok(Self {
+            scans,
+            received,
+            clock,
+            notes,
+        })
     }
 
     fn start_ns(&self, index: usize) -> Option<i64> {
-        self.received.get(index).map(|(frame, _)| self.clock.start_ns(*frame))
+        self.received
+            .get(index)
+            .map(|(frame, _)| self.clock.start_ns(*frame))
     }
 
     fn period_ns(&self) -> i64 {
@@ -75,7 +90,9 @@ impl Radiate {
 }
 
 fn file_name(path: &Path) -> String {
-    path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
+    path.file_name()
+        .map(|n| n.to_string_lossy().into_owned())
+        .unwrap_or_default()
 }
 
 /// Frame number and time of receipt of an image.
@@ -91,16 +108,27 @@ fn receipt(
             "no time for {}; every image needs a line `Frame: <number> Time: <seconds>.<nanoseconds>`",
             file_name(image)
         );
-        OpenError::Text { path: list.to_owned(), line: 0, reason }
+        OpenError::Text {
+            path: list.to_owned(),
+            line: 0,
+            reason,
+        }
     };
     let frame = scans.images.number(index).ok_or_else(missing)?;
-    stamps.get(&frame).map(|ns| (frame, *ns)).ok_or_else(missing)
+    stamps
+        .get(&frame)
+        .map(|ns| (frame, *ns))
+        .ok_or_else(missing)
 }
 
 /// Times by frame number, and how many of them leave out leading zeros.
 fn parse_stamps(path: &Path, text: &str) -> Result<(BTreeMap<i64, i64>, usize), OpenError> {
     let (mut stamps, mut unpadded) = (BTreeMap::new(), 0);
-    for (line, content) in text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty()) {
+    for (line, content) in text
+        .lines()
+        .enumerate()
+        .filter(|(_, l)| !l.trim().is_empty())
+    {
         let (frame, ns, digits) = parse_line(content).ok_or_else(|| OpenError::Text {
             path: path.to_owned(),
             line: line + 1,
@@ -119,8 +147,15 @@ fn parse_line(line: &str) -> Option<(i64, i64, usize)> {
     let mut words = line.split_whitespace();
     let (frame, number, time, value) = (words.next()?, words.next()?, words.next()?, words.next()?);
     let (seconds, nanoseconds) = value.split_once('.')?;
-    let ns: i64 = nanoseconds.parse().ok().filter(|ns| (0..SECOND_NS).contains(ns))?;
-    let stamp = seconds.parse::<i64>().ok()?.checked_mul(SECOND_NS)?.checked_add(ns)?;
+    let ns: i64 = nanoseconds
+        .parse()
+        .ok()
+        .filter(|ns| (0..SECOND_NS).contains(ns))?;
+    let stamp = seconds
+        .parse::<i64>()
+        .ok()?
+        .checked_mul(SECOND_NS)?
+        .checked_add(ns)?;
     let labelled = frame == "Frame:" && time == "Time:" && stamp::plausible(stamp);
     labelled.then_some((number.parse().ok()?, stamp, nanoseconds.len()))
 }
@@ -151,7 +186,8 @@ impl Dataset for Radiate {
     }
 
     fn nominal_stamp_ns(&self, index: usize) -> Option<i64> {
-        self.start_ns(index).map(|start| start + mean_after_start_ns(self.period_ns(), self.scans.azimuths()))
+        self.start_ns(index)
+            .map(|start| start + mean_after_start_ns(self.period_ns(), self.scans.azimuths()))
     }
 
     fn logged_stamp_ns(&self, index: usize) -> Option<i64> {
@@ -171,7 +207,10 @@ impl Dataset for Radiate {
     }
 
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {
-        let start_ns = self.start_ns(index).ok_or(ReadError::NoSuchScan { index, len: self.len() })?;
+        let start_ns = self.start_ns(index).ok_or(ReadError::NoSuchScan {
+            index,
+            len: self.len(),
+        })?;
         let period_ns = self.period_ns();
         self.scans.read(index, slot, start_ns, period_ns)
     }
@@ -184,8 +223,14 @@ mod tests {
 
     #[test]
     fn nanoseconds_without_leading_zeros_are_integers() {
-        assert_eq!(parse_line("Frame: 000243 Time: 1549986608.1533537"), Some((243, 1_549_986_608_001_533_537, 7)));
-        assert_eq!(parse_line("Frame: 1 Time: 1549986608.0"), Some((1, 1_549_986_608_000_000_000, 1)));
+        assert_eq!(
+            parse_line("Frame: 000243 Time: 1549986608.1533537"),
+            Some((243, 1_549_986_608_001_533_537, 7))
+        );
+        assert_eq!(
+            parse_line("Frame: 1 Time: 1549986608.0"),
+            Some((1, 1_549_986_608_000_000_000, 1))
+        );
         for bad in [
             "Frame: 1 Time: 1549986608",
             "Frame: 1 Time: 1549986608.1234567890",

@@ -19,17 +19,33 @@ impl SensorClock {
     /// `received` holds (scan number, ns), numbers growing; `period` bounds the period, ns. Minimises
     /// `sum(received - start - period * number)` subject to no term being negative: a linear programme in two unknowns, whose
     /// optimum is the edge of the points' lower convex hull over their mean number. `None` without points.
-    pub(crate) fn below(received: &[(i64, i64)], period: std::ops::RangeInclusive<f64>) -> Option<Self> {
+    pub(crate) fn below(
+        received: &[(i64, i64)],
+        period: std::ops::RangeInclusive<f64>,
+    ) -> Option<Self> {
         let &(first_number, origin_ns) = received.first()?;
         let points: Vec<(f64, f64)> = received
             .iter()
-            .map(|(number, ns)| (*number as f64 - first_number as f64, (ns - origin_ns) as f64))
+            .map(|(number, ns)| {
+                (
+                    *number as f64 - first_number as f64,
+                    (ns - origin_ns) as f64,
+                )
+            })
             .collect();
         let mean = points.iter().map(|p| p.0).sum::<f64>() / points.len() as f64;
-        let slope = slope_over(&lower_hull(&points), mean).unwrap_or((period.start() + period.end()) / 2.0);
+        let slope =
+            slope_over(&lower_hull(&points), mean).unwrap_or((period.start() + period.end()) / 2.0);
         let slope = slope.clamp(*period.start(), *period.end());
-        let start = points.iter().map(|(number, ns)| ns - slope * number).fold(f64::INFINITY, f64::min);
-        Some(Self { origin_ns, start: start - slope * first_number as f64, period: slope })
+        let start = points
+            .iter()
+            .map(|(number, ns)| ns - slope * number)
+            .fold(f64::INFINITY, f64::min);
+        Some(Self {
+            origin_ns,
+            start: start - slope * first_number as f64,
+            period: slope,
+        })
     }
 
     /// Start of a scan's sweep, ns since 1970.
@@ -71,11 +87,16 @@ mod tests {
     /// By brute force: the best start for each period of a grid.
     fn slack_of_grid(received: &[(i64, i64)]) -> f64 {
         let slack = |period: f64| {
-            let late: Vec<f64> = received.iter().map(|(k, ns)| *ns as f64 - period * *k as f64).collect();
+            let late: Vec<f64> = received
+                .iter()
+                .map(|(k, ns)| *ns as f64 - period * *k as f64)
+                .collect();
             let start = late.iter().copied().fold(f64::INFINITY, f64::min);
             late.iter().map(|l| l - start).sum::<f64>()
         };
-        (20_000..=30_000).map(|p| slack(f64::from(p) * 1e4)).fold(f64::INFINITY, f64::min)
+        (20_000..=30_000)
+            .map(|p| slack(f64::from(p) * 1e4))
+            .fold(f64::INFINITY, f64::min)
     }
 
     proptest! {
@@ -93,11 +114,27 @@ mod tests {
 
     #[test]
     fn an_even_clock_is_found_through_stalls() {
-        let late = |k: i64| if (30..36).contains(&k) { 1_400 - (k - 30) * 230 } else { k * 7 % 5 };
-        let received: Vec<_> =
-            (0..100).map(|k| (k, 1_549_986_607_000_000_000 + k * 250_020_000 + late(k) * 1_000_000)).collect();
+        let late = |k: i64| {
+            if (30..36).contains(&k) {
+                1_400 - (k - 30) * 230
+            } else {
+                k * 7 % 5
+            }
+        };
+        let received: Vec<_> = (0..100)
+            .map(|k| {
+                (
+                    k,
+                    1_549_986_607_000_000_000 + k * 250_020_000 + late(k) * 1_000_000,
+                )
+            })
+            .collect();
         let clock = SensorClock::below(&received, BOUNDS).unwrap();
-        assert!((clock.period - 250_020_000.0).abs() < 20_000.0, "{}", clock.period);
+        assert!(
+            (clock.period - 250_020_000.0).abs() < 20_000.0,
+            "{}",
+            clock.period
+        );
         assert!((clock.start_ns(33) - received[0].1 - 33 * 250_020_000).abs() < 1_000_000);
     }
 

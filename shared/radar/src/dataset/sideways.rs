@@ -30,7 +30,12 @@ impl SidewaysScans {
         options: &DatasetOptions,
         metres_a_bin: impl FnOnce(usize) -> f32,
     ) -> Result<(Self, Vec<String>), OpenError> {
-        let Found { format, images, mut notes, .. } = found;
+        let Found {
+            format,
+            images,
+            mut notes,
+            ..
+        } = found;
         options.check_without_encoder(format)?;
         let mut scans = Self {
             images,
@@ -41,7 +46,9 @@ impl SidewaysScans {
             scratch: Vec::new(),
         };
         scans.check_shape(format)?;
-        scans.range_resolution_m = options.range_resolution_m.unwrap_or_else(|| metres_a_bin(scans.bins()));
+        scans.range_resolution_m = options
+            .range_resolution_m
+            .unwrap_or_else(|| metres_a_bin(scans.bins()));
         if scans.on_their_side() {
             scans.scratch = vec![0; scans.images.size.bytes()];
             let size = scans.images.size;
@@ -58,7 +65,12 @@ impl SidewaysScans {
             return Ok(());
         }
         let reason = format!("it needs 2 to {MAX_AZIMUTHS} azimuths along its shorter side");
-        Err(OpenError::WrongImage { path: self.images.file(0).to_owned(), actual: self.images.size, format, reason })
+        Err(OpenError::WrongImage {
+            path: self.images.file(0).to_owned(),
+            actual: self.images.size,
+            format,
+            reason,
+        })
     }
 
     pub(crate) fn on_their_side(&self) -> bool {
@@ -74,7 +86,10 @@ impl SidewaysScans {
     }
 
     pub(crate) fn limits(&self) -> ScanLimits {
-        ScanLimits { bytes: self.images.size.bytes(), azimuths: self.azimuths() }
+        ScanLimits {
+            bytes: self.images.size.bytes(),
+            azimuths: self.azimuths(),
+        }
     }
 
     /// Reads a scan whose sweep starts at `start_ns` and takes `period_ns`; its time is the mean of its azimuths'.
@@ -97,7 +112,10 @@ impl SidewaysScans {
             self.images.decode(index, slot.bytes)?;
         }
         fill_uniform(&mut slot.azimuth_rad[..azimuths]);
-        eccentricity::correct(&mut slot.azimuth_rad[..azimuths], self.azimuth_eccentricity_rad);
+        eccentricity::correct(
+            &mut slot.azimuth_rad[..azimuths],
+            self.azimuth_eccentricity_rad,
+        );
         slot.flags[..azimuths].fill(flag::MEASURED);
         for (column, stamp) in slot.stamp_ns[..azimuths].iter_mut().enumerate() {
             *stamp = start_ns + period_ns * column as i64 / azimuths as i64;

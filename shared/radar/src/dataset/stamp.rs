@@ -20,7 +20,10 @@ pub(crate) fn plausible(stamp_ns: i64) -> bool {
 
 /// A stamp in ns, whatever its unit was: the years 2015 to 2040 do not overlap in s, ms, us and ns.
 pub(crate) fn to_ns(raw: i64) -> Option<i64> {
-    [1, 1_000, 1_000_000, SECOND_NS].into_iter().filter_map(|unit| raw.checked_mul(unit)).find(|ns| plausible(*ns))
+    [1, 1_000, 1_000_000, SECOND_NS]
+        .into_iter()
+        .filter_map(|unit| raw.checked_mul(unit))
+        .find(|ns| plausible(*ns))
 }
 
 /// Decimal seconds as ns, exactly: `12.5` is 12,500,000,000. Exponents are accepted and go through `f64`.
@@ -34,7 +37,11 @@ pub(crate) fn parse_seconds(text: &str) -> Option<i64> {
     let sign = if whole.starts_with('-') { -1 } else { 1 };
     let seconds: i64 = unsigned.parse().ok()?;
     let nanoseconds = format!("{fraction:0<9}").get(..9)?.parse::<i64>().ok()?;
-    seconds.checked_mul(SECOND_NS)?.checked_add(nanoseconds).filter(|ns| *ns <= FARTHEST_NS).map(|ns| sign * ns)
+    seconds
+        .checked_mul(SECOND_NS)?
+        .checked_add(nanoseconds)
+        .filter(|ns| *ns <= FARTHEST_NS)
+        .map(|ns| sign * ns)
 }
 
 fn rounded_ns(seconds: f64) -> Option<i64> {
@@ -45,9 +52,16 @@ fn rounded_ns(seconds: f64) -> Option<i64> {
 /// Median time between neighbouring scans, of those that can be one turn.
 pub(crate) fn usual_interval(stamps: impl Iterator<Item = i64>) -> i64 {
     let stamps: Vec<i64> = stamps.collect();
-    let mut intervals: Vec<i64> = stamps.windows(2).map(|w| w[1] - w[0]).filter(|ns| TURN_NS.contains(ns)).collect();
+    let mut intervals: Vec<i64> = stamps
+        .windows(2)
+        .map(|w| w[1] - w[0])
+        .filter(|ns| TURN_NS.contains(ns))
+        .collect();
     intervals.sort_unstable();
-    intervals.get(intervals.len() / 2).copied().unwrap_or(USUAL_TURN_NS)
+    intervals
+        .get(intervals.len() / 2)
+        .copied()
+        .unwrap_or(USUAL_TURN_NS)
 }
 
 /// The middle of two times.
@@ -62,7 +76,12 @@ mod tests {
 
     #[test]
     fn the_unit_follows_from_the_size() {
-        for raw in [1_547_131_046, 1_547_131_046_000, 1_547_131_046_000_000, 1_547_131_046_000_000_000] {
+        for raw in [
+            1_547_131_046,
+            1_547_131_046_000,
+            1_547_131_046_000_000,
+            1_547_131_046_000_000_000,
+        ] {
             assert_eq!(to_ns(raw), Some(1_547_131_046_000_000_000), "{raw}");
         }
         for raw in [0, -1, 586, 1_000_000_000, i64::MAX, i64::MIN] {
@@ -72,12 +91,25 @@ mod tests {
 
     #[test]
     fn decimal_seconds_keep_every_nanosecond() {
-        assert_eq!(parse_seconds("1549986606.800100001"), Some(1_549_986_606_800_100_001));
+        assert_eq!(
+            parse_seconds("1549986606.800100001"),
+            Some(1_549_986_606_800_100_001)
+        );
         assert_eq!(parse_seconds("0"), Some(0));
         assert_eq!(parse_seconds("-1.5"), Some(-1_500_000_000));
         assert_eq!(parse_seconds("1.5e3"), Some(1_500_000_000_000));
         assert_eq!(parse_seconds("1.1234567899"), Some(1_123_456_789));
-        for bad in ["", "nan", "inf", "1.2.3", "x", "1e300", "9999999999", "-9999999999", "1e10"] {
+        for bad in [
+            "",
+            "nan",
+            "inf",
+            "1.2.3",
+            "x",
+            "1e300",
+            "9999999999",
+            "-9999999999",
+            "1e10",
+        ] {
             assert_eq!(parse_seconds(bad), None, "{bad}");
         }
     }

@@ -18,10 +18,17 @@ pub(super) fn options(root: &Path) -> Result<DatasetOptions, OpenError> {
     for path in places.map(|folder| folder.join(FILE)) {
         let text = match fs::read_to_string(&path) {
             Ok(text) => text,
-            Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => continue,
+            Err(error)
+                if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) =>
+            {
+                continue;
+            }
             Err(source) => return Err(OpenError::Io { path, source }),
         };
-        let wrong = |error: toml::de::Error| OpenError::Told { path: path.clone(), reason: error.message().to_owned() };
+        let wrong = |error: toml::de::Error| OpenError::Told {
+            path: path.clone(),
+            reason: error.message().to_owned(),
+        };
         return toml::from_str(&text).map_err(wrong);
     }
     Ok(DatasetOptions::default())
@@ -38,12 +45,29 @@ mod tests {
         let images = folder.path().join("radar");
         fs::create_dir(&images).unwrap();
         assert_eq!(options(&images).unwrap(), DatasetOptions::default());
-        fs::write(folder.path().join(FILE), "range_offset_m = -0.25\nencoder_counts = 3600\n").unwrap();
-        let told = DatasetOptions { range_offset_m: Some(-0.25), encoder_counts: Some(3600), ..Default::default() };
+        fs::write(
+            folder.path().join(FILE),
+            "range_offset_m = -0.25\nencoder_counts = 3600\n",
+        )
+        .unwrap();
+        let told = DatasetOptions {
+            range_offset_m: Some(-0.25),
+            encoder_counts: Some(3600),
+            ..Default::default()
+        };
         assert_eq!(options(folder.path()).unwrap(), told);
         assert_eq!(options(&images).unwrap(), told);
-        let mine = DatasetOptions { range_offset_m: Some(0.5), ..Default::default() };
-        assert_eq!(mine.or(&told), DatasetOptions { range_offset_m: Some(0.5), ..told });
+        let mine = DatasetOptions {
+            range_offset_m: Some(0.5),
+            ..Default::default()
+        };
+        assert_eq!(
+            mine.or(&told),
+            DatasetOptions {
+                range_offset_m: Some(0.5),
+                ..told
+            }
+        );
     }
 
     #[test]
@@ -51,6 +75,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join(FILE), "range_ofset_m = 1.0").unwrap();
         let error = options(folder.path()).unwrap_err().to_string();
-        assert!(error.contains("dataset.toml") && error.contains("range_ofset_m"), "{error}");
+        assert!(
+            error.contains("dataset.toml") && error.contains("range_ofset_m"),
+            "{error}"
+        );
     }
 }

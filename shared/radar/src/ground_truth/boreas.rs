@@ -15,11 +15,18 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
         let stamp = stamp_field(line, row, time)?;
         check_growing(line, &stamps, stamp)?;
         let position = Vector2::new(number(line, row, east)?, number(line, row, north)?);
-        let yaw = forward_heading(number(line, row, roll)?, number(line, row, pitch)?, number(line, row, heading)?);
+        let yaw = forward_heading(
+            number(line, row, roll)?,
+            number(line, row, pitch)?,
+            number(line, row, heading)?,
+        );
         stamps.push(stamp);
         poses.push(Isometry2::new(position, yaw));
     }
-    Ok(Trajectory { stamp_ns: Some(stamps), poses })
+    Ok(Trajectory {
+        stamp_ns: Some(stamps),
+        poses,
+    })
 }
 
 /// Direction of the sensor's x axis in the east-north plane, counter-clockwise from east.

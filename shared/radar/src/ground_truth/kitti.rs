@@ -8,7 +8,10 @@ use crate::dataset::stamp;
 use crate::trajectory::{Trajectory, mirrored, planar};
 
 pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
-    let stamped = lines(text).next().and_then(|(_, row)| leading_stamp(row)).is_some();
+    let stamped = lines(text)
+        .next()
+        .and_then(|(_, row)| leading_stamp(row))
+        .is_some();
     let mut stamps = stamped.then(Vec::new);
     let mut poses = Vec::new();
     for (line, row) in lines(text) {
@@ -29,13 +32,18 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
             }
         }
     }
-    Ok(Trajectory { stamp_ns: stamps, poses })
+    Ok(Trajectory {
+        stamp_ns: stamps,
+        poses,
+    })
 }
 
 fn leading_stamp(row: &str) -> Option<i64> {
     let mut words = row.split_whitespace();
     let first = words.next()?;
-    (words.count() == 12).then(|| first.parse().ok().and_then(stamp::to_ns)).flatten()
+    (words.count() == 12)
+        .then(|| first.parse().ok().and_then(stamp::to_ns))
+        .flatten()
 }
 
 /// Writes KITTI poses in the plane (z = 0).
@@ -43,7 +51,10 @@ pub fn write_kitti(trajectory: &Trajectory, out: &mut impl Write) -> io::Result<
     for pose in &trajectory.poses {
         let (sin, cos) = pose.rotation.angle().sin_cos();
         let (x, y, minus) = (pose.translation.x, pose.translation.y, -sin);
-        writeln!(out, "{cos:.12} {minus:.12} 0 {x:.6} {sin:.12} {cos:.12} 0 {y:.6} 0 0 1 0")?;
+        writeln!(
+            out,
+            "{cos:.12} {minus:.12} 0 {x:.6} {sin:.12} {cos:.12} 0 {y:.6} 0 0 1 0"
+        )?;
     }
     Ok(())
 }

@@ -20,7 +20,10 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
         stamps.push(stamp);
         poses.push(radar_pose(&matrix));
     }
-    Ok(Trajectory { stamp_ns: Some(stamps), poses })
+    Ok(Trajectory {
+        stamp_ns: Some(stamps),
+        poses,
+    })
 }
 
 fn radar_pose(m: &[f64; 12]) -> Isometry2<f64> {
@@ -28,7 +31,10 @@ fn radar_pose(m: &[f64; 12]) -> Isometry2<f64> {
     let position = Vector3::new(m[3], m[7], m[11]) + rotation * Vector3::from(RADAR_IN_BASE_M);
     let (sin, cos) = RADAR_YAW_DEG.to_radians().sin_cos();
     let forward = rotation * Vector3::new(cos, sin, 0.0);
-    Isometry2::new(Vector2::new(position.x, position.y), forward.y.atan2(forward.x))
+    Isometry2::new(
+        Vector2::new(position.x, position.y),
+        forward.y.atan2(forward.x),
+    )
 }
 
 #[cfg(test)]

@@ -20,7 +20,10 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
     let mut motions = parse_rows(text)?;
     motions.sort_by_key(|m| m.from_ns);
     let Some(first) = motions.first() else {
-        return Err(LineError { line: 1, reason: "there is a header and no motion".to_owned() });
+        return Err(LineError {
+            line: 1,
+            reason: "there is a header and no motion".to_owned(),
+        });
     };
     let (mut stamps, mut poses) = (vec![first.from_ns], vec![Isometry2::identity()]);
     let (mut now_ns, mut pose) = (first.from_ns, Isometry2::identity());
@@ -30,7 +33,10 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
         stamps.push(now_ns);
         poses.push(pose);
     }
-    Ok(Trajectory { stamp_ns: Some(stamps), poses })
+    Ok(Trajectory {
+        stamp_ns: Some(stamps),
+        poses,
+    })
 }
 
 fn parse_rows(text: &str) -> Result<Vec<Motion>, LineError> {
@@ -52,7 +58,12 @@ fn parse_rows(text: &str) -> Result<Vec<Motion>, LineError> {
 }
 
 fn check_chain(m: &Motion, now_ns: i64) -> Result<(), LineError> {
-    let error = |reason| Err(LineError { line: m.line, reason });
+    let error = |reason| {
+        Err(LineError {
+            line: m.line,
+            reason,
+        })
+    };
     if m.to_ns <= m.from_ns {
         return error("the source scan must be newer than the destination scan".to_owned());
     }

@@ -12,34 +12,48 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
     let (mut stamps, mut poses) = (Vec::new(), Vec::new());
     for (line, row) in lines(text) {
         let seconds = row.split_whitespace().next().unwrap_or_default();
-        let stamp = stamp::parse_seconds(seconds)
-            .ok_or_else(|| LineError { line, reason: format!("time {seconds:?} is not a number of seconds") })?;
+        let stamp = stamp::parse_seconds(seconds).ok_or_else(|| LineError {
+            line,
+            reason: format!("time {seconds:?} is not a number of seconds"),
+        })?;
         check_growing(line, &stamps, stamp)?;
         let [_, x, y, _, qx, qy, qz, qw] = numbers(line, row.split_whitespace())?;
         let norm = qx * qx + qy * qy + qz * qz + qw * qw;
         if norm < 1e-12 {
-            return Err(LineError { line, reason: "the quaternion is zero".to_owned() });
+            return Err(LineError {
+                line,
+                reason: "the quaternion is zero".to_owned(),
+            });
         }
         stamps.push(stamp);
         // Direction of the x axis in the plane: right for any roll and pitch, and for quaternions that are not quite normal.
         let yaw = (2.0 * (qw * qz + qx * qy)).atan2(qw * qw + qx * qx - qy * qy - qz * qz);
         poses.push(Isometry2::new(Vector2::new(x, y), yaw));
     }
-    Ok(Trajectory { stamp_ns: Some(stamps), poses })
+    Ok(Trajectory {
+        stamp_ns: Some(stamps),
+        poses,
+    })
 }
 
 /// Writes TUM with whole nanoseconds. A trajectory without times is refused with `InvalidInput`.
 pub fn write_tum(trajectory: &Trajectory, out: &mut impl Write) -> io::Result<()> {
     let stamps = trajectory.stamp_ns.as_ref();
     let stamps = stamps.ok_or_else(|| {
-        io::Error::new(io::ErrorKind::InvalidInput, "a TUM file needs times, and this trajectory has none")
+        io::Error::new(
+            io::ErrorKind::InvalidInput,
+            "a TUM file needs times, and this trajectory has none",
+        )
     })?;
     for (ns, pose) in stamps.iter().zip(&trajectory.poses) {
         let (sin, cos) = (pose.rotation.angle() / 2.0).sin_cos();
         let (sign, size) = (if *ns < 0 { "-" } else { "" }, ns.unsigned_abs());
         let (seconds, nanoseconds) = (size / 1_000_000_000, size % 1_000_000_000);
         let (x, y) = (pose.translation.x, pose.translation.y);
-        writeln!(out, "{sign}{seconds}.{nanoseconds:09} {x:.6} {y:.6} 0 0 0 {sin:.12} {cos:.12}")?;
+        writeln!(
+            out,
+            "{sign}{seconds}.{nanoseconds:09} {x:.6} {y:.6} 0 0 0 {sin:.12} {cos:.12}"
+        )?;
     }
     Ok(())
 }

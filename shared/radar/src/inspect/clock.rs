@@ -56,13 +56,25 @@ pub(super) fn offset(reference: &Trajectory, other: &Trajectory) -> Option<Clock
     let motions = motions(reference);
     let turns = reference.has_heading() && other.has_heading();
     let steps = REACH_NS / STEP_NS;
-    let tried: Vec<Option<Fit>> = (-steps..=steps).map(|k| fit(&motions, other, k * STEP_NS, turns)).collect();
+    let tried: Vec<Option<Fit>> = (-steps..=steps)
+        .map(|k| fit(&motions, other, k * STEP_NS, turns))
+        .collect();
     let most = tried.iter().flatten().map(|f| f.count).max()?;
     let enough = |f: &Fit| f.count >= FEWEST && f.count as f64 >= LEAST_SHARE * most as f64;
-    let score = |k: usize| tried.get(k).and_then(Option::as_ref).filter(|f| enough(f)).map(Fit::score);
+    let score = |k: usize| {
+        tried
+            .get(k)
+            .and_then(Option::as_ref)
+            .filter(|f| enough(f))
+            .map(Fit::score)
+    };
     let best = (0..tried.len())
         .filter(|k| score(*k).is_some())
-        .max_by(|a, b| score(*a).partial_cmp(&score(*b)).unwrap_or(std::cmp::Ordering::Equal))?;
+        .max_by(|a, b| {
+            score(*a)
+                .partial_cmp(&score(*b))
+                .unwrap_or(std::cmp::Ordering::Equal)
+        })?;
     let fine = match (score(best.wrapping_sub(1)), score(best), score(best + 1)) {
         (Some(a), Some(b), Some(c)) if a - 2.0 * b + c < 0.0 => 0.5 * (a - c) / (a - 2.0 * b + c),
         _ => 0.0,
@@ -77,13 +89,22 @@ pub(super) fn offset(reference: &Trajectory, other: &Trajectory) -> Option<Clock
 }
 
 fn motions(reference: &Trajectory) -> Vec<Motion> {
-    let Some(stamps) = &reference.stamp_ns else { return Vec::new() };
+    let Some(stamps) = &reference.stamp_ns else {
+        return Vec::new();
+    };
     let over_baseline = |i: usize| {
         let j = stamps.partition_point(|s| *s < stamps[i] + BASELINE_NS);
         let (a, b) = (reference.poses.get(i)?, reference.poses.get(j)?);
-        let (distance_m, turn_rad) =
-            ((b.translation.vector - a.translation.vector).norm(), (a.rotation.inverse() * b.rotation).angle());
-        Some(Motion { from_ns: stamps[i], to_ns: stamps[j], distance_m, turn_rad })
+        let (distance_m, turn_rad) = (
+            (b.translation.vector - a.translation.vector).norm(),
+            (a.rotation.inverse() * b.rotation).angle(),
+        );
+        Some(Motion {
+            from_ns: stamps[i],
+            to_ns: stamps[j],
+            distance_m,
+            turn_rad,
+        })
     };
     (0..stamps.len()).map_while(over_baseline).collect()
 }
@@ -104,12 +125,27 @@ impl Fit {
 fn fit(motions: &[Motion], other: &Trajectory, late_ns: i64, turns: bool) -> Option<Fit> {
     let (mut speed, mut turn) = (Correlation::default(), Correlation::default());
     for m in motions {
-        let Some((a, b)) = other.at(m.from_ns + late_ns).zip(other.at(m.to_ns + late_ns)) else { continue };
+        let Some((a, b)) = other
+            .at(m.from_ns + late_ns)
+            .zip(other.at(m.to_ns + late_ns))
+        else {
+            continue;
+        };
         let seconds = (m.to_ns - m.from_ns) as f64 * 1e-9;
-        speed.add(m.distance_m / seconds, (b.translation.vector - a.translation.vector).norm() / seconds);
-        turn.add(m.turn_rad / seconds, (a.rotation.inverse() * b.rotation).angle() / seconds);
+        speed.add(
+            m.distance_m / seconds,
+            (b.translation.vector - a.translation.vector).norm() / seconds,
+        );
+        turn.add(
+            m.turn_rad / seconds,
+            (a.rotation.inverse() * b.rotation).angle() / seconds,
+        );
     }
-    (speed.n > 0.0).then(|| Fit { count: speed.n as usize, speed: speed.value(), turn: turns.then(|| turn.value()) })
+    (speed.n > 0.0).then(|| Fit {
+        count: speed.n as usize,
+        speed: speed.value(),
+        turn: turns.then(|| turn.value()),
+    })
 }
 
 /// Pearson's correlation, from running sums.
@@ -132,9 +168,16 @@ impl Correlation {
     /// 0 where one of both does not vary.
     fn value(&self) -> f64 {
         let variance = |sum: f64, squares: f64| squares / self.n - (sum / self.n).powi(2);
-        let (a, b) = (variance(self.sum.0, self.squares.0), variance(self.sum.1, self.squares.1));
+        let (a, b) = (
+            variance(self.sum.0, self.squares.0),
+            variance(self.sum.1, self.squares.1),
+        );
         let covariance = self.products / self.n - self.sum.0 * self.sum.1 / (self.n * self.n);
-        if a <= 1e-12 || b <= 1e-12 { 0.0 } else { covariance / (a * b).sqrt() }
+        if a <= 1e-12 || b <= 1e-12 {
+            0.0
+        } else {
+            covariance / (a * b).sqrt()
+        }
     }
 }
 
@@ -152,16 +195,25 @@ mod tests {
             stamps.push(1_549_986_607_000_000_000 + k * 50_000_000 + late_ns);
             poses.push(pose);
             let speed = 8.0 + 3.0 * (0.37 * t).sin() + 2.0 * (1.1 * t).cos();
-            pose *= Isometry2::new(Vector2::new(speed * 0.05, 0.0), sign * 0.05 * 0.3 * (0.53 * t).sin());
+            pose *= Isometry2::new(
+                Vector2::new(speed * 0.05, 0.0),
+                sign * 0.05 * 0.3 * (0.53 * t).sin(),
+            );
         }
-        Trajectory { stamp_ns: Some(stamps), poses }
+        Trajectory {
+            stamp_ns: Some(stamps),
+            poses,
+        }
     }
 
     #[test]
     fn a_late_clock_is_measured() {
         for late_ms in [-3_210, -20, 0, 777, 1_600] {
             let found = offset(&drive(0, 1.0), &drive(late_ms * 1_000_000, 1.0)).unwrap();
-            assert!((found.late_s - late_ms as f64 * 1e-3).abs() < 0.01, "{late_ms} ms: {found:?}");
+            assert!(
+                (found.late_s - late_ms as f64 * 1e-3).abs() < 0.01,
+                "{late_ms} ms: {found:?}"
+            );
             assert!(found.is_convincing() && !found.mirrored);
             assert_eq!(found.agrees(), late_ms.abs() < 150);
         }
@@ -170,7 +222,10 @@ mod tests {
     #[test]
     fn a_mirrored_truth_is_told() {
         let found = offset(&drive(0, 1.0), &drive(500_000_000, -1.0)).unwrap();
-        assert!(found.mirrored && (found.late_s - 0.5).abs() < 0.01, "{found:?}");
+        assert!(
+            found.mirrored && (found.late_s - 0.5).abs() < 0.01,
+            "{found:?}"
+        );
     }
 
     #[test]

@@ -9,15 +9,39 @@ impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}", self.root.display())?;
         line(f, "format", format_args!("{}", self.format))?;
-        let read =
-            if self.scans_read < self.scans { format!(" ({} of them read)", self.scans_read) } else { String::new() };
+        let read = if self.scans_read < self.scans {
+            format!(" ({} of them read)", self.scans_read)
+        } else {
+            String::new()
+        };
         line(f, "scans", format_args!("{}{read}", self.scans))?;
-        let side = if self.on_their_side { ", on their side" } else { "" };
+        let side = if self.on_their_side {
+            ", on their side"
+        } else {
+            ""
+        };
         line(f, "images", format_args!("{}{side}", self.image))?;
-        line(f, "sweep", format_args!("{} azimuths x {} range bins, clockwise", self.azimuths, self.bins))?;
-        let offset =
-            if self.range_offset_m == 0.0 { String::new() } else { format!(", offset {} m", self.range_offset_m) };
-        line(f, "range", format_args!("{:.6} m a bin{offset}, to {:.1} m", self.range_resolution_m, self.max_range_m))?;
+        line(
+            f,
+            "sweep",
+            format_args!(
+                "{} azimuths x {} range bins, clockwise",
+                self.azimuths, self.bins
+            ),
+        )?;
+        let offset = if self.range_offset_m == 0.0 {
+            String::new()
+        } else {
+            format!(", offset {} m", self.range_offset_m)
+        };
+        line(
+            f,
+            "range",
+            format_args!(
+                "{:.6} m a bin{offset}, to {:.1} m",
+                self.range_resolution_m, self.max_range_m
+            ),
+        )?;
         self.azimuth_line(f)?;
         self.row_line(f)?;
         if let Some(timing) = &self.timing {
@@ -31,17 +55,33 @@ impl fmt::Display for Report {
             line(f, "ground truth", format_args!("none found"))?;
         }
         writeln!(f, "worth knowing")?;
-        self.oddities.iter().try_for_each(|sentence| writeln!(f, "  - {sentence}"))
+        self.oddities
+            .iter()
+            .try_for_each(|sentence| writeln!(f, "  - {sentence}"))
     }
 }
 
 impl Report {
     fn azimuth_line(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let source =
-            self.encoder_counts.map_or("even steps".to_owned(), |counts| format!("encoder of {counts} counts a turn"));
+        let source = self
+            .encoder_counts
+            .map_or("even steps".to_owned(), |counts| {
+                format!("encoder of {counts} counts a turn")
+            });
         let (least, most) = self.rows.first_azimuth_deg;
-        let first = if most - least < 0.005 { format!("{least:.2}") } else { format!("{least:.2} to {most:.2}") };
-        line(f, "azimuths", format_args!("{source}, step {:.3} deg, first at {first} deg", self.rows.step_deg))
+        let first = if most - least < 0.005 {
+            format!("{least:.2}")
+        } else {
+            format!("{least:.2} to {most:.2}")
+        };
+        line(
+            f,
+            "azimuths",
+            format_args!(
+                "{source}, step {:.3} deg, first at {first} deg",
+                self.rows.step_deg
+            ),
+        )
     }
 
     fn row_line(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -51,7 +91,14 @@ impl Report {
             Chirps::Mixed => "said in some scans",
         };
         let (rows, lost) = (&self.rows, self.rows.lost);
-        line(f, "rows", format_args!("{}, {} not measured, {lost} lost; chirps {chirps}", rows.rows, rows.not_measured))
+        line(
+            f,
+            "rows",
+            format_args!(
+                "{}, {} not measured, {lost} lost; chirps {chirps}",
+                rows.rows, rows.not_measured
+            ),
+        )
     }
 }
 
@@ -62,7 +109,11 @@ fn line(f: &mut fmt::Formatter<'_>, name: &str, value: fmt::Arguments<'_>) -> fm
 fn timing_lines(f: &mut fmt::Formatter<'_>, timing: &TimingReport) -> fmt::Result {
     let seconds = (timing.last_ns - timing.first_ns) as f64 * 1e-9;
     let start = timing.first_ns as f64 * 1e-9;
-    line(f, "time", format_args!("{start:.3} s since 1970, for {seconds:.3} s"))?;
+    line(
+        f,
+        "time",
+        format_args!("{start:.3} s since 1970, for {seconds:.3} s"),
+    )?;
     if timing.period_s == 0.0 {
         return Ok(());
     }
@@ -71,7 +122,9 @@ fn timing_lines(f: &mut fmt::Formatter<'_>, timing: &TimingReport) -> fmt::Resul
     line(
         f,
         "period",
-        format_args!("{period:.4} s; logged {least:.3} to {most:.3} s apart, jitter {jitter:.1} ms RMS"),
+        format_args!(
+            "{period:.4} s; logged {least:.3} to {most:.3} s apart, jitter {jitter:.1} ms RMS"
+        ),
     )?;
     line(
         f,
@@ -86,14 +139,23 @@ fn timing_lines(f: &mut fmt::Formatter<'_>, timing: &TimingReport) -> fmt::Resul
 }
 
 fn truth_line(f: &mut fmt::Formatter<'_>, truth: &TruthReport, root: &Path) -> fmt::Result {
-    let name = truth.file.strip_prefix(root).unwrap_or(&truth.file).display();
+    let name = truth
+        .file
+        .strip_prefix(root)
+        .unwrap_or(&truth.file)
+        .display();
     if truth.error.is_some() {
         return line(f, "ground truth", format_args!("{name}: cannot be read"));
     }
-    let span = truth.span_ns.map_or("no times".to_owned(), |(a, b)| format!("{:.1} s", (b - a) as f64 * 1e-9));
-    let covered = truth.scans_covered.map_or(String::new(), |n| format!(", covers {n} scans"));
-    let nearest =
-        truth.nearest_pose_s.map_or(String::new(), |s| format!(", nearest pose {:.1} ms from a scan's time", s * 1e3));
+    let span = truth.span_ns.map_or("no times".to_owned(), |(a, b)| {
+        format!("{:.1} s", (b - a) as f64 * 1e-9)
+    });
+    let covered = truth
+        .scans_covered
+        .map_or(String::new(), |n| format!(", covers {n} scans"));
+    let nearest = truth.nearest_pose_s.map_or(String::new(), |s| {
+        format!(", nearest pose {:.1} ms from a scan's time", s * 1e3)
+    });
     let clock = match &truth.clock {
         Some(clock) if clock.agrees() => format!(", clock agrees ({:+.2} s)", clock.late_s),
         Some(clock) if clock.is_convincing() => format!(", clock {:+.2} s", clock.late_s),
@@ -101,5 +163,9 @@ fn truth_line(f: &mut fmt::Formatter<'_>, truth: &TruthReport, root: &Path) -> f
         None => String::new(),
     };
     let (poses, metres) = (truth.poses, truth.path_length_m);
-    line(f, "ground truth", format_args!("{name}: {poses} poses, {metres:.1} m, {span}{covered}{nearest}{clock}"))
+    line(
+        f,
+        "ground truth",
+        format_args!("{name}: {poses} poses, {metres:.1} m, {span}{covered}{nearest}{clock}"),
+    )
 }

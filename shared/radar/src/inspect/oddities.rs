@@ -11,19 +11,26 @@ pub(super) fn list(report: &Report, notes: &[String], options: &DatasetOptions) 
     found.extend(resolution(report, options));
     match &report.timing {
         Some(timing) => found.extend(times(timing)),
-        None => found.push("The files are not named by times: scans have the times of their rows only.".to_owned()),
+        None => found.push(
+            "The files are not named by times: scans have the times of their rows only.".to_owned(),
+        ),
     }
     found.extend(rows(report));
     found.extend(scans(report));
     match report.truths.as_slice() {
         [] => found.push("No ground truth was found: a result can be run, not judged.".to_owned()),
-        truths => found.extend(truths.iter().flat_map(|truth| truth_sentences(truth, report))),
+        truths => found.extend(
+            truths
+                .iter()
+                .flat_map(|truth| truth_sentences(truth, report)),
+        ),
     }
     found
 }
 
 fn resolution(report: &Report, options: &DatasetOptions) -> Option<String> {
-    let oxford = matches!(report.format, Format::Oxford | Format::Oord) && options.range_resolution_m.is_none();
+    let oxford = matches!(report.format, Format::Oxford | Format::Oord)
+        && options.range_resolution_m.is_none();
     oxford.then(|| {
         format!(
             "Range resolution is taken as {} m: the dataset's own kit says 0.0432 m, with which paths come out more than 1 % short.",
@@ -42,7 +49,12 @@ fn times(timing: &TimingReport) -> impl Iterator<Item = String> {
         )
     });
     let gaps = (!timing.gaps.is_empty()).then(|| {
-        let places = some(timing.gaps.iter().map(|g| format!("{} ({} missing)", g.scan, g.missing)));
+        let places = some(
+            timing
+                .gaps
+                .iter()
+                .map(|g| format!("{} ({} missing)", g.scan, g.missing)),
+        );
         let missing = if timing.missing_scans == 1 {
             "1 scan is".to_owned()
         } else {
@@ -51,13 +63,20 @@ fn times(timing: &TimingReport) -> impl Iterator<Item = String> {
         format!("{missing} missing, before scans {places}.")
     });
     let backwards = (!timing.backwards.is_empty()).then(|| {
-        format!("Logged time runs backwards at scans {}.", some(timing.backwards.iter().map(ToString::to_string)))
+        format!(
+            "Logged time runs backwards at scans {}.",
+            some(timing.backwards.iter().map(ToString::to_string))
+        )
     });
     [stalls, gaps, backwards].into_iter().flatten()
 }
 
 fn times_word(n: usize) -> String {
-    if n == 1 { "once".to_owned() } else { format!("{n} times") }
+    if n == 1 {
+        "once".to_owned()
+    } else {
+        format!("{n} times")
+    }
 }
 
 fn rows(report: &Report) -> impl Iterator<Item = String> {
@@ -71,9 +90,10 @@ fn rows(report: &Report) -> impl Iterator<Item = String> {
             percent(rows.not_measured)
         )
     });
-    let lost = (rows.lost > 0).then(|| format!("{} rows are lost: the azimuth jumps over them.", rows.lost));
-    let chirps =
-        (rows.chirps == Chirps::Mixed).then(|| "Some scans say the chirps' directions and some do not.".to_owned());
+    let lost = (rows.lost > 0)
+        .then(|| format!("{} rows are lost: the azimuth jumps over them.", rows.lost));
+    let chirps = (rows.chirps == Chirps::Mixed)
+        .then(|| "Some scans say the chirps' directions and some do not.".to_owned());
     let ringing = (rows.ringing_bins > 0).then(|| {
         format!(
             "Range bins 0 to {} (to {:.1} m) are the sensor's own ringing: alike in all directions, and brighter than the scene; keep the minimum range above that.",
@@ -85,9 +105,14 @@ fn rows(report: &Report) -> impl Iterator<Item = String> {
 }
 
 fn scans(report: &Report) -> impl Iterator<Item = String> {
-    let single = (report.scans == 1).then(|| "There is one scan only, and a motion needs two.".to_owned());
+    let single =
+        (report.scans == 1).then(|| "There is one scan only, and a motion needs two.".to_owned());
     let unreadable = (!report.unreadable.is_empty()).then(|| {
-        let first = report.unreadable.first().map(|u| u.error.clone()).unwrap_or_default();
+        let first = report
+            .unreadable
+            .first()
+            .map(|u| u.error.clone())
+            .unwrap_or_default();
         let places = some(report.unreadable.iter().map(|u| u.scan.to_string()));
         format!(
             "{} of {} scans read cannot be used (scans {places}): {first}.",
@@ -99,17 +124,28 @@ fn scans(report: &Report) -> impl Iterator<Item = String> {
 }
 
 fn truth_sentences(truth: &TruthReport, report: &Report) -> Vec<String> {
-    let name = truth.file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = truth
+        .file
+        .file_name()
+        .map(|n| n.to_string_lossy().into_owned())
+        .unwrap_or_default();
     if let Some(error) = &truth.error {
         return vec![format!("Ground truth cannot be read: {error}.")];
     }
-    let heading = (!truth.has_heading && truth.poses > 1).then(|| format!("{name} has positions only, no headings."));
-    let timeless = truth.span_ns.is_none().then(|| format!("{name} has no times: it can be compared by index only."));
+    let heading = (!truth.has_heading && truth.poses > 1)
+        .then(|| format!("{name} has positions only, no headings."));
+    let timeless = truth
+        .span_ns
+        .is_none()
+        .then(|| format!("{name} has no times: it can be compared by index only."));
     let covered = truth
         .scans_covered
         .filter(|n| *n < report.scans)
         .map(|n| format!("{name} covers {n} of {} scans.", report.scans));
-    [heading, timeless, covered, clock_sentence(truth, &name)].into_iter().flatten().collect()
+    [heading, timeless, covered, clock_sentence(truth, &name)]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 fn clock_sentence(truth: &TruthReport, name: &str) -> Option<String> {
@@ -119,14 +155,20 @@ fn clock_sentence(truth: &TruthReport, name: &str) -> Option<String> {
             "{name} moves unlike the given trajectory at any offset within 10 s: its clock cannot be judged."
         ));
     }
-    let mirrored =
-        if clock.mirrored { " and it is mirrored (turns left where the trajectory turns right)" } else { "" };
+    let mirrored = if clock.mirrored {
+        " and it is mirrored (turns left where the trajectory turns right)"
+    } else {
+        ""
+    };
     match (clock.agrees(), clock.late_s > 0.0) {
         (true, _) if clock.mirrored => Some(format!("{name}'s clock agrees{mirrored}.")),
         (true, _) => None,
         (false, late) => {
             let word = if late { "late" } else { "early" };
-            Some(format!("{name} is {:.2} s {word} against the given trajectory{mirrored}.", clock.late_s.abs()))
+            Some(format!(
+                "{name} is {:.2} s {word} against the given trajectory{mirrored}.",
+                clock.late_s.abs()
+            ))
         }
     }
 }
@@ -135,5 +177,9 @@ fn clock_sentence(truth: &TruthReport, name: &str) -> Option<String> {
 fn some(items: impl ExactSizeIterator<Item = String>) -> String {
     let more = items.len().saturating_sub(NAMED);
     let named = items.take(NAMED).collect::<Vec<_>>().join(", ");
-    if more == 0 { named } else { format!("{named} and {more} more") }
+    if more == 0 {
+        named
+    } else {
+        format!("{named} and {more} more")
+    }
 }

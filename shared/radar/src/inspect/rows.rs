@@ -63,7 +63,11 @@ impl Survey {
     pub(super) fn add(&mut self, scan: &PolarScan<'_>) {
         self.scans += 1;
         self.rows += scan.flags.len() as u64;
-        self.not_measured += scan.flags.iter().filter(|f| *f & flag::MEASURED == 0).count() as u64;
+        self.not_measured += scan
+            .flags
+            .iter()
+            .filter(|f| *f & flag::MEASURED == 0)
+            .count() as u64;
         self.with_chirps += usize::from(scan.flags.iter().any(|f| f & flag::CHIRP_KNOWN != 0));
         self.add_azimuths(scan);
         if self.scans <= POWER_SCANS {
@@ -72,17 +76,23 @@ impl Survey {
     }
 
     fn add_azimuths(&mut self, scan: &PolarScan<'_>) {
-        let Some(&first) = scan.azimuth_rad.first() else { return };
+        let Some(&first) = scan.azimuth_rad.first() else {
+            return;
+        };
         let (least, most) = self.first_rad.unwrap_or((first, first));
         self.first_rad = Some((least.min(first), most.max(first)));
         let steps: Vec<f64> = steps_rad(scan).collect();
         let usual = median(&steps);
-        self.lost += steps.iter().map(|s| ((s / usual).round() as u64).saturating_sub(1)).sum::<u64>();
+        self.lost += steps
+            .iter()
+            .map(|s| ((s / usual).round() as u64).saturating_sub(1))
+            .sum::<u64>();
         self.steps_rad.push(usual);
     }
 
     fn add_powers(&mut self, scan: &PolarScan<'_>) {
-        self.power.resize(scan.geometry.bins.max(self.power.len()), (0, 0));
+        self.power
+            .resize(scan.geometry.bins.max(self.power.len()), (0, 0));
         self.power_rows += scan.geometry.azimuths as u64;
         for azimuth in 0..scan.geometry.azimuths {
             for (sum, power) in self.power.iter_mut().zip(scan.row(azimuth)) {
@@ -112,26 +122,32 @@ impl Survey {
 
     fn ringing_bins(&self) -> usize {
         let rows = self.power_rows.max(1) as f64;
-        let overall =
-            self.power.iter().map(|(sum, _)| *sum as f64).sum::<f64>() / (rows * self.power.len().max(1) as f64);
+        let overall = self.power.iter().map(|(sum, _)| *sum as f64).sum::<f64>()
+            / (rows * self.power.len().max(1) as f64);
         let rings = |(sum, squares): &(u64, u64)| {
             let mean = *sum as f64 / rows;
             let deviation = (*squares as f64 / rows - mean * mean).max(0.0).sqrt();
             mean > RINGING_BRIGHTNESS * overall && deviation <= RINGING_VARIATION * mean
         };
-        let quiet = self.power.windows(QUIET_BINS).position(|bins| !bins.iter().any(rings));
+        let quiet = self
+            .power
+            .windows(QUIET_BINS)
+            .position(|bins| !bins.iter().any(rings));
         quiet.unwrap_or(0)
     }
 }
 
 /// Steps from azimuth to azimuth, the seam included, positive in the sense of rotation.
 fn steps_rad<'a>(scan: &PolarScan<'a>) -> impl Iterator<Item = f64> + 'a {
-    let sign = if scan.geometry.sense == Sense::Clockwise { 1.0 } else { -1.0 };
+    let sign = if scan.geometry.sense == Sense::Clockwise {
+        1.0
+    } else {
+        -1.0
+    };
     let next = scan.azimuth_rad.iter().cycle().skip(1);
-    scan.azimuth_rad
-        .iter()
-        .zip(next)
-        .map(move |(a, b)| (sign * (f64::from(*b) - f64::from(*a))).rem_euclid(std::f64::consts::TAU))
+    scan.azimuth_rad.iter().zip(next).map(move |(a, b)| {
+        (sign * (f64::from(*b) - f64::from(*a))).rem_euclid(std::f64::consts::TAU)
+    })
 }
 
 fn median(values: &[f64]) -> f64 {

@@ -59,8 +59,13 @@ pub struct Stall {
 /// `None` where not every scan has a time.
 pub(super) fn examine(dataset: &dyn Dataset) -> Option<TimingReport> {
     let all = 0..dataset.len();
-    let used: Vec<i64> = all.clone().map(|i| dataset.nominal_stamp_ns(i)).collect::<Option<_>>()?;
-    let logged: Vec<i64> = all.map(|i| dataset.logged_stamp_ns(i)).collect::<Option<_>>()?;
+    let used: Vec<i64> = all
+        .clone()
+        .map(|i| dataset.nominal_stamp_ns(i))
+        .collect::<Option<_>>()?;
+    let logged: Vec<i64> = all
+        .map(|i| dataset.logged_stamp_ns(i))
+        .collect::<Option<_>>()?;
     times(&used, &logged)
 }
 
@@ -70,13 +75,28 @@ fn times(used: &[i64], logged: &[i64]) -> Option<TimingReport> {
     let period_s = median(&used_s);
     let late_s = lateness_s(used, logged);
     let (mut gaps, mut stalls, mut backwards) = (Vec::new(), Vec::new(), Vec::new());
-    for (i, (on_clock, on_host)) in used_s.iter().copied().zip(logged_s.iter().copied()).enumerate() {
+    for (i, (on_clock, on_host)) in used_s
+        .iter()
+        .copied()
+        .zip(logged_s.iter().copied())
+        .enumerate()
+    {
         let scan = i + 1;
-        if period_s > 0.0 && on_clock > GAP_PERIODS * period_s && !catches_up(&logged_s[scan..], period_s) {
+        if period_s > 0.0
+            && on_clock > GAP_PERIODS * period_s
+            && !catches_up(&logged_s[scan..], period_s)
+        {
             let missing = ((on_clock / period_s).round() as u32 - 1) as usize;
-            gaps.push(Gap { scan, missing, seconds: on_clock });
+            gaps.push(Gap {
+                scan,
+                missing,
+                seconds: on_clock,
+            });
         } else if period_s > 0.0 && on_host > STALL_PERIODS * period_s {
-            stalls.push(Stall { scan, late_s: late_s[scan].max(on_host - period_s) });
+            stalls.push(Stall {
+                scan,
+                late_s: late_s[scan].max(on_host - period_s),
+            });
         } else if on_host < 0.0 {
             backwards.push(scan);
         }
@@ -95,7 +115,10 @@ fn times(used: &[i64], logged: &[i64]) -> Option<TimingReport> {
 }
 
 fn intervals_s(stamps: &[i64]) -> Vec<f64> {
-    stamps.windows(2).map(|w| (w[1] - w[0]) as f64 * 1e-9).collect()
+    stamps
+        .windows(2)
+        .map(|w| (w[1] - w[0]) as f64 * 1e-9)
+        .collect()
 }
 
 fn median(values: &[f64]) -> f64 {
@@ -113,13 +136,22 @@ fn lateness_s(used: &[i64], logged: &[i64]) -> Vec<f64> {
 
 /// Whether the scans that follow a long interval come faster than the sensor makes them.
 fn catches_up(afterwards: &[f64], period_s: f64) -> bool {
-    let next: Vec<f64> =
-        afterwards.iter().copied().take(AFTERWARDS).take_while(|s| *s < STALL_PERIODS * period_s).collect();
+    let next: Vec<f64> = afterwards
+        .iter()
+        .copied()
+        .take(AFTERWARDS)
+        .take_while(|s| *s < STALL_PERIODS * period_s)
+        .collect();
     !next.is_empty() && median(&next) < CATCH_UP_PERIODS * period_s
 }
 
 fn jitter_s(logged_s: &[f64], period_s: f64) -> f64 {
-    let ordinary = || logged_s.iter().map(|s| s - period_s).filter(|d| d.abs() < (STALL_PERIODS - 1.0) * period_s);
+    let ordinary = || {
+        logged_s
+            .iter()
+            .map(|s| s - period_s)
+            .filter(|d| d.abs() < (STALL_PERIODS - 1.0) * period_s)
+    };
     let count = ordinary().count().max(1);
     (ordinary().map(|d| d * d).sum::<f64>() / count as f64).sqrt()
 }
@@ -127,7 +159,11 @@ fn jitter_s(logged_s: &[f64], period_s: f64) -> f64 {
 fn extremes(values: &[f64]) -> (f64, f64) {
     let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let least = values.iter().copied().fold(f64::INFINITY, f64::min);
-    if values.is_empty() { (0.0, 0.0) } else { (most, least) }
+    if values.is_empty() {
+        (0.0, 0.0)
+    } else {
+        (most, least)
+    }
 }
 
 #[cfg(test)]
@@ -138,7 +174,9 @@ mod tests {
     const MS: i64 = 1_000_000;
 
     fn even(n: i64) -> Vec<i64> {
-        (0..n).map(|k| 1_549_986_607_000 * MS + k * 250 * MS).collect()
+        (0..n)
+            .map(|k| 1_549_986_607_000 * MS + k * 250 * MS)
+            .collect()
     }
 
     #[test]
@@ -146,7 +184,14 @@ mod tests {
         let mut stamps = even(20);
         stamps.drain(7..10);
         let report = times(&stamps, &stamps).unwrap();
-        assert_eq!(report.gaps, [Gap { scan: 7, missing: 3, seconds: 1.0 }]);
+        assert_eq!(
+            report.gaps,
+            [Gap {
+                scan: 7,
+                missing: 3,
+                seconds: 1.0
+            }]
+        );
         assert_eq!((report.missing_scans, report.stalls.len()), (3, 0));
         assert!((report.period_s - 0.25).abs() < 1e-9 && report.jitter_s < 1e-9);
     }
@@ -162,14 +207,21 @@ mod tests {
             assert_eq!(report.missing_scans, 0, "{:?}", report.gaps);
             assert_eq!(report.stalls.len(), 1);
             assert_eq!(report.stalls[0].scan, 10);
-            assert!((report.stalls[0].late_s - 0.9).abs() < 1e-9, "{}", report.stalls[0].late_s);
+            assert!(
+                (report.stalls[0].late_s - 0.9).abs() < 1e-9,
+                "{}",
+                report.stalls[0].late_s
+            );
         }
     }
 
     #[test]
     fn one_scan_has_no_period() {
         let report = times(&even(1), &even(1)).unwrap();
-        assert_eq!((report.period_s, report.jitter_s, report.missing_scans), (0.0, 0.0, 0));
+        assert_eq!(
+            (report.period_s, report.jitter_s, report.missing_scans),
+            (0.0, 0.0, 0)
+        );
     }
 
     #[test]

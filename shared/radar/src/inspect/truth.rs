@@ -36,15 +36,28 @@ pub struct TruthReport {
 }
 
 /// The usual place's file and all TUM files in the root, by name.
-pub(super) fn examine(root: &Path, dataset: &dyn Dataset, trajectory: Option<&Trajectory>) -> Vec<TruthReport> {
-    let mut files: Vec<PathBuf> =
-        std::fs::read_dir(root).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
+pub(super) fn examine(
+    root: &Path,
+    dataset: &dyn Dataset,
+    trajectory: Option<&Trajectory>,
+) -> Vec<TruthReport> {
+    let mut files: Vec<PathBuf> = std::fs::read_dir(root)
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|entry| entry.path())
+        .collect();
     files.retain(|path| path.extension().is_some_and(|e| e == "tum") && path.is_file());
     files.extend(find_ground_truth(root));
     files.sort();
     files.dedup();
-    let stamps: Vec<i64> = (0..dataset.len()).filter_map(|i| dataset.nominal_stamp_ns(i)).collect();
-    files.into_iter().map(|file| examine_file(file, &stamps, trajectory)).collect()
+    let stamps: Vec<i64> = (0..dataset.len())
+        .filter_map(|i| dataset.nominal_stamp_ns(i))
+        .collect();
+    files
+        .into_iter()
+        .map(|file| examine_file(file, &stamps, trajectory))
+        .collect()
 }
 
 fn examine_file(file: PathBuf, scans_ns: &[i64], trajectory: Option<&Trajectory>) -> TruthReport {
@@ -74,9 +87,14 @@ fn nearest_pose_s(truth: &Trajectory, scans_ns: &[i64]) -> Option<f64> {
     let nearest = |scan: &i64| {
         let after = stamps.partition_point(|s| s < scan);
         let around = [after.checked_sub(1), Some(after)].into_iter().flatten();
-        around.filter_map(|i| stamps.get(i)).map(|s| (s - scan).abs()).min()
+        around
+            .filter_map(|i| stamps.get(i))
+            .map(|s| (s - scan).abs())
+            .min()
     };
     let mut distances: Vec<i64> = scans_ns.iter().filter_map(nearest).collect();
     distances.sort_unstable();
-    distances.get(distances.len() / 2).map(|ns| *ns as f64 * 1e-9)
+    distances
+        .get(distances.len() / 2)
+        .map(|ns| *ns as f64 * 1e-9)
 }

@@ -27,7 +27,11 @@ pub(super) struct Beam {
 
 impl Beam {
     pub fn new(half_width_rad: f32) -> Self {
-        Self { half_width_rad, row: Vec::new(), found: Vec::new() }
+        Self {
+            half_width_rad,
+            row: Vec::new(),
+            found: Vec::new(),
+        }
     }
 
     /// The cells of all azimuths, in order, that have power and are as bright as any within the beam.
@@ -37,7 +41,9 @@ impl Beam {
         // All that could be found: so no later scan of this size allocates. Untouched memory costs nothing.
         self.found.reserve(azimuths * cells.cells());
         for azimuth in 0..azimuths {
-            let Some(powers) = cells.lit(azimuth) else { continue };
+            let Some(powers) = cells.lit(azimuth) else {
+                continue;
+            };
             self.row.clear();
             self.row.extend_from_slice(powers);
             for neighbour in neighbours(scan, azimuth, self.half_width_rad) {
@@ -53,7 +59,11 @@ impl Beam {
 
 /// The azimuths within a half width on either side, across the sweep's seam too, each once. Half of an even spacing more
 /// is allowed, for antennas do not turn evenly.
-fn neighbours(scan: &PolarScan<'_>, azimuth: usize, half_width_rad: f32) -> impl Iterator<Item = usize> {
+fn neighbours(
+    scan: &PolarScan<'_>,
+    azimuth: usize,
+    half_width_rad: f32,
+) -> impl Iterator<Item = usize> {
     let azimuths = scan.geometry.azimuths;
     let furthest_rad = half_width_rad + 0.5 * TAU / azimuths as f32;
     let (centre_rad, bearings) = (scan.azimuth_rad[azimuth], scan.azimuth_rad);
@@ -61,8 +71,12 @@ fn neighbours(scan: &PolarScan<'_>, azimuth: usize, half_width_rad: f32) -> impl
         let turn = bearings[other] - centre_rad;
         ((turn + PI).rem_euclid(TAU) - PI).abs() <= furthest_rad
     };
-    let later = (1..=azimuths / 2).map(move |step| (azimuth + step) % azimuths).take_while(within);
-    let earlier = (1..=(azimuths - 1) / 2).map(move |step| (azimuth + azimuths - step) % azimuths).take_while(within);
+    let later = (1..=azimuths / 2)
+        .map(move |step| (azimuth + step) % azimuths)
+        .take_while(within);
+    let earlier = (1..=(azimuths - 1) / 2)
+        .map(move |step| (azimuth + azimuths - step) % azimuths)
+        .take_while(within);
     later.chain(earlier)
 }
 
@@ -78,7 +92,11 @@ fn collect(row: &[i16], azimuth: u16, found: &mut Vec<Peak>) {
             continue;
         }
         for (k, &power) in powers.iter().enumerate().filter(|(_, power)| **power > 0) {
-            found.push(Peak { azimuth, cell: (block * BLOCK + k) as u32, power });
+            found.push(Peak {
+                azimuth,
+                cell: (block * BLOCK + k) as u32,
+                power,
+            });
         }
     }
 }

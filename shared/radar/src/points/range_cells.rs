@@ -39,9 +39,16 @@ impl Layout {
         let cell_m = geometry.range_resolution_m * bins_a_cell as f32;
         let place = |range_m: f32| (range_m - geometry.range_offset_m) / cell_m - 0.5;
         let skipped = place(config.min_range_m).ceil().max(0.0) as usize;
-        let end = ((place(config.max_range_m) + 1.0).floor().max(0.0) as usize).min(geometry.bins / bins_a_cell);
+        let end = ((place(config.max_range_m) + 1.0).floor().max(0.0) as usize)
+            .min(geometry.bins / bins_a_cell);
         let cells = end.saturating_sub(skipped);
-        Self { bins_a_cell, skipped, cells, cell_m, range_offset_m: geometry.range_offset_m }
+        Self {
+            bins_a_cell,
+            skipped,
+            cells,
+            cell_m,
+            range_offset_m: geometry.range_offset_m,
+        }
     }
 }
 
@@ -49,14 +56,29 @@ impl RangeCells {
     /// Takes the powers of a scan that passed its check.
     pub fn measure(&mut self, scan: &PolarScan<'_>, floor: u8, config: &PointsConfig) {
         self.layout = Layout::new(scan, config);
-        let (azimuths, Layout { bins_a_cell, skipped, cells, .. }) = (scan.geometry.azimuths, self.layout);
+        let (
+            azimuths,
+            Layout {
+                bins_a_cell,
+                skipped,
+                cells,
+                ..
+            },
+        ) = (scan.geometry.azimuths, self.layout);
         self.powers.resize(azimuths * cells, 0);
         self.lit.clear();
         self.lit.resize(azimuths, false);
-        for azimuth in (0..azimuths).filter(|&azimuth| cells > 0 && scan.flags[azimuth] & flag::MEASURED != 0) {
+        for azimuth in
+            (0..azimuths).filter(|&azimuth| cells > 0 && scan.flags[azimuth] & flag::MEASURED != 0)
+        {
             let bins = &scan.row(azimuth)[skipped * bins_a_cell..][..cells * bins_a_cell];
             let powers = &mut self.powers[azimuth * cells..][..cells];
-            sum(bins, bins_a_cell, i16::from(floor) * bins_a_cell as i16, powers);
+            sum(
+                bins,
+                bins_a_cell,
+                i16::from(floor) * bins_a_cell as i16,
+                powers,
+            );
             self.lit[azimuth] = powers.iter().fold(0, |any, power| any | power) != 0;
         }
     }
@@ -98,7 +120,12 @@ fn sum(bins: &[u8], bins_a_cell: usize, floor: i16, powers: &mut [i16]) {
     }
 }
 
-fn sum_each<const BINS: usize>(bins: &[u8], floor: i16, powers: &mut [i16], sum: impl Fn([u8; BINS]) -> i16) {
+fn sum_each<const BINS: usize>(
+    bins: &[u8],
+    floor: i16,
+    powers: &mut [i16],
+    sum: impl Fn([u8; BINS]) -> i16,
+) {
     for (power, bins) in powers.iter_mut().zip(bins.as_chunks::<BINS>().0) {
         *power = (sum(*bins) - floor).max(0);
     }

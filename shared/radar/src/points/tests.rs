@@ -11,8 +11,14 @@ const UNSET: Point = [f32::NAN; 5];
 
 fn extract(config: &PointsConfig, scan: &OwnedScan, floor: u8) -> Vec<Point> {
     let mut out = vec![UNSET; config.capacity];
-    let count = PointExtractor::new(config).unwrap().extract(&scan.view(), floor, &mut out).unwrap();
-    assert!(out[count..].iter().flatten().all(|value| value.is_nan()), "only points are written");
+    let count = PointExtractor::new(config)
+        .unwrap()
+        .extract(&scan.view(), floor, &mut out)
+        .unwrap();
+    assert!(
+        out[count..].iter().flatten().all(|value| value.is_nan()),
+        "only points are written"
+    );
     out.truncate(count);
     out
 }
@@ -21,14 +27,21 @@ fn extract(config: &PointsConfig, scan: &OwnedScan, floor: u8) -> Vec<Point> {
 fn direct(config: &PointsConfig, scan: &OwnedScan, floor: u8) -> Vec<Point> {
     let view = scan.view();
     let geometry = &view.geometry;
-    let depth = (config.range_cell_m / geometry.range_resolution_m).round().max(1.0) as usize;
+    let depth = (config.range_cell_m / geometry.range_resolution_m)
+        .round()
+        .max(1.0) as usize;
     let measured = |azimuth: usize| view.flags[azimuth] & flag::MEASURED != 0;
     let power = |azimuth: usize, cell: usize| {
-        let sum: i32 = view.row(azimuth)[cell * depth..][..depth].iter().map(|&bin| i32::from(bin)).sum();
+        let sum: i32 = view.row(azimuth)[cell * depth..][..depth]
+            .iter()
+            .map(|&bin| i32::from(bin))
+            .sum();
         (sum - i32::from(floor) * depth as i32).max(0)
     };
     let beside = |a: usize, b: usize| {
-        let turn = (view.azimuth_rad[a] - view.azimuth_rad[b]).to_degrees().rem_euclid(360.0);
+        let turn = (view.azimuth_rad[a] - view.azimuth_rad[b])
+            .to_degrees()
+            .rem_euclid(360.0);
         turn.min(360.0 - turn) <= config.beam_deg + 180.0 / geometry.azimuths as f32
     };
     let mut points = Vec::new();
@@ -36,16 +49,32 @@ fn direct(config: &PointsConfig, scan: &OwnedScan, floor: u8) -> Vec<Point> {
         for cell in 0..geometry.bins / depth {
             let range_m = view.range_m((cell * depth) as f32 + 0.5 * (depth as f32 - 1.0));
             let here = power(azimuth, cell);
-            let rivals = (0..geometry.azimuths).filter(|&other| measured(other) && beside(azimuth, other));
-            let outshone = rivals.map(|other| power(other, cell)).any(|there| there > here);
-            if here == 0 || outshone || !(config.min_range_m..=config.max_range_m).contains(&range_m) {
+            let rivals =
+                (0..geometry.azimuths).filter(|&other| measured(other) && beside(azimuth, other));
+            let outshone = rivals
+                .map(|other| power(other, cell))
+                .any(|there| there > here);
+            if here == 0
+                || outshone
+                || !(config.min_range_m..=config.max_range_m).contains(&range_m)
+            {
                 continue;
             }
             let (sin, cos) = view.azimuth_rad[azimuth].sin_cos();
-            let left = if geometry.sense == Sense::Clockwise { -sin } else { sin };
+            let left = if geometry.sense == Sense::Clockwise {
+                -sin
+            } else {
+                sin
+            };
             let weight = (here as f32 / depth as f32 / config.weight_cap).min(1.0);
             let time_s = (view.stamp_ns[azimuth] - geometry.stamp_ns) as f32 * 1e-9;
-            points.push([range_m * cos, range_m * left, time_s, weight, view.doppler_s(azimuth)]);
+            points.push([
+                range_m * cos,
+                range_m * left,
+                time_s,
+                weight,
+                view.doppler_s(azimuth),
+            ]);
         }
     }
     points
@@ -60,14 +89,20 @@ fn noise(azimuths: usize, bins: usize, range_resolution_m: f32, seed: u32) -> Ow
     };
     let turn = std::f32::consts::TAU / azimuths as f32;
     let mut scan = Sensor {
-        azimuth_rad: (0..azimuths).map(|i| (i as f32 + random() as f32 / 1024.0) * turn).collect(),
+        azimuth_rad: (0..azimuths)
+            .map(|i| (i as f32 + random() as f32 / 1024.0) * turn)
+            .collect(),
         time_s: (0..azimuths).map(|i| 1e-3 * (i as f64 - 10.0)).collect(),
         bins,
         range_resolution_m,
         range_offset_m: -0.31,
         doppler_s: 0.049,
         chirps_alternate: seed.is_multiple_of(2),
-        sense: if seed.is_multiple_of(3) { Sense::Clockwise } else { Sense::CounterClockwise },
+        sense: if seed.is_multiple_of(3) {
+            Sense::Clockwise
+        } else {
+            Sense::CounterClockwise
+        },
         ..Sensor::navtech()
     }
     .scan();
@@ -81,7 +116,10 @@ fn noise(azimuths: usize, bins: usize, range_resolution_m: f32, seed: u32) -> Ow
 fn assert_alike(got: &[Point], expected: &[Point]) {
     assert_eq!(got.len(), expected.len());
     for (got, expected) in got.iter().zip(expected) {
-        let near = got.iter().zip(expected).all(|(got, expected)| (got - expected).abs() < 1e-4);
+        let near = got
+            .iter()
+            .zip(expected)
+            .all(|(got, expected)| (got - expected).abs() < 1e-4);
         assert!(near, "{got:?} for {expected:?}");
     }
 }
@@ -117,16 +155,30 @@ proptest! {
 
 /// Scatterers all around but for the seam, which a moving sensor sees twice or not at all.
 fn places() -> Vec<Point2<f64>> {
-    let polar = |k: u32| (f64::from(k) * std::f64::consts::FRAC_PI_4, 10.0 + 11.0 * f64::from(k));
-    (1..8).map(polar).map(|(bearing, range)| Point2::new(range * bearing.cos(), range * bearing.sin())).collect()
+    let polar = |k: u32| {
+        (
+            f64::from(k) * std::f64::consts::FRAC_PI_4,
+            10.0 + 11.0 * f64::from(k),
+        )
+    };
+    (1..8)
+        .map(polar)
+        .map(|(bearing, range)| Point2::new(range * bearing.cos(), range * bearing.sin()))
+        .collect()
 }
 
 #[test]
 fn a_moving_sensors_points_are_where_the_scatterers_are_once_motion_and_doppler_are_undone() {
-    let twist = Twist { vx_mps: 18.0, vy_mps: -0.4, yaw_rate_radps: 0.4 };
-    for (sense, chirps_alternate, range_resolution_m) in
-        [(Sense::Clockwise, false, 0.0438), (Sense::CounterClockwise, false, 0.1736), (Sense::Clockwise, true, 0.0438)]
-    {
+    let twist = Twist {
+        vx_mps: 18.0,
+        vy_mps: -0.4,
+        yaw_rate_radps: 0.4,
+    };
+    for (sense, chirps_alternate, range_resolution_m) in [
+        (Sense::Clockwise, false, 0.0438),
+        (Sense::CounterClockwise, false, 0.1736),
+        (Sense::Clockwise, true, 0.0438),
+    ] {
         let sensor = Sensor {
             twist,
             sense,
@@ -137,19 +189,35 @@ fn a_moving_sensors_points_are_where_the_scatterers_are_once_motion_and_doppler_
             doppler_s: 0.045,
             ..Sensor::navtech()
         };
-        let all = PointsConfig { max_range_m: 95.0, ..PointsConfig::default() };
+        let all = PointsConfig {
+            max_range_m: 95.0,
+            ..PointsConfig::default()
+        };
         let points = extract(&all, &sensor.measure(&places(), 0.5), 30);
         let placed: Vec<_> = points.iter().map(|point| place(point, &twist)).collect();
         for scatterer in places() {
-            let near = placed.iter().zip(&points).filter(|(place, _)| (*place - scatterer).norm() < 4.0);
-            let (sum, moment) = near.fold((0.0, Vector2::zeros()), |(sum, moment), (place, point)| {
-                (sum + f64::from(point[3]), moment + (place - scatterer) * f64::from(point[3]))
-            });
+            let near = placed
+                .iter()
+                .zip(&points)
+                .filter(|(place, _)| (*place - scatterer).norm() < 4.0);
+            let (sum, moment) =
+                near.fold((0.0, Vector2::zeros()), |(sum, moment), (place, point)| {
+                    (
+                        sum + f64::from(point[3]),
+                        moment + (place - scatterer) * f64::from(point[3]),
+                    )
+                });
             // A bearing is known to half an azimuth, a range to a tenth of a cell.
             let miss = moment / sum;
             let along = miss.dot(&scatterer.coords.normalize()).abs();
-            assert!(along < 0.03, "{sense:?} {chirps_alternate}: {scatterer} missed by {along} m along range");
-            assert!(miss.norm() < 0.05 + 0.5 * 0.9f64.to_radians() * scatterer.coords.norm(), "{scatterer}: {miss}");
+            assert!(
+                along < 0.03,
+                "{sense:?} {chirps_alternate}: {scatterer} missed by {along} m along range"
+            );
+            assert!(
+                miss.norm() < 0.05 + 0.5 * 0.9f64.to_radians() * scatterer.coords.norm(),
+                "{scatterer}: {miss}"
+            );
         }
     }
 }
@@ -164,31 +232,54 @@ fn place(point: &Point, twist: &Twist) -> Point2<f64> {
 
 #[test]
 fn a_scatterer_on_the_seam_is_seen_once() {
-    let mut scan = Sensor { bins: 500, range_resolution_m: 0.1736, ..Sensor::navtech() }.scan();
+    let mut scan = Sensor {
+        bins: 500,
+        range_resolution_m: 0.1736,
+        ..Sensor::navtech()
+    }
+    .scan();
     for (azimuth, power) in [(398, 100), (399, 180), (0, 150), (1, 90)] {
         let geometry = scan.geometry;
         scan.bytes[geometry.first_byte + azimuth * geometry.stride + 100] = power;
     }
     let points = extract(&PointsConfig::default(), &scan, 60);
     assert_eq!(points.len(), 1);
-    assert_eq!((points[0][2], points[0][3]), ((scan.view().time_s(399)) as f32, 1.0));
+    assert_eq!(
+        (points[0][2], points[0][3]),
+        ((scan.view().time_s(399)) as f32, 1.0)
+    );
 }
 
 #[test]
 fn two_azimuths_that_are_equally_bright_both_stay() {
-    let mut scan = Sensor { bins: 500, range_resolution_m: 0.1736, ..Sensor::navtech() }.scan();
+    let mut scan = Sensor {
+        bins: 500,
+        range_resolution_m: 0.1736,
+        ..Sensor::navtech()
+    }
+    .scan();
     for azimuth in [20, 21] {
         let geometry = scan.geometry;
         scan.bytes[geometry.first_byte + azimuth * geometry.stride + 100] = 90;
     }
     let points = extract(&PointsConfig::default(), &scan, 60);
-    assert_eq!(points.iter().map(|point| point[3]).collect::<Vec<_>>(), [0.5, 0.5]);
+    assert_eq!(
+        points.iter().map(|point| point[3]).collect::<Vec<_>>(),
+        [0.5, 0.5]
+    );
 }
 
 #[test]
 fn nothing_remains_of_the_scan_before() {
-    let scans = [noise(90, 300, 0.05, 1), noise(40, 200, 0.3, 2), noise(90, 300, 0.05, 3)];
-    let config = PointsConfig { capacity: 200, ..PointsConfig::default() };
+    let scans = [
+        noise(90, 300, 0.05, 1),
+        noise(40, 200, 0.3, 2),
+        noise(90, 300, 0.05, 3),
+    ];
+    let config = PointsConfig {
+        capacity: 200,
+        ..PointsConfig::default()
+    };
     let mut extractor = PointExtractor::new(&config).unwrap();
     let mut out = vec![UNSET; 200];
     for scan in scans.iter().chain(&scans) {
@@ -207,22 +298,68 @@ fn scans_of_almost_nothing_have_no_points_and_contradictory_ones_are_refused() {
     }
     let mut scan = noise(4, 10, 0.1, 5);
     scan.geometry.bins = 11;
-    let refused = PointExtractor::new(&PointsConfig::default()).unwrap().extract(&scan.view(), 0, &mut [UNSET]);
-    assert!(matches!(refused, Err(ScanError::Length { what: "image", .. })));
+    let refused = PointExtractor::new(&PointsConfig::default())
+        .unwrap()
+        .extract(&scan.view(), 0, &mut [UNSET]);
+    assert!(matches!(
+        refused,
+        Err(ScanError::Length { what: "image", .. })
+    ));
 }
 
 #[test]
 fn settings_out_of_bounds_are_refused_by_name() {
     let default = PointsConfig::default;
     for (name, config) in [
-        ("beam_deg", PointsConfig { beam_deg: f32::NAN, ..default() }),
-        ("range_cell_m", PointsConfig { range_cell_m: 0.0, ..default() }),
-        ("min_range_m", PointsConfig { min_range_m: -1.0, ..default() }),
-        ("max_range_m", PointsConfig { max_range_m: 5.0, ..default() }),
-        ("weight_cap", PointsConfig { weight_cap: 0.0, ..default() }),
-        ("capacity", PointsConfig { capacity: 100_000, ..default() }),
+        (
+            "beam_deg",
+            PointsConfig {
+                beam_deg: f32::NAN,
+                ..default()
+            },
+        ),
+        (
+            "range_cell_m",
+            PointsConfig {
+                range_cell_m: 0.0,
+                ..default()
+            },
+        ),
+        (
+            "min_range_m",
+            PointsConfig {
+                min_range_m: -1.0,
+                ..default()
+            },
+        ),
+        (
+            "max_range_m",
+            PointsConfig {
+                max_range_m: 5.0,
+                ..default()
+            },
+        ),
+        (
+            "weight_cap",
+            PointsConfig {
+                weight_cap: 0.0,
+                ..default()
+            },
+        ),
+        (
+            "capacity",
+            PointsConfig {
+                capacity: 100_000,
+                ..default()
+            },
+        ),
     ] {
         let refused = PointExtractor::new(&config).unwrap_err();
-        assert!(refused.to_string().starts_with(&format!("points.{name} is ")), "{refused}");
+        assert!(
+            refused
+                .to_string()
+                .starts_with(&format!("points.{name} is ")),
+            "{refused}"
+        );
     }
 }

@@ -71,7 +71,11 @@ impl BearingTable {
             }
             let gap = self.bearings[below + 1] - self.bearings[below];
             let past = bearing - self.bearings[below];
-            let share = if gap > 0.0 { (past / gap).clamp(0.0, 1.0) } else { 0.0 };
+            let share = if gap > 0.0 {
+                (past / gap).clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
             // Past the last azimuth its time holds: the first one's, a sweep earlier, is no neighbour.
             let (earlier, later) = (seconds(below), seconds(below + 1));
             self.row[node] = (below as f64 + share) as f32;
@@ -87,7 +91,10 @@ mod tests {
 
     /// A scan that has nothing but azimuths (degrees) and times (seconds).
     fn measured(azimuths: &[(f32, f64)]) -> BearingTable {
-        let mut scan = OwnedScan::with_limits(ScanLimits { bytes: 0, azimuths: azimuths.len() });
+        let mut scan = OwnedScan::with_limits(ScanLimits {
+            bytes: 0,
+            azimuths: azimuths.len(),
+        });
         scan.geometry.azimuths = azimuths.len();
         for (i, &(degrees, time_s)) in azimuths.iter().enumerate() {
             scan.azimuth_rad[i] = degrees.to_radians();
@@ -106,7 +113,12 @@ mod tests {
     fn rows_and_times_follow_uneven_azimuths_across_north() {
         let table = measured(&[(300.0, 0.0), (350.0, 0.1), (20.0, 0.15), (200.0, 0.4)]);
         assert!((table.start - 300.0 / 360.0).abs() < 1e-6);
-        for (past, row, time_s) in [(0.0, 0.0, 0.0), (50.0, 1.0, 0.1), (65.0, 1.5, 0.125), (170.0, 2.5, 0.275)] {
+        for (past, row, time_s) in [
+            (0.0, 0.0, 0.0),
+            (50.0, 1.0, 0.1),
+            (65.0, 1.5, 0.125),
+            (170.0, 2.5, 0.275),
+        ] {
             assert!((near(&table.row, past) - row).abs() < 2e-3, "{past}");
             assert!((near(&table.time_s, past) - time_s).abs() < 2e-4, "{past}");
         }
@@ -122,7 +134,13 @@ mod tests {
 
     #[test]
     fn an_encoder_that_steps_back_costs_no_more_than_that_row() {
-        let table = measured(&[(0.0, 0.0), (359.9, 0.1), (90.0, 0.2), (89.0, 0.3), (180.0, 0.4)]);
+        let table = measured(&[
+            (0.0, 0.0),
+            (359.9, 0.1),
+            (90.0, 0.2),
+            (89.0, 0.3),
+            (180.0, 0.4),
+        ]);
         assert!((near(&table.row, 45.0) - 1.5).abs() < 2e-2);
         assert!((near(&table.row, 135.5) - 3.5).abs() < 2e-2);
         assert!((near(&table.row, 270.0) - 4.5).abs() < 2e-2);

@@ -73,10 +73,18 @@ impl PolarImage {
 
     /// Takes the scan's powers out to `furthest_m`; columns beyond hold nothing of use. With a `motion` the columns are
     /// true ranges, Doppler's shift undone azimuth by azimuth, so that rising and falling chirps may alternate.
-    pub fn fill(&mut self, scan: &PolarScan<'_>, floor: u8, furthest_m: f32, motion: Option<&SweepMotion>) {
+    pub fn fill(
+        &mut self,
+        scan: &PolarScan<'_>,
+        floor: u8,
+        furthest_m: f32,
+        motion: Option<&SweepMotion>,
+    ) {
         self.lay_out(&scan.geometry);
         let motion = motion.filter(|_| scan.geometry.doppler_s != 0.0);
-        let most_m = motion.map_or(0.0, |motion| motion.speed_mps() * scan.geometry.doppler_s.abs());
+        let most_m = motion.map_or(0.0, |motion| {
+            motion.speed_mps() * scan.geometry.doppler_s.abs()
+        });
         let layout = &self.layout;
         let (stride, reach) = (layout.stride(), layout.window.reach());
         let place = (furthest_m + most_m - scan.geometry.range_offset_m) / layout.piece_m();
@@ -87,7 +95,13 @@ impl PolarImage {
         for azimuth in 0..layout.azimuths {
             let powers = &scan.row(azimuth)[..bins];
             let sums = &mut self.pieces[first..first + pieces];
-            window::sum_pieces(powers, floor, layout.window.bins_a_piece, &mut self.above_floor, sums);
+            window::sum_pieces(
+                powers,
+                floor,
+                layout.window.bins_a_piece,
+                &mut self.above_floor,
+                sums,
+            );
             let row = &mut self.samples[azimuth * stride..][..stride];
             let Some(motion) = motion else {
                 window::average(&self.pieces, &layout.window, &mut row[..columns]);
@@ -100,7 +114,8 @@ impl PolarImage {
             row[0] = 0;
             row[stride - 2..].fill(0);
         }
-        self.samples.copy_within(..columns, layout.azimuths * stride);
+        self.samples
+            .copy_within(..columns, layout.azimuths * stride);
     }
 
     fn lay_out(&mut self, geometry: &SweepGeometry) {

@@ -22,11 +22,17 @@ pub(super) struct SweepMotion {
 
 impl SweepMotion {
     pub fn new(twist: Twist, scan: &PolarScan<'_>) -> Result<Self, RasterError> {
-        let longest_s = (0..scan.geometry.azimuths).map(|azimuth| scan.time_s(azimuth).abs()).fold(0.0, f64::max);
+        let longest_s = (0..scan.geometry.azimuths)
+            .map(|azimuth| scan.time_s(azimuth).abs())
+            .fold(0.0, f64::max);
         let turn_rad = (twist.yaw_rate_radps * longest_s).abs();
         let travel_m = twist.speed_mps() * longest_s;
         if !(turn_rad <= MAX_TURN_RAD && travel_m <= MAX_TRAVEL_M) {
-            return Err(RasterError::Twist { twist, turn_rad, travel_m });
+            return Err(RasterError::Twist {
+                twist,
+                turn_rad,
+                travel_m,
+            });
         }
         let seen = match scan.geometry.sense {
             Sense::Clockwise => twist.mirrored(),

@@ -22,7 +22,11 @@ impl Twist {
         // log of SE(2): the chord, turned back by half the turn, stretched to its arc.
         let stretch = 1.0 / sinc(half);
         let arc = UnitComplex::new(-half) * motion.translation.vector * (stretch / dt_s);
-        Self { vx_mps: arc.x, vy_mps: arc.y, yaw_rate_radps: yaw / dt_s }
+        Self {
+            vx_mps: arc.x,
+            vy_mps: arc.y,
+            yaw_rate_radps: yaw / dt_s,
+        }
     }
 
     /// The pose after `t_s` seconds in the frame at second 0: exp(twist t). Negative times are the past.
@@ -35,7 +39,11 @@ impl Twist {
 
     /// The same motion seen in a mirror, x forward and y right.
     pub(super) fn mirrored(&self) -> Self {
-        Self { vx_mps: self.vx_mps, vy_mps: -self.vy_mps, yaw_rate_radps: -self.yaw_rate_radps }
+        Self {
+            vx_mps: self.vx_mps,
+            vy_mps: -self.vy_mps,
+            yaw_rate_radps: -self.yaw_rate_radps,
+        }
     }
 
     pub(super) fn speed_mps(&self) -> f64 {
@@ -44,7 +52,11 @@ impl Twist {
 }
 
 fn sinc(x: f64) -> f64 {
-    if x.abs() < 1e-4 { 1.0 - x * x / 6.0 } else { x.sin() / x }
+    if x.abs() < 1e-4 {
+        1.0 - x * x / 6.0
+    } else {
+        x.sin() / x
+    }
 }
 
 #[cfg(test)]

@@ -48,16 +48,40 @@ impl PolarScan<'_> {
         check_length("table of flags", self.flags.len(), geometry.azimuths)?;
         if geometry.azimuths > 0 {
             let last_row = (geometry.azimuths - 1).saturating_mul(geometry.stride);
-            let bytes = last_row.saturating_add(geometry.first_byte).saturating_add(geometry.bins);
+            let bytes = last_row
+                .saturating_add(geometry.first_byte)
+                .saturating_add(geometry.bins);
             check_length("image", self.bytes.len(), bytes)?;
         }
-        check_number("number of azimuths", geometry.azimuths as f64, 0.0..=MAX_AZIMUTHS as f64)?;
+        check_number(
+            "number of azimuths",
+            geometry.azimuths as f64,
+            0.0..=MAX_AZIMUTHS as f64,
+        )?;
         check_number("number of bins", geometry.bins as f64, 0.0..=1e6)?;
-        check_number("range resolution in metres", geometry.range_resolution_m.into(), 1e-3..=1e3)?;
-        check_number("range offset in metres", geometry.range_offset_m.into(), -1e4..=1e4)?;
-        check_number("Doppler shift in seconds", geometry.doppler_s.into(), -1.0..=1.0)?;
-        match self.azimuth_rad[..geometry.azimuths].iter().position(|azimuth| !azimuth.is_finite()) {
-            Some(index) => Err(ScanError::Azimuth { index, value: self.azimuth_rad[index] }),
+        check_number(
+            "range resolution in metres",
+            geometry.range_resolution_m.into(),
+            1e-3..=1e3,
+        )?;
+        check_number(
+            "range offset in metres",
+            geometry.range_offset_m.into(),
+            -1e4..=1e4,
+        )?;
+        check_number(
+            "Doppler shift in seconds",
+            geometry.doppler_s.into(),
+            -1.0..=1.0,
+        )?;
+        match self.azimuth_rad[..geometry.azimuths]
+            .iter()
+            .position(|azimuth| !azimuth.is_finite())
+        {
+            Some(index) => Err(ScanError::Azimuth {
+                index,
+                value: self.azimuth_rad[index],
+            }),
             None => Ok(()),
         }
     }
@@ -66,13 +90,25 @@ impl PolarScan<'_> {
 fn check_length(what: &'static str, actual: usize, expected: usize) -> Result<(), ScanError> {
     match actual >= expected {
         true => Ok(()),
-        false => Err(ScanError::Length { what, expected, actual }),
+        false => Err(ScanError::Length {
+            what,
+            expected,
+            actual,
+        }),
     }
 }
 
-fn check_number(what: &'static str, value: f64, bounds: RangeInclusive<f64>) -> Result<(), ScanError> {
+fn check_number(
+    what: &'static str,
+    value: f64,
+    bounds: RangeInclusive<f64>,
+) -> Result<(), ScanError> {
     match bounds.contains(&value) {
         true => Ok(()),
-        false => Err(ScanError::Geometry { what, value, bounds }),
+        false => Err(ScanError::Geometry {
+            what,
+            value,
+            bounds,
+        }),
     }
 }

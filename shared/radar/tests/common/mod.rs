@@ -27,7 +27,11 @@ pub fn write_png(path: &Path, width: usize, height: usize, pixels: &[u8]) {
     let mut encoder = png::Encoder::new(file, width as u32, height as u32);
     encoder.set_color(png::ColorType::Grayscale);
     encoder.set_depth(png::BitDepth::Eight);
-    encoder.write_header().unwrap().write_image_data(pixels).unwrap();
+    encoder
+        .write_header()
+        .unwrap()
+        .write_image_data(pixels)
+        .unwrap();
 }
 
 /// A sweep in Navtech's columns; change what a test is about.
@@ -71,8 +75,10 @@ impl Sweep {
         let mut pixels = Vec::with_capacity(self.rows * self.width());
         for row in 0..self.rows {
             pixels.extend((self.start + row as i64 * self.row_interval).to_le_bytes());
-            pixels
-                .extend((((usize::from(self.first_count) + row * usize::from(self.step)) % 5600) as u16).to_le_bytes());
+            pixels.extend(
+                (((usize::from(self.first_count) + row * usize::from(self.step)) % 5600) as u16)
+                    .to_le_bytes(),
+            );
             pixels.push((self.byte_ten)(row));
             pixels.extend((0..self.bins).map(|bin| Self::power(row, bin)));
         }
@@ -94,7 +100,11 @@ pub fn write_oxford(root: &Path, n: i64) -> Vec<PathBuf> {
         .iter()
         .map(|start| {
             let path = root.join(format!("radar/{start}.png"));
-            Sweep { start: *start, ..Sweep::default() }.write(&path);
+            Sweep {
+                start: *start,
+                ..Sweep::default()
+            }
+            .write(&path);
             path
         })
         .collect()
@@ -103,13 +113,24 @@ pub fn write_oxford(root: &Path, n: i64) -> Vec<PathBuf> {
 /// `n` RADIATE scans of 60 bins x 40 azimuths, received at even times.
 pub fn write_radiate(root: &Path, n: i64) -> Vec<PathBuf> {
     let (azimuths, bins) = (40, 60);
-    let pixels: Vec<u8> = (0..bins * azimuths).map(|i| Sweep::power(i % azimuths, i / azimuths)).collect();
+    let pixels: Vec<u8> = (0..bins * azimuths)
+        .map(|i| Sweep::power(i % azimuths, i / azimuths))
+        .collect();
     let line = |k: i64| {
         let ns = k * 250_000_000 + 3_000_000;
-        format!("Frame: {:06} Time: {}.{}\n", k + 7, 1_549_986_607 + ns / 1_000_000_000, ns % 1_000_000_000)
+        format!(
+            "Frame: {:06} Time: {}.{}\n",
+            k + 7,
+            1_549_986_607 + ns / 1_000_000_000,
+            ns % 1_000_000_000
+        )
     };
     fs::create_dir_all(root.join("Navtech_Polar")).unwrap();
-    fs::write(root.join("Navtech_Polar.txt"), (0..n).map(line).collect::<String>()).unwrap();
+    fs::write(
+        root.join("Navtech_Polar.txt"),
+        (0..n).map(line).collect::<String>(),
+    )
+    .unwrap();
     (0..n)
         .map(|k| {
             let path = root.join(format!("Navtech_Polar/{:06}.png", k + 7));

@@ -14,12 +14,27 @@ pub const RESOLUTION_M: f32 = 0.2;
 pub const PERIOD_NS: i64 = 250_000_000;
 
 /// The grid that the drawn scans are on already.
-pub const GRID: RangeGrid = RangeGrid { resolution_m: RESOLUTION_M, cells: BINS };
-pub const CONFIG: MeterConfig = MeterConfig { grid: GRID, threshold: 60, cell_m: 0.4 };
+pub const GRID: RangeGrid = RangeGrid {
+    resolution_m: RESOLUTION_M,
+    cells: BINS,
+};
+pub const CONFIG: MeterConfig = MeterConfig {
+    grid: GRID,
+    threshold: 60,
+    cell_m: 0.4,
+};
 
 /// A scan with these powers by azimuth and bin, the `index`-th of its recording.
-pub fn scan(azimuths: usize, bins: usize, index: i64, power: impl FnMut(usize, usize) -> u8) -> OwnedScan {
-    let mut scan = OwnedScan::with_limits(ScanLimits { bytes: azimuths * bins, azimuths });
+pub fn scan(
+    azimuths: usize,
+    bins: usize,
+    index: i64,
+    power: impl FnMut(usize, usize) -> u8,
+) -> OwnedScan {
+    let mut scan = OwnedScan::with_limits(ScanLimits {
+        bytes: azimuths * bins,
+        azimuths,
+    });
     let stamp_ns = index * PERIOD_NS;
     scan.geometry = SweepGeometry {
         azimuths,
@@ -47,7 +62,9 @@ pub fn scan(azimuths: usize, bins: usize, index: i64, power: impl FnMut(usize, u
 /// Independent powers from 0 to `most`.
 pub fn noise(seed: u64, most: u8) -> Vec<u8> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    (0..AZIMUTHS * BINS).map(|_| random.random_range(0..=most)).collect()
+    (0..AZIMUTHS * BINS)
+        .map(|_| random.random_range(0..=most))
+        .collect()
 }
 
 /// A scan of posts, each a few bins deep and three azimuths wide, by a sensor that is at `pose(seconds since its stamp)`.
@@ -58,7 +75,8 @@ pub fn posts(posts: &[Point2<f64>], index: i64, pose: impl Fn(f64) -> Isometry2<
         for post in posts {
             let seen = pose.inverse() * post;
             let clockwise = -seen.y.atan2(seen.x);
-            let off = (clockwise - f64::from(drawn.azimuth_rad[azimuth])).rem_euclid(std::f64::consts::TAU);
+            let off = (clockwise - f64::from(drawn.azimuth_rad[azimuth]))
+                .rem_euclid(std::f64::consts::TAU);
             let off = off.min(std::f64::consts::TAU - off);
             let bin = (seen.coords.norm() / f64::from(RESOLUTION_M)) as usize;
             if off < 1.5 * std::f64::consts::TAU / AZIMUTHS as f64 && bin >= 2 && bin + 2 < BINS {

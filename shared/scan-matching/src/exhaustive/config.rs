@@ -41,7 +41,11 @@ impl Default for ExhaustiveConfig {
 impl ExhaustiveConfig {
     /// MbyM's search as it is compared with in Weston et al.: bare correlations.
     pub fn mbym() -> Self {
-        Self { overlap: Overlap::None, peak: Peak::Parabola, ..Self::default() }
+        Self {
+            overlap: Overlap::None,
+            peak: Peak::Parabola,
+            ..Self::default()
+        }
     }
 
     /// Checks every value.
@@ -49,18 +53,35 @@ impl ExhaustiveConfig {
     /// # Errors
     /// The first key that no search can be built from.
     pub fn validate(&self) -> Result<(), ConfigError> {
-        let check = |good, key, actual: &dyn ToString, expected| accept(good, "exhaustive", key, actual, expected);
-        check(self.reach_deg > 0.0 && self.reach_deg <= 180.0, "reach_deg", &self.reach_deg, "above 0, at most 180")?;
+        let check = |good, key, actual: &dyn ToString, expected| {
+            accept(good, "exhaustive", key, actual, expected)
+        };
+        check(
+            self.reach_deg > 0.0 && self.reach_deg <= 180.0,
+            "reach_deg",
+            &self.reach_deg,
+            "above 0, at most 180",
+        )?;
         check(
             self.step_deg >= 0.01 && self.step_deg <= self.reach_deg,
             "step_deg",
             &self.step_deg,
             "0.01 to reach_deg",
         )?;
-        check(positive(self.reach_m), "reach_m", &self.reach_m, "metres, above 0")?;
+        check(
+            positive(self.reach_m),
+            "reach_m",
+            &self.reach_m,
+            "metres, above 0",
+        )?;
         let fitted = !matches!(self.peak, Peak::SoftArgmax { .. });
         check(fitted, "peak", &"soft_argmax", "gaussian or parabola")?;
-        check(positive(self.variance_scale), "variance_scale", &self.variance_scale, "a positive number")
+        check(
+            positive(self.variance_scale),
+            "variance_scale",
+            &self.variance_scale,
+            "a positive number",
+        )
     }
 
     /// Number of angles that are tried.
@@ -72,10 +93,20 @@ impl ExhaustiveConfig {
         let (reach, step) = (self.reach_deg.to_radians(), self.step_deg.to_radians());
         if self.reach_deg >= 180.0 {
             let count = (TAU / step).ceil() as usize;
-            return AngleGrid { first: -PI, step: TAU / count as f64, count, circle: true };
+            return AngleGrid {
+                first: -PI,
+                step: TAU / count as f64,
+                count,
+                circle: true,
+            };
         }
         let side = (reach / step + 1e-9).floor();
-        AngleGrid { first: -side * step, step, count: 2 * side as usize + 1, circle: false }
+        AngleGrid {
+            first: -side * step,
+            step,
+            count: 2 * side as usize + 1,
+            circle: false,
+        }
     }
 }
 
@@ -98,7 +129,11 @@ impl AngleGrid {
     /// The angle `by` steps from the k-th; at the ends of an open grid the last one again.
     pub fn beside(&self, k: usize, by: isize) -> usize {
         let (place, count) = (k as isize + by, self.count as isize);
-        (if self.circle { place.rem_euclid(count) } else { place.clamp(0, count - 1) }) as usize
+        (if self.circle {
+            place.rem_euclid(count)
+        } else {
+            place.clamp(0, count - 1)
+        }) as usize
     }
 
     /// Whether the k-th angle has a neighbour on both sides.
@@ -126,14 +161,21 @@ mod tests {
     fn the_default_has_thirty_one_angles_zero_among_them() {
         let grid = ExhaustiveConfig::default().angles();
         assert_eq!(grid.count, 31);
-        assert!((grid.angle(0.0).to_degrees() + 15.0).abs() < 1e-9 && grid.angle(15.0).abs() < 1e-9);
+        assert!(
+            (grid.angle(0.0).to_degrees() + 15.0).abs() < 1e-9 && grid.angle(15.0).abs() < 1e-9
+        );
         assert!(!grid.is_inner(0) && grid.is_inner(1) && !grid.is_inner(30));
         assert_eq!((grid.beside(30, 2), grid.beside(0, -1)), (30, 0));
     }
 
     #[test]
     fn the_whole_circle_closes() {
-        let grid = ExhaustiveConfig { reach_deg: 180.0, step_deg: 7.0, ..Default::default() }.angles();
+        let grid = ExhaustiveConfig {
+            reach_deg: 180.0,
+            step_deg: 7.0,
+            ..Default::default()
+        }
+        .angles();
         assert_eq!(grid.count, 52);
         assert!((grid.angle(52.0) - grid.angle(0.0) - TAU).abs() < 1e-12);
         assert!(grid.is_inner(0) && grid.are_close(0, 51));
@@ -143,14 +185,47 @@ mod tests {
     fn impossible_values_name_their_key() {
         let refused = |config: ExhaustiveConfig| config.validate().unwrap_err().to_string();
         let default = ExhaustiveConfig::default;
-        assert!(refused(ExhaustiveConfig { reach_deg: 181.0, ..default() }).starts_with("exhaustive.reach_deg = 181"));
-        assert!(refused(ExhaustiveConfig { step_deg: f64::NAN, ..default() }).contains("step_deg"));
-        assert!(refused(ExhaustiveConfig { step_deg: 16.0, ..default() }).contains("step_deg"));
-        assert!(refused(ExhaustiveConfig { reach_m: 0.0, ..default() }).contains("reach_m"));
+        assert!(
+            refused(ExhaustiveConfig {
+                reach_deg: 181.0,
+                ..default()
+            })
+            .starts_with("exhaustive.reach_deg = 181")
+        );
+        assert!(
+            refused(ExhaustiveConfig {
+                step_deg: f64::NAN,
+                ..default()
+            })
+            .contains("step_deg")
+        );
+        assert!(
+            refused(ExhaustiveConfig {
+                step_deg: 16.0,
+                ..default()
+            })
+            .contains("step_deg")
+        );
+        assert!(
+            refused(ExhaustiveConfig {
+                reach_m: 0.0,
+                ..default()
+            })
+            .contains("reach_m")
+        );
         let soft = Peak::SoftArgmax { temperature: 1.0 };
-        assert!(refused(ExhaustiveConfig { peak: soft, ..default() }).contains("gaussian or parabola"));
+        assert!(
+            refused(ExhaustiveConfig {
+                peak: soft,
+                ..default()
+            })
+            .contains("gaussian or parabola")
+        );
         ExhaustiveConfig::mbym().validate().unwrap();
         let written = toml::to_string(&ExhaustiveConfig::mbym()).unwrap();
-        assert_eq!(toml::from_str::<ExhaustiveConfig>(&written).unwrap(), ExhaustiveConfig::mbym());
+        assert_eq!(
+            toml::from_str::<ExhaustiveConfig>(&written).unwrap(),
+            ExhaustiveConfig::mbym()
+        );
     }
 }

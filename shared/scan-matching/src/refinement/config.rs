@@ -91,16 +91,53 @@ impl RefinementConfig {
     /// # Errors
     /// The first key that no refinement can be built from.
     pub fn validate(&self) -> Result<(), ConfigError> {
-        let check = |good, key, actual: &dyn ToString, expected| accept(good, "refinement", key, actual, expected);
-        check((1..=64).contains(&self.keyframes), "keyframes", &self.keyframes, "1 to 64")?;
-        check((0.05..=10.0).contains(&self.cell_m), "cell_m", &self.cell_m, "metres, 0.05 to 10")?;
+        let check = |good, key, actual: &dyn ToString, expected| {
+            accept(good, "refinement", key, actual, expected)
+        };
+        check(
+            (1..=64).contains(&self.keyframes),
+            "keyframes",
+            &self.keyframes,
+            "1 to 64",
+        )?;
+        check(
+            (0.05..=10.0).contains(&self.cell_m),
+            "cell_m",
+            &self.cell_m,
+            "metres, 0.05 to 10",
+        )?;
         let cells = self.reach_m / self.cell_m;
-        check((8.0..=1000.0).contains(&cells), "reach_m", &self.reach_m, "8 to 1000 cells of cell_m")?;
-        check((1.0..=8.0).contains(&self.coarse), "coarse", &self.coarse, "1 to 8")?;
+        check(
+            (8.0..=1000.0).contains(&cells),
+            "reach_m",
+            &self.reach_m,
+            "8 to 1000 cells of cell_m",
+        )?;
+        check(
+            (1.0..=8.0).contains(&self.coarse),
+            "coarse",
+            &self.coarse,
+            "1 to 8",
+        )?;
         let share = "a share, 0 to 1";
-        check((0.0..=1.0).contains(&self.least_overlap), "least_overlap", &self.least_overlap, share)?;
-        check((0.0..=1.0).contains(&self.firm_overlap), "firm_overlap", &self.firm_overlap, share)?;
-        check((0.0..=1.0).contains(&self.least_support), "least_support", &self.least_support, share)?;
+        check(
+            (0.0..=1.0).contains(&self.least_overlap),
+            "least_overlap",
+            &self.least_overlap,
+            share,
+        )?;
+        check(
+            (0.0..=1.0).contains(&self.firm_overlap),
+            "firm_overlap",
+            &self.firm_overlap,
+            share,
+        )?;
+        check(
+            (0.0..=1.0).contains(&self.least_support),
+            "least_support",
+            &self.least_support,
+            share,
+        )?;
         for (key, value) in [
             ("keyframe_distance_m", self.keyframe_distance_m),
             ("keyframe_angle_deg", self.keyframe_angle_deg),
@@ -114,6 +151,11 @@ impl RefinementConfig {
         ] {
             check(positive(value), key, &value, "a positive number")?;
         }
-        check((0.0..=90.0).contains(&self.yaw_sigma_deg), "yaw_sigma_deg", &self.yaw_sigma_deg, "0 to 90")
+        check(
+            (0.0..=90.0).contains(&self.yaw_sigma_deg),
+            "yaw_sigma_deg",
+            &self.yaw_sigma_deg,
+            "0 to 90",
+        )
     }
 }

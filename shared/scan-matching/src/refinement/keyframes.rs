@@ -24,12 +24,18 @@ pub struct Keyframe {
 impl Keyframe {
     /// What it saw, for safekeeping: where each level's image begins, and its cells.
     pub fn images(&self) -> [(&[i64; 2], &[u8]); 2] {
-        [(&self.fine.corner, &self.fine.cells), (&self.coarse.corner, &self.coarse.cells)]
+        [
+            (&self.fine.corner, &self.fine.cells),
+            (&self.coarse.corner, &self.coarse.cells),
+        ]
     }
 
     /// The same, to fill in.
     pub fn images_mut(&mut self) -> [(&mut [i64; 2], &mut [u8]); 2] {
-        [(&mut self.fine.corner, &mut self.fine.cells), (&mut self.coarse.corner, &mut self.coarse.cells)]
+        [
+            (&mut self.fine.corner, &mut self.fine.cells),
+            (&mut self.coarse.corner, &mut self.coarse.cells),
+        ]
     }
 }
 
@@ -46,10 +52,19 @@ impl Keyframes {
     pub fn new(config: &RefinementConfig) -> Self {
         let level = |cell_m| Level::new(cell_m, config.reach_m);
         let (fine, coarse) = (level(config.cell_m), level(config.cell_m * config.coarse));
-        let keyframe =
-            Keyframe { id: 0, pose: Isometry2::identity(), fine: fine.new_image(), coarse: coarse.new_image() };
+        let keyframe = Keyframe {
+            id: 0,
+            pose: Isometry2::identity(),
+            fine: fine.new_image(),
+            coarse: coarse.new_image(),
+        };
         let count = config.keyframes;
-        Self { fine, coarse, used: VecDeque::with_capacity(count), spare: vec![keyframe; count] }
+        Self {
+            fine,
+            coarse,
+            used: VecDeque::with_capacity(count),
+            spare: vec![keyframe; count],
+        }
     }
 
     /// Cells of a keyframe's images together.
@@ -71,7 +86,9 @@ impl Keyframes {
 
     /// Adds a keyframe, in place of the oldest where there are as many as may be.
     pub fn draw(&mut self, id: u64, points: &Placed, pose: &Isometry2<f64>) {
-        let Some(mut keyframe) = self.spare.pop().or_else(|| self.used.pop_front()) else { return };
+        let Some(mut keyframe) = self.spare.pop().or_else(|| self.used.pop_front()) else {
+            return;
+        };
         (keyframe.id, keyframe.pose) = (id, *pose);
         self.fine.draw(points, pose, &mut keyframe.fine);
         self.coarse.draw(points, pose, &mut keyframe.coarse);
@@ -81,7 +98,9 @@ impl Keyframes {
 
     /// Adds a keyframe that `load` fills in; returns whether there was room, and one to load.
     pub fn push(&mut self, load: &mut impl FnMut(&mut Keyframe) -> bool) -> bool {
-        let Some(mut keyframe) = self.spare.pop() else { return false };
+        let Some(mut keyframe) = self.spare.pop() else {
+            return false;
+        };
         let loaded = load(&mut keyframe);
         if loaded {
             self.used.push_back(keyframe);
@@ -93,8 +112,10 @@ impl Keyframes {
 
     /// Makes the map anew.
     pub fn stack(&mut self) {
-        self.fine.stack(self.used.iter().map(|keyframe| &keyframe.fine));
-        self.coarse.stack(self.used.iter().map(|keyframe| &keyframe.coarse));
+        self.fine
+            .stack(self.used.iter().map(|keyframe| &keyframe.fine));
+        self.coarse
+            .stack(self.used.iter().map(|keyframe| &keyframe.coarse));
     }
 
     pub fn fine(&self) -> Lookup<'_> {

@@ -55,11 +55,22 @@ impl Level {
     pub fn new(cell_m: f64, reach_m: f64) -> Self {
         let n = 2 * (reach_m / cell_m).ceil() as usize + 1;
         let cells = || vec![0.0; n * n];
-        Self { cell_m, n, corner: [0; 2], sum: vec![0; n * n], images: 0, drawing: cells(), blurred: cells() }
+        Self {
+            cell_m,
+            n,
+            corner: [0; 2],
+            sum: vec![0; n * n],
+            images: 0,
+            drawing: cells(),
+            blurred: cells(),
+        }
     }
 
     pub fn new_image(&self) -> Image {
-        Image { corner: [0; 2], cells: vec![0; self.n * self.n] }
+        Image {
+            corner: [0; 2],
+            cells: vec![0; self.n * self.n],
+        }
     }
 
     /// Draws a keyframe: splats, blurs, and saturates.
@@ -68,7 +79,8 @@ impl Level {
     /// along with the vehicle, outweighs the thousand faint returns that hold the motion.
     pub fn draw(&mut self, points: &Placed, pose: &Isometry2<f64>, image: &mut Image) {
         let half = (self.n / 2) as i64;
-        image.corner = [pose.translation.x, pose.translation.y].map(|v| (v / self.cell_m).floor() as i64 - half);
+        image.corner = [pose.translation.x, pose.translation.y]
+            .map(|v| (v / self.cell_m).floor() as i64 - half);
         self.splat(points, pose, image.corner);
         blur(&self.drawing, &mut self.blurred, 1);
         blur(&self.blurred, &mut self.drawing, self.n);
@@ -83,7 +95,10 @@ impl Level {
         let inside = BLUR_REACH as f64..(n - BLUR_REACH - 2) as f64;
         for ((&x, &y), &weight) in points.x_m.iter().zip(&points.y_m).zip(&points.weight) {
             let at = pose * Point2::new(f64::from(x), f64::from(y));
-            let (u, v) = (at.x * per_m - corner[0] as f64, at.y * per_m - corner[1] as f64);
+            let (u, v) = (
+                at.x * per_m - corner[0] as f64,
+                at.y * per_m - corner[1] as f64,
+            );
             if !(inside.contains(&u) && inside.contains(&v)) {
                 continue;
             }
@@ -101,11 +116,16 @@ impl Level {
     pub fn stack<'a>(&mut self, images: impl Iterator<Item = &'a Image> + Clone) {
         self.sum.fill(0);
         self.images = 0;
-        let Some(newest) = images.clone().last() else { return };
+        let Some(newest) = images.clone().last() else {
+            return;
+        };
         self.corner = newest.corner;
         for image in images {
             self.images += 1;
-            let [down, right] = [image.corner[0] - self.corner[0], image.corner[1] - self.corner[1]];
+            let [down, right] = [
+                image.corner[0] - self.corner[0],
+                image.corner[1] - self.corner[1],
+            ];
             let n = self.n as i64;
             let (first_col, last_col) = (right.max(0), (right + n).min(n));
             if first_col >= last_col {
@@ -133,7 +153,11 @@ impl Level {
 
 /// One pass of the blur along an axis. What lies within the blur's reach of the array's ends stays zero; the caller draws
 /// nothing there.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 fn blur(from: &[f32], to: &mut [f32], stride: usize) {
     let margin = BLUR_REACH * stride;
     let count = from.len() - 2 * margin;
@@ -141,12 +165,19 @@ fn blur(from: &[f32], to: &mut [f32], stride: usize) {
     let (a, b, c, d, e, f, g) = (at(0), at(1), at(2), at(3), at(4), at(5), at(6));
     let inner = &mut to[margin..][..count];
     for k in 0..count {
-        inner[k] = BLUR[0] * d[k] + BLUR[1] * (c[k] + e[k]) + BLUR[2] * (b[k] + f[k]) + BLUR[3] * (a[k] + g[k]);
+        inner[k] = BLUR[0] * d[k]
+            + BLUR[1] * (c[k] + e[k])
+            + BLUR[2] * (b[k] + f[k])
+            + BLUR[3] * (a[k] + g[k]);
     }
 }
 
 /// Sum and sum of squares, in lanes.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 fn moments(values: &[f32]) -> (f64, f64) {
     let (chunks, rest) = values.as_chunks::<16>();
     let (mut sums, mut squares) = ([0.0_f32; 16], [0.0_f32; 16]);
@@ -156,12 +187,21 @@ fn moments(values: &[f32]) -> (f64, f64) {
             squares[lane] += chunk[lane] * chunk[lane];
         }
     }
-    let total = |lanes: [f32; 16], rest: f32| lanes.iter().map(|v| f64::from(*v)).sum::<f64>() + f64::from(rest);
-    (total(sums, rest.iter().sum()), total(squares, rest.iter().map(|v| v * v).sum()))
+    let total = |lanes: [f32; 16], rest: f32| {
+        lanes.iter().map(|v| f64::from(*v)).sum::<f64>() + f64::from(rest)
+    };
+    (
+        total(sums, rest.iter().sum()),
+        total(squares, rest.iter().map(|v| v * v).sum()),
+    )
 }
 
 /// Most cells saw nothing; sixteen of them at once are passed over.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 fn saturate(values: &[f32], mean: f32, cells: &mut [u8]) {
     for (cells, values) in cells.chunks_mut(16).zip(values.chunks(16)) {
         if values.iter().all(|value| *value == 0.0) {
@@ -176,9 +216,15 @@ fn saturate(values: &[f32], mean: f32, cells: &mut [u8]) {
 }
 
 /// At most 64 images of at most 255: no sum is too large.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 fn add(cells: &[u8], sum: &mut [u16]) {
-    sum.iter_mut().zip(cells).for_each(|(sum, cell)| *sum += u16::from(*cell));
+    sum.iter_mut()
+        .zip(cells)
+        .for_each(|(sum, cell)| *sum += u16::from(*cell));
 }
 
 #[cfg(test)]
@@ -197,7 +243,9 @@ mod tests {
 
     fn brightest(level: &Level) -> [f64; 2] {
         let lookup = level.lookup();
-        let brightest = (0..lookup.sum.len()).max_by_key(|k| (lookup.sum[*k], std::cmp::Reverse(*k))).unwrap_or(0);
+        let brightest = (0..lookup.sum.len())
+            .max_by_key(|k| (lookup.sum[*k], std::cmp::Reverse(*k)))
+            .unwrap_or(0);
         [brightest / level.n, brightest % level.n]
             .map(|k| k as f64 * level.cell_m)
             .into_iter()
@@ -215,7 +263,11 @@ mod tests {
         level.draw(&points(&[[6.0, 2.0]]), &Isometry2::identity(), &mut first);
         let pose = Isometry2::new(Vector2::new(3.0, 1.0), std::f64::consts::FRAC_PI_2);
         let seen = pose.inverse() * Point2::new(6.0, 2.0);
-        level.draw(&points(&[[seen.x as f32, seen.y as f32]]), &pose, &mut second);
+        level.draw(
+            &points(&[[seen.x as f32, seen.y as f32]]),
+            &pose,
+            &mut second,
+        );
         level.stack([&first, &second].into_iter());
         assert_eq!(brightest(&level), [6.0, 2.0]);
         let peak = f32::from(level.lookup().sum.iter().copied().max().unwrap_or(0));
@@ -229,7 +281,11 @@ mod tests {
     fn a_blur_keeps_the_sum() {
         let mut level = Level::new(1.0, 20.0);
         let mut image = level.new_image();
-        level.draw(&points(&[[0.3, 0.4], [7.7, -8.2]]), &Isometry2::identity(), &mut image);
+        level.draw(
+            &points(&[[0.3, 0.4], [7.7, -8.2]]),
+            &Isometry2::identity(),
+            &mut image,
+        );
         let (sum, _) = moments(&level.drawing);
         assert!((sum - 2.0).abs() < 1e-5, "{sum}");
     }
@@ -238,7 +294,11 @@ mod tests {
     fn what_is_out_of_reach_is_left_out() {
         let mut level = Level::new(1.0, 20.0);
         let mut image = level.new_image();
-        level.draw(&points(&[[25.0, 0.0], [f32::NAN, 0.0], [0.0, -1e30]]), &Isometry2::identity(), &mut image);
+        level.draw(
+            &points(&[[25.0, 0.0], [f32::NAN, 0.0], [0.0, -1e30]]),
+            &Isometry2::identity(),
+            &mut image,
+        );
         assert!(image.cells.iter().all(|cell| *cell == 0));
         level.stack([&image].into_iter());
         assert!(level.lookup().sum.iter().all(|sum| *sum == 0));

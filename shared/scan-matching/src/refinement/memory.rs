@@ -62,7 +62,13 @@ impl Anchor {
     }
 
     /// Whether a vehicle can have come from here to `pose`. `firmness` 0 to 1: how far the match may be off besides.
-    fn reaches(&self, pose: &Isometry2<f64>, interval_s: f64, firmness: f64, config: &RefinementConfig) -> bool {
+    fn reaches(
+        &self,
+        pose: &Isometry2<f64>,
+        interval_s: f64,
+        firmness: f64,
+        config: &RefinementConfig,
+    ) -> bool {
         let time_s = self.age_s + interval_s;
         let apart = (self.velocity_to(pose, interval_s) - self.velocity) * time_s;
         let shift = config.jitter_m * firmness + config.acceleration_mps2 * time_s.powi(2);
@@ -96,7 +102,8 @@ impl Memory {
         config: &RefinementConfig,
     ) -> bool {
         let mut anchors = self.anchors.iter().flatten().peekable();
-        anchors.peek().is_none() || anchors.any(|anchor| anchor.reaches(pose, interval_s, firmness, config))
+        anchors.peek().is_none()
+            || anchors.any(|anchor| anchor.reaches(pose, interval_s, firmness, config))
     }
 
     /// Steps on to `pose`.
@@ -110,32 +117,64 @@ impl Memory {
     ) {
         match outcome {
             Outcome::Refined => self.anchor(pose, interval_s, config),
-            _ => self.anchors.iter_mut().flatten().for_each(|anchor| anchor.age_s += interval_s),
+            _ => self
+                .anchors
+                .iter_mut()
+                .flatten()
+                .for_each(|anchor| anchor.age_s += interval_s),
         }
         if outcome != Outcome::Predicted {
             self.usual_overlap = running_mean(self.usual_overlap, overlap);
             self.usual_weight = running_mean(self.usual_weight, weight);
         }
-        self.doubtful = if outcome == Outcome::Refined { 0 } else { self.doubtful + 1 };
-        self.unmatched = if outcome == Outcome::Predicted { self.unmatched + 1 } else { 0 };
+        self.doubtful = if outcome == Outcome::Refined {
+            0
+        } else {
+            self.doubtful + 1
+        };
+        self.unmatched = if outcome == Outcome::Predicted {
+            self.unmatched + 1
+        } else {
+            0
+        };
         self.pose = pose;
     }
 
     /// Makes `pose` the newest anchor. One that it cannot have come from was wrong and goes.
     fn anchor(&mut self, pose: Isometry2<f64>, interval_s: f64, config: &RefinementConfig) {
-        let right =
-            self.anchors.iter().flatten().find(|anchor| anchor.reaches(&pose, interval_s, 1.0, config)).copied();
+        let right = self
+            .anchors
+            .iter()
+            .flatten()
+            .find(|anchor| anchor.reaches(&pose, interval_s, 1.0, config))
+            .copied();
         let velocity = match &right {
-            Some(anchor) => anchor.velocity.lerp(&anchor.velocity_to(&pose, interval_s), INERTIA),
+            Some(anchor) => anchor
+                .velocity
+                .lerp(&anchor.velocity_to(&pose, interval_s), INERTIA),
             None => self.velocity_to(&pose, interval_s),
         };
-        let aged = right.map(|anchor| Anchor { age_s: anchor.age_s + interval_s, ..anchor });
-        self.anchors = [Some(Anchor { pose, velocity, age_s: 0.0 }), aged];
+        let aged = right.map(|anchor| Anchor {
+            age_s: anchor.age_s + interval_s,
+            ..anchor
+        });
+        self.anchors = [
+            Some(Anchor {
+                pose,
+                velocity,
+                age_s: 0.0,
+            }),
+            aged,
+        ];
     }
 }
 
 fn running_mean(mean: f64, value: f64) -> f64 {
-    if mean > 0.0 { mean + NEWEST * (value - mean) } else { value }
+    if mean > 0.0 {
+        mean + NEWEST * (value - mean)
+    } else {
+        value
+    }
 }
 
 /// Constant velocity in the moving frame over a motion: the chord in its middle direction, m/s, m/s, rad/s.
@@ -148,14 +187,21 @@ pub(super) fn velocity(motion: &Isometry2<f64>, time_s: f64) -> Vector3<f64> {
 /// The motion over a time at constant velocity; inverse of [`velocity`].
 fn motion_at(velocity: &Vector3<f64>, time_s: f64) -> Isometry2<f64> {
     let turn = velocity.z * time_s;
-    Isometry2::new(Rotation2::new(0.5 * turn) * Vector2::new(velocity.x, velocity.y) * time_s, turn)
+    Isometry2::new(
+        Rotation2::new(0.5 * turn) * Vector2::new(velocity.x, velocity.y) * time_s,
+        turn,
+    )
 }
 
 /// What is known of a motion that nothing was matched for: that its acceleration was within the limits.
 pub(super) fn unmatched_covariance(interval_s: f64, config: &RefinementConfig) -> Matrix3<f64> {
-    let spread = |jitter: f64, acceleration: f64| (jitter + acceleration * interval_s.powi(2)).powi(2) / 3.0;
+    let spread =
+        |jitter: f64, acceleration: f64| (jitter + acceleration * interval_s.powi(2)).powi(2) / 3.0;
     let shift = spread(config.jitter_m, config.acceleration_mps2);
-    let turn = spread(config.jitter_deg.to_radians(), config.yaw_acceleration_degps2.to_radians());
+    let turn = spread(
+        config.jitter_deg.to_radians(),
+        config.yaw_acceleration_degps2.to_radians(),
+    );
     Matrix3::from_diagonal(&Vector3::new(shift, shift, turn))
 }
 
@@ -191,16 +237,37 @@ mod tests {
 
     #[test]
     fn a_steady_drive_goes_on() {
-        let memory = after(&[(0.0, 0.0), (2.5, 0.0), (5.0, 0.0), (7.5, 0.0), (10.0, 0.0), (12.5, 0.0), (15.0, 0.0)]);
+        let memory = after(&[
+            (0.0, 0.0),
+            (2.5, 0.0),
+            (5.0, 0.0),
+            (7.5, 0.0),
+            (10.0, 0.0),
+            (12.5, 0.0),
+            (15.0, 0.0),
+        ]);
         let [from_last, from_the_one_before] = memory.foretell(INTERVAL_S);
         assert!((from_last.translation.x - 17.5).abs() < 0.1, "{from_last}");
-        assert!((from_the_one_before.translation.x - 17.5).abs() < 0.2, "{from_the_one_before}");
+        assert!(
+            (from_the_one_before.translation.x - 17.5).abs() < 0.2,
+            "{from_the_one_before}"
+        );
     }
 
     #[test]
     fn no_vehicle_turns_on_the_spot_by_ninety_degrees() {
-        let (memory, config) = (after(&[(0.0, 0.0), (2.5, 0.0), (5.0, 0.0)]), RefinementConfig::default());
-        let at = |x: f64, yaw: f64| memory.allows(&Isometry2::new(Vector2::new(x, 0.0), yaw), INTERVAL_S, 1.0, &config);
+        let (memory, config) = (
+            after(&[(0.0, 0.0), (2.5, 0.0), (5.0, 0.0)]),
+            RefinementConfig::default(),
+        );
+        let at = |x: f64, yaw: f64| {
+            memory.allows(
+                &Isometry2::new(Vector2::new(x, 0.0), yaw),
+                INTERVAL_S,
+                1.0,
+                &config,
+            )
+        };
         assert!(at(7.5, 0.0) && at(7.2, 0.1));
         assert!(!at(7.5, std::f64::consts::FRAC_PI_2) && !at(30.0, 0.0));
     }
@@ -216,9 +283,14 @@ mod tests {
             allowed
         };
         assert!(step(12.4, 0.14), "eight degrees at once are just possible");
-        assert!(step(15.0, -0.01), "but not there and back: it goes on from the anchor before");
+        assert!(
+            step(15.0, -0.01),
+            "but not there and back: it goes on from the anchor before"
+        );
         assert!(step(17.5, 0.0));
-        let velocity = memory.anchors[0].map(|anchor| anchor.velocity.z.abs()).unwrap_or(9.0);
+        let velocity = memory.anchors[0]
+            .map(|anchor| anchor.velocity.z.abs())
+            .unwrap_or(9.0);
         assert!(velocity < 0.1, "{velocity} rad/s");
     }
 }

@@ -40,11 +40,21 @@ pub(super) struct Normal {
 }
 
 /// Descends from `start`.
-pub(super) fn register(map: &Lookup<'_>, points: &Placed, start: &Isometry2<f64>, iterations: usize) -> Match {
-    let mut best = Match { pose: *start, normal: linearise(map, points, start) };
+pub(super) fn register(
+    map: &Lookup<'_>,
+    points: &Placed,
+    start: &Isometry2<f64>,
+    iterations: usize,
+) -> Match {
+    let mut best = Match {
+        pose: *start,
+        normal: linearise(map, points, start),
+    };
     let mut damping = FIRST_DAMPING;
     for _ in 0..iterations {
-        let Some(step) = step(&best.normal, damping) else { break };
+        let Some(step) = step(&best.normal, damping) else {
+            break;
+        };
         let pose = Isometry2::new(
             best.pose.translation.vector + Vector2::new(step.x, step.y),
             best.pose.rotation.angle() + step.z,
@@ -53,7 +63,11 @@ pub(super) fn register(map: &Lookup<'_>, points: &Placed, start: &Isometry2<f64>
         if normal.cost < best.normal.cost {
             best = Match { pose, normal };
             damping = (0.3 * damping).max(LEAST_DAMPING);
-            if step.iter().zip(SETTLED).all(|(moved, settled)| moved.abs() < settled) {
+            if step
+                .iter()
+                .zip(SETTLED)
+                .all(|(moved, settled)| moved.abs() < settled)
+            {
                 break;
             }
         } else {
@@ -79,12 +93,23 @@ fn step(normal: &Normal, damping: f64) -> Option<Vector3<f64>> {
 pub(super) fn linearise(map: &Lookup<'_>, points: &Placed, pose: &Isometry2<f64>) -> Normal {
     let at = (pose.translation.vector - Vector2::from(map.origin)) * f64::from(map.per_m);
     let (sin, cos) = pose.rotation.angle().sin_cos();
-    let place = Place { at: at.map(|v| v as f32).into(), sin: sin as f32, cos: cos as f32 };
+    let place = Place {
+        at: at.map(|v| v as f32).into(),
+        sin: sin as f32,
+        cos: cos as f32,
+    };
     let mut total = [0.0_f64; SUMS];
-    let columns = points.x_m.chunks(BLOCK).zip(points.y_m.chunks(BLOCK)).zip(points.weight.chunks(BLOCK));
+    let columns = points
+        .x_m
+        .chunks(BLOCK)
+        .zip(points.y_m.chunks(BLOCK))
+        .zip(points.weight.chunks(BLOCK));
     for ((x_m, y_m), weight) in columns {
         let sums = sum_block(map, x_m, y_m, weight, &place);
-        total.iter_mut().zip(sums).for_each(|(total, sum)| *total += f64::from(sum));
+        total
+            .iter_mut()
+            .zip(sums)
+            .for_each(|(total, sum)| *total += f64::from(sum));
     }
     let [cost, overlap, gx, gy, gt, xx, xy, xt, yy, yt, tt] = total;
     Normal {
@@ -109,16 +134,34 @@ const SUMS: usize = 11;
 type Lanes = [f32; LANES];
 
 /// What a block of points adds. Points left over are filled up with some of no weight.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
-fn sum_block<'a>(map: &Lookup<'a>, x_m: &[f32], y_m: &[f32], weight: &[f32], place: &Place) -> [f32; SUMS] {
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
+fn sum_block<'a>(
+    map: &Lookup<'a>,
+    x_m: &[f32],
+    y_m: &[f32],
+    weight: &[f32],
+    place: &Place,
+) -> [f32; SUMS] {
     let (value, slope, last) = (1.0 / map.full, map.per_m / map.full, (map.n - 2) as f32);
     let mut sums = [[0.0_f32; LANES]; SUMS];
-    for ((x_m, y_m), weight) in x_m.chunks(LANES).zip(y_m.chunks(LANES)).zip(weight.chunks(LANES)) {
+    for ((x_m, y_m), weight) in x_m
+        .chunks(LANES)
+        .zip(y_m.chunks(LANES))
+        .zip(weight.chunks(LANES))
+    {
         let [x, y, w] = [x_m, y_m, weight].map(filled_up);
         let mut rotated = [[0.0; LANES]; 2];
-        let (mut across, mut along, mut inside, mut first) = ([0.0; LANES], [0.0; LANES], [0.0; LANES], [0; LANES]);
+        let (mut across, mut along, mut inside, mut first) =
+            ([0.0; LANES], [0.0; LANES], [0.0; LANES], [0; LANES]);
         for k in 0..LANES {
-            let (rx, ry) = (place.cos * x[k] - place.sin * y[k], place.sin * x[k] + place.cos * y[k]);
+            let (rx, ry) = (
+                place.cos * x[k] - place.sin * y[k],
+                place.sin * x[k] + place.cos * y[k],
+            );
             let (u, v) = (rx * map.per_m + place.at[0], ry * map.per_m + place.at[1]);
             // A point outside, or nowhere, reads a cell inside and does not count.
             let (cell_u, cell_v) = (u.max(0.0).min(last) as i32, v.max(0.0).min(last) as i32);
@@ -129,8 +172,14 @@ fn sum_block<'a>(map: &Lookup<'a>, x_m: &[f32], y_m: &[f32], weight: &[f32], pla
         }
         let [a, b, c, d] = corners(map, &first);
         for k in 0..LANES {
-            let (upper, lower) = (a[k] + along[k] * (b[k] - a[k]), c[k] + along[k] * (d[k] - c[k]));
-            let (left, right) = (a[k] + across[k] * (c[k] - a[k]), b[k] + across[k] * (d[k] - b[k]));
+            let (upper, lower) = (
+                a[k] + along[k] * (b[k] - a[k]),
+                c[k] + along[k] * (d[k] - c[k]),
+            );
+            let (left, right) = (
+                a[k] + across[k] * (c[k] - a[k]),
+                b[k] + across[k] * (d[k] - b[k]),
+            );
             let seen = |term: f32| if inside[k] > 0.0 { term } else { 0.0 };
             let m = seen(value * (upper + across[k] * (lower - upper)));
             let (jx, jy) = (seen(slope * (lower - upper)), seen(slope * (right - left)));
@@ -194,7 +243,9 @@ mod tests {
         Placed {
             x_m: points.iter().map(|p| p[0] as f32).collect(),
             y_m: points.iter().map(|p| p[1] as f32).collect(),
-            weight: (0..points.len()).map(|k| 0.2 + 0.1 * (k % 8) as f32).collect(),
+            weight: (0..points.len())
+                .map(|k| 0.2 + 0.1 * (k % 8) as f32)
+                .collect(),
         }
     }
 
@@ -222,13 +273,17 @@ mod tests {
     }
 
     fn pose(shift_m: f64, turn: f64) -> impl Strategy<Value = Isometry2<f64>> {
-        (prop::array::uniform2(-shift_m..shift_m), -turn..turn).prop_map(|(at, yaw)| Isometry2::new(at.into(), yaw))
+        (prop::array::uniform2(-shift_m..shift_m), -turn..turn)
+            .prop_map(|(at, yaw)| Isometry2::new(at.into(), yaw))
     }
 
     /// The pose, moved along one of its three unknowns.
     fn moved(pose: &Isometry2<f64>, unknown: usize, by: f64) -> Isometry2<f64> {
         let step = Vector3::ith(unknown, by);
-        Isometry2::new(pose.translation.vector + step.xy(), pose.rotation.angle() + step.z)
+        Isometry2::new(
+            pose.translation.vector + step.xy(),
+            pose.rotation.angle() + step.z,
+        )
     }
 
     /// Whether a point is so far from its cell's edges that the steps of the differences do not leave it.
@@ -317,7 +372,13 @@ mod tests {
     fn an_empty_map_or_scan_leaves_the_start() {
         let start = Isometry2::new(Vector2::new(1.0, 2.0), 0.3);
         let (empty, full) = (Level::new(CELL_M, 20.0), map(&[[1.0, 2.0], [-3.0, 4.0]]));
-        assert_eq!(register(&empty.lookup(), &placed(&[[1.0, 2.0]]), &start, 10).pose, start);
-        assert_eq!(register(&full.lookup(), &placed(&[]), &start, 10).pose, start);
+        assert_eq!(
+            register(&empty.lookup(), &placed(&[[1.0, 2.0]]), &start, 10).pose,
+            start
+        );
+        assert_eq!(
+            register(&full.lookup(), &placed(&[]), &start, 10).pose,
+            start
+        );
     }
 }

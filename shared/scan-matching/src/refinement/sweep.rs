@@ -20,7 +20,11 @@ pub(super) struct Placed {
 impl Placed {
     pub fn with_capacity(points: usize) -> Self {
         let column = || Vec::with_capacity(points);
-        Self { x_m: column(), y_m: column(), weight: column() }
+        Self {
+            x_m: column(),
+            y_m: column(),
+            weight: column(),
+        }
     }
 
     /// Undoes the sweep's distortion by a constant velocity (m/s, m/s, rad/s) of the sensor in its own frame.
@@ -29,7 +33,13 @@ impl Placed {
             column.clear();
             column.resize(points.len(), 0.0);
         }
-        place(points, velocity.map(|v| v as f32).into(), &mut self.x_m, &mut self.y_m, &mut self.weight);
+        place(
+            points,
+            velocity.map(|v| v as f32).into(),
+            &mut self.x_m,
+            &mut self.y_m,
+            &mut self.weight,
+        );
     }
 
     /// Leaves only one point in `step`.
@@ -47,13 +57,27 @@ impl Placed {
 
     /// Of the weights, each counted as often as it weighs.
     pub fn mean_weight(&self) -> f64 {
-        self.weight.iter().map(|w| f64::from(*w).powi(2)).sum::<f64>() / self.total_weight()
+        self.weight
+            .iter()
+            .map(|w| f64::from(*w).powi(2))
+            .sum::<f64>()
+            / self.total_weight()
     }
 }
 
 /// The sensor's pose at time t on its arc is the chord (v t), turned by half the angle, and the turn by the whole angle.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
-fn place(points: &[ScanPoint], [vx, vy, rate]: [f32; 3], x_m: &mut [f32], y_m: &mut [f32], weight: &mut [f32]) {
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
+fn place(
+    points: &[ScanPoint],
+    [vx, vy, rate]: [f32; 3],
+    x_m: &mut [f32],
+    y_m: &mut [f32],
+    weight: &mut [f32],
+) {
     let places = x_m.iter_mut().zip(y_m).zip(weight);
     for (&[x, y, t, w, doppler], ((x_m, y_m), weight)) in points.iter().zip(places) {
         // Range shift by Doppler along the line of sight u: r + doppler (u . v); x + (u . v) u doppler.
@@ -73,7 +97,10 @@ fn place(points: &[ScanPoint], [vx, vy, rate]: [f32; 3], x_m: &mut [f32], y_m: &
 #[inline(always)]
 fn sin_cos(a: f32) -> (f32, f32) {
     let s = a * a;
-    (a * (1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0))), 1.0 - s / 2.0 * (1.0 - s / 12.0 * (1.0 - s / 30.0)))
+    (
+        a * (1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0))),
+        1.0 - s / 2.0 * (1.0 - s / 12.0 * (1.0 - s / 30.0)),
+    )
 }
 
 #[cfg(test)]
@@ -109,7 +136,11 @@ mod tests {
     #[test]
     fn what_comes_nearer_was_seen_too_near() {
         let mut placed = Placed::default();
-        let ahead_and_aside = [[30.0, 0.0, 0.0, 1.0, 0.05], [0.0, 30.0, 0.0, 1.0, 0.05], [-30.0, 0.0, 0.0, 1.0, 0.05]];
+        let ahead_and_aside = [
+            [30.0, 0.0, 0.0, 1.0, 0.05],
+            [0.0, 30.0, 0.0, 1.0, 0.05],
+            [-30.0, 0.0, 0.0, 1.0, 0.05],
+        ];
         placed.place(&ahead_and_aside, &Vector3::new(10.0, 0.0, 0.0));
         assert_eq!(placed.x_m, [30.5, 0.0, -29.5]);
         assert_eq!(placed.y_m, [0.0, 30.0, 0.0]);

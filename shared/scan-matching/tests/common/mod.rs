@@ -4,7 +4,8 @@
 pub mod scenes;
 
 use gyre_scan_matching::{
-    MotionEstimate, RotationConfig, RotationEstimate, RotationSearch, TranslationConfig, TranslationSearch,
+    MotionEstimate, RotationConfig, RotationEstimate, RotationSearch, TranslationConfig,
+    TranslationSearch,
 };
 
 /// Pose of the later scan's frame in the earlier scan's frame.
@@ -17,7 +18,11 @@ pub struct Motion {
 
 impl Motion {
     pub fn degrees(x: f64, y: f64, yaw_deg: f64) -> Self {
-        Self { x, y, yaw: yaw_deg.to_radians() }
+        Self {
+            x,
+            y,
+            yaw: yaw_deg.to_radians(),
+        }
     }
 
     /// A point of the earlier frame, seen from the later one: x = R^T (x' - t), Eq. 1 the other way round.
@@ -57,7 +62,12 @@ pub fn scatterers(count: usize, radius_m: f64, seed: u64) -> Vec<([f64; 2], f64)
 }
 
 /// Draws scatterers as Gaussians of `blur` cells, row 0 far ahead, column 0 far left.
-pub fn draw(points: impl Iterator<Item = ([f64; 2], f64)>, n: usize, cell_m: f64, blur: f64) -> Vec<f32> {
+pub fn draw(
+    points: impl Iterator<Item = ([f64; 2], f64)>,
+    n: usize,
+    cell_m: f64,
+    blur: f64,
+) -> Vec<f32> {
     let mut raster = vec![0.0; n * n];
     let (middle, reach) = ((n - 1) as f64 / 2.0, (5.0 * blur).ceil() as isize);
     for ([x, y], strength) in points {
@@ -66,7 +76,8 @@ pub fn draw(points: impl Iterator<Item = ([f64; 2], f64)>, n: usize, cell_m: f64
             for j in col.round() as isize - reach..=col.round() as isize + reach {
                 if (0..n as isize).contains(&i) && (0..n as isize).contains(&j) {
                     let r2 = (i as f64 - row).powi(2) + (j as f64 - col).powi(2);
-                    raster[i as usize * n + j as usize] += (strength * (-0.5 * r2 / blur.powi(2)).exp()) as f32;
+                    raster[i as usize * n + j as usize] +=
+                        (strength * (-0.5 * r2 / blur.powi(2)).exp()) as f32;
                 }
             }
         }
@@ -78,7 +89,12 @@ pub fn draw(points: impl Iterator<Item = ([f64; 2], f64)>, n: usize, cell_m: f64
 pub fn pair(n: usize, cell_m: f64, motion: Motion, seed: u64) -> (Vec<f32>, Vec<f32>) {
     let scene = scatterers(150, 0.75 * n as f64 * cell_m, seed);
     let earlier = draw(scene.iter().copied(), n, cell_m, 1.2);
-    let later = draw(scene.iter().map(|&(p, s)| (motion.seen_from_later(p), s)), n, cell_m, 1.2);
+    let later = draw(
+        scene.iter().map(|&(p, s)| (motion.seen_from_later(p), s)),
+        n,
+        cell_m,
+        1.2,
+    );
     (earlier, later)
 }
 

@@ -50,7 +50,12 @@ pub fn car(middle: [f64; 2], speed_mps: f64) -> [Reflector; 4] {
 
 pub fn wall(from: [f64; 2], to: [f64; 2], points: usize) -> Reflector {
     let from = Vector2::from(from);
-    Reflector { from, along: Vector2::from(to) - from, velocity: Vector2::zeros(), points }
+    Reflector {
+        from,
+        along: Vector2::from(to) - from,
+        velocity: Vector2::zeros(),
+        points,
+    }
 }
 
 pub fn post(at: [f64; 2]) -> Reflector {
@@ -98,7 +103,12 @@ pub struct Drive {
 
 impl Drive {
     pub fn steady(speed_mps: f64, yaw_rate_deg: f64, scans: usize) -> Self {
-        Self { speed_mps, acceleration_mps2: 0.0, yaw_rate: yaw_rate_deg.to_radians(), scans }
+        Self {
+            speed_mps,
+            acceleration_mps2: 0.0,
+            yaw_rate: yaw_rate_deg.to_radians(),
+            scans,
+        }
     }
 
     pub fn speed(&self, time_s: f64) -> f64 {
@@ -123,7 +133,11 @@ impl Drive {
 /// The motion along an arc of this length that turns by this angle.
 fn arc(length: f64, turn: f64) -> Isometry2<f64> {
     let (sin, cos) = turn.sin_cos();
-    let [ahead, aside] = if turn.abs() < 1e-9 { [1.0, 0.5 * turn] } else { [sin / turn, (1.0 - cos) / turn] };
+    let [ahead, aside] = if turn.abs() < 1e-9 {
+        [1.0, 0.5 * turn]
+    } else {
+        [sin / turn, (1.0 - cos) / turn]
+    };
     Isometry2::new(Vector2::new(ahead, aside) * length, turn)
 }
 
@@ -155,16 +169,24 @@ impl Sensor {
                 // Twelve even numbers' sum is as good as normal.
                 let normal = (0..12).map(|_| numbers.next()).sum::<f64>() - 6.0;
                 let sensor = |t: f64| pose * arc(speed * t, drive.yaw_rate * t);
-                let seen = |t: f64| sensor(t).inverse() * Point2::from(place + reflector.velocity * (middle_s + t));
+                let seen = |t: f64| {
+                    sensor(t).inverse() * Point2::from(place + reflector.velocity * (middle_s + t))
+                };
                 let Some(time_s) = swept(seen) else { continue };
                 let at = seen(time_s).coords;
                 if !VISIBLE_M.contains(&at.norm()) {
                     continue;
                 }
-                let approach = Vector2::new(speed, 0.0) - sensor(time_s).rotation.inverse() * reflector.velocity;
+                let approach = Vector2::new(speed, 0.0)
+                    - sensor(time_s).rotation.inverse() * reflector.velocity;
                 let sight = at.normalize();
-                let shift = self.noise_m * normal + self.offset_m - self.doppler_s * sight.dot(&approach);
-                let told = if self.hides_doppler { 0.0 } else { self.doppler_s };
+                let shift =
+                    self.noise_m * normal + self.offset_m - self.doppler_s * sight.dot(&approach);
+                let told = if self.hides_doppler {
+                    0.0
+                } else {
+                    self.doppler_s
+                };
                 let at = at + sight * shift;
                 points.push([at.x, at.y, time_s, weight, told].map(|v| v as f32));
             }
@@ -222,8 +244,15 @@ impl Run {
         }
         let off = self.drive.pose(self.refined.len()).inv_mul(&pose);
         let yaw_deg = off.rotation.angle().to_degrees();
-        let drift_deg = 100.0 * yaw_deg / (self.drive.driven_m() - self.drive.length_m(first as f64 * SWEEP_S));
-        Errors { drift_deg, yaw_deg, shift_m: off.translation.vector.norm(), worst_m, worst_deg }
+        let drift_deg =
+            100.0 * yaw_deg / (self.drive.driven_m() - self.drive.length_m(first as f64 * SWEEP_S));
+        Errors {
+            drift_deg,
+            yaw_deg,
+            shift_m: off.translation.vector.norm(),
+            worst_m,
+            worst_deg,
+        }
     }
 }
 
@@ -240,18 +269,26 @@ pub fn searched(drive: &Drive, k: usize) -> Isometry2<f64> {
 
 /// The scans of a drive.
 pub fn scans(scene: &[Reflector], drive: &Drive, sensor: &Sensor) -> Vec<Vec<ScanPoint>> {
-    (0..drive.scans).map(|k| sensor.scan(scene, drive, k)).collect()
+    (0..drive.scans)
+        .map(|k| sensor.scan(scene, drive, k))
+        .collect()
 }
 
 pub fn refinement() -> Refinement {
-    let config = RefinementConfig { reach_m: VISIBLE_M.end() + 10.0, ..RefinementConfig::default() };
+    let config = RefinementConfig {
+        reach_m: VISIBLE_M.end() + 10.0,
+        ..RefinementConfig::default()
+    };
     Refinement::new(&config, CAPACITY).unwrap()
 }
 
 /// Refines the motions between these scans of a drive.
 pub fn refine(drive: &Drive, scans: &[Vec<ScanPoint>]) -> Run {
     let mut refinement = refinement();
-    Run { drive: *drive, refined: refine_on(&mut refinement, drive, scans, 0..scans.len() - 1) }
+    Run {
+        drive: *drive,
+        refined: refine_on(&mut refinement, drive, scans, 0..scans.len() - 1),
+    }
 }
 
 /// The motions from each scan `k` of a range to the one after.
@@ -261,7 +298,17 @@ pub fn refine_on(
     scans: &[Vec<ScanPoint>],
     range: std::ops::Range<usize>,
 ) -> Vec<Refined> {
-    range.map(|k| refinement.next(k as u64 + 1, &scans[k + 1], &scans[k], &searched(drive, k), SWEEP_S)).collect()
+    range
+        .map(|k| {
+            refinement.next(
+                k as u64 + 1,
+                &scans[k + 1],
+                &scans[k],
+                &searched(drive, k),
+                SWEEP_S,
+            )
+        })
+        .collect()
 }
 
 /// Both in one.

@@ -40,34 +40,62 @@ impl Exhibit {
 
     /// Any pictures.
     pub fn of(title: &'static str, pictures: Vec<(&'static str, Picture)>) -> Self {
-        Self { title, key: None, says: "", source: "", pictures }
+        Self {
+            title,
+            key: None,
+            says: "",
+            source: "",
+            pictures,
+        }
     }
 
     /// The same with the key that switches it.
     pub fn switch(self, key: &'static str) -> Self {
-        Self { key: Some(key), ..self }
+        Self {
+            key: Some(key),
+            ..self
+        }
     }
 
     /// The same with its words.
     pub fn words(self, says: &'static str, source: &'static str) -> Self {
-        Self { says, source, ..self }
+        Self {
+            says,
+            source,
+            ..self
+        }
     }
 
     fn file(&self, caption: &str) -> String {
         let name = format!("{} {caption}", self.title).to_lowercase();
-        let words = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
+        let words = name
+            .split(|c: char| !c.is_ascii_alphanumeric())
+            .filter(|word| !word.is_empty());
         words.collect::<Vec<_>>().join("-") + ".png"
     }
 
     /// Its part of the page.
     pub fn markdown(&self) -> String {
-        let key = self.key.map_or(String::new(), |key| format!(" (`effects.{key}`)"));
+        let key = self
+            .key
+            .map_or(String::new(), |key| format!(" (`effects.{key}`)"));
         let row = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
-        let captions = row(self.pictures.iter().map(|(caption, _)| (*caption).to_owned()).collect());
+        let captions = row(self
+            .pictures
+            .iter()
+            .map(|(caption, _)| (*caption).to_owned())
+            .collect());
         let rule = row(vec!["---".to_owned(); self.pictures.len()]);
         let image = |caption: &str| format!("![{}, {caption}]({})", self.title, self.file(caption));
-        let images = row(self.pictures.iter().map(|(caption, _)| image(caption)).collect());
-        format!("\n### {}{key}\n\n{}\n\nSource: {}.\n\n{captions}{rule}{images}", self.title, self.says, self.source)
+        let images = row(self
+            .pictures
+            .iter()
+            .map(|(caption, _)| image(caption))
+            .collect());
+        format!(
+            "\n### {}{key}\n\n{}\n\nSource: {}.\n\n{captions}{rule}{images}",
+            self.title, self.says, self.source
+        )
     }
 
     /// Writes its pictures and says how many bytes they take.

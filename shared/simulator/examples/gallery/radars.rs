@@ -12,11 +12,17 @@ use crate::scenes;
 use crate::shot::Shot;
 
 pub fn exhibits() -> Result<Vec<Exhibit>, SimulatorError> {
-    Ok(vec![range_point_spread(), range_law(), quantisation(), profiles()?])
+    Ok(vec![
+        range_point_spread(),
+        range_law(),
+        quantisation(),
+        profiles()?,
+    ])
 }
 
 fn range_point_spread() -> Exhibit {
-    let pairs = [(20.0, 0.0), (20.5, 0.0), (24.0, 0.0), (25.2, 0.0)].map(|(range_m, side)| (range_m, PI / 2.0 + side));
+    let pairs = [(20.0, 0.0), (20.5, 0.0), (24.0, 0.0), (25.2, 0.0)]
+        .map(|(range_m, side)| (range_m, PI / 2.0 + side));
     let shot = Shot::drawn(scenes::posts_at(pairs, 1.0));
     let picture = |profile: Profile| {
         let middle = (profile.sampling().azimuths / 4) as f64;
@@ -41,7 +47,10 @@ fn range_point_spread() -> Exhibit {
 
 fn range_law() -> Exhibit {
     let ranges = [2.5, 5.0, 10.0, 20.0, 40.0, 80.0, 160.0];
-    let places = ranges.into_iter().enumerate().map(|(i, range_m)| (range_m, (4.0 + 8.0 * i as f64) * PI / 200.0));
+    let places = ranges
+        .into_iter()
+        .enumerate()
+        .map(|(i, range_m)| (range_m, (4.0 + 8.0 * i as f64) * PI / 200.0));
     let shot = Shot::drawn(scenes::posts_at(places, 10.0));
     let frame = Frame::polar(0.0..56.0, 0.0..165.0).shades(BLACK, 140.0);
     Exhibit::of("Power against range", vec![("posts of 10 m²", frame.picture(&[shot.scan()]))]).words(

@@ -6,8 +6,8 @@ use gyre_radar::{OwnedScan, ScanLimits};
 use gyre_simulator::profile::Profile;
 use gyre_simulator::weather::WeatherConfig;
 use gyre_simulator::{
-    Body, ConstantTwist, Effects, Movers, Scene, Sensor, SensorConfig, SimulationConfig, Simulator, SimulatorError,
-    SweepTime, Trajectory, World,
+    Body, ConstantTwist, Effects, Movers, Scene, Sensor, SensorConfig, SimulationConfig, Simulator,
+    SimulatorError, SweepTime, Trajectory, World,
 };
 use nalgebra::Isometry2;
 
@@ -45,41 +45,75 @@ impl Shot {
             trajectory: Arc::new(ConstantTwist::default()),
             weather: WeatherConfig::default(),
             sensor: SensorConfig::default(),
-            effects: Effects { noise: true, ..Effects::NONE },
+            effects: Effects {
+                noise: true,
+                ..Effects::NONE
+            },
             index: 0,
         }
     }
 
     /// A radar under way through the town, with all effects but those that strike by chance.
     pub fn town(profile: Profile) -> Result<Self, SimulatorError> {
-        let simulator = Simulator::new(&SimulationConfig { seed: SEED, ..SimulationConfig::default() })?;
+        let simulator = Simulator::new(&SimulationConfig {
+            seed: SEED,
+            ..SimulationConfig::default()
+        })?;
         Ok(Self {
             world: Arc::new(simulator.world().clone()),
             trajectory: Arc::new(Drive(simulator)),
-            sensor: SensorConfig { profile, ..SensorConfig::default() },
-            effects: Effects { interference: false, dropped_azimuths: false, ..Effects::ALL },
+            sensor: SensorConfig {
+                profile,
+                ..SensorConfig::default()
+            },
+            effects: Effects {
+                interference: false,
+                dropped_azimuths: false,
+                ..Effects::ALL
+            },
             ..Self::drawn(Body::default())
         })
     }
 
     /// The same at a steady speed, metres a second ahead and radians a second to the left.
     pub fn driving(self, forward_m_s: f64, yaw_rad_s: f64) -> Self {
-        Self { trajectory: Arc::new(ConstantTwist { forward_m_s, left_m_s: 0.0, yaw_rad_s }), ..self }
+        Self {
+            trajectory: Arc::new(ConstantTwist {
+                forward_m_s,
+                left_m_s: 0.0,
+                yaw_rad_s,
+            }),
+            ..self
+        }
     }
 
     /// The same with another radar.
     pub fn with(self, profile: Profile) -> Self {
-        Self { sensor: SensorConfig { profile, ..self.sensor }, ..self }
+        Self {
+            sensor: SensorConfig {
+                profile,
+                ..self.sensor
+            },
+            ..self
+        }
     }
 
     /// The scan.
     pub fn scan(&self) -> OwnedScan {
         let sampling = self.sensor.sampling();
         let (azimuths, period_us) = (sampling.azimuths, sampling.period_us);
-        let mut scan = OwnedScan::with_limits(ScanLimits { bytes: azimuths * sampling.stride(), azimuths });
+        let mut scan = OwnedScan::with_limits(ScanLimits {
+            bytes: azimuths * sampling.stride(),
+            azimuths,
+        });
         // The middle of the first sweep is the trajectory's time zero: a drawn scene is seen from where it is drawn.
         let start_us = EPOCH_US + period_us * self.index as i64 - period_us / 2;
-        let time = SweepTime { start_us, period_us, azimuths, epoch_us: EPOCH_US };
+        let time = SweepTime {
+            start_us,
+            period_us,
+            azimuths,
+            epoch_us: EPOCH_US,
+        };
         let scene = Scene {
             world: &self.world,
             movers: self.movers.as_ref(),
@@ -93,6 +127,14 @@ impl Shot {
 
     /// This scan and those that follow, so many in all.
     pub fn scans(&self, count: u64) -> Vec<OwnedScan> {
-        (self.index..self.index + count).map(|index| Self { index, ..self.clone() }.scan()).collect()
+        (self.index..self.index + count)
+            .map(|index| {
+                Self {
+                    index,
+                    ..self.clone()
+                }
+                .scan()
+            })
+            .collect()
     }
 }

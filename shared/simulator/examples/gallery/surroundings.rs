@@ -18,12 +18,17 @@ pub fn exhibits() -> Result<Vec<Exhibit>, SimulatorError> {
 }
 
 fn weather(title: &'static str, weather: WeatherConfig, shot: Shot, frame: &Frame) -> Exhibit {
-    Exhibit::switched((title, "weather"), &Shot { weather, ..shot }, frame, |e| &mut e.weather)
+    Exhibit::switched((title, "weather"), &Shot { weather, ..shot }, frame, |e| {
+        &mut e.weather
+    })
 }
 
 fn rain() -> Exhibit {
     let shot = Shot::drawn(scenes::lattice(12.0, 90.0, 10.0));
-    let heavy = WeatherConfig { rain_mm_h: 25.0, ..WeatherConfig::default() };
+    let heavy = WeatherConfig {
+        rain_mm_h: 25.0,
+        ..WeatherConfig::default()
+    };
     weather("Rain", heavy, shot, &Frame::map(95.0).shades(12.0, 70.0)).words(
         "Posts 12 m apart in a cloudburst of 25 mm/h: drops send back echoes of their own nearby, and what is far loses 2.3 dB per 100 m of range.",
         "ITU-R P.838-3 (attenuation); Currie, Dyer and Hayes 1975 (reflectivity)",
@@ -38,7 +43,10 @@ fn fog() -> Exhibit {
         rings.extend(scenes::ring(range_m, 300, 80.0 * taken));
     }
     let shot = Shot::drawn(rings).with(Profile::Ras6);
-    let thick = WeatherConfig { fog_g_m3: 3.0, ..WeatherConfig::default() };
+    let thick = WeatherConfig {
+        fog_g_m3: 3.0,
+        ..WeatherConfig::default()
+    };
     weather("Fog", thick, shot, &Frame::polar(0.0..100.0, 50.0..300.0).shades(30.0, 70.0)).words(
         "Rings of posts as bright as each other, 60 to 300 m around a RAS6, in fog of 3 g/m³, six times what leaves 50 m of sight: a radar \
          hardly minds. The far ones lose up to 8 dB.",
@@ -48,7 +56,10 @@ fn fog() -> Exhibit {
 
 fn snow() -> Exhibit {
     let shot = Shot::drawn(scenes::lattice(8.0, 40.0, 1.0));
-    let heavy = WeatherConfig { snow_mm_h: 8.0, ..WeatherConfig::default() };
+    let heavy = WeatherConfig {
+        snow_mm_h: 8.0,
+        ..WeatherConfig::default()
+    };
     weather("Snow", heavy, shot, &Frame::map(42.0).shades(BLACK, 40.0)).words(
         "Posts 8 m apart in heavy snow, 8 mm/h of water: flakes come in clumps, so its echoes are spottier than rain's; snow on the radome takes its share.",
         "middle values of a literature that varies widely",
@@ -71,13 +82,31 @@ fn traffic() -> Exhibit {
 
 /// How late a scan was received after the first, beyond even spacing, seconds.
 fn delays_s(host_stamps: HostStamps) -> Result<Vec<f64>, SimulatorError> {
-    let output = OutputConfig { format: Some(OutputFormat::Radiate), host_stamps, ..OutputConfig::default() };
-    let mut config = SimulationConfig { scans: 240, output, ..SimulationConfig::default() };
+    let output = OutputConfig {
+        format: Some(OutputFormat::Radiate),
+        host_stamps,
+        ..OutputConfig::default()
+    };
+    let mut config = SimulationConfig {
+        scans: 240,
+        output,
+        ..SimulationConfig::default()
+    };
     config.sensor.profile = Profile::Cts350xRadiate;
     let recording = Recording::new(&config)?;
-    let received_s: Vec<f64> = recording.renderer().stamps().unwrap_or_default().lines().filter_map(received).collect();
+    let received_s: Vec<f64> = recording
+        .renderer()
+        .stamps()
+        .unwrap_or_default()
+        .lines()
+        .filter_map(received)
+        .collect();
     let period_s = recording.simulator().sampling().period_us as f64 * 1e-6;
-    Ok(received_s.iter().enumerate().map(|(i, at)| at - received_s[0] - i as f64 * period_s).collect())
+    Ok(received_s
+        .iter()
+        .enumerate()
+        .map(|(i, at)| at - received_s[0] - i as f64 * period_s)
+        .collect())
 }
 
 /// `Frame: 000001 Time: 1547132400.250000000`, the nanoseconds without leading zeros.
@@ -91,7 +120,9 @@ fn host_stamps() -> Result<Exhibit, SimulatorError> {
         const SECONDS_HIGH: f64 = 1.5;
         Picture::of((240, 80), |column, row| {
             let height = (79 - row) as f64 / 80.0 * SECONDS_HIGH;
-            let bar = delays_s.get(column).is_some_and(|delay| height <= *delay + 0.02);
+            let bar = delays_s
+                .get(column)
+                .is_some_and(|delay| height <= *delay + 0.02);
             if bar {
                 1.0
             } else if row % 26 == 0 {
@@ -101,8 +132,10 @@ fn host_stamps() -> Result<Exhibit, SimulatorError> {
             }
         })
     };
-    let pictures =
-        vec![("even", plot(delays_s(HostStamps::Even)?)), ("stalling", plot(delays_s(HostStamps::Stalling)?))];
+    let pictures = vec![
+        ("even", plot(delays_s(HostStamps::Even)?)),
+        ("stalling", plot(delays_s(HostStamps::Stalling)?)),
+    ];
     Ok(Exhibit::of("Host stamps", pictures).words(
         "How late the host receives each of 240 scans, up to 1.5 s: now and then it stalls and then catches up, while the sensor turns evenly. \
          RADIATE's format logs these times (`output.host_stamps`).",

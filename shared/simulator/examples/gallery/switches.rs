@@ -61,7 +61,9 @@ fn doppler() -> Exhibit {
 }
 
 fn doppler_of_alternating_chirps() -> Exhibit {
-    let shot = Shot::drawn(scenes::ring(30.0, 250, 4.0)).driving(25.0, 0.0).with(Profile::Ras6);
+    let shot = Shot::drawn(scenes::ring(30.0, 250, 4.0))
+        .driving(25.0, 0.0)
+        .with(Profile::Ras6);
     let frame = Frame::polar(-15.0..15.0, 27.0..33.0).shades(20.0, 110.0);
     Exhibit::switched(("Doppler of alternating chirps", "doppler"), &shot, &frame, |e| &mut e.doppler).words(
         "The same ahead, by a RAS6: rising and falling chirps by turns shift it to and fro, which gives the car's speed away.",
@@ -70,9 +72,13 @@ fn doppler_of_alternating_chirps() -> Exhibit {
 }
 
 fn encoder_wobble() -> Exhibit {
-    let behind = [(12.0, 0.0), (20.0, 0.06), (28.0, -0.06), (36.0, 0.0)].map(|(range_m, side)| (range_m, PI + side));
+    let behind = [(12.0, 0.0), (20.0, 0.06), (28.0, -0.06), (36.0, 0.0)]
+        .map(|(range_m, side)| (range_m, PI + side));
     let mut shot = Shot::drawn(scenes::posts_at(behind, 50.0));
-    shot.sensor = SensorConfig { azimuth_eccentricity_rad: 0.05, ..shot.sensor };
+    shot.sensor = SensorConfig {
+        azimuth_eccentricity_rad: 0.05,
+        ..shot.sensor
+    };
     let frame = Frame::polar(185.0..215.0, 8.0..40.0);
     Exhibit::switched(("Encoder wobble", "encoder_wobble"), &shot, &frame, |e| &mut e.encoder_wobble).words(
         "Posts behind the car, 30 azimuths of the sweep: the encoder's disc is 0.05 rad off its axis (far more than in any recording), \
@@ -116,8 +122,16 @@ fn highlights() -> Exhibit {
     let shot = Shot::drawn(scenes::glass_front()).driving(15.0, 0.0);
     let frame = Frame::map(32.0);
     let picture = |highlights, index| {
-        let effects = Effects { highlights, ..shot.effects };
-        frame.picture(&[Shot { effects, index, ..shot.clone() }.scan()])
+        let effects = Effects {
+            highlights,
+            ..shot.effects
+        };
+        frame.picture(&[Shot {
+            effects,
+            index,
+            ..shot.clone()
+        }
+        .scan()])
     };
     let pictures = vec![
         ("off", picture(false, 0)),
@@ -138,16 +152,23 @@ fn scintillation() -> Exhibit {
     // As bright as each other, nearly.
     let post = |y: f64| scenes::post(8.75, y, 0.02 * y * y);
     let posts = [6.0, 10.0, 14.0, 18.0, 22.0].map(post).to_vec();
-    let mut shot = Shot::drawn(Body { scatterers: posts, walls: vec![] }).driving(0.5, 0.0);
+    let mut shot = Shot::drawn(Body {
+        scatterers: posts,
+        walls: vec![],
+    })
+    .driving(0.5, 0.0);
     let mut picture = |on| {
         shot.effects.scintillation = on;
         let (scans, sampling) = (shot.scans(SCANS as u64), shot.sensor.sampling());
         let bin = |column: usize| {
-            sampling.bin(METRES.start + (METRES.end - METRES.start) * column as f64 / 240.0).max(0.0) as usize
+            sampling
+                .bin(METRES.start + (METRES.end - METRES.start) * column as f64 / 240.0)
+                .max(0.0) as usize
         };
         Picture::of((240, SCANS), |column, row| {
             // The half turn to the left, which holds the posts.
-            let rows = (200..400).map(|azimuth| &scans[row].view().row(azimuth)[bin(column)..=bin(column + 1)]);
+            let rows = (200..400)
+                .map(|azimuth| &scans[row].view().row(azimuth)[bin(column)..=bin(column + 1)]);
             (f64::from(rows.flatten().copied().max().unwrap_or_default()) - 80.0) / 45.0
         })
     };
@@ -186,7 +207,10 @@ fn speckle() -> Exhibit {
 }
 
 fn phase_noise() -> Exhibit {
-    let shot = Shot::drawn(scenes::posts_at([(30.0, PI / 2.0), (60.0, PI / 2.0 + 0.2)], 3000.0));
+    let shot = Shot::drawn(scenes::posts_at(
+        [(30.0, PI / 2.0), (60.0, PI / 2.0 + 0.2)],
+        3000.0,
+    ));
     let frame = Frame::polar(70.0..140.0, 0.0..165.0).shades(0.0, 80.0);
     Exhibit::switched(("Phase noise", "phase_noise"), &shot, &frame, |e| &mut e.phase_noise).words(
         "Two corner reflectors: each raises the noise of its whole azimuth, 60 dB below itself and more close by. In town: saturation streaks.",
@@ -227,15 +251,30 @@ fn own_vehicle() -> Exhibit {
 
 fn ground() -> Exhibit {
     let mut front = scenes::rough_wall((3.0, -20.0), (15.0, -20.0), 1.0);
-    front.walls.push(scenes::wall((3.0, -20.0), (15.0, -20.0), 1e-4, 0.0));
+    front
+        .walls
+        .push(scenes::wall((3.0, -20.0), (15.0, -20.0), 1e-4, 0.0));
     let shot = Shot::drawn(front);
     let frame = Frame::map(40.0).shades(2.0, 22.0);
     let picture = |ground, occlusion| {
-        let effects = Effects { ground, occlusion, ..shot.effects };
-        frame.picture(&Shot { effects, ..shot.clone() }.scans(16))
+        let effects = Effects {
+            ground,
+            occlusion,
+            ..shot.effects
+        };
+        frame.picture(
+            &Shot {
+                effects,
+                ..shot.clone()
+            }
+            .scans(16),
+        )
     };
-    let pictures =
-        vec![("off", picture(false, true)), ("on", picture(true, true)), ("on, occlusion off", picture(true, false))];
+    let pictures = vec![
+        ("off", picture(false, true)),
+        ("on", picture(true, true)),
+        ("on, occlusion off", picture(true, false)),
+    ];
     Exhibit::of("Ground", pictures).switch("ground").words(
         "The mean of 16 scans of open country with one front, to the right: road, verges and fields send back a little, in patches that \
          belong to the place; none from behind the front, unless nothing hides anything.",
@@ -268,12 +307,24 @@ fn spurious_lines() -> Exhibit {
 
 fn interference() -> Exhibit {
     let shot = Shot::drawn(scenes::lattice(12.0, 90.0, 10.0));
-    let scan =
-        |index, interference| Shot { index, effects: Effects { interference, ..shot.effects }, ..shot.clone() }.scan();
+    let scan = |index, interference| {
+        Shot {
+            index,
+            effects: Effects {
+                interference,
+                ..shot.effects
+            },
+            ..shot.clone()
+        }
+        .scan()
+    };
     // The first scan with a burst, and where that is.
     let heard = |index| {
         let (off, on) = (scan(index, false), scan(index, true));
-        Some((index, (0..400).find(|azimuth| off.view().row(*azimuth) != on.view().row(*azimuth))?))
+        Some((
+            index,
+            (0..400).find(|azimuth| off.view().row(*azimuth) != on.view().row(*azimuth))?,
+        ))
     };
     let (index, azimuth) = (0..SCANS).find_map(heard).unwrap_or_default();
     let first = azimuth as f64 - 25.0;
@@ -288,10 +339,26 @@ fn interference() -> Exhibit {
 fn dropped_azimuths() -> Exhibit {
     let shot = Shot::drawn(scenes::scattered(15.0..24.0, 400, 0.5));
     let scan = |index, dropped_azimuths| {
-        Shot { index, effects: Effects { dropped_azimuths, ..shot.effects }, ..shot.clone() }.scan()
+        Shot {
+            index,
+            effects: Effects {
+                dropped_azimuths,
+                ..shot.effects
+            },
+            ..shot.clone()
+        }
+        .scan()
     };
     // The first scan that lost an azimuth, and which.
-    let lost = |index| Some((index, scan(index, true).flags.iter().position(|flags| *flags == 0)?));
+    let lost = |index| {
+        Some((
+            index,
+            scan(index, true)
+                .flags
+                .iter()
+                .position(|flags| *flags == 0)?,
+        ))
+    };
     let (index, azimuth) = (0..SCANS).find_map(lost).unwrap_or_default();
     let first = azimuth as f64 - 6.0;
     let frame = Frame::polar(first..first + 12.0, 15.0..24.0);

@@ -13,7 +13,9 @@ const RATE_SPAN_S: f64 = 1e-3;
 
 /// The scan's time, microseconds since 1970.
 pub(crate) fn stamp_us(simulator: &Simulator, index: usize) -> i64 {
-    simulator.time(index).stamp_us((simulator.sampling().azimuths / 2).saturating_sub(1))
+    simulator
+        .time(index)
+        .stamp_us((simulator.sampling().azimuths / 2).saturating_sub(1))
 }
 
 pub(crate) fn file_name(simulator: &Simulator, index: usize) -> String {
@@ -21,13 +23,17 @@ pub(crate) fn file_name(simulator: &Simulator, index: usize) -> String {
 }
 
 pub(crate) fn side_files(simulator: &Simulator) -> Vec<SideFile> {
-    vec![("applanix/radar_poses.csv".into(), radar_poses_csv(simulator).into_bytes())]
+    vec![(
+        "applanix/radar_poses.csv".into(),
+        radar_poses_csv(simulator).into_bytes(),
+    )]
 }
 
 fn radar_poses_csv(simulator: &Simulator) -> String {
-    let header =
-        "GPSTime,easting,northing,altitude,vel_east,vel_north,vel_up,roll,pitch,heading,angvel_z,angvel_y,angvel_x\n";
-    std::iter::once(header.to_owned()).chain((0..simulator.scans()).map(|index| row(simulator, index))).collect()
+    let header = "GPSTime,easting,northing,altitude,vel_east,vel_north,vel_up,roll,pitch,heading,angvel_z,angvel_y,angvel_x\n";
+    std::iter::once(header.to_owned())
+        .chain((0..simulator.scans()).map(|index| row(simulator, index)))
+        .collect()
 }
 
 /// With the sensor's z axis down (a roll of pi) the heading is the course, counter-clockwise from east, while a left turn is
@@ -36,9 +42,16 @@ fn row(simulator: &Simulator, index: usize) -> String {
     let (stamp_us, trajectory) = (stamp_us(simulator, index), simulator.trajectory());
     let time_s = simulator.time(index).trajectory_s(stamp_us);
     let (pose, velocity) = (trajectory.pose(time_s), trajectory.velocity(time_s));
-    let (before, after) = (trajectory.pose(time_s - RATE_SPAN_S / 2.0), trajectory.pose(time_s + RATE_SPAN_S / 2.0));
+    let (before, after) = (
+        trajectory.pose(time_s - RATE_SPAN_S / 2.0),
+        trajectory.pose(time_s + RATE_SPAN_S / 2.0),
+    );
     let yaw_rate = before.rotation.rotation_to(&after.rotation).angle() / RATE_SPAN_S;
-    let (east, north, heading) = (pose.translation.x, pose.translation.y, pose.rotation.angle());
+    let (east, north, heading) = (
+        pose.translation.x,
+        pose.translation.y,
+        pose.rotation.angle(),
+    );
     format!(
         "{stamp_us},{east:.9},{north:.9},{zero:.9},{:.9},{:.9},{zero:.9},{PI:.15},{zero:.9},{heading:.12},{:.9},{zero:.9},{zero:.9}\n",
         velocity.x,

@@ -13,14 +13,22 @@ pub(crate) fn file_name(simulator: &Simulator, index: usize) -> String {
 
 pub(crate) fn side_files(simulator: &Simulator) -> Vec<SideFile> {
     vec![
-        ("radar.timestamps".into(), timestamps(simulator).into_bytes()),
-        ("gt/radar_odometry.csv".into(), radar_odometry_csv(simulator).into_bytes()),
+        (
+            "radar.timestamps".into(),
+            timestamps(simulator).into_bytes(),
+        ),
+        (
+            "gt/radar_odometry.csv".into(),
+            radar_odometry_csv(simulator).into_bytes(),
+        ),
     ]
 }
 
 /// `radar.timestamps`: each sweep's name and whether it is valid.
 fn timestamps(simulator: &Simulator) -> String {
-    (0..simulator.scans()).map(|i| format!("{} 1\n", simulator.time(i).start_us)).collect()
+    (0..simulator.scans())
+        .map(|i| format!("{} 1\n", simulator.time(i).start_us))
+        .collect()
 }
 
 /// `gt/radar_odometry.csv`: source is the newer scan, destination the older. With nine decimals where Oxford has six:
@@ -32,7 +40,11 @@ fn radar_odometry_csv(simulator: &Simulator) -> String {
         let (source, destination) = (simulator.time(newer), simulator.time(newer - 1));
         let motion = simulator.pose(newer - 1).inverse() * simulator.pose(newer);
         // From y left, yaw counter-clockwise to y right, yaw clockwise.
-        let (x, y, yaw) = (motion.translation.x, -motion.translation.y, -motion.rotation.angle());
+        let (x, y, yaw) = (
+            motion.translation.x,
+            -motion.translation.y,
+            -motion.rotation.angle(),
+        );
         format!(
             "{},{},{x:.9},{y:.9},{zero:.9},{zero:.9},{zero:.9},{yaw:.9},{},{}\n",
             source.middle_us(),
@@ -42,5 +54,7 @@ fn radar_odometry_csv(simulator: &Simulator) -> String {
             zero = 0.0,
         )
     };
-    std::iter::once(header.to_owned()).chain((1..simulator.scans()).map(row)).collect()
+    std::iter::once(header.to_owned())
+        .chain((1..simulator.scans()).map(row))
+        .collect()
 }

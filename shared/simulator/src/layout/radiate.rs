@@ -52,7 +52,12 @@ pub(crate) fn stamps(simulator: &Simulator, host: HostStamps, seed: u64) -> Stri
     for index in 0..simulator.scans() {
         let received_us = simulator.time(index).start_us + delay_us(simulator, host, seed, index);
         let (seconds, rest_us) = (received_us / 1_000_000, received_us % 1_000_000);
-        let _ = writeln!(text, "Frame: {:06} Time: {seconds}.{}", index + 1, rest_us * 1000);
+        let _ = writeln!(
+            text,
+            "Frame: {:06} Time: {seconds}.{}",
+            index + 1,
+            rest_us * 1000
+        );
     }
     text
 }
@@ -66,7 +71,9 @@ fn delay_us(simulator: &Simulator, host: HostStamps, seed: u64, index: usize) ->
     let mut rng = Stream::Stall(block as u64).generator(seed);
     let begins = block * STALL_EVERY + rng.random_range(8..STALL_EVERY / 2);
     let ends_us = simulator.time(begins).start_us + (rng.random_range(STALL_S) * 1e6) as i64;
-    let Some(waited) = index.checked_sub(begins) else { return 0 };
+    let Some(waited) = index.checked_sub(begins) else {
+        return 0;
+    };
     let handed_over_us = ends_us + waited as i64 * CATCH_UP_US;
     (handed_over_us - simulator.time(index).start_us).max(0)
 }
@@ -92,9 +99,17 @@ mod tests {
 
     #[test]
     fn a_host_that_stalls_is_late_by_up_to_its_stall_and_never_hands_over_backwards() {
-        let simulator = Simulator::new(&SimulationConfig { scans: 400, ..SimulationConfig::default() }).unwrap();
-        let late: Vec<i64> = (0..400).map(|i| delay_us(&simulator, HostStamps::Stalling, 3, i)).collect();
-        let received: Vec<i64> = (0..400).map(|i| simulator.time(i).start_us + late[i]).collect();
+        let simulator = Simulator::new(&SimulationConfig {
+            scans: 400,
+            ..SimulationConfig::default()
+        })
+        .unwrap();
+        let late: Vec<i64> = (0..400)
+            .map(|i| delay_us(&simulator, HostStamps::Stalling, 3, i))
+            .collect();
+        let received: Vec<i64> = (0..400)
+            .map(|i| simulator.time(i).start_us + late[i])
+            .collect();
         assert!(received.windows(2).all(|w| w[0] < w[1]));
         let worst = late.iter().copied().max().unwrap();
         assert!((600_000..1_400_000).contains(&worst), "{worst}");
@@ -105,12 +120,17 @@ mod tests {
     #[test]
     fn laying_on_side_is_a_transposition_without_the_metadata() {
         let (azimuths, bins, first) = (21, 13, 2);
-        let rows: Vec<u8> = (0..azimuths * (bins + first)).map(|i| (i * 7 % 251) as u8).collect();
+        let rows: Vec<u8> = (0..azimuths * (bins + first))
+            .map(|i| (i * 7 % 251) as u8)
+            .collect();
         let mut into = vec![0; azimuths * bins];
         lay_on_side(&rows, bins + first, first, &mut into);
         for azimuth in 0..azimuths {
             for bin in 0..bins {
-                assert_eq!(into[bin * azimuths + azimuth], rows[azimuth * (bins + first) + first + bin]);
+                assert_eq!(
+                    into[bin * azimuths + azimuth],
+                    rows[azimuth * (bins + first) + first + bin]
+                );
             }
         }
     }

@@ -34,7 +34,8 @@ impl Air {
     /// Cross-section of the drops in one resolution cell, square metres.
     pub fn clutter_m2(&self, range_m: f64, receiver: &Receiver) -> f64 {
         // One-way beams are wider than two-way ones by the root of two.
-        let area_m2 = range_m * range_m * std::f64::consts::SQRT_2 * receiver.beam_rad * BEAM_HEIGHT_RAD;
+        let area_m2 =
+            range_m * range_m * std::f64::consts::SQRT_2 * receiver.beam_rad * BEAM_HEIGHT_RAD;
         self.reflectivity_m2_m3 * area_m2 * receiver.cell_m
     }
 }

@@ -5,8 +5,16 @@ use crate::interpolate::interpolate;
 /// Side lobes, there and back: dB below the middle of the beam at so many half-power widths beside it.
 ///
 /// The envelope measured on Oxford's, RADIATE's and Boreas-RT's scans: medians of the azimuths beside isolated strong echoes.
-const SIDE_LOBES: [(f64, f64); 8] =
-    [(1.0, -11.5), (1.64, -20.5), (2.45, -29.5), (3.27, -37.5), (4.1, -42.5), (4.9, -46.0), (6.5, -52.0), (8.0, -57.0)];
+const SIDE_LOBES: [(f64, f64); 8] = [
+    (1.0, -11.5),
+    (1.64, -20.5),
+    (2.45, -29.5),
+    (3.27, -37.5),
+    (4.1, -42.5),
+    (4.9, -46.0),
+    (6.5, -52.0),
+    (8.0, -57.0),
+];
 /// Entries of the table for one half-power width.
 const STEPS: f64 = 64.0;
 /// Half-power widths to each side that the table spans.
@@ -26,13 +34,21 @@ impl Antenna {
         let power = |widths: f64| {
             // One half at half a width.
             let main_db = -12.04 * widths * widths;
-            let db =
-                if side_lobes { main_db.max(interpolate(&SIDE_LOBES, widths).unwrap_or(main_db)) } else { main_db };
+            let db = if side_lobes {
+                main_db.max(interpolate(&SIDE_LOBES, widths).unwrap_or(main_db))
+            } else {
+                main_db
+            };
             10f64.powf(db / 10.0)
         };
         let entries = (REACH * STEPS) as usize + 1;
-        let amplitudes = (0..entries).map(|i| power(i as f64 / STEPS).sqrt() as f32).collect();
-        Self { scale: STEPS / width_rad, amplitudes }
+        let amplitudes = (0..entries)
+            .map(|i| power(i as f64 / STEPS).sqrt() as f32)
+            .collect();
+        Self {
+            scale: STEPS / width_rad,
+            amplitudes,
+        }
     }
 
     /// Amplitude gain `off_rad` beside the middle; 0 far beside it.
@@ -43,7 +59,9 @@ impl Antenna {
 
     /// The angle beyond which the amplitude gain stays below `least`, radians.
     pub fn reach_rad(&self, least: f64) -> f64 {
-        let beyond = self.amplitudes.partition_point(|&gain| f64::from(gain) >= least);
+        let beyond = self
+            .amplitudes
+            .partition_point(|&gain| f64::from(gain) >= least);
         beyond as f64 / self.scale
     }
 }

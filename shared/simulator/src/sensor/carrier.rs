@@ -53,7 +53,9 @@ impl Carrier {
         seed: u64,
     ) -> Self {
         let mut rng = Stream::Carrier.generator(seed);
-        let mut carrier = Self { azimuths: vec![Vec::new(); sampling.azimuths] };
+        let mut carrier = Self {
+            azimuths: vec![Vec::new(); sampling.azimuths],
+        };
         if effects.ringing {
             carrier.ring(sampling, receiver, spectrum, &mut rng);
         }
@@ -71,13 +73,22 @@ impl Carrier {
         }
     }
 
-    fn ring(&mut self, sampling: &Sampling, receiver: &Receiver, spectrum: &RangeSpectrum, rng: &mut ChaCha8Rng) {
+    fn ring(
+        &mut self,
+        sampling: &Sampling,
+        receiver: &Receiver,
+        spectrum: &RangeSpectrum,
+        rng: &mut ChaCha8Rng,
+    ) {
         let (cells, spacing) = spectrum.noise_cells();
-        let falling = |azimuth: usize| sampling.chirp == Chirp::Alternating && !azimuth.is_multiple_of(2);
+        let falling =
+            |azimuth: usize| sampling.chirp == Chirp::Alternating && !azimuth.is_multiple_of(2);
         let louder_db: Vec<f64> = smooth_noise(sampling.azimuths, rng)
             .into_iter()
             .enumerate()
-            .map(|(azimuth, uneven)| UNEVEN_DB * uneven + if falling(azimuth) { FALLING_DB } else { 0.0 })
+            .map(|(azimuth, uneven)| {
+                UNEVEN_DB * uneven + if falling(azimuth) { FALLING_DB } else { 0.0 }
+            })
             .collect();
         let end_m = receiver.ringing_db.last().map_or(0.0, |last| last.0);
         for bin in (0..cells).map(|cell| cell as f64 * spacing) {
@@ -89,7 +100,11 @@ impl Carrier {
             for ((fixed, louder_db), wave) in self.azimuths.iter_mut().zip(&louder_db).zip(waves) {
                 let power = 10f64.powf((level_db + louder_db) / 10.0) / f64::from(NOISE_OVERLAP);
                 let wave = wave * power.sqrt();
-                fixed.push(Fixed { bin, real: wave.x as f32, imaginary: wave.y as f32 });
+                fixed.push(Fixed {
+                    bin,
+                    real: wave.x as f32,
+                    imaginary: wave.y as f32,
+                });
             }
         }
     }
@@ -105,7 +120,11 @@ impl Carrier {
         for azimuth in (middle - reach).ceil() as usize..=(middle + reach) as usize {
             let widths = (azimuth as f64 - middle) * sampling.step_rad() / receiver.beam_rad;
             let amplitude = (power * 10f64.powf(-1.2 * widths * widths)).sqrt();
-            let echo = fixed(sampling.bin(range_m), amplitude, &mut ChaCha8Rng::seed_from_u64(phase));
+            let echo = fixed(
+                sampling.bin(range_m),
+                amplitude,
+                &mut ChaCha8Rng::seed_from_u64(phase),
+            );
             self.azimuths[azimuth % sampling.azimuths].push(echo);
         }
     }
@@ -113,17 +132,24 @@ impl Carrier {
 
 fn fixed(bin: f64, amplitude: f64, rng: &mut ChaCha8Rng) -> Fixed {
     let (sine, cosine) = (TAU * rng.random::<f64>()).sin_cos();
-    Fixed { bin, real: (amplitude * cosine) as f32, imaginary: (amplitude * sine) as f32 }
+    Fixed {
+        bin,
+        real: (amplitude * cosine) as f32,
+        imaginary: (amplitude * sine) as f32,
+    }
 }
 
 /// Complex Gaussian numbers round a circle, of power 1 on average, each like its neighbours: an autoregressive process that ends where
 /// it begins.
 fn alike_waves(count: usize, rng: &mut ChaCha8Rng) -> Vec<Vector2<f64>> {
     let deviation = ((1.0 - ALIKE * ALIKE) / 2.0).sqrt();
-    let fresh: Vec<Vector2<f64>> =
-        (0..count).map(|_| Vector2::new(rng.sample(StandardNormal), rng.sample(StandardNormal)) * deviation).collect();
+    let fresh: Vec<Vector2<f64>> = (0..count)
+        .map(|_| Vector2::new(rng.sample(StandardNormal), rng.sample(StandardNormal)) * deviation)
+        .collect();
     // What a turn from nothing ends with, were it turned for ever.
-    let turn = fresh.iter().fold(Vector2::zeros(), |wave, fresh| wave * ALIKE + fresh);
+    let turn = fresh
+        .iter()
+        .fold(Vector2::zeros(), |wave, fresh| wave * ALIKE + fresh);
     let mut wave = turn / (1.0 - ALIKE.powi(count as i32));
     let next = |fresh: &Vector2<f64>| {
         wave = wave * ALIKE + fresh;
@@ -135,8 +161,14 @@ fn alike_waves(count: usize, rng: &mut ChaCha8Rng) -> Vec<Vector2<f64>> {
 /// Normal numbers round a circle, smooth over some of them, with a standard deviation of about 1.
 fn smooth_noise(count: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
     let white: Vec<f64> = (0..count).map(|_| rng.sample(StandardNormal)).collect();
-    let mean = |at: usize| (0..SMOOTH_AZIMUTHS).map(|i| white[(at + i) % count]).sum::<f64>();
-    (0..count).map(|at| mean(at) / (SMOOTH_AZIMUTHS as f64).sqrt()).collect()
+    let mean = |at: usize| {
+        (0..SMOOTH_AZIMUTHS)
+            .map(|i| white[(at + i) % count])
+            .sum::<f64>()
+    };
+    (0..count)
+        .map(|at| mean(at) / (SMOOTH_AZIMUTHS as f64).sqrt())
+        .collect()
 }
 
 #[cfg(test)]
@@ -147,12 +179,17 @@ mod tests {
     fn waves_keep_their_power_and_resemble_their_neighbours_all_round_the_circle() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let circles: Vec<_> = (0..4000).map(|_| alike_waves(120, &mut rng)).collect();
-        let mean = |of: &dyn Fn(&[Vector2<f64>]) -> f64| circles.iter().map(|circle| of(circle)).sum::<f64>() / 4000.0;
+        let mean = |of: &dyn Fn(&[Vector2<f64>]) -> f64| {
+            circles.iter().map(|circle| of(circle)).sum::<f64>() / 4000.0
+        };
         for (at, next) in [(0, 1), (60, 61), (119, 0)] {
             let power = mean(&|circle| circle[at].norm_squared());
             let alike = mean(&|circle| circle[at].dot(&circle[next]));
             assert!((power - 1.0).abs() < 0.08, "azimuth {at}: power {power}");
-            assert!((alike / power - ALIKE).abs() < 0.03, "azimuths {at} and {next}: {alike} of {power}");
+            assert!(
+                (alike / power - ALIKE).abs() < 0.03,
+                "azimuths {at} and {next}: {alike} of {power}"
+            );
         }
         let across = mean(&|circle| circle[0].dot(&circle[60]));
         assert!(across.abs() < 0.1 + 2.0 * ALIKE.powi(60), "{across}");

@@ -42,16 +42,28 @@ impl SensorConfig {
     /// Refuses what cannot be simulated, naming the key.
     pub fn validate(&self) -> Result<(), SimulatorError> {
         within("sensor.period_s", self.period_s.unwrap_or(1.0), 0.05, 2.0)?;
-        within("sensor.range_offset_m", self.range_offset_m.unwrap_or(0.0), -5.0, 5.0)?;
+        within(
+            "sensor.range_offset_m",
+            self.range_offset_m.unwrap_or(0.0),
+            -5.0,
+            5.0,
+        )?;
         within("sensor.doppler_s", self.doppler_s.unwrap_or(0.0), -0.5, 0.5)?;
-        within("sensor.azimuth_eccentricity_rad", self.azimuth_eccentricity_rad, -0.05, 0.05)
+        within(
+            "sensor.azimuth_eccentricity_rad",
+            self.azimuth_eccentricity_rad,
+            -0.05,
+            0.05,
+        )
     }
 
     /// How it samples.
     pub fn sampling(&self) -> Sampling {
         let kind = self.profile.sampling();
         Sampling {
-            period_us: self.period_s.map_or(kind.period_us, |period_s| (period_s * 1e6).round() as i64),
+            period_us: self
+                .period_s
+                .map_or(kind.period_us, |period_s| (period_s * 1e6).round() as i64),
             range_offset_m: self.range_offset_m.unwrap_or(kind.range_offset_m),
             doppler_s: self.doppler_s.unwrap_or(kind.doppler_s),
             ..kind

@@ -66,21 +66,40 @@ impl View<'_> {
     }
 
     /// Adds a scatterer's echo for each time that the beam passes it, if there is enough of it.
-    fn look(&self, scatterer: &Scatterer, position: Point2<f64>, velocity: Vector2<f64>, echoes: &mut Vec<Echo>) {
+    fn look(
+        &self,
+        scatterer: &Scatterer,
+        position: Point2<f64>,
+        velocity: Vector2<f64>,
+        echoes: &mut Vec<Echo>,
+    ) {
         let range_m = (position - self.stations.middle().position).norm();
-        if scatterer.cross_section_m2 * self.received((range_m - 5.0).max(NEAREST_M)) < NEGLIGIBLE_POWER {
+        if scatterer.cross_section_m2 * self.received((range_m - 5.0).max(NEAREST_M))
+            < NEGLIGIBLE_POWER
+        {
             return;
         }
         let place = |station: &Station| position + velocity * station.time_s;
         self.stations.passings(place, |azimuth| {
             let station = self.stations.at(azimuth);
             if let Some(amplitude) = self.amplitude(scatterer, place(station), station, azimuth) {
-                echoes.push(Echo { position, velocity, amplitude, azimuth });
+                echoes.push(Echo {
+                    position,
+                    velocity,
+                    amplitude,
+                    azimuth,
+                });
             }
         });
     }
 
-    fn amplitude(&self, scatterer: &Scatterer, place: Point2<f64>, from: &Station, azimuth: f64) -> Option<f64> {
+    fn amplitude(
+        &self,
+        scatterer: &Scatterer,
+        place: Point2<f64>,
+        from: &Station,
+        azimuth: f64,
+    ) -> Option<f64> {
         let way = from.position - place;
         let range_m = way.norm();
         if !(NEAREST_M..self.reach_m).contains(&range_m) {
@@ -92,7 +111,11 @@ impl View<'_> {
         if in_the_open < NEGLIGIBLE_POWER {
             return None;
         }
-        let body = if self.effects.aspect { scatterer.body } else { NO_BODY };
+        let body = if self.effects.aspect {
+            scatterer.body
+        } else {
+            NO_BODY
+        };
         let passed = self.transmission(azimuth, range_m, body);
         (in_the_open * passed > NEGLIGIBLE_POWER).then(|| (in_the_open * passed).sqrt())
     }
@@ -100,20 +123,38 @@ impl View<'_> {
     /// Cross-section that a scatterer shows towards `direction`, a unit vector, square metres.
     pub fn cross_section_m2(&self, scatterer: &Scatterer, direction: Vector2<f64>) -> f64 {
         let aspect = &scatterer.aspect;
-        let facing = if self.effects.aspect { aspect.gain(direction) } else { aspect.mean_gain() };
-        let flicker = if self.effects.scintillation { scintillation(scatterer.position, direction) } else { 1.0 };
+        let facing = if self.effects.aspect {
+            aspect.gain(direction)
+        } else {
+            aspect.mean_gain()
+        };
+        let flicker = if self.effects.scintillation {
+            scintillation(scatterer.position, direction)
+        } else {
+            1.0
+        };
         scatterer.cross_section_m2 * facing * flicker
     }
 
     /// Share of the power that walls let through to a thing of `body`, there and back.
     pub fn transmission(&self, azimuth: f64, range_m: f64, body: u32) -> f64 {
-        if self.effects.occlusion { f64::from(self.skyline.transmission(azimuth, range_m, body)) } else { 1.0 }
+        if self.effects.occlusion {
+            f64::from(self.skyline.transmission(azimuth, range_m, body))
+        } else {
+            1.0
+        }
     }
 
     /// Share of the power that the beam has at a scatterer's height, seen over a way of `range_m`.
     pub fn lit(&self, scatterer: &Scatterer, range_m: f64, from: &Station) -> f64 {
         if self.effects.elevation {
-            lit(scatterer.position, scatterer.cross_section_m2, range_m, from.lift_rad, self.receiver.beam_height_rad)
+            lit(
+                scatterer.position,
+                scatterer.cross_section_m2,
+                range_m,
+                from.lift_rad,
+                self.receiver.beam_height_rad,
+            )
         } else {
             1.0
         }

@@ -42,17 +42,24 @@ impl Nodding {
     pub fn new(seed: u64) -> Self {
         let mut rng = Stream::Nodding.generator(seed);
         let mut oscillation = || Oscillation {
-            amplitude_rad: NODDING_RAD * (2.0 / OSCILLATIONS as f64).sqrt() * rng.sample::<f64, _>(StandardNormal),
+            amplitude_rad: NODDING_RAD
+                * (2.0 / OSCILLATIONS as f64).sqrt()
+                * rng.sample::<f64, _>(StandardNormal),
             frequency_hz: rng.random_range(NODDING_HZ),
             phase: rng.random_range(0.0..TAU),
         };
-        Self { pitch: std::array::from_fn(|_| oscillation()), roll: std::array::from_fn(|_| oscillation()) }
+        Self {
+            pitch: std::array::from_fn(|_| oscillation()),
+            roll: std::array::from_fn(|_| oscillation()),
+        }
     }
 
     /// How far the beam points up at an azimuth (clockwise from ahead) and a time, radians.
     pub fn lift_rad(&self, time_s: f64, azimuth_rad: f64) -> f64 {
         let sum = |all: &[Oscillation]| -> f64 {
-            all.iter().map(|o| o.amplitude_rad * (TAU * o.frequency_hz * time_s + o.phase).sin()).sum()
+            all.iter()
+                .map(|o| o.amplitude_rad * (TAU * o.frequency_hz * time_s + o.phase).sin())
+                .sum()
         };
         sum(&self.pitch) * azimuth_rad.cos() + sum(&self.roll) * azimuth_rad.sin()
     }
@@ -60,7 +67,13 @@ impl Nodding {
 
 /// Share of the power that a scatterer gets from a beam of a height that points up by `lift_rad`. What is strong stands upright (posts,
 /// corners) and is lit at some height in any case.
-pub(super) fn lit(place: Point2<f64>, cross_section_m2: f64, range_m: f64, lift_rad: f64, beam_height_rad: f64) -> f64 {
+pub(super) fn lit(
+    place: Point2<f64>,
+    cross_section_m2: f64,
+    range_m: f64,
+    lift_rad: f64,
+    beam_height_rad: f64,
+) -> f64 {
     let off = (height_m(place) / range_m - lift_rad) / beam_height_rad;
     let spot = (-4.0 * LN_2 * off * off).exp();
     let upright = cross_section_m2 / (cross_section_m2 + UPRIGHT_M2);
@@ -78,10 +91,15 @@ mod tests {
 
     #[test]
     fn heights_fill_their_span_evenly() {
-        let heights: Vec<f64> = (0..10_000).map(|i| height_m(Point2::new(f64::from(i) * 0.1, 7.0))).collect();
+        let heights: Vec<f64> = (0..10_000)
+            .map(|i| height_m(Point2::new(f64::from(i) * 0.1, 7.0)))
+            .collect();
         let mean = heights.iter().sum::<f64>() / 1e4;
         let spread = (heights.iter().map(|h| h * h).sum::<f64>() / 1e4).sqrt();
-        assert!(mean.abs() < 0.05 && (spread - HEIGHT_M / 3f64.sqrt()).abs() < 0.05, "{mean} {spread}");
+        assert!(
+            mean.abs() < 0.05 && (spread - HEIGHT_M / 3f64.sqrt()).abs() < 0.05,
+            "{mean} {spread}"
+        );
     }
 
     #[test]
@@ -91,7 +109,10 @@ mod tests {
             .find(|p| height_m(*p) > 0.97 * HEIGHT_M)
             .unwrap_or_default();
         assert!(lit(place, 0.1, 1e4, 0.0, 0.045) > 0.99 && lit(place, 0.1, 1e4, 0.05, 0.045) < 0.1);
-        assert!(lit(place, 0.1, HEIGHT_M / 0.05, 0.05, 0.045) > 0.9 && lit(place, 0.1, 10.0, 0.0, 0.045) < 0.05);
+        assert!(
+            lit(place, 0.1, HEIGHT_M / 0.05, 0.05, 0.045) > 0.9
+                && lit(place, 0.1, 10.0, 0.0, 0.045) < 0.05
+        );
         assert!(lit(place, 0.1, 10.0, 0.0, 0.25) > 0.3, "a fan lights it");
     }
 }

@@ -39,18 +39,28 @@ impl View<'_> {
         }
     }
 
-    fn ghost(&self, world: &World, wall: &Wall, of: &crate::world::Scatterer, echoes: &mut Vec<Echo>) {
+    fn ghost(
+        &self,
+        world: &World,
+        wall: &Wall,
+        of: &crate::world::Scatterer,
+        echoes: &mut Vec<Echo>,
+    ) {
         let position = image(of.position, wall);
         self.stations.passings(
             |_: &Station| position,
             |azimuth| {
                 let station = self.stations.at(azimuth);
                 let way = position - station.position;
-                let Some(share) = crossing(station.position, way, wall) else { return };
+                let Some(share) = crossing(station.position, way, wall) else {
+                    return;
+                };
                 let range_m = way.norm();
                 let bounce = station.position + way * share;
-                let cross_section_m2 = self.cross_section_m2(of, (bounce - of.position).normalize());
-                let mirrored = cross_section_m2 * wall.mirror * wall.mirror * self.lit(of, range_m, station);
+                let cross_section_m2 =
+                    self.cross_section_m2(of, (bounce - of.position).normalize());
+                let mirrored =
+                    cross_section_m2 * wall.mirror * wall.mirror * self.lit(of, range_m, station);
                 let bright = mirrored * self.received(range_m);
                 let negligible = NEGLIGIBLE_POWER / bright;
                 if range_m > self.reach_m || negligible >= 1.0 {
@@ -58,10 +68,19 @@ impl View<'_> {
                 }
                 let out = self.transmission(azimuth, share * range_m, wall.body);
                 let on = || world.transmission(bounce, of.position, wall.body, negligible);
-                let passed = if self.effects.occlusion { out * on() } else { out };
+                let passed = if self.effects.occlusion {
+                    out * on()
+                } else {
+                    out
+                };
                 if passed > negligible {
                     let amplitude = (bright * passed).sqrt();
-                    echoes.push(Echo { position, velocity: Vector2::zeros(), amplitude, azimuth });
+                    echoes.push(Echo {
+                        position,
+                        velocity: Vector2::zeros(),
+                        amplitude,
+                        azimuth,
+                    });
                 }
             },
         );
@@ -72,13 +91,21 @@ impl View<'_> {
 fn mirrors(world: &World, skyline: &Skyline, azimuths: usize) -> Vec<Wall> {
     let mut rays: BTreeMap<u32, u32> = BTreeMap::new();
     for first in skyline.first_walls(azimuths) {
-        if world.walls().get(first.wall as usize).is_some_and(|wall| wall.mirror >= LEAST_MIRROR) {
+        if world
+            .walls()
+            .get(first.wall as usize)
+            .is_some_and(|wall| wall.mirror >= LEAST_MIRROR)
+        {
             *rays.entry(first.wall).or_default() += 1;
         }
     }
     let mut largest: Vec<(u32, u32)> = rays.into_iter().map(|(wall, rays)| (rays, wall)).collect();
     largest.sort_unstable_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
-    largest.into_iter().take(MOST_MIRRORS).map(|(_, wall)| world.walls()[wall as usize]).collect()
+    largest
+        .into_iter()
+        .take(MOST_MIRRORS)
+        .map(|(_, wall)| world.walls()[wall as usize])
+        .collect()
 }
 
 /// Where a mirrored thing is seen: its image behind the wall.

@@ -14,6 +14,7 @@ const PATCH_M: f64 = 14.0;
 /// Power from the ground in one resolution cell, had the way to it nothing in it.
 pub(super) fn ground_power(place: Point2<f64>, range_m: f64, receiver: &Receiver) -> f64 {
     let area_m2 = range_m * receiver.beam_rad * receiver.cell_m;
-    let reflectivity = 10f64.powf((REFLECTIVITY_DB + PATCHES_DB * smooth_noise(place, PATCH_M, 0)) / 10.0);
+    let reflectivity =
+        10f64.powf((REFLECTIVITY_DB + PATCHES_DB * smooth_noise(place, PATCH_M, 0)) / 10.0);
     reflectivity * area_m2 * receiver.sensitivity(range_m)
 }

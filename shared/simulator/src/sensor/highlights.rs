@@ -19,9 +19,15 @@ const SMOOTHNESS: f64 = 0.02;
 impl View<'_> {
     /// Collects the highlights of all walls that are met first by a ray.
     pub fn highlights(&self, world: &World, echoes: &mut Vec<Echo>) {
-        let numbers: BTreeSet<u32> =
-            self.skyline.first_walls(self.stations.azimuths()).map(|first| first.wall).collect();
-        for wall in numbers.into_iter().filter_map(|number| world.walls().get(number as usize)) {
+        let numbers: BTreeSet<u32> = self
+            .skyline
+            .first_walls(self.stations.azimuths())
+            .map(|first| first.wall)
+            .collect();
+        for wall in numbers
+            .into_iter()
+            .filter_map(|number| world.walls().get(number as usize))
+        {
             self.highlight(wall, echoes);
         }
     }
@@ -40,7 +46,12 @@ impl View<'_> {
             let passed = self.transmission(azimuth, range_m, wall.body);
             let power = cross_section_m2 * passed * self.received(range_m);
             if power > NEGLIGIBLE_POWER {
-                echoes.push(Echo { position, velocity: Vector2::zeros(), amplitude: power.sqrt(), azimuth });
+                echoes.push(Echo {
+                    position,
+                    velocity: Vector2::zeros(),
+                    amplitude: power.sqrt(),
+                    azimuth,
+                });
             }
         });
     }
@@ -50,5 +61,9 @@ impl View<'_> {
 fn foot(from: Point2<f64>, wall: &Wall) -> Point2<f64> {
     let along = wall.to - wall.from;
     let length2 = along.norm_squared();
-    if length2 == 0.0 { wall.from } else { wall.from + along * ((from - wall.from).dot(&along) / length2) }
+    if length2 == 0.0 {
+        wall.from
+    } else {
+        wall.from + along * ((from - wall.from).dot(&along) / length2)
+    }
 }

@@ -82,11 +82,17 @@ pub(super) struct Noise {
 }
 
 impl Noise {
-    pub fn new(sampling: &Sampling, receiver: &Receiver, effects: &Effects, spectrum: &RangeSpectrum) -> Self {
+    pub fn new(
+        sampling: &Sampling,
+        receiver: &Receiver,
+        effects: &Effects,
+        spectrum: &RangeSpectrum,
+    ) -> Self {
         let (cells, spacing) = spectrum.noise_cells();
         let range_m = |cell: usize| sampling.range_m(cell as f64 * spacing).max(0.0);
         let power = |db: f64| 10f64.powf(db / 10.0);
-        let floor_at = |cell: usize| interpolate(receiver.floor_db, range_m(cell)).map_or(0.0, power);
+        let floor_at =
+            |cell: usize| interpolate(receiver.floor_db, range_m(cell)).map_or(0.0, power);
         let mut steady = vec![if effects.noise { 1.0 } else { 0.0 }; cells];
         if effects.spurious_lines {
             for (share, power) in LINES {
@@ -94,19 +100,35 @@ impl Noise {
             }
         }
         let coarse = (sampling.reach_m() / COARSE_M) as usize + 2;
-        let skirt_at = |i: usize| SKIRT * (1.0 + SKIRT_PEAK / (1.0 + (i as f64 * COARSE_M / SKIRT_WIDTH_M).powi(2)));
-        let behind = |i: usize, (share, length_m): (f64, f64)| share * (-(i as f64) * COARSE_M / length_m).exp();
+        let skirt_at = |i: usize| {
+            SKIRT * (1.0 + SKIRT_PEAK / (1.0 + (i as f64 * COARSE_M / SKIRT_WIDTH_M).powi(2)))
+        };
+        let behind = |i: usize, (share, length_m): (f64, f64)| {
+            share * (-(i as f64) * COARSE_M / length_m).exp()
+        };
         let on = if effects.reverberation { 1.0 } else { 0.0 };
         Self {
             floor: (0..cells).map(floor_at).collect(),
             steady,
             clutter: vec![0.0; cells],
             ground: vec![0.0; coarse],
-            coarse_of: (0..cells).map(|cell| (range_m(cell) / COARSE_M) as usize).collect(),
+            coarse_of: (0..cells)
+                .map(|cell| (range_m(cell) / COARSE_M) as usize)
+                .collect(),
             echoes: vec![0.0; coarse],
             raised: vec![0.0; coarse],
-            skirt: (0..coarse).map(|i| if effects.phase_noise { skirt_at(i) } else { 0.0 }).collect(),
-            tail: (0..coarse).map(|i| on * TAIL.map(|tail| behind(i, tail)).iter().sum::<f64>()).collect(),
+            skirt: (0..coarse)
+                .map(|i| {
+                    if effects.phase_noise {
+                        skirt_at(i)
+                    } else {
+                        0.0
+                    }
+                })
+                .collect(),
+            tail: (0..coarse)
+                .map(|i| on * TAIL.map(|tail| behind(i, tail)).iter().sum::<f64>())
+                .collect(),
             street_tail: (0..coarse).map(|i| on * behind(i, STREET)).collect(),
             around: vec![0.0; coarse * sampling.azimuths],
             street: vec![0.0; coarse * sampling.azimuths],
@@ -147,14 +169,17 @@ impl Noise {
     /// Settles how much each direction reverberates: log-normal numbers that belong to the place and the world's directions.
     /// Leaves stir and doors open: a part of it is new in each sweep.
     pub fn feel_surroundings(&mut self, stations: &Stations, rng: &mut impl Rng) {
-        let stirred: Vec<f64> =
-            (0..LIVELY_SECTORS).map(|_| STIRRED_DB * rng.sample::<f64, _>(StandardNormal)).collect();
+        let stirred: Vec<f64> = (0..LIVELY_SECTORS)
+            .map(|_| STIRRED_DB * rng.sample::<f64, _>(StandardNormal))
+            .collect();
         for (azimuth, liveliness) in self.liveliness.iter_mut().enumerate() {
             let station = stations.at(azimuth as f64);
-            let sector = station.beam.y.atan2(station.beam.x).rem_euclid(TAU) / TAU * LIVELY_SECTORS as f64;
+            let sector =
+                station.beam.y.atan2(station.beam.x).rem_euclid(TAU) / TAU * LIVELY_SECTORS as f64;
             let (first, share) = (sector as u64 % LIVELY_SECTORS, sector.fract());
             let db = |sector: u64| {
-                LIVELINESS_DB * smooth_noise(station.position, LIVELY_M, sector) + stirred[sector as usize]
+                LIVELINESS_DB * smooth_noise(station.position, LIVELY_M, sector)
+                    + stirred[sector as usize]
             };
             let both = db(first) * (1.0 - share) + db((first + 1) % LIVELY_SECTORS) * share;
             *liveliness = 10f64.powf(both / 10.0);
@@ -166,7 +191,10 @@ impl Noise {
         let (coarse, azimuths) = (self.echoes.len(), self.liveliness.len());
         self.around.fill(0.0);
         for (azimuth, range_m, power) in echoes {
-            let (azimuth, cell) = (azimuth.round() as i64, (range_m.max(0.0) / COARSE_M) as usize);
+            let (azimuth, cell) = (
+                azimuth.round() as i64,
+                (range_m.max(0.0) / COARSE_M) as usize,
+            );
             if cell < coarse {
                 self.around[azimuth.rem_euclid(azimuths as i64) as usize * coarse + cell] += power;
             }
@@ -177,7 +205,9 @@ impl Noise {
             for beside in 0..=2 * STREET_AZIMUTHS {
                 let to = (azimuth + azimuths + beside - STREET_AZIMUTHS) % azimuths;
                 let to = &mut self.street[to * coarse..(to + 1) * coarse];
-                to.iter_mut().zip(from).for_each(|(to, from)| *to += from / (2 * STREET_AZIMUTHS + 1) as f64);
+                to.iter_mut()
+                    .zip(from)
+                    .for_each(|(to, from)| *to += from / (2 * STREET_AZIMUTHS + 1) as f64);
             }
         }
     }
@@ -201,12 +231,20 @@ impl Noise {
     pub fn add(&mut self, spectrum: &mut RangeSpectrum, azimuth: usize, rng: &mut impl Rng) {
         self.spread_echoes(azimuth);
         let heard = |burst: &&Burst| (burst.first..burst.first + burst.azimuths).contains(&azimuth);
-        let burst = self.bursts.iter().filter(heard).map(|burst| burst.strength).sum::<f64>();
+        let burst = self
+            .bursts
+            .iter()
+            .filter(heard)
+            .map(|burst| burst.strength)
+            .sum::<f64>();
         let (_, spacing) = spectrum.noise_cells();
         for (cell, floor) in self.floor.iter().enumerate() {
             let clutter = if self.snow { 0.0 } else { self.clutter[cell] };
             let coarse = self.coarse_of[cell];
-            let mean = floor * (self.steady[cell] + burst) + clutter + self.ground[coarse] + self.raised[coarse];
+            let mean = floor * (self.steady[cell] + burst)
+                + clutter
+                + self.ground[coarse]
+                + self.raised[coarse];
             add_gaussian(spectrum, cell as f64 * spacing, mean, rng);
         }
         if self.snow {
@@ -221,14 +259,21 @@ impl Noise {
     fn spread_echoes(&mut self, azimuth: usize) {
         let (liveliness, coarse) = (self.liveliness[azimuth], self.echoes.len());
         self.raised.fill(0.0);
-        for (from, &power) in
-            self.street[azimuth * coarse..][..coarse].iter().enumerate().filter(|(_, power)| **power > 0.0)
+        for (from, &power) in self.street[azimuth * coarse..][..coarse]
+            .iter()
+            .enumerate()
+            .filter(|(_, power)| **power > 0.0)
         {
             for (raised, tail) in self.raised[from..].iter_mut().zip(&self.street_tail) {
                 *raised += liveliness * power * tail;
             }
         }
-        for (from, &power) in self.echoes.iter().enumerate().filter(|(_, power)| **power > 0.0) {
+        for (from, &power) in self
+            .echoes
+            .iter()
+            .enumerate()
+            .filter(|(_, power)| **power > 0.0)
+        {
             let (before, behind) = self.raised.split_at_mut(from);
             for (raised, skirt) in before.iter_mut().rev().zip(&self.skirt[1..]) {
                 *raised += power * skirt;

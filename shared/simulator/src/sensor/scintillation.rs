@@ -38,6 +38,10 @@ mod tests {
         let weak = powers.iter().filter(|power| **power < 0.2).count() as f64 / powers.len() as f64;
         assert!((mean - 1.0).abs() < 0.15, "{mean}");
         assert!((weak - (1.0 - (-0.2f64).exp())).abs() < 0.06, "{weak}");
-        assert!(powers.windows(2).all(|pair| (pair[1] - pair[0]).abs() < 0.2));
+        assert!(
+            powers
+                .windows(2)
+                .all(|pair| (pair[1] - pair[0]).abs() < 0.2)
+        );
     }
 }

@@ -34,7 +34,13 @@ pub(super) struct Skyline {
 
 impl Skyline {
     /// Casts all rays of a sweep.
-    pub fn cast(&mut self, world: &World, moving: &[Moving<'_>], stations: &Stations, reach_m: f64) {
+    pub fn cast(
+        &mut self,
+        world: &World,
+        moving: &[Moving<'_>],
+        stations: &Stations,
+        reach_m: f64,
+    ) {
         self.passed.clear();
         self.starts.clear();
         for ray in 0..(stations.azimuths() + 2 * MARGIN) * RAYS {
@@ -50,11 +56,23 @@ impl Skyline {
         self.starts.push(self.passed.len());
     }
 
-    fn cast_ray(&mut self, world: &World, moving: &[Moving<'_>], station: &Station, way: Vector2<f64>, reach_m: f64) {
+    fn cast_ray(
+        &mut self,
+        world: &World,
+        moving: &[Moving<'_>],
+        station: &Station,
+        way: Vector2<f64>,
+        reach_m: f64,
+    ) {
         let passed = &mut self.passed;
         let mut add = |number: u32, wall: &Wall, share: f64| {
             let range_m = (share * reach_m) as f32;
-            passed.push(Passed { range_m, transmission: wall.transmission as f32, body: wall.body, wall: number });
+            passed.push(Passed {
+                range_m,
+                transmission: wall.transmission as f32,
+                body: wall.body,
+                wall: number,
+            });
         };
         world.walls_between(station.position, station.position + way, &mut add);
         for mover in moving {

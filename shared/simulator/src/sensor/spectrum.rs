@@ -58,12 +58,17 @@ impl RangeSpectrum {
 
     /// Independent cells of noise in the spectrum, and the distance between them in bins.
     pub fn noise_cells(&self) -> (usize, f64) {
-        ((self.bins as f64 / self.bins_per_cell) as usize + 1, self.bins_per_cell)
+        (
+            (self.bins as f64 / self.bins_per_cell) as usize + 1,
+            self.bins_per_cell,
+        )
     }
 
     /// Adds an echo at `bin` (fractions count) with a complex amplitude; its peak power is the amplitude's square.
     pub fn add(&mut self, bin: f64, real: f32, imaginary: f32) {
-        let Some((response, first)) = self.place(bin) else { return };
+        let Some((response, first)) = self.place(bin) else {
+            return;
+        };
         let response = &self.response[response * self.taps..(response + 1) * self.taps];
         let span = first..first + self.taps;
         for (value, tap) in self.real[span.clone()].iter_mut().zip(response) {
@@ -76,9 +81,14 @@ impl RangeSpectrum {
 
     /// Adds an echo that does not interfere, of so much power.
     pub fn add_power(&mut self, bin: f64, power: f32) {
-        let Some((response, first)) = self.place(bin) else { return };
+        let Some((response, first)) = self.place(bin) else {
+            return;
+        };
         let response = &self.response[response * self.taps..(response + 1) * self.taps];
-        for (value, tap) in self.incoherent[first..first + self.taps].iter_mut().zip(response) {
+        for (value, tap) in self.incoherent[first..first + self.taps]
+            .iter_mut()
+            .zip(response)
+        {
             *value += power * tap * tap;
         }
     }
@@ -89,7 +99,10 @@ impl RangeSpectrum {
             return None;
         }
         let steps = (bin * SUB_BINS as f64 + 0.5) as usize;
-        Some((steps % SUB_BINS, steps / SUB_BINS + self.pad() - self.taps / 2))
+        Some((
+            steps % SUB_BINS,
+            steps / SUB_BINS + self.pad() - self.taps / 2,
+        ))
     }
 
     /// Places before and behind the spectrum, so that responses need no limits.
@@ -100,7 +113,10 @@ impl RangeSpectrum {
     /// Writes the spectrum's power as the sensor would: one byte a bin, half a decibel a count.
     pub fn read_out(&self, row: &mut [u8]) {
         let span = self.pad()..self.pad() + self.bins;
-        let parts = self.real[span.clone()].iter().zip(&self.imaginary[span.clone()]).zip(&self.incoherent[span]);
+        let parts = self.real[span.clone()]
+            .iter()
+            .zip(&self.imaginary[span.clone()])
+            .zip(&self.incoherent[span]);
         let powers = parts.map(|((re, im), power)| re * re + im * im + power);
         for (byte, power) in row.iter_mut().zip(powers) {
             *byte = counts(power, self.full_scale, self.whole_powers);
@@ -110,8 +126,13 @@ impl RangeSpectrum {
 
 /// Spectrum of a Hann window, 1 at its peak, `cells` resolution cells away.
 fn hann_response(cells: f64) -> f64 {
-    let sinc =
-        |u: f64| if u.abs() < 1e-9 { 1.0 } else { (std::f64::consts::PI * u).sin() / (std::f64::consts::PI * u) };
+    let sinc = |u: f64| {
+        if u.abs() < 1e-9 {
+            1.0
+        } else {
+            (std::f64::consts::PI * u).sin() / (std::f64::consts::PI * u)
+        }
+    };
     sinc(cells) + 0.5 * (sinc(cells - 1.0) + sinc(cells + 1.0))
 }
 
@@ -121,7 +142,11 @@ fn hann_response(cells: f64) -> f64 {
 /// nothing between.
 pub fn counts(power: f32, full_scale: f32, whole_powers: bool) -> u8 {
     let compressed = power / (1.0 + power / full_scale);
-    let power = if whole_powers { (compressed + NO_FRACTIONS) - NO_FRACTIONS } else { compressed };
+    let power = if whole_powers {
+        (compressed + NO_FRACTIONS) - NO_FRACTIONS
+    } else {
+        compressed
+    };
     (6.020_6 * log2(power.max(1.0)) - 0.1 + NO_FRACTIONS).to_bits() as u8
 }
 
@@ -137,7 +162,8 @@ fn log2(value: f32) -> f32 {
     // log2(m) = 2/ln(2) * artanh(t), t = (m - 1) / (m + 1) <= 1/3.
     let t = (mantissa - 1.0) / (mantissa + 1.0);
     let t2 = t * t;
-    exponent as f32 + 2.885_39 * t * (1.0 + t2 * (0.333_333 + t2 * (0.2 + t2 * (0.142_857 + t2 * 0.111_111))))
+    exponent as f32
+        + 2.885_39 * t * (1.0 + t2 * (0.333_333 + t2 * (0.2 + t2 * (0.142_857 + t2 * 0.111_111))))
 }
 
 #[cfg(test)]
@@ -146,7 +172,10 @@ mod tests {
     use crate::profile::Profile;
 
     fn spectrum(bins: usize) -> RangeSpectrum {
-        let (sampling, receiver) = (Profile::Cts350xOxford.sampling(), Profile::Cts350xOxford.receiver());
+        let (sampling, receiver) = (
+            Profile::Cts350xOxford.sampling(),
+            Profile::Cts350xOxford.receiver(),
+        );
         RangeSpectrum::new(bins, sampling.range_resolution_m, &receiver)
     }
 
@@ -160,7 +189,9 @@ mod tests {
 
     #[test]
     fn counts_have_the_gaps_of_real_scans_and_never_wrap() {
-        let steps: Vec<u8> = (0..10).map(|power| counts(power as f32, 1e7, true)).collect();
+        let steps: Vec<u8> = (0..10)
+            .map(|power| counts(power as f32, 1e7, true))
+            .collect();
         assert_eq!(steps, [0, 0, 6, 9, 12, 14, 15, 17, 18, 19]);
         assert_eq!(counts(1.0e5, 1e7, true), 100);
         assert!((134..=140).contains(&counts(1e7, 1e7, true)));
@@ -175,7 +206,11 @@ mod tests {
         let mut row = vec![0; 400];
         spectrum.read_out(&mut row);
         assert_eq!(row[200], counts(250_000.0, 1e7, true));
-        assert!(row[196] < row[200] - 4 && row[196] > row[200] - 9, "{:?}", &row[190..211]);
+        assert!(
+            row[196] < row[200] - 4 && row[196] > row[200] - 9,
+            "{:?}",
+            &row[190..211]
+        );
         assert_eq!(row[196], row[204]);
         assert!(row[150] == 0 && row[250] == 0);
     }

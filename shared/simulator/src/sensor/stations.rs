@@ -55,7 +55,11 @@ impl Stations {
         for index in 0..sampling.azimuths + 2 * MARGIN {
             let azimuth = index as f64 - MARGIN as f64;
             let since_start_s = azimuth * time.period_us as f64 * 1e-6 / sampling.azimuths as f64;
-            let time_s = if moving { time.trajectory_s(time.start_us) - middle_s + since_start_s } else { 0.0 };
+            let time_s = if moving {
+                time.trajectory_s(time.start_us) - middle_s + since_start_s
+            } else {
+                0.0
+            };
             let pose = trajectory.pose(middle_s + time_s);
             let velocity = trajectory.velocity(middle_s + time_s);
             let azimuth_rad = self.first_rad + azimuth * self.step_rad;
@@ -145,5 +149,9 @@ impl Stations {
 fn angle(from: Vector2<f64>, to: Vector2<f64>) -> f64 {
     let (across, along) = (from.perp(&to), from.dot(&to));
     // The tangent of a small angle is the angle, and much faster.
-    if across.abs() < 0.1 * along { across / along } else { across.atan2(along) }
+    if across.abs() < 0.1 * along {
+        across / along
+    } else {
+        across.atan2(along)
+    }
 }

@@ -47,7 +47,11 @@ impl Streets {
         let sides = side_lines(&lines, &mut rng);
         let drawn = |line: &Line, half_width_m: f64, driven: bool| {
             let centre = simplified(line, TOLERANCE_M);
-            Street { centre, half_width_m, driven }
+            Street {
+                centre,
+                half_width_m,
+                driven,
+            }
         };
         let mut streets = Vec::with_capacity(lines.len() + sides.len());
         for (line, speed_m_s) in lines.iter().zip(speeds) {
@@ -69,16 +73,23 @@ fn driven_width_m(speed_m_s: f64, rng: &mut impl Rng) -> f64 {
 /// Mean speed on each line where the vehicle moved, metres a second.
 fn mean_speeds(lines: &[Line], way: &[WayPoint]) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0); lines.len()];
-    let carriageway = |line: &Line| Street { centre: line.clone(), half_width_m: 0.0, driven: true };
+    let carriageway = |line: &Line| Street {
+        centre: line.clone(),
+        half_width_m: 0.0,
+        driven: true,
+    };
     let network = Streets::new(lines.iter().map(carriageway).collect());
     for ends in way.windows(2) {
-        let speed_m_s = (ends[1].vehicle - ends[0].vehicle).norm() / (ends[1].time_s - ends[0].time_s).max(1e-3);
+        let speed_m_s = (ends[1].vehicle - ends[0].vehicle).norm()
+            / (ends[1].time_s - ends[0].time_s).max(1e-3);
         if let Some(nearest) = network.nearest(ends[0].centre, 12.0) {
             let (sum, count) = &mut sums[nearest.street];
             (*sum, *count) = (*sum + speed_m_s, *count + 1.0);
         }
     }
-    sums.into_iter().map(|(sum, count)| if count > 0.0 { sum / count } else { 0.0 }).collect()
+    sums.into_iter()
+        .map(|(sum, count)| if count > 0.0 { sum / count } else { 0.0 })
+        .collect()
 }
 
 /// Widens streets that do not hold the vehicle.

@@ -56,7 +56,12 @@ impl LineGrid {
         let (low, high) = (cell(from.inf(&to)), cell(from.sup(&to)));
         for column in low.0..=high.0 {
             for row in low.1..=high.1 {
-                self.cells.entry((column, row)).or_default().push(Segment { line, point, from, to });
+                self.cells.entry((column, row)).or_default().push(Segment {
+                    line,
+                    point,
+                    from,
+                    to,
+                });
             }
         }
     }
@@ -81,7 +86,10 @@ impl LineGrid {
 }
 
 fn cell(place: Point2<f64>) -> (i64, i64) {
-    ((place.x / CELL_M).floor() as i64, (place.y / CELL_M).floor() as i64)
+    (
+        (place.x / CELL_M).floor() as i64,
+        (place.y / CELL_M).floor() as i64,
+    )
 }
 
 /// Length of a line, metres.
@@ -95,12 +103,20 @@ pub fn simplified(line: &[Point2<f64>], tolerance_m: f64) -> Line {
     let mut open = vec![(0, line.len().saturating_sub(1))];
     while let Some((first, last)) = open.pop() {
         (keep[first], keep[last]) = (true, true);
-        let chord = Segment { line: 0, point: 0, from: line[first], to: line[last] };
+        let chord = Segment {
+            line: 0,
+            point: 0,
+            from: line[first],
+            to: line[last],
+        };
         let off = |index: &usize| (chord.foot(line[*index]) - line[*index]).norm();
         let farthest = (first + 1..last).max_by(|a, b| off(a).total_cmp(&off(b)));
         if let Some(middle) = farthest.filter(|index| off(index) > tolerance_m) {
             open.extend([(first, middle), (middle, last)]);
         }
     }
-    line.iter().zip(keep).filter_map(|(point, keep)| keep.then_some(*point)).collect()
+    line.iter()
+        .zip(keep)
+        .filter_map(|(point, keep)| keep.then_some(*point))
+        .collect()
 }

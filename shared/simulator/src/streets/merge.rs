@@ -44,7 +44,12 @@ pub fn way(trajectory: &dyn Trajectory, duration_s: f64, keep: Keep) -> Vec<WayP
         let ahead = direction(&poses, index);
         let vehicle = Point2::from(pose.translation.vector);
         let centre = vehicle + Vector2::new(-ahead.y, ahead.x) * to_centre;
-        WayPoint { vehicle, centre, ahead, time_s }
+        WayPoint {
+            vehicle,
+            centre,
+            ahead,
+            time_s,
+        }
     };
     (0..poses.len()).map(point).collect()
 }
@@ -52,7 +57,9 @@ pub fn way(trajectory: &dyn Trajectory, duration_s: f64, keep: Keep) -> Vec<WayP
 /// Poses with their times, each some metres from the one before; at least two, the last of them ahead of a vehicle that stands.
 fn steps(trajectory: &dyn Trajectory, duration_s: f64) -> Vec<(f64, Isometry2<f64>)> {
     let mut poses = vec![(0.0, trajectory.pose(0.0))];
-    let apart = |a: &Isometry2<f64>, b: &Isometry2<f64>| (a.translation.vector - b.translation.vector).norm();
+    let apart = |a: &Isometry2<f64>, b: &Isometry2<f64>| {
+        (a.translation.vector - b.translation.vector).norm()
+    };
     for step in 1..=(duration_s / 0.05) as usize {
         let time_s = 0.05 * step as f64;
         let pose = trajectory.pose(time_s);
@@ -61,17 +68,27 @@ fn steps(trajectory: &dyn Trajectory, duration_s: f64) -> Vec<(f64, Isometry2<f6
         }
     }
     let (_, last) = poses[poses.len() - 1];
-    poses.push((duration_s, last * Isometry2::new(Vector2::new(STEP_M, 0.0), 0.0)));
+    poses.push((
+        duration_s,
+        last * Isometry2::new(Vector2::new(STEP_M, 0.0), 0.0),
+    ));
     poses
 }
 
 /// The direction of the way where the vehicle looks ahead along it; its own where it turns on the spot.
 fn direction(poses: &[(f64, Isometry2<f64>)], index: usize) -> Vector2<f64> {
-    let (before, after) = (poses[index.saturating_sub(1)].1, poses[(index + 1).min(poses.len() - 1)].1);
+    let (before, after) = (
+        poses[index.saturating_sub(1)].1,
+        poses[(index + 1).min(poses.len() - 1)].1,
+    );
     let chord = after.translation.vector - before.translation.vector;
     let looks = poses[index].1.rotation * Vector2::x();
     let along = chord.dot(&looks);
-    if along.abs() < 0.7 * chord.norm() || chord.norm() < STEP_M { looks } else { chord.normalize() * along.signum() }
+    if along.abs() < 0.7 * chord.norm() || chord.norm() < STEP_M {
+        looks
+    } else {
+        chord.normalize() * along.signum()
+    }
 }
 
 /// Centre lines of the streets that a way takes, each once.
@@ -80,7 +97,12 @@ pub fn driven_lines(way: &[WayPoint]) -> Vec<Line> {
     for point in way {
         merger.go(point);
     }
-    merger.finish().iter().flat_map(|line| cut_at_turns(line)).filter(|line| length_m(line) > 0.0).collect()
+    merger
+        .finish()
+        .iter()
+        .flat_map(|line| cut_at_turns(line))
+        .filter(|line| length_m(line) > 0.0)
+        .collect()
 }
 
 #[derive(Debug, Default)]
@@ -99,10 +121,15 @@ impl Merger {
     fn go(&mut self, point: &WayPoint) {
         let reach_m = if self.drawing { JOIN_M } else { LEAVE_M };
         let beside = |segment: &&Segment| {
-            (0.0..=1.0).contains(&segment.share(point.centre)) && segment.direction().dot(&point.ahead).abs() > PARALLEL
+            (0.0..=1.0).contains(&segment.share(point.centre))
+                && segment.direction().dot(&point.ahead).abs() > PARALLEL
         };
         let apart = |segment: &Segment| (segment.foot(point.centre) - point.centre).norm();
-        let found = self.grid.near(point.centre, reach_m).filter(beside).min_by(|a, b| apart(a).total_cmp(&apart(b)));
+        let found = self
+            .grid
+            .near(point.centre, reach_m)
+            .filter(beside)
+            .min_by(|a, b| apart(a).total_cmp(&apart(b)));
         match found.copied() {
             Some(street) => self.join(&street, point.centre),
             None => self.draw(point),
@@ -150,7 +177,11 @@ impl Merger {
 
     /// The lines, each in the middle of all that was driven on it.
     fn finish(self) -> Vec<Line> {
-        self.lines.iter().zip(&self.spans).map(|(line, spans)| centred(line, spans)).collect()
+        self.lines
+            .iter()
+            .zip(&self.spans)
+            .map(|(line, spans)| centred(line, spans))
+            .collect()
     }
 }
 
@@ -161,9 +192,15 @@ fn centred(line: &Line, spans: &[[f64; 2]]) -> Line {
         let reach = reach.min(index).min(line.len() - 1 - index);
         let around = &spans[index - reach..=index + reach];
         let end = if reach == 0 { 0.0 } else { 1.0 };
-        let left_m = end * around.iter().map(|span| 0.5 * (span[0] + span[1])).sum::<f64>() / around.len() as f64;
+        let left_m = end
+            * around
+                .iter()
+                .map(|span| 0.5 * (span[0] + span[1]))
+                .sum::<f64>()
+            / around.len() as f64;
         let along = line[(index + 1).min(line.len() - 1)] - line[index.saturating_sub(1)];
-        let left = Rotation2::new(std::f64::consts::FRAC_PI_2) * along.try_normalize(0.0).unwrap_or_default();
+        let left = Rotation2::new(std::f64::consts::FRAC_PI_2)
+            * along.try_normalize(0.0).unwrap_or_default();
         line[index] + left * left_m
     };
     (0..line.len()).map(shifted).collect()
@@ -173,7 +210,11 @@ fn centred(line: &Line, spans: &[[f64; 2]]) -> Line {
 fn cut_at_turns(line: &[Point2<f64>]) -> Vec<Line> {
     let reach = (TURN.1 / STEP_M / 2.0) as usize;
     let turn = |index: usize| {
-        let along = |from: usize, to: usize| (line[to] - line[from]).try_normalize(0.0).unwrap_or_default();
+        let along = |from: usize, to: usize| {
+            (line[to] - line[from])
+                .try_normalize(0.0)
+                .unwrap_or_default()
+        };
         along(index - reach, index).angle(&along(index, index + reach))
     };
     let mut pieces = Vec::new();
@@ -184,8 +225,8 @@ fn cut_at_turns(line: &[Point2<f64>]) -> Vec<Line> {
             index += 1;
             continue;
         }
-        let sharpest =
-            (index..(index + 2 * reach).min(line.len() - reach)).max_by(|a, b| turn(*a).total_cmp(&turn(*b)));
+        let sharpest = (index..(index + 2 * reach).min(line.len() - reach))
+            .max_by(|a, b| turn(*a).total_cmp(&turn(*b)));
         let corner = sharpest.unwrap_or(index);
         pieces.push(line[start..=corner].to_vec());
         start = corner;

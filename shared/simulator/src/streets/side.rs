@@ -45,7 +45,11 @@ pub struct SideStreets<'a, R> {
 
 /// The side streets of these lines.
 pub fn side_lines(driven: &[Line], rng: &mut impl Rng) -> Vec<Line> {
-    let mut sides = SideStreets { lines: driven.to_vec(), grid: LineGrid::default(), rng };
+    let mut sides = SideStreets {
+        lines: driven.to_vec(),
+        grid: LineGrid::default(),
+        rng,
+    };
     for (number, line) in driven.iter().enumerate() {
         sides.grid.add_line(number, line);
     }
@@ -69,7 +73,12 @@ impl<R: Rng> SideStreets<'_, R> {
             let goes_on = self.rng.random_bool(RUN_ON);
             let (end, direction) = (line[line.len() - 1], end_direction(line));
             let parallel = |s: &Segment| s.direction().dot(&direction).abs() > PARALLEL;
-            if goes_on && !self.grid.near(end + direction * AHEAD_M, BESIDE_M).any(parallel) {
+            if goes_on
+                && !self
+                    .grid
+                    .near(end + direction * AHEAD_M, BESIDE_M)
+                    .any(parallel)
+            {
                 self.build(end, direction);
             }
         }
@@ -94,7 +103,9 @@ impl<R: Rng> SideStreets<'_, R> {
     fn branch(&mut self, start: Point2<f64>, along: Vector2<f64>, side: f64) {
         let skew = self.rng.random_range(-SKEW_RAD..SKEW_RAD);
         let direction = Rotation2::new(side * FRAC_PI_2 + skew) * along;
-        let stranger = |s: &Segment| s.direction().dot(&along).abs() < 0.9 && s.direction().dot(&direction) > -0.9;
+        let stranger = |s: &Segment| {
+            s.direction().dot(&along).abs() < 0.9 && s.direction().dot(&direction) > -0.9
+        };
         if !self.grid.near(start, APART_M).any(stranger) {
             self.build(start, direction);
         }
@@ -103,7 +114,9 @@ impl<R: Rng> SideStreets<'_, R> {
     /// Draws a street from `start` as far as there is room, or up to a street that it meets at a steep angle.
     fn build(&mut self, start: Point2<f64>, direction: Vector2<f64>) {
         let wanted_m = self.rng.random_range(LENGTH_M);
-        let bend = Rotation2::new(STEP_M * self.rng.random_range(-BEND_RAD_M..BEND_RAD_M) * self.rng.random::<f64>());
+        let bend = Rotation2::new(
+            STEP_M * self.rng.random_range(-BEND_RAD_M..BEND_RAD_M) * self.rng.random::<f64>(),
+        );
         let (mut line, mut direction) = (vec![start], direction);
         for _ in 0..(wanted_m / STEP_M) as usize {
             let here = line[line.len() - 1] + direction * STEP_M;
@@ -131,7 +144,9 @@ impl<R: Rng> SideStreets<'_, R> {
         let mut room = Room::Free;
         for segment in self.grid.near(here, APART_M) {
             let foot = segment.foot(here);
-            if (segment.foot(start) - start).norm() < APART_M && (here - start).norm() < 1.2 * APART_M {
+            if (segment.foot(start) - start).norm() < APART_M
+                && (here - start).norm() < 1.2 * APART_M
+            {
                 continue;
             }
             let ahead = (foot - here).dot(&direction) > 0.0;
@@ -157,8 +172,17 @@ enum Room {
 fn end_direction(line: &[Point2<f64>]) -> Vector2<f64> {
     let end = line[line.len() - 1];
     // The last metres of a line that was cut at a turn are a part of the turn.
-    let back = line.iter().rev().find(|p| (end - *p).norm() > 14.0).copied().unwrap_or(line[0]);
-    let before = line.iter().rev().find(|p| (back - *p).norm() > 14.0 && (end - *p).norm() > 14.0).copied();
+    let back = line
+        .iter()
+        .rev()
+        .find(|p| (end - *p).norm() > 14.0)
+        .copied()
+        .unwrap_or(line[0]);
+    let before = line
+        .iter()
+        .rev()
+        .find(|p| (back - *p).norm() > 14.0 && (end - *p).norm() > 14.0)
+        .copied();
     let (from, to) = before.map_or((line[0], end), |before| (before, back));
     (to - from).try_normalize(0.0).unwrap_or(Vector2::x())
 }

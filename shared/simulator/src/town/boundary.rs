@@ -44,9 +44,21 @@ struct Make {
 impl Boundary {
     fn make(self) -> Make {
         let make = |transmission, mirror, posts, filling, thickness_m, flash_m2| {
-            let ((posts_m, post_m2), (filling_m, filling_m2)): ((f64, f64), (f64, f64)) = (posts, filling);
-            let screen = Screen { transmission, mirror };
-            Make { screen, posts_m, post_m2, filling_m, filling_m2, thickness_m, flash_m2 }
+            let ((posts_m, post_m2), (filling_m, filling_m2)): ((f64, f64), (f64, f64)) =
+                (posts, filling);
+            let screen = Screen {
+                transmission,
+                mirror,
+            };
+            Make {
+                screen,
+                posts_m,
+                post_m2,
+                filling_m,
+                filling_m2,
+                thickness_m,
+                flash_m2,
+            }
         };
         match self {
             Self::Hedge => make(0.5, 0.0, (0.0, 0.0), (0.45, 0.08), 0.4, 0.0),
@@ -70,13 +82,32 @@ impl Site<'_> {
         let (along, make, body) = (way / length_m, kind.make(), self.body());
         let outward = right_of(way);
         self.wall(from, to, make.screen, body);
-        let posts = if make.posts_m > 0.0 { (length_m / make.posts_m) as usize + 1 } else { 0 };
+        let posts = if make.posts_m > 0.0 {
+            (length_m / make.posts_m) as usize + 1
+        } else {
+            0
+        };
         for post in 0..posts {
-            self.point(from + along * (post as f64 * make.posts_m), make.post_m2, 3.0, body);
+            self.point(
+                from + along * (post as f64 * make.posts_m),
+                make.post_m2,
+                3.0,
+                body,
+            );
         }
-        for at in stations(&mut self.rng, length_m, 0.5 * make.filling_m, 1.5 * make.filling_m) {
+        for at in stations(
+            &mut self.rng,
+            length_m,
+            0.5 * make.filling_m,
+            1.5 * make.filling_m,
+        ) {
             let aside = self.rng.random_range(-make.thickness_m..make.thickness_m);
-            self.point(from + along * at + outward * aside, make.filling_m2, 5.0, body);
+            self.point(
+                from + along * at + outward * aside,
+                make.filling_m2,
+                5.0,
+                body,
+            );
         }
         self.flashes([from, to], outward, make.flash_m2, body);
     }
@@ -100,13 +131,22 @@ impl Site<'_> {
         self.cloud(place, 1, 0.1, 0.2, 1.5);
         self.cloud(place, 9, crown_m, reach_m, 0.15);
         let half = Vector2::new(crown_m.min(reach_m), 0.0);
-        let crown = Screen { transmission: 0.8, mirror: 0.0 };
+        let crown = Screen {
+            transmission: 0.8,
+            mirror: 0.0,
+        };
         self.wall(place - half, place + half, crown, NO_BODY);
         self.wall(place - half.yx(), place + half.yx(), crown, NO_BODY);
     }
 
     /// Bushes, bins, roughness: weak things all over a piece of land.
-    pub(super) fn clutter(&mut self, from: Point2<f64>, size: Vector2<f64>, per_m2: f64, median_m2: f64) {
+    pub(super) fn clutter(
+        &mut self,
+        from: Point2<f64>,
+        size: Vector2<f64>,
+        per_m2: f64,
+        median_m2: f64,
+    ) {
         for _ in 0..(size.x * size.y * per_m2).max(0.0) as usize {
             let share = Vector2::from_fn(|_, _| self.rng.random::<f64>());
             self.point(from + size.component_mul(&share), median_m2, 6.0, NO_BODY);
@@ -114,7 +154,13 @@ impl Site<'_> {
     }
 
     /// Undergrowth: a patch with a ragged edge that fades out.
-    pub(super) fn undergrowth(&mut self, from: Point2<f64>, size: Vector2<f64>, per_m2: f64, median_m2: f64) {
+    pub(super) fn undergrowth(
+        &mut self,
+        from: Point2<f64>,
+        size: Vector2<f64>,
+        per_m2: f64,
+        median_m2: f64,
+    ) {
         let key = self.rng.random();
         for _ in 0..(size.x * size.y * per_m2).max(0.0) as usize {
             let share = Vector2::from_fn(|_, _| self.rng.random::<f64>());

@@ -49,14 +49,40 @@ impl Room {
         let (cut, step) = (w * share, (0.25 * d).min(3.0));
         let corners: &[(f64, f64)] = match form {
             Form::Plain => &[(0.0, 0.0), (w, 0.0), (w, d), (0.0, d)],
-            Form::Angle => &[(0.0, 0.0), (w, 0.0), (w, 0.55 * d), (cut, 0.55 * d), (cut, d), (0.0, d)],
-            Form::Stepped => &[(0.0, step), (cut, step), (cut, 0.0), (w, 0.0), (w, d), (0.0, d)],
+            Form::Angle => &[
+                (0.0, 0.0),
+                (w, 0.0),
+                (w, 0.55 * d),
+                (cut, 0.55 * d),
+                (cut, d),
+                (0.0, d),
+            ],
+            Form::Stepped => &[
+                (0.0, step),
+                (cut, step),
+                (cut, 0.0),
+                (w, 0.0),
+                (w, d),
+                (0.0, d),
+            ],
             Form::Church => {
                 let (left, right) = (0.35 * w, 0.65 * w);
-                &[(0.0, 6.0), (left, 6.0), (left, 0.0), (right, 0.0), (right, 6.0), (w, 6.0), (w, d), (0.0, d)]
+                &[
+                    (0.0, 6.0),
+                    (left, 6.0),
+                    (left, 0.0),
+                    (right, 0.0),
+                    (right, 6.0),
+                    (w, 6.0),
+                    (w, d),
+                    (0.0, d),
+                ]
             }
         };
-        corners.iter().map(|(x, y)| Point2::new(self.x + x, self.y + y)).collect()
+        corners
+            .iter()
+            .map(|(x, y)| Point2::new(self.x + x, self.y + y))
+            .collect()
     }
 }
 
@@ -69,11 +95,27 @@ impl Site<'_> {
         let outline = building.room.outline(building.form, share);
         let corner = |index: usize| outline[index % outline.len()];
         for index in 0..outline.len() {
-            let (before, from, to) = (corner(index + outline.len() - 1), corner(index), corner(index + 1));
+            let (before, from, to) = (
+                corner(index + outline.len() - 1),
+                corner(index),
+                corner(index + 1),
+            );
             let to_street = right_of(to - from).y < -0.5;
-            let (material, share) = if to_street { (building.front, 1.0) } else { (building.rest, BEHIND) };
+            let (material, share) = if to_street {
+                (building.front, 1.0)
+            } else {
+                (building.rest, BEHIND)
+            };
             let detail = share * building.detail;
-            self.facade(&Facade { from, to, material, detail, bay_m, inside_m, body });
+            self.facade(&Facade {
+                from,
+                to,
+                material,
+                detail,
+                bay_m,
+                inside_m,
+                body,
+            });
             self.corner(before, from, to, detail, body);
             if to_street && building.balconies_m > 0.0 {
                 self.balconies(from, to, building.balconies_m, body);
@@ -82,10 +124,23 @@ impl Site<'_> {
     }
 
     /// A corner sticking out scatters its edge to all sides; two walls that meet inwards send back what enters.
-    fn corner(&mut self, before: Point2<f64>, at: Point2<f64>, after: Point2<f64>, detail: f64, body: u32) {
+    fn corner(
+        &mut self,
+        before: Point2<f64>,
+        at: Point2<f64>,
+        after: Point2<f64>,
+        detail: f64,
+        body: u32,
+    ) {
         let (arriving, leaving) = (at - before, after - at);
         if arriving.perp(&leaving) > 0.0 {
-            self.facing(at, right_of(arriving) + right_of(leaving), 0.5, 3.0 * detail, body);
+            self.facing(
+                at,
+                right_of(arriving) + right_of(leaving),
+                0.5,
+                3.0 * detail,
+                body,
+            );
         } else {
             self.facing(at, right_of(arriving) + right_of(leaving), 2.0, 25.0, body);
         }
@@ -98,7 +153,13 @@ impl Site<'_> {
         for index in 0..((to - from).norm() / every_m) as usize {
             let place = from + along * ((index as f64 + 0.3) * every_m);
             for side in [-1.0, 1.0] {
-                self.facing(place + along * side, outward + along * (0.6 * side), 4.0, 6.0, body);
+                self.facing(
+                    place + along * side,
+                    outward + along * (0.6 * side),
+                    4.0,
+                    6.0,
+                    body,
+                );
             }
             self.facing(place + outward * 1.2, outward, 0.5, 0.8, body);
         }
@@ -107,8 +168,12 @@ impl Site<'_> {
     /// A bus stop: glass to the back and the sides, a metal frame.
     pub(super) fn shelter(&mut self) {
         let body = self.body();
-        let corners = [(-1.8, 0.0), (-1.8, 1.2), (1.8, 1.2), (1.8, 0.0)].map(|(x, y)| Point2::new(x, y));
-        let glass = Screen { transmission: 0.4, mirror: 0.4 };
+        let corners =
+            [(-1.8, 0.0), (-1.8, 1.2), (1.8, 1.2), (1.8, 0.0)].map(|(x, y)| Point2::new(x, y));
+        let glass = Screen {
+            transmission: 0.4,
+            mirror: 0.4,
+        };
         for ends in corners.windows(2) {
             self.wall(ends[0], ends[1], glass, body);
         }
@@ -116,7 +181,13 @@ impl Site<'_> {
             self.point(place, 1.5, 4.0, body);
         }
         for side in [-1.0, 1.0] {
-            self.facing(Point2::new(1.7 * side, 1.1), Vector2::new(-side, -1.0), 2.0, 20.0, body);
+            self.facing(
+                Point2::new(1.7 * side, 1.1),
+                Vector2::new(-side, -1.0),
+                2.0,
+                20.0,
+                body,
+            );
         }
     }
 }
@@ -127,13 +198,26 @@ mod tests {
 
     #[test]
     fn outlines_run_counter_clockwise_inside_their_room() {
-        let room = Room { x: 2.0, y: 1.0, width_m: 20.0, depth_m: 16.0 };
+        let room = Room {
+            x: 2.0,
+            y: 1.0,
+            width_m: 20.0,
+            depth_m: 16.0,
+        };
         for form in [Form::Plain, Form::Angle, Form::Stepped, Form::Church] {
             let outline = room.outline(form, 0.4);
             let next = |i: usize| outline[(i + 1) % outline.len()];
-            let area: f64 = outline.iter().enumerate().map(|(i, p)| p.coords.perp(&next(i).coords) / 2.0).sum();
+            let area: f64 = outline
+                .iter()
+                .enumerate()
+                .map(|(i, p)| p.coords.perp(&next(i).coords) / 2.0)
+                .sum();
             assert!((0.5 * 320.0..=320.0).contains(&area), "{form:?}: {area} m²");
-            assert!(outline.iter().all(|p| (2.0..=22.0).contains(&p.x) && (1.0..=17.0).contains(&p.y)));
+            assert!(
+                outline
+                    .iter()
+                    .all(|p| (2.0..=22.0).contains(&p.x) && (1.0..=17.0).contains(&p.y))
+            );
         }
     }
 }

@@ -36,7 +36,11 @@ pub enum Character {
 
 impl Default for TownConfig {
     fn default() -> Self {
-        Self { character: Character::Mixed, parked_cars: 0.5, trees: 1.0 }
+        Self {
+            character: Character::Mixed,
+            parked_cars: 0.5,
+            trees: 1.0,
+        }
     }
 }
 

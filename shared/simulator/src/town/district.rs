@@ -88,11 +88,19 @@ impl District {
                 (Use::Hall, 0.02),
             ],
             (Self::Suburb, false) => &[(Use::Green, 0.4), (Use::Yards, 0.3), (Use::Detached, 0.3)],
-            (Self::Campus, true) => &[(Use::Hall, 0.3), (Use::Flats, 0.2), (Use::Green, 0.32), (Use::CarPark, 0.18)],
+            (Self::Campus, true) => &[
+                (Use::Hall, 0.3),
+                (Use::Flats, 0.2),
+                (Use::Green, 0.32),
+                (Use::CarPark, 0.18),
+            ],
             (Self::Campus, false) => &[(Use::Green, 0.5), (Use::Hall, 0.3), (Use::CarPark, 0.2)],
-            (Self::Country, true) => {
-                &[(Use::Field, 0.82), (Use::Farm, 0.06), (Use::Detached, 0.06), (Use::Green, 0.06)]
-            }
+            (Self::Country, true) => &[
+                (Use::Field, 0.82),
+                (Use::Farm, 0.06),
+                (Use::Detached, 0.06),
+                (Use::Green, 0.06),
+            ],
             (Self::Country, false) => &[(Use::Field, 0.9), (Use::Green, 0.1)],
         }
     }

@@ -39,7 +39,10 @@ impl Material {
             Self::Metal => (0.003, 0.6),
             Self::Timber => (0.3, 0.03),
         };
-        Screen { transmission, mirror }
+        Screen {
+            transmission,
+            mirror,
+        }
     }
 
     /// Factor on the roughness, and the shares of bays with a window, a door and a drain pipe.
@@ -86,21 +89,37 @@ impl Bay {
 
 /// Unit vector to the right of a way.
 pub(super) fn right_of(way: Vector2<f64>) -> Vector2<f64> {
-    Vector2::new(way.y, -way.x).try_normalize(1e-9).unwrap_or_else(Vector2::x)
+    Vector2::new(way.y, -way.x)
+        .try_normalize(1e-9)
+        .unwrap_or_else(Vector2::x)
 }
 
 impl Site<'_> {
     pub(super) fn facade(&mut self, facade: &Facade) {
         let way = facade.to - facade.from;
         let length_m = way.norm();
-        self.wall(facade.from, facade.to, facade.material.screen(), facade.body);
+        self.wall(
+            facade.from,
+            facade.to,
+            facade.material.screen(),
+            facade.body,
+        );
         let (along, outward) = (way / length_m, right_of(way));
         let bays = (length_m / facade.bay_m).round().max(1.0);
         let width_m = length_m / bays;
         for number in 0..bays as usize {
             let from = facade.from + along * (number as f64 * width_m);
             let strength = facade.detail * 10f64.powf(0.5 * normal(&mut self.rng));
-            self.bay(&Bay { from, along, outward, width_m, strength }, facade);
+            self.bay(
+                &Bay {
+                    from,
+                    along,
+                    outward,
+                    width_m,
+                    strength,
+                },
+                facade,
+            );
         }
     }
 
@@ -115,13 +134,30 @@ impl Site<'_> {
         }
         // Pilasters, gutters, the joints of panels: at every bay's side, seen along the street from far away.
         let relief_m2 = if self.chance(pipe) { 5.0 } else { 1.6 };
-        self.facing(bay.at(0.0, 0.1), bay.outward, 0.4, relief_m2 * bay.strength, facade.body);
+        self.facing(
+            bay.at(0.0, 0.1),
+            bay.outward,
+            0.4,
+            relief_m2 * bay.strength,
+            facade.body,
+        );
     }
 
     fn rough_wall(&mut self, bay: &Bay, roughness: f64, facade: &Facade) {
-        for at in stations(&mut self.rng, bay.width_m, 0.1 / facade.detail, 0.35 / facade.detail) {
+        for at in stations(
+            &mut self.rng,
+            bay.width_m,
+            0.1 / facade.detail,
+            0.35 / facade.detail,
+        ) {
             let place = bay.at(at, self.rng.random_range(0.0..0.15));
-            self.facing(place, bay.outward, 1.5, 0.15 * roughness * bay.strength, facade.body);
+            self.facing(
+                place,
+                bay.outward,
+                1.5,
+                0.15 * roughness * bay.strength,
+                facade.body,
+            );
         }
     }
 
@@ -132,15 +168,28 @@ impl Site<'_> {
         for side in [-1.0, 1.0] {
             let way = Rotation2::new(side * self.rng.random_range(0.7..1.4)) * bay.outward;
             let sharpness = self.rng.random_range(2.0..10.0);
-            self.facing(bay.at(middle_m + side * half_m, 0.05), way, sharpness, 10.0 * bay.strength, facade.body);
+            self.facing(
+                bay.at(middle_m + side * half_m, 0.05),
+                way,
+                sharpness,
+                10.0 * bay.strength,
+                facade.body,
+            );
         }
         // Panes do not hang quite parallel to their wall.
         let way = Rotation2::new(0.02 * normal(&mut self.rng)) * bay.outward;
-        let pane_m2 = if facade.material == Material::Glass { 160.0 } else { 40.0 };
+        let pane_m2 = if facade.material == Material::Glass {
+            160.0
+        } else {
+            40.0
+        };
         self.facing(bay.at(middle_m, 0.0), way, 250.0, pane_m2, facade.body);
         for _ in 0..(4.0 * facade.detail).round() as usize {
             let depth_m = -1.8 * (1.0 - self.rng.random::<f64>()).ln();
-            let place = bay.at(middle_m + self.rng.random_range(-half_m..half_m), -depth_m.min(facade.inside_m));
+            let place = bay.at(
+                middle_m + self.rng.random_range(-half_m..half_m),
+                -depth_m.min(facade.inside_m),
+            );
             self.facing(place, bay.outward, 1.5, 0.3 * bay.strength, facade.body);
         }
     }
@@ -150,7 +199,13 @@ impl Site<'_> {
         let at = self.between(0.0, bay.width_m);
         for side in [-1.0, 1.0] {
             let way = bay.outward + bay.along * side;
-            self.facing(bay.at(at + 0.45 * side, -0.1), way, 3.0, 5.0 * bay.strength, body);
+            self.facing(
+                bay.at(at + 0.45 * side, -0.1),
+                way,
+                3.0,
+                5.0 * bay.strength,
+                body,
+            );
         }
     }
 }

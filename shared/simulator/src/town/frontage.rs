@@ -36,8 +36,17 @@ impl Line {
         }
         let cell = |metres: f64| (4.0 * metres).round() as i64 as u64;
         let (start, next) = (nodes[0], nodes[nodes.len().min(5) - 1]);
-        let key = hash(&[cell(start.x), cell(start.y), cell(next.x / 4.0), cell(next.y / 4.0)]);
-        Self { length_m: (nodes.len() - 1) as f64 * NODE_M, nodes, key }
+        let key = hash(&[
+            cell(start.x),
+            cell(start.y),
+            cell(next.x / 4.0),
+            cell(next.y / 4.0),
+        ]);
+        Self {
+            length_m: (nodes.len() - 1) as f64 * NODE_M,
+            nodes,
+            key,
+        }
     }
 
     fn centre(&self, along_m: f64) -> Point2<f64> {
@@ -69,7 +78,13 @@ impl<'a> Frontage<'a> {
     /// Both sides of a street.
     pub(super) fn sides(streets: &'a Streets, street: usize, line: &'a Line) -> [Self; 2] {
         let half_width_m = streets.streets()[street].half_width_m;
-        [1.0, -1.0].map(|side| Self { streets, line, street, half_width_m, side })
+        [1.0, -1.0].map(|side| Self {
+            streets,
+            line,
+            street,
+            half_width_m,
+            side,
+        })
     }
 
     pub(super) fn length_m(&self) -> f64 {
@@ -107,7 +122,9 @@ impl<'a> Frontage<'a> {
     /// Whether a place is this side's to furnish: no other street, and no other part of this one, is nearer.
     pub(super) fn owns(&self, along_m: f64, place: Point2<f64>) -> bool {
         let nearest = self.streets.nearest(place, 30.0);
-        nearest.is_some_and(|found| found.street == self.street && (found.along_m - along_m).abs() < OWN_M)
+        nearest.is_some_and(|found| {
+            found.street == self.street && (found.along_m - along_m).abs() < OWN_M
+        })
     }
 
     /// Whether a place is at least `metres` from all kerbs.
@@ -120,7 +137,11 @@ impl<'a> Frontage<'a> {
     pub(super) fn lot(&self, along_m: f64, width_m: f64, out_m: f64, depth_m: f64) -> Option<Lot> {
         let [front, back] = [out_m, out_m + depth_m].map(|out| {
             let (from, to) = (self.place(along_m, out), self.place(along_m + width_m, out));
-            if self.side > 0.0 { (from, to) } else { (to, from) }
+            if self.side > 0.0 {
+                (from, to)
+            } else {
+                (to, from)
+            }
         });
         let way = (front.1 - front.0).try_normalize(1e-6)?;
         let usable_m = (front.1 - front.0).norm().min((back.1 - back.0).dot(&way));
@@ -129,6 +150,11 @@ impl<'a> Frontage<'a> {
         }
         let origin = nalgebra::center(&front.0, &front.1) - way * (usable_m / 2.0);
         let pose = Isometry2::new(origin.coords, way.y.atan2(way.x));
-        Some(Lot { pose, width_m: usable_m, frontage_m: width_m, depth_m })
+        Some(Lot {
+            pose,
+            width_m: usable_m,
+            frontage_m: width_m,
+            depth_m,
+        })
     }
 }

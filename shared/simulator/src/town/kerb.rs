@@ -51,7 +51,10 @@ impl Kerb<'_> {
         if self.bays {
             self.parked_cars(built);
         }
-        if self.rng.random_bool((trees * self.config.trees).clamp(0.0, 1.0)) {
+        if self
+            .rng
+            .random_bool((trees * self.config.trees).clamp(0.0, 1.0))
+        {
             self.trees(built);
         }
         self.occasional(built);
@@ -64,7 +67,13 @@ impl Kerb<'_> {
     }
 
     /// A site at a station, if the place is this kerb's and free.
-    fn site<'s>(&mut self, along_m: f64, out_m: f64, free_m: f64, built: &'s mut Built) -> Option<Site<'s>> {
+    fn site<'s>(
+        &mut self,
+        along_m: f64,
+        out_m: f64,
+        free_m: f64,
+        built: &'s mut Built,
+    ) -> Option<Site<'s>> {
         let pose = self.frontage.frame(along_m, out_m);
         let place = Point2::from(pose.translation.vector);
         let ours = self.frontage.owns(along_m, place) && self.frontage.is_clear(place, free_m);
@@ -77,7 +86,9 @@ impl Kerb<'_> {
     fn has_room(&self, along_m: f64, out_m: f64, half_m: f64, y: [f64; 2]) -> bool {
         let frame = self.frontage.frame(along_m, out_m);
         let is_clear = |x: f64, y: f64| self.frontage.is_clear(frame * Point2::new(x, y), 0.1);
-        [-1.0, -0.5, 0.0, 0.5, 1.0].into_iter().all(|share| y.into_iter().all(|y| is_clear(half_m * share, y)))
+        [-1.0, -0.5, 0.0, 0.5, 1.0]
+            .into_iter()
+            .all(|share| y.into_iter().all(|y| is_clear(half_m * share, y)))
     }
 
     /// At regular distances along the whole street, by turns to its left and right.
@@ -95,7 +106,11 @@ impl Kerb<'_> {
     }
 
     fn signs(&mut self, built: &mut Built) {
-        let every_m = if self.district == District::Country { 90.0 } else { 28.0 };
+        let every_m = if self.district == District::Country {
+            90.0
+        } else {
+            28.0
+        };
         self.along(0.2 * every_m, 1.8 * every_m, |kerb, along_m| {
             let out_m = kerb.posts_out_m();
             if let Some(mut site) = kerb.site(along_m, out_m, FREE_M, built) {
@@ -116,7 +131,10 @@ impl Kerb<'_> {
 
     fn parked_cars(&mut self, built: &mut Built) {
         self.along(5.4, 6.6, |kerb, along_m| {
-            if !kerb.rng.random_bool(kerb.config.parked_cars.clamp(0.0, 1.0)) {
+            if !kerb
+                .rng
+                .random_bool(kerb.config.parked_cars.clamp(0.0, 1.0))
+            {
                 return;
             }
             let (length, width) = (CAR_HALF_M.0 + 0.2, CAR_HALF_M.1);
@@ -152,7 +170,10 @@ impl Kerb<'_> {
 
     fn bollards(&mut self, built: &mut Built) {
         let out_m = self.posts_out_m();
-        let (from_m, every_m) = (self.rng.random_range(self.from_m..self.to_m), self.rng.random_range(1.5..2.5));
+        let (from_m, every_m) = (
+            self.rng.random_range(self.from_m..self.to_m),
+            self.rng.random_range(1.5..2.5),
+        );
         for along_m in (0..12).map(|index| from_m + f64::from(index) * every_m) {
             if along_m < self.to_m
                 && let Some(mut site) = self.site(along_m, out_m, FREE_M, built)
@@ -179,8 +200,12 @@ impl Kerb<'_> {
         let out_m = self.posts_out_m();
         let mut along_m = self.from_m;
         while along_m + RAIL_M <= self.to_m {
-            let [from, to] = [0.0, RAIL_M].map(|more_m| self.frontage.place(along_m + more_m, out_m));
-            let is_clear = |step: i32| self.frontage.is_clear(from + (to - from) * (0.25 * f64::from(step)), FREE_M);
+            let [from, to] =
+                [0.0, RAIL_M].map(|more_m| self.frontage.place(along_m + more_m, out_m));
+            let is_clear = |step: i32| {
+                self.frontage
+                    .is_clear(from + (to - from) * (0.25 * f64::from(step)), FREE_M)
+            };
             let free = (0..=4).all(is_clear) && self.frontage.owns(along_m + RAIL_M, to);
             if let Some(mut site) = self.site(along_m, out_m, FREE_M, built)
                 && free
@@ -196,9 +221,14 @@ impl Kerb<'_> {
     fn ground(&mut self, built: &mut Built) {
         self.along(2.0, 6.0, |kerb, along_m| {
             let middle_m = kerb.pavement_m / 2.0;
-            let Some(mut site) = kerb.site(along_m, middle_m, middle_m - 0.1, built) else { return };
+            let Some(mut site) = kerb.site(along_m, middle_m, middle_m - 0.1, built) else {
+                return;
+            };
             for _ in 0..5 {
-                let (x, y) = (site.rng.random_range(-2.0..2.0), site.rng.random_range(-1.0..1.0) * (middle_m - 0.3));
+                let (x, y) = (
+                    site.rng.random_range(-2.0..2.0),
+                    site.rng.random_range(-1.0..1.0) * (middle_m - 0.3),
+                );
                 if kerb.frontage.is_clear(site.pose * Point2::new(x, y), 0.05) {
                     site.point(Point2::new(x, y), 0.01, 6.0, NO_BODY);
                 }
@@ -230,6 +260,12 @@ impl Site<'_> {
         let turn = Rotation2::new(0.08 * normal(&mut self.rng));
         let against = if self.chance(0.8) { -1.0 } else { 1.0 };
         self.point(Point2::origin(), 1.5, 3.0, body);
-        self.facing(Point2::new(0.05 * against, 0.0), turn * Vector2::new(against, 0.0), 400.0, 150.0, body);
+        self.facing(
+            Point2::new(0.05 * against, 0.0),
+            turn * Vector2::new(against, 0.0),
+            400.0,
+            150.0,
+            body,
+        );
     }
 }

@@ -28,8 +28,13 @@ pub(super) struct Lot {
 
 impl Lot {
     pub(super) fn corners(&self) -> [Point2<f64>; 4] {
-        [(0.0, 0.0), (self.width_m, 0.0), (self.width_m, self.depth_m), (0.0, self.depth_m)]
-            .map(|(x, y)| self.pose * Point2::new(x, y))
+        [
+            (0.0, 0.0),
+            (self.width_m, 0.0),
+            (self.width_m, self.depth_m),
+            (0.0, self.depth_m),
+        ]
+        .map(|(x, y)| self.pose * Point2::new(x, y))
     }
 
     /// Whether all of it is at least `metres` from all kerbs.
@@ -39,7 +44,10 @@ impl Lot {
         let share = |step: usize, steps: usize| step as f64 / steps as f64;
         (0..=rows).all(|row| {
             (0..=columns).all(|column| {
-                let local = Point2::new(self.width_m * share(column, columns), self.depth_m * share(row, rows));
+                let local = Point2::new(
+                    self.width_m * share(column, columns),
+                    self.depth_m * share(row, rows),
+                );
                 streets.clearance_m(self.pose * local, metres) >= metres
             })
         })
@@ -53,7 +61,10 @@ impl Lot {
                 let axis = lot.pose * axis;
                 let [a, b] = [&ours, &theirs].map(|corners| {
                     let shadow = corners.map(|corner| corner.coords.dot(&axis));
-                    (shadow.into_iter().fold(f64::MAX, f64::min), shadow.into_iter().fold(f64::MIN, f64::max))
+                    (
+                        shadow.into_iter().fold(f64::MAX, f64::min),
+                        shadow.into_iter().fold(f64::MIN, f64::max),
+                    )
                 });
                 a.1 > b.0 + TOLERANCE_M && b.1 > a.0 + TOLERANCE_M
             })
@@ -72,11 +83,18 @@ impl Register {
     /// Takes a lot, if all of it is still free.
     pub(super) fn take(&mut self, lot: &Lot) -> bool {
         let taken = |number: &u32| self.lots[*number as usize].overlaps(lot);
-        if cells(lot).any(|cell| self.cells.get(&cell).is_some_and(|there| there.iter().any(taken))) {
+        if cells(lot).any(|cell| {
+            self.cells
+                .get(&cell)
+                .is_some_and(|there| there.iter().any(taken))
+        }) {
             return false;
         }
         for cell in cells(lot) {
-            self.cells.entry(cell).or_default().push(self.lots.len() as u32);
+            self.cells
+                .entry(cell)
+                .or_default()
+                .push(self.lots.len() as u32);
         }
         self.lots.push(*lot);
         true
@@ -94,7 +112,9 @@ fn cells(lot: &Lot) -> impl Iterator<Item = (i32, i32)> {
     let low = corners.iter().skip(1).fold(corners[0], |a, b| a.inf(b)) / CELL_M;
     let high = corners.iter().skip(1).fold(corners[0], |a, b| a.sup(b)) / CELL_M;
     let columns = low.x.floor() as i32..=high.x.floor() as i32;
-    columns.flat_map(move |column| (low.y.floor() as i32..=high.y.floor() as i32).map(move |row| (column, row)))
+    columns.flat_map(move |column| {
+        (low.y.floor() as i32..=high.y.floor() as i32).map(move |row| (column, row))
+    })
 }
 
 #[cfg(test)]
@@ -102,7 +122,12 @@ mod tests {
     use super::*;
 
     fn lot(x: f64, y: f64, turn: f64) -> Lot {
-        Lot { pose: Isometry2::new(Vector2::new(x, y), turn), width_m: 10.0, frontage_m: 10.0, depth_m: 30.0 }
+        Lot {
+            pose: Isometry2::new(Vector2::new(x, y), turn),
+            width_m: 10.0,
+            frontage_m: 10.0,
+            depth_m: 30.0,
+        }
     }
 
     #[test]
@@ -112,7 +137,10 @@ mod tests {
         assert!(!register.take(&lot(5.0, 5.0, 0.7)));
         assert!(!register.take(&lot(0.0, 0.0, 0.0)));
         assert!(register.take(&lot(10.0, 0.0, 0.0)), "it shares a side");
-        assert!(register.take(&lot(24.0, 27.0, 0.8)), "it lies askew behind the second");
+        assert!(
+            register.take(&lot(24.0, 27.0, 0.8)),
+            "it lies askew behind the second"
+        );
         assert_eq!(register.lots().len(), 3);
     }
 }

@@ -91,7 +91,13 @@ struct Planner<'a> {
 impl<'a> Planner<'a> {
     fn plan(config: &'a TownConfig, streets: &'a Streets, seed: u64) -> Self {
         let lines: Vec<Line> = streets.streets().iter().map(Line::new).collect();
-        let mut planner = Self { config, streets, seed, register: Register::default(), built: Built::default() };
+        let mut planner = Self {
+            config,
+            streets,
+            seed,
+            register: Register::default(),
+            built: Built::default(),
+        };
         // First rows before second ones, and driven streets before others: what is seen best is not built over.
         for row in [Row::First, Row::Second] {
             for driven in [true, false] {
@@ -121,7 +127,11 @@ impl<'a> Planner<'a> {
 
     fn stretch<'l>(&self, frontage: Frontage<'l>, number: u64) -> Stretch<'l> {
         let from_m = number as f64 * STRETCH_M;
-        let district = District::at(self.config.character, self.seed, frontage.place(from_m + STRETCH_M / 2.0, 10.0));
+        let district = District::at(
+            self.config.character,
+            self.seed,
+            frontage.place(from_m + STRETCH_M / 2.0, 10.0),
+        );
         let key = random::hash(&[self.seed, frontage.key(), number]);
         let mut rng = generator(&[key]);
         let (bays, _) = district.kerb_shares();
@@ -130,55 +140,132 @@ impl<'a> Planner<'a> {
         let (least_m, most_m) = district.depth_m();
         let depth_m = rng.random_range(least_m..most_m);
         let to_m = (from_m + STRETCH_M).min(frontage.length_m());
-        Stretch { frontage, district, key, from_m, to_m, pavement_m, bays, depth_m }
+        Stretch {
+            frontage,
+            district,
+            key,
+            from_m,
+            to_m,
+            pavement_m,
+            bays,
+            depth_m,
+        }
     }
 
     /// Divides a stretch and builds on its pieces, one after the other.
     fn row(&mut self, stretch: &Stretch<'_>, row: Row) {
         let mut rng = generator(&[stretch.key, 1 + row as u64]);
-        let detail = if row == Row::First { 1.0 } else { DETAIL_BEHIND };
+        let detail = if row == Row::First {
+            1.0
+        } else {
+            DETAIL_BEHIND
+        };
         let mut at_m = stretch.from_m;
         while at_m + LEAST_WIDTH_M < stretch.to_m {
             let claimed = (0..DRAWS).find_map(|_| self.draw(stretch, row, at_m, &mut rng));
             if let Some((kind, lot)) = claimed {
-                self.plot(&lot, kind, stretch.key ^ row as u64, detail, generator(&[rng.random()]));
+                self.plot(
+                    &lot,
+                    kind,
+                    stretch.key ^ row as u64,
+                    detail,
+                    generator(&[rng.random()]),
+                );
             }
             at_m += claimed.map_or(SKIP_M, |(_, lot)| lot.frontage_m);
         }
     }
 
     /// Draws a use, and takes land for it if there is enough from a station on.
-    fn draw(&mut self, stretch: &Stretch<'_>, row: Row, at_m: f64, rng: &mut ChaCha8Rng) -> Option<(Use, Lot)> {
+    fn draw(
+        &mut self,
+        stretch: &Stretch<'_>,
+        row: Row,
+        at_m: f64,
+        rng: &mut ChaCha8Rng,
+    ) -> Option<(Use, Lot)> {
         let kind = stretch.district.draw(row == Row::First, rng);
         let (least_m, most_m) = kind.width_m();
         let width_m = rng.random_range(least_m..most_m).min(stretch.to_m - at_m);
-        let lot = if width_m < least_m { None } else { self.claim(stretch, row, kind, at_m, width_m) };
+        let lot = if width_m < least_m {
+            None
+        } else {
+            self.claim(stretch, row, kind, at_m, width_m)
+        };
         lot.map(|lot| (kind, lot))
     }
 
     /// Takes the land for a use from a station on, as deep as it is free.
-    fn claim(&mut self, stretch: &Stretch<'_>, row: Row, kind: Use, at_m: f64, width_m: f64) -> Option<Lot> {
-        let out_m = stretch.pavement_m + if row == Row::First { 0.0 } else { stretch.depth_m };
+    fn claim(
+        &mut self,
+        stretch: &Stretch<'_>,
+        row: Row,
+        kind: Use,
+        at_m: f64,
+        width_m: f64,
+    ) -> Option<Lot> {
+        let out_m = stretch.pavement_m
+            + if row == Row::First {
+                0.0
+            } else {
+                stretch.depth_m
+            };
         let middle_m = at_m + width_m / 2.0;
-        if !stretch.frontage.owns(middle_m, stretch.frontage.place(middle_m, stretch.pavement_m)) {
+        if !stretch.frontage.owns(
+            middle_m,
+            stretch.frontage.place(middle_m, stretch.pavement_m),
+        ) {
             return None;
         }
-        DEPTHS.iter().map(|share| share * stretch.depth_m).filter(|depth_m| *depth_m >= kind.least_depth_m()).find_map(
-            |depth_m| {
+        DEPTHS
+            .iter()
+            .map(|share| share * stretch.depth_m)
+            .filter(|depth_m| *depth_m >= kind.least_depth_m())
+            .find_map(|depth_m| {
                 let lot = stretch.frontage.lot(at_m, width_m, out_m, depth_m)?;
                 (lot.is_clear(self.streets, CLEAR_M) && self.register.take(&lot)).then_some(lot)
-            },
-        )
+            })
     }
 
     fn plot(&mut self, lot: &Lot, kind: Use, row_key: u64, detail: f64, rng: ChaCha8Rng) {
-        let site = Site { built: &mut self.built, pose: lot.pose, rng };
-        Plot { site, config: self.config, width_m: lot.width_m, depth_m: lot.depth_m, row_key, detail }.build(kind);
+        let site = Site {
+            built: &mut self.built,
+            pose: lot.pose,
+            rng,
+        };
+        Plot {
+            site,
+            config: self.config,
+            width_m: lot.width_m,
+            depth_m: lot.depth_m,
+            row_key,
+            detail,
+        }
+        .build(kind);
     }
 
     fn kerb(&mut self, stretch: &Stretch<'_>) {
-        let Stretch { frontage, district, from_m, to_m, pavement_m, bays, key, .. } = *stretch;
+        let Stretch {
+            frontage,
+            district,
+            from_m,
+            to_m,
+            pavement_m,
+            bays,
+            key,
+            ..
+        } = *stretch;
         let rng = generator(&[key, 3]);
-        Kerb { frontage, config: self.config, district, from_m, to_m, pavement_m, bays, rng }.furnish(&mut self.built);
+        Kerb {
+            frontage,
+            config: self.config,
+            district,
+            from_m,
+            to_m,
+            pavement_m,
+            bays,
+            rng,
+        }
+        .furnish(&mut self.built);
     }
 }

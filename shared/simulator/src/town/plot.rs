@@ -45,10 +45,26 @@ impl TerraceStyle {
             _ => Material::Glass,
         };
         match rng.random::<f64>() {
-            ..0.5 => Self { setback_m: 0.0, front, before: None },
-            ..0.65 => Self { setback_m: rng.random_range(0.3..1.0), front, before: None },
-            ..0.88 => Self { setback_m: rng.random_range(1.5..3.0), front, before: Some(Boundary::Railing) },
-            _ => Self { setback_m: rng.random_range(1.5..3.0), front, before: Some(Boundary::Wall) },
+            ..0.5 => Self {
+                setback_m: 0.0,
+                front,
+                before: None,
+            },
+            ..0.65 => Self {
+                setback_m: rng.random_range(0.3..1.0),
+                front,
+                before: None,
+            },
+            ..0.88 => Self {
+                setback_m: rng.random_range(1.5..3.0),
+                front,
+                before: Some(Boundary::Railing),
+            },
+            _ => Self {
+                setback_m: rng.random_range(1.5..3.0),
+                front,
+                before: Some(Boundary::Wall),
+            },
         }
     }
 }
@@ -75,13 +91,21 @@ impl Plot<'_, '_> {
     }
 
     fn house(&mut self, room: Room, form: Form, front: Material, rest: Material) {
-        self.site.building(&Building { room, form, front, rest, detail: self.detail, balconies_m: 0.0 });
+        self.site.building(&Building {
+            room,
+            form,
+            front,
+            rest,
+            detail: self.detail,
+            balconies_m: 0.0,
+        });
     }
 
     /// A boundary across the plot, `y` metres from the street, with a gap for a gate.
     fn across(&mut self, kind: Boundary, y: f64) {
         let gate_m = self.site.between(1.0, (self.width_m - 4.0).max(1.0));
-        let [left, gate, beyond, right] = [0.3, gate_m, gate_m + 3.2, self.width_m - 0.3].map(|x| self.at(x, y));
+        let [left, gate, beyond, right] =
+            [0.3, gate_m, gate_m + 3.2, self.width_m - 0.3].map(|x| self.at(x, y));
         self.site.boundary(kind, left, gate);
         if beyond.x < right.x {
             self.site.boundary(kind, beyond, right);
@@ -102,7 +126,10 @@ impl Plot<'_, '_> {
         let wanted = per_1000_m2 * 1e-3 * area_m2 * self.config.trees;
         let count = wanted as usize + usize::from(self.site.chance(wanted.fract()));
         for _ in 0..count {
-            let (x, y) = (self.site.between(1.6, self.width_m - 1.6), self.site.between(y + 1.6, self.depth_m - 1.6));
+            let (x, y) = (
+                self.site.between(1.6, self.width_m - 1.6),
+                self.site.between(y + 1.6, self.depth_m - 1.6),
+            );
             let place = self.at(x, y);
             self.site.tree(place, 1.5);
         }
@@ -110,7 +137,8 @@ impl Plot<'_, '_> {
 
     fn clutter(&mut self, y: f64, per_m2: f64, median_m2: f64) {
         let size = Vector2::new(self.width_m, self.depth_m - y);
-        self.site.clutter(Point2::new(0.0, y), size, per_m2, median_m2);
+        self.site
+            .clutter(Point2::new(0.0, y), size, per_m2, median_m2);
     }
 
     /// Grass, and on a share of plots undergrowth that reflects as a whole.
@@ -118,7 +146,8 @@ impl Plot<'_, '_> {
         self.clutter(0.5, 0.04, 0.02);
         if self.site.chance(rough) {
             let size = Vector2::new(self.width_m, self.depth_m - 0.5);
-            self.site.undergrowth(Point2::new(0.0, 0.5), size, 1.2, 0.05);
+            self.site
+                .undergrowth(Point2::new(0.0, 0.5), size, 1.2, 0.05);
         }
     }
 
@@ -129,8 +158,16 @@ impl Plot<'_, '_> {
         } else {
             generator(&[self.site.rng.random()])
         });
-        let depth_m = self.site.between(9.0, 13.0).min(self.depth_m - style.setback_m);
-        let room = Room { x: PARTY_M, y: style.setback_m, width_m: self.width_m - 2.0 * PARTY_M, depth_m };
+        let depth_m = self
+            .site
+            .between(9.0, 13.0)
+            .min(self.depth_m - style.setback_m);
+        let room = Room {
+            x: PARTY_M,
+            y: style.setback_m,
+            width_m: self.width_m - 2.0 * PARTY_M,
+            depth_m,
+        };
         let form = match self.site.between(0.0, 1.0) {
             ..0.6 => Form::Plain,
             ..0.75 => Form::Stepped,
@@ -148,11 +185,20 @@ impl Plot<'_, '_> {
         if self.depth_m - y < 3.0 {
             return;
         }
-        let kind = if self.site.chance(0.6) { Boundary::Wall } else { Boundary::Fence };
+        let kind = if self.site.chance(0.6) {
+            Boundary::Wall
+        } else {
+            Boundary::Fence
+        };
         self.aside(kind, y);
         self.across(kind, self.depth_m - 0.3);
         if self.depth_m - y > 5.0 && self.site.chance(0.4) {
-            let room = Room { x: 0.5, y: self.depth_m - 3.2, width_m: 2.5, depth_m: 2.0 };
+            let room = Room {
+                x: 0.5,
+                y: self.depth_m - 3.2,
+                width_m: 2.5,
+                depth_m: 2.0,
+            };
             self.house(room, Form::Plain, Material::Timber, Material::Timber);
         }
         self.trees(y, 2.0);
@@ -173,8 +219,22 @@ impl Plot<'_, '_> {
         }
         let width_m = self.site.between(6.5, 10.5).min(self.width_m - 4.4);
         let depth_m = self.site.between(7.0, 10.0);
-        let form = if self.site.chance(0.5) { Form::Stepped } else { Form::Angle };
-        self.house(Room { x: 1.0, y: garden_m, width_m, depth_m }, form, Material::Brick, Material::Brick);
+        let form = if self.site.chance(0.5) {
+            Form::Stepped
+        } else {
+            Form::Angle
+        };
+        self.house(
+            Room {
+                x: 1.0,
+                y: garden_m,
+                width_m,
+                depth_m,
+            },
+            form,
+            Material::Brick,
+            Material::Brick,
+        );
         self.drive(1.0 + width_m + 0.3, garden_m);
         self.aside(Boundary::Fence, garden_m);
         self.across(Boundary::Fence, self.depth_m - 0.4);
@@ -186,7 +246,17 @@ impl Plot<'_, '_> {
     fn drive(&mut self, x: f64, garden_m: f64) {
         let y = garden_m + self.site.between(1.0, 3.0);
         if self.site.chance(0.6) {
-            self.house(Room { x, y, width_m: 2.8, depth_m: 5.5 }, Form::Plain, Material::Metal, Material::Brick);
+            self.house(
+                Room {
+                    x,
+                    y,
+                    width_m: 2.8,
+                    depth_m: 5.5,
+                },
+                Form::Plain,
+                Material::Metal,
+                Material::Brick,
+            );
         }
         if garden_m > 5.0 && self.site.chance(self.config.parked_cars) {
             let place = self.at(x + 1.4, y - 2.6);
@@ -197,11 +267,31 @@ impl Plot<'_, '_> {
     fn flats(&mut self) {
         let setback_m = self.site.between(3.0, 7.0);
         let depth_m = self.site.between(11.0, 15.0).min(self.depth_m - setback_m);
-        let room = Room { x: 1.5, y: setback_m, width_m: self.width_m - 3.0, depth_m };
-        let form = if self.site.chance(0.5) { Form::Plain } else { Form::Stepped };
+        let room = Room {
+            x: 1.5,
+            y: setback_m,
+            width_m: self.width_m - 3.0,
+            depth_m,
+        };
+        let form = if self.site.chance(0.5) {
+            Form::Plain
+        } else {
+            Form::Stepped
+        };
         let (front, rest, detail) = (Material::Concrete, Material::Concrete, self.detail);
-        self.site.building(&Building { room, form, front, rest, detail, balconies_m: 3.6 });
-        let front = if self.site.chance(0.5) { Boundary::Railing } else { Boundary::Hedge };
+        self.site.building(&Building {
+            room,
+            form,
+            front,
+            rest,
+            detail,
+            balconies_m: 3.6,
+        });
+        let front = if self.site.chance(0.5) {
+            Boundary::Railing
+        } else {
+            Boundary::Hedge
+        };
         self.across(front, 0.6);
         self.parking(setback_m + depth_m + 4.0);
         self.clutter(0.5, 0.02, 0.03);
@@ -210,7 +300,12 @@ impl Plot<'_, '_> {
     fn hall(&mut self) {
         let setback_m = self.site.between(4.0, (0.4 * self.depth_m).max(4.5));
         let depth_m = (self.depth_m - setback_m) * self.site.between(0.6, 0.95);
-        let room = Room { x: 2.0, y: setback_m, width_m: self.width_m - 4.0, depth_m };
+        let room = Room {
+            x: 2.0,
+            y: setback_m,
+            width_m: self.width_m - 4.0,
+            depth_m,
+        };
         let form = match self.site.between(0.0, 1.0) {
             ..0.35 => Form::Plain,
             ..0.7 => Form::Angle,
@@ -229,9 +324,18 @@ impl Plot<'_, '_> {
     }
 
     fn church(&mut self) {
-        let room = Room { x: 5.0, y: 5.0, width_m: self.width_m - 10.0, depth_m: (self.depth_m - 6.0).min(34.0) };
+        let room = Room {
+            x: 5.0,
+            y: 5.0,
+            width_m: self.width_m - 10.0,
+            depth_m: (self.depth_m - 6.0).min(34.0),
+        };
         self.house(room, Form::Church, Material::Brick, Material::Brick);
-        let front = if self.site.chance(0.5) { Boundary::Railing } else { Boundary::Wall };
+        let front = if self.site.chance(0.5) {
+            Boundary::Railing
+        } else {
+            Boundary::Wall
+        };
         self.across(front, 0.4);
         // Gravestones.
         self.clutter(1.0, 0.05, 0.15);
@@ -277,7 +381,11 @@ impl Plot<'_, '_> {
         for bay in 1..(self.width_m / 2.5) as usize {
             if self.site.chance(0.8 * self.config.parked_cars) {
                 let place = self.at(2.5 * bay as f64, y);
-                let heading_rad = if self.site.chance(0.5) { FRAC_PI_2 } else { -FRAC_PI_2 };
+                let heading_rad = if self.site.chance(0.5) {
+                    FRAC_PI_2
+                } else {
+                    -FRAC_PI_2
+                };
                 self.site.parked_car(place, heading_rad);
             }
         }
@@ -291,7 +399,11 @@ impl Plot<'_, '_> {
             _ => {}
         }
         if self.site.chance(0.4) {
-            let kind = if self.site.chance(0.6) { Boundary::Hedge } else { Boundary::Wire };
+            let kind = if self.site.chance(0.6) {
+                Boundary::Hedge
+            } else {
+                Boundary::Wire
+            };
             self.aside(kind, 2.0);
         }
         let wooded = if self.site.chance(0.2) { 12.0 } else { 1.5 };
@@ -301,9 +413,19 @@ impl Plot<'_, '_> {
 
     fn farm(&mut self) {
         let wide_m = self.width_m - 20.0;
-        let house = Room { x: 3.0, y: 6.0, width_m: 11.0, depth_m: 9.0 };
+        let house = Room {
+            x: 3.0,
+            y: 6.0,
+            width_m: 11.0,
+            depth_m: 9.0,
+        };
         self.house(house, Form::Angle, Material::Brick, Material::Brick);
-        let barn = Room { x: 18.0, y: 9.0, width_m: wide_m, depth_m: (self.depth_m - 12.0).min(20.0) };
+        let barn = Room {
+            x: 18.0,
+            y: 9.0,
+            width_m: wide_m,
+            depth_m: (self.depth_m - 12.0).min(20.0),
+        };
         self.house(barn, Form::Plain, Material::Metal, Material::Metal);
         self.across(Boundary::Wall, 0.6);
         let place = self.at(15.0, 4.0);

@@ -67,15 +67,27 @@ mod tests {
 
     #[test]
     fn smooth_function_has_no_steps_and_fills_its_range() {
-        let at = |i: i32| smooth(7, Point2::new(f64::from(i), 0.3 * f64::from(i) - 500.0), 100.0);
+        let at = |i: i32| {
+            smooth(
+                7,
+                Point2::new(f64::from(i), 0.3 * f64::from(i) - 500.0),
+                100.0,
+            )
+        };
         let values: Vec<f64> = (-5000..5000).map(at).collect();
-        assert!(values.windows(2).all(|pair| (pair[1] - pair[0]).abs() < 0.04));
+        assert!(
+            values
+                .windows(2)
+                .all(|pair| (pair[1] - pair[0]).abs() < 0.04)
+        );
         assert!(values.iter().any(|v| *v < 0.15) && values.iter().any(|v| *v > 0.85));
     }
 
     #[test]
     fn neighbouring_keys_give_unlike_generators() {
-        let mut firsts: Vec<u64> = (0..1000).map(|key| generator(&[1, key]).random::<u64>() >> 40).collect();
+        let mut firsts: Vec<u64> = (0..1000)
+            .map(|key| generator(&[1, key]).random::<u64>() >> 40)
+            .collect();
         firsts.sort_unstable();
         firsts.dedup();
         assert!(firsts.len() > 995, "{}", firsts.len());

@@ -40,35 +40,88 @@ impl Site<'_> {
     }
 
     pub(super) fn between(&mut self, least: f64, most: f64) -> f64 {
-        if least < most { self.rng.random_range(least..most) } else { least }
+        if least < most {
+            self.rng.random_range(least..most)
+        } else {
+            least
+        }
     }
 
     /// A scatterer that reflects to all sides, of `median_m2` with a spread of `deviation_db`.
-    pub(super) fn point(&mut self, place: Point2<f64>, median_m2: f64, deviation_db: f64, body: u32) {
+    pub(super) fn point(
+        &mut self,
+        place: Point2<f64>,
+        median_m2: f64,
+        deviation_db: f64,
+        body: u32,
+    ) {
         self.push(place, median_m2, deviation_db, Aspect::AllRound, body);
     }
 
     /// A scatterer that reflects towards `way` (any length): see [`Aspect::Facing`].
-    pub(super) fn facing(&mut self, place: Point2<f64>, way: Vector2<f64>, sharpness: f64, median_m2: f64, body: u32) {
+    pub(super) fn facing(
+        &mut self,
+        place: Point2<f64>,
+        way: Vector2<f64>,
+        sharpness: f64,
+        median_m2: f64,
+        body: u32,
+    ) {
         let normal = self.pose * way.try_normalize(1e-9).unwrap_or_else(Vector2::x);
-        self.push(place, median_m2, 5.0, Aspect::Facing { normal, sharpness }, body);
+        self.push(
+            place,
+            median_m2,
+            5.0,
+            Aspect::Facing { normal, sharpness },
+            body,
+        );
     }
 
-    fn push(&mut self, place: Point2<f64>, median_m2: f64, deviation_db: f64, aspect: Aspect, body: u32) {
+    fn push(
+        &mut self,
+        place: Point2<f64>,
+        median_m2: f64,
+        deviation_db: f64,
+        aspect: Aspect,
+        body: u32,
+    ) {
         let cross_section_m2 = spread(&mut self.rng, median_m2, deviation_db);
-        self.built.content.scatterers.push(Scatterer { position: self.pose * place, cross_section_m2, aspect, body });
+        self.built.content.scatterers.push(Scatterer {
+            position: self.pose * place,
+            cross_section_m2,
+            aspect,
+            body,
+        });
     }
 
     pub(super) fn wall(&mut self, from: Point2<f64>, to: Point2<f64>, screen: Screen, body: u32) {
-        let Screen { transmission, mirror } = screen;
+        let Screen {
+            transmission,
+            mirror,
+        } = screen;
         let (from, to) = (self.pose * from, self.pose * to);
-        self.built.content.walls.push(Wall { from, to, transmission, mirror, body });
+        self.built.content.walls.push(Wall {
+            from,
+            to,
+            transmission,
+            mirror,
+            body,
+        });
     }
 
     /// Scatterers of no body around a place: normally distributed, and never further than `reach_m` in x or y.
-    pub(super) fn cloud(&mut self, place: Point2<f64>, count: usize, deviation_m: f64, reach_m: f64, median_m2: f64) {
+    pub(super) fn cloud(
+        &mut self,
+        place: Point2<f64>,
+        count: usize,
+        deviation_m: f64,
+        reach_m: f64,
+        median_m2: f64,
+    ) {
         for _ in 0..count {
-            let offset = Vector2::from_fn(|_, _| (deviation_m * normal(&mut self.rng)).clamp(-reach_m, reach_m));
+            let offset = Vector2::from_fn(|_, _| {
+                (deviation_m * normal(&mut self.rng)).clamp(-reach_m, reach_m)
+            });
             self.point(place + offset, median_m2, 4.0, NO_BODY);
         }
     }
@@ -76,7 +129,13 @@ impl Site<'_> {
     /// Puts a finished body, given around its own origin, at a pose.
     pub(super) fn place(&mut self, body: &Body, pose: &Isometry2<f64>) {
         let pose = self.pose * pose;
-        self.built.content.scatterers.extend(body.scatterers.iter().map(|s| s.moved(&pose)));
-        self.built.content.walls.extend(body.walls.iter().map(|w| w.moved(&pose)));
+        self.built
+            .content
+            .scatterers
+            .extend(body.scatterers.iter().map(|s| s.moved(&pose)));
+        self.built
+            .content
+            .walls
+            .extend(body.walls.iter().map(|w| w.moved(&pose)));
     }
 }

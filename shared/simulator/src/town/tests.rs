@@ -6,24 +6,46 @@ use crate::streets::Street;
 use crate::world::{NO_BODY, Wall, World};
 
 /// A street from a place, `turn_rad` to the left for every metre.
-fn street(from: (f64, f64), heading_rad: f64, length_m: f64, turn_rad: f64, driven: bool) -> Street {
+fn street(
+    from: (f64, f64),
+    heading_rad: f64,
+    length_m: f64,
+    turn_rad: f64,
+    driven: bool,
+) -> Street {
     let mut pose = Isometry2::new(Vector2::new(from.0, from.1), heading_rad);
     let mut centre = Vec::new();
     for _ in 0..=(length_m / 2.0) as usize {
         centre.push(Point2::from(pose.translation.vector));
         pose *= Isometry2::new(Vector2::new(2.0, 0.0), 2.0 * turn_rad);
     }
-    Street { centre, half_width_m: if driven { 4.0 } else { 2.5 }, driven }
+    Street {
+        centre,
+        half_width_m: if driven { 4.0 } else { 2.5 },
+        driven,
+    }
 }
 
 /// A street that is driven, with bends to both sides, and others that leave it at odd angles, or cross it.
 fn network() -> Streets {
     let mut bends = street((0.0, 0.0), 0.0, 200.0, 0.0, true);
     let last = bends.centre[bends.centre.len() - 1];
-    bends.centre.extend(street((last.x, last.y), 0.0, 60.0, 0.035, true).centre.into_iter().skip(1));
+    bends.centre.extend(
+        street((last.x, last.y), 0.0, 60.0, 0.035, true)
+            .centre
+            .into_iter()
+            .skip(1),
+    );
     let last = bends.centre[bends.centre.len() - 1];
-    bends.centre.extend(street((last.x, last.y), 2.1, 120.0, -0.02, true).centre.into_iter().skip(1));
-    let side = |x: f64, heading_rad: f64, turn_rad: f64| street((x, 0.0), heading_rad, 150.0, turn_rad, false);
+    bends.centre.extend(
+        street((last.x, last.y), 2.1, 120.0, -0.02, true)
+            .centre
+            .into_iter()
+            .skip(1),
+    );
+    let side = |x: f64, heading_rad: f64, turn_rad: f64| {
+        street((x, 0.0), heading_rad, 150.0, turn_rad, false)
+    };
     Streets::new(vec![
         bends,
         side(40.0, 0.6, 0.0),
@@ -36,11 +58,19 @@ fn network() -> Streets {
 }
 
 fn config(character: Character) -> TownConfig {
-    TownConfig { character, ..TownConfig::default() }
+    TownConfig {
+        character,
+        ..TownConfig::default()
+    }
 }
 
-const CHARACTERS: [Character; 5] =
-    [Character::Mixed, Character::City, Character::Suburb, Character::Campus, Character::Country];
+const CHARACTERS: [Character; 5] = [
+    Character::Mixed,
+    Character::City,
+    Character::Suburb,
+    Character::Campus,
+    Character::Country,
+];
 
 #[test]
 fn carriageways_are_free_in_bends_and_at_junctions_of_any_angle() {
@@ -49,13 +79,19 @@ fn carriageways_are_free_in_bends_and_at_junctions_of_any_angle() {
         let town = build(&config(character), &streets, seed);
         for scatterer in &town.scatterers {
             let clearance_m = streets.clearance_m(scatterer.position, 1.0);
-            assert!(clearance_m > 0.0, "seed {seed}, {character:?}: {clearance_m} m at {scatterer:?}");
+            assert!(
+                clearance_m > 0.0,
+                "seed {seed}, {character:?}: {clearance_m} m at {scatterer:?}"
+            );
         }
         for wall in &town.walls {
             let steps = ((wall.to - wall.from).norm() / 0.5).ceil();
             for step in 0..=steps as usize {
                 let place = wall.from + (wall.to - wall.from) * (step as f64 / steps);
-                assert!(streets.clearance_m(place, 1.0) > 0.0, "seed {seed}, {character:?}: a wall at {place}");
+                assert!(
+                    streets.clearance_m(place, 1.0) > 0.0,
+                    "seed {seed}, {character:?}: a wall at {place}"
+                );
             }
         }
     }
@@ -66,8 +102,13 @@ fn one_sees_along_every_straight_street() {
     let streets = network();
     let world = World::new(build(&config(Character::City), &streets, 3));
     for (street, length_m) in [(0, 200.0), (1, 148.0), (5, 148.0), (6, 128.0)] {
-        let end = |along_m: f64| Point2::from(streets.streets()[street].at(along_m).translation.vector);
-        assert_eq!(world.transmission(end(0.0), end(length_m), NO_BODY, 0.0), 1.0, "street {street}");
+        let end =
+            |along_m: f64| Point2::from(streets.streets()[street].at(along_m).translation.vector);
+        assert_eq!(
+            world.transmission(end(0.0), end(length_m), NO_BODY, 0.0),
+            1.0,
+            "street {street}"
+        );
     }
 }
 
@@ -76,18 +117,32 @@ fn buildings_do_not_overlap() {
     let streets = network();
     for (seed, character) in (0..5).zip(CHARACTERS) {
         let town = build(&config(character), &streets, seed);
-        let solid: Vec<&Wall> = town.walls.iter().filter(|wall| wall.transmission < 0.2).collect();
+        let solid: Vec<&Wall> = town
+            .walls
+            .iter()
+            .filter(|wall| wall.transmission < 0.2)
+            .collect();
         assert!(solid.len() > 20, "{character:?}: {}", solid.len());
         for (index, wall) in solid.iter().enumerate() {
             // Neighbours may share a wall or a corner: shrunk by some centimetres, it must not reach the other.
             let inset = (wall.to - wall.from).normalize() * 0.05;
-            for other in solid[index + 1..].iter().filter(|other| other.body != wall.body) {
+            for other in solid[index + 1..]
+                .iter()
+                .filter(|other| other.body != wall.body)
+            {
                 let way = wall.to - wall.from - 2.0 * inset;
                 let shorter = (other.to - other.from).normalize() * 0.05;
-                let other = Wall { from: other.from + shorter, to: other.to - shorter, ..**other };
+                let other = Wall {
+                    from: other.from + shorter,
+                    to: other.to - shorter,
+                    ..**other
+                };
                 let across = way.perp(&(other.to - other.from)).abs() > 1e-3;
                 let crossed = across && crossing(wall.from + inset, way, &other).is_some();
-                assert!(!crossed, "seed {seed}, {character:?}: {wall:?} and {other:?}");
+                assert!(
+                    !crossed,
+                    "seed {seed}, {character:?}: {wall:?} and {other:?}"
+                );
             }
         }
     }
@@ -132,15 +187,26 @@ fn a_place_looks_the_same_when_its_street_goes_on_for_longer() {
     let short = town(500.0, None);
     assert!(short.len() > 1000, "{}", short.len());
     let long = town(900.0, Some(street((700.0, 0.0), 1.0, 100.0, 0.0, false)));
-    assert!(short == long, "{} and {} scatterers", short.len(), long.len());
+    assert!(
+        short == long,
+        "{} and {} scatterers",
+        short.len(),
+        long.len()
+    );
 }
 
 #[test]
 fn a_street_that_is_driven_twice_is_built_once() {
     let once = street((0.0, 0.0), 0.0, 600.0, 0.0, true);
     let mut twice = once.clone();
-    twice.centre.extend(street((600.0, 1.5), std::f64::consts::PI, 600.0, 0.0, true).centre);
-    let count = |street: Street| build(&TownConfig::default(), &Streets::new(vec![street]), 2).scatterers.len() as f64;
+    twice
+        .centre
+        .extend(street((600.0, 1.5), std::f64::consts::PI, 600.0, 0.0, true).centre);
+    let count = |street: Street| {
+        build(&TownConfig::default(), &Streets::new(vec![street]), 2)
+            .scatterers
+            .len() as f64
+    };
     let ratio = count(twice) / count(once);
     assert!((0.7..1.3).contains(&ratio), "{ratio}");
 }
@@ -151,17 +217,35 @@ fn a_town_is_as_dense_as_its_character() {
     let count = |character| {
         let town = build(&config(character), &streets, 1);
         let near = |place: Point2<f64>| (place - Point2::new(90.0, 0.0)).norm() < 165.0;
-        (town.scatterers.iter().filter(|s| near(s.position)).count(), town.walls.len())
+        (
+            town.scatterers.iter().filter(|s| near(s.position)).count(),
+            town.walls.len(),
+        )
     };
     let [_, city, suburb, campus, country] = CHARACTERS.map(count);
     assert!((25_000..70_000).contains(&city.0), "{city:?}");
-    assert!(city.0 > suburb.0 && suburb.0 > campus.0 && campus.0 > country.0, "{suburb:?} {campus:?} {country:?}");
+    assert!(
+        city.0 > suburb.0 && suburb.0 > campus.0 && campus.0 > country.0,
+        "{suburb:?} {campus:?} {country:?}"
+    );
     assert!(country.0 > 2_000 && country.1 < city.1 / 2, "{country:?}");
 }
 
 #[test]
 fn streets_without_length_and_no_streets_at_all_are_survived() {
-    let point = Street { centre: vec![Point2::origin(); 2], half_width_m: 3.0, driven: true };
-    assert!(build(&TownConfig::default(), &Streets::new(vec![point]), 1).scatterers.is_empty());
-    assert!(build(&TownConfig::default(), &Streets::default(), 1).scatterers.is_empty());
+    let point = Street {
+        centre: vec![Point2::origin(); 2],
+        half_width_m: 3.0,
+        driven: true,
+    };
+    assert!(
+        build(&TownConfig::default(), &Streets::new(vec![point]), 1)
+            .scatterers
+            .is_empty()
+    );
+    assert!(
+        build(&TownConfig::default(), &Streets::default(), 1)
+            .scatterers
+            .is_empty()
+    );
 }

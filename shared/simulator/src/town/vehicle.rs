@@ -17,20 +17,38 @@ const CAR_TRANSMISSION: f64 = 0.8;
 /// All together some 10 m² to each side, the order that is reported of passenger cars at 77 GHz.
 pub(crate) fn car(body: u32, rng: &mut impl Rng) -> Body {
     let (length, width) = CAR_HALF_M;
-    let corners =
-        [(length, width), (length, -width), (-length, -width), (-length, width)].map(|(x, y)| Point2::new(x, y));
+    let corners = [
+        (length, width),
+        (length, -width),
+        (-length, -width),
+        (-length, width),
+    ]
+    .map(|(x, y)| Point2::new(x, y));
     let mut car = Body::default();
     for side in 0..4 {
         let (from, to) = (corners[side], corners[(side + 1) % 4]);
         let corner = spread(rng, 2.0, 4.0);
-        car.scatterers.push(Scatterer { position: from, cross_section_m2: corner, aspect: Aspect::AllRound, body });
+        car.scatterers.push(Scatterer {
+            position: from,
+            cross_section_m2: corner,
+            aspect: Aspect::AllRound,
+            body,
+        });
         let way = to - from;
         let outward = Vector2::new(-way.y, way.x).normalize();
         for share in stations(rng, 1.0, 0.1, 0.4) {
             let normal = Rotation2::new(rng.random_range(-0.5..0.5)) * outward;
-            let aspect = Aspect::Facing { normal, sharpness: rng.random_range(1.0..10.0) };
+            let aspect = Aspect::Facing {
+                normal,
+                sharpness: rng.random_range(1.0..10.0),
+            };
             let cross_section_m2 = spread(rng, 1.5, 5.0);
-            car.scatterers.push(Scatterer { position: from + way * share, cross_section_m2, aspect, body });
+            car.scatterers.push(Scatterer {
+                position: from + way * share,
+                cross_section_m2,
+                aspect,
+                body,
+            });
         }
     }
     // Either diagonal stands for the whole outline: whatever passes the car crosses one at least.
@@ -41,7 +59,10 @@ pub(crate) fn car(body: u32, rng: &mut impl Rng) -> Body {
         mirror: 0.0,
         body,
     };
-    car.walls = vec![diagonal(corners[0], corners[2]), diagonal(corners[1], corners[3])];
+    car.walls = vec![
+        diagonal(corners[0], corners[2]),
+        diagonal(corners[1], corners[3]),
+    ];
     car
 }
 

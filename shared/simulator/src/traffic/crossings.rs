@@ -39,7 +39,14 @@ struct Junction<'a> {
 }
 
 /// Adds those who come out of side streets; `share` of the streets have any.
-pub fn add(crowd: &mut Crowd, streets: &Streets, way: &OwnWay, keep: Keep, share: f64, rng: &mut ChaCha8Rng) {
+pub fn add(
+    crowd: &mut Crowd,
+    streets: &Streets,
+    way: &OwnWay,
+    keep: Keep,
+    share: f64,
+    rng: &mut ChaCha8Rng,
+) {
     for junction in junctions(streets) {
         for pass in passes(&junction, way) {
             if rng.random_bool(share) {
@@ -50,17 +57,35 @@ pub fn add(crowd: &mut Crowd, streets: &Streets, way: &OwnWay, keep: Keep, share
 }
 
 fn junctions(streets: &Streets) -> impl Iterator<Item = Junction<'_>> {
-    let sides = || streets.streets().iter().filter(|street| !street.driven && street.length_m() > SHORTEST_M);
+    let sides = || {
+        streets
+            .streets()
+            .iter()
+            .filter(|street| !street.driven && street.length_m() > SHORTEST_M)
+    };
     sides().map(move |from| {
         let place = from.centre[0];
         let nearest = streets.streets().iter().filter(|s| s.driven);
-        let near = |s: &&Street| s.centre.windows(2).any(|ends| segment_distance_m(ends, place) < 1.0);
-        let kerb_m = nearest.filter(near).map(|s| s.half_width_m).fold(3.0, f64::max).min(SHORTEST_M / 2.0);
+        let near = |s: &&Street| {
+            s.centre
+                .windows(2)
+                .any(|ends| segment_distance_m(ends, place) < 1.0)
+        };
+        let kerb_m = nearest
+            .filter(near)
+            .map(|s| s.half_width_m)
+            .fold(3.0, f64::max)
+            .min(SHORTEST_M / 2.0);
         let across = |s: &&Street| {
             let opposite = direction(s).dot(&direction(from)) < -0.8;
             opposite && (s.centre[0] - place).norm() < 4.0
         };
-        Junction { place, kerb_m, from, to: sides().find(across) }
+        Junction {
+            place,
+            kerb_m,
+            from,
+            to: sides().find(across),
+        }
     })
 }
 
@@ -93,7 +118,10 @@ fn passes(junction: &Junction<'_>, way: &OwnWay) -> Vec<Pass> {
             passes.extend(open.take());
             continue;
         }
-        let pass = open.get_or_insert(Pass { seen_s: [time_s; 2], close_s: [f64::INFINITY, f64::NEG_INFINITY] });
+        let pass = open.get_or_insert(Pass {
+            seen_s: [time_s; 2],
+            close_s: [f64::INFINITY, f64::NEG_INFINITY],
+        });
         pass.seen_s[1] = time_s;
         if distance_m < KEEP_OFF_M {
             pass.close_s = [pass.close_s[0].min(time_s), time_s];
@@ -105,7 +133,14 @@ fn passes(junction: &Junction<'_>, way: &OwnWay) -> Vec<Pass> {
 }
 
 /// A queue that is there when the vehicle passes; what it waits for once the vehicle has gone is a gap in the traffic.
-fn queue(crowd: &mut Crowd, junction: &Junction<'_>, way: &OwnWay, pass: Pass, keep: Keep, rng: &mut ChaCha8Rng) {
+fn queue(
+    crowd: &mut Crowd,
+    junction: &Junction<'_>,
+    way: &OwnWay,
+    pass: Pass,
+    keep: Keep,
+    rng: &mut ChaCha8Rng,
+) {
     let (path, length_m, nose_m) = path(junction, keep);
     let mut stop_m = nose_m;
     let mut from_s = pass.close_s[0] - rng.random_range(-2.0..12.0);
@@ -140,7 +175,11 @@ fn queue(crowd: &mut Crowd, junction: &Junction<'_>, way: &OwnWay, pass: Pass, k
 fn gap(crowd: &Crowd, place: Point2<f64>, way: &OwnWay, from_s: f64, until_s: f64) -> f64 {
     let there = |actor: &Actor, time_s: f64| {
         let on_way = !matches!(actor.track, Track::Crossing(_)) && actor.is_shown(time_s);
-        let pose = if on_way { actor.track.pose(way, time_s) } else { None };
+        let pose = if on_way {
+            actor.track.pose(way, time_s)
+        } else {
+            None
+        };
         pose.is_some_and(|pose| (pose.translation.vector - place.coords).norm() < CLEAR_M)
     };
     let mut start_s = from_s;
@@ -151,7 +190,11 @@ fn gap(crowd: &Crowd, place: Point2<f64>, way: &OwnWay, from_s: f64, until_s: f6
         }
         time_s += 0.5;
     }
-    if start_s + CLEAR_S < until_s { start_s } else { f64::INFINITY }
+    if start_s + CLEAR_S < until_s {
+        start_s
+    } else {
+        f64::INFINITY
+    }
 }
 
 /// The path out of a side street, in its lane, and into the one across; its length; and where the nose of the first stands.
@@ -159,12 +202,16 @@ fn path(junction: &Junction<'_>, keep: Keep) -> (UniformSpline<2>, f64, f64) {
     let side = if keep == Keep::Left { 1.0 } else { -1.0 };
     let lane = |street: &Street, along_m: f64, outwards: f64| {
         let left_m = side * outwards * (LANE_M / 2.0).min(street.half_width_m / 2.0);
-        (street.at(along_m) * Isometry2::translation(0.0, left_m)).translation.vector
+        (street.at(along_m) * Isometry2::translation(0.0, left_m))
+            .translation
+            .vector
     };
     let steps = |street: &Street| (street.length_m().min(PATH_M) / 2.0) as usize;
     let mouth = (junction.kerb_m / 2.0) as usize;
-    let mut places: Vec<Vector2<f64>> =
-        (mouth..=steps(junction.from)).rev().map(|i| lane(junction.from, 2.0 * i as f64, -1.0)).collect();
+    let mut places: Vec<Vector2<f64>> = (mouth..=steps(junction.from))
+        .rev()
+        .map(|i| lane(junction.from, 2.0 * i as f64, -1.0))
+        .collect();
     let nose_m = 2.0 * (places.len() - 1) as f64 - (junction.kerb_m - 2.0 * mouth as f64) - STOP_M;
     if let Some(to) = junction.to {
         places.extend((mouth + 1..=steps(to)).map(|i| lane(to, 2.0 * i as f64, 1.0)));
@@ -174,7 +221,11 @@ fn path(junction: &Junction<'_>, keep: Keep) -> (UniformSpline<2>, f64, f64) {
     let sample = |place: &Vector2<f64>| {
         at += (place - before).norm();
         before = *place;
-        Sample { at, value: [place.x, place.y], weight: 1.0 }
+        Sample {
+            at,
+            value: [place.x, place.y],
+            weight: 1.0,
+        }
     };
     let samples: Vec<_> = places.iter().map(sample).collect();
     (UniformSpline::fit(&samples, 2.0, 0.1), at, nose_m)

@@ -44,15 +44,30 @@ pub struct OwnWay {
 
 impl OwnWay {
     /// The way of the first `duration_s` of a drive through `streets`.
-    pub fn new(trajectory: &dyn Trajectory, duration_s: f64, streets: &Streets, keep: Keep) -> Self {
+    pub fn new(
+        trajectory: &dyn Trajectory,
+        duration_s: f64,
+        streets: &Streets,
+        keep: Keep,
+    ) -> Self {
         let side = if keep == Keep::Left { 1.0 } else { -1.0 };
         let duration_s = trajectory.duration_s().min(duration_s);
         let times = (0..=(duration_s / STEP_S) as usize).map(|i| i as f64 * STEP_S);
-        let poses: Vec<_> = times.map(|time_s| (time_s, trajectory.pose(time_s))).collect();
+        let poses: Vec<_> = times
+            .map(|time_s| (time_s, trajectory.pose(time_s)))
+            .collect();
         let driven = distances(&poses);
         let length_m = driven[driven.len() - 1];
-        let one = |at: f64, value: f64| Sample { at, value: [value], weight: 1.0 };
-        let progress: Vec<_> = poses.iter().zip(&driven).map(|((time_s, _), m)| one(*time_s, *m)).collect();
+        let one = |at: f64, value: f64| Sample {
+            at,
+            value: [value],
+            weight: 1.0,
+        };
+        let progress: Vec<_> = poses
+            .iter()
+            .zip(&driven)
+            .map(|((time_s, _), m)| one(*time_s, *m))
+            .collect();
         let places = UniformSpline::fit(&place_samples(&poses, &driven), STEP_M, 1.0 / WIGGLE_M);
         let kerbs = kerb_samples(&places, length_m, streets);
         let (clock, place_of_clock) = clocks(&poses, &driven, length_m);
@@ -82,7 +97,11 @@ impl OwnWay {
         let (mut low, mut high) = (0, steps);
         while low < high {
             let middle = (low + high) / 2;
-            if self.progress_m(middle as f64 * STEP_S) < along_m { low = middle + 1 } else { high = middle }
+            if self.progress_m(middle as f64 * STEP_S) < along_m {
+                low = middle + 1
+            } else {
+                high = middle
+            }
         }
         low as f64 * STEP_S
     }
@@ -100,9 +119,14 @@ impl OwnWay {
     /// A pose on the way, `inwards_m` beside the vehicle's own track (towards the middle of the street), looking along it.
     pub fn pose(&self, along_m: f64, inwards_m: f64) -> Isometry2<f64> {
         let ([x, y], [dx, dy]) = (self.places.value(along_m), self.places.slope(along_m));
-        let along = Vector2::new(dx, dy).try_normalize(1e-9).unwrap_or(Vector2::x());
+        let along = Vector2::new(dx, dy)
+            .try_normalize(1e-9)
+            .unwrap_or(Vector2::x());
         let inwards = Vector2::new(along.y, -along.x) * self.side;
-        Isometry2::new(Vector2::new(x, y) + inwards * inwards_m, along.y.atan2(along.x))
+        Isometry2::new(
+            Vector2::new(x, y) + inwards * inwards_m,
+            along.y.atan2(along.x),
+        )
     }
 
     /// From the vehicle's track to the kerbs on its own side and on the other, metres.
@@ -128,16 +152,23 @@ impl OwnWay {
     /// Length of the shortest loop that the way makes, metres: until it runs over the same place in the same direction.
     fn shortest_loop_m(&self) -> f64 {
         let count = (self.length_m / STEP_M) as usize;
-        let poses: Vec<_> = (0..=count).map(|i| self.pose(i as f64 * STEP_M, 0.0)).collect();
+        let poses: Vec<_> = (0..=count)
+            .map(|i| self.pose(i as f64 * STEP_M, 0.0))
+            .collect();
         let window = (2.0 * REACH_M / 0.9 / STEP_M) as usize;
         let again = |i: usize, j: &usize| {
             let seen = poses[i].inverse() * poses[*j];
             seen.translation.vector.norm() < AGAIN_M && seen.rotation.cos_angle() > 0.7
         };
         let first = 2 * (AGAIN_M / STEP_M) as usize;
-        let loops =
-            (0..=count).filter_map(|i| (i + first..=(i + window).min(count)).find(|j| again(i, j)).map(|j| j - i));
-        loops.min().map_or(f64::INFINITY, |steps| steps as f64 * STEP_M)
+        let loops = (0..=count).filter_map(|i| {
+            (i + first..=(i + window).min(count))
+                .find(|j| again(i, j))
+                .map(|j| j - i)
+        });
+        loops
+            .min()
+            .map_or(f64::INFINITY, |steps| steps as f64 * STEP_M)
     }
 }
 
@@ -152,7 +183,11 @@ fn distances(poses: &[(f64, Isometry2<f64>)]) -> Vec<f64> {
 
 /// Places every few metres, with straight lines before and behind.
 fn place_samples(poses: &[(f64, Isometry2<f64>)], driven: &[f64]) -> Vec<Sample<2>> {
-    let sample = |at: f64, place: Point2<f64>| Sample { at, value: [place.x, place.y], weight: 1.0 };
+    let sample = |at: f64, place: Point2<f64>| Sample {
+        at,
+        value: [place.x, place.y],
+        weight: 1.0,
+    };
     let steps = (BEYOND_M / STEP_M) as i64;
     let straight = |pose: &Isometry2<f64>, from_m: f64, step: i64| {
         let ahead_m = step as f64 * STEP_M;
@@ -175,14 +210,23 @@ fn kerb_samples(places: &UniformSpline<2>, length_m: f64, streets: &Streets) -> 
         let at = step as f64 * 4.0;
         let [x, y] = places.value(at);
         let nearest = streets.nearest(Point2::new(x, y), 10.0);
-        let (half_m, offset_m) = nearest.map_or((4.0, 1.6), |n| (n.offset_m - n.clearance_m, n.offset_m));
-        Sample { at, value: [half_m - offset_m, half_m + offset_m], weight: 1.0 }
+        let (half_m, offset_m) =
+            nearest.map_or((4.0, 1.6), |n| (n.offset_m - n.clearance_m, n.offset_m));
+        Sample {
+            at,
+            value: [half_m - offset_m, half_m + offset_m],
+            weight: 1.0,
+        }
     };
     (0..=(length_m / 4.0) as usize).map(sample).collect()
 }
 
 /// When others are where: about as fast as the vehicle is there, but nowhere waiting.
-fn clocks(poses: &[(f64, Isometry2<f64>)], driven: &[f64], length_m: f64) -> (UniformSpline<1>, UniformSpline<1>) {
+fn clocks(
+    poses: &[(f64, Isometry2<f64>)],
+    driven: &[f64],
+    length_m: f64,
+) -> (UniformSpline<1>, UniformSpline<1>) {
     let count = ((length_m + 2.0 * BEYOND_M) / STEP_M) as usize;
     let mut seconds = 0.0;
     let mut clock = Vec::with_capacity(count + 1);
@@ -195,9 +239,23 @@ fn clocks(poses: &[(f64, Isometry2<f64>)], driven: &[f64], length_m: f64) -> (Un
         // The speed over two seconds around the place.
         let (a, b) = (next.saturating_sub(10), (next + 10).min(driven.len() - 1));
         let own_m_s = (driven[b] - driven[a]) / (poses[b].0 - poses[a].0).max(STEP_S);
-        clock.push(Sample { at, value: [seconds], weight: 1.0 });
+        clock.push(Sample {
+            at,
+            value: [seconds],
+            weight: 1.0,
+        });
         seconds += STEP_M / own_m_s.max(SLOWEST_M_S);
     }
-    let inverse: Vec<_> = clock.iter().map(|s| Sample { at: s.value[0], value: [s.at], weight: 1.0 }).collect();
-    (UniformSpline::fit(&clock, 4.0, 1.0 / GRADUAL_M), UniformSpline::fit(&inverse, 0.5, 0.15))
+    let inverse: Vec<_> = clock
+        .iter()
+        .map(|s| Sample {
+            at: s.value[0],
+            value: [s.at],
+            weight: 1.0,
+        })
+        .collect();
+    (
+        UniformSpline::fit(&clock, 4.0, 1.0 / GRADUAL_M),
+        UniformSpline::fit(&inverse, 0.5, 0.15),
+    )
 }

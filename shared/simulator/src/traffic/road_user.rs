@@ -63,9 +63,27 @@ impl Kind {
         let half_m = self.half_m();
         match self {
             Self::Car => town::car(number, rng),
-            Self::Van => Shape { half_m, edge_m2: 3.0, panel_m2: 15.0, transmission: 0.2 }.body(number, rng),
-            Self::Lorry => Shape { half_m, edge_m2: 6.0, panel_m2: 40.0, transmission: 0.05 }.body(number, rng),
-            Self::Bus => Shape { half_m, edge_m2: 5.0, panel_m2: 40.0, transmission: 0.05 }.body(number, rng),
+            Self::Van => Shape {
+                half_m,
+                edge_m2: 3.0,
+                panel_m2: 15.0,
+                transmission: 0.2,
+            }
+            .body(number, rng),
+            Self::Lorry => Shape {
+                half_m,
+                edge_m2: 6.0,
+                panel_m2: 40.0,
+                transmission: 0.05,
+            }
+            .body(number, rng),
+            Self::Bus => Shape {
+                half_m,
+                edge_m2: 5.0,
+                panel_m2: 40.0,
+                transmission: 0.05,
+            }
+            .body(number, rng),
             Self::Cyclist => cloud(number, half_m, 5, 0.2, rng),
             Self::Pedestrian => cloud(number, half_m, 2, 0.1, rng),
         }
@@ -75,8 +93,13 @@ impl Kind {
 impl Shape {
     fn body(&self, number: u32, rng: &mut ChaCha8Rng) -> Body {
         let (length, width) = self.half_m;
-        let corners =
-            [(length, width), (length, -width), (-length, -width), (-length, width)].map(|(x, y)| Point2::new(x, y));
+        let corners = [
+            (length, width),
+            (length, -width),
+            (-length, -width),
+            (-length, width),
+        ]
+        .map(|(x, y)| Point2::new(x, y));
         let mut body = Body::default();
         for side in 0..4 {
             let (from, to) = (corners[side], corners[(side + 1) % 4]);
@@ -91,34 +114,69 @@ impl Shape {
         }
         let transmission = self.transmission.sqrt();
         // Whatever passes the outline crosses one diagonal at least, and half of it both.
-        let diagonal =
-            |a: usize, b: usize| Wall { from: corners[a], to: corners[b], transmission, mirror: 0.0, body: number };
+        let diagonal = |a: usize, b: usize| Wall {
+            from: corners[a],
+            to: corners[b],
+            transmission,
+            mirror: 0.0,
+            body: number,
+        };
         body.walls = vec![diagonal(0, 2), diagonal(1, 3)];
         body
     }
 
     /// A panel about every metre: flat, hence bright at a right angle, but never quite even.
-    fn panels(&self, body: &mut Body, from: Point2<f64>, to: Point2<f64>, number: u32, rng: &mut ChaCha8Rng) {
+    fn panels(
+        &self,
+        body: &mut Body,
+        from: Point2<f64>,
+        to: Point2<f64>,
+        number: u32,
+        rng: &mut ChaCha8Rng,
+    ) {
         let way = to - from;
         let outward = Vector2::new(-way.y, way.x).normalize();
         let count = way.norm().ceil() as usize;
         for panel in 0..count {
-            let position = from + way * ((panel as f64 + rng.random_range(0.2..0.8)) / count as f64);
+            let position =
+                from + way * ((panel as f64 + rng.random_range(0.2..0.8)) / count as f64);
             let normal = Rotation2::new(rng.random_range(-0.15..0.15)) * outward;
-            let aspect = Aspect::Facing { normal, sharpness: rng.random_range(10.0..120.0) };
+            let aspect = Aspect::Facing {
+                normal,
+                sharpness: rng.random_range(10.0..120.0),
+            };
             let cross_section_m2 = spread(rng, self.panel_m2, 5.0);
-            body.scatterers.push(Scatterer { position, cross_section_m2, aspect, body: number });
+            body.scatterers.push(Scatterer {
+                position,
+                cross_section_m2,
+                aspect,
+                body: number,
+            });
         }
     }
 }
 
 /// Weak scatterers all round; a person hides next to nothing.
-fn cloud(number: u32, half_m: (f64, f64), count: usize, median_m2: f64, rng: &mut ChaCha8Rng) -> Body {
+fn cloud(
+    number: u32,
+    half_m: (f64, f64),
+    count: usize,
+    median_m2: f64,
+    rng: &mut ChaCha8Rng,
+) -> Body {
     let mut body = Body::default();
     for _ in 0..count {
-        let position = Point2::new(rng.random_range(-half_m.0..half_m.0), rng.random_range(-half_m.1..half_m.1));
+        let position = Point2::new(
+            rng.random_range(-half_m.0..half_m.0),
+            rng.random_range(-half_m.1..half_m.1),
+        );
         let cross_section_m2 = spread(rng, median_m2, 3.0);
-        body.scatterers.push(Scatterer { position, cross_section_m2, aspect: Aspect::AllRound, body: number });
+        body.scatterers.push(Scatterer {
+            position,
+            cross_section_m2,
+            aspect: Aspect::AllRound,
+            body: number,
+        });
     }
     body
 }

@@ -111,9 +111,13 @@ impl Track {
             Self::Beside(beside) => beside.inwards_m(way.kerbs_m(along_m)),
         };
         let pose = way.pose(along_m, inwards_m);
-        let turned =
-            matches!(self, Self::Oncoming(_)) || matches!(self, Self::Beside(b) if b.share == 0.0 && b.speed_m_s < 0.0);
-        Some(if turned { pose * Isometry2::rotation(PI) } else { pose })
+        let turned = matches!(self, Self::Oncoming(_))
+            || matches!(self, Self::Beside(b) if b.share == 0.0 && b.speed_m_s < 0.0);
+        Some(if turned {
+            pose * Isometry2::rotation(PI)
+        } else {
+            pose
+        })
     }
 
     /// Metres along the way at a time; zero for what is not on it.
@@ -122,10 +126,15 @@ impl Track {
             Self::Lane { ahead, gaps } => {
                 let sign = if *ahead { 1.0 } else { -1.0 };
                 let own_m = way.progress_m(time_s + sign * REACTION_S * gaps.len() as f64);
-                gaps.iter().fold(own_m, |place_m, gap| place_m + sign * gap.at(place_m))
+                gaps.iter()
+                    .fold(own_m, |place_m, gap| place_m + sign * gap.at(place_m))
             }
             Self::Oncoming(vehicle) => vehicle.along_m(way, time_s),
-            Self::Beside(b) => b.at_m + b.share * (way.progress_m(time_s) - b.at_m) + b.speed_m_s * (time_s - b.at_s),
+            Self::Beside(b) => {
+                b.at_m
+                    + b.share * (way.progress_m(time_s) - b.at_m)
+                    + b.speed_m_s * (time_s - b.at_s)
+            }
             Self::Crossing(_) => 0.0,
         }
     }
@@ -138,7 +147,8 @@ fn other_lane_m([own_m, other_m]: [f64; 2]) -> f64 {
 
 impl Gap {
     fn at(&self, place_m: f64) -> f64 {
-        self.least_m + self.more_m * 0.5 * (1.0 - (TAU * place_m / self.period_m + self.phase).cos())
+        self.least_m
+            + self.more_m * 0.5 * (1.0 - (TAU * place_m / self.period_m + self.phase).cos())
     }
 }
 
@@ -163,7 +173,8 @@ impl Beside {
 
 impl Crossing {
     fn pose(&self, time_s: f64) -> Option<Isometry2<f64>> {
-        let at_m = self.waits_m - self.ramp_m(self.from_s - time_s) + self.ramp_m(time_s - self.until_s);
+        let at_m =
+            self.waits_m - self.ramp_m(self.from_s - time_s) + self.ramp_m(time_s - self.until_s);
         if !(0.0..=self.length_m).contains(&at_m) {
             return None;
         }
@@ -173,6 +184,10 @@ impl Crossing {
 
     /// Metres driven some seconds after starting: first at 2 m/s², and less and less.
     fn ramp_m(&self, seconds: f64) -> f64 {
-        if seconds <= 0.0 { 0.0 } else { self.speed_m_s * seconds * seconds / (seconds + self.speed_m_s) }
+        if seconds <= 0.0 {
+            0.0
+        } else {
+            self.speed_m_s * seconds * seconds / (seconds + self.speed_m_s)
+        }
     }
 }

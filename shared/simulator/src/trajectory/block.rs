@@ -35,17 +35,28 @@ pub struct BlockLoop {
 
 impl BlockLoop {
     /// A loop along the centre lines of four streets: `length_m` along x by `width_m` along y, each at least 30 m.
-    pub fn new(length_m: f64, width_m: f64, speed_m_s: f64, lateral_acceleration_m_s2: f64) -> Self {
+    pub fn new(
+        length_m: f64,
+        width_m: f64,
+        speed_m_s: f64,
+        lateral_acceleration_m_s2: f64,
+    ) -> Self {
         let footprint = bend_footprint();
         let straights = [length_m - 2.0 * footprint, width_m - 2.0 * footprint].map(|s| s.max(0.0));
         let lap_m = 2.0 * (straights[0] + straights[1]) + 4.0 * BEND_M;
         let count = (lap_m / STEP_M).ceil() as usize;
         let step = lap_m / count as f64;
-        let headings: Vec<f64> = (0..=count).map(|i| heading_at(i as f64 * step, &straights)).collect();
+        let headings: Vec<f64> = (0..=count)
+            .map(|i| heading_at(i as f64 * step, &straights))
+            .collect();
         let speeds = speeds(&headings, step, speed_m_s, lateral_acceleration_m_s2);
         let nodes = integrate(&headings, &speeds, step, -width_m / 2.0);
         let lap_s = nodes[count].time_s;
-        Self { nodes, lap_s, lap_m }
+        Self {
+            nodes,
+            lap_s,
+            lap_m,
+        }
     }
 
     /// Time of one lap, seconds.
@@ -62,7 +73,10 @@ impl BlockLoop {
 impl Trajectory for BlockLoop {
     fn pose(&self, time_s: f64) -> Isometry2<f64> {
         let time = time_s.rem_euclid(self.lap_s);
-        let next = self.nodes.partition_point(|node| node.time_s <= time).clamp(1, self.nodes.len() - 1);
+        let next = self
+            .nodes
+            .partition_point(|node| node.time_s <= time)
+            .clamp(1, self.nodes.len() - 1);
         let (a, b) = (self.nodes[next - 1], self.nodes[next]);
         let share = (time - a.time_s) / (b.time_s - a.time_s);
         let between = |from: f64, to: f64| from + share * (to - from);
@@ -91,7 +105,9 @@ fn bend_heading(share: f64) -> f64 {
 fn bend_footprint() -> f64 {
     let count = (BEND_M / STEP_M) as usize;
     let step = BEND_M / count as f64;
-    (0..count).map(|i| step * bend_heading((i as f64 + 0.5) / count as f64).cos()).sum()
+    (0..count)
+        .map(|i| step * bend_heading((i as f64 + 0.5) / count as f64).cos())
+        .sum()
 }
 
 /// Heading after `distance_m` of a lap: half a straight, bend, straight, bend, ..., half a straight.
@@ -127,7 +143,12 @@ fn speeds(headings: &[f64], step: f64, cruise: f64, lateral: f64) -> Vec<f64> {
 }
 
 fn integrate(headings: &[f64], speeds: &[f64], step: f64, start_y_m: f64) -> Vec<Node> {
-    let mut node = Node { time_s: 0.0, x_m: 0.0, y_m: start_y_m, heading_rad: headings[0] };
+    let mut node = Node {
+        time_s: 0.0,
+        x_m: 0.0,
+        y_m: start_y_m,
+        heading_rad: headings[0],
+    };
     let mut nodes = vec![node];
     for (pair, speed) in headings.windows(2).zip(speeds) {
         let middle = 0.5 * (pair[0] + pair[1]);
@@ -169,9 +190,15 @@ mod tests {
         for i in 0..3000 {
             let time = f64::from(i) * 0.01;
             let motion = path.pose(time).inverse() * path.pose(time + 0.01);
-            assert!(motion.translation.x > 0.04 && motion.translation.x < 0.0951, "{time}: {motion}");
+            assert!(
+                motion.translation.x > 0.04 && motion.translation.x < 0.0951,
+                "{time}: {motion}"
+            );
             assert!(motion.translation.y.abs() < 1e-3, "{time}: {motion}");
-            assert!(motion.rotation.angle() > -1e-9 && motion.rotation.angle() < 0.01, "{time}: {motion}");
+            assert!(
+                motion.rotation.angle() > -1e-9 && motion.rotation.angle() < 0.01,
+                "{time}: {motion}"
+            );
         }
     }
 

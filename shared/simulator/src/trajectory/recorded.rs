@@ -26,7 +26,11 @@ pub struct Excerpt {
 
 impl Default for Excerpt {
     fn default() -> Self {
-        Self { from_s: 0.0, for_s: f64::INFINITY, rate_hz: 4.0 }
+        Self {
+            from_s: 0.0,
+            for_s: f64::INFINITY,
+            rate_hz: 4.0,
+        }
     }
 }
 
@@ -35,16 +39,28 @@ impl Default for Excerpt {
 /// It passes within 5 cm of 95 % of a real drive's poses and within 10 cm of 99 % (what is left is their noise), and stands still before its start and after its end.
 pub fn read(path: &Path, excerpt: Excerpt) -> Result<TimedPoses, SimulatorError> {
     let poses = timed(path, excerpt.rate_hz)?;
-    let refuse = |reason: String| SimulatorError::Drive { path: path.to_owned(), reason };
+    let refuse = |reason: String| SimulatorError::Drive {
+        path: path.to_owned(),
+        reason,
+    };
     let end_s = excerpt.from_s + excerpt.for_s;
-    let within: Vec<_> = poses.iter().filter(|(s, _)| (excerpt.from_s..=end_s).contains(s)).collect();
+    let within: Vec<_> = poses
+        .iter()
+        .filter(|(s, _)| (excerpt.from_s..=end_s).contains(s))
+        .collect();
     let [(start_s, origin), _, ..] = within[..] else {
         let last_s = poses.last().map_or(0.0, |(s, _)| *s);
-        return Err(refuse(format!("it has less than two poses from {} s on; it lasts {last_s:.1} s", excerpt.from_s)));
+        return Err(refuse(format!(
+            "it has less than two poses from {} s on; it lasts {last_s:.1} s",
+            excerpt.from_s
+        )));
     };
     check_steps(&within).map_err(refuse)?;
     let into_world = origin.inverse();
-    let moved: Vec<_> = within.iter().map(|(s, pose)| (s - start_s, into_world * pose)).collect();
+    let moved: Vec<_> = within
+        .iter()
+        .map(|(s, pose)| (s - start_s, into_world * pose))
+        .collect();
     let ahead = share_ahead(&moved);
     if ahead < 0.5 {
         let share = 100.0 * ahead;
@@ -59,12 +75,19 @@ pub fn read(path: &Path, excerpt: Excerpt) -> Result<TimedPoses, SimulatorError>
 fn check_steps(poses: &[&(f64, Isometry2<f64>)]) -> Result<(), String> {
     for pair in poses.windows(2) {
         let ((from_s, from), (to_s, to)) = (pair[0], pair[1]);
-        let (seconds, metres) = (to_s - from_s, (to.translation.vector - from.translation.vector).norm());
+        let (seconds, metres) = (
+            to_s - from_s,
+            (to.translation.vector - from.translation.vector).norm(),
+        );
         if metres > FASTEST_M_S * seconds + 1.0 {
-            return Err(format!("it jumps by {metres:.1} m within {seconds:.3} s, {from_s:.3} s after its start"));
+            return Err(format!(
+                "it jumps by {metres:.1} m within {seconds:.3} s, {from_s:.3} s after its start"
+            ));
         }
         if seconds > LONGEST_PAUSE_S {
-            return Err(format!("it pauses for {seconds:.0} s, {from_s:.3} s after its start"));
+            return Err(format!(
+                "it pauses for {seconds:.0} s, {from_s:.3} s after its start"
+            ));
         }
     }
     Ok(())
@@ -77,8 +100,12 @@ fn timed(path: &Path, rate_hz: f64) -> Result<Vec<(f64, Isometry2<f64>)>, Simula
         Some(stamps) => (stamps[index] - stamps[0]) as f64 * 1e-9,
         None => index as f64 / rate_hz,
     };
-    let mut poses: Vec<(f64, Isometry2<f64>)> =
-        read.poses.iter().enumerate().map(|(index, pose)| (seconds(index), *pose)).collect();
+    let mut poses: Vec<(f64, Isometry2<f64>)> = read
+        .poses
+        .iter()
+        .enumerate()
+        .map(|(index, pose)| (seconds(index), *pose))
+        .collect();
     poses.dedup_by(|later, kept| later.0 <= kept.0);
     Ok(poses)
 }

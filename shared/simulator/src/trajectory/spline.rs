@@ -40,7 +40,11 @@ impl<const D: usize> UniformSpline<D> {
             [] => (0.0, 0.0),
         };
         let intervals = ((end - start) / step).ceil().max(1.0) as usize;
-        let mut curve = Self { start, step, coefficients: vec![[0.0; D]; intervals + SUPPORT - 1] };
+        let mut curve = Self {
+            start,
+            step,
+            coefficients: vec![[0.0; D]; intervals + SUPPORT - 1],
+        };
         let mut normal = vec![[0.0; BAND]; curve.coefficients.len()];
         for sample in samples {
             curve.count(sample, &mut normal);
@@ -76,7 +80,10 @@ impl<const D: usize> UniformSpline<D> {
 
     fn combine(&self, first: usize, weights: &[f64; SUPPORT]) -> [f64; D] {
         let mut sum = [0.0; D];
-        for (coefficient, weight) in self.coefficients[first..first + SUPPORT].iter().zip(weights) {
+        for (coefficient, weight) in self.coefficients[first..first + SUPPORT]
+            .iter()
+            .zip(weights)
+        {
             for (into, value) in sum.iter_mut().zip(coefficient) {
                 *into += weight * value;
             }
@@ -112,7 +119,15 @@ fn basis_slope(f: f64) -> [f64; SUPPORT] {
     let g = 1.0 - f;
     let inner = |f: f64| 50.0 + f * (40.0 + f * (-60.0 + f * (-80.0 + f * 50.0)));
     let outer = |f: f64| 5.0 + f * (20.0 + f * (30.0 + f * (20.0 - f * 25.0)));
-    [-5.0 * g.powi(4), -outer(g), -inner(g), inner(f), outer(f), 5.0 * f.powi(4)].map(|b| b / 120.0)
+    [
+        -5.0 * g.powi(4),
+        -outer(g),
+        -inner(g),
+        inner(f),
+        outer(f),
+        5.0 * f.powi(4),
+    ]
+    .map(|b| b / 120.0)
 }
 
 /// Adds `weight` times the squares of a difference of neighbouring coefficients.
@@ -145,7 +160,9 @@ fn factorise(band: &mut [[f64; BAND]]) {
 /// Solves with the factors, in place.
 fn solve<const D: usize>(factors: &[[f64; BAND]], right: &mut [[f64; D]]) {
     let reach = |row: usize| BAND.min(factors.len() - row);
-    let subtract = |from: [f64; D], factor: f64, what: [f64; D]| std::array::from_fn(|d| from[d] - factor * what[d]);
+    let subtract = |from: [f64; D], factor: f64, what: [f64; D]| {
+        std::array::from_fn(|d| from[d] - factor * what[d])
+    };
     for row in 0..factors.len() {
         for i in 1..reach(row) {
             right[row + i] = subtract(right[row + i], factors[row][i], right[row]);
@@ -167,7 +184,13 @@ mod tests {
 
     fn samples(of: impl Fn(f64) -> f64, count: usize, spacing: f64) -> Vec<Sample<1>> {
         let at = |i: usize| i as f64 * spacing;
-        (0..count).map(|i| Sample { at: at(i), value: [of(at(i))], weight: 1.0 }).collect()
+        (0..count)
+            .map(|i| Sample {
+                at: at(i),
+                value: [of(at(i))],
+                weight: 1.0,
+            })
+            .collect()
     }
 
     #[test]
@@ -184,7 +207,9 @@ mod tests {
         let amplitude = |periods: f64| {
             let wave = |at: f64| (TAU * periods * at).sin();
             let curve = UniformSpline::fit(&samples(wave, 400, 0.25), 0.25, 0.5);
-            (100..300).map(|i| curve.value([f64::from(i) * 0.25][0])[0].abs()).fold(0.0, f64::max)
+            (100..300)
+                .map(|i| curve.value([f64::from(i) * 0.25][0])[0].abs())
+                .fold(0.0, f64::max)
         };
         assert!(amplitude(0.2) > 0.99, "{}", amplitude(0.2));
         assert!((amplitude(0.5) - 0.5).abs() < 0.05, "{}", amplitude(0.5));
@@ -195,7 +220,10 @@ mod tests {
     fn one_sample_or_none_gives_a_constant() {
         let one = UniformSpline::fit(&samples(|_| 7.0, 1, 1.0), 0.5, 1.0);
         assert!((one.value(-3.0)[0] - 7.0).abs() < 1e-6 && (one.value(9.0)[0] - 7.0).abs() < 1e-6);
-        assert_eq!(UniformSpline::<2>::fit(&[], 1.0, 1.0).value(4.0), [0.0, 0.0]);
+        assert_eq!(
+            UniformSpline::<2>::fit(&[], 1.0, 1.0).value(4.0),
+            [0.0, 0.0]
+        );
     }
 
     proptest! {

@@ -45,7 +45,10 @@ impl TimedPoses {
         let duration_s = samples.last().map_or(0.0, |last| last.at);
         let spacing_s = duration_s / (samples.len().max(2) - 1) as f64;
         let step_s = spacing_s.clamp(0.02, 0.5 / cutoff_hz);
-        Self { curve: UniformSpline::fit(samples, step_s, cutoff_hz), duration_s }
+        Self {
+            curve: UniformSpline::fit(samples, step_s, cutoff_hz),
+            duration_s,
+        }
     }
 }
 
@@ -73,7 +76,11 @@ fn unwrapped(poses: &[(f64, Isometry2<f64>)]) -> Vec<Sample<3>> {
     let mut yaw = 0.0;
     let sample = |(at, pose): &(f64, Isometry2<f64>)| {
         yaw += (pose.rotation.angle() - yaw + PI).rem_euclid(TAU) - PI;
-        Sample { at: *at, value: [pose.translation.x, pose.translation.y, yaw], weight: 1.0 }
+        Sample {
+            at: *at,
+            value: [pose.translation.x, pose.translation.y, yaw],
+            weight: 1.0,
+        }
     };
     poses.iter().map(sample).collect()
 }
@@ -87,7 +94,11 @@ fn hold_stands(samples: &mut [Sample<3>]) {
             let off: [f64; 3] = std::array::from_fn(|d| s.value[d] - origin.value[d]);
             off[0].hypot(off[1]) < STAND_M && off[2].abs() < STAND_RAD
         };
-        let count = samples[first..].iter().take_while(|s| near(s)).count().max(1);
+        let count = samples[first..]
+            .iter()
+            .take_while(|s| near(s))
+            .count()
+            .max(1);
         let stand = &mut samples[first..first + count];
         if stand[count - 1].at - origin.at < STAND_S {
             first += 1;
@@ -95,7 +106,11 @@ fn hold_stands(samples: &mut [Sample<3>]) {
         }
         let value = std::array::from_fn(|d| median(stand.iter().map(|s| s.value[d])));
         for sample in stand {
-            *sample = Sample { value, weight: STAND_WEIGHT, ..*sample };
+            *sample = Sample {
+                value,
+                weight: STAND_WEIGHT,
+                ..*sample
+            };
         }
         first += count;
     }

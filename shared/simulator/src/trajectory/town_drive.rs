@@ -43,14 +43,24 @@ impl TownDrive {
         let route = route::route(&town, self.length_m, &mut rng);
         let lane = lane::lane(&town, &route, self.keep);
         let way = steered(&lane);
-        let limits = speed::Limits { speed_m_s: self.speed_m_s, lateral_m_s2: self.lateral_acceleration_m_s2 };
+        let limits = speed::Limits {
+            speed_m_s: self.speed_m_s,
+            lateral_m_s2: self.lateral_acceleration_m_s2,
+        };
         let progress = speed::progress(&way, &lane, &limits, self.length_m, &mut rng, STEP_S);
         let pose = |along_m: &f64| {
             let ([x, y], [dx, dy]) = (way.curve.value(*along_m), way.curve.slope(*along_m));
             Isometry2::new(nalgebra::Vector2::new(x, y), dy.atan2(dx))
         };
-        let start = progress.first().map_or(Isometry2::identity(), pose).inverse();
-        let poses: Vec<_> = progress.iter().enumerate().map(|(i, s)| (i as f64 * STEP_S, start * pose(s))).collect();
+        let start = progress
+            .first()
+            .map_or(Isometry2::identity(), pose)
+            .inverse();
+        let poses: Vec<_> = progress
+            .iter()
+            .enumerate()
+            .map(|(i, s)| (i as f64 * STEP_S, start * pose(s)))
+            .collect();
         TimedPoses::new(&poses, CUTOFF_HZ)
     }
 }
@@ -69,10 +79,17 @@ fn steered(lane: &lane::Lane) -> Way {
     let sample = |place: &Point2<f64>| {
         length_m += before.map_or(0.0, |before| (place - before).norm());
         before = Some(*place);
-        Sample { at: length_m, value: [place.x, place.y], weight: 1.0 }
+        Sample {
+            at: length_m,
+            value: [place.x, place.y],
+            weight: 1.0,
+        }
     };
     let samples: Vec<_> = lane.places.iter().map(sample).collect();
-    Way { curve: UniformSpline::fit(&samples, 1.0, 1.0 / STEER_M), length_m }
+    Way {
+        curve: UniformSpline::fit(&samples, 1.0, 1.0 / STEER_M),
+        length_m,
+    }
 }
 
 #[cfg(test)]

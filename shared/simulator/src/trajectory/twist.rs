@@ -19,10 +19,16 @@ impl Trajectory for ConstantTwist {
     fn pose(&self, time_s: f64) -> Isometry2<f64> {
         let yaw = self.yaw_rad_s * time_s;
         // The exponential of a planar twist: sin(a)/a and (1 - cos(a))/a, with their limits at a = 0.
-        let (along, across) =
-            if yaw.abs() < 1e-9 { (1.0, 0.5 * yaw) } else { (yaw.sin() / yaw, (1.0 - yaw.cos()) / yaw) };
+        let (along, across) = if yaw.abs() < 1e-9 {
+            (1.0, 0.5 * yaw)
+        } else {
+            (yaw.sin() / yaw, (1.0 - yaw.cos()) / yaw)
+        };
         let (x, y) = (self.forward_m_s * time_s, self.left_m_s * time_s);
-        Isometry2::new(Vector2::new(along * x - across * y, across * x + along * y), yaw)
+        Isometry2::new(
+            Vector2::new(along * x - across * y, across * x + along * y),
+            yaw,
+        )
     }
 }
 
@@ -34,10 +40,17 @@ mod tests {
 
     #[test]
     fn constant_twist_turns_on_a_circle() {
-        let twist = ConstantTwist { forward_m_s: 3.0, left_m_s: 0.0, yaw_rad_s: FRAC_PI_2 };
+        let twist = ConstantTwist {
+            forward_m_s: 3.0,
+            left_m_s: 0.0,
+            yaw_rad_s: FRAC_PI_2,
+        };
         let quarter = twist.pose(1.0);
         let radius = 3.0 / FRAC_PI_2;
-        assert!((quarter.translation.x - radius).abs() < 1e-12 && (quarter.translation.y - radius).abs() < 1e-12);
+        assert!(
+            (quarter.translation.x - radius).abs() < 1e-12
+                && (quarter.translation.y - radius).abs() < 1e-12
+        );
         assert!((quarter.rotation.angle() - FRAC_PI_2).abs() < 1e-12);
     }
 }

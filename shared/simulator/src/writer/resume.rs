@@ -42,26 +42,46 @@ pub(super) fn missing(
     out: &Path,
 ) -> Result<Vec<usize>, SimulatorError> {
     let folder = out.join(recording.image_folder());
-    let names: Vec<String> = (0..recording.scans()).map(|index| recording.image_name(index)).collect();
+    let names: Vec<String> = (0..recording.scans())
+        .map(|index| recording.image_name(index))
+        .collect();
     let there = images(&folder)?;
     let made_by_this = made_by_this(config, out)?;
     let ours: BTreeSet<&str> = names.iter().map(String::as_str).collect();
-    if let Some(other) = there.iter().find(|name| !made_by_this || !ours.contains(name.as_str())) {
-        return Err(SimulatorError::OutputInUse { folder, other: other.clone() });
+    if let Some(other) = there
+        .iter()
+        .find(|name| !made_by_this || !ours.contains(name.as_str()))
+    {
+        return Err(SimulatorError::OutputInUse {
+            folder,
+            other: other.clone(),
+        });
     }
-    let (kept, missing): (Vec<usize>, Vec<usize>) = (0..names.len()).partition(|&i| there.contains(&names[i]));
-    let ends = kept.first().into_iter().chain(kept.last().filter(|_| kept.len() > 1));
-    ends.copied().try_for_each(|index| require_same(recording, index, &folder.join(&names[index])))?;
+    let (kept, missing): (Vec<usize>, Vec<usize>) =
+        (0..names.len()).partition(|&i| there.contains(&names[i]));
+    let ends = kept
+        .first()
+        .into_iter()
+        .chain(kept.last().filter(|_| kept.len() > 1));
+    ends.copied()
+        .try_for_each(|index| require_same(recording, index, &folder.join(&names[index])))?;
     Ok(missing)
 }
 
 /// The complete images; what was begun and not completed is removed.
 fn images(folder: &Path) -> Result<BTreeSet<String>, SimulatorError> {
-    let listing = |source| SimulatorError::List { folder: folder.to_owned(), source };
+    let listing = |source| SimulatorError::List {
+        folder: folder.to_owned(),
+        source,
+    };
     let mut names = BTreeSet::new();
     for entry in fs::read_dir(folder).map_err(listing)? {
         let entry = entry.map_err(listing)?;
-        match entry.path().extension().is_some_and(|extension| extension == PART) {
+        match entry
+            .path()
+            .extension()
+            .is_some_and(|extension| extension == PART)
+        {
             true => fs::remove_file(entry.path()).map_err(SimulatorError::write(&entry.path()))?,
             false => _ = names.insert(entry.file_name().to_string_lossy().into_owned()),
         }
@@ -80,13 +100,18 @@ fn made_by_this(config: &SimulationConfig, out: &Path) -> Result<bool, Simulator
     let found: Option<SimulationConfig> = toml::from_str(&text).ok();
     match found.is_some_and(|found| same_scans(&found) == same_scans(config)) {
         true => Ok(true),
-        false => Err(SimulatorError::OtherRecording { folder: out.to_owned() }),
+        false => Err(SimulatorError::OtherRecording {
+            folder: out.to_owned(),
+        }),
     }
 }
 
 /// The configuration without what the content of a scan does not depend on.
 fn same_scans(config: &SimulationConfig) -> SimulationConfig {
-    let mut config = SimulationConfig { scans: 1, ..config.clone() };
+    let mut config = SimulationConfig {
+        scans: 1,
+        ..config.clone()
+    };
     config.output.store = false;
     config
 }
@@ -96,10 +121,15 @@ fn require_same(recording: &Recording, index: usize, path: &Path) -> Result<(), 
     let size = recording.image_size();
     let (mut pixels, mut encoded) = (vec![0; size.bytes()], Vec::new());
     recording.renderer().draw(index, &mut pixels);
-    encode(size, &pixels, &mut encoded).map_err(|source| SimulatorError::Encode { path: path.to_owned(), source })?;
+    encode(size, &pixels, &mut encoded).map_err(|source| SimulatorError::Encode {
+        path: path.to_owned(),
+        source,
+    })?;
     let found = fs::read(path).map_err(SimulatorError::write(path))?;
     match found == encoded {
         true => Ok(()),
-        false => Err(SimulatorError::OtherImage { path: path.to_owned() }),
+        false => Err(SimulatorError::OtherImage {
+            path: path.to_owned(),
+        }),
     }
 }

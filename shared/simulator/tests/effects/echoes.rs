@@ -11,14 +11,32 @@ fn two_scatterers_cancel_or_add_in_amplitude_with_speckle_and_in_power_without()
     let wavelength_m = Setup::default().receiver().wavelength_m();
     let peak = |speckle, apart_m: f64| {
         let pair = vec![post(20.0, 100.0, 0.5), post(20.0 + apart_m, 100.0, 0.5)];
-        let setup = Setup::of(pair, Effects { speckle, ..Effects::NONE });
+        let setup = Setup::of(
+            pair,
+            Effects {
+                speckle,
+                ..Effects::NONE
+            },
+        );
         peak_db(&setup.scan(), 100, setup.bins(18.0..22.0)) - setup.received_db(0.5, 20.0)
     };
     // There and back: a quarter of a wavelength of range is half a wavelength of the way.
-    assert!(peak(true, wavelength_m / 4.0) < -35.0, "{}", peak(true, wavelength_m / 4.0));
-    assert!((peak(true, wavelength_m / 2.0) - 6.0).abs() < 0.7, "{}", peak(true, wavelength_m / 2.0));
+    assert!(
+        peak(true, wavelength_m / 4.0) < -35.0,
+        "{}",
+        peak(true, wavelength_m / 4.0)
+    );
+    assert!(
+        (peak(true, wavelength_m / 2.0) - 6.0).abs() < 0.7,
+        "{}",
+        peak(true, wavelength_m / 2.0)
+    );
     for apart_m in [wavelength_m / 4.0, wavelength_m / 2.0] {
-        assert!((peak(false, apart_m) - 3.0).abs() < 0.6, "{}", peak(false, apart_m));
+        assert!(
+            (peak(false, apart_m) - 3.0).abs() < 0.6,
+            "{}",
+            peak(false, apart_m)
+        );
     }
 }
 
@@ -27,12 +45,24 @@ fn a_panel_at_30_degrees_reflects_by_its_cosines_power_and_without_aspect_like_a
     let peak = |aspect, turned_rad: f64| {
         let mut panel = post(30.0, 100.0, 20.0);
         let normal = Rotation2::new(turned_rad) * -panel.position.coords.normalize();
-        panel.aspect = Aspect::Facing { normal, sharpness: 20.0 };
-        let setup = Setup::of(vec![panel], Effects { aspect, ..Effects::NONE });
+        panel.aspect = Aspect::Facing {
+            normal,
+            sharpness: 20.0,
+        };
+        let setup = Setup::of(
+            vec![panel],
+            Effects {
+                aspect,
+                ..Effects::NONE
+            },
+        );
         peak_db(&setup.scan(), 100, setup.bins(29.0..31.0))
     };
     let fall_db = peak(true, 0.0) - peak(true, 30f64.to_radians());
-    assert!((fall_db + 20.0 * db(30f64.to_radians().cos())).abs() < 0.8, "{fall_db} dB");
+    assert!(
+        (fall_db + 20.0 * db(30f64.to_radians().cos())).abs() < 0.8,
+        "{fall_db} dB"
+    );
     assert_eq!(peak(false, 0.0), peak(false, 1.0));
     // On average over all sides as much as with it.
     let mean = 1.0 / (std::f64::consts::TAU * 20.64).sqrt();
@@ -42,14 +72,30 @@ fn a_panel_at_30_degrees_reflects_by_its_cosines_power_and_without_aspect_like_a
 #[test]
 fn a_wall_takes_what_it_does_not_let_through() {
     let peak = |occlusion, transmission: Option<f64>| {
-        let mut setup = Setup::of(vec![post(30.0, 100.0, 20.0)], Effects { occlusion, ..Effects::NONE });
+        let mut setup = Setup::of(
+            vec![post(30.0, 100.0, 20.0)],
+            Effects {
+                occlusion,
+                ..Effects::NONE
+            },
+        );
         let across = |x| Point2::new(x, -20.0);
-        let wall = |transmission| Wall { from: across(-5.0), to: across(5.0), transmission, mirror: 0.0, body: 1 };
+        let wall = |transmission| Wall {
+            from: across(-5.0),
+            to: across(5.0),
+            transmission,
+            mirror: 0.0,
+            body: 1,
+        };
         setup.body.walls.extend(transmission.map(wall));
         peak_db(&setup.scan(), 100, setup.bins(29.0..31.0))
     };
     let open = peak(true, None);
-    assert!((open - peak(true, Some(1e-3)) - 30.0).abs() < 0.6, "{}", peak(true, Some(1e-3)));
+    assert!(
+        (open - peak(true, Some(1e-3)) - 30.0).abs() < 0.6,
+        "{}",
+        peak(true, Some(1e-3))
+    );
     assert_eq!(open, peak(false, Some(1e-3)));
 }
 
@@ -67,23 +113,54 @@ fn a_mirrored_post_stands_at_its_images_place_with_the_mirrors_share_squared() {
     let mut thing = image;
     thing.position.y = -20.0 - image.position.y;
     let peak = |multipath, scatterer, walls: Vec<Wall>| {
-        let mut setup = Setup::of(vec![scatterer], Effects { multipath, occlusion: true, ..Effects::NONE });
+        let mut setup = Setup::of(
+            vec![scatterer],
+            Effects {
+                multipath,
+                occlusion: true,
+                ..Effects::NONE
+            },
+        );
         setup.body.walls = walls;
         peak_db(&setup.scan(), 100, setup.bins(15.5..16.5))
     };
     let (ghost, alone) = (peak(true, thing, vec![mirror]), peak(true, image, vec![]));
-    assert!((ghost - alone - 2.0 * db(0.8)).abs() < 0.8, "{ghost} dB for {alone} dB");
+    assert!(
+        (ghost - alone - 2.0 * db(0.8)).abs() < 0.8,
+        "{ghost} dB for {alone} dB"
+    );
     assert!(peak(false, thing, vec![mirror]) < 1.0);
-    assert!(peak(true, thing, vec![Wall { mirror: 0.1, ..mirror }]) < 1.0, "a rough wall shows nothing");
+    assert!(
+        peak(
+            true,
+            thing,
+            vec![Wall {
+                mirror: 0.1,
+                ..mirror
+            }]
+        ) < 1.0,
+        "a rough wall shows nothing"
+    );
 }
 
 #[test]
 fn a_ghost_is_not_seen_where_the_way_misses_the_mirror() {
-    let short =
-        Wall { from: Point2::new(5.0, -10.0), to: Point2::new(20.0, -10.0), transmission: 0.5, mirror: 0.8, body: 1 };
+    let short = Wall {
+        from: Point2::new(5.0, -10.0),
+        to: Point2::new(20.0, -10.0),
+        transmission: 0.5,
+        mirror: 0.8,
+        body: 1,
+    };
     let mut thing = post(16.0, 100.0, 30.0);
     thing.position += Vector2::new(0.0, 12.0);
-    let mut setup = Setup::of(vec![thing], Effects { multipath: true, ..Effects::NONE });
+    let mut setup = Setup::of(
+        vec![thing],
+        Effects {
+            multipath: true,
+            ..Effects::NONE
+        },
+    );
     setup.body.walls = vec![short];
     assert!(peak_db(&setup.scan(), 100, setup.bins(15.5..16.5)) < 1.0);
 }

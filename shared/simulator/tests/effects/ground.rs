@@ -10,11 +10,18 @@ use nalgebra::{Isometry2, Point2, Vector2};
 
 use crate::scene::{Setup, db, mean_db, power, powers};
 
-const GROUND: Effects = Effects { ground: true, ..Effects::NONE };
+const GROUND: Effects = Effects {
+    ground: true,
+    ..Effects::NONE
+};
 
 /// RADIATE's radar, whose floor of powers hides least of it.
 fn setup(effects: Effects) -> Setup<'static> {
-    Setup { effects, ..Setup::default() }.with(Profile::Cts350xRadiate)
+    Setup {
+        effects,
+        ..Setup::default()
+    }
+    .with(Profile::Cts350xRadiate)
 }
 
 #[test]
@@ -24,25 +31,45 @@ fn ground_is_there_all_round_falls_with_range_and_goes_with_its_switch() {
     let level = |range_m| mean_db(&scans, 0..400, on.bins(range_m));
     let (near, far) = (level(8.0..40.0), level(70.0..90.0));
     assert!(near > 2.0 && near > far + 2.0, "{near} dB and {far} dB");
-    assert!(powers(&setup(Effects::NONE).scan()).into_iter().flatten().all(|count| *count == 0));
+    assert!(
+        powers(&setup(Effects::NONE).scan())
+            .into_iter()
+            .flatten()
+            .all(|count| *count == 0)
+    );
 }
 
 #[test]
 fn an_opaque_wall_leaves_the_ground_before_it_and_hides_that_behind() {
     let scan = |occlusion, walled: bool| {
-        let mut setup = setup(Effects { occlusion, ..GROUND });
+        let mut setup = setup(Effects {
+            occlusion,
+            ..GROUND
+        });
         let corner = |x| Point2::new(x, -8.0);
-        let wall = Wall { from: corner(-20.0), to: corner(20.0), transmission: 1e-6, mirror: 0.0, body: 1 };
+        let wall = Wall {
+            from: corner(-20.0),
+            to: corner(20.0),
+            transmission: 1e-6,
+            mirror: 0.0,
+            body: 1,
+        };
         setup.body.walls.extend(walled.then_some(wall));
         setup.scan()
     };
     let (open, hidden) = (scan(true, false), scan(true, true));
     let right = 85..115;
-    let (before, behind) = (setup(GROUND).bins(0.0..5.0), setup(GROUND).bins(12.0..100.0));
+    let (before, behind) = (
+        setup(GROUND).bins(0.0..5.0),
+        setup(GROUND).bins(12.0..100.0),
+    );
     for azimuth in right.clone() {
         let (open, hidden) = (open.view().row(azimuth), hidden.view().row(azimuth));
         assert_eq!(open[before.clone()], hidden[before.clone()]);
-        assert!(hidden[behind.clone()].iter().all(|count| *count == 0), "azimuth {azimuth}");
+        assert!(
+            hidden[behind.clone()].iter().all(|count| *count == 0),
+            "azimuth {azimuth}"
+        );
     }
     assert!(mean_db(std::slice::from_ref(&open), right, behind) > 1.0);
     assert_eq!(powers(&scan(false, true)), powers(&open));
@@ -62,7 +89,8 @@ fn brightness_db(scans: &[OwnedScan], places: impl Iterator<Item = Point2<f64>>)
     let setup = setup(GROUND);
     let about = |place: Point2<f64>| {
         let (range_m, azimuth) = (place.coords.norm(), (-place.y).atan2(place.x) / TAU * 400.0);
-        let azimuths = (-3..=3).map(|beside| (azimuth.round() as i64 + beside).rem_euclid(400) as usize);
+        let azimuths =
+            (-3..=3).map(|beside| (azimuth.round() as i64 + beside).rem_euclid(400) as usize);
         let gain = db(setup.receiver().sensitivity(range_m) * range_m);
         // The least power there is counts as none.
         let bins = setup.bins(range_m - 1.0..range_m + 1.0);
@@ -74,22 +102,47 @@ fn brightness_db(scans: &[OwnedScan], places: impl Iterator<Item = Point2<f64>>)
 
 fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-    let moment = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| (x - mean(a)) * (y - mean(b))).sum::<f64>();
+    let moment = |a: &[f64], b: &[f64]| {
+        a.iter()
+            .zip(b)
+            .map(|(x, y)| (x - mean(a)) * (y - mean(b)))
+            .sum::<f64>()
+    };
     moment(a, b) / (moment(a, a) * moment(b, b)).sqrt()
 }
 
 #[test]
 fn the_same_patches_are_seen_from_two_poses() {
-    let poses = [Isometry2::identity(), Isometry2::new(Vector2::new(24.0, 7.0), 1.9)];
+    let poses = [
+        Isometry2::identity(),
+        Isometry2::new(Vector2::new(24.0, 7.0), 1.9),
+    ];
     // Between the two.
-    let places = || (0..=8).flat_map(|i| (-8..=8).map(move |j| Point2::new(8.0 + f64::from(i), 2.0 * f64::from(j))));
+    let places = || {
+        (0..=8).flat_map(|i| {
+            (-8..=8).map(move |j| Point2::new(8.0 + f64::from(i), 2.0 * f64::from(j)))
+        })
+    };
     let seen = |pose: Isometry2<f64>, from: Isometry2<f64>| {
         let parked = Parked(pose);
-        let scans = Setup { trajectory: &parked, ..setup(GROUND) }.scans(6);
-        brightness_db(&scans, places().map(|place| from.inverse_transform_point(&place)))
+        let scans = Setup {
+            trajectory: &parked,
+            ..setup(GROUND)
+        }
+        .scans(6);
+        brightness_db(
+            &scans,
+            places().map(|place| from.inverse_transform_point(&place)),
+        )
     };
     let [first, second] = poses.map(|pose| seen(pose, pose));
     let elsewhere = seen(Isometry2::translation(1000.0, 0.0), poses[0]);
-    let (same, other) = (correlation(&first, &second), correlation(&first, &elsewhere));
-    assert!(same > 0.5 && same > other + 0.3, "{same}, and {other} elsewhere");
+    let (same, other) = (
+        correlation(&first, &second),
+        correlation(&first, &elsewhere),
+    );
+    assert!(
+        same > 0.5 && same > other + 0.3,
+        "{same}, and {other} elsewhere"
+    );
 }

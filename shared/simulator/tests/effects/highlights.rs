@@ -13,8 +13,19 @@ use crate::scene::{Setup, db, peak_bin, peak_db, post, powers};
 const RIGHT: usize = 100;
 
 fn setup(highlights: bool, wall: Wall) -> Setup<'static> {
-    let body = Body { scatterers: vec![], walls: vec![wall] };
-    Setup { body, effects: Effects { highlights, sweep_motion: true, ..Effects::NONE }, ..Setup::default() }
+    let body = Body {
+        scatterers: vec![],
+        walls: vec![wall],
+    };
+    Setup {
+        body,
+        effects: Effects {
+            highlights,
+            sweep_motion: true,
+            ..Effects::NONE
+        },
+        ..Setup::default()
+    }
 }
 
 /// A mirror to the right, as long as stated to both sides of the foot of its perpendicular.
@@ -22,7 +33,13 @@ fn mirror(range_m: f64, mirror: f64, ahead_m: std::ops::Range<f64>) -> Wall {
     let foot = post(range_m, RIGHT as f64, 1.0).position;
     let along = Vector2::new(-foot.y, foot.x).normalize();
     let (from, to) = (foot + along * ahead_m.start, foot + along * ahead_m.end);
-    Wall { from, to, transmission: 1e-4, mirror, body: 1 }
+    Wall {
+        from,
+        to,
+        transmission: 1e-4,
+        mirror,
+        body: 1,
+    }
 }
 
 fn is_dark(scan: &OwnedScan) -> bool {
@@ -32,10 +49,20 @@ fn is_dark(scan: &OwnedScan) -> bool {
 #[test]
 fn the_brightest_place_is_the_foot_of_the_perpendicular_wherever_the_radar_has_driven() {
     let (range_m, speed_m_s) = (12.0, 8.0);
-    let ahead = ConstantTwist { forward_m_s: speed_m_s, left_m_s: 0.0, yaw_rad_s: 0.0 };
-    let beside =
-        Wall { from: Point2::new(-40.0, -range_m), to: Point2::new(40.0, -range_m), ..mirror(range_m, 0.5, 0.0..1.0) };
-    let on = Setup { trajectory: &ahead, ..setup(true, beside) };
+    let ahead = ConstantTwist {
+        forward_m_s: speed_m_s,
+        left_m_s: 0.0,
+        yaw_rad_s: 0.0,
+    };
+    let beside = Wall {
+        from: Point2::new(-40.0, -range_m),
+        to: Point2::new(40.0, -range_m),
+        ..mirror(range_m, 0.5, 0.0..1.0)
+    };
+    let on = Setup {
+        trajectory: &ahead,
+        ..setup(true, beside)
+    };
     let scans = on.scans(9);
     let brightest = |scan: &OwnedScan| {
         let top = |azimuth: &usize| scan.view().row(*azimuth).iter().copied().max();
@@ -47,10 +74,22 @@ fn the_brightest_place_is_the_foot_of_the_perpendicular_wherever_the_radar_has_d
     for (index, scan) in [(0, &scans[0]), (8, &scans[8])] {
         // From where the sensor is as it looks there: 16 m apart.
         let (forward, left, azimuth) = brightest(scan);
-        assert!(forward.abs() < 0.2 && (left + range_m).abs() < 0.1, "scan {index}: {forward} m, {left} m");
-        assert!(azimuth.abs_diff(RIGHT) <= 1, "scan {index}: azimuth {azimuth}");
+        assert!(
+            forward.abs() < 0.2 && (left + range_m).abs() < 0.1,
+            "scan {index}: {forward} m, {left} m"
+        );
+        assert!(
+            azimuth.abs_diff(RIGHT) <= 1,
+            "scan {index}: azimuth {azimuth}"
+        );
     }
-    assert!(is_dark(&Setup { trajectory: &ahead, ..setup(false, beside) }.scan()));
+    assert!(is_dark(
+        &Setup {
+            trajectory: &ahead,
+            ..setup(false, beside)
+        }
+        .scan()
+    ));
     // Beyond its end the wall has no such place.
     assert!(is_dark(on.scans(24).last().unwrap()));
 }
@@ -59,14 +98,28 @@ fn the_brightest_place_is_the_foot_of_the_perpendicular_wherever_the_radar_has_d
 fn it_has_the_cross_section_of_the_walls_mirror_image_less_one_share_for_all() {
     let share_db = |range_m: f64, share: f64| {
         let setup = setup(true, mirror(range_m, share, -30.0..30.0));
-        let peak = peak_db(&setup.scan(), RIGHT, setup.bins(range_m - 1.0..range_m + 1.0));
+        let peak = peak_db(
+            &setup.scan(),
+            RIGHT,
+            setup.bins(range_m - 1.0..range_m + 1.0),
+        );
         peak - setup.received_db(PI * range_m * range_m * share, range_m)
     };
-    let shares = [(10.0, 0.8), (10.0, 0.2), (40.0, 0.8), (40.0, 0.2)].map(|(range_m, share)| share_db(range_m, share));
-    assert!(shares.iter().all(|db| (db - shares[0]).abs() < 0.8), "{shares:?} dB");
+    let shares = [(10.0, 0.8), (10.0, 0.2), (40.0, 0.8), (40.0, 0.2)]
+        .map(|(range_m, share)| share_db(range_m, share));
+    assert!(
+        shares.iter().all(|db| (db - shares[0]).abs() < 0.8),
+        "{shares:?} dB"
+    );
     assert!((-40.0..db(0.5)).contains(&shares[0]), "{shares:?} dB");
-    assert!(is_dark(&setup(true, mirror(10.0, 0.0, -30.0..30.0)).scan()), "a rough wall");
-    assert!(is_dark(&setup(true, mirror(10.0, 0.8, 1.0..30.0)).scan()), "a wall beside the perpendicular");
+    assert!(
+        is_dark(&setup(true, mirror(10.0, 0.0, -30.0..30.0)).scan()),
+        "a rough wall"
+    );
+    assert!(
+        is_dark(&setup(true, mirror(10.0, 0.8, 1.0..30.0)).scan()),
+        "a wall beside the perpendicular"
+    );
 }
 
 #[test]
@@ -74,8 +127,17 @@ fn what_stands_before_it_hides_it() {
     let peak = |occlusion| {
         let mut setup = setup(true, mirror(20.0, 0.1, -30.0..30.0));
         setup.effects.occlusion = occlusion;
-        setup.body.walls.push(Wall { transmission: 0.01, body: 2, ..mirror(10.0, 0.0, -5.0..5.0) });
+        setup.body.walls.push(Wall {
+            transmission: 0.01,
+            body: 2,
+            ..mirror(10.0, 0.0, -5.0..5.0)
+        });
         peak_db(&setup.scan(), RIGHT, setup.bins(19.0..21.0))
     };
-    assert!((peak(false) - peak(true) - 20.0).abs() < 0.8, "{} and {} dB", peak(false), peak(true));
+    assert!(
+        (peak(false) - peak(true) - 20.0).abs() < 0.8,
+        "{} and {} dB",
+        peak(false),
+        peak(true)
+    );
 }

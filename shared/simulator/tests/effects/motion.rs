@@ -4,18 +4,34 @@ use std::f64::consts::TAU;
 
 use gyre_radar::{DatasetOptions, OwnedScan};
 use gyre_simulator::profile::Profile;
-use gyre_simulator::{Body, ConstantTwist, Effects, Movers, Moving, SensorConfig, SimulationConfig, write_dataset};
+use gyre_simulator::{
+    Body, ConstantTwist, Effects, Movers, Moving, SensorConfig, SimulationConfig, write_dataset,
+};
 use nalgebra::{Isometry2, Point2, Vector2};
 
 use crate::scene::{Setup, peak_bin, post, power};
 
-const AHEAD: ConstantTwist = ConstantTwist { forward_m_s: 20.0, left_m_s: 0.0, yaw_rad_s: 0.0 };
+const AHEAD: ConstantTwist = ConstantTwist {
+    forward_m_s: 20.0,
+    left_m_s: 0.0,
+    yaw_rad_s: 0.0,
+};
 
 /// The azimuth, with fractions, at which the power of a lone point is centred.
 fn centre(scan: &OwnedScan) -> f64 {
-    let sums = |azimuth: usize| scan.view().row(azimuth).iter().map(|count| power(*count) - power(0)).sum::<f64>();
+    let sums = |azimuth: usize| {
+        scan.view()
+            .row(azimuth)
+            .iter()
+            .map(|count| power(*count) - power(0))
+            .sum::<f64>()
+    };
     let weights: Vec<f64> = (0..scan.geometry.azimuths).map(sums).collect();
-    let moment: f64 = weights.iter().enumerate().map(|(azimuth, weight)| azimuth as f64 * weight).sum();
+    let moment: f64 = weights
+        .iter()
+        .enumerate()
+        .map(|(azimuth, weight)| azimuth as f64 * weight)
+        .sum();
     moment / weights.iter().sum::<f64>()
 }
 
@@ -23,13 +39,28 @@ fn centre(scan: &OwnedScan) -> f64 {
 fn azimuths_are_measured_each_from_its_own_pose_or_all_from_the_middle() {
     // At azimuth 100, a quarter of the sweep, the car is 1.25 m short of the middle.
     let measured = |sweep_motion| {
-        let mut setup = Setup::of(vec![post(20.0, 100.0, 3.0)], Effects { sweep_motion, ..Effects::NONE });
+        let mut setup = Setup::of(
+            vec![post(20.0, 100.0, 3.0)],
+            Effects {
+                sweep_motion,
+                ..Effects::NONE
+            },
+        );
         setup.trajectory = &AHEAD;
         centre(&setup.scan())
     };
-    assert!((measured(false) - 100.0).abs() < 0.05, "{}", measured(false));
+    assert!(
+        (measured(false) - 100.0).abs() < 0.05,
+        "{}",
+        measured(false)
+    );
     let turned = -(1.25f64 / 20.0).atan() / TAU * 400.0;
-    assert!((measured(true) - 100.0 - turned).abs() < 0.15, "{} for {}", measured(true), 100.0 + turned);
+    assert!(
+        (measured(true) - 100.0 - turned).abs() < 0.15,
+        "{} for {}",
+        measured(true),
+        100.0 + turned
+    );
 }
 
 /// A post that moves at 10 m/s to the right from a place 20 m to the right.
@@ -38,19 +69,36 @@ struct Leaving(Body);
 impl Movers for Leaving {
     fn visit<'a>(&'a self, time_s: f64, _: Point2<f64>, _: f64, see: &mut dyn FnMut(Moving<'a>)) {
         let pose = Isometry2::translation(0.0, -10.0 * time_s);
-        see(Moving { body: &self.0, pose, velocity: Vector2::new(0.0, -10.0) });
+        see(Moving {
+            body: &self.0,
+            pose,
+            velocity: Vector2::new(0.0, -10.0),
+        });
     }
 }
 
 #[test]
 fn what_moves_is_seen_where_it_is_when_the_beam_passes() {
-    let leaving = Leaving(Body { scatterers: vec![post(20.0, 100.0, 3.0)], walls: vec![] });
+    let leaving = Leaving(Body {
+        scatterers: vec![post(20.0, 100.0, 3.0)],
+        walls: vec![],
+    });
     for (sweep_motion, expected_m) in [(true, [19.375, 24.375]), (false, [20.0, 25.0])] {
-        let setup = Setup { movers: &leaving, effects: Effects { sweep_motion, ..Effects::NONE }, ..Setup::default() };
+        let setup = Setup {
+            movers: &leaving,
+            effects: Effects {
+                sweep_motion,
+                ..Effects::NONE
+            },
+            ..Setup::default()
+        };
         let scans = setup.scans(3);
         for (scan, expected_m) in [&scans[0], &scans[2]].into_iter().zip(expected_m) {
             let range_m = setup.sampling().range_m(peak_bin(scan, 100));
-            assert!((range_m - expected_m).abs() < 0.05, "{range_m} m for {expected_m} m");
+            assert!(
+                (range_m - expected_m).abs() < 0.05,
+                "{range_m} m for {expected_m} m"
+            );
         }
     }
 }
@@ -59,11 +107,21 @@ fn what_moves_is_seen_where_it_is_when_the_beam_passes() {
 fn rising_chirps_read_what_approaches_too_near_and_falling_ones_too_far() {
     let shifts_m = |profile: Profile, azimuth: f64| {
         let measured = |doppler| {
-            let mut setup =
-                Setup::of(vec![post(30.0, azimuth, 3.0)], Effects { doppler, ..Effects::NONE }).with(profile);
+            let mut setup = Setup::of(
+                vec![post(30.0, azimuth, 3.0)],
+                Effects {
+                    doppler,
+                    ..Effects::NONE
+                },
+            )
+            .with(profile);
             setup.trajectory = &AHEAD;
             let scan = setup.scan();
-            [0, 1].map(|side| setup.sampling().range_m(peak_bin(&scan, azimuth as usize + side)))
+            [0, 1].map(|side| {
+                setup
+                    .sampling()
+                    .range_m(peak_bin(&scan, azimuth as usize + side))
+            })
         };
         let (on, off) = (measured(true), measured(false));
         [on[0] - off[0], on[1] - off[1]]
@@ -78,18 +136,31 @@ fn rising_chirps_read_what_approaches_too_near_and_falling_ones_too_far() {
         (Profile::K2pi, 10.0, [0.0, 0.0]),
     ] {
         let found = shifts_m(profile, azimuth);
-        let off = found.iter().zip(expected).map(|(found, expected)| (found - expected).abs());
-        assert!(off.fold(0.0, f64::max) < 0.05, "{profile:?} at {azimuth}: {found:?} m for {expected:?} m");
+        let off = found
+            .iter()
+            .zip(expected)
+            .map(|(found, expected)| (found - expected).abs());
+        assert!(
+            off.fold(0.0, f64::max) < 0.05,
+            "{profile:?} at {azimuth}: {found:?} m for {expected:?} m"
+        );
     }
 }
 
 #[test]
 fn an_azimuth_says_which_chirp_it_used() {
-    let setup = Setup { effects: Effects::ALL, ..Setup::default() }.with(Profile::Ras6);
+    let setup = Setup {
+        effects: Effects::ALL,
+        ..Setup::default()
+    }
+    .with(Profile::Ras6);
     let scan = setup.scan();
     for azimuth in 0..400 {
         let sign = if azimuth % 2 == 0 { 1.0 } else { -1.0 };
-        assert_eq!(scan.view().doppler_s(azimuth), sign * setup.sampling().doppler_s as f32);
+        assert_eq!(
+            scan.view().doppler_s(azimuth),
+            sign * setup.sampling().doppler_s as f32
+        );
     }
 }
 
@@ -98,27 +169,44 @@ fn a_discs_eccentricity_turns_the_beam_by_its_cosine() {
     const ECCENTRICITY_RAD: f64 = 0.02;
     for azimuth in [30.0, 100.0, 200.0, 250.0, 390.0] {
         let measured = |encoder_wobble| {
-            let effects = Effects { encoder_wobble, ..Effects::NONE };
+            let effects = Effects {
+                encoder_wobble,
+                ..Effects::NONE
+            };
             let mut setup = Setup::of(vec![post(30.0, azimuth, 3.0)], effects);
-            setup.sensor = SensorConfig { azimuth_eccentricity_rad: ECCENTRICITY_RAD, ..setup.sensor };
+            setup.sensor = SensorConfig {
+                azimuth_eccentricity_rad: ECCENTRICITY_RAD,
+                ..setup.sensor
+            };
             let angle = |azimuth: f64| setup.sampling().azimuth_rad(0) + azimuth * TAU / 400.0;
             angle(centre(&setup.scan()))
         };
         let (truth, reported) = (measured(false), measured(true));
         let corrected = reported + ECCENTRICITY_RAD * reported.cos();
         let twentieth_rad = 0.05 * TAU / 400.0;
-        assert!((corrected - truth).abs() < twentieth_rad, "azimuth {azimuth}: {} rad", corrected - truth);
+        assert!(
+            (corrected - truth).abs() < twentieth_rad,
+            "azimuth {azimuth}: {} rad",
+            corrected - truth
+        );
     }
 }
 
 #[test]
 fn a_readers_correction_is_that_of_the_disc() {
     let folder = tempfile::tempdir().unwrap();
-    let mut config = SimulationConfig { scans: 1, effects: Effects::NONE, ..SimulationConfig::default() };
+    let mut config = SimulationConfig {
+        scans: 1,
+        effects: Effects::NONE,
+        ..SimulationConfig::default()
+    };
     config.sensor.azimuth_eccentricity_rad = 0.02;
     write_dataset(&config, folder.path(), &mut |_, _| {}).unwrap();
     let read = |azimuth_eccentricity_rad| {
-        let options = DatasetOptions { azimuth_eccentricity_rad, ..DatasetOptions::default() };
+        let options = DatasetOptions {
+            azimuth_eccentricity_rad,
+            ..DatasetOptions::default()
+        };
         let mut dataset = gyre_radar::open(folder.path(), &options).unwrap();
         let mut scan = OwnedScan::with_limits(dataset.limits());
         scan.geometry = dataset.read(0, scan.slot()).unwrap();
@@ -127,6 +215,9 @@ fn a_readers_correction_is_that_of_the_disc() {
     assert_eq!(read(None), read(Some(0.02)), "the recording says so itself");
     for (reported, corrected) in read(Some(0.0)).into_iter().zip(read(Some(0.02))) {
         let expected = (reported + 0.02 * reported.cos()).rem_euclid(TAU as f32);
-        assert!((corrected - expected).abs() < 1e-5, "{corrected} for {expected}");
+        assert!(
+            (corrected - expected).abs() < 1e-5,
+            "{corrected} for {expected}"
+        );
     }
 }

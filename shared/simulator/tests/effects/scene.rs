@@ -6,7 +6,9 @@ use gyre_radar::{OwnedScan, ScanLimits};
 use gyre_simulator::profile::{Profile, Receiver, Sampling};
 use gyre_simulator::weather::WeatherConfig;
 use gyre_simulator::world::{Aspect, NO_BODY, Scatterer};
-use gyre_simulator::{Body, ConstantTwist, Effects, Movers, Scene, Sensor, SensorConfig, SweepTime, Trajectory, World};
+use gyre_simulator::{
+    Body, ConstantTwist, Effects, Movers, Scene, Sensor, SensorConfig, SweepTime, Trajectory, World,
+};
 use nalgebra::Point2;
 
 /// What is measured, and how: Oxford's radar at rest, without any effect, unless said otherwise.
@@ -19,7 +21,11 @@ pub struct Setup<'a> {
     pub effects: Effects,
 }
 
-const AT_REST: ConstantTwist = ConstantTwist { forward_m_s: 0.0, left_m_s: 0.0, yaw_rad_s: 0.0 };
+const AT_REST: ConstantTwist = ConstantTwist {
+    forward_m_s: 0.0,
+    left_m_s: 0.0,
+    yaw_rad_s: 0.0,
+};
 
 impl Default for Setup<'_> {
     fn default() -> Self {
@@ -36,7 +42,14 @@ impl Default for Setup<'_> {
 
 impl Setup<'_> {
     pub fn of(scatterers: Vec<Scatterer>, effects: Effects) -> Self {
-        Self { body: Body { scatterers, walls: vec![] }, effects, ..Self::default() }
+        Self {
+            body: Body {
+                scatterers,
+                walls: vec![],
+            },
+            effects,
+            ..Self::default()
+        }
     }
 
     pub fn with(mut self, profile: Profile) -> Self {
@@ -58,16 +71,29 @@ impl Setup<'_> {
     }
 
     pub fn scans(&self, count: u64) -> Vec<OwnedScan> {
-        let Sampling { azimuths, period_us, .. } = self.sampling();
+        let Sampling {
+            azimuths,
+            period_us,
+            ..
+        } = self.sampling();
         let world = World::new(self.body.clone());
         let mut sensor = Sensor::new(&self.sensor, &self.effects, 7);
         let mut scan = |index: u64| {
             let epoch_us = 1_500_000_000_000_000;
-            let mut time = SweepTime { start_us: epoch_us, period_us, azimuths, epoch_us };
+            let mut time = SweepTime {
+                start_us: epoch_us,
+                period_us,
+                azimuths,
+                epoch_us,
+            };
             time.epoch_us = time.middle_us();
             time.start_us += period_us * index as i64;
-            let scene =
-                Scene { world: &world, movers: self.movers, trajectory: self.trajectory, weather: self.weather };
+            let scene = Scene {
+                world: &world,
+                movers: self.movers,
+                trajectory: self.trajectory,
+                weather: self.weather,
+            };
             let bytes = azimuths * self.sampling().stride();
             let mut scan = OwnedScan::with_limits(ScanLimits { bytes, azimuths });
             scan.geometry = sensor.sweep(scene, time, index, &mut scan.slot());
@@ -92,7 +118,12 @@ impl Setup<'_> {
 pub fn post(range_m: f64, azimuth: f64, cross_section_m2: f64) -> Scatterer {
     let angle = Profile::Cts350xOxford.sampling().azimuth_rad(0) + azimuth * TAU / 400.0;
     let position = Point2::new(range_m * angle.cos(), -range_m * angle.sin());
-    Scatterer { position, cross_section_m2, aspect: Aspect::AllRound, body: NO_BODY }
+    Scatterer {
+        position,
+        cross_section_m2,
+        aspect: Aspect::AllRound,
+        body: NO_BODY,
+    }
 }
 
 pub fn db(power: f64) -> f64 {
@@ -110,14 +141,27 @@ pub fn mean_db(
     azimuths: impl IntoIterator<Item = usize> + Clone,
     bins: std::ops::Range<usize>,
 ) -> f64 {
-    let rows = scans.iter().flat_map(|scan| azimuths.clone().into_iter().map(move |azimuth| scan.view().row(azimuth)));
-    let powers: Vec<f64> = rows.flat_map(|row| row[bins.clone()].iter().map(|count| power(*count))).collect();
+    let rows = scans.iter().flat_map(|scan| {
+        azimuths
+            .clone()
+            .into_iter()
+            .map(move |azimuth| scan.view().row(azimuth))
+    });
+    let powers: Vec<f64> = rows
+        .flat_map(|row| row[bins.clone()].iter().map(|count| power(*count)))
+        .collect();
     db(powers.iter().sum::<f64>() / powers.len() as f64)
 }
 
 /// Strongest power of bins in an azimuth, dB.
 pub fn peak_db(scan: &OwnedScan, azimuth: usize, bins: std::ops::Range<usize>) -> f64 {
-    db(power(scan.view().row(azimuth)[bins].iter().copied().max().unwrap()))
+    db(power(
+        scan.view().row(azimuth)[bins]
+            .iter()
+            .copied()
+            .max()
+            .unwrap(),
+    ))
 }
 
 /// The bin of the strongest power in an azimuth: the middle of its plateau.
@@ -131,5 +175,7 @@ pub fn peak_bin(scan: &OwnedScan, azimuth: usize) -> f64 {
 /// The powers alone, azimuth by azimuth.
 pub fn powers(scan: &OwnedScan) -> Vec<&[u8]> {
     let view = scan.view();
-    (0..view.geometry.azimuths).map(|azimuth| view.row(azimuth)).collect()
+    (0..view.geometry.azimuths)
+        .map(|azimuth| view.row(azimuth))
+        .collect()
 }

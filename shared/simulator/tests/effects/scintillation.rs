@@ -13,36 +13,74 @@ const TURN_RAD_S: f64 = std::f64::consts::TAU / (0.25 * SCANS as f64);
 
 /// So many scans of a post that always stands 20 m to the left: the radar circles about it.
 fn scans(count: u64, scintillation: bool, yaw_rad_s: f64) -> Vec<OwnedScan> {
-    let post =
-        Scatterer { position: Point2::new(0.0, 20.0), cross_section_m2: 3.0, aspect: Aspect::AllRound, body: NO_BODY };
-    let round = ConstantTwist { forward_m_s: 20.0 * yaw_rad_s, left_m_s: 0.0, yaw_rad_s };
-    Setup { trajectory: &round, ..Setup::of(vec![post], Effects { scintillation, ..Effects::NONE }) }.scans(count)
+    let post = Scatterer {
+        position: Point2::new(0.0, 20.0),
+        cross_section_m2: 3.0,
+        aspect: Aspect::AllRound,
+        body: NO_BODY,
+    };
+    let round = ConstantTwist {
+        forward_m_s: 20.0 * yaw_rad_s,
+        left_m_s: 0.0,
+        yaw_rad_s,
+    };
+    Setup {
+        trajectory: &round,
+        ..Setup::of(
+            vec![post],
+            Effects {
+                scintillation,
+                ..Effects::NONE
+            },
+        )
+    }
+    .scans(count)
 }
 
 /// The post's power in each scan, dB.
 fn powers_db(scans: &[OwnedScan]) -> Vec<f64> {
-    scans.iter().map(|scan| peak_db(scan, 299, Setup::default().bins(19.0..21.0))).collect()
+    scans
+        .iter()
+        .map(|scan| peak_db(scan, 299, Setup::default().bins(19.0..21.0)))
+        .collect()
 }
 
 #[test]
 fn a_posts_power_is_spread_exponentially_over_aspects_about_what_it_is_without() {
-    let (steady, flickering) =
-        (powers_db(&scans(SCANS, false, TURN_RAD_S)), powers_db(&scans(SCANS, true, TURN_RAD_S)));
-    let factors: Vec<f64> =
-        steady.iter().zip(&flickering).map(|(steady, on)| 10f64.powf((on - steady) / 10.0)).collect();
+    let (steady, flickering) = (
+        powers_db(&scans(SCANS, false, TURN_RAD_S)),
+        powers_db(&scans(SCANS, true, TURN_RAD_S)),
+    );
+    let factors: Vec<f64> = steady
+        .iter()
+        .zip(&flickering)
+        .map(|(steady, on)| 10f64.powf((on - steady) / 10.0))
+        .collect();
     let mean = factors.iter().sum::<f64>() / factors.len() as f64;
     assert!((0.75..1.3).contains(&mean), "{mean}");
     // Of an exponential distribution 1 - exp(-0.2) = 18% lie below a fifth of the mean, exp(-2) = 14% above twice it.
-    let share = |chosen: &dyn Fn(f64) -> bool| factors.iter().filter(|f| chosen(**f)).count() as f64 / SCANS as f64;
+    let share = |chosen: &dyn Fn(f64) -> bool| {
+        factors.iter().filter(|f| chosen(**f)).count() as f64 / SCANS as f64
+    };
     let (weak, strong) = (share(&|f| f < 0.2), share(&|f| f > 2.0));
-    assert!((weak - 0.18).abs() < 0.09 && (strong - 0.14).abs() < 0.09, "{weak} and {strong}");
+    assert!(
+        (weak - 0.18).abs() < 0.09 && (strong - 0.14).abs() < 0.09,
+        "{weak} and {strong}"
+    );
 }
 
 #[test]
 fn power_changes_from_pose_to_pose_and_without_it_or_at_rest_never() {
-    let largest_change_db =
-        |powers: &[f64]| powers.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
+    let largest_change_db = |powers: &[f64]| {
+        powers
+            .windows(2)
+            .map(|pair| (pair[1] - pair[0]).abs())
+            .fold(0.0, f64::max)
+    };
     assert!(largest_change_db(&powers_db(&scans(30, true, TURN_RAD_S))) > 6.0);
-    assert!(largest_change_db(&powers_db(&scans(30, false, TURN_RAD_S))) <= 0.5, "one step of the quantisation");
+    assert!(
+        largest_change_db(&powers_db(&scans(30, false, TURN_RAD_S))) <= 0.5,
+        "one step of the quantisation"
+    );
     assert_eq!(largest_change_db(&powers_db(&scans(30, true, 0.0))), 0.0);
 }

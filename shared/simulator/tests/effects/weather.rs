@@ -6,16 +6,35 @@ use gyre_simulator::weather::WeatherConfig;
 
 use crate::scene::{Setup, db, mean_db, peak_db, post, power, powers};
 
-const RAIN: WeatherConfig = WeatherConfig { from_s: 0.0, rain_mm_h: 100.0, fog_g_m3: 0.0, snow_mm_h: 0.0 };
-const FOG: WeatherConfig = WeatherConfig { rain_mm_h: 0.0, fog_g_m3: 3.0, ..RAIN };
-const SNOW: WeatherConfig = WeatherConfig { rain_mm_h: 0.0, snow_mm_h: 40.0, ..RAIN };
-const ON: Effects = Effects { weather: true, ..Effects::NONE };
+const RAIN: WeatherConfig = WeatherConfig {
+    from_s: 0.0,
+    rain_mm_h: 100.0,
+    fog_g_m3: 0.0,
+    snow_mm_h: 0.0,
+};
+const FOG: WeatherConfig = WeatherConfig {
+    rain_mm_h: 0.0,
+    fog_g_m3: 3.0,
+    ..RAIN
+};
+const SNOW: WeatherConfig = WeatherConfig {
+    rain_mm_h: 0.0,
+    snow_mm_h: 40.0,
+    ..RAIN
+};
+const ON: Effects = Effects {
+    weather: true,
+    ..Effects::NONE
+};
 
 /// How much more an echo at 220 m loses by the weather than one at 20 m, dB.
 fn loss_db(weather: WeatherConfig, effects: Effects) -> f64 {
     let loss = |range_m: f64, cross_section_m2: f64| {
         let at = |weather| {
-            let setup = Setup { weather, ..Setup::of(vec![post(range_m, 100.0, cross_section_m2)], effects) };
+            let setup = Setup {
+                weather,
+                ..Setup::of(vec![post(range_m, 100.0, cross_section_m2)], effects)
+            };
             let setup = setup.with(Profile::Ras6);
             peak_db(&setup.scan(), 100, setup.bins(range_m - 1.0..range_m + 1.0))
         };
@@ -29,7 +48,11 @@ fn rain_attenuates_as_p_838_says() {
     // ITU-R P.838-3, horizontal polarisation, 76.5 GHz: between k 1.0315, alpha 0.7345 (70 GHz) and 1.1704, 0.7115 (80 GHz).
     let db_km = 1.122 * 100f64.powf(0.7195);
     let loss = loss_db(RAIN, ON);
-    assert!((loss - 0.4 * db_km).abs() < 1.0, "{loss} dB for {} dB", 0.4 * db_km);
+    assert!(
+        (loss - 0.4 * db_km).abs() < 1.0,
+        "{loss} dB for {} dB",
+        0.4 * db_km
+    );
     assert_eq!(loss_db(RAIN, Effects::NONE), 0.0);
 }
 
@@ -43,7 +66,11 @@ fn fog_attenuates_as_p_840_says() {
 
 #[test]
 fn rains_echoes_fill_the_beam_whose_area_grows_with_the_square_of_range() {
-    let setup = Setup { weather: RAIN, effects: ON, ..Setup::default() };
+    let setup = Setup {
+        weather: RAIN,
+        effects: ON,
+        ..Setup::default()
+    };
     let scans = setup.scans(2);
     let clutter_m2 = |range_m: f64| {
         let received = mean_db(&scans, 0..400, setup.bins(range_m - 1.0..range_m + 1.0));
@@ -51,22 +78,41 @@ fn rains_echoes_fill_the_beam_whose_area_grows_with_the_square_of_range() {
         received - db(setup.receiver().sensitivity(range_m)) + attenuation
     };
     let (near, far) = (clutter_m2(20.0), clutter_m2(80.0));
-    assert!((far - near - db(16.0)).abs() < 0.4, "{far} dB and {near} dB");
+    assert!(
+        (far - near - db(16.0)).abs() < 0.4,
+        "{far} dB and {near} dB"
+    );
     // So it falls with the square of range where a point's echo falls with the fourth power: here less, as the receiver's gain rises.
-    let setup = Setup { weather: RAIN, effects: Effects::NONE, ..Setup::default() };
-    assert!(powers(&setup.scan()).into_iter().flatten().all(|count| *count == 0));
+    let setup = Setup {
+        weather: RAIN,
+        effects: Effects::NONE,
+        ..Setup::default()
+    };
+    assert!(
+        powers(&setup.scan())
+            .into_iter()
+            .flatten()
+            .all(|count| *count == 0)
+    );
 }
 
 #[test]
 fn snow_is_spottier_than_rain() {
     // Second moment of power over its mean's square: 2 of Gaussian noise.
     let moment = |weather| {
-        let setup = Setup { weather, effects: ON, ..Setup::default() };
+        let setup = Setup {
+            weather,
+            effects: ON,
+            ..Setup::default()
+        };
         let scan = setup.scan();
         let near = setup.bins(19.0..21.0);
         let rows = powers(&scan);
-        let values = rows.iter().flat_map(|row| row[near.clone()].iter().map(|count| power(*count)));
-        let (count, sum, squares) = values.fold((0.0, 0.0, 0.0), |(n, s, q), p| (n + 1.0, s + p, q + p * p));
+        let values = rows
+            .iter()
+            .flat_map(|row| row[near.clone()].iter().map(|count| power(*count)));
+        let (count, sum, squares) =
+            values.fold((0.0, 0.0, 0.0), |(n, s, q), p| (n + 1.0, s + p, q + p * p));
         squares * count / (sum * sum)
     };
     let (rain, snow) = (moment(RAIN), moment(SNOW));

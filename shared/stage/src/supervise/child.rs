@@ -9,7 +9,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-use rustix::process::{Pid, Signal, getpid, getppid, kill_process_group, set_parent_process_death_signal};
+use rustix::process::{
+    Pid, Signal, getpid, getppid, kill_process_group, set_parent_process_death_signal,
+};
 
 use super::{StagePlan, SuperviseError};
 use crate::{Manifest, StageError, run};
@@ -54,7 +56,11 @@ impl Child {
         })
     }
 
-    pub(super) fn respawn(&mut self, manifest: &Manifest, newest_pose: Option<u64>) -> Result<(), SuperviseError> {
+    pub(super) fn respawn(
+        &mut self,
+        manifest: &Manifest,
+        newest_pose: Option<u64>,
+    ) -> Result<(), SuperviseError> {
         self.process = start(&self.plan, manifest, &self.log)?;
         self.status = None;
         self.pose_at_restart = Some(newest_pose);
@@ -92,7 +98,10 @@ impl Child {
     /// Counts the death against the policy.
     pub(super) fn may_restart(&mut self, death: &Death) -> Result<(), SuperviseError> {
         if death.code == Some(i32::from(StageError::HOPELESS)) {
-            let words = death.last_words.clone().unwrap_or_else(|| format!("{}: {}", self.name(), death.how));
+            let words = death
+                .last_words
+                .clone()
+                .unwrap_or_else(|| format!("{}: {}", self.name(), death.how));
             return Err(SuperviseError::Hopeless { words });
         }
         let policy = self.plan.restart;
@@ -107,7 +116,10 @@ impl Child {
             times: self.deaths.len(),
             window_s: policy.window_s,
             how: death.how.clone(),
-            words: death.last_words.as_ref().map_or(String::new(), |words| format!(" ({words})")),
+            words: death
+                .last_words
+                .as_ref()
+                .map_or(String::new(), |words| format!(" ({words})")),
         })
     }
 
@@ -117,7 +129,12 @@ impl Child {
             (Some(signal), _) => format!("signal {signal}"),
             (None, code) => format!("exit code {}", code.unwrap_or_default()),
         };
-        Death { killed: status.signal().is_some(), how, code: status.code(), last_words: self.last_words() }
+        Death {
+            killed: status.signal().is_some(),
+            how,
+            code: status.code(),
+            last_words: self.last_words(),
+        }
     }
 
     pub(super) fn ask_to_end(&self) {
@@ -146,7 +163,10 @@ impl Child {
         self.log.seek(SeekFrom::Start(self.said_before)).ok()?;
         let read = self.log.read_to_string(&mut said).ok()?;
         self.said_before += read as u64;
-        said.lines().rev().find(|line| !line.trim().is_empty()).map(str::to_owned)
+        said.lines()
+            .rev()
+            .find(|line| !line.trim().is_empty())
+            .map(str::to_owned)
     }
 }
 
@@ -159,14 +179,28 @@ impl Drop for Child {
 /// What it writes to its standard output and error: `<out>/log/<stage>.txt`.
 fn open_log(plan: &StagePlan, manifest: &Manifest) -> Result<File, StageError> {
     let path = manifest.out.join("log").join(format!("{}.txt", plan.name));
-    let opened = OpenOptions::new().create(true).append(true).read(true).open(&path);
+    let opened = OpenOptions::new()
+        .create(true)
+        .append(true)
+        .read(true)
+        .open(&path);
     opened.map_err(|source| StageError::File { path, source })
 }
 
-fn start(plan: &StagePlan, manifest: &Manifest, log: &File) -> Result<std::process::Child, SuperviseError> {
-    let failed = |source| SuperviseError::Spawn { stage: plan.name.clone(), command: plan.command.join(" "), source };
-    let (program, arguments) =
-        plan.command.split_first().ok_or_else(|| failed(io::Error::new(io::ErrorKind::InvalidInput, "it is empty")))?;
+fn start(
+    plan: &StagePlan,
+    manifest: &Manifest,
+    log: &File,
+) -> Result<std::process::Child, SuperviseError> {
+    let failed = |source| SuperviseError::Spawn {
+        stage: plan.name.clone(),
+        command: plan.command.join(" "),
+        source,
+    };
+    let (program, arguments) = plan
+        .command
+        .split_first()
+        .ok_or_else(|| failed(io::Error::new(io::ErrorKind::InvalidInput, "it is empty")))?;
     let mut command = Command::new(program);
     command
         .args(arguments)

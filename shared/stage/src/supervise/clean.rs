@@ -4,7 +4,10 @@
 //! can leave a shared-memory file of no length, and whoever opens that waits for ever; or a tag of no content, and cleaning
 //! fails for ever. Both are removed first. What has not been seen yet is caught by a time limit.
 
-use std::{collections::HashSet, fs, os::unix::fs::PermissionsExt, path::Path, sync::mpsc, thread, time::Duration};
+use std::{
+    collections::HashSet, fs, os::unix::fs::PermissionsExt, path::Path, sync::mpsc, thread,
+    time::Duration,
+};
 
 use iceoryx2::{
     node::NodeView,
@@ -80,9 +83,23 @@ fn remove_dead_nodes(transport: &Config) -> bool {
 
 /// The ids of dead processes' ports: each has a tag `<prefix><port id>.port_tag` in its node's directory.
 fn ports_of(manifest: &Manifest, dead: &[String]) -> HashSet<String> {
-    let names = |node: &String| fs::read_dir(manifest.root.join("nodes").join(node)).into_iter().flatten().flatten();
-    let port = |name: String| Some(name.strip_prefix(&manifest.prefix)?.strip_suffix(".port_tag")?.to_owned());
-    dead.iter().flat_map(names).filter_map(|tag| port(tag.file_name().to_string_lossy().into_owned())).collect()
+    let names = |node: &String| {
+        fs::read_dir(manifest.root.join("nodes").join(node))
+            .into_iter()
+            .flatten()
+            .flatten()
+    };
+    let port = |name: String| {
+        Some(
+            name.strip_prefix(&manifest.prefix)?
+                .strip_suffix(".port_tag")?
+                .to_owned(),
+        )
+    };
+    dead.iter()
+        .flat_map(names)
+        .filter_map(|tag| port(tag.file_name().to_string_lossy().into_owned()))
+        .collect()
 }
 
 /// Removes files of no length whose names are the run's and pass `is_dead`.
@@ -101,7 +118,9 @@ fn unlink_half_made_tags(directory: &Path) {
     for file in fs::read_dir(directory).into_iter().flatten().flatten() {
         let name = file.file_name().to_string_lossy().into_owned();
         let tag = name.ends_with(".service_tag") || name.ends_with(".port_tag");
-        let half_made = file.metadata().is_ok_and(|f| f.len() == 0 && f.permissions().mode() & 0o777 == HALF_MADE);
+        let half_made = file
+            .metadata()
+            .is_ok_and(|f| f.len() == 0 && f.permissions().mode() & 0o777 == HALF_MADE);
         if tag && half_made {
             let _ = fs::remove_file(file.path());
         }
@@ -116,13 +135,19 @@ mod tests {
     #[test]
     fn only_empty_files_of_dead_ports_are_removed() {
         let directory = tempfile::tempdir().unwrap();
-        for (name, content) in
-            [("run_1_2.connection", ""), ("run_3_4.connection", ""), ("run_1_5.data", "x"), ("other_1", "")]
-        {
+        for (name, content) in [
+            ("run_1_2.connection", ""),
+            ("run_3_4.connection", ""),
+            ("run_1_5.data", "x"),
+            ("other_1", ""),
+        ] {
             fs::write(directory.path().join(name), content).unwrap();
         }
         unlink_empty_files(directory.path(), "run_", |name| name.contains("_1_"));
-        let mut left: Vec<_> = fs::read_dir(directory.path()).unwrap().map(|file| file.unwrap().file_name()).collect();
+        let mut left: Vec<_> = fs::read_dir(directory.path())
+            .unwrap()
+            .map(|file| file.unwrap().file_name())
+            .collect();
         left.sort();
         assert_eq!(left, ["other_1", "run_1_5.data", "run_3_4.connection"]);
     }
@@ -136,6 +161,9 @@ mod tests {
             fs::set_permissions(&path, fs::Permissions::from_mode(mode)).unwrap();
         }
         unlink_half_made_tags(directory.path());
-        assert!(!directory.path().join("a.port_tag").exists() && directory.path().join("b.port_tag").exists());
+        assert!(
+            !directory.path().join("a.port_tag").exists()
+                && directory.path().join("b.port_tag").exists()
+        );
     }
 }

@@ -45,7 +45,11 @@ pub struct RestartPolicy {
 
 impl Default for RestartPolicy {
     fn default() -> Self {
-        Self { limit: 5, window_s: 30.0, backoff_ms: 100 }
+        Self {
+            limit: 5,
+            window_s: 30.0,
+            backoff_ms: 100,
+        }
     }
 }
 
@@ -107,7 +111,9 @@ pub enum SuperviseError {
     #[error(transparent)]
     Stage(#[from] StageError),
     /// A command cannot be started.
-    #[error("cannot start {stage} with `{command}`: {source}; see [stages.{stage}] command in the configuration")]
+    #[error(
+        "cannot start {stage} with `{command}`: {source}; see [stages.{stage}] command in the configuration"
+    )]
     Spawn {
         /// Which stage.
         stage: String,
@@ -123,7 +129,9 @@ pub enum SuperviseError {
         words: String,
     },
     /// A stage that dies again and again.
-    #[error("{stage} died {times} times within {window_s} s, the last time by {how}{words}; giving up")]
+    #[error(
+        "{stage} died {times} times within {window_s} s, the last time by {how}{words}; giving up"
+    )]
     TooManyDeaths {
         /// Which.
         stage: String,
@@ -137,7 +145,9 @@ pub enum SuperviseError {
         words: String,
     },
     /// Nothing comes out, though nobody dies.
-    #[error("no pose for {after:?}, three times in a row, though no stage died; see log.jsonl for what they wait for")]
+    #[error(
+        "no pose for {after:?}, three times in a row, though no stage died; see log.jsonl for what they wait for"
+    )]
     Stalled {
         /// The limit.
         after: Duration,

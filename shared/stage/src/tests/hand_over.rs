@@ -22,7 +22,10 @@ fn a_late_reader_first_gets_the_history_in_order_and_each_item_once() {
     let history = WINDOW.sizes(Pose::TOPIC).history as u64;
     (0..history + 3).for_each(|seq| send(&poses, seq, 0));
     let mut late = reader(&run.manifest, None);
-    assert!(take_all(&mut late).is_empty(), "a newcomer is answered when the publisher next looks");
+    assert!(
+        take_all(&mut late).is_empty(),
+        "a newcomer is answered when the publisher next looks"
+    );
     poses.greet().unwrap();
     (history + 3..history + 5).for_each(|seq| send(&poses, seq, 0));
     assert_eq!(take_all(&mut late), (3..history + 5).collect::<Vec<_>>());
@@ -49,7 +52,14 @@ fn a_missing_item_breaks_the_promise() {
     reader.head().unwrap();
     reader.advance();
     let error = reader.head().map(|head| head.map(|head| head.item().seq));
-    assert!(matches!(error, Err(StageError::BrokenPromise { topic: "pose", expected: 6, got: 7 })));
+    assert!(matches!(
+        error,
+        Err(StageError::BrokenPromise {
+            topic: "pose",
+            expected: 6,
+            got: 7
+        })
+    ));
 }
 
 #[test]
@@ -73,8 +83,14 @@ fn the_item_before_stays_readable_however_long_the_stream() {
     let poses = writer::<Pose>(&run.manifest);
     for seq in 0..100 {
         send(&poses, seq, 0);
-        assert_eq!(reader.head().unwrap().map(|head| head.item().seq), Some(seq));
-        assert_eq!(reader.before().map(|before| before.item().seq), seq.checked_sub(1));
+        assert_eq!(
+            reader.head().unwrap().map(|head| head.item().seq),
+            Some(seq)
+        );
+        assert_eq!(
+            reader.before().map(|before| before.item().seq),
+            seq.checked_sub(1)
+        );
         reader.advance();
     }
 }
@@ -97,6 +113,8 @@ fn a_stranger_that_counts_to_the_end_of_numbers_is_survived() {
     let run = Run::new();
     let mut reader = reader(&run.manifest, None);
     let poses = writer::<Pose>(&run.manifest);
-    [u64::MAX, u64::MAX].into_iter().for_each(|seq| send(&poses, seq, u32::MAX));
+    [u64::MAX, u64::MAX]
+        .into_iter()
+        .for_each(|seq| send(&poses, seq, u32::MAX));
     assert_eq!(take_all(&mut reader), [u64::MAX, u64::MAX]);
 }

@@ -31,7 +31,12 @@ fn a_sleeper_is_woken_by_a_message() {
     });
     // Other tests' children may wake us too.
     while sleeper.head().unwrap().is_none() {
-        assert!(!signals.wait(&[sleeper.listener()], None, LONG).unwrap().timed_out);
+        assert!(
+            !signals
+                .wait(&[sleeper.listener()], None, LONG)
+                .unwrap()
+                .timed_out
+        );
     }
     let awake = Instant::now();
     received.send(()).unwrap();

@@ -46,16 +46,27 @@ fn value(cell: usize) -> f32 {
 /// The publishing process: this test again, started by the test below.
 #[test]
 fn publisher() {
-    let Some(root) = env::var_os(run::ENVIRONMENT) else { return };
+    let Some(root) = env::var_os(run::ENVIRONMENT) else {
+        return;
+    };
     let manifest = Manifest::read(root.as_ref()).unwrap();
     let masked = writer::<Masked>(&manifest);
     let mut draft = masked.loan().unwrap();
-    draft.header().item = Item { seq: 7, ..Item::default() };
+    draft.header().item = Item {
+        seq: 7,
+        ..Item::default()
+    };
     let cells = draft.values::<f32>();
-    cells.iter_mut().enumerate().for_each(|(cell, v)| *v = value(cell));
+    cells
+        .iter_mut()
+        .enumerate()
+        .for_each(|(cell, v)| *v = value(cell));
     let place = place_of(cells);
     masked.send(draft, Stage::Masking).unwrap();
-    println!("\nWROTE {} {} {} {}", place.inode, place.offset, place.path, place.rights);
+    println!(
+        "\nWROTE {} {} {} {}",
+        place.inode, place.offset, place.path, place.rights
+    );
     // Lives until its reader is through.
     let _ = std::io::stdin().lines().next();
 }
@@ -76,18 +87,34 @@ fn a_reader_in_another_process_sees_the_publishers_own_memory() {
     let signals = Signals::install().unwrap();
     let mut masked = reader::<Masked>(&run.manifest, None);
     let mut child = start_publisher(&run.manifest);
-    let mut said = BufReader::new(child.stdout.take().unwrap()).lines().map_while(Result::ok);
+    let mut said = BufReader::new(child.stdout.take().unwrap())
+        .lines()
+        .map_while(Result::ok);
     let wrote = said.find(|line| line.starts_with("WROTE")).unwrap();
     while masked.head().unwrap().is_none() {
-        let woken = signals.wait(&[masked.listener()], None, std::time::Duration::from_secs(5)).unwrap();
+        let woken = signals
+            .wait(
+                &[masked.listener()],
+                None,
+                std::time::Duration::from_secs(5),
+            )
+            .unwrap();
         assert!(!woken.timed_out);
     }
     let received = masked.current().unwrap();
     let cells = &received.values::<f32>()[..RASTER];
     assert!(cells.iter().enumerate().all(|(cell, v)| *v == value(cell)));
     let place = place_of(cells);
-    assert_eq!(wrote, format!("WROTE {} {} {} rw-s", place.inode, place.offset, place.path));
-    assert!(place.path.starts_with(&format!("/dev/shm/{}", run.manifest.prefix)) && place.path.ends_with(".data"));
+    assert_eq!(
+        wrote,
+        format!("WROTE {} {} {} rw-s", place.inode, place.offset, place.path)
+    );
+    assert!(
+        place
+            .path
+            .starts_with(&format!("/dev/shm/{}", run.manifest.prefix))
+            && place.path.ends_with(".data")
+    );
     assert_eq!(place.rights, "r--s", "a reader cannot damage its input");
     assert_eq!(cells.as_ptr() as usize % 64, 0, "fit for vector registers");
     drop(child.stdin.take());

@@ -28,7 +28,11 @@ impl Learned {
         }
         let network = Network::load(&configuration.masking, &configuration.raster)?;
         let raster = vec![0.0; configuration.raster.n * configuration.raster.n];
-        Ok(Some(Self { input: raster.repeat(network.scans()), network, masked: [raster.clone(), raster] }))
+        Ok(Some(Self {
+            input: raster.repeat(network.scans()),
+            network,
+            masked: [raster.clone(), raster],
+        }))
     }
 
     /// Scans that the network looks at.
@@ -51,11 +55,20 @@ impl Learned {
         self.masked.swap(0, 1);
         let cells = self.masked[0].len();
         let masks = self.network.run(&self.input)?;
-        let rasters = self.input.chunks_exact(cells).zip(masks.chunks_exact(cells));
+        let rasters = self
+            .input
+            .chunks_exact(cells)
+            .zip(masks.chunks_exact(cells));
         for (masked, (raster, mask)) in self.masked.iter_mut().zip(rasters) {
-            masked.iter_mut().zip(raster.iter().zip(mask)).for_each(|(masked, (power, mask))| *masked = power * mask);
+            masked
+                .iter_mut()
+                .zip(raster.iter().zip(mask))
+                .for_each(|(masked, (power, mask))| *masked = power * mask);
         }
         let [later, earlier] = &self.masked;
-        Ok(Pair { later, earlier: Some(earlier) })
+        Ok(Pair {
+            later,
+            earlier: Some(earlier),
+        })
     }
 }

@@ -47,11 +47,16 @@ impl Timer {
         (raster.n, raster.cell_m) = (n, model.as_ref().map_or(scaled, |model| model.cell_m));
         configuration.masking.threads = 1;
         let timer = Self::of(&configuration, !row.mask_alone, scans);
-        let timer = timer.map_err(|reason| format!("{} at {n} cells a side: {reason}", row.name))?;
+        let timer =
+            timer.map_err(|reason| format!("{} at {n} cells a side: {reason}", row.name))?;
         Ok(Self { model, ..timer })
     }
 
-    fn of(configuration: &Configuration, searches: bool, scans: &[OwnedScan]) -> Result<Self, Failure> {
+    fn of(
+        configuration: &Configuration,
+        searches: bool,
+        scans: &[OwnedScan],
+    ) -> Result<Self, Failure> {
         let Prepared { rasters, points } = prepare(configuration, scans)?;
         let learned = Learned::load(configuration)?;
         let looks_at = learned.as_ref().map_or(1, Learned::scans);
@@ -61,7 +66,9 @@ impl Timer {
             cell_m: configuration.raster.cell_m,
             angles: exhaustive.then(|| configuration.exhaustive.candidates()),
             learned,
-            search: searches.then(|| search(configuration, looks_at)).transpose()?,
+            search: searches
+                .then(|| search(configuration, looks_at))
+                .transpose()?,
             refiner: Refiner::new(configuration, points, scans)?,
             rasters,
             seq: 0,
@@ -92,7 +99,10 @@ impl Timer {
         let start = Instant::now();
         let pair = match &mut self.learned {
             Some(learned) => learned.mask()?,
-            None => Pair { later: rasters[0], earlier: Some(rasters[1]) },
+            None => Pair {
+                later: rasters[0],
+                earlier: Some(rasters[1]),
+            },
         };
         if let Some(search) = &mut self.search {
             let motion = black_box(search(self.seq, black_box(pair))?);
@@ -105,7 +115,12 @@ impl Timer {
 
     pub fn median(self) -> Median {
         let halves_ms = [0, 1].map(|half| median(self.halves_ms[half].clone()));
-        Median { cell_m: self.cell_m, angles: self.angles, ms: median(self.halves_ms.concat()), halves_ms }
+        Median {
+            cell_m: self.cell_m,
+            angles: self.angles,
+            ms: median(self.halves_ms.concat()),
+            halves_ms,
+        }
     }
 }
 
@@ -119,14 +134,28 @@ struct Prepared {
 
 fn prepare(configuration: &Configuration, scans: &[OwnedScan]) -> Result<Prepared, Failure> {
     let (raster, masking) = (&configuration.raster, &configuration.masking);
-    let kind = if masking.kind == MaskKind::Learned { MaskKind::Threshold } else { masking.kind };
+    let kind = if masking.kind == MaskKind::Learned {
+        MaskKind::Threshold
+    } else {
+        masking.kind
+    };
     let masker = |masking: &MaskingConfig| Masker::new(raster, &configuration.points, masking);
-    let (mut masker, mut plain) = (masker(masking)?, masker(&MaskingConfig { kind, ..masking.clone() })?);
+    let (mut masker, mut plain) = (
+        masker(masking)?,
+        masker(&MaskingConfig {
+            kind,
+            ..masking.clone()
+        })?,
+    );
     let cells = raster.n * raster.n;
     let mut masked = vec![0.0; masker.rasters() * MaskedHeader::raster_values(cells)];
     let mut rasters = vec![vec![0.0; cells]; scans.len()];
     let mut points = vec![vec![Point::default(); configuration.points.capacity]; scans.len()];
-    let sweep = |number: usize| Sweep { number: number as u64, scan: scans[number].view(), motion: None };
+    let sweep = |number: usize| Sweep {
+        number: number as u64,
+        scan: scans[number].view(),
+        motion: None,
+    };
     for (number, (raster, points)) in rasters.iter_mut().zip(&mut points).enumerate() {
         let before = number.checked_sub(1).map(sweep);
         let twist = masker.mask(&sweep(number), before.as_ref(), &mut masked)?;
@@ -156,17 +185,32 @@ impl Refiner {
         }
         let refinement = Refinement::new(&configuration.refinement, configuration.points.capacity)?;
         let stamps_ns = scans.iter().map(|scan| scan.geometry.stamp_ns).collect();
-        Ok(Some(Self { refinement, points, stamps_ns }))
+        Ok(Some(Self {
+            refinement,
+            points,
+            stamps_ns,
+        }))
     }
 
     /// Refines the motion from scan `later - 1` to scan `later`. Nobody drove from the last scan to the first: a chain starts
     /// there.
     fn next(&mut self, seq: u64, later: usize, motion: &MotionEstimate) {
-        let Some(earlier) = later.checked_sub(1) else { return self.refinement.start() };
+        let Some(earlier) = later.checked_sub(1) else {
+            return self.refinement.start();
+        };
         let interval_ns = self.stamps_ns[later].saturating_sub(self.stamps_ns[earlier]);
-        let motion = MotionEstimate { interval_ns, ..*motion };
+        let motion = MotionEstimate {
+            interval_ns,
+            ..*motion
+        };
         let (later, earlier) = (&self.points[later], &self.points[earlier]);
-        black_box(gyre_refinement::refine(&mut self.refinement, seq, later, earlier, &motion));
+        black_box(gyre_refinement::refine(
+            &mut self.refinement,
+            seq,
+            later,
+            earlier,
+            &motion,
+        ));
     }
 }
 

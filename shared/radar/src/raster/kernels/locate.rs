@@ -40,11 +40,19 @@ pub struct Taps {
 
 impl Taps {
     /// Before anything is located.
-    pub const NONE: Self = Self { sample: [0; BLOCK], along_range: [0.0; BLOCK], along_azimuth: [0.0; BLOCK] };
+    pub const NONE: Self = Self {
+        sample: [0; BLOCK],
+        along_range: [0.0; BLOCK],
+        along_azimuth: [0.0; BLOCK],
+    };
 }
 
 /// Taps of a row of cells seen by a sensor that stands.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
 pub fn locate(cells: &CellRow, lookup: &Lookup, taps: &mut [Taps]) {
     let places = cells.bearing.iter().zip(cells.range_m);
     for ((bearing, range_m), taps) in places.zip(taps) {
@@ -55,7 +63,11 @@ pub fn locate(cells: &CellRow, lookup: &Lookup, taps: &mut [Taps]) {
 
 /// Taps of a row of cells seen by a sensor that moves: where it stood depends on when it looked, and that on where it
 /// stood.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
 pub fn locate_moving(cells: &CellRow, motion: &SweepMotion, lookup: &Lookup, taps: &mut [Taps]) {
     let start = lookup.bearings.start;
     let places = cells.bearing.iter().zip(cells.z_m);
@@ -82,8 +94,15 @@ fn tap(lookup: &Lookup<'_>, from_start: &Block<f32>, range_m: &Block<f32>) -> Ta
         let column = range_m[k] * lookup.columns_a_metre + lookup.column_at_sensor;
         let column = column.max(0.0).min(lookup.last_column);
         // Column 0 is empty, whatever the scan.
-        let column = if range_m[k] < lookup.minimum_range_m { 0.0 } else { column };
-        let (left, upper) = (whole_below(column), whole_below(row).min(lookup.last_azimuth));
+        let column = if range_m[k] < lookup.minimum_range_m {
+            0.0
+        } else {
+            column
+        };
+        let (left, upper) = (
+            whole_below(column),
+            whole_below(row).min(lookup.last_azimuth),
+        );
         taps.sample[k] = (upper * lookup.stride + left) as u32;
         taps.along_range[k] = column - left as f32;
         taps.along_azimuth[k] = row - upper as f32;
@@ -110,7 +129,11 @@ pub fn blend(taps: &[Taps], samples: &[u16], stride: usize, out: &mut [f32]) {
 #[inline(always)]
 fn since(bearing: f32, start: f32) -> f32 {
     let difference = bearing - start;
-    if difference < 0.0 { difference + 1.0 } else { difference }
+    if difference < 0.0 {
+        difference + 1.0
+    } else {
+        difference
+    }
 }
 
 #[inline(always)]
@@ -181,14 +204,28 @@ mod tests {
 
     #[test]
     fn whole_number_below_is_defined_for_all_floats() {
-        for value in [0.0, 0.25, -1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX] {
+        for value in [
+            0.0,
+            0.25,
+            -1.0,
+            f32::NAN,
+            f32::INFINITY,
+            f32::NEG_INFINITY,
+            f32::MAX,
+        ] {
             assert!((0..1 << 23).contains(&whole_below(value)));
         }
     }
 
     #[test]
     fn turns_on_the_axes_and_at_the_origin_are_exact() {
-        let axes = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.25), (-1.0, 0.0, 0.5), (0.0, -1.0, 0.75), (0.0, 0.0, 0.0)];
+        let axes = [
+            (1.0, 0.0, 0.0),
+            (0.0, 1.0, 0.25),
+            (-1.0, 0.0, 0.5),
+            (0.0, -1.0, 0.75),
+            (0.0, 0.0, 0.0),
+        ];
         for (x, z, expected) in axes {
             assert_eq!(turns(x, z), expected, "({x}, {z})");
         }

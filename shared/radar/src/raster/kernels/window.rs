@@ -33,7 +33,9 @@ impl Window {
     pub fn new(bins: f32) -> Self {
         let bins = f64::from(bins.max(1.0));
         let mut bins_a_piece = 1;
-        while bins_a_piece < MAX_BINS_A_PIECE && bins >= (2 * bins_a_piece) as f64 * f64::from(PIECES_A_WINDOW) {
+        while bins_a_piece < MAX_BINS_A_PIECE
+            && bins >= (2 * bins_a_piece) as f64 * f64::from(PIECES_A_WINDOW)
+        {
             bins_a_piece *= 2;
         }
         let beside_middle = 0.5 * (bins / bins_a_piece as f64 - 1.0);
@@ -54,8 +56,18 @@ impl Window {
 }
 
 /// Writes the sums of pieces of the powers above the floor; `above_floor` is room for them.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-pub fn sum_pieces(powers: &[u8], floor: u8, bins_a_piece: usize, above_floor: &mut [u8], pieces: &mut [u16]) {
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+pub fn sum_pieces(
+    powers: &[u8],
+    floor: u8,
+    bins_a_piece: usize,
+    above_floor: &mut [u8],
+    pieces: &mut [u16],
+) {
     let above_floor = &mut above_floor[..powers.len()];
     for (above, &power) in above_floor.iter_mut().zip(powers) {
         *above = power.saturating_sub(floor);
@@ -107,7 +119,11 @@ const BLOCK: usize = 32;
 
 /// Writes the window's mean at each column; column `c` is centred on `pieces[c + window.reach()]`.
 /// Needs `out.len() + 2 * window.reach()` pieces.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
 pub fn average(pieces: &[u16], window: &Window, out: &mut [u16]) {
     let (blocks, rest) = out.as_chunks_mut::<BLOCK>();
     let done = blocks.len() * BLOCK;
@@ -143,15 +159,28 @@ fn sums<const COLUMNS: usize>(pieces: &[u16], terms: usize, spacing: usize) -> [
 }
 
 /// Moves samples by so many columns toward the end, linear between columns; where nothing comes from is zero.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
 pub fn shift(samples: &[u16], by: f32, out: &mut [u16]) {
     let whole = (-by).floor();
     let share = ((-by - whole) * UNIT as f32) as u32;
     let first = (-whole).max(0.0) as usize;
     let from = whole.max(0.0) as usize;
     out.fill(0);
-    let pairs = samples.get(from..).unwrap_or_default().iter().zip(samples.get(from + 1..).unwrap_or_default());
-    for (out, (&near, &far)) in out.get_mut(first..).unwrap_or_default().iter_mut().zip(pairs) {
+    let pairs = samples
+        .get(from..)
+        .unwrap_or_default()
+        .iter()
+        .zip(samples.get(from + 1..).unwrap_or_default());
+    for (out, (&near, &far)) in out
+        .get_mut(first..)
+        .unwrap_or_default()
+        .iter_mut()
+        .zip(pairs)
+    {
         *out = ((u32::from(near) * (UNIT - share) + u32::from(far) * share) / UNIT) as u16;
     }
 }
@@ -168,7 +197,10 @@ mod tests {
         let mean = |(index, piece): (usize, &[u8])| {
             let first = (index * bins_a_piece) as f64;
             let covered = (first + bins_a_piece as f64).min(end) - first.max(start);
-            let sum: u32 = piece.iter().map(|&bin| u32::from(bin.saturating_sub(floor))).sum();
+            let sum: u32 = piece
+                .iter()
+                .map(|&bin| u32::from(bin.saturating_sub(floor)))
+                .sum();
             covered.max(0.0) / bins_a_piece as f64 * f64::from(sum)
         };
         bins.chunks(bins_a_piece).enumerate().map(mean).sum::<f64>() / width
@@ -179,7 +211,13 @@ mod tests {
         let count = bins.len().div_ceil(window.bins_a_piece);
         let mut pieces = vec![0; count + 2 * reach];
         let mut room = vec![0; bins.len()];
-        sum_pieces(bins, floor, window.bins_a_piece, &mut room, &mut pieces[reach..reach + count]);
+        sum_pieces(
+            bins,
+            floor,
+            window.bins_a_piece,
+            &mut room,
+            &mut pieces[reach..reach + count],
+        );
         let mut out = vec![0; count];
         average(&pieces, window, &mut out);
         out

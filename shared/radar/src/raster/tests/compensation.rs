@@ -16,23 +16,40 @@ fn polar(range_m: f64, bearing_rad: f64) -> Point2<f64> {
 fn places() -> Vec<Point2<f64>> {
     let ranges = [25.0, 60.0, 12.0, 80.0, 40.0, 70.0, 18.0];
     let bearings = (1..8).map(|k| f64::from(k) * std::f64::consts::FRAC_PI_4);
-    ranges.into_iter().zip(bearings).map(|(range, bearing)| polar(range, bearing)).collect()
+    ranges
+        .into_iter()
+        .zip(bearings)
+        .map(|(range, bearing)| polar(range, bearing))
+        .collect()
 }
 
 fn worst_miss(config: &RasterConfig, sensor: &Sensor, undo: Option<Twist>) -> f64 {
     let places = places();
     let raster = raster(config, &sensor.measure(&places, SIGMA_M), undo);
-    let misses = places.iter().map(|place| miss_cells(config, &raster, place, 4.0 * SIGMA_M));
+    let misses = places
+        .iter()
+        .map(|place| miss_cells(config, &raster, place, 4.0 * SIGMA_M));
     misses.fold(0.0, f64::max)
 }
 
 #[test]
 fn scatterers_lie_where_they_are_at_mid_sweep_only_if_the_motion_is_undone() {
-    let twist = Twist { vx_mps: 15.0, vy_mps: -0.4, yaw_rate_radps: 0.5 };
+    let twist = Twist {
+        vx_mps: 15.0,
+        vy_mps: -0.4,
+        yaw_rate_radps: 0.5,
+    };
     for sense in [Sense::Clockwise, Sense::CounterClockwise] {
         for sampling in [Sampling::Averaged, Sampling::Bilinear] {
-            let sensor = Sensor { twist, sense, ..Sensor::navtech() };
-            let config = RasterConfig { sampling, ..RasterConfig::default() };
+            let sensor = Sensor {
+                twist,
+                sense,
+                ..Sensor::navtech()
+            };
+            let config = RasterConfig {
+                sampling,
+                ..RasterConfig::default()
+            };
             let undone = worst_miss(&config, &sensor, Some(twist));
             let left = worst_miss(&config, &sensor, None);
             assert!(undone < 0.03, "{sense:?} {sampling:?}: {undone}");
@@ -59,39 +76,81 @@ proptest! {
 
 #[test]
 fn dopplers_shift_is_undone_chirp_by_chirp() {
-    let twist = Twist { vx_mps: 20.0, vy_mps: 0.5, yaw_rate_radps: 0.3 };
-    for (sense, chirps_alternate, doppler_s) in
-        [(Sense::Clockwise, false, 0.042), (Sense::CounterClockwise, false, -0.042), (Sense::Clockwise, true, 0.049)]
-    {
-        let sensor = Sensor { twist, sense, doppler_s, chirps_alternate, ..Sensor::navtech() };
+    let twist = Twist {
+        vx_mps: 20.0,
+        vy_mps: 0.5,
+        yaw_rate_radps: 0.3,
+    };
+    for (sense, chirps_alternate, doppler_s) in [
+        (Sense::Clockwise, false, 0.042),
+        (Sense::CounterClockwise, false, -0.042),
+        (Sense::Clockwise, true, 0.049),
+    ] {
+        let sensor = Sensor {
+            twist,
+            sense,
+            doppler_s,
+            chirps_alternate,
+            ..Sensor::navtech()
+        };
         for config in [
             RasterConfig::default(),
-            RasterConfig { cell_m: 0.4, n: 511, ..RasterConfig::default() },
-            RasterConfig { sampling: Sampling::Bilinear, ..RasterConfig::default() },
+            RasterConfig {
+                cell_m: 0.4,
+                n: 511,
+                ..RasterConfig::default()
+            },
+            RasterConfig {
+                sampling: Sampling::Bilinear,
+                ..RasterConfig::default()
+            },
         ] {
             let miss = worst_miss(&config, &sensor, Some(twist));
-            assert!(miss < 0.05, "{sense:?} {chirps_alternate} {config:?}: {miss}");
+            assert!(
+                miss < 0.05,
+                "{sense:?} {chirps_alternate} {config:?}: {miss}"
+            );
         }
     }
 }
 
 #[test]
 fn dopplers_shift_moves_scatterers_where_it_is_not_known() {
-    let twist = Twist { vx_mps: 20.0, vy_mps: 0.0, yaw_rate_radps: 0.0 };
-    let sensor = Sensor { twist, doppler_s: 0.042, ..Sensor::navtech() };
+    let twist = Twist {
+        vx_mps: 20.0,
+        vy_mps: 0.0,
+        yaw_rate_radps: 0.0,
+    };
+    let sensor = Sensor {
+        twist,
+        doppler_s: 0.042,
+        ..Sensor::navtech()
+    };
     let config = RasterConfig::default();
     let mut scan = sensor.measure(&places(), SIGMA_M);
     scan.geometry.doppler_s = 0.0;
     let place = polar(12.0, 3.0 * std::f64::consts::FRAC_PI_4);
-    let miss = miss_cells(&config, &raster(&config, &scan, Some(twist)), &place, 4.0 * SIGMA_M);
+    let miss = miss_cells(
+        &config,
+        &raster(&config, &scan, Some(twist)),
+        &place,
+        4.0 * SIGMA_M,
+    );
     let expected = 0.042 * 20.0 * std::f64::consts::FRAC_1_SQRT_2 / f64::from(config.cell_m);
     assert!((miss - expected).abs() < 0.05, "{miss} for {expected}");
 }
 
 #[test]
 fn stamps_are_believed_where_they_come_in_bursts() {
-    let twist = Twist { vx_mps: 20.0, vy_mps: 0.0, yaw_rate_radps: 0.3 };
-    let mut sensor = Sensor { twist, ..Sensor::navtech() };
+    let twist = Twist {
+        vx_mps: 20.0,
+        vy_mps: 0.0,
+        yaw_rate_radps: 0.3,
+    };
+    let mut sensor = Sensor {
+        twist,
+        ..Sensor::navtech()
+    };
     for (azimuth, time_s) in sensor.time_s.iter_mut().enumerate() {
         *time_s = 0.25 * ((azimuth / 8 * 8) as f64 / 400.0 - 0.5) + 1e-5 * (azimuth % 8) as f64;
     }

@@ -11,9 +11,17 @@ const SIGMA_M: f64 = 1.0;
 
 /// Ahead (across the seam), left, right, behind, near and far.
 fn places() -> Vec<Point2<f64>> {
-    [(30.0, 0.3), (8.0, -6.0), (-20.0, 15.0), (-35.0, -0.2), (0.4, 40.0), (3.0, -44.0), (38.0, 33.0)]
-        .map(|(x, y)| Point2::new(x, y))
-        .to_vec()
+    [
+        (30.0, 0.3),
+        (8.0, -6.0),
+        (-20.0, 15.0),
+        (-35.0, -0.2),
+        (0.4, 40.0),
+        (3.0, -44.0),
+        (38.0, 33.0),
+    ]
+    .map(|(x, y)| Point2::new(x, y))
+    .to_vec()
 }
 
 fn check(config: &RasterConfig, sensor: &Sensor, tolerance_cells: f64) {
@@ -21,12 +29,21 @@ fn check(config: &RasterConfig, sensor: &Sensor, tolerance_cells: f64) {
     let raster = raster(config, &sensor.measure(&places, SIGMA_M), None);
     for place in &places {
         let miss = miss_cells(config, &raster, place, 4.0 * SIGMA_M);
-        assert!(miss < tolerance_cells, "{config:?}, {:?}: {place} is off by {miss} cells", sensor.sense);
+        assert!(
+            miss < tolerance_cells,
+            "{config:?}, {:?}: {place} is off by {miss} cells",
+            sensor.sense
+        );
     }
 }
 
 fn config(n: usize, sampling: Sampling) -> RasterConfig {
-    RasterConfig { n, cell_m: 102.0 / n as f32, sampling, ..RasterConfig::default() }
+    RasterConfig {
+        n,
+        cell_m: 102.0 / n as f32,
+        sampling,
+        ..RasterConfig::default()
+    }
 }
 
 #[test]
@@ -34,7 +51,11 @@ fn scatterers_lie_where_they_are_for_both_senses_and_samplings_and_offsets() {
     for sense in [Sense::Clockwise, Sense::CounterClockwise] {
         for sampling in [Sampling::Averaged, Sampling::Bilinear] {
             for range_offset_m in [0.0, -0.31, 2.5] {
-                let sensor = Sensor { sense, range_offset_m, ..Sensor::navtech() };
+                let sensor = Sensor {
+                    sense,
+                    range_offset_m,
+                    ..Sensor::navtech()
+                };
                 check(&config(255, sampling), &sensor, 0.04);
             }
         }
@@ -50,7 +71,11 @@ fn scatterers_lie_where_they_are_at_every_size() {
 
 #[test]
 fn scatterers_lie_where_they_are_where_bins_are_coarse() {
-    let radiate = Sensor { bins: 576, range_resolution_m: 100.0 / 576.0, ..Sensor::navtech() };
+    let radiate = Sensor {
+        bins: 576,
+        range_resolution_m: 100.0 / 576.0,
+        ..Sensor::navtech()
+    };
     for sampling in [Sampling::Averaged, Sampling::Bilinear] {
         check(&config(511, sampling), &radiate, 0.06);
     }
@@ -58,9 +83,16 @@ fn scatterers_lie_where_they_are_where_bins_are_coarse() {
 
 #[test]
 fn a_row_to_the_right_is_drawn_to_the_right() {
-    let config = RasterConfig { n: 51, cell_m: 1.0, ..RasterConfig::default() };
+    let config = RasterConfig {
+        n: 51,
+        cell_m: 1.0,
+        ..RasterConfig::default()
+    };
     for (sense, column) in [(Sense::Clockwise, 45), (Sense::CounterClockwise, 5)] {
-        let sensor = Sensor { sense, ..Sensor::navtech() };
+        let sensor = Sensor {
+            sense,
+            ..Sensor::navtech()
+        };
         let mut scan = sensor.scan();
         let quarter = 99; // at 89.9 degrees
         let first = scan.geometry.first_byte + quarter * scan.geometry.stride;

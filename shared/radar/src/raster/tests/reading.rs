@@ -10,7 +10,9 @@ fn mean(row: &[u8], place: f64, depth: f64) -> f64 {
     let (start, end) = (place - 0.5 * depth, place + 0.5 * depth);
     let bins = start.max(0.0) as usize..(end.max(0.0).ceil() as usize).min(row.len());
     let covered = |bin: usize| ((bin + 1) as f64).min(end) - (bin as f64).max(start);
-    bins.map(|bin| covered(bin) * f64::from(row[bin])).sum::<f64>() / depth
+    bins.map(|bin| covered(bin) * f64::from(row[bin]))
+        .sum::<f64>()
+        / depth
 }
 
 /// Between the two nearest bins.
@@ -24,7 +26,11 @@ fn between(row: &[u8], place: f64) -> f64 {
 fn direct(config: &RasterConfig, scan: &OwnedScan, depth_bins: Option<f64>) -> Vec<f64> {
     let view = scan.view();
     let count = view.azimuth_rad.len();
-    let turns: Vec<f64> = view.azimuth_rad.iter().map(|&a| f64::from(a) / TAU).collect();
+    let turns: Vec<f64> = view
+        .azimuth_rad
+        .iter()
+        .map(|&a| f64::from(a) / TAU)
+        .collect();
     let cell = |cell: usize| {
         let centre = centre_m(config, cell / config.n, cell % config.n);
         let range_m = centre.coords.norm();
@@ -33,11 +39,14 @@ fn direct(config: &RasterConfig, scan: &OwnedScan, depth_bins: Option<f64>) -> V
         }
         let bearing = (-centre.y).atan2(centre.x) / TAU;
         let past = |azimuth: usize| (bearing - turns[azimuth]).rem_euclid(1.0);
-        let below = (0..count).min_by(|&a, &b| past(a).total_cmp(&past(b))).unwrap();
+        let below = (0..count)
+            .min_by(|&a, &b| past(a).total_cmp(&past(b)))
+            .unwrap();
         let above = (below + 1) % count;
         let share = past(below) / (turns[above] - turns[below]).rem_euclid(1.0);
         let geometry = &scan.geometry;
-        let place = (range_m - f64::from(geometry.range_offset_m)) / f64::from(geometry.range_resolution_m);
+        let place =
+            (range_m - f64::from(geometry.range_offset_m)) / f64::from(geometry.range_resolution_m);
         let read = |azimuth| match depth_bins {
             Some(depth) => mean(view.row(azimuth), place, depth),
             None => between(view.row(azimuth), place),
@@ -49,7 +58,12 @@ fn direct(config: &RasterConfig, scan: &OwnedScan, depth_bins: Option<f64>) -> V
 
 /// Random powers at wobbling azimuths, bins up to within the raster.
 fn noise(range_resolution_m: f32, bins: usize) -> OwnedScan {
-    let mut sensor = Sensor { bins, range_resolution_m, range_offset_m: -0.31, ..Sensor::navtech() };
+    let mut sensor = Sensor {
+        bins,
+        range_resolution_m,
+        range_offset_m: -0.31,
+        ..Sensor::navtech()
+    };
     for (i, azimuth) in sensor.azimuth_rad.iter_mut().enumerate() {
         *azimuth += 0.001 * (i as f32 * 1.7).sin();
     }
@@ -64,13 +78,23 @@ fn noise(range_resolution_m: f32, bins: usize) -> OwnedScan {
 
 /// Root of the mean square of the difference, and its largest.
 fn difference(got: &[f32], expected: &[f64]) -> (f64, f64) {
-    let errors = got.iter().zip(expected).map(|(&got, expected)| (f64::from(got) - expected).abs());
-    let (squares, largest) = errors.fold((0.0, 0.0f64), |(sum, largest), e| (sum + e * e, largest.max(e)));
+    let errors = got
+        .iter()
+        .zip(expected)
+        .map(|(&got, expected)| (f64::from(got) - expected).abs());
+    let (squares, largest) = errors.fold((0.0, 0.0f64), |(sum, largest), e| {
+        (sum + e * e, largest.max(e))
+    });
     ((squares / got.len() as f64).sqrt(), largest)
 }
 
 fn config(n: usize, sampling: Sampling) -> RasterConfig {
-    RasterConfig { n, cell_m: 0.8, sampling, ..RasterConfig::default() }
+    RasterConfig {
+        n,
+        cell_m: 0.8,
+        sampling,
+        ..RasterConfig::default()
+    }
 }
 
 #[test]
@@ -78,8 +102,12 @@ fn bilinear_raster_equals_direct_interpolation() {
     let config = config(127, Sampling::Bilinear);
     for (resolution_m, bins) in [(0.0438, 1100), (0.1736, 300)] {
         let scan = noise(resolution_m, bins);
-        let (rms, largest) = difference(&raster(&config, &scan, None), &direct(&config, &scan, None));
-        assert!(rms < 0.05 && largest < 1.5, "{resolution_m} m: {rms}, at most {largest}");
+        let (rms, largest) =
+            difference(&raster(&config, &scan, None), &direct(&config, &scan, None));
+        assert!(
+            rms < 0.05 && largest < 1.5,
+            "{resolution_m} m: {rms}, at most {largest}"
+        );
     }
 }
 
@@ -92,7 +120,10 @@ fn averaged_raster_equals_direct_mean() {
         let expected = direct(&config, &scan, Some(depth));
         let (rms, largest) = difference(&raster(&config, &scan, None), &expected);
         // Of a mean of 127 with a spread of 17 or more between cells; only the ends of the windows differ.
-        assert!(rms < 2.5 && largest < 20.0, "{resolution_m} m: {rms}, at most {largest}");
+        assert!(
+            rms < 2.5 && largest < 20.0,
+            "{resolution_m} m: {rms}, at most {largest}"
+        );
     }
 }
 
@@ -102,10 +133,16 @@ fn only_power_above_the_floor_counts() {
     let mut scan = noise(0.0438, 1500);
     let mut floored = vec![0.0; config.n * config.n];
     let mut rasteriser = Rasteriser::new(&config).unwrap();
-    rasteriser.rasterise(&scan.view(), 60, None, &mut floored).unwrap();
-    scan.bytes.iter_mut().for_each(|power| *power = power.saturating_sub(60));
+    rasteriser
+        .rasterise(&scan.view(), 60, None, &mut floored)
+        .unwrap();
+    scan.bytes
+        .iter_mut()
+        .for_each(|power| *power = power.saturating_sub(60));
     assert_eq!(floored, raster(&config, &scan, None));
-    rasteriser.rasterise(&scan.view(), 255, None, &mut floored).unwrap();
+    rasteriser
+        .rasterise(&scan.view(), 255, None, &mut floored)
+        .unwrap();
     assert!(floored.iter().all(|&power| power == 0.0));
 }
 

@@ -9,7 +9,11 @@ use serde::Deserialize;
 use serde::de::value::{Error as ValueError, MapDeserializer};
 
 fn small() -> RasterConfig {
-    RasterConfig { n: 33, cell_m: 1.0, ..RasterConfig::default() }
+    RasterConfig {
+        n: 33,
+        cell_m: 1.0,
+        ..RasterConfig::default()
+    }
 }
 
 fn sensor(azimuths: usize, bins: usize) -> Sensor {
@@ -30,11 +34,22 @@ fn try_raster(scan: &OwnedScan, twist: Option<Twist>) -> Result<Vec<f32>, Raster
 
 #[test]
 fn scans_of_almost_nothing_give_finite_rasters() {
-    for (azimuths, bins) in [(0, 0), (0, 100), (100, 0), (1, 1), (1, 500), (2, 2), (400, 1)] {
+    for (azimuths, bins) in [
+        (0, 0),
+        (0, 100),
+        (100, 0),
+        (1, 1),
+        (1, 500),
+        (2, 2),
+        (400, 1),
+    ] {
         let mut scan = sensor(azimuths, bins).scan();
         scan.bytes.fill(255);
         let raster = try_raster(&scan, None).unwrap();
-        assert!(raster.iter().all(|power| (0.0..=245.0).contains(power)), "{azimuths} x {bins}");
+        assert!(
+            raster.iter().all(|power| (0.0..=245.0).contains(power)),
+            "{azimuths} x {bins}"
+        );
     }
 }
 
@@ -43,7 +58,13 @@ fn raster_of_the_wrong_length_is_refused() {
     let scan = sensor(4, 10).scan();
     let mut rasteriser = Rasteriser::new(&small()).unwrap();
     let refused = rasteriser.rasterise(&scan.view(), 0, None, &mut [0.0; 1000]);
-    assert_eq!(refused, Err(RasterError::OutputLength { expected: 1089, actual: 1000 }));
+    assert_eq!(
+        refused,
+        Err(RasterError::OutputLength {
+            expected: 1089,
+            actual: 1000
+        })
+    );
 }
 
 #[test]
@@ -52,15 +73,33 @@ fn scan_that_is_shorter_than_its_geometry_is_refused() {
     scan.geometry.bins = 11;
     let refused = try_raster(&scan, None).unwrap_err();
     assert!(
-        matches!(refused, RasterError::Scan(ScanError::Length { what: "image", expected: 85, actual: 84 })),
+        matches!(
+            refused,
+            RasterError::Scan(ScanError::Length {
+                what: "image",
+                expected: 85,
+                actual: 84
+            })
+        ),
         "{refused}"
     );
     let mut view = scan.view();
     view.stamp_ns = &[];
-    let refused = Rasteriser::new(&small()).unwrap().rasterise(&view, 0, None, &mut [0.0; 1089]);
-    assert!(matches!(refused, Err(RasterError::Scan(ScanError::Length { what: "table of stamps", .. }))));
+    let refused = Rasteriser::new(&small())
+        .unwrap()
+        .rasterise(&view, 0, None, &mut [0.0; 1089]);
+    assert!(matches!(
+        refused,
+        Err(RasterError::Scan(ScanError::Length {
+            what: "table of stamps",
+            ..
+        }))
+    ));
     scan.geometry.stride = usize::MAX;
-    assert!(matches!(try_raster(&scan, None), Err(RasterError::Scan(ScanError::Length { what: "image", .. }))));
+    assert!(matches!(
+        try_raster(&scan, None),
+        Err(RasterError::Scan(ScanError::Length { what: "image", .. }))
+    ));
 }
 
 #[test]
@@ -69,22 +108,43 @@ fn impossible_numbers_are_refused() {
         let mut scan = sensor(4, 10).scan();
         scan.geometry.range_resolution_m = resolution_m;
         assert!(
-            matches!(try_raster(&scan, None), Err(RasterError::Scan(ScanError::Geometry { .. }))),
+            matches!(
+                try_raster(&scan, None),
+                Err(RasterError::Scan(ScanError::Geometry { .. }))
+            ),
             "{resolution_m}"
         );
     }
     let mut scan = sensor(4, 10).scan();
     scan.azimuth_rad[2] = f32::NAN;
-    assert!(matches!(try_raster(&scan, None), Err(RasterError::Scan(ScanError::Azimuth { index: 2, .. }))));
+    assert!(matches!(
+        try_raster(&scan, None),
+        Err(RasterError::Scan(ScanError::Azimuth { index: 2, .. }))
+    ));
 }
 
 #[test]
 fn impossible_motions_are_refused() {
     let scan = sensor(400, 100).scan();
-    let impossible = [(f64::NAN, 0.0, 0.0), (0.0, f64::INFINITY, 0.0), (0.0, 0.0, 1e3), (1e9, 0.0, 0.0)];
+    let impossible = [
+        (f64::NAN, 0.0, 0.0),
+        (0.0, f64::INFINITY, 0.0),
+        (0.0, 0.0, 1e3),
+        (1e9, 0.0, 0.0),
+    ];
     for (vx_mps, vy_mps, yaw_rate_radps) in impossible {
-        let twist = Twist { vx_mps, vy_mps, yaw_rate_radps };
-        assert!(matches!(try_raster(&scan, Some(twist)), Err(RasterError::Twist { .. })), "{twist:?}");
+        let twist = Twist {
+            vx_mps,
+            vy_mps,
+            yaw_rate_radps,
+        };
+        assert!(
+            matches!(
+                try_raster(&scan, Some(twist)),
+                Err(RasterError::Twist { .. })
+            ),
+            "{twist:?}"
+        );
     }
 }
 
@@ -93,13 +153,36 @@ fn settings_out_of_bounds_are_refused_by_name() {
     let default = RasterConfig::default;
     let wrong = [
         ("n", RasterConfig { n: 0, ..default() }),
-        ("cell_m", RasterConfig { cell_m: f32::NAN, ..default() }),
-        ("minimum_range_m", RasterConfig { minimum_range_m: -1.0, ..default() }),
-        ("averaged_cells", RasterConfig { averaged_cells: 0.0, ..default() }),
+        (
+            "cell_m",
+            RasterConfig {
+                cell_m: f32::NAN,
+                ..default()
+            },
+        ),
+        (
+            "minimum_range_m",
+            RasterConfig {
+                minimum_range_m: -1.0,
+                ..default()
+            },
+        ),
+        (
+            "averaged_cells",
+            RasterConfig {
+                averaged_cells: 0.0,
+                ..default()
+            },
+        ),
     ];
     for (name, config) in wrong {
         let refused = Rasteriser::new(&config).unwrap_err();
-        assert!(refused.to_string().starts_with(&format!("raster.{name} is ")), "{refused}");
+        assert!(
+            refused
+                .to_string()
+                .starts_with(&format!("raster.{name} is ")),
+            "{refused}"
+        );
     }
     assert_eq!(default().validate(), Ok(()));
 }
@@ -110,7 +193,10 @@ fn unknown_settings_are_refused_and_missing_ones_have_defaults() {
         let entries = MapDeserializer::<_, ValueError>::new([(key, 0.4f32)].into_iter());
         RasterConfig::deserialize(entries)
     };
-    let expected = RasterConfig { cell_m: 0.4, ..RasterConfig::default() };
+    let expected = RasterConfig {
+        cell_m: 0.4,
+        ..RasterConfig::default()
+    };
     assert_eq!(read("cell_m").unwrap(), expected);
     assert!(read("cel_m").unwrap_err().to_string().contains("cel_m"));
 }
@@ -119,15 +205,41 @@ fn unknown_settings_are_refused_and_missing_ones_have_defaults() {
 fn nothing_remains_of_the_scan_before() {
     let config = RasterConfig::default();
     let place = [Point2::new(20.0, 10.0)];
-    let twist = Twist { vx_mps: 12.0, vy_mps: 0.0, yaw_rate_radps: 0.2 };
+    let twist = Twist {
+        vx_mps: 12.0,
+        vy_mps: 0.0,
+        yaw_rate_radps: 0.2,
+    };
     let navtech = Sensor::navtech();
-    let other = Sensor { bins: 576, range_resolution_m: 0.1736, sense: Sense::CounterClockwise, ..Sensor::navtech() };
-    let scans = [navtech.measure(&place, 1.0), other.measure(&place, 2.0), sensor(100, 2000).scan()];
+    let other = Sensor {
+        bins: 576,
+        range_resolution_m: 0.1736,
+        sense: Sense::CounterClockwise,
+        ..Sensor::navtech()
+    };
+    let scans = [
+        navtech.measure(&place, 1.0),
+        other.measure(&place, 2.0),
+        sensor(100, 2000).scan(),
+    ];
     let mut rasteriser = Rasteriser::new(&config).unwrap();
     let mut reused = vec![0.0; config.n * config.n];
-    for (scan, twist) in [(0, None), (1, Some(twist)), (0, Some(twist)), (2, None), (0, None), (1, None)] {
-        rasteriser.rasterise(&scans[scan].view(), 0, twist, &mut reused).unwrap();
-        assert_eq!(reused, raster(&config, &scans[scan], twist), "scan {scan}, {twist:?}");
+    for (scan, twist) in [
+        (0, None),
+        (1, Some(twist)),
+        (0, Some(twist)),
+        (2, None),
+        (0, None),
+        (1, None),
+    ] {
+        rasteriser
+            .rasterise(&scans[scan].view(), 0, twist, &mut reused)
+            .unwrap();
+        assert_eq!(
+            reused,
+            raster(&config, &scans[scan], twist),
+            "scan {scan}, {twist:?}"
+        );
     }
 }
 

@@ -30,8 +30,12 @@ impl Sensor {
     pub fn navtech() -> Self {
         let count = 400;
         Self {
-            azimuth_rad: (0..count).map(|i| ((14 * i + 13) as f64 / 5600.0 * TAU) as f32).collect(),
-            time_s: (0..count).map(|i| 0.25 * ((f64::from(i) + 0.5) / f64::from(count) - 0.5)).collect(),
+            azimuth_rad: (0..count)
+                .map(|i| ((14 * i + 13) as f64 / 5600.0 * TAU) as f32)
+                .collect(),
+            time_s: (0..count)
+                .map(|i| 0.25 * ((f64::from(i) + 0.5) / f64::from(count) - 0.5))
+                .collect(),
             bins: 3650,
             range_resolution_m: 0.0438,
             range_offset_m: 0.0,
@@ -46,7 +50,10 @@ impl Sensor {
     pub fn scan(&self) -> OwnedScan {
         let azimuths = self.azimuth_rad.len();
         let stride = METADATA + self.bins;
-        let mut scan = OwnedScan::with_limits(ScanLimits { bytes: azimuths * stride, azimuths });
+        let mut scan = OwnedScan::with_limits(ScanLimits {
+            bytes: azimuths * stride,
+            azimuths,
+        });
         scan.geometry = SweepGeometry {
             azimuths,
             bins: self.bins,
@@ -59,7 +66,10 @@ impl Sensor {
             stamp_ns: STAMP_NS,
         };
         scan.azimuth_rad.copy_from_slice(&self.azimuth_rad);
-        let stamps = self.time_s.iter().map(|time_s| STAMP_NS + (time_s * 1e9).round() as i64);
+        let stamps = self
+            .time_s
+            .iter()
+            .map(|time_s| STAMP_NS + (time_s * 1e9).round() as i64);
         scan.stamp_ns = stamps.collect();
         for (azimuth, flags) in scan.flags.iter_mut().enumerate() {
             *flags = flag::MEASURED | self.chirp(azimuth);
@@ -70,14 +80,26 @@ impl Sensor {
     /// The scan of bells of height 200 and the given sigma about points of the frame at the scan's stamp.
     pub fn measure(&self, scatterers: &[Point2<f64>], sigma_m: f64) -> OwnedScan {
         let mut scan = self.scan();
-        let first_centre_m = 0.5 * f64::from(self.range_resolution_m) + f64::from(self.range_offset_m);
-        for (azimuth, row) in scan.bytes.chunks_exact_mut(METADATA + self.bins).enumerate() {
+        let first_centre_m =
+            0.5 * f64::from(self.range_resolution_m) + f64::from(self.range_offset_m);
+        for (azimuth, row) in scan
+            .bytes
+            .chunks_exact_mut(METADATA + self.bins)
+            .enumerate()
+        {
             row[..METADATA].fill(255);
             let seen_from = self.twist.pose_at(self.time_s[azimuth]).inverse();
             let look = self.look(azimuth);
-            let approach_mps = look.dot(&nalgebra::Vector2::new(self.twist.vx_mps, self.twist.vy_mps));
+            let approach_mps = look.dot(&nalgebra::Vector2::new(
+                self.twist.vx_mps,
+                self.twist.vy_mps,
+            ));
             let falls = self.chirp(azimuth) == flag::CHIRP_KNOWN;
-            let reads_too_near_m = f64::from(if falls { -self.doppler_s } else { self.doppler_s }) * approach_mps;
+            let reads_too_near_m = f64::from(if falls {
+                -self.doppler_s
+            } else {
+                self.doppler_s
+            }) * approach_mps;
             for scatterer in scatterers.iter().map(|scatterer| seen_from * scatterer) {
                 for (bin, power) in row[METADATA..].iter_mut().enumerate() {
                     let read_m = first_centre_m + bin as f64 * f64::from(self.range_resolution_m);
@@ -113,7 +135,9 @@ impl Sensor {
 pub fn raster(config: &RasterConfig, scan: &OwnedScan, twist: Option<Twist>) -> Vec<f32> {
     let mut raster = vec![f32::NAN; config.n * config.n];
     let mut rasteriser = Rasteriser::new(config).unwrap();
-    rasteriser.rasterise(&scan.view(), 0, twist, &mut raster).unwrap();
+    rasteriser
+        .rasterise(&scan.view(), 0, twist, &mut raster)
+        .unwrap();
     raster
 }
 
@@ -121,12 +145,20 @@ pub fn raster(config: &RasterConfig, scan: &OwnedScan, twist: Option<Twist>) -> 
 pub fn centre_m(config: &RasterConfig, row: usize, column: usize) -> Point2<f64> {
     let middle = 0.5 * (config.n as f64 - 1.0);
     let cell_m = f64::from(config.cell_m);
-    Point2::new((middle - row as f64) * cell_m, (middle - column as f64) * cell_m)
+    Point2::new(
+        (middle - row as f64) * cell_m,
+        (middle - column as f64) * cell_m,
+    )
 }
 
 /// How many cells the raster's centroid within `reach_m` of `expected` lies from it. Infinite where the raster is dark
 /// there.
-pub fn miss_cells(config: &RasterConfig, raster: &[f32], expected: &Point2<f64>, reach_m: f64) -> f64 {
+pub fn miss_cells(
+    config: &RasterConfig,
+    raster: &[f32],
+    expected: &Point2<f64>,
+    reach_m: f64,
+) -> f64 {
     let (mut sum, mut moment) = (0.0, nalgebra::Vector2::zeros());
     for (cell, &power) in raster.iter().enumerate() {
         let offset = centre_m(config, cell / config.n, cell % config.n) - expected;

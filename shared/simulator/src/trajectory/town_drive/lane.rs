@@ -23,7 +23,11 @@ pub struct Lane {
 
 /// The lane along a route.
 pub fn lane(plan: &Plan, route: &[usize], keep: Keep) -> Lane {
-    let mut lane = Lane { places: Vec::new(), limits: Vec::new(), waits: Vec::new() };
+    let mut lane = Lane {
+        places: Vec::new(),
+        limits: Vec::new(),
+        waits: Vec::new(),
+    };
     for leg in route.windows(3) {
         let along = lane.street(plan, [leg[0], leg[1]], keep);
         let (to, onward) = beside(plan, [leg[1], leg[2]], BEND_M, keep);
@@ -33,13 +37,21 @@ pub fn lane(plan: &Plan, route: &[usize], keep: Keep) -> Lane {
 }
 
 /// The lane's place and direction so many metres along a street.
-fn beside(plan: &Plan, [from, to]: [usize; 2], along_m: f64, keep: Keep) -> (Point2<f64>, Vector2<f64>) {
+fn beside(
+    plan: &Plan,
+    [from, to]: [usize; 2],
+    along_m: f64,
+    keep: Keep,
+) -> (Point2<f64>, Vector2<f64>) {
     let (middle, direction) = plan.street(from, to, along_m / plan.distance_m(from, to));
     let left_m = match keep {
         Keep::Left => LANE_M / 2.0,
         Keep::Right => -LANE_M / 2.0,
     };
-    (middle + Vector2::new(-direction.y, direction.x) * left_m, direction)
+    (
+        middle + Vector2::new(-direction.y, direction.x) * left_m,
+        direction,
+    )
 }
 
 impl Lane {
@@ -53,24 +65,43 @@ impl Lane {
             if along_m < whole_m - WAIT_M && along_m + step_m >= whole_m - WAIT_M {
                 self.waits.push(self.places.len());
             }
-            self.push(beside(plan, ends, along_m, keep).0, plan.limit(ends[0], ends[1]));
+            self.push(
+                beside(plan, ends, along_m, keep).0,
+                plan.limit(ends[0], ends[1]),
+            );
         }
         beside(plan, ends, whole_m - BEND_M, keep)
     }
 
     /// Adds a curve from one place and direction to another (a cubic of Bézier's).
-    fn bend(&mut self, from: (Point2<f64>, Vector2<f64>), to: (Point2<f64>, Vector2<f64>), limit: f64) {
+    fn bend(
+        &mut self,
+        from: (Point2<f64>, Vector2<f64>),
+        to: (Point2<f64>, Vector2<f64>),
+        limit: f64,
+    ) {
         let chord_m = (to.0 - from.0).norm();
         let turn = from.1.angle(&to.1);
         // A circle's handles are 4/3 tan(turn/4) radii long, and its chord 2 sin(turn/2) radii.
-        let handle_m =
-            if turn < 0.05 { chord_m / 3.0 } else { chord_m * (turn / 4.0).tan() / (1.5 * (turn / 2.0).sin()) };
-        let ends = [from.0, from.0 + from.1 * handle_m, to.0 - to.1 * handle_m, to.0].map(|p| p.coords);
+        let handle_m = if turn < 0.05 {
+            chord_m / 3.0
+        } else {
+            chord_m * (turn / 4.0).tan() / (1.5 * (turn / 2.0).sin())
+        };
+        let ends = [
+            from.0,
+            from.0 + from.1 * handle_m,
+            to.0 - to.1 * handle_m,
+            to.0,
+        ]
+        .map(|p| p.coords);
         let steps = (chord_m * 1.1 / STEP_M).ceil() as usize;
         for step in 0..steps {
             let (t, u) = (step as f64 / steps as f64, 1.0 - step as f64 / steps as f64);
-            let place =
-                ends[0] * u.powi(3) + ends[1] * (3.0 * u * u * t) + ends[2] * (3.0 * u * t * t) + ends[3] * t.powi(3);
+            let place = ends[0] * u.powi(3)
+                + ends[1] * (3.0 * u * u * t)
+                + ends[2] * (3.0 * u * t * t)
+                + ends[3] * t.powi(3);
             self.push(Point2::from(place), limit);
         }
     }

@@ -34,12 +34,20 @@ impl Plan {
         let [xs, ys] = [0, 1].map(|_| grid_lines(side, rng));
         let mut jitter = || rng.random_range(-JITTER_M..JITTER_M);
         let place = |index: usize| Point2::new(xs[index % side], ys[index / side]);
-        let junctions: Vec<_> = (0..side * side).map(|i| place(i) + Vector2::new(jitter(), jitter())).collect();
+        let junctions: Vec<_> = (0..side * side)
+            .map(|i| place(i) + Vector2::new(jitter(), jitter()))
+            .collect();
         let swerve = |_| [0, 1].map(|_| rng.random_range(-SWERVE_M..SWERVE_M));
         let swerves_m = (0..side * side).map(swerve).collect();
         let mut limit = || LIMITS[rng.random_range(0..LIMITS.len())];
         let limits = [0, 1].map(|_| (0..side).map(|_| limit()).collect());
-        let mut plan = Self { junctions, neighbours: vec![Vec::new(); side * side], columns: side, swerves_m, limits };
+        let mut plan = Self {
+            junctions,
+            neighbours: vec![Vec::new(); side * side],
+            columns: side,
+            swerves_m,
+            limits,
+        };
         plan.connect();
         plan.remove_some(rng);
         plan
@@ -56,7 +64,9 @@ impl Plan {
                 (row + 1 < side, side as isize),
             ];
             let built = ways.into_iter().filter(|(there, _)| *there);
-            self.neighbours[index] = built.map(|(_, step)| index.wrapping_add_signed(step)).collect();
+            self.neighbours[index] = built
+                .map(|(_, step)| index.wrapping_add_signed(step))
+                .collect();
         }
     }
 
@@ -64,7 +74,8 @@ impl Plan {
     fn remove_some(&mut self, rng: &mut impl Rng) {
         for from in 0..self.junctions.len() {
             for to in self.neighbours[from].clone() {
-                let spare = from < to && self.neighbours[from].len() > 3 && self.neighbours[to].len() > 3;
+                let spare =
+                    from < to && self.neighbours[from].len() > 3 && self.neighbours[to].len() > 3;
                 if spare && rng.random_bool(MISSING) {
                     self.neighbours[from].retain(|n| *n != to);
                     self.neighbours[to].retain(|n| *n != from);
@@ -78,10 +89,14 @@ impl Plan {
         let (low, high) = (from.min(to), from.max(to));
         let swerve_m = self.swerves_m[low][usize::from(high - low == 1)];
         let way = self.junctions[to] - self.junctions[from];
-        let side = Vector2::new(-way.y, way.x).normalize() * if from < to { swerve_m } else { -swerve_m };
+        let side =
+            Vector2::new(-way.y, way.x).normalize() * if from < to { swerve_m } else { -swerve_m };
         // A squared sine leaves both junctions along the straight line between them.
         let place = self.junctions[from] + way * share + side * (PI * share).sin().powi(2);
-        (place, (way + side * (PI * (2.0 * PI * share).sin())).normalize())
+        (
+            place,
+            (way + side * (PI * (2.0 * PI * share).sin())).normalize(),
+        )
     }
 
     /// Length of the straight line between two junctions, metres.
@@ -92,7 +107,11 @@ impl Plan {
     /// Speed limit between two junctions as a share of the highest one.
     pub fn limit(&self, from: usize, to: usize) -> f64 {
         let (low, high) = (from.min(to), from.max(to));
-        if high - low == 1 { self.limits[0][low / self.columns] } else { self.limits[1][low % self.columns] }
+        if high - low == 1 {
+            self.limits[0][low / self.columns]
+        } else {
+            self.limits[1][low % self.columns]
+        }
     }
 }
 

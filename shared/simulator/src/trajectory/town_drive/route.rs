@@ -17,7 +17,11 @@ const REPEATED: usize = 2;
 pub fn route(plan: &Plan, length_m: f64, rng: &mut impl Rng) -> Vec<usize> {
     let start = plan.junctions.len() / 2;
     let first = plan.neighbours[start][rng.random_range(0..plan.neighbours[start].len())];
-    let mut drive = Drive { plan, passed: vec![start, first], length_m: plan.distance_m(start, first) };
+    let mut drive = Drive {
+        plan,
+        passed: vec![start, first],
+        length_m: plan.distance_m(start, first),
+    };
     drive.tour(FIRST_TOUR * length_m, rng);
     drive.home();
     drive.drive_back();
@@ -56,8 +60,16 @@ impl Drive<'_> {
     /// Takes any street but the one it came by, rather one that it does not know yet.
     fn wander(&mut self, rng: &mut impl Rng) {
         let (here, before) = (self.last(0), self.last(1));
-        let known = |to: usize| self.passed.windows(2).any(|w| w == [here, to] || w == [to, here]);
-        let mut ways: Vec<usize> = self.plan.neighbours[here].iter().copied().filter(|to| *to != before).collect();
+        let known = |to: usize| {
+            self.passed
+                .windows(2)
+                .any(|w| w == [here, to] || w == [to, here])
+        };
+        let mut ways: Vec<usize> = self.plan.neighbours[here]
+            .iter()
+            .copied()
+            .filter(|to| *to != before)
+            .collect();
         if ways.iter().any(|to| !known(*to)) && rng.random_bool(0.8) {
             ways.retain(|to| !known(*to));
         }
@@ -76,14 +88,24 @@ impl Drive<'_> {
 
     /// The shortest way to the start that goes on along the first street without turning round.
     fn ways_home(&self) -> Vec<usize> {
-        self.shortest((self.last(1), self.last(0)), |before, here| here == self.passed[0] && before != self.passed[1])
+        self.shortest((self.last(1), self.last(0)), |before, here| {
+            here == self.passed[0] && before != self.passed[1]
+        })
     }
 
     /// Drives the streets after the first ones in the opposite direction.
     fn drive_back(&mut self) {
-        let Some(stretch) = self.passed.get(REPEATED + 1..2 * REPEATED + 2).map(<[usize]>::to_vec) else { return };
+        let Some(stretch) = self
+            .passed
+            .get(REPEATED + 1..2 * REPEATED + 2)
+            .map(<[usize]>::to_vec)
+        else {
+            return;
+        };
         let (end, inner) = (stretch[REPEATED], stretch[REPEATED - 1]);
-        for to in self.shortest((self.last(1), self.last(0)), |before, here| here == end && before != inner) {
+        for to in self.shortest((self.last(1), self.last(0)), |before, here| {
+            here == end && before != inner
+        }) {
             self.go(to);
         }
         for to in stretch.iter().rev().skip(1) {
@@ -95,7 +117,9 @@ impl Drive<'_> {
 
     fn way_m(&self, way: &[usize]) -> f64 {
         let mut here = self.last(0);
-        way.iter().map(|to| self.plan.distance_m(std::mem::replace(&mut here, *to), *to)).sum()
+        way.iter()
+            .map(|to| self.plan.distance_m(std::mem::replace(&mut here, *to), *to))
+            .sum()
     }
 
     /// The way with the fewest streets from the second of two junctions, coming from the first, to where `arrived` (given
@@ -115,7 +139,10 @@ impl Drive<'_> {
                 way.reverse();
                 return way;
             }
-            for next in self.plan.neighbours[state.1].iter().filter(|next| **next != state.0) {
+            for next in self.plan.neighbours[state.1]
+                .iter()
+                .filter(|next| **next != state.0)
+            {
                 let next = (state.1, *next);
                 if let Entry::Vacant(unseen) = came_from.entry(next) {
                     unseen.insert(Some(state));

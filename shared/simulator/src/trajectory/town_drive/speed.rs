@@ -31,10 +31,18 @@ pub struct Limits {
 }
 
 /// Metres along the way every `step_s`, over `length_m` of it, standing at first and at last.
-pub fn progress(way: &Way, lane: &Lane, limits: &Limits, length_m: f64, rng: &mut impl Rng, step_s: f64) -> Vec<f64> {
+pub fn progress(
+    way: &Way,
+    lane: &Lane,
+    limits: &Limits,
+    length_m: f64,
+    rng: &mut impl Rng,
+    step_s: f64,
+) -> Vec<f64> {
     let count = (length_m.min(way.length_m) / STEP_M) as usize;
     let per_place = way.length_m / (lane.places.len() - 1) as f64;
-    let place = |node: usize| ((node as f64 * STEP_M / per_place) as usize).min(lane.places.len() - 1);
+    let place =
+        |node: usize| ((node as f64 * STEP_M / per_place) as usize).min(lane.places.len() - 1);
     let fastest = |node: usize| {
         let bend = (limits.lateral_m_s2 / curvature(way, node as f64 * STEP_M).max(1e-6)).sqrt();
         bend.min(limits.speed_m_s * lane.limits[place(node)])
@@ -48,11 +56,18 @@ pub fn progress(way: &Way, lane: &Lane, limits: &Limits, length_m: f64, rng: &mu
             waits_s[node] = rng.random_range(WAIT_S);
         }
     }
-    for (speed, _) in speeds.iter_mut().zip(&waits_s).filter(|(_, wait_s)| **wait_s > 0.0) {
+    for (speed, _) in speeds
+        .iter_mut()
+        .zip(&waits_s)
+        .filter(|(_, wait_s)| **wait_s > 0.0)
+    {
         *speed = 0.0;
     }
     brake_and_speed_up(&mut speeds);
-    gradual(&timed(&speeds, &waits_s), (step_s / FINE_S).round() as usize)
+    gradual(
+        &timed(&speeds, &waits_s),
+        (step_s / FINE_S).round() as usize,
+    )
 }
 
 fn curvature(way: &Way, along_m: f64) -> f64 {

@@ -3,23 +3,44 @@ use crate::streets::Streets;
 use crate::trajectory::Trajectory;
 
 fn drives() -> impl Iterator<Item = (TownDrive, TimedPoses)> {
-    let city = TownDrive { length_m: 4000.0, speed_m_s: 13.9, lateral_acceleration_m_s2: 2.2, keep: Keep::Left };
+    let city = TownDrive {
+        length_m: 4000.0,
+        speed_m_s: 13.9,
+        lateral_acceleration_m_s2: 2.2,
+        keep: Keep::Left,
+    };
     // Checchin et al., 2010: 1135 m of campus at 0 to 25 km/h.
-    let campus = TownDrive { length_m: 1135.0, speed_m_s: 25.0 / 3.6, keep: Keep::Right, ..city };
+    let campus = TownDrive {
+        length_m: 1135.0,
+        speed_m_s: 25.0 / 3.6,
+        keep: Keep::Right,
+        ..city
+    };
     (1..=6).flat_map(move |seed| [city, campus].map(|drive| (drive, drive.trajectory(seed))))
 }
 
 /// Sizes of the values' n-th difference quotients.
-fn derivative(values: &[nalgebra::Vector2<f64>], order: usize, step: f64) -> Vec<nalgebra::Vector2<f64>> {
-    (0..order).fold(values.to_vec(), |values, _| values.windows(2).map(|w| (w[1] - w[0]) / step).collect())
+fn derivative(
+    values: &[nalgebra::Vector2<f64>],
+    order: usize,
+    step: f64,
+) -> Vec<nalgebra::Vector2<f64>> {
+    (0..order).fold(values.to_vec(), |values, _| {
+        values.windows(2).map(|w| (w[1] - w[0]) / step).collect()
+    })
 }
 
 #[test]
 fn drives_have_their_length_and_start_at_the_origin() {
     for (wanted, drive) in drives() {
         let place = |i: usize| drive.pose(i as f64 * 0.1).translation.vector;
-        let driven: f64 = (0..(drive.duration_s() * 10.0) as usize).map(|i| (place(i + 1) - place(i)).norm()).sum();
-        assert!((driven - wanted.length_m).abs() < 0.01 * wanted.length_m + 2.0, "{driven} for {wanted:?}");
+        let driven: f64 = (0..(drive.duration_s() * 10.0) as usize)
+            .map(|i| (place(i + 1) - place(i)).norm())
+            .sum();
+        assert!(
+            (driven - wanted.length_m).abs() < 0.01 * wanted.length_m + 2.0,
+            "{driven} for {wanted:?}"
+        );
         assert!(place(0).norm() < 0.01);
     }
 }
@@ -27,9 +48,15 @@ fn drives_have_their_length_and_start_at_the_origin() {
 #[test]
 fn driver_keeps_to_the_limits_and_never_jerks() {
     for (wanted, drive) in drives() {
-        let velocities: Vec<_> =
-            (0..(drive.duration_s() * 20.0) as usize).map(|i| drive.velocity(i as f64 * 0.05)).collect();
-        let largest = |order| derivative(&velocities, order, 0.05).iter().map(|v| v.norm()).fold(0.0, f64::max);
+        let velocities: Vec<_> = (0..(drive.duration_s() * 20.0) as usize)
+            .map(|i| drive.velocity(i as f64 * 0.05))
+            .collect();
+        let largest = |order| {
+            derivative(&velocities, order, 0.05)
+                .iter()
+                .map(|v| v.norm())
+                .fold(0.0, f64::max)
+        };
         for (i, v) in derivative(&velocities, 2, 0.05).iter().enumerate() {
             if v.norm() > 6.0 {
                 println!(
@@ -63,23 +90,35 @@ fn vehicle_looks_where_it_goes() {
 #[test]
 fn streets_are_driven_again_in_both_directions_and_never_side_by_side() {
     for (wanted, drive) in drives() {
-        let poses: Vec<_> = (0..(drive.duration_s() * 2.0) as usize).map(|i| drive.pose(i as f64 * 0.5)).collect();
-        let straight = |i: &usize| *i > 2 && poses[i - 2].rotation.angle_to(&poses[*i].rotation).abs() < 0.03;
+        let poses: Vec<_> = (0..(drive.duration_s() * 2.0) as usize)
+            .map(|i| drive.pose(i as f64 * 0.5))
+            .collect();
+        let straight =
+            |i: &usize| *i > 2 && poses[i - 2].rotation.angle_to(&poses[*i].rotation).abs() < 0.03;
         let straights: Vec<usize> = (0..poses.len()).filter(straight).collect();
         let (mut again, mut back) = (0, 0);
         for (n, i) in straights.iter().enumerate() {
             for later in straights[n..].iter().filter(|later| **later > i + 60) {
                 let (pose, later) = (poses[*i], poses[*later]);
                 let seen = pose.inverse() * later;
-                let parallel = seen.rotation.cos_angle().abs() > 0.97 && seen.translation.x.abs() < 3.0;
+                let parallel =
+                    seen.rotation.cos_angle().abs() > 0.97 && seen.translation.x.abs() < 3.0;
                 let beside_m = seen.translation.y.abs();
                 again += usize::from(parallel && beside_m < 1.0 && seen.rotation.cos_angle() > 0.0);
-                back += usize::from(parallel && (2.5..4.0).contains(&beside_m) && seen.rotation.cos_angle() < 0.0);
-                assert!(!parallel || !(6.0..38.0).contains(&beside_m), "streets {beside_m} m apart");
+                back += usize::from(
+                    parallel && (2.5..4.0).contains(&beside_m) && seen.rotation.cos_angle() < 0.0,
+                );
+                assert!(
+                    !parallel || !(6.0..38.0).contains(&beside_m),
+                    "streets {beside_m} m apart"
+                );
             }
         }
         assert!(again > 20, "{wanted:?} drives nothing again");
-        assert!(back > 10 || wanted.length_m < 2000.0, "{wanted:?} drives nothing back");
+        assert!(
+            back > 10 || wanted.length_m < 2000.0,
+            "{wanted:?} drives nothing back"
+        );
     }
 }
 
@@ -87,7 +126,16 @@ fn streets_are_driven_again_in_both_directions_and_never_side_by_side() {
 fn streets_along_a_town_drive_are_those_of_its_plan() {
     for (wanted, drive) in drives() {
         let streets = Streets::along(&drive, f64::INFINITY, wanted.keep, 1);
-        let driven: f64 = streets.streets().iter().filter(|s| s.driven).map(|s| s.length_m()).sum();
-        assert!(driven < 0.9 * wanted.length_m, "{driven} m of streets for {} m", wanted.length_m);
+        let driven: f64 = streets
+            .streets()
+            .iter()
+            .filter(|s| s.driven)
+            .map(|s| s.length_m())
+            .sum();
+        assert!(
+            driven < 0.9 * wanted.length_m,
+            "{driven} m of streets for {} m",
+            wanted.length_m
+        );
     }
 }
