@@ -1,0 +1,154 @@
+//! Covariances of (x, y, yaw), in m^2, m rad and rad^2.
+//!
+//! The covariance of a motion is that of its three numbers along the axes of the *earlier* frame. Its error is
+//! therefore the plain difference of these numbers, estimate less truth, the yaw's the shorter way round.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::Pose;
+
+/// The upper triangle by rows: xx, xy, x yaw, yy, y yaw, yaw yaw.
+pub type Packed = [f64; 6];
+
+/// The upper triangle of a covariance.
+pub fn pack(covariance: &Matrix3<f64>) -> Packed {
+    let at = |row, column| covariance[(row, column)];
+    [at(0, 0), at(0, 1), at(0, 2), at(1, 1), at(1, 2), at(2, 2)]
+}
+
+/// The symmetric matrix of an upper triangle.
+pub fn unpack(&[xx, xy, xyaw, yy, yyaw, yawyaw]: &Packed) -> Matrix3<f64> {
+    Matrix3::new(xx, xy, xyaw, xy, yy, yyaw, xyaw, yyaw, yawyaw)
+}
+
+/// The derivative of a composed pose by the pose that it starts from, where (x, y) is how far the composed one lies
+/// from that pose, m, in the same axes (Checchin et al., Eq. 1).
+pub fn lever(x_m: f64, y_m: f64) -> Matrix3<f64> {
+    Matrix3::new(1.0, 0.0, -y_m, 0.0, 1.0, x_m, 0.0, 0.0, 1.0)
+}
+
+/// A motion, or a pose, with the covariance of its (x, y, yaw).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UncertainMotion {
+    /// The later frame in the earlier one.
+    pub motion: Pose,
+    /// Covariance of (x, y, yaw), along the earlier frame's axes.
+    pub covariance: Matrix3<f64>,
+}
+
+impl UncertainMotion {
+    /// No motion, known exactly.
+    pub fn identity() -> Self {
+        Self {
+            motion: Pose::identity(),
+            covariance: Matrix3::zeros(),
+        }
+    }
+
+    /// This motion, then `next`, whose error is independent; to first order (Checchin et al., Eqs. 1 and 2).
+    pub fn then(&self, next: &Self) -> Self {
+        let motion = self.motion * next.motion;
+        let moved = motion.translation.vector - self.motion.translation.vector;
+        let by_self = lever(moved.x, moved.y);
+        let by_next = self.motion.rotation.to_rotation_matrix().to_homogeneous();
+        let covariance = by_self * self.covariance * by_self.transpose()
+            + by_next * next.covariance * by_next.transpose();
+        Self { motion, covariance }
+    }
+
+    /// (x, y, yaw) of this motion less those of the true one, yaw in (-pi, pi].
+    pub fn error(&self, truth: &Pose) -> Vector3<f64> {
+        let apart = self.motion.translation.vector - truth.translation.vector;
+        Vector3::new(
+            apart.x,
+            apart.y,
+            truth.rotation.rotation_to(&self.motion.rotation).angle(),
+        )
+    }
+
+    /// Whether the covariance is finite and positive definite, so that errors can be measured by it.
+    pub fn has_covariance(&self) -> bool {
+        let c = &self.covariance;
+        c.iter().all(|value| value.is_finite()) && c.cholesky().is_some()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    use super::*;
+    use crate::{pose, xy_yaw};
+
+    fn diagonal(x: f64, y: f64, yaw: f64) -> Matrix3<f64> {
+        Matrix3::from_diagonal(&Vector3::new(x, y, yaw))
+    }
+
+    fn uncertain(motion: Pose, covariance: Matrix3<f64>) -> UncertainMotion {
+        UncertainMotion { motion, covariance }
+    }
+
+    #[test]
+    fn a_packed_covariance_comes_back_symmetric() {
+        let packed = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+        let covariance = unpack(&packed);
+        assert_eq!(covariance, covariance.transpose());
+        assert_eq!(pack(&covariance), packed);
+    }
+
+    #[test]
+    fn a_left_turn_then_forward_ends_on_the_left() {
+        let turn = uncertain(pose(2.0, 0.0, FRAC_PI_2), Matrix3::zeros());
+        let end = turn.then(&uncertain(pose(3.0, 0.0, FRAC_PI_2), Matrix3::zeros()));
+        let [x, y, yaw] = xy_yaw(&end.motion);
+        assert!((x - 2.0).abs() < 1e-12 && (y - 3.0).abs() < 1e-12 && (yaw - PI).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_uncertain_heading_spreads_to_the_side_with_the_distance() {
+        let heading = uncertain(Pose::identity(), diagonal(0.0, 0.0, 1e-4));
+        let end = heading.then(&uncertain(pose(100.0, 0.0, 0.0), Matrix3::zeros()));
+        assert!(
+            (end.covariance[(1, 1)].sqrt() - 1.0).abs() < 1e-9,
+            "1 m after 100 m at 0.01 rad"
+        );
+        assert!(end.covariance[(0, 0)] < 1e-12 && (end.covariance[(1, 2)] - 0.01).abs() < 1e-9);
+    }
+
+    #[test]
+    fn composed_covariances_swing_and_turn_with_the_first_motion() {
+        let turn = uncertain(pose(2.0, 0.0, FRAC_PI_2), diagonal(0.0, 0.0, 1e-4));
+        let both = turn.then(&uncertain(pose(10.0, 0.0, 0.0), diagonal(4.0, 1.0, 0.0)));
+        assert!(
+            (both.motion.translation.vector - nalgebra::Vector2::new(2.0, 10.0)).norm() < 1e-12
+        );
+        // 10 m to the left at 0.01 rad: 0.1 m along x. The second motion's x is now y.
+        let expected = Matrix3::new(1.01, 0.0, -1e-3, 0.0, 4.0, 0.0, -1e-3, 0.0, 1e-4);
+        assert!(
+            (both.covariance - expected).norm() < 1e-12,
+            "{}",
+            both.covariance
+        );
+    }
+
+    #[test]
+    fn errors_of_yaw_take_the_shorter_way() {
+        let estimate = uncertain(pose(1.0, 2.0, PI - 0.1), Matrix3::identity());
+        let error = estimate.error(&pose(0.5, 3.0, -PI + 0.1));
+        assert!(
+            (error - Vector3::new(0.5, -1.0, -0.2)).norm() < 1e-12,
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn zero_nan_and_indefinite_matrices_are_no_covariances() {
+        let has = |covariance| uncertain(Pose::identity(), covariance).has_covariance();
+        assert!(has(diagonal(1e-4, 1e-4, 1e-8)));
+        assert!(
+            !has(Matrix3::zeros())
+                && !has(diagonal(1.0, f64::NAN, 1.0))
+                && !has(diagonal(1.0, -1.0, 1.0))
+        );
+    }
+}

@@ -1,0 +1,21 @@
+//! Motion in the plane: poses, twists and covariances in SE(2), and the points of a scan.
+//!
+//! Reading order:
+//! - [`Pose`]: a frame in another frame; [`pose`] builds one, [`interpolate`] goes between two;
+//! - [`Twist`]: a constant velocity, and the poses that it leads to;
+//! - [`covariance`]: how covariances of (x, y, yaw) are packed and composed, and [`UncertainMotion`];
+//! - [`SparsePoint`]: one return of a scan, in the sensor's frame at the time of its azimuth.
+//!
+//! # Frames and units
+//! Frames follow REP-103: x forward, y left, yaw counter-clockwise. Lengths are in m, angles in rad, times in s.
+//! A motion is the pose of the later frame in the earlier frame. Composition is `first * then`.
+
+pub mod covariance;
+mod point;
+mod pose;
+mod twist;
+
+pub use covariance::UncertainMotion;
+pub use point::SparsePoint;
+pub use pose::{Pose, interpolate, mirrored, pose, wrap_angle, xy_yaw};
+pub use twist::Twist;

@@ -1,0 +1,35 @@
+//! The points of a scan.
+
+use bytemuck::{Pod, Zeroable};
+
+/// One return of a scan, where the sensor saw it: neither motion compensation nor the Doppler shift is applied.
+///
+/// With `u` the direction to the point and `v` the sensor's velocity, the point truly lay at
+/// `(x, y) + doppler_s (u . v) u` in the sensor's frame at the time of its azimuth.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct SparsePoint {
+    /// Forward of the sensor at the time of the point's azimuth, m.
+    pub x_m: f32,
+    /// To the left of it, m.
+    pub y_m: f32,
+    /// Time of the azimuth less the scan's stamp, s.
+    pub time_s: f32,
+    /// How much the point counts, from 0 to 1. A weight that is not above 0 counts as 0.
+    pub weight: f32,
+    /// Metres to add to the range for each m/s at which the sensor approaches the point; 0 where it is unknown.
+    pub doppler_s: f32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_point_is_five_packed_floats() {
+        assert_eq!(
+            (size_of::<SparsePoint>(), align_of::<SparsePoint>()),
+            (20, 4)
+        );
+    }
+}
