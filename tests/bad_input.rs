@@ -225,7 +225,7 @@ fn an_impossible_value_is_told_with_what_is_possible() {
         ),
         ("[dataset]\nformat = 'oxfort'", ["oxfort", "oxford"]),
         ("[simulation]\nscans = 0", ["simulation", "scans"]),
-        ("[simulation.drive]\nspeed_m_s = 1e9", ["speed_m_s", "40"]),
+        ("[simulation.drive]\nspeed_mps = 1e9", ["speed_mps", "40"]),
         (
             "[stages.masking]\nrestart = { limit = -1 }",
             ["masking", "-1"],

@@ -207,7 +207,7 @@ fn a_folder_of_another_recording_is_refused() {
     let recording = written(&[]);
     let refused = Ended::of(simulate(
         recording.path(),
-        &["--set", "simulation.drive.speed_m_s=5"],
+        &["--set", "simulation.drive.speed_mps=5"],
     ));
     refused.refused_with(&["recording of another configuration", "another folder"]);
     let unknown = Ended::of(simulate(recording.path(), &["--format", "fomo"]));

@@ -227,7 +227,7 @@ pub struct SimulateArguments {
     /// Threads to render on. Default: all processors. The files are the same whatever their number.
     #[arg(long)]
     pub threads: Option<NonZeroUsize>,
-    /// Override a key, as in simulation.drive.speed_m_s=5; may be repeated.
+    /// Override a key, as in simulation.drive.speed_mps=5; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
 }

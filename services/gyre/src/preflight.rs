@@ -5,7 +5,7 @@ use std::{path::Path, time::Duration};
 use gyre_masking::{MaskKind, Masker, model::Card};
 use gyre_messages::{Footprint, Limits, Window};
 use gyre_radar::Dataset;
-use gyre_simulator::Recording;
+use gyre_simulator::SimulatedDrive;
 use thiserror::Error;
 
 use crate::{configuration::Configuration, print};
@@ -117,7 +117,7 @@ pub struct Played {
 pub fn open(configuration: &Configuration) -> Result<Played, crate::Failure> {
     let (data, options) = (&configuration.source.data, &configuration.dataset);
     if let Some(simulation) = configuration.streamed() {
-        let recording = Recording::new(simulation)?;
+        let recording = SimulatedDrive::new(simulation)?;
         let truth = Some(recording.ground_truth_tum());
         return Ok(Played {
             dataset: gyre_radar_replay::open_simulation(recording, options)?,

@@ -6,7 +6,7 @@ mod render_ahead;
 
 use gyre_messages::ScanHeader;
 use gyre_radar::{Dataset, DatasetOptions, OpenError};
-use gyre_simulator::{Recording, SimulationConfig};
+use gyre_simulator::{SimulatedDrive, SimulationConfig};
 use gyre_stage::{Launch, Source, StageError, Statistics, source};
 
 pub use config::SourceConfig;
@@ -26,7 +26,7 @@ pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
     let simulation = streamed(launch)?;
     let dataset = match &simulation {
         Some(simulation) => {
-            let recording = Recording::new(simulation).map_err(|error| input(&error))?;
+            let recording = SimulatedDrive::new(simulation).map_err(|error| input(&error))?;
             open_simulation(recording, &options)
         }
         None => gyre_radar::open(&config.data, &options),
@@ -56,7 +56,7 @@ fn streamed(launch: &Launch) -> Result<Option<SimulationConfig>, StageError> {
 
 /// A simulated drive as a dataset that lies on no disk.
 pub fn open_simulation(
-    recording: Recording,
+    recording: SimulatedDrive,
     options: &DatasetOptions,
 ) -> Result<Box<dyn Dataset>, OpenError> {
     gyre_radar::open_source(Box::new(RenderAhead::new(recording)), options)

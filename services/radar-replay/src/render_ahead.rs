@@ -9,7 +9,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 
 use gyre_radar::{Format, ImageSize, ImageSource};
-use gyre_simulator::{Recording, Renderer};
+use gyre_simulator::{Renderer, SimulatedDrive};
 
 /// Images rendered or being rendered that nobody has asked for yet.
 const AHEAD: usize = 6;
@@ -25,7 +25,7 @@ pub(crate) struct RenderAhead {
 }
 
 impl RenderAhead {
-    pub(crate) fn new(recording: Recording) -> Self {
+    pub(crate) fn new(recording: SimulatedDrive) -> Self {
         Self {
             renderer: recording.renderer(),
             crew: None,
@@ -60,7 +60,7 @@ impl ImageSource for RenderAhead {
             return self.renderer.draw(index, pixels);
         }
         self.crew
-            .get_or_insert_with(|| Crew::start(self.renderer.recording(), index))
+            .get_or_insert_with(|| Crew::start(self.renderer.drive(), index))
             .take(index, pixels);
     }
 }
@@ -161,7 +161,7 @@ impl Shared {
 }
 
 impl Crew {
-    fn start(recording: &Recording, first: usize) -> Self {
+    fn start(recording: &SimulatedDrive, first: usize) -> Self {
         let queue = Queue {
             images: recording.scans(),
             wanted: first,
@@ -223,7 +223,7 @@ mod tests {
 
     #[test]
     fn images_asked_for_in_any_order_are_those_rendered_alone() {
-        let recording = Recording::new(&SimulationConfig {
+        let recording = SimulatedDrive::new(&SimulationConfig {
             scans: 12,
             ..SimulationConfig::default()
         })

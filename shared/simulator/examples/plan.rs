@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use gyre_simulator::drive::{DriveConfig, DriveKind};
 use gyre_simulator::traffic::{Traffic, TrafficConfig};
-use gyre_simulator::{Keep, Movers, Streets, Trajectory};
+use gyre_simulator::{Keep, Movers, Path, Streets};
 use nalgebra::Point2;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -20,12 +20,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         Some("town") => DriveConfig {
             kind: DriveKind::Town,
             length_m: 8000.0,
-            speed_m_s: 13.9,
+            speed_mps: 13.9,
             ..DriveConfig::default()
         },
         Some(file) => DriveConfig::along_file(file.into()),
     };
-    let drive = kind.trajectory(seed)?;
+    let drive = kind.path(seed)?;
     let duration_s = drive.duration_s().min(60.0 * 60.0);
     let keep = if arguments.get(3).is_some_and(|keep| keep == "right") {
         Keep::Right
@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
     let mut drawing = svg(drive.as_ref(), duration_s, &streets)?;
     let started = std::time::Instant::now();
-    let drive: Arc<dyn Trajectory> = drive.into();
+    let drive: Arc<dyn Path> = drive.into();
     let traffic = Traffic::new(
         &TrafficConfig::default(),
         drive.clone(),
@@ -69,7 +69,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 fn add_moment(
     svg: &mut String,
     traffic: &Traffic,
-    drive: &dyn Trajectory,
+    drive: &dyn Path,
     time_s: f64,
 ) -> std::fmt::Result {
     let own = drive.pose(time_s).translation;
@@ -99,11 +99,7 @@ fn add_moment(
     result
 }
 
-fn svg(
-    drive: &dyn Trajectory,
-    duration_s: f64,
-    streets: &Streets,
-) -> Result<String, std::fmt::Error> {
+fn svg(drive: &dyn Path, duration_s: f64, streets: &Streets) -> Result<String, std::fmt::Error> {
     let points = || streets.streets().iter().flat_map(|street| &street.centre);
     let low = points().fold(Point2::new(f64::MAX, f64::MAX), |a, b| a.inf(b))
         - nalgebra::Vector2::repeat(20.0);

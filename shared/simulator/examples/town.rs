@@ -3,11 +3,10 @@
 //! Walls are lines (what they let through is pale), scatterers dots whose area grows with their cross-section.
 
 use std::fmt::Write as _;
-use std::path::Path;
 
+use gyre_simulator::path::recorded::{Excerpt, read};
 use gyre_simulator::town::{self, Character, TownConfig};
-use gyre_simulator::trajectory::recorded::{Excerpt, read};
-use gyre_simulator::{BlockLoop, Body, Keep, Streets, Trajectory};
+use gyre_simulator::{BlockLoop, Body, Keep, Path, Streets};
 use nalgebra::Point2;
 
 /// Metres that are drawn to each side of the place.
@@ -18,8 +17,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let out = arguments
         .first()
         .ok_or("usage: town OUT.svg [TRAJECTORY|- [CHARACTER [AT_S [SEED]]]]")?;
-    let drive: Box<dyn Trajectory> = match arguments.get(1).filter(|path| *path != "-") {
-        Some(path) => Box::new(read(Path::new(path), Excerpt::default())?),
+    let drive: Box<dyn Path> = match arguments.get(1).filter(|path| *path != "-") {
+        Some(path) => Box::new(read(std::path::Path::new(path), Excerpt::default())?),
         None => Box::new(BlockLoop::new(40.0, 32.0, 9.5, 5.0)),
     };
     let character = arguments

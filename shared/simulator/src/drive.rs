@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::SimulatorError;
 use crate::config::within;
+use crate::path::recorded::{self, Excerpt};
+use crate::path::{BlockLoop, Path, TownDrive};
 use crate::streets::Keep;
-use crate::trajectory::recorded::{self, Excerpt};
-use crate::trajectory::{BlockLoop, TownDrive, Trajectory};
 
 /// Where a drive comes from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -36,10 +36,10 @@ pub struct DriveConfig {
     /// `block`: its width, metres along y.
     pub block_width_m: f64,
     /// `block` and `town`: speed on straights, metres a second; in a town on its fastest streets.
-    pub speed_m_s: f64,
+    pub speed_mps: f64,
     /// `block` and `town`: sideways acceleration at which bends are taken, metres a second squared. It sets the speed in
     /// them. By default 5 round a block and 2.2 in a town.
-    pub lateral_acceleration_m_s2: Option<f64>,
+    pub lateral_acceleration_mps2: Option<f64>,
     /// `town`: length of the drive, metres.
     pub length_m: f64,
     /// `file`: the trajectory, of any form that [`gyre_radar::read_trajectory`] knows.
@@ -59,8 +59,8 @@ impl Default for DriveConfig {
             keep: Keep::Left,
             block_length_m: 40.0,
             block_width_m: 32.0,
-            speed_m_s: 9.5,
-            lateral_acceleration_m_s2: None,
+            speed_mps: 9.5,
+            lateral_acceleration_mps2: None,
             length_m: 1000.0,
             file: None,
             from_s: 0.0,
@@ -86,7 +86,7 @@ impl DriveConfig {
         Self {
             kind: DriveKind::Town,
             keep: Keep::Right,
-            speed_m_s: 25.0 / 3.6,
+            speed_mps: 25.0 / 3.6,
             length_m: 1135.0,
             ..Self::default()
         }
@@ -96,10 +96,10 @@ impl DriveConfig {
     pub fn validate(&self) -> Result<(), SimulatorError> {
         within("drive.block_length_m", self.block_length_m, 30.0, 400.0)?;
         within("drive.block_width_m", self.block_width_m, 30.0, 400.0)?;
-        within("drive.speed_m_s", self.speed_m_s, 0.5, 40.0)?;
+        within("drive.speed_mps", self.speed_mps, 0.5, 40.0)?;
         within(
-            "drive.lateral_acceleration_m_s2",
-            self.lateral_acceleration_m_s2.unwrap_or(1.0),
+            "drive.lateral_acceleration_mps2",
+            self.lateral_acceleration_mps2.unwrap_or(1.0),
             0.1,
             20.0,
         )?;
@@ -119,8 +119,8 @@ impl DriveConfig {
     }
 
     /// The drive; all its randomness comes from `seed`. Fails where its file cannot be read or driven.
-    pub fn trajectory(&self, seed: u64) -> Result<Box<dyn Trajectory>, SimulatorError> {
-        let lateral_acceleration_m_s2 = |default| self.lateral_acceleration_m_s2.unwrap_or(default);
+    pub fn path(&self, seed: u64) -> Result<Box<dyn Path>, SimulatorError> {
+        let lateral_acceleration_mps2 = |default| self.lateral_acceleration_mps2.unwrap_or(default);
         Ok(match (self.kind, &self.file) {
             (DriveKind::File, Some(file)) => {
                 let for_s = self.for_s.unwrap_or(f64::INFINITY);
@@ -136,17 +136,17 @@ impl DriveConfig {
             (DriveKind::Town, _) => Box::new(
                 TownDrive {
                     length_m: self.length_m,
-                    speed_m_s: self.speed_m_s,
-                    lateral_acceleration_m_s2: lateral_acceleration_m_s2(2.2),
+                    speed_mps: self.speed_mps,
+                    lateral_acceleration_mps2: lateral_acceleration_mps2(2.2),
                     keep: self.keep,
                 }
-                .trajectory(seed),
+                .path(seed),
             ),
             (DriveKind::Block | DriveKind::File, _) => Box::new(BlockLoop::new(
                 self.block_length_m,
                 self.block_width_m,
-                self.speed_m_s,
-                lateral_acceleration_m_s2(5.0),
+                self.speed_mps,
+                lateral_acceleration_mps2(5.0),
             )),
         })
     }
@@ -171,7 +171,7 @@ mod tests {
         );
         let missing = DriveConfig::along_file("nowhere/poses.tum".into());
         missing.validate().unwrap();
-        let refused = missing.trajectory(1).err().unwrap().to_string();
+        let refused = missing.path(1).err().unwrap().to_string();
         assert!(refused.contains("nowhere/poses.tum"), "{refused}");
     }
 
@@ -180,14 +180,14 @@ mod tests {
         let config: DriveConfig =
             toml::from_str("kind = \"town\"\nlength_m = 500.0\nkeep = \"right\"").unwrap();
         assert_eq!((config.kind, config.keep), (DriveKind::Town, Keep::Right));
-        let drive = config.trajectory(1).unwrap();
+        let drive = config.path(1).unwrap();
         assert!(
             (30.0..400.0).contains(&drive.duration_s()),
             "{} s",
             drive.duration_s()
         );
-        assert_eq!(drive.pose(20.0), config.trajectory(1).unwrap().pose(20.0));
-        assert_ne!(drive.pose(20.0), config.trajectory(2).unwrap().pose(20.0));
+        assert_eq!(drive.pose(20.0), config.path(1).unwrap().pose(20.0));
+        assert_ne!(drive.pose(20.0), config.path(2).unwrap().pose(20.0));
         assert!(toml::from_str::<DriveConfig>("kind = \"boat\"").is_err());
     }
 }

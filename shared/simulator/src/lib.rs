@@ -4,14 +4,14 @@
 //! form with exact ground truth, on a disk or straight into a pipeline. In the order in which the data come about:
 //!
 //! - [`config`]: what to simulate,
-//! - [`drive`], [`trajectory`]: which way is taken, and where the sensor is at any instant,
+//! - [`drive`], [`path`]: which way is taken, and where the sensor is at any instant,
 //! - [`streets`]: the ways through the town,
 //! - [`town`], [`traffic`]: what stands and what moves around it,
 //! - [`world`], [`occlusion`]: how that reflects, and what hides what,
 //! - [`profile`]: the radars, [`weather`]: rain, fog and snow,
 //! - [`sensor`]: what a sweep measures of it,
 //! - [`simulator`]: one scan at a time, with its exact pose,
-//! - [`output`], [`recording`], [`truth`]: the drive as a recording of a dataset's form,
+//! - [`output`], [`simulated_drive`], [`truth`]: the drive as a recording of a dataset's form,
 //! - [`writer`]: that on a disk,
 //! - [`faults`]: the same, or a real one, spoilt on purpose.
 //!
@@ -38,15 +38,15 @@ mod interpolate;
 mod layout;
 pub mod occlusion;
 pub mod output;
+pub mod path;
 pub mod profile;
-pub mod recording;
 pub mod sensor;
+pub mod simulated_drive;
 pub mod simulator;
 mod stream;
 pub mod streets;
 pub mod town;
 pub mod traffic;
-pub mod trajectory;
 pub mod truth;
 pub mod weather;
 pub mod world;
@@ -56,11 +56,11 @@ pub use config::SimulationConfig;
 pub use error::SimulatorError;
 pub use faults::{Fault, FaultPlan, write_faulty};
 pub use output::{HostStamps, OutputFormat};
+pub use path::{BlockLoop, Path, SplinePath};
 pub use profile::{Profile, Sampling};
-pub use recording::{Recording, Renderer};
 pub use sensor::{Effects, Scene, Sensor, SensorConfig, SweepTime};
+pub use simulated_drive::{Renderer, SimulatedDrive};
 pub use simulator::{SimulatedScan, Simulator};
 pub use streets::{Keep, Street, Streets};
-pub use trajectory::{BlockLoop, ConstantTwist, TimedPoses, Trajectory};
 pub use world::{Body, Movers, Moving, World};
 pub use writer::{Summary, write_dataset, write_dataset_on};

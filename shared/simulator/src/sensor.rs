@@ -53,9 +53,9 @@ use self::noise::Noise;
 use self::skyline::Skyline;
 use self::spectrum::RangeSpectrum;
 use self::stations::Stations;
+use crate::path::Path;
 use crate::profile::{Chirp, METADATA_BYTES, Receiver, Sampling};
 use crate::stream::Stream;
-use crate::trajectory::Trajectory;
 use crate::weather::WeatherConfig;
 use crate::world::{Movers, Moving, World};
 
@@ -91,7 +91,7 @@ impl SweepTime {
     }
 
     /// Time on the trajectory of a stamp, seconds.
-    pub fn trajectory_s(&self, stamp_us: i64) -> f64 {
+    pub fn drive_time_s(&self, stamp_us: i64) -> f64 {
         (stamp_us - self.epoch_us) as f64 * 1e-6
     }
 }
@@ -104,7 +104,7 @@ pub struct Scene<'a> {
     /// What moves.
     pub movers: &'a dyn Movers,
     /// How the sensor moves.
-    pub trajectory: &'a dyn Trajectory,
+    pub path: &'a dyn Path,
     /// What the weather is like.
     pub weather: WeatherConfig,
 }
@@ -198,14 +198,14 @@ impl Sensor {
         let error_rad = |azimuth_rad: f64| wobble_rad * azimuth_rad.cos();
         let lift_rad = |time_s, azimuth_rad| self.nodding.lift_rad(time_s, azimuth_rad);
         self.stations.follow(
-            scene.trajectory,
+            scene.path,
             time,
             &self.sampling,
             moving,
             error_rad,
             lift_rad,
         );
-        let middle_s = time.trajectory_s(time.middle_us());
+        let middle_s = time.drive_time_s(time.middle_us());
         let centre = self.stations.middle().position;
         let reach_m = self.sampling.reach_m();
         let mut movers: Vec<Moving<'_>> = Vec::new();
@@ -345,9 +345,9 @@ impl Sensor {
             let off_rad =
                 station.beam.perp(&way) / station.beam.dot(&way) + self.jitter_rad[azimuth];
             let amplitude = echo.amplitude * self.antenna.gain(off_rad);
-            let approach_m_s = (station.velocity - echo.velocity).dot(&way) / range_m;
+            let approach_mps = (station.velocity - echo.velocity).dot(&way) / range_m;
             // What approaches reads too near with a rising chirp.
-            let measured_m = range_m - doppler_s * approach_m_s;
+            let measured_m = range_m - doppler_s * approach_mps;
             let bin = self.sampling.bin(measured_m);
             if self.effects.speckle {
                 // There and back: two wavelengths of phase for each wavelength of range.

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use gyre_radar::{OwnedScan, ScanLimits, ScanSlot, SweepGeometry};
 use nalgebra::Isometry2;
 
+use crate::path::Path;
 use crate::profile::Sampling;
 use crate::sensor::{Scene, Sensor, SweepTime};
 use crate::streets::Streets;
 use crate::traffic::Traffic;
-use crate::trajectory::Trajectory;
 use crate::weather::WeatherConfig;
 use crate::world::World;
 use crate::{SimulationConfig, SimulatorError, town};
@@ -26,7 +26,7 @@ const ENDLESS_S: f64 = 600.0;
 pub struct Simulator {
     config: SimulationConfig,
     sampling: Sampling,
-    trajectory: Arc<dyn Trajectory>,
+    path: Arc<dyn Path>,
     world: Arc<World>,
     traffic: Traffic,
 }
@@ -44,29 +44,29 @@ impl Simulator {
     /// Builds the town and the drive. Fails where the configuration makes no sense.
     pub fn new(config: &SimulationConfig) -> Result<Self, SimulatorError> {
         config.validate()?;
-        let trajectory: Arc<dyn Trajectory> = config.drive.trajectory(config.seed)?.into();
+        let path: Arc<dyn Path> = config.drive.path(config.seed)?.into();
         let sampling = config.sensor.sampling();
         // Streets, town and traffic of a drive do not depend on how many scans are taken of it.
         let taken_s = config.scans as f64 * sampling.period_us as f64 * 1e-6;
-        let [laid_s, lively_s] = match trajectory.duration_s() {
+        let [laid_s, lively_s] = match path.duration_s() {
             whole_s if whole_s.is_finite() => [whole_s; 2],
             _ => [ENDLESS_S, (taken_s / ENDLESS_S).ceil() * ENDLESS_S],
         };
         let keep = config.drive.keep;
-        let streets = Streets::along(trajectory.as_ref(), laid_s, keep, config.seed);
+        let streets = Streets::along(path.as_ref(), laid_s, keep, config.seed);
         Ok(Self {
             config: config.clone(),
             sampling,
             world: Arc::new(World::new(town::build(&config.town, &streets, config.seed))),
             traffic: Traffic::new(
                 &config.traffic,
-                trajectory.clone(),
+                path.clone(),
                 lively_s,
                 &streets,
                 keep,
                 config.seed,
             ),
-            trajectory,
+            path,
         })
     }
 
@@ -86,8 +86,8 @@ impl Simulator {
     }
 
     /// The drive.
-    pub fn trajectory(&self) -> &dyn Trajectory {
-        self.trajectory.as_ref()
+    pub fn path(&self) -> &dyn Path {
+        self.path.as_ref()
     }
 
     /// The town.
@@ -113,7 +113,7 @@ impl Simulator {
     /// Pose of the sensor in the world at the middle of scan `index`.
     pub fn pose(&self, index: usize) -> Isometry2<f64> {
         let time = self.time(index);
-        self.trajectory.pose(time.trajectory_s(time.middle_us()))
+        self.path.pose(time.drive_time_s(time.middle_us()))
     }
 
     /// A radar as configured, for [`Simulator::render_into`].
@@ -150,8 +150,8 @@ impl Simulator {
         let scene = Scene {
             world: &self.world,
             movers: &self.traffic,
-            trajectory: self.trajectory.as_ref(),
-            weather: WeatherConfig::at(&self.config.weather, time.trajectory_s(time.start_us)),
+            path: self.path.as_ref(),
+            weather: WeatherConfig::at(&self.config.weather, time.drive_time_s(time.start_us)),
         };
         sensor.sweep(scene, time, index as u64, slot)
     }

@@ -9,7 +9,7 @@ use nalgebra::{Isometry2, Point2, Vector2};
 
 pub use along::{Keep, LANE_M};
 
-use crate::trajectory::Trajectory;
+use crate::path::Path;
 
 /// Metres a side of a cell of the index, in towns of a usual size.
 const CELL_M: f64 = 20.0;
@@ -133,9 +133,9 @@ impl Streets {
     }
 
     /// The single street that a drive takes, from its start to its end or for `at_most_s`.
-    pub fn driven(trajectory: &dyn Trajectory, at_most_s: f64, half_width_m: f64) -> Self {
-        let duration_s = trajectory.duration_s().min(at_most_s);
-        let place = |time_s: f64| Point2::from(trajectory.pose(time_s).translation.vector);
+    pub fn driven(path: &dyn Path, at_most_s: f64, half_width_m: f64) -> Self {
+        let duration_s = path.duration_s().min(at_most_s);
+        let place = |time_s: f64| Point2::from(path.pose(time_s).translation.vector);
         let mut centre = vec![place(0.0)];
         for step in 1..=(duration_s / 0.05) as usize {
             let here = place(0.05 * step as f64);
@@ -146,7 +146,7 @@ impl Streets {
                 centre.push(here);
             }
         }
-        centre.push(place(duration_s) + trajectory.pose(duration_s) * Vector2::new(0.1, 0.0));
+        centre.push(place(duration_s) + path.pose(duration_s) * Vector2::new(0.1, 0.0));
         Self::new(vec![Street {
             centre,
             half_width_m,
@@ -252,7 +252,7 @@ mod tests {
     use std::f64::consts::FRAC_PI_2;
 
     use super::*;
-    use crate::trajectory::BlockLoop;
+    use crate::path::BlockLoop;
 
     #[test]
     fn a_place_beside_a_bent_street_is_found_at_its_distance() {

@@ -18,9 +18,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::SimulatorError;
 use crate::config::within;
+use crate::path::Path;
 use crate::stream::Stream;
 use crate::streets::{Keep, LANE_M, Streets};
-use crate::trajectory::Trajectory;
 use crate::world::{Body, Movers, Moving};
 use own_way::OwnWay;
 use road_user::Kind;
@@ -95,7 +95,7 @@ impl TrafficConfig {
 /// All road users but the driven vehicle.
 #[derive(Clone)]
 pub struct Traffic {
-    trajectory: Arc<dyn Trajectory>,
+    path: Arc<dyn Path>,
     way: Arc<OwnWay>,
     actors: Arc<Vec<Actor>>,
 }
@@ -120,14 +120,14 @@ impl Traffic {
     /// The traffic around the first `duration_s` of a drive, the same for the same seed.
     pub fn new(
         config: &TrafficConfig,
-        trajectory: Arc<dyn Trajectory>,
+        path: Arc<dyn Path>,
         duration_s: f64,
         streets: &Streets,
         keep: Keep,
         seed: u64,
     ) -> Self {
         let mut rng = Stream::Traffic.generator(seed);
-        let way = OwnWay::new(trajectory.as_ref(), duration_s, streets, keep);
+        let way = OwnWay::new(path.as_ref(), duration_s, streets, keep);
         let mut crowd = Crowd::default();
         if config.vehicles_per_km > 0.0 {
             crowd.own_lane(config, &mut rng);
@@ -140,7 +140,7 @@ impl Traffic {
         crowd.cyclists(config, &way, &mut rng);
         crowd.pedestrians(config, &way, &mut rng);
         Self {
-            trajectory,
+            path,
             way: Arc::new(way),
             actors: Arc::new(crowd.actors),
         }
@@ -155,7 +155,7 @@ impl Movers for Traffic {
         reach_m: f64,
         see: &mut dyn FnMut(Moving<'a>),
     ) {
-        let own = self.trajectory.pose(time_s);
+        let own = self.path.pose(time_s);
         for actor in self.actors.iter().filter(|actor| actor.is_shown(time_s)) {
             let Some(pose) = actor.track.pose(&self.way, time_s) else {
                 continue;
@@ -261,7 +261,7 @@ impl Crowd {
                 at_m,
                 at_s: 0.0,
                 share: 1.0 + config.speed_spread.max(0.1) * rng.random_range(0.8..1.6),
-                speed_m_s: 0.0,
+                speed_mps: 0.0,
                 lane: Lane::Inwards(LANE_M - 0.3),
             };
             self.along(kind, beside, way, rng);
@@ -271,8 +271,8 @@ impl Crowd {
     /// Those in the other lane, but for those who would meet somebody overtaking.
     fn oncoming(&mut self, config: &TrafficConfig, way: &OwnWay, rng: &mut ChaCha8Rng) {
         let whole_s = way.clock_s(f64::INFINITY);
-        let mean_m_s = (way.length_m() + 600.0) / whole_s;
-        let mean_s = (1000.0 / config.vehicles_per_km / mean_m_s).max(1.2 * HEADWAY_S);
+        let mean_mps = (way.length_m() + 600.0) / whole_s;
+        let mean_s = (1000.0 / config.vehicles_per_km / mean_mps).max(1.2 * HEADWAY_S);
         let overtaking: Vec<Track> = self
             .actors
             .iter()
@@ -283,7 +283,7 @@ impl Crowd {
             enters_s += HEADWAY_S - (mean_s - HEADWAY_S) * (1.0 - rng.random::<f64>()).ln();
             let kind = Kind::motorised(rng);
             // Longer vehicles keep longer headways.
-            enters_s += (kind.half_m().0 - 2.0).max(0.0) / mean_m_s;
+            enters_s += (kind.half_m().0 - 2.0).max(0.0) / mean_mps;
             let vehicle = Oncoming {
                 enters_s,
                 drift_s: DRIFT_S * (config.speed_spread / 0.3).min(1.5) * rng.random::<f64>(),
@@ -317,7 +317,7 @@ impl Crowd {
                     at_m,
                     at_s: 0.0,
                     share: 0.0,
-                    speed_m_s: 0.0,
+                    speed_mps: 0.0,
                     lane,
                 },
                 way,
@@ -336,7 +336,7 @@ impl Crowd {
                     at_m,
                     at_s: 0.0,
                     share,
-                    speed_m_s: 0.0,
+                    speed_mps: 0.0,
                     lane,
                 },
                 way,
@@ -353,13 +353,13 @@ impl Crowd {
             } else {
                 Lane::OtherKerb(beyond_m)
             };
-            let speed_m_s =
+            let speed_mps =
                 rng.random_range(0.9..1.7) * if rng.random_bool(0.5) { 1.0 } else { -1.0 };
             let beside = Beside {
                 at_m,
                 at_s: way.time_at(at_m),
                 share: 0.0,
-                speed_m_s,
+                speed_mps,
                 lane,
             };
             self.along(Kind::Pedestrian, beside, way, rng);

@@ -31,9 +31,7 @@ pub(crate) fn ground_truth_tum(simulator: &Simulator, stamps_ns: Vec<i64>) -> Ve
 
 fn pose_at(simulator: &Simulator, index: usize, stamp_ns: i64) -> Isometry2<f64> {
     let epoch_ns = simulator.time(index).epoch_us * 1000;
-    simulator
-        .trajectory()
-        .pose((stamp_ns - epoch_ns) as f64 * 1e-9)
+    simulator.path().pose((stamp_ns - epoch_ns) as f64 * 1e-9)
 }
 
 /// `azimuth_poses.npy` as bytes.
@@ -44,8 +42,8 @@ pub(crate) fn azimuth_poses_npy(simulator: &Simulator) -> Vec<u8> {
     for index in 0..scans {
         let time = simulator.time(index);
         for azimuth in 0..azimuths {
-            let time_s = time.trajectory_s(time.stamp_us(azimuth));
-            let pose = simulator.trajectory().pose(time_s);
+            let time_s = time.drive_time_s(time.stamp_us(azimuth));
+            let pose = simulator.path().pose(time_s);
             for value in [
                 time_s,
                 pose.translation.x,

@@ -11,7 +11,7 @@ use std::sync::mpsc;
 use gyre_radar::ImageSource as _;
 
 use crate::image::{write_image, write_whole};
-use crate::recording::Recording;
+use crate::simulated_drive::SimulatedDrive;
 use crate::{SimulationConfig, SimulatorError};
 
 pub use resume::MADE_BY;
@@ -60,22 +60,19 @@ pub fn write_dataset_on(
     out: &Path,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<Summary, SimulatorError> {
-    let recording = Recording::new(config)?;
-    let images = out.join(recording.image_folder());
+    let drive = SimulatedDrive::new(config)?;
+    let images = out.join(drive.image_folder());
     fs::create_dir_all(&images).map_err(SimulatorError::write(&images))?;
     let _alone = lock(out)?;
-    let missing = resume::missing(&recording, config, out)?;
+    let missing = resume::missing(&drive, config, out)?;
     write_whole(&out.join(MADE_BY), resume::made_by(config)?.as_bytes())?;
-    write_whole(
-        &out.join(resume::TOLD),
-        resume::told(&recording)?.as_bytes(),
-    )?;
-    write_side_files(&recording, out)?;
-    let kept = recording.scans() - missing.len();
-    progress(kept, recording.scans());
-    let mut written = |done| progress(kept + done, recording.scans());
-    write_images(&recording, &missing, threads.get(), &images, &mut written)?;
-    Ok(summary(&recording, out, kept))
+    write_whole(&out.join(resume::TOLD), resume::told(&drive)?.as_bytes())?;
+    write_side_files(&drive, out)?;
+    let kept = drive.scans() - missing.len();
+    progress(kept, drive.scans());
+    let mut written = |done| progress(kept + done, drive.scans());
+    write_images(&drive, &missing, threads.get(), &images, &mut written)?;
+    Ok(summary(&drive, out, kept))
 }
 
 /// The folder for this process alone, until what is returned is dropped.
@@ -93,8 +90,8 @@ fn lock(folder: &Path) -> Result<File, SimulatorError> {
     }
 }
 
-fn summary(recording: &Recording, out: &Path, kept: usize) -> Summary {
-    let simulator = recording.simulator();
+fn summary(drive: &SimulatedDrive, out: &Path, kept: usize) -> Summary {
+    let simulator = drive.simulator();
     let last = simulator.scans() - 1;
     let step_m = |i: usize| {
         (simulator.pose(i).inverse() * simulator.pose(i + 1))
@@ -111,8 +108,8 @@ fn summary(recording: &Recording, out: &Path, kept: usize) -> Summary {
     }
 }
 
-fn write_side_files(recording: &Recording, out: &Path) -> Result<(), SimulatorError> {
-    for (name, bytes) in recording.side_files() {
+fn write_side_files(drive: &SimulatedDrive, out: &Path) -> Result<(), SimulatorError> {
+    for (name, bytes) in drive.side_files() {
         let path = out.join(name);
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(SimulatorError::write(folder))?;
@@ -124,7 +121,7 @@ fn write_side_files(recording: &Recording, out: &Path) -> Result<(), SimulatorEr
 
 /// Renders and writes the scans in `missing`, each thread taking the next one that nobody has taken.
 fn write_images(
-    recording: &Recording,
+    drive: &SimulatedDrive,
     missing: &[usize],
     threads: usize,
     folder: &Path,
@@ -135,7 +132,7 @@ fn write_images(
     std::thread::scope(|scope| {
         for _ in 0..threads.min(missing.len()) {
             let (sender, next) = (sender.clone(), &next);
-            scope.spawn(move || work(recording, folder, missing, next, &sender));
+            scope.spawn(move || work(drive, folder, missing, next, &sender));
         }
         drop(sender);
         let mut outcome = Ok(());
@@ -152,18 +149,18 @@ fn write_images(
 }
 
 fn work(
-    recording: &Recording,
+    drive: &SimulatedDrive,
     folder: &Path,
     missing: &[usize],
     next: &AtomicUsize,
     results: &mpsc::Sender<Result<(), SimulatorError>>,
 ) {
-    let (mut renderer, size) = (recording.renderer(), recording.image_size());
+    let (mut renderer, size) = (drive.renderer(), drive.image_size());
     let (mut pixels, mut encoded) = (vec![0; size.bytes()], Vec::new());
     while let Some(&index) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
         renderer.draw(index, &mut pixels);
         let written = write_image(
-            &folder.join(recording.image_name(index)),
+            &folder.join(drive.image_name(index)),
             size,
             &pixels,
             &mut encoded,

@@ -205,10 +205,10 @@ fn impossible_configuration_names_its_key() {
     let refused = |config: SimulationConfig| Simulator::new(&config).err().unwrap().to_string();
     assert!(refused(config(0)).contains("`scans`"));
     let drive = gyre_simulator::drive::DriveConfig {
-        speed_m_s: f64::NAN,
+        speed_mps: f64::NAN,
         ..Default::default()
     };
-    assert!(refused(SimulationConfig { drive, ..config(1) }).contains("speed_m_s`"));
+    assert!(refused(SimulationConfig { drive, ..config(1) }).contains("speed_mps`"));
     let unknown = toml::from_str::<SimulationConfig>("scanz = 3")
         .unwrap_err()
         .to_string();

@@ -1,12 +1,12 @@
 //! Real trajectories as drives: how close they pass, and that a car could have driven them.
 #![allow(clippy::unwrap_used)]
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use gyre_radar::read_trajectory;
-use gyre_simulator::Trajectory;
-use gyre_simulator::trajectory::recorded::{Excerpt, read};
+use gyre_simulator::Path;
+use gyre_simulator::path::recorded::{Excerpt, read};
 
 fn real_files() -> Vec<PathBuf> {
     let Some(root) = std::env::var_os("GYRE_DATA") else {
@@ -18,12 +18,12 @@ fn real_files() -> Vec<PathBuf> {
         "oxford-2019-01-10-11-46-21.radar_odometry.csv",
         "oxford-2019-01-16-13-09-37.kitti.txt",
     ]
-    .map(|name| Path::new(&root).join("trajectories").join(name))
+    .map(|name| std::path::Path::new(&root).join("trajectories").join(name))
     .to_vec()
 }
 
 /// Sorted magnitudes of a quantity over the drive; its n-th derivative by differences 50 ms apart.
-fn derivative(drive: &dyn Trajectory, order: usize, of: &dyn Fn(f64) -> [f64; 2]) -> Vec<f64> {
+fn derivative(drive: &dyn Path, order: usize, of: &dyn Fn(f64) -> [f64; 2]) -> Vec<f64> {
     let step = 0.05;
     let mut values: Vec<[f64; 2]> = (0..(drive.duration_s() / step) as usize)
         .map(|i| of(i as f64 * step))
@@ -169,7 +169,7 @@ fn files_that_cannot_be_driven_are_refused_by_name() {
         refused.contains("jumps by 500000.0 m within 1.000 s"),
         "{refused}"
     );
-    let missing = read(Path::new("nowhere.csv"), Excerpt::default())
+    let missing = read(std::path::Path::new("nowhere.csv"), Excerpt::default())
         .unwrap_err()
         .to_string();
     assert!(missing.contains("nowhere.csv"), "{missing}");

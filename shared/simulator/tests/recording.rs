@@ -14,8 +14,8 @@ use gyre_radar::{
 };
 use gyre_simulator::output::OutputConfig;
 use gyre_simulator::{
-    HostStamps, OutputFormat, Recording, SimulationConfig, SimulatorError, Summary, write_dataset,
-    write_dataset_on,
+    HostStamps, OutputFormat, SimulatedDrive, SimulationConfig, SimulatorError, Summary,
+    write_dataset, write_dataset_on,
 };
 use nalgebra::Isometry2;
 
@@ -48,10 +48,10 @@ fn written(config: &SimulationConfig) -> tempfile::TempDir {
 }
 
 /// What the radar knows of itself, but not which format it is: that is to be found.
-fn options(recording: &Recording) -> DatasetOptions {
+fn options(drive: &SimulatedDrive) -> DatasetOptions {
     DatasetOptions {
         format: None,
-        ..recording.dataset_options()
+        ..drive.dataset_options()
     }
 }
 
@@ -65,34 +65,34 @@ fn read(dataset: &mut dyn Dataset, index: usize) -> OwnedScan {
 fn each_format_is_detected_and_read_back_as_it_was_rendered() {
     for format in FORMATS {
         let config = config(format, 3);
-        let (folder, recording) = (written(&config), Recording::new(&config).unwrap());
-        let mut dataset = gyre_radar::open(folder.path(), &options(&recording)).unwrap();
-        assert_eq!((dataset.format(), dataset.len()), (recording.format(), 3));
+        let (folder, drive) = (written(&config), SimulatedDrive::new(&config).unwrap());
+        let mut dataset = gyre_radar::open(folder.path(), &options(&drive)).unwrap();
+        assert_eq!((dataset.format(), dataset.len()), (drive.format(), 3));
         for index in 0..3 {
             let (read, rendered) = (
                 read(dataset.as_mut(), index),
-                recording.simulator().render_scan(index).scan,
+                drive.simulator().render_scan(index).scan,
             );
-            assert_same_measurement(&recording, &read, &rendered);
+            assert_same_measurement(&drive, &read, &rendered);
             assert!(
-                (read.geometry.stamp_ns - recording.stamp_ns(index)).abs() <= 1000,
+                (read.geometry.stamp_ns - drive.stamp_ns(index)).abs() <= 1000,
                 "{format:?}"
             );
             let nominal_ns = dataset.nominal_stamp_ns(index).unwrap();
             assert!(
-                (nominal_ns - recording.stamp_ns(index)).abs() < 1_000_000,
+                (nominal_ns - drive.stamp_ns(index)).abs() < 1_000_000,
                 "{format:?}: {nominal_ns}"
             );
         }
     }
 }
 
-fn assert_same_measurement(recording: &Recording, read: &OwnedScan, rendered: &OwnedScan) {
+fn assert_same_measurement(drive: &SimulatedDrive, read: &OwnedScan, rendered: &OwnedScan) {
     let (read, rendered) = (read.view(), rendered.view());
     let (a, b) = (&read.geometry, &rendered.geometry);
     assert_eq!((a.azimuths, a.bins, a.sense), (b.azimuths, b.bins, b.sense));
     assert!((a.range_resolution_m - b.range_resolution_m).abs() < 1e-6);
-    let without_encoder = recording.format() == Format::Radiate;
+    let without_encoder = drive.format() == Format::Radiate;
     // Without an encoder the first azimuth counts as straight ahead.
     let first_rad = if without_encoder {
         rendered.azimuth_rad[0]
@@ -106,7 +106,7 @@ fn assert_same_measurement(recording: &Recording, read: &OwnedScan, rendered: &O
         );
         assert!((read.stamp_ns[azimuth] - rendered.stamp_ns[azimuth]).abs() < 2_000);
         // Only Oxford's form says which azimuths were filled in.
-        let told = recording.format() == Format::Oxford;
+        let told = drive.format() == Format::Oxford;
         assert!(!told || read.flags[azimuth] == rendered.flags[azimuth]);
     }
 }
@@ -115,7 +115,7 @@ fn assert_same_measurement(recording: &Recording, read: &OwnedScan, rendered: &O
 fn each_format_says_where_the_sensor_was() {
     for format in FORMATS {
         let config = config(format, 8);
-        let (folder, recording) = (written(&config), Recording::new(&config).unwrap());
+        let (folder, drive) = (written(&config), SimulatedDrive::new(&config).unwrap());
         assert_eq!(
             find_ground_truth(folder.path()),
             Some(folder.path().join("ground_truth.tum"))
@@ -132,11 +132,11 @@ fn each_format_says_where_the_sensor_was() {
             let start = truth.poses[0];
             for (index, pose) in truth.poses.iter().enumerate() {
                 assert!(
-                    (stamps[index] - recording.stamp_ns(index)).abs() <= 1000,
+                    (stamps[index] - drive.stamp_ns(index)).abs() <= 1000,
                     "{file}: scan {index}"
                 );
                 let expected =
-                    pose_at(&recording, stamps[0]).inverse() * pose_at(&recording, stamps[index]);
+                    pose_at(&drive, stamps[0]).inverse() * pose_at(&drive, stamps[index]);
                 let error = (start.inverse() * pose).inverse() * expected;
                 assert!(error.translation.vector.norm() < 1e-5, "{file}: {error}");
                 assert!(error.rotation.angle().abs() < 1e-7, "{file}: {error}");
@@ -145,11 +145,11 @@ fn each_format_says_where_the_sensor_was() {
     }
 }
 
-fn pose_at(recording: &Recording, stamp_ns: i64) -> Isometry2<f64> {
-    let epoch_ns = recording.simulator().time(0).epoch_us * 1000;
-    recording
+fn pose_at(drive: &SimulatedDrive, stamp_ns: i64) -> Isometry2<f64> {
+    let epoch_ns = drive.simulator().time(0).epoch_us * 1000;
+    drive
         .simulator()
-        .trajectory()
+        .path()
         .pose((stamp_ns - epoch_ns) as f64 * 1e-9)
 }
 
@@ -157,11 +157,11 @@ fn pose_at(recording: &Recording, stamp_ns: i64) -> Isometry2<f64> {
 fn nothing_looks_wrong_to_an_inspection_of_any_format() {
     for format in FORMATS {
         let config = config(format, 4);
-        let (folder, recording) = (written(&config), Recording::new(&config).unwrap());
-        let report = inspect(folder.path(), &options(&recording), None)
+        let (folder, drive) = (written(&config), SimulatedDrive::new(&config).unwrap());
+        let report = inspect(folder.path(), &options(&drive), None)
             .unwrap()
             .to_string();
-        assert!(report.contains(recording.format().name()), "{report}");
+        assert!(report.contains(drive.format().name()), "{report}");
         assert!(report.contains("ground_truth.tum"), "{report}");
     }
 }
@@ -170,15 +170,15 @@ fn nothing_looks_wrong_to_an_inspection_of_any_format() {
 fn a_host_that_stalls_shifts_the_logged_times_and_not_the_sensors_clock() {
     let mut config = config(OutputFormat::Radiate, 40);
     config.output.host_stamps = HostStamps::Stalling;
-    let recording = Recording::new(&config).unwrap();
-    let source = Box::new(recording.renderer());
-    let dataset = gyre_radar::open_source(source, &recording.dataset_options()).unwrap();
+    let drive = SimulatedDrive::new(&config).unwrap();
+    let source = Box::new(drive.renderer());
+    let dataset = gyre_radar::open_source(source, &drive.dataset_options()).unwrap();
     let late_ns = |index: usize| {
         dataset.logged_stamp_ns(index).unwrap() - dataset.nominal_stamp_ns(index).unwrap()
     };
     assert!((0..40).map(late_ns).max().unwrap() > 150_000_000);
     for index in 0..40 {
-        let error_ns = dataset.nominal_stamp_ns(index).unwrap() - recording.stamp_ns(index);
+        let error_ns = dataset.nominal_stamp_ns(index).unwrap() - drive.stamp_ns(index);
         assert!(error_ns.abs() < 1_000_000, "scan {index}: {error_ns} ns");
     }
 }
@@ -186,7 +186,7 @@ fn a_host_that_stalls_shifts_the_logged_times_and_not_the_sensors_clock() {
 #[test]
 fn azimuth_poses_are_an_array_that_numpy_reads() {
     let config = config(OutputFormat::Oxford, 2);
-    let (folder, recording) = (written(&config), Recording::new(&config).unwrap());
+    let (folder, drive) = (written(&config), SimulatedDrive::new(&config).unwrap());
     let bytes = fs::read(folder.path().join("azimuth_poses.npy")).unwrap();
     assert_eq!(&bytes[..8], b"\x93NUMPY\x01\x00");
     let header = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
@@ -202,10 +202,10 @@ fn azimuth_poses_are_an_array_that_numpy_reads() {
         .collect();
     assert_eq!(values.len(), 2 * 400 * 4);
     for (scan, azimuth) in [(0, 0), (0, 399), (1, 17)] {
-        let simulator = recording.simulator();
+        let simulator = drive.simulator();
         let time = simulator.time(scan);
-        let time_s = time.trajectory_s(time.stamp_us(azimuth));
-        let pose = simulator.trajectory().pose(time_s);
+        let time_s = time.drive_time_s(time.stamp_us(azimuth));
+        let pose = simulator.path().pose(time_s);
         let expected = [
             time_s,
             pose.translation.x,
@@ -318,7 +318,7 @@ fn an_image_that_would_come_out_otherwise_is_told() {
     let first = folder
         .path()
         .join("radar")
-        .join(Recording::new(&config).unwrap().image_name(0));
+        .join(SimulatedDrive::new(&config).unwrap().image_name(0));
     let mut bytes = fs::read(&first).unwrap();
     *bytes.last_mut().unwrap() ^= 1;
     fs::write(&first, bytes).unwrap();
@@ -333,10 +333,10 @@ fn an_image_that_would_come_out_otherwise_is_told() {
 fn played_without_a_disk_it_is_what_it_is_read_from_one() {
     for format in FORMATS {
         let config = config(format, 3);
-        let (folder, recording) = (written(&config), Recording::new(&config).unwrap());
-        let options = recording.dataset_options();
+        let (folder, drive) = (written(&config), SimulatedDrive::new(&config).unwrap());
+        let options = drive.dataset_options();
         let mut disk = gyre_radar::open(folder.path(), &options).unwrap();
-        let mut memory = gyre_radar::open_source(Box::new(recording.renderer()), &options).unwrap();
+        let mut memory = gyre_radar::open_source(Box::new(drive.renderer()), &options).unwrap();
         assert_eq!((disk.len(), disk.limits()), (memory.len(), memory.limits()));
         assert_eq!(disk.notes(), memory.notes());
         for index in [2, 0, 1] {

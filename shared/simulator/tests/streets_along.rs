@@ -2,17 +2,17 @@
 #![allow(clippy::unwrap_used)]
 
 use std::f64::consts::PI;
-use std::path::Path;
 use std::time::Instant;
 
+use gyre_geometry::Twist;
+use gyre_simulator::path::SplinePath;
+use gyre_simulator::path::recorded::{Excerpt, read};
 use gyre_simulator::streets::Keep;
-use gyre_simulator::trajectory::TimedPoses;
-use gyre_simulator::trajectory::recorded::{Excerpt, read};
-use gyre_simulator::{BlockLoop, ConstantTwist, Streets, Trajectory};
+use gyre_simulator::{BlockLoop, Path, Streets};
 use nalgebra::{Isometry2, Point2, Vector2};
 
 /// Largest clearance of the vehicle's middle along a drive: below -1.2 m the carriageways hold it everywhere.
-fn worst_clearance(drive: &dyn Trajectory, duration_s: f64, streets: &Streets) -> f64 {
+fn worst_clearance(drive: &dyn Path, duration_s: f64, streets: &Streets) -> f64 {
     let place = |i: usize| Point2::from(drive.pose(i as f64 * 0.1).translation.vector);
     (0..(duration_s * 10.0) as usize)
         .map(|i| streets.clearance_m(place(i), 20.0))
@@ -29,7 +29,7 @@ fn length_m(streets: &Streets, driven: bool) -> f64 {
 }
 
 /// A drive along points at walking pace, looking from each to the next.
-fn along_points(points: &[(f64, f64)], reversing: &[bool]) -> TimedPoses {
+fn along_points(points: &[(f64, f64)], reversing: &[bool]) -> SplinePath {
     let mut poses = Vec::new();
     let mut time_s = 0.0;
     for (ends, back) in points.windows(2).zip(reversing) {
@@ -48,7 +48,7 @@ fn along_points(points: &[(f64, f64)], reversing: &[bool]) -> TimedPoses {
             time_s += 0.25;
         }
     }
-    TimedPoses::new(&poses, 0.7)
+    SplinePath::new(&poses, 0.7)
 }
 
 #[test]
@@ -107,11 +107,11 @@ fn three_point_turns_and_standing_give_streets() {
         length_m(&streets, true)
     );
     assert!(worst_clearance(&drive, drive.duration_s(), &streets) < -1.2);
-    let on_the_spot = ConstantTwist {
-        yaw_rad_s: 0.7,
-        ..ConstantTwist::default()
+    let on_the_spot = Twist {
+        yaw_rate_radps: 0.7,
+        ..Twist::default()
     };
-    for drive in [ConstantTwist::default(), on_the_spot] {
+    for drive in [Twist::default(), on_the_spot] {
         let streets = Streets::along(&drive, 60.0, Keep::Left, 3);
         assert!(worst_clearance(&drive, 60.0, &streets) < -1.2);
     }
@@ -176,7 +176,7 @@ fn real_drives_get_streets_quickly() {
     ];
     for (name, keep) in files {
         let drive = read(
-            &Path::new(&root).join("trajectories").join(name),
+            &std::path::Path::new(&root).join("trajectories").join(name),
             Excerpt::default(),
         )
         .unwrap();

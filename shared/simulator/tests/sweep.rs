@@ -3,13 +3,13 @@
 
 use std::f64::consts::TAU;
 
+use gyre_geometry::Twist;
 use gyre_radar::{DatasetOptions, OwnedScan, ScanLimits};
 use gyre_simulator::profile::{METADATA_BYTES, Profile, Sampling};
 use gyre_simulator::weather::WeatherConfig;
 use gyre_simulator::world::{Aspect, NO_BODY, Scatterer, Wall};
 use gyre_simulator::{
-    Body, ConstantTwist, Effects, Scene, Sensor, SensorConfig, SimulationConfig, Simulator,
-    SweepTime, Trajectory, World,
+    Body, Effects, Path, Scene, Sensor, SensorConfig, SimulationConfig, Simulator, SweepTime, World,
 };
 use nalgebra::Point2;
 
@@ -44,23 +44,17 @@ fn quiet() -> Effects {
     }
 }
 
-fn sweep(content: Body, trajectory: &dyn Trajectory, doppler_s: f64) -> OwnedScan {
+fn sweep(content: Body, path: &dyn Path, doppler_s: f64) -> OwnedScan {
     let config = SensorConfig {
         doppler_s: Some(doppler_s),
         ..SensorConfig::default()
     };
-    sweep_with(
-        content,
-        trajectory,
-        &config,
-        &quiet(),
-        WeatherConfig::default(),
-    )
+    sweep_with(content, path, &config, &quiet(), WeatherConfig::default())
 }
 
 fn sweep_with(
     content: Body,
-    trajectory: &dyn Trajectory,
+    path: &dyn Path,
     config: &SensorConfig,
     effects: &Effects,
     weather: WeatherConfig,
@@ -83,7 +77,7 @@ fn sweep_with(
     let scene = Scene {
         world: &World::new(content),
         movers: &(),
-        trajectory,
+        path,
         weather,
     };
     scan.geometry = Sensor::new(config, effects, 7).sweep(scene, time, 0, &mut scan.slot());
@@ -117,10 +111,10 @@ fn brightest(scan: &OwnedScan) -> (usize, f64, u8) {
 }
 
 /// The azimuth that points best at a world point when it is measured, and the range from there.
-fn expected(trajectory: &dyn Trajectory, target: Point2<f64>) -> (usize, f64) {
+fn expected(path: &dyn Path, target: Point2<f64>) -> (usize, f64) {
     let seen = |azimuth: usize| {
         let time_s = (250_000 * azimuth as i64 / AZIMUTHS as i64) as f64 * 1e-6;
-        let local = trajectory.pose(time_s).inverse_transform_point(&target);
+        let local = path.pose(time_s).inverse_transform_point(&target);
         let off = (-local.y).atan2(local.x) - azimuth_rad(azimuth);
         (off - TAU * (off / TAU).round(), local.coords.norm())
     };
@@ -134,16 +128,16 @@ fn expected(trajectory: &dyn Trajectory, target: Point2<f64>) -> (usize, f64) {
 #[test]
 fn point_comes_out_where_the_moving_sensor_met_it() {
     let motions = [
-        ConstantTwist::default(),
-        ConstantTwist {
-            forward_m_s: 12.0,
-            left_m_s: 0.0,
-            yaw_rad_s: 0.0,
+        Twist::default(),
+        Twist {
+            vx_mps: 12.0,
+            vy_mps: 0.0,
+            yaw_rate_radps: 0.0,
         },
-        ConstantTwist {
-            forward_m_s: 9.0,
-            left_m_s: 0.5,
-            yaw_rad_s: -0.9,
+        Twist {
+            vx_mps: 9.0,
+            vy_mps: 0.5,
+            yaw_rate_radps: -0.9,
         },
     ];
     for motion in motions {
@@ -186,7 +180,7 @@ fn point_to_the_right_lies_at_a_quarter_turn() {
             scatterers: vec![point(0.0, -20.0)],
             walls: vec![],
         },
-        &ConstantTwist::default(),
+        &Twist::default(),
         0.0,
     );
     let (azimuth, _, _) = brightest(&scan);
@@ -198,10 +192,10 @@ fn point_to_the_right_lies_at_a_quarter_turn() {
 
 #[test]
 fn closing_speed_shortens_the_range_ahead_and_lengthens_it_behind() {
-    let motion = ConstantTwist {
-        forward_m_s: 10.0,
-        left_m_s: 0.0,
-        yaw_rad_s: 0.0,
+    let motion = Twist {
+        vx_mps: 10.0,
+        vy_mps: 0.0,
+        yaw_rate_radps: 0.0,
     };
     for (x, sign) in [(30.0, -1.0), (-30.0, 1.0)] {
         let at = |shift: f64| {
@@ -235,7 +229,7 @@ fn wall_hides_a_part_of_what_is_behind_it_and_nothing_before_it() {
                 scatterers: vec![point(30.0, 0.0)],
                 walls,
             },
-            &ConstantTwist::default(),
+            &Twist::default(),
             0.0,
         );
         let bin = sampling().bin(30.0) as usize;
@@ -254,7 +248,7 @@ fn wall_hides_a_part_of_what_is_behind_it_and_nothing_before_it() {
 
 #[test]
 fn empty_world_holds_noise_and_ringing_alone() {
-    let scan = sweep(Body::default(), &ConstantTwist::default(), 0.0);
+    let scan = sweep(Body::default(), &Twist::default(), 0.0);
     let far = (0..AZIMUTHS)
         .flat_map(|azimuth| &row(&scan, azimuth)[2800..])
         .map(|&power| f64::from(power));

@@ -1,21 +1,21 @@
 //! The town along whole drives: free of what would stand in the way, and of a size that can be rendered.
 #![allow(clippy::unwrap_used)]
 
+use gyre_simulator::path::recorded::{Excerpt, read};
 use gyre_simulator::town::{self, TownConfig};
-use gyre_simulator::trajectory::recorded::{Excerpt, read};
 use gyre_simulator::world::NO_BODY;
-use gyre_simulator::{BlockLoop, Keep, Streets, Trajectory, World};
+use gyre_simulator::{BlockLoop, Keep, Path, Streets, World};
 use nalgebra::Point2;
 
 /// How far the radars look, metres.
 const REACH_M: f64 = 165.0;
 
-fn place(drive: &dyn Trajectory, time_s: f64) -> Point2<f64> {
+fn place(drive: &dyn Path, time_s: f64) -> Point2<f64> {
     Point2::from(drive.pose(time_s).translation.vector)
 }
 
 /// Builds the town along a drive and checks that nothing stands on a street or between two places of the drive.
-fn free_town(drive: &dyn Trajectory, duration_s: f64, seed: u64) -> World {
+fn free_town(drive: &dyn Path, duration_s: f64, seed: u64) -> World {
     let streets = Streets::along(drive, duration_s, Keep::Left, seed);
     let world = World::new(town::build(&TownConfig::default(), &streets, seed));
     for scatterer in world.scatterers() {

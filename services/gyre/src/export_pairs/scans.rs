@@ -51,12 +51,12 @@ pub fn for_each_scan(
 mod tests {
     #![allow(clippy::unwrap_used)]
     use gyre_radar::open_source;
-    use gyre_simulator::{Recording, SimulationConfig};
+    use gyre_simulator::{SimulatedDrive, SimulationConfig};
 
     use super::*;
 
     fn drive() -> Box<dyn Dataset> {
-        let recording = Recording::new(&SimulationConfig {
+        let recording = SimulatedDrive::new(&SimulationConfig {
             scans: 7,
             ..SimulationConfig::default()
         })

@@ -158,12 +158,12 @@ pub fn walls_among_posts() -> Body {
 /// Traffic: one car that passes the sensor at a steady speed, x ahead.
 pub struct Passing {
     pub car: Body,
-    pub speed_m_s: f64,
+    pub speed_mps: f64,
 }
 
 impl Passing {
     /// An outline of a car, 4.4 m by 1.8 m.
-    pub fn new(speed_m_s: f64) -> Self {
+    pub fn new(speed_mps: f64) -> Self {
         let along = (0..12).map(|i| -2.2 + 0.4 * f64::from(i));
         let scatterers = along
             .flat_map(|x| [post(x, 0.9, 1.0), post(x, -0.9, 1.0)])
@@ -173,15 +173,15 @@ impl Passing {
                 scatterers,
                 walls: vec![],
             },
-            speed_m_s,
+            speed_mps,
         }
     }
 }
 
 impl Movers for Passing {
     fn visit<'a>(&'a self, time_s: f64, _: Point2<f64>, _: f64, see: &mut dyn FnMut(Moving<'a>)) {
-        let velocity = Vector2::new(self.speed_m_s, 0.0);
-        let pose = Isometry2::translation(self.speed_m_s * time_s - 10.0, -4.0);
+        let velocity = Vector2::new(self.speed_mps, 0.0);
+        let pose = Isometry2::translation(self.speed_mps * time_s - 10.0, -4.0);
         see(Moving {
             body: &self.car,
             pose,

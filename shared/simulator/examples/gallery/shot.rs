@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
+use gyre_geometry::Twist;
 use gyre_radar::{OwnedScan, ScanLimits};
 use gyre_simulator::profile::Profile;
 use gyre_simulator::weather::WeatherConfig;
 use gyre_simulator::{
-    Body, ConstantTwist, Effects, Movers, Scene, Sensor, SensorConfig, SimulationConfig, Simulator,
-    SimulatorError, SweepTime, Trajectory, World,
+    Body, Effects, Movers, Path, Scene, Sensor, SensorConfig, SimulationConfig, Simulator,
+    SimulatorError, SweepTime, World,
 };
 use nalgebra::Isometry2;
 
@@ -19,7 +20,7 @@ const EPOCH_US: i64 = 1_547_132_400_000_000;
 pub struct Shot {
     pub world: Arc<World>,
     pub movers: Arc<dyn Movers>,
-    pub trajectory: Arc<dyn Trajectory>,
+    pub path: Arc<dyn Path>,
     pub weather: WeatherConfig,
     pub sensor: SensorConfig,
     pub effects: Effects,
@@ -30,9 +31,9 @@ pub struct Shot {
 /// The drive of a simulator.
 struct Drive(Simulator);
 
-impl Trajectory for Drive {
+impl Path for Drive {
     fn pose(&self, time_s: f64) -> Isometry2<f64> {
-        self.0.trajectory().pose(time_s)
+        self.0.path().pose(time_s)
     }
 }
 
@@ -42,7 +43,7 @@ impl Shot {
         Self {
             world: Arc::new(World::new(scene)),
             movers: Arc::new(()),
-            trajectory: Arc::new(ConstantTwist::default()),
+            path: Arc::new(Twist::default()),
             weather: WeatherConfig::default(),
             sensor: SensorConfig::default(),
             effects: Effects {
@@ -61,7 +62,7 @@ impl Shot {
         })?;
         Ok(Self {
             world: Arc::new(simulator.world().clone()),
-            trajectory: Arc::new(Drive(simulator)),
+            path: Arc::new(Drive(simulator)),
             sensor: SensorConfig {
                 profile,
                 ..SensorConfig::default()
@@ -76,12 +77,12 @@ impl Shot {
     }
 
     /// The same at a steady speed, metres a second ahead and radians a second to the left.
-    pub fn driving(self, forward_m_s: f64, yaw_rad_s: f64) -> Self {
+    pub fn driving(self, vx_mps: f64, yaw_rate_radps: f64) -> Self {
         Self {
-            trajectory: Arc::new(ConstantTwist {
-                forward_m_s,
-                left_m_s: 0.0,
-                yaw_rad_s,
+            path: Arc::new(Twist {
+                vx_mps,
+                vy_mps: 0.0,
+                yaw_rate_radps,
             }),
             ..self
         }
@@ -117,7 +118,7 @@ impl Shot {
         let scene = Scene {
             world: &self.world,
             movers: self.movers.as_ref(),
-            trajectory: self.trajectory.as_ref(),
+            path: self.path.as_ref(),
             weather: self.weather,
         };
         let mut sensor = Sensor::new(&self.sensor, &self.effects, SEED);

@@ -6,7 +6,9 @@ use gyre_radar::ImageSource;
 use gyre_simulator::output::OutputConfig;
 use gyre_simulator::profile::Profile;
 use gyre_simulator::weather::WeatherConfig;
-use gyre_simulator::{Body, HostStamps, OutputFormat, Recording, SimulationConfig, SimulatorError};
+use gyre_simulator::{
+    Body, HostStamps, OutputFormat, SimulatedDrive, SimulationConfig, SimulatorError,
+};
 
 use crate::exhibit::Exhibit;
 use crate::picture::{BLACK, Frame, Picture};
@@ -93,15 +95,15 @@ fn delays_s(host_stamps: HostStamps) -> Result<Vec<f64>, SimulatorError> {
         ..SimulationConfig::default()
     };
     config.sensor.profile = Profile::Cts350xRadiate;
-    let recording = Recording::new(&config)?;
-    let received_s: Vec<f64> = recording
+    let drive = SimulatedDrive::new(&config)?;
+    let received_s: Vec<f64> = drive
         .renderer()
         .stamps()
         .unwrap_or_default()
         .lines()
         .filter_map(received)
         .collect();
-    let period_s = recording.simulator().sampling().period_us as f64 * 1e-6;
+    let period_s = drive.simulator().sampling().period_us as f64 * 1e-6;
     Ok(received_s
         .iter()
         .enumerate()

@@ -39,12 +39,12 @@ fn radar_poses_csv(simulator: &Simulator) -> String {
 /// With the sensor's z axis down (a roll of pi) the heading is the course, counter-clockwise from east, while a left turn is
 /// negative about z.
 fn row(simulator: &Simulator, index: usize) -> String {
-    let (stamp_us, trajectory) = (stamp_us(simulator, index), simulator.trajectory());
-    let time_s = simulator.time(index).trajectory_s(stamp_us);
-    let (pose, velocity) = (trajectory.pose(time_s), trajectory.velocity(time_s));
+    let (stamp_us, path) = (stamp_us(simulator, index), simulator.path());
+    let time_s = simulator.time(index).drive_time_s(stamp_us);
+    let (pose, velocity) = (path.pose(time_s), path.velocity(time_s));
     let (before, after) = (
-        trajectory.pose(time_s - RATE_SPAN_S / 2.0),
-        trajectory.pose(time_s + RATE_SPAN_S / 2.0),
+        path.pose(time_s - RATE_SPAN_S / 2.0),
+        path.pose(time_s + RATE_SPAN_S / 2.0),
     );
     let yaw_rate = before.rotation.rotation_to(&after.rotation).angle() / RATE_SPAN_S;
     let (east, north, heading) = (

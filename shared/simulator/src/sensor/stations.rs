@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use nalgebra::{Point2, Vector2};
 
 use super::SweepTime;
+use crate::path::Path;
 use crate::profile::Sampling;
-use crate::trajectory::Trajectory;
 
 /// Azimuths before the first and after the last whose poses are known: a beam reaches into a sweep from there.
 pub(super) const MARGIN: usize = 16;
@@ -40,14 +40,14 @@ impl Stations {
     /// it points up at a time on the trajectory, seconds, and an azimuth.
     pub fn follow(
         &mut self,
-        trajectory: &dyn Trajectory,
+        path: &dyn Path,
         time: SweepTime,
         sampling: &Sampling,
         moving: bool,
         error_rad: impl Fn(f64) -> f64,
         lift_rad: impl Fn(f64, f64) -> f64,
     ) {
-        let middle_s = time.trajectory_s(time.middle_us());
+        let middle_s = time.drive_time_s(time.middle_us());
         self.azimuths = sampling.azimuths;
         self.first_rad = sampling.azimuth_rad(0);
         self.step_rad = sampling.step_rad();
@@ -56,12 +56,12 @@ impl Stations {
             let azimuth = index as f64 - MARGIN as f64;
             let since_start_s = azimuth * time.period_us as f64 * 1e-6 / sampling.azimuths as f64;
             let time_s = if moving {
-                time.trajectory_s(time.start_us) - middle_s + since_start_s
+                time.drive_time_s(time.start_us) - middle_s + since_start_s
             } else {
                 0.0
             };
-            let pose = trajectory.pose(middle_s + time_s);
-            let velocity = trajectory.velocity(middle_s + time_s);
+            let pose = path.pose(middle_s + time_s);
+            let velocity = path.velocity(middle_s + time_s);
             let azimuth_rad = self.first_rad + azimuth * self.step_rad;
             // Azimuths grow clockwise, angles counter-clockwise.
             let heading_rad = pose.rotation.angle() - error_rad(azimuth_rad);

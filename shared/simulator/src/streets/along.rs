@@ -8,8 +8,8 @@ use super::lines::{Line, simplified};
 use super::merge::{WayPoint, driven_lines, way};
 use super::side::side_lines;
 use super::{Street, Streets};
+use crate::path::Path;
 use crate::stream::Stream;
-use crate::trajectory::Trajectory;
 
 /// Width of a lane, metres: a vehicle drives half of it beside the middle of its street.
 pub const LANE_M: f64 = 3.2;
@@ -38,10 +38,10 @@ impl Streets {
     ///
     /// The driven vehicle keeps to its lane; what it drives twice, in either direction and some metres beside, is one
     /// street. The carriageways hold it everywhere with 1.3 m to spare from its middle.
-    pub fn along(trajectory: &dyn Trajectory, duration_s: f64, keep: Keep, seed: u64) -> Self {
+    pub fn along(path: &dyn Path, duration_s: f64, keep: Keep, seed: u64) -> Self {
         let mut rng = Stream::Streets.generator(seed);
-        let duration_s = trajectory.duration_s().min(duration_s);
-        let way = way(trajectory, duration_s, keep);
+        let duration_s = path.duration_s().min(duration_s);
+        let way = way(path, duration_s, keep);
         let lines = driven_lines(&way);
         let speeds = mean_speeds(&lines, &way);
         let sides = side_lines(&lines, &mut rng);
@@ -54,10 +54,10 @@ impl Streets {
             }
         };
         let mut streets = Vec::with_capacity(lines.len() + sides.len());
-        for (line, speed_m_s) in lines.iter().zip(speeds) {
-            streets.push(drawn(line, driven_width_m(speed_m_s, &mut rng) / 2.0, true));
+        for (line, speed_mps) in lines.iter().zip(speeds) {
+            streets.push(drawn(line, driven_width_m(speed_mps, &mut rng) / 2.0, true));
         }
-        widen(&mut streets, trajectory, duration_s);
+        widen(&mut streets, path, duration_s);
         for line in &sides {
             streets.push(drawn(line, rng.random_range(SIDE_WIDTH_M) / 2.0, false));
         }
@@ -66,8 +66,8 @@ impl Streets {
 }
 
 /// Width of a street on which one drives so fast: 6 m where slow, beyond 10 m on main roads.
-fn driven_width_m(speed_m_s: f64, rng: &mut impl Rng) -> f64 {
-    (3.5 + 0.65 * speed_m_s).clamp(6.0, 11.0) + rng.random_range(0.0..2.5)
+fn driven_width_m(speed_mps: f64, rng: &mut impl Rng) -> f64 {
+    (3.5 + 0.65 * speed_mps).clamp(6.0, 11.0) + rng.random_range(0.0..2.5)
 }
 
 /// Mean speed on each line where the vehicle moved, metres a second.
@@ -80,11 +80,11 @@ fn mean_speeds(lines: &[Line], way: &[WayPoint]) -> Vec<f64> {
     };
     let network = Streets::new(lines.iter().map(carriageway).collect());
     for ends in way.windows(2) {
-        let speed_m_s = (ends[1].vehicle - ends[0].vehicle).norm()
+        let speed_mps = (ends[1].vehicle - ends[0].vehicle).norm()
             / (ends[1].time_s - ends[0].time_s).max(1e-3);
         if let Some(nearest) = network.nearest(ends[0].centre, 12.0) {
             let (sum, count) = &mut sums[nearest.street];
-            (*sum, *count) = (*sum + speed_m_s, *count + 1.0);
+            (*sum, *count) = (*sum + speed_mps, *count + 1.0);
         }
     }
     sums.into_iter()
@@ -93,10 +93,10 @@ fn mean_speeds(lines: &[Line], way: &[WayPoint]) -> Vec<f64> {
 }
 
 /// Widens streets that do not hold the vehicle.
-fn widen(streets: &mut [Street], trajectory: &dyn Trajectory, duration_s: f64) {
+fn widen(streets: &mut [Street], path: &dyn Path, duration_s: f64) {
     let network = Streets::new(streets.to_vec());
     for step in 0..=(duration_s / PASS_S) as usize {
-        let place = Point2::from(trajectory.pose(step as f64 * PASS_S).translation.vector);
+        let place = Point2::from(path.pose(step as f64 * PASS_S).translation.vector);
         if let Some(nearest) = network.nearest(place, 20.0) {
             let street = &mut streets[nearest.street];
             street.half_width_m = street.half_width_m.max(nearest.offset_m + BESIDE_VEHICLE_M);

@@ -4,7 +4,7 @@ use nalgebra::{Isometry2, Point2, Rotation2, Vector2};
 
 use super::along::{Keep, LANE_M};
 use super::lines::{Line, LineGrid, Segment, length_m};
-use crate::trajectory::Trajectory;
+use crate::path::Path;
 
 /// Metres between points of the way.
 const STEP_M: f64 = 2.0;
@@ -33,8 +33,8 @@ pub struct WayPoint {
 }
 
 /// The way of a drive, a point every two metres.
-pub fn way(trajectory: &dyn Trajectory, duration_s: f64, keep: Keep) -> Vec<WayPoint> {
-    let poses = steps(trajectory, duration_s);
+pub fn way(path: &dyn Path, duration_s: f64, keep: Keep) -> Vec<WayPoint> {
+    let poses = steps(path, duration_s);
     let to_centre = match keep {
         Keep::Left => -LANE_M / 2.0,
         Keep::Right => LANE_M / 2.0,
@@ -55,14 +55,14 @@ pub fn way(trajectory: &dyn Trajectory, duration_s: f64, keep: Keep) -> Vec<WayP
 }
 
 /// Poses with their times, each some metres from the one before; at least two, the last of them ahead of a vehicle that stands.
-fn steps(trajectory: &dyn Trajectory, duration_s: f64) -> Vec<(f64, Isometry2<f64>)> {
-    let mut poses = vec![(0.0, trajectory.pose(0.0))];
+fn steps(path: &dyn Path, duration_s: f64) -> Vec<(f64, Isometry2<f64>)> {
+    let mut poses = vec![(0.0, path.pose(0.0))];
     let apart = |a: &Isometry2<f64>, b: &Isometry2<f64>| {
         (a.translation.vector - b.translation.vector).norm()
     };
     for step in 1..=(duration_s / 0.05) as usize {
         let time_s = 0.05 * step as f64;
-        let pose = trajectory.pose(time_s);
+        let pose = path.pose(time_s);
         if apart(&pose, &poses[poses.len() - 1].1) >= STEP_M {
             poses.push((time_s, pose));
         }

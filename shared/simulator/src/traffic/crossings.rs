@@ -8,8 +8,8 @@ use super::own_way::OwnWay;
 use super::road_user::Kind;
 use super::track::{Crossing, Track};
 use super::{Actor, Crowd};
+use crate::path::spline::{Sample, UniformSpline};
 use crate::streets::{Keep, LANE_M, Street, Streets};
-use crate::trajectory::spline::{Sample, UniformSpline};
 
 /// Vehicles are shown while the driven one is so near to the junction, metres.
 const SEEN_M: f64 = 170.0;
@@ -155,13 +155,13 @@ fn queue(
             Some(_) => gap(crowd, junction.place, way, until_s, pass.seen_s[1]),
             None => f64::INFINITY,
         };
-        let speed_m_s = rng.random_range(7.0..10.0);
+        let speed_mps = rng.random_range(7.0..10.0);
         let track = Track::Crossing(Crossing {
             path: path.clone(),
             waits_m: stop_m - half_m,
             from_s,
             until_s,
-            speed_m_s,
+            speed_mps,
             length_m,
         });
         crowd.add(kind, pass.seen_s, track, rng);

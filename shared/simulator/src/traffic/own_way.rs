@@ -2,9 +2,9 @@
 
 use nalgebra::{Isometry2, Point2, Vector2};
 
+use crate::path::Path;
+use crate::path::spline::{Sample, UniformSpline};
 use crate::streets::{Keep, Streets};
-use crate::trajectory::Trajectory;
-use crate::trajectory::spline::{Sample, UniformSpline};
 
 /// The way goes on straight for so many metres before its start and after its end.
 const BEYOND_M: f64 = 300.0;
@@ -17,7 +17,7 @@ const STEP_M: f64 = 2.0;
 /// Seconds between samples of the progress.
 const STEP_S: f64 = 0.1;
 /// The least speed at which the others drive where the vehicle itself waits or turns, metres a second.
-const SLOWEST_M_S: f64 = 4.5;
+const SLOWEST_MPS: f64 = 4.5;
 /// Traffic is shown so far along the way, metres.
 const REACH_M: f64 = 260.0;
 /// A place of the way is driven again where it comes so near, metres.
@@ -44,18 +44,11 @@ pub struct OwnWay {
 
 impl OwnWay {
     /// The way of the first `duration_s` of a drive through `streets`.
-    pub fn new(
-        trajectory: &dyn Trajectory,
-        duration_s: f64,
-        streets: &Streets,
-        keep: Keep,
-    ) -> Self {
+    pub fn new(path: &dyn Path, duration_s: f64, streets: &Streets, keep: Keep) -> Self {
         let side = if keep == Keep::Left { 1.0 } else { -1.0 };
-        let duration_s = trajectory.duration_s().min(duration_s);
+        let duration_s = path.duration_s().min(duration_s);
         let times = (0..=(duration_s / STEP_S) as usize).map(|i| i as f64 * STEP_S);
-        let poses: Vec<_> = times
-            .map(|time_s| (time_s, trajectory.pose(time_s)))
-            .collect();
+        let poses: Vec<_> = times.map(|time_s| (time_s, path.pose(time_s))).collect();
         let driven = distances(&poses);
         let length_m = driven[driven.len() - 1];
         let one = |at: f64, value: f64| Sample {
@@ -238,13 +231,13 @@ fn clocks(
         }
         // The speed over two seconds around the place.
         let (a, b) = (next.saturating_sub(10), (next + 10).min(driven.len() - 1));
-        let own_m_s = (driven[b] - driven[a]) / (poses[b].0 - poses[a].0).max(STEP_S);
+        let own_mps = (driven[b] - driven[a]) / (poses[b].0 - poses[a].0).max(STEP_S);
         clock.push(Sample {
             at,
             value: [seconds],
             weight: 1.0,
         });
-        seconds += STEP_M / own_m_s.max(SLOWEST_M_S);
+        seconds += STEP_M / own_mps.max(SLOWEST_MPS);
     }
     let inverse: Vec<_> = clock
         .iter()

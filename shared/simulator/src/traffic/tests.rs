@@ -2,16 +2,16 @@
 use std::collections::BTreeMap;
 
 use super::*;
-use crate::trajectory::{BlockLoop, TownDrive};
+use crate::path::{BlockLoop, TownDrive};
 
-fn town(seed: u64, config: &TrafficConfig) -> (Arc<dyn Trajectory>, Traffic) {
+fn town(seed: u64, config: &TrafficConfig) -> (Arc<dyn Path>, Traffic) {
     let town = TownDrive {
         length_m: 2500.0,
-        speed_m_s: 13.9,
-        lateral_acceleration_m_s2: 2.2,
+        speed_mps: 13.9,
+        lateral_acceleration_mps2: 2.2,
         keep: Keep::Left,
     };
-    let drive: Arc<dyn Trajectory> = Arc::new(town.trajectory(seed));
+    let drive: Arc<dyn Path> = Arc::new(town.path(seed));
     let duration_s = drive.duration_s();
     let streets = Streets::along(drive.as_ref(), duration_s, Keep::Left, seed);
     let traffic = Traffic::new(
@@ -27,7 +27,7 @@ fn town(seed: u64, config: &TrafficConfig) -> (Arc<dyn Trajectory>, Traffic) {
 
 fn around(
     traffic: &Traffic,
-    drive: &dyn Trajectory,
+    drive: &dyn Path,
     time_s: f64,
     reach_m: f64,
 ) -> Vec<(u32, Isometry2<f64>, Vector2<f64>)> {
@@ -190,7 +190,7 @@ fn density_says_how_many_there_are() {
 
 #[test]
 fn small_block_has_traffic_that_is_nowhere_twice() {
-    let drive: Arc<dyn Trajectory> = Arc::new(BlockLoop::new(40.0, 32.0, 9.5, 5.0));
+    let drive: Arc<dyn Path> = Arc::new(BlockLoop::new(40.0, 32.0, 9.5, 5.0));
     let streets = Streets::along(drive.as_ref(), 60.0, Keep::Left, 1);
     let traffic = Traffic::new(
         &TrafficConfig::default(),
@@ -209,11 +209,11 @@ fn small_block_has_traffic_that_is_nowhere_twice() {
 
 #[test]
 fn vehicle_that_stands_or_turns_on_the_spot_has_traffic_too() {
-    use crate::trajectory::ConstantTwist;
-    for yaw_rad_s in [0.0, 0.5] {
-        let drive: Arc<dyn Trajectory> = Arc::new(ConstantTwist {
-            yaw_rad_s,
-            ..ConstantTwist::default()
+    use gyre_geometry::Twist;
+    for yaw_rate_radps in [0.0, 0.5] {
+        let drive: Arc<dyn Path> = Arc::new(Twist {
+            yaw_rate_radps,
+            ..Twist::default()
         });
         let streets = Streets::along(drive.as_ref(), 60.0, Keep::Right, 1);
         let traffic = Traffic::new(

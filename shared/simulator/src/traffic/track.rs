@@ -5,8 +5,8 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::Isometry2;
 
 use super::own_way::OwnWay;
+use crate::path::spline::UniformSpline;
 use crate::streets::LANE_M;
-use crate::trajectory::spline::UniformSpline;
 
 /// Seconds that a vehicle's motion lags that of the one ahead (Newell, "A simplified car-following theory", 2002).
 pub const REACTION_S: f64 = 1.2;
@@ -60,7 +60,7 @@ pub struct Beside {
     /// Metres along the way for each metre of the vehicle: above 1 overtakes it, below is overtaken.
     pub share: f64,
     /// Metres a second along the way besides.
-    pub speed_m_s: f64,
+    pub speed_mps: f64,
     pub lane: Lane,
 }
 
@@ -90,7 +90,7 @@ pub struct Crossing {
     /// until when, seconds; for ever where it is infinite.
     pub until_s: f64,
     /// Speed that it brakes from and speeds up to, metres a second.
-    pub speed_m_s: f64,
+    pub speed_mps: f64,
     /// Length of the path, metres: it is gone beyond its ends.
     pub length_m: f64,
 }
@@ -112,7 +112,7 @@ impl Track {
         };
         let pose = way.pose(along_m, inwards_m);
         let turned = matches!(self, Self::Oncoming(_))
-            || matches!(self, Self::Beside(b) if b.share == 0.0 && b.speed_m_s < 0.0);
+            || matches!(self, Self::Beside(b) if b.share == 0.0 && b.speed_mps < 0.0);
         Some(if turned {
             pose * Isometry2::rotation(PI)
         } else {
@@ -133,7 +133,7 @@ impl Track {
             Self::Beside(b) => {
                 b.at_m
                     + b.share * (way.progress_m(time_s) - b.at_m)
-                    + b.speed_m_s * (time_s - b.at_s)
+                    + b.speed_mps * (time_s - b.at_s)
             }
             Self::Crossing(_) => 0.0,
         }
@@ -187,7 +187,7 @@ impl Crossing {
         if seconds <= 0.0 {
             0.0
         } else {
-            self.speed_m_s * seconds * seconds / (seconds + self.speed_m_s)
+            self.speed_mps * seconds * seconds / (seconds + self.speed_mps)
         }
     }
 }

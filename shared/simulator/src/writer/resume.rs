@@ -8,7 +8,7 @@ use std::path::Path;
 use gyre_radar::ImageSource as _;
 
 use crate::image::{PART, encode};
-use crate::recording::Recording;
+use crate::simulated_drive::SimulatedDrive;
 use crate::{SimulationConfig, SimulatorError};
 
 /// The file that says what made a recording: its configuration.
@@ -23,8 +23,8 @@ pub(super) fn made_by(config: &SimulationConfig) -> Result<String, SimulatorErro
 }
 
 /// Content of [`TOLD`]: how to read it so that it is true to its radar.
-pub(super) fn told(recording: &Recording) -> Result<String, SimulatorError> {
-    to_toml(&recording.dataset_options())
+pub(super) fn told(drive: &SimulatedDrive) -> Result<String, SimulatorError> {
+    to_toml(&drive.dataset_options())
 }
 
 fn to_toml(value: &impl serde::Serialize) -> Result<String, SimulatorError> {
@@ -37,13 +37,13 @@ fn to_toml(value: &impl serde::Serialize) -> Result<String, SimulatorError> {
 
 /// The scans that `out` lacks; refuses a folder that would become a mixture.
 pub(super) fn missing(
-    recording: &Recording,
+    drive: &SimulatedDrive,
     config: &SimulationConfig,
     out: &Path,
 ) -> Result<Vec<usize>, SimulatorError> {
-    let folder = out.join(recording.image_folder());
-    let names: Vec<String> = (0..recording.scans())
-        .map(|index| recording.image_name(index))
+    let folder = out.join(drive.image_folder());
+    let names: Vec<String> = (0..drive.scans())
+        .map(|index| drive.image_name(index))
         .collect();
     let there = images(&folder)?;
     let made_by_this = made_by_this(config, out)?;
@@ -64,7 +64,7 @@ pub(super) fn missing(
         .into_iter()
         .chain(kept.last().filter(|_| kept.len() > 1));
     ends.copied()
-        .try_for_each(|index| require_same(recording, index, &folder.join(&names[index])))?;
+        .try_for_each(|index| require_same(drive, index, &folder.join(&names[index])))?;
     Ok(missing)
 }
 
@@ -117,10 +117,10 @@ fn same_scans(config: &SimulationConfig) -> SimulationConfig {
 }
 
 /// Another build may render otherwise, and an image may have been changed.
-fn require_same(recording: &Recording, index: usize, path: &Path) -> Result<(), SimulatorError> {
-    let size = recording.image_size();
+fn require_same(drive: &SimulatedDrive, index: usize, path: &Path) -> Result<(), SimulatorError> {
+    let size = drive.image_size();
     let (mut pixels, mut encoded) = (vec![0; size.bytes()], Vec::new());
-    recording.renderer().draw(index, &mut pixels);
+    drive.renderer().draw(index, &mut pixels);
     encode(size, &pixels, &mut encoded).map_err(|source| SimulatorError::Encode {
         path: path.to_owned(),
         source,

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use gyre_radar::OwnedScan;
 use gyre_simulator::profile::Profile;
 use gyre_simulator::world::Wall;
-use gyre_simulator::{Effects, Trajectory};
+use gyre_simulator::{Effects, Path};
 use nalgebra::{Isometry2, Point2, Vector2};
 
 use crate::scene::{Setup, db, mean_db, power, powers};
@@ -78,7 +78,7 @@ fn an_opaque_wall_leaves_the_ground_before_it_and_hides_that_behind() {
 /// Stands where it is.
 struct Parked(Isometry2<f64>);
 
-impl Trajectory for Parked {
+impl Path for Parked {
     fn pose(&self, _: f64) -> Isometry2<f64> {
         self.0
     }
@@ -126,7 +126,7 @@ fn the_same_patches_are_seen_from_two_poses() {
     let seen = |pose: Isometry2<f64>, from: Isometry2<f64>| {
         let parked = Parked(pose);
         let scans = Setup {
-            trajectory: &parked,
+            path: &parked,
             ..setup(GROUND)
         }
         .scans(6);

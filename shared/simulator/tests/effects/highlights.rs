@@ -2,9 +2,10 @@
 
 use std::f64::consts::PI;
 
+use gyre_geometry::Twist;
 use gyre_radar::OwnedScan;
 use gyre_simulator::world::Wall;
-use gyre_simulator::{Body, ConstantTwist, Effects};
+use gyre_simulator::{Body, Effects};
 use nalgebra::{Point2, Vector2};
 
 use crate::scene::{Setup, db, peak_bin, peak_db, post, powers};
@@ -48,11 +49,11 @@ fn is_dark(scan: &OwnedScan) -> bool {
 
 #[test]
 fn the_brightest_place_is_the_foot_of_the_perpendicular_wherever_the_radar_has_driven() {
-    let (range_m, speed_m_s) = (12.0, 8.0);
-    let ahead = ConstantTwist {
-        forward_m_s: speed_m_s,
-        left_m_s: 0.0,
-        yaw_rad_s: 0.0,
+    let (range_m, speed_mps) = (12.0, 8.0);
+    let ahead = Twist {
+        vx_mps: speed_mps,
+        vy_mps: 0.0,
+        yaw_rate_radps: 0.0,
     };
     let beside = Wall {
         from: Point2::new(-40.0, -range_m),
@@ -60,7 +61,7 @@ fn the_brightest_place_is_the_foot_of_the_perpendicular_wherever_the_radar_has_d
         ..mirror(range_m, 0.5, 0.0..1.0)
     };
     let on = Setup {
-        trajectory: &ahead,
+        path: &ahead,
         ..setup(true, beside)
     };
     let scans = on.scans(9);
@@ -85,7 +86,7 @@ fn the_brightest_place_is_the_foot_of_the_perpendicular_wherever_the_radar_has_d
     }
     assert!(is_dark(
         &Setup {
-            trajectory: &ahead,
+            path: &ahead,
             ..setup(false, beside)
         }
         .scan()

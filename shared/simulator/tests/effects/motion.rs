@@ -2,19 +2,20 @@
 
 use std::f64::consts::TAU;
 
+use gyre_geometry::Twist;
 use gyre_radar::{DatasetOptions, OwnedScan};
 use gyre_simulator::profile::Profile;
 use gyre_simulator::{
-    Body, ConstantTwist, Effects, Movers, Moving, SensorConfig, SimulationConfig, write_dataset,
+    Body, Effects, Movers, Moving, SensorConfig, SimulationConfig, write_dataset,
 };
 use nalgebra::{Isometry2, Point2, Vector2};
 
 use crate::scene::{Setup, peak_bin, post, power};
 
-const AHEAD: ConstantTwist = ConstantTwist {
-    forward_m_s: 20.0,
-    left_m_s: 0.0,
-    yaw_rad_s: 0.0,
+const AHEAD: Twist = Twist {
+    vx_mps: 20.0,
+    vy_mps: 0.0,
+    yaw_rate_radps: 0.0,
 };
 
 /// The azimuth, with fractions, at which the power of a lone point is centred.
@@ -46,7 +47,7 @@ fn azimuths_are_measured_each_from_its_own_pose_or_all_from_the_middle() {
                 ..Effects::NONE
             },
         );
-        setup.trajectory = &AHEAD;
+        setup.path = &AHEAD;
         centre(&setup.scan())
     };
     assert!(
@@ -115,7 +116,7 @@ fn rising_chirps_read_what_approaches_too_near_and_falling_ones_too_far() {
                 },
             )
             .with(profile);
-            setup.trajectory = &AHEAD;
+            setup.path = &AHEAD;
             let scan = setup.scan();
             [0, 1].map(|side| {
                 setup

@@ -1,7 +1,8 @@
 //! Noise of every kind, by its mean power.
 
+use gyre_geometry::Twist;
+use gyre_simulator::Effects;
 use gyre_simulator::profile::Profile;
-use gyre_simulator::{ConstantTwist, Effects};
 
 use crate::scene::{Setup, mean_db, post, powers};
 
@@ -236,13 +237,13 @@ fn the_own_vehicle_is_behind_the_radar_whichever_way_it_heads() {
         },
         ..Setup::default()
     };
-    let turning = ConstantTwist {
-        forward_m_s: 5.0,
-        left_m_s: 0.0,
-        yaw_rad_s: 1.0,
+    let turning = Twist {
+        vx_mps: 5.0,
+        vy_mps: 0.0,
+        yaw_rate_radps: 1.0,
     };
     let scans = Setup {
-        trajectory: &turning,
+        path: &turning,
         ..setup(true)
     }
     .scans(4);

@@ -2,29 +2,28 @@
 
 use std::f64::consts::TAU;
 
+use gyre_geometry::Twist;
 use gyre_radar::{OwnedScan, ScanLimits};
 use gyre_simulator::profile::{Profile, Receiver, Sampling};
 use gyre_simulator::weather::WeatherConfig;
 use gyre_simulator::world::{Aspect, NO_BODY, Scatterer};
-use gyre_simulator::{
-    Body, ConstantTwist, Effects, Movers, Scene, Sensor, SensorConfig, SweepTime, Trajectory, World,
-};
+use gyre_simulator::{Body, Effects, Movers, Path, Scene, Sensor, SensorConfig, SweepTime, World};
 use nalgebra::Point2;
 
 /// What is measured, and how: Oxford's radar at rest, without any effect, unless said otherwise.
 pub struct Setup<'a> {
     pub body: Body,
     pub movers: &'a dyn Movers,
-    pub trajectory: &'a dyn Trajectory,
+    pub path: &'a dyn Path,
     pub weather: WeatherConfig,
     pub sensor: SensorConfig,
     pub effects: Effects,
 }
 
-const AT_REST: ConstantTwist = ConstantTwist {
-    forward_m_s: 0.0,
-    left_m_s: 0.0,
-    yaw_rad_s: 0.0,
+const AT_REST: Twist = Twist {
+    vx_mps: 0.0,
+    vy_mps: 0.0,
+    yaw_rate_radps: 0.0,
 };
 
 impl Default for Setup<'_> {
@@ -32,7 +31,7 @@ impl Default for Setup<'_> {
         Self {
             body: Body::default(),
             movers: &(),
-            trajectory: &AT_REST,
+            path: &AT_REST,
             weather: WeatherConfig::default(),
             sensor: SensorConfig::default(),
             effects: Effects::NONE,
@@ -91,7 +90,7 @@ impl Setup<'_> {
             let scene = Scene {
                 world: &world,
                 movers: self.movers,
-                trajectory: self.trajectory,
+                path: self.path,
                 weather: self.weather,
             };
             let bytes = azimuths * self.sampling().stride();

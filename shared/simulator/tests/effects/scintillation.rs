@@ -1,31 +1,32 @@
 //! How a lone post flickers as it is passed.
 
+use gyre_geometry::Twist;
 use gyre_radar::OwnedScan;
+use gyre_simulator::Effects;
 use gyre_simulator::world::{Aspect, NO_BODY, Scatterer};
-use gyre_simulator::{ConstantTwist, Effects};
 use nalgebra::Point2;
 
 use crate::scene::{Setup, peak_db};
 
 /// Scans of a turn about the post.
 const SCANS: u64 = 200;
-const TURN_RAD_S: f64 = std::f64::consts::TAU / (0.25 * SCANS as f64);
+const TURN_RADPS: f64 = std::f64::consts::TAU / (0.25 * SCANS as f64);
 
 /// So many scans of a post that always stands 20 m to the left: the radar circles about it.
-fn scans(count: u64, scintillation: bool, yaw_rad_s: f64) -> Vec<OwnedScan> {
+fn scans(count: u64, scintillation: bool, yaw_rate_radps: f64) -> Vec<OwnedScan> {
     let post = Scatterer {
         position: Point2::new(0.0, 20.0),
         cross_section_m2: 3.0,
         aspect: Aspect::AllRound,
         body: NO_BODY,
     };
-    let round = ConstantTwist {
-        forward_m_s: 20.0 * yaw_rad_s,
-        left_m_s: 0.0,
-        yaw_rad_s,
+    let round = Twist {
+        vx_mps: 20.0 * yaw_rate_radps,
+        vy_mps: 0.0,
+        yaw_rate_radps,
     };
     Setup {
-        trajectory: &round,
+        path: &round,
         ..Setup::of(
             vec![post],
             Effects {
@@ -48,8 +49,8 @@ fn powers_db(scans: &[OwnedScan]) -> Vec<f64> {
 #[test]
 fn a_posts_power_is_spread_exponentially_over_aspects_about_what_it_is_without() {
     let (steady, flickering) = (
-        powers_db(&scans(SCANS, false, TURN_RAD_S)),
-        powers_db(&scans(SCANS, true, TURN_RAD_S)),
+        powers_db(&scans(SCANS, false, TURN_RADPS)),
+        powers_db(&scans(SCANS, true, TURN_RADPS)),
     );
     let factors: Vec<f64> = steady
         .iter()
@@ -77,9 +78,9 @@ fn power_changes_from_pose_to_pose_and_without_it_or_at_rest_never() {
             .map(|pair| (pair[1] - pair[0]).abs())
             .fold(0.0, f64::max)
     };
-    assert!(largest_change_db(&powers_db(&scans(30, true, TURN_RAD_S))) > 6.0);
+    assert!(largest_change_db(&powers_db(&scans(30, true, TURN_RADPS))) > 6.0);
     assert!(
-        largest_change_db(&powers_db(&scans(30, false, TURN_RAD_S))) <= 0.5,
+        largest_change_db(&powers_db(&scans(30, false, TURN_RADPS))) <= 0.5,
         "one step of the quantisation"
     );
     assert_eq!(largest_change_db(&powers_db(&scans(30, true, 0.0))), 0.0);

@@ -1,22 +1,22 @@
 use super::*;
+use crate::path::Path;
 use crate::streets::Streets;
-use crate::trajectory::Trajectory;
 
-fn drives() -> impl Iterator<Item = (TownDrive, TimedPoses)> {
+fn drives() -> impl Iterator<Item = (TownDrive, SplinePath)> {
     let city = TownDrive {
         length_m: 4000.0,
-        speed_m_s: 13.9,
-        lateral_acceleration_m_s2: 2.2,
+        speed_mps: 13.9,
+        lateral_acceleration_mps2: 2.2,
         keep: Keep::Left,
     };
     // Checchin et al., 2010: 1135 m of campus at 0 to 25 km/h.
     let campus = TownDrive {
         length_m: 1135.0,
-        speed_m_s: 25.0 / 3.6,
+        speed_mps: 25.0 / 3.6,
         keep: Keep::Right,
         ..city
     };
-    (1..=6).flat_map(move |seed| [city, campus].map(|drive| (drive, drive.trajectory(seed))))
+    (1..=6).flat_map(move |seed| [city, campus].map(|drive| (drive, drive.path(seed))))
 }
 
 /// Sizes of the values' n-th difference quotients.
@@ -68,7 +68,7 @@ fn driver_keeps_to_the_limits_and_never_jerks() {
                 );
             }
         }
-        assert!(largest(0) < wanted.speed_m_s * 1.01, "{} m/s", largest(0));
+        assert!(largest(0) < wanted.speed_mps * 1.01, "{} m/s", largest(0));
         assert!(largest(1) < 3.2, "{} m/s2", largest(1));
         assert!(largest(2) < 6.0, "{} m/s3", largest(2));
         let still = velocities.iter().filter(|v| v.norm() < 0.01).count() as f64 * 0.05;

@@ -4,14 +4,14 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use nalgebra::{Isometry2, Vector2};
 
-use super::Trajectory;
+use super::Path;
 
 /// Length of a bend by 90 degrees, metres of path.
 const BEND_M: f64 = 20.0;
 /// Share of a bend over which the curvature rises, and again falls: no vehicle turns its wheels at once.
 const RAMP: f64 = 0.25;
 /// Braking and accelerating along the path, metres a second squared.
-const LONGITUDINAL_M_S2: f64 = 2.5;
+const LONGITUDINAL_MPS2: f64 = 2.5;
 /// Metres of path between two nodes of the table.
 const STEP_M: f64 = 0.01;
 
@@ -38,8 +38,8 @@ impl BlockLoop {
     pub fn new(
         length_m: f64,
         width_m: f64,
-        speed_m_s: f64,
-        lateral_acceleration_m_s2: f64,
+        speed_mps: f64,
+        lateral_acceleration_mps2: f64,
     ) -> Self {
         let footprint = bend_footprint();
         let straights = [length_m - 2.0 * footprint, width_m - 2.0 * footprint].map(|s| s.max(0.0));
@@ -49,7 +49,7 @@ impl BlockLoop {
         let headings: Vec<f64> = (0..=count)
             .map(|i| heading_at(i as f64 * step, &straights))
             .collect();
-        let speeds = speeds(&headings, step, speed_m_s, lateral_acceleration_m_s2);
+        let speeds = speeds(&headings, step, speed_mps, lateral_acceleration_mps2);
         let nodes = integrate(&headings, &speeds, step, -width_m / 2.0);
         let lap_s = nodes[count].time_s;
         Self {
@@ -70,7 +70,7 @@ impl BlockLoop {
     }
 }
 
-impl Trajectory for BlockLoop {
+impl Path for BlockLoop {
     fn pose(&self, time_s: f64) -> Isometry2<f64> {
         let time = time_s.rem_euclid(self.lap_s);
         let next = self
@@ -130,7 +130,7 @@ fn speeds(headings: &[f64], step: f64, cruise: f64, lateral: f64) -> Vec<f64> {
     let limit = |pair: &[f64]| cruise.min((lateral * step / (pair[1] - pair[0]).max(1e-12)).sqrt());
     let mut speeds: Vec<f64> = headings.windows(2).map(limit).collect();
     let count = speeds.len();
-    let reach = |from: f64| (from * from + 2.0 * LONGITUDINAL_M_S2 * step).sqrt();
+    let reach = |from: f64| (from * from + 2.0 * LONGITUDINAL_MPS2 * step).sqrt();
     for i in 0..2 * count {
         let (here, next) = (i % count, (i + 1) % count);
         speeds[next] = speeds[next].min(reach(speeds[here]));

@@ -6,8 +6,8 @@ use super::Way;
 use super::lane::Lane;
 
 /// Speeding up and braking along the lane, metres a second squared: what drivers in towns do.
-const SPEED_UP_M_S2: f64 = 1.4;
-const BRAKE_M_S2: f64 = 1.8;
+const SPEED_UP_MPS2: f64 = 1.4;
+const BRAKE_MPS2: f64 = 1.8;
 /// Share of the junctions at which one waits, and how long, seconds.
 const WAITING: f64 = 0.3;
 const WAIT_S: std::ops::Range<f64> = 3.0..18.0;
@@ -18,16 +18,16 @@ const STEP_M: f64 = 0.25;
 /// The distance driven is averaged over these spans, one after the other, seconds: acceleration changes that gradually.
 const GRADUAL_S: [f64; 2] = [0.9, 0.6];
 /// Twice the least mean speed between two nodes, metres a second.
-const CREEP_M_S: f64 = 0.1;
+const CREEP_MPS: f64 = 0.1;
 /// Seconds between the instants that are averaged.
 const FINE_S: f64 = 0.05;
 
 /// What limits the speed.
 pub struct Limits {
     /// Highest speed limit, metres a second.
-    pub speed_m_s: f64,
+    pub speed_mps: f64,
     /// Sideways acceleration in bends, metres a second squared.
-    pub lateral_m_s2: f64,
+    pub lateral_mps2: f64,
 }
 
 /// Metres along the way every `step_s`, over `length_m` of it, standing at first and at last.
@@ -44,8 +44,8 @@ pub fn progress(
     let place =
         |node: usize| ((node as f64 * STEP_M / per_place) as usize).min(lane.places.len() - 1);
     let fastest = |node: usize| {
-        let bend = (limits.lateral_m_s2 / curvature(way, node as f64 * STEP_M).max(1e-6)).sqrt();
-        bend.min(limits.speed_m_s * lane.limits[place(node)])
+        let bend = (limits.lateral_mps2 / curvature(way, node as f64 * STEP_M).max(1e-6)).sqrt();
+        bend.min(limits.speed_mps * lane.limits[place(node)])
     };
     let mut speeds: Vec<f64> = (0..=count).map(fastest).collect();
     let mut waits_s = vec![0.0; count + 1];
@@ -80,10 +80,10 @@ fn curvature(way: &Way, along_m: f64) -> f64 {
 
 fn brake_and_speed_up(speeds: &mut [f64]) {
     for i in 1..speeds.len() {
-        speeds[i] = speeds[i].min((speeds[i - 1].powi(2) + 2.0 * SPEED_UP_M_S2 * STEP_M).sqrt());
+        speeds[i] = speeds[i].min((speeds[i - 1].powi(2) + 2.0 * SPEED_UP_MPS2 * STEP_M).sqrt());
     }
     for i in (1..speeds.len()).rev() {
-        speeds[i - 1] = speeds[i - 1].min((speeds[i].powi(2) + 2.0 * BRAKE_M_S2 * STEP_M).sqrt());
+        speeds[i - 1] = speeds[i - 1].min((speeds[i].powi(2) + 2.0 * BRAKE_MPS2 * STEP_M).sqrt());
     }
 }
 
@@ -102,7 +102,7 @@ fn timed(speeds: &[f64], waits_s: &[f64]) -> Vec<f64> {
         fill(at_m, until_s, at_m, until_s + waits_s[node]);
         until_s += waits_s[node];
         // Where one stands at both ends, as where a wait meets the end of the drive, one creeps between.
-        let takes_s = 2.0 * STEP_M / (pair[0] + pair[1]).max(CREEP_M_S);
+        let takes_s = 2.0 * STEP_M / (pair[0] + pair[1]).max(CREEP_MPS);
         fill(at_m, until_s, at_m + STEP_M, until_s + takes_s);
         until_s += takes_s;
     }

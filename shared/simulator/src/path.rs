@@ -1,27 +1,26 @@
-//! How the sensor moves: a pose for every instant.
+//! The path of the sensor: its pose at every instant.
 
 mod block;
 pub mod recorded;
 pub mod spline;
-mod timed_poses;
+mod spline_path;
 mod town_drive;
-mod twist;
 
-use nalgebra::{Isometry2, Vector2};
+use gyre_geometry::{Pose, Twist};
+use nalgebra::Vector2;
 
 pub use block::BlockLoop;
-pub use timed_poses::TimedPoses;
+pub use spline_path::SplinePath;
 pub use town_drive::TownDrive;
-pub use twist::ConstantTwist;
 
 /// A motion that is continuous in time.
-pub trait Trajectory: Send + Sync {
+pub trait Path: Send + Sync {
     /// Pose of the sensor (x forward, y left, yaw counter-clockwise) in the world at `time_s` seconds after the start.
     ///
-    /// Defined for every time: a drive that ends stands still before its start and after its end.
-    fn pose(&self, time_s: f64) -> Isometry2<f64>;
+    /// Defined for every time: before its start and after its end a path of finite duration stands still.
+    fn pose(&self, time_s: f64) -> Pose;
 
-    /// How long the drive lasts, seconds; infinite where it goes on for ever.
+    /// Duration of the drive, seconds; infinite where it never ends.
     fn duration_s(&self) -> f64 {
         f64::INFINITY
     }
@@ -32,5 +31,12 @@ pub trait Trajectory: Send + Sync {
         (self.pose(time_s + half_s).translation.vector
             - self.pose(time_s - half_s).translation.vector)
             / (2.0 * half_s)
+    }
+}
+
+/// A constant velocity, from the world's origin at time zero.
+impl Path for Twist {
+    fn pose(&self, time_s: f64) -> Pose {
+        self.pose_at(time_s)
     }
 }

@@ -5,11 +5,11 @@ use std::path::Path;
 use gyre_radar::read_trajectory;
 use nalgebra::{Isometry2, Point2};
 
-use super::TimedPoses;
+use super::SplinePath;
 use crate::SimulatorError;
 
 /// No vehicle is faster, metres a second.
-const FASTEST_M_S: f64 = 90.0;
+const FASTEST_MPS: f64 = 90.0;
 /// Nor stands without a pose for longer, seconds.
 const LONGEST_PAUSE_S: f64 = 3600.0;
 
@@ -37,7 +37,7 @@ impl Default for Excerpt {
 /// The drive of a file of any form that [`gyre_radar::read_trajectory`] knows, in the frame of the excerpt's first pose.
 ///
 /// It passes within 5 cm of 95 % of a real drive's poses and within 10 cm of 99 % (what is left is their noise), and stands still before its start and after its end.
-pub fn read(path: &Path, excerpt: Excerpt) -> Result<TimedPoses, SimulatorError> {
+pub fn read(path: &Path, excerpt: Excerpt) -> Result<SplinePath, SimulatorError> {
     let poses = timed(path, excerpt.rate_hz)?;
     let refuse = |reason: String| SimulatorError::Drive {
         path: path.to_owned(),
@@ -68,7 +68,7 @@ pub fn read(path: &Path, excerpt: Excerpt) -> Result<TimedPoses, SimulatorError>
             "only {share:.0} % of its way lead ahead (x forward, y left): is it another frame?"
         )));
     }
-    Ok(TimedPoses::measured(&moved))
+    Ok(SplinePath::measured(&moved))
 }
 
 /// Refuses what no vehicle does: jumps, and pauses of many hours.
@@ -79,7 +79,7 @@ fn check_steps(poses: &[&(f64, Isometry2<f64>)]) -> Result<(), String> {
             to_s - from_s,
             (to.translation.vector - from.translation.vector).norm(),
         );
-        if metres > FASTEST_M_S * seconds + 1.0 {
+        if metres > FASTEST_MPS * seconds + 1.0 {
             return Err(format!(
                 "it jumps by {metres:.1} m within {seconds:.3} s, {from_s:.3} s after its start"
             ));

@@ -7,7 +7,7 @@ mod speed;
 
 use nalgebra::{Isometry2, Point2};
 
-use super::TimedPoses;
+use super::SplinePath;
 use super::spline::{Sample, UniformSpline};
 use crate::stream::Stream;
 use crate::streets::Keep;
@@ -25,9 +25,9 @@ pub struct TownDrive {
     /// Length of the drive, metres.
     pub length_m: f64,
     /// Speed limit on the fastest streets, metres a second; it is lower on others.
-    pub speed_m_s: f64,
+    pub speed_mps: f64,
     /// Sideways acceleration at which bends are taken, metres a second squared.
-    pub lateral_acceleration_m_s2: f64,
+    pub lateral_acceleration_mps2: f64,
     /// The side that traffic keeps to.
     pub keep: Keep,
 }
@@ -37,15 +37,15 @@ impl TownDrive {
     ///
     /// It comes back to its first streets and takes them once more, has driven some streets in both directions by then,
     /// and ends standing. Streets cross at junctions only; parallel ones are 50 m apart or more. Its start is the origin.
-    pub fn trajectory(&self, seed: u64) -> TimedPoses {
+    pub fn path(&self, seed: u64) -> SplinePath {
         let mut rng = Stream::Drive.generator(seed);
         let town = plan::Plan::new(self.length_m, &mut rng);
         let route = route::route(&town, self.length_m, &mut rng);
         let lane = lane::lane(&town, &route, self.keep);
         let way = steered(&lane);
         let limits = speed::Limits {
-            speed_m_s: self.speed_m_s,
-            lateral_m_s2: self.lateral_acceleration_m_s2,
+            speed_mps: self.speed_mps,
+            lateral_mps2: self.lateral_acceleration_mps2,
         };
         let progress = speed::progress(&way, &lane, &limits, self.length_m, &mut rng, STEP_S);
         let pose = |along_m: &f64| {
@@ -61,7 +61,7 @@ impl TownDrive {
             .enumerate()
             .map(|(i, s)| (i as f64 * STEP_S, start * pose(s)))
             .collect();
-        TimedPoses::new(&poses, CUTOFF_HZ)
+        SplinePath::new(&poses, CUTOFF_HZ)
     }
 }
 

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Isometry2, Vector2};
 
-use super::Trajectory;
+use super::Path;
 use super::spline::{Sample, UniformSpline};
 
 /// What a drive known at some instants is smoothed with: what changes faster than so many times a second is measuring
@@ -21,12 +21,12 @@ const STAND_WEIGHT: f64 = 30.0;
 
 /// A drive through poses at given instants, its derivatives continuous up to the fourth.
 #[derive(Clone, Debug)]
-pub struct TimedPoses {
+pub struct SplinePath {
     curve: UniformSpline<3>,
     duration_s: f64,
 }
 
-impl TimedPoses {
+impl SplinePath {
     /// A drive close to `poses`, whose times ascend (seconds from zero), without what is faster than `cutoff_hz`.
     pub fn new(poses: &[(f64, Isometry2<f64>)], cutoff_hz: f64) -> Self {
         Self::smooth(&unwrapped(poses), cutoff_hz)
@@ -52,7 +52,7 @@ impl TimedPoses {
     }
 }
 
-impl Trajectory for TimedPoses {
+impl Path for SplinePath {
     fn pose(&self, time_s: f64) -> Isometry2<f64> {
         let [x, y, yaw] = self.curve.value(time_s.clamp(0.0, self.duration_s));
         Isometry2::new(Vector2::new(x, y), yaw)

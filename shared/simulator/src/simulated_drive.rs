@@ -14,14 +14,14 @@ use crate::{SimulationConfig, Simulator, SimulatorError, truth};
 
 /// A simulated drive as a recording.
 #[derive(Clone)]
-pub struct Recording {
+pub struct SimulatedDrive {
     simulator: Simulator,
     output: OutputFormat,
     host: HostStamps,
     seed: u64,
 }
 
-impl Recording {
+impl SimulatedDrive {
     /// Builds the town and the drive. Fails where the configuration makes no sense, or its format does not fit its radar.
     pub fn new(config: &SimulationConfig) -> Result<Self, SimulatorError> {
         let simulator = Simulator::new(config)?;
@@ -153,7 +153,7 @@ impl Recording {
             OwnedScan::with_limits(self.simulator.limits()),
         );
         Renderer {
-            recording: self.clone(),
+            drive: self.clone(),
             sensor,
             scan,
         }
@@ -162,46 +162,46 @@ impl Recording {
 
 /// Renders one image after the other, with the memory that takes.
 pub struct Renderer {
-    recording: Recording,
+    drive: SimulatedDrive,
     sensor: Sensor,
     scan: OwnedScan,
 }
 
 impl Renderer {
     /// What is rendered.
-    pub fn recording(&self) -> &Recording {
-        &self.recording
+    pub fn drive(&self) -> &SimulatedDrive {
+        &self.drive
     }
 }
 
 impl ImageSource for Renderer {
     fn format(&self) -> Format {
-        self.recording.format()
+        self.drive.format()
     }
 
     fn size(&self) -> ImageSize {
-        self.recording.image_size()
+        self.drive.image_size()
     }
 
     fn folder(&self) -> PathBuf {
-        self.recording.image_folder().into()
+        self.drive.image_folder().into()
     }
 
     fn files(&self) -> Vec<PathBuf> {
         let folder = self.folder();
-        (0..self.recording.scans())
-            .map(|index| folder.join(self.recording.image_name(index)))
+        (0..self.drive.scans())
+            .map(|index| folder.join(self.drive.image_name(index)))
             .collect()
     }
 
     fn stamps(&self) -> Option<String> {
-        self.recording.stamps()
+        self.drive.stamps()
     }
 
     /// The same bytes whenever and on whatever thread it is called.
     fn draw(&mut self, index: usize, pixels: &mut [u8]) {
-        let simulator = &self.recording.simulator;
-        match self.recording.output {
+        let simulator = &self.drive.simulator;
+        match self.drive.output {
             OutputFormat::Radiate => {
                 let geometry =
                     simulator.render_into(index, &mut self.sensor, &mut self.scan.slot());
