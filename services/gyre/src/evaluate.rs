@@ -2,7 +2,7 @@
 
 use std::{fs, process::ExitCode};
 
-use gyre_evaluation::{Evaluation, JudgedMotions, Motion, NeesOptions, Options, TruthSigma};
+use gyre_evaluation::{Evaluation, MatchedMotions, NeesOptions, Options, TimedMotion, TruthSigma};
 use gyre_radar::{Trajectory, ground_truth::read_trajectory};
 
 use crate::{
@@ -55,9 +55,9 @@ fn judged_motions(
     estimate: &Trajectory,
     truth: &Trajectory,
     evaluation: &Evaluation,
-) -> Result<Option<JudgedMotions>, Failure> {
+) -> Result<Option<MatchedMotions>, Failure> {
     let judge =
-        |motions: &[Motion]| judge_motions(arguments.nees_part.of(motions), truth, evaluation);
+        |motions: &[TimedMotion]| judge_motions(arguments.nees_part.of(motions), truth, evaluation);
     if let Some(path) = &arguments.odometry {
         return judge(&odometry::read(path)?).map(Some);
     }
@@ -79,7 +79,7 @@ fn judged_motions(
 const ROUNDING_NS: i64 = 1_000;
 
 /// Whether every motion ends at a pose of the trajectory.
-fn has_stamps(trajectory: &Trajectory, motions: &[Motion]) -> bool {
+fn has_stamps(trajectory: &Trajectory, motions: &[TimedMotion]) -> bool {
     let stamps = trajectory.stamp_ns.as_deref().unwrap_or_default();
     motions.iter().all(|motion| {
         let next =
@@ -92,7 +92,7 @@ fn has_stamps(trajectory: &Trajectory, motions: &[Motion]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use gyre_evaluation::UncertainMotion;
+    use gyre_geometry::UncertainMotion;
 
     use super::*;
 
@@ -103,10 +103,10 @@ mod tests {
             stamp_ns: Some(stamps),
             poses: Vec::new(),
         };
-        let ends_at = |to_ns| Motion {
+        let ends_at = |to_ns| TimedMotion {
             from_ns: 0,
             to_ns,
-            estimate: UncertainMotion::standing(),
+            estimate: UncertainMotion::identity(),
         };
         assert!(has_stamps(
             &trajectory,

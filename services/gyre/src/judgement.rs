@@ -4,8 +4,8 @@
 use std::{fmt, path::Path};
 
 use gyre_evaluation::{
-    Association, Bands, Coverage, Evaluation, EvaluationError, JudgedMotions, Motion, Nees,
-    NeesOptions, Options, bands, nees, plot_bands, plot_errors, plot_trajectory,
+    Association, Bands, Coverage, Evaluation, EvaluationError, MatchedMotions, Nees, NeesOptions,
+    Options, TimedMotion, bands, nees, plot_bands, plot_errors, plot_trajectory,
 };
 use gyre_radar::Trajectory;
 use serde::Serialize;
@@ -31,7 +31,7 @@ impl Judgement {
     /// Adds what the motions' covariances are worth.
     pub fn new(
         evaluation: Evaluation,
-        motions: Option<&JudgedMotions>,
+        motions: Option<&MatchedMotions>,
         options: &NeesOptions,
     ) -> Self {
         let nees = motions.map(|motions| nees(motions, options));
@@ -100,10 +100,10 @@ pub fn judge(
 
 /// Holds motions against the truth by which the trajectory that they make was judged.
 pub fn judge_motions(
-    motions: &[Motion],
+    motions: &[TimedMotion],
     truth: &Trajectory,
     evaluation: &Evaluation,
-) -> Result<JudgedMotions, Failure> {
+) -> Result<MatchedMotions, Failure> {
     let Coverage::Time { max_gap_ns, .. } = evaluation.coverage else {
         return Err(
             "covariances are judged by time, and estimate or ground truth has no stamps".into(),
@@ -115,16 +115,16 @@ pub fn judge_motions(
             "covariances need a ground truth with heading and with axes as the estimate's".into(),
         );
     }
-    Ok(JudgedMotions::new(motions, timed(truth), max_gap_ns)?)
+    Ok(MatchedMotions::new(motions, timed(truth), max_gap_ns)?)
 }
 
-fn timed(trajectory: &Trajectory) -> gyre_evaluation::Trajectory<'_> {
-    gyre_evaluation::Trajectory::new(
+fn timed(trajectory: &Trajectory) -> gyre_evaluation::TimedPoses<'_> {
+    gyre_evaluation::TimedPoses::new(
         trajectory.stamp_ns.as_deref().unwrap_or_default(),
         &trajectory.poses,
     )
 }
 
-fn untimed(trajectory: &Trajectory) -> gyre_evaluation::Trajectory<'_> {
-    gyre_evaluation::Trajectory::untimed(&trajectory.poses)
+fn untimed(trajectory: &Trajectory) -> gyre_evaluation::TimedPoses<'_> {
+    gyre_evaluation::TimedPoses::untimed(&trajectory.poses)
 }

@@ -4,10 +4,10 @@ mod read;
 
 use std::fmt::Write;
 
-use gyre_evaluation::{Motion, UncertainMotion};
+use gyre_evaluation::TimedMotion;
+use gyre_geometry::{UncertainMotion, covariance::unpack, pose};
 use gyre_messages::{PoseHeader, Refinement, flag, hypothesis, outcome};
 use gyre_radar::Trajectory;
-use nalgebra::{Isometry2, Matrix3, Vector2};
 
 pub use read::read;
 
@@ -82,23 +82,22 @@ fn hypothesis_name(refinement: &Refinement) -> &'static str {
 
 /// The poses with the scans' times.
 pub fn trajectory(poses: &[PoseHeader]) -> Trajectory {
-    let pose = |pose: &PoseHeader| Isometry2::new(Vector2::new(pose.x_m, pose.y_m), pose.yaw_rad);
+    let pose_of = |header: &PoseHeader| pose(header.x_m, header.y_m, header.yaw_rad);
     Trajectory {
         stamp_ns: Some(poses.iter().map(|pose| pose.item.stamp_ns).collect()),
-        poses: poses.iter().map(pose).collect(),
+        poses: poses.iter().map(pose_of).collect(),
     }
 }
 
 /// The motions with their times and covariances. Where the chain starts there is none.
-pub fn motions(poses: &[PoseHeader]) -> Vec<Motion> {
-    let motion = |pose: &PoseHeader| {
-        let (to_ns, motion) = (pose.item.stamp_ns, &pose.motion);
-        let [xx, xy, xyaw, yy, yyaw, yawyaw] = motion.covariance;
+pub fn motions(poses: &[PoseHeader]) -> Vec<TimedMotion> {
+    let motion = |header: &PoseHeader| {
+        let (to_ns, motion) = (header.item.stamp_ns, &header.motion);
         let estimate = UncertainMotion {
-            motion: Isometry2::new(Vector2::new(motion.x_m, motion.y_m), motion.yaw_rad),
-            covariance: Matrix3::new(xx, xy, xyaw, xy, yy, yyaw, xyaw, yyaw, yawyaw),
+            motion: pose(motion.x_m, motion.y_m, motion.yaw_rad),
+            covariance: unpack(&motion.covariance),
         };
-        Motion {
+        TimedMotion {
             from_ns: to_ns.saturating_sub(motion.interval_ns),
             to_ns,
             estimate,

@@ -1,19 +1,20 @@
 //! Which pose of the estimate is held against which pose of the truth.
 
+use gyre_geometry::{Pose, interpolate};
 use serde::Serialize;
 
-use crate::{EvaluationError, MatchedPoses, Pose, Side, matched::require_poses};
+use crate::{EvaluationError, MatchedPoses, Side, matched::require_poses};
 
 /// Poses, and their stamps where they have any.
 #[derive(Debug, Clone, Copy)]
-pub struct Trajectory<'a> {
+pub struct TimedPoses<'a> {
     /// One stamp a pose, ns, never running backwards. Not looked at in association by index.
     pub stamps_ns: &'a [i64],
     /// Poses of the sensor in one fixed frame.
     pub poses: &'a [Pose],
 }
 
-impl<'a> Trajectory<'a> {
+impl<'a> TimedPoses<'a> {
     /// Poses with stamps.
     pub fn new(stamps_ns: &'a [i64], poses: &'a [Pose]) -> Self {
         Self { stamps_ns, poses }
@@ -105,8 +106,8 @@ impl Coverage {
 /// [`EvaluationError`] where poses are none (NaN, no rotation), stamps are missing or run backwards (by time only), or fewer than
 /// two poses have a counterpart.
 pub fn associate(
-    estimate: Trajectory<'_>,
-    truth: Trajectory<'_>,
+    estimate: TimedPoses<'_>,
+    truth: TimedPoses<'_>,
     association: Association,
 ) -> Result<(MatchedPoses, Coverage), EvaluationError> {
     require_poses(Side::Estimate, estimate.poses)?;
@@ -141,8 +142,8 @@ fn by_index(
 }
 
 fn by_time(
-    estimate: Trajectory<'_>,
-    truth: Trajectory<'_>,
+    estimate: TimedPoses<'_>,
+    truth: TimedPoses<'_>,
     max_gap_ns: i64,
 ) -> Result<(MatchedPoses, Coverage), EvaluationError> {
     let estimate_ns = require_stamps(Side::Estimate, &estimate)?;
@@ -188,7 +189,7 @@ fn by_time(
 /// The span of the stamps, `None` where there are none; refuses a wrong count and time that runs backwards.
 pub(crate) fn require_stamps(
     side: Side,
-    trajectory: &Trajectory<'_>,
+    trajectory: &TimedPoses<'_>,
 ) -> Result<Option<(i64, i64)>, EvaluationError> {
     let (stamps, poses) = (trajectory.stamps_ns, trajectory.poses.len());
     if stamps.len() != poses {
@@ -220,7 +221,7 @@ pub(crate) enum At {
 const ROUNDING_NS: u64 = 1_000;
 
 /// The truth at `stamp_ns`. A stamp that the truth has itself is never in a gap.
-pub(crate) fn truth_at(truth: Trajectory<'_>, stamp_ns: i64, max_gap_ns: i64) -> At {
+pub(crate) fn truth_at(truth: TimedPoses<'_>, stamp_ns: i64, max_gap_ns: i64) -> At {
     let ends = truth
         .stamps_ns
         .first()
@@ -253,18 +254,11 @@ pub(crate) fn truth_at(truth: Trajectory<'_>, stamp_ns: i64, max_gap_ns: i64) ->
     ))
 }
 
-/// Position on the straight line between, yaw the shorter way round; `share` 0 is `from`, 1 is `to`.
-fn interpolate(from: &Pose, to: &Pose, share: f64) -> Pose {
-    let position = from.translation.vector.lerp(&to.translation.vector, share);
-    let turn = from.rotation.rotation_to(&to.rotation).powf(share);
-    Pose::from_parts(position.into(), turn * from.rotation)
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::pose;
+    use gyre_geometry::pose;
     use std::f64::consts::PI;
 
     const SECOND: i64 = 1_000_000_000;
@@ -281,8 +275,8 @@ mod tests {
     fn the_truth_is_interpolated_across_the_turn_of_the_yaw() {
         let truth = [pose(0.0, 0.0, PI - 0.1), pose(4.0, 2.0, -PI + 0.3)];
         let (matched, _) = associate(
-            Trajectory::new(&seconds(&[10.0, 10.25, 11.0]), &line(3)),
-            Trajectory::new(&seconds(&[10.0, 11.0]), &truth),
+            TimedPoses::new(&seconds(&[10.0, 10.25, 11.0]), &line(3)),
+            TimedPoses::new(&seconds(&[10.0, 11.0]), &truth),
             Association::default(),
         )
         .unwrap();
@@ -295,8 +289,8 @@ mod tests {
     #[test]
     fn poses_outside_the_span_and_in_gaps_are_left_out_and_counted() {
         let (matched, coverage) = associate(
-            Trajectory::new(&seconds(&[-0.5, 0.0, 0.5, 1.0, 2.5, 4.0, 4.1]), &line(7)),
-            Trajectory::new(&seconds(&[0.0, 1.0, 4.0]), &line(3)),
+            TimedPoses::new(&seconds(&[-0.5, 0.0, 0.5, 1.0, 2.5, 4.0, 4.1]), &line(7)),
+            TimedPoses::new(&seconds(&[0.0, 1.0, 4.0]), &line(3)),
             Association::default(),
         )
         .unwrap();
@@ -319,10 +313,10 @@ mod tests {
     fn a_stamp_rounded_beyond_an_end_of_the_truth_counts_as_that_end() {
         let (truth, estimate) = (line(2), line(3));
         let found = |stamps: [i64; 3]| {
-            let estimate = Trajectory::new(&stamps, &estimate);
+            let estimate = TimedPoses::new(&stamps, &estimate);
             associate(
                 estimate,
-                Trajectory::new(&[5_000, 9_000], &truth),
+                TimedPoses::new(&[5_000, 9_000], &truth),
                 Association::default(),
             )
             .unwrap()
@@ -338,8 +332,8 @@ mod tests {
     #[test]
     fn index_association_cuts_to_the_shorter_and_says_so() {
         let (matched, coverage) = associate(
-            Trajectory::untimed(&line(3)),
-            Trajectory::untimed(&line(5)),
+            TimedPoses::untimed(&line(3)),
+            TimedPoses::untimed(&line(5)),
             Association::Index,
         )
         .unwrap();
@@ -357,8 +351,8 @@ mod tests {
     #[test]
     fn trajectories_of_different_times_are_refused_with_both_spans() {
         let error = associate(
-            Trajectory::new(&seconds(&[1.0, 2.0]), &line(2)),
-            Trajectory::new(&seconds(&[10.0, 12.5]), &line(2)),
+            TimedPoses::new(&seconds(&[1.0, 2.0]), &line(2)),
+            TimedPoses::new(&seconds(&[10.0, 12.5]), &line(2)),
             Association::default(),
         )
         .unwrap_err();
@@ -372,8 +366,8 @@ mod tests {
     #[test]
     fn one_common_instant_is_too_few() {
         let error = associate(
-            Trajectory::new(&seconds(&[1.0, 2.0]), &line(2)),
-            Trajectory::new(&seconds(&[2.0, 3.0]), &line(2)),
+            TimedPoses::new(&seconds(&[1.0, 2.0]), &line(2)),
+            TimedPoses::new(&seconds(&[2.0, 3.0]), &line(2)),
             Association::default(),
         );
         assert_eq!(
@@ -392,8 +386,8 @@ mod tests {
         let error = |estimate: &[i64], truth: &[i64]| {
             let (e, t) = (line(3), line(3));
             associate(
-                Trajectory::new(estimate, &e),
-                Trajectory::new(truth, &t),
+                TimedPoses::new(estimate, &e),
+                TimedPoses::new(truth, &t),
                 Association::default(),
             )
             .unwrap_err()
@@ -420,8 +414,8 @@ mod tests {
     #[test]
     fn stamps_at_the_ends_of_the_clock_do_not_overflow() {
         let (matched, _) = associate(
-            Trajectory::new(&[i64::MIN, 0, i64::MAX], &line(3)),
-            Trajectory::new(&[i64::MIN, i64::MAX], &line(2)),
+            TimedPoses::new(&[i64::MIN, 0, i64::MAX], &line(3)),
+            TimedPoses::new(&[i64::MIN, i64::MAX], &line(2)),
             Association::Time {
                 max_gap_ns: i64::MAX,
             },
@@ -432,7 +426,7 @@ mod tests {
 
     #[test]
     fn empty_trajectories_are_refused() {
-        let empty = Trajectory::untimed(&[]);
+        let empty = TimedPoses::untimed(&[]);
         for association in [Association::default(), Association::Index] {
             let error = associate(empty, empty, association).unwrap_err();
             assert_eq!(

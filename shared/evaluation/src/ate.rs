@@ -1,8 +1,9 @@
 //! Absolute trajectory error: how far positions lie from the truth after the best SE(2) alignment.
 
+use gyre_geometry::Pose;
 use serde::{Serialize, Serializer};
 
-use crate::{MatchedPoses, Pose};
+use crate::MatchedPoses;
 
 /// Absolute trajectory error after SE(2) alignment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -95,7 +96,7 @@ fn serialize_isometry<S: Serializer>(pose: &Pose, serializer: S) -> Result<S::Ok
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::pose;
+    use gyre_geometry::pose;
 
     #[test]
     fn two_points_too_far_apart_share_the_excess() {

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::{JudgedMotions, TruthSigma, motions::Chain};
+use crate::{MatchedMotions, TruthSigma, motions::Chain};
 
 /// Errors and spreads along each unbroken chain of motions that has truth. A chain is aligned with the truth at its first
 /// pose that has any: there both error and spread are zero.
@@ -26,7 +26,7 @@ pub struct BandSample {
 }
 
 /// Composes the motions of each chain, and holds every pose that has truth against it (Checchin et al., Fig. 3).
-pub fn bands(judged: &JudgedMotions, truth_sigma: TruthSigma) -> Bands {
+pub fn bands(judged: &MatchedMotions, truth_sigma: TruthSigma) -> Bands {
     let start_ns = judged.span_ns().0;
     let chains = judged
         .chains

@@ -44,7 +44,7 @@ impl fmt::Display for Evaluation {
     }
 }
 
-const TOO_SHORT: &str = "no stretch of the path exceeds 100 m";
+const TOO_SHORT: &str = "no segment of the path exceeds 100 m";
 
 impl Evaluation {
     fn why_no_kitti(&self) -> String {
@@ -55,16 +55,13 @@ impl Evaluation {
         }
     }
 
-    /// A line for each length that has stretches.
+    /// A line for each length that has segments.
     fn fmt_lengths(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Some(seg) = &self.seg else { return Ok(()) };
-        write!(
-            f,
-            "\n\n  length  stretches  translation    rotation     seg"
-        )?;
+        write!(f, "\n\n  length  segments  translation    rotation     seg")?;
         write!(f, "\n       m                        %   deg/100 m       %")?;
         for (k, length) in seg.by_length.iter().enumerate() {
-            write!(f, "\n{:8.0} {:10}", length.length_m, length.stretches)?;
+            write!(f, "\n{:8.0} {:10}", length.length_m, length.segments)?;
             match self.kitti.as_ref().and_then(|kitti| kitti.by_length.get(k)) {
                 Some(kitti) => write!(
                     f,
@@ -114,11 +111,11 @@ impl fmt::Display for Kitti {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{:.5} % translation, {:.5} deg/100 m ({:.4} deg/km) rotation; {} stretches, step {}",
+            "{:.5} % translation, {:.5} deg/100 m ({:.4} deg/km) rotation; {} segments, step {}",
             self.translation_percent,
             self.rotation_deg_per_100m,
             self.rotation_deg_per_km,
-            self.stretches,
+            self.segments,
             self.step
         )
     }
@@ -128,7 +125,7 @@ impl fmt::Display for Seg {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{:.4} % of the length, each stretch aligned by itself",
+            "{:.4} % of the length, each segment aligned by itself",
             self.percent
         )
     }
@@ -173,7 +170,7 @@ impl fmt::Display for Rpe {
 }
 
 impl fmt::Display for Nees {
-    /// A table of all stretches; the alternate form has lines for each half of the time, too.
+    /// A table of all segments; the alternate form has lines for each half of the time, too.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
@@ -198,14 +195,14 @@ impl fmt::Display for Nees {
         write!(
             f,
             "\n{:>8}{:>10}{:>11}{:>16}{:>32}{:>25}",
-            "motions", "half", "stretches", "pose", "translation", "yaw"
+            "motions", "half", "segments", "pose", "translation", "yaw"
         )?;
         self.by_length.iter().try_for_each(|length| length.fmt(f))
     }
 }
 
 impl fmt::Display for NeesLength {
-    /// Lines that begin with a line break: all stretches, and in the alternate form each half.
+    /// Lines that begin with a line break: all segments, and in the alternate form each half.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "\n{:8}{:>10}{}", self.motions, "all", self.all)?;
         let halves = [("first", &self.first_half), ("second", &self.second_half)];
@@ -236,9 +233,9 @@ impl fmt::Display for TruthSigma {
 
 impl fmt::Display for NeesFigures {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:11}", self.stretches)?;
+        write!(f, "{:11}", self.segments)?;
         for figure in [self.pose, self.translation, self.yaw] {
-            let [low, high] = figure.honest_range;
+            let [low, high] = figure.acceptance_interval;
             write!(
                 f,
                 "{:8.2} [{low:.2}, {high:.2}]{:6.1} %",

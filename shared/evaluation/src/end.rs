@@ -40,7 +40,7 @@ pub fn end_error(matched: &MatchedPoses) -> EndError {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::pose;
+    use gyre_geometry::pose;
 
     #[test]
     fn frames_do_not_matter_and_only_the_ends_do() {

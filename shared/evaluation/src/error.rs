@@ -139,7 +139,7 @@ pub enum EvaluationError {
         "none of {motions} motions can be judged: {without_truth} without ground truth at both ends (same clock?), \
          {without_covariance} without a positive definite covariance"
     )]
-    NoMotionJudged {
+    NoMatchedMotion {
         /// Motions given.
         motions: usize,
         /// Motions without truth at both ends.

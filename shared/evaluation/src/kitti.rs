@@ -1,16 +1,17 @@
-//! The KITTI odometry errors: drift of translation and rotation over stretches of 100 to 800 m.
+//! The KITTI odometry errors: drift of translation and rotation over segments of 100 to 800 m.
 
 use std::num::NonZeroUsize;
 
+use gyre_geometry::Pose;
 use nalgebra::Complex;
 use serde::Serialize;
 
 use crate::{
-    MatchedPoses, Pose,
-    stretches::{PerLength, Stretch, stretches},
+    MatchedPoses,
+    segments::{PerLength, Segment, segments},
 };
 
-/// KITTI odometry errors, means over all stretches of all lengths.
+/// KITTI odometry errors, means over all segments of all lengths.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Kitti {
     /// Translation error, % of the nominal length.
@@ -19,15 +20,15 @@ pub struct Kitti {
     pub rotation_deg_per_100m: f64,
     /// The same in degrees per km, as the KITTI site's "deg/m" times 1000.
     pub rotation_deg_per_km: f64,
-    /// Number of stretches in the means.
-    pub stretches: usize,
-    /// Poses between the starts of stretches.
+    /// Number of segments in the means.
+    pub segments: usize,
+    /// Poses between the starts of segments.
     pub step: NonZeroUsize,
-    /// The means of each length that has stretches, short lengths first.
+    /// The means of each length that has segments, short lengths first.
     pub by_length: Vec<KittiLength>,
 }
 
-/// KITTI errors of the stretches of one nominal length.
+/// KITTI errors of the segments of one nominal length.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct KittiLength {
     /// Nominal length, m.
@@ -36,35 +37,35 @@ pub struct KittiLength {
     pub translation_percent: f64,
     /// Rotation error, degrees per 100 m.
     pub rotation_deg_per_100m: f64,
-    /// Number of stretches in the means.
-    pub stretches: usize,
+    /// Number of segments in the means.
+    pub segments: usize,
 }
 
-/// Measures the drift over every stretch that begins at every `step`-th pose; `None` where the path has no stretch
-/// beyond 100 m. No alignment: only motions within a stretch are compared.
+/// Measures the drift over every segment that begins at every `step`-th pose; `None` where the path has no segment
+/// beyond 100 m. No alignment: only motions within a segment are compared.
 ///
 /// `step` is 10 in the development kit (1 s of its lidar at 10 Hz); radar papers use 10 or 4 (1 s at 4 Hz).
 pub fn kitti(matched: &MatchedPoses, step: NonZeroUsize) -> Option<Kitti> {
     let mut errors = PerLength::new();
-    for stretch in stretches(&matched.distance_m(), step) {
-        errors.add(stretch.length, stretch_error(matched, stretch));
+    for segment in segments(&matched.distance_m(), step) {
+        errors.add(segment.length, segment_error(matched, segment));
     }
-    let ([translation_percent, rotation_deg_per_100m], stretches) = errors.mean()?;
+    let ([translation_percent, rotation_deg_per_100m], segments) = errors.mean()?;
     Some(Kitti {
         translation_percent,
         rotation_deg_per_100m,
         rotation_deg_per_km: 10.0 * rotation_deg_per_100m,
-        stretches,
+        segments,
         step,
         by_length: errors.means().map(length_mean).collect(),
     })
 }
 
-/// Translation error (%) and rotation error (deg/100 m) of one stretch.
-fn stretch_error(matched: &MatchedPoses, stretch: Stretch) -> [f64; 2] {
-    let estimated = Motion::within(matched.estimate(), stretch);
-    let error = estimated.to(&Motion::within(matched.truth(), stretch));
-    let per_100m = 100.0 / stretch.length_m();
+/// Translation error (%) and rotation error (deg/100 m) of one segment.
+fn segment_error(matched: &MatchedPoses, segment: Segment) -> [f64; 2] {
+    let estimated = Motion::within(matched.estimate(), segment);
+    let error = estimated.to(&Motion::within(matched.truth(), segment));
+    let per_100m = 100.0 / segment.length_m();
     [
         error.translation.norm() * per_100m,
         error.angle_rad().to_degrees() * per_100m,
@@ -90,8 +91,8 @@ impl Motion {
     }
 
     /// inverse(first) last.
-    fn within(poses: &[Pose], stretch: Stretch) -> Self {
-        Self::of(&poses[stretch.first]).to(&Self::of(&poses[stretch.last]))
+    fn within(poses: &[Pose], segment: Segment) -> Self {
+        Self::of(&poses[segment.first]).to(&Self::of(&poses[segment.last]))
     }
 
     /// inverse(self) other.
@@ -109,12 +110,12 @@ impl Motion {
 }
 
 fn length_mean(
-    (length_m, [translation_percent, rotation_deg_per_100m], stretches): (f64, [f64; 2], usize),
+    (length_m, [translation_percent, rotation_deg_per_100m], segments): (f64, [f64; 2], usize),
 ) -> KittiLength {
     KittiLength {
         length_m,
         translation_percent,
         rotation_deg_per_100m,
-        stretches,
+        segments,
     }
 }

@@ -1,25 +1,26 @@
-//! How well a planar trajectory fits its ground truth: KITTI, ATE, RPE and seg, NEES of its covariances, and plots of them.
+//! Metrics of planar odometry against ground truth: KITTI drift, ATE, RPE, segment error and NEES, with plots.
 //!
-//! Pure mathematics on slices of poses and stamps; files are read elsewhere. Poses are
-//! [`nalgebra::Isometry2<f64>`] ([`Pose`]), each the pose of the sensor in some fixed frame (REP-103: x forward, y left,
-//! yaw counter-clockwise); stamps are nanoseconds. The fixed frames of estimate and truth need not agree.
+//! The crate computes on slices of poses and stamps; files are read elsewhere. A [`Pose`](gyre_geometry::Pose) is that
+//! of the sensor in a fixed frame (REP-103: x forward, y left, yaw counter-clockwise); stamps are in ns. Estimate and
+//! ground truth may have different fixed frames.
 //!
 //! Reading order:
 //! - [`report`]: [`evaluate`] is the whole method, one line a step;
-//! - [`mod@associate`]: which pose of the estimate is held against which pose of the truth;
-//! - [`mirror`]: axes that run the other way, found and undone;
-//! - [`mod@ate`], [`mod@kitti`], [`mod@seg`], [`mod@end`], [`mod@rpe`]: one metric each, on [`MatchedPoses`];
-//! - [`motions`]: reported motions with covariances, all or those of a part, each beside its truth;
-//! - [`mod@nees`], [`mod@bands`]: whether these covariances are honest, as figures and over time;
-//! - [`plot`]: trajectory, errors and bands as SVG.
+//! - [`mod@associate`]: association of estimated poses with ground-truth poses;
+//! - [`handedness`]: frames with y to the right or clockwise yaw, detected and converted;
+//! - [`mod@kitti`], [`mod@seg`], [`mod@ate`], [`mod@end`], [`mod@rpe`]: one metric each, on [`MatchedPoses`];
+//! - [`motions`]: reported motions with covariances, associated with the ground truth;
+//! - [`mod@nees`], [`mod@bands`]: consistency of these covariances, as figures and over time;
+//! - [`plot`]: trajectory, errors and error bands as SVG.
 //!
 //! ```
-//! use gyre_evaluation::{Association, Options, Pose, Trajectory, evaluate};
+//! use gyre_evaluation::{Association, Options, TimedPoses, evaluate};
+//! use gyre_geometry::Pose;
 //!
 //! let truth: Vec<_> = (0..200).map(|k| Pose::translation(k as f64, 0.0)).collect();
 //! let estimate: Vec<_> = (0..200).map(|k| Pose::translation(1.01 * k as f64, 5.0)).collect();
 //! let options = Options { association: Association::Index, ..Options::default() };
-//! let evaluation = evaluate(Trajectory::untimed(&estimate), Trajectory::untimed(&truth), &options)?;
+//! let evaluation = evaluate(TimedPoses::untimed(&estimate), TimedPoses::untimed(&truth), &options)?;
 //! let kitti = evaluation.kitti.as_ref().ok_or("shorter than 100 m")?;
 //! assert!((kitti.translation_percent - 1.01).abs() < 1e-9); // 1 % of the 101 m that exceed 100 m
 //! println!("{evaluation}");
@@ -29,44 +30,34 @@
 pub mod associate;
 pub mod ate;
 pub mod bands;
-mod chi_square;
-mod covariance;
 mod display;
 pub mod end;
 mod error;
+pub mod handedness;
 pub mod kitti;
 mod matched;
-pub mod mirror;
 pub mod motions;
 pub mod nees;
 pub mod plot;
 pub mod report;
 pub mod rpe;
 pub mod seg;
-mod stretches;
+mod segments;
+mod truth_sigma;
 
-pub use associate::{Association, Coverage, Trajectory, associate};
+pub use associate::{Association, Coverage, TimedPoses, associate};
 pub use ate::{Ate, align, ate};
 pub use bands::{BandSample, Bands, bands};
-pub use covariance::{TruthSigma, UncertainMotion};
 pub use end::{EndError, end_error};
 pub use error::{EvaluationError, Side};
+pub use handedness::{Axes, HeadingFault};
 pub use kitti::{Kitti, kitti};
 pub use matched::MatchedPoses;
-pub use mirror::{Axes, HeadingFault};
-pub use motions::{JudgedMotions, Motion, Part};
+pub use motions::{MatchedMotions, Part, TimedMotion};
 pub use nees::{Nees, NeesFigure, NeesFigures, NeesLength, NeesOptions, nees};
 pub use plot::{PlotError, plot_bands, plot_errors, plot_trajectory};
 pub use report::{Evaluation, Options, evaluate};
 pub use rpe::{PairError, Rpe, rpe};
 pub use seg::{Seg, seg};
-pub use stretches::STRETCH_LENGTHS_M;
-
-/// The pose of a sensor in some fixed frame: metres, radians.
-pub type Pose = nalgebra::Isometry2<f64>;
-
-/// The pose (x, y, yaw).
-#[cfg(test)]
-fn pose(x_m: f64, y_m: f64, yaw_rad: f64) -> Pose {
-    Pose::new(nalgebra::Vector2::new(x_m, y_m), yaw_rad)
-}
+pub use segments::SEGMENT_LENGTHS_M;
+pub use truth_sigma::TruthSigma;

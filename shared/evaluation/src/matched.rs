@@ -1,6 +1,8 @@
 //! Poses of the estimate, each with its counterpart in the truth: what all metrics work on.
 
-use crate::{EvaluationError, Pose, Side, error::LARGEST_COORDINATE_M};
+use gyre_geometry::Pose;
+
+use crate::{EvaluationError, Side, error::LARGEST_COORDINATE_M};
 
 /// Two equally long lists of valid poses; pose `k` of one belongs to pose `k` of the other.
 ///
@@ -126,7 +128,7 @@ pub(crate) fn path_m(poses: &[Pose]) -> f64 {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::pose;
+    use gyre_geometry::pose;
 
     #[test]
     fn unequal_and_too_short_lists_are_refused_with_their_lengths() {

@@ -1,14 +1,16 @@
 //! Reported motions beside the truth's poses at the same times.
 
+use gyre_geometry::{Pose, UncertainMotion};
+
 use crate::{
-    EvaluationError, Pose, Side, Trajectory, UncertainMotion,
+    EvaluationError, Side, TimedPoses,
     associate::{At, require_stamps, truth_at},
     matched::require_poses,
 };
 
 /// A motion as an odometry reports it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Motion {
+pub struct TimedMotion {
     /// Time of the earlier frame, ns.
     pub from_ns: i64,
     /// Time of the later frame, ns.
@@ -36,7 +38,7 @@ impl Part {
 
     /// The motions, given in the order of their times, that begin within this part: those of adjoining parts share none and leave
     /// none out.
-    pub fn of<'m>(&self, motions: &'m [Motion]) -> &'m [Motion] {
+    pub fn of<'m>(&self, motions: &'m [TimedMotion]) -> &'m [TimedMotion] {
         let (Some(first), Some(last)) = (motions.first(), motions.last()) else {
             return motions;
         };
@@ -55,7 +57,7 @@ impl Part {
 
 /// Motions in unbroken chains, with the truth at every joint that has one.
 #[derive(Debug, Clone, PartialEq)]
-pub struct JudgedMotions {
+pub struct MatchedMotions {
     pub(crate) chains: Vec<Chain>,
     /// Motions given.
     pub motions: usize,
@@ -73,16 +75,16 @@ pub(crate) struct Chain {
     pub truth: Vec<Option<Pose>>,
 }
 
-impl JudgedMotions {
+impl MatchedMotions {
     /// Looks up the truth, interpolated across gaps of up to `max_gap_ns`, at both ends of each motion.
     ///
     /// # Errors
     /// [`EvaluationError::NotAMotion`] and [`EvaluationError::MotionBackwards`] for what no odometry reports, the errors of
-    /// [`associate()`](crate::associate()) that concern the truth, and [`EvaluationError::NoMotionJudged`] where no motion has both
+    /// [`associate()`](crate::associate()) that concern the truth, and [`EvaluationError::NoMatchedMotion`] where no motion has both
     /// truth and covariance.
     pub fn new(
-        motions: &[Motion],
-        truth: Trajectory<'_>,
+        motions: &[TimedMotion],
+        truth: TimedPoses<'_>,
         max_gap_ns: i64,
     ) -> Result<Self, EvaluationError> {
         require_poses(Side::Truth, truth.poses)?;
@@ -110,7 +112,7 @@ impl JudgedMotions {
     }
 
     /// Adds a motion to the last chain, or, where it does not join, to a new one.
-    fn add(&mut self, motion: &Motion, from: Option<Pose>, to: Option<Pose>) {
+    fn add(&mut self, motion: &TimedMotion, from: Option<Pose>, to: Option<Pose>) {
         match self
             .chains
             .last_mut()
@@ -138,7 +140,7 @@ impl JudgedMotions {
         };
         match self.chains.iter().any(both_ends) {
             true => Ok(self),
-            false => Err(EvaluationError::NoMotionJudged {
+            false => Err(EvaluationError::NoMatchedMotion {
                 motions: self.motions,
                 without_truth: self.without_truth,
                 without_covariance: self.without_covariance,
@@ -165,7 +167,7 @@ impl Chain {
     pub fn composed(&self, first: usize) -> impl Iterator<Item = UncertainMotion> + '_ {
         self.motions[first..]
             .iter()
-            .scan(UncertainMotion::standing(), |so_far, motion| {
+            .scan(UncertainMotion::identity(), |so_far, motion| {
                 *so_far = so_far.then(motion);
                 Some(*so_far)
             })
@@ -177,11 +179,11 @@ impl Chain {
     }
 }
 
-fn require_motions(motions: &[Motion]) -> Result<(), EvaluationError> {
+fn require_motions(motions: &[TimedMotion]) -> Result<(), EvaluationError> {
     let mut previous_ns = motions.first().map_or(0, |first| first.from_ns);
     for (
         index,
-        &Motion {
+        &TimedMotion {
             from_ns,
             to_ns,
             estimate: UncertainMotion { motion, .. },
@@ -220,16 +222,16 @@ mod tests {
     use nalgebra::Matrix3;
 
     use super::*;
-    use crate::pose;
+    use gyre_geometry::pose;
 
     const MS: i64 = 1_000_000;
 
-    fn motion(from_ms: i64, to_ms: i64, variance: f64) -> Motion {
+    fn motion(from_ms: i64, to_ms: i64, variance: f64) -> TimedMotion {
         let estimate = UncertainMotion {
             motion: pose(1.0, 0.0, 0.0),
             covariance: Matrix3::identity() * variance,
         };
-        Motion {
+        TimedMotion {
             from_ns: from_ms * MS,
             to_ns: to_ms * MS,
             estimate,
@@ -237,10 +239,13 @@ mod tests {
     }
 
     /// With a truth that is at x = t at t ms, interpolated across up to 20 ms.
-    fn judged(motions: &[Motion], truth_ms: &[i64]) -> Result<JudgedMotions, EvaluationError> {
+    fn judged(
+        motions: &[TimedMotion],
+        truth_ms: &[i64],
+    ) -> Result<MatchedMotions, EvaluationError> {
         let poses: Vec<_> = truth_ms.iter().map(|&t| pose(t as f64, 0.0, 0.0)).collect();
         let stamps: Vec<_> = truth_ms.iter().map(|t| t * MS).collect();
-        JudgedMotions::new(motions, Trajectory::new(&stamps, &poses), 20 * MS)
+        MatchedMotions::new(motions, TimedPoses::new(&stamps, &poses), 20 * MS)
     }
 
     #[test]
@@ -311,7 +316,7 @@ mod tests {
         let none = judged(&[motion(0, 10, 0.0), motion(100, 110, 1.0)], &[0, 10]).unwrap_err();
         assert_eq!(
             none,
-            EvaluationError::NoMotionJudged {
+            EvaluationError::NoMatchedMotion {
                 motions: 2,
                 without_truth: 1,
                 without_covariance: 1
@@ -319,7 +324,7 @@ mod tests {
         );
         assert!(matches!(
             judged(&[], &[0, 10]),
-            Err(EvaluationError::NoMotionJudged { motions: 0, .. })
+            Err(EvaluationError::NoMatchedMotion { motions: 0, .. })
         ));
         let backwards = judged(&[motion(0, 10, 1.0), motion(9, 19, 1.0)], &[0, 10]);
         assert!(matches!(

@@ -4,13 +4,14 @@ use std::num::NonZeroUsize;
 
 use nalgebra::{Matrix2, Matrix3, Vector3};
 use serde::Serialize;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::{JudgedMotions, TruthSigma, chi_square::quantile, motions::Chain};
+use crate::{MatchedMotions, TruthSigma, motions::Chain};
 
 /// How to judge covariances.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NeesOptions {
-    /// Numbers of motions that are composed into one stretch.
+    /// Numbers of motions that are composed into one segment.
     pub lengths: Vec<NonZeroUsize>,
     /// How uncertain the truth itself is: its share is added to each covariance.
     pub truth_sigma: TruthSigma,
@@ -32,8 +33,8 @@ impl Default for NeesOptions {
 
 /// How honest the covariances are. `Display` is a table, the alternate form a longer one.
 ///
-/// The error of a stretch of motions is e = (x, y, yaw) of the estimate less those of the truth, along the axes of the
-/// stretch's first frame; P is the covariance composed over the stretch, plus the truth's own. The normalised error squared
+/// The error of a segment of motions is e = (x, y, yaw) of the estimate less those of the truth, along the axes of the
+/// segment's first frame; P is the covariance composed over the segment, plus the truth's own. The normalised error squared
 /// e' inv(P) e of an honest covariance has a chi-square distribution, whose expectation is its degrees of freedom: 3, or 2 for
 /// the translation alone, or 1 for the yaw. Stretches of one length share no motion.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -50,12 +51,12 @@ pub struct Nees {
     pub by_length: Vec<NeesLength>,
 }
 
-/// The figures of stretches of one length.
+/// The figures of segments of one length.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NeesLength {
-    /// Motions in a stretch.
+    /// Motions in a segment.
     pub motions: usize,
-    /// All stretches.
+    /// All segments.
     pub all: NeesFigures,
     /// Those that begin in the first half of the time.
     pub first_half: Option<NeesFigures>,
@@ -63,11 +64,11 @@ pub struct NeesLength {
     pub second_half: Option<NeesFigures>,
 }
 
-/// The figures of a set of stretches.
+/// The figures of a set of segments.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NeesFigures {
-    /// Number of stretches.
-    pub stretches: usize,
+    /// Number of segments.
+    pub segments: usize,
     /// x, y and yaw together.
     pub pose: NeesFigure,
     /// x and y.
@@ -81,9 +82,9 @@ pub struct NeesFigures {
 pub struct NeesFigure {
     /// The mean divided by its expectation. Above 1 the covariances promise too much, below 1 too little.
     pub ratio: f64,
-    /// Where 95 % of the ratios of honest covariances lie, if errors are Gaussian and independent from stretch to stretch.
-    pub honest_range: [f64; 2],
-    /// Share of the stretches whose error lies outside the covariance's 95 % region, %.
+    /// Where 95 % of the ratios of honest covariances lie, if errors are Gaussian and independent from segment to segment.
+    pub acceptance_interval: [f64; 2],
+    /// Share of the segments whose error lies outside the covariance's 95 % region, %.
     pub outside_percent: f64,
 }
 
@@ -93,17 +94,17 @@ const CONFIDENCE: f64 = 0.95;
 /// Degrees of freedom of pose, translation and yaw.
 const FREEDOMS: [usize; 3] = [3, 2, 1];
 
-/// Measures the honesty of single motions and of longer stretches.
+/// Measures the honesty of single motions and of longer segments.
 ///
-/// The truth's noise dominates short stretches where it is not told (`truth_sigma`); long ones are few.
-pub fn nees(judged: &JudgedMotions, options: &NeesOptions) -> Nees {
+/// The truth's noise dominates short segments where it is not told (`truth_sigma`); long ones are few.
+pub fn nees(judged: &MatchedMotions, options: &NeesOptions) -> Nees {
     let (from_ns, to_ns) = judged.span_ns();
     let middle_ns = from_ns.midpoint(to_ns);
     let of_length = |&length: &NonZeroUsize| {
         let samples: Vec<_> = judged
             .chains
             .iter()
-            .flat_map(|chain| stretches(chain, length, options.truth_sigma))
+            .flat_map(|chain| segments(chain, length, options.truth_sigma))
             .collect();
         let (first, second) =
             samples.split_at(samples.partition_point(|sample| sample.from_ns < middle_ns));
@@ -123,7 +124,7 @@ pub fn nees(judged: &JudgedMotions, options: &NeesOptions) -> Nees {
     }
 }
 
-/// One stretch.
+/// One segment.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
     from_ns: i64,
@@ -131,8 +132,8 @@ struct Sample {
     squared: [f64; 3],
 }
 
-/// The stretches of `length` motions, one after the other, that have truth at both ends.
-fn stretches(
+/// The segments of `length` motions, one after the other, that have truth at both ends.
+fn segments(
     chain: &Chain,
     length: NonZeroUsize,
     sigma: TruthSigma,
@@ -143,10 +144,10 @@ fn stretches(
         .filter(move |first| chain.motions.len() - first >= length);
     starts.filter_map(move |first| {
         let truth = chain.true_motion(first, first + length)?;
-        let stretch = chain.composed(first).nth(length - 1)?;
+        let segment = chain.composed(first).nth(length - 1)?;
         let squared = normalised(
-            &stretch.error(&truth),
-            &(stretch.covariance + sigma.of_motion(&truth)),
+            &segment.error(&truth),
+            &(segment.covariance + sigma.of_motion(&truth)),
         )?;
         Some(Sample {
             from_ns: chain.stamps_ns[first],
@@ -167,20 +168,58 @@ fn figures(samples: &[Sample]) -> Option<NeesFigures> {
     let of = |part: usize| {
         let (n, freedom) = (samples.len(), FREEDOMS[part]);
         let values = || samples.iter().map(|sample| sample.squared[part]);
-        let limit = quantile(CONFIDENCE, freedom);
+        let limit = chi_square_quantile(CONFIDENCE, freedom);
         let expected = (n * freedom) as f64;
         let tail = 0.5 * (1.0 - CONFIDENCE);
         NeesFigure {
             ratio: values().sum::<f64>() / expected,
-            honest_range: [tail, 1.0 - tail].map(|p| quantile(p, n * freedom) / expected),
+            acceptance_interval: [tail, 1.0 - tail]
+                .map(|p| chi_square_quantile(p, n * freedom) / expected),
             outside_percent: 100.0 * values().filter(|&value| value > limit).count() as f64
                 / n as f64,
         }
     };
     (!samples.is_empty()).then(|| NeesFigures {
-        stretches: samples.len(),
+        segments: samples.len(),
         pose: of(0),
         translation: of(1),
         yaw: of(2),
     })
+}
+
+/// The value that a chi-square variable of `freedom` > 0 degrees of freedom stays below with probability `p`.
+fn chi_square_quantile(p: f64, freedom: usize) -> f64 {
+    ChiSquared::new(freedom as f64).map_or(f64::NAN, |chi_square| chi_square.inverse_cdf(p))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_are_those_of_the_tables() {
+        let table = [
+            (0.95, 1, 3.841459),
+            (0.95, 2, 5.991465),
+            (0.95, 3, 7.814728),
+            (0.025, 1, 0.000982069),
+            (0.975, 10, 20.483177),
+            (0.025, 100, 74.221927),
+            (0.975, 100, 129.561197),
+        ];
+        for (p, freedom, expected) in table {
+            let found = chi_square_quantile(p, freedom);
+            assert!(
+                (found / expected - 1.0).abs() < 1e-6,
+                "{p} {freedom}: {found}"
+            );
+        }
+    }
+
+    #[test]
+    fn many_degrees_of_freedom_come_near_to_the_normal_distribution() {
+        let freedom = 60_000.0f64;
+        let expected = freedom + 1.959964 * (2.0 * freedom).sqrt();
+        assert!((chi_square_quantile(0.975, 60_000) - expected).abs() < 2.0);
+    }
 }

@@ -6,13 +6,13 @@ use serde::Serialize;
 
 use crate::{
     Association, Ate, Axes, Coverage, EndError, EvaluationError, Kitti, MatchedPoses, Rpe, Seg,
-    Trajectory, associate, ate, end_error, kitti, mirror::resolve_axes, rpe, seg,
+    TimedPoses, associate, ate, end_error, handedness::resolve_axes, kitti, rpe, seg,
 };
 
 /// How to evaluate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
-    /// Poses between the starts of the stretches of KITTI and seg; published figures use 10 or 4.
+    /// Poses between the starts of the segments of KITTI and seg; published figures use 10 or 4.
     pub step: NonZeroUsize,
     /// How counterparts are found.
     pub association: Association,
@@ -43,7 +43,7 @@ pub struct Evaluation {
     pub kitti: Option<Kitti>,
     /// Absolute error after alignment.
     pub ate: Ate,
-    /// Shape of stretches of 100 to 800 m; `None` for a shorter path.
+    /// Shape of segments of 100 to 800 m; `None` for a shorter path.
     pub seg: Option<Seg>,
     /// How far off the last pose is; `None` for a truth without heading.
     pub end: Option<EndError>,
@@ -59,8 +59,8 @@ pub struct Evaluation {
 /// # Errors
 /// See [`associate()`]. A path too short for KITTI is no error: the evaluation then holds per-pair figures and says so.
 pub fn evaluate(
-    estimate: Trajectory<'_>,
-    truth: Trajectory<'_>,
+    estimate: TimedPoses<'_>,
+    truth: TimedPoses<'_>,
     options: &Options,
 ) -> Result<Evaluation, EvaluationError> {
     let (matched, coverage) = associate(estimate, truth, options.association)?;

@@ -78,7 +78,7 @@ fn rmse(values: impl ExactSizeIterator<Item = f64>) -> f64 {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::{Pose, pose};
+    use gyre_geometry::{Pose, pose};
 
     #[test]
     fn a_single_false_turn_counts_once_however_far_it_displaces_the_rest() {

@@ -5,10 +5,9 @@ mod common;
 
 use std::{fs, num::NonZeroUsize, path::PathBuf};
 
-use common::{chain, pose};
-use gyre_evaluation::{
-    Association, Coverage, Evaluation, Kitti, Options, Pose, Trajectory, evaluate,
-};
+use common::chain;
+use gyre_evaluation::{Association, Coverage, Evaluation, Kitti, Options, TimedPoses, evaluate};
+use gyre_geometry::{Pose, pose};
 use nalgebra::{Complex, Unit};
 
 /// The folder of real data; tests return where there is none.
@@ -56,8 +55,8 @@ fn by_index(estimate: &[Pose], truth: &[Pose], step: usize) -> Evaluation {
         association: Association::Index,
     };
     evaluate(
-        Trajectory::untimed(estimate),
-        Trajectory::untimed(truth),
+        TimedPoses::untimed(estimate),
+        TimedPoses::untimed(truth),
         &options,
     )
     .unwrap()

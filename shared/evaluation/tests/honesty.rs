@@ -5,11 +5,11 @@ mod common;
 
 use std::num::NonZeroUsize;
 
-use common::pose;
 use gyre_evaluation::{
-    JudgedMotions, Motion, Nees, NeesFigure, NeesFigures, NeesOptions, Pose, Trajectory,
-    TruthSigma, UncertainMotion, bands, nees, plot::bands_svg,
+    MatchedMotions, Nees, NeesFigure, NeesFigures, NeesOptions, TimedMotion, TimedPoses,
+    TruthSigma, bands, nees, plot::bands_svg,
 };
+use gyre_geometry::{Pose, UncertainMotion, pose};
 use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -46,7 +46,7 @@ fn disturbed(truth: &Pose, error: Vector3<f64>) -> Pose {
 struct Drive {
     stamps_ns: Vec<i64>,
     truth: Vec<Pose>,
-    motions: Vec<Motion>,
+    motions: Vec<TimedMotion>,
 }
 
 impl Drive {
@@ -64,7 +64,7 @@ impl Drive {
                 motion,
                 covariance: claimed * covariance(),
             };
-            Motion {
+            TimedMotion {
                 from_ns: stamps_ns[k],
                 to_ns: stamps_ns[k + 1],
                 estimate,
@@ -78,10 +78,10 @@ impl Drive {
         }
     }
 
-    fn judged(&self) -> JudgedMotions {
-        JudgedMotions::new(
+    fn judged(&self) -> MatchedMotions {
+        MatchedMotions::new(
             &self.motions,
-            Trajectory::new(&self.stamps_ns, &self.truth),
+            TimedPoses::new(&self.stamps_ns, &self.truth),
             INTERVAL_NS,
         )
         .unwrap()
@@ -98,7 +98,7 @@ fn parts(figures: &NeesFigures) -> [NeesFigure; 3] {
 }
 
 #[test]
-fn ratios_of_true_covariances_lie_in_the_honest_range_as_often_as_it_says() {
+fn ratios_of_true_covariances_lie_in_the_acceptance_interval_as_often_as_it_says() {
     let (drives, mut honest) = (400, [[0; 3]; 4]);
     for seed in 0..drives {
         for (length, honest) in Drive::new(640, seed, 1.0)
@@ -108,7 +108,7 @@ fn ratios_of_true_covariances_lie_in_the_honest_range_as_often_as_it_says() {
             .zip(&mut honest)
         {
             for (figure, honest) in parts(&length.all).iter().zip(honest) {
-                let [low, high] = figure.honest_range;
+                let [low, high] = figure.acceptance_interval;
                 *honest += usize::from(low < figure.ratio && figure.ratio < high);
             }
         }
@@ -126,12 +126,12 @@ fn ratios_of_true_covariances_lie_in_the_honest_range_as_often_as_it_says() {
 #[test]
 fn a_long_drive_of_true_covariances_has_the_ratio_one_in_each_half() {
     let nees = Drive::new(12_800, 7, 1.0).nees();
-    let stretches: Vec<_> = nees
+    let segments: Vec<_> = nees
         .by_length
         .iter()
-        .map(|length| (length.motions, length.all.stretches))
+        .map(|length| (length.motions, length.all.segments))
         .collect();
-    assert_eq!(stretches, [(1, 12_800), (4, 3_200), (16, 800), (64, 200)]);
+    assert_eq!(segments, [(1, 12_800), (4, 3_200), (16, 800), (64, 200)]);
     let single = &nees.by_length[0];
     for figure in [
         &single.all,
@@ -163,7 +163,7 @@ fn twice_the_covariance_is_half_the_ratio() {
 }
 
 #[test]
-fn a_drift_that_single_motions_hide_shows_in_long_stretches() {
+fn a_drift_that_single_motions_hide_shows_in_long_segments() {
     let mut drive = Drive::new(6_400, 11, 1.0);
     for motion in &mut drive.motions {
         motion.estimate.motion = disturbed(&motion.estimate.motion, Vector3::new(0.0, 0.0, 4e-4));
@@ -201,7 +201,7 @@ fn a_noisy_truth_is_forgiven_when_it_is_told() {
         },
     );
     for length in &told.by_length {
-        // neighbouring stretches share a pose of the truth, so the ratio scatters a little more than the range says
+        // neighbouring segments share a pose of the truth, so the ratio scatters a little more than the range says
         assert!((length.all.pose.ratio - 1.0).abs() < 0.15, "{told}");
     }
 }
@@ -234,7 +234,7 @@ fn a_band_starts_at_nothing_and_its_yaw_grows_with_the_root_of_time() {
 }
 
 #[test]
-fn stretches_that_no_chain_has_are_left_out() {
+fn segments_that_no_chain_has_are_left_out() {
     let drive = Drive::new(10, 1, 1.0);
     let lengths = [4, 11].into_iter().filter_map(NonZeroUsize::new).collect();
     let nees = nees(
@@ -247,7 +247,7 @@ fn stretches_that_no_chain_has_are_left_out() {
     assert_eq!(
         nees.by_length
             .iter()
-            .map(|l| (l.motions, l.all.stretches))
+            .map(|l| (l.motions, l.all.segments))
             .collect::<Vec<_>>(),
         [(4, 2)]
     );

@@ -3,12 +3,13 @@
 
 mod common;
 
-use common::{drive, pose};
+use common::drive;
 use gyre_evaluation::{
-    Association, Evaluation, Options, PlotError, Pose, Trajectory, evaluate,
+    Association, Evaluation, Options, PlotError, TimedPoses, evaluate,
     plot::{errors_svg, trajectory_svg},
     plot_errors, plot_trajectory,
 };
+use gyre_geometry::{Pose, pose};
 
 fn evaluation(n: usize) -> Evaluation {
     let truth = drive(n, 120.0);
@@ -19,8 +20,8 @@ fn evaluation(n: usize) -> Evaluation {
         ..Options::default()
     };
     evaluate(
-        Trajectory::untimed(&estimate),
-        Trajectory::untimed(&truth),
+        TimedPoses::untimed(&estimate),
+        TimedPoses::untimed(&truth),
         &options,
     )
     .unwrap()
@@ -81,7 +82,7 @@ fn an_estimate_in_another_frame_is_drawn_on_its_truth() {
 #[test]
 fn long_paths_plot_errors_over_length_and_short_ones_over_pairs() {
     let long = errors_svg(&evaluation(400)).unwrap();
-    assert!(long.contains("stretch length (m)") && long.contains("rotation (deg/100 m)"));
+    assert!(long.contains("segment length (m)") && long.contains("rotation (deg/100 m)"));
     let short = errors_svg(&evaluation(20)).unwrap();
     assert!(short.contains("distance travelled (m)") && short.contains("too short"));
 }

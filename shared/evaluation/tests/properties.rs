@@ -5,11 +5,12 @@ mod common;
 
 use std::num::NonZeroUsize;
 
-use common::{any_drive, any_pose, chain, drive, pose};
+use common::{any_drive, any_pose, chain, drive};
 use gyre_evaluation::{
-    Association, Evaluation, MatchedPoses, Options, Pose, STRETCH_LENGTHS_M, Trajectory, align,
-    ate, evaluate, kitti, rpe, seg,
+    Association, Evaluation, MatchedPoses, Options, SEGMENT_LENGTHS_M, TimedPoses, align, ate,
+    evaluate, kitti, rpe, seg,
 };
+use gyre_geometry::{Pose, pose};
 use proptest::prelude::*;
 
 /// What an arc cosine near 1 makes of rounding, degrees: the square root of some hundred ulps.
@@ -36,7 +37,7 @@ fn rechained(poses: &[Pose], change: impl Fn(usize, Pose) -> Pose) -> Vec<Pose> 
 fn kitti_by_walking(estimate: &[Pose], truth: &[Pose], step: usize) -> (f64, f64, usize) {
     let (mut translation, mut rotation, mut n) = (0.0, 0.0, 0);
     for first in (0..truth.len()).step_by(step) {
-        for length in STRETCH_LENGTHS_M {
+        for length in SEGMENT_LENGTHS_M {
             let (mut travelled, mut last) = (0.0, first);
             while travelled <= length && last + 1 < truth.len() {
                 travelled +=
@@ -105,19 +106,19 @@ proptest! {
         let estimate = rechained(&truth, |k, m| pose(
             scale * m.translation.x, 0.1 * (k as f64).sin(), m.rotation.angle() + bias));
         let fast = kitti(&matched(&estimate, &truth), step(every)).unwrap();
-        let (translation, rotation, stretches) = kitti_by_walking(&estimate, &truth, every);
+        let (translation, rotation, segments) = kitti_by_walking(&estimate, &truth, every);
         prop_assert!((fast.translation_percent - translation).abs() < 1e-8);
         prop_assert!((fast.rotation_deg_per_100m - rotation).abs() < ARC_COSINE_DEG);
-        prop_assert_eq!(fast.stretches, stretches);
+        prop_assert_eq!(fast.segments, segments);
         let weighted = |value: fn(&kitti::KittiLength) -> f64| fast.by_length.iter()
-            .map(|l| value(l) * l.stretches as f64).sum::<f64>() / fast.stretches as f64;
+            .map(|l| value(l) * l.segments as f64).sum::<f64>() / fast.segments as f64;
         prop_assert!((weighted(|l| l.translation_percent) - translation).abs() < 1e-8);
         prop_assert!((weighted(|l| l.rotation_deg_per_100m) - rotation).abs() < ARC_COSINE_DEG);
     }
 
     #[test]
     fn a_scale_error_on_a_straight_is_the_translation_error(percent in -5.0..5.0f64) {
-        // steps of 1/8 m are exact in binary, so each stretch ends 1/8 m beyond its length
+        // steps of 1/8 m are exact in binary, so each segment ends 1/8 m beyond its length
         let line = |scale: f64| (0..8000).map(|k| pose(0.125 * f64::from(k) * scale, 0.0, 0.0)).collect::<Vec<_>>();
         let m = matched(&line(1.0 + percent / 100.0), &line(1.0));
         let result = kitti(&m, step(100)).unwrap();
@@ -160,7 +161,7 @@ proptest! {
             .map(|p| moved_by * pose(p.translation.x, -p.translation.y, -p.rotation.angle())).collect();
         let judge = |estimate: &[Pose]| {
             let options = Options { association: Association::Index, ..Options::default() };
-            evaluate(Trajectory::untimed(estimate), Trajectory::untimed(&truth), &options).unwrap()
+            evaluate(TimedPoses::untimed(estimate), TimedPoses::untimed(&truth), &options).unwrap()
         };
         let (plain, found): (Evaluation, Evaluation) = (judge(&estimate), judge(&mirrored));
         prop_assert!(!plain.axes.y_negated && !plain.axes.heading_negated);
@@ -182,8 +183,8 @@ fn interpolation_finds_a_finer_truth_at_the_estimates_stamps() {
         .map(|(p, t)| (*p, *t))
         .unzip();
     let evaluation = evaluate(
-        Trajectory::new(&estimate_ns, &estimate),
-        Trajectory::new(&truth_ns, &truth),
+        TimedPoses::new(&estimate_ns, &estimate),
+        TimedPoses::new(&truth_ns, &truth),
         &Options::default(),
     )
     .unwrap();
@@ -200,8 +201,8 @@ fn a_path_below_100_m_says_so_and_keeps_the_errors_per_pair() {
         ..Options::default()
     };
     let evaluation = evaluate(
-        Trajectory::untimed(&estimate),
-        Trajectory::untimed(&truth),
+        TimedPoses::untimed(&estimate),
+        TimedPoses::untimed(&truth),
         &options,
     )
     .unwrap();
@@ -209,7 +210,7 @@ fn a_path_below_100_m_says_so_and_keeps_the_errors_per_pair() {
     assert!((evaluation.rpe.as_ref().unwrap().translation_rmse_m - 0.1).abs() < 1e-9);
     let table = evaluation.to_string();
     assert!(
-        table.contains("no stretch of the path exceeds 100 m; see the errors per pair"),
+        table.contains("no segment of the path exceeds 100 m; see the errors per pair"),
         "{table}"
     );
     assert!(table.contains("translation 0.1000 m rmse"), "{table}");

@@ -2,8 +2,8 @@
 
 use std::{fs, path::Path, str::FromStr};
 
-use gyre_evaluation::{Motion, UncertainMotion};
-use nalgebra::{Isometry2, Matrix3, Vector2};
+use gyre_evaluation::TimedMotion;
+use gyre_geometry::{UncertainMotion, covariance::unpack, pose};
 
 use crate::Failure;
 
@@ -19,14 +19,14 @@ const COVARIANCE: [&str; 6] = [
 ];
 
 /// The motions of an `odometry.csv`. A covariance that is left empty becomes NaN: a motion that has none.
-pub fn read(path: &Path) -> Result<Vec<Motion>, Failure> {
+pub fn read(path: &Path) -> Result<Vec<TimedMotion>, Failure> {
     let text = fs::read_to_string(path)
         .map_err(|error| format!("cannot read {}: {error}", path.display()))?;
     parse(&text).map_err(|reason| format!("{}{reason}", path.display()).into())
 }
 
 /// As [`read`]; the error goes on where the file's name ended.
-fn parse(text: &str) -> Result<Vec<Motion>, String> {
+fn parse(text: &str) -> Result<Vec<TimedMotion>, String> {
     let mut lines = text.lines();
     let header: Vec<&str> = lines
         .next()
@@ -66,7 +66,7 @@ struct Columns {
 }
 
 impl Columns {
-    fn motion(&self, fields: &[&str]) -> Result<Motion, String> {
+    fn motion(&self, fields: &[&str]) -> Result<TimedMotion, String> {
         let [to_ns, interval_ns] = values::<i64, 2>(fields, self.times)?;
         let [x, y, yaw] = values::<f64, 3>(fields, self.motion)?;
         let or_none = self.covariance.map(|column| {
@@ -76,13 +76,12 @@ impl Columns {
                 fields[column]
             }
         });
-        let [xx, xy, xyaw, yy, yyaw, yawyaw] = values::<f64, 6>(&or_none, [0, 1, 2, 3, 4, 5])?;
-        let covariance = Matrix3::new(xx, xy, xyaw, xy, yy, yyaw, xyaw, yyaw, yawyaw);
-        let motion = Isometry2::new(Vector2::new(x, y), yaw);
+        let covariance = unpack(&values(&or_none, [0, 1, 2, 3, 4, 5])?);
+        let motion = pose(x, y, yaw);
         let from_ns = to_ns
             .checked_sub(interval_ns)
             .ok_or("interval_ns is none")?;
-        Ok(Motion {
+        Ok(TimedMotion {
             from_ns,
             to_ns,
             estimate: UncertainMotion { motion, covariance },

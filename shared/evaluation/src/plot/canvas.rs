@@ -125,7 +125,7 @@ pub struct Entry<'a> {
 
 /// How a legend shows its entry.
 pub enum Symbol {
-    /// A stretch of a line.
+    /// A segment of a line.
     Line(ShapeStyle),
     /// A filled area.
     Area(RGBColor),

@@ -10,7 +10,7 @@ const SIZE: (u32, u32) = (900, 640);
 /// Free room above the largest error, as a share of it.
 const HEADROOM: f64 = 0.12;
 
-/// The plot as an SVG document: over stretch length where there are KITTI errors, otherwise of each pair over the
+/// The plot as an SVG document: over segment length where there are KITTI errors, otherwise of each pair over the
 /// distance travelled.
 ///
 /// # Errors
@@ -32,19 +32,19 @@ fn by_length(kitti: &Kitti) -> Result<String, PlotError> {
             .collect()
     };
     let caption = format!(
-        "mean over {} stretches, step {}: {:.2} %, {:.2} deg/100 m (dashed)",
-        kitti.stretches, kitti.step, kitti.translation_percent, kitti.rotation_deg_per_100m
+        "mean over {} segments, step {}: {:.2} %, {:.2} deg/100 m (dashed)",
+        kitti.segments, kitti.step, kitti.translation_percent, kitti.rotation_deg_per_100m
     );
     let longest = kitti.by_length.last().map_or(100.0, |l| l.length_m);
     let panel = |y_desc, values, mean| Panel {
-        x_desc: "stretch length (m)",
+        x_desc: "segment length (m)",
         y_desc,
         values,
         mean: Some(mean),
         x: 50.0..longest + 50.0,
     };
     draw(
-        "Error over stretch length",
+        "Error over segment length",
         &caption,
         [
             panel(
@@ -66,7 +66,7 @@ fn by_pair(rpe: &Rpe) -> Result<String, PlotError> {
         rpe.pairs.iter().map(|p| (p.distance_m, value(p))).collect()
     };
     let caption = format!(
-        "{} pairs, path too short for 100 m stretches; rmse {:.3} m, {:.3} deg (dashed)",
+        "{} pairs, path too short for 100 m segments; rmse {:.3} m, {:.3} deg (dashed)",
         rpe.pairs.len(),
         rpe.translation_rmse_m,
         rpe.rotation_rmse_deg

@@ -16,7 +16,9 @@ pub use bands::bands_svg;
 pub use errors::errors_svg;
 pub use trajectory::trajectory_svg;
 
-use crate::{Bands, Evaluation, EvaluationError, MatchedPoses, Pose};
+use gyre_geometry::Pose;
+
+use crate::{Bands, Evaluation, EvaluationError, MatchedPoses};
 
 /// Why a plot was not made.
 #[derive(Debug, thiserror::Error)]

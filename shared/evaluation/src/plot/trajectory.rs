@@ -1,10 +1,11 @@
 //! The trajectory seen from above.
 
+use gyre_geometry::Pose;
 use plotters::prelude::*;
 
 use super::{PlotError, canvas::*};
 use crate::{
-    MatchedPoses, Pose, Side, ate,
+    MatchedPoses, Side, ate,
     matched::{path_m, require_poses},
 };
 

@@ -1,13 +1,8 @@
 //! Drives for tests.
 #![allow(dead_code)] // no test uses all of it
 
-use gyre_evaluation::Pose;
+use gyre_geometry::{Pose, pose};
 use proptest::prelude::*;
-
-/// The pose (x, y, yaw).
-pub fn pose(x_m: f64, y_m: f64, yaw_rad: f64) -> Pose {
-    Pose::new(nalgebra::Vector2::new(x_m, y_m), yaw_rad)
-}
 
 /// Chains motions from `start`.
 pub fn chain(start: Pose, motions: impl IntoIterator<Item = Pose>) -> Vec<Pose> {
@@ -20,7 +15,7 @@ pub fn chain(start: Pose, motions: impl IntoIterator<Item = Pose>) -> Vec<Pose> 
     poses
 }
 
-/// A drive of `n` motions of 2.37 m (no stretch ends on a whole number of them) with bends that repeat every `bend` motions, more to the left.
+/// A drive of `n` motions of 2.37 m (no segment ends on a whole number of them) with bends that repeat every `bend` motions, more to the left.
 pub fn drive(n: usize, bend: f64) -> Vec<Pose> {
     let turn = |k: usize| 0.03 * (k as f64 * std::f64::consts::TAU / bend).sin() + 0.003;
     chain(

@@ -6,9 +6,10 @@
 
 use std::fmt;
 
+use gyre_geometry::Pose;
 use serde::Serialize;
 
-use crate::{MatchedPoses, Pose, ate::aligned_rmse_m};
+use crate::{MatchedPoses, ate::aligned_rmse_m};
 
 /// What had to change sign in the estimate to agree with the truth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -223,7 +224,7 @@ impl fmt::Display for Axes {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::pose;
+    use gyre_geometry::pose;
 
     /// A drive with bends to both sides, more to the left, that ends elsewhere.
     fn drive() -> Vec<Pose> {

@@ -1,38 +1,38 @@
-//! The stretches of 100 to 800 m that KITTI and seg average over.
+//! The segments of 100 to 800 m that KITTI and seg average over.
 
 use std::num::NonZeroUsize;
 
 /// The nominal lengths, m.
-pub const STRETCH_LENGTHS_M: [f64; 8] = [100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0];
+pub const SEGMENT_LENGTHS_M: [f64; 8] = [100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0];
 
-/// One stretch: from pose `first` to pose `last`, both included.
+/// One segment: from pose `first` to pose `last`, both included.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Stretch {
+pub(crate) struct Segment {
     pub first: usize,
     pub last: usize,
-    /// Index into [`STRETCH_LENGTHS_M`].
+    /// Index into [`SEGMENT_LENGTHS_M`].
     pub length: usize,
 }
 
-impl Stretch {
+impl Segment {
     /// The nominal length, m: errors are divided by it, not by the way actually travelled.
     pub fn length_m(self) -> f64 {
-        STRETCH_LENGTHS_M[self.length]
+        SEGMENT_LENGTHS_M[self.length]
     }
 }
 
-/// All stretches that begin at every `step`-th pose and end at the first pose *beyond* the nominal length.
+/// All segments that begin at every `step`-th pose and end at the first pose *beyond* the nominal length.
 ///
 /// `distance_m` grows (weakly) from pose to pose. A length that the rest of the path does not exceed is skipped.
-pub(crate) fn stretches(
+pub(crate) fn segments(
     distance_m: &[f64],
     step: NonZeroUsize,
-) -> impl Iterator<Item = Stretch> + '_ {
+) -> impl Iterator<Item = Segment> + '_ {
     let ends = move |first: usize| {
-        (0..STRETCH_LENGTHS_M.len()).filter_map(move |length| {
-            let limit = distance_m[first] + STRETCH_LENGTHS_M[length];
+        (0..SEGMENT_LENGTHS_M.len()).filter_map(move |length| {
+            let limit = distance_m[first] + SEGMENT_LENGTHS_M[length];
             let last = first + distance_m[first..].partition_point(|&d| d <= limit);
-            (last < distance_m.len()).then_some(Stretch {
+            (last < distance_m.len()).then_some(Segment {
                 first,
                 last,
                 length,
@@ -42,18 +42,18 @@ pub(crate) fn stretches(
     (0..distance_m.len()).step_by(step.get()).flat_map(ends)
 }
 
-/// Sums and counts for each nominal length, in [`STRETCH_LENGTHS_M`]'s order.
+/// Sums and counts for each nominal length, in [`SEGMENT_LENGTHS_M`]'s order.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PerLength<const N: usize> {
-    sums: [[f64; N]; STRETCH_LENGTHS_M.len()],
-    counts: [usize; STRETCH_LENGTHS_M.len()],
+    sums: [[f64; N]; SEGMENT_LENGTHS_M.len()],
+    counts: [usize; SEGMENT_LENGTHS_M.len()],
 }
 
 impl<const N: usize> PerLength<N> {
     pub fn new() -> Self {
         Self {
-            sums: [[0.0; N]; STRETCH_LENGTHS_M.len()],
-            counts: [0; STRETCH_LENGTHS_M.len()],
+            sums: [[0.0; N]; SEGMENT_LENGTHS_M.len()],
+            counts: [0; SEGMENT_LENGTHS_M.len()],
         }
     }
 
@@ -64,7 +64,7 @@ impl<const N: usize> PerLength<N> {
         }
     }
 
-    /// Mean over all stretches of all lengths, and their count; `None` without a stretch.
+    /// Mean over all segments of all lengths, and their count; `None` without a segment.
     pub fn mean(&self) -> Option<([f64; N], usize)> {
         let count: usize = self.counts.iter().sum();
         let total = |value: usize| self.sums.iter().map(|s| s[value]).sum::<f64>();
@@ -76,9 +76,9 @@ impl<const N: usize> PerLength<N> {
         })
     }
 
-    /// Nominal length (m), mean and count of each length that has stretches.
+    /// Nominal length (m), mean and count of each length that has segments.
     pub fn means(&self) -> impl Iterator<Item = (f64, [f64; N], usize)> + '_ {
-        let lengths = STRETCH_LENGTHS_M.iter().zip(&self.sums).zip(&self.counts);
+        let lengths = SEGMENT_LENGTHS_M.iter().zip(&self.sums).zip(&self.counts);
         lengths
             .filter(|(_, count)| **count > 0)
             .map(|((&length_m, sums), &count)| {
@@ -94,25 +94,25 @@ mod tests {
     const EVERY: NonZeroUsize = NonZeroUsize::MIN;
 
     #[test]
-    fn a_stretch_ends_strictly_beyond_its_length() {
+    fn a_segment_ends_strictly_beyond_its_length() {
         let distance = [0.0, 100.0, 100.0, 101.0];
-        let found: Vec<_> = stretches(&distance, EVERY).collect();
+        let found: Vec<_> = segments(&distance, EVERY).collect();
         assert_eq!(
             found,
-            [Stretch {
+            [Segment {
                 first: 0,
                 last: 3,
                 length: 0
             }]
         );
-        assert_eq!(stretches(&[0.0, 100.0], EVERY).count(), 0);
+        assert_eq!(segments(&[0.0, 100.0], EVERY).count(), 0);
     }
 
     #[test]
     fn every_length_that_the_path_exceeds_starts_at_every_step() {
         let distance: Vec<f64> = (0..=250).map(f64::from).collect();
         let step = NonZeroUsize::new(50).unwrap_or(EVERY);
-        let found: Vec<_> = stretches(&distance, step)
+        let found: Vec<_> = segments(&distance, step)
             .map(|s| (s.first, s.last, s.length))
             .collect();
         assert_eq!(
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn means_leave_out_lengths_without_a_stretch() {
+    fn means_leave_out_lengths_without_a_segment() {
         let mut per_length = PerLength::<1>::new();
         assert_eq!(per_length.mean(), None);
         per_length.add(0, [1.0]);
