@@ -10,8 +10,9 @@ use std::{
 };
 
 use common::{Ended, Run, gyre, recording};
+use gyre_geometry::Twist;
 use gyre_radar::{
-    Trajectory, Twist,
+    Trajectory,
     ground_truth::{find_ground_truth, write_tum},
     read_trajectory,
 };

@@ -12,8 +12,8 @@ use std::{
 };
 
 use common::{Ended, Run, gyre, recording};
+use gyre_geometry::Twist;
 use gyre_masking::runtime;
-use gyre_radar::Twist;
 use nalgebra::{Isometry2, Vector2};
 use tempfile::TempDir;
 

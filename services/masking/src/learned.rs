@@ -1,7 +1,8 @@
 //! Masks that a network makes: of each scan alone, or of each scan and the one before, for this pair.
 
+use gyre_geometry::Twist;
 use gyre_messages::MaskedHeader;
-use gyre_radar::raster::{RasterConfig, Twist};
+use gyre_radar::RasterConfig;
 
 use crate::{
     MaskError, MaskingConfig,

@@ -16,10 +16,11 @@ mod tests;
 
 use std::time::Duration;
 
+use gyre_geometry::{SparsePoint, Twist};
 use gyre_messages::{Masked, MaskedHeader, SearchedMotion, mask_kind};
 use gyre_radar::{
-    Point, PointExtractor, PointsConfig, PointsError, PolarScan, ScanError,
-    raster::{RasterConfig, RasterError, Twist},
+    PointExtractor, PointsConfig, PointsError, PolarScan, ScanError,
+    raster::{RasterConfig, RasterError},
 };
 use gyre_stage::{
     Launch, Stage, StageError, Statistics,
@@ -128,9 +129,9 @@ impl Masker {
     ) -> Result<Option<Twist>, MaskError> {
         let (cells, actual) = (self.raster.n * self.raster.n, out.len());
         match (&mut self.learned, out.get_mut(..cells)) {
-            (_, None) => Err(RasterError::OutputLength {
-                expected: cells,
-                actual,
+            (_, None) => Err(RasterError::Shape {
+                n: self.raster.n,
+                actual: [1, actual],
             }
             .into()),
             (None, Some(raster)) => Ok(self.rasters.make(sweep, raster)?),
@@ -148,7 +149,7 @@ impl Masker {
         &mut self,
         scan: &PolarScan<'_>,
         twist: Option<Twist>,
-        out: &mut [Point],
+        out: &mut [SparsePoint],
     ) -> Result<usize, ScanError> {
         let count = self.points.extract(scan, self.config.floor(), out)?;
         if let Some(learned) = self
@@ -172,7 +173,7 @@ impl Masker {
     }
 
     /// The cell of a raster compensated by `twist` that a point of the scan lies in, row by row; `None` outside of the raster.
-    pub fn cell_of(&self, point: &Point, twist: Option<Twist>) -> Option<usize> {
+    pub fn cell_of(&self, point: &SparsePoint, twist: Option<Twist>) -> Option<usize> {
         self.frame(twist).cell_of(point)
     }
 
@@ -224,7 +225,7 @@ impl Stage for Masker {
             values.split_at_mut(self.rasters() * MaskedHeader::raster_values(cells));
         let twist = self.mask(&sweep, before.as_ref(), rasters);
         let twist = twist.map_err(|e| input.scan.malformed(e.to_string()))?;
-        let points = self.points(&sweep.scan, twist, points.as_chunks_mut().0);
+        let points = self.points(&sweep.scan, twist, MaskedHeader::points_mut(points));
         let points = points.map_err(|e| input.scan.malformed(e.to_string()))?;
         self.write_header(header, twist, points);
         if self.config.stress_delay_ms > 0 {

@@ -47,7 +47,7 @@ pub struct RasterFacts {
     /// How a cell's value came from the bins.
     pub sampling: Option<Sampling>,
     /// Metres around the radar that were left out.
-    pub minimum_range_m: Option<f32>,
+    pub min_range_m: Option<f32>,
     /// Width, in cells, of what [`Sampling::Averaged`] averaged over.
     pub averaged_cells: Option<f32>,
 }
@@ -203,9 +203,9 @@ impl Card {
                 masking.undo_doppler,
             ),
             unlike(
-                "raster.minimum_range_m",
-                self.raster.minimum_range_m,
-                raster.minimum_range_m,
+                "raster.min_range_m",
+                self.raster.min_range_m,
+                raster.min_range_m,
             ),
             unlike("raster.sampling", self.raster.sampling, raster.sampling),
             averaged

@@ -1,6 +1,6 @@
 //! A mask on the sparse points.
 
-use gyre_radar::{Point, raster::Twist};
+use gyre_geometry::{SparsePoint, Twist};
 use nalgebra::{Isometry2, Point2};
 
 /// How a scan's raster was made, as far as it tells where a point lies in it.
@@ -19,12 +19,12 @@ pub(crate) struct Frame {
 impl Frame {
     /// Multiplies each point's weight by the mask (`n * n` factors) at the cell that the point lies in, raised to `exponent`.
     /// What lies outside of the raster keeps its weight.
-    pub fn weigh(&self, mask: &[f32], exponent: f32, points: &mut [Point]) {
+    pub fn weigh(&self, mask: &[f32], exponent: f32, points: &mut [SparsePoint]) {
         // The points of an azimuth have one time.
-        for points in points.chunk_by_mut(|a, b| a[2] == b[2]) {
+        for points in points.chunk_by_mut(|a, b| a.time_s == b.time_s) {
             let sensor = self.sensor_at(&points[0]);
             for point in points {
-                point[3] *= self
+                point.weight *= self
                     .cell_seen_from(sensor, point)
                     .map_or(1.0, |cell| mask[cell].powf(exponent));
             }
@@ -32,28 +32,24 @@ impl Frame {
     }
 
     /// The cell that a point lies in, row by row; `None` outside of the raster.
-    pub fn cell_of(&self, point: &Point) -> Option<usize> {
+    pub fn cell_of(&self, point: &SparsePoint) -> Option<usize> {
         self.cell_seen_from(self.sensor_at(point), point)
     }
 
     /// Where the sensor was in the raster's frame when it saw the point.
-    fn sensor_at(&self, [.., time_s, _, _]: &Point) -> Option<Isometry2<f64>> {
-        self.twist.map(|twist| twist.pose_at((*time_s).into()))
+    fn sensor_at(&self, point: &SparsePoint) -> Option<Isometry2<f64>> {
+        self.twist.map(|twist| twist.pose_at(point.time_s.into()))
     }
 
-    fn cell_seen_from(
-        &self,
-        sensor: Option<Isometry2<f64>>,
-        &[x_m, y_m, _, _, doppler_s]: &Point,
-    ) -> Option<usize> {
+    fn cell_seen_from(&self, sensor: Option<Isometry2<f64>>, point: &SparsePoint) -> Option<usize> {
         let seen = self.approached(
-            Point2::new(f64::from(x_m), f64::from(y_m)),
-            doppler_s.into(),
+            Point2::new(f64::from(point.x_m), f64::from(point.y_m)),
+            point.doppler_s.into(),
         );
         self.cell(sensor.map_or(seen, |sensor| sensor * seen))
     }
 
-    /// Where a point is with Doppler's shift undone, if it is undone: see [`Point`].
+    /// Where a point is with Doppler's shift undone, if it is undone: see [`SparsePoint`].
     fn approached(&self, seen: Point2<f64>, doppler_s: f64) -> Point2<f64> {
         match self.twist.filter(|_| self.doppler_undone) {
             Some(twist) => {
@@ -101,9 +97,9 @@ mod tests {
     ) -> f32 {
         let mut mask = [1.0; 25];
         mask[row * 5 + column] = 0.5;
-        let mut points = [[x_m, y_m, time_s, 1.0, doppler_s]];
+        let mut points = [[x_m, y_m, time_s, 1.0, doppler_s].into()];
         frame.weigh(&mask, 1.0, &mut points);
-        points[0][3]
+        points[0].weight
     }
 
     #[test]
@@ -122,17 +118,17 @@ mod tests {
             [0.0, -5.1],
             [f32::NAN, 0.0],
         ] {
-            let mut points = [[place[0], place[1], 0.0, 0.7, 0.0]];
+            let mut points = [[place[0], place[1], 0.0, 0.7, 0.0].into()];
             FRAME.weigh(&[0.0; 25], 1.0, &mut points);
-            assert_eq!(points[0][3], 0.7, "{place:?}");
+            assert_eq!(points[0].weight, 0.7, "{place:?}");
         }
     }
 
     #[test]
     fn the_exponent_compresses_the_mask() {
-        let mut points = [[0.0, 0.0, 0.0, 0.8, 0.0]];
+        let mut points = [[0.0, 0.0, 0.0, 0.8, 0.0].into()];
         FRAME.weigh(&[0.25; 25], 0.5, &mut points);
-        assert_eq!(points[0][3], 0.4);
+        assert_eq!(points[0].weight, 0.4);
     }
 
     #[test]
@@ -197,12 +193,12 @@ mod tests {
             cell_m: frame.cell_m,
             ..RasterConfig::default()
         };
-        let mut raster = vec![0.0; frame.n * frame.n];
+        let mut raster = ndarray::Array2::zeros((frame.n, frame.n));
         Rasteriser::new(&config)
             .unwrap()
-            .rasterise(&scan.view(), 60, Some(twist), &mut raster)
+            .rasterise(&scan.view(), 60, Some(twist), raster.view_mut())
             .unwrap();
-        let mut points = vec![[0.0; 5]; 8192];
+        let mut points = vec![SparsePoint::default(); 8192];
         let config = PointsConfig {
             max_range_m: 100.0,
             ..PointsConfig::default()
@@ -218,7 +214,7 @@ mod tests {
             .collect();
         let mut weighed = points[..count].to_vec();
         frame.weigh(&lit, 1.0, &mut weighed);
-        weighed.iter().filter(|point| point[3] > 0.0).count() as f32 / count as f32
+        weighed.iter().filter(|point| point.weight > 0.0).count() as f32 / count as f32
     }
 
     #[test]

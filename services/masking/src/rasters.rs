@@ -1,11 +1,13 @@
 //! Rasters before any network: above the floor, and with the sweep's distortion undone.
 
+use gyre_geometry::Twist;
 use gyre_messages::SearchedMotion;
 use gyre_radar::{
     PolarScan,
-    raster::{RasterConfig, RasterError, Rasteriser, Twist},
+    raster::{RasterConfig, RasterError, Rasteriser},
 };
 use nalgebra::{Isometry2, Vector2};
+use ndarray::ArrayViewMut2;
 
 use crate::MaskingConfig;
 
@@ -45,6 +47,10 @@ impl Rasters {
         sweep: &Sweep<'_>,
         cells: &mut [f32],
     ) -> Result<Option<Twist>, RasterError> {
+        let n = self.rasteriser.config().n;
+        let actual = [1, cells.len()];
+        let mut raster = ArrayViewMut2::from_shape((n, n), cells)
+            .map_err(|_| RasterError::Shape { n, actual })?;
         let mut scan = sweep.scan;
         if !self.undo_doppler {
             scan.geometry.doppler_s = 0.0;
@@ -52,7 +58,7 @@ impl Rasters {
         if let Some(twist) = sweep.motion.filter(|_| self.compensate).map(twist_of) {
             match self
                 .rasteriser
-                .rasterise(&scan, self.floor, Some(twist), cells)
+                .rasterise(&scan, self.floor, Some(twist), raster.view_mut())
             {
                 Ok(()) => return Ok(Some(twist)),
                 // A motion that no vehicle makes is a wrong match: better no compensation than that.
@@ -60,7 +66,7 @@ impl Rasters {
                 Err(error) => return Err(error),
             }
         }
-        self.rasteriser.rasterise(&scan, self.floor, None, cells)?;
+        self.rasteriser.rasterise(&scan, self.floor, None, raster)?;
         Ok(None)
     }
 }

@@ -80,9 +80,9 @@ fn points_start_above_the_masks_floor() {
             ..PointsConfig::default()
         };
         let mut masker = Masker::new(&RasterConfig::default(), &points, config).unwrap();
-        let mut out = vec![[0.0; 5]; points.capacity];
+        let mut out = vec![SparsePoint::default(); points.capacity];
         let count = masker.points(&wall().view(), None, &mut out).unwrap();
-        (count, out[0][3])
+        (count, out[0].weight)
     };
     assert_eq!(
         count(&MaskingConfig::default()),

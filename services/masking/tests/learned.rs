@@ -132,7 +132,7 @@ fn points_are_weighed_by_the_masks_of_their_cells() {
     let points = |config: &MaskingConfig| {
         let (mut masker, (mut out, _)) = (masker(config), room());
         let twist = masker.mask(&sweep, None, &mut out).unwrap();
-        let mut points = vec![[0.0; 5]; 8192];
+        let mut points = vec![gyre_geometry::SparsePoint::default(); 8192];
         let count = masker.points(&sweep.scan, twist, &mut points).unwrap();
         points.truncate(count);
         points
@@ -149,7 +149,7 @@ fn points_are_weighed_by_the_masks_of_their_cells() {
         let index = |metres: f32| (N as f32 / 2.0 - metres / 0.8).floor();
         let mut inside = 0;
         for (weighed, plain) in weighed.iter().zip(&plain) {
-            let (row, column) = (index(plain[0]), index(plain[1]));
+            let (row, column) = (index(plain.x_m), index(plain.y_m));
             let is_inside = row.min(column) >= 0.0 && row.max(column) < N as f32;
             let factor = if is_inside {
                 mask[row as usize * N + column as usize].sqrt()
@@ -157,7 +157,7 @@ fn points_are_weighed_by_the_masks_of_their_cells() {
                 1.0
             };
             assert!(
-                (weighed[3] - factor * plain[3]).abs() < 1e-5,
+                (weighed.weight - factor * plain.weight).abs() < 1e-5,
                 "{weighed:?}, {plain:?}"
             );
             inside += usize::from(is_inside);

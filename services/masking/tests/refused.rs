@@ -316,11 +316,10 @@ fn what_the_network_was_not_trained_for_is_named() {
         card("undo_doppler = false").unlike_training(&config, &raster()),
         ["masking.undo_doppler is true instead of false"]
     );
-    let facts =
-        "cell_m = 0.8\nsampling = \"averaged\"\naveraged_cells = 2.0\nminimum_range_m = 3.0";
+    let facts = "cell_m = 0.8\nsampling = \"averaged\"\naveraged_cells = 2.0\nmin_range_m = 3.0";
     let (_folder, path) = changed("single-31", "cell_m = 0.8", facts);
     let card = Card::read(&learned(&path)).unwrap();
-    let nearer = "raster.minimum_range_m is 2 instead of 3";
+    let nearer = "raster.min_range_m is 2 instead of 3";
     assert_eq!(
         card.unlike_training(&config, &raster()),
         [nearer, "raster.averaged_cells is 1 instead of 2"]

@@ -2,12 +2,13 @@
 
 pub mod checkpoint;
 
+use gyre_geometry::SparsePoint;
 use gyre_messages::{
     Item, Masked, MaskedHeader, Motion, MotionEstimate, Refined, Refinement as Record, flag,
     hypothesis, outcome,
 };
 use gyre_radar::PointsConfig;
-use gyre_scan_matching::{Hypothesis, Outcome, Refinement, RefinementConfig, ScanPoint};
+use gyre_scan_matching::{Hypothesis, Outcome, Refinement, RefinementConfig};
 use gyre_stage::{
     Launch, Stage, StageError, Statistics,
     inputs::{Joined, JoinedView},
@@ -99,8 +100,8 @@ impl Refiner {
 pub fn refine(
     refinement: &mut Refinement,
     seq: u64,
-    later: &[ScanPoint],
-    earlier: &[ScanPoint],
+    later: &[SparsePoint],
+    earlier: &[SparsePoint],
     motion: &MotionEstimate,
 ) -> MotionEstimate {
     let searched = Isometry2::new(Vector2::new(motion.x_m, motion.y_m), motion.yaw_rad);
@@ -142,7 +143,7 @@ pub fn refine(
     }
 }
 
-fn points(masked: &Received<Masked>) -> Result<&[ScanPoint], StageError> {
+fn points(masked: &Received<Masked>) -> Result<&[SparsePoint], StageError> {
     let header: &MaskedHeader = masked.header();
     header
         .points(masked.values())

@@ -3,8 +3,9 @@
 
 use std::{fs, path::Path};
 
+use gyre_geometry::SparsePoint;
 use gyre_refinement::checkpoint::{self, Checkpoint, CheckpointError};
-use gyre_scan_matching::{Memory, Refinement, RefinementConfig, ScanPoint};
+use gyre_scan_matching::{Memory, Refinement, RefinementConfig};
 use nalgebra::{Isometry2, Vector2};
 
 const WINDOW: usize = 8;
@@ -36,7 +37,7 @@ fn open(path: &Path) -> Checkpoint {
 }
 
 /// What a drive of a metre a scan sees of a world.
-fn scan(world: u64, item: u64) -> Vec<ScanPoint> {
+fn scan(world: u64, item: u64) -> Vec<SparsePoint> {
     let spread = |k: u64, salt: u64| {
         let mixed = (k + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15 ^ salt ^ world << 40);
         (mixed ^ mixed >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 40
@@ -50,7 +51,7 @@ fn scan(world: u64, item: u64) -> Vec<ScanPoint> {
     };
     let visible = (0..1500).map(place).filter(|[x, y]| x.hypot(*y) < 35.0);
     visible
-        .map(|[x, y]| [x as f32, y as f32, 0.0, 0.7, 0.0])
+        .map(|[x, y]| [x as f32, y as f32, 0.0, 0.7, 0.0].into())
         .take(512)
         .collect()
 }

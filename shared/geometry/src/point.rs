@@ -21,6 +21,20 @@ pub struct SparsePoint {
     pub doppler_s: f32,
 }
 
+/// A point from its fields in their order.
+impl From<[f32; 5]> for SparsePoint {
+    fn from(fields: [f32; 5]) -> Self {
+        bytemuck::cast(fields)
+    }
+}
+
+/// The fields of a point in their order.
+impl From<SparsePoint> for [f32; 5] {
+    fn from(point: SparsePoint) -> Self {
+        bytemuck::cast(point)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use gyre_radar::Point;
+use gyre_geometry::SparsePoint;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -140,7 +140,8 @@ impl Limits {
         match topic {
             "scan" => ByteBlock::count(self.scan_bytes),
             "masked" => {
-                let points = FloatBlock::count(self.points * size_of::<Point>() / size_of::<f32>());
+                let points =
+                    FloatBlock::count(self.points * size_of::<SparsePoint>() / size_of::<f32>());
                 self.rasters * FloatBlock::count(self.raster_cells) + points
             }
             _ => 1,

@@ -1,7 +1,7 @@
 //! `masked`: Cartesian rasters with what would mislead the search taken out, and the scan's sparse points.
 
 use bytemuck::{Pod, Zeroable};
-use gyre_radar::Point;
+use gyre_geometry::SparsePoint;
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
@@ -63,15 +63,16 @@ impl MaskedHeader {
         FloatBlock::count(cells) * FloatBlock::LEN
     }
 
-    /// The scan's points, each `[x_m, y_m, time_s, weight, doppler_s]`: see `gyre_radar::Point`. `None` where the payload
-    /// is shorter than the header says.
-    pub fn points<'a>(&self, values: &'a [f32]) -> Option<&'a [Point]> {
+    /// The scan's points. `None` where the payload is shorter than the header says.
+    pub fn points<'a>(&self, values: &'a [f32]) -> Option<&'a [SparsePoint]> {
         let first = (self.rasters as usize).checked_mul(Self::raster_values(self.cells()))?;
-        values
-            .get(first..)?
-            .as_chunks()
-            .0
-            .get(..self.points as usize)
+        let (points, _) = values.get(first..)?.as_chunks::<5>();
+        Some(bytemuck::cast_slice(points.get(..self.points as usize)?))
+    }
+
+    /// Room for points: as many as the values behind the rasters hold.
+    pub fn points_mut(values: &mut [f32]) -> &mut [SparsePoint] {
+        bytemuck::cast_slice_mut(values.as_chunks_mut::<5>().0)
     }
 
     /// The rasters to compare: this scan's, and that of the scan before, which is the second one here where the mask looked
@@ -147,10 +148,11 @@ mod tests {
         let expected = [
             [16.0, 17.0, 18.0, 19.0, 20.0],
             [21.0, 22.0, 23.0, 24.0, 25.0],
-        ];
+        ]
+        .map(SparsePoint::from);
         assert_eq!(one.points(&values), Some(expected.as_slice()));
         let two = MaskedHeader { rasters: 2, ..one };
-        assert_eq!(two.points(&values).map(|points| points[0][0]), Some(32.0));
+        assert_eq!(two.points(&values).map(|points| points[0].x_m), Some(32.0));
         assert_eq!(MaskedHeader { points: 4, ..two }.points(&values), None);
         assert_eq!(
             MaskedHeader {

@@ -3,6 +3,7 @@
 //!
 //! `cargo run --release -p gyre-radar --example points_bench`
 
+use gyre_geometry::SparsePoint;
 use gyre_radar::{DatasetOptions, OwnedScan, PointExtractor, PointsConfig};
 use std::error::Error;
 use std::path::Path;
@@ -52,7 +53,7 @@ fn first_scans(folder: &Path) -> Result<Vec<OwnedScan>, Box<dyn Error>> {
 fn measure(scans: &[OwnedScan], floor: u8) -> Result<(usize, f64), Box<dyn Error>> {
     let config = PointsConfig::default();
     let mut extractor = PointExtractor::new(&config)?;
-    let mut out = vec![[0.0; 5]; config.capacity];
+    let mut out = vec![SparsePoint::default(); config.capacity];
     let (mut counts, mut times) = (Vec::new(), Vec::new());
     // Repetitions outside, so that each scan has left the cache when its turn comes again.
     for _ in 0..REPETITIONS {

@@ -3,10 +3,11 @@
 //!
 //! `cargo run --release -p gyre-radar --example raster_bench`
 
+use gyre_geometry::Twist;
 use gyre_radar::{
-    DatasetOptions, OwnedScan, RasterConfig, Rasteriser, Sampling, ScanLimits, Sense,
-    SweepGeometry, Twist,
+    DatasetOptions, OwnedScan, RasterConfig, Rasteriser, Sampling, ScanLimits, Sense, SweepGeometry,
 };
+use ndarray::Array2;
 use std::error::Error;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -58,11 +59,11 @@ fn median_ms(
     twist: Option<Twist>,
 ) -> Result<f64, Box<dyn Error>> {
     let mut rasteriser = Rasteriser::new(config)?;
-    let mut raster = vec![0.0; config.n * config.n];
+    let mut raster = Array2::zeros((config.n, config.n));
     let mut times = Vec::<Duration>::with_capacity(REPETITIONS);
     for _ in 0..REPETITIONS {
         let start = Instant::now();
-        rasteriser.rasterise(&scan.view(), FLOOR, twist, &mut raster)?;
+        rasteriser.rasterise(&scan.view(), FLOOR, twist, raster.view_mut())?;
         times.push(start.elapsed());
     }
     times.sort_unstable();

@@ -11,6 +11,7 @@
 pub mod dataset;
 pub mod ground_truth;
 pub mod inspect;
+mod median;
 pub mod points;
 pub mod raster;
 pub mod scan;
@@ -24,8 +25,9 @@ pub use ground_truth::{
     TrajectoryError, find_ground_truth, read_trajectory, write_kitti, write_tum,
 };
 pub use inspect::{Report, inspect};
-pub use points::{Point, PointExtractor, PointsConfig, PointsError};
-pub use raster::{RasterConfig, RasterError, Rasteriser, Sampling, Twist};
+pub use median::median;
+pub use points::{PointExtractor, PointsConfig, PointsError};
+pub use raster::{RasterConfig, RasterError, Rasteriser, Sampling};
 pub use scan::{
     MAX_AZIMUTHS, OwnedScan, PolarScan, ScanError, ScanLimits, ScanSlot, Sense, SweepGeometry,
 };

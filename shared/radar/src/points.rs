@@ -14,21 +14,10 @@ mod range_cells;
 mod tests;
 
 use crate::scan::{PolarScan, ScanError, Sense};
+use gyre_geometry::SparsePoint;
 use peaks::{Beam, Peak};
 use range_cells::RangeCells;
 use serde::{Deserialize, Serialize};
-
-/// One return: `[x_m, y_m, time_s, weight, doppler_s]`.
-///
-/// - `x_m`, `y_m`: where it is in the sensor's own frame at the moment when its azimuth was measured, metres, x forward
-///   and y left. Neither the sweep's motion nor Doppler's shift is undone.
-/// - `time_s`: that moment, seconds from the scan's stamp.
-/// - `weight`: power above the floor over [`PointsConfig::weight_cap`], in `(0, 1]`. A learned mask multiplies it by
-///   its own factor afterwards, which may be 0.
-/// - `doppler_s`: metres to add to the range for each m/s at which the sensor approaches the point
-///   ([`PolarScan::doppler_s`]). With `u` the direction to the point and `v` the sensor's velocity, the point truly lay
-///   at `(x, y) + doppler_s (u . v) u`.
-pub type Point = [f32; 5];
 
 /// The most points that may be asked for.
 pub const MAX_POINTS: usize = 65_536;
@@ -157,8 +146,9 @@ impl PointExtractor {
     }
 
     /// Writes the points of `scan` whose power is above `floor` to the start of `out`, azimuth by azimuth and outward.
-    /// Returns how many there are: at most [`PointsConfig::capacity`] and `out.len()`. Azimuths that were not measured
-    /// give none and outshine none.
+    /// A point's weight is its power above the floor over [`PointsConfig::weight_cap`], at most 1.
+    /// Returns how many points there are: at most [`PointsConfig::capacity`] and `out.len()`. Azimuths that were not
+    /// measured give none and suppress none.
     ///
     /// # Errors
     /// A scan that contradicts itself; `out` is untouched then.
@@ -166,7 +156,7 @@ impl PointExtractor {
         &mut self,
         scan: &PolarScan<'_>,
         floor: u8,
-        out: &mut [Point],
+        out: &mut [SparsePoint],
     ) -> Result<usize, ScanError> {
         scan.check()?;
         let room = out.len().min(self.config.capacity);
@@ -233,13 +223,13 @@ impl View {
         }
     }
 
-    fn point(&self, range_m: f32, weight: f32) -> Point {
-        [
-            range_m * self.look[0],
-            range_m * self.look[1],
-            self.time_s,
+    fn point(&self, range_m: f32, weight: f32) -> SparsePoint {
+        SparsePoint {
+            x_m: range_m * self.look[0],
+            y_m: range_m * self.look[1],
+            time_s: self.time_s,
             weight,
-            self.doppler_s,
-        ]
+            doppler_s: self.doppler_s,
+        }
     }
 }

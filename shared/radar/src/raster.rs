@@ -15,7 +15,6 @@ mod cells;
 mod kernels;
 mod polar_image;
 mod sweep_motion;
-mod twist;
 
 #[cfg(test)]
 pub(crate) mod tests;
@@ -23,13 +22,14 @@ pub(crate) mod tests;
 use crate::scan::{PolarScan, ScanError, Sense, SweepGeometry};
 use bearing_table::BearingTable;
 use cells::Cells;
+use gyre_geometry::Twist;
 use kernels::locate::{self, Lookup, Taps};
+use ndarray::ArrayViewMut2;
 use polar_image::PolarImage;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use sweep_motion::SweepMotion;
 pub use sweep_motion::{MAX_TRAVEL_M, MAX_TURN_RAD};
-pub use twist::Twist;
 
 /// The largest `n` that a raster may have.
 pub const MAX_CELLS_A_SIDE: usize = 4096;
@@ -66,7 +66,7 @@ pub struct RasterConfig {
     /// Metres a cell.
     pub cell_m: f32,
     /// What is nearer than this is the vehicle or the sensor's ringing, and is blanked. Metres.
-    pub minimum_range_m: f32,
+    pub min_range_m: f32,
     /// How a cell's value comes from the range bins: `averaged` or `bilinear`.
     pub sampling: Sampling,
     /// What `averaged` takes the mean over: a depth of so many cells. A little more than 1 smooths.
@@ -78,7 +78,7 @@ impl Default for RasterConfig {
         Self {
             n: 255,
             cell_m: 0.8,
-            minimum_range_m: 2.0,
+            min_range_m: 2.0,
             sampling: Sampling::Averaged,
             averaged_cells: 1.0,
         }
@@ -98,8 +98,8 @@ impl RasterConfig {
         if !(1e-3..=100.0).contains(&self.cell_m) {
             return setting("cell_m", self.cell_m.into(), "0.001 to 100");
         }
-        if !(self.minimum_range_m >= 0.0 && self.minimum_range_m.is_finite()) {
-            return setting("minimum_range_m", self.minimum_range_m.into(), "0 or more");
+        if !(self.min_range_m >= 0.0 && self.min_range_m.is_finite()) {
+            return setting("min_range_m", self.min_range_m.into(), "0 or more");
         }
         if !(0.1..=10.0).contains(&self.averaged_cells) {
             return setting("averaged_cells", self.averaged_cells.into(), "0.1 to 10");
@@ -121,13 +121,13 @@ pub enum RasterError {
         /// What it may be.
         bounds: &'static str,
     },
-    /// The slice for the raster is not `n x n`.
-    #[error("the raster has {expected} cells, but there is room for {actual}")]
-    OutputLength {
-        /// `n * n`.
-        expected: usize,
-        /// What was given.
-        actual: usize,
+    /// The array for the raster is not a contiguous, row-major `n x n`.
+    #[error("the raster needs a contiguous array of {n} x {n} cells, but got {} x {}", actual[0], actual[1])]
+    Shape {
+        /// Cells a side.
+        n: usize,
+        /// Rows and columns of the array.
+        actual: [usize; 2],
     },
     /// The scan contradicts itself.
     #[error(transparent)]
@@ -183,7 +183,7 @@ impl Rasteriser {
         &self.config
     }
 
-    /// Writes the raster of `scan` to `out`: `n * n` values, power above `floor`, 0 to `255 - floor`.
+    /// Writes the raster of `scan` to `raster`: `n x n` values, power above `floor`, 0 to `255 - floor`.
     ///
     /// With a `twist` the raster shows the scene from where the sensor stood at `scan.geometry.stamp_ns`: each cell
     /// is looked up where the sensor was when it looked there, by the azimuths' own stamps, and Doppler's shift of the
@@ -191,18 +191,20 @@ impl Rasteriser {
     /// What no azimuth or bin covers is zero; a scan without azimuths or bins gives zeros. Between the last azimuth
     /// and the first, as between all others, the powers are interpolated.
     ///
-    /// # Errors A wrong length of `out`, a scan that contradicts itself, a twist that is not finite or turns too far.
-    /// `out` is untouched then.
+    /// # Errors
+    /// A wrong shape or layout of `raster`, a scan that contradicts itself, a twist that is not finite or turns too far.
+    /// `raster` is unchanged then.
     pub fn rasterise(
         &mut self,
         scan: &PolarScan<'_>,
         floor: u8,
         twist: Option<Twist>,
-        out: &mut [f32],
+        mut raster: ArrayViewMut2<'_, f32>,
     ) -> Result<(), RasterError> {
-        self.check(scan, out)?;
+        let cells = self.cells_of(&mut raster)?;
+        scan.check()?;
         if scan.geometry.azimuths == 0 || scan.geometry.bins == 0 {
-            out.fill(0.0);
+            cells.fill(0.0);
             return Ok(());
         }
         let motion = twist
@@ -217,7 +219,7 @@ impl Rasteriser {
             self.cells.furthest_m + travel_m,
             motion.as_ref(),
         );
-        self.sample(&scan.geometry, motion.as_ref(), out);
+        self.sample(&scan.geometry, motion.as_ref(), cells);
         Ok(())
     }
 
@@ -230,7 +232,7 @@ impl Rasteriser {
             columns_a_metre: self.polar.columns_a_metre(),
             column_at_sensor: self.polar.column_at_sensor(geometry.range_offset_m),
             last_column: (stride - 2) as f32,
-            minimum_range_m: self.config.minimum_range_m,
+            min_range_m: self.config.min_range_m,
         };
         for (index, row) in out.chunks_exact_mut(self.config.n).enumerate() {
             let cells = self.cells.row(index);
@@ -242,14 +244,15 @@ impl Rasteriser {
         }
     }
 
-    fn check(&self, scan: &PolarScan<'_>, out: &[f32]) -> Result<(), RasterError> {
-        let expected = self.config.n * self.config.n;
-        if out.len() != expected {
-            return Err(RasterError::OutputLength {
-                expected,
-                actual: out.len(),
-            });
+    fn cells_of<'a>(
+        &self,
+        raster: &'a mut ArrayViewMut2<'_, f32>,
+    ) -> Result<&'a mut [f32], RasterError> {
+        let (n, actual) = (self.config.n, raster.dim().into());
+        match actual == [n, n] {
+            true => raster.as_slice_mut(),
+            false => None,
         }
-        Ok(scan.check()?)
+        .ok_or(RasterError::Shape { n, actual })
     }
 }

@@ -6,6 +6,7 @@
 mod check;
 
 pub use check::ScanError;
+use ndarray::{ArrayView2, ShapeBuilder};
 
 /// Most azimuths in one sweep. Navtech's radars measure 400, some 800.
 pub const MAX_AZIMUTHS: usize = 1024;
@@ -77,6 +78,23 @@ impl<'a> PolarScan<'a> {
     pub fn row(&self, azimuth: usize) -> &'a [u8] {
         let first = self.geometry.first_byte + azimuth * self.geometry.stride;
         &self.bytes[first..first + self.geometry.bins]
+    }
+
+    /// The powers, azimuth x range bin: a view of the scan's bytes that skips what lies between rows.
+    ///
+    /// # Panics
+    /// If the scan does not pass [`PolarScan::check`].
+    pub fn power(&self) -> ArrayView2<'a, u8> {
+        let SweepGeometry {
+            azimuths,
+            bins,
+            stride,
+            first_byte,
+            ..
+        } = self.geometry;
+        let shape = (azimuths, bins).strides((stride, 1));
+        let bytes = self.bytes.get(first_byte..).unwrap_or_default();
+        ArrayView2::from_shape(shape, bytes).expect("the scan passes its check")
     }
 
     /// Seconds from the scan's stamp to an azimuth's.

@@ -1,7 +1,9 @@
 //! What differs between a scan and the next, once both are seen from the same place.
 
-use gyre_radar::{PolarScan, RasterConfig, RasterError, Rasteriser, Sampling, Twist};
+use gyre_geometry::Twist;
+use gyre_radar::{PolarScan, RasterConfig, RasterError, Rasteriser, Sampling};
 use nalgebra::Isometry2;
+use ndarray::ArrayViewMut2;
 use serde::Serialize;
 
 /// What differs between consecutive scans.
@@ -75,13 +77,14 @@ impl ChangeMeter {
             .saturating_sub(earlier.geometry.stamp_ns);
         let twist = Twist::from_motion(motion, interval_ns as f64 * 1e-9);
         let between_ns = earlier.geometry.stamp_ns + interval_ns / 2;
+        let n = self.rasteriser.config().n;
         for (scan, raster) in [(earlier, &mut self.earlier), (later, &mut self.later)] {
             let mut scan = *scan;
             scan.geometry.stamp_ns = between_ns;
+            let raster = ArrayViewMut2::from_shape((n, n), raster).expect("n * n cells");
             self.rasteriser
                 .rasterise(&scan, self.threshold, Some(twist), raster)?;
         }
-        let n = self.rasteriser.config().n;
         if let Some(correlation) = correlation(&self.earlier, &self.later, n) {
             self.pairs += 1;
             self.correlations += correlation;

@@ -3,6 +3,7 @@
 use std::{fs::File, io::BufWriter, path::Path};
 
 use gyre_radar::{PolarScan, RasterConfig, RasterError, Rasteriser};
+use ndarray::Array2;
 use thiserror::Error;
 
 /// A grey picture: powers as they are, 0 black.
@@ -37,16 +38,16 @@ impl Picture {
         let config = RasterConfig {
             n,
             cell_m,
-            minimum_range_m: 0.0,
+            min_range_m: 0.0,
             ..RasterConfig::default()
         };
         let mut rasteriser = Rasteriser::new(&config)?;
-        let mut cells = vec![0.0; n * n];
-        rasteriser.rasterise(scan, 0, None, &mut cells)?;
+        let mut cells = Array2::zeros((n, n));
+        rasteriser.rasterise(scan, 0, None, cells.view_mut())?;
         Ok(Self {
             width: n,
             height: n,
-            pixels: cells.into_iter().map(|power| power.round() as u8).collect(),
+            pixels: cells.iter().map(|power| power.round() as u8).collect(),
         })
     }
 

@@ -147,7 +147,7 @@ fn two_different_scenes_have_nothing_in_common() {
 #[test]
 fn a_drive_is_undone_by_its_motion_and_by_no_other() {
     // 12 m/s and 30 deg/s: 3 m and 7.5 degrees from scan to scan, and as much within a sweep.
-    let drive = gyre_radar::Twist {
+    let drive = gyre_geometry::Twist {
         vx_mps: 12.0,
         vy_mps: 0.0,
         yaw_rate_radps: 0.52,

@@ -68,7 +68,7 @@ pub use exhaustive::{ExhaustiveConfig, ExhaustiveSearch, JointEstimate};
 pub use fft::fast_size;
 pub use refinement::{
     Anchor, Hypothesis, Keyframe, Memory, Outcome, Refined, Refinement, RefinementConfig,
-    RefinementKind, ScanPoint,
+    RefinementKind,
 };
 pub use rotation::{RotationEstimate, RotationRunnerUp, RotationSearch};
 pub use spectrum::PolarSpectrum;

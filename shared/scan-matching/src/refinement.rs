@@ -14,12 +14,12 @@ mod memory;
 mod register;
 mod sweep;
 
+use gyre_geometry::SparsePoint;
 use nalgebra::{Isometry2, Matrix3, Vector3};
 
 pub use config::{RefinementConfig, RefinementKind};
 pub use keyframes::Keyframe;
 pub use memory::{Anchor, Memory};
-pub use sweep::ScanPoint;
 
 use crate::ConfigError;
 use keyframes::Keyframes;
@@ -95,7 +95,7 @@ pub struct Refinement {
 /// A scan to be matched.
 #[derive(Clone, Copy)]
 struct Query<'a> {
-    points: &'a [ScanPoint],
+    points: &'a [SparsePoint],
     /// Pose in the first scan's frame that the search's motion leads to.
     searched: Isometry2<f64>,
     interval_s: f64,
@@ -161,8 +161,8 @@ impl Refinement {
     pub fn next(
         &mut self,
         id: u64,
-        later: &[ScanPoint],
-        earlier: &[ScanPoint],
+        later: &[SparsePoint],
+        earlier: &[SparsePoint],
         searched: &Isometry2<f64>,
         interval_s: f64,
     ) -> Refined {
@@ -190,7 +190,7 @@ impl Refinement {
 
     /// Makes the earlier scan the first keyframe. Its sweep is undone with the motion to the later one: first the search's, then
     /// the one that this leads to.
-    fn begin(&mut self, id: u64, earlier: &[ScanPoint], query: &Query<'_>) {
+    fn begin(&mut self, id: u64, earlier: &[SparsePoint], query: &Query<'_>) {
         let pose = self.memory.pose;
         let searched = self.memory.velocity_to(&query.searched, query.interval_s);
         self.draw(id, earlier, &pose, &searched);
@@ -397,7 +397,7 @@ impl Refinement {
     fn draw(
         &mut self,
         id: u64,
-        points: &[ScanPoint],
+        points: &[SparsePoint],
         pose: &Isometry2<f64>,
         velocity: &Vector3<f64>,
     ) {

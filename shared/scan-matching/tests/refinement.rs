@@ -6,7 +6,8 @@
 mod common;
 
 use common::scenes::*;
-use gyre_scan_matching::{Memory, Outcome, Refinement, ScanPoint};
+use gyre_geometry::SparsePoint;
+use gyre_scan_matching::{Memory, Outcome, Refinement};
 use nalgebra::{Isometry2, Matrix3, Vector3};
 
 const NOISY: Sensor = Sensor {
@@ -127,8 +128,8 @@ fn mirrored_points_give_the_mirrored_motion() {
     let (mut apart, mut sums) = (Vec::new(), Vec::new());
     for seed in 1..6 {
         let scans = scans(&one_sided(seed), &drive, &NOISY);
-        let mirror_point = |p: &ScanPoint| [p[0], -p[1], p[2], p[3], p[4]];
-        let mirrored: Vec<Vec<ScanPoint>> = scans
+        let mirror_point = |p: &SparsePoint| SparsePoint { y_m: -p.y_m, ..*p };
+        let mirrored: Vec<Vec<SparsePoint>> = scans
             .iter()
             .map(|scan| scan.iter().map(mirror_point).collect())
             .collect();
@@ -181,9 +182,9 @@ fn traffic_does_not_pull_the_motion() {
 
 /// What a range offset adds to the scene's apparent motion, for each metre ahead, is b du/dx = b (sin / r) u', u' being
 /// across the line of sight u. The turn of the rigid motion nearest to that, rad/m: some b sin^2 / r^2.
-fn drift_of_offset(points: &[ScanPoint], offset_m: f64) -> f64 {
+fn drift_of_offset(points: &[SparsePoint], offset_m: f64) -> f64 {
     let (mut information, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    for [x, y, ..] in points.iter().map(|p| p.map(f64::from)) {
+    for [x, y] in points.iter().map(|p| [p.x_m, p.y_m].map(f64::from)) {
         let r = x.hypot(y);
         let (cos, sin) = (x / r, y / r);
         let apparent = [-sin, cos].map(|v| v * offset_m * sin / r);
@@ -304,7 +305,10 @@ fn what_all_points_weigh_changes_neither_motions_nor_covariances() {
         .iter()
         .map(|scan| {
             scan.iter()
-                .map(|&[x, y, t, w, d]| [x, y, t, 0.25 * w, d])
+                .map(|p| SparsePoint {
+                    weight: 0.25 * p.weight,
+                    ..*p
+                })
                 .collect()
         })
         .collect();

@@ -4,7 +4,8 @@
 mod common;
 
 use common::{Numbers, scenes::*};
-use gyre_scan_matching::{Outcome, Refined, Refinement, RefinementConfig, ScanPoint};
+use gyre_geometry::SparsePoint;
+use gyre_scan_matching::{Outcome, Refined, Refinement, RefinementConfig};
 use nalgebra::Isometry2;
 
 const NOISY: Sensor = Sensor {
@@ -16,7 +17,7 @@ const NOISY: Sensor = Sensor {
 };
 
 /// A gentle bend, 60 scans, and what is seen on it.
-fn bend() -> (Drive, Vec<Vec<ScanPoint>>) {
+fn bend() -> (Drive, Vec<Vec<SparsePoint>>) {
     let drive = Drive::steady(10.0, 4.0, 60);
     (
         drive,
@@ -25,7 +26,7 @@ fn bend() -> (Drive, Vec<Vec<ScanPoint>>) {
 }
 
 /// Points that have nothing to do with the scene.
-fn noise(seed: u64) -> Vec<ScanPoint> {
+fn noise(seed: u64) -> Vec<SparsePoint> {
     let mut numbers = Numbers(seed);
     let mut point = || {
         [
@@ -36,7 +37,7 @@ fn noise(seed: u64) -> Vec<ScanPoint> {
             0.0,
         ]
     };
-    (0..900).map(|_| point().map(|v| v as f32)).collect()
+    (0..900).map(|_| point().map(|v| v as f32).into()).collect()
 }
 
 fn bits(refined: &[Refined]) -> Vec<u64> {
@@ -77,11 +78,15 @@ fn sane(refined: &Refined) {
 fn a_fault_of_one_scan_passes() {
     let (drive, good) = bend();
     let before = refine(&drive, &good).errors();
-    let turned: Vec<ScanPoint> = good[30]
+    let turned: Vec<SparsePoint> = good[30]
         .iter()
-        .map(|p| [-p[1], p[0], p[2], p[3], p[4]])
+        .map(|p| SparsePoint {
+            x_m: -p.y_m,
+            y_m: p.x_m,
+            ..*p
+        })
         .collect();
-    let half: Vec<ScanPoint> = good[30].iter().filter(|p| p[1] > 0.0).copied().collect();
+    let half: Vec<SparsePoint> = good[30].iter().filter(|p| p.y_m > 0.0).copied().collect();
     let faults = [
         ("noise", noise(1), Outcome::Predicted),
         ("turned", turned, Outcome::Predicted),
@@ -154,18 +159,21 @@ fn after_enough_scans_of_noise_the_map_begins_anew() {
 #[test]
 fn nothing_that_points_may_hold_makes_a_motion_that_is_no_number() {
     let (drive, good) = bend();
-    let faults: [(&str, Vec<ScanPoint>); 5] = [
+    let faults: [(&str, Vec<SparsePoint>); 5] = [
         ("none", Vec::new()),
-        ("nan", vec![[f32::NAN; 5]; 500]),
-        ("infinite", vec![[f32::INFINITY, 1.0, 0.0, 1.0, 0.0]; 500]),
+        ("nan", vec![[f32::NAN; 5].into(); 500]),
+        (
+            "infinite",
+            vec![[f32::INFINITY, 1.0, 0.0, 1.0, 0.0].into(); 500],
+        ),
         (
             "weightless",
             good[30]
                 .iter()
-                .map(|p| [p[0], p[1], p[2], 0.0, p[4]])
+                .map(|p| SparsePoint { weight: 0.0, ..*p })
                 .collect(),
         ),
-        ("at the sensor", vec![[0.0; 5]; 500]),
+        ("at the sensor", vec![SparsePoint::default(); 500]),
     ];
     for (name, fault) in faults {
         // In the middle of a drive, from its beginning, and nothing else at all.
@@ -191,8 +199,8 @@ fn nothing_that_points_may_hold_makes_a_motion_that_is_no_number() {
 #[test]
 fn a_few_points_that_are_no_numbers_cost_little() {
     let (drive, mut scans) = bend();
-    scans[30][7][0] = f32::NAN;
-    scans[31][7][3] = f32::NAN;
+    scans[30][7].x_m = f32::NAN;
+    scans[31][7].weight = f32::NAN;
     let run = refine(&drive, &scans);
     run.refined.iter().for_each(sane);
     assert!(run.errors().shift_m < 0.4, "{:?}", run.errors());

@@ -7,7 +7,8 @@ mod common;
 use std::f64::consts::TAU;
 
 use common::scenes::posts;
-use gyre_scan_matching::{Outcome, Refined, Refinement, RefinementConfig, ScanPoint};
+use gyre_geometry::SparsePoint;
+use gyre_scan_matching::{Outcome, Refined, Refinement, RefinementConfig};
 use nalgebra::{Isometry2, Point2, Rotation2, Vector2};
 
 const SWEEP_S: f64 = 1.0;
@@ -34,7 +35,7 @@ fn pose(time_s: f64) -> Isometry2<f64> {
 }
 
 /// The posts as scan `k` sees them, each when the clockwise beam passes it.
-fn scan(posts: &[Point2<f64>], k: usize) -> Vec<ScanPoint> {
+fn scan(posts: &[Point2<f64>], k: usize) -> Vec<SparsePoint> {
     let see = |post: &Point2<f64>| {
         let (mut time_s, mut place) = (0.0, Point2::origin());
         for _ in 0..20 {
@@ -43,7 +44,7 @@ fn scan(posts: &[Point2<f64>], k: usize) -> Vec<ScanPoint> {
         }
         RANGE_M
             .contains(&place.coords.norm())
-            .then(|| [place.x as f32, place.y as f32, time_s as f32, 1.0, 0.0])
+            .then(|| [place.x as f32, place.y as f32, time_s as f32, 1.0, 0.0].into())
     };
     posts.iter().filter_map(see).collect()
 }

@@ -3,9 +3,10 @@
 
 use std::collections::VecDeque;
 
+use gyre_geometry::Twist;
 use gyre_masking::{Masker, Sweep};
 use gyre_messages::{MaskedHeader, Pair, SearchedMotion};
-use gyre_radar::{Dataset, OwnedScan, Twist};
+use gyre_radar::{Dataset, OwnedScan};
 
 use super::exposure::{Exposer, Exposure};
 use crate::{

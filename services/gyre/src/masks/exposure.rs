@@ -1,8 +1,8 @@
 //! What became of a scan: its raster with everything in it, the mask, what is left, and the points.
 
+use gyre_geometry::{SparsePoint, Twist};
 use gyre_masking::{MaskError, MaskKind, Masker, MaskerError, MaskingConfig};
 use gyre_messages::MaskedHeader;
-use gyre_radar::{Point, Twist};
 use thiserror::Error;
 
 use super::chain::Link;
@@ -57,7 +57,7 @@ pub struct Exposer {
     floor: u8,
     /// Without any mask, and without the network.
     bare: [Masker; 2],
-    points: [Vec<Point>; 2],
+    points: [Vec<SparsePoint>; 2],
 }
 
 impl Exposer {
@@ -70,7 +70,7 @@ impl Exposer {
             Masker::new(&configuration.raster, &configuration.points, &masking)
         };
         let floor = configuration.masking.floor();
-        let points = vec![Point::default(); configuration.points.capacity];
+        let points = vec![SparsePoint::default(); configuration.points.capacity];
         Ok(Self {
             n: configuration.raster.n,
             floor,
@@ -152,8 +152,8 @@ impl Exposer {
         let [plain, weighed] = &mut self.points;
         let count = self.bare[1].points(&scan.sweep().scan, twist, plain)?;
         masker.points(&scan.sweep().scan, twist, weighed)?;
-        let factor = |(plain, weighed): (&Point, &Point)| {
-            Some((masker.cell_of(plain, twist)?, weighed[3] / plain[3]))
+        let factor = |(plain, weighed): (&SparsePoint, &SparsePoint)| {
+            Some((masker.cell_of(plain, twist)?, weighed.weight / plain.weight))
         };
         Ok(plain[..count]
             .iter()

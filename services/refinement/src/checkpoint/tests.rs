@@ -1,5 +1,6 @@
 #![allow(clippy::unwrap_used)]
-use gyre_scan_matching::{RefinementConfig, ScanPoint};
+use gyre_geometry::SparsePoint;
+use gyre_scan_matching::RefinementConfig;
 
 use nalgebra::Vector2;
 
@@ -21,7 +22,7 @@ fn config() -> RefinementConfig {
 }
 
 /// What the vehicle sees of two rows of posts, `metres` along its way.
-fn scan(metres: f64) -> Vec<ScanPoint> {
+fn scan(metres: f64) -> Vec<SparsePoint> {
     let post = |k: i32| {
         [
             f64::from(7 * k % 29) * 7.0 - metres % 7.0 - 90.0,
@@ -32,7 +33,7 @@ fn scan(metres: f64) -> Vec<ScanPoint> {
     (0..60)
         .map(post)
         .filter(near)
-        .map(|[x, y]| [x as f32, y as f32, 0.0, 1.0, 0.0])
+        .map(|[x, y]| [x as f32, y as f32, 0.0, 1.0, 0.0].into())
         .collect()
 }
 

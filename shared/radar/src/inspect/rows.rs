@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::median::median;
 use crate::scan::{PolarScan, Sense, flag};
 
 /// Scans whose powers are summed to find the ringing; more would tell nothing new.
@@ -82,7 +83,7 @@ impl Survey {
         let (least, most) = self.first_rad.unwrap_or((first, first));
         self.first_rad = Some((least.min(first), most.max(first)));
         let steps: Vec<f64> = steps_rad(scan).collect();
-        let usual = median(&steps);
+        let usual = median(steps.iter().copied()).unwrap_or(0.0);
         self.lost += steps
             .iter()
             .map(|s| ((s / usual).round() as u64).saturating_sub(1))
@@ -114,7 +115,9 @@ impl Survey {
                 n if n == self.scans => Chirps::Alternating,
                 _ => Chirps::Mixed,
             },
-            step_deg: median(&self.steps_rad).to_degrees(),
+            step_deg: median(self.steps_rad.iter().copied())
+                .unwrap_or(0.0)
+                .to_degrees(),
             first_azimuth_deg: (f64::from(least).to_degrees(), f64::from(most).to_degrees()),
             ringing_bins: self.ringing_bins(),
         }
@@ -148,10 +151,4 @@ fn steps_rad<'a>(scan: &PolarScan<'a>) -> impl Iterator<Item = f64> + 'a {
     scan.azimuth_rad.iter().zip(next).map(move |(a, b)| {
         (sign * (f64::from(*b) - f64::from(*a))).rem_euclid(std::f64::consts::TAU)
     })
-}
-
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
 }

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::dataset::Dataset;
+use crate::median::median;
 
 /// An interval longer than this many periods, on the clock that is used, is a gap.
 const GAP_PERIODS: f64 = 1.5;
@@ -72,7 +73,7 @@ pub(super) fn examine(dataset: &dyn Dataset) -> Option<TimingReport> {
 /// `used`: the clock that the scans are read with; `logged`: as written down by the host.
 fn times(used: &[i64], logged: &[i64]) -> Option<TimingReport> {
     let (used_s, logged_s) = (intervals_s(used), intervals_s(logged));
-    let period_s = median(&used_s);
+    let period_s = median(used_s.iter().copied()).unwrap_or(0.0);
     let late_s = lateness_s(used, logged);
     let (mut gaps, mut stalls, mut backwards) = (Vec::new(), Vec::new(), Vec::new());
     for (i, (on_clock, on_host)) in used_s
@@ -121,12 +122,6 @@ fn intervals_s(stamps: &[i64]) -> Vec<f64> {
         .collect()
 }
 
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
-}
-
 /// How late each stamp was logged, against the most prompt one.
 fn lateness_s(used: &[i64], logged: &[i64]) -> Vec<f64> {
     let late: Vec<i64> = logged.iter().zip(used).map(|(l, u)| l - u).collect();
@@ -136,13 +131,12 @@ fn lateness_s(used: &[i64], logged: &[i64]) -> Vec<f64> {
 
 /// Whether the scans that follow a long interval come faster than the sensor makes them.
 fn catches_up(afterwards: &[f64], period_s: f64) -> bool {
-    let next: Vec<f64> = afterwards
+    let next = afterwards
         .iter()
         .copied()
         .take(AFTERWARDS)
-        .take_while(|s| *s < STALL_PERIODS * period_s)
-        .collect();
-    !next.is_empty() && median(&next) < CATCH_UP_PERIODS * period_s
+        .take_while(|s| *s < STALL_PERIODS * period_s);
+    median(next).is_some_and(|s| s < CATCH_UP_PERIODS * period_s)
 }
 
 fn jitter_s(logged_s: &[f64], period_s: f64) -> f64 {

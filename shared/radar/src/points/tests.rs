@@ -1,22 +1,28 @@
 #![allow(clippy::unwrap_used)]
 
-use super::{Point, PointExtractor, PointsConfig};
-use crate::raster::Twist;
+use super::{PointExtractor, PointsConfig};
 use crate::raster::tests::scene::Sensor;
 use crate::scan::{OwnedScan, ScanError, Sense, flag};
+use gyre_geometry::{SparsePoint, Twist};
 use nalgebra::{Point2, Vector2};
 use proptest::prelude::*;
 
-const UNSET: Point = [f32::NAN; 5];
+const UNSET: SparsePoint = SparsePoint {
+    x_m: f32::NAN,
+    y_m: f32::NAN,
+    time_s: f32::NAN,
+    weight: f32::NAN,
+    doppler_s: f32::NAN,
+};
 
-fn extract(config: &PointsConfig, scan: &OwnedScan, floor: u8) -> Vec<Point> {
+fn extract(config: &PointsConfig, scan: &OwnedScan, floor: u8) -> Vec<SparsePoint> {
     let mut out = vec![UNSET; config.capacity];
     let count = PointExtractor::new(config)
         .unwrap()
         .extract(&scan.view(), floor, &mut out)
         .unwrap();
     assert!(
-        out[count..].iter().flatten().all(|value| value.is_nan()),
+        out[count..].iter().all(|point| point.x_m.is_nan()),
         "only points are written"
     );
     out.truncate(count);
@@ -24,7 +30,7 @@ fn extract(config: &PointsConfig, scan: &OwnedScan, floor: u8) -> Vec<Point> {
 }
 
 /// The points by their definition: every cell of every azimuth against all azimuths.
-fn direct(config: &PointsConfig, scan: &OwnedScan, floor: u8) -> Vec<Point> {
+fn direct(config: &PointsConfig, scan: &OwnedScan, floor: u8) -> Vec<SparsePoint> {
     let view = scan.view();
     let geometry = &view.geometry;
     let depth = (config.range_cell_m / geometry.range_resolution_m)
@@ -68,13 +74,13 @@ fn direct(config: &PointsConfig, scan: &OwnedScan, floor: u8) -> Vec<Point> {
             };
             let weight = (here as f32 / depth as f32 / config.weight_cap).min(1.0);
             let time_s = (view.stamp_ns[azimuth] - geometry.stamp_ns) as f32 * 1e-9;
-            points.push([
-                range_m * cos,
-                range_m * left,
+            points.push(SparsePoint {
+                x_m: range_m * cos,
+                y_m: range_m * left,
                 time_s,
                 weight,
-                view.doppler_s(azimuth),
-            ]);
+                doppler_s: view.doppler_s(azimuth),
+            });
         }
     }
     points
@@ -113,12 +119,13 @@ fn noise(azimuths: usize, bins: usize, range_resolution_m: f32, seed: u32) -> Ow
     scan
 }
 
-fn assert_alike(got: &[Point], expected: &[Point]) {
+fn assert_alike(got: &[SparsePoint], expected: &[SparsePoint]) {
     assert_eq!(got.len(), expected.len());
     for (got, expected) in got.iter().zip(expected) {
-        let near = got
+        let [got_fields, expected_fields] = [got, expected].map(|&point| <[f32; 5]>::from(point));
+        let near = got_fields
             .iter()
-            .zip(expected)
+            .zip(expected_fields)
             .all(|(got, expected)| (got - expected).abs() < 1e-4);
         assert!(near, "{got:?} for {expected:?}");
     }
@@ -144,12 +151,12 @@ proptest! {
         let config = PointsConfig { capacity, ..all.clone() };
         let (all, few) = (extract(&all, &scan, 100), extract(&config, &scan, 100));
         prop_assert!(few.len() <= capacity);
-        let weakest = few.iter().map(|point| point[3]).fold(1.0, f32::min);
-        let stay = |point: &&Point| !few.is_empty() && point[3] >= weakest;
+        let weakest = few.iter().map(|point| point.weight).fold(1.0, f32::min);
+        let stay = |point: &&SparsePoint| !few.is_empty() && point.weight >= weakest;
         prop_assert_eq!(&all.iter().filter(stay).copied().collect::<Vec<_>>(), &few);
         // One step of power lower would be too many.
-        let next = all.iter().map(|point| point[3]).filter(|&weight| few.is_empty() || weight < weakest).fold(0.0, f32::max);
-        prop_assert!(all.len() <= capacity || all.iter().filter(|point| point[3] >= next).count() > capacity);
+        let next = all.iter().map(|point| point.weight).filter(|&weight| few.is_empty() || weight < weakest).fold(0.0, f32::max);
+        prop_assert!(all.len() <= capacity || all.iter().filter(|point| point.weight >= next).count() > capacity);
     }
 }
 
@@ -203,8 +210,8 @@ fn a_moving_sensors_points_are_where_the_scatterers_are_once_motion_and_doppler_
             let (sum, moment) =
                 near.fold((0.0, Vector2::zeros()), |(sum, moment), (place, point)| {
                     (
-                        sum + f64::from(point[3]),
-                        moment + (place - scatterer) * f64::from(point[3]),
+                        sum + f64::from(point.weight),
+                        moment + (place - scatterer) * f64::from(point.weight),
                     )
                 });
             // A bearing is known to half an azimuth, a range to a tenth of a cell.
@@ -223,8 +230,8 @@ fn a_moving_sensors_points_are_where_the_scatterers_are_once_motion_and_doppler_
 }
 
 /// Where a point lies in the frame at the scan's stamp.
-fn place(point: &Point, twist: &Twist) -> Point2<f64> {
-    let [x, y, time_s, _, doppler_s] = point.map(f64::from);
+fn place(point: &SparsePoint, twist: &Twist) -> Point2<f64> {
+    let [x, y, time_s, _, doppler_s] = <[f32; 5]>::from(*point).map(f64::from);
     let look = Vector2::new(x, y).normalize();
     let shift_m = doppler_s * look.dot(&Vector2::new(twist.vx_mps, twist.vy_mps));
     twist.pose_at(time_s) * Point2::from(Vector2::new(x, y) + look * shift_m)
@@ -245,7 +252,7 @@ fn a_scatterer_on_the_seam_is_seen_once() {
     let points = extract(&PointsConfig::default(), &scan, 60);
     assert_eq!(points.len(), 1);
     assert_eq!(
-        (points[0][2], points[0][3]),
+        (points[0].time_s, points[0].weight),
         ((scan.view().time_s(399)) as f32, 1.0)
     );
 }
@@ -264,7 +271,7 @@ fn two_azimuths_that_are_equally_bright_both_stay() {
     }
     let points = extract(&PointsConfig::default(), &scan, 60);
     assert_eq!(
-        points.iter().map(|point| point[3]).collect::<Vec<_>>(),
+        points.iter().map(|point| point.weight).collect::<Vec<_>>(),
         [0.5, 0.5]
     );
 }

@@ -1,8 +1,8 @@
 //! A twist as the loops over cells use it.
 
 use super::RasterError;
-use super::twist::Twist;
 use crate::scan::{PolarScan, Sense};
+use gyre_geometry::Twist;
 
 /// The furthest that a compensated sensor may turn between the scan's stamp and any azimuth, radians.
 pub const MAX_TURN_RAD: f64 = 2.0;

@@ -59,6 +59,10 @@ impl PolarScan<'_> {
             0.0..=MAX_AZIMUTHS as f64,
         )?;
         check_number("number of bins", geometry.bins as f64, 0.0..=1e6)?;
+        if geometry.azimuths > 1 {
+            let bins = geometry.bins as f64;
+            check_number("row stride in bytes", geometry.stride as f64, bins..=1e9)?;
+        }
         check_number(
             "range resolution in metres",
             geometry.range_resolution_m.into(),

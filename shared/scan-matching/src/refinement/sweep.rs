@@ -1,13 +1,8 @@
 //! A scan's points, put where they were in the middle of its sweep.
 
+use gyre_geometry::SparsePoint;
 use multiversion::multiversion;
 use nalgebra::Vector3;
-
-/// A point of a scan, as the sensor saw it: `[x_m, y_m, time_s, weight, doppler_s]`.
-///
-/// x forward and y left in the sensor's frame at the moment it was measured; that moment from the middle of the sweep;
-/// what the point counts, above 0 and at most 1; and by how much its range is too short for each m/s of approach.
-pub type ScanPoint = [f32; 5];
 
 /// Points in the frame of the sweep's middle, as three columns.
 #[derive(Debug, Default)]
@@ -28,7 +23,7 @@ impl Placed {
     }
 
     /// Undoes the sweep's distortion by a constant velocity (m/s, m/s, rad/s) of the sensor in its own frame.
-    pub fn place(&mut self, points: &[ScanPoint], velocity: &Vector3<f64>) {
+    pub fn place(&mut self, points: &[SparsePoint], velocity: &Vector3<f64>) {
         for column in [&mut self.x_m, &mut self.y_m, &mut self.weight] {
             column.clear();
             column.resize(points.len(), 0.0);
@@ -72,14 +67,21 @@ impl Placed {
     "aarch64+neon"
 ))]
 fn place(
-    points: &[ScanPoint],
+    points: &[SparsePoint],
     [vx, vy, rate]: [f32; 3],
     x_m: &mut [f32],
     y_m: &mut [f32],
     weight: &mut [f32],
 ) {
     let places = x_m.iter_mut().zip(y_m).zip(weight);
-    for (&[x, y, t, w, doppler], ((x_m, y_m), weight)) in points.iter().zip(places) {
+    for (point, ((x_m, y_m), weight)) in points.iter().zip(places) {
+        let SparsePoint {
+            x_m: x,
+            y_m: y,
+            time_s: t,
+            weight: w,
+            doppler_s: doppler,
+        } = *point;
         // Range shift by Doppler along the line of sight u: r + doppler (u . v); x + (u . v) u doppler.
         let toward = doppler * (x * vx + y * vy) / (x * x + y * y).max(1e-6);
         let (x, y) = (x + toward * x, y + toward * y);
@@ -117,7 +119,7 @@ mod tests {
             at in prop::array::uniform2(-90.0_f64..90.0),
         ) {
             let mut placed = Placed::default();
-            placed.place(&[[at[0] as f32, at[1] as f32, t as f32, 0.5, 0.0]], &Vector3::new(v[0], v[1], rate));
+            placed.place(&[[at[0] as f32, at[1] as f32, t as f32, 0.5, 0.0].into()], &Vector3::new(v[0], v[1], rate));
             // The arc in a thousand straight steps, each taken along the heading in its middle.
             let (steps, mut pose) = (1000, Isometry2::identity());
             let dt = t / f64::from(steps);
@@ -140,7 +142,8 @@ mod tests {
             [30.0, 0.0, 0.0, 1.0, 0.05],
             [0.0, 30.0, 0.0, 1.0, 0.05],
             [-30.0, 0.0, 0.0, 1.0, 0.05],
-        ];
+        ]
+        .map(SparsePoint::from);
         placed.place(&ahead_and_aside, &Vector3::new(10.0, 0.0, 0.0));
         assert_eq!(placed.x_m, [30.5, 0.0, -29.5]);
         assert_eq!(placed.y_m, [0.0, 30.0, 0.0]);

@@ -1,6 +1,7 @@
 //! Generated point scans with exact truth: what a sensor that turns clockwise sees of reflectors in the plane on its way.
 
-use gyre_scan_matching::{Refined, Refinement, RefinementConfig, ScanPoint};
+use gyre_geometry::SparsePoint;
+use gyre_scan_matching::{Refined, Refinement, RefinementConfig};
 use nalgebra::{Isometry2, Point2, Vector2, Vector3};
 
 use super::Numbers;
@@ -157,7 +158,7 @@ pub struct Sensor {
 
 impl Sensor {
     /// Scan `k` of a drive. The velocity stays the same during the sweep.
-    pub fn scan(&self, scene: &[Reflector], drive: &Drive, k: usize) -> Vec<ScanPoint> {
+    pub fn scan(&self, scene: &[Reflector], drive: &Drive, k: usize) -> Vec<SparsePoint> {
         let mut numbers = Numbers(self.seed << 32 | k as u64);
         let middle_s = k as f64 * SWEEP_S;
         let (pose, speed) = (drive.pose(k), drive.speed(middle_s));
@@ -188,7 +189,7 @@ impl Sensor {
                     self.doppler_s
                 };
                 let at = at + sight * shift;
-                points.push([at.x, at.y, time_s, weight, told].map(|v| v as f32));
+                points.push([at.x, at.y, time_s, weight, told].map(|v| v as f32).into());
             }
         }
         points
@@ -268,7 +269,7 @@ pub fn searched(drive: &Drive, k: usize) -> Isometry2<f64> {
 }
 
 /// The scans of a drive.
-pub fn scans(scene: &[Reflector], drive: &Drive, sensor: &Sensor) -> Vec<Vec<ScanPoint>> {
+pub fn scans(scene: &[Reflector], drive: &Drive, sensor: &Sensor) -> Vec<Vec<SparsePoint>> {
     (0..drive.scans)
         .map(|k| sensor.scan(scene, drive, k))
         .collect()
@@ -283,7 +284,7 @@ pub fn refinement() -> Refinement {
 }
 
 /// Refines the motions between these scans of a drive.
-pub fn refine(drive: &Drive, scans: &[Vec<ScanPoint>]) -> Run {
+pub fn refine(drive: &Drive, scans: &[Vec<SparsePoint>]) -> Run {
     let mut refinement = refinement();
     Run {
         drive: *drive,
@@ -295,7 +296,7 @@ pub fn refine(drive: &Drive, scans: &[Vec<ScanPoint>]) -> Run {
 pub fn refine_on(
     refinement: &mut Refinement,
     drive: &Drive,
-    scans: &[Vec<ScanPoint>],
+    scans: &[Vec<SparsePoint>],
     range: std::ops::Range<usize>,
 ) -> Vec<Refined> {
     range

@@ -2,9 +2,10 @@
 
 use std::{hint::black_box, time::Instant};
 
+use gyre_geometry::SparsePoint;
 use gyre_masking::{MaskKind, Masker, MaskingConfig, Sweep};
 use gyre_messages::{MaskedHeader, MotionEstimate, Pair};
-use gyre_radar::{OwnedScan, Point};
+use gyre_radar::OwnedScan;
 use gyre_scan_matching::{ConfigError, Refinement, RefinementKind};
 
 use super::{Median, learned::Learned};
@@ -129,7 +130,7 @@ struct Prepared {
     /// Before any network.
     rasters: Vec<Vec<f32>>,
     /// As masking makes them.
-    points: Vec<Vec<Point>>,
+    points: Vec<Vec<SparsePoint>>,
 }
 
 fn prepare(configuration: &Configuration, scans: &[OwnedScan]) -> Result<Prepared, Failure> {
@@ -150,7 +151,7 @@ fn prepare(configuration: &Configuration, scans: &[OwnedScan]) -> Result<Prepare
     let cells = raster.n * raster.n;
     let mut masked = vec![0.0; masker.rasters() * MaskedHeader::raster_values(cells)];
     let mut rasters = vec![vec![0.0; cells]; scans.len()];
-    let mut points = vec![vec![Point::default(); configuration.points.capacity]; scans.len()];
+    let mut points = vec![vec![SparsePoint::default(); configuration.points.capacity]; scans.len()];
     let sweep = |number: usize| Sweep {
         number: number as u64,
         scan: scans[number].view(),
@@ -169,7 +170,7 @@ fn prepare(configuration: &Configuration, scans: &[OwnedScan]) -> Result<Prepare
 /// The refinement of a configuration, with the points and the times of the scans.
 struct Refiner {
     refinement: Refinement,
-    points: Vec<Vec<Point>>,
+    points: Vec<Vec<SparsePoint>>,
     stamps_ns: Vec<i64>,
 }
 
@@ -177,7 +178,7 @@ impl Refiner {
     /// `None` where the configuration refines nothing.
     fn new(
         configuration: &Configuration,
-        points: Vec<Vec<Point>>,
+        points: Vec<Vec<SparsePoint>>,
         scans: &[OwnedScan],
     ) -> Result<Option<Self>, ConfigError> {
         if configuration.refinement.kind == RefinementKind::None {

@@ -27,7 +27,7 @@ pub struct Lookup<'a> {
     /// The last column that has another one after it.
     pub last_column: f32,
     /// Nearer cells are blank.
-    pub minimum_range_m: f32,
+    pub min_range_m: f32,
 }
 
 /// For a block of cells: the first of the four samples that surround each, and how far it lies toward the others.
@@ -94,7 +94,7 @@ fn tap(lookup: &Lookup<'_>, from_start: &Block<f32>, range_m: &Block<f32>) -> Ta
         let column = range_m[k] * lookup.columns_a_metre + lookup.column_at_sensor;
         let column = column.max(0.0).min(lookup.last_column);
         // Column 0 is empty, whatever the scan.
-        let column = if range_m[k] < lookup.minimum_range_m {
+        let column = if range_m[k] < lookup.min_range_m {
             0.0
         } else {
             column

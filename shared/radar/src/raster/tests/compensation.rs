@@ -1,8 +1,9 @@
 //! The raster of a moving sensor shows the scene from the middle of the sweep.
 
 use super::scene::{Sensor, miss_cells, raster};
-use crate::raster::{RasterConfig, Sampling, Twist};
+use crate::raster::{RasterConfig, Sampling};
 use crate::scan::Sense;
+use gyre_geometry::Twist;
 use nalgebra::Point2;
 use proptest::prelude::*;
 

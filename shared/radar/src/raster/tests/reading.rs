@@ -3,6 +3,7 @@
 use super::scene::{Sensor, centre_m, raster};
 use crate::raster::{RasterConfig, Rasteriser, Sampling};
 use crate::scan::OwnedScan;
+use ndarray::Array2;
 use std::f64::consts::TAU;
 
 /// The mean of a row over a depth about a place, both in bins; outside of the scan there is nothing.
@@ -34,7 +35,7 @@ fn direct(config: &RasterConfig, scan: &OwnedScan, depth_bins: Option<f64>) -> V
     let cell = |cell: usize| {
         let centre = centre_m(config, cell / config.n, cell % config.n);
         let range_m = centre.coords.norm();
-        if range_m < f64::from(config.minimum_range_m) {
+        if range_m < f64::from(config.min_range_m) {
             return 0.0;
         }
         let bearing = (-centre.y).atan2(centre.x) / TAU;
@@ -131,17 +132,17 @@ fn averaged_raster_equals_direct_mean() {
 fn only_power_above_the_floor_counts() {
     let config = config(127, Sampling::Averaged);
     let mut scan = noise(0.0438, 1500);
-    let mut floored = vec![0.0; config.n * config.n];
+    let mut floored = Array2::zeros((config.n, config.n));
     let mut rasteriser = Rasteriser::new(&config).unwrap();
     rasteriser
-        .rasterise(&scan.view(), 60, None, &mut floored)
+        .rasterise(&scan.view(), 60, None, floored.view_mut())
         .unwrap();
     scan.bytes
         .iter_mut()
         .for_each(|power| *power = power.saturating_sub(60));
-    assert_eq!(floored, raster(&config, &scan, None));
+    assert_eq!(floored.as_slice().unwrap(), raster(&config, &scan, None));
     rasteriser
-        .rasterise(&scan.view(), 255, None, &mut floored)
+        .rasterise(&scan.view(), 255, None, floored.view_mut())
         .unwrap();
     assert!(floored.iter().all(|&power| power == 0.0));
 }

@@ -1,9 +1,11 @@
 //! Whatever comes in: an error or a raster of finite powers, and the same one each time.
 
 use super::scene::{STAMP_NS, Sensor, raster};
-use crate::raster::{RasterConfig, RasterError, Rasteriser, Sampling, Twist};
+use crate::raster::{RasterConfig, RasterError, Rasteriser, Sampling};
 use crate::scan::{OwnedScan, ScanError, Sense};
+use gyre_geometry::Twist;
 use nalgebra::Point2;
+use ndarray::{Array2, ArrayViewMut2, s};
 use proptest::prelude::*;
 use serde::Deserialize;
 use serde::de::value::{Error as ValueError, MapDeserializer};
@@ -27,9 +29,9 @@ fn sensor(azimuths: usize, bins: usize) -> Sensor {
 }
 
 fn try_raster(scan: &OwnedScan, twist: Option<Twist>) -> Result<Vec<f32>, RasterError> {
-    let mut out = vec![f32::NAN; 33 * 33];
-    Rasteriser::new(&small())?.rasterise(&scan.view(), 10, twist, &mut out)?;
-    Ok(out)
+    let mut raster = Array2::from_elem((33, 33), f32::NAN);
+    Rasteriser::new(&small())?.rasterise(&scan.view(), 10, twist, raster.view_mut())?;
+    Ok(raster.into_raw_vec_and_offset().0)
 }
 
 #[test]
@@ -54,17 +56,32 @@ fn scans_of_almost_nothing_give_finite_rasters() {
 }
 
 #[test]
-fn raster_of_the_wrong_length_is_refused() {
+fn a_raster_of_another_shape_or_layout_is_refused() {
     let scan = sensor(4, 10).scan();
     let mut rasteriser = Rasteriser::new(&small()).unwrap();
-    let refused = rasteriser.rasterise(&scan.view(), 0, None, &mut [0.0; 1000]);
-    assert_eq!(
-        refused,
-        Err(RasterError::OutputLength {
-            expected: 1089,
-            actual: 1000
-        })
-    );
+    let mut refused = |raster: ArrayViewMut2<'_, f32>, actual| {
+        let refused = rasteriser.rasterise(&scan.view(), 0, None, raster);
+        assert_eq!(refused, Err(RasterError::Shape { n: 33, actual }));
+    };
+    refused(Array2::zeros((33, 32)).view_mut(), [33, 32]);
+    refused(Array2::zeros((33, 33)).view_mut().reversed_axes(), [33, 33]);
+    refused(Array2::zeros((66, 33)).slice_mut(s![..;2, ..]), [33, 33]);
+}
+
+#[test]
+fn power_is_the_rows_without_what_lies_between_them() {
+    let mut scan = sensor(4, 10).scan();
+    let mut value = 0u8;
+    scan.bytes.fill_with(|| {
+        value = value.wrapping_add(7);
+        value
+    });
+    let scan = scan.view();
+    let power = scan.power();
+    assert_eq!(power.dim(), (4, 10));
+    for (azimuth, row) in power.rows().into_iter().enumerate() {
+        assert_eq!(row.as_slice(), Some(scan.row(azimuth)));
+    }
 }
 
 #[test]
@@ -85,9 +102,12 @@ fn scan_that_is_shorter_than_its_geometry_is_refused() {
     );
     let mut view = scan.view();
     view.stamp_ns = &[];
-    let refused = Rasteriser::new(&small())
-        .unwrap()
-        .rasterise(&view, 0, None, &mut [0.0; 1089]);
+    let refused = Rasteriser::new(&small()).unwrap().rasterise(
+        &view,
+        0,
+        None,
+        Array2::zeros((33, 33)).view_mut(),
+    );
     assert!(matches!(
         refused,
         Err(RasterError::Scan(ScanError::Length {
@@ -161,9 +181,9 @@ fn settings_out_of_bounds_are_refused_by_name() {
             },
         ),
         (
-            "minimum_range_m",
+            "min_range_m",
             RasterConfig {
-                minimum_range_m: -1.0,
+                min_range_m: -1.0,
                 ..default()
             },
         ),
@@ -223,7 +243,7 @@ fn nothing_remains_of_the_scan_before() {
         sensor(100, 2000).scan(),
     ];
     let mut rasteriser = Rasteriser::new(&config).unwrap();
-    let mut reused = vec![0.0; config.n * config.n];
+    let mut reused = Array2::zeros((config.n, config.n));
     for (scan, twist) in [
         (0, None),
         (1, Some(twist)),
@@ -233,10 +253,10 @@ fn nothing_remains_of_the_scan_before() {
         (1, None),
     ] {
         rasteriser
-            .rasterise(&scans[scan].view(), 0, twist, &mut reused)
+            .rasterise(&scans[scan].view(), 0, twist, reused.view_mut())
             .unwrap();
         assert_eq!(
-            reused,
+            reused.as_slice().unwrap(),
             raster(&config, &scans[scan], twist),
             "scan {scan}, {twist:?}"
         );
@@ -261,8 +281,8 @@ proptest! {
         let sampling = if bilinear { Sampling::Bilinear } else { Sampling::Averaged };
         let config = RasterConfig { sampling, ..small() };
         let twist = moving.then_some(Twist { vx_mps: vx, vy_mps: 0.0, yaw_rate_radps: yaw_rate });
-        let mut out = vec![f32::NAN; 33 * 33];
-        Rasteriser::new(&config).unwrap().rasterise(&scan.view(), floor, twist, &mut out).unwrap();
+        let mut out = Array2::from_elem((33, 33), f32::NAN);
+        Rasteriser::new(&config).unwrap().rasterise(&scan.view(), floor, twist, out.view_mut()).unwrap();
         let most = f32::from(255 - floor);
         prop_assert!(out.iter().all(|power| (0.0..=most + 0.01).contains(power)));
     }

@@ -1,8 +1,10 @@
 //! Scans drawn exactly: what a sensor that may move measures of soft scatterers.
 
-use crate::raster::{RasterConfig, Rasteriser, Twist};
+use crate::raster::{RasterConfig, Rasteriser};
 use crate::scan::{OwnedScan, ScanLimits, Sense, SweepGeometry, flag};
+use gyre_geometry::Twist;
 use nalgebra::Point2;
+use ndarray::Array2;
 use std::f64::consts::TAU;
 
 /// Bytes before each row, so that rows do not start at byte 0.
@@ -133,12 +135,12 @@ impl Sensor {
 
 /// The raster of a scan, no floor.
 pub fn raster(config: &RasterConfig, scan: &OwnedScan, twist: Option<Twist>) -> Vec<f32> {
-    let mut raster = vec![f32::NAN; config.n * config.n];
+    let mut raster = Array2::from_elem((config.n, config.n), f32::NAN);
     let mut rasteriser = Rasteriser::new(config).unwrap();
     rasteriser
-        .rasterise(&scan.view(), 0, twist, &mut raster)
+        .rasterise(&scan.view(), 0, twist, raster.view_mut())
         .unwrap();
-    raster
+    raster.into_raw_vec_and_offset().0
 }
 
 /// A cell's centre, metres ahead and to the left.
