@@ -1,12 +1,8 @@
 //! Bad input: one clear sentence and a failure before anything starts, or a scan that is skipped, counted, and no more.
 
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
 use std::{fs, path::Path, process::Command};
 
-use common::{Ended, Run, STAGES, odometry, recording};
+use crate::common::{Ended, Run, STAGES, odometry, recording};
 
 /// A run of another folder than the recording's.
 fn run_of(folder: &Path) -> Run {
@@ -316,7 +312,7 @@ fn a_stage_command_that_does_not_exist_is_told() {
 #[test]
 fn an_unknown_stage_and_a_stage_without_a_run_are_told() {
     let stage = |name| {
-        let mut command = common::gyre();
+        let mut command = crate::common::gyre();
         command.args(["stage", name]).env_remove("GYRE_RUN");
         Ended::of(command)
     };

@@ -1,9 +1,5 @@
 //! `gyre evaluate` on the results of a run: the figures of a trajectory and of its covariances, as a table, as JSON and drawn.
 
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
 use std::{
     ffi::OsStr,
     fs,
@@ -11,7 +7,7 @@ use std::{
     process::Command,
 };
 
-use common::{Ended, Run, gyre, recording};
+use crate::common::{Ended, Run, gyre, recording};
 use serde_json::Value;
 
 /// A run of the small recording that is over.

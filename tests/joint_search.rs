@@ -1,12 +1,8 @@
 //! The exhaustive search by five processes, joint-search in place of the two halves: the same result every time.
 
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
 use std::{collections::BTreeSet, path::Path};
 
-use common::{Run, odometry};
+use crate::common::{Run, odometry};
 use serde_json::Value;
 
 const JOINT: &str = "joint-search";
@@ -21,7 +17,7 @@ const SCANS: usize = 64;
 
 /// The demo with another search.
 fn demo() -> Run {
-    let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/demo.toml");
+    let demo = Path::new(crate::PROJECT).join("configs/demo.toml");
     Run::of_file(&demo).set("search.kind=exhaustive")
 }
 

@@ -1,13 +1,9 @@
 //! A radar that takes a second for a turn (Checchin et al. 2010), simulated, with real processes: the shipped configuration and the
 //! paper's algorithm on the first minute of the same drive, bends included.
 
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
 use std::path::Path;
 
-use common::{Run, odometry};
+use crate::common::{Run, odometry};
 use serde_json::Value;
 
 const SCANS: usize = 60;
@@ -16,7 +12,7 @@ const SEEDS: [u32; 3] = [1, 2, 3];
 
 /// What a configuration makes of a drive: its evaluation.
 fn evaluation(configuration: &str, seed: u32) -> Value {
-    let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
+    let configs = Path::new(crate::PROJECT).join("configs");
     let run = Run::of_file(&configs.join(configuration)).rate("max");
     let run = run
         .set(&format!("simulation.scans={SCANS}"))

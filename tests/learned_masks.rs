@@ -1,15 +1,13 @@
 //! Learned masks in a whole run: restarts change nothing, and what does not fit is refused before anything starts.
 
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
-use common::{Run, Running, STAGES, odometry, recording, runtime_is_installed, send, undisturbed};
+use crate::common::{
+    Run, Running, STAGES, odometry, recording, runtime_is_installed, send, undisturbed,
+};
 use gyre_masking::{MaskKind, Masker, MaskingConfig, Sweep, runtime};
 use gyre_messages::{MaskedHeader, Pair};
 use gyre_radar::{DatasetOptions, OwnedScan, PointsConfig, RasterConfig};
@@ -23,8 +21,8 @@ const ONE_SCAN: &str = "single-127";
 const TWO_SCANS: &str = "pair-127";
 
 fn card(model: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../masking/tests/models")
+    Path::new(crate::PROJECT)
+        .join("services/masking/tests/models")
         .join(model)
         .with_extension("toml")
 }

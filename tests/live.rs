@@ -1,10 +1,6 @@
 //! Live mode: a radar does not wait, so a slow stage sheds load, in one place, counted to the scan.
 
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
-use common::{
+use crate::common::{
     Run,
     odometry::{self, Row},
     recording,

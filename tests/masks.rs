@@ -1,9 +1,5 @@
 //! `gyre masks` as a whole: pictures of what each kind of mask keeps of a small simulated drive, and what is refused.
 
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
 use std::{
     collections::BTreeSet,
     fs::{self, File},
@@ -11,7 +7,7 @@ use std::{
     path::Path,
 };
 
-use common::{Ended, Run, gyre, recording};
+use crate::common::{Ended, Run, gyre, recording};
 use gyre_geometry::Twist;
 use gyre_masking::runtime;
 use nalgebra::{Isometry2, Vector2};
@@ -52,7 +48,7 @@ fn masks_of(data: &Path, folder: &Path, arguments: &[&str]) -> Ended {
 
 /// The `--set` sentences of a learned mask.
 fn learned(model: &str) -> [String; 2] {
-    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../masking/tests/models");
+    let models = Path::new(crate::PROJECT).join("services/masking/tests/models");
     [
         "masking.kind=learned".to_owned(),
         format!("masking.model='{}'", models.join(model).display()),

@@ -1,12 +1,8 @@
 //! `gyre run` as a whole: six processes, the same result every time, whatever interrupts it.
 
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
 use std::{collections::BTreeSet, fs, process::Command, thread, time::Duration};
 
-use common::{Ended, Run, STAGES, assert_nothing_left, odometry, recording, undisturbed};
+use crate::common::{Ended, Run, STAGES, assert_nothing_left, odometry, recording, undisturbed};
 use rustix::process::Signal;
 
 /// Slow enough to be disturbed in the middle: the recording's six seconds in one.

@@ -1,18 +1,12 @@
 //! Real scans (`GYRE_DATA`) through the whole pipeline, with the accuracy that is to be kept.
 
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
 use std::path::{Path, PathBuf};
 
-use common::{Ended, Run, odometry, real_data, runtime_is_installed};
+use crate::common::{Ended, Run, odometry, real_data, runtime_is_installed};
 use serde_json::Value;
 
 fn configuration(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../configs")
-        .join(name)
+    Path::new(crate::PROJECT).join("configs").join(name)
 }
 
 fn figure(json: &Value, path: &str) -> f64 {
@@ -152,7 +146,7 @@ fn published_kitti_figures_are_reproduced() {
         return;
     };
     let evaluate = |estimate: &Path, truth: &Path, step: &str| {
-        let mut command = common::gyre();
+        let mut command = crate::common::gyre();
         command
             .args(["evaluate", "--json", "--step", step, "--estimate"])
             .arg(estimate);

@@ -1,13 +1,9 @@
 //! Refinement, the process between the search and the poses: what it changes, what it leaves alone, and its death while it
 //! writes its map.
 
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
 use std::{collections::BTreeSet, fs, thread, time::Duration};
 
-use common::{Ended, Pid, Run, Running, STAGES, recording, send, undisturbed};
+use crate::common::{Ended, Pid, Run, Running, STAGES, recording, send, undisturbed};
 use rustix::process::Signal;
 use serde_json::Value;
 

@@ -1,15 +1,11 @@
 //! What a run takes of the machine: no memory for each scan, no time while there is nothing to do.
 
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
 use std::{
     thread,
     time::{Duration, Instant},
 };
 
-use common::{Run, STAGES, cpu_time, recording, send, undisturbed};
+use crate::common::{Run, STAGES, cpu_time, recording, send, undisturbed};
 use rustix::process::Signal;
 
 #[test]

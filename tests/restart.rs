@@ -1,10 +1,6 @@
 //! `kill -9` of stages: each is started again, and the result is the undisturbed run's, byte for byte.
 
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
-use common::{Run, Running, STAGES, odometry, recording, send, undisturbed};
+use crate::common::{Run, Running, STAGES, odometry, recording, send, undisturbed};
 use rustix::process::Signal;
 use serde_json::Value;
 

@@ -1,9 +1,5 @@
 //! Simulated drives with real processes: written by `gyre simulate`, and played by `gyre run` without touching the disk.
 
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
 use std::{
     collections::BTreeMap,
     fs,
@@ -13,7 +9,7 @@ use std::{
     time::Duration,
 };
 
-use common::{Ended, Run, gyre, odometry};
+use crate::common::{Ended, Run, gyre, odometry};
 use rustix::process::Signal;
 
 const SCANS: usize = 12;
@@ -150,7 +146,7 @@ fn a_radar_that_does_not_wait_can_be_simulated() {
 }
 
 fn images(recording: &Path) -> Vec<PathBuf> {
-    common::recording::images(recording)
+    crate::common::recording::images(recording)
 }
 
 fn all_files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
@@ -178,7 +174,7 @@ fn a_simulation_that_was_killed_goes_on_with_what_is_complete() {
         );
         thread::sleep(Duration::from_millis(1));
     }
-    common::send(killed.id(), Signal::KILL);
+    crate::common::send(killed.id(), Signal::KILL);
     killed.wait().unwrap();
     let kept = images(folder.path())
         .into_iter()

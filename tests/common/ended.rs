@@ -80,6 +80,9 @@ fn sentence_of(stderr: &str) -> &str {
     stderr
         .lines()
         .last()
-        .and_then(|line| line.strip_prefix("gyre: "))
+        .and_then(|line| {
+            line.strip_prefix("gyre: ")
+                .or(line.strip_prefix("gyre-lab: "))
+        })
         .unwrap_or_default()
 }

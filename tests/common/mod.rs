@@ -42,7 +42,7 @@ const CONFIGURATION: &str = "[raster]\nn = 127\ncell_m = 0.8\n";
 
 /// The program under test.
 pub fn gyre() -> Command {
-    Command::new(env!("CARGO_BIN_EXE_gyre"))
+    Command::new(crate::PROGRAM)
 }
 
 /// A folder of real data; says so and returns `None` where there is none.
@@ -154,7 +154,7 @@ impl Run {
     pub fn stage_script(self, stage: &str, script: &str) -> Self {
         use std::os::unix::fs::PermissionsExt;
         let path = self.folder.path().join(format!("{stage}.sh"));
-        let script = script.replace("{gyre}", env!("CARGO_BIN_EXE_gyre"));
+        let script = script.replace("{gyre}", crate::PROGRAM);
         fs::write(&path, format!("#!/bin/sh\n{script}\n")).unwrap();
         fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
         let command = format!("stages.{stage}.command=['{}']", path.display());

@@ -42,7 +42,7 @@ def add_reproduce(commands) -> None:
     command.add_argument("recipe", type=Path)
     add_work(command)
     add_models(command)
-    command.add_argument("--gyre", type=Path, help="the program; by default the project's build")
+    command.add_argument("--gyre", type=Path, help="the program gyre-lab; by default the project's build")
     command.set_defaults(run=reproduce)
 
 
@@ -115,7 +115,7 @@ def publish_runs(options: argparse.Namespace) -> None:
 def add_drift(commands) -> None:
     command = commands.add_parser("drift", help="drift of checkpoints and ONNX files, and without masks")
     command.add_argument("checkpoint", type=Path, nargs="*")
-    command.add_argument("--scans", type=Path, required=True, help="a file of gyre export-pairs")
+    command.add_argument("--scans", type=Path, required=True, help="a file of gyre-lab export-pairs")
     command.set_defaults(run=show_drift)
 
 

@@ -1,4 +1,4 @@
-"""Pairs of scans with their true motions, from the file that `gyre export-pairs` writes."""
+"""Pairs of scans with their true motions, from the file that `gyre-lab export-pairs` writes."""
 
 import hashlib
 import json

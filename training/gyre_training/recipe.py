@@ -43,7 +43,7 @@ FIXED = {
 
 
 def search_of(settings: dict) -> SearchConfig:
-    """The search that the rasters' own configuration describes, as `gyre export-pairs` resolved it. One that networks cannot
+    """The search that the rasters' own configuration describes, as `gyre-lab export-pairs` resolved it. One that networks cannot
     be trained through is refused."""
     rotation, translation = settings["rotation"], settings["translation"]
     for section, fixed in FIXED.items():

@@ -1,4 +1,4 @@
-"""The simulated worlds that are learnt from, and the pairs made of them: calls of `gyre`."""
+"""The simulated worlds that are learnt from, and the pairs made of them: calls of `gyre-lab`."""
 
 import os
 import subprocess
@@ -12,11 +12,11 @@ SPLITS = ("train", "validation", "test")
 
 def find_gyre(given: Path | None) -> Path:
     """The program: as given, or the project's own build."""
-    places = [given] if given else [PROJECT / "target" / build / "gyre" for build in ("release", "debug")]
+    places = [given] if given else [PROJECT / "target" / build / "gyre-lab" for build in ("release", "debug")]
     for place in places:
         if place.is_file():
             return place.resolve()
-    raise SystemExit(f"no gyre at {' or '.join(map(str, places))}: cargo build --release, or name it with --gyre")
+    raise SystemExit(f"no gyre-lab at {' or '.join(map(str, places))}: cargo build --release -p gyre-lab, or name it with --gyre")
 
 
 def simulate(gyre: Path, folder: Path) -> None:

@@ -32,7 +32,7 @@ def draw(n: int, cell_m: float, points: Tensor, dtype=torch.float32) -> Tensor:
 
 
 def write(path: Path, pose: np.ndarray, sequence: list[int] | None = None, rasters: np.ndarray | None = None) -> Scans:
-    """A file as `gyre export-pairs` writes it, read back: (k, 3) true poses, and rasters of 1 m cells where they matter."""
+    """A file as `gyre-lab export-pairs` writes it, read back: (k, 3) true poses, and rasters of 1 m cells where they matter."""
     rasters = np.zeros((len(pose), 2, 2)) if rasters is None else rasters
     n = rasters.shape[1]
     fields = {"raster": ("<f2", (n, n)), "pose": ("<f8", (3,)), "sequence": ("<u4", ())}

@@ -8,9 +8,13 @@ use serde::Serialize;
 /// Percentiles of a duration, microseconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Percentiles {
+    /// Median, us.
     pub p50_us: f64,
+    /// 90th percentile, us.
     pub p90_us: f64,
+    /// 99th percentile, us.
     pub p99_us: f64,
+    /// Maximum, us.
     pub max_us: f64,
 }
 

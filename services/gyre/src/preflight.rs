@@ -46,9 +46,13 @@ pub enum PreflightError {
 
 /// What the dataset and the machine allow.
 pub struct Preflight {
+    /// Scans to play.
     pub scans: usize,
+    /// How much may be on its way.
     pub window: Window,
+    /// The largest payloads.
     pub limits: Limits,
+    /// Shared memory that the run takes.
     pub footprint: Footprint,
     /// `ground_truth.tum` of a simulation that is played without being stored.
     pub truth: Option<Vec<u8>>,
@@ -108,6 +112,7 @@ pub fn warn_of_training(configuration: &Configuration) -> Result<(), crate::Fail
 
 /// What is to be played.
 pub struct Played {
+    /// Its scans.
     pub dataset: Box<dyn Dataset>,
     /// `ground_truth.tum` of a simulation that is played without being stored.
     pub truth: Option<Vec<u8>>,

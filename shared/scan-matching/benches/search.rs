@@ -1,5 +1,5 @@
 //! Times of the search on this machine, one thread, medians: the transforms that no search of this form avoids, and each
-//! step. `gyre tables` has the whole beside the papers and a peer.
+//! step. `gyre-lab tables` has the whole beside the papers and a peer.
 #![allow(clippy::unwrap_used)]
 
 #[path = "../tests/common/mod.rs"]

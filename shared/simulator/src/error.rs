@@ -1,8 +1,8 @@
-//! What can go wrong when a dataset is generated or spoilt.
+//! What can go wrong when a dataset is generated.
 
 use std::path::PathBuf;
 
-use gyre_radar::{OpenError, ReadError, TrajectoryError};
+use gyre_radar::TrajectoryError;
 
 /// Why a dataset could not be set up or written.
 #[derive(Debug, thiserror::Error)]
@@ -70,12 +70,6 @@ pub enum SimulatorError {
         /// What the system said.
         source: std::io::Error,
     },
-    /// The recording that is to be spoilt is none.
-    #[error(transparent)]
-    Open(#[from] OpenError),
-    /// A scan that is to be spoilt cannot be read.
-    #[error(transparent)]
-    Read(#[from] ReadError),
     /// An image could not be encoded.
     #[error("cannot encode {}: {source}", path.display())]
     Encode {

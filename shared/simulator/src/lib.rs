@@ -12,8 +12,7 @@
 //! - [`sensor`]: what a sweep measures of it,
 //! - [`simulator`]: one scan at a time, with its exact pose,
 //! - [`output`], [`simulated_drive`], [`truth`]: the drive as a recording of a dataset's form,
-//! - [`writer`]: that on a disk,
-//! - [`faults`]: the same, or a real one, spoilt on purpose.
+//! - [`writer`]: that on a disk.
 //!
 //! What each effect of the sensor looks like, off and on, is in `gallery/README.md` in the crate's folder, which
 //! `cargo run --release -p gyre-simulator --example gallery` draws.
@@ -32,7 +31,6 @@
 pub mod config;
 pub mod drive;
 pub mod error;
-pub mod faults;
 mod image;
 mod interpolate;
 mod layout;
@@ -54,7 +52,6 @@ pub mod writer;
 
 pub use config::SimulationConfig;
 pub use error::SimulatorError;
-pub use faults::{Fault, FaultPlan, write_faulty};
 pub use output::{HostStamps, OutputFormat};
 pub use path::{BlockLoop, Path, SplinePath};
 pub use profile::{Profile, Sampling};

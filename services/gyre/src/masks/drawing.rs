@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use gyre_realism::picture::{PictureError, write_rgb};
+use crate::picture::{PictureError, write_rgb};
 
 use super::exposure::{Exposure, View};
 

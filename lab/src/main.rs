@@ -1,0 +1,30 @@
+//! `gyre-lab`: tables of the papers, ablations, realism of simulated scans, corrupted recordings, training pairs.
+
+mod cli;
+mod corrupt;
+mod export_pairs;
+mod realism;
+mod tables;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+use cli::{Command, Lab};
+use gyre::Failure;
+
+fn main() -> ExitCode {
+    match Lab::parse().command {
+        Command::Gyre(command) => gyre::report("gyre", gyre::execute(command)),
+        command => gyre::report("gyre-lab", execute(command)),
+    }
+}
+
+fn execute(command: Command) -> Result<ExitCode, Failure> {
+    match command {
+        Command::Tables(arguments) => tables::tables(&arguments),
+        Command::Realism(arguments) => realism::realism(&arguments),
+        Command::Corrupt(arguments) => corrupt::corrupt(&arguments),
+        Command::ExportPairs(arguments) => export_pairs::export_pairs(&arguments),
+        Command::Gyre(command) => gyre::execute(command),
+    }
+}

@@ -1,0 +1,101 @@
+//! Drawn scans.
+
+#![allow(clippy::unwrap_used)]
+
+mod comparison;
+mod powers;
+mod texture;
+
+use crate::realism::{Meter, MeterConfig, RangeGrid, ScanStatistics};
+use gyre_radar::{OwnedScan, ScanLimits, Sense, SweepGeometry};
+use nalgebra::{Isometry2, Point2};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+pub const AZIMUTHS: usize = 400;
+pub const BINS: usize = 250;
+pub const RESOLUTION_M: f32 = 0.2;
+pub const PERIOD_NS: i64 = 250_000_000;
+
+/// The grid that the drawn scans are on already.
+pub const GRID: RangeGrid = RangeGrid {
+    resolution_m: RESOLUTION_M,
+    cells: BINS,
+};
+pub const CONFIG: MeterConfig = MeterConfig {
+    grid: GRID,
+    threshold: 60,
+    cell_m: 0.4,
+};
+
+/// A scan with these powers by azimuth and bin, the `index`-th of its recording.
+pub fn scan(
+    azimuths: usize,
+    bins: usize,
+    index: i64,
+    power: impl FnMut(usize, usize) -> u8,
+) -> OwnedScan {
+    let mut scan = OwnedScan::with_limits(ScanLimits {
+        bytes: azimuths * bins,
+        azimuths,
+    });
+    let stamp_ns = index * PERIOD_NS;
+    scan.geometry = SweepGeometry {
+        azimuths,
+        bins,
+        stride: bins,
+        first_byte: 0,
+        range_resolution_m: RESOLUTION_M,
+        range_offset_m: 0.0,
+        doppler_s: 0.0,
+        sense: Sense::Clockwise,
+        stamp_ns,
+    };
+    for azimuth in 0..azimuths {
+        let turn = azimuth as f64 / azimuths as f64;
+        scan.azimuth_rad[azimuth] = (turn * std::f64::consts::TAU) as f32;
+        scan.stamp_ns[azimuth] = stamp_ns + ((turn - 0.5) * PERIOD_NS as f64) as i64;
+    }
+    let mut power = power;
+    for (place, byte) in scan.bytes.iter_mut().enumerate() {
+        *byte = power(place / bins, place % bins);
+    }
+    scan
+}
+
+/// Independent powers from 0 to `most`.
+pub fn noise(seed: u64, most: u8) -> Vec<u8> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    (0..AZIMUTHS * BINS)
+        .map(|_| random.random_range(0..=most))
+        .collect()
+}
+
+/// A scan of posts, each a few bins deep and three azimuths wide, by a sensor that is at `pose(seconds since its stamp)`.
+pub fn posts(posts: &[Point2<f64>], index: i64, pose: impl Fn(f64) -> Isometry2<f64>) -> OwnedScan {
+    let mut drawn = scan(AZIMUTHS, BINS, index, |_, _| 0);
+    for azimuth in 0..AZIMUTHS {
+        let pose = pose((drawn.stamp_ns[azimuth] - drawn.geometry.stamp_ns) as f64 * 1e-9);
+        for post in posts {
+            let seen = pose.inverse() * post;
+            let clockwise = -seen.y.atan2(seen.x);
+            let off = (clockwise - f64::from(drawn.azimuth_rad[azimuth]))
+                .rem_euclid(std::f64::consts::TAU);
+            let off = off.min(std::f64::consts::TAU - off);
+            let bin = (seen.coords.norm() / f64::from(RESOLUTION_M)) as usize;
+            if off < 1.5 * std::f64::consts::TAU / AZIMUTHS as f64 && bin >= 2 && bin + 2 < BINS {
+                drawn.bytes[azimuth * BINS + bin - 1..=azimuth * BINS + bin + 1].fill(200);
+            }
+        }
+    }
+    drawn
+}
+
+/// What scans without known motions are like.
+pub fn measured<'s>(scans: impl IntoIterator<Item = &'s OwnedScan>) -> ScanStatistics {
+    let mut meter = Meter::new(CONFIG).unwrap();
+    for scan in scans {
+        meter.add(&scan.view(), None).unwrap();
+    }
+    meter.finish().unwrap()
+}

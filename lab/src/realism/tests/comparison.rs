@@ -1,0 +1,189 @@
+//! Distances between recordings, plots and pictures of them.
+
+use super::*;
+use crate::realism::{Change, Measured, Recording, SearchErrors, compare, plot::curves};
+use gyre::picture::Picture;
+
+/// A recording of noise with a wall, brighter by `gain`, whose searches are `errors` off.
+fn recording(seed: u64, gain: u8, errors: f64) -> Recording {
+    let noise = noise(seed, 40);
+    let wall = |azimuth: usize, bin: usize| (100..104).contains(&bin) && azimuth.is_multiple_of(3);
+    let one = scan(AZIMUTHS, BINS, 0, |azimuth, bin| {
+        noise[azimuth * BINS + bin] + gain + if wall(azimuth, bin) { 60 } else { 0 }
+    });
+    let change = Change {
+        pairs: 9,
+        correlation: 1.0 - errors,
+        unmatched_share: errors,
+    };
+    let errors = SearchErrors {
+        motions: 10,
+        path_m: 25.0,
+        translation_rmse_m: errors,
+        rotation_rmse_deg: 2.0 * errors,
+        ate_m: errors,
+        seg_percent: None,
+    };
+    let mut statistics = measured([&one]);
+    statistics.change = Some(change);
+    Recording {
+        name: format!("number {seed}"),
+        statistics,
+        plain: Some(errors),
+        refined: Some(errors),
+    }
+}
+
+fn whole(recording: Recording) -> Measured {
+    Measured {
+        whole: recording,
+        halves: None,
+    }
+}
+
+#[test]
+fn a_recording_is_at_no_distance_from_itself() {
+    let (one, other) = (whole(recording(1, 0, 0.1)), whole(recording(2, 30, 0.3)));
+    let comparison = compare(&one, &one, Some(&other));
+    for row in &comparison.rows {
+        let known = row.values[0].is_some();
+        assert_eq!(row.sim_real, known.then_some(0.0), "{}", row.statistic);
+    }
+    assert_eq!(
+        comparison.judged,
+        comparison
+            .rows
+            .iter()
+            .filter(|row| row.values[0].is_some())
+            .count()
+    );
+    let not_closer: Vec<&str> = comparison
+        .rows
+        .iter()
+        .filter(|row| row.closer == Some(false))
+        .map(|row| row.statistic)
+        .collect();
+    assert!(not_closer.is_empty(), "{not_closer:?}");
+}
+
+#[test]
+fn distances_have_the_units_that_they_name() {
+    let (one, other) = (recording(1, 0, 0.1), recording(1, 30, 0.2));
+    let comparison = compare(&whole(one), &whole(other), None);
+    let distance = |name: &str| {
+        comparison
+            .rows
+            .iter()
+            .find(|row| row.statistic == name)
+            .unwrap()
+            .sim_real
+            .unwrap()
+    };
+    let close = |name: &str, expected: f64| {
+        assert!(
+            (distance(name) - expected).abs() < 1e-4,
+            "{name}: {}, not {expected}",
+            distance(name)
+        );
+    };
+    close("histogram of power", 30.0);
+    close("mean power against range", 30.0);
+    close("correlation length in range", 0.0);
+    close("next scan: correlation", 0.1);
+    close("next scan: returns without counterpart", 2f64.ln());
+    close("plain search: translation of a motion", 2f64.ln());
+    close("refined search: rotation of a motion", 2f64.ln());
+    assert_eq!((comparison.judged, comparison.closer), (0, 0));
+}
+
+#[test]
+fn the_nearer_recording_is_closer_and_what_is_not_known_is_not_judged() {
+    let (real, mut near, far) = (
+        recording(1, 0, 0.1),
+        recording(2, 2, 0.11),
+        recording(3, 40, 0.5),
+    );
+    near.plain = None;
+    let halves = Some([recording(1, 0, 0.1), recording(1, 1, 0.2)]);
+    let real = Measured {
+        whole: real,
+        halves,
+    };
+    let comparison = compare(&whole(near), &real, Some(&whole(far)));
+    let row = |name: &str| {
+        comparison
+            .rows
+            .iter()
+            .find(|row| row.statistic == name)
+            .unwrap()
+    };
+    assert_eq!(row("histogram of power").closer, Some(true));
+    let within = row("histogram of power").within_real.unwrap();
+    assert!(
+        (within - 1.0).abs() < 1e-9 && row("histogram of power").within_other.is_none(),
+        "{within}"
+    );
+    assert!(
+        !row("histogram of power").is_within_chance()
+            && row("next scan: correlation").is_within_chance()
+    );
+    assert_eq!(
+        row("refined search: translation of a motion").closer,
+        Some(true)
+    );
+    let plain = row("plain search: translation of a motion");
+    assert_eq!(
+        (plain.closer, plain.sim_real, &plain.values[0]),
+        (None, None, &None)
+    );
+    assert!(plain.real_other.is_some());
+}
+
+#[test]
+fn every_plot_has_a_line_and_a_label_for_each_recording() {
+    let recordings = [
+        recording(1, 0, 0.1),
+        recording(2, 10, 0.1),
+        recording(3, 20, 0.1),
+    ];
+    let three = curves(&recordings.iter().collect::<Vec<_>>()).unwrap();
+    let two = curves(&[&recordings[0], &recordings[1]]).unwrap();
+    assert_eq!(three.len(), 4);
+    for ((name, three), (_, two)) in three.iter().zip(&two) {
+        assert!(
+            three.contains("other real") && !two.contains("other real"),
+            "{name}"
+        );
+        assert!(three.contains("1 scans of number 3"), "{name}");
+        let lines = |svg: &str| svg.matches("<polyline").count();
+        assert!(lines(three) > lines(two), "{name}");
+    }
+}
+
+#[test]
+fn a_picture_from_above_has_ahead_up_and_left_left() {
+    // A post ahead at 20 m, and a fainter one to the right at 30 m.
+    let near = |bin: usize, at: usize| bin.abs_diff(at) <= 2;
+    let drawn = scan(AZIMUTHS, BINS, 0, |azimuth, bin| match azimuth {
+        0..2 | 398.. if near(bin, 100) => 200,
+        98..=102 if near(bin, 150) => 100,
+        _ => 0,
+    });
+    let picture = Picture::from_above(&drawn.view(), 0.5).unwrap();
+    assert_eq!((picture.width, picture.height), (201, 201));
+    let at = |x_m: f64, y_m: f64| {
+        let (row, column) = (100.0 - x_m / 0.5, 100.0 - y_m / 0.5);
+        picture.pixels[row as usize * picture.width + column as usize]
+    };
+    assert!(
+        at(20.0, 0.0) > 150 && (60..=100).contains(&at(0.0, -30.0)),
+        "{} {}",
+        at(20.0, 0.0),
+        at(0.0, -30.0)
+    );
+    assert_eq!((at(-20.0, 0.0), at(0.0, 30.0)), (0, 0));
+    assert!(Picture::from_above(&drawn.view(), 0.001).is_err());
+    let measured = Picture::as_measured(&drawn.view());
+    assert_eq!((measured.width, measured.height), (BINS, AZIMUTHS));
+    assert_eq!(measured.pixels[100 * BINS + 150], 100);
+}

@@ -1,0 +1,219 @@
+//! `gyre-lab realism` as a whole, on small simulated recordings.
+
+use std::{fs, path::Path};
+
+use crate::common::{Ended, gyre, real_data, recording};
+use gyre_simulator::{SimulationConfig, write_dataset};
+use serde_json::Value;
+use tempfile::TempDir;
+
+const DIAGRAMS: [&str; 4] = [
+    "histogram.svg",
+    "power-against-range.svg",
+    "correlation-in-range.svg",
+    "correlation-in-azimuth.svg",
+];
+const PICTURES: [&str; 2] = [".png", "-as-measured.png"];
+
+/// A folder with `other`, a drive through another town, and the configuration that simulated recordings are read with.
+fn folder() -> TempDir {
+    let folder = tempfile::Builder::new()
+        .prefix("gyre-realism-")
+        .tempdir()
+        .unwrap();
+    let config = SimulationConfig {
+        scans: 8,
+        seed: 7,
+        traffic: gyre_simulator::traffic::TrafficConfig::none(),
+        ..SimulationConfig::default()
+    };
+    write_dataset(&config, &folder.path().join("other"), &mut |_, _| ()).unwrap();
+    fs::write(
+        folder.path().join("small.toml"),
+        "[raster]\nn = 127\ncell_m = 0.8\n",
+    )
+    .unwrap();
+    folder
+}
+
+/// `gyre-lab realism` in a folder.
+fn realism(folder: &Path, arguments: &[&str]) -> Ended {
+    let mut command = gyre();
+    command
+        .current_dir(folder)
+        .args(["realism", "--out", "out"])
+        .args(arguments);
+    Ended::of(command)
+}
+
+fn report(folder: &Path) -> Value {
+    serde_json::from_str(&fs::read_to_string(folder.join("out/realism.json")).unwrap()).unwrap()
+}
+
+fn rows(report: &Value) -> &Vec<Value> {
+    report["comparison"]["rows"].as_array().unwrap()
+}
+
+#[test]
+fn a_recording_is_closer_to_itself_than_another_is_in_all_that_is_measured() {
+    let folder = folder();
+    let small = recording::small().to_str().unwrap();
+    let configs = [
+        "--sim-config",
+        "small.toml",
+        "--real-config",
+        "small.toml",
+        "--between-config",
+        "small.toml",
+    ];
+    let arguments = [small, small, "--between", "other", "--scans", "8"];
+    let ended = realism(folder.path(), &[&arguments, &configs[..]].concat());
+    ended.succeeded();
+    let report = report(folder.path());
+    for row in rows(&report)
+        .iter()
+        .filter(|row| !row["values"][0].is_null())
+    {
+        assert_eq!(row["sim_real"], 0.0, "{row:#}");
+    }
+    let comparison = &report["comparison"];
+    assert!(
+        comparison["judged"].as_u64().unwrap() >= 12,
+        "{comparison:#}"
+    );
+    assert_eq!(comparison["closer"], comparison["judged"], "{comparison:#}");
+    let last = ended.stdout.lines().last().unwrap();
+    assert_eq!(last, format!("closer in {0} of {0}", comparison["judged"]));
+    assert_eq!(
+        fs::read_to_string(folder.path().join("out/realism.md")).unwrap(),
+        ended.stdout
+    );
+    for name in DIAGRAMS {
+        assert!(
+            fs::read_to_string(folder.path().join("out").join(name))
+                .unwrap()
+                .contains("<polyline"),
+            "{name}"
+        );
+    }
+    for (role, kind) in ["sim", "real", "other"]
+        .iter()
+        .flat_map(|role| PICTURES.map(|kind| (role, kind)))
+    {
+        assert!(
+            folder.path().join(format!("out/{role}{kind}")).is_file(),
+            "{role}{kind}"
+        );
+    }
+    let subject = |index: usize| &report["subjects"][index];
+    assert_eq!(subject(0)["aligned"]["by_truth"], 7);
+    assert_eq!(subject(2)["measured"]["whole"]["statistics"]["scans"], 8);
+}
+
+#[test]
+fn one_scan_and_a_recording_without_truth_have_what_can_be_had() {
+    let folder = folder();
+    let single = recording::copy(1);
+    fs::remove_dir_all(folder.path().join("other/gt")).unwrap();
+    fs::remove_file(folder.path().join("other/ground_truth.tum")).unwrap();
+    let configs = ["--sim-config", "small.toml", "--real-config", "small.toml"];
+    realism(
+        folder.path(),
+        &[&[single.path().to_str().unwrap(), "other"], &configs[..]].concat(),
+    )
+    .succeeded();
+    let report = report(folder.path());
+    assert_eq!(report["subjects"][1]["aligned"]["by_odometry"], 7);
+    for row in rows(&report) {
+        let of_scans = ["next scan", "plain search", "refined search"];
+        let needs_two = of_scans
+            .iter()
+            .any(|of| row["statistic"].as_str().unwrap().starts_with(of));
+        assert_eq!(row["values"][0].is_null(), needs_two, "{row:#}");
+        assert_eq!(row["sim_real"].is_null(), needs_two, "{row:#}");
+        let needs_truth = row["statistic"].as_str().unwrap().contains("search");
+        assert_eq!(row["values"][1].is_null(), needs_truth, "{row:#}");
+        assert!(row["closer"].is_null(), "{row:#}");
+    }
+}
+
+#[test]
+fn without_runs_the_scans_alone_are_measured() {
+    let folder = folder();
+    let small = recording::small().to_str().unwrap();
+    let ended = realism(
+        folder.path(),
+        &[
+            small,
+            "other",
+            "--search-scans",
+            "0",
+            "--scans",
+            "5",
+            "--threshold",
+            "80",
+        ],
+    );
+    ended.succeeded();
+    let report = report(folder.path());
+    let statistics = &report["subjects"][0]["measured"]["whole"]["statistics"];
+    assert_eq!(
+        (&statistics["scans"], &statistics["threshold"]),
+        (&Value::from(5), &Value::from(80))
+    );
+    assert_eq!(statistics["change"]["pairs"], 4);
+    assert!(!folder.path().join("out/sim/gyre").exists());
+    let distance = rows(&report)[0]["sim_real"].as_f64().unwrap();
+    assert!(distance > 0.01, "{distance}");
+}
+
+#[test]
+fn what_cannot_be_compared_is_refused() {
+    let folder = folder();
+    realism(folder.path(), &["other", "nowhere"]).refused_with(&["nowhere"]);
+    realism(
+        folder.path(),
+        &["other", "other", "--real-config", "none.toml"],
+    )
+    .refused_with(&["none.toml"]);
+}
+
+/// Another part of the same drive is nearer than a drive with another radar of the same kind.
+#[test]
+fn one_drive_is_closer_to_itself_than_to_another() {
+    let (Some(radiate), Some(oxford)) = (
+        real_data("radiate-2019-02-12"),
+        real_data("oxford-2019-01-10-14-36-48"),
+    ) else {
+        return;
+    };
+    let folder = folder();
+    let part = |name: &str, source: &str| {
+        let text = format!(
+            "[dataset]\nformat = \"radiate\"\nrange_offset_m = -0.15\n[source]\n{source}\n"
+        );
+        fs::write(folder.path().join(name), text).unwrap();
+    };
+    part("first.toml", "scans = 233");
+    part("second.toml", "first = 233");
+    let [radiate, oxford] = [&radiate, &oxford].map(|path| path.to_str().unwrap());
+    let configs = [
+        "--sim-config",
+        "first.toml",
+        "--real-config",
+        "second.toml",
+        "--search-scans",
+        "0",
+    ];
+    let ended = realism(
+        folder.path(),
+        &[&[radiate, radiate, "--between", oxford], &configs[..]].concat(),
+    );
+    ended.succeeded();
+    let report = report(folder.path());
+    for (index, factor) in [(0, 10.0), (1, 5.0), (5, 5.0)] {
+        let row = &rows(&report)[index];
+        let [near, far] = ["sim_real", "real_other"].map(|key| row[key].as_f64().unwrap());
+        assert!(factor * near < far, "{row:#}");
+    }
+}

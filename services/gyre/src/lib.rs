@@ -1,0 +1,53 @@
+//! Gyre's command line as a library: `gyre` is this crate's binary, and the laboratory builds on the same parts.
+//!
+//! Reading order: [`cli`], then [`run`] (what `gyre run` does, on a page), [`configuration`], [`results`].
+
+pub mod cli;
+pub mod configuration;
+pub mod evaluate;
+pub mod inspect;
+pub mod judgement;
+pub mod latency;
+pub mod machine;
+pub mod masks;
+pub mod odometry;
+pub mod picture;
+pub mod preflight;
+pub mod print;
+pub mod progress;
+pub mod results;
+pub mod run;
+pub mod search;
+pub mod simulate;
+pub mod stage;
+pub mod summary;
+
+use std::process::ExitCode;
+
+use cli::Command;
+
+/// A sentence for the person at the terminal.
+pub type Failure = Box<dyn std::error::Error + Send + Sync>;
+
+/// Executes a command of `gyre`.
+///
+/// # Errors
+/// One sentence that says what, where and what to do.
+pub fn execute(command: Command) -> Result<ExitCode, Failure> {
+    match command {
+        Command::Stage { name } => Ok(stage::run(&name)),
+        Command::Run(arguments) => run::run(&arguments),
+        Command::Inspect(arguments) => inspect::inspect(&arguments),
+        Command::Evaluate(arguments) => evaluate::evaluate(&arguments),
+        Command::Masks(arguments) => masks::masks(&arguments),
+        Command::Simulate(arguments) => simulate::simulate(&arguments),
+    }
+}
+
+/// The exit code of a command; a failure is printed as `program: sentence`.
+pub fn report(program: &str, result: Result<ExitCode, Failure>) -> ExitCode {
+    result.unwrap_or_else(|error| {
+        print::note(format_args!("{program}: {error}"));
+        ExitCode::FAILURE
+    })
+}

@@ -1,0 +1,24 @@
+//! Gyre as a whole, with real processes. One program, so that all of it is linked once; each run has a folder of its own.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+mod bad_input;
+mod evaluate;
+mod joint_search;
+mod k2pi;
+mod learned_masks;
+mod live;
+mod masks;
+mod pipeline;
+mod real_scans;
+mod refinement;
+mod resources;
+mod restart;
+mod simulation;
+
+/// The program under test.
+const PROGRAM: &str = env!("CARGO_BIN_EXE_gyre");
+/// The project's folder.
+const PROJECT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
