@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use gyre_simulator::drive::{DriveConfig, DriveKind};
 use gyre_simulator::traffic::{Traffic, TrafficConfig};
-use gyre_simulator::{Keep, Movers, Path, Streets};
+use gyre_simulator::{DrivingSide, Movers, Path, Streets};
 use nalgebra::Point2;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -28,9 +28,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let drive = kind.path(seed)?;
     let duration_s = drive.duration_s().min(60.0 * 60.0);
     let keep = if arguments.get(3).is_some_and(|keep| keep == "right") {
-        Keep::Right
+        DrivingSide::Right
     } else {
-        Keep::Left
+        DrivingSide::Left
     };
     let started = std::time::Instant::now();
     let streets = Streets::along(drive.as_ref(), duration_s, keep, seed);

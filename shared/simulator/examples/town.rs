@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 use gyre_simulator::path::recorded::{Excerpt, read};
 use gyre_simulator::town::{self, Character, TownConfig};
-use gyre_simulator::{BlockLoop, Body, Keep, Path, Streets};
+use gyre_simulator::{BlockLoop, Body, DrivingSide, Path, Streets};
 use nalgebra::Point2;
 
 /// Metres that are drawn to each side of the place.
@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let streets = Streets::along(
         drive.as_ref(),
         drive.duration_s().min(3600.0),
-        Keep::Left,
+        DrivingSide::Left,
         seed,
     );
     let started = std::time::Instant::now();

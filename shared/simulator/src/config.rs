@@ -3,8 +3,9 @@
 use gyre_radar::DatasetOptions;
 use serde::{Deserialize, Serialize};
 
-use crate::SimulatorError;
 use crate::drive::DriveConfig;
+use crate::error::SimulatorError;
+use crate::limits::require_within;
 use crate::output::{OutputConfig, OutputFormat};
 use crate::profile::Chirp;
 use crate::sensor::{Effects, SensorConfig};
@@ -58,7 +59,7 @@ impl Default for SimulationConfig {
 impl SimulationConfig {
     /// Refuses what cannot be simulated, naming the key.
     pub fn validate(&self) -> Result<(), SimulatorError> {
-        within("scans", self.scans as f64, 1.0, 100_000.0)?;
+        require_within("scans", self.scans as f64, 1.0, 100_000.0)?;
         self.drive.validate()?;
         self.town.validate()?;
         self.traffic.validate()?;
@@ -83,21 +84,4 @@ impl SimulationConfig {
             ..DatasetOptions::default()
         }
     }
-}
-
-/// Refuses a value beyond its limits, naming its key.
-pub(crate) fn within(
-    key: &'static str,
-    value: f64,
-    least: f64,
-    most: f64,
-) -> Result<(), SimulatorError> {
-    if (least..=most).contains(&value) {
-        return Ok(());
-    }
-    Err(SimulatorError::Config {
-        key,
-        value: value.to_string(),
-        expected: format!("between {least} and {most}"),
-    })
 }

@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use crate::SimulatorError;
-use crate::config::within;
+use crate::error::SimulatorError;
+use crate::lanes::DrivingSide;
+use crate::limits::require_within;
 use crate::path::recorded::{self, Excerpt};
 use crate::path::{BlockLoop, Path, TownDrive};
-use crate::streets::Keep;
 
 /// Where a drive comes from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -30,7 +30,7 @@ pub struct DriveConfig {
     /// `block`, `town` or `file`. The keys below that another kind names have no effect.
     pub kind: DriveKind,
     /// The side of the road that traffic keeps to: `left` or `right`.
-    pub keep: Keep,
+    pub keep: DrivingSide,
     /// `block`: its length, from street centre to street centre, metres along x.
     pub block_length_m: f64,
     /// `block`: its width, metres along y.
@@ -56,7 +56,7 @@ impl Default for DriveConfig {
     fn default() -> Self {
         Self {
             kind: DriveKind::Block,
-            keep: Keep::Left,
+            keep: DrivingSide::Left,
             block_length_m: 40.0,
             block_width_m: 32.0,
             speed_mps: 9.5,
@@ -85,7 +85,7 @@ impl DriveConfig {
     pub fn campus() -> Self {
         Self {
             kind: DriveKind::Town,
-            keep: Keep::Right,
+            keep: DrivingSide::Right,
             speed_mps: 25.0 / 3.6,
             length_m: 1135.0,
             ..Self::default()
@@ -94,19 +94,19 @@ impl DriveConfig {
 
     /// Refuses what cannot be driven, naming the key.
     pub fn validate(&self) -> Result<(), SimulatorError> {
-        within("drive.block_length_m", self.block_length_m, 30.0, 400.0)?;
-        within("drive.block_width_m", self.block_width_m, 30.0, 400.0)?;
-        within("drive.speed_mps", self.speed_mps, 0.5, 40.0)?;
-        within(
+        require_within("drive.block_length_m", self.block_length_m, 30.0, 400.0)?;
+        require_within("drive.block_width_m", self.block_width_m, 30.0, 400.0)?;
+        require_within("drive.speed_mps", self.speed_mps, 0.5, 40.0)?;
+        require_within(
             "drive.lateral_acceleration_mps2",
             self.lateral_acceleration_mps2.unwrap_or(1.0),
             0.1,
             20.0,
         )?;
-        within("drive.length_m", self.length_m, 300.0, 100_000.0)?;
-        within("drive.from_s", self.from_s, 0.0, 1e6)?;
-        within("drive.for_s", self.for_s.unwrap_or(1.0), 1.0, 1e6)?;
-        within("drive.rate_hz", self.rate_hz, 0.1, 100.0)?;
+        require_within("drive.length_m", self.length_m, 300.0, 100_000.0)?;
+        require_within("drive.from_s", self.from_s, 0.0, 1e6)?;
+        require_within("drive.for_s", self.for_s.unwrap_or(1.0), 1.0, 1e6)?;
+        require_within("drive.rate_hz", self.rate_hz, 0.1, 100.0)?;
         if self.kind == DriveKind::File && self.file.is_none() {
             let expected = "the path of a trajectory where `drive.kind` is \"file\"".to_owned();
             return Err(SimulatorError::Config {
@@ -179,7 +179,10 @@ mod tests {
     fn kinds_are_read_from_a_configuration() {
         let config: DriveConfig =
             toml::from_str("kind = \"town\"\nlength_m = 500.0\nkeep = \"right\"").unwrap();
-        assert_eq!((config.kind, config.keep), (DriveKind::Town, Keep::Right));
+        assert_eq!(
+            (config.kind, config.keep),
+            (DriveKind::Town, DrivingSide::Right)
+        );
         let drive = config.path(1).unwrap();
         assert!(
             (30.0..400.0).contains(&drive.duration_s()),

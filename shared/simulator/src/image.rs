@@ -5,7 +5,7 @@ use std::path::Path;
 
 use gyre_radar::ImageSize;
 
-use crate::SimulatorError;
+use crate::error::SimulatorError;
 
 /// Extension of files that are not complete yet.
 pub(crate) const PART: &str = "part";

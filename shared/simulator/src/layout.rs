@@ -3,8 +3,4 @@
 pub(crate) mod boreas;
 pub(crate) mod oxford;
 pub(crate) mod radiate;
-
-use std::path::PathBuf;
-
-/// A file beside the images: its path below the dataset's folder, and what is in it.
-pub(crate) type SideFile = (PathBuf, Vec<u8>);
+pub(crate) mod side_file;

@@ -7,7 +7,7 @@
 //! - [`drive`], [`path`]: which way is taken, and where the sensor is at any instant,
 //! - [`streets`]: the ways through the town,
 //! - [`town`], [`traffic`]: what stands and what moves around it,
-//! - [`world`], [`occlusion`]: how that reflects, and what hides what,
+//! - [`body`], [`world`], [`occlusion`]: how that reflects, and what hides what,
 //! - [`profile`]: the radars, [`weather`]: rain, fog and snow,
 //! - [`sensor`]: what a sweep measures of it,
 //! - [`simulator`]: one scan at a time, with its exact pose,
@@ -28,12 +28,15 @@
 //! # Ok::<(), gyre_simulator::SimulatorError>(())
 //! ```
 
+pub mod body;
 pub mod config;
 pub mod drive;
 pub mod error;
 mod image;
 mod interpolate;
+pub mod lanes;
 mod layout;
+mod limits;
 pub mod occlusion;
 pub mod output;
 pub mod path;
@@ -50,14 +53,16 @@ pub mod weather;
 pub mod world;
 pub mod writer;
 
+pub use body::{Body, Movers, Moving};
 pub use config::SimulationConfig;
 pub use error::SimulatorError;
+pub use lanes::DrivingSide;
 pub use output::{HostStamps, OutputFormat};
 pub use path::{BlockLoop, Path, SplinePath};
 pub use profile::{Profile, Sampling};
 pub use sensor::{Effects, Scene, Sensor, SensorConfig, SweepTime};
 pub use simulated_drive::{Renderer, SimulatedDrive};
 pub use simulator::{SimulatedScan, Simulator};
-pub use streets::{Keep, Street, Streets};
-pub use world::{Body, Movers, Moving, World};
+pub use streets::{Street, Streets};
+pub use world::World;
 pub use writer::{Summary, write_dataset, write_dataset_on};

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point2, Vector2};
 
-use crate::world::{NO_BODY, Wall};
+use crate::body::{NO_BODY, Wall};
 
 /// Metres a side of a cell: a few walls in each, some ten cells on the way to most scatterers.
 const CELL_M: f64 = 5.0;

@@ -1,42 +1,13 @@
 //! The path of the sensor: its pose at every instant.
 
 mod block;
+mod continuous;
 pub mod recorded;
 pub mod spline;
 mod spline_path;
 mod town_drive;
 
-use gyre_geometry::{Pose, Twist};
-use nalgebra::Vector2;
-
 pub use block::BlockLoop;
+pub use continuous::Path;
 pub use spline_path::SplinePath;
 pub use town_drive::TownDrive;
-
-/// A motion that is continuous in time.
-pub trait Path: Send + Sync {
-    /// Pose of the sensor (x forward, y left, yaw counter-clockwise) in the world at `time_s` seconds after the start.
-    ///
-    /// Defined for every time: before its start and after its end a path of finite duration stands still.
-    fn pose(&self, time_s: f64) -> Pose;
-
-    /// Duration of the drive, seconds; infinite where it never ends.
-    fn duration_s(&self) -> f64 {
-        f64::INFINITY
-    }
-
-    /// Velocity of the sensor in the world at a time, metres a second.
-    fn velocity(&self, time_s: f64) -> Vector2<f64> {
-        let half_s = 0.5e-3;
-        (self.pose(time_s + half_s).translation.vector
-            - self.pose(time_s - half_s).translation.vector)
-            / (2.0 * half_s)
-    }
-}
-
-/// A constant velocity, from the world's origin at time zero.
-impl Path for Twist {
-    fn pose(&self, time_s: f64) -> Pose {
-        self.pose_at(time_s)
-    }
-}

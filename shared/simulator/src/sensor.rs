@@ -4,7 +4,7 @@
 //!
 //! - `stations`: where the sensor is at each azimuth, and when its beam passes a place,
 //! - `skyline`: rays to all sides, and the walls that each passes,
-//! - `echoes`, `highlights`, `ghosts`: what can be seen, directly, as a gliding spot on a wall, and mirrored, and how strongly; `air`: what the weather takes,
+//! - `echoes`, `highlights`, `ghosts`: what can be seen, directly, as a gliding spot on a wall, and mirrored, and how strongly; `atmosphere`: what the weather takes,
 //! - `scintillation`: how they flicker as they are passed,
 //! - `elevation`: how much of each the beam has, being a few degrees high; `antenna`: how much of it each azimuth's beam takes in,
 //! - `spectrum`: what range processing and quantisation make of it,
@@ -16,8 +16,9 @@
 //! cell interfere (speckle), and do so differently from the next pose. Not modelled: heights other than by chance, ways
 //! that bounce once.
 
-mod air;
 mod antenna;
+mod atmosphere;
+mod beam_index;
 mod carrier;
 mod config;
 mod echoes;
@@ -32,9 +33,9 @@ mod scintillation;
 mod skyline;
 pub mod spectrum;
 mod stations;
+mod sweep_time;
 
 use std::f64::consts::TAU;
-use std::ops::Range;
 
 use gyre_radar::scan::flag;
 use gyre_radar::{ScanSlot, Sense, SweepGeometry};
@@ -42,22 +43,25 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use self::air::Air;
 use self::antenna::Antenna;
+use self::atmosphere::Atmosphere;
+use self::beam_index::BeamIndex;
 use self::carrier::Carrier;
 pub use self::config::SensorConfig;
-use self::echoes::{Echo, NEGLIGIBLE_POWER, View};
+use self::echoes::{Echo, View};
 pub use self::effects::Effects;
 use self::elevation::Nodding;
 use self::noise::Noise;
 use self::skyline::Skyline;
 use self::spectrum::RangeSpectrum;
 use self::stations::Stations;
+pub use self::sweep_time::SweepTime;
+use crate::body::{Movers, Moving};
 use crate::path::Path;
 use crate::profile::{Chirp, METADATA_BYTES, Receiver, Sampling};
 use crate::stream::Stream;
 use crate::weather::WeatherConfig;
-use crate::world::{Movers, Moving, World};
+use crate::world::World;
 
 /// Each azimuth has a part of its own of a scan's random numbers.
 const WORDS_AN_AZIMUTH: u128 = 1 << 24;
@@ -65,36 +69,6 @@ const WORDS_AN_AZIMUTH: u128 = 1 << 24;
 const DROPPED: f64 = 0.002;
 /// Jitter of the encoder, standard deviation, radians: a third of a count.
 const ENCODER_JITTER_RAD: f64 = 3.7e-4;
-
-/// When a sweep happens.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SweepTime {
-    /// The first azimuth's stamp, microseconds since 1970.
-    pub start_us: i64,
-    /// Time of one turn, microseconds.
-    pub period_us: i64,
-    /// Azimuths in one turn.
-    pub azimuths: usize,
-    /// The trajectory's time zero, microseconds since 1970.
-    pub epoch_us: i64,
-}
-
-impl SweepTime {
-    /// Stamp of an azimuth, microseconds since 1970.
-    pub fn stamp_us(&self, azimuth: usize) -> i64 {
-        self.start_us + self.period_us * azimuth as i64 / self.azimuths as i64
-    }
-
-    /// Middle of the sweep: half-way between the first and the last azimuth, microseconds since 1970.
-    pub fn middle_us(&self) -> i64 {
-        self.start_us + (self.stamp_us(self.azimuths - 1) - self.start_us) / 2
-    }
-
-    /// Time on the trajectory of a stamp, seconds.
-    pub fn drive_time_s(&self, stamp_us: i64) -> f64 {
-        (stamp_us - self.epoch_us) as f64 * 1e-6
-    }
-}
 
 /// What is to be measured.
 #[derive(Clone, Copy)]
@@ -125,11 +99,7 @@ pub struct Sensor {
     stations: Stations,
     skyline: Skyline,
     echoes: Vec<Echo>,
-    /// The azimuths whose beams take in each echo.
-    spans: Vec<Range<usize>>,
-    /// Echoes by azimuth: those of azimuth `a` are `lit[starts[a]..starts[a + 1]]`.
-    starts: Vec<usize>,
-    lit: Vec<u32>,
+    beams: BeamIndex,
     jitter_rad: Vec<f64>,
 }
 
@@ -148,9 +118,7 @@ impl Sensor {
             stations: Stations::default(),
             skyline: Skyline::default(),
             echoes: Vec::new(),
-            spans: Vec::new(),
-            starts: Vec::new(),
-            lit: Vec::new(),
+            beams: BeamIndex::default(),
             jitter_rad: vec![0.0; sampling.azimuths],
             config: config.clone(),
             effects: *effects,
@@ -219,12 +187,12 @@ impl Sensor {
         } else {
             WeatherConfig::default()
         };
-        let air = Air::new(&weather, self.receiver.carrier_ghz);
+        let atmosphere = Atmosphere::new(&weather, self.receiver.carrier_ghz);
         let view = View {
             stations: &self.stations,
             skyline: &self.skyline,
             receiver: &self.receiver,
-            air: &air,
+            atmosphere: &atmosphere,
             effects: &self.effects,
             reach_m,
         };
@@ -247,7 +215,7 @@ impl Sensor {
             .iter_mut()
             .for_each(|jitter| *jitter = jitter_rad * rng.sample::<f64, _>(StandardNormal));
         let clutter =
-            |range_m: f64| air.clutter_m2(range_m, view.receiver) * view.received(range_m);
+            |range_m: f64| atmosphere.clutter_m2(range_m, view.receiver) * view.received(range_m);
         let (snow, interference) = (weather.snow_mm_h > 0.0, self.effects.interference);
         self.noise.feel_surroundings(&self.stations, rng);
         self.noise.begin_sweep(
@@ -267,48 +235,7 @@ impl Sensor {
             )
         };
         self.noise.listen_around(self.echoes.iter().map(heard));
-        self.light();
-    }
-
-    /// Sorts echoes by the azimuths whose beams take them in.
-    fn light(&mut self) {
-        let azimuths = self.sampling.azimuths;
-        let step_rad = self.stations.step_rad();
-        let span = |echo: &Echo| {
-            let reach = self
-                .antenna
-                .reach_rad((NEGLIGIBLE_POWER.sqrt() / echo.amplitude).min(1.0))
-                / step_rad;
-            let reach = reach.min(stations::MARGIN as f64);
-            let (first, last) = (
-                (echo.azimuth - reach).ceil(),
-                (echo.azimuth + reach).floor(),
-            );
-            (first.max(0.0) as usize)..((last + 1.0).clamp(0.0, azimuths as f64) as usize)
-        };
-        self.spans.clear();
-        self.spans.extend(self.echoes.iter().map(span));
-        self.starts.clear();
-        self.starts.resize(azimuths + 1, 0);
-        self.spans
-            .iter()
-            .cloned()
-            .flatten()
-            .for_each(|azimuth| self.starts[azimuth] += 1);
-        let mut end = 0;
-        for start in &mut self.starts {
-            end += *start;
-            *start = end;
-        }
-        self.lit.clear();
-        self.lit.resize(end, 0);
-        // From the last one on, so that each azimuth's end comes down to its start.
-        for (number, span) in self.spans.iter().enumerate().rev() {
-            for azimuth in span.clone() {
-                self.starts[azimuth] -= 1;
-                self.lit[self.starts[azimuth]] = number as u32;
-            }
-        }
+        self.beams.sort(&self.echoes, &self.antenna, &self.stations);
     }
 
     /// Fills the spectrum with what one azimuth receives.
@@ -337,8 +264,8 @@ impl Sensor {
                     &self.receiver,
                 )
         });
-        for lit in self.starts[azimuth]..self.starts[azimuth + 1] {
-            let echo = &self.echoes[self.lit[lit] as usize];
+        for &number in self.beams.echoes(azimuth) {
+            let echo = &self.echoes[number as usize];
             let way = echo.place(&station) - station.position;
             let range_m = way.norm();
             // Small angles: the tangent will do.

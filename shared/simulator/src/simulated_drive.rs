@@ -5,12 +5,16 @@ use std::path::PathBuf;
 
 use gyre_radar::{DatasetOptions, Format, ImageSize, ImageSource, OwnedScan, ScanSlot};
 
-use crate::layout::{SideFile, boreas, oxford, radiate};
+use crate::config::SimulationConfig;
+use crate::error::SimulatorError;
+use crate::layout::side_file::SideFile;
+use crate::layout::{boreas, oxford, radiate};
 use crate::output::{HostStamps, OutputFormat};
 use crate::profile::Chirp;
 use crate::profile::METADATA_BYTES;
 use crate::sensor::Sensor;
-use crate::{SimulationConfig, Simulator, SimulatorError, truth};
+use crate::simulator::Simulator;
+use crate::truth;
 
 /// A simulated drive as a recording.
 #[derive(Clone)]

@@ -2,17 +2,19 @@
 
 use std::sync::Arc;
 
+use gyre_geometry::Pose;
 use gyre_radar::{OwnedScan, ScanLimits, ScanSlot, SweepGeometry};
-use nalgebra::Isometry2;
 
+use crate::config::SimulationConfig;
+use crate::error::SimulatorError;
 use crate::path::Path;
 use crate::profile::Sampling;
 use crate::sensor::{Scene, Sensor, SweepTime};
 use crate::streets::Streets;
+use crate::town;
 use crate::traffic::Traffic;
 use crate::weather::WeatherConfig;
 use crate::world::World;
-use crate::{SimulationConfig, SimulatorError, town};
 
 /// Stamp of the first azimuth of the first scan, microseconds since 1970 (2019-01-10 15:00 UTC): readers
 /// of recordings check that a year is plausible, and the same configuration has to give the same files.
@@ -37,7 +39,7 @@ pub struct SimulatedScan {
     /// The scan, in the layout of an Oxford image (its bytes are the image's, metadata included).
     pub scan: OwnedScan,
     /// Pose of the sensor in the world at the middle of the sweep (the scan's stamp).
-    pub pose: Isometry2<f64>,
+    pub pose: Pose,
 }
 
 impl Simulator {
@@ -111,7 +113,7 @@ impl Simulator {
     }
 
     /// Pose of the sensor in the world at the middle of scan `index`.
-    pub fn pose(&self, index: usize) -> Isometry2<f64> {
+    pub fn pose(&self, index: usize) -> Pose {
         let time = self.time(index);
         self.path.pose(time.drive_time_s(time.middle_us()))
     }

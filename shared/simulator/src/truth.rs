@@ -5,10 +5,10 @@
 //! x and y in the world, metres; yaw, radians counter-clockwise. 12.8 MB for 1,000 scans of 400 azimuths, exact to the last bit, and
 //! `numpy.load(path, mmap_mode="r")` opens it; as text it would be several times that, rounded, and slower to write than all else.
 
+use gyre_geometry::Pose;
 use gyre_radar::Trajectory;
-use nalgebra::Isometry2;
 
-use crate::Simulator;
+use crate::simulator::Simulator;
 
 /// `ground_truth.tum` as bytes. `stamps_ns` are the scans' times.
 pub(crate) fn ground_truth_tum(simulator: &Simulator, stamps_ns: Vec<i64>) -> Vec<u8> {
@@ -29,7 +29,7 @@ pub(crate) fn ground_truth_tum(simulator: &Simulator, stamps_ns: Vec<i64>) -> Ve
     text
 }
 
-fn pose_at(simulator: &Simulator, index: usize, stamp_ns: i64) -> Isometry2<f64> {
+fn pose_at(simulator: &Simulator, index: usize, stamp_ns: i64) -> Pose {
     let epoch_ns = simulator.time(index).epoch_us * 1000;
     simulator.path().pose((stamp_ns - epoch_ns) as f64 * 1e-9)
 }

@@ -6,8 +6,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::SimulatorError;
-use crate::config::within;
+use crate::error::SimulatorError;
+use crate::limits::require_within;
 
 /// What the weather is like from some time on: a section `[[simulation.weather]]`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -26,10 +26,10 @@ pub struct WeatherConfig {
 impl WeatherConfig {
     /// Refuses what cannot be simulated, naming the key.
     pub fn validate(&self) -> Result<(), SimulatorError> {
-        within("weather.from_s", self.from_s, 0.0, 1e6)?;
-        within("weather.rain_mm_h", self.rain_mm_h, 0.0, 200.0)?;
-        within("weather.fog_g_m3", self.fog_g_m3, 0.0, 5.0)?;
-        within("weather.snow_mm_h", self.snow_mm_h, 0.0, 50.0)
+        require_within("weather.from_s", self.from_s, 0.0, 1e6)?;
+        require_within("weather.rain_mm_h", self.rain_mm_h, 0.0, 200.0)?;
+        require_within("weather.fog_g_m3", self.fog_g_m3, 0.0, 5.0)?;
+        require_within("weather.snow_mm_h", self.snow_mm_h, 0.0, 50.0)
     }
 
     /// The weather that holds at a time of the drive: clear where none has begun.

@@ -10,9 +10,10 @@ use std::sync::mpsc;
 
 use gyre_radar::ImageSource as _;
 
+use crate::config::SimulationConfig;
+use crate::error::SimulatorError;
 use crate::image::{write_image, write_whole};
 use crate::simulated_drive::SimulatedDrive;
-use crate::{SimulationConfig, SimulatorError};
 
 pub use resume::MADE_BY;
 

@@ -7,11 +7,11 @@ use std::fs;
 use std::path::Path;
 
 use common::all_files;
+use gyre_geometry::Pose;
 use gyre_radar::scan::flag;
 use gyre_radar::{DatasetOptions, Format, OwnedScan};
 use gyre_simulator::profile::METADATA_BYTES;
 use gyre_simulator::{SimulationConfig, Simulator, SimulatorError, write_dataset};
-use nalgebra::{Isometry2, Vector2};
 
 fn config(scans: usize) -> SimulationConfig {
     SimulationConfig {
@@ -122,7 +122,7 @@ fn reader_for_real_data_reads_what_was_rendered() {
 struct Row {
     stamps: [i64; 2],
     images: [i64; 2],
-    motion: Isometry2<f64>,
+    motion: Pose,
 }
 
 fn rows(folder: &Path) -> Vec<Row> {
@@ -137,7 +137,7 @@ fn rows(folder: &Path) -> Vec<Row> {
         let whole = |i: usize| fields[i].parse::<i64>().unwrap();
         let real = |i: usize| fields[i].parse::<f64>().unwrap();
         // From y right, yaw clockwise to y left, yaw counter-clockwise.
-        let motion = Isometry2::new(Vector2::new(real(2), -real(3)), -real(7));
+        let motion = gyre_geometry::pose(real(2), -real(3), -real(7));
         Row {
             stamps: [whole(0), whole(1)],
             images: [whole(8), whole(9)],

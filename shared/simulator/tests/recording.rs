@@ -9,6 +9,7 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 
 use common::all_files;
+use gyre_geometry::Pose;
 use gyre_radar::{
     Dataset, DatasetOptions, Format, OwnedScan, find_ground_truth, inspect, read_trajectory,
 };
@@ -17,7 +18,6 @@ use gyre_simulator::{
     HostStamps, OutputFormat, SimulatedDrive, SimulationConfig, SimulatorError, Summary,
     write_dataset, write_dataset_on,
 };
-use nalgebra::Isometry2;
 
 const FORMATS: [OutputFormat; 3] = [
     OutputFormat::Oxford,
@@ -145,7 +145,7 @@ fn each_format_says_where_the_sensor_was() {
     }
 }
 
-fn pose_at(drive: &SimulatedDrive, stamp_ns: i64) -> Isometry2<f64> {
+fn pose_at(drive: &SimulatedDrive, stamp_ns: i64) -> Pose {
     let epoch_ns = drive.simulator().time(0).epoch_us * 1000;
     drive
         .simulator()

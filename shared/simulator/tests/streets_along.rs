@@ -4,12 +4,13 @@
 use std::f64::consts::PI;
 use std::time::Instant;
 
+use gyre_geometry::Pose;
 use gyre_geometry::Twist;
+use gyre_simulator::lanes::DrivingSide;
 use gyre_simulator::path::SplinePath;
 use gyre_simulator::path::recorded::{Excerpt, read};
-use gyre_simulator::streets::Keep;
 use gyre_simulator::{BlockLoop, Path, Streets};
-use nalgebra::{Isometry2, Point2, Vector2};
+use nalgebra::{Point2, Vector2};
 
 /// Largest clearance of the vehicle's middle along a drive: below -1.2 m the carriageways hold it everywhere.
 fn worst_clearance(drive: &dyn Path, duration_s: f64, streets: &Streets) -> f64 {
@@ -43,7 +44,7 @@ fn along_points(points: &[(f64, f64)], reversing: &[bool]) -> SplinePath {
         for step in 0..steps {
             poses.push((
                 time_s,
-                Isometry2::new(from + way * (step as f64 / steps as f64), yaw),
+                Pose::new(from + way * (step as f64 / steps as f64), yaw),
             ));
             time_s += 0.25;
         }
@@ -54,7 +55,7 @@ fn along_points(points: &[(f64, f64)], reversing: &[bool]) -> SplinePath {
 #[test]
 fn laps_of_a_block_are_one_ring_of_streets() {
     let block = BlockLoop::new(120.0, 90.0, 9.5, 5.0);
-    for keep in [Keep::Left, Keep::Right] {
+    for keep in [DrivingSide::Left, DrivingSide::Right] {
         let streets = Streets::along(&block, 5.0 * block.lap_s(), keep, 1);
         assert!(
             (length_m(&streets, true) - block.lap_m()).abs() < 20.0,
@@ -80,7 +81,7 @@ fn street_driven_back_some_metres_beside_is_one() {
         (0.0, 4.0),
     ];
     let drive = along_points(&there_and_back, &[false; 4]);
-    let streets = Streets::along(&drive, f64::INFINITY, Keep::Right, 3);
+    let streets = Streets::along(&drive, f64::INFINITY, DrivingSide::Right, 3);
     assert!(
         (length_m(&streets, true) - 400.0).abs() < 40.0,
         "{}",
@@ -100,7 +101,7 @@ fn three_point_turns_and_standing_give_streets() {
         (0.0, 3.5),
     ];
     let drive = along_points(&turn, &[false, false, true, false, false]);
-    let streets = Streets::along(&drive, f64::INFINITY, Keep::Right, 3);
+    let streets = Streets::along(&drive, f64::INFINITY, DrivingSide::Right, 3);
     assert!(
         length_m(&streets, true) < 150.0,
         "{}",
@@ -112,7 +113,7 @@ fn three_point_turns_and_standing_give_streets() {
         ..Twist::default()
     };
     for drive in [Twist::default(), on_the_spot] {
-        let streets = Streets::along(&drive, 60.0, Keep::Left, 3);
+        let streets = Streets::along(&drive, 60.0, DrivingSide::Left, 3);
         assert!(worst_clearance(&drive, 60.0, &streets) < -1.2);
     }
 }
@@ -121,7 +122,7 @@ fn three_point_turns_and_standing_give_streets() {
 fn same_seed_draws_the_same_streets_and_another_seed_others() {
     let block = BlockLoop::new(300.0, 200.0, 9.5, 5.0);
     let drawn = |seed| {
-        Streets::along(&block, 200.0, Keep::Left, seed)
+        Streets::along(&block, 200.0, DrivingSide::Left, seed)
             .streets()
             .to_vec()
     };
@@ -133,7 +134,7 @@ fn same_seed_draws_the_same_streets_and_another_seed_others() {
 fn side_streets_leave_room_to_all_others() {
     let block = BlockLoop::new(300.0, 200.0, 9.5, 5.0);
     for seed in 0..20 {
-        let streets = Streets::along(&block, 200.0, Keep::Left, seed);
+        let streets = Streets::along(&block, 200.0, DrivingSide::Left, seed);
         let all = streets.streets();
         for (number, side) in all.iter().enumerate().filter(|(_, s)| !s.driven) {
             let others = Streets::new(
@@ -170,9 +171,15 @@ fn real_drives_get_streets_quickly() {
         return;
     };
     let files = [
-        ("boreas-2021-09-02-11-42-radar_poses.csv", Keep::Right),
-        ("oxford-2019-01-10-11-46-21.radar_odometry.csv", Keep::Left),
-        ("oxford-2019-01-16-13-09-37.kitti.txt", Keep::Left),
+        (
+            "boreas-2021-09-02-11-42-radar_poses.csv",
+            DrivingSide::Right,
+        ),
+        (
+            "oxford-2019-01-10-11-46-21.radar_odometry.csv",
+            DrivingSide::Left,
+        ),
+        ("oxford-2019-01-16-13-09-37.kitti.txt", DrivingSide::Left),
     ];
     for (name, keep) in files {
         let drive = read(

@@ -5,9 +5,9 @@ use std::f64::consts::TAU;
 
 use gyre_geometry::Twist;
 use gyre_radar::{DatasetOptions, OwnedScan, ScanLimits};
+use gyre_simulator::body::{Aspect, NO_BODY, Scatterer, Wall};
 use gyre_simulator::profile::{METADATA_BYTES, Profile, Sampling};
 use gyre_simulator::weather::WeatherConfig;
-use gyre_simulator::world::{Aspect, NO_BODY, Scatterer, Wall};
 use gyre_simulator::{
     Body, Effects, Path, Scene, Sensor, SensorConfig, SimulationConfig, Simulator, SweepTime, World,
 };

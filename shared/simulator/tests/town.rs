@@ -1,10 +1,10 @@
 //! The town along whole drives: free of what would stand in the way, and of a size that can be rendered.
 #![allow(clippy::unwrap_used)]
 
+use gyre_simulator::body::NO_BODY;
 use gyre_simulator::path::recorded::{Excerpt, read};
 use gyre_simulator::town::{self, TownConfig};
-use gyre_simulator::world::NO_BODY;
-use gyre_simulator::{BlockLoop, Keep, Path, Streets, World};
+use gyre_simulator::{BlockLoop, DrivingSide, Path, Streets, World};
 use nalgebra::Point2;
 
 /// How far the radars look, metres.
@@ -16,7 +16,7 @@ fn place(drive: &dyn Path, time_s: f64) -> Point2<f64> {
 
 /// Builds the town along a drive and checks that nothing stands on a street or between two places of the drive.
 fn free_town(drive: &dyn Path, duration_s: f64, seed: u64) -> World {
-    let streets = Streets::along(drive, duration_s, Keep::Left, seed);
+    let streets = Streets::along(drive, duration_s, DrivingSide::Left, seed);
     let world = World::new(town::build(&TownConfig::default(), &streets, seed));
     for scatterer in world.scatterers() {
         assert!(

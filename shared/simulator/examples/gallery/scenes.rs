@@ -3,9 +3,10 @@
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-use gyre_simulator::world::{Aspect, NO_BODY, Scatterer, Wall};
+use gyre_geometry::Pose;
+use gyre_simulator::body::{Aspect, NO_BODY, Scatterer, Wall};
 use gyre_simulator::{Body, Movers, Moving};
-use nalgebra::{Isometry2, Point2, Vector2};
+use nalgebra::{Point2, Vector2};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -181,7 +182,7 @@ impl Passing {
 impl Movers for Passing {
     fn visit<'a>(&'a self, time_s: f64, _: Point2<f64>, _: f64, see: &mut dyn FnMut(Moving<'a>)) {
         let velocity = Vector2::new(self.speed_mps, 0.0);
-        let pose = Isometry2::translation(self.speed_mps * time_s - 10.0, -4.0);
+        let pose = Pose::translation(self.speed_mps * time_s - 10.0, -4.0);
         see(Moving {
             body: &self.car,
             pose,

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use gyre_geometry::Pose;
 use gyre_geometry::Twist;
 use gyre_radar::{OwnedScan, ScanLimits};
 use gyre_simulator::profile::Profile;
@@ -10,7 +11,6 @@ use gyre_simulator::{
     Body, Effects, Movers, Path, Scene, Sensor, SensorConfig, SimulationConfig, Simulator,
     SimulatorError, SweepTime, World,
 };
-use nalgebra::Isometry2;
 
 const SEED: u64 = 1;
 const EPOCH_US: i64 = 1_547_132_400_000_000;
@@ -32,7 +32,7 @@ pub struct Shot {
 struct Drive(Simulator);
 
 impl Path for Drive {
-    fn pose(&self, time_s: f64) -> Isometry2<f64> {
+    fn pose(&self, time_s: f64) -> Pose {
         self.0.path().pose(time_s)
     }
 }

@@ -3,8 +3,8 @@
 
 use std::f64::consts::PI;
 
-use super::SideFile;
-use crate::Simulator;
+use super::side_file::SideFile;
+use crate::simulator::Simulator;
 
 pub(crate) const FOLDER: &str = "radar";
 

@@ -2,8 +2,8 @@
 //! `gt/radar_odometry.csv`: for each scan but the first its pose in the frame of the one before, at the middles of the sweeps,
 //! x forward, **y right, yaw clockwise**.
 
-use super::SideFile;
-use crate::Simulator;
+use super::side_file::SideFile;
+use crate::simulator::Simulator;
 
 pub(crate) const FOLDER: &str = "radar";
 

@@ -5,9 +5,10 @@ use std::fmt::Write as _;
 
 use rand::Rng;
 
+use crate::error::SimulatorError;
 use crate::output::HostStamps;
+use crate::simulator::Simulator;
 use crate::stream::Stream;
-use crate::{Simulator, SimulatorError};
 
 pub(crate) const FOLDER: &str = "Navtech_Polar";
 
@@ -95,7 +96,7 @@ pub(crate) fn lay_on_side(rows: &[u8], stride: usize, first_byte: usize, into: &
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::SimulationConfig;
+    use crate::config::SimulationConfig;
 
     #[test]
     fn a_host_that_stalls_is_late_by_up_to_its_stall_and_never_hands_over_backwards() {

@@ -2,9 +2,9 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use nalgebra::{Isometry2, Vector2};
+use gyre_geometry::Pose;
 
-use super::Path;
+use super::continuous::Path;
 
 /// Length of a bend by 90 degrees, metres of path.
 const BEND_M: f64 = 20.0;
@@ -71,7 +71,7 @@ impl BlockLoop {
 }
 
 impl Path for BlockLoop {
-    fn pose(&self, time_s: f64) -> Isometry2<f64> {
+    fn pose(&self, time_s: f64) -> Pose {
         let time = time_s.rem_euclid(self.lap_s);
         let next = self
             .nodes
@@ -80,8 +80,9 @@ impl Path for BlockLoop {
         let (a, b) = (self.nodes[next - 1], self.nodes[next]);
         let share = (time - a.time_s) / (b.time_s - a.time_s);
         let between = |from: f64, to: f64| from + share * (to - from);
-        Isometry2::new(
-            Vector2::new(between(a.x_m, b.x_m), between(a.y_m, b.y_m)),
+        gyre_geometry::pose(
+            between(a.x_m, b.x_m),
+            between(a.y_m, b.y_m),
             between(a.heading_rad, b.heading_rad),
         )
     }

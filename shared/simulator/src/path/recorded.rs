@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
+use gyre_geometry::Pose;
 use gyre_radar::read_trajectory;
-use nalgebra::{Isometry2, Point2};
+use nalgebra::Point2;
 
-use super::SplinePath;
-use crate::SimulatorError;
+use super::spline_path::SplinePath;
+use crate::error::SimulatorError;
 
 /// No vehicle is faster, metres a second.
 const FASTEST_MPS: f64 = 90.0;
@@ -72,7 +73,7 @@ pub fn read(path: &Path, excerpt: Excerpt) -> Result<SplinePath, SimulatorError>
 }
 
 /// Refuses what no vehicle does: jumps, and pauses of many hours.
-fn check_steps(poses: &[&(f64, Isometry2<f64>)]) -> Result<(), String> {
+fn check_steps(poses: &[&(f64, Pose)]) -> Result<(), String> {
     for pair in poses.windows(2) {
         let ((from_s, from), (to_s, to)) = (pair[0], pair[1]);
         let (seconds, metres) = (
@@ -94,13 +95,13 @@ fn check_steps(poses: &[&(f64, Isometry2<f64>)]) -> Result<(), String> {
 }
 
 /// All poses with their seconds after the first; of poses with the same stamp the first.
-fn timed(path: &Path, rate_hz: f64) -> Result<Vec<(f64, Isometry2<f64>)>, SimulatorError> {
+fn timed(path: &Path, rate_hz: f64) -> Result<Vec<(f64, Pose)>, SimulatorError> {
     let read = read_trajectory(path)?;
     let seconds = |index: usize| match &read.stamp_ns {
         Some(stamps) => (stamps[index] - stamps[0]) as f64 * 1e-9,
         None => index as f64 / rate_hz,
     };
-    let mut poses: Vec<(f64, Isometry2<f64>)> = read
+    let mut poses: Vec<(f64, Pose)> = read
         .poses
         .iter()
         .enumerate()
@@ -111,7 +112,7 @@ fn timed(path: &Path, rate_hz: f64) -> Result<Vec<(f64, Isometry2<f64>)>, Simula
 }
 
 /// Share of a way that leads along x of the body, within 45 degrees; 1 where there is no way to speak of.
-fn share_ahead(poses: &[(f64, Isometry2<f64>)]) -> f64 {
+fn share_ahead(poses: &[(f64, Pose)]) -> f64 {
     let (mut ahead_m, mut all_m) = (0.0, 0.0);
     let mut from = poses[0].1;
     for (_, pose) in poses {

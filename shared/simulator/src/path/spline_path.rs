@@ -2,9 +2,10 @@
 
 use std::f64::consts::{PI, TAU};
 
-use nalgebra::{Isometry2, Vector2};
+use gyre_geometry::Pose;
+use nalgebra::Vector2;
 
-use super::Path;
+use super::continuous::Path;
 use super::spline::{Sample, UniformSpline};
 
 /// What a drive known at some instants is smoothed with: what changes faster than so many times a second is measuring
@@ -28,14 +29,14 @@ pub struct SplinePath {
 
 impl SplinePath {
     /// A drive close to `poses`, whose times ascend (seconds from zero), without what is faster than `cutoff_hz`.
-    pub fn new(poses: &[(f64, Isometry2<f64>)], cutoff_hz: f64) -> Self {
+    pub fn new(poses: &[(f64, Pose)], cutoff_hz: f64) -> Self {
         Self::smooth(&unwrapped(poses), cutoff_hz)
     }
 
     /// A drive close to poses that were measured, and so are off by some centimetres.
     ///
     /// Where they hardly differ for a while, the vehicle stands.
-    pub fn measured(poses: &[(f64, Isometry2<f64>)]) -> Self {
+    pub fn measured(poses: &[(f64, Pose)]) -> Self {
         let mut samples = unwrapped(poses);
         hold_stands(&mut samples);
         Self::smooth(&samples, MEASURED_HZ)
@@ -53,9 +54,9 @@ impl SplinePath {
 }
 
 impl Path for SplinePath {
-    fn pose(&self, time_s: f64) -> Isometry2<f64> {
+    fn pose(&self, time_s: f64) -> Pose {
         let [x, y, yaw] = self.curve.value(time_s.clamp(0.0, self.duration_s));
-        Isometry2::new(Vector2::new(x, y), yaw)
+        gyre_geometry::pose(x, y, yaw)
     }
 
     fn duration_s(&self) -> f64 {
@@ -72,9 +73,9 @@ impl Path for SplinePath {
 }
 
 /// Poses as x, y and a yaw that does not jump.
-fn unwrapped(poses: &[(f64, Isometry2<f64>)]) -> Vec<Sample<3>> {
+fn unwrapped(poses: &[(f64, Pose)]) -> Vec<Sample<3>> {
     let mut yaw = 0.0;
-    let sample = |(at, pose): &(f64, Isometry2<f64>)| {
+    let sample = |(at, pose): &(f64, Pose)| {
         yaw += (pose.rotation.angle() - yaw + PI).rem_euclid(TAU) - PI;
         Sample {
             at: *at,

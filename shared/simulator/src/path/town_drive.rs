@@ -4,20 +4,18 @@ mod lane;
 mod plan;
 mod route;
 mod speed;
+mod steered;
 
-use nalgebra::{Isometry2, Point2};
+use gyre_geometry::Pose;
 
-use super::SplinePath;
-use super::spline::{Sample, UniformSpline};
+use super::spline_path::SplinePath;
+use crate::lanes::DrivingSide;
 use crate::stream::Stream;
-use crate::streets::Keep;
 
 /// Seconds between the poses that the drive is computed at.
 const STEP_S: f64 = 0.1;
 /// What changes faster than so many times a second is smoothed away: less than any car turns its wheels.
 const CUTOFF_HZ: f64 = 1.2;
-/// The wheels are turned over so many metres: shorter wiggles of the lane are smoothed away.
-const STEER_M: f64 = 9.0;
 
 /// What to drive through a town.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,7 +27,7 @@ pub struct TownDrive {
     /// Sideways acceleration at which bends are taken, metres a second squared.
     pub lateral_acceleration_mps2: f64,
     /// The side that traffic keeps to.
-    pub keep: Keep,
+    pub keep: DrivingSide,
 }
 
 impl TownDrive {
@@ -42,7 +40,7 @@ impl TownDrive {
         let town = plan::Plan::new(self.length_m, &mut rng);
         let route = route::route(&town, self.length_m, &mut rng);
         let lane = lane::lane(&town, &route, self.keep);
-        let way = steered(&lane);
+        let way = steered::steered(&lane);
         let limits = speed::Limits {
             speed_mps: self.speed_mps,
             lateral_mps2: self.lateral_acceleration_mps2,
@@ -50,45 +48,15 @@ impl TownDrive {
         let progress = speed::progress(&way, &lane, &limits, self.length_m, &mut rng, STEP_S);
         let pose = |along_m: &f64| {
             let ([x, y], [dx, dy]) = (way.curve.value(*along_m), way.curve.slope(*along_m));
-            Isometry2::new(nalgebra::Vector2::new(x, y), dy.atan2(dx))
+            gyre_geometry::pose(x, y, dy.atan2(dx))
         };
-        let start = progress
-            .first()
-            .map_or(Isometry2::identity(), pose)
-            .inverse();
+        let start = progress.first().map_or(Pose::identity(), pose).inverse();
         let poses: Vec<_> = progress
             .iter()
             .enumerate()
             .map(|(i, s)| (i as f64 * STEP_S, start * pose(s)))
             .collect();
         SplinePath::new(&poses, CUTOFF_HZ)
-    }
-}
-
-/// A lane as it is driven.
-struct Way {
-    /// The vehicle by metres along the lane.
-    curve: UniformSpline<2>,
-    length_m: f64,
-}
-
-/// Drives a lane with wheels that turn gradually.
-fn steered(lane: &lane::Lane) -> Way {
-    let mut length_m = 0.0;
-    let mut before: Option<Point2<f64>> = None;
-    let sample = |place: &Point2<f64>| {
-        length_m += before.map_or(0.0, |before| (place - before).norm());
-        before = Some(*place);
-        Sample {
-            at: length_m,
-            value: [place.x, place.y],
-            weight: 1.0,
-        }
-    };
-    let samples: Vec<_> = lane.places.iter().map(sample).collect();
-    Way {
-        curve: UniformSpline::fit(&samples, 1.0, 1.0 / STEER_M),
-        length_m,
     }
 }
 

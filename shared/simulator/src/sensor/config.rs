@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::SimulatorError;
-use crate::config::within;
+use crate::error::SimulatorError;
+use crate::limits::require_within;
 use crate::profile::{Profile, Sampling};
 
 /// Which radar measures, and in what this one differs from its kind.
@@ -41,15 +41,15 @@ impl Default for SensorConfig {
 impl SensorConfig {
     /// Refuses what cannot be simulated, naming the key.
     pub fn validate(&self) -> Result<(), SimulatorError> {
-        within("sensor.period_s", self.period_s.unwrap_or(1.0), 0.05, 2.0)?;
-        within(
+        require_within("sensor.period_s", self.period_s.unwrap_or(1.0), 0.05, 2.0)?;
+        require_within(
             "sensor.range_offset_m",
             self.range_offset_m.unwrap_or(0.0),
             -5.0,
             5.0,
         )?;
-        within("sensor.doppler_s", self.doppler_s.unwrap_or(0.0), -0.5, 0.5)?;
-        within(
+        require_within("sensor.doppler_s", self.doppler_s.unwrap_or(0.0), -0.5, 0.5)?;
+        require_within(
             "sensor.azimuth_eccentricity_rad",
             self.azimuth_eccentricity_rad,
             -0.05,

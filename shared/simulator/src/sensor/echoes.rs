@@ -2,14 +2,15 @@
 
 use nalgebra::{Point2, Vector2};
 
-use super::Air;
+use super::atmosphere::Atmosphere;
 use super::effects::Effects;
 use super::elevation::lit;
 use super::scintillation::scintillation;
 use super::skyline::Skyline;
 use super::stations::{Station, Stations};
+use crate::body::{Moving, NO_BODY, Scatterer};
 use crate::profile::Receiver;
-use crate::world::{Moving, NO_BODY, Scatterer, World};
+use crate::world::World;
 
 /// Echoes with less power than this are not worth adding.
 pub(super) const NEGLIGIBLE_POWER: f64 = 0.05;
@@ -41,7 +42,7 @@ pub(super) struct View<'a> {
     pub stations: &'a Stations,
     pub skyline: &'a Skyline,
     pub receiver: &'a Receiver,
-    pub air: &'a Air,
+    pub atmosphere: &'a Atmosphere,
     pub effects: &'a Effects,
     pub reach_m: f64,
 }
@@ -162,6 +163,6 @@ impl View<'_> {
 
     /// Power received from 1 m2 at a range: the fourth power of range, and the receiver's gain, which rises with it.
     pub fn received(&self, range_m: f64) -> f64 {
-        self.receiver.sensitivity(range_m) * self.air.passed(range_m)
+        self.receiver.sensitivity(range_m) * self.atmosphere.passed(range_m)
     }
 }

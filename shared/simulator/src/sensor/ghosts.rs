@@ -11,8 +11,9 @@ use nalgebra::{Point2, Vector2};
 use super::echoes::{Echo, NEGLIGIBLE_POWER, View};
 use super::skyline::Skyline;
 use super::stations::Station;
+use crate::body::{Scatterer, Wall};
 use crate::occlusion::crossing;
-use crate::world::{Wall, World};
+use crate::world::World;
 
 /// Walls that mirror less than this share of the power show nothing.
 const LEAST_MIRROR: f64 = 0.15;
@@ -28,7 +29,7 @@ impl View<'_> {
     pub fn ghosts(&self, world: &World, echoes: &mut Vec<Echo>) {
         for wall in mirrors(world, self.skyline, self.stations.azimuths()) {
             let middle = Point2::from((wall.from.coords + wall.to.coords) / 2.0);
-            let strong = |s: &&crate::world::Scatterer| {
+            let strong = |s: &&Scatterer| {
                 s.cross_section_m2 >= LEAST_CROSS_SECTION_M2
                     && s.body != wall.body
                     && (s.position - middle).norm() < REACH_M
@@ -39,13 +40,7 @@ impl View<'_> {
         }
     }
 
-    fn ghost(
-        &self,
-        world: &World,
-        wall: &Wall,
-        of: &crate::world::Scatterer,
-        echoes: &mut Vec<Echo>,
-    ) {
+    fn ghost(&self, world: &World, wall: &Wall, of: &Scatterer, echoes: &mut Vec<Echo>) {
         let position = image(of.position, wall);
         self.stations.passings(
             |_: &Station| position,

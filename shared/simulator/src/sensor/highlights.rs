@@ -11,7 +11,8 @@ use nalgebra::{Point2, Vector2};
 
 use super::echoes::{Echo, NEGLIGIBLE_POWER, View};
 use super::stations::Station;
-use crate::world::{Wall, World};
+use crate::body::Wall;
+use crate::world::World;
 
 /// Share of the mirrored power that stays together: walls have windows, joints and courses.
 const SMOOTHNESS: f64 = 0.02;

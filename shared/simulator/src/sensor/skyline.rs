@@ -3,8 +3,9 @@
 use nalgebra::{Rotation2, Vector2};
 
 use super::stations::{MARGIN, Station, Stations};
+use crate::body::{Moving, NO_BODY, Wall};
 use crate::occlusion::crossing;
-use crate::world::{Moving, NO_BODY, Wall, World};
+use crate::world::World;
 
 /// Rays for each azimuth of 0.9 degrees.
 const RAYS: usize = 4;

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Point2, Vector2};
 
-use super::SweepTime;
+use super::sweep_time::SweepTime;
 use crate::path::Path;
 use crate::profile::Sampling;
 

@@ -2,17 +2,16 @@
 
 use nalgebra::Point2;
 use rand::Rng;
-use serde::{Deserialize, Serialize};
 
 use super::lines::{Line, simplified};
 use super::merge::{WayPoint, driven_lines, way};
+use super::network::Streets;
 use super::side::side_lines;
-use super::{Street, Streets};
+use super::street::Street;
+use crate::lanes::DrivingSide;
 use crate::path::Path;
 use crate::stream::Stream;
 
-/// Width of a lane, metres: a vehicle drives half of it beside the middle of its street.
-pub const LANE_M: f64 = 3.2;
 /// Room that the carriageway leaves beside the middle of the driven vehicle, metres.
 const BESIDE_VEHICLE_M: f64 = 1.3;
 /// How often it is looked whether the carriageway holds the vehicle, seconds.
@@ -22,23 +21,12 @@ const TOLERANCE_M: f64 = 0.1;
 /// Width of side streets, metres, from narrow residential ones to collectors.
 const SIDE_WIDTH_M: std::ops::Range<f64> = 5.0..8.0;
 
-/// The side of the road that traffic keeps to.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Keep {
-    /// As in Britain, where Oxford's and RADIATE's recordings were made.
-    #[default]
-    Left,
-    /// As in most other countries.
-    Right,
-}
-
 impl Streets {
     /// The streets along the first `duration_s` of a drive, and side streets that branch off them, the same for the same seed.
     ///
     /// The driven vehicle keeps to its lane; what it drives twice, in either direction and some metres beside, is one
     /// street. The carriageways hold it everywhere with 1.3 m to spare from its middle.
-    pub fn along(path: &dyn Path, duration_s: f64, keep: Keep, seed: u64) -> Self {
+    pub fn along(path: &dyn Path, duration_s: f64, keep: DrivingSide, seed: u64) -> Self {
         let mut rng = Stream::Streets.generator(seed);
         let duration_s = path.duration_s().min(duration_s);
         let way = way(path, duration_s, keep);

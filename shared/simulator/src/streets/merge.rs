@@ -1,9 +1,10 @@
 //! A way that is driven, as centre lines: what is driven twice becomes one street.
 
-use nalgebra::{Isometry2, Point2, Rotation2, Vector2};
+use gyre_geometry::Pose;
+use nalgebra::{Point2, Rotation2, Vector2};
 
-use super::along::{Keep, LANE_M};
 use super::lines::{Line, LineGrid, Segment, length_m};
+use crate::lanes::{DrivingSide, LANE_M};
 use crate::path::Path;
 
 /// Metres between points of the way.
@@ -33,11 +34,11 @@ pub struct WayPoint {
 }
 
 /// The way of a drive, a point every two metres.
-pub fn way(path: &dyn Path, duration_s: f64, keep: Keep) -> Vec<WayPoint> {
+pub fn way(path: &dyn Path, duration_s: f64, keep: DrivingSide) -> Vec<WayPoint> {
     let poses = steps(path, duration_s);
     let to_centre = match keep {
-        Keep::Left => -LANE_M / 2.0,
-        Keep::Right => LANE_M / 2.0,
+        DrivingSide::Left => -LANE_M / 2.0,
+        DrivingSide::Right => LANE_M / 2.0,
     };
     let point = |index: usize| {
         let (time_s, pose) = poses[index];
@@ -55,11 +56,9 @@ pub fn way(path: &dyn Path, duration_s: f64, keep: Keep) -> Vec<WayPoint> {
 }
 
 /// Poses with their times, each some metres from the one before; at least two, the last of them ahead of a vehicle that stands.
-fn steps(path: &dyn Path, duration_s: f64) -> Vec<(f64, Isometry2<f64>)> {
+fn steps(path: &dyn Path, duration_s: f64) -> Vec<(f64, Pose)> {
     let mut poses = vec![(0.0, path.pose(0.0))];
-    let apart = |a: &Isometry2<f64>, b: &Isometry2<f64>| {
-        (a.translation.vector - b.translation.vector).norm()
-    };
+    let apart = |a: &Pose, b: &Pose| (a.translation.vector - b.translation.vector).norm();
     for step in 1..=(duration_s / 0.05) as usize {
         let time_s = 0.05 * step as f64;
         let pose = path.pose(time_s);
@@ -68,15 +67,12 @@ fn steps(path: &dyn Path, duration_s: f64) -> Vec<(f64, Isometry2<f64>)> {
         }
     }
     let (_, last) = poses[poses.len() - 1];
-    poses.push((
-        duration_s,
-        last * Isometry2::new(Vector2::new(STEP_M, 0.0), 0.0),
-    ));
+    poses.push((duration_s, last * gyre_geometry::pose(STEP_M, 0.0, 0.0)));
     poses
 }
 
 /// The direction of the way where the vehicle looks ahead along it; its own where it turns on the spot.
-fn direction(poses: &[(f64, Isometry2<f64>)], index: usize) -> Vector2<f64> {
+fn direction(poses: &[(f64, Pose)], index: usize) -> Vector2<f64> {
     let (before, after) = (
         poses[index.saturating_sub(1)].1,
         poses[(index + 1).min(poses.len() - 1)].1,

@@ -6,7 +6,7 @@ use rand::Rng;
 use super::facade::right_of;
 use super::random::{smooth, stations};
 use super::site::{Screen, Site};
-use crate::world::NO_BODY;
+use crate::body::NO_BODY;
 
 /// Metres over which the edge of undergrowth comes and goes.
 const RAGGED_M: f64 = 9.0;

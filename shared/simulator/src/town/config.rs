@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::SimulatorError;
-use crate::config::within;
+use crate::error::SimulatorError;
+use crate::limits::require_within;
 
 /// What the town is like.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -47,7 +47,7 @@ impl Default for TownConfig {
 impl TownConfig {
     /// Refuses what cannot be built, naming the key.
     pub fn validate(&self) -> Result<(), SimulatorError> {
-        within("town.parked_cars", self.parked_cars, 0.0, 1.0)?;
-        within("town.trees", self.trees, 0.0, 3.0)
+        require_within("town.parked_cars", self.parked_cars, 0.0, 1.0)?;
+        require_within("town.trees", self.trees, 0.0, 3.0)
     }
 }

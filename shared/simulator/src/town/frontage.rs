@@ -1,6 +1,7 @@
 //! One side of a street: where its kerb runs, and the land beyond it.
 
-use nalgebra::{Isometry2, Point2, Vector2};
+use gyre_geometry::Pose;
+use nalgebra::{Point2, Vector2};
 
 use super::land::Lot;
 use super::random::hash;
@@ -114,9 +115,9 @@ impl<'a> Frontage<'a> {
     }
 
     /// A frame `out_m` metres beyond the kerb: x along it, y away from the street.
-    pub(super) fn frame(&self, along_m: f64, out_m: f64) -> Isometry2<f64> {
+    pub(super) fn frame(&self, along_m: f64, out_m: f64) -> Pose {
         let along = self.line.direction(along_m) * self.side;
-        Isometry2::new(self.place(along_m, out_m).coords, along.y.atan2(along.x))
+        Pose::new(self.place(along_m, out_m).coords, along.y.atan2(along.x))
     }
 
     /// Whether a place is this side's to furnish: no other street, and no other part of this one, is nearer.
@@ -149,7 +150,7 @@ impl<'a> Frontage<'a> {
             return None;
         }
         let origin = nalgebra::center(&front.0, &front.1) - way * (usable_m / 2.0);
-        let pose = Isometry2::new(origin.coords, way.y.atan2(way.x));
+        let pose = Pose::new(origin.coords, way.y.atan2(way.x));
         Some(Lot {
             pose,
             width_m: usable_m,

@@ -15,7 +15,7 @@ use super::frontage::Frontage;
 use super::random::{generator, hash, normal};
 use super::site::{Built, Site};
 use super::vehicle::CAR_HALF_M;
-use crate::world::NO_BODY;
+use crate::body::NO_BODY;
 
 /// From the kerb to posts and signs, metres.
 const POSTS_OUT_M: f64 = 0.5;

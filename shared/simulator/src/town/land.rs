@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Isometry2, Point2, Vector2};
+use gyre_geometry::Pose;
+use nalgebra::{Point2, Vector2};
 
 use crate::streets::Streets;
 
@@ -17,7 +18,7 @@ const SAMPLE_M: f64 = 3.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Lot {
     /// Its corner on the street: x along its front, y away from the street.
-    pub pose: Isometry2<f64>,
+    pub pose: Pose,
     /// Along the front, metres.
     pub width_m: f64,
     /// Of the street that it lies along, metres: more than its width in bends to its side.
@@ -123,7 +124,7 @@ mod tests {
 
     fn lot(x: f64, y: f64, turn: f64) -> Lot {
         Lot {
-            pose: Isometry2::new(Vector2::new(x, y), turn),
+            pose: gyre_geometry::pose(x, y, turn),
             width_m: 10.0,
             frontage_m: 10.0,
             depth_m: 30.0,

@@ -1,11 +1,12 @@
 //! A building site: where things are put together in a frame of their own.
 
-use nalgebra::{Isometry2, Point2, Vector2};
+use gyre_geometry::Pose;
+use nalgebra::{Point2, Vector2};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 use super::random::{normal, spread};
-use crate::world::{Aspect, Body, NO_BODY, Scatterer, Wall};
+use crate::body::{Aspect, Body, NO_BODY, Scatterer, Wall};
 
 /// What has been built, and the number of the last body.
 #[derive(Default)]
@@ -17,7 +18,7 @@ pub(super) struct Built {
 /// A place with a frame, whose things are drawn from a generator of its own. All coordinates are in that frame.
 pub(super) struct Site<'a> {
     pub built: &'a mut Built,
-    pub pose: Isometry2<f64>,
+    pub pose: Pose,
     pub rng: ChaCha8Rng,
 }
 
@@ -127,7 +128,7 @@ impl Site<'_> {
     }
 
     /// Puts a finished body, given around its own origin, at a pose.
-    pub(super) fn place(&mut self, body: &Body, pose: &Isometry2<f64>) {
+    pub(super) fn place(&mut self, body: &Body, pose: &Pose) {
         let pose = self.pose * pose;
         self.built
             .content

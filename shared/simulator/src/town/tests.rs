@@ -1,9 +1,10 @@
-use nalgebra::{Isometry2, Point2, Vector2};
+use nalgebra::Point2;
 
 use super::*;
+use crate::body::{NO_BODY, Wall};
 use crate::occlusion::crossing;
 use crate::streets::Street;
-use crate::world::{NO_BODY, Wall, World};
+use crate::world::World;
 
 /// A street from a place, `turn_rad` to the left for every metre.
 fn street(
@@ -13,11 +14,11 @@ fn street(
     turn_rad: f64,
     driven: bool,
 ) -> Street {
-    let mut pose = Isometry2::new(Vector2::new(from.0, from.1), heading_rad);
+    let mut pose = gyre_geometry::pose(from.0, from.1, heading_rad);
     let mut centre = Vec::new();
     for _ in 0..=(length_m / 2.0) as usize {
         centre.push(Point2::from(pose.translation.vector));
-        pose *= Isometry2::new(Vector2::new(2.0, 0.0), 2.0 * turn_rad);
+        pose *= gyre_geometry::pose(2.0, 0.0, 2.0 * turn_rad);
     }
     Street {
         centre,

@@ -1,11 +1,12 @@
 //! Cars, parked or under way.
 
-use nalgebra::{Isometry2, Point2, Rotation2, Vector2};
+use gyre_geometry::Pose;
+use nalgebra::{Point2, Rotation2, Vector2};
 use rand::Rng;
 
 use super::random::{normal, spread, stations};
 use super::site::Site;
-use crate::world::{Aspect, Body, Scatterer, Wall};
+use crate::body::{Aspect, Body, Scatterer, Wall};
 
 /// Half a car's length and width, metres.
 pub(super) const CAR_HALF_M: (f64, f64) = (2.15, 0.9);
@@ -72,6 +73,6 @@ impl Site<'_> {
         let body = self.body();
         let car = car(body, &mut self.rng);
         let askew_rad = (0.03 * normal(&mut self.rng)).clamp(-0.06, 0.06);
-        self.place(&car, &Isometry2::new(place.coords, heading_rad + askew_rad));
+        self.place(&car, &Pose::new(place.coords, heading_rad + askew_rad));
     }
 }

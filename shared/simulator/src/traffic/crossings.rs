@@ -1,15 +1,18 @@
 //! Who waits in side streets while the driven vehicle passes, and crosses when it has gone.
 
-use nalgebra::{Isometry2, Point2, Vector2};
+use gyre_geometry::Pose;
+use nalgebra::{Point2, Vector2};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
+use super::actor::Actor;
+use super::crowd::Crowd;
 use super::own_way::OwnWay;
 use super::road_user::Kind;
 use super::track::{Crossing, Track};
-use super::{Actor, Crowd};
+use crate::lanes::{DrivingSide, LANE_M};
 use crate::path::spline::{Sample, UniformSpline};
-use crate::streets::{Keep, LANE_M, Street, Streets};
+use crate::streets::{Street, Streets};
 
 /// Vehicles are shown while the driven one is so near to the junction, metres.
 const SEEN_M: f64 = 170.0;
@@ -43,7 +46,7 @@ pub fn add(
     crowd: &mut Crowd,
     streets: &Streets,
     way: &OwnWay,
-    keep: Keep,
+    keep: DrivingSide,
     share: f64,
     rng: &mut ChaCha8Rng,
 ) {
@@ -138,7 +141,7 @@ fn queue(
     junction: &Junction<'_>,
     way: &OwnWay,
     pass: Pass,
-    keep: Keep,
+    keep: DrivingSide,
     rng: &mut ChaCha8Rng,
 ) {
     let (path, length_m, nose_m) = path(junction, keep);
@@ -198,11 +201,11 @@ fn gap(crowd: &Crowd, place: Point2<f64>, way: &OwnWay, from_s: f64, until_s: f6
 }
 
 /// The path out of a side street, in its lane, and into the one across; its length; and where the nose of the first stands.
-fn path(junction: &Junction<'_>, keep: Keep) -> (UniformSpline<2>, f64, f64) {
-    let side = if keep == Keep::Left { 1.0 } else { -1.0 };
+fn path(junction: &Junction<'_>, keep: DrivingSide) -> (UniformSpline<2>, f64, f64) {
+    let side = if keep == DrivingSide::Left { 1.0 } else { -1.0 };
     let lane = |street: &Street, along_m: f64, outwards: f64| {
         let left_m = side * outwards * (LANE_M / 2.0).min(street.half_width_m / 2.0);
-        (street.at(along_m) * Isometry2::translation(0.0, left_m))
+        (street.at(along_m) * Pose::translation(0.0, left_m))
             .translation
             .vector
     };

@@ -1,10 +1,12 @@
 //! The way of the driven vehicle by its length: what all traffic around it is placed on.
 
-use nalgebra::{Isometry2, Point2, Vector2};
+use gyre_geometry::Pose;
+use nalgebra::{Point2, Vector2};
 
+use crate::lanes::DrivingSide;
 use crate::path::Path;
 use crate::path::spline::{Sample, UniformSpline};
-use crate::streets::{Keep, Streets};
+use crate::streets::Streets;
 
 /// The way goes on straight for so many metres before its start and after its end.
 const BEYOND_M: f64 = 300.0;
@@ -44,8 +46,8 @@ pub struct OwnWay {
 
 impl OwnWay {
     /// The way of the first `duration_s` of a drive through `streets`.
-    pub fn new(path: &dyn Path, duration_s: f64, streets: &Streets, keep: Keep) -> Self {
-        let side = if keep == Keep::Left { 1.0 } else { -1.0 };
+    pub fn new(path: &dyn Path, duration_s: f64, streets: &Streets, keep: DrivingSide) -> Self {
+        let side = if keep == DrivingSide::Left { 1.0 } else { -1.0 };
         let duration_s = path.duration_s().min(duration_s);
         let times = (0..=(duration_s / STEP_S) as usize).map(|i| i as f64 * STEP_S);
         let poses: Vec<_> = times.map(|time_s| (time_s, path.pose(time_s))).collect();
@@ -110,13 +112,13 @@ impl OwnWay {
     }
 
     /// A pose on the way, `inwards_m` beside the vehicle's own track (towards the middle of the street), looking along it.
-    pub fn pose(&self, along_m: f64, inwards_m: f64) -> Isometry2<f64> {
+    pub fn pose(&self, along_m: f64, inwards_m: f64) -> Pose {
         let ([x, y], [dx, dy]) = (self.places.value(along_m), self.places.slope(along_m));
         let along = Vector2::new(dx, dy)
             .try_normalize(1e-9)
             .unwrap_or(Vector2::x());
         let inwards = Vector2::new(along.y, -along.x) * self.side;
-        Isometry2::new(
+        Pose::new(
             Vector2::new(x, y) + inwards * inwards_m,
             along.y.atan2(along.x),
         )
@@ -165,7 +167,7 @@ impl OwnWay {
     }
 }
 
-fn distances(poses: &[(f64, Isometry2<f64>)]) -> Vec<f64> {
+fn distances(poses: &[(f64, Pose)]) -> Vec<f64> {
     let mut driven = vec![0.0];
     for pair in poses.windows(2) {
         let step_m = (pair[1].1.translation.vector - pair[0].1.translation.vector).norm();
@@ -175,14 +177,14 @@ fn distances(poses: &[(f64, Isometry2<f64>)]) -> Vec<f64> {
 }
 
 /// Places every few metres, with straight lines before and behind.
-fn place_samples(poses: &[(f64, Isometry2<f64>)], driven: &[f64]) -> Vec<Sample<2>> {
+fn place_samples(poses: &[(f64, Pose)], driven: &[f64]) -> Vec<Sample<2>> {
     let sample = |at: f64, place: Point2<f64>| Sample {
         at,
         value: [place.x, place.y],
         weight: 1.0,
     };
     let steps = (BEYOND_M / STEP_M) as i64;
-    let straight = |pose: &Isometry2<f64>, from_m: f64, step: i64| {
+    let straight = |pose: &Pose, from_m: f64, step: i64| {
         let ahead_m = step as f64 * STEP_M;
         sample(from_m + ahead_m, pose * Point2::new(ahead_m, 0.0))
     };
@@ -216,7 +218,7 @@ fn kerb_samples(places: &UniformSpline<2>, length_m: f64, streets: &Streets) -> 
 
 /// When others are where: about as fast as the vehicle is there, but nowhere waiting.
 fn clocks(
-    poses: &[(f64, Isometry2<f64>)],
+    poses: &[(f64, Pose)],
     driven: &[f64],
     length_m: f64,
 ) -> (UniformSpline<1>, UniformSpline<1>) {

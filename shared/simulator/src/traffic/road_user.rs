@@ -11,8 +11,8 @@ use nalgebra::{Point2, Rotation2, Vector2};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
+use crate::body::{Aspect, Body, Scatterer, Wall};
 use crate::town;
-use crate::world::{Aspect, Body, Scatterer, Wall};
 
 /// A kind of road user.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,6 +1,10 @@
 #![allow(clippy::unwrap_used)]
 use std::collections::BTreeMap;
 
+use gyre_geometry::Pose;
+use nalgebra::Vector2;
+
+use super::track::Track;
 use super::*;
 use crate::path::{BlockLoop, TownDrive};
 
@@ -9,17 +13,17 @@ fn town(seed: u64, config: &TrafficConfig) -> (Arc<dyn Path>, Traffic) {
         length_m: 2500.0,
         speed_mps: 13.9,
         lateral_acceleration_mps2: 2.2,
-        keep: Keep::Left,
+        keep: DrivingSide::Left,
     };
     let drive: Arc<dyn Path> = Arc::new(town.path(seed));
     let duration_s = drive.duration_s();
-    let streets = Streets::along(drive.as_ref(), duration_s, Keep::Left, seed);
+    let streets = Streets::along(drive.as_ref(), duration_s, DrivingSide::Left, seed);
     let traffic = Traffic::new(
         config,
         drive.clone(),
         duration_s,
         &streets,
-        Keep::Left,
+        DrivingSide::Left,
         seed,
     );
     (drive, traffic)
@@ -30,7 +34,7 @@ fn around(
     drive: &dyn Path,
     time_s: f64,
     reach_m: f64,
-) -> Vec<(u32, Isometry2<f64>, Vector2<f64>)> {
+) -> Vec<(u32, Pose, Vector2<f64>)> {
     let mut all = Vec::new();
     let centre = Point2::from(drive.pose(time_s).translation.vector);
     traffic.visit(time_s, centre, reach_m, &mut |m| {
@@ -40,7 +44,7 @@ fn around(
 }
 
 /// Whether the middles of two road users are so near that they are inside each other.
-fn overlap(a: &Actor, at: &Isometry2<f64>, b: &Actor, there: &Isometry2<f64>) -> bool {
+fn overlap(a: &Actor, at: &Pose, b: &Actor, there: &Pose) -> bool {
     let seen = at.inverse() * there;
     let (cosine, sine) = (
         seen.rotation.cos_angle().abs(),
@@ -191,13 +195,13 @@ fn density_says_how_many_there_are() {
 #[test]
 fn small_block_has_traffic_that_is_nowhere_twice() {
     let drive: Arc<dyn Path> = Arc::new(BlockLoop::new(40.0, 32.0, 9.5, 5.0));
-    let streets = Streets::along(drive.as_ref(), 60.0, Keep::Left, 1);
+    let streets = Streets::along(drive.as_ref(), 60.0, DrivingSide::Left, 1);
     let traffic = Traffic::new(
         &TrafficConfig::default(),
         drive.clone(),
         60.0,
         &streets,
-        Keep::Left,
+        DrivingSide::Left,
         1,
     );
     assert!(traffic.way.reach_m() < 60.0, "{}", traffic.way.reach_m());
@@ -215,13 +219,13 @@ fn vehicle_that_stands_or_turns_on_the_spot_has_traffic_too() {
             yaw_rate_radps,
             ..Twist::default()
         });
-        let streets = Streets::along(drive.as_ref(), 60.0, Keep::Right, 1);
+        let streets = Streets::along(drive.as_ref(), 60.0, DrivingSide::Right, 1);
         let traffic = Traffic::new(
             &TrafficConfig::default(),
             drive.clone(),
             60.0,
             &streets,
-            Keep::Right,
+            DrivingSide::Right,
             1,
         );
         let places = (0..60).flat_map(|i| around(&traffic, drive.as_ref(), f64::from(i), 150.0));

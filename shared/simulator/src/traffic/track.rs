@@ -2,11 +2,11 @@
 
 use std::f64::consts::{PI, TAU};
 
-use nalgebra::Isometry2;
+use gyre_geometry::Pose;
 
 use super::own_way::OwnWay;
+use crate::lanes::LANE_M;
 use crate::path::spline::UniformSpline;
-use crate::streets::LANE_M;
 
 /// Seconds that a vehicle's motion lags that of the one ahead (Newell, "A simplified car-following theory", 2002).
 pub const REACTION_S: f64 = 1.2;
@@ -97,7 +97,7 @@ pub struct Crossing {
 
 impl Track {
     /// The pose at a time; `None` where it is not on the road.
-    pub fn pose(&self, way: &OwnWay, time_s: f64) -> Option<Isometry2<f64>> {
+    pub fn pose(&self, way: &OwnWay, time_s: f64) -> Option<Pose> {
         if let Self::Crossing(crossing) = self {
             return crossing.pose(time_s);
         }
@@ -114,7 +114,7 @@ impl Track {
         let turned = matches!(self, Self::Oncoming(_))
             || matches!(self, Self::Beside(b) if b.share == 0.0 && b.speed_mps < 0.0);
         Some(if turned {
-            pose * Isometry2::rotation(PI)
+            pose * Pose::rotation(PI)
         } else {
             pose
         })
@@ -172,14 +172,14 @@ impl Beside {
 }
 
 impl Crossing {
-    fn pose(&self, time_s: f64) -> Option<Isometry2<f64>> {
+    fn pose(&self, time_s: f64) -> Option<Pose> {
         let at_m =
             self.waits_m - self.ramp_m(self.from_s - time_s) + self.ramp_m(time_s - self.until_s);
         if !(0.0..=self.length_m).contains(&at_m) {
             return None;
         }
         let ([x, y], [dx, dy]) = (self.path.value(at_m), self.path.slope(at_m));
-        Some(Isometry2::new(nalgebra::Vector2::new(x, y), dy.atan2(dx)))
+        Some(gyre_geometry::pose(x, y, dy.atan2(dx)))
     }
 
     /// Metres driven some seconds after starting: first at 2 m/s², and less and less.

@@ -7,9 +7,10 @@ use std::path::Path;
 
 use gyre_radar::ImageSource as _;
 
+use crate::config::SimulationConfig;
+use crate::error::SimulatorError;
 use crate::image::{PART, encode};
 use crate::simulated_drive::SimulatedDrive;
-use crate::{SimulationConfig, SimulatorError};
 
 /// The file that says what made a recording: its configuration.
 pub const MADE_BY: &str = "simulation.toml";

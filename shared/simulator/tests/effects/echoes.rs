@@ -1,7 +1,7 @@
 //! What scatterers and walls make of a point: aspect, cover, images, interference.
 
 use gyre_simulator::Effects;
-use gyre_simulator::world::{Aspect, Wall};
+use gyre_simulator::body::{Aspect, Wall};
 use nalgebra::{Point2, Rotation2, Vector2};
 
 use crate::scene::{Setup, db, peak_db, post};

@@ -2,11 +2,12 @@
 
 use std::f64::consts::TAU;
 
+use gyre_geometry::Pose;
 use gyre_radar::OwnedScan;
+use gyre_simulator::body::Wall;
 use gyre_simulator::profile::Profile;
-use gyre_simulator::world::Wall;
 use gyre_simulator::{Effects, Path};
-use nalgebra::{Isometry2, Point2, Vector2};
+use nalgebra::Point2;
 
 use crate::scene::{Setup, db, mean_db, power, powers};
 
@@ -76,10 +77,10 @@ fn an_opaque_wall_leaves_the_ground_before_it_and_hides_that_behind() {
 }
 
 /// Stands where it is.
-struct Parked(Isometry2<f64>);
+struct Parked(Pose);
 
 impl Path for Parked {
-    fn pose(&self, _: f64) -> Isometry2<f64> {
+    fn pose(&self, _: f64) -> Pose {
         self.0
     }
 }
@@ -113,17 +114,14 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
 
 #[test]
 fn the_same_patches_are_seen_from_two_poses() {
-    let poses = [
-        Isometry2::identity(),
-        Isometry2::new(Vector2::new(24.0, 7.0), 1.9),
-    ];
+    let poses = [Pose::identity(), gyre_geometry::pose(24.0, 7.0, 1.9)];
     // Between the two.
     let places = || {
         (0..=8).flat_map(|i| {
             (-8..=8).map(move |j| Point2::new(8.0 + f64::from(i), 2.0 * f64::from(j)))
         })
     };
-    let seen = |pose: Isometry2<f64>, from: Isometry2<f64>| {
+    let seen = |pose: Pose, from: Pose| {
         let parked = Parked(pose);
         let scans = Setup {
             path: &parked,
@@ -136,7 +134,7 @@ fn the_same_patches_are_seen_from_two_poses() {
         )
     };
     let [first, second] = poses.map(|pose| seen(pose, pose));
-    let elsewhere = seen(Isometry2::translation(1000.0, 0.0), poses[0]);
+    let elsewhere = seen(Pose::translation(1000.0, 0.0), poses[0]);
     let (same, other) = (
         correlation(&first, &second),
         correlation(&first, &elsewhere),

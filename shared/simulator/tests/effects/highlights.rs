@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use gyre_geometry::Twist;
 use gyre_radar::OwnedScan;
-use gyre_simulator::world::Wall;
+use gyre_simulator::body::Wall;
 use gyre_simulator::{Body, Effects};
 use nalgebra::{Point2, Vector2};
 

@@ -2,13 +2,14 @@
 
 use std::f64::consts::TAU;
 
+use gyre_geometry::Pose;
 use gyre_geometry::Twist;
 use gyre_radar::{DatasetOptions, OwnedScan};
 use gyre_simulator::profile::Profile;
 use gyre_simulator::{
     Body, Effects, Movers, Moving, SensorConfig, SimulationConfig, write_dataset,
 };
-use nalgebra::{Isometry2, Point2, Vector2};
+use nalgebra::{Point2, Vector2};
 
 use crate::scene::{Setup, peak_bin, post, power};
 
@@ -69,7 +70,7 @@ struct Leaving(Body);
 
 impl Movers for Leaving {
     fn visit<'a>(&'a self, time_s: f64, _: Point2<f64>, _: f64, see: &mut dyn FnMut(Moving<'a>)) {
-        let pose = Isometry2::translation(0.0, -10.0 * time_s);
+        let pose = Pose::translation(0.0, -10.0 * time_s);
         see(Moving {
             body: &self.0,
             pose,

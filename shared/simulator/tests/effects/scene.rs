@@ -4,9 +4,9 @@ use std::f64::consts::TAU;
 
 use gyre_geometry::Twist;
 use gyre_radar::{OwnedScan, ScanLimits};
+use gyre_simulator::body::{Aspect, NO_BODY, Scatterer};
 use gyre_simulator::profile::{Profile, Receiver, Sampling};
 use gyre_simulator::weather::WeatherConfig;
-use gyre_simulator::world::{Aspect, NO_BODY, Scatterer};
 use gyre_simulator::{Body, Effects, Movers, Path, Scene, Sensor, SensorConfig, SweepTime, World};
 use nalgebra::Point2;
 

@@ -3,7 +3,7 @@
 use gyre_geometry::Twist;
 use gyre_radar::OwnedScan;
 use gyre_simulator::Effects;
-use gyre_simulator::world::{Aspect, NO_BODY, Scatterer};
+use gyre_simulator::body::{Aspect, NO_BODY, Scatterer};
 use nalgebra::Point2;
 
 use crate::scene::{Setup, peak_db};

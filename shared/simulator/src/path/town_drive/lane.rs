@@ -3,7 +3,7 @@
 use nalgebra::{Point2, Vector2};
 
 use super::plan::Plan;
-use crate::streets::{Keep, LANE_M};
+use crate::lanes::{DrivingSide, LANE_M};
 
 /// From a junction's middle to where bends begin, metres along the street.
 const BEND_M: f64 = 11.0;
@@ -22,7 +22,7 @@ pub struct Lane {
 }
 
 /// The lane along a route.
-pub fn lane(plan: &Plan, route: &[usize], keep: Keep) -> Lane {
+pub fn lane(plan: &Plan, route: &[usize], keep: DrivingSide) -> Lane {
     let mut lane = Lane {
         places: Vec::new(),
         limits: Vec::new(),
@@ -41,12 +41,12 @@ fn beside(
     plan: &Plan,
     [from, to]: [usize; 2],
     along_m: f64,
-    keep: Keep,
+    keep: DrivingSide,
 ) -> (Point2<f64>, Vector2<f64>) {
     let (middle, direction) = plan.street(from, to, along_m / plan.distance_m(from, to));
     let left_m = match keep {
-        Keep::Left => LANE_M / 2.0,
-        Keep::Right => -LANE_M / 2.0,
+        DrivingSide::Left => LANE_M / 2.0,
+        DrivingSide::Right => -LANE_M / 2.0,
     };
     (
         middle + Vector2::new(-direction.y, direction.x) * left_m,
@@ -56,7 +56,12 @@ fn beside(
 
 impl Lane {
     /// Adds a street up to where the bend at its end begins; returns place and direction there.
-    fn street(&mut self, plan: &Plan, ends: [usize; 2], keep: Keep) -> (Point2<f64>, Vector2<f64>) {
+    fn street(
+        &mut self,
+        plan: &Plan,
+        ends: [usize; 2],
+        keep: DrivingSide,
+    ) -> (Point2<f64>, Vector2<f64>) {
         let whole_m = plan.distance_m(ends[0], ends[1]);
         let steps = ((whole_m - 2.0 * BEND_M) / STEP_M) as usize;
         let step_m = (whole_m - 2.0 * BEND_M) / steps as f64;

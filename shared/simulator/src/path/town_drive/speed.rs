@@ -2,8 +2,8 @@
 
 use rand::Rng;
 
-use super::Way;
 use super::lane::Lane;
+use super::steered::SteeredLane;
 
 /// Speeding up and braking along the lane, metres a second squared: what drivers in towns do.
 const SPEED_UP_MPS2: f64 = 1.4;
@@ -32,7 +32,7 @@ pub struct Limits {
 
 /// Metres along the way every `step_s`, over `length_m` of it, standing at first and at last.
 pub fn progress(
-    way: &Way,
+    way: &SteeredLane,
     lane: &Lane,
     limits: &Limits,
     length_m: f64,
@@ -70,7 +70,7 @@ pub fn progress(
     )
 }
 
-fn curvature(way: &Way, along_m: f64) -> f64 {
+fn curvature(way: &SteeredLane, along_m: f64) -> f64 {
     let heading = |at: f64| {
         let [x, y] = way.curve.slope(at);
         nalgebra::Vector2::new(x, y)

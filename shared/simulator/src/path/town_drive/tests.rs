@@ -7,13 +7,13 @@ fn drives() -> impl Iterator<Item = (TownDrive, SplinePath)> {
         length_m: 4000.0,
         speed_mps: 13.9,
         lateral_acceleration_mps2: 2.2,
-        keep: Keep::Left,
+        keep: DrivingSide::Left,
     };
     // Checchin et al., 2010: 1135 m of campus at 0 to 25 km/h.
     let campus = TownDrive {
         length_m: 1135.0,
         speed_mps: 25.0 / 3.6,
-        keep: Keep::Right,
+        keep: DrivingSide::Right,
         ..city
     };
     (1..=6).flat_map(move |seed| [city, campus].map(|drive| (drive, drive.path(seed))))

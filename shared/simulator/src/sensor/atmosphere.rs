@@ -5,7 +5,7 @@ use crate::weather::WeatherConfig;
 
 /// The air between sensor and echo.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Air {
+pub(super) struct Atmosphere {
     /// Share of the power that a wet radome lets through, there and back.
     radome: f64,
     /// Attenuation there and back, nepers of power a metre.
@@ -17,7 +17,7 @@ pub(super) struct Air {
 /// Height of the beam at half power, radians: Navtech state 1.8 degrees for the antenna's upper part, spread downwards to fill in.
 const BEAM_HEIGHT_RAD: f64 = 0.07;
 
-impl Air {
+impl Atmosphere {
     pub fn new(weather: &WeatherConfig, carrier_ghz: f64) -> Self {
         Self {
             radome: 10f64.powf(-weather.radome_db() / 10.0),

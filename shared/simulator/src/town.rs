@@ -29,8 +29,8 @@ use rand_chacha::ChaCha8Rng;
 pub use config::{Character, TownConfig};
 pub(crate) use vehicle::car;
 
+use crate::body::Body;
 use crate::streets::Streets;
-use crate::world::Body;
 use district::{District, Use};
 use frontage::{Frontage, Line};
 use kerb::{BAYS_M, Kerb};

@@ -1,0 +1,155 @@
+//! Bodies: scatterers that reflect and walls that hide what is behind them, standing or moving.
+
+use gyre_geometry::Pose;
+use nalgebra::{Point2, Vector2};
+
+/// The body of a thing that belongs to nothing larger.
+pub const NO_BODY: u32 = 0;
+
+/// Which way a scatterer reflects.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Aspect {
+    /// The same to all sides: posts, leaves, corners of cars.
+    AllRound,
+    /// To one side: power falls with the cosine of the angle from `normal`, raised to `sharpness`
+    /// (1 to 2: rough walls; 300: a smooth panel that flashes within some degrees).
+    Facing {
+        /// Unit vector, world frame.
+        normal: Vector2<f64>,
+        /// Exponent of the cosine.
+        sharpness: f64,
+    },
+}
+
+impl Aspect {
+    /// Share of the power that goes towards `direction`, a unit vector from the scatterer to the sensor: 0 to 1.
+    pub fn gain(&self, direction: Vector2<f64>) -> f64 {
+        match *self {
+            Self::AllRound => 1.0,
+            Self::Facing { normal, sharpness } => normal.dot(&direction).max(0.0).powf(sharpness),
+        }
+    }
+
+    /// The same on average over all directions: the mean of a cosine's power over a circle, about
+    /// `1 / sqrt(2 pi (sharpness + 0.64))`.
+    pub fn mean_gain(&self) -> f64 {
+        match *self {
+            Self::AllRound => 1.0,
+            Self::Facing { sharpness, .. } => {
+                1.0 / (std::f64::consts::TAU * (sharpness + 0.64)).sqrt()
+            }
+        }
+    }
+}
+
+/// A point that reflects.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scatterer {
+    /// Where, world frame, metres.
+    pub position: Point2<f64>,
+    /// Radar cross-section, square metres.
+    pub cross_section_m2: f64,
+    /// Which way it reflects.
+    pub aspect: Aspect,
+    /// What it is a part of: walls of the same body do not hide it. [`NO_BODY`] where it stands alone.
+    pub body: u32,
+}
+
+/// A straight wall that lets a part of the power through.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wall {
+    /// One end, world frame, metres.
+    pub from: Point2<f64>,
+    /// The other end.
+    pub to: Point2<f64>,
+    /// Share of the power that passes, there and back: 0 (nothing) to 1.
+    pub transmission: f64,
+    /// Share of the power that it mirrors: 0 (rough) to 1 (a sheet of metal).
+    pub mirror: f64,
+    /// What it is a part of.
+    pub body: u32,
+}
+
+impl Scatterer {
+    /// The same scatterer on a body that stands at `pose`.
+    pub fn moved(&self, pose: &Pose) -> Self {
+        let aspect = match self.aspect {
+            Aspect::AllRound => Aspect::AllRound,
+            Aspect::Facing { normal, sharpness } => Aspect::Facing {
+                normal: pose * normal,
+                sharpness,
+            },
+        };
+        Self {
+            position: pose * self.position,
+            aspect,
+            ..*self
+        }
+    }
+}
+
+impl Wall {
+    /// The same wall on a body that stands at `pose`.
+    pub fn moved(&self, pose: &Pose) -> Self {
+        Self {
+            from: pose * self.from,
+            to: pose * self.to,
+            ..*self
+        }
+    }
+}
+
+/// A thing made of scatterers and walls.
+#[derive(Clone, Debug, Default)]
+pub struct Body {
+    /// What reflects.
+    pub scatterers: Vec<Scatterer>,
+    /// What hides.
+    pub walls: Vec<Wall>,
+}
+
+impl Body {
+    /// Adds all of another body.
+    pub fn extend(&mut self, other: Body) {
+        self.scatterers.extend(other.scatterers);
+        self.walls.extend(other.walls);
+    }
+}
+
+/// A body on its way.
+#[derive(Clone, Copy, Debug)]
+pub struct Moving<'a> {
+    /// What it is made of, in its own frame (x ahead); its number is its own among all movers and the town.
+    pub body: &'a Body,
+    /// Where its frame is in the world at the time asked for.
+    pub pose: Pose,
+    /// Velocity of that frame in the world, metres a second.
+    pub velocity: Vector2<f64>,
+}
+
+impl Moving<'_> {
+    /// Where its frame is `time_s` seconds later. Turning is left out: a sweep is short.
+    pub fn pose_after(&self, time_s: f64) -> Pose {
+        Pose::from_parts(
+            (self.pose.translation.vector + self.velocity * time_s).into(),
+            self.pose.rotation,
+        )
+    }
+}
+
+/// What moves around the sensor.
+pub trait Movers: Send + Sync {
+    /// Shows all bodies within `reach_m` of `centre` at a time of the drive, always in the same order.
+    fn visit<'a>(
+        &'a self,
+        time_s: f64,
+        centre: Point2<f64>,
+        reach_m: f64,
+        see: &mut dyn FnMut(Moving<'a>),
+    );
+}
+
+/// Nothing moves.
+impl Movers for () {
+    fn visit<'a>(&'a self, _: f64, _: Point2<f64>, _: f64, _: &mut dyn FnMut(Moving<'a>)) {}
+}

@@ -1,0 +1,36 @@
+//! A lane as it is driven, with wheels that turn gradually.
+
+use nalgebra::Point2;
+
+use super::lane::Lane;
+use crate::path::spline::{Sample, UniformSpline};
+
+/// The wheels are turned over so many metres: shorter wiggles of the lane are smoothed away.
+const STEER_M: f64 = 9.0;
+
+/// A lane as it is driven.
+pub struct SteeredLane {
+    /// The vehicle by metres along the lane.
+    pub curve: UniformSpline<2>,
+    pub length_m: f64,
+}
+
+/// Drives a lane with wheels that turn gradually.
+pub fn steered(lane: &Lane) -> SteeredLane {
+    let mut length_m = 0.0;
+    let mut before: Option<Point2<f64>> = None;
+    let sample = |place: &Point2<f64>| {
+        length_m += before.map_or(0.0, |before| (place - before).norm());
+        before = Some(*place);
+        Sample {
+            at: length_m,
+            value: [place.x, place.y],
+            weight: 1.0,
+        }
+    };
+    let samples: Vec<_> = lane.places.iter().map(sample).collect();
+    SteeredLane {
+        curve: UniformSpline::fit(&samples, 1.0, 1.0 / STEER_M),
+        length_m,
+    }
+}

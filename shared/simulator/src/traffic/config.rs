@@ -1,0 +1,56 @@
+//! How much traffic there is: the section `[simulation.traffic]`.
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::SimulatorError;
+use crate::limits::require_within;
+
+/// How much moves.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TrafficConfig {
+    /// Motor vehicles on a kilometre of each lane. Zero: none, not even in side streets.
+    pub vehicles_per_km: f64,
+    /// Spread of their speeds, as a share: how much gaps and pace vary.
+    pub speed_spread: f64,
+    /// Cyclists that are overtaken on a kilometre.
+    pub cyclists_per_km: f64,
+    /// Pedestrians on the pavements of a kilometre.
+    pub pedestrians_per_km: f64,
+}
+
+impl Default for TrafficConfig {
+    fn default() -> Self {
+        Self {
+            vehicles_per_km: 20.0,
+            speed_spread: 0.3,
+            cyclists_per_km: 3.0,
+            pedestrians_per_km: 25.0,
+        }
+    }
+}
+
+impl TrafficConfig {
+    /// An empty road.
+    pub fn none() -> Self {
+        Self {
+            vehicles_per_km: 0.0,
+            cyclists_per_km: 0.0,
+            pedestrians_per_km: 0.0,
+            ..Self::default()
+        }
+    }
+
+    /// Refuses what cannot be simulated, naming the key.
+    pub fn validate(&self) -> Result<(), SimulatorError> {
+        require_within("traffic.vehicles_per_km", self.vehicles_per_km, 0.0, 80.0)?;
+        require_within("traffic.speed_spread", self.speed_spread, 0.0, 0.8)?;
+        require_within("traffic.cyclists_per_km", self.cyclists_per_km, 0.0, 50.0)?;
+        require_within(
+            "traffic.pedestrians_per_km",
+            self.pedestrians_per_km,
+            0.0,
+            500.0,
+        )
+    }
+}
