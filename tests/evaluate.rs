@@ -71,7 +71,7 @@ fn a_table_and_all_plots_come_of_an_odometry() {
     assert_eq!(
         ["1", "4", "16", "64"].map(rows_of),
         [1, 1, 1, 0],
-        "23 motions have no stretch of 64:\n{table}"
+        "23 motions have no segment of 64:\n{table}"
     );
     for word in ["ATE", "covariance    23 motions", "first", "second"] {
         assert!(table.contains(word), "{word} is not in:\n{table}");

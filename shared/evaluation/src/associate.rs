@@ -1,26 +1,26 @@
-//! Which pose of the estimate is held against which pose of the truth.
+//! Association: the ground-truth pose of each estimated pose, by time or by index.
 
 use gyre_geometry::{Pose, interpolate};
 use serde::Serialize;
 
 use crate::{EvaluationError, MatchedPoses, Side, matched::require_poses};
 
-/// Poses, and their stamps where they have any.
+/// A trajectory: poses, and their stamps where they have any.
 #[derive(Debug, Clone, Copy)]
 pub struct TimedPoses<'a> {
-    /// One stamp a pose, ns, never running backwards. Not looked at in association by index.
+    /// One stamp a pose, ns, in order. Association by index ignores them.
     pub stamps_ns: &'a [i64],
     /// Poses of the sensor in one fixed frame.
     pub poses: &'a [Pose],
 }
 
 impl<'a> TimedPoses<'a> {
-    /// Poses with stamps.
+    /// The poses with their stamps.
     pub fn new(stamps_ns: &'a [i64], poses: &'a [Pose]) -> Self {
         Self { stamps_ns, poses }
     }
 
-    /// Poses without stamps, as in KITTI files: for association by index.
+    /// The poses without stamps, as in KITTI files: for association by index.
     pub fn untimed(poses: &'a [Pose]) -> Self {
         Self {
             stamps_ns: &[],
@@ -29,13 +29,13 @@ impl<'a> TimedPoses<'a> {
     }
 }
 
-/// How counterparts are found.
+/// The rule by which estimated poses are associated with ground-truth poses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(tag = "by", rename_all = "snake_case")]
 pub enum Association {
-    /// The truth is interpolated at the estimate's stamps: positions linearly, yaw the shorter way round.
+    /// The ground truth is interpolated at the stamps of the estimate: positions linearly, yaw the shorter way round.
     Time {
-        /// Widest gap between two stamps of the truth that is interpolated across, ns.
+        /// The widest gap between two stamps of the ground truth that is interpolated across, ns.
         max_gap_ns: i64,
     },
     /// Pose `k` belongs to pose `k`; the longer list is cut to the shorter.
@@ -43,7 +43,7 @@ pub enum Association {
 }
 
 impl Default for Association {
-    /// By time, across gaps of up to 1 s.
+    /// Returns association by time, across gaps of up to 1 s.
     fn default() -> Self {
         Self::Time {
             max_gap_ns: 1_000_000_000,
@@ -51,41 +51,41 @@ impl Default for Association {
     }
 }
 
-/// How much of the trajectories the comparison covers.
+/// The numbers of poses that were associated and left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(tag = "by", rename_all = "snake_case")]
 pub enum Coverage {
     /// Associated by time.
     Time {
-        /// Estimated poses with a counterpart.
+        /// Estimated poses with a ground-truth pose.
         matched: usize,
-        /// Estimated poses before the truth's first or after its last stamp: left out.
+        /// Estimated poses before the first or after the last stamp of the ground truth: left out.
         outside_span: usize,
-        /// Estimated poses in gaps of the truth wider than allowed: left out.
+        /// Estimated poses in gaps of the ground truth wider than allowed: left out.
         in_gaps: usize,
         /// The widest gap allowed, ns.
         max_gap_ns: i64,
     },
     /// Associated by index.
     Index {
-        /// Estimated poses with a counterpart.
+        /// Estimated poses with a ground-truth pose.
         matched: usize,
-        /// Estimated poses beyond the truth's end: left out.
+        /// Estimated poses beyond the end of the ground truth: left out.
         estimate_surplus: usize,
-        /// True poses beyond the estimate's end: left out.
+        /// Ground-truth poses beyond the end of the estimate: left out.
         truth_surplus: usize,
     },
 }
 
 impl Coverage {
-    /// Estimated poses with a counterpart.
+    /// Estimated poses with a ground-truth pose.
     pub fn matched(&self) -> usize {
         match *self {
             Coverage::Time { matched, .. } | Coverage::Index { matched, .. } => matched,
         }
     }
 
-    /// Estimated poses without one.
+    /// Estimated poses without a ground-truth pose.
     pub fn left_out(&self) -> usize {
         match *self {
             Coverage::Time {
@@ -100,11 +100,11 @@ impl Coverage {
     }
 }
 
-/// Finds the counterpart of each estimated pose, and says how many have none.
+/// Returns the estimated poses that have a ground-truth pose, with it, and counts those that have none.
 ///
 /// # Errors
-/// [`EvaluationError`] where poses are none (NaN, no rotation), stamps are missing or run backwards (by time only), or fewer than
-/// two poses have a counterpart.
+/// [`EvaluationError`] if a pose is invalid (not finite, no rotation), if stamps are missing or out of order (by time
+/// only), or if fewer than two poses are associated.
 pub fn associate(
     estimate: TimedPoses<'_>,
     truth: TimedPoses<'_>,
@@ -148,13 +148,13 @@ fn by_time(
 ) -> Result<(MatchedPoses, Coverage), EvaluationError> {
     let estimate_ns = require_stamps(Side::Estimate, &estimate)?;
     let truth_ns = require_stamps(Side::Truth, &truth)?;
-    let (mut kept, mut counterparts) = (Vec::new(), Vec::new());
+    let (mut kept, mut true_poses) = (Vec::new(), Vec::new());
     let (mut outside_span, mut in_gaps) = (0, 0);
     for (&stamp_ns, pose) in estimate.stamps_ns.iter().zip(estimate.poses) {
         match truth_at(truth, stamp_ns, max_gap_ns) {
-            At::Pose(counterpart) => {
+            At::Pose(true_pose) => {
                 kept.push(*pose);
-                counterparts.push(counterpart);
+                true_poses.push(true_pose);
             }
             At::Outside => outside_span += 1,
             At::Gap => in_gaps += 1,
@@ -183,10 +183,10 @@ fn by_time(
         in_gaps,
         max_gap_ns,
     };
-    Ok((MatchedPoses::new(kept, counterparts)?, coverage))
+    Ok((MatchedPoses::new(kept, true_poses)?, coverage))
 }
 
-/// The span of the stamps, `None` where there are none; refuses a wrong count and time that runs backwards.
+/// Returns the first and last stamp, `None` of an empty trajectory; refuses a wrong count and decreasing stamps.
 pub(crate) fn require_stamps(
     side: Side,
     trajectory: &TimedPoses<'_>,
@@ -200,7 +200,7 @@ pub(crate) fn require_stamps(
         });
     }
     if let Some(k) = stamps.windows(2).position(|w| w[1] < w[0]) {
-        return Err(EvaluationError::Backwards {
+        return Err(EvaluationError::DecreasingStamps {
             side,
             index: k + 1,
             previous_ns: stamps[k],
@@ -210,17 +210,17 @@ pub(crate) fn require_stamps(
     Ok(stamps.first().copied().zip(stamps.last().copied()))
 }
 
-/// What the truth knows about one instant.
+/// The ground truth at one instant.
 pub(crate) enum At {
     Pose(Pose),
     Outside,
     Gap,
 }
 
-/// Stamps are written in microseconds: what lies so far beyond an end of the truth's span lies on it.
+/// Files have stamps in microseconds: a stamp that lies this close to an end of the ground truth lies on it.
 const ROUNDING_NS: u64 = 1_000;
 
-/// The truth at `stamp_ns`. A stamp that the truth has itself is never in a gap.
+/// Returns the ground truth at `stamp_ns`. A stamp that the ground truth has itself is never in a gap.
 pub(crate) fn truth_at(truth: TimedPoses<'_>, stamp_ns: i64, max_gap_ns: i64) -> At {
     let ends = truth
         .stamps_ns
@@ -241,7 +241,7 @@ pub(crate) fn truth_at(truth: TimedPoses<'_>, stamp_ns: i64, max_gap_ns: i64) ->
     let Some(&after_ns) = truth.stamps_ns.get(after) else {
         return At::Outside;
     };
-    // i128: hostile stamps may lie further apart than an i64 can hold
+    // i128: any two stamps may lie further apart than an i64 can hold.
     let since = |t: i64| i128::from(t) - i128::from(truth.stamps_ns[before]);
     if since(after_ns) > i128::from(max_gap_ns) {
         return At::Gap;
@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn the_truth_is_interpolated_across_the_turn_of_the_yaw() {
+    fn the_ground_truth_is_interpolated_where_the_yaw_wraps() {
         let truth = [pose(0.0, 0.0, PI - 0.1), pose(4.0, 2.0, -PI + 0.3)];
         let (matched, _) = associate(
             TimedPoses::new(&seconds(&[10.0, 10.25, 11.0]), &line(3)),
@@ -310,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stamp_rounded_beyond_an_end_of_the_truth_counts_as_that_end() {
+    fn a_stamp_rounded_beyond_an_end_of_the_ground_truth_is_that_end() {
         let (truth, estimate) = (line(2), line(3));
         let found = |stamps: [i64; 3]| {
             let estimate = TimedPoses::new(&stamps, &estimate);
@@ -330,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn index_association_cuts_to_the_shorter_and_says_so() {
+    fn association_by_index_cuts_the_longer_trajectory_and_counts() {
         let (matched, coverage) = associate(
             TimedPoses::untimed(&line(3)),
             TimedPoses::untimed(&line(5)),
@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn trajectories_of_different_times_are_refused_with_both_spans() {
+    fn trajectories_without_common_time_are_refused_with_both_spans() {
         let error = associate(
             TimedPoses::new(&seconds(&[1.0, 2.0]), &line(2)),
             TimedPoses::new(&seconds(&[10.0, 12.5]), &line(2)),
@@ -358,13 +358,13 @@ mod tests {
         .unwrap_err();
         let message = error.to_string();
         assert!(
-            message.contains("1.000 s to 2.000 s against 10.000 s to 12.500 s"),
+            message.contains("1.000 s to 2.000 s, ground truth 10.000 s to 12.500 s"),
             "{message}"
         );
     }
 
     #[test]
-    fn one_common_instant_is_too_few() {
+    fn one_common_stamp_is_too_few() {
         let error = associate(
             TimedPoses::new(&seconds(&[1.0, 2.0]), &line(2)),
             TimedPoses::new(&seconds(&[2.0, 3.0]), &line(2)),
@@ -381,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn stamps_that_run_backwards_or_are_missing_are_refused() {
+    fn decreasing_and_missing_stamps_are_refused() {
         let good = seconds(&[0.0, 1.0, 2.0]);
         let error = |estimate: &[i64], truth: &[i64]| {
             let (e, t) = (line(3), line(3));
@@ -394,7 +394,7 @@ mod tests {
         };
         assert_eq!(
             error(&good, &[0, 7, 5]),
-            EvaluationError::Backwards {
+            EvaluationError::DecreasingStamps {
                 side: Side::Truth,
                 index: 2,
                 previous_ns: 7,

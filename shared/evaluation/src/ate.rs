@@ -1,4 +1,7 @@
-//! Absolute trajectory error: how far positions lie from the truth after the best SE(2) alignment.
+//! Absolute trajectory error (ATE): distances of positions from the ground truth after SE(2) alignment.
+//!
+//! Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012, in the plane; the alignment has no
+//! scale.
 
 use gyre_geometry::Pose;
 use serde::{Serialize, Serializer};
@@ -8,18 +11,18 @@ use crate::MatchedPoses;
 /// Absolute trajectory error after SE(2) alignment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Ate {
-    /// Root of the mean squared distance, m: the usual figure.
+    /// Root of the mean squared distance, m: the figure that papers give.
     pub rmse_m: f64,
     /// Mean distance, m.
     pub mean_m: f64,
     /// Largest distance, m.
     pub max_m: f64,
-    /// The alignment: maps poses of the estimate's fixed frame into the truth's.
+    /// The alignment: the fixed frame of the estimate in that of the ground truth.
     #[serde(serialize_with = "serialize_isometry")]
     pub truth_from_estimate: Pose,
 }
 
-/// Measures the distances between the positions of the truth and of the aligned estimate.
+/// Returns the distances between the positions of the ground truth and of the aligned estimate.
 pub fn ate(matched: &MatchedPoses) -> Ate {
     let truth_from_estimate = align(matched);
     let distances = || {
@@ -36,20 +39,20 @@ pub fn ate(matched: &MatchedPoses) -> Ate {
     }
 }
 
-/// The rigid motion, without scale, that brings the estimate's positions nearest to the truth's in the sense of least
-/// squares. Headings take no part. Where the positions leave the rotation open (all in one place), it is none.
+/// Returns the rigid motion that aligns the positions of the estimate with those of the ground truth by least squares.
+/// Headings are not used. If the positions do not define the rotation (all in one place), it is 0.
 pub fn align(matched: &MatchedPoses) -> Pose {
     align_positions(matched.estimate(), matched.truth())
 }
 
-/// RMSE (m) of the positions `estimate` against `truth`, equally long and not empty, after their alignment.
+/// Returns the RMSE (m) of the positions after their alignment; both slices have the same length, at least 1.
 pub(crate) fn aligned_rmse_m(estimate: &[Pose], truth: &[Pose]) -> f64 {
     let truth_from_estimate = align_positions(estimate, truth);
     let square = |(e, t)| distance_m(&truth_from_estimate, e, t).powi(2);
     (estimate.iter().zip(truth).map(square).sum::<f64>() / truth.len() as f64).sqrt()
 }
 
-/// Closed form in the plane: the angle that maximises sum(t . R e) over centred positions is
+/// Returns the least-squares alignment in closed form: the angle that maximises sum(t . R e) over centred positions is
 /// atan2(sum of cross products, sum of dot products).
 fn align_positions(estimate: &[Pose], truth: &[Pose]) -> Pose {
     let (e0, t0) = (centroid(estimate), centroid(truth));
@@ -76,7 +79,7 @@ fn distance_m(truth_from_estimate: &Pose, estimate: &Pose, truth: &Pose) -> f64 
     (aligned.coords - truth.translation.vector).norm()
 }
 
-/// As `{ x_m, y_m, yaw_rad }`.
+/// Writes a pose as `{ x_m, y_m, yaw_rad }`.
 fn serialize_isometry<S: Serializer>(pose: &Pose, serializer: S) -> Result<S::Ok, S::Error> {
     #[derive(Serialize)]
     struct Planar {
@@ -99,7 +102,7 @@ mod tests {
     use gyre_geometry::pose;
 
     #[test]
-    fn two_points_too_far_apart_share_the_excess() {
+    fn two_points_share_the_error_of_their_distance() {
         let at = |x| pose(x, 0.0, 0.0);
         let matched = MatchedPoses::new(vec![at(10.0), at(14.0)], vec![at(-1.0), at(1.0)]).unwrap();
         let ate = ate(&matched);
@@ -108,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn an_estimate_that_stands_still_is_moved_but_not_turned() {
+    fn a_standing_estimate_is_translated_but_not_rotated() {
         let truth: Vec<_> = (0..5).map(|k| pose(f64::from(k), 3.0, 1.0)).collect();
         let matched = MatchedPoses::new(vec![Pose::identity(); 5], truth).unwrap();
         assert_eq!(align(&matched), pose(2.0, 3.0, 0.0));

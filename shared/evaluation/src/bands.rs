@@ -1,34 +1,35 @@
-//! The error of composed poses over time, beside the spread that their covariance promises.
+//! The error of composed poses over time, with the standard deviation that their covariance states.
 
 use nalgebra::Vector3;
 
 use crate::{MatchedMotions, TruthSigma, motions::Chain};
 
-/// Errors and spreads along each unbroken chain of motions that has truth. A chain is aligned with the truth at its first
-/// pose that has any: there both error and spread are zero.
+/// Errors and standard deviations along each unbroken chain of motions that has ground truth (Checchin et al., Fig. 3).
+///
+/// A chain is aligned with the ground truth at its first pose that has any: there both are zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bands {
-    /// Sample after sample, the aligned pose first.
+    /// The samples of each chain in order, the aligned pose first.
     pub chains: Vec<Vec<BandSample>>,
-    /// What the spreads hold of the truth's own uncertainty.
+    /// The uncertainty of the ground truth that the standard deviations include.
     pub truth_sigma: TruthSigma,
 }
 
-/// One pose.
+/// The error of one pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BandSample {
     /// Time since the first motion began, s.
     pub time_s: f64,
-    /// Estimate less truth of (x, y, yaw), along the axes of the aligned pose; m, rad in (-pi, pi].
+    /// (x, y, yaw) of the estimate less those of the ground truth, along the axes of the aligned pose; m, rad in (-pi, pi].
     pub error: Vector3<f64>,
-    /// Standard deviations of (x, y, yaw), the truth's own included; m, rad.
+    /// Standard deviations of (x, y, yaw), those of the ground truth included; m, rad.
     pub sigma: Vector3<f64>,
 }
 
-/// Composes the motions of each chain, and holds every pose that has truth against it (Checchin et al., Fig. 3).
-pub fn bands(judged: &MatchedMotions, truth_sigma: TruthSigma) -> Bands {
-    let start_ns = judged.span_ns().0;
-    let chains = judged
+/// Composes the motions of each chain and compares every pose with its ground truth, where there is one.
+pub fn bands(matched: &MatchedMotions, truth_sigma: TruthSigma) -> Bands {
+    let start_ns = matched.span_ns().0;
+    let chains = matched
         .chains
         .iter()
         .map(|chain| samples(chain, start_ns, truth_sigma));
@@ -42,7 +43,7 @@ fn samples(chain: &Chain, start_ns: i64, truth_sigma: TruthSigma) -> Vec<BandSam
     let Some(first) = chain.truth.iter().position(Option::is_some) else {
         return Vec::new();
     };
-    let time_s = |joint: usize| chain.stamps_ns[joint].abs_diff(start_ns) as f64 * 1e-9;
+    let time_s = |node: usize| chain.stamps_ns[node].abs_diff(start_ns) as f64 * 1e-9;
     let aligned = BandSample {
         time_s: time_s(first),
         error: Vector3::zeros(),
@@ -51,12 +52,12 @@ fn samples(chain: &Chain, start_ns: i64, truth_sigma: TruthSigma) -> Vec<BandSam
     let later = chain
         .composed(first)
         .zip(first + 1..)
-        .filter_map(|(pose, joint)| {
-            let truth = chain.true_motion(first, joint)?;
+        .filter_map(|(pose, node)| {
+            let truth = chain.true_motion(first, node)?;
             let covariance = pose.covariance + truth_sigma.of_motion(&truth);
             let sigma = covariance.diagonal().map(f64::sqrt);
             Some(BandSample {
-                time_s: time_s(joint),
+                time_s: time_s(node),
                 error: pose.error(&truth),
                 sigma,
             })
@@ -65,7 +66,8 @@ fn samples(chain: &Chain, start_ns: i64, truth_sigma: TruthSigma) -> Vec<BandSam
 }
 
 impl Bands {
-    /// Share of the poses, aligned ones aside, whose error is within `sigmas` standard deviations: of x, y, yaw, %.
+    /// Returns the share of the poses whose error in x, y, yaw is within `sigmas` standard deviations, %. The aligned
+    /// poses do not count.
     pub fn inside_percent(&self, sigmas: f64) -> [f64; 3] {
         let later = || self.chains.iter().flat_map(|chain| chain.iter().skip(1));
         let inside = |part: usize| {

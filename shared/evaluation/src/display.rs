@@ -1,4 +1,4 @@
-//! An evaluation as a person reads it.
+//! Evaluations as text.
 
 use std::fmt;
 
@@ -12,7 +12,7 @@ impl fmt::Display for Evaluation {
         writeln!(f, "axes          {}", self.axes)?;
         writeln!(
             f,
-            "path          {:.2} m, estimated {:.2} m",
+            "path length   {:.2} m, estimate {:.2} m",
             self.path_m, self.estimated_path_m
         )?;
         match &self.kitti {
@@ -30,11 +30,11 @@ impl fmt::Display for Evaluation {
             ate.rmse_m, ate.mean_m, ate.max_m
         )?;
         if let Some(end) = &self.end {
-            writeln!(f, "end           {end}")?;
+            writeln!(f, "end point     {end}")?;
         }
         match &self.rpe {
-            Some(rpe) => write!(f, "per pair      {rpe}")?,
-            None => write!(f, "per pair      none: the truth has no heading")?,
+            Some(rpe) => write!(f, "RPE           {rpe}")?,
+            None => write!(f, "RPE           none: the ground truth has no heading")?,
         }
         if f.alternate() {
             self.fmt_lengths(f)
@@ -44,18 +44,18 @@ impl fmt::Display for Evaluation {
     }
 }
 
-const TOO_SHORT: &str = "no segment of the path exceeds 100 m";
+const TOO_SHORT: &str = "the path is not longer than 100 m";
 
 impl Evaluation {
     fn why_no_kitti(&self) -> String {
         if self.axes.truth_lacks_heading {
-            "the truth has no heading; believe ATE and seg".to_owned()
+            "the ground truth has no heading; use ATE and seg".to_owned()
         } else {
-            format!("{TOO_SHORT}; see the errors per pair")
+            format!("{TOO_SHORT}; use RPE")
         }
     }
 
-    /// A line for each length that has segments.
+    /// Writes a line for each length that has segments.
     fn fmt_lengths(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Some(seg) = &self.seg else { return Ok(()) };
         write!(f, "\n\n  length  segments  translation    rotation     seg")?;
@@ -87,8 +87,8 @@ impl fmt::Display for Coverage {
                 max_gap_ns,
             } => write!(
                 f,
-                "by time: {matched} of {all} estimated poses; left out: {outside_span} outside the truth's span, \
-                 {in_gaps} in its gaps beyond {} s",
+                "by time: {matched} of {all} estimated poses; left out: {outside_span} outside the span of the ground truth, \
+                 {in_gaps} in its gaps above {} s",
                 max_gap_ns as f64 * 1e-9
             ),
             Coverage::Index {
@@ -98,9 +98,9 @@ impl fmt::Display for Coverage {
             } => {
                 write!(f, "by index: {matched} of {all} estimated poses")?;
                 match (estimate_surplus, truth_surplus) {
-                    (0, 0) => write!(f, ", as many as the truth has"),
-                    (0, cut) => write!(f, "; the truth was cut by its last {cut}"),
-                    (cut, _) => write!(f, "; the estimate was cut by its last {cut}"),
+                    (0, 0) => write!(f, ", as many as the ground truth has"),
+                    (0, cut) => write!(f, "; left out: the last {cut} of the ground truth"),
+                    (cut, _) => write!(f, "; left out: the last {cut} of the estimate"),
                 }
             }
         }
@@ -125,7 +125,7 @@ impl fmt::Display for Seg {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{:.4} % of the length, each segment aligned by itself",
+            "{:.4} % of the length; rmse after SE(2) alignment of each segment",
             self.percent
         )
     }
@@ -133,20 +133,20 @@ impl fmt::Display for Seg {
 
 impl fmt::Display for EndError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:.2} m off", self.position_m)?;
+        write!(f, "{:.2} m", self.position_m)?;
         if let Some(percent) = self.percent {
             write!(f, ", {percent:.2} % of the path")?;
         }
         write!(
             f,
-            ", heading {:.2} deg; the first poses on each other",
+            ", heading {:.2} deg; first poses aligned",
             self.heading_deg
         )
     }
 }
 
 impl fmt::Display for Rpe {
-    /// Two lines, the second indented as the rows of an evaluation are.
+    /// Writes two lines, the second indented as the rows of an evaluation are.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
@@ -154,7 +154,7 @@ impl fmt::Display for Rpe {
             self.translation_rmse_m, self.translation_mean_m
         )?;
         if let Some(ratio) = self.forward_ratio {
-            write!(f, "; forward sum {ratio:.4} of the truth's")?;
+            write!(f, "; forward distance {ratio:.4} of the true one")?;
         }
         let (rmse, mean, pairs) = (
             self.rotation_rmse_deg,
@@ -170,26 +170,26 @@ impl fmt::Display for Rpe {
 }
 
 impl fmt::Display for Nees {
-    /// A table of all segments; the alternate form has lines for each half of the time, too.
+    /// Writes a table of all segments; the alternate form has lines for each half of the drive, too.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "covariance    {} motions; left out: {} without truth, ",
+            "covariance    {} motions; left out: {} without ground truth, ",
             self.motions, self.without_truth
         )?;
         writeln!(
             f,
-            "{} without covariance; truth: {}",
+            "{} without covariance; ground truth {}",
             self.without_covariance, self.truth_sigma
         )?;
         writeln!(
             f,
-            "{:14}mean normalised error squared over its expectation (1: honest, more: overconfident)",
+            "{:14}mean NEES over its degrees of freedom (1: consistent, above: overconfident)",
             ""
         )?;
         writeln!(
             f,
-            "{:14}[where 95 % of honest, independent ones lie]  share outside the 95 % region",
+            "{:14}[95 % acceptance interval of independent errors]  share outside the 95 % region",
             ""
         )?;
         write!(
@@ -202,7 +202,7 @@ impl fmt::Display for Nees {
 }
 
 impl fmt::Display for NeesLength {
-    /// Lines that begin with a line break: all segments, and in the alternate form each half.
+    /// Writes lines that begin with a line break: all segments, and in the alternate form each half.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "\n{:8}{:>10}{}", self.motions, "all", self.all)?;
         let halves = [("first", &self.first_half), ("second", &self.second_half)];
@@ -220,7 +220,7 @@ impl fmt::Display for NeesLength {
 impl fmt::Display for TruthSigma {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self == Self::default() {
-            true => write!(f, "taken as exact"),
+            true => write!(f, "exact"),
             false => write!(
                 f,
                 "sigma {} m, {:.3} deg",

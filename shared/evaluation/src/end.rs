@@ -1,21 +1,22 @@
-//! How far off the estimate ends.
+//! End-point error: the drift of a whole drive.
 
 use serde::Serialize;
 
 use crate::MatchedPoses;
 
-/// Error of the last matched pose where the first ones lie on each other, heading and all: the drift of a whole drive.
+/// The error of the last pose once the first poses are aligned in position and heading (Checchin et al., Fig. 3, its last
+/// sample).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct EndError {
-    /// Distance between the ends, m.
+    /// Distance between the last positions, m.
     pub position_m: f64,
-    /// The same as a share of the truth's length, %; `None` where the truth stands still.
+    /// The same as a share of the path length, %; `None` if the ground truth does not move.
     pub percent: Option<f64>,
-    /// Error of the last heading, estimate less truth, degrees in (-180, 180].
+    /// Error of the last heading, estimate less ground truth, degrees in (-180, 180].
     pub heading_deg: f64,
 }
 
-/// Holds the motion from the first matched pose to the last against the true one (Checchin et al., Fig. 3, its last sample).
+/// Compares the motion from the first to the last matched pose with the true one.
 pub fn end_error(matched: &MatchedPoses) -> EndError {
     let last = matched.len() - 1;
     let (estimate, truth) = (matched.estimate(), matched.truth());
@@ -43,13 +44,13 @@ mod tests {
     use gyre_geometry::pose;
 
     #[test]
-    fn frames_do_not_matter_and_only_the_ends_do() {
+    fn only_the_motion_from_the_first_to_the_last_pose_counts() {
         let truth = vec![
             pose(5.0, 5.0, 0.0),
             pose(15.0, 5.0, 0.0),
             pose(25.0, 5.0, 0.1),
         ];
-        // Begins elsewhere with another heading, strays on the way, and ends 3 m ahead and 4 m to the left.
+        // Another start and heading, errors on the way, and an end 3 m ahead and 4 m to the left.
         let start = pose(-7.0, 2.0, 1.0);
         let estimate = vec![
             start,
@@ -65,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn a_truth_that_stands_has_no_share() {
+    fn a_standing_ground_truth_has_no_relative_error() {
         let end = end_error(
             &MatchedPoses::new(vec![pose(0.0, 0.0, 0.0); 2], vec![pose(1.0, 1.0, 0.5); 2]).unwrap(),
         );

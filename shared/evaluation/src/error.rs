@@ -1,13 +1,13 @@
-//! What can be wrong with the input of an evaluation.
+//! Errors of an evaluation's input.
 
 use std::fmt;
 
-/// Which of the two trajectories is meant.
+/// One of the two trajectories.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
-    /// The trajectory that is judged.
+    /// The trajectory that is evaluated.
     Estimate,
-    /// The trajectory that it is held against.
+    /// The trajectory that it is compared with.
     Truth,
 }
 
@@ -20,13 +20,13 @@ impl fmt::Display for Side {
     }
 }
 
-/// Largest coordinate that counts as a position, m: map projections stay far below.
+/// The largest coordinate of a position, m: map projections stay far below.
 pub(crate) const LARGEST_COORDINATE_M: f64 = 1e9;
 
-/// Why two trajectories cannot be compared.
+/// The reason why two trajectories cannot be compared.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EvaluationError {
-    /// A position is NaN, infinite, or further out than any vehicle drives.
+    /// A position is not finite, or further out than any vehicle drives.
     #[error("the position of pose {index} of the {side} is not within {limit:e} m: ({x_m}, {y_m})", limit = LARGEST_COORDINATE_M)]
     BadPosition {
         /// Whose pose.
@@ -38,11 +38,11 @@ pub enum EvaluationError {
         /// Its y, m.
         y_m: f64,
     },
-    /// The rotation of a pose is none: its cosine and sine do not lie on the unit circle.
+    /// The cosine and sine of a pose do not lie on the unit circle.
     #[error(
-        "pose {index} of the {side} has no rotation: its cosine and sine have length {length}, not 1"
+        "the rotation of pose {index} of the {side} is invalid: its cosine and sine have length {length}, not 1"
     )]
-    NotARotation {
+    BadRotation {
         /// Whose pose.
         side: Side,
         /// Its index, from 0.
@@ -60,11 +60,11 @@ pub enum EvaluationError {
         /// Stamps given.
         stamps: usize,
     },
-    /// Stamps run backwards.
+    /// Stamps decrease.
     #[error(
-        "the stamps of the {side} run backwards at pose {index}: {stamp_ns} ns after {previous_ns} ns"
+        "the stamps of the {side} decrease at pose {index}: {stamp_ns} ns after {previous_ns} ns"
     )]
-    Backwards {
+    DecreasingStamps {
         /// Whose stamps.
         side: Side,
         /// Index of the pose whose stamp is earlier than the one before.
@@ -74,43 +74,43 @@ pub enum EvaluationError {
         /// The offending stamp, ns.
         stamp_ns: i64,
     },
-    /// No pose of the estimate lies within the time span of the truth.
+    /// No pose of the estimate lies within the time span of the ground truth.
     #[error(
-        "estimate and ground truth do not overlap in time: {} against {} (same clock, same unit?)",
+        "the trajectories do not overlap in time: estimate {}, ground truth {} (same clock, same unit?)",
         span_s(.estimate_ns),
         span_s(.truth_ns)
     )]
     NoOverlap {
         /// First and last stamp of the estimate, ns.
         estimate_ns: (i64, i64),
-        /// First and last stamp of the truth, ns.
+        /// First and last stamp of the ground truth, ns.
         truth_ns: (i64, i64),
     },
-    /// Fewer than two poses have a counterpart: there is no motion to judge.
+    /// Fewer than two poses are associated: there is no motion to compare.
     #[error(
-        "{matched} of {estimate} estimated poses have a counterpart among the {truth} of the ground truth; at least 2 are needed"
+        "{matched} of {estimate} estimated poses could be associated with the {truth} poses of the ground truth; at least 2 are needed"
     )]
     TooFew {
-        /// Poses with a counterpart.
+        /// Associated poses.
         matched: usize,
         /// Poses of the estimate.
         estimate: usize,
-        /// Poses of the truth.
+        /// Poses of the ground truth.
         truth: usize,
     },
-    /// Poses that are to be compared one by one are not equally many.
+    /// Poses that are to be compared one by one differ in number.
     #[error(
-        "{estimate} estimated poses cannot be held one by one against {truth} of the ground truth"
+        "{estimate} estimated poses cannot be compared one by one with {truth} poses of the ground truth"
     )]
     LengthMismatch {
         /// Poses of the estimate.
         estimate: usize,
-        /// Poses of the truth.
+        /// Poses of the ground truth.
         truth: usize,
     },
-    /// The numbers of a motion are NaN, infinite, or further than any vehicle drives.
-    #[error("motion {index} is none: ({x_m} m, {y_m} m, {yaw_rad} rad)")]
-    NotAMotion {
+    /// A motion is not finite, or further than any vehicle drives.
+    #[error("motion {index} is invalid: ({x_m} m, {y_m} m, {yaw_rad} rad)")]
+    BadMotion {
         /// Its index, from 0.
         index: usize,
         /// Its x, m.
@@ -120,29 +120,29 @@ pub enum EvaluationError {
         /// Its yaw, rad.
         yaw_rad: f64,
     },
-    /// A motion does not end after it begins, or begins before the one before has ended.
+    /// A motion does not end after its start, or starts before the end of the one before.
     #[error(
-        "the motions run backwards at motion {index}: from {from_ns} ns to {to_ns} ns, after {previous_ns} ns"
+        "motion {index} is out of order: from {from_ns} ns to {to_ns} ns, after {previous_ns} ns"
     )]
-    MotionBackwards {
+    MotionOutOfOrder {
         /// Its index, from 0.
         index: usize,
-        /// End of the motion before, ns; for the first motion its own beginning.
+        /// End of the motion before, ns; for the first motion its own start.
         previous_ns: i64,
         /// Its earlier stamp, ns.
         from_ns: i64,
         /// Its later stamp, ns.
         to_ns: i64,
     },
-    /// Covariances cannot be judged: there is not one motion with truth and covariance.
+    /// No motion has both ground truth and a covariance.
     #[error(
-        "none of {motions} motions can be judged: {without_truth} without ground truth at both ends (same clock?), \
-         {without_covariance} without a positive definite covariance"
+        "none of {motions} motions has ground truth and covariance: {without_truth} without ground truth at both ends \
+         (same clock?), {without_covariance} without a positive definite covariance"
     )]
     NoMatchedMotion {
         /// Motions given.
         motions: usize,
-        /// Motions without truth at both ends.
+        /// Motions without ground truth at both ends.
         without_truth: usize,
         /// Motions without a positive definite covariance.
         without_covariance: usize,

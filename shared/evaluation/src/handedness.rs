@@ -1,8 +1,8 @@
-//! Axes that run the other way: frames with y to the right, headings that grow clockwise.
+//! Handedness: frames with y to the right and clockwise yaw, detected and converted.
 //!
-//! Radar data sets and odometries disagree on handedness. A frame with y to the right has a clockwise yaw, so both
-//! change sign together; some files get only one of the two wrong. The estimate is held against the truth with each
-//! sign, and what is found is undone in the estimate and said.
+//! Radar datasets and odometries disagree on handedness. A frame with y to the right has a clockwise yaw, so both
+//! change sign together; some files have only one of the two wrong. The estimate is compared with the ground truth with
+//! each sign, and converted to the signs that fit.
 
 use std::fmt;
 
@@ -11,60 +11,60 @@ use serde::Serialize;
 
 use crate::{MatchedPoses, ate::aligned_rmse_m};
 
-/// What had to change sign in the estimate to agree with the truth.
+/// The axes that were negated in the estimate to agree with the ground truth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Axes {
-    /// y was negated: the path is mirrored against the truth's.
+    /// y was negated: the path was mirrored.
     pub y_negated: bool,
-    /// yaw was negated: heading grows the other way.
+    /// yaw was negated.
     pub heading_negated: bool,
-    /// Set where only one of the two was negated: then one of the trajectories contradicts itself.
+    /// Set if only one of the two was negated: then heading and path of one of the trajectories contradict each other.
     pub heading_fault: Option<HeadingFault>,
-    /// The truth's heading never changes although the estimate turns: it has positions only.
+    /// The heading of the ground truth is constant although the estimate turns: it has positions only.
     pub truth_lacks_heading: bool,
 }
 
-/// Whose heading runs against the turns of its own path.
+/// The trajectory whose heading has the opposite sense of the turns of its path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum HeadingFault {
-    /// The estimate's.
+    /// The estimate.
     Estimate,
-    /// The truth's.
+    /// The ground truth.
     Truth,
-    /// The paths do not tell.
+    /// The paths do not show it.
     Unclear,
 }
 
-/// Whether one sign fits clearly better than the other.
+/// The sign of an axis that fits clearly better.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum AxisSense {
-    /// As given.
+enum Sign {
+    /// The sign as given.
     AsGiven,
-    /// Negated.
+    /// The opposite sign.
     Negated,
-    /// Neither: a straight path looks the same in a mirror.
+    /// Neither: a straight path equals its mirror image.
     Open,
 }
 
-/// One sign wins when it leaves less than this share of the other's misfit...
+/// A sign is clear if its misfit is below this share of the other's...
 const CLEAR_SHARE: f64 = 0.5;
-/// ...and the other's misfit is more than rounding: positions, m.
-const LEAST_MISFIT_M: f64 = 0.01;
-/// The same for headings, rad.
-const LEAST_MISFIT_RAD: f64 = 1e-3;
-/// A heading that moves by less than this is none, rad (TUM files carry nine decimals).
+/// ...and the other's misfit is more than rounding: for positions, m.
+const MIN_MISFIT_M: f64 = 0.01;
+/// For headings, rad.
+const MIN_MISFIT_RAD: f64 = 1e-3;
+/// A heading that varies by less than this is constant, rad (TUM files have nine decimals).
 const CONSTANT_RAD: f64 = 1e-6;
-/// An estimate that turns by less than this does not show that the truth lacks a heading, rad.
-const LEAST_TURN_RAD: f64 = 0.1;
-/// Steps over which a path's own turns are measured: long against the noise of positions, m.
+/// The least turn of the estimate that shows that the ground truth has no heading, rad.
+const MIN_TURN_RAD: f64 = 0.1;
+/// The steps over which the turns of a path are measured, m: long compared with the noise of positions.
 const COURSE_STEP_M: f64 = 5.0;
 
-/// Finds the signs in which the estimate fits the truth, and returns it with those signs.
+/// Returns the poses with the estimate converted to the signs that fit the ground truth, and those signs.
 ///
-/// Positions and headings vote: where one of them is clear and the other open, the clear one decides for both.
-/// A wrong-handed sensor frame always shows, and a poor estimate is not mirrored because its mirror image happens to
-/// lie a little nearer.
+/// Positions and headings vote: if one of them is clear and the other is not, the clear one decides for both. So a
+/// left-handed sensor frame is always found, and a poor estimate is not mirrored because its mirror image happens to be
+/// a little nearer.
 pub fn resolve_axes(matched: MatchedPoses) -> (MatchedPoses, Axes) {
     let (estimate_yaw, truth_yaw) = (
         unwrapped_yaw(matched.estimate()),
@@ -77,19 +77,19 @@ pub fn resolve_axes(matched: MatchedPoses) -> (MatchedPoses, Axes) {
         .map(|p| negate(p, true, true))
         .collect();
     let mirrored_m = aligned_rmse_m(&mirror_image, matched.truth());
-    let y = sense(given_m, mirrored_m, LEAST_MISFIT_M);
+    let y = sense(given_m, mirrored_m, MIN_MISFIT_M);
     let heading = sense(
         heading_misfit(&estimate_yaw, &truth_yaw, 1.0),
         heading_misfit(&estimate_yaw, &truth_yaw, -1.0),
-        LEAST_MISFIT_RAD,
+        MIN_MISFIT_RAD,
     );
-    let (y_negated, heading_negated) = decide(y, heading, mirrored_m < given_m + LEAST_MISFIT_M);
+    let (y_negated, heading_negated) = decide(y, heading, mirrored_m < given_m + MIN_MISFIT_M);
     let axes = Axes {
         y_negated,
         heading_negated,
         heading_fault: (y_negated != heading_negated).then(|| heading_fault(&matched)),
         truth_lacks_heading: range(&truth_yaw) < CONSTANT_RAD
-            && range(&estimate_yaw) > LEAST_TURN_RAD,
+            && range(&estimate_yaw) > MIN_TURN_RAD,
     };
     (
         matched.map_estimate(|p| negate(p, y_negated, heading_negated)),
@@ -97,9 +97,9 @@ pub fn resolve_axes(matched: MatchedPoses) -> (MatchedPoses, Axes) {
     )
 }
 
-/// Whether to negate y and heading, from the votes of both.
-fn decide(y: AxisSense, heading: AxisSense, mirror_no_worse: bool) -> (bool, bool) {
-    use AxisSense::{AsGiven, Negated, Open};
+/// Returns whether to negate y and heading, by the votes of both.
+fn decide(y: Sign, heading: Sign, mirror_no_worse: bool) -> (bool, bool) {
+    use Sign::{AsGiven, Negated, Open};
     match (y, heading) {
         (Open, Open | AsGiven) => (false, false),
         (Open, Negated) => (mirror_no_worse, true),
@@ -108,13 +108,13 @@ fn decide(y: AxisSense, heading: AxisSense, mirror_no_worse: bool) -> (bool, boo
     }
 }
 
-fn sense(given: f64, negated: f64, least: f64) -> AxisSense {
-    if negated < CLEAR_SHARE * given && given > least {
-        AxisSense::Negated
-    } else if given < CLEAR_SHARE * negated && negated > least {
-        AxisSense::AsGiven
+fn sense(given: f64, negated: f64, min_misfit: f64) -> Sign {
+    if negated < CLEAR_SHARE * given && given > min_misfit {
+        Sign::Negated
+    } else if given < CLEAR_SHARE * negated && negated > min_misfit {
+        Sign::AsGiven
     } else {
-        AxisSense::Open
+        Sign::Open
     }
 }
 
@@ -129,7 +129,7 @@ fn negate(pose: &Pose, y: bool, heading: bool) -> Pose {
     changed
 }
 
-/// Yaw of each pose without jumps of a full turn, rad.
+/// Returns the yaw of each pose without jumps of a full turn, rad.
 fn unwrapped_yaw(poses: &[Pose]) -> Vec<f64> {
     let mut yaw = poses.first().map_or(0.0, |p| p.rotation.angle());
     let turns = poses
@@ -152,7 +152,7 @@ fn range(values: &[f64]) -> f64 {
     high - low
 }
 
-/// Spread (RMS about its mean, rad) of the difference between `sign` times the estimated and the true yaw.
+/// Returns the standard deviation of `sign` times the estimated yaw less the true yaw, rad.
 fn heading_misfit(estimate: &[f64], truth: &[f64], sign: f64) -> f64 {
     let n = truth.len() as f64;
     let difference = || estimate.iter().zip(truth).map(|(e, t)| sign * e - t);
@@ -172,7 +172,7 @@ fn heading_fault(matched: &MatchedPoses) -> HeadingFault {
     }
 }
 
-/// Sum over the path of heading change times course change: negative where the heading turns against its own path.
+/// Returns the sum of heading change times course change: negative if the heading has the opposite sense of the path.
 fn turns_with_path(poses: &[Pose]) -> f64 {
     let mut kept: Vec<&Pose> = Vec::new();
     for pose in poses {
@@ -196,24 +196,22 @@ impl fmt::Display for Axes {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match (self.y_negated, self.heading_negated) {
             (false, false) => "as given",
-            (true, true) => {
-                "the estimate is mirrored against the truth: its y and yaw were negated"
-            }
+            (true, true) => "the handedness of the estimate differs: its y and yaw were negated",
             (true, false) => {
-                "the estimate's path, but not its heading, is mirrored: its y was negated"
+                "the path of the estimate is mirrored, its heading is not: its y was negated"
             }
-            (false, true) => "the estimate's heading runs the other way: its yaw was negated",
+            (false, true) => {
+                "the heading of the estimate has the opposite sense: its yaw was negated"
+            }
         })?;
         f.write_str(match self.heading_fault {
             None => "",
-            Some(HeadingFault::Estimate) => " (its heading turns against its own path)",
-            Some(HeadingFault::Truth) => {
-                " (it is the truth's heading that turns against its own path)"
-            }
-            Some(HeadingFault::Unclear) => " (whose heading is wrong is unclear)",
+            Some(HeadingFault::Estimate) => " (its heading contradicts its path)",
+            Some(HeadingFault::Truth) => " (the heading of the ground truth contradicts its path)",
+            Some(HeadingFault::Unclear) => " (it is unclear whose heading is wrong)",
         })?;
         if self.truth_lacks_heading {
-            f.write_str("; the truth has no heading")
+            f.write_str("; the ground truth has no heading")
         } else {
             Ok(())
         }
@@ -226,7 +224,7 @@ mod tests {
     use super::*;
     use gyre_geometry::pose;
 
-    /// A drive with bends to both sides, more to the left, that ends elsewhere.
+    /// A drive with bends to both sides, more to the left.
     fn drive() -> Vec<Pose> {
         let mut here = pose(3.0, -2.0, 0.4);
         (0..300)
@@ -247,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn each_combination_of_signs_is_found_and_its_culprit_named() {
+    fn each_combination_of_signs_is_found_with_the_trajectory_at_fault() {
         for (y, heading) in [(false, false), (true, true), (true, false), (false, true)] {
             let fault = |side| (y != heading).then_some(side);
             let estimate = resolve(with(drive(), y, heading), drive());
@@ -275,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn the_estimate_comes_back_in_the_signs_of_the_truth() {
+    fn the_estimate_is_converted_to_the_signs_of_the_ground_truth() {
         let matched = MatchedPoses::new(with(drive(), true, true), drive()).unwrap();
         let (resolved, _) = resolve_axes(matched);
         assert_eq!(resolved.estimate(), drive());
@@ -288,19 +286,19 @@ mod tests {
     }
 
     #[test]
-    fn a_poor_estimate_is_not_mirrored_for_a_little_gain() {
+    fn a_poor_estimate_is_not_mirrored_for_a_small_gain() {
         assert_eq!(
-            decide(sense(20.0, 15.0, 0.01), AxisSense::AsGiven, true),
+            decide(sense(20.0, 15.0, 0.01), Sign::AsGiven, true),
             (false, false)
         );
         assert_eq!(
-            decide(sense(20.0, 15.0, 0.01), AxisSense::Negated, true),
+            decide(sense(20.0, 15.0, 0.01), Sign::Negated, true),
             (true, true)
         );
     }
 
     #[test]
-    fn a_truth_of_positions_alone_is_recognised() {
+    fn a_ground_truth_without_heading_is_recognised() {
         let positions = drive()
             .iter()
             .map(|p| pose(p.translation.x, p.translation.y, 0.0))

@@ -1,4 +1,7 @@
-//! The KITTI odometry errors: drift of translation and rotation over segments of 100 to 800 m.
+//! KITTI odometry errors: drift of translation and rotation over segments of 100 to 800 m.
+//!
+//! Geiger et al., "Are we ready for autonomous driving?", CVPR 2012, as the odometry development kit computes them. They
+//! need no alignment: only motions within a segment are compared.
 
 use std::num::NonZeroUsize;
 
@@ -11,38 +14,38 @@ use crate::{
     segments::{PerLength, Segment, segments},
 };
 
-/// KITTI odometry errors, means over all segments of all lengths.
+/// The KITTI odometry errors, means over all segments of all lengths.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Kitti {
-    /// Translation error, % of the nominal length.
+    /// Translation error, % of the segment length.
     pub translation_percent: f64,
     /// Rotation error, degrees per 100 m.
     pub rotation_deg_per_100m: f64,
-    /// The same in degrees per km, as the KITTI site's "deg/m" times 1000.
+    /// The same in degrees per km: 1000 times the "deg/m" of the KITTI leaderboard.
     pub rotation_deg_per_km: f64,
-    /// Number of segments in the means.
+    /// Number of segments.
     pub segments: usize,
-    /// Poses between the starts of segments.
+    /// Poses from the start of a segment to the start of the next.
     pub step: NonZeroUsize,
-    /// The means of each length that has segments, short lengths first.
+    /// The means for each length that has segments, shortest first.
     pub by_length: Vec<KittiLength>,
 }
 
-/// KITTI errors of the segments of one nominal length.
+/// The KITTI errors of the segments of one length.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct KittiLength {
-    /// Nominal length, m.
+    /// Segment length, m.
     pub length_m: f64,
-    /// Translation error, % of the nominal length.
+    /// Translation error, % of the segment length.
     pub translation_percent: f64,
     /// Rotation error, degrees per 100 m.
     pub rotation_deg_per_100m: f64,
-    /// Number of segments in the means.
+    /// Number of segments.
     pub segments: usize,
 }
 
-/// Measures the drift over every segment that begins at every `step`-th pose; `None` where the path has no segment
-/// beyond 100 m. No alignment: only motions within a segment are compared.
+/// Returns the mean errors of the segments that start at every `step`-th pose, `None` if the path is not longer than
+/// 100 m.
 ///
 /// `step` is 10 in the development kit (1 s of its lidar at 10 Hz); radar papers use 10 or 4 (1 s at 4 Hz).
 pub fn kitti(matched: &MatchedPoses, step: NonZeroUsize) -> Option<Kitti> {
@@ -61,7 +64,7 @@ pub fn kitti(matched: &MatchedPoses, step: NonZeroUsize) -> Option<Kitti> {
     })
 }
 
-/// Translation error (%) and rotation error (deg/100 m) of one segment.
+/// Returns the translation error (%) and the rotation error (deg/100 m) of one segment.
 fn segment_error(matched: &MatchedPoses, segment: Segment) -> [f64; 2] {
     let estimated = Motion::within(matched.estimate(), segment);
     let error = estimated.to(&Motion::within(matched.truth(), segment));
@@ -74,9 +77,9 @@ fn segment_error(matched: &MatchedPoses, segment: Segment) -> [f64; 2] {
 
 /// A planar rigid motion in complex numbers: x -> rotation x + translation.
 ///
-/// It is inverted by true division, not by conjugation, and its angle is an arc cosine, because the development kit
-/// inverts matrices and takes their trace. That matters in the fifth decimal of published figures only: files hold
-/// rotations to six decimals, so their length is 1 to six decimals too.
+/// The inverse is a true division, not a conjugation, and the angle an arc cosine, because the development kit inverts
+/// matrices and takes their trace. This matters only in the fifth decimal of published figures: rotations in files have
+/// six decimals.
 struct Motion {
     rotation: Complex<f64>,
     translation: Complex<f64>,
@@ -90,12 +93,12 @@ impl Motion {
         }
     }
 
-    /// inverse(first) last.
+    /// inverse(first pose) * last pose.
     fn within(poses: &[Pose], segment: Segment) -> Self {
         Self::of(&poses[segment.first]).to(&Self::of(&poses[segment.last]))
     }
 
-    /// inverse(self) other.
+    /// inverse(self) * other.
     fn to(&self, other: &Self) -> Self {
         Self {
             rotation: other.rotation / self.rotation,

@@ -1,12 +1,10 @@
-//! Poses of the estimate, each with its counterpart in the truth: what all metrics work on.
+//! Estimated poses with their associated ground-truth poses: the input of all metrics.
 
 use gyre_geometry::Pose;
 
 use crate::{EvaluationError, Side, error::LARGEST_COORDINATE_M};
 
-/// Two equally long lists of valid poses; pose `k` of one belongs to pose `k` of the other.
-///
-/// There are always at least two. The two lists may be in different fixed frames.
+/// Estimated and ground-truth poses, associated by index: valid, at least two, equally many. The fixed frames may differ.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MatchedPoses {
     estimate: Vec<Pose>,
@@ -14,11 +12,11 @@ pub struct MatchedPoses {
 }
 
 impl MatchedPoses {
-    /// Pairs the poses one by one.
+    /// Associates the poses one by one.
     ///
     /// # Errors
     /// [`EvaluationError::LengthMismatch`], [`EvaluationError::TooFew`] below two poses,
-    /// [`EvaluationError::BadPosition`] and [`EvaluationError::NotARotation`].
+    /// [`EvaluationError::BadPosition`] and [`EvaluationError::BadRotation`].
     pub fn new(estimate: Vec<Pose>, truth: Vec<Pose>) -> Result<Self, EvaluationError> {
         let (n, m) = (estimate.len(), truth.len());
         if n != m {
@@ -44,23 +42,23 @@ impl MatchedPoses {
         &self.estimate
     }
 
-    /// The true poses.
+    /// The ground-truth poses.
     pub fn truth(&self) -> &[Pose] {
         &self.truth
     }
 
-    /// Estimate and truth side by side.
+    /// The pairs (estimate, ground truth).
     pub fn iter(&self) -> impl Iterator<Item = (&Pose, &Pose)> {
         self.estimate.iter().zip(&self.truth)
     }
 
-    /// Number of pairs, at least 2.
+    /// The number of pairs, at least 2.
     #[allow(clippy::len_without_is_empty)] // never empty
     pub fn len(&self) -> usize {
         self.truth.len()
     }
 
-    /// Distance travelled along the truth up to each pose, m; the first is 0.
+    /// The distance travelled along the ground truth up to each pose, m; the first is 0.
     pub fn distance_m(&self) -> Vec<f64> {
         let mut travelled = 0.0;
         let add = |step| {
@@ -73,7 +71,7 @@ impl MatchedPoses {
             .collect()
     }
 
-    /// The same pairs with each estimated pose passed through `change`, which must keep poses valid.
+    /// Applies `change`, which must keep poses valid, to each estimated pose.
     pub(crate) fn map_estimate(self, change: impl FnMut(&Pose) -> Pose) -> Self {
         Self {
             estimate: self.estimate.iter().map(change).collect(),
@@ -82,14 +80,14 @@ impl MatchedPoses {
     }
 }
 
-/// Rotations may miss the unit circle by what text files round, and by no more than this.
+/// The largest distance of (cosine, sine) from the unit circle: rounding in text files stays below.
 const LARGEST_ROUNDING: f64 = 1e-3;
 
-/// Refuses positions that are none (NaN, infinite, absurdly far) and rotations that are none.
+/// Refuses positions that are not finite or too far out, and invalid rotations.
 pub(crate) fn require_poses(side: Side, poses: &[Pose]) -> Result<(), EvaluationError> {
     for (index, pose) in poses.iter().enumerate() {
         let (x_m, y_m) = (pose.translation.x, pose.translation.y);
-        // NaN fails these comparisons
+        // NaN fails these comparisons.
         let within = |v: f64| v.abs() <= LARGEST_COORDINATE_M;
         if !(within(x_m) && within(y_m)) {
             return Err(EvaluationError::BadPosition {
@@ -102,7 +100,7 @@ pub(crate) fn require_poses(side: Side, poses: &[Pose]) -> Result<(), Evaluation
         let length = pose.rotation.complex().norm();
         let on_circle = (length - 1.0).abs() <= LARGEST_ROUNDING;
         if !on_circle {
-            return Err(EvaluationError::NotARotation {
+            return Err(EvaluationError::BadRotation {
                 side,
                 index,
                 length,
@@ -112,14 +110,14 @@ pub(crate) fn require_poses(side: Side, poses: &[Pose]) -> Result<(), Evaluation
     Ok(())
 }
 
-/// Lengths of the steps from pose to pose, m.
+/// The distances from pose to pose, m.
 fn steps_m(poses: &[Pose]) -> impl Iterator<Item = f64> + '_ {
     poses
         .windows(2)
         .map(|w| (w[1].translation.vector - w[0].translation.vector).norm())
 }
 
-/// Length of the whole path, m.
+/// The length of the path, m.
 pub(crate) fn path_m(poses: &[Pose]) -> f64 {
     steps_m(poses).sum()
 }
@@ -131,7 +129,7 @@ mod tests {
     use gyre_geometry::pose;
 
     #[test]
-    fn unequal_and_too_short_lists_are_refused_with_their_lengths() {
+    fn lists_of_unequal_length_or_below_two_poses_are_refused() {
         let still = Pose::identity();
         assert_eq!(
             MatchedPoses::new(vec![still; 3], vec![still; 2]),
@@ -151,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn a_position_that_is_none_is_named() {
+    fn an_invalid_position_is_refused_with_its_index() {
         for x in [f64::NAN, f64::INFINITY, -2e9] {
             let mut poses = vec![Pose::identity(); 3];
             poses[2].translation.x = x;
@@ -177,7 +175,7 @@ mod tests {
             )
         };
         assert!(scaled(1.0 + 1e-6).is_ok());
-        let refused = EvaluationError::NotARotation {
+        let refused = EvaluationError::BadRotation {
             side: Side::Estimate,
             index: 0,
             length: 0.5,
@@ -186,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn distance_adds_up_the_steps_of_the_truth() {
+    fn distance_is_the_path_length_of_the_ground_truth() {
         let at = |x, y| pose(x, y, 0.0);
         let matched = MatchedPoses::new(
             vec![at(0.0, 0.0); 3],

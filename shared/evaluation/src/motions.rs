@@ -1,4 +1,4 @@
-//! Reported motions beside the truth's poses at the same times.
+//! Association of reported motions with the ground truth at their stamps.
 
 use gyre_geometry::{Pose, UncertainMotion};
 
@@ -8,19 +8,18 @@ use crate::{
     matched::require_poses,
 };
 
-/// A motion as an odometry reports it.
+/// A motion with its stamps and covariance, as an odometry reports it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimedMotion {
-    /// Time of the earlier frame, ns.
+    /// Stamp of the earlier frame, ns.
     pub from_ns: i64,
-    /// Time of the later frame, ns.
+    /// Stamp of the later frame, ns.
     pub to_ns: i64,
-    /// The later frame in the earlier.
+    /// The later frame in the earlier one.
     pub estimate: UncertainMotion,
 }
 
-/// A part of a drive: shares of the time from the first motion's beginning to the last one's end. What is calibrated on one part
-/// is shown on another.
+/// A part of a drive, by shares of its duration. Covariances are calibrated on one part and tested on another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Part {
     from: f64,
@@ -31,13 +30,13 @@ impl Part {
     /// The whole drive.
     pub const ALL: Self = Self { from: 0.0, to: 1.0 };
 
-    /// From one share of the time to another; `None` unless 0 <= `from` < `to` <= 1.
+    /// The part from one share of the duration to another; `None` unless 0 <= `from` < `to` <= 1.
     pub fn new(from: f64, to: f64) -> Option<Self> {
         (0.0 <= from && from < to && to <= 1.0).then_some(Self { from, to })
     }
 
-    /// The motions, given in the order of their times, that begin within this part: those of adjoining parts share none and leave
-    /// none out.
+    /// Returns the motions that start within this part; `motions` are in order of time. Adjoining parts share no motion
+    /// and leave none out.
     pub fn of<'m>(&self, motions: &'m [TimedMotion]) -> &'m [TimedMotion] {
         let (Some(first), Some(last)) = (motions.first(), motions.last()) else {
             return motions;
@@ -48,26 +47,26 @@ impl Part {
                 (motion.from_ns.saturating_sub(first.from_ns) as f64) < share * duration_ns
             })
         };
-        // motions that do not run in order have no parts; whoever judges them says so
+        // Motions out of order have no parts: `MatchedMotions::new` refuses them.
         motions
             .get(before(self.from)..before(self.to))
             .unwrap_or(motions)
     }
 }
 
-/// Motions in unbroken chains, with the truth at every joint that has one.
+/// Motions in unbroken chains, with the ground truth at their stamps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MatchedMotions {
     pub(crate) chains: Vec<Chain>,
     /// Motions given.
     pub motions: usize,
-    /// Motions without truth at both ends.
+    /// Motions without ground truth at both ends.
     pub without_truth: usize,
     /// Motions without a positive definite covariance: left out, and the chain ends there.
     pub without_covariance: usize,
 }
 
-/// `n` motions, each beginning where the one before ended, and their `n + 1` joints.
+/// `n` consecutive motions and their `n + 1` nodes.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Chain {
     pub motions: Vec<UncertainMotion>,
@@ -76,12 +75,12 @@ pub(crate) struct Chain {
 }
 
 impl MatchedMotions {
-    /// Looks up the truth, interpolated across gaps of up to `max_gap_ns`, at both ends of each motion.
+    /// Associates both ends of each motion with the ground truth, interpolated across gaps of up to `max_gap_ns`.
     ///
     /// # Errors
-    /// [`EvaluationError::NotAMotion`] and [`EvaluationError::MotionBackwards`] for what no odometry reports, the errors of
-    /// [`associate()`](crate::associate()) that concern the truth, and [`EvaluationError::NoMatchedMotion`] where no motion has both
-    /// truth and covariance.
+    /// [`EvaluationError::BadMotion`] and [`EvaluationError::MotionOutOfOrder`] for invalid motions, the errors of
+    /// [`associate()`](crate::associate()) that concern the ground truth, and [`EvaluationError::NoMatchedMotion`] if no
+    /// motion has both ground truth and covariance.
     pub fn new(
         motions: &[TimedMotion],
         truth: TimedPoses<'_>,
@@ -94,7 +93,7 @@ impl MatchedMotions {
             At::Pose(pose) => Some(pose),
             At::Outside | At::Gap => None,
         };
-        let mut judged = Self {
+        let mut matched = Self {
             chains: Vec::new(),
             motions: motions.len(),
             without_truth: 0,
@@ -102,16 +101,16 @@ impl MatchedMotions {
         };
         for motion in motions {
             let (from, to) = (at(motion.from_ns), at(motion.to_ns));
-            judged.without_truth += usize::from(from.is_none() || to.is_none());
+            matched.without_truth += usize::from(from.is_none() || to.is_none());
             match motion.estimate.has_covariance() {
-                true => judged.add(motion, from, to),
-                false => judged.without_covariance += 1,
+                true => matched.add(motion, from, to),
+                false => matched.without_covariance += 1,
             }
         }
-        judged.require_some()
+        matched.require_some()
     }
 
-    /// Adds a motion to the last chain, or, where it does not join, to a new one.
+    /// Adds a motion to the last chain if it starts where that ends, else to a new one.
     fn add(&mut self, motion: &TimedMotion, from: Option<Pose>, to: Option<Pose>) {
         match self
             .chains
@@ -148,7 +147,7 @@ impl MatchedMotions {
         }
     }
 
-    /// First and last time of the chains, ns.
+    /// Returns the first and last stamp of the chains, ns.
     pub(crate) fn span_ns(&self) -> (i64, i64) {
         let first = self
             .chains
@@ -163,7 +162,7 @@ impl MatchedMotions {
 }
 
 impl Chain {
-    /// The motions from joint `first` on, composed one after the other: to joint `first + 1`, `first + 2`, ...
+    /// Returns the composed motions from node `first` to nodes `first + 1`, `first + 2`, ...
     pub fn composed(&self, first: usize) -> impl Iterator<Item = UncertainMotion> + '_ {
         self.motions[first..]
             .iter()
@@ -173,7 +172,7 @@ impl Chain {
             })
     }
 
-    /// The true motion between two joints, where both have truth.
+    /// Returns the true motion between two nodes that both have ground truth.
     pub fn true_motion(&self, first: usize, last: usize) -> Option<Pose> {
         Some(self.truth[first]?.inv_mul(&self.truth[last]?))
     }
@@ -196,7 +195,7 @@ fn require_motions(motions: &[TimedMotion]) -> Result<(), EvaluationError> {
                 motion.translation.y,
                 motion.rotation.angle(),
             );
-            return Err(EvaluationError::NotAMotion {
+            return Err(EvaluationError::BadMotion {
                 index,
                 x_m,
                 y_m,
@@ -204,7 +203,7 @@ fn require_motions(motions: &[TimedMotion]) -> Result<(), EvaluationError> {
             });
         }
         if from_ns < previous_ns || to_ns <= from_ns {
-            return Err(EvaluationError::MotionBackwards {
+            return Err(EvaluationError::MotionOutOfOrder {
                 index,
                 previous_ns,
                 from_ns,
@@ -238,8 +237,8 @@ mod tests {
         }
     }
 
-    /// With a truth that is at x = t at t ms, interpolated across up to 20 ms.
-    fn judged(
+    /// Matches with a ground truth that is at x = t at t ms, interpolated across up to 20 ms.
+    fn matched(
         motions: &[TimedMotion],
         truth_ms: &[i64],
     ) -> Result<MatchedMotions, EvaluationError> {
@@ -249,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn chains_end_where_motions_do_not_join_and_at_a_motion_without_covariance() {
+    fn chains_end_at_gaps_and_at_motions_without_covariance() {
         let motions = [
             motion(0, 10, 1.0),
             motion(10, 20, 1.0),
@@ -257,13 +256,13 @@ mod tests {
             motion(40, 50, 0.0),
             motion(50, 60, 1.0),
         ];
-        let found = judged(&motions, &[0, 20, 40, 60]).unwrap();
-        let joints: Vec<_> = found
+        let found = matched(&motions, &[0, 20, 40, 60]).unwrap();
+        let stamps: Vec<_> = found
             .chains
             .iter()
             .map(|chain| chain.stamps_ns.iter().map(|t| t / MS).collect::<Vec<_>>())
             .collect();
-        assert_eq!(joints, [vec![0, 10, 20], vec![30, 40], vec![50, 60]]);
+        assert_eq!(stamps, [vec![0, 10, 20], vec![30, 40], vec![50, 60]]);
         assert_eq!(
             (found.motions, found.without_truth, found.without_covariance),
             (5, 0, 1)
@@ -272,9 +271,9 @@ mod tests {
     }
 
     #[test]
-    fn a_chain_goes_on_across_a_gap_of_the_truth() {
+    fn a_chain_continues_across_a_gap_of_the_ground_truth() {
         let motions = [0, 10, 20, 30].map(|t| motion(t, t + 10, 1.0));
-        let found = judged(&motions, &[0, 10, 40]).unwrap();
+        let found = matched(&motions, &[0, 10, 40]).unwrap();
         assert_eq!((found.chains.len(), found.without_truth), (1, 3));
         assert_eq!(
             found.chains[0].true_motion(0, 4),
@@ -312,8 +311,8 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_judged_is_an_error_that_says_why() {
-        let none = judged(&[motion(0, 10, 0.0), motion(100, 110, 1.0)], &[0, 10]).unwrap_err();
+    fn motions_that_cannot_be_matched_are_refused_with_the_reason() {
+        let none = matched(&[motion(0, 10, 0.0), motion(100, 110, 1.0)], &[0, 10]).unwrap_err();
         assert_eq!(
             none,
             EvaluationError::NoMatchedMotion {
@@ -323,19 +322,19 @@ mod tests {
             }
         );
         assert!(matches!(
-            judged(&[], &[0, 10]),
+            matched(&[], &[0, 10]),
             Err(EvaluationError::NoMatchedMotion { motions: 0, .. })
         ));
-        let backwards = judged(&[motion(0, 10, 1.0), motion(9, 19, 1.0)], &[0, 10]);
+        let backwards = matched(&[motion(0, 10, 1.0), motion(9, 19, 1.0)], &[0, 10]);
         assert!(matches!(
             backwards,
-            Err(EvaluationError::MotionBackwards { index: 1, .. })
+            Err(EvaluationError::MotionOutOfOrder { index: 1, .. })
         ));
         let mut broken = motion(0, 10, 1.0);
         broken.estimate.motion.translation.x = f64::NAN;
         assert!(matches!(
-            judged(&[broken], &[0, 10]),
-            Err(EvaluationError::NotAMotion { index: 0, .. })
+            matched(&[broken], &[0, 10]),
+            Err(EvaluationError::BadMotion { index: 0, .. })
         ));
     }
 }

@@ -1,4 +1,10 @@
-//! Normalised error squared: whether the errors of motions are as large as their covariances say.
+//! Normalised estimation error squared (NEES): the consistency of covariances with the errors of motions.
+//!
+//! Bar-Shalom, Li and Kirubarajan, "Estimation with applications to tracking and navigation", 2001, Sec. 5.4. The error of
+//! a segment of consecutive motions is e = (x, y, yaw) of the estimate less those of the ground truth, along the axes of its
+//! first frame; P is the covariance composed over the segment, plus that of the ground truth. The NEES e' inv(P) e of a
+//! consistent covariance has a chi-square distribution, whose expectation is its degrees of freedom: 3, or 2 for the
+//! translation alone, or 1 for the yaw. Segments of one length share no motion.
 
 use std::num::NonZeroUsize;
 
@@ -8,17 +14,17 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::{MatchedMotions, TruthSigma, motions::Chain};
 
-/// How to judge covariances.
+/// The options of [`nees()`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct NeesOptions {
-    /// Numbers of motions that are composed into one segment.
+    /// Segment lengths, in motions.
     pub lengths: Vec<NonZeroUsize>,
-    /// How uncertain the truth itself is: its share is added to each covariance.
+    /// The uncertainty of the ground truth, which is added to each covariance.
     pub truth_sigma: TruthSigma,
 }
 
 impl Default for NeesOptions {
-    /// 1, 4, 16 and 64 motions; an exact truth.
+    /// Returns 1, 4, 16 and 64 motions, and an exact ground truth.
     fn default() -> Self {
         let lengths = [1, 4, 16, 64]
             .into_iter()
@@ -31,40 +37,35 @@ impl Default for NeesOptions {
     }
 }
 
-/// How honest the covariances are. `Display` is a table, the alternate form a longer one.
-///
-/// The error of a segment of motions is e = (x, y, yaw) of the estimate less those of the truth, along the axes of the
-/// segment's first frame; P is the covariance composed over the segment, plus the truth's own. The normalised error squared
-/// e' inv(P) e of an honest covariance has a chi-square distribution, whose expectation is its degrees of freedom: 3, or 2 for
-/// the translation alone, or 1 for the yaw. Stretches of one length share no motion.
+/// The NEES of the motions for each segment length. `Display` is a table; `{:#}` adds both halves of the drive.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Nees {
     /// Motions given.
     pub motions: usize,
-    /// Motions left out because the truth is missing at an end.
+    /// Motions left out because an end has no ground truth.
     pub without_truth: usize,
-    /// Motions left out because their covariance is missing or not positive definite.
+    /// Motions left out because they have no positive definite covariance.
     pub without_covariance: usize,
-    /// What was taken as the truth's own uncertainty.
+    /// The uncertainty of the ground truth.
     pub truth_sigma: TruthSigma,
-    /// The lengths that any chain of motions has, in the order given.
+    /// The figures for each length that has segments, in the order given.
     pub by_length: Vec<NeesLength>,
 }
 
-/// The figures of segments of one length.
+/// The NEES of the segments of one length.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NeesLength {
-    /// Motions in a segment.
+    /// Segment length, in motions.
     pub motions: usize,
     /// All segments.
     pub all: NeesFigures,
-    /// Those that begin in the first half of the time.
+    /// Segments that start in the first half of the drive's duration.
     pub first_half: Option<NeesFigures>,
-    /// Those that begin in the second half.
+    /// Segments that start in the second half.
     pub second_half: Option<NeesFigures>,
 }
 
-/// The figures of a set of segments.
+/// The NEES of a set of segments.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NeesFigures {
     /// Number of segments.
@@ -77,31 +78,31 @@ pub struct NeesFigures {
     pub yaw: NeesFigure,
 }
 
-/// Mean normalised error squared against its expectation.
+/// The mean NEES relative to its expectation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct NeesFigure {
-    /// The mean divided by its expectation. Above 1 the covariances promise too much, below 1 too little.
+    /// The mean NEES divided by its degrees of freedom. Above 1 the covariances are overconfident, below 1 conservative.
     pub ratio: f64,
-    /// Where 95 % of the ratios of honest covariances lie, if errors are Gaussian and independent from segment to segment.
+    /// The interval with 95 % of the ratios of consistent covariances, if errors are Gaussian and independent.
     pub acceptance_interval: [f64; 2],
-    /// Share of the segments whose error lies outside the covariance's 95 % region, %.
+    /// Share of the segments whose error lies outside the 95 % region of their covariance, %.
     pub outside_percent: f64,
 }
 
-/// Probability within a region, and of an honest ratio within its range.
+/// The probability of a region, and of the acceptance interval.
 const CONFIDENCE: f64 = 0.95;
 
 /// Degrees of freedom of pose, translation and yaw.
 const FREEDOMS: [usize; 3] = [3, 2, 1];
 
-/// Measures the honesty of single motions and of longer segments.
+/// Returns the NEES of the motions.
 ///
-/// The truth's noise dominates short segments where it is not told (`truth_sigma`); long ones are few.
-pub fn nees(judged: &MatchedMotions, options: &NeesOptions) -> Nees {
-    let (from_ns, to_ns) = judged.span_ns();
+/// The noise of the ground truth dominates short segments unless `truth_sigma` accounts for it; long segments are few.
+pub fn nees(matched: &MatchedMotions, options: &NeesOptions) -> Nees {
+    let (from_ns, to_ns) = matched.span_ns();
     let middle_ns = from_ns.midpoint(to_ns);
     let of_length = |&length: &NonZeroUsize| {
-        let samples: Vec<_> = judged
+        let samples: Vec<_> = matched
             .chains
             .iter()
             .flat_map(|chain| segments(chain, length, options.truth_sigma))
@@ -116,23 +117,23 @@ pub fn nees(judged: &MatchedMotions, options: &NeesOptions) -> Nees {
         })
     };
     Nees {
-        motions: judged.motions,
-        without_truth: judged.without_truth,
-        without_covariance: judged.without_covariance,
+        motions: matched.motions,
+        without_truth: matched.without_truth,
+        without_covariance: matched.without_covariance,
         truth_sigma: options.truth_sigma,
         by_length: options.lengths.iter().filter_map(of_length).collect(),
     }
 }
 
-/// One segment.
+/// The NEES of one segment.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
     from_ns: i64,
-    /// Normalised error squared of pose, translation and yaw.
+    /// Of pose, translation and yaw.
     squared: [f64; 3],
 }
 
-/// The segments of `length` motions, one after the other, that have truth at both ends.
+/// Returns the consecutive segments of `length` motions that have ground truth at both ends.
 fn segments(
     chain: &Chain,
     length: NonZeroUsize,
@@ -156,7 +157,7 @@ fn segments(
     })
 }
 
-/// e' inv(P) e of pose, translation and yaw; `None` where P is not positive definite.
+/// Returns the NEES of pose, translation and yaw; `None` if P is not positive definite.
 fn normalised(error: &Vector3<f64>, covariance: &Matrix3<f64>) -> Option<[f64; 3]> {
     let pose = error.dot(&covariance.cholesky()?.solve(error));
     let position: Matrix2<f64> = covariance.fixed_view::<2, 2>(0, 0).into_owned();
@@ -187,7 +188,7 @@ fn figures(samples: &[Sample]) -> Option<NeesFigures> {
     })
 }
 
-/// The value that a chi-square variable of `freedom` > 0 degrees of freedom stays below with probability `p`.
+/// Returns the quantile `p` of the chi-square distribution with `freedom` > 0 degrees of freedom.
 fn chi_square_quantile(p: f64, freedom: usize) -> f64 {
     ChiSquared::new(freedom as f64).map_or(f64::NAN, |chi_square| chi_square.inverse_cdf(p))
 }
@@ -217,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn many_degrees_of_freedom_come_near_to_the_normal_distribution() {
+    fn quantiles_of_many_degrees_of_freedom_approach_the_normal_distribution() {
         let freedom = 60_000.0f64;
         let expected = freedom + 1.959964 * (2.0 * freedom).sqrt();
         assert!((chi_square_quantile(0.975, 60_000) - expected).abs() < 2.0);

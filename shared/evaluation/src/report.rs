@@ -1,4 +1,4 @@
-//! The whole evaluation: associate, undo mirrored axes, measure.
+//! The whole evaluation: associate, convert the handedness, compute the metrics.
 
 use std::num::NonZeroUsize;
 
@@ -9,17 +9,17 @@ use crate::{
     TimedPoses, associate, ate, end_error, handedness::resolve_axes, kitti, rpe, seg,
 };
 
-/// How to evaluate.
+/// The options of an evaluation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
-    /// Poses between the starts of the segments of KITTI and seg; published figures use 10 or 4.
+    /// Poses from the start of a segment of KITTI and seg to the start of the next; published figures use 10 or 4.
     pub step: NonZeroUsize,
-    /// How counterparts are found.
+    /// The rule by which poses are associated.
     pub association: Association,
 }
 
 impl Default for Options {
-    /// Step 10, by time.
+    /// Returns step 10 and association by time.
     fn default() -> Self {
         Self {
             step: NonZeroUsize::MIN.saturating_add(9),
@@ -28,36 +28,36 @@ impl Default for Options {
     }
 }
 
-/// All metrics of one estimate against its truth. `Display` is a small table; `{:#}` adds a line for each length.
+/// All metrics of one estimate. `Display` is a short table; `{:#}` adds a line for each segment length.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Evaluation {
-    /// How much of the trajectories was compared.
+    /// The numbers of poses that were compared.
     pub coverage: Coverage,
-    /// Axes that ran the other way.
+    /// The axes that were negated in the estimate.
     pub axes: Axes,
-    /// Length of the truth over the matched poses, m.
+    /// Path length of the ground truth over the matched poses, m.
     pub path_m: f64,
-    /// Length of the estimate over the matched poses, m. Noise makes paths longer.
+    /// Path length of the estimate over the matched poses, m. Noise makes it longer.
     pub estimated_path_m: f64,
-    /// Drift over 100 to 800 m; `None` for a shorter path or a truth without heading.
+    /// KITTI odometry errors; `None` for a path up to 100 m or a ground truth without heading.
     pub kitti: Option<Kitti>,
-    /// Absolute error after alignment.
+    /// Absolute trajectory error.
     pub ate: Ate,
-    /// Shape of segments of 100 to 800 m; `None` for a shorter path.
+    /// Segment error; `None` for a path up to 100 m.
     pub seg: Option<Seg>,
-    /// How far off the last pose is; `None` for a truth without heading.
+    /// End-point error; `None` for a ground truth without heading.
     pub end: Option<EndError>,
-    /// Errors of single motions; `None` for a truth without heading.
+    /// Relative pose error; `None` for a ground truth without heading.
     pub rpe: Option<Rpe>,
-    /// What was compared, the estimate in the truth's handedness but not aligned; for plots, not serialised.
+    /// The poses that were compared, the estimate in the handedness of the ground truth but not aligned; not serialised.
     #[serde(skip)]
     pub matched: MatchedPoses,
 }
 
-/// Judges `estimate` by `truth`.
+/// Compares `estimate` with `truth`.
 ///
 /// # Errors
-/// See [`associate()`]. A path too short for KITTI is no error: the evaluation then holds per-pair figures and says so.
+/// Those of [`associate()`]. A path that is too short for KITTI is no error.
 pub fn evaluate(
     estimate: TimedPoses<'_>,
     truth: TimedPoses<'_>,

@@ -1,43 +1,45 @@
-//! Relative pose error between neighbouring poses.
+//! Relative pose error (RPE) with a delta of one pose.
+//!
+//! Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012, in the plane.
 
 use serde::Serialize;
 
 use crate::MatchedPoses;
 
-/// Errors of the motions between neighbouring matched poses (delta 1).
+/// The errors of the motions from each matched pose to the next.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Rpe {
-    /// Root of the mean squared translation error of a pair, m.
+    /// RMSE of the translation of a pair, m.
     pub translation_rmse_m: f64,
     /// Mean translation error of a pair, m.
     pub translation_mean_m: f64,
-    /// Root of the mean squared rotation error of a pair, degrees.
+    /// RMSE of the rotation of a pair, degrees.
     pub rotation_rmse_deg: f64,
-    /// Mean of the rotation error's magnitude, degrees.
+    /// Mean magnitude of the rotation error of a pair, degrees.
     pub rotation_mean_deg: f64,
-    /// Estimated over true forward translation, both summed over the pairs; `None` where the truth does not move
-    /// forward (below 1 m in sum). Tells a wrong range resolution at once.
+    /// Estimated over true forward translation, both summed over the pairs; `None` if the ground truth moves forward
+    /// by less than 1 m. It shows a wrong range resolution.
     pub forward_ratio: Option<f64>,
-    /// Every pair in order; not part of the serialised summary.
+    /// All pairs in order; not serialised.
     #[serde(skip)]
     pub pairs: Vec<PairError>,
 }
 
-/// Error of the motion between two neighbouring poses.
+/// The error of the motion from one pose to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PairError {
-    /// Distance travelled along the truth up to the later pose, m.
+    /// Distance travelled along the ground truth up to the later pose, m.
     pub distance_m: f64,
     /// Length of the translation error, m.
     pub translation_m: f64,
-    /// Rotation error with its sign (truth less estimate), degrees in (-180, 180].
+    /// Rotation error with its sign (ground truth less estimate), degrees in (-180, 180].
     pub rotation_deg: f64,
 }
 
-/// Forward translation in sum below which a ratio says nothing, m.
-const LEAST_FORWARD_M: f64 = 1.0;
+/// The least forward translation for a ratio, m.
+const MIN_FORWARD_M: f64 = 1.0;
 
-/// Compares each motion from a pose to the next with the true one.
+/// Compares the motion from each pose to the next with the true one.
 pub fn rpe(matched: &MatchedPoses) -> Rpe {
     let (estimate, truth) = (matched.estimate(), matched.truth());
     let (mut forward_estimate, mut forward_truth) = (0.0, 0.0);
@@ -54,7 +56,7 @@ pub fn rpe(matched: &MatchedPoses) -> Rpe {
             rotation_deg: error.rotation.angle().to_degrees(),
         });
     }
-    let moves_forward = forward_truth >= LEAST_FORWARD_M;
+    let moves_forward = forward_truth >= MIN_FORWARD_M;
     Rpe {
         translation_rmse_m: rmse(pairs.iter().map(|p| p.translation_m)),
         translation_mean_m: mean(pairs.iter().map(|p| p.translation_m)),
@@ -81,7 +83,7 @@ mod tests {
     use gyre_geometry::{Pose, pose};
 
     #[test]
-    fn a_single_false_turn_counts_once_however_far_it_displaces_the_rest() {
+    fn a_single_rotation_error_counts_once() {
         let chain = |turn_at: Option<usize>| {
             let mut here = Pose::identity();
             let turn = |k: usize| if Some(k) == turn_at { 0.1 } else { 0.0 };

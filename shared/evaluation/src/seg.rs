@@ -1,4 +1,4 @@
-//! Segment error: the shape of each 100 to 800 m segment, judged by positions alone.
+//! Segment error (seg): the ATE of each segment of 100 to 800 m, relative to its length.
 
 use std::num::NonZeroUsize;
 
@@ -10,34 +10,34 @@ use crate::{
     segments::{PerLength, segments},
 };
 
-/// RMSE of positions within a segment after the segment's own SE(2) alignment, as a share of its length.
+/// The RMSE of the positions of a segment after its own SE(2) alignment, in % of its length.
 ///
-/// Unlike KITTI's figures it needs no heading in the truth, so it stays trustworthy where that heading is poor.
+/// Unlike the KITTI errors it uses no heading, so it is valid where the ground truth has a poor heading or none.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Seg {
-    /// Mean over all segments of all lengths, % of the nominal length.
+    /// Mean over all segments of all lengths, % of the segment length.
     pub percent: f64,
-    /// Number of segments in the mean.
+    /// Number of segments.
     pub segments: usize,
-    /// Poses between the starts of segments.
+    /// Poses from the start of a segment to the start of the next.
     pub step: NonZeroUsize,
-    /// The means of each length that has segments, short lengths first.
+    /// The means for each length that has segments, shortest first.
     pub by_length: Vec<SegLength>,
 }
 
-/// Segment error of the segments of one nominal length.
+/// The segment error of the segments of one length.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SegLength {
-    /// Nominal length, m.
+    /// Segment length, m.
     pub length_m: f64,
-    /// Mean RMSE, % of the nominal length.
+    /// Mean RMSE, % of the segment length.
     pub percent: f64,
-    /// Number of segments in the mean.
+    /// Number of segments.
     pub segments: usize,
 }
 
-/// Aligns every segment that begins at every `step`-th pose by itself; `None` where the path has no segment beyond
-/// 100 m. The segments are those of [`kitti`](crate::kitti::kitti).
+/// Returns the mean error of the segments of [`kitti`](crate::kitti::kitti), each aligned by itself; `None` if the path
+/// is not longer than 100 m.
 pub fn seg(matched: &MatchedPoses, step: NonZeroUsize) -> Option<Seg> {
     let mut errors = PerLength::new();
     for segment in segments(&matched.distance_m(), step) {

@@ -1,8 +1,8 @@
-//! The segments of 100 to 800 m that KITTI and seg average over.
+//! The segments (KITTI: subsequences) of 100 to 800 m over which the KITTI errors and seg are means.
 
 use std::num::NonZeroUsize;
 
-/// The nominal lengths, m.
+/// The segment lengths, m.
 pub const SEGMENT_LENGTHS_M: [f64; 8] = [100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0];
 
 /// One segment: from pose `first` to pose `last`, both included.
@@ -15,15 +15,15 @@ pub(crate) struct Segment {
 }
 
 impl Segment {
-    /// The nominal length, m: errors are divided by it, not by the way actually travelled.
+    /// The length, m. As in the development kit errors are divided by it, not by the distance travelled.
     pub fn length_m(self) -> f64 {
         SEGMENT_LENGTHS_M[self.length]
     }
 }
 
-/// All segments that begin at every `step`-th pose and end at the first pose *beyond* the nominal length.
+/// Returns all segments that start at every `step`-th pose and end at the first pose *beyond* the length.
 ///
-/// `distance_m` grows (weakly) from pose to pose. A length that the rest of the path does not exceed is skipped.
+/// `distance_m` does not decrease. A length that the rest of the path does not exceed is skipped.
 pub(crate) fn segments(
     distance_m: &[f64],
     step: NonZeroUsize,
@@ -42,7 +42,7 @@ pub(crate) fn segments(
     (0..distance_m.len()).step_by(step.get()).flat_map(ends)
 }
 
-/// Sums and counts for each nominal length, in [`SEGMENT_LENGTHS_M`]'s order.
+/// Sums and counts for each of [`SEGMENT_LENGTHS_M`].
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PerLength<const N: usize> {
     sums: [[f64; N]; SEGMENT_LENGTHS_M.len()],
@@ -64,7 +64,7 @@ impl<const N: usize> PerLength<N> {
         }
     }
 
-    /// Mean over all segments of all lengths, and their count; `None` without a segment.
+    /// Returns the mean over all segments of all lengths, and their count; `None` without a segment.
     pub fn mean(&self) -> Option<([f64; N], usize)> {
         let count: usize = self.counts.iter().sum();
         let total = |value: usize| self.sums.iter().map(|s| s[value]).sum::<f64>();
@@ -76,7 +76,7 @@ impl<const N: usize> PerLength<N> {
         })
     }
 
-    /// Nominal length (m), mean and count of each length that has segments.
+    /// Returns length (m), mean and count for each length that has segments.
     pub fn means(&self) -> impl Iterator<Item = (f64, [f64; N], usize)> + '_ {
         let lengths = SEGMENT_LENGTHS_M.iter().zip(&self.sums).zip(&self.counts);
         lengths
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn every_length_that_the_path_exceeds_starts_at_every_step() {
+    fn segments_of_every_length_start_at_every_step() {
         let distance: Vec<f64> = (0..=250).map(f64::from).collect();
         let step = NonZeroUsize::new(50).unwrap_or(EVERY);
         let found: Vec<_> = segments(&distance, step)

@@ -1,4 +1,4 @@
-//! Published figures, from published trajectories.
+//! The KITTI errors of published trajectories, compared with the published figures.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -10,7 +10,7 @@ use gyre_evaluation::{Association, Coverage, Evaluation, Kitti, Options, TimedPo
 use gyre_geometry::{Pose, pose};
 use nalgebra::{Complex, Unit};
 
-/// The folder of real data; tests return where there is none.
+/// The folder of real data; without it the tests are skipped.
 fn data() -> Option<PathBuf> {
     let root = std::env::var_os("GYRE_DATA").map(PathBuf::from);
     if root.is_none() {
@@ -19,8 +19,8 @@ fn data() -> Option<PathBuf> {
     root
 }
 
-/// KITTI poses: rows of a 3 x 4 matrix, twelve numbers a line. Cosine and sine are kept as they are written, not
-/// normalised: the fifth decimal of the published figures is that rounding's.
+/// Reads KITTI poses: a 3 x 4 matrix by rows, twelve numbers a line. Cosine and sine are not normalised, because the fifth
+/// decimal of the published figures depends on their rounding.
 fn kitti_poses(path: PathBuf) -> Vec<Pose> {
     let parse = |line: &str| {
         let m: Vec<f64> = line
@@ -39,7 +39,7 @@ fn kitti_poses(path: PathBuf) -> Vec<Pose> {
         .collect()
 }
 
-/// Oxford's motions chained from the identity, in their own frame: y right, yaw clockwise.
+/// Reads Oxford's motions and chains them from the identity, in their own frame: y right, yaw clockwise.
 fn chained_csv(path: PathBuf) -> Vec<Pose> {
     let mut motions = Vec::new();
     for line in fs::read_to_string(path).unwrap().lines().skip(1) {
@@ -62,7 +62,7 @@ fn by_index(estimate: &[Pose], truth: &[Pose], step: usize) -> Evaluation {
     .unwrap()
 }
 
-/// Translation % and rotation deg/100 m to five decimals, as published.
+/// Returns translation (%) and rotation (deg/100 m) to five decimals, as published.
 fn five_decimals(kitti: Option<&Kitti>) -> (String, String) {
     let kitti = kitti.unwrap();
     (
@@ -76,7 +76,7 @@ fn figures(translation: &str, rotation: &str) -> (String, String) {
 }
 
 #[test]
-fn kitti_metric_case_matches_the_published_figures_at_all_steps() {
+fn kitti_errors_equal_the_published_figures_at_all_steps() {
     let Some(data) = data() else { return };
     let case = data.join("golden/kitti-metric");
     let (estimate, truth) = (
@@ -99,7 +99,7 @@ fn kitti_metric_case_matches_the_published_figures_at_all_steps() {
 }
 
 #[test]
-fn chained_csv_case_matches_in_both_handednesses() {
+fn kitti_errors_of_chained_motions_equal_the_published_figures_in_both_handednesses() {
     let Some(data) = data() else { return };
     let estimate = kitti_poses(data.join("golden/csv-chain/estimate.txt"));
     let y_right =

@@ -27,7 +27,7 @@ fn evaluation(n: usize) -> Evaluation {
     .unwrap()
 }
 
-/// The points of the polylines with `colour`, in canvas units.
+/// Returns the points of the longest polyline of a colour, in canvas units.
 fn polyline(svg: &str, colour: &str) -> Vec<(f64, f64)> {
     let line = svg
         .lines()
@@ -65,7 +65,7 @@ fn axes_are_equal_and_y_points_up() {
 }
 
 #[test]
-fn an_estimate_in_another_frame_is_drawn_on_its_truth() {
+fn an_estimate_in_another_frame_is_drawn_over_its_ground_truth() {
     let e = evaluation(200);
     let svg = trajectory_svg(e.matched.estimate(), Some(&e.matched)).unwrap();
     let (estimate, truth) = (polyline(&svg, ESTIMATE), polyline(&svg, TRUTH));
@@ -76,11 +76,13 @@ fn an_estimate_in_another_frame_is_drawn_on_its_truth() {
             .zip(&truth)
             .all(|(a, b)| (a.0 - b.0).abs() <= 1.0 && (a.1 - b.1).abs() <= 1.0)
     );
-    assert!(svg.contains("SE(2) alignment") && svg.contains("start") && svg.contains("truth"));
+    assert!(
+        svg.contains("SE(2) alignment") && svg.contains("start") && svg.contains("ground truth")
+    );
 }
 
 #[test]
-fn long_paths_plot_errors_over_length_and_short_ones_over_pairs() {
+fn long_paths_have_kitti_errors_and_short_ones_the_relative_pose_error() {
     let long = errors_svg(&evaluation(400)).unwrap();
     assert!(long.contains("segment length (m)") && long.contains("rotation (deg/100 m)"));
     let short = errors_svg(&evaluation(20)).unwrap();
@@ -88,31 +90,31 @@ fn long_paths_plot_errors_over_length_and_short_ones_over_pairs() {
 }
 
 #[test]
-fn nothing_to_draw_and_unwritable_files_are_errors() {
+fn missing_and_invalid_poses_and_unwritable_files_are_errors() {
     assert!(matches!(trajectory_svg(&[], None), Err(PlotError::Empty)));
-    let lost = std::path::Path::new("no-such-folder/plot.svg");
+    let unwritable = std::path::Path::new("no-such-folder/plot.svg");
     assert!(matches!(
-        plot_trajectory(lost, &drive(5, 10.0), None),
+        plot_trajectory(unwritable, &drive(5, 10.0), None),
         Err(PlotError::Write { .. })
     ));
     assert!(matches!(
-        plot_errors(lost, &evaluation(50)),
+        plot_errors(unwritable, &evaluation(50)),
         Err(PlotError::Write { .. })
     ));
     let (a, b) = (drive(5, 10.0), drive(6, 10.0));
     assert!(matches!(
-        plot_trajectory(lost, &a, Some(&b)),
+        plot_trajectory(unwritable, &a, Some(&b)),
         Err(PlotError::Poses(_))
     ));
-    let nowhere = [pose(f64::NAN, 0.0, 0.0)];
+    let invalid = [pose(f64::NAN, 0.0, 0.0)];
     assert!(matches!(
-        plot_trajectory(lost, &nowhere, None),
+        plot_trajectory(unwritable, &invalid, None),
         Err(PlotError::Poses(_))
     ));
 }
 
 #[test]
-fn a_single_pose_and_a_standing_radar_are_drawn() {
+fn a_single_pose_and_a_standing_sensor_are_drawn() {
     assert!(trajectory_svg(&[Pose::identity()], None).is_ok());
     assert!(trajectory_svg(&[Pose::identity(); 9], None).is_ok());
 }

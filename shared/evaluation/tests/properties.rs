@@ -1,4 +1,4 @@
-//! What holds of the metrics for any drive.
+//! Properties of the metrics for random drives.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -13,7 +13,7 @@ use gyre_evaluation::{
 use gyre_geometry::{Pose, pose};
 use proptest::prelude::*;
 
-/// What an arc cosine near 1 makes of rounding, degrees: the square root of some hundred ulps.
+/// The rounding error of an arc cosine near 1, degrees: the square root of some hundred ulps.
 const ARC_COSINE_DEG: f64 = 3e-5;
 
 fn step(step: usize) -> NonZeroUsize {
@@ -24,7 +24,7 @@ fn matched(estimate: &[Pose], truth: &[Pose]) -> MatchedPoses {
     MatchedPoses::new(estimate.to_vec(), truth.to_vec()).unwrap()
 }
 
-/// Motions between neighbours, each passed through `change`, chained anew.
+/// Chains the motions from pose to pose after `change`.
 fn rechained(poses: &[Pose], change: impl Fn(usize, Pose) -> Pose) -> Vec<Pose> {
     let motions = poses
         .windows(2)
@@ -33,8 +33,9 @@ fn rechained(poses: &[Pose], change: impl Fn(usize, Pose) -> Pose) -> Vec<Pose> 
     chain(poses[0], motions.collect::<Vec<_>>())
 }
 
-/// Slow, plain KITTI: walks to each end and uses 3 x 3 matrices. Translation %, deg/100 m, count.
-fn kitti_by_walking(estimate: &[Pose], truth: &[Pose], step: usize) -> (f64, f64, usize) {
+/// The KITTI errors by their definition: a linear search for each end, and 3 x 3 matrices. Returns translation (%),
+/// rotation (deg/100 m) and the number of segments.
+fn kitti_by_definition(estimate: &[Pose], truth: &[Pose], step: usize) -> (f64, f64, usize) {
     let (mut translation, mut rotation, mut n) = (0.0, 0.0, 0);
     for first in (0..truth.len()).step_by(step) {
         for length in SEGMENT_LENGTHS_M {
@@ -67,7 +68,7 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(48) })]
 
     #[test]
-    fn a_moved_copy_has_no_error((n, bend) in any_drive(), moved_by in any_pose()) {
+    fn a_copy_in_another_frame_has_no_error((n, bend) in any_drive(), moved_by in any_pose()) {
         let truth = drive(n, bend);
         let estimate: Vec<_> = truth.iter().map(|p| moved_by * p).collect();
         let m = matched(&estimate, &truth);
@@ -79,7 +80,7 @@ proptest! {
     }
 
     #[test]
-    fn the_alignment_undoes_the_motion_of_a_copy((n, bend) in any_drive(), moved_by in any_pose()) {
+    fn the_alignment_inverts_the_motion_of_a_copy((n, bend) in any_drive(), moved_by in any_pose()) {
         let truth = drive(n, bend);
         let estimate: Vec<_> = truth.iter().map(|p| moved_by * p).collect();
         let round_trip = align(&matched(&estimate, &truth)) * moved_by;
@@ -101,12 +102,12 @@ proptest! {
     }
 
     #[test]
-    fn kitti_equals_the_plain_walk((n, bend) in any_drive(), every in 1usize..12, scale in 0.95..1.05, bias in -0.002..0.002) {
+    fn kitti_errors_equal_their_definition((n, bend) in any_drive(), every in 1usize..12, scale in 0.95..1.05, bias in -0.002..0.002) {
         let truth = drive(n, bend);
         let estimate = rechained(&truth, |k, m| pose(
             scale * m.translation.x, 0.1 * (k as f64).sin(), m.rotation.angle() + bias));
         let fast = kitti(&matched(&estimate, &truth), step(every)).unwrap();
-        let (translation, rotation, segments) = kitti_by_walking(&estimate, &truth, every);
+        let (translation, rotation, segments) = kitti_by_definition(&estimate, &truth, every);
         prop_assert!((fast.translation_percent - translation).abs() < 1e-8);
         prop_assert!((fast.rotation_deg_per_100m - rotation).abs() < ARC_COSINE_DEG);
         prop_assert_eq!(fast.segments, segments);
@@ -117,8 +118,8 @@ proptest! {
     }
 
     #[test]
-    fn a_scale_error_on_a_straight_is_the_translation_error(percent in -5.0..5.0f64) {
-        // steps of 1/8 m are exact in binary, so each segment ends 1/8 m beyond its length
+    fn a_scale_error_on_a_straight_line_is_the_translation_error(percent in -5.0..5.0f64) {
+        // Steps of 1/8 m are exact in binary, so each segment ends 1/8 m beyond its length.
         let line = |scale: f64| (0..8000).map(|k| pose(0.125 * f64::from(k) * scale, 0.0, 0.0)).collect::<Vec<_>>();
         let m = matched(&line(1.0 + percent / 100.0), &line(1.0));
         let result = kitti(&m, step(100)).unwrap();
@@ -131,7 +132,7 @@ proptest! {
     }
 
     #[test]
-    fn a_steady_yaw_drift_is_the_rotation_error(deg_per_100m in -3.0..3.0f64) {
+    fn a_constant_yaw_drift_is_the_rotation_error(deg_per_100m in -3.0..3.0f64) {
         let truth: Vec<_> = (0..4000).map(|k| pose(0.25 * f64::from(k), 0.0, 0.0)).collect();
         let per_step = (deg_per_100m / 400.0).to_radians();
         let estimate = rechained(&truth, |_, m| m * Pose::rotation(per_step));
@@ -144,7 +145,7 @@ proptest! {
     }
 
     #[test]
-    fn seg_and_ate_do_not_look_at_headings((n, bend) in any_drive(), bias in -3.0..3.0) {
+    fn seg_and_ate_do_not_depend_on_headings((n, bend) in any_drive(), bias in -3.0..3.0) {
         let truth = drive(n, bend);
         let noisy = rechained(&truth, |k, m| m * Pose::rotation(0.001 * (k as f64).sin()));
         let turned: Vec<_> = noisy.iter().map(|p| p * Pose::rotation(bias)).collect();
@@ -154,16 +155,16 @@ proptest! {
     }
 
     #[test]
-    fn a_mirrored_copy_is_found_and_judged_like_the_original((n, bend) in any_drive(), moved_by in any_pose(), bias in -0.0005..0.0005) {
+    fn a_mirrored_copy_has_the_errors_of_the_original((n, bend) in any_drive(), moved_by in any_pose(), bias in -0.0005..0.0005) {
         let truth = drive(n, bend);
         let estimate = rechained(&truth, |_, m| m * Pose::rotation(bias));
         let mirrored: Vec<_> = estimate.iter()
             .map(|p| moved_by * pose(p.translation.x, -p.translation.y, -p.rotation.angle())).collect();
-        let judge = |estimate: &[Pose]| {
+        let evaluated = |estimate: &[Pose]| {
             let options = Options { association: Association::Index, ..Options::default() };
             evaluate(TimedPoses::untimed(estimate), TimedPoses::untimed(&truth), &options).unwrap()
         };
-        let (plain, found): (Evaluation, Evaluation) = (judge(&estimate), judge(&mirrored));
+        let (plain, found): (Evaluation, Evaluation) = (evaluated(&estimate), evaluated(&mirrored));
         prop_assert!(!plain.axes.y_negated && !plain.axes.heading_negated);
         prop_assert!(found.axes.y_negated && found.axes.heading_negated);
         prop_assert!((plain.ate.rmse_m - found.ate.rmse_m).abs() < 1e-7);
@@ -173,7 +174,7 @@ proptest! {
 }
 
 #[test]
-fn interpolation_finds_a_finer_truth_at_the_estimates_stamps() {
+fn a_denser_ground_truth_is_found_at_the_stamps_of_the_estimate() {
     let truth = drive(300, 100.0);
     let truth_ns: Vec<i64> = (0..301).map(|k| k * 250_000_000).collect();
     let (estimate, estimate_ns): (Vec<_>, Vec<_>) = truth
@@ -193,7 +194,7 @@ fn interpolation_finds_a_finer_truth_at_the_estimates_stamps() {
 }
 
 #[test]
-fn a_path_below_100_m_says_so_and_keeps_the_errors_per_pair() {
+fn a_path_below_100_m_has_no_kitti_errors_but_rpe() {
     let truth = drive(30, 50.0);
     let estimate = rechained(&truth, |_, m| m * pose(0.1, 0.0, 0.0));
     let options = Options {
@@ -210,7 +211,7 @@ fn a_path_below_100_m_says_so_and_keeps_the_errors_per_pair() {
     assert!((evaluation.rpe.as_ref().unwrap().translation_rmse_m - 0.1).abs() < 1e-9);
     let table = evaluation.to_string();
     assert!(
-        table.contains("no segment of the path exceeds 100 m; see the errors per pair"),
+        table.contains("the path is not longer than 100 m; use RPE"),
         "{table}"
     );
     assert!(table.contains("translation 0.1000 m rmse"), "{table}");

@@ -1,4 +1,4 @@
-//! Errors over time with the bands that the covariance promises.
+//! Errors over time with the 3-sigma bands of their covariance.
 
 use std::ops::Range;
 
@@ -7,21 +7,21 @@ use plotters::prelude::*;
 use super::{PlotError, canvas::*};
 use crate::{BandSample, Bands, TruthSigma};
 
-/// Size of the document, px: the header, and three panels of equal height of which the last carries the time axis.
+/// Size of the document, px: the header and three panels of equal height, the last with the time axis.
 const SIZE: (u32, u32) = (900, HEADER + 3 * PANEL + TIME_AXIS);
 const PANEL: u32 = 220;
 const TIME_AXIS: u32 = 56;
 /// Half the width of a band, in standard deviations.
 const SIGMAS: f64 = 3.0;
-/// Free room above and below, as a share of the largest value.
+/// Margin above and below, as a share of the largest value.
 const HEADROOM: f64 = 0.08;
-/// A band: the estimate's colour, faint.
+/// The colour of a band: that of the estimate, pale.
 const BAND: RGBColor = RGBColor(205, 226, 243);
 
-/// The plot as an SVG document: x, y and yaw over time, each error within its band of 3 standard deviations.
+/// Returns the plot as an SVG document: the errors in x, y and yaw over time, each with its 3-sigma band.
 ///
 /// # Errors
-/// [`PlotError::Empty`] where no chain has a pose with truth after its first, [`PlotError::Draw`].
+/// [`PlotError::Empty`] if no pose has ground truth, and [`PlotError::Draw`].
 pub fn bands_svg(bands: &Bands) -> Result<String, PlotError> {
     let last = bands
         .chains
@@ -32,11 +32,11 @@ pub fn bands_svg(bands: &Bands) -> Result<String, PlotError> {
         .ok_or(PlotError::Empty)?;
     let legend = [
         Entry {
-            label: "estimate less truth",
+            label: "estimate - ground truth",
             symbol: Symbol::Line(line(ESTIMATE, 2.0)),
         },
         Entry {
-            label: "3 sigma either way",
+            label: "+-3 sigma",
             symbol: Symbol::Area(BAND),
         },
     ];
@@ -48,7 +48,7 @@ pub fn bands_svg(bands: &Bands) -> Result<String, PlotError> {
     document(SIZE, |area| {
         header(
             area,
-            "Error over time, and the covariance's band",
+            "Error over time with 3-sigma bands",
             &caption(bands),
             &legend,
         )?;
@@ -71,11 +71,11 @@ pub fn bands_svg(bands: &Bands) -> Result<String, PlotError> {
 fn caption(bands: &Bands) -> String {
     let [x, y, yaw] = bands.inside_percent(SIGMAS);
     let inside = format!(
-        "aligned with the truth at the start; within the band: x {x:.0} %, y {y:.0} %, yaw {yaw:.0} %"
+        "aligned with the ground truth at the start; within the band: x {x:.0} %, y {y:.0} %, yaw {yaw:.0} %"
     );
     match bands.truth_sigma {
         sigma if sigma == TruthSigma::default() => inside,
-        sigma => format!("{inside}; truth: {sigma}"),
+        sigma => format!("{inside}; ground truth {sigma}"),
     }
 }
 
@@ -94,7 +94,7 @@ struct Point {
 }
 
 impl Panel {
-    /// The panel of one part (x, y, yaw) of the error, in a unit of which `scale` make one SI unit.
+    /// The panel of one component (x, y, yaw) of the error, in a unit of which `scale` make one SI unit.
     fn new(bands: &Bands, y_desc: &'static str, part: usize, scale: f64) -> Self {
         let point = |s: &BandSample| Point {
             time_s: s.time_s,
@@ -111,7 +111,7 @@ impl Panel {
         }
     }
 
-    /// Symmetric about zero, with all errors and bands in it.
+    /// Returns a range that is symmetric about zero and contains all errors and bands.
     fn range(&self) -> Range<f64> {
         let largest = self
             .chains
@@ -188,7 +188,7 @@ fn draw_mesh(
     mesh.draw().map_err(drawing)
 }
 
-/// The area between both limits.
+/// Returns the area between both limits.
 fn band(chain: &[Point]) -> Polygon<(f64, f64)> {
     let upper = chain.iter().map(|p| (p.time_s, p.band));
     let lower = chain.iter().rev().map(|p| (p.time_s, -p.band));

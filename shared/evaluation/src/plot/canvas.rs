@@ -1,4 +1,4 @@
-//! What all plots share: a fine grid of coordinates, a palette, a header with title, caption and legend.
+//! Common parts of the plots: coordinates, colours, axes, and the header with title, caption and legend.
 
 use std::ops::Range;
 
@@ -17,44 +17,44 @@ pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 pub type Chart<'a, 'b> =
     ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
-/// plotters places SVG points on whole pixels, which makes curves jagged. So everything is drawn this much larger,
-/// and the document shows it smaller.
-const FINENESS: u32 = 8;
+/// Canvas units in a px. plotters rounds SVG coordinates to integers, which makes curves jagged: everything is drawn this
+/// much larger and shown smaller.
+const UNITS_PER_PX: u32 = 8;
 
-/// The estimate, and errors in general.
+/// The colour of the estimate and of errors.
 pub const ESTIMATE: RGBColor = RGBColor(0, 98, 178);
-/// The truth.
+/// The colour of the ground truth.
 pub const TRUTH: RGBColor = RGBColor(120, 124, 130);
-/// Marks on top of lines.
+/// The colour of marks on top of lines.
 pub const MARK: RGBColor = RGBColor(213, 94, 0);
-/// Text.
+/// The colour of text.
 pub const INK: RGBColor = RGBColor(34, 38, 44);
-/// Text of less weight.
+/// The colour of secondary text.
 pub const QUIET: RGBColor = RGBColor(96, 102, 110);
-/// Grid lines.
+/// The colour of grid lines.
 pub const GRID: RGBColor = RGBColor(226, 229, 233);
 
 /// Height of the header, px.
 pub const HEADER: u32 = 84;
 
-/// A length in px of the shown document as units of the canvas.
+/// Returns a length in px of the shown document in canvas units.
 pub fn px(length: f64) -> u32 {
-    (length * f64::from(FINENESS)).round() as u32
+    (length * f64::from(UNITS_PER_PX)).round() as u32
 }
 
-/// A font of `size` px. The SVG back end divides sizes by 1.24; this undoes it.
+/// Returns a font of `size` px. The SVG back end divides sizes by 1.24, which is compensated here.
 pub fn font(size: f64, colour: RGBColor) -> TextStyle<'static> {
-    ("sans-serif", 1.24 * size * f64::from(FINENESS))
+    ("sans-serif", 1.24 * size * f64::from(UNITS_PER_PX))
         .into_font()
         .color(&colour)
 }
 
-/// A line of `width` px.
+/// Returns the style of a line of `width` px.
 pub fn line(colour: RGBColor, width: f64) -> ShapeStyle {
     colour.stroke_width(px(width))
 }
 
-/// An empty diagram with its axes and what stands beside them.
+/// Returns an empty diagram with its axes and their descriptions.
 ///
 /// # Errors
 /// [`PlotError::Draw`].
@@ -91,7 +91,7 @@ pub fn chart<'a, 'b>(
     Ok(chart)
 }
 
-/// Draws on a white document of `size` px and returns it.
+/// Returns a white document of `size` px with what `draw` draws.
 ///
 /// # Errors
 /// [`PlotError::Draw`], or what `draw` returns.
@@ -99,7 +99,7 @@ pub fn document(
     size: (u32, u32),
     draw: impl FnOnce(&Area<'_>) -> Result<(), PlotError>,
 ) -> Result<String, PlotError> {
-    let fine = (size.0 * FINENESS, size.1 * FINENESS);
+    let fine = (size.0 * UNITS_PER_PX, size.1 * UNITS_PER_PX);
     let mut svg = String::new();
     {
         let area = SVGBackend::with_string(&mut svg, fine).into_drawing_area();
@@ -117,15 +117,15 @@ pub fn document(
 
 /// One entry of a legend.
 pub struct Entry<'a> {
-    /// What it says.
+    /// The text.
     pub label: &'a str,
-    /// What stands before it.
+    /// The symbol in front of the text.
     pub symbol: Symbol,
 }
 
-/// How a legend shows its entry.
+/// The symbol of a legend entry.
 pub enum Symbol {
-    /// A segment of a line.
+    /// A piece of a line.
     Line(ShapeStyle),
     /// A filled area.
     Area(RGBColor),
@@ -133,7 +133,7 @@ pub enum Symbol {
     Dot,
 }
 
-/// Title, caption below it, legend on the right.
+/// Draws the title, the caption below it, and the legend on the right.
 ///
 /// # Errors
 /// [`PlotError::Draw`].
@@ -160,7 +160,7 @@ pub fn header(
         text_anchor::HPos::Left,
         text_anchor::VPos::Center,
     ));
-    let width = f64::from(area.dim_in_pixel().0) / f64::from(FINENESS);
+    let width = f64::from(area.dim_in_pixel().0) / f64::from(UNITS_PER_PX);
     let mut x = width - 24.0 - legend.iter().map(entry_width).sum::<f64>();
     for entry in legend {
         match entry.symbol {
@@ -185,12 +185,12 @@ pub fn header(
     Ok(())
 }
 
-/// A mark at one place.
+/// Returns a mark.
 pub fn dot<C>(at: C) -> Circle<C, u32> {
     Circle::new(at, px(6.0), MARK.filled())
 }
 
-/// A tick's number without needless zeros.
+/// Formats the number of a tick without trailing zeros.
 pub fn number(value: &f64) -> String {
     let text = format!("{value:.3}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
@@ -201,12 +201,12 @@ pub fn number(value: &f64) -> String {
     }
 }
 
-/// Room for an entry, px; a letter of a 14 px sans-serif font is about half as wide as it is high.
+/// Returns the width of an entry, px; a letter of a 14 px sans-serif font is about half as wide as high.
 fn entry_width(entry: &Entry<'_>) -> f64 {
     33.0 + 7.6 * entry.label.len() as f64 + 14.0
 }
 
-/// The drawing library's error in ours.
+/// Converts an error of the drawing library.
 pub fn drawing<E: std::error::Error + Send + Sync>(error: DrawingAreaErrorKind<E>) -> PlotError {
     PlotError::Draw(error.to_string())
 }

@@ -7,14 +7,14 @@ use crate::{Evaluation, Kitti, Rpe};
 
 /// Size of the document, px: two panels of equal height below the header.
 const SIZE: (u32, u32) = (900, 640);
-/// Free room above the largest error, as a share of it.
+/// Margin above the largest error, as a share of it.
 const HEADROOM: f64 = 0.12;
 
-/// The plot as an SVG document: over segment length where there are KITTI errors, otherwise of each pair over the
-/// distance travelled.
+/// Returns the plot as an SVG document: the KITTI errors over segment length, or, without them, the RPE over the distance
+/// travelled.
 ///
 /// # Errors
-/// [`PlotError::Empty`] where the evaluation has neither, [`PlotError::Draw`].
+/// [`PlotError::Empty`] if the evaluation has neither, and [`PlotError::Draw`].
 pub fn errors_svg(evaluation: &Evaluation) -> Result<String, PlotError> {
     match (&evaluation.kitti, &evaluation.rpe) {
         (Some(kitti), _) => by_length(kitti),
@@ -44,7 +44,7 @@ fn by_length(kitti: &Kitti) -> Result<String, PlotError> {
         x: 50.0..longest + 50.0,
     };
     draw(
-        "Error over segment length",
+        "KITTI errors over segment length",
         &caption,
         [
             panel(
@@ -66,7 +66,7 @@ fn by_pair(rpe: &Rpe) -> Result<String, PlotError> {
         rpe.pairs.iter().map(|p| (p.distance_m, value(p))).collect()
     };
     let caption = format!(
-        "{} pairs, path too short for 100 m segments; rmse {:.3} m, {:.3} deg (dashed)",
+        "{} pairs, path too short for segments of 100 m; rmse {:.3} m, {:.3} deg (dashed)",
         rpe.pairs.len(),
         rpe.translation_rmse_m,
         rpe.rotation_rmse_deg
@@ -80,7 +80,7 @@ fn by_pair(rpe: &Rpe) -> Result<String, PlotError> {
         x: 0.0..1.03 * end,
     };
     draw(
-        "Error of each pair",
+        "Relative pose error over distance",
         &caption,
         [
             panel(
@@ -120,7 +120,7 @@ fn draw(title: &str, caption: &str, panels: [Panel; 2]) -> Result<String, PlotEr
 
 fn draw_panel(area: &Area<'_>, panel: &Panel) -> Result<(), PlotError> {
     let largest = panel.values.iter().map(|v| v.1).fold(0.0, f64::max);
-    // an estimate without any error still gets an axis
+    // An estimate without error still needs an axis.
     let top = if largest > 1e-9 {
         (1.0 + HEADROOM) * largest
     } else {
@@ -149,7 +149,7 @@ fn draw_panel(area: &Area<'_>, panel: &Panel) -> Result<(), PlotError> {
             line(ESTIMATE, 2.0),
         ))
         .map_err(drawing)?;
-    // dots while they can be told apart
+    // Dots as long as they do not overlap.
     if panel.values.len() <= 60 {
         let dot = |&at: &(f64, f64)| Circle::new(at, px(4.0), ESTIMATE.filled());
         chart

@@ -1,6 +1,6 @@
-//! Trajectories, errors and their bands as SVG, readable on paper and in a browser.
+//! Plots of trajectories, errors and error bands as SVG.
 //!
-//! Text stays text (drawn by the viewer's sans-serif font): nothing needs fonts when it is built or run.
+//! Text stays text in the viewer's sans-serif font: neither building nor running needs fonts.
 
 mod bands;
 pub mod canvas;
@@ -20,16 +20,16 @@ use gyre_geometry::Pose;
 
 use crate::{Bands, Evaluation, EvaluationError, MatchedPoses};
 
-/// Why a plot was not made.
+/// The reason why a plot was not made.
 #[derive(Debug, thiserror::Error)]
 pub enum PlotError {
-    /// There is nothing to draw.
+    /// There is no pose to draw.
     #[error("there is no pose to plot")]
     Empty,
-    /// The poses cannot be held against each other.
+    /// The poses cannot be compared.
     #[error(transparent)]
     Poses(#[from] EvaluationError),
-    /// The drawing library refused; its words.
+    /// The error message of the drawing library.
     #[error("failed to draw: {0}")]
     Draw(String),
     /// The file could not be written.
@@ -37,19 +37,18 @@ pub enum PlotError {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the system.
         source: io::Error,
     },
 }
 
-/// Draws `estimate`, against `truth` where there is one, into an SVG file: equal axes in metres, start marked.
+/// Draws `estimate`, over `truth` if given, into an SVG file: equal axes in metres, start marked.
 ///
-/// With a truth, which must have as many poses, the estimate is first aligned to it by SE(2), and the caption says so.
-/// An [`Evaluation`] holds such poses, in one handedness:
-/// `plot_trajectory(path, e.matched.estimate(), Some(e.matched.truth()))`.
+/// The ground truth must have as many poses; the estimate is aligned with it in SE(2). An [`Evaluation`] holds such poses,
+/// of one handedness: `plot_trajectory(path, e.matched.estimate(), Some(e.matched.truth()))`.
 ///
 /// # Errors
-/// [`PlotError`]: no poses, poses that are none or not equally many, a file that cannot be written.
+/// [`PlotError`] if there are no poses, if poses are invalid or differ in number, or if the file cannot be written.
 pub fn plot_trajectory(
     path: &Path,
     estimate: &[Pose],
@@ -65,20 +64,19 @@ pub fn plot_trajectory(
     write(path, &svg)
 }
 
-/// Draws the errors over distance into an SVG file: KITTI's translation and rotation error for each length, or, where
-/// the path is too short for them, the error of each pair over the distance travelled.
+/// Draws the KITTI errors over segment length into an SVG file, or, if the path is too short for them, the RPE over the
+/// distance travelled.
 ///
 /// # Errors
-/// [`PlotError`]: neither kind of error is there (a truth without heading), a file that cannot be written.
+/// [`PlotError`] if the evaluation has neither (a ground truth without heading), or if the file cannot be written.
 pub fn plot_errors(path: &Path, evaluation: &Evaluation) -> Result<(), PlotError> {
     write(path, &errors_svg(evaluation)?)
 }
 
-/// Draws the error of the composed poses over time into an SVG file, x, y and yaw, each within its band of 3 standard
-/// deviations.
+/// Draws the error of the composed poses in x, y and yaw over time into an SVG file, with 3-sigma bands.
 ///
 /// # Errors
-/// [`PlotError`]: no pose has truth, a file that cannot be written.
+/// [`PlotError`] if no pose has ground truth, or if the file cannot be written.
 pub fn plot_bands(path: &Path, bands: &Bands) -> Result<(), PlotError> {
     write(path, &bands_svg(bands)?)
 }

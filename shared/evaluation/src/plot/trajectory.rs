@@ -11,22 +11,22 @@ use crate::{
 
 /// Largest plotting area, px.
 const LARGEST: (f64, f64) = (900.0, 720.0);
-/// Smallest plotting area, px, however thin the path: the header needs the width.
+/// Smallest plotting area, px: the header needs the width.
 const SMALLEST: (f64, f64) = (600.0, 260.0);
-/// Room for labels left of, and below, the plotting area; margin around all but the header, px.
+/// Space for labels left of and below the plotting area, and the margin, px.
 const LEFT: u32 = 84;
 const BELOW: u32 = 48;
 const MARGIN: u32 = 20;
-/// Free border around the paths, as a share of the larger extent.
+/// Border around the paths, as a share of the larger extent.
 const BORDER: f64 = 0.06;
 /// Smallest extent shown, m.
-const LEAST_EXTENT_M: f64 = 1.0;
+const MIN_EXTENT_M: f64 = 1.0;
 
-/// The plot as an SVG document. With `matched`, its aligned estimate is drawn over its truth; `estimate` alone, in its
-/// own frame, without.
+/// Returns the plot as an SVG document: the aligned estimate of `matched` over its ground truth, or `estimate` alone in its
+/// own frame.
 ///
 /// # Errors
-/// [`PlotError::Empty`], [`PlotError::Poses`] where a pose is none, [`PlotError::Draw`].
+/// [`PlotError::Empty`], [`PlotError::Poses`] if a pose is invalid, and [`PlotError::Draw`].
 pub fn trajectory_svg(
     estimate: &[Pose],
     matched: Option<&MatchedPoses>,
@@ -45,7 +45,7 @@ pub fn trajectory_svg(
     })
 }
 
-/// What is drawn, positions in m.
+/// The content of the plot, positions in m.
 struct Scene {
     estimate: Vec<(f64, f64)>,
     truth: Option<Vec<(f64, f64)>>,
@@ -73,9 +73,9 @@ impl Scene {
         Self {
             estimate: positions(&aligned),
             truth: Some(positions(matched.truth())),
-            title: "Trajectory against ground truth",
+            title: "Trajectory and ground truth",
             caption: format!(
-                "estimate moved onto the truth by SE(2) alignment; ATE {:.2} m rmse",
+                "estimate after SE(2) alignment; ATE {:.2} m rmse",
                 ate.rmse_m
             ),
         }
@@ -90,7 +90,7 @@ impl Scene {
             legend.insert(
                 0,
                 Entry {
-                    label: "truth",
+                    label: "ground truth",
                     symbol: Symbol::Line(line(TRUTH, 4.0)),
                 },
             );
@@ -110,7 +110,7 @@ fn positions(poses: &[Pose]) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// The part of the plane that is shown, at the same scale both ways.
+/// The part of the plane that is shown, at the same scale on both axes.
 struct View {
     x_m: (f64, f64),
     y_m: (f64, f64),
@@ -119,7 +119,7 @@ struct View {
 }
 
 impl View {
-    /// Shows all `points`; `None` where there are none.
+    /// The view of all `points`; `None` if there are none.
     fn around<'a>(points: impl Iterator<Item = &'a (f64, f64)>) -> Option<Self> {
         let grow = |b: [f64; 4], p: &(f64, f64)| {
             [b[0].min(p.0), b[1].max(p.0), b[2].min(p.1), b[3].max(p.1)]
@@ -127,7 +127,7 @@ impl View {
         let [left, right, low, high] = points.fold(None, |b, p| {
             Some(grow(b.unwrap_or([p.0, p.0, p.1, p.1]), p))
         })?;
-        let border = BORDER * (right - left).max(high - low).max(LEAST_EXTENT_M);
+        let border = BORDER * (right - left).max(high - low).max(MIN_EXTENT_M);
         let (width_m, height_m) = (right - left + 2.0 * border, high - low + 2.0 * border);
         let px_per_m = (LARGEST.0 / width_m).min(LARGEST.1 / height_m);
         let shown = |extent_m: f64, smallest: f64| (extent_m * px_per_m).max(smallest).round();
@@ -155,7 +155,7 @@ fn draw(area: &Area<'_>, scene: &Scene, view: &View) -> Result<(), PlotError> {
         .set_label_area_size(LabelAreaPosition::Bottom, px(f64::from(BELOW)))
         .build_cartesian_2d(view.x_m.0..view.x_m.1, view.y_m.0..view.y_m.1)
         .map_err(drawing)?;
-    // about one tick in 90 px, on both axes alike
+    // One tick in about 90 px on both axes.
     let ticks = |px: u32| (px / 90).max(2) as usize;
     chart
         .configure_mesh()

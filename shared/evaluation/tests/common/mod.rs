@@ -1,10 +1,10 @@
 //! Drives for tests.
-#![allow(dead_code)] // no test uses all of it
+#![allow(dead_code)] // No test uses all of it.
 
 use gyre_geometry::{Pose, pose};
 use proptest::prelude::*;
 
-/// Chains motions from `start`.
+/// Returns the poses of motions from `start`.
 pub fn chain(start: Pose, motions: impl IntoIterator<Item = Pose>) -> Vec<Pose> {
     let mut here = start;
     let mut poses = vec![here];
@@ -15,7 +15,8 @@ pub fn chain(start: Pose, motions: impl IntoIterator<Item = Pose>) -> Vec<Pose> 
     poses
 }
 
-/// A drive of `n` motions of 2.37 m (no segment ends on a whole number of them) with bends that repeat every `bend` motions, more to the left.
+/// Returns a drive of `n` motions of 2.37 m (no segment length is a multiple) with bends that repeat every `bend` motions,
+/// more to the left.
 pub fn drive(n: usize, bend: f64) -> Vec<Pose> {
     let turn = |k: usize| 0.03 * (k as f64 * std::f64::consts::TAU / bend).sin() + 0.003;
     chain(
@@ -24,12 +25,12 @@ pub fn drive(n: usize, bend: f64) -> Vec<Pose> {
     )
 }
 
-/// The size and bends of any [`drive`] between 150 m and 1.2 km.
+/// The parameters of a random [`drive`] of 150 m to 1.2 km.
 pub fn any_drive() -> impl Strategy<Value = (usize, f64)> {
     (60usize..480, 40.0..200.0)
 }
 
-/// Any planar motion within a few kilometres.
+/// A random planar motion of up to a few kilometres.
 pub fn any_pose() -> impl Strategy<Value = Pose> {
     (-3000.0..3000.0, -3000.0..3000.0, -3.2..3.2).prop_map(|(x, y, yaw)| pose(x, y, yaw))
 }

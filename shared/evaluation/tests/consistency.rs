@@ -1,4 +1,4 @@
-//! Covariances that are known to be true, and what becomes of them.
+//! NEES and error bands of motions whose covariance is known.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -16,7 +16,7 @@ use rand_chacha::ChaCha8Rng;
 
 const INTERVAL_NS: i64 = 250_000_000;
 
-/// Correlated, and small enough for first order over 64 motions.
+/// Correlated, and small enough for a first-order composition of 64 motions.
 fn covariance() -> Matrix3<f64> {
     let spread = Matrix3::new(0.02, 0.0, 0.0, 0.006, 0.03, 0.0, 1e-4, -4e-4, 8e-4);
     spread * spread.transpose()
@@ -33,7 +33,7 @@ fn gaussian(random: &mut impl Rng) -> Vector3<f64> {
     Vector3::new(draw(), draw(), draw())
 }
 
-/// (x, y, yaw) of a pose with an error added along the axes of its frame of reference.
+/// A pose with an error of (x, y, yaw) along the axes of its reference frame.
 fn disturbed(truth: &Pose, error: Vector3<f64>) -> Pose {
     pose(
         truth.translation.x + error.x,
@@ -42,7 +42,7 @@ fn disturbed(truth: &Pose, error: Vector3<f64>) -> Pose {
     )
 }
 
-/// A winding drive, and motions along it drawn from `covariance()`, which claim `claimed` times that.
+/// A winding drive and its motions with errors drawn from `covariance()`; their stated covariance is `scale` times that.
 struct Drive {
     stamps_ns: Vec<i64>,
     truth: Vec<Pose>,
@@ -50,7 +50,7 @@ struct Drive {
 }
 
 impl Drive {
-    fn new(motions: usize, seed: u64, claimed: f64) -> Self {
+    fn new(motions: usize, seed: u64, scale: f64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let truth = common::drive(motions, 90.0);
         let stamps_ns: Vec<_> = (0..truth.len() as i64).map(|k| k * INTERVAL_NS).collect();
@@ -62,7 +62,7 @@ impl Drive {
             );
             let estimate = UncertainMotion {
                 motion,
-                covariance: claimed * covariance(),
+                covariance: scale * covariance(),
             };
             TimedMotion {
                 from_ns: stamps_ns[k],
@@ -78,7 +78,7 @@ impl Drive {
         }
     }
 
-    fn judged(&self) -> MatchedMotions {
+    fn matched(&self) -> MatchedMotions {
         MatchedMotions::new(
             &self.motions,
             TimedPoses::new(&self.stamps_ns, &self.truth),
@@ -88,7 +88,7 @@ impl Drive {
     }
 
     fn nees(&self) -> Nees {
-        nees(&self.judged(), &NeesOptions::default())
+        nees(&self.matched(), &NeesOptions::default())
     }
 }
 
@@ -98,33 +98,33 @@ fn parts(figures: &NeesFigures) -> [NeesFigure; 3] {
 }
 
 #[test]
-fn ratios_of_true_covariances_lie_in_the_acceptance_interval_as_often_as_it_says() {
-    let (drives, mut honest) = (400, [[0; 3]; 4]);
+fn true_covariances_pass_the_acceptance_interval_95_times_in_100() {
+    let (drives, mut accepted) = (400, [[0; 3]; 4]);
     for seed in 0..drives {
-        for (length, honest) in Drive::new(640, seed, 1.0)
+        for (length, accepted) in Drive::new(640, seed, 1.0)
             .nees()
             .by_length
             .iter()
-            .zip(&mut honest)
+            .zip(&mut accepted)
         {
-            for (figure, honest) in parts(&length.all).iter().zip(honest) {
+            for (figure, accepted) in parts(&length.all).iter().zip(accepted) {
                 let [low, high] = figure.acceptance_interval;
-                *honest += usize::from(low < figure.ratio && figure.ratio < high);
+                *accepted += usize::from(low < figure.ratio && figure.ratio < high);
             }
         }
     }
     let share = |count: usize| 100.0 * count as f64 / drives as f64;
     assert!(
-        honest
+        accepted
             .iter()
             .flatten()
             .all(|&count| (92.0..98.0).contains(&share(count))),
-        "{honest:?} of {drives}"
+        "{accepted:?} of {drives}"
     );
 }
 
 #[test]
-fn a_long_drive_of_true_covariances_has_the_ratio_one_in_each_half() {
+fn true_covariances_have_a_ratio_of_one_in_each_half_of_a_long_drive() {
     let nees = Drive::new(12_800, 7, 1.0).nees();
     let segments: Vec<_> = nees
         .by_length
@@ -150,7 +150,7 @@ fn a_long_drive_of_true_covariances_has_the_ratio_one_in_each_half() {
 }
 
 #[test]
-fn twice_the_covariance_is_half_the_ratio() {
+fn twice_the_covariance_halves_the_ratio() {
     let (once, twice) = (
         Drive::new(640, 3, 1.0).nees(),
         Drive::new(640, 3, 2.0).nees(),
@@ -163,7 +163,7 @@ fn twice_the_covariance_is_half_the_ratio() {
 }
 
 #[test]
-fn a_drift_that_single_motions_hide_shows_in_long_segments() {
+fn a_small_yaw_bias_shows_in_long_segments() {
     let mut drive = Drive::new(6_400, 11, 1.0);
     for motion in &mut drive.motions {
         motion.estimate.motion = disturbed(&motion.estimate.motion, Vector3::new(0.0, 0.0, 4e-4));
@@ -174,7 +174,7 @@ fn a_drift_that_single_motions_hide_shows_in_long_segments() {
 }
 
 #[test]
-fn a_noisy_truth_is_forgiven_when_it_is_told() {
+fn the_noise_of_the_ground_truth_is_accounted_for() {
     let mut drive = Drive::new(6_400, 5, 1.0);
     let sigma = TruthSigma {
         position_m: 0.1,
@@ -185,33 +185,33 @@ fn a_noisy_truth_is_forgiven_when_it_is_told() {
     for truth in &mut drive.truth {
         *truth = disturbed(truth, gaussian(&mut random).component_mul(&scale));
     }
-    let judged = drive.judged();
+    let matched = drive.matched();
     assert!(
-        nees(&judged, &NeesOptions::default()).by_length[0]
+        nees(&matched, &NeesOptions::default()).by_length[0]
             .all
             .pose
             .ratio
             > 5.0
     );
-    let told = nees(
-        &judged,
+    let with_sigma = nees(
+        &matched,
         &NeesOptions {
             truth_sigma: sigma,
             ..NeesOptions::default()
         },
     );
-    for length in &told.by_length {
-        // neighbouring segments share a pose of the truth, so the ratio scatters a little more than the range says
-        assert!((length.all.pose.ratio - 1.0).abs() < 0.15, "{told}");
+    for length in &with_sigma.by_length {
+        // Adjoining segments share a ground-truth pose, so the ratio varies a little more than the interval.
+        assert!((length.all.pose.ratio - 1.0).abs() < 0.15, "{with_sigma}");
     }
 }
 
 #[test]
-fn bands_hold_the_errors_of_true_covariances() {
+fn three_sigma_bands_contain_the_errors_of_true_covariances() {
     let mut inside = [0.0; 3];
     let drives = 300;
     for seed in 0..drives {
-        let bands = bands(&Drive::new(100, seed, 1.0).judged(), TruthSigma::default());
+        let bands = bands(&Drive::new(100, seed, 1.0).matched(), TruthSigma::default());
         let share = bands.inside_percent(3.0);
         inside = [0, 1, 2].map(|part| inside[part] + share[part] / drives as f64);
     }
@@ -222,8 +222,8 @@ fn bands_hold_the_errors_of_true_covariances() {
 }
 
 #[test]
-fn a_band_starts_at_nothing_and_its_yaw_grows_with_the_root_of_time() {
-    let bands = bands(&Drive::new(100, 1, 1.0).judged(), TruthSigma::default());
+fn sigma_starts_at_zero_and_that_of_yaw_grows_with_the_root_of_time() {
+    let bands = bands(&Drive::new(100, 1, 1.0).matched(), TruthSigma::default());
     let samples = &bands.chains[0];
     assert_eq!(
         (samples.len(), samples[0].sigma, samples[0].error),
@@ -234,11 +234,11 @@ fn a_band_starts_at_nothing_and_its_yaw_grows_with_the_root_of_time() {
 }
 
 #[test]
-fn segments_that_no_chain_has_are_left_out() {
+fn lengths_without_a_segment_are_left_out() {
     let drive = Drive::new(10, 1, 1.0);
     let lengths = [4, 11].into_iter().filter_map(NonZeroUsize::new).collect();
     let nees = nees(
-        &drive.judged(),
+        &drive.matched(),
         &NeesOptions {
             lengths,
             ..NeesOptions::default()
@@ -257,8 +257,8 @@ fn segments_that_no_chain_has_are_left_out() {
 fn bands_are_drawn_for_every_chain() {
     let mut drive = Drive::new(40, 1, 1.0);
     drive.motions.remove(20);
-    let svg = bands_svg(&bands(&drive.judged(), TruthSigma::default())).unwrap();
-    for label in ["x (m)", "y (m)", "yaw (deg)", "time (s)", "3 sigma"] {
+    let svg = bands_svg(&bands(&drive.matched(), TruthSigma::default())).unwrap();
+    for label in ["x (m)", "y (m)", "yaw (deg)", "time (s)", "+-3 sigma"] {
         assert!(svg.contains(label), "{label}");
     }
     assert_eq!(svg.matches("<polygon").count(), 6);
