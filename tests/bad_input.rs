@@ -212,8 +212,8 @@ fn an_impossible_value_is_told_with_what_is_possible() {
             ["refinement.reach_m = 1", "8 to 1000 cells"],
         ),
         (
-            "[refinement]\nleast_overlap = 1.5",
-            ["refinement.least_overlap = 1.5", "0 to 1"],
+            "[refinement]\nmin_overlap = 1.5",
+            ["refinement.min_overlap = 1.5", "0 to 1"],
         ),
         (
             "[refinement]\njitter_m = nan",

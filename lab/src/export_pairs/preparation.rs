@@ -7,7 +7,7 @@ use gyre_masking::{MaskError, MaskKind, Masker, MaskerError, Sweep};
 use gyre_messages::SearchedMotion;
 use gyre_radar::PolarScan;
 use gyre_scan_matching::{
-    ConfigError, PolarSpectrum, RotationSearch, ShapeError, TranslationSearch,
+    ConfigError, PolarSpectrum, RotationSearch, ShapeError, TranslationSearch, square,
 };
 use half::{f16, slice::HalfFloatSliceExt};
 use nalgebra::Isometry2;
@@ -45,6 +45,7 @@ pub enum PreparationError {
 
 /// See the module. Nothing is allocated once it is planned.
 pub struct Preparation {
+    n: usize,
     masker: Masker,
     rotation: RotationSearch,
     translation: TranslationSearch,
@@ -88,6 +89,7 @@ impl Preparation {
         };
         let (later, earlier) = (view(), view());
         Ok(Self {
+            n: raster.n,
             masker: Masker::new(raster, &configuration.points, masking)?,
             rotation,
             translation: TranslationSearch::new(
@@ -166,14 +168,17 @@ impl Preparation {
     /// The motion from the raster before to this one; `None` where the chain begins.
     fn search(&mut self) -> Result<Option<[f64; 3]>, ShapeError> {
         let (later, earlier) = (&mut self.later, &self.earlier);
-        self.rotation.spectrum(&later.cells, &mut later.spectrum)?;
+        let raster = square("raster", &later.cells, self.n)?;
+        self.rotation.spectrum(raster, &mut later.spectrum)?;
         if self.chain.is_empty() {
             return Ok(None);
         }
         let rotation = self.rotation.search(&later.spectrum, &earlier.spectrum)?;
-        let motion = self
-            .translation
-            .search(&later.cells, &earlier.cells, &rotation)?;
+        let motion = self.translation.search(
+            raster,
+            square("raster", &earlier.cells, self.n)?,
+            &rotation,
+        )?;
         Ok(Some([motion.x_m, motion.y_m, motion.yaw_rad]))
     }
 

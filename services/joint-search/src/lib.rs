@@ -3,7 +3,7 @@
 
 use gyre_messages::{Masked, Motion, MotionEstimate, Pair, Refinement, RotationEstimate};
 use gyre_radar::raster::RasterConfig;
-use gyre_scan_matching::{ConfigError, ExhaustiveConfig, ExhaustiveSearch, ShapeError};
+use gyre_scan_matching::{ConfigError, ExhaustiveConfig, ExhaustiveSearch, ShapeError, square};
 use gyre_stage::{
     Launch, Stage, StageError, Statistics,
     inputs::{PairView, Pairs},
@@ -26,6 +26,7 @@ pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
 /// Motions of consecutive scans.
 pub struct Motions {
     search: ExhaustiveSearch,
+    n: usize,
 }
 
 impl Motions {
@@ -33,6 +34,7 @@ impl Motions {
     pub fn new(raster: &RasterConfig, config: &ExhaustiveConfig) -> Result<Self, ConfigError> {
         Ok(Self {
             search: ExhaustiveSearch::new(raster.n, raster.cell_m.into(), config)?,
+            n: raster.n,
         })
     }
 
@@ -41,7 +43,9 @@ impl Motions {
         let Some(earlier) = pair.earlier else {
             return Ok(MotionEstimate::default());
         };
-        let found = self.search.search(pair.later, earlier)?;
+        let later = square("later raster", pair.later, self.n)?;
+        let earlier = square("earlier raster", earlier, self.n)?;
+        let found = self.search.search(later, earlier)?;
         let (motion, c) = (&found.motion, &found.motion.covariance);
         Ok(MotionEstimate {
             x_m: motion.x_m,
@@ -98,7 +102,7 @@ impl Stage for Motions {
     }
 }
 
-fn wire(found: &gyre_scan_matching::RotationEstimate) -> RotationEstimate {
+fn wire(found: &gyre_scan_matching::RotationMatch) -> RotationEstimate {
     RotationEstimate {
         angle_rad: found.angle_rad,
         variance_rad2: found.variance_rad2,

@@ -15,8 +15,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_scan_matching::{Anchor, Keyframe, Memory, Refinement};
-use nalgebra::{Complex, Isometry2, Translation2, UnitComplex, Vector3};
+use gyre_geometry::Twist;
+use gyre_scan_matching::{Anchor, Keyframe, Refiner, TrackerState};
+use nalgebra::{Complex, Isometry2, Translation2, UnitComplex};
 use thiserror::Error;
 
 /// What the file starts with; the number is the version of its slots.
@@ -153,12 +154,12 @@ impl Checkpoint {
     /// Writes what is known after `item`: first the keyframes that are new, then the state that speaks of them. Where the file
     /// says the same already, an earlier life is being repeated and nothing is written: what that life knew later may still
     /// be asked for. Where it says otherwise, what it says of later items is of no use any more.
-    pub fn write(&mut self, item: u64, refinement: &Refinement) -> Result<(), CheckpointError> {
+    pub fn write(&mut self, item: u64, refinement: &Refiner) -> Result<(), CheckpointError> {
         let (mut count, mut oldest) = (0_u64, u64::MAX);
         for keyframe in refinement.keyframes() {
             (count, oldest) = (count + 1, oldest.min(keyframe.id));
         }
-        let state = encode_state([item, count, oldest], refinement.memory());
+        let state = encode_state([item, count, oldest], refinement.state());
         if self.read_state(item).is_some_and(|found| found == state) {
             return Ok(());
         }
@@ -172,7 +173,7 @@ impl Checkpoint {
         })
     }
 
-    fn write_new(&mut self, item: u64, oldest: u64, refinement: &Refinement) -> io::Result<()> {
+    fn write_new(&mut self, item: u64, oldest: u64, refinement: &Refiner) -> io::Result<()> {
         for keyframe in refinement.keyframes() {
             let known = self
                 .keyframes
@@ -220,11 +221,7 @@ impl Checkpoint {
     }
 
     /// Makes the refinement what it was after `item`.
-    pub fn restore(
-        &mut self,
-        item: u64,
-        refinement: &mut Refinement,
-    ) -> Result<(), CheckpointError> {
+    pub fn restore(&mut self, item: u64, refinement: &mut Refiner) -> Result<(), CheckpointError> {
         let missing = || CheckpointError::Missing {
             path: self.path.clone(),
             item: item.saturating_add(1),
@@ -320,7 +317,7 @@ fn pose_of(words: &[u64]) -> Isometry2<f64> {
     )
 }
 
-fn memory_words(memory: &Memory) -> [u64; MEMORY_WORDS] {
+fn memory_words(memory: &TrackerState) -> [u64; MEMORY_WORDS] {
     let mut words = [0; MEMORY_WORDS];
     words[..4].copy_from_slice(&pose_words(&memory.pose));
     for (k, anchor) in memory.anchors.iter().enumerate() {
@@ -328,13 +325,21 @@ fn memory_words(memory: &Memory) -> [u64; MEMORY_WORDS] {
         if let Some(anchor) = anchor {
             words[0] = 1;
             words[1..5].copy_from_slice(&pose_words(&anchor.pose));
-            let v = anchor.velocity;
-            words[5..].copy_from_slice(&[v.x, v.y, v.z, anchor.age_s].map(f64::to_bits));
+            let twist = anchor.twist;
+            words[5..].copy_from_slice(
+                &[
+                    twist.vx_mps,
+                    twist.vy_mps,
+                    twist.yaw_rate_radps,
+                    anchor.age_s,
+                ]
+                .map(f64::to_bits),
+            );
         }
     }
     let rest = [
-        memory.usual_overlap.to_bits(),
-        memory.usual_weight.to_bits(),
+        memory.mean_overlap.to_bits(),
+        memory.mean_weight.to_bits(),
         memory.doubtful.into(),
         memory.unmatched.into(),
     ];
@@ -342,28 +347,33 @@ fn memory_words(memory: &Memory) -> [u64; MEMORY_WORDS] {
     words
 }
 
-fn memory_of(words: &[u64; MEMORY_WORDS]) -> Memory {
+fn memory_of(words: &[u64; MEMORY_WORDS]) -> TrackerState {
     let anchor = |k: usize| {
         let words = &words[4 + k * ANCHOR_WORDS..][..ANCHOR_WORDS];
-        let [x, y, yaw, age_s] = [5, 6, 7, 8].map(|k| f64::from_bits(words[k]));
+        let [vx_mps, vy_mps, yaw_rate_radps, age_s] =
+            [5, 6, 7, 8].map(|k| f64::from_bits(words[k]));
         (words[0] == 1).then(|| Anchor {
             pose: pose_of(&words[1..5]),
-            velocity: Vector3::new(x, y, yaw),
+            twist: Twist {
+                vx_mps,
+                vy_mps,
+                yaw_rate_radps,
+            },
             age_s,
         })
     };
     let rest = &words[4 + 2 * ANCHOR_WORDS..];
-    Memory {
+    TrackerState {
         pose: pose_of(words),
         anchors: [anchor(0), anchor(1)],
-        usual_overlap: f64::from_bits(rest[0]),
-        usual_weight: f64::from_bits(rest[1]),
+        mean_overlap: f64::from_bits(rest[0]),
+        mean_weight: f64::from_bits(rest[1]),
         doubtful: rest[2] as u32,
         unmatched: rest[3] as u32,
     }
 }
 
-fn encode_state(head: [u64; 3], memory: &Memory) -> [u8; STATE_BYTES] {
+fn encode_state(head: [u64; 3], memory: &TrackerState) -> [u8; STATE_BYTES] {
     let mut slot = [0; STATE_BYTES];
     head.into_iter()
         .chain(memory_words(memory))
@@ -374,7 +384,7 @@ fn encode_state(head: [u64; 3], memory: &Memory) -> [u8; STATE_BYTES] {
     slot
 }
 
-fn decode_state(slot: &[u8; STATE_BYTES]) -> Option<([u64; 3], Memory)> {
+fn decode_state(slot: &[u8; STATE_BYTES]) -> Option<([u64; 3], TrackerState)> {
     let memory = std::array::from_fn(|k| word(slot, k + 4));
     sound(slot).then(|| ([1, 2, 3].map(|k| word(slot, k)), memory_of(&memory)))
 }
@@ -391,7 +401,10 @@ fn encode_keyframe(keyframe: &Keyframe, slot: &mut [u8]) {
             .iter()
             .enumerate()
             .for_each(|(k, value)| put(slot, 6 + 2 * level + k, *value as u64));
-        slot[at..at + cells.len()].copy_from_slice(cells);
+        slot[at..]
+            .iter_mut()
+            .zip(cells)
+            .for_each(|(to, cell)| *to = *cell);
         at += cells.len();
     }
     let check = check_word(&slot[8..]);
@@ -405,8 +418,12 @@ fn decode_keyframe(slot: &[u8], keyframe: &mut Keyframe) -> bool {
     let mut at = KEYFRAME_WORDS * 8;
     for (level, (corner, cells)) in keyframe.images_mut().into_iter().enumerate() {
         *corner = [0, 1].map(|k| word(slot, 6 + 2 * level + k) as i64);
-        cells.copy_from_slice(&slot[at..at + cells.len()]);
-        at += cells.len();
+        let count = cells.len();
+        cells
+            .into_iter()
+            .zip(&slot[at..])
+            .for_each(|(cell, from)| *cell = *from);
+        at += count;
     }
     sound(slot)
 }

@@ -2,13 +2,13 @@
 
 pub mod checkpoint;
 
-use gyre_geometry::SparsePoint;
+use gyre_geometry::{SparsePoint, UncertainMotion, covariance::pack, pose};
 use gyre_messages::{
     Item, Masked, MaskedHeader, Motion, MotionEstimate, Refined, Refinement as Record, flag,
     hypothesis, outcome,
 };
 use gyre_radar::PointsConfig;
-use gyre_scan_matching::{Hypothesis, Outcome, Refinement, RefinementConfig};
+use gyre_scan_matching::{InitialGuess, Outcome, RefinementConfig, Refiner};
 use gyre_stage::{
     Launch, Stage, StageError, Statistics,
     inputs::{Joined, JoinedView},
@@ -16,7 +16,6 @@ use gyre_stage::{
     stage,
     writer::Draft,
 };
-use nalgebra::{Isometry2, Vector2};
 
 use checkpoint::{Checkpoint, CheckpointError};
 
@@ -27,7 +26,7 @@ pub const NAME: &str = "refinement";
 pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
     let points: PointsConfig = launch.section("points")?;
     let config: RefinementConfig = launch.section("refinement")?;
-    let refinement = Refinement::new(&config, points.capacity)
+    let refinement = Refiner::new(&config, points.capacity)
         .map_err(|error| StageError::Configuration(error.to_string()))?;
     let manifest = &launch.manifest;
     let path = checkpoint::path(&manifest.out);
@@ -36,7 +35,7 @@ pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
         .map_err(unusable)?;
     stage::run(
         launch,
-        &mut Refiner {
+        &mut Refining {
             refinement,
             checkpoint,
             next: None,
@@ -45,14 +44,14 @@ pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
 }
 
 /// The stage: the refinement, and the file that keeps what it knows.
-struct Refiner {
-    refinement: Refinement,
+struct Refining {
+    refinement: Refiner,
     checkpoint: Checkpoint,
     /// The item that what the refinement knows is for; `None` after a start.
     next: Option<u64>,
 }
 
-impl Stage for Refiner {
+impl Stage for Refining {
     type Inputs = Joined<Masked, Motion>;
     type Output = Refined;
     const HOP: gyre_messages::Stage = gyre_messages::Stage::Refinement;
@@ -82,11 +81,11 @@ impl Stage for Refiner {
     }
 }
 
-impl Refiner {
+impl Refining {
     /// Makes the refinement know what it has to before this item.
     fn stand_before(&mut self, item: &Item) -> Result<(), StageError> {
         if item.is(flag::BREAK) {
-            self.refinement.start();
+            self.refinement.reset();
         } else if self.next != Some(item.seq) {
             self.checkpoint
                 .restore(item.seq.saturating_sub(1), &mut self.refinement)
@@ -98,43 +97,39 @@ impl Refiner {
 
 /// The motion as it is after refinement. The search's own findings stay in it.
 pub fn refine(
-    refinement: &mut Refinement,
+    refinement: &mut Refiner,
     seq: u64,
     later: &[SparsePoint],
     earlier: &[SparsePoint],
     motion: &MotionEstimate,
 ) -> MotionEstimate {
-    let searched = Isometry2::new(Vector2::new(motion.x_m, motion.y_m), motion.yaw_rad);
-    let refined = refinement.next(
+    let searched = pose(motion.x_m, motion.y_m, motion.yaw_rad);
+    let refined = refinement.refine(
         seq,
         later,
         earlier,
         &searched,
         motion.interval_ns as f64 * 1e-9,
     );
-    let c = &refined.covariance;
+    let UncertainMotion {
+        motion: refined_pose,
+        covariance,
+    } = &refined.motion;
     MotionEstimate {
-        x_m: refined.motion.translation.x,
-        y_m: refined.motion.translation.y,
-        yaw_rad: refined.motion.rotation.angle(),
-        covariance: [
-            c[(0, 0)],
-            c[(0, 1)],
-            c[(0, 2)],
-            c[(1, 1)],
-            c[(1, 2)],
-            c[(2, 2)],
-        ],
+        x_m: refined_pose.translation.x,
+        y_m: refined_pose.translation.y,
+        yaw_rad: refined_pose.rotation.angle(),
+        covariance: pack(covariance),
         refinement: Record {
             outcome: match refined.outcome {
                 Outcome::Refined => outcome::REFINED,
                 Outcome::Weak => outcome::WEAK,
                 Outcome::Predicted => outcome::PREDICTED,
             },
-            hypothesis: match refined.hypothesis {
-                Hypothesis::Prediction => hypothesis::PREDICTION,
-                Hypothesis::Search => hypothesis::SEARCH,
-                Hypothesis::Fan => hypothesis::FAN,
+            hypothesis: match refined.guess {
+                InitialGuess::Prediction => hypothesis::PREDICTION,
+                InitialGuess::Search => hypothesis::SEARCH,
+                InitialGuess::YawOffset => hypothesis::FAN,
             },
             overlap: refined.overlap,
             support: refined.support,

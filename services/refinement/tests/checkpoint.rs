@@ -5,7 +5,7 @@ use std::{fs, path::Path};
 
 use gyre_geometry::SparsePoint;
 use gyre_refinement::checkpoint::{self, Checkpoint, CheckpointError};
-use gyre_scan_matching::{Memory, Refinement, RefinementConfig};
+use gyre_scan_matching::{RefinementConfig, Refiner, TrackerState};
 use nalgebra::{Isometry2, Vector2};
 
 const WINDOW: usize = 8;
@@ -23,12 +23,12 @@ fn config() -> RefinementConfig {
     }
 }
 
-fn refinement() -> Refinement {
-    Refinement::new(&config(), 512).unwrap()
+fn refinement() -> Refiner {
+    Refiner::new(&config(), 512).unwrap()
 }
 
 fn open_with(path: &Path, config: &RefinementConfig, window: usize) -> Checkpoint {
-    let cells = Refinement::new(config, 512).unwrap().keyframe_cells();
+    let cells = Refiner::new(config, 512).unwrap().keyframe_cells();
     Checkpoint::open(path, window, config.keyframes, cells).unwrap()
 }
 
@@ -58,7 +58,7 @@ fn scan(world: u64, item: u64) -> Vec<SparsePoint> {
 
 /// Refines item by item, each written before the next, as the stage does.
 fn live(
-    refinement: &mut Refinement,
+    refinement: &mut Refiner,
     checkpoint: &mut Checkpoint,
     world: u64,
     items: std::ops::Range<u64>,
@@ -69,9 +69,9 @@ fn live(
     }
 }
 
-fn step(refinement: &mut Refinement, world: u64, item: u64) {
+fn step(refinement: &mut Refiner, world: u64, item: u64) {
     let searched = Isometry2::new(Vector2::new(STEP_M, 0.0), 0.0);
-    refinement.next(
+    refinement.refine(
         item,
         &scan(world, item),
         &scan(world, item - 1),
@@ -81,7 +81,7 @@ fn step(refinement: &mut Refinement, world: u64, item: u64) {
 }
 
 /// All that a refinement knows, in bits.
-fn known(refinement: &Refinement) -> Vec<u64> {
+fn known(refinement: &Refiner) -> Vec<u64> {
     let pose = |p: &Isometry2<f64>| {
         [
             p.translation.x,
@@ -91,22 +91,24 @@ fn known(refinement: &Refinement) -> Vec<u64> {
         ]
         .map(f64::to_bits)
     };
-    let memory: &Memory = refinement.memory();
+    let memory: &TrackerState = refinement.state();
     let mut words = pose(&memory.pose).to_vec();
     for anchor in &memory.anchors {
         words.push(anchor.is_some().into());
         if let Some(anchor) = anchor {
             words.extend(pose(&anchor.pose));
             words.extend(
-                anchor
-                    .velocity
-                    .iter()
-                    .chain([&anchor.age_s])
-                    .map(|v| v.to_bits()),
+                [
+                    anchor.twist.vx_mps,
+                    anchor.twist.vy_mps,
+                    anchor.twist.yaw_rate_radps,
+                    anchor.age_s,
+                ]
+                .map(f64::to_bits),
             );
         }
     }
-    words.extend([memory.usual_overlap, memory.usual_weight].map(f64::to_bits));
+    words.extend([memory.mean_overlap, memory.mean_weight].map(f64::to_bits));
     words.extend([memory.doubtful, memory.unmatched].map(u64::from));
     for keyframe in refinement.keyframes() {
         words.push(keyframe.id);
@@ -248,11 +250,11 @@ fn the_file_of_another_configuration_is_begun_anew() {
         cell_m: 2.0,
         ..config()
     };
-    let mut refinement = Refinement::new(&other, 512).unwrap();
+    let mut refinement = Refiner::new(&other, 512).unwrap();
     let mut checkpoint = open_with(&path, &other, WINDOW);
     assert!(checkpoint.restore(19, &mut refinement).is_err());
     live(&mut refinement, &mut checkpoint, 1, 1..10);
-    let mut again = Refinement::new(&other, 512).unwrap();
+    let mut again = Refiner::new(&other, 512).unwrap();
     open_with(&path, &other, WINDOW)
         .restore(9, &mut again)
         .unwrap();
@@ -313,7 +315,7 @@ fn keyframes_of_a_repeated_life_stay_out_of_the_next_ones_map() {
     checkpoint.restore(2, &mut refinement).unwrap();
     for item in 3..8 {
         // This time the vehicle stands, and makes no keyframes.
-        refinement.next(
+        refinement.refine(
             item,
             &scan(1, 2),
             &scan(1, 2),
@@ -330,7 +332,7 @@ fn keyframes_of_a_repeated_life_stay_out_of_the_next_ones_map() {
 fn a_chain_that_begins_again_leaves_the_one_before_out() {
     let (_folder, path) = lived(21);
     let (mut refinement, mut checkpoint) = (refinement(), open(&path));
-    refinement.start();
+    refinement.reset();
     checkpoint.write(15, &refinement).unwrap();
     assert_eq!(restored(&path, 15).unwrap(), history(1, 1)[0]);
     live(&mut refinement, &mut checkpoint, 2, 16..21);

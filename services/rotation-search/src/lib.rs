@@ -2,7 +2,7 @@
 
 use gyre_messages::{Masked, Pair, Rotation, RotationEstimate};
 use gyre_radar::raster::RasterConfig;
-use gyre_scan_matching::{ConfigError, PolarSpectrum, RotationConfig, RotationSearch, ShapeError};
+use gyre_scan_matching::{ConfigError, RotationConfig, SequentialRotation, ShapeError, square};
 use gyre_stage::{
     Launch, Stage, StageError, Statistics,
     inputs::{PairView, Pairs},
@@ -24,24 +24,15 @@ pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
 
 /// Rotations of consecutive scans; each scan's spectrum is computed once and kept for the next pair.
 pub struct Rotations {
-    search: RotationSearch,
-    later: PolarSpectrum,
-    earlier: PolarSpectrum,
-    /// The scan that `earlier` belongs to.
-    kept: Option<u64>,
+    search: SequentialRotation,
+    n: usize,
 }
 
 impl Rotations {
     /// Plans the search for rasters of `n` x `n` cells.
     pub fn new(n: usize, config: &RotationConfig) -> Result<Self, ConfigError> {
-        let search = RotationSearch::new(n, config)?;
-        let (later, earlier) = (search.new_spectrum(), search.new_spectrum());
-        Ok(Self {
-            search,
-            later,
-            earlier,
-            kept: None,
-        })
+        let search = SequentialRotation::new(n, config)?;
+        Ok(Self { search, n })
     }
 
     /// The rotation of scan `seq` against the one before; all zero where the chain starts.
@@ -51,18 +42,14 @@ impl Rotations {
         pair: Pair<'_>,
         own_masks: bool,
     ) -> Result<RotationEstimate, ShapeError> {
-        self.search.spectrum(pair.later, &mut self.later)?;
-        let mut rotation = RotationEstimate::default();
-        if let Some(earlier) = pair.earlier {
-            // After a restart nothing is kept; a mask that looks at both scans leaves the earlier one another raster each time.
-            if own_masks || self.kept != seq.checked_sub(1) {
-                self.search.spectrum(earlier, &mut self.earlier)?;
-            }
-            rotation = wire(&self.search.search(&self.later, &self.earlier)?);
-        }
-        std::mem::swap(&mut self.later, &mut self.earlier);
-        self.kept = Some(seq);
-        Ok(rotation)
+        let later = square("later raster", pair.later, self.n)?;
+        let earlier = pair
+            .earlier
+            .map(|cells| square("earlier raster", cells, self.n));
+        let found = self
+            .search
+            .next(seq, later, earlier.transpose()?, own_masks)?;
+        Ok(found.as_ref().map_or_else(RotationEstimate::default, wire))
     }
 }
 
@@ -89,7 +76,7 @@ impl Stage for Rotations {
     }
 }
 
-fn wire(found: &gyre_scan_matching::RotationEstimate) -> RotationEstimate {
+fn wire(found: &gyre_scan_matching::RotationMatch) -> RotationEstimate {
     RotationEstimate {
         angle_rad: found.angle_rad,
         variance_rad2: found.variance_rad2,

@@ -2,7 +2,7 @@
 
 use gyre_messages::{Masked, Motion, MotionEstimate, Pair, Refinement, Rotation, RotationEstimate};
 use gyre_radar::raster::RasterConfig;
-use gyre_scan_matching::{ConfigError, ShapeError, TranslationConfig, TranslationSearch};
+use gyre_scan_matching::{ConfigError, ShapeError, TranslationConfig, TranslationSearch, square};
 use gyre_stage::{
     Launch, Stage, StageError, Statistics,
     inputs::{Joined, JoinedView},
@@ -25,6 +25,7 @@ pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
 /// Motions of consecutive scans whose rotation is known.
 pub struct Translations {
     search: TranslationSearch,
+    n: usize,
 }
 
 impl Translations {
@@ -32,6 +33,7 @@ impl Translations {
     pub fn new(raster: &RasterConfig, config: &TranslationConfig) -> Result<Self, ConfigError> {
         Ok(Self {
             search: TranslationSearch::new(raster.n, raster.cell_m.into(), config)?,
+            n: raster.n,
         })
     }
 
@@ -44,9 +46,9 @@ impl Translations {
         let Some(earlier) = pair.earlier else {
             return Ok(MotionEstimate::default());
         };
-        let found = self
-            .search
-            .search(pair.later, earlier, &searched(&rotation))?;
+        let later = square("later raster", pair.later, self.n)?;
+        let earlier = square("earlier raster", earlier, self.n)?;
+        let found = self.search.search(later, earlier, &searched(&rotation))?;
         let c = &found.covariance;
         Ok(MotionEstimate {
             x_m: found.x_m,
@@ -102,8 +104,8 @@ impl Stage for Translations {
     }
 }
 
-fn searched(rotation: &RotationEstimate) -> gyre_scan_matching::RotationEstimate {
-    gyre_scan_matching::RotationEstimate {
+fn searched(rotation: &RotationEstimate) -> gyre_scan_matching::RotationMatch {
+    gyre_scan_matching::RotationMatch {
         angle_rad: rotation.angle_rad,
         variance_rad2: rotation.variance_rad2,
         score: rotation.score,

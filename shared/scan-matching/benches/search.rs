@@ -119,16 +119,25 @@ fn steps() {
         };
         let mut translation = TranslationSearch::new(n, cell, &config).unwrap();
         let (mut f, mut g) = (rotation.new_spectrum(), rotation.new_spectrum());
-        rotation.spectrum(&earlier, &mut g).unwrap();
-        let spectrum = median_ms(|| rotation.spectrum(black_box(&later), &mut f).unwrap());
+        rotation.spectrum(earlier.view(), &mut g).unwrap();
+        let spectrum = median_ms(|| rotation.spectrum(black_box(later.view()), &mut f).unwrap());
         let angle = median_ms(|| _ = black_box(rotation.search(&f, &g).unwrap()));
         let estimate = rotation.search(&f, &g).unwrap();
-        let shift =
-            median_ms(|| _ = black_box(translation.search(&later, &earlier, &estimate).unwrap()));
+        let shift = median_ms(|| {
+            _ = black_box(
+                translation
+                    .search(later.view(), earlier.view(), &estimate)
+                    .unwrap(),
+            )
+        });
         let total = median_ms(|| {
-            rotation.spectrum(black_box(&later), &mut f).unwrap();
+            rotation.spectrum(black_box(later.view()), &mut f).unwrap();
             let estimate = rotation.search(&f, &g).unwrap();
-            black_box(translation.search(&later, &earlier, &estimate).unwrap());
+            black_box(
+                translation
+                    .search(later.view(), earlier.view(), &estimate)
+                    .unwrap(),
+            );
         });
         println!("{n:5} {cell:7.3} {spectrum:9.3} {angle:9.3} {shift:12.3} {total:9.3}");
     }
@@ -146,8 +155,13 @@ fn candidates() {
         let (earlier, later) = pair(n, cell, motion, 1);
         let time = |config: &ExhaustiveConfig| {
             let mut search = ExhaustiveSearch::new(n, cell, config).unwrap();
-            let total =
-                median_ms(|| _ = black_box(search.search(black_box(&later), &earlier).unwrap()));
+            let total = median_ms(|| {
+                _ = black_box(
+                    search
+                        .search(black_box(later.view()), earlier.view())
+                        .unwrap(),
+                )
+            });
             (total, total / search.candidates() as f64)
         };
         let default = ExhaustiveConfig {

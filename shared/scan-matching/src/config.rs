@@ -46,7 +46,7 @@ pub enum Magnitude {
 /// Weight over the raster before the rotation's transform.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Window {
+pub enum Taper {
     /// No weight. For rasters that already end in zeros.
     None,
     /// Product of two Hann windows (Weston et al., Algorithm 1, line 5).
@@ -98,7 +98,7 @@ pub struct RotationConfig {
     /// Keep only the phase of the polar spectra's own transform (Checchin et al., Eq. 6).
     pub phase_only: bool,
     /// `none`, `hann` or `radial_hann`.
-    pub window: Window,
+    pub window: Taper,
     /// Lower end of the band, cycles a cell. What is longer than 20 cells says little about the angle and is ruled
     /// by the range's fall-off, which does not turn with the scene.
     pub band_low: f64,
@@ -123,7 +123,7 @@ impl Default for RotationConfig {
             form: RotationForm::default(),
             magnitude: Magnitude::default(),
             phase_only: false,
-            window: Window::default(),
+            window: Taper::default(),
             band_low: 0.05,
             band_high: 0.45,
             angles: 576,
@@ -172,7 +172,7 @@ impl RotationConfig {
         Self {
             form: RotationForm::ProfileMean,
             magnitude: Magnitude::Linear,
-            window: Window::Hann,
+            window: Taper::Hann,
             angles: 733,
             band_low: 0.01,
             band_high: 0.35,

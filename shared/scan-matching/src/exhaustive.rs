@@ -2,9 +2,11 @@
 
 mod config;
 
-use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
+use std::f64::consts::FRAC_1_SQRT_2;
 
+use gyre_geometry::wrap_angle;
 use nalgebra::{Matrix3, Rotation2, Vector2};
+use ndarray::ArrayView2;
 
 use crate::config::{ConfigError, Overlap, Peak, reach_cells};
 use crate::correlate::KeptCorrelation;
@@ -12,11 +14,11 @@ use crate::covariance::{guess, motion_covariance, shift_covariance};
 use crate::fft::fast_size;
 use crate::overlap::OverlapEnergy;
 use crate::peak::{LinePeak, PlanePeak, line_peak};
-use crate::rotation::{RotationEstimate, RotationRunnerUp};
+use crate::rotation::{RotationMatch, RotationRunnerUp};
 use crate::scores::{Scores, Shift};
-use crate::translation::{MotionEstimate, MotionRunnerUp};
+use crate::translation::{MotionMatch, MotionRunnerUp};
 use crate::warp::Rotation;
-use crate::{ShapeError, expect_shape, kernels};
+use crate::{ShapeError, cells, kernels};
 
 use config::AngleGrid;
 pub use config::ExhaustiveConfig;
@@ -31,11 +33,11 @@ const OFFSET: f64 = 0.211_324_865_405_187_1;
 
 /// The motion between two scans, and its angle apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct JointEstimate {
+pub struct JointMatch {
     /// The angle; its runner-up is the next highest local maximum over the angles.
-    pub rotation: RotationEstimate,
+    pub rotation: RotationMatch,
     /// The whole motion; its runner-up is another shift at the same angle, or another angle's best, whichever is higher.
-    pub motion: MotionEstimate,
+    pub motion: MotionMatch,
 }
 
 /// Finds angle and shift together by trying every angle (Masking by Moving; `raw` in Weston et al., Table III).
@@ -133,8 +135,12 @@ impl ExhaustiveSearch {
     /// Rasters are n x n, row 0 far ahead, column 0 far left. Values that are not finite count as zero.
     ///
     /// # Errors
-    /// Where a raster is not of this search's shape.
-    pub fn search(&mut self, later: &[f32], earlier: &[f32]) -> Result<JointEstimate, ShapeError> {
+    /// If a raster is not n x n in standard layout.
+    pub fn search(
+        &mut self,
+        later: ArrayView2<'_, f32>,
+        earlier: ArrayView2<'_, f32>,
+    ) -> Result<JointMatch, ShapeError> {
         self.search_around(later, earlier, 0.0)
     }
 
@@ -144,12 +150,12 @@ impl ExhaustiveSearch {
     /// As [`search`](Self::search).
     pub fn search_around(
         &mut self,
-        later: &[f32],
-        earlier: &[f32],
+        later: ArrayView2<'_, f32>,
+        earlier: ArrayView2<'_, f32>,
         prior_rad: f64,
-    ) -> Result<JointEstimate, ShapeError> {
-        expect_shape("later raster", later.len(), self.n * self.n)?;
-        expect_shape("earlier raster", earlier.len(), self.n * self.n)?;
+    ) -> Result<JointMatch, ShapeError> {
+        let later = cells("later raster", &later, self.n)?;
+        let earlier = cells("earlier raster", &earlier, self.n)?;
         kernels::finite_copy(later, &mut self.later);
         kernels::finite_copy(earlier, &mut self.earlier);
         self.later_energy.measure(&self.later);
@@ -270,11 +276,11 @@ impl ExhaustiveSearch {
         })
     }
 
-    fn estimate(&self, found: &Found) -> JointEstimate {
+    fn estimate(&self, found: &Found) -> JointMatch {
         let score = found.over_shifts.value.min(1.0);
         let second = self.angle_runner_up(found.best);
-        let rotation = RotationEstimate {
-            angle_rad: wrapped(found.angle_rad),
+        let rotation = RotationMatch {
+            angle_rad: wrap_angle(found.angle_rad),
             variance_rad2: self.angle_variance(score, found.over_angles.curvature),
             score,
             runner_up: second.map(|k| RotationRunnerUp {
@@ -293,7 +299,7 @@ impl ExhaustiveSearch {
             self.cell_m,
             guess,
         );
-        let motion = MotionEstimate {
+        let motion = MotionMatch {
             x_m: place.x,
             y_m: place.y,
             yaw_rad: rotation.angle_rad,
@@ -307,7 +313,7 @@ impl ExhaustiveSearch {
             runner_up: self.runner_up(found, second),
             half_turn: false,
         };
-        JointEstimate { rotation, motion }
+        JointMatch { rotation, motion }
     }
 
     /// (1 - score) over the curvature of the best scores along the angle, scaled as the shift's: the angle's variance
@@ -371,23 +377,23 @@ impl ExhaustiveSearch {
 
     /// The k-th angle, within (-pi, pi].
     fn angle(&self, found: &Found, k: usize) -> f64 {
-        wrapped(found.prior_rad + self.angles.angle(k as f64))
+        wrap_angle(found.prior_rad + self.angles.angle(k as f64))
     }
 
-    fn no_match(&self, prior_rad: f64) -> JointEstimate {
+    fn no_match(&self, prior_rad: f64) -> JointMatch {
         let (guess, angle_rad, variance_rad2) = (
             guess(self.config.reach_m),
-            wrapped(prior_rad),
+            wrap_angle(prior_rad),
             self.angles.guess(),
         );
-        JointEstimate {
-            rotation: RotationEstimate {
+        JointMatch {
+            rotation: RotationMatch {
                 angle_rad,
                 variance_rad2,
                 score: 0.0,
                 runner_up: None,
             },
-            motion: MotionEstimate {
+            motion: MotionMatch {
                 x_m: 0.0,
                 y_m: 0.0,
                 yaw_rad: angle_rad,
@@ -430,10 +436,4 @@ impl Turned {
 /// t = R t' with t' the shift along the raster's axes, cells: rows run backward, columns to the right.
 fn translation(angle_rad: f64, shift: Vector2<f64>, cell_m: f64) -> Vector2<f64> {
     Rotation2::new(angle_rad) * shift * -cell_m
-}
-
-/// Within (-pi, pi].
-fn wrapped(angle_rad: f64) -> f64 {
-    let turned = angle_rad.rem_euclid(TAU);
-    if turned > PI { turned - TAU } else { turned }
 }

@@ -5,21 +5,25 @@
 //! shift leaves as they are, then t by one correlation.
 //!
 //! # Layout, in the order of the data
-//! - `window`, `fft`, `polar`: a raster's magnitude spectrum on a polar grid;
+//! - `taper`, `fft`, `polar`: the magnitude spectrum of a raster on a polar grid;
 //! - `spectrum`: [`PolarSpectrum`], what is kept of a scan; `rotation`: [`RotationSearch`], the angle;
-//! - `warp`: the earlier raster turned by it;
-//! - `translation`: [`TranslationSearch`], the shift and the whole motion; `scores`: one a shift; `overlap` normalises them;
+//!   `sequential`: [`SequentialRotation`], the angles along a stream of scans;
+//! - `warp`: the earlier raster turned by that angle;
+//! - `translation`: [`TranslationSearch`], the shift and the whole motion; `scores`: one score a shift; `overlap`
+//!   normalises them;
 //! - `exhaustive`: [`ExhaustiveSearch`], all three unknowns at once, angle by angle; `correlate`: its transforms;
-//! - `refinement`: [`Refinement`], the motion below a cell, against a map of the last keyframes;
-//! - `peak`: maxima between samples; `covariance`: what their shapes say; `whiten`: phase-only correlation; `kernels`:
-//!   inner loops.
+//! - `refinement`: [`Refiner`], the motion to a fraction of a cell, against a map of the last keyframes;
+//! - `peak`: maxima between samples; `covariance`: covariances from the shapes of peaks; `whiten`: phase-only
+//!   correlation; `kernels`: inner loops.
 //!
-//! # Frames
-//! x forward, y left, yaw counter-clockwise; metres and radians. A raster is n x n `f32`, row after row, row 0 far
-//! ahead, column 0 far left, the sensor in the middle: the centre of the middle cell where n is odd.
+//! # Frames and shapes
+//! x forward, y left, yaw counter-clockwise; metres and radians. A raster is n x n `f32` in standard (row-major,
+//! contiguous) layout: row 0 is far ahead, column 0 far left, and the sensor is in the middle, which is the centre of the
+//! middle cell if n is odd. A motion is the pose of the later scan's frame in the earlier scan's frame.
 //!
 //! ```
 //! use gyre_scan_matching::{RotationConfig, RotationSearch, TranslationConfig, TranslationSearch};
+//! use ndarray::Array2;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let (n, cell_m) = (127, 0.8);
@@ -27,17 +31,17 @@
 //! let mut translation = TranslationSearch::new(n, cell_m, &TranslationConfig::default())?;
 //! let (mut earlier_spectrum, mut later_spectrum) = (rotation.new_spectrum(), rotation.new_spectrum());
 //!
-//! // Everything comes nearer by two cells: the sensor drove 1.6 m ahead.
-//! let (mut earlier, mut later) = (vec![0.0_f32; n * n], vec![0.0_f32; n * n]);
+//! // All scatterers come nearer by two cells: the sensor drove 1.6 m ahead.
+//! let (mut earlier, mut later) = (Array2::zeros((n, n)), Array2::zeros((n, n)));
 //! for (row, col) in [(30, 40), (41, 75), (48, 52), (70, 90), (85, 33), (92, 61)] {
-//!     earlier[row * n + col] = 1.0;
-//!     later[(row + 2) * n + col] = 1.0;
+//!     earlier[[row, col]] = 1.0_f32;
+//!     later[[row + 2, col]] = 1.0_f32;
 //! }
 //!
-//! rotation.spectrum(&earlier, &mut earlier_spectrum)?;
-//! rotation.spectrum(&later, &mut later_spectrum)?;
+//! rotation.spectrum(earlier.view(), &mut earlier_spectrum)?;
+//! rotation.spectrum(later.view(), &mut later_spectrum)?;
 //! let angle = rotation.search(&later_spectrum, &earlier_spectrum)?;
-//! let motion = translation.search(&later, &earlier, &angle)?;
+//! let motion = translation.search(later.view(), earlier.view(), &angle)?;
 //! assert!((motion.x_m - 1.6).abs() < 0.01 && motion.y_m.abs() < 0.01);
 //! # Ok(())
 //! # }
@@ -55,45 +59,92 @@ mod polar;
 mod refinement;
 mod rotation;
 mod scores;
+mod sequential;
 mod spectrum;
+mod taper;
 mod translation;
 mod warp;
 mod whiten;
-mod window;
+
+use ndarray::ArrayView2;
 
 pub use config::{
-    ConfigError, Magnitude, Overlap, Peak, RotationConfig, RotationForm, TranslationConfig, Window,
+    ConfigError, Magnitude, Overlap, Peak, RotationConfig, RotationForm, Taper, TranslationConfig,
 };
-pub use exhaustive::{ExhaustiveConfig, ExhaustiveSearch, JointEstimate};
+pub use exhaustive::{ExhaustiveConfig, ExhaustiveSearch, JointMatch};
 pub use fft::fast_size;
 pub use refinement::{
-    Anchor, Hypothesis, Keyframe, Memory, Outcome, Refined, Refinement, RefinementConfig,
-    RefinementKind,
+    Anchor, InitialGuess, Keyframe, Outcome, Refined, RefinementConfig, RefinementKind, Refiner,
+    TrackerState,
 };
-pub use rotation::{RotationEstimate, RotationRunnerUp, RotationSearch};
+pub use rotation::{RotationMatch, RotationRunnerUp, RotationSearch};
+pub use sequential::SequentialRotation;
 pub use spectrum::PolarSpectrum;
-pub use translation::{MotionEstimate, MotionRunnerUp, TranslationSearch};
+pub use translation::{MotionMatch, MotionRunnerUp, TranslationSearch};
 
-/// A slice of another length than the search was planned for.
+/// A raster or a spectrum that does not fit the search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{what} has {actual} values: expected {expected}")]
-pub struct ShapeError {
-    /// Which slice.
-    pub what: &'static str,
-    /// Its length.
-    pub actual: usize,
-    /// The length that the search was planned for.
-    pub expected: usize,
+pub enum ShapeError {
+    /// The search was planned for another shape.
+    #[error("{what} is {}: expected {}", by(.actual), by(.expected))]
+    Shape {
+        /// Which input.
+        what: &'static str,
+        /// Its rows and columns.
+        actual: [usize; 2],
+        /// The rows and columns that the search was planned for.
+        expected: [usize; 2],
+    },
+    /// The values are not in standard (row-major, contiguous) layout.
+    #[error("{what} is not in row-major, contiguous layout")]
+    Layout {
+        /// Which input.
+        what: &'static str,
+    },
 }
 
-fn expect_shape(what: &'static str, actual: usize, expected: usize) -> Result<(), ShapeError> {
+fn by([rows, columns]: &[usize; 2]) -> String {
+    format!("{rows} x {columns}")
+}
+
+fn expect_shape(
+    what: &'static str,
+    actual: [usize; 2],
+    expected: [usize; 2],
+) -> Result<(), ShapeError> {
     if actual == expected {
         Ok(())
     } else {
-        Err(ShapeError {
+        Err(ShapeError::Shape {
             what,
             actual,
             expected,
         })
     }
+}
+
+/// Views a slice of n * n cells, row after row, as an `n` x `n` raster.
+///
+/// # Errors
+/// If the slice has another number of cells.
+pub fn square<'a>(
+    what: &'static str,
+    cells: &'a [f32],
+    n: usize,
+) -> Result<ArrayView2<'a, f32>, ShapeError> {
+    ArrayView2::from_shape((n, n), cells).map_err(|_| ShapeError::Shape {
+        what,
+        actual: [1, cells.len()],
+        expected: [n, n],
+    })
+}
+
+/// The cells of an `n` x `n` raster, row after row.
+fn cells<'a>(
+    what: &'static str,
+    raster: &ArrayView2<'a, f32>,
+    n: usize,
+) -> Result<&'a [f32], ShapeError> {
+    expect_shape(what, [raster.nrows(), raster.ncols()], [n, n])?;
+    raster.to_slice().ok_or(ShapeError::Layout { what })
 }

@@ -14,12 +14,12 @@ mod memory;
 mod register;
 mod sweep;
 
-use gyre_geometry::SparsePoint;
-use nalgebra::{Isometry2, Matrix3, Vector3};
+use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion};
+use nalgebra::{Matrix3, Vector3};
 
 pub use config::{RefinementConfig, RefinementKind};
 pub use keyframes::Keyframe;
-pub use memory::{Anchor, Memory};
+pub use memory::{Anchor, TrackerState};
 
 use crate::ConfigError;
 use keyframes::Keyframes;
@@ -57,22 +57,20 @@ pub enum Outcome {
 
 /// What a match started from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Hypothesis {
+pub enum InitialGuess {
     /// The motion before goes on.
     Prediction,
     /// The search's motion.
     Search,
     /// The prediction turned to one side, tried when nothing else fitted.
-    Fan,
+    YawOffset,
 }
 
 /// The refined motion: pose of the later scan's frame in the earlier one's.
 #[derive(Debug, Clone, Copy)]
 pub struct Refined {
-    /// x forward, y left (m), yaw counter-clockwise (rad).
-    pub motion: Isometry2<f64>,
-    /// Of (x, y, yaw): m^2, m rad, rad^2.
-    pub covariance: Matrix3<f64>,
+    /// The motion, and its covariance of (x, y, yaw).
+    pub motion: UncertainMotion,
     /// Mean of the map under the points, 0 to 1.
     pub overlap: f64,
     /// The points' weight, as a share of what is usual.
@@ -80,15 +78,15 @@ pub struct Refined {
     /// How it came about.
     pub outcome: Outcome,
     /// What the accepted match started from; the prediction where there is none.
-    pub hypothesis: Hypothesis,
+    pub guess: InitialGuess,
 }
 
 /// Refines motions scan by scan; remembers the last keyframes.
 #[derive(Debug)]
-pub struct Refinement {
+pub struct Refiner {
     config: RefinementConfig,
     keyframes: Keyframes,
-    memory: Memory,
+    memory: TrackerState,
     placed: Placed,
 }
 
@@ -97,14 +95,14 @@ pub struct Refinement {
 struct Query<'a> {
     points: &'a [SparsePoint],
     /// Pose in the first scan's frame that the search's motion leads to.
-    searched: Isometry2<f64>,
+    searched: Pose,
     interval_s: f64,
 }
 
 /// A match, what it started from, and what it is worth.
 #[derive(Clone, Copy)]
 struct Candidate {
-    hypothesis: Hypothesis,
+    hypothesis: InitialGuess,
     found: Match,
     overlap: f64,
     support: f64,
@@ -112,7 +110,7 @@ struct Candidate {
     believed: bool,
 }
 
-impl Refinement {
+impl Refiner {
     /// Plans the refinement of scans of at most `capacity` points.
     ///
     /// # Errors
@@ -122,19 +120,19 @@ impl Refinement {
         Ok(Self {
             keyframes: Keyframes::new(config),
             config: config.clone(),
-            memory: Memory::default(),
+            memory: TrackerState::default(),
             placed: Placed::with_capacity(capacity),
         })
     }
 
     /// Forgets all: a chain of motions starts with the next scan.
-    pub fn start(&mut self) {
-        self.memory = Memory::default();
+    pub fn reset(&mut self) {
+        self.memory = TrackerState::default();
         self.keyframes.clear();
     }
 
     /// What the next call depends on besides the keyframes.
-    pub fn memory(&self) -> &Memory {
+    pub fn state(&self) -> &TrackerState {
         &self.memory
     }
 
@@ -149,7 +147,7 @@ impl Refinement {
     }
 
     /// Goes on where another one stood: `load` fills the next keyframe, oldest first, and says whether there was one.
-    pub fn restore(&mut self, memory: Memory, mut load: impl FnMut(&mut Keyframe) -> bool) {
+    pub fn restore(&mut self, memory: TrackerState, mut load: impl FnMut(&mut Keyframe) -> bool) {
         self.keyframes.clear();
         while self.keyframes.push(&mut load) {}
         self.keyframes.stack();
@@ -158,12 +156,12 @@ impl Refinement {
 
     /// The motion from the `earlier` scan's points to the `later` one's, which are those of scan number `id`, starting from
     /// what the search found. The earlier points are looked at where there is no map yet.
-    pub fn next(
+    pub fn refine(
         &mut self,
         id: u64,
         later: &[SparsePoint],
         earlier: &[SparsePoint],
-        searched: &Isometry2<f64>,
+        searched: &Pose,
         interval_s: f64,
     ) -> Refined {
         // Stamps that stand still say nothing about velocities: as if a second had passed.
@@ -179,7 +177,7 @@ impl Refinement {
         let mut best = self.best_of(&query, &self.starts(&query));
         if !best.believed {
             let [prediction, _] = self.memory.foretell(interval_s);
-            let fan = FAN.map(|turn| (Hypothesis::Fan, prediction * Isometry2::rotation(turn)));
+            let fan = FAN.map(|turn| (InitialGuess::YawOffset, prediction * Pose::rotation(turn)));
             let other = self.best_of(&query, &fan);
             if other.believed {
                 best = other;
@@ -201,19 +199,19 @@ impl Refinement {
     }
 
     /// Where to start from; the same place again counts once.
-    fn starts(&self, query: &Query<'_>) -> [(Hypothesis, Isometry2<f64>); 3] {
+    fn starts(&self, query: &Query<'_>) -> [(InitialGuess, Pose); 3] {
         let [prediction, before] = self.memory.foretell(query.interval_s);
         [
-            (Hypothesis::Prediction, prediction),
-            (Hypothesis::Search, query.searched),
-            (Hypothesis::Prediction, before),
+            (InitialGuess::Prediction, prediction),
+            (InitialGuess::Search, query.searched),
+            (InitialGuess::Prediction, before),
         ]
     }
 
     /// Descends from each start on the coarse map, and from the best of them on the fine one.
-    fn best_of(&mut self, query: &Query<'_>, starts: &[(Hypothesis, Isometry2<f64>)]) -> Candidate {
+    fn best_of(&mut self, query: &Query<'_>, starts: &[(InitialGuess, Pose)]) -> Candidate {
         let coarse = self.keyframes.coarse();
-        let mut best: Option<(Hypothesis, Match, bool)> = None;
+        let mut best: Option<(InitialGuess, Match, bool)> = None;
         for (k, (hypothesis, start)) in starts.iter().enumerate() {
             if starts[..k]
                 .iter()
@@ -242,14 +240,14 @@ impl Refinement {
             }
         }
         let (hypothesis, pose) = best
-            .map_or((Hypothesis::Prediction, self.memory.pose), |(h, m, _)| {
+            .map_or((InitialGuess::Prediction, self.memory.pose), |(h, m, _)| {
                 (h, m.pose)
             });
         let found = self.fine(query, pose);
         self.judge(query, hypothesis, found)
     }
 
-    fn in_one_valley(&self, a: &Isometry2<f64>, b: &Isometry2<f64>) -> bool {
+    fn in_one_valley(&self, a: &Pose, b: &Pose) -> bool {
         let apart = a.inv_mul(b);
         let cell_m = self.config.cell_m * self.config.coarse;
         apart.translation.vector.norm() <= SAME_VALLEY.0 * cell_m
@@ -257,9 +255,9 @@ impl Refinement {
     }
 
     /// Matches on the fine map, the sweep undone by the motion found so far.
-    fn fine(&mut self, query: &Query<'_>, mut pose: Isometry2<f64>) -> Match {
+    fn fine(&mut self, query: &Query<'_>, mut pose: Pose) -> Match {
         let fine = self.keyframes.fine();
-        let mut round = |pose: &Isometry2<f64>| {
+        let mut round = |pose: &Pose| {
             self.placed.place(
                 query.points,
                 &self.memory.velocity_to(pose, query.interval_s),
@@ -272,20 +270,19 @@ impl Refinement {
         round(&pose)
     }
 
-    fn judge(&self, query: &Query<'_>, hypothesis: Hypothesis, found: Match) -> Candidate {
+    fn judge(&self, query: &Query<'_>, hypothesis: InitialGuess, found: Match) -> Candidate {
         let weight = self.placed.total_weight();
         let overlap = if weight > 0.0 {
             found.normal.overlap / weight
         } else {
             0.0
         };
-        let support = if self.memory.usual_weight > 0.0 {
-            weight / self.memory.usual_weight
+        let support = if self.memory.mean_weight > 0.0 {
+            weight / self.memory.mean_weight
         } else {
             1.0
         };
-        let fits =
-            overlap > 0.0 && overlap >= self.config.least_overlap * self.memory.usual_overlap;
+        let fits = overlap > 0.0 && overlap >= self.config.min_overlap * self.memory.mean_overlap;
         let allowed = self.memory.allows(
             &found.pose,
             query.interval_s,
@@ -327,7 +324,7 @@ impl Refinement {
             }
         };
         let hypothesis = if outcome == Outcome::Predicted {
-            Hypothesis::Prediction
+            InitialGuess::Prediction
         } else {
             hypothesis
         };
@@ -339,19 +336,21 @@ impl Refinement {
             query.interval_s,
             &self.config,
         );
-        if self.memory.unmatched >= self.config.patience {
+        if self.memory.unmatched >= self.config.max_unmatched {
             // The next scan is compared with this one alone, and the one after that with the next, until two are alike.
             self.keyframes.clear();
         } else if outcome == Outcome::Refined && self.keyframes.is_far(&pose, &self.config) {
             self.draw(id, query.points, &pose, &velocity);
         }
         Refined {
-            motion: before.inv_mul(&pose),
-            covariance,
+            motion: UncertainMotion {
+                motion: before.inv_mul(&pose),
+                covariance,
+            },
             overlap,
             support,
             outcome,
-            hypothesis,
+            guess: hypothesis,
         }
     }
 
@@ -361,8 +360,8 @@ impl Refinement {
         let apart = query.searched.inv_mul(&candidate.found.pose);
         let agrees = apart.translation.vector.norm() <= config.search_agrees_m
             && apart.rotation.angle().abs() <= config.search_agrees_deg.to_radians();
-        let fits = candidate.overlap >= config.firm_overlap * self.memory.usual_overlap;
-        let firm = fits && agrees && candidate.support >= config.least_support;
+        let fits = candidate.overlap >= config.firm_overlap * self.memory.mean_overlap;
+        let firm = fits && agrees && candidate.support >= config.min_support;
         let firm = firm || self.memory.doubtful >= MOST_DOUBTFUL;
         if firm {
             Outcome::Refined
@@ -394,13 +393,7 @@ impl Refinement {
             .then_some(covariance)
     }
 
-    fn draw(
-        &mut self,
-        id: u64,
-        points: &[SparsePoint],
-        pose: &Isometry2<f64>,
-        velocity: &Vector3<f64>,
-    ) {
+    fn draw(&mut self, id: u64, points: &[SparsePoint], pose: &Pose, velocity: &Twist) {
         self.placed.place(points, velocity);
         self.keyframes.draw(id, &self.placed, pose);
     }

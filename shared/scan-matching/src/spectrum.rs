@@ -1,18 +1,18 @@
-//! What a rotation search keeps of one scan.
+//! The part of a scan that a rotation search keeps.
 
+use ndarray::ArrayView2;
 use rustfft::num_complex::Complex32;
 
 use crate::{ShapeError, expect_shape, kernels};
 
-/// The polar magnitude spectrum of one scan, transformed along the angle: all that a rotation search needs of it.
+/// The polar magnitude spectrum of one scan, transformed along the angle: all that a rotation search needs of the scan.
 ///
-/// Row after row of `harmonics()` values, one row a radius (a single one for `line14`). Harmonic 0, the mean over
-/// the angle, is zero.
+/// Radius x harmonic. Harmonic 0, the mean over the angle, is zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PolarSpectrum {
     angles: usize,
     pub(crate) data: Vec<Complex32>,
-    /// Sum of squares over all angles and radii, times the number of angles; 0 where it is no number.
+    /// Sum of squares over all angles and radii, times the number of angles; 0 if that is not finite.
     pub(crate) energy: f64,
 }
 
@@ -25,36 +25,26 @@ impl PolarSpectrum {
         }
     }
 
-    /// Refuses a spectrum of another shape.
-    pub(crate) fn expect(&self, angles: usize, radii: usize) -> Result<(), ShapeError> {
-        expect_shape("polar spectrum's angle", self.angles, angles)?;
-        expect_shape("polar spectrum", self.data.len(), radii * self.harmonics())
+    /// Refuses a spectrum of another number of radii or angles.
+    pub(crate) fn expect(&self, radii: usize, angles: usize) -> Result<(), ShapeError> {
+        let actual = [self.radii(), self.angles];
+        expect_shape("polar spectrum (radii x angles)", actual, [radii, angles])
     }
 
-    /// Number of harmonics a radius: `angles / 2 + 1`.
-    pub fn harmonics(&self) -> usize {
-        self.angles / 2 + 1
-    }
-
-    /// Number of radii.
+    /// Returns the number of radii; 1 for `line14`.
     pub fn radii(&self) -> usize {
         self.data.len() / self.harmonics()
     }
 
-    /// The spectrum, radius after radius.
-    pub fn as_slice(&self) -> &[Complex32] {
-        &self.data
+    /// Returns the number of harmonics along the angle at each radius: `angles / 2 + 1`.
+    pub fn harmonics(&self) -> usize {
+        self.angles / 2 + 1
     }
 
-    /// Takes over a spectrum that [`as_slice`](Self::as_slice) gave elsewhere.
-    ///
-    /// # Errors
-    /// Where the length differs.
-    pub fn copy_from_slice(&mut self, data: &[Complex32]) -> Result<(), ShapeError> {
-        expect_shape("polar spectrum", data.len(), self.data.len())?;
-        self.data.copy_from_slice(data);
-        self.measure();
-        Ok(())
+    /// Returns the spectrum, radius x harmonic.
+    pub fn view(&self) -> ArrayView2<'_, Complex32> {
+        ArrayView2::from_shape((self.radii(), self.harmonics()), &self.data)
+            .expect("the data are planned as radii x harmonics")
     }
 
     /// Energy over all angles and radii: each harmonic stands for its mirror image too, but for the highest of an even

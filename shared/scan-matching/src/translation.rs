@@ -1,6 +1,7 @@
 //! The shift between two scans whose angle is known, and the whole motion.
 
 use nalgebra::{Matrix3, Rotation2, Vector2};
+use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{ConfigError, TranslationConfig, reach_cells};
@@ -8,10 +9,10 @@ use crate::covariance::{guess, motion_covariance, shift_covariance};
 use crate::fft::{PairSpectrum, fast_size};
 use crate::overlap::OverlapEnergy;
 use crate::peak::PlanePeak;
-use crate::rotation::RotationEstimate;
+use crate::rotation::RotationMatch;
 use crate::scores::{Scores, Shift};
 use crate::warp::Rotation;
-use crate::{ShapeError, expect_shape, kernels, whiten};
+use crate::{ShapeError, cells, kernels, whiten};
 
 /// Another shift that matches nearly as well.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -26,7 +27,7 @@ pub struct MotionRunnerUp {
 
 /// Pose of the later scan's frame in the earlier scan's frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct MotionEstimate {
+pub struct MotionMatch {
     /// Forward, m.
     pub x_m: f64,
     /// Left, m.
@@ -88,15 +89,15 @@ impl TranslationSearch {
     /// Rasters are n x n, row 0 far ahead, column 0 far left. Values that are not finite count as zero.
     ///
     /// # Errors
-    /// Where a raster is not of this search's shape.
+    /// If a raster is not n x n in standard layout.
     pub fn search(
         &mut self,
-        later: &[f32],
-        earlier: &[f32],
-        rotation: &RotationEstimate,
-    ) -> Result<MotionEstimate, ShapeError> {
-        expect_shape("later raster", later.len(), self.n * self.n)?;
-        expect_shape("earlier raster", earlier.len(), self.n * self.n)?;
+        later: ArrayView2<'_, f32>,
+        earlier: ArrayView2<'_, f32>,
+        rotation: &RotationMatch,
+    ) -> Result<MotionMatch, ShapeError> {
+        let later = cells("later raster", &later, self.n)?;
+        let earlier = cells("earlier raster", &earlier, self.n)?;
         kernels::finite_copy(later, &mut self.later);
         self.later_energy.measure(&self.later);
         let straight = self.at_angle(earlier, rotation.angle_rad, rotation.variance_rad2);
@@ -106,7 +107,7 @@ impl TranslationSearch {
         let other = opposite(rotation.angle_rad);
         let reversed = self.at_angle(earlier, other, rotation.variance_rad2);
         Ok(if reversed.score > straight.score {
-            MotionEstimate {
+            MotionMatch {
                 half_turn: true,
                 ..reversed
             }
@@ -116,7 +117,7 @@ impl TranslationSearch {
     }
 
     /// The motion if the angle is `angle_rad`.
-    fn at_angle(&mut self, earlier: &[f32], angle_rad: f64, variance_rad2: f64) -> MotionEstimate {
+    fn at_angle(&mut self, earlier: &[f32], angle_rad: f64, variance_rad2: f64) -> MotionMatch {
         self.turn(earlier, angle_rad); // line 16
         self.turned_energy.measure(&self.turned);
         let energy = (self.later_energy.total() * self.turned_energy.total()).sqrt();
@@ -198,7 +199,7 @@ impl TranslationSearch {
         runner_up: Option<(Shift, f64)>,
         angle_rad: f64,
         variance_rad2: f64,
-    ) -> MotionEstimate {
+    ) -> MotionMatch {
         let turn = Rotation2::new(angle_rad);
         let translation = turn * shift * -self.cell_m;
         let score = peak.value.min(1.0);
@@ -210,7 +211,7 @@ impl TranslationSearch {
             self.cell_m,
             guess,
         );
-        MotionEstimate {
+        MotionMatch {
             x_m: translation.x,
             y_m: translation.y,
             yaw_rad: angle_rad,
@@ -235,9 +236,9 @@ impl TranslationSearch {
         turn * Vector2::new(centre.y, -centre.x)
     }
 
-    fn no_match(&self, angle_rad: f64, variance_rad2: f64) -> MotionEstimate {
+    fn no_match(&self, angle_rad: f64, variance_rad2: f64) -> MotionMatch {
         let guess = guess(self.config.reach_m);
-        MotionEstimate {
+        MotionMatch {
             x_m: 0.0,
             y_m: 0.0,
             yaw_rad: angle_rad,

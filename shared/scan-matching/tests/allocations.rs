@@ -54,10 +54,12 @@ fn searches_allocate_nothing_after_construction() {
         let mut translation = TranslationSearch::new(n, cell_m, &config).unwrap();
         let (mut f, mut g) = (rotation.new_spectrum(), rotation.new_spectrum());
         let before = ALLOCATIONS.with(Cell::get);
-        rotation.spectrum(&earlier, &mut g).unwrap();
-        rotation.spectrum(&later, &mut f).unwrap();
+        rotation.spectrum(earlier.view(), &mut g).unwrap();
+        rotation.spectrum(later.view(), &mut f).unwrap();
         let angle = rotation.search(&f, &g).unwrap();
-        translation.search(&later, &earlier, &angle).unwrap();
+        translation
+            .search(later.view(), earlier.view(), &angle)
+            .unwrap();
         assert_eq!(
             ALLOCATIONS.with(Cell::get),
             before,
@@ -66,7 +68,7 @@ fn searches_allocate_nothing_after_construction() {
     }
     let mut exhaustive = ExhaustiveSearch::new(n, cell_m, &ExhaustiveConfig::default()).unwrap();
     let before = ALLOCATIONS.with(Cell::get);
-    exhaustive.search(&later, &earlier).unwrap();
+    exhaustive.search(later.view(), earlier.view()).unwrap();
     assert_eq!(ALLOCATIONS.with(Cell::get), before, "exhaustive");
 }
 
@@ -79,10 +81,10 @@ fn the_refinement_allocates_nothing_after_construction() {
         &scenes::Sensor::default(),
     );
     scans[20..30].iter_mut().for_each(Vec::clear); // loses its map, and begins anew
-    let mut refinement = scenes::refinement();
+    let mut refiner = scenes::refiner();
     let before = ALLOCATIONS.with(Cell::get);
     for k in 0..scans.len() - 1 {
-        refinement.next(
+        refiner.refine(
             k as u64 + 1,
             &scans[k + 1],
             &scans[k],
@@ -90,8 +92,8 @@ fn the_refinement_allocates_nothing_after_construction() {
             scenes::SWEEP_S,
         );
     }
-    refinement.start();
-    refinement.next(
+    refiner.reset();
+    refiner.refine(
         1,
         &scans[1],
         &scans[0],

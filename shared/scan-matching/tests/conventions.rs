@@ -4,13 +4,14 @@
 mod common;
 
 use common::{Motion, draw, search};
-use gyre_scan_matching::{RotationEstimate, TranslationConfig, TranslationSearch};
+use gyre_scan_matching::{RotationMatch, TranslationConfig, TranslationSearch};
+use ndarray::Array2;
 
 const CELL_M: f64 = 0.5;
 const N: usize = 101;
 
-fn known_angle(angle_rad: f64) -> RotationEstimate {
-    RotationEstimate {
+fn known_angle(angle_rad: f64) -> RotationMatch {
+    RotationMatch {
         angle_rad,
         variance_rad2: 1e-6,
         score: 1.0,
@@ -19,14 +20,13 @@ fn known_angle(angle_rad: f64) -> RotationEstimate {
 }
 
 /// Brightest cell as (x, y) in metres.
-fn brightest(raster: &[f32]) -> [f64; 2] {
-    let k = (0..raster.len())
-        .max_by(|&a, &b| raster[a].total_cmp(&raster[b]))
-        .unwrap();
+fn brightest(raster: &Array2<f32>) -> [f64; 2] {
+    let cells = raster.indexed_iter();
+    let ((row, col), _) = cells.max_by(|a, b| a.1.total_cmp(b.1)).unwrap();
     let middle = (N - 1) as f64 / 2.0;
     [
-        (middle - (k / N) as f64) * CELL_M,
-        (middle - (k % N) as f64) * CELL_M,
+        (middle - row as f64) * CELL_M,
+        (middle - col as f64) * CELL_M,
     ]
 }
 
@@ -56,7 +56,7 @@ fn drawn_points_lie_where_rows_and_columns_say() {
         ([-5.0, -20.0], 60, 90),
     ] {
         let raster = draw([(point, 1.0)].into_iter(), N, CELL_M, 0.6);
-        assert_eq!(raster[row * N + col], 1.0);
+        assert_eq!(raster[[row, col]], 1.0);
         assert_eq!(brightest(&raster), point);
     }
 }
@@ -79,7 +79,7 @@ fn three_points_give_their_motion_back() {
         let mut translation =
             TranslationSearch::new(N, CELL_M, &TranslationConfig::default()).unwrap();
         let found = translation
-            .search(&later, &earlier, &known_angle(motion.yaw))
+            .search(later.view(), earlier.view(), &known_angle(motion.yaw))
             .unwrap();
         assert!(
             (found.x_m - motion.x).abs() < 0.03 && (found.y_m - motion.y).abs() < 0.03,
@@ -107,7 +107,11 @@ fn what_leaves_at_one_edge_does_not_come_back_at_the_other() {
     };
     let mut translation = TranslationSearch::new(N, CELL_M, &config).unwrap();
     let found = translation
-        .search(&raster(&later), &raster(&earlier), &known_angle(0.0))
+        .search(
+            raster(&later).view(),
+            raster(&earlier).view(),
+            &known_angle(0.0),
+        )
         .unwrap();
     assert!(found.score < 1e-3, "{found:?}");
 }
@@ -123,7 +127,7 @@ fn the_scene_behind_the_lever_moves_with_the_angle() {
     let mut translation = TranslationSearch::new(N, CELL_M, &TranslationConfig::default()).unwrap();
     let mut at = |e: f64| {
         translation
-            .search(&raster, &raster, &known_angle(e))
+            .search(raster.view(), raster.view(), &known_angle(e))
             .unwrap()
     };
     let (plus, minus, middle) = (at(0.01), at(-0.01), at(0.0));

@@ -4,24 +4,25 @@
 mod common;
 
 use common::{Motion, Numbers, draw, pair};
-use gyre_scan_matching::{ExhaustiveConfig, ExhaustiveSearch, JointEstimate, Overlap, Peak};
+use gyre_scan_matching::{ExhaustiveConfig, ExhaustiveSearch, JointMatch, Overlap, Peak};
+use ndarray::{Array2, ArrayView2};
 use proptest::prelude::*;
 
 fn search(
     n: usize,
     cell_m: f64,
     config: &ExhaustiveConfig,
-    earlier: &[f32],
-    later: &[f32],
-) -> JointEstimate {
+    earlier: &Array2<f32>,
+    later: &Array2<f32>,
+) -> JointMatch {
     ExhaustiveSearch::new(n, cell_m, config)
         .unwrap()
-        .search(later, earlier)
+        .search(later.view(), earlier.view())
         .unwrap()
 }
 
 /// Errors (m, m, degrees).
-fn errors(found: &JointEstimate, motion: Motion) -> [f64; 3] {
+fn errors(found: &JointMatch, motion: Motion) -> [f64; 3] {
     let turn = (found.motion.yaw_rad - motion.yaw + std::f64::consts::PI)
         .rem_euclid(std::f64::consts::TAU);
     [
@@ -96,7 +97,8 @@ proptest! {
             ..Default::default()
         };
         let mut exhaustive = ExhaustiveSearch::new(n, 1.0, &config).unwrap();
-        let found = exhaustive.search_around(&f, &g, prior_deg.to_radians()).unwrap().motion;
+        let view = |raster| ArrayView2::from_shape((n, n), raster).unwrap();
+        let found = exhaustive.search_around(view(&f), view(&g), prior_deg.to_radians()).unwrap().motion;
         // Angles are compared by rasters read between the cells, all alike blurred.
         let all = (-2..=2).flat_map(|k| (-3..=3).flat_map(move |i| (-3..=3).map(move |j| (k, [i, j]))));
         let summed = all.map(|(k, s)| (k, s, direct_sum(&f, &g, n, (angle(k), 0.2113), s)));
@@ -230,7 +232,7 @@ fn a_prior_moves_the_middle_of_the_angles() {
     let mut exhaustive = ExhaustiveSearch::new(127, 0.8, &config).unwrap();
     assert_eq!(exhaustive.candidates(), 7);
     let found = exhaustive
-        .search_around(&later, &earlier, 128.4_f64.to_radians())
+        .search_around(later.view(), earlier.view(), 128.4_f64.to_radians())
         .unwrap();
     let [dx, dy, dyaw] = errors(&found, motion);
     assert!(
@@ -298,7 +300,7 @@ fn two_matches_are_both_reported() {
 #[test]
 fn rasters_without_a_match_give_no_motion_and_a_wide_covariance() {
     let (earlier, later) = pair(65, 0.8, Motion::degrees(1.0, 0.0, 2.0), 1);
-    let empty = vec![0.0; 65 * 65];
+    let empty = Array2::zeros((65, 65));
     for (f, g) in [(&empty, &empty), (&later, &empty), (&empty, &earlier)] {
         let found = search(65, 0.8, &ExhaustiveConfig::default(), g, f);
         assert_eq!(
@@ -332,7 +334,7 @@ fn no_value_of_a_cell_makes_a_result_that_is_no_number() {
                 .for_each(|v| *v = bad);
             for config in [ExhaustiveConfig::default(), ExhaustiveConfig::mbym()] {
                 for (f, g) in [(&raster, &earlier), (&earlier, &raster), (&raster, &raster)] {
-                    let JointEstimate { motion, rotation } = search(65, 0.8, &config, g, f);
+                    let JointMatch { motion, rotation } = search(65, 0.8, &config, g, f);
                     let numbers = [
                         rotation.angle_rad,
                         rotation.variance_rad2,
@@ -355,17 +357,18 @@ fn no_value_of_a_cell_makes_a_result_that_is_no_number() {
 fn rasters_of_another_size_and_impossible_reaches_are_refused() {
     let config = ExhaustiveConfig::default();
     let mut exhaustive = ExhaustiveSearch::new(65, 0.8, &config).unwrap();
-    let error = exhaustive.search(&[0.0; 65 * 65], &[0.0; 7]).unwrap_err();
+    let (raster, small) = (Array2::zeros((65, 65)), Array2::zeros((7, 65)));
+    let error = exhaustive.search(raster.view(), small.view()).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "earlier raster has 7 values: expected 4225"
+        "earlier raster is 7 x 65: expected 65 x 65"
     );
     assert!(
         exhaustive
-            .search(&[], &[0.0; 65 * 65])
+            .search(small.view(), raster.view())
             .unwrap_err()
             .to_string()
-            .starts_with("later raster has 0")
+            .starts_with("later raster is 7 x 65")
     );
     let error = ExhaustiveSearch::new(
         65,
@@ -394,9 +397,9 @@ fn results_repeat_to_the_last_bit_whatever_was_searched_before() {
     let (earlier, later) = pair(97, 0.8, Motion::degrees(2.0, -1.0, 5.0), 2);
     let fresh = search(97, 0.8, &ExhaustiveConfig::default(), &earlier, &later);
     let mut used = ExhaustiveSearch::new(97, 0.8, &ExhaustiveConfig::default()).unwrap();
-    let bright = vec![5.0; 97 * 97];
+    let bright = Array2::from_elem((97, 97), 5.0);
     for (f, g) in [(&bright, &later), (&later, &bright), (&earlier, &later)] {
-        used.search(f, g).unwrap();
+        used.search(f.view(), g.view()).unwrap();
     }
-    assert_eq!(used.search(&later, &earlier).unwrap(), fresh);
+    assert_eq!(used.search(later.view(), earlier.view()).unwrap(), fresh);
 }

@@ -7,13 +7,15 @@ use common::{Motion, pair, search};
 use gyre_scan_matching::{
     Peak, RotationConfig, RotationForm, RotationSearch, TranslationConfig, TranslationSearch,
 };
+use ndarray::Array2;
 
 const N: usize = 65;
 const CELL_M: f64 = 0.8;
 
 #[test]
 fn empty_rasters_give_no_motion_and_a_wide_covariance() {
-    let (angle, motion) = search(N, CELL_M, &Default::default(), &[0.0; N * N], &[0.0; N * N]);
+    let empty = Array2::zeros((N, N));
+    let (angle, motion) = search(N, CELL_M, &Default::default(), &empty, &empty);
     assert_eq!(
         (angle.angle_rad, angle.score, angle.runner_up),
         (0.0, 0.0, None)
@@ -95,8 +97,15 @@ fn holes_that_are_not_numbers_cost_little() {
 fn rasters_of_another_size_are_refused_with_both_sizes() {
     let mut rotation = RotationSearch::new(N, &RotationConfig::default()).unwrap();
     let mut spectrum = rotation.new_spectrum();
-    let error = rotation.spectrum(&[0.0; 7], &mut spectrum).unwrap_err();
-    assert_eq!(error.to_string(), "raster has 7 values: expected 4225");
+    let small = Array2::zeros((7, N));
+    let error = rotation.spectrum(small.view(), &mut spectrum).unwrap_err();
+    assert_eq!(error.to_string(), "raster is 7 x 65: expected 65 x 65");
+    let raster = Array2::zeros((N, N));
+    let error = rotation.spectrum(raster.t(), &mut spectrum).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "raster is not in row-major, contiguous layout"
+    );
     let line14 = RotationConfig {
         form: RotationForm::ProfileMean,
         ..RotationConfig::default()
@@ -167,12 +176,17 @@ fn results_repeat_to_the_last_bit() {
     let mut rotation = RotationSearch::new(127, &RotationConfig::default()).unwrap();
     let mut translation = TranslationSearch::new(127, 0.8, &TranslationConfig::default()).unwrap();
     let (mut f, mut g) = (rotation.new_spectrum(), rotation.new_spectrum());
-    let mut once = |between: &[f32]| {
-        rotation.spectrum(between, &mut f).unwrap(); // what was there before leaves no trace
-        rotation.spectrum(&later, &mut f).unwrap();
-        rotation.spectrum(&earlier, &mut g).unwrap();
+    let mut once = |between: &Array2<f32>| {
+        rotation.spectrum(between.view(), &mut f).unwrap(); // what was there before leaves no trace
+        rotation.spectrum(later.view(), &mut f).unwrap();
+        rotation.spectrum(earlier.view(), &mut g).unwrap();
         let angle = rotation.search(&f, &g).unwrap();
-        (angle, translation.search(&later, &earlier, &angle).unwrap())
+        (
+            angle,
+            translation
+                .search(later.view(), earlier.view(), &angle)
+                .unwrap(),
+        )
     };
-    assert_eq!(once(&vec![5.0; 127 * 127]), once(&earlier));
+    assert_eq!(once(&Array2::from_elem((127, 127), 5.0)), once(&earlier));
 }

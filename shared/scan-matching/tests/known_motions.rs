@@ -5,24 +5,18 @@ mod common;
 
 use common::{Motion, Numbers, draw, pair, search};
 use gyre_scan_matching::{
-    MotionEstimate, Overlap, Peak, RotationConfig, RotationForm, TranslationConfig,
+    MotionMatch, Overlap, Peak, RotationConfig, RotationForm, TranslationConfig,
 };
 
 type Configs = (RotationConfig, TranslationConfig);
 
-fn recovered(
-    n: usize,
-    cell_m: f64,
-    configs: &Configs,
-    motion: Motion,
-    seed: u64,
-) -> MotionEstimate {
+fn recovered(n: usize, cell_m: f64, configs: &Configs, motion: Motion, seed: u64) -> MotionMatch {
     let (earlier, later) = pair(n, cell_m, motion, seed);
     search(n, cell_m, configs, &earlier, &later).1
 }
 
 /// Errors (m, m, degrees).
-fn errors(found: &MotionEstimate, motion: Motion) -> [f64; 3] {
+fn errors(found: &MotionMatch, motion: Motion) -> [f64; 3] {
     [
         found.x_m - motion.x,
         found.y_m - motion.y,

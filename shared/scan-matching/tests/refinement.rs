@@ -6,9 +6,9 @@
 mod common;
 
 use common::scenes::*;
-use gyre_geometry::SparsePoint;
-use gyre_scan_matching::{Memory, Outcome, Refinement};
-use nalgebra::{Isometry2, Matrix3, Vector3};
+use gyre_geometry::{Pose, SparsePoint, mirrored as mirror};
+use gyre_scan_matching::{Outcome, Refiner, TrackerState};
+use nalgebra::{Matrix3, Vector3};
 
 const NOISY: Sensor = Sensor {
     noise_m: 0.1,
@@ -114,14 +114,6 @@ fn yaw_drifts_little_where_things_stand_on_one_side_only() {
     assert!(sums.iter().all(|mean| mean.abs() < 0.18), "{sums:?}");
 }
 
-/// The same motion for a vehicle that has left and right exchanged.
-fn mirror(motion: &Isometry2<f64>) -> Isometry2<f64> {
-    Isometry2::new(
-        [motion.translation.x, -motion.translation.y].into(),
-        -motion.rotation.angle(),
-    )
-}
-
 #[test]
 fn mirrored_points_give_the_mirrored_motion() {
     let drive = Drive::steady(10.0, 5.0, 41);
@@ -133,11 +125,11 @@ fn mirrored_points_give_the_mirrored_motion() {
             .iter()
             .map(|scan| scan.iter().map(mirror_point).collect())
             .collect();
-        let (mut one, mut other) = (refinement(), refinement());
+        let (mut one, mut other) = (refiner(), refiner());
         for k in 0..scans.len() - 1 {
             let (id, searched) = (k as u64 + 1, searched(&drive, k));
-            one.next(id, &scans[k + 1], &scans[k], &searched, SWEEP_S);
-            other.next(
+            one.refine(id, &scans[k + 1], &scans[k], &searched, SWEEP_S);
+            other.refine(
                 id,
                 &mirrored[k + 1],
                 &mirrored[k],
@@ -145,13 +137,13 @@ fn mirrored_points_give_the_mirrored_motion() {
                 SWEEP_S,
             );
             if k == 4 {
-                let between = one.memory().pose.inv_mul(&mirror(&other.memory().pose));
+                let between = one.state().pose.inv_mul(&mirror(&other.state().pose));
                 apart.push(
                     between.translation.vector.norm() + 50.0 * between.rotation.angle().abs(),
                 );
             }
         }
-        let yaw = |refinement: &Refinement| refinement.memory().pose.rotation.angle().to_degrees();
+        let yaw = |refiner: &Refiner| refiner.state().pose.rotation.angle().to_degrees();
         sums.push(yaw(&one) + yaw(&other));
     }
     apart.sort_by(f64::total_cmp);
@@ -286,7 +278,7 @@ fn a_doppler_shift_that_is_hidden_spoils_an_accelerating_drive() {
 fn covariances_are_symmetric_and_positive_definite() {
     for drive in [straight(), Drive::steady(8.0, 20.0, 41)] {
         for refined in run(&town(AROUND, 1), &drive, &NOISY).refined {
-            let covariance = refined.covariance;
+            let covariance = refined.motion.covariance;
             assert!(
                 (covariance - covariance.transpose()).norm() <= 1e-12 * covariance.norm(),
                 "{covariance}"
@@ -313,8 +305,9 @@ fn what_all_points_weigh_changes_neither_motions_nor_covariances() {
         })
         .collect();
     let [whole, lighter] =
-        [whole, lighter].map(|scans| refine_on(&mut refinement(), &drive, &scans, 0..20));
+        [whole, lighter].map(|scans| refine_on(&mut refiner(), &drive, &scans, 0..20));
     for (a, b) in whole.iter().zip(&lighter) {
+        let (a, b) = (a.motion, b.motion);
         assert!(
             (a.motion.translation.vector - b.motion.translation.vector).norm() < 1e-3,
             "{} {}",
@@ -345,22 +338,22 @@ fn a_corridor_leaves_its_axis_uncertain() {
     let scans = scans(&scene, &drive, &NOISY);
     for yaw in [0.0, 0.5, std::f64::consts::FRAC_PI_2] {
         // The covariance is in the vehicle's frame: where the corridor leads in the world does not matter.
-        let mut refinement = refinement();
-        refinement.restore(
-            Memory {
-                pose: Isometry2::rotation(yaw),
-                ..Memory::default()
+        let mut refiner = refiner();
+        refiner.restore(
+            TrackerState {
+                pose: Pose::rotation(yaw),
+                ..TrackerState::default()
             },
             |_| false,
         );
         let run = Run {
             drive,
-            refined: refine_on(&mut refinement, &drive, &scans, 0..40),
+            refined: refine_on(&mut refiner, &drive, &scans, 0..40),
         };
         let mean = |k: usize| {
             run.refined
                 .iter()
-                .map(|refined| refined.covariance[(k, k)])
+                .map(|refined| refined.motion.covariance[(k, k)])
                 .sum::<f64>()
                 / 40.0
         };

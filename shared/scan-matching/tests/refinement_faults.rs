@@ -4,9 +4,8 @@
 mod common;
 
 use common::{Numbers, scenes::*};
-use gyre_geometry::SparsePoint;
-use gyre_scan_matching::{Outcome, Refined, Refinement, RefinementConfig};
-use nalgebra::Isometry2;
+use gyre_geometry::{Pose, SparsePoint};
+use gyre_scan_matching::{Outcome, Refined, RefinementConfig, Refiner};
 
 const NOISY: Sensor = Sensor {
     noise_m: 0.1,
@@ -28,7 +27,7 @@ fn bend() -> (Drive, Vec<Vec<SparsePoint>>) {
 /// Points that have nothing to do with the scene.
 fn noise(seed: u64) -> Vec<SparsePoint> {
     let mut numbers = Numbers(seed);
-    let mut point = || {
+    let mut values = || {
         [
             numbers.within(65.0),
             numbers.within(65.0),
@@ -37,12 +36,12 @@ fn noise(seed: u64) -> Vec<SparsePoint> {
             0.0,
         ]
     };
-    (0..900).map(|_| point().map(|v| v as f32).into()).collect()
+    (0..900).map(|_| point(values())).collect()
 }
 
 fn bits(refined: &[Refined]) -> Vec<u64> {
     let numbers = |refined: &Refined| {
-        let motion = &refined.motion;
+        let motion = &refined.motion.motion;
         let pose = [
             motion.translation.x,
             motion.translation.y,
@@ -51,11 +50,11 @@ fn bits(refined: &[Refined]) -> Vec<u64> {
         ];
         let mut numbers = [
             pose.as_slice(),
-            refined.covariance.as_slice(),
+            refined.motion.covariance.as_slice(),
             &[refined.overlap, refined.support],
         ]
         .concat();
-        numbers.push(f64::from(refined.outcome as u8) + 0.1 * f64::from(refined.hypothesis as u8));
+        numbers.push(f64::from(refined.outcome as u8) + 0.1 * f64::from(refined.guess as u8));
         numbers
     };
     refined.iter().flat_map(numbers).map(f64::to_bits).collect()
@@ -64,7 +63,7 @@ fn bits(refined: &[Refined]) -> Vec<u64> {
 /// Numbers that a vehicle's motion can have.
 #[track_caller]
 fn sane(refined: &Refined) {
-    let (motion, covariance) = (refined.motion, refined.covariance);
+    let (motion, covariance) = (refined.motion.motion, refined.motion.covariance);
     let sane = motion.translation.vector.iter().all(|v| v.abs() < 10.0)
         && motion.rotation.angle().abs() < 1.0
         && covariance.iter().all(|v| v.is_finite())
@@ -124,22 +123,22 @@ fn a_fault_of_one_scan_passes() {
 fn after_enough_scans_of_noise_the_map_begins_anew() {
     const FIRST: usize = 29;
     const RECOVERED: usize = 10;
-    let patience = RefinementConfig::default().patience as usize;
+    let patience = RefinementConfig::default().max_unmatched as usize;
     let (drive, good) = bend();
     for seed in 0..4 {
         let mut scans = good.clone();
         (0..patience).for_each(|k| scans[FIRST + 1 + k] = noise(100 * seed + k as u64));
-        let (mut refinement, last) = (refinement(), FIRST + patience - 1);
-        let mut refined = refine_on(&mut refinement, &drive, &scans, 0..last);
-        assert!(refinement.keyframes().count() > 0);
-        refined.extend(refine_on(&mut refinement, &drive, &scans, last..last + 1));
-        assert_eq!(refinement.keyframes().count(), 0);
+        let (mut refiner, last) = (refiner(), FIRST + patience - 1);
+        let mut refined = refine_on(&mut refiner, &drive, &scans, 0..last);
+        assert!(refiner.keyframes().count() > 0);
+        refined.extend(refine_on(&mut refiner, &drive, &scans, last..last + 1));
+        assert_eq!(refiner.keyframes().count(), 0);
         assert!(
             refined[FIRST..]
                 .iter()
                 .all(|refined| refined.outcome == Outcome::Predicted)
         );
-        refined.extend(refine_on(&mut refinement, &drive, &scans, last + 1..59));
+        refined.extend(refine_on(&mut refiner, &drive, &scans, last + 1..59));
         let run = Run { drive, refined };
         let (whole, after) = (run.errors(), run.errors_from(last + 1 + RECOVERED));
         println!("after {after:.3?}, whole {whole:.3?}");
@@ -161,10 +160,10 @@ fn nothing_that_points_may_hold_makes_a_motion_that_is_no_number() {
     let (drive, good) = bend();
     let faults: [(&str, Vec<SparsePoint>); 5] = [
         ("none", Vec::new()),
-        ("nan", vec![[f32::NAN; 5].into(); 500]),
+        ("nan", vec![point([f64::NAN; 5]); 500]),
         (
             "infinite",
-            vec![[f32::INFINITY, 1.0, 0.0, 1.0, 0.0].into(); 500],
+            vec![point([f64::INFINITY, 1.0, 0.0, 1.0, 0.0]); 500],
         ),
         (
             "weightless",
@@ -173,7 +172,7 @@ fn nothing_that_points_may_hold_makes_a_motion_that_is_no_number() {
                 .map(|p| SparsePoint { weight: 0.0, ..*p })
                 .collect(),
         ),
-        ("at the sensor", vec![SparsePoint::default(); 500]),
+        ("at the sensor", vec![point([0.0; 5]); 500]),
     ];
     for (name, fault) in faults {
         // In the middle of a drive, from its beginning, and nothing else at all.
@@ -215,16 +214,16 @@ fn a_few_points_that_are_no_numbers_cost_little() {
 fn stamps_that_stand_still_do_no_harm() {
     let (drive, scans) = bend();
     for interval_s in [0.0, -1.0, f64::NAN] {
-        let mut refinement = refinement();
-        let mut refined = refine_on(&mut refinement, &drive, &scans, 0..20);
-        refined.push(refinement.next(
+        let mut refiner = refiner();
+        let mut refined = refine_on(&mut refiner, &drive, &scans, 0..20);
+        refined.push(refiner.refine(
             21,
             &scans[21],
             &scans[20],
             &searched(&drive, 20),
             interval_s,
         ));
-        refined.extend(refine_on(&mut refinement, &drive, &scans, 21..59));
+        refined.extend(refine_on(&mut refiner, &drive, &scans, 21..59));
         let run = Run { drive, refined };
         run.refined.iter().for_each(sane);
         println!("interval {interval_s}: {:.3?}", run.errors());
@@ -242,9 +241,9 @@ fn identical_input_gives_identical_bits() {
     let once = refine(&drive, &scans);
     assert_eq!(bits(&once.refined), bits(&refine(&drive, &scans).refined));
     // What was there before a start leaves no trace.
-    let mut again = refinement();
+    let mut again = refiner();
     refine_on(&mut again, &drive, &scans, 10..40);
-    again.start();
+    again.reset();
     assert_eq!(
         bits(&once.refined),
         bits(&refine_on(&mut again, &drive, &scans, 0..59))
@@ -252,18 +251,18 @@ fn identical_input_gives_identical_bits() {
 }
 
 /// A refinement that knows what another one does, and has known something else before.
-fn restored(from: &Refinement, mut into: Refinement) -> Refinement {
+fn restored(from: &Refiner, mut into: Refiner) -> Refiner {
     let mut keyframes = from.keyframes();
-    into.restore(*from.memory(), |to| {
+    into.restore(*from.state(), |to| {
         let Some(from) = keyframes.next() else {
             return false;
         };
         (to.id, to.pose) = (from.id, from.pose);
-        for ((corner, cells), (from_corner, from_cells)) in
+        for ((corner, mut cells), (from_corner, from_cells)) in
             to.images_mut().into_iter().zip(from.images())
         {
-            *corner = *from_corner;
-            cells.copy_from_slice(from_cells);
+            *corner = from_corner;
+            cells.assign(&from_cells);
         }
         true
     });
@@ -275,10 +274,10 @@ fn a_restored_refinement_goes_on_bit_for_bit() {
     let (drive, mut scans) = bend();
     scans[31] = noise(2); // with doubts remembered
     for cut in [1, 7, 31, 45] {
-        let (mut one, mut used) = (refinement(), refinement());
+        let (mut one, mut used) = (refiner(), refiner());
         refine_on(&mut one, &drive, &scans, 0..cut);
         refine_on(&mut used, &drive, &scans, 5..25);
-        let mut others = [restored(&one, refinement()), restored(&one, used)];
+        let mut others = [restored(&one, refiner()), restored(&one, used)];
         let expected = bits(&refine_on(&mut one, &drive, &scans, cut..59));
         for other in &mut others {
             assert_eq!(
@@ -293,11 +292,9 @@ fn a_restored_refinement_goes_on_bit_for_bit() {
 #[test]
 fn a_chain_begins_at_the_first_scan_of_any_number() {
     let (drive, scans) = bend();
-    let mut refinement = refinement();
-    let refined = refinement.next(0, &scans[1], &scans[0], &searched(&drive, 0), SWEEP_S);
+    let mut refiner = refiner();
+    let refined = refiner.refine(0, &scans[1], &scans[0], &searched(&drive, 0), SWEEP_S);
     sane(&refined);
-    let off = drive.pose(1).inv_mul(&refined.motion);
-    assert!(
-        off.translation.vector.norm() < 0.2 && refinement.memory().pose != Isometry2::identity()
-    );
+    let off = drive.pose(1).inv_mul(&refined.motion.motion);
+    assert!(off.translation.vector.norm() < 0.2 && refiner.state().pose != Pose::identity());
 }

@@ -6,10 +6,10 @@ mod common;
 
 use std::f64::consts::TAU;
 
-use common::scenes::posts;
-use gyre_geometry::SparsePoint;
-use gyre_scan_matching::{Outcome, Refined, Refinement, RefinementConfig};
-use nalgebra::{Isometry2, Point2, Rotation2, Vector2};
+use common::scenes::{point, posts};
+use gyre_geometry::{Pose, SparsePoint};
+use gyre_scan_matching::{Outcome, Refined, RefinementConfig, Refiner};
+use nalgebra::{Point2, Rotation2, Vector2};
 
 const SWEEP_S: f64 = 1.0;
 const SPEED_MPS: f64 = 4.4;
@@ -23,12 +23,12 @@ const RANGE_M: std::ops::Range<f64> = 5.0..70.0;
 const SEARCH_OFF: [f64; 3] = [0.4, -0.3, 0.07];
 
 /// A straight street, a right bend, a straight street.
-fn pose(time_s: f64) -> Isometry2<f64> {
+fn pose(time_s: f64) -> Pose {
     let arc = |time_s: f64, rate: f64| {
         let turn = rate * time_s;
         let half = 0.5 * turn;
         let chord = SPEED_MPS * time_s * if half == 0.0 { 1.0 } else { half.sin() / half };
-        Isometry2::new(Rotation2::new(half) * Vector2::new(chord, 0.0), turn)
+        Pose::new(Rotation2::new(half) * Vector2::new(chord, 0.0), turn)
     };
     let in_bend_s = time_s.clamp(BEND_S[0], BEND_S[1]) - BEND_S[0];
     arc(time_s.min(BEND_S[0]), 0.0) * arc(in_bend_s, RATE) * arc((time_s - BEND_S[1]).max(0.0), 0.0)
@@ -44,12 +44,12 @@ fn scan(posts: &[Point2<f64>], k: usize) -> Vec<SparsePoint> {
         }
         RANGE_M
             .contains(&place.coords.norm())
-            .then(|| [place.x as f32, place.y as f32, time_s as f32, 1.0, 0.0].into())
+            .then(|| point([place.x, place.y, time_s, 1.0, 0.0]))
     };
     posts.iter().filter_map(see).collect()
 }
 
-fn true_motion(k: usize) -> Isometry2<f64> {
+fn true_motion(k: usize) -> Pose {
     pose((k - 1) as f64 * SWEEP_S).inv_mul(&pose(k as f64 * SWEEP_S))
 }
 
@@ -60,11 +60,11 @@ fn refined(seed: u64) -> Vec<Refined> {
         acceleration_mps2: 2.0,
         yaw_acceleration_degps2: 35.0,
         firm_overlap: 0.5,
-        least_overlap: 0.3,
+        min_overlap: 0.3,
         reach_m: 80.0,
         ..RefinementConfig::default()
     };
-    let mut refinement = Refinement::new(&config, 2048).unwrap();
+    let mut refiner = Refiner::new(&config, 2048).unwrap();
     let posts: Vec<_> = posts([[-80.0, 130.0], [-120.0, 80.0]], 60.0, seed)
         .iter()
         .map(|p| p.from.into())
@@ -72,8 +72,8 @@ fn refined(seed: u64) -> Vec<Refined> {
     let scans: Vec<_> = (0..SCANS).map(|k| scan(&posts, k)).collect();
     let [x, y, turn] = SEARCH_OFF;
     let next = |k: usize| {
-        let searched = true_motion(k) * Isometry2::new(Vector2::new(x, y), turn);
-        refinement.next(k as u64, &scans[k], &scans[k - 1], &searched, SWEEP_S)
+        let searched = true_motion(k) * Pose::new(Vector2::new(x, y), turn);
+        refiner.refine(k as u64, &scans[k], &scans[k - 1], &searched, SWEEP_S)
     };
     (1..SCANS).map(next).collect()
 }
@@ -83,17 +83,17 @@ fn refined(seed: u64) -> Vec<Refined> {
 #[test]
 fn a_bend_that_begins_between_two_scans_is_followed() {
     for seed in 1..=6 {
-        let mut end = Isometry2::identity();
+        let mut end = Pose::identity();
         for (k, refined) in (1..).zip(refined(seed)) {
-            let off = true_motion(k).inv_mul(&refined.motion);
+            let off = true_motion(k).inv_mul(&refined.motion.motion);
             let turned = off.rotation.angle().to_degrees();
             assert_ne!(refined.outcome, Outcome::Predicted, "seed {seed}, scan {k}");
             assert!(
                 turned.abs() < 2.6,
                 "seed {seed}, scan {k}: {turned:.2} degrees off, from {:?}",
-                refined.hypothesis
+                refined.guess
             );
-            end *= refined.motion;
+            end *= refined.motion.motion;
         }
         let shift_m = pose((SCANS - 1) as f64 * SWEEP_S)
             .inv_mul(&end)

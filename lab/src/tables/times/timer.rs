@@ -6,7 +6,7 @@ use gyre_geometry::SparsePoint;
 use gyre_masking::{MaskKind, Masker, MaskingConfig, Sweep};
 use gyre_messages::{MaskedHeader, MotionEstimate, Pair};
 use gyre_radar::OwnedScan;
-use gyre_scan_matching::{ConfigError, Refinement, RefinementKind};
+use gyre_scan_matching::{ConfigError, RefinementKind, Refiner as Matcher};
 
 use super::{Median, learned::Learned};
 use crate::tables::{Sequence, models::Model, rows::Row};
@@ -169,7 +169,7 @@ fn prepare(configuration: &Configuration, scans: &[OwnedScan]) -> Result<Prepare
 
 /// The refinement of a configuration, with the points and the times of the scans.
 struct Refiner {
-    refinement: Refinement,
+    refinement: Matcher,
     points: Vec<Vec<SparsePoint>>,
     stamps_ns: Vec<i64>,
 }
@@ -184,7 +184,7 @@ impl Refiner {
         if configuration.refinement.kind == RefinementKind::None {
             return Ok(None);
         }
-        let refinement = Refinement::new(&configuration.refinement, configuration.points.capacity)?;
+        let refinement = Matcher::new(&configuration.refinement, configuration.points.capacity)?;
         let stamps_ns = scans.iter().map(|scan| scan.geometry.stamp_ns).collect();
         Ok(Some(Self {
             refinement,
@@ -197,7 +197,7 @@ impl Refiner {
     /// there.
     fn next(&mut self, seq: u64, later: usize, motion: &MotionEstimate) {
         let Some(earlier) = later.checked_sub(1) else {
-            return self.refinement.start();
+            return self.refinement.reset();
         };
         let interval_ns = self.stamps_ns[later].saturating_sub(self.stamps_ns[earlier]);
         let motion = MotionEstimate {

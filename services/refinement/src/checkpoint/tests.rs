@@ -39,14 +39,14 @@ fn scan(metres: f64) -> Vec<SparsePoint> {
 
 /// A process of the stage: what it knows, and the file it shares with the processes before and after.
 struct Life {
-    refinement: Refinement,
+    refinement: Refiner,
     checkpoint: Checkpoint,
     next: Option<u64>,
 }
 
 impl Life {
     fn begin(path: &Path) -> Self {
-        let refinement = Refinement::new(&config(), 100).unwrap();
+        let refinement = Refiner::new(&config(), 100).unwrap();
         let checkpoint = Checkpoint::open(
             path,
             WINDOW,
@@ -78,14 +78,15 @@ impl Life {
         self.next = Some(item + 1);
         let motion = match item.checked_sub(1) {
             None => {
-                self.refinement.start();
+                self.refinement.reset();
                 Isometry2::identity()
             }
             Some(before) => {
                 let [later, earlier] = [item, before].map(|k| scan(k as f64 * speed));
                 let searched = Isometry2::new(Vector2::new(speed, 0.0), 0.0);
                 self.refinement
-                    .next(item, &later, &earlier, &searched, INTERVAL_S)
+                    .refine(item, &later, &earlier, &searched, INTERVAL_S)
+                    .motion
                     .motion
             }
         };

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::{ConfigError, accept, positive};
 
-/// Configuration of [`Refinement`](crate::Refinement): section `[refinement]`.
+/// Configuration of [`Refiner`](crate::Refiner): section `[refinement]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RefinementConfig {
@@ -31,17 +31,17 @@ pub struct RefinementConfig {
     /// ... and degrees.
     pub jitter_deg: f64,
     /// A match that overlaps the map by less than this share of what is usual is not believed.
-    pub least_overlap: f64,
+    pub min_overlap: f64,
     /// A match is used, but its scan kept out of the map, where it overlaps the map by less than this share of what is usual, ...
     pub firm_overlap: f64,
     /// ... where its points weigh less than this share of what is usual, ...
-    pub least_support: f64,
+    pub min_support: f64,
     /// ... or where the search says otherwise by more than this, m ...
     pub search_agrees_m: f64,
     /// ... or degrees.
     pub search_agrees_deg: f64,
     /// After so many scans in a row that matched nothing, the map begins anew.
-    pub patience: u32,
+    pub max_unmatched: u32,
     /// Covariance = this x mean weight of the points x mean squared residual x inverse information matrix ...
     pub variance_scale: f64,
     /// ... and this standard deviation of the heading besides, degrees: no antenna turns quite evenly.
@@ -73,12 +73,12 @@ impl Default for RefinementConfig {
             yaw_acceleration_degps2: 90.0,
             jitter_m: 0.8,
             jitter_deg: 3.0,
-            least_overlap: 0.5,
+            min_overlap: 0.5,
             firm_overlap: 0.7,
             search_agrees_m: 2.0,
             search_agrees_deg: 6.0,
-            least_support: 0.6,
-            patience: 5,
+            min_support: 0.6,
+            max_unmatched: 5,
             variance_scale: 0.7,
             yaw_sigma_deg: 0.19,
         }
@@ -121,9 +121,9 @@ impl RefinementConfig {
         )?;
         let share = "a share, 0 to 1";
         check(
-            (0.0..=1.0).contains(&self.least_overlap),
-            "least_overlap",
-            &self.least_overlap,
+            (0.0..=1.0).contains(&self.min_overlap),
+            "min_overlap",
+            &self.min_overlap,
             share,
         )?;
         check(
@@ -133,9 +133,9 @@ impl RefinementConfig {
             share,
         )?;
         check(
-            (0.0..=1.0).contains(&self.least_support),
-            "least_support",
-            &self.least_support,
+            (0.0..=1.0).contains(&self.min_support),
+            "min_support",
+            &self.min_support,
             share,
         )?;
         for (key, value) in [

@@ -2,7 +2,8 @@
 
 use std::collections::VecDeque;
 
-use nalgebra::Isometry2;
+use gyre_geometry::Pose;
+use ndarray::{ArrayView2, ArrayViewMut2};
 
 use super::{
     RefinementConfig,
@@ -16,26 +17,23 @@ pub struct Keyframe {
     /// Number of its scan.
     pub id: u64,
     /// Its pose in the first scan's frame.
-    pub pose: Isometry2<f64>,
+    pub pose: Pose,
     fine: Image,
     coarse: Image,
 }
 
 impl Keyframe {
-    /// What it saw, for safekeeping: where each level's image begins, and its cells.
-    pub fn images(&self) -> [(&[i64; 2], &[u8]); 2] {
-        [
-            (&self.fine.corner, &self.fine.cells),
-            (&self.coarse.corner, &self.coarse.cells),
-        ]
+    /// Returns its fine and its coarse image, each with the map's cell (x, y) that its first value belongs to.
+    ///
+    /// Rows are of equal x, which grows with the row; y grows with the column. A cell is 0 where the scan saw nothing,
+    /// and at most 255.
+    pub fn images(&self) -> [([i64; 2], ArrayView2<'_, u8>); 2] {
+        [&self.fine, &self.coarse].map(|image| (image.corner, image.view()))
     }
 
-    /// The same, to fill in.
-    pub fn images_mut(&mut self) -> [(&mut [i64; 2], &mut [u8]); 2] {
-        [
-            (&mut self.fine.corner, &mut self.fine.cells),
-            (&mut self.coarse.corner, &mut self.coarse.cells),
-        ]
+    /// Returns the same images to be filled in.
+    pub fn images_mut(&mut self) -> [(&mut [i64; 2], ArrayViewMut2<'_, u8>); 2] {
+        [&mut self.fine, &mut self.coarse].map(Image::parts_mut)
     }
 }
 
@@ -54,7 +52,7 @@ impl Keyframes {
         let (fine, coarse) = (level(config.cell_m), level(config.cell_m * config.coarse));
         let keyframe = Keyframe {
             id: 0,
-            pose: Isometry2::identity(),
+            pose: Pose::identity(),
             fine: fine.new_image(),
             coarse: coarse.new_image(),
         };
@@ -85,7 +83,7 @@ impl Keyframes {
     }
 
     /// Adds a keyframe, in place of the oldest where there are as many as may be.
-    pub fn draw(&mut self, id: u64, points: &Placed, pose: &Isometry2<f64>) {
+    pub fn draw(&mut self, id: u64, points: &Placed, pose: &Pose) {
         let Some(mut keyframe) = self.spare.pop().or_else(|| self.used.pop_front()) else {
             return;
         };
@@ -127,7 +125,7 @@ impl Keyframes {
     }
 
     /// Whether a scan at `pose` is far enough from the last keyframe to be one.
-    pub fn is_far(&self, pose: &Isometry2<f64>, config: &RefinementConfig) -> bool {
+    pub fn is_far(&self, pose: &Pose, config: &RefinementConfig) -> bool {
         self.used.back().is_none_or(|last| {
             let moved = last.pose.inv_mul(pose);
             moved.translation.vector.norm() >= config.keyframe_distance_m

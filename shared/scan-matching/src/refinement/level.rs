@@ -3,8 +3,10 @@
 //! A keyframe is drawn once, from its own points at its own pose, and never resampled: what is resampled again and again
 //! smears, and a map that smears along the way driven pulls the next scan after it.
 
-use gyre_simd::simd;
-use nalgebra::{Isometry2, Point2};
+use gyre_geometry::Pose;
+use multiversion::multiversion;
+use nalgebra::Point2;
+use ndarray::{ArrayView2, ArrayViewMut2};
 
 use super::sweep::Placed;
 
@@ -19,9 +21,25 @@ pub(super) const FULL: f32 = 255.0;
 pub(super) struct Image {
     /// The world's cell (x, y) at the image's first value.
     pub corner: [i64; 2],
+    /// Cells a side.
+    n: usize,
     /// Rows of equal x, growing with x; within a row growing with y.
     pub cells: Vec<u8>,
 }
+
+impl Image {
+    pub fn view(&self) -> ArrayView2<'_, u8> {
+        ArrayView2::from_shape((self.n, self.n), &self.cells).expect(SQUARE)
+    }
+
+    /// The corner and the cells, to be filled in.
+    pub fn parts_mut(&mut self) -> (&mut [i64; 2], ArrayViewMut2<'_, u8>) {
+        let cells = ArrayViewMut2::from_shape((self.n, self.n), &mut self.cells);
+        (&mut self.corner, cells.expect(SQUARE))
+    }
+}
+
+const SQUARE: &str = "an image has n x n cells";
 
 /// The mean of the keyframes' images.
 #[derive(Debug)]
@@ -69,6 +87,7 @@ impl Level {
     pub fn new_image(&self) -> Image {
         Image {
             corner: [0; 2],
+            n: self.n,
             cells: vec![0; self.n * self.n],
         }
     }
@@ -77,7 +96,7 @@ impl Level {
     ///
     /// The saturation m / (m + mean) lets a cell say at most "something is here": without it bright clutter, and what moves
     /// along with the vehicle, outweighs the thousand faint returns that hold the motion.
-    pub fn draw(&mut self, points: &Placed, pose: &Isometry2<f64>, image: &mut Image) {
+    pub fn draw(&mut self, points: &Placed, pose: &Pose, image: &mut Image) {
         let half = (self.n / 2) as i64;
         image.corner = [pose.translation.x, pose.translation.y]
             .map(|v| (v / self.cell_m).floor() as i64 - half);
@@ -89,7 +108,7 @@ impl Level {
         saturate(&self.drawing, mean as f32, &mut image.cells);
     }
 
-    fn splat(&mut self, points: &Placed, pose: &Isometry2<f64>, corner: [i64; 2]) {
+    fn splat(&mut self, points: &Placed, pose: &Pose, corner: [i64; 2]) {
         self.drawing.fill(0.0);
         let (n, per_m) = (self.n, 1.0 / self.cell_m);
         let inside = BLUR_REACH as f64..(n - BLUR_REACH - 2) as f64;
@@ -153,7 +172,11 @@ impl Level {
 
 /// One pass of the blur along an axis. What lies within the blur's reach of the array's ends stays zero; the caller draws
 /// nothing there.
-#[simd]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 fn blur(from: &[f32], to: &mut [f32], stride: usize) {
     let margin = BLUR_REACH * stride;
     let count = from.len() - 2 * margin;
@@ -169,7 +192,11 @@ fn blur(from: &[f32], to: &mut [f32], stride: usize) {
 }
 
 /// Sum and sum of squares, in lanes.
-#[simd]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 fn moments(values: &[f32]) -> (f64, f64) {
     let (chunks, rest) = values.as_chunks::<16>();
     let (mut sums, mut squares) = ([0.0_f32; 16], [0.0_f32; 16]);
@@ -189,7 +216,11 @@ fn moments(values: &[f32]) -> (f64, f64) {
 }
 
 /// Most cells saw nothing; sixteen of them at once are passed over.
-#[simd]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 fn saturate(values: &[f32], mean: f32, cells: &mut [u8]) {
     for (cells, values) in cells.chunks_mut(16).zip(values.chunks(16)) {
         if values.iter().all(|value| *value == 0.0) {
@@ -204,7 +235,11 @@ fn saturate(values: &[f32], mean: f32, cells: &mut [u8]) {
 }
 
 /// At most 64 images of at most 255: no sum is too large.
-#[simd]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 fn add(cells: &[u8], sum: &mut [u16]) {
     sum.iter_mut()
         .zip(cells)
@@ -213,7 +248,7 @@ fn add(cells: &[u8], sum: &mut [u16]) {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector2;
+    use gyre_geometry::pose;
 
     use super::*;
 
@@ -244,8 +279,8 @@ mod tests {
     fn the_same_place_seen_from_two_poses_falls_into_one_cell() {
         let mut level = Level::new(0.5, 20.0);
         let (mut first, mut second) = (level.new_image(), level.new_image());
-        level.draw(&points(&[[6.0, 2.0]]), &Isometry2::identity(), &mut first);
-        let pose = Isometry2::new(Vector2::new(3.0, 1.0), std::f64::consts::FRAC_PI_2);
+        level.draw(&points(&[[6.0, 2.0]]), &Pose::identity(), &mut first);
+        let pose = pose(3.0, 1.0, std::f64::consts::FRAC_PI_2);
         let seen = pose.inverse() * Point2::new(6.0, 2.0);
         level.draw(
             &points(&[[seen.x as f32, seen.y as f32]]),
@@ -267,7 +302,7 @@ mod tests {
         let mut image = level.new_image();
         level.draw(
             &points(&[[0.3, 0.4], [7.7, -8.2]]),
-            &Isometry2::identity(),
+            &Pose::identity(),
             &mut image,
         );
         let (sum, _) = moments(&level.drawing);
@@ -280,7 +315,7 @@ mod tests {
         let mut image = level.new_image();
         level.draw(
             &points(&[[25.0, 0.0], [f32::NAN, 0.0], [0.0, -1e30]]),
-            &Isometry2::identity(),
+            &Pose::identity(),
             &mut image,
         );
         assert!(image.cells.iter().all(|cell| *cell == 0));

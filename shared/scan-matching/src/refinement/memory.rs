@@ -1,6 +1,7 @@
 //! What is remembered from scan to scan besides the map.
 
-use nalgebra::{Isometry2, Matrix3, Rotation2, Vector2, Vector3};
+use gyre_geometry::{Pose, Twist};
+use nalgebra::{Matrix3, Vector3};
 
 use super::{Outcome, RefinementConfig};
 
@@ -11,15 +12,15 @@ const NEWEST: f64 = 0.2;
 
 /// Where the vehicle is, where it surely was, and what a match usually looks like.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Memory {
+pub struct TrackerState {
     /// Pose of the last scan in the first one's frame.
-    pub pose: Isometry2<f64>,
+    pub pose: Pose,
     /// The last two refined scans, newest first. The second is there in case the first was wrong after all.
     pub anchors: [Option<Anchor>; 2],
     /// Running mean of the overlap of matched scans.
-    pub usual_overlap: f64,
+    pub mean_overlap: f64,
     /// Running mean of the weight of their points.
-    pub usual_weight: f64,
+    pub mean_weight: f64,
     /// Scans in a row that were not refined firmly.
     pub doubtful: u32,
     /// Scans in a row that matched nothing.
@@ -30,20 +31,20 @@ pub struct Memory {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Anchor {
     /// Its pose in the first scan's frame.
-    pub pose: Isometry2<f64>,
+    pub pose: Pose,
     /// Running mean of the velocity there, in the vehicle's frame: m/s, m/s, rad/s.
-    pub velocity: Vector3<f64>,
+    pub twist: Twist,
     /// How long ago it was measured, s.
     pub age_s: f64,
 }
 
-impl Default for Memory {
+impl Default for TrackerState {
     fn default() -> Self {
         Self {
-            pose: Isometry2::identity(),
+            pose: Pose::identity(),
             anchors: [None; 2],
-            usual_overlap: 0.0,
-            usual_weight: 0.0,
+            mean_overlap: 0.0,
+            mean_weight: 0.0,
             doubtful: 0,
             unmatched: 0,
         }
@@ -52,51 +53,53 @@ impl Default for Memory {
 
 impl Anchor {
     /// The pose a time later if the velocity stays as it is.
-    fn foretell(&self, interval_s: f64) -> Isometry2<f64> {
-        self.pose * motion_at(&self.velocity, self.age_s + interval_s)
+    fn foretell(&self, interval_s: f64) -> Pose {
+        self.pose * self.twist.chord_pose_at(self.age_s + interval_s)
     }
 
     /// The mean velocity on the way to `pose`.
-    fn velocity_to(&self, pose: &Isometry2<f64>, interval_s: f64) -> Vector3<f64> {
-        velocity(&self.pose.inv_mul(pose), self.age_s + interval_s)
+    fn velocity_to(&self, pose: &Pose, interval_s: f64) -> Twist {
+        Twist::from_chord(&self.pose.inv_mul(pose), self.age_s + interval_s)
     }
 
     /// Whether a vehicle can have come from here to `pose`. `firmness` 0 to 1: how far the match may be off besides.
     fn reaches(
         &self,
-        pose: &Isometry2<f64>,
+        pose: &Pose,
         interval_s: f64,
         firmness: f64,
         config: &RefinementConfig,
     ) -> bool {
         let time_s = self.age_s + interval_s;
-        let apart = (self.velocity_to(pose, interval_s) - self.velocity) * time_s;
+        let twist = self.velocity_to(pose, interval_s);
+        let moved = (twist.linear_mps() - self.twist.linear_mps()) * time_s;
+        let turned = (twist.yaw_rate_radps - self.twist.yaw_rate_radps) * time_s;
         let shift = config.jitter_m * firmness + config.acceleration_mps2 * time_s.powi(2);
         let turn = config.jitter_deg * firmness + config.yaw_acceleration_degps2 * time_s.powi(2);
-        apart.xy().norm() <= shift && apart.z.abs() <= turn.to_radians()
+        moved.norm() <= shift && turned.abs() <= turn.to_radians()
     }
 }
 
-impl Memory {
+impl TrackerState {
     /// Where the vehicle is after the interval if nothing changes, once from each anchor; where it was if there is none.
-    pub(super) fn foretell(&self, interval_s: f64) -> [Isometry2<f64>; 2] {
+    pub(super) fn foretell(&self, interval_s: f64) -> [Pose; 2] {
         let from = |anchor: &Anchor| anchor.foretell(interval_s);
         let first = self.anchors[0].as_ref().map_or(self.pose, from);
         [first, self.anchors[1].as_ref().map_or(first, from)]
     }
 
     /// The mean velocity on the way to `pose`, since the vehicle's place was last known for sure.
-    pub(super) fn velocity_to(&self, pose: &Isometry2<f64>, interval_s: f64) -> Vector3<f64> {
+    pub(super) fn velocity_to(&self, pose: &Pose, interval_s: f64) -> Twist {
         match &self.anchors[0] {
             Some(anchor) => anchor.velocity_to(pose, interval_s),
-            None => velocity(&self.pose.inv_mul(pose), interval_s),
+            None => Twist::from_chord(&self.pose.inv_mul(pose), interval_s),
         }
     }
 
     /// Whether a vehicle can be at `pose`: on its way from either anchor.
     pub(super) fn allows(
         &self,
-        pose: &Isometry2<f64>,
+        pose: &Pose,
         interval_s: f64,
         firmness: f64,
         config: &RefinementConfig,
@@ -109,7 +112,7 @@ impl Memory {
     /// Steps on to `pose`.
     pub(super) fn go_on(
         &mut self,
-        pose: Isometry2<f64>,
+        pose: Pose,
         outcome: Outcome,
         [overlap, weight]: [f64; 2],
         interval_s: f64,
@@ -124,8 +127,8 @@ impl Memory {
                 .for_each(|anchor| anchor.age_s += interval_s),
         }
         if outcome != Outcome::Predicted {
-            self.usual_overlap = running_mean(self.usual_overlap, overlap);
-            self.usual_weight = running_mean(self.usual_weight, weight);
+            self.mean_overlap = running_mean(self.mean_overlap, overlap);
+            self.mean_weight = running_mean(self.mean_weight, weight);
         }
         self.doubtful = if outcome == Outcome::Refined {
             0
@@ -141,16 +144,16 @@ impl Memory {
     }
 
     /// Makes `pose` the newest anchor. One that it cannot have come from was wrong and goes.
-    fn anchor(&mut self, pose: Isometry2<f64>, interval_s: f64, config: &RefinementConfig) {
+    fn anchor(&mut self, pose: Pose, interval_s: f64, config: &RefinementConfig) {
         let right = self
             .anchors
             .iter()
             .flatten()
             .find(|anchor| anchor.reaches(&pose, interval_s, 1.0, config))
             .copied();
-        let velocity = match &right {
+        let twist = match &right {
             Some(anchor) => anchor
-                .velocity
+                .twist
                 .lerp(&anchor.velocity_to(&pose, interval_s), INERTIA),
             None => self.velocity_to(&pose, interval_s),
         };
@@ -161,7 +164,7 @@ impl Memory {
         self.anchors = [
             Some(Anchor {
                 pose,
-                velocity,
+                twist,
                 age_s: 0.0,
             }),
             aged,
@@ -175,22 +178,6 @@ fn running_mean(mean: f64, value: f64) -> f64 {
     } else {
         value
     }
-}
-
-/// Constant velocity in the moving frame over a motion: the chord in its middle direction, m/s, m/s, rad/s.
-pub(super) fn velocity(motion: &Isometry2<f64>, time_s: f64) -> Vector3<f64> {
-    let turn = motion.rotation.angle();
-    let along = Rotation2::new(-0.5 * turn) * motion.translation.vector;
-    Vector3::new(along.x, along.y, turn) / time_s
-}
-
-/// The motion over a time at constant velocity; inverse of [`velocity`].
-fn motion_at(velocity: &Vector3<f64>, time_s: f64) -> Isometry2<f64> {
-    let turn = velocity.z * time_s;
-    Isometry2::new(
-        Rotation2::new(0.5 * turn) * Vector2::new(velocity.x, velocity.y) * time_s,
-        turn,
-    )
 }
 
 /// What is known of a motion that nothing was matched for: that its acceleration was within the limits.
@@ -207,32 +194,20 @@ pub(super) fn unmatched_covariance(interval_s: f64, config: &RefinementConfig) -
 
 #[cfg(test)]
 mod tests {
-    use proptest::prelude::*;
+    use gyre_geometry::pose;
 
     use super::*;
 
     const INTERVAL_S: f64 = 0.25;
 
-    fn after(poses: &[(f64, f64)]) -> Memory {
+    fn after(poses: &[(f64, f64)]) -> TrackerState {
         let config = RefinementConfig::default();
-        let mut memory = Memory::default();
+        let mut memory = TrackerState::default();
         for (x, yaw) in poses {
-            let pose = Isometry2::new(Vector2::new(*x, 0.0), *yaw);
+            let pose = pose(*x, 0.0, *yaw);
             memory.go_on(pose, Outcome::Refined, [0.3, 100.0], INTERVAL_S, &config);
         }
         memory
-    }
-
-    proptest! {
-        #[test]
-        fn a_velocity_makes_the_motion_that_it_was_taken_from(
-            x in -5.0_f64..5.0, y in -5.0_f64..5.0, turn in -1.0_f64..1.0, time_s in 0.05_f64..2.0,
-        ) {
-            let motion = Isometry2::new(Vector2::new(x, y), turn);
-            let again = motion_at(&velocity(&motion, time_s), time_s);
-            prop_assert!((again.translation.vector - motion.translation.vector).norm() < 1e-9);
-            prop_assert!(again.rotation.angle_to(&motion.rotation).abs() < 1e-9);
-        }
     }
 
     #[test]
@@ -260,14 +235,7 @@ mod tests {
             after(&[(0.0, 0.0), (2.5, 0.0), (5.0, 0.0)]),
             RefinementConfig::default(),
         );
-        let at = |x: f64, yaw: f64| {
-            memory.allows(
-                &Isometry2::new(Vector2::new(x, 0.0), yaw),
-                INTERVAL_S,
-                1.0,
-                &config,
-            )
-        };
+        let at = |x: f64, yaw: f64| memory.allows(&pose(x, 0.0, yaw), INTERVAL_S, 1.0, &config);
         assert!(at(7.5, 0.0) && at(7.2, 0.1));
         assert!(!at(7.5, std::f64::consts::FRAC_PI_2) && !at(30.0, 0.0));
     }
@@ -277,7 +245,7 @@ mod tests {
         let mut memory = after(&[(0.0, 0.0), (2.5, 0.0), (5.0, 0.0), (7.5, 0.0), (10.0, 0.0)]);
         let config = RefinementConfig::default();
         let mut step = |x: f64, yaw: f64| {
-            let pose = Isometry2::new(Vector2::new(x, 0.0), yaw);
+            let pose = pose(x, 0.0, yaw);
             let allowed = memory.allows(&pose, INTERVAL_S, 1.0, &config);
             memory.go_on(pose, Outcome::Refined, [0.3, 100.0], INTERVAL_S, &config);
             allowed
@@ -289,7 +257,7 @@ mod tests {
         );
         assert!(step(17.5, 0.0));
         let velocity = memory.anchors[0]
-            .map(|anchor| anchor.velocity.z.abs())
+            .map(|anchor| anchor.twist.yaw_rate_radps.abs())
             .unwrap_or(9.0);
         assert!(velocity < 0.1, "{velocity} rad/s");
     }

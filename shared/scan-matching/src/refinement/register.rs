@@ -3,8 +3,9 @@
 //! Minimises sum w (1 - M(T p))^2 over the points p with weights w, M being the map: each point wants to lie where the
 //! keyframes saw something.
 
-use gyre_simd::simd;
-use nalgebra::{Isometry2, Matrix3, Vector2, Vector3};
+use gyre_geometry::Pose;
+use multiversion::multiversion;
+use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::{level::Lookup, sweep::Placed};
 
@@ -22,7 +23,7 @@ const LANES: usize = 16;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Match {
     /// Pose of the points' frame in the world.
-    pub pose: Isometry2<f64>,
+    pub pose: Pose,
     pub normal: Normal,
 }
 
@@ -43,7 +44,7 @@ pub(super) struct Normal {
 pub(super) fn register(
     map: &Lookup<'_>,
     points: &Placed,
-    start: &Isometry2<f64>,
+    start: &Pose,
     iterations: usize,
 ) -> Match {
     let mut best = Match {
@@ -55,7 +56,7 @@ pub(super) fn register(
         let Some(step) = step(&best.normal, damping) else {
             break;
         };
-        let pose = Isometry2::new(
+        let pose = Pose::new(
             best.pose.translation.vector + Vector2::new(step.x, step.y),
             best.pose.rotation.angle() + step.z,
         );
@@ -90,7 +91,7 @@ fn step(normal: &Normal, damping: f64) -> Option<Vector3<f64>> {
 }
 
 /// The cost and its slope at a pose.
-pub(super) fn linearise(map: &Lookup<'_>, points: &Placed, pose: &Isometry2<f64>) -> Normal {
+pub(super) fn linearise(map: &Lookup<'_>, points: &Placed, pose: &Pose) -> Normal {
     let at = (pose.translation.vector - Vector2::from(map.origin)) * f64::from(map.per_m);
     let (sin, cos) = pose.rotation.angle().sin_cos();
     let place = Place {
@@ -134,7 +135,11 @@ const SUMS: usize = 11;
 type Lanes = [f32; LANES];
 
 /// What a block of points adds. Points left over are filled up with some of no weight.
-#[simd]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 fn sum_block<'a>(
     map: &Lookup<'a>,
     x_m: &[f32],
@@ -248,16 +253,16 @@ mod tests {
     /// A map of two keyframes: all points, and every second one a little aside.
     fn map(points: &[[f64; 2]]) -> Level {
         let mut level = Level::new(CELL_M, 20.0);
-        let mut draw = |points: &[[f64; 2]], pose: &Isometry2<f64>| -> Image {
+        let mut draw = |points: &[[f64; 2]], pose: &Pose| -> Image {
             let mut image = level.new_image();
             level.draw(&placed(points), pose, &mut image);
             image
         };
         let images = [
-            draw(points, &Isometry2::identity()),
+            draw(points, &Pose::identity()),
             draw(
                 &points.iter().step_by(2).copied().collect::<Vec<_>>(),
-                &Isometry2::new(Vector2::new(0.3, -0.2), 0.01),
+                &Pose::new(Vector2::new(0.3, -0.2), 0.01),
             ),
         ];
         level.stack(images.iter());
@@ -268,22 +273,22 @@ mod tests {
         prop::collection::vec(prop::array::uniform2(-14.0_f64..14.0), count)
     }
 
-    fn pose(shift_m: f64, turn: f64) -> impl Strategy<Value = Isometry2<f64>> {
+    fn pose(shift_m: f64, turn: f64) -> impl Strategy<Value = Pose> {
         (prop::array::uniform2(-shift_m..shift_m), -turn..turn)
-            .prop_map(|(at, yaw)| Isometry2::new(at.into(), yaw))
+            .prop_map(|(at, yaw)| Pose::new(at.into(), yaw))
     }
 
     /// The pose, moved along one of its three unknowns.
-    fn moved(pose: &Isometry2<f64>, unknown: usize, by: f64) -> Isometry2<f64> {
+    fn moved(pose: &Pose, unknown: usize, by: f64) -> Pose {
         let step = Vector3::ith(unknown, by);
-        Isometry2::new(
+        Pose::new(
             pose.translation.vector + step.xy(),
             pose.rotation.angle() + step.z,
         )
     }
 
     /// Whether a point is so far from its cell's edges that the steps of the differences do not leave it.
-    fn inside_a_cell(pose: &Isometry2<f64>, [x, y]: &[f64; 2]) -> bool {
+    fn inside_a_cell(pose: &Pose, [x, y]: &[f64; 2]) -> bool {
         (pose * Point2::new(*x, *y)).coords.iter().all(|v| {
             let share = (v / CELL_M).rem_euclid(1.0);
             (0.1..0.9).contains(&share)
@@ -357,7 +362,7 @@ mod tests {
         fn points_slide_back_to_where_they_were_drawn(world in points(60..200), start in pose(0.35, 0.02)) {
             let mut level = Level::new(CELL_M, 20.0);
             let (points, mut image) = (placed(&world), level.new_image());
-            level.draw(&points, &Isometry2::identity(), &mut image);
+            level.draw(&points, &Pose::identity(), &mut image);
             level.stack(std::iter::once(&image));
             let found = register(&level.lookup(), &points, &start, 30).pose;
             prop_assert!(found.translation.vector.norm() < 0.15 && found.rotation.angle().abs() < 0.015, "{found}");
@@ -366,7 +371,7 @@ mod tests {
 
     #[test]
     fn an_empty_map_or_scan_leaves_the_start() {
-        let start = Isometry2::new(Vector2::new(1.0, 2.0), 0.3);
+        let start = Pose::new(Vector2::new(1.0, 2.0), 0.3);
         let (empty, full) = (Level::new(CELL_M, 20.0), map(&[[1.0, 2.0], [-3.0, 4.0]]));
         assert_eq!(
             register(&empty.lookup(), &placed(&[[1.0, 2.0]]), &start, 10).pose,

@@ -1,8 +1,7 @@
 //! A scan's points, put where they were in the middle of its sweep.
 
-use gyre_geometry::SparsePoint;
-use gyre_simd::simd;
-use nalgebra::Vector3;
+use gyre_geometry::{SparsePoint, Twist};
+use multiversion::multiversion;
 
 /// Points in the frame of the sweep's middle, as three columns.
 #[derive(Debug, Default)]
@@ -22,15 +21,15 @@ impl Placed {
         }
     }
 
-    /// Undoes the sweep's distortion by a constant velocity (m/s, m/s, rad/s) of the sensor in its own frame.
-    pub fn place(&mut self, points: &[SparsePoint], velocity: &Vector3<f64>) {
+    /// Undoes the sweep's distortion by a constant velocity of the sensor.
+    pub fn place(&mut self, points: &[SparsePoint], twist: &Twist) {
         for column in [&mut self.x_m, &mut self.y_m, &mut self.weight] {
             column.clear();
             column.resize(points.len(), 0.0);
         }
         place(
             points,
-            velocity.map(|v| v as f32).into(),
+            [twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps].map(|v| v as f32),
             &mut self.x_m,
             &mut self.y_m,
             &mut self.weight,
@@ -61,7 +60,11 @@ impl Placed {
 }
 
 /// The sensor's pose at time t on its arc is the chord (v t), turned by half the angle, and the turn by the whole angle.
-#[simd]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 fn place(
     points: &[SparsePoint],
     [vx, vy, rate]: [f32; 3],
@@ -108,6 +111,25 @@ mod tests {
 
     use super::*;
 
+    fn twist(vx_mps: f64, vy_mps: f64, yaw_rate_radps: f64) -> Twist {
+        Twist {
+            vx_mps,
+            vy_mps,
+            yaw_rate_radps,
+        }
+    }
+
+    fn point(values: [f64; 5]) -> SparsePoint {
+        let [x_m, y_m, time_s, weight, doppler_s] = values.map(|v| v as f32);
+        SparsePoint {
+            x_m,
+            y_m,
+            time_s,
+            weight,
+            doppler_s,
+        }
+    }
+
     proptest! {
         #[test]
         fn a_point_lies_where_the_sensor_on_its_arc_saw_it(
@@ -115,7 +137,7 @@ mod tests {
             at in prop::array::uniform2(-90.0_f64..90.0),
         ) {
             let mut placed = Placed::default();
-            placed.place(&[[at[0] as f32, at[1] as f32, t as f32, 0.5, 0.0].into()], &Vector3::new(v[0], v[1], rate));
+            placed.place(&[point([at[0], at[1], t, 0.5, 0.0])], &twist(v[0], v[1], rate));
             // The arc in a thousand straight steps, each taken along the heading in its middle.
             let (steps, mut pose) = (1000, Isometry2::identity());
             let dt = t / f64::from(steps);
@@ -139,8 +161,8 @@ mod tests {
             [0.0, 30.0, 0.0, 1.0, 0.05],
             [-30.0, 0.0, 0.0, 1.0, 0.05],
         ]
-        .map(SparsePoint::from);
-        placed.place(&ahead_and_aside, &Vector3::new(10.0, 0.0, 0.0));
+        .map(point);
+        placed.place(&ahead_and_aside, &twist(10.0, 0.0, 0.0));
         assert_eq!(placed.x_m, [30.5, 0.0, -29.5]);
         assert_eq!(placed.y_m, [0.0, 30.0, 0.0]);
     }

@@ -4,9 +4,10 @@
 pub mod scenes;
 
 use gyre_scan_matching::{
-    MotionEstimate, RotationConfig, RotationEstimate, RotationSearch, TranslationConfig,
+    MotionMatch, RotationConfig, RotationMatch, RotationSearch, TranslationConfig,
     TranslationSearch,
 };
+use ndarray::Array2;
 
 /// Pose of the later scan's frame in the earlier scan's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,8 +68,8 @@ pub fn draw(
     n: usize,
     cell_m: f64,
     blur: f64,
-) -> Vec<f32> {
-    let mut raster = vec![0.0; n * n];
+) -> Array2<f32> {
+    let mut raster = Array2::zeros((n, n));
     let (middle, reach) = ((n - 1) as f64 / 2.0, (5.0 * blur).ceil() as isize);
     for ([x, y], strength) in points {
         let (row, col) = (middle - x / cell_m, middle - y / cell_m);
@@ -76,7 +77,7 @@ pub fn draw(
             for j in col.round() as isize - reach..=col.round() as isize + reach {
                 if (0..n as isize).contains(&i) && (0..n as isize).contains(&j) {
                     let r2 = (i as f64 - row).powi(2) + (j as f64 - col).powi(2);
-                    raster[i as usize * n + j as usize] +=
+                    raster[[i as usize, j as usize]] +=
                         (strength * (-0.5 * r2 / blur.powi(2)).exp()) as f32;
                 }
             }
@@ -86,7 +87,7 @@ pub fn draw(
 }
 
 /// The earlier and the later raster of a scene with 150 scatterers, around the sensor and beyond the raster's edge.
-pub fn pair(n: usize, cell_m: f64, motion: Motion, seed: u64) -> (Vec<f32>, Vec<f32>) {
+pub fn pair(n: usize, cell_m: f64, motion: Motion, seed: u64) -> (Array2<f32>, Array2<f32>) {
     let scene = scatterers(150, 0.75 * n as f64 * cell_m, seed);
     let earlier = draw(scene.iter().copied(), n, cell_m, 1.2);
     let later = draw(
@@ -103,15 +104,17 @@ pub fn search(
     n: usize,
     cell_m: f64,
     configs: &(RotationConfig, TranslationConfig),
-    earlier: &[f32],
-    later: &[f32],
-) -> (RotationEstimate, MotionEstimate) {
+    earlier: &Array2<f32>,
+    later: &Array2<f32>,
+) -> (RotationMatch, MotionMatch) {
     let mut rotation = RotationSearch::new(n, &configs.0).unwrap();
     let mut translation = TranslationSearch::new(n, cell_m, &configs.1).unwrap();
     let (mut f, mut g) = (rotation.new_spectrum(), rotation.new_spectrum());
-    rotation.spectrum(earlier, &mut g).unwrap();
-    rotation.spectrum(later, &mut f).unwrap();
+    rotation.spectrum(earlier.view(), &mut g).unwrap();
+    rotation.spectrum(later.view(), &mut f).unwrap();
     let angle = rotation.search(&f, &g).unwrap();
-    let motion = translation.search(later, earlier, &angle).unwrap();
+    let motion = translation
+        .search(later.view(), earlier.view(), &angle)
+        .unwrap();
     (angle, motion)
 }

@@ -1,8 +1,8 @@
 //! Generated point scans with exact truth: what a sensor that turns clockwise sees of reflectors in the plane on its way.
 
-use gyre_geometry::SparsePoint;
-use gyre_scan_matching::{Refined, Refinement, RefinementConfig};
-use nalgebra::{Isometry2, Point2, Vector2, Vector3};
+use gyre_geometry::{Pose, SparsePoint};
+use gyre_scan_matching::{Refined, RefinementConfig, Refiner};
+use nalgebra::{Point2, Vector2, Vector3};
 
 use super::Numbers;
 
@@ -31,7 +31,7 @@ pub fn rectangle(
     velocity: [f64; 2],
     points: usize,
 ) -> [Reflector; 4] {
-    let pose = Isometry2::new(middle.into(), yaw);
+    let pose = Pose::new(middle.into(), yaw);
     let corner = |k: usize| {
         let (ahead, aside) = [(0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5)][k % 4];
         (pose * Point2::new(ahead * length, aside * width)).coords
@@ -121,7 +121,7 @@ impl Drive {
     }
 
     /// Pose of scan `k` in the first one's frame.
-    pub fn pose(&self, k: usize) -> Isometry2<f64> {
+    pub fn pose(&self, k: usize) -> Pose {
         let time_s = k as f64 * SWEEP_S;
         arc(self.length_m(time_s), self.yaw_rate * time_s)
     }
@@ -132,14 +132,14 @@ impl Drive {
 }
 
 /// The motion along an arc of this length that turns by this angle.
-fn arc(length: f64, turn: f64) -> Isometry2<f64> {
+fn arc(length: f64, turn: f64) -> Pose {
     let (sin, cos) = turn.sin_cos();
     let [ahead, aside] = if turn.abs() < 1e-9 {
         [1.0, 0.5 * turn]
     } else {
         [sin / turn, (1.0 - cos) / turn]
     };
-    Isometry2::new(Vector2::new(ahead, aside) * length, turn)
+    Pose::new(Vector2::new(ahead, aside) * length, turn)
 }
 
 /// What the sensor does to the ranges.
@@ -183,16 +183,28 @@ impl Sensor {
                 let sight = at.normalize();
                 let shift =
                     self.noise_m * normal + self.offset_m - self.doppler_s * sight.dot(&approach);
-                let told = if self.hides_doppler {
+                let reported = if self.hides_doppler {
                     0.0
                 } else {
                     self.doppler_s
                 };
                 let at = at + sight * shift;
-                points.push([at.x, at.y, time_s, weight, told].map(|v| v as f32).into());
+                points.push(point([at.x, at.y, time_s, weight, reported]));
             }
         }
         points
+    }
+}
+
+/// The point `[x_m, y_m, time_s, weight, doppler_s]`.
+pub fn point(values: [f64; 5]) -> SparsePoint {
+    let [x_m, y_m, time_s, weight, doppler_s] = values.map(|v| v as f32);
+    SparsePoint {
+        x_m,
+        y_m,
+        time_s,
+        weight,
+        doppler_s,
     }
 }
 
@@ -208,7 +220,7 @@ fn swept(seen: impl Fn(f64) -> Point2<f64>) -> Option<f64> {
     ((meets(time_s) - time_s).abs() < 1e-9).then_some(time_s)
 }
 
-/// What a refinement made of a drive.
+/// A drive and its refined motions.
 pub struct Run {
     pub drive: Drive,
     /// Motion from scan k to k + 1.
@@ -237,7 +249,7 @@ impl Run {
     pub fn errors_from(&self, first: usize) -> Errors {
         let (mut pose, mut worst_m, mut worst_deg) = (self.drive.pose(first), 0.0_f64, 0.0_f64);
         for k in first..self.refined.len() {
-            let motion = self.refined[k].motion;
+            let motion = self.refined[k].motion.motion;
             let off = true_motion(&self.drive, k).inv_mul(&motion);
             worst_m = worst_m.max(off.translation.vector.norm());
             worst_deg = worst_deg.max(off.rotation.angle().to_degrees().abs());
@@ -257,15 +269,15 @@ impl Run {
     }
 }
 
-fn true_motion(drive: &Drive, k: usize) -> Isometry2<f64> {
+fn true_motion(drive: &Drive, k: usize) -> Pose {
     drive.pose(k).inv_mul(&drive.pose(k + 1))
 }
 
 /// The true motion to scan k + 1 as a search finds it, a quarter of a metre and half a degree off.
-pub fn searched(drive: &Drive, k: usize) -> Isometry2<f64> {
+pub fn searched(drive: &Drive, k: usize) -> Pose {
     let mut numbers = Numbers(0x5ea2c4 + k as u64);
     let off = Vector3::from_fn(|_, _| numbers.within(1.0));
-    true_motion(drive, k) * Isometry2::new(off.xy() * 0.25, off.z * 0.5_f64.to_radians())
+    true_motion(drive, k) * Pose::new(off.xy() * 0.25, off.z * 0.5_f64.to_radians())
 }
 
 /// The scans of a drive.
@@ -275,33 +287,33 @@ pub fn scans(scene: &[Reflector], drive: &Drive, sensor: &Sensor) -> Vec<Vec<Spa
         .collect()
 }
 
-pub fn refinement() -> Refinement {
+pub fn refiner() -> Refiner {
     let config = RefinementConfig {
         reach_m: VISIBLE_M.end() + 10.0,
         ..RefinementConfig::default()
     };
-    Refinement::new(&config, CAPACITY).unwrap()
+    Refiner::new(&config, CAPACITY).unwrap()
 }
 
 /// Refines the motions between these scans of a drive.
 pub fn refine(drive: &Drive, scans: &[Vec<SparsePoint>]) -> Run {
-    let mut refinement = refinement();
+    let mut refiner = refiner();
     Run {
         drive: *drive,
-        refined: refine_on(&mut refinement, drive, scans, 0..scans.len() - 1),
+        refined: refine_on(&mut refiner, drive, scans, 0..scans.len() - 1),
     }
 }
 
 /// The motions from each scan `k` of a range to the one after.
 pub fn refine_on(
-    refinement: &mut Refinement,
+    refiner: &mut Refiner,
     drive: &Drive,
     scans: &[Vec<SparsePoint>],
     range: std::ops::Range<usize>,
 ) -> Vec<Refined> {
     range
         .map(|k| {
-            refinement.next(
+            refiner.refine(
                 k as u64 + 1,
                 &scans[k + 1],
                 &scans[k],

@@ -2,10 +2,10 @@
 
 use std::f64::consts::PI;
 
-use crate::config::Window;
+use crate::config::Taper;
 
 /// The weights of an n x n raster, row by row.
-pub(crate) fn weights(window: Window, n: usize) -> Vec<f32> {
+pub(crate) fn weights(window: Taper, n: usize) -> Vec<f32> {
     let middle = (n - 1) as f64 / 2.0;
     let half = (n as f64 + 1.0) / 2.0;
     let hann = |t: f64| {
@@ -18,9 +18,9 @@ pub(crate) fn weights(window: Window, n: usize) -> Vec<f32> {
     let at = |row: usize, col: usize| {
         let (u, v) = (row as f64 - middle, col as f64 - middle);
         match window {
-            Window::None => 1.0,
-            Window::Hann => hann(u) * hann(v),
-            Window::RadialHann => hann(u.hypot(v)),
+            Taper::None => 1.0,
+            Taper::Hann => hann(u) * hann(v),
+            Taper::RadialHann => hann(u.hypot(v)),
         }
     };
     (0..n * n).map(|k| at(k / n, k % n) as f32).collect()
