@@ -1,10 +1,10 @@
-"""python -m gyre_training: see README.md."""
+"""The entry point of `python -m gyre_training`; see README.md."""
 
 import os
 import sys
 
-# Large blocks are kept instead of given back and asked for again at each step: halves the time of a step on a CPU.
-# Threads that wait sleep: where something else runs beside, spinning ones make a step ten times slower.
+# malloc keeps large blocks between steps, which halves the time of a step on a CPU. Waiting threads sleep: on a machine
+# that runs something else as well, spinning ones make a step ten times slower.
 SETTINGS = {
     "MALLOC_MMAP_THRESHOLD_": str(1 << 33),
     "MALLOC_TRIM_THRESHOLD_": str(1 << 34),

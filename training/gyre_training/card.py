@@ -1,4 +1,4 @@
-"""A model's card, `models/NAME.toml`: what a user needs to know, and what Gyre checks before it runs the model."""
+"""Model cards, `models/NAME.toml`: provenance for the user, and what Gyre checks before it runs the model."""
 
 import hashlib
 import json
@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def write(path: Path, inputs: int, opset: int, parameters: int, settings: dict, provenance: dict) -> None:
-    """Writes the card of the ONNX file at `path`. `settings` are those of the rasters, as Gyre resolved them."""
+    """Writes the card of the ONNX file at `path`. `settings` is the resolved configuration of the rasters."""
     content = path.read_bytes()
     model = {"file": path.name, "sha256": hashlib.sha256(content).hexdigest(), "bytes": len(content)}
     masking = settings["masking"]

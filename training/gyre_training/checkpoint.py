@@ -1,6 +1,6 @@
-"""Less memory for more time: what lies between a block's inputs and outputs is not kept for the way back but computed again.
+"""Activation checkpointing: the activations of a block are recomputed in the backward pass instead of stored.
 
-A network's activations are most of what a training holds. The gradients stay the same to the bit."""
+Activations are most of a training's memory. The gradients are bit-identical."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
@@ -11,14 +11,14 @@ from torch.utils.checkpoint import checkpoint
 
 
 def recomputed(block: nn.Module, function: Callable[..., Tensor], *inputs: Tensor) -> Tensor:
-    """`function(*inputs)`, which runs `block`, of which only the inputs are kept."""
+    """Returns `function(*inputs)`, which runs `block`; only the inputs are stored."""
     contexts = lambda: (nullcontext(), counted_once(block))  # noqa: E731
     return checkpoint(function, *inputs, use_reentrant=False, preserve_rng_state=False, context_fn=contexts)
 
 
 @contextmanager
 def counted_once(block: nn.Module) -> Iterator[None]:
-    """Batch norms leave their running means as they are: a batch that is run twice is to count once."""
+    """Freezes the running statistics of batch norms, so that a batch that is run twice counts once."""
     norms = [module for module in block.modules() if isinstance(module, _BatchNorm)]
     before = [(norm.momentum, norm.num_batches_tracked) for norm in norms]
     for norm in norms:

@@ -15,14 +15,14 @@ from .pairs import Scans
 from .plots import training_log
 from .search import ScanMatch
 from .train import Trainer, trained
-from .worlds import export_pairs, find_gyre, simulate
+from .worlds import export_pairs, find_gyre_lab, simulate
 
 
 def run(arguments: list[str]) -> None:
-    parser = argparse.ArgumentParser(prog="python -m gyre_training", description="Trains Gyre's masks.")
-    parser.add_argument("--threads", type=int, help="threads of PyTorch; all by default")
+    parser = argparse.ArgumentParser(prog="python -m gyre_training", description="Trains the mask networks of Gyre.")
+    parser.add_argument("--threads", type=int, help="PyTorch threads (default: all)")
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
-    parser.add_argument("--checkpoint", action="store_true", help="train in less memory and more time, to the same weights")
+    parser.add_argument("--checkpoint", action="store_true", help="activation checkpointing: less memory, more time, same weights")
     commands = parser.add_subparsers(required=True)
     add_reproduce(commands)
     add_train(commands)
@@ -38,34 +38,34 @@ def run(arguments: list[str]) -> None:
 
 
 def add_reproduce(commands) -> None:
-    command = commands.add_parser("reproduce", help="all from nothing: worlds, pairs, training (also of what it begins with), ONNX file and card")
+    command = commands.add_parser("reproduce", help="worlds, pairs, training (also of the recipes it starts from), ONNX file and card")
     command.add_argument("recipe", type=Path)
     add_work(command)
     add_models(command)
-    command.add_argument("--gyre", type=Path, help="the program gyre-lab; by default the project's build")
+    command.add_argument("--gyre-lab", type=Path, help="the program gyre-lab (default: the build of this repository)")
     command.set_defaults(run=reproduce)
 
 
 def add_work(command) -> None:
-    command.add_argument("--work", type=Path, default=Path("out/training"), help="has worlds/, pairs/RASTER/ and runs/NAME/; kept")
+    command.add_argument("--work", type=Path, default=Path("out/training"), help="folder of worlds/, pairs/RASTER/ and runs/NAME/, which are reused")
 
 
 def add_models(command) -> None:
-    command.add_argument("--models", type=Path, default=Path("out/models"), help="where the model goes")
+    command.add_argument("--models", type=Path, default=Path("out/models"), help="output folder of the model")
 
 
 def reproduce(options: argparse.Namespace) -> None:
-    gyre, work = find_gyre(options.gyre), options.work.resolve()
-    simulate(gyre, work / "worlds")
+    gyre_lab, work = find_gyre_lab(options.gyre_lab), options.work.resolve()
+    simulate(gyre_lab, work / "worlds")
     for recipe in recipes.lineage(options.recipe):
         pairs = work / "pairs" / recipe.raster
-        export_pairs(gyre, work / "worlds", recipe.configuration, pairs)
+        export_pairs(gyre_lab, work / "worlds", recipe.configuration, pairs)
         folder = train_recipe(recipe, pairs, work, options)
     publish(recipe, folder, pairs, options.models)
 
 
 def add_train(commands) -> None:
-    command = commands.add_parser("train", help="train a recipe on pairs that are there, or go on with it")
+    command = commands.add_parser("train", help="train a recipe on existing pairs, or resume its training")
     command.add_argument("recipe", type=Path)
     add_work(command)
     command.set_defaults(run=train)
@@ -77,7 +77,7 @@ def train(options: argparse.Namespace) -> None:
 
 
 def train_recipe(recipe: recipes.Recipe, pairs: Path, work: Path, options: argparse.Namespace) -> Path:
-    """Trains; returns the run's folder."""
+    """Trains a recipe and returns the folder of the run."""
     scans, validation = (Scans(pairs / f"{split}.npy") for split in ("train", "validation"))
     search = recipes.search_of(scans.settings)
     runs = work / "runs"
@@ -113,9 +113,9 @@ def publish_runs(options: argparse.Namespace) -> None:
 
 
 def add_drift(commands) -> None:
-    command = commands.add_parser("drift", help="drift of checkpoints and ONNX files, and without masks")
+    command = commands.add_parser("drift", help="drift with the masks of checkpoints and ONNX files, and without masks")
     command.add_argument("checkpoint", type=Path, nargs="*")
-    command.add_argument("--scans", type=Path, required=True, help="a file of gyre-lab export-pairs")
+    command.add_argument("--scans", type=Path, required=True, help="a file written by gyre-lab export-pairs")
     command.set_defaults(run=show_drift)
 
 
@@ -133,8 +133,8 @@ def masks_of(path: Path, device: str):
 
 
 def add_plot(commands) -> None:
-    command = commands.add_parser("plot", help="draw a training's log.csv")
-    command.add_argument("folder", type=Path, nargs="+", help="a training's folder")
+    command = commands.add_parser("plot", help="plot the log.csv of a run as log.svg")
+    command.add_argument("folder", type=Path, nargs="+", help="the folder of a run")
     command.set_defaults(run=plot)
 
 

@@ -1,4 +1,4 @@
-"""Networks of finished trainings side by side: how long a mask takes, and how far motions lead astray with it."""
+"""Compares trained networks: the inference time of a mask and the drift of the odometry with it."""
 
 import tempfile
 import time
@@ -21,9 +21,9 @@ ROUNDS = 40
 
 
 @dataclass(frozen=True)
-class Contender:
-    """One network in one kind of numbers. `pair_ms`: the masks that a pair costs, on one thread; where a network looks at
-    each scan alone, the earlier scan has its mask already."""
+class Candidate:
+    """A network in one number format. `pair_ms` is the time of the masks of a pair on one thread; a network of single
+    scans masks only the later scan, because the earlier one has its mask already."""
 
     name: str
     numbers: str
@@ -33,10 +33,10 @@ class Contender:
 
 
 def register(commands) -> None:
-    command = commands.add_parser("compare", help="time and drift of trained networks, in floats and in integers")
-    command.add_argument("folder", type=Path, nargs="+", help="a training's folder; all for one raster")
-    command.add_argument("--pairs", type=Path, required=True, help="folder with train.npy, to calibrate on, and test.npy")
-    command.add_argument("--out", type=Path, default=Path("out/compare"), help="for compare.md and compare.svg")
+    command = commands.add_parser("compare", help="inference time and drift of trained networks, in floats and in 8-bit integers")
+    command.add_argument("folder", type=Path, nargs="+", help="the folders of runs, all with the same raster")
+    command.add_argument("--pairs", type=Path, required=True, help="folder of train.npy (for calibration) and test.npy")
+    command.add_argument("--out", type=Path, default=Path("out/compare"), help="output folder of compare.md and compare.svg")
     command.set_defaults(run=compare)
 
 
@@ -46,22 +46,22 @@ def compare(options: Namespace) -> None:
         files = [file for folder in options.folder for file in exported(folder, calibration, Path(scratch))]
         times = median_ms([OnnxMasks(file) for file in files], test)
         unmasked = drift_of(None, test)
-        contenders = []
+        candidates = []
         for file, pair_ms in zip(files, times):
             (name, numbers), masks, megabytes = file.stem.split("."), OnnxMasks(file), file.stat().st_size / 1e6
-            contenders.append(Contender(name, numbers, megabytes, pair_ms, drift_of(masks, test)))
+            candidates.append(Candidate(name, numbers, megabytes, pair_ms, drift_of(masks, test)))
             if masks.inputs == 1 and numbers == "integers":
                 again = drift_of(EverySecond(masks), test)
-                contenders.append(Contender(f"{name}, every second scan", numbers, megabytes, pair_ms / 2, again))
+                candidates.append(Candidate(f"{name}, every second scan", numbers, megabytes, pair_ms / 2, again))
     options.out.mkdir(parents=True, exist_ok=True)
-    table = markdown(contenders, unmasked)
+    table = markdown(candidates, unmasked)
     (options.out / "compare.md").write_text(table)
-    plots.speed_and_drift(contenders, options.out / "compare.svg")
+    plots.speed_and_drift(candidates, options.out / "compare.svg")
     print(table, end="")
 
 
 def exported(folder: Path, calibration: Scans, scratch: Path) -> list[Path]:
-    """The best epoch as NAME.floats.onnx and NAME.integers.onnx."""
+    """Exports the best epoch as NAME.floats.onnx and NAME.integers.onnx."""
     floats, integers = (scratch / f"{folder.name}.{numbers}.onnx" for numbers in ("floats", "integers"))
     export(trained(folder / "best.pt"), calibration.n, floats)
     quantise(floats, calibration, integers)
@@ -69,7 +69,7 @@ def exported(folder: Path, calibration: Scans, scratch: Path) -> list[Path]:
 
 
 def median_ms(networks: list[OnnxMasks], scans: Scans) -> list[float]:
-    """In turn, so that what else the machine does slows all alike."""
+    """Returns the median inference times. The networks take turns, so that other load on the machine affects all alike."""
     pair = scans.rasters(scans.pairs(1)[0])[None]
     seconds = np.zeros((ROUNDS, len(networks)))
     for times in seconds:
@@ -82,8 +82,8 @@ def median_ms(networks: list[OnnxMasks], scans: Scans) -> list[float]:
 
 
 class EverySecond:
-    """Masks of every second scan, each laid on the scan after it as well, where it lies: half the work. Of consecutive
-    pairs, an even number at a time."""
+    """Masks of every second scan, each used for the next scan as well: half the work. Takes consecutive pairs, an even
+    number per call."""
 
     def __init__(self, masks: OnnxMasks):
         self.masks = masks
@@ -98,14 +98,14 @@ class EverySecond:
 def drift_of(network: OnnxMasks | EverySecond | None, scans: Scans) -> Drift:
     pairs = scans.pairs(1)
     match = ScanMatch(scans.n, scans.cell_m, recipe.search_of(scans.settings))
-    # Sequence by sequence, so that no mask is another's.
+    # By sequence, so that no mask is used across sequences.
     found = [motions(scans, pairs[at], network, match) for at in split(scans.sequence[pairs[:, 0]])]
     return drift(scans, np.concatenate(found), pairs)
 
 
-def markdown(contenders: list[Contender], unmasked: Drift) -> str:
+def markdown(candidates: list[Candidate], unmasked: Drift) -> str:
     rows = [("no mask", "", "", "", unmasked)]
-    rows += [(one.name, one.numbers, f"{one.megabytes:.1f}", f"{one.pair_ms:.1f}", one.drift) for one in contenders]
+    rows += [(one.name, one.numbers, f"{one.megabytes:.1f}", f"{one.pair_ms:.1f}", one.drift) for one in candidates]
     lines = ["| network | numbers | MB | ms | translation, % | rotation, deg/100 m |", "|---|---|---|---|---|---|"]
     for *cells, error in rows:
         cells += [f"{error.translation_percent:.2f}", f"{error.rotation_deg_per_100m:.2f}"]

@@ -1,4 +1,4 @@
-"""Distillation: a network learns another one's masks, before the search teaches it."""
+"""Distillation: a network learns the masks of a teacher before it is trained through the search."""
 
 from pathlib import Path
 
@@ -11,8 +11,8 @@ from .train import Trainer, fingerprint, trained
 
 
 class Distiller(Trainer):
-    """A training whose loss is how far the masks are from those of a teacher: a pose tells three numbers a pair, a teacher
-    one for each cell."""
+    """A training whose loss is the distance of the masks from those of a teacher: a pose gives three numbers a pair, a
+    teacher one for each cell."""
 
     def __init__(self, teacher: Path, *arguments, **options):
         self.teacher, self.taught_by = trained(teacher), fingerprint(teacher)
@@ -23,7 +23,7 @@ class Distiller(Trainer):
         return {"teacher": self.taught_by}
 
     def loss(self, batch: Batch) -> Tensor:
-        """Cross entropy, each cell weighed by its power: a mask of nothing does not matter."""
+        """Returns the cross entropy, weighted by the power of each cell: the mask of an empty cell does not matter."""
         scans = torch.stack([batch.later, batch.earlier], 1)
         with torch.no_grad():
             masks = torch.sigmoid(self.teacher.logits_of_pairs(scans))

@@ -1,4 +1,4 @@
-"""How far motions lead astray: the KITTI odometry metric, on whatever stretches the sequences are long enough for."""
+"""The KITTI odometry errors (Geiger et al. 2012), with shorter segments for short sequences."""
 
 from dataclasses import dataclass
 
@@ -8,13 +8,13 @@ from torch import nn
 
 from .pairs import Scans, between
 
-# Stretches, m. Training worlds are shorter than KITTI's 800 m.
+# Segment lengths, m. Many training worlds are shorter than the 800 m of KITTI.
 LENGTHS = (50, 100, 150, 200, 300, 400, 500, 600, 700, 800)
 
 
 @dataclass(frozen=True)
 class Drift:
-    """Mean errors of all stretches, and of single motions."""
+    """Mean errors over all segments, and of single motions (relative pose error)."""
 
     translation_percent: float
     rotation_deg_per_100m: float
@@ -29,7 +29,7 @@ class Drift:
 
 
 def chain(motions: np.ndarray) -> np.ndarray:
-    """Poses (k + 1, 3) of k motions, the first at the origin."""
+    """Returns the poses (k + 1, 3) of k motions, the first at the origin."""
     poses = np.zeros((len(motions) + 1, 3))
     for k, (x, y, yaw) in enumerate(motions):
         cos, sin = np.cos(poses[k, 2]), np.sin(poses[k, 2])
@@ -37,13 +37,14 @@ def chain(motions: np.ndarray) -> np.ndarray:
     return poses
 
 
-def stretches(true: np.ndarray, found: np.ndarray, step: int = 4) -> np.ndarray:
-    """Errors (k, 2) of stretches of each length, translation (a share) and rotation (rad/m): KITTI's devkit."""
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(true[:, :2], axis=0), axis=1))])
+def segments(true: np.ndarray, found: np.ndarray, step: int = 4) -> np.ndarray:
+    """Returns the errors (k, 2) of the segments of each length as in the KITTI development kit: translation (relative to the
+    length) and rotation (rad/m)."""
+    distance = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(true[:, :2], axis=0), axis=1))])
     errors = []
     for length in LENGTHS:
         first = np.arange(0, len(true), step)
-        last = np.searchsorted(way, way[first] + length)
+        last = np.searchsorted(distance, distance[first] + length)
         first, last = first[last < len(true)], last[last < len(true)]
         if len(first):
             error = between(between(true[first], true[last]), between(found[first], found[last]))
@@ -52,10 +53,10 @@ def stretches(true: np.ndarray, found: np.ndarray, step: int = 4) -> np.ndarray:
 
 
 def drift(scans: Scans, found: np.ndarray, pairs: np.ndarray) -> Drift:
-    """The drift of the motions `found` (k, 3) between consecutive scans."""
+    """Returns the drift of the motions `found` (k, 3) between consecutive scans."""
     true = scans.motions(pairs)
     sequence = scans.sequence[pairs[:, 0]]
-    errors = np.concatenate([stretches(chain(true[at]), chain(found[at])) for at in split(sequence)])
+    errors = np.concatenate([segments(chain(true[at]), chain(found[at])) for at in split(sequence)])
     single = between(true, found)
     share, turn = errors.mean(0) if len(errors) else (np.nan, np.nan)
     return Drift(
@@ -67,12 +68,13 @@ def drift(scans: Scans, found: np.ndarray, pairs: np.ndarray) -> Drift:
 
 
 def split(sequence: np.ndarray) -> list[np.ndarray]:
+    """Returns the indices of each sequence."""
     return [np.flatnonzero(sequence == one) for one in np.unique(sequence)]
 
 
 @torch.no_grad()
 def motions(scans: Scans, pairs: np.ndarray, network: nn.Module | None, match: nn.Module, batch: int = 16) -> np.ndarray:
-    """Motions (k, 3) between the scans as the network (where there is one) masks them, by the highest peaks."""
+    """Returns the motions (k, 3) between scans with the masks of `network` (None: without masks), by the highest peaks."""
     device = next(match.buffers()).device
     found = []
     for k in range(0, len(pairs), batch):

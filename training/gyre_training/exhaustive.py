@@ -1,4 +1,4 @@
-"""The search of Masking by Moving (Barnes et al. 2019): every angle with every shift. What f-mbym is measured against."""
+"""The search of Masking by Moving (Barnes et al. 2019), every angle with every shift: the baseline of f-mbym."""
 
 import math
 
@@ -10,7 +10,7 @@ from .search import SearchConfig, TranslationSearch, sampled
 
 
 class ExhaustiveMatch(nn.Module):
-    """MbyM's search: every angle of a grid, each with all shifts (Barnes et al. 2019; `raw` in Weston et al.)."""
+    """The exhaustive search over a grid of angles and all shifts (`raw` in Weston et al.)."""
 
     def __init__(self, n: int, cell_m: float, config: SearchConfig, reach_deg: float = 15.0, step_deg: float = 1.0):
         super().__init__()
@@ -22,20 +22,20 @@ class ExhaustiveMatch(nn.Module):
             self.register_buffer(name, value, persistent=False)
 
     def _scores(self, later: Tensor, earlier: Tensor) -> Tensor:
-        """Sums of products, (batch, angles, shifts, shifts): a factor common to all is nothing to either kind of peak."""
+        """Returns the correlations (batch, angles, shifts, shifts), not normalised: a common factor changes neither kind of peak."""
         search = self.translation
-        # The batch as channels: all scans are turned by the same angles, so one set of places serves them all.
+        # The batch as channels: all scans are rotated by the same angles, so they share one sampling grid.
         turned = sampled(earlier.expand(len(self.angles), *earlier.shape), self.grid) * self.inside[:, None]
         return search.products(search.spectra(turned) * search.spectra(later).conj()).transpose(0, 1)
 
     def forward(self, later: Tensor, earlier: Tensor) -> Tensor:
-        """The motion by soft peaks over all three unknowns: (batch, 3)."""
+        """Returns the motions (batch, 3) by a soft-argmax over all three unknowns."""
         within, shifts = self.translation.within, self.translation.shifts
         scores = self._scores(later, earlier)[:, :, within][..., within]
         weights = self.translation.config.soft.weights(scores.flatten(1)).view_as(scores)
         angles = (weights.sum((2, 3)) * self.angles).sum(1)
         near = shifts[within].to(weights)
-        # A shift is one of g turned by its own angle: x and y are weighed, not shifts.
+        # A shift is in the frame of the rotated scan: the mean is over x and y, not over shifts.
         u, v = near[:, None].expand(len(near), -1), near[None, :].expand(len(near), -1)
         x, y = (-self.translation.cell_m * s for s in (u, v))
         cos, sin = torch.cos(self.angles)[:, None, None], torch.sin(self.angles)[:, None, None]
@@ -44,7 +44,7 @@ class ExhaustiveMatch(nn.Module):
 
     @torch.no_grad()
     def hard(self, later: Tensor, earlier: Tensor) -> Tensor:
-        """The motion by the highest peak: (batch, 3)."""
+        """Returns the motions (batch, 3) by the highest peak."""
         scores = self._scores(later, earlier)
         best = scores[:, :, self.translation.within][..., self.translation.within].amax((2, 3))
         k = best[:, 1:-1].argmax(1) + 1

@@ -1,4 +1,4 @@
-"""A trained network as an ONNX file, and what ONNX Runtime makes of it."""
+"""Export of a trained network as an ONNX file, quantisation, and its masks by ONNX Runtime."""
 
 import tempfile
 from pathlib import Path
@@ -17,7 +17,7 @@ OPSET = 17
 
 
 class OnnxMasks:
-    """An ONNX file in the place of a `MaskNetwork`: the same masks as at run time."""
+    """An ONNX file with the interface of `MaskNetwork`: the masks that Gyre computes."""
 
     def __init__(self, path: Path, threads: int = 1):
         options = onnxruntime.SessionOptions()
@@ -27,7 +27,7 @@ class OnnxMasks:
         self.inputs = self.session.get_inputs()[0].shape[1]
 
     def __call__(self, scans: Tensor) -> Tensor:
-        """(batch, inputs, n, n) to the same, one after the other."""
+        """Returns masks (batch, inputs, n, n) of scans of that shape, one at a time."""
         masks = [self.session.run(None, {"scans": one[None].numpy()})[0] for one in scans.cpu()]
         return torch.from_numpy(np.concatenate(masks)).to(scans.device)
 
@@ -39,8 +39,8 @@ class OnnxMasks:
 
 
 def export(network: MaskNetwork, n: int, path: Path) -> None:
-    """Writes the network for rasters of n x n cells, one pair (or scan) at a time, batch norms folded, and checks that
-    ONNX Runtime finds the same masks."""
+    """Writes the network for rasters of n x n cells with a batch of 1, and checks that ONNX Runtime computes the same
+    masks."""
     network = network.eval().cpu()
     example = 255 * torch.rand(1, network.config.inputs, n, n, generator=torch.Generator().manual_seed(1)) ** 4
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -54,9 +54,9 @@ def export(network: MaskNetwork, n: int, path: Path) -> None:
 
 
 def quantise(path: Path, scans: Scans, out: Path, examples: int = 64) -> None:
-    """Writes the network in 8-bit integers: weights one scale a feature, activations one scale a tensor, each set on
-    scans that it was trained on. Activations are unsigned and weights signed, which is what x86 multiplies fastest; weights
-    use 7 of their bits, since processors without VNNI add two products in 16 bits, where twice 255 x 127 does not fit."""
+    """Writes the network quantised to 8-bit integers: weights per channel, activations per tensor, calibrated on training
+    scans. Activations are unsigned and weights signed, which x86 multiplies fastest. Weights use 7 bits, because processors
+    without VNNI add two products in 16 bits, which overflow at 2 x 255 x 127."""
     with tempfile.TemporaryDirectory() as folder:
         prepared = Path(folder) / "prepared.onnx"
         quant_pre_process(str(path), str(prepared))
@@ -73,7 +73,7 @@ def quantise(path: Path, scans: Scans, out: Path, examples: int = 64) -> None:
 
 
 class Calibration(quantization.CalibrationDataReader):
-    """Scans spread evenly over a file."""
+    """Calibration scans, spread evenly over a file."""
 
     def __init__(self, scans: Scans, inputs: int, examples: int):
         pairs = scans.pairs(1)

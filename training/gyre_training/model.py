@@ -1,4 +1,4 @@
-"""From a finished training to a model that Gyre runs."""
+"""Publishes a finished run as a model for Gyre."""
 
 import csv
 from pathlib import Path
@@ -12,7 +12,7 @@ from .worlds import followed, worlds_of
 
 
 def publish(recipe: Recipe, folder: Path, pairs: Path, models: Path) -> Path:
-    """Writes the best epoch of a run as `NAME.onnx` and its card."""
+    """Writes the best epoch of a run as `NAME.onnx` with its card and returns the path."""
     network, scans = trained(folder / "best.pt"), Scans(pairs / "train.npy")
     path = models / f"{recipe.name}.onnx"
     export(network, scans.n, path)
@@ -26,7 +26,7 @@ def publish(recipe: Recipe, folder: Path, pairs: Path, models: Path) -> Path:
 
 
 def provenance(recipe: Recipe, folder: Path, scans: Scans) -> dict:
-    """How the model came about: what its card says beside what it looks at."""
+    """Returns the provenance of the model for its card."""
     state = load(folder / "best.pt")
     with (folder / "log.csv").open() as file:
         rows = list(csv.DictReader(file))
@@ -52,7 +52,7 @@ def provenance(recipe: Recipe, folder: Path, scans: Scans) -> dict:
 
 
 def data(scans: Scans) -> str:
-    """What the scans are of. Simulated ones are known by their worlds' names."""
+    """Returns the source of the scans. Simulated ones have the names of worlds."""
     names = [sequence["name"] for sequence in scans.settings["sequences"]]
     others = sorted(set(names) - {world.stem for world in worlds_of("train")})
     return f"recordings: {', '.join(others)}" if others else "simulated only: training/worlds/train"

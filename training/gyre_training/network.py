@@ -1,4 +1,4 @@
-"""The masking networks: Weston et al., Table II, and lighter ones of the same shape."""
+"""The mask networks: the U-Net of Weston et al., Table II, and lighter variants."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -11,19 +11,19 @@ from .checkpoint import recomputed
 from .exchange import symmetrise
 from .polar import to_polar, to_raster
 
-# Rasters hold powers above a floor, 0 to 255.
+# Rasters have powers of 0 to 255.
 FULL_SCALE = 255.0
 
 
 @dataclass(frozen=True)
 class NetworkConfig:
-    """A U-Net over `inputs` scans (2: the later and the earlier one; 1: each on its own).
+    """A U-Net of `inputs` scans (2: the later and the earlier one together; 1: each scan by itself).
 
-    `widths` are the features of the levels, each half the size of the one before. With `shrink` of 2 the masks are
-    computed at half the resolution and enlarged. With `fold` of 4 each square of 4 x 4 cells becomes one cell of 16
-    features, and so many features become the masks of such a square: all that is fine is kept, but every convolution is
-    done on a sixteenth of the cells. `separable` blocks filter each feature on its own, then mix them. A `polar` network
-    sees azimuth and range instead of x and y. Networks of two scans treat both alike (`exchange.py`).
+    `widths` are the features of the levels, each at half the resolution of the one before. `shrink = 2` computes masks at
+    half the resolution and upsamples them. `fold = 4` makes each square of 4 x 4 cells one cell of 16 features
+    (space-to-depth) and unfolds the masks at the end: no detail is lost, and each convolution has a sixteenth of the cells.
+    `separable` uses depthwise separable convolutions. `polar` resamples to azimuth and range. Networks of two scans are
+    symmetric (`exchange.py`).
     """
 
     inputs: int = 2
@@ -46,7 +46,7 @@ class NetworkConfig:
 
 
 def convolution(inputs: int, outputs: int, separable: bool) -> nn.Module:
-    """3 x 3, batch norm, ReLU."""
+    """Returns a 3 x 3 convolution with batch norm and ReLU."""
     if separable and inputs >= 8:
         layers = [
             nn.Conv2d(inputs, inputs, 3, padding=1, groups=inputs, bias=False),
@@ -62,19 +62,19 @@ def block(inputs: int, outputs: int, separable: bool) -> nn.Module:
 
 
 def joined(x: Tensor, skip: Tensor) -> Tensor:
-    """What comes up from the level below, beside what was skipped to here. Odd sizes are halved downward, so the way back
-    goes to the skip's own size."""
+    """Returns the upsampled features of the level below, concatenated with the skip connection. Odd sizes are halved
+    downward, so the features are upsampled to the size of the skip."""
     return torch.cat([F.interpolate(x, size=skip.shape[-2:], mode="bilinear", align_corners=False), skip], 1)
 
 
 class MaskNetwork(nn.Module):
-    """Masks of scans, Eq. 9: (batch, inputs, n, n) of powers to the same shape of factors between 0 and 1."""
+    """Masks of scans (Eq. 9): powers (batch, inputs, n, n) to factors of 0 to 1 of the same shape."""
 
     def __init__(self, config: NetworkConfig = NetworkConfig()):
         super().__init__()
         self.config = config
-        self.checkpoint = False  # while training: less memory, more time
-        self.mixed_precision = False  # while training: features in bfloat16
+        self.checkpoint = False  # in training only: less memory, more time
+        self.mixed_precision = False  # in training only: features in bfloat16
         widths, separable = config.widths, config.separable
         folded = config.inputs * config.fold**2
         pairs = zip((folded, *widths), widths)
@@ -83,14 +83,14 @@ class MaskNetwork(nn.Module):
         self.decoder = nn.ModuleList(block(i + o, o, separable) for i, o in pairs)
         self.masks = nn.Conv2d(widths[0], folded, 3, padding=1)
         self.symmetrise()
-        # A place's features beside each other: a third faster on a CPU.
+        # Channels last: a third faster on a CPU.
         self.to(memory_format=torch.channels_last)
 
     def forward(self, scans: Tensor) -> Tensor:
         return torch.sigmoid(self.logits(scans))
 
     def logits(self, scans: Tensor) -> Tensor:
-        """What the sigmoid is taken of."""
+        """Returns the masks before the sigmoid."""
         if not (self.mixed_precision and self.training):
             return self._logits(scans)
         with torch.autocast(scans.device.type, torch.bfloat16):
@@ -129,18 +129,18 @@ class MaskNetwork(nn.Module):
         return function(*inputs)
 
     def masked(self, later: Tensor, earlier: Tensor) -> tuple[Tensor, Tensor]:
-        """Both scans (batch, n, n) as their masks leave them (Eq. 10)."""
+        """Returns both scans (batch, n, n) multiplied with their masks (Eq. 10)."""
         scans = torch.stack([later, earlier], 1)
         return tuple((scans * torch.sigmoid(self.logits_of_pairs(scans))).unbind(1))
 
     def logits_of_pairs(self, scans: Tensor) -> Tensor:
-        """`logits` of (batch, 2, n, n), whether the network looks at both scans at once or at each on its own."""
+        """Returns the logits of pairs (batch, 2, n, n), for networks of two scans and of single scans."""
         if self.config.inputs == 1:
             return self.logits(scans.flatten(0, 1)[:, None]).view_as(scans)
         return self.logits(scans)
 
     def symmetrise(self) -> None:
-        """Of two scans neither is preferred: to be called after each change of the weights."""
+        """Makes a network of two scans symmetric. Call it after each change of the weights."""
         if self.config.inputs == 1:
             return
         widths = self.config.widths

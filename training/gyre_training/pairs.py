@@ -1,4 +1,4 @@
-"""Pairs of scans with their true motions, from the file that `gyre-lab export-pairs` writes."""
+"""Pairs of scans with their true motions, from a file of `gyre-lab export-pairs`."""
 
 import hashlib
 import json
@@ -13,7 +13,7 @@ from torch import Tensor
 
 @dataclass(frozen=True)
 class Batch:
-    """Rasters (batch, n, n) of both scans, and the motions (batch, 3) between them: x, y (m), yaw (rad)."""
+    """Rasters (batch, n, n) of both scans and the true motions (batch, 3) between them: x, y (m), yaw (rad)."""
 
     later: Tensor
     earlier: Tensor
@@ -24,7 +24,7 @@ class Batch:
 
 
 def between(earlier: np.ndarray, later: np.ndarray) -> np.ndarray:
-    """The pose of the later frame in the earlier one: (k, 3) from two (k, 3) of x, y, yaw."""
+    """Returns the poses (k, 3) of the later frames in the earlier ones; arguments and result are x, y, yaw."""
     dx, dy = (later - earlier)[:, :2].T
     cos, sin = np.cos(earlier[:, 2]), np.sin(earlier[:, 2])
     yaw = later[:, 2] - earlier[:, 2]
@@ -33,7 +33,7 @@ def between(earlier: np.ndarray, later: np.ndarray) -> np.ndarray:
 
 
 class Scans:
-    """One file of scans, mapped into memory; nothing is read before it is needed."""
+    """The scans of one file, mapped into memory."""
 
     def __init__(self, path: Path):
         self.records = np.load(path, mmap_mode="r")
@@ -44,25 +44,25 @@ class Scans:
         self.pose = np.array(self.records["pose"])
 
     def fingerprint(self) -> str:
-        """What tells this file from others: its poses, some of its rasters, and what they are meant to be."""
-        meant = {key: value for key, value in self.settings.items() if key not in ("sequences", "version", "commit")}
-        digest = hashlib.sha256(json.dumps(meant, sort_keys=True, default=str).encode())
+        """Returns a hash of the poses, of some rasters, and of the settings."""
+        settings = {key: value for key, value in self.settings.items() if key not in ("sequences", "version", "commit")}
+        digest = hashlib.sha256(json.dumps(settings, sort_keys=True, default=str).encode())
         digest.update(self.pose.tobytes())
         digest.update(self.records[:: max(1, len(self.records) // 16)].tobytes())
         return digest.hexdigest()
 
     def pairs(self, step: int) -> np.ndarray:
-        """Indices (k, 2) of the earlier and the later of scans that are `step` apart in the same sequence."""
+        """Returns the indices (k, 2) of the earlier and the later scan of all pairs that are `step` apart in one sequence."""
         first = np.arange(len(self.sequence) - step)
         first = first[self.sequence[first] == self.sequence[first + step]]
         return np.stack([first, first + step], 1)
 
     def motions(self, pairs: np.ndarray) -> np.ndarray:
-        """True motions (k, 3)."""
+        """Returns the true motions (k, 3)."""
         return between(self.pose[pairs[:, 0]], self.pose[pairs[:, 1]])
 
     def rasters(self, indices: np.ndarray) -> Tensor:
-        """(k, n, n)."""
+        """Returns the rasters (k, n, n)."""
         return torch.from_numpy(self.records["raster"][indices].astype(np.float32))
 
     def batch(self, pairs: np.ndarray) -> Batch:
@@ -72,30 +72,30 @@ class Scans:
 
 @dataclass(frozen=True)
 class Sampling:
-    """Which pairs a network learns from."""
+    """The choice of training pairs."""
 
-    # How many scans lie between the two at most, the later one counted.
+    # Largest difference of the two scans' indices.
     steps: int = 3
-    # Largest shift (m) along each axis and largest angle (deg): what lies at a search's edge teaches nothing.
+    # Largest shift (m) along each axis and largest angle (deg): below the limits of the search, with a margin for the peak.
     reach_m: float = 11.0
     reach_deg: float = 18.0
-    # What moves less (m) and turns less (deg) is standing, and only this share of such pairs is kept.
+    # A pair that moves less (m) and turns less (deg) is standing; only this share of such pairs is used.
     standing_m: float = 0.1
     standing_deg: float = 0.2
     standing_share: float = 0.1
 
     def pairs(self, scans: Scans, seed: int) -> np.ndarray:
-        """All pairs to learn from, in the file's order."""
+        """Returns all training pairs in the order of the file."""
         pairs = np.concatenate([scans.pairs(step) for step in range(1, self.steps + 1)])
         motion = scans.motions(pairs)
         shift, angle = np.abs(motion[:, :2]).max(1), np.degrees(np.abs(motion[:, 2]))
         standing = (shift < self.standing_m) & (angle < self.standing_deg)
-        lucky = np.random.default_rng([seed, 0x57A2D]).random(len(pairs)) < self.standing_share
-        return pairs[(shift < self.reach_m) & (angle < self.reach_deg) & (~standing | lucky)]
+        drawn = np.random.default_rng([seed, 0x57A2D]).random(len(pairs)) < self.standing_share
+        return pairs[(shift < self.reach_m) & (angle < self.reach_deg) & (~standing | drawn)]
 
 
 def augmented(batch: Batch, rng: np.random.Generator) -> Batch:
-    """The same scenes as other drives could have seen them: mirrored, driven backward in time, with another gain."""
+    """Returns a copy that is randomly mirrored, reversed in time, and scaled in power."""
     count = len(batch.motion)
     mirrored, reversed_, gain = rng.random(count) < 0.5, rng.random(count) < 0.5, rng.uniform(0.8, 1.25, count)
     mirrored, reversed_ = torch.from_numpy(mirrored), torch.from_numpy(reversed_)
@@ -111,12 +111,12 @@ def augmented(batch: Batch, rng: np.random.Generator) -> Batch:
 
 
 def mirror(rasters: Tensor, which: Tensor) -> Tensor:
-    """Left and right exchanged where `which` says so."""
+    """Flips the rasters chosen by `which` left to right."""
     return torch.where(which[:, None, None], rasters.flip(2), rasters)
 
 
 def inverse(motion: Tensor) -> Tensor:
-    """The pose of the earlier frame in the later one."""
+    """Returns the poses of the earlier frames in the later ones."""
     x, y, yaw = motion.unbind(1)
     cos, sin = torch.cos(yaw), torch.sin(yaw)
     return torch.stack([-(cos * x + sin * y), sin * x - cos * y, -yaw], 1)

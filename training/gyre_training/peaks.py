@@ -1,4 +1,4 @@
-"""Where among scores the motion lies: at a soft peak, which has gradients everywhere, or at the highest one, between samples."""
+"""Peaks of scores: the soft-argmax, which is differentiable, and the highest peak with sub-sample interpolation."""
 
 from dataclasses import dataclass
 
@@ -8,32 +8,32 @@ from torch import Tensor
 
 @dataclass(frozen=True)
 class SoftArgmax:
-    """Mean of all positions, weighted with exp(temperature * score), of scores less their mean and over their largest
-    magnitude: so a temperature means the same for any raster (lines 15 and 19)."""
+    """The mean position, weighted by exp(temperature * score) (lines 15 and 19). Scores are centred and divided by their
+    largest magnitude, so that a temperature means the same for any raster."""
 
     temperature: float = 48.0
 
     def weights(self, scores: Tensor) -> Tensor:
-        """(batch, positions) -> (batch, positions), each row summing to 1."""
+        """Returns the weights (batch, positions) of scores (batch, positions); each row sums to 1."""
         scores = scores - scores.mean(1, keepdim=True)
         largest = scores.abs().amax(1, keepdim=True).clamp_min(1e-20)
         return torch.softmax(self.temperature * scores / largest, 1)
 
 
-# Samples on each side of the highest one that a fit looks at, and how far from it a fit may end.
+# Samples on each side of the highest one that a fit uses, and the largest offset of a fit.
 SUPPORT = 3
-FARTHEST = 0.75
+MAX_OFFSET = 0.75
 
 
 def around(scores: Tensor, best: Tensor, count: int) -> Tensor:
-    """The samples within SUPPORT of the best one, the ends repeated: (batch, 2 SUPPORT + 1), double."""
+    """Returns the samples within SUPPORT of the best one (batch, 2 SUPPORT + 1) in double; the ends are repeated."""
     at = best[:, None] + torch.arange(-SUPPORT, SUPPORT + 1, device=best.device)
     return scores.gather(1, at.clamp(0, count - 1)).double()
 
 
 def line_peak(kind: str, samples: Tensor) -> Tensor:
-    """The maximum's place beside the middle sample: a parabola through three, or one through the logarithm above a
-    pedestal, which is a Gaussian."""
+    """Returns the offset of the maximum from the middle sample, by a parabola through three samples or through their
+    logarithms above a pedestal (a Gaussian)."""
     near = samples[:, SUPPORT - 1 : SUPPORT + 2]
     if kind == "gaussian":
         highest = near[:, 1:2]
@@ -43,15 +43,16 @@ def line_peak(kind: str, samples: Tensor) -> Tensor:
 
 
 def parabola(near: Tensor) -> Tensor:
-    """The summit of the parabola through three samples (..., 3), beside the middle one; at it where there is none."""
+    """Returns the offset of the vertex of the parabola through three samples (..., 3) from the middle one, 0 without a
+    maximum."""
     a, b, c = near.unbind(-1)
     curvature = a - 2 * b + c
-    offset = (0.5 * (a - c) / curvature.clamp_max(-1e-12)).clamp(-FARTHEST, FARTHEST)
+    offset = (0.5 * (a - c) / curvature.clamp_max(-1e-12)).clamp(-MAX_OFFSET, MAX_OFFSET)
     return torch.where(curvature < 0, offset, 0.0)
 
 
 def plane_peak(kind: str, scores: Tensor, i: int, j: int) -> Tensor:
-    """The maximum's place (down, right) beside the sample (i, j)."""
+    """Returns the offset (down, right) of the maximum from the sample (i, j)."""
     near = scores[i - 1 : i + 2, j - 1 : j + 2]
     parabolas = parabola(torch.stack([near[:, 1], near[1]]))
     if kind != "gaussian":
@@ -63,7 +64,7 @@ def plane_peak(kind: str, scores: Tensor, i: int, j: int) -> Tensor:
 
 
 def paraboloid(near: Tensor) -> Tensor | None:
-    """The summit of the paraboloid that fits nine samples best, where it has one nearby."""
+    """Returns the offset of the vertex of the least-squares paraboloid of 3 x 3 samples, None without a maximum nearby."""
     steps = torch.tensor([-1.0, 0.0, 1.0], dtype=torch.float64, device=near.device)
     i, j = steps[:, None], steps[None, :]
     gradient = torch.stack([(near * i).sum(), (near * j).sum()]) / 6
@@ -74,4 +75,4 @@ def paraboloid(near: Tensor) -> Tensor | None:
         return None
     offset = torch.stack([cross * gradient[1] - right * gradient[0], cross * gradient[0] - down * gradient[1]])
     offset = offset / determinant
-    return offset if offset.abs().max() <= FARTHEST else None
+    return offset if offset.abs().max() <= MAX_OFFSET else None

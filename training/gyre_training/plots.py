@@ -1,4 +1,4 @@
-"""Plots, as SVG."""
+"""Plots as SVG."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import matplotlib
 
 matplotlib.use("svg")
-# The same numbers give the same file.
+# Deterministic files.
 matplotlib.rcParams |= {"svg.hashsalt": "gyre", "svg.fonttype": "none", "axes.grid": True, "grid.alpha": 0.3, "font.size": 9}
 
 from matplotlib import pyplot  # noqa: E402
@@ -19,14 +19,14 @@ from matplotlib.ticker import LogLocator, NullFormatter  # noqa: E402
 from .train import load  # noqa: E402
 
 if TYPE_CHECKING:
-    from .compare import Contender
+    from .compare import Candidate
     from .step_time import Measurement
 
 PANEL_INCHES = (4.6, 3.4)
 
 
 def panels(count: int) -> tuple[pyplot.Figure, Sequence[pyplot.Axes]]:
-    """Panels side by side."""
+    """Returns a figure with panels side by side."""
     width, height = PANEL_INCHES
     return pyplot.subplots(1, count, figsize=(count * width, height), layout="constrained")
 
@@ -38,7 +38,8 @@ def save(figure: pyplot.Figure, path: Path) -> None:
 
 
 def step_times(measurements: list[Measurement], limit_mib: float, path: Path) -> None:
-    """A step's time and memory against the batch (Weston et al., Fig. 2); a cross is a batch that passed the limit."""
+    """Plots time and memory of a training step over batch size (Weston et al., Fig. 2); a cross marks a batch above the
+    memory limit."""
     figure, (time, memory) = panels(2)
     for method in dict.fromkeys(one.method for one in measurements):
         ours = [one for one in measurements if one.method == method]
@@ -60,11 +61,11 @@ def step_times(measurements: list[Measurement], limit_mib: float, path: Path) ->
     save(figure, path)
 
 
-def speed_and_drift(contenders: Sequence[Contender], path: Path) -> None:
-    """Drift against the time of a mask: hollow in floats, full in integers, a line between the two of one network."""
+def speed_and_drift(candidates: Sequence[Candidate], path: Path) -> None:
+    """Plots drift over inference time: hollow markers in floats, filled ones in integers, a line for each network."""
     figure, axes = panels(2)
-    for name in dict.fromkeys(one.name for one in contenders):
-        ours = [one for one in contenders if one.name == name]
+    for name in dict.fromkeys(one.name for one in candidates):
+        ours = [one for one in candidates if one.name == name]
         for panel, error in zip(axes, ("translation_percent", "rotation_deg_per_100m")):
             places = [(one.pair_ms, getattr(one.drift, error)) for one in ours]
             (line,) = panel.plot(*zip(*places), "-", linewidth=1, label=name)
@@ -81,7 +82,7 @@ def speed_and_drift(contenders: Sequence[Contender], path: Path) -> None:
 
 
 def training_log(folder: Path) -> Path:
-    """`log.csv` of a training as `log.svg` beside it: loss, validation drift and learning rate over the epochs."""
+    """Plots `log.csv` of a run as `log.svg` (loss, validation drift and learning rate over epochs) and returns its path."""
     with (folder / "log.csv").open(newline="") as file:
         rows = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
     columns = {key: [row[key] for row in rows] for key in rows[0]}

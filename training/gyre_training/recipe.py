@@ -1,4 +1,4 @@
-"""Recipes: all that makes a model, in one file of `recipes/`."""
+"""Recipes: the files of `recipes/`, each with all settings of a model."""
 
 import math
 import tomllib
@@ -16,18 +16,18 @@ PROJECT = HOME.parent
 
 @dataclass(frozen=True)
 class Recipe:
-    """`raster` names the file of `rasters/` that says what the networks look at: a configuration of Gyre."""
+    """The settings of a model. `raster` names a file of `rasters/`: the Gyre configuration of its input."""
 
     name: str
     raster: str
     network: NetworkConfig
     training: TrainingConfig
-    # The recipe whose network this one begins with.
+    # The recipe whose best weights initialise the network.
     initial: str | None = None
-    # The recipe whose masks the network learns first, and how.
+    # The recipe whose masks are distilled before the training, and the settings of the distillation.
     teacher: str | None = None
     distillation: TrainingConfig = TrainingConfig()
-    # Whether the model computes in 8-bit integers.
+    # Quantise the model to 8-bit integers.
     integers: bool = False
 
     @property
@@ -35,7 +35,7 @@ class Recipe:
         return HOME / "rasters" / f"{self.raster}.toml"
 
 
-# What a search of Gyre may do that `ScanMatch` does not, and the only values that it knows.
+# Options of Gyre's search that `ScanMatch` lacks, with the only values that it supports.
 FIXED = {
     "rotation": {"magnitude": "linear", "phase_only": False},
     "translation": {"phase_only": False, "half_turn": False},
@@ -43,15 +43,15 @@ FIXED = {
 
 
 def search_of(settings: dict) -> SearchConfig:
-    """The search that the rasters' own configuration describes, as `gyre-lab export-pairs` resolved it. One that networks cannot
-    be trained through is refused."""
+    """Returns the search of the rasters' configuration, as `gyre-lab export-pairs` resolved it. A search that `ScanMatch` does
+    not support is refused."""
     rotation, translation = settings["rotation"], settings["translation"]
     for section, fixed in FIXED.items():
         for key, value in fixed.items():
             if settings[section].get(key, value) != value:
-                raise SystemExit(f"no network is trained through {section}.{key} = {settings[section][key]}: set it to {value}")
+                raise SystemExit(f"training does not support {section}.{key} = {settings[section][key]}: set it to {value}")
     if rotation.get("peak") != translation.get("peak"):
-        raise SystemExit("no network is trained through peaks of two kinds: set rotation.peak and translation.peak alike")
+        raise SystemExit("training needs one kind of peak: give rotation.peak and translation.peak the same value")
     known = {field.name for field in fields(SearchConfig)}
     values = {key: value for key, value in (translation | rotation).items() if key in known}
     band = values["band_high"] - values["band_low"]
@@ -60,7 +60,7 @@ def search_of(settings: dict) -> SearchConfig:
 
 
 def read(path: Path) -> Recipe:
-    """A recipe; what it cannot say is refused by name."""
+    """Reads a recipe; unknown keys are rejected by name."""
     try:
         values = tomllib.loads(path.read_text())
         if "distillation" in values and "teacher" not in values:
@@ -69,16 +69,16 @@ def read(path: Path) -> Recipe:
         stages = {stage: training_config(values.pop(stage, {})) for stage in ("training", "distillation")}
         return Recipe(name=path.stem, network=network, **stages, **values)
     except (OSError, TypeError, ValueError) as error:
-        raise SystemExit(f"{path} is no recipe: {error}") from error
+        raise SystemExit(f"{path} is not a valid recipe: {error}") from error
 
 
 def training_config(values: dict) -> TrainingConfig:
-    """A section `[training]` or `[distillation]`."""
+    """Returns the settings of a section `[training]` or `[distillation]`."""
     return TrainingConfig(**values | {"sampling": Sampling(**values.get("sampling", {}))})
 
 
 def lineage(path: Path) -> list[Recipe]:
-    """A recipe after those that it builds upon, the first one first."""
+    """Returns a recipe and those that it depends on, in the order of their training."""
     recipe = read(path)
     before = [lineage(path.with_name(f"{name}.toml")) for name in (recipe.teacher, recipe.initial) if name]
     return list({one.name: one for one in [*sum(before, []), recipe]}.values())

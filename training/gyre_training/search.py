@@ -1,11 +1,11 @@
-"""ScanMatch (Weston et al., Algorithm 1), differentiable, batch by batch.
+"""The decoupled scan matching of Weston et al., Algorithm 1 (ScanMatch), differentiable and batched.
 
 Frames and signs are those of Gyre's own search: rasters are (batch, n, n), row 0 far ahead, column 0 far left; a motion
-(x, y, yaw) is the pose of the later scan's frame in the earlier one's, metres and radians, y to the left and yaw
-counter-clockwise. With u, v the cells down and right of the middle, x = -u and y = -v.
+(x, y, yaw) is the pose of the later frame in the earlier one, in m and rad, y to the left and yaw counter-clockwise. With
+u, v the cells down and right of the middle, x = -u and y = -v.
 
-The slips of Algorithm 1 are put right: a correlation has a conjugate (lines 13 and 18), no angle and no shift is counted
-twice (lines 2 to 4), and padding reaches only as far as the shifts that are looked at (line 17).
+Differences from Algorithm 1 as printed: correlations have a conjugate (lines 13 and 18), no angle and no shift occurs
+twice (lines 2 to 4), and rasters are padded only for the shifts that are searched (line 17).
 """
 
 import math
@@ -20,7 +20,7 @@ from .peaks import SUPPORT, SoftArgmax, around, line_peak, parabola, plane_peak
 
 @dataclass(frozen=True)
 class SearchConfig:
-    """What a search looks at; the names are those of Gyre's sections `[rotation]` and `[translation]`."""
+    """The settings of the search, named as in Gyre's sections `[rotation]` and `[translation]`."""
 
     form: str = "eq7"
     window: str = "hann"
@@ -36,8 +36,8 @@ class SearchConfig:
 
 
 def fast_size(least: int) -> int:
-    """The size that Gyre's transforms take for at least `least` samples: even, of factors 2, 3, 5 and 11, where 5 and 11 cost
-    a quarter more. It sets what frequencies the rotation looks at, so it is to be the same here."""
+    """Returns the transform size that Gyre takes for at least `least` samples: even, with factors 2, 3, 5 and 11, where 5 and
+    11 cost a quarter more. It defines the frequencies of the rotation search, so it must be the same here."""
 
     def rest(n: int, primes: tuple[int, ...]) -> int:
         for prime in primes:
@@ -50,7 +50,7 @@ def fast_size(least: int) -> int:
 
 
 def window(kind: str, n: int) -> Tensor:
-    """Weights of an n x n raster before its transform (line 5)."""
+    """Returns the taper of an n x n raster before its transform (line 5)."""
     t = torch.arange(n, dtype=torch.float64) - (n - 1) / 2
     half = (n + 1) / 2
 
@@ -65,7 +65,7 @@ def window(kind: str, n: int) -> Tensor:
 
 
 class RotationSearch(nn.Module):
-    """The angle between two scans from their magnitude spectra (lines 5 to 15)."""
+    """The search for the angle between two scans by their magnitude spectra (lines 5 to 15)."""
 
     def __init__(self, n: int, config: SearchConfig):
         super().__init__()
@@ -78,67 +78,68 @@ class RotationSearch(nn.Module):
         self.register_buffer("shifts", torch.arange(-reach, reach + 1), persistent=False)
 
     def _polar_grid(self) -> tuple[Tensor, int, int]:
-        """Where the polar samples lie among the magnitudes of the band, as `grid_sample` wants it (line 11)."""
+        """Returns the `grid_sample` coordinates of the polar samples in the spectrum of the band (line 11), and its rows and
+        columns."""
         config = self.config
         bins = int(config.band_high * self.size) + 1
         rho = torch.linspace(config.band_low, config.band_high, config.radii, dtype=torch.float64) * self.size
         theta = -math.pi / 2 + torch.arange(config.angles, dtype=torch.float64) * (math.pi / config.angles)
         u, v = rho[:, None] * torch.cos(theta), rho[:, None] * torch.sin(theta)
-        u, v = torch.where(v < 0, -u, u), v.abs()  # a real image has the same magnitude at (-u, -v)
+        u, v = torch.where(v < 0, -u, u), v.abs()  # the magnitudes of a real image are symmetric
         return torch.stack([2 * v / bins - 1, u / bins], -1)[None].float(), bins, bins + 1
 
     def spectra(self, rasters: Tensor) -> Tensor:
-        """Polar magnitudes, transformed along the angle: (batch, profiles, angles // 2 + 1)."""
+        """Returns the polar magnitudes, transformed along the angle: (batch, profiles, angles // 2 + 1)."""
         plane = torch.fft.rfft2(rasters * self.window, s=(self.size, self.size))[..., : self.columns]
         plane = torch.cat([plane[:, -self.rows :], plane[:, : self.rows + 1]], 1)
-        # The root has no slope at zero: what is added lies far below a raster's rounding.
+        # The root is not differentiable at 0; the term added is far below the rounding of a raster.
         magnitude = (plane.real.square() + plane.imag.square() + 1e-12).sqrt()
         grid = self.grid.expand(len(rasters), -1, -1, -1)
         polar = F.grid_sample(magnitude[:, None], grid, align_corners=True, padding_mode="border")[:, 0]
         if self.config.form == "line14":
-            polar = polar.sum(1, keepdim=True)  # the mean over all radial shifts is that of the summed profiles
+            polar = polar.sum(1, keepdim=True)  # the mean over all radial shifts equals that of the summed profiles
         return torch.fft.rfft(polar - polar.mean(2, keepdim=True), dim=2)
 
     def correlation(self, later: Tensor, earlier: Tensor) -> Tensor:
-        """Scores of all angles within reach: (batch, angles) (Eq. 7, or line 14)."""
+        """Returns the scores (batch, angles) of all angles within reach (Eq. 7, or line 14)."""
         cross = (self.spectra(earlier) * self.spectra(later).conj()).sum(1)
         return torch.fft.irfft(cross, n=self.config.angles, dim=1)[:, self.shifts % self.config.angles]
 
     def soft(self, scores: Tensor) -> Tensor:
-        """The angle, radians: (batch,)."""
+        """Returns the angles (batch,) by the soft-argmax, rad."""
         return (self.config.soft.weights(scores) * self.shifts).sum(1) * self.step
 
     def local(self, scores: Tensor) -> Tensor:
-        """The angle at the highest peak by a parabola, radians, with gradients: (batch,)."""
+        """Returns the angles (batch,) of the highest peaks by a parabola, rad; differentiable."""
         best = scores.detach()[:, 1:-1].argmax(1) + 1
         near = scores.gather(1, best[:, None] + torch.arange(-1, 2, device=scores.device))
         return (self.shifts[best] + parabola(near)) * self.step
 
     def hard(self, scores: Tensor) -> Tensor:
-        """The angle at the highest peak, radians: (batch,)."""
+        """Returns the angles (batch,) of the highest peaks, rad."""
         best = scores[:, 1:-1].argmax(1) + 1
         offset = line_peak(self.config.peak, around(scores, best, len(self.shifts)))
         return (self.shifts[best] + offset) * self.step
 
 
-# How far outside of a raster, in cells, a place may lie that is still looked up: as far as rounding carries one.
+# A point this far outside of a raster (cells) still counts as inside: the tolerance for rounding.
 EDGE_CELLS = 1e-6
 
 
 def turn(middle: Tensor, angles: Tensor) -> tuple[Tensor, Tensor]:
-    """R x, down and right of the middle, of all cells x: each (angles, n, n)."""
+    """Returns R x of all cells x, down and right of the middle: each (angles, n, n)."""
     cos, sin = torch.cos(angles)[:, None, None], torch.sin(angles)[:, None, None]
     u, v = middle[:, None], middle[None, :]
     return cos * u - sin * v, sin * u + cos * v
 
 
 def sampled(rasters: Tensor, grid: Tensor) -> Tensor:
-    """Bilinear, (k, channels, n, n). What lies up to a cell outside would otherwise be blended with zeros."""
+    """Samples (k, channels, n, n) bilinearly; with border padding, as zero padding would darken the outermost cells."""
     return F.grid_sample(rasters, grid, align_corners=True, padding_mode="border")
 
 
 class TranslationSearch(nn.Module):
-    """The shift between two scans whose angle is known (lines 16 to 21)."""
+    """The search for the shift between two scans whose angle is known (lines 16 to 21)."""
 
     def __init__(self, n: int, cell_m: float, config: SearchConfig):
         super().__init__()
@@ -153,39 +154,40 @@ class TranslationSearch(nn.Module):
         self.register_buffer("middle", middle, persistent=False)
 
     def turned(self, rasters: Tensor, angles: Tensor) -> Tensor:
-        """g'(x) = g(R x), zero where R x lies outside of g (line 16)."""
+        """Returns the rotated rasters g'(x) = g(R x), zero if R x lies outside of g (line 16)."""
         grid, inside = self.places(angles)
         return sampled(rasters[:, None], grid)[:, 0] * inside
 
     def places(self, angles: Tensor) -> tuple[Tensor, Tensor]:
-        """R x of each cell x as `grid_sample` wants it, (angles, n, n, 2), and whether it lies inside, (angles, n, n)."""
+        """Returns the `grid_sample` coordinates of R x for each cell x, (angles, n, n, 2), and whether R x lies inside,
+        (angles, n, n)."""
         u, v = turn(self.middle, angles)
         with torch.no_grad():
-            # In double and with Gyre's own slack: at angles near zero a whole row lies on the edge, and counts or does not.
+            # In double and with Gyre's tolerance: at angles near zero a whole row lies on the edge.
             farthest = torch.maximum(*(t.abs() for t in turn(self.middle.double(), angles.double())))
             inside = farthest <= (self.n - 1) / 2 + EDGE_CELLS
         return torch.stack([v, u], -1) / ((self.n - 1) / 2), inside
 
     def spectra(self, rasters: Tensor) -> Tensor:
-        """Half spectra of rasters (..., n, n) with room for the shifts; the rows of zeros are not transformed."""
+        """Returns the half spectra of rasters (..., n, n), padded for the shifts; rows of zeros are not transformed."""
         return torch.fft.fft(torch.fft.rfft(rasters, n=self.size), n=self.size, dim=-2)
 
     def products(self, cross: Tensor) -> Tensor:
-        """Cross spectra back to sums of products at the shifts: only the rows that are looked at are transformed back."""
+        """Transforms cross spectra back to correlations at the shifts; only the rows that are needed are transformed."""
         near = self.shifts % self.size
         rows = torch.fft.ifft(cross, dim=-2)[..., near, :]
         return torch.fft.irfft(rows, n=self.size)[..., near]
 
     def correlation(self, later: Tensor, turned: Tensor) -> Tensor:
-        """Scores of all shifts (down, right): (batch, shifts, shifts) (lines 17 and 18)."""
+        """Returns the scores (batch, shifts, shifts) of all shifts (down, right) (lines 17 and 18)."""
         scores = self.products(self.spectra(turned) * self.spectra(later).conj())
         if self.config.overlap == "energy":
-            return scores / (self._left(later, 1) * self._left(turned, -1) + 1e-12).sqrt()
+            return scores / (self._overlap_energy(later, 1) * self._overlap_energy(turned, -1) + 1e-12).sqrt()
         energy = later.square().sum((1, 2)) * turned.square().sum((1, 2))
         return scores / (energy + 1e-12).sqrt()[:, None, None]
 
-    def _left(self, rasters: Tensor, sign: int) -> Tensor:
-        """Energy of each raster in what is left of it after each shift, from its sums over rectangles."""
+    def _overlap_energy(self, rasters: Tensor, sign: int) -> Tensor:
+        """Returns the energy of each raster in the overlap after each shift, by summed areas."""
         sums = F.pad(rasters.double().square().cumsum(1).cumsum(2), (1, 0, 1, 0))
         low = (-sign * self.shifts).clamp_min(0)
         high = self.n - (sign * self.shifts).clamp_min(0)
@@ -193,14 +195,15 @@ class TranslationSearch(nn.Module):
         return (rows[:, :, high] - rows[:, :, low]).clamp_min(0).to(rasters.dtype)
 
     def soft(self, scores: Tensor) -> Tensor:
-        """The shift (down, right), cells: (batch, 2)."""
+        """Returns the shifts (batch, 2) by the soft-argmax (down, right), cells."""
         scores = scores[:, self.within][:, :, self.within]
         weights = self.config.soft.weights(scores.flatten(1)).view_as(scores)
         shifts = self.shifts[self.within].to(weights)
         return torch.stack([(weights.sum(2) * shifts).sum(1), (weights.sum(1) * shifts).sum(1)], 1)
 
     def local(self, scores: Tensor) -> Tensor:
-        """The shift (down, right) at the highest peak by a parabola along each axis, cells, with gradients: (batch, 2)."""
+        """Returns the shifts (batch, 2) of the highest peaks by a parabola along each axis (down, right), cells;
+        differentiable."""
         best = self._highest(scores.detach())
         steps, every = torch.arange(-1, 2, device=scores.device), torch.arange(len(scores), device=scores.device)[:, None]
         down = scores[every, best[:, :1] + steps, best[:, 1:]]
@@ -208,26 +211,26 @@ class TranslationSearch(nn.Module):
         return best - self.around + torch.stack([parabola(down), parabola(right)], 1)
 
     def _highest(self, scores: Tensor) -> Tensor:
-        """Where the highest score within reach stands (row, column): (batch, 2)."""
+        """Returns the indices (batch, 2) of the highest scores within reach (row, column)."""
         inner = scores[:, self.within][:, :, self.within]
         best = inner.flatten(1).argmax(1)
         return torch.stack([best // inner.shape[1], best % inner.shape[1]], 1) + SUPPORT
 
     def hard(self, scores: Tensor) -> Tensor:
-        """The shift (down, right) at the highest peak, cells: (batch, 2)."""
+        """Returns the shifts (batch, 2) of the highest peaks (down, right), cells."""
         best = self._highest(scores)
         offsets = [plane_peak(self.config.peak, s, i, j) for s, (i, j) in zip(scores.double(), best.tolist(), strict=True)]
         return best - self.around + torch.stack(offsets).to(scores.device)
 
     def motion(self, shift: Tensor, angles: Tensor) -> Tensor:
-        """t = R t' (lines 20 and 21): (batch, 3) of x, y, yaw."""
+        """Returns the motions (batch, 3) of x, y, yaw: t = R t' (lines 20 and 21)."""
         x, y = (shift * -self.cell_m).unbind(1)
         cos, sin = torch.cos(angles), torch.sin(angles)
         return torch.stack([cos * x - sin * y, sin * x + cos * y, angles], 1)
 
 
 class ScanMatch(nn.Module):
-    """Algorithm 1: the motion between masked scans."""
+    """Algorithm 1: the motions between masked scans."""
 
     def __init__(self, n: int, cell_m: float, config: SearchConfig):
         super().__init__()
@@ -235,13 +238,13 @@ class ScanMatch(nn.Module):
         self.translation = TranslationSearch(n, cell_m, config)
 
     def forward(self, later: Tensor, earlier: Tensor) -> Tensor:
-        """The motion by soft peaks, with gradients: (batch, 3)."""
+        """Returns the motions (batch, 3) by the soft-argmax; differentiable."""
         angles = self.rotation.soft(self.rotation.correlation(later, earlier))
         turned = self.translation.turned(earlier, angles)
         return self.translation.motion(self.translation.soft(self.translation.correlation(later, turned)), angles)
 
     def soft_and_local(self, later: Tensor, earlier: Tensor) -> tuple[Tensor, Tensor]:
-        """The motion by soft peaks, and by parabolas at the highest ones, both with gradients: (batch, 3) each."""
+        """Returns the motions (batch, 3) by the soft-argmax and those by parabolas at the highest peaks, both differentiable."""
         rotation = self.rotation.correlation(later, earlier)
         angles = self.rotation.soft(rotation)
         scores = self.translation.correlation(later, self.translation.turned(earlier, angles))
@@ -250,7 +253,7 @@ class ScanMatch(nn.Module):
 
     @torch.no_grad()
     def hard(self, later: Tensor, earlier: Tensor) -> Tensor:
-        """The motion by the highest peaks, as Gyre finds it: (batch, 3)."""
+        """Returns the motions (batch, 3) by the highest peaks, as Gyre computes them."""
         angles = self.rotation.hard(self.rotation.correlation(later, earlier)).float()
         turned = self.translation.turned(earlier, angles)
         return self.translation.motion(self.translation.hard(self.translation.correlation(later, turned)), angles)

@@ -1,8 +1,8 @@
-"""Time and memory of a training step against the batch: Weston et al., Sec. V-C and Fig. 2.
+"""Time and memory of a training step over batch size: Weston et al., Sec. V-C and Fig. 2.
 
-Each batch of each method runs in a process of its own, so that a peak of memory is its own; the processes of one batch take
-their steps in turn, so that what else the machine does meets all of them alike. While a method is measured, up to twice the
-limit of memory must be free for it: what does not fit is found by trying it.
+Each batch of each method runs in a separate process, for a separate memory peak. The processes of one batch take turns, so
+that other load on the machine affects all alike. A batch above the limit is found by trying it, so up to twice the memory
+limit must be free.
 """
 
 import argparse
@@ -27,17 +27,17 @@ from .search import ScanMatch, SearchConfig
 from .train import pose_error
 
 MIB = 1 << 20
-# A raster's side in the papers, m: 127 cells of 0.8, 255 of 0.4, 511 of 0.2.
+# Side length of a raster in the papers, m: 127 cells of 0.8, 255 of 0.4, 511 of 0.2.
 SIDE_M = 102.0
 OUT_OF_MEMORY = 75
 
 
 def every_shift(n: int, cell_m: float) -> SearchConfig:
-    """Rasters padded to twice their size, and every shift at which they still overlap."""
+    """Returns a search over every shift at which rasters overlap: padded to twice their size."""
     return SearchConfig(reach_m=(n - 1) * cell_m)
 
 
-# mbym as the papers have it (Eq. 2), and as Gyre trains it: shifts farther than a vehicle gets are not computed.
+# mbym as in the papers (Eq. 2), and as Gyre trains it: only the shifts that a vehicle can make.
 METHODS: dict[str, Callable[[int, float], nn.Module]] = {
     "f-mbym": lambda n, cell_m: ScanMatch(n, cell_m, SearchConfig()),
     "mbym": lambda n, cell_m: ExhaustiveMatch(n, cell_m, every_shift(n, cell_m)),
@@ -47,7 +47,7 @@ METHODS: dict[str, Callable[[int, float], nn.Module]] = {
 
 @dataclass(frozen=True)
 class Setting:
-    """What one process measures."""
+    """The measurement of one process."""
 
     method: str
     n: int
@@ -59,7 +59,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class Measurement:
-    """The median of the steps (None: not measured) and the peak of memory (None: there was not that much)."""
+    """The median time of a step (None: not measured) and the peak memory (None: out of memory)."""
 
     method: str
     batch: int
@@ -69,14 +69,14 @@ class Measurement:
 
 
 class Memory:
-    """The peak of what has been taken since this was made, MiB."""
+    """The peak of the memory that was allocated since the construction, MiB."""
 
     def __init__(self, device: str):
         self.cuda = device.startswith("cuda")
         if self.cuda:
             torch.cuda.reset_peak_memory_stats()
         else:
-            Path("/proc/self/clear_refs").write_text("5")  # the peak so far is forgotten
+            Path("/proc/self/clear_refs").write_text("5")  # resets the peak
         self.before = self._peak()
 
     def peak(self) -> float:
@@ -87,13 +87,13 @@ class Memory:
 
 
 def resident(which: str) -> float:
-    """A line of /proc/self/status, MiB."""
+    """Returns a value of /proc/self/status, MiB."""
     lines = Path("/proc/self/status").read_text().splitlines()
     return next(int(line.split()[1]) for line in lines if line.startswith(which)) / 1024
 
 
 class Training:
-    """A training of the network of Table II on noise: what is in the rasters makes no difference to a step's time."""
+    """A training of the network of Table II on noise: the time of a step does not depend on the data."""
 
     def __init__(self, setting: Setting):
         torch.manual_seed(1)
@@ -106,7 +106,7 @@ class Training:
         self.motion = torch.zeros(setting.batch, 3, device=setting.device)
 
     def step(self) -> float:
-        """Seconds."""
+        """Takes a step and returns its duration, s."""
         began = self._now()
         found = self.match(*self.network.masked(*self.scans))
         value = pose_error(found, self.motion, 1.0).sum(1).mean()  # Eq. 12
@@ -122,34 +122,34 @@ class Training:
 
 
 def serve(setting: Setting) -> None:
-    """Takes a step, and says how long it took and what has been the peak of memory so far, for each line that it is given."""
+    """Takes a step for each input line, and prints its duration (s) and the peak memory so far (MiB)."""
     torch.set_num_threads(setting.threads)
     try:
-        # A first step loads hundreds of MiB of PyTorch itself.
+        # The first step loads hundreds of MiB of PyTorch.
         Training(replace(setting, method="f-mbym", n=64, batch=1)).step()
         memory = Memory(setting.device)
         training = Training(setting)
         for _ in sys.stdin:
             print(json.dumps([training.step(), memory.peak()]), flush=True)
     except RuntimeError as error:
-        # There is no class of its own for a CPU's.
+        # On a CPU the error has no class of its own.
         if isinstance(error, torch.OutOfMemoryError) or "memory" in str(error):
             sys.exit(OUT_OF_MEMORY)
         raise
 
 
 class Worker:
-    """A process that takes steps on demand."""
+    """A process that takes training steps on demand."""
 
     def __init__(self, setting: Setting):
         self.setting = setting
         command = [sys.executable, "-m", "gyre_training.step_time", json.dumps(asdict(setting))]
         pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-        # Found from anywhere, whether the package is installed or not.
+        # The working directory makes the package importable if it is not installed.
         self.process = subprocess.Popen(command, cwd=HOME, **pipes)
 
     def step(self) -> tuple[float, float] | None:
-        """Seconds and MiB; None where there was not enough memory."""
+        """Takes a step and returns its duration (s) and the peak memory (MiB), None if out of memory."""
         try:
             self.process.stdin.write("\n")
             self.process.stdin.flush()
@@ -169,7 +169,7 @@ class Worker:
 
 
 def compare(settings: list[Setting], steps: int, limit_mib: float) -> list[Measurement]:
-    """All methods at one batch, step by step in turn, after a first step each that is not counted."""
+    """Measures all methods at one batch size; they take turns, and the time of each first step is not counted."""
     workers = [Worker(setting) for setting in settings]
     try:
         first = {worker: worker.step() for worker in workers}
@@ -182,7 +182,7 @@ def compare(settings: list[Setting], steps: int, limit_mib: float) -> list[Measu
 
 
 def summary(setting: Setting, first: tuple | None, later: list[tuple | None], limit_mib: float) -> Measurement:
-    """A method at a batch, from its steps' seconds and MiB."""
+    """Returns the measurement of a method from the durations and peaks of its steps."""
     if first is None or None in later:
         return Measurement(setting.method, setting.batch, False)
     memory = max(mib for _, mib in [first, *later])
@@ -191,7 +191,7 @@ def summary(setting: Setting, first: tuple | None, later: list[tuple | None], li
 
 
 def measure(n: int, batches: list[int], limit_mib: float, steps: int, checkpoint: bool, device: str) -> Iterator[Measurement]:
-    """All methods at rising batches, each until one passes the limit."""
+    """Measures all methods at rising batch sizes, each up to the first that exceeds the limit."""
     left = list(METHODS)
     for batch in sorted(batches):
         settings = [Setting(method, n, batch, checkpoint, device, torch.get_num_threads()) for method in left]
@@ -204,13 +204,13 @@ def measure(n: int, batches: list[int], limit_mib: float, steps: int, checkpoint
 
 
 def table(measurements: list[Measurement], limit_mib: float) -> str:
-    """A line for each batch with each method's time and memory; then f-mbym beside the others."""
+    """Returns a table of time and memory by batch size and method, and the ratios of the others to f-mbym."""
     cells = {(one.batch, one.method): one for one in measurements}
     lines = [f"{'batch':>6}" + "".join(f"{method:>24}" for method in METHODS)]
     for batch in sorted({one.batch for one in measurements}):
         lines.append(f"{batch:>6}" + "".join(f"{cell(cells.get((batch, method))):>24}" for method in METHODS))
-    beside = [against(cells, other) for other in METHODS if other != "f-mbym"]
-    return "\n".join([*lines, f"within {limit_mib / 1024:g} GiB:", *beside])
+    ratios = [against(cells, other) for other in METHODS if other != "f-mbym"]
+    return "\n".join([*lines, f"within {limit_mib / 1024:g} GiB:", *ratios])
 
 
 def cell(one: Measurement | None) -> str:
@@ -221,7 +221,7 @@ def cell(one: Measurement | None) -> str:
 
 
 def against(cells: dict[tuple[int, str], Measurement], other: str) -> str:
-    """How many times faster and larger f-mbym is."""
+    """Returns the ratios of batch size, time and memory of another method to f-mbym."""
     fitting = {method: {b: one for (b, m), one in cells.items() if m == method and one.fits} for method in ("f-mbym", other)}
     ours, theirs = fitting["f-mbym"], fitting[other]
     both = sorted(ours.keys() & theirs.keys())
@@ -230,13 +230,13 @@ def against(cells: dict[tuple[int, str], Measurement], other: str) -> str:
     times = ", ".join(f"{theirs[b].step_s / ours[b].step_s:.1f} ({b})" for b in both)
     memory = ", ".join(f"{theirs[b].memory_mib / ours[b].memory_mib:.1f} ({b})" for b in both)
     return (
-        f"  f-mbym beside {other}: {max(ours) / max(theirs):g} times the batch ({max(ours)} to {max(theirs)}); "
-        f"times as fast a step {times}; {other}'s memory over f-mbym's {memory}"
+        f"  f-mbym compared with {other}: {max(ours) / max(theirs):g} times the batch ({max(ours)} to {max(theirs)}); "
+        f"step time of {other} / f-mbym {times}; memory of {other} / f-mbym {memory}"
     )
 
 
 def run(options: argparse.Namespace) -> None:
-    """The command `step-time`."""
+    """Runs the command `step-time`."""
     from .plots import step_times
 
     limit_mib, measurements = 1024 * options.memory_gib, []
@@ -260,13 +260,13 @@ def numbers(text: str) -> list[int]:
 
 
 def register(commands) -> None:
-    """Adds `step-time`; whether blocks are computed again, and where, are options of all commands."""
-    command = commands.add_parser("step-time", help="time and memory of a training step against the batch, f-mbym beside mbym")
-    command.add_argument("--n", type=int, default=255, help="cells of a raster's side")
+    """Adds the command `step-time`; `--checkpoint` and `--device` are options of all commands."""
+    command = commands.add_parser("step-time", help="time and memory of a training step over batch size, f-mbym compared with mbym")
+    command.add_argument("--n", type=int, default=255, help="cells of a side of the raster")
     batches = [1 << k for k in range(11)]
-    command.add_argument("--batches", type=numbers, default=batches, help="1,2,4,... by default")
-    command.add_argument("--memory-gib", type=float, default=4.0, help="a batch that takes more does not fit")
-    command.add_argument("--steps", type=int, default=5, help="steps of which the median is taken")
+    command.add_argument("--batches", type=numbers, default=batches, help="batch sizes (default: 1,2,4,...,1024)")
+    command.add_argument("--memory-gib", type=float, default=4.0, help="memory limit")
+    command.add_argument("--steps", type=int, default=5, help="steps for the median")
     command.add_argument("--out", type=Path, default=Path("step-time"))
     command.set_defaults(run=run)
 

@@ -1,4 +1,4 @@
-"""Training: Adam on the error of the pose that the search finds in the masked scans (Weston et al., Eq. 12)."""
+"""Training: Adam on the pose error of the search with masked scans (Weston et al., Eqs. 9 to 12)."""
 
 import csv
 import hashlib
@@ -21,7 +21,7 @@ from .search import ScanMatch, SearchConfig
 
 @dataclass(frozen=True)
 class TrainingConfig:
-    """How long and how to train. `angle_weight` is what a radian counts beside a metre (1 in the papers)."""
+    """The settings of a training. `angle_weight` is the weight of a radian relative to a metre (1 in the papers)."""
 
     seed: int = 1
     batch: int = 8
@@ -32,11 +32,11 @@ class TrainingConfig:
     clip: float = 1.0
     angle_weight: float = 1.0
     exhaustive: bool = False
-    # The network's features in bfloat16: two thirds of a step's time on processors that compute with it, more on others.
+    # Features in bfloat16: two thirds of the step time on processors that support it, slower on others.
     mixed_precision: bool = False
     augment: bool = True
-    # What the error of the highest peak's own place counts beside that of the soft peak, where it is the right peak (0 in
-    # the papers). A soft peak is sharp enough to choose among peaks only where it is blind to fractions of a cell.
+    # Weight of the error of the highest peak, if it is the right one, relative to the error of the soft-argmax (0 in the
+    # papers). A soft-argmax that is sharp enough to select a peak has no gradient within a cell.
     local_weight: float = 1.0
     sampling: Sampling = field(default_factory=Sampling)
 
@@ -45,19 +45,20 @@ class TrainingConfig:
 
 
 def pose_error(found: Tensor, true: Tensor, angle_weight: float) -> Tensor:
-    """The terms of Eq. 12: (batch, 3)."""
+    """Returns the terms of Eq. 12: (batch, 3)."""
     return (found - true).abs() * torch.tensor([1.0, 1.0, angle_weight], device=true.device)
 
 
-# Epochs count from this part of a training on: before it the learning rate is high, and the epoch that looks best is a lucky one.
+# The best epoch is chosen from this share of the training on: earlier the learning rate is high, and a low validation drift
+# is chance.
 SETTLED = 0.8
 
-# What is farther off, along each axis by itself, is another peak: cells and radians.
+# The largest error of the right peak along each axis, cells and rad.
 SAME_PEAK_CELLS, SAME_PEAK_RAD = 1.5, math.radians(1.5)
 
 
 class Trainer:
-    """One training, which may be cut off at any time and goes on from its folder."""
+    """A training that may be interrupted at any time and is resumed from its folder."""
 
     def __init__(
         self,
@@ -94,7 +95,7 @@ class Trainer:
         self._resume()
 
     def others(self) -> dict[str, str]:
-        """What else the training learns from."""
+        """Returns further inputs of the training that identify it."""
         return {}
 
     @property
@@ -102,18 +103,18 @@ class Trainer:
         return self.config.epochs * self.config.steps_an_epoch()
 
     def run(self) -> None:
-        """Trains to the end, an epoch at a time; the best of the last epochs by validation drift is kept in `best.pt`."""
+        """Trains all epochs; `best.pt` is the one of the last epochs with the least validation drift."""
         print(f"{self.network.parameters_count()} parameters, {len(self.pairs)} pairs, {self.steps} steps of "
               f"{self.config.batch}; at step {self.step}", flush=True)
         while self.step < self.steps:
             self._epoch()
 
     def learning_rate(self) -> float:
-        """Half a cosine from the first to the last, after a short rise."""
+        """Returns the learning rate: a short warm-up, then a cosine decay."""
         config, done = self.config, self.step / self.steps
-        rise = min(1.0, (self.step + 1) / 50)
+        warm_up = min(1.0, (self.step + 1) / 50)
         span = config.learning_rate - config.last_learning_rate
-        return rise * (config.last_learning_rate + span * 0.5 * (1 + math.cos(math.pi * done)))
+        return warm_up * (config.last_learning_rate + span * 0.5 * (1 + math.cos(math.pi * done)))
 
     def _epoch(self) -> None:
         config = self.config
@@ -127,7 +128,7 @@ class Trainer:
             self.step += 1
             if k == first + 20:
                 self._announce((time.time() - began) / 21)
-            # Not after an epoch's last step: who goes on from there would miss its validation.
+            # Not after the last step of an epoch: resuming there would skip its validation.
             if time.time() - saved > 60 and k + 1 < config.steps_an_epoch():
                 saved = self._save("last.pt", began)
         self.seconds += time.time() - began
@@ -150,7 +151,7 @@ class Trainer:
         return float(value.detach())
 
     def loss(self, batch: Batch) -> Tensor:
-        """Eqs. 9 to 12, and the same of the highest peaks' own places."""
+        """Returns the loss of Eqs. 9 to 12, plus that of the highest peaks."""
         config, masked = self.config, self.network.masked(batch.later, batch.earlier)
         if config.exhaustive or not config.local_weight:
             return pose_error(self.match(*masked), batch.motion, config.angle_weight).sum(1).mean()
@@ -161,7 +162,7 @@ class Trainer:
         return (soft + config.local_weight * near * local).sum(1).mean()
 
     def validate(self) -> Drift:
-        """Drift over the validation sequences, by the highest peaks."""
+        """Returns the drift of the validation sequences, by the highest peaks."""
         self.network.eval()
         pairs = self.validation.pairs(1)
         return drift(self.validation, motions(self.validation, pairs, self.network, self.match), pairs)
@@ -198,7 +199,7 @@ class Trainer:
             writer.writerow(row)
 
     def _save(self, name: str, began: float | None = None) -> float:
-        """Writes under another name first: whoever is cut off here finds the file before."""
+        """Writes a checkpoint atomically (another name, then a rename) and returns the time."""
         now = time.time()
         state = {
             "network": self.network.state_dict(),
@@ -221,24 +222,24 @@ class Trainer:
             return
         state = load(path)
         if filled(state["meaning"], DEFAULTS) != self.meaning:
-            raise SystemExit(f"{self.folder} holds another training: give another folder, or delete it")
+            raise SystemExit(f"{self.folder} holds another training: choose another folder, or delete it")
         self.network.load_state_dict(state["network"])
         self.optimiser.load_state_dict(state["optimiser"])
         self.step, self.seconds, self.best = state["step"], state["seconds"], state["best"]
 
 
-# What a checkpoint does not say was not there to be chosen when it was written.
+# Keys that a checkpoint lacks did not exist when it was written: they have their defaults.
 DEFAULTS = {"network": NetworkConfig().to_dict(), "search": asdict(SearchConfig()), "training": asdict(TrainingConfig())}
 
 
 def filled(values: dict, defaults: dict) -> dict:
-    """The values, and what they lack of the defaults, section by section."""
+    """Returns the values, completed with the defaults section by section."""
     inner = {key: filled(value, defaults.get(key, {})) for key, value in values.items() if isinstance(value, dict)}
     return defaults | values | inner
 
 
 def fingerprint(checkpoint: Path | None) -> str:
-    """What tells a checkpoint's network from others."""
+    """Returns a hash of the weights of a checkpoint, empty without one."""
     if not checkpoint:
         return ""
     digest = hashlib.sha256()
@@ -248,7 +249,7 @@ def fingerprint(checkpoint: Path | None) -> str:
 
 
 def machine(device: torch.device) -> str:
-    """Whom a training's time is the time of."""
+    """Returns the name of the device, for the training time in the model card."""
     if device.type == "cuda":
         return torch.cuda.get_device_name(device)
     threads = torch.get_num_threads()
@@ -256,14 +257,14 @@ def machine(device: torch.device) -> str:
 
 
 def load(path: Path) -> dict:
-    """A checkpoint."""
+    """Loads a checkpoint."""
     if not path.exists():
-        raise SystemExit(f"there is no {path}: train the recipe of that name first")
+        raise SystemExit(f"{path} does not exist: train the recipe of that name first")
     return torch.load(path, map_location="cpu", weights_only=True)
 
 
 def trained(path: Path) -> MaskNetwork:
-    """The network of a checkpoint, ready to mask."""
+    """Returns the network of a checkpoint for inference."""
     state = load(path)
     network = MaskNetwork(NetworkConfig.from_dict(state["meaning"]["network"]))
     network.load_state_dict(state["network"])

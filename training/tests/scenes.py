@@ -1,4 +1,4 @@
-"""Drawn scenes: scatterers seen from two poses."""
+"""Synthetic scenes: scatterers seen from known poses."""
 
 import math
 from pathlib import Path
@@ -11,7 +11,7 @@ from gyre_training.pairs import Scans
 
 
 def scene(n: int, cell_m: float, motion: tuple[float, float, float], seed: int = 1, dtype=torch.float32) -> tuple[Tensor, Tensor]:
-    """(later, earlier), each (1, n, n): the same scatterers, drawn without any FFT, before and after the motion."""
+    """Returns rasters (later, earlier) of (1, n, n): the same scatterers after and before the motion, drawn without FFT."""
     generator = torch.Generator().manual_seed(seed)
     radius = 0.45 * n * cell_m * torch.rand(60, generator=generator).sqrt()
     bearing = 2 * math.pi * torch.rand(60, generator=generator)
@@ -32,7 +32,7 @@ def draw(n: int, cell_m: float, points: Tensor, dtype=torch.float32) -> Tensor:
 
 
 def write(path: Path, pose: np.ndarray, sequence: list[int] | None = None, rasters: np.ndarray | None = None) -> Scans:
-    """A file as `gyre-lab export-pairs` writes it, read back: (k, 3) true poses, and rasters of 1 m cells where they matter."""
+    """Writes a file in the format of `gyre-lab export-pairs` and reads it back: true poses (k, 3), rasters of 1 m cells."""
     rasters = np.zeros((len(pose), 2, 2)) if rasters is None else rasters
     n = rasters.shape[1]
     fields = {"raster": ("<f2", (n, n)), "pose": ("<f8", (3,)), "sequence": ("<u4", ())}
@@ -44,7 +44,7 @@ def write(path: Path, pose: np.ndarray, sequence: list[int] | None = None, raste
 
 
 def drive(path: Path, scans: int, n: int = 32, seed: int = 1) -> Scans:
-    """3 m a scan through scatterers, a bend to the left and back."""
+    """Writes a drive of 3 m a scan through scatterers, with a bend to the left and back."""
     rng = np.random.default_rng(seed)
     yaw = 0.3 * np.sin(np.arange(scans) / 4)
     steps = np.stack([3 * np.cos(yaw), 3 * np.sin(yaw)], 1)

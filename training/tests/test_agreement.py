@@ -1,4 +1,4 @@
-"""The search that masks are trained through is the search that Gyre runs."""
+"""The differentiable search finds the motions of Gyre's own search."""
 
 import math
 import os
@@ -12,40 +12,42 @@ from gyre_training.drift import motions
 from gyre_training.pairs import Scans
 from gyre_training.recipe import HOME, search_of
 from gyre_training.search import ScanMatch
-from gyre_training.worlds import find_gyre
+from gyre_training.worlds import find_gyre_lab
 
 WORLD = "\n[simulation]\nscans = 11\nseed = 7\n"
 RASTERS = {
     "papers, Eq. 7": ("paper-127", []),
     "papers, line 14": ("paper-127", ["rotation.form=line14"]),
     "Gyre's default": ("gyre-255", []),
-    # 250 = 2 5^3 is a size that Gyre's transforms pass over.
+    # 250 = 2 5^3: Gyre takes another transform size.
     "another size": ("paper-127", ["raster.n=250", "raster.cell_m=0.4"]),
 }
 
 
-def gyre() -> Path:
-    """The program: what GYRE names, or what cargo has built."""
+def gyre_lab() -> Path:
+    """Returns the program in GYRE_LAB, else the one beside the program in GYRE, else the build of this repository."""
+    if "GYRE_LAB" in os.environ:
+        return Path(os.environ["GYRE_LAB"])
     if "GYRE" in os.environ:
-        return Path(os.environ["GYRE"])
+        return Path(os.environ["GYRE"]).with_name("gyre-lab")
     try:
-        return find_gyre(None)
+        return find_gyre_lab(None)
     except SystemExit as missing:
-        pytest.skip(f"{missing}, or in GYRE")
+        pytest.skip(f"{missing}, or set GYRE_LAB")
 
 
 @pytest.mark.parametrize("name,overrides", RASTERS.values(), ids=RASTERS)
-def test_hard_peaks_are_those_of_gyre(name, overrides, tmp_path):
+def test_motions_by_the_highest_peaks_equal_those_of_gyre(name, overrides, tmp_path):
     configuration, out = tmp_path / "world.toml", tmp_path / "pairs.npy"
     configuration.write_text((HOME / "rasters" / f"{name}.toml").read_text() + WORLD)
     sets = [argument for override in overrides for argument in ("--set", override)]
-    done = subprocess.run([gyre(), "export-pairs", configuration, "--out", out, *sets], capture_output=True, text=True)
+    done = subprocess.run([gyre_lab(), "export-pairs", configuration, "--out", out, *sets], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     scans = Scans(out)
     pairs = scans.pairs(1)
     assert len(pairs) == 10
     found = motions(scans, pairs, None, ScanMatch(scans.n, scans.cell_m, search_of(scans.settings)))
     searched = scans.records["searched"][pairs[:, 1]]
-    assert np.abs(searched[:, 0]).max() > 1.0, "the vehicle is to move"
+    assert np.abs(searched[:, 0]).max() > 1.0, "the vehicle must move"
     assert np.abs(found - searched)[:, :2].max() < 1e-3 * scans.cell_m
     assert np.abs(found - searched)[:, 2].max() < math.radians(1e-3)

@@ -31,10 +31,10 @@ def test_networks_are_compared_in_floats_and_integers(tmp_path: Path):
 
 
 @pytest.mark.parametrize("pairs", [6, 5])
-def test_every_second_scans_mask_serves_the_scan_after_it(pairs):
+def test_the_mask_of_every_second_scan_is_used_for_the_next_one(pairs):
     scans = torch.arange(1.0, pairs + 2)[:, None, None].expand(-1, 2, 2)
-    masks = EverySecond(lambda given: 10 ** given)  # tells whose mask it is
+    masks = EverySecond(lambda given: 10 ** given)  # identifies the scan of a mask
     later, earlier = masks.masked(scans[1:], scans[:-1])
-    whose = [int(torch.log10(masked[0, 0] / scan[0, 0]).round()) for masked, scan in zip(later, scans[1:])]
-    assert whose == [1, 3, 3, 5, 5, 7][:pairs]
+    owners = [int(torch.log10(masked[0, 0] / scan[0, 0]).round()) for masked, scan in zip(later, scans[1:])]
+    assert owners == [1, 3, 3, 5, 5, 7][:pairs]
     assert [int(torch.log10(masked[0, 0] / scan[0, 0]).round()) for masked, scan in zip(earlier, scans)] == [1, 1, 3, 3, 5, 5][:pairs]

@@ -30,7 +30,7 @@ def scans_of(scans: Scans, inputs: int) -> torch.Tensor:
 
 
 @pytest.mark.parametrize("config", NETWORKS.values(), ids=NETWORKS)
-def test_onnx_runtime_finds_the_same_masks(config, scans, tmp_path):
+def test_onnx_runtime_computes_the_same_masks(config, scans, tmp_path):
     torch.manual_seed(1)
     network, path = MaskNetwork(config).eval(), tmp_path / "network.onnx"
     export(network, scans.n, path)
@@ -43,7 +43,7 @@ def test_onnx_runtime_finds_the_same_masks(config, scans, tmp_path):
 
 
 @pytest.mark.parametrize("config", [NETWORKS["both scans"], NETWORKS["one scan, folded"]])
-def test_integers_change_masks_a_little(config, scans, tmp_path):
+def test_quantisation_changes_masks_a_little(config, scans, tmp_path):
     torch.manual_seed(1)
     floats, integers = tmp_path / "floats.onnx", tmp_path / "integers.onnx"
     export(MaskNetwork(config).eval(), scans.n, floats)
@@ -53,7 +53,7 @@ def test_integers_change_masks_a_little(config, scans, tmp_path):
     assert 0 < difference.max() and difference.mean() < 0.02
 
 
-def test_a_card_says_which_file_it_is_of(tmp_path):
+def test_a_card_identifies_its_file(tmp_path):
     path = tmp_path / "network.onnx"
     path.write_bytes(b"a network")
     settings = {"raster": {"n": 31, "cell_m": 0.8}, "masking": {"kind": "none", "threshold": 60, "compensate": False, "undo_doppler": True}}

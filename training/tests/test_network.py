@@ -6,7 +6,7 @@ import torch
 from gyre_training.network import MaskNetwork, NetworkConfig
 
 
-def test_mixed_precision_keeps_masks_gradients_and_weights_but_for_rounding():
+def test_mixed_precision_keeps_masks_gradients_and_weights_up_to_rounding():
     torch.manual_seed(1)
     exact = MaskNetwork(NetworkConfig(widths=(4, 8, 16))).train()
     mixed = copy.deepcopy(exact)
@@ -18,11 +18,11 @@ def test_mixed_precision_keeps_masks_gradients_and_weights_but_for_rounding():
     assert b.dtype == torch.float32 and torch.cosine_similarity(a, b, dim=0) > 0.95
     assert 0 < (exact.logits(scans) - mixed.logits(scans)).abs().max() < 0.1
     mixed.load_state_dict(exact.state_dict())
-    assert torch.equal(exact.eval()(scans), mixed.eval()(scans))  # as it is used, it is exact
+    assert torch.equal(exact.eval()(scans), mixed.eval()(scans))  # inference is not mixed
 
 
 @pytest.mark.parametrize("mixed_precision", [False, True])
-def test_computing_again_changes_neither_gradients_nor_running_means(mixed_precision):
+def test_checkpointing_changes_neither_gradients_nor_running_statistics(mixed_precision):
     torch.manual_seed(1)
     # 31 cells: odd sizes at every level.
     kept = MaskNetwork(NetworkConfig(widths=(4, 8, 16))).train()
@@ -39,7 +39,7 @@ def test_computing_again_changes_neither_gradients_nor_running_means(mixed_preci
         assert torch.equal(a, b), name
 
 
-def test_computing_again_keeps_less_for_the_way_back():
+def test_checkpointing_stores_less_for_the_backward_pass():
     def kept_bytes(checkpoint: bool) -> int:
         network = MaskNetwork(NetworkConfig(widths=(4, 8, 16))).train()
         network.checkpoint, kept = checkpoint, {}
@@ -48,7 +48,7 @@ def test_computing_again_keeps_less_for_the_way_back():
             kept[tensor.untyped_storage().data_ptr()] = tensor.untyped_storage().nbytes()
             return tensor
 
-        # The masks hold on to what is kept, so that no two tensors have had the same place in memory.
+        # The masks keep the saved tensors alive, so that no two share an address.
         with torch.autograd.graph.saved_tensors_hooks(pack, lambda tensor: tensor):
             masks = network(torch.rand(2, 2, 64, 64))
         return sum(kept.values()) if masks.requires_grad else 0
@@ -65,7 +65,7 @@ def test_exchanging_the_scans_exchanges_the_masks(changes):
             tensor.add_(0.2 * (torch.rand_like(tensor) - 0.5))
     scans = torch.tensor([255.0, 25.0])[:, None, None] * torch.rand(3, 2, 31, 31)
     with torch.no_grad():
-        for _ in range(20):  # batch norm learns what it is given
+        for _ in range(20):  # running statistics of batch norm
             network(scans)
         free = network.eval().logits(scans)
         assert not torch.allclose(network.logits(scans.flip(1)), free.flip(1), atol=1e-3)
@@ -77,7 +77,7 @@ def test_exchanging_the_scans_exchanges_the_masks(changes):
     assert not torch.allclose(tied[:, 0], tied[:, 1], atol=1e-4)
 
 
-def test_a_width_without_halves_is_refused():
+def test_odd_widths_of_a_two_scan_network_are_refused():
     with pytest.raises(ValueError, match="must be even"):
         NetworkConfig(widths=(4, 7))
     NetworkConfig(inputs=1, widths=(4, 7))

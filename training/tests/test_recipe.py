@@ -9,7 +9,7 @@ SETTINGS = {"raster": {"n": 255}, "rotation": ROTATION, "translation": TRANSLATI
 
 
 @pytest.mark.parametrize("path", sorted((HOME / "recipes").glob("*.toml")), ids=lambda path: path.stem)
-def test_recipes_lead_back_to_ones_that_begin_with_nothing(path):
+def test_dependencies_of_recipes_start_from_scratch(path):
     recipes = lineage(path)
     assert recipes[-1].name == path.stem and not recipes[0].initial and not recipes[0].teacher
     assert all(recipe.configuration.exists() for recipe in recipes)
@@ -24,13 +24,13 @@ def test_recipes_lead_back_to_ones_that_begin_with_nothing(path):
         ("raster = ", "Invalid value"),
     ],
 )
-def test_what_a_recipe_cannot_say_is_refused_by_name(text, reason, tmp_path):
+def test_unknown_keys_of_a_recipe_are_rejected_by_name(text, reason, tmp_path):
     (tmp_path / "one.toml").write_text(text if "raster" in text else f'raster = "a"\n{text}')
-    with pytest.raises(SystemExit, match=f"one.toml is no recipe: .*{reason}"):
+    with pytest.raises(SystemExit, match=f"one.toml is not a valid recipe: .*{reason}"):
         read(tmp_path / "one.toml")
 
 
-def test_both_stages_have_a_sampling_of_their_own(tmp_path):
+def test_both_stages_have_a_separate_sampling(tmp_path):
     (tmp_path / "one.toml").write_text('''
         raster = "a"
         teacher = "b"
@@ -42,7 +42,7 @@ def test_both_stages_have_a_sampling_of_their_own(tmp_path):
     assert (one.distillation.sampling.steps, one.training.sampling.steps, one.training.epochs) == (2, 3, 4)
 
 
-def test_the_search_is_the_configurations():
+def test_the_search_has_the_settings_of_the_configuration():
     search = search_of(SETTINGS)
     assert (search.radii, search.peak, search.overlap, search.angles) == (102, "gaussian", "energy", 576)
 
@@ -51,18 +51,18 @@ def test_the_search_is_the_configurations():
     "section, key, value",
     [("rotation", "magnitude", "log"), ("rotation", "phase_only", True), ("translation", "half_turn", True), ("translation", "peak", "parabola")],
 )
-def test_a_search_that_no_network_is_trained_through_is_refused(section, key, value):
+def test_an_unsupported_search_is_refused(section, key, value):
     with pytest.raises(SystemExit, match=key):
         search_of(SETTINGS | {section: SETTINGS[section] | {key: value}})
 
 
-def test_pairs_that_were_made_otherwise_are_refused(tmp_path):
+def test_pairs_of_other_settings_are_refused(tmp_path):
     path, raster = tmp_path / "train.npy", tmp_path / "raster.toml"
     raster.write_text("[raster]\nn = 127\n[points]\ncapacity = 0")
     path.with_suffix(".toml").write_text('[raster]\nn = 127\n[[sequences]]\nname = "a"\n[[sequences]]\nname = "b"')
     worlds.require_pairs_of(["a", "b"], raster, path)
     for names in (["a"], ["a", "b", "c"]):
-        with pytest.raises(SystemExit, match="made otherwise"):
+        with pytest.raises(SystemExit, match="made with other settings"):
             worlds.require_pairs_of(names, raster, path)
     raster.write_text("[raster]\nn = 255")
     with pytest.raises(SystemExit, match="raster.n"):

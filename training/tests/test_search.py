@@ -15,10 +15,10 @@ MOTIONS = [(0.0, 0.0, 0.0), (3.1, 0.0, 0.0), (2.0, -1.4, 0.05), (-4.3, 0.7, -0.1
 
 @pytest.mark.parametrize("config", CONFIGS.values(), ids=CONFIGS)
 @pytest.mark.parametrize("motion", MOTIONS)
-def test_drawn_motions_are_found_by_hard_and_by_soft_peaks(config, motion):
+def test_known_motions_are_found_by_highest_peak_and_soft_argmax(config, motion):
     match = ScanMatch(127, 0.8, config)
     later, earlier = scene(127, 0.8, motion)
-    # A spectrum of sixty scatterers over a window that does not turn with them fixes the angle to a fifth of a degree.
+    # Sixty scatterers under a taper that does not rotate with them determine the angle to a fifth of a degree.
     for found, tolerance_m, tolerance_deg in [(match.hard(later, earlier), 0.15, 0.3), (match(later, earlier), 0.5, 1.0)]:
         error = (found[0].double() - torch.tensor(motion).double()).abs()
         assert error[:2].max() < tolerance_m, found
@@ -26,7 +26,7 @@ def test_drawn_motions_are_found_by_hard_and_by_soft_peaks(config, motion):
 
 
 @pytest.mark.parametrize("motion", [(2.0, -1.4, 0.05), (-4.3, 0.7, -0.12)])
-def test_the_exhaustive_search_finds_the_same(motion):
+def test_the_exhaustive_search_finds_known_motions(motion):
     match = ExhaustiveMatch(63, 0.8, SearchConfig(reach_m=8.0))
     later, earlier = scene(63, 0.8, motion)
     for found, tolerance in [(match.hard(later, earlier), 0.15), (match(later, earlier), 0.6)]:
@@ -34,8 +34,8 @@ def test_the_exhaustive_search_finds_the_same(motion):
         assert abs(math.degrees(found[0, 2] - motion[2])) < 1.0, found
 
 
-def test_three_points_pin_the_direction_of_a_motion():
-    # Driving 4 m ahead brings what is ahead 4 m nearer, by 5 cells down; a turn to the left moves it to the right.
+def test_a_motion_forward_moves_points_down():
+    # After 4 m forward a point ahead is 4 m nearer: 5 cells down.
     match = ScanMatch(63, 0.8, SearchConfig(reach_m=8.0))
     later, earlier = torch.zeros(1, 63, 63), torch.zeros(1, 63, 63)
     for row, col in [(15, 20), (22, 40), (12, 31)]:
@@ -71,7 +71,7 @@ def test_translation_scores_equal_their_direct_sums(overlap):
 
 @pytest.mark.parametrize("form", ["line14", "eq7"])
 @pytest.mark.parametrize("overlap", ["none", "energy"])
-def test_gradients_are_those_of_finite_differences(form, overlap):
+def test_gradients_equal_finite_differences(form, overlap):
     config = SearchConfig(form=form, angles=72, radii=12, reach_m=6.0, overlap=overlap, soft=SoftArgmax(20.0))
     match = ScanMatch(31, 1.0, config).double()
     later, earlier = scene(31, 1.0, (1.3, -0.6, 0.07), dtype=torch.float64)
@@ -90,7 +90,7 @@ def test_gradients_are_those_of_finite_differences(form, overlap):
         assert torch.isclose((gradient * along).sum(), difference, rtol=2e-3, atol=1e-8)
 
 
-def test_a_soft_peak_does_not_depend_on_the_scores_scale():
+def test_the_soft_argmax_does_not_depend_on_the_scale_of_scores():
     scores = torch.randn(3, 40, generator=torch.Generator().manual_seed(1))
     weights = SoftArgmax(9.0).weights(scores)
     assert torch.allclose(weights, SoftArgmax(9.0).weights(1e-6 * scores + 4e-6), atol=1e-4)

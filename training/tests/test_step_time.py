@@ -7,14 +7,14 @@ from gyre_training.plots import step_times, training_log
 from gyre_training.step_time import METHODS, Measurement, Memory, Setting, against, compare, table
 
 
-def test_what_is_taken_and_given_back_counts_in_the_peak():
+def test_freed_memory_counts_in_the_peak():
     memory = Memory("cpu")
     taken = b"\1" * (64 << 20)
     del taken
     assert 63 < memory.peak() < 80
 
 
-def test_a_batch_is_measured_in_turn_and_one_that_passes_the_limit_says_so():
+def test_methods_are_measured_and_one_above_the_limit_does_not_fit():
     settings = [Setting(method, 67, 2, True, "cpu", 1) for method in METHODS]
     fast, slow, near = compare(settings, steps=2, limit_mib=60.0)
     assert fast.fits and fast.step_s > 0 and 2 < fast.memory_mib < 60
@@ -22,9 +22,9 @@ def test_a_batch_is_measured_in_turn_and_one_that_passes_the_limit_says_so():
     assert fast.memory_mib < near.memory_mib < slow.memory_mib
 
 
-def test_a_process_that_fails_for_another_reason_is_no_measurement():
+def test_a_process_that_fails_for_another_reason_is_an_error():
     with pytest.raises(RuntimeError, match="n=63"):
-        # The deepest level of 63 cells is one, of which a batch of one has no variance.
+        # The deepest level of 63 cells has one cell: a batch of 1 has no variance.
         compare([Setting("f-mbym", 63, 1, False, "cpu", 1)], steps=1, limit_mib=1e6)
 
 
@@ -44,7 +44,7 @@ def test_ratios_are_of_equal_batches_and_of_the_largest_that_fit():
     assert "passed: 4500 MiB" in table(MEASURED, 4096.0)
 
 
-def test_plots_are_the_same_file_twice(tmp_path):
+def test_plots_are_deterministic(tmp_path):
     for name in ("a.svg", "b.svg"):
         step_times(MEASURED, 4096.0, tmp_path / name)
     first = (tmp_path / "a.svg").read_text()
@@ -52,7 +52,7 @@ def test_plots_are_the_same_file_twice(tmp_path):
     assert all(word in first for word in ("f-mbym", "peak memory, GiB", "training step, s"))
 
 
-def test_a_log_is_drawn_with_the_epoch_that_was_kept(tmp_path):
+def test_a_log_is_plotted_with_the_best_epoch(tmp_path):
     rows = [{"epoch": k, "step": 10 * (k + 1), "loss": 1 / (k + 1), "translation_percent": t, "rotation_deg_per_100m": 1.0, "learning_rate": 1e-3}
             for k, t in enumerate((2.0, 3.0, 4.0))]
     torch.save({"step": 20}, tmp_path / "best.pt")

@@ -17,8 +17,8 @@ SEARCH = SearchConfig(angles=60, radii=10, reach_m=8.0)
 CONFIG = TrainingConfig(batch=2, epochs=2, epoch_pairs=8)
 
 
-class CutOff(Exception):
-    """Stands for a power cut."""
+class Interrupted(Exception):
+    """Simulates a power failure."""
 
 
 @pytest.fixture
@@ -30,18 +30,18 @@ def trainer(folder: Path, scans, **changes) -> Trainer:
     return Trainer(folder, *scans, NETWORK, SEARCH, TrainingConfig(**vars(CONFIG) | changes))
 
 
-def cut_off(trainer: Trainer, monkeypatch, after: int) -> None:
-    """Trains, and stops dead in the step after `after` more."""
+def interrupt(trainer: Trainer, monkeypatch, after: int) -> None:
+    """Trains, and raises in the step after `after` more."""
     learn, done = trainer._learn, itertools.count()
 
     def until(*arguments):
         if next(done) == after:
-            raise CutOff
+            raise Interrupted
         return learn(*arguments)
 
     with monkeypatch.context() as patch:
         patch.setattr(trainer, "_learn", until)
-        with pytest.raises(CutOff):
+        with pytest.raises(Interrupted):
             trainer.run()
 
 
@@ -50,14 +50,14 @@ def rows(folder: Path) -> list[dict]:
         return list(csv.DictReader(file))
 
 
-def test_a_training_that_is_cut_off_ends_with_the_same_weights(scans, tmp_path, monkeypatch):
+def test_an_interrupted_training_ends_with_the_same_weights(scans, tmp_path, monkeypatch):
     whole = trainer(tmp_path / "whole", scans)
     whole.run()
-    # A minute passes at each look at the clock: every step is saved.
+    # The clock advances a minute at each call: every step is saved.
     clock = itertools.count(0.0, 61.0)
     monkeypatch.setattr(train.time, "time", lambda: next(clock))
-    cut_off(trainer(tmp_path / "cut", scans), monkeypatch, after=3)  # within the first epoch
-    cut_off(trainer(tmp_path / "cut", scans), monkeypatch, after=3)  # within the second
+    interrupt(trainer(tmp_path / "cut", scans), monkeypatch, after=3)  # within the first epoch
+    interrupt(trainer(tmp_path / "cut", scans), monkeypatch, after=3)  # within the second
     again = trainer(tmp_path / "cut", scans)
     assert again.step == 6
     again.run()
@@ -68,13 +68,13 @@ def test_a_training_that_is_cut_off_ends_with_the_same_weights(scans, tmp_path, 
         for key, weights in a["network"].items():
             assert torch.equal(weights, b["network"][key]), (name, key)
     for a, b in zip(rows(tmp_path / "whole"), rows(tmp_path / "cut"), strict=True):
-        # The loss of an epoch that was cut off is that of its last part alone.
+        # The loss of an interrupted epoch is that of its last part.
         assert {**a, "seconds": 0, "loss": 0} == {**b, "seconds": 0, "loss": 0}
 
 
-def test_work_since_the_last_save_is_done_again(scans, tmp_path, monkeypatch):
+def test_steps_since_the_last_save_are_repeated(scans, tmp_path, monkeypatch):
     trainer(tmp_path / "whole", scans).run()
-    cut_off(trainer(tmp_path / "cut", scans), monkeypatch, after=6)  # saved at the end of the first epoch alone
+    interrupt(trainer(tmp_path / "cut", scans), monkeypatch, after=6)  # saved only at the end of the first epoch
     again = trainer(tmp_path / "cut", scans)
     assert again.step == 4
     again.run()
@@ -82,16 +82,16 @@ def test_work_since_the_last_save_is_done_again(scans, tmp_path, monkeypatch):
     assert all(torch.equal(a[key], b[key]) for key in a)
 
 
-def test_an_epoch_that_is_cut_off_in_its_validation_is_validated_again(scans, tmp_path, monkeypatch):
+def test_an_epoch_interrupted_in_its_validation_is_validated_again(scans, tmp_path, monkeypatch):
     trainer(tmp_path / "whole", scans).run()
     cut, clock = trainer(tmp_path / "cut", scans), itertools.count(0.0, 61.0)
     with monkeypatch.context() as patch:
         patch.setattr(train.time, "time", lambda: next(clock))
-        patch.setattr(cut, "validate", lambda: (_ for _ in ()).throw(CutOff))
-        with pytest.raises(CutOff):
+        patch.setattr(cut, "validate", lambda: (_ for _ in ()).throw(Interrupted))
+        with pytest.raises(Interrupted):
             cut.run()
     trainer(tmp_path / "cut", scans).run()
-    # The time and the loss of an epoch that was cut off are those of its last part.
+    # Time and loss of an interrupted epoch are those of its last part.
     both = [[{**row, "seconds": 0, "loss": 0} for row in rows(tmp_path / name)] for name in ("whole", "cut")]
     assert both[0] == both[1] and len(both[0]) == 2
 
@@ -106,7 +106,7 @@ def test_a_folder_of_another_training_is_refused(scans, tmp_path):
             Trainer(tmp_path / "run", *scans, NETWORK, SEARCH, TrainingConfig(**vars(CONFIG) | changes), **options)
 
 
-def test_a_run_from_before_there_was_a_key_goes_on(scans, tmp_path):
+def test_a_run_without_newer_keys_is_resumed(scans, tmp_path):
     run = trainer(tmp_path / "run", scans)
     del run.meaning["training"]["clip"], run.meaning["network"]["polar"], run.meaning["training"]["sampling"]["reach_m"]
     run._save("last.pt")
@@ -115,7 +115,7 @@ def test_a_run_from_before_there_was_a_key_goes_on(scans, tmp_path):
         trainer(tmp_path / "run", scans, clip=2.0)
 
 
-def test_masks_learn(scans, tmp_path):
+def test_training_reduces_the_loss(scans, tmp_path):
     training = trainer(tmp_path / "run", scans, epochs=30, learning_rate=1e-2, augment=False)
     training.run()
     losses = [float(row["loss"]) for row in rows(tmp_path / "run")]
@@ -124,7 +124,7 @@ def test_masks_learn(scans, tmp_path):
     assert masks.shape == (1, 2, 32, 32) and 0 <= masks.min() and masks.max() <= 1
 
 
-def test_an_epoch_counts_once_the_learning_rate_has_fallen(scans, tmp_path, monkeypatch):
+def test_the_best_epoch_is_chosen_after_the_learning_rate_has_decayed(scans, tmp_path, monkeypatch):
     training = trainer(tmp_path / "run", scans, epochs=10, epoch_pairs=2)
     drifts = iter([0.1, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0, 0.2, 1.0, 2.0])
     monkeypatch.setattr(training, "validate", lambda: Drift(next(drifts), 1.0, 1.0, 1.0))
@@ -132,6 +132,6 @@ def test_an_epoch_counts_once_the_learning_rate_has_fallen(scans, tmp_path, monk
     assert load(tmp_path / "run" / "best.pt")["step"] == 9
 
 
-def test_a_radian_counts_as_its_weight_says():
+def test_the_angle_weight_scales_the_angle_error():
     found, true = torch.tensor([[1.0, -2.0, 0.1], [0.0, 0.0, 0.0]]), torch.zeros(2, 3)
     assert torch.allclose(pose_error(found, true, 30.0), torch.tensor([[1.0, 2.0, 3.0], [0.0, 0.0, 0.0]]))
