@@ -1,7 +1,7 @@
 //! Over which distance powers are alike, in range and in azimuth, apart from what is usual at their range.
 
 use gyre_radar::PolarScan;
-use multiversion::multiversion;
+use gyre_simd::simd;
 use serde::Serialize;
 
 /// Longest lag in range, m.
@@ -122,11 +122,7 @@ fn dot(a: &[u8], b: &[u8]) -> u64 {
 }
 
 /// The same of few enough for the sum to fit.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
+#[simd]
 fn dot_part(a: &[u8], b: &[u8]) -> i32 {
     let mut sum = 0i32;
     for (a, b) in a.iter().zip(b) {

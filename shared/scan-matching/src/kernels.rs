@@ -4,7 +4,7 @@
 // at a time, which triples the time of the image rotation. Every place is clamped to the image right before it is read.
 #![allow(unsafe_code)]
 
-use multiversion::multiversion;
+use gyre_simd::simd;
 use rustfft::num_complex::Complex32;
 
 /// Partial sums kept beside each other, so that a sum can be vectorised.
@@ -45,11 +45,7 @@ impl Bilinear {
 ///
 /// `start` and `step` are (row, column) in cells. The caller keeps the line within the image; a sample that rounding
 /// puts outside is moved to the edge.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
-    "x86_64+avx2+fma",
-    "aarch64+neon"
-))]
+#[simd]
 pub(crate) fn bilinear_line(
     image: &[f32],
     n: usize,
@@ -78,11 +74,7 @@ pub(crate) fn bilinear_line(
 }
 
 /// Bilinear values at the places of a table, in an image with rows of `stride`.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
-    "x86_64+avx2+fma",
-    "aarch64+neon"
-))]
+#[simd]
 pub(crate) fn bilinear_table(image: &[f32], stride: usize, table: &[Bilinear], out: &mut [f32]) {
     assert!(image.len() >= stride + 2 && image.len() < 1 << 31);
     let last = (image.len() - stride - 2) as u32;
@@ -97,11 +89,7 @@ pub(crate) fn bilinear_table(image: &[f32], stride: usize, table: &[Bilinear], o
 }
 
 /// Row times window; what is not finite counts as zero.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
-    "x86_64+avx2+fma",
-    "aarch64+neon"
-))]
+#[simd]
 pub(crate) fn weigh(row: &[f32], window: &[f32], out: &mut [f32]) {
     for ((o, &v), &w) in out.iter_mut().zip(row).zip(window) {
         *o = if v.is_finite() { v * w } else { 0.0 };
@@ -109,11 +97,7 @@ pub(crate) fn weigh(row: &[f32], window: &[f32], out: &mut [f32]) {
 }
 
 /// A copy in which what is not finite is zero.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
-    "x86_64+avx2+fma",
-    "aarch64+neon"
-))]
+#[simd]
 pub(crate) fn finite_copy(from: &[f32], to: &mut [f32]) {
     for (t, &v) in to.iter_mut().zip(from) {
         *t = if v.is_finite() { v } else { 0.0 };
@@ -121,11 +105,7 @@ pub(crate) fn finite_copy(from: &[f32], to: &mut [f32]) {
 }
 
 /// Adds the square of each value to `sums`; returns the sum of the squares.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
-    "x86_64+avx2+fma",
-    "aarch64+neon"
-))]
+#[simd]
 pub(crate) fn add_squares(row: &[f32], sums: &mut [f32]) -> f32 {
     let mut lanes = [0.0; LANES];
     let (mut values, mut sums) = (row.chunks_exact(LANES), sums.chunks_exact_mut(LANES));
@@ -148,11 +128,7 @@ pub(crate) fn add_squares(row: &[f32], sums: &mut [f32]) -> f32 {
 }
 
 /// Sum of |z|^2.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
-    "x86_64+avx2+fma",
-    "aarch64+neon"
-))]
+#[simd]
 pub(crate) fn energy(values: &[Complex32]) -> f32 {
     let mut lanes = [0.0; LANES];
     for chunk in values.chunks(LANES) {
@@ -164,11 +140,7 @@ pub(crate) fn energy(values: &[Complex32]) -> f32 {
 }
 
 /// |z| of each value.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
-    "x86_64+avx2+fma",
-    "aarch64+neon"
-))]
+#[simd]
 pub(crate) fn modulus(spectrum: &[Complex32], out: &mut [f32]) {
     for (m, z) in out.iter_mut().zip(spectrum) {
         *m = (z.re * z.re + z.im * z.im).sqrt();
@@ -176,11 +148,7 @@ pub(crate) fn modulus(spectrum: &[Complex32], out: &mut [f32]) {
 }
 
 /// cross += g conj(f)
-#[multiversion(targets(
-    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
-    "x86_64+avx2+fma",
-    "aarch64+neon"
-))]
+#[simd]
 pub(crate) fn add_cross(f: &[Complex32], g: &[Complex32], cross: &mut [Complex32]) {
     for ((c, f), g) in cross.iter_mut().zip(f).zip(g) {
         c.re += g.re * f.re + g.im * f.im;
@@ -189,11 +157,7 @@ pub(crate) fn add_cross(f: &[Complex32], g: &[Complex32], cross: &mut [Complex32
 }
 
 /// g + i h.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
-    "x86_64+avx2+fma",
-    "aarch64+neon"
-))]
+#[simd]
 pub(crate) fn interleave(g: &[f32], h: &[f32], out: &mut [Complex32]) {
     for ((z, &g), &h) in out.iter_mut().zip(g).zip(h) {
         *z = Complex32::new(g, h);
@@ -201,11 +165,7 @@ pub(crate) fn interleave(g: &[f32], h: &[f32], out: &mut [Complex32]) {
 }
 
 /// z *= w
-#[multiversion(targets(
-    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
-    "x86_64+avx2+fma",
-    "aarch64+neon"
-))]
+#[simd]
 pub(crate) fn multiply(column: &mut [Complex32], by: &[Complex32]) {
     for (z, w) in column.iter_mut().zip(by) {
         *z = Complex32::new(z.re * w.re - z.im * w.im, z.re * w.im + z.im * w.re);
@@ -213,11 +173,7 @@ pub(crate) fn multiply(column: &mut [Complex32], by: &[Complex32]) {
 }
 
 /// Im(z m) / 2 - i (|z|^2 - |m|^2) / 4 in place of z, where `mirror` holds m in reverse order.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
-    "x86_64+avx2+fma",
-    "aarch64+neon"
-))]
+#[simd]
 pub(crate) fn cross_of_pair(column: &mut [Complex32], mirror: &[Complex32]) {
     for (z, m) in column.iter_mut().zip(mirror.iter().rev()) {
         let re = 0.5 * (z.re * m.im + z.im * m.re);
@@ -227,11 +183,7 @@ pub(crate) fn cross_of_pair(column: &mut [Complex32], mirror: &[Complex32]) {
 }
 
 /// Divides each score by the share of `energy` that both rasters have left in the overlap; `f` is in reverse order.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
-    "x86_64+avx2+fma",
-    "aarch64+neon"
-))]
+#[simd]
 pub(crate) fn divide_by_share(scores: &mut [f32], f: &[f64], g: &[f64], energy: f64) {
     for ((score, &f), &g) in scores.iter_mut().zip(f.iter().rev()).zip(g) {
         let share = (f * g).sqrt() / energy;
@@ -244,11 +196,7 @@ pub(crate) fn divide_by_share(scores: &mut [f32], f: &[f64], g: &[f64], energy: 
 }
 
 /// ln(1 + scale m) of each value, all at least 0, to 2e-6 relative.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
-    "x86_64+avx2+fma",
-    "aarch64+neon"
-))]
+#[simd]
 pub(crate) fn log1p_scaled(values: &mut [f32], scale: f32) {
     for m in values {
         *m = ln(1.0 + scale * *m);

@@ -4,7 +4,7 @@
 //! smears, and a map that smears along the way driven pulls the next scan after it.
 
 use gyre_geometry::Pose;
-use multiversion::multiversion;
+use gyre_simd::simd;
 use nalgebra::Point2;
 use ndarray::{ArrayView2, ArrayViewMut2};
 
@@ -172,11 +172,7 @@ impl Level {
 
 /// One pass of the blur along an axis. What lies within the blur's reach of the array's ends stays zero; the caller draws
 /// nothing there.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
-    "x86_64+avx2+fma",
-    "aarch64+neon"
-))]
+#[simd]
 fn blur(from: &[f32], to: &mut [f32], stride: usize) {
     let margin = BLUR_REACH * stride;
     let count = from.len() - 2 * margin;
@@ -192,11 +188,7 @@ fn blur(from: &[f32], to: &mut [f32], stride: usize) {
 }
 
 /// Sum and sum of squares, in lanes.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
-    "x86_64+avx2+fma",
-    "aarch64+neon"
-))]
+#[simd]
 fn moments(values: &[f32]) -> (f64, f64) {
     let (chunks, rest) = values.as_chunks::<16>();
     let (mut sums, mut squares) = ([0.0_f32; 16], [0.0_f32; 16]);
@@ -216,11 +208,7 @@ fn moments(values: &[f32]) -> (f64, f64) {
 }
 
 /// Most cells saw nothing; sixteen of them at once are passed over.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
-    "x86_64+avx2+fma",
-    "aarch64+neon"
-))]
+#[simd]
 fn saturate(values: &[f32], mean: f32, cells: &mut [u8]) {
     for (cells, values) in cells.chunks_mut(16).zip(values.chunks(16)) {
         if values.iter().all(|value| *value == 0.0) {
@@ -235,11 +223,7 @@ fn saturate(values: &[f32], mean: f32, cells: &mut [u8]) {
 }
 
 /// At most 64 images of at most 255: no sum is too large.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
-    "x86_64+avx2+fma",
-    "aarch64+neon"
-))]
+#[simd]
 fn add(cells: &[u8], sum: &mut [u16]) {
     sum.iter_mut()
         .zip(cells)

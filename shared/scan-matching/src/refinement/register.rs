@@ -4,7 +4,7 @@
 //! keyframes saw something.
 
 use gyre_geometry::Pose;
-use multiversion::multiversion;
+use gyre_simd::simd;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::{level::Lookup, sweep::Placed};
@@ -135,11 +135,7 @@ const SUMS: usize = 11;
 type Lanes = [f32; LANES];
 
 /// What a block of points adds. Points left over are filled up with some of no weight.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
-    "x86_64+avx2+fma",
-    "aarch64+neon"
-))]
+#[simd]
 fn sum_block<'a>(
     map: &Lookup<'a>,
     x_m: &[f32],

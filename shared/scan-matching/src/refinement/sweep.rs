@@ -1,7 +1,7 @@
 //! A scan's points, put where they were in the middle of its sweep.
 
 use gyre_geometry::{SparsePoint, Twist};
-use multiversion::multiversion;
+use gyre_simd::simd;
 
 /// Points in the frame of the sweep's middle, as three columns.
 #[derive(Debug, Default)]
@@ -60,11 +60,7 @@ impl Placed {
 }
 
 /// The sensor's pose at time t on its arc is the chord (v t), turned by half the angle, and the turn by the whole angle.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512vl+avx512bw+avx512dq",
-    "x86_64+avx2+fma",
-    "aarch64+neon"
-))]
+#[simd]
 fn place(
     points: &[SparsePoint],
     [vx, vy, rate]: [f32; 3],

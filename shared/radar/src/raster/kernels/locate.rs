@@ -4,7 +4,7 @@ use super::super::bearing_table::{BearingTable, NODES};
 use super::super::cells::{BLOCK, Block, CellRow};
 use super::super::sweep_motion::SweepMotion;
 use super::window::UNIT;
-use multiversion::multiversion;
+use gyre_simd::simd;
 use std::array::from_fn;
 
 /// From a cell's bearing to the time, to the place, to the bearing there. After the second step a cell 12 m away is
@@ -48,11 +48,7 @@ impl Taps {
 }
 
 /// Taps of a row of cells seen by a sensor that stands.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
+#[simd]
 pub fn locate(cells: &CellRow, lookup: &Lookup, taps: &mut [Taps]) {
     let places = cells.bearing.iter().zip(cells.range_m);
     for ((bearing, range_m), taps) in places.zip(taps) {
@@ -63,11 +59,7 @@ pub fn locate(cells: &CellRow, lookup: &Lookup, taps: &mut [Taps]) {
 
 /// Taps of a row of cells seen by a sensor that moves: where it stood depends on when it looked, and that on where it
 /// stood.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
+#[simd]
 pub fn locate_moving(cells: &CellRow, motion: &SweepMotion, lookup: &Lookup, taps: &mut [Taps]) {
     let start = lookup.bearings.start;
     let places = cells.bearing.iter().zip(cells.z_m);

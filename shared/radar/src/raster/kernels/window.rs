@@ -1,6 +1,6 @@
 //! Averaging along range, one azimuth at a time.
 
-use multiversion::multiversion;
+use gyre_simd::simd;
 
 /// A sample's unit: 1/256 of the scan's. The largest mean, 255, just fits a u16.
 pub const UNIT: u32 = 256;
@@ -56,11 +56,7 @@ impl Window {
 }
 
 /// Writes the sums of pieces of the powers above the floor; `above_floor` is room for them.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
+#[simd]
 pub fn sum_pieces(
     powers: &[u8],
     floor: u8,
@@ -119,11 +115,7 @@ const BLOCK: usize = 32;
 
 /// Writes the window's mean at each column; column `c` is centred on `pieces[c + window.reach()]`.
 /// Needs `out.len() + 2 * window.reach()` pieces.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
+#[simd]
 pub fn average(pieces: &[u16], window: &Window, out: &mut [u16]) {
     let (blocks, rest) = out.as_chunks_mut::<BLOCK>();
     let done = blocks.len() * BLOCK;
@@ -159,11 +151,7 @@ fn sums<const COLUMNS: usize>(pieces: &[u16], terms: usize, spacing: usize) -> [
 }
 
 /// Moves samples by so many columns toward the end, linear between columns; where nothing comes from is zero.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
+#[simd]
 pub fn shift(samples: &[u16], by: f32, out: &mut [u16]) {
     let whole = (-by).floor();
     let share = ((-by - whole) * UNIT as f32) as u32;
