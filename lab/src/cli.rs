@@ -4,7 +4,7 @@ use std::{num::NonZeroUsize, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::corrupt::Fault;
+use crate::{corrupt::Fault, sequence::SequenceArguments};
 
 /// Gyre's laboratory: what research on radar odometry needs, and a robot does not.
 ///
@@ -18,9 +18,11 @@ pub struct Lab {
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Print the papers' tables for this machine: times of the searches, and the accuracy that they reach.
+    /// Print Fast-MbyM's Table III for this machine: the times of the searches, and the accuracy that they reach.
     Tables(TablesArguments),
-    /// Measure how like real scans simulated ones are.
+    /// Measure what each step from the paper's form to a configuration gives, or what single changes of it do.
+    Ablation(AblationArguments),
+    /// Measure how close simulated scans are to real ones.
     Realism(RealismArguments),
     /// Write a copy of a recording in which some scans are corrupted, to see what an odometry makes of them.
     Corrupt(CorruptArguments),
@@ -33,41 +35,41 @@ pub enum Command {
 
 #[derive(Debug, Args)]
 pub struct TablesArguments {
-    /// A sequence's configuration; one for each --data, in the same order.
-    #[arg(long = "config", required = true)]
-    pub configurations: Vec<PathBuf>,
-    /// A sequence's folder; may be repeated. Times are measured on scans of the first.
-    #[arg(long, required = true)]
-    pub data: Vec<PathBuf>,
+    /// The sequences. Times are measured on scans of the first.
+    #[command(flatten)]
+    pub sequences: SequenceArguments,
     /// Where tables.md, tables.json and all runs go.
     #[arg(long, default_value = "out/tables")]
     pub out: PathBuf,
-    /// The folder of the learned masks: f-mbym-N.toml and mbym-N.toml for rasters of N cells a side, gyre-255.toml for Gyre's
-    /// own rows. A row whose model is not there is left out, and so it is said.
-    #[arg(long, default_value = "models")]
-    pub models: PathBuf,
-    /// Also run with each of these changes alone, as in masking.threshold=50,70: what the choice is worth among its
-    /// neighbours; may be repeated.
-    #[arg(long, value_name = "KEY=VALUE,...")]
-    pub vary: Vec<String>,
-    /// Also run each step from the paper's form to the configuration as it is, each with those before it.
+    /// Measure the times only (Table IIIa).
     #[arg(long)]
-    pub ladder: bool,
-    /// Leave Table III out, times and accuracy: only what --ladder and --vary ask for.
-    #[arg(long)]
-    pub no_table_iii: bool,
+    pub times: bool,
     /// Rasters' sides whose times are measured, cells.
     #[arg(long, value_delimiter = ',', default_value = "127,255,511")]
     pub sizes: Vec<usize>,
-    /// Timed passes of each search, once before the peer and once after it.
+    /// Timed passes of each search, once before the baseline and once after it.
     #[arg(long, default_value = "25")]
     pub passes: NonZeroUsize,
-    /// A Python interpreter with torch: the peer is timed between the two.
-    #[arg(long, requires = "peer_script")]
-    pub peer: Option<PathBuf>,
-    /// The peer's program.
-    #[arg(long, requires = "peer")]
-    pub peer_script: Option<PathBuf>,
+    /// A Python interpreter with torch: the baseline is timed between the two.
+    #[arg(long, value_name = "PYTHON", requires = "baseline_script")]
+    pub baseline: Option<PathBuf>,
+    /// The baseline's program.
+    #[arg(long, value_name = "FILE", requires = "baseline")]
+    pub baseline_script: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct AblationArguments {
+    /// The sequences.
+    #[command(flatten)]
+    pub sequences: SequenceArguments,
+    /// Where ablation.md, ablation.json and all runs go.
+    #[arg(long, default_value = "out/ablation")]
+    pub out: PathBuf,
+    /// Run each of these changes alone instead of the steps, as in masking.threshold=50,70: shows whether a choice holds among its
+    /// neighbours; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE,...")]
+    pub vary: Vec<String>,
 }
 
 #[derive(Debug, Args)]

@@ -1,9 +1,13 @@
 //! `gyre-lab`: tables of the papers, ablations, realism of simulated scans, corrupted recordings, training pairs.
 
+mod ablation;
 mod cli;
 mod corrupt;
 mod export_pairs;
+mod models;
 mod realism;
+mod report;
+mod sequence;
 mod tables;
 
 use std::process::ExitCode;
@@ -22,6 +26,7 @@ fn main() -> ExitCode {
 fn execute(command: Command) -> Result<ExitCode, Failure> {
     match command {
         Command::Tables(arguments) => tables::tables(&arguments),
+        Command::Ablation(arguments) => ablation::ablation(&arguments),
         Command::Realism(arguments) => realism::realism(&arguments),
         Command::Corrupt(arguments) => corrupt::corrupt(&arguments),
         Command::ExportPairs(arguments) => export_pairs::export_pairs(&arguments),

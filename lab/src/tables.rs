@@ -1,271 +1,120 @@
-//! `gyre-lab tables`: Fast-MbyM's Table III for this machine, the paper's figures and a peer's beside ours.
+//! `gyre-lab tables`: Fast-MbyM's Table III for this machine, the paper's figures and a baseline's beside ours.
 //!
-//! - [`rows`]: what is compared, and what each row changes in a configuration;
-//! - [`papers`]: the paper's figures; [`models`]: the networks;
-//! - [`times`] (Table IIIa) and [`peer`]; [`accuracy`] (Table IIIb): the measurements;
-//! - [`variations`]: what single changes do to the shipped configuration;
-//! - [`ladder`]: the steps from the paper's form to it;
-//! - [`markdown`]: the tables as text.
+//! - [`rows`]: what is compared, and what each row overrides in a configuration;
+//! - [`times`]: Table IIIa, and [`baseline`] in it; Table IIIb is made of runs.
 
-pub(crate) mod accuracy;
-mod ladder;
-mod markdown;
-mod models;
-mod papers;
-mod peer;
-pub(crate) mod rows;
+mod baseline;
+pub mod rows;
 mod times;
-mod variations;
 
-use std::{
-    env, fs,
-    path::{Path, PathBuf},
-    process::ExitCode,
-};
+use std::{path::Path, process::ExitCode};
 
-use gyre_radar::OwnedScan;
+use gyre::Failure;
 use serde::Serialize;
 
-use crate::cli::TablesArguments;
-use accuracy::Accuracies;
-use gyre::{
-    Failure,
-    configuration::Configuration,
-    machine::{Machine, today},
-    print,
+use crate::{
+    cli::TablesArguments,
+    report::{Heading, Notes, make_folder, publish},
+    sequence::{Experiment, LEGEND, Line, Sequence},
 };
-use ladder::Ladder;
-use models::Models;
-use peer::Peer;
+use baseline::Baseline;
+use rows::{Row, Rows, Table};
 use times::Times;
-use variations::Variations;
 
-/// All of it: `tables.json`.
+/// Where the paper's figures are from.
+const PAPER: &str =
+    "\nThe paper: Weston, Gadd, De Martini, Newman, Posner: Fast-MbyM, ICRA 2022, Table III.\n";
+
+/// `tables.json`.
 #[derive(Debug, Serialize)]
 struct Tables {
-    version: &'static str,
-    /// Known where the builder set `GYRE_COMMIT`.
-    commit: Option<&'static str>,
-    machine: Machine,
-    /// UTC.
-    date: String,
-    command: String,
-    /// Table IIIa, unless `--no-table-iii` leaves it out.
-    times: Option<Times>,
+    #[serde(flatten)]
+    heading: Heading,
+    /// Table IIIa.
+    times: Times,
     /// Table IIIb, sequence by sequence.
-    accuracy: Vec<Accuracies>,
-    /// What `--vary` asked for, sequence by sequence.
-    variations: Vec<Variations>,
-    /// What `--ladder` asked for, sequence by sequence.
-    ladders: Vec<Ladder>,
-    /// Where the paper's figures are from.
-    papers: &'static str,
+    accuracy: Vec<Experiment>,
 }
 
 /// Measures, prints and writes both tables.
+///
+/// # Errors
+/// What cannot be read, run or written.
 pub fn tables(arguments: &TablesArguments) -> Result<ExitCode, Failure> {
-    let sequences = sequences(arguments)?;
-    let changes = variations::changes(&arguments.vary)?;
-    let where_asked = |asked: bool| if asked { sequences.as_slice() } else { &[] };
-    let table_iii = !arguments.no_table_iii;
-    for change in &changes {
-        sequences[0].configuration(std::slice::from_ref(change))?;
-    }
-    let out = &arguments.out;
-    fs::create_dir_all(out)
-        .map_err(|error| format!("cannot write to {}: {error}", out.display()))?;
-    let models = Models::new(&arguments.models);
-    let peer = Peer::new(arguments.peer.as_deref(), arguments.peer_script.as_deref());
+    let sequences = Sequence::all(&arguments.sequences)?;
+    let (out, models) = (&arguments.out, &arguments.sequences.models);
+    let rows = Rows::read()?;
+    make_folder(out)?;
+    let baseline = arguments
+        .baseline
+        .as_deref()
+        .zip(arguments.baseline_script.as_deref());
+    let baseline = baseline.map(|(python, script)| Baseline { python, script });
+    let times = Times::measure(&rows, &sequences[0], arguments, baseline)?;
+    let runs: &[Sequence] = if arguments.times { &[] } else { &sequences };
     let tables = Tables {
-        version: env!("CARGO_PKG_VERSION"),
-        commit: option_env!("GYRE_COMMIT"),
-        machine: Machine::this(),
-        date: today(),
-        command: command(
-            env::args_os()
-                .skip(1)
-                .map(|argument| argument.to_string_lossy().into_owned()),
-        ),
-        times: where_asked(table_iii)
-            .first()
-            .map(|first| {
-                times::measure(
-                    first,
-                    &arguments.sizes,
-                    arguments.passes.get(),
-                    &models,
-                    peer.as_ref(),
-                    out,
-                )
-            })
-            .transpose()?,
-        accuracy: where_asked(table_iii)
+        heading: Heading::now(),
+        times,
+        accuracy: runs
             .iter()
-            .map(|sequence| accuracy::measure(sequence, &models, &out.join(&sequence.name)))
+            .map(|sequence| accuracy(&rows, sequence, models, out))
             .collect::<Result<_, _>>()?,
-        variations: where_asked(!changes.is_empty())
-            .iter()
-            .map(|sequence| variations::measure(sequence, &changes, &out.join(&sequence.name)))
-            .collect::<Result<_, _>>()?,
-        ladders: where_asked(arguments.ladder)
-            .iter()
-            .map(|sequence| ladder::measure(sequence, &models, &out.join(&sequence.name)))
-            .collect::<Result<_, _>>()?,
-        papers: papers::SOURCE,
     };
-    let text = markdown::of(&tables);
-    save(
-        &out.join("tables.json"),
-        &serde_json::to_string_pretty(&tables)?,
-    )?;
-    save(&out.join("tables.md"), &text)?;
-    print::line(text.trim_end())?;
+    let mut text = tables.heading.markdown("Tables") + PAPER + &tables.times.markdown();
+    text.extend(tables.accuracy.iter().map(Experiment::markdown));
+    if !tables.accuracy.is_empty() {
+        text += LEGEND;
+    }
+    publish(out, "tables", &tables, &text)?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// A sequence that was named on the command line.
-#[derive(Debug)]
-pub(crate) struct Sequence {
-    /// The configuration's and the folder's names: the results' folder.
-    name: String,
-    file: PathBuf,
-    data: PathBuf,
-}
-
-/// The sequences in the order of the command line, each with a folder of its own for its results.
-fn sequences(arguments: &TablesArguments) -> Result<Vec<Sequence>, Failure> {
-    let (files, data) = (&arguments.configurations, &arguments.data);
-    if files.len() != data.len() {
-        return Err(format!(
-            "{} --config but {} --data: give one for one",
-            files.len(),
-            data.len()
-        )
-        .into());
-    }
-    let mut sequences: Vec<Sequence> = Vec::new();
-    for (file, data) in files.iter().zip(data) {
-        let sequence = Sequence::new(file, data);
-        if let Some(other) = sequences.iter().find(|other| other.name == sequence.name) {
-            let (one, two) = (other.data.display(), data.display());
-            return Err(format!(
-                "{one} and {two} would write to the same folder, {}",
-                sequence.name
-            )
-            .into());
-        }
-        sequence.configuration(&[])?;
-        sequences.push(sequence);
-    }
-    Ok(sequences)
-}
-
-impl Sequence {
-    pub(crate) fn new(file: &Path, data: &Path) -> Self {
-        // `recordings/.` and the like have names only once they are resolved.
-        let resolved = data.canonicalize().unwrap_or_else(|_| data.to_owned());
-        let folder = resolved.file_name().unwrap_or_default().to_string_lossy();
-        let name = format!(
-            "{}-{folder}",
-            file.file_stem().unwrap_or_default().to_string_lossy()
-        );
-        Self {
-            name,
-            file: file.to_owned(),
-            data: data.to_owned(),
-        }
-    }
-
-    /// Its configuration with a row's changes.
-    pub(crate) fn configuration(&self, changes: &[String]) -> Result<Configuration, Failure> {
-        Ok(Configuration::read(&self.file, changes)?)
-    }
-
-    /// The arguments of the `gyre run` with a row's changes.
-    fn run_arguments(&self, changes: &[String], out: &Path) -> Vec<String> {
-        let mut arguments = vec!["run".to_owned(), self.file.display().to_string()];
-        for (option, path) in [("--data", self.data.as_path()), ("--out", out)] {
-            arguments.extend([option.to_owned(), path.display().to_string()]);
-        }
-        arguments.extend(["--rate", "max", "--fresh"].map(str::to_owned));
-        arguments.extend(
-            changes
-                .iter()
-                .flat_map(|change| ["--set".to_owned(), change.clone()]),
-        );
-        arguments
-    }
-
-    /// Its first scans, at most `most`, those that cannot be read left out; at least two.
-    fn scans(&self, most: usize) -> Result<Vec<OwnedScan>, Failure> {
-        let configuration = self.configuration(&[])?;
-        let mut dataset = gyre_radar::open(&self.data, &configuration.dataset)?;
-        let len = dataset.len();
-        let read = |index| {
-            let mut scan = OwnedScan::with_limits(dataset.limits());
-            scan.geometry = dataset.read(index, scan.slot()).ok()?;
-            Some(scan)
+/// Runs every row of Table IIIb on `sequence`. Where the network of one is missing there is only what the paper says, if it does.
+fn accuracy(
+    rows: &Rows,
+    sequence: &Sequence,
+    models: &Path,
+    out: &Path,
+) -> Result<Experiment, Failure> {
+    let (mut lines, mut left_out) = (Vec::new(), Notes::new());
+    for row in rows.of(Table::Accuracy) {
+        let n = sequence.configuration(&row.changes(rows, None))?.raster.n;
+        let measured = match row.is_measured() {
+            true => run(rows, row, sequence, models, out)?,
+            false => Ok(Line::default()),
         };
-        let scans: Vec<OwnedScan> = (configuration.source.first..len)
-            .filter_map(read)
-            .take(most)
-            .collect();
-        match scans.len() {
-            0 | 1 => {
-                Err(format!("{} has no two scans that can be read", self.data.display()).into())
-            }
-            _ => Ok(scans),
+        let line = measured.unwrap_or_else(|reason| {
+            left_out.entry(reason).or_default().push(row.name.clone());
+            Line::default()
+        });
+        if line.command.is_some() || row.is_of_paper() {
+            let (row, paper) = (row.name.clone(), rows.figures(row, Table::Accuracy, n));
+            lines.push(Line { row, paper, ..line });
         }
     }
+    Ok(Experiment {
+        title: "IIIb: accuracy",
+        data: sequence.data.display().to_string(),
+        lines,
+        left_out,
+    })
 }
 
-/// The command line that calls gyre with these arguments.
-fn command(arguments: impl IntoIterator<Item = impl AsRef<str>>) -> String {
-    let quoted = |argument: &str| {
-        let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+@%".contains(c);
-        match !argument.is_empty() && argument.chars().all(plain) {
-            true => argument.to_owned(),
-            false => format!("'{}'", argument.replace('\'', r"'\''")),
-        }
+/// Runs a row; inside, why its network cannot be used.
+fn run(
+    rows: &Rows,
+    row: &Row,
+    sequence: &Sequence,
+    models: &Path,
+    out: &Path,
+) -> Result<Result<Line, String>, Failure> {
+    let model = match row.mask.is_empty() {
+        true => None,
+        false => match sequence.model(models, &row.mask, &row.changes(rows, None))? {
+            Ok(model) => Some(model),
+            Err(reason) => return Ok(Err(reason)),
+        },
     };
-    let words = arguments
-        .into_iter()
-        .map(|argument| quoted(argument.as_ref()));
-    std::iter::once("gyre".to_owned())
-        .chain(words)
-        .collect::<Vec<_>>()
-        .join(" ")
-}
-
-fn save(path: &Path, text: &str) -> Result<(), Failure> {
-    fs::write(path, text)
-        .map_err(|error| format!("cannot write {}: {error}", path.display()).into())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_command_can_be_given_to_a_shell() {
-        assert_eq!(
-            command(["run", "a b.toml", "--set", "x=1", "it's"]),
-            r"gyre run 'a b.toml' --set x=1 'it'\''s'"
-        );
-        assert_eq!(command([""; 1]), "gyre ''");
-    }
-
-    #[test]
-    fn a_run_repeats_the_row_from_the_command_line() {
-        let sequence = Sequence::new(
-            Path::new("configs/oxford.toml"),
-            Path::new("recordings/monday"),
-        );
-        assert_eq!(sequence.name, "oxford-monday");
-        let arguments =
-            sequence.run_arguments(&["search.kind=exhaustive".to_owned()], Path::new("out/raw"));
-        let expected = "gyre run configs/oxford.toml --data recordings/monday --out out/raw --rate max --fresh \
-                        --set search.kind=exhaustive";
-        assert_eq!(command(arguments), expected);
-    }
+    let (_, line) = sequence.run(&row.name, &row.changes(rows, model.as_ref()), out)?;
+    Ok(Ok(Line { model, ..line }))
 }

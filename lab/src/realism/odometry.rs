@@ -8,10 +8,7 @@ use gyre_radar::{
 };
 
 use super::recording::{Part, Source};
-use crate::tables::{
-    accuracy,
-    rows::{PLAIN, Row, SHIPPED},
-};
+use crate::tables::rows::Rows;
 use gyre::{Failure, judgement::judge, print};
 
 /// How a recording moves, and how well that is found out from its scans.
@@ -36,8 +33,8 @@ impl Searches {
                 ..Self::default()
             });
         }
-        let plain = Some(run(source, PLAIN, scans)?);
-        let refined = Some(run(source, SHIPPED, scans)?);
+        let plain = Some(run(source, "f-raw, line 14", scans)?);
+        let refined = Some(run(source, "Gyre", scans)?);
         Ok(Self {
             truth,
             plain,
@@ -72,10 +69,13 @@ fn truth(source: &Source) -> Option<Trajectory> {
     (truth.stamp_ns.is_some() && truth.has_heading()).then_some(truth)
 }
 
-fn run(source: &Source, row: &Row, scans: usize) -> Result<Trajectory, Failure> {
-    let mut changes = row.changes();
+/// Runs a row of Table III on the first `scans` scans.
+fn run(source: &Source, row: &str, scans: usize) -> Result<Trajectory, Failure> {
+    let rows = Rows::read()?;
+    let mut changes = rows
+        .named(row)
+        .map_or_else(Vec::new, |row| row.changes(&rows, None));
     changes.push(format!("source.scans={scans}"));
-    let out = source.runs.join(row.folder());
-    accuracy::run(&source.sequence, row.name, &changes, &out)?;
+    let (out, _) = source.sequence.run(row, &changes, &source.runs)?;
     Ok(read_trajectory(&out.join("trajectory.tum"))?)
 }

@@ -11,8 +11,9 @@ use gyre_radar::{Dataset, DatasetOptions, Format, OwnedScan, Trajectory};
 use nalgebra::Isometry2;
 use serde::Serialize;
 
-use super::{odometry::Searches, save};
-use crate::tables::Sequence;
+use super::odometry::Searches;
+use crate::report::save;
+use crate::sequence::Sequence;
 use gyre::{Failure, print};
 
 /// Consecutive scans that are measured in a row.

@@ -9,7 +9,7 @@ use gyre_radar::OwnedScan;
 use gyre_scan_matching::{ConfigError, RefinementKind, Refiner as Matcher};
 
 use super::{Median, learned::Learned};
-use crate::tables::{Sequence, models::Model, rows::Row};
+use crate::{models::Model, sequence::Sequence, tables::rows::Row};
 use gyre::{
     Failure,
     configuration::{Configuration, SearchKind},
@@ -38,11 +38,12 @@ impl Timer {
     pub fn new(
         sequence: &Sequence,
         row: &Row,
+        changes: &[String],
         model: Option<Model>,
         n: usize,
         scans: &[OwnedScan],
     ) -> Result<Self, Failure> {
-        let mut configuration = sequence.configuration(&row.changes_with(model.as_ref()))?;
+        let mut configuration = sequence.configuration(changes)?;
         let raster = &mut configuration.raster;
         let scaled = raster.cell_m * raster.n as f32 / n as f32;
         (raster.n, raster.cell_m) = (n, model.as_ref().map_or(scaled, |model| model.cell_m));
