@@ -205,7 +205,7 @@ fn a_folder_of_another_recording_is_refused() {
         recording.path(),
         &["--set", "simulation.drive.speed_mps=5"],
     ));
-    refused.refused_with(&["recording of another configuration", "another folder"]);
+    refused.refused_with(&["dataset of another configuration", "another folder"]);
     let unknown = Ended::of(simulate(recording.path(), &["--format", "fomo"]));
     assert!(
         unknown.stderr.contains("oxford, boreas, radiate"),

@@ -83,7 +83,7 @@ pub fn store(simulation: &SimulationConfig, out: &Path) -> Result<PathBuf, Failu
     let summary = match write(threads, simulation, out) {
         Err(
             SimulatorError::OutputInUse { .. }
-            | SimulatorError::OtherRecording { .. }
+            | SimulatorError::OtherDataset { .. }
             | SimulatorError::OtherImage { .. },
         ) => {
             fs::remove_dir_all(out)?;

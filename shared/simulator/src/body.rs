@@ -3,16 +3,16 @@
 use gyre_geometry::Pose;
 use nalgebra::{Point2, Vector2};
 
-/// The body of a thing that belongs to nothing larger.
+/// The body number of scatterers and walls that belong to no body.
 pub const NO_BODY: u32 = 0;
 
-/// Which way a scatterer reflects.
+/// The dependence of a scatterer's reflection on direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Aspect {
-    /// The same to all sides: posts, leaves, corners of cars.
+    /// The same in all directions: posts, leaves, corners of cars.
     AllRound,
-    /// To one side: power falls with the cosine of the angle from `normal`, raised to `sharpness`
-    /// (1 to 2: rough walls; 300: a smooth panel that flashes within some degrees).
+    /// Mainly in one direction: power falls with the cosine of the angle from `normal`, raised to
+    /// `sharpness` (1 to 2: rough walls; 300: a smooth panel that flashes within some degrees).
     Facing {
         /// Unit vector, world frame.
         normal: Vector2<f64>,
@@ -22,7 +22,8 @@ pub enum Aspect {
 }
 
 impl Aspect {
-    /// Share of the power that goes towards `direction`, a unit vector from the scatterer to the sensor: 0 to 1.
+    /// Share of the power that is reflected towards `direction`, a unit vector from the scatterer to the
+    /// sensor: 0 to 1.
     pub fn gain(&self, direction: Vector2<f64>) -> f64 {
         match *self {
             Self::AllRound => 1.0,
@@ -30,8 +31,8 @@ impl Aspect {
         }
     }
 
-    /// The same on average over all directions: the mean of a cosine's power over a circle, about
-    /// `1 / sqrt(2 pi (sharpness + 0.64))`.
+    /// The mean of [`Aspect::gain`] over all directions: that of a power of the cosine over a circle is
+    /// about `1 / sqrt(2 pi (sharpness + 0.64))`.
     pub fn mean_gain(&self) -> f64 {
         match *self {
             Self::AllRound => 1.0,
@@ -42,31 +43,31 @@ impl Aspect {
     }
 }
 
-/// A point that reflects.
+/// A point scatterer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scatterer {
-    /// Where, world frame, metres.
+    /// Position, world frame, metres.
     pub position: Point2<f64>,
     /// Radar cross-section, square metres.
     pub cross_section_m2: f64,
-    /// Which way it reflects.
+    /// The dependence on direction.
     pub aspect: Aspect,
-    /// What it is a part of: walls of the same body do not hide it. [`NO_BODY`] where it stands alone.
+    /// Its body, whose walls do not hide it; [`NO_BODY`] if it has none.
     pub body: u32,
 }
 
-/// A straight wall that lets a part of the power through.
+/// A straight wall that lets a part of the power pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wall {
     /// One end, world frame, metres.
     pub from: Point2<f64>,
     /// The other end.
     pub to: Point2<f64>,
-    /// Share of the power that passes, there and back: 0 (nothing) to 1.
+    /// Two-way share of the power that passes: 0 to 1.
     pub transmission: f64,
-    /// Share of the power that it mirrors: 0 (rough) to 1 (a sheet of metal).
+    /// Share of the power that is mirrored: 0 (rough) to 1 (a sheet of metal).
     pub mirror: f64,
-    /// What it is a part of.
+    /// Its body.
     pub body: u32,
 }
 
@@ -99,12 +100,12 @@ impl Wall {
     }
 }
 
-/// A thing made of scatterers and walls.
+/// Scatterers and walls.
 #[derive(Clone, Debug, Default)]
 pub struct Body {
-    /// What reflects.
+    /// The scatterers.
     pub scatterers: Vec<Scatterer>,
-    /// What hides.
+    /// The walls.
     pub walls: Vec<Wall>,
 }
 
@@ -116,19 +117,19 @@ impl Body {
     }
 }
 
-/// A body on its way.
+/// A moving body at an instant.
 #[derive(Clone, Copy, Debug)]
 pub struct Moving<'a> {
-    /// What it is made of, in its own frame (x ahead); its number is its own among all movers and the town.
+    /// Its content, in its own frame (x ahead), with a number that no other body has.
     pub body: &'a Body,
-    /// Where its frame is in the world at the time asked for.
+    /// The pose of its frame in the world.
     pub pose: Pose,
-    /// Velocity of that frame in the world, metres a second.
+    /// The velocity of its frame in the world, metres a second.
     pub velocity: Vector2<f64>,
 }
 
 impl Moving<'_> {
-    /// Where its frame is `time_s` seconds later. Turning is left out: a sweep is short.
+    /// The pose `time_s` seconds later. Rotation is neglected, since a sweep is short.
     pub fn pose_after(&self, time_s: f64) -> Pose {
         Pose::from_parts(
             (self.pose.translation.vector + self.velocity * time_s).into(),
@@ -137,9 +138,9 @@ impl Moving<'_> {
     }
 }
 
-/// What moves around the sensor.
+/// The moving bodies around the sensor.
 pub trait Movers: Send + Sync {
-    /// Shows all bodies within `reach_m` of `centre` at a time of the drive, always in the same order.
+    /// Visits all bodies within `reach_m` of `centre` at a time of the drive, always in the same order.
     fn visit<'a>(
         &'a self,
         time_s: f64,
@@ -149,7 +150,7 @@ pub trait Movers: Send + Sync {
     );
 }
 
-/// Nothing moves.
+/// No moving bodies.
 impl Movers for () {
     fn visit<'a>(&'a self, _: f64, _: Point2<f64>, _: f64, _: &mut dyn FnMut(Moving<'a>)) {}
 }

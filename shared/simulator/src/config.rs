@@ -1,4 +1,4 @@
-//! What to simulate.
+//! The configuration of a simulation.
 
 use gyre_radar::DatasetOptions;
 use serde::{Deserialize, Serialize};
@@ -13,30 +13,32 @@ use crate::town::TownConfig;
 use crate::traffic::TrafficConfig;
 use crate::weather::WeatherConfig;
 
-/// What to simulate. Every key has a default, and unknown keys are refused.
+/// A simulation. Every key has a default, and unknown keys are rejected.
 ///
-/// One configuration gives one dataset, byte for byte (for one build on one kind of machine: sines and logarithms are the system's).
+/// One configuration gives one dataset, byte for byte (with one build on one kind of machine: sines and
+/// logarithms are the system's).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SimulationConfig {
-    /// Scans to generate. Round a block the vehicle keeps circling as long as they last; where another drive ends, it stands.
+    /// Scans to generate. A drive round a block is repeated as long as they last; after the end of any
+    /// other drive the vehicle stands.
     pub scans: usize,
-    /// Where all randomness comes from: the town, the speckle, the noise.
+    /// The seed of all randomness: the town, the speckle, the noise.
     pub seed: u64,
-    /// Which way the vehicle takes.
+    /// The path of the vehicle.
     pub drive: DriveConfig,
-    /// What lines the streets.
+    /// The buildings and other objects along the streets.
     pub town: TownConfig,
-    /// What moves besides.
+    /// The other road users.
     pub traffic: TrafficConfig,
-    /// What measures.
+    /// The radar.
     pub sensor: SensorConfig,
-    /// What makes scans hard.
+    /// The effects of the sensor that are simulated.
     pub effects: Effects,
-    /// What the weather is like, and from when on. Default: clear.
+    /// The weather, section by section of the drive. Default: clear.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub weather: Vec<WeatherConfig>,
-    /// In which form the scans come out.
+    /// The format of the dataset.
     pub output: OutputConfig,
 }
 
@@ -57,7 +59,10 @@ impl Default for SimulationConfig {
 }
 
 impl SimulationConfig {
-    /// Refuses what cannot be simulated, naming the key.
+    /// Checks that all values can be simulated.
+    ///
+    /// # Errors
+    /// [`SimulatorError::Config`] with the key of the first value that cannot.
     pub fn validate(&self) -> Result<(), SimulatorError> {
         require_within("scans", self.scans as f64, 1.0, 100_000.0)?;
         self.drive.validate()?;
@@ -67,7 +72,7 @@ impl SimulationConfig {
         self.weather.iter().try_for_each(WeatherConfig::validate)
     }
 
-    /// How a reader of its scans is to read them, so that ranges and angles come out as they were.
+    /// Returns the options with which a reader gets the ranges and angles of the simulated radar.
     pub fn dataset_options(&self) -> DatasetOptions {
         let sampling = self.sensor.sampling();
         let doppler_s = match sampling.chirp {

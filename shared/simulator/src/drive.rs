@@ -1,4 +1,4 @@
-//! Which way the vehicle takes: the section `[simulation.drive]`.
+//! The path of the vehicle: the section `[simulation.drive]`.
 
 use std::path::PathBuf;
 
@@ -10,45 +10,45 @@ use crate::limits::require_within;
 use crate::path::recorded::{self, Excerpt};
 use crate::path::{BlockLoop, Path, TownDrive};
 
-/// Where a drive comes from.
+/// The kind of a drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum DriveKind {
-    /// Round a block of houses, for ever.
+    /// Laps of a rectangular block of houses, without end.
     #[default]
     Block,
     /// A random drive through a town.
     Town,
-    /// A drive that was driven and recorded.
+    /// A recorded trajectory.
     File,
 }
 
-/// Which way the vehicle takes, and how fast.
+/// The path of the vehicle and its speed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DriveConfig {
-    /// `block`, `town` or `file`. The keys below that another kind names have no effect.
+    /// `block`, `town` or `file`. Keys of the other kinds have no effect.
     pub kind: DriveKind,
-    /// The side of the road that traffic keeps to: `left` or `right`.
+    /// The side of the road on which vehicles drive: `left` or `right`.
     pub keep: DrivingSide,
-    /// `block`: its length, from street centre to street centre, metres along x.
+    /// `block`: length from street centre to street centre along x, metres.
     pub block_length_m: f64,
-    /// `block`: its width, metres along y.
+    /// `block`: width along y, metres.
     pub block_width_m: f64,
     /// `block` and `town`: speed on straights, metres a second; in a town on its fastest streets.
     pub speed_mps: f64,
-    /// `block` and `town`: sideways acceleration at which bends are taken, metres a second squared. It sets the speed in
-    /// them. By default 5 round a block and 2.2 in a town.
+    /// `block` and `town`: lateral acceleration in bends, metres a second squared, which limits the speed
+    /// there. Default: 5 round a block, 2.2 in a town.
     pub lateral_acceleration_mps2: Option<f64>,
     /// `town`: length of the drive, metres.
     pub length_m: f64,
-    /// `file`: the trajectory, of any form that [`gyre_radar::read_trajectory`] knows.
+    /// `file`: the trajectory, in any format that [`gyre_radar::read_trajectory`] knows.
     pub file: Option<PathBuf>,
-    /// `file`: where to begin, seconds after its first pose.
+    /// `file`: start, seconds after the first pose.
     pub from_s: f64,
-    /// `file`: how much of it to drive at most, seconds; all by default.
+    /// `file`: maximum duration, seconds. Default: to the end.
     pub for_s: Option<f64>,
-    /// `file`: poses a second where the file has no times (KITTI's form).
+    /// `file`: poses a second in a file without times (KITTI's format).
     pub rate_hz: f64,
 }
 
@@ -71,7 +71,7 @@ impl Default for DriveConfig {
 }
 
 impl DriveConfig {
-    /// A drive along a recorded trajectory.
+    /// The drive along a recorded trajectory.
     pub fn along_file(file: PathBuf) -> Self {
         Self {
             kind: DriveKind::File,
@@ -80,8 +80,8 @@ impl DriveConfig {
         }
     }
 
-    /// The shape of the first experiment of Checchin et al., "Radar scan matching SLAM using the Fourier-Mellin transform"
-    /// (2010): 1135 m of campus at 0 to 25 km/h.
+    /// A drive like the first experiment of Checchin et al., "Radar scan matching SLAM using the
+    /// Fourier-Mellin transform" (2010): 1135 m of campus at 0 to 25 km/h.
     pub fn campus() -> Self {
         Self {
             kind: DriveKind::Town,
@@ -92,7 +92,10 @@ impl DriveConfig {
         }
     }
 
-    /// Refuses what cannot be driven, naming the key.
+    /// Checks that all values can be driven.
+    ///
+    /// # Errors
+    /// [`SimulatorError::Config`] with the key of the first value that cannot.
     pub fn validate(&self) -> Result<(), SimulatorError> {
         require_within("drive.block_length_m", self.block_length_m, 30.0, 400.0)?;
         require_within("drive.block_width_m", self.block_width_m, 30.0, 400.0)?;
@@ -118,7 +121,11 @@ impl DriveConfig {
         Ok(())
     }
 
-    /// The drive; all its randomness comes from `seed`. Fails where its file cannot be read or driven.
+    /// Builds the path; all its randomness comes from `seed`.
+    ///
+    /// # Errors
+    /// [`SimulatorError::Trajectory`] if the file cannot be read, [`SimulatorError::Drive`] if no vehicle
+    /// can drive along its poses.
     pub fn path(&self, seed: u64) -> Result<Box<dyn Path>, SimulatorError> {
         let lateral_acceleration_mps2 = |default| self.lateral_acceleration_mps2.unwrap_or(default);
         Ok(match (self.kind, &self.file) {
@@ -138,7 +145,7 @@ impl DriveConfig {
                     length_m: self.length_m,
                     speed_mps: self.speed_mps,
                     lateral_acceleration_mps2: lateral_acceleration_mps2(2.2),
-                    keep: self.keep,
+                    driving_side: self.keep,
                 }
                 .path(seed),
             ),
@@ -158,7 +165,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn file_kind_without_a_file_or_with_a_missing_one_is_refused_by_name() {
+    fn a_missing_file_is_named_in_the_error() {
         let none = DriveConfig {
             kind: DriveKind::File,
             ..DriveConfig::default()
@@ -171,8 +178,8 @@ mod tests {
         );
         let missing = DriveConfig::along_file("nowhere/poses.tum".into());
         missing.validate().unwrap();
-        let refused = missing.path(1).err().unwrap().to_string();
-        assert!(refused.contains("nowhere/poses.tum"), "{refused}");
+        let error = missing.path(1).err().unwrap().to_string();
+        assert!(error.contains("nowhere/poses.tum"), "{error}");
     }
 
     #[test]

@@ -1,55 +1,55 @@
-//! What can go wrong when a dataset is generated.
+//! Errors of generating a dataset.
 
 use std::path::PathBuf;
 
 use gyre_radar::TrajectoryError;
 
-/// Why a dataset could not be set up or written.
+/// The reason why a dataset could not be set up or written.
 #[derive(Debug, thiserror::Error)]
 pub enum SimulatorError {
-    /// A key of [`crate::SimulationConfig`] has a value that cannot be simulated.
+    /// A value of [`crate::SimulationConfig`] cannot be simulated.
     #[error("simulation key `{key}` is {value}, but it must be {expected}")]
     Config {
         /// The key as written in a configuration.
         key: &'static str,
-        /// The value that was given.
+        /// The given value.
         value: String,
-        /// What would do.
+        /// The values that are allowed.
         expected: String,
     },
-    /// The trajectory to drive along cannot be read.
+    /// The trajectory file cannot be read.
     #[error(transparent)]
     Trajectory(#[from] TrajectoryError),
-    /// A trajectory that can be read cannot be driven.
+    /// No vehicle can drive along the poses of a trajectory file.
     #[error("cannot drive along {}: {reason}", path.display())]
     Drive {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The reason.
         reason: String,
     },
-    /// The output folder holds what is of another dataset; a mixture of both would be read as one.
-    #[error("{} holds `{other}`, which is not of this dataset: give an empty folder", folder.display())]
+    /// The output folder holds files of another dataset.
+    #[error("{} holds `{other}`, which is no file of this dataset: choose an empty folder", folder.display())]
     OutputInUse {
         /// The folder.
         folder: PathBuf,
-        /// The first file that does not belong.
+        /// The first foreign file.
         other: String,
     },
-    /// The output folder holds a recording of another configuration.
-    #[error("{} holds a recording of another configuration (its simulation.toml says which): give another folder", folder.display())]
-    OtherRecording {
+    /// The output folder holds a dataset of another configuration.
+    #[error("{} holds a dataset of another configuration (see its simulation.toml): choose another folder", folder.display())]
+    OtherDataset {
         /// The folder.
         folder: PathBuf,
     },
-    /// An image that is to be kept is not the one that would be written.
-    #[error("{} is not what would be written now: another build made it, or it was changed; give another folder", path.display())]
+    /// An existing image differs from the rendered one.
+    #[error("{} differs from the image that is rendered now: another build made it, or it was changed; choose another folder", path.display())]
     OtherImage {
         /// The image.
         path: PathBuf,
     },
-    /// Two at once would mix.
-    #[error("another process is writing to {}: wait for it, or give another folder", folder.display())]
+    /// Another process writes to the output folder.
+    #[error("another process is writing to {}: wait for it, or choose another folder", folder.display())]
     Busy {
         /// The folder.
         folder: PathBuf,
@@ -57,9 +57,9 @@ pub enum SimulatorError {
     /// A file or folder could not be written.
     #[error("cannot write {}: {source}", path.display())]
     Write {
-        /// What was to be written.
+        /// The path.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// A folder could not be listed.
@@ -67,7 +67,7 @@ pub enum SimulatorError {
     List {
         /// The folder.
         folder: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// An image could not be encoded.
@@ -75,13 +75,13 @@ pub enum SimulatorError {
     Encode {
         /// The image.
         path: PathBuf,
-        /// What the encoder said.
+        /// The encoder's error.
         source: png::EncodingError,
     },
 }
 
 impl SimulatorError {
-    /// Wraps an input or output error with the path that it is about.
+    /// Adds the path to an input or output error.
     pub(crate) fn write(path: &std::path::Path) -> impl FnOnce(std::io::Error) -> Self + '_ {
         move |source| Self::Write {
             path: path.to_owned(),

@@ -1,4 +1,4 @@
-//! Scans as images, and files that are there as a whole or not at all.
+//! Scans as images, and files that are written as a whole.
 
 use std::fs;
 use std::path::Path;
@@ -7,11 +7,12 @@ use gyre_radar::ImageSize;
 
 use crate::error::SimulatorError;
 
-/// Extension of files that are not complete yet.
+/// Extension of incomplete files.
 pub(crate) const PART: &str = "part";
 
-/// Encodes an 8-bit grey PNG to `into`, whose content is replaced. Fast rather than small: the difference to the neighbour in range
-/// packs better than any other that a PNG knows, and needs no trying row by row (4 ms for an Oxford scan, which halves).
+/// Encodes an 8-bit grey PNG to `into`, whose content is replaced. Fast rather than small: the difference
+/// to the neighbour in range compresses better than PNG's other filters and needs no trial for each row (4
+/// ms for an Oxford scan, which halves in size).
 pub(crate) fn encode(
     size: ImageSize,
     pixels: &[u8],
@@ -22,7 +23,7 @@ pub(crate) fn encode(
     encoder.set_color(png::ColorType::Grayscale);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::Fastest);
-    // In images on their side range runs downwards.
+    // In transposed images range runs downwards.
     encoder.set_filter(if size.height > size.width {
         png::Filter::Up
     } else {
@@ -34,6 +35,9 @@ pub(crate) fn encode(
 }
 
 /// Writes an image as a whole or not at all; `buffer` is working memory.
+///
+/// # Errors
+/// [`SimulatorError::Encode`] or [`SimulatorError::Write`].
 pub(crate) fn write_image(
     path: &Path,
     size: ImageSize,
@@ -44,11 +48,15 @@ pub(crate) fn write_image(
         path: path.to_owned(),
         source,
     })?;
-    write_whole(path, buffer)
+    write_atomically(path, buffer)
 }
 
-/// Writes a file under another name and renames it: whoever is killed meanwhile leaves no half of it. (A power failure may.)
-pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), SimulatorError> {
+/// Writes a temporary file and renames it, so that a killed process leaves no partial file. (A power
+/// failure may.)
+///
+/// # Errors
+/// [`SimulatorError::Write`].
+pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), SimulatorError> {
     let part = path.with_extension(PART);
     fs::write(&part, bytes).map_err(SimulatorError::write(&part))?;
     fs::rename(&part, path).map_err(SimulatorError::write(path))

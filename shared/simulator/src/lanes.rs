@@ -2,10 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Width of a lane, metres: a vehicle drives half of it beside the middle of its street.
+/// Width of a lane, metres: a vehicle drives half of it beside the centre line of its street.
 pub const LANE_M: f64 = 3.2;
 
-/// The side of the road that traffic keeps to.
+/// The side of the road on which vehicles drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum DrivingSide {

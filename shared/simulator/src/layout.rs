@@ -1,4 +1,5 @@
-//! A file a format: how images are named and arranged, what lies beside them, and which instant of a sweep is a scan's time.
+//! The dataset formats, one file each: names and folders of the images, the files beside them, and the
+//! instant of a sweep that is the scan's time.
 
 pub(crate) mod boreas;
 pub(crate) mod oxford;

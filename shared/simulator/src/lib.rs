@@ -1,21 +1,22 @@
 //! Simulated drives: towns, traffic, weather, and spinning FMCW radars that are fitted to real ones.
 //!
-//! A vehicle with a spinning radar drives through a procedural town; what comes out is a recording in Oxford's, Boreas' or RADIATE's
-//! form with exact ground truth, on a disk or straight into a pipeline. In the order in which the data come about:
+//! A vehicle with a spinning radar drives through a procedural town. The result is a dataset in Oxford's,
+//! Boreas' or RADIATE's format with exact ground truth, written to a disk or streamed into a pipeline. In
+//! the order of the data:
 //!
-//! - [`config`]: what to simulate,
-//! - [`drive`], [`path`]: which way is taken, and where the sensor is at any instant,
-//! - [`streets`]: the ways through the town,
-//! - [`town`], [`traffic`]: what stands and what moves around it,
-//! - [`body`], [`world`], [`occlusion`]: how that reflects, and what hides what,
-//! - [`profile`]: the radars, [`weather`]: rain, fog and snow,
-//! - [`sensor`]: what a sweep measures of it,
-//! - [`simulator`]: one scan at a time, with its exact pose,
-//! - [`output`], [`simulated_drive`], [`truth`]: the drive as a recording of a dataset's form,
-//! - [`writer`]: that on a disk.
+//! - [`config`]: the configuration,
+//! - [`drive`], [`path`]: the path of the sensor, a pose for every instant,
+//! - [`lanes`], [`streets`]: the network of streets,
+//! - [`town`], [`traffic`]: what stands along them and what moves on them,
+//! - [`body`], [`world`], [`occlusion`]: scatterers and walls, and which walls lie between two points,
+//! - [`profile`]: the radars; [`weather`]: rain, fog and snow,
+//! - [`sensor`]: the measurement of one sweep,
+//! - [`simulator`]: single scans with their exact poses,
+//! - [`output`], [`simulated_drive`], [`truth`]: the drive in a dataset format,
+//! - [`writer`]: the same on a disk.
 //!
-//! What each effect of the sensor looks like, off and on, is in `gallery/README.md` in the crate's folder, which
-//! `cargo run --release -p gyre-simulator --example gallery` draws.
+//! `gallery/README.md` in the crate's folder shows each effect of the sensor off and on; `cargo run
+//! --release -p gyre-simulator --example gallery` draws it.
 //!
 //! ```
 //! use gyre_simulator::{SimulationConfig, Simulator};

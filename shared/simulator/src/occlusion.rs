@@ -1,16 +1,16 @@
-//! Which walls lie between two points: a uniform grid of walls, walked cell by cell.
+//! A uniform grid of walls, which finds those between two points cell by cell.
 
 use nalgebra::{Point2, Vector2};
 
 use crate::body::{NO_BODY, Wall};
 
-/// Metres a side of a cell: a few walls in each, some ten cells on the way to most scatterers.
+/// Side of a cell, metres: a few walls in each, some ten cells between the sensor and most scatterers.
 const CELL_M: f64 = 5.0;
-/// The grid begins so far before the first wall: no round number, since a wall that lies along the edge of a cell is not met from the
-/// cell beside it.
+/// Margin before the first wall, metres. Not a round number, since a wall along the edge of a cell is not
+/// found from the cell beside it.
 const MARGIN_M: f64 = 1.618_034;
 
-/// Walls sorted into the cells that they touch.
+/// Walls indexed by the cells that they touch.
 #[derive(Clone, Debug)]
 pub struct WallGrid {
     walls: Vec<Wall>,
@@ -23,7 +23,7 @@ pub struct WallGrid {
 }
 
 impl WallGrid {
-    /// Sorts the walls.
+    /// Indexes the walls.
     pub fn new(walls: Vec<Wall>) -> Self {
         let ends = || walls.iter().flat_map(|wall| [wall.from, wall.to]);
         let lowest = ends().fold(Point2::new(0.0, 0.0), |a: Point2<f64>, b| a.inf(&b))
@@ -43,7 +43,7 @@ impl WallGrid {
         grid
     }
 
-    /// All walls, in the order given.
+    /// All walls, in the given order.
     pub fn walls(&self) -> &[Wall] {
         &self.walls
     }
@@ -70,7 +70,7 @@ impl WallGrid {
         inside.then(|| row as usize * self.columns + column as usize)
     }
 
-    /// Share of the power that passes between two points; see [`crate::World::transmission`].
+    /// Two-line share of the power that passes between two points; see [`crate::World::transmission`].
     pub fn transmission(
         &self,
         from: Point2<f64>,
@@ -83,7 +83,7 @@ impl WallGrid {
         let mut entered = 0.0;
         while let Some((column, row, left)) = walk.next_cell() {
             if let Some(cell) = self.cell(column, row) {
-                // A wall lies in several cells, but is crossed in one of them only.
+                // A wall lies in several cells, but the line crosses it in one of them only.
                 let span = entered..left;
                 passed *= self.crossed(cell, from, to - from, body, span);
                 if passed < negligible {
@@ -95,7 +95,7 @@ impl WallGrid {
         passed
     }
 
-    /// Shows all walls between two points; see [`crate::World::walls_between`].
+    /// Visits all walls between two points; see [`crate::World::walls_between`].
     pub fn between(
         &self,
         from: Point2<f64>,
@@ -110,7 +110,7 @@ impl WallGrid {
                 .map_or(&[][..], |cell| self.walls_in(cell))
             {
                 let wall = &self.walls[index as usize];
-                // A wall lies in several cells, but is crossed in one of them only.
+                // A wall lies in several cells, but the line crosses it in one of them only.
                 if let Some(share) =
                     crossing(from, to - from, wall).filter(|share| (entered..left).contains(share))
                 {
@@ -129,7 +129,7 @@ impl WallGrid {
         &self,
         cell: usize,
         from: Point2<f64>,
-        way: Vector2<f64>,
+        line: Vector2<f64>,
         body: u32,
         span: std::ops::Range<f64>,
     ) -> f64 {
@@ -137,32 +137,32 @@ impl WallGrid {
             .iter()
             .map(|&index| &self.walls[index as usize])
             .filter(|wall| body == NO_BODY || wall.body != body)
-            .filter(|wall| crossing(from, way, wall).is_some_and(|share| span.contains(&share)))
+            .filter(|wall| crossing(from, line, wall).is_some_and(|share| span.contains(&share)))
             .map(|wall| wall.transmission)
             .product()
     }
 }
 
-/// The share of `way` after which it crosses the wall, if it does.
-pub fn crossing(from: Point2<f64>, way: Vector2<f64>, wall: &Wall) -> Option<f64> {
+/// The share of `line` after which it crosses the wall, if it does.
+pub fn crossing(from: Point2<f64>, line: Vector2<f64>, wall: &Wall) -> Option<f64> {
     let along = wall.to - wall.from;
-    let determinant = way.perp(&along);
+    let determinant = line.perp(&along);
     if determinant == 0.0 {
         return None;
     }
     let offset = wall.from - from;
     let share = offset.perp(&along) / determinant;
-    let on_wall = offset.perp(&way) / determinant;
+    let on_wall = offset.perp(&line) / determinant;
     ((0.0..1.0).contains(&share) && (0.0..=1.0).contains(&on_wall)).then_some(share)
 }
 
-/// The cells that a line passes, in order (Amanatides and Woo 1987).
+/// The cells along a line, in order (Amanatides and Woo 1987).
 struct CellWalk {
     cell: [i64; 2],
     step: [i64; 2],
-    /// Share of the line at which it leaves the cell through its next side in x, in y.
+    /// Share of the line at which it leaves the cell in x and in y.
     next: [f64; 2],
-    /// Share of the line that one cell takes in x, in y.
+    /// Share of the line that lies in one cell in x and in y.
     stride: [f64; 2],
     done: bool,
 }
@@ -170,7 +170,7 @@ struct CellWalk {
 impl CellWalk {
     fn new(grid: &WallGrid, from: Point2<f64>, to: Point2<f64>) -> Self {
         let start = (from - grid.corner) / CELL_M;
-        let way = (to - from) / CELL_M;
+        let line = (to - from) / CELL_M;
         let mut walk = Self {
             cell: [0; 2],
             step: [0; 2],
@@ -181,10 +181,10 @@ impl CellWalk {
         for axis in 0..2 {
             let floor = start[axis].floor();
             walk.cell[axis] = floor as i64;
-            if way[axis] != 0.0 {
-                walk.step[axis] = if way[axis] > 0.0 { 1 } else { -1 };
-                walk.stride[axis] = 1.0 / way[axis].abs();
-                let to_side = if way[axis] > 0.0 {
+            if line[axis] != 0.0 {
+                walk.step[axis] = if line[axis] > 0.0 { 1 } else { -1 };
+                walk.stride[axis] = 1.0 / line[axis].abs();
+                let to_side = if line[axis] > 0.0 {
                     floor + 1.0 - start[axis]
                 } else {
                     start[axis] - floor
@@ -195,7 +195,7 @@ impl CellWalk {
         walk
     }
 
-    /// Column, row, and the share of the line at which it leaves that cell (1 in the last).
+    /// Column, row, and the share of the line at which it leaves the cell (1 in the last).
     fn next_cell(&mut self) -> Option<(i64, i64, f64)> {
         if self.done {
             return None;
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn grid_finds_the_same_walls_as_trying_all() {
+    fn grid_finds_the_same_walls_as_a_search_through_all() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let wall = |i: u32, rng: &mut ChaCha8Rng| {
             let from = point(rng);
@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn walls_along_the_axes_at_round_places_hide_from_both_sides() {
+    fn walls_along_the_axes_at_round_coordinates_hide_from_both_sides() {
         for at in [-20.0, -5.0, 0.0, 5.0, 10.0] {
             for (from, to) in [((at, -15.0), (at, 15.0)), ((-15.0, at), (15.0, at))]
                 .map(|(a, b)| (point_at(a), point_at(b)))
@@ -268,11 +268,11 @@ mod tests {
                 }]);
                 let across = Vector2::new((to - from).y, (to - from).x) + Vector2::new(0.7, 0.7);
                 let middle = nalgebra::center(&from, &to);
-                for way in [across, -across] {
+                for line in [across, -across] {
                     assert_eq!(
-                        grid.transmission(middle - way, middle + way, NO_BODY, 0.0),
+                        grid.transmission(middle - line, middle + line, NO_BODY, 0.0),
                         0.5,
-                        "{from} to {to}, {way}"
+                        "{from} to {to}, {line}"
                     );
                 }
             }

@@ -1,4 +1,4 @@
-//! In which form the scans come out: the section `[simulation.output]`.
+//! The format of the dataset: the section `[simulation.output]`.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,20 +6,21 @@ use std::str::FromStr;
 use gyre_radar::Format;
 use serde::{Deserialize, Serialize};
 
-/// In which form the scans come out.
+/// The format of the dataset.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct OutputConfig {
-    /// Whose form of files. Default: in a configuration that of `dataset.format`, else Oxford's.
+    /// Format of the files. Default: in a run that of `dataset.format`, else Oxford's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub format: Option<OutputFormat>,
-    /// The times at which the host receives scans, which RADIATE logs instead of the sensor's.
+    /// The times at which the host receives scans, which RADIATE logs instead of the sensor's times.
     pub host_stamps: HostStamps,
-    /// `gyre run` writes the recording to its results and plays it from there. Default: it plays without touching the disk.
+    /// Whether `gyre run` writes the dataset to its results and plays it from there. Default: it is played
+    /// without touching the disk.
     pub store: bool,
 }
 
-/// Whose form of files.
+/// A dataset format that can be written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OutputFormat {
@@ -28,7 +29,8 @@ pub enum OutputFormat {
     Oxford,
     /// Boreas, and Boreas Road Trip where the chirps alternate. Fits every radar.
     Boreas,
-    /// RADIATE: images on their side, without metadata. Fits radars that turn four times a second and begin straight ahead.
+    /// RADIATE: transposed images without metadata. Fits radars that turn four times a second and whose
+    /// first azimuth is straight ahead.
     Radiate,
 }
 
@@ -51,7 +53,7 @@ impl FromStr for OutputFormat {
 }
 
 impl OutputFormat {
-    /// All of them.
+    /// All formats.
     pub const ALL: [Self; 3] = [Self::Oxford, Self::Boreas, Self::Radiate];
 
     /// The name in configurations and on the command line.
@@ -63,7 +65,7 @@ impl OutputFormat {
         }
     }
 
-    /// The one that is read as `format`; `None` where there is none.
+    /// The format that is read as `format`, if it can be written.
     pub fn read_as(format: Format) -> Option<Self> {
         match format {
             Format::Oxford => Some(Self::Oxford),
@@ -74,13 +76,14 @@ impl OutputFormat {
     }
 }
 
-/// How a host receives scans.
+/// The delays with which a host receives scans.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum HostStamps {
-    /// Each at the same delay.
+    /// The same delay for each scan.
     #[default]
     Even,
-    /// About once in 64 scans it stalls for up to 1.4 s and then catches up, as in RADIATE's recordings.
+    /// About once in 64 scans the host stalls for up to 1.4 s and then catches up, as in RADIATE's
+    /// recordings.
     Stalling,
 }

@@ -1,5 +1,5 @@
-//! A simulated drive as a recording of a format: images with their names, what lies beside them, and the truth. Where it goes, to a
-//! disk or straight into a pipeline, is another's business.
+//! A simulated drive in a dataset format: images with their names, side files and ground truth. It can be
+//! written to a disk or streamed into a pipeline.
 
 use std::path::PathBuf;
 
@@ -16,7 +16,7 @@ use crate::sensor::Sensor;
 use crate::simulator::Simulator;
 use crate::truth;
 
-/// A simulated drive as a recording.
+/// A simulated drive in a dataset format.
 #[derive(Clone)]
 pub struct SimulatedDrive {
     simulator: Simulator,
@@ -26,7 +26,10 @@ pub struct SimulatedDrive {
 }
 
 impl SimulatedDrive {
-    /// Builds the town and the drive. Fails where the configuration makes no sense, or its format does not fit its radar.
+    /// Builds the town and the path.
+    ///
+    /// # Errors
+    /// As [`Simulator::new`]; [`SimulatorError::Config`] if the radar does not fit the format.
     pub fn new(config: &SimulationConfig) -> Result<Self, SimulatorError> {
         let simulator = Simulator::new(config)?;
         let output = config.output.format.unwrap_or_default();
@@ -41,12 +44,12 @@ impl SimulatedDrive {
         })
     }
 
-    /// What is recorded.
+    /// The simulator.
     pub fn simulator(&self) -> &Simulator {
         &self.simulator
     }
 
-    /// The format that a reader of recordings will call it.
+    /// The format as readers of datasets name it.
     pub fn format(&self) -> Format {
         match self.output {
             OutputFormat::Oxford => Format::Oxford,
@@ -58,7 +61,7 @@ impl SimulatedDrive {
         }
     }
 
-    /// How a reader is to read it so that ranges and angles come out as they were: this is what the radar knows of itself.
+    /// Returns the options with which a reader gets the ranges and angles of the simulated radar.
     pub fn dataset_options(&self) -> DatasetOptions {
         DatasetOptions {
             format: Some(self.format()),
@@ -66,12 +69,12 @@ impl SimulatedDrive {
         }
     }
 
-    /// Scans.
+    /// Number of scans.
     pub fn scans(&self) -> usize {
         self.simulator.scans()
     }
 
-    /// The folder of images, below the recording's.
+    /// The folder of the images, relative to the dataset's.
     pub fn image_folder(&self) -> &'static str {
         match self.output {
             OutputFormat::Oxford => oxford::FOLDER,
@@ -80,7 +83,7 @@ impl SimulatedDrive {
         }
     }
 
-    /// An image's name.
+    /// The name of an image.
     pub fn image_name(&self, index: usize) -> String {
         match self.output {
             OutputFormat::Oxford => oxford::file_name(&self.simulator, index),
@@ -104,7 +107,7 @@ impl SimulatedDrive {
         }
     }
 
-    /// The scan's time as the format means it, nanoseconds since 1970.
+    /// The scan's time as the format defines it, nanoseconds since 1970.
     pub fn stamp_ns(&self, index: usize) -> i64 {
         let time = self.simulator.time(index);
         match self.output {
@@ -116,7 +119,7 @@ impl SimulatedDrive {
         }
     }
 
-    /// `ground_truth.tum`: the poses at the scans' times.
+    /// `ground_truth.tum`: the poses at the times of the scans.
     pub fn ground_truth_tum(&self) -> Vec<u8> {
         truth::ground_truth_tum(
             &self.simulator,
@@ -126,7 +129,7 @@ impl SimulatedDrive {
         )
     }
 
-    /// All that lies beside the images.
+    /// All files beside the images.
     pub(crate) fn side_files(&self) -> Vec<SideFile> {
         let mut files = match self.output {
             OutputFormat::Oxford => oxford::side_files(&self.simulator),
@@ -150,7 +153,7 @@ impl SimulatedDrive {
             .then(|| radiate::stamps(&self.simulator, self.host, self.seed))
     }
 
-    /// A radar of one's own for this drive; several may measure at the same time.
+    /// Returns a new renderer; several can work at the same time.
     pub fn renderer(&self) -> Renderer {
         let (sensor, scan) = (
             self.simulator.sensor(),
@@ -164,7 +167,7 @@ impl SimulatedDrive {
     }
 }
 
-/// Renders one image after the other, with the memory that takes.
+/// Renders images of a drive; owns the sensor and its working memory.
 pub struct Renderer {
     drive: SimulatedDrive,
     sensor: Sensor,
@@ -172,7 +175,7 @@ pub struct Renderer {
 }
 
 impl Renderer {
-    /// What is rendered.
+    /// The drive that is rendered.
     pub fn drive(&self) -> &SimulatedDrive {
         &self.drive
     }
@@ -202,21 +205,21 @@ impl ImageSource for Renderer {
         self.drive.stamps()
     }
 
-    /// The same bytes whenever and on whatever thread it is called.
+    /// Gives the same bytes whenever and on whatever thread it is called.
     fn draw(&mut self, index: usize, pixels: &mut [u8]) {
         let simulator = &self.drive.simulator;
         match self.drive.output {
             OutputFormat::Radiate => {
                 let geometry =
                     simulator.render_into(index, &mut self.sensor, &mut self.scan.slot());
-                radiate::lay_on_side(
+                radiate::transpose(
                     &self.scan.bytes,
                     geometry.stride,
                     geometry.first_byte,
                     pixels,
                 );
             }
-            // Their images are what a sweep is rendered as.
+            // An image of these formats is the sweep as it is rendered.
             OutputFormat::Oxford | OutputFormat::Boreas => {
                 let mut slot = ScanSlot {
                     bytes: pixels,

@@ -1,4 +1,4 @@
-//! One scan at a time, from memory to memory: the simulator without files.
+//! Rendering of single scans in memory, without files.
 
 use std::sync::Arc;
 
@@ -16,14 +16,15 @@ use crate::traffic::Traffic;
 use crate::weather::WeatherConfig;
 use crate::world::World;
 
-/// Stamp of the first azimuth of the first scan, microseconds since 1970 (2019-01-10 15:00 UTC): readers
-/// of recordings check that a year is plausible, and the same configuration has to give the same files.
+/// Stamp of the first azimuth of the first scan, microseconds since 1970 (2019-01-10 15:00 UTC). Readers
+/// check that the year is plausible, and it is fixed so that a configuration always gives the same files.
 const EPOCH_US: i64 = 1_547_132_400_000_000;
 
-/// How much of a drive without end is looked at to lay streets, seconds; and its traffic is made for multiples of this.
+/// Duration of an endless drive along which streets are laid, seconds; its traffic is made for multiples of
+/// this.
 const ENDLESS_S: f64 = 600.0;
 
-/// A drive through a town, ready to be measured. Shared freely between threads.
+/// A drive through a town, ready to be rendered. Cheap to clone and shared between threads.
 #[derive(Clone)]
 pub struct Simulator {
     config: SimulationConfig,
@@ -33,7 +34,7 @@ pub struct Simulator {
     traffic: Traffic,
 }
 
-/// A scan with the truth about it.
+/// A scan with its ground truth.
 #[derive(Clone, Debug)]
 pub struct SimulatedScan {
     /// The scan, in the layout of an Oxford image (its bytes are the image's, metadata included).
@@ -43,19 +44,22 @@ pub struct SimulatedScan {
 }
 
 impl Simulator {
-    /// Builds the town and the drive. Fails where the configuration makes no sense.
+    /// Builds the town and the path.
+    ///
+    /// # Errors
+    /// As [`SimulationConfig::validate`] and [`crate::drive::DriveConfig::path`].
     pub fn new(config: &SimulationConfig) -> Result<Self, SimulatorError> {
         config.validate()?;
         let path: Arc<dyn Path> = config.drive.path(config.seed)?.into();
         let sampling = config.sensor.sampling();
-        // Streets, town and traffic of a drive do not depend on how many scans are taken of it.
-        let taken_s = config.scans as f64 * sampling.period_us as f64 * 1e-6;
-        let [laid_s, lively_s] = match path.duration_s() {
-            whole_s if whole_s.is_finite() => [whole_s; 2],
-            _ => [ENDLESS_S, (taken_s / ENDLESS_S).ceil() * ENDLESS_S],
+        // Streets, town and traffic do not depend on the number of scans.
+        let scans_s = config.scans as f64 * sampling.period_us as f64 * 1e-6;
+        let [streets_s, traffic_s] = match path.duration_s() {
+            duration_s if duration_s.is_finite() => [duration_s; 2],
+            _ => [ENDLESS_S, (scans_s / ENDLESS_S).ceil() * ENDLESS_S],
         };
         let keep = config.drive.keep;
-        let streets = Streets::along(path.as_ref(), laid_s, keep, config.seed);
+        let streets = Streets::along(path.as_ref(), streets_s, keep, config.seed);
         Ok(Self {
             config: config.clone(),
             sampling,
@@ -63,7 +67,7 @@ impl Simulator {
             traffic: Traffic::new(
                 &config.traffic,
                 path.clone(),
-                lively_s,
+                traffic_s,
                 &streets,
                 keep,
                 config.seed,
@@ -72,22 +76,22 @@ impl Simulator {
         })
     }
 
-    /// What is simulated.
+    /// The configuration.
     pub fn config(&self) -> &SimulationConfig {
         &self.config
     }
 
-    /// How the radar samples.
+    /// The sampling of the radar.
     pub fn sampling(&self) -> &Sampling {
         &self.sampling
     }
 
-    /// Scans in the dataset; more can be rendered.
+    /// Scans in the dataset; scans beyond can be rendered too.
     pub fn scans(&self) -> usize {
         self.config.scans
     }
 
-    /// The drive.
+    /// The path of the sensor.
     pub fn path(&self) -> &dyn Path {
         self.path.as_ref()
     }
@@ -97,7 +101,7 @@ impl Simulator {
         &self.world
     }
 
-    /// When scan `index` is taken.
+    /// The time of scan `index`.
     pub fn time(&self, index: usize) -> SweepTime {
         let Sampling {
             period_us,
@@ -118,12 +122,12 @@ impl Simulator {
         self.path.pose(time.drive_time_s(time.middle_us()))
     }
 
-    /// A radar as configured, for [`Simulator::render_into`].
+    /// A new sensor for [`Simulator::render_into`].
     pub fn sensor(&self) -> Sensor {
         Sensor::new(&self.config.sensor, &self.config.effects, self.config.seed)
     }
 
-    /// What memory one scan needs.
+    /// The size of one scan.
     pub fn limits(&self) -> ScanLimits {
         ScanLimits {
             bytes: self.sampling.azimuths * self.sampling.stride(),
@@ -131,7 +135,7 @@ impl Simulator {
         }
     }
 
-    /// Measures scan `index`: the same bytes whenever and on whatever thread it is called.
+    /// Renders scan `index`: the same bytes whenever and on whatever thread it is called.
     pub fn render_scan(&self, index: usize) -> SimulatedScan {
         let mut scan = OwnedScan::with_limits(self.limits());
         scan.geometry = self.render_into(index, &mut self.sensor(), &mut scan.slot());
@@ -141,7 +145,7 @@ impl Simulator {
         }
     }
 
-    /// Measures scan `index` into memory that is used again, at least as much as [`Simulator::limits`] say.
+    /// Renders scan `index` into existing memory, of at least the size of [`Simulator::limits`].
     pub fn render_into(
         &self,
         index: usize,

@@ -1,36 +1,36 @@
-//! Which part of a seed's random numbers belongs to what. No two share one, so that nothing random depends on anything else that is.
+//! Independent streams of random numbers from one seed, so that no random quantity depends on another.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// What random numbers are drawn for.
+/// The use of a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stream {
-    /// The sensor's in one scan, by its number.
+    /// The sensor in one scan, by its number.
     Scan(u64),
-    /// Streets along a drive.
+    /// The streets along a drive.
     Streets,
     /// A drive through a town.
     Drive,
-    /// Other road users.
+    /// The other road users.
     Traffic,
-    /// When the host stalls, by the block of scans in which it does once.
+    /// Host stalls, by block of scans with one stall each.
     Stall(u64),
-    /// How the vehicle pitches and rolls.
+    /// Pitch and roll of the vehicle.
     Nodding,
-    /// What turns with the radar.
+    /// Echoes that are fixed to the radar.
     Carrier,
 }
 
 impl Stream {
-    /// Its generator, at its first number.
+    /// The stream's generator, at its first number.
     pub fn generator(self, seed: u64) -> ChaCha8Rng {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(self.number());
         rng
     }
 
-    /// Scans and blocks of them are far fewer than lie between any two.
+    /// There are far fewer scans and blocks than numbers between the constants.
     fn number(self) -> u64 {
         match self {
             Self::Scan(index) => 1 + index,
@@ -51,8 +51,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_two_things_share_a_stream() {
-        // 100 000 scans are the most that a configuration may ask for.
+    fn no_two_uses_share_a_stream() {
+        // 100 000 scans are the maximum of the configuration.
         let counted = (0..100_000).flat_map(|i| [Stream::Scan(i), Stream::Stall(i)]);
         let single = [
             Stream::Streets,

@@ -1,16 +1,18 @@
-//! The exact truth beside a recording of any format: `ground_truth.tum`, the pose at each scan's time, and `azimuth_poses.npy`, the
-//! pose at each azimuth's.
+//! Exact ground truth beside a dataset of any format: `ground_truth.tum`, the pose at the time of each
+//! scan, and `azimuth_poses.npy`, the pose at the time of each azimuth.
 //!
-//! The latter is a NumPy array of format 1.0, `<f8`, of shape (scans, azimuths, 4): seconds since the first azimuth of the first scan;
-//! x and y in the world, metres; yaw, radians counter-clockwise. 12.8 MB for 1,000 scans of 400 azimuths, exact to the last bit, and
-//! `numpy.load(path, mmap_mode="r")` opens it; as text it would be several times that, rounded, and slower to write than all else.
+//! The latter is a NumPy array (format 1.0, `<f8`) of shape (scans, azimuths, 4): seconds since the first
+//! azimuth of the first scan; x and y in the world, metres; yaw, radians counter-clockwise. It takes 12.8
+//! MB for 1,000 scans of 400 azimuths, and `numpy.load(path, mmap_mode="r")` opens it. The header is
+//! written here since `ndarray-npy` and `npyz` would add a Python parser (pest) and a C build for these ten
+//! lines.
 
 use gyre_geometry::Pose;
 use gyre_radar::Trajectory;
 
 use crate::simulator::Simulator;
 
-/// `ground_truth.tum` as bytes. `stamps_ns` are the scans' times.
+/// `ground_truth.tum` as bytes. `stamps_ns` are the times of the scans.
 pub(crate) fn ground_truth_tum(simulator: &Simulator, stamps_ns: Vec<i64>) -> Vec<u8> {
     let poses = stamps_ns
         .iter()

@@ -1,30 +1,34 @@
-//! Rain, fog and snow: what they take from an echo, and what they send back themselves.
+//! Rain, fog and snow: attenuation and backscatter.
 //!
-//! Specific attenuation follows ITU-R P.838-3 (rain: k R^alpha) and P.840 (fog, by liquid water); the reflectivity of rain
-//! is Currie, Dyer and Hayes' (1975) fit A R^B at 70 GHz, and for 24 GHz one between their 9.4 and 35 GHz. Snow and what a wet
-//! radome takes vary widely in the literature: middle values.
+//! Specific attenuation follows ITU-R P.838-3 (rain: k R^alpha) and P.840 (fog, by liquid water). The
+//! reflectivity of rain is Currie, Dyer and Hayes' (1975) fit A R^B at 70 GHz, and for 24 GHz one between
+//! their 9.4 and 35 GHz. For snow and wet radomes, whose figures vary widely in the literature, middle
+//! values are used.
 
 use serde::{Deserialize, Serialize};
 
 use crate::error::SimulatorError;
 use crate::limits::require_within;
 
-/// What the weather is like from some time on: a section `[[simulation.weather]]`.
+/// The weather from a time on: a section `[[simulation.weather]]`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct WeatherConfig {
-    /// Seconds after the start from which it holds; the last one that has begun counts.
+    /// Start, seconds after the start of the drive; the latest section that has started applies.
     pub from_s: f64,
     /// Rain, millimetres an hour: 2 light, 10 moderate, 50 heavy.
     pub rain_mm_h: f64,
-    /// Fog, grams of water in a cubic metre of air: 0.05 for sight of 300 m, 0.5 for 50 m.
+    /// Fog, grams of water in a cubic metre of air: 0.05 for a visibility of 300 m, 0.5 for 50 m.
     pub fog_g_m3: f64,
     /// Snow as melted water, millimetres an hour: 1 light, 5 heavy.
     pub snow_mm_h: f64,
 }
 
 impl WeatherConfig {
-    /// Refuses what cannot be simulated, naming the key.
+    /// Checks that all values can be simulated.
+    ///
+    /// # Errors
+    /// [`SimulatorError::Config`] with the key of the first value that cannot.
     pub fn validate(&self) -> Result<(), SimulatorError> {
         require_within("weather.from_s", self.from_s, 0.0, 1e6)?;
         require_within("weather.rain_mm_h", self.rain_mm_h, 0.0, 200.0)?;
@@ -32,7 +36,7 @@ impl WeatherConfig {
         require_within("weather.snow_mm_h", self.snow_mm_h, 0.0, 50.0)
     }
 
-    /// The weather that holds at a time of the drive: clear where none has begun.
+    /// The weather at a time of the drive; clear before the first section.
     pub fn at(all: &[Self], time_s: f64) -> Self {
         let begun = all.iter().filter(|weather| weather.from_s <= time_s);
         begun
@@ -43,7 +47,7 @@ impl WeatherConfig {
 
     /// Attenuation one way, decibels a metre, at a carrier frequency.
     pub fn attenuation_db_m(&self, carrier_ghz: f64) -> f64 {
-        // P.838-3, horizontal polarisation: 24 GHz and 77 GHz; between the two nothing is simulated.
+        // P.838-3, horizontal polarisation, at 24 GHz and 77 GHz; no radar between the two is simulated.
         let (k, alpha, fog_db_km, snow) = if carrier_ghz > 50.0 {
             (1.13, 0.717, 4.6, 0.6)
         } else {
@@ -53,7 +57,7 @@ impl WeatherConfig {
         (rain + fog_db_km * self.fog_g_m3 + snow * self.snow_mm_h) / 1000.0
     }
 
-    /// Loss of the wet (or snowed on) radome, there and back, decibels.
+    /// Two-way loss of the wet (or snow-covered) radome, decibels.
     pub fn radome_db(&self) -> f64 {
         2.5 * (self.rain_mm_h / 10.0).min(3.0).sqrt() + 1.5 * (self.snow_mm_h / 3.0).min(2.0).sqrt()
     }
@@ -75,7 +79,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_began_last_holds() {
+    fn the_latest_weather_applies() {
         let rain = WeatherConfig {
             from_s: 10.0,
             rain_mm_h: 5.0,
@@ -93,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn heavy_rain_takes_ten_decibels_a_kilometre_at_77_ghz_and_clear_air_nothing() {
+    fn heavy_rain_attenuates_by_ten_decibels_a_kilometre_at_77_ghz_and_clear_weather_not_at_all() {
         let rain = WeatherConfig {
             rain_mm_h: 25.0,
             ..Default::default()

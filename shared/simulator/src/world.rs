@@ -8,10 +8,10 @@ use crate::occlusion::WallGrid;
 /// Metres a side of the tiles that scatterers are sorted into.
 const TILE_M: f64 = 16.0;
 
-/// All that stands still around the sensor, ready to be looked at.
+/// All that stands still around the sensor.
 #[derive(Clone, Debug)]
 pub struct World {
-    /// Tile by tile, and in a tile in the order given.
+    /// Tile by tile; within a tile in the given order.
     scatterers: Vec<Scatterer>,
     corner: Point2<f64>,
     columns: usize,
@@ -22,7 +22,7 @@ pub struct World {
 }
 
 impl World {
-    /// A world of these scatterers and walls.
+    /// Indexes scatterers and walls.
     pub fn new(content: Body) -> Self {
         let Body {
             mut scatterers,
@@ -55,12 +55,12 @@ impl World {
         }
     }
 
-    /// All that reflects.
+    /// All scatterers.
     pub fn scatterers(&self) -> &[Scatterer] {
         &self.scatterers
     }
 
-    /// Runs of scatterers that hold all within `reach_m` of a place, and some beyond.
+    /// Runs of scatterers that include all within `reach_m` of a place, and some beyond.
     pub fn around(&self, place: Point2<f64>, reach_m: f64) -> impl Iterator<Item = &[Scatterer]> {
         let low = (place - self.corner).add_scalar(-reach_m) / TILE_M;
         let high = (place - self.corner).add_scalar(reach_m) / TILE_M;
@@ -80,13 +80,13 @@ impl World {
         (top..bottom).map(row)
     }
 
-    /// All that hides.
+    /// All walls.
     pub fn walls(&self) -> &[Wall] {
         self.walls.walls()
     }
 
-    /// Share of the power that passes between two points, there and back; walls of `body` count for nothing.
-    /// Stops with a value below `negligible` as soon as so little is left.
+    /// Two-way share of the power that passes between two points; walls of `body` are ignored. Stops as
+    /// soon as the share is below `negligible`.
     pub fn transmission(
         &self,
         from: Point2<f64>,
@@ -97,7 +97,8 @@ impl World {
         self.walls.transmission(from, to, body, negligible)
     }
 
-    /// Shows the walls between two points, each once: its number in [`World::walls`], and the share of the way to it.
+    /// Visits the walls between two points, each once: its number in [`World::walls`], and the share of the
+    /// line at which it is crossed.
     pub fn walls_between(
         &self,
         from: Point2<f64>,
@@ -114,7 +115,7 @@ mod tests {
     use crate::body::{Aspect, NO_BODY};
 
     #[test]
-    fn all_that_is_near_is_among_what_is_around() {
+    fn around_includes_all_that_is_near() {
         let at = |i: i32, j: i32| Point2::new(f64::from(i) * 7.3 - 90.0, f64::from(j) * 9.1 - 40.0);
         let scatterer = |position| Scatterer {
             position,

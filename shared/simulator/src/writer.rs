@@ -1,4 +1,4 @@
-//! A recording on disk: written on all processors, the same bytes whatever their number, and gone on with where it was cut short.
+//! Writes a simulated drive to a folder, on all processors. Resumes an interrupted one.
 
 mod resume;
 
@@ -12,27 +12,31 @@ use gyre_radar::ImageSource as _;
 
 use crate::config::SimulationConfig;
 use crate::error::SimulatorError;
-use crate::image::{write_image, write_whole};
+use crate::image::{write_atomically, write_image};
 use crate::simulated_drive::SimulatedDrive;
 
 pub use resume::MADE_BY;
 
-/// What was written.
+/// The result of writing a dataset.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Summary {
     /// The dataset's folder.
     pub folder: PathBuf,
-    /// Scans in it.
+    /// Scans in the dataset.
     pub scans: usize,
-    /// Those of them that were there already.
+    /// Scans that existed already.
     pub kept: usize,
-    /// Length of the path from the first scan to the last, metres (as a chain of straight motions).
+    /// Length of the path from the first scan to the last, metres (sum of the straight lines between
+    /// scans).
     pub path_m: f64,
     /// Time from the first scan to the last, seconds.
     pub duration_s: f64,
 }
 
-/// [`write_dataset_on`] all processors.
+/// Calls [`write_dataset_on`] with one thread for each processor.
+///
+/// # Errors
+/// As [`write_dataset_on`].
 pub fn write_dataset(
     config: &SimulationConfig,
     out: &Path,
@@ -46,15 +50,16 @@ pub fn write_dataset(
     )
 }
 
-/// Writes the recording of `config` to the folder `out` on `threads` threads, and calls `progress(done, total)` as it grows.
+/// Writes the dataset of `config` to the folder `out` on `threads` threads, and calls `progress(done,
+/// total)` for each image.
 ///
-/// The files are the same, byte for byte, for the same configuration and any number of threads. What an earlier call with the same
-/// configuration left is kept, be it cut short or of fewer scans; of that the first and the last image are compared with what would be
-/// written now.
+/// The files are the same, byte for byte, for the same configuration and any number of threads. Images of
+/// an earlier call with the same configuration are kept, if it was interrupted or had fewer scans; the
+/// first and the last of them are compared with newly rendered ones.
 ///
 /// # Errors
-/// [`SimulatorError`] where `out` holds another recording or images of unknown origin, another process writes to it, or it cannot be
-/// written.
+/// [`SimulatorError`] if `config` cannot be simulated, if `out` holds another dataset or images of unknown
+/// origin, if another process writes to it, or if it cannot be written.
 pub fn write_dataset_on(
     threads: NonZeroUsize,
     config: &SimulationConfig,
@@ -66,8 +71,11 @@ pub fn write_dataset_on(
     fs::create_dir_all(&images).map_err(SimulatorError::write(&images))?;
     let _alone = lock(out)?;
     let missing = resume::missing(&drive, config, out)?;
-    write_whole(&out.join(MADE_BY), resume::made_by(config)?.as_bytes())?;
-    write_whole(&out.join(resume::TOLD), resume::told(&drive)?.as_bytes())?;
+    write_atomically(&out.join(MADE_BY), resume::made_by(config)?.as_bytes())?;
+    write_atomically(
+        &out.join(resume::DATASET_OPTIONS),
+        resume::dataset_options(&drive)?.as_bytes(),
+    )?;
     write_side_files(&drive, out)?;
     let kept = drive.scans() - missing.len();
     progress(kept, drive.scans());
@@ -76,7 +84,7 @@ pub fn write_dataset_on(
     Ok(summary(&drive, out, kept))
 }
 
-/// The folder for this process alone, until what is returned is dropped.
+/// Locks the folder for this process until the returned file is dropped.
 fn lock(folder: &Path) -> Result<File, SimulatorError> {
     let handle = File::open(folder).map_err(SimulatorError::write(folder))?;
     match handle.try_lock() {
@@ -115,12 +123,12 @@ fn write_side_files(drive: &SimulatedDrive, out: &Path) -> Result<(), SimulatorE
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(SimulatorError::write(folder))?;
         }
-        write_whole(&path, &bytes)?;
+        write_atomically(&path, &bytes)?;
     }
     Ok(())
 }
 
-/// Renders and writes the scans in `missing`, each thread taking the next one that nobody has taken.
+/// Renders and writes the scans in `missing`; each thread takes the next one that is left.
 fn write_images(
     drive: &SimulatedDrive,
     missing: &[usize],
@@ -139,7 +147,7 @@ fn write_images(
         let mut outcome = Ok(());
         for (done, result) in results.iter().enumerate() {
             if result.is_err() && outcome.is_ok() {
-                // Nobody takes another scan; those under way end.
+                // No thread takes another scan; those in work are completed.
                 next.store(missing.len(), Ordering::Relaxed);
                 outcome = result;
             }

@@ -140,16 +140,16 @@ fn excerpt_starts_at_the_origin_and_stands_before_and_after() {
 #[test]
 fn files_that_cannot_be_driven_are_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
-    let sideways = folder.path().join("sideways.tum");
+    let rotated = folder.path().join("rotated.tum");
     let line = |i: u32| format!("{}.0 0 {} 0 0 0 0 1\n", 1_600_000_000 + i, 5 * i);
-    std::fs::write(&sideways, (0..50).map(line).collect::<String>()).unwrap();
-    let refused = read(&sideways, Excerpt::default()).unwrap_err().to_string();
+    std::fs::write(&rotated, (0..50).map(line).collect::<String>()).unwrap();
+    let refused = read(&rotated, Excerpt::default()).unwrap_err().to_string();
     assert!(
-        refused.contains("sideways.tum") && refused.contains("0 % of its way"),
+        refused.contains("rotated.tum") && refused.contains("0 % of its length"),
         "{refused}"
     );
     let beyond = read(
-        &sideways,
+        &rotated,
         Excerpt {
             from_s: 900.0,
             ..Excerpt::default()
@@ -157,7 +157,7 @@ fn files_that_cannot_be_driven_are_refused_by_name() {
     )
     .unwrap_err()
     .to_string();
-    assert!(beyond.contains("less than two poses"), "{beyond}");
+    assert!(beyond.contains("fewer than two poses"), "{beyond}");
     let jumping = folder.path().join("jumping.tum");
     std::fs::write(
         &jumping,

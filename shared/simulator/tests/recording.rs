@@ -287,7 +287,7 @@ fn a_folder_of_another_origin_is_refused_and_left_as_it_is() {
     };
     assert!(matches!(
         write(&other_seed, folder.path()),
-        Err(SimulatorError::OtherRecording { .. })
+        Err(SimulatorError::OtherDataset { .. })
     ));
     let fewer = SimulationConfig {
         scans: 2,

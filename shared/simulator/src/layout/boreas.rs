@@ -8,7 +8,7 @@ use crate::simulator::Simulator;
 
 pub(crate) const FOLDER: &str = "radar";
 
-/// Time over which the turn rate is taken, seconds.
+/// Time over which the yaw rate is taken, seconds.
 const RATE_SPAN_S: f64 = 1e-3;
 
 /// The scan's time, microseconds since 1970.

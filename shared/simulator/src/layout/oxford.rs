@@ -1,6 +1,6 @@
-//! Oxford Radar RobotCar: `radar/<us>.png`, one a sweep, named by its first azimuth; `radar.timestamps`; and
-//! `gt/radar_odometry.csv`: for each scan but the first its pose in the frame of the one before, at the middles of the sweeps,
-//! x forward, **y right, yaw clockwise**.
+//! Oxford Radar RobotCar: `radar/<us>.png`, one for each sweep, named by the time of its first azimuth;
+//! `radar.timestamps`; and `gt/radar_odometry.csv`: the pose of each scan but the first in the frame of the
+//! one before, at the middle of the sweeps, x forward, **y right, yaw clockwise**.
 
 use super::side_file::SideFile;
 use crate::simulator::Simulator;
@@ -24,15 +24,15 @@ pub(crate) fn side_files(simulator: &Simulator) -> Vec<SideFile> {
     ]
 }
 
-/// `radar.timestamps`: each sweep's name and whether it is valid.
+/// `radar.timestamps`: the name of each sweep and whether it is valid.
 fn timestamps(simulator: &Simulator) -> String {
     (0..simulator.scans())
         .map(|i| format!("{} 1\n", simulator.time(i).start_us))
         .collect()
 }
 
-/// `gt/radar_odometry.csv`: source is the newer scan, destination the older. With nine decimals where Oxford has six:
-/// the truth is exact, and its chain should be.
+/// `gt/radar_odometry.csv`: source is the newer scan, destination the older. With nine decimals instead of
+/// Oxford's six, since the ground truth is exact and should stay so when it is chained.
 fn radar_odometry_csv(simulator: &Simulator) -> String {
     let header = "source_timestamp,destination_timestamp,x,y,z,roll,pitch,yaw,\
                   source_radar_timestamp,destination_radar_timestamp\n";

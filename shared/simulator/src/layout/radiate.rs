@@ -1,5 +1,6 @@
-//! RADIATE: `Navtech_Polar/000001.png`, range downwards and azimuth to the right, no metadata; and `Navtech_Polar.txt` with the times
-//! at which the host received the scans. There is no truth of its own form that could be exact: `ground_truth.tum` stands in.
+//! RADIATE: `Navtech_Polar/000001.png`, range downwards and azimuth to the right, without metadata; and
+//! `Navtech_Polar.txt` with the times at which the host received the scans. RADIATE has no exact ground
+//! truth, so it is written as `ground_truth.tum`.
 
 use std::fmt::Write as _;
 
@@ -12,16 +13,19 @@ use crate::stream::Stream;
 
 pub(crate) const FOLDER: &str = "Navtech_Polar";
 
-/// Periods among which a reader looks for the sensor's clock, microseconds.
+/// Sensor periods that a reader can recognise, microseconds.
 const PERIODS_US: std::ops::RangeInclusive<i64> = 200_000..=300_000;
-/// Scans in which the host stalls once: seven times in 466 scans of a recording.
+/// One host stall in this many scans: a recording has seven in 466.
 const STALL_EVERY: usize = 64;
-/// How long it stalls, seconds.
+/// Duration of a stall, seconds.
 const STALL_S: std::ops::Range<f64> = 0.3..1.4;
-/// Time from scan to scan when it catches up, microseconds.
+/// Time between scans while the host catches up, microseconds.
 const CATCH_UP_US: i64 = 5_000;
 
-/// Refuses radars that this format's readers cannot know.
+/// Checks that readers of this format can handle the radar.
+///
+/// # Errors
+/// [`SimulatorError::Config`] if they cannot.
 pub(crate) fn check(simulator: &Simulator) -> Result<(), SimulatorError> {
     let sampling = simulator.sampling();
     match PERIODS_US.contains(&sampling.period_us) && sampling.bins > sampling.azimuths {
@@ -30,7 +34,7 @@ pub(crate) fn check(simulator: &Simulator) -> Result<(), SimulatorError> {
             key: "output.format",
             value: "radiate".to_owned(),
             expected: format!(
-                "another one for {} azimuths x {} bins in {} us: its readers know radars of more bins than azimuths and of 0.2 to 0.3 s a turn",
+                "oxford or boreas for {} azimuths x {} bins in {} us: readers of RADIATE expect more bins than azimuths and 0.2 to 0.3 s a turn",
                 sampling.azimuths, sampling.bins, sampling.period_us
             ),
         }),
@@ -41,13 +45,14 @@ pub(crate) fn file_name(index: usize) -> String {
     format!("{:06}.png", index + 1)
 }
 
-/// The scan's time, nanoseconds since 1970: the mean of its columns', spread evenly over a turn.
+/// The scan's time, nanoseconds since 1970: the mean over its columns, whose times are evenly spaced over a
+/// turn.
 pub(crate) fn stamp_ns(simulator: &Simulator, index: usize) -> i64 {
     let (time, azimuths) = (simulator.time(index), simulator.sampling().azimuths as i64);
     time.start_us * 1000 + time.period_us * 1000 * (azimuths - 1) / (2 * azimuths)
 }
 
-/// `Navtech_Polar.txt`: nanoseconds stand behind the dot *without leading zeros*.
+/// `Navtech_Polar.txt`: the nanoseconds follow the dot *without leading zeros*.
 pub(crate) fn stamps(simulator: &Simulator, host: HostStamps, seed: u64) -> String {
     let mut text = String::new();
     for index in 0..simulator.scans() {
@@ -63,7 +68,7 @@ pub(crate) fn stamps(simulator: &Simulator, host: HostStamps, seed: u64) -> Stri
     text
 }
 
-/// How late the host is with a scan, microseconds; the least delay there is counts as none.
+/// Delay of the host for a scan, microseconds, less the shortest delay.
 fn delay_us(simulator: &Simulator, host: HostStamps, seed: u64, index: usize) -> i64 {
     if host == HostStamps::Even {
         return 0;
@@ -72,17 +77,17 @@ fn delay_us(simulator: &Simulator, host: HostStamps, seed: u64, index: usize) ->
     let mut rng = Stream::Stall(block as u64).generator(seed);
     let begins = block * STALL_EVERY + rng.random_range(8..STALL_EVERY / 2);
     let ends_us = simulator.time(begins).start_us + (rng.random_range(STALL_S) * 1e6) as i64;
-    let Some(waited) = index.checked_sub(begins) else {
+    let Some(waiting) = index.checked_sub(begins) else {
         return 0;
     };
-    let handed_over_us = ends_us + waited as i64 * CATCH_UP_US;
-    (handed_over_us - simulator.time(index).start_us).max(0)
+    let received_us = ends_us + waiting as i64 * CATCH_UP_US;
+    (received_us - simulator.time(index).start_us).max(0)
 }
 
-/// Lays rows of `stride` bytes on their side: `into[bin][azimuth] = rows[azimuth][first_byte + bin]`.
-pub(crate) fn lay_on_side(rows: &[u8], stride: usize, first_byte: usize, into: &mut [u8]) {
+/// Transposes rows of `stride` bytes: `into[bin][azimuth] = rows[azimuth][first_byte + bin]`.
+pub(crate) fn transpose(rows: &[u8], stride: usize, first_byte: usize, into: &mut [u8]) {
     let azimuths = rows.len() / stride;
-    // Rows by eights: each line of the image is then written in runs.
+    // Eight rows at a time, so that each line of the image is written in runs.
     for (group, rows) in rows.chunks(8 * stride).enumerate() {
         for (bin, line) in into.chunks_exact_mut(azimuths).enumerate() {
             for (row, to) in rows.chunks_exact(stride).zip(&mut line[8 * group..]) {
@@ -99,7 +104,7 @@ mod tests {
     use crate::config::SimulationConfig;
 
     #[test]
-    fn a_host_that_stalls_is_late_by_up_to_its_stall_and_never_hands_over_backwards() {
+    fn a_stalling_host_is_late_by_at_most_its_stall_and_keeps_the_order() {
         let simulator = Simulator::new(&SimulationConfig {
             scans: 400,
             ..SimulationConfig::default()
@@ -119,13 +124,13 @@ mod tests {
     }
 
     #[test]
-    fn laying_on_side_is_a_transposition_without_the_metadata() {
+    fn transposing_leaves_the_metadata_out() {
         let (azimuths, bins, first) = (21, 13, 2);
         let rows: Vec<u8> = (0..azimuths * (bins + first))
             .map(|i| (i * 7 % 251) as u8)
             .collect();
         let mut into = vec![0; azimuths * bins];
-        lay_on_side(&rows, bins + first, first, &mut into);
+        transpose(&rows, bins + first, first, &mut into);
         for azimuth in 0..azimuths {
             for bin in 0..bins {
                 assert_eq!(

@@ -2,5 +2,5 @@
 
 use std::path::PathBuf;
 
-/// A file beside the images: its path below the dataset's folder, and what is in it.
+/// A file beside the images: its path in the dataset's folder, and its content.
 pub(crate) type SideFile = (PathBuf, Vec<u8>);

@@ -1,4 +1,4 @@
-//! Round a block of houses, for ever.
+//! Laps round a block of houses.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -6,13 +6,13 @@ use gyre_geometry::Pose;
 
 use super::continuous::Path;
 
-/// Length of a bend by 90 degrees, metres of path.
+/// Length of a bend by 90 degrees along the path, metres.
 const BEND_M: f64 = 20.0;
-/// Share of a bend over which the curvature rises, and again falls: no vehicle turns its wheels at once.
+/// Share of a bend over which the curvature rises, and over which it falls again: steering takes time.
 const RAMP: f64 = 0.25;
-/// Braking and accelerating along the path, metres a second squared.
+/// Braking and acceleration along the path, metres a second squared.
 const LONGITUDINAL_MPS2: f64 = 2.5;
-/// Metres of path between two nodes of the table.
+/// Distance of the table's nodes along the path, metres.
 const STEP_M: f64 = 0.01;
 
 #[derive(Clone, Copy, Debug)]
@@ -23,9 +23,10 @@ struct Node {
     heading_rad: f64,
 }
 
-/// A drive around a rectangular block, counter-clockwise, with rounded corners that are taken more slowly.
+/// Laps around a rectangular block, counter-clockwise, with rounded corners that are taken more slowly.
 ///
-/// The world's origin is the block's centre; the drive starts in the middle of the side at negative y, towards positive x.
+/// The world's origin is the block's centre; the path starts in the middle of the side at negative y,
+/// towards positive x.
 #[derive(Clone, Debug)]
 pub struct BlockLoop {
     nodes: Vec<Node>,
@@ -88,7 +89,7 @@ impl Path for BlockLoop {
     }
 }
 
-/// Heading gained after `share` of a bend: the integral of a trapezoid of curvature, from 0 to 90 degrees.
+/// Heading gained after `share` of a bend: the integral of a trapezoidal curvature, from 0 to 90 degrees.
 fn bend_heading(share: f64) -> f64 {
     let rising = |u: f64| u * u / (2.0 * RAMP);
     let area = 1.0 - RAMP;
@@ -102,7 +103,7 @@ fn bend_heading(share: f64) -> f64 {
     FRAC_PI_2 * gained / area
 }
 
-/// How far before a corner its bend begins, metres.
+/// Distance from a corner at which its bend begins, metres.
 fn bend_footprint() -> f64 {
     let count = (BEND_M / STEP_M) as usize;
     let step = BEND_M / count as f64;
@@ -126,7 +127,7 @@ fn heading_at(distance_m: f64, straights_m: &[f64; 2]) -> f64 {
     TAU
 }
 
-/// Speed at each node: as fast as the bends allow, with gentle braking and accelerating, the same each lap.
+/// Speed at each node: as fast as bends, braking and acceleration allow, the same in each lap.
 fn speeds(headings: &[f64], step: f64, cruise: f64, lateral: f64) -> Vec<f64> {
     let limit = |pair: &[f64]| cruise.min((lateral * step / (pair[1] - pair[0]).max(1e-12)).sqrt());
     let mut speeds: Vec<f64> = headings.windows(2).map(limit).collect();
@@ -180,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn loop_is_longer_than_the_shortest_kitti_stretch() {
+    fn lap_is_longer_than_the_shortest_kitti_segment() {
         let path = default_loop();
         assert!(path.lap_m() > 115.0, "{}", path.lap_m());
     }

@@ -1,16 +1,16 @@
-//! What all paths can be asked.
+//! The trait of all paths.
 
 use gyre_geometry::{Pose, Twist};
 use nalgebra::Vector2;
 
-/// A motion that is continuous in time.
+/// A motion of the sensor that is continuous in time.
 pub trait Path: Send + Sync {
     /// Pose of the sensor (x forward, y left, yaw counter-clockwise) in the world at `time_s` seconds after the start.
     ///
     /// Defined for every time: before its start and after its end a path of finite duration stands still.
     fn pose(&self, time_s: f64) -> Pose;
 
-    /// Duration of the drive, seconds; infinite where it never ends.
+    /// Duration, seconds; infinite for an endless path.
     fn duration_s(&self) -> f64 {
         f64::INFINITY
     }

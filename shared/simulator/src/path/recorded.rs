@@ -1,4 +1,4 @@
-//! A drive that somebody drove: trajectories from files.
+//! Paths along recorded trajectories.
 
 use std::path::Path;
 
@@ -9,17 +9,17 @@ use nalgebra::Point2;
 use super::spline_path::SplinePath;
 use crate::error::SimulatorError;
 
-/// No vehicle is faster, metres a second.
+/// Maximum speed, metres a second.
 const FASTEST_MPS: f64 = 90.0;
-/// Nor stands without a pose for longer, seconds.
+/// Maximum time between two poses, seconds.
 const LONGEST_PAUSE_S: f64 = 3600.0;
 
-/// What to take of a file.
+/// The part of a file that is driven.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Excerpt {
-    /// Where to begin, seconds after the file's first pose.
+    /// Start, seconds after the file's first pose.
     pub from_s: f64,
-    /// How much at most, seconds.
+    /// Maximum duration, seconds.
     pub for_s: f64,
     /// Poses a second in a file without times.
     pub rate_hz: f64,
@@ -35,12 +35,18 @@ impl Default for Excerpt {
     }
 }
 
-/// The drive of a file of any form that [`gyre_radar::read_trajectory`] knows, in the frame of the excerpt's first pose.
+/// Reads a trajectory of any format that [`gyre_radar::read_trajectory`] knows and returns a path along it,
+/// in the frame of the excerpt's first pose.
 ///
-/// It passes within 5 cm of 95 % of a real drive's poses and within 10 cm of 99 % (what is left is their noise), and stands still before its start and after its end.
+/// The path passes within 5 cm of 95 % of a real drive's poses and within 10 cm of 99 %; the rest is noise
+/// of the poses.
+///
+/// # Errors
+/// [`SimulatorError::Trajectory`] if the file cannot be read; [`SimulatorError::Drive`] if the excerpt has
+/// fewer than two poses, jumps, pauses for hours, or does not move forward.
 pub fn read(path: &Path, excerpt: Excerpt) -> Result<SplinePath, SimulatorError> {
     let poses = timed(path, excerpt.rate_hz)?;
-    let refuse = |reason: String| SimulatorError::Drive {
+    let error = |reason: String| SimulatorError::Drive {
         path: path.to_owned(),
         reason,
     };
@@ -51,28 +57,28 @@ pub fn read(path: &Path, excerpt: Excerpt) -> Result<SplinePath, SimulatorError>
         .collect();
     let [(start_s, origin), _, ..] = within[..] else {
         let last_s = poses.last().map_or(0.0, |(s, _)| *s);
-        return Err(refuse(format!(
-            "it has less than two poses from {} s on; it lasts {last_s:.1} s",
+        return Err(error(format!(
+            "it has fewer than two poses after {} s; it lasts {last_s:.1} s",
             excerpt.from_s
         )));
     };
-    check_steps(&within).map_err(refuse)?;
+    check_steps(&within).map_err(error)?;
     let into_world = origin.inverse();
     let moved: Vec<_> = within
         .iter()
         .map(|(s, pose)| (s - start_s, into_world * pose))
         .collect();
-    let ahead = share_ahead(&moved);
-    if ahead < 0.5 {
-        let share = 100.0 * ahead;
-        return Err(refuse(format!(
-            "only {share:.0} % of its way lead ahead (x forward, y left): is it another frame?"
+    let forward = share_forward(&moved);
+    if forward < 0.5 {
+        let share = 100.0 * forward;
+        return Err(error(format!(
+            "only {share:.0} % of its length is driven forward (x forward, y left): is it in another frame?"
         )));
     }
     Ok(SplinePath::measured(&moved))
 }
 
-/// Refuses what no vehicle does: jumps, and pauses of many hours.
+/// Rejects jumps, and pauses of hours.
 fn check_steps(poses: &[&(f64, Pose)]) -> Result<(), String> {
     for pair in poses.windows(2) {
         let ((from_s, from), (to_s, to)) = (pair[0], pair[1]);
@@ -94,7 +100,7 @@ fn check_steps(poses: &[&(f64, Pose)]) -> Result<(), String> {
     Ok(())
 }
 
-/// All poses with their seconds after the first; of poses with the same stamp the first.
+/// The poses with their seconds after the first; of poses with the same stamp the first.
 fn timed(path: &Path, rate_hz: f64) -> Result<Vec<(f64, Pose)>, SimulatorError> {
     let read = read_trajectory(path)?;
     let seconds = |index: usize| match &read.stamp_ns {
@@ -111,9 +117,9 @@ fn timed(path: &Path, rate_hz: f64) -> Result<Vec<(f64, Pose)>, SimulatorError> 
     Ok(poses)
 }
 
-/// Share of a way that leads along x of the body, within 45 degrees; 1 where there is no way to speak of.
-fn share_ahead(poses: &[(f64, Pose)]) -> f64 {
-    let (mut ahead_m, mut all_m) = (0.0, 0.0);
+/// Share of the distance that is driven along x of the body, within 45 degrees; 1 if it hardly moves.
+fn share_forward(poses: &[(f64, Pose)]) -> f64 {
+    let (mut forward_m, mut all_m) = (0.0, 0.0);
     let mut from = poses[0].1;
     for (_, pose) in poses {
         let step = from.inverse_transform_point(&Point2::from(pose.translation.vector));
@@ -122,8 +128,8 @@ fn share_ahead(poses: &[(f64, Pose)]) -> f64 {
             continue;
         }
         all_m += length_m;
-        ahead_m += if step.x > step.y.abs() { length_m } else { 0.0 };
+        forward_m += if step.x > step.y.abs() { length_m } else { 0.0 };
         from = *pose;
     }
-    if all_m > 5.0 { ahead_m / all_m } else { 1.0 }
+    if all_m > 5.0 { forward_m / all_m } else { 1.0 }
 }

@@ -2,25 +2,26 @@
 
 use std::f64::consts::TAU;
 
-/// Coefficients that reach into one interval between knots.
+/// Coefficients that influence one interval between knots.
 const SUPPORT: usize = 6;
-/// Entries of a row of the normal equations from the diagonal on.
+/// Entries of a row of the normal equations, from the diagonal on.
 const BAND: usize = SUPPORT;
-/// Penalty on first differences that settles what too few samples leave open, relative to a sample's weight.
+/// Penalty on first differences, relative to a sample's weight: determines coefficients without samples.
 const TINY: f64 = 1e-9;
 
 /// A sample of a curve in `D` coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample<const D: usize> {
-    /// Where on the curve: time or path length.
+    /// The parameter of the curve: time or path length.
     pub at: f64,
     /// The coordinates there.
     pub value: [f64; D],
-    /// How much it counts.
+    /// The weight in the fit.
     pub weight: f64,
 }
 
-/// A curve in `D` coordinates whose derivatives are continuous up to the fourth. A lookup takes constant time.
+/// A curve in `D` coordinates whose derivatives are continuous up to the fourth. Evaluation takes constant
+/// time.
 #[derive(Clone, Debug)]
 pub struct UniformSpline<const D: usize> {
     start: f64,
@@ -29,10 +30,11 @@ pub struct UniformSpline<const D: usize> {
 }
 
 impl<const D: usize> UniformSpline<D> {
-    /// The curve with knots `step` apart that is close to the samples and whose third derivative is small (Eilers and Marx,
-    /// "Flexible smoothing with B-splines and penalties", 1996): what changes faster than `cutoff` periods a unit is smoothed away.
+    /// Fits a curve with knots `step` apart to the samples, with a penalty on its third derivative (Eilers
+    /// and Marx, "Flexible smoothing with B-splines and penalties", 1996): a low-pass filter with the
+    /// frequency `cutoff`, periods a unit.
     ///
-    /// Samples in ascending order; without any the curve is zero.
+    /// The samples are in ascending order; without any the curve is zero.
     pub fn fit(samples: &[Sample<D>], step: f64, cutoff: f64) -> Self {
         let (start, end) = match samples {
             [first, .., last] => (first.at, last.at),
@@ -58,19 +60,19 @@ impl<const D: usize> UniformSpline<D> {
         curve
     }
 
-    /// The coordinates at a place; beyond the samples those of the nearer end.
+    /// The coordinates at a place; outside the samples those of the nearer end.
     pub fn value(&self, at: f64) -> [f64; D] {
         let (first, share) = self.locate(at);
         self.combine(first, &basis(share))
     }
 
-    /// The first derivative at a place, not held at the ends.
+    /// The first derivative at a place; unlike the value not clamped at the ends.
     pub fn slope(&self, at: f64) -> [f64; D] {
         let (first, share) = self.locate(at);
         self.combine(first, &basis_slope(share).map(|b| b / self.step))
     }
 
-    /// Number of the interval that holds a place, and the share of it that lies before the place.
+    /// The interval in which a place lies, and the share of it before the place.
     fn locate(&self, at: f64) -> (usize, f64) {
         let intervals = self.coefficients.len() - (SUPPORT - 1);
         let along = ((at - self.start) / self.step).clamp(0.0, intervals as f64);
@@ -91,7 +93,8 @@ impl<const D: usize> UniformSpline<D> {
         sum
     }
 
-    /// Adds a sample to the normal equations: the matrix in `normal`, the right-hand side in the coefficients.
+    /// Adds a sample to the normal equations: the matrix in `normal`, the right-hand side in the
+    /// coefficients.
     fn count(&mut self, sample: &Sample<D>, normal: &mut [[f64; BAND]]) {
         let (first, share) = self.locate(sample.at);
         let weights = basis(share);
@@ -106,7 +109,7 @@ impl<const D: usize> UniformSpline<D> {
     }
 }
 
-/// The six pieces of the B-spline of degree five, after `f` of an interval.
+/// The six pieces of the B-spline of degree five, at the share `f` of an interval.
 fn basis(f: f64) -> [f64; SUPPORT] {
     let g = 1.0 - f;
     let inner = |f: f64| 26.0 + f * (50.0 + f * (20.0 + f * (-20.0 + f * (-20.0 + f * 10.0))));
@@ -130,7 +133,7 @@ fn basis_slope(f: f64) -> [f64; SUPPORT] {
     .map(|b| b / 120.0)
 }
 
-/// Adds `weight` times the squares of a difference of neighbouring coefficients.
+/// Adds the penalty `weight` on the squares of a difference of neighbouring coefficients.
 fn penalise(normal: &mut [[f64; BAND]], difference: &[f64], weight: f64) {
     for first in 0..normal.len().saturating_sub(difference.len() - 1) {
         for (i, a) in difference.iter().enumerate() {
@@ -141,7 +144,8 @@ fn penalise(normal: &mut [[f64; BAND]], difference: &[f64], weight: f64) {
     }
 }
 
-/// Replaces a positive definite band matrix by its factors L D L': D on the diagonal, the columns of L beside it.
+/// Replaces a positive definite band matrix by its factors L D L': D on the diagonal, the columns of L
+/// beside it.
 fn factorise(band: &mut [[f64; BAND]]) {
     for column in 0..band.len() {
         let row = band[column];
@@ -157,7 +161,7 @@ fn factorise(band: &mut [[f64; BAND]]) {
     }
 }
 
-/// Solves with the factors, in place.
+/// Solves the factorised equations in place.
 fn solve<const D: usize>(factors: &[[f64; BAND]], right: &mut [[f64; D]]) {
     let reach = |row: usize| BAND.min(factors.len() - row);
     let subtract = |from: [f64; D], factor: f64, what: [f64; D]| {
@@ -194,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn pieces_add_up_to_one_and_their_slopes_to_zero() {
+    fn basis_functions_sum_to_one_and_their_slopes_to_zero() {
         for i in 0..=10 {
             let share = f64::from(i) / 10.0;
             assert!((basis(share).iter().sum::<f64>() - 1.0).abs() < 1e-14);
@@ -203,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn slow_waves_pass_and_fast_ones_do_not() {
+    fn low_frequencies_pass_and_high_ones_do_not() {
         let amplitude = |periods: f64| {
             let wave = |at: f64| (TAU * periods * at).sin();
             let curve = UniformSpline::fit(&samples(wave, 400, 0.25), 0.25, 0.5);
@@ -227,9 +231,9 @@ mod tests {
     }
 
     proptest! {
-        /// The third derivative of a parabola is zero: nothing is to be smoothed.
+        /// The third derivative of a parabola is zero, so there is no penalty.
         #[test]
-        fn parabolas_are_kept(a in -5.0..5.0f64, b in -5.0..5.0f64, c in -1.0..1.0f64, at in 0.0..9.0f64) {
+        fn parabolas_are_reproduced(a in -5.0..5.0f64, b in -5.0..5.0f64, c in -1.0..1.0f64, at in 0.0..9.0f64) {
             let of = |t: f64| a + t * (b + t * c);
             let curve: UniformSpline<1> = UniformSpline::fit(&samples(of, 40, 0.25), 0.3, 0.5);
             prop_assert!((curve.value(at)[0] - of(at)).abs() < 1e-4);

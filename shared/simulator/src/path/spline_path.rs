@@ -1,4 +1,4 @@
-//! A drive that is known at some instants only, made continuous.
+//! A smooth path through poses at discrete times.
 
 use std::f64::consts::{PI, TAU};
 
@@ -8,19 +8,18 @@ use nalgebra::Vector2;
 use super::continuous::Path;
 use super::spline::{Sample, UniformSpline};
 
-/// What a drive known at some instants is smoothed with: what changes faster than so many times a second is measuring
-/// noise rather than a car.
+/// Cut-off frequency for measured poses, Hz: faster changes are noise.
 const MEASURED_HZ: f64 = 0.7;
-/// As long as a vehicle stays within so many metres, for [`STAND_S`] at least, it stands.
+/// A vehicle that moves by less than this, metres, for at least [`STAND_S`] is standing.
 const STAND_M: f64 = 0.04;
-/// And within so many radians.
+/// The same for its yaw, radians.
 const STAND_RAD: f64 = 0.01;
-/// See [`STAND_M`].
+/// Minimum duration of a stand, seconds.
 const STAND_S: f64 = 1.5;
-/// How much more the instants of a stand count: no smoothing may make the vehicle creep.
+/// Weight of the poses of a stand, so that the vehicle does not creep after smoothing.
 const STAND_WEIGHT: f64 = 30.0;
 
-/// A drive through poses at given instants, its derivatives continuous up to the fourth.
+/// A path through poses at given times, with derivatives continuous up to the fourth.
 #[derive(Clone, Debug)]
 pub struct SplinePath {
     curve: UniformSpline<3>,
@@ -28,14 +27,13 @@ pub struct SplinePath {
 }
 
 impl SplinePath {
-    /// A drive close to `poses`, whose times ascend (seconds from zero), without what is faster than `cutoff_hz`.
+    /// A path close to `poses`, whose times ascend from zero (seconds), low-pass filtered with `cutoff_hz`.
     pub fn new(poses: &[(f64, Pose)], cutoff_hz: f64) -> Self {
         Self::smooth(&unwrapped(poses), cutoff_hz)
     }
 
-    /// A drive close to poses that were measured, and so are off by some centimetres.
-    ///
-    /// Where they hardly differ for a while, the vehicle stands.
+    /// A path close to measured poses, which have errors of some centimetres. The vehicle stands where they
+    /// hardly change for a while.
     pub fn measured(poses: &[(f64, Pose)]) -> Self {
         let mut samples = unwrapped(poses);
         hold_stands(&mut samples);
@@ -72,7 +70,8 @@ impl Path for SplinePath {
     }
 }
 
-/// Poses as x, y and a yaw that does not jump.
+/// The poses as x, y and continuous yaw. Its rounding differs from `gyre_geometry::wrap_angle`, and
+/// rendered images depend on it.
 fn unwrapped(poses: &[(f64, Pose)]) -> Vec<Sample<3>> {
     let mut yaw = 0.0;
     let sample = |(at, pose): &(f64, Pose)| {
@@ -86,7 +85,7 @@ fn unwrapped(poses: &[(f64, Pose)]) -> Vec<Sample<3>> {
     poses.iter().map(sample).collect()
 }
 
-/// Gives all samples of a stand one pose, their median.
+/// Sets all samples of a stand to their median.
 fn hold_stands(samples: &mut [Sample<3>]) {
     let mut first = 0;
     while first < samples.len() {

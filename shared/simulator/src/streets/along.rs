@@ -1,10 +1,10 @@
-//! Streets laid along a drive, with side streets: the town's plan where only the drive is known.
+//! Streets laid along a drive, with side streets.
 
 use nalgebra::Point2;
 use rand::Rng;
 
 use super::lines::{Line, simplified};
-use super::merge::{WayPoint, driven_lines, way};
+use super::merge::{Waypoint, driven_lines, waypoints};
 use super::network::Streets;
 use super::side::side_lines;
 use super::street::Street;
@@ -12,26 +12,27 @@ use crate::lanes::DrivingSide;
 use crate::path::Path;
 use crate::stream::Stream;
 
-/// Room that the carriageway leaves beside the middle of the driven vehicle, metres.
+/// Minimum distance from the vehicle's centre to the kerb, metres.
 const BESIDE_VEHICLE_M: f64 = 1.3;
-/// How often it is looked whether the carriageway holds the vehicle, seconds.
+/// Time between the poses for which that is checked, seconds.
 const PASS_S: f64 = 0.05;
-/// Deviation that a street's line may have from the points that were driven, metres.
+/// Maximum deviation of a street's line from the driven points, metres.
 const TOLERANCE_M: f64 = 0.1;
 /// Width of side streets, metres, from narrow residential ones to collectors.
 const SIDE_WIDTH_M: std::ops::Range<f64> = 5.0..8.0;
 
 impl Streets {
-    /// The streets along the first `duration_s` of a drive, and side streets that branch off them, the same for the same seed.
+    /// Lays streets along the first `duration_s` of a drive, and side streets that branch off, the same for
+    /// the same seed.
     ///
-    /// The driven vehicle keeps to its lane; what it drives twice, in either direction and some metres beside, is one
-    /// street. The carriageways hold it everywhere with 1.3 m to spare from its middle.
-    pub fn along(path: &dyn Path, duration_s: f64, keep: DrivingSide, seed: u64) -> Self {
+    /// The ego vehicle drives in its lane. What it drives twice, in either direction and with some metres
+    /// of offset, is one street. Everywhere its centre is at least 1.3 m from the kerb.
+    pub fn along(path: &dyn Path, duration_s: f64, driving_side: DrivingSide, seed: u64) -> Self {
         let mut rng = Stream::Streets.generator(seed);
         let duration_s = path.duration_s().min(duration_s);
-        let way = way(path, duration_s, keep);
-        let lines = driven_lines(&way);
-        let speeds = mean_speeds(&lines, &way);
+        let waypoints = waypoints(path, duration_s, driving_side);
+        let lines = driven_lines(&waypoints);
+        let speeds = mean_speeds(&lines, &waypoints);
         let sides = side_lines(&lines, &mut rng);
         let drawn = |line: &Line, half_width_m: f64, driven: bool| {
             let centre = simplified(line, TOLERANCE_M);
@@ -53,13 +54,13 @@ impl Streets {
     }
 }
 
-/// Width of a street on which one drives so fast: 6 m where slow, beyond 10 m on main roads.
+/// Width of a street by its mean speed: 6 m where slow, more than 10 m on main roads.
 fn driven_width_m(speed_mps: f64, rng: &mut impl Rng) -> f64 {
     (3.5 + 0.65 * speed_mps).clamp(6.0, 11.0) + rng.random_range(0.0..2.5)
 }
 
-/// Mean speed on each line where the vehicle moved, metres a second.
-fn mean_speeds(lines: &[Line], way: &[WayPoint]) -> Vec<f64> {
+/// Mean speed along each line while the vehicle moves, metres a second.
+fn mean_speeds(lines: &[Line], waypoints: &[Waypoint]) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0); lines.len()];
     let carriageway = |line: &Line| Street {
         centre: line.clone(),
@@ -67,7 +68,7 @@ fn mean_speeds(lines: &[Line], way: &[WayPoint]) -> Vec<f64> {
         driven: true,
     };
     let network = Streets::new(lines.iter().map(carriageway).collect());
-    for ends in way.windows(2) {
+    for ends in waypoints.windows(2) {
         let speed_mps = (ends[1].vehicle - ends[0].vehicle).norm()
             / (ends[1].time_s - ends[0].time_s).max(1e-3);
         if let Some(nearest) = network.nearest(ends[0].centre, 12.0) {
@@ -80,7 +81,7 @@ fn mean_speeds(lines: &[Line], way: &[WayPoint]) -> Vec<f64> {
         .collect()
 }
 
-/// Widens streets that do not hold the vehicle.
+/// Widens the streets that are too narrow for the vehicle.
 fn widen(streets: &mut [Street], path: &dyn Path, duration_s: f64) {
     let network = Streets::new(streets.to_vec());
     for step in 0..=(duration_s / PASS_S) as usize {

@@ -1,16 +1,16 @@
-//! Lines of points in the plane: how they bend, what lies near them.
+//! Polylines in the plane, indexed by place.
 
 use std::collections::HashMap;
 
 use nalgebra::{Point2, Vector2};
 
-/// Metres a side of a cell of [`LineGrid`].
+/// Side of a cell of [`LineGrid`], metres.
 const CELL_M: f64 = 16.0;
 
-/// A line of points.
+/// A polyline.
 pub type Line = Vec<Point2<f64>>;
 
-/// A straight piece of a line in a [`LineGrid`].
+/// A segment of a polyline in a [`LineGrid`].
 #[derive(Clone, Copy, Debug)]
 pub struct Segment {
     /// Number of its line.
@@ -22,15 +22,15 @@ pub struct Segment {
 }
 
 impl Segment {
-    /// Unit vector along the segment; zero where its ends are one.
+    /// Unit vector along the segment; zero if its ends coincide.
     pub fn direction(&self) -> Vector2<f64> {
         (self.to - self.from).try_normalize(0.0).unwrap_or_default()
     }
 
-    /// Where a place's foot lies: 0 at the first end, 1 at the other, beyond these outside.
+    /// The projection of a place: 0 at the first end, 1 at the other.
     pub fn share(&self, place: Point2<f64>) -> f64 {
-        let way = self.to - self.from;
-        (place - self.from).dot(&way) / way.norm_squared().max(1e-12)
+        let segment = self.to - self.from;
+        (place - self.from).dot(&segment) / segment.norm_squared().max(1e-12)
     }
 
     /// The nearest point of the segment.
@@ -44,7 +44,7 @@ impl Segment {
     }
 }
 
-/// Segments that can be looked up by place while more are added.
+/// Segments indexed by place; more can be added.
 #[derive(Debug, Default)]
 pub struct LineGrid {
     cells: HashMap<(i64, i64), Vec<Segment>>,
@@ -73,7 +73,8 @@ impl LineGrid {
         }
     }
 
-    /// The segments within `reach_m` of a place, in the order of cells and of their addition; some more than once.
+    /// The segments within `reach_m` of a place, by cell and in the order in which they were added; some
+    /// more than once.
     pub fn near(&self, place: Point2<f64>, reach_m: f64) -> impl Iterator<Item = &Segment> {
         let reach = Vector2::repeat(reach_m);
         let (low, high) = (cell(place - reach), cell(place + reach));
@@ -97,7 +98,7 @@ pub fn length_m(line: &[Point2<f64>]) -> f64 {
     line.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum()
 }
 
-/// The line without points that lie within `tolerance_m` of what the others draw (Douglas and Peucker, 1973).
+/// The line without points within `tolerance_m` of the line through the others (Douglas and Peucker, 1973).
 pub fn simplified(line: &[Point2<f64>], tolerance_m: f64) -> Line {
     let mut keep = vec![false; line.len()];
     let mut open = vec![(0, line.len().saturating_sub(1))];

@@ -1,4 +1,4 @@
-//! A way that is driven, as centre lines: what is driven twice becomes one street.
+//! The driven path as centre lines: passes along the same street are merged.
 
 use gyre_geometry::Pose;
 use nalgebra::{Point2, Rotation2, Vector2};
@@ -7,36 +7,37 @@ use super::lines::{Line, LineGrid, Segment, length_m};
 use crate::lanes::{DrivingSide, LANE_M};
 use crate::path::Path;
 
-/// Metres between points of the way.
+/// Distance between waypoints, metres.
 const STEP_M: f64 = 2.0;
-/// A way that runs less than so many metres beside a street is on it.
+/// A path joins a street when it runs closer beside it than this, metres.
 const JOIN_M: f64 = 8.0;
-/// And one that is on it leaves it farther away only.
+/// A path leaves its street when it is farther away than this, metres.
 const LEAVE_M: f64 = 11.0;
-/// Cosine of the angle up to which two directions are parallel.
+/// Minimum cosine of the angle between parallel directions.
 const PARALLEL: f64 = 0.85;
-/// Metres to either side over which a street's shift to the middle of what was driven is averaged.
+/// Distance to either side over which the shift of a street to the middle of its passes is averaged,
+/// metres.
 const SHIFT_M: f64 = 20.0;
-/// A way that turns by more than the angle (radians) within the length (metres) takes another street.
+/// A path that turns by more than the angle (radians) within the distance (metres) takes another street.
 const TURN: (f64, f64) = (0.9, 24.0);
 
-/// A point of the way that is driven.
+/// A point of the driven path.
 #[derive(Clone, Copy, Debug)]
-pub struct WayPoint {
-    /// Where the vehicle is.
+pub struct Waypoint {
+    /// The position of the vehicle.
     pub vehicle: Point2<f64>,
-    /// The middle of its street, by the lane that it keeps to.
+    /// The centre of its street, given its lane.
     pub centre: Point2<f64>,
-    /// Which way it looks, a unit vector.
+    /// The driving direction, a unit vector.
     pub ahead: Vector2<f64>,
-    /// When, seconds.
+    /// The time, seconds.
     pub time_s: f64,
 }
 
-/// The way of a drive, a point every two metres.
-pub fn way(path: &dyn Path, duration_s: f64, keep: DrivingSide) -> Vec<WayPoint> {
+/// Samples a path every two metres.
+pub fn waypoints(path: &dyn Path, duration_s: f64, driving_side: DrivingSide) -> Vec<Waypoint> {
     let poses = steps(path, duration_s);
-    let to_centre = match keep {
+    let to_centre = match driving_side {
         DrivingSide::Left => -LANE_M / 2.0,
         DrivingSide::Right => LANE_M / 2.0,
     };
@@ -45,7 +46,7 @@ pub fn way(path: &dyn Path, duration_s: f64, keep: DrivingSide) -> Vec<WayPoint>
         let ahead = direction(&poses, index);
         let vehicle = Point2::from(pose.translation.vector);
         let centre = vehicle + Vector2::new(-ahead.y, ahead.x) * to_centre;
-        WayPoint {
+        Waypoint {
             vehicle,
             centre,
             ahead,
@@ -55,7 +56,7 @@ pub fn way(path: &dyn Path, duration_s: f64, keep: DrivingSide) -> Vec<WayPoint>
     (0..poses.len()).map(point).collect()
 }
 
-/// Poses with their times, each some metres from the one before; at least two, the last of them ahead of a vehicle that stands.
+/// Poses with their times, some metres apart; at least two, the last of which lies ahead of the path's end.
 fn steps(path: &dyn Path, duration_s: f64) -> Vec<(f64, Pose)> {
     let mut poses = vec![(0.0, path.pose(0.0))];
     let apart = |a: &Pose, b: &Pose| (a.translation.vector - b.translation.vector).norm();
@@ -71,7 +72,8 @@ fn steps(path: &dyn Path, duration_s: f64) -> Vec<(f64, Pose)> {
     poses
 }
 
-/// The direction of the way where the vehicle looks ahead along it; its own where it turns on the spot.
+/// The direction of the path; the vehicle's own where the path is not along it, as when it turns on the
+/// spot.
 fn direction(poses: &[(f64, Pose)], index: usize) -> Vector2<f64> {
     let (before, after) = (
         poses[index.saturating_sub(1)].1,
@@ -87,11 +89,11 @@ fn direction(poses: &[(f64, Pose)], index: usize) -> Vector2<f64> {
     }
 }
 
-/// Centre lines of the streets that a way takes, each once.
-pub fn driven_lines(way: &[WayPoint]) -> Vec<Line> {
+/// Centre lines of the driven streets, each once.
+pub fn driven_lines(waypoints: &[Waypoint]) -> Vec<Line> {
     let mut merger = Merger::default();
-    for point in way {
-        merger.go(point);
+    for point in waypoints {
+        merger.add(point);
     }
     merger
         .finish()
@@ -104,17 +106,17 @@ pub fn driven_lines(way: &[WayPoint]) -> Vec<Line> {
 #[derive(Debug, Default)]
 struct Merger {
     lines: Vec<Line>,
-    /// For each point of each line how far to its left and right the way passed, metres to the left.
+    /// The passes beside each point of each line: minimum and maximum offset, metres to the left.
     spans: Vec<Vec<[f64; 2]>>,
     grid: LineGrid,
-    /// Whether the last line is being drawn.
+    /// Whether the last line is being continued.
     drawing: bool,
-    /// Where the way was last on a street that was there before.
+    /// The last place on an existing street.
     joined: Option<Point2<f64>>,
 }
 
 impl Merger {
-    fn go(&mut self, point: &WayPoint) {
+    fn add(&mut self, point: &Waypoint) {
         let reach_m = if self.drawing { JOIN_M } else { LEAVE_M };
         let beside = |segment: &&Segment| {
             (0.0..=1.0).contains(&segment.share(point.centre))
@@ -145,7 +147,7 @@ impl Merger {
         }
     }
 
-    fn draw(&mut self, point: &WayPoint) {
+    fn draw(&mut self, point: &Waypoint) {
         if !self.drawing {
             self.lines.push(Line::new());
             self.spans.push(Vec::new());
@@ -171,7 +173,7 @@ impl Merger {
         self.spans[number].push([0.0; 2]);
     }
 
-    /// The lines, each in the middle of all that was driven on it.
+    /// The lines, each shifted to the middle of its passes.
     fn finish(self) -> Vec<Line> {
         self.lines
             .iter()
@@ -184,7 +186,7 @@ impl Merger {
 fn centred(line: &Line, spans: &[[f64; 2]]) -> Line {
     let reach = (SHIFT_M / STEP_M) as usize;
     let shifted = |index: usize| {
-        // The ends stay where other lines begin.
+        // The ends stay, since other lines begin there.
         let reach = reach.min(index).min(line.len() - 1 - index);
         let around = &spans[index - reach..=index + reach];
         let end = if reach == 0 { 0.0 } else { 1.0 };
@@ -202,7 +204,7 @@ fn centred(line: &Line, spans: &[[f64; 2]]) -> Line {
     (0..line.len()).map(shifted).collect()
 }
 
-/// Cuts a line where it turns off, in the middle of the turn.
+/// Cuts a line in the middle of each sharp turn.
 fn cut_at_turns(line: &[Point2<f64>]) -> Vec<Line> {
     let reach = (TURN.1 / STEP_M / 2.0) as usize;
     let turn = |index: usize| {

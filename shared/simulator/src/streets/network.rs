@@ -4,21 +4,21 @@ use nalgebra::{Point2, Vector2};
 
 use super::street::Street;
 
-/// Metres a side of a cell of the index, in towns of a usual size.
+/// Side of a cell of the index, metres.
 const CELL_M: f64 = 20.0;
-/// No index has many more cells; a town that is larger has larger ones.
+/// Maximum number of cells: larger towns have larger cells.
 const MOST_CELLS: f64 = 1e6;
 
-/// Where a place lies beside the street that is nearest to it.
+/// The position of a place relative to the nearest street.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nearest {
-    /// Number of the street.
+    /// Index of the street.
     pub street: usize,
     /// Metres along the street's centre line.
     pub along_m: f64,
-    /// Metres from the centre line, to either side.
+    /// Distance from the centre line, metres.
     pub offset_m: f64,
-    /// Metres from the kerb: below zero on the carriageway.
+    /// Distance from the kerb, metres: negative on the carriageway.
     pub clearance_m: f64,
 }
 
@@ -31,24 +31,24 @@ pub struct Streets {
     cell_m: f64,
     columns: usize,
     rows: usize,
-    /// Where each cell's pieces begin in `pieces`, and the end of the last.
+    /// `starts[c]..starts[c + 1]` are the pieces of cell `c`.
     starts: Vec<u32>,
     pieces: Vec<Piece>,
 }
 
-/// A straight piece of a street.
+/// A segment of a street's centre line.
 #[derive(Clone, Copy, Debug)]
 struct Piece {
     street: u32,
     half_width_m: f64,
     from: Point2<f64>,
-    way: Vector2<f64>,
+    segment: Vector2<f64>,
     length_m: f64,
     along_m: f64,
 }
 
 impl Streets {
-    /// A network of these streets.
+    /// Indexes the streets.
     pub fn new(streets: Vec<Street>) -> Self {
         let points = || streets.iter().flat_map(|street| &street.centre);
         let lowest = points().fold(Point2::new(f64::MAX, f64::MAX), |a, b| a.inf(b));
@@ -81,12 +81,12 @@ impl Streets {
         network
     }
 
-    /// The streets, by their numbers.
+    /// The streets.
     pub fn streets(&self) -> &[Street] {
         &self.streets
     }
 
-    /// What is nearest of the streets whose kerb is less than `within_m` away; `None` where there is none.
+    /// The nearest street, if its kerb is less than `within_m` away.
     pub fn nearest(&self, place: Point2<f64>, within_m: f64) -> Option<Nearest> {
         if self.pieces.is_empty() {
             return None;
@@ -109,7 +109,7 @@ impl Streets {
         best
     }
 
-    /// Metres from the nearest kerb, below zero on a carriageway, at most `within_m`.
+    /// Distance from the nearest kerb, metres, negative on a carriageway, at most `within_m`.
     pub fn clearance_m(&self, place: Point2<f64>, within_m: f64) -> f64 {
         self.nearest(place, within_m)
             .map_or(within_m, |nearest| nearest.clearance_m)
@@ -125,14 +125,14 @@ impl Streets {
         for (number, street) in self.streets.iter().enumerate() {
             let mut along_m = 0.0;
             for ends in street.centre.windows(2) {
-                let way = ends[1] - ends[0];
+                let segment = ends[1] - ends[0];
                 let (street, half_width_m) = (number as u32, street.half_width_m);
                 let piece = Piece {
                     street,
                     half_width_m,
                     from: ends[0],
-                    way,
-                    length_m: way.norm(),
+                    segment,
+                    length_m: segment.norm(),
                     along_m,
                 };
                 along_m += piece.length_m;
@@ -153,12 +153,12 @@ impl Streets {
 }
 
 impl Piece {
-    /// Where a place lies beside the piece, if its kerb is less than `least_m` away.
+    /// The position of a place relative to the piece, if its kerb is less than `least_m` away.
     fn nearer(&self, place: Point2<f64>, least_m: f64) -> Option<Nearest> {
         let off = place - self.from;
         let share =
-            (off.dot(&self.way) / (self.length_m * self.length_m).max(1e-12)).clamp(0.0, 1.0);
-        let apart = (off - self.way * share).norm_squared();
+            (off.dot(&self.segment) / (self.length_m * self.length_m).max(1e-12)).clamp(0.0, 1.0);
+        let apart = (off - self.segment * share).norm_squared();
         let reach_m = least_m + self.half_width_m;
         if reach_m <= 0.0 || apart >= reach_m * reach_m {
             return None;

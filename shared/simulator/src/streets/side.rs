@@ -1,4 +1,4 @@
-//! Side streets: what branches off the streets that are driven.
+//! Side streets that branch off the driven streets.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -7,43 +7,43 @@ use rand::Rng;
 
 use super::lines::{Line, LineGrid, Segment, length_m};
 
-/// Metres between two places where streets branch off on a side.
+/// Distance between junctions on one side, metres.
 const SPACING_M: std::ops::Range<f64> = 60.0..150.0;
-/// Length of a side street that nothing cuts short, metres.
+/// Length of a side street that nothing shortens, metres.
 const LENGTH_M: std::ops::Range<f64> = 60.0..250.0;
-/// A shorter one is not built.
+/// Minimum length of a side street, metres.
 const SHORTEST_M: f64 = 40.0;
-/// Share of the places with streets to both sides.
+/// Share of the junctions with streets on both sides.
 const CROSSROADS: f64 = 0.4;
-/// Share of the turns of a drive beyond which the streets run on.
+/// Share of the turns of a drive at which the street continues straight on.
 const RUN_ON: f64 = 0.7;
-/// From this length of a street on its ends run on, metres.
+/// Minimum length of a street that continues, metres.
 const RUN_ON_FROM_M: f64 = 25.0;
-/// Largest deviation from a right angle, radians.
+/// Maximum deviation from a right angle, radians.
 const SKEW_RAD: f64 = 0.2;
-/// Sharpest bend of a side street, radians a metre.
+/// Maximum curvature of a side street, radians a metre.
 const BEND_RAD_M: f64 = 1.0 / 150.0;
-/// A street whose end another continues does not run on itself: that one is looked for so many metres ahead,
+/// A street does not continue if another one continues it: a street this far ahead, metres,
 const AHEAD_M: f64 = 15.0;
-/// so many beside,
+/// within this distance, metres,
 const BESIDE_M: f64 = 10.0;
-/// with the cosine of the angle between them above this.
+/// and at an angle with at least this cosine.
 const PARALLEL: f64 = 0.8;
-/// Metres between the points of a side street.
+/// Distance between the points of a side street, metres.
 const STEP_M: f64 = 4.0;
-/// Room that two streets leave between them, metres, where they do not meet.
+/// Minimum distance between streets that do not meet, metres.
 const APART_M: f64 = 32.0;
-/// Cosine of the angle between two streets that may meet.
+/// Maximum cosine of the angle between streets that meet.
 const STEEP: f64 = 0.6;
 
-/// Draws side streets among lines that are there already.
+/// Draws side streets among existing lines.
 pub struct SideStreets<'a, R> {
     lines: Vec<Line>,
     grid: LineGrid,
     rng: &'a mut R,
 }
 
-/// The side streets of these lines.
+/// Draws the side streets of these lines.
 pub fn side_lines(driven: &[Line], rng: &mut impl Rng) -> Vec<Line> {
     let mut sides = SideStreets {
         lines: driven.to_vec(),
@@ -63,7 +63,7 @@ pub fn side_lines(driven: &[Line], rng: &mut impl Rng) -> Vec<Line> {
 }
 
 impl<R: Rng> SideStreets<'_, R> {
-    /// Lets both ends of a line run on straight, where nothing is there yet.
+    /// Continues both ends of a line straight on if there is room.
     fn run_on(&mut self, line: &[Point2<f64>]) {
         if length_m(line) < RUN_ON_FROM_M {
             return;
@@ -111,7 +111,8 @@ impl<R: Rng> SideStreets<'_, R> {
         }
     }
 
-    /// Draws a street from `start` as far as there is room, or up to a street that it meets at a steep angle.
+    /// Draws a street from `start` as long as there is room, or up to a street that it meets at a steep
+    /// angle.
     fn build(&mut self, start: Point2<f64>, direction: Vector2<f64>) {
         let wanted_m = self.rng.random_range(LENGTH_M);
         let bend = Rotation2::new(
@@ -127,7 +128,7 @@ impl<R: Rng> SideStreets<'_, R> {
                     break;
                 }
                 Room::TooNear => {
-                    // What has come near lies ahead by now: leave room to it.
+                    // Keep the distance to the street that came near.
                     line.truncate(line.len().saturating_sub(2));
                     break;
                 }
@@ -168,10 +169,10 @@ enum Room {
     TooNear,
 }
 
-/// Direction in which a line ends, over its last metres.
+/// The direction in which a line ends.
 fn end_direction(line: &[Point2<f64>]) -> Vector2<f64> {
     let end = line[line.len() - 1];
-    // The last metres of a line that was cut at a turn are a part of the turn.
+    // The last metres of a line that was cut at a turn belong to the turn.
     let back = line
         .iter()
         .rev()
@@ -187,14 +188,14 @@ fn end_direction(line: &[Point2<f64>]) -> Vector2<f64> {
     (to - from).try_normalize(0.0).unwrap_or(Vector2::x())
 }
 
-/// A place on a line and its direction there.
+/// Place and direction at a distance along a line.
 fn at(line: &[Point2<f64>], along_m: f64) -> Option<(Point2<f64>, Vector2<f64>)> {
     let mut left_m = along_m;
     for ends in line.windows(2) {
-        let way = ends[1] - ends[0];
-        let length_m = way.norm();
+        let segment = ends[1] - ends[0];
+        let length_m = segment.norm();
         if left_m <= length_m && length_m > 0.0 {
-            return Some((ends[0] + way * (left_m / length_m), way / length_m));
+            return Some((ends[0] + segment * (left_m / length_m), segment / length_m));
         }
         left_m -= length_m;
     }

@@ -3,14 +3,14 @@
 use gyre_geometry::Pose;
 use nalgebra::Point2;
 
-/// A street, as a line of points that are some metres apart.
+/// A street, as a polyline with points some metres apart.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Street {
-    /// The middle of the carriageway, world frame, metres: at least two points.
+    /// The centre line, world frame, metres: at least two points.
     pub centre: Vec<Point2<f64>>,
-    /// From the middle of the carriageway to its kerbs, metres.
+    /// Distance from the centre line to the kerbs, metres.
     pub half_width_m: f64,
-    /// Whether the drive takes it; the others run on from it through the town.
+    /// Whether the ego vehicle drives on it; false for side streets.
     pub driven: bool,
 }
 
@@ -23,19 +23,19 @@ impl Street {
             .sum()
     }
 
-    /// A place on the centre line and the street's direction there, x along it.
+    /// The pose at a distance along the centre line, x along the street.
     pub fn at(&self, along_m: f64) -> Pose {
         let mut left_m = along_m;
         let mut pose = Pose::identity();
         for ends in self.centre.windows(2) {
-            let way = ends[1] - ends[0];
-            let length_m = way.norm();
+            let segment = ends[1] - ends[0];
+            let length_m = segment.norm();
             let share = if length_m > 0.0 {
                 left_m / length_m
             } else {
                 0.0
             };
-            pose = Pose::new(ends[0].coords + way * share, way.y.atan2(way.x));
+            pose = Pose::new(ends[0].coords + segment * share, segment.y.atan2(segment.x));
             if share <= 1.0 {
                 break;
             }

@@ -13,7 +13,7 @@ fn town(seed: u64, config: &TrafficConfig) -> (Arc<dyn Path>, Traffic) {
         length_m: 2500.0,
         speed_mps: 13.9,
         lateral_acceleration_mps2: 2.2,
-        keep: DrivingSide::Left,
+        driving_side: DrivingSide::Left,
     };
     let drive: Arc<dyn Path> = Arc::new(town.path(seed));
     let duration_s = drive.duration_s();

@@ -1,4 +1,4 @@
-//! Whether a folder may be gone on with, and what it lacks.
+//! Decides whether a folder can be resumed, and which scans it lacks.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -12,19 +12,22 @@ use crate::error::SimulatorError;
 use crate::image::{PART, encode};
 use crate::simulated_drive::SimulatedDrive;
 
-/// The file that says what made a recording: its configuration.
+/// The file with the configuration that made a dataset.
 pub const MADE_BY: &str = "simulation.toml";
 
-/// The file that says how to read it; see [`gyre_radar::open`].
-pub(super) const TOLD: &str = "dataset.toml";
+/// The file with the options to read it; see [`gyre_radar::open`].
+pub(super) const DATASET_OPTIONS: &str = "dataset.toml";
 
 /// Content of [`MADE_BY`].
 pub(super) fn made_by(config: &SimulationConfig) -> Result<String, SimulatorError> {
-    Ok(format!("# What made this recording.\n{}", to_toml(config)?))
+    Ok(format!(
+        "# The configuration that made this dataset.\n{}",
+        to_toml(config)?
+    ))
 }
 
-/// Content of [`TOLD`]: how to read it so that it is true to its radar.
-pub(super) fn told(drive: &SimulatedDrive) -> Result<String, SimulatorError> {
+/// Content of [`DATASET_OPTIONS`].
+pub(super) fn dataset_options(drive: &SimulatedDrive) -> Result<String, SimulatorError> {
     to_toml(&drive.dataset_options())
 }
 
@@ -32,11 +35,15 @@ fn to_toml(value: &impl serde::Serialize) -> Result<String, SimulatorError> {
     toml::to_string(value).map_err(|error| SimulatorError::Config {
         key: "simulation",
         value: error.to_string(),
-        expected: "something that can be written as TOML".to_owned(),
+        expected: "a configuration that can be written as TOML".to_owned(),
     })
 }
 
-/// The scans that `out` lacks; refuses a folder that would become a mixture.
+/// Returns the scans that `out` lacks.
+///
+/// # Errors
+/// [`SimulatorError`] if `out` holds images of another dataset, or images that differ from what is rendered
+/// now.
 pub(super) fn missing(
     drive: &SimulatedDrive,
     config: &SimulationConfig,
@@ -69,7 +76,7 @@ pub(super) fn missing(
     Ok(missing)
 }
 
-/// The complete images; what was begun and not completed is removed.
+/// Lists the complete images and removes incomplete ones.
 fn images(folder: &Path) -> Result<BTreeSet<String>, SimulatorError> {
     let listing = |source| SimulatorError::List {
         folder: folder.to_owned(),
@@ -90,7 +97,8 @@ fn images(folder: &Path) -> Result<BTreeSet<String>, SimulatorError> {
     Ok(names)
 }
 
-/// Whether `out` was made by `config`, but for how many scans and how they are played; false where nothing says what made it.
+/// Whether `out` was made by `config`, up to the number of scans and how they are played; false if it does
+/// not say.
 fn made_by_this(config: &SimulationConfig, out: &Path) -> Result<bool, SimulatorError> {
     let path = out.join(MADE_BY);
     let text = match fs::read_to_string(&path) {
@@ -101,13 +109,13 @@ fn made_by_this(config: &SimulationConfig, out: &Path) -> Result<bool, Simulator
     let found: Option<SimulationConfig> = toml::from_str(&text).ok();
     match found.is_some_and(|found| same_scans(&found) == same_scans(config)) {
         true => Ok(true),
-        false => Err(SimulatorError::OtherRecording {
+        false => Err(SimulatorError::OtherDataset {
             folder: out.to_owned(),
         }),
     }
 }
 
-/// The configuration without what the content of a scan does not depend on.
+/// The configuration without the keys that do not change the content of a scan.
 fn same_scans(config: &SimulationConfig) -> SimulationConfig {
     let mut config = SimulationConfig {
         scans: 1,
@@ -117,7 +125,8 @@ fn same_scans(config: &SimulationConfig) -> SimulationConfig {
     config
 }
 
-/// Another build may render otherwise, and an image may have been changed.
+/// Checks an image against a newly rendered one: another build may render differently, and the file may
+/// have been changed.
 fn require_same(drive: &SimulatedDrive, index: usize, path: &Path) -> Result<(), SimulatorError> {
     let size = drive.image_size();
     let (mut pixels, mut encoded) = (vec![0; size.bytes()], Vec::new());

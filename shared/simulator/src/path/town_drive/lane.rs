@@ -1,50 +1,50 @@
-//! The lane that a route takes: beside the middle of its streets, round the corners at junctions.
+//! The lane along a route: beside the centre lines of its streets, with bends at junctions.
 
 use nalgebra::{Point2, Vector2};
 
 use super::plan::Plan;
 use crate::lanes::{DrivingSide, LANE_M};
 
-/// From a junction's middle to where bends begin, metres along the street.
+/// Distance from a junction's centre at which bends begin, metres along the street.
 const BEND_M: f64 = 11.0;
-/// From a junction's middle to where one waits at it, metres.
+/// Distance from a junction's centre at which vehicles wait, metres.
 const WAIT_M: f64 = 13.0;
-/// Metres between points of the lane.
+/// Distance between points of the lane, metres.
 const STEP_M: f64 = 1.0;
 
 /// A lane through a town.
 pub struct Lane {
     pub places: Vec<Point2<f64>>,
-    /// For each place the speed limit of its street, as a share of the highest.
+    /// The speed limit of each place's street, as a share of the highest.
     pub limits: Vec<f64>,
-    /// Places before junctions where one may have to wait, by their numbers.
+    /// Indices of the places before junctions where the vehicle may have to wait.
     pub waits: Vec<usize>,
 }
 
-/// The lane along a route.
-pub fn lane(plan: &Plan, route: &[usize], keep: DrivingSide) -> Lane {
+/// Builds the lane along a route.
+pub fn lane(plan: &Plan, route: &[usize], driving_side: DrivingSide) -> Lane {
     let mut lane = Lane {
         places: Vec::new(),
         limits: Vec::new(),
         waits: Vec::new(),
     };
     for leg in route.windows(3) {
-        let along = lane.street(plan, [leg[0], leg[1]], keep);
-        let (to, onward) = beside(plan, [leg[1], leg[2]], BEND_M, keep);
+        let along = lane.street(plan, [leg[0], leg[1]], driving_side);
+        let (to, onward) = beside(plan, [leg[1], leg[2]], BEND_M, driving_side);
         lane.bend(along, (to, onward), plan.limit(leg[0], leg[1]));
     }
     lane
 }
 
-/// The lane's place and direction so many metres along a street.
+/// The lane's place and direction at a distance along a street.
 fn beside(
     plan: &Plan,
     [from, to]: [usize; 2],
     along_m: f64,
-    keep: DrivingSide,
+    driving_side: DrivingSide,
 ) -> (Point2<f64>, Vector2<f64>) {
     let (middle, direction) = plan.street(from, to, along_m / plan.distance_m(from, to));
-    let left_m = match keep {
+    let left_m = match driving_side {
         DrivingSide::Left => LANE_M / 2.0,
         DrivingSide::Right => -LANE_M / 2.0,
     };
@@ -55,12 +55,12 @@ fn beside(
 }
 
 impl Lane {
-    /// Adds a street up to where the bend at its end begins; returns place and direction there.
+    /// Adds a street up to the bend at its end; returns place and direction there.
     fn street(
         &mut self,
         plan: &Plan,
         ends: [usize; 2],
-        keep: DrivingSide,
+        driving_side: DrivingSide,
     ) -> (Point2<f64>, Vector2<f64>) {
         let whole_m = plan.distance_m(ends[0], ends[1]);
         let steps = ((whole_m - 2.0 * BEND_M) / STEP_M) as usize;
@@ -71,14 +71,14 @@ impl Lane {
                 self.waits.push(self.places.len());
             }
             self.push(
-                beside(plan, ends, along_m, keep).0,
+                beside(plan, ends, along_m, driving_side).0,
                 plan.limit(ends[0], ends[1]),
             );
         }
-        beside(plan, ends, whole_m - BEND_M, keep)
+        beside(plan, ends, whole_m - BEND_M, driving_side)
     }
 
-    /// Adds a curve from one place and direction to another (a cubic of Bézier's).
+    /// Adds a curve from one place and direction to another (a cubic Bézier curve).
     fn bend(
         &mut self,
         from: (Point2<f64>, Vector2<f64>),
@@ -87,7 +87,7 @@ impl Lane {
     ) {
         let chord_m = (to.0 - from.0).norm();
         let turn = from.1.angle(&to.1);
-        // A circle's handles are 4/3 tan(turn/4) radii long, and its chord 2 sin(turn/2) radii.
+        // The handles of a circular arc are 4/3 tan(turn/4) radii long, its chord 2 sin(turn/2) radii.
         let handle_m = if turn < 0.05 {
             chord_m / 3.0
         } else {

@@ -5,22 +5,22 @@ use std::f64::consts::PI;
 use nalgebra::{Point2, Vector2};
 use rand::Rng;
 
-/// Metres between parallel streets.
+/// Distance between parallel streets, metres.
 const SPACING_M: std::ops::Range<f64> = 76.0..130.0;
-/// How far a junction may lie off its place on the grid, metres in x and y.
+/// Maximum offset of a junction from its place on the grid, metres in x and y.
 const JITTER_M: f64 = 6.0;
-/// How far a street may swerve from the straight line between its junctions, metres.
+/// Maximum offset of a street from the straight line between its junctions, metres.
 const SWERVE_M: f64 = 5.0;
-/// Share of the streets that are not built.
+/// Share of the streets that are left out.
 const MISSING: f64 = 0.15;
-/// Speed limits as shares of the highest: main roads, usual streets, narrow ones.
+/// Speed limits of main, ordinary and narrow streets, as shares of the highest.
 const LIMITS: [f64; 3] = [1.0, 0.8, 0.62];
 
 /// Junctions and the streets between them.
 #[derive(Debug)]
 pub struct Plan {
     pub junctions: Vec<Point2<f64>>,
-    /// For each junction where its streets lead, ascending.
+    /// The neighbours of each junction, ascending.
     pub neighbours: Vec<Vec<usize>>,
     columns: usize,
     swerves_m: Vec<[f64; 2]>,
@@ -28,7 +28,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// A town that is large enough for a drive of some length.
+    /// Draws a town that is large enough for a drive of `length_m`.
     pub fn new(length_m: f64, rng: &mut impl Rng) -> Self {
         let side = ((length_m / 250.0).sqrt().ceil() as usize).clamp(3, 60) + 2;
         let [xs, ys] = [0, 1].map(|_| grid_lines(side, rng));
@@ -57,20 +57,21 @@ impl Plan {
         let side = self.columns;
         for index in 0..side * side {
             let (column, row) = (index % side, index / side);
-            let ways = [
+            let directions = [
                 (row > 0, -(side as isize)),
                 (column > 0, -1),
                 (column + 1 < side, 1),
                 (row + 1 < side, side as isize),
             ];
-            let built = ways.into_iter().filter(|(there, _)| *there);
+            let built = directions.into_iter().filter(|(there, _)| *there);
             self.neighbours[index] = built
                 .map(|(_, step)| index.wrapping_add_signed(step))
                 .collect();
         }
     }
 
-    /// Takes out streets whose ends keep three others, so that no junction becomes a dead end or a mere bend.
+    /// Removes streets between junctions that keep three others, so that no junction becomes a dead end or
+    /// a bend.
     fn remove_some(&mut self, rng: &mut impl Rng) {
         for from in 0..self.junctions.len() {
             for to in self.neighbours[from].clone() {
@@ -84,18 +85,18 @@ impl Plan {
         }
     }
 
-    /// A point of the middle of the street between two junctions and its direction there; `share` is 0 at `from`, 1 at `to`.
+    /// Place and direction on the centre line between two junctions; `share` is 0 at `from`, 1 at `to`.
     pub fn street(&self, from: usize, to: usize, share: f64) -> (Point2<f64>, Vector2<f64>) {
         let (low, high) = (from.min(to), from.max(to));
         let swerve_m = self.swerves_m[low][usize::from(high - low == 1)];
-        let way = self.junctions[to] - self.junctions[from];
-        let side =
-            Vector2::new(-way.y, way.x).normalize() * if from < to { swerve_m } else { -swerve_m };
-        // A squared sine leaves both junctions along the straight line between them.
-        let place = self.junctions[from] + way * share + side * (PI * share).sin().powi(2);
+        let line = self.junctions[to] - self.junctions[from];
+        let side = Vector2::new(-line.y, line.x).normalize()
+            * if from < to { swerve_m } else { -swerve_m };
+        // A squared sine leaves both junctions in the direction of the straight line between them.
+        let place = self.junctions[from] + line * share + side * (PI * share).sin().powi(2);
         (
             place,
-            (way + side * (PI * (2.0 * PI * share).sin())).normalize(),
+            (line + side * (PI * (2.0 * PI * share).sin())).normalize(),
         )
     }
 
@@ -104,7 +105,7 @@ impl Plan {
         (self.junctions[to] - self.junctions[from]).norm()
     }
 
-    /// Speed limit between two junctions as a share of the highest one.
+    /// Speed limit between two junctions, as a share of the highest.
     pub fn limit(&self, from: usize, to: usize) -> f64 {
         let (low, high) = (from.min(to), from.max(to));
         if high - low == 1 {

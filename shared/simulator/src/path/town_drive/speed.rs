@@ -1,50 +1,51 @@
-//! How fast a lane is driven: limits, bends, braking, waiting, and no jerk.
+//! The speed along a lane: limits, bends, braking, waiting, limited jerk.
 
 use rand::Rng;
 
 use super::lane::Lane;
 use super::steered::SteeredLane;
 
-/// Speeding up and braking along the lane, metres a second squared: what drivers in towns do.
+/// Acceleration and braking along the lane, metres a second squared, as usual in towns.
 const SPEED_UP_MPS2: f64 = 1.4;
 const BRAKE_MPS2: f64 = 1.8;
-/// Share of the junctions at which one waits, and how long, seconds.
+/// Share of the junctions at which the vehicle waits, and duration, seconds.
 const WAITING: f64 = 0.3;
 const WAIT_S: std::ops::Range<f64> = 3.0..18.0;
-/// Standing before the start and after the end, seconds.
+/// Standstill before the start and after the end, seconds.
 const REST_S: f64 = 3.0;
-/// Metres between two nodes of the table of speeds.
+/// Distance between nodes of the table of speeds, metres.
 const STEP_M: f64 = 0.25;
-/// The distance driven is averaged over these spans, one after the other, seconds: acceleration changes that gradually.
+/// Windows of the moving averages that limit the jerk, applied one after the other, seconds.
 const GRADUAL_S: [f64; 2] = [0.9, 0.6];
-/// Twice the least mean speed between two nodes, metres a second.
+/// Twice the minimum mean speed between two nodes, metres a second.
 const CREEP_MPS: f64 = 0.1;
-/// Seconds between the instants that are averaged.
+/// Time between the values that are averaged, seconds.
 const FINE_S: f64 = 0.05;
 
-/// What limits the speed.
+/// The limits of the speed.
 pub struct Limits {
     /// Highest speed limit, metres a second.
     pub speed_mps: f64,
-    /// Sideways acceleration in bends, metres a second squared.
+    /// Lateral acceleration in bends, metres a second squared.
     pub lateral_mps2: f64,
 }
 
-/// Metres along the way every `step_s`, over `length_m` of it, standing at first and at last.
+/// Distance along the lane every `step_s`, metres, over `length_m`, with a standstill at both ends.
 pub fn progress(
-    way: &SteeredLane,
+    steered: &SteeredLane,
     lane: &Lane,
     limits: &Limits,
     length_m: f64,
     rng: &mut impl Rng,
     step_s: f64,
 ) -> Vec<f64> {
-    let count = (length_m.min(way.length_m) / STEP_M) as usize;
-    let per_place = way.length_m / (lane.places.len() - 1) as f64;
+    let count = (length_m.min(steered.length_m) / STEP_M) as usize;
+    let per_place = steered.length_m / (lane.places.len() - 1) as f64;
     let place =
         |node: usize| ((node as f64 * STEP_M / per_place) as usize).min(lane.places.len() - 1);
     let fastest = |node: usize| {
-        let bend = (limits.lateral_mps2 / curvature(way, node as f64 * STEP_M).max(1e-6)).sqrt();
+        let bend =
+            (limits.lateral_mps2 / curvature(steered, node as f64 * STEP_M).max(1e-6)).sqrt();
         bend.min(limits.speed_mps * lane.limits[place(node)])
     };
     let mut speeds: Vec<f64> = (0..=count).map(fastest).collect();
@@ -70,9 +71,9 @@ pub fn progress(
     )
 }
 
-fn curvature(way: &SteeredLane, along_m: f64) -> f64 {
+fn curvature(steered: &SteeredLane, along_m: f64) -> f64 {
     let heading = |at: f64| {
-        let [x, y] = way.curve.slope(at);
+        let [x, y] = steered.curve.slope(at);
         nalgebra::Vector2::new(x, y)
     };
     heading(along_m - 0.5).angle(&heading(along_m + 0.5))
@@ -87,7 +88,7 @@ fn brake_and_speed_up(speeds: &mut [f64]) {
     }
 }
 
-/// Metres along the way at even instants.
+/// Distance along the lane at even times, metres.
 fn timed(speeds: &[f64], waits_s: &[f64]) -> Vec<f64> {
     let mut along_m = Vec::new();
     let mut until_s = 0.0;
@@ -101,7 +102,7 @@ fn timed(speeds: &[f64], waits_s: &[f64]) -> Vec<f64> {
         let at_m = node as f64 * STEP_M;
         fill(at_m, until_s, at_m, until_s + waits_s[node]);
         until_s += waits_s[node];
-        // Where one stands at both ends, as where a wait meets the end of the drive, one creeps between.
+        // Between two nodes at standstill, as where a wait meets the end of the drive, the vehicle creeps.
         let takes_s = 2.0 * STEP_M / (pair[0] + pair[1]).max(CREEP_MPS);
         fill(at_m, until_s, at_m + STEP_M, until_s + takes_s);
         until_s += takes_s;
@@ -111,7 +112,7 @@ fn timed(speeds: &[f64], waits_s: &[f64]) -> Vec<f64> {
     along_m
 }
 
-/// Every `stride`-th value after averaging over [`GRADUAL_S`].
+/// Every `stride`-th value after the moving averages of [`GRADUAL_S`].
 fn gradual(along_m: &[f64], stride: usize) -> Vec<f64> {
     let mut values = along_m.to_vec();
     for span_s in GRADUAL_S {

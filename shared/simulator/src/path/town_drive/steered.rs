@@ -1,21 +1,21 @@
-//! A lane as it is driven, with wheels that turn gradually.
+//! A lane as a vehicle drives it, with gradual steering.
 
 use nalgebra::Point2;
 
 use super::lane::Lane;
 use crate::path::spline::{Sample, UniformSpline};
 
-/// The wheels are turned over so many metres: shorter wiggles of the lane are smoothed away.
+/// Cut-off wavelength of the smoothing, metres: vehicles steer over this distance.
 const STEER_M: f64 = 9.0;
 
-/// A lane as it is driven.
+/// A smoothed lane.
 pub struct SteeredLane {
-    /// The vehicle by metres along the lane.
+    /// Places by distance along the lane, metres.
     pub curve: UniformSpline<2>,
     pub length_m: f64,
 }
 
-/// Drives a lane with wheels that turn gradually.
+/// Smooths a lane.
 pub fn steered(lane: &Lane) -> SteeredLane {
     let mut length_m = 0.0;
     let mut before: Option<Point2<f64>> = None;

@@ -7,19 +7,19 @@ fn drives() -> impl Iterator<Item = (TownDrive, SplinePath)> {
         length_m: 4000.0,
         speed_mps: 13.9,
         lateral_acceleration_mps2: 2.2,
-        keep: DrivingSide::Left,
+        driving_side: DrivingSide::Left,
     };
     // Checchin et al., 2010: 1135 m of campus at 0 to 25 km/h.
     let campus = TownDrive {
         length_m: 1135.0,
         speed_mps: 25.0 / 3.6,
-        keep: DrivingSide::Right,
+        driving_side: DrivingSide::Right,
         ..city
     };
     (1..=6).flat_map(move |seed| [city, campus].map(|drive| (drive, drive.path(seed))))
 }
 
-/// Sizes of the values' n-th difference quotients.
+/// The n-th difference quotients of the values.
 fn derivative(
     values: &[nalgebra::Vector2<f64>],
     order: usize,
@@ -46,7 +46,7 @@ fn drives_have_their_length_and_start_at_the_origin() {
 }
 
 #[test]
-fn driver_keeps_to_the_limits_and_never_jerks() {
+fn speed_acceleration_and_jerk_are_limited() {
     for (wanted, drive) in drives() {
         let velocities: Vec<_> = (0..(drive.duration_s() * 20.0) as usize)
             .map(|i| drive.velocity(i as f64 * 0.05))
@@ -77,7 +77,7 @@ fn driver_keeps_to_the_limits_and_never_jerks() {
 }
 
 #[test]
-fn vehicle_looks_where_it_goes() {
+fn heading_is_the_direction_of_travel() {
     for (_, drive) in drives() {
         for i in 0..(drive.duration_s() * 10.0) as usize {
             let time = i as f64 * 0.1;
@@ -88,7 +88,7 @@ fn vehicle_looks_where_it_goes() {
 }
 
 #[test]
-fn streets_are_driven_again_in_both_directions_and_never_side_by_side() {
+fn streets_are_repeated_in_both_directions_and_never_side_by_side() {
     for (wanted, drive) in drives() {
         let poses: Vec<_> = (0..(drive.duration_s() * 2.0) as usize)
             .map(|i| drive.pose(i as f64 * 0.5))
@@ -114,10 +114,10 @@ fn streets_are_driven_again_in_both_directions_and_never_side_by_side() {
                 );
             }
         }
-        assert!(again > 20, "{wanted:?} drives nothing again");
+        assert!(again > 20, "{wanted:?} repeats no street");
         assert!(
             back > 10 || wanted.length_m < 2000.0,
-            "{wanted:?} drives nothing back"
+            "{wanted:?} drives no street in the opposite direction"
         );
     }
 }
@@ -125,7 +125,7 @@ fn streets_are_driven_again_in_both_directions_and_never_side_by_side() {
 #[test]
 fn streets_along_a_town_drive_are_those_of_its_plan() {
     for (wanted, drive) in drives() {
-        let streets = Streets::along(&drive, f64::INFINITY, wanted.keep, 1);
+        let streets = Streets::along(&drive, f64::INFINITY, wanted.driving_side, 1);
         let driven: f64 = streets
             .streets()
             .iter()
