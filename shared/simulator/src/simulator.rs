@@ -58,8 +58,8 @@ impl Simulator {
             duration_s if duration_s.is_finite() => [duration_s; 2],
             _ => [ENDLESS_S, (scans_s / ENDLESS_S).ceil() * ENDLESS_S],
         };
-        let keep = config.drive.keep;
-        let streets = Streets::along(path.as_ref(), streets_s, keep, config.seed);
+        let driving_side = config.drive.keep;
+        let streets = Streets::along(path.as_ref(), streets_s, driving_side, config.seed);
         Ok(Self {
             config: config.clone(),
             sampling,
@@ -69,7 +69,7 @@ impl Simulator {
                 path.clone(),
                 traffic_s,
                 &streets,
-                keep,
+                driving_side,
                 config.seed,
             ),
             path,

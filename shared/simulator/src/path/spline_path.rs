@@ -3,6 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use gyre_geometry::Pose;
+use gyre_radar::median;
 use nalgebra::Vector2;
 
 use super::continuous::Path;
@@ -104,7 +105,9 @@ fn hold_stands(samples: &mut [Sample<3>]) {
             first += 1;
             continue;
         }
-        let value = std::array::from_fn(|d| median(stand.iter().map(|s| s.value[d])));
+        let value = std::array::from_fn(|d| {
+            median(stand.iter().map(|s| s.value[d])).unwrap_or(origin.value[d])
+        });
         for sample in stand {
             *sample = Sample {
                 value,
@@ -114,10 +117,4 @@ fn hold_stands(samples: &mut [Sample<3>]) {
         }
         first += count;
     }
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut all: Vec<f64> = values.collect();
-    all.sort_by(f64::total_cmp);
-    all[all.len() / 2]
 }
