@@ -1,400 +1,381 @@
-//! Joint refinement of (x, y, yaw) against a local map of the last keyframes.
+//! Refinement of (x, y, yaw) by aligning sparse points with a local map of the last keyframes.
 //!
-//! A scan is a list of sparse points. The map is the mean of what the last keyframes saw, each drawn once from its own
-//! points at its own pose, blurred and saturated. The points are laid on the map by Levenberg-Marquardt, on a coarse map
-//! first and then on the fine one, while the sweep's distortion is undone with the very motion that is sought.
+//! The map is the mean of what the last keyframes saw, each drawn once from its own points at its own pose, blurred and
+//! saturated. A scan is aligned with it by Levenberg-Marquardt, first on a coarse map and then on the fine one, and is
+//! deskewed with the very motion that is sought.
 //!
-//! Nothing is believed blindly: a match that no vehicle could have driven, or that overlaps the map far less than usual,
-//! is tried again from another start, and given up for the motion before if that does not help.
+//! Reading order:
+//! - [`Refiner::refine`]: the method;
+//! - `points`: a scan's points, deskewed;
+//! - `local_map`, `map_level`: the keyframes, and the two rasters that points are aligned with;
+//! - `alignment`, `normal_equations`: Levenberg-Marquardt;
+//! - `tracker`: the last poses, what is predicted from them, and which poses a vehicle can have reached;
+//! - `uncertainty`: covariances.
 
+mod alignment;
 mod config;
-mod keyframes;
-mod level;
-mod memory;
-mod register;
-mod sweep;
+mod local_map;
+mod map_level;
+mod normal_equations;
+mod points;
+mod tracker;
+mod uncertainty;
 
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion};
-use nalgebra::{Matrix3, Vector3};
 
 pub use config::{RefinementConfig, RefinementKind};
-pub use keyframes::Keyframe;
-pub use memory::{Anchor, TrackerState};
+pub use local_map::Keyframe;
+pub use tracker::{Anchor, TrackerState};
 
 use crate::ConfigError;
-use keyframes::Keyframes;
-use register::{Match, register};
-use sweep::Placed;
+use alignment::{Alignment, align};
+use local_map::LocalMap;
+use points::DeskewedPoints;
 
-/// Most steps of a descent on the coarse map, and on the fine one.
-const COARSE_STEPS: usize = 10;
-const FINE_STEPS: usize = 6;
-/// On the coarse map one point in so many will do.
-const COARSE_POINTS: usize = 3;
-/// How often the points are placed anew, by the motion just found, and matched on the fine map.
+const COARSE_ITERATIONS: usize = 10;
+const FINE_ITERATIONS: usize = 6;
+/// On the coarse map every third point is enough.
+const COARSE_STRIDE: usize = 3;
+/// Times that the points are deskewed by the newest motion and aligned on the fine map.
 const FINE_ROUNDS: usize = 2;
-/// Starts nearer to each other than this share a valley: coarse cells, and rad.
-const SAME_VALLEY: (f64, f64) = (0.5, 0.035);
-/// A start's coarse overlap must be better by this factor than the prediction's to be preferred to it.
+/// Initial guesses closer to each other than this lie in one basin of attraction.
+const SAME_BASIN_COARSE_CELLS: f64 = 0.5;
+const SAME_BASIN_RAD: f64 = 0.035;
+/// A later guess is preferred to an earlier one if its coarse overlap is better by this factor.
 const CLEARLY_BETTER: f64 = 1.02;
-/// What has been doubted so many times in a row is how things are now.
-const MOST_DOUBTFUL: u32 = 2;
-/// By how much the covariance of a weak match is wider.
-const WEAK_SPREAD: f64 = 4.0;
-/// Turns of the prediction that are tried when nothing else fits, rad.
-const FAN: [f64; 4] = [-0.1, 0.1, -0.2, 0.2];
+/// After this many doubtful scans in a row a plausible match is accepted.
+const MAX_DOUBTFUL: u32 = 2;
+/// Factor on the covariance of a weak match.
+const WEAK_COVARIANCE_FACTOR: f64 = 4.0;
+/// Yaw offsets from the prediction, tried if no other initial guess gives a plausible match.
+const YAW_OFFSETS_RAD: [f64; 4] = [-0.1, 0.1, -0.2, 0.2];
 
-/// How a motion came about.
+/// The reliability of a refined motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
-    /// Refined.
+    /// Aligned with the map.
     Refined,
-    /// Refined, but with little to go by; kept out of the map.
+    /// Aligned, but doubtful; kept out of the map.
     Weak,
-    /// Nothing fitted: the motion before goes on.
+    /// No plausible match: the motion is predicted at constant velocity.
     Predicted,
 }
 
-/// What a match started from.
+/// The initial guess that an alignment started from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InitialGuess {
-    /// The motion before goes on.
+    /// Constant velocity.
     Prediction,
-    /// The search's motion.
+    /// The motion that the search found.
     Search,
-    /// The prediction turned to one side, tried when nothing else fitted.
+    /// The prediction with a yaw offset, tried if nothing else gave a plausible match.
     YawOffset,
 }
 
-/// The refined motion: pose of the later scan's frame in the earlier one's.
+/// A refined motion.
 #[derive(Debug, Clone, Copy)]
 pub struct Refined {
-    /// The motion, and its covariance of (x, y, yaw).
+    /// Pose of the later scan's frame in the earlier one's, with its covariance.
     pub motion: UncertainMotion,
     /// Mean of the map under the points, 0 to 1.
     pub overlap: f64,
-    /// The points' weight, as a share of what is usual.
+    /// Weight of the points as a share of its running mean; 1 if there is none yet.
     pub support: f64,
-    /// How it came about.
+    /// The reliability of the motion.
     pub outcome: Outcome,
-    /// What the accepted match started from; the prediction where there is none.
+    /// The initial guess of the accepted match; the prediction if there is none.
     pub guess: InitialGuess,
 }
 
-/// Refines motions scan by scan; remembers the last keyframes.
+/// Refines motions scan by scan against a map of the last keyframes.
+///
+/// Nothing is allocated after construction.
 #[derive(Debug)]
 pub struct Refiner {
     config: RefinementConfig,
-    keyframes: Keyframes,
-    memory: TrackerState,
-    placed: Placed,
+    map: LocalMap,
+    state: TrackerState,
+    points: DeskewedPoints,
 }
 
-/// A scan to be matched.
-#[derive(Clone, Copy)]
-struct Query<'a> {
+/// A scan to be aligned.
+struct Scan<'a> {
+    id: u64,
     points: &'a [SparsePoint],
-    /// Pose in the first scan's frame that the search's motion leads to.
+    /// Its pose in the map by the motion that the search found.
     searched: Pose,
+    /// Time since the scan before.
     interval_s: f64,
 }
 
-/// A match, what it started from, and what it is worth.
-#[derive(Clone, Copy)]
+/// An alignment and how well it fits.
 struct Candidate {
-    hypothesis: InitialGuess,
-    found: Match,
+    guess: InitialGuess,
+    alignment: Alignment,
     overlap: f64,
+    /// Sum of the points' weights, and the same as a share of its running mean.
+    weight: f64,
     support: f64,
-    /// Whether it can be, and fits well enough, to be believed.
-    believed: bool,
+    /// A vehicle can have driven there, and the scan overlaps the map about as much as the scans before.
+    is_plausible: bool,
 }
 
 impl Refiner {
     /// Plans the refinement of scans of at most `capacity` points.
     ///
     /// # Errors
-    /// The first key of `config` that no refinement can be built from.
+    /// The first key of `config` that is out of its bounds.
     pub fn new(config: &RefinementConfig, capacity: usize) -> Result<Self, ConfigError> {
         config.validate()?;
         Ok(Self {
-            keyframes: Keyframes::new(config),
+            map: LocalMap::new(config),
             config: config.clone(),
-            memory: TrackerState::default(),
-            placed: Placed::with_capacity(capacity),
+            state: TrackerState::default(),
+            points: DeskewedPoints::with_capacity(capacity),
         })
     }
 
-    /// Forgets all: a chain of motions starts with the next scan.
-    pub fn reset(&mut self) {
-        self.memory = TrackerState::default();
-        self.keyframes.clear();
-    }
-
-    /// What the next call depends on besides the keyframes.
-    pub fn state(&self) -> &TrackerState {
-        &self.memory
-    }
-
-    /// The keyframes of the map, oldest first.
-    pub fn keyframes(&self) -> impl Iterator<Item = &Keyframe> {
-        self.keyframes.iter()
-    }
-
-    /// Cells of a keyframe's images together.
-    pub fn keyframe_cells(&self) -> usize {
-        self.keyframes.cells()
-    }
-
-    /// Goes on where another one stood: `load` fills the next keyframe, oldest first, and says whether there was one.
-    pub fn restore(&mut self, memory: TrackerState, mut load: impl FnMut(&mut Keyframe) -> bool) {
-        self.keyframes.clear();
-        while self.keyframes.push(&mut load) {}
-        self.keyframes.stack();
-        self.memory = memory;
-    }
-
-    /// The motion from the `earlier` scan's points to the `later` one's, which are those of scan number `id`, starting from
-    /// what the search found. The earlier points are looked at where there is no map yet.
+    /// Refines the motion from the `earlier` scan to the `later` one, which has number `scan`.
+    ///
+    /// `searched` is the motion that the search found, `interval_s` the time between the stamps. The earlier points are
+    /// used only while the map is empty.
     pub fn refine(
         &mut self,
-        id: u64,
+        scan: u64,
         later: &[SparsePoint],
         earlier: &[SparsePoint],
         searched: &Pose,
         interval_s: f64,
     ) -> Refined {
-        // Stamps that stand still say nothing about velocities: as if a second had passed.
-        let interval_s = if interval_s > 0.0 { interval_s } else { 1.0 };
-        let query = Query {
+        let scan = Scan {
+            id: scan,
             points: later,
-            searched: self.memory.pose * searched,
-            interval_s,
+            searched: self.state.pose * searched,
+            // Stamps that do not advance give no velocity: a second is assumed.
+            interval_s: if interval_s > 0.0 { interval_s } else { 1.0 },
         };
-        if self.keyframes.is_empty() {
-            self.begin(id.wrapping_sub(1), earlier, &query);
+        if self.map.is_empty() {
+            self.start_map(&scan, earlier);
         }
-        let mut best = self.best_of(&query, &self.starts(&query));
-        if !best.believed {
-            let [prediction, _] = self.memory.foretell(interval_s);
-            let fan = FAN.map(|turn| (InitialGuess::YawOffset, prediction * Pose::rotation(turn)));
-            let other = self.best_of(&query, &fan);
-            if other.believed {
-                best = other;
+        let predicted = self.state.predict(scan.interval_s);
+        let mut best = self.align(&scan, &initial_guesses(predicted, scan.searched));
+        if !best.is_plausible {
+            let offset = self.align(&scan, &yaw_offsets(predicted[0]));
+            if offset.is_plausible {
+                best = offset;
             }
         }
-        self.conclude(id, &query, &best)
+        let (outcome, estimate) = self.accept_or_predict(&scan, &best);
+        let motion = self.state.pose.inv_mul(&estimate.motion);
+        self.update(&scan, &best, outcome, &estimate.motion);
+        Refined {
+            motion: UncertainMotion { motion, ..estimate },
+            overlap: best.overlap,
+            support: best.support,
+            guess: match outcome {
+                Outcome::Predicted => InitialGuess::Prediction,
+                Outcome::Refined | Outcome::Weak => best.guess,
+            },
+            outcome,
+        }
     }
 
-    /// Makes the earlier scan the first keyframe. Its sweep is undone with the motion to the later one: first the search's, then
-    /// the one that this leads to.
-    fn begin(&mut self, id: u64, earlier: &[SparsePoint], query: &Query<'_>) {
-        let pose = self.memory.pose;
-        let searched = self.memory.velocity_to(&query.searched, query.interval_s);
-        self.draw(id, earlier, &pose, &searched);
-        let found = self.best_of(query, &self.starts(query)).found.pose;
-        let found = self.memory.velocity_to(&found, query.interval_s);
-        self.keyframes.clear();
-        self.draw(id, earlier, &pose, &found);
+    /// Forgets the map and the tracker state: the next scan starts a new chain of motions.
+    pub fn reset(&mut self) {
+        self.state = TrackerState::default();
+        self.map.clear();
     }
 
-    /// Where to start from; the same place again counts once.
-    fn starts(&self, query: &Query<'_>) -> [(InitialGuess, Pose); 3] {
-        let [prediction, before] = self.memory.foretell(query.interval_s);
-        [
-            (InitialGuess::Prediction, prediction),
-            (InitialGuess::Search, query.searched),
-            (InitialGuess::Prediction, before),
-        ]
+    /// Restores an earlier state. `load` fills in the next keyframe, oldest first, and returns whether there was one.
+    pub fn restore(&mut self, state: TrackerState, load: impl FnMut(&mut Keyframe) -> bool) {
+        self.map.restore(load);
+        self.state = state;
     }
 
-    /// Descends from each start on the coarse map, and from the best of them on the fine one.
-    fn best_of(&mut self, query: &Query<'_>, starts: &[(InitialGuess, Pose)]) -> Candidate {
-        let coarse = self.keyframes.coarse();
-        let mut best: Option<(InitialGuess, Match, bool)> = None;
-        for (k, (hypothesis, start)) in starts.iter().enumerate() {
-            if starts[..k]
+    /// Returns the state that the next motion depends on, apart from the keyframes.
+    pub fn state(&self) -> &TrackerState {
+        &self.state
+    }
+
+    /// Returns the keyframes of the map, oldest first.
+    pub fn keyframes(&self) -> impl Iterator<Item = &Keyframe> {
+        self.map.keyframes()
+    }
+
+    /// Returns the number of cells of both images of a keyframe.
+    pub fn keyframe_cells(&self) -> usize {
+        self.map.keyframe_cells()
+    }
+
+    /// Makes the earlier scan the first keyframe, deskewed with the motion to the later scan: first with the searched
+    /// motion, then with the one that aligning the later scan gives.
+    fn start_map(&mut self, scan: &Scan<'_>, earlier: &[SparsePoint]) {
+        let (id, pose) = (scan.id.wrapping_sub(1), self.state.pose);
+        let twist = self.state.twist_to(&scan.searched, scan.interval_s);
+        self.insert_keyframe(id, earlier, &pose, &twist);
+        let guesses = initial_guesses(self.state.predict(scan.interval_s), scan.searched);
+        let aligned = self.align(scan, &guesses).alignment.pose;
+        let twist = self.state.twist_to(&aligned, scan.interval_s);
+        self.map.clear();
+        self.insert_keyframe(id, earlier, &pose, &twist);
+    }
+
+    /// Aligns the scan from each initial guess on the coarse map, and from the best of them on the fine map.
+    fn align(&mut self, scan: &Scan<'_>, guesses: &[(InitialGuess, Pose)]) -> Candidate {
+        let (guess, coarse) = self.align_coarse(scan, guesses);
+        let alignment = self.align_fine(scan, coarse);
+        self.assess(scan, guess, alignment)
+    }
+
+    fn align_coarse(
+        &mut self,
+        scan: &Scan<'_>,
+        guesses: &[(InitialGuess, Pose)],
+    ) -> (InitialGuess, Pose) {
+        let mut best: Option<(InitialGuess, Alignment, bool)> = None;
+        for (k, (guess, initial)) in guesses.iter().enumerate() {
+            if guesses[..k]
                 .iter()
-                .any(|(_, other)| self.in_one_valley(start, other))
+                .any(|(_, other)| self.in_same_basin(initial, other))
             {
                 continue;
             }
-            // By the start's own motion: in a sweep of a second, that of the scan before is ten degrees off where a turn begins.
-            self.placed.place(
-                query.points,
-                &self.memory.velocity_to(start, query.interval_s),
-            );
-            self.placed.thin(COARSE_POINTS);
-            let found = register(&coarse, &self.placed, start, COARSE_STEPS);
-            let allowed = self
-                .memory
-                .allows(&found.pose, query.interval_s, 1.0, &self.config);
-            let better = best.is_none_or(|(_, best, best_allowed)| match (allowed, best_allowed) {
-                (true, true) | (false, false) => {
+            // Each guess deskews with its own motion: at a second a turn, the motion before is ten degrees off where a
+            // bend begins.
+            self.deskew(scan, initial);
+            self.points.thin(COARSE_STRIDE);
+            let found = align(&self.map.coarse(), &self.points, initial, COARSE_ITERATIONS);
+            let reachable = self.is_reachable(scan, &found.pose, 1.0);
+            let is_better = best.as_ref().is_none_or(|(_, best, best_reachable)| {
+                if reachable == *best_reachable {
                     found.normal.overlap > CLEARLY_BETTER * best.normal.overlap
+                } else {
+                    reachable
                 }
-                (allowed, _) => allowed,
             });
-            if better {
-                best = Some((*hypothesis, found, allowed));
+            if is_better {
+                best = Some((*guess, found, reachable));
             }
         }
-        let (hypothesis, pose) = best
-            .map_or((InitialGuess::Prediction, self.memory.pose), |(h, m, _)| {
-                (h, m.pose)
-            });
-        let found = self.fine(query, pose);
-        self.judge(query, hypothesis, found)
+        best.map_or(
+            (InitialGuess::Prediction, self.state.pose),
+            |(guess, found, _)| (guess, found.pose),
+        )
     }
 
-    fn in_one_valley(&self, a: &Pose, b: &Pose) -> bool {
+    fn in_same_basin(&self, a: &Pose, b: &Pose) -> bool {
         let apart = a.inv_mul(b);
         let cell_m = self.config.cell_m * self.config.coarse;
-        apart.translation.vector.norm() <= SAME_VALLEY.0 * cell_m
-            && apart.rotation.angle().abs() <= SAME_VALLEY.1
+        apart.translation.vector.norm() <= SAME_BASIN_COARSE_CELLS * cell_m
+            && apart.rotation.angle().abs() <= SAME_BASIN_RAD
     }
 
-    /// Matches on the fine map, the sweep undone by the motion found so far.
-    fn fine(&mut self, query: &Query<'_>, mut pose: Pose) -> Match {
-        let fine = self.keyframes.fine();
-        let mut round = |pose: &Pose| {
-            self.placed.place(
-                query.points,
-                &self.memory.velocity_to(pose, query.interval_s),
-            );
-            register(&fine, &self.placed, pose, FINE_STEPS)
-        };
+    fn align_fine(&mut self, scan: &Scan<'_>, coarse: Pose) -> Alignment {
+        let mut pose = coarse;
         for _ in 1..FINE_ROUNDS {
-            pose = round(&pose).pose;
+            pose = self.align_fine_once(scan, &pose).pose;
         }
-        round(&pose)
+        self.align_fine_once(scan, &pose)
     }
 
-    fn judge(&self, query: &Query<'_>, hypothesis: InitialGuess, found: Match) -> Candidate {
-        let weight = self.placed.total_weight();
+    fn align_fine_once(&mut self, scan: &Scan<'_>, pose: &Pose) -> Alignment {
+        self.deskew(scan, pose);
+        align(&self.map.fine(), &self.points, pose, FINE_ITERATIONS)
+    }
+
+    /// Deskews the scan with the motion that leads to `pose`.
+    fn deskew(&mut self, scan: &Scan<'_>, pose: &Pose) {
+        let twist = self.state.twist_to(pose, scan.interval_s);
+        self.points.deskew(scan.points, &twist);
+    }
+
+    fn assess(&self, scan: &Scan<'_>, guess: InitialGuess, alignment: Alignment) -> Candidate {
+        let weight = self.points.total_weight();
         let overlap = if weight > 0.0 {
-            found.normal.overlap / weight
+            alignment.normal.overlap / weight
         } else {
             0.0
         };
-        let support = if self.memory.mean_weight > 0.0 {
-            weight / self.memory.mean_weight
+        let support = if self.state.mean_weight > 0.0 {
+            weight / self.state.mean_weight
         } else {
             1.0
         };
-        let fits = overlap > 0.0 && overlap >= self.config.min_overlap * self.memory.mean_overlap;
-        let allowed = self.memory.allows(
-            &found.pose,
-            query.interval_s,
-            support.min(1.0),
-            &self.config,
-        );
+        let fits = overlap > 0.0 && overlap >= self.config.min_overlap * self.state.mean_overlap;
         Candidate {
-            hypothesis,
-            found,
+            is_plausible: fits && self.is_reachable(scan, &alignment.pose, support.min(1.0)),
+            guess,
+            alignment,
             overlap,
+            weight,
             support,
-            believed: fits && allowed,
         }
     }
 
-    /// Takes the candidate, or the prediction where it is not believed, and remembers.
-    fn conclude(&mut self, id: u64, query: &Query<'_>, candidate: &Candidate) -> Refined {
-        let Candidate {
-            hypothesis,
-            found,
-            overlap,
-            support,
-            believed,
-        } = *candidate;
-        let weight = self.placed.total_weight();
-        let before = self.memory.pose;
-        let (outcome, pose, covariance) = match self.covariance(&found, weight) {
-            Some(covariance) if believed => match self.outcome(query, candidate) {
-                Outcome::Weak => (Outcome::Weak, found.pose, covariance * WEAK_SPREAD),
-                firm => (firm, found.pose, covariance),
-            },
-            _ => {
-                let [prediction, _] = self.memory.foretell(query.interval_s);
-                (
-                    Outcome::Predicted,
-                    prediction,
-                    memory::unmatched_covariance(query.interval_s, &self.config),
-                )
-            }
+    fn is_reachable(&self, scan: &Scan<'_>, pose: &Pose, jitter_share: f64) -> bool {
+        self.state
+            .can_reach(pose, scan.interval_s, jitter_share, &self.config)
+    }
+
+    /// Returns the pose of a plausible match and the covariance of its motion, or the predicted ones.
+    fn accept_or_predict(&self, scan: &Scan<'_>, best: &Candidate) -> (Outcome, UncertainMotion) {
+        let pose = &self.state.pose;
+        let covariance =
+            uncertainty::of_alignment(&best.alignment, &self.points, pose, &self.config);
+        let Some(covariance) = covariance.filter(|_| best.is_plausible) else {
+            let [motion, _] = self.state.predict(scan.interval_s);
+            let covariance = uncertainty::of_prediction(scan.interval_s, &self.config);
+            return (Outcome::Predicted, UncertainMotion { motion, covariance });
         };
-        let hypothesis = if outcome == Outcome::Predicted {
-            InitialGuess::Prediction
+        let motion = best.alignment.pose;
+        if self.is_firm(scan, best) || self.state.doubtful >= MAX_DOUBTFUL {
+            (Outcome::Refined, UncertainMotion { motion, covariance })
         } else {
-            hypothesis
-        };
-        let velocity = self.memory.velocity_to(&pose, query.interval_s);
-        self.memory.go_on(
-            pose,
-            outcome,
-            [overlap, weight],
-            query.interval_s,
-            &self.config,
-        );
-        if self.memory.unmatched >= self.config.max_unmatched {
-            // The next scan is compared with this one alone, and the one after that with the next, until two are alike.
-            self.keyframes.clear();
-        } else if outcome == Outcome::Refined && self.keyframes.is_far(&pose, &self.config) {
-            self.draw(id, query.points, &pose, &velocity);
-        }
-        Refined {
-            motion: UncertainMotion {
-                motion: before.inv_mul(&pose),
-                covariance,
-            },
-            overlap,
-            support,
-            outcome,
-            guess: hypothesis,
+            let covariance = covariance * WEAK_COVARIANCE_FACTOR;
+            (Outcome::Weak, UncertainMotion { motion, covariance })
         }
     }
 
-    /// Whether a match that is believed may be built upon.
-    fn outcome(&self, query: &Query<'_>, candidate: &Candidate) -> Outcome {
+    /// Whether the scan overlaps the map well, has enough points, and agrees with the search.
+    fn is_firm(&self, scan: &Scan<'_>, best: &Candidate) -> bool {
         let config = &self.config;
-        let apart = query.searched.inv_mul(&candidate.found.pose);
-        let agrees = apart.translation.vector.norm() <= config.search_agrees_m
-            && apart.rotation.angle().abs() <= config.search_agrees_deg.to_radians();
-        let fits = candidate.overlap >= config.firm_overlap * self.memory.mean_overlap;
-        let firm = fits && agrees && candidate.support >= config.min_support;
-        let firm = firm || self.memory.doubtful >= MOST_DOUBTFUL;
-        if firm {
-            Outcome::Refined
-        } else {
-            Outcome::Weak
+        let apart = scan.searched.inv_mul(&best.alignment.pose);
+        best.overlap >= config.firm_overlap * self.state.mean_overlap
+            && best.support >= config.min_support
+            && apart.translation.vector.norm() <= config.search_agrees_m
+            && apart.rotation.angle().abs() <= config.search_agrees_deg.to_radians()
+    }
+
+    /// Updates the tracker state and the map with the accepted or predicted pose.
+    fn update(&mut self, scan: &Scan<'_>, best: &Candidate, outcome: Outcome, pose: &Pose) {
+        let (config, fit) = (&self.config, [best.overlap, best.weight]);
+        let twist = self.state.twist_to(pose, scan.interval_s);
+        self.state
+            .update(*pose, outcome, fit, scan.interval_s, config);
+        if self.state.unmatched >= config.max_unmatched {
+            // A new map starts with this scan at the next call, and so on until two scans match.
+            self.map.clear();
+        } else if outcome == Outcome::Refined && self.map.needs_keyframe(pose, config) {
+            self.insert_keyframe(scan.id, scan.points, pose, &twist);
         }
     }
 
-    /// Of the motion, from the information matrix at the match; `None` where the points do not fix it.
-    fn covariance(&self, found: &Match, weight: f64) -> Option<Matrix3<f64>> {
-        let inverse = found.normal.information.try_inverse()?;
-        let mean_squared_residual = found.normal.cost / weight;
-        // From the world's axes into those of the frame before.
-        let turn = self
-            .memory
-            .pose
-            .rotation
-            .inverse()
-            .to_rotation_matrix()
-            .to_homogeneous();
-        // If each point weighed half as much, as under a mask, the information would be half of what it was, and the match the same.
-        let scale = self.config.variance_scale * self.placed.mean_weight() * mean_squared_residual;
-        let shape = turn * inverse * turn.transpose() * scale;
-        let yaw = self.config.yaw_sigma_deg.to_radians().powi(2);
-        let covariance = shape + Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, yaw));
-        covariance
-            .iter()
-            .all(|v| v.is_finite())
-            .then_some(covariance)
+    fn insert_keyframe(&mut self, id: u64, points: &[SparsePoint], pose: &Pose, twist: &Twist) {
+        self.points.deskew(points, twist);
+        self.map.insert(id, &self.points, pose);
     }
+}
 
-    fn draw(&mut self, id: u64, points: &[SparsePoint], pose: &Pose, velocity: &Twist) {
-        self.placed.place(points, velocity);
-        self.keyframes.draw(id, &self.placed, pose);
-    }
+/// The prediction, the search's motion, and the prediction from the scan before in case the last match was wrong.
+fn initial_guesses(predicted: [Pose; 2], searched: Pose) -> [(InitialGuess, Pose); 3] {
+    let [from_last, from_second_last] = predicted;
+    [
+        (InitialGuess::Prediction, from_last),
+        (InitialGuess::Search, searched),
+        (InitialGuess::Prediction, from_second_last),
+    ]
+}
+
+fn yaw_offsets(predicted: Pose) -> [(InitialGuess, Pose); 4] {
+    YAW_OFFSETS_RAD.map(|offset| (InitialGuess::YawOffset, predicted * Pose::rotation(offset)))
 }

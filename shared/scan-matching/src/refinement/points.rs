@@ -1,17 +1,17 @@
-//! A scan's points, put where they were in the middle of its sweep.
+//! Deskewing: a scan's points in the sensor's frame at the scan's stamp.
 
 use gyre_geometry::{SparsePoint, Twist};
 use gyre_simd::simd;
 
-/// Points in the frame of the sweep's middle, as three columns.
+/// The points of a scan in the sensor's frame at its stamp, as three columns.
 #[derive(Debug, Default)]
-pub(super) struct Placed {
+pub(super) struct DeskewedPoints {
     pub x_m: Vec<f32>,
     pub y_m: Vec<f32>,
     pub weight: Vec<f32>,
 }
 
-impl Placed {
+impl DeskewedPoints {
     pub fn with_capacity(points: usize) -> Self {
         let column = || Vec::with_capacity(points);
         Self {
@@ -21,13 +21,13 @@ impl Placed {
         }
     }
 
-    /// Undoes the sweep's distortion by a constant velocity of the sensor.
-    pub fn place(&mut self, points: &[SparsePoint], twist: &Twist) {
+    /// Moves each point from the sensor's frame at the point's time to that at the stamp, at constant velocity.
+    pub fn deskew(&mut self, points: &[SparsePoint], twist: &Twist) {
         for column in [&mut self.x_m, &mut self.y_m, &mut self.weight] {
             column.clear();
             column.resize(points.len(), 0.0);
         }
-        place(
+        deskew(
             points,
             [twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps].map(|v| v as f32),
             &mut self.x_m,
@@ -36,11 +36,11 @@ impl Placed {
         );
     }
 
-    /// Leaves only one point in `step`.
-    pub fn thin(&mut self, step: usize) {
+    /// Keeps every `stride`-th point.
+    pub fn thin(&mut self, stride: usize) {
         for column in [&mut self.x_m, &mut self.y_m, &mut self.weight] {
-            let count = column.len().div_ceil(step);
-            (0..count).for_each(|k| column[k] = column[k * step]);
+            let count = column.len().div_ceil(stride);
+            (0..count).for_each(|k| column[k] = column[k * stride]);
             column.truncate(count);
         }
     }
@@ -49,7 +49,7 @@ impl Placed {
         self.weight.iter().map(|w| f64::from(*w)).sum()
     }
 
-    /// Of the weights, each counted as often as it weighs.
+    /// The mean of the weights, weighted by themselves.
     pub fn mean_weight(&self) -> f64 {
         self.weight
             .iter()
@@ -59,9 +59,10 @@ impl Placed {
     }
 }
 
-/// The sensor's pose at time t on its arc is the chord (v t), turned by half the angle, and the turn by the whole angle.
+/// The sensor's pose at time t: the chord v t turned by half the angle, and the whole angle
+/// ([`Twist::chord_pose_at`]).
 #[simd]
-fn place(
+fn deskew(
     points: &[SparsePoint],
     [vx, vy, rate]: [f32; 3],
     x_m: &mut [f32],
@@ -77,7 +78,7 @@ fn place(
             weight: w,
             doppler_s: doppler,
         } = *point;
-        // Range shift by Doppler along the line of sight u: r + doppler (u . v); x + (u . v) u doppler.
+        // The Doppler shift along the line of sight u: r + doppler (u . v), so x + doppler (u . v) u.
         let toward = doppler * (x * vx + y * vy) / (x * x + y * y).max(1e-6);
         let (x, y) = (x + toward * x, y + toward * y);
         let (sin, cos) = sin_cos(rate * t);
@@ -85,12 +86,12 @@ fn place(
         let (ahead, aside) = (vx * t, vy * t);
         *x_m = half_cos * ahead - half_sin * aside + cos * x - sin * y;
         *y_m = half_sin * ahead + half_cos * aside + sin * x + cos * y;
-        // What is no number counts nothing.
+        // A weight that is NaN counts as 0.
         *weight = if w > 0.0 { w.min(1.0) } else { 0.0 };
     }
 }
 
-/// Sine and cosine by their series: to 2e-6 within half a radian, which a vehicle turns in no sweep.
+/// Sine and cosine by their series, to 2e-6 within half a radian: no vehicle turns more in a sweep.
 #[inline(always)]
 fn sin_cos(a: f32) -> (f32, f32) {
     let s = a * a;
@@ -115,26 +116,15 @@ mod tests {
         }
     }
 
-    fn point(values: [f64; 5]) -> SparsePoint {
-        let [x_m, y_m, time_s, weight, doppler_s] = values.map(|v| v as f32);
-        SparsePoint {
-            x_m,
-            y_m,
-            time_s,
-            weight,
-            doppler_s,
-        }
-    }
-
     proptest! {
         #[test]
         fn a_point_lies_where_the_sensor_on_its_arc_saw_it(
             v in prop::array::uniform2(-20.0_f64..20.0), rate in -2.0_f64..2.0, t in -0.125_f64..0.125,
             at in prop::array::uniform2(-90.0_f64..90.0),
         ) {
-            let mut placed = Placed::default();
-            placed.place(&[point([at[0], at[1], t, 0.5, 0.0])], &twist(v[0], v[1], rate));
-            // The arc in a thousand straight steps, each taken along the heading in its middle.
+            let mut points = DeskewedPoints::default();
+            points.deskew(&[[at[0] as f32, at[1] as f32, t as f32, 0.5, 0.0].into()], &twist(v[0], v[1], rate));
+            // The arc in a thousand straight steps, each along the heading in its middle.
             let (steps, mut pose) = (1000, Isometry2::identity());
             let dt = t / f64::from(steps);
             for _ in 0..steps {
@@ -144,22 +134,22 @@ mod tests {
             let expected = pose * Point2::new(at[0], at[1]);
             // The chord is taken as long as the arc: off by the turn squared over 24.
             let slack = 1e-3 + (v[0].hypot(v[1]) * t.abs()) * (rate * t).powi(2) / 20.0;
-            prop_assert!((f64::from(placed.x_m[0]) - expected.x).abs() < slack);
-            prop_assert!((f64::from(placed.y_m[0]) - expected.y).abs() < slack);
+            prop_assert!((f64::from(points.x_m[0]) - expected.x).abs() < slack);
+            prop_assert!((f64::from(points.y_m[0]) - expected.y).abs() < slack);
         }
     }
 
     #[test]
-    fn what_comes_nearer_was_seen_too_near() {
-        let mut placed = Placed::default();
+    fn doppler_shifts_are_added_to_the_ranges_of_approaching_points() {
+        let mut points = DeskewedPoints::default();
         let ahead_and_aside = [
             [30.0, 0.0, 0.0, 1.0, 0.05],
             [0.0, 30.0, 0.0, 1.0, 0.05],
             [-30.0, 0.0, 0.0, 1.0, 0.05],
         ]
-        .map(point);
-        placed.place(&ahead_and_aside, &twist(10.0, 0.0, 0.0));
-        assert_eq!(placed.x_m, [30.5, 0.0, -29.5]);
-        assert_eq!(placed.y_m, [0.0, 30.0, 0.0]);
+        .map(SparsePoint::from);
+        points.deskew(&ahead_and_aside, &twist(10.0, 0.0, 0.0));
+        assert_eq!(points.x_m, [30.5, 0.0, -29.5]);
+        assert_eq!(points.y_m, [0.0, 30.0, 0.0]);
     }
 }

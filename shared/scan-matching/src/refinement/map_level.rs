@@ -1,29 +1,29 @@
-//! One level of the local map: keyframes' images on the world's grid, and their mean.
+//! One level of the local map: the keyframes' images on the grid of the map, and their sum.
 //!
-//! A keyframe is drawn once, from its own points at its own pose, and never resampled: what is resampled again and again
-//! smears, and a map that smears along the way driven pulls the next scan after it.
+//! A keyframe is drawn once, from its own points at its own pose, and never resampled: repeated resampling blurs the map
+//! along the path, and a blurred map pulls the next scan with it.
 
 use gyre_geometry::Pose;
 use gyre_simd::simd;
 use nalgebra::Point2;
 use ndarray::{ArrayView2, ArrayViewMut2};
 
-use super::sweep::Placed;
+use super::points::DeskewedPoints;
 
-/// A Gaussian of one cell, at 0 to 3 cells.
+/// Weights of a Gaussian blur with a standard deviation of one cell, at distances of 0 to 3 cells.
 const BLUR: [f32; 4] = [0.399_050_3, 0.242_036_2, 0.054_005_58, 0.004_433_048];
 const BLUR_REACH: usize = 3;
-/// A cell that a keyframe is sure of.
+/// The value of a fully occupied cell.
 pub(super) const FULL: f32 = 255.0;
 
-/// What one keyframe saw, on a square of the world's grid: 0 where nothing, up to 255.
+/// The image of one keyframe, on a square of the map's grid: 0 for an empty cell, up to 255.
 #[derive(Debug, Clone)]
 pub(super) struct Image {
-    /// The world's cell (x, y) at the image's first value.
+    /// The map's cell (x, y) that the first value belongs to.
     pub corner: [i64; 2],
     /// Cells a side.
     n: usize,
-    /// Rows of equal x, growing with x; within a row growing with y.
+    /// Row after row. Rows are of equal x, which grows with the row; y grows within a row.
     pub cells: Vec<u8>,
 }
 
@@ -41,9 +41,9 @@ impl Image {
 
 const SQUARE: &str = "an image has n x n cells";
 
-/// The mean of the keyframes' images.
+/// The sum of the keyframes' images.
 #[derive(Debug)]
-pub(super) struct Level {
+pub(super) struct MapLevel {
     /// Metres a cell.
     pub cell_m: f64,
     /// Cells a side.
@@ -56,20 +56,20 @@ pub(super) struct Level {
     blurred: Vec<f32>,
 }
 
-/// Where a pose lies on a level, and the level's values.
-pub(super) struct Lookup<'a> {
-    /// Sums of values; divide by `full`.
+/// A level as alignments read it.
+pub(super) struct MapView<'a> {
+    /// Sums of the images, row after row; divided by `full` they are shares from 0 to 1.
     pub sum: &'a [u16],
     pub n: usize,
-    /// What a cell that all keyframes are sure of has.
+    /// The sum in a cell that is fully occupied in all keyframes.
     pub full: f32,
     /// Cells a metre.
     pub per_m: f32,
-    /// World coordinates of cell (0, 0)'s place in the array, m.
+    /// Map coordinates (x, y) of cell (0, 0), m.
     pub origin: [f64; 2],
 }
 
-impl Level {
+impl MapLevel {
     pub fn new(cell_m: f64, reach_m: f64) -> Self {
         let n = 2 * (reach_m / cell_m).ceil() as usize + 1;
         let cells = || vec![0.0; n * n];
@@ -94,9 +94,9 @@ impl Level {
 
     /// Draws a keyframe: splats, blurs, and saturates.
     ///
-    /// The saturation m / (m + mean) lets a cell say at most "something is here": without it bright clutter, and what moves
-    /// along with the vehicle, outweighs the thousand faint returns that hold the motion.
-    pub fn draw(&mut self, points: &Placed, pose: &Pose, image: &mut Image) {
+    /// The saturation m / (m + mean) bounds the weight of a cell: without it bright clutter, and what moves with the
+    /// vehicle, outweighs the many faint returns that determine the motion.
+    pub fn draw(&mut self, points: &DeskewedPoints, pose: &Pose, image: &mut Image) {
         let half = (self.n / 2) as i64;
         image.corner = [pose.translation.x, pose.translation.y]
             .map(|v| (v / self.cell_m).floor() as i64 - half);
@@ -108,7 +108,7 @@ impl Level {
         saturate(&self.drawing, mean as f32, &mut image.cells);
     }
 
-    fn splat(&mut self, points: &Placed, pose: &Pose, corner: [i64; 2]) {
+    fn splat(&mut self, points: &DeskewedPoints, pose: &Pose, corner: [i64; 2]) {
         self.drawing.fill(0.0);
         let (n, per_m) = (self.n, 1.0 / self.cell_m);
         let inside = BLUR_REACH as f64..(n - BLUR_REACH - 2) as f64;
@@ -131,8 +131,8 @@ impl Level {
         }
     }
 
-    /// Makes this the map of these images, about the last of them. Sums of whole numbers: exact in any order.
-    pub fn stack<'a>(&mut self, images: impl Iterator<Item = &'a Image> + Clone) {
+    /// Sums these images on the square of the last one. The sums are of integers, so exact in any order.
+    pub fn sum_images<'a>(&mut self, images: impl Iterator<Item = &'a Image> + Clone) {
         self.sum.fill(0);
         self.images = 0;
         let Some(newest) = images.clone().last() else {
@@ -159,8 +159,8 @@ impl Level {
         }
     }
 
-    pub fn lookup(&self) -> Lookup<'_> {
-        Lookup {
+    pub fn view(&self) -> MapView<'_> {
+        MapView {
             sum: &self.sum,
             n: self.n,
             full: FULL * self.images.max(1) as f32,
@@ -170,7 +170,7 @@ impl Level {
     }
 }
 
-/// One pass of the blur along an axis. What lies within the blur's reach of the array's ends stays zero; the caller draws
+/// One pass of the blur along an axis. Cells within the blur's reach of the array's ends stay zero; the caller draws
 /// nothing there.
 #[simd]
 fn blur(from: &[f32], to: &mut [f32], stride: usize) {
@@ -207,7 +207,7 @@ fn moments(values: &[f32]) -> (f64, f64) {
     )
 }
 
-/// Most cells saw nothing; sixteen of them at once are passed over.
+/// Saturates the cells. Most are empty, so they are skipped sixteen at a time.
 #[simd]
 fn saturate(values: &[f32], mean: f32, cells: &mut [u8]) {
     for (cells, values) in cells.chunks_mut(16).zip(values.chunks(16)) {
@@ -216,13 +216,13 @@ fn saturate(values: &[f32], mean: f32, cells: &mut [u8]) {
             continue;
         }
         for (cell, value) in cells.iter_mut().zip(values) {
-            // By way of i32: the shorter way is not vectorised.
+            // By way of i32: the direct conversion is not vectorised.
             *cell = (FULL * value / (value + mean) + 0.5) as i32 as u8;
         }
     }
 }
 
-/// At most 64 images of at most 255: no sum is too large.
+/// Adds an image to the sum. At most 64 images of at most 255 do not overflow.
 #[simd]
 fn add(cells: &[u8], sum: &mut [u16]) {
     sum.iter_mut()
@@ -236,23 +236,23 @@ mod tests {
 
     use super::*;
 
-    fn points(places: &[[f32; 2]]) -> Placed {
-        Placed {
+    fn points(places: &[[f32; 2]]) -> DeskewedPoints {
+        DeskewedPoints {
             x_m: places.iter().map(|p| p[0]).collect(),
             y_m: places.iter().map(|p| p[1]).collect(),
             weight: vec![1.0; places.len()],
         }
     }
 
-    fn brightest(level: &Level) -> [f64; 2] {
-        let lookup = level.lookup();
-        let brightest = (0..lookup.sum.len())
-            .max_by_key(|k| (lookup.sum[*k], std::cmp::Reverse(*k)))
+    fn brightest(level: &MapLevel) -> [f64; 2] {
+        let view = level.view();
+        let brightest = (0..view.sum.len())
+            .max_by_key(|k| (view.sum[*k], std::cmp::Reverse(*k)))
             .unwrap_or(0);
         [brightest / level.n, brightest % level.n]
             .map(|k| k as f64 * level.cell_m)
             .into_iter()
-            .zip(lookup.origin)
+            .zip(view.origin)
             .map(|(at, origin)| at + origin)
             .collect::<Vec<_>>()
             .try_into()
@@ -260,8 +260,8 @@ mod tests {
     }
 
     #[test]
-    fn the_same_place_seen_from_two_poses_falls_into_one_cell() {
-        let mut level = Level::new(0.5, 20.0);
+    fn one_place_seen_from_two_poses_falls_into_one_cell() {
+        let mut level = MapLevel::new(0.5, 20.0);
         let (mut first, mut second) = (level.new_image(), level.new_image());
         level.draw(&points(&[[6.0, 2.0]]), &Pose::identity(), &mut first);
         let pose = pose(3.0, 1.0, std::f64::consts::FRAC_PI_2);
@@ -271,18 +271,18 @@ mod tests {
             &pose,
             &mut second,
         );
-        level.stack([&first, &second].into_iter());
+        level.sum_images([&first, &second].into_iter());
         assert_eq!(brightest(&level), [6.0, 2.0]);
-        let peak = f32::from(level.lookup().sum.iter().copied().max().unwrap_or(0));
+        let peak = f32::from(level.view().sum.iter().copied().max().unwrap_or(0));
         assert!(
-            (peak / level.lookup().full - 2.0 / 3.0).abs() < 0.01,
+            (peak / level.view().full - 2.0 / 3.0).abs() < 0.01,
             "{peak}: m / (m + mean), a Gaussian's mean being half its peak"
         );
     }
 
     #[test]
     fn a_blur_keeps_the_sum() {
-        let mut level = Level::new(1.0, 20.0);
+        let mut level = MapLevel::new(1.0, 20.0);
         let mut image = level.new_image();
         level.draw(
             &points(&[[0.3, 0.4], [7.7, -8.2]]),
@@ -294,8 +294,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_out_of_reach_is_left_out() {
-        let mut level = Level::new(1.0, 20.0);
+    fn points_out_of_reach_are_ignored() {
+        let mut level = MapLevel::new(1.0, 20.0);
         let mut image = level.new_image();
         level.draw(
             &points(&[[25.0, 0.0], [f32::NAN, 0.0], [0.0, -1e30]]),
@@ -303,7 +303,7 @@ mod tests {
             &mut image,
         );
         assert!(image.cells.iter().all(|cell| *cell == 0));
-        level.stack([&image].into_iter());
-        assert!(level.lookup().sum.iter().all(|sum| *sum == 0));
+        level.sum_images([&image].into_iter());
+        assert!(level.view().sum.iter().all(|sum| *sum == 0));
     }
 }

@@ -1,4 +1,4 @@
-//! The keyframes of the local map, on two levels.
+//! The local map: the last keyframes, and the sums of their images on a fine and a coarse level.
 
 use std::collections::VecDeque;
 
@@ -7,16 +7,16 @@ use ndarray::{ArrayView2, ArrayViewMut2};
 
 use super::{
     RefinementConfig,
-    level::{Image, Level, Lookup},
-    sweep::Placed,
+    map_level::{Image, MapLevel, MapView},
+    points::DeskewedPoints,
 };
 
-/// A scan that is part of the map.
+/// A scan that is part of the local map.
 #[derive(Debug, Clone)]
 pub struct Keyframe {
-    /// Number of its scan.
+    /// Number of the scan.
     pub id: u64,
-    /// Its pose in the first scan's frame.
+    /// Pose in the first scan's frame.
     pub pose: Pose,
     fine: Image,
     coarse: Image,
@@ -37,18 +37,18 @@ impl Keyframe {
     }
 }
 
-/// The last keyframes and their sum.
+/// The last keyframes and their sums.
 #[derive(Debug)]
-pub(super) struct Keyframes {
-    fine: Level,
-    coarse: Level,
+pub(super) struct LocalMap {
+    fine: MapLevel,
+    coarse: MapLevel,
     used: VecDeque<Keyframe>,
     spare: Vec<Keyframe>,
 }
 
-impl Keyframes {
+impl LocalMap {
     pub fn new(config: &RefinementConfig) -> Self {
-        let level = |cell_m| Level::new(cell_m, config.reach_m);
+        let level = |cell_m| MapLevel::new(cell_m, config.reach_m);
         let (fine, coarse) = (level(config.cell_m), level(config.cell_m * config.coarse));
         let keyframe = Keyframe {
             id: 0,
@@ -65,8 +65,8 @@ impl Keyframes {
         }
     }
 
-    /// Cells of a keyframe's images together.
-    pub fn cells(&self) -> usize {
+    /// Cells of both images of a keyframe.
+    pub fn keyframe_cells(&self) -> usize {
         self.fine.n.pow(2) + self.coarse.n.pow(2)
     }
 
@@ -74,7 +74,7 @@ impl Keyframes {
         self.used.is_empty()
     }
 
-    pub fn iter(&self) -> impl Iterator<Item = &Keyframe> {
+    pub fn keyframes(&self) -> impl Iterator<Item = &Keyframe> {
         self.used.iter()
     }
 
@@ -82,8 +82,8 @@ impl Keyframes {
         self.spare.extend(self.used.drain(..));
     }
 
-    /// Adds a keyframe, in place of the oldest where there are as many as may be.
-    pub fn draw(&mut self, id: u64, points: &Placed, pose: &Pose) {
+    /// Adds a keyframe in place of the oldest one, if the map is full.
+    pub fn insert(&mut self, id: u64, points: &DeskewedPoints, pose: &Pose) {
         let Some(mut keyframe) = self.spare.pop().or_else(|| self.used.pop_front()) else {
             return;
         };
@@ -91,41 +91,39 @@ impl Keyframes {
         self.fine.draw(points, pose, &mut keyframe.fine);
         self.coarse.draw(points, pose, &mut keyframe.coarse);
         self.used.push_back(keyframe);
-        self.stack();
+        self.sum_images();
     }
 
-    /// Adds a keyframe that `load` fills in; returns whether there was room, and one to load.
-    pub fn push(&mut self, load: &mut impl FnMut(&mut Keyframe) -> bool) -> bool {
-        let Some(mut keyframe) = self.spare.pop() else {
-            return false;
-        };
-        let loaded = load(&mut keyframe);
-        if loaded {
+    /// Replaces the keyframes by those that `load` fills in, oldest first, until it returns `false` or the map is full.
+    pub fn restore(&mut self, mut load: impl FnMut(&mut Keyframe) -> bool) {
+        self.clear();
+        while let Some(mut keyframe) = self.spare.pop() {
+            if !load(&mut keyframe) {
+                self.spare.push(keyframe);
+                break;
+            }
             self.used.push_back(keyframe);
-        } else {
-            self.spare.push(keyframe);
         }
-        loaded
+        self.sum_images();
     }
 
-    /// Makes the map anew.
-    pub fn stack(&mut self) {
+    fn sum_images(&mut self) {
         self.fine
-            .stack(self.used.iter().map(|keyframe| &keyframe.fine));
+            .sum_images(self.used.iter().map(|keyframe| &keyframe.fine));
         self.coarse
-            .stack(self.used.iter().map(|keyframe| &keyframe.coarse));
+            .sum_images(self.used.iter().map(|keyframe| &keyframe.coarse));
     }
 
-    pub fn fine(&self) -> Lookup<'_> {
-        self.fine.lookup()
+    pub fn fine(&self) -> MapView<'_> {
+        self.fine.view()
     }
 
-    pub fn coarse(&self) -> Lookup<'_> {
-        self.coarse.lookup()
+    pub fn coarse(&self) -> MapView<'_> {
+        self.coarse.view()
     }
 
-    /// Whether a scan at `pose` is far enough from the last keyframe to be one.
-    pub fn is_far(&self, pose: &Pose, config: &RefinementConfig) -> bool {
+    /// Whether `pose` is far enough from the last keyframe for another one.
+    pub fn needs_keyframe(&self, pose: &Pose, config: &RefinementConfig) -> bool {
         self.used.back().is_none_or(|last| {
             let moved = last.pose.inv_mul(pose);
             moved.translation.vector.norm() >= config.keyframe_distance_m
