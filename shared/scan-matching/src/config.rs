@@ -1,10 +1,10 @@
-//! What a search can be told. Every key has a default; an impossible value names itself.
+//! Configuration of the searches. Every key has a default; an error names the key of an invalid value.
 
 use serde::{Deserialize, Serialize};
 
 use crate::peak::SUPPORT;
 
-/// A value that no search can be built from.
+/// An invalid value of a search.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{section}.{key} = {actual}: expected {expected}")]
 pub struct ConfigError {
@@ -14,11 +14,11 @@ pub struct ConfigError {
     pub key: &'static str,
     /// The value as given.
     pub actual: String,
-    /// What would have been accepted.
+    /// The accepted values.
     pub expected: &'static str,
 }
 
-/// How the two polar spectra are compared.
+/// The comparison of two polar spectra.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum RotationForm {
     /// Circular correlation along the angle, summed over radii (Weston et al., Eq. 7).
@@ -31,39 +31,43 @@ pub enum RotationForm {
     ProfileMean,
 }
 
-/// What is taken of a spectrum's modulus.
+/// The scale of spectral magnitudes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Magnitude {
-    /// The modulus itself.
+    /// The magnitude itself.
     #[default]
     Linear,
-    /// ln(1 + modulus / mean modulus of the band): weak structure counts beside strong, and so does noise. Helps where
-    /// the band reaches down to the lowest frequencies, which tower above the rest.
+    /// ln(1 + magnitude / mean magnitude of the band). Weak structure counts beside strong
+    /// structure, and so does noise. Helps where the band includes the lowest frequencies, which
+    /// dominate the others.
     Log,
 }
 
-/// Weight over the raster before the rotation's transform.
+/// The weight of the raster before the Fourier transform of the rotation search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Taper {
-    /// No weight. For rasters that already end in zeros.
+    /// No weight, for rasters that already end in zeros.
     None,
     /// Product of two Hann windows (Weston et al., Algorithm 1, line 5).
     Hann,
-    /// Hann window of the range: alike in all directions, so it adds none of its own to the spectrum.
+    /// Hann window of the range: equal in all directions, so that it adds no direction of its own
+    /// to the spectrum.
     #[default]
     RadialHann,
 }
 
-/// How a peak is placed between samples.
+/// The interpolation of a peak between samples.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Peak {
-    /// A Gaussian over a pedestal, the lowest of the neighbouring samples: off by up to 0.02 of a step.
+    /// A Gaussian over a pedestal, the lowest of the neighbouring samples: errors up to 0.02 of a
+    /// step.
     #[default]
     Gaussian,
-    /// Parabola through three samples of each axis: off by up to 0.1 of a step on narrow peaks.
+    /// A parabola through three samples along each axis: errors up to 0.1 of a step on narrow
+    /// peaks.
     Parabola,
     /// Mean of all positions within reach, weighted with exp(temperature z), where z is the score less
     /// the highest score, over the scores' standard deviation (Weston et al., Algorithm 1, lines 15 and 19).
@@ -73,16 +77,16 @@ pub enum Peak {
     },
 }
 
-/// What makes up for an overlap that shrinks as the shift grows.
+/// The normalisation for an overlap that shrinks as the shift grows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Overlap {
-    /// Nothing: the correlation as it is, biased toward zero shift.
+    /// None: the plain correlation, biased towards zero shift.
     None,
-    /// Divide by the share of cells that overlap.
+    /// Divides by the share of the cells that overlap.
     Area,
-    /// Divide by the energy that each raster has within the overlap, which makes every value a
-    /// correlation coefficient of what both scans see.
+    /// Divides by the energy of each raster within the overlap, so that each value is a correlation
+    /// coefficient of what both scans see.
     #[default]
     Energy,
 }
@@ -91,29 +95,34 @@ pub enum Overlap {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RotationConfig {
-    /// `eq7` or `line14`.
+    /// Comparison of the polar spectra: `eq7` (Weston et al., Eq. 7) or `line14` (their Algorithm
+    /// 1, line 14).
     pub form: RotationForm,
-    /// `linear` or `log`.
+    /// Scale of the spectral magnitudes: `linear` or `log`.
     pub magnitude: Magnitude,
-    /// Keep only the phase of the polar spectra's own transform (Checchin et al., Eq. 6).
+    /// Phase correlation: keeps only the phase of the transform of the polar spectra (Checchin et
+    /// al., Eq. 6).
     pub phase_only: bool,
-    /// `none`, `hann` or `radial_hann`.
+    /// Window over the raster: `none`, `hann` or `radial_hann`.
     pub window: Taper,
-    /// Lower end of the band, cycles a cell. What is longer than 20 cells says little about the angle and is ruled
-    /// by the range's fall-off, which does not turn with the scene.
+    /// Lower end of the frequency band, cycles per cell. Structure longer than 20 cells contributes
+    /// little to the angle and is dominated by the decrease of power with range, which does not
+    /// rotate with the scene.
     pub band_low: f64,
-    /// Upper end of the band, cycles a cell; below 0.5.
+    /// Upper end of the frequency band, cycles per cell; below 0.5.
     pub band_high: f64,
-    /// Samples of the angle over half a turn. Products of small primes are fast; 733 (the paper) costs six times more.
+    /// Number of samples of the angle over half a turn. Products of small primes are fast; 733 (the
+    /// paper) takes six times as long.
     pub angles: usize,
-    /// Samples of the radius over the band; left out: about one a frequency bin.
+    /// Number of samples of the radius over the band. Default: about one per frequency bin.
     pub radii: Option<usize>,
     /// Largest angle searched to either side, degrees; at most 90.
     pub reach_deg: f64,
-    /// How the peak is placed between samples.
+    /// Interpolation of the peak between samples.
     pub peak: Peak,
-    /// Variance = this x (1 - score) / curvature of the peak. The curvature gives the shape alone; the factor, about
-    /// one over the number of independent samples, is calibrated on real scans with known motions.
+    /// Factor of the variance: factor x (1 - score) / curvature of the peak. The curvature gives
+    /// the shape alone; the factor, about the inverse of the number of independent samples, is
+    /// calibrated on real scans with known motions.
     pub variance_scale: f64,
 }
 
@@ -141,15 +150,18 @@ impl Default for RotationConfig {
 pub struct TranslationConfig {
     /// Largest shift searched along each axis, m.
     pub reach_m: f64,
-    /// Keep only the phase of the cross-spectrum (Checchin et al., Eq. 6).
+    /// Phase correlation: keeps only the phase of the cross-spectrum (Checchin et al., Eq. 6).
     pub phase_only: bool,
-    /// What makes up for the shrinking overlap; without effect where `phase_only`.
+    /// Normalisation for the shrinking overlap: `none`, `area` or `energy`. No effect with
+    /// `phase_only`.
     pub overlap: Overlap,
-    /// How the peak is placed between cells.
+    /// Interpolation of the peak between cells.
     pub peak: Peak,
-    /// Also try the angle half a turn away and keep the better match: magnitude spectra cannot tell the two apart.
+    /// Also tries the angle half a turn away and keeps the better match: magnitude spectra cannot
+    /// distinguish the two.
     pub half_turn: bool,
-    /// Covariance = this x (1 - score) x inverse curvature of the peak, calibrated as the angle's.
+    /// Factor of the covariance: factor x (1 - score) x inverse curvature of the peak, calibrated
+    /// like that of the angle.
     pub variance_scale: f64,
 }
 

@@ -1,4 +1,4 @@
-//! What the exhaustive search can be told.
+//! Configuration of the exhaustive search.
 
 use std::f64::consts::{PI, TAU};
 
@@ -12,16 +12,18 @@ use crate::config::{ConfigError, Overlap, Peak, accept, positive};
 pub struct ExhaustiveConfig {
     /// Largest angle searched to either side, degrees; 180 is the whole circle.
     pub reach_deg: f64,
-    /// From one angle to the next, degrees. The cost grows as its inverse.
+    /// Step between angles, degrees. The cost grows with its inverse.
     pub step_deg: f64,
     /// Largest shift searched along each axis, m.
     pub reach_m: f64,
-    /// What makes up for the shrinking overlap. `none` and `area` compare the angles by their bare correlations, as in
-    /// MbyM: turning blurs, so unturned rasters have the advantage. `energy` compares correlation coefficients.
+    /// Normalisation for the shrinking overlap. `none` and `area` compare the angles by their plain
+    /// correlations, as in MbyM: rotation blurs, so unrotated rasters have the advantage. `energy`
+    /// compares correlation coefficients.
     pub overlap: Overlap,
-    /// How the peak is placed between angles and between cells: `gaussian` or `parabola`.
+    /// Interpolation of the peak between angles and between cells: `gaussian` or `parabola`.
     pub peak: Peak,
-    /// Covariance = this x (1 - score) x inverse curvature of the peak in all three unknowns.
+    /// Factor of the covariance: factor x (1 - score) x inverse curvature of the peak in all three
+    /// unknowns.
     pub variance_scale: f64,
 }
 

@@ -1,4 +1,4 @@
-//! What the refinement can be told.
+//! Configuration of the refinement.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,51 +8,57 @@ use crate::config::{ConfigError, accept, positive};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RefinementConfig {
-    /// `none`: the search's motion is the result. `local-map`: it is refined against a map of the last keyframes.
+    /// `none`: the searched motion is the result. `local-map`: it is refined by registration
+    /// against a map of the last keyframes.
     pub kind: RefinementKind,
-    /// How many keyframes make the map; 1 compares with the last one alone.
+    /// Number of keyframes in the map, 1 to 64. 1 registers against the last keyframe alone.
     pub keyframes: usize,
-    /// A scan becomes a keyframe so far from the last one, m ...
+    /// Distance from the last keyframe at which a scan becomes a keyframe, m.
     pub keyframe_distance_m: f64,
-    /// ... or so much turned, degrees.
+    /// Rotation from the last keyframe at which a scan becomes a keyframe, degrees.
     pub keyframe_angle_deg: f64,
-    /// Metres a cell of the map; its blur has a standard deviation of one cell.
+    /// Size of a cell of the map, m. The map is blurred by a Gaussian with a standard deviation of
+    /// one cell.
     pub cell_m: f64,
-    /// The map reaches so far from its newest keyframe, m: the points' largest range and a little more.
+    /// Extent of the map to each side of its newest keyframe, m: a little more than
+    /// `points.max_range_m`.
     pub reach_m: f64,
-    /// How many times coarser the map is on which the match begins.
+    /// Cell size of the coarse map, on which registration starts, over that of the fine map.
     pub coarse: f64,
-    /// Most the velocity of a vehicle changes in a second, m/s^2: a motion that changes it more is not believed.
+    /// Maximum acceleration of the vehicle, m/s². A match that exceeds it is rejected.
     pub acceleration_mps2: f64,
-    /// Most its yaw rate changes in a second, degrees/s^2.
+    /// Maximum yaw acceleration of the vehicle, degrees/s². A match that exceeds it is rejected.
     pub yaw_acceleration_degps2: f64,
-    /// A match may lie so far off besides, m ...
+    /// Tolerance of the acceleration limit for the noise of matches, m.
     pub jitter_m: f64,
-    /// ... and degrees.
+    /// Tolerance of the yaw acceleration limit for the noise of matches, degrees.
     pub jitter_deg: f64,
-    /// A match that overlaps the map by less than this share of what is usual is not believed.
+    /// Minimum overlap with the map, as a share of its running mean. A match below it is rejected.
     pub min_overlap: f64,
-    /// A match is used, but its scan kept out of the map, where it overlaps the map by less than this share of what is usual, ...
+    /// Overlap with the map, as a share of its running mean, below which a match is `weak`: it is
+    /// used, but its scan stays out of the map.
     pub firm_overlap: f64,
-    /// ... where its points weigh less than this share of what is usual, ...
+    /// Weight of the scan's points, as a share of its running mean, below which a match is `weak`.
     pub min_support: f64,
-    /// ... or where the search says otherwise by more than this, m ...
+    /// Distance from the searched motion above which a match is `weak`, m.
     pub search_agrees_m: f64,
-    /// ... or degrees.
+    /// Angle from the searched motion above which a match is `weak`, degrees.
     pub search_agrees_deg: f64,
-    /// After so many scans in a row that matched nothing, the map begins anew.
+    /// Number of consecutive scans without a match after which a new map is started.
     pub max_unmatched: u32,
-    /// Covariance = this x mean weight of the points x mean squared residual x inverse information matrix ...
+    /// Factor of the covariance: factor x mean weight of the points x mean squared residual x
+    /// inverse information matrix.
     pub variance_scale: f64,
-    /// ... and this standard deviation of the heading besides, degrees: no antenna turns quite evenly.
+    /// Standard deviation of the heading that is added to the covariance, degrees, for the uneven
+    /// rotation of the antenna.
     pub yaw_sigma_deg: f64,
 }
 
-/// What follows the search.
+/// The refinement of searched motions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RefinementKind {
-    /// Nothing.
+    /// No refinement.
     None,
     /// Registration against the local map.
     #[default]

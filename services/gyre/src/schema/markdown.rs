@@ -1,0 +1,120 @@
+//! The reference of the configuration, made from its schema.
+
+use std::fmt::Write;
+
+use schemars::Schema;
+use serde_json::{Map, Value};
+
+const INTRODUCTION: &str = "\
+# Configuration
+
+You want to know what a key means, or which keys there are. A run is configured by one TOML file; every key has a default, so a file is
+a few lines. `configs/` has one for each dataset. `gyre run CONFIG --set section.key=value` overrides a key; a value that is not TOML is taken as
+text. Unknown keys are rejected. The resolved configuration is written beside the results as `config.toml`.
+
+Units are in the names: `_m`, `_s`, `_ms`, `_deg`, `_rad`, `_mps` (m/s), `_mps2` (m/s²), `_degps2` (degrees/s²).
+
+Editors that know [Taplo](https://taplo.tamasfe.dev) complete and check keys with the schema beside this page, if the configuration begins with
+`#:schema PATH/docs/gyre.schema.json`.
+
+This page is made by `gyre schema --markdown` from the structures in the code.";
+
+/// The whole page.
+pub fn reference(schema: &Schema) -> String {
+    let mut page = INTRODUCTION.to_owned();
+    for (name, section) in properties(schema.as_value()) {
+        write_section(&mut page, name, section);
+    }
+    page
+}
+
+/// A section with a table of its keys, then the sections in it.
+fn write_section(page: &mut String, name: &str, schema: &Value) {
+    if schema["type"] == "array" {
+        return write_object(page, &format!("[[{name}]]"), name, schema, &schema["items"]);
+    }
+    match schema.get("additionalProperties") {
+        Some(named @ Value::Object(_)) => {
+            let name = format!("{name}.NAME");
+            write_object(page, &format!("[{name}]"), &name, schema, named);
+        }
+        _ => write_object(page, &format!("[{name}]"), name, schema, schema),
+    }
+}
+
+fn write_object(page: &mut String, title: &str, name: &str, described: &Value, object: &Value) {
+    let _ = write!(
+        page,
+        "\n\n## `{title}`\n\n{}",
+        text(&described["description"])
+    );
+    let (sections, keys): (Vec<_>, Vec<_>) =
+        properties(object).partition(|(_, key)| is_section(key));
+    if !keys.is_empty() {
+        page.push_str("\n\n| key | type | default | meaning |\n|---|---|---|---|");
+    }
+    for (key, schema) in keys {
+        let default = schema.get("default").map_or(String::new(), toml_code);
+        let meaning = text(&schema["description"]).replace('|', "\\|");
+        let _ = write!(
+            page,
+            "\n| `{key}` | {} | {default} | {meaning} |",
+            kind(schema)
+        );
+    }
+    for (key, schema) in sections {
+        write_section(page, &format!("{name}.{key}"), schema);
+    }
+}
+
+fn is_section(schema: &Value) -> bool {
+    let object = |schema: &Value| schema.get("properties").is_some();
+    object(schema) || object(&schema["items"]) || object(&schema["additionalProperties"])
+}
+
+fn properties(schema: &Value) -> impl Iterator<Item = (&String, &Value)> {
+    schema["properties"]
+        .as_object()
+        .into_iter()
+        .flat_map(Map::iter)
+}
+
+/// A key's type in words, or its possible values.
+fn kind(schema: &Value) -> String {
+    let choices = ["oneOf", "anyOf"]
+        .iter()
+        .find_map(|key| schema[*key].as_array());
+    if let Some(choices) = choices {
+        return choices.iter().map(kind).collect::<Vec<_>>().join(", ");
+    }
+    if let Some(values) = schema["enum"].as_array() {
+        return values.iter().map(toml_code).collect::<Vec<_>>().join(", ");
+    }
+    if let Some(value) = schema.get("const") {
+        return toml_code(value);
+    }
+    if let Some((key, value)) = properties(schema).next() {
+        return match value.get("properties") {
+            Some(_) => format!("`{{ {key} = {{ {} }} }}`", inner(value)),
+            None => format!("`{{ {key} = ... }}`"),
+        };
+    }
+    match &schema["type"] {
+        Value::Array(types) => types.iter().map(text).collect::<Vec<_>>().join(" or "),
+        Value::String(name) if name == "array" => format!("list of {}", kind(&schema["items"])),
+        name => text(name).to_owned(),
+    }
+}
+
+fn inner(object: &Value) -> String {
+    let keys = properties(object).map(|(key, schema)| format!("{key} = {}", kind(schema)));
+    keys.collect::<Vec<_>>().join(", ")
+}
+
+fn toml_code(value: &Value) -> String {
+    format!("`{value}`")
+}
+
+fn text(value: &Value) -> &str {
+    value.as_str().unwrap_or_default()
+}
