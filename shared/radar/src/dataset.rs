@@ -6,6 +6,8 @@ mod eccentricity;
 mod error;
 mod first_look;
 mod fomo;
+mod format;
+mod image_size;
 mod image_source;
 mod images;
 mod mulran;
@@ -24,9 +26,10 @@ use std::path::Path;
 
 use crate::scan::{ScanLimits, ScanSlot, SweepGeometry};
 pub use error::{OpenError, ReadError};
+pub use format::Format;
+pub use image_size::ImageSize;
 pub use image_source::ImageSource;
-pub use options::{AzimuthSource, DatasetOptions, Format};
-pub use png_image::ImageSize;
+pub use options::{AzimuthSource, DatasetOptions};
 
 /// The scans of one recording, in the order of their times.
 ///

@@ -1,6 +1,7 @@
 //! Poses along a drive, in the plane.
 
-use nalgebra::{Complex, Isometry2, Translation2, Unit, UnitComplex, Vector2};
+use gyre_geometry::{Pose, interpolate};
+use nalgebra::{Complex, Translation2, Unit, UnitComplex};
 
 /// Poses of the sensor, REP-103 (x forward, y left, yaw counter-clockwise; m, rad), in a world frame that its source chose.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -8,7 +9,7 @@ pub struct Trajectory {
     /// Time of each pose, ns (since 1970 in recordings), never decreasing; `None` where the source knows no times.
     pub stamp_ns: Option<Vec<i64>>,
     /// The sensor in the world: as many as stamps.
-    pub poses: Vec<Isometry2<f64>>,
+    pub poses: Vec<Pose>,
 }
 
 impl Trajectory {
@@ -44,7 +45,7 @@ impl Trajectory {
     }
 
     /// The pose at a time: on the straight line between its neighbours, the angle likewise. `None` outside the span.
-    pub fn at(&self, stamp_ns: i64) -> Option<Isometry2<f64>> {
+    pub fn at(&self, stamp_ns: i64) -> Option<Pose> {
         let stamps = self.stamp_ns.as_ref()?;
         let after = stamps.partition_point(|s| *s < stamp_ns);
         let (b, to) = (self.poses.get(after)?, *stamps.get(after)?);
@@ -53,15 +54,11 @@ impl Trajectory {
         }
         let (a, from) = (self.poses.get(after.checked_sub(1)?)?, stamps[after - 1]);
         let share = (stamp_ns - from) as f64 / (to - from) as f64;
-        let position = a.translation.vector.lerp(&b.translation.vector, share);
-        Some(Isometry2::new(
-            position,
-            a.rotation.angle() + share * (b.rotation * a.rotation.inverse()).angle(),
-        ))
+        Some(interpolate(a, b, share))
     }
 
     /// As [`Trajectory::at`]; times that miss the span by no more than `tolerance_ns` are its ends, for files round.
-    pub fn near(&self, stamp_ns: i64, tolerance_ns: u64) -> Option<Isometry2<f64>> {
+    pub fn near(&self, stamp_ns: i64, tolerance_ns: u64) -> Option<Pose> {
         let (first, last) = self.span_ns()?;
         let within = stamp_ns.clamp(first, last);
         self.at(within)
@@ -84,35 +81,27 @@ impl Trajectory {
 ///
 /// Cosine and sine stay as they were written where they fit each other: published KITTI figures come from matrices rounded to six
 /// decimals, and putting those right changes the fifth decimal of the result.
-pub(crate) fn planar(matrix: &[f64; 12]) -> Isometry2<f64> {
+pub(crate) fn planar(matrix: &[f64; 12]) -> Pose {
     let (cos, sin) = (matrix[0], matrix[4]);
     let rotation = match (cos.hypot(sin) - 1.0).abs() < 1e-4 {
         true => Unit::new_unchecked(Complex::new(cos, sin)),
         false => UnitComplex::new(sin.atan2(cos)),
     };
-    Isometry2::from_parts(Translation2::new(matrix[3], matrix[7]), rotation)
-}
-
-/// The same pose with y and yaw the other way round: from y right and clockwise to REP-103, in both frames.
-pub(crate) fn mirrored(pose: Isometry2<f64>) -> Isometry2<f64> {
-    Isometry2::new(
-        Vector2::new(pose.translation.x, -pose.translation.y),
-        -pose.rotation.angle(),
-    )
+    Pose::from_parts(Translation2::new(matrix[3], matrix[7]), rotation)
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use gyre_geometry::pose;
     use std::f64::consts::PI;
 
     #[test]
     fn between_poses_the_angle_takes_the_short_way() {
-        let pose = |x: f64, yaw: f64| Isometry2::new(Vector2::new(x, 0.0), yaw);
         let trajectory = Trajectory {
             stamp_ns: Some(vec![0, 100]),
-            poses: vec![pose(0.0, PI - 0.1), pose(2.0, -PI + 0.1)],
+            poses: vec![pose(0.0, 0.0, PI - 0.1), pose(2.0, 0.0, -PI + 0.1)],
         };
         let middle = trajectory.at(50).unwrap();
         assert!((middle.translation.x - 1.0).abs() < 1e-12);
@@ -128,9 +117,7 @@ mod tests {
 
     #[test]
     fn near_an_end_is_the_end_and_gaps_are_as_wide_as_the_poses_are_apart() {
-        let poses = [1.0, 2.0, 4.0]
-            .map(|x| Isometry2::new(Vector2::new(x, 0.0), 0.0))
-            .to_vec();
+        let poses = [1.0, 2.0, 4.0].map(|x| pose(x, 0.0, 0.0)).to_vec();
         let trajectory = Trajectory {
             stamp_ns: Some(vec![0, 100, 150]),
             poses,

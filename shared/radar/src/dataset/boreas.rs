@@ -7,9 +7,10 @@
 use super::detect::Found;
 use super::error::OpenError;
 use super::first_look::{FirstLook, NamedBy};
+use super::format::Format;
 use super::navtech_png::ByteTen;
 use super::navtech_scans::{NavtechScans, Profile, ScanTime};
-use super::options::{AzimuthSource, DatasetOptions, Format};
+use super::options::{AzimuthSource, DatasetOptions};
 use super::stamp::SECOND_NS;
 
 /// Metres a range bin before 2021-09-21, when the radar's firmware was changed.

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use super::error::OpenError;
 use super::first_look::{FirstLook, NamedBy};
+use super::format::Format;
 use super::image_source::ImageSource;
 use super::images::{Images, has_png};
-use super::options::Format;
 
 /// A dataset that was found, before its format's reader takes over.
 #[derive(Debug)]

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use super::options::Format;
-use super::png_image::ImageSize;
+use super::format::Format;
+use super::image_size::ImageSize;
 
 /// A dataset that cannot be opened at all.
 #[derive(Debug, thiserror::Error)]

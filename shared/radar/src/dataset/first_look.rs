@@ -1,8 +1,8 @@
 //! What one image with Navtech's columns says of its dataset, before anything is decided.
 
+use super::image_size::ImageSize;
 use super::images::Images;
 use super::navtech_png::{METADATA_BYTES, RowMetadata, chirps_alternate, rows};
-use super::png_image::ImageSize;
 use super::stamp;
 
 /// How near the time in a file's name must be to a row's to count as that row's, ns.

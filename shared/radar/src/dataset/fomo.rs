@@ -3,9 +3,10 @@
 use super::detect::Found;
 use super::error::OpenError;
 use super::first_look::NamedBy;
+use super::format::Format;
 use super::navtech_png::ByteTen;
 use super::navtech_scans::{NavtechScans, Profile, ScanTime};
-use super::options::{AzimuthSource, DatasetOptions, Format};
+use super::options::{AzimuthSource, DatasetOptions};
 
 /// Metres a range bin.
 pub const RANGE_RESOLUTION_M: f32 = 0.0438;

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use super::options::Format;
-use super::png_image::ImageSize;
+use super::format::Format;
+use super::image_size::ImageSize;
 
 /// Makes a recording's images when they are asked for. [`open_source`](super::open_source) reads them as it would read the same images
 /// from a disk.

@@ -5,8 +5,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::error::{OpenError, ReadError};
+use super::image_size::ImageSize;
 use super::image_source::ImageSource;
-use super::png_image::{self, ImageReader, ImageSize};
+use super::png_image::{self, ImageReader};
 use super::stamp;
 
 /// Images that are tried for one that can be read, when the first ones are damaged.

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::error::ReadError;
+use super::image_size::ImageSize;
 use super::options::AzimuthSource;
-use super::png_image::ImageSize;
 use super::stamp;
 use crate::scan::flag;
 

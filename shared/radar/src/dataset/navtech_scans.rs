@@ -7,10 +7,11 @@ use super::detect::Found;
 use super::eccentricity;
 use super::error::{OpenError, ReadError};
 use super::first_look::{FirstLook, NamedBy};
+use super::format::Format;
+use super::image_size::ImageSize;
 use super::images::Images;
 use super::navtech_png::{self, ByteTen, METADATA_BYTES};
-use super::options::{AzimuthSource, DatasetOptions, Format};
-use super::png_image::ImageSize;
+use super::options::{AzimuthSource, DatasetOptions};
 use super::stamp;
 use crate::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, Sense, SweepGeometry};
 

@@ -6,9 +6,10 @@
 use super::detect::Found;
 use super::error::OpenError;
 use super::first_look::NamedBy;
+use super::format::Format;
 use super::navtech_png::ByteTen;
 use super::navtech_scans::{NavtechScans, Profile, ScanTime};
-use super::options::{AzimuthSource, DatasetOptions, Format};
+use super::options::{AzimuthSource, DatasetOptions};
 
 /// Metres a range bin. The dataset's own kit says 0.0432, with which paths come out 1.4 % short of the ground truth.
 pub const RANGE_RESOLUTION_M: f32 = 0.0438;

@@ -1,11 +1,11 @@
 //! Grey PNG images, decoded straight into the caller's memory.
 
-use std::fmt;
 use std::fs::File;
 use std::io::{self, Cursor, Read};
 use std::path::Path;
 
 use super::error::ReadError;
+use super::image_size::ImageSize;
 
 /// Most bytes of one image: 1024 azimuths of 32,768 range bins and their metadata.
 const MAX_IMAGE_BYTES: u64 = 1024 * (32_768 + 11);
@@ -14,28 +14,6 @@ const HEADER_BYTES: usize = 29;
 const SIGNATURE: [u8; 8] = [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n'];
 /// What the decoder may take beside the image: rows, tables, chunks of text.
 const DECODER_BYTES: usize = 4 << 20;
-
-/// Pixels of an image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-pub struct ImageSize {
-    /// Columns.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-}
-
-impl ImageSize {
-    /// Bytes of the image: one a pixel.
-    pub fn bytes(self) -> usize {
-        self.width * self.height
-    }
-}
-
-impl fmt::Display for ImageSize {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} columns x {} rows", self.width, self.height)
-    }
-}
 
 /// The size of a PNG from its first bytes alone.
 pub(crate) fn read_size(path: &Path) -> Result<ImageSize, ReadError> {

@@ -3,10 +3,11 @@
 use super::detect::Found;
 use super::eccentricity;
 use super::error::{OpenError, ReadError};
+use super::format::Format;
 use super::images::Images;
 use super::navtech_png::fill_uniform;
 use super::navtech_scans::check_room;
-use super::options::{DatasetOptions, Format};
+use super::options::DatasetOptions;
 use crate::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, Sense, SweepGeometry, flag};
 
 /// Pixels of a square that is turned at once: a cache line wide, so that neither side is walked through memory pixel by pixel.

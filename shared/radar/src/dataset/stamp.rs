@@ -1,6 +1,8 @@
 //! Times as datasets write them: integers of s, ms, us or ns since 1970, and decimal seconds.
 
-/// Nanoseconds of a second.
+use crate::median::median;
+
+/// Nanoseconds per second.
 pub(crate) const SECOND_NS: i64 = 1_000_000_000;
 
 /// 2015-01-01 and 2041-01-01, s since 1970: no recording is older, and none can be younger.
@@ -52,16 +54,12 @@ fn rounded_ns(seconds: f64) -> Option<i64> {
 /// Median time between neighbouring scans, of those that can be one turn.
 pub(crate) fn usual_interval(stamps: impl Iterator<Item = i64>) -> i64 {
     let stamps: Vec<i64> = stamps.collect();
-    let mut intervals: Vec<i64> = stamps
+    let turns = stamps
         .windows(2)
         .map(|w| w[1] - w[0])
-        .filter(|ns| TURN_NS.contains(ns))
-        .collect();
-    intervals.sort_unstable();
-    intervals
-        .get(intervals.len() / 2)
-        .copied()
-        .unwrap_or(USUAL_TURN_NS)
+        .filter(|ns| TURN_NS.contains(ns));
+    // A turn in ns is exact in f64.
+    median(turns.map(|ns| ns as f64)).map_or(USUAL_TURN_NS, |ns| ns as i64)
 }
 
 /// The middle of two times.

@@ -1,6 +1,6 @@
 //! Boreas' `radar_poses.csv`: the radar in east-north-up, its own frame x forward, y right, z down (roll near pi).
 
-use nalgebra::{Isometry2, Vector2};
+use gyre_geometry::pose;
 
 use super::{LineError, check_growing, columns, lines, number, stamp_field};
 use crate::trajectory::Trajectory;
@@ -14,14 +14,17 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
     for (line, row) in rows {
         let stamp = stamp_field(line, row, time)?;
         check_growing(line, &stamps, stamp)?;
-        let position = Vector2::new(number(line, row, east)?, number(line, row, north)?);
         let yaw = forward_heading(
             number(line, row, roll)?,
             number(line, row, pitch)?,
             number(line, row, heading)?,
         );
         stamps.push(stamp);
-        poses.push(Isometry2::new(position, yaw));
+        poses.push(pose(
+            number(line, row, east)?,
+            number(line, row, north)?,
+            yaw,
+        ));
     }
     Ok(Trajectory {
         stamp_ns: Some(stamps),

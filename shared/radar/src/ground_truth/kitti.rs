@@ -3,9 +3,11 @@
 
 use std::io::{self, Write};
 
+use gyre_geometry::mirrored;
+
 use super::{LineError, check_growing, lines, numbers};
 use crate::dataset::stamp;
-use crate::trajectory::{Trajectory, mirrored, planar};
+use crate::trajectory::{Trajectory, planar};
 
 pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
     let stamped = lines(text)
@@ -28,7 +30,7 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
                 check_growing(line, stamps, stamp)?;
                 stamps.push(stamp);
                 // First frame in the current sensor's, y right: inverted, then y left.
-                poses.push(mirrored(pose.inverse()));
+                poses.push(mirrored(&pose.inverse()));
             }
         }
     }

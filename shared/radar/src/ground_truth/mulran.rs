@@ -1,6 +1,7 @@
 //! MulRan's `global_pose.csv`: time and row-major 3 x 4 pose of the vehicle (x forward, y left, z up) in UTM; no header.
 
-use nalgebra::{Isometry2, Matrix3, Vector2, Vector3};
+use gyre_geometry::{Pose, pose};
+use nalgebra::{Matrix3, Vector3};
 
 use super::{LineError, check_growing, lines, numbers, stamp_field};
 use crate::trajectory::Trajectory;
@@ -26,15 +27,12 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
     })
 }
 
-fn radar_pose(m: &[f64; 12]) -> Isometry2<f64> {
+fn radar_pose(m: &[f64; 12]) -> Pose {
     let rotation = Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
     let position = Vector3::new(m[3], m[7], m[11]) + rotation * Vector3::from(RADAR_IN_BASE_M);
     let (sin, cos) = RADAR_YAW_DEG.to_radians().sin_cos();
     let forward = rotation * Vector3::new(cos, sin, 0.0);
-    Isometry2::new(
-        Vector2::new(position.x, position.y),
-        forward.y.atan2(forward.x),
-    )
+    pose(position.x, position.y, forward.y.atan2(forward.x))
 }
 
 #[cfg(test)]

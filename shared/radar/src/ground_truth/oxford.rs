@@ -1,10 +1,10 @@
 //! Oxford's `radar_odometry.csv`: each row is the newer scan's pose (source) in the older one's frame (destination), x forward,
 //! y right, yaw clockwise; stamps are at mid-sweep.
 
-use nalgebra::{Isometry2, Vector2};
+use gyre_geometry::{Pose, mirrored, pose};
 
 use super::{LineError, columns, lines, number, stamp_field};
-use crate::trajectory::{Trajectory, mirrored};
+use crate::trajectory::Trajectory;
 
 /// One row.
 struct Motion {
@@ -12,7 +12,7 @@ struct Motion {
     from_ns: i64,
     to_ns: i64,
     /// The newer scan in the older one's frame, REP-103.
-    motion: Isometry2<f64>,
+    motion: Pose,
 }
 
 /// Chains the motions from identity. Rows may come in any order; a gap between them is an error.
@@ -25,13 +25,13 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
             reason: "there is a header and no motion".to_owned(),
         });
     };
-    let (mut stamps, mut poses) = (vec![first.from_ns], vec![Isometry2::identity()]);
-    let (mut now_ns, mut pose) = (first.from_ns, Isometry2::identity());
+    let (mut stamps, mut poses) = (vec![first.from_ns], vec![Pose::identity()]);
+    let (mut now_ns, mut now) = (first.from_ns, Pose::identity());
     for m in &motions {
         check_chain(m, now_ns)?;
-        (now_ns, pose) = (m.to_ns, pose * m.motion);
+        (now_ns, now) = (m.to_ns, now * m.motion);
         stamps.push(now_ns);
-        poses.push(pose);
+        poses.push(now);
     }
     Ok(Trajectory {
         stamp_ns: Some(stamps),
@@ -45,13 +45,16 @@ fn parse_rows(text: &str) -> Result<Vec<Motion>, LineError> {
     let names = ["source_timestamp", "destination_timestamp", "x", "y", "yaw"];
     let [source, destination, x, y, yaw] = columns(header, names)?;
     rows.map(|(line, row)| {
-        let position = Vector2::new(number(line, row, x)?, number(line, row, y)?);
-        let motion = mirrored(Isometry2::new(position, number(line, row, yaw)?));
+        let motion = pose(
+            number(line, row, x)?,
+            number(line, row, y)?,
+            number(line, row, yaw)?,
+        );
         Ok(Motion {
             line,
             from_ns: stamp_field(line, row, destination)?,
             to_ns: stamp_field(line, row, source)?,
-            motion,
+            motion: mirrored(&motion),
         })
     })
     .collect()

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use nalgebra::{Isometry2, Vector2};
+use gyre_geometry::pose;
 
 use super::{LineError, check_growing, lines, numbers};
 use crate::dataset::stamp;
@@ -28,7 +28,7 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
         stamps.push(stamp);
         // Direction of the x axis in the plane: right for any roll and pitch, and for quaternions that are not quite normal.
         let yaw = (2.0 * (qw * qz + qx * qy)).atan2(qw * qw + qx * qx - qy * qy - qz * qz);
-        poses.push(Isometry2::new(Vector2::new(x, y), yaw));
+        poses.push(pose(x, y, yaw));
     }
     Ok(Trajectory {
         stamp_ns: Some(stamps),

@@ -185,20 +185,17 @@ impl Correlation {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use nalgebra::{Isometry2, Vector2};
+    use gyre_geometry::{Pose, pose};
 
     /// A drive of varying speed and turns, seen `late_ns` late.
     fn drive(late_ns: i64, sign: f64) -> Trajectory {
-        let (mut pose, mut poses, mut stamps) = (Isometry2::identity(), Vec::new(), Vec::new());
+        let (mut now, mut poses, mut stamps) = (Pose::identity(), Vec::new(), Vec::new());
         for k in 0..1200_i64 {
             let t = k as f64 * 0.05;
             stamps.push(1_549_986_607_000_000_000 + k * 50_000_000 + late_ns);
-            poses.push(pose);
+            poses.push(now);
             let speed = 8.0 + 3.0 * (0.37 * t).sin() + 2.0 * (1.1 * t).cos();
-            pose *= Isometry2::new(
-                Vector2::new(speed * 0.05, 0.0),
-                sign * 0.05 * 0.3 * (0.53 * t).sin(),
-            );
+            now *= pose(speed * 0.05, 0.0, sign * 0.05 * 0.3 * (0.53 * t).sin());
         }
         Trajectory {
             stamp_ns: Some(stamps),

@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::clock::{self, ClockOffset};
 use crate::dataset::Dataset;
 use crate::ground_truth::{find_ground_truth, read_trajectory};
+use crate::median::median;
 use crate::trajectory::Trajectory;
 
 /// Without decoding, the last scan's time is known to a few milliseconds; that is no reason to count it as outside, ns.
@@ -92,9 +93,10 @@ fn nearest_pose_s(truth: &Trajectory, scans_ns: &[i64]) -> Option<f64> {
             .map(|s| (s - scan).abs())
             .min()
     };
-    let mut distances: Vec<i64> = scans_ns.iter().filter_map(nearest).collect();
-    distances.sort_unstable();
-    distances
-        .get(distances.len() / 2)
-        .map(|ns| *ns as f64 * 1e-9)
+    median(
+        scans_ns
+            .iter()
+            .filter_map(nearest)
+            .map(|ns| ns as f64 * 1e-9),
+    )
 }

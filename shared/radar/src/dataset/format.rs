@@ -1,0 +1,61 @@
+//! The file formats of datasets.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// A dataset's form of files, named in configurations in kebab case (`boreas-rt`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Format {
+    /// Oxford Radar RobotCar.
+    Oxford,
+    /// Oxford Offroad Radar Dataset.
+    Oord,
+    /// Boreas.
+    Boreas,
+    /// Boreas Road Trip.
+    BoreasRt,
+    /// MulRan as recorded: images on their side, no metadata.
+    Mulran,
+    /// MulRan converted to Oxford's columns.
+    MulranOxfordForm,
+    /// RADIATE.
+    Radiate,
+    /// FoMo.
+    Fomo,
+}
+
+impl Format {
+    /// All formats, in the order of preference where two fit equally.
+    pub const ALL: [Self; 8] = [
+        Self::Oxford,
+        Self::Oord,
+        Self::Boreas,
+        Self::BoreasRt,
+        Self::Mulran,
+        Self::MulranOxfordForm,
+        Self::Radiate,
+        Self::Fomo,
+    ];
+
+    /// The name used in configurations.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Oxford => "oxford",
+            Self::Oord => "oord",
+            Self::Boreas => "boreas",
+            Self::BoreasRt => "boreas-rt",
+            Self::Mulran => "mulran",
+            Self::MulranOxfordForm => "mulran-oxford-form",
+            Self::Radiate => "radiate",
+            Self::Fomo => "fomo",
+        }
+    }
+}
+
+impl fmt::Display for Format {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
