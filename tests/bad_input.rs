@@ -53,7 +53,7 @@ fn the_folder_holds_other_things() {
     fs::write(folder.path().join("notes.txt"), "buy milk").unwrap();
     run_of(folder.path())
         .finish()
-        .refused_with(&["not a dataset that Gyre knows", "no PNG images"]);
+        .refused_with(&["not a known dataset", "no PNG images"]);
 }
 
 #[test]
@@ -127,7 +127,7 @@ fn skips(bad: usize, reason: &str, spoil: impl FnOnce(&Path)) {
 
 #[test]
 fn a_truncated_first_image_is_skipped() {
-    skips(0, "cut short", |image| recording::truncate(image, 100_000));
+    skips(0, "truncated", |image| recording::truncate(image, 100_000));
 }
 
 #[test]
@@ -137,17 +137,17 @@ fn an_empty_first_image_is_skipped() {
 
 #[test]
 fn a_truncated_image_in_the_middle_is_skipped() {
-    skips(4, "cut short", |image| recording::truncate(image, 100_000));
+    skips(4, "truncated", |image| recording::truncate(image, 100_000));
 }
 
 #[test]
 fn a_truncated_last_image_is_skipped() {
-    skips(7, "cut short", |image| recording::truncate(image, 100_000));
+    skips(7, "truncated", |image| recording::truncate(image, 100_000));
 }
 
 #[test]
 fn an_image_of_another_size_is_skipped() {
-    skips(4, "the dataset's first image is", |image| {
+    skips(4, "the first image of the dataset is", |image| {
         recording::resize(image, 1000, 400)
     });
 }

@@ -203,7 +203,7 @@ fn write_spoilt(
         let first = geometry.first_byte + row * geometry.stride;
         scan.bytes[first..first + geometry.bins].copy_from_slice(powers);
     }
-    if dataset.on_their_side() {
+    if dataset.is_transposed() {
         scan.bytes = transposed(&powers, geometry.bins);
     }
     let path = folder.join(dataset.file(index).file_name().unwrap_or_default());

@@ -1,10 +1,11 @@
-//! A recording of radar scans on disk, whatever its format.
+//! Readers of radar recordings: one trait, one file per format.
 
 mod boreas;
+mod dataset_toml;
 mod detect;
 mod eccentricity;
 mod error;
-mod first_look;
+mod first_image;
 mod fomo;
 mod format;
 mod image_size;
@@ -18,9 +19,9 @@ mod oxford;
 mod png_image;
 mod radiate;
 mod sensor_clock;
-mod sideways;
+
 pub(crate) mod stamp;
-mod told;
+mod transposed;
 
 use std::path::Path;
 
@@ -31,74 +32,84 @@ pub use image_size::ImageSize;
 pub use image_source::ImageSource;
 pub use options::{AzimuthSource, DatasetOptions};
 
-/// The scans of one recording, in the order of their times.
+/// The scans of one recording, ordered by time.
 ///
-/// A scan that cannot be read gives an error and leaves the others readable.
+/// A scan that cannot be read gives an error; the others stay readable.
 pub trait Dataset: Send {
-    /// The form of its files.
+    /// The file format.
     fn format(&self) -> Format;
 
-    /// Scans.
+    /// Number of scans.
     fn len(&self) -> usize;
 
-    /// Whether there is no scan; `open` refuses such a folder.
+    /// Returns whether there is no scan; `open` rejects such a folder.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// What memory one scan needs: from the first image's header; every image must have its size.
+    /// Memory that a scan needs, from the header of the first image. All images must have its size.
     fn limits(&self) -> ScanLimits;
 
-    /// Columns and rows of the images as stored.
+    /// Size of the images as stored.
     fn image_size(&self) -> ImageSize;
 
-    /// Whether the images are stored with range downwards, and turned by [`Dataset::read`].
-    fn on_their_side(&self) -> bool {
+    /// Returns whether the images are stored as range x azimuth, and transposed by [`Dataset::read`].
+    fn is_transposed(&self) -> bool {
         false
     }
 
     /// The file of a scan; an empty path past the end.
     fn file(&self, index: usize) -> &Path;
 
-    /// The scan's time (middle of the sweep on the sensor's clock), ns since 1970, as far as it is known without decoding.
+    /// Time of a scan (the middle of the sweep on the sensor's clock), ns since 1970, as far as it is known without decoding.
     fn nominal_stamp_ns(&self, index: usize) -> Option<i64>;
 
-    /// The time that was logged for the scan (file name or list of stamps), ns since 1970, before anything was made of it.
+    /// Time logged for a scan (in the file name or the list of stamps), ns since 1970.
     fn logged_stamp_ns(&self, index: usize) -> Option<i64>;
 
-    /// One sentence: what the stamps mean, and how the middle of the sweep was obtained.
+    /// The definition of the stamps, and how the middle of the sweep is obtained: one sentence.
     fn stamp_meaning(&self) -> &'static str;
 
-    /// Encoder counts a turn, where azimuths come from an encoder.
+    /// Encoder counts per turn, if azimuths come from an encoder.
     fn encoder_counts(&self) -> Option<u16>;
 
-    /// What the reader noticed when it opened the dataset, and what it made of that: whole sentences.
+    /// Observations of the reader when it opened the dataset, and how it handles them: whole sentences.
     fn notes(&self) -> &[String];
 
-    /// Decodes a scan into `slot`, whose slices are at least as long as [`Dataset::limits`] say.
+    /// Decodes a scan into `slot`, whose slices are at least as long as [`Dataset::limits`].
+    ///
+    /// # Errors
+    /// An index past the end, an image that cannot be read or decoded, metadata that is not of one sweep, a slot that is
+    /// too small.
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError>;
 }
 
 /// Opens the dataset at `root`: the folder that holds the radar's folder, or the folder of images itself.
 ///
-/// The format is detected unless `options` names it. What `options` leave open is taken from a `dataset.toml` in the folder, if
-/// there is one: the recording's word on itself.
+/// The format is detected unless `options` names it. Options that are not set are read from a `dataset.toml` in the folder,
+/// if there is one.
+///
+/// # Errors
+/// A folder without images of a known format, options out of bounds, or files that cannot be read.
 pub fn open(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
-    let options = options.or(&told::options(root)?);
+    let options = options.or(&dataset_toml::options(root)?);
     options.check()?;
-    read_as_found(detect::locate(root, options.format)?, &options)
+    open_found(detect::locate(root, options.format)?, &options)
 }
 
-/// Opens a recording that lies on no disk: in its own format, unless `options` name another.
+/// Opens a recording that is not on disk, in its own format unless `options` names another.
+///
+/// # Errors
+/// A source without images, or options out of bounds.
 pub fn open_source(
     source: Box<dyn ImageSource>,
     options: &DatasetOptions,
 ) -> Result<Box<dyn Dataset>, OpenError> {
     options.check()?;
-    read_as_found(detect::Found::source(source, options.format)?, options)
+    open_found(detect::Found::source(source, options.format)?, options)
 }
 
-fn read_as_found(
+fn open_found(
     found: detect::Found,
     options: &DatasetOptions,
 ) -> Result<Box<dyn Dataset>, OpenError> {

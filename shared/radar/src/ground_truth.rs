@@ -1,4 +1,4 @@
-//! Trajectories on disk: the ground truth of each dataset, and the pose files that tools exchange.
+//! Trajectory files: the ground truth of each dataset, and the common pose formats.
 
 mod boreas;
 mod kitti;
@@ -15,7 +15,7 @@ pub use tum::write_tum;
 
 use crate::trajectory::Trajectory;
 
-/// Where datasets keep their ground truth, below the root; the first that is there is taken.
+/// Files of ground truth relative to the root of a dataset, in order of precedence.
 const PLACES: [&str; 9] = [
     "ground_truth.tum",
     "gt/radar_odometry.csv",
@@ -31,17 +31,17 @@ const PLACES: [&str; 9] = [
 /// A trajectory that cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum TrajectoryError {
-    /// A file that the system would not give.
+    /// A file that cannot be read.
     #[error("cannot read the trajectory {path}: {source}")]
     Io {
         /// The file.
         path: PathBuf,
-        /// The system's reason.
+        /// The cause.
         source: io::Error,
     },
-    /// Content of no known form.
+    /// A file of unknown format.
     #[error(
-        "{path} is no trajectory that Gyre reads (Oxford radar_odometry.csv, Boreas radar_poses.csv, MulRan global_pose.csv, TUM, KITTI): {reason}"
+        "{path} is not a trajectory of a known format (Oxford radar_odometry.csv, Boreas radar_poses.csv, MulRan global_pose.csv, TUM, KITTI): {reason}"
     )]
     Unknown {
         /// The file.
@@ -49,7 +49,7 @@ pub enum TrajectoryError {
         /// What was found.
         reason: String,
     },
-    /// A line that is not what its form demands.
+    /// A line that does not match the format.
     #[error("{path}, line {line}: {reason}")]
     Line {
         /// The file.
@@ -61,29 +61,32 @@ pub enum TrajectoryError {
     },
 }
 
-/// What is wrong with a line (from 1); the file's path is added by the caller.
+/// An error in a line (from 1); the caller adds the path of the file.
 #[derive(Debug)]
 struct LineError {
     line: usize,
     reason: String,
 }
 
-/// The form of a trajectory's file.
+/// The format of a trajectory file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TrajectoryFormat {
-    /// Oxford's `radar_odometry.csv`: motions between scans, chained from identity.
+    /// Oxford `radar_odometry.csv`: motions between scans, composed from the identity.
     OxfordCsv,
-    /// Boreas' `radar_poses.csv`.
+    /// Boreas `radar_poses.csv`.
     BoreasCsv,
-    /// MulRan's `global_pose.csv`: the vehicle's poses, moved to the radar.
+    /// MulRan `global_pose.csv`: poses of the vehicle, transformed to the radar.
     MulranCsv,
     /// `seconds x y z qx qy qz qw`.
     Tum,
-    /// Rows of a 3 x 4 matrix, no times; x and y span the plane.
+    /// Row-major 3 x 4 matrices without times; the plane is x-y.
     Kitti,
 }
 
-/// Reads a trajectory of any known form, told by its first line of content, and converts it to REP-103.
+/// Reads a trajectory of any known format, detected from its first line, and converts it to REP-103.
+///
+/// # Errors
+/// A file that cannot be read, or is not of a known format.
 pub fn read_trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
     let text = fs::read_to_string(path).map_err(|source| TrajectoryError::Io {
         path: path.to_owned(),
@@ -92,7 +95,10 @@ pub fn read_trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
     parse_trajectory(&text, path)
 }
 
-/// As [`read_trajectory`], of a text that need not lie on a disk; `path` is what errors call it.
+/// As [`read_trajectory`], from a text; `path` is the name in errors.
+///
+/// # Errors
+/// A text that is not of a known format.
 pub fn parse_trajectory(text: &str, path: &Path) -> Result<Trajectory, TrajectoryError> {
     let format = detect(text).map_err(|reason| TrajectoryError::Unknown {
         path: path.to_owned(),
@@ -105,7 +111,7 @@ pub fn parse_trajectory(text: &str, path: &Path) -> Result<Trajectory, Trajector
     })
 }
 
-/// The first file below a dataset's root that ground truth is usually kept in; the folder of images itself will do as root.
+/// Returns the ground truth file of a dataset, if there is one at a usual path. `root` may also be the folder of images.
 pub fn find_ground_truth(root: &Path) -> Option<PathBuf> {
     let above = root
         .file_name()
@@ -143,7 +149,7 @@ fn detect(text: &str) -> Result<TrajectoryFormat, String> {
     }
 }
 
-/// Lines with content, numbered from 1; `#` starts a comment.
+/// Returns the non-empty lines, numbered from 1; `#` starts a comment.
 fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     text.lines()
         .enumerate()
@@ -151,7 +157,7 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
         .filter(|(_, l)| !l.is_empty() && !l.starts_with('#'))
 }
 
-/// `N` finite numbers.
+/// Parses `N` finite numbers.
 fn numbers<'a, const N: usize>(
     line: usize,
     fields: impl Iterator<Item = &'a str>,
@@ -161,7 +167,7 @@ fn numbers<'a, const N: usize>(
         let value = field.trim().parse::<f64>().ok().filter(|v| v.is_finite());
         let value = value.ok_or_else(|| LineError {
             line,
-            reason: format!("{field:?} is not a number"),
+            reason: format!("{field:?} is not a finite number"),
         })?;
         if let Some(into) = values.get_mut(count) {
             *into = value;
@@ -172,12 +178,12 @@ fn numbers<'a, const N: usize>(
         _ if count == N => Ok(values),
         _ => Err(LineError {
             line,
-            reason: format!("{count} columns where {N} are expected"),
+            reason: format!("{count} columns instead of {N}"),
         }),
     }
 }
 
-/// The columns of a csv by name, in the order asked for.
+/// Returns the columns of a csv with the given names.
 fn columns<const N: usize>(header: &str, names: [&str; N]) -> Result<[usize; N], LineError> {
     let mut found = [0; N];
     for (into, name) in found.iter_mut().zip(names) {
@@ -190,7 +196,7 @@ fn columns<const N: usize>(header: &str, names: [&str; N]) -> Result<[usize; N],
     Ok(found)
 }
 
-/// A field of a csv's row.
+/// Returns a field of a csv row.
 fn field(line: usize, row: &str, column: usize) -> Result<&str, LineError> {
     row.split(',')
         .nth(column)
@@ -205,7 +211,7 @@ fn number(line: usize, row: &str, column: usize) -> Result<f64, LineError> {
     numbers::<1>(line, std::iter::once(field(line, row, column)?)).map(|[v]| v)
 }
 
-/// An integer stamp of any unit, ns since 1970.
+/// Parses an integer stamp of any unit to ns since 1970.
 fn stamp_field(line: usize, row: &str, column: usize) -> Result<i64, LineError> {
     let text = field(line, row, column)?;
     let stamp = text.parse().ok().and_then(crate::dataset::stamp::to_ns);
@@ -215,8 +221,8 @@ fn stamp_field(line: usize, row: &str, column: usize) -> Result<i64, LineError> 
     })
 }
 
-/// Refuses times that run backwards.
-fn check_growing(line: usize, stamps: &[i64], next: i64) -> Result<(), LineError> {
+/// Rejects times that run backwards.
+fn check_increasing(line: usize, stamps: &[i64], next: i64) -> Result<(), LineError> {
     match stamps.last() {
         Some(last) if next < *last => {
             let back_s = (last - next) as f64 * 1e-9;

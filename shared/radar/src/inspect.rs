@@ -1,20 +1,20 @@
-//! What a dataset is, and what looks wrong with it: `gyre inspect`.
+//! Summary of a dataset and of its faults: `gyre inspect`.
 
 mod clock;
 mod display;
-mod oddities;
+mod findings;
+mod ground_truth;
 mod rows;
 mod timing;
-mod truth;
 
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
 pub use clock::ClockOffset;
+pub use ground_truth::GroundTruthReport;
 pub use rows::{Chirps, RowsReport};
 pub use timing::{Gap, Stall, TimingReport};
-pub use truth::TruthReport;
 
 use crate::dataset::ImageSize;
 use crate::dataset::OpenError;
@@ -23,64 +23,67 @@ use crate::dataset::{DatasetOptions, Format};
 use crate::scan::OwnedScan;
 use crate::trajectory::Trajectory;
 
-/// Pixels that are decoded at most; a longer dataset is sampled evenly. About 2 s of work.
+/// Maximum number of pixels to decode, about 2 s; longer datasets are subsampled.
 const PIXEL_BUDGET: usize = 250_000_000;
 
-/// What a dataset is. [`std::fmt::Display`] prints it for a reader, serde for a program.
+/// Summary of a dataset: [`std::fmt::Display`] prints it, serde serialises it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// The dataset's root.
+    /// Root of the dataset.
     pub root: PathBuf,
-    /// The form of its files.
+    /// File format.
     pub format: Format,
-    /// Scans (images).
+    /// Number of scans.
     pub scans: usize,
-    /// How many of them were read for this report, evenly over the dataset.
+    /// Number of scans read for this report, spread over the dataset.
     pub scans_read: usize,
-    /// Images as stored.
+    /// Size of the images as stored.
     pub image: ImageSize,
-    /// Whether images are stored with range downwards.
-    pub on_their_side: bool,
-    /// Azimuths of a scan.
+    /// Whether images are stored as range x azimuth.
+    pub transposed: bool,
+    /// Azimuths per scan.
     pub azimuths: usize,
-    /// Range bins of an azimuth.
+    /// Range bins per azimuth.
     pub bins: usize,
-    /// Metres a range bin.
+    /// Depth of a range bin, m.
     pub range_resolution_m: f32,
-    /// Metres to add to every range.
+    /// Offset of the ranges, m.
     pub range_offset_m: f32,
-    /// Range of the last bin's centre, m.
+    /// Range of the centre of the last bin, m.
     pub max_range_m: f32,
-    /// Encoder counts a turn, where azimuths come from an encoder.
+    /// Encoder counts per turn, if azimuths come from an encoder.
     pub encoder_counts: Option<u16>,
-    /// What the stamps mean, one sentence.
+    /// Definition of the stamps, one sentence.
     pub stamp_meaning: &'static str,
-    /// Times of the scans; `None` where the files are not named by times and no list gives them.
+    /// Times of the scans; `None` if neither the file names nor a list give them.
     pub timing: Option<TimingReport>,
-    /// Rows of all scans read.
+    /// Rows of the scans read.
     pub rows: RowsReport,
     /// Scans that could not be read.
     pub unreadable: Vec<Unreadable>,
     /// Ground truth files found.
-    pub truths: Vec<TruthReport>,
-    /// What the reader noticed, and what looks wrong: whole sentences.
-    pub oddities: Vec<String>,
+    pub ground_truths: Vec<GroundTruthReport>,
+    /// Observations of the reader and faults: whole sentences.
+    pub findings: Vec<String>,
 }
 
 /// A scan that could not be read.
 #[derive(Clone, Debug, Serialize)]
 pub struct Unreadable {
-    /// Its index, from 0.
+    /// Index, from 0.
     pub scan: usize,
-    /// Its file.
+    /// File.
     pub file: PathBuf,
-    /// Why.
+    /// Cause.
     pub error: String,
 }
 
-/// Looks through the dataset at `root`.
+/// Examines the dataset at `root`.
 ///
-/// With a `trajectory` whose times are the scans' (an odometry result), the clock of each ground truth with times is compared with it.
+/// With a `trajectory` of the dataset (an odometry result), the clock of each stamped ground truth is compared with it.
+///
+/// # Errors
+/// A dataset that cannot be opened; see [`open`].
 pub fn inspect(
     root: &Path,
     options: &DatasetOptions,
@@ -88,23 +91,23 @@ pub fn inspect(
 ) -> Result<Report, OpenError> {
     let mut dataset = open(root, options)?;
     let timing = timing::examine(dataset.as_ref());
-    let seen = read_scans(dataset.as_mut());
-    let mut report = assemble(root, dataset.as_ref(), seen, timing);
-    report.truths = truth::examine(root, dataset.as_ref(), trajectory);
-    report.oddities = oddities::list(&report, dataset.notes(), options);
+    let read = read_scans(dataset.as_mut());
+    let mut report = assemble(root, dataset.as_ref(), read, timing);
+    report.ground_truths = ground_truth::examine(root, dataset.as_ref(), trajectory);
+    report.findings = findings::list(&report, dataset.notes(), options);
     Ok(report)
 }
 
-/// What reading the scans gave.
-struct Seen {
+/// Results of reading the scans.
+struct ScansRead {
     scans_read: usize,
     rows: RowsReport,
     unreadable: Vec<Unreadable>,
-    /// The last scan that was read.
+    /// The last scan.
     scan: OwnedScan,
 }
 
-fn read_scans(dataset: &mut dyn Dataset) -> Seen {
+fn read_scans(dataset: &mut dyn Dataset) -> ScansRead {
     let step = (dataset.len() * dataset.limits().bytes)
         .div_ceil(PIXEL_BUDGET)
         .max(1);
@@ -124,7 +127,7 @@ fn read_scans(dataset: &mut dyn Dataset) -> Seen {
             }),
         }
     }
-    Seen {
+    ScansRead {
         scans_read,
         rows: survey.report(),
         unreadable,
@@ -135,18 +138,18 @@ fn read_scans(dataset: &mut dyn Dataset) -> Seen {
 fn assemble(
     root: &Path,
     dataset: &dyn Dataset,
-    seen: Seen,
+    read: ScansRead,
     timing: Option<TimingReport>,
 ) -> Report {
-    let geometry = seen.scan.geometry;
-    let max_range_m = seen.scan.view().range_m(geometry.bins as f32 - 1.0);
+    let geometry = read.scan.geometry;
+    let max_range_m = read.scan.view().range_m(geometry.bins as f32 - 1.0);
     Report {
         root: root.to_owned(),
         format: dataset.format(),
         scans: dataset.len(),
-        scans_read: seen.scans_read,
+        scans_read: read.scans_read,
         image: dataset.image_size(),
-        on_their_side: dataset.on_their_side(),
+        transposed: dataset.is_transposed(),
         azimuths: geometry.azimuths,
         bins: geometry.bins,
         range_resolution_m: geometry.range_resolution_m,
@@ -155,9 +158,9 @@ fn assemble(
         encoder_counts: dataset.encoder_counts(),
         stamp_meaning: dataset.stamp_meaning(),
         timing,
-        rows: seen.rows,
-        unreadable: seen.unreadable,
-        truths: Vec::new(),
-        oddities: Vec::new(),
+        rows: read.rows,
+        unreadable: read.unreadable,
+        ground_truths: Vec::new(),
+        findings: Vec::new(),
     }
 }

@@ -1,12 +1,12 @@
 //! Polar radar scans: readers, ground truth, rasterisation.
 //!
 //! Reading order:
-//! - [`scan`]: one sweep in the sensor's own grid, borrowed for reading or for filling;
-//! - [`mod@dataset`]: recordings on disk behind one trait, a file each format;
-//! - [`raster`]: from a sweep to a Cartesian raster, the sweep's motion undone;
-//! - [`points`]: from a sweep to the returns that stand out;
-//! - [`mod@ground_truth`]: trajectories of others, converted to REP-103;
-//! - [`mod@inspect`]: what a recording is, and what looks wrong with it.
+//! - [`scan`]: one sweep in the sensor's polar grid, borrowed for reading or for filling;
+//! - [`mod@dataset`]: recordings on disk behind one trait, one file per format;
+//! - [`raster`]: from a scan to a Cartesian raster, with motion compensation;
+//! - [`points`]: from a scan to sparse points, its strongest returns;
+//! - [`mod@ground_truth`]: trajectories in the formats of datasets and tools, converted to REP-103;
+//! - [`mod@inspect`]: a summary of a recording and of its faults.
 
 pub mod dataset;
 pub mod ground_truth;

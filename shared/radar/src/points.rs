@@ -1,11 +1,11 @@
-//! Polar scan to sparse points: the returns that stand out, where the sensor saw them.
+//! Extraction of sparse points from a polar scan: its strongest returns, at their measured positions.
 //!
-//! A point is a range cell above the floor that no azimuth beside it outshines within the antenna's beam: a scatterer
-//! lights several azimuths up, and only the one that looked straight at it tells its bearing. Nothing is compared along
-//! range, so that a wall seen at a slant stays whole.
+//! A point is a range cell above the floor that survives non-maximum suppression across the azimuths within the antenna's
+//! beam: a scatterer appears in several azimuths, and the strongest gives its bearing. There is no suppression along range,
+//! so that a wall at a grazing angle is kept as a whole.
 //!
-//! In the order of the work: `RangeCells` sums the bins of each range cell, `peaks` finds the maxima across azimuths,
-//! and [`PointExtractor`] places the strongest of them.
+//! Steps: `RangeCells` sums the bins of each range cell, `peaks` finds the maxima across azimuths, and [`PointExtractor`]
+//! converts the strongest of them to points.
 
 mod peaks;
 mod range_cells;
@@ -19,25 +19,25 @@ use peaks::{Beam, Peak};
 use range_cells::RangeCells;
 use serde::{Deserialize, Serialize};
 
-/// The most points that may be asked for.
+/// The largest [`PointsConfig::capacity`].
 pub const MAX_POINTS: usize = 65_536;
 
-/// Which returns become points: the section `[points]` of a configuration.
+/// Selection of points: the section `[points]` of a configuration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PointsConfig {
-    /// A return must be the brightest at its range within so many degrees on either side, to the nearest azimuth.
-    /// Default 2.7: three azimuths of 0.9.
+    /// Half width of the non-maximum suppression, degrees, rounded to whole azimuths: a point is the strongest return at its
+    /// range within it. Default 2.7: three azimuths of 0.9.
     pub beam_deg: f32,
-    /// Bins finer than this are averaged to cells of about this depth, metres: a whole number of bins. Default 0.17.
+    /// Approximate depth of a range cell, m, rounded to whole bins. Default 0.17.
     pub range_cell_m: f32,
-    /// What is nearer than this is the vehicle's own reflections. Metres. Default 5.
+    /// Minimum range, m. Nearer returns are reflections of the vehicle itself. Default 5.
     pub min_range_m: f32,
-    /// What is further than this is left out: the beam is metres wide there, and azimuths are noise. Metres. Default 80.
+    /// Maximum range, m. Farther away the beam is metres wide, and bearings are inaccurate. Default 80.
     pub max_range_m: f32,
-    /// Power above the floor from which on a point counts in full. Default 60.
+    /// Power above the floor at which the weight of a point reaches 1. Default 60.
     pub weight_cap: f32,
-    /// The most points of a scan; where there are more, the weakest are left out. 0: none are looked for. Default 8192.
+    /// Maximum number of points per scan; the weakest are dropped. 0 disables the extraction. Default 8192.
     pub capacity: usize,
 }
 
@@ -54,7 +54,7 @@ impl Default for PointsConfig {
     }
 }
 
-/// A setting out of its bounds.
+/// A setting that is out of bounds.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("points.{key} is {value}, but must be {bounds}")]
 pub struct PointsError {
@@ -62,15 +62,15 @@ pub struct PointsError {
     pub key: &'static str,
     /// Its value.
     pub value: f64,
-    /// What it may be.
+    /// Permitted values.
     pub bounds: &'static str,
 }
 
 impl PointsConfig {
-    /// Whether points can be found so.
+    /// Checks the bounds of all settings.
     ///
     /// # Errors
-    /// The first setting that is out of its bounds.
+    /// Returns the first setting that is out of bounds.
     pub fn validate(&self) -> Result<(), PointsError> {
         let setting = |fits: bool, key, value: f32, bounds| match fits {
             true => Ok(()),
@@ -120,18 +120,18 @@ impl PointsConfig {
     }
 }
 
-/// Finds the points of scans, one scan after the other. All memory is set aside by the first scan of a size.
+/// Extracts the points of scans. The first scan of a size allocates the memory.
 #[derive(Debug)]
 pub struct PointExtractor {
     config: PointsConfig,
     cells: RangeCells,
     beam: Beam,
-    /// Peaks by power, while the weakest are left out.
+    /// Histogram of the powers of the peaks, to drop the weakest.
     counts: Vec<u32>,
 }
 
 impl PointExtractor {
-    /// An extractor that has seen no scan yet.
+    /// Returns an extractor.
     ///
     /// # Errors
     /// See [`PointsConfig::validate`].
@@ -145,13 +145,13 @@ impl PointExtractor {
         })
     }
 
-    /// Writes the points of `scan` whose power is above `floor` to the start of `out`, azimuth by azimuth and outward.
+    /// Writes the points of `scan` with a power above `floor` to the start of `out`, ordered by azimuth, then by range.
     /// A point's weight is its power above the floor over [`PointsConfig::weight_cap`], at most 1.
-    /// Returns how many points there are: at most [`PointsConfig::capacity`] and `out.len()`. Azimuths that were not
-    /// measured give none and suppress none.
+    /// Returns the number of points, at most [`PointsConfig::capacity`] and `out.len()`. Azimuths that were not measured
+    /// give no points and suppress none.
     ///
     /// # Errors
-    /// A scan that contradicts itself; `out` is untouched then.
+    /// An inconsistent scan; `out` is unchanged then.
     pub fn extract(
         &mut self,
         scan: &PolarScan<'_>,
@@ -163,10 +163,10 @@ impl PointExtractor {
         if room == 0 {
             return Ok(0);
         }
-        self.cells.measure(scan, floor, &self.config);
+        self.cells.update(scan, floor, &self.config);
         let peaks = self.beam.peaks(scan, &self.cells);
         let weakest = weakest_that_fits(peaks, room, &mut self.counts);
-        let cap = self.config.weight_cap * self.cells.bins_a_cell() as f32;
+        let cap = self.config.weight_cap * self.cells.bins_per_cell() as f32;
         let mut count = 0;
         for peaks in peaks.chunk_by(|a, b| a.azimuth == b.azimuth) {
             let view = View::of(scan, usize::from(peaks[0].azimuth));
@@ -182,7 +182,7 @@ impl PointExtractor {
     }
 }
 
-/// The lowest power that at most `room` peaks reach.
+/// Returns the lowest power that at most `room` peaks reach.
 fn weakest_that_fits(peaks: &[Peak], room: usize, counts: &mut Vec<u32>) -> i16 {
     if peaks.len() <= room {
         return 1;
@@ -201,10 +201,10 @@ fn weakest_that_fits(peaks: &[Peak], room: usize, counts: &mut Vec<u32>) -> i16 
     weakest as i16 + 1
 }
 
-/// What the points of one azimuth have in common.
+/// The common properties of the points of one azimuth.
 struct View {
-    /// Toward where the azimuth looks, x forward and y left.
-    look: [f32; 2],
+    /// Unit vector of the azimuth, x forward and y left.
+    direction: [f32; 2],
     time_s: f32,
     doppler_s: f32,
 }
@@ -217,7 +217,7 @@ impl View {
             Sense::CounterClockwise => sin,
         };
         Self {
-            look: [cos, left],
+            direction: [cos, left],
             time_s: scan.time_s(azimuth) as f32,
             doppler_s: scan.doppler_s(azimuth),
         }
@@ -225,8 +225,8 @@ impl View {
 
     fn point(&self, range_m: f32, weight: f32) -> SparsePoint {
         SparsePoint {
-            x_m: range_m * self.look[0],
-            y_m: range_m * self.look[1],
+            x_m: range_m * self.direction[0],
+            y_m: range_m * self.direction[1],
             time_s: self.time_s,
             weight,
             doppler_s: self.doppler_s,

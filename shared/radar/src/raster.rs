@@ -1,14 +1,15 @@
-//! Polar scan to Cartesian raster, with the azimuths as measured and, on request, the sweep's motion undone.
+//! Conversion of a polar scan to a Cartesian raster, by the measured azimuths, with optional motion compensation.
 //!
-//! A raster is `n x n`, row-major: row 0 is far ahead, column 0 far left, and the sensor stands at the centre of
-//! the middle cell (between the middle cells where `n` is even). Its frame is the sensor's at the scan's stamp,
-//! x forward and y left. A value is the power above a floor.
+//! A raster is `n x n`, row-major: row 0 is far ahead, column 0 far left, and the sensor is at the centre of the middle
+//! cell (between the middle cells where `n` is even). Its frame is the sensor's at the scan's stamp, x forward and
+//! y left. A value is the power above a floor.
 //!
-//! In the order of the work:
-//! 1. `bearing_table`: from an angle to the fractional azimuth measured there, and to the time of measuring;
-//! 2. `polar_image`: the powers above the floor, averaged along range over what one cell covers, at their true ranges;
-//! 3. `kernels::locate`: each cell's place in the polar image, seen from where [`Twist`] puts the sensor, and the
-//!    mean of the four samples around it.
+//! Steps:
+//! 1. `bearing_table`: maps a bearing to the fractional azimuth measured there, and to the time of the measurement;
+//! 2. `polar_image`: the powers above the floor, averaged along range over the depth of a cell, with the Doppler shift
+//!    compensated;
+//! 3. `kernels::locate`: the position of each cell in the polar image, seen from where the [`Twist`] places the sensor,
+//!    and bilinear interpolation there.
 
 mod bearing_table;
 mod cells;
@@ -31,20 +32,20 @@ use std::fmt;
 use sweep_motion::SweepMotion;
 pub use sweep_motion::{MAX_TRAVEL_M, MAX_TURN_RAD};
 
-/// The largest `n` that a raster may have.
-pub const MAX_CELLS_A_SIDE: usize = 4096;
+/// The largest number of cells per side of a raster.
+pub const MAX_CELLS_PER_SIDE: usize = 4096;
 
-/// How a cell's value comes from the range bins.
+/// How the value of a cell is computed from the range bins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sampling {
-    /// The mean of the range bins that one cell covers, bilinear between azimuths: no aliasing where bins are finer
-    /// than cells. Bins are taken together by 2, 4, ... up to an eighth of that depth, so a single bright bin may move
-    /// by a sixteenth of a cell. Azimuths are not averaged: near the sensor, where several fall into one cell, that
-    /// made no trajectory better.
+    /// The mean of the range bins that one cell covers, linear between azimuths: no aliasing where bins are finer than
+    /// cells. Bins are summed in groups of 2, 4, ... up to an eighth of that depth, which may shift a single bright bin
+    /// by a sixteenth of a cell. Azimuths are not averaged: near the sensor, where several fall into one cell, averaging
+    /// improved no trajectory.
     #[default]
     Averaged,
-    /// Bilinear between the four nearest measurements: one point of the scan stands for the whole cell.
+    /// Bilinear between the four nearest measurements: samples one point of the scan per cell.
     Bilinear,
 }
 
@@ -57,19 +58,19 @@ impl fmt::Display for Sampling {
     }
 }
 
-/// What raster to make: the section `[raster]` of a configuration.
+/// Size and sampling of the rasters: the section `[raster]` of a configuration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RasterConfig {
-    /// Cells a side. Odd numbers put the sensor into the middle of a cell.
+    /// Cells per side. With an odd number the sensor is at the centre of a cell.
     pub n: usize,
-    /// Metres a cell.
+    /// Size of a cell, m.
     pub cell_m: f32,
-    /// What is nearer than this is the vehicle or the sensor's ringing, and is blanked. Metres.
+    /// Minimum range, m. Nearer cells, which hold the vehicle or the ringing of the sensor, are set to zero.
     pub min_range_m: f32,
-    /// How a cell's value comes from the range bins: `averaged` or `bilinear`.
+    /// How the value of a cell is computed from the range bins: `averaged` or `bilinear`.
     pub sampling: Sampling,
-    /// What `averaged` takes the mean over: a depth of so many cells. A little more than 1 smooths.
+    /// Depth of the mean of `averaged`, in cells. More than 1 smooths.
     pub averaged_cells: f32,
 }
 
@@ -86,13 +87,13 @@ impl Default for RasterConfig {
 }
 
 impl RasterConfig {
-    /// Whether a raster can be made so.
+    /// Checks the bounds of all settings.
     ///
     /// # Errors
     /// [`RasterError::Setting`] names the first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), RasterError> {
         let setting = |key, value, bounds| Err(RasterError::Setting { key, value, bounds });
-        if !(1..=MAX_CELLS_A_SIDE).contains(&self.n) {
+        if !(1..=MAX_CELLS_PER_SIDE).contains(&self.n) {
             return setting("n", self.n as f64, "1 to 4096");
         }
         if !(1e-3..=100.0).contains(&self.cell_m) {
@@ -108,46 +109,46 @@ impl RasterConfig {
     }
 }
 
-/// Why no raster can be made.
+/// A raster that cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RasterError {
-    /// A setting is out of its bounds.
+    /// A setting is out of bounds.
     #[error("raster.{key} is {value}, but must be {bounds}")]
     Setting {
         /// The setting.
         key: &'static str,
         /// Its value.
         value: f64,
-        /// What it may be.
+        /// Permitted values.
         bounds: &'static str,
     },
-    /// The array for the raster is not a contiguous, row-major `n x n`.
+    /// The array for the raster is not `n x n`, or not contiguous and row-major.
     #[error("the raster needs a contiguous array of {n} x {n} cells, but got {} x {}", actual[0], actual[1])]
     Shape {
-        /// Cells a side.
+        /// Cells per side.
         n: usize,
         /// Rows and columns of the array.
         actual: [usize; 2],
     },
-    /// The scan contradicts itself.
+    /// The scan is inconsistent.
     #[error(transparent)]
     Scan(#[from] ScanError),
-    /// The motion to undo is not finite, or goes further than [`MAX_TURN_RAD`] or [`MAX_TRAVEL_M`].
+    /// The motion to compensate is not finite, or exceeds [`MAX_TURN_RAD`] or [`MAX_TRAVEL_M`].
     #[error(
-        "no sensor turns by {turn_rad} rad and travels {travel_m} m within half a sweep (twist {twist:?})"
+        "a turn of {turn_rad} rad and a travel of {travel_m} m within half a sweep are out of bounds (twist {twist:?})"
     )]
     Twist {
-        /// The motion.
+        /// The twist.
         twist: Twist,
-        /// The turn between the scan's stamp and the azimuth furthest from it in time.
+        /// The turn between the scan's stamp and the azimuth furthest from it in time, rad.
         turn_rad: f64,
-        /// The distance travelled in that time.
+        /// The distance travelled in that time, m.
         travel_m: f64,
     },
 }
 
-/// Makes rasters of scans, one after the other. All memory that depends on the raster is set aside by
-/// [`Rasteriser::new`], all that depends on the scan's size by the first scan of that size.
+/// Converts scans to rasters. [`Rasteriser::new`] allocates the memory that depends on the raster, and the first scan of
+/// a size the memory that depends on the scan.
 #[derive(Debug)]
 pub struct Rasteriser {
     config: RasterConfig,
@@ -158,7 +159,7 @@ pub struct Rasteriser {
 }
 
 impl Rasteriser {
-    /// Sets memory aside and computes where the cells are.
+    /// Allocates memory and computes the positions of the cells.
     ///
     /// # Errors
     /// See [`RasterConfig::validate`].
@@ -178,22 +179,21 @@ impl Rasteriser {
         })
     }
 
-    /// The configuration that it was made with.
+    /// Returns the configuration.
     pub fn config(&self) -> &RasterConfig {
         &self.config
     }
 
-    /// Writes the raster of `scan` to `raster`: `n x n` values, power above `floor`, 0 to `255 - floor`.
+    /// Writes the raster of `scan`: `n x n` powers above `floor`, from 0 to `255 - floor`.
     ///
-    /// With a `twist` the raster shows the scene from where the sensor stood at `scan.geometry.stamp_ns`: each cell
-    /// is looked up where the sensor was when it looked there, by the azimuths' own stamps, and Doppler's shift of the
-    /// ranges is undone where the scan knows it.
-    /// What no azimuth or bin covers is zero; a scan without azimuths or bins gives zeros. Between the last azimuth
-    /// and the first, as between all others, the powers are interpolated.
+    /// With a `twist` the raster is motion-compensated: it shows the scene as seen from the sensor's pose at
+    /// `scan.geometry.stamp_ns`, by the stamps of the azimuths. The Doppler shift of the ranges is compensated where the
+    /// scan's Doppler coefficient is known. Cells that no azimuth or bin covers are zero; a scan without azimuths or bins
+    /// gives zeros. Powers are interpolated between neighbouring azimuths, also between the last and the first.
     ///
     /// # Errors
-    /// A wrong shape or layout of `raster`, a scan that contradicts itself, a twist that is not finite or turns too far.
-    /// `raster` is unchanged then.
+    /// A wrong shape or layout of `raster`, an inconsistent scan, a twist that is not finite or too large. `raster` is
+    /// unchanged then.
     pub fn rasterise(
         &mut self,
         scan: &PolarScan<'_>,
@@ -210,13 +210,13 @@ impl Rasteriser {
         let motion = twist
             .map(|twist| SweepMotion::new(twist, scan))
             .transpose()?;
-        self.bearings.measure(scan);
-        self.cells.look_in(scan.geometry.sense);
+        self.bearings.update(scan);
+        self.cells.set_sense(scan.geometry.sense);
         let travel_m = motion.as_ref().map_or(0.0, |motion| motion.travel_m);
         self.polar.fill(
             scan,
             floor,
-            self.cells.furthest_m + travel_m,
+            self.cells.max_range_m + travel_m,
             motion.as_ref(),
         );
         self.sample(&scan.geometry, motion.as_ref(), cells);
@@ -229,7 +229,7 @@ impl Rasteriser {
             bearings: &self.bearings,
             last_azimuth: geometry.azimuths as i32 - 1,
             stride: stride as i32,
-            columns_a_metre: self.polar.columns_a_metre(),
+            columns_per_metre: self.polar.columns_per_metre(),
             column_at_sensor: self.polar.column_at_sensor(geometry.range_offset_m),
             last_column: (stride - 2) as f32,
             min_range_m: self.config.min_range_m,

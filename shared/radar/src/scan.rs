@@ -1,86 +1,87 @@
-//! One sweep of the radar, in the sensor's own polar grid.
+//! One sweep of the radar in the sensor's polar grid.
 //!
-//! The bytes live wherever the caller keeps them (usually shared memory): [`PolarScan`] borrows them for reading,
-//! [`ScanSlot`] borrows them for a reader of files to fill.
+//! The caller owns the memory (usually shared memory): [`PolarScan`] borrows it for reading, [`ScanSlot`] borrows it for
+//! a dataset reader to fill.
 
 mod check;
 
 pub use check::ScanError;
 use ndarray::{ArrayView2, ShapeBuilder};
 
-/// Most azimuths in one sweep. Navtech's radars measure 400, some 800.
+/// The largest number of azimuths in a sweep. Navtech radars measure 400, some 800.
 pub const MAX_AZIMUTHS: usize = 1024;
 
-/// Which way the azimuths grow, seen from above.
+/// The direction in which azimuths increase, seen from above.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sense {
-    /// Ahead, right, behind, left: Navtech's sensors.
+    /// Ahead, right, behind, left: Navtech sensors.
     Clockwise,
     /// Ahead, left, behind, right.
     CounterClockwise,
 }
 
-/// What an azimuth's flag byte says; several may hold.
+/// Bits of an azimuth's flag byte.
 pub mod flag {
-    /// The row was measured (not filled in from its neighbours).
+    /// The azimuth was measured, not interpolated from its neighbours.
     pub const MEASURED: u8 = 1;
-    /// The row was measured with a rising chirp (sensors that alternate; see [`CHIRP_KNOWN`]).
+    /// The azimuth was measured with a rising chirp; valid only with [`CHIRP_KNOWN`].
     pub const CHIRP_UP: u8 = 2;
-    /// The sensor says which chirp each azimuth used, so that [`CHIRP_UP`] means something.
+    /// The sensor reports the chirp of each azimuth in [`CHIRP_UP`].
     pub const CHIRP_KNOWN: u8 = 4;
 }
 
-/// Where the powers lie in a scan's bytes, and what they measure.
+/// The layout of the powers in the bytes of a scan, and their scale.
 ///
-/// The power of azimuth `a` at range bin `b` is byte `first_byte + a * stride + b`. Rows keep the bytes
-/// that a file puts before each row (Oxford: 11), so that an image decodes in place.
+/// The power of azimuth `a` at range bin `b` is byte `first_byte + a * stride + b`. Rows keep the metadata bytes that a
+/// file stores before each row (Oxford: 11), so that an image decodes in place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SweepGeometry {
-    /// Rows: azimuths in this sweep.
+    /// Number of azimuths (rows).
     pub azimuths: usize,
-    /// Columns: range bins of an azimuth.
+    /// Number of range bins per azimuth (columns).
     pub bins: usize,
-    /// Bytes from one azimuth's first bin to the next azimuth's.
+    /// Bytes between the first bins of consecutive azimuths.
     pub stride: usize,
-    /// The first azimuth's first bin.
+    /// Index of the first azimuth's first bin.
     pub first_byte: usize,
-    /// Metres a range bin.
+    /// Depth of a range bin, m.
     pub range_resolution_m: f32,
-    /// Metres to add to a bin's range: bin `b`'s centre is at `(b + 0.5) * range_resolution_m + range_offset_m`.
+    /// Offset of the ranges, m: the centre of bin `b` is at `(b + 0.5) * range_resolution_m + range_offset_m`.
     pub range_offset_m: f32,
-    /// Metres to add to a range for each m/s at which the sensor approaches what it looks at (Doppler's shift of a chirp),
-    /// 0 where it is not known. What approaches reads too near with a rising chirp, so this is positive there, and
-    /// negative with a falling one; azimuths that say which chirp they used take their sign from that.
+    /// Doppler coefficient, s: metres to add to a range for each m/s of closing speed; 0 if unknown. With a rising chirp
+    /// an approaching target appears too near, so the coefficient is positive, and with a falling chirp negative. Where
+    /// the chirp of an azimuth is known, it determines the sign.
     pub doppler_s: f32,
-    /// Which way the azimuths grow.
+    /// The direction in which azimuths increase.
     pub sense: Sense,
-    /// The scan's time, ns since 1970: the middle of the sweep on the sensor's clock, unless the reader says otherwise.
+    /// Time of the scan, ns since 1970: the middle of the sweep on the sensor's clock, unless the reader documents otherwise.
     pub stamp_ns: i64,
 }
 
-/// A scan to read: `azimuths x bins` powers with the angle and time of each azimuth.
+/// A borrowed scan: `azimuths x bins` powers, with the angle and time of each azimuth.
 #[derive(Clone, Copy, Debug)]
 pub struct PolarScan<'a> {
-    /// Where the powers lie and what they measure.
+    /// Layout and scale of the powers.
     pub geometry: SweepGeometry,
     /// All bytes of the scan.
     pub bytes: &'a [u8],
-    /// Angle of each azimuth from straight ahead, radians in `[0, 2 pi)`, growing in `geometry.sense`, as the sensor measured it.
+    /// Measured angle of each azimuth from straight ahead, rad in `[0, 2 pi)`, increasing in the direction of
+    /// `geometry.sense`.
     pub azimuth_rad: &'a [f32],
     /// Time of each azimuth, ns since 1970, on the sensor's clock.
     pub stamp_ns: &'a [i64],
-    /// What is known of each azimuth; see [`flag`].
+    /// Flags of each azimuth; see [`flag`].
     pub flags: &'a [u8],
 }
 
 impl<'a> PolarScan<'a> {
-    /// The powers of one azimuth, nearest first.
+    /// The powers of one azimuth, nearest bin first.
     pub fn row(&self, azimuth: usize) -> &'a [u8] {
         let first = self.geometry.first_byte + azimuth * self.geometry.stride;
         &self.bytes[first..first + self.geometry.bins]
     }
 
-    /// The powers, azimuth x range bin: a view of the scan's bytes that skips what lies between rows.
+    /// The powers, azimuth x range bin: a strided view of the bytes, without the metadata between rows.
     ///
     /// # Panics
     /// If the scan does not pass [`PolarScan::check`].
@@ -97,12 +98,13 @@ impl<'a> PolarScan<'a> {
         ArrayView2::from_shape(shape, bytes).expect("the scan passes its check")
     }
 
-    /// Seconds from the scan's stamp to an azimuth's.
+    /// Time of an azimuth relative to the scan's stamp, s.
     pub fn time_s(&self, azimuth: usize) -> f64 {
         self.stamp_ns[azimuth].saturating_sub(self.geometry.stamp_ns) as f64 * 1e-9
     }
 
-    /// [`SweepGeometry::doppler_s`] of one azimuth, its sign by the azimuth's chirp where that is known.
+    /// Doppler coefficient of one azimuth, s: [`SweepGeometry::doppler_s`] with the sign of the azimuth's chirp where it
+    /// is known.
     pub fn doppler_s(&self, azimuth: usize) -> f32 {
         let shift_s = self.geometry.doppler_s;
         match self.flags[azimuth] & (flag::CHIRP_KNOWN | flag::CHIRP_UP) {
@@ -112,38 +114,38 @@ impl<'a> PolarScan<'a> {
         }
     }
 
-    /// Range of a bin's centre in metres, Doppler's shift included; fractions of a bin are welcome.
+    /// Range of the centre of a bin as measured (no Doppler compensation), m. Accepts fractional bins.
     pub fn range_m(&self, bin: f32) -> f32 {
         (bin + 0.5) * self.geometry.range_resolution_m + self.geometry.range_offset_m
     }
 }
 
-/// Where a reader of files puts a scan. All slices are at least as long as the dataset's [`ScanLimits`] say.
+/// Memory that a dataset reader fills with a scan. Each slice is at least as long as the dataset's [`ScanLimits`].
 #[derive(Debug)]
 pub struct ScanSlot<'a> {
-    /// For the image's bytes.
+    /// Bytes of the image.
     pub bytes: &'a mut [u8],
-    /// For the angle of each azimuth.
+    /// See [`PolarScan::azimuth_rad`].
     pub azimuth_rad: &'a mut [f32],
-    /// For the time of each azimuth.
+    /// See [`PolarScan::stamp_ns`].
     pub stamp_ns: &'a mut [i64],
-    /// For each azimuth's flags.
+    /// See [`PolarScan::flags`].
     pub flags: &'a mut [u8],
 }
 
-/// The largest scan of a dataset: what memory to set aside.
+/// The size of the largest scan of a dataset, for allocation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ScanLimits {
     /// Bytes of the image.
     pub bytes: usize,
-    /// Azimuths, at most [`MAX_AZIMUTHS`].
+    /// Number of azimuths, at most [`MAX_AZIMUTHS`].
     pub azimuths: usize,
 }
 
-/// A scan in memory of its own: for tests, tools and generators.
+/// A scan that owns its memory: for tests, tools and generators.
 #[derive(Clone, Debug)]
 pub struct OwnedScan {
-    /// Where the powers lie and what they measure.
+    /// Layout and scale of the powers.
     pub geometry: SweepGeometry,
     /// All bytes of the scan.
     pub bytes: Vec<u8>,
@@ -156,7 +158,8 @@ pub struct OwnedScan {
 }
 
 impl OwnedScan {
-    /// An empty scan with room for `limits`; give its [`OwnedScan::slot`] to a reader and keep the geometry that comes back.
+    /// Returns an empty scan with the capacity `limits`. Pass its [`OwnedScan::slot`] to a reader, and assign the
+    /// geometry that the reader returns.
     pub fn with_limits(limits: ScanLimits) -> Self {
         Self {
             geometry: SweepGeometry {
@@ -177,7 +180,7 @@ impl OwnedScan {
         }
     }
 
-    /// The memory to fill.
+    /// Returns the memory to fill.
     pub fn slot(&mut self) -> ScanSlot<'_> {
         ScanSlot {
             bytes: &mut self.bytes,
@@ -187,7 +190,7 @@ impl OwnedScan {
         }
     }
 
-    /// The scan, for reading.
+    /// Returns a view of the scan.
     pub fn view(&self) -> PolarScan<'_> {
         let azimuths = self.geometry.azimuths;
         PolarScan {

@@ -1,29 +1,29 @@
-//! Poses along a drive, in the plane.
+//! Trajectories in the plane.
 
 use gyre_geometry::{Pose, interpolate};
 use nalgebra::{Complex, Translation2, Unit, UnitComplex};
 
-/// Poses of the sensor, REP-103 (x forward, y left, yaw counter-clockwise; m, rad), in a world frame that its source chose.
+/// Poses of the sensor (REP-103) in the world frame of the source.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trajectory {
-    /// Time of each pose, ns (since 1970 in recordings), never decreasing; `None` where the source knows no times.
+    /// Time of each pose, ns (since 1970 in recordings), non-decreasing; `None` if the source has no times.
     pub stamp_ns: Option<Vec<i64>>,
-    /// The sensor in the world: as many as stamps.
+    /// Pose of the sensor in the world frame, one per stamp.
     pub poses: Vec<Pose>,
 }
 
 impl Trajectory {
-    /// Poses.
+    /// Number of poses.
     pub fn len(&self) -> usize {
         self.poses.len()
     }
 
-    /// Whether there is no pose.
+    /// Returns whether there is no pose.
     pub fn is_empty(&self) -> bool {
         self.poses.is_empty()
     }
 
-    /// Sum of the steps between poses, m.
+    /// Length of the path, m: the sum of the distances between consecutive poses.
     pub fn path_length_m(&self) -> f64 {
         self.poses
             .windows(2)
@@ -31,7 +31,7 @@ impl Trajectory {
             .sum()
     }
 
-    /// Whether the poses have headings, rather than one filled-in value for all.
+    /// Returns whether the poses have headings, rather than one constant value.
     pub fn has_heading(&self) -> bool {
         self.poses
             .windows(2)
@@ -44,7 +44,7 @@ impl Trajectory {
         Some((*stamps.first()?, *stamps.last()?))
     }
 
-    /// The pose at a time: on the straight line between its neighbours, the angle likewise. `None` outside the span.
+    /// Returns the pose at a time, linearly interpolated. `None` outside the time span.
     pub fn at(&self, stamp_ns: i64) -> Option<Pose> {
         let stamps = self.stamp_ns.as_ref()?;
         let after = stamps.partition_point(|s| *s < stamp_ns);
@@ -57,7 +57,7 @@ impl Trajectory {
         Some(interpolate(a, b, share))
     }
 
-    /// As [`Trajectory::at`]; times that miss the span by no more than `tolerance_ns` are its ends, for files round.
+    /// As [`Trajectory::at`], but accepts times up to `tolerance_ns` outside the span, since files round stamps.
     pub fn near(&self, stamp_ns: i64, tolerance_ns: u64) -> Option<Pose> {
         let (first, last) = self.span_ns()?;
         let within = stamp_ns.clamp(first, last);
@@ -65,7 +65,7 @@ impl Trajectory {
             .filter(|_| within.abs_diff(stamp_ns) <= tolerance_ns)
     }
 
-    /// Time between the poses around a time, ns: 0 at a pose, `None` outside the span.
+    /// Time between the poses around a time, ns: 0 at a pose, `None` outside the time span.
     pub fn gap_ns(&self, stamp_ns: i64) -> Option<u64> {
         let stamps = self.stamp_ns.as_ref()?;
         let after = stamps.partition_point(|s| *s < stamp_ns);
@@ -77,10 +77,10 @@ impl Trajectory {
     }
 }
 
-/// A pose in the plane from the first two rows of a row-major 3 x 4 matrix; the heading is that of the x axis.
+/// Returns the planar pose of a row-major 3 x 4 matrix; the heading is that of the x axis.
 ///
-/// Cosine and sine stay as they were written where they fit each other: published KITTI figures come from matrices rounded to six
-/// decimals, and putting those right changes the fifth decimal of the result.
+/// Cosine and sine are taken without normalisation if their norm is near 1: published KITTI results come from matrices
+/// rounded to six decimals, and normalising them changes the fifth decimal of the result.
 pub(crate) fn planar(matrix: &[f64; 12]) -> Pose {
     let (cos, sin) = (matrix[0], matrix[4]);
     let rotation = match (cos.hypot(sin) - 1.0).abs() < 1e-4 {
@@ -98,7 +98,7 @@ mod tests {
     use std::f64::consts::PI;
 
     #[test]
-    fn between_poses_the_angle_takes_the_short_way() {
+    fn interpolation_turns_the_shorter_way() {
         let trajectory = Trajectory {
             stamp_ns: Some(vec![0, 100]),
             poses: vec![pose(0.0, 0.0, PI - 0.1), pose(2.0, 0.0, -PI + 0.1)],
@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn near_an_end_is_the_end_and_gaps_are_as_wide_as_the_poses_are_apart() {
+    fn times_within_the_tolerance_are_clamped_and_gaps_are_measured() {
         let poses = [1.0, 2.0, 4.0].map(|x| pose(x, 0.0, 0.0)).to_vec();
         let trajectory = Trajectory {
             stamp_ns: Some(vec![0, 100, 150]),

@@ -1,4 +1,4 @@
-//! What `inspect` finds by itself.
+//! Findings of `inspect` on real and generated datasets.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -13,24 +13,24 @@ fn report(folder: &str, trajectory: Option<&Trajectory>) -> Option<Report> {
     Some(report)
 }
 
-fn says(report: &Report, words: &[&str]) -> bool {
+fn mentions(report: &Report, words: &[&str]) -> bool {
     report
-        .oddities
+        .findings
         .iter()
         .any(|sentence| words.iter().all(|word| sentence.contains(word)))
 }
 
 #[track_caller]
-fn assert_says(report: &Report, words: &[&str]) {
+fn assert_mentions(report: &Report, words: &[&str]) {
     assert!(
-        says(report, words),
+        mentions(report, words),
         "nothing of {words:?} in {:#?}",
-        report.oddities
+        report.findings
     );
 }
 
 #[test]
-fn radiate_names_its_stalls_its_stamps_and_its_images() {
+fn stalls_stamps_and_transposed_images_of_radiate_are_reported() {
     let Some(report) = report("radiate-2019-02-12", None) else {
         return;
     };
@@ -45,20 +45,20 @@ fn radiate_names_its_stalls_its_stamps_and_its_images() {
         "{}",
         timing.period_s
     );
-    assert_says(&report, &["stalled 7 times"]);
-    assert_says(&report, &["without leading zeros"]);
-    assert_says(&report, &["on their side", "576"]);
-    assert_says(&report, &["Range bins 0 to 10", "ringing"]);
-    assert!(report.on_their_side && (report.max_range_m - 99.9).abs() < 0.1);
+    assert_mentions(&report, &["stalled 7 times"]);
+    assert_mentions(&report, &["without leading zeros"]);
+    assert_mentions(&report, &["transposed", "576"]);
+    assert_mentions(&report, &["Range bins 0 to 10", "ringing"]);
+    assert!(report.transposed && (report.max_range_m - 99.9).abs() < 0.1);
 }
 
 #[test]
-fn a_late_truth_is_found_once_a_trajectory_is_given() {
+fn a_late_ground_truth_is_detected_with_a_trajectory() {
     let Some(root) = real("radiate-2019-02-12") else {
         return;
     };
     let truth = read_trajectory(&root.join("ground_truth.tum")).unwrap();
-    // Something like an odometry result: every fifth pose, 4 Hz.
+    // Like an odometry result: every fifth pose, 4 Hz.
     let every = |n: usize| Trajectory {
         stamp_ns: truth
             .stamp_ns
@@ -69,7 +69,7 @@ fn a_late_truth_is_found_once_a_trajectory_is_given() {
     let report = report("radiate-2019-02-12", Some(&every(5))).unwrap();
     let clock = |name: &str| {
         report
-            .truths
+            .ground_truths
             .iter()
             .find(|t| t.file.ends_with(name))
             .unwrap()
@@ -79,12 +79,12 @@ fn a_late_truth_is_found_once_a_trajectory_is_given() {
     assert!(clock("ground_truth.tum").agrees());
     let late = clock("gnss_as_logged.tum");
     assert!((1.4..1.7).contains(&late.late_s), "{late:?}");
-    assert_says(&report, &["gnss_as_logged.tum", "late"]);
-    assert!(!says(&report, &["ground_truth.tum is"]));
+    assert_mentions(&report, &["gnss_as_logged.tum", "late"]);
+    assert!(!mentions(&report, &["ground_truth.tum is"]));
 }
 
 #[test]
-fn tiny_foggy_has_no_truth_and_no_stall() {
+fn tiny_foggy_has_no_ground_truth_and_no_stall() {
     let Some(report) = report("radiate-tiny_foggy", None) else {
         return;
     };
@@ -92,29 +92,29 @@ fn tiny_foggy_has_no_truth_and_no_stall() {
         (report.scans, report.timing.as_ref().unwrap().stalls.len()),
         (18, 0)
     );
-    assert_says(&report, &["on their side"]);
-    assert_says(&report, &["No ground truth"]);
+    assert_mentions(&report, &["transposed"]);
+    assert_mentions(&report, &["No ground truth"]);
 }
 
 #[test]
-fn oxford_names_its_resolution_and_its_bursts() {
+fn resolution_and_bursts_of_oxford_are_reported() {
     let Some(report) = report("oxford-2019-01-10-14-36-48", None) else {
         return;
     };
-    assert_says(&report, &["0.0438 m", "0.0432"]);
-    assert_says(&report, &["bursts"]);
+    assert_mentions(&report, &["0.0438 m", "0.0432"]);
+    assert_mentions(&report, &["bursts"]);
     assert_eq!(
         (report.rows.rows, report.rows.not_measured, report.rows.lost),
         (4400, 0, 0)
     );
     assert!((report.rows.first_azimuth_deg.0 - 0.836).abs() < 1e-3);
-    let truth = &report.truths[0];
+    let truth = &report.ground_truths[0];
     assert_eq!((truth.poses, truth.scans_covered), (11, Some(11)));
     assert!(truth.nearest_pose_s.unwrap() < 2e-3, "{truth:?}");
 }
 
 #[test]
-fn boreas_rt_and_fomo_say_what_they_are() {
+fn boreas_rt_and_fomo_are_reported() {
     let Some(rt) = report("samples/boreas-rt-2024-12-03", None) else {
         return;
     };
@@ -122,17 +122,17 @@ fn boreas_rt_and_fomo_say_what_they_are() {
         (rt.format.name(), rt.rows.chirps, rt.rows.not_measured),
         ("boreas-rt", Chirps::Alternating, 0)
     );
-    assert_says(&rt, &["Byte 10 alternates", "chirp"]);
-    assert_says(&rt, &["one scan only"]);
+    assert_mentions(&rt, &["Byte 10 alternates", "chirp"]);
+    assert_mentions(&rt, &["only one scan"]);
     let fomo = report("samples/fomo-2025-10-14", None).unwrap();
     assert_eq!(
         (fomo.format.name(), fomo.rows.chirps, fomo.rows.not_measured),
         ("fomo", Chirps::Unknown, 0)
     );
-    assert_says(&fomo, &["one scan only"]);
-    assert_says(&fomo, &["Byte 10 is 0"]);
-    assert_says(&fomo, &["gt.txt", "positions only"]);
-    assert_says(&fomo, &["encoder_counts = 5600"]);
+    assert_mentions(&fomo, &["only one scan"]);
+    assert_mentions(&fomo, &["Byte 10 is 0"]);
+    assert_mentions(&fomo, &["gt.txt", "positions only"]);
+    assert_mentions(&fomo, &["encoder_counts = 5600"]);
 }
 
 #[test]
@@ -142,7 +142,7 @@ fn gaps_lost_rows_and_damaged_files_are_counted() {
     std::fs::remove_file(&files[4]).unwrap();
     let whole = std::fs::read(&files[7]).unwrap();
     std::fs::write(&files[7], &whole[..whole.len() / 2]).unwrap();
-    // Every tenth row filled in, one lost: 39 rows where the first image has 40 would be another size, so the last step is double.
+    // Every tenth row interpolated, and one lost: since all images must have 40 rows, the last step is double.
     let sweep = Sweep {
         start: common::START_US + 9 * common::PERIOD_US,
         byte_ten: |row| if row % 10 == 3 { 0 } else { 255 },
@@ -163,14 +163,14 @@ fn gaps_lost_rows_and_damaged_files_are_counted() {
     );
     assert_eq!((report.unreadable.len(), report.unreadable[0].scan), (1, 6));
     assert_eq!((report.rows.not_measured, report.rows.lost), (4, 1));
-    assert_says(&report, &["1 scan is missing, before scans 4"]);
-    assert_says(&report, &["cut short"]);
+    assert_mentions(&report, &["1 scan is missing, before scans 4"]);
+    assert_mentions(&report, &["truncated"]);
     let json = serde_json::to_string(&report).unwrap();
     assert!(json.contains("\"missing_scans\":1") && json.contains("\"format\":\"oxford\""));
 }
 
 #[test]
-fn an_untroubled_dataset_has_little_to_tell() {
+fn a_dataset_without_faults_has_few_findings() {
     let root = tempfile::tempdir().unwrap();
     write_radiate(root.path(), 9);
     let report = inspect(root.path(), &DatasetOptions::default(), None).unwrap();
@@ -184,6 +184,8 @@ fn an_untroubled_dataset_has_little_to_tell() {
         (0, 0, 0)
     );
     assert!(
-        !says(&report, &["stalled"]) && !says(&report, &["lost"]) && report.unreadable.is_empty()
+        !mentions(&report, &["stalled"])
+            && !mentions(&report, &["lost"])
+            && report.unreadable.is_empty()
     );
 }

@@ -1,4 +1,4 @@
-//! Each reader on real scans.
+//! The readers on real scans.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -14,7 +14,7 @@ fn opened(folder: &str) -> Option<Box<dyn Dataset>> {
     Some(open(&real(folder)?, &DatasetOptions::default()).unwrap())
 }
 
-/// The image by another way: the whole of it, as the decoder gives it.
+/// The image as decoded, without a reader.
 fn decoded(path: &Path) -> (usize, usize, Vec<u8>) {
     let mut reader = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(path).unwrap()))
         .read_info()
@@ -62,7 +62,7 @@ fn oxford_scans_decode_in_place_with_true_azimuths() {
 }
 
 #[test]
-fn oxford_scan_times_are_the_ground_truths() {
+fn oxford_scan_times_equal_those_of_the_ground_truth() {
     let Some(mut oxford) = opened("oxford-2019-01-10-14-36-48") else {
         return;
     };
@@ -86,7 +86,7 @@ fn oxford_scan_times_are_the_ground_truths() {
 }
 
 #[test]
-fn oxford_row_stamps_are_smooth_and_keep_to_the_sweep() {
+fn oxford_row_stamps_are_smooth_and_start_with_the_sweep() {
     let Some(mut oxford) = opened("oxford-2019-01-10-14-36-48") else {
         return;
     };
@@ -112,12 +112,12 @@ fn oxford_row_stamps_are_smooth_and_keep_to_the_sweep() {
 }
 
 #[test]
-fn radiate_images_are_turned_and_its_clock_is_even() {
+fn radiate_images_are_transposed_and_the_clock_is_uniform() {
     let Some(mut radiate) = opened("radiate-2019-02-12") else {
         return;
     };
     assert_eq!(
-        (radiate.format(), radiate.len(), radiate.on_their_side()),
+        (radiate.format(), radiate.len(), radiate.is_transposed()),
         (Format::Radiate, 466, true)
     );
     let mut stamps = Vec::new();
@@ -137,13 +137,13 @@ fn radiate_images_are_turned_and_its_clock_is_even() {
         );
         stamps.push((index as f64, scan.geometry.stamp_ns));
     }
-    // The yardstick's clock: 1549986607.7092834 s + k * 0.25002 s, and the mean of 400 columns.
+    // Reference clock: 1549986607.7092834 s + k * 0.25002 s, and the mean of 400 columns.
     for (index, stamp) in stamps {
-        let yardstick = 0.7092834 + index * 0.25002 + 0.25002 * 399.0 / 800.0;
+        let reference = 0.7092834 + index * 0.25002 + 0.25002 * 399.0 / 800.0;
         let found = (stamp - 1_549_986_607_000_000_000) as f64 * 1e-9;
         assert!(
-            (found - yardstick).abs() < 2e-3,
-            "scan {index}: {found} and {yardstick}"
+            (found - reference).abs() < 2e-3,
+            "scan {index}: {found} and {reference}"
         );
     }
 }
@@ -166,7 +166,7 @@ fn no_radiate_scan_is_received_before_its_sweep_starts() {
 }
 
 #[test]
-fn boreas_rt_is_told_by_its_chirps() {
+fn boreas_rt_is_detected_by_its_chirps() {
     let Some(mut scans) = opened("samples/boreas-rt-2024-12-03") else {
         return;
     };
@@ -202,7 +202,7 @@ fn boreas_rt_is_told_by_its_chirps() {
 }
 
 #[test]
-fn fomo_is_told_by_its_name_and_keeps_all_rows() {
+fn fomo_is_detected_by_its_name_and_keeps_all_rows() {
     let Some(mut scans) = opened("samples/fomo-2025-10-14") else {
         return;
     };

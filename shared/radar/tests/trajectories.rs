@@ -1,4 +1,4 @@
-//! Ground truth and pose files, real and written.
+//! Ground truth and pose files, real and generated.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -33,8 +33,8 @@ fn row(from: i64, to: i64, x: f64, y: f64, yaw: f64) -> String {
 }
 
 #[test]
-fn oxford_motions_turn_to_rep_103_and_chain_from_identity() {
-    // Ahead by 2 m turning right by 90 degrees, then 1 m ahead and 0.5 m to the right. The rows' order does not matter.
+fn oxford_motions_are_converted_to_rep_103_and_composed_from_identity() {
+    // 2 m ahead with a right turn of 90 degrees, then 1 m ahead and 0.5 m to the right. Rows may be in any order.
     let quarter = std::f64::consts::FRAC_PI_2;
     let text = [
         HEADER,
@@ -71,7 +71,7 @@ fn a_gap_in_oxford_motions_is_an_error_with_its_line() {
 }
 
 #[test]
-fn the_oxford_drive_is_nine_kilometres_and_comes_back() {
+fn the_oxford_drive_is_nine_kilometres() {
     let Some(root) = real("trajectories") else {
         return;
     };
@@ -84,7 +84,7 @@ fn the_oxford_drive_is_nine_kilometres_and_comes_back() {
         trajectory.path_length_m()
     );
     let golden = read_trajectory(&real("golden/csv-chain").unwrap().join("estimate.txt")).unwrap();
-    // The estimate is that of an odometry with y as it lies in its file: the paths' lengths agree, whatever the hand.
+    // The estimate was made without mirroring y; the lengths of the paths agree nevertheless.
     let ratio = golden.path_length_m() / trajectory.path_length_m();
     assert!((0.98..1.03).contains(&ratio), "{ratio}");
 }
@@ -139,7 +139,7 @@ fn real_kitti_and_tum_files_are_read() {
 }
 
 #[test]
-fn a_tum_yaw_survives_roll_and_pitch() {
+fn tum_yaw_is_independent_of_roll_and_pitch() {
     let rotation = nalgebra::UnitQuaternion::from_euler_angles(0.3, -0.2, 1.1);
     let q = rotation.coords;
     let text = format!("# comment\n1.5 1 2 3 {} {} {} {}\n", q.x, q.y, q.z, q.w);
@@ -150,7 +150,7 @@ fn a_tum_yaw_survives_roll_and_pitch() {
 
 #[test]
 fn boreas_odometry_files_are_inverted_and_mirrored() {
-    // First frame in the sensor's, 2 m ahead and a right turn of 0.1 rad later (y right, yaw clockwise).
+    // The first frame in the sensor frame after 2 m ahead and a right turn of 0.1 rad (y right, yaw clockwise).
     let later = Isometry2::new(Vector2::new(2.0, 0.3), 0.1);
     let m = later.inverse().to_homogeneous();
     let line = |t: i64, m: &nalgebra::Matrix3<f64>| {
@@ -177,7 +177,7 @@ fn boreas_odometry_files_are_inverted_and_mirrored() {
 }
 
 #[test]
-fn bad_files_are_refused_with_their_line() {
+fn invalid_files_are_rejected_with_their_line() {
     let cases = [
         ("", "empty"),
         ("1 2 3\n", "3 columns"),
@@ -200,7 +200,7 @@ fn bad_files_are_refused_with_their_line() {
 }
 
 #[test]
-fn ground_truth_is_found_where_each_dataset_keeps_it() {
+fn ground_truth_is_found_at_the_path_of_each_dataset() {
     for place in [
         "ground_truth.tum",
         "gt/radar_odometry.csv",
@@ -252,7 +252,7 @@ fn assert_close(a: &Trajectory, b: &Trajectory) {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
     #[test]
-    fn written_trajectories_come_back(written in trajectory()) {
+    fn written_trajectories_are_read_back(written in trajectory()) {
         let (mut tum, mut kitti) = (Vec::new(), Vec::new());
         write_tum(&written, &mut tum).unwrap();
         write_kitti(&written, &mut kitti).unwrap();

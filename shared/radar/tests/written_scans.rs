@@ -1,4 +1,4 @@
-//! Readers on small written datasets, good and bad.
+//! Readers on small generated datasets, valid and invalid.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -23,7 +23,7 @@ fn opened(root: &Path) -> Box<dyn Dataset> {
     open(root, &DatasetOptions::default()).unwrap()
 }
 
-fn refused(root: &Path) -> OpenError {
+fn rejected(root: &Path) -> OpenError {
     open(root, &DatasetOptions::default()).err().unwrap()
 }
 
@@ -32,7 +32,7 @@ fn first_scan(root: &Path) -> Result<OwnedScan, ReadError> {
 }
 
 #[test]
-fn written_powers_come_back() {
+fn written_powers_are_read_back() {
     let root = folder();
     write_oxford(root.path(), 3);
     let mut dataset = opened(root.path());
@@ -55,7 +55,7 @@ fn written_powers_come_back() {
 }
 
 #[test]
-fn a_radar_of_another_encoder_and_period_is_read_with_options_alone() {
+fn a_radar_with_another_encoder_and_period_needs_options_only() {
     let root = folder();
     let turn_us = 1_000_000;
     for start in [START_US, START_US + turn_us, START_US + 2 * turn_us] {
@@ -90,7 +90,7 @@ fn a_radar_of_another_encoder_and_period_is_read_with_options_alone() {
 }
 
 #[test]
-fn sideways_powers_come_back_turned() {
+fn transposed_powers_are_transposed_back() {
     let root = folder();
     write_radiate(root.path(), 4);
     let mut dataset = opened(root.path());
@@ -116,7 +116,7 @@ fn sideways_powers_come_back_turned() {
 }
 
 #[test]
-fn a_damaged_image_in_the_middle_leaves_the_others_readable() {
+fn a_corrupt_image_in_the_middle_leaves_the_others_readable() {
     let root = folder();
     let files = write_oxford(root.path(), 7);
     let whole = fs::read(&files[1]).unwrap();
@@ -127,19 +127,19 @@ fn a_damaged_image_in_the_middle_leaves_the_others_readable() {
         ..Sweep::default()
     }
     .write(&files[3]);
-    fs::write(&files[4], b"not a picture").unwrap();
+    fs::write(&files[4], b"not an image").unwrap();
     fs::write(&files[5], b"").unwrap();
     let mut dataset = opened(root.path());
     let mut error = |index| read(dataset.as_mut(), index).err();
     assert!(matches!(error(1), Some(ReadError::Truncated { .. })));
-    let (turned, short) = (error(2).unwrap().to_string(), error(3).unwrap().to_string());
+    let (rotated, short) = (error(2).unwrap().to_string(), error(3).unwrap().to_string());
     assert!(
-        turned.contains("40 columns x 71 rows")
-            && turned.ends_with("it lies rotated by 90 degrees"),
-        "{turned}"
+        rotated.contains("40 columns x 71 rows")
+            && rotated.ends_with("it is rotated by 90 degrees"),
+        "{rotated}"
     );
     assert!(
-        short.ends_with("first image is 71 columns x 40 rows"),
+        short.ends_with("first image of the dataset is 71 columns x 40 rows"),
         "{short}"
     );
     assert!(matches!(error(4), Some(ReadError::NotPng { .. })));
@@ -155,7 +155,7 @@ fn a_damaged_image_in_the_middle_leaves_the_others_readable() {
 }
 
 #[test]
-fn every_cut_of_an_image_gives_an_error_and_no_panic() {
+fn a_truncated_or_corrupt_image_gives_an_error_and_no_panic() {
     let root = folder();
     let files = write_oxford(root.path(), 2);
     let whole = fs::read(&files[1]).unwrap();
@@ -178,7 +178,7 @@ fn every_cut_of_an_image_gives_an_error_and_no_panic() {
 }
 
 #[test]
-fn other_pixels_than_grey_bytes_are_refused() {
+fn other_pixels_than_grey_bytes_are_rejected() {
     let root = folder();
     let files = write_oxford(root.path(), 2);
     let file = fs::File::create(&files[1]).unwrap();
@@ -194,24 +194,24 @@ fn other_pixels_than_grey_bytes_are_refused() {
 }
 
 #[test]
-fn a_header_that_promises_too_much_takes_no_memory() {
+fn an_oversized_header_allocates_no_memory() {
     let root = folder();
     let files = write_oxford(root.path(), 1);
     let mut bytes = fs::read(&files[0]).unwrap();
     bytes[16..24].copy_from_slice(&[0x7f, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff]);
     fs::write(&files[0], bytes).unwrap();
     assert!(matches!(
-        refused(root.path()),
+        rejected(root.path()),
         OpenError::FirstImage(ReadError::TooLarge { .. })
     ));
 }
 
 #[test]
-fn a_slot_that_is_too_small_is_refused() {
+fn a_slot_that_is_too_small_is_rejected() {
     let root = folder();
     write_oxford(root.path(), 1);
-    write_radiate(&root.path().join("sideways"), 1);
-    for path in [root.path().to_owned(), root.path().join("sideways")] {
+    write_radiate(&root.path().join("transposed"), 1);
+    for path in [root.path().to_owned(), root.path().join("transposed")] {
         let mut dataset = opened(&path);
         let limits = dataset.limits();
         for small in [
@@ -237,21 +237,21 @@ fn a_slot_that_is_too_small_is_refused() {
 }
 
 #[test]
-fn rows_that_are_no_sweep_are_refused() {
+fn rows_that_are_not_one_sweep_are_rejected() {
     let cases: [(Sweep, &str); 5] = [
         (
             Sweep {
                 step: 0,
                 ..Sweep::default()
             },
-            "azimuth does not grow",
+            "azimuth does not increase",
         ),
         (
             Sweep {
                 step: 5500,
                 ..Sweep::default()
             },
-            "azimuth does not grow",
+            "azimuth does not increase",
         ),
         (
             Sweep {
@@ -285,7 +285,7 @@ fn rows_that_are_no_sweep_are_refused() {
 }
 
 #[test]
-fn an_encoder_of_another_size_is_named_and_can_be_set() {
+fn an_encoder_of_another_size_is_reported_and_can_be_configured() {
     let root = folder();
     let files = write_oxford(root.path(), 1);
     let sweep = Sweep::default();
@@ -322,7 +322,7 @@ fn an_encoder_of_another_size_is_named_and_can_be_set() {
 }
 
 #[test]
-fn byte_ten_is_validity_in_oxford_and_nothing_in_boreas() {
+fn byte_ten_is_validity_in_oxford_and_unused_in_boreas() {
     let root = folder();
     let sweep = Sweep {
         byte_ten: |row| if row == 5 { 0 } else { 255 },
@@ -344,7 +344,7 @@ fn byte_ten_is_validity_in_oxford_and_nothing_in_boreas() {
 }
 
 #[test]
-fn alternating_chirps_never_count_as_lost_rows() {
+fn alternating_chirps_are_not_invalid_rows() {
     let root = folder();
     let sweep = Sweep {
         byte_ten: |row| if row % 2 == 0 { 255 } else { 0 },
@@ -370,7 +370,7 @@ fn alternating_chirps_never_count_as_lost_rows() {
     );
 }
 
-/// Writes `n` scans into `folder`, named by their `named`th row, stamps in units of `ns_a_unit`.
+/// Writes three scans to `folder`, named by the stamp of row `named`; a microsecond has `unit` units of the stamps.
 fn write_named(folder: &Path, bins: usize, start_us: i64, named: i64, unit: i64) {
     for k in 0..3 {
         let start = (start_us + k * PERIOD_US) * unit;
@@ -385,7 +385,7 @@ fn write_named(folder: &Path, bins: usize, start_us: i64, named: i64, unit: i64)
 }
 
 #[test]
-fn boreas_takes_its_resolution_from_the_date_and_its_time_from_the_middle() {
+fn boreas_resolution_depends_on_the_date_and_its_time_is_the_middle_row() {
     for (start_us, resolution) in [
         (1_630_000_000_000_000, 0.0596),
         (1_632_182_400_000_000, 0.04381),
@@ -411,7 +411,7 @@ fn boreas_takes_its_resolution_from_the_date_and_its_time_from_the_middle() {
 }
 
 #[test]
-fn layouts_and_first_images_tell_the_formats() {
+fn formats_are_detected_from_layouts_and_first_images() {
     let cases: [(&str, usize, i64, i64, Format); 6] = [
         ("navtech", 60, 0, 1, Format::Fomo),
         ("Navtech_CTS350-X_Radar", 60, 0, 1, Format::Oord),
@@ -435,7 +435,7 @@ fn layouts_and_first_images_tell_the_formats() {
 }
 
 #[test]
-fn an_equal_fit_says_what_was_chosen_and_how_to_force_the_other() {
+fn an_ambiguous_format_is_reported_with_its_alternative() {
     let root = folder();
     write_named(root.path(), 60, START_US, 0, 1);
     let dataset = opened(root.path());
@@ -447,7 +447,7 @@ fn an_equal_fit_says_what_was_chosen_and_how_to_force_the_other() {
 }
 
 #[test]
-fn oord_takes_even_azimuths() {
+fn oord_has_uniform_azimuths() {
     let root = folder();
     let sweep = Sweep {
         step: 0,
@@ -464,7 +464,7 @@ fn oord_takes_even_azimuths() {
 }
 
 #[test]
-fn mulran_is_turned_and_its_name_is_the_end_of_the_sweep() {
+fn mulran_is_transposed_and_named_by_the_end_of_the_sweep() {
     let root = folder();
     let end = |k: i64| (START_US + k * PERIOD_US) * 1000;
     for k in 0..3 {
@@ -479,7 +479,7 @@ fn mulran_is_turned_and_its_name_is_the_end_of_the_sweep() {
     }
     let mut dataset = opened(root.path());
     assert_eq!(
-        (dataset.format(), dataset.on_their_side()),
+        (dataset.format(), dataset.is_transposed()),
         (Format::Mulran, true)
     );
     let scan = read(dataset.as_mut(), 2).unwrap();
@@ -492,56 +492,56 @@ fn mulran_is_turned_and_its_name_is_the_end_of_the_sweep() {
 }
 
 #[test]
-fn radiate_without_its_stamps_says_which_file_is_wrong() {
+fn radiate_without_stamps_names_the_file() {
     let root = folder();
     write_radiate(root.path(), 2);
     let list = root.path().join("Navtech_Polar.txt");
     fs::write(&list, "Frame: 000007 Time: 1549986607.5\n").unwrap();
-    let error = refused(root.path()).to_string();
+    let error = rejected(root.path()).to_string();
     assert!(
         error.contains("Navtech_Polar.txt") && error.contains("000008.png"),
         "{error}"
     );
     fs::write(&list, "Frame: 000007 Time: 1549986607.5\nnonsense\n").unwrap();
-    let error = refused(root.path()).to_string();
+    let error = rejected(root.path()).to_string();
     assert!(error.contains("line 2"), "{error}");
     fs::remove_file(&list).unwrap();
     assert!(
-        matches!(refused(root.path()), OpenError::Io { path, .. } if path.ends_with("Navtech_Polar.txt"))
+        matches!(rejected(root.path()), OpenError::Io { path, .. } if path.ends_with("Navtech_Polar.txt"))
     );
 }
 
 #[test]
-fn what_is_no_dataset_is_refused_with_a_sentence() {
+fn folders_without_a_dataset_are_rejected() {
     let root = folder();
     assert!(matches!(
-        refused(&root.path().join("nothing")),
+        rejected(&root.path().join("nothing")),
         OpenError::Missing { .. }
     ));
-    assert!(matches!(refused(root.path()), OpenError::NoImages { .. }));
+    assert!(matches!(rejected(root.path()), OpenError::NoImages { .. }));
     fs::write(root.path().join("notes.txt"), "hello").unwrap();
-    let error = refused(root.path()).to_string();
+    let error = rejected(root.path()).to_string();
     assert!(
         error.contains("Navtech_Polar") && error.contains("`format`"),
         "{error}"
     );
     assert!(matches!(
-        refused(&root.path().join("notes.txt")),
+        rejected(&root.path().join("notes.txt")),
         OpenError::NotAFolder { .. }
     ));
     fs::create_dir(root.path().join("radar")).unwrap();
     assert!(
-        matches!(refused(root.path()), OpenError::NoImages { path } if path.ends_with("radar"))
+        matches!(rejected(root.path()), OpenError::NoImages { path } if path.ends_with("radar"))
     );
     write_png(&root.path().join("radar/holiday.png"), 30, 20, &[0; 600]);
     assert!(matches!(
-        refused(root.path()),
+        rejected(root.path()),
         OpenError::UnknownLayout { .. }
     ));
 }
 
 #[test]
-fn impossible_options_are_refused() {
+fn options_out_of_bounds_are_rejected() {
     let root = folder();
     write_radiate(root.path(), 2);
     let none = DatasetOptions::default();
@@ -602,7 +602,7 @@ fn impossible_options_are_refused() {
 }
 
 #[test]
-fn options_speak_kebab_case_and_refuse_unknown_keys() {
+fn options_are_kebab_case_and_unknown_keys_are_rejected() {
     let options: DatasetOptions =
         serde_json::from_str(r#"{"format": "boreas-rt", "azimuth_source": "uniform"}"#).unwrap();
     assert_eq!(

@@ -1,29 +1,29 @@
-//! Which format a folder holds: by its layout, else by what the first image says.
+//! Detection of the format of a folder: by its layout, otherwise by the first image.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::error::OpenError;
-use super::first_look::{FirstLook, NamedBy};
+use super::first_image::{FirstImage, NamedBy};
 use super::format::Format;
 use super::image_source::ImageSource;
 use super::images::{Images, has_png};
 
-/// A dataset that was found, before its format's reader takes over.
+/// A located dataset, the input of the readers.
 #[derive(Debug)]
 pub(crate) struct Found {
     pub(crate) format: Format,
     /// The folder of images.
     pub(crate) folder: PathBuf,
     pub(crate) images: Images,
-    /// How the format was decided, where that is worth saying.
+    /// The reason for the format, if it was detected from the first image.
     pub(crate) notes: Vec<String>,
-    /// The list of stamps, where it lies in no file.
+    /// The list of stamps, if it is not in a file.
     pub(crate) stamps: Option<String>,
 }
 
 impl Found {
-    /// A recording that lies in no folder.
+    /// Returns a recording that is not on disk.
     pub(crate) fn source(
         source: Box<dyn ImageSource>,
         forced: Option<Format>,
@@ -40,7 +40,7 @@ impl Found {
     }
 }
 
-/// Where each format keeps its images, below the root.
+/// The folders of images of each format, relative to the root.
 const LAYOUTS: [(Format, &[&str]); 8] = [
     (Format::Radiate, &["Navtech_Polar"]),
     (Format::Oord, &["Navtech_CTS350-X_Radar"]),
@@ -62,7 +62,7 @@ const LAYOUTS: [(Format, &[&str]); 8] = [
     (Format::BoreasRt, &["radar"]),
 ];
 
-/// Finds the images at `root`, as `forced` or as detected.
+/// Locates the images at `root`, in the format `forced` or as detected.
 pub(crate) fn locate(root: &Path, forced: Option<Format>) -> Result<Found, OpenError> {
     check_folder(root)?;
     let folder = find_folder(root, forced)?;
@@ -96,7 +96,7 @@ fn check_folder(root: &Path) -> Result<(), OpenError> {
     }
 }
 
-/// The folder that holds the images: one of the layouts', else the root.
+/// Returns the folder that holds the images: that of a known layout, otherwise the root.
 fn find_folder(root: &Path, forced: Option<Format>) -> Result<PathBuf, OpenError> {
     let known = || {
         LAYOUTS
@@ -109,10 +109,10 @@ fn find_folder(root: &Path, forced: Option<Format>) -> Result<PathBuf, OpenError
         return Ok(folder);
     }
     if has_png(root) {
-        // `.` and `..` would hide the folder's name, beside which some formats keep their stamps.
+        // `.` and `..` hide the name of the folder, beside which some formats store their stamps.
         return Ok(fs::canonicalize(root).unwrap_or_else(|_| root.to_owned()));
     }
-    // A known folder that is there but empty tells more than the root.
+    // An empty folder of a known layout is more informative than the root.
     if let Some(folder) = candidates.find(|folder| folder.is_dir()) {
         return Err(OpenError::NoImages { path: folder });
     }
@@ -124,7 +124,7 @@ fn find_folder(root: &Path, forced: Option<Format>) -> Result<PathBuf, OpenError
     let mut folders: Vec<&str> = known().copied().collect();
     folders.dedup();
     let reason = format!(
-        "it holds no PNG images itself, and none of the folders {}",
+        "it holds no PNG images, and none of the folders {}",
         folders.join(", ")
     );
     Err(OpenError::UnknownLayout {
@@ -133,7 +133,7 @@ fn find_folder(root: &Path, forced: Option<Format>) -> Result<PathBuf, OpenError
     })
 }
 
-/// The format that a folder's name and its neighbours leave no doubt of.
+/// Returns the format if the name of the folder and the files beside it determine it.
 fn by_layout(root: &Path, folder: &Path) -> Option<Format> {
     let name = folder.file_name()?.to_str()?;
     let beside = |file: &str| {
@@ -155,7 +155,7 @@ fn by_layout(root: &Path, folder: &Path) -> Option<Format> {
     }
 }
 
-/// The format that fits the first image best.
+/// Returns the format that fits the first image best.
 fn by_image(
     root: &Path,
     folder: &Path,
@@ -165,26 +165,23 @@ fn by_image(
         path: folder.to_owned(),
         reason: format!("its images ({}) {reason}", images_size(folder)),
     };
-    let Some(look) = FirstLook::take(images).filter(FirstLook::has_stamps) else {
+    let Some(image) = FirstImage::read(images).filter(FirstImage::has_stamps) else {
         let without_metadata =
             images.size.height > images.size.width && images.name_stamp_ns(0).is_some();
         return match without_metadata {
             true => Ok((
                 Format::Mulran,
-                vec![decided(
-                    Format::Mulran,
-                    "images on their side, named by times",
-                )],
+                vec![decided(Format::Mulran, "transposed images, named by times")],
             )),
             false => Err(unknown(
-                "bear no stamps in their first 8 columns, lie beside no list of stamps, and are not named by times",
+                "have no stamps in their first 8 columns, have no list of stamps beside them, and are not named by times",
             )),
         };
     };
     let boreas_folders = ["applanix", "calib"].iter().any(|f| root.join(f).is_dir());
     let mut scores: Vec<(i32, Format)> = Format::ALL
         .iter()
-        .map(|f| (score(*f, &look, boreas_folders), *f))
+        .map(|f| (score(*f, &image, boreas_folders), *f))
         .collect();
     scores.sort_by_key(|(score, format)| (-score, *format));
     let (best, format) = scores[0];
@@ -194,10 +191,10 @@ fn by_image(
         .filter(|(s, _)| *s == best)
         .map(|(_, f)| f.name())
         .collect();
-    let mut note = decided(format, &evidence(&look));
+    let mut note = decided(format, &evidence(&image));
     if !equal.is_empty() {
         note += &format!(
-            " It fits {} equally: `format = \"{}\"` would force that.",
+            " It fits {} equally: set `format = \"{}\"` for that.",
             equal.join(" and "),
             equal[0]
         );
@@ -213,37 +210,38 @@ fn images_size(folder: &Path) -> String {
 
 fn decided(format: Format, evidence: &str) -> String {
     format!(
-        "The folder's layout names no dataset; read as {format} from its first image: {evidence}."
+        "The layout of the folder matches no dataset; read as {format} by its first image: {evidence}."
     )
 }
 
-fn evidence(look: &FirstLook) -> String {
-    let named = look
+fn evidence(image: &FirstImage) -> String {
+    let named = image
         .named_by()
-        .map_or("a name that is no time of the sweep", NamedBy::words);
-    let named = if look.named_by().is_some() {
+        .map_or("names that are not times of the sweep", NamedBy::words);
+    let named = if image.named_by().is_some() {
         format!("named by {named}")
     } else {
         named.to_owned()
     };
-    let chirps = if look.chirps_alternate() {
+    let chirps = if image.chirps_alternate() {
         ", chirps alternate"
     } else {
         ""
     };
-    let unit = if look.nanoseconds() {
+    let unit = if image.nanoseconds() {
         ", stamps in ns"
     } else {
         ""
     };
-    format!("{} range bins, {named}{chirps}{unit}", look.bins())
+    format!("{} range bins, {named}{chirps}{unit}", image.bins())
 }
 
-/// Of formats that no image can be told by.
+/// The score of formats that cannot be detected from an image.
 const NEVER: i32 = -100;
 
-/// How well a format fits; formats without metadata columns, and OORD, which differs from Oxford in its folders only, not at all.
-fn score(format: Format, look: &FirstLook, boreas_folders: bool) -> i32 {
+/// Scores how well a format fits the first image. Formats without metadata columns are excluded, and so is OORD, which differs
+/// from Oxford only in its folders.
+fn score(format: Format, image: &FirstImage, boreas_folders: bool) -> i32 {
     let (bins, named, chirps): (&[usize], NamedBy, bool) = match format {
         Format::Oxford => (&[3768], NamedBy::Start, false),
         Format::Boreas => (&[3360], NamedBy::Middle, false),
@@ -253,16 +251,16 @@ fn score(format: Format, look: &FirstLook, boreas_folders: bool) -> i32 {
         Format::Oord | Format::Mulran | Format::Radiate => return NEVER,
     };
     let boreas = matches!(format, Format::Boreas | Format::BoreasRt);
-    let by_name = look
+    let by_name = image
         .named_by()
         .map_or(0, |by| if by == named { 2 } else { -2 });
-    let by_bins = if bins.contains(&look.bins()) { 2 } else { 0 };
-    let by_chirps = if look.chirps_alternate() == chirps {
+    let by_bins = if bins.contains(&image.bins()) { 2 } else { 0 };
+    let by_chirps = if image.chirps_alternate() == chirps {
         1
     } else {
         -1
     };
-    let by_unit = if look.nanoseconds() == (format == Format::MulranOxfordForm) {
+    let by_unit = if image.nanoseconds() == (format == Format::MulranOxfordForm) {
         0
     } else {
         -3

@@ -1,89 +1,85 @@
-//! What can go wrong with a dataset: one clear sentence each, saying what, where and what to do.
+//! Errors of datasets. Each message says what is wrong, where, and what to do.
 
 use std::path::PathBuf;
 
 use super::format::Format;
 use super::image_size::ImageSize;
 
-/// A dataset that cannot be opened at all.
+/// A dataset that cannot be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
-    /// Nothing is there.
+    /// The path does not exist.
     #[error("there is no dataset at {path}: no such folder; check the path")]
     Missing {
-        /// The path that was asked for.
+        /// The path.
         path: PathBuf,
     },
-    /// A file where a folder must be.
+    /// The path is a file.
     #[error(
-        "{path} is a file: name the dataset's folder, the one that holds the radar images or their folder"
+        "{path} is a file: give the folder of the dataset, which holds the radar images or their folder"
     )]
     NotAFolder {
-        /// The path that was asked for.
+        /// The path.
         path: PathBuf,
     },
     /// A folder without radar images.
     #[error(
-        "{path} holds no PNG images: nothing was downloaded or unpacked there, or the path is one level off"
+        "{path} holds no PNG images: the dataset is not downloaded or unpacked, or the path is one level off"
     )]
     NoImages {
-        /// The folder where the images should be.
+        /// The folder.
         path: PathBuf,
     },
-    /// Images or folders of a layout that no reader knows.
-    #[error(
-        "{path} is not a dataset that Gyre knows: {reason}; if it is one, say which with `format`"
-    )]
+    /// A layout of folders and images that no reader knows.
+    #[error("{path} is not a known dataset: {reason}; if it is one, set its `format`")]
     UnknownLayout {
         /// The dataset's root.
         path: PathBuf,
-        /// What was found or looked for.
+        /// What was found.
         reason: String,
     },
-    /// An option with an impossible value, or one that the format has no use for.
-    #[error("{key} = {value} is not possible for a {format} dataset: {reason}")]
+    /// An option that is out of bounds, or does not apply to the format.
+    #[error("{key} = {value} is invalid for a {format} dataset: {reason}")]
     BadOption {
-        /// The option's key.
+        /// The key.
         key: &'static str,
-        /// Its value, as given.
+        /// The value.
         value: String,
-        /// The dataset's format, or "any".
+        /// The format, or "any".
         format: String,
-        /// What would be possible.
+        /// The permitted values.
         reason: &'static str,
     },
-    /// A text file of the dataset (stamps) that cannot be understood.
+    /// A text file of the dataset (stamps) that cannot be parsed.
     #[error("{path}, line {line}: {reason}")]
     Text {
         /// The file.
         path: PathBuf,
-        /// The line, from 1; 0 where the file as a whole is meant.
+        /// The line, from 1; 0 for the file as a whole.
         line: usize,
-        /// What is wrong and what was expected.
+        /// What is wrong, and what is expected.
         reason: String,
     },
-    /// A file or folder that the system would not give.
+    /// A file or folder that cannot be read.
     #[error("cannot read {path}: {source}")]
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// The system's reason.
+        /// The cause.
         source: std::io::Error,
     },
-    /// A `dataset.toml` that cannot be understood.
-    #[error(
-        "{path} should say how the recording is to be read, with the keys of [dataset]: {reason}"
-    )]
-    Told {
+    /// A `dataset.toml` that cannot be parsed.
+    #[error("{path} does not hold keys of the section [dataset]: {reason}")]
+    DatasetToml {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// What is wrong.
         reason: String,
     },
-    /// The first image cannot serve: it says how large all scans are.
-    #[error("the first image does not say how large the scans are: {0}")]
+    /// The first image, which determines the size of all scans, cannot be read.
+    #[error("the size of the scans is unknown, since the first image cannot be read: {0}")]
     FirstImage(#[from] ReadError),
-    /// Images that are not what the format demands.
+    /// Images that do not match the format.
     #[error("{path} is {actual}, not a {format} image: {reason}")]
     WrongImage {
         /// The first image.
@@ -92,150 +88,148 @@ pub enum OpenError {
         actual: ImageSize,
         /// The format.
         format: Format,
-        /// What the format demands.
+        /// What the format requires.
         reason: String,
     },
 }
 
-/// One scan that cannot be read; the scans beside it may be good.
+/// A scan that cannot be read. Other scans may be readable.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// An index past the end.
-    #[error("scan {index} was asked for, and the dataset has {len}")]
+    #[error("scan {index} does not exist: the dataset has {len} scans")]
     NoSuchScan {
-        /// The scan asked for, from 0.
+        /// The index, from 0.
         index: usize,
-        /// Scans in the dataset.
+        /// Number of scans.
         len: usize,
     },
-    /// A file that the system would not give.
+    /// A file that cannot be read.
     #[error("cannot read {path}: {source}")]
     Io {
         /// The file.
         path: PathBuf,
-        /// The system's reason.
+        /// The cause.
         source: std::io::Error,
     },
-    /// A file that does not start as a PNG does.
+    /// A file without the signature of a PNG.
     #[error("{path} is not a PNG image")]
     NotPng {
         /// The file.
         path: PathBuf,
     },
-    /// A file that ends too early.
-    #[error(
-        "{path} is cut short: its {bytes} bytes end before the image does; copy or download it again"
-    )]
+    /// A truncated file.
+    #[error("{path} is truncated after {bytes} bytes; copy or download it again")]
     Truncated {
         /// The file.
         path: PathBuf,
-        /// Bytes that are there.
+        /// Bytes present.
         bytes: usize,
     },
-    /// A file whose content is damaged.
-    #[error("{path} is damaged: {reason}; copy or download it again")]
+    /// A corrupt file.
+    #[error("{path} is corrupt: {reason}; copy or download it again")]
     Damaged {
         /// The file.
         path: PathBuf,
-        /// The decoder's reason.
+        /// The decoder's message.
         reason: String,
     },
     /// An image that is not 8-bit grey.
-    #[error("{path} has {actual} pixels where 8-bit grey is needed; it was converted on the way")]
+    #[error("{path} has {actual} pixels instead of 8-bit grey: it was converted from the original")]
     WrongPixels {
         /// The file.
         path: PathBuf,
-        /// Colour type and bits.
+        /// Bit depth and colour type.
         actual: String,
     },
-    /// An image unlike the first.
-    #[error("{path} is {actual}, and the dataset's first image is {expected}{}", turned(.actual, .expected))]
+    /// An image of another size than the first.
+    #[error("{path} is {actual}, but the first image of the dataset is {expected}{}", transposed(.actual, .expected))]
     WrongSize {
         /// The file.
         path: PathBuf,
         /// Its size.
         actual: ImageSize,
-        /// The first image's size.
+        /// The size of the first image.
         expected: ImageSize,
     },
-    /// An image or file larger than any radar's.
-    #[error("{path} is too large for a radar scan: {actual} bytes, and at most {limit} are read")]
+    /// An image or file that is larger than any radar scan.
+    #[error("{path} is too large for a radar scan: {actual} bytes, at most {limit} are accepted")]
     TooLarge {
         /// The file.
         path: PathBuf,
-        /// Its size in bytes (of the file or of its image).
+        /// Size of the file or the image, bytes.
         actual: u64,
-        /// The most that is accepted.
+        /// Maximum size, bytes.
         limit: u64,
     },
-    /// Memory to fill that is smaller than the dataset's limits say.
-    #[error("the slot has room for {actual} {what}, and this scan needs {needed}")]
+    /// A slot that is smaller than the limits of the dataset.
+    #[error("the slot holds {actual} {what}, but this scan needs {needed}")]
     SlotTooSmall {
-        /// Which of the slot's slices.
+        /// The slice of the slot.
         what: &'static str,
         /// Elements needed.
         needed: usize,
-        /// Elements there.
+        /// Elements present.
         actual: usize,
     },
-    /// An encoder count that the encoder cannot give.
+    /// An encoder count beyond one turn.
     #[error(
-        "{path}, row {row}: encoder count {count} is above the encoder's {counts} counts a turn; set `encoder_counts`, or `azimuth_source = \"uniform\"`"
+        "{path}, row {row}: encoder count {count} exceeds {counts} counts per turn; set `encoder_counts`, or `azimuth_source = \"uniform\"`"
     )]
     EncoderCount {
         /// The file.
         path: PathBuf,
-        /// The image's row, from 0.
+        /// The row of the image, from 0.
         row: usize,
-        /// The count found.
+        /// The count.
         count: u16,
-        /// Counts of a turn.
+        /// Counts per turn.
         counts: u16,
     },
-    /// An azimuth that does not follow the one before.
+    /// An azimuth that does not increase.
     #[error(
-        "{path}, row {row}: azimuth does not grow (encoder count {count} after {previous}); the rows are not one sweep"
+        "{path}, row {row}: azimuth does not increase (encoder count {count} after {previous}); the rows are not one sweep"
     )]
     AzimuthOrder {
         /// The file.
         path: PathBuf,
-        /// The image's row, from 0.
+        /// The row of the image, from 0.
         row: usize,
-        /// The encoder count found.
+        /// The encoder count.
         count: u16,
-        /// The row before's.
+        /// The encoder count of the previous row.
         previous: u16,
     },
-    /// A stamp that is no time at which a radar ran.
+    /// A stamp outside the years of radar recordings.
     #[error(
-        "{path}, row {row}: stamp {value} is not in the years 2015 to 2040 in s, ms, us or ns; the first 11 bytes of a row are not what they should be"
+        "{path}, row {row}: stamp {value} is not a time of the years 2015 to 2040 in s, ms, us or ns: the first 11 bytes of the row are not Navtech metadata"
     )]
     StampYear {
         /// The file.
         path: PathBuf,
-        /// The image's row, from 0.
+        /// The row of the image, from 0.
         row: usize,
         /// The stamp as stored.
         value: i64,
     },
     /// Stamps that jump within a sweep.
     #[error(
-        "{path}: its first and last rows are {span_s:.3} s apart, which is not one sweep; the clock was set in between"
+        "{path}: its first and last rows are {span_s:.3} s apart, which is not one sweep: the clock was set in between"
     )]
     SweepTime {
         /// The file.
         path: PathBuf,
-        /// Last row's stamp less the first's, s.
+        /// Stamp of the last row minus that of the first, s.
         span_s: f64,
     },
 }
 
-fn turned(actual: &ImageSize, expected: &ImageSize) -> &'static str {
+fn transposed(actual: &ImageSize, expected: &ImageSize) -> &'static str {
     if actual.width == expected.height
         && actual.height == expected.width
         && actual.width != actual.height
     {
-        ": it lies rotated by 90 degrees"
+        ": it is rotated by 90 degrees"
     } else {
         ""
     }

@@ -1,19 +1,19 @@
-//! FoMo: `navtech/<us>.png`, Oxford's columns, an encoder of 5595 counts by its kit.
+//! FoMo: `navtech/<us>.png`, metadata columns as in Oxford, an encoder of 5595 counts by its development kit.
 
 use super::detect::Found;
 use super::error::OpenError;
-use super::first_look::NamedBy;
+use super::first_image::NamedBy;
 use super::format::Format;
 use super::navtech_png::ByteTen;
 use super::navtech_scans::{NavtechScans, Profile, ScanTime};
 use super::options::{AzimuthSource, DatasetOptions};
 
-/// Metres a range bin.
+/// Depth of a range bin, m.
 pub const RANGE_RESOLUTION_M: f32 = 0.0438;
-/// Encoder counts a turn.
+/// Encoder counts per turn.
 pub const ENCODER_COUNTS: u16 = 5595;
 
-const STAMPS: &str = "Files are named by the time of the sweep's first row; a scan's time is half-way between its first and last row's stamps.";
+const STAMPS: &str = "Files are named by the stamp of the first row; the time of a scan is the mean of its first and last row's stamps.";
 
 pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<NavtechScans, OpenError> {
     NavtechScans::open(found, options, |_| Profile {

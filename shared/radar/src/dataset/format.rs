@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// A dataset's form of files, named in configurations in kebab case (`boreas-rt`).
+/// A file format; configurations name it in kebab case (`boreas-rt`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Format {
@@ -16,9 +16,9 @@ pub enum Format {
     Boreas,
     /// Boreas Road Trip.
     BoreasRt,
-    /// MulRan as recorded: images on their side, no metadata.
+    /// MulRan as recorded: transposed images (range x azimuth) without metadata.
     Mulran,
-    /// MulRan converted to Oxford's columns.
+    /// MulRan converted to the columns of Oxford.
     MulranOxfordForm,
     /// RADIATE.
     Radiate,
@@ -27,7 +27,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// All formats, in the order of preference where two fit equally.
+    /// All formats, in the order of preference if several fit equally.
     pub const ALL: [Self; 8] = [
         Self::Oxford,
         Self::Oord,
@@ -39,7 +39,7 @@ impl Format {
         Self::Fomo,
     ];
 
-    /// The name used in configurations.
+    /// The name in configurations.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Oxford => "oxford",

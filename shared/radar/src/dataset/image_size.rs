@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// Pixels of an image.
+/// Size of an image in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct ImageSize {
     /// Columns.
@@ -12,7 +12,7 @@ pub struct ImageSize {
 }
 
 impl ImageSize {
-    /// Bytes of the image: one a pixel.
+    /// Bytes of the image: one per pixel.
     pub fn bytes(self) -> usize {
         self.width * self.height
     }

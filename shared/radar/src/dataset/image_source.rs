@@ -1,28 +1,27 @@
-//! Recordings that need not lie on a disk.
+//! Recordings that are not on disk.
 
 use std::path::PathBuf;
 
 use super::format::Format;
 use super::image_size::ImageSize;
 
-/// Makes a recording's images when they are asked for. [`open_source`](super::open_source) reads them as it would read the same images
-/// from a disk.
+/// A generator of a recording's images on request. [`open_source`](super::open_source) reads them like images on disk.
 pub trait ImageSource: Send {
-    /// The form of files that the images have.
+    /// The file format.
     fn format(&self) -> Format;
 
-    /// Columns and rows, the same for all.
+    /// Size of all images.
     fn size(&self) -> ImageSize;
 
-    /// The folder of images that a recording on disk would have, below its root.
+    /// The folder of images in the corresponding recording on disk, relative to its root.
     fn folder(&self) -> PathBuf;
 
-    /// The images' files in that folder, in the order of their times.
+    /// The image files in that folder, ordered by time.
     fn files(&self) -> Vec<PathBuf>;
 
-    /// The text of the list of stamps beside that folder, in formats whose images bear none.
+    /// The text of the list of stamps beside that folder, in formats whose images have no stamps.
     fn stamps(&self) -> Option<String>;
 
-    /// Fills `pixels`, [`ImageSource::size`] of them, row by row, with the image of file `index`.
+    /// Writes the image of file `index` to `pixels`, row-major, of size [`ImageSource::size`].
     fn draw(&mut self, index: usize, pixels: &mut [u8]);
 }

@@ -1,4 +1,4 @@
-//! The images of a dataset: which files, in which order, how large.
+//! The images of a dataset: their files, order and size.
 
 use std::fmt;
 use std::fs;
@@ -10,10 +10,10 @@ use super::image_source::ImageSource;
 use super::png_image::{self, ImageReader};
 use super::stamp;
 
-/// Images that are tried for one that can be read, when the first ones are damaged.
+/// Number of images tried until one can be read.
 const FIRST_TRIES: usize = 8;
 
-/// Images in the order of their numbers, all of the first one's size.
+/// Images ordered by number, all of the size of the first one.
 #[derive(Debug)]
 pub(crate) struct Images {
     files: Vec<PathBuf>,
@@ -21,7 +21,7 @@ pub(crate) struct Images {
     origin: Origin,
 }
 
-/// Where an image's pixels come from.
+/// The origin of the pixels.
 enum Origin {
     Files(ImageReader),
     Source(Box<dyn ImageSource>),
@@ -38,7 +38,7 @@ impl fmt::Debug for Origin {
 }
 
 impl Images {
-    /// Lists `folder` and reads the size from the first image whose header can be read.
+    /// Lists `folder` and reads the size from the first image with a valid header.
     pub(crate) fn open(folder: &Path) -> Result<Self, OpenError> {
         let files = list_png(folder)?;
         let Some(first) = files.first() else {
@@ -60,7 +60,7 @@ impl Images {
         })
     }
 
-    /// Images that lie in no folder.
+    /// Returns the images of a source.
     pub(crate) fn of(source: Box<dyn ImageSource>) -> Result<Self, OpenError> {
         let (files, size) = (source.files(), source.size());
         match files.is_empty() {
@@ -79,19 +79,19 @@ impl Images {
         self.files.len()
     }
 
-    /// The file of a scan; an empty path past the end.
+    /// The file of an image; an empty path past the end.
     pub(crate) fn file(&self, index: usize) -> &Path {
         self.files
             .get(index)
             .map_or(Path::new(""), PathBuf::as_path)
     }
 
-    /// The number that a file is named by.
+    /// The number in the name of a file.
     pub(crate) fn number(&self, index: usize) -> Option<i64> {
         file_number(self.file(index))
     }
 
-    /// The time that a file is named by, ns.
+    /// The time in the name of a file, ns.
     pub(crate) fn name_stamp_ns(&self, index: usize) -> Option<i64> {
         self.number(index).and_then(stamp::to_ns)
     }
@@ -102,11 +102,11 @@ impl Images {
             .files
             .get(index)
             .ok_or(ReadError::NoSuchScan { index, len })?;
-        let (room, needed) = (pixels.len(), self.size.bytes());
+        let (actual, needed) = (pixels.len(), self.size.bytes());
         let pixels = pixels.get_mut(..needed).ok_or(ReadError::SlotTooSmall {
             what: "bytes",
             needed,
-            actual: room,
+            actual,
         })?;
         match &mut self.origin {
             Origin::Files(reader) => reader.decode(path, self.size, pixels),
@@ -117,7 +117,7 @@ impl Images {
         }
     }
 
-    /// The first image that can be decoded, with its index.
+    /// Returns the first image that can be decoded, with its index.
     pub(crate) fn first_readable(&mut self) -> Option<(usize, Vec<u8>)> {
         let mut pixels = vec![0; self.size.bytes()];
         let index =
@@ -126,7 +126,7 @@ impl Images {
     }
 }
 
-/// The PNG files of a folder: numbered ones by number, then the others by name.
+/// Returns the PNG files of a folder: numbered ones by number, then the others by name.
 pub(crate) fn list_png(folder: &Path) -> Result<Vec<PathBuf>, OpenError> {
     let io_error = |source| OpenError::Io {
         path: folder.to_owned(),
@@ -147,7 +147,7 @@ pub(crate) fn list_png(folder: &Path) -> Result<Vec<PathBuf>, OpenError> {
     Ok(files)
 }
 
-/// Whether a folder is there and holds a PNG.
+/// Returns whether a folder exists and holds a PNG.
 pub(crate) fn has_png(folder: &Path) -> bool {
     folder.is_dir() && list_png(folder).is_ok_and(|files| !files.is_empty())
 }

@@ -1,27 +1,27 @@
 //! MulRan: `sensor_data/radar/polar/<ns>.png` as recorded (3360 rows of range x 400 columns of azimuth, no metadata), or
-//! converted to Oxford's columns in `polar_oxford_form/<ns>.png` with stamps in nanoseconds. Named by the end of the sweep.
+//! converted to the format of Oxford in `polar_oxford_form/<ns>.png` with stamps in ns. Named by the end of the sweep.
 
 use std::path::Path;
 
 use super::Dataset;
 use super::detect::Found;
 use super::error::{OpenError, ReadError};
-use super::first_look::NamedBy;
+use super::first_image::NamedBy;
 use super::format::Format;
 use super::image_size::ImageSize;
 use super::navtech_png::ByteTen;
 use super::navtech_scans::{NavtechScans, Profile, ScanTime};
 use super::options::{AzimuthSource, DatasetOptions};
-use super::sideways::{SidewaysScans, mean_after_start_ns};
 use super::stamp;
+use super::transposed::{TransposedScans, mean_after_start_ns};
 use crate::scan::{ScanLimits, ScanSlot, SweepGeometry};
 
-/// Metres a range bin: 200 m over 3360 bins.
+/// Depth of a range bin, m: 200 m over 3360 bins.
 pub const RANGE_RESOLUTION_M: f32 = 200.0 / 3360.0;
 
-const STAMPS: &str = "Files are named by the end of the sweep; a scan's time is half a turn earlier, a turn being the time since the \
-                      file before, and columns are spread evenly over the turn.";
-const ROW_STAMPS: &str = "Files are named by the end of the sweep; a scan's time is half-way between its first and last row's stamps.";
+const STAMPS: &str = "Files are named by the end of the sweep; the time of a scan is half a turn earlier, where a turn is the time \
+                      since the previous file, and columns are spread uniformly over the turn.";
+const ROW_STAMPS: &str = "Files are named by the end of the sweep; the time of a scan is the mean of its first and last row's stamps.";
 
 pub(crate) fn open_oxford_form(
     found: Found,
@@ -43,10 +43,10 @@ pub(crate) fn open_oxford_form(
     })
 }
 
-/// MulRan's scans as recorded.
+/// MulRan scans as recorded.
 #[derive(Debug)]
 pub(crate) struct MulranPolar {
-    scans: SidewaysScans,
+    scans: TransposedScans,
     end_ns: Vec<i64>,
     period_ns: i64,
     notes: Vec<String>,
@@ -54,11 +54,11 @@ pub(crate) struct MulranPolar {
 
 impl MulranPolar {
     pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<Self, OpenError> {
-        let (scans, notes) = SidewaysScans::open(found, options, |_| RANGE_RESOLUTION_M)?;
+        let (scans, notes) = TransposedScans::open(found, options, |_| RANGE_RESOLUTION_M)?;
         let end_ns = (0..scans.images.len())
             .map(|index| end_ns(&scans, index))
             .collect::<Result<Vec<_>, _>>()?;
-        let period_ns = stamp::usual_interval(end_ns.iter().copied());
+        let period_ns = stamp::median_interval_ns(end_ns.iter().copied());
         Ok(Self {
             scans,
             end_ns,
@@ -67,7 +67,7 @@ impl MulranPolar {
         })
     }
 
-    /// Start and length of a scan's turn.
+    /// Start and duration of the turn of a scan, ns.
     fn turn_ns(&self, index: usize) -> Option<(i64, i64)> {
         let end = *self.end_ns.get(index)?;
         let since = index.checked_sub(1).map(|before| end - self.end_ns[before]);
@@ -78,7 +78,7 @@ impl MulranPolar {
     }
 }
 
-fn end_ns(scans: &SidewaysScans, index: usize) -> Result<i64, OpenError> {
+fn end_ns(scans: &TransposedScans, index: usize) -> Result<i64, OpenError> {
     scans
         .images
         .name_stamp_ns(index)
@@ -106,8 +106,8 @@ impl Dataset for MulranPolar {
         self.scans.images.size
     }
 
-    fn on_their_side(&self) -> bool {
-        self.scans.on_their_side()
+    fn is_transposed(&self) -> bool {
+        self.scans.is_transposed()
     }
 
     fn file(&self, index: usize) -> &Path {

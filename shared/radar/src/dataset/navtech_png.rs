@@ -1,4 +1,4 @@
-//! The columns that Navtech's drivers put before the powers of each row: stamp, encoder count, one byte of flags.
+//! The metadata columns that Navtech drivers store before the powers of each row: stamp, encoder count, one byte of flags.
 
 use std::path::Path;
 
@@ -8,21 +8,21 @@ use super::options::AzimuthSource;
 use super::stamp;
 use crate::scan::flag;
 
-/// Bytes before the first power of a row.
+/// Metadata bytes per row.
 pub(crate) const METADATA_BYTES: usize = 11;
-/// Share of neighbouring rows that must differ in byte 10 for it to be the chirp's direction.
+/// Minimum share of consecutive rows that differ in byte 10 if it is the direction of the chirp.
 const ALTERNATING_SHARE: f64 = 0.9;
-/// Longest time that one sweep may take, s. The slowest scanning radars turn once in 2 s.
-const LONGEST_SWEEP_S: f64 = 5.0;
+/// Maximum duration of a sweep, s. The slowest scanning radars turn once in 2 s.
+const MAX_SWEEP_S: f64 = 5.0;
 
-/// What one row says of itself.
+/// The metadata of a row.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RowMetadata {
     /// Bytes 0 to 7, little-endian: time since 1970, us or ns.
     pub(crate) stamp: i64,
-    /// Bytes 8 and 9, little-endian: the encoder's count.
+    /// Bytes 8 and 9, little-endian: the encoder count.
     pub(crate) count: u16,
-    /// Byte 10: validity, chirp direction or nothing.
+    /// Byte 10: validity, direction of the chirp, or unused.
     pub(crate) byte_ten: u8,
 }
 
@@ -38,7 +38,7 @@ impl RowMetadata {
     }
 }
 
-/// The metadata of each row of an image that is wider than [`METADATA_BYTES`].
+/// Returns the metadata of each row of an image wider than [`METADATA_BYTES`].
 pub(crate) fn rows(pixels: &[u8], size: ImageSize) -> impl Iterator<Item = RowMetadata> + '_ {
     pixels
         .chunks_exact(size.width)
@@ -46,7 +46,7 @@ pub(crate) fn rows(pixels: &[u8], size: ImageSize) -> impl Iterator<Item = RowMe
         .map(RowMetadata::parse)
 }
 
-/// Whether byte 10 goes to and fro between 0 and 255 from row to row: then it is the chirp's direction, not validity.
+/// Returns whether byte 10 alternates between 0 and 255 from row to row. Then it is the direction of the chirp, not validity.
 pub(crate) fn chirps_alternate(bytes_ten: impl Iterator<Item = u8>) -> bool {
     let (mut pairs, mut changes, mut last) = (0_usize, 0_usize, None);
     for byte in bytes_ten {
@@ -61,16 +61,16 @@ pub(crate) fn chirps_alternate(bytes_ten: impl Iterator<Item = u8>) -> bool {
     pairs > 0 && changes as f64 >= ALTERNATING_SHARE * pairs as f64
 }
 
-/// What byte 10 means where it does not alternate.
+/// The meaning of byte 10 if it does not alternate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ByteTen {
-    /// 255: measured; else filled in from the neighbours.
+    /// 255: measured; otherwise interpolated from the neighbours.
     Validity,
-    /// Nothing.
+    /// Unused.
     Unused,
 }
 
-/// Flags of each row, see [`flag`].
+/// Writes the flags of each row, see [`flag`].
 pub(crate) fn fill_flags(pixels: &[u8], size: ImageSize, meaning: ByteTen, flags: &mut [u8]) {
     let chirps = chirps_alternate(rows(pixels, size).map(|row| row.byte_ten));
     for (row, into) in rows(pixels, size).zip(flags) {
@@ -83,7 +83,7 @@ pub(crate) fn fill_flags(pixels: &[u8], size: ImageSize, meaning: ByteTen, flags
     }
 }
 
-/// Angle of each row in `[0, 2 pi)`; refuses rows that are not one sweep.
+/// Writes the angle of each row in `[0, 2 pi)`. Rejects rows that are not one sweep.
 pub(crate) fn fill_azimuths(
     path: &Path,
     pixels: &[u8],
@@ -104,7 +104,7 @@ pub(crate) fn fill_azimuths(
     Ok(())
 }
 
-/// Row `i` of `n` at `2 pi i / n`.
+/// Writes uniform angles: row `i` of `n` at `2 pi i / n`.
 pub(crate) fn fill_uniform(azimuth_rad: &mut [f32]) {
     let step = std::f64::consts::TAU / azimuth_rad.len() as f64;
     for (row, into) in azimuth_rad.iter_mut().enumerate() {
@@ -112,7 +112,7 @@ pub(crate) fn fill_uniform(azimuth_rad: &mut [f32]) {
     }
 }
 
-/// The counts of a sweep grow, but for at most one step past zero, and make at most one turn.
+/// Checks that the counts increase, with at most one wrap-around at zero and at most one turn.
 fn check_order(
     path: &Path,
     row_counts: impl Iterator<Item = u16>,
@@ -149,7 +149,7 @@ fn check_order(
     Ok(())
 }
 
-/// Time of each row as logged, ns; refuses what is no time, and times that are not those of one sweep.
+/// Writes the logged time of each row, ns. Rejects invalid times, and times that are not of one sweep.
 pub(crate) fn fill_stamps(
     path: &Path,
     pixels: &[u8],
@@ -165,7 +165,7 @@ pub(crate) fn fill_stamps(
         })?;
     }
     let span_s = (stamp_ns[size.height - 1] - stamp_ns[0]) as f64 * 1e-9;
-    if !(0.0..=LONGEST_SWEEP_S).contains(&span_s) {
+    if !(0.0..=MAX_SWEEP_S).contains(&span_s) {
         return Err(ReadError::SweepTime {
             path: path.to_owned(),
             span_s,
@@ -174,8 +174,8 @@ pub(crate) fn fill_stamps(
     Ok(())
 }
 
-/// Replaces times that came in bursts (a packet's rows share a time of receipt) by the line through them over the azimuth,
-/// laid so that the middle of the sweep keeps its time: half-way between the first and the last row's stamps.
+/// Replaces stamps that come in bursts (the rows of a packet share the time of receipt) by a linear fit over the azimuth,
+/// shifted so that the middle of the sweep keeps its time: the mean of the first and last row's stamps.
 pub(crate) fn smooth_stamps(azimuth_rad: &[f32], stamp_ns: &mut [i64]) {
     let n = stamp_ns.len();
     if n < 2 {
@@ -184,20 +184,20 @@ pub(crate) fn smooth_stamps(azimuth_rad: &[f32], stamp_ns: &mut [i64]) {
     let middle_ns = stamp::middle(stamp_ns[0], stamp_ns[n - 1]);
     let angle = |row: usize| sweep_angle(azimuth_rad[0], azimuth_rad[row]);
     let mean_angle = (0..n).map(angle).sum::<f64>() / n as f64;
-    let (mut up, mut across) = (0.0, 0.0);
+    let (mut covariance, mut variance) = (0.0, 0.0);
     for (row, stamp) in stamp_ns.iter().enumerate() {
         let from_mean = angle(row) - mean_angle;
-        up += from_mean * (stamp - middle_ns) as f64;
-        across += from_mean * from_mean;
+        covariance += from_mean * (stamp - middle_ns) as f64;
+        variance += from_mean * from_mean;
     }
-    let ns_per_rad = up / across;
+    let ns_per_rad = covariance / variance;
     let middle_angle = angle(n - 1) / 2.0;
     for (row, stamp) in stamp_ns.iter_mut().enumerate() {
         *stamp = middle_ns + ((angle(row) - middle_angle) * ns_per_rad).round() as i64;
     }
 }
 
-/// How far the sweep has come from its first azimuth, rad.
+/// Angle of an azimuth relative to the first, rad.
 fn sweep_angle(first_rad: f32, azimuth_rad: f32) -> f64 {
     (f64::from(azimuth_rad) - f64::from(first_rad)).rem_euclid(std::f64::consts::TAU)
 }
@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn alternation_is_told_from_validity() {
+    fn alternation_is_distinguished_from_validity() {
         assert!(chirps_alternate([0, 255, 0, 255, 0].into_iter()));
         assert!(!chirps_alternate([255; 6].into_iter()));
         assert!(!chirps_alternate([0; 6].into_iter()));
@@ -262,7 +262,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn smoothing_an_even_sweep_changes_nothing(start in 0_u16..5600, step in 10_u16..15, period in 1_000_000_i64..3_000_000) {
+        fn smoothing_a_uniform_sweep_changes_nothing(start in 0_u16..5600, step in 10_u16..15, period in 1_000_000_i64..3_000_000) {
             let n = 300_usize;
             let angle = |i: usize| (usize::from(start) + i * usize::from(step)) % 5600;
             let azimuth: Vec<f32> = (0..n).map(|i| (angle(i) as f64 * std::f64::consts::TAU / 5600.0) as f32).collect();

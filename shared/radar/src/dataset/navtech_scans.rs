@@ -1,4 +1,5 @@
-//! A folder of images with Navtech's columns, read by a format's profile: what Oxford, OORD, Boreas, MulRan (Oxford's form) and FoMo share.
+//! Reader of images with Navtech metadata columns, parameterised by a profile per format: Oxford, OORD, Boreas, MulRan
+//! (Oxford format) and FoMo.
 
 use std::path::Path;
 
@@ -6,7 +7,7 @@ use super::Dataset;
 use super::detect::Found;
 use super::eccentricity;
 use super::error::{OpenError, ReadError};
-use super::first_look::{FirstLook, NamedBy};
+use super::first_image::{FirstImage, NamedBy};
 use super::format::Format;
 use super::image_size::ImageSize;
 use super::images::Images;
@@ -15,16 +16,16 @@ use super::options::{AzimuthSource, DatasetOptions};
 use super::stamp;
 use crate::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, Sense, SweepGeometry};
 
-/// How a scan's time follows from its rows'.
+/// The definition of the time of a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ScanTime {
-    /// Half-way between the first and the last row.
+    /// The mean of the first and last row's stamps.
     Halfway,
-    /// The time of row `n / 2 - 1`.
+    /// The stamp of row `n / 2 - 1`.
     MiddleRow,
 }
 
-/// What tells one format from another.
+/// The parameters of a format.
 #[derive(Clone, Debug)]
 pub(crate) struct Profile {
     pub(crate) format: Format,
@@ -35,7 +36,7 @@ pub(crate) struct Profile {
     pub(crate) encoder_counts: u16,
     pub(crate) azimuth_source: AzimuthSource,
     pub(crate) scan_time: ScanTime,
-    /// Rows' stamps come in bursts, and are replaced by a line over the azimuth.
+    /// Whether row stamps come in bursts, and are replaced by a linear fit over the azimuth.
     pub(crate) smooth_stamps: bool,
     pub(crate) byte_ten: ByteTen,
     pub(crate) named_by: NamedBy,
@@ -58,7 +59,7 @@ impl Profile {
     }
 }
 
-/// The scans of such a folder. Images decode in place: a scan's rows keep their 11 bytes of metadata.
+/// The scans of a folder. Images decode in place: the rows of a scan keep their 11 bytes of metadata.
 #[derive(Debug)]
 pub(crate) struct NavtechScans {
     images: Images,
@@ -68,11 +69,11 @@ pub(crate) struct NavtechScans {
 }
 
 impl NavtechScans {
-    /// `profile` holds the format's defaults, for which it may look at the first image; `options` go over them.
+    /// `profile` returns the defaults of the format, which may depend on the first image; `options` take precedence.
     pub(crate) fn open(
         found: Found,
         options: &DatasetOptions,
-        profile: impl FnOnce(Option<&FirstLook>) -> Profile,
+        profile: impl FnOnce(Option<&FirstImage>) -> Profile,
     ) -> Result<Self, OpenError> {
         let Found {
             format,
@@ -81,11 +82,15 @@ impl NavtechScans {
             ..
         } = found;
         check_shape(&images, format)?;
-        let look = FirstLook::take(&mut images);
-        let profile = profile(look.as_ref()).with(options);
-        notes.extend(look.iter().flat_map(|look| observations(look, &profile)));
+        let first_image = FirstImage::read(&mut images);
+        let profile = profile(first_image.as_ref()).with(options);
+        notes.extend(
+            first_image
+                .iter()
+                .flat_map(|image| observations(image, &profile)),
+        );
         let period_ns =
-            stamp::usual_interval((0..images.len()).filter_map(|i| images.name_stamp_ns(i)));
+            stamp::median_interval_ns((0..images.len()).filter_map(|i| images.name_stamp_ns(i)));
         Ok(Self {
             images,
             profile,
@@ -96,9 +101,9 @@ impl NavtechScans {
 
     fn check_slot(&self, slot: &ScanSlot<'_>) -> Result<(), ReadError> {
         let rows = self.images.size.height;
-        check_room("azimuths", rows, slot.azimuth_rad.len())?;
-        check_room("stamps", rows, slot.stamp_ns.len())?;
-        check_room("flags", rows, slot.flags.len())
+        check_capacity("azimuths", rows, slot.azimuth_rad.len())?;
+        check_capacity("stamps", rows, slot.stamp_ns.len())?;
+        check_capacity("flags", rows, slot.flags.len())
     }
 
     fn scan_time_ns(&self, stamp_ns: &[i64]) -> i64 {
@@ -109,7 +114,7 @@ impl NavtechScans {
         }
     }
 
-    /// Time from this scan's name to the next one's, where that can be one turn; else the usual one.
+    /// Time between the names of this file and the next, ns, if that can be one turn; otherwise the median.
     fn interval_ns(&self, index: usize) -> i64 {
         let name = |i: usize| self.images.name_stamp_ns(i);
         let next = index
@@ -122,7 +127,7 @@ impl NavtechScans {
     }
 }
 
-pub(crate) fn check_room(
+pub(crate) fn check_capacity(
     what: &'static str,
     needed: usize,
     actual: usize,
@@ -140,11 +145,9 @@ pub(crate) fn check_room(
 fn check_shape(images: &Images, format: Format) -> Result<(), OpenError> {
     let ImageSize { width, height } = images.size;
     let reason = if width <= METADATA_BYTES {
-        format!("it needs {METADATA_BYTES} columns of metadata before the powers")
+        format!("it requires {METADATA_BYTES} columns of metadata before the powers")
     } else if !(2..=MAX_AZIMUTHS).contains(&height) {
-        format!(
-            "it needs a row for each azimuth, 2 to {MAX_AZIMUTHS} of them; it may lie on its side"
-        )
+        format!("it requires one row per azimuth, 2 to {MAX_AZIMUTHS}; the image may be transposed")
     } else {
         return Ok(());
     };
@@ -156,19 +159,19 @@ fn check_shape(images: &Images, format: Format) -> Result<(), OpenError> {
     })
 }
 
-/// What is worth saying about the first image.
-fn observations(look: &FirstLook, profile: &Profile) -> Vec<String> {
-    let named = look.named_by().filter(|by| *by != profile.named_by).map(|by| {
-        let (format, usual) = (profile.format, profile.named_by.words());
+/// Observations on the first image.
+fn observations(image: &FirstImage, profile: &Profile) -> Vec<String> {
+    let named = image.named_by().filter(|by| *by != profile.named_by).map(|by| {
+        let (format, expected) = (profile.format, profile.named_by.words());
         format!(
-            "The files are named by {}, while {format} files are named by {usual}: the format may be another one.",
+            "The files are named by {}, but {format} files by {expected}: the format may be another one.",
             by.words()
         )
     });
     [
-        note_bursts(look, profile),
-        note_byte_ten(look, profile),
-        note_encoder(look, profile),
+        note_bursts(image, profile),
+        note_byte_ten(image, profile),
+        note_encoder(image, profile),
         named,
     ]
     .into_iter()
@@ -176,47 +179,47 @@ fn observations(look: &FirstLook, profile: &Profile) -> Vec<String> {
     .collect()
 }
 
-fn note_bursts(look: &FirstLook, profile: &Profile) -> Option<String> {
-    let (least, most, mean) = look.row_intervals_ns()?;
-    let made = if profile.smooth_stamps {
-        "replaced by a line over the azimuth"
+fn note_bursts(image: &FirstImage, profile: &Profile) -> Option<String> {
+    let (min, max, mean) = image.row_intervals_ns()?;
+    let handling = if profile.smooth_stamps {
+        "replaced by a linear fit over the azimuth"
     } else {
-        "taken as they are"
+        "used as they are"
     };
-    (most > 4 * mean.max(1)).then(|| {
+    (max > 4 * mean.max(1)).then(|| {
         format!(
-            "Row stamps come in bursts ({} to {} us apart, {} us on average), as packets are received: they are {made}.",
-            least / 1000,
-            most / 1000,
+            "Row stamps come in bursts ({} to {} us apart, {} us on average), as packets are received: they are {handling}.",
+            min / 1000,
+            max / 1000,
             mean / 1000
         )
     })
 }
 
-fn note_byte_ten(look: &FirstLook, profile: &Profile) -> Option<String> {
-    if look.chirps_alternate() {
-        return Some("Byte 10 alternates from row to row: it is the chirp's direction (255 up, 0 down), not validity; no row is dropped for it.".to_owned());
+fn note_byte_ten(image: &FirstImage, profile: &Profile) -> Option<String> {
+    if image.chirps_alternate() {
+        return Some("Byte 10 alternates from row to row: it is the direction of the chirp (255 up, 0 down), not validity; no row is dropped.".to_owned());
     }
-    (look.byte_ten_is_zero() && profile.byte_ten == ByteTen::Unused).then(|| {
-        "Byte 10 is 0 in every row: it says nothing about validity or chirps, and all rows count as measured."
+    (image.byte_ten_is_zero() && profile.byte_ten == ByteTen::Unused).then(|| {
+        "Byte 10 is 0 in every row: it gives neither validity nor chirps, and all rows count as measured."
             .to_owned()
     })
 }
 
-fn note_encoder(look: &FirstLook, profile: &Profile) -> Option<String> {
+fn note_encoder(image: &FirstImage, profile: &Profile) -> Option<String> {
     if profile.azimuth_source == AzimuthSource::Uniform {
         return Some(
-            "Azimuths are taken as even steps from straight ahead; the encoder columns are not used.".to_owned(),
+            "Azimuths are taken as uniformly spaced from straight ahead; the encoder columns are not used.".to_owned(),
         );
     }
     let counts = profile.encoder_counts;
-    let (step, seam) = look.encoder_step(counts)?;
+    let (step, seam) = image.encoder_step(counts)?;
     (step != seam).then(|| {
-        let even = i32::from(counts) + i32::from(step) - i32::from(seam);
+        let uniform = i32::from(counts) + i32::from(step) - i32::from(seam);
         format!(
-            "The encoder steps by {step} counts a row and by {seam} across the seam, with {counts} counts a turn: \
-             with `encoder_counts = {even}` the seam would be even, and the azimuths differ by up to {:.2} deg.",
-            360.0 * (f64::from(even) / f64::from(counts) - 1.0).abs()
+            "The encoder steps by {step} counts per row and by {seam} from the last row to the first, with {counts} counts per \
+             turn: `encoder_counts = {uniform}` would make the steps equal, and change azimuths by up to {:.2} deg.",
+            360.0 * (f64::from(uniform) / f64::from(counts) - 1.0).abs()
         )
     })
 }

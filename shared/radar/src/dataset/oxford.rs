@@ -1,21 +1,22 @@
-//! Oxford Radar RobotCar, and the Offroad dataset that took its form.
+//! Oxford Radar RobotCar, and the Oxford Offroad dataset (OORD), which uses its format.
 //!
 //! `radar/<us>.png`, 400 azimuths x (11 + 3768), named by the start of the sweep; azimuths clockwise from ahead.
-//! OORD keeps the images in `Navtech_CTS350-X_Radar/`, and its encoder columns are not to be trusted.
+//! OORD stores the images in `Navtech_CTS350-X_Radar/`, and its encoder columns are unreliable.
 
 use super::detect::Found;
 use super::error::OpenError;
-use super::first_look::NamedBy;
+use super::first_image::NamedBy;
 use super::format::Format;
 use super::navtech_png::ByteTen;
 use super::navtech_scans::{NavtechScans, Profile, ScanTime};
 use super::options::{AzimuthSource, DatasetOptions};
 
-/// Metres a range bin. The dataset's own kit says 0.0432, with which paths come out 1.4 % short of the ground truth.
+/// Depth of a range bin, m. The development kit of the dataset gives 0.0432, with which paths are 1.4 % shorter than the
+/// ground truth.
 pub const RANGE_RESOLUTION_M: f32 = 0.0438;
 
-const STAMPS: &str = "Files are named by the time of the sweep's first row; a scan's time is half-way between its first and \
-                      last row's stamps, which is also what the ground truth refers to, and rows are spread along it by their azimuth.";
+const STAMPS: &str = "Files are named by the stamp of the first row; the time of a scan is the mean of its first and last row's \
+                      stamps, as in the ground truth, and the stamps of the rows are a linear fit over the azimuth.";
 
 pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<NavtechScans, OpenError> {
     NavtechScans::open(found, options, |_| {

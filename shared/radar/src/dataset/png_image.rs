@@ -1,4 +1,4 @@
-//! Grey PNG images, decoded straight into the caller's memory.
+//! Grey PNG images, decoded into the caller's memory.
 
 use std::fs::File;
 use std::io::{self, Cursor, Read};
@@ -7,15 +7,15 @@ use std::path::Path;
 use super::error::ReadError;
 use super::image_size::ImageSize;
 
-/// Most bytes of one image: 1024 azimuths of 32,768 range bins and their metadata.
+/// Maximum size of an image, bytes: 1024 azimuths of 32,768 range bins and their metadata.
 const MAX_IMAGE_BYTES: u64 = 1024 * (32_768 + 11);
-/// Signature, and the header chunk up to the interlace method.
+/// Length of the signature and the header chunk up to the interlace method.
 const HEADER_BYTES: usize = 29;
 const SIGNATURE: [u8; 8] = [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n'];
-/// What the decoder may take beside the image: rows, tables, chunks of text.
+/// Memory limit of the decoder beside the image: rows, tables, text chunks.
 const DECODER_BYTES: usize = 4 << 20;
 
-/// The size of a PNG from its first bytes alone.
+/// Reads the size of a PNG from its header.
 pub(crate) fn read_size(path: &Path) -> Result<ImageSize, ReadError> {
     let mut header = [0; HEADER_BYTES];
     let mut file = File::open(path).map_err(|e| io_error(path, e))?;
@@ -31,7 +31,7 @@ pub(crate) fn read_size(path: &Path) -> Result<ImageSize, ReadError> {
     parse_header(path, &header[..filled])
 }
 
-/// Size from the header chunk; refuses other pixels than 8-bit grey, and images that no radar makes.
+/// Parses the header chunk. Rejects pixels other than 8-bit grey and images too large for a radar scan.
 fn parse_header(path: &Path, bytes: &[u8]) -> Result<ImageSize, ReadError> {
     let shown = bytes.len().min(SIGNATURE.len());
     if bytes[..shown] != SIGNATURE[..shown] {
@@ -80,7 +80,7 @@ fn check_size(path: &Path, width: u64, height: u64) -> Result<ImageSize, ReadErr
     if bytes == 0 {
         return Err(ReadError::Damaged {
             path: path.to_owned(),
-            reason: "its header says that it has no pixels".to_owned(),
+            reason: "its header gives a size of zero".to_owned(),
         });
     }
     if bytes > MAX_IMAGE_BYTES {
@@ -96,14 +96,14 @@ fn check_size(path: &Path, width: u64, height: u64) -> Result<ImageSize, ReadErr
     })
 }
 
-/// Decodes one image after the other; keeps the memory for the file's bytes.
+/// Decodes images, and reuses the memory for the bytes of the file.
 #[derive(Debug, Default)]
 pub(crate) struct ImageReader {
     file: Vec<u8>,
 }
 
 impl ImageReader {
-    /// Decodes `path`, which must be of size `expected`, into `pixels`, `expected.bytes()` of them, row by row.
+    /// Decodes `path`, an image of size `expected`, into `expected.bytes()` pixels, row-major.
     pub(crate) fn decode(
         &mut self,
         path: &Path,
@@ -126,7 +126,7 @@ impl ImageReader {
     fn load(&mut self, path: &Path) -> Result<(), ReadError> {
         let file = File::open(path).map_err(|e| io_error(path, e))?;
         self.file.clear();
-        // One byte more than is accepted tells a file of exactly that size from a larger one.
+        // One byte more than accepted distinguishes a file of exactly the maximum size from a larger one.
         file.take(MAX_IMAGE_BYTES + 1)
             .read_to_end(&mut self.file)
             .map_err(|e| io_error(path, e))?;

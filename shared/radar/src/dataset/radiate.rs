@@ -1,7 +1,7 @@
 //! RADIATE: `Navtech_Polar/<frame>.png`, 576 rows of range x 400 columns of azimuth, and `Navtech_Polar.txt` with times.
 //!
-//! The times are `seconds.nanoseconds` with the nanoseconds' leading zeros left out, and they are the host's times of receipt: after
-//! a stall they come late by up to 1.4 s while the antenna turns evenly. The sensor's clock is rebuilt from them.
+//! The times are `seconds.nanoseconds`, without leading zeros in the nanoseconds, and they are the times of receipt at the
+//! host: after a stall they are late by up to 1.4 s while the antenna turns uniformly. The sensor clock is reconstructed.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -14,22 +14,22 @@ use super::format::Format;
 use super::image_size::ImageSize;
 use super::options::DatasetOptions;
 use super::sensor_clock::SensorClock;
-use super::sideways::{SidewaysScans, mean_after_start_ns};
 use super::stamp::{self, SECOND_NS};
+use super::transposed::{TransposedScans, mean_after_start_ns};
 use crate::scan::{ScanLimits, ScanSlot, SweepGeometry};
 
 /// Full range of the images, m.
 const RANGE_M: f32 = 100.0;
-/// The radar turns four times a second; bounds within which its period is looked for, ns.
+/// Bounds of the period, ns: the radar turns four times per second.
 const PERIOD_NS: std::ops::RangeInclusive<f64> = 0.2e9..=0.3e9;
 
-const STAMPS: &str = "Logged stamps are the host's times of receipt; the sensor's clock is the even series that touches them from below, \
-                      columns are spread evenly over its period, and a scan's time is their mean.";
+const STAMPS: &str = "Logged stamps are times of receipt at the host; the sensor clock is the uniform series that touches them from \
+                      below, columns are spread uniformly over its period, and the time of a scan is their mean.";
 
 /// The scans of a RADIATE sequence.
 #[derive(Debug)]
 pub(crate) struct Radiate {
-    scans: SidewaysScans,
+    scans: TransposedScans,
     /// Frame number and time of receipt of each scan.
     received: Vec<(i64, i64)>,
     clock: SensorClock,
@@ -48,7 +48,8 @@ impl Radiate {
             .clone()
             .map_or_else(|| fs::read_to_string(&list).map_err(io_error), Ok)?;
         let (stamps, unpadded) = parse_stamps(&list, &text)?;
-        let (scans, mut notes) = SidewaysScans::open(found, options, |bins| RANGE_M / bins as f32)?;
+        let (scans, mut notes) =
+            TransposedScans::open(found, options, |bins| RANGE_M / bins as f32)?;
         let received = (0..scans.images.len())
             .map(|i| receipt(&scans, i, &stamps, &list))
             .collect::<Result<Vec<_>, _>>()?;
@@ -57,15 +58,15 @@ impl Radiate {
             .ok_or_else(|| OpenError::NoImages { path: path() })?;
         if unpadded > 0 {
             notes.push(format!(
-                "{unpadded} of {} stamps in {} write their nanoseconds without leading zeros (.5 means 5 ns): they are read as integers; \
-                 as decimals, time would jump to and fro.",
+                "{unpadded} of {} stamps in {} have nanoseconds without leading zeros (.5 means 5 ns), and are read as integers; \
+                 read as decimals, time would run backwards.",
                 stamps.len(),
                 file_name(&list)
             ));
         }
         if stamps.len() > received.len() {
             notes.push(format!(
-                "{} lists {} scans, and {} images are there.",
+                "{} lists {} scans, but there are {} images.",
                 file_name(&list),
                 stamps.len(),
                 received.len()
@@ -98,7 +99,7 @@ fn file_name(path: &Path) -> String {
 
 /// Frame number and time of receipt of an image.
 fn receipt(
-    scans: &SidewaysScans,
+    scans: &TransposedScans,
     index: usize,
     stamps: &BTreeMap<i64, i64>,
     list: &Path,
@@ -106,7 +107,7 @@ fn receipt(
     let image = scans.images.file(index);
     let missing = || {
         let reason = format!(
-            "no time for {}; every image needs a line `Frame: <number> Time: <seconds>.<nanoseconds>`",
+            "no time for {}; every image requires a line `Frame: <number> Time: <seconds>.<nanoseconds>`",
             file_name(image)
         );
         OpenError::Text {
@@ -122,7 +123,7 @@ fn receipt(
         .ok_or_else(missing)
 }
 
-/// Times by frame number, and how many of them leave out leading zeros.
+/// Returns times by frame number, and how many of them lack leading zeros.
 fn parse_stamps(path: &Path, text: &str) -> Result<(BTreeMap<i64, i64>, usize), OpenError> {
     let (mut stamps, mut unpadded) = (BTreeMap::new(), 0);
     for (line, content) in text
@@ -178,8 +179,8 @@ impl Dataset for Radiate {
         self.scans.images.size
     }
 
-    fn on_their_side(&self) -> bool {
-        self.scans.on_their_side()
+    fn is_transposed(&self) -> bool {
+        self.scans.is_transposed()
     }
 
     fn file(&self, index: usize) -> &Path {

@@ -1,7 +1,7 @@
-//! The sensor's even clock, from times at which a host received its scans.
+//! Reconstruction of the uniform sensor clock from the times of receipt at the host.
 
-/// No scan is farther from the first, ns: a century. It keeps absurd frame numbers from overflowing.
-const FARTHEST_NS: i64 = 3_155_760_000_000_000_000;
+/// Maximum time from the first scan, ns: a century. It prevents overflow for absurd frame numbers.
+const MAX_NS: i64 = 3_155_760_000_000_000_000;
 
 /// Scan `number` starts at `start_ns + period_ns * number`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,11 +14,11 @@ pub(crate) struct SensorClock {
 }
 
 impl SensorClock {
-    /// The even series that lies below all times of receipt and as close to them as can be: a host is late, never early.
+    /// Fits the uniform series that is closest to the times of receipt from below: a host is late, never early.
     ///
-    /// `received` holds (scan number, ns), numbers growing; `period` bounds the period, ns. Minimises
-    /// `sum(received - start - period * number)` subject to no term being negative: a linear programme in two unknowns, whose
-    /// optimum is the edge of the points' lower convex hull over their mean number. `None` without points.
+    /// `received` holds (scan number, ns) with increasing numbers; `period` bounds the period, ns. Minimises
+    /// `sum(received - start - period * number)` such that no term is negative: a linear programme in two unknowns, whose
+    /// optimum is the edge of the lower convex hull of the points at their mean number. `None` without points.
     pub(crate) fn below(
         received: &[(i64, i64)],
         period: std::ops::RangeInclusive<f64>,
@@ -48,10 +48,10 @@ impl SensorClock {
         })
     }
 
-    /// Start of a scan's sweep, ns since 1970.
+    /// Start of the sweep of a scan, ns since 1970.
     pub(crate) fn start_ns(&self, number: i64) -> i64 {
         let after = (self.start + self.period * number as f64).round() as i64;
-        self.origin_ns + after.clamp(-FARTHEST_NS, FARTHEST_NS)
+        self.origin_ns + after.clamp(-MAX_NS, MAX_NS)
     }
 }
 
@@ -70,7 +70,7 @@ fn lower_hull(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     hull
 }
 
-/// Slope of the hull's edge over `x`.
+/// Slope of the edge of the hull at `x`.
 fn slope_over(hull: &[(f64, f64)], x: f64) -> Option<f64> {
     let edge = hull.windows(2).find(|edge| edge[1].0 >= x)?;
     Some((edge[1].1 - edge[0].1) / (edge[1].0 - edge[0].0))
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn an_even_clock_is_found_through_stalls() {
+    fn a_uniform_clock_is_found_through_stalls() {
         let late = |k: i64| {
             if (30..36).contains(&k) {
                 1_400 - (k - 30) * 230

@@ -1,26 +1,26 @@
-//! Times as datasets write them: integers of s, ms, us or ns since 1970, and decimal seconds.
+//! Time formats of datasets: integers of s, ms, us or ns since 1970, and decimal seconds.
 
 use crate::median::median;
 
 /// Nanoseconds per second.
 pub(crate) const SECOND_NS: i64 = 1_000_000_000;
 
-/// 2015-01-01 and 2041-01-01, s since 1970: no recording is older, and none can be younger.
+/// 2015-01-01 and 2041-01-01, s since 1970: the range of plausible times.
 const YEARS_S: std::ops::Range<i64> = 1_420_070_400..2_240_611_200;
 
-/// Times are read up to 140 years from 1970, so that no difference of two of them overflows.
-const FARTHEST_NS: i64 = i64::MAX / 2;
-/// Turns that an antenna may need, ns; what lies outside is a gap, or no time at all.
+/// Times are accepted up to 146 years from 1970, so that no difference overflows.
+const MAX_NS: i64 = i64::MAX / 2;
+/// Plausible durations of a turn, ns; others are gaps or errors.
 const TURN_NS: std::ops::Range<i64> = 10_000_000..10_000_000_000;
-/// A turn of the antenna where the files do not tell, ns: these radars turn four times a second.
-const USUAL_TURN_NS: i64 = 250_000_000;
+/// Default duration of a turn, ns: Navtech radars turn four times per second.
+const DEFAULT_TURN_NS: i64 = 250_000_000;
 
-/// Whether a time in ns lies in the years 2015 to 2040.
+/// Returns whether a time in ns is in the years 2015 to 2040.
 pub(crate) fn plausible(stamp_ns: i64) -> bool {
     YEARS_S.contains(&stamp_ns.div_euclid(SECOND_NS))
 }
 
-/// A stamp in ns, whatever its unit was: the years 2015 to 2040 do not overlap in s, ms, us and ns.
+/// Converts a stamp of unknown unit to ns: the years 2015 to 2040 do not overlap in s, ms, us and ns.
 pub(crate) fn to_ns(raw: i64) -> Option<i64> {
     [1, 1_000, 1_000_000, SECOND_NS]
         .into_iter()
@@ -28,7 +28,7 @@ pub(crate) fn to_ns(raw: i64) -> Option<i64> {
         .find(|ns| plausible(*ns))
 }
 
-/// Decimal seconds as ns, exactly: `12.5` is 12,500,000,000. Exponents are accepted and go through `f64`.
+/// Parses decimal seconds to ns, exactly: `12.5` is 12,500,000,000. Values with an exponent are rounded to `f64`.
 pub(crate) fn parse_seconds(text: &str) -> Option<i64> {
     let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
     let digits = |t: &str| t.bytes().all(|b| b.is_ascii_digit());
@@ -42,27 +42,27 @@ pub(crate) fn parse_seconds(text: &str) -> Option<i64> {
     seconds
         .checked_mul(SECOND_NS)?
         .checked_add(nanoseconds)
-        .filter(|ns| *ns <= FARTHEST_NS)
+        .filter(|ns| *ns <= MAX_NS)
         .map(|ns| sign * ns)
 }
 
 fn rounded_ns(seconds: f64) -> Option<i64> {
     let ns = seconds * 1e9;
-    (ns.abs() <= FARTHEST_NS as f64).then_some(ns.round() as i64)
+    (ns.abs() <= MAX_NS as f64).then_some(ns.round() as i64)
 }
 
-/// Median time between neighbouring scans, of those that can be one turn.
-pub(crate) fn usual_interval(stamps: impl Iterator<Item = i64>) -> i64 {
+/// Median time between consecutive scans, ns, of those that can be one turn.
+pub(crate) fn median_interval_ns(stamps: impl Iterator<Item = i64>) -> i64 {
     let stamps: Vec<i64> = stamps.collect();
     let turns = stamps
         .windows(2)
         .map(|w| w[1] - w[0])
         .filter(|ns| TURN_NS.contains(ns));
     // A turn in ns is exact in f64.
-    median(turns.map(|ns| ns as f64)).map_or(USUAL_TURN_NS, |ns| ns as i64)
+    median(turns.map(|ns| ns as f64)).map_or(DEFAULT_TURN_NS, |ns| ns as i64)
 }
 
-/// The middle of two times.
+/// The mean of two times, ns.
 pub(crate) fn middle(first_ns: i64, last_ns: i64) -> i64 {
     first_ns + (last_ns - first_ns) / 2
 }

@@ -1,8 +1,8 @@
-//! Boreas' `radar_poses.csv`: the radar in east-north-up, its own frame x forward, y right, z down (roll near pi).
+//! Boreas `radar_poses.csv`: poses of the radar in east-north-up; the radar frame is x forward, y right, z down (roll near pi).
 
 use gyre_geometry::pose;
 
-use super::{LineError, check_growing, columns, lines, number, stamp_field};
+use super::{LineError, check_increasing, columns, lines, number, stamp_field};
 use crate::trajectory::Trajectory;
 
 pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
@@ -13,7 +13,7 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
     let (mut stamps, mut poses) = (Vec::new(), Vec::new());
     for (line, row) in rows {
         let stamp = stamp_field(line, row, time)?;
-        check_growing(line, &stamps, stamp)?;
+        check_increasing(line, &stamps, stamp)?;
         let yaw = forward_heading(
             number(line, row, roll)?,
             number(line, row, pitch)?,
@@ -32,10 +32,10 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
     })
 }
 
-/// Direction of the sensor's x axis in the east-north plane, counter-clockwise from east.
+/// Returns the direction of the sensor's x axis in the east-north plane, counter-clockwise from east.
 ///
 /// The rotation from sensor to ENU is `roll(r) pitch(p) yaw(h)` of transposed elementary matrices; its first column is the x axis.
-/// Only the x axis counts: that the sensor's y points right (z down) and Gyre's left does not move it.
+/// The x axis does not depend on whether y points right (z down) or left.
 fn forward_heading(roll: f64, pitch: f64, heading: f64) -> f64 {
     let ((sr, cr), (sp, cp), (sh, ch)) = (roll.sin_cos(), pitch.sin_cos(), heading.sin_cos());
     let (x, y) = (cp * ch, cr * -sh + sr * sp * ch);
@@ -48,7 +48,7 @@ mod tests {
     use std::f64::consts::PI;
 
     #[test]
-    fn with_z_down_the_heading_is_the_course() {
+    fn with_z_down_the_heading_is_the_yaw() {
         for heading in [-3.0, -1.0, 0.0, 0.5, 2.9] {
             assert!((forward_heading(PI, 0.0, heading) - heading).abs() < 1e-12);
             assert!((forward_heading(-PI, 0.0, heading) - heading).abs() < 1e-12);

@@ -1,11 +1,11 @@
-//! KITTI: twelve numbers a line, a row-major 3 x 4 pose; a leading index is accepted. Also Boreas' odometry files, whose 13 columns
-//! are a stamp and the pose's inverse.
+//! KITTI: twelve numbers per line, a row-major 3 x 4 pose, after an optional index. Also Boreas odometry files, whose 13
+//! columns are a stamp and the inverse of the pose.
 
 use std::io::{self, Write};
 
 use gyre_geometry::mirrored;
 
-use super::{LineError, check_growing, lines, numbers};
+use super::{LineError, check_increasing, lines, numbers};
 use crate::dataset::stamp;
 use crate::trajectory::{Trajectory, planar};
 
@@ -27,9 +27,9 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
                     line,
                     reason: "the first column is not a time, as in the first line".to_owned(),
                 })?;
-                check_growing(line, stamps, stamp)?;
+                check_increasing(line, stamps, stamp)?;
                 stamps.push(stamp);
-                // First frame in the current sensor's, y right: inverted, then y left.
+                // The first frame in the current sensor frame, y right: invert, then mirror to y left.
                 poses.push(mirrored(&pose.inverse()));
             }
         }
@@ -49,6 +49,9 @@ fn leading_stamp(row: &str) -> Option<i64> {
 }
 
 /// Writes KITTI poses in the plane (z = 0).
+///
+/// # Errors
+/// Errors of `out`.
 pub fn write_kitti(trajectory: &Trajectory, out: &mut impl Write) -> io::Result<()> {
     for pose in &trajectory.poses {
         let (sin, cos) = pose.rotation.angle().sin_cos();

@@ -1,22 +1,22 @@
-//! MulRan's `global_pose.csv`: time and row-major 3 x 4 pose of the vehicle (x forward, y left, z up) in UTM; no header.
+//! MulRan `global_pose.csv`: time and row-major 3 x 4 pose of the vehicle (x forward, y left, z up) in UTM, without header.
 
 use gyre_geometry::{Pose, pose};
 use nalgebra::{Matrix3, Vector3};
 
-use super::{LineError, check_growing, lines, numbers, stamp_field};
+use super::{LineError, check_increasing, lines, numbers, stamp_field};
 use crate::trajectory::Trajectory;
 
-/// The radar in the vehicle's frame, m.
+/// Position of the radar in the vehicle frame, m.
 const RADAR_IN_BASE_M: [f64; 3] = [1.50, -0.04, 1.97];
-/// The radar's yaw in the vehicle's frame, degrees.
+/// Yaw of the radar in the vehicle frame, degrees.
 const RADAR_YAW_DEG: f64 = 0.9;
 
-/// Poses of the radar. Coordinates are of the order of 1e6 m: all in `f64`.
+/// Parses poses of the radar. Coordinates of the order of 1e6 m require `f64`.
 pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
     let (mut stamps, mut poses) = (Vec::new(), Vec::new());
     for (line, row) in lines(text) {
         let stamp = stamp_field(line, row, 0)?;
-        check_growing(line, &stamps, stamp)?;
+        check_increasing(line, &stamps, stamp)?;
         let matrix = numbers::<12>(line, row.split(',').skip(1))?;
         stamps.push(stamp);
         poses.push(radar_pose(&matrix));
@@ -41,8 +41,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_radar_sits_ahead_of_the_base_however_far_the_origin() {
-        // A vehicle that heads north.
+    fn the_radar_is_ahead_of_the_vehicle_frame_for_any_origin() {
+        // A vehicle heading north.
         let text = "1561000444390857630,0,-1,0,353062.123456789,1,0,0,4026023.987654321,0,0,1,20\n";
         let trajectory = parse(text).unwrap();
         let pose = trajectory.poses[0];

@@ -1,5 +1,5 @@
-//! Oxford's `radar_odometry.csv`: each row is the newer scan's pose (source) in the older one's frame (destination), x forward,
-//! y right, yaw clockwise; stamps are at mid-sweep.
+//! Oxford `radar_odometry.csv`: each row is the pose of the later scan (source) in the frame of the earlier one (destination),
+//! x forward, y right, yaw clockwise; stamps are at mid-sweep.
 
 use gyre_geometry::{Pose, mirrored, pose};
 
@@ -11,18 +11,18 @@ struct Motion {
     line: usize,
     from_ns: i64,
     to_ns: i64,
-    /// The newer scan in the older one's frame, REP-103.
+    /// The later scan in the frame of the earlier one, REP-103.
     motion: Pose,
 }
 
-/// Chains the motions from identity. Rows may come in any order; a gap between them is an error.
+/// Composes the motions from the identity. Rows may be in any order; a gap between them is an error.
 pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
     let mut motions = parse_rows(text)?;
     motions.sort_by_key(|m| m.from_ns);
     let Some(first) = motions.first() else {
         return Err(LineError {
             line: 1,
-            reason: "there is a header and no motion".to_owned(),
+            reason: "the file has a header but no motion".to_owned(),
         });
     };
     let (mut stamps, mut poses) = (vec![first.from_ns], vec![Pose::identity()]);
@@ -68,12 +68,12 @@ fn check_chain(m: &Motion, now_ns: i64) -> Result<(), LineError> {
         })
     };
     if m.to_ns <= m.from_ns {
-        return error("the source scan must be newer than the destination scan".to_owned());
+        return error("the source scan must be later than the destination scan".to_owned());
     }
     if m.from_ns != now_ns {
         let gap_s = (m.from_ns - now_ns) as f64 * 1e-9;
         return error(format!(
-            "this motion starts {gap_s:.6} s after the one before it ended: the chain has a gap or an overlap"
+            "this motion starts {gap_s:.6} s after the end of the previous one: the motions have a gap or an overlap"
         ));
     }
     Ok(())

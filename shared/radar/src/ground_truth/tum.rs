@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use gyre_geometry::pose;
 
-use super::{LineError, check_growing, lines, numbers};
+use super::{LineError, check_increasing, lines, numbers};
 use crate::dataset::stamp;
 use crate::trajectory::Trajectory;
 
@@ -16,7 +16,7 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
             line,
             reason: format!("time {seconds:?} is not a number of seconds"),
         })?;
-        check_growing(line, &stamps, stamp)?;
+        check_increasing(line, &stamps, stamp)?;
         let [_, x, y, _, qx, qy, qz, qw] = numbers(line, row.split_whitespace())?;
         let norm = qx * qx + qy * qy + qz * qz + qw * qw;
         if norm < 1e-12 {
@@ -26,7 +26,7 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
             });
         }
         stamps.push(stamp);
-        // Direction of the x axis in the plane: right for any roll and pitch, and for quaternions that are not quite normal.
+        // Direction of the x axis in the plane: correct for any roll and pitch, and for quaternions that are not exactly normalised.
         let yaw = (2.0 * (qw * qz + qx * qy)).atan2(qw * qw + qx * qx - qy * qy - qz * qz);
         poses.push(pose(x, y, yaw));
     }
@@ -36,13 +36,16 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
     })
 }
 
-/// Writes TUM with whole nanoseconds. A trajectory without times is refused with `InvalidInput`.
+/// Writes TUM poses with stamps in ns.
+///
+/// # Errors
+/// `InvalidInput` for a trajectory without times; errors of `out`.
 pub fn write_tum(trajectory: &Trajectory, out: &mut impl Write) -> io::Result<()> {
     let stamps = trajectory.stamp_ns.as_ref();
     let stamps = stamps.ok_or_else(|| {
         io::Error::new(
             io::ErrorKind::InvalidInput,
-            "a TUM file needs times, and this trajectory has none",
+            "a TUM file requires times, but the trajectory has none",
         )
     })?;
     for (ns, pose) in stamps.iter().zip(&trajectory.poses) {

@@ -1,49 +1,49 @@
-//! The time offset between two trajectories, by their speeds and turns.
+//! Time offset between two trajectories, from their speeds and yaw rates.
 
 use serde::Serialize;
 
 use crate::trajectory::Trajectory;
 
-/// Offsets that are tried, to both sides, and their distance, ns.
-const REACH_NS: i64 = 10_000_000_000;
+/// Range and step of the offsets that are evaluated, ns.
+const MAX_OFFSET_NS: i64 = 10_000_000_000;
 const STEP_NS: i64 = 50_000_000;
-/// Motions are compared over about this long: longer than a scan, so that the noise of single positions averages out, ns.
+/// Duration of the motions that are compared, ns: longer than a scan, to average the noise of positions.
 const BASELINE_NS: i64 = 1_000_000_000;
-/// Fewest motions, and the least share of them, that must be within both trajectories for an offset to count.
-const FEWEST: usize = 12;
-const LEAST_SHARE: f64 = 0.6;
-/// An offset below this is no disagreement, s.
-const AGREES_S: f64 = 0.15;
-/// Correlation of speeds and turns below which nothing can be said.
-const CONVINCING: f64 = 0.6;
+/// Minimum number and share of motions within both trajectories for an offset to be considered.
+const MIN_MOTIONS: usize = 12;
+const MIN_SHARE: f64 = 0.6;
+/// Maximum offset of clocks that agree, s.
+const MAX_AGREEING_S: f64 = 0.15;
+/// Minimum correlation of speeds or yaw rates for a reliable offset.
+const MIN_CORRELATION: f64 = 0.6;
 
-/// How far a trajectory's clock is from another's.
+/// Offset between the clocks of two trajectories.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ClockOffset {
-    /// How late it is, s: what the other does at `t` it does at `t + late_s`.
+    /// Delay, s: the motion of the reference at `t` is that of the other trajectory at `t + late_s`.
     pub late_s: f64,
     /// Correlation of the speeds at that offset.
     pub speed_correlation: f64,
-    /// Correlation of the yaw rates; `None` where one has no headings.
+    /// Correlation of the yaw rates at that offset; `None` if a trajectory has no headings.
     pub turn_correlation: Option<f64>,
-    /// Whether it turns left where the other turns right.
+    /// Whether the trajectories turn in opposite directions.
     pub mirrored: bool,
 }
 
 impl ClockOffset {
-    /// Whether motions are alike enough for the offset to mean something.
-    pub fn is_convincing(&self) -> bool {
+    /// Returns whether the correlation is high enough for the offset to be reliable.
+    pub fn is_reliable(&self) -> bool {
         let turns = self.turn_correlation.map(f64::abs);
-        turns.map_or(self.speed_correlation, |t| t.max(self.speed_correlation)) >= CONVINCING
+        turns.map_or(self.speed_correlation, |t| t.max(self.speed_correlation)) >= MIN_CORRELATION
     }
 
-    /// Whether both clocks agree.
+    /// Returns whether the clocks agree.
     pub fn agrees(&self) -> bool {
-        self.is_convincing() && self.late_s.abs() <= AGREES_S
+        self.is_reliable() && self.late_s.abs() <= MAX_AGREEING_S
     }
 }
 
-/// A motion of the reference: when, how far, how much it turned.
+/// A motion of the reference.
 struct Motion {
     from_ns: i64,
     to_ns: i64,
@@ -51,21 +51,22 @@ struct Motion {
     turn_rad: f64,
 }
 
-/// The offset of `other` at which its speeds and turns follow `reference`'s best; `None` where they hardly overlap.
+/// Returns the offset of `other` with the highest correlation of speeds and yaw rates; `None` without sufficient overlap.
 pub(super) fn offset(reference: &Trajectory, other: &Trajectory) -> Option<ClockOffset> {
     let motions = motions(reference);
     let turns = reference.has_heading() && other.has_heading();
-    let steps = REACH_NS / STEP_NS;
+    let steps = MAX_OFFSET_NS / STEP_NS;
     let tried: Vec<Option<Fit>> = (-steps..=steps)
         .map(|k| fit(&motions, other, k * STEP_NS, turns))
         .collect();
-    let most = tried.iter().flatten().map(|f| f.count).max()?;
-    let enough = |f: &Fit| f.count >= FEWEST && f.count as f64 >= LEAST_SHARE * most as f64;
+    let max_count = tried.iter().flatten().map(|f| f.count).max()?;
+    let is_sufficient =
+        |f: &Fit| f.count >= MIN_MOTIONS && f.count as f64 >= MIN_SHARE * max_count as f64;
     let score = |k: usize| {
         tried
             .get(k)
             .and_then(Option::as_ref)
-            .filter(|f| enough(f))
+            .filter(|f| is_sufficient(f))
             .map(Fit::score)
     };
     let best = (0..tried.len())
@@ -84,7 +85,7 @@ pub(super) fn offset(reference: &Trajectory, other: &Trajectory) -> Option<Clock
         late_s: (best as f64 - steps as f64 + fine) * STEP_NS as f64 * 1e-9,
         speed_correlation: found.speed,
         turn_correlation: found.turn,
-        mirrored: found.turn.is_some_and(|t| t < -CONVINCING),
+        mirrored: found.turn.is_some_and(|t| t < -MIN_CORRELATION),
     })
 }
 
@@ -109,7 +110,7 @@ fn motions(reference: &Trajectory) -> Vec<Motion> {
     (0..stamps.len()).map_while(over_baseline).collect()
 }
 
-/// How well the other trajectory follows at one offset.
+/// Correlation at one offset.
 struct Fit {
     count: usize,
     speed: f64,
@@ -148,7 +149,7 @@ fn fit(motions: &[Motion], other: &Trajectory, late_ns: i64, turns: bool) -> Opt
     })
 }
 
-/// Pearson's correlation, from running sums.
+/// Pearson correlation, from running sums.
 #[derive(Default)]
 struct Correlation {
     n: f64,
@@ -165,7 +166,7 @@ impl Correlation {
         self.products += a * b;
     }
 
-    /// 0 where one of both does not vary.
+    /// The coefficient; 0 if a variable is constant.
     fn value(&self) -> f64 {
         let variance = |sum: f64, squares: f64| squares / self.n - (sum / self.n).powi(2);
         let (a, b) = (
@@ -187,7 +188,7 @@ mod tests {
     use super::*;
     use gyre_geometry::{Pose, pose};
 
-    /// A drive of varying speed and turns, seen `late_ns` late.
+    /// A drive of varying speed and yaw rate, delayed by `late_ns`.
     fn drive(late_ns: i64, sign: f64) -> Trajectory {
         let (mut now, mut poses, mut stamps) = (Pose::identity(), Vec::new(), Vec::new());
         for k in 0..1200_i64 {
@@ -211,13 +212,13 @@ mod tests {
                 (found.late_s - late_ms as f64 * 1e-3).abs() < 0.01,
                 "{late_ms} ms: {found:?}"
             );
-            assert!(found.is_convincing() && !found.mirrored);
+            assert!(found.is_reliable() && !found.mirrored);
             assert_eq!(found.agrees(), late_ms.abs() < 150);
         }
     }
 
     #[test]
-    fn a_mirrored_truth_is_told() {
+    fn a_mirrored_ground_truth_is_detected() {
         let found = offset(&drive(0, 1.0), &drive(500_000_000, -1.0)).unwrap();
         assert!(
             found.mirrored && (found.late_s - 0.5).abs() < 0.01,

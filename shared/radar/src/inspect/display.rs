@@ -1,9 +1,9 @@
-//! The report for a reader.
+//! The printed form of the report.
 
 use std::fmt;
 use std::path::Path;
 
-use super::{Chirps, Report, TimingReport, TruthReport};
+use super::{Chirps, GroundTruthReport, Report, TimingReport};
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -15,8 +15,8 @@ impl fmt::Display for Report {
             String::new()
         };
         line(f, "scans", format_args!("{}{read}", self.scans))?;
-        let side = if self.on_their_side {
-            ", on their side"
+        let side = if self.transposed {
+            ", transposed (range x azimuth)"
         } else {
             ""
         };
@@ -38,7 +38,7 @@ impl fmt::Display for Report {
             f,
             "range",
             format_args!(
-                "{:.6} m a bin{offset}, to {:.1} m",
+                "{:.6} m per bin{offset}, to {:.1} m",
                 self.range_resolution_m, self.max_range_m
             ),
         )?;
@@ -48,14 +48,14 @@ impl fmt::Display for Report {
             timing_lines(f, timing)?;
         }
         line(f, "stamps", format_args!("{}", self.stamp_meaning))?;
-        for truth in &self.truths {
+        for truth in &self.ground_truths {
             truth_line(f, truth, &self.root)?;
         }
-        if self.truths.is_empty() {
+        if self.ground_truths.is_empty() {
             line(f, "ground truth", format_args!("none found"))?;
         }
-        writeln!(f, "worth knowing")?;
-        self.oddities
+        writeln!(f, "findings")?;
+        self.findings
             .iter()
             .try_for_each(|sentence| writeln!(f, "  - {sentence}"))
     }
@@ -63,16 +63,14 @@ impl fmt::Display for Report {
 
 impl Report {
     fn azimuth_line(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let source = self
-            .encoder_counts
-            .map_or("even steps".to_owned(), |counts| {
-                format!("encoder of {counts} counts a turn")
-            });
-        let (least, most) = self.rows.first_azimuth_deg;
-        let first = if most - least < 0.005 {
-            format!("{least:.2}")
+        let source = self.encoder_counts.map_or("uniform".to_owned(), |counts| {
+            format!("encoder of {counts} counts per turn")
+        });
+        let (min, max) = self.rows.first_azimuth_deg;
+        let first = if max - min < 0.005 {
+            format!("{min:.2}")
         } else {
-            format!("{least:.2} to {most:.2}")
+            format!("{min:.2} to {max:.2}")
         };
         line(
             f,
@@ -86,9 +84,9 @@ impl Report {
 
     fn row_line(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let chirps = match self.rows.chirps {
-            Chirps::Unknown => "not said",
-            Chirps::Alternating => "up and down in turn",
-            Chirps::Mixed => "said in some scans",
+            Chirps::Unknown => "unknown",
+            Chirps::Alternating => "alternating",
+            Chirps::Mixed => "known in some scans",
         };
         let (rows, lost) = (&self.rows, self.rows.lost);
         line(
@@ -117,13 +115,13 @@ fn timing_lines(f: &mut fmt::Formatter<'_>, timing: &TimingReport) -> fmt::Resul
     if timing.period_s == 0.0 {
         return Ok(());
     }
-    let (most, least) = timing.logged_interval_s;
+    let (max, min) = timing.logged_interval_s;
     let (period, jitter) = (timing.period_s, timing.jitter_s * 1e3);
     line(
         f,
         "period",
         format_args!(
-            "{period:.4} s; logged {least:.3} to {most:.3} s apart, jitter {jitter:.1} ms RMS"
+            "{period:.4} s; logged {min:.3} to {max:.3} s apart, jitter {jitter:.1} ms RMS"
         ),
     )?;
     line(
@@ -138,7 +136,7 @@ fn timing_lines(f: &mut fmt::Formatter<'_>, timing: &TimingReport) -> fmt::Resul
     )
 }
 
-fn truth_line(f: &mut fmt::Formatter<'_>, truth: &TruthReport, root: &Path) -> fmt::Result {
+fn truth_line(f: &mut fmt::Formatter<'_>, truth: &GroundTruthReport, root: &Path) -> fmt::Result {
     let name = truth
         .file
         .strip_prefix(root)
@@ -154,12 +152,12 @@ fn truth_line(f: &mut fmt::Formatter<'_>, truth: &TruthReport, root: &Path) -> f
         .scans_covered
         .map_or(String::new(), |n| format!(", covers {n} scans"));
     let nearest = truth.nearest_pose_s.map_or(String::new(), |s| {
-        format!(", nearest pose {:.1} ms from a scan's time", s * 1e3)
+        format!(", median distance of the nearest pose {:.1} ms", s * 1e3)
     });
     let clock = match &truth.clock {
         Some(clock) if clock.agrees() => format!(", clock agrees ({:+.2} s)", clock.late_s),
-        Some(clock) if clock.is_convincing() => format!(", clock {:+.2} s", clock.late_s),
-        Some(_) => ", clock cannot be judged".to_owned(),
+        Some(clock) if clock.is_reliable() => format!(", clock {:+.2} s", clock.late_s),
+        Some(_) => ", clock unknown".to_owned(),
         None => String::new(),
     };
     let (poses, metres) = (truth.poses, truth.path_length_m);

@@ -1,51 +1,51 @@
-//! Rows of the scans: measured or not, lost, chirps, the encoder's steps, and ringing near the sensor.
+//! Rows of the scans: validity, losses, chirps, azimuth steps, and ringing near the sensor.
 
 use serde::Serialize;
 
 use crate::median::median;
 use crate::scan::{PolarScan, Sense, flag};
 
-/// Scans whose powers are summed to find the ringing; more would tell nothing new.
+/// Number of scans whose powers are averaged to detect ringing.
 const POWER_SCANS: usize = 40;
-/// Ringing is brighter than the mean of all powers by this factor ...
+/// Ringing exceeds the mean of all powers by this factor ...
 const RINGING_BRIGHTNESS: f64 = 1.5;
-/// ... and nearly the same in all directions at all times: its deviation is at most this share of its mean.
+/// ... and is nearly constant over azimuth and time: its standard deviation is at most this share of its mean.
 const RINGING_VARIATION: f64 = 0.3;
-/// Bins in a row that must not ring for the ringing to have ended.
+/// Number of consecutive bins without ringing that end it.
 const QUIET_BINS: usize = 3;
 
-/// What the rows say of the chirps.
+/// Knowledge of the chirp directions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Chirps {
-    /// Nothing.
+    /// Unknown.
     Unknown,
-    /// Rising and falling in turn.
+    /// Alternately rising and falling.
     Alternating,
     /// Known in some scans and not in others.
     Mixed,
 }
 
-/// Rows of all scans that were read.
+/// Summary of the rows of the scans read.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RowsReport {
-    /// All rows.
+    /// Number of rows.
     pub rows: u64,
-    /// Rows that were filled in from their neighbours.
+    /// Rows that were interpolated from their neighbours.
     pub not_measured: u64,
-    /// Rows that are not there: places where the azimuth makes more than one step.
+    /// Missing rows, where the azimuth makes more than one step.
     pub lost: u64,
-    /// What the rows say of the chirps.
+    /// Knowledge of the chirp directions.
     pub chirps: Chirps,
-    /// Median step from azimuth to azimuth, degrees.
+    /// Median step between azimuths, degrees.
     pub step_deg: f64,
-    /// Least and greatest first azimuth, degrees.
+    /// Minimum and maximum first azimuth, degrees.
     pub first_azimuth_deg: (f64, f64),
-    /// Range bins from the sensor outwards that hold its ringing.
+    /// Number of range bins, from the sensor outwards, with ringing.
     pub ringing_bins: usize,
 }
 
-/// Collects [`RowsReport`] from scan after scan.
+/// Accumulates [`RowsReport`] over scans.
 #[derive(Default)]
 pub(super) struct Survey {
     scans: usize,
@@ -56,7 +56,7 @@ pub(super) struct Survey {
     steps_rad: Vec<f64>,
     first_rad: Option<(f32, f32)>,
     power_rows: u64,
-    /// Sum and sum of squares of each bin's powers.
+    /// Sum and sum of squares of the powers of each bin.
     power: Vec<(u64, u64)>,
 }
 
@@ -80,15 +80,15 @@ impl Survey {
         let Some(&first) = scan.azimuth_rad.first() else {
             return;
         };
-        let (least, most) = self.first_rad.unwrap_or((first, first));
-        self.first_rad = Some((least.min(first), most.max(first)));
+        let (min, max) = self.first_rad.unwrap_or((first, first));
+        self.first_rad = Some((min.min(first), max.max(first)));
         let steps: Vec<f64> = steps_rad(scan).collect();
-        let usual = median(steps.iter().copied()).unwrap_or(0.0);
+        let median_rad = median(steps.iter().copied()).unwrap_or(0.0);
         self.lost += steps
             .iter()
-            .map(|s| ((s / usual).round() as u64).saturating_sub(1))
+            .map(|s| ((s / median_rad).round() as u64).saturating_sub(1))
             .sum::<u64>();
-        self.steps_rad.push(usual);
+        self.steps_rad.push(median_rad);
     }
 
     fn add_powers(&mut self, scan: &PolarScan<'_>) {
@@ -105,7 +105,7 @@ impl Survey {
     }
 
     pub(super) fn report(&self) -> RowsReport {
-        let (least, most) = self.first_rad.unwrap_or_default();
+        let (min, max) = self.first_rad.unwrap_or_default();
         RowsReport {
             rows: self.rows,
             not_measured: self.not_measured,
@@ -118,7 +118,7 @@ impl Survey {
             step_deg: median(self.steps_rad.iter().copied())
                 .unwrap_or(0.0)
                 .to_degrees(),
-            first_azimuth_deg: (f64::from(least).to_degrees(), f64::from(most).to_degrees()),
+            first_azimuth_deg: (f64::from(min).to_degrees(), f64::from(max).to_degrees()),
             ringing_bins: self.ringing_bins(),
         }
     }
@@ -140,7 +140,7 @@ impl Survey {
     }
 }
 
-/// Steps from azimuth to azimuth, the seam included, positive in the sense of rotation.
+/// Steps between azimuths, including that from the last to the first, positive in the sense of rotation.
 fn steps_rad<'a>(scan: &PolarScan<'a>) -> impl Iterator<Item = f64> + 'a {
     let sign = if scan.geometry.sense == Sense::Clockwise {
         1.0

@@ -5,35 +5,35 @@ use serde::Serialize;
 use crate::dataset::Dataset;
 use crate::median::median;
 
-/// An interval longer than this many periods, on the clock that is used, is a gap.
+/// Interval on the used clock from which on scans are missing, periods.
 const GAP_PERIODS: f64 = 1.5;
-/// A logged interval longer than this many periods is a stall of the host.
+/// Logged interval from which on the host has stalled, periods.
 const STALL_PERIODS: f64 = 1.4;
-/// After a stall the host takes in scans faster than the sensor makes them: at most this many periods apart.
+/// Maximum interval while the host catches up after a stall, periods.
 const CATCH_UP_PERIODS: f64 = 0.97;
-/// Scans after a long interval by which a gap is told from a stall.
+/// Number of scans after a long interval that distinguish a gap from a stall.
 const AFTERWARDS: usize = 5;
 
-/// The times of a dataset's scans. Indices count scans from 0.
+/// Times of the scans. Indices are from 0.
 #[derive(Clone, Debug, Serialize)]
 pub struct TimingReport {
-    /// First scan's time, ns since 1970.
+    /// Time of the first scan, ns since 1970.
     pub first_ns: i64,
-    /// Last scan's time, ns since 1970.
+    /// Time of the last scan, ns since 1970.
     pub last_ns: i64,
     /// Median time between scans, s; 0 for a single scan.
     pub period_s: f64,
-    /// RMS deviation of the logged intervals from the period, s, gaps and stalls left out.
+    /// RMS deviation of the logged intervals from the period, s, without gaps and stalls.
     pub jitter_s: f64,
-    /// Longest and shortest logged interval, s.
+    /// Maximum and minimum logged interval, s.
     pub logged_interval_s: (f64, f64),
-    /// Scans that are missing between the first and the last.
+    /// Number of missing scans.
     pub missing_scans: usize,
-    /// Where they are missing.
+    /// Missing scans.
     pub gaps: Vec<Gap>,
-    /// Where the host stalled: stamps were logged late, and no scan is missing.
+    /// Stalls of the host: stamps were logged late, but no scan is missing.
     pub stalls: Vec<Stall>,
-    /// Scans whose logged stamp lies before that of the scan before.
+    /// Scans whose logged stamp is before that of the previous scan.
     pub backwards: Vec<usize>,
 }
 
@@ -42,22 +42,22 @@ pub struct TimingReport {
 pub struct Gap {
     /// The first scan after the gap.
     pub scan: usize,
-    /// How many are missing.
+    /// Number of missing scans.
     pub missing: usize,
-    /// From the scan before the gap to the one after, s.
+    /// Time between the scans before and after the gap, s.
     pub seconds: f64,
 }
 
 /// A stall of the host.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Stall {
-    /// The first scan that came late.
+    /// The first late scan.
     pub scan: usize,
-    /// How late its stamp is, s.
+    /// Delay of its stamp, s.
     pub late_s: f64,
 }
 
-/// `None` where not every scan has a time.
+/// Examines the times of all scans; `None` if a scan has no time.
 pub(super) fn examine(dataset: &dyn Dataset) -> Option<TimingReport> {
     let all = 0..dataset.len();
     let used: Vec<i64> = all
@@ -70,7 +70,7 @@ pub(super) fn examine(dataset: &dyn Dataset) -> Option<TimingReport> {
     times(&used, &logged)
 }
 
-/// `used`: the clock that the scans are read with; `logged`: as written down by the host.
+/// `used` are the times that the scans are read with, `logged` those recorded by the host.
 fn times(used: &[i64], logged: &[i64]) -> Option<TimingReport> {
     let (used_s, logged_s) = (intervals_s(used), intervals_s(logged));
     let period_s = median(used_s.iter().copied()).unwrap_or(0.0);
@@ -122,14 +122,14 @@ fn intervals_s(stamps: &[i64]) -> Vec<f64> {
         .collect()
 }
 
-/// How late each stamp was logged, against the most prompt one.
+/// Delay of each logged stamp relative to the most prompt one.
 fn lateness_s(used: &[i64], logged: &[i64]) -> Vec<f64> {
     let late: Vec<i64> = logged.iter().zip(used).map(|(l, u)| l - u).collect();
     let prompt = late.iter().copied().min().unwrap_or(0);
     late.iter().map(|l| (l - prompt) as f64 * 1e-9).collect()
 }
 
-/// Whether the scans that follow a long interval come faster than the sensor makes them.
+/// Returns whether the scans after a long interval arrive faster than the sensor period.
 fn catches_up(afterwards: &[f64], period_s: f64) -> bool {
     let next = afterwards
         .iter()
@@ -140,23 +140,23 @@ fn catches_up(afterwards: &[f64], period_s: f64) -> bool {
 }
 
 fn jitter_s(logged_s: &[f64], period_s: f64) -> f64 {
-    let ordinary = || {
+    let regular = || {
         logged_s
             .iter()
             .map(|s| s - period_s)
             .filter(|d| d.abs() < (STALL_PERIODS - 1.0) * period_s)
     };
-    let count = ordinary().count().max(1);
-    (ordinary().map(|d| d * d).sum::<f64>() / count as f64).sqrt()
+    let count = regular().count().max(1);
+    (regular().map(|d| d * d).sum::<f64>() / count as f64).sqrt()
 }
 
 fn extremes(values: &[f64]) -> (f64, f64) {
-    let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let max = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let min = values.iter().copied().fold(f64::INFINITY, f64::min);
     if values.is_empty() {
         (0.0, 0.0)
     } else {
-        (most, least)
+        (max, min)
     }
 }
 
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stall_that_is_caught_up_is_no_gap() {
+    fn a_stall_with_catching_up_is_not_a_gap() {
         let mut logged = even(30);
         for (k, late) in [900, 700, 500, 300, 100].into_iter().enumerate() {
             logged[10 + k] += late * MS;
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn time_that_runs_backwards_is_found() {
+    fn time_that_runs_backwards_is_detected() {
         let mut logged = even(9);
         logged[4] -= 400 * MS;
         assert_eq!(times(&even(9), &logged).unwrap().backwards, [4]);

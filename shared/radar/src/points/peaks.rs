@@ -1,13 +1,13 @@
-//! Cells that no azimuth beside them outshines.
+//! Non-maximum suppression across azimuths.
 
 use super::range_cells::RangeCells;
 use crate::scan::PolarScan;
 use std::f32::consts::{PI, TAU};
 
-/// Cells that are looked through together.
+/// Cells per test for emptiness.
 const BLOCK: usize = 16;
 
-/// A cell that became a point.
+/// A local maximum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Peak {
     pub azimuth: u16,
@@ -16,11 +16,11 @@ pub(super) struct Peak {
     pub power: i16,
 }
 
-/// How far a return shines into the azimuths beside it.
+/// Finds the local maxima within the width of the beam.
 #[derive(Debug)]
 pub(super) struct Beam {
     half_width_rad: f32,
-    /// One azimuth's powers, 0 where a neighbour is brighter.
+    /// Powers of one azimuth, 0 where a neighbour is stronger.
     row: Vec<i16>,
     found: Vec<Peak>,
 }
@@ -34,21 +34,21 @@ impl Beam {
         }
     }
 
-    /// The cells of all azimuths, in order, that have power and are as bright as any within the beam.
+    /// Returns the cells of all azimuths, in order, that have power and are not exceeded within the beam.
     pub fn peaks(&mut self, scan: &PolarScan<'_>, cells: &RangeCells) -> &[Peak] {
         let azimuths = scan.geometry.azimuths;
         self.found.clear();
-        // All that could be found: so no later scan of this size allocates. Untouched memory costs nothing.
+        // The upper bound, so that no later scan of this size allocates. Untouched memory is not committed.
         self.found.reserve(azimuths * cells.cells());
         for azimuth in 0..azimuths {
-            let Some(powers) = cells.lit(azimuth) else {
+            let Some(powers) = cells.powers(azimuth) else {
                 continue;
             };
             self.row.clear();
             self.row.extend_from_slice(powers);
             for neighbour in neighbours(scan, azimuth, self.half_width_rad) {
-                if let Some(powers) = cells.lit(neighbour) {
-                    outshine(&mut self.row, powers);
+                if let Some(powers) = cells.powers(neighbour) {
+                    suppress(&mut self.row, powers);
                 }
             }
             collect(&self.row, azimuth as u16, &mut self.found);
@@ -57,19 +57,19 @@ impl Beam {
     }
 }
 
-/// The azimuths within a half width on either side, across the sweep's seam too, each once. Half of an even spacing more
-/// is allowed, for antennas do not turn evenly.
+/// Returns the other azimuths within a half width on either side, also across the end of the sweep, each once. Half of the
+/// mean spacing is added, since antennas do not turn quite uniformly.
 fn neighbours(
     scan: &PolarScan<'_>,
     azimuth: usize,
     half_width_rad: f32,
 ) -> impl Iterator<Item = usize> {
     let azimuths = scan.geometry.azimuths;
-    let furthest_rad = half_width_rad + 0.5 * TAU / azimuths as f32;
+    let max_rad = half_width_rad + 0.5 * TAU / azimuths as f32;
     let (centre_rad, bearings) = (scan.azimuth_rad[azimuth], scan.azimuth_rad);
     let within = move |&other: &usize| {
         let turn = bearings[other] - centre_rad;
-        ((turn + PI).rem_euclid(TAU) - PI).abs() <= furthest_rad
+        ((turn + PI).rem_euclid(TAU) - PI).abs() <= max_rad
     };
     let later = (1..=azimuths / 2)
         .map(move |step| (azimuth + step) % azimuths)
@@ -80,7 +80,7 @@ fn neighbours(
     later.chain(earlier)
 }
 
-fn outshine(row: &mut [i16], neighbour: &[i16]) {
+fn suppress(row: &mut [i16], neighbour: &[i16]) {
     for (power, &beside) in row.iter_mut().zip(neighbour) {
         *power = if beside > *power { 0 } else { *power };
     }

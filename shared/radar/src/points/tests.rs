@@ -29,7 +29,7 @@ fn extract(config: &PointsConfig, scan: &OwnedScan, floor: u8) -> Vec<SparsePoin
     out
 }
 
-/// The points by their definition: every cell of every azimuth against all azimuths.
+/// The points by their definition: compares every cell of every azimuth with all azimuths.
 fn direct(config: &PointsConfig, scan: &OwnedScan, floor: u8) -> Vec<SparsePoint> {
     let view = scan.view();
     let geometry = &view.geometry;
@@ -44,7 +44,7 @@ fn direct(config: &PointsConfig, scan: &OwnedScan, floor: u8) -> Vec<SparsePoint
             .sum();
         (sum - i32::from(floor) * depth as i32).max(0)
     };
-    let beside = |a: usize, b: usize| {
+    let within_beam = |a: usize, b: usize| {
         let turn = (view.azimuth_rad[a] - view.azimuth_rad[b])
             .to_degrees()
             .rem_euclid(360.0);
@@ -55,13 +55,13 @@ fn direct(config: &PointsConfig, scan: &OwnedScan, floor: u8) -> Vec<SparsePoint
         for cell in 0..geometry.bins / depth {
             let range_m = view.range_m((cell * depth) as f32 + 0.5 * (depth as f32 - 1.0));
             let here = power(azimuth, cell);
-            let rivals =
-                (0..geometry.azimuths).filter(|&other| measured(other) && beside(azimuth, other));
-            let outshone = rivals
+            let rivals = (0..geometry.azimuths)
+                .filter(|&other| measured(other) && within_beam(azimuth, other));
+            let suppressed = rivals
                 .map(|other| power(other, cell))
                 .any(|there| there > here);
             if here == 0
-                || outshone
+                || suppressed
                 || !(config.min_range_m..=config.max_range_m).contains(&range_m)
             {
                 continue;
@@ -86,7 +86,7 @@ fn direct(config: &PointsConfig, scan: &OwnedScan, floor: u8) -> Vec<SparsePoint
     points
 }
 
-/// Noise of azimuths that wobble, one in ten of them not measured.
+/// Noise at irregular azimuths, one in ten of them not measured.
 fn noise(azimuths: usize, bins: usize, range_resolution_m: f32, seed: u32) -> OwnedScan {
     let mut state = seed;
     let mut random = move || {
@@ -145,22 +145,22 @@ proptest! {
     }
 
     #[test]
-    fn where_there_are_too_many_the_strongest_stay(seed: u32, capacity in 0usize..400) {
+    fn the_strongest_points_are_kept(seed: u32, capacity in 0usize..400) {
         let scan = noise(40, 200, 0.17, seed);
         let all = PointsConfig { weight_cap: 255.0, ..PointsConfig::default() };
         let config = PointsConfig { capacity, ..all.clone() };
         let (all, few) = (extract(&all, &scan, 100), extract(&config, &scan, 100));
         prop_assert!(few.len() <= capacity);
         let weakest = few.iter().map(|point| point.weight).fold(1.0, f32::min);
-        let stay = |point: &&SparsePoint| !few.is_empty() && point.weight >= weakest;
-        prop_assert_eq!(&all.iter().filter(stay).copied().collect::<Vec<_>>(), &few);
-        // One step of power lower would be too many.
+        let is_kept = |point: &&SparsePoint| !few.is_empty() && point.weight >= weakest;
+        prop_assert_eq!(&all.iter().filter(is_kept).copied().collect::<Vec<_>>(), &few);
+        // With a threshold one step lower there are too many.
         let next = all.iter().map(|point| point.weight).filter(|&weight| few.is_empty() || weight < weakest).fold(0.0, f32::max);
         prop_assert!(all.len() <= capacity || all.iter().filter(|point| point.weight >= next).count() > capacity);
     }
 }
 
-/// Scatterers all around but for the seam, which a moving sensor sees twice or not at all.
+/// Scatterers in all directions except straight ahead, where a moving sensor may see them twice or not at all.
 fn places() -> Vec<Point2<f64>> {
     let polar = |k: u32| {
         (
@@ -175,7 +175,7 @@ fn places() -> Vec<Point2<f64>> {
 }
 
 #[test]
-fn a_moving_sensors_points_are_where_the_scatterers_are_once_motion_and_doppler_are_undone() {
+fn compensated_points_of_a_moving_sensor_are_at_the_scatterers() {
     let twist = Twist {
         vx_mps: 18.0,
         vy_mps: -0.4,
@@ -214,7 +214,7 @@ fn a_moving_sensors_points_are_where_the_scatterers_are_once_motion_and_doppler_
                         moment + (place - scatterer) * f64::from(point.weight),
                     )
                 });
-            // A bearing is known to half an azimuth, a range to a tenth of a cell.
+            // The accuracy is half an azimuth in bearing, and a tenth of a cell in range.
             let miss = moment / sum;
             let along = miss.dot(&scatterer.coords.normalize()).abs();
             assert!(
@@ -229,16 +229,16 @@ fn a_moving_sensors_points_are_where_the_scatterers_are_once_motion_and_doppler_
     }
 }
 
-/// Where a point lies in the frame at the scan's stamp.
+/// Transforms a point to the frame at the scan's stamp, with Doppler compensation.
 fn place(point: &SparsePoint, twist: &Twist) -> Point2<f64> {
     let [x, y, time_s, _, doppler_s] = <[f32; 5]>::from(*point).map(f64::from);
-    let look = Vector2::new(x, y).normalize();
-    let shift_m = doppler_s * look.dot(&Vector2::new(twist.vx_mps, twist.vy_mps));
-    twist.pose_at(time_s) * Point2::from(Vector2::new(x, y) + look * shift_m)
+    let direction = Vector2::new(x, y).normalize();
+    let shift_m = doppler_s * direction.dot(&Vector2::new(twist.vx_mps, twist.vy_mps));
+    twist.pose_at(time_s) * Point2::from(Vector2::new(x, y) + direction * shift_m)
 }
 
 #[test]
-fn a_scatterer_on_the_seam_is_seen_once() {
+fn a_scatterer_between_the_last_and_first_azimuth_gives_one_point() {
     let mut scan = Sensor {
         bins: 500,
         range_resolution_m: 0.1736,
@@ -258,7 +258,7 @@ fn a_scatterer_on_the_seam_is_seen_once() {
 }
 
 #[test]
-fn two_azimuths_that_are_equally_bright_both_stay() {
+fn two_equally_strong_azimuths_both_give_points() {
     let mut scan = Sensor {
         bins: 500,
         range_resolution_m: 0.1736,
@@ -277,7 +277,7 @@ fn two_azimuths_that_are_equally_bright_both_stay() {
 }
 
 #[test]
-fn nothing_remains_of_the_scan_before() {
+fn the_previous_scan_leaves_no_trace() {
     let scans = [
         noise(90, 300, 0.05, 1),
         noise(40, 200, 0.3, 2),
@@ -296,7 +296,7 @@ fn nothing_remains_of_the_scan_before() {
 }
 
 #[test]
-fn scans_of_almost_nothing_have_no_points_and_contradictory_ones_are_refused() {
+fn tiny_scans_have_no_points_and_inconsistent_ones_are_rejected() {
     for (azimuths, bins) in [(1, 0), (1, 1), (1, 500), (2, 2)] {
         let mut scan = noise(azimuths, bins, 0.0438, 4);
         assert!(extract(&PointsConfig::default(), &scan, 255).is_empty());
@@ -305,17 +305,17 @@ fn scans_of_almost_nothing_have_no_points_and_contradictory_ones_are_refused() {
     }
     let mut scan = noise(4, 10, 0.1, 5);
     scan.geometry.bins = 11;
-    let refused = PointExtractor::new(&PointsConfig::default())
+    let rejected = PointExtractor::new(&PointsConfig::default())
         .unwrap()
         .extract(&scan.view(), 0, &mut [UNSET]);
     assert!(matches!(
-        refused,
+        rejected,
         Err(ScanError::Length { what: "image", .. })
     ));
 }
 
 #[test]
-fn settings_out_of_bounds_are_refused_by_name() {
+fn settings_out_of_bounds_are_rejected_by_name() {
     let default = PointsConfig::default;
     for (name, config) in [
         (
@@ -361,12 +361,12 @@ fn settings_out_of_bounds_are_refused_by_name() {
             },
         ),
     ] {
-        let refused = PointExtractor::new(&config).unwrap_err();
+        let rejected = PointExtractor::new(&config).unwrap_err();
         assert!(
-            refused
+            rejected
                 .to_string()
                 .starts_with(&format!("points.{name} is ")),
-            "{refused}"
+            "{rejected}"
         );
     }
 }

@@ -1,26 +1,25 @@
-//! From a bearing to the azimuth measured there, and when.
+//! Lookup table from a bearing to the azimuth measured there, and to its time.
 
 use crate::scan::{MAX_AZIMUTHS, PolarScan};
 use std::f64::consts::TAU;
 
-/// Nodes a turn: ten between Navtech's azimuths. Between nodes the table is linear, so that it errs only next to a
-/// measured azimuth, by less than `azimuths / (4 NODES)` of the change in spacing there.
+/// Nodes per turn: ten between Navtech azimuths. The table is linear between nodes, so its error is confined to the
+/// neighbourhood of a measured azimuth, and below `azimuths / (4 NODES)` of the change in spacing there.
 pub(super) const NODES: usize = 4096;
 
-/// How far an azimuth may lie behind the one before it, turns: the encoder's jitter, or a sweep that ends past its
-/// start.
+/// How far an azimuth may lie behind the previous one, turns: encoder jitter, or a sweep that ends past its start.
 const BACKLASH: f64 = 0.1;
 
-/// Rows and times over the turn that starts at the first azimuth, at bearings `k / NODES`.
+/// Fractional azimuths and times at bearings `k / NODES`, over the turn that starts at the first azimuth.
 #[derive(Debug)]
 pub(super) struct BearingTable {
     /// Bearing of the first azimuth, turns in `[0, 1)`.
     pub start: f32,
     /// Fractional azimuth, `[0, azimuths]`; `azimuths` is the first one again.
     pub row: Box<[f32; NODES + 1]>,
-    /// Seconds from the scan's stamp.
+    /// Time relative to the scan's stamp, s.
     pub time_s: Box<[f32; NODES + 1]>,
-    /// Bearings of the azimuths from the first one on, turns, never falling, with 1 at the end.
+    /// Bearings of the azimuths relative to the first, turns, non-decreasing, followed by 1.
     bearings: Vec<f64>,
 }
 
@@ -34,13 +33,13 @@ impl BearingTable {
         }
     }
 
-    /// Takes the azimuths and stamps of a scan that has at least one azimuth and passed its check.
-    pub fn measure(&mut self, scan: &PolarScan<'_>) {
+    /// Computes the table of a checked scan with at least one azimuth.
+    pub fn update(&mut self, scan: &PolarScan<'_>) {
         let azimuths = &scan.azimuth_rad[..scan.geometry.azimuths];
         let first = azimuths.first().copied().unwrap_or(0.0);
         self.start = (f64::from(first) / TAU).rem_euclid(1.0) as f32;
         if self.start >= 1.0 {
-            self.start = 0.0; // just below a whole turn, rounded up
+            self.start = 0.0; // rounded up to a whole turn
         }
         self.unwrap(azimuths);
         self.fill_nodes(scan);
@@ -76,7 +75,7 @@ impl BearingTable {
             } else {
                 0.0
             };
-            // Past the last azimuth its time holds: the first one's, a sweep earlier, is no neighbour.
+            // The time past the last azimuth stays constant: the first azimuth was measured a sweep earlier.
             let (earlier, later) = (seconds(below), seconds(below + 1));
             self.row[node] = (below as f64 + share) as f32;
             self.time_s[node] = (earlier + share * (later - earlier)) as f32;
@@ -89,7 +88,7 @@ mod tests {
     use super::*;
     use crate::scan::{OwnedScan, ScanLimits};
 
-    /// A scan that has nothing but azimuths (degrees) and times (seconds).
+    /// The table of a scan with azimuths (degrees) and times (seconds) only.
     fn measured(azimuths: &[(f32, f64)]) -> BearingTable {
         let mut scan = OwnedScan::with_limits(ScanLimits {
             bytes: 0,
@@ -101,7 +100,7 @@ mod tests {
             scan.stamp_ns[i] = (time_s * 1e9) as i64;
         }
         let mut table = BearingTable::new();
-        table.measure(&scan.view());
+        table.update(&scan.view());
         table
     }
 
@@ -125,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn between_last_and_first_azimuth_rows_go_on_and_time_holds() {
+    fn between_last_and_first_azimuth_rows_increase_and_time_is_constant() {
         let table = measured(&[(10.0, 0.0), (130.0, 0.1), (250.0, 0.2)]);
         assert!((near(&table.row, 300.0) - 2.5).abs() < 2e-3);
         assert_eq!(near(&table.time_s, 300.0), 0.2);
@@ -133,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn an_encoder_that_steps_back_costs_no_more_than_that_row() {
+    fn an_encoder_that_steps_back_affects_that_row_only() {
         let table = measured(&[
             (0.0, 0.0),
             (359.9, 0.1),

@@ -1,38 +1,38 @@
-//! Where the raster's cells are.
+//! Positions of the cells of a raster.
 
 use crate::scan::Sense;
 use std::f32::consts::SQRT_2;
 use std::f64::consts::TAU;
 
-/// Cells that the loops take together.
+/// Cells per iteration of the vectorised loops.
 pub(super) const BLOCK: usize = 32;
 
-/// One number for each cell of a block.
+/// One value per cell of a block.
 pub(super) type Block<T> = [T; BLOCK];
 
-/// The centres of all cells, Cartesian and polar, in a frame whose second axis `z` points to where azimuths grow:
-/// y for sensors that turn counter-clockwise, -y for the others. So nothing further on asks for the sense.
+/// The centres of all cells, Cartesian and polar, in a frame whose second axis `z` points towards increasing azimuths:
+/// y for counter-clockwise sensors, -y for clockwise ones. The kernels therefore need not know the sense of rotation.
 /// Rows are padded to whole blocks with cells at the sensor.
 #[derive(Debug)]
 pub(super) struct Cells {
     n: usize,
     cell_m: f32,
     sense: Sense,
-    /// Metres along `z` of each column.
+    /// `z` of each column, m.
     z_m: Vec<Block<f32>>,
-    /// Turns from straight ahead toward `z`, `[0, 1]`, row by row.
+    /// Bearing from straight ahead towards `z`, turns in `[0, 1]`, row by row.
     bearing: Vec<Block<f32>>,
-    /// Metres from the sensor, row by row.
+    /// Range, m, row by row.
     range_m: Vec<Block<f32>>,
-    /// Range of the corners, metres.
-    pub furthest_m: f32,
+    /// Range of the corners, m.
+    pub max_range_m: f32,
 }
 
 /// One row of the raster.
 pub(super) struct CellRow<'a> {
-    /// Metres ahead, the same for the whole row.
+    /// x of the row, m.
     pub x_m: f32,
-    /// See [`Cells`]; all three have as many blocks.
+    /// See [`Cells`]; all three have the same number of blocks.
     pub z_m: &'a [Block<f32>],
     pub bearing: &'a [Block<f32>],
     pub range_m: &'a [Block<f32>],
@@ -48,21 +48,21 @@ impl Cells {
             z_m: vec![[0.0; BLOCK]; blocks],
             bearing: vec![[0.0; BLOCK]; n * blocks],
             range_m: vec![[0.0; BLOCK]; n * blocks],
-            furthest_m: 0.5 * (n as f32 - 1.0) * cell_m * SQRT_2,
+            max_range_m: 0.5 * (n as f32 - 1.0) * cell_m * SQRT_2,
         };
         cells.compute();
         cells
     }
 
-    /// Turns the frame to the scan's sense; a dataset has one, so this computes at most once.
-    pub fn look_in(&mut self, sense: Sense) {
+    /// Sets the sense of rotation. A dataset has one, so the cells are recomputed at most once.
+    pub fn set_sense(&mut self, sense: Sense) {
         if self.sense != sense {
             self.sense = sense;
             self.compute();
         }
     }
 
-    /// Blocks of a row.
+    /// Blocks per row.
     pub fn blocks(&self) -> usize {
         self.z_m.len()
     }
@@ -77,7 +77,7 @@ impl Cells {
         }
     }
 
-    /// Metres from the sensor to the centre of a row (ahead) or column (left).
+    /// x of a row or y of a column, m.
     fn offset_m(&self, index: usize) -> f64 {
         (0.5 * (self.n as f64 - 1.0) - index as f64) * f64::from(self.cell_m)
     }

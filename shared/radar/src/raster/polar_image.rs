@@ -1,33 +1,33 @@
-//! The scan as it is sampled: power above the floor, averaged along range over what a cell covers, in steps of range
-//! that are fine beside a cell but coarse beside a bin, so that the cells' reads stay in the cache.
+//! The polar image that cells are sampled from: power above the floor, averaged along range over the depth of a cell. Its
+//! columns are finer than a cell but coarser than a bin, so that it stays in the cache.
 
 use super::kernels::window::{self, Window};
 use super::sweep_motion::SweepMotion;
 use crate::scan::{PolarScan, SweepGeometry};
 
-/// Row-major samples, in units of 1/256 of the scan's power: one row an azimuth and the first one again at the end,
-/// with empty columns at both sides. Bilinear sampling is the same with a window of one bin.
+/// Row-major samples, in units of 1/256 of the scan's power: one row per azimuth, the first one repeated at the end, and
+/// empty columns on both sides. Bilinear sampling uses a window of one bin.
 #[derive(Debug)]
 pub(super) struct PolarImage {
     window_m: f32,
     layout: Layout,
     samples: Vec<u16>,
-    /// One azimuth's sums of bins, with as many empty ones around them as the windows reach over.
+    /// Piecewise sums of one azimuth, padded with zeros by the reach of the window.
     pieces: Vec<u16>,
-    /// One azimuth's powers above the floor.
+    /// Powers above the floor of one azimuth.
     above_floor: Vec<u8>,
-    /// One azimuth's samples at the ranges as measured, while Doppler's shift is undone.
+    /// Samples of one azimuth before Doppler compensation.
     measured: Vec<u16>,
 }
 
-/// What follows from the scan's geometry.
+/// The dimensions, which follow from the geometry of the scan.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Layout {
     azimuths: usize,
     bins: usize,
     range_resolution_m: f32,
     window: Window,
-    /// Pieces of an azimuth.
+    /// Pieces per azimuth.
     pieces: usize,
 }
 
@@ -38,28 +38,28 @@ impl Layout {
             azimuths: geometry.azimuths,
             bins: geometry.bins,
             range_resolution_m: geometry.range_resolution_m,
-            pieces: geometry.bins.div_ceil(window.bins_a_piece),
+            pieces: geometry.bins.div_ceil(window.bins_per_piece),
             window,
         }
     }
 
-    /// Columns before the first piece. The first of them is empty: no window reaches further.
+    /// Columns before the first piece. The first of them is out of reach of the window, and so empty.
     fn lead(&self) -> usize {
         self.window.reach() + 1
     }
 
-    /// Columns, the last two empty.
+    /// Number of columns; the last two are empty.
     fn stride(&self) -> usize {
         self.lead() + self.pieces + self.window.reach() + 2
     }
 
     fn piece_m(&self) -> f32 {
-        self.range_resolution_m * self.window.bins_a_piece as f32
+        self.range_resolution_m * self.window.bins_per_piece as f32
     }
 }
 
 impl PolarImage {
-    /// `window_m`: metres of range that a sample is the mean of; less than a bin counts as one bin.
+    /// `window_m` is the depth of the mean, m; less than a bin counts as one bin.
     pub fn new(window_m: f32) -> Self {
         Self {
             window_m,
@@ -71,26 +71,26 @@ impl PolarImage {
         }
     }
 
-    /// Takes the scan's powers out to `furthest_m`; columns beyond hold nothing of use. With a `motion` the columns are
-    /// true ranges, Doppler's shift undone azimuth by azimuth, so that rising and falling chirps may alternate.
+    /// Computes the image of a scan out to `max_range_m`; columns beyond are undefined. With a `motion` the Doppler shift is
+    /// compensated azimuth by azimuth, so that rising and falling chirps may alternate.
     pub fn fill(
         &mut self,
         scan: &PolarScan<'_>,
         floor: u8,
-        furthest_m: f32,
+        max_range_m: f32,
         motion: Option<&SweepMotion>,
     ) {
         self.lay_out(&scan.geometry);
         let motion = motion.filter(|_| scan.geometry.doppler_s != 0.0);
-        let most_m = motion.map_or(0.0, |motion| {
+        let max_shift_m = motion.map_or(0.0, |motion| {
             motion.speed_mps() * scan.geometry.doppler_s.abs()
         });
         let layout = &self.layout;
         let (stride, reach) = (layout.stride(), layout.window.reach());
-        let place = (furthest_m + most_m - scan.geometry.range_offset_m) / layout.piece_m();
+        let place = (max_range_m + max_shift_m - scan.geometry.range_offset_m) / layout.piece_m();
         let columns = stride.min((place.max(0.0) as usize).saturating_add(layout.lead() + 3));
         let pieces = layout.pieces.min(columns + reach);
-        let bins = layout.bins.min(pieces * layout.window.bins_a_piece);
+        let bins = layout.bins.min(pieces * layout.window.bins_per_piece);
         let first = layout.lead() + reach;
         for azimuth in 0..layout.azimuths {
             let powers = &scan.row(azimuth)[..bins];
@@ -98,7 +98,7 @@ impl PolarImage {
             window::sum_pieces(
                 powers,
                 floor,
-                layout.window.bins_a_piece,
+                layout.window.bins_per_piece,
                 &mut self.above_floor,
                 sums,
             );
@@ -141,11 +141,11 @@ impl PolarImage {
         self.layout.stride()
     }
 
-    pub fn columns_a_metre(&self) -> f32 {
+    pub fn columns_per_metre(&self) -> f32 {
         1.0 / self.layout.piece_m()
     }
 
-    /// The fractional column of what lies `range_offset_m` before the first bin's start.
+    /// The fractional column at range 0.
     pub fn column_at_sensor(&self, range_offset_m: f32) -> f32 {
         self.layout.lead() as f32 - 0.5 - range_offset_m / self.layout.piece_m()
     }

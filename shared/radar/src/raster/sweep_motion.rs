@@ -1,22 +1,22 @@
-//! A twist as the loops over cells use it.
+//! The motion of the sensor within a sweep, in the form that the kernels use.
 
 use super::RasterError;
 use crate::scan::{PolarScan, Sense};
 use gyre_geometry::Twist;
 
-/// The furthest that a compensated sensor may turn between the scan's stamp and any azimuth, radians.
+/// Maximum turn of the sensor between the scan's stamp and any azimuth, rad.
 pub const MAX_TURN_RAD: f64 = 2.0;
 
-/// The furthest that it may travel in that time, metres.
+/// Maximum travel in that time, m.
 pub const MAX_TRAVEL_M: f64 = 1e4;
 
-/// A sensor's motion within the sweep, in the frame of [`super::cells::Cells`].
+/// Motion of the sensor within a sweep, in the frame of [`super::cells::Cells`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SweepMotion {
     vx_mps: f32,
     vz_mps: f32,
     half_yaw_rate_radps: f32,
-    /// No azimuth was measured further than this from where the sensor stood at the scan's stamp, metres.
+    /// Maximum distance of the sensor from its position at the scan's stamp, m.
     pub travel_m: f32,
 }
 
@@ -34,33 +34,33 @@ impl SweepMotion {
                 travel_m,
             });
         }
-        let seen = match scan.geometry.sense {
+        let mirrored = match scan.geometry.sense {
             Sense::Clockwise => twist.mirrored(),
             Sense::CounterClockwise => twist,
         };
         Ok(Self {
-            vx_mps: seen.vx_mps as f32,
-            vz_mps: seen.vy_mps as f32,
-            half_yaw_rate_radps: (0.5 * seen.yaw_rate_radps) as f32,
+            vx_mps: mirrored.vx_mps as f32,
+            vz_mps: mirrored.vy_mps as f32,
+            half_yaw_rate_radps: (0.5 * mirrored.yaw_rate_radps) as f32,
             travel_m: travel_m as f32,
         })
     }
 
-    /// Speed toward what the sensor looks at, m/s.
+    /// Closing speed to a stationary target at an azimuth, m/s.
     pub fn approach_mps(&self, azimuth_rad: f32) -> f32 {
         let (sin, cos) = azimuth_rad.sin_cos();
         self.vx_mps * cos + self.vz_mps * sin
     }
 
-    /// The largest speed toward anything, m/s.
+    /// The largest closing speed, m/s.
     pub fn speed_mps(&self) -> f32 {
         self.vx_mps.hypot(self.vz_mps)
     }
 
-    /// A point, given in the frame at the scan's stamp, in the sensor's frame `t_s` seconds later: exp(twist t)^-1 p.
+    /// Transforms a point from the frame at the scan's stamp to the sensor's frame `t_s` seconds later: exp(twist t)^-1 p.
     ///
-    /// With R the turn by half of the yaw, the pose at t is (R d, R R), where d is the arc drawn straight to its
-    /// chord; so its inverse takes p to R' (R' p - d).
+    /// With R the rotation by half of the yaw, the pose at t is (R d, R R), where d is the chord of the arc before that
+    /// rotation; its inverse maps p to R' (R' p - d).
     #[inline(always)]
     pub fn in_sensor(&self, x: f32, z: f32, t_s: f32) -> (f32, f32) {
         let half = self.half_yaw_rate_radps * t_s;
@@ -72,7 +72,7 @@ impl SweepMotion {
     }
 }
 
-/// (sin x / x, cos x), right to 1e-6 for |x| <= MAX_TURN_RAD / 2: the first terms of their series.
+/// (sin x / x, cos x) by the first terms of their series, accurate to 1e-6 for |x| <= MAX_TURN_RAD / 2.
 #[inline(always)]
 fn sinc_cos(x: f32) -> (f32, f32) {
     let s = x * x;

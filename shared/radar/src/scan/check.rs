@@ -1,35 +1,35 @@
-//! Whether a scan is what its geometry says.
+//! Consistency of a scan with its geometry.
 
 use super::{MAX_AZIMUTHS, PolarScan};
 use std::ops::RangeInclusive;
 
-/// How a scan contradicts itself.
+/// An inconsistent scan.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ScanError {
-    /// One of the scan's slices is shorter than its geometry says.
-    #[error("the scan's {what} has {actual} elements, its geometry asks for {expected}")]
+    /// A slice is shorter than the geometry requires.
+    #[error("the scan's {what} has {actual} elements, but its geometry requires {expected}")]
     Length {
-        /// Which slice.
+        /// The slice.
         what: &'static str,
-        /// What the geometry asks for.
+        /// Elements required by the geometry.
         expected: usize,
-        /// What is there.
+        /// Elements present.
         actual: usize,
     },
-    /// One of the geometry's numbers is impossible.
+    /// A number of the geometry is out of bounds.
     #[error("the scan's {what} is {value}, expected {} to {}", bounds.start(), bounds.end())]
     Geometry {
-        /// Which number.
+        /// The number.
         what: &'static str,
         /// Its value.
         value: f64,
-        /// What it may be.
+        /// Permitted values.
         bounds: RangeInclusive<f64>,
     },
-    /// An azimuth is not a finite angle.
+    /// The angle of an azimuth is not finite.
     #[error("azimuth {index} of the scan is at {value} rad")]
     Azimuth {
-        /// Which row.
+        /// The row.
         index: usize,
         /// Its angle.
         value: f32,
@@ -37,15 +37,15 @@ pub enum ScanError {
 }
 
 impl PolarScan<'_> {
-    /// Whether all that the geometry promises is there, and no number is impossible.
+    /// Checks that the slices are as long as the geometry requires, and that every number is within its bounds.
     ///
     /// # Errors
-    /// The first contradiction.
+    /// Returns the first inconsistency.
     pub fn check(&self) -> Result<(), ScanError> {
         let geometry = &self.geometry;
         check_length("azimuth table", self.azimuth_rad.len(), geometry.azimuths)?;
-        check_length("table of stamps", self.stamp_ns.len(), geometry.azimuths)?;
-        check_length("table of flags", self.flags.len(), geometry.azimuths)?;
+        check_length("stamp table", self.stamp_ns.len(), geometry.azimuths)?;
+        check_length("flag table", self.flags.len(), geometry.azimuths)?;
         if geometry.azimuths > 0 {
             let last_row = (geometry.azimuths - 1).saturating_mul(geometry.stride);
             let bytes = last_row

@@ -1,4 +1,4 @@
-//! Small written datasets, and the way to the real ones.
+//! Small generated datasets, and paths of real ones.
 #![allow(dead_code, clippy::unwrap_used)]
 
 use std::fs;
@@ -10,7 +10,7 @@ use gyre_radar::{Dataset, OwnedScan, ReadError};
 pub const START_US: i64 = 1_547_131_046_000_000;
 pub const PERIOD_US: i64 = 250_000;
 
-/// The folder of real data, or `None` and a word about it.
+/// The folder of real data; `None`, with a message, if there is none.
 pub fn real(folder: &str) -> Option<PathBuf> {
     match std::env::var_os("GYRE_DATA") {
         Some(root) => Some(Path::new(&root).join(folder)),
@@ -34,14 +34,14 @@ pub fn write_png(path: &Path, width: usize, height: usize, pixels: &[u8]) {
         .unwrap();
 }
 
-/// A sweep in Navtech's columns; change what a test is about.
+/// A sweep with Navtech metadata columns.
 #[derive(Clone)]
 pub struct Sweep {
     pub rows: usize,
     pub bins: usize,
     pub first_count: u16,
     pub step: u16,
-    /// Stamp of the first row and of each next, in the file's unit.
+    /// Stamp of the first row, and interval of the rows, in the unit of the file.
     pub start: i64,
     pub row_interval: i64,
     pub byte_ten: fn(usize) -> u8,
@@ -66,7 +66,7 @@ impl Sweep {
         self.bins + 11
     }
 
-    /// The power that every written scan has at a place.
+    /// The power of every generated scan at a row and bin.
     pub fn power(row: usize, bin: usize) -> u8 {
         (row * 31 + bin * 7) as u8
     }
@@ -90,7 +90,7 @@ impl Sweep {
     }
 }
 
-/// `n` Oxford scans in `root/radar`, their files in order.
+/// Writes `n` Oxford scans to `root/radar`, and returns their files in order.
 pub fn write_oxford(root: &Path, n: i64) -> Vec<PathBuf> {
     let starts: Vec<i64> = (0..n).map(|k| START_US + k * PERIOD_US).collect();
     let list: String = starts.iter().map(|s| format!("{s} 1\n")).collect();
@@ -110,7 +110,7 @@ pub fn write_oxford(root: &Path, n: i64) -> Vec<PathBuf> {
         .collect()
 }
 
-/// `n` RADIATE scans of 60 bins x 40 azimuths, received at even times.
+/// Writes `n` RADIATE scans of 60 bins x 40 azimuths, received at uniform times.
 pub fn write_radiate(root: &Path, n: i64) -> Vec<PathBuf> {
     let (azimuths, bins) = (40, 60);
     let pixels: Vec<u8> = (0..bins * azimuths)

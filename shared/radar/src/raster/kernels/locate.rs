@@ -1,4 +1,4 @@
-//! Where each cell lies in the polar image, and what is there.
+//! The position of each cell in the polar image, and the interpolated power there.
 
 use super::super::bearing_table::{BearingTable, NODES};
 use super::super::cells::{BLOCK, Block, CellRow};
@@ -7,30 +7,30 @@ use super::window::UNIT;
 use gyre_simd::simd;
 use std::array::from_fn;
 
-/// From a cell's bearing to the time, to the place, to the bearing there. After the second step a cell 12 m away is
-/// centimetres off at 30 m/s, and others less.
+/// Steps from the bearing of a cell to the time of measurement, to the position relative to the sensor at that time, to
+/// the bearing there. After the second step the error at 30 m/s is centimetres for a cell 12 m away, and less for others.
 const FIXED_POINT_STEPS: usize = 2;
 
-/// What cells are looked up in.
+/// The tables that cells are looked up in.
 #[derive(Clone, Copy, Debug)]
 pub struct Lookup<'a> {
-    /// From bearings to azimuths and times.
+    /// Maps bearings to azimuths and times.
     pub bearings: &'a BearingTable,
-    /// The last row of the polar image that has another one after it.
+    /// The last row of the polar image with a successor.
     pub last_azimuth: i32,
-    /// Samples from one row of the polar image to the next.
+    /// Samples between consecutive rows of the polar image.
     pub stride: i32,
-    /// Columns of the polar image a metre.
-    pub columns_a_metre: f32,
+    /// Columns of the polar image per metre.
+    pub columns_per_metre: f32,
     /// The column at range 0.
     pub column_at_sensor: f32,
-    /// The last column that has another one after it.
+    /// The last column with a successor.
     pub last_column: f32,
-    /// Nearer cells are blank.
+    /// Nearer cells are zero.
     pub min_range_m: f32,
 }
 
-/// For a block of cells: the first of the four samples that surround each, and how far it lies toward the others.
+/// Interpolation of a block of cells: the first of the four samples around each cell, and the weights of the others.
 #[derive(Clone, Copy, Debug)]
 pub struct Taps {
     sample: Block<u32>,
@@ -39,7 +39,7 @@ pub struct Taps {
 }
 
 impl Taps {
-    /// Before anything is located.
+    /// Initial value.
     pub const NONE: Self = Self {
         sample: [0; BLOCK],
         along_range: [0.0; BLOCK],
@@ -47,30 +47,30 @@ impl Taps {
     };
 }
 
-/// Taps of a row of cells seen by a sensor that stands.
+/// Computes the taps of a row of cells for a sensor at rest.
 #[simd]
 pub fn locate(cells: &CellRow, lookup: &Lookup, taps: &mut [Taps]) {
     let places = cells.bearing.iter().zip(cells.range_m);
     for ((bearing, range_m), taps) in places.zip(taps) {
-        let from_start = bearing.map(|bearing| since(bearing, lookup.bearings.start));
+        let from_start = bearing.map(|bearing| relative(bearing, lookup.bearings.start));
         *taps = tap(lookup, &from_start, range_m);
     }
 }
 
-/// Taps of a row of cells seen by a sensor that moves: where it stood depends on when it looked, and that on where it
-/// stood.
+/// Computes the taps of a row of cells for a moving sensor, by fixed-point iteration: the sensor's position depends on the
+/// time of the measurement, which depends on the bearing of the cell from that position.
 #[simd]
 pub fn locate_moving(cells: &CellRow, motion: &SweepMotion, lookup: &Lookup, taps: &mut [Taps]) {
     let start = lookup.bearings.start;
     let places = cells.bearing.iter().zip(cells.z_m);
     for ((bearing, z_m), taps) in places.zip(taps) {
-        let mut from_start = bearing.map(|bearing| since(bearing, start));
+        let mut from_start = bearing.map(|bearing| relative(bearing, start));
         let (mut x, mut z) = ([cells.x_m; BLOCK], *z_m);
         for _ in 0..FIXED_POINT_STEPS {
             let t_s = from_start.map(|turns| interpolate(&lookup.bearings.time_s, turns));
             for k in 0..BLOCK {
                 (x[k], z[k]) = motion.in_sensor(cells.x_m, z_m[k], t_s[k]);
-                from_start[k] = since(turns(x[k], z[k]), start);
+                from_start[k] = relative(turns(x[k], z[k]), start);
             }
         }
         let range_m = from_fn(|k| (x[k] * x[k] + z[k] * z[k]).sqrt());
@@ -83,17 +83,17 @@ fn tap(lookup: &Lookup<'_>, from_start: &Block<f32>, range_m: &Block<f32>) -> Ta
     let mut taps = Taps::NONE;
     for k in 0..BLOCK {
         let row = interpolate(&lookup.bearings.row, from_start[k]);
-        let column = range_m[k] * lookup.columns_a_metre + lookup.column_at_sensor;
+        let column = range_m[k] * lookup.columns_per_metre + lookup.column_at_sensor;
         let column = column.max(0.0).min(lookup.last_column);
-        // Column 0 is empty, whatever the scan.
+        // Column 0 is always empty.
         let column = if range_m[k] < lookup.min_range_m {
             0.0
         } else {
             column
         };
         let (left, upper) = (
-            whole_below(column),
-            whole_below(row).min(lookup.last_azimuth),
+            integer_below(column),
+            integer_below(row).min(lookup.last_azimuth),
         );
         taps.sample[k] = (upper * lookup.stride + left) as u32;
         taps.along_range[k] = column - left as f32;
@@ -102,7 +102,7 @@ fn tap(lookup: &Lookup<'_>, from_start: &Block<f32>, range_m: &Block<f32>) -> Ta
     taps
 }
 
-/// The bilinear mean of the four samples of each cell of a row, in units of power.
+/// Writes the bilinear interpolation of the four samples of each cell of a row, in units of power.
 pub fn blend(taps: &[Taps], samples: &[u16], stride: usize, out: &mut [f32]) {
     for (taps, out) in taps.iter().zip(out.chunks_mut(BLOCK)) {
         for (k, value) in out.iter_mut().enumerate() {
@@ -117,9 +117,9 @@ pub fn blend(taps: &[Taps], samples: &[u16], stride: usize, out: &mut [f32]) {
     }
 }
 
-/// Turns from `start` on to `bearing`, both in `[0, 1]`.
+/// `bearing` relative to `start`, turns; both in `[0, 1]`.
 #[inline(always)]
-fn since(bearing: f32, start: f32) -> f32 {
+fn relative(bearing: f32, start: f32) -> f32 {
     let difference = bearing - start;
     if difference < 0.0 {
         difference + 1.0
@@ -131,22 +131,22 @@ fn since(bearing: f32, start: f32) -> f32 {
 #[inline(always)]
 fn interpolate(table: &[f32; NODES + 1], turns: f32) -> f32 {
     let place = turns * NODES as f32;
-    let node = whole_below(place).min(NODES as i32 - 1);
+    let node = integer_below(place).min(NODES as i32 - 1);
     let (below, above) = (table[node as usize], table[node as usize + 1]);
     below + (place - node as f32) * (above - below)
 }
 
-/// The whole number below `value`, or, at a whole number, that or the one before: what interpolates alike. For values
-/// in `[0, 2^22]`; it never leaves `[0, 2^23)`. A cast takes ten times longer, since it minds overflow and NaN.
+/// The integer below `value`; at an integer, that or the previous one, which interpolates alike. Valid in `[0, 2^22]`, and
+/// in `[0, 2^23)` for any input. A cast takes ten times longer, since it handles overflow and NaN.
 #[inline(always)]
-fn whole_below(value: f32) -> i32 {
+fn integer_below(value: f32) -> i32 {
     const MANTISSA: u32 = (1 << 23) - 1;
     let rounded = (value - 0.5).max(0.0) + (1 << 23) as f32;
     (rounded.to_bits() & MANTISSA) as i32
 }
 
-/// atan2(z, x) in turns, `[0, 1]`, right to 1e-8 turns before rounding: a minimax polynomial in the
-/// smaller coordinate over the larger.
+/// atan2(z, x) in turns, `[0, 1]`, accurate to 1e-8 turns before rounding: a minimax polynomial in the ratio of the
+/// smaller coordinate to the larger.
 #[inline(always)]
 fn turns(x: f32, z: f32) -> f32 {
     const ARCTANGENT: [f32; 8] = [
@@ -159,15 +159,15 @@ fn turns(x: f32, z: f32) -> f32 {
         0.003_479_594,
         -0.000_645_303_34,
     ];
-    let (ahead, aside) = (x.abs(), z.abs());
-    let ratio = ahead.min(aside) / ahead.max(aside).max(f32::MIN_POSITIVE);
+    let (abs_x, abs_z) = (x.abs(), z.abs());
+    let ratio = abs_x.min(abs_z) / abs_x.max(abs_z).max(f32::MIN_POSITIVE);
     let square = ratio * ratio;
     let mut sum = ARCTANGENT[7];
     for power in (0..7).rev() {
         sum = sum * square + ARCTANGENT[power];
     }
     let octant = sum * ratio;
-    let quadrant = if aside > ahead { 0.25 - octant } else { octant };
+    let quadrant = if abs_z > abs_x { 0.25 - octant } else { octant };
     let half = if x < 0.0 { 0.5 - quadrant } else { quadrant };
     if z < 0.0 { 1.0 - half } else { half }
 }
@@ -188,14 +188,14 @@ mod tests {
 
     proptest! {
         #[test]
-        fn whole_numbers_below_are_within_one(value in 0.0..4e6f32) {
-            let past = value - whole_below(value) as f32;
+        fn integers_below_are_within_one(value in 0.0..4e6f32) {
+            let past = value - integer_below(value) as f32;
             prop_assert!((0.0..=1.0).contains(&past));
         }
     }
 
     #[test]
-    fn whole_number_below_is_defined_for_all_floats() {
+    fn integer_below_is_defined_for_all_floats() {
         for value in [
             0.0,
             0.25,
@@ -205,7 +205,7 @@ mod tests {
             f32::NEG_INFINITY,
             f32::MAX,
         ] {
-            assert!((0..1 << 23).contains(&whole_below(value)));
+            assert!((0..1 << 23).contains(&integer_below(value)));
         }
     }
 

@@ -2,65 +2,65 @@
 
 use gyre_simd::simd;
 
-/// A sample's unit: 1/256 of the scan's. The largest mean, 255, just fits a u16.
+/// Units of a sample per unit of power. The largest mean, 255, fits a u16.
 pub const UNIT: u32 = 256;
 
-/// Pieces that a window spans at least, if it has as many bins. On Oxford's scans at 0.8 m a cell, 8 pieces keep
-/// rasters within 0.5 % (RMS) of the mean with exact ends, 4 pieces within 3 % in two thirds of the time.
-const PIECES_A_WINDOW: f32 = 8.0;
+/// Minimum number of pieces per window, if it has as many bins. On Oxford scans with cells of 0.8 m, 8 pieces keep rasters
+/// within 0.5 % (RMS) of the mean with exact ends, and 4 pieces within 3 % in two thirds of the time.
+const PIECES_PER_WINDOW: f32 = 8.0;
 
-/// The most bins in a piece: its sum must fit a u16.
-const MAX_BINS_A_PIECE: usize = 128;
+/// Maximum number of bins per piece: the sum must fit a u16.
+const MAX_BINS_PER_PIECE: usize = 128;
 
-/// Weights of a mean over a stretch of range, as fixed-point numbers.
+/// Fixed-point weights of a moving mean along range.
 ///
-/// The bins come in *pieces*, sums of 1, 2, 4, ... bins. The window's middle pieces count in full, one more on each
-/// side in part.
+/// Bins are summed to *pieces* of 1, 2, 4, ... bins. The pieces in the middle of the window count in full, one more on each
+/// side partially.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Window {
     /// A power of two.
-    pub bins_a_piece: usize,
-    /// Pieces that count in full; odd.
+    pub bins_per_piece: usize,
+    /// Pieces that count in full; an odd number.
     full: usize,
-    /// 65536 UNIT over the window's length in bins.
+    /// 65536 UNIT / (length of the window in bins).
     full_weight: u32,
-    /// The same times the share of the outer two.
+    /// Likewise for the two partial pieces.
     part_weight: u32,
 }
 
 impl Window {
-    /// A window of so many bins; less than one counts as one.
+    /// Returns a window of `bins` bins, at least one.
     pub fn new(bins: f32) -> Self {
         let bins = f64::from(bins.max(1.0));
-        let mut bins_a_piece = 1;
-        while bins_a_piece < MAX_BINS_A_PIECE
-            && bins >= (2 * bins_a_piece) as f64 * f64::from(PIECES_A_WINDOW)
+        let mut bins_per_piece = 1;
+        while bins_per_piece < MAX_BINS_PER_PIECE
+            && bins >= (2 * bins_per_piece) as f64 * f64::from(PIECES_PER_WINDOW)
         {
-            bins_a_piece *= 2;
+            bins_per_piece *= 2;
         }
-        let beside_middle = 0.5 * (bins / bins_a_piece as f64 - 1.0);
+        let beside_middle = 0.5 * (bins / bins_per_piece as f64 - 1.0);
         let weight = 65536.0 * f64::from(UNIT) / bins;
-        // Rounded down, so that a window of 255s cannot overflow.
+        // Rounded down, so that a window of value 255 cannot overflow.
         Self {
-            bins_a_piece,
+            bins_per_piece,
             full: 2 * beside_middle as usize + 1,
             full_weight: weight as u32,
             part_weight: (weight * beside_middle.fract()) as u32,
         }
     }
 
-    /// Pieces on either side of the middle one.
+    /// Number of pieces on each side of the middle one.
     pub fn reach(&self) -> usize {
         self.full / 2 + 1
     }
 }
 
-/// Writes the sums of pieces of the powers above the floor; `above_floor` is room for them.
+/// Writes the piecewise sums of the powers above the floor. `above_floor` is scratch memory.
 #[simd]
 pub fn sum_pieces(
     powers: &[u8],
     floor: u8,
-    bins_a_piece: usize,
+    bins_per_piece: usize,
     above_floor: &mut [u8],
     pieces: &mut [u16],
 ) {
@@ -68,15 +68,15 @@ pub fn sum_pieces(
     for (above, &power) in above_floor.iter_mut().zip(powers) {
         *above = power.saturating_sub(floor);
     }
-    match bins_a_piece {
+    match bins_per_piece {
         1 => sum_each(above_floor, pieces, |[a]: [u8; 1]| u16::from(a)),
         2 => sum_each(above_floor, pieces, sum_2),
         4 => sum_each(above_floor, pieces, sum_4),
-        _ => sum_long(above_floor, bins_a_piece, pieces),
+        _ => sum_long(above_floor, bins_per_piece, pieces),
     }
 }
 
-/// Written as arithmetic on whole words, which compilers vectorise where they do not see through sums of bytes.
+/// Arithmetic on words, which compilers vectorise better than sums of bytes.
 #[inline(always)]
 fn sum_2(bytes: [u8; 2]) -> u16 {
     let word = u16::from_le_bytes(bytes);
@@ -102,19 +102,19 @@ fn sum_each<const BINS: usize>(bins: &[u8], pieces: &mut [u16], sum: impl Fn([u8
 }
 
 #[inline(always)]
-fn sum_long(bins: &[u8], bins_a_piece: usize, pieces: &mut [u16]) {
-    for (piece, bins) in pieces.iter_mut().zip(bins.chunks(bins_a_piece)) {
+fn sum_long(bins: &[u8], bins_per_piece: usize, pieces: &mut [u16]) {
+    for (piece, bins) in pieces.iter_mut().zip(bins.chunks(bins_per_piece)) {
         let (whole, rest) = bins.as_chunks::<4>();
         let rest: u16 = rest.iter().map(|&bin| u16::from(bin)).sum();
         *piece = rest + whole.iter().map(|&bins| sum_4(bins)).sum::<u16>();
     }
 }
 
-/// Columns that are averaged together, so that their sums stay in registers.
+/// Columns per iteration, so that their sums stay in registers.
 const BLOCK: usize = 32;
 
-/// Writes the window's mean at each column; column `c` is centred on `pieces[c + window.reach()]`.
-/// Needs `out.len() + 2 * window.reach()` pieces.
+/// Writes the mean of the window at each column; column `c` is centred on `pieces[c + window.reach()]`.
+/// Requires `out.len() + 2 * window.reach()` pieces.
 #[simd]
 pub fn average(pieces: &[u16], window: &Window, out: &mut [u16]) {
     let (blocks, rest) = out.as_chunks_mut::<BLOCK>();
@@ -138,7 +138,7 @@ fn average_block<const COLUMNS: usize>(pieces: &[u16], window: &Window) -> [u16;
     means
 }
 
-/// For each column the sum of `terms` pieces that lie `spacing` apart, the first one at the column.
+/// Returns the sum of `terms` pieces per column, `spacing` apart, the first one at the column.
 #[inline(always)]
 fn sums<const COLUMNS: usize>(pieces: &[u16], terms: usize, spacing: usize) -> [u32; COLUMNS] {
     let mut sums = [0; COLUMNS];
@@ -150,7 +150,7 @@ fn sums<const COLUMNS: usize>(pieces: &[u16], terms: usize, spacing: usize) -> [
     sums
 }
 
-/// Moves samples by so many columns toward the end, linear between columns; where nothing comes from is zero.
+/// Shifts samples by `by` columns towards higher ranges, linear between columns; zero where there is no source.
 #[simd]
 pub fn shift(samples: &[u16], by: f32, out: &mut [u16]) {
     let whole = (-by).floor();
@@ -178,32 +178,36 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// The mean of pieces over `[centre - width / 2, centre + width / 2]`, in bins; the outer pieces count in part,
-    /// outside of the scan there is nothing.
-    fn direct_mean(bins: &[u8], floor: u8, bins_a_piece: usize, centre: f64, width: f64) -> f64 {
+    /// The mean of pieces over `[centre - width / 2, centre + width / 2]`, in bins; the outer pieces count partially, and
+    /// outside the scan the power is zero.
+    fn direct_mean(bins: &[u8], floor: u8, bins_per_piece: usize, centre: f64, width: f64) -> f64 {
         let (start, end) = (centre - 0.5 * width, centre + 0.5 * width);
         let mean = |(index, piece): (usize, &[u8])| {
-            let first = (index * bins_a_piece) as f64;
-            let covered = (first + bins_a_piece as f64).min(end) - first.max(start);
+            let first = (index * bins_per_piece) as f64;
+            let covered = (first + bins_per_piece as f64).min(end) - first.max(start);
             let sum: u32 = piece
                 .iter()
                 .map(|&bin| u32::from(bin.saturating_sub(floor)))
                 .sum();
-            covered.max(0.0) / bins_a_piece as f64 * f64::from(sum)
+            covered.max(0.0) / bins_per_piece as f64 * f64::from(sum)
         };
-        bins.chunks(bins_a_piece).enumerate().map(mean).sum::<f64>() / width
+        bins.chunks(bins_per_piece)
+            .enumerate()
+            .map(mean)
+            .sum::<f64>()
+            / width
     }
 
     fn means(bins: &[u8], floor: u8, window: &Window) -> Vec<u16> {
         let reach = window.reach();
-        let count = bins.len().div_ceil(window.bins_a_piece);
+        let count = bins.len().div_ceil(window.bins_per_piece);
         let mut pieces = vec![0; count + 2 * reach];
-        let mut room = vec![0; bins.len()];
+        let mut scratch = vec![0; bins.len()];
         sum_pieces(
             bins,
             floor,
-            window.bins_a_piece,
-            &mut room,
+            window.bins_per_piece,
+            &mut scratch,
             &mut pieces[reach..reach + count],
         );
         let mut out = vec![0; count];
@@ -217,10 +221,10 @@ mod tests {
             bins in proptest::collection::vec(0u8..=255, 1..600), floor in 0u8..120, width in 0.1..300.0f32,
         ) {
             let window = Window::new(width);
-            let (width, bins_a_piece) = (f64::from(width.max(1.0)), window.bins_a_piece);
+            let (width, bins_per_piece) = (f64::from(width.max(1.0)), window.bins_per_piece);
             for (piece, mean) in means(&bins, floor, &window).into_iter().enumerate() {
-                let centre = (piece as f64 + 0.5) * bins_a_piece as f64;
-                let expected = direct_mean(&bins, floor, bins_a_piece, centre, width);
+                let centre = (piece as f64 + 0.5) * bins_per_piece as f64;
+                let expected = direct_mean(&bins, floor, bins_per_piece, centre, width);
                 let got = f64::from(mean) / f64::from(UNIT);
                 prop_assert!((got - expected).abs() < 0.02, "piece {piece}: {got} for {expected}");
             }
@@ -229,7 +233,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn shifted_samples_equal_the_line_between_their_neighbours(
+        fn shifted_samples_equal_linear_interpolation(
             samples in proptest::collection::vec(0u16..=65280, 2..200), by in -250.0..250.0f32,
         ) {
             let mut out = vec![1; samples.len()];
@@ -240,17 +244,17 @@ mod tests {
                 let inside = place.floor() >= 0.0 && place.floor() + 1.0 < samples.len() as f32;
                 let share = place - place.floor();
                 let expected = if inside { at(place) * (1.0 - share) + at(place + 1.0) * share } else { 0.0 };
-                // The share is a whole number of 256ths.
+                // The share is a multiple of 1/256.
                 prop_assert!((f32::from(got) - expected).abs() <= 1.0 + 65280.0 / 255.0, "{column}: {got} for {expected}");
             }
         }
     }
 
     #[test]
-    fn a_window_of_the_brightest_bins_does_not_overflow() {
+    fn a_window_of_saturated_bins_does_not_overflow() {
         for width in [1.0, 2.5, 18.26, 127.9, 1e3, 1e5] {
             let window = Window::new(width);
-            let bins = vec![255; 3 * width as usize + 2 * window.bins_a_piece];
+            let bins = vec![255; 3 * width as usize + 2 * window.bins_per_piece];
             let means = means(&bins, 0, &window);
             let middle = f64::from(means[means.len() / 2]) / f64::from(UNIT);
             assert!((middle - 255.0).abs() < 2.0, "width {width}: {middle}");

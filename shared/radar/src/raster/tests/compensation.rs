@@ -1,4 +1,4 @@
-//! The raster of a moving sensor shows the scene from the middle of the sweep.
+//! Motion compensation: the raster of a moving sensor shows the scene at the middle of the sweep.
 
 use super::scene::{Sensor, miss_cells, raster};
 use crate::raster::{RasterConfig, Sampling};
@@ -13,7 +13,7 @@ fn polar(range_m: f64, bearing_rad: f64) -> Point2<f64> {
     Point2::new(range_m * bearing_rad.cos(), range_m * bearing_rad.sin())
 }
 
-/// Scatterers all around but for the seam, which a moving sensor sees twice or not at all.
+/// Scatterers in all directions except straight ahead, where a moving sensor may see them twice or not at all.
 fn places() -> Vec<Point2<f64>> {
     let ranges = [25.0, 60.0, 12.0, 80.0, 40.0, 70.0, 18.0];
     let bearings = (1..8).map(|k| f64::from(k) * std::f64::consts::FRAC_PI_4);
@@ -24,9 +24,9 @@ fn places() -> Vec<Point2<f64>> {
         .collect()
 }
 
-fn worst_miss(config: &RasterConfig, sensor: &Sensor, undo: Option<Twist>) -> f64 {
+fn worst_miss(config: &RasterConfig, sensor: &Sensor, twist: Option<Twist>) -> f64 {
     let places = places();
-    let raster = raster(config, &sensor.measure(&places, SIGMA_M), undo);
+    let raster = raster(config, &sensor.measure(&places, SIGMA_M), twist);
     let misses = places
         .iter()
         .map(|place| miss_cells(config, &raster, place, 4.0 * SIGMA_M));
@@ -34,7 +34,7 @@ fn worst_miss(config: &RasterConfig, sensor: &Sensor, undo: Option<Twist>) -> f6
 }
 
 #[test]
-fn scatterers_lie_where_they_are_at_mid_sweep_only_if_the_motion_is_undone() {
+fn scatterers_are_placed_at_mid_sweep_only_with_compensation() {
     let twist = Twist {
         vx_mps: 15.0,
         vy_mps: -0.4,
@@ -51,10 +51,13 @@ fn scatterers_lie_where_they_are_at_mid_sweep_only_if_the_motion_is_undone() {
                 sampling,
                 ..RasterConfig::default()
             };
-            let undone = worst_miss(&config, &sensor, Some(twist));
-            let left = worst_miss(&config, &sensor, None);
-            assert!(undone < 0.03, "{sense:?} {sampling:?}: {undone}");
-            assert!(left > 1.0, "{sense:?} {sampling:?}: {left}");
+            let compensated = worst_miss(&config, &sensor, Some(twist));
+            let uncompensated = worst_miss(&config, &sensor, None);
+            assert!(compensated < 0.03, "{sense:?} {sampling:?}: {compensated}");
+            assert!(
+                uncompensated > 1.0,
+                "{sense:?} {sampling:?}: {uncompensated}"
+            );
         }
     }
 }
@@ -62,10 +65,10 @@ fn scatterers_lie_where_they_are_at_mid_sweep_only_if_the_motion_is_undone() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
     #[test]
-    fn any_motion_of_a_vehicle_is_undone(
+    fn any_motion_of_a_vehicle_is_compensated(
         vx in -20.0..30.0f64, vy in -3.0..3.0f64, yaw_rate in -1.0..1.0f64, clockwise: bool,
     ) {
-        // Tyres hold some 8 m/s^2 sideways.
+        // Tyres allow a lateral acceleration of some 8 m/s^2.
         let yaw_rate_radps = yaw_rate * (8.0 / vx.abs()).min(1.0);
         let twist = Twist { vx_mps: vx, vy_mps: vy, yaw_rate_radps };
         let sense = if clockwise { Sense::Clockwise } else { Sense::CounterClockwise };
@@ -76,7 +79,7 @@ proptest! {
 }
 
 #[test]
-fn dopplers_shift_is_undone_chirp_by_chirp() {
+fn doppler_shifts_are_compensated_chirp_by_chirp() {
     let twist = Twist {
         vx_mps: 20.0,
         vy_mps: 0.5,
@@ -116,7 +119,7 @@ fn dopplers_shift_is_undone_chirp_by_chirp() {
 }
 
 #[test]
-fn dopplers_shift_moves_scatterers_where_it_is_not_known() {
+fn an_unknown_doppler_shift_displaces_scatterers() {
     let twist = Twist {
         vx_mps: 20.0,
         vy_mps: 0.0,
@@ -142,7 +145,7 @@ fn dopplers_shift_moves_scatterers_where_it_is_not_known() {
 }
 
 #[test]
-fn stamps_are_believed_where_they_come_in_bursts() {
+fn stamps_in_bursts_are_used_as_they_are() {
     let twist = Twist {
         vx_mps: 20.0,
         vy_mps: 0.0,
@@ -160,7 +163,7 @@ fn stamps_are_believed_where_they_come_in_bursts() {
 }
 
 #[test]
-fn standing_still_changes_nothing() {
+fn compensation_of_a_zero_twist_changes_nothing() {
     let sensor = Sensor::navtech();
     let config = RasterConfig::default();
     let scan = sensor.measure(&places(), SIGMA_M);

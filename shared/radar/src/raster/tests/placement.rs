@@ -1,4 +1,4 @@
-//! A scatterer appears in the raster where it stands.
+//! Scatterers appear in the raster at their true positions.
 
 use super::scene::{Sensor, centre_m, miss_cells, raster};
 use crate::raster::{RasterConfig, Sampling};
@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 const SIGMA_M: f64 = 1.0;
 
-/// Ahead (across the seam), left, right, behind, near and far.
+/// Ahead (between the last and the first azimuth), left, right, behind, near and far.
 fn places() -> Vec<Point2<f64>> {
     [
         (30.0, 0.3),
@@ -47,7 +47,7 @@ fn config(n: usize, sampling: Sampling) -> RasterConfig {
 }
 
 #[test]
-fn scatterers_lie_where_they_are_for_both_senses_and_samplings_and_offsets() {
+fn scatterers_are_placed_for_both_senses_and_samplings_and_offsets() {
     for sense in [Sense::Clockwise, Sense::CounterClockwise] {
         for sampling in [Sampling::Averaged, Sampling::Bilinear] {
             for range_offset_m in [0.0, -0.31, 2.5] {
@@ -63,14 +63,14 @@ fn scatterers_lie_where_they_are_for_both_senses_and_samplings_and_offsets() {
 }
 
 #[test]
-fn scatterers_lie_where_they_are_at_every_size() {
+fn scatterers_are_placed_at_every_size() {
     for n in [127, 128, 254, 255, 256, 511] {
         check(&config(n, Sampling::Averaged), &Sensor::navtech(), 0.06);
     }
 }
 
 #[test]
-fn scatterers_lie_where_they_are_where_bins_are_coarse() {
+fn scatterers_are_placed_with_coarse_bins() {
     let radiate = Sensor {
         bins: 576,
         range_resolution_m: 100.0 / 576.0,
@@ -107,7 +107,7 @@ fn a_row_to_the_right_is_drawn_to_the_right() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
     #[test]
-    fn wobbling_azimuths_are_taken_as_measured(amplitude in 0.05..0.45f64, waves in 1.0..120.0f64, start in 0.0..TAU) {
+    fn irregular_azimuths_are_used_as_measured(amplitude in 0.05..0.45f64, waves in 1.0..120.0f64, start in 0.0..TAU) {
         let mut sensor = Sensor::navtech();
         let count = sensor.azimuth_rad.len() as f64;
         for (i, azimuth) in sensor.azimuth_rad.iter_mut().enumerate() {
@@ -119,7 +119,7 @@ proptest! {
 }
 
 #[test]
-fn a_slow_wobble_that_is_ignored_would_be_seen() {
+fn ignoring_a_slow_azimuth_error_displaces_scatterers() {
     let even = Sensor::navtech();
     let mut wobbling = even.clone();
     for (i, azimuth) in wobbling.azimuth_rad.iter_mut().enumerate() {

@@ -1,4 +1,4 @@
-//! Values against sums written out, on noise, where every neighbour counts.
+//! Raster values against direct sums, on noise.
 
 use super::scene::{Sensor, centre_m, raster};
 use crate::raster::{RasterConfig, Rasteriser, Sampling};
@@ -6,7 +6,7 @@ use crate::scan::OwnedScan;
 use ndarray::Array2;
 use std::f64::consts::TAU;
 
-/// The mean of a row over a depth about a place, both in bins; outside of the scan there is nothing.
+/// The mean of a row over a depth around a place, both in bins; zero outside the scan.
 fn mean(row: &[u8], place: f64, depth: f64) -> f64 {
     let (start, end) = (place - 0.5 * depth, place + 0.5 * depth);
     let bins = start.max(0.0) as usize..(end.max(0.0).ceil() as usize).min(row.len());
@@ -16,14 +16,14 @@ fn mean(row: &[u8], place: f64, depth: f64) -> f64 {
         / depth
 }
 
-/// Between the two nearest bins.
+/// Linear interpolation between the two nearest bins.
 fn between(row: &[u8], place: f64) -> f64 {
     let weight = |bin: usize| (1.0 - (place - 0.5 - bin as f64).abs()).max(0.0);
     let near = (place - 2.0).max(0.0) as usize..((place + 2.0).max(0.0) as usize).min(row.len());
     near.map(|bin| weight(bin) * f64::from(row[bin])).sum()
 }
 
-/// A raster by the definition: every azimuth is searched, every bin of the window summed.
+/// The raster by its definition: searches every azimuth, and sums every bin of the window.
 fn direct(config: &RasterConfig, scan: &OwnedScan, depth_bins: Option<f64>) -> Vec<f64> {
     let view = scan.view();
     let count = view.azimuth_rad.len();
@@ -57,7 +57,7 @@ fn direct(config: &RasterConfig, scan: &OwnedScan, depth_bins: Option<f64>) -> V
     (0..config.n * config.n).map(cell).collect()
 }
 
-/// Random powers at wobbling azimuths, bins up to within the raster.
+/// Random powers at irregular azimuths, with a range within the raster.
 fn noise(range_resolution_m: f32, bins: usize) -> OwnedScan {
     let mut sensor = Sensor {
         bins,
@@ -77,7 +77,7 @@ fn noise(range_resolution_m: f32, bins: usize) -> OwnedScan {
     scan
 }
 
-/// Root of the mean square of the difference, and its largest.
+/// RMS and maximum of the difference.
 fn difference(got: &[f32], expected: &[f64]) -> (f64, f64) {
     let errors = got
         .iter()
@@ -107,7 +107,7 @@ fn bilinear_raster_equals_direct_interpolation() {
             difference(&raster(&config, &scan, None), &direct(&config, &scan, None));
         assert!(
             rms < 0.05 && largest < 1.5,
-            "{resolution_m} m: {rms}, at most {largest}"
+            "{resolution_m} m: {rms}, maximum {largest}"
         );
     }
 }
@@ -120,10 +120,10 @@ fn averaged_raster_equals_direct_mean() {
         let depth = f64::from(config.cell_m / resolution_m);
         let expected = direct(&config, &scan, Some(depth));
         let (rms, largest) = difference(&raster(&config, &scan, None), &expected);
-        // Of a mean of 127 with a spread of 17 or more between cells; only the ends of the windows differ.
+        // The mean is 127, with a standard deviation of 17 or more between cells; only the ends of the windows differ.
         assert!(
             rms < 2.5 && largest < 20.0,
-            "{resolution_m} m: {rms}, at most {largest}"
+            "{resolution_m} m: {rms}, maximum {largest}"
         );
     }
 }
@@ -148,7 +148,7 @@ fn only_power_above_the_floor_counts() {
 }
 
 #[test]
-fn beyond_the_last_bin_and_below_the_minimum_range_there_is_nothing() {
+fn cells_beyond_the_last_bin_and_below_the_minimum_range_are_zero() {
     let config = config(255, Sampling::Averaged);
     let mut scan = noise(0.0438, 1500); // to 65.4 m
     scan.bytes.fill(200);

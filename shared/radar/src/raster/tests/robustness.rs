@@ -1,4 +1,4 @@
-//! Whatever comes in: an error or a raster of finite powers, and the same one each time.
+//! Any input gives an error or a raster of finite powers, and the same one each time.
 
 use super::scene::{STAMP_NS, Sensor, raster};
 use crate::raster::{RasterConfig, RasterError, Rasteriser, Sampling};
@@ -35,7 +35,7 @@ fn try_raster(scan: &OwnedScan, twist: Option<Twist>) -> Result<Vec<f32>, Raster
 }
 
 #[test]
-fn scans_of_almost_nothing_give_finite_rasters() {
+fn tiny_scans_give_finite_rasters() {
     for (azimuths, bins) in [
         (0, 0),
         (0, 100),
@@ -56,20 +56,20 @@ fn scans_of_almost_nothing_give_finite_rasters() {
 }
 
 #[test]
-fn a_raster_of_another_shape_or_layout_is_refused() {
+fn a_raster_of_another_shape_or_layout_is_rejected() {
     let scan = sensor(4, 10).scan();
     let mut rasteriser = Rasteriser::new(&small()).unwrap();
-    let mut refused = |raster: ArrayViewMut2<'_, f32>, actual| {
-        let refused = rasteriser.rasterise(&scan.view(), 0, None, raster);
-        assert_eq!(refused, Err(RasterError::Shape { n: 33, actual }));
+    let mut rejected = |raster: ArrayViewMut2<'_, f32>, actual| {
+        let rejected = rasteriser.rasterise(&scan.view(), 0, None, raster);
+        assert_eq!(rejected, Err(RasterError::Shape { n: 33, actual }));
     };
-    refused(Array2::zeros((33, 32)).view_mut(), [33, 32]);
-    refused(Array2::zeros((33, 33)).view_mut().reversed_axes(), [33, 33]);
-    refused(Array2::zeros((66, 33)).slice_mut(s![..;2, ..]), [33, 33]);
+    rejected(Array2::zeros((33, 32)).view_mut(), [33, 32]);
+    rejected(Array2::zeros((33, 33)).view_mut().reversed_axes(), [33, 33]);
+    rejected(Array2::zeros((66, 33)).slice_mut(s![..;2, ..]), [33, 33]);
 }
 
 #[test]
-fn power_is_the_rows_without_what_lies_between_them() {
+fn power_is_a_view_of_the_rows_without_metadata() {
     let mut scan = sensor(4, 10).scan();
     let mut value = 0u8;
     scan.bytes.fill_with(|| {
@@ -85,33 +85,33 @@ fn power_is_the_rows_without_what_lies_between_them() {
 }
 
 #[test]
-fn scan_that_is_shorter_than_its_geometry_is_refused() {
+fn a_scan_that_is_shorter_than_its_geometry_is_rejected() {
     let mut scan = sensor(4, 10).scan();
     scan.geometry.bins = 11;
-    let refused = try_raster(&scan, None).unwrap_err();
+    let rejected = try_raster(&scan, None).unwrap_err();
     assert!(
         matches!(
-            refused,
+            rejected,
             RasterError::Scan(ScanError::Length {
                 what: "image",
                 expected: 85,
                 actual: 84
             })
         ),
-        "{refused}"
+        "{rejected}"
     );
     let mut view = scan.view();
     view.stamp_ns = &[];
-    let refused = Rasteriser::new(&small()).unwrap().rasterise(
+    let rejected = Rasteriser::new(&small()).unwrap().rasterise(
         &view,
         0,
         None,
         Array2::zeros((33, 33)).view_mut(),
     );
     assert!(matches!(
-        refused,
+        rejected,
         Err(RasterError::Scan(ScanError::Length {
-            what: "table of stamps",
+            what: "stamp table",
             ..
         }))
     ));
@@ -123,7 +123,7 @@ fn scan_that_is_shorter_than_its_geometry_is_refused() {
 }
 
 #[test]
-fn impossible_numbers_are_refused() {
+fn numbers_out_of_bounds_are_rejected() {
     for resolution_m in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         let mut scan = sensor(4, 10).scan();
         scan.geometry.range_resolution_m = resolution_m;
@@ -144,7 +144,7 @@ fn impossible_numbers_are_refused() {
 }
 
 #[test]
-fn impossible_motions_are_refused() {
+fn motions_out_of_bounds_are_rejected() {
     let scan = sensor(400, 100).scan();
     let impossible = [
         (f64::NAN, 0.0, 0.0),
@@ -169,7 +169,7 @@ fn impossible_motions_are_refused() {
 }
 
 #[test]
-fn settings_out_of_bounds_are_refused_by_name() {
+fn settings_out_of_bounds_are_rejected_by_name() {
     let default = RasterConfig::default;
     let wrong = [
         ("n", RasterConfig { n: 0, ..default() }),
@@ -196,19 +196,19 @@ fn settings_out_of_bounds_are_refused_by_name() {
         ),
     ];
     for (name, config) in wrong {
-        let refused = Rasteriser::new(&config).unwrap_err();
+        let rejected = Rasteriser::new(&config).unwrap_err();
         assert!(
-            refused
+            rejected
                 .to_string()
                 .starts_with(&format!("raster.{name} is ")),
-            "{refused}"
+            "{rejected}"
         );
     }
     assert_eq!(default().validate(), Ok(()));
 }
 
 #[test]
-fn unknown_settings_are_refused_and_missing_ones_have_defaults() {
+fn unknown_settings_are_rejected_and_missing_ones_have_defaults() {
     let read = |key: &str| {
         let entries = MapDeserializer::<_, ValueError>::new([(key, 0.4f32)].into_iter());
         RasterConfig::deserialize(entries)
@@ -222,7 +222,7 @@ fn unknown_settings_are_refused_and_missing_ones_have_defaults() {
 }
 
 #[test]
-fn nothing_remains_of_the_scan_before() {
+fn the_previous_scan_leaves_no_trace() {
     let config = RasterConfig::default();
     let place = [Point2::new(20.0, 10.0)];
     let twist = Twist {

@@ -1,4 +1,4 @@
-//! Scans drawn exactly: what a sensor that may move measures of soft scatterers.
+//! Synthetic scans: exact measurements of Gaussian scatterers by a moving sensor.
 
 use crate::raster::{RasterConfig, Rasteriser};
 use crate::scan::{OwnedScan, ScanLimits, Sense, SweepGeometry, flag};
@@ -11,24 +11,24 @@ use std::f64::consts::TAU;
 const METADATA: usize = 11;
 pub const STAMP_NS: i64 = 1_547_131_046_353_776_000;
 
-/// A sensor, and how it moves while it sweeps.
+/// A sensor and its motion during the sweep.
 #[derive(Clone, Debug)]
 pub struct Sensor {
     pub azimuth_rad: Vec<f32>,
-    /// Seconds from the scan's stamp.
+    /// Times relative to the scan's stamp, s.
     pub time_s: Vec<f64>,
     pub bins: usize,
     pub range_resolution_m: f32,
     pub range_offset_m: f32,
     pub doppler_s: f32,
-    /// Every second azimuth's chirp falls, and the scan says so.
+    /// Whether chirps alternate, and the scan reports them.
     pub chirps_alternate: bool,
     pub sense: Sense,
     pub twist: Twist,
 }
 
 impl Sensor {
-    /// 400 even azimuths in 0.25 s, the first one encoder step past straight ahead, 160 m.
+    /// 400 uniform azimuths in 0.25 s, the first one encoder step past straight ahead, 160 m.
     pub fn navtech() -> Self {
         let count = 400;
         Self {
@@ -79,7 +79,7 @@ impl Sensor {
         scan
     }
 
-    /// The scan of bells of height 200 and the given sigma about points of the frame at the scan's stamp.
+    /// The scan of Gaussians of height 200 and the given sigma around points in the frame at the scan's stamp.
     pub fn measure(&self, scatterers: &[Point2<f64>], sigma_m: f64) -> OwnedScan {
         let mut scan = self.scan();
         let first_centre_m =
@@ -91,7 +91,7 @@ impl Sensor {
         {
             row[..METADATA].fill(255);
             let seen_from = self.twist.pose_at(self.time_s[azimuth]).inverse();
-            let look = self.look(azimuth);
+            let look = self.direction(azimuth);
             let approach_mps = look.dot(&nalgebra::Vector2::new(
                 self.twist.vx_mps,
                 self.twist.vy_mps,
@@ -123,8 +123,8 @@ impl Sensor {
         }
     }
 
-    /// The direction of an azimuth, x forward and y left.
-    fn look(&self, azimuth: usize) -> nalgebra::Vector2<f64> {
+    /// The unit vector of an azimuth, x forward and y left.
+    fn direction(&self, azimuth: usize) -> nalgebra::Vector2<f64> {
         let angle = f64::from(self.azimuth_rad[azimuth]);
         match self.sense {
             Sense::Clockwise => nalgebra::Vector2::new(angle.cos(), -angle.sin()),
@@ -133,7 +133,7 @@ impl Sensor {
     }
 }
 
-/// The raster of a scan, no floor.
+/// The raster of a scan without floor.
 pub fn raster(config: &RasterConfig, scan: &OwnedScan, twist: Option<Twist>) -> Vec<f32> {
     let mut raster = Array2::from_elem((config.n, config.n), f32::NAN);
     let mut rasteriser = Rasteriser::new(config).unwrap();
@@ -143,7 +143,7 @@ pub fn raster(config: &RasterConfig, scan: &OwnedScan, twist: Option<Twist>) -> 
     raster.into_raw_vec_and_offset().0
 }
 
-/// A cell's centre, metres ahead and to the left.
+/// The centre of a cell, x and y in m.
 pub fn centre_m(config: &RasterConfig, row: usize, column: usize) -> Point2<f64> {
     let middle = 0.5 * (config.n as f64 - 1.0);
     let cell_m = f64::from(config.cell_m);
@@ -153,7 +153,7 @@ pub fn centre_m(config: &RasterConfig, row: usize, column: usize) -> Point2<f64>
     )
 }
 
-/// How many cells the raster's centroid within `reach_m` of `expected` lies from it. Infinite where the raster is dark
+/// Distance of the centroid of the raster within `reach_m` of `expected` from it, cells. Infinite if the raster is zero
 /// there.
 pub fn miss_cells(
     config: &RasterConfig,

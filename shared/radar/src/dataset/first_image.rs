@@ -1,21 +1,21 @@
-//! What one image with Navtech's columns says of its dataset, before anything is decided.
+//! Properties of a dataset from its first image with Navtech metadata columns.
 
 use super::image_size::ImageSize;
 use super::images::Images;
 use super::navtech_png::{METADATA_BYTES, RowMetadata, chirps_alternate, rows};
 use super::stamp;
 
-/// How near the time in a file's name must be to a row's to count as that row's, ns.
+/// Maximum difference between the time in the name of a file and the stamp of a row that it refers to, ns.
 const SAME_TIME_NS: i64 = 5_000_000;
 
-/// Which time of the sweep an image is named by.
+/// The time in the sweep that an image is named by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NamedBy {
-    /// The first row's.
+    /// That of the first row.
     Start,
     /// That of row `n / 2 - 1`.
     Middle,
-    /// The last row's.
+    /// That of the last row.
     End,
 }
 
@@ -31,15 +31,15 @@ impl NamedBy {
 
 /// The metadata of the first image that can be read.
 #[derive(Debug)]
-pub(crate) struct FirstLook {
+pub(crate) struct FirstImage {
     pub(crate) size: ImageSize,
     rows: Vec<RowMetadata>,
     name_ns: Option<i64>,
 }
 
-impl FirstLook {
-    /// `None` where no image can be read or they are too narrow for metadata.
-    pub(crate) fn take(images: &mut Images) -> Option<Self> {
+impl FirstImage {
+    /// Returns `None` if no image can be read or the images are too narrow for metadata.
+    pub(crate) fn read(images: &mut Images) -> Option<Self> {
         let size = images.size;
         if size.width <= METADATA_BYTES || size.height < 2 {
             return None;
@@ -57,41 +57,41 @@ impl FirstLook {
         self.size.width - METADATA_BYTES
     }
 
-    /// Whether every row bears a time at which a radar may have run.
+    /// Returns whether every row has a plausible time.
     pub(crate) fn has_stamps(&self) -> bool {
         self.rows
             .iter()
             .all(|row| stamp::to_ns(row.stamp).is_some())
     }
 
-    /// Whether the rows' stamps are in nanoseconds.
+    /// Returns whether the stamps of the rows are in ns.
     pub(crate) fn nanoseconds(&self) -> bool {
         self.rows
             .first()
             .is_some_and(|row| stamp::plausible(row.stamp))
     }
 
-    /// A row's time, ns.
+    /// Time of a row, ns.
     fn row_ns(&self, row: usize) -> Option<i64> {
         self.rows.get(row).and_then(|row| stamp::to_ns(row.stamp))
     }
 
-    /// The first row's time, ns.
+    /// Time of the first row, ns.
     pub(crate) fn start_ns(&self) -> Option<i64> {
         self.row_ns(0)
     }
 
-    /// Whether byte 10 is the chirp's direction.
+    /// Returns whether byte 10 is the direction of the chirp.
     pub(crate) fn chirps_alternate(&self) -> bool {
         chirps_alternate(self.rows.iter().map(|row| row.byte_ten))
     }
 
-    /// Whether byte 10 is 0 in every row.
+    /// Returns whether byte 10 is 0 in every row.
     pub(crate) fn byte_ten_is_zero(&self) -> bool {
         self.rows.iter().all(|row| row.byte_ten == 0)
     }
 
-    /// Which of the rows' times the file is named by; `None` where its name is no time or near none of them.
+    /// Returns the time in the sweep that the file is named by; `None` if its name is not a time of the sweep.
     pub(crate) fn named_by(&self) -> Option<NamedBy> {
         let (name, last) = (self.name_ns?, self.rows.len() - 1);
         let rows = [
@@ -107,7 +107,7 @@ impl FirstLook {
         (near <= SAME_TIME_NS).then_some(by)
     }
 
-    /// Least and most time between neighbouring rows, ns, and the mean.
+    /// Minimum, maximum and mean time between consecutive rows, ns.
     pub(crate) fn row_intervals_ns(&self) -> Option<(i64, i64, i64)> {
         let stamps: Vec<i64> = self
             .rows
@@ -119,7 +119,7 @@ impl FirstLook {
         Some((intervals().min()?, intervals().max()?, mean))
     }
 
-    /// Encoder counts from row to row where all rows have the same step, and over the seam from the last row to the first.
+    /// Encoder step between rows, if it is constant, and the step from the last row to the first.
     pub(crate) fn encoder_step(&self, counts: u16) -> Option<(u16, u16)> {
         let step = self.rows[1].count.checked_sub(self.rows[0].count)?;
         let even = self

@@ -1,10 +1,10 @@
-//! What looks wrong with a dataset, in sentences.
+//! Faults of a dataset, in sentences.
 
-use super::{Chirps, Report, TimingReport, TruthReport};
+use super::{Chirps, GroundTruthReport, Report, TimingReport};
 use crate::dataset::{DatasetOptions, Format};
 
-/// Scans that are named one by one; more are counted.
-const NAMED: usize = 8;
+/// Maximum number of scans that are listed; more are counted.
+const MAX_LISTED: usize = 8;
 
 pub(super) fn list(report: &Report, notes: &[String], options: &DatasetOptions) -> Vec<String> {
     let mut found = notes.to_vec();
@@ -12,17 +12,19 @@ pub(super) fn list(report: &Report, notes: &[String], options: &DatasetOptions) 
     match &report.timing {
         Some(timing) => found.extend(times(timing)),
         None => found.push(
-            "The files are not named by times: scans have the times of their rows only.".to_owned(),
+            "The files are not named by times: scans have only the times of their rows.".to_owned(),
         ),
     }
     found.extend(rows(report));
     found.extend(scans(report));
-    match report.truths.as_slice() {
-        [] => found.push("No ground truth was found: a result can be run, not judged.".to_owned()),
-        truths => found.extend(
-            truths
+    match report.ground_truths.as_slice() {
+        [] => found.push(
+            "No ground truth was found: odometry can run, but cannot be evaluated.".to_owned(),
+        ),
+        ground_truths => found.extend(
+            ground_truths
                 .iter()
-                .flat_map(|truth| truth_sentences(truth, report)),
+                .flat_map(|truth| ground_truth_findings(truth, report)),
         ),
     }
     found
@@ -33,7 +35,7 @@ fn resolution(report: &Report, options: &DatasetOptions) -> Option<String> {
         && options.range_resolution_m.is_none();
     oxford.then(|| {
         format!(
-            "Range resolution is taken as {} m: the dataset's own kit says 0.0432 m, with which paths come out more than 1 % short.",
+            "The range resolution is {} m: with the 0.0432 m of the development kit, paths are more than 1 % short.",
             report.range_resolution_m
         )
     })
@@ -44,8 +46,8 @@ fn times(timing: &TimingReport) -> impl Iterator<Item = String> {
     let stalls = (!timing.stalls.is_empty()).then(|| {
         let places = some(timing.stalls.iter().map(|s| format!("{} ({:.2} s)", s.scan, s.late_s)));
         format!(
-            "The host stalled {}, by up to {worst:.2} s, and caught up while the antenna turned evenly: logged stamps are late from scans {places}.",
-            times_word(timing.stalls.len())
+            "The host stalled {}, by up to {worst:.2} s, and caught up while the antenna turned uniformly: logged stamps are late from scans {places}.",
+            times_text(timing.stalls.len())
         )
     });
     let gaps = (!timing.gaps.is_empty()).then(|| {
@@ -71,7 +73,7 @@ fn times(timing: &TimingReport) -> impl Iterator<Item = String> {
     [stalls, gaps, backwards].into_iter().flatten()
 }
 
-fn times_word(n: usize) -> String {
+fn times_text(n: usize) -> String {
     if n == 1 {
         "once".to_owned()
     } else {
@@ -82,31 +84,30 @@ fn times_word(n: usize) -> String {
 fn rows(report: &Report) -> impl Iterator<Item = String> {
     let rows = &report.rows;
     let percent = |n: u64| 100.0 * n as f64 / rows.rows.max(1) as f64;
-    let invented = (rows.not_measured > 0).then(|| {
+    let interpolated = (rows.not_measured > 0).then(|| {
         format!(
-            "{} of {} rows ({:.2} %) were not measured but filled in from their neighbours.",
+            "{} of {} rows ({:.2} %) were not measured but interpolated from their neighbours.",
             rows.not_measured,
             rows.rows,
             percent(rows.not_measured)
         )
     });
-    let lost = (rows.lost > 0)
-        .then(|| format!("{} rows are lost: the azimuth jumps over them.", rows.lost));
+    let lost = (rows.lost > 0).then(|| format!("{} rows are lost: the azimuth jumps.", rows.lost));
     let chirps = (rows.chirps == Chirps::Mixed)
-        .then(|| "Some scans say the chirps' directions and some do not.".to_owned());
+        .then(|| "The directions of the chirps are known in some scans only.".to_owned());
     let ringing = (rows.ringing_bins > 0).then(|| {
         format!(
-            "Range bins 0 to {} (to {:.1} m) are the sensor's own ringing: alike in all directions, and brighter than the scene; keep the minimum range above that.",
+            "Range bins 0 to {} (to {:.1} m) are ringing of the sensor: uniform over azimuth, and stronger than the scene; set the minimum range above that.",
             rows.ringing_bins - 1,
             rows.ringing_bins as f32 * report.range_resolution_m + report.range_offset_m
         )
     });
-    [invented, lost, chirps, ringing].into_iter().flatten()
+    [interpolated, lost, chirps, ringing].into_iter().flatten()
 }
 
 fn scans(report: &Report) -> impl Iterator<Item = String> {
-    let single =
-        (report.scans == 1).then(|| "There is one scan only, and a motion needs two.".to_owned());
+    let single = (report.scans == 1)
+        .then(|| "There is only one scan, but a motion requires two.".to_owned());
     let unreadable = (!report.unreadable.is_empty()).then(|| {
         let first = report
             .unreadable
@@ -115,7 +116,7 @@ fn scans(report: &Report) -> impl Iterator<Item = String> {
             .unwrap_or_default();
         let places = some(report.unreadable.iter().map(|u| u.scan.to_string()));
         format!(
-            "{} of {} scans read cannot be used (scans {places}): {first}.",
+            "{} of {} scans cannot be read (scans {places}): {first}.",
             report.unreadable.len(),
             report.scans_read
         )
@@ -123,60 +124,60 @@ fn scans(report: &Report) -> impl Iterator<Item = String> {
     [single, unreadable].into_iter().flatten()
 }
 
-fn truth_sentences(truth: &TruthReport, report: &Report) -> Vec<String> {
+fn ground_truth_findings(truth: &GroundTruthReport, report: &Report) -> Vec<String> {
     let name = truth
         .file
         .file_name()
         .map(|n| n.to_string_lossy().into_owned())
         .unwrap_or_default();
     if let Some(error) = &truth.error {
-        return vec![format!("Ground truth cannot be read: {error}.")];
+        return vec![format!("The ground truth cannot be read: {error}.")];
     }
     let heading = (!truth.has_heading && truth.poses > 1)
         .then(|| format!("{name} has positions only, no headings."));
-    let timeless = truth
+    let unstamped = truth
         .span_ns
         .is_none()
-        .then(|| format!("{name} has no times: it can be compared by index only."));
+        .then(|| format!("{name} has no times: poses can be compared by index only."));
     let covered = truth
         .scans_covered
         .filter(|n| *n < report.scans)
         .map(|n| format!("{name} covers {n} of {} scans.", report.scans));
-    [heading, timeless, covered, clock_sentence(truth, &name)]
+    [heading, unstamped, covered, clock_finding(truth, &name)]
         .into_iter()
         .flatten()
         .collect()
 }
 
-fn clock_sentence(truth: &TruthReport, name: &str) -> Option<String> {
+fn clock_finding(truth: &GroundTruthReport, name: &str) -> Option<String> {
     let clock = truth.clock.as_ref()?;
-    if !clock.is_convincing() {
+    if !clock.is_reliable() {
         return Some(format!(
-            "{name} moves unlike the given trajectory at any offset within 10 s: its clock cannot be judged."
+            "{name} does not correlate with the given trajectory at any offset within 10 s: its clock cannot be compared."
         ));
     }
     let mirrored = if clock.mirrored {
-        " and it is mirrored (turns left where the trajectory turns right)"
+        " and mirrored (it turns left where the trajectory turns right)"
     } else {
         ""
     };
     match (clock.agrees(), clock.late_s > 0.0) {
-        (true, _) if clock.mirrored => Some(format!("{name}'s clock agrees{mirrored}.")),
+        (true, _) if clock.mirrored => Some(format!("The clock of {name} agrees{mirrored}.")),
         (true, _) => None,
         (false, late) => {
             let word = if late { "late" } else { "early" };
             Some(format!(
-                "{name} is {:.2} s {word} against the given trajectory{mirrored}.",
+                "{name} is {:.2} s {word} relative to the given trajectory{mirrored}.",
                 clock.late_s.abs()
             ))
         }
     }
 }
 
-/// The first few, and how many more.
+/// Lists the first items, and counts the rest.
 fn some(items: impl ExactSizeIterator<Item = String>) -> String {
-    let more = items.len().saturating_sub(NAMED);
-    let named = items.take(NAMED).collect::<Vec<_>>().join(", ");
+    let more = items.len().saturating_sub(MAX_LISTED);
+    let named = items.take(MAX_LISTED).collect::<Vec<_>>().join(", ");
     if more == 0 {
         named
     } else {

@@ -1,4 +1,4 @@
-//! Ground truth beside a dataset: what it covers, and whether its clock agrees.
+//! The ground truth files of a dataset: their coverage and clocks.
 
 use std::path::{Path, PathBuf};
 
@@ -10,38 +10,38 @@ use crate::ground_truth::{find_ground_truth, read_trajectory};
 use crate::median::median;
 use crate::trajectory::Trajectory;
 
-/// Without decoding, the last scan's time is known to a few milliseconds; that is no reason to count it as outside, ns.
+/// Tolerance of the time span, ns: without decoding, times of scans are known to a few milliseconds.
 const MARGIN_NS: i64 = 20_000_000;
 
-/// A ground truth file.
+/// Summary of a ground truth file.
 #[derive(Clone, Debug, Serialize)]
-pub struct TruthReport {
+pub struct GroundTruthReport {
     /// The file.
     pub file: PathBuf,
-    /// Why it could not be read; all below is empty then.
+    /// Why it cannot be read; the fields below are empty then.
     pub error: Option<String>,
-    /// Poses.
+    /// Number of poses.
     pub poses: usize,
-    /// Path, m.
+    /// Length of the path, m.
     pub path_length_m: f64,
     /// Whether it has headings.
     pub has_heading: bool,
-    /// First and last time, ns; `None` where it has no times.
+    /// First and last time, ns; `None` if it has no times.
     pub span_ns: Option<(i64, i64)>,
-    /// Scans whose time is within its span; `None` where times are not known.
+    /// Number of scans within its time span; `None` if times are unknown.
     pub scans_covered: Option<usize>,
-    /// Median distance from a scan's time to the nearest pose's, s.
+    /// Median difference between the time of a scan and the nearest pose, s.
     pub nearest_pose_s: Option<f64>,
-    /// Its clock against the trajectory that was given.
+    /// Its clock relative to the given trajectory.
     pub clock: Option<ClockOffset>,
 }
 
-/// The usual place's file and all TUM files in the root, by name.
+/// Examines the ground truth at the usual path and all TUM files in the root, by name.
 pub(super) fn examine(
     root: &Path,
     dataset: &dyn Dataset,
     trajectory: Option<&Trajectory>,
-) -> Vec<TruthReport> {
+) -> Vec<GroundTruthReport> {
     let mut files: Vec<PathBuf> = std::fs::read_dir(root)
         .into_iter()
         .flatten()
@@ -61,7 +61,11 @@ pub(super) fn examine(
         .collect()
 }
 
-fn examine_file(file: PathBuf, scans_ns: &[i64], trajectory: Option<&Trajectory>) -> TruthReport {
+fn examine_file(
+    file: PathBuf,
+    scans_ns: &[i64],
+    trajectory: Option<&Trajectory>,
+) -> GroundTruthReport {
     let (truth, error) = match read_trajectory(&file) {
         Ok(truth) => (truth, None),
         Err(error) => (Trajectory::default(), Some(error.to_string())),
@@ -70,7 +74,7 @@ fn examine_file(file: PathBuf, scans_ns: &[i64], trajectory: Option<&Trajectory>
         let span = first.saturating_sub(MARGIN_NS)..=last.saturating_add(MARGIN_NS);
         scans_ns.iter().filter(|s| span.contains(s)).count()
     };
-    TruthReport {
+    GroundTruthReport {
         file,
         error,
         poses: truth.len(),

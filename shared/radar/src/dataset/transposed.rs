@@ -1,4 +1,4 @@
-//! Images without metadata that lie on their side: rows are range (the first is the nearest), columns azimuth from straight ahead.
+//! Reader of transposed images without metadata: rows are range (nearest first), columns azimuth from straight ahead.
 
 use super::detect::Found;
 use super::eccentricity;
@@ -6,16 +6,16 @@ use super::error::{OpenError, ReadError};
 use super::format::Format;
 use super::images::Images;
 use super::navtech_png::fill_uniform;
-use super::navtech_scans::check_room;
+use super::navtech_scans::check_capacity;
 use super::options::DatasetOptions;
 use crate::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, Sense, SweepGeometry, flag};
 
-/// Pixels of a square that is turned at once: a cache line wide, so that neither side is walked through memory pixel by pixel.
+/// Side of the blocks of the transposition, pixels: a cache line.
 const BLOCK: usize = 64;
 
-/// Such images, and the memory to turn them. An image that is wider than high counts as upright: rows are azimuth.
+/// The scans of a folder, with scratch memory for the transposition. Images that are wider than high are not transposed.
 #[derive(Debug)]
-pub(crate) struct SidewaysScans {
+pub(crate) struct TransposedScans {
     pub(crate) images: Images,
     pub(crate) range_resolution_m: f32,
     range_offset_m: f32,
@@ -24,12 +24,12 @@ pub(crate) struct SidewaysScans {
     scratch: Vec<u8>,
 }
 
-impl SidewaysScans {
-    /// `metres_a_bin` gives the format's resolution from the number of range bins.
+impl TransposedScans {
+    /// `metres_per_bin` returns the range resolution of the format from the number of range bins.
     pub(crate) fn open(
         found: Found,
         options: &DatasetOptions,
-        metres_a_bin: impl FnOnce(usize) -> f32,
+        metres_per_bin: impl FnOnce(usize) -> f32,
     ) -> Result<(Self, Vec<String>), OpenError> {
         let Found {
             format,
@@ -49,12 +49,12 @@ impl SidewaysScans {
         scans.check_shape(format)?;
         scans.range_resolution_m = options
             .range_resolution_m
-            .unwrap_or_else(|| metres_a_bin(scans.bins()));
-        if scans.on_their_side() {
+            .unwrap_or_else(|| metres_per_bin(scans.bins()));
+        if scans.is_transposed() {
             scans.scratch = vec![0; scans.images.size.bytes()];
             let size = scans.images.size;
             notes.push(format!(
-                "Images lie on their side ({} rows of range x {} columns of azimuth): each is turned on reading.",
+                "Images are transposed ({} rows of range x {} columns of azimuth): they are transposed back when read.",
                 size.height, size.width
             ));
         }
@@ -65,7 +65,7 @@ impl SidewaysScans {
         if (2..=MAX_AZIMUTHS).contains(&self.azimuths()) {
             return Ok(());
         }
-        let reason = format!("it needs 2 to {MAX_AZIMUTHS} azimuths along its shorter side");
+        let reason = format!("it requires 2 to {MAX_AZIMUTHS} azimuths along its shorter side");
         Err(OpenError::WrongImage {
             path: self.images.file(0).to_owned(),
             actual: self.images.size,
@@ -74,7 +74,7 @@ impl SidewaysScans {
         })
     }
 
-    pub(crate) fn on_their_side(&self) -> bool {
+    pub(crate) fn is_transposed(&self) -> bool {
         self.images.size.height > self.images.size.width
     }
 
@@ -93,7 +93,7 @@ impl SidewaysScans {
         }
     }
 
-    /// Reads a scan whose sweep starts at `start_ns` and takes `period_ns`; its time is the mean of its azimuths'.
+    /// Reads a scan whose sweep starts at `start_ns` and takes `period_ns`; its time is the mean of its azimuth stamps.
     pub(crate) fn read(
         &mut self,
         index: usize,
@@ -102,11 +102,11 @@ impl SidewaysScans {
         period_ns: i64,
     ) -> Result<SweepGeometry, ReadError> {
         let (azimuths, bins) = (self.azimuths(), self.bins());
-        check_room("bytes", azimuths * bins, slot.bytes.len())?;
-        check_room("azimuths", azimuths, slot.azimuth_rad.len())?;
-        check_room("stamps", azimuths, slot.stamp_ns.len())?;
-        check_room("flags", azimuths, slot.flags.len())?;
-        if self.on_their_side() {
+        check_capacity("bytes", azimuths * bins, slot.bytes.len())?;
+        check_capacity("azimuths", azimuths, slot.azimuth_rad.len())?;
+        check_capacity("stamps", azimuths, slot.stamp_ns.len())?;
+        check_capacity("flags", azimuths, slot.flags.len())?;
+        if self.is_transposed() {
             self.images.decode(index, &mut self.scratch)?;
             transpose(&self.scratch, azimuths, &mut slot.bytes[..azimuths * bins]);
         } else {
@@ -139,7 +139,7 @@ impl SidewaysScans {
     }
 }
 
-/// Mean time of `azimuths` columns spread evenly over a period, from the first.
+/// Mean time of `azimuths` columns spread uniformly over a period, relative to the first, ns.
 pub(crate) fn mean_after_start_ns(period_ns: i64, azimuths: usize) -> i64 {
     let n = azimuths as i64;
     period_ns * (n - 1) / (2 * n)
@@ -168,7 +168,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn transposing_equals_the_direct_sum_of_indices(rows in 1_usize..150, columns in 1_usize..150) {
+        fn transposition_swaps_indices(rows in 1_usize..150, columns in 1_usize..150) {
             let from: Vec<u8> = (0..rows * columns).map(|i| (i * 7 % 251) as u8).collect();
             let mut to = vec![0; from.len()];
             transpose(&from, columns, &mut to);

@@ -1,7 +1,7 @@
-//! `dataset.toml`: what a recording says of itself.
+//! `dataset.toml`: options stored with a recording.
 //!
-//! Calibration belongs to a radar, so it is best kept beside what the radar recorded: range offset, Doppler's shift, the encoder's
-//! eccentricity. Simulated recordings come with it. What the reader is told explicitly counts more.
+//! Range offset, Doppler coefficient and encoder eccentricity are properties of a radar, so they are best stored beside its
+//! recordings. Simulated recordings include the file. Options given explicitly take precedence.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -9,10 +9,10 @@ use std::path::Path;
 
 use super::{DatasetOptions, OpenError};
 
-/// The file, in the dataset's folder, beside the folder of images or in it.
+/// File name, beside the folder of images or in it.
 const FILE: &str = "dataset.toml";
 
-/// What lies at or above a dataset's root; nothing where nothing lies there.
+/// Reads the file in the root of a dataset or its parent. Without a file, all options are unset.
 pub(super) fn options(root: &Path) -> Result<DatasetOptions, OpenError> {
     let places = [Some(root), root.parent()].into_iter().flatten();
     for path in places.map(|folder| folder.join(FILE)) {
@@ -25,11 +25,11 @@ pub(super) fn options(root: &Path) -> Result<DatasetOptions, OpenError> {
             }
             Err(source) => return Err(OpenError::Io { path, source }),
         };
-        let wrong = |error: toml::de::Error| OpenError::Told {
+        let invalid = |error: toml::de::Error| OpenError::DatasetToml {
             path: path.clone(),
             reason: error.message().to_owned(),
         };
-        return toml::from_str(&text).map_err(wrong);
+        return toml::from_str(&text).map_err(invalid);
     }
     Ok(DatasetOptions::default())
 }
@@ -40,7 +40,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_recording_is_heard_from_its_folder_and_from_that_of_its_images() {
+    fn options_are_read_from_the_root_and_from_the_folder_of_images() {
         let folder = tempfile::tempdir().unwrap();
         let images = folder.path().join("radar");
         fs::create_dir(&images).unwrap();
@@ -50,28 +50,28 @@ mod tests {
             "range_offset_m = -0.25\nencoder_counts = 3600\n",
         )
         .unwrap();
-        let told = DatasetOptions {
+        let stored = DatasetOptions {
             range_offset_m: Some(-0.25),
             encoder_counts: Some(3600),
             ..Default::default()
         };
-        assert_eq!(options(folder.path()).unwrap(), told);
-        assert_eq!(options(&images).unwrap(), told);
-        let mine = DatasetOptions {
+        assert_eq!(options(folder.path()).unwrap(), stored);
+        assert_eq!(options(&images).unwrap(), stored);
+        let explicit = DatasetOptions {
             range_offset_m: Some(0.5),
             ..Default::default()
         };
         assert_eq!(
-            mine.or(&told),
+            explicit.or(&stored),
             DatasetOptions {
                 range_offset_m: Some(0.5),
-                ..told
+                ..stored
             }
         );
     }
 
     #[test]
-    fn a_slip_in_it_is_told_by_name() {
+    fn unknown_keys_are_rejected_by_name() {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join(FILE), "range_ofset_m = 1.0").unwrap();
         let error = options(folder.path()).unwrap_err().to_string();
