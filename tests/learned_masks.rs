@@ -8,12 +8,7 @@ use std::{
 use crate::common::{
     Run, Running, STAGES, odometry, recording, runtime_is_installed, send, undisturbed,
 };
-use gyre_masking::{MaskKind, Masker, MaskingConfig, Sweep, runtime};
-use gyre_messages::{MaskedHeader, Pair};
-use gyre_radar::{DatasetOptions, OwnedScan, PointsConfig, RasterConfig};
-use gyre_rotation_search::Rotations;
-use gyre_scan_matching::{RotationConfig, TranslationConfig};
-use gyre_translation_search::Translations;
+use gyre_masking::runtime;
 use rustix::process::Signal;
 
 const MIDDLE: usize = recording::SCANS / 3;
@@ -22,7 +17,7 @@ const TWO_SCANS: &str = "pair-127";
 
 fn card(model: &str) -> PathBuf {
     Path::new(crate::PROJECT)
-        .join("services/masking/tests/models")
+        .join("shared/masking/tests/models")
         .join(model)
         .with_extension("toml")
 }
@@ -68,85 +63,6 @@ fn a_network_changes_the_motions_and_the_run_says_which_one_it_was() {
             resolved["masking"]["sha256"].as_str().unwrap()
         );
     }
-}
-
-/// The motions that the stages' libraries find in the small recording with this mask and no process: x, y, yaw.
-fn motions_by_hand(masking: &MaskingConfig) -> Vec<[f64; 3]> {
-    let raster = RasterConfig {
-        n: 127,
-        cell_m: 0.8,
-        ..RasterConfig::default()
-    };
-    let mut dataset = gyre_radar::open(recording::small(), &DatasetOptions::default()).unwrap();
-    let mut masker = Masker::new(&raster, &PointsConfig::default(), masking).unwrap();
-    let mut rotations = Rotations::new(raster.n, &RotationConfig::default()).unwrap();
-    let mut translations = Translations::new(&raster, &TranslationConfig::default()).unwrap();
-    let scans = (0..recording::SCANS).map(|index| {
-        let mut scan = OwnedScan::with_limits(dataset.limits());
-        scan.geometry = dataset.read(index, scan.slot()).unwrap();
-        scan
-    });
-    let scans: Vec<OwnedScan> = scans.collect();
-    let sweep = |number: usize| Sweep {
-        number: number as u64,
-        scan: scans[number].view(),
-        motion: None,
-    };
-    let second = MaskedHeader::raster_values(raster.n * raster.n);
-    let mut rasters = vec![0.0; 2 * second];
-    let motion = |later: usize| {
-        masker
-            .mask(&sweep(later), Some(&sweep(later - 1)), &mut rasters)
-            .unwrap();
-        let earlier = Some(&rasters[second..][..raster.n * raster.n]);
-        let pair = Pair {
-            later: &rasters[..raster.n * raster.n],
-            earlier,
-        };
-        let motion = translations
-            .next(pair, rotations.next(later as u64, pair, true).unwrap())
-            .unwrap();
-        [motion.x_m, motion.y_m, motion.yaw_rad]
-    };
-    (1..recording::SCANS).map(motion).collect()
-}
-
-#[test]
-fn the_search_compares_both_scans_as_the_network_of_this_pair_masks_them() {
-    if !runtime_is_installed() {
-        return;
-    }
-    let run = masked_by(TWO_SCANS)
-        .set("masking.compensate=false")
-        .set("refinement.kind=none");
-    let (csv, masking) = (
-        run.complete(),
-        MaskingConfig {
-            compensate: false,
-            ..MaskingConfig::default()
-        },
-    );
-    let model = Some(card(TWO_SCANS));
-    let expected = motions_by_hand(&MaskingConfig {
-        kind: MaskKind::Learned,
-        model,
-        ..masking
-    });
-    let columns: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
-    let places = ["x_m", "y_m", "yaw_rad"]
-        .map(|name| columns.iter().position(|column| *column == name).unwrap());
-    for (row, expected) in csv.lines().skip(1).zip(&expected) {
-        let fields: Vec<&str> = row.split(',').collect();
-        let found: [f64; 3] = places.map(|place| fields[place].parse().unwrap());
-        assert!(
-            found
-                .iter()
-                .zip(expected)
-                .all(|(found, expected)| (found - expected).abs() < 1e-6),
-            "{row}: {expected:?}"
-        );
-    }
-    assert_eq!(csv.lines().count(), recording::SCANS);
 }
 
 #[test]

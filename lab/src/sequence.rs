@@ -9,7 +9,7 @@ use std::{
 
 use clap::Args;
 use gyre::{Failure, configuration::Configuration, print};
-use gyre_messages::Stage;
+use gyre_messages::StageId;
 use gyre_radar::OwnedScan;
 use serde::Serialize;
 use serde_json::Value;
@@ -286,18 +286,22 @@ impl Sequence {
 /// The figures of `summary.json`.
 fn figures(summary: &Value) -> Figures {
     let at = |place: &str| summary.pointer(place).and_then(Value::as_f64);
-    let work_ms = |stage: Stage| {
+    let work_ms = |stage: StageId| {
         at(&["/latency/stages", stage.name(), "work", "p50_us"].join("/")).unwrap_or(0.0) * 1e-3
     };
-    let around = [Stage::RadarReplay, Stage::Masking, Stage::PoseIntegration];
-    let searching = Stage::ALL
+    let around = [
+        StageId::RadarReplay,
+        StageId::Masking,
+        StageId::PoseIntegration,
+    ];
+    let searching = StageId::ALL
         .into_iter()
         .filter(|stage| !around.contains(stage));
     let known = FIGURES
         .iter()
         .filter_map(|figure| Some((figure.key, at(figure.place)?)));
     let mut figures: Figures = known.collect();
-    figures.insert("masking_ms", work_ms(Stage::Masking));
+    figures.insert("masking_ms", work_ms(StageId::Masking));
     figures.insert("search_ms", searching.map(work_ms).sum());
     figures
 }

@@ -7,7 +7,7 @@ use std::{
     time::Duration,
 };
 
-use gyre_messages::Stage;
+use gyre_messages::StageId;
 use rustix::process::{Signal, kill_process};
 
 /// A process id.
@@ -72,7 +72,7 @@ fn stage_name(pid: Pid) -> Option<String> {
         .rfind(|word| !word.is_empty())?;
     let path = PathBuf::from(String::from_utf8_lossy(last).into_owned());
     let name = path.file_stem()?.to_string_lossy().into_owned();
-    Stage::ALL
+    StageId::ALL
         .iter()
         .any(|stage| stage.name() == name)
         .then_some(name)

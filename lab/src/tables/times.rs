@@ -2,9 +2,7 @@
 //! process.
 //!
 //! - [`timer`]: a row at one size, again and again;
-//! - [`learned`]: its mask.
 
-mod learned;
 mod timer;
 
 use gyre::Failure;

@@ -12,7 +12,8 @@ use std::{
 };
 
 use gyre_masking::MaskingConfig;
-use gyre_messages::{Stage, Window};
+use gyre_messages::{StageId, Window};
+use gyre_odometry::{OdometryConfig, SearchConfig, SearchKind};
 use gyre_radar::{DatasetOptions, PointsConfig, RasterConfig};
 use gyre_radar_replay::SourceConfig;
 use gyre_scan_matching::{
@@ -72,25 +73,6 @@ pub struct RunConfig {
     /// Ground truth to judge the result by. Default: what lies in the dataset's folder.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ground_truth: Option<PathBuf>,
-}
-
-/// The section `[search]`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SearchConfig {
-    /// `decoupled`: rotation, then translation, in two processes. `exhaustive`: both together, in one. Default `decoupled`.
-    pub kind: SearchKind,
-}
-
-/// How a motion is searched for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum SearchKind {
-    /// By rotation-search and translation-search.
-    #[default]
-    Decoupled,
-    /// By joint-search.
-    Exhaustive,
 }
 
 /// What happens when scans come faster than they can be processed.
@@ -215,7 +197,7 @@ impl Configuration {
             translation: strict::section(&mut table, "translation")?,
             exhaustive: strict::section(&mut table, "exhaustive")?,
             refinement: strict::section(&mut table, "refinement")?,
-            stages: strict::sections(&mut table, "stages", &Stage::ALL.map(Stage::name))?,
+            stages: strict::sections(&mut table, "stages", &StageId::ALL.map(StageId::name))?,
         };
         let format = configuration.dataset.format.and_then(OutputFormat::read_as);
         if let Some(simulation) = &mut configuration.simulation {
@@ -284,7 +266,7 @@ impl Configuration {
                 return Err(value("simulation", reason));
             }
         }
-        if self.has(Stage::Refinement) && self.points.capacity == 0 {
+        if self.has(StageId::Refinement) && self.points.capacity == 0 {
             let reason = "points.capacity is 0, but a refinement of kind `local-map` matches points: it must be 1 or more";
             return Err(value("points", reason.to_owned()));
         }
@@ -373,20 +355,35 @@ impl Configuration {
     }
 
     /// Whether the run has this stage.
-    pub fn has(&self, stage: Stage) -> bool {
+    pub fn has(&self, stage: StageId) -> bool {
         match stage {
-            Stage::RotationSearch | Stage::TranslationSearch => {
+            StageId::RotationSearch | StageId::TranslationSearch => {
                 self.search.kind == SearchKind::Decoupled
             }
-            Stage::JointSearch => self.search.kind == SearchKind::Exhaustive,
-            Stage::Refinement => self.refinement.kind == RefinementKind::LocalMap,
-            Stage::RadarReplay | Stage::Masking | Stage::PoseIntegration => true,
+            StageId::JointSearch => self.search.kind == SearchKind::Exhaustive,
+            StageId::Refinement => self.refinement.kind == RefinementKind::LocalMap,
+            StageId::RadarReplay | StageId::Masking | StageId::PoseIntegration => true,
+        }
+    }
+
+    /// The settings of the method alone.
+    pub fn odometry(&self) -> OdometryConfig {
+        OdometryConfig {
+            raster: self.raster.clone(),
+            points: self.points.clone(),
+            masking: self.masking.clone(),
+            search: self.search,
+            rotation: self.rotation.clone(),
+            translation: self.translation.clone(),
+            exhaustive: self.exhaustive.clone(),
+            refinement: self.refinement.clone(),
         }
     }
 
     /// The processes to start: `gyre stage NAME`, or what the configuration says instead.
     pub fn stage_plans(&self, gyre: &Path) -> Vec<StagePlan> {
-        let plan = |stage: Stage| {
+        let live = self.run.mode == Mode::Live;
+        let plan = |stage: StageId| {
             let name = stage.name();
             let own = self.stages.get(name).cloned().unwrap_or_default();
             let ours = || {
@@ -405,9 +402,12 @@ impl Configuration {
                 name: name.to_owned(),
                 command,
                 restart: own.restart,
+                outlives_restarts: live && stage == StageId::RadarReplay,
+                // Live masking alone knows which scans it admitted.
+                restarts_all: live && stage == StageId::Masking,
             }
         };
-        Stage::ALL
+        StageId::ALL
             .into_iter()
             .filter(|stage| self.has(*stage))
             .map(plan)

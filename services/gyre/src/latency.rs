@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use gyre_messages::{Hop, PoseHeader, Stage};
+use gyre_messages::{Hop, PoseHeader, StageId};
 use serde::Serialize;
 
 /// Percentiles of a duration, microseconds.
@@ -39,7 +39,7 @@ pub struct Latency {
     pub scans: usize,
     /// From the completion of the sweep (its last azimuth's time) to the journalled pose.
     pub sensor_to_pose: Percentiles,
-    /// Stage by stage.
+    /// StageId by stage.
     pub stages: BTreeMap<&'static str, HopLatency>,
     /// Share of the time that two or more stages worked at once.
     pub overlap: f64,
@@ -68,7 +68,7 @@ impl Latency {
     /// From the stamps of the poses.
     pub fn of(poses: &[PoseHeader]) -> Self {
         let finished =
-            |pose: &PoseHeader| pose.item.hops[Stage::PoseIntegration as usize].finished_ns;
+            |pose: &PoseHeader| pose.item.hops[StageId::PoseIntegration as usize].finished_ns;
         let span_ns = span(poses);
         let stages = hops(poses, span_ns);
         let busiest = stages.iter().max_by(|a, b| a.1.busy.total_cmp(&b.1.busy));
@@ -86,21 +86,21 @@ impl Latency {
 
 /// The hops of the stages that the run has: those of the others stayed zero.
 fn hops(poses: &[PoseHeader], span_ns: i64) -> BTreeMap<&'static str, HopLatency> {
-    let passed = |stage: &Stage| {
+    let passed = |stage: &StageId| {
         poses
             .iter()
             .any(|pose| pose.item.hops[*stage as usize] != Hop::default())
     };
     let mut before = None;
     let mut stages = BTreeMap::new();
-    for stage in Stage::ALL.into_iter().filter(passed) {
+    for stage in StageId::ALL.into_iter().filter(passed) {
         stages.insert(stage.name(), hop(poses, before, stage, span_ns));
         before = Some(stage);
     }
     stages
 }
 
-fn hop(poses: &[PoseHeader], before: Option<Stage>, stage: Stage, span_ns: i64) -> HopLatency {
+fn hop(poses: &[PoseHeader], before: Option<StageId>, stage: StageId, span_ns: i64) -> HopLatency {
     let hops = || poses.iter().map(move |pose| pose.item.hops[stage as usize]);
     let transport = before.map(|before| {
         let crossing = |pose: &PoseHeader| {
@@ -123,7 +123,7 @@ fn span(poses: &[PoseHeader]) -> i64 {
     let first = poses.iter().map(|pose| pose.item.hops[0].started_ns).min();
     let last = poses
         .iter()
-        .map(|pose| pose.item.hops[Stage::PoseIntegration as usize].finished_ns)
+        .map(|pose| pose.item.hops[StageId::PoseIntegration as usize].finished_ns)
         .max();
     last.unwrap_or(0) - first.unwrap_or(0)
 }

@@ -17,7 +17,6 @@ pub mod print;
 pub mod progress;
 pub mod results;
 pub mod run;
-pub mod search;
 pub mod simulate;
 pub mod stage;
 pub mod summary;

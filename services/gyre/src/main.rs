@@ -4,6 +4,11 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use gyre::cli::Gyre;
+use gyre_stage::CountingAllocator;
+
+/// Each run reports the allocations of its stages.
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 fn main() -> ExitCode {
     gyre::report("gyre", gyre::execute(Gyre::parse().command))

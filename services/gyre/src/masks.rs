@@ -1,12 +1,12 @@
-//! `gyre masks`: what the mask keeps of a scan, for the eye.
+//! `gyre masks`: pictures of what the mask keeps of scans.
 //!
-//! - [`chain`]: scans masked one after the other as in a run;
-//! - [`exposure`]: what became of one of them, and its figures;
-//! - [`drawing`]: that as a picture.
+//! - [`inspector`]: masks scans one after the other as in a run, and inspects chosen ones;
+//! - [`inspection`]: what the mask keeps of one of them, in figures;
+//! - [`drawing`]: the same as a picture.
 
-mod chain;
 mod drawing;
-mod exposure;
+mod inspection;
+mod inspector;
 
 use std::{fs, ops::Range, process::ExitCode};
 
@@ -17,8 +17,8 @@ use crate::{
     preflight::{self, Played},
     print,
 };
-use chain::Chain;
 use drawing::Canvas;
+use inspector::MaskInspector;
 
 /// Scans that are drawn where nobody says which; and on the overview, at most.
 const FEW: usize = 8;
@@ -35,19 +35,19 @@ pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
         configuration.played(dataset.len()),
         &configuration.data(),
     )?;
-    let mut chain = Chain::new(&configuration, dataset)?;
+    let mut inspector = MaskInspector::new(&configuration, dataset)?;
     preflight::warn_of_training(&configuration)?;
     let out = &arguments.out;
     fs::create_dir_all(out)
         .map_err(|error| format!("cannot write to {}: {error}", out.display()))?;
-    print::line(exposure::HEADER)?;
+    print::line(inspection::HEADER)?;
     let (mut overview, apart) = (Vec::new(), chosen.len().div_ceil(FEW));
     for (index, number) in chosen.into_iter().enumerate() {
-        let Some(exposure) = chain.expose(number)? else {
+        let Some(inspection) = inspector.inspect(number)? else {
             continue;
         };
-        print::line(exposure.line())?;
-        let picture = Canvas::of(&exposure);
+        print::line(inspection.line())?;
+        let picture = Canvas::of(&inspection);
         picture.write(&out.join(format!("scan-{number:06}.png")))?;
         if index % apart == 0 {
             overview.push(picture);

@@ -5,8 +5,7 @@ mod read;
 use std::fmt::Write;
 
 use gyre_evaluation::TimedMotion;
-use gyre_geometry::{UncertainMotion, covariance::unpack, pose};
-use gyre_messages::{PoseHeader, Refinement, flag, hypothesis, outcome};
+use gyre_messages::{PoseHeader, RefinementRecord, flag, initial_guess, outcome};
 use gyre_radar::Trajectory;
 
 pub use read::read;
@@ -53,14 +52,14 @@ pub fn csv(poses: &[PoseHeader]) -> String {
             text,
             ",{},{}",
             outcome_name(refinement),
-            hypothesis_name(refinement)
+            initial_guess_name(refinement)
         );
         let _ = writeln!(text, ",{:.9},{:.9}", refinement.overlap, refinement.support);
     }
     text
 }
 
-fn outcome_name(refinement: &Refinement) -> &'static str {
+fn outcome_name(refinement: &RefinementRecord) -> &'static str {
     match refinement.outcome {
         outcome::SEARCHED => "searched",
         outcome::REFINED => "refined",
@@ -70,37 +69,32 @@ fn outcome_name(refinement: &Refinement) -> &'static str {
     }
 }
 
-fn hypothesis_name(refinement: &Refinement) -> &'static str {
-    match refinement.hypothesis {
-        hypothesis::NONE => "none",
-        hypothesis::PREDICTION => "prediction",
-        hypothesis::SEARCH => "search",
-        hypothesis::FAN => "fan",
+fn initial_guess_name(refinement: &RefinementRecord) -> &'static str {
+    match refinement.initial_guess {
+        initial_guess::NONE => "none",
+        initial_guess::PREDICTION => "prediction",
+        initial_guess::SEARCH => "search",
+        initial_guess::YAW_OFFSET => "yaw-offset",
         _ => "unknown",
     }
 }
 
 /// The poses with the scans' times.
 pub fn trajectory(poses: &[PoseHeader]) -> Trajectory {
-    let pose_of = |header: &PoseHeader| pose(header.x_m, header.y_m, header.yaw_rad);
     Trajectory {
         stamp_ns: Some(poses.iter().map(|pose| pose.item.stamp_ns).collect()),
-        poses: poses.iter().map(pose_of).collect(),
+        poses: poses.iter().map(|pose| pose.pose().motion).collect(),
     }
 }
 
 /// The motions with their times and covariances. Where the chain starts there is none.
 pub fn motions(poses: &[PoseHeader]) -> Vec<TimedMotion> {
     let motion = |header: &PoseHeader| {
-        let (to_ns, motion) = (header.item.stamp_ns, &header.motion);
-        let estimate = UncertainMotion {
-            motion: pose(motion.x_m, motion.y_m, motion.yaw_rad),
-            covariance: unpack(&motion.covariance),
-        };
+        let to_ns = header.item.stamp_ns;
         TimedMotion {
-            from_ns: to_ns.saturating_sub(motion.interval_ns),
+            from_ns: to_ns.saturating_sub(header.motion.interval_ns),
             to_ns,
-            estimate,
+            estimate: header.motion.motion(),
         }
     };
     poses
@@ -127,10 +121,10 @@ mod tests {
             motion: MotionEstimate {
                 x_m: 1.5,
                 searched: [1.25, 0.0, 0.0],
-                refinement: Refinement {
+                refinement: RefinementRecord {
                     outcome: outcome::REFINED,
-                    hypothesis: hypothesis::FAN,
-                    ..Refinement::default()
+                    initial_guess: initial_guess::YAW_OFFSET,
+                    ..RefinementRecord::default()
                 },
                 ..MotionEstimate::default()
             },
@@ -141,7 +135,7 @@ mod tests {
         assert_eq!(fields, [28, 28, 28]);
         assert!(text.contains(",1.500000000,"));
         assert!(text.ends_with(
-            ",1.250000000,0.000000000,0.000000000,refined,fan,0.000000000,0.000000000\n"
+            ",1.250000000,0.000000000,0.000000000,refined,yaw-offset,0.000000000,0.000000000\n"
         ));
     }
 }

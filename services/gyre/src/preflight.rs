@@ -74,11 +74,11 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
         &configuration.points,
         &configuration.masking,
     )?;
-    let window = configuration.window(period(dataset.as_ref()), masker.rasters());
+    let window = configuration.window(period(dataset.as_ref()), masker.scans());
     let limits = Limits {
         scan_bytes: dataset.limits().bytes,
         raster_cells: configuration.raster.n * configuration.raster.n,
-        rasters: masker.rasters(),
+        rasters: masker.scans(),
         points: configuration.points.capacity,
     };
     let footprint = Footprint::new(&window, &limits);
@@ -122,10 +122,10 @@ pub struct Played {
 pub fn open(configuration: &Configuration) -> Result<Played, crate::Failure> {
     let (data, options) = (&configuration.source.data, &configuration.dataset);
     if let Some(simulation) = configuration.streamed() {
-        let recording = SimulatedDrive::new(simulation)?;
-        let truth = Some(recording.ground_truth_tum());
+        let drive = SimulatedDrive::new(simulation)?;
+        let truth = Some(drive.ground_truth_tum());
         return Ok(Played {
-            dataset: gyre_radar_replay::open_simulation(recording, options)?,
+            dataset: drive.open(options)?,
             truth,
         });
     }

@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use gyre_evaluation::{NeesOptions, Options, plot_trajectory};
-use gyre_messages::{PoseHeader, Stage, flag};
+use gyre_messages::{PoseHeader, StageId, flag};
 use gyre_radar::{
     Trajectory,
     ground_truth::{find_ground_truth, read_trajectory, write_tum},
@@ -42,7 +42,7 @@ pub fn write(
     let latency = Latency::of(&poses[session.resumed.min(poses.len())..]);
     save(out, "latency.json", serde_json::to_string_pretty(&latency)?)?;
     let motions = configuration
-        .has(Stage::Refinement)
+        .has(StageId::Refinement)
         .then(|| MotionCounts::of(poses));
     let counts = Counts {
         motions,

@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Stage, flag};
+use gyre_messages::{StageId, flag};
 use gyre_pose_integration::journal;
 use gyre_refinement::checkpoint;
 use gyre_stage::{
@@ -49,7 +49,7 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
         window: checked.window,
         limits: checked.limits,
         live: configuration.run.mode == Mode::Live,
-        refines: configuration.has(Stage::Refinement),
+        refines: configuration.has(StageId::Refinement),
         rate: configuration.run.rate.factor(),
     };
     let resolved = configuration.to_toml()?;

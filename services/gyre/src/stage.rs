@@ -2,26 +2,44 @@
 
 use std::process::ExitCode;
 
-use gyre_messages::Stage;
-use gyre_stage::{Launch, StageError, Statistics, launch};
+use gyre_messages::StageId;
+use gyre_radar::DatasetOptions;
+use gyre_radar_replay::Pace;
+use gyre_simulator::{SimulatedDrive, SimulationConfig};
+use gyre_stage::{Launch, StageCounters, StageError, launch};
 
 /// Runs a stage by its name.
 pub fn run(name: &str) -> ExitCode {
-    let work: fn(&Launch) -> Result<Statistics, StageError> = match name {
-        gyre_radar_replay::NAME => gyre_radar_replay::run,
-        gyre_masking::NAME => gyre_masking::run,
-        gyre_rotation_search::NAME => gyre_rotation_search::run,
-        gyre_translation_search::NAME => gyre_translation_search::run,
-        gyre_joint_search::NAME => gyre_joint_search::run,
-        gyre_refinement::NAME => gyre_refinement::run,
-        gyre_pose_integration::NAME => gyre_pose_integration::run,
-        _ => {
-            eprintln!(
-                "gyre: there is no stage `{name}`; there are {}",
-                Stage::ALL.map(Stage::name).join(", ")
-            );
-            return ExitCode::FAILURE;
-        }
+    let Some(stage) = StageId::by_name(name) else {
+        let names = StageId::ALL.map(StageId::name).join(", ");
+        eprintln!("gyre: there is no stage `{name}`; there are {names}");
+        return ExitCode::FAILURE;
+    };
+    let work: fn(&Launch) -> Result<StageCounters, StageError> = match stage {
+        StageId::RadarReplay => play,
+        StageId::Masking => gyre_masking_stage::run,
+        StageId::RotationSearch => gyre_rotation_search::run,
+        StageId::TranslationSearch => gyre_translation_search::run,
+        StageId::JointSearch => gyre_joint_search::run,
+        StageId::Refinement => gyre_refinement::run,
+        StageId::PoseIntegration => gyre_pose_integration::run,
     };
     launch::main(name, work)
+}
+
+/// Plays a recording, or a simulation as it is rendered.
+fn play(launch: &Launch) -> Result<StageCounters, StageError> {
+    let input = |error: &dyn std::error::Error| StageError::Input(error.to_string());
+    let simulation = match launch.has_section("simulation") {
+        true => Some(launch.section::<SimulationConfig>("simulation")?),
+        false => None,
+    };
+    // A simulation that was stored is played as a recording.
+    let Some(simulation) = simulation.filter(|simulation| !simulation.output.store) else {
+        return gyre_radar_replay::run(launch);
+    };
+    let options: DatasetOptions = launch.section("dataset")?;
+    let drive = SimulatedDrive::new(&simulation).map_err(|error| input(&error))?;
+    let dataset = drive.open(&options).map_err(|error| input(&error))?;
+    gyre_radar_replay::play(launch, dataset, Pace::OnDemand)
 }

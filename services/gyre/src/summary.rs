@@ -3,9 +3,9 @@
 use std::{collections::BTreeMap, fmt, path::Path, time::Duration};
 
 use gyre_masking::{MaskKind, MaskingConfig};
-use gyre_messages::{Footprint, PoseHeader, Stage, flag, hypothesis, outcome};
+use gyre_messages::{Footprint, PoseHeader, StageId, flag, initial_guess, outcome};
 use gyre_stage::{
-    Statistics,
+    StageCounters,
     supervise::{Ending, Report},
 };
 use serde::Serialize;
@@ -74,7 +74,8 @@ impl MotionCounts {
                 .filter(move |r| r.outcome == outcome)
         };
         let count = |outcome| with(outcome).count() as u64;
-        let second = with(outcome::REFINED).filter(|r| r.hypothesis != hypothesis::PREDICTION);
+        let second =
+            with(outcome::REFINED).filter(|r| r.initial_guess != initial_guess::PREDICTION);
         let (weak, predicted) = (count(outcome::WEAK), count(outcome::PREDICTED));
         Self {
             refined: count(outcome::REFINED),
@@ -183,7 +184,7 @@ pub struct Summary {
     restarts: BTreeMap<String, usize>,
     recovery_ms: Vec<f64>,
     /// What each stage counted in its last life.
-    stages: BTreeMap<String, Statistics>,
+    stages: BTreeMap<String, StageCounters>,
     latency: Latency,
     /// As `gyre evaluate --json` prints it.
     evaluation: Option<Judgement>,
@@ -226,7 +227,7 @@ impl Summary {
                 .map(|time| time.as_secs_f64() * 1e3)
                 .collect(),
             stages: report
-                .map(|report| report.statistics.clone())
+                .map(|report| report.counters.clone())
                 .unwrap_or_default(),
             latency,
             evaluation,
@@ -298,7 +299,7 @@ impl Summary {
         )?;
         row(f, "sensor to pose", &self.latency.sensor_to_pose)?;
         writeln!(f)?;
-        for stage in Stage::ALL {
+        for stage in StageId::ALL {
             let Some(hop) = self.latency.stages.get(stage.name()) else {
                 continue;
             };
@@ -308,8 +309,9 @@ impl Summary {
             }
             row(f, stage.name(), &hop.work)?;
             write!(f, "{:6.0} %", hop.busy * 100.0)?;
-            match self.stages.get(stage.name()) {
-                Some(statistics) => writeln!(f, "{:14}", statistics.allocations_after_five)?,
+            let counters = self.stages.get(stage.name());
+            match counters.and_then(|counters| counters.allocations_after_five) {
+                Some(allocations) => writeln!(f, "{allocations:14}")?,
                 None => writeln!(f)?,
             }
         }
@@ -333,7 +335,7 @@ fn row(f: &mut fmt::Formatter<'_>, name: &str, p: &Percentiles) -> fmt::Result {
 
 #[cfg(test)]
 mod tests {
-    use gyre_messages::{Item, MotionEstimate, Refinement};
+    use gyre_messages::{Item, MotionEstimate, RefinementRecord};
 
     use super::*;
 
@@ -364,11 +366,11 @@ mod tests {
 
     #[test]
     fn weak_and_predicted_motions_are_doubtful() {
-        let pose = |(outcome, hypothesis)| {
-            let refinement = Refinement {
+        let pose = |(outcome, initial_guess)| {
+            let refinement = RefinementRecord {
                 outcome,
-                hypothesis,
-                ..Refinement::default()
+                initial_guess,
+                ..RefinementRecord::default()
             };
             PoseHeader {
                 motion: MotionEstimate {
@@ -379,12 +381,12 @@ mod tests {
             }
         };
         let poses = [
-            (outcome::SEARCHED, hypothesis::NONE),
-            (outcome::REFINED, hypothesis::PREDICTION),
-            (outcome::REFINED, hypothesis::SEARCH),
-            (outcome::REFINED, hypothesis::FAN),
-            (outcome::WEAK, hypothesis::SEARCH),
-            (outcome::PREDICTED, hypothesis::NONE),
+            (outcome::SEARCHED, initial_guess::NONE),
+            (outcome::REFINED, initial_guess::PREDICTION),
+            (outcome::REFINED, initial_guess::SEARCH),
+            (outcome::REFINED, initial_guess::YAW_OFFSET),
+            (outcome::WEAK, initial_guess::SEARCH),
+            (outcome::PREDICTED, initial_guess::NONE),
         ];
         let counts = MotionCounts::of(&poses.map(pose));
         let expected = MotionCounts {

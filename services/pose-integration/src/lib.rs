@@ -1,19 +1,19 @@
-//! Composes motions to poses, with their covariances, and journals each before anybody hears of it.
+//! The pose-integration stage: composes motions to poses, with their covariances, and journals each pose before it is published.
 
 mod compose;
 pub mod journal;
 
-use gyre_messages::{Item, Motion, MotionHeader, PoseHeader, Refined, flag};
-use gyre_stage::{Launch, Sink, StageError, Statistics, clock, sink};
+use gyre_messages::{Item, Motion, MotionHeader, PoseHeader, Refined, StageId, flag};
+use gyre_stage::{Launch, Sink, StageCounters, StageError, clock, sink};
 
 pub use compose::compose;
 use journal::Journal;
 
-/// The stage's name.
-pub const NAME: &str = "pose-integration";
-
 /// Runs the stage until it is told to stop.
-pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
+///
+/// # Errors
+/// A journal that cannot be used, and what ends a stage.
+pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let path = journal::path(&launch.manifest.out);
     let (journal, records) =
         Journal::open(&path).map_err(|error| StageError::Input(error.to_string()))?;
@@ -46,9 +46,7 @@ impl Sink for Integration {
 
     fn integrate(&mut self, motion: &MotionHeader) -> Result<PoseHeader, StageError> {
         let mut pose = compose(self.last.as_ref(), motion);
-        pose.item
-            .hop(gyre_messages::Stage::PoseIntegration)
-            .finished_ns = clock::now_ns();
+        pose.item.hop(StageId::PoseIntegration).finished_ns = clock::now_ns();
         self.write(&pose)?;
         self.last = Some(pose);
         Ok(pose)

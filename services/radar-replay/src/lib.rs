@@ -1,79 +1,68 @@
-//! Plays a recorded dataset onto the `scan` topic, each image decoded where its readers will find it; or a simulated drive, each
-//! image rendered while those before it are on their way, read as it would be read from a disk.
+//! The source stage: plays a dataset onto the `scan` topic, each image decoded where its readers find it.
+//!
+//! [`run`] opens a recording on a disk; [`play`] plays any dataset.
 
 mod config;
-mod render_ahead;
 
 use gyre_messages::ScanHeader;
-use gyre_radar::{Dataset, DatasetOptions, OpenError};
-use gyre_simulator::{SimulatedDrive, SimulationConfig};
-use gyre_stage::{Launch, Source, StageError, Statistics, source};
+use gyre_radar::{Dataset, DatasetOptions};
+use gyre_stage::{Launch, Source, StageCounters, StageError, source};
 
 pub use config::SourceConfig;
-use render_ahead::RenderAhead;
 
-/// The stage's name.
-pub const NAME: &str = "radar-replay";
+/// A dataset that fell behind by less kept up, s.
+const NOTABLE_SLIP_S: f64 = 0.01;
 
-/// A simulation that fell behind by less kept up, seconds.
-const WORTH_SAYING_S: f64 = 0.01;
+/// What happens in live mode to scans that come while the source is busy or away.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pace {
+    /// They are missed, as a radar's would be.
+    Sensor,
+    /// They wait: a scan that is made on demand exists only once it is read.
+    OnDemand,
+}
 
-/// Runs the stage until it is told to stop.
-pub fn run(launch: &Launch) -> Result<Statistics, StageError> {
+/// Plays the recording that `[source]` names until it is told to stop.
+///
+/// # Errors
+/// A recording that cannot be opened, and what ends a stage.
+pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let config: SourceConfig = launch.section("source")?;
     let options: DatasetOptions = launch.section("dataset")?;
-    let input = |error: &dyn std::error::Error| StageError::Input(error.to_string());
-    let simulation = streamed(launch)?;
-    let dataset = match &simulation {
-        Some(simulation) => {
-            let recording = SimulatedDrive::new(simulation).map_err(|error| input(&error))?;
-            open_simulation(recording, &options)
-        }
-        None => gyre_radar::open(&config.data, &options),
-    };
-    let dataset = dataset.map_err(|error| input(&error))?;
-    let mut replay = Replay {
-        passes_by: simulation.is_none(),
-        ..Replay::of(dataset, &config)
-    };
-    let statistics = source::run(launch, &mut replay)?;
-    let slipped_s = statistics.slipped_ns as f64 * 1e-9;
-    if slipped_s > WORTH_SAYING_S {
+    let dataset = gyre_radar::open(&config.data, &options)
+        .map_err(|error| StageError::Input(error.to_string()))?;
+    play(launch, dataset, Pace::Sensor)
+}
+
+/// Plays the part of a dataset that `[source]` names until it is told to stop.
+///
+/// # Errors
+/// What ends a stage.
+pub fn play(
+    launch: &Launch,
+    dataset: Box<dyn Dataset>,
+    pace: Pace,
+) -> Result<StageCounters, StageError> {
+    let config: SourceConfig = launch.section("source")?;
+    let counters = source::run(launch, &mut Replay::new(dataset, &config, pace))?;
+    let slipped_s = counters.slipped_ns as f64 * 1e-9;
+    if slipped_s > NOTABLE_SLIP_S {
         tracing::warn!(slipped_s, "the simulation did not keep up with the rate");
     }
-    Ok(statistics)
-}
-
-/// The simulation to play, if it is not to be read from where it was stored.
-fn streamed(launch: &Launch) -> Result<Option<SimulationConfig>, StageError> {
-    match launch.has_section("simulation") {
-        true => launch
-            .section("simulation")
-            .map(|simulation: SimulationConfig| Some(simulation).filter(|s| !s.output.store)),
-        false => Ok(None),
-    }
-}
-
-/// A simulated drive as a dataset that lies on no disk.
-pub fn open_simulation(
-    recording: SimulatedDrive,
-    options: &DatasetOptions,
-) -> Result<Box<dyn Dataset>, OpenError> {
-    gyre_radar::open_source(Box::new(RenderAhead::new(recording)), options)
+    Ok(counters)
 }
 
 /// A part of a dataset.
-pub struct Replay {
+struct Replay {
     dataset: Box<dyn Dataset>,
     first: usize,
     scans: usize,
     half_period_ns: i64,
-    passes_by: bool,
+    pace: Pace,
 }
 
 impl Replay {
-    /// The part of a dataset that `config` names.
-    pub fn of(dataset: Box<dyn Dataset>, config: &SourceConfig) -> Self {
+    fn new(dataset: Box<dyn Dataset>, config: &SourceConfig, pace: Pace) -> Self {
         let first = config.first.min(dataset.len());
         let scans = config
             .scans
@@ -85,7 +74,7 @@ impl Replay {
             first,
             scans,
             half_period_ns,
-            passes_by: true,
+            pace,
         }
     }
 }
@@ -100,9 +89,8 @@ impl Source for Replay {
         Some(self.dataset.nominal_stamp_ns(self.first + index)? + self.half_period_ns)
     }
 
-    /// A simulated sweep is complete when it is rendered, and not before.
     fn passes_by(&self) -> bool {
-        self.passes_by
+        self.pace == Pace::Sensor
     }
 
     fn read(
@@ -118,9 +106,9 @@ impl Source for Replay {
 }
 
 fn median_period_ns(dataset: &dyn Dataset) -> i64 {
-    let stamps = (0..dataset.len()).map_while(|index| dataset.nominal_stamp_ns(index));
-    let stamps: Vec<i64> = stamps.collect();
-    let mut periods: Vec<i64> = stamps.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    periods.sort_unstable();
-    periods.get(periods.len() / 2).copied().unwrap_or(0)
+    let stamps: Vec<i64> = (0..dataset.len())
+        .map_while(|index| dataset.nominal_stamp_ns(index))
+        .collect();
+    let periods = stamps.windows(2).map(|pair| (pair[1] - pair[0]) as f64);
+    gyre_radar::median(periods).map_or(0, |period_ns| period_ns as i64)
 }

@@ -5,7 +5,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::Pose;
+use crate::{Pose, pose, xy_yaw};
 
 /// The upper triangle by rows: xx, xy, x yaw, yy, y yaw, yaw yaw.
 pub type Packed = [f64; 6];
@@ -56,6 +56,16 @@ impl UncertainMotion {
         Self { motion, covariance }
     }
 
+    /// The same, rebuilt from x, y, yaw and the upper triangle of the covariance: a rotation of unit length, a symmetric
+    /// matrix. Motions are exchanged and composed in this form, so that they are the same bits in one process and in several.
+    pub fn normalized(&self) -> Self {
+        let [x_m, y_m, yaw_rad] = xy_yaw(&self.motion);
+        Self {
+            motion: pose(x_m, y_m, yaw_rad),
+            covariance: unpack(&pack(&self.covariance)),
+        }
+    }
+
     /// (x, y, yaw) of this motion less those of the true one, yaw in (-pi, pi].
     pub fn error(&self, truth: &Pose) -> Vector3<f64> {
         let apart = self.motion.translation.vector - truth.translation.vector;
@@ -78,7 +88,6 @@ mod tests {
     use std::f64::consts::{FRAC_PI_2, PI};
 
     use super::*;
-    use crate::{pose, xy_yaw};
 
     fn diagonal(x: f64, y: f64, yaw: f64) -> Matrix3<f64> {
         Matrix3::from_diagonal(&Vector3::new(x, y, yaw))

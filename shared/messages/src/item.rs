@@ -1,4 +1,4 @@
-//! What every message starts with.
+//! The start of every message: which scan it is about, and when each process worked on it.
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
@@ -9,17 +9,18 @@ pub mod flag {
     pub const END: u32 = 1;
     /// The chain of motions starts here: there is no scan before this one to compare with.
     pub const BREAK: u32 = 2;
-    /// On `pose`: this is where the trajectory stands now. All have it but those published again after a restart, save the last.
+    /// On `pose`: the newest pose of the trajectory. After a restart the last poses are published again, and only the
+    /// last of them has this flag.
     pub const SYNC: u32 = 4;
-    /// On `pose`: the trajectory is still empty, begin with the first scan.
+    /// On `pose`: the trajectory is empty, and the stream begins with the first scan.
     pub const BASE: u32 = 8;
 }
 
-/// The processes that a scan can pass, in order: the index of each one's [`Hop`]. A run has either the two halves of the
-/// search or the joint one, and refinement or not; the hops of those it has not stay zero.
+/// The processes that a scan can pass, in the order of the stream: the index of each one's [`Hop`]. A run has either the
+/// two halves of the search or the joint one, and refinement or not; the hops of those that it lacks stay zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(usize)]
-pub enum Stage {
+pub enum StageId {
     /// Reads the sensor or a recording.
     RadarReplay = 0,
     /// Rasterises and masks.
@@ -30,13 +31,13 @@ pub enum Stage {
     TranslationSearch = 3,
     /// Finds both together.
     JointSearch = 4,
-    /// Refines the motion against what was seen before.
+    /// Refines the motion against the local map.
     Refinement = 5,
     /// Composes the motions.
     PoseIntegration = 6,
 }
 
-impl Stage {
+impl StageId {
     /// All of them, in the order of the stream.
     pub const ALL: [Self; 7] = [
         Self::RadarReplay,
@@ -49,60 +50,66 @@ impl Stage {
     ];
 
     /// The name used in configurations, on the command line and in results.
-    pub fn name(self) -> &'static str {
-        let names = [
-            "radar-replay",
-            "masking",
-            "rotation-search",
-            "translation-search",
-            "joint-search",
-            "refinement",
-            "pose-integration",
-        ];
-        names[self as usize]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::RadarReplay => "radar-replay",
+            Self::Masking => "masking",
+            Self::RotationSearch => "rotation-search",
+            Self::TranslationSearch => "translation-search",
+            Self::JointSearch => "joint-search",
+            Self::Refinement => "refinement",
+            Self::PoseIntegration => "pose-integration",
+        }
+    }
+
+    /// The stage of this name.
+    pub fn by_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|stage| stage.name() == name)
     }
 }
 
-/// When one process had a scan: `CLOCK_MONOTONIC`, ns; zero where it has not been yet.
+/// When one process worked on a scan: `CLOCK_MONOTONIC`, ns; zero before.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
 #[type_name("gyre_hop_v1")]
 pub struct Hop {
     /// The last of its inputs was taken from the queue.
     pub received_ns: i64,
-    /// Its work began.
+    /// `process` began.
     pub started_ns: i64,
-    /// Its work was done.
+    /// `process` ended.
     pub finished_ns: i64,
-    /// It was handed to the transport.
+    /// The output was handed to the transport.
     pub published_ns: i64,
 }
 
-/// One [`Hop`] a [`Stage`].
-pub type Hops = [Hop; Stage::ALL.len()];
+/// One [`Hop`] for each [`StageId`].
+pub type Hops = [Hop; StageId::ALL.len()];
 
-/// Which scan a message is about, what it follows, and when each process had it.
+/// Which scan a message is about, which scan it follows, and when each process worked on it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
 #[type_name("gyre_item_v3")]
 pub struct Item {
-    /// Number in the chain of motions: consecutive, from 0. All rules of the hand-over count in it.
+    /// Number in the chain of motions: consecutive, from 0. The hand-over protocol counts in it.
     pub seq: u64,
     /// The scan's place in the recording, or the sensor's own count.
     pub scan: u64,
-    /// The scan that this one is compared with (itself where the chain starts).
+    /// The scan that this one is matched against (itself where the chain starts).
     pub previous_scan: u64,
-    /// Number among the scans that the source published: a gap between consecutive items is what live mode dropped.
+    /// Number among the scans that the source published: a gap between consecutive items counts the scans dropped in
+    /// live mode.
     pub published: u64,
     /// The scan's time on the sensor's clock, ns since 1970: the middle of its sweep.
     pub stamp_ns: i64,
-    /// When the scan was complete, or would have been on the radar itself: `CLOCK_MONOTONIC`, ns. Latency counts from here.
+    /// When the sweep was complete, or would have been on the radar itself: `CLOCK_MONOTONIC`, ns. Latency counts from
+    /// here.
     pub due_ns: i64,
-    /// Process id of the publisher: tells one life of a stage from the next.
+    /// Process id of the publisher; it changes when a stage is restarted.
     pub pid: u32,
     /// See [`flag`].
     pub flags: u32,
-    /// When each process had it.
+    /// When each process worked on it.
     pub hops: Hops,
 }
 
@@ -113,7 +120,7 @@ impl Item {
     }
 
     /// This process's stamps.
-    pub fn hop(&mut self, stage: Stage) -> &mut Hop {
+    pub fn hop(&mut self, stage: StageId) -> &mut Hop {
         &mut self.hops[stage as usize]
     }
 }

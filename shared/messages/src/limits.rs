@@ -2,25 +2,19 @@
 
 use std::fmt;
 
-use gyre_geometry::SparsePoint;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::{
-    ByteBlock, FloatBlock, MaskedHeader, MotionHeader, PoseHeader, RotationHeader, ScanHeader,
-    TOPICS,
-};
+use crate::{TOPICS, topic::History};
 
 /// Processes that may open a topic at once; one that just died counts until it has been cleaned up.
 pub const MAX_NODES: usize = 16;
-/// Samples that a reader may hold: the scan before, the one at hand, one in passing.
+/// Samples that a reader may hold: the scan before, the current one, one in passing.
 const BORROWED: usize = 3;
 /// Samples that a publisher fills at once.
 const LOANED: usize = 1;
-/// What the transport puts before each sample, and rounding, bytes.
-const SAMPLE_OVERHEAD: usize = 192;
 
-/// How many scans may be on their way, and what the stages look back at.
+/// How many scans may be in flight, and how far back the stages look.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Window {
     /// Most scans between admission and their pose (W).
@@ -39,7 +33,7 @@ pub enum WindowError {
     /// Too small or too large.
     #[error("run.window is {0}, but it must be at least 1 and at most 64 scans")]
     Scans(usize),
-    /// So far back the motions are not kept.
+    /// Motions that old are not kept.
     #[error("masking.lag is {0}, but it must be at most 16 scans")]
     Lag(usize),
 }
@@ -56,18 +50,21 @@ pub struct TopicSizes {
     /// Samples that the publisher may fill at once.
     pub loaned: usize,
     /// Readers.
-    pub subscribers: usize,
+    pub readers: usize,
 }
 
 impl TopicSizes {
     /// Samples in the publisher's segment.
-    pub fn chunks(&self) -> usize {
-        self.subscribers * (self.buffer + self.borrowed) + self.history + self.loaned
+    pub fn samples(&self) -> usize {
+        self.readers * (self.buffer + self.borrowed) + self.history + self.loaned
     }
 }
 
 impl Window {
-    /// Checks the limits.
+    /// Checks the bounds of its numbers.
+    ///
+    /// # Errors
+    /// The first number that is out of its bounds.
     pub fn validate(&self) -> Result<(), WindowError> {
         if !(1..=64).contains(&self.scans) {
             return Err(WindowError::Scans(self.scans));
@@ -78,7 +75,7 @@ impl Window {
         Ok(())
     }
 
-    /// Whether item `seq` may be on its way when `newest_pose` is the last one finished.
+    /// Whether item `seq` may be in flight when `newest_pose` is the last one finished.
     pub fn admits(&self, seq: u64, newest_pose: Option<u64>) -> bool {
         let scans = self.scans as u64;
         newest_pose.map_or(seq < scans, |newest| seq <= newest.saturating_add(scans))
@@ -86,37 +83,18 @@ impl Window {
 
     /// Sizes of a topic's queues. A restarted reader first gets the history, and what was already past it can still
     /// finish and let `scans` new ones in: so a queue is longer than the history by the window.
-    pub fn sizes(&self, topic: &str) -> TopicSizes {
-        let data = self.scans + self.look_back;
-        let feedback = data + self.scans + self.lag + 1;
-        let (history, subscribers) = match topic {
-            "scan" => (data, 1),
-            // Both halves of the search, and refinement.
-            "masked" => (data, 3),
-            "rotation" => (data, 1),
-            // Masking, and whoever is next in the stream.
-            "motion" => (feedback, 2),
-            "refined" => (feedback, 1),
-            _ => (feedback, 3),
+    pub(crate) fn queues(&self, history: History, readers: usize) -> TopicSizes {
+        let stream = self.scans + self.look_back;
+        let history = match history {
+            History::Stream => stream,
+            History::Feedback => stream + self.scans + self.lag + 1,
         };
-        let sizes = TopicSizes {
+        TopicSizes {
             history,
             buffer: history + self.scans,
             borrowed: BORROWED,
             loaned: LOANED,
-            subscribers,
-        };
-        match topic {
-            "scan" if self.live_depth > 0 => {
-                let depth = self.live_depth.max(data);
-                TopicSizes {
-                    history: depth,
-                    buffer: depth,
-                    borrowed: depth + self.look_back,
-                    ..sizes
-                }
-            }
-            _ => sizes,
+            readers,
         }
     }
 }
@@ -134,32 +112,6 @@ pub struct Limits {
     pub points: usize,
 }
 
-impl Limits {
-    /// Longest payload of a topic, in its elements.
-    pub fn elements(&self, topic: &str) -> usize {
-        match topic {
-            "scan" => ByteBlock::count(self.scan_bytes),
-            "masked" => {
-                let points =
-                    FloatBlock::count(self.points * size_of::<SparsePoint>() / size_of::<f32>());
-                self.rasters * FloatBlock::count(self.raster_cells) + points
-            }
-            _ => 1,
-        }
-    }
-
-    fn sample_bytes(&self, topic: &str) -> usize {
-        let header = match topic {
-            "scan" => size_of::<ScanHeader>(),
-            "masked" => size_of::<MaskedHeader>(),
-            "rotation" => size_of::<RotationHeader>(),
-            "motion" | "refined" => size_of::<MotionHeader>(),
-            _ => size_of::<PoseHeader>(),
-        };
-        SAMPLE_OVERHEAD + header + self.elements(topic) * 64
-    }
-}
-
 /// How much shared memory a run needs.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Footprint {
@@ -170,14 +122,12 @@ pub struct Footprint {
 impl Footprint {
     /// The footprint of a window and its largest messages.
     pub fn new(window: &Window, limits: &Limits) -> Self {
-        let segment = |topic| {
-            (
-                topic,
-                window.sizes(topic).chunks() * limits.sample_bytes(topic),
-            )
-        };
+        let segments = TOPICS.map(|topic| {
+            let samples = (topic.sizes)(window).samples();
+            (topic.name, samples * (topic.max_sample_bytes)(limits))
+        });
         Self {
-            segments: TOPICS.map(segment).to_vec(),
+            segments: segments.to_vec(),
         }
     }
 
@@ -189,18 +139,11 @@ impl Footprint {
 
 impl fmt::Display for Footprint {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{:.1} MB of shared memory at most (",
-            self.total() as f64 / 1e6
-        )?;
+        let total_mb = self.total() as f64 / 1e6;
+        write!(f, "{total_mb:.1} MB of shared memory at most (")?;
         for (i, (topic, bytes)) in self.segments.iter().enumerate() {
-            write!(
-                f,
-                "{}{topic} {:.1}",
-                if i == 0 { "" } else { ", " },
-                *bytes as f64 / 1e6
-            )?;
+            let separator = if i == 0 { "" } else { ", " };
+            write!(f, "{separator}{topic} {:.1}", *bytes as f64 / 1e6)?;
         }
         write!(f, ")")
     }
@@ -209,6 +152,7 @@ impl fmt::Display for Footprint {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{Masked, Message, Pose, Scan};
 
     const WINDOW: Window = Window {
         scans: 4,
@@ -219,11 +163,10 @@ mod tests {
 
     #[test]
     fn queues_hold_the_history_and_a_window_more() {
-        let scan = WINDOW.sizes("scan");
-        assert_eq!((scan.history, scan.buffer, scan.chunks()), (5, 9, 18));
-        let masked = WINDOW.sizes("masked");
-        assert_eq!(masked.chunks(), 42);
-        let pose = WINDOW.sizes("pose");
+        let scan = Scan::sizes(&WINDOW);
+        assert_eq!((scan.history, scan.buffer, scan.samples()), (5, 9, 18));
+        assert_eq!(Masked::sizes(&WINDOW).samples(), 42);
+        let pose = Pose::sizes(&WINDOW);
         assert_eq!((pose.history, pose.buffer), (12, 16));
     }
 
@@ -248,11 +191,9 @@ mod tests {
     }
 
     #[test]
-    fn a_window_of_nothing_is_refused() {
-        assert_eq!(
-            Window { scans: 0, ..WINDOW }.validate(),
-            Err(WindowError::Scans(0))
-        );
+    fn an_empty_window_is_refused() {
+        let empty = Window { scans: 0, ..WINDOW };
+        assert_eq!(empty.validate(), Err(WindowError::Scans(0)));
         assert!(WINDOW.validate().is_ok());
     }
 }

@@ -3,17 +3,30 @@
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::SparsePoint;
 use iceoryx2::prelude::ZeroCopySend;
+use ndarray::{ArrayView2, ArrayViewMut2};
 
 use crate::{
-    FloatBlock, Item,
-    topic::{header, message},
+    ByteBlock, FloatBlock, Item, Limits, Message,
+    topic::{History, header},
 };
 
-message! {
-    /// One raster where the mask depends on one scan alone; two (this scan, then the scan before, each as this
-    /// pair's mask leaves it) where the mask looked at both. The second starts at the next whole block, and at the next
-    /// after the last raster this scan's points.
-    Masked, "masked", MaskedHeader, FloatBlock
+/// One raster where the mask depends on one scan alone; two (this scan, then the scan before, each as this pair's
+/// mask leaves it) where the mask looked at both. Then the scan's points. Each part starts at a whole block.
+#[derive(Debug)]
+pub enum Masked {}
+
+impl Message for Masked {
+    const TOPIC: &'static str = "masked";
+    // Both halves of the search, and refinement.
+    const READERS: usize = 3;
+    const HISTORY: History = History::Stream;
+    type Header = MaskedHeader;
+    type Element = FloatBlock;
+
+    fn max_elements(limits: &Limits) -> usize {
+        limits.rasters * FloatBlock::count(limits.raster_cells)
+            + (limits.points * size_of::<SparsePoint>()).div_ceil(ByteBlock::LEN)
+    }
 }
 header!(MaskedHeader);
 
@@ -23,7 +36,7 @@ pub mod mask_kind {
     pub const NONE: u32 = 0;
     /// Power below a threshold counts as nothing.
     pub const THRESHOLD: u32 = 1;
-    /// Besides, a network weighed each cell.
+    /// A network weighed each cell above the threshold.
     pub const LEARNED: u32 = 2;
 }
 
@@ -42,9 +55,9 @@ pub struct MaskedHeader {
     pub cell_m: f32,
     /// How it was masked: see [`mask_kind`].
     pub mask: u32,
-    /// The velocity that the sweep's distortion was undone with: x, y (m/s), yaw (rad/s); zero where it was not.
+    /// The velocity used for motion compensation: x, y (m/s), yaw (rad/s); zero where there was none.
     pub twist: [f32; 3],
-    /// 1 where the sweep's distortion was undone.
+    /// 1 where the sweep was motion-compensated.
     pub compensated: u32,
     /// Points behind the rasters, see [`MaskedHeader::points`].
     pub points: u32,
@@ -52,63 +65,104 @@ pub struct MaskedHeader {
     pub reserved: u32,
 }
 
+/// The parts of a payload to fill: see [`MaskedHeader::split`].
+#[derive(Debug)]
+pub struct MaskedParts<'a> {
+    /// For this scan's raster, n x n.
+    pub later: ArrayViewMut2<'a, f32>,
+    /// For the raster of the scan before, n x n, where the mask looks at two scans.
+    pub earlier: Option<ArrayViewMut2<'a, f32>>,
+    /// For the scan's points.
+    pub points: &'a mut [SparsePoint],
+}
+
+/// Two rasters to match, n x n each.
+#[derive(Clone, Copy, Debug)]
+pub struct Pair<'a> {
+    /// The raster of this scan.
+    pub later: ArrayView2<'a, f32>,
+    /// The raster of the scan before; `None` where the chain of motions starts.
+    pub earlier: Option<ArrayView2<'a, f32>>,
+    /// Whether the mask looked at both scans, so that the earlier raster is another one than in the pair before.
+    pub earlier_changed: bool,
+}
+
 impl MaskedHeader {
-    /// Values of one raster.
-    pub fn cells(&self) -> usize {
-        self.n as usize * self.n as usize
+    /// Values of one raster, rounded up to whole blocks.
+    fn raster_values(n: usize) -> Option<usize> {
+        let cells = n.checked_mul(n)?;
+        Some(FloatBlock::count(cells) * FloatBlock::LEN)
     }
 
-    /// Values from one raster's start to that of what follows it, for rasters of so many cells.
-    pub fn raster_values(cells: usize) -> usize {
-        FloatBlock::count(cells) * FloatBlock::LEN
+    /// Divides a payload into its parts, for `rasters` (1 or 2) of n x n cells. `None` where it is too short.
+    pub fn split(values: &mut [f32], n: usize, rasters: usize) -> Option<MaskedParts<'_>> {
+        let raster = Self::raster_values(n)?;
+        let (later, rest) = values.split_at_mut_checked(raster)?;
+        let (earlier, rest) = match rasters {
+            2 => rest
+                .split_at_mut_checked(raster)
+                .map(|(earlier, rest)| (Some(earlier), rest))?,
+            _ => (None, rest),
+        };
+        let view = |values| ArrayViewMut2::from_shape((n, n), values).ok();
+        let earlier = match earlier {
+            Some(values) => Some(view(&mut values[..n * n])?),
+            None => None,
+        };
+        let floats = size_of::<SparsePoint>() / size_of::<f32>();
+        let whole = rest.len() / floats * floats;
+        Some(MaskedParts {
+            later: view(&mut later[..n * n])?,
+            earlier,
+            points: bytemuck::cast_slice_mut(&mut rest[..whole]),
+        })
+    }
+
+    /// Raster `index` of a payload, n x n. `None` where the payload is shorter than the header says.
+    fn raster<'a>(&self, values: &'a [f32], index: usize) -> Option<ArrayView2<'a, f32>> {
+        let n = self.n as usize;
+        let first = index.checked_mul(Self::raster_values(n)?)?;
+        let cells = values.get(first..first.checked_add(n * n)?)?;
+        ArrayView2::from_shape((n, n), cells).ok()
     }
 
     /// The scan's points. `None` where the payload is shorter than the header says.
     pub fn points<'a>(&self, values: &'a [f32]) -> Option<&'a [SparsePoint]> {
-        let first = (self.rasters as usize).checked_mul(Self::raster_values(self.cells()))?;
-        let (points, _) = values.get(first..)?.as_chunks::<5>();
-        Some(bytemuck::cast_slice(points.get(..self.points as usize)?))
+        let first = (self.rasters as usize).checked_mul(Self::raster_values(self.n as usize)?)?;
+        let floats = size_of::<SparsePoint>() / size_of::<f32>();
+        let count = (self.points as usize).checked_mul(floats)?;
+        Some(bytemuck::cast_slice(values.get(first..)?.get(..count)?))
     }
 
-    /// Room for points: as many as the values behind the rasters hold.
-    pub fn points_mut(values: &mut [f32]) -> &mut [SparsePoint] {
-        bytemuck::cast_slice_mut(values.as_chunks_mut::<5>().0)
-    }
-
-    /// The rasters to compare: this scan's, and that of the scan before, which is the second one here where the mask looked
-    /// at both, else the first one there. `None` where a payload is shorter than its header says.
+    /// The rasters to match: this scan's, and that of the scan before, which is the second one here where the mask
+    /// looked at both, else the first one there. `None` where a payload is shorter than its header says.
     pub fn pair<'a>(
         &self,
         values: &'a [f32],
         before: Option<(&Self, &'a [f32])>,
     ) -> Option<Pair<'a>> {
-        let later = values.get(..self.cells())?;
-        let second = Self::raster_values(self.cells());
+        let earlier_changed = self.rasters == 2;
         let earlier = match before {
             None => None,
-            Some(_) if self.rasters == 2 => Some(values.get(second..second + self.cells())?),
-            Some((header, values)) if header.n == self.n => Some(values.get(..self.cells())?),
+            Some(_) if earlier_changed => Some(self.raster(values, 1)?),
+            Some((header, values)) if header.n == self.n => Some(header.raster(values, 0)?),
             Some(_) => return None,
         };
-        Some(Pair { later, earlier })
+        Some(Pair {
+            later: self.raster(values, 0)?,
+            earlier,
+            earlier_changed,
+        })
     }
-}
-
-/// Two rasters of the same size.
-#[derive(Clone, Copy, Debug)]
-pub struct Pair<'a> {
-    /// This scan's.
-    pub later: &'a [f32],
-    /// That of the scan before; `None` where the chain of motions starts.
-    pub earlier: Option<&'a [f32]>,
 }
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[test]
-    fn the_raster_before_comes_from_the_scan_before_unless_the_mask_looked_at_both() {
+    fn the_earlier_raster_is_that_of_the_scan_before_unless_the_mask_looked_at_both() {
         let one = MaskedHeader {
             n: 3,
             rasters: 1,
@@ -116,19 +170,12 @@ mod tests {
         };
         let (now, then) = ([1.0; 32], [2.0; 32]);
         let earlier = |header: &MaskedHeader| {
-            header
-                .pair(&now, Some((&one, &then)))
-                .and_then(|pair| pair.earlier)
+            let pair = header.pair(&now, Some((&one, &then)))?;
+            pair.earlier.map(|raster| (raster.dim(), raster[[0, 0]]))
         };
-        assert_eq!(
-            earlier(&one).map(|raster| (raster.len(), raster[0])),
-            Some((9, 2.0))
-        );
+        assert_eq!(earlier(&one), Some(((3, 3), 2.0)));
         let two = MaskedHeader { rasters: 2, ..one };
-        assert_eq!(
-            earlier(&two).map(|raster| (raster.len(), raster[0])),
-            Some((9, 1.0))
-        );
+        assert_eq!(earlier(&two), Some(((3, 3), 1.0)));
         assert!(
             one.pair(&now, None)
                 .is_some_and(|pair| pair.earlier.is_none())
@@ -137,31 +184,40 @@ mod tests {
     }
 
     #[test]
-    fn points_start_at_the_block_behind_the_last_raster() {
-        let values: Vec<f32> = (0..48).map(|value| value as f32).collect();
-        let one = MaskedHeader {
-            n: 3,
-            rasters: 1,
-            points: 2,
+    fn what_was_written_into_the_parts_is_read_back() {
+        for rasters in [1, 2] {
+            let mut values = vec![0.0_f32; (rasters + 1) * 16];
+            let mut parts = MaskedHeader::split(&mut values, 3, rasters).unwrap();
+            assert_eq!(parts.points.len(), 3);
+            parts.later.fill(1.0);
+            parts.earlier.iter_mut().for_each(|raster| raster.fill(2.0));
+            parts.points[1].weight = 0.5;
+            let header = MaskedHeader {
+                n: 3,
+                rasters: rasters as u32,
+                points: 2,
+                ..MaskedHeader::default()
+            };
+            let pair = header.pair(&values, Some((&header, &values))).unwrap();
+            assert_eq!(pair.later.sum(), 9.0);
+            assert_eq!(pair.earlier.unwrap().sum(), 9.0 * rasters as f32);
+            assert_eq!(header.points(&values).unwrap()[1].weight, 0.5);
+            assert_eq!(
+                MaskedHeader {
+                    points: 4,
+                    ..header
+                }
+                .points(&values),
+                None
+            );
+        }
+        assert!(MaskedHeader::split(&mut [0.0; 16], 3, 2).is_none());
+        let absurd = MaskedHeader {
+            rasters: u32::MAX,
+            n: u32::MAX,
             ..MaskedHeader::default()
         };
-        let expected = [
-            [16.0, 17.0, 18.0, 19.0, 20.0],
-            [21.0, 22.0, 23.0, 24.0, 25.0],
-        ]
-        .map(SparsePoint::from);
-        assert_eq!(one.points(&values), Some(expected.as_slice()));
-        let two = MaskedHeader { rasters: 2, ..one };
-        assert_eq!(two.points(&values).map(|points| points[0].x_m), Some(32.0));
-        assert_eq!(MaskedHeader { points: 4, ..two }.points(&values), None);
-        assert_eq!(
-            MaskedHeader {
-                rasters: u32::MAX,
-                n: u32::MAX,
-                ..one
-            }
-            .points(&values),
-            None
-        );
+        assert_eq!(absurd.points(&[0.0; 16]), None);
+        assert!(absurd.pair(&[0.0; 16], None).is_none());
     }
 }

@@ -1,20 +1,30 @@
 //! `motion`: how the vehicle moved between two scans.
 
 use bytemuck::{Pod, Zeroable};
+use gyre_geometry::{Pose, Twist, UncertainMotion, covariance, pose, xy_yaw};
+use gyre_scan_matching::{MotionMatch, Refined};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
-    FloatBlock, Item, Refinement, RotationEstimate,
-    topic::{header, message},
+    FloatBlock, Item, Message, RefinementRecord, RotationEstimate,
+    topic::{History, header},
 };
 
-message! {
-    /// The motion from the scan before to this one.
-    Motion, "motion", MotionHeader, FloatBlock
+/// The motion from the scan before to this one.
+#[derive(Debug)]
+pub enum Motion {}
+
+impl Message for Motion {
+    const TOPIC: &'static str = "motion";
+    // Masking, and the next stage in the stream.
+    const READERS: usize = 2;
+    const HISTORY: History = History::Feedback;
+    type Header = MotionHeader;
+    type Element = FloatBlock;
 }
 header!(MotionHeader);
 
-/// The pose of this scan's frame in the frame of the scan before, and how much to trust it.
+/// The pose of this scan's frame in the frame of the scan before, with its covariance.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[type_name("gyre_motion_estimate_v2")]
@@ -25,8 +35,8 @@ pub struct MotionEstimate {
     pub y_m: f64,
     /// Counter-clockwise, rad.
     pub yaw_rad: f64,
-    /// Covariance of (x, y, yaw), the upper triangle by rows: xx, xy, x yaw, yy, y yaw, yaw yaw.
-    pub covariance: [f64; 6],
+    /// Covariance of (x, y, yaw): see [`covariance::Packed`].
+    pub covariance: covariance::Packed,
     /// Time between the two scans, ns on the sensor's clock.
     pub interval_ns: i64,
     /// Height of the translation's peak, at most 1.
@@ -35,33 +45,73 @@ pub struct MotionEstimate {
     pub runner_up_score: f64,
     /// The rotation that the translation was searched with.
     pub rotation: RotationEstimate,
-    /// The motion as the search found it: x, y (m), yaw (rad). Masking undoes the sweep with it, so it is the same on every topic.
+    /// The motion as the search found it: x, y (m), yaw (rad). Motion compensation uses it, so it is the same on every
+    /// topic.
     pub searched: [f64; 3],
     /// How the refinement changed that.
-    pub refinement: Refinement,
+    pub refinement: RefinementRecord,
 }
 
-/// What masking learns of a motion: the same whether it hears it on `motion` or, refined, with its pose.
+/// A motion as the search found it: the same whether masking reads it from `motion` or, refined, from `pose`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SearchedMotion {
-    /// Forward, m.
-    pub x_m: f64,
-    /// To the left, m.
-    pub y_m: f64,
-    /// Counter-clockwise, rad.
-    pub yaw_rad: f64,
+    /// The motion.
+    pub motion: Pose,
     /// Time between the two scans, ns on the sensor's clock.
     pub interval_ns: i64,
 }
 
+impl SearchedMotion {
+    /// The constant velocity that makes this motion.
+    pub fn twist(&self) -> Twist {
+        Twist::from_motion(&self.motion, self.interval_ns as f64 * 1e-9)
+    }
+}
+
 impl MotionEstimate {
-    /// The motion as the search found it.
-    pub fn as_searched(&self) -> SearchedMotion {
-        let [x_m, y_m, yaw_rad] = self.searched;
-        SearchedMotion {
+    /// The motion that a search found over `interval_ns`, with the rotation that it was searched with.
+    pub fn from_search(found: &MotionMatch, rotation: RotationEstimate, interval_ns: i64) -> Self {
+        Self {
+            x_m: found.x_m,
+            y_m: found.y_m,
+            yaw_rad: found.yaw_rad,
+            covariance: covariance::pack(&found.covariance),
+            interval_ns,
+            score: found.score,
+            runner_up_score: found.runner_up.map_or(0.0, |runner_up| runner_up.score),
+            rotation,
+            searched: [found.x_m, found.y_m, found.yaw_rad],
+            refinement: RefinementRecord::default(),
+        }
+    }
+
+    /// The motion after refinement. The result of the search stays beside it.
+    #[must_use]
+    pub fn refined(&self, refined: &Refined) -> Self {
+        let [x_m, y_m, yaw_rad] = xy_yaw(&refined.motion.motion);
+        Self {
             x_m,
             y_m,
             yaw_rad,
+            covariance: covariance::pack(&refined.motion.covariance),
+            refinement: refined.into(),
+            ..*self
+        }
+    }
+
+    /// The motion with its covariance.
+    pub fn motion(&self) -> UncertainMotion {
+        UncertainMotion {
+            motion: pose(self.x_m, self.y_m, self.yaw_rad),
+            covariance: covariance::unpack(&self.covariance),
+        }
+    }
+
+    /// The motion as the search found it.
+    pub fn searched(&self) -> SearchedMotion {
+        let [x_m, y_m, yaw_rad] = self.searched;
+        SearchedMotion {
+            motion: pose(x_m, y_m, yaw_rad),
             interval_ns: self.interval_ns,
         }
     }

@@ -1,20 +1,28 @@
-//! `rotation`: how far the vehicle turned between two scans.
+//! `rotation`: by how much the vehicle turned between two scans.
 
 use bytemuck::{Pod, Zeroable};
+use gyre_scan_matching::RotationMatch;
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
-    FloatBlock, Item,
-    topic::{header, message},
+    FloatBlock, Item, Message,
+    topic::{History, header},
 };
 
-message! {
-    /// The rotation of this scan against the one before.
-    Rotation, "rotation", RotationHeader, FloatBlock
+/// The rotation of this scan against the one before.
+#[derive(Debug)]
+pub enum Rotation {}
+
+impl Message for Rotation {
+    const TOPIC: &'static str = "rotation";
+    const READERS: usize = 1;
+    const HISTORY: History = History::Stream;
+    type Header = RotationHeader;
+    type Element = FloatBlock;
 }
 header!(RotationHeader);
 
-/// An angle and how much to trust it.
+/// An angle with its variance.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[type_name("gyre_rotation_estimate_v1")]
@@ -29,6 +37,31 @@ pub struct RotationEstimate {
     pub runner_up_rad: f64,
     /// Its height.
     pub runner_up_score: f64,
+}
+
+impl From<&RotationMatch> for RotationEstimate {
+    fn from(found: &RotationMatch) -> Self {
+        let runner_up = found.runner_up;
+        Self {
+            angle_rad: found.angle_rad,
+            variance_rad2: found.variance_rad2,
+            score: found.score,
+            runner_up_rad: runner_up.map_or(0.0, |runner_up| runner_up.angle_rad),
+            runner_up_score: runner_up.map_or(0.0, |runner_up| runner_up.score),
+        }
+    }
+}
+
+impl From<RotationEstimate> for RotationMatch {
+    /// The runner-up is left out: no search needs it.
+    fn from(rotation: RotationEstimate) -> Self {
+        Self {
+            angle_rad: rotation.angle_rad,
+            variance_rad2: rotation.variance_rad2,
+            score: rotation.score,
+            runner_up: None,
+        }
+    }
 }
 
 /// See [`RotationEstimate`].

@@ -5,13 +5,39 @@ use gyre_radar::{MAX_AZIMUTHS, PolarScan, ScanSlot, Sense, SweepGeometry};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
-    ByteBlock, Item,
-    topic::{header, message},
+    ByteBlock, Item, Limits, Message, TopicSizes, Window,
+    topic::{History, header},
 };
 
-message! {
-    /// A sweep: the power of azimuth `a` at range bin `b` is byte `first_byte + a * stride + b` of the payload.
-    Scan, "scan", ScanHeader, ByteBlock
+/// A sweep: the power of azimuth `a` at range bin `b` is byte `first_byte + a * stride + b` of the payload.
+#[derive(Debug)]
+pub enum Scan {}
+
+impl Message for Scan {
+    const TOPIC: &'static str = "scan";
+    const READERS: usize = 1;
+    const HISTORY: History = History::Stream;
+    type Header = ScanHeader;
+    type Element = ByteBlock;
+
+    fn max_elements(limits: &Limits) -> usize {
+        ByteBlock::count(limits.scan_bytes)
+    }
+
+    /// In live mode the source keeps what comes while masking is restarted.
+    fn sizes(window: &Window) -> TopicSizes {
+        let sizes = window.queues(Self::HISTORY, Self::READERS);
+        if window.live_depth == 0 {
+            return sizes;
+        }
+        let depth = window.live_depth.max(sizes.history);
+        TopicSizes {
+            history: depth,
+            buffer: depth,
+            borrowed: depth + window.look_back,
+            ..sizes
+        }
+    }
 }
 header!(ScanHeader);
 
@@ -36,7 +62,7 @@ pub struct ScanHeader {
     pub range_offset_m: f32,
     /// 1 where azimuths grow clockwise seen from above, else 0.
     pub clockwise: u32,
-    /// Metres to add to a range for each m/s of approach, 0 where it is not known: see [`SweepGeometry::doppler_s`].
+    /// Metres to add to a range for each m/s of approach, 0 where it is unknown: see [`SweepGeometry::doppler_s`].
     pub doppler_s: f32,
     /// Time of each row, ns since 1970.
     pub azimuth_stamp_ns: [i64; MAX_AZIMUTHS],

@@ -42,6 +42,7 @@ pub mod occlusion;
 pub mod output;
 pub mod path;
 pub mod profile;
+mod render_ahead;
 pub mod sensor;
 pub mod simulated_drive;
 pub mod simulator;

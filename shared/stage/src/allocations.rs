@@ -1,4 +1,4 @@
-//! Counts heap allocations, so that "`process` allocates nothing" is a figure and not a claim.
+//! Counts of heap allocations, so that "`process` allocates nothing" is measured and not claimed.
 
 use std::{
     alloc::{GlobalAlloc, Layout, System},
@@ -9,18 +9,24 @@ thread_local! {
     static COUNT: Cell<u64> = const { Cell::new(0) };
 }
 
-struct Counting;
-
-#[global_allocator]
-static COUNTING: Counting = Counting;
+/// The system's allocator, counting the allocations of each thread. A program has its stages' allocations counted by
+/// making this its global allocator:
+///
+/// ```
+/// #[global_allocator]
+/// static ALLOCATOR: gyre_stage::CountingAllocator = gyre_stage::CountingAllocator;
+/// # fn main() {}
+/// ```
+#[derive(Debug)]
+pub struct CountingAllocator;
 
 fn count() {
-    // A thread that is being torn down has no counter any more; nobody asks for it either.
+    // A thread that is being torn down has no counter any more.
     let _ = COUNT.try_with(|count| count.set(count.get() + 1));
 }
 
 // SAFETY: every call goes to the system's allocator unchanged; counting neither allocates nor panics.
-unsafe impl GlobalAlloc for Counting {
+unsafe impl GlobalAlloc for CountingAllocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count();
         unsafe { System.alloc(layout) }
@@ -41,19 +47,29 @@ unsafe impl GlobalAlloc for Counting {
     }
 }
 
-/// Allocations of this thread so far.
+/// Allocations of this thread so far; 0 where they are not counted.
 pub(crate) fn so_far() -> u64 {
     COUNT.with(Cell::get)
 }
 
+/// Whether this program counts its allocations.
+pub(crate) fn are_counted() -> bool {
+    // A stage has allocated long before its first item.
+    so_far() > 0
+}
+
 #[cfg(test)]
 mod tests {
-    use super::so_far;
+    use super::{CountingAllocator, are_counted, so_far};
+
+    #[global_allocator]
+    static ALLOCATOR: CountingAllocator = CountingAllocator;
 
     #[test]
     fn an_allocation_is_counted_once_and_its_end_is_not() {
         let before = so_far();
         drop(std::hint::black_box(Box::new(7)));
         assert_eq!(so_far() - before, 1);
+        assert!(are_counted());
     }
 }

@@ -1,4 +1,4 @@
-//! What can end a stage before its time.
+//! Errors that end a stage.
 
 use std::{fmt::Debug, path::PathBuf};
 
@@ -37,9 +37,9 @@ pub enum StageError {
         /// What the transport said.
         reason: String,
     },
-    /// An item is missing: one that this stage was promised has been overwritten or never sent.
+    /// An item is missing: it has been overwritten, or was never sent.
     #[error("topic `{topic}`: expected item {expected}, but got {got}")]
-    BrokenPromise {
+    SequenceGap {
         /// On which topic.
         topic: &'static str,
         /// The number that had to come.
@@ -84,7 +84,7 @@ impl StageError {
     /// What the process exits with.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Transport { .. } | Self::BrokenPromise { .. } => Self::RESTART,
+            Self::Transport { .. } | Self::SequenceGap { .. } => Self::RESTART,
             _ => Self::HOPELESS,
         }
     }

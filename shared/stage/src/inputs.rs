@@ -1,6 +1,6 @@
-//! What a stage in the middle of the stream waits for: pairs of consecutive items, alone or joined with another topic.
+//! The inputs of a stage: pairs of consecutive items, alone or joined with another topic.
 
-use gyre_messages::{Item, Message, flag};
+use gyre_messages::{Item, Masked, Message, Pair, flag};
 
 use crate::{
     Launch, StageError,
@@ -28,9 +28,15 @@ pub trait Inputs: Sized {
     where
         Self: 'a;
 
-    /// Opens them, each with its greeting.
+    /// Opens them.
+    ///
+    /// # Errors
+    /// A failure of the transport.
     fn open(launch: &Launch) -> Result<Self, StageError>;
     /// Takes what has come and says what to do next.
+    ///
+    /// # Errors
+    /// A failure of the transport, a missing item.
     fn turn(&mut self) -> Result<Turn, StageError>;
     /// The inputs of the item that [`Turn::Process`] named.
     fn view(&self) -> Option<Self::View<'_>>;
@@ -38,7 +44,7 @@ pub trait Inputs: Sized {
     fn advance(&mut self);
     /// What the publishers notify.
     fn listeners(&self) -> Vec<&Listener>;
-    /// Items skipped because they had been had before.
+    /// Items skipped because they had been received before.
     fn duplicates(&self) -> u64;
 }
 
@@ -49,10 +55,34 @@ pub struct Pairs<M: Message> {
 
 /// See [`Pairs`].
 pub struct PairView<'a, M: Message> {
-    /// The item at hand.
+    /// The current item.
     pub current: &'a Received<M>,
     /// The one before; `None` where the chain starts.
     pub before: Option<&'a Received<M>>,
+}
+
+impl<M: Message> PairView<'_, M> {
+    /// Time between the two scans, ns on the sensor's clock; 0 where the chain starts.
+    pub fn interval_ns(&self) -> i64 {
+        let stamp_ns = self.current.item().stamp_ns;
+        self.before
+            .map_or(0, |before| stamp_ns.saturating_sub(before.item().stamp_ns))
+    }
+}
+
+impl PairView<'_, Masked> {
+    /// The rasters to match.
+    ///
+    /// # Errors
+    /// A payload that is shorter than its header says.
+    pub fn rasters(&self) -> Result<Pair<'_>, StageError> {
+        let before = self.before.map(|before| (before.header(), before.values()));
+        let pair = self.current.header().pair(self.current.values(), before);
+        pair.ok_or_else(|| {
+            self.current
+                .malformed("its rasters do not fit their headers")
+        })
+    }
 }
 
 impl<M: Message> Inputs for Pairs<M> {
@@ -60,7 +90,7 @@ impl<M: Message> Inputs for Pairs<M> {
 
     fn open(launch: &Launch) -> Result<Self, StageError> {
         Ok(Self {
-            reader: Reader::open(&launch.node, None)?,
+            reader: Reader::open(launch, None)?,
         })
     }
 
@@ -100,11 +130,9 @@ pub struct Joined<A: Message, B: Message> {
 
 /// See [`Joined`].
 pub struct JoinedView<'a, A: Message, B: Message> {
-    /// The item at hand.
-    pub current: &'a Received<A>,
-    /// The one before; `None` where the chain starts.
-    pub before: Option<&'a Received<A>>,
-    /// What the other topic says of the item at hand.
+    /// The current item of the first topic and the one before.
+    pub pair: PairView<'a, A>,
+    /// The other topic's message for the current item.
     pub other: &'a Received<B>,
 }
 
@@ -113,8 +141,8 @@ impl<A: Message, B: Message> Inputs for Joined<A, B> {
 
     fn open(launch: &Launch) -> Result<Self, StageError> {
         Ok(Self {
-            pairs: Reader::open(&launch.node, None)?,
-            other: Reader::open(&launch.node, None)?,
+            pairs: Reader::open(launch, None)?,
+            other: Reader::open(launch, None)?,
         })
     }
 
@@ -129,7 +157,7 @@ impl<A: Message, B: Message> Inputs for Joined<A, B> {
                 return Ok(Turn::Keep);
             }
             if item.seq == other.seq {
-                // The later input's stamps tell the item's way here.
+                // The later input has all stamps so far.
                 let item = Item {
                     hops: other.hops,
                     ..item
@@ -143,8 +171,10 @@ impl<A: Message, B: Message> Inputs for Joined<A, B> {
 
     fn view(&self) -> Option<JoinedView<'_, A, B>> {
         Some(JoinedView {
-            current: self.pairs.current()?,
-            before: self.pairs.before(),
+            pair: PairView {
+                current: self.pairs.current()?,
+                before: self.pairs.before(),
+            },
             other: self.other.current()?,
         })
     }

@@ -12,9 +12,8 @@ use serde::de::DeserializeOwned;
 use tracing::span::EnteredSpan;
 
 use crate::{
-    Manifest, StageError, Statistics, run,
+    Manifest, StageCounters, StageError, counters, run,
     services::{self, Node},
-    statistics,
     wake::Signals,
 };
 
@@ -84,20 +83,23 @@ impl Launch {
         self.configuration.contains_key(section)
     }
 
-    fn leave_statistics(&self, statistics: &Statistics) -> Result<(), StageError> {
-        let path = self.manifest.root.join(statistics::file_name(&self.name));
-        let text = serde_json::to_string(statistics)
+    fn leave_statistics(&self, counters: &StageCounters) -> Result<(), StageError> {
+        let path = self.manifest.root.join(counters::file_name(&self.name));
+        let text = serde_json::to_string(counters)
             .map_err(|e| StageError::Configuration(e.to_string()))?;
         fs::write(&path, text).map_err(|source| StageError::File { path, source })
     }
 }
 
 /// The `main` of every stage: joins the run, works until the end, says in one sentence what went wrong.
-pub fn main(name: &str, work: impl FnOnce(&Launch) -> Result<Statistics, StageError>) -> ExitCode {
+pub fn main(
+    name: &str,
+    work: impl FnOnce(&Launch) -> Result<StageCounters, StageError>,
+) -> ExitCode {
     let result = Launch::from_environment(name).and_then(|launch| {
         tracing::debug!(pid = std::process::id(), "started");
-        let statistics = work(&launch)?;
-        launch.leave_statistics(&statistics)
+        let counters = work(&launch)?;
+        launch.leave_statistics(&counters)
     });
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -8,7 +8,7 @@ use iceoryx2::{
 };
 
 use crate::{
-    StageError, clock,
+    Launch, StageError, clock,
     services::{self, Ipc, Listener, Node, Notifier},
 };
 
@@ -49,25 +49,32 @@ impl<M: Message> Received<M> {
 pub struct Port<M: Message> {
     subscriber: Subscriber<Ipc, [M::Element], M::Header>,
     data: Listener,
-    _hello: Notifier,
+    _handshake: Notifier,
 }
 
 impl<M: Message> Port<M> {
-    /// Opens the topic for reading and greets its publisher, which answers with its history.
-    pub(crate) fn open(node: &Node) -> Result<Self, StageError> {
+    /// Opens the topic of a run for reading and notifies its publisher, which answers with its history.
+    ///
+    /// # Errors
+    /// A failure of the transport.
+    pub fn open(launch: &Launch) -> Result<Self, StageError> {
+        Self::on(&launch.node)
+    }
+
+    pub(crate) fn on(node: &Node) -> Result<Self, StageError> {
         let subscriber = services::open_topic::<M>(node)?
             .subscriber_builder()
             .create()
             .map_err(|e| StageError::transport(format!("subscribe to {}", M::TOPIC), e))?;
         let data = services::listener(node, &services::data_event(M::TOPIC))?;
-        let hello = services::notifier(node, &services::hello_event(M::TOPIC))?;
-        hello.notify().map_err(|e| {
-            StageError::transport(format!("greet the publisher of {}", M::TOPIC), e)
+        let handshake = services::notifier(node, &services::handshake_event(M::TOPIC))?;
+        handshake.notify().map_err(|e| {
+            StageError::transport(format!("notify the publisher of {}", M::TOPIC), e)
         })?;
         Ok(Self {
             subscriber,
             data,
-            _hello: hello,
+            _handshake: handshake,
         })
     }
 
@@ -78,7 +85,7 @@ impl<M: Message> Port<M> {
                 sample,
                 received_ns: clock::now_ns(),
             })),
-            // What a dead publisher left still fills our hands: give something back first, then ask again.
+            // Samples of a dead publisher are still borrowed: some are released first, then this is tried again.
             Err(ReceiveError::ExceedsMaxBorrows) => Ok(None),
             Err(error) => Err(StageError::transport(
                 format!("receive {}", M::TOPIC),
@@ -88,7 +95,7 @@ impl<M: Message> Port<M> {
     }
 
     /// What the publisher notifies.
-    pub(crate) fn listener(&self) -> &Listener {
+    pub fn listener(&self) -> &Listener {
         &self.data
     }
 }
@@ -104,9 +111,16 @@ pub struct Reader<M: Message> {
 
 impl<M: Message> Reader<M> {
     /// Opens the topic; `next` is the first item wanted, or whatever comes first.
-    pub(crate) fn open(node: &Node, next: Option<u64>) -> Result<Self, StageError> {
+    ///
+    /// # Errors
+    /// A failure of the transport.
+    pub fn open(launch: &Launch, next: Option<u64>) -> Result<Self, StageError> {
+        Self::on(&launch.node, next)
+    }
+
+    pub(crate) fn on(node: &Node, next: Option<u64>) -> Result<Self, StageError> {
         Ok(Self {
-            port: Port::open(node)?,
+            port: Port::on(node)?,
             next,
             head: None,
             before: None,
@@ -115,7 +129,7 @@ impl<M: Message> Reader<M> {
     }
 
     /// The item at hand, taken from the queue if need be. Items that were had before are skipped;
-    /// one that is missing breaks the window's promise.
+    /// a missing one is an error, since queues are sized so that none can be lost.
     pub fn head(&mut self) -> Result<Option<&Received<M>>, StageError> {
         while self.head.is_none() {
             let Some(received) = self.port.receive()? else {
@@ -125,7 +139,7 @@ impl<M: Message> Reader<M> {
             match self.next {
                 Some(next) if got < next => self.duplicates += 1,
                 Some(next) if got > next => {
-                    return Err(StageError::BrokenPromise {
+                    return Err(StageError::SequenceGap {
                         topic: M::TOPIC,
                         expected: next,
                         got,
@@ -169,7 +183,8 @@ impl<M: Message> Reader<M> {
         self.duplicates
     }
 
-    pub(crate) fn listener(&self) -> &Listener {
+    /// What the publisher notifies.
+    pub fn listener(&self) -> &Listener {
         self.port.listener()
     }
 }

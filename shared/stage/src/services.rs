@@ -1,6 +1,6 @@
-//! The transport's services: created once by the supervisor with the window's sizes, opened by everybody else.
+//! The transport's services: the supervisor creates them once with the window's sizes, stages open them.
 //!
-//! Stages never say a size, so no restart finds a service gone or of another size.
+//! Stages never name a size, so no restart finds a service gone or of another size.
 
 use gyre_messages::{MAX_NODES, Masked, Message, Motion, Pose, Refined, Rotation, Scan, Window};
 use iceoryx2::{
@@ -15,11 +15,13 @@ pub(crate) type Node = iceoryx2::node::Node<Ipc>;
 pub(crate) type Topic<M> =
     publish_subscribe::PortFactory<Ipc, [<M as Message>::Element], <M as Message>::Header>;
 pub(crate) type Event = event::PortFactory<Ipc>;
-pub(crate) type Listener = iceoryx2::port::listener::Listener<Ipc>;
+/// Receives the notifications of an event.
+pub type Listener = iceoryx2::port::listener::Listener<Ipc>;
 pub(crate) type Notifier = iceoryx2::port::notifier::Notifier<Ipc>;
 
-/// Ports of an event beyond those in use: a listener that was killed half made can cost a place until the run ends.
-const AIR: usize = 6;
+/// Ports of an event beyond those in use: a listener that was killed while it was being created can occupy one until the
+/// run ends.
+const HEADROOM: usize = 6;
 
 /// A node of this run. `name` shows in the transport's own tools.
 pub(crate) fn node(config: &Config, name: &str) -> Result<Node, StageError> {
@@ -48,9 +50,14 @@ impl Services {
     pub(crate) fn create(node: &Node, window: &Window) -> Result<Self, StageError> {
         let mut events = Vec::new();
         for topic in gyre_messages::TOPICS {
-            let readers = window.sizes(topic).subscribers;
-            events.push(create_event(node, &data_event(topic), readers, 1)?);
-            events.push(create_event(node, &hello_event(topic), 1, readers)?);
+            let readers = (topic.sizes)(window).readers;
+            events.push(create_event(node, &data_event(topic.name), readers, 1)?);
+            events.push(create_event(
+                node,
+                &handshake_event(topic.name),
+                1,
+                readers,
+            )?);
         }
         Ok(Self {
             _scan: create_topic::<Scan>(node, window)?,
@@ -69,9 +76,9 @@ pub(crate) fn data_event(topic: &str) -> String {
     format!("{topic}_data")
 }
 
-/// Name of the event that a new reader greets the publisher with.
-pub(crate) fn hello_event(topic: &str) -> String {
-    format!("{topic}_hello")
+/// Name of the event that a new reader announces itself to the publisher with.
+pub(crate) fn handshake_event(topic: &str) -> String {
+    format!("{topic}_handshake")
 }
 
 fn service_name(name: &str) -> Result<ServiceName, StageError> {
@@ -79,7 +86,7 @@ fn service_name(name: &str) -> Result<ServiceName, StageError> {
 }
 
 fn create_topic<M: Message>(node: &Node, window: &Window) -> Result<Topic<M>, StageError> {
-    let sizes = window.sizes(M::TOPIC);
+    let sizes = M::sizes(window);
     node.service_builder(&service_name(M::TOPIC)?)
         .publish_subscribe::<[M::Element]>()
         .user_header::<M::Header>()
@@ -88,7 +95,7 @@ fn create_topic<M: Message>(node: &Node, window: &Window) -> Result<Topic<M>, St
         .subscriber_max_buffer_size(sizes.buffer)
         .subscriber_max_borrowed_samples(sizes.borrowed)
         .max_publishers(1)
-        .max_subscribers(sizes.subscribers)
+        .max_subscribers(sizes.readers)
         .max_nodes(MAX_NODES)
         .create()
         .map_err(|e| StageError::transport(format!("create the topic {}", M::TOPIC), e))
@@ -102,8 +109,8 @@ fn create_event(
 ) -> Result<Event, StageError> {
     node.service_builder(&service_name(name)?)
         .event()
-        .max_listeners(listeners + AIR)
-        .max_notifiers(notifiers + AIR)
+        .max_listeners(listeners + HEADROOM)
+        .max_notifiers(notifiers + HEADROOM)
         .max_nodes(MAX_NODES)
         .event_id_max_value(1)
         .create()

@@ -1,9 +1,9 @@
 //! The loop of the last stage: it alone owns state, and journals before it publishes.
 
-use gyre_messages::{Header, Item, Message, MotionHeader, Pose, PoseHeader, Stage, flag};
+use gyre_messages::{Header, Item, Message, MotionHeader, Pose, PoseHeader, StageId, flag};
 
 use crate::{
-    Launch, StageError, Statistics, allocations, clock, reader::Reader, wake, writer::Writer,
+    Launch, StageCounters, StageError, allocations, clock, reader::Reader, wake, writer::Writer,
 };
 
 /// What keeps the trajectory.
@@ -20,9 +20,9 @@ pub trait Sink {
 pub fn run<M: Message<Header = MotionHeader>>(
     launch: &Launch,
     sink: &mut impl Sink,
-) -> Result<Statistics, StageError> {
+) -> Result<StageCounters, StageError> {
     let poses = Writer::<Pose>::open(&launch.node, &launch.manifest)?;
-    let (restored, ended) = sink.restore(launch.manifest.window.sizes("pose").history)?;
+    let (restored, ended) = sink.restore(Pose::sizes(&launch.manifest.window).history)?;
     publish_again(&poses, &restored)?;
     let next = restored
         .last()
@@ -31,29 +31,29 @@ pub fn run<M: Message<Header = MotionHeader>>(
         sink,
         poses,
         ended,
-        statistics: Statistics::default(),
+        counters: StageCounters::default(),
     };
     if ended {
         integration.publish_end(restored.last().map(|pose| pose.item).unwrap_or_default())?;
     }
-    let mut motions = Reader::<M>::open(&launch.node, Some(next))?;
+    let mut motions = Reader::<M>::open(launch, Some(next))?;
     integration.drain(&mut motions)?;
     loop {
         let woken = launch.signals.wait(
             &[motions.listener()],
             Some(integration.poses.listener()),
-            wake::NET,
+            wake::MAX_WAIT,
         )?;
-        integration.statistics.wakes += 1;
+        integration.counters.wakes += 1;
         if woken.stop {
-            integration.statistics.duplicates = motions.duplicates();
-            return Ok(integration.statistics);
+            integration.counters.duplicates = motions.duplicates();
+            return Ok(integration.counters);
         }
-        if woken.may_have_newcomers() {
-            integration.poses.greet()?;
+        if woken.may_have_new_readers() {
+            integration.poses.accept_readers()?;
         }
         if integration.drain(&mut motions)? && woken.timed_out {
-            integration.statistics.wakes_caught_late += 1;
+            integration.counters.wakes_caught_late += 1;
         }
     }
 }
@@ -91,14 +91,14 @@ fn standing(pose: PoseHeader) -> PoseHeader {
 fn publish(poses: &Writer<Pose>, pose: PoseHeader) -> Result<(), StageError> {
     let mut draft = poses.loan()?;
     *draft.header() = pose;
-    poses.send(draft, Stage::PoseIntegration)
+    poses.send(draft, StageId::PoseIntegration)
 }
 
 struct Integration<'a, S: Sink> {
     sink: &'a mut S,
     poses: Writer<Pose>,
     ended: bool,
-    statistics: Statistics,
+    counters: StageCounters,
 }
 
 impl<S: Sink> Integration<'_, S> {
@@ -119,7 +119,7 @@ impl<S: Sink> Integration<'_, S> {
                     self.ended = true;
                 }
                 false => {
-                    motion.item.hop(Stage::PoseIntegration).received_ns = received.received_ns;
+                    motion.item.hop(StageId::PoseIntegration).received_ns = received.received_ns;
                     self.integrate(motion)?;
                 }
             }
@@ -131,9 +131,9 @@ impl<S: Sink> Integration<'_, S> {
 
     fn integrate(&mut self, mut motion: MotionHeader) -> Result<(), StageError> {
         let (started_ns, allocated) = (clock::now_ns(), allocations::so_far());
-        motion.item.hop(Stage::PoseIntegration).started_ns = started_ns;
+        motion.item.hop(StageId::PoseIntegration).started_ns = started_ns;
         let pose = self.sink.integrate(&motion)?;
-        self.statistics.record(
+        self.counters.record(
             allocations::so_far() - allocated,
             clock::now_ns() - started_ns,
         );
@@ -146,6 +146,6 @@ impl<S: Sink> Integration<'_, S> {
             flags: flag::END,
             ..item
         };
-        self.poses.send(draft, Stage::PoseIntegration)
+        self.poses.send(draft, StageId::PoseIntegration)
     }
 }

@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use gyre_messages::{Hop, Item, Pose, Scan, ScanHeader, Stage, flag};
+use gyre_messages::{Hop, Item, Pose, Scan, ScanHeader, StageId, flag};
 
 use crate::{
-    Launch, StageError, Statistics, allocations, clock,
+    Launch, StageCounters, StageError, allocations, clock,
     reader::Port,
     wake,
     writer::{Draft, Writer},
@@ -38,9 +38,9 @@ pub trait Source {
 }
 
 /// Runs the source until SIGTERM.
-pub fn run(launch: &Launch, source: &mut impl Source) -> Result<Statistics, StageError> {
+pub fn run(launch: &Launch, source: &mut impl Source) -> Result<StageCounters, StageError> {
     let credit = Credit {
-        poses: Port::open(&launch.node)?,
+        poses: Port::open(launch)?,
         newest: None,
         published: None,
         sync: None,
@@ -51,13 +51,13 @@ pub fn run(launch: &Launch, source: &mut impl Source) -> Result<Statistics, Stag
         source,
         credit,
         scans,
-        statistics: Statistics::default(),
+        counters: StageCounters::default(),
     };
     let Some(position) = playback.wait_for_start()? else {
-        return Ok(playback.statistics);
+        return Ok(playback.counters);
     };
     playback.play(position)?;
-    Ok(playback.statistics)
+    Ok(playback.counters)
 }
 
 /// What the poses say: how far the run is.
@@ -147,7 +147,7 @@ struct Playback<'a, S: Source> {
     source: &'a mut S,
     credit: Credit,
     scans: Writer<Scan>,
-    statistics: Statistics,
+    counters: StageCounters,
 }
 
 /// A scan's time, sensor to run: `due = start + (complete - first) / rate`.
@@ -180,7 +180,7 @@ impl<S: Source> Playback<'_, S> {
         loop {
             // Sleep first: the keeper hands over its last poses one by one and wakes us when all are there. Who looks earlier
             // can take one of them for the last, and then sends more than its readers have room for.
-            if self.sleep(wake::NET)? {
+            if self.sleep(wake::MAX_WAIT)? {
                 return Ok(None);
             }
             self.credit.update()?;
@@ -205,7 +205,7 @@ impl<S: Source> Playback<'_, S> {
                 .as_mut()
                 .filter(|_| self.launch.manifest.live && !self.source.passes_by())
             {
-                self.statistics.slipped_ns += tempo.slip(complete_ns);
+                self.counters.slipped_ns += tempo.slip(complete_ns);
             }
             if !self.admit(
                 draft,
@@ -226,7 +226,7 @@ impl<S: Source> Playback<'_, S> {
         }
         if self.wait_for_turn(position.published, None)? {
             self.end(&position)?;
-            while !self.sleep(wake::NET)? {}
+            while !self.sleep(wake::MAX_WAIT)? {}
         }
         Ok(())
     }
@@ -243,14 +243,14 @@ impl<S: Source> Playback<'_, S> {
             match self.source.read(position.index, header, bytes) {
                 Ok(()) => {
                     let finished_ns = clock::now_ns();
-                    self.statistics
+                    self.counters
                         .record(allocations::so_far() - allocated, finished_ns - started_ns);
                     let stamp_ns = header.item.stamp_ns;
                     header.item = Item {
                         stamp_ns,
                         ..position.item()
                     };
-                    *header.item.hop(Stage::RadarReplay) = Hop {
+                    *header.item.hop(StageId::RadarReplay) = Hop {
                         received_ns: started_ns,
                         started_ns,
                         finished_ns,
@@ -259,7 +259,7 @@ impl<S: Source> Playback<'_, S> {
                     return Ok(Some(draft));
                 }
                 Err(reason) => {
-                    self.statistics.unreadable += 1;
+                    self.counters.unreadable += 1;
                     tracing::warn!(scan = position.index, "skipped: {reason}");
                     position.index += 1;
                 }
@@ -278,7 +278,7 @@ impl<S: Source> Playback<'_, S> {
         let turn = self.wait_for_turn(position.published, due_ns)?;
         if turn {
             draft.header().item.due_ns = due_ns.unwrap_or_else(clock::now_ns);
-            self.scans.send(draft, Stage::RadarReplay)?;
+            self.scans.send(draft, StageId::RadarReplay)?;
         }
         Ok(turn)
     }
@@ -293,7 +293,11 @@ impl<S: Source> Playback<'_, S> {
             if room && wait.is_zero() {
                 return Ok(true);
             }
-            let limit = if room { wait.min(wake::NET) } else { wake::NET };
+            let limit = if room {
+                wait.min(wake::MAX_WAIT)
+            } else {
+                wake::MAX_WAIT
+            };
             if self.sleep(limit)? {
                 return Ok(false);
             }
@@ -326,7 +330,7 @@ impl<S: Source> Playback<'_, S> {
             if wait.is_zero() || self.credit.published >= Some(sent) {
                 return Ok(true);
             }
-            if self.sleep(wait.min(wake::NET))? {
+            if self.sleep(wait.min(wake::MAX_WAIT))? {
                 return Ok(false);
             }
         }
@@ -347,7 +351,7 @@ impl<S: Source> Playback<'_, S> {
             flags: flag::END,
             ..position.item()
         };
-        self.scans.send(draft, Stage::RadarReplay)
+        self.scans.send(draft, StageId::RadarReplay)
     }
 
     /// Sleeps, and answers readers that have come; true when told to stop.
@@ -357,9 +361,9 @@ impl<S: Source> Playback<'_, S> {
             Some(self.scans.listener()),
             limit,
         )?;
-        self.statistics.wakes += 1;
-        if woken.may_have_newcomers() {
-            self.scans.greet()?;
+        self.counters.wakes += 1;
+        if woken.may_have_new_readers() {
+            self.scans.accept_readers()?;
         }
         Ok(woken.stop)
     }

@@ -1,24 +1,28 @@
-//! The loop of a stage in the middle of the stream.
+//! The loop of a stage between source and sink.
 
 use gyre_messages::{Header, Item, Message, flag};
 
 use crate::{
-    Launch, StageError, Statistics, allocations, clock,
+    Launch, StageCounters, StageError, allocations, clock,
     inputs::{Inputs, Turn},
     wake,
     writer::{Draft, Writer},
 };
 
-/// A stage: a function of its inputs. All else is this crate's business.
+/// A stage: a function of its inputs. Waiting, joining, publishing and restarting are this crate's.
 pub trait Stage {
-    /// What it waits for.
+    /// The inputs that it waits for.
     type Inputs: Inputs;
-    /// What it sends.
+    /// The message that it publishes.
     type Output: Message;
-    /// Which of the processes it is, or stands in for.
-    const HOP: gyre_messages::Stage;
+    /// Which of the processes it is, or replaces.
+    const HOP: gyre_messages::StageId;
 
-    /// Works on borrowed shared memory and writes into a loaned sample: header (but its item) and payload.
+    /// Processes one item: reads borrowed shared memory and writes header and payload of a loaned sample. The header's
+    /// item is filled in afterwards.
+    ///
+    /// # Errors
+    /// What ends the process; its exit code tells the supervisor whether a restart can help.
     fn process(
         &mut self,
         input: <Self::Inputs as Inputs>::View<'_>,
@@ -27,7 +31,7 @@ pub trait Stage {
 }
 
 /// Runs a stage until SIGTERM.
-pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<Statistics, StageError> {
+pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<StageCounters, StageError> {
     let inputs = S::Inputs::open(launch)?;
     let output = Writer::open(&launch.node, &launch.manifest)?;
     let mut flow = Flow {
@@ -36,25 +40,25 @@ pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<Statistics, Stage
         output,
         last_sent: None,
         ended: false,
-        statistics: Statistics::default(),
+        counters: StageCounters::default(),
     };
     flow.drain()?;
     loop {
         let woken = launch.signals.wait(
             &flow.inputs.listeners(),
             Some(flow.output.listener()),
-            wake::NET,
+            wake::MAX_WAIT,
         )?;
-        flow.statistics.wakes += 1;
+        flow.counters.wakes += 1;
         if woken.stop {
-            flow.statistics.duplicates = flow.inputs.duplicates();
-            return Ok(flow.statistics);
+            flow.counters.duplicates = flow.inputs.duplicates();
+            return Ok(flow.counters);
         }
-        if woken.may_have_newcomers() {
-            flow.output.greet()?;
+        if woken.may_have_new_readers() {
+            flow.output.accept_readers()?;
         }
         if flow.drain()? && woken.timed_out {
-            flow.statistics.wakes_caught_late += 1;
+            flow.counters.wakes_caught_late += 1;
         }
     }
 }
@@ -65,11 +69,11 @@ struct Flow<'a, S: Stage> {
     output: Writer<S::Output>,
     last_sent: Option<u64>,
     ended: bool,
-    statistics: Statistics,
+    counters: StageCounters,
 }
 
 impl<S: Stage> Flow<'_, S> {
-    /// Does all that can be done now; returns whether that was anything.
+    /// Processes all that has come; returns whether there was anything.
     fn drain(&mut self) -> Result<bool, StageError> {
         let mut progressed = false;
         while !self.ended {
@@ -86,7 +90,7 @@ impl<S: Stage> Flow<'_, S> {
     }
 
     fn process(&mut self, mut item: Item, received_ns: i64) -> Result<(), StageError> {
-        self.promise(&item)?;
+        self.require_next(&item)?;
         let mut draft = self.output.loan()?;
         let Some(view) = self.inputs.view() else {
             return Ok(());
@@ -101,12 +105,12 @@ impl<S: Stage> Flow<'_, S> {
             published_ns: 0,
         };
         *draft.header().item_mut() = item;
-        self.statistics.record(allocated, finished_ns - started_ns);
+        self.counters.record(allocated, finished_ns - started_ns);
         self.send(item.seq, draft)
     }
 
     fn end(&mut self, item: Item) -> Result<(), StageError> {
-        self.promise(&item)?;
+        self.require_next(&item)?;
         self.ended = true;
         let mut draft = self.output.loan()?;
         *draft.header().item_mut() = Item {
@@ -122,10 +126,10 @@ impl<S: Stage> Flow<'_, S> {
         Ok(())
     }
 
-    /// What a stage sends is consecutive: a hole in its history would kill each reader that is restarted on it.
-    fn promise(&self, item: &Item) -> Result<(), StageError> {
+    /// Requires that the output is consecutive: a gap in its history would end each reader that is restarted on it.
+    fn require_next(&self, item: &Item) -> Result<(), StageError> {
         match self.last_sent.map(|last| last.saturating_add(1)) {
-            Some(expected) if item.seq != expected => Err(StageError::BrokenPromise {
+            Some(expected) if item.seq != expected => Err(StageError::SequenceGap {
                 topic: S::Output::TOPIC,
                 expected,
                 got: item.seq,

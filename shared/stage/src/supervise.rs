@@ -1,7 +1,7 @@
 //! Starts the processes of a run, repairs the run when one dies, and leaves nothing behind.
 //!
-//! On a death only the dead stage is cleaned up after and started again: start means resume. When that does not help (it dies
-//! again before a new pose, no pose comes at all, or live masking dies, which alone knows what it admitted) all are started again.
+//! After a death only the dead stage is cleaned up after and restarted: a start resumes. Where that does not help (it dies
+//! again before a new pose, no pose comes at all, or its plan says so) all are restarted.
 
 mod child;
 mod clean;
@@ -13,14 +13,13 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Header, Pose, PoseHeader, flag};
+use gyre_messages::{Header, Pose, PoseHeader, StageId, flag};
 use iceoryx2::prelude::{Config, FilePath, SemanticString};
 
 use crate::{
-    StageError, Statistics, clock,
+    StageCounters, StageError, clock, counters,
     reader::Port,
     services::{self, Node, Services},
-    statistics,
     wake::{self, Signals},
 };
 use child::Child;
@@ -29,7 +28,7 @@ pub use child::Death;
 pub use plan::{Ending, Event, Plan, Report, RestartPolicy, StagePlan, SuperviseError};
 
 /// Time that stages have to end by themselves before they are killed.
-const PATIENCE: Duration = Duration::from_secs(2);
+const STOP_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Runs all stages of `plan` until the stream ends, one of `signals` asks to stop, or nothing helps any more.
 ///
@@ -49,7 +48,7 @@ pub fn supervise(
         ending: ending?,
         restarts,
         recovery,
-        statistics: statistics(plan),
+        counters: counters(plan),
     })
 }
 
@@ -73,7 +72,7 @@ struct Supervisor<'a> {
 }
 
 struct Recovering {
-    hop: gyre_messages::Stage,
+    hop: StageId,
     died_ns: i64,
     started_ns: i64,
 }
@@ -89,7 +88,7 @@ impl<'a> Supervisor<'a> {
         use_as_global(&manifest.root.join("iox.toml"))?;
         let node = services::node(&transport, "supervisor")?;
         let services = Services::create(&node, &manifest.window)?;
-        let poses = Port::open(&node)?;
+        let poses = Port::on(&node)?;
         Ok(Self {
             plan,
             observe,
@@ -125,7 +124,7 @@ impl<'a> Supervisor<'a> {
         loop {
             let woken = self
                 .signals
-                .wait(&[self.poses.listener()], None, wake::NET)?;
+                .wait(&[self.poses.listener()], None, wake::MAX_WAIT)?;
             if woken.stop {
                 return Ok(Ending::Interrupted);
             }
@@ -181,8 +180,7 @@ impl<'a> Supervisor<'a> {
             });
             child.may_restart(&death)?;
             everybody |= child.died_without_progress(self.newest_pose);
-            everybody |=
-                self.plan.manifest.live && child.name() == gyre_messages::Stage::Masking.name();
+            everybody |= child.plan().restarts_all;
             if !death.killed {
                 backoff = backoff.max(child.backoff());
             }
@@ -201,12 +199,9 @@ impl<'a> Supervisor<'a> {
         Ok(())
     }
 
-    /// Everybody, but a live source that lives: the radar goes on turning.
+    /// All stages, but those that live and outlive restarts.
     fn generation(&self, dead: &[usize]) -> Vec<usize> {
-        let source = gyre_messages::Stage::RadarReplay.name();
-        let stays = |i: &usize| {
-            self.plan.manifest.live && self.children[*i].name() == source && !dead.contains(i)
-        };
+        let stays = |i: &usize| self.children[*i].plan().outlives_restarts && !dead.contains(i);
         (0..self.children.len()).filter(|i| !stays(i)).collect()
     }
 
@@ -219,9 +214,7 @@ impl<'a> Supervisor<'a> {
         for i in again {
             let child = &mut self.children[*i];
             child.respawn(&self.plan.manifest, self.newest_pose)?;
-            let hop = gyre_messages::Stage::ALL
-                .into_iter()
-                .find(|stage| stage.name() == child.name());
+            let hop = StageId::by_name(child.name());
             self.recovering.extend(hop.map(|hop| Recovering {
                 hop,
                 died_ns,
@@ -247,9 +240,9 @@ impl<'a> Supervisor<'a> {
     /// Asks all to end, and ends those that do not.
     fn stop(&mut self) -> Result<(), SuperviseError> {
         self.children.iter().for_each(Child::ask_to_end);
-        let patience = Instant::now() + PATIENCE;
+        let patience = Instant::now() + STOP_TIMEOUT;
         while Instant::now() < patience && !self.children.iter_mut().all(Child::has_ended) {
-            self.signals.wait(&[], None, wake::NET)?;
+            self.signals.wait(&[], None, wake::MAX_WAIT)?;
         }
         self.children.iter_mut().for_each(Child::kill);
         Ok(())
@@ -287,10 +280,10 @@ fn use_as_global(path: &std::path::Path) -> Result<(), StageError> {
 }
 
 /// What the stages left of themselves at their orderly ends, by name.
-fn statistics(plan: &Plan) -> BTreeMap<String, Statistics> {
+fn counters(plan: &Plan) -> BTreeMap<String, StageCounters> {
     let left = |stage: &StagePlan| {
         let text =
-            fs::read_to_string(plan.manifest.root.join(statistics::file_name(&stage.name))).ok()?;
+            fs::read_to_string(plan.manifest.root.join(counters::file_name(&stage.name))).ok()?;
         Some((stage.name.clone(), serde_json::from_str(&text).ok()?))
     };
     plan.stages.iter().filter_map(left).collect()

@@ -2,12 +2,11 @@
 
 #![allow(clippy::unwrap_used)]
 
-mod feedback;
 mod hand_over;
 mod wake_up;
 mod zero_copy;
 
-use gyre_messages::{Item, Limits, Message, Pose, Stage, Window};
+use gyre_messages::{Item, Limits, Message, Pose, StageId, Window};
 use tempfile::TempDir;
 
 use crate::{
@@ -76,7 +75,7 @@ fn writer<M: Message>(manifest: &Manifest) -> Writer<M> {
 }
 
 fn reader<M: Message>(manifest: &Manifest, next: Option<u64>) -> Reader<M> {
-    Reader::open(&node(manifest), next).unwrap()
+    Reader::on(&node(manifest), next).unwrap()
 }
 
 /// A pose is the smallest message.
@@ -87,5 +86,5 @@ fn send(poses: &Writer<Pose>, seq: u64, flags: u32) {
         flags,
         ..Item::default()
     };
-    poses.send(draft, Stage::PoseIntegration).unwrap();
+    poses.send(draft, StageId::PoseIntegration).unwrap();
 }

@@ -23,7 +23,7 @@ use signal_hook::{consts, low_level::pipe};
 use crate::{StageError, services::Listener};
 
 /// The longest sleep.
-pub const NET: Duration = Duration::from_millis(200);
+pub const MAX_WAIT: Duration = Duration::from_millis(200);
 
 /// Signals turned into something to wait for.
 #[derive(Debug)]
@@ -41,16 +41,16 @@ pub struct Woken {
     pub stop: bool,
     /// A child process has ended.
     pub child: bool,
-    /// A reader has greeted.
-    pub hello: bool,
+    /// A reader has opened the topic.
+    pub handshake: bool,
     /// Nothing came: the limit was reached.
     pub timed_out: bool,
 }
 
 impl Woken {
-    /// Whether readers may have come: one has greeted, or its greeting may have been lost.
-    pub fn may_have_newcomers(&self) -> bool {
-        self.hello || self.timed_out
+    /// Whether readers may have come: one has notified us, or its notification may have been lost.
+    pub fn may_have_new_readers(&self) -> bool {
+        self.handshake || self.timed_out
     }
 }
 
@@ -76,16 +76,16 @@ impl Signals {
     }
 
     /// Sleeps until one of the listeners is notified, a signal comes or `limit` is over, whichever is first.
-    /// The notifications of `data` are consumed: look at all queues afterwards. A notification of `hello` is left for
-    /// [`Writer::greet`](crate::writer::Writer::greet), to be called when [`Woken::may_have_newcomers`] says so.
+    /// The notifications of `data` are consumed: look at all queues afterwards. A notification of `handshake` is left for
+    /// [`Writer::accept_readers`](crate::writer::Writer::accept_readers), to be called when [`Woken::may_have_new_readers`] says so.
     pub(crate) fn wait(
         &self,
         data: &[&Listener],
-        hello: Option<&Listener>,
+        handshake: Option<&Listener>,
         limit: Duration,
     ) -> Result<Woken, StageError> {
         let mut polled = vec![self.stop.as_fd(), self.child.as_fd()];
-        polled.extend(data.iter().copied().chain(hello).map(descriptor));
+        polled.extend(data.iter().copied().chain(handshake).map(descriptor));
         let mut polled: Vec<_> = polled
             .into_iter()
             .map(|fd| PollFd::from_borrowed_fd(fd, PollFlags::IN))
@@ -114,7 +114,7 @@ impl Signals {
         Ok(Woken {
             stop: self.stopped.get(),
             child,
-            hello: next(),
+            handshake: next(),
             timed_out,
         })
     }

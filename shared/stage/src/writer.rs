@@ -1,6 +1,6 @@
 //! The publishing end of a topic.
 
-use gyre_messages::{Header, Message};
+use gyre_messages::{Header, Message, StageId};
 use iceoryx2::{
     port::{publisher::Publisher, update_connections::UpdateConnections},
     prelude::BackpressureStrategy,
@@ -12,9 +12,9 @@ use crate::{
     services::{self, Ipc, Listener, Node, Notifier},
 };
 
-/// Publishes a topic's messages. What it sent last is kept for readers that come later, see [`Writer::greet`].
+/// Publishes a topic's messages. What it sent last is kept for readers that come later, see [`Writer::accept_readers`].
 pub struct Writer<M: Message> {
-    hello: Listener,
+    handshake: Listener,
     data: Notifier,
     publisher: Publisher<Ipc, [M::Element], M::Header>,
     elements: usize,
@@ -28,27 +28,27 @@ pub struct Draft<M: Message> {
 impl<M: Message> Writer<M> {
     /// Opens the topic for publishing.
     pub(crate) fn open(node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
-        let hello = services::listener(node, &services::hello_event(M::TOPIC))?;
+        let handshake = services::listener(node, &services::handshake_event(M::TOPIC))?;
         let data = services::notifier(node, &services::data_event(M::TOPIC))?;
-        let elements = manifest.limits.elements(M::TOPIC);
+        let elements = M::max_elements(&manifest.limits);
         // Last, for a publisher connects at once to all readers there are.
         let publisher = services::open_topic::<M>(node)?
             .publisher_builder()
             .initial_max_slice_len(elements)
-            .max_loaned_samples(manifest.window.sizes(M::TOPIC).loaned)
-            // Never wait for a slow or dead reader: the window bounds what is on its way.
+            .max_loaned_samples(M::sizes(&manifest.window).loaned)
+            // Never wait for a slow or dead reader: the window bounds what is in flight.
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
             .map_err(|e| StageError::transport(format!("publish {}", M::TOPIC), e))?;
         Ok(Self {
-            hello,
+            handshake,
             data,
             publisher,
             elements,
         })
     }
 
-    /// A message to fill: its header is the default, its payload is whatever lies in the memory.
+    /// Lends a message to fill: its header is the default, its payload is whatever the memory holds.
     pub fn loan(&self) -> Result<Draft<M>, StageError> {
         let sample = self
             .publisher
@@ -60,8 +60,8 @@ impl<M: Message> Writer<M> {
         })
     }
 
-    /// Hands a message over. The transport copies nothing: readers get its place.
-    pub fn send(&self, mut draft: Draft<M>, hop: gyre_messages::Stage) -> Result<(), StageError> {
+    /// Publishes a message. The transport copies nothing: readers get its place in shared memory.
+    pub fn send(&self, mut draft: Draft<M>, hop: StageId) -> Result<(), StageError> {
         let item = draft.header().item_mut();
         item.pid = std::process::id();
         item.hop(hop).published_ns = clock::now_ns();
@@ -74,22 +74,23 @@ impl<M: Message> Writer<M> {
 
     /// Hands the history to readers that have come since the last call, and wakes them.
     ///
-    /// Without a newcomer nobody is woken: who is woken greets, so greetings would go around for ever.
-    pub fn greet(&self) -> Result<(), StageError> {
-        let mut newcomer = false;
-        self.hello
-            .try_wait(|_| newcomer = true)
+    /// Readers are woken only where a new one has come: readers that are woken answer handshakes of their own topics, so
+    /// wake-ups would circulate for ever.
+    pub fn accept_readers(&self) -> Result<(), StageError> {
+        let mut new_reader = false;
+        self.handshake
+            .try_wait(|_| new_reader = true)
             .map_err(|e| StageError::transport(format!("hear the readers of {}", M::TOPIC), e))?;
-        // In any case, for a greeting can be lost; its reader then finds the history when its own wait is over.
+        // In any case: a handshake can be lost, and its reader then finds the history when its own wait ends.
         self.publisher.update_connections().map_err(|e| {
             StageError::transport(format!("connect the readers of {}", M::TOPIC), e)
         })?;
-        if newcomer { self.notify() } else { Ok(()) }
+        if new_reader { self.notify() } else { Ok(()) }
     }
 
-    /// What new readers greet with.
+    /// What new readers notify.
     pub(crate) fn listener(&self) -> &Listener {
-        &self.hello
+        &self.handshake
     }
 
     fn notify(&self) -> Result<(), StageError> {

@@ -2,34 +2,30 @@
 
 use std::{hint::black_box, time::Instant};
 
-use gyre_geometry::SparsePoint;
-use gyre_masking::{MaskKind, Masker, MaskingConfig, Sweep};
-use gyre_messages::{MaskedHeader, MotionEstimate, Pair};
+use gyre::{Failure, configuration::Configuration};
+use gyre_masking::{MaskKind, network::Network};
+use gyre_odometry::{Odometry, SearchKind};
 use gyre_radar::OwnedScan;
-use gyre_scan_matching::{ConfigError, RefinementKind, Refiner as Matcher};
+use ndarray::Array3;
 
-use super::{Median, learned::Learned};
+use super::Median;
 use crate::{models::Model, sequence::Sequence, tables::rows::Row};
-use gyre::{
-    Failure,
-    configuration::{Configuration, SearchKind},
-    search::{Search, search},
-};
 
 /// Untimed passes before each half.
 const BURN_IN: usize = 5;
 
-/// What a row does with a pair of scans, in the order in which it does it, and how long that took.
+/// What a row does with a pair of scans after rasterising: the network's masks, the search, the refinement.
 pub struct Timer {
     /// The network that masks.
     pub model: Option<Model>,
     cell_m: f32,
     angles: Option<usize>,
-    learned: Option<Learned>,
-    search: Option<Search>,
-    refiner: Option<Refiner>,
-    rasters: Vec<Vec<f32>>,
-    seq: u64,
+    odometry: Odometry,
+    /// A network and rasters to mask: scans x n x n.
+    network: Option<(Network, Array3<f32>)>,
+    searches: bool,
+    scans: Vec<OwnedScan>,
+    next: usize,
     halves_ms: [Vec<f64>; 2],
 }
 
@@ -59,21 +55,25 @@ impl Timer {
         searches: bool,
         scans: &[OwnedScan],
     ) -> Result<Self, Failure> {
-        let Prepared { rasters, points } = prepare(configuration, scans)?;
-        let learned = Learned::load(configuration)?;
-        let looks_at = learned.as_ref().map_or(1, Learned::scans);
-        let exhaustive = configuration.search.kind == SearchKind::Exhaustive && learned.is_none();
+        let (raster, masking) = (&configuration.raster, &configuration.masking);
+        let network = match masking.kind {
+            MaskKind::Learned => {
+                let network = Network::load(masking, raster)?;
+                let rasters = Array3::zeros((network.scans(), raster.n, raster.n));
+                Some((network, rasters))
+            }
+            _ => None,
+        };
+        let exhaustive = configuration.search.kind == SearchKind::Exhaustive && network.is_none();
         Ok(Self {
             model: None,
-            cell_m: configuration.raster.cell_m,
+            cell_m: raster.cell_m,
             angles: exhaustive.then(|| configuration.exhaustive.candidates()),
-            learned,
-            search: searches
-                .then(|| search(configuration, looks_at))
-                .transpose()?,
-            refiner: Refiner::new(configuration, points, scans)?,
-            rasters,
-            seq: 0,
+            odometry: Odometry::new(&configuration.odometry())?,
+            network,
+            searches,
+            scans: scans.to_vec(),
+            next: 0,
             halves_ms: [Vec::new(), Vec::new()],
         })
     }
@@ -91,145 +91,44 @@ impl Timer {
 
     /// Masks, searches and refines the next pair, as far as the row does; the time it took, ms.
     fn pass(&mut self) -> Result<f64, Failure> {
-        self.seq += 1;
-        let scan = |seq: u64| seq as usize % self.rasters.len();
-        let (later, earlier) = (scan(self.seq), scan(self.seq - 1));
-        let rasters = [later, earlier].map(|scan| self.rasters[scan].as_slice());
-        if let Some(learned) = &mut self.learned {
-            learned.take(rasters);
+        if self.next == self.scans.len() {
+            // Nobody drove from the last scan to the first.
+            self.next = 0;
+            self.odometry.restart();
+        }
+        if self.next == 0 {
+            self.odometry
+                .register_compensated(&self.scans[0].view(), None)?;
+            self.next = 1;
+        }
+        self.odometry.mask(&self.scans[self.next].view(), None)?;
+        if let Some((_, rasters)) = &mut self.network {
+            rasters.assign(&self.odometry.masked_mut());
         }
         let start = Instant::now();
-        let pair = match &mut self.learned {
-            Some(learned) => learned.mask()?,
-            None => Pair {
-                later: rasters[0],
-                earlier: Some(rasters[1]),
-            },
-        };
-        if let Some(search) = &mut self.search {
-            let motion = black_box(search(self.seq, black_box(pair))?);
-            if let Some(refiner) = &mut self.refiner {
-                refiner.next(self.seq, later, &motion);
-            }
+        if let Some((network, rasters)) = &mut self.network {
+            black_box(network.run(rasters.view())?);
         }
-        Ok(start.elapsed().as_secs_f64() * 1e3)
+        let found = match self.searches {
+            true => black_box(self.odometry.search()?),
+            false => None,
+        };
+        let refined = found.as_ref().and_then(|found| self.odometry.refine(found));
+        let time_ms = start.elapsed().as_secs_f64() * 1e3;
+        self.odometry.integrate(found, black_box(refined));
+        self.next += 1;
+        Ok(time_ms)
     }
 
+    /// The medians of all passes and of each half.
     pub fn median(self) -> Median {
-        let halves_ms = [0, 1].map(|half| median(self.halves_ms[half].clone()));
+        let median = |times: Vec<f64>| gyre_radar::median(times).unwrap_or(0.0);
+        let halves_ms = self.halves_ms.clone().map(median);
         Median {
             cell_m: self.cell_m,
             angles: self.angles,
             ms: median(self.halves_ms.concat()),
             halves_ms,
         }
-    }
-}
-
-/// What a row's passes work on, scan by scan.
-struct Prepared {
-    /// Before any network.
-    rasters: Vec<Vec<f32>>,
-    /// As masking makes them.
-    points: Vec<Vec<SparsePoint>>,
-}
-
-fn prepare(configuration: &Configuration, scans: &[OwnedScan]) -> Result<Prepared, Failure> {
-    let (raster, masking) = (&configuration.raster, &configuration.masking);
-    let kind = if masking.kind == MaskKind::Learned {
-        MaskKind::Threshold
-    } else {
-        masking.kind
-    };
-    let masker = |masking: &MaskingConfig| Masker::new(raster, &configuration.points, masking);
-    let (mut masker, mut plain) = (
-        masker(masking)?,
-        masker(&MaskingConfig {
-            kind,
-            ..masking.clone()
-        })?,
-    );
-    let cells = raster.n * raster.n;
-    let mut masked = vec![0.0; masker.rasters() * MaskedHeader::raster_values(cells)];
-    let mut rasters = vec![vec![0.0; cells]; scans.len()];
-    let mut points = vec![vec![SparsePoint::default(); configuration.points.capacity]; scans.len()];
-    let sweep = |number: usize| Sweep {
-        number: number as u64,
-        scan: scans[number].view(),
-        motion: None,
-    };
-    for (number, (raster, points)) in rasters.iter_mut().zip(&mut points).enumerate() {
-        let before = number.checked_sub(1).map(sweep);
-        let twist = masker.mask(&sweep(number), before.as_ref(), &mut masked)?;
-        let found = masker.points(&scans[number].view(), twist, points)?;
-        points.truncate(found);
-        plain.mask(&sweep(number), None, raster)?;
-    }
-    Ok(Prepared { rasters, points })
-}
-
-/// The refinement of a configuration, with the points and the times of the scans.
-struct Refiner {
-    refinement: Matcher,
-    points: Vec<Vec<SparsePoint>>,
-    stamps_ns: Vec<i64>,
-}
-
-impl Refiner {
-    /// `None` where the configuration refines nothing.
-    fn new(
-        configuration: &Configuration,
-        points: Vec<Vec<SparsePoint>>,
-        scans: &[OwnedScan],
-    ) -> Result<Option<Self>, ConfigError> {
-        if configuration.refinement.kind == RefinementKind::None {
-            return Ok(None);
-        }
-        let refinement = Matcher::new(&configuration.refinement, configuration.points.capacity)?;
-        let stamps_ns = scans.iter().map(|scan| scan.geometry.stamp_ns).collect();
-        Ok(Some(Self {
-            refinement,
-            points,
-            stamps_ns,
-        }))
-    }
-
-    /// Refines the motion from scan `later - 1` to scan `later`. Nobody drove from the last scan to the first: a chain starts
-    /// there.
-    fn next(&mut self, seq: u64, later: usize, motion: &MotionEstimate) {
-        let Some(earlier) = later.checked_sub(1) else {
-            return self.refinement.reset();
-        };
-        let interval_ns = self.stamps_ns[later].saturating_sub(self.stamps_ns[earlier]);
-        let motion = MotionEstimate {
-            interval_ns,
-            ..*motion
-        };
-        let (later, earlier) = (&self.points[later], &self.points[earlier]);
-        black_box(gyre_refinement::refine(
-            &mut self.refinement,
-            seq,
-            later,
-            earlier,
-            &motion,
-        ));
-    }
-}
-
-/// The upper median; 0 of nothing.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_median_is_the_one_in_the_middle() {
-        assert_eq!(median(vec![9.0, 1.0, 2.0]), 2.0);
-        assert_eq!(median(vec![4.0, 1.0]), 4.0);
-        assert_eq!(median(Vec::new()), 0.0);
     }
 }

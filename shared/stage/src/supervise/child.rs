@@ -67,6 +67,10 @@ impl Child {
         Ok(())
     }
 
+    pub(super) fn plan(&self) -> &StagePlan {
+        &self.plan
+    }
+
     pub(super) fn name(&self) -> &str {
         &self.plan.name
     }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::child::Death;
-use crate::{Manifest, StageError, Statistics};
+use crate::{Manifest, StageCounters, StageError};
 
 /// A run.
 #[derive(Debug)]
@@ -29,6 +29,10 @@ pub struct StagePlan {
     pub command: Vec<String>,
     /// What to do when it dies.
     pub restart: RestartPolicy,
+    /// It goes on when the others are restarted: a live source, since a radar does not wait.
+    pub outlives_restarts: bool,
+    /// Its death restarts the others too: it owns state that a restart alone does not bring back.
+    pub restarts_all: bool,
 }
 
 /// When to give up on a stage: after `limit` restarts within `window_s`.
@@ -101,7 +105,7 @@ pub struct Report {
     /// From each death to the first pose that the new process worked on.
     pub recovery: Vec<Duration>,
     /// What each stage counted in its last life.
-    pub statistics: BTreeMap<String, Statistics>,
+    pub counters: BTreeMap<String, StageCounters>,
 }
 
 /// Why a run could not go on.

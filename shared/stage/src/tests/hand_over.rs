@@ -19,14 +19,14 @@ fn take_all(reader: &mut Reader<Pose>) -> Vec<u64> {
 fn a_late_reader_first_gets_the_history_in_order_and_each_item_once() {
     let run = Run::new();
     let poses = writer::<Pose>(&run.manifest);
-    let history = WINDOW.sizes(Pose::TOPIC).history as u64;
+    let history = Pose::sizes(&WINDOW).history as u64;
     (0..history + 3).for_each(|seq| send(&poses, seq, 0));
     let mut late = reader(&run.manifest, None);
     assert!(
         take_all(&mut late).is_empty(),
         "a newcomer is answered when the publisher next looks"
     );
-    poses.greet().unwrap();
+    poses.accept_readers().unwrap();
     (history + 3..history + 5).for_each(|seq| send(&poses, seq, 0));
     assert_eq!(take_all(&mut late), (3..history + 5).collect::<Vec<_>>());
 }
@@ -42,7 +42,7 @@ fn items_that_were_had_are_skipped_and_counted() {
 }
 
 #[test]
-fn a_missing_item_breaks_the_promise() {
+fn a_missing_item_is_an_error() {
     let run = Run::new();
     let mut reader = reader::<Pose>(&run.manifest, None);
     let poses = writer::<Pose>(&run.manifest);
@@ -54,7 +54,7 @@ fn a_missing_item_breaks_the_promise() {
     let error = reader.head().map(|head| head.map(|head| head.item().seq));
     assert!(matches!(
         error,
-        Err(StageError::BrokenPromise {
+        Err(StageError::SequenceGap {
             topic: "pose",
             expected: 6,
             got: 7

@@ -55,9 +55,9 @@ fn a_greeting_is_answered_once() {
         newcomer.listener().try_wait(|_| times += 1).unwrap();
         times
     };
-    poses.greet().unwrap();
+    poses.accept_readers().unwrap();
     assert_eq!(woken(), 1);
     // Who is woken greets: if that woke others, greetings would go around the processes for ever.
-    poses.greet().unwrap();
+    poses.accept_readers().unwrap();
     assert_eq!(woken(), 0);
 }

@@ -6,7 +6,7 @@ use std::{
     process::{Child, Command, Stdio},
 };
 
-use gyre_messages::{Item, Masked, Stage};
+use gyre_messages::{Item, Masked, StageId};
 
 use super::{Run, reader, writer};
 use crate::{Manifest, run, wake::Signals};
@@ -62,7 +62,7 @@ fn publisher() {
         .enumerate()
         .for_each(|(cell, v)| *v = value(cell));
     let place = place_of(cells);
-    masked.send(draft, Stage::Masking).unwrap();
+    masked.send(draft, StageId::Masking).unwrap();
     println!(
         "\nWROTE {} {} {} {}",
         place.inode, place.offset, place.path, place.rights

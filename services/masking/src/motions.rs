@@ -1,0 +1,150 @@
+//! The motions for motion compensation: by number, never by time.
+//!
+//! A motion comes twice: from the search as soon as it is found, and with its pose once that is journalled. The first one
+//! is taken, so both must be the same, and a refined motion is not the searched one. So only the motion as searched is used,
+//! which refinement passes on unchanged. After a restart the motions before the last pose come from the journal; those after
+//! it come from the search, which finds them again.
+
+use std::collections::VecDeque;
+
+use gyre_messages::{Item, Motion, Pose, SearchedMotion, flag};
+use gyre_stage::{Launch, Listener, StageError, reader::Port};
+
+/// Motions kept: more than any window and lag need.
+const KEPT: usize = 256;
+
+/// The motions found so far, and the trajectory's newest pose.
+pub struct Motions {
+    motions: Port<Motion>,
+    poses: Port<Pose>,
+    known: KnownMotions,
+    sync: Option<Item>,
+    newest_pose: Option<u64>,
+}
+
+impl Motions {
+    pub fn open(launch: &Launch) -> Result<Self, StageError> {
+        Ok(Self {
+            motions: Port::open(launch)?,
+            poses: Port::open(launch)?,
+            known: KnownMotions::default(),
+            sync: None,
+            newest_pose: None,
+        })
+    }
+
+    /// Takes all that has come.
+    pub fn update(&mut self) -> Result<(), StageError> {
+        while let Some(received) = self.motions.receive()? {
+            self.known
+                .insert(received.item(), received.header().motion.searched());
+        }
+        while let Some(received) = self.poses.receive()? {
+            let item = *received.item();
+            if item.is(flag::END) {
+                continue;
+            }
+            if !item.is(flag::BASE) {
+                self.known
+                    .insert(&item, received.header().motion.searched());
+                self.newest_pose = self.newest_pose.max(Some(item.seq));
+            }
+            if item.is(flag::SYNC) {
+                self.sync = Some(item);
+            }
+        }
+        Ok(())
+    }
+
+    /// The motion of item `seq`: `None` while it is unknown, `Some(None)` where the chain starts.
+    pub fn of(&self, seq: u64) -> Option<Option<SearchedMotion>> {
+        self.known.of(seq)
+    }
+
+    /// The item of the trajectory's newest pose when it was last reported: `None` until then.
+    pub fn sync(&self) -> Option<&Item> {
+        self.sync.as_ref()
+    }
+
+    /// The number of the newest pose; `None` before the first.
+    pub fn newest_pose(&self) -> Option<u64> {
+        self.newest_pose
+    }
+
+    pub fn listeners(&self) -> [&Listener; 2] {
+        [self.motions.listener(), self.poses.listener()]
+    }
+}
+
+/// Motions by number, in order; the oldest are dropped.
+#[derive(Default)]
+struct KnownMotions(VecDeque<(u64, Option<SearchedMotion>)>);
+
+impl KnownMotions {
+    fn insert(&mut self, item: &Item, motion: SearchedMotion) {
+        if item.is(flag::END) || self.of(item.seq).is_some() {
+            return;
+        }
+        // Where the chain starts there is no motion.
+        let motion = (!item.is(flag::BREAK)).then_some(motion);
+        let place = self.0.partition_point(|(seq, _)| *seq < item.seq);
+        self.0.insert(place, (item.seq, motion));
+        if self.0.len() > KEPT {
+            self.0.pop_front();
+        }
+    }
+
+    fn of(&self, seq: u64) -> Option<Option<SearchedMotion>> {
+        let known = self.0.iter().rev().find(|(known, _)| *known == seq);
+        known.map(|(_, motion)| *motion)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gyre_messages::MotionEstimate;
+
+    use super::*;
+
+    /// A motion that was searched as 1.5 m ahead, and then refined to `x_m`.
+    fn refined_to(x_m: f64) -> MotionEstimate {
+        MotionEstimate {
+            x_m,
+            searched: [1.5, -0.25, 0.125],
+            interval_ns: 250_000_000,
+            ..MotionEstimate::default()
+        }
+    }
+
+    fn item(seq: u64, flags: u32) -> Item {
+        Item {
+            seq,
+            flags,
+            ..Item::default()
+        }
+    }
+
+    #[test]
+    fn a_motion_is_the_searched_one_whether_it_comes_at_once_or_refined_with_its_pose() {
+        let searched = refined_to(1.5).searched();
+        for order in [[1.5, 1.75], [1.75, 1.5]] {
+            let mut known = KnownMotions::default();
+            for x_m in order {
+                known.insert(&item(7, 0), refined_to(x_m).searched());
+            }
+            assert_eq!(known.of(7), Some(Some(searched)));
+            assert_eq!(known.of(8), None);
+        }
+    }
+
+    #[test]
+    fn where_the_chain_starts_there_is_no_motion_and_the_oldest_are_dropped() {
+        let mut known = KnownMotions::default();
+        for seq in 0..KEPT as u64 + 3 {
+            let flags = if seq == 5 { flag::BREAK } else { 0 };
+            known.insert(&item(seq, flags), refined_to(1.5).searched());
+        }
+        assert_eq!((known.of(2), known.of(5)), (None, Some(None)));
+        assert_eq!(known.0.len(), KEPT);
+    }
+}

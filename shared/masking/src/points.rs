@@ -1,0 +1,279 @@
+//! The mask's factors on sparse points.
+
+use gyre_geometry::{Pose, SparsePoint, Twist};
+use nalgebra::Point2;
+use ndarray::ArrayView2;
+
+/// How a scan's raster was made, as far as it says where a point lies in it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RasterFrame {
+    /// Cells a side.
+    pub n: usize,
+    /// Metres a cell.
+    pub cell_m: f32,
+    /// The velocity of motion compensation.
+    pub twist: Option<Twist>,
+    /// Whether the Doppler shift was compensated with it.
+    pub doppler_compensated: bool,
+}
+
+impl RasterFrame {
+    /// Multiplies each point's weight by the mask's factor at the point's cell, raised to `exponent`. A point outside of the
+    /// raster keeps its weight.
+    pub fn weigh(&self, mask: ArrayView2<'_, f32>, exponent: f32, points: &mut [SparsePoint]) {
+        // The points of an azimuth have one time.
+        for points in points.chunk_by_mut(|a, b| a.time_s == b.time_s) {
+            let sensor = self.sensor_at(&points[0]);
+            for point in points {
+                let factor = self
+                    .cell_seen_from(sensor, point)
+                    .map(|cell| mask[cell].powf(exponent));
+                point.weight *= factor.unwrap_or(1.0);
+            }
+        }
+    }
+
+    /// The cell (row, column) that a point lies in; `None` outside of the raster.
+    pub fn cell_of(&self, point: &SparsePoint) -> Option<[usize; 2]> {
+        self.cell_seen_from(self.sensor_at(point), point)
+    }
+
+    /// The sensor in the raster's frame at the time of the point's azimuth.
+    fn sensor_at(&self, point: &SparsePoint) -> Option<Pose> {
+        self.twist.map(|twist| twist.pose_at(point.time_s.into()))
+    }
+
+    fn cell_seen_from(&self, sensor: Option<Pose>, point: &SparsePoint) -> Option<[usize; 2]> {
+        let seen = Point2::new(f64::from(point.x_m), f64::from(point.y_m));
+        let place = self.without_doppler(seen, point.doppler_s.into());
+        self.cell(sensor.map_or(place, |sensor| sensor * place))
+    }
+
+    /// The place of a point without its Doppler shift, if the raster is without it: see [`SparsePoint`].
+    fn without_doppler(&self, seen: Point2<f64>, doppler_s: f64) -> Point2<f64> {
+        match self.twist.filter(|_| self.doppler_compensated) {
+            Some(twist) => {
+                let range_m = seen.coords.norm().max(f64::MIN_POSITIVE);
+                let approach_mps = (twist.vx_mps * seen.x + twist.vy_mps * seen.y) / range_m;
+                seen + seen.coords * (doppler_s * approach_mps / range_m)
+            }
+            None => seen,
+        }
+    }
+
+    /// The cell (row, column) nearest to a place in the raster's frame.
+    fn cell(&self, place: Point2<f64>) -> Option<[usize; 2]> {
+        let index = |metres: f64| {
+            let index = (0.5 * (self.n as f64 - 1.0) - metres / f64::from(self.cell_m)).round();
+            (0.0..self.n as f64)
+                .contains(&index)
+                .then_some(index as usize)
+        };
+        Some([index(place.x)?, index(place.y)?])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use gyre_radar::{
+        OwnedScan, PointExtractor, PointsConfig, RasterConfig, ScanLimits, Sense, SweepGeometry,
+        raster::Rasteriser, scan::flag,
+    };
+    use ndarray::Array2;
+
+    const FRAME: RasterFrame = RasterFrame {
+        n: 5,
+        cell_m: 2.0,
+        twist: None,
+        doppler_compensated: false,
+    };
+
+    /// Factors of a point's weight when cell (row, column) alone has the mask 0.5, and all others 1.
+    fn factor(
+        frame: RasterFrame,
+        (row, column): (usize, usize),
+        [x_m, y_m, time_s, doppler_s]: [f32; 4],
+    ) -> f32 {
+        let mut mask = Array2::ones((5, 5));
+        mask[[row, column]] = 0.5;
+        let mut points = [SparsePoint {
+            x_m,
+            y_m,
+            time_s,
+            weight: 1.0,
+            doppler_s,
+        }];
+        frame.weigh(mask.view(), 1.0, &mut points);
+        points[0].weight
+    }
+
+    #[test]
+    fn a_point_has_the_mask_of_the_cell_that_it_lies_in() {
+        assert_eq!(factor(FRAME, (0, 2), [4.9, 0.9, 0.0, 0.0]), 0.5);
+        assert_eq!(factor(FRAME, (2, 0), [-0.9, 3.1, 0.0, 0.0]), 0.5);
+        assert_eq!(factor(FRAME, (2, 0), [-1.1, 3.1, 0.0, 0.0]), 1.0);
+    }
+
+    #[test]
+    fn a_point_outside_of_the_raster_keeps_its_weight() {
+        for place in [
+            [5.1, 0.0],
+            [-5.1, 0.0],
+            [0.0, 5.1],
+            [0.0, -5.1],
+            [f32::NAN, 0.0],
+        ] {
+            let mut points = [SparsePoint {
+                x_m: place[0],
+                y_m: place[1],
+                weight: 0.7,
+                ..SparsePoint::default()
+            }];
+            FRAME.weigh(Array2::zeros((5, 5)).view(), 1.0, &mut points);
+            assert_eq!(points[0].weight, 0.7, "{place:?}");
+        }
+    }
+
+    #[test]
+    fn the_exponent_compresses_the_mask() {
+        let mut points = [SparsePoint {
+            weight: 0.8,
+            ..SparsePoint::default()
+        }];
+        FRAME.weigh(Array2::from_elem((5, 5), 0.25).view(), 0.5, &mut points);
+        assert_eq!(points[0].weight, 0.4);
+    }
+
+    #[test]
+    fn a_point_is_moved_as_its_sweep_is_compensated() {
+        let twist = Some(Twist {
+            vx_mps: 10.0,
+            vy_mps: 0.0,
+            yaw_rate_radps: 0.0,
+        });
+        let moving = RasterFrame { twist, ..FRAME };
+        assert_eq!(factor(moving, (1, 2), [0.0, 0.0, 0.2, 0.0]), 0.5);
+        assert_eq!(factor(moving, (3, 2), [0.0, 0.0, -0.2, 0.0]), 0.5);
+        let quarter = std::f64::consts::FRAC_PI_2 / 0.1;
+        let turning = RasterFrame {
+            twist: Some(Twist {
+                vx_mps: 0.0,
+                vy_mps: 0.0,
+                yaw_rate_radps: quarter,
+            }),
+            ..FRAME
+        };
+        assert_eq!(factor(turning, (2, 0), [4.0, 0.0, 0.1, 0.0]), 0.5);
+    }
+
+    const AZIMUTHS: usize = 400;
+    const BINS: usize = 500;
+
+    /// A return in every twentieth azimuth, at ranges from 15 to 80 m, seen within 0.25 s.
+    fn spots(sense: Sense) -> OwnedScan {
+        let mut scan = OwnedScan::with_limits(ScanLimits {
+            bytes: AZIMUTHS * BINS,
+            azimuths: AZIMUTHS,
+        });
+        let sizes = SweepGeometry {
+            azimuths: AZIMUTHS,
+            bins: BINS,
+            stride: BINS,
+            ..scan.geometry
+        };
+        scan.geometry = SweepGeometry {
+            range_resolution_m: 0.175,
+            doppler_s: 0.05,
+            sense,
+            ..sizes
+        };
+        for azimuth in 0..AZIMUTHS {
+            scan.azimuth_rad[azimuth] = azimuth as f32 * std::f32::consts::TAU / AZIMUTHS as f32;
+            scan.stamp_ns[azimuth] = (azimuth as i64 - AZIMUTHS as i64 / 2) * 625_000;
+            scan.flags[azimuth] = flag::MEASURED;
+        }
+        for azimuth in (5..AZIMUTHS).step_by(20) {
+            scan.bytes[azimuth * BINS + 90 + azimuth * 7 % 360..][..6].fill(200);
+        }
+        scan
+    }
+
+    /// The share of a scan's points that lie, by `frame`, where the raster made with `twist` has power.
+    fn share_that_meets(twist: Twist, sense: Sense, frame: RasterFrame) -> f32 {
+        let scan = spots(sense);
+        let config = RasterConfig {
+            n: frame.n,
+            cell_m: frame.cell_m,
+            ..RasterConfig::default()
+        };
+        let mut raster = Array2::zeros((frame.n, frame.n));
+        Rasteriser::new(&config)
+            .unwrap()
+            .rasterise(&scan.view(), 60, Some(twist), raster.view_mut())
+            .unwrap();
+        let mut points = vec![SparsePoint::default(); 8192];
+        let config = PointsConfig {
+            max_range_m: 100.0,
+            ..PointsConfig::default()
+        };
+        let count = PointExtractor::new(&config)
+            .unwrap()
+            .extract(&scan.view(), 60, &mut points)
+            .unwrap();
+        assert!(count >= 100, "{count}");
+        let lit = raster.mapv(|power: f32| f32::from(power > 10.0));
+        let mut weighed = points[..count].to_vec();
+        frame.weigh(lit.view(), 1.0, &mut weighed);
+        weighed.iter().filter(|point| point.weight > 0.0).count() as f32 / count as f32
+    }
+
+    #[test]
+    fn points_lie_where_the_raster_has_their_power() {
+        let twist = Twist {
+            vx_mps: 25.0,
+            vy_mps: 1.0,
+            yaw_rate_radps: 0.6,
+        };
+        let moving = RasterFrame {
+            n: 401,
+            cell_m: 0.5,
+            twist: Some(twist),
+            doppler_compensated: true,
+        };
+        for sense in [Sense::Clockwise, Sense::CounterClockwise] {
+            let share = share_that_meets(twist, sense, moving);
+            assert!(share > 0.99, "{share}");
+            for other in [
+                RasterFrame {
+                    doppler_compensated: false,
+                    ..moving
+                },
+                RasterFrame {
+                    twist: None,
+                    ..moving
+                },
+            ] {
+                let share = share_that_meets(twist, sense, other);
+                assert!(share < 0.8, "{share} for {other:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn dopplers_shift_is_compensated_where_the_raster_is_without_it() {
+        let twist = Some(Twist {
+            vx_mps: 20.0,
+            vy_mps: 0.0,
+            yaw_rate_radps: 0.0,
+        });
+        let [kept, compensated] = [false, true].map(|doppler_compensated| RasterFrame {
+            twist,
+            doppler_compensated,
+            ..FRAME
+        });
+        assert_eq!(factor(kept, (1, 2), [2.0, 0.0, 0.0, 0.1]), 0.5);
+        assert_eq!(factor(compensated, (0, 2), [2.0, 0.0, 0.0, 0.1]), 0.5);
+    }
+}

@@ -1,0 +1,105 @@
+#![allow(clippy::unwrap_used)]
+
+use super::*;
+use gyre_radar::{OwnedScan, ScanLimits, Sense, SweepGeometry, scan::flag};
+use ndarray::Array2;
+
+const AZIMUTHS: usize = 400;
+const BINS: usize = 300;
+
+/// A wall all around, 4 m deep, its middle at 40 m.
+fn wall() -> OwnedScan {
+    let mut scan = OwnedScan::with_limits(ScanLimits {
+        bytes: AZIMUTHS * BINS,
+        azimuths: AZIMUTHS,
+    });
+    scan.geometry = SweepGeometry {
+        azimuths: AZIMUTHS,
+        bins: BINS,
+        stride: BINS,
+        range_resolution_m: 0.2,
+        doppler_s: 0.04,
+        sense: Sense::Clockwise,
+        ..scan.geometry
+    };
+    for azimuth in 0..AZIMUTHS {
+        scan.bytes[azimuth * BINS + 190..][..20].fill(100);
+        scan.azimuth_rad[azimuth] = azimuth as f32 * std::f32::consts::TAU / AZIMUTHS as f32;
+        scan.flags[azimuth] = flag::MEASURED;
+    }
+    scan
+}
+
+/// Mean place of the power straight ahead, metres, seen at 20 m/s.
+fn wall_ahead_m(config: &MaskingConfig) -> f32 {
+    let raster = RasterConfig {
+        n: 401,
+        cell_m: 0.25,
+        ..RasterConfig::default()
+    };
+    let mut masker = Masker::new(&raster, &PointsConfig::default(), config).unwrap();
+    let twist = Twist {
+        vx_mps: 20.0,
+        ..Twist::default()
+    };
+    let mut cells = Array2::zeros((401, 401));
+    let wall = wall();
+    let sweep = Sweep {
+        number: 0,
+        scan: wall.view(),
+        twist: Some(twist),
+    };
+    assert!(masker.mask(&sweep, None, cells.view_mut(), None).unwrap() == Some(twist));
+    let ahead = (0..200).map(|row| (cells[[row, 200]], (200 - row) as f32 * 0.25));
+    let (sum, moment) = ahead.fold((0.0, 0.0), |(sum, moment), (power, x_m)| {
+        (sum + power, moment + power * x_m)
+    });
+    moment / sum
+}
+
+#[test]
+fn rasters_keep_the_doppler_shift_unless_it_is_to_be_compensated() {
+    let kept = wall_ahead_m(&MaskingConfig::default());
+    let undone = wall_ahead_m(&MaskingConfig {
+        undo_doppler: true,
+        ..MaskingConfig::default()
+    });
+    assert!((kept - 40.0).abs() < 0.1, "{kept}");
+    assert!(
+        (undone - kept - 0.04 * 20.0).abs() < 0.02,
+        "{undone}, {kept} with the shift"
+    );
+}
+
+#[test]
+fn points_start_above_the_threshold() {
+    let count = |config: &MaskingConfig| {
+        let points = PointsConfig {
+            capacity: 20_000,
+            ..PointsConfig::default()
+        };
+        let mut masker = Masker::new(&RasterConfig::default(), &points, config).unwrap();
+        let mut out = vec![SparsePoint::default(); points.capacity];
+        let count = masker.points(&wall().view(), None, &mut out).unwrap();
+        (count, out[0].weight)
+    };
+    assert_eq!(
+        count(&MaskingConfig::default()),
+        (20 * AZIMUTHS, 40.0 / 60.0)
+    );
+    assert_eq!(
+        count(&MaskingConfig {
+            threshold: 100,
+            ..MaskingConfig::default()
+        })
+        .0,
+        0
+    );
+    assert_eq!(
+        count(&MaskingConfig {
+            kind: MaskKind::None,
+            ..MaskingConfig::default()
+        }),
+        (20 * AZIMUTHS, 1.0)
+    );
+}

@@ -1,0 +1,167 @@
+//! What the tests of learned masks share: their models, a scan, and the models' arithmetic by hand.
+
+// Each test binary uses its own part of this.
+#![allow(dead_code, clippy::unwrap_used)]
+
+use std::path::{Path, PathBuf};
+
+use gyre_geometry::Twist;
+use gyre_masking::{MaskKind, Masker, MaskingConfig, Sweep, runtime};
+use gyre_radar::{
+    OwnedScan, PointsConfig, RasterConfig, ScanLimits, Sense, SweepGeometry, scan::flag,
+};
+use ndarray::Array2;
+
+/// Cells a side of the models that tests compute by hand.
+pub const N: usize = 31;
+
+const AZIMUTHS: usize = 400;
+const BINS: usize = 200;
+
+/// The card of one of the tests' models: see `models/make.py`.
+pub fn card(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/models")
+        .join(name)
+        .with_extension("toml")
+}
+
+/// Whether networks can be computed here; says so where not.
+pub fn runtime_is_installed() -> bool {
+    let found = runtime::find(None).is_ok();
+    if !found {
+        println!("skipped: ONNX Runtime is not installed");
+    }
+    found
+}
+
+/// The rasters that the models with `-31` in their names are for.
+pub fn raster() -> RasterConfig {
+    RasterConfig {
+        n: N,
+        cell_m: 0.8,
+        ..RasterConfig::default()
+    }
+}
+
+/// A learned mask by this model. Power up to 20 counts as nothing.
+pub fn learned(card: &Path) -> MaskingConfig {
+    MaskingConfig {
+        kind: MaskKind::Learned,
+        threshold: 20,
+        model: Some(card.to_owned()),
+        undo_doppler: true,
+        ..MaskingConfig::default()
+    }
+}
+
+/// The same without the network.
+pub fn unlearned() -> MaskingConfig {
+    MaskingConfig {
+        kind: MaskKind::Threshold,
+        threshold: 20,
+        undo_doppler: true,
+        ..MaskingConfig::default()
+    }
+}
+
+/// A masker of small rasters.
+pub fn masker(config: &MaskingConfig) -> Masker {
+    Masker::new(&raster(), &PointsConfig::default(), config).unwrap()
+}
+
+/// A scan of powers that are all different from their neighbours', another one for each seed.
+pub fn scan(seed: usize) -> OwnedScan {
+    let mut scan = OwnedScan::with_limits(ScanLimits {
+        bytes: AZIMUTHS * BINS,
+        azimuths: AZIMUTHS,
+    });
+    scan.geometry = SweepGeometry {
+        azimuths: AZIMUTHS,
+        bins: BINS,
+        stride: BINS,
+        range_resolution_m: 0.175,
+        doppler_s: 0.04,
+        sense: Sense::Clockwise,
+        ..scan.geometry
+    };
+    for azimuth in 0..AZIMUTHS {
+        for bin in 0..BINS {
+            scan.bytes[azimuth * BINS + bin] =
+                ((azimuth / 9 * 31 + bin / 5 * 57 + seed * 101) % 251) as u8;
+        }
+        scan.azimuth_rad[azimuth] = azimuth as f32 * std::f32::consts::TAU / AZIMUTHS as f32;
+        scan.stamp_ns[azimuth] = (azimuth as i64 - AZIMUTHS as i64 / 2) * 625_000;
+        scan.flags[azimuth] = flag::MEASURED;
+    }
+    scan
+}
+
+/// The scan as masking has it, while the vehicle drives a bend at 12 m/s.
+pub fn sweep(number: u64, scan: &OwnedScan) -> Sweep<'_> {
+    Sweep {
+        number,
+        scan: scan.view(),
+        twist: Some(Twist {
+            vx_mps: 12.0,
+            vy_mps: 0.1,
+            yaw_rate_radps: 0.2,
+        }),
+    }
+}
+
+/// An empty raster.
+pub fn blank() -> Array2<f32> {
+    Array2::from_elem((N, N), f32::NAN)
+}
+
+/// The raster of a sweep before the network.
+pub fn unmasked(sweep: &Sweep<'_>) -> Array2<f32> {
+    let mut raster = blank();
+    masker(&unlearned())
+        .mask(sweep, None, raster.view_mut(), None)
+        .unwrap();
+    raster
+}
+
+/// The masks of the tests' models, one for each raster: the sigmoid of a convolution, as in `models/make.py`.
+pub fn masks_by_hand(rasters: &[Array2<f32>]) -> Vec<Array2<f32>> {
+    let channels = rasters.len();
+    let kernel = |place: usize| ((place * 5 % 13) as f64 - 6.0) / 64.0;
+    let power = |channel: usize, row: isize, column: isize| {
+        let inside = |index: isize| (0..N as isize).contains(&index);
+        if inside(row) && inside(column) {
+            f64::from(rasters[channel][[row as usize, column as usize]]) / 16.0
+        } else {
+            0.0
+        }
+    };
+    let logit = |out: usize, row: usize, column: usize| {
+        let taps = (0..channels * 9).map(|tap| {
+            let (of, dy, dx) = (tap / 9, (tap % 9 / 3) as isize - 1, (tap % 3) as isize - 1);
+            kernel(out * channels * 9 + tap) * power(of, row as isize + dy, column as isize + dx)
+        });
+        out as f64 / 4.0 + 0.125 + taps.sum::<f64>()
+    };
+    let mask = |out: usize| {
+        Array2::from_shape_fn((N, N), |(row, column)| {
+            (1.0 / (1.0 + (-logit(out, row, column)).exp())) as f32
+        })
+    };
+    (0..channels).map(mask).collect()
+}
+
+/// Asserts that the values are those of the raster times the mask.
+pub fn assert_masked(actual: &Array2<f32>, raster: &Array2<f32>, mask: &Array2<f32>) {
+    assert!(
+        raster.iter().filter(|power| **power > 0.0).count() > N * N / 2,
+        "a nearly empty raster tests nothing"
+    );
+    for ((cell, actual), (power, mask)) in actual.indexed_iter().zip(raster.iter().zip(mask)) {
+        let expected = power * mask;
+        assert!(
+            (actual - expected).abs() <= 1e-5 * power,
+            "cell {cell:?}: {actual}, not {expected}"
+        );
+    }
+}

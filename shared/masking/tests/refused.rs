@@ -1,0 +1,332 @@
+//! Models and runtimes that do not fit: one sentence that says what, where, and what to do.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use common::{N, card, learned, raster, runtime_is_installed};
+use gyre_masking::{MaskingConfig, Provider, model::Card, network::Network, runtime::INSTALL};
+use gyre_radar::{RasterConfig, Sampling};
+use ndarray::Array3;
+use sha2::{Digest, Sha256};
+use tempfile::TempDir;
+
+/// Asserts that the network is refused with one sentence that has all of these words.
+fn refused(config: &MaskingConfig, raster: &RasterConfig, words: &[&str]) {
+    let sentence = Network::load(config, raster).unwrap_err().to_string();
+    assert!(
+        !sentence.contains('\n') && !sentence.contains("/onnxruntime_src/"),
+        "{sentence}"
+    );
+    for word in words {
+        assert!(sentence.contains(word), "`{word}` is not in: {sentence}");
+    }
+}
+
+/// A copy of a model in a folder of its own, with its card changed from one text to another.
+fn changed(name: &str, from: &str, to: &str) -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let copy = folder.path().join(card(name).file_name().unwrap());
+    let text = fs::read_to_string(card(name)).unwrap();
+    assert!(text.contains(from), "{text}");
+    fs::write(&copy, text.replace(from, to)).unwrap();
+    fs::copy(
+        card(name).with_extension("onnx"),
+        copy.with_extension("onnx"),
+    )
+    .unwrap();
+    (folder, copy)
+}
+
+/// A copy of a model with other bytes, which its card vouches for.
+fn vouched_for(bytes: &[u8]) -> (TempDir, PathBuf) {
+    let sha256 = |bytes: &[u8]| -> String {
+        Sha256::digest(bytes)
+            .iter()
+            .map(|byte| format!("{byte:02x}"))
+            .collect()
+    };
+    let old = fs::read(card("single-31").with_extension("onnx")).unwrap();
+    let (folder, copy) = changed("single-31", &sha256(&old), &sha256(bytes));
+    fs::write(copy.with_extension("onnx"), bytes).unwrap();
+    (folder, copy)
+}
+
+// The model. Of these all but the last few are told without ONNX Runtime.
+
+#[test]
+fn no_model_is_named() {
+    let config = MaskingConfig {
+        model: None,
+        ..learned(Path::new(""))
+    };
+    refused(
+        &config,
+        &raster(),
+        &["masking.model does not name a model", "models/NAME.toml"],
+    );
+}
+
+#[test]
+fn the_card_is_missing() {
+    refused(
+        &learned(Path::new("/no/such.toml")),
+        &raster(),
+        &["card /no/such.toml", "No such file"],
+    );
+}
+
+#[test]
+fn the_model_is_named_in_place_of_its_card() {
+    refused(
+        &learned(&card("single-31").with_extension("onnx")),
+        &raster(),
+        &["single-31.onnx", ".toml beside it"],
+    );
+}
+
+#[test]
+fn the_card_lacks_a_key() {
+    let (_folder, card) = changed("single-31", "sha256", "checksum");
+    refused(
+        &learned(&card),
+        &raster(),
+        &[
+            "single-31.toml",
+            "not the card of a model",
+            "missing field `sha256`",
+        ],
+    );
+}
+
+#[test]
+fn the_model_looks_at_more_scans_than_there_are() {
+    let (_folder, card) = changed("single-31", "inputs = 1", "inputs = 3");
+    refused(&learned(&card), &raster(), &["model.inputs is 3", "1 or 2"]);
+}
+
+#[test]
+fn the_rasters_are_of_another_size() {
+    let config = learned(&card("single-31"));
+    let other = RasterConfig { n: 255, ..raster() };
+    refused(
+        &config,
+        &other,
+        &[
+            "raster.n is 255",
+            "single-31.toml is for 31",
+            "set raster.n = 31",
+            "masking.model",
+        ],
+    );
+    let other = RasterConfig {
+        cell_m: 0.4,
+        ..raster()
+    };
+    refused(
+        &config,
+        &other,
+        &["raster.cell_m is 0.4", "set raster.cell_m = 0.8"],
+    );
+}
+
+#[test]
+fn the_models_file_is_missing() {
+    let (_folder, card) = changed("single-31", "single-31.onnx", "gone.onnx");
+    refused(
+        &learned(&card),
+        &raster(),
+        &["file", "gone.onnx", "No such file"],
+    );
+}
+
+#[test]
+fn the_models_file_is_cut_short() {
+    let (_folder, card) = changed("single-31", "none: see make.py", "cut short");
+    let file = card.with_extension("onnx");
+    let bytes = fs::read(&file).unwrap();
+    fs::write(&file, &bytes[..bytes.len() - 1]).unwrap();
+    refused(
+        &learned(&card),
+        &raster(),
+        &[
+            "single-31.onnx has the SHA-256",
+            "its card says",
+            "get it again",
+        ],
+    );
+}
+
+#[test]
+fn the_model_is_not_the_one_that_the_run_began_with() {
+    let config = MaskingConfig {
+        sha256: Some("0123".to_owned()),
+        ..learned(&card("single-31"))
+    };
+    refused(
+        &config,
+        &raster(),
+        &[
+            "masking.sha256 is 0123",
+            "single-31.toml",
+            "leave masking.sha256 out",
+        ],
+    );
+}
+
+#[test]
+fn what_onnx_runtime_cannot_read_is_refused_in_its_words() {
+    if !runtime_is_installed() {
+        return;
+    }
+    let bytes = fs::read(card("single-31").with_extension("onnx")).unwrap();
+    let (_folder, cut_short) = vouched_for(&bytes[..bytes.len() / 2]);
+    refused(
+        &learned(&cut_short),
+        &raster(),
+        &["ONNX Runtime cannot load", "single-31.onnx"],
+    );
+    let (_folder, other) = vouched_for(b"no model");
+    refused(
+        &learned(&other),
+        &raster(),
+        &["ONNX Runtime cannot load", "single-31.onnx"],
+    );
+}
+
+#[test]
+fn operators_that_are_too_new_are_told() {
+    if !runtime_is_installed() {
+        return;
+    }
+    refused(
+        &learned(&card("opset-99")),
+        &raster(),
+        &[
+            "opset-99.onnx has operators of version 99",
+            "up to 2",
+            "opset=2",
+        ],
+    );
+}
+
+#[test]
+fn a_model_that_takes_something_else_than_its_card_says_is_told() {
+    if !runtime_is_installed() {
+        return;
+    }
+    let (_folder, card) = changed("pair-31", "inputs = 2", "inputs = 1");
+    let words = [
+        "takes `scans` Float32 [1, 2, 31, 31]",
+        "must have the one `scans` Float32 [1, 1, 31, 31]",
+    ];
+    refused(&learned(&card), &raster(), &words);
+}
+
+#[test]
+fn factors_that_are_nan_are_refused() {
+    if !runtime_is_installed() {
+        return;
+    }
+    let mut network = Network::load(&learned(&card("single-31")), &raster()).unwrap();
+    let mut cells = Array3::from_elem((1, N, N), 1.0);
+    assert!(network.run(cells.view()).is_ok());
+    cells[[0, N / 2, N / 2]] = f32::NAN;
+    let sentence = network.run(cells.view()).unwrap_err().to_string();
+    assert!(
+        sentence.contains("9 of 961 factors are NaN") && sentence.contains("`cpu`"),
+        "{sentence}"
+    );
+}
+
+// Who computes it.
+
+#[test]
+fn a_runtime_that_is_not_there_is_told_with_the_command_that_installs_it() {
+    let runtime = Some(PathBuf::from("/no/such/folder"));
+    let config = MaskingConfig {
+        runtime,
+        ..learned(&card("single-31"))
+    };
+    refused(
+        &config,
+        &raster(),
+        &["masking.runtime is /no/such/folder", INSTALL],
+    );
+}
+
+#[cfg(not(any(feature = "cuda", feature = "tensorrt", feature = "openvino")))]
+#[test]
+fn a_provider_that_is_not_built_in_is_told_with_the_feature_that_has_it() {
+    if !runtime_is_installed() {
+        return;
+    }
+    for (provider, feature) in [
+        (Provider::Cuda, "cuda"),
+        (Provider::Tensorrt, "tensorrt"),
+        (Provider::Openvino, "openvino"),
+    ] {
+        let config = MaskingConfig {
+            provider,
+            ..learned(&card("single-31"))
+        };
+        refused(
+            &config,
+            &raster(),
+            &[feature, &format!("--features {feature}"), "`cpu`"],
+        );
+    }
+}
+
+// What is not refused, but told.
+
+#[test]
+fn what_the_network_was_not_trained_for_is_named() {
+    let card = |training: &str| {
+        let (_folder, path) = changed(
+            "single-31",
+            "[training]",
+            &format!("[masking]\n{training}\n[training]"),
+        );
+        Card::read(&learned(&path)).unwrap()
+    };
+    let config = learned(Path::new(""));
+    let other = RasterConfig {
+        sampling: Sampling::Bilinear,
+        ..raster()
+    };
+    assert!(card("").unlike_training(&config, &other).is_empty());
+    assert!(
+        card("floor = 20\ncompensate = true")
+            .unlike_training(&config, &raster())
+            .is_empty()
+    );
+    assert_eq!(
+        card("floor = 0\ncompensate = false").unlike_training(&config, &raster()),
+        [
+            "masking.threshold is 20 instead of 0",
+            "masking.compensate is true instead of false"
+        ]
+    );
+    assert_eq!(
+        card("undo_doppler = false").unlike_training(&config, &raster()),
+        ["masking.undo_doppler is true instead of false"]
+    );
+    let facts = "cell_m = 0.8\nsampling = \"averaged\"\naveraged_cells = 2.0\nmin_range_m = 3.0";
+    let (_folder, path) = changed("single-31", "cell_m = 0.8", facts);
+    let card = Card::read(&learned(&path)).unwrap();
+    let nearer = "raster.min_range_m is 2 instead of 3";
+    assert_eq!(
+        card.unlike_training(&config, &raster()),
+        [nearer, "raster.averaged_cells is 1 instead of 2"]
+    );
+    assert_eq!(
+        card.unlike_training(&config, &other),
+        [nearer, "raster.sampling is bilinear instead of averaged"]
+    );
+}

@@ -1,0 +1,52 @@
+//! A folder of scans in, a trajectory out: TUM on standard output (time, x, y, z and a quaternion; s, m).
+//!
+//!     cargo run --release -p gyre-odometry --example trajectory -- DATASET [CONFIG.toml] > trajectory.tum
+
+use std::{env, error::Error, fs, io, path::Path};
+
+use gyre_odometry::{Odometry, OdometryConfig};
+use gyre_radar::{DatasetOptions, OwnedScan, Trajectory, write_tum};
+use serde::Deserialize;
+
+/// The sections of a run's configuration that matter here.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct Config {
+    dataset: DatasetOptions,
+    #[serde(flatten)]
+    odometry: OdometryConfig,
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = env::args().skip(1).collect();
+    let folder = arguments
+        .first()
+        .ok_or("usage: trajectory DATASET [CONFIG.toml]")?;
+    let config: Config = match arguments.get(1) {
+        Some(path) => toml::from_str(&fs::read_to_string(path)?)?,
+        None => Config::default(),
+    };
+
+    let mut dataset = gyre_radar::open(Path::new(folder), &config.dataset)?;
+    let mut scan = OwnedScan::with_limits(dataset.limits());
+    let mut odometry = Odometry::new(&config.odometry)?;
+    let (mut stamps, mut poses) = (Vec::new(), Vec::new());
+    for index in 0..dataset.len() {
+        match dataset.read(index, scan.slot()) {
+            Ok(geometry) => scan.geometry = geometry,
+            Err(error) => {
+                eprintln!("left out: {error}");
+                continue;
+            }
+        }
+        let registered = odometry.register(&scan.view())?;
+        stamps.push(scan.geometry.stamp_ns);
+        poses.push(registered.pose.motion);
+    }
+    let trajectory = Trajectory {
+        stamp_ns: Some(stamps),
+        poses,
+    };
+    write_tum(&trajectory, &mut io::stdout().lock())?;
+    Ok(())
+}

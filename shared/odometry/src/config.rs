@@ -1,0 +1,48 @@
+//! The sections of a configuration that the method depends on.
+
+use gyre_masking::MaskingConfig;
+use gyre_radar::{PointsConfig, RasterConfig};
+use gyre_scan_matching::{ExhaustiveConfig, RefinementConfig, RotationConfig, TranslationConfig};
+use serde::{Deserialize, Serialize};
+
+/// The settings of the method, by section of a run's configuration. A run's file can be read as this: other sections are
+/// ignored.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct OdometryConfig {
+    /// The Cartesian rasters.
+    pub raster: RasterConfig,
+    /// The sparse points beside them.
+    pub points: PointsConfig,
+    /// The mask, and motion compensation.
+    pub masking: MaskingConfig,
+    /// Which search.
+    pub search: SearchConfig,
+    /// The search for the rotation.
+    pub rotation: RotationConfig,
+    /// The search for the translation.
+    pub translation: TranslationConfig,
+    /// The search for both together.
+    pub exhaustive: ExhaustiveConfig,
+    /// The refinement against the local map.
+    pub refinement: RefinementConfig,
+}
+
+/// The section `[search]`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SearchConfig {
+    /// `decoupled`: rotation, then translation, in two processes. `exhaustive`: both together, in one. Default `decoupled`.
+    pub kind: SearchKind,
+}
+
+/// How a motion is searched for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SearchKind {
+    /// Rotation first, from the Fourier magnitudes, then translation (Weston et al., Sec. III-C).
+    #[default]
+    Decoupled,
+    /// Every angle of a grid with its whole correlation over the shifts.
+    Exhaustive,
+}

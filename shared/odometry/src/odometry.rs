@@ -1,0 +1,312 @@
+//! Odometry: from scans to motions and poses.
+
+use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose};
+use gyre_masking::{MaskError, Masker, MaskerError, Sweep};
+use gyre_radar::{PolarScan, ScanError};
+use gyre_scan_matching::{ConfigError, JointMatch, Refined, RefinementKind, Refiner, ShapeError};
+use ndarray::{Array2, ArrayView2, ArrayViewMut2};
+use thiserror::Error;
+
+use crate::{OdometryConfig, compensation::LaggedTwists, search::MotionSearch};
+
+/// Registers one scan after the other against those before.
+pub struct Odometry {
+    masker: Masker,
+    search: MotionSearch,
+    refiner: Option<Refiner>,
+    twists: LaggedTwists,
+    /// The scan that is being registered.
+    current: Frame,
+    /// The scan before.
+    before: Frame,
+    /// The raster of the scan before as the mask of this pair leaves it, where the mask looks at two scans.
+    before_by_pair: Option<Array2<f32>>,
+    /// Scans since the chain of motions started.
+    seq: u64,
+    pose: UncertainMotion,
+}
+
+/// A registered scan.
+#[derive(Clone, Copy, Debug)]
+pub struct Registered {
+    /// Number of the scan in the chain of motions, from 0.
+    pub seq: u64,
+    /// The motion from the scan before, with its covariance: this scan's frame in that one's. The identity where the chain
+    /// starts.
+    pub motion: UncertainMotion,
+    /// The pose in the frame of the first scan, with its covariance.
+    pub pose: UncertainMotion,
+    /// How the motion was found.
+    pub outcome: Outcome,
+    /// Time between the two scans, ns.
+    pub interval_ns: i64,
+    /// The result of the search; `None` where the chain starts.
+    pub searched: Option<JointMatch>,
+    /// The result of the refinement; `None` where there is none.
+    pub refined: Option<Refined>,
+}
+
+/// How a motion was found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// There is no scan before: the chain of motions starts here.
+    Start,
+    /// By the search alone: no refinement is configured.
+    Searched,
+    /// Refined against the local map.
+    Refined,
+    /// Refined with little support: its covariance is wider, and the scan stays out of the map.
+    Weak,
+    /// No match: predicted from the motions before.
+    Predicted,
+}
+
+/// Settings that no odometry can be built from.
+#[derive(Debug, Error)]
+pub enum SetupError {
+    /// The rasters', the points' or the mask's.
+    #[error(transparent)]
+    Masker(#[from] MaskerError),
+    /// The search's or the refinement's.
+    #[error(transparent)]
+    Search(#[from] ConfigError),
+}
+
+/// Why a scan cannot be registered.
+#[derive(Debug, Error)]
+pub enum OdometryError {
+    /// It cannot be rasterised or masked.
+    #[error(transparent)]
+    Mask(#[from] MaskError),
+    /// No points can be extracted from it.
+    #[error(transparent)]
+    Points(#[from] ScanError),
+    /// Its raster cannot be searched.
+    #[error(transparent)]
+    Search(#[from] ShapeError),
+}
+
+/// What a scan becomes.
+struct Frame {
+    stamp_ns: i64,
+    twist: Option<Twist>,
+    raster: Array2<f32>,
+    points: Vec<SparsePoint>,
+    /// Points in use.
+    count: usize,
+}
+
+impl Odometry {
+    /// Plans all parts; nothing is allocated afterwards.
+    ///
+    /// # Errors
+    /// The first setting that is out of its bounds; a network that cannot be used.
+    pub fn new(config: &OdometryConfig) -> Result<Self, SetupError> {
+        let masker = Masker::new(&config.raster, &config.points, &config.masking)?;
+        let refiner = match config.refinement.kind {
+            RefinementKind::None => None,
+            RefinementKind::LocalMap => {
+                Some(Refiner::new(&config.refinement, config.points.capacity)?)
+            }
+        };
+        let n = config.raster.n;
+        let frame = || Frame::new(n, config.points.capacity);
+        Ok(Self {
+            search: MotionSearch::new(config)?,
+            refiner,
+            twists: LaggedTwists::new(config.masking.feedback_lag()),
+            current: frame(),
+            before: frame(),
+            before_by_pair: (masker.scans() == 2).then(|| Array2::zeros((n, n))),
+            masker,
+            seq: 0,
+            pose: UncertainMotion::identity(),
+        })
+    }
+
+    /// Registers the next scan: its motion since the scan before, and its pose.
+    ///
+    /// # Errors
+    /// A scan that cannot be used. It is left out: the next one is registered against the scan before it.
+    pub fn register(&mut self, scan: &PolarScan<'_>) -> Result<Registered, OdometryError> {
+        let twist = self.twists.next();
+        self.register_compensated(scan, twist)
+    }
+
+    /// As [`Odometry::register`], with the velocity for motion compensation from elsewhere (an IMU, the truth).
+    ///
+    /// # Errors
+    /// As [`Odometry::register`].
+    pub fn register_compensated(
+        &mut self,
+        scan: &PolarScan<'_>,
+        twist: Option<Twist>,
+    ) -> Result<Registered, OdometryError> {
+        self.mask(scan, twist)?;
+        let searched = self.search()?;
+        let refined = searched.as_ref().and_then(|found| self.refine(found));
+        Ok(self.integrate(searched, refined))
+    }
+
+    /// Compensates the sweep's motion, rasterises the scan, masks it and extracts its points (Weston et al., Sec. III-A).
+    ///
+    /// # Errors
+    /// A scan that contradicts itself, a network that fails.
+    pub fn mask(
+        &mut self,
+        scan: &PolarScan<'_>,
+        twist: Option<Twist>,
+    ) -> Result<(), OdometryError> {
+        let sweep = Sweep {
+            number: self.seq,
+            scan: *scan,
+            twist,
+        };
+        let frame = &mut self.current;
+        let before = self.before_by_pair.as_mut().map(|raster| raster.view_mut());
+        let follows = self.seq.checked_sub(1);
+        frame.twist = self
+            .masker
+            .mask(&sweep, follows, frame.raster.view_mut(), before)?;
+        frame.count = self.masker.points(scan, frame.twist, &mut frame.points)?;
+        frame.stamp_ns = scan.geometry.stamp_ns;
+        Ok(())
+    }
+
+    /// Searches for the rotation, then for the translation between the last two masked scans (Weston et al., Eqs. 7 and 8);
+    /// `None` where the chain starts.
+    ///
+    /// # Errors
+    /// None with the rasters of [`Odometry::mask`].
+    pub fn search(&mut self) -> Result<Option<JointMatch>, OdometryError> {
+        let changed = self.before_by_pair.is_some();
+        let before = self.before_by_pair.as_ref().unwrap_or(&self.before.raster);
+        let before = (self.seq > 0).then(|| before.view());
+        Ok(self
+            .search
+            .find(self.seq, self.current.raster.view(), before, changed)?)
+    }
+
+    /// Refines the searched motion against the map of the last keyframes; `None` where no refinement is configured.
+    pub fn refine(&mut self, searched: &JointMatch) -> Option<Refined> {
+        let (motion, interval_s) = (motion_of(searched), self.interval_ns() as f64 * 1e-9);
+        let (later, earlier) = (self.current.points(), self.before.points());
+        let refiner = self.refiner.as_mut()?;
+        Some(refiner.refine(self.seq, later, earlier, &motion, interval_s))
+    }
+
+    /// Composes the motion with the pose (Checchin et al., Eqs. 1 and 2), and makes the scan the one before.
+    pub fn integrate(
+        &mut self,
+        searched: Option<JointMatch>,
+        refined: Option<Refined>,
+    ) -> Registered {
+        let interval_ns = self.interval_ns();
+        let (motion, outcome) = match (&searched, &refined) {
+            (_, Some(refined)) => (refined.motion, refined.outcome.into()),
+            (Some(found), None) => {
+                let motion = UncertainMotion {
+                    motion: motion_of(found),
+                    covariance: found.motion.covariance,
+                };
+                (motion, Outcome::Searched)
+            }
+            (None, None) => (UncertainMotion::identity(), Outcome::Start),
+        };
+        let motion = motion.normalized();
+        self.pose = self.pose.then(&motion).normalized();
+        let interval_s = interval_ns as f64 * 1e-9;
+        self.twists.push(
+            searched
+                .as_ref()
+                .map(|found| Twist::from_motion(&motion_of(found), interval_s)),
+        );
+        std::mem::swap(&mut self.current, &mut self.before);
+        self.seq += 1;
+        Registered {
+            seq: self.seq - 1,
+            motion,
+            pose: self.pose,
+            outcome,
+            interval_ns,
+            searched,
+            refined,
+        }
+    }
+
+    /// Starts a new chain with the next scan; the pose stays.
+    pub fn restart(&mut self) {
+        self.seq = 0;
+        self.twists.clear();
+        if let Some(refiner) = &mut self.refiner {
+            refiner.reset();
+        }
+    }
+
+    /// The masker, for its factors and the cells of points.
+    pub fn masker(&self) -> &Masker {
+        &self.masker
+    }
+
+    /// The raster that [`Odometry::mask`] made last, before it is searched: n x n, row 0 far ahead.
+    pub fn masked_mut(&mut self) -> ArrayViewMut2<'_, f32> {
+        self.current.raster.view_mut()
+    }
+
+    /// The raster of the last registered scan after the mask, n x n, row 0 far ahead.
+    pub fn raster(&self) -> ArrayView2<'_, f32> {
+        self.before.raster.view()
+    }
+
+    /// The raster of the scan before the last one, as the mask of this pair leaves it, where the mask looks at two scans.
+    pub fn raster_before(&self) -> Option<ArrayView2<'_, f32>> {
+        self.before_by_pair.as_ref().map(|raster| raster.view())
+    }
+
+    /// The points of the last registered scan.
+    pub fn points(&self) -> &[SparsePoint] {
+        self.before.points()
+    }
+
+    /// The velocity that the last registered scan was motion-compensated with.
+    pub fn twist(&self) -> Option<Twist> {
+        self.before.twist
+    }
+
+    fn interval_ns(&self) -> i64 {
+        match self.seq {
+            0 => 0,
+            _ => self.current.stamp_ns.saturating_sub(self.before.stamp_ns),
+        }
+    }
+}
+
+impl Frame {
+    fn new(n: usize, capacity: usize) -> Self {
+        Self {
+            stamp_ns: 0,
+            twist: None,
+            raster: Array2::zeros((n, n)),
+            points: vec![SparsePoint::default(); capacity],
+            count: 0,
+        }
+    }
+
+    fn points(&self) -> &[SparsePoint] {
+        &self.points[..self.count]
+    }
+}
+
+fn motion_of(found: &JointMatch) -> Pose {
+    pose(found.motion.x_m, found.motion.y_m, found.motion.yaw_rad)
+}
+
+impl From<gyre_scan_matching::Outcome> for Outcome {
+    fn from(outcome: gyre_scan_matching::Outcome) -> Self {
+        match outcome {
+            gyre_scan_matching::Outcome::Refined => Self::Refined,
+            gyre_scan_matching::Outcome::Weak => Self::Weak,
+            gyre_scan_matching::Outcome::Predicted => Self::Predicted,
+        }
+    }
+}

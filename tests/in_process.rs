@@ -1,0 +1,92 @@
+//! `Odometry` in one process finds the bits that the processes of a run find.
+
+use std::path::Path;
+
+use gyre::{configuration::Configuration, preflight};
+use gyre_messages::{PoseHeader, flag};
+use gyre_odometry::{Odometry, OdometryConfig, Outcome, Registered};
+use gyre_pose_integration::journal;
+use gyre_radar::OwnedScan;
+
+use crate::common::{Run, real_data, runtime_is_installed};
+
+/// Registers all scans that a finished run played.
+fn register_all(run: &Run) -> Vec<Registered> {
+    let resolved = run.out().join("config.toml");
+    let configuration = Configuration::read(&resolved, &[]).unwrap();
+    let config: OdometryConfig = toml::from_str(&run.result("config.toml")).unwrap();
+    assert_eq!(config, configuration.odometry());
+    let mut dataset = preflight::open(&configuration).unwrap().dataset;
+    let mut scan = OwnedScan::with_limits(dataset.limits());
+    let mut odometry = Odometry::new(&config).unwrap();
+    let scans = configuration.played(dataset.len());
+    scans
+        .map(|index| {
+            scan.geometry = dataset.read(index, scan.slot()).unwrap();
+            odometry.register(&scan.view()).unwrap()
+        })
+        .collect()
+}
+
+/// Asserts that motions and poses of a run and of `Odometry` are the same bits.
+fn assert_same_bits(run: &Run) -> usize {
+    run.complete();
+    let journal = journal::read(&journal::path(run.out())).unwrap();
+    let poses: Vec<&PoseHeader> = journal
+        .iter()
+        .filter(|pose| !pose.item.is(flag::END))
+        .collect();
+    let registered = register_all(run);
+    assert_eq!(poses.len(), registered.len());
+    for (pose, registered) in poses.iter().zip(&registered) {
+        let seq = pose.item.seq;
+        assert_eq!(seq, registered.seq);
+        assert_eq!(pose.motion.motion(), registered.motion, "motion {seq}");
+        assert_eq!(pose.pose(), registered.pose, "pose {seq}");
+        assert_eq!(pose.motion.interval_ns, registered.interval_ns);
+        assert_eq!(
+            pose.item.is(flag::BREAK),
+            registered.outcome == Outcome::Start
+        );
+    }
+    poses.len()
+}
+
+fn configuration(name: &str) -> Run {
+    Run::of_file(&Path::new(crate::PROJECT).join("configs").join(name))
+}
+
+#[test]
+fn on_the_demo() {
+    assert_eq!(assert_same_bits(&configuration("demo.toml")), 64);
+}
+
+#[test]
+fn on_real_scans() {
+    if let Some(data) = real_data("radiate-2019-02-12") {
+        let run = configuration("radiate.toml").data(&data);
+        assert_eq!(assert_same_bits(&run), 466);
+    }
+}
+
+#[test]
+fn with_every_angle_tried() {
+    let run = Run::of_recording()
+        .set("search.kind=exhaustive")
+        .set("source.scans=6");
+    assert_eq!(assert_same_bits(&run), 6);
+}
+
+#[test]
+fn with_networks_of_one_and_of_two_scans() {
+    if !runtime_is_installed() {
+        return;
+    }
+    for model in ["single-127", "pair-127"] {
+        let card = Path::new(crate::PROJECT)
+            .join("shared/masking/tests/models")
+            .join(model)
+            .with_extension("toml");
+        assert_same_bits(&Run::of_recording().masked_by(&card));
+    }
+}
