@@ -1,12 +1,12 @@
 //! A procedural town along any network of streets.
 //!
-//! Each side of a street is divided into stretches, each stretch into pieces of land by what its district holds
-//! ([`TownConfig::character`]): houses wall to wall, houses in gardens, halls, lawns, car parks, fields. A second row
-//! behind fills what is seen through gaps. Land is taken once, and only where it is clear of all streets. Between land
-//! and carriageway stand posts, signs, trees and parked cars.
+//! Each side of a street is divided into stretches, and each stretch into lots by the uses of its district
+//! ([`TownConfig::character`]): terraced houses, detached houses, halls, lawns, car parks, fields. A second
+//! row fills what is visible through gaps. No two lots overlap, and none reaches into a street. Posts,
+//! signs, trees and parked cars stand between lots and carriageway.
 //!
-//! What stands somewhere depends on the seed, on the place, and on the streets near by, and on nothing else: a drive
-//! that goes on for longer, or comes back, finds the same town.
+//! The content of a place depends on the seed, the place and the streets near by alone, so a longer drive
+//! or a later pass sees the same town.
 
 mod boundary;
 mod building;
@@ -39,22 +39,22 @@ use plot::Plot;
 use random::generator;
 use site::{Built, Site};
 
-/// Metres of a street whose land is divided at a time: what obstructs one stretch does not shift the next.
+/// Length of the stretches of a street that are divided independently of each other, metres.
 const STRETCH_M: f64 = 72.0;
-/// Land is at least this far from all kerbs, metres.
+/// Minimum distance of lots from all kerbs, metres.
 const CLEAR_M: f64 = 1.2;
-/// Metres to go on where land cannot be built on.
+/// Step along the street where no lot fits, metres.
 const SKIP_M: f64 = 2.0;
-/// Narrower rests of a stretch stay empty, metres.
-const LEAST_WIDTH_M: f64 = 4.0;
-/// Uses that are drawn for a place before it is given up.
+/// Narrower remainders of a stretch stay empty, metres.
+const MIN_WIDTH_M: f64 = 4.0;
+/// Number of uses that are tried for a place.
 const DRAWS: usize = 3;
-/// Shares of the intended depth that are tried until a piece of land is free.
+/// Shares of the intended depth that are tried for a lot.
 const DEPTHS: [f64; 3] = [1.0, 0.6, 0.35];
-/// How much there is to see of buildings behind the first row, where that is 1.
+/// Detail of the buildings of the second row relative to the first.
 const DETAIL_BEHIND: f64 = 0.5;
 
-/// The town along these streets; the same for the same seed.
+/// Builds the town along these streets; the same for the same seed.
 pub fn build(config: &TownConfig, streets: &Streets, seed: u64) -> Body {
     Planner::plan(config, streets, seed).built.content
 }
@@ -72,14 +72,14 @@ struct Stretch<'a> {
     key: u64,
     from_m: f64,
     to_m: f64,
-    /// From the kerb to the land, metres.
+    /// Distance from the kerb to the lots, metres.
     pavement_m: f64,
     bays: bool,
-    /// Of the land along the street, metres.
+    /// Depth of the lots, metres.
     depth_m: f64,
 }
 
-/// Puts the town together.
+/// Builds the town.
 struct Planner<'a> {
     config: &'a TownConfig,
     streets: &'a Streets,
@@ -98,7 +98,8 @@ impl<'a> Planner<'a> {
             register: Register::default(),
             built: Built::default(),
         };
-        // First rows before second ones, and driven streets before others: what is seen best is not built over.
+        // First rows before second ones and driven streets before others, since the most visible lots have
+        // priority.
         for row in [Row::First, Row::Second] {
             for driven in [true, false] {
                 planner.line(&lines, row, driven);
@@ -107,7 +108,7 @@ impl<'a> Planner<'a> {
         planner
     }
 
-    /// Builds along all streets that are driven, or all others.
+    /// Builds along all driven streets, or along all others.
     fn line(&mut self, lines: &[Line], row: Row, driven: bool) {
         for (street, line) in lines.iter().enumerate() {
             if self.streets.streets()[street].driven != driven {
@@ -137,8 +138,8 @@ impl<'a> Planner<'a> {
         let (bays, _) = district.kerb_shares();
         let bays = rng.random_bool(bays);
         let pavement_m = rng.random_range(1.8..3.4) + if bays { BAYS_M } else { 0.0 };
-        let (least_m, most_m) = district.depth_m();
-        let depth_m = rng.random_range(least_m..most_m);
+        let (min_m, max_m) = district.depth_m();
+        let depth_m = rng.random_range(min_m..max_m);
         let to_m = (from_m + STRETCH_M).min(frontage.length_m());
         Stretch {
             frontage,
@@ -152,7 +153,7 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Divides a stretch and builds on its pieces, one after the other.
+    /// Divides a stretch into lots and builds on them.
     fn row(&mut self, stretch: &Stretch<'_>, row: Row) {
         let mut rng = generator(&[stretch.key, 1 + row as u64]);
         let detail = if row == Row::First {
@@ -161,7 +162,7 @@ impl<'a> Planner<'a> {
             DETAIL_BEHIND
         };
         let mut at_m = stretch.from_m;
-        while at_m + LEAST_WIDTH_M < stretch.to_m {
+        while at_m + MIN_WIDTH_M < stretch.to_m {
             let claimed = (0..DRAWS).find_map(|_| self.draw(stretch, row, at_m, &mut rng));
             if let Some((kind, lot)) = claimed {
                 self.plot(
@@ -176,7 +177,7 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Draws a use, and takes land for it if there is enough from a station on.
+    /// Draws a use and claims a lot for it, starting at `at_m`.
     fn draw(
         &mut self,
         stretch: &Stretch<'_>,
@@ -185,9 +186,9 @@ impl<'a> Planner<'a> {
         rng: &mut ChaCha8Rng,
     ) -> Option<(Use, Lot)> {
         let kind = stretch.district.draw(row == Row::First, rng);
-        let (least_m, most_m) = kind.width_m();
-        let width_m = rng.random_range(least_m..most_m).min(stretch.to_m - at_m);
-        let lot = if width_m < least_m {
+        let (min_m, max_m) = kind.width_m();
+        let width_m = rng.random_range(min_m..max_m).min(stretch.to_m - at_m);
+        let lot = if width_m < min_m {
             None
         } else {
             self.claim(stretch, row, kind, at_m, width_m)
@@ -195,7 +196,7 @@ impl<'a> Planner<'a> {
         lot.map(|lot| (kind, lot))
     }
 
-    /// Takes the land for a use from a station on, as deep as it is free.
+    /// Claims a lot for a use, starting at `at_m`, as deep as possible.
     fn claim(
         &mut self,
         stretch: &Stretch<'_>,
@@ -220,7 +221,7 @@ impl<'a> Planner<'a> {
         DEPTHS
             .iter()
             .map(|share| share * stretch.depth_m)
-            .filter(|depth_m| *depth_m >= kind.least_depth_m())
+            .filter(|depth_m| *depth_m >= kind.min_depth_m())
             .find_map(|depth_m| {
                 let lot = stretch.frontage.lot(at_m, width_m, out_m, depth_m)?;
                 (lot.is_clear(self.streets, CLEAR_M) && self.register.take(&lot)).then_some(lot)

@@ -1,22 +1,23 @@
-//! Other road users: they move, and so must not be mistaken for the town.
+//! The other road users.
 //!
-//! Each one's place is a function of time alone, so that any instant can be asked for in any order. Those in the driven
-//! vehicle's lane are tied to its progress and never come nearer than vehicles stand in a queue; the others keep off it.
+//! The place of each is a function of time alone, so any time can be asked for in any order. Vehicles in
+//! the ego vehicle's lane follow its progress at no less than the distance of a queue; the others driving_side
+//! clear of it.
 
 mod actor;
+mod actors;
 mod config;
 mod crossings;
-mod crowd;
-mod own_way;
-mod road_user;
+mod ego_route;
+mod kind;
 mod track;
 
 use std::sync::Arc;
 
 use nalgebra::Point2;
 
+pub use actors::FIRST_BODY;
 pub use config::TrafficConfig;
-pub use crowd::FIRST_BODY;
 
 use crate::body::{Movers, Moving};
 use crate::lanes::DrivingSide;
@@ -24,44 +25,44 @@ use crate::path::Path;
 use crate::stream::Stream;
 use crate::streets::Streets;
 use actor::Actor;
-use crowd::Crowd;
-use own_way::OwnWay;
+use actors::Actors;
+use ego_route::EgoRoute;
 
-/// All road users but the driven vehicle.
+/// All road users but the ego vehicle.
 #[derive(Clone)]
 pub struct Traffic {
     path: Arc<dyn Path>,
-    way: Arc<OwnWay>,
+    route: Arc<EgoRoute>,
     actors: Arc<Vec<Actor>>,
 }
 
 impl Traffic {
-    /// The traffic around the first `duration_s` of a drive, the same for the same seed.
+    /// Draws the traffic around the first `duration_s` of a drive, the same for the same seed.
     pub fn new(
         config: &TrafficConfig,
         path: Arc<dyn Path>,
         duration_s: f64,
         streets: &Streets,
-        keep: DrivingSide,
+        driving_side: DrivingSide,
         seed: u64,
     ) -> Self {
         let mut rng = Stream::Traffic.generator(seed);
-        let way = OwnWay::new(path.as_ref(), duration_s, streets, keep);
-        let mut crowd = Crowd::default();
+        let route = EgoRoute::new(path.as_ref(), duration_s, streets, driving_side);
+        let mut actors = Actors::default();
         if config.vehicles_per_km > 0.0 {
-            crowd.own_lane(config, &mut rng);
-            crowd.overtaking(config, &way, &mut rng);
-            crowd.oncoming(config, &way, &mut rng);
-            crowd.bus_stops(&way, &mut rng);
+            actors.ego_lane(config, &mut rng);
+            actors.overtaking(config, &route, &mut rng);
+            actors.oncoming(config, &route, &mut rng);
+            actors.bus_stops(&route, &mut rng);
             let share = (config.vehicles_per_km / 40.0).min(0.8);
-            crossings::add(&mut crowd, streets, &way, keep, share, &mut rng);
+            crossings::add(&mut actors, streets, &route, driving_side, share, &mut rng);
         }
-        crowd.cyclists(config, &way, &mut rng);
-        crowd.pedestrians(config, &way, &mut rng);
+        actors.cyclists(config, &route, &mut rng);
+        actors.pedestrians(config, &route, &mut rng);
         Self {
             path,
-            way: Arc::new(way),
-            actors: Arc::new(crowd.actors),
+            route: Arc::new(route),
+            actors: Arc::new(actors.actors),
         }
     }
 }
@@ -74,17 +75,17 @@ impl Movers for Traffic {
         reach_m: f64,
         see: &mut dyn FnMut(Moving<'a>),
     ) {
-        let own = self.path.pose(time_s);
-        for actor in self.actors.iter().filter(|actor| actor.is_shown(time_s)) {
-            let Some(pose) = actor.track.pose(&self.way, time_s) else {
+        let ego = self.path.pose(time_s);
+        for actor in self.actors.iter().filter(|actor| actor.is_visible(time_s)) {
+            let Some(pose) = actor.track.pose(&self.route, time_s) else {
                 continue;
             };
             if (pose.translation.vector - centre.coords).norm() >= reach_m
-                || actor.runs_into(&own, &pose)
+                || actor.overlaps(&ego, &pose)
             {
                 continue;
             }
-            let velocity = actor.velocity(&self.way, time_s, &pose);
+            let velocity = actor.velocity(&self.route, time_s, &pose);
             see(Moving {
                 body: &actor.body,
                 pose,

@@ -1,43 +1,44 @@
-//! What stands between one piece of land and the next, and what grows there.
+//! Boundaries between lots, and vegetation.
 
 use nalgebra::{Point2, Vector2};
 use rand::Rng;
 
 use super::facade::right_of;
-use super::random::{smooth, stations};
+use super::random::{random_positions, smooth};
 use super::site::{Screen, Site};
 use crate::body::NO_BODY;
 
-/// Metres over which the edge of undergrowth comes and goes.
+/// Scale of the ragged edge of undergrowth, metres.
 const RAGGED_M: f64 = 9.0;
 
-/// What divides land.
+/// A kind of boundary.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Boundary {
     Hedge,
     /// Boards between posts.
     Fence,
-    /// Thin bars: one sees through, and along the bars they are bright.
+    /// Thin bars: nearly transparent, and bright along the bars.
     Railing,
     Wall,
     /// Posts with wires between.
     Wire,
-    /// A crash barrier: long, regular, like a mirror.
+    /// A crash barrier: long, regular and specular.
     Barrier,
 }
 
-/// How a boundary is made. All are lower than a radar on a roof, which sees what is higher behind. Hedges: Weissberger's decay of 1.55 dB a metre of foliage at 77 GHz, both ways.
+/// The properties of a boundary. All are lower than a radar on a roof, which sees higher objects behind
+/// them. Hedges: Weissberger's attenuation of 1.55 dB a metre of foliage at 77 GHz, two-way.
 struct Make {
     screen: Screen,
-    /// Metres between its posts; none at 0.
+    /// Distance between posts, metres; 0 without posts.
     posts_m: f64,
     post_m2: f64,
-    /// Metres between the scatterers of what fills it.
+    /// Distance between the scatterers of the filling, metres.
     filling_m: f64,
     filling_m2: f64,
-    /// How far these stray to both sides, metres.
+    /// Maximum offset of the filling's scatterers to both sides, metres.
     thickness_m: f64,
-    /// Of a flash at a right angle, square metres a piece of 4 m.
+    /// Cross-section of a flash at normal incidence, square metres for each 4 m.
     flash_m2: f64,
 }
 
@@ -72,15 +73,15 @@ impl Boundary {
 }
 
 impl Site<'_> {
-    /// A boundary between two places. It screens where it is longer than a metre.
+    /// Adds a boundary between two places, if it is longer than a metre.
     pub(super) fn boundary(&mut self, kind: Boundary, from: Point2<f64>, to: Point2<f64>) {
-        let way = to - from;
-        let length_m = way.norm();
+        let direction = to - from;
+        let length_m = direction.norm();
         if length_m < 1.0 {
             return;
         }
-        let (along, make, body) = (way / length_m, kind.make(), self.body());
-        let outward = right_of(way);
+        let (along, make, body) = (direction / length_m, kind.make(), self.body());
+        let outward = right_of(direction);
         self.wall(from, to, make.screen, body);
         let posts = if make.posts_m > 0.0 {
             (length_m / make.posts_m) as usize + 1
@@ -95,7 +96,7 @@ impl Site<'_> {
                 body,
             );
         }
-        for at in stations(
+        for at in random_positions(
             &mut self.rng,
             length_m,
             0.5 * make.filling_m,
@@ -112,20 +113,31 @@ impl Site<'_> {
         self.flashes([from, to], outward, make.flash_m2, body);
     }
 
-    /// Smooth pieces, to both sides.
+    /// Smooth pieces, on both sides.
     fn flashes(&mut self, ends: [Point2<f64>; 2], outward: Vector2<f64>, flash_m2: f64, body: u32) {
         if flash_m2 == 0.0 {
             return;
         }
-        let way = ends[1] - ends[0];
-        for share in stations(&mut self.rng, 1.0, 2.0 / way.norm(), 6.0 / way.norm()) {
+        let direction = ends[1] - ends[0];
+        for share in random_positions(
+            &mut self.rng,
+            1.0,
+            2.0 / direction.norm(),
+            6.0 / direction.norm(),
+        ) {
             for side in [-1.0, 1.0] {
-                self.facing(ends[0] + way * share, outward * side, 250.0, flash_m2, body);
+                self.facing(
+                    ends[0] + direction * share,
+                    outward * side,
+                    250.0,
+                    flash_m2,
+                    body,
+                );
             }
         }
     }
 
-    /// A tree: a trunk, branches around it, and a crown that dims what is behind.
+    /// Adds a tree: a trunk, branches around it, and a crown that attenuates.
     pub(super) fn tree(&mut self, place: Point2<f64>, reach_m: f64) {
         let crown_m = self.between(0.5, 1.0);
         self.cloud(place, 1, 0.1, 0.2, 1.5);
@@ -139,7 +151,7 @@ impl Site<'_> {
         self.wall(place - half.yx(), place + half.yx(), crown, NO_BODY);
     }
 
-    /// Bushes, bins, roughness: weak things all over a piece of land.
+    /// Adds weak scatterers all over an area: bushes, bins, roughness.
     pub(super) fn clutter(
         &mut self,
         from: Point2<f64>,
@@ -153,7 +165,7 @@ impl Site<'_> {
         }
     }
 
-    /// Undergrowth: a patch with a ragged edge that fades out.
+    /// Adds undergrowth: an area of weak scatterers with a ragged edge.
     pub(super) fn undergrowth(
         &mut self,
         from: Point2<f64>,

@@ -1,11 +1,11 @@
-//! Buildings: an outline, closed by facades, with the corners that a radar sees best.
+//! Buildings: a closed outline of facades, with corners, which reflect most.
 
 use nalgebra::{Point2, Vector2};
 
 use super::facade::{Facade, Material, right_of};
 use super::site::{Screen, Site};
 
-/// The form of a building on the ground.
+/// The ground plan of a building.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Form {
     Plain,
@@ -13,11 +13,11 @@ pub(super) enum Form {
     Angle,
     /// With a part of the front set back.
     Stepped,
-    /// A nave with a tower before it.
+    /// A nave with a tower in front.
     Church,
 }
 
-/// Room for a building in its site's frame: x along the street, y away from it.
+/// The space for a building in its site's frame: x along the street, y away from it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Room {
     pub x: f64,
@@ -26,16 +26,16 @@ pub(super) struct Room {
     pub depth_m: f64,
 }
 
-/// A building to be put up.
+/// A building.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Building {
     pub room: Room,
     pub form: Form,
     pub front: Material,
     pub rest: Material,
-    /// How much there is to see of its front; see [`Facade::detail`].
+    /// Detail of its front; see [`Facade::detail`].
     pub detail: f64,
-    /// Metres between the balconies on its front; none at 0.
+    /// Distance between the balconies on its front, metres; 0 without balconies.
     pub balconies_m: f64,
 }
 
@@ -43,7 +43,8 @@ pub(super) struct Building {
 const BEHIND: f64 = 0.4;
 
 impl Room {
-    /// The corners of a form in this room, counter-clockwise from the front's left. `share` says where it is divided.
+    /// The corners of a ground plan in this space, counter-clockwise from the front's left. `share` says
+    /// where it is divided.
     fn outline(&self, form: Form, share: f64) -> Vec<Point2<f64>> {
         let (w, d) = (self.width_m, self.depth_m);
         let (cut, step) = (w * share, (0.25 * d).min(3.0));
@@ -123,7 +124,7 @@ impl Site<'_> {
         }
     }
 
-    /// A corner sticking out scatters its edge to all sides; two walls that meet inwards send back what enters.
+    /// Convex corners scatter in all directions; concave ones are retroreflecting dihedrals.
     fn corner(
         &mut self,
         before: Point2<f64>,
@@ -146,7 +147,7 @@ impl Site<'_> {
         }
     }
 
-    /// Floor, rail and wall: two right angles each.
+    /// Balconies: floor, rail and wall form two dihedrals each.
     fn balconies(&mut self, from: Point2<f64>, to: Point2<f64>, every_m: f64, body: u32) {
         let along = (to - from).normalize();
         let outward = right_of(along);
@@ -165,7 +166,7 @@ impl Site<'_> {
         }
     }
 
-    /// A bus stop: glass to the back and the sides, a metal frame.
+    /// Adds a bus shelter: glass at the back and the sides, a metal frame.
     pub(super) fn shelter(&mut self) {
         let body = self.body();
         let corners =

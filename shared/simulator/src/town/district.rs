@@ -1,4 +1,4 @@
-//! Which kind of district a place lies in, and what stands there.
+//! The districts of a town and their land uses.
 
 use nalgebra::Point2;
 use rand::Rng;
@@ -15,12 +15,12 @@ pub(super) enum District {
     Country,
 }
 
-/// What a piece of land is used for.
+/// A land use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Use {
-    /// A house between its neighbours, with a yard behind.
+    /// A terraced house with a yard behind.
     Terrace,
-    /// A house in a garden, with a garage.
+    /// A detached house in a garden, with a garage.
     Detached,
     /// A block of flats with balconies.
     Flats,
@@ -32,15 +32,15 @@ pub(super) enum Use {
     CarPark,
     Field,
     Farm,
-    /// A way between houses.
+    /// A passage between houses.
     Alley,
     /// Sheds and walls behind houses.
     Yards,
 }
 
-/// Metres over which the town changes from houses wall to wall to open land.
+/// Scale on which the density of buildings changes, metres.
 const BUILT_UP_M: f64 = 350.0;
-/// Metres over which campuses come and go.
+/// Scale on which campuses appear, metres.
 const CAMPUS_M: f64 = 450.0;
 
 impl District {
@@ -66,7 +66,7 @@ impl District {
         }
     }
 
-    /// Uses with their shares, in the first row along a street or behind it.
+    /// Uses with their shares, in the first row along a street or in the second.
     fn uses(self, first_row: bool) -> &'static [(Use, f64)] {
         match (self, first_row) {
             (Self::City, true) => &[
@@ -116,7 +116,7 @@ impl District {
         drawn.unwrap_or(&uses[0]).0
     }
 
-    /// Depth of the land along a street, metres: least and most.
+    /// Minimum and maximum depth of the lots, metres.
     pub(super) fn depth_m(self) -> (f64, f64) {
         match self {
             Self::City => (15.0, 24.0),
@@ -126,7 +126,7 @@ impl District {
         }
     }
 
-    /// Share of the stretches of kerb where cars may be parked, and where trees stand in a row.
+    /// Share of the stretches with parking bays, and of those with a row of trees.
     pub(super) fn kerb_shares(self) -> (f64, f64) {
         match self {
             Self::City => (0.55, 0.2),
@@ -138,7 +138,7 @@ impl District {
 }
 
 impl Use {
-    /// Least and greatest width along the street, metres.
+    /// Minimum and maximum width along the street, metres.
     pub(super) fn width_m(self) -> (f64, f64) {
         match self {
             Self::Terrace => (5.5, 12.0),
@@ -155,8 +155,8 @@ impl Use {
         }
     }
 
-    /// Shallowest land that will do, metres.
-    pub(super) fn least_depth_m(self) -> f64 {
+    /// Minimum depth, metres.
+    pub(super) fn min_depth_m(self) -> f64 {
         match self {
             Self::Terrace | Self::Alley | Self::Yards | Self::Green | Self::Field => 7.0,
             Self::CarPark => 12.0,

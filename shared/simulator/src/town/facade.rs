@@ -1,23 +1,24 @@
-//! Facades: what a radar sees of a wall.
+//! Facades: the scatterers of a wall.
 //!
-//! Real scans show a row of houses as short bright pieces and dots with gaps between. So a facade is made of regular
-//! bays, each with a strength of its own: rough wall (many weak scatterers, whose echoes interfere), relief between
-//! the bays that makes rows of beads along a street, and in some of them windows (reveals that look along the street, a pane that flashes at a right angle, a room behind that
-//! smears the echo over range), doors (a recess: two walls and the ground, bright over a wide angle) and drain pipes.
-//! Cross-sections are fitted to the histogram of real scans' powers.
+//! In real scans a row of houses appears as short bright pieces and dots with gaps between. So a facade
+//! consists of regular bays, each with its own strength: rough wall (many weak scatterers, whose echoes
+//! interfere), relief between the bays, which appears as a row of dots along a street, and in some of them
+//! windows (reveals that face along the street, a pane that flashes at normal incidence, a room that
+//! extends the echo in range), doors (a recess: two walls and the ground, bright over a wide angle) and
+//! drain pipes. Cross-sections are fitted to the histogram of powers in real scans.
 
 use nalgebra::{Point2, Rotation2, Vector2};
 use rand::Rng;
 
-use super::random::{normal, stations};
+use super::random::{normal, random_positions};
 use super::site::{Screen, Site};
 
-/// What a wall is made of.
+/// The material of a wall.
 ///
-/// What mirrors follows from the relative permittivities of ITU-R P.2040 at normal incidence (brick 3.9: 0.11,
-/// concrete 5.2: 0.15, glass 6.3: 0.19 for each surface, wood 2.0: 0.03), less what roughness scatters, more for
-/// coated panes. What passes is larger than through the material alone: windows pass more, and in a plane the radar
-/// cannot look over anything.
+/// The mirrored share follows from the relative permittivities of ITU-R P.2040 at normal incidence (brick
+/// 3.9: 0.11, concrete 5.2: 0.15, glass 6.3: 0.19 for each surface, wood 2.0: 0.03), reduced by roughness
+/// and increased by coatings. The transmitted share is larger than that of the material alone, since
+/// windows transmit more and a radar in the plane cannot see over anything.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Material {
     Brick,
@@ -57,22 +58,23 @@ impl Material {
     }
 }
 
-/// One wall, seen from its outside.
+/// One wall, seen from outside.
 pub(super) struct Facade {
-    /// The wall's ends in the site's frame; outside is to the right of the way from the first to the second.
+    /// The wall's ends in the site's frame; outside is on the right when going from the first to the
+    /// second.
     pub from: Point2<f64>,
     pub to: Point2<f64>,
     pub material: Material,
-    /// How much there is to see: 1 towards a street, less on sides and backs.
+    /// Density of detail: 1 towards a street, less on sides and backs.
     pub detail: f64,
-    /// Metres between the middles of its windows.
+    /// Distance between the centres of its windows, metres.
     pub bay_m: f64,
-    /// From the wall to the end of the rooms behind it, metres.
+    /// Depth of the rooms behind the wall, metres.
     pub inside_m: f64,
     pub body: u32,
 }
 
-/// A part of a facade with a strength of its own.
+/// A part of a facade with its own strength.
 struct Bay {
     from: Point2<f64>,
     along: Vector2<f64>,
@@ -87,24 +89,24 @@ impl Bay {
     }
 }
 
-/// Unit vector to the right of a way.
-pub(super) fn right_of(way: Vector2<f64>) -> Vector2<f64> {
-    Vector2::new(way.y, -way.x)
+/// Unit vector to the right of a direction.
+pub(super) fn right_of(direction: Vector2<f64>) -> Vector2<f64> {
+    Vector2::new(direction.y, -direction.x)
         .try_normalize(1e-9)
         .unwrap_or_else(Vector2::x)
 }
 
 impl Site<'_> {
     pub(super) fn facade(&mut self, facade: &Facade) {
-        let way = facade.to - facade.from;
-        let length_m = way.norm();
+        let direction = facade.to - facade.from;
+        let length_m = direction.norm();
         self.wall(
             facade.from,
             facade.to,
             facade.material.screen(),
             facade.body,
         );
-        let (along, outward) = (way / length_m, right_of(way));
+        let (along, outward) = (direction / length_m, right_of(direction));
         let bays = (length_m / facade.bay_m).round().max(1.0);
         let width_m = length_m / bays;
         for number in 0..bays as usize {
@@ -132,7 +134,8 @@ impl Site<'_> {
         if self.chance(door) {
             self.door(bay, facade.body);
         }
-        // Pilasters, gutters, the joints of panels: at every bay's side, seen along the street from far away.
+        // Pilasters, gutters and panel joints at the side of every bay, visible along the street from far
+        // away.
         let relief_m2 = if self.chance(pipe) { 5.0 } else { 1.6 };
         self.facing(
             bay.at(0.0, 0.1),
@@ -144,7 +147,7 @@ impl Site<'_> {
     }
 
     fn rough_wall(&mut self, bay: &Bay, roughness: f64, facade: &Facade) {
-        for at in stations(
+        for at in random_positions(
             &mut self.rng,
             bay.width_m,
             0.1 / facade.detail,
@@ -161,29 +164,35 @@ impl Site<'_> {
         }
     }
 
-    /// Reveals to both sides, a pane, and what is behind it.
+    /// Reveals on both sides, a pane, and the room behind it.
     fn window(&mut self, bay: &Bay, facade: &Facade) {
         let half_m = self.between(0.3, 0.8).min(bay.width_m / 2.0);
         let middle_m = bay.width_m / 2.0;
         for side in [-1.0, 1.0] {
-            let way = Rotation2::new(side * self.rng.random_range(0.7..1.4)) * bay.outward;
+            let direction = Rotation2::new(side * self.rng.random_range(0.7..1.4)) * bay.outward;
             let sharpness = self.rng.random_range(2.0..10.0);
             self.facing(
                 bay.at(middle_m + side * half_m, 0.05),
-                way,
+                direction,
                 sharpness,
                 10.0 * bay.strength,
                 facade.body,
             );
         }
-        // Panes do not hang quite parallel to their wall.
-        let way = Rotation2::new(0.02 * normal(&mut self.rng)) * bay.outward;
+        // Panes are not quite parallel to their wall.
+        let direction = Rotation2::new(0.02 * normal(&mut self.rng)) * bay.outward;
         let pane_m2 = if facade.material == Material::Glass {
             160.0
         } else {
             40.0
         };
-        self.facing(bay.at(middle_m, 0.0), way, 250.0, pane_m2, facade.body);
+        self.facing(
+            bay.at(middle_m, 0.0),
+            direction,
+            250.0,
+            pane_m2,
+            facade.body,
+        );
         for _ in 0..(4.0 * facade.detail).round() as usize {
             let depth_m = -1.8 * (1.0 - self.rng.random::<f64>()).ln();
             let place = bay.at(
@@ -194,14 +203,14 @@ impl Site<'_> {
         }
     }
 
-    /// A recess: its jambs and steps make right angles that look back wherever they are seen from.
+    /// A recess whose jambs and steps form dihedrals.
     fn door(&mut self, bay: &Bay, body: u32) {
         let at = self.between(0.0, bay.width_m);
         for side in [-1.0, 1.0] {
-            let way = bay.outward + bay.along * side;
+            let direction = bay.outward + bay.along * side;
             self.facing(
                 bay.at(at + 0.45 * side, -0.1),
-                way,
+                direction,
                 3.0,
                 5.0 * bay.strength,
                 body,

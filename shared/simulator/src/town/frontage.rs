@@ -1,4 +1,4 @@
-//! One side of a street: where its kerb runs, and the land beyond it.
+//! One side of a street: its kerb and the land beyond.
 
 use gyre_geometry::Pose;
 use nalgebra::{Point2, Vector2};
@@ -7,20 +7,20 @@ use super::land::Lot;
 use super::random::hash;
 use crate::streets::{Street, Streets};
 
-/// Metres between the nodes of a street's line.
+/// Distance between the nodes of a street's line, metres.
 const NODE_M: f64 = 2.0;
-/// Metres before and behind a station over which its direction is taken: a driven line wavers.
+/// Distance to either side over which the direction is averaged, metres, since driven lines waver.
 const TANGENT_M: f64 = 5.0;
-/// How far from its station, along the street, the nearest point of a street may be for a place to be the station's.
+/// Maximum distance along the street between a place's own station and its nearest point of a street,
+/// metres.
 const OWN_M: f64 = 8.0;
 
-/// The middle of a street's carriageway, by metres along it.
+/// The centre line of a street, by distance along it.
 pub(super) struct Line {
     /// Places, [`NODE_M`] apart along the street.
     nodes: Vec<Point2<f64>>,
     length_m: f64,
-    /// What the street's random numbers come from: where it begins. Its number among the streets may change as the
-    /// network grows, and its end as the drive does.
+    /// The seed of the street: where it begins. Its index and its end change when the network grows.
     key: u64,
 }
 
@@ -29,9 +29,11 @@ impl Line {
         let mut nodes = vec![street.centre[0]];
         let mut passed_m = 0.0;
         for ends in street.centre.windows(2) {
-            let (way, length_m) = (ends[1] - ends[0], (ends[1] - ends[0]).norm());
+            let (direction, length_m) = (ends[1] - ends[0], (ends[1] - ends[0]).norm());
             while nodes.len() as f64 * NODE_M <= passed_m + length_m {
-                nodes.push(ends[0] + way * ((nodes.len() as f64 * NODE_M - passed_m) / length_m));
+                nodes.push(
+                    ends[0] + direction * ((nodes.len() as f64 * NODE_M - passed_m) / length_m),
+                );
             }
             passed_m += length_m;
         }
@@ -59,8 +61,8 @@ impl Line {
 
     /// Unit vector along the street.
     fn direction(&self, along_m: f64) -> Vector2<f64> {
-        let way = self.centre(along_m + TANGENT_M) - self.centre(along_m - TANGENT_M);
-        way.try_normalize(1e-6).unwrap_or_else(Vector2::x)
+        let direction = self.centre(along_m + TANGENT_M) - self.centre(along_m - TANGENT_M);
+        direction.try_normalize(1e-6).unwrap_or_else(Vector2::x)
     }
 }
 
@@ -92,17 +94,17 @@ impl<'a> Frontage<'a> {
         self.line.length_m
     }
 
-    /// What the random numbers of both sides come from.
+    /// The seed that both sides share.
     pub(super) fn street_key(&self) -> u64 {
         self.line.key
     }
 
-    /// Share of a regular distance by which this side's things are shifted against the other's.
+    /// Offset of this side's regular objects, as a share of their distance.
     pub(super) fn phase(&self) -> f64 {
         if self.side > 0.0 { 0.0 } else { 0.5 }
     }
 
-    /// What this side's random numbers come from.
+    /// The seed of this side.
     pub(super) fn key(&self) -> u64 {
         self.line.key ^ u64::from(self.side < 0.0)
     }
@@ -120,7 +122,7 @@ impl<'a> Frontage<'a> {
         Pose::new(self.place(along_m, out_m).coords, along.y.atan2(along.x))
     }
 
-    /// Whether a place is this side's to furnish: no other street, and no other part of this one, is nearer.
+    /// Whether a place belongs to this side: no other street, and no other part of this one, is nearer.
     pub(super) fn owns(&self, along_m: f64, place: Point2<f64>) -> bool {
         let nearest = self.streets.nearest(place, 30.0);
         nearest.is_some_and(|found| {
@@ -133,8 +135,8 @@ impl<'a> Frontage<'a> {
         self.streets.clearance_m(place, metres) >= metres
     }
 
-    /// The largest rectangle with its front along the kerb between two stations, `out_m` metres beyond it; none where
-    /// the street bends too sharply. It may lie on other streets.
+    /// The largest rectangle with its front along the kerb between two random_positions, `out_m` metres beyond it;
+    /// none where the street bends too sharply. It may overlap other streets.
     pub(super) fn lot(&self, along_m: f64, width_m: f64, out_m: f64, depth_m: f64) -> Option<Lot> {
         let [front, back] = [out_m, out_m + depth_m].map(|out| {
             let (from, to) = (self.place(along_m, out), self.place(along_m + width_m, out));
@@ -144,13 +146,15 @@ impl<'a> Frontage<'a> {
                 (to, from)
             }
         });
-        let way = (front.1 - front.0).try_normalize(1e-6)?;
-        let usable_m = (front.1 - front.0).norm().min((back.1 - back.0).dot(&way));
+        let direction = (front.1 - front.0).try_normalize(1e-6)?;
+        let usable_m = (front.1 - front.0)
+            .norm()
+            .min((back.1 - back.0).dot(&direction));
         if usable_m < 0.6 * width_m {
             return None;
         }
-        let origin = nalgebra::center(&front.0, &front.1) - way * (usable_m / 2.0);
-        let pose = Pose::new(origin.coords, way.y.atan2(way.x));
+        let origin = nalgebra::center(&front.0, &front.1) - direction * (usable_m / 2.0);
+        let pose = Pose::new(origin.coords, direction.y.atan2(direction.x));
         Some(Lot {
             pose,
             width_m: usable_m,

@@ -1,8 +1,9 @@
-//! What stands between a street and the land along it: posts, signs, trees, parked cars, barriers.
+//! Objects between a street and its lots: posts, signs, trees, parked cars, barriers.
 //!
-//! A post is a metal cylinder, 2π r h² / λ at a right angle (Knott, Shaeffer, Tuley: Radar Cross Section), of whose height
-//! only the first Fresnel zone counts: r = 0.08 m and h = 0.2 m at 20 m make 5 m². A sign is a flat plate, 4π A² / λ², in
-//! the same zone some thousand square metres, of which hardly one hangs upright enough to show half.
+//! A post is a metal cylinder, 2π r h² / λ at normal incidence (Knott, Shaeffer, Tuley: Radar Cross
+//! Section), of which only the first Fresnel zone contributes: r = 0.08 m and h = 0.2 m at 20 m give 5 m².
+//! A sign is a flat plate, 4π A² / λ², some thousand square metres in the same zone, but hardly any sign is
+//! vertical enough to show half of it.
 
 use nalgebra::{Point2, Rotation2, Vector2};
 use rand::Rng;
@@ -17,15 +18,15 @@ use super::site::{Built, Site};
 use super::vehicle::CAR_HALF_M;
 use crate::body::NO_BODY;
 
-/// From the kerb to posts and signs, metres.
+/// Distance from the kerb to posts and signs, metres.
 const POSTS_OUT_M: f64 = 0.5;
-/// From the kerb to the middle of parked cars: they stand in bays beside the carriageway, metres.
+/// Distance from the kerb to the centre of parked cars, metres: they stand in bays beside the carriageway.
 const CARS_OUT_M: f64 = 1.25;
-/// Width of the bays of parked cars, metres.
+/// Width of the parking bays, metres.
 pub(super) const BAYS_M: f64 = 2.4;
 /// Length of a piece of a rail, metres.
 const RAIL_M: f64 = 4.0;
-/// Nothing reaches nearer to any kerb than this, metres.
+/// Minimum distance of all objects from all kerbs, metres.
 const FREE_M: f64 = 0.2;
 
 /// A stretch of one side of a street.
@@ -33,12 +34,12 @@ pub(super) struct Kerb<'a> {
     pub frontage: Frontage<'a>,
     pub config: &'a TownConfig,
     pub district: District,
-    /// Where it begins and ends, metres along the street.
+    /// Its start and end, metres along the street.
     pub from_m: f64,
     pub to_m: f64,
-    /// From the kerb to the land beyond, bays included, metres.
+    /// Distance from the kerb to the lots, including bays, metres.
     pub pavement_m: f64,
-    /// Whether there are bays for cars.
+    /// Whether there are parking bays.
     pub bays: bool,
     pub rng: ChaCha8Rng,
 }
@@ -61,12 +62,12 @@ impl Kerb<'_> {
         self.ground(built);
     }
 
-    /// Where posts stand: behind the bays, if there are any.
+    /// Distance of posts from the kerb, metres: behind the bays if there are any.
     fn posts_out_m(&self) -> f64 {
         POSTS_OUT_M + if self.bays { BAYS_M } else { 0.0 }
     }
 
-    /// A site at a station, if the place is this kerb's and free.
+    /// A site at a station, if the place belongs to this kerb and is free.
     fn site<'s>(
         &mut self,
         along_m: f64,
@@ -81,8 +82,8 @@ impl Kerb<'_> {
         ours.then_some(Site { built, pose, rng })
     }
 
-    /// Whether a rectangle in the frame of a station, of half a length along the kerb and between two distances from the
-    /// frame's origin, reaches over no kerb.
+    /// Whether a rectangle in the frame of a station, of half a length along the kerb and between two
+    /// distances from the frame's origin, stays off all carriageways.
     fn has_room(&self, along_m: f64, out_m: f64, half_m: f64, y: [f64; 2]) -> bool {
         let frame = self.frontage.frame(along_m, out_m);
         let is_clear = |x: f64, y: f64| self.frontage.is_clear(frame * Point2::new(x, y), 0.1);
@@ -91,7 +92,7 @@ impl Kerb<'_> {
             .all(|share| y.into_iter().all(|y| is_clear(half_m * share, y)))
     }
 
-    /// At regular distances along the whole street, by turns to its left and right.
+    /// At regular distances along the whole street, on its left and right in turn.
     fn lamp_posts(&mut self, built: &mut Built) {
         let every_m = 40.0 + (hash(&[self.frontage.street_key()]) % 25) as f64;
         let first = (self.from_m / every_m - self.frontage.phase()).ceil();
@@ -147,7 +148,7 @@ impl Kerb<'_> {
         });
     }
 
-    /// Bollards, a bus stop, railings, a crash barrier: each on few stretches.
+    /// Bollards, a bus stop, railings, a crash barrier: each on a few stretches.
     fn occasional(&mut self, built: &mut Built) {
         let (urban, open) = match self.district {
             District::City => (1.0, 0.0),
@@ -185,7 +186,7 @@ impl Kerb<'_> {
 
     fn bus_stop(&mut self, built: &mut Built) {
         let along_m = self.rng.random_range(self.from_m..self.to_m);
-        // Open to the street, its back at the land's edge.
+        // Open to the street, with its back to the lots.
         let out_m = self.pavement_m - 1.3;
         if out_m > POSTS_OUT_M
             && self.has_room(along_m, out_m, 1.8, [0.0, 1.2])
@@ -195,7 +196,7 @@ impl Kerb<'_> {
         }
     }
 
-    /// A rail along the kerb, in pieces that follow its bends.
+    /// Adds a rail along the kerb, in pieces that follow its bends.
     fn rail(&mut self, kind: Boundary, built: &mut Built) {
         let out_m = self.posts_out_m();
         let mut along_m = self.from_m;
@@ -217,7 +218,7 @@ impl Kerb<'_> {
         }
     }
 
-    /// Kerb stones, drains, grass and litter between the carriageway and the land: weak, and everywhere.
+    /// Adds weak scatterers everywhere: kerb stones, drains, grass and litter.
     fn ground(&mut self, built: &mut Built) {
         self.along(2.0, 6.0, |kerb, along_m| {
             let middle_m = kerb.pavement_m / 2.0;
@@ -236,25 +237,25 @@ impl Kerb<'_> {
         });
     }
 
-    /// Calls for stations with random distances between `least_m` and `most_m` along the stretch.
-    fn along(&mut self, least_m: f64, most_m: f64, mut call: impl FnMut(&mut Self, f64)) {
-        let mut along_m = self.from_m + self.rng.random_range(0.0..most_m);
+    /// Calls `call` for stations along the stretch at random distances between `min_m` and `max_m`.
+    fn along(&mut self, min_m: f64, max_m: f64, mut call: impl FnMut(&mut Self, f64)) {
+        let mut along_m = self.from_m + self.rng.random_range(0.0..max_m);
         while along_m < self.to_m {
             call(self, along_m);
-            along_m += self.rng.random_range(least_m..most_m);
+            along_m += self.rng.random_range(min_m..max_m);
         }
     }
 }
 
 impl Site<'_> {
-    /// A lamp post: pole, foot and door, close together.
+    /// Adds a lamp post: pole, foot and door, close together.
     pub(super) fn post(&mut self, place: Point2<f64>) {
         for median_m2 in [3.0, 1.0, 0.5] {
             self.cloud(place, 1, 0.1, 0.2, median_m2);
         }
     }
 
-    /// A pole with a plate against the traffic, whose bends and brackets reflect to all sides.
+    /// Adds a pole with a plate facing the traffic, whose bends and brackets reflect in all directions.
     fn sign(&mut self) {
         let body = self.body();
         let turn = Rotation2::new(0.08 * normal(&mut self.rng));

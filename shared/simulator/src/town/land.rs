@@ -1,4 +1,4 @@
-//! Land: which of it is taken, so that nothing is built twice.
+//! The register of lots, which keeps them from overlapping.
 
 use std::collections::BTreeMap;
 
@@ -7,23 +7,24 @@ use nalgebra::{Point2, Vector2};
 
 use crate::streets::Streets;
 
-/// Metres a side of a cell of the register.
+/// Side of a cell of the register, metres.
 const CELL_M: f64 = 24.0;
-/// Neighbours may overlap by this much, metres: rounding, where two share a side.
+/// Permitted overlap of neighbours, metres, for rounding.
 const TOLERANCE_M: f64 = 0.02;
-/// Metres between the places of a lot that are held against the streets: less than the narrowest street is wide.
+/// Distance between the places of a lot that are checked against the streets, metres: less than the width
+/// of any street.
 const SAMPLE_M: f64 = 3.0;
 
 /// A rectangle of land beside a street.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Lot {
-    /// Its corner on the street: x along its front, y away from the street.
+    /// The pose of its corner on the street: x along its front, y away from the street.
     pub pose: Pose,
-    /// Along the front, metres.
+    /// Width along the front, metres.
     pub width_m: f64,
-    /// Of the street that it lies along, metres: more than its width in bends to its side.
+    /// Length of the street that it takes, metres: more than its width on the inside of bends.
     pub frontage_m: f64,
-    /// Away from the street, metres.
+    /// Depth away from the street, metres.
     pub depth_m: f64,
 }
 
@@ -54,7 +55,7 @@ impl Lot {
         })
     }
 
-    /// Whether the two have land in common: no side of either separates them.
+    /// Whether the two overlap: no side of either separates them.
     pub(super) fn overlaps(&self, other: &Self) -> bool {
         let (ours, theirs) = (self.corners(), other.corners());
         [self, other].into_iter().all(|lot| {
@@ -81,7 +82,7 @@ pub(super) struct Register {
 }
 
 impl Register {
-    /// Takes a lot, if all of it is still free.
+    /// Takes a lot, if all of it is free.
     pub(super) fn take(&mut self, lot: &Lot) -> bool {
         let taken = |number: &u32| self.lots[*number as usize].overlaps(lot);
         if cells(lot).any(|cell| {

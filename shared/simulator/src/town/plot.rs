@@ -1,4 +1,4 @@
-//! What stands on a piece of land, by its use.
+//! The buildings and other objects of a lot, by its use.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -14,26 +14,26 @@ use super::facade::Material;
 use super::random::generator;
 use super::site::Site;
 
-/// Between a house and the side of its land where it has neighbours, metres.
+/// Distance between a terraced house and the side of its lot, metres.
 const PARTY_M: f64 = 0.03;
 
-/// A piece of land, from the street (`y` = 0) backwards; what is built on it stays inside.
+/// A lot to be built on, from the street (`y` = 0) backwards; everything stays inside.
 pub(super) struct Plot<'a, 's> {
     pub site: Site<'s>,
     pub config: &'a TownConfig,
     pub width_m: f64,
     pub depth_m: f64,
-    /// What the plots of a stretch draw in common from.
+    /// The seed that the plots of a stretch share.
     pub row_key: u64,
-    /// How much there is to see of its buildings: 1 along a street, less behind.
+    /// Detail of its buildings: 1 along a street, less behind.
     pub detail: f64,
 }
 
-/// What the houses of a terrace have in common.
+/// The common properties of a terrace.
 struct TerraceStyle {
     setback_m: f64,
     front: Material,
-    /// What stands before the houses.
+    /// The boundary in front of the houses.
     before: Option<Boundary>,
 }
 
@@ -101,7 +101,7 @@ impl Plot<'_, '_> {
         });
     }
 
-    /// A boundary across the plot, `y` metres from the street, with a gap for a gate.
+    /// Adds a boundary across the plot, `y` metres from the street, with a gap for a gate.
     fn across(&mut self, kind: Boundary, y: f64) {
         let gate_m = self.site.between(1.0, (self.width_m - 4.0).max(1.0));
         let [left, gate, beyond, right] =
@@ -112,7 +112,7 @@ impl Plot<'_, '_> {
         }
     }
 
-    /// A boundary along the plot's left side, from `y` to its back.
+    /// Adds a boundary along the plot's left side, from `y` to its back.
     fn aside(&mut self, kind: Boundary, y: f64) {
         let (from, to) = (self.at(0.1, y + 0.2), self.at(0.1, self.depth_m - 0.2));
         if from.y < to.y {
@@ -120,7 +120,7 @@ impl Plot<'_, '_> {
         }
     }
 
-    /// So many trees for a thousand square metres, from `y` to the back.
+    /// Adds trees, with a density for a thousand square metres, from `y` to the back.
     fn trees(&mut self, y: f64, per_1000_m2: f64) {
         let area_m2 = self.width_m * (self.depth_m - y).max(0.0);
         let wanted = per_1000_m2 * 1e-3 * area_m2 * self.config.trees;
@@ -141,7 +141,7 @@ impl Plot<'_, '_> {
             .clutter(Point2::new(0.0, y), size, per_m2, median_m2);
     }
 
-    /// Grass, and on a share of plots undergrowth that reflects as a whole.
+    /// Adds grass, and on a share of plots undergrowth that covers everything.
     fn ground(&mut self, rough: f64) {
         self.clutter(0.5, 0.04, 0.02);
         if self.site.chance(rough) {
@@ -151,7 +151,7 @@ impl Plot<'_, '_> {
         }
     }
 
-    /// A house of a row that was built together: most of them share setback and material.
+    /// A terraced house: most houses of a terrace share setback and material.
     fn terrace(&mut self) {
         let style = TerraceStyle::draw(&mut if self.site.chance(0.75) {
             generator(&[self.row_key])
@@ -180,7 +180,7 @@ impl Plot<'_, '_> {
         self.yards(style.setback_m + depth_m);
     }
 
-    /// What is behind houses: a wall to the neighbour and at the back, a shed, bins.
+    /// Behind houses: walls at one side and at the back, a shed, bins.
     fn yards(&mut self, y: f64) {
         if self.depth_m - y < 3.0 {
             return;
@@ -242,7 +242,7 @@ impl Plot<'_, '_> {
         self.clutter(0.5, 0.04, 0.03);
     }
 
-    /// A garage beside the house, and perhaps a car before it.
+    /// A garage beside the house, and on some plots a car in front of it.
     fn drive(&mut self, x: f64, garden_m: f64) {
         let y = garden_m + self.site.between(1.0, 3.0);
         if self.site.chance(0.6) {

@@ -1,7 +1,7 @@
-//! Random quantities that the town is made of.
+//! Random quantities of the town.
 //!
-//! Nothing is drawn from one long stream: each thing has a generator of its own, seeded by what and where it is.
-//! So a place looks the same whatever else is built, before or after it.
+//! Each object has its own generator, seeded by what and where it is, so a place looks the same whatever
+//! else is built.
 
 use std::f64::consts::TAU;
 
@@ -9,7 +9,7 @@ use nalgebra::Point2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Mixes keys to a number that looks random (the finalizer of SplitMix64, Steele et al. 2014, a key at a time).
+/// Mixes keys to a pseudo-random number (the finalizer of SplitMix64, Steele et al. 2014, for each key).
 pub fn hash(keys: &[u64]) -> u64 {
     keys.iter().fold(0x9e37_79b9_7f4a_7c15, |state, key| {
         let mut mixed = (state ^ key).wrapping_add(0x9e37_79b9_7f4a_7c15);
@@ -19,7 +19,7 @@ pub fn hash(keys: &[u64]) -> u64 {
     })
 }
 
-/// The generator of the thing with these keys.
+/// The generator of the object with these keys.
 pub fn generator(keys: &[u64]) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(hash(keys))
 }
@@ -30,23 +30,23 @@ pub fn normal(rng: &mut impl Rng) -> f64 {
     radius * (TAU * rng.random::<f64>()).cos()
 }
 
-/// A log-normal number: `median`, times or divided by a spread given in decibels (one standard deviation).
+/// A log-normal number with a median and a standard deviation in decibels.
 pub fn spread(rng: &mut impl Rng, median: f64, deviation_db: f64) -> f64 {
     median * 10f64.powf(1.35 * deviation_db * normal(rng) / 10.0)
 }
 
-/// Distances along a line with random gaps between `least` and `most`, beginning with such a gap, all below `end`.
-pub fn stations(rng: &mut impl Rng, end: f64, least: f64, most: f64) -> Vec<f64> {
+/// Positions along a line, all below `end`, with random gaps between `min` and `max`.
+pub fn random_positions(rng: &mut impl Rng, end: f64, min: f64, max: f64) -> Vec<f64> {
     let mut all = Vec::new();
-    let mut at = rng.random_range(0.0..most);
+    let mut at = rng.random_range(0.0..max);
     while at < end {
         all.push(at);
-        at += rng.random_range(least..most);
+        at += rng.random_range(min..max);
     }
     all
 }
 
-/// A smooth random function of place, 0 to 1, that changes over about `cell_m` metres.
+/// A smooth random function of place, 0 to 1, that changes on the scale `cell_m`, metres.
 pub fn smooth(key: u64, place: Point2<f64>, cell_m: f64) -> f64 {
     let scaled = place / cell_m;
     let (column, row) = (scaled.x.floor(), scaled.y.floor());
@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn neighbouring_keys_give_unlike_generators() {
+    fn neighbouring_keys_give_different_generators() {
         let mut firsts: Vec<u64> = (0..1000)
             .map(|key| generator(&[1, key]).random::<u64>() >> 40)
             .collect();

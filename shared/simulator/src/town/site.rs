@@ -1,4 +1,4 @@
-//! A building site: where things are put together in a frame of their own.
+//! A building site: a frame in which objects are put together.
 
 use gyre_geometry::Pose;
 use nalgebra::{Point2, Vector2};
@@ -8,21 +8,21 @@ use rand_chacha::ChaCha8Rng;
 use super::random::{normal, spread};
 use crate::body::{Aspect, Body, NO_BODY, Scatterer, Wall};
 
-/// What has been built, and the number of the last body.
+/// Everything built so far, and the number of the last body.
 #[derive(Default)]
 pub(super) struct Built {
     pub content: Body,
     last_body: u32,
 }
 
-/// A place with a frame, whose things are drawn from a generator of its own. All coordinates are in that frame.
+/// A place with a frame and a random generator. All coordinates are in that frame.
 pub(super) struct Site<'a> {
     pub built: &'a mut Built,
     pub pose: Pose,
     pub rng: ChaCha8Rng,
 }
 
-/// How much of the power a wall lets through, there and back, and how much it mirrors.
+/// Two-way transmitted share and mirrored share of a wall's power.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Screen {
     pub transmission: f64,
@@ -30,7 +30,7 @@ pub(super) struct Screen {
 }
 
 impl Site<'_> {
-    /// A number for a new body.
+    /// The number of a new body.
     pub(super) fn body(&mut self) -> u32 {
         self.built.last_body += 1;
         self.built.last_body
@@ -40,15 +40,15 @@ impl Site<'_> {
         self.rng.random_bool(share.clamp(0.0, 1.0))
     }
 
-    pub(super) fn between(&mut self, least: f64, most: f64) -> f64 {
-        if least < most {
-            self.rng.random_range(least..most)
+    pub(super) fn between(&mut self, min: f64, max: f64) -> f64 {
+        if min < max {
+            self.rng.random_range(min..max)
         } else {
-            least
+            min
         }
     }
 
-    /// A scatterer that reflects to all sides, of `median_m2` with a spread of `deviation_db`.
+    /// Adds a scatterer that reflects in all directions, of `median_m2` with a spread of `deviation_db`.
     pub(super) fn point(
         &mut self,
         place: Point2<f64>,
@@ -59,16 +59,16 @@ impl Site<'_> {
         self.push(place, median_m2, deviation_db, Aspect::AllRound, body);
     }
 
-    /// A scatterer that reflects towards `way` (any length): see [`Aspect::Facing`].
+    /// Adds a scatterer that reflects towards `direction` (of any length): see [`Aspect::Facing`].
     pub(super) fn facing(
         &mut self,
         place: Point2<f64>,
-        way: Vector2<f64>,
+        direction: Vector2<f64>,
         sharpness: f64,
         median_m2: f64,
         body: u32,
     ) {
-        let normal = self.pose * way.try_normalize(1e-9).unwrap_or_else(Vector2::x);
+        let normal = self.pose * direction.try_normalize(1e-9).unwrap_or_else(Vector2::x);
         self.push(
             place,
             median_m2,
@@ -110,7 +110,8 @@ impl Site<'_> {
         });
     }
 
-    /// Scatterers of no body around a place: normally distributed, and never further than `reach_m` in x or y.
+    /// Adds scatterers without a body around a place: normally distributed, at most `reach_m` away in x and
+    /// y.
     pub(super) fn cloud(
         &mut self,
         place: Point2<f64>,
@@ -127,7 +128,7 @@ impl Site<'_> {
         }
     }
 
-    /// Puts a finished body, given around its own origin, at a pose.
+    /// Adds a body, given around its own origin, at a pose.
     pub(super) fn place(&mut self, body: &Body, pose: &Pose) {
         let pose = self.pose * pose;
         self.built

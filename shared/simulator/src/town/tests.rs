@@ -6,7 +6,7 @@ use crate::occlusion::crossing;
 use crate::streets::Street;
 use crate::world::World;
 
-/// A street from a place, `turn_rad` to the left for every metre.
+/// A street from a place, with a constant curvature `turn_rad`, rad/m to the left.
 fn street(
     from: (f64, f64),
     heading_rad: f64,
@@ -27,7 +27,7 @@ fn street(
     }
 }
 
-/// A street that is driven, with bends to both sides, and others that leave it at odd angles, or cross it.
+/// A driven street with bends in both directions, and others that branch off at various angles or cross it.
 fn network() -> Streets {
     let mut bends = street((0.0, 0.0), 0.0, 200.0, 0.0, true);
     let last = bends.centre[bends.centre.len() - 1];
@@ -99,7 +99,7 @@ fn carriageways_are_free_in_bends_and_at_junctions_of_any_angle() {
 }
 
 #[test]
-fn one_sees_along_every_straight_street() {
+fn every_straight_street_is_free_from_end_to_end() {
     let streets = network();
     let world = World::new(build(&config(Character::City), &streets, 3));
     for (street, length_m) in [(0, 200.0), (1, 148.0), (5, 148.0), (6, 128.0)] {
@@ -125,21 +125,22 @@ fn buildings_do_not_overlap() {
             .collect();
         assert!(solid.len() > 20, "{character:?}: {}", solid.len());
         for (index, wall) in solid.iter().enumerate() {
-            // Neighbours may share a wall or a corner: shrunk by some centimetres, it must not reach the other.
+            // Neighbours may share a wall or a corner, but a building shrunk by some centimetres must not
+            // touch the other.
             let inset = (wall.to - wall.from).normalize() * 0.05;
             for other in solid[index + 1..]
                 .iter()
                 .filter(|other| other.body != wall.body)
             {
-                let way = wall.to - wall.from - 2.0 * inset;
+                let direction = wall.to - wall.from - 2.0 * inset;
                 let shorter = (other.to - other.from).normalize() * 0.05;
                 let other = Wall {
                     from: other.from + shorter,
                     to: other.to - shorter,
                     ..**other
                 };
-                let across = way.perp(&(other.to - other.from)).abs() > 1e-3;
-                let crossed = across && crossing(wall.from + inset, way, &other).is_some();
+                let across = direction.perp(&(other.to - other.from)).abs() > 1e-3;
+                let crossed = across && crossing(wall.from + inset, direction, &other).is_some();
                 assert!(
                     !crossed,
                     "seed {seed}, {character:?}: {wall:?} and {other:?}"
@@ -172,7 +173,7 @@ fn same_seed_builds_the_same_town_and_another_seed_another() {
 }
 
 #[test]
-fn a_place_looks_the_same_when_its_street_goes_on_for_longer() {
+fn a_place_looks_the_same_when_its_street_becomes_longer() {
     let place = |town: &Body| -> Vec<(Point2<f64>, f64)> {
         let here = town.scatterers.iter().filter(|s| s.position.x < 350.0);
         here.map(|s| (s.position, s.cross_section_m2)).collect()
@@ -180,7 +181,7 @@ fn a_place_looks_the_same_when_its_street_goes_on_for_longer() {
     let side = street((200.0, 0.0), 1.3, 200.0, 0.0, false);
     let town = |length_m: f64, farther: Option<Street>| {
         let mut streets = vec![street((0.0, 0.0), 0.0, length_m, 0.0, true)];
-        // It begins farther on, but comes before the others.
+        // The longer street begins farther on, but comes before the others.
         streets.extend(farther);
         streets.push(side.clone());
         place(&build(&TownConfig::default(), &Streets::new(streets), 9))
@@ -233,7 +234,7 @@ fn a_town_is_as_dense_as_its_character() {
 }
 
 #[test]
-fn streets_without_length_and_no_streets_at_all_are_survived() {
+fn streets_without_length_and_no_streets_give_a_town_too() {
     let point = Street {
         centre: vec![Point2::origin(); 2],
         half_width_m: 3.0,

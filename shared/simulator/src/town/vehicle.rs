@@ -1,21 +1,23 @@
-//! Cars, parked or under way.
+//! Cars.
 
 use gyre_geometry::Pose;
 use nalgebra::{Point2, Rotation2, Vector2};
 use rand::Rng;
 
-use super::random::{normal, spread, stations};
+use super::random::{normal, random_positions, spread};
 use super::site::Site;
 use crate::body::{Aspect, Body, Scatterer, Wall};
 
-/// Half a car's length and width, metres.
+/// Half of a car's length and width, metres.
 pub(super) const CAR_HALF_M: (f64, f64) = (2.15, 0.9);
-/// Power that passes a car (through its windows, below it, above it to what is higher), there and back.
+/// Two-way share of the power that passes a car: through its windows, below it, and above it to what is
+/// higher.
 const CAR_TRANSMISSION: f64 = 0.8;
 
-/// A car around its own origin, x ahead: bright corners, wheels and plates, and sides that hide what is behind.
+/// A car around its own origin, x ahead: bright corners, wheels and plates, and sides that hide what is
+/// behind.
 ///
-/// All together some 10 m² to each side, the order that is reported of passenger cars at 77 GHz.
+/// The sum is about 10 m² on each side, the order reported for passenger cars at 77 GHz.
 pub(crate) fn car(body: u32, rng: &mut impl Rng) -> Body {
     let (length, width) = CAR_HALF_M;
     let corners = [
@@ -35,9 +37,9 @@ pub(crate) fn car(body: u32, rng: &mut impl Rng) -> Body {
             aspect: Aspect::AllRound,
             body,
         });
-        let way = to - from;
-        let outward = Vector2::new(-way.y, way.x).normalize();
-        for share in stations(rng, 1.0, 0.1, 0.4) {
+        let direction = to - from;
+        let outward = Vector2::new(-direction.y, direction.x).normalize();
+        for share in random_positions(rng, 1.0, 0.1, 0.4) {
             let normal = Rotation2::new(rng.random_range(-0.5..0.5)) * outward;
             let aspect = Aspect::Facing {
                 normal,
@@ -45,14 +47,14 @@ pub(crate) fn car(body: u32, rng: &mut impl Rng) -> Body {
             };
             let cross_section_m2 = spread(rng, 1.5, 5.0);
             car.scatterers.push(Scatterer {
-                position: from + way * share,
+                position: from + direction * share,
                 cross_section_m2,
                 aspect,
                 body,
             });
         }
     }
-    // Either diagonal stands for the whole outline: whatever passes the car crosses one at least.
+    // The diagonals stand for the outline: a line through the car crosses at least one of them.
     let diagonal = |from: Point2<f64>, to: Point2<f64>| Wall {
         from,
         to,
@@ -68,7 +70,7 @@ pub(crate) fn car(body: u32, rng: &mut impl Rng) -> Body {
 }
 
 impl Site<'_> {
-    /// A car about `place`, ahead to `heading_rad` or the opposite.
+    /// Adds a parked car at `place`, facing `heading_rad` or the opposite direction.
     pub(super) fn parked_car(&mut self, place: Point2<f64>, heading_rad: f64) {
         let body = self.body();
         let car = car(body, &mut self.rng);

@@ -1,21 +1,21 @@
-//! How much traffic there is: the section `[simulation.traffic]`.
+//! The density of traffic: the section `[simulation.traffic]`.
 
 use serde::{Deserialize, Serialize};
 
 use crate::error::SimulatorError;
 use crate::limits::require_within;
 
-/// How much moves.
+/// The density of traffic.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrafficConfig {
-    /// Motor vehicles on a kilometre of each lane. Zero: none, not even in side streets.
+    /// Motor vehicles on a kilometre of each lane; 0 for none, not even in side streets.
     pub vehicles_per_km: f64,
-    /// Spread of their speeds, as a share: how much gaps and pace vary.
+    /// Relative spread of their speeds, by which gaps and paces vary.
     pub speed_spread: f64,
-    /// Cyclists that are overtaken on a kilometre.
+    /// Cyclists that the ego vehicle overtakes, for each kilometre.
     pub cyclists_per_km: f64,
-    /// Pedestrians on the pavements of a kilometre.
+    /// Pedestrians on the pavements, for each kilometre.
     pub pedestrians_per_km: f64,
 }
 
@@ -31,7 +31,7 @@ impl Default for TrafficConfig {
 }
 
 impl TrafficConfig {
-    /// An empty road.
+    /// No traffic.
     pub fn none() -> Self {
         Self {
             vehicles_per_km: 0.0,
@@ -41,7 +41,10 @@ impl TrafficConfig {
         }
     }
 
-    /// Refuses what cannot be simulated, naming the key.
+    /// Checks that all values can be simulated.
+    ///
+    /// # Errors
+    /// [`SimulatorError::Config`] with the key of the first value that cannot.
     pub fn validate(&self) -> Result<(), SimulatorError> {
         require_within("traffic.vehicles_per_km", self.vehicles_per_km, 0.0, 80.0)?;
         require_within("traffic.speed_spread", self.speed_spread, 0.0, 0.8)?;

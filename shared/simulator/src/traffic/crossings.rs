@@ -1,4 +1,4 @@
-//! Who waits in side streets while the driven vehicle passes, and crosses when it has gone.
+//! Vehicles that wait in side streets while the ego vehicle passes, and cross after it.
 
 use gyre_geometry::Pose;
 use nalgebra::{Point2, Vector2};
@@ -6,54 +6,55 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 use super::actor::Actor;
-use super::crowd::Crowd;
-use super::own_way::OwnWay;
-use super::road_user::Kind;
+use super::actors::Actors;
+use super::ego_route::EgoRoute;
+use super::kind::Kind;
 use super::track::{Crossing, Track};
 use crate::lanes::{DrivingSide, LANE_M};
 use crate::path::spline::{Sample, UniformSpline};
 use crate::streets::{Street, Streets};
 
-/// Vehicles are shown while the driven one is so near to the junction, metres.
+/// Vehicles are visible while the ego vehicle is nearer to the junction than this, metres.
 const SEEN_M: f64 = 170.0;
-/// And keep off the junction while it is so near, metres.
+/// They wait while it is nearer than this, metres.
 const KEEP_OFF_M: f64 = 40.0;
-/// From a kerb to the nose of one who waits, metres; between two who wait.
+/// Distance from the kerb to the front of the first waiting vehicle, and between waiting vehicles, metres.
 const STOP_M: f64 = 1.5;
 const BETWEEN_M: f64 = 2.5;
-/// Longest queue.
+/// Maximum length of a queue.
 const LONGEST: usize = 3;
-/// Length of a side street that is driven, metres.
+/// Length of a side street that vehicles drive along, metres.
 const PATH_M: f64 = 120.0;
-/// Nobody comes out of a shorter street, metres.
+/// Minimum length of a side street with vehicles, metres.
 const SHORTEST_M: f64 = 30.0;
-/// How near to the junction's middle others must not be while somebody crosses, metres, and for how long, seconds.
+/// Others must not be nearer to the junction's centre than this, metres, during this time, seconds, for a
+/// vehicle to cross.
 const CLEAR_M: f64 = 9.0;
 const CLEAR_S: f64 = 5.0;
 
-/// A junction of side streets with the way.
+/// A junction of side streets with the ego vehicle's route.
 struct Junction<'a> {
     place: Point2<f64>,
-    /// From its middle to where the side streets begin, metres.
+    /// Distance from its centre to the side streets, metres.
     kerb_m: f64,
     from: &'a Street,
-    /// The side street across, if there is one.
+    /// The opposite side street, if there is one.
     to: Option<&'a Street>,
 }
 
-/// Adds those who come out of side streets; `share` of the streets have any.
+/// Adds the vehicles of side streets; `share` of the streets have some.
 pub fn add(
-    crowd: &mut Crowd,
+    actors: &mut Actors,
     streets: &Streets,
-    way: &OwnWay,
-    keep: DrivingSide,
+    route: &EgoRoute,
+    driving_side: DrivingSide,
     share: f64,
     rng: &mut ChaCha8Rng,
 ) {
     for junction in junctions(streets) {
-        for pass in passes(&junction, way) {
+        for pass in passes(&junction, route) {
             if rng.random_bool(share) {
-                queue(crowd, &junction, way, pass, keep, rng);
+                queue(actors, &junction, route, pass, driving_side, rng);
             }
         }
     }
@@ -93,30 +94,31 @@ fn junctions(streets: &Streets) -> impl Iterator<Item = Junction<'_>> {
 }
 
 fn segment_distance_m(ends: &[Point2<f64>], place: Point2<f64>) -> f64 {
-    let way = ends[1] - ends[0];
-    let share = ((place - ends[0]).dot(&way) / way.norm_squared().max(1e-9)).clamp(0.0, 1.0);
-    (ends[0] + way * share - place).norm()
+    let route = ends[1] - ends[0];
+    let share = ((place - ends[0]).dot(&route) / route.norm_squared().max(1e-9)).clamp(0.0, 1.0);
+    (ends[0] + route * share - place).norm()
 }
 
-/// Direction in which a side street leaves its junction.
+/// The direction in which a side street leaves its junction.
 fn direction(street: &Street) -> Vector2<f64> {
     street.at(10.0).rotation * Vector2::x()
 }
 
-/// A time that the driven vehicle spends near a junction: when it is seen, and when it is close, seconds.
+/// A pass of the ego vehicle: the times during which it is within [`SEEN_M`] and within [`KEEP_OFF_M`],
+/// seconds.
 #[derive(Clone, Copy)]
 struct Pass {
     seen_s: [f64; 2],
     close_s: [f64; 2],
 }
 
-fn passes(junction: &Junction<'_>, way: &OwnWay) -> Vec<Pass> {
+fn passes(junction: &Junction<'_>, route: &EgoRoute) -> Vec<Pass> {
     let mut passes: Vec<Pass> = Vec::new();
     let mut open: Option<Pass> = None;
-    for step in 0..=(2.0 * way.duration_s()) as usize {
+    for step in 0..=(2.0 * route.duration_s()) as usize {
         let time_s = 0.5 * step as f64;
-        let own = way.pose(way.progress_m(time_s), 0.0).translation.vector;
-        let distance_m = (own - junction.place.coords).norm();
+        let ego = route.pose(route.progress_m(time_s), 0.0).translation.vector;
+        let distance_m = (ego - junction.place.coords).norm();
         if distance_m > SEEN_M {
             passes.extend(open.take());
             continue;
@@ -135,27 +137,27 @@ fn passes(junction: &Junction<'_>, way: &OwnWay) -> Vec<Pass> {
     passes
 }
 
-/// A queue that is there when the vehicle passes; what it waits for once the vehicle has gone is a gap in the traffic.
+/// Adds a queue that waits while the ego vehicle passes, and then crosses in a gap of the traffic.
 fn queue(
-    crowd: &mut Crowd,
+    actors: &mut Actors,
     junction: &Junction<'_>,
-    way: &OwnWay,
+    route: &EgoRoute,
     pass: Pass,
-    keep: DrivingSide,
+    driving_side: DrivingSide,
     rng: &mut ChaCha8Rng,
 ) {
-    let (path, length_m, nose_m) = path(junction, keep);
+    let (path, length_m, nose_m) = path(junction, driving_side);
     let mut stop_m = nose_m;
     let mut from_s = pass.close_s[0] - rng.random_range(-2.0..12.0);
     let mut until_s = pass.close_s[1] + rng.random_range(0.5..3.0);
     for _ in 0..rng.random_range(1..=LONGEST) {
-        let kind = Kind::motorised(rng);
+        let kind = Kind::motor_vehicle(rng);
         let (half_m, _) = kind.half_m();
         if stop_m < 2.0 * half_m + 5.0 {
             break;
         }
         until_s = match junction.to {
-            Some(_) => gap(crowd, junction.place, way, until_s, pass.seen_s[1]),
+            Some(_) => gap(actors, junction.place, route, until_s, pass.seen_s[1]),
             None => f64::INFINITY,
         };
         let speed_mps = rng.random_range(7.0..10.0);
@@ -167,19 +169,20 @@ fn queue(
             speed_mps,
             length_m,
         });
-        crowd.add(kind, pass.seen_s, track, rng);
+        actors.add(kind, pass.seen_s, track, rng);
         stop_m -= 2.0 * half_m + BETWEEN_M;
         from_s += 2.5;
         until_s += 2.5;
     }
 }
 
-/// The first time from `from_s` on at which nobody else is on the junction; never if there is none before `until_s`.
-fn gap(crowd: &Crowd, place: Point2<f64>, way: &OwnWay, from_s: f64, until_s: f64) -> f64 {
+/// The first time from `from_s` on at which the junction is free; infinite if there is none before
+/// `until_s`.
+fn gap(actors: &Actors, place: Point2<f64>, route: &EgoRoute, from_s: f64, until_s: f64) -> f64 {
     let there = |actor: &Actor, time_s: f64| {
-        let on_way = !matches!(actor.track, Track::Crossing(_)) && actor.is_shown(time_s);
+        let on_way = !matches!(actor.track, Track::Crossing(_)) && actor.is_visible(time_s);
         let pose = if on_way {
-            actor.track.pose(way, time_s)
+            actor.track.pose(route, time_s)
         } else {
             None
         };
@@ -188,7 +191,7 @@ fn gap(crowd: &Crowd, place: Point2<f64>, way: &OwnWay, from_s: f64, until_s: f6
     let mut start_s = from_s;
     let mut time_s = from_s;
     while time_s < (start_s + CLEAR_S).min(until_s) {
-        if crowd.actors.iter().any(|actor| there(actor, time_s)) {
+        if actors.actors.iter().any(|actor| there(actor, time_s)) {
             start_s = time_s + 0.5;
         }
         time_s += 0.5;
@@ -200,9 +203,14 @@ fn gap(crowd: &Crowd, place: Point2<f64>, way: &OwnWay, from_s: f64, until_s: f6
     }
 }
 
-/// The path out of a side street, in its lane, and into the one across; its length; and where the nose of the first stands.
-fn path(junction: &Junction<'_>, keep: DrivingSide) -> (UniformSpline<2>, f64, f64) {
-    let side = if keep == DrivingSide::Left { 1.0 } else { -1.0 };
+/// The path from a side street, in its lane, into the opposite one; its length; and the place of the first
+/// vehicle's front.
+fn path(junction: &Junction<'_>, driving_side: DrivingSide) -> (UniformSpline<2>, f64, f64) {
+    let side = if driving_side == DrivingSide::Left {
+        1.0
+    } else {
+        -1.0
+    };
     let lane = |street: &Street, along_m: f64, outwards: f64| {
         let left_m = side * outwards * (LANE_M / 2.0).min(street.half_width_m / 2.0);
         (street.at(along_m) * Pose::translation(0.0, left_m))

@@ -43,7 +43,7 @@ fn around(
     all
 }
 
-/// Whether the middles of two road users are so near that they are inside each other.
+/// Whether two road users overlap.
 fn overlap(a: &Actor, at: &Pose, b: &Actor, there: &Pose) -> bool {
     let seen = at.inverse() * there;
     let (cosine, sine) = (
@@ -56,30 +56,34 @@ fn overlap(a: &Actor, at: &Pose, b: &Actor, there: &Pose) -> bool {
 }
 
 #[test]
-fn nobody_drives_through_the_vehicle_even_where_nobody_is_hidden() {
+fn road_users_keep_clear_of_the_ego_vehicle_even_without_being_hidden() {
     let (mut seen, mut through) = (0, Vec::new());
     for seed in 1..=3 {
         let (drive, traffic) = town(seed, &TrafficConfig::default());
         for step in 0..(drive.duration_s() * 4.0) as usize {
             let time_s = 0.25 * step as f64;
-            let own = drive.pose(time_s);
-            for actor in traffic.actors.iter().filter(|actor| actor.is_shown(time_s)) {
-                let Some(pose) = actor.track.pose(&traffic.way, time_s) else {
+            let ego = drive.pose(time_s);
+            for actor in traffic
+                .actors
+                .iter()
+                .filter(|actor| actor.is_visible(time_s))
+            {
+                let Some(pose) = actor.track.pose(&traffic.route, time_s) else {
                     continue;
                 };
                 seen += 1;
-                if actor.runs_into(&own, &pose) {
+                if actor.overlaps(&ego, &pose) {
                     through.push((time_s, actor.half_m));
                 }
             }
         }
     }
-    // Corners of vehicles cut into the vehicle's lane where both turn.
+    // Corners of vehicles cut into the ego lane where both turn.
     assert!(seen > 20_000 && through.len() < 20, "{through:?} of {seen}");
 }
 
 #[test]
-fn road_users_keep_off_each_other() {
+fn road_users_keep_clear_of_each_other() {
     let (mut pairs, mut overlapping) = (0, BTreeMap::<String, usize>::new());
     let (drive, traffic) = town(2, &TrafficConfig::default());
     let name = |track: &Track| {
@@ -96,9 +100,12 @@ fn road_users_keep_off_each_other() {
     };
     for step in 0..drive.duration_s() as usize {
         let time_s = step as f64;
-        let shown = traffic.actors.iter().filter(|actor| actor.is_shown(time_s));
+        let shown = traffic
+            .actors
+            .iter()
+            .filter(|actor| actor.is_visible(time_s));
         let placed: Vec<_> = shown
-            .filter_map(|actor| Some((actor, actor.track.pose(&traffic.way, time_s)?)))
+            .filter_map(|actor| Some((actor, actor.track.pose(&traffic.route, time_s)?)))
             .collect();
         for (i, (a, at)) in placed.iter().enumerate() {
             for (b, there) in &placed[i + 1..] {
@@ -153,7 +160,7 @@ fn velocities_are_those_of_the_motion_and_speeds_are_possible() {
 }
 
 #[test]
-fn any_instant_is_the_same_in_any_order_and_for_the_same_seed_only() {
+fn any_time_gives_the_same_in_any_order_and_for_the_same_seed_only() {
     let (drive, traffic) = town(1, &TrafficConfig::default());
     let at = |traffic: &Traffic, time_s: f64| around(traffic, drive.as_ref(), time_s, 150.0);
     let forwards: Vec<_> = (0..100).map(|i| at(&traffic, f64::from(i))).collect();
@@ -172,7 +179,7 @@ fn any_instant_is_the_same_in_any_order_and_for_the_same_seed_only() {
 }
 
 #[test]
-fn density_says_how_many_there_are() {
+fn number_follows_the_density() {
     let mean = |vehicles_per_km| {
         let config = TrafficConfig {
             vehicles_per_km,
@@ -193,7 +200,7 @@ fn density_says_how_many_there_are() {
 }
 
 #[test]
-fn small_block_has_traffic_that_is_nowhere_twice() {
+fn traffic_round_a_small_block_is_nowhere_twice() {
     let drive: Arc<dyn Path> = Arc::new(BlockLoop::new(40.0, 32.0, 9.5, 5.0));
     let streets = Streets::along(drive.as_ref(), 60.0, DrivingSide::Left, 1);
     let traffic = Traffic::new(
@@ -204,7 +211,11 @@ fn small_block_has_traffic_that_is_nowhere_twice() {
         DrivingSide::Left,
         1,
     );
-    assert!(traffic.way.reach_m() < 60.0, "{}", traffic.way.reach_m());
+    assert!(
+        traffic.route.reach_m() < 60.0,
+        "{}",
+        traffic.route.reach_m()
+    );
     let seen: usize = (0..60)
         .map(|i| around(&traffic, drive.as_ref(), f64::from(i), 150.0).len())
         .sum();
@@ -238,23 +249,23 @@ fn vehicle_that_stands_or_turns_on_the_spot_has_traffic_too() {
 }
 
 #[test]
-fn asking_is_cheap() {
+fn visiting_is_fast() {
     let (drive, traffic) = town(1, &TrafficConfig::default());
     let started = std::time::Instant::now();
     let seen: usize = (0..4000)
         .map(|i| around(&traffic, drive.as_ref(), 0.05 * f64::from(i), 165.0).len())
         .sum();
-    let look_us = started.elapsed().as_secs_f64() * 1e6 / 4000.0;
+    let visit_us = started.elapsed().as_secs_f64() * 1e6 / 4000.0;
     println!(
-        "{} road users, {} shown and {look_us:.1} us a look",
+        "{} road users, {} shown and {visit_us:.1} us a visit",
         traffic.actors.len(),
         seen / 4000
     );
-    assert!(look_us < 2000.0, "{look_us} us");
+    assert!(visit_us < 2000.0, "{visit_us} us");
 }
 
 #[test]
-fn queues_at_crossroads_wait_for_the_vehicle_and_then_cross() {
+fn queues_at_crossroads_wait_for_the_ego_vehicle_and_then_cross() {
     let (mut waiting, mut crossing) = (0, 0);
     for seed in 1..=3 {
         let (drive, traffic) = town(seed, &TrafficConfig::default());
@@ -264,10 +275,10 @@ fn queues_at_crossroads_wait_for_the_vehicle_and_then_cross() {
             };
             waiting += 1;
             let off_m = |time_s: f64| {
-                let pose = actor.track.pose(&traffic.way, time_s)?;
+                let pose = actor.track.pose(&traffic.route, time_s)?;
                 Some((pose.translation.vector - drive.pose(time_s).translation.vector).norm())
             };
-            crossing += usize::from(vehicle.until_s + 5.0 < actor.shown_s[1]);
+            crossing += usize::from(vehicle.until_s + 5.0 < actor.visible_s[1]);
             let nearest_m = (0..100)
                 .filter_map(|i| off_m(vehicle.from_s + f64::from(i)))
                 .fold(f64::MAX, f64::min);

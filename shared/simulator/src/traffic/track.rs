@@ -1,118 +1,119 @@
-//! How road users move: functions of time alone.
+//! The motion of road users as functions of time.
 
 use std::f64::consts::{PI, TAU};
 
 use gyre_geometry::Pose;
 
-use super::own_way::OwnWay;
+use super::ego_route::EgoRoute;
 use crate::lanes::LANE_M;
 use crate::path::spline::UniformSpline;
 
-/// Seconds that a vehicle's motion lags that of the one ahead (Newell, "A simplified car-following theory", 2002).
+/// Delay of a vehicle's motion behind that of the one ahead, seconds (Newell, "A simplified car-following
+/// theory", 2002).
 pub const REACTION_S: f64 = 1.2;
 
-/// Where a road user is at any time.
+/// The place of a road user at any time.
 #[derive(Clone, Debug)]
 pub enum Track {
-    /// In the vehicle's lane, ahead of it or behind: the gaps to all vehicles between, nearest first.
+    /// In the ego lane, ahead or behind: the gaps to all vehicles between, nearest first.
     Lane { ahead: bool, gaps: Vec<Gap> },
-    /// Towards the vehicle in the other lane.
+    /// In the oncoming lane.
     Oncoming(Oncoming),
-    /// Along the way, beside the vehicle's track.
-    Beside(Beside),
+    /// Along the route, beside the ego vehicle's track.
+    Alongside(Alongside),
     /// Out of a side street.
     Crossing(Crossing),
 }
 
-/// A gap between two vehicles in a lane, which depends on where the nearer one is.
+/// A gap between two vehicles in a lane, by the place of the nearer one.
 #[derive(Clone, Debug)]
 pub struct Gap {
-    /// From middle to middle when standing, metres.
+    /// Minimum distance between their centres, metres.
     pub least_m: f64,
-    /// How much it grows at most, metres,
+    /// Maximum increase, metres,
     pub more_m: f64,
-    /// with this period along the way, metres,
+    /// with this period along the route, metres,
     pub period_m: f64,
     /// and this phase, radians.
     pub phase: f64,
 }
 
-/// A vehicle in the other lane.
+/// A vehicle in the oncoming lane.
 #[derive(Clone, Debug)]
 pub struct Oncoming {
-    /// When it enters the way at its end, seconds.
+    /// The time at which it enters the route at its end, seconds.
     pub enters_s: f64,
-    /// It runs early or late by this, seconds,
+    /// Maximum time that it is early or late, seconds,
     pub drift_s: f64,
-    /// in turns of this length of the way, metres,
+    /// with this period along the route, metres,
     pub period_m: f64,
-    /// with this phase, radians.
+    /// and this phase, radians.
     pub phase: f64,
 }
 
-/// Somebody who goes along the way.
+/// A road user that moves along the route.
 #[derive(Clone, Debug)]
-pub struct Beside {
-    /// Where the vehicle meets them, metres along the way,
+pub struct Alongside {
+    /// The place where the ego vehicle meets it, metres along the route,
     pub at_m: f64,
-    /// and when, seconds.
+    /// and the time, seconds.
     pub at_s: f64,
-    /// Metres along the way for each metre of the vehicle: above 1 overtakes it, below is overtaken.
+    /// Its speed relative to the ego vehicle's: above 1 it overtakes, below it is overtaken.
     pub share: f64,
-    /// Metres a second along the way besides.
+    /// Its additional speed along the route, metres a second.
     pub speed_mps: f64,
     pub lane: Lane,
 }
 
-/// Where across the street somebody goes.
+/// The lateral position of a road user.
 #[derive(Clone, Copy, Debug)]
 pub enum Lane {
-    /// So far from the vehicle's track towards the middle of the street, metres.
+    /// Distance from the ego vehicle's track towards the centre of the street, metres.
     Inwards(f64),
-    /// So far beyond the kerb of the vehicle's side, metres, and never nearer to its track than [`PASSING_M`].
-    OwnKerb(f64),
-    /// So far beyond the other kerb, metres.
+    /// Distance beyond the kerb on the ego vehicle's side, metres; at least [`PASSING_M`] from its track.
+    EgoKerb(f64),
+    /// Distance beyond the other kerb, metres.
     OtherKerb(f64),
 }
 
-/// Room between the tracks of the vehicle and of a cyclist, metres.
+/// Distance between the tracks of the ego vehicle and a cyclist, metres.
 pub const PASSING_M: f64 = 1.7;
 
 /// A vehicle that comes out of a side street, waits, and may cross.
 #[derive(Clone, Debug)]
 pub struct Crossing {
-    /// Its path by length.
+    /// Its path by distance.
     pub path: UniformSpline<2>,
-    /// Where on the path it waits, metres.
+    /// The place on the path where it waits, metres.
     pub waits_m: f64,
-    /// Since when, seconds,
+    /// The start of the wait, seconds.
     pub from_s: f64,
-    /// until when, seconds; for ever where it is infinite.
+    /// The end of the wait, seconds; infinite if it does not cross.
     pub until_s: f64,
-    /// Speed that it brakes from and speeds up to, metres a second.
+    /// Speed before and after the wait, metres a second.
     pub speed_mps: f64,
-    /// Length of the path, metres: it is gone beyond its ends.
+    /// Length of the path, metres; beyond its ends the vehicle is gone.
     pub length_m: f64,
 }
 
 impl Track {
-    /// The pose at a time; `None` where it is not on the road.
-    pub fn pose(&self, way: &OwnWay, time_s: f64) -> Option<Pose> {
+    /// The pose at a time; `None` if it is not on the road.
+    pub fn pose(&self, route: &EgoRoute, time_s: f64) -> Option<Pose> {
         if let Self::Crossing(crossing) = self {
             return crossing.pose(time_s);
         }
-        let along_m = self.along_m(way, time_s);
-        if (along_m - way.progress_m(time_s)).abs() > way.reach_m() {
+        let along_m = self.along_m(route, time_s);
+        if (along_m - route.progress_m(time_s)).abs() > route.reach_m() {
             return None;
         }
         let inwards_m = match self {
             Self::Lane { .. } | Self::Crossing(_) => 0.0,
-            Self::Oncoming(_) => other_lane_m(way.kerbs_m(along_m)),
-            Self::Beside(beside) => beside.inwards_m(way.kerbs_m(along_m)),
+            Self::Oncoming(_) => other_lane_m(route.kerbs_m(along_m)),
+            Self::Alongside(alongside) => alongside.inwards_m(route.kerbs_m(along_m)),
         };
-        let pose = way.pose(along_m, inwards_m);
+        let pose = route.pose(along_m, inwards_m);
         let turned = matches!(self, Self::Oncoming(_))
-            || matches!(self, Self::Beside(b) if b.share == 0.0 && b.speed_mps < 0.0);
+            || matches!(self, Self::Alongside(b) if b.share == 0.0 && b.speed_mps < 0.0);
         Some(if turned {
             pose * Pose::rotation(PI)
         } else {
@@ -120,19 +121,19 @@ impl Track {
         })
     }
 
-    /// Metres along the way at a time; zero for what is not on it.
-    pub fn along_m(&self, way: &OwnWay, time_s: f64) -> f64 {
+    /// Distance along the route at a time, metres; zero for road users that are not on it.
+    pub fn along_m(&self, route: &EgoRoute, time_s: f64) -> f64 {
         match self {
             Self::Lane { ahead, gaps } => {
                 let sign = if *ahead { 1.0 } else { -1.0 };
-                let own_m = way.progress_m(time_s + sign * REACTION_S * gaps.len() as f64);
+                let ego_m = route.progress_m(time_s + sign * REACTION_S * gaps.len() as f64);
                 gaps.iter()
-                    .fold(own_m, |place_m, gap| place_m + sign * gap.at(place_m))
+                    .fold(ego_m, |place_m, gap| place_m + sign * gap.at(place_m))
             }
-            Self::Oncoming(vehicle) => vehicle.along_m(way, time_s),
-            Self::Beside(b) => {
+            Self::Oncoming(vehicle) => vehicle.along_m(route, time_s),
+            Self::Alongside(b) => {
                 b.at_m
-                    + b.share * (way.progress_m(time_s) - b.at_m)
+                    + b.share * (route.progress_m(time_s) - b.at_m)
                     + b.speed_mps * (time_s - b.at_s)
             }
             Self::Crossing(_) => 0.0,
@@ -140,9 +141,10 @@ impl Track {
     }
 }
 
-/// From the vehicle's track to that of oncoming traffic, metres: in the middle of the other half of the carriageway.
-fn other_lane_m([own_m, other_m]: [f64; 2]) -> f64 {
-    (0.75 * other_m - 0.25 * own_m).max(LANE_M)
+/// Distance from the ego vehicle's track to the oncoming lane, metres: in the middle of the other half of
+/// the carriageway.
+fn other_lane_m([ego_m, other_m]: [f64; 2]) -> f64 {
+    (0.75 * other_m - 0.25 * ego_m).max(LANE_M)
 }
 
 impl Gap {
@@ -153,19 +155,19 @@ impl Gap {
 }
 
 impl Oncoming {
-    fn along_m(&self, way: &OwnWay, time_s: f64) -> f64 {
-        let until_start_s = way.clock_s(f64::INFINITY) - (time_s - self.enters_s);
-        let on_time_m = way.place_m(until_start_s);
+    fn along_m(&self, route: &EgoRoute, time_s: f64) -> f64 {
+        let until_start_s = route.clock_s(f64::INFINITY) - (time_s - self.enters_s);
+        let on_time_m = route.place_m(until_start_s);
         let drift_s = self.drift_s * (TAU * on_time_m / self.period_m + self.phase).sin();
-        way.place_m(until_start_s + drift_s)
+        route.place_m(until_start_s + drift_s)
     }
 }
 
-impl Beside {
-    fn inwards_m(&self, [own_m, other_m]: [f64; 2]) -> f64 {
+impl Alongside {
+    fn inwards_m(&self, [ego_m, other_m]: [f64; 2]) -> f64 {
         match self.lane {
             Lane::Inwards(inwards_m) => inwards_m,
-            Lane::OwnKerb(beyond_m) => -(own_m + beyond_m).max(PASSING_M),
+            Lane::EgoKerb(beyond_m) => -(ego_m + beyond_m).max(PASSING_M),
             Lane::OtherKerb(beyond_m) => other_m + beyond_m,
         }
     }
@@ -182,7 +184,7 @@ impl Crossing {
         Some(gyre_geometry::pose(x, y, dy.atan2(dx)))
     }
 
-    /// Metres driven some seconds after starting: first at 2 m/s², and less and less.
+    /// Distance driven in a time after starting, metres: initially at 2 m/s², then less and less.
     fn ramp_m(&self, seconds: f64) -> f64 {
         if seconds <= 0.0 {
             0.0

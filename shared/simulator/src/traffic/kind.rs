@@ -1,11 +1,12 @@
-//! What cars, vans, lorries, buses, cyclists and pedestrians look like to a radar at 77 GHz.
+//! The bodies of cars, vans, lorries, buses, cyclists and pedestrians at 77 GHz.
 //!
-//! Cross-sections are of the order that is published: 1 to 100 m² for a car by its aspect, some 100 m² and more for the flat
-//! sides of lorries (Skolnik, *Introduction to Radar Systems*, gives 100 m² for a car, 200 m² for a pickup lorry, 2 m² for a
-//! bicycle, 1 m² for a man at microwaves); about -8 dBm² for a pedestrian at 76 GHz (Yamada et al., EuMC 2005; measured
-//! from all sides by Fortuny-Guasch and Chareau, JRC report EUR 25762, 2013); some decibels more for a cyclist (Belgiovane
-//! and Chen, IEEE T-ITS 2017). How much passes is an assumption that follows from the sensor's height: from a roof it looks
-//! over cars, not over buses. Limbs and wheels that move within a body (micro-Doppler) are left out.
+//! Cross-sections are of the published order: 1 to 100 m² for a car by its aspect, 100 m² and more for the
+//! flat sides of lorries (Skolnik, *Introduction to Radar Systems*, gives 100 m² for a car, 200 m² for a
+//! pickup, 2 m² for a bicycle, 1 m² for a person at microwaves); about -8 dBm² for a pedestrian at 76 GHz
+//! (Yamada et al., EuMC 2005; measured from all sides by Fortuny-Guasch and Chareau, JRC report EUR 25762,
+//! 2013); some decibels more for a cyclist (Belgiovane and Chen, IEEE T-ITS 2017). Transmission is assumed
+//! from the height of the sensor: from a roof it sees over cars, but not over buses. Micro-Doppler of limbs
+//! and wheels is neglected.
 
 use nalgebra::{Point2, Rotation2, Vector2};
 use rand::Rng;
@@ -28,10 +29,10 @@ pub enum Kind {
 /// A box on wheels.
 struct Shape {
     half_m: (f64, f64),
-    /// Median cross-section of an edge, seen from all sides, and of one of the panels between, seen at a right angle, m².
+    /// Median cross-section of an edge, seen from all sides, and of a panel, seen at normal incidence, m².
     edge_m2: f64,
     panel_m2: f64,
-    /// Share of the power that passes, there and back.
+    /// Two-route share of the power that passes.
     transmission: f64,
 }
 
@@ -48,8 +49,8 @@ impl Kind {
         }
     }
 
-    /// A motor vehicle as they come in a town: mostly cars.
-    pub fn motorised(rng: &mut impl Rng) -> Self {
+    /// Draws a motor vehicle: mostly cars.
+    pub fn motor_vehicle(rng: &mut impl Rng) -> Self {
         match rng.random_range(0..100) {
             0..74 => Self::Car,
             74..89 => Self::Van,
@@ -58,7 +59,7 @@ impl Kind {
         }
     }
 
-    /// The body of one of its kind around its own origin, x ahead.
+    /// Draws a body of this kind around its own origin, x ahead.
     pub fn body(self, number: u32, rng: &mut ChaCha8Rng) -> Body {
         let half_m = self.half_m();
         match self {
@@ -113,7 +114,7 @@ impl Shape {
             self.panels(&mut body, from, to, number, rng);
         }
         let transmission = self.transmission.sqrt();
-        // Whatever passes the outline crosses one diagonal at least, and half of it both.
+        // A line through the outline crosses at least one diagonal, half of the lines both.
         let diagonal = |a: usize, b: usize| Wall {
             from: corners[a],
             to: corners[b],
@@ -125,7 +126,7 @@ impl Shape {
         body
     }
 
-    /// A panel about every metre: flat, hence bright at a right angle, but never quite even.
+    /// Adds about one panel for each metre: flat, hence bright at normal incidence, but slightly tilted.
     fn panels(
         &self,
         body: &mut Body,
@@ -134,12 +135,12 @@ impl Shape {
         number: u32,
         rng: &mut ChaCha8Rng,
     ) {
-        let way = to - from;
-        let outward = Vector2::new(-way.y, way.x).normalize();
-        let count = way.norm().ceil() as usize;
+        let route = to - from;
+        let outward = Vector2::new(-route.y, route.x).normalize();
+        let count = route.norm().ceil() as usize;
         for panel in 0..count {
             let position =
-                from + way * ((panel as f64 + rng.random_range(0.2..0.8)) / count as f64);
+                from + route * ((panel as f64 + rng.random_range(0.2..0.8)) / count as f64);
             let normal = Rotation2::new(rng.random_range(-0.15..0.15)) * outward;
             let aspect = Aspect::Facing {
                 normal,
@@ -156,7 +157,7 @@ impl Shape {
     }
 }
 
-/// Weak scatterers all round; a person hides next to nothing.
+/// Weak scatterers all around, without walls.
 fn cloud(
     number: u32,
     half_m: (f64, f64),
@@ -181,9 +182,9 @@ fn cloud(
     body
 }
 
-/// A log-normal number about `median`, one standard deviation given in decibels.
+/// A log-normal number with a median and a standard deviation in decibels.
 fn spread(rng: &mut ChaCha8Rng, median: f64, deviation_db: f64) -> f64 {
-    // The sum of twelve uniform numbers is near enough to a normal one, and never far out.
+    // The sum of twelve uniform numbers is close to normal and has no outliers.
     let normal = (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
     median * 10f64.powf(deviation_db * normal / 10.0)
 }

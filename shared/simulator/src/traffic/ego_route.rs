@@ -1,4 +1,4 @@
-//! The way of the driven vehicle by its length: what all traffic around it is placed on.
+//! The route of the ego vehicle by distance, along which all other traffic is placed.
 
 use gyre_geometry::Pose;
 use nalgebra::{Point2, Vector2};
@@ -8,46 +8,57 @@ use crate::path::Path;
 use crate::path::spline::{Sample, UniformSpline};
 use crate::streets::Streets;
 
-/// The way goes on straight for so many metres before its start and after its end.
+/// Straight extension of the route before its start and after its end, metres.
 const BEYOND_M: f64 = 300.0;
-/// Other vehicles do not copy wiggles of the driven one shorter than this, metres.
+/// Cut-off wavelength of the route, metres: other vehicles do not copy shorter deviations.
 const WIGGLE_M: f64 = 14.0;
-/// Widths and speeds change over so many metres.
+/// Scale on which widths and speeds change, metres.
 const GRADUAL_M: f64 = 60.0;
-/// Metres between samples of the way.
+/// Distance between samples of the route, metres.
 const STEP_M: f64 = 2.0;
-/// Seconds between samples of the progress.
+/// Time between samples of the progress, seconds.
 const STEP_S: f64 = 0.1;
-/// The least speed at which the others drive where the vehicle itself waits or turns, metres a second.
+/// Minimum speed of the others where the ego vehicle waits or turns, metres a second.
 const SLOWEST_MPS: f64 = 4.5;
-/// Traffic is shown so far along the way, metres.
+/// Maximum distance along the route at which traffic is visible, metres.
 const REACH_M: f64 = 260.0;
-/// A place of the way is driven again where it comes so near, metres.
+/// A place of the route is passed again where the route comes nearer than this, metres.
 const AGAIN_M: f64 = 6.0;
 
-/// The way that is driven, and how it is driven.
+/// The route of the ego vehicle, and the traffic's pace along it.
 #[derive(Clone, Debug)]
-pub struct OwnWay {
-    /// Places by metres along the way.
+pub struct EgoRoute {
+    /// Places by distance along the route, metres.
     places: UniformSpline<2>,
-    /// Metres along the way by time.
+    /// Distance along the route by time.
     progress: UniformSpline<1>,
-    /// To the kerbs on the vehicle's own side and on the other, metres, by metres along the way.
+    /// Distance to the kerbs on the ego vehicle's side and on the other, metres, by distance along the
+    /// route.
     kerbs: UniformSpline<2>,
-    /// Seconds that others take from the way's beginning, by metres along it, and the inverse.
+    /// Travel time of the others from the start of the route, seconds, by distance along it, and the
+    /// inverse.
     clock: UniformSpline<1>,
     place_of_clock: UniformSpline<1>,
-    /// The own side is on the left (1) or right (-1).
+    /// The ego side is on the left (1) or right (-1).
     side: f64,
     length_m: f64,
     duration_s: f64,
     reach_m: f64,
 }
 
-impl OwnWay {
-    /// The way of the first `duration_s` of a drive through `streets`.
-    pub fn new(path: &dyn Path, duration_s: f64, streets: &Streets, keep: DrivingSide) -> Self {
-        let side = if keep == DrivingSide::Left { 1.0 } else { -1.0 };
+impl EgoRoute {
+    /// The route of the first `duration_s` of a drive through `streets`.
+    pub fn new(
+        path: &dyn Path,
+        duration_s: f64,
+        streets: &Streets,
+        driving_side: DrivingSide,
+    ) -> Self {
+        let side = if driving_side == DrivingSide::Left {
+            1.0
+        } else {
+            -1.0
+        };
         let duration_s = path.duration_s().min(duration_s);
         let times = (0..=(duration_s / STEP_S) as usize).map(|i| i as f64 * STEP_S);
         let poses: Vec<_> = times.map(|time_s| (time_s, path.pose(time_s))).collect();
@@ -66,7 +77,7 @@ impl OwnWay {
         let places = UniformSpline::fit(&place_samples(&poses, &driven), STEP_M, 1.0 / WIGGLE_M);
         let kerbs = kerb_samples(&places, length_m, streets);
         let (clock, place_of_clock) = clocks(&poses, &driven, length_m);
-        let mut way = Self {
+        let mut route = Self {
             places,
             progress: UniformSpline::fit(&progress, 0.25, 1.0),
             kerbs: UniformSpline::fit(&kerbs, 10.0, 1.0 / GRADUAL_M),
@@ -77,16 +88,16 @@ impl OwnWay {
             duration_s,
             reach_m: REACH_M,
         };
-        way.reach_m = REACH_M.min(0.45 * way.shortest_loop_m());
-        way
+        route.reach_m = REACH_M.min(0.45 * route.shortest_loop_m());
+        route
     }
 
-    /// Metres along the way at a time.
+    /// Distance along the route at a time, metres.
     pub fn progress_m(&self, time_s: f64) -> f64 {
         self.progress.value(time_s)[0]
     }
 
-    /// When the vehicle is at a place, seconds; the first time where it waits there.
+    /// The first time at which the ego vehicle is at a place, seconds.
     pub fn time_at(&self, along_m: f64) -> f64 {
         let steps = (self.duration_s / STEP_S) as usize;
         let (mut low, mut high) = (0, steps);
@@ -101,17 +112,18 @@ impl OwnWay {
         low as f64 * STEP_S
     }
 
-    /// Seconds that others take from the way's beginning to a place.
+    /// Travel time of the others from the start of the route to a place, seconds.
     pub fn clock_s(&self, along_m: f64) -> f64 {
         self.clock.value(along_m)[0]
     }
 
-    /// Where others are so many seconds after the way's beginning, metres.
+    /// Distance that the others travel from the start of the route in a time, metres.
     pub fn place_m(&self, clock_s: f64) -> f64 {
         self.place_of_clock.value(clock_s)[0]
     }
 
-    /// A pose on the way, `inwards_m` beside the vehicle's own track (towards the middle of the street), looking along it.
+    /// A pose on the route, `inwards_m` beside the ego vehicle's track (towards the centre of the street),
+    /// x along it.
     pub fn pose(&self, along_m: f64, inwards_m: f64) -> Pose {
         let ([x, y], [dx, dy]) = (self.places.value(along_m), self.places.slope(along_m));
         let along = Vector2::new(dx, dy)
@@ -124,27 +136,29 @@ impl OwnWay {
         )
     }
 
-    /// From the vehicle's track to the kerbs on its own side and on the other, metres.
+    /// Distance from the ego vehicle's track to the kerbs on its own side and on the other, metres.
     pub fn kerbs_m(&self, along_m: f64) -> [f64; 2] {
         self.kerbs.value(along_m)
     }
 
-    /// Length of the way, metres.
+    /// Length of the route, metres.
     pub fn length_m(&self) -> f64 {
         self.length_m
     }
 
-    /// Time that the drive takes, seconds.
+    /// Duration of the drive, seconds.
     pub fn duration_s(&self) -> f64 {
         self.duration_s
     }
 
-    /// How far along the way traffic is shown, metres: less than half of the shortest loop, so that nothing is in two places.
+    /// Maximum distance along the route at which traffic is visible, metres: less than half of the shortest
+    /// loop, so that nothing is in two places.
     pub fn reach_m(&self) -> f64 {
         self.reach_m
     }
 
-    /// Length of the shortest loop that the way makes, metres: until it runs over the same place in the same direction.
+    /// Length of the shortest loop of the route, metres: until it passes the same place in the same
+    /// direction.
     fn shortest_loop_m(&self) -> f64 {
         let count = (self.length_m / STEP_M) as usize;
         let poses: Vec<_> = (0..=count)
@@ -176,7 +190,7 @@ fn distances(poses: &[(f64, Pose)]) -> Vec<f64> {
     driven
 }
 
-/// Places every few metres, with straight lines before and behind.
+/// Places every few metres, with straight extensions at both ends.
 fn place_samples(poses: &[(f64, Pose)], driven: &[f64]) -> Vec<Sample<2>> {
     let sample = |at: f64, place: Point2<f64>| Sample {
         at,
@@ -216,7 +230,7 @@ fn kerb_samples(places: &UniformSpline<2>, length_m: f64, streets: &Streets) -> 
     (0..=(length_m / 4.0) as usize).map(sample).collect()
 }
 
-/// When others are where: about as fast as the vehicle is there, but nowhere waiting.
+/// Travel time by distance and its inverse: about the ego vehicle's pace, but without its stops.
 fn clocks(
     poses: &[(f64, Pose)],
     driven: &[f64],
@@ -231,15 +245,15 @@ fn clocks(
         while next + 1 < driven.len() && driven[next + 1] < at {
             next += 1;
         }
-        // The speed over two seconds around the place.
+        // The mean speed over two seconds around the place.
         let (a, b) = (next.saturating_sub(10), (next + 10).min(driven.len() - 1));
-        let own_mps = (driven[b] - driven[a]) / (poses[b].0 - poses[a].0).max(STEP_S);
+        let ego_mps = (driven[b] - driven[a]) / (poses[b].0 - poses[a].0).max(STEP_S);
         clock.push(Sample {
             at,
             value: [seconds],
             weight: 1.0,
         });
-        seconds += STEP_M / own_mps.max(SLOWEST_MPS);
+        seconds += STEP_M / ego_mps.max(SLOWEST_MPS);
     }
     let inverse: Vec<_> = clock
         .iter()
