@@ -1,4 +1,4 @@
-//! The radars that can be simulated: what their data sheets, their recordings and the literature say of them.
+//! The simulated radars, from data sheets, recordings and the literature.
 
 use std::f64::consts::TAU;
 
@@ -7,42 +7,42 @@ use serde::{Deserialize, Serialize};
 /// Bytes before each azimuth's bins: stamp, encoder, validity or chirp, as in Oxford's files.
 pub const METADATA_BYTES: usize = 11;
 
-/// A radar by its name.
+/// A radar.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Profile {
-    /// Navtech CTS350-X as Oxford Radar RobotCar recorded it: 3768 bins of 0.0438 m.
+    /// Navtech CTS350-X as recorded by Oxford Radar RobotCar: 3768 bins of 0.0438 m.
     #[default]
     Cts350xOxford,
-    /// Navtech CTS350-X as RADIATE recorded it: 576 bins of 0.1736 m.
+    /// Navtech CTS350-X as recorded by RADIATE: 576 bins of 0.1736 m.
     Cts350xRadiate,
     /// Navtech CIR204-H (Boreas until 2024, MulRan): 3360 bins of 0.0596 m, 200 m.
     Cir204h,
-    /// Navtech RAS6 (Boreas-RT, FoMo): 6848 bins of 0.0438 m, 300 m, rising and falling chirps by turns.
+    /// Navtech RAS6 (Boreas-RT, FoMo): 6848 bins of 0.0438 m, 300 m, alternating chirps.
     Ras6,
     /// K2Pi (Checchin et al. 2010): 24 GHz, one turn a second, 3 degrees, 0.6 m, 3 to 100 m.
     K2pi,
 }
 
-/// The chirps' direction, which gives Doppler's shift its sign.
+/// The direction of the chirps, which determines the sign of the Doppler shift.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Chirp {
-    /// What approaches reads too near.
+    /// Approaching objects are measured too near.
     Rising,
-    /// What approaches reads too far.
+    /// Approaching objects are measured too far.
     Falling,
-    /// Rising in even azimuths, falling in odd ones, and each says which.
+    /// Rising in even azimuths and falling in odd ones, as each azimuth's metadata says.
     Alternating,
 }
 
-/// How a radar samples the world around it.
+/// The sampling of a radar.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
     /// Azimuths of a turn.
     pub azimuths: usize,
     /// Range bins of an azimuth.
     pub bins: usize,
-    /// Metres a range bin.
+    /// Range resolution, metres a bin.
     pub range_resolution_m: f64,
     /// Metres to add to a bin's range: bin `b` is at `(b + 0.5) * range_resolution_m + range_offset_m`.
     pub range_offset_m: f64,
@@ -54,41 +54,44 @@ pub struct Sampling {
     pub encoder_first: u16,
     /// Counts from one azimuth to the next.
     pub encoder_step: u16,
-    /// The chirps' direction.
+    /// The direction of the chirps.
     pub chirp: Chirp,
-    /// Metres of range that a closing speed of 1 m/s shifts an echo by.
+    /// Doppler shift: metres of range for each m/s of closing speed.
     pub doppler_s: f64,
 }
 
-/// How a radar transmits and receives.
+/// The transmitter and receiver of a radar.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Receiver {
-    /// Carrier, GHz.
+    /// Carrier frequency, GHz.
     pub carrier_ghz: f64,
-    /// Width of the beam at half power, there and back, radians.
+    /// Two-way half-power width of the beam, radians.
     pub beam_rad: f64,
-    /// Height of the beam at half power, there and back, radians.
+    /// Two-way half-power height of the beam, radians.
     pub beam_height_rad: f64,
-    /// Range resolution of the window: between two independent cells, metres.
+    /// Distance between two independent range cells, metres, given the window.
     pub cell_m: f64,
-    /// Power received from 1 m2 is this over the fourth power of range far away, in the receiver's units.
+    /// Power received from 1 m² is this over the fourth power of the range, at long range, in the
+    /// receiver's units.
     pub constant: f64,
-    /// Range below which it falls with the square only, metres: an FMCW receiver filters low beat frequencies.
+    /// Range below which power falls with the square only, metres: an FMCW receiver filters low beat
+    /// frequencies.
     pub filter_m: f64,
-    /// Range below which it rises with the square, metres: the antenna on the roof looks over what is near.
+    /// Range below which power rises with the square, metres: near objects lie below the beam of the
+    /// antenna on the roof.
     pub near_m: f64,
     /// Power at which the receiver saturates, in its units.
     pub full_scale: f32,
-    /// Whether powers are sent as whole numbers of its unit.
+    /// Whether powers are rounded to whole units.
     pub whole_powers: bool,
-    /// Mean power of the receiver's noise by range: (m, dB above the unit), to be interpolated.
+    /// Mean power of the receiver's noise by range: (m, dB above the unit), interpolated.
     pub floor_db: &'static [(f64, f64)],
-    /// The same of the transmitter's ringing in the first metres.
+    /// Mean power of the transmitter's ringing in the first metres, likewise.
     pub ringing_db: &'static [(f64, f64)],
 }
 
 impl Receiver {
-    /// Power received from 1 m2 at a range.
+    /// Power received from 1 m² at a range.
     pub fn sensitivity(&self, range_m: f64) -> f64 {
         let square = range_m * range_m;
         let under_beam = (self.near_m * self.near_m / square).powi(2);
@@ -122,24 +125,24 @@ impl Sampling {
         METADATA_BYTES + self.bins
     }
 
-    /// The bin, with fractions, in which a range falls.
+    /// The bin of a range, with fractions.
     pub fn bin(&self, range_m: f64) -> f64 {
         (range_m - self.range_offset_m) / self.range_resolution_m - 0.5
     }
 
-    /// The range of a bin's middle, metres.
+    /// The range of a bin's centre, metres.
     pub fn range_m(&self, bin: f64) -> f64 {
         (bin + 0.5) * self.range_resolution_m + self.range_offset_m
     }
 
-    /// The farthest range, metres.
+    /// The maximum range, metres.
     pub fn reach_m(&self) -> f64 {
         self.range_m(self.bins as f64)
     }
 }
 
 impl Profile {
-    /// All of them.
+    /// All radars.
     pub const ALL: [Self; 5] = [
         Self::Cts350xOxford,
         Self::Cts350xRadiate,
@@ -148,7 +151,7 @@ impl Profile {
         Self::K2pi,
     ];
 
-    /// How it samples.
+    /// The sampling of this radar.
     pub fn sampling(self) -> Sampling {
         let oxford = Sampling {
             azimuths: 400,
@@ -185,8 +188,9 @@ impl Profile {
                 doppler_s: 0.0505,
                 ..oxford
             },
-            // Checchin et al. 2010, Table 1; 3600 counts are its angular precision of 0.1 degrees. What Doppler's effect shifts
-            // a range by depends on the chirp's duration, which is not told: 0 until `sensor.doppler_s` says otherwise.
+            // Checchin et al. 2010, Table 1; 3600 counts are its angular precision of 0.1 degrees. The
+            // Doppler shift depends on the duration of the chirp, which is not published: 0 unless
+            // `sensor.doppler_s` is set.
             Self::K2pi => Sampling {
                 azimuths: 120,
                 bins: 162,
@@ -202,7 +206,7 @@ impl Profile {
         }
     }
 
-    /// How it transmits and receives.
+    /// The transmitter and receiver of this radar.
     pub fn receiver(self) -> Receiver {
         let oxford = Receiver {
             carrier_ghz: 76.5,
@@ -228,7 +232,7 @@ impl Profile {
                 ringing_db: &RADIATE_RINGING,
                 ..oxford
             },
-            // No scan of it at hand: Oxford's, with the longer cell of its smaller bandwidth.
+            // No recording was available: Oxford's values, with the longer cell of its smaller bandwidth.
             Self::Cir204h => Receiver {
                 cell_m: 0.33,
                 constant: 1.6e11,
@@ -241,10 +245,10 @@ impl Profile {
                 ringing_db: &RAS6_RINGING,
                 ..oxford
             },
-            // Checchin et al. 2010, Table 1: 24 GHz, an angular resolution of 3 degrees, 250 MHz, which is 0.6 m. A gain of 20 dB
-            // with so narrow a beam makes a fan: 20 degrees high one way, assumed. Assumed are the sensitivity, by which 1 m2 at
-            // 100 m, the end of its range, stands 16 dB above the floor, its filter and its floor. Nothing is nearer than 3 m,
-            // so no ringing shows.
+            // Checchin et al. 2010, Table 1: 24 GHz, an angular resolution of 3 degrees, 250 MHz, which is
+            // 0.6 m. A gain of 20 dB with such a narrow beam implies a fan beam, assumed 20 degrees high
+            // one way. Assumptions are the sensitivity, by which 1 m² at 100 m, the maximum range, is 16 dB
+            // above the floor, the filter and the floor. The first bin is at 3 m, so no ringing is visible.
             Self::K2pi => Receiver {
                 carrier_ghz: 24.0,
                 beam_rad: 3.0f64.to_radians(),
@@ -261,7 +265,7 @@ impl Profile {
     }
 }
 
-/// Floors are those of azimuths in which nothing stands, in real scans; K2Pi's is assumed.
+/// Floors are measured in empty azimuths of real scans; K2Pi's is assumed.
 const OXFORD_FLOOR: [(f64, f64); 4] = [(2.5, 2.5), (5.0, 3.7), (60.0, 3.7), (150.0, 3.2)];
 const OXFORD_RINGING: [(f64, f64); 8] = [
     (0.2, 19.7),

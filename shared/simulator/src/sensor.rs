@@ -1,38 +1,39 @@
 //! A sweep of a spinning FMCW radar, each azimuth measured at its own time from its own pose.
 //!
-//! In the order in which a sweep comes about:
+//! In the order of a measurement:
 //!
-//! - `stations`: where the sensor is at each azimuth, and when its beam passes a place,
-//! - `skyline`: rays to all sides, and the walls that each passes,
-//! - `echoes`, `highlights`, `ghosts`: what can be seen, directly, as a gliding spot on a wall, and mirrored, and how strongly; `atmosphere`: what the weather takes,
-//! - `scintillation`: how they flicker as they are passed,
-//! - `elevation`: how much of each the beam has, being a few degrees high; `antenna`: how much of it each azimuth's beam takes in,
-//! - `spectrum`: what range processing and quantisation make of it,
-//! - `ground`: what the road and the fields send back,
-//! - `carrier`: what turns with the radar, its ringing and its vehicle; `noise`: all that no echo explains,
-//! - `effects`: each of these on or off.
+//! - `sweep_poses`: the sensor's pose at each azimuth, and the times at which its beam passes a place,
+//! - `line_of_sight`: rays in all directions, and the walls along each,
+//! - `echoes`, `highlights`, `ghosts`: direct echoes, specular reflections of walls, and mirror images,
+//!   with their amplitudes; `atmosphere`: attenuation by the weather,
+//! - `scintillation`: fluctuation of echoes with the direction,
+//! - `elevation`, `antenna`: the beam's pattern in elevation and azimuth,
+//! - `spectrum`: range processing and quantisation,
+//! - `ground`: backscatter of road and fields,
+//! - `fixed_echoes`: ringing and the vehicle's own parts; `noise`: all power that is no single echo,
+//! - `effects`: switches for all of these.
 //!
-//! Echoes are summed as complex amplitudes with the phase of their true path, so that scatterers in one resolution
-//! cell interfere (speckle), and do so differently from the next pose. Not modelled: heights other than by chance, ways
-//! that bounce once.
+//! Echoes are summed as complex amplitudes with the phase of their true path, so scatterers in one
+//! resolution cell interfere (speckle), differently from each pose. Not modelled: terrain, true heights of
+//! objects, and paths with a single bounce.
 
 mod antenna;
 mod atmosphere;
 mod beam_index;
-mod carrier;
 mod config;
 mod echoes;
 pub mod effects;
 mod elevation;
+mod fixed_echoes;
 mod ghosts;
 mod ground;
 mod highlights;
+mod line_of_sight;
 mod noise;
 mod place_noise;
 mod scintillation;
-mod skyline;
 pub mod spectrum;
-mod stations;
+mod sweep_poses;
 mod sweep_time;
 
 use std::f64::consts::TAU;
@@ -46,15 +47,15 @@ use rand_distr::StandardNormal;
 use self::antenna::Antenna;
 use self::atmosphere::Atmosphere;
 use self::beam_index::BeamIndex;
-use self::carrier::Carrier;
 pub use self::config::SensorConfig;
 use self::echoes::{Echo, View};
 pub use self::effects::Effects;
-use self::elevation::Nodding;
+use self::elevation::PitchRoll;
+use self::fixed_echoes::FixedEchoes;
+use self::line_of_sight::LineOfSight;
 use self::noise::Noise;
-use self::skyline::Skyline;
 use self::spectrum::RangeSpectrum;
-use self::stations::Stations;
+use self::sweep_poses::SweepPoses;
 pub use self::sweep_time::SweepTime;
 use crate::body::{Movers, Moving};
 use crate::path::Path;
@@ -63,27 +64,27 @@ use crate::stream::Stream;
 use crate::weather::WeatherConfig;
 use crate::world::World;
 
-/// Each azimuth has a part of its own of a scan's random numbers.
-const WORDS_AN_AZIMUTH: u128 = 1 << 24;
+/// Size of each azimuth's part of a scan's random numbers, in words.
+const WORDS_PER_AZIMUTH: u128 = 1 << 24;
 /// Share of azimuths that are lost.
 const DROPPED: f64 = 0.002;
 /// Jitter of the encoder, standard deviation, radians: a third of a count.
 const ENCODER_JITTER_RAD: f64 = 3.7e-4;
 
-/// What is to be measured.
+/// The surroundings of the sensor during a sweep.
 #[derive(Clone, Copy)]
 pub struct Scene<'a> {
-    /// What stands.
+    /// The static world.
     pub world: &'a World,
-    /// What moves.
+    /// The moving bodies.
     pub movers: &'a dyn Movers,
-    /// How the sensor moves.
+    /// The path of the sensor.
     pub path: &'a dyn Path,
-    /// What the weather is like.
+    /// The weather.
     pub weather: WeatherConfig,
 }
 
-/// The radar, with its working memory.
+/// A radar with its working memory.
 #[derive(Clone, Debug)]
 pub struct Sensor {
     config: SensorConfig,
@@ -94,29 +95,29 @@ pub struct Sensor {
     antenna: Antenna,
     spectrum: RangeSpectrum,
     noise: Noise,
-    carrier: Carrier,
-    nodding: Nodding,
-    stations: Stations,
-    skyline: Skyline,
+    fixed_echoes: FixedEchoes,
+    pitch_roll: PitchRoll,
+    sweep_poses: SweepPoses,
+    line_of_sight: LineOfSight,
     echoes: Vec<Echo>,
     beams: BeamIndex,
     jitter_rad: Vec<f64>,
 }
 
 impl Sensor {
-    /// A radar that has seen nothing yet. All its randomness comes from `seed`.
+    /// A new radar; all its randomness comes from `seed`.
     pub fn new(config: &SensorConfig, effects: &Effects, seed: u64) -> Self {
         let (sampling, receiver) = (config.sampling(), config.profile.receiver());
         let spectrum = RangeSpectrum::new(sampling.bins, sampling.range_resolution_m, &receiver);
         Self {
             antenna: Antenna::new(receiver.beam_rad, effects.side_lobes),
             noise: Noise::new(&sampling, &receiver, effects, &spectrum),
-            carrier: Carrier::new(&sampling, &receiver, effects, &spectrum, seed),
-            nodding: Nodding::new(seed),
+            fixed_echoes: FixedEchoes::new(&sampling, &receiver, effects, &spectrum, seed),
+            pitch_roll: PitchRoll::new(seed),
             spectrum,
             seed,
-            stations: Stations::default(),
-            skyline: Skyline::default(),
+            sweep_poses: SweepPoses::default(),
+            line_of_sight: LineOfSight::default(),
             echoes: Vec::new(),
             beams: BeamIndex::default(),
             jitter_rad: vec![0.0; sampling.azimuths],
@@ -127,14 +128,15 @@ impl Sensor {
         }
     }
 
-    /// How it samples.
+    /// The sampling of the radar.
     pub fn sampling(&self) -> &Sampling {
         &self.sampling
     }
 
-    /// Measures one sweep into `slot` and says how it lies there: rows of [`METADATA_BYTES`], then powers, as in an Oxford image.
+    /// Measures one sweep into `slot` and returns its geometry: rows of [`METADATA_BYTES`], then powers, as
+    /// in an Oxford image.
     ///
-    /// Its randomness comes from the radar's seed and `index`, the number of the scan.
+    /// All randomness comes from the radar's seed and `index`, the number of the scan.
     pub fn sweep(
         &mut self,
         scene: Scene<'_>,
@@ -143,9 +145,9 @@ impl Sensor {
         slot: &mut ScanSlot<'_>,
     ) -> SweepGeometry {
         let mut rng = Stream::Scan(index).generator(self.seed);
-        self.look_around(scene, time, &mut rng);
+        self.collect_echoes(scene, time, &mut rng);
         for azimuth in 0..self.sampling.azimuths {
-            rng.set_word_pos((azimuth as u128 + 1) * WORDS_AN_AZIMUTH);
+            rng.set_word_pos((azimuth as u128 + 1) * WORDS_PER_AZIMUTH);
             self.measure(azimuth, &mut rng);
             self.write_row(azimuth, time, slot);
         }
@@ -155,33 +157,34 @@ impl Sensor {
         self.geometry(time)
     }
 
-    /// Lists all that the sweep sees.
-    fn look_around(&mut self, scene: Scene<'_>, time: SweepTime, rng: &mut ChaCha8Rng) {
-        let wobble_rad = if self.effects.encoder_wobble {
+    /// Collects the echoes of the sweep.
+    fn collect_echoes(&mut self, scene: Scene<'_>, time: SweepTime, rng: &mut ChaCha8Rng) {
+        let eccentricity_rad = if self.effects.encoder_wobble {
             self.config.azimuth_eccentricity_rad
         } else {
             0.0
         };
         let moving = self.effects.sweep_motion;
-        let error_rad = |azimuth_rad: f64| wobble_rad * azimuth_rad.cos();
-        let lift_rad = |time_s, azimuth_rad| self.nodding.lift_rad(time_s, azimuth_rad);
-        self.stations.follow(
+        let error_rad = |azimuth_rad: f64| eccentricity_rad * azimuth_rad.cos();
+        let elevation_rad =
+            |time_s, azimuth_rad| self.pitch_roll.elevation_rad(time_s, azimuth_rad);
+        self.sweep_poses.sample(
             scene.path,
             time,
             &self.sampling,
             moving,
             error_rad,
-            lift_rad,
+            elevation_rad,
         );
         let middle_s = time.drive_time_s(time.middle_us());
-        let centre = self.stations.middle().position;
+        let centre = self.sweep_poses.middle().position;
         let reach_m = self.sampling.reach_m();
         let mut movers: Vec<Moving<'_>> = Vec::new();
         scene
             .movers
             .visit(middle_s, centre, reach_m, &mut |mover| movers.push(mover));
-        self.skyline
-            .cast(scene.world, &movers, &self.stations, reach_m);
+        self.line_of_sight
+            .cast(scene.world, &movers, &self.sweep_poses, reach_m);
         let weather = if self.effects.weather {
             scene.weather
         } else {
@@ -189,8 +192,8 @@ impl Sensor {
         };
         let atmosphere = Atmosphere::new(&weather, self.receiver.carrier_ghz);
         let view = View {
-            stations: &self.stations,
-            skyline: &self.skyline,
+            sweep_poses: &self.sweep_poses,
+            line_of_sight: &self.line_of_sight,
             receiver: &self.receiver,
             atmosphere: &atmosphere,
             effects: &self.effects,
@@ -205,7 +208,8 @@ impl Sensor {
         if self.effects.multipath {
             view.ghosts(scene.world, &mut self.echoes);
         }
-        // Always as many random numbers, so that no effect changes another's; those of bursts, which vary, come last.
+        // The number of drawn values does not depend on the effects, so that none changes another's.
+        // Interference, which needs a varying number, comes last.
         let jitter_rad = if self.effects.encoder_wobble {
             ENCODER_JITTER_RAD
         } else {
@@ -217,7 +221,7 @@ impl Sensor {
         let clutter =
             |range_m: f64| atmosphere.clutter_m2(range_m, view.receiver) * view.received(range_m);
         let (snow, interference) = (weather.snow_mm_h > 0.0, self.effects.interference);
-        self.noise.feel_surroundings(&self.stations, rng);
+        self.noise.draw_reverberation(&self.sweep_poses, rng);
         self.noise.begin_sweep(
             &self.sampling,
             &self.spectrum,
@@ -226,21 +230,22 @@ impl Sensor {
             clutter,
             rng,
         );
-        let middle = *self.stations.middle();
-        let heard = |echo: &Echo| {
+        let middle = *self.sweep_poses.middle();
+        let power_of = |echo: &Echo| {
             (
                 echo.azimuth,
                 (echo.position - middle.position).norm(),
                 echo.amplitude * echo.amplitude,
             )
         };
-        self.noise.listen_around(self.echoes.iter().map(heard));
-        self.beams.sort(&self.echoes, &self.antenna, &self.stations);
+        self.noise.collect_powers(self.echoes.iter().map(power_of));
+        self.beams
+            .sort(&self.echoes, &self.antenna, &self.sweep_poses);
     }
 
-    /// Fills the spectrum with what one azimuth receives.
+    /// Computes the spectrum that one azimuth receives.
     fn measure(&mut self, azimuth: usize, rng: &mut ChaCha8Rng) {
-        let station = *self.stations.at(azimuth as f64);
+        let azimuth_pose = *self.sweep_poses.at(azimuth as f64);
         let doppler_s = if self.effects.doppler {
             self.doppler_s(azimuth)
         } else {
@@ -253,40 +258,40 @@ impl Sensor {
                 return 0.0;
             }
             let passed = if self.effects.occlusion {
-                self.skyline.open(azimuth, range_m)
+                self.line_of_sight.transmission_along(azimuth, range_m)
             } else {
                 1.0
             };
             f64::from(passed)
                 * ground::ground_power(
-                    station.position + station.beam * range_m,
+                    azimuth_pose.position + azimuth_pose.beam * range_m,
                     range_m,
                     &self.receiver,
                 )
         });
         for &number in self.beams.echoes(azimuth) {
             let echo = &self.echoes[number as usize];
-            let way = echo.place(&station) - station.position;
-            let range_m = way.norm();
-            // Small angles: the tangent will do.
-            let off_rad =
-                station.beam.perp(&way) / station.beam.dot(&way) + self.jitter_rad[azimuth];
+            let ray = echo.place(&azimuth_pose) - azimuth_pose.position;
+            let range_m = ray.norm();
+            // Small angles: the tangent is the angle.
+            let off_rad = azimuth_pose.beam.perp(&ray) / azimuth_pose.beam.dot(&ray)
+                + self.jitter_rad[azimuth];
             let amplitude = echo.amplitude * self.antenna.gain(off_rad);
-            let approach_mps = (station.velocity - echo.velocity).dot(&way) / range_m;
-            // What approaches reads too near with a rising chirp.
+            let approach_mps = (azimuth_pose.velocity - echo.velocity).dot(&ray) / range_m;
+            // With a rising chirp approaching objects are measured too near.
             let measured_m = range_m - doppler_s * approach_mps;
             let bin = self.sampling.bin(measured_m);
             if self.effects.speckle {
-                // There and back: two wavelengths of phase for each wavelength of range.
+                // Two-way: two wavelengths of phase for each wavelength of range.
                 let (sine, cosine) = (TAU * (2.0 * range_m / wavelength_m).fract()).sin_cos();
                 self.spectrum
                     .add(bin, (amplitude * cosine) as f32, (amplitude * sine) as f32);
             } else {
                 self.spectrum.add_power(bin, (amplitude * amplitude) as f32);
             }
-            self.noise.note(measured_m, amplitude * amplitude);
+            self.noise.add_echo(measured_m, amplitude * amplitude);
         }
-        self.carrier.add(&mut self.spectrum, azimuth);
+        self.fixed_echoes.add(&mut self.spectrum, azimuth);
         self.noise.add(&mut self.spectrum, azimuth, rng);
     }
 
@@ -319,10 +324,10 @@ impl Sensor {
         slot.flags[azimuth] = flags;
     }
 
-    /// Replaces some azimuths by the mean of their neighbours, and says so where the format can.
+    /// Replaces lost azimuths by the mean of their neighbours, and marks them where the format can.
     fn drop_azimuths(&self, rng: &mut ChaCha8Rng, slot: &mut ScanSlot<'_>) {
         let stride = self.sampling.stride();
-        rng.set_word_pos(WORDS_AN_AZIMUTH / 2);
+        rng.set_word_pos(WORDS_PER_AZIMUTH / 2);
         for azimuth in 1..self.sampling.azimuths - 1 {
             if !rng.random_bool(DROPPED) || self.sampling.chirp == Chirp::Alternating {
                 continue;

@@ -17,9 +17,9 @@ pub(crate) enum Stream {
     /// Host stalls, by block of scans with one stall each.
     Stall(u64),
     /// Pitch and roll of the vehicle.
-    Nodding,
+    PitchRoll,
     /// Echoes that are fixed to the radar.
-    Carrier,
+    FixedEchoes,
 }
 
 impl Stream {
@@ -38,8 +38,8 @@ impl Stream {
             Self::Drive => 1 << 41,
             Self::Traffic => 1 << 42,
             Self::Stall(block) => (1 << 43) + block,
-            Self::Nodding => u64::MAX - 1,
-            Self::Carrier => u64::MAX,
+            Self::PitchRoll => u64::MAX - 1,
+            Self::FixedEchoes => u64::MAX,
         }
     }
 }
@@ -58,8 +58,8 @@ mod tests {
             Stream::Streets,
             Stream::Drive,
             Stream::Traffic,
-            Stream::Nodding,
-            Stream::Carrier,
+            Stream::PitchRoll,
+            Stream::FixedEchoes,
         ];
         let numbers: BTreeSet<u64> = counted.chain(single).map(Stream::number).collect();
         assert_eq!(numbers.len(), 200_005);

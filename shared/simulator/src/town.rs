@@ -19,6 +19,7 @@ mod land;
 mod plot;
 mod random;
 mod site;
+mod terrace;
 #[cfg(test)]
 mod tests;
 mod vehicle;

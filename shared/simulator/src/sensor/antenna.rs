@@ -1,8 +1,8 @@
-//! The antenna's pattern, there and back.
+//! The two-way antenna pattern in azimuth.
 
 use crate::interpolate::interpolate;
 
-/// Side lobes, there and back: dB below the middle of the beam at so many half-power widths beside it.
+/// Two-way side lobes: dB below the main lobe by the angle in half-power widths.
 ///
 /// The envelope measured on Oxford's, RADIATE's and Boreas-RT's scans: medians of the azimuths beside isolated strong echoes.
 const SIDE_LOBES: [(f64, f64); 8] = [
@@ -15,12 +15,12 @@ const SIDE_LOBES: [(f64, f64); 8] = [
     (6.5, -52.0),
     (8.0, -57.0),
 ];
-/// Entries of the table for one half-power width.
+/// Entries of the table for each half-power width.
 const STEPS: f64 = 64.0;
-/// Half-power widths to each side that the table spans.
+/// Half-power widths on each side that the table covers.
 const REACH: f64 = 8.0;
 
-/// Amplitude that an echo arrives with, by the angle at which it stands beside the beam's middle (two-way).
+/// Two-way amplitude gain by the angle from the beam's axis.
 #[derive(Clone, Debug)]
 pub struct Antenna {
     /// Entries a radian.
@@ -29,7 +29,7 @@ pub struct Antenna {
 }
 
 impl Antenna {
-    /// An antenna whose two-way power falls to one half at `width_rad / 2` beside its middle.
+    /// An antenna whose two-way power falls to one half at `width_rad / 2` from its axis.
     pub fn new(width_rad: f64, side_lobes: bool) -> Self {
         let power = |widths: f64| {
             // One half at half a width.
@@ -51,17 +51,17 @@ impl Antenna {
         }
     }
 
-    /// Amplitude gain `off_rad` beside the middle; 0 far beside it.
+    /// Amplitude gain `off_rad` from the axis; 0 far from it.
     pub fn gain(&self, off_rad: f64) -> f64 {
         let at = (off_rad.abs() * self.scale) as usize;
         self.amplitudes.get(at).copied().map_or(0.0, f64::from)
     }
 
-    /// The angle beyond which the amplitude gain stays below `least`, radians.
-    pub fn reach_rad(&self, least: f64) -> f64 {
+    /// The angle beyond which the amplitude gain stays below `min_gain`, radians.
+    pub fn reach_rad(&self, min_gain: f64) -> f64 {
         let beyond = self
             .amplitudes
-            .partition_point(|&gain| f64::from(gain) >= least);
+            .partition_point(|&gain| f64::from(gain) >= min_gain);
         beyond as f64 / self.scale
     }
 }
@@ -71,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn power_falls_to_one_half_at_half_the_width_and_ever_further() {
+    fn power_falls_monotonically_and_to_one_half_at_half_the_width() {
         for side_lobes in [false, true] {
             let antenna = Antenna::new(0.03, side_lobes);
             assert_eq!(antenna.gain(0.0), 1.0);
@@ -82,12 +82,12 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_heard_beyond_its_reach() {
+    fn gain_is_below_the_minimum_beyond_the_reach() {
         let antenna = Antenna::new(0.03, true);
-        for least in [0.5, 0.05, 0.005, 0.0001] {
-            let reach = antenna.reach_rad(least);
-            assert!(antenna.gain(reach - 1e-3) >= least || reach > 0.23);
-            assert!(antenna.gain(reach + 1e-9) < least);
+        for min_gain in [0.5, 0.05, 0.005, 0.0001] {
+            let reach = antenna.reach_rad(min_gain);
+            assert!(antenna.gain(reach - 1e-3) >= min_gain || reach > 0.23);
+            assert!(antenna.gain(reach + 1e-9) < min_gain);
         }
     }
 }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::antenna::Antenna;
 use super::echoes::{Echo, NEGLIGIBLE_POWER};
-use super::stations::{MARGIN, Stations};
+use super::sweep_poses::{MARGIN, SweepPoses};
 
 /// Echoes sorted by the azimuths whose beams they lie in.
 #[derive(Clone, Debug, Default)]
@@ -18,8 +18,8 @@ pub(super) struct BeamIndex {
 
 impl BeamIndex {
     /// Sorts the echoes of a sweep.
-    pub fn sort(&mut self, echoes: &[Echo], antenna: &Antenna, stations: &Stations) {
-        let (azimuths, step_rad) = (stations.azimuths(), stations.step_rad());
+    pub fn sort(&mut self, echoes: &[Echo], antenna: &Antenna, sweep_poses: &SweepPoses) {
+        let (azimuths, step_rad) = (sweep_poses.azimuths(), sweep_poses.step_rad());
         let span = |echo: &Echo| {
             let reach =
                 antenna.reach_rad((NEGLIGIBLE_POWER.sqrt() / echo.amplitude).min(1.0)) / step_rad;

@@ -1,4 +1,4 @@
-//! Which radar: the section `[simulation.sensor]`.
+//! The radar: the section `[simulation.sensor]`.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,23 +6,24 @@ use crate::error::SimulatorError;
 use crate::limits::require_within;
 use crate::profile::{Profile, Sampling};
 
-/// Which radar measures, and in what this one differs from its kind.
+/// The radar, and its deviations from its profile.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SensorConfig {
-    /// Which radar. Default `cts350x-oxford`.
+    /// The radar. Default: `cts350x-oxford`.
     pub profile: Profile,
-    /// Time of one sweep, seconds. Default: the radar's.
+    /// Time of one sweep, seconds. Default: the profile's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub period_s: Option<f64>,
-    /// Metres to add to a bin's range. Default: the radar's.
+    /// Metres to add to a bin's range. Default: the profile's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range_offset_m: Option<f64>,
-    /// Metres of range that a closing speed of 1 m/s shifts an echo by; 0 for a radar without the effect. Default: the radar's.
+    /// Doppler shift: metres of range for each m/s of closing speed; 0 for a radar without the effect.
+    /// Default: the profile's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub doppler_s: Option<f64>,
-    /// How far the encoder's disc is off its axis, radians: the beam stands at `azimuth + eccentricity * cos(azimuth)`, what
-    /// `dataset.azimuth_eccentricity_rad` puts right. Default 0.
+    /// Eccentricity of the encoder's disc, radians: the beam points to `azimuth + eccentricity *
+    /// cos(azimuth)`, which `dataset.azimuth_eccentricity_rad` corrects. Default: 0.
     pub azimuth_eccentricity_rad: f64,
 }
 
@@ -39,7 +40,10 @@ impl Default for SensorConfig {
 }
 
 impl SensorConfig {
-    /// Refuses what cannot be simulated, naming the key.
+    /// Checks that all values can be simulated.
+    ///
+    /// # Errors
+    /// [`SimulatorError::Config`] with the key of the first value that cannot.
     pub fn validate(&self) -> Result<(), SimulatorError> {
         require_within("sensor.period_s", self.period_s.unwrap_or(1.0), 0.05, 2.0)?;
         require_within(
@@ -57,7 +61,7 @@ impl SensorConfig {
         )
     }
 
-    /// How it samples.
+    /// The sampling of the radar.
     pub fn sampling(&self) -> Sampling {
         let kind = self.profile.sampling();
         Sampling {

@@ -1,46 +1,46 @@
-//! What a sweep can see: everything that reflects, with the amplitude that size, aspect, cover, range and air leave of it.
+//! The echoes of a sweep, with amplitudes by cross-section, aspect, occlusion, range and weather.
 
 use nalgebra::{Point2, Vector2};
 
 use super::atmosphere::Atmosphere;
 use super::effects::Effects;
-use super::elevation::lit;
+use super::elevation::elevation_gain;
+use super::line_of_sight::LineOfSight;
 use super::scintillation::scintillation;
-use super::skyline::Skyline;
-use super::stations::{Station, Stations};
+use super::sweep_poses::{AzimuthPose, SweepPoses};
 use crate::body::{Moving, NO_BODY, Scatterer};
 use crate::profile::Receiver;
 use crate::world::World;
 
-/// Echoes with less power than this are not worth adding.
+/// Echoes with less power are neglected.
 pub(super) const NEGLIGIBLE_POWER: f64 = 0.05;
-/// Nothing reflects nearer than this, metres: it would be inside the radar.
+/// Minimum range of scatterers, metres.
 const NEAREST_M: f64 = 0.5;
 
-/// Something visible.
+/// An echo.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Echo {
-    /// Where it is at the middle of the sweep, world frame.
+    /// Position at the middle of the sweep, world frame.
     pub position: Point2<f64>,
-    /// How it moves, metres a second, world frame.
+    /// Velocity, metres a second, world frame.
     pub velocity: Vector2<f64>,
-    /// Amplitude in the middle of the beam: the root of the power received.
+    /// Amplitude on the beam's axis: the square root of the received power.
     pub amplitude: f64,
-    /// When the beam passes it, in azimuths with fractions.
+    /// The azimuth at which the beam passes it, with fractions.
     pub azimuth: f64,
 }
 
 impl Echo {
-    /// Where it is when the sensor is at a station.
-    pub fn place(&self, station: &Station) -> Point2<f64> {
-        self.position + self.velocity * station.time_s
+    /// The position at the time of an azimuth.
+    pub fn place(&self, azimuth_pose: &AzimuthPose) -> Point2<f64> {
+        self.position + self.velocity * azimuth_pose.time_s
     }
 }
 
-/// What looking needs to know.
+/// Everything that determines the amplitudes.
 pub(super) struct View<'a> {
-    pub stations: &'a Stations,
-    pub skyline: &'a Skyline,
+    pub sweep_poses: &'a SweepPoses,
+    pub line_of_sight: &'a LineOfSight,
     pub receiver: &'a Receiver,
     pub atmosphere: &'a Atmosphere,
     pub effects: &'a Effects,
@@ -48,42 +48,44 @@ pub(super) struct View<'a> {
 }
 
 impl View<'_> {
-    /// Collects all that stands.
+    /// Adds the echoes of the static world.
     pub fn standing(&self, world: &World, echoes: &mut Vec<Echo>) {
-        let centre = self.stations.middle().position;
+        let centre = self.sweep_poses.middle().position;
         for scatterer in world.around(centre, self.reach_m).flatten() {
-            self.look(scatterer, scatterer.position, Vector2::zeros(), echoes);
+            self.add_echoes(scatterer, scatterer.position, Vector2::zeros(), echoes);
         }
     }
 
-    /// Collects all that moves.
+    /// Adds the echoes of the moving bodies.
     pub fn moving(&self, moving: &[Moving<'_>], echoes: &mut Vec<Echo>) {
         for mover in moving {
             for scatterer in &mover.body.scatterers {
                 let there = scatterer.moved(&mover.pose);
-                self.look(&there, there.position, mover.velocity, echoes);
+                self.add_echoes(&there, there.position, mover.velocity, echoes);
             }
         }
     }
 
-    /// Adds a scatterer's echo for each time that the beam passes it, if there is enough of it.
-    fn look(
+    /// Adds a scatterer's echo for each pass of the beam, unless it is negligible.
+    fn add_echoes(
         &self,
         scatterer: &Scatterer,
         position: Point2<f64>,
         velocity: Vector2<f64>,
         echoes: &mut Vec<Echo>,
     ) {
-        let range_m = (position - self.stations.middle().position).norm();
+        let range_m = (position - self.sweep_poses.middle().position).norm();
         if scatterer.cross_section_m2 * self.received((range_m - 5.0).max(NEAREST_M))
             < NEGLIGIBLE_POWER
         {
             return;
         }
-        let place = |station: &Station| position + velocity * station.time_s;
-        self.stations.passings(place, |azimuth| {
-            let station = self.stations.at(azimuth);
-            if let Some(amplitude) = self.amplitude(scatterer, place(station), station, azimuth) {
+        let place = |azimuth_pose: &AzimuthPose| position + velocity * azimuth_pose.time_s;
+        self.sweep_poses.beam_passes(place, |azimuth| {
+            let azimuth_pose = self.sweep_poses.at(azimuth);
+            if let Some(amplitude) =
+                self.amplitude(scatterer, place(azimuth_pose), azimuth_pose, azimuth)
+            {
                 echoes.push(Echo {
                     position,
                     velocity,
@@ -98,18 +100,18 @@ impl View<'_> {
         &self,
         scatterer: &Scatterer,
         place: Point2<f64>,
-        from: &Station,
+        from: &AzimuthPose,
         azimuth: f64,
     ) -> Option<f64> {
-        let way = from.position - place;
-        let range_m = way.norm();
+        let ray = from.position - place;
+        let range_m = ray.norm();
         if !(NEAREST_M..self.reach_m).contains(&range_m) {
             return None;
         }
-        let in_the_open = self.cross_section_m2(scatterer, way / range_m)
+        let unoccluded = self.cross_section_m2(scatterer, ray / range_m)
             * self.received(range_m)
-            * self.lit(scatterer, range_m, from);
-        if in_the_open < NEGLIGIBLE_POWER {
+            * self.elevation_gain(scatterer, range_m, from);
+        if unoccluded < NEGLIGIBLE_POWER {
             return None;
         }
         let body = if self.effects.aspect {
@@ -118,10 +120,10 @@ impl View<'_> {
             NO_BODY
         };
         let passed = self.transmission(azimuth, range_m, body);
-        (in_the_open * passed > NEGLIGIBLE_POWER).then(|| (in_the_open * passed).sqrt())
+        (unoccluded * passed > NEGLIGIBLE_POWER).then(|| (unoccluded * passed).sqrt())
     }
 
-    /// Cross-section that a scatterer shows towards `direction`, a unit vector, square metres.
+    /// Cross-section of a scatterer towards `direction`, a unit vector, square metres.
     pub fn cross_section_m2(&self, scatterer: &Scatterer, direction: Vector2<f64>) -> f64 {
         let aspect = &scatterer.aspect;
         let facing = if self.effects.aspect {
@@ -137,23 +139,23 @@ impl View<'_> {
         scatterer.cross_section_m2 * facing * flicker
     }
 
-    /// Share of the power that walls let through to a thing of `body`, there and back.
+    /// Two-way share of the power that walls transmit to a scatterer of `body`.
     pub fn transmission(&self, azimuth: f64, range_m: f64, body: u32) -> f64 {
         if self.effects.occlusion {
-            f64::from(self.skyline.transmission(azimuth, range_m, body))
+            f64::from(self.line_of_sight.transmission(azimuth, range_m, body))
         } else {
             1.0
         }
     }
 
-    /// Share of the power that the beam has at a scatterer's height, seen over a way of `range_m`.
-    pub fn lit(&self, scatterer: &Scatterer, range_m: f64, from: &Station) -> f64 {
+    /// Share of the beam's power at a scatterer's height, at `range_m`.
+    pub fn elevation_gain(&self, scatterer: &Scatterer, range_m: f64, from: &AzimuthPose) -> f64 {
         if self.effects.elevation {
-            lit(
+            elevation_gain(
                 scatterer.position,
                 scatterer.cross_section_m2,
                 range_m,
-                from.lift_rad,
+                from.elevation_rad,
                 self.receiver.beam_height_rad,
             )
         } else {
@@ -161,8 +163,8 @@ impl View<'_> {
         }
     }
 
-    /// Power received from 1 m2 at a range: the fourth power of range, and the receiver's gain, which rises with it.
+    /// Power received from 1 m² at a range.
     pub fn received(&self, range_m: f64) -> f64 {
-        self.receiver.sensitivity(range_m) * self.atmosphere.passed(range_m)
+        self.receiver.sensitivity(range_m) * self.atmosphere.transmission(range_m)
     }
 }

@@ -1,7 +1,8 @@
-//! The third dimension, as far as a plane world needs it: the beam is a few degrees high, and the vehicle pitches and rolls.
+//! Elevation in a planar world: the beam has a height of a few degrees, and the vehicle pitches and rolls.
 //!
-//! Each scatterer stands for a column of a facade, a trunk or a car, lit at one height. What is near shows a small part of its
-//! column; and as the vehicle nods, another one. So returns come and go from scan to scan.
+//! Each scatterer stands for a column of a facade, a trunk or a car, of which the beam illuminates one
+//! height. At short range it illuminates a small part of the column, and another one as the vehicle
+//! pitches, so returns come and go from scan to scan.
 
 use std::f64::consts::{LN_2, TAU};
 
@@ -12,15 +13,15 @@ use rand_distr::StandardNormal;
 use super::place_noise::place_hash;
 use crate::stream::Stream;
 
-/// Heights of scatterers about the radar's, metres: this much up or down.
+/// Maximum height of scatterers above and below the radar, metres.
 const HEIGHT_M: f64 = 1.6;
-/// Cross-section of what is half a spot and half an upright, square metres.
+/// Cross-section at which a scatterer is half a point and half a vertical line, square metres.
 const UPRIGHT_M2: f64 = 4.0;
-/// Nodding of a car on its springs, standard deviation, radians.
+/// Pitch and roll of a car on its springs, standard deviation, radians.
 const NODDING_RAD: f64 = 0.008;
-/// Its frequencies, hertz.
+/// Frequencies of pitch and roll, hertz.
 const NODDING_HZ: std::ops::Range<f64> = 0.7..2.2;
-/// Oscillations that it is made of, for each axis.
+/// Number of oscillations for each axis.
 const OSCILLATIONS: usize = 4;
 
 #[derive(Clone, Copy, Debug)]
@@ -30,17 +31,17 @@ struct Oscillation {
     phase: f64,
 }
 
-/// How the vehicle pitches and rolls.
+/// The pitch and roll of the vehicle.
 #[derive(Clone, Debug)]
-pub(super) struct Nodding {
+pub(super) struct PitchRoll {
     pitch: [Oscillation; OSCILLATIONS],
     roll: [Oscillation; OSCILLATIONS],
 }
 
-impl Nodding {
-    /// A vehicle's; one seed is one drive.
+impl PitchRoll {
+    /// Draws the oscillations; one seed is one drive.
     pub fn new(seed: u64) -> Self {
-        let mut rng = Stream::Nodding.generator(seed);
+        let mut rng = Stream::PitchRoll.generator(seed);
         let mut oscillation = || Oscillation {
             amplitude_rad: NODDING_RAD
                 * (2.0 / OSCILLATIONS as f64).sqrt()
@@ -54,8 +55,8 @@ impl Nodding {
         }
     }
 
-    /// How far the beam points up at an azimuth (clockwise from ahead) and a time, radians.
-    pub fn lift_rad(&self, time_s: f64, azimuth_rad: f64) -> f64 {
+    /// Elevation of the beam at an azimuth (clockwise from ahead) and a time, radians.
+    pub fn elevation_rad(&self, time_s: f64, azimuth_rad: f64) -> f64 {
         let sum = |all: &[Oscillation]| -> f64 {
             all.iter()
                 .map(|o| o.amplitude_rad * (TAU * o.frequency_hz * time_s + o.phase).sin())
@@ -65,22 +66,22 @@ impl Nodding {
     }
 }
 
-/// Share of the power that a scatterer gets from a beam of a height that points up by `lift_rad`. What is strong stands upright (posts,
-/// corners) and is lit at some height in any case.
-pub(super) fn lit(
+/// Share of the beam's power that illuminates a scatterer, for a beam with the elevation `elevation_rad`.
+/// Strong scatterers are vertical lines (posts, corners), which are always illuminated at some height.
+pub(super) fn elevation_gain(
     place: Point2<f64>,
     cross_section_m2: f64,
     range_m: f64,
-    lift_rad: f64,
+    elevation_rad: f64,
     beam_height_rad: f64,
 ) -> f64 {
-    let off = (height_m(place) / range_m - lift_rad) / beam_height_rad;
+    let off = (height_m(place) / range_m - elevation_rad) / beam_height_rad;
     let spot = (-4.0 * LN_2 * off * off).exp();
     let upright = cross_section_m2 / (cross_section_m2 + UPRIGHT_M2);
     spot + (1.0 - spot) * upright
 }
 
-/// The height of what stands at a place, metres above the radar: as good as random, and always the same.
+/// The height of a scatterer above the radar, metres: pseudo-random, by its place.
 fn height_m(place: Point2<f64>) -> f64 {
     HEIGHT_M * (2.0 * place_hash(place, 0) - 1.0)
 }
@@ -90,7 +91,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn heights_fill_their_span_evenly() {
+    fn heights_are_uniformly_distributed() {
         let heights: Vec<f64> = (0..10_000)
             .map(|i| height_m(Point2::new(f64::from(i) * 0.1, 7.0)))
             .collect();
@@ -103,16 +104,22 @@ mod tests {
     }
 
     #[test]
-    fn a_beam_that_points_up_loses_what_is_far_and_keeps_what_is_high() {
+    fn a_raised_beam_loses_far_and_keeps_high_scatterers() {
         let place = (0..10_000)
             .map(|i| Point2::new(f64::from(i), 0.0))
             .find(|p| height_m(*p) > 0.97 * HEIGHT_M)
             .unwrap_or_default();
-        assert!(lit(place, 0.1, 1e4, 0.0, 0.045) > 0.99 && lit(place, 0.1, 1e4, 0.05, 0.045) < 0.1);
         assert!(
-            lit(place, 0.1, HEIGHT_M / 0.05, 0.05, 0.045) > 0.9
-                && lit(place, 0.1, 10.0, 0.0, 0.045) < 0.05
+            elevation_gain(place, 0.1, 1e4, 0.0, 0.045) > 0.99
+                && elevation_gain(place, 0.1, 1e4, 0.05, 0.045) < 0.1
         );
-        assert!(lit(place, 0.1, 10.0, 0.0, 0.25) > 0.3, "a fan lights it");
+        assert!(
+            elevation_gain(place, 0.1, HEIGHT_M / 0.05, 0.05, 0.045) > 0.9
+                && elevation_gain(place, 0.1, 10.0, 0.0, 0.045) < 0.05
+        );
+        assert!(
+            elevation_gain(place, 0.1, 10.0, 0.0, 0.25) > 0.3,
+            "a fan beam illuminates it"
+        );
     }
 }

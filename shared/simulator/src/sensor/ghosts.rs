@@ -1,33 +1,32 @@
-//! Mirror images: what is seen twice bounced off a smooth front (sensor, wall, thing, wall, sensor).
+//! Ghost targets: mirror images by a double bounce off a smooth front (sensor, wall, object, wall, sensor).
 //!
-//! The image of a thing behind a mirror is seen exactly like a thing that stands there, wherever the way to it goes through the
-//! mirror. Ways that bounce once only come back from another direction than they were sent to, and a narrow beam does not
-//! hear them.
+//! A mirror image behaves like an object behind the wall, visible where the line of sight to it crosses the
+//! wall. Single-bounce paths return from another direction than they left in, outside a narrow beam.
 
 use std::collections::BTreeMap;
 
 use nalgebra::{Point2, Vector2};
 
 use super::echoes::{Echo, NEGLIGIBLE_POWER, View};
-use super::skyline::Skyline;
-use super::stations::Station;
+use super::line_of_sight::LineOfSight;
+use super::sweep_poses::AzimuthPose;
 use crate::body::{Scatterer, Wall};
 use crate::occlusion::crossing;
 use crate::world::World;
 
-/// Walls that mirror less than this share of the power show nothing.
+/// Minimum mirrored share of walls that are considered.
 const LEAST_MIRROR: f64 = 0.15;
-/// Most mirrors of a sweep: those that fill most of the view.
+/// Maximum number of mirrors in a sweep: those that cover most of the view.
 const MOST_MIRRORS: usize = 12;
-/// Things that reflect less than this, square metres, have no visible image.
+/// Minimum cross-section of objects with a visible image, square metres.
 const LEAST_CROSS_SECTION_M2: f64 = 3.0;
-/// How far from a mirror a thing may be, metres.
+/// Maximum distance of objects from a mirror, metres.
 const REACH_M: f64 = 50.0;
 
 impl View<'_> {
-    /// Collects the images of strong reflectors in the largest mirrors.
+    /// Adds the images of strong reflectors in the largest mirrors.
     pub fn ghosts(&self, world: &World, echoes: &mut Vec<Echo>) {
-        for wall in mirrors(world, self.skyline, self.stations.azimuths()) {
+        for wall in mirrors(world, self.line_of_sight, self.sweep_poses.azimuths()) {
             let middle = Point2::from((wall.from.coords + wall.to.coords) / 2.0);
             let strong = |s: &&Scatterer| {
                 s.cross_section_m2 >= LEAST_CROSS_SECTION_M2
@@ -42,20 +41,22 @@ impl View<'_> {
 
     fn ghost(&self, world: &World, wall: &Wall, of: &Scatterer, echoes: &mut Vec<Echo>) {
         let position = image(of.position, wall);
-        self.stations.passings(
-            |_: &Station| position,
+        self.sweep_poses.beam_passes(
+            |_: &AzimuthPose| position,
             |azimuth| {
-                let station = self.stations.at(azimuth);
-                let way = position - station.position;
-                let Some(share) = crossing(station.position, way, wall) else {
+                let azimuth_pose = self.sweep_poses.at(azimuth);
+                let ray = position - azimuth_pose.position;
+                let Some(share) = crossing(azimuth_pose.position, ray, wall) else {
                     return;
                 };
-                let range_m = way.norm();
-                let bounce = station.position + way * share;
+                let range_m = ray.norm();
+                let bounce = azimuth_pose.position + ray * share;
                 let cross_section_m2 =
                     self.cross_section_m2(of, (bounce - of.position).normalize());
-                let mirrored =
-                    cross_section_m2 * wall.mirror * wall.mirror * self.lit(of, range_m, station);
+                let mirrored = cross_section_m2
+                    * wall.mirror
+                    * wall.mirror
+                    * self.elevation_gain(of, range_m, azimuth_pose);
                 let bright = mirrored * self.received(range_m);
                 let negligible = NEGLIGIBLE_POWER / bright;
                 if range_m > self.reach_m || negligible >= 1.0 {
@@ -82,10 +83,10 @@ impl View<'_> {
     }
 }
 
-/// The mirrors that fill most of the view, by the number of rays that meet them first.
-fn mirrors(world: &World, skyline: &Skyline, azimuths: usize) -> Vec<Wall> {
+/// The mirrors that cover most of the view, by the number of rays that hit them first.
+fn mirrors(world: &World, line_of_sight: &LineOfSight, azimuths: usize) -> Vec<Wall> {
     let mut rays: BTreeMap<u32, u32> = BTreeMap::new();
-    for first in skyline.first_walls(azimuths) {
+    for first in line_of_sight.first_walls(azimuths) {
         if world
             .walls()
             .get(first.wall as usize)
@@ -103,7 +104,7 @@ fn mirrors(world: &World, skyline: &Skyline, azimuths: usize) -> Vec<Wall> {
         .collect()
 }
 
-/// Where a mirrored thing is seen: its image behind the wall.
+/// The mirror image of a place behind the wall.
 fn image(of: Point2<f64>, wall: &Wall) -> Point2<f64> {
     let along = (wall.to - wall.from).normalize();
     let across = Vector2::new(-along.y, along.x);

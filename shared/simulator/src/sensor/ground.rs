@@ -1,17 +1,18 @@
-//! What the ground itself sends back: road, verges, lawns and fields, in patches that rise towards the radar or fall away.
+//! Backscatter of the ground: road, verges, lawns and fields, in patches of varying slope.
 
 use nalgebra::Point2;
 
 use super::place_noise::smooth_noise;
 use crate::profile::Receiver;
 
-/// Backscatter of a square metre of ground at a grazing angle, middle value, dB: dry asphalt at 77 GHz; rough grass is 20 dB above it.
+/// Backscatter of a square metre of ground at a grazing angle, median, dB: dry asphalt at 77 GHz; rough
+/// grass is 20 dB above it.
 const REFLECTIVITY_DB: f64 = -50.0;
-/// How much patches differ from that, standard deviation, dB, and how large they are, metres.
+/// Variation between patches, standard deviation, dB, and their size, metres.
 const PATCHES_DB: f64 = 11.0;
 const PATCH_M: f64 = 14.0;
 
-/// Power from the ground in one resolution cell, had the way to it nothing in it.
+/// Power from the ground in one resolution cell, without occlusion.
 pub(super) fn ground_power(place: Point2<f64>, range_m: f64, receiver: &Receiver) -> f64 {
     let area_m2 = range_m * receiver.beam_rad * receiver.cell_m;
     let reflectivity =

@@ -1,8 +1,9 @@
-//! Highlights: the spot of a smooth wall that faces the sensor squarely, and glides along the wall as the sensor drives by.
+//! Specular highlights: the reflection of a smooth wall at normal incidence, which moves along the wall
+//! with the sensor.
 //!
-//! A flat plate that is larger than the first Fresnel zone reflects like its own mirror image: its cross-section is
-//! pi R^2 times the mirrored share (Knott, Shaeffer and Tuley, Radar Cross Section), less what its roughness scatters away. What
-//! glides along with a vehicle tells it that it stands still.
+//! A flat plate larger than the first Fresnel zone reflects like its own mirror image: its cross-section is
+//! pi R^2 times the mirrored share (Knott, Shaeffer and Tuley, Radar Cross Section), less the part that
+//! roughness scatters. For odometry a highlight looks like an object at rest relative to the vehicle.
 
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
@@ -10,19 +11,19 @@ use std::f64::consts::PI;
 use nalgebra::{Point2, Vector2};
 
 use super::echoes::{Echo, NEGLIGIBLE_POWER, View};
-use super::stations::Station;
+use super::sweep_poses::AzimuthPose;
 use crate::body::Wall;
 use crate::world::World;
 
-/// Share of the mirrored power that stays together: walls have windows, joints and courses.
+/// Coherent share of the mirrored power: walls have windows, joints and courses.
 const SMOOTHNESS: f64 = 0.02;
 
 impl View<'_> {
-    /// Collects the highlights of all walls that are met first by a ray.
+    /// Adds the highlights of all walls that a ray hits first.
     pub fn highlights(&self, world: &World, echoes: &mut Vec<Echo>) {
         let numbers: BTreeSet<u32> = self
-            .skyline
-            .first_walls(self.stations.azimuths())
+            .line_of_sight
+            .first_walls(self.sweep_poses.azimuths())
             .map(|first| first.wall)
             .collect();
         for wall in numbers
@@ -34,11 +35,11 @@ impl View<'_> {
     }
 
     fn highlight(&self, wall: &Wall, echoes: &mut Vec<Echo>) {
-        let spot = |station: &Station| foot(station.position, wall);
-        self.stations.passings(spot, |azimuth| {
-            let station = self.stations.at(azimuth);
-            let position = spot(station);
-            let range_m = (position - station.position).norm();
+        let spot = |azimuth_pose: &AzimuthPose| foot(azimuth_pose.position, wall);
+        self.sweep_poses.beam_passes(spot, |azimuth| {
+            let azimuth_pose = self.sweep_poses.at(azimuth);
+            let position = spot(azimuth_pose);
+            let range_m = (position - azimuth_pose.position).norm();
             let on_wall = (position - wall.from).dot(&(position - wall.to)) < 0.0;
             if !on_wall || range_m > self.reach_m {
                 return;
@@ -58,7 +59,7 @@ impl View<'_> {
     }
 }
 
-/// The place on a wall's line that is nearest.
+/// The projection of a place onto a wall's line.
 fn foot(from: Point2<f64>, wall: &Wall) -> Point2<f64> {
     let along = wall.to - wall.from;
     let length2 = along.norm_squared();

@@ -1,4 +1,5 @@
-//! All power that no single echo explains: the receiver's noise, ground, weather, phase noise, reverberation, lines, other radars.
+//! All power that is no single echo: thermal noise, ground, weather, phase noise, reverberation, spurious
+//! lines, interference.
 
 use std::f64::consts::TAU;
 
@@ -8,40 +9,42 @@ use rand_distr::StandardNormal;
 use super::effects::Effects;
 use super::place_noise::smooth_noise;
 use super::spectrum::{NOISE_OVERLAP, RangeSpectrum};
-use super::stations::Stations;
+use super::sweep_poses::SweepPoses;
 use crate::interpolate::interpolate;
 use crate::profile::{Receiver, Sampling};
 
-/// Metres a cell of the coarse profile of power from which phase noise is reckoned.
+/// Length of a cell of the coarse power profile for phase noise and reverberation, metres.
 const COARSE_M: f64 = 2.0;
-/// Phase noise far beside an echo: power in each bin as a share of the echo's, as measured on Oxford's and RADIATE's scans
-/// (the lower fifth of an azimuth's powers rises with their sum).
+/// Phase noise far from an echo: power in each bin as a share of the echo's, measured in Oxford's and
+/// RADIATE's scans (the lower fifth of an azimuth's powers rises with their sum).
 const SKIRT: f64 = 1.0e-6;
-/// How much more of it there is at the echo itself, and the distance at which that falls to one half, metres.
+/// Factor of the phase noise at the echo itself, and the distance at which it has fallen to one half,
+/// metres.
 const SKIRT_PEAK: f64 = 100.0;
 const SKIRT_WIDTH_M: f64 = 1.5;
-/// Echoes bounce on: so much of an echo's power, falling exponentially over so many metres behind it. First what is behind a
-/// front (rooms, eaves, what stands close by), then a whole street, which a beam hears from some azimuths to either side.
+/// Reverberation: share of an echo's power, and exponential decay length, metres. First what lies behind a
+/// front (rooms, eaves, near objects), then a whole street, which a beam also receives from neighbouring
+/// azimuths.
 const TAIL: [(f64, f64); 2] = [(2.0e-3, 1.5), (2.0e-5, 10.0)];
 const STREET: (f64, f64) = (2.5e-6, 50.0);
 const STREET_AZIMUTHS: usize = 4;
-/// How much that differs from one direction to the next, standard deviation, dB: what belongs to the place, and what is new in each
-/// sweep.
+/// Variation of reverberation between directions, standard deviation, dB: the part that belongs to the
+/// place, and the part that is new in each sweep.
 const LIVELINESS_DB: f64 = 8.0;
 const STIRRED_DB: f64 = 7.0;
-/// Directions that differ, and over how many metres of the way each changes.
-const LIVELY_SECTORS: u64 = 60;
-const LIVELY_M: f64 = 4.0;
-/// Spurious lines: range as a share of the farthest, and power in units of the floor there.
+/// Number of directions, and the distance over which each changes, metres.
+const REVERBERATION_SECTORS: u64 = 60;
+const REVERBERATION_M: f64 = 4.0;
+/// Spurious lines: range as a share of the maximum, and power in units of the floor there.
 const LINES: [(f64, f64); 4] = [(0.069, 0.5), (0.164, 0.6), (0.37, 0.9), (0.55, 0.7)];
-/// Times a scan that another radar is heard, on average.
+/// Mean number of interference bursts in a scan.
 const BURSTS_A_SCAN: f64 = 0.6;
-/// Azimuths that one burst lasts.
+/// Length of a burst, azimuths.
 const BURST_AZIMUTHS: std::ops::RangeInclusive<usize> = 1..=4;
-/// How far bursts stand above the floor, dB.
+/// Power of bursts above the floor, dB.
 const BURST_DB: std::ops::Range<f64> = 3.0..22.0;
 
-/// Another radar, heard from some azimuth on.
+/// An interference burst.
 #[derive(Clone, Copy, Debug)]
 struct Burst {
     first: usize,
@@ -50,32 +53,32 @@ struct Burst {
     strength: f64,
 }
 
-/// Noise of one sweep.
+/// The noise of one sweep.
 #[derive(Clone, Debug)]
 pub(super) struct Noise {
-    /// Mean power of the receiver's noise in each noise cell.
+    /// Mean power of the thermal noise in each noise cell.
     floor: Vec<f64>,
-    /// How many times that is there without any echo: once, and more where there is a line.
+    /// Factor on it without any echo: 1, more at spurious lines.
     steady: Vec<f64>,
-    /// Mean power of rain, fog and snow in each noise cell, as received.
+    /// Mean received power of rain, fog and snow in each noise cell.
     clutter: Vec<f64>,
-    /// Mean power of the ground in each coarse cell of the azimuth at hand.
+    /// Mean power of the ground in each coarse cell of the current azimuth.
     ground: Vec<f64>,
     /// Noise cell to coarse cell.
     coarse_of: Vec<usize>,
-    /// Power of echoes in each coarse cell of the azimuth at hand, and the noise that it brings there.
+    /// Power of echoes in each coarse cell of the current azimuth, and the noise that results.
     echoes: Vec<f64>,
     raised: Vec<f64>,
-    /// Power of echoes in each coarse cell of all azimuths, one azimuth after the other; and its mean over those that a street's
-    /// reverberation comes from.
+    /// Power of echoes in each coarse cell of all azimuths, azimuth by azimuth; and its mean over the
+    /// azimuths from which a street reverberates.
     around: Vec<f64>,
     street: Vec<f64>,
-    /// Share of an echo's power that is phase noise so many coarse cells beside it, and that reverberates so many behind it,
-    /// at the front and along the street.
+    /// Phase noise by the distance from an echo, in coarse cells, and reverberation by the distance behind
+    /// it, at the front and along the street, as shares of the echo's power.
     skirt: Vec<f64>,
     tail: Vec<f64>,
     street_tail: Vec<f64>,
-    /// By how much each azimuth's surroundings reverberate more or less than usual.
+    /// Factor on the reverberation of each azimuth.
     liveliness: Vec<f64>,
     bursts: Vec<Burst>,
     snow: bool,
@@ -138,7 +141,7 @@ impl Noise {
         }
     }
 
-    /// Settles what holds for a whole sweep. `clutter` gives the power from a resolution cell at a range.
+    /// Prepares a sweep. `clutter` gives the power from a resolution cell of the atmosphere at a range.
     pub fn begin_sweep(
         &mut self,
         sampling: &Sampling,
@@ -154,7 +157,7 @@ impl Noise {
         }
         self.snow = snow;
         self.bursts.clear();
-        // A Poisson process, one exponential gap after another.
+        // A Poisson process: exponential gaps.
         let mut at = -(1.0 - rng.random::<f64>()).ln();
         while interference && at < BURSTS_A_SCAN {
             self.bursts.push(Burst {
@@ -166,28 +169,33 @@ impl Noise {
         }
     }
 
-    /// Settles how much each direction reverberates: log-normal numbers that belong to the place and the world's directions.
-    /// Leaves stir and doors open: a part of it is new in each sweep.
-    pub fn feel_surroundings(&mut self, stations: &Stations, rng: &mut impl Rng) {
-        let stirred: Vec<f64> = (0..LIVELY_SECTORS)
+    /// Draws the reverberation of each direction: log-normal, by place and direction. A part is new in each
+    /// sweep, as from moving leaves and opened doors.
+    pub fn draw_reverberation(&mut self, sweep_poses: &SweepPoses, rng: &mut impl Rng) {
+        let stirred: Vec<f64> = (0..REVERBERATION_SECTORS)
             .map(|_| STIRRED_DB * rng.sample::<f64, _>(StandardNormal))
             .collect();
         for (azimuth, liveliness) in self.liveliness.iter_mut().enumerate() {
-            let station = stations.at(azimuth as f64);
-            let sector =
-                station.beam.y.atan2(station.beam.x).rem_euclid(TAU) / TAU * LIVELY_SECTORS as f64;
-            let (first, share) = (sector as u64 % LIVELY_SECTORS, sector.fract());
+            let azimuth_pose = sweep_poses.at(azimuth as f64);
+            let sector = azimuth_pose
+                .beam
+                .y
+                .atan2(azimuth_pose.beam.x)
+                .rem_euclid(TAU)
+                / TAU
+                * REVERBERATION_SECTORS as f64;
+            let (first, share) = (sector as u64 % REVERBERATION_SECTORS, sector.fract());
             let db = |sector: u64| {
-                LIVELINESS_DB * smooth_noise(station.position, LIVELY_M, sector)
+                LIVELINESS_DB * smooth_noise(azimuth_pose.position, REVERBERATION_M, sector)
                     + stirred[sector as usize]
             };
-            let both = db(first) * (1.0 - share) + db((first + 1) % LIVELY_SECTORS) * share;
+            let both = db(first) * (1.0 - share) + db((first + 1) % REVERBERATION_SECTORS) * share;
             *liveliness = 10f64.powf(both / 10.0);
         }
     }
 
-    /// Settles what a sweep's echoes are, (azimuth, range in metres, power) each.
-    pub fn listen_around(&mut self, echoes: impl Iterator<Item = (f64, f64, f64)>) {
+    /// Collects the echoes of a sweep: azimuth, range in metres, and power.
+    pub fn collect_powers(&mut self, echoes: impl Iterator<Item = (f64, f64, f64)>) {
         let (coarse, azimuths) = (self.echoes.len(), self.liveliness.len());
         self.around.fill(0.0);
         for (azimuth, range_m, power) in echoes {
@@ -212,7 +220,7 @@ impl Noise {
         }
     }
 
-    /// Forgets the azimuth before. `ground` gives the power from a resolution cell of the ground at a range.
+    /// Prepares an azimuth. `ground` gives the power from a resolution cell of the ground at a range.
     pub fn begin_azimuth(&mut self, ground: impl Fn(f64) -> f64) {
         self.echoes.fill(0.0);
         for (cell, power) in self.ground.iter_mut().enumerate() {
@@ -220,21 +228,22 @@ impl Noise {
         }
     }
 
-    /// Notes an echo's power.
-    pub fn note(&mut self, range_m: f64, power: f64) {
+    /// Adds an echo of the current azimuth.
+    pub fn add_echo(&mut self, range_m: f64, power: f64) {
         if let Some(cell) = self.echoes.get_mut((range_m.max(0.0) / COARSE_M) as usize) {
             *cell += power;
         }
     }
 
-    /// Adds all of it to the spectrum of an azimuth.
+    /// Adds the noise to the spectrum of an azimuth.
     pub fn add(&mut self, spectrum: &mut RangeSpectrum, azimuth: usize, rng: &mut impl Rng) {
         self.spread_echoes(azimuth);
-        let heard = |burst: &&Burst| (burst.first..burst.first + burst.azimuths).contains(&azimuth);
+        let power_of =
+            |burst: &&Burst| (burst.first..burst.first + burst.azimuths).contains(&azimuth);
         let burst = self
             .bursts
             .iter()
-            .filter(heard)
+            .filter(power_of)
             .map(|burst| burst.strength)
             .sum::<f64>();
         let (_, spacing) = spectrum.noise_cells();
@@ -249,7 +258,7 @@ impl Noise {
         }
         if self.snow {
             for (cell, clutter) in self.clutter.iter().enumerate() {
-                // Flakes come in clumps: power that is spread exponentially about a mean that itself is.
+                // Snow is clumped: exponentially distributed power about an exponentially distributed mean.
                 let clump = -(1.0 - rng.random::<f64>()).ln();
                 add_gaussian(spectrum, cell as f64 * spacing, clump * clutter, rng);
             }
@@ -285,7 +294,7 @@ impl Noise {
     }
 }
 
-/// Adds one cell's complex Gaussian noise, of so much power on average in each bin.
+/// Adds one cell's complex Gaussian noise with a mean power in each bin.
 fn add_gaussian(spectrum: &mut RangeSpectrum, bin: f64, mean: f64, rng: &mut impl Rng) {
     let deviation = (mean as f32 / (2.0 * NOISE_OVERLAP)).sqrt();
     let (real, imaginary): (f32, f32) = (rng.sample(StandardNormal), rng.sample(StandardNormal));

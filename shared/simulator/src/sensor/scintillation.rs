@@ -1,4 +1,5 @@
-//! How what reflects flickers as it is passed: every real thing is some wavelengths large and has lobes of its own.
+//! Scintillation: real objects are some wavelengths large and have lobes, so their echoes fluctuate with
+//! the direction.
 
 use std::f64::consts::TAU;
 
@@ -6,11 +7,12 @@ use nalgebra::{Point2, Vector2};
 
 use super::place_noise::place_hash;
 
-/// Angle over which a scatterer's lobes change, radians: half a wavelength over its size, here some fifteen centimetres.
+/// Angular scale of a scatterer's lobes, radians: half a wavelength over its size, here some fifteen
+/// centimetres.
 const LOBE_RAD: f64 = 0.012;
 
-/// Factor on the cross-section of what stands at `place`, seen from `direction` (a unit vector): exponentially distributed
-/// over directions with a mean near 1 (Swerling's first case), smooth from one to the next.
+/// Factor on the cross-section of a scatterer at `place`, seen from `direction` (a unit vector):
+/// exponentially distributed over directions with a mean near 1 (Swerling case 1), and smooth.
 pub(super) fn scintillation(place: Point2<f64>, direction: Vector2<f64>) -> f64 {
     let lobe = direction.y.atan2(direction.x).rem_euclid(TAU) / LOBE_RAD;
     let (before, share) = (lobe.floor(), lobe.fract());

@@ -1,23 +1,24 @@
-//! What the receiver makes of echoes: a spectrum over range, and its power in logarithmic steps.
+//! Range processing: the spectrum of one azimuth, and its power in logarithmic steps.
 
 use crate::profile::Receiver;
 
-/// Resolution cells to each side of an echo up to which its point response is kept: side lobes are 55 dB down there.
+/// Half-length of the point response, resolution cells: side lobes beyond are 55 dB down.
 const CELLS_KEPT: f64 = 4.0;
-/// Positions below a bin for which the response is tabulated.
+/// Tabulated positions within a bin.
 const SUB_BINS: usize = 16;
-/// Energy of the point response in cells: what independent noise of power 1 in each cell adds up to in every bin.
+/// Energy of the point response in cells: mean power in every bin of independent noise with power 1 in each
+/// cell.
 pub const NOISE_OVERLAP: f32 = 1.5;
 
-/// Amplitude spectrum of one azimuth over range, to which echoes are added.
+/// The complex amplitudes of one azimuth over range.
 #[derive(Clone, Debug)]
 pub struct RangeSpectrum {
-    /// For each of [`SUB_BINS`] positions the response at `taps` bins.
+    /// The response at `taps` bins for each of [`SUB_BINS`] positions.
     response: Vec<f32>,
     taps: usize,
     real: Vec<f32>,
     imaginary: Vec<f32>,
-    /// Power of what does not interfere.
+    /// Power of incoherent echoes.
     incoherent: Vec<f32>,
     bins: usize,
     bins_per_cell: f64,
@@ -26,7 +27,7 @@ pub struct RangeSpectrum {
 }
 
 impl RangeSpectrum {
-    /// An empty spectrum of so many range bins of `bin_m` metres.
+    /// An empty spectrum of `bins` range bins of `bin_m` metres.
     pub fn new(bins: usize, bin_m: f64, receiver: &Receiver) -> Self {
         let bins_per_cell = receiver.cell_m / bin_m;
         let half = (bins_per_cell * CELLS_KEPT).ceil() as usize;
@@ -56,7 +57,7 @@ impl RangeSpectrum {
         self.incoherent.fill(0.0);
     }
 
-    /// Independent cells of noise in the spectrum, and the distance between them in bins.
+    /// Number of independent noise cells in the spectrum, and their distance in bins.
     pub fn noise_cells(&self) -> (usize, f64) {
         (
             (self.bins as f64 / self.bins_per_cell) as usize + 1,
@@ -64,7 +65,8 @@ impl RangeSpectrum {
         )
     }
 
-    /// Adds an echo at `bin` (fractions count) with a complex amplitude; its peak power is the amplitude's square.
+    /// Adds an echo at `bin` (with fractions) with a complex amplitude; its peak power is the amplitude's
+    /// square.
     pub fn add(&mut self, bin: f64, real: f32, imaginary: f32) {
         let Some((response, first)) = self.place(bin) else {
             return;
@@ -79,7 +81,7 @@ impl RangeSpectrum {
         }
     }
 
-    /// Adds an echo that does not interfere, of so much power.
+    /// Adds an incoherent echo with a power.
     pub fn add_power(&mut self, bin: f64, power: f32) {
         let Some((response, first)) = self.place(bin) else {
             return;
@@ -93,7 +95,7 @@ impl RangeSpectrum {
         }
     }
 
-    /// Which response an echo has, and the first place that it fills; `None` out of range.
+    /// The response of an echo, and the first bin that it fills; `None` out of range.
     fn place(&self, bin: f64) -> Option<(usize, usize)> {
         if !(0.0..self.bins as f64).contains(&bin) {
             return None;
@@ -105,12 +107,12 @@ impl RangeSpectrum {
         ))
     }
 
-    /// Places before and behind the spectrum, so that responses need no limits.
+    /// Padding at both ends, so that responses need no clipping.
     fn pad(&self) -> usize {
         self.taps + 1
     }
 
-    /// Writes the spectrum's power as the sensor would: one byte a bin, half a decibel a count.
+    /// Writes the power as the sensor does: one byte a bin, half a decibel a count.
     pub fn read_out(&self, row: &mut [u8]) {
         let span = self.pad()..self.pad() + self.bins;
         let parts = self.real[span.clone()]
@@ -124,7 +126,7 @@ impl RangeSpectrum {
     }
 }
 
-/// Spectrum of a Hann window, 1 at its peak, `cells` resolution cells away.
+/// Spectrum of a Hann window, 1 at its peak, `cells` resolution cells from it.
 fn hann_response(cells: f64) -> f64 {
     let sinc = |u: f64| {
         if u.abs() < 1e-9 {
@@ -136,10 +138,10 @@ fn hann_response(cells: f64) -> f64 {
     sinc(cells) + 0.5 * (sinc(cells - 1.0) + sinc(cells + 1.0))
 }
 
-/// Power to counts of half a decibel; what is stronger than `full_scale` is compressed.
+/// Converts power to counts of half a decibel, with compression above `full_scale`.
 ///
-/// The CTS350-X and the RAS6 send whole numbers of power: scans hold 0, 6, 9, 12, 14, 15, 17, ... (powers 1, 2, 3, ...) and
-/// nothing between.
+/// The CTS350-X and the RAS6 send integer powers: scans hold 0, 6, 9, 12, 14, 15, 17, ... (powers 1, 2, 3,
+/// ...) and nothing between.
 pub fn counts(power: f32, full_scale: f32, whole_powers: bool) -> u8 {
     let compressed = power / (1.0 + power / full_scale);
     let power = if whole_powers {
@@ -150,11 +152,11 @@ pub fn counts(power: f32, full_scale: f32, whole_powers: bool) -> u8 {
     (6.020_6 * log2(power.max(1.0)) - 0.1 + NO_FRACTIONS).to_bits() as u8
 }
 
-/// A sum with this has no bits left for a fraction, so it is rounded, and its last byte is the whole number: without calls or casts that
-/// look at each number alone, the loop over bins runs several at once.
+/// The sum with this constant is rounded to an integer, which is in its last byte. This vectorises, unlike
+/// casts and calls.
 const NO_FRACTIONS: f32 = 8_388_608.0;
 
-/// Logarithm of a number of at least 1, to 1e-4: by arithmetic alone, so that all machines agree on it.
+/// Logarithm of a number of at least 1, accurate to 1e-4; arithmetic alone, so that all machines agree.
 fn log2(value: f32) -> f32 {
     let bits = value.to_bits();
     let exponent = (bits >> 23) as i32 - 127;
@@ -180,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn logarithm_is_right_to_a_ten_thousandth() {
+    fn logarithm_is_accurate_to_a_ten_thousandth() {
         for step in 0..2000 {
             let value = 1.01f32.powi(step);
             assert!((log2(value) - value.log2()).abs() < 2e-4, "{value}");
@@ -216,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn an_echo_looks_the_same_whether_it_could_interfere_or_not() {
+    fn a_single_echo_is_the_same_whether_coherent_or_not() {
         let (mut wave, mut power) = (spectrum(400), spectrum(400));
         wave.add(123.4, 30.0, 40.0);
         power.add_power(123.4, 2500.0);

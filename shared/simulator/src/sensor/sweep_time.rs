@@ -1,6 +1,6 @@
-//! When a sweep happens.
+//! The time of a sweep.
 
-/// When a sweep happens.
+/// The time of a sweep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SweepTime {
     /// The first azimuth's stamp, microseconds since 1970.
@@ -9,7 +9,7 @@ pub struct SweepTime {
     pub period_us: i64,
     /// Azimuths in one turn.
     pub azimuths: usize,
-    /// The trajectory's time zero, microseconds since 1970.
+    /// The start of the drive, microseconds since 1970.
     pub epoch_us: i64,
 }
 
@@ -24,7 +24,7 @@ impl SweepTime {
         self.start_us + (self.stamp_us(self.azimuths - 1) - self.start_us) / 2
     }
 
-    /// Time on the trajectory of a stamp, seconds.
+    /// Time of a stamp since the start of the drive, seconds.
     pub fn drive_time_s(&self, stamp_us: i64) -> f64 {
         (stamp_us - self.epoch_us) as f64 * 1e-6
     }

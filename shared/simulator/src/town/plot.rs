@@ -4,7 +4,6 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::{Point2, Vector2};
 use rand::Rng;
-use rand_chacha::ChaCha8Rng;
 
 use super::boundary::Boundary;
 use super::building::{Building, Form, Room};
@@ -13,6 +12,7 @@ use super::district::Use;
 use super::facade::Material;
 use super::random::generator;
 use super::site::Site;
+use super::terrace::TerraceStyle;
 
 /// Distance between a terraced house and the side of its lot, metres.
 const PARTY_M: f64 = 0.03;
@@ -27,46 +27,6 @@ pub(super) struct Plot<'a, 's> {
     pub row_key: u64,
     /// Detail of its buildings: 1 along a street, less behind.
     pub detail: f64,
-}
-
-/// The common properties of a terrace.
-struct TerraceStyle {
-    setback_m: f64,
-    front: Material,
-    /// The boundary in front of the houses.
-    before: Option<Boundary>,
-}
-
-impl TerraceStyle {
-    fn draw(rng: &mut ChaCha8Rng) -> Self {
-        let front = match rng.random::<f64>() {
-            ..0.7 => Material::Brick,
-            ..0.82 => Material::Concrete,
-            _ => Material::Glass,
-        };
-        match rng.random::<f64>() {
-            ..0.5 => Self {
-                setback_m: 0.0,
-                front,
-                before: None,
-            },
-            ..0.65 => Self {
-                setback_m: rng.random_range(0.3..1.0),
-                front,
-                before: None,
-            },
-            ..0.88 => Self {
-                setback_m: rng.random_range(1.5..3.0),
-                front,
-                before: Some(Boundary::Railing),
-            },
-            _ => Self {
-                setback_m: rng.random_range(1.5..3.0),
-                front,
-                before: Some(Boundary::Wall),
-            },
-        }
-    }
 }
 
 impl Plot<'_, '_> {

@@ -1,4 +1,5 @@
-//! What turns with the radar: its own ringing, and the roof that it stands on. The same in every scan, to the phase.
+//! Echoes that are fixed to the radar: its own ringing, and the roof below it. They are the same in every
+//! scan, including their phase.
 
 use std::f64::consts::TAU;
 
@@ -13,25 +14,26 @@ use crate::interpolate::interpolate;
 use crate::profile::{Chirp, Receiver, Sampling};
 use crate::stream::Stream;
 
-/// How ringing differs from azimuth to azimuth, standard deviation, dB, and over how many azimuths it changes.
-const UNEVEN_DB: f64 = 3.0;
+/// Variation of the ringing over the azimuths: standard deviation, dB, and the number of azimuths over
+/// which it is smoothed.
+const RINGING_SPREAD_DB: f64 = 3.0;
 const SMOOTH_AZIMUTHS: usize = 12;
-/// Correlation of ringing's complex amplitude from one azimuth to the next.
-const ALIKE: f64 = 0.95;
-/// By how much falling chirps ring louder than rising ones (Boreas-RT, FoMo), dB.
+/// Correlation of the ringing's complex amplitude between neighbouring azimuths.
+const RINGING_CORRELATION: f64 = 0.95;
+/// Excess of the ringing in falling chirps (Boreas-RT, FoMo), dB.
 const FALLING_DB: f64 = 4.0;
-/// Parts of the vehicle that show: roof rails, racks, the tail, all behind the radar.
+/// Number of visible parts of the vehicle: roof rails, racks, the tail, all behind the radar.
 const PARTS: usize = 10;
-/// Where their random numbers begin, so that they are the same with and without ringing.
+/// The start of their random numbers, which do not depend on the ringing.
 const PARTS_AT_WORD: u128 = 1 << 32;
-/// How far behind they are, metres, and how far to either side of straight behind, radians.
+/// Their range, metres, and their angle from straight behind, radians.
 const PARTS_M: std::ops::Range<f64> = 1.5..7.0;
 const PARTS_RAD: std::ops::Range<f64> = -0.7..0.7;
-/// How far they stand above the floor, dB.
+/// Their power above the floor, dB.
 const PARTS_DB: std::ops::Range<f64> = 10.0..35.0;
 
 #[derive(Clone, Copy, Debug)]
-struct Fixed {
+struct FixedEcho {
     bin: f64,
     real: f32,
     imaginary: f32,
@@ -39,12 +41,12 @@ struct Fixed {
 
 /// Echoes that are the same in every scan.
 #[derive(Clone, Debug)]
-pub(super) struct Carrier {
-    azimuths: Vec<Vec<Fixed>>,
+pub(super) struct FixedEchoes {
+    azimuths: Vec<Vec<FixedEcho>>,
 }
 
-impl Carrier {
-    /// Draws them; one seed is one vehicle.
+impl FixedEchoes {
+    /// Draws the echoes; one seed is one vehicle.
     pub fn new(
         sampling: &Sampling,
         receiver: &Receiver,
@@ -52,28 +54,28 @@ impl Carrier {
         spectrum: &RangeSpectrum,
         seed: u64,
     ) -> Self {
-        let mut rng = Stream::Carrier.generator(seed);
-        let mut carrier = Self {
+        let mut rng = Stream::FixedEchoes.generator(seed);
+        let mut fixed_echoes = Self {
             azimuths: vec![Vec::new(); sampling.azimuths],
         };
         if effects.ringing {
-            carrier.ring(sampling, receiver, spectrum, &mut rng);
+            fixed_echoes.add_ringing(sampling, receiver, spectrum, &mut rng);
         }
         if effects.own_vehicle {
             rng.set_word_pos(PARTS_AT_WORD);
-            (0..PARTS).for_each(|_| carrier.part(sampling, receiver, &mut rng));
+            (0..PARTS).for_each(|_| fixed_echoes.add_vehicle_part(sampling, receiver, &mut rng));
         }
-        carrier
+        fixed_echoes
     }
 
-    /// Adds what an azimuth has of it.
+    /// Adds the echoes of an azimuth.
     pub fn add(&self, spectrum: &mut RangeSpectrum, azimuth: usize) {
         for fixed in &self.azimuths[azimuth] {
             spectrum.add(fixed.bin, fixed.real, fixed.imaginary);
         }
     }
 
-    fn ring(
+    fn add_ringing(
         &mut self,
         sampling: &Sampling,
         receiver: &Receiver,
@@ -87,20 +89,20 @@ impl Carrier {
             .into_iter()
             .enumerate()
             .map(|(azimuth, uneven)| {
-                UNEVEN_DB * uneven + if falling(azimuth) { FALLING_DB } else { 0.0 }
+                RINGING_SPREAD_DB * uneven + if falling(azimuth) { FALLING_DB } else { 0.0 }
             })
             .collect();
         let end_m = receiver.ringing_db.last().map_or(0.0, |last| last.0);
         for bin in (0..cells).map(|cell| cell as f64 * spacing) {
-            // By the bin, not the range: an offset of the range is the radar's own delay.
+            // By the bin and not the range: an offset of the range is the radar's own delay.
             let range_m = (bin + 0.5) * sampling.range_resolution_m;
             let level_db = interpolate(receiver.ringing_db, range_m).filter(|_| range_m <= end_m);
             let Some(level_db) = level_db else { continue };
-            let waves = alike_waves(sampling.azimuths, rng);
+            let waves = correlated_amplitudes(sampling.azimuths, rng);
             for ((fixed, louder_db), wave) in self.azimuths.iter_mut().zip(&louder_db).zip(waves) {
                 let power = 10f64.powf((level_db + louder_db) / 10.0) / f64::from(NOISE_OVERLAP);
                 let wave = wave * power.sqrt();
-                fixed.push(Fixed {
+                fixed.push(FixedEcho {
                     bin,
                     real: wave.x as f32,
                     imaginary: wave.y as f32,
@@ -109,12 +111,12 @@ impl Carrier {
         }
     }
 
-    fn part(&mut self, sampling: &Sampling, receiver: &Receiver, rng: &mut ChaCha8Rng) {
+    fn add_vehicle_part(&mut self, sampling: &Sampling, receiver: &Receiver, rng: &mut ChaCha8Rng) {
         let (range_m, side_rad) = (rng.random_range(PARTS_M), rng.random_range(PARTS_RAD));
         let floor_db = interpolate(receiver.floor_db, range_m).unwrap_or_default();
         let power = 10f64.powf((floor_db + rng.random_range(PARTS_DB)) / 10.0);
         let middle = (TAU / 2.0 + side_rad) / sampling.step_rad();
-        // The beam's main lobe: 6 dB down one azimuth of 0.9 degrees beside it.
+        // The main lobe: 6 dB down at one azimuth of 0.9 degrees.
         let reach = 2.0 * receiver.beam_rad / sampling.step_rad();
         let phase = rng.random::<u64>();
         for azimuth in (middle - reach).ceil() as usize..=(middle + reach) as usize {
@@ -130,35 +132,35 @@ impl Carrier {
     }
 }
 
-fn fixed(bin: f64, amplitude: f64, rng: &mut ChaCha8Rng) -> Fixed {
+fn fixed(bin: f64, amplitude: f64, rng: &mut ChaCha8Rng) -> FixedEcho {
     let (sine, cosine) = (TAU * rng.random::<f64>()).sin_cos();
-    Fixed {
+    FixedEcho {
         bin,
         real: (amplitude * cosine) as f32,
         imaginary: (amplitude * sine) as f32,
     }
 }
 
-/// Complex Gaussian numbers round a circle, of power 1 on average, each like its neighbours: an autoregressive process that ends where
-/// it begins.
-fn alike_waves(count: usize, rng: &mut ChaCha8Rng) -> Vec<Vector2<f64>> {
-    let deviation = ((1.0 - ALIKE * ALIKE) / 2.0).sqrt();
+/// Complex Gaussian numbers on a circle, with a mean power of 1 and correlated neighbours: a periodic
+/// autoregressive process.
+fn correlated_amplitudes(count: usize, rng: &mut ChaCha8Rng) -> Vec<Vector2<f64>> {
+    let deviation = ((1.0 - RINGING_CORRELATION * RINGING_CORRELATION) / 2.0).sqrt();
     let fresh: Vec<Vector2<f64>> = (0..count)
         .map(|_| Vector2::new(rng.sample(StandardNormal), rng.sample(StandardNormal)) * deviation)
         .collect();
-    // What a turn from nothing ends with, were it turned for ever.
-    let turn = fresh
-        .iter()
-        .fold(Vector2::zeros(), |wave, fresh| wave * ALIKE + fresh);
-    let mut wave = turn / (1.0 - ALIKE.powi(count as i32));
+    // The state after infinitely many turns.
+    let turn = fresh.iter().fold(Vector2::zeros(), |wave, fresh| {
+        wave * RINGING_CORRELATION + fresh
+    });
+    let mut wave = turn / (1.0 - RINGING_CORRELATION.powi(count as i32));
     let next = |fresh: &Vector2<f64>| {
-        wave = wave * ALIKE + fresh;
+        wave = wave * RINGING_CORRELATION + fresh;
         wave
     };
     fresh.iter().map(next).collect()
 }
 
-/// Normal numbers round a circle, smooth over some of them, with a standard deviation of about 1.
+/// Normal numbers on a circle, smoothed by a moving average, with a standard deviation of about 1.
 fn smooth_noise(count: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
     let white: Vec<f64> = (0..count).map(|_| rng.sample(StandardNormal)).collect();
     let mean = |at: usize| {
@@ -176,9 +178,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn waves_keep_their_power_and_resemble_their_neighbours_all_round_the_circle() {
+    fn amplitudes_keep_their_power_and_correlation_all_round_the_circle() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let circles: Vec<_> = (0..4000).map(|_| alike_waves(120, &mut rng)).collect();
+        let circles: Vec<_> = (0..4000)
+            .map(|_| correlated_amplitudes(120, &mut rng))
+            .collect();
         let mean = |of: &dyn Fn(&[Vector2<f64>]) -> f64| {
             circles.iter().map(|circle| of(circle)).sum::<f64>() / 4000.0
         };
@@ -187,11 +191,14 @@ mod tests {
             let alike = mean(&|circle| circle[at].dot(&circle[next]));
             assert!((power - 1.0).abs() < 0.08, "azimuth {at}: power {power}");
             assert!(
-                (alike / power - ALIKE).abs() < 0.03,
+                (alike / power - RINGING_CORRELATION).abs() < 0.03,
                 "azimuths {at} and {next}: {alike} of {power}"
             );
         }
         let across = mean(&|circle| circle[0].dot(&circle[60]));
-        assert!(across.abs() < 0.1 + 2.0 * ALIKE.powi(60), "{across}");
+        assert!(
+            across.abs() < 0.1 + 2.0 * RINGING_CORRELATION.powi(60),
+            "{across}"
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! Where the sensor is at each azimuth of a sweep, and when its beam passes a place.
+//! The sensor's pose at each azimuth of a sweep, and the times at which its beam passes a place.
 
 use std::f64::consts::TAU;
 
@@ -8,44 +8,44 @@ use super::sweep_time::SweepTime;
 use crate::path::Path;
 use crate::profile::Sampling;
 
-/// Azimuths before the first and after the last whose poses are known: a beam reaches into a sweep from there.
+/// Additional azimuths before the first and after the last, whose beams reach into the sweep.
 pub(super) const MARGIN: usize = 16;
 
 /// The sensor at one azimuth.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Station {
+pub(super) struct AzimuthPose {
     pub position: Point2<f64>,
     pub velocity: Vector2<f64>,
-    /// Where the beam would stand at azimuth zero, radians: the heading, less the encoder's error here.
+    /// Direction of azimuth zero, radians: the heading less the encoder's error.
     pub heading_rad: f64,
     /// Unit vector along the beam, world frame.
     pub beam: Vector2<f64>,
-    /// How far the beam points up, radians.
-    pub lift_rad: f64,
-    /// Time since the middle of the sweep, seconds; zero at all azimuths where they are all measured then.
+    /// Elevation of the beam, radians.
+    pub elevation_rad: f64,
+    /// Time since the middle of the sweep, seconds; zero where all azimuths are measured then.
     pub time_s: f64,
 }
 
-/// The sensor at all azimuths of a sweep and at [`MARGIN`] more to each side.
+/// The sensor at all azimuths of a sweep and at [`MARGIN`] more on each side.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Stations {
-    all: Vec<Station>,
+pub(super) struct SweepPoses {
+    all: Vec<AzimuthPose>,
     azimuths: usize,
     first_rad: f64,
     step_rad: f64,
 }
 
-impl Stations {
-    /// Follows a sweep. `error_rad` says by how much the beam stands to the right of an azimuth as reported, `lift_rad` by how much
-    /// it points up at a time on the trajectory, seconds, and an azimuth.
-    pub fn follow(
+impl SweepPoses {
+    /// Samples the path during a sweep. `error_rad` is the deviation of the beam to the right of a reported
+    /// azimuth, `elevation_rad` its elevation at a time of the drive, seconds, and an azimuth.
+    pub fn sample(
         &mut self,
         path: &dyn Path,
         time: SweepTime,
         sampling: &Sampling,
         moving: bool,
         error_rad: impl Fn(f64) -> f64,
-        lift_rad: impl Fn(f64, f64) -> f64,
+        elevation_rad: impl Fn(f64, f64) -> f64,
     ) {
         let middle_s = time.drive_time_s(time.middle_us());
         self.azimuths = sampling.azimuths;
@@ -63,34 +63,34 @@ impl Stations {
             let pose = path.pose(middle_s + time_s);
             let velocity = path.velocity(middle_s + time_s);
             let azimuth_rad = self.first_rad + azimuth * self.step_rad;
-            // Azimuths grow clockwise, angles counter-clockwise.
+            // Azimuths increase clockwise, angles counter-clockwise.
             let heading_rad = pose.rotation.angle() - error_rad(azimuth_rad);
             let (sine, cosine) = (heading_rad - azimuth_rad).sin_cos();
             let position = Point2::from(pose.translation.vector);
-            let lift_rad = lift_rad(middle_s + time_s, azimuth_rad);
-            self.all.push(Station {
+            let elevation_rad = elevation_rad(middle_s + time_s, azimuth_rad);
+            self.all.push(AzimuthPose {
                 position,
                 velocity,
                 heading_rad,
                 beam: Vector2::new(cosine, sine),
-                lift_rad,
+                elevation_rad,
                 time_s,
             });
         }
     }
 
-    /// The sensor at the azimuth nearest to this one, of `-MARGIN..azimuths + MARGIN`.
-    pub fn at(&self, azimuth: f64) -> &Station {
+    /// The sensor at the nearest azimuth of `-MARGIN..azimuths + MARGIN`.
+    pub fn at(&self, azimuth: f64) -> &AzimuthPose {
         &self.all[self.index(azimuth)]
     }
 
     fn index(&self, azimuth: f64) -> usize {
-        // What is below zero becomes zero.
+        // The cast turns negative numbers into zero.
         ((azimuth + MARGIN as f64 + 0.5) as usize).min(self.all.len() - 1)
     }
 
     /// The sensor at the middle of the sweep.
-    pub fn middle(&self) -> &Station {
+    pub fn middle(&self) -> &AzimuthPose {
         self.at((self.azimuths / 2) as f64)
     }
 
@@ -104,32 +104,37 @@ impl Stations {
         self.step_rad
     }
 
-    /// Shows when, in azimuths with fractions, the beam passes a thing that is at `place(station)`: once as a rule, twice or
-    /// never near the sweep's seam if the vehicle turns; also when it passes up to [`MARGIN`] azimuths before or after.
-    pub fn passings(&self, place: impl Fn(&Station) -> Point2<f64>, mut see: impl FnMut(f64)) {
+    /// Visits the azimuths, with fractions, at which the beam passes an object at `place(azimuth_pose)`:
+    /// usually once, twice or never near the sweep's seam if the vehicle turns, and up to [`MARGIN`]
+    /// azimuths outside the sweep.
+    pub fn beam_passes(
+        &self,
+        place: impl Fn(&AzimuthPose) -> Point2<f64>,
+        mut visit: impl FnMut(f64),
+    ) {
         let turn = self.azimuths as f64;
         let guess = self.bearing(self.middle(), &place).rem_euclid(turn);
-        let first = self.passing(guess, &place);
-        see(first);
+        let first = self.beam_pass(guess, &place);
+        visit(first);
         let margin = 2.0 * MARGIN as f64;
         let other = match first {
-            first if first < margin => self.passing(first + turn, &place),
-            first if first > turn - margin => self.passing(first - turn, &place),
+            first if first < margin => self.beam_pass(first + turn, &place),
+            first if first > turn - margin => self.beam_pass(first - turn, &place),
             _ => return,
         };
         if (other - first).abs() > 0.5 * turn {
-            see(other);
+            visit(other);
         }
     }
 
-    /// Goes to where the beam is expected to pass, looks again from there, and so on.
-    fn passing(&self, guess: f64, place: &impl Fn(&Station) -> Point2<f64>) -> f64 {
+    /// Iterates from an initial guess of the azimuth.
+    fn beam_pass(&self, guess: f64, place: &impl Fn(&AzimuthPose) -> Point2<f64>) -> f64 {
         let mut azimuth = guess;
         for _ in 0..4 {
             let index = self.index(azimuth);
-            let station = &self.all[index];
-            let way = place(station) - station.position;
-            let next = index as f64 - MARGIN as f64 - angle(station.beam, way) / self.step_rad;
+            let azimuth_pose = &self.all[index];
+            let ray = place(azimuth_pose) - azimuth_pose.position;
+            let next = index as f64 - MARGIN as f64 - angle(azimuth_pose.beam, ray) / self.step_rad;
             if (next - azimuth).abs() < 0.05 {
                 return next;
             }
@@ -138,10 +143,15 @@ impl Stations {
         azimuth
     }
 
-    /// Bearing in azimuths, clockwise from the first one, of a thing as seen from a station.
-    fn bearing(&self, station: &Station, place: &impl Fn(&Station) -> Point2<f64>) -> f64 {
-        let way = place(station) - station.position;
-        (station.heading_rad - way.y.atan2(way.x) - self.first_rad).rem_euclid(TAU) / self.step_rad
+    /// Bearing of an object in azimuths, clockwise from the first one.
+    fn bearing(
+        &self,
+        azimuth_pose: &AzimuthPose,
+        place: &impl Fn(&AzimuthPose) -> Point2<f64>,
+    ) -> f64 {
+        let ray = place(azimuth_pose) - azimuth_pose.position;
+        (azimuth_pose.heading_rad - ray.y.atan2(ray.x) - self.first_rad).rem_euclid(TAU)
+            / self.step_rad
     }
 }
 
