@@ -1,4 +1,4 @@
-//! Time to read a scan, medians: `GYRE_DATA=... cargo bench -p gyre-radar --bench read`.
+//! Median time to read a scan: `GYRE_DATA=... cargo bench -p gyre-radar --bench read`.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -52,7 +52,7 @@ fn measure(root: &Path) -> Result<(), OpenError> {
     Ok(())
 }
 
-/// The same file through the PNG decoder and nothing else.
+/// Decodes the same file with the PNG decoder only.
 fn decode_alone(path: &Path, file: &mut Vec<u8>, pixels: &mut [u8]) {
     use std::io::Read;
     file.clear();

@@ -13,22 +13,22 @@ use gyre_radar::{
 };
 use nalgebra::{Isometry2, Point2, Vector2};
 
-/// Side of a panel, and the margin around it, pixels.
+/// Side of a panel and margin around it, pixels.
 const SIDE: usize = 440;
 const MARGIN: usize = 16;
 const WIDTH: usize = 2 * SIDE + 3 * MARGIN;
 const HEIGHT: usize = SIDE + 2 * MARGIN;
-/// Between two rings or grid lines, m.
+/// Spacing of rings and grid lines, m.
 const GRID_M: f64 = 25.0;
-/// How far one scan is shown, and how far its returns enter the map, m.
+/// Range of the scan shown, and of the returns that are added to the map, m.
 const SCAN_REACH_M: f64 = 100.0;
 const MAP_REACH_M: f64 = 60.0;
-/// How fast a map's pixel follows what is brighter, and, as a share of that, what is darker.
+/// Gain of a map pixel towards a higher brightness, and the share of it towards a lower one.
 const MAP_GAIN: f64 = 0.25;
 const MAP_LOSS: f64 = 0.1;
-/// Power below the first value is noise, above the second it is as bright as can be.
+/// Powers shown with minimum and maximum brightness.
 const POWER: (f64, f64) = (50.0, 120.0);
-/// A return nearer than this is the vehicle's own, m.
+/// Minimum range, m: nearer returns are of the vehicle itself.
 const OWN_M: f64 = 3.0;
 
 const BACKGROUND: Colour = [11.0, 16.0, 26.0];
@@ -36,7 +36,7 @@ const PANEL: Colour = [17.0, 24.0, 38.0];
 const GRID: Colour = [58.0, 72.0, 96.0];
 const TRUTH: Colour = [235.0, 240.0, 250.0];
 const ESTIMATE: Colour = [255.0, 138.0, 36.0];
-/// From nothing to the strongest return.
+/// Colours by increasing brightness.
 const GLOW: [Colour; 5] = [
     PANEL,
     [32.0, 74.0, 118.0],
@@ -78,7 +78,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     canvas.write(Path::new(picture))
 }
 
-/// The truth in the frame of the estimate's first pose.
+/// Returns the ground truth, aligned to the first pose of the estimate.
 fn aligned(
     truth: &Trajectory,
     estimate: &Trajectory,
@@ -96,10 +96,10 @@ fn aligned(
         .collect())
 }
 
-/// Looks powers up by place.
+/// Samples the powers of a scan by position.
 struct Sampler<'a> {
     scan: PolarScan<'a>,
-    /// Azimuth by angle, in even steps from straight ahead in the scan's sense.
+    /// Nearest azimuth per uniform step from straight ahead, in the scan's sense.
     azimuths: Vec<usize>,
 }
 
@@ -120,14 +120,14 @@ impl<'a> Sampler<'a> {
         }
     }
 
-    /// The sensor's pose at each step's time, where the trajectory covers the scan; beyond its ends the sensor stands.
+    /// Returns the pose of the sensor at the time of each step; beyond the ends of the trajectory, the nearest pose.
     fn poses(&self, trajectory: &Trajectory) -> Option<Vec<Isometry2<f64>>> {
         let (first, last) = trajectory.span_ns()?;
         let at = |azimuth: &usize| trajectory.at(self.scan.stamp_ns[*azimuth].clamp(first, last));
         self.azimuths.iter().map(at).collect()
     }
 
-    /// The step towards a place in the sensor's frame, with a fraction.
+    /// Returns the fractional step towards a position in the sensor frame.
     fn step(&self, place: &Point2<f64>) -> f64 {
         let angle = match self.scan.geometry.sense {
             Sense::Clockwise => -place.y.atan2(place.x),
@@ -136,7 +136,7 @@ impl<'a> Sampler<'a> {
         angle.rem_euclid(TAU) / TAU * self.azimuths.len() as f64
     }
 
-    /// Brightness, 0 to 1, at a place in the sensor's frame, bilinear between azimuths.
+    /// Returns the brightness, 0 to 1, at a position in the sensor frame, linear between azimuths.
     fn brightness(&self, place: &Point2<f64>) -> f64 {
         let range_m = place.coords.norm();
         if range_m < OWN_M {
@@ -153,7 +153,7 @@ impl<'a> Sampler<'a> {
         ((power - POWER.0) / (POWER.1 - POWER.0)).clamp(0.0, 1.0)
     }
 
-    /// Mean power over some neighbouring bins: a pixel covers more than one.
+    /// Returns the mean power of neighbouring bins, since a pixel covers more than one.
     fn power(&self, step: usize, bin: f64) -> f64 {
         let row = self.scan.row(self.azimuths[step]);
         let first = (bin - 1.5).max(0.0) as usize;
@@ -164,10 +164,10 @@ impl<'a> Sampler<'a> {
     }
 }
 
-/// Where the map lies: x to the right and y upwards on the picture, unless the drive is higher than it is wide.
+/// The area of the map.
 struct Map {
     centre: Vector2<f64>,
-    m_a_pixel: f64,
+    m_per_pixel: f64,
 }
 
 impl Map {
@@ -177,12 +177,13 @@ impl Map {
         let high = places().fold(Vector2::repeat(f64::MIN), |high, at| high.sup(&at));
         Self {
             centre: (low + high) / 2.0,
-            m_a_pixel: ((high - low).max() + MAP_REACH_M) / SIDE as f64,
+            m_per_pixel: ((high - low).max() + MAP_REACH_M) / SIDE as f64,
         }
     }
 
     fn place(&self, column: usize, row: usize) -> Point2<f64> {
-        let from_centre = |pixel: usize| (pixel as f64 + 0.5 - SIDE as f64 / 2.0) * self.m_a_pixel;
+        let from_centre =
+            |pixel: usize| (pixel as f64 + 0.5 - SIDE as f64 / 2.0) * self.m_per_pixel;
         Point2::new(
             self.centre.x - from_centre(row),
             self.centre.y - from_centre(column),
@@ -190,11 +191,11 @@ impl Map {
     }
 
     fn pixel(&self, place: Vector2<f64>) -> (f64, f64) {
-        let at = (self.centre - place) / self.m_a_pixel + Vector2::repeat(SIDE as f64 / 2.0);
+        let at = (self.centre - place) / self.m_per_pixel + Vector2::repeat(SIDE as f64 / 2.0);
         (at.y, at.x)
     }
 
-    /// Adds a scan, each azimuth seen from where the sensor was then.
+    /// Adds a scan, motion-compensated: each azimuth from the sensor's pose at its time.
     fn add(&self, powers: &mut [f64], sampler: &Sampler, poses: &[Isometry2<f64>]) {
         let middle = poses[poses.len() / 2];
         for (index, power) in powers.iter_mut().enumerate() {
@@ -211,16 +212,16 @@ impl Map {
 
 fn draw_scan(canvas: &mut Canvas, sampler: &Sampler) {
     let half = SIDE as f64 / 2.0;
-    let m_a_pixel = SCAN_REACH_M / half;
+    let m_per_pixel = SCAN_REACH_M / half;
     canvas.shade(MARGIN, |column, row| {
         let (right, ahead) = (column - half, half - row);
-        let range_m = right.hypot(ahead) * m_a_pixel;
+        let range_m = right.hypot(ahead) * m_per_pixel;
         let colour = glow(
             sampler
-                .brightness(&Point2::new(ahead, -right).map(|at| at * m_a_pixel))
+                .brightness(&Point2::new(ahead, -right).map(|at| at * m_per_pixel))
                 .sqrt(),
         );
-        let ring = (range_m / GRID_M - (range_m / GRID_M).round()).abs() * GRID_M / m_a_pixel;
+        let ring = (range_m / GRID_M - (range_m / GRID_M).round()).abs() * GRID_M / m_per_pixel;
         let colour = mix(colour, GRID, 0.6 * (1.0 - ring).max(0.0));
         mix(
             colour,
@@ -252,8 +253,9 @@ fn draw_map(
     canvas.shade(left, |column, row| {
         let index = row as usize * SIDE + column as usize;
         let place = map.place(column as usize, row as usize);
-        let off =
-            |value: f64| (value / GRID_M - (value / GRID_M).round()).abs() * GRID_M / map.m_a_pixel;
+        let off = |value: f64| {
+            (value / GRID_M - (value / GRID_M).round()).abs() * GRID_M / map.m_per_pixel
+        };
         let line = (1.0 - off(place.x).min(off(place.y))).max(0.0);
         mix(
             glow(0.9 * (powers[index] - 0.03).max(0.0).sqrt()),

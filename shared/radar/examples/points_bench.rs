@@ -1,5 +1,5 @@
-//! How long the points of one scan take, on one thread, and how many there are: medians over the first scans of each
-//! recording under `GYRE_DATA`.
+//! Time to extract the points of a scan on one thread, and their number: medians over the first scans of each recording in
+//! `GYRE_DATA`.
 //!
 //! `cargo run --release -p gyre-radar --example points_bench`
 
@@ -49,13 +49,13 @@ fn first_scans(folder: &Path) -> Result<Vec<OwnedScan>, Box<dyn Error>> {
     (0..count).map(read).collect()
 }
 
-/// Medians of the number of points and of the time.
+/// Returns the medians of the number of points and of the time, ms.
 fn measure(scans: &[OwnedScan], floor: u8) -> Result<(usize, f64), Box<dyn Error>> {
     let config = PointsConfig::default();
     let mut extractor = PointExtractor::new(&config)?;
     let mut out = vec![SparsePoint::default(); config.capacity];
     let (mut counts, mut times) = (Vec::new(), Vec::new());
-    // Repetitions outside, so that each scan has left the cache when its turn comes again.
+    // Repetitions in the outer loop, so that a scan has left the cache before it is processed again.
     for _ in 0..REPETITIONS {
         for scan in scans {
             let start = Instant::now();

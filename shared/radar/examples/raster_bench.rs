@@ -1,5 +1,5 @@
-//! How long one raster takes, on one thread: medians for an Oxford scan (the first under `GYRE_DATA`), or one of its
-//! size that is made up, at three sizes, both samplings, with and without the sweep's motion undone.
+//! Time to make a raster on one thread: medians for an Oxford scan (the first in `GYRE_DATA`), or a synthetic one of its size,
+//! at three raster sizes, with both samplings, with and without motion compensation.
 //!
 //! `cargo run --release -p gyre-radar --example raster_bench`
 
@@ -21,7 +21,7 @@ const REPETITIONS: usize = 301;
 fn main() -> Result<(), Box<dyn Error>> {
     let (scan, origin) = match oxford_scan()? {
         Some(scan) => (scan, "Oxford"),
-        None => (made_up_scan(), "made up (GYRE_DATA is not set)"),
+        None => (synthetic_scan(), "synthetic (GYRE_DATA is not set)"),
     };
     println!(
         "one thread; scan: {origin}, {} x {}",
@@ -70,8 +70,8 @@ fn median_ms(
     Ok(times[REPETITIONS / 2].as_secs_f64() * 1e3)
 }
 
-/// Noise at the level of a real scan's, with a wall now and then.
-fn made_up_scan() -> OwnedScan {
+/// Noise at the level of a real scan, with occasional walls.
+fn synthetic_scan() -> OwnedScan {
     let stride = BINS + METADATA;
     let mut scan = OwnedScan::with_limits(ScanLimits {
         bytes: AZIMUTHS * stride,

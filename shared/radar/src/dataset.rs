@@ -118,9 +118,9 @@ fn open_found(
         Format::Oord => Box::new(oxford::open_oord(found, options)?),
         Format::Boreas => Box::new(boreas::open(found, options)?),
         Format::BoreasRt => Box::new(boreas::open_road_trip(found, options)?),
-        Format::Mulran => Box::new(mulran::MulranPolar::open(found, options)?),
+        Format::Mulran => Box::new(mulran::open(found, options)?),
         Format::MulranOxfordForm => Box::new(mulran::open_oxford_form(found, options)?),
-        Format::Radiate => Box::new(radiate::Radiate::open(found, options)?),
+        Format::Radiate => Box::new(radiate::open(found, options)?),
         Format::Fomo => Box::new(fomo::open(found, options)?),
     })
 }

@@ -1,6 +1,6 @@
 //! The median.
 
-/// The median: the upper one of the two middle values where their number is even, `None` without values.
+/// Returns the median: the upper of the two middle values if their number is even, `None` without values.
 pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<f64> = values.into_iter().collect();
     values.sort_by(f64::total_cmp);

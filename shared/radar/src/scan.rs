@@ -75,13 +75,13 @@ pub struct PolarScan<'a> {
 }
 
 impl<'a> PolarScan<'a> {
-    /// The powers of one azimuth, nearest bin first.
+    /// Returns the powers of one azimuth, nearest bin first.
     pub fn row(&self, azimuth: usize) -> &'a [u8] {
         let first = self.geometry.first_byte + azimuth * self.geometry.stride;
         &self.bytes[first..first + self.geometry.bins]
     }
 
-    /// The powers, azimuth x range bin: a strided view of the bytes, without the metadata between rows.
+    /// Returns the powers, azimuth x range bin: a strided view of the bytes, without the metadata between rows.
     ///
     /// # Panics
     /// If the scan does not pass [`PolarScan::check`].

@@ -24,7 +24,7 @@ fn mentions(report: &Report, words: &[&str]) -> bool {
 fn assert_mentions(report: &Report, words: &[&str]) {
     assert!(
         mentions(report, words),
-        "nothing of {words:?} in {:#?}",
+        "{words:?} is not in {:#?}",
         report.findings
     );
 }

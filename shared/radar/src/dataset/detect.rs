@@ -215,9 +215,10 @@ fn decided(format: Format, evidence: &str) -> String {
 }
 
 fn evidence(image: &FirstImage) -> String {
-    let named = image
-        .named_by()
-        .map_or("names that are not times of the sweep", NamedBy::words);
+    let named = image.named_by().map_or(
+        "names that are not times of the sweep",
+        NamedBy::description,
+    );
     let named = if image.named_by().is_some() {
         format!("named by {named}")
     } else {

@@ -20,7 +20,7 @@ pub(crate) enum NamedBy {
 }
 
 impl NamedBy {
-    pub(crate) fn words(self) -> &'static str {
+    pub(crate) fn description(self) -> &'static str {
         match self {
             Self::Start => "the sweep's start",
             Self::Middle => "the sweep's middle",
@@ -122,12 +122,12 @@ impl FirstImage {
     /// Encoder step between rows, if it is constant, and the step from the last row to the first.
     pub(crate) fn encoder_step(&self, counts: u16) -> Option<(u16, u16)> {
         let step = self.rows[1].count.checked_sub(self.rows[0].count)?;
-        let even = self
+        let is_constant = self
             .rows
             .windows(2)
             .all(|w| w[1].count.checked_sub(w[0].count) == Some(step));
         let (first, last) = (self.rows[0].count, self.rows[self.rows.len() - 1].count);
         let seam = first.checked_add(counts)?.checked_sub(last)?;
-        even.then_some((step, seam))
+        is_constant.then_some((step, seam))
     }
 }

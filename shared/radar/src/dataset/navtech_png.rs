@@ -266,11 +266,11 @@ mod tests {
             let n = 300_usize;
             let angle = |i: usize| (usize::from(start) + i * usize::from(step)) % 5600;
             let azimuth: Vec<f32> = (0..n).map(|i| (angle(i) as f64 * std::f64::consts::TAU / 5600.0) as f32).collect();
-            let even: Vec<i64> = (0..n).map(|i| 1_547_131_046_000_000_000 + i as i64 * period).collect();
-            let mut stamps = even.clone();
+            let uniform: Vec<i64> = (0..n).map(|i| 1_547_131_046_000_000_000 + i as i64 * period).collect();
+            let mut stamps = uniform.clone();
             smooth_stamps(&azimuth, &mut stamps);
-            for (smooth, even) in stamps.iter().zip(&even) {
-                prop_assert!((smooth - even).abs() < 1_000, "{}", smooth - even);
+            for (smooth, uniform) in stamps.iter().zip(&uniform) {
+                prop_assert!((smooth - uniform).abs() < 1_000, "{}", smooth - uniform);
             }
         }
     }

@@ -162,10 +162,10 @@ fn check_shape(images: &Images, format: Format) -> Result<(), OpenError> {
 /// Observations on the first image.
 fn observations(image: &FirstImage, profile: &Profile) -> Vec<String> {
     let named = image.named_by().filter(|by| *by != profile.named_by).map(|by| {
-        let (format, expected) = (profile.format, profile.named_by.words());
+        let (format, expected) = (profile.format, profile.named_by.description());
         format!(
             "The files are named by {}, but {format} files by {expected}: the format may be another one.",
-            by.words()
+            by.description()
         )
     });
     [

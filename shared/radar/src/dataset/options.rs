@@ -1,6 +1,6 @@
 //! Options for reading a dataset.
 
-use std::fmt;
+use std::{fmt, ops::RangeInclusive};
 
 use serde::{Deserialize, Serialize};
 
@@ -52,50 +52,40 @@ pub struct DatasetOptions {
 impl DatasetOptions {
     /// Rejects values out of bounds.
     pub(crate) fn check(&self) -> Result<(), OpenError> {
-        let resolution_ok = self
-            .range_resolution_m
-            .is_none_or(|r| (1e-3..=10.0).contains(&r));
-        let offset_ok = self
-            .range_offset_m
-            .is_none_or(|o| (-100.0..=100.0).contains(&o));
-        let doppler_ok = self.doppler_s.is_none_or(|d| (-1.0..=1.0).contains(&d));
-        let eccentricity_ok = self
-            .azimuth_eccentricity_rad
-            .is_none_or(|e| (-0.1..=0.1).contains(&e));
-        let counts_ok = self.encoder_counts.is_none_or(|c| c >= 16);
-        if !resolution_ok {
-            return Err(self.invalid(
-                "range_resolution_m",
-                self.range_resolution_m,
-                "it must be from 0.001 to 10 m",
-            ));
-        }
-        if !offset_ok {
-            return Err(self.invalid(
-                "range_offset_m",
-                self.range_offset_m,
-                "it must be from -100 to 100 m",
-            ));
-        }
-        if !doppler_ok {
-            return Err(self.invalid("doppler_s", self.doppler_s, "it must be from -1 to 1 s"));
-        }
-        if !eccentricity_ok {
-            let actual = self.azimuth_eccentricity_rad;
-            return Err(self.invalid(
-                "azimuth_eccentricity_rad",
-                actual,
-                "it must be from -0.1 to 0.1 rad",
-            ));
-        }
-        if !counts_ok {
-            return Err(self.invalid(
-                "encoder_counts",
-                self.encoder_counts,
-                "an encoder has at least 16 counts per turn",
-            ));
-        }
-        Ok(())
+        let check = |key, value: Option<f32>, bounds: RangeInclusive<f32>, reason| match value {
+            Some(v) if !bounds.contains(&v) => Err(self.invalid(key, value, reason)),
+            _ => Ok(()),
+        };
+        check(
+            "range_resolution_m",
+            self.range_resolution_m,
+            1e-3..=10.0,
+            "it must be from 0.001 to 10 m",
+        )?;
+        check(
+            "range_offset_m",
+            self.range_offset_m,
+            -100.0..=100.0,
+            "it must be from -100 to 100 m",
+        )?;
+        check(
+            "doppler_s",
+            self.doppler_s,
+            -1.0..=1.0,
+            "it must be from -1 to 1 s",
+        )?;
+        check(
+            "azimuth_eccentricity_rad",
+            self.azimuth_eccentricity_rad,
+            -0.1..=0.1,
+            "it must be from -0.1 to 0.1 rad",
+        )?;
+        check(
+            "encoder_counts",
+            self.encoder_counts.map(f32::from),
+            16.0..=f32::INFINITY,
+            "an encoder has at least 16 counts per turn",
+        )
     }
 
     /// Returns these options, with those of `other` where these are not set.

@@ -7,16 +7,13 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use super::Dataset;
 use super::detect::Found;
-use super::error::{OpenError, ReadError};
-use super::format::Format;
-use super::image_size::ImageSize;
+use super::error::OpenError;
+use super::images::Images;
 use super::options::DatasetOptions;
 use super::sensor_clock::SensorClock;
 use super::stamp::{self, SECOND_NS};
-use super::transposed::{TransposedScans, mean_after_start_ns};
-use crate::scan::{ScanLimits, ScanSlot, SweepGeometry};
+use super::transposed::{TransposedScans, Turn};
 
 /// Full range of the images, m.
 const RANGE_M: f32 = 100.0;
@@ -26,69 +23,56 @@ const PERIOD_NS: std::ops::RangeInclusive<f64> = 0.2e9..=0.3e9;
 const STAMPS: &str = "Logged stamps are times of receipt at the host; the sensor clock is the uniform series that touches them from \
                       below, columns are spread uniformly over its period, and the time of a scan is their mean.";
 
-/// The scans of a RADIATE sequence.
-#[derive(Debug)]
-pub(crate) struct Radiate {
-    scans: TransposedScans,
-    /// Frame number and time of receipt of each scan.
-    received: Vec<(i64, i64)>,
-    clock: SensorClock,
-    notes: Vec<String>,
+pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedScans, OpenError> {
+    let list = found.folder.with_extension("txt");
+    let io_error = |source| OpenError::Io {
+        path: list.clone(),
+        source,
+    };
+    let text = found
+        .stamps
+        .clone()
+        .map_or_else(|| fs::read_to_string(&list).map_err(io_error), Ok)?;
+    let (stamps, unpadded) = parse_stamps(&list, &text)?;
+    let mut scans = TransposedScans::open(found, options, STAMPS, |bins| RANGE_M / bins as f32)?;
+    scans.turns = turns(&scans.images, &stamps, &list)?;
+    if unpadded > 0 {
+        scans.notes.push(format!(
+            "{unpadded} of {} stamps in {} have nanoseconds without leading zeros (.5 means 5 ns), and are read as integers; \
+             read as decimals, time would run backwards.",
+            stamps.len(),
+            file_name(&list)
+        ));
+    }
+    if stamps.len() > scans.turns.len() {
+        scans.notes.push(format!(
+            "{} lists {} scans, but there are {} images.",
+            file_name(&list),
+            stamps.len(),
+            scans.turns.len()
+        ));
+    }
+    Ok(scans)
 }
 
-impl Radiate {
-    pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<Self, OpenError> {
-        let list = found.folder.with_extension("txt");
-        let io_error = |source| OpenError::Io {
-            path: list.clone(),
-            source,
-        };
-        let text = found
-            .stamps
-            .clone()
-            .map_or_else(|| fs::read_to_string(&list).map_err(io_error), Ok)?;
-        let (stamps, unpadded) = parse_stamps(&list, &text)?;
-        let (scans, mut notes) =
-            TransposedScans::open(found, options, |bins| RANGE_M / bins as f32)?;
-        let received = (0..scans.images.len())
-            .map(|i| receipt(&scans, i, &stamps, &list))
-            .collect::<Result<Vec<_>, _>>()?;
-        let path = || scans.images.file(0).to_owned();
-        let clock = SensorClock::below(&received, PERIOD_NS)
-            .ok_or_else(|| OpenError::NoImages { path: path() })?;
-        if unpadded > 0 {
-            notes.push(format!(
-                "{unpadded} of {} stamps in {} have nanoseconds without leading zeros (.5 means 5 ns), and are read as integers; \
-                 read as decimals, time would run backwards.",
-                stamps.len(),
-                file_name(&list)
-            ));
-        }
-        if stamps.len() > received.len() {
-            notes.push(format!(
-                "{} lists {} scans, but there are {} images.",
-                file_name(&list),
-                stamps.len(),
-                received.len()
-            ));
-        }
-        Ok(Self {
-            scans,
-            received,
-            clock,
-            notes,
-        })
-    }
-
-    fn start_ns(&self, index: usize) -> Option<i64> {
-        self.received
-            .get(index)
-            .map(|(frame, _)| self.clock.start_ns(*frame))
-    }
-
-    fn period_ns(&self) -> i64 {
-        self.clock.period.round() as i64
-    }
+/// Returns the sweeps on the reconstructed sensor clock.
+fn turns(
+    images: &Images,
+    stamps: &BTreeMap<i64, i64>,
+    list: &Path,
+) -> Result<Vec<Turn>, OpenError> {
+    let received = (0..images.len())
+        .map(|index| receipt(images, index, stamps, list))
+        .collect::<Result<Vec<_>, _>>()?;
+    let clock = SensorClock::below(&received, PERIOD_NS).ok_or_else(|| OpenError::NoImages {
+        path: images.file(0).to_owned(),
+    })?;
+    let turn = |&(frame, logged_ns): &(i64, i64)| Turn {
+        start_ns: clock.start_ns(frame),
+        period_ns: clock.period.round() as i64,
+        logged_ns,
+    };
+    Ok(received.iter().map(turn).collect())
 }
 
 fn file_name(path: &Path) -> String {
@@ -99,12 +83,12 @@ fn file_name(path: &Path) -> String {
 
 /// Frame number and time of receipt of an image.
 fn receipt(
-    scans: &TransposedScans,
+    images: &Images,
     index: usize,
     stamps: &BTreeMap<i64, i64>,
     list: &Path,
 ) -> Result<(i64, i64), OpenError> {
-    let image = scans.images.file(index);
+    let image = images.file(index);
     let missing = || {
         let reason = format!(
             "no time for {}; every image requires a line `Frame: <number> Time: <seconds>.<nanoseconds>`",
@@ -116,7 +100,7 @@ fn receipt(
             reason,
         }
     };
-    let frame = scans.images.number(index).ok_or_else(missing)?;
+    let frame = images.number(index).ok_or_else(missing)?;
     stamps
         .get(&frame)
         .map(|ns| (frame, *ns))
@@ -160,62 +144,6 @@ fn parse_line(line: &str) -> Option<(i64, i64, usize)> {
         .checked_add(ns)?;
     let labelled = frame == "Frame:" && time == "Time:" && stamp::plausible(stamp);
     labelled.then_some((number.parse().ok()?, stamp, nanoseconds.len()))
-}
-
-impl Dataset for Radiate {
-    fn format(&self) -> Format {
-        Format::Radiate
-    }
-
-    fn len(&self) -> usize {
-        self.scans.images.len()
-    }
-
-    fn limits(&self) -> ScanLimits {
-        self.scans.limits()
-    }
-
-    fn image_size(&self) -> ImageSize {
-        self.scans.images.size
-    }
-
-    fn is_transposed(&self) -> bool {
-        self.scans.is_transposed()
-    }
-
-    fn file(&self, index: usize) -> &Path {
-        self.scans.images.file(index)
-    }
-
-    fn nominal_stamp_ns(&self, index: usize) -> Option<i64> {
-        self.start_ns(index)
-            .map(|start| start + mean_after_start_ns(self.period_ns(), self.scans.azimuths()))
-    }
-
-    fn logged_stamp_ns(&self, index: usize) -> Option<i64> {
-        self.received.get(index).map(|(_, ns)| *ns)
-    }
-
-    fn stamp_meaning(&self) -> &'static str {
-        STAMPS
-    }
-
-    fn encoder_counts(&self) -> Option<u16> {
-        None
-    }
-
-    fn notes(&self) -> &[String] {
-        &self.notes
-    }
-
-    fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {
-        let start_ns = self.start_ns(index).ok_or(ReadError::NoSuchScan {
-            index,
-            len: self.len(),
-        })?;
-        let period_ns = self.period_ns();
-        self.scans.read(index, slot, start_ns, period_ns)
-    }
 }
 
 #[cfg(test)]

@@ -1,9 +1,13 @@
 //! Reader of transposed images without metadata: rows are range (nearest first), columns azimuth from straight ahead.
 
+use std::path::Path;
+
+use super::Dataset;
 use super::detect::Found;
 use super::eccentricity;
 use super::error::{OpenError, ReadError};
 use super::format::Format;
+use super::image_size::ImageSize;
 use super::images::Images;
 use super::navtech_png::fill_uniform;
 use super::navtech_scans::check_capacity;
@@ -13,11 +17,25 @@ use crate::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, Sense, SweepGeometry, flag
 /// Side of the blocks of the transposition, pixels: a cache line.
 const BLOCK: usize = 64;
 
+/// The sweep of a scan.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Turn {
+    pub(crate) start_ns: i64,
+    pub(crate) period_ns: i64,
+    /// The stamp as logged.
+    pub(crate) logged_ns: i64,
+}
+
 /// The scans of a folder, with scratch memory for the transposition. Images that are wider than high are not transposed.
 #[derive(Debug)]
 pub(crate) struct TransposedScans {
     pub(crate) images: Images,
-    pub(crate) range_resolution_m: f32,
+    /// One per image.
+    pub(crate) turns: Vec<Turn>,
+    pub(crate) notes: Vec<String>,
+    format: Format,
+    stamp_meaning: &'static str,
+    range_resolution_m: f32,
     range_offset_m: f32,
     doppler_s: f32,
     azimuth_eccentricity_rad: f32,
@@ -25,43 +43,48 @@ pub(crate) struct TransposedScans {
 }
 
 impl TransposedScans {
-    /// `metres_per_bin` returns the range resolution of the format from the number of range bins.
+    /// `metres_per_bin` returns the range resolution of the format from the number of range bins. The caller adds the turns.
     pub(crate) fn open(
         found: Found,
         options: &DatasetOptions,
+        stamp_meaning: &'static str,
         metres_per_bin: impl FnOnce(usize) -> f32,
-    ) -> Result<(Self, Vec<String>), OpenError> {
+    ) -> Result<Self, OpenError> {
         let Found {
             format,
             images,
-            mut notes,
+            notes,
             ..
         } = found;
         options.check_without_encoder(format)?;
         let mut scans = Self {
             images,
+            turns: Vec::new(),
+            notes,
+            format,
+            stamp_meaning,
             range_resolution_m: 0.0,
             range_offset_m: options.range_offset_m.unwrap_or(0.0),
             doppler_s: options.doppler_s.unwrap_or(0.0),
             azimuth_eccentricity_rad: options.azimuth_eccentricity_rad.unwrap_or(0.0),
             scratch: Vec::new(),
         };
-        scans.check_shape(format)?;
+        scans.check_shape()?;
         scans.range_resolution_m = options
             .range_resolution_m
             .unwrap_or_else(|| metres_per_bin(scans.bins()));
         if scans.is_transposed() {
-            scans.scratch = vec![0; scans.images.size.bytes()];
             let size = scans.images.size;
-            notes.push(format!(
+            scans.scratch = vec![0; size.bytes()];
+            scans.notes.push(format!(
                 "Images are transposed ({} rows of range x {} columns of azimuth): they are transposed back when read.",
                 size.height, size.width
             ));
         }
-        Ok((scans, notes))
+        Ok(scans)
     }
 
-    fn check_shape(&self, format: Format) -> Result<(), OpenError> {
+    fn check_shape(&self) -> Result<(), OpenError> {
         if (2..=MAX_AZIMUTHS).contains(&self.azimuths()) {
             return Ok(());
         }
@@ -69,38 +92,77 @@ impl TransposedScans {
         Err(OpenError::WrongImage {
             path: self.images.file(0).to_owned(),
             actual: self.images.size,
-            format,
+            format: self.format,
             reason,
         })
     }
 
-    pub(crate) fn is_transposed(&self) -> bool {
-        self.images.size.height > self.images.size.width
-    }
-
-    pub(crate) fn azimuths(&self) -> usize {
+    fn azimuths(&self) -> usize {
         self.images.size.height.min(self.images.size.width)
     }
 
-    pub(crate) fn bins(&self) -> usize {
+    fn bins(&self) -> usize {
         self.images.size.height.max(self.images.size.width)
     }
 
-    pub(crate) fn limits(&self) -> ScanLimits {
+    fn stamp_ns(&self, turn: &Turn) -> i64 {
+        turn.start_ns + mean_after_start_ns(turn.period_ns, self.azimuths())
+    }
+}
+
+impl Dataset for TransposedScans {
+    fn format(&self) -> Format {
+        self.format
+    }
+
+    fn len(&self) -> usize {
+        self.images.len()
+    }
+
+    fn limits(&self) -> ScanLimits {
         ScanLimits {
             bytes: self.images.size.bytes(),
             azimuths: self.azimuths(),
         }
     }
 
-    /// Reads a scan whose sweep starts at `start_ns` and takes `period_ns`; its time is the mean of its azimuth stamps.
-    pub(crate) fn read(
-        &mut self,
-        index: usize,
-        slot: ScanSlot<'_>,
-        start_ns: i64,
-        period_ns: i64,
-    ) -> Result<SweepGeometry, ReadError> {
+    fn image_size(&self) -> ImageSize {
+        self.images.size
+    }
+
+    fn is_transposed(&self) -> bool {
+        self.images.size.height > self.images.size.width
+    }
+
+    fn file(&self, index: usize) -> &Path {
+        self.images.file(index)
+    }
+
+    fn nominal_stamp_ns(&self, index: usize) -> Option<i64> {
+        self.turns.get(index).map(|turn| self.stamp_ns(turn))
+    }
+
+    fn logged_stamp_ns(&self, index: usize) -> Option<i64> {
+        self.turns.get(index).map(|turn| turn.logged_ns)
+    }
+
+    fn stamp_meaning(&self) -> &'static str {
+        self.stamp_meaning
+    }
+
+    fn encoder_counts(&self) -> Option<u16> {
+        None
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {
+        let turn = *self.turns.get(index).ok_or(ReadError::NoSuchScan {
+            index,
+            len: self.len(),
+        })?;
         let (azimuths, bins) = (self.azimuths(), self.bins());
         check_capacity("bytes", azimuths * bins, slot.bytes.len())?;
         check_capacity("azimuths", azimuths, slot.azimuth_rad.len())?;
@@ -112,35 +174,29 @@ impl TransposedScans {
         } else {
             self.images.decode(index, slot.bytes)?;
         }
-        fill_uniform(&mut slot.azimuth_rad[..azimuths]);
-        eccentricity::correct(
-            &mut slot.azimuth_rad[..azimuths],
-            self.azimuth_eccentricity_rad,
-        );
+        let azimuth_rad = &mut slot.azimuth_rad[..azimuths];
+        fill_uniform(azimuth_rad);
+        eccentricity::correct(azimuth_rad, self.azimuth_eccentricity_rad);
         slot.flags[..azimuths].fill(flag::MEASURED);
         for (column, stamp) in slot.stamp_ns[..azimuths].iter_mut().enumerate() {
-            *stamp = start_ns + period_ns * column as i64 / azimuths as i64;
+            *stamp = turn.start_ns + turn.period_ns * column as i64 / azimuths as i64;
         }
-        Ok(self.geometry(start_ns + mean_after_start_ns(period_ns, azimuths)))
-    }
-
-    fn geometry(&self, stamp_ns: i64) -> SweepGeometry {
-        SweepGeometry {
-            azimuths: self.azimuths(),
-            bins: self.bins(),
-            stride: self.bins(),
+        Ok(SweepGeometry {
+            azimuths,
+            bins,
+            stride: bins,
             first_byte: 0,
             range_resolution_m: self.range_resolution_m,
             range_offset_m: self.range_offset_m,
             doppler_s: self.doppler_s,
             sense: Sense::Clockwise,
-            stamp_ns,
-        }
+            stamp_ns: self.stamp_ns(&turn),
+        })
     }
 }
 
 /// Mean time of `azimuths` columns spread uniformly over a period, relative to the first, ns.
-pub(crate) fn mean_after_start_ns(period_ns: i64, azimuths: usize) -> i64 {
+fn mean_after_start_ns(period_ns: i64, azimuths: usize) -> i64 {
     let n = azimuths as i64;
     period_ns * (n - 1) / (2 * n)
 }

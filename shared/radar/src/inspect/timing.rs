@@ -167,7 +167,7 @@ mod tests {
 
     const MS: i64 = 1_000_000;
 
-    fn even(n: i64) -> Vec<i64> {
+    fn uniform(n: i64) -> Vec<i64> {
         (0..n)
             .map(|k| 1_549_986_607_000 * MS + k * 250 * MS)
             .collect()
@@ -175,7 +175,7 @@ mod tests {
 
     #[test]
     fn a_gap_is_counted_and_no_stall() {
-        let mut stamps = even(20);
+        let mut stamps = uniform(20);
         stamps.drain(7..10);
         let report = times(&stamps, &stamps).unwrap();
         assert_eq!(
@@ -192,11 +192,11 @@ mod tests {
 
     #[test]
     fn a_stall_with_catching_up_is_not_a_gap() {
-        let mut logged = even(30);
+        let mut logged = uniform(30);
         for (k, late) in [900, 700, 500, 300, 100].into_iter().enumerate() {
             logged[10 + k] += late * MS;
         }
-        for used in [even(30), logged.clone()] {
+        for used in [uniform(30), logged.clone()] {
             let report = times(&used, &logged).unwrap();
             assert_eq!(report.missing_scans, 0, "{:?}", report.gaps);
             assert_eq!(report.stalls.len(), 1);
@@ -211,7 +211,7 @@ mod tests {
 
     #[test]
     fn one_scan_has_no_period() {
-        let report = times(&even(1), &even(1)).unwrap();
+        let report = times(&uniform(1), &uniform(1)).unwrap();
         assert_eq!(
             (report.period_s, report.jitter_s, report.missing_scans),
             (0.0, 0.0, 0)
@@ -220,8 +220,8 @@ mod tests {
 
     #[test]
     fn time_that_runs_backwards_is_detected() {
-        let mut logged = even(9);
+        let mut logged = uniform(9);
         logged[4] -= 400 * MS;
-        assert_eq!(times(&even(9), &logged).unwrap().backwards, [4]);
+        assert_eq!(times(&uniform(9), &logged).unwrap().backwards, [4]);
     }
 }

@@ -81,8 +81,8 @@ fn neighbours(
 }
 
 fn suppress(row: &mut [i16], neighbour: &[i16]) {
-    for (power, &beside) in row.iter_mut().zip(neighbour) {
-        *power = if beside > *power { 0 } else { *power };
+    for (power, &other) in row.iter_mut().zip(neighbour) {
+        *power = if other > *power { 0 } else { *power };
     }
 }
 

@@ -47,13 +47,13 @@ impl BearingTable {
 
     fn unwrap(&mut self, azimuths: &[f32]) {
         self.bearings.clear();
-        let (mut unwrapped, mut furthest) = (0.0f64, 0.0f64);
+        let (mut unwrapped, mut largest) = (0.0f64, 0.0f64);
         let mut before = azimuths.first().copied().unwrap_or(0.0);
         for &azimuth in azimuths {
             let step = (f64::from(azimuth) - f64::from(before)) / TAU;
             unwrapped += (step + BACKLASH).rem_euclid(1.0) - BACKLASH;
-            furthest = furthest.max(unwrapped).min(1.0);
-            self.bearings.push(furthest);
+            largest = largest.max(unwrapped).min(1.0);
+            self.bearings.push(largest);
             before = azimuth;
         }
         self.bearings.push(1.0);

@@ -111,8 +111,8 @@ proptest! {
         let mut sensor = Sensor::navtech();
         let count = sensor.azimuth_rad.len() as f64;
         for (i, azimuth) in sensor.azimuth_rad.iter_mut().enumerate() {
-            let wobble = amplitude * (waves * i as f64).sin();
-            *azimuth = (start + (i as f64 + wobble) / count * TAU).rem_euclid(TAU) as f32;
+            let deviation = amplitude * (waves * i as f64).sin();
+            *azimuth = (start + (i as f64 + deviation) / count * TAU).rem_euclid(TAU) as f32;
         }
         check(&config(255, Sampling::Averaged), &sensor, 0.12);
     }
@@ -120,16 +120,16 @@ proptest! {
 
 #[test]
 fn ignoring_a_slow_azimuth_error_displaces_scatterers() {
-    let even = Sensor::navtech();
-    let mut wobbling = even.clone();
-    for (i, azimuth) in wobbling.azimuth_rad.iter_mut().enumerate() {
+    let uniform = Sensor::navtech();
+    let mut irregular = uniform.clone();
+    for (i, azimuth) in irregular.azimuth_rad.iter_mut().enumerate() {
         *azimuth += 0.03 * (i as f32 * 0.05).sin();
     }
     let place = [Point2::new(-35.0, 20.0)];
-    let mut scan = wobbling.measure(&place, SIGMA_M);
+    let mut scan = irregular.measure(&place, SIGMA_M);
     let config = config(255, Sampling::Averaged);
     let measured = raster(&config, &scan, None);
-    scan.azimuth_rad.copy_from_slice(&even.azimuth_rad);
+    scan.azimuth_rad.copy_from_slice(&uniform.azimuth_rad);
     let assumed = raster(&config, &scan, None);
     assert!(miss_cells(&config, &measured, &place[0], 4.0) < 0.05);
     assert!(miss_cells(&config, &assumed, &place[0], 4.0) > 1.0);

@@ -90,25 +90,29 @@ impl Sensor {
             .enumerate()
         {
             row[..METADATA].fill(255);
-            let seen_from = self.twist.pose_at(self.time_s[azimuth]).inverse();
-            let look = self.direction(azimuth);
-            let approach_mps = look.dot(&nalgebra::Vector2::new(
+            let sensor_from_stamp = self.twist.pose_at(self.time_s[azimuth]).inverse();
+            let direction = self.direction(azimuth);
+            let approach_mps = direction.dot(&nalgebra::Vector2::new(
                 self.twist.vx_mps,
                 self.twist.vy_mps,
             ));
-            let falls = self.chirp(azimuth) == flag::CHIRP_KNOWN;
-            let reads_too_near_m = f64::from(if falls {
+            let is_falling = self.chirp(azimuth) == flag::CHIRP_KNOWN;
+            let shift_m = f64::from(if is_falling {
                 -self.doppler_s
             } else {
                 self.doppler_s
             }) * approach_mps;
-            for scatterer in scatterers.iter().map(|scatterer| seen_from * scatterer) {
+            for scatterer in scatterers
+                .iter()
+                .map(|scatterer| sensor_from_stamp * scatterer)
+            {
                 for (bin, power) in row[METADATA..].iter_mut().enumerate() {
-                    let read_m = first_centre_m + bin as f64 * f64::from(self.range_resolution_m);
-                    let range_m = read_m + reads_too_near_m;
-                    let distance_sq = (scatterer.coords - look * range_m).norm_squared();
-                    let bell = 200.0 * (-0.5 * distance_sq / (sigma_m * sigma_m)).exp();
-                    *power = power.saturating_add(bell.round() as u8);
+                    let measured_m =
+                        first_centre_m + bin as f64 * f64::from(self.range_resolution_m);
+                    let range_m = measured_m + shift_m;
+                    let distance_sq = (scatterer.coords - direction * range_m).norm_squared();
+                    let power_here = 200.0 * (-0.5 * distance_sq / (sigma_m * sigma_m)).exp();
+                    *power = power.saturating_add(power_here.round() as u8);
                 }
             }
         }
