@@ -106,7 +106,7 @@ fn a_recording_is_closer_to_itself_than_another_is_in_all_that_is_measured() {
         );
     }
     let subject = |index: usize| &report["subjects"][index];
-    assert_eq!(subject(0)["aligned"]["by_truth"], 7);
+    assert_eq!(subject(0)["measured"]["whole"]["aligned_by_truth"], 7);
     assert_eq!(subject(2)["measured"]["whole"]["statistics"]["scans"], 8);
 }
 
@@ -123,7 +123,10 @@ fn one_scan_and_a_recording_without_truth_have_what_can_be_had() {
     )
     .succeeded();
     let report = report(folder.path());
-    assert_eq!(report["subjects"][1]["aligned"]["by_odometry"], 7);
+    assert_eq!(
+        report["subjects"][1]["measured"]["whole"]["aligned_by_odometry"],
+        7
+    );
     for row in rows(&report) {
         let of_scans = ["next scan", "plain search", "refined search"];
         let needs_two = of_scans

@@ -5,23 +5,16 @@
 
 use serde::Serialize;
 
-use crate::realism::{Change, Curve, Measured, Recording, SearchErrors};
-
-/// Added to both shares before they are compared, so that a share of nothing has a ratio too.
-const SHARE_FLOOR: f64 = 1e-6;
-/// The same for saturated bins: a few of them are chance.
-const SATURATED_FLOOR: f64 = 1e-5;
-/// Ranges at which the mean power is shown, m.
-const SHOWN_RANGES_M: [f64; 2] = [10.0, 80.0];
+use super::recording::{Measured, Recording};
 
 /// All statistics of a simulated and a real recording, and of another real one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
-    /// One a statistic.
+    /// One row a statistic.
     pub rows: Vec<Row>,
     /// Rows in which the simulated recording is closer to the real one than the other real one is.
     pub closer: usize,
-    /// Rows that both distances are known of.
+    /// Rows in which both distances are known.
     pub judged: usize,
 }
 
@@ -32,7 +25,7 @@ pub struct Row {
     pub statistic: &'static str,
     /// Its distance, with the unit.
     pub distance: &'static str,
-    /// As it reads for the simulated, the real and the other real recording; `None` where it is not known.
+    /// Its value for the simulated, the real and the other real recording; `None` where it is not known.
     pub values: [Option<String>; 3],
     /// From one half of the real recording to its other half: less than this means nothing.
     pub within_real: Option<f64>,
@@ -47,13 +40,11 @@ pub struct Row {
 }
 
 impl Row {
-    /// Whether the simulated recording is no farther from the real one than halves of one real recording are from each other: two
-    /// real recordings may be closer still, by chance.
+    /// Returns whether the simulated recording is no farther from the real one than halves of one real recording are from each other:
+    /// two real recordings may be closer still, by chance.
     pub fn is_within_chance(&self) -> bool {
-        let chance = [self.within_real, self.within_other]
-            .into_iter()
-            .flatten()
-            .reduce(f64::max);
+        let halves = [self.within_real, self.within_other];
+        let chance = halves.into_iter().flatten().reduce(f64::max);
         self.sim_real
             .zip(chance)
             .is_some_and(|(distance, chance)| distance <= chance)
@@ -62,26 +53,22 @@ impl Row {
 
 /// Compares `sim` with `real`, and `real` with another real recording.
 pub fn compare(sim: &Measured, real: &Measured, other: Option<&Measured>) -> Comparison {
-    let row = |statistic: &Statistic| {
-        let between = |a: &Measured, b: &Measured| (statistic.between)(&a.whole, &b.whole);
+    let row = |(statistic, kind): &(&'static str, Kind)| {
         let within = |measured: &Measured| {
             let [first, second] = measured.halves.as_ref()?;
-            (statistic.between)(first, second)
+            kind.between(first, second)
         };
-        let sim_real = between(sim, real);
-        let real_other = other.and_then(|other| between(real, other));
+        let sim_real = kind.between(&sim.whole, &real.whole);
+        let real_other = other.and_then(|other| kind.between(&real.whole, &other.whole));
         Row {
-            statistic: statistic.name,
-            distance: statistic.distance,
-            values: [Some(sim), Some(real), other]
-                .map(|measured| (statistic.shown)(&measured?.whole)),
+            statistic,
+            distance: kind.distance(),
+            values: [Some(sim), Some(real), other].map(|measured| kind.shown(&measured?.whole)),
             within_real: within(real),
             within_other: other.and_then(within),
             sim_real,
             real_other,
-            closer: sim_real
-                .zip(real_other)
-                .map(|(sim_real, real_other)| sim_real < real_other),
+            closer: sim_real.zip(real_other).map(|(sim, other)| sim < other),
         }
     };
     let rows: Vec<Row> = STATISTICS.iter().map(row).collect();
@@ -93,251 +80,144 @@ pub fn compare(sim: &Measured, real: &Measured, other: Option<&Measured>) -> Com
     }
 }
 
-/// How a statistic is shown and compared; `None` where a recording has none or the distance is no number.
-struct Statistic {
-    name: &'static str,
-    distance: &'static str,
-    shown: fn(&Recording) -> Option<String>,
-    between: fn(&Recording, &Recording) -> Option<f64>,
+/// How a statistic is shown and compared.
+enum Kind {
+    Histogram,
+    MeanPower,
+    /// A number that a recording may lack.
+    Number(Unit, fn(&Recording) -> Option<f64>),
 }
 
-const LOG_RATIO: &str = "abs. log ratio";
-
-/// All of them. To add one, add an entry.
-static STATISTICS: [Statistic; 14] = [
-    Statistic {
-        name: "histogram of power",
-        distance: "Wasserstein, counts",
-        shown: |recording| {
-            let percentile = |share| recording.statistics.histogram.percentile(share);
-            Some(format!(
-                "50 %: {}, 90 %: {}, 99 %: {}",
-                percentile(0.5),
-                percentile(0.9),
-                percentile(0.99)
-            ))
-        },
-        between: |a, b| finite(a.statistics.histogram.wasserstein(&b.statistics.histogram)),
-    },
-    Statistic {
-        name: "mean power against range",
-        distance: "RMS, counts",
-        shown: |recording| {
-            let at = |range_m: f64| {
-                let power = recording.statistics.mean_power_at(range_m)?;
-                Some(format!("{range_m} m: {power:.1}"))
-            };
-            let shown: Vec<String> = SHOWN_RANGES_M.into_iter().filter_map(at).collect();
-            (!shown.is_empty()).then(|| shown.join(", "))
-        },
-        between: |a, b| rms_difference(&a.statistics.mean_power, &b.statistics.mean_power),
-    },
-    Statistic {
-        name: "correlation length in range",
-        distance: LOG_RATIO,
-        shown: |recording| shown_length(&recording.statistics.range_correlation, "m"),
-        between: |a, b| {
-            by(
-                a,
-                b,
-                |recording| recording.statistics.range_correlation.length(),
-                log_ratio,
-            )
-        },
-    },
-    Statistic {
-        name: "correlation length in azimuth",
-        distance: LOG_RATIO,
-        shown: |recording| shown_length(&recording.statistics.azimuth_correlation, "deg"),
-        between: |a, b| {
-            by(
-                a,
-                b,
-                |recording| recording.statistics.azimuth_correlation.length(),
-                log_ratio,
-            )
-        },
-    },
-    Statistic {
-        name: "share of saturated bins",
-        distance: LOG_RATIO,
-        shown: |recording| Some(format!("{:.1e}", recording.statistics.saturated_share)),
-        between: |a, b| {
-            by(
-                a,
-                b,
-                |recording| Some(recording.statistics.saturated_share),
-                saturated_ratio,
-            )
-        },
-    },
-    Statistic {
-        name: "share above the threshold",
-        distance: LOG_RATIO,
-        shown: |recording| Some(percent(recording.statistics.share_above)),
-        between: |a, b| {
-            by(
-                a,
-                b,
-                |recording| Some(recording.statistics.share_above),
-                share_ratio,
-            )
-        },
-    },
-    Statistic {
-        name: "next scan: correlation",
-        distance: "abs. difference",
-        shown: |recording| Some(format!("{:.3}", change(recording)?.correlation)),
-        between: |a, b| {
-            by(
-                a,
-                b,
-                |recording| Some(change(recording)?.correlation),
-                |a, b| (a - b).abs(),
-            )
-        },
-    },
-    Statistic {
-        name: "next scan: returns without counterpart",
-        distance: LOG_RATIO,
-        shown: |recording| Some(percent(change(recording)?.unmatched_share)),
-        between: |a, b| {
-            by(
-                a,
-                b,
-                |recording| Some(change(recording)?.unmatched_share),
-                share_ratio,
-            )
-        },
-    },
-    Statistic {
-        name: "plain search: translation of a motion",
-        distance: LOG_RATIO,
-        shown: |recording| metres(plain(recording)?.translation_rmse_m),
-        between: |a, b| {
-            by(
-                a,
-                b,
-                |recording| Some(plain(recording)?.translation_rmse_m),
-                log_ratio,
-            )
-        },
-    },
-    Statistic {
-        name: "plain search: rotation of a motion",
-        distance: LOG_RATIO,
-        shown: |recording| degrees(plain(recording)?.rotation_rmse_deg),
-        between: |a, b| {
-            by(
-                a,
-                b,
-                |recording| Some(plain(recording)?.rotation_rmse_deg),
-                log_ratio,
-            )
-        },
-    },
-    Statistic {
-        name: "plain search: seg",
-        distance: LOG_RATIO,
-        shown: |recording| Some(percent(plain(recording)?.seg_percent? / 100.0)),
-        between: |a, b| by(a, b, |recording| plain(recording)?.seg_percent, log_ratio),
-    },
-    Statistic {
-        name: "refined search: translation of a motion",
-        distance: LOG_RATIO,
-        shown: |recording| metres(refined(recording)?.translation_rmse_m),
-        between: |a, b| {
-            by(
-                a,
-                b,
-                |recording| Some(refined(recording)?.translation_rmse_m),
-                log_ratio,
-            )
-        },
-    },
-    Statistic {
-        name: "refined search: rotation of a motion",
-        distance: LOG_RATIO,
-        shown: |recording| degrees(refined(recording)?.rotation_rmse_deg),
-        between: |a, b| {
-            by(
-                a,
-                b,
-                |recording| Some(refined(recording)?.rotation_rmse_deg),
-                log_ratio,
-            )
-        },
-    },
-    Statistic {
-        name: "refined search: seg",
-        distance: LOG_RATIO,
-        shown: |recording| Some(percent(refined(recording)?.seg_percent? / 100.0)),
-        between: |a, b| by(a, b, |recording| refined(recording)?.seg_percent, log_ratio),
-    },
-];
-
-/// The distance of a number that both recordings have.
-fn by(
-    a: &Recording,
-    b: &Recording,
-    of: fn(&Recording) -> Option<f64>,
-    distance: fn(f64, f64) -> f64,
-) -> Option<f64> {
-    finite(distance(of(a)?, of(b)?))
+/// How a number is shown and compared.
+#[derive(Clone, Copy)]
+struct Unit {
+    suffix: &'static str,
+    factor: f64,
+    decimals: usize,
+    /// Added to both numbers before their ratio is taken, so that a share of nothing has one too. `None`: the difference is taken.
+    floor: Option<f64>,
 }
 
-fn finite(distance: f64) -> Option<f64> {
-    distance.is_finite().then_some(distance)
-}
-
-fn log_ratio(a: f64, b: f64) -> f64 {
-    (a / b).ln().abs()
-}
-
-fn share_ratio(a: f64, b: f64) -> f64 {
-    log_ratio(a + SHARE_FLOOR, b + SHARE_FLOOR)
-}
-
-fn saturated_ratio(a: f64, b: f64) -> f64 {
-    log_ratio(a + SATURATED_FLOOR, b + SATURATED_FLOOR)
-}
-
-/// Over as much of the range as both have.
-fn rms_difference(a: &[f64], b: &[f64]) -> Option<f64> {
-    let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
-    finite((squares.sum::<f64>() / a.len().min(b.len()) as f64).sqrt())
-}
-
-fn change(recording: &Recording) -> Option<&Change> {
-    recording.statistics.change.as_ref()
-}
-
-fn plain(recording: &Recording) -> Option<&SearchErrors> {
-    recording.plain.as_ref()
-}
-
-fn refined(recording: &Recording) -> Option<&SearchErrors> {
-    recording.refined.as_ref()
-}
-
-fn shown_length(curve: &Curve, unit: &str) -> Option<String> {
-    match curve.length() {
-        Some(length) => Some(format!("{length:.2} {unit}")),
-        None => {
-            let longest = curve.values.len().checked_sub(1)? as f64 * curve.step;
-            Some(format!("over {longest:.1} {unit}"))
-        }
+const fn unit(suffix: &'static str, factor: f64, decimals: usize, floor: f64) -> Unit {
+    Unit {
+        suffix,
+        factor,
+        decimals,
+        floor: Some(floor),
     }
 }
 
-fn metres(length_m: f64) -> Option<String> {
-    Some(format!("{length_m:.3} m"))
+const METRES: Unit = unit(" m", 1.0, 3, 0.0);
+const DEGREES: Unit = unit(" deg", 1.0, 3, 0.0);
+const PERCENT: Unit = unit(" %", 1.0, 2, 0.0);
+const SHARE: Unit = unit(" %", 100.0, 2, 1e-6);
+/// A few saturated bins are chance.
+const SATURATED: Unit = unit(" %", 100.0, 4, 1e-5);
+const COEFFICIENT: Unit = Unit {
+    floor: None,
+    ..unit("", 1.0, 3, 0.0)
+};
+
+/// All of them. To add one, add an entry.
+static STATISTICS: [(&str, Kind); 14] = [
+    ("histogram of power", Kind::Histogram),
+    ("mean power against range", Kind::MeanPower),
+    (
+        "correlation length in range",
+        Kind::Number(METRES, |r| r.statistics.range_correlation.length()),
+    ),
+    (
+        "correlation length in azimuth",
+        Kind::Number(DEGREES, |r| r.statistics.azimuth_correlation.length()),
+    ),
+    (
+        "share of saturated bins",
+        Kind::Number(SATURATED, |r| Some(r.statistics.saturated_share)),
+    ),
+    (
+        "share above the threshold",
+        Kind::Number(SHARE, |r| Some(r.statistics.share_above)),
+    ),
+    (
+        "next scan: correlation",
+        Kind::Number(COEFFICIENT, |r| Some(r.statistics.change?.correlation)),
+    ),
+    (
+        "next scan: returns without counterpart",
+        Kind::Number(SHARE, |r| Some(r.statistics.change?.unmatched_share)),
+    ),
+    (
+        "plain search: translation of a motion",
+        Kind::Number(METRES, |r| Some(r.plain?.translation_rmse_m)),
+    ),
+    (
+        "plain search: rotation of a motion",
+        Kind::Number(DEGREES, |r| Some(r.plain?.rotation_rmse_deg)),
+    ),
+    (
+        "plain search: seg",
+        Kind::Number(PERCENT, |r| r.plain?.seg_percent),
+    ),
+    (
+        "refined search: translation of a motion",
+        Kind::Number(METRES, |r| Some(r.refined?.translation_rmse_m)),
+    ),
+    (
+        "refined search: rotation of a motion",
+        Kind::Number(DEGREES, |r| Some(r.refined?.rotation_rmse_deg)),
+    ),
+    (
+        "refined search: seg",
+        Kind::Number(PERCENT, |r| r.refined?.seg_percent),
+    ),
+];
+
+impl Kind {
+    fn distance(&self) -> &'static str {
+        match self {
+            Self::Histogram => "Wasserstein, counts",
+            Self::MeanPower => "RMS, counts",
+            Self::Number(Unit { floor: None, .. }, _) => "abs. difference",
+            Self::Number(..) => "abs. log ratio",
+        }
+    }
+
+    fn shown(&self, recording: &Recording) -> Option<String> {
+        let statistics = &recording.statistics;
+        match self {
+            Self::Histogram => {
+                let percentile = |share| statistics.histogram.percentile(share);
+                let [median, high, top] = [0.5, 0.9, 0.99].map(percentile);
+                Some(format!("50 %: {median}, 90 %: {high}, 99 %: {top}"))
+            }
+            Self::MeanPower => {
+                let at = |range_m| statistics.around(range_m, |cell| statistics.mean_power[cell]);
+                Some(format!("10 m: {:.1}", at(10.0)?))
+            }
+            Self::Number(unit, of) => {
+                let value = of(recording)? * unit.factor;
+                Some(format!("{value:.*}{}", unit.decimals, unit.suffix))
+            }
+        }
+    }
+
+    /// `None` where a recording lacks the statistic, or the distance is not finite.
+    fn between(&self, a: &Recording, b: &Recording) -> Option<f64> {
+        let (s, t) = (&a.statistics, &b.statistics);
+        let distance = match self {
+            Self::Histogram => s.histogram.wasserstein(&t.histogram),
+            Self::MeanPower => rms_difference(&s.mean_power, &t.mean_power),
+            Self::Number(unit, of) => match (of(a)?, of(b)?, unit.floor) {
+                (a, b, Some(floor)) => ((a + floor) / (b + floor)).ln().abs(),
+                (a, b, None) => (a - b).abs(),
+            },
+        };
+        distance.is_finite().then_some(distance)
+    }
 }
 
-fn degrees(angle_deg: f64) -> Option<String> {
-    Some(format!("{angle_deg:.3} deg"))
-}
-
-fn percent(share: f64) -> String {
-    format!("{:.2} %", 100.0 * share)
+/// Over as much of the range as both have.
+fn rms_difference(a: &[f64], b: &[f64]) -> f64 {
+    let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
+    (squares.sum::<f64>() / a.len().min(b.len()) as f64).sqrt()
 }

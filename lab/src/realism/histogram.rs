@@ -1,11 +1,9 @@
-//! How often each power occurs.
+//! How often each power occurs, overall and range by range.
 
+use gyre_radar::PolarScan;
 use serde::Serialize;
 
-/// The powers of an 8-bit scan.
-pub const LEVELS: usize = 256;
-
-/// How often each power from 0 to 255 occurs.
+/// The number of times that each power from 0 to 255 occurs.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(transparent)]
 pub struct Histogram {
@@ -15,53 +13,63 @@ pub struct Histogram {
 impl Default for Histogram {
     fn default() -> Self {
         Self {
-            counts: vec![0; LEVELS],
+            counts: vec![0; 256],
         }
     }
 }
 
 impl Histogram {
     /// Counts powers.
-    pub fn add(&mut self, powers: &[u8]) {
+    pub fn add<'p>(&mut self, powers: impl IntoIterator<Item = &'p u8>) {
         for power in powers {
             self.counts[usize::from(*power)] += 1;
         }
     }
 
-    /// Adds counts, by power.
-    pub(crate) fn add_counts(&mut self, counts: &[u64]) {
-        for (sum, count) in self.counts.iter_mut().zip(counts) {
-            *sum += count;
-        }
-    }
-
-    /// How often each power occurs: 256 numbers.
+    /// Returns all counts, by power.
     pub fn counts(&self) -> &[u64] {
         &self.counts
     }
 
-    /// All that was counted.
+    /// Returns the number of powers counted.
     pub fn total(&self) -> u64 {
         self.counts.iter().sum()
     }
 
-    /// The least power that at least this share of all does not exceed; 0 of nothing.
-    pub fn percentile(&self, share: f64) -> u8 {
-        percentile(&self.counts, share)
+    /// Returns the mean power; NaN of nothing.
+    pub fn mean(&self) -> f64 {
+        let products = self
+            .counts
+            .iter()
+            .zip(0..)
+            .map(|(count, power)| count * power);
+        products.sum::<u64>() as f64 / self.total() as f64
     }
 
-    /// Share of the powers above `threshold`; NaN of nothing.
+    /// Returns the least power that at least this share of all does not exceed; 0 of nothing.
+    pub fn percentile(&self, share: f64) -> u8 {
+        let wanted = share * self.total() as f64;
+        let mut below = 0;
+        let found = self.counts.iter().position(|count| {
+            below += count;
+            below as f64 >= wanted && below > 0
+        });
+        found.unwrap_or(0) as u8
+    }
+
+    /// Returns the share of the powers above `threshold`; NaN of nothing.
     pub fn share_above(&self, threshold: u8) -> f64 {
         let above: u64 = self.counts[usize::from(threshold) + 1..].iter().sum();
         above as f64 / self.total() as f64
     }
 
-    /// Powers that occur, in order.
+    /// Returns the powers that occur, in order.
     pub fn levels(&self) -> impl DoubleEndedIterator<Item = u8> {
         (0..=u8::MAX).filter(|power| self.counts[usize::from(*power)] > 0)
     }
 
-    /// Wasserstein's first distance, counts: how far the powers of one must be moved, on average, to become those of the other.
+    /// Returns the first Wasserstein distance, counts: how far the powers of one must be moved, on average, to become those of the
+    /// other.
     pub fn wasserstein(&self, other: &Self) -> f64 {
         let (total, other_total) = (self.total() as f64, other.total() as f64);
         let (mut below, mut other_below) = (0, 0);
@@ -75,23 +83,51 @@ impl Histogram {
     }
 }
 
-/// Mean of the powers counted.
-pub(crate) fn mean(counts: &[u64]) -> f64 {
-    let sum: u64 = counts
-        .iter()
-        .zip(0..)
-        .map(|(count, power)| count * power)
-        .sum();
-    sum as f64 / counts.iter().sum::<u64>() as f64
+/// A histogram for each cell of range, over all azimuths and scans.
+#[derive(Clone, Debug)]
+pub struct PowerByRange {
+    cells: Vec<Histogram>,
 }
 
-/// See [`Histogram::percentile`].
-pub(crate) fn percentile(counts: &[u64], share: f64) -> u8 {
-    let wanted = share * counts.iter().sum::<u64>() as f64;
-    let mut below = 0;
-    let found = counts.iter().position(|count| {
-        below += count;
-        below as f64 >= wanted && below > 0
-    });
-    found.unwrap_or(0) as u8
+impl PowerByRange {
+    /// Creates empty histograms for scans of `cells` cells.
+    pub fn new(cells: usize) -> Self {
+        Self {
+            cells: vec![Histogram::default(); cells],
+        }
+    }
+
+    /// Counts a scan's powers. It has the grid's cells.
+    pub fn add(&mut self, scan: &PolarScan<'_>) {
+        for azimuth in 0..scan.geometry.azimuths {
+            for (power, cell) in scan.row(azimuth).iter().zip(&mut self.cells) {
+                cell.counts[usize::from(*power)] += 1;
+            }
+        }
+    }
+
+    /// Returns the histogram over all ranges.
+    pub fn histogram(&self) -> Histogram {
+        let mut all = Histogram::default();
+        for cell in &self.cells {
+            all.counts
+                .iter_mut()
+                .zip(&cell.counts)
+                .for_each(|(sum, count)| *sum += count);
+        }
+        all
+    }
+
+    /// Returns the mean power of each cell.
+    pub fn means(&self) -> Vec<f64> {
+        self.cells.iter().map(Histogram::mean).collect()
+    }
+
+    /// Returns the power of each cell that this share of its powers does not exceed.
+    pub fn percentiles(&self, share: f64) -> Vec<u8> {
+        self.cells
+            .iter()
+            .map(|cell| cell.percentile(share))
+            .collect()
+    }
 }

@@ -5,167 +5,133 @@ use std::ops::Range;
 use gyre_evaluation::plot::{PlotError, canvas::*};
 use plotters::prelude::*;
 
-use crate::realism::Recording;
+use super::{correlation::Curve, recording::Recording};
 
 /// Size of a document, px.
 const SIZE: (u32, u32) = (900, 480);
-/// Colours, recording by recording.
-const COLOURS: [RGBColor; 3] = [ESTIMATE, INK, MARK];
-/// What stands for them in the legend.
-const LABELS: [&str; 3] = ["simulated", "real", "other real"];
+/// Colours and labels, recording by recording.
+const STYLES: [(RGBColor, &str); 3] =
+    [(ESTIMATE, "simulated"), (INK, "real"), (MARK, "other real")];
 /// Decades of shares that are drawn: less than this is a bin in a scan or none at all.
-const LEAST_LOG_SHARE: f64 = -6.0;
+const MIN_LOG_SHARE: f64 = -6.0;
 
-/// A diagram's name, as that of a file, and its SVG document.
-pub type Drawing = (&'static str, String);
+type Points = Vec<(f64, f64)>;
 
-/// The curves of a simulated, a real and, if it is there, another real recording, laid over each other: the histogram, the mean power against range, both autocorrelations.
-///
-/// # Errors
-/// [`PlotError::Draw`].
-pub fn curves(recordings: &[&Recording]) -> Result<Vec<Drawing>, PlotError> {
-    DIAGRAMS
-        .iter()
-        .map(|diagram| Ok((diagram.name, diagram.draw(recordings)?)))
-        .collect()
-}
+/// A diagram: its file, title, axes and curve.
+type Diagram = (
+    &'static str,
+    &'static str,
+    [&'static str; 2],
+    fn(&Recording) -> Points,
+);
 
-struct Diagram {
-    name: &'static str,
-    title: &'static str,
-    x_desc: &'static str,
-    y_desc: &'static str,
-    points: fn(&Recording) -> Vec<(f64, f64)>,
-}
-
-static DIAGRAMS: [Diagram; 4] = [
-    Diagram {
-        name: "histogram",
-        title: "Histogram of power",
-        x_desc: "power (counts)",
-        y_desc: "log10 of the share of cells",
-        points: log_shares,
-    },
-    Diagram {
-        name: "power-against-range",
-        title: "Mean power against range",
-        x_desc: "range (m)",
-        y_desc: "mean power (counts)",
-        points: |recording| {
+const DIAGRAMS: [Diagram; 4] = [
+    (
+        "histogram",
+        "Histogram of power",
+        ["power (counts)", "log10 of the share of cells"],
+        log_shares,
+    ),
+    (
+        "power-against-range",
+        "Mean power against range",
+        ["range (m)", "mean power (counts)"],
+        |recording| {
             let statistics = &recording.statistics;
             let cells = statistics.mean_power.iter().enumerate();
             cells
                 .map(|(cell, power)| (statistics.grid.centre_m(cell), *power))
                 .collect()
         },
-    },
-    Diagram {
-        name: "correlation-in-range",
-        title: "Autocorrelation in range",
-        x_desc: "lag (m)",
-        y_desc: "correlation",
-        points: |recording| points(&recording.statistics.range_correlation),
-    },
-    Diagram {
-        name: "correlation-in-azimuth",
-        title: "Autocorrelation in azimuth",
-        x_desc: "lag (deg)",
-        y_desc: "correlation",
-        points: |recording| points(&recording.statistics.azimuth_correlation),
-    },
+    ),
+    (
+        "correlation-in-range",
+        "Autocorrelation in range",
+        ["lag (m)", "correlation"],
+        |recording| points(&recording.statistics.range_correlation),
+    ),
+    (
+        "correlation-in-azimuth",
+        "Autocorrelation in azimuth",
+        ["lag (deg)", "correlation"],
+        |recording| points(&recording.statistics.azimuth_correlation),
+    ),
 ];
 
-fn points(curve: &crate::realism::Curve) -> Vec<(f64, f64)> {
-    curve
-        .values
+/// Draws the curves of a simulated, a real and, if it is there, another real recording over each other. Returns names of files and SVG
+/// documents.
+///
+/// # Errors
+/// [`PlotError::Draw`].
+pub fn curves(recordings: &[&Recording]) -> Result<Vec<(&'static str, String)>, PlotError> {
+    let draw = |diagram: &Diagram| Ok((diagram.0, draw(diagram, recordings)?));
+    DIAGRAMS.iter().map(draw).collect()
+}
+
+fn draw(
+    (_, title, axes, points): &Diagram,
+    recordings: &[&Recording],
+) -> Result<String, PlotError> {
+    let curves: Vec<Points> = recordings
         .iter()
-        .enumerate()
-        .map(|(lag, value)| (lag as f64 * curve.step, *value))
+        .map(|recording| points(recording))
+        .collect();
+    let all = || curves.iter().flatten();
+    let (x, y) = (
+        range(all().map(|point| point.0)),
+        range(all().map(|point| point.1)),
+    );
+    let styles = || {
+        recordings
+            .iter()
+            .zip(STYLES)
+            .map(|(_, (colour, label))| (line(colour, 2.0), label))
+    };
+    let entry = |(style, label)| Entry {
+        label,
+        symbol: Symbol::Line(style),
+    };
+    let legend: Vec<Entry<'_>> = styles().map(entry).collect();
+    document(SIZE, |area| {
+        header(area, title, &caption(recordings), &legend)?;
+        let below_header = area.split_vertically(px(f64::from(HEADER))).1;
+        let mut chart = chart(&below_header, x, y, *axes)?;
+        for (curve, (style, _)) in curves.iter().zip(styles()) {
+            let series = LineSeries::new(curve.iter().copied(), style);
+            chart.draw_series(series).map_err(drawing)?;
+        }
+        Ok(())
+    })
+}
+
+fn points(curve: &Curve) -> Points {
+    let lags = curve.values.iter().enumerate();
+    lags.map(|(lag, value)| (lag as f64 * curve.step, *value))
         .collect()
 }
 
 /// Powers that do not occur are left out.
-fn log_shares(recording: &Recording) -> Vec<(f64, f64)> {
+fn log_shares(recording: &Recording) -> Points {
     let histogram = &recording.statistics.histogram;
     let total = histogram.total() as f64;
-    let log_share = |count: &u64| (*count as f64 / total).log10();
-    let shares = histogram
-        .counts()
-        .iter()
-        .enumerate()
-        .map(|(power, count)| (power as f64, log_share(count)));
+    let counts = histogram.counts().iter().enumerate();
+    let shares = counts.map(|(power, count)| (power as f64, (*count as f64 / total).log10()));
     shares
-        .filter(|(_, log_share)| *log_share > LEAST_LOG_SHARE)
+        .filter(|(_, log_share)| *log_share > MIN_LOG_SHARE)
         .collect()
 }
 
-impl Diagram {
-    fn draw(&self, recordings: &[&Recording]) -> Result<String, PlotError> {
-        let curves: Vec<Vec<(f64, f64)>> = recordings
-            .iter()
-            .map(|recording| (self.points)(recording))
-            .collect();
-        let all = || curves.iter().flatten();
-        let (x, y) = (
-            range(all().map(|point| point.0)),
-            range(all().map(|point| point.1)),
-        );
-        let entry = |((_, label), colour)| Entry {
-            label,
-            symbol: Symbol::Line(line(colour, 2.0)),
-        };
-        let legend: Vec<Entry<'_>> = recordings
-            .iter()
-            .zip(LABELS)
-            .zip(COLOURS)
-            .map(entry)
-            .collect();
-        document(SIZE, |area| {
-            header(area, self.title, &caption(recordings), &legend)?;
-            let below_header = area.split_vertically(px(f64::from(HEADER))).1;
-            self.draw_chart(&below_header, &curves, x, y)
-        })
-    }
-
-    fn draw_chart(
-        &self,
-        area: &Area<'_>,
-        curves: &[Vec<(f64, f64)>],
-        x: Range<f64>,
-        y: Range<f64>,
-    ) -> Result<(), PlotError> {
-        let mut chart = chart(area, x, y, [self.x_desc, self.y_desc])?;
-        for (curve, colour) in curves.iter().zip(COLOURS) {
-            chart
-                .draw_series(LineSeries::new(curve.iter().copied(), line(colour, 2.0)))
-                .map_err(drawing)?;
-        }
-        Ok(())
-    }
-}
-
 /// From the least to the largest, and a little more than nothing.
-fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
-    let (least, most) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), v| {
-        (least.min(v), most.max(v))
-    });
+fn range(values: impl Iterator<Item = f64> + Clone) -> Range<f64> {
+    let least = values.clone().fold(f64::INFINITY, f64::min);
+    let most = values.fold(f64::NEG_INFINITY, f64::max);
     if least < most { least..most } else { 0.0..1.0 }
 }
 
-/// What the curves were measured on.
 fn caption(recordings: &[&Recording]) -> String {
-    let Some(first) = recordings.first() else {
-        return String::new();
-    };
-    let grid = first.statistics.grid;
     let scans = |recording: &&Recording| {
         format!("{} scans of {}", recording.statistics.scans, recording.name)
     };
     let scans: Vec<String> = recordings.iter().map(scans).collect();
-    format!(
-        "{}; cells of {:.4} m up to {:.1} m",
-        scans.join(", "),
-        grid.resolution_m,
-        grid.range_m()
-    )
+    scans.join(", ")
 }

@@ -1,136 +1,160 @@
-//! A recording that was named on the command line.
+//! A recording that was named on the command line: its scans, how they moved, and what the searches reach on it.
 
 use std::{
-    fs,
     ops::Range,
     path::{Path, PathBuf},
 };
 
-use crate::realism::{Measured, Meter, MeterConfig, Recording, ScanStatistics};
-use gyre_radar::{Dataset, DatasetOptions, Format, OwnedScan, Trajectory};
+use gyre::{Failure, judgement::judge, print};
+use gyre_evaluation::Options;
+use gyre_radar::{
+    Dataset, DatasetOptions, Format, OwnedScan, Trajectory,
+    ground_truth::{find_ground_truth, read_trajectory},
+};
 use nalgebra::Isometry2;
 use serde::Serialize;
 
-use super::odometry::Searches;
-use crate::report::save;
-use crate::sequence::Sequence;
-use gyre::{Failure, print};
+use super::statistics::{Meter, MeterConfig, ScanStatistics};
+use crate::{
+    report::{make_folder, save},
+    sequence::Sequence,
+    tables::rows::Rows,
+};
 
 /// Consecutive scans that are measured in a row.
 const RUN: usize = 8;
 /// A recording with fewer scans is not halved.
-const LEAST_HALVED: usize = 6;
+const MIN_HALVED: usize = 6;
 /// Stamps this close to a trajectory's end are its end, ns: files round.
 const ROUNDING_NS: u64 = 1_000_000;
+
+/// A recording as a whole, and its halves: how far apart these are is what a distance owes to chance and to the streets driven.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Measured {
+    /// All of it.
+    pub whole: Recording,
+    /// Its first and its second half; `None` where it has too few scans.
+    #[serde(skip)]
+    pub halves: Option<[Recording; 2]>,
+}
+
+/// All that was measured of a recording, or of a half.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Recording {
+    /// What it is called.
+    pub name: String,
+    /// Of its scans.
+    pub statistics: ScanStatistics,
+    /// The plain search: the paper's form. `None` without ground truth or without a second scan.
+    pub plain: Option<SearchErrors>,
+    /// The refined search: the shipped configuration.
+    pub refined: Option<SearchErrors>,
+    /// Pairs of consecutive scans that were aligned by ground truth.
+    pub aligned_by_truth: usize,
+    /// Pairs of consecutive scans that were aligned by the refined search.
+    pub aligned_by_odometry: usize,
+}
+
+/// How far an odometry is off on the recording.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct SearchErrors {
+    /// Root of the mean squared translation error of a motion, m.
+    pub translation_rmse_m: f64,
+    /// Root of the mean squared rotation error of a motion, degrees.
+    pub rotation_rmse_deg: f64,
+    /// Absolute trajectory error, m.
+    pub ate_m: f64,
+    /// Segment error, %; `None` where the path is shorter than 100 m.
+    pub seg_percent: Option<f64>,
+}
 
 /// A recording, open.
 pub struct Source {
     /// `sim`, `real` or `other`: what its files are called.
     pub role: &'static str,
+    /// Its folder.
     pub data: PathBuf,
-    /// Its configuration, if one was named.
-    pub configuration_file: Option<PathBuf>,
-    /// What can be run on it.
-    pub sequence: Sequence,
-    /// The folder of all that is run on it.
-    pub runs: PathBuf,
+    sequence: Sequence,
     /// The scans that its configuration plays.
     played: Range<usize>,
     dataset: Box<dyn Dataset>,
-}
-
-/// What of a recording is measured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
-    Whole,
-    FirstHalf,
-    SecondHalf,
-}
-
-/// Pairs of consecutive scans that were aligned by each.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Aligned {
-    /// By ground truth.
-    pub by_truth: usize,
-    /// By the refined odometry.
-    pub by_odometry: usize,
+    /// Ground truth with times and headings.
+    truth: Option<Trajectory>,
+    plain: Option<Trajectory>,
+    refined: Option<Trajectory>,
 }
 
 impl Source {
     /// Opens a recording by its configuration, or by the one that ships for its format.
+    ///
+    /// # Errors
+    /// A recording or a configuration that cannot be read.
     pub fn open(
         role: &'static str,
         data: &Path,
         configuration: Option<&Path>,
         out: &Path,
     ) -> Result<Self, Failure> {
-        let runs = out.join(role);
-        fs::create_dir_all(&runs)
-            .map_err(|error| format!("cannot write to {}: {error}", runs.display()))?;
         let file = match configuration {
             Some(file) => file.to_owned(),
             None => {
                 let format = gyre_radar::open(data, &DatasetOptions::default())?.format();
-                let file = runs.join(format!("{format}.toml"));
+                let file = out.join(role).join(format!("{format}.toml"));
+                make_folder(&out.join(role))?;
                 save(&file, shipped(format))?;
                 file
             }
         };
         let sequence = Sequence::new(&file, data);
-        let resolved = sequence.configuration(&[])?;
-        let dataset = gyre_radar::open(data, &resolved.dataset)?;
-        let played = resolved.played(dataset.len());
-        let configuration_file = configuration.map(Path::to_owned);
+        let configuration = sequence.configuration(&[])?;
+        let dataset = gyre_radar::open(data, &configuration.dataset)?;
+        let truth = find_ground_truth(data).and_then(|path| noted(read_trajectory(&path)));
         Ok(Self {
             role,
             data: data.to_owned(),
-            configuration_file,
             sequence,
-            runs,
-            played,
+            played: configuration.played(dataset.len()),
             dataset,
+            truth: truth.filter(|truth| truth.stamp_ns.is_some() && truth.has_heading()),
+            plain: None,
+            refined: None,
         })
     }
 
-    /// What it is called in tables.
-    pub fn name(&self) -> String {
-        let resolved = self
-            .data
-            .canonicalize()
-            .unwrap_or_else(|_| self.data.clone());
-        resolved
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned()
-    }
-
-    /// Scans that its configuration plays.
-    pub fn scans(&self) -> usize {
-        self.played.len()
-    }
-
-    /// The first scan that can be read.
-    pub fn first_scan(&mut self) -> Result<OwnedScan, Failure> {
-        self.scan_from(self.played.start)
-    }
-
-    /// The scan half-way through, or the next one that can be read.
-    pub fn middle_scan(&mut self) -> Result<OwnedScan, Failure> {
-        self.scan_from(self.played.start + self.scans() / 2)
-    }
-
-    fn scan_from(&mut self, first: usize) -> Result<OwnedScan, Failure> {
-        let mut scan = OwnedScan::with_limits(self.dataset.limits());
-        let found = (first..self.played.end).any(|index| self.read(index, &mut scan));
-        match found {
-            true => Ok(scan),
-            false => Err(format!(
-                "{}: no scan from number {first} on can be read",
-                self.data.display()
-            )
-            .into()),
+    /// Runs the search in the paper's form and the shipped configuration on the first `scans` scans, if there are two.
+    ///
+    /// # Errors
+    /// A run that does not succeed.
+    pub fn search(&mut self, scans: usize, out: &Path) -> Result<(), Failure> {
+        let scans = self.played.len().min(scans);
+        if scans < 2 {
+            return Ok(());
         }
+        let rows = Rows::read()?;
+        let run = |row: &str| -> Result<Option<Trajectory>, Failure> {
+            let mut changes = rows
+                .named(row)
+                .map_or_else(Vec::new, |row| row.changes(&rows, None));
+            changes.push(format!("source.scans={scans}"));
+            let (out, _) = self.sequence.run(row, &changes, &out.join(self.role))?;
+            Ok(Some(read_trajectory(&out.join("trajectory.tum"))?))
+        };
+        let (plain, refined) = (run("f-raw, line 14")?, run("Gyre")?);
+        (self.plain, self.refined) = (plain, refined);
+        Ok(())
+    }
+
+    /// Reads the first scan that can be read, or the one half-way through.
+    ///
+    /// # Errors
+    /// No scan from there on can be read.
+    pub fn scan(&mut self, half_way: bool) -> Result<OwnedScan, Failure> {
+        let first = self.played.start + if half_way { self.played.len() / 2 } else { 0 };
+        let mut scan = OwnedScan::with_limits(self.dataset.limits());
+        let data = self.data.display();
+        let failed = format!("{data}: no scan from number {first} on can be read");
+        let found = (first..self.played.end).any(|index| self.read(index, &mut scan));
+        found.then_some(scan).ok_or_else(|| failed.into())
     }
 
     /// Reads a scan; says why it cannot be read.
@@ -144,115 +168,107 @@ impl Source {
     }
 
     /// Measures at most `most` scans of the whole recording, and as many of each half.
-    pub fn measure(
-        &mut self,
-        config: MeterConfig,
-        most: usize,
-        searches: &Searches,
-    ) -> Result<(Measured, Aligned), Failure> {
-        let (whole, aligned) = self.measure_part(Part::Whole, config, most, searches)?;
-        let halves = match self.scans() {
-            ..LEAST_HALVED => None,
+    ///
+    /// # Errors
+    /// No scan can be measured.
+    pub fn measure(&mut self, config: MeterConfig, most: usize) -> Result<Measured, Failure> {
+        let whole = self.measure_part(0..2, config, most)?;
+        let halves = match self.played.len() {
+            ..MIN_HALVED => None,
             _ => Some([
-                self.measure_part(Part::FirstHalf, config, most, searches)?
-                    .0,
-                self.measure_part(Part::SecondHalf, config, most, searches)?
-                    .0,
+                self.measure_part(0..1, config, most)?,
+                self.measure_part(1..2, config, most)?,
             ]),
         };
-        Ok((Measured { whole, halves }, aligned))
+        Ok(Measured { whole, halves })
     }
 
+    /// Measures a range of halves: at most `most` scans, each with its motion since the one before it where that is known.
     fn measure_part(
         &mut self,
-        part: Part,
+        halves: Range<usize>,
         config: MeterConfig,
         most: usize,
-        searches: &Searches,
-    ) -> Result<(Recording, Aligned), Failure> {
-        let scans = part.of(self.played.clone());
-        let (statistics, aligned) = self.statistics(scans, config, most, searches)?;
-        let (plain, refined) = (
-            searches.errors(&searches.plain, part),
-            searches.errors(&searches.refined, part),
-        );
-        Ok((
-            Recording {
-                name: self.name(),
-                statistics,
-                plain,
-                refined,
-            },
-            aligned,
-        ))
-    }
-
-    /// ScanStatistics of at most `most` of these scans, each with its motion since the one before it where that is known.
-    fn statistics(
-        &mut self,
-        scans: Range<usize>,
-        config: MeterConfig,
-        most: usize,
-        searches: &Searches,
-    ) -> Result<(ScanStatistics, Aligned), Failure> {
+    ) -> Result<Recording, Failure> {
         let mut meter = Meter::new(config)?;
-        let mut aligned = Aligned::default();
+        let (mut by_truth, mut by_odometry) = (0, 0);
         let mut scan = OwnedScan::with_limits(self.dataset.limits());
-        for run in runs(scans.len(), most) {
+        let part = part(&halves, self.played.len());
+        let first = self.played.start + part.start;
+        for run in runs(part.len(), most) {
             let mut before_ns = None;
-            for index in scans.start + run.start..scans.start + run.end {
+            for index in first + run.start..first + run.end {
                 if !self.read(index, &mut scan) {
                     before_ns = None;
                     continue;
                 }
                 let now_ns = scan.geometry.stamp_ns;
-                let motion = before_ns
-                    .and_then(|before_ns| searches.motion(before_ns, now_ns, &mut aligned));
-                meter.add(&scan.view(), motion.as_ref())?;
+                let by = |trajectory: &Option<Trajectory>| {
+                    motion(trajectory.as_ref()?, before_ns?, now_ns)
+                };
+                let (truth, odometry) = (by(&self.truth), by(&self.refined));
+                by_truth += usize::from(truth.is_some());
+                by_odometry += usize::from(truth.is_none() && odometry.is_some());
+                meter.add(&scan.view(), truth.or(odometry).as_ref())?;
                 before_ns = Some(now_ns);
             }
         }
-        let statistics = meter
-            .finish()
-            .ok_or_else(|| format!("{} has no scan to measure", self.data.display()))?;
-        Ok((statistics, aligned))
+        let nothing = || format!("{} has no scan to measure", self.data.display());
+        Ok(Recording {
+            name: self.name(),
+            statistics: meter.finish().ok_or_else(nothing)?,
+            plain: self.errors(self.plain.as_ref(), &halves),
+            refined: self.errors(self.refined.as_ref(), &halves),
+            aligned_by_truth: by_truth,
+            aligned_by_odometry: by_odometry,
+        })
+    }
+
+    /// What it is called in tables.
+    fn name(&self) -> String {
+        let resolved = self
+            .data
+            .canonicalize()
+            .unwrap_or_else(|_| self.data.clone());
+        resolved
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
+    }
+
+    /// Errors of a part of a trajectory that was found; `None` without truth that fits.
+    fn errors(&self, found: Option<&Trajectory>, halves: &Range<usize>) -> Option<SearchErrors> {
+        let (found, truth) = (found?, self.truth.as_ref()?);
+        let poses = part(halves, found.len());
+        let found = Trajectory {
+            stamp_ns: found
+                .stamp_ns
+                .as_ref()
+                .map(|stamps| stamps[poses.clone()].to_vec()),
+            poses: found.poses[poses].to_vec(),
+        };
+        let judged = noted(judge(&found, truth, Options::default()))?;
+        let rpe = judged.rpe.as_ref()?;
+        Some(SearchErrors {
+            translation_rmse_m: rpe.translation_rmse_m,
+            rotation_rmse_deg: rpe.rotation_rmse_deg,
+            ate_m: judged.ate.rmse_m,
+            seg_percent: judged.seg.as_ref().map(|seg| seg.percent),
+        })
     }
 }
 
-impl Part {
-    /// The scans of it.
-    fn of(self, scans: Range<usize>) -> Range<usize> {
-        let middle = scans.start + scans.len() / 2;
-        match self {
-            Self::Whole => scans,
-            Self::FirstHalf => scans.start..middle,
-            Self::SecondHalf => middle..scans.end,
-        }
-    }
-
-    /// The poses of it.
-    pub fn of_trajectory(self, trajectory: &Trajectory) -> Trajectory {
-        let poses = self.of(0..trajectory.len());
-        let stamps = trajectory.stamp_ns.as_ref();
-        Trajectory {
-            stamp_ns: stamps.map(|stamps| stamps[poses.clone()].to_vec()),
-            poses: trajectory.poses[poses].to_vec(),
-        }
-    }
+/// `None` of an error, which is printed.
+fn noted<T, E: std::fmt::Display>(result: Result<T, E>) -> Option<T> {
+    let note = |error: &E| print::note(format_args!("not compared with the truth: {error}"));
+    result.inspect_err(note).ok()
 }
 
-impl Searches {
-    /// The motion from one time to another, by the truth if it can, else by the refined odometry.
-    fn motion(&self, from_ns: i64, to_ns: i64, aligned: &mut Aligned) -> Option<Isometry2<f64>> {
-        let by = |trajectory: &Option<Trajectory>| motion(trajectory.as_ref()?, from_ns, to_ns);
-        if let Some(motion) = by(&self.truth) {
-            aligned.by_truth += 1;
-            return Some(motion);
-        }
-        let motion = by(&self.refined)?;
-        aligned.by_odometry += 1;
-        Some(motion)
-    }
+/// A range of halves among so many.
+fn part(halves: &Range<usize>, of: usize) -> Range<usize> {
+    let at = |half: usize| [0, of / 2, of][half];
+    at(halves.start)..at(halves.end)
 }
 
 fn motion(trajectory: &Trajectory, from_ns: i64, to_ns: i64) -> Option<Isometry2<f64>> {
@@ -293,8 +309,8 @@ mod tests {
     #[test]
     fn runs_cover_a_short_recording_and_spread_over_a_long_one() {
         let ends = |scans, most| {
-            runs(scans, most)
-                .iter()
+            let runs = runs(scans, most);
+            runs.iter()
                 .map(|run| (run.start, run.end))
                 .collect::<Vec<_>>()
         };

@@ -3,7 +3,7 @@
 use gyre_radar::PolarScan;
 use serde::Serialize;
 
-use crate::realism::histogram::Histogram;
+use super::histogram::Histogram;
 
 /// An azimuth's floor is the power that this share of its outer half does not exceed: returns hardly reach it.
 const FLOOR_SHARE: f64 = 0.2;

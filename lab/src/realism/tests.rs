@@ -6,7 +6,10 @@ mod comparison;
 mod powers;
 mod texture;
 
-use crate::realism::{Meter, MeterConfig, RangeGrid, ScanStatistics};
+use super::{
+    grid::RangeGrid,
+    statistics::{Meter, MeterConfig, ScanStatistics},
+};
 use gyre_radar::{OwnedScan, ScanLimits, Sense, SweepGeometry};
 use nalgebra::{Isometry2, Point2};
 use rand::{Rng, SeedableRng};
@@ -63,7 +66,7 @@ pub fn scan(
     scan
 }
 
-/// Independent powers from 0 to `most`.
+/// Returns independent powers from 0 to `most`.
 pub fn noise(seed: u64, most: u8) -> Vec<u8> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     (0..AZIMUTHS * BINS)
@@ -91,7 +94,7 @@ pub fn posts(posts: &[Point2<f64>], index: i64, pose: impl Fn(f64) -> Isometry2<
     drawn
 }
 
-/// What scans without known motions are like.
+/// Measures scans without known motions.
 pub fn measured<'s>(scans: impl IntoIterator<Item = &'s OwnedScan>) -> ScanStatistics {
     let mut meter = Meter::new(CONFIG).unwrap();
     for scan in scans {

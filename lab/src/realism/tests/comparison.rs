@@ -1,7 +1,12 @@
 //! Distances between recordings, plots and pictures of them.
 
 use super::*;
-use crate::realism::{Change, Measured, Recording, SearchErrors, compare, plot::curves};
+use crate::realism::{
+    change::Change,
+    comparison::compare,
+    plot::curves,
+    recording::{Measured, Recording, SearchErrors},
+};
 use gyre::picture::Picture;
 
 /// A recording of noise with a wall, brighter by `gain`, whose searches are `errors` off.
@@ -17,8 +22,6 @@ fn recording(seed: u64, gain: u8, errors: f64) -> Recording {
         unmatched_share: errors,
     };
     let errors = SearchErrors {
-        motions: 10,
-        path_m: 25.0,
         translation_rmse_m: errors,
         rotation_rmse_deg: 2.0 * errors,
         ate_m: errors,
@@ -31,6 +34,8 @@ fn recording(seed: u64, gain: u8, errors: f64) -> Recording {
         statistics,
         plain: Some(errors),
         refined: Some(errors),
+        aligned_by_truth: 0,
+        aligned_by_odometry: 0,
     }
 }
 

@@ -1,7 +1,7 @@
 //! Histograms, the common grid, powers by range, saturation, streaks.
 
 use super::*;
-use crate::realism::{Histogram, Meter, RangeGrid, Resampler};
+use crate::realism::{grid::Resampler, histogram::Histogram};
 use proptest::prelude::*;
 
 fn histogram(powers: &[u8]) -> Histogram {
@@ -11,9 +11,9 @@ fn histogram(powers: &[u8]) -> Histogram {
 }
 
 #[test]
-fn a_histogram_knows_its_percentiles_and_share_above() {
+fn a_histogram_knows_its_mean_percentiles_and_share_above() {
     let known = histogram(&[0, 0, 10, 20, 60, 61, 100, 200, 200, 255]);
-    assert_eq!(known.total(), 10);
+    assert_eq!((known.total(), known.mean()), (10, 90.6));
     assert_eq!(
         [0.0, 0.2, 0.21, 0.5, 0.9, 1.0].map(|share| known.percentile(share)),
         [0, 0, 10, 60, 200, 255]
@@ -124,12 +124,14 @@ fn powers_are_known_range_by_range() {
     assert_eq!(at(149), (0.1 * 100.0 + 0.9 * 49.0, 49, 49, 100));
     assert_eq!(statistics.share_above, 0.1);
     // 9.45 to 10.45 m are bins 47 to 52: powers 47, 48, 49, 0, 1 and 2.
-    let around = statistics.mean_power_at(9.95).unwrap();
+    let around = statistics
+        .around(9.95, |cell| statistics.mean_power[cell])
+        .unwrap();
     assert!(
         (around - (10.0 + 0.9 * 147.0 / 6.0)).abs() < 1e-9,
         "{around}"
     );
-    assert_eq!(statistics.mean_power_at(60.0), None);
+    assert_eq!(statistics.around(60.0, |_| 0.0), None);
 }
 
 #[test]

@@ -1,7 +1,10 @@
 //! Correlation lengths and the change from scan to scan.
 
 use super::*;
-use crate::realism::{ChangeMeter, Curve, Meter};
+use crate::realism::{
+    change::{Change, ChangeMeter},
+    correlation::Curve,
+};
 use gyre_radar::OwnedScan;
 use nalgebra::{Isometry2, Point2, Vector2};
 use proptest::prelude::*;
@@ -112,11 +115,7 @@ fn town(seed: u64) -> Vec<Point2<f64>> {
 }
 
 /// What is found between two scans, the later one 0.25 s after the earlier.
-fn change(
-    earlier: &OwnedScan,
-    later: &OwnedScan,
-    motion: &Isometry2<f64>,
-) -> crate::realism::Change {
+fn change(earlier: &OwnedScan, later: &OwnedScan, motion: &Isometry2<f64>) -> Change {
     let mut meter = ChangeMeter::new(GRID.range_m(), 0.4, 60).unwrap();
     meter.add(&earlier.view(), &later.view(), motion).unwrap();
     meter.finish().unwrap()
