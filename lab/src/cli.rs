@@ -126,11 +126,11 @@ pub struct ExportPairsArguments {
 pub struct CorruptArguments {
     /// The dataset's folder. The copy has links to it, and needs it.
     pub path: PathBuf,
-    /// What is done: noise, later (the powers of the scan ten later), turned (by a quarter), half-blank, dropped.
+    /// What is done to a scan.
     #[arg(long)]
     pub fault: Fault,
-    /// Every so-manyth scan is spoilt, never the first.
-    #[arg(long, default_value = "20")]
+    /// Every Nth scan is corrupted, never the first.
+    #[arg(long, value_name = "N", default_value = "20")]
     pub every: NonZeroUsize,
     /// Seed of the noise.
     #[arg(long, default_value = "1")]

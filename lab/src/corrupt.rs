@@ -1,34 +1,185 @@
-//! `gyre-lab corrupt`: a recording with faults that were put there on purpose.
+//! `gyre-lab corrupt`: a copy of a recording, real or simulated, in which some scans are corrupted in a known way. An odometry should
+//! get over each of them, and report that it had to.
+//!
+//! The copy has links to all that is untouched, so it takes little room and goes with the recording. Noise depends on the seed
+//! alone: the same arguments give the same pixels.
 
-mod faults;
 #[cfg(test)]
 mod tests;
 
-use std::process::ExitCode;
+use std::{
+    collections::BTreeSet,
+    ffi::{OsStr, OsString},
+    fs,
+    num::NonZeroUsize,
+    os::unix::fs::symlink,
+    path::Path,
+    process::ExitCode,
+};
 
-use gyre::{Failure, print};
+use clap::ValueEnum;
+use gyre::{Failure, picture::Picture, print};
+use gyre_radar::{Dataset, DatasetOptions, OwnedScan};
+use rand::{RngCore, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
-use crate::cli::CorruptArguments;
+use crate::{cli::CorruptArguments, report::make_folder};
 
-pub use faults::Fault;
-use faults::{FaultPlan, write_faulty};
+/// What is done to a scan. Stamps, encoder and all else that a file says beside the powers stay as they are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Fault {
+    /// Every power is drawn uniformly from 0 to 255.
+    Noise,
+    /// The powers are those of the scan ten later. The last ten scans have none, and are spared.
+    Later,
+    /// The azimuths are rolled by a quarter turn.
+    Turned,
+    /// The half turn from straight ahead on is blank.
+    HalfBlank,
+    /// The scan is missing.
+    Dropped,
+}
 
-/// Writes the spoilt copy, and says which scans were hit.
+/// How much later the scan is that stands in for another.
+const LATER: usize = 10;
+
+/// Which scans are corrupted, and how.
+#[derive(Clone, Copy, Debug)]
+struct Plan {
+    fault: Fault,
+    /// Every Nth scan is corrupted, never the first one.
+    every: NonZeroUsize,
+    seed: u64,
+}
+
+/// Writes the corrupted copy, and says which scans were hit.
+///
+/// # Errors
+/// A recording that cannot be read, an output folder that is not empty or cannot be written.
 pub fn corrupt(arguments: &CorruptArguments) -> Result<ExitCode, Failure> {
-    let &CorruptArguments {
-        fault, every, seed, ..
-    } = arguments;
-    let hits = write_faulty(
-        &arguments.path,
-        &arguments.out,
-        &FaultPlan { fault, every, seed },
-    )?;
+    let &CorruptArguments { fault, every, seed, .. } = arguments;
+    let hits = write_corrupted(&arguments.path, &arguments.out, &Plan { fault, every, seed })?;
     let numbers: Vec<_> = hits.iter().map(usize::to_string).collect();
+    let name = fault.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
     print::line(format_args!(
-        "wrote {} with {fault} in {} scans: {}",
+        "wrote {} with {name} in {} scans: {}",
         arguments.out.display(),
         hits.len(),
         numbers.join(" ")
     ))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Writes a corrupted copy of the recording in the folder `source`, of any format, to the folder `out`. Returns the numbers of the
+/// scans that were hit, by their place in `source`.
+fn write_corrupted(source: &Path, out: &Path, plan: &Plan) -> Result<Vec<usize>, Failure> {
+    let source = source.canonicalize().unwrap_or_else(|_| source.to_owned());
+    let mut dataset = gyre_radar::open(&source, &DatasetOptions::default())?;
+    let hits: Vec<usize> = plan.hits(dataset.len()).collect();
+    let name = |index: &usize| Some(dataset.file(*index).file_name()?.to_owned());
+    let corrupted: BTreeSet<OsString> = hits.iter().filter_map(name).collect();
+    let folder = dataset.file(0).parent().unwrap_or(&source);
+    let images = folder.strip_prefix(&source).unwrap_or(Path::new("")).to_owned();
+    make_folder(out)?;
+    if let Some(other) = entries(out)?.into_iter().min() {
+        let (out, other) = (out.display(), other.display());
+        return Err(format!("{out} holds `{other}`: give an empty folder").into());
+    }
+    link_around(&source, out, &images, &corrupted)?;
+    if plan.fault != Fault::Dropped {
+        for &index in &hits {
+            plan.write(dataset.as_mut(), index, &out.join(&images))?;
+        }
+    }
+    Ok(hits)
+}
+
+/// Links all of `source` into `out`, folders as a whole, but for the folders that lead to `images`, and in there but for `corrupted`.
+fn link_around(
+    source: &Path,
+    out: &Path,
+    images: &Path,
+    corrupted: &BTreeSet<OsString>,
+) -> Result<(), Failure> {
+    let (mut here, mut there) = (source.to_owned(), out.to_owned());
+    for next in images {
+        link_all(&here, &there, |name| name != next)?;
+        here.push(next);
+        there.push(next);
+        make_folder(&there)?;
+    }
+    link_all(&here, &there, |name| !corrupted.contains(name))
+}
+
+fn link_all(here: &Path, there: &Path, wanted: impl Fn(&OsStr) -> bool) -> Result<(), Failure> {
+    for name in entries(here)?.iter().filter(|name| wanted(name)) {
+        let link = there.join(name);
+        symlink(here.join(name), &link)
+            .map_err(|error| format!("cannot write {}: {error}", link.display()))?;
+    }
+    Ok(())
+}
+
+fn entries(folder: &Path) -> Result<Vec<OsString>, Failure> {
+    let names = |entries: fs::ReadDir| entries.map(|entry| Ok(entry?.file_name())).collect();
+    fs::read_dir(folder)
+        .and_then(names)
+        .map_err(|error| format!("cannot list {}: {error}", folder.display()).into())
+}
+
+impl Plan {
+    /// The numbers, from 0, of the scans that are hit in a recording of so many.
+    fn hits(&self, scans: usize) -> impl Iterator<Item = usize> {
+        let end = match self.fault {
+            Fault::Later => scans.saturating_sub(LATER),
+            _ => scans,
+        };
+        (self.every.get()..end).step_by(self.every.get())
+    }
+
+    fn write(&self, dataset: &mut dyn Dataset, index: usize, folder: &Path) -> Result<(), Failure> {
+        let mut scan = read(dataset, index)?;
+        let geometry = scan.geometry;
+        let mut powers = match self.fault {
+            Fault::Later => powers_of(&read(dataset, index + LATER)?),
+            _ => powers_of(&scan),
+        };
+        match self.fault {
+            Fault::Noise => {
+                let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+                random.set_stream(index as u64);
+                random.fill_bytes(&mut powers);
+            }
+            Fault::Turned => powers.rotate_left(geometry.azimuths / 4 * geometry.bins),
+            Fault::HalfBlank => powers[..geometry.azimuths / 2 * geometry.bins].fill(0),
+            Fault::Later | Fault::Dropped => {}
+        }
+        for (row, powers) in powers.chunks_exact(geometry.bins).enumerate() {
+            let first = geometry.first_byte + row * geometry.stride;
+            scan.bytes[first..first + geometry.bins].copy_from_slice(powers);
+        }
+        if dataset.is_transposed() {
+            let column = |bin| powers.iter().skip(bin).step_by(geometry.bins).copied();
+            scan.bytes = (0..geometry.bins).flat_map(column).collect();
+        }
+        let size = dataset.image_size();
+        let picture = Picture {
+            width: size.width,
+            height: size.height,
+            pixels: scan.bytes,
+        };
+        let file = dataset.file(index).file_name().unwrap_or_default();
+        Ok(picture.write(&folder.join(file))?)
+    }
+}
+
+fn read(dataset: &mut dyn Dataset, index: usize) -> Result<OwnedScan, Failure> {
+    let mut scan = OwnedScan::with_limits(dataset.limits());
+    scan.geometry = dataset.read(index, scan.slot())?;
+    Ok(scan)
+}
+
+/// All rows' powers, without what stands between them.
+fn powers_of(scan: &OwnedScan) -> Vec<u8> {
+    scan.view().power().iter().copied().collect()
 }
