@@ -57,10 +57,18 @@ struct Plan {
 /// # Errors
 /// A recording that cannot be read, an output folder that is not empty or cannot be written.
 pub fn corrupt(arguments: &CorruptArguments) -> Result<ExitCode, Failure> {
-    let &CorruptArguments { fault, every, seed, .. } = arguments;
-    let hits = write_corrupted(&arguments.path, &arguments.out, &Plan { fault, every, seed })?;
+    let &CorruptArguments {
+        fault, every, seed, ..
+    } = arguments;
+    let hits = write_corrupted(
+        &arguments.path,
+        &arguments.out,
+        &Plan { fault, every, seed },
+    )?;
     let numbers: Vec<_> = hits.iter().map(usize::to_string).collect();
-    let name = fault.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
+    let name = fault
+        .to_possible_value()
+        .map_or_else(String::new, |value| value.get_name().to_owned());
     print::line(format_args!(
         "wrote {} with {name} in {} scans: {}",
         arguments.out.display(),
@@ -79,7 +87,10 @@ fn write_corrupted(source: &Path, out: &Path, plan: &Plan) -> Result<Vec<usize>,
     let name = |index: &usize| Some(dataset.file(*index).file_name()?.to_owned());
     let corrupted: BTreeSet<OsString> = hits.iter().filter_map(name).collect();
     let folder = dataset.file(0).parent().unwrap_or(&source);
-    let images = folder.strip_prefix(&source).unwrap_or(Path::new("")).to_owned();
+    let images = folder
+        .strip_prefix(&source)
+        .unwrap_or(Path::new(""))
+        .to_owned();
     make_folder(out)?;
     if let Some(other) = entries(out)?.into_iter().min() {
         let (out, other) = (out.display(), other.display());
