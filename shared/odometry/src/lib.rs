@@ -1,8 +1,7 @@
 //! Radar odometry in one process: the whole method on one page.
 //!
-//! [`Odometry::register`] is the method; `search` and `compensation` are its two parts that no other crate has. The
-//! processes of a run compose the same parts from [`gyre_masking`] and [`gyre_scan_matching`], so their motions are the same
-//! bits.
+//! [`Odometry::register`] is the method: compensate, rasterise, mask, rotate, translate, refine, compose. The processes of a run
+//! compose the same parts from [`gyre_masking`] and [`gyre_scan_matching`], so their motions are the same bits.
 //!
 //! # Frames and units
 //! As in [`gyre_geometry`]: x forward, y left, yaw counter-clockwise; m, rad, s.
@@ -36,7 +35,8 @@
 mod compensation;
 mod config;
 mod odometry;
-mod search;
+mod registered;
 
 pub use config::{OdometryConfig, SearchConfig, SearchKind};
-pub use odometry::{Odometry, OdometryError, Outcome, Registered, SetupError};
+pub use odometry::Odometry;
+pub use registered::{OdometryError, Outcome, Registered, SetupError};

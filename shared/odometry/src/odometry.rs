@@ -1,18 +1,23 @@
 //! Odometry: from scans to motions and poses.
 
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose};
-use gyre_masking::{MaskError, Masker, MaskerError, Sweep};
-use gyre_radar::{PolarScan, ScanError};
-use gyre_scan_matching::{ConfigError, JointMatch, Refined, RefinementKind, Refiner, ShapeError};
+use gyre_masking::{Masker, Sweep};
+use gyre_radar::PolarScan;
+use gyre_scan_matching::{
+    ConfigError, ExhaustiveSearch, JointMatch, Refined, RefinementKind, Refiner,
+    SequentialRotation, TranslationSearch,
+};
 use ndarray::{Array2, ArrayView2, ArrayViewMut2};
-use thiserror::Error;
 
-use crate::{OdometryConfig, compensation::LaggedTwists, search::MotionSearch};
+use crate::{
+    OdometryConfig, OdometryError, Outcome, Registered, SearchKind, SetupError,
+    compensation::LaggedTwists,
+};
 
 /// Registers one scan after the other against those before.
 pub struct Odometry {
     masker: Masker,
-    search: MotionSearch,
+    search: Search,
     refiner: Option<Refiner>,
     twists: LaggedTwists,
     /// The scan that is being registered.
@@ -26,64 +31,10 @@ pub struct Odometry {
     pose: UncertainMotion,
 }
 
-/// A registered scan.
-#[derive(Clone, Copy, Debug)]
-pub struct Registered {
-    /// Number of the scan in the chain of motions, from 0.
-    pub seq: u64,
-    /// The motion from the scan before, with its covariance: this scan's frame in that one's. The identity where the chain
-    /// starts.
-    pub motion: UncertainMotion,
-    /// The pose in the frame of the first scan, with its covariance.
-    pub pose: UncertainMotion,
-    /// How the motion was found.
-    pub outcome: Outcome,
-    /// Time between the two scans, ns.
-    pub interval_ns: i64,
-    /// The result of the search; `None` where the chain starts.
-    pub searched: Option<JointMatch>,
-    /// The result of the refinement; `None` where there is none.
-    pub refined: Option<Refined>,
-}
-
-/// How a motion was found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
-    /// There is no scan before: the chain of motions starts here.
-    Start,
-    /// By the search alone: no refinement is configured.
-    Searched,
-    /// Refined against the local map.
-    Refined,
-    /// Refined with little support: its covariance is wider, and the scan stays out of the map.
-    Weak,
-    /// No match: predicted from the motions before.
-    Predicted,
-}
-
-/// Settings that no odometry can be built from.
-#[derive(Debug, Error)]
-pub enum SetupError {
-    /// The rasters', the points' or the mask's.
-    #[error(transparent)]
-    Masker(#[from] MaskerError),
-    /// The search's or the refinement's.
-    #[error(transparent)]
-    Search(#[from] ConfigError),
-}
-
-/// Why a scan cannot be registered.
-#[derive(Debug, Error)]
-pub enum OdometryError {
-    /// It cannot be rasterised or masked.
-    #[error(transparent)]
-    Mask(#[from] MaskError),
-    /// No points can be extracted from it.
-    #[error(transparent)]
-    Points(#[from] ScanError),
-    /// Its raster cannot be searched.
-    #[error(transparent)]
-    Search(#[from] ShapeError),
+/// The configured search.
+enum Search {
+    Decoupled(Box<SequentialRotation>, Box<TranslationSearch>),
+    Exhaustive(Box<ExhaustiveSearch>),
 }
 
 /// What a scan becomes.
@@ -112,7 +63,7 @@ impl Odometry {
         let n = config.raster.n;
         let frame = || Frame::new(n, config.points.capacity);
         Ok(Self {
-            search: MotionSearch::new(config)?,
+            search: Search::new(config)?,
             refiner,
             twists: LaggedTwists::new(config.masking.feedback_lag()),
             current: frame(),
@@ -130,21 +81,9 @@ impl Odometry {
     /// A scan that cannot be used. It is left out: the next one is registered against the scan before it.
     pub fn register(&mut self, scan: &PolarScan<'_>) -> Result<Registered, OdometryError> {
         let twist = self.twists.next();
-        self.register_compensated(scan, twist)
-    }
-
-    /// As [`Odometry::register`], with the velocity for motion compensation from elsewhere (an IMU, the truth).
-    ///
-    /// # Errors
-    /// As [`Odometry::register`].
-    pub fn register_compensated(
-        &mut self,
-        scan: &PolarScan<'_>,
-        twist: Option<Twist>,
-    ) -> Result<Registered, OdometryError> {
         self.mask(scan, twist)?;
         let searched = self.search()?;
-        let refined = searched.as_ref().and_then(|found| self.refine(found));
+        let refined = searched.as_ref().and_then(|motion| self.refine(motion));
         Ok(self.integrate(searched, refined))
     }
 
@@ -173,18 +112,30 @@ impl Odometry {
         Ok(())
     }
 
-    /// Searches for the rotation, then for the translation between the last two masked scans (Weston et al., Eqs. 7 and 8);
-    /// `None` where the chain starts.
+    /// Searches for the rotation (Weston et al., Eq. 7), then for the translation (Eq. 8) between the last two masked scans,
+    /// or for both together by trying every angle; `None` where the chain starts.
     ///
     /// # Errors
     /// None with the rasters of [`Odometry::mask`].
     pub fn search(&mut self) -> Result<Option<JointMatch>, OdometryError> {
+        let later = self.current.raster.view();
         let changed = self.before_by_pair.is_some();
-        let before = self.before_by_pair.as_ref().unwrap_or(&self.before.raster);
-        let before = (self.seq > 0).then(|| before.view());
-        Ok(self
-            .search
-            .find(self.seq, self.current.raster.view(), before, changed)?)
+        let earlier = self.before_by_pair.as_ref().unwrap_or(&self.before.raster);
+        let earlier = (self.seq > 0).then(|| earlier.view());
+        match &mut self.search {
+            Search::Decoupled(rotation, translation) => {
+                let rotation = rotation.next(self.seq, later, earlier, changed)?;
+                let (Some(rotation), Some(earlier)) = (rotation, earlier) else {
+                    return Ok(None);
+                };
+                let motion = translation.search(later, earlier, &rotation)?;
+                Ok(Some(JointMatch { rotation, motion }))
+            }
+            Search::Exhaustive(search) => {
+                let found = earlier.map(|earlier| search.search(later, earlier));
+                Ok(found.transpose()?)
+            }
+        }
     }
 
     /// Refines the searched motion against the map of the last keyframes; `None` where no refinement is configured.
@@ -281,6 +232,23 @@ impl Odometry {
     }
 }
 
+impl Search {
+    fn new(config: &OdometryConfig) -> Result<Self, ConfigError> {
+        let (n, cell_m) = (config.raster.n, config.raster.cell_m.into());
+        Ok(match config.search.kind {
+            SearchKind::Decoupled => Self::Decoupled(
+                Box::new(SequentialRotation::new(n, &config.rotation)?),
+                Box::new(TranslationSearch::new(n, cell_m, &config.translation)?),
+            ),
+            SearchKind::Exhaustive => Self::Exhaustive(Box::new(ExhaustiveSearch::new(
+                n,
+                cell_m,
+                &config.exhaustive,
+            )?)),
+        })
+    }
+}
+
 impl Frame {
     fn new(n: usize, capacity: usize) -> Self {
         Self {
@@ -299,14 +267,4 @@ impl Frame {
 
 fn motion_of(found: &JointMatch) -> Pose {
     pose(found.motion.x_m, found.motion.y_m, found.motion.yaw_rad)
-}
-
-impl From<gyre_scan_matching::Outcome> for Outcome {
-    fn from(outcome: gyre_scan_matching::Outcome) -> Self {
-        match outcome {
-            gyre_scan_matching::Outcome::Refined => Self::Refined,
-            gyre_scan_matching::Outcome::Weak => Self::Weak,
-            gyre_scan_matching::Outcome::Predicted => Self::Predicted,
-        }
-    }
 }

@@ -97,8 +97,9 @@ impl Timer {
             self.odometry.restart();
         }
         if self.next == 0 {
-            self.odometry
-                .register_compensated(&self.scans[0].view(), None)?;
+            self.odometry.mask(&self.scans[0].view(), None)?;
+            let start = self.odometry.search()?;
+            self.odometry.integrate(start, None);
             self.next = 1;
         }
         self.odometry.mask(&self.scans[self.next].view(), None)?;
