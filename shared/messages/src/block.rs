@@ -1,11 +1,11 @@
-//! Payload elements: blocks of 64 bytes, so that every payload starts on a cache line and fits any vector register.
+//! Payload elements: blocks of 64 bytes, so that every payload starts on a cache line and is aligned for any vector unit.
 //!
-//! The alignment belongs to the element: asking the transport to align a slice of bytes multiplies the memory by the alignment.
+//! The element type carries the alignment, because the transport multiplies the memory of an aligned slice of bytes by the alignment.
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-/// 64 bytes of an image.
+/// 64 bytes of a polar scan.
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct ByteBlock([u8; 64]);
@@ -16,26 +16,26 @@ pub struct ByteBlock([u8; 64]);
 pub struct FloatBlock([f32; 16]);
 
 impl ByteBlock {
-    /// Bytes a block.
+    /// Bytes per block.
     pub const LEN: usize = 64;
 
-    /// Blocks that hold this many bytes.
+    /// Returns the number of blocks that hold this many bytes.
     pub fn count(bytes: usize) -> usize {
         bytes.div_ceil(Self::LEN)
     }
 }
 
 impl FloatBlock {
-    /// Values a block.
+    /// Values per block.
     pub const LEN: usize = 16;
 
-    /// Blocks that hold this many values.
+    /// Returns the number of blocks that hold this many values.
     pub fn count(values: usize) -> usize {
         values.div_ceil(Self::LEN)
     }
 }
 
-// SAFETY: plain numbers, repr(C), no pointers. By hand, because the derive refuses `align`.
+// SAFETY: plain numbers, repr(C), no pointers. Implemented by hand because the derive rejects `align`.
 unsafe impl ZeroCopySend for ByteBlock {
     unsafe fn type_name() -> &'static str {
         "gyre_byte_block_v1"

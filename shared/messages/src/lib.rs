@@ -6,35 +6,41 @@
 //! |---|---|---|
 //! | `scan` | [`ScanHeader`] | the sweep's bytes, in [`ByteBlock`]s |
 //! | `masked` | [`MaskedHeader`] | one or two rasters and the scan's points, in [`FloatBlock`]s |
-//! | `rotation` | [`RotationHeader`] | empty (later: the polar spectrum) |
+//! | `rotation` | [`RotationHeader`] | empty |
 //! | `motion` | [`MotionHeader`] | empty |
 //! | `refined` | [`MotionHeader`] | empty |
 //! | `pose` | [`PoseHeader`] | empty |
 //!
-//! All of them start with an [`Item`]: which scan this is, which one it follows, and when each process worked on it.
-//! A type's name carries its version, so that two builds that disagree refuse each other instead of misreading.
+//! All headers start with an [`Item`], which identifies the scan and carries the time stamps of each stage. Type names carry a
+//! version, so that two builds of different versions reject each other's messages instead of misreading them.
+//!
+//! Reading order: `item`, `limits`, `message` (the contract of a message type), one file per message, `topics`.
 
-// Sharing a type between processes is a claim that the compiler cannot check; each `unsafe impl` here says why it holds.
+// The compiler cannot check that a type may be shared between processes; each `unsafe impl` states why it may.
 #![allow(unsafe_code)]
 
 mod block;
 mod item;
 mod limits;
 mod masked;
+mod message;
 mod motion;
 mod pose;
 mod refined;
+mod refinement;
 mod rotation;
 mod scan;
-mod topic;
+mod topics;
 
 pub use block::{ByteBlock, FloatBlock};
 pub use item::{Hop, Hops, Item, StageId, flag};
-pub use limits::{Footprint, Limits, MAX_NODES, TopicSizes, Window, WindowError};
+pub use limits::{History, Limits, MAX_NODES, TopicSizes, Window, WindowError};
 pub use masked::{Masked, MaskedHeader, MaskedParts, Pair, mask_kind};
+pub use message::{Header, Message};
 pub use motion::{Motion, MotionEstimate, MotionHeader, SearchedMotion};
 pub use pose::{Pose, PoseHeader};
-pub use refined::{Refined, RefinementRecord, initial_guess, outcome};
+pub use refined::Refined;
+pub use refinement::{RefinementRecord, initial_guess, outcome};
 pub use rotation::{Rotation, RotationEstimate, RotationHeader};
 pub use scan::{Scan, ScanHeader};
-pub use topic::{Header, History, Message, TOPICS, Topic};
+pub use topics::{Footprint, TOPICS, Topic};

@@ -1,4 +1,4 @@
-//! `masked`: Cartesian rasters with what would mislead the search taken out, and the scan's sparse points.
+//! `masked`: masked Cartesian rasters and the scan's sparse points.
 
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::SparsePoint;
@@ -6,18 +6,20 @@ use iceoryx2::prelude::ZeroCopySend;
 use ndarray::{ArrayView2, ArrayViewMut2};
 
 use crate::{
-    ByteBlock, FloatBlock, Item, Limits, Message,
-    topic::{History, header},
+    block::{ByteBlock, FloatBlock},
+    item::Item,
+    limits::{History, Limits},
+    message::{Message, header},
 };
 
-/// One raster where the mask depends on one scan alone; two (this scan, then the scan before, each as this pair's
-/// mask leaves it) where the mask looked at both. Then the scan's points. Each part starts at a whole block.
+/// The payload is one raster if the mask takes one scan, or two (this scan and the previous one, both masked for this pair) if
+/// it takes both; then the scan's points. Each part starts at a whole block.
 #[derive(Debug)]
 pub enum Masked {}
 
 impl Message for Masked {
     const TOPIC: &'static str = "masked";
-    // Both halves of the search, and refinement.
+    // Rotation search, translation search and refinement.
     const READERS: usize = 3;
     const HISTORY: History = History::Stream;
     type Header = MaskedHeader;
@@ -34,45 +36,45 @@ header!(MaskedHeader);
 pub mod mask_kind {
     /// No mask.
     pub const NONE: u32 = 0;
-    /// Power below a threshold counts as nothing.
+    /// Power up to a threshold is set to zero.
     pub const THRESHOLD: u32 = 1;
-    /// A network weighed each cell above the threshold.
+    /// A network weights each cell above the threshold.
     pub const LEARNED: u32 = 2;
 }
 
-/// A raster's geometry and how it was made.
+/// The geometry of a raster and the processing that led to it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
 #[type_name("gyre_masked_header_v3")]
 pub struct MaskedHeader {
-    /// Which scan this is.
+    /// The scan.
     pub item: Item,
-    /// Cells a side. Row 0 is far ahead, column 0 far left, the sensor in the middle.
+    /// Cells per side. Row 0 is far ahead, column 0 far left, the sensor is in the middle.
     pub n: u32,
     /// Rasters in the payload: 1 or 2.
     pub rasters: u32,
-    /// Metres a cell.
+    /// Size of a cell, m.
     pub cell_m: f32,
-    /// How it was masked: see [`mask_kind`].
+    /// The mask: see [`mask_kind`].
     pub mask: u32,
-    /// The velocity used for motion compensation: x, y (m/s), yaw (rad/s); zero where there was none.
+    /// The velocity used for motion compensation: x, y (m/s), yaw rate (rad/s); zero without compensation.
     pub twist: [f32; 3],
-    /// 1 where the sweep was motion-compensated.
+    /// 1 if the scan is motion-compensated.
     pub compensated: u32,
-    /// Points behind the rasters, see [`MaskedHeader::points`].
+    /// Number of points after the rasters: see [`MaskedHeader::points`].
     pub points: u32,
     /// Unused, zero.
     pub reserved: u32,
 }
 
-/// The parts of a payload to fill: see [`MaskedHeader::split`].
+/// The parts of a payload, to fill in: see [`MaskedHeader::split`].
 #[derive(Debug)]
 pub struct MaskedParts<'a> {
-    /// For this scan's raster, n x n.
+    /// The raster of this scan, n x n.
     pub later: ArrayViewMut2<'a, f32>,
-    /// For the raster of the scan before, n x n, where the mask looks at two scans.
+    /// The raster of the previous scan, n x n, if the mask takes two scans.
     pub earlier: Option<ArrayViewMut2<'a, f32>>,
-    /// For the scan's points.
+    /// The scan's points.
     pub points: &'a mut [SparsePoint],
 }
 
@@ -81,20 +83,20 @@ pub struct MaskedParts<'a> {
 pub struct Pair<'a> {
     /// The raster of this scan.
     pub later: ArrayView2<'a, f32>,
-    /// The raster of the scan before; `None` where the chain of motions starts.
+    /// The raster of the previous scan; `None` where the chain of motions starts.
     pub earlier: Option<ArrayView2<'a, f32>>,
-    /// Whether the mask looked at both scans, so that the earlier raster is another one than in the pair before.
+    /// True if the mask took both scans: the earlier raster then differs from the later one of the previous pair.
     pub earlier_changed: bool,
 }
 
 impl MaskedHeader {
-    /// Values of one raster, rounded up to whole blocks.
+    /// Returns the number of values of one raster, rounded up to whole blocks.
     fn raster_values(n: usize) -> Option<usize> {
         let cells = n.checked_mul(n)?;
         Some(FloatBlock::count(cells) * FloatBlock::LEN)
     }
 
-    /// Divides a payload into its parts, for `rasters` (1 or 2) of n x n cells. `None` where it is too short.
+    /// Splits a payload into its parts, with `rasters` (1 or 2) of n x n cells. `None` if it is too short.
     pub fn split(values: &mut [f32], n: usize, rasters: usize) -> Option<MaskedParts<'_>> {
         let raster = Self::raster_values(n)?;
         let (later, rest) = values.split_at_mut_checked(raster)?;
@@ -118,7 +120,7 @@ impl MaskedHeader {
         })
     }
 
-    /// Raster `index` of a payload, n x n. `None` where the payload is shorter than the header says.
+    /// Returns raster `index` of a payload, n x n; `None` if the payload is shorter than the header says.
     fn raster<'a>(&self, values: &'a [f32], index: usize) -> Option<ArrayView2<'a, f32>> {
         let n = self.n as usize;
         let first = index.checked_mul(Self::raster_values(n)?)?;
@@ -126,7 +128,7 @@ impl MaskedHeader {
         ArrayView2::from_shape((n, n), cells).ok()
     }
 
-    /// The scan's points. `None` where the payload is shorter than the header says.
+    /// Returns the scan's points; `None` if the payload is shorter than the header says.
     pub fn points<'a>(&self, values: &'a [f32]) -> Option<&'a [SparsePoint]> {
         let first = (self.rasters as usize).checked_mul(Self::raster_values(self.n as usize)?)?;
         let floats = size_of::<SparsePoint>() / size_of::<f32>();
@@ -134,15 +136,15 @@ impl MaskedHeader {
         Some(bytemuck::cast_slice(values.get(first..)?.get(..count)?))
     }
 
-    /// The rasters to match: this scan's, and that of the scan before, which is the second one here where the mask
-    /// looked at both, else the first one there. `None` where a payload is shorter than its header says.
+    /// Returns the rasters to match. The earlier one is the second raster of this payload if the mask took both scans, else the
+    /// first raster of the previous message. `None` if a payload is shorter than its header says.
     pub fn pair<'a>(
         &self,
         values: &'a [f32],
-        before: Option<(&Self, &'a [f32])>,
+        previous: Option<(&Self, &'a [f32])>,
     ) -> Option<Pair<'a>> {
         let earlier_changed = self.rasters == 2;
-        let earlier = match before {
+        let earlier = match previous {
             None => None,
             Some(_) if earlier_changed => Some(self.raster(values, 1)?),
             Some((header, values)) if header.n == self.n => Some(header.raster(values, 0)?),
@@ -162,7 +164,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_earlier_raster_is_that_of_the_scan_before_unless_the_mask_looked_at_both() {
+    fn the_earlier_raster_is_of_the_previous_message_unless_the_mask_took_both_scans() {
         let one = MaskedHeader {
             n: 3,
             rasters: 1,
@@ -184,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_written_into_the_parts_is_read_back() {
+    fn parts_that_were_written_are_read_back() {
         for rasters in [1, 2] {
             let mut values = vec![0.0_f32; (rasters + 1) * 16];
             let mut parts = MaskedHeader::split(&mut values, 3, rasters).unwrap();

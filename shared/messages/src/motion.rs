@@ -1,4 +1,4 @@
-//! `motion`: how the vehicle moved between two scans.
+//! `motion`: the motion of the vehicle between two scans.
 
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{Pose, Twist, UncertainMotion, covariance, pose, xy_yaw};
@@ -6,11 +6,15 @@ use gyre_scan_matching::{MotionMatch, Refined};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
-    FloatBlock, Item, Message, RefinementRecord, RotationEstimate,
-    topic::{History, header},
+    block::FloatBlock,
+    item::Item,
+    limits::History,
+    message::{Message, header},
+    refinement::RefinementRecord,
+    rotation::RotationEstimate,
 };
 
-/// The motion from the scan before to this one.
+/// The motion from the previous scan to this one.
 #[derive(Debug)]
 pub enum Motion {}
 
@@ -24,7 +28,7 @@ impl Message for Motion {
 }
 header!(MotionHeader);
 
-/// The pose of this scan's frame in the frame of the scan before, with its covariance.
+/// The pose of this scan's frame in the previous scan's frame, with its covariance.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[type_name("gyre_motion_estimate_v2")]
@@ -39,20 +43,19 @@ pub struct MotionEstimate {
     pub covariance: covariance::Packed,
     /// Time between the two scans, ns on the sensor's clock.
     pub interval_ns: i64,
-    /// Height of the translation's peak, at most 1.
+    /// Height of the correlation peak of the translation, at most 1.
     pub score: f64,
-    /// Height of the next best peak.
+    /// Height of the second highest peak.
     pub runner_up_score: f64,
     /// The rotation that the translation was searched with.
     pub rotation: RotationEstimate,
-    /// The motion as the search found it: x, y (m), yaw (rad). Motion compensation uses it, so it is the same on every
-    /// topic.
+    /// The searched motion: x, y (m), yaw (rad). It is the same on every topic, because motion compensation uses it.
     pub searched: [f64; 3],
-    /// How the refinement changed that.
+    /// The result of the refinement.
     pub refinement: RefinementRecord,
 }
 
-/// A motion as the search found it: the same whether masking reads it from `motion` or, refined, from `pose`.
+/// The searched motion. It is the same whether masking reads it from `motion` or from `pose` after refinement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SearchedMotion {
     /// The motion.
@@ -62,14 +65,14 @@ pub struct SearchedMotion {
 }
 
 impl SearchedMotion {
-    /// The constant velocity that makes this motion.
+    /// Returns the constant velocity of this motion.
     pub fn twist(&self) -> Twist {
         Twist::from_motion(&self.motion, self.interval_ns as f64 * 1e-9)
     }
 }
 
 impl MotionEstimate {
-    /// The motion that a search found over `interval_ns`, with the rotation that it was searched with.
+    /// Creates a motion from the result of a search, with the rotation that it was searched with.
     pub fn from_search(found: &MotionMatch, rotation: RotationEstimate, interval_ns: i64) -> Self {
         Self {
             x_m: found.x_m,
@@ -85,7 +88,7 @@ impl MotionEstimate {
         }
     }
 
-    /// The motion after refinement. The result of the search stays beside it.
+    /// Returns the motion after refinement. The searched motion stays beside it.
     #[must_use]
     pub fn refined(&self, refined: &Refined) -> Self {
         let [x_m, y_m, yaw_rad] = xy_yaw(&refined.motion.motion);
@@ -99,7 +102,7 @@ impl MotionEstimate {
         }
     }
 
-    /// The motion with its covariance.
+    /// Returns the motion with its covariance.
     pub fn motion(&self) -> UncertainMotion {
         UncertainMotion {
             motion: pose(self.x_m, self.y_m, self.yaw_rad),
@@ -107,7 +110,7 @@ impl MotionEstimate {
         }
     }
 
-    /// The motion as the search found it.
+    /// Returns the searched motion.
     pub fn searched(&self) -> SearchedMotion {
         let [x_m, y_m, yaw_rad] = self.searched;
         SearchedMotion {
@@ -117,13 +120,13 @@ impl MotionEstimate {
     }
 }
 
-/// See [`MotionEstimate`].
+/// The header of `motion` and `refined`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
 #[type_name("gyre_motion_header_v3")]
 pub struct MotionHeader {
-    /// Which scan this is.
+    /// The scan.
     pub item: Item,
-    /// All zero where the chain starts.
+    /// The motion; all zero where the chain starts.
     pub motion: MotionEstimate,
 }

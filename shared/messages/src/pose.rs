@@ -1,15 +1,18 @@
-//! `pose`: where the vehicle is, and the credit that lets a new scan in.
+//! `pose`: the pose of the vehicle, which is also the credit that admits a new scan.
 
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{UncertainMotion, covariance, pose};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
-    FloatBlock, Item, Message, MotionEstimate,
-    topic::{History, header},
+    block::FloatBlock,
+    item::Item,
+    limits::History,
+    message::{Message, header},
+    motion::MotionEstimate,
 };
 
-/// The trajectory's newest pose. Its `seq` is the credit that admits scan `seq + W`.
+/// The newest pose of the trajectory. Pose `seq` is the credit that admits scan `seq + W`.
 #[derive(Debug)]
 pub enum Pose {}
 
@@ -28,9 +31,9 @@ header!(PoseHeader);
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
 #[type_name("gyre_pose_header_v3")]
 pub struct PoseHeader {
-    /// Which scan this is.
+    /// The scan.
     pub item: Item,
-    /// The motion from the scan before.
+    /// The motion from the previous scan.
     pub motion: MotionEstimate,
     /// Forward, m.
     pub x_m: f64,
@@ -40,12 +43,12 @@ pub struct PoseHeader {
     pub yaw_rad: f64,
     /// Covariance of (x, y, yaw) in the frame of the first scan: see [`covariance::Packed`].
     pub covariance: covariance::Packed,
-    /// Counts corrections of the whole trajectory (loop closing); 0 as long as poses are motions composed.
+    /// Number of corrections of the whole trajectory (loop closures); always 0 while poses are only composed motions.
     pub trajectory_version: u64,
 }
 
 impl PoseHeader {
-    /// The pose with its covariance.
+    /// Returns the pose with its covariance.
     pub fn pose(&self) -> UncertainMotion {
         UncertainMotion {
             motion: pose(self.x_m, self.y_m, self.yaw_rad),

@@ -1,15 +1,17 @@
-//! `rotation`: by how much the vehicle turned between two scans.
+//! `rotation`: the rotation of the vehicle between two scans.
 
 use bytemuck::{Pod, Zeroable};
 use gyre_scan_matching::RotationMatch;
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
-    FloatBlock, Item, Message,
-    topic::{History, header},
+    block::FloatBlock,
+    item::Item,
+    limits::History,
+    message::{Message, header},
 };
 
-/// The rotation of this scan against the one before.
+/// The rotation from the previous scan to this one.
 #[derive(Debug)]
 pub enum Rotation {}
 
@@ -27,15 +29,15 @@ header!(RotationHeader);
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[type_name("gyre_rotation_estimate_v1")]
 pub struct RotationEstimate {
-    /// Yaw of this scan's frame in the frame of the scan before, rad, counter-clockwise.
+    /// Yaw of this scan's frame in the previous scan's frame, rad, counter-clockwise.
     pub angle_rad: f64,
-    /// Its variance, rad^2, from the shape of the peak.
+    /// Variance from the shape of the peak, rad^2.
     pub variance_rad2: f64,
-    /// Height of the peak, at most 1.
+    /// Height of the correlation peak, at most 1.
     pub score: f64,
-    /// The next best angle, rad.
+    /// Angle of the second highest peak, rad.
     pub runner_up_rad: f64,
-    /// Its height.
+    /// Height of the second highest peak.
     pub runner_up_score: f64,
 }
 
@@ -53,7 +55,7 @@ impl From<&RotationMatch> for RotationEstimate {
 }
 
 impl From<RotationEstimate> for RotationMatch {
-    /// The runner-up is left out: no search needs it.
+    /// Converts without the runner-up, which no search needs.
     fn from(rotation: RotationEstimate) -> Self {
         Self {
             angle_rad: rotation.angle_rad,
@@ -64,13 +66,13 @@ impl From<RotationEstimate> for RotationMatch {
     }
 }
 
-/// See [`RotationEstimate`].
+/// The header of `rotation`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
 #[type_name("gyre_rotation_header_v3")]
 pub struct RotationHeader {
-    /// Which scan this is.
+    /// The scan.
     pub item: Item,
-    /// All zero where the chain starts.
+    /// The rotation; all zero where the chain starts.
     pub rotation: RotationEstimate,
 }

@@ -1,15 +1,17 @@
-//! `scan`: one sweep as the sensor gave it.
+//! `scan`: one polar scan as measured by the sensor.
 
 use bytemuck::Zeroable;
 use gyre_radar::{MAX_AZIMUTHS, PolarScan, ScanSlot, Sense, SweepGeometry};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
-    ByteBlock, Item, Limits, Message, TopicSizes, Window,
-    topic::{History, header},
+    block::ByteBlock,
+    item::Item,
+    limits::{History, Limits, TopicSizes, Window},
+    message::{Message, header},
 };
 
-/// A sweep: the power of azimuth `a` at range bin `b` is byte `first_byte + a * stride + b` of the payload.
+/// A polar scan: the power of azimuth `a` at range bin `b` is byte `first_byte + a * stride + b` of the payload.
 #[derive(Debug)]
 pub enum Scan {}
 
@@ -24,7 +26,7 @@ impl Message for Scan {
         ByteBlock::count(limits.scan_bytes)
     }
 
-    /// In live mode the source keeps what comes while masking is restarted.
+    /// In live mode the history holds the scans that are published while masking restarts.
     fn sizes(window: &Window) -> TopicSizes {
         let sizes = window.queues(Self::HISTORY, Self::READERS);
         if window.live_depth == 0 {
@@ -41,34 +43,34 @@ impl Message for Scan {
 }
 header!(ScanHeader);
 
-/// A sweep's geometry and the angle and time of each azimuth, as measured.
+/// The geometry of a scan, and the measured angle and time of each azimuth.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Zeroable, ZeroCopySend)]
 #[type_name("gyre_scan_header_v3")]
 pub struct ScanHeader {
-    /// Which scan this is.
+    /// The scan.
     pub item: Item,
-    /// Rows.
+    /// Number of rows.
     pub azimuths: u32,
-    /// Range bins of a row.
+    /// Range bins per row.
     pub bins: u32,
-    /// Bytes from one row's first bin to the next row's.
+    /// Bytes from the first bin of a row to that of the next row.
     pub stride: u32,
-    /// The first row's first bin.
+    /// Position of the first bin of the first row.
     pub first_byte: u32,
-    /// Metres a range bin.
+    /// Size of a range bin, m.
     pub range_resolution_m: f32,
-    /// Bin `b`'s centre is at `(b + 0.5) * range_resolution_m + range_offset_m`.
+    /// Offset of ranges, m: the centre of bin `b` is at `(b + 0.5) * range_resolution_m + range_offset_m`.
     pub range_offset_m: f32,
-    /// 1 where azimuths grow clockwise seen from above, else 0.
+    /// 1 if azimuths grow clockwise seen from above, else 0.
     pub clockwise: u32,
-    /// Metres to add to a range for each m/s of approach, 0 where it is unknown: see [`SweepGeometry::doppler_s`].
+    /// Metres to add to a range for each m/s of approach; 0 if unknown: see [`SweepGeometry::doppler_s`].
     pub doppler_s: f32,
     /// Time of each row, ns since 1970.
     pub azimuth_stamp_ns: [i64; MAX_AZIMUTHS],
-    /// Angle of each row from straight ahead, radians in [0, 2 pi).
+    /// Angle of each row from straight ahead, rad in [0, 2 pi).
     pub azimuth_rad: [f32; MAX_AZIMUTHS],
-    /// What is known of each row: see `gyre_radar::scan::flag`.
+    /// Flags of each row: see `gyre_radar::scan::flag`.
     pub azimuth_flags: [u8; MAX_AZIMUTHS],
 }
 
@@ -79,7 +81,7 @@ impl Default for ScanHeader {
 }
 
 impl ScanHeader {
-    /// The scan in this header and its payload's bytes; `None` where they do not fit each other.
+    /// Returns a view of the scan in this header and its payload; `None` if the payload is shorter than the header says.
     pub fn view<'a>(&'a self, bytes: &'a [u8]) -> Option<PolarScan<'a>> {
         let geometry = self.geometry();
         let last_byte = geometry.first_byte.checked_add(
@@ -98,7 +100,7 @@ impl ScanHeader {
         })
     }
 
-    /// Where a reader of files puts a scan: this header's tables and the payload's bytes.
+    /// Returns the buffers that a dataset reader fills: the tables of this header and the bytes of the payload.
     pub fn slot<'a>(&'a mut self, bytes: &'a mut [u8]) -> ScanSlot<'a> {
         ScanSlot {
             bytes,
@@ -108,7 +110,7 @@ impl ScanHeader {
         }
     }
 
-    /// Notes what the reader said of the scan that it put into the slot.
+    /// Stores the geometry of the scan that a dataset reader put into the slot.
     pub fn set_geometry(&mut self, geometry: &SweepGeometry) {
         self.azimuths = geometry.azimuths as u32;
         self.bins = geometry.bins as u32;
@@ -145,7 +147,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_header_that_promises_more_than_its_payload_is_refused() {
+    fn a_header_that_describes_more_than_its_payload_is_rejected() {
         let mut header = ScanHeader {
             azimuths: 4,
             bins: 10,

@@ -1,0 +1,58 @@
+//! The contract of a message type: its topic, its header, the elements of its payload and the sizes of its queues.
+
+use std::fmt::Debug;
+
+use bytemuck::Pod;
+use iceoryx2::prelude::ZeroCopySend;
+
+use crate::{
+    item::Item,
+    limits::{History, Limits, TopicSizes, Window},
+};
+
+/// A fixed header that starts with an [`Item`].
+pub trait Header: ZeroCopySend + Default + Debug + 'static {
+    /// The scan that the message is about.
+    fn item(&self) -> &Item;
+    /// The same, to fill in.
+    fn item_mut(&mut self) -> &mut Item;
+}
+
+/// A message type.
+pub trait Message: 'static {
+    /// The name of the topic.
+    const TOPIC: &'static str;
+    /// Number of processes that subscribe to the topic.
+    const READERS: usize;
+    /// How far back the publisher's history reaches.
+    const HISTORY: History;
+    /// The header of each message.
+    type Header: Header;
+    /// The element that the payload is a slice of.
+    type Element: ZeroCopySend + Pod + Debug;
+
+    /// The longest payload, in elements. A topic without a payload still has one element.
+    fn max_elements(_limits: &Limits) -> usize {
+        1
+    }
+
+    /// The sizes of the topic's queues.
+    fn sizes(window: &Window) -> TopicSizes {
+        window.queues(Self::HISTORY, Self::READERS)
+    }
+}
+
+/// Implements [`Header`] for a type with a field `item`.
+macro_rules! header {
+    ($header:ty) => {
+        impl $crate::message::Header for $header {
+            fn item(&self) -> &$crate::item::Item {
+                &self.item
+            }
+            fn item_mut(&mut self) -> &mut $crate::item::Item {
+                &mut self.item
+            }
+        }
+    };
+}
+pub(crate) use header;

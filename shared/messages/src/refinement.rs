@@ -1,0 +1,63 @@
+//! The record of a refinement in the messages that carry a motion.
+
+use bytemuck::{Pod, Zeroable};
+use gyre_scan_matching::{InitialGuess, Outcome};
+use iceoryx2::prelude::ZeroCopySend;
+
+/// Values of [`RefinementRecord::outcome`].
+pub mod outcome {
+    /// The searched motion: there is no refinement, or the chain starts here.
+    pub const SEARCHED: u32 = 0;
+    /// Refined.
+    pub const REFINED: u32 = 1;
+    /// Refined with little support: the motion is used, but the scan does not enter the map.
+    pub const WEAK: u32 = 2;
+    /// No match: the motion is predicted from previous motions.
+    pub const PREDICTED: u32 = 3;
+}
+
+/// Values of [`RefinementRecord::initial_guess`].
+pub mod initial_guess {
+    /// There was no refinement.
+    pub const NONE: u32 = 0;
+    /// The prediction at constant velocity.
+    pub const PREDICTION: u32 = 1;
+    /// The searched motion.
+    pub const SEARCH: u32 = 2;
+    /// The prediction with a yaw offset, tried when no other guess matched.
+    pub const YAW_OFFSET: u32 = 3;
+}
+
+/// The result of a refinement; all zero without one.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
+#[type_name("gyre_refinement_v1")]
+pub struct RefinementRecord {
+    /// The outcome: see [`outcome`].
+    pub outcome: u32,
+    /// The initial guess of the accepted motion: see [`initial_guess`].
+    pub initial_guess: u32,
+    /// Mean value of the map at the scan's points, from 0 to 1; 1 if every keyframe has returns at all of them.
+    pub overlap: f64,
+    /// Weight of the scan's points relative to the running mean.
+    pub support: f64,
+}
+
+impl From<&gyre_scan_matching::Refined> for RefinementRecord {
+    fn from(refined: &gyre_scan_matching::Refined) -> Self {
+        Self {
+            outcome: match refined.outcome {
+                Outcome::Refined => outcome::REFINED,
+                Outcome::Weak => outcome::WEAK,
+                Outcome::Predicted => outcome::PREDICTED,
+            },
+            initial_guess: match refined.guess {
+                InitialGuess::Prediction => initial_guess::PREDICTION,
+                InitialGuess::Search => initial_guess::SEARCH,
+                InitialGuess::YawOffset => initial_guess::YAW_OFFSET,
+            },
+            overlap: refined.overlap,
+            support: refined.support,
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! All topics, and the shared memory that they need.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use crate::{
+    limits::{Limits, TopicSizes, Window},
+    masked::Masked,
+    message::Message,
+    motion::Motion,
+    pose::Pose,
+    refined::Refined,
+    rotation::Rotation,
+    scan::Scan,
+};
+
+/// Bytes that the transport puts before each sample, rounded up.
+const SAMPLE_OVERHEAD: usize = 192;
+
+/// The properties of a topic that do not depend on its types.
+#[derive(Clone, Copy, Debug)]
+pub struct Topic {
+    /// The name of the topic.
+    pub name: &'static str,
+    /// The sizes of its queues.
+    pub sizes: fn(&Window) -> TopicSizes,
+    /// Bytes of its largest sample in shared memory.
+    pub max_sample_bytes: fn(&Limits) -> usize,
+}
+
+impl Topic {
+    const fn of<M: Message>() -> Self {
+        Self {
+            name: M::TOPIC,
+            sizes: M::sizes,
+            max_sample_bytes: max_sample_bytes::<M>,
+        }
+    }
+}
+
+/// All topics, in the order of the stream.
+pub const TOPICS: [Topic; 6] = [
+    Topic::of::<Scan>(),
+    Topic::of::<Masked>(),
+    Topic::of::<Rotation>(),
+    Topic::of::<Motion>(),
+    Topic::of::<Refined>(),
+    Topic::of::<Pose>(),
+];
+
+fn max_sample_bytes<M: Message>(limits: &Limits) -> usize {
+    SAMPLE_OVERHEAD + size_of::<M::Header>() + M::max_elements(limits) * size_of::<M::Element>()
+}
+
+/// The shared memory that a run needs.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Footprint {
+    /// Bytes of each topic's segment when all of it is in use, by topic.
+    pub segments: Vec<(&'static str, usize)>,
+}
+
+impl Footprint {
+    /// The footprint of a window and its largest messages.
+    pub fn new(window: &Window, limits: &Limits) -> Self {
+        let segments = TOPICS.map(|topic| {
+            let samples = (topic.sizes)(window).samples();
+            (topic.name, samples * (topic.max_sample_bytes)(limits))
+        });
+        Self {
+            segments: segments.to_vec(),
+        }
+    }
+
+    /// Bytes of all segments.
+    pub fn total(&self) -> usize {
+        self.segments.iter().map(|(_, bytes)| bytes).sum()
+    }
+}
+
+impl fmt::Display for Footprint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let total_mb = self.total() as f64 / 1e6;
+        write!(f, "{total_mb:.1} MB of shared memory at most (")?;
+        for (i, (topic, bytes)) in self.segments.iter().enumerate() {
+            let separator = if i == 0 { "" } else { ", " };
+            write!(f, "{separator}{topic} {:.1}", *bytes as f64 / 1e6)?;
+        }
+        write!(f, ")")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WINDOW: Window = Window {
+        scans: 4,
+        lag: 2,
+        look_back: 1,
+        live_depth: 0,
+    };
+
+    #[test]
+    fn queues_hold_the_history_and_one_window_more() {
+        let scan = Scan::sizes(&WINDOW);
+        assert_eq!((scan.history, scan.buffer, scan.samples()), (5, 9, 18));
+        assert_eq!(Masked::sizes(&WINDOW).samples(), 42);
+        let pose = Pose::sizes(&WINDOW);
+        assert_eq!((pose.history, pose.buffer), (12, 16));
+    }
+
+    #[test]
+    fn the_footprint_of_oxford_at_255_equals_the_measured_one() {
+        let limits = Limits {
+            scan_bytes: 400 * 3779,
+            raster_cells: 255 * 255,
+            rasters: 2,
+            points: 0,
+        };
+        let total = Footprint::new(&WINDOW, &limits).total();
+        // Measured: 42.9 MB with two readers of `masked`. The third reader adds twelve rasters of 0.52 MB.
+        assert!((48_000_000..52_000_000).contains(&total), "{total}");
+    }
+}
