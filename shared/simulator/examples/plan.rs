@@ -1,4 +1,4 @@
-//! Draws streets, drive and moments of traffic: `cargo run --release -p gyre-simulator --example plan -- OUT.svg [TRAJECTORY|town|campus|block [SEED [left|right]]]`.
+//! Draws the streets, the drive and the traffic at some times: `cargo run --release -p gyre-simulator --example plan -- OUT.svg [TRAJECTORY|town|campus|block [SEED [left|right]]]`.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -65,7 +65,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Adds the vehicle and all that moves around it at a time: a dot for each scatterer, a line for each second of way.
+/// Adds the ego vehicle and the traffic at a time: a dot for each scatterer, a line for one second of motion.
 fn add_moment(
     svg: &mut String,
     traffic: &Traffic,

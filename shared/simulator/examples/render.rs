@@ -1,6 +1,6 @@
-//! Times rendering alone: `cargo run --release -p gyre-simulator --example render -- [CONFIG [SCANS]]`.
+//! Times the rendering of scans: `cargo run --release -p gyre-simulator --example render -- [CONFIG [SCANS]]`.
 //!
-//! CONFIG has the keys of the section `[simulation]` at its top.
+//! CONFIG has the keys of the section `[simulation]` at its top level.
 
 use std::time::Instant;
 

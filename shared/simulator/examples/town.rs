@@ -1,6 +1,6 @@
-//! Draws a town around a place of a drive: `cargo run --release -p gyre-simulator --example town -- OUT.svg [TRAJECTORY|- [CHARACTER [AT_S [SEED]]]]`.
+//! Draws the town around a place of a drive: `cargo run --release -p gyre-simulator --example town -- OUT.svg [TRAJECTORY|- [CHARACTER [AT_S [SEED]]]]`.
 //!
-//! Walls are lines (what they let through is pale), scatterers dots whose area grows with their cross-section.
+//! Walls are lines (pale where they transmit), scatterers dots whose area grows with their cross-section.
 
 use std::fmt::Write as _;
 
@@ -9,7 +9,7 @@ use gyre_simulator::town::{self, Character, TownConfig};
 use gyre_simulator::{BlockLoop, Body, DrivingSide, Path, Streets};
 use nalgebra::Point2;
 
-/// Metres that are drawn to each side of the place.
+/// Half of the drawing's side, metres.
 const REACH_M: f64 = 165.0;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

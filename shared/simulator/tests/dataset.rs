@@ -1,4 +1,5 @@
-//! A generated dataset: repeatable, in Oxford's conventions, and readable by the reader for real data.
+//! A dataset in Oxford's format: reproducible, in its conventions, and readable by the reader for real
+//! data.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -34,7 +35,7 @@ fn same_configuration_writes_the_same_bytes() {
 }
 
 #[test]
-fn another_seed_measures_another_town() {
+fn another_seed_gives_another_town() {
     let simulator = |seed| Simulator::new(&SimulationConfig { seed, ..config(1) }).unwrap();
     assert_ne!(
         simulator(1).render_scan(0).scan.bytes,
@@ -71,7 +72,7 @@ fn progress_counts_every_scan_once() {
 }
 
 #[test]
-fn stamps_and_encoder_grow_evenly_through_scan_and_dataset() {
+fn stamps_and_encoder_increase_evenly_through_scan_and_dataset() {
     let simulator = Simulator::new(&config(2)).unwrap();
     let mut last_stamp = i64::MIN;
     for index in 0..2 {
@@ -82,7 +83,7 @@ fn stamps_and_encoder_grow_evenly_through_scan_and_dataset() {
             let encoder = u16::from_le_bytes([row[8], row[9]]);
             assert!(stamp > last_stamp);
             assert_eq!(usize::from(encoder), 13 + 14 * azimuth);
-            // What was lost says so.
+            // Lost azimuths are marked.
             assert_eq!(row[10] == 255, scan.flags[azimuth] == flag::MEASURED);
             assert_eq!(scan.stamp_ns[azimuth], stamp * 1000);
             last_stamp = stamp;
@@ -91,7 +92,7 @@ fn stamps_and_encoder_grow_evenly_through_scan_and_dataset() {
 }
 
 #[test]
-fn reader_for_real_data_reads_what_was_rendered() {
+fn reader_for_real_data_reads_the_rendered_scan() {
     let folder = generate(&config(2));
     let simulator = Simulator::new(&config(2)).unwrap();
     let mut dataset = gyre_radar::open(folder.path(), &DatasetOptions::default()).unwrap();
@@ -112,7 +113,8 @@ fn reader_for_real_data_reads_what_was_rendered() {
         for azimuth in 0..400 {
             assert_eq!(read.row(azimuth), rendered.row(azimuth));
             assert!((read.azimuth_rad[azimuth] - rendered.azimuth_rad[azimuth]).abs() < 1e-5);
-            // The reader spreads stamps along the sweep, which ours are already, to the microsecond.
+            // The reader interpolates stamps along the sweep; the simulated ones are even, to the
+            // microsecond.
             assert!((read.stamp_ns[azimuth] - rendered.stamp_ns[azimuth]).abs() < 2_000);
         }
     }
@@ -190,25 +192,25 @@ fn csv_names_images_by_sweep_start_and_motions_by_sweep_middle() {
 }
 
 #[test]
-fn folder_with_scans_of_another_drive_is_refused() {
+fn folder_with_scans_of_another_drive_is_rejected() {
     let folder = generate(&config(3));
-    let refused = write_dataset(&config(2), folder.path(), &mut |_, _| {});
+    let error = write_dataset(&config(2), folder.path(), &mut |_, _| {});
     assert!(
-        matches!(refused, Err(SimulatorError::OutputInUse { .. })),
-        "{refused:?}"
+        matches!(error, Err(SimulatorError::OutputInUse { .. })),
+        "{error:?}"
     );
     write_dataset(&config(3), folder.path(), &mut |_, _| {}).expect("the same drive again");
 }
 
 #[test]
-fn impossible_configuration_names_its_key() {
-    let refused = |config: SimulationConfig| Simulator::new(&config).err().unwrap().to_string();
-    assert!(refused(config(0)).contains("`scans`"));
+fn invalid_configuration_names_its_key() {
+    let error = |config: SimulationConfig| Simulator::new(&config).err().unwrap().to_string();
+    assert!(error(config(0)).contains("`scans`"));
     let drive = gyre_simulator::drive::DriveConfig {
         speed_mps: f64::NAN,
         ..Default::default()
     };
-    assert!(refused(SimulationConfig { drive, ..config(1) }).contains("speed_mps`"));
+    assert!(error(SimulationConfig { drive, ..config(1) }).contains("speed_mps`"));
     let unknown = toml::from_str::<SimulationConfig>("scanz = 3")
         .unwrap_err()
         .to_string();

@@ -1,4 +1,4 @@
-//! Real trajectories as drives: how close they pass, and that a car could have driven them.
+//! Paths along real trajectories: distance from the poses, and limits of vehicle dynamics.
 #![allow(clippy::unwrap_used)]
 
 use std::path::PathBuf;
@@ -22,7 +22,7 @@ fn real_files() -> Vec<PathBuf> {
     .to_vec()
 }
 
-/// Sorted magnitudes of a quantity over the drive; its n-th derivative by differences 50 ms apart.
+/// Sorted magnitudes of the n-th derivative of a quantity along the drive, by differences over 50 ms.
 fn derivative(drive: &dyn Path, order: usize, of: &dyn Fn(f64) -> [f64; 2]) -> Vec<f64> {
     let step = 0.05;
     let mut values: Vec<[f64; 2]> = (0..(drive.duration_s() / step) as usize)
@@ -40,7 +40,7 @@ fn derivative(drive: &dyn Path, order: usize, of: &dyn Fn(f64) -> [f64; 2]) -> V
 }
 
 #[test]
-fn real_drives_pass_near_their_poses() {
+fn real_drives_stay_close_to_their_poses() {
     for path in real_files() {
         let started = Instant::now();
         let drive = read(&path, Excerpt::default()).unwrap();
@@ -77,7 +77,7 @@ fn real_drives_pass_near_their_poses() {
 }
 
 #[test]
-fn real_drives_are_what_a_car_does() {
+fn real_drives_respect_the_limits_of_a_car() {
     for path in real_files() {
         let drive = read(&path, Excerpt::default()).unwrap();
         let velocity = |time: f64| drive.velocity(time).into();
@@ -138,15 +138,15 @@ fn excerpt_starts_at_the_origin_and_stands_before_and_after() {
 }
 
 #[test]
-fn files_that_cannot_be_driven_are_refused_by_name() {
+fn files_that_cannot_be_driven_are_rejected_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let rotated = folder.path().join("rotated.tum");
     let line = |i: u32| format!("{}.0 0 {} 0 0 0 0 1\n", 1_600_000_000 + i, 5 * i);
     std::fs::write(&rotated, (0..50).map(line).collect::<String>()).unwrap();
-    let refused = read(&rotated, Excerpt::default()).unwrap_err().to_string();
+    let error = read(&rotated, Excerpt::default()).unwrap_err().to_string();
     assert!(
-        refused.contains("rotated.tum") && refused.contains("0 % of its length"),
-        "{refused}"
+        error.contains("rotated.tum") && error.contains("0 % of its length"),
+        "{error}"
     );
     let beyond = read(
         &rotated,
@@ -164,10 +164,10 @@ fn files_that_cannot_be_driven_are_refused_by_name() {
         "1600000000.0 0 0 0 0 0 0 1\n1600000001.0 5e5 0 0 0 0 0 1\n",
     )
     .unwrap();
-    let refused = read(&jumping, Excerpt::default()).unwrap_err().to_string();
+    let error = read(&jumping, Excerpt::default()).unwrap_err().to_string();
     assert!(
-        refused.contains("jumps by 500000.0 m within 1.000 s"),
-        "{refused}"
+        error.contains("jumps by 500000.0 m within 1.000 s"),
+        "{error}"
     );
     let missing = read(std::path::Path::new("nowhere.csv"), Excerpt::default())
         .unwrap_err()

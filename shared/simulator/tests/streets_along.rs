@@ -1,4 +1,4 @@
-//! Streets laid along drives: each once, wide enough, with side streets that leave room.
+//! Streets laid along drives: each once, wide enough, with side streets that keep their distance.
 #![allow(clippy::unwrap_used)]
 
 use std::f64::consts::PI;
@@ -12,7 +12,8 @@ use gyre_simulator::path::recorded::{Excerpt, read};
 use gyre_simulator::{BlockLoop, Path, Streets};
 use nalgebra::{Point2, Vector2};
 
-/// Largest clearance of the vehicle's middle along a drive: below -1.2 m the carriageways hold it everywhere.
+/// Maximum clearance of the vehicle's centre along a drive: below -1.2 m it is on the carriageway
+/// everywhere.
 fn worst_clearance(drive: &dyn Path, duration_s: f64, streets: &Streets) -> f64 {
     let place = |i: usize| Point2::from(drive.pose(i as f64 * 0.1).translation.vector);
     (0..(duration_s * 10.0) as usize)
@@ -29,7 +30,7 @@ fn length_m(streets: &Streets, driven: bool) -> f64 {
         .sum()
 }
 
-/// A drive along points at walking pace, looking from each to the next.
+/// A drive along points at walking pace, heading from each to the next.
 fn along_points(points: &[(f64, f64)], reversing: &[bool]) -> SplinePath {
     let mut poses = Vec::new();
     let mut time_s = 0.0;
@@ -38,13 +39,13 @@ fn along_points(points: &[(f64, f64)], reversing: &[bool]) -> SplinePath {
             Vector2::new(ends[0].0, ends[0].1),
             Vector2::new(ends[1].0, ends[1].1),
         );
-        let way = to - from;
-        let yaw = way.y.atan2(way.x) + if *back { PI } else { 0.0 };
-        let steps = (way.norm() / 0.5) as usize;
+        let segment = to - from;
+        let yaw = segment.y.atan2(segment.x) + if *back { PI } else { 0.0 };
+        let steps = (segment.norm() / 0.5) as usize;
         for step in 0..steps {
             poses.push((
                 time_s,
-                Pose::new(from + way * (step as f64 / steps as f64), yaw),
+                Pose::new(from + segment * (step as f64 / steps as f64), yaw),
             ));
             time_s += 0.25;
         }
@@ -72,7 +73,7 @@ fn laps_of_a_block_are_one_ring_of_streets() {
 }
 
 #[test]
-fn street_driven_back_some_metres_beside_is_one() {
+fn passes_in_both_directions_are_one_street() {
     let there_and_back = [
         (0.0, 0.0),
         (400.0, 0.0),
@@ -131,7 +132,7 @@ fn same_seed_draws_the_same_streets_and_another_seed_others() {
 }
 
 #[test]
-fn side_streets_leave_room_to_all_others() {
+fn side_streets_keep_their_distance_from_all_others() {
     let block = BlockLoop::new(300.0, 200.0, 9.5, 5.0);
     for seed in 0..20 {
         let streets = Streets::along(&block, 200.0, DrivingSide::Left, seed);

@@ -1,4 +1,4 @@
-//! What a sweep sees of known scenes: where a point comes out, what a wall hides, how powers are distributed.
+//! Sweeps of known scenes: places of points, occlusion, distribution of powers.
 #![allow(clippy::unwrap_used)]
 
 use std::f64::consts::TAU;
@@ -13,7 +13,7 @@ use gyre_simulator::{
 };
 use nalgebra::Point2;
 
-/// Ringing fills the first bins; no point is put there.
+/// Ringing fills the first bins; no point is placed there.
 const FIRST_FREE_BIN: usize = 80;
 const AZIMUTHS: usize = 400;
 
@@ -34,7 +34,7 @@ fn point(x: f64, y: f64) -> Scatterer {
     }
 }
 
-/// Without what would move or hide a single point; see `sweep_with`.
+/// Without the effects that move or hide a single point; see `sweep_with`.
 fn quiet() -> Effects {
     Effects {
         encoder_wobble: false,
@@ -89,7 +89,7 @@ fn row(scan: &OwnedScan, azimuth: usize) -> &[u8] {
     &scan.bytes[azimuth * stride + METADATA_BYTES..(azimuth + 1) * stride]
 }
 
-/// Azimuth and bin of the strongest power, each the middle of the plateau that rounding leaves.
+/// Azimuth and bin of the maximum power, each the middle of the plateau caused by rounding.
 fn brightest(scan: &OwnedScan) -> (usize, f64, u8) {
     let best = |azimuth: usize| {
         row(scan, azimuth)[FIRST_FREE_BIN..]
@@ -110,7 +110,7 @@ fn brightest(scan: &OwnedScan) -> (usize, f64, u8) {
     )
 }
 
-/// The azimuth that points best at a world point when it is measured, and the range from there.
+/// The azimuth whose beam is closest to a world point when it is measured, and the range from there.
 fn expected(path: &dyn Path, target: Point2<f64>) -> (usize, f64) {
     let seen = |azimuth: usize| {
         let time_s = (250_000 * azimuth as i64 / AZIMUTHS as i64) as f64 * 1e-6;
@@ -124,9 +124,9 @@ fn expected(path: &dyn Path, target: Point2<f64>) -> (usize, f64) {
     (azimuth, seen(azimuth).1)
 }
 
-/// None of the points lies near the sweep's seam ahead: a vehicle that turns meets those twice, or never.
+/// No point lies near the sweep's seam ahead: a turning vehicle sees those twice or never.
 #[test]
-fn point_comes_out_where_the_moving_sensor_met_it() {
+fn point_appears_where_the_moving_sensor_passed_it() {
     let motions = [
         Twist::default(),
         Twist {
@@ -215,7 +215,7 @@ fn closing_speed_shortens_the_range_ahead_and_lengthens_it_behind() {
 }
 
 #[test]
-fn wall_hides_a_part_of_what_is_behind_it_and_nothing_before_it() {
+fn wall_attenuates_what_is_behind_it_and_nothing_in_front() {
     let wall = |x: f64| Wall {
         from: Point2::new(x, -5.0),
         to: Point2::new(x, 5.0),
@@ -241,13 +241,13 @@ fn wall_hides_a_part_of_what_is_behind_it_and_nothing_before_it() {
     };
     let open = i32::from(power(vec![]));
     let hidden = open - i32::from(power(vec![wall(20.0)]));
-    // 20 dB in steps of half a decibel, and the noise that rides on it.
+    // 20 dB in steps of half a decibel, plus noise.
     assert!((36..=44).contains(&hidden), "{hidden} counts");
     assert!((open - i32::from(power(vec![wall(40.0)]))).abs() <= 2);
 }
 
 #[test]
-fn empty_world_holds_noise_and_ringing_alone() {
+fn empty_world_gives_noise_and_ringing_only() {
     let scan = sweep(Body::default(), &Twist::default(), 0.0);
     let far = (0..AZIMUTHS)
         .flat_map(|azimuth| &row(&scan, azimuth)[2800..])

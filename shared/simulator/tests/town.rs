@@ -1,4 +1,4 @@
-//! The town along whole drives: free of what would stand in the way, and of a size that can be rendered.
+//! Towns along whole drives: free carriageways, and a size that can be rendered.
 #![allow(clippy::unwrap_used)]
 
 use gyre_simulator::body::NO_BODY;
@@ -7,14 +7,15 @@ use gyre_simulator::town::{self, TownConfig};
 use gyre_simulator::{BlockLoop, DrivingSide, Path, Streets, World};
 use nalgebra::Point2;
 
-/// How far the radars look, metres.
+/// Maximum range of the radars, metres.
 const REACH_M: f64 = 165.0;
 
 fn place(drive: &dyn Path, time_s: f64) -> Point2<f64> {
     Point2::from(drive.pose(time_s).translation.vector)
 }
 
-/// Builds the town along a drive and checks that nothing stands on a street or between two places of the drive.
+/// Builds the town along a drive and checks that nothing stands on a street or between two places of the
+/// drive.
 fn free_town(drive: &dyn Path, duration_s: f64, seed: u64) -> World {
     let streets = Streets::along(drive, duration_s, DrivingSide::Left, seed);
     let world = World::new(town::build(&TownConfig::default(), &streets, seed));
@@ -49,7 +50,7 @@ fn a_loop_of_streets_is_free() {
 }
 
 #[test]
-fn real_drives_are_free_and_their_towns_of_a_size_that_can_be_rendered() {
+fn real_drives_have_free_streets_and_towns_of_a_reasonable_size() {
     let Some(data) = std::env::var_os("GYRE_DATA") else {
         println!("skipped: GYRE_DATA is not set");
         return;

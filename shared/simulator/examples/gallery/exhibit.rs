@@ -12,18 +12,18 @@ use crate::shot::Shot;
 pub struct Exhibit {
     /// Heading; pictures are named after it.
     pub title: &'static str,
-    /// The key that switches it, if one does.
+    /// The key of its switch, if it has one.
     pub key: Option<&'static str>,
-    /// What there is to see, in a sentence.
-    pub says: &'static str,
-    /// Where it is taken from: literature or data.
+    /// A sentence that describes the pictures.
+    pub description: &'static str,
+    /// The source: literature or data.
     pub source: &'static str,
     /// Captions and pictures.
     pub pictures: Vec<(&'static str, Picture)>,
 }
 
 impl Exhibit {
-    /// An effect off and on.
+    /// Pictures of an effect off and on.
     pub fn switched(
         (title, key): (&'static str, &'static str),
         shot: &Shot,
@@ -38,18 +38,18 @@ impl Exhibit {
         Self::of(title, vec![("off", picture(false)), ("on", picture(true))]).switch(key)
     }
 
-    /// Any pictures.
+    /// An exhibit of any pictures.
     pub fn of(title: &'static str, pictures: Vec<(&'static str, Picture)>) -> Self {
         Self {
             title,
             key: None,
-            says: "",
+            description: "",
             source: "",
             pictures,
         }
     }
 
-    /// The same with the key that switches it.
+    /// Sets the key of its switch.
     pub fn switch(self, key: &'static str) -> Self {
         Self {
             key: Some(key),
@@ -57,10 +57,10 @@ impl Exhibit {
         }
     }
 
-    /// The same with its words.
-    pub fn words(self, says: &'static str, source: &'static str) -> Self {
+    /// Sets description and source.
+    pub fn words(self, description: &'static str, source: &'static str) -> Self {
         Self {
-            says,
+            description,
             source,
             ..self
         }
@@ -74,7 +74,7 @@ impl Exhibit {
         words.collect::<Vec<_>>().join("-") + ".png"
     }
 
-    /// Its part of the page.
+    /// Returns its part of the page.
     pub fn markdown(&self) -> String {
         let key = self
             .key
@@ -94,11 +94,11 @@ impl Exhibit {
             .collect());
         format!(
             "\n### {}{key}\n\n{}\n\nSource: {}.\n\n{captions}{rule}{images}",
-            self.title, self.says, self.source
+            self.title, self.description, self.source
         )
     }
 
-    /// Writes its pictures and says how many bytes they take.
+    /// Writes its pictures and returns their size in bytes.
     pub fn write(&self, folder: &Path) -> Result<usize, Box<dyn std::error::Error>> {
         let mut bytes = 0;
         for (caption, picture) in &self.pictures {

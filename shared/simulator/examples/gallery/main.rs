@@ -17,14 +17,14 @@ use std::path::Path;
 use exhibit::Exhibit;
 
 const INTRODUCTION: &str = "\
-# What the simulated radar does
+# The effects of the simulated radar
 
-Each effect off and on: the same scene, radar and seed, and only that effect differs. Made by
+Each effect off and on, with the same scene, radar and seed. Drawn by
 `cargo run --release -p gyre-simulator --example gallery`.
 
-Pictures are either polar (a row for each azimuth, range to the right) or seen from above (the sensor in the middle, ahead is up). Grey
-is power on the sensor's own scale, in half decibels. Unless said otherwise the radar is Oxford's CTS350-X, at rest in a drawn scene,
-with noise and no other effect. A key `effects.x` is the switch in a configuration's section `[simulation.effects]`.
+Pictures are either polar (a row for each azimuth, range to the right) or maps (the sensor in the centre, ahead is up). Grey is power on
+the sensor's scale of half decibels. By default the radar is Oxford's CTS350-X, at rest in a synthetic scene, with noise and no other
+effect. `effects.x` is the key of the switch in the configuration's section `[simulation.effects]`.
 ";
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut page = INTRODUCTION.to_owned();
     let mut bytes = 0;
     let sections: [(&str, Vec<Exhibit>); 3] = [
-        ("Effects that can be switched", switches::exhibits()),
+        ("Effects with a switch", switches::exhibits()),
         ("Weather, traffic and the host", surroundings::exhibits()?),
         ("Radars and their receivers", radars::exhibits()?),
     ];

@@ -6,17 +6,17 @@ use gyre_radar::OwnedScan;
 
 /// Shades of grey: four bits a pixel keep a picture of noise small.
 const SHADES: f64 = 15.0;
-/// Power that is black unless said otherwise, in counts: most noise is darker.
+/// Default power of black, in counts: most noise is darker.
 pub const BLACK: f64 = 8.0;
 
-/// What of a scan is shown, and how.
+/// The part of a scan that is shown, and its grey scale.
 #[derive(Clone)]
 pub struct Frame {
-    /// Which part of it.
+    /// The part of the scan.
     pub part: Part,
     /// Columns and rows of pixels.
     pub size: (usize, usize),
-    /// Powers, in the sensor's counts of half a decibel, that are black and white.
+    /// The powers of black and white, in the sensor's counts of half a decibel.
     pub shades: (f64, f64),
 }
 
@@ -25,14 +25,14 @@ pub struct Frame {
 pub enum Part {
     /// As measured: a row for each azimuth, range to the right, metres.
     Polar(Range<f64>, Range<f64>),
-    /// From above, ahead is up: a square about the sensor, so many metres to each side.
+    /// A map around the sensor, ahead is up: half of its side, metres.
     Map(f64),
 }
 
 /// A grey picture.
 pub struct Picture {
     size: (usize, usize),
-    /// Black to white as 0 to 1, row by row.
+    /// From 0 (black) to 1 (white), row by row.
     grey: Vec<f64>,
 }
 
@@ -46,7 +46,7 @@ impl Frame {
         }
     }
 
-    /// A map of so many metres to each side.
+    /// A map with half of its side in metres.
     pub fn map(half_m: f64) -> Self {
         Self {
             part: Part::Map(half_m),
@@ -55,7 +55,7 @@ impl Frame {
         }
     }
 
-    /// The same with other powers as black and white.
+    /// Sets the powers of black and white.
     pub fn shades(self, black: f64, white: f64) -> Self {
         Self {
             shades: (black, white),
@@ -63,7 +63,7 @@ impl Frame {
         }
     }
 
-    /// The mean of some scans.
+    /// Draws the mean of some scans.
     pub fn picture(&self, scans: &[OwnedScan]) -> Picture {
         let (black, white) = self.shades;
         let pixels =
@@ -117,7 +117,7 @@ impl Frame {
     }
 }
 
-/// Mean power of the bins that lie within azimuths and ranges, of the nearest one if none does.
+/// Mean power of the bins within azimuths and ranges; that of the nearest bin if there is none.
 fn mean_power(scan: &OwnedScan, azimuths: Range<f64>, range_m: Range<f64>) -> f64 {
     let indices = |span: Range<f64>| {
         let first = span.start.round() as i64;

@@ -1,4 +1,4 @@
-//! The radars, and what their receivers make of an echo.
+//! The radars and their receivers.
 
 use std::f64::consts::PI;
 
@@ -39,8 +39,8 @@ fn range_point_spread() -> Exhibit {
         ],
     )
     .words(
-        "Two posts 0.5 m apart and two 1.2 m apart, within 7 degrees: a point is as wide as the chirp's bandwidth and the window leave it, over \
-         several bins or less than two.",
+        "Two posts 0.5 m apart and two 1.2 m apart, within 7 degrees: the width of a point depends on the chirp's bandwidth and the window, from \
+         several bins to less than two.",
         "Harris 1978, the spectrum of a Hann window; cells measured on isolated points of real scans",
     )
 }
@@ -54,8 +54,8 @@ fn range_law() -> Exhibit {
     let shot = Shot::drawn(scenes::posts_at(places, 10.0));
     let frame = Frame::polar(0.0..56.0, 0.0..165.0).shades(BLACK, 140.0);
     Exhibit::of("Power against range", vec![("posts of 10 m²", frame.picture(&[shot.scan()]))]).words(
-        "Equal posts at 2.5, 5, 10, ... 160 m: the fourth power of range far away, less steep nearby, where the receiver filters low beat \
-         frequencies, and weaker again below the beam.",
+        "Equal posts at 2.5, 5, 10, ... 160 m: power falls with the fourth power of range at long range and less steeply at short range, where \
+         the receiver filters low beat frequencies; the nearest lie below the beam.",
         "the radar equation; gain by range fitted to Oxford's, RADIATE's and Boreas-RT's mean powers",
     )
 }
@@ -68,7 +68,7 @@ fn quantisation() -> Exhibit {
         })
     };
     Exhibit::of("Quantisation", vec![("RADIATE's, K2Pi's", ramp(false)), ("Oxford's, Boreas'", ramp(true))]).words(
-        "Power that rises by 15 dB from left to right: all are sent in steps of half a decibel, but some radars round power to whole numbers \
+        "Power that rises by 15 dB from left to right: all radars send steps of half a decibel, but some round power to integers \
          first, which leaves gaps: 0, 6, 9, 12, 14, 15, ...",
         "the values that occur in real scans",
     )
@@ -92,7 +92,7 @@ fn profiles() -> Result<Exhibit, SimulatorError> {
         ],
     )
     .words(
-        "A whole turn in the town, all effects on but those that strike by chance, up to 165 m or as far as the radar reaches (100 m for RADIATE's and K2Pi).",
-        "data sheets and recordings; Checchin et al. 2010 for K2Pi, whose floor is made up",
+        "A whole sweep in the town, with all effects except random events, up to 165 m or the radar's maximum range (100 m for RADIATE's and K2Pi).",
+        "data sheets and recordings; Checchin et al. 2010 for K2Pi, whose floor is assumed",
     ))
 }

@@ -1,4 +1,4 @@
-//! Drawn scenes, each with what one effect is seen best in. The sensor is at the origin, x ahead and y to the left.
+//! Synthetic scenes, each suited to one effect. The sensor is at the origin, x ahead and y to the left.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -10,7 +10,7 @@ use nalgebra::{Point2, Vector2};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// A thing that reflects to all sides.
+/// A scatterer that reflects in all directions.
 pub fn post(x: f64, y: f64, cross_section_m2: f64) -> Scatterer {
     Scatterer {
         position: Point2::new(x, y),
@@ -49,12 +49,12 @@ pub fn lattice(spacing_m: f64, half_m: f64, cross_section_m2: f64) -> Body {
     }
 }
 
-/// A rough wall between two points: scatterers so close that many share a resolution cell.
-pub fn rough_wall(from: (f64, f64), to: (f64, f64), m2_a_metre: f64) -> Body {
+/// A rough wall between two points, with many scatterers in each resolution cell.
+pub fn rough_wall(from: (f64, f64), to: (f64, f64), m2_per_m: f64) -> Body {
     let (from, to) = (Point2::new(from.0, from.1), Point2::new(to.0, to.1));
     let count = ((to - from).norm() / 0.07) as usize;
     let place = |i: usize| from + (to - from) * (i as f64 / count as f64);
-    let cross_section_m2 = m2_a_metre * (to - from).norm() / count as f64;
+    let cross_section_m2 = m2_per_m * (to - from).norm() / count as f64;
     let scatterers = (0..count)
         .map(|i| post(place(i).x, place(i).y, cross_section_m2))
         .collect();
@@ -64,7 +64,7 @@ pub fn rough_wall(from: (f64, f64), to: (f64, f64), m2_a_metre: f64) -> Body {
     }
 }
 
-/// The four sides of a courtyard about the sensor.
+/// The four sides of a courtyard around the sensor.
 pub fn courtyard(half_m: f64) -> Body {
     let corners = [
         (half_m, half_m),
@@ -77,7 +77,7 @@ pub fn courtyard(half_m: f64) -> Body {
     all
 }
 
-/// Evenly round the sensor, at a range.
+/// Scatterers evenly around the sensor, at a range.
 pub fn ring(range_m: f64, count: usize, cross_section_m2: f64) -> Body {
     posts_at(
         (0..count).map(|i| (range_m, TAU * (i as f64 + 0.5) / count as f64)),
@@ -85,7 +85,7 @@ pub fn ring(range_m: f64, count: usize, cross_section_m2: f64) -> Body {
     )
 }
 
-/// All round the sensor without order, between two ranges.
+/// Scatterers at random around the sensor, between two ranges.
 pub fn scattered(range_m: Range<f64>, count: usize, cross_section_m2: f64) -> Body {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let places = (0..count).map(|_| {
@@ -110,7 +110,7 @@ pub fn panels(y: f64, sharpness: f64) -> Body {
     wall
 }
 
-/// What hides or mirrors.
+/// A wall that hides or mirrors.
 pub fn wall(from: (f64, f64), to: (f64, f64), transmission: f64, mirror: f64) -> Wall {
     Wall {
         from: Point2::new(from.0, from.1),
@@ -121,7 +121,7 @@ pub fn wall(from: (f64, f64), to: (f64, f64), transmission: f64, mirror: f64) ->
     }
 }
 
-/// A sheet of metal to the left, with three posts before it.
+/// A sheet of metal to the left, with three posts in front of it.
 pub fn metal_wall() -> Body {
     let mut all = rough_wall((-22.0, 14.0), (22.0, 14.0), 0.05);
     all.walls
@@ -134,7 +134,7 @@ pub fn metal_wall() -> Body {
     all
 }
 
-/// A faint long front of glass to the left, with three posts before it.
+/// A long faint glass front to the left, with three posts in front of it.
 pub fn glass_front() -> Body {
     let mut all = rough_wall((-60.0, 14.0), (60.0, 14.0), 0.005);
     all.walls.push(wall((-60.0, 14.0), (60.0, 14.0), 0.1, 0.4));
@@ -146,7 +146,7 @@ pub fn glass_front() -> Body {
     all
 }
 
-/// Two houses' fronts among posts.
+/// The fronts of two houses among posts.
 pub fn walls_among_posts() -> Body {
     let mut all = lattice(5.0, 45.0, 5.0);
     for (from, to) in [((12.0, 3.0), (12.0, -9.0)), ((-6.0, 13.0), (9.0, 17.0))] {
@@ -156,14 +156,14 @@ pub fn walls_among_posts() -> Body {
     all
 }
 
-/// Traffic: one car that passes the sensor at a steady speed, x ahead.
+/// A car that passes the sensor at a constant speed along x.
 pub struct Passing {
     pub car: Body,
     pub speed_mps: f64,
 }
 
 impl Passing {
-    /// An outline of a car, 4.4 m by 1.8 m.
+    /// The outline of a car, 4.4 m by 1.8 m.
     pub fn new(speed_mps: f64) -> Self {
         let along = (0..12).map(|i| -2.2 + 0.4 * f64::from(i));
         let scatterers = along

@@ -1,4 +1,4 @@
-//! What a radar is pointed at, and the scan that comes of it.
+//! A radar in a scene, and its scans.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use gyre_simulator::{
 const SEED: u64 = 1;
 const EPOCH_US: i64 = 1_547_132_400_000_000;
 
-/// A scene, a radar in it, and when it looks.
+/// A scene and a radar in it at one scan.
 #[derive(Clone)]
 pub struct Shot {
     pub world: Arc<World>,
@@ -28,7 +28,7 @@ pub struct Shot {
     pub index: u64,
 }
 
-/// The drive of a simulator.
+/// The path of a simulator.
 struct Drive(Simulator);
 
 impl Path for Drive {
@@ -38,7 +38,7 @@ impl Path for Drive {
 }
 
 impl Shot {
-    /// Oxford's radar at rest in a drawn scene, with noise and no other effect.
+    /// Oxford's radar at rest in a synthetic scene, with noise and no other effect.
     pub fn drawn(scene: Body) -> Self {
         Self {
             world: Arc::new(World::new(scene)),
@@ -54,7 +54,7 @@ impl Shot {
         }
     }
 
-    /// A radar under way through the town, with all effects but those that strike by chance.
+    /// A radar on a drive through the town, with all effects except random events.
     pub fn town(profile: Profile) -> Result<Self, SimulatorError> {
         let simulator = Simulator::new(&SimulationConfig {
             seed: SEED,
@@ -76,7 +76,7 @@ impl Shot {
         })
     }
 
-    /// The same at a steady speed, metres a second ahead and radians a second to the left.
+    /// Sets a constant velocity: m/s ahead and rad/s to the left.
     pub fn driving(self, vx_mps: f64, yaw_rate_radps: f64) -> Self {
         Self {
             path: Arc::new(Twist {
@@ -88,7 +88,7 @@ impl Shot {
         }
     }
 
-    /// The same with another radar.
+    /// Sets the radar.
     pub fn with(self, profile: Profile) -> Self {
         Self {
             sensor: SensorConfig {
@@ -99,7 +99,7 @@ impl Shot {
         }
     }
 
-    /// The scan.
+    /// Measures the scan.
     pub fn scan(&self) -> OwnedScan {
         let sampling = self.sensor.sampling();
         let (azimuths, period_us) = (sampling.azimuths, sampling.period_us);
@@ -107,7 +107,7 @@ impl Shot {
             bytes: azimuths * sampling.stride(),
             azimuths,
         });
-        // The middle of the first sweep is the trajectory's time zero: a drawn scene is seen from where it is drawn.
+        // The path's time zero is the middle of the first sweep, so the sensor is at the origin of a synthetic scene.
         let start_us = EPOCH_US + period_us * self.index as i64 - period_us / 2;
         let time = SweepTime {
             start_us,
@@ -126,7 +126,7 @@ impl Shot {
         scan
     }
 
-    /// This scan and those that follow, so many in all.
+    /// Measures `count` scans from this one on.
     pub fn scans(&self, count: u64) -> Vec<OwnedScan> {
         (self.index..self.index + count)
             .map(|index| {

@@ -1,4 +1,4 @@
-//! Weather, traffic, and the host that receives.
+//! Weather, traffic, and the receiving host.
 
 use std::sync::Arc;
 
@@ -32,7 +32,7 @@ fn rain() -> Exhibit {
         ..WeatherConfig::default()
     };
     weather("Rain", heavy, shot, &Frame::map(95.0).shades(12.0, 70.0)).words(
-        "Posts 12 m apart in a cloudburst of 25 mm/h: drops send back echoes of their own nearby, and what is far loses 2.3 dB per 100 m of range.",
+        "Posts 12 m apart in heavy rain of 25 mm/h: drops scatter back at short range, and echoes lose 2.3 dB per 100 m of range.",
         "ITU-R P.838-3 (attenuation); Currie, Dyer and Hayes 1975 (reflectivity)",
     )
 }
@@ -40,9 +40,9 @@ fn rain() -> Exhibit {
 fn fog() -> Exhibit {
     let mut rings = Body::default();
     for range_m in [60.0f64, 100.0, 140.0, 180.0, 220.0, 260.0, 295.0] {
-        // What range takes, but for the receiver's filter of near ones.
-        let taken = range_m.powi(2) * (range_m.powi(2) + 60f64.powi(2)) / 300f64.powi(4);
-        rings.extend(scenes::ring(range_m, 300, 80.0 * taken));
+        // Compensates the dependence on range, including the receiver's filter.
+        let loss = range_m.powi(2) * (range_m.powi(2) + 60f64.powi(2)) / 300f64.powi(4);
+        rings.extend(scenes::ring(range_m, 300, 80.0 * loss));
     }
     let shot = Shot::drawn(rings).with(Profile::Ras6);
     let thick = WeatherConfig {
@@ -50,8 +50,8 @@ fn fog() -> Exhibit {
         ..WeatherConfig::default()
     };
     weather("Fog", thick, shot, &Frame::polar(0.0..100.0, 50.0..300.0).shades(30.0, 70.0)).words(
-        "Rings of posts as bright as each other, 60 to 300 m around a RAS6, in fog of 3 g/m³, six times what leaves 50 m of sight: a radar \
-         hardly minds. The far ones lose up to 8 dB.",
+        "Rings of equally bright posts, 60 to 300 m around a RAS6, in fog of 3 g/m³, six times the density of 50 m visibility: the effect on \
+         a radar is small, up to 8 dB for the farthest.",
         "ITU-R P.840",
     )
 }
@@ -63,8 +63,8 @@ fn snow() -> Exhibit {
         ..WeatherConfig::default()
     };
     weather("Snow", heavy, shot, &Frame::map(42.0).shades(BLACK, 40.0)).words(
-        "Posts 8 m apart in heavy snow, 8 mm/h of water: flakes come in clumps, so its echoes are spottier than rain's; snow on the radome takes its share.",
-        "middle values of a literature that varies widely",
+        "Posts 8 m apart in heavy snow, 8 mm/h of water: snow is clumped, so its backscatter is spottier than that of rain; snow on the radome attenuates, too.",
+        "middle values of widely varying literature",
     )
 }
 
@@ -76,13 +76,17 @@ fn traffic() -> Exhibit {
         shot.index = index;
         frame.picture(&[shot.scan()])
     };
-    Exhibit::of("Traffic", vec![("one scan", picture(0)), ("1 s later", picture(4))]).words(
-        "A car passes at 12 m/s between posts that stand: it moves within a sweep, and from one to the next.",
-        "bodies of scatterers with a velocity; the town's follow its streets",
+    Exhibit::of(
+        "Traffic",
+        vec![("one scan", picture(0)), ("1 s later", picture(4))],
+    )
+    .words(
+        "A car passes at 12 m/s between posts: it moves within a sweep and between sweeps.",
+        "bodies of scatterers with a velocity; in the town they follow its streets",
     )
 }
 
-/// How late a scan was received after the first, beyond even spacing, seconds.
+/// Delay of each scan at the host relative to the first, seconds.
 fn delays_s(host_stamps: HostStamps) -> Result<Vec<f64>, SimulatorError> {
     let output = OutputConfig {
         format: Some(OutputFormat::Radiate),
@@ -139,7 +143,7 @@ fn host_stamps() -> Result<Exhibit, SimulatorError> {
         ("stalling", plot(delays_s(HostStamps::Stalling)?)),
     ];
     Ok(Exhibit::of("Host stamps", pictures).words(
-        "How late the host receives each of 240 scans, up to 1.5 s: now and then it stalls and then catches up, while the sensor turns evenly. \
+        "Delay of the host for each of 240 scans, up to 1.5 s: it stalls now and then and catches up, while the sensor turns evenly. \
          RADIATE's format logs these times (`output.host_stamps`).",
         "RADIATE's recordings: seven stalls in 466 scans",
     ))

@@ -1,4 +1,4 @@
-//! Every switch of `Effects`, off and on.
+//! Each switch of `Effects`, off and on.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -11,7 +11,7 @@ use crate::picture::{BLACK, Frame, Picture};
 use crate::scenes;
 use crate::shot::Shot;
 
-/// Scans in which to look for what strikes by chance.
+/// Number of scans that are searched for random events.
 const SCANS: u64 = 50;
 
 pub fn exhibits() -> Vec<Exhibit> {
@@ -45,7 +45,7 @@ fn sweep_motion() -> Exhibit {
     Exhibit::switched(("Motion within a sweep", "sweep_motion"), &shot, &Frame::map(45.0), |e| &mut e.sweep_motion)
         .words(
             "A square courtyard from a car that drives at 15 m/s and turns left at 1.2 rad/s: each azimuth is measured from its own \
-             pose, so the square is bent and does not close ahead, where the sweep begins and ends.",
+             pose, so the square is distorted and does not close ahead, where the sweep begins and ends.",
             "Burnett, Schoellig and Barfoot 2021, on motion distortion of spinning radars",
         )
 }
@@ -54,9 +54,9 @@ fn doppler() -> Exhibit {
     let shot = Shot::drawn(scenes::ring(30.0, 250, 4.0)).driving(25.0, 0.0);
     let frame = Frame::polar(0.0..400.0, 27.0..33.0);
     Exhibit::switched(("Doppler", "doppler"), &shot, &frame, |e| &mut e.doppler).words(
-        "A ring of posts 30 m around a car at 25 m/s, azimuths from ahead (top) to the right, behind and the left: what it drives \
-         towards reads 1 m too near, what it leaves as much too far. (All azimuths are measured from one place.)",
-        "Burnett, Schoellig and Barfoot 2021; the factor is the radar's carrier over its sweep rate",
+        "A ring of posts 30 m around a car at 25 m/s, azimuths from ahead (top) to the right, behind and the left: posts \
+         ahead are measured 1 m too near, posts behind 1 m too far. (All azimuths are measured from one place.)",
+        "Burnett, Schoellig and Barfoot 2021; the factor is the radar's carrier frequency over its sweep rate",
     )
 }
 
@@ -66,8 +66,8 @@ fn doppler_of_alternating_chirps() -> Exhibit {
         .with(Profile::Ras6);
     let frame = Frame::polar(-15.0..15.0, 27.0..33.0).shades(20.0, 110.0);
     Exhibit::switched(("Doppler of alternating chirps", "doppler"), &shot, &frame, |e| &mut e.doppler).words(
-        "The same ahead, by a RAS6: rising and falling chirps by turns shift it to and fro, which gives the car's speed away.",
-        "the form of Boreas-RT's and FoMo's recordings",
+        "The same ahead, by a RAS6: its rising and falling chirps alternate, and so does the shift, which reveals the car's speed.",
+        "the format of Boreas-RT's and FoMo's recordings",
     )
 }
 
@@ -81,9 +81,9 @@ fn encoder_wobble() -> Exhibit {
     };
     let frame = Frame::polar(185.0..215.0, 8.0..40.0);
     Exhibit::switched(("Encoder wobble", "encoder_wobble"), &shot, &frame, |e| &mut e.encoder_wobble).words(
-        "Posts behind the car, 30 azimuths of the sweep: the encoder's disc is 0.05 rad off its axis (far more than in any recording), \
-         so all stand three azimuths from where they are; and its counts jitter.",
-        "the first harmonic of an encoder's error, 0.0025 rad on RADIATE's radar; `dataset.azimuth_eccentricity_rad` undoes it",
+        "Posts behind the car, 30 azimuths of the sweep: the eccentricity of the encoder is 0.05 rad (far more than in any recording), \
+         so all appear three azimuths from their true places; and its counts jitter.",
+        "the first harmonic of an encoder's error, 0.0025 rad on RADIATE's radar; `dataset.azimuth_eccentricity_rad` corrects it",
     )
 }
 
@@ -91,8 +91,8 @@ fn side_lobes() -> Exhibit {
     let shot = Shot::drawn(scenes::posts_at([(40.0, PI / 2.0)], 2000.0));
     let frame = Frame::polar(78.0..118.0, 35.0..45.0).shades(0.0, 120.0);
     Exhibit::switched(("Side lobes", "side_lobes"), &shot, &frame, |e| &mut e.side_lobes).words(
-        "A corner reflector of 2000 m² at 40 m, 40 azimuths about it: lobes beside the beam show it at ever fainter power.",
-        "the envelope beside isolated strong echoes in Oxford's, RADIATE's and Boreas-RT's scans",
+        "A corner reflector of 2000 m² at 40 m, 40 azimuths around it: side lobes show it at decreasing power.",
+        "the envelope next to isolated strong echoes in Oxford's, RADIATE's and Boreas-RT's scans",
     )
 }
 
@@ -101,23 +101,23 @@ fn elevation() -> Exhibit {
     posts.extend(scenes::ring(15.0, 8, 20.0));
     let shot = Shot::drawn(posts);
     let frame = Frame::map(22.0).shades(30.0, 90.0);
-    Exhibit::switched(("Beam height and nodding", "elevation"), &shot, &frame, |e| &mut e.elevation).words(
-        "Faint posts 3 m apart, and eight strong ones round the car: the beam is a few degrees high and the car nods on its springs, so what is near \
-         is lit by chance. What is strong stands upright, and is lit at one height or another.",
-        "the data sheet's 1.8 degrees, widened downwards; how returns come and go between consecutive real scans",
+    Exhibit::switched(("Beam height and pitch", "elevation"), &shot, &frame, |e| &mut e.elevation).words(
+        "Faint posts 3 m apart, and eight strong ones around the car: the beam has a height of a few degrees and the car pitches and rolls, so near \
+         scatterers are illuminated by chance. Strong ones are vertical lines, which are always illuminated at some height.",
+        "the data sheet's 1.8 degrees, widened downwards; changes between consecutive real scans",
     )
 }
 
 fn aspect() -> Exhibit {
     let shot = Shot::drawn(scenes::panels(14.0, 60.0));
     Exhibit::switched(("Aspect", "aspect"), &shot, &Frame::map(45.0), |e| &mut e.aspect).words(
-        "A wall of smooth panels on the left: where it is met at a right angle it flashes, elsewhere it reflects past the sensor.",
-        "a cosine's power about the surface's normal (Phong 1975), as for specular and rough facets in radar",
+        "A wall of smooth panels on the left: it flashes at normal incidence and reflects past the sensor elsewhere.",
+        "a power of the cosine about the surface's normal (Phong 1975), as for specular and rough facets in radar",
     )
 }
 
 fn highlights() -> Exhibit {
-    /// Scans in which it drives 15 m.
+    /// Scans during which the car drives 15 m.
     const LATER: u64 = 4;
     let shot = Shot::drawn(scenes::glass_front()).driving(15.0, 0.0);
     let frame = Frame::map(32.0);
@@ -140,16 +140,16 @@ fn highlights() -> Exhibit {
         ("on, 15 m on", picture(true, LATER)),
     ];
     Exhibit::of("Highlights", pictures).switch("highlights").words(
-        "A glass front along the left side, with three posts before it, from two places 15 m apart: the posts stay behind, but the spot where the \
-         front faces the radar squarely has glided along with it.",
-        "Knott, Shaeffer and Tuley, Radar Cross Section, on large flat plates; how smooth walls are is made up",
+        "A glass front along the left side, with three posts in front of it, from two places 15 m apart: the posts stay behind, but the specular \
+         reflection at normal incidence has moved along with the radar.",
+        "Knott, Shaeffer and Tuley, Radar Cross Section, on large flat plates; the smoothness of walls is assumed",
     )
 }
 
 fn scintillation() -> Exhibit {
     const SCANS: usize = 140;
     const METRES: Range<f64> = 4.0..28.0;
-    // As bright as each other, nearly.
+    // Of nearly equal power.
     let post = |y: f64| scenes::post(8.75, y, 0.02 * y * y);
     let posts = [6.0, 10.0, 14.0, 18.0, 22.0].map(post).to_vec();
     let mut shot = Shot::drawn(Body {
@@ -166,7 +166,7 @@ fn scintillation() -> Exhibit {
                 .max(0.0) as usize
         };
         Picture::of((240, SCANS), |column, row| {
-            // The half turn to the left, which holds the posts.
+            // The posts are on the left.
             let rows = (200..400)
                 .map(|azimuth| &scans[row].view().row(azimuth)[bin(column)..=bin(column + 1)]);
             (f64::from(rows.flatten().copied().max().unwrap_or_default()) - 80.0) / 45.0
@@ -175,16 +175,16 @@ fn scintillation() -> Exhibit {
     let pictures = vec![("off", picture(false)), ("on", picture(true))];
     Exhibit::of("Scintillation", pictures).switch("scintillation").words(
         "Five posts to the left, passed at 0.5 m/s: a row for each of 140 scans, range to the right. A post is some wavelengths large and \
-         has lobes of its own, so it flickers, and faster the nearer it is passed.",
-        "Swerling 1960, Probability of Detection for Fluctuating Targets (his first case); how returns come and go between consecutive real scans",
+         has lobes, so its echo fluctuates, faster at short range.",
+        "Swerling 1960, Probability of Detection for Fluctuating Targets (case 1); changes between consecutive real scans",
     )
 }
 
 fn occlusion() -> Exhibit {
     let shot = Shot::drawn(scenes::walls_among_posts());
     Exhibit::switched(("Occlusion", "occlusion"), &shot, &Frame::map(45.0), |e| &mut e.occlusion).words(
-        "Two walls among posts: they throw shadows. What a wall lets through is its own: here 40 dB less.",
-        "ITU-R P.2040 for what building materials let through",
+        "Two walls among posts: they cast shadows. Each wall has its own transmission, here -40 dB.",
+        "ITU-R P.2040 for the transmission of building materials",
     )
 }
 
@@ -192,8 +192,8 @@ fn multipath() -> Exhibit {
     let mut shot = Shot::drawn(scenes::metal_wall());
     shot.effects.occlusion = true;
     Exhibit::switched(("Multipath ghosts", "multipath"), &shot, &Frame::map(32.0), |e| &mut e.multipath).words(
-        "A sheet of metal on the left with three posts before it: each has a mirror image behind the sheet, where nothing is.",
-        "image theory; Kraus et al. 2020 on ghosts of automotive radars; ITU-R P.2040 for what facades mirror",
+        "A sheet of metal on the left with three posts in front of it: each has a mirror image behind the sheet, a ghost target.",
+        "image theory; Kraus et al. 2020 on ghosts of automotive radars; ITU-R P.2040 for the reflection of facades",
     )
 }
 
@@ -201,7 +201,7 @@ fn speckle() -> Exhibit {
     let shot = Shot::drawn(scenes::scattered(19.6..20.4, 8000, 0.005));
     let frame = Frame::polar(70.0..130.0, 17.0..23.0).shades(20.0, 100.0);
     Exhibit::switched(("Speckle", "speckle"), &shot, &frame, |e| &mut e.speckle).words(
-        "A rough wall that bends round the sensor, many scatterers to a resolution cell: their echoes interfere, and break it into bright and dark.",
+        "A rough curved wall around the sensor, with many scatterers in each resolution cell: their echoes interfere.",
         "Goodman 2007 (fully developed speckle: powers exponentially distributed)",
     )
 }
@@ -213,7 +213,7 @@ fn phase_noise() -> Exhibit {
     ));
     let frame = Frame::polar(70.0..140.0, 0.0..165.0).shades(0.0, 80.0);
     Exhibit::switched(("Phase noise", "phase_noise"), &shot, &frame, |e| &mut e.phase_noise).words(
-        "Two corner reflectors: each raises the noise of its whole azimuth, 60 dB below itself and more close by. In town: saturation streaks.",
+        "Two corner reflectors: each raises the noise of its whole azimuth, 60 dB below itself and more next to it. In a town this appears as streaks.",
         "the lower fifth of an azimuth's powers against their sum, in Oxford's and RADIATE's scans",
     )
 }
@@ -225,8 +225,8 @@ fn reverberation() -> Exhibit {
     shot.effects.speckle = true;
     let frame = Frame::polar(-80.0..80.0, 0.0..120.0).shades(0.0, 80.0);
     Exhibit::switched(("Reverberation", "reverberation"), &shot, &frame, |e| &mut e.reverberation).words(
-        "A front ahead and a strong post to either side: echoes bounce on between houses, and leave a tail behind what is strong that differs \
-         from one direction to the next.",
+        "A front ahead and a strong post to either side: multiple reflections between houses leave a tail behind strong echoes, which differs \
+         between directions.",
         "mean power behind fronts and down streets in Oxford's and RADIATE's scans",
     )
 }
@@ -235,7 +235,7 @@ fn ringing() -> Exhibit {
     let shot = Shot::drawn(Body::default());
     let frame = Frame::polar(0.0..400.0, 0.0..10.0).shades(0.0, 60.0);
     Exhibit::switched(("Ringing", "ringing"), &shot, &frame, |e| &mut e.ringing).words(
-        "The first 10 m of an empty place: the transmitter rings in the first three, much alike in neighbouring azimuths and the same in every scan.",
+        "The first 10 m of an empty world: the transmitter rings in the first three, similarly in neighbouring azimuths and identically in every scan.",
         "mean power of the first bins of real scans, profile by profile",
     )
 }
@@ -244,8 +244,8 @@ fn own_vehicle() -> Exhibit {
     let shot = Shot::drawn(Body::default());
     let frame = Frame::map(9.0).shades(0.0, 80.0);
     Exhibit::switched(("Own vehicle", "own_vehicle"), &shot, &frame, |e| &mut e.own_vehicle).words(
-        "The first 9 m of an empty place: roof rails, racks and the tail behind the radar, which turn with it.",
-        "what stays put in all scans of a real drive",
+        "The first 9 m of an empty world: roof rails, racks and the tail of the vehicle, behind the radar.",
+        "echoes that are constant in all scans of a real drive",
     )
 }
 
@@ -276,9 +276,9 @@ fn ground() -> Exhibit {
         ("on, occlusion off", picture(true, false)),
     ];
     Exhibit::of("Ground", pictures).switch("ground").words(
-        "The mean of 16 scans of open country with one front, to the right: road, verges and fields send back a little, in patches that \
-         belong to the place; none from behind the front, unless nothing hides anything.",
-        "diffuse power between echoes in Oxford's and RADIATE's scans; how large patches are is made up",
+        "The mean of 16 scans of open country with one front, to the right: road, verges and fields scatter back weakly, in fixed \
+         patches; none from behind the front, unless occlusion is off.",
+        "diffuse power between echoes in Oxford's and RADIATE's scans; the size of patches is assumed",
     )
 }
 
@@ -286,8 +286,8 @@ fn noise() -> Exhibit {
     let shot = Shot::drawn(scenes::lattice(8.0, 56.0, 0.03));
     let frame = Frame::map(60.0).shades(2.0, 50.0);
     Exhibit::switched(("Noise", "noise"), &shot, &frame, |e| &mut e.noise).words(
-        "Posts 8 m apart: the receiver's noise is everywhere, and drowns the faint ones.",
-        "powers of azimuths in which nothing stands, in Oxford's, RADIATE's and Boreas-RT's scans",
+        "Posts 8 m apart: the receiver's noise is everywhere and masks the faint ones.",
+        "powers of empty azimuths in Oxford's, RADIATE's and Boreas-RT's scans",
     )
 }
 
@@ -300,8 +300,8 @@ fn spurious_lines() -> Exhibit {
     };
     let pictures = vec![("off", picture(false)), ("on", picture(true))];
     Exhibit::of("Spurious lines", pictures).switch("spurious_lines").words(
-        "The mean of 16 scans of an empty place, 50 to 70 m: clocks and power supplies in the radar draw a faint line at a fixed range.",
-        "common in FMCW receivers; how many, where and how strong is made up",
+        "The mean of 16 scans of an empty world, 50 to 70 m: clocks and power supplies in the radar cause a faint line at a fixed range.",
+        "common in FMCW receivers; number, ranges and powers are assumed",
     )
 }
 
@@ -318,21 +318,21 @@ fn interference() -> Exhibit {
         }
         .scan()
     };
-    // The first scan with a burst, and where that is.
-    let heard = |index| {
+    // The first scan with a burst, and its azimuth.
+    let interfered = |index| {
         let (off, on) = (scan(index, false), scan(index, true));
         Some((
             index,
             (0..400).find(|azimuth| off.view().row(*azimuth) != on.view().row(*azimuth))?,
         ))
     };
-    let (index, azimuth) = (0..SCANS).find_map(heard).unwrap_or_default();
+    let (index, azimuth) = (0..SCANS).find_map(interfered).unwrap_or_default();
     let first = azimuth as f64 - 25.0;
     let frame = Frame::polar(first..first + 56.0, 0.0..165.0).shades(BLACK, 60.0);
     let shot = Shot { index, ..shot };
     Exhibit::switched(("Interference", "interference"), &shot, &frame, |e| &mut e.interference).words(
-        "56 azimuths of a sweep in which another radar was heard, which happens in about every second one: it raises the noise of one to four azimuths.",
-        "Brooker 2007, Mutual Interference of Millimeter-Wave Radar Systems; how often and how strong is made up",
+        "56 azimuths of a sweep in which another radar interferes, as in about every second sweep: it raises the noise of one to four azimuths.",
+        "Brooker 2007, Mutual Interference of Millimeter-Wave Radar Systems; frequency and power are assumed",
     )
 }
 
@@ -349,7 +349,7 @@ fn dropped_azimuths() -> Exhibit {
         }
         .scan()
     };
-    // The first scan that lost an azimuth, and which.
+    // The first scan with a lost azimuth, and its index.
     let lost = |index| {
         Some((
             index,
@@ -369,8 +369,8 @@ fn dropped_azimuths() -> Exhibit {
             .with_margin(|row| scan.flags[first as usize + row * 12 / frame.size.1] != 0)
     };
     Exhibit::of("Dropped azimuths", vec![("off", picture(false)), ("on", picture(true))]).switch("dropped_azimuths").words(
-        "12 azimuths of a field of posts; the strip at the left is white where they were measured. One is lost, is filled in by the mean of its \
-         neighbours, and says so.",
-        "the validity byte of Oxford's format; how often is made up",
+        "12 azimuths of a field of posts; the strip at the left is white where they were measured. One is lost, replaced by the mean of its \
+         neighbours, and marked.",
+        "the validity byte of Oxford's format; the frequency is assumed",
     )
 }

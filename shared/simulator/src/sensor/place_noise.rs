@@ -32,7 +32,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn noise_is_smooth_and_spread_as_stated() {
+    fn noise_is_smooth_and_has_the_stated_deviation() {
         let place = |i: u32| Point2::new(f64::from(i) * 0.7 - 4000.0, f64::from(i % 97) * 1.3);
         let values: Vec<f64> = (0..20_000)
             .map(|i| smooth_noise(place(i), 14.0, 3))

@@ -32,7 +32,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn power_is_spread_exponentially_about_one_and_smooth() {
+    fn power_is_exponentially_distributed_about_one_and_smooth() {
         let place = Point2::new(12.5, -3.25);
         let at = |angle: f64| scintillation(place, Vector2::new(angle.cos(), angle.sin()));
         let powers: Vec<f64> = (0..60_000).map(|i| at(f64::from(i) * 1e-4)).collect();

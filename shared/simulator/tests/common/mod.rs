@@ -1,11 +1,11 @@
-//! What several tests need.
+//! Helpers for several tests.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-/// The content of all files in a folder and those below it, by their paths from there.
+/// The content of all files in a folder and its subfolders, by relative path.
 pub fn all_files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut files = BTreeMap::new();
     for entry in fs::read_dir(folder).unwrap() {

@@ -1,4 +1,4 @@
-//! What the antenna makes of a point: its beam, side lobes, height; and the range window.
+//! The response of a point: beam, side lobes, elevation, range window.
 
 use gyre_simulator::Effects;
 use gyre_simulator::profile::Profile;
@@ -6,7 +6,7 @@ use gyre_simulator::profile::Profile;
 use crate::scene::{Setup, db, mean_db, peak_db, post, power};
 
 #[test]
-fn without_effects_only_the_points_response_is_left() {
+fn without_effects_only_the_points_response_remains() {
     let setup = Setup::of(vec![post(20.0, 100.0, 3.0)], Effects::NONE);
     let scan = setup.scan();
     let (azimuths, bins) = (97..=103, setup.bins(18.9..21.1));
@@ -20,7 +20,7 @@ fn without_effects_only_the_points_response_is_left() {
         }
     }
     let (top, wanted) = (peak_db(&scan, 100, bins), setup.received_db(3.0, 20.0));
-    // 6e5 of a full scale of 1e7 are compressed by a quarter of a decibel.
+    // 6e5 of a full scale of 1e7 is compressed by a quarter of a decibel.
     assert!(
         (top - wanted + 0.25).abs() < 0.4,
         "{top} dB for {wanted} dB"
@@ -28,7 +28,7 @@ fn without_effects_only_the_points_response_is_left() {
 }
 
 #[test]
-fn a_point_falls_by_6_db_one_resolution_cell_beside_it() {
+fn a_point_falls_by_6_db_at_one_resolution_cell() {
     for profile in [Profile::Cts350xOxford, Profile::Cir204h, Profile::Ras6] {
         let setup = Setup::of(vec![post(20.0, 100.0, 0.1)], Effects::NONE).with(profile);
         let (sampling, cell_m) = (setup.sampling(), setup.receiver().cell_m);
@@ -51,7 +51,7 @@ fn a_point_falls_by_6_db_one_resolution_cell_beside_it() {
 }
 
 #[test]
-fn side_lobes_fall_ever_further_beside_a_point_and_are_gone_without() {
+fn side_lobes_decrease_and_vanish_without_the_effect() {
     let measured = |side_lobes| {
         let setup = Setup::of(
             vec![post(40.0, 100.0, 200.0)],
@@ -79,7 +79,7 @@ fn side_lobes_fall_ever_further_beside_a_point_and_are_gone_without() {
 }
 
 #[test]
-fn a_flat_beam_misses_most_of_what_is_faint_and_near_and_little_of_what_is_strong() {
+fn a_flat_beam_misses_most_faint_near_scatterers_and_few_strong_ones() {
     let measured = |cross_section_m2, elevation| {
         let posts = (0..400)
             .step_by(5)

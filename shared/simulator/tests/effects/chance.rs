@@ -1,4 +1,4 @@
-//! What strikes by chance, how often, and that nothing else changes with it.
+//! Random events: their frequency, and that they change nothing else.
 
 use gyre_radar::OwnedScan;
 use gyre_simulator::profile::{METADATA_BYTES, Profile};
@@ -15,7 +15,7 @@ fn k2pi(effects: Effects) -> Setup<'static> {
 }
 
 #[test]
-fn other_radars_are_heard_0_6_times_a_scan_in_one_to_four_azimuths() {
+fn interference_occurs_0_6_times_a_scan_in_one_to_four_azimuths() {
     const SCANS: u64 = 500;
     let scans = k2pi(Effects {
         interference: true,
@@ -24,12 +24,12 @@ fn other_radars_are_heard_0_6_times_a_scan_in_one_to_four_azimuths() {
     .scans(SCANS);
     let mut lengths = Vec::new();
     for scan in &scans {
-        let heard: Vec<bool> = powers(scan)
+        let interfered: Vec<bool> = powers(scan)
             .iter()
             .map(|row| row.iter().any(|count| *count > 0))
             .collect();
         lengths.extend(
-            heard
+            interfered
                 .chunk_by(|a, b| a == b)
                 .filter(|run| run[0])
                 .map(<[bool]>::len),
@@ -45,7 +45,7 @@ fn other_radars_are_heard_0_6_times_a_scan_in_one_to_four_azimuths() {
 }
 
 #[test]
-fn two_azimuths_in_a_thousand_are_lost_filled_in_and_marked() {
+fn two_azimuths_in_a_thousand_are_lost_interpolated_and_marked() {
     const SCANS: u64 = 250;
     let scans = k2pi(Effects {
         dropped_azimuths: true,
@@ -83,7 +83,7 @@ fn two_azimuths_in_a_thousand_are_lost_filled_in_and_marked() {
     );
 }
 
-/// Share of azimuths that are the same from 10 m on.
+/// Share of azimuths that are equal from 10 m on.
 fn same_beyond_10_m(a: &OwnedScan, b: &OwnedScan) -> f64 {
     let first = Setup::default().bins(0.0..10.0).end;
     let (a, b) = (powers(a), powers(b));
@@ -96,7 +96,7 @@ fn same_beyond_10_m(a: &OwnedScan, b: &OwnedScan) -> f64 {
 }
 
 #[test]
-fn switching_one_effect_leaves_the_random_numbers_of_all_others() {
+fn switching_one_effect_keeps_the_random_numbers_of_all_others() {
     let without = [
         Effects {
             ringing: false,
@@ -157,7 +157,7 @@ fn the_own_vehicle_is_the_same_with_and_without_ringing() {
 }
 
 #[test]
-fn noise_stays_the_same_beside_whatever_else_is_measured() {
+fn noise_does_not_depend_on_what_else_is_measured() {
     let scan = |effects: Effects| {
         Setup {
             effects,
@@ -170,7 +170,7 @@ fn noise_stays_the_same_beside_whatever_else_is_measured() {
         ..Effects::NONE
     };
     let alone = scan(noise);
-    // What adds to its power where nothing else is.
+    // Power is only added where no other echo is.
     let more = Effects {
         ground: false,
         interference: false,
@@ -186,7 +186,7 @@ fn noise_stays_the_same_beside_whatever_else_is_measured() {
 }
 
 #[test]
-fn a_scan_is_the_same_on_whatever_thread_and_in_whatever_order_it_is_measured() {
+fn a_scan_does_not_depend_on_the_thread_or_the_order() {
     let mut config = SimulationConfig::default();
     config.sensor.profile = Profile::Cts350xRadiate;
     config.weather = vec![gyre_simulator::weather::WeatherConfig {

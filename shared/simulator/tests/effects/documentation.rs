@@ -5,7 +5,7 @@ use std::path::Path;
 use gyre_simulator::{Effects, Profile};
 
 #[test]
-fn the_gallery_shows_every_switch_and_radar_and_all_its_pictures_are_there() {
+fn the_gallery_shows_every_switch_and_radar_and_has_all_pictures() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("gallery");
     let page = std::fs::read_to_string(folder.join("README.md")).unwrap();
     let switches = toml::Table::try_from(Effects::ALL).unwrap();

@@ -1,4 +1,4 @@
-//! What scatterers and walls make of a point: aspect, cover, images, interference.
+//! Echoes of scatterers and walls: aspect, occlusion, images, interference.
 
 use gyre_simulator::Effects;
 use gyre_simulator::body::{Aspect, Wall};
@@ -20,7 +20,7 @@ fn two_scatterers_cancel_or_add_in_amplitude_with_speckle_and_in_power_without()
         );
         peak_db(&setup.scan(), 100, setup.bins(18.0..22.0)) - setup.received_db(0.5, 20.0)
     };
-    // There and back: a quarter of a wavelength of range is half a wavelength of the way.
+    // Two-way: a quarter of a wavelength of range is half a wavelength of path.
     assert!(
         peak(true, wavelength_m / 4.0) < -35.0,
         "{}",
@@ -41,7 +41,7 @@ fn two_scatterers_cancel_or_add_in_amplitude_with_speckle_and_in_power_without()
 }
 
 #[test]
-fn a_panel_at_30_degrees_reflects_by_its_cosines_power_and_without_aspect_like_any_other() {
+fn a_panel_at_30_degrees_reflects_by_the_power_of_its_cosine_and_without_aspect_equally() {
     let peak = |aspect, turned_rad: f64| {
         let mut panel = post(30.0, 100.0, 20.0);
         let normal = Rotation2::new(turned_rad) * -panel.position.coords.normalize();
@@ -64,13 +64,13 @@ fn a_panel_at_30_degrees_reflects_by_its_cosines_power_and_without_aspect_like_a
         "{fall_db} dB"
     );
     assert_eq!(peak(false, 0.0), peak(false, 1.0));
-    // On average over all sides as much as with it.
+    // The mean over all directions is the same with and without aspect.
     let mean = 1.0 / (std::f64::consts::TAU * 20.64).sqrt();
     assert!((peak(false, 0.0) - peak(true, 0.0) - db(mean)).abs() < 0.8);
 }
 
 #[test]
-fn a_wall_takes_what_it_does_not_let_through() {
+fn a_wall_attenuates_by_its_transmission() {
     let peak = |occlusion, transmission: Option<f64>| {
         let mut setup = Setup::of(
             vec![post(30.0, 100.0, 20.0)],
@@ -100,7 +100,7 @@ fn a_wall_takes_what_it_does_not_let_through() {
 }
 
 #[test]
-fn a_mirrored_post_stands_at_its_images_place_with_the_mirrors_share_squared() {
+fn a_mirrored_post_appears_at_its_image_with_the_squared_mirrored_share() {
     let mirror = Wall {
         from: Point2::new(-20.0, -10.0),
         to: Point2::new(20.0, -10.0),
@@ -108,7 +108,7 @@ fn a_mirrored_post_stands_at_its_images_place_with_the_mirrors_share_squared() {
         mirror: 0.8,
         body: 1,
     };
-    // In the middle of azimuth 100, which points to the right.
+    // At the centre of azimuth 100, to the right.
     let image = post(16.0, 100.0, 4.0);
     let mut thing = image;
     thing.position.y = -20.0 - image.position.y;
@@ -144,7 +144,7 @@ fn a_mirrored_post_stands_at_its_images_place_with_the_mirrors_share_squared() {
 }
 
 #[test]
-fn a_ghost_is_not_seen_where_the_way_misses_the_mirror() {
+fn a_ghost_is_invisible_where_the_line_of_sight_misses_the_mirror() {
     let short = Wall {
         from: Point2::new(5.0, -10.0),
         to: Point2::new(20.0, -10.0),

@@ -1,4 +1,4 @@
-//! What road and fields send back: where it is, what hides it, and that it belongs to the world.
+//! Backscatter of the ground: where it is, occlusion, and that its patches are fixed in the world.
 
 use std::f64::consts::TAU;
 
@@ -16,7 +16,7 @@ const GROUND: Effects = Effects {
     ..Effects::NONE
 };
 
-/// RADIATE's radar, whose floor of powers hides least of it.
+/// RADIATE's radar, whose floor masks least of it.
 fn setup(effects: Effects) -> Setup<'static> {
     Setup {
         effects,
@@ -26,7 +26,7 @@ fn setup(effects: Effects) -> Setup<'static> {
 }
 
 #[test]
-fn ground_is_there_all_round_falls_with_range_and_goes_with_its_switch() {
+fn ground_surrounds_the_sensor_falls_with_range_and_has_a_switch() {
     let on = setup(GROUND);
     let scans = on.scans(4);
     let level = |range_m| mean_db(&scans, 0..400, on.bins(range_m));
@@ -41,7 +41,7 @@ fn ground_is_there_all_round_falls_with_range_and_goes_with_its_switch() {
 }
 
 #[test]
-fn an_opaque_wall_leaves_the_ground_before_it_and_hides_that_behind() {
+fn an_opaque_wall_hides_the_ground_behind_it_and_not_in_front() {
     let scan = |occlusion, walled: bool| {
         let mut setup = setup(Effects {
             occlusion,
@@ -76,7 +76,7 @@ fn an_opaque_wall_leaves_the_ground_before_it_and_hides_that_behind() {
     assert_eq!(powers(&scan(false, true)), powers(&open));
 }
 
-/// Stands where it is.
+/// A sensor at rest.
 struct Parked(Pose);
 
 impl Path for Parked {
@@ -85,7 +85,8 @@ impl Path for Parked {
     }
 }
 
-/// Brightness of the ground about places in the sensor's frame: power less what range makes of it, dB.
+/// Brightness of the ground around places in the sensor's frame: power with the dependence on range
+/// removed, dB.
 fn brightness_db(scans: &[OwnedScan], places: impl Iterator<Item = Point2<f64>>) -> Vec<f64> {
     let setup = setup(GROUND);
     let about = |place: Point2<f64>| {
@@ -93,7 +94,7 @@ fn brightness_db(scans: &[OwnedScan], places: impl Iterator<Item = Point2<f64>>)
         let azimuths =
             (-3..=3).map(|beside| (azimuth.round() as i64 + beside).rem_euclid(400) as usize);
         let gain = db(setup.receiver().sensitivity(range_m) * range_m);
-        // The least power there is counts as none.
+        // The minimum power counts as none.
         let bins = setup.bins(range_m - 1.0..range_m + 1.0);
         let mean = 10f64.powf(mean_db(scans, azimuths.collect::<Vec<_>>(), bins) / 10.0);
         db((mean - power(0)).max(0.05)) - gain
@@ -113,9 +114,9 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
 }
 
 #[test]
-fn the_same_patches_are_seen_from_two_poses() {
+fn the_same_patches_appear_from_two_poses() {
     let poses = [Pose::identity(), gyre_geometry::pose(24.0, 7.0, 1.9)];
-    // Between the two.
+    // Between the two poses.
     let places = || {
         (0..=8).flat_map(|i| {
             (-8..=8).map(move |j| Point2::new(8.0 + f64::from(i), 2.0 * f64::from(j)))

@@ -1,4 +1,4 @@
-//! The spot where a smooth wall faces the radar squarely.
+//! Specular highlights of smooth walls.
 
 use std::f64::consts::PI;
 
@@ -10,7 +10,7 @@ use nalgebra::{Point2, Vector2};
 
 use crate::scene::{Setup, db, peak_bin, peak_db, post, powers};
 
-/// Points to the right of Oxford's radar.
+/// The azimuth to the right of Oxford's radar.
 const RIGHT: usize = 100;
 
 fn setup(highlights: bool, wall: Wall) -> Setup<'static> {
@@ -29,7 +29,7 @@ fn setup(highlights: bool, wall: Wall) -> Setup<'static> {
     }
 }
 
-/// A mirror to the right, as long as stated to both sides of the foot of its perpendicular.
+/// A mirror to the right, with ends `ahead_m` from the foot of the perpendicular.
 fn mirror(range_m: f64, mirror: f64, ahead_m: std::ops::Range<f64>) -> Wall {
     let foot = post(range_m, RIGHT as f64, 1.0).position;
     let along = Vector2::new(-foot.y, foot.x).normalize();
@@ -48,7 +48,7 @@ fn is_dark(scan: &OwnedScan) -> bool {
 }
 
 #[test]
-fn the_brightest_place_is_the_foot_of_the_perpendicular_wherever_the_radar_has_driven() {
+fn the_brightest_place_is_the_foot_of_the_perpendicular_at_any_time() {
     let (range_m, speed_mps) = (12.0, 8.0);
     let ahead = Twist {
         vx_mps: speed_mps,
@@ -73,7 +73,7 @@ fn the_brightest_place_is_the_foot_of_the_perpendicular_wherever_the_radar_has_d
         (at_m * angle.cos(), at_m * angle.sin(), azimuth)
     };
     for (index, scan) in [(0, &scans[0]), (8, &scans[8])] {
-        // From where the sensor is as it looks there: 16 m apart.
+        // The sensor's place at that azimuth; the scans are 16 m apart.
         let (forward, left, azimuth) = brightest(scan);
         assert!(
             forward.abs() < 0.2 && (left + range_m).abs() < 0.1,
@@ -91,12 +91,12 @@ fn the_brightest_place_is_the_foot_of_the_perpendicular_wherever_the_radar_has_d
         }
         .scan()
     ));
-    // Beyond its end the wall has no such place.
+    // Beyond its end the wall has no highlight.
     assert!(is_dark(on.scans(24).last().unwrap()));
 }
 
 #[test]
-fn it_has_the_cross_section_of_the_walls_mirror_image_less_one_share_for_all() {
+fn its_cross_section_is_that_of_the_mirror_image_less_a_constant_share() {
     let share_db = |range_m: f64, share: f64| {
         let setup = setup(true, mirror(range_m, share, -30.0..30.0));
         let peak = peak_db(
@@ -124,7 +124,7 @@ fn it_has_the_cross_section_of_the_walls_mirror_image_less_one_share_for_all() {
 }
 
 #[test]
-fn what_stands_before_it_hides_it() {
+fn objects_in_front_hide_it() {
     let peak = |occlusion| {
         let mut setup = setup(true, mirror(20.0, 0.1, -30.0..30.0));
         setup.effects.occlusion = occlusion;

@@ -1,4 +1,4 @@
-//! Each of the sensor's effects does what it says, in numbers; and without it nothing of it is left.
+//! Quantitative tests of each effect of the sensor, on and off.
 #![allow(clippy::unwrap_used)]
 
 mod beam;

@@ -1,4 +1,4 @@
-//! What motion does: of the sensor, of what it sees, of the beam against its encoder.
+//! Motion of the sensor and of objects, and of the beam relative to its encoder.
 
 use std::f64::consts::TAU;
 
@@ -19,7 +19,7 @@ const AHEAD: Twist = Twist {
     yaw_rate_radps: 0.0,
 };
 
-/// The azimuth, with fractions, at which the power of a lone point is centred.
+/// The azimuth, with fractions, of the centre of a single point's power.
 fn centre(scan: &OwnedScan) -> f64 {
     let sums = |azimuth: usize| {
         scan.view()
@@ -38,8 +38,8 @@ fn centre(scan: &OwnedScan) -> f64 {
 }
 
 #[test]
-fn azimuths_are_measured_each_from_its_own_pose_or_all_from_the_middle() {
-    // At azimuth 100, a quarter of the sweep, the car is 1.25 m short of the middle.
+fn azimuths_are_measured_from_their_own_poses_or_all_from_the_middle() {
+    // At azimuth 100, a quarter of the sweep, the car is 1.25 m before the middle.
     let measured = |sweep_motion| {
         let mut setup = Setup::of(
             vec![post(20.0, 100.0, 3.0)],
@@ -65,7 +65,7 @@ fn azimuths_are_measured_each_from_its_own_pose_or_all_from_the_middle() {
     );
 }
 
-/// A post that moves at 10 m/s to the right from a place 20 m to the right.
+/// A post that moves at 10 m/s to the right, starting 20 m to the right.
 struct Leaving(Body);
 
 impl Movers for Leaving {
@@ -80,7 +80,7 @@ impl Movers for Leaving {
 }
 
 #[test]
-fn what_moves_is_seen_where_it_is_when_the_beam_passes() {
+fn a_moving_object_appears_where_it_is_when_the_beam_passes() {
     let leaving = Leaving(Body {
         scatterers: vec![post(20.0, 100.0, 3.0)],
         walls: vec![],
@@ -106,7 +106,7 @@ fn what_moves_is_seen_where_it_is_when_the_beam_passes() {
 }
 
 #[test]
-fn rising_chirps_read_what_approaches_too_near_and_falling_ones_too_far() {
+fn approaching_objects_are_too_near_with_rising_chirps_and_too_far_with_falling_ones() {
     let shifts_m = |profile: Profile, azimuth: f64| {
         let measured = |doppler| {
             let mut setup = Setup::of(
@@ -128,7 +128,7 @@ fn rising_chirps_read_what_approaches_too_near_and_falling_ones_too_far() {
         let (on, off) = (measured(true), measured(false));
         [on[0] - off[0], on[1] - off[1]]
     };
-    // 9 degrees off the way ahead or back: 19.75 m/s.
+    // 9 degrees off the direction of travel: 19.75 m/s.
     for (profile, azimuth, expected) in [
         (Profile::Cts350xOxford, 10.0, [-0.83, -0.83]),
         (Profile::Cts350xOxford, 210.0, [0.83, 0.83]),
@@ -150,7 +150,7 @@ fn rising_chirps_read_what_approaches_too_near_and_falling_ones_too_far() {
 }
 
 #[test]
-fn an_azimuth_says_which_chirp_it_used() {
+fn an_azimuth_reports_its_chirp() {
     let setup = Setup {
         effects: Effects::ALL,
         ..Setup::default()
@@ -167,7 +167,7 @@ fn an_azimuth_says_which_chirp_it_used() {
 }
 
 #[test]
-fn a_discs_eccentricity_turns_the_beam_by_its_cosine() {
+fn encoder_eccentricity_turns_the_beam_by_its_cosine() {
     const ECCENTRICITY_RAD: f64 = 0.02;
     for azimuth in [30.0, 100.0, 200.0, 250.0, 390.0] {
         let measured = |encoder_wobble| {
@@ -195,7 +195,7 @@ fn a_discs_eccentricity_turns_the_beam_by_its_cosine() {
 }
 
 #[test]
-fn a_readers_correction_is_that_of_the_disc() {
+fn a_readers_correction_cancels_the_eccentricity() {
     let folder = tempfile::tempdir().unwrap();
     let mut config = SimulationConfig {
         scans: 1,

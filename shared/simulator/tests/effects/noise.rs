@@ -1,4 +1,4 @@
-//! Noise of every kind, by its mean power.
+//! The kinds of noise, by their mean power.
 
 use gyre_geometry::Twist;
 use gyre_simulator::Effects;
@@ -36,7 +36,7 @@ fn noise_has_the_profiles_floor_and_exponential_power() {
             .count() as f64
             / counts.len() as f64
     };
-    // Of an exponential distribution 1 - 1/e lies below the mean, 1 - exp(-0.2) below a fifth of it.
+    // For an exponential distribution 1 - 1/e lies below the mean, 1 - exp(-0.2) below a fifth of it.
     assert!((below(0.0) - 0.632).abs() < 0.03, "{}", below(0.0));
     assert!((below(-7.0) - 0.181).abs() < 0.03, "{}", below(-7.0));
 }
@@ -76,7 +76,7 @@ fn whole_powers_leave_gaps_in_the_counts() {
 }
 
 #[test]
-fn phase_noise_of_an_echo_lies_some_60_db_below_it_in_far_bins_of_its_azimuth() {
+fn phase_noise_is_60_db_below_the_echo_in_far_bins_of_its_azimuth() {
     let measured = |phase_noise| {
         let setup = Setup::of(
             vec![post(30.0, 100.0, 2e4)],
@@ -92,7 +92,8 @@ fn phase_noise_of_an_echo_lies_some_60_db_below_it_in_far_bins_of_its_azimuth() 
     };
     let [there, beside, elsewhere] = measured(true);
     assert!((there - 60.0).abs() < 5.0, "{there} dB");
-    // Beside it as much less as the beam: 3 dB at half its width, and so with the square.
+    // Off the beam's axis it falls as the echo does: 3 dB at half the beam's width, with the square of the
+    // angle.
     let sensor = Setup::default();
     let fall_db = 12.04 * (sensor.sampling().step_rad() / sensor.receiver().beam_rad).powi(2);
     assert!(
@@ -103,7 +104,7 @@ fn phase_noise_of_an_echo_lies_some_60_db_below_it_in_far_bins_of_its_azimuth() 
 }
 
 #[test]
-fn reverberation_trails_what_is_strong_and_never_leads_it() {
+fn reverberation_follows_strong_echoes_and_never_precedes_them() {
     let azimuths = || (3..400).step_by(7);
     let setup = |reverberation| {
         let posts = azimuths()
@@ -122,7 +123,8 @@ fn reverberation_trails_what_is_strong_and_never_leads_it() {
     for row in scans.iter().flat_map(|scan| powers(scan)) {
         assert!(row[on.bins(5.0..27.0)].iter().all(|count| *count == 0));
     }
-    // How far below the echo its tail is so many metres behind it: in the liveliest, the middle and the deadest of ten directions.
+    // Power below the echo by the distance behind it: in the directions with the most, the median and the
+    // least reverberation of ten.
     let below_db = |behind_m: f64| {
         let rows = scans
             .iter()
@@ -170,7 +172,7 @@ fn ringing_fills_the_first_metres_with_the_same_bytes_in_every_scan() {
     for (range_m, tabulated_db) in tabulated.iter().filter(|(_, db)| *db > 15.0) {
         let bin = (range_m / range_resolution_m) as usize;
         let level = mean_db(&scans[..1], EVERYWHERE, bin.saturating_sub(2)..bin + 3);
-        // Neighbours ring alike, so a turn has only some ten independent values.
+        // Neighbouring azimuths are correlated, so a sweep has only some ten independent values.
         assert!(
             (level - tabulated_db).abs() < 4.5,
             "{level} dB for {tabulated_db} dB at {range_m} m"
@@ -190,7 +192,7 @@ fn ringing_fills_the_first_metres_with_the_same_bytes_in_every_scan() {
 }
 
 #[test]
-fn ringing_changes_smoothly_from_azimuth_to_azimuth_and_where_the_turn_closes() {
+fn ringing_changes_smoothly_between_azimuths_and_across_the_seam() {
     let scan = Setup {
         effects: Effects {
             ringing: true,
@@ -200,7 +202,7 @@ fn ringing_changes_smoothly_from_azimuth_to_azimuth_and_where_the_turn_closes() 
     }
     .scan();
     let rows = powers(&scan);
-    // Decibels by which azimuths so many apart differ, on average over all bins up to 1.3 m.
+    // Differences between azimuths by their distance, dB, averaged over all bins up to 1.3 m.
     let apart_db = |azimuth: usize, apart: usize| {
         let (one, other) = (&rows[azimuth][..30], &rows[(azimuth + apart) % 400][..30]);
         let counts = one
@@ -229,7 +231,7 @@ fn ringing_changes_smoothly_from_azimuth_to_azimuth_and_where_the_turn_closes() 
 }
 
 #[test]
-fn the_own_vehicle_is_behind_the_radar_whichever_way_it_heads() {
+fn the_own_vehicle_is_behind_the_radar_at_any_heading() {
     let setup = |own_vehicle| Setup {
         effects: Effects {
             own_vehicle,
@@ -251,7 +253,7 @@ fn the_own_vehicle_is_behind_the_radar_whichever_way_it_heads() {
     assert!(scans.iter().all(|scan| powers(scan) == powers(&parked)));
     let near = setup(true).bins(0.5..8.0);
     for (azimuth, row) in powers(&parked).into_iter().enumerate() {
-        // 0.7 rad to either side of straight behind, and a beam.
+        // 0.7 rad to either side of straight behind, plus the beam.
         let behind = (150..=250).contains(&azimuth);
         assert!(
             row.iter()
@@ -273,7 +275,7 @@ fn the_own_vehicle_is_behind_the_radar_whichever_way_it_heads() {
 }
 
 #[test]
-fn spurious_lines_stand_at_their_ranges_with_or_without_noise() {
+fn spurious_lines_are_at_their_ranges_with_or_without_noise() {
     let setup = Setup {
         effects: Effects {
             spurious_lines: true,
@@ -288,7 +290,7 @@ fn spurious_lines_stand_at_their_ranges_with_or_without_noise() {
         .collect();
     let lines = lit.chunk_by(|a, b| b - a == 1).count();
     assert_eq!(lines, 4, "{lit:?}");
-    // At 37% of 100 m: 0.9 of the floor, 9.9 dB, of which a cell has two thirds in its own bin.
+    // At 37% of 100 m: 0.9 of the floor, 9.9 dB, of which two thirds are in the line's own bin.
     let line = (200..226)
         .map(|bin| mean_db(&scans, EVERYWHERE, bin..bin + 1))
         .fold(0.0, f64::max);

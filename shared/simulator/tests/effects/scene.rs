@@ -1,4 +1,4 @@
-//! Small scenes, and powers read from what is measured of them.
+//! Small scenes and the powers measured in them.
 
 use std::f64::consts::TAU;
 
@@ -10,7 +10,7 @@ use gyre_simulator::weather::WeatherConfig;
 use gyre_simulator::{Body, Effects, Movers, Path, Scene, Sensor, SensorConfig, SweepTime, World};
 use nalgebra::Point2;
 
-/// What is measured, and how: Oxford's radar at rest, without any effect, unless said otherwise.
+/// A scene and a radar. Default: Oxford's radar at rest, without effects.
 pub struct Setup<'a> {
     pub body: Body,
     pub movers: &'a dyn Movers,
@@ -64,7 +64,7 @@ impl Setup<'_> {
         self.sensor.profile.receiver()
     }
 
-    /// The first scan; the trajectory's time zero is the middle of it.
+    /// Measures the first scan, whose middle is the path's time zero.
     pub fn scan(&self) -> OwnedScan {
         self.scans(1).remove(0)
     }
@@ -101,19 +101,19 @@ impl Setup<'_> {
         (0..count).map(&mut scan).collect()
     }
 
-    /// Bins within ranges in metres.
+    /// The bins of a range interval, metres.
     pub fn bins(&self, range_m: std::ops::Range<f64>) -> std::ops::Range<usize> {
         let bin = |range_m: f64| self.sampling().bin(range_m).round().max(0.0) as usize;
         bin(range_m.start)..bin(range_m.end)
     }
 
-    /// Power that a scatterer of so many square metres at a range is received with, dB.
+    /// Received power of a scatterer with a cross-section at a range, dB.
     pub fn received_db(&self, cross_section_m2: f64, range_m: f64) -> f64 {
         db(cross_section_m2 * self.receiver().sensitivity(range_m))
     }
 }
 
-/// A scatterer at a range, in the middle of an azimuth of Oxford's radar (fractions count).
+/// A scatterer at a range, at the centre of an azimuth of Oxford's radar (with fractions).
 pub fn post(range_m: f64, azimuth: f64, cross_section_m2: f64) -> Scatterer {
     let angle = Profile::Cts350xOxford.sampling().azimuth_rad(0) + azimuth * TAU / 400.0;
     let position = Point2::new(range_m * angle.cos(), -range_m * angle.sin());
@@ -152,7 +152,7 @@ pub fn mean_db(
     db(powers.iter().sum::<f64>() / powers.len() as f64)
 }
 
-/// Strongest power of bins in an azimuth, dB.
+/// Maximum power of bins in an azimuth, dB.
 pub fn peak_db(scan: &OwnedScan, azimuth: usize, bins: std::ops::Range<usize>) -> f64 {
     db(power(
         scan.view().row(azimuth)[bins]
@@ -163,7 +163,7 @@ pub fn peak_db(scan: &OwnedScan, azimuth: usize, bins: std::ops::Range<usize>) -
     ))
 }
 
-/// The bin of the strongest power in an azimuth: the middle of its plateau.
+/// The bin of the maximum power in an azimuth: the middle of its plateau.
 pub fn peak_bin(scan: &OwnedScan, azimuth: usize) -> f64 {
     let row = scan.view().row(azimuth);
     let top = row.iter().copied().max().unwrap();
@@ -171,7 +171,7 @@ pub fn peak_bin(scan: &OwnedScan, azimuth: usize) -> f64 {
     bins.iter().sum::<usize>() as f64 / bins.len() as f64
 }
 
-/// The powers alone, azimuth by azimuth.
+/// The powers without metadata, azimuth by azimuth.
 pub fn powers(scan: &OwnedScan) -> Vec<&[u8]> {
     let view = scan.view();
     (0..view.geometry.azimuths)

@@ -1,4 +1,4 @@
-//! How a lone post flickers as it is passed.
+//! Fluctuation of a single post's echo.
 
 use gyre_geometry::Twist;
 use gyre_radar::OwnedScan;
@@ -8,11 +8,11 @@ use nalgebra::Point2;
 
 use crate::scene::{Setup, peak_db};
 
-/// Scans of a turn about the post.
+/// Number of scans in one turn around the post.
 const SCANS: u64 = 200;
 const TURN_RADPS: f64 = std::f64::consts::TAU / (0.25 * SCANS as f64);
 
-/// So many scans of a post that always stands 20 m to the left: the radar circles about it.
+/// Scans of a post that stays 20 m to the left: the radar circles around it.
 fn scans(count: u64, scintillation: bool, yaw_rate_radps: f64) -> Vec<OwnedScan> {
     let post = Scatterer {
         position: Point2::new(0.0, 20.0),
@@ -47,7 +47,7 @@ fn powers_db(scans: &[OwnedScan]) -> Vec<f64> {
 }
 
 #[test]
-fn a_posts_power_is_spread_exponentially_over_aspects_about_what_it_is_without() {
+fn power_is_exponentially_distributed_over_directions_about_the_constant_one() {
     let (steady, flickering) = (
         powers_db(&scans(SCANS, false, TURN_RADPS)),
         powers_db(&scans(SCANS, true, TURN_RADPS)),
@@ -59,7 +59,8 @@ fn a_posts_power_is_spread_exponentially_over_aspects_about_what_it_is_without()
         .collect();
     let mean = factors.iter().sum::<f64>() / factors.len() as f64;
     assert!((0.75..1.3).contains(&mean), "{mean}");
-    // Of an exponential distribution 1 - exp(-0.2) = 18% lie below a fifth of the mean, exp(-2) = 14% above twice it.
+    // For an exponential distribution 1 - exp(-0.2) = 18% lies below a fifth of the mean, exp(-2) = 14%
+    // above twice it.
     let share = |chosen: &dyn Fn(f64) -> bool| {
         factors.iter().filter(|f| chosen(**f)).count() as f64 / SCANS as f64
     };
@@ -71,7 +72,7 @@ fn a_posts_power_is_spread_exponentially_over_aspects_about_what_it_is_without()
 }
 
 #[test]
-fn power_changes_from_pose_to_pose_and_without_it_or_at_rest_never() {
+fn power_changes_between_poses_and_not_at_rest_or_without_the_effect() {
     let largest_change_db = |powers: &[f64]| {
         powers
             .windows(2)

@@ -27,7 +27,7 @@ const ON: Effects = Effects {
     ..Effects::NONE
 };
 
-/// How much more an echo at 220 m loses by the weather than one at 20 m, dB.
+/// Excess loss by the weather of an echo at 220 m over one at 20 m, dB.
 fn loss_db(weather: WeatherConfig, effects: Effects) -> f64 {
     let loss = |range_m: f64, cross_section_m2: f64| {
         let at = |weather| {
@@ -44,8 +44,9 @@ fn loss_db(weather: WeatherConfig, effects: Effects) -> f64 {
 }
 
 #[test]
-fn rain_attenuates_as_p_838_says() {
-    // ITU-R P.838-3, horizontal polarisation, 76.5 GHz: between k 1.0315, alpha 0.7345 (70 GHz) and 1.1704, 0.7115 (80 GHz).
+fn rain_attenuates_as_in_p_838() {
+    // ITU-R P.838-3, horizontal polarisation, 76.5 GHz: between k 1.0315, alpha 0.7345 (70 GHz) and 1.1704,
+    // 0.7115 (80 GHz).
     let db_km = 1.122 * 100f64.powf(0.7195);
     let loss = loss_db(RAIN, ON);
     assert!(
@@ -57,7 +58,7 @@ fn rain_attenuates_as_p_838_says() {
 }
 
 #[test]
-fn fog_attenuates_as_p_840_says() {
+fn fog_attenuates_as_in_p_840() {
     // 4.6 dB/km for each g/m3 at 76.5 GHz and 10 degrees.
     let loss = loss_db(FOG, ON);
     assert!((loss - 0.4 * 4.6 * 3.0).abs() < 0.8, "{loss} dB");
@@ -65,7 +66,7 @@ fn fog_attenuates_as_p_840_says() {
 }
 
 #[test]
-fn rains_echoes_fill_the_beam_whose_area_grows_with_the_square_of_range() {
+fn rain_fills_the_beam_whose_area_grows_with_the_square_of_range() {
     let setup = Setup {
         weather: RAIN,
         effects: ON,
@@ -82,7 +83,8 @@ fn rains_echoes_fill_the_beam_whose_area_grows_with_the_square_of_range() {
         (far - near - db(16.0)).abs() < 0.4,
         "{far} dB and {near} dB"
     );
-    // So it falls with the square of range where a point's echo falls with the fourth power: here less, as the receiver's gain rises.
+    // So it falls with the square of range, not with the fourth power like a point's echo; here less, since
+    // the receiver's gain rises.
     let setup = Setup {
         weather: RAIN,
         effects: Effects::NONE,
@@ -98,7 +100,7 @@ fn rains_echoes_fill_the_beam_whose_area_grows_with_the_square_of_range() {
 
 #[test]
 fn snow_is_spottier_than_rain() {
-    // Second moment of power over its mean's square: 2 of Gaussian noise.
+    // Second moment of power over the square of its mean: 2 for Gaussian noise.
     let moment = |weather| {
         let setup = Setup {
             weather,

@@ -1,4 +1,5 @@
-//! Recordings of each format: written, read back by the readers for real data, cut short, gone on with, and played without a disk.
+//! Datasets of each format: written, read by the readers for real data, interrupted, resumed, and streamed
+//! without a disk.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -47,7 +48,7 @@ fn written(config: &SimulationConfig) -> tempfile::TempDir {
     folder
 }
 
-/// What the radar knows of itself, but not which format it is: that is to be found.
+/// The options of the radar without the format, which is to be detected.
 fn options(drive: &SimulatedDrive) -> DatasetOptions {
     DatasetOptions {
         format: None,
@@ -105,14 +106,14 @@ fn assert_same_measurement(drive: &SimulatedDrive, read: &OwnedScan, rendered: &
             (read.azimuth_rad[azimuth] + first_rad - rendered.azimuth_rad[azimuth]).abs() < 1e-5
         );
         assert!((read.stamp_ns[azimuth] - rendered.stamp_ns[azimuth]).abs() < 2_000);
-        // Only Oxford's form says which azimuths were filled in.
-        let told = drive.format() == Format::Oxford;
-        assert!(!told || read.flags[azimuth] == rendered.flags[azimuth]);
+        // Only Oxford's format marks interpolated azimuths.
+        let has_flags = drive.format() == Format::Oxford;
+        assert!(!has_flags || read.flags[azimuth] == rendered.flags[azimuth]);
     }
 }
 
 #[test]
-fn each_format_says_where_the_sensor_was() {
+fn each_format_gives_the_poses_of_the_sensor() {
     for format in FORMATS {
         let config = config(format, 8);
         let (folder, drive) = (written(&config), SimulatedDrive::new(&config).unwrap());
@@ -154,7 +155,7 @@ fn pose_at(drive: &SimulatedDrive, stamp_ns: i64) -> Pose {
 }
 
 #[test]
-fn nothing_looks_wrong_to_an_inspection_of_any_format() {
+fn inspection_finds_nothing_odd_in_any_format() {
     for format in FORMATS {
         let config = config(format, 4);
         let (folder, drive) = (written(&config), SimulatedDrive::new(&config).unwrap());
@@ -167,7 +168,7 @@ fn nothing_looks_wrong_to_an_inspection_of_any_format() {
 }
 
 #[test]
-fn a_host_that_stalls_shifts_the_logged_times_and_not_the_sensors_clock() {
+fn a_stalling_host_shifts_the_logged_times_and_not_the_sensors_clock() {
     let mut config = config(OutputFormat::Radiate, 40);
     config.output.host_stamps = HostStamps::Stalling;
     let drive = SimulatedDrive::new(&config).unwrap();
@@ -235,7 +236,7 @@ fn the_number_of_threads_does_not_change_a_byte() {
 }
 
 #[test]
-fn what_was_cut_short_is_kept_and_completed() {
+fn an_interrupted_dataset_is_completed() {
     let config = config(OutputFormat::Boreas, 6);
     let whole = written(&config);
     let cut = written(&config);
@@ -244,7 +245,7 @@ fn what_was_cut_short_is_kept_and_completed() {
         .map(|entry| entry.unwrap().path());
     let images: BTreeMap<_, _> = images.map(|path| (path.clone(), path)).collect();
     let images: Vec<_> = images.into_values().collect();
-    // One is missing, one was under way, and all else is there.
+    // One image is missing, one is incomplete, the others are complete.
     fs::remove_file(&images[2]).unwrap();
     fs::rename(&images[4], images[4].with_extension("part")).unwrap();
     fs::remove_file(cut.path().join("ground_truth.tum")).unwrap();
@@ -264,7 +265,7 @@ fn what_was_cut_short_is_kept_and_completed() {
 }
 
 #[test]
-fn a_recording_grows_to_more_scans() {
+fn a_dataset_is_extended_by_more_scans() {
     for format in FORMATS {
         let folder = written(&config(format, 3));
         let summary = write(&config(format, 5), folder.path()).unwrap();
@@ -277,7 +278,7 @@ fn a_recording_grows_to_more_scans() {
 }
 
 #[test]
-fn a_folder_of_another_origin_is_refused_and_left_as_it_is() {
+fn a_folder_of_another_origin_is_rejected_and_not_changed() {
     let original = config(OutputFormat::Oxford, 3);
     let folder = written(&original);
     let before = all_files(folder.path());
@@ -312,7 +313,7 @@ fn a_folder_of_another_origin_is_refused_and_left_as_it_is() {
 }
 
 #[test]
-fn an_image_that_would_come_out_otherwise_is_told() {
+fn an_image_that_would_be_rendered_differently_is_reported() {
     let config = config(OutputFormat::Oxford, 3);
     let folder = written(&config);
     let first = folder
@@ -322,15 +323,15 @@ fn an_image_that_would_come_out_otherwise_is_told() {
     let mut bytes = fs::read(&first).unwrap();
     *bytes.last_mut().unwrap() ^= 1;
     fs::write(&first, bytes).unwrap();
-    let refused = write(&config, folder.path());
+    let error = write(&config, folder.path());
     assert!(
-        matches!(&refused, Err(SimulatorError::OtherImage { path }) if *path == first),
-        "{refused:?}"
+        matches!(&error, Err(SimulatorError::OtherImage { path }) if *path == first),
+        "{error:?}"
     );
 }
 
 #[test]
-fn played_without_a_disk_it_is_what_it_is_read_from_one() {
+fn streamed_scans_equal_those_from_a_disk() {
     for format in FORMATS {
         let config = config(format, 3);
         let (folder, drive) = (written(&config), SimulatedDrive::new(&config).unwrap());
