@@ -37,6 +37,8 @@ pub enum Command {
     Masks(MasksArguments),
     /// Write a simulated recording, or go on with one.
     Simulate(SimulateArguments),
+    /// Print the JSON schema of configurations, for editors.
+    Schema(SchemaArguments),
 }
 
 /// The arguments of `gyre run`.
@@ -130,6 +132,14 @@ pub struct MasksArguments {
     /// Override a key, as in masking.kind=threshold; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
+}
+
+/// The arguments of `gyre schema`.
+#[derive(Debug, Args)]
+pub struct SchemaArguments {
+    /// Print the reference of the configuration in Markdown instead.
+    #[arg(long)]
+    pub markdown: bool,
 }
 
 /// The arguments of `gyre simulate`.

@@ -27,7 +27,8 @@ use thiserror::Error;
 pub use rate::Rate;
 
 /// A run, section by section. Every key has a default.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, schemars::JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct Configuration {
     /// How to run.
     pub run: RunConfig,
@@ -59,7 +60,7 @@ pub struct Configuration {
 }
 
 /// The section `[run]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RunConfig {
     /// `lossless`: every scan is processed, the source waits. `live`: the newest scan wins. Default `lossless`.
@@ -76,7 +77,7 @@ pub struct RunConfig {
 }
 
 /// What happens when scans come faster than they can be processed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mode {
     /// The source waits.
@@ -86,7 +87,7 @@ pub enum Mode {
 }
 
 /// A section `[stages.NAME]`.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct StageConfig {
     /// Program and arguments of another program that stands in for the stage. Default: `gyre stage NAME`.

@@ -17,6 +17,7 @@ pub mod print;
 pub mod progress;
 pub mod results;
 pub mod run;
+pub mod schema;
 pub mod simulate;
 pub mod stage;
 pub mod summary;
@@ -40,6 +41,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Evaluate(arguments) => evaluate::evaluate(&arguments),
         Command::Masks(arguments) => masks::masks(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
+        Command::Schema(arguments) => schema::schema(&arguments),
     }
 }
 

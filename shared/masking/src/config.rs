@@ -8,7 +8,7 @@ use thiserror::Error;
 use crate::{model::Card, network::NetworkError, runtime};
 
 /// How to mask.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MaskingConfig {
     /// `none`; `threshold`: power below [`MaskingConfig::threshold`] counts as nothing; or `learned`: besides, a network
@@ -47,7 +47,7 @@ pub struct MaskingConfig {
 }
 
 /// The masks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum MaskKind {
     /// Everything counts.
@@ -59,7 +59,9 @@ pub enum MaskKind {
 }
 
 /// Who computes a network.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "lowercase")]
 pub enum Provider {
     /// The processor.

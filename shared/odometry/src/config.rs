@@ -29,7 +29,9 @@ pub struct OdometryConfig {
 }
 
 /// The section `[search]`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(default, deny_unknown_fields)]
 pub struct SearchConfig {
     /// `decoupled`: rotation, then translation, in two processes. `exhaustive`: both together, in one. Default `decoupled`.
@@ -37,7 +39,9 @@ pub struct SearchConfig {
 }
 
 /// How a motion is searched for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum SearchKind {
     /// Rotation first, from the Fourier magnitudes, then translation (Weston et al., Sec. III-C).

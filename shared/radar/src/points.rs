@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 pub const MAX_POINTS: usize = 65_536;
 
 /// Selection of points: the section `[points]` of a configuration.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PointsConfig {
     /// Half width of the non-maximum suppression, degrees, rounded to whole azimuths: a point is the strongest return at its

@@ -36,7 +36,9 @@ pub use sweep_motion::{MAX_TRAVEL_M, MAX_TURN_RAD};
 pub const MAX_CELLS_PER_SIDE: usize = 4096;
 
 /// How the value of a cell is computed from the range bins.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sampling {
     /// The mean of the range bins that one cell covers, linear between azimuths: no aliasing where bins are finer than
@@ -59,7 +61,7 @@ impl fmt::Display for Sampling {
 }
 
 /// Size and sampling of the rasters: the section `[raster]` of a configuration.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RasterConfig {
     /// Cells per side. With an odd number the sensor is at the centre of a cell.

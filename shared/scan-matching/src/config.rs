@@ -19,7 +19,9 @@ pub struct ConfigError {
 }
 
 /// The comparison of two polar spectra.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
+)]
 pub enum RotationForm {
     /// Circular correlation along the angle, summed over radii (Weston et al., Eq. 7).
     #[default]
@@ -32,7 +34,9 @@ pub enum RotationForm {
 }
 
 /// The scale of spectral magnitudes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Magnitude {
     /// The magnitude itself.
@@ -45,7 +49,9 @@ pub enum Magnitude {
 }
 
 /// The weight of the raster before the Fourier transform of the rotation search.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Taper {
     /// No weight, for rasters that already end in zeros.
@@ -59,7 +65,7 @@ pub enum Taper {
 }
 
 /// The interpolation of a peak between samples.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Peak {
     /// A Gaussian over a pedestal, the lowest of the neighbouring samples: errors up to 0.02 of a
@@ -78,7 +84,9 @@ pub enum Peak {
 }
 
 /// The normalisation for an overlap that shrinks as the shift grows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Overlap {
     /// None: the plain correlation, biased towards zero shift.
@@ -92,7 +100,7 @@ pub enum Overlap {
 }
 
 /// Configuration of [`RotationSearch`](crate::RotationSearch): section `[rotation]`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RotationConfig {
     /// Comparison of the polar spectra: `eq7` (Weston et al., Eq. 7) or `line14` (their Algorithm
@@ -145,7 +153,7 @@ impl Default for RotationConfig {
 }
 
 /// Configuration of [`TranslationSearch`](crate::TranslationSearch): section `[translation]`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TranslationConfig {
     /// Largest shift searched along each axis, m.

@@ -17,7 +17,7 @@ use crate::weather::WeatherConfig;
 ///
 /// One configuration gives one dataset, byte for byte (with one build on one kind of machine: sines and
 /// logarithms are the system's).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SimulationConfig {
     /// Scans to generate. A drive round a block is repeated as long as they last; after the end of any

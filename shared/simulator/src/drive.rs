@@ -11,7 +11,9 @@ use crate::path::recorded::{self, Excerpt};
 use crate::path::{BlockLoop, Path, TownDrive};
 
 /// The kind of a drive.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "lowercase")]
 pub enum DriveKind {
     /// Laps of a rectangular block of houses, without end.
@@ -24,7 +26,7 @@ pub enum DriveKind {
 }
 
 /// The path of the vehicle and its speed.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DriveConfig {
     /// `block`, `town` or `file`. Keys of the other kinds have no effect.

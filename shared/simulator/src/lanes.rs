@@ -6,7 +6,9 @@ use serde::{Deserialize, Serialize};
 pub const LANE_M: f64 = 3.2;
 
 /// The side of the road on which vehicles drive.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "lowercase")]
 pub enum DrivingSide {
     /// As in Britain, where Oxford's and RADIATE's recordings were made.

@@ -7,7 +7,7 @@ use gyre_radar::Format;
 use serde::{Deserialize, Serialize};
 
 /// The format of the dataset.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct OutputConfig {
     /// Format of the files. Default: in a run that of `dataset.format`, else Oxford's.
@@ -21,7 +21,9 @@ pub struct OutputConfig {
 }
 
 /// A dataset format that can be written.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum OutputFormat {
     /// Oxford Radar RobotCar. Fits every radar.
@@ -77,7 +79,9 @@ impl OutputFormat {
 }
 
 /// The delays with which a host receives scans.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum HostStamps {
     /// The same delay for each scan.

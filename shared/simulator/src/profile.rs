@@ -8,7 +8,9 @@ use serde::{Deserialize, Serialize};
 pub const METADATA_BYTES: usize = 11;
 
 /// A radar.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum Profile {
     /// Navtech CTS350-X as recorded by Oxford Radar RobotCar: 3768 bins of 0.0438 m.

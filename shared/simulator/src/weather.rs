@@ -11,7 +11,7 @@ use crate::error::SimulatorError;
 use crate::limits::require_within;
 
 /// The weather from a time on: a section `[[simulation.weather]]`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct WeatherConfig {
     /// Start, seconds after the start of the drive; the latest section that has started applies.

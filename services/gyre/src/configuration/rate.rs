@@ -1,7 +1,8 @@
 //! How fast a recording is played.
 
-use std::{fmt, str::FromStr};
+use std::{borrow::Cow, fmt, str::FromStr};
 
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 /// The pace of the source.
@@ -63,5 +64,18 @@ impl<'de> Deserialize<'de> for Rate {
             number => number.to_string(),
         };
         text.parse().map_err(de::Error::custom)
+    }
+}
+
+impl JsonSchema for Rate {
+    fn schema_name() -> Cow<'static, str> {
+        "Rate".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "anyOf": [
+            { "enum": ["max", "realtime"] },
+            { "type": "number", "minimum": 0.001, "maximum": 1000 },
+        ] })
     }
 }

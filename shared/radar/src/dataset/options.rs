@@ -8,7 +8,7 @@ use super::error::OpenError;
 use super::format::Format;
 
 /// The source of the azimuth angles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum AzimuthSource {
     /// The encoder count of each row.
@@ -18,7 +18,7 @@ pub enum AzimuthSource {
 }
 
 /// How to read a dataset: the section `[dataset]` of a configuration. All keys are optional; the defaults depend on the format.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct DatasetOptions {
     /// The file format. Default: detected from the folder, else from the first image.

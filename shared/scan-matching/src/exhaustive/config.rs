@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::config::{ConfigError, Overlap, Peak, accept, positive};
 
 /// Configuration of [`ExhaustiveSearch`](crate::ExhaustiveSearch): section `[exhaustive]`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ExhaustiveConfig {
     /// Largest angle searched to either side, degrees; 180 is the whole circle.

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::config::{ConfigError, accept, positive};
 
 /// Configuration of [`Refiner`](crate::Refiner): section `[refinement]`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RefinementConfig {
     /// `none`: the searched motion is the result. `local-map`: it is refined by registration
@@ -55,7 +55,9 @@ pub struct RefinementConfig {
 }
 
 /// The refinement of searched motions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum RefinementKind {
     /// No refinement.

@@ -7,7 +7,7 @@ use crate::limits::require_within;
 use crate::profile::{Profile, Sampling};
 
 /// The radar, and its deviations from its profile.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SensorConfig {
     /// The radar. Default: `cts350x-oxford`.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// crate's folder shows each off and on, with its source.
 ///
 /// Each has its own random numbers, so switching one does not change the others.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Effects {
     /// Each azimuth is measured at its own time from its own pose; off: all at the middle of the sweep.

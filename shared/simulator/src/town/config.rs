@@ -6,7 +6,7 @@ use crate::error::SimulatorError;
 use crate::limits::require_within;
 
 /// The buildings and other objects along the streets.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TownConfig {
     /// The type of development.
@@ -18,7 +18,9 @@ pub struct TownConfig {
 }
 
 /// A type of development.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum Character {
     /// The other types in turn, each for some hundred metres.

@@ -6,7 +6,7 @@ use crate::error::SimulatorError;
 use crate::limits::require_within;
 
 /// The density of traffic.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrafficConfig {
     /// Motor vehicles on a kilometre of each lane; 0 for none, not even in side streets.

@@ -36,14 +36,14 @@ pub struct StagePlan {
 }
 
 /// When to give up on a stage: after `limit` restarts within `window_s`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RestartPolicy {
-    /// Restarts within `window_s` that are not yet too many. Default 5.
+    /// Maximum number of restarts within `window_s`; one more ends the run.
     pub limit: usize,
-    /// Seconds. Default 30.
+    /// Length of the time window of `limit`, s.
     pub window_s: f64,
-    /// Wait before starting a stage again that ended by itself, ms; one that was killed is started at once. Default 100.
+    /// Delay before the restart of a stage that ended by itself, ms. A killed one is restarted at once.
     pub backoff_ms: u64,
 }
 
