@@ -26,36 +26,38 @@ use thiserror::Error;
 
 pub use rate::Rate;
 
-/// A run, section by section. Every key has a default.
+/// The configuration of a run. Every key has a default.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, schemars::JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub struct Configuration {
-    /// How to run.
+    /// The mode and pace of the run.
     pub run: RunConfig,
-    /// What to play.
+    /// The recording to play.
     pub source: SourceConfig,
-    /// How to read it.
+    /// The format of the recording and the constants of its radar. A key that is left out is taken
+    /// from the recording's `dataset.toml`, else from the format.
     pub dataset: DatasetOptions,
-    /// A drive to be simulated and played, instead of `source.data`.
+    /// A drive to simulate and play, instead of `source.data`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub simulation: Option<SimulationConfig>,
     /// The Cartesian rasters.
     pub raster: RasterConfig,
-    /// The sparse points beside them.
+    /// The sparse points, which the refinement registers.
     pub points: PointsConfig,
-    /// What to take out of them.
+    /// Masks and motion compensation.
     pub masking: MaskingConfig,
-    /// Which search.
+    /// The kind of the search.
     pub search: SearchConfig,
-    /// The search for the rotation.
+    /// The rotation search.
     pub rotation: RotationConfig,
-    /// The search for the translation.
+    /// The translation search.
     pub translation: TranslationConfig,
-    /// The search for both together.
+    /// The exhaustive search, for `search.kind = "exhaustive"`.
     pub exhaustive: ExhaustiveConfig,
-    /// What becomes of the motion that was found.
+    /// The refinement of searched motions.
     pub refinement: RefinementConfig,
-    /// Stages that are started or restarted differently, by name.
+    /// The command and the restarts of a stage: `radar-replay`, `masking`, `rotation-search`,
+    /// `translation-search`, `joint-search`, `refinement` or `pose-integration`.
     pub stages: BTreeMap<String, StageConfig>,
 }
 
@@ -63,15 +65,17 @@ pub struct Configuration {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RunConfig {
-    /// `lossless`: every scan is processed, the source waits. `live`: the newest scan wins. Default `lossless`.
+    /// `lossless`: every scan is processed, and the source waits. `live`: the newest scan wins.
     pub mode: Mode,
-    /// Most scans between admission and their pose. More than the free cores buys nothing and costs latency. Default 4.
+    /// Maximum number of scans between admission and their pose, 1 to 64. More than the free cores
+    /// increases latency and not throughput.
     pub window: usize,
-    /// `max`, `realtime` or a factor. Default `max`; live mode needs another.
+    /// Pace of the source: `max`, `realtime`, or a factor of real time from 0.001 to 1000. Live mode
+    /// needs another than `max`.
     pub rate: Rate,
-    /// Start all stages again when no pose has come for so long, s; 0: never. Default 60.
+    /// Time without a new pose after which all stages are restarted, s; 0: never.
     pub stall_timeout_s: f64,
-    /// Ground truth to judge the result by. Default: what lies in the dataset's folder.
+    /// Ground truth for the evaluation. Default: the one in the recording's folder.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ground_truth: Option<PathBuf>,
 }
@@ -90,10 +94,10 @@ pub enum Mode {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct StageConfig {
-    /// Program and arguments of another program that stands in for the stage. Default: `gyre stage NAME`.
+    /// Program and arguments of a replacement. Default: `gyre stage NAME`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub command: Vec<String>,
-    /// When to give up on it.
+    /// Limits of its restarts.
     pub restart: RestartPolicy,
 }
 

@@ -7,58 +7,59 @@ use thiserror::Error;
 
 use crate::{model::Card, network::NetworkError, runtime};
 
-/// How to mask.
+/// The mask and motion compensation: section `[masking]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MaskingConfig {
-    /// `none`; `threshold`: power below [`MaskingConfig::threshold`] counts as nothing; or `learned`: besides, a network
-    /// says for each cell how much it counts. Default `threshold`.
+    /// `none`: everything counts. `threshold`: power below `threshold` counts as zero. `learned`: in
+    /// addition, a network weights each cell.
     pub kind: MaskKind,
-    /// Power that counts as nothing, 0 to 255; a network does not even see it. Default 60.
+    /// Power below which a return counts as zero, 0 to 255, before any network.
     pub threshold: u8,
-    /// The card of the network, `models/NAME.toml`: see [`crate::model::Card`].
+    /// Model card of the network, as `models/NAME.toml`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<PathBuf>,
-    /// The network's SHA-256, where it must not be another one. Default: what its card says.
+    /// SHA-256 of the network, to refuse another one. Default: the one of its card.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sha256: Option<String>,
-    /// ONNX Runtime's library, or the folder that it is in. Default: see [`crate::runtime::find`].
+    /// The library of ONNX Runtime, or its folder. Default: it is searched for, see docs/masks.md.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub runtime: Option<PathBuf>,
-    /// Threads that compute the network, 1 to 64. Default 1, for the other stages work at the same time.
+    /// Threads that compute the network, 1 to 64. The other stages work at the same time.
     pub threads: usize,
-    /// Who computes it: `cpu`, or one that Gyre was built for: `cuda`, `tensorrt`, `openvino`. Default `cpu`.
+    /// Execution provider of the network: `cpu`, or `cuda`, `tensorrt` or `openvino` in a build with
+    /// that feature.
     pub provider: Provider,
-    /// A sparse point's weight is multiplied by the network's mask to the power of this: 0, the mask says nothing of points;
-    /// 1, it counts as it does in the rasters. A point's weight is its power compressed, so its mask is to be compressed
-    /// too: in full it makes the faintest lone returns weigh the most. Default 0.5.
+    /// Exponent of the network's mask in the weights of the sparse points, 0 to 4: 0 ignores the
+    /// mask, 1 applies it as in the rasters. The weights are compressed powers, so the mask is
+    /// compressed too; in full it gives the weakest single returns the largest weights.
     pub point_exponent: f32,
-    /// Undo the distortion that the vehicle's motion puts into a sweep. Default true.
+    /// Whether rasters are motion compensated.
     pub compensate: bool,
-    /// Which motion to undo it with: that of the scan so many scans before, at least 1. With 2 or more the stages overlap
-    /// across scans. Default 2.
+    /// Motion compensation of scan k uses the motion of scan k - lag; 1 to 16. With 2 or more the
+    /// stages overlap across scans.
     pub lag: usize,
-    /// Undo Doppler's shift in the rasters too, with the same motion, where the scan knows it. At constant speed the shift
-    /// cancels between rasters; undone, it cancels only between scans that both know their motion, and a motion seems
-    /// too short by the whole shift where compensation sets in. Default false.
+    /// Whether rasters are also compensated for the Doppler shift, with the same motion. At constant
+    /// speed the shift cancels between rasters. Compensated, it cancels only between scans that both
+    /// have a known motion, so the motion where compensation begins is short by the whole shift.
     pub undo_doppler: bool,
-    /// Wait so long over each scan, ms: to see what happens under load. Default 0.
+    /// Delay for each scan, ms, to test behaviour under load.
     pub stress_delay_ms: u64,
 }
 
-/// The masks.
+/// The kind of a mask.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum MaskKind {
     /// Everything counts.
     None,
-    /// Weak returns count as nothing.
+    /// Weak returns count as zero.
     Threshold,
-    /// A network weighs what is above the threshold.
+    /// A network weights what is above the threshold.
     Learned,
 }
 
-/// Who computes a network.
+/// The execution provider of a network.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
 )]

@@ -12,17 +12,17 @@ use serde::{Deserialize, Serialize};
 pub struct OdometryConfig {
     /// The Cartesian rasters.
     pub raster: RasterConfig,
-    /// The sparse points beside them.
+    /// The sparse points, which the refinement registers.
     pub points: PointsConfig,
     /// The mask, and motion compensation.
     pub masking: MaskingConfig,
-    /// Which search.
+    /// The kind of the search.
     pub search: SearchConfig,
-    /// The search for the rotation.
+    /// The rotation search.
     pub rotation: RotationConfig,
-    /// The search for the translation.
+    /// The translation search.
     pub translation: TranslationConfig,
-    /// The search for both together.
+    /// The exhaustive search, for `search.kind = "exhaustive"`.
     pub exhaustive: ExhaustiveConfig,
     /// The refinement against the local map.
     pub refinement: RefinementConfig,
@@ -34,11 +34,11 @@ pub struct OdometryConfig {
 )]
 #[serde(default, deny_unknown_fields)]
 pub struct SearchConfig {
-    /// `decoupled`: rotation, then translation, in two processes. `exhaustive`: both together, in one. Default `decoupled`.
+    /// `decoupled`: rotation, then translation. `exhaustive`: both together, every angle.
     pub kind: SearchKind,
 }
 
-/// How a motion is searched for.
+/// The kind of a search.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
 )]
