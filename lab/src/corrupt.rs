@@ -18,7 +18,7 @@ use std::{
 };
 
 use clap::ValueEnum;
-use gyre::{Failure, picture::Picture, print};
+use gyre::{Failure, picture::write_grey, print};
 use gyre_radar::{Dataset, DatasetOptions, OwnedScan};
 use rand::{RngCore, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -173,14 +173,12 @@ impl Plan {
             let column = |bin| powers.iter().skip(bin).step_by(geometry.bins).copied();
             scan.bytes = (0..geometry.bins).flat_map(column).collect();
         }
-        let size = dataset.image_size();
-        let picture = Picture {
-            width: size.width,
-            height: size.height,
-            pixels: scan.bytes,
-        };
         let file = dataset.file(index).file_name().unwrap_or_default();
-        Ok(picture.write(&folder.join(file))?)
+        Ok(write_grey(
+            &folder.join(file),
+            dataset.image_size().width,
+            &scan.bytes,
+        )?)
     }
 }
 

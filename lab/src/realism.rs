@@ -6,41 +6,35 @@
 //! - [`recording`]: a recording that was named, its scans and how they moved, what the searches reach on it;
 //! - [`statistics`]: measures a recording, scan by scan: [`grid`], [`histogram`], [`correlation`], [`streaks`] (azimuths that are bright
 //!   over their whole length) and [`change`] (from a scan to the next) have a statistic each;
-//! - [`comparison`]: the distances, and which of two recordings is closer;
-//! - [`plot`]: the curves of several recordings as SVG; [`markdown`]: the tables as text.
+//! - [`comparison`]: the distances, and which of two recordings is closer.
 
 mod change;
 mod comparison;
 mod correlation;
 mod grid;
 mod histogram;
-mod markdown;
-mod plot;
 mod recording;
 mod statistics;
 mod streaks;
 #[cfg(test)]
 mod tests;
 
-use std::{
-    path::{Path, PathBuf},
-    process::ExitCode,
-};
+use std::{path::PathBuf, process::ExitCode};
 
-use gyre::{Failure, picture::Picture, print};
+use gyre::{Failure, print};
 use gyre_masking::MaskingConfig;
 use serde::Serialize;
 
 use crate::{
     cli::RealismArguments,
-    report::{make_folder, publish, save},
+    report::{make_folder, number, or_dash, publish, table},
 };
-use comparison::{Comparison, compare};
+use comparison::{Comparison, Row, compare};
 use grid::RangeGrid;
-use recording::{Measured, Recording, Source};
+use recording::{Measured, Source};
 use statistics::MeterConfig;
 
-/// Cells of the rasters in which consecutive scans are compared, and pixels of the pictures, m.
+/// Cells of the rasters in which consecutive scans are compared, m.
 const CELL_M: f32 = 0.4;
 
 /// `realism.json`.
@@ -67,7 +61,7 @@ struct Subject {
     measured: Measured,
 }
 
-/// Measures the recordings, compares them, and writes tables, plots and pictures.
+/// Measures the recordings, compares them, and writes both.
 ///
 /// # Errors
 /// What cannot be read, run or written.
@@ -76,7 +70,7 @@ pub fn realism(arguments: &RealismArguments) -> Result<ExitCode, Failure> {
     let mut sources = sources(arguments)?;
     let geometries = sources
         .iter_mut()
-        .map(|source| Ok(source.scan(false)?.geometry));
+        .map(|source| Ok(source.first_scan()?.geometry));
     let geometries = geometries.collect::<Result<Vec<_>, Failure>>()?;
     let grid =
         RangeGrid::common(&geometries).ok_or("the recordings' scans have no range in common")?;
@@ -92,19 +86,11 @@ pub fn realism(arguments: &RealismArguments) -> Result<ExitCode, Failure> {
     for source in &mut sources {
         source.search(arguments.search_scans, out)?;
         print::note(format_args!("{}: statistics", source.role));
-        draw(source, out)?;
         subjects.push(Subject {
             role: source.role,
             data: source.data.clone(),
             measured: source.measure(config, arguments.scans.get())?,
         });
-    }
-    let recordings: Vec<&Recording> = subjects
-        .iter()
-        .map(|subject| &subject.measured.whole)
-        .collect();
-    for (name, svg) in plot::curves(&recordings)? {
-        save(&out.join(format!("{name}.svg")), &svg)?;
     }
     let other = subjects.get(2).map(|other| &other.measured);
     let comparison = compare(&subjects[0].measured, &subjects[1].measured, other);
@@ -115,7 +101,7 @@ pub fn realism(arguments: &RealismArguments) -> Result<ExitCode, Failure> {
         subjects,
         comparison,
     };
-    publish(out, "realism", &report, &markdown::of(&report))?;
+    publish(out, "realism", &report, &report.markdown())?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -136,10 +122,63 @@ fn sources(arguments: &RealismArguments) -> Result<Vec<Source>, Failure> {
     named.into_iter().filter_map(open).collect()
 }
 
-/// Draws the scan half-way through from above and as measured.
-fn draw(source: &mut Source, out: &Path) -> Result<(), Failure> {
-    let scan = source.scan(true)?;
-    let path = |what: &str| out.join(format!("{}{what}.png", source.role));
-    Picture::from_above(&scan.view(), CELL_M)?.write(&path(""))?;
-    Ok(Picture::as_measured(&scan.view()).write(&path("-as-measured"))?)
+impl Report {
+    fn markdown(&self) -> String {
+        let subjects = self.subjects.iter();
+        let names =
+            subjects.map(|subject| format!("{}: {}", subject.role, subject.measured.whole.name));
+        let mut header = vec!["statistic".to_owned()];
+        header.extend(names);
+        header.extend(["distance", "within real", "sim-real"].map(str::to_owned));
+        let between = self.subjects.len() > 2;
+        let others = ["real-other", "within other", "sim is"].map(str::to_owned);
+        header.extend(others.into_iter().filter(|_| between));
+        let rows = self
+            .comparison
+            .rows
+            .iter()
+            .map(|row| cells(row, self.subjects.len()));
+        let verdict = format!(
+            "\ncloser in {} of {}\n",
+            self.comparison.closer, self.comparison.judged
+        );
+        format!(
+            "# Realism\n\nPowers averaged over {:.4} m of range up to {:.1} m, the coarsest and the shortest of the recordings'; saturation \
+             in the sensors' own bins; consecutive scans compared in cells of {} m; `within` is between a recording's halves, \
+             and what is no more than that is chance.\n\n{}{}",
+            self.grid.resolution_m,
+            self.grid.range_m(),
+            self.cell_m,
+            table(&header, rows),
+            if between { &verdict } else { "" }
+        )
+    }
+}
+
+fn cells(row: &Row, recordings: usize) -> Vec<String> {
+    let verdict = match row.closer {
+        None => "-",
+        Some(true) => "closer",
+        Some(false) if row.is_within_chance() => "farther, within chance",
+        Some(false) => "farther",
+    };
+    let mut cells = vec![row.statistic.to_owned()];
+    cells.extend(
+        row.values
+            .iter()
+            .take(recordings)
+            .map(|value| or_dash(value.as_ref())),
+    );
+    cells.extend([
+        row.distance.to_owned(),
+        number(row.within_real, 3),
+        number(row.sim_real, 3),
+    ]);
+    let others = [
+        number(row.real_other, 3),
+        number(row.within_other, 3),
+        verdict.to_owned(),
+    ];
+    cells.extend(others.into_iter().filter(|_| recordings > 2));
+    cells
 }

@@ -43,69 +43,24 @@ pub struct Sequence {
     pub data: PathBuf,
 }
 
-/// A figure of `summary.json`.
-struct Figure {
-    key: &'static str,
-    heading: &'static str,
-    decimals: usize,
-    place: &'static str,
-}
-
-const fn figure(
-    key: &'static str,
-    heading: &'static str,
-    decimals: usize,
-    place: &'static str,
-) -> Figure {
-    Figure {
-        key,
-        heading,
-        decimals,
-        place,
-    }
-}
-
-/// The figures of a run that tables show. Those without a place are made of several.
-const FIGURES: [Figure; 11] = [
-    figure("path_m", "path m", 0, "/evaluation/path_m"),
-    figure(
-        "translation_percent",
-        "KITTI %",
-        2,
-        "/evaluation/kitti/translation_percent",
-    ),
-    figure(
-        "rotation_deg_per_100m",
-        "deg/100 m",
-        2,
-        "/evaluation/kitti/rotation_deg_per_100m",
-    ),
-    figure(
-        "rotation_deg_per_km",
-        "deg/km",
-        2,
-        "/evaluation/kitti/rotation_deg_per_km",
-    ),
-    figure("ate_m", "ATE m", 2, "/evaluation/ate/rmse_m"),
-    figure("seg_percent", "seg %", 3, "/evaluation/seg/percent"),
-    figure(
-        "pair_rotation_deg",
-        "deg a scan",
-        3,
-        "/evaluation/rpe/rotation_rmse_deg",
-    ),
-    figure(
-        "forward_ratio",
-        "forward",
-        4,
-        "/evaluation/rpe/forward_ratio",
-    ),
-    figure("masking_ms", "masking ms", 2, ""),
-    figure("search_ms", "search ms", 2, ""),
-    figure("scans_per_s", "scans/s", 0, "/scans_per_s"),
+/// The figures of a run that tables show: place in the evaluation of `summary.json`, heading, decimals. The last three are made of
+/// other parts of it.
+const FIGURES: [(&str, &str, usize); 12] = [
+    ("path_m", "path m", 0),
+    ("kitti/translation_percent", "KITTI %", 2),
+    ("kitti/rotation_deg_per_100m", "deg/100 m", 2),
+    ("kitti/rotation_deg_per_km", "deg/km", 2),
+    ("ate/rmse_m", "ATE m", 2),
+    ("seg/percent", "seg %", 3),
+    ("rpe/translation_rmse_m", "m a scan", 3),
+    ("rpe/rotation_rmse_deg", "deg a scan", 3),
+    ("rpe/forward_ratio", "forward", 4),
+    ("masking_ms", "masking ms", 2),
+    ("search_ms", "search ms", 2),
+    ("scans_per_s", "scans/s", 0),
 ];
 
-/// The figures of a run by their keys; one is missing without a ground truth that fits, or where the truth allows none.
+/// Figures of a run by their places; one is missing without a ground truth that fits, or where the truth allows none.
 pub type Figures = BTreeMap<&'static str, f64>;
 
 /// A row of an [`Experiment`].
@@ -286,8 +241,10 @@ impl Sequence {
 /// The figures of `summary.json`.
 fn figures(summary: &Value) -> Figures {
     let at = |place: &str| summary.pointer(place).and_then(Value::as_f64);
+    let judged =
+        |(place, ..): &(&'static str, _, _)| Some((*place, at(&format!("/evaluation/{place}"))?));
     let work_ms = |stage: StageId| {
-        at(&["/latency/stages", stage.name(), "work", "p50_us"].join("/")).unwrap_or(0.0) * 1e-3
+        at(&format!("/latency/stages/{}/work/p50_us", stage.name())).unwrap_or(0.0) * 1e-3
     };
     let around = [
         StageId::RadarReplay,
@@ -297,12 +254,10 @@ fn figures(summary: &Value) -> Figures {
     let searching = StageId::ALL
         .into_iter()
         .filter(|stage| !around.contains(stage));
-    let known = FIGURES
-        .iter()
-        .filter_map(|figure| Some((figure.key, at(figure.place)?)));
-    let mut figures: Figures = known.collect();
+    let mut figures: Figures = FIGURES.iter().filter_map(judged).collect();
     figures.insert("masking_ms", work_ms(StageId::Masking));
     figures.insert("search_ms", searching.map(work_ms).sum());
+    figures.extend(at("/scans_per_s").map(|rate| ("scans_per_s", rate)));
     figures
 }
 
@@ -311,15 +266,16 @@ impl Experiment {
     pub fn markdown(&self) -> String {
         let papers = self.lines.iter().any(|line| line.paper != [None; 2]);
         let mut header = vec!["row"];
-        header.extend(FIGURES.map(|figure| figure.heading));
+        header.extend(FIGURES.map(|(_, heading, _)| heading));
         header.extend(if papers {
             &["paper %", "paper deg/km"][..]
         } else {
             &[]
         });
         let cells = |line: &Line| {
-            let ours =
-                |figure: &Figure| number(line.figures.get(figure.key).copied(), figure.decimals);
+            let ours = |(place, _, decimals): &(&str, &str, usize)| {
+                number(line.figures.get(place).copied(), *decimals)
+            };
             let paper = line.paper.map(|figure| number(figure, 2));
             let shown = if papers { &paper[..] } else { &[] };
             let ours = FIGURES.iter().map(ours).chain(shown.iter().cloned());
@@ -352,7 +308,7 @@ impl Experiment {
 }
 
 /// What the columns of [`Experiment::markdown`] mean.
-pub const LEGEND: &str = "\nKITTI and seg need a truth of more than 100 m. deg a scan: rotation error of single motions, RMS. \
+pub const LEGEND: &str = "\nKITTI and seg need a truth of more than 100 m. m and deg a scan: errors of single motions, RMS. \
     forward: estimated over true distance. ms: median work of the stages in the running pipeline. -: not known.\n";
 
 #[cfg(test)]
@@ -388,10 +344,10 @@ mod tests {
         });
         let summary = json!({ "scans_per_s": 120.5, "latency": { "stages": stages }, "evaluation": evaluation });
         let expected = [
-            ("ate_m", 0.5),
+            ("ate/rmse_m", 0.5),
             ("masking_ms", 2.0),
-            ("pair_rotation_deg", 0.25),
             ("path_m", 22.0),
+            ("rpe/rotation_rmse_deg", 0.25),
             ("scans_per_s", 120.5),
             ("search_ms", 2.25),
         ];
@@ -402,7 +358,7 @@ mod tests {
     fn a_table_has_ours_and_where_there_are_any_the_papers_figures() {
         let line = Line {
             row: "raw".to_owned(),
-            figures: Figures::from([("ate_m", 1.5), ("scans_per_s", 120.4)]),
+            figures: Figures::from([("ate/rmse_m", 1.5), ("scans_per_s", 120.4)]),
             ..Line::default()
         };
         let mut experiment = Experiment {
@@ -411,14 +367,14 @@ mod tests {
             lines: vec![line],
             left_out: Notes::new(),
         };
-        let plain = "| raw | - | - | - | - | 1.50 | - | - | - | - | - | 120 |\n";
+        let plain = "| raw | - | - | - | - | 1.50 | - | - | - | - | - | - | 120 |\n";
         assert!(
             experiment.markdown().contains(plain),
             "{}",
             experiment.markdown()
         );
         experiment.lines[0].paper = [Some(6.39), None];
-        let beside = "| raw | - | - | - | - | 1.50 | - | - | - | - | - | 120 | 6.39 | - |\n";
+        let beside = "| raw | - | - | - | - | 1.50 | - | - | - | - | - | - | 120 | 6.39 | - |\n";
         assert!(
             experiment.markdown().contains(beside),
             "{}",

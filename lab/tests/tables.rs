@@ -136,7 +136,7 @@ fn both_tables_are_filled_and_their_commands_repeat_the_runs() {
     for row in ROWS {
         let figures = &line(accuracy, row)["figures"];
         let [path, ate, search] =
-            ["path_m", "ate_m", "search_ms"].map(|key| figures[key].as_f64().unwrap());
+            ["path_m", "ate/rmse_m", "search_ms"].map(|key| figures[key].as_f64().unwrap());
         assert!(
             path > 40.0 && ate < 0.05 * path && search > 0.0,
             "{row}: {figures:#}"
@@ -211,7 +211,7 @@ fn masked_rows_are_timed_and_run_with_the_networks_that_there_are() {
     );
 
     let accuracy = &json["accuracy"][0]["lines"];
-    let ate = |row: &str| line(accuracy, row)["figures"]["ate_m"].clone();
+    let ate = |row: &str| line(accuracy, row)["figures"]["ate/rmse_m"].clone();
     for row in masked {
         assert!(
             line(accuracy, row)["figures"]["masking_ms"]
@@ -241,7 +241,10 @@ fn an_ablation_has_a_learned_mask_where_the_network_fits_the_raster() {
         [0, 1].map(|sequence| json["experiments"][sequence]["lines"].as_array().unwrap());
     assert_eq!((small.len(), wide.len()), (10, 9));
     assert_eq!(small[5]["row"], "6 learned mask");
-    assert_ne!(small[5]["figures"]["ate_m"], small[4]["figures"]["ate_m"]);
+    assert_ne!(
+        small[5]["figures"]["ate/rmse_m"],
+        small[4]["figures"]["ate/rmse_m"]
+    );
     let is_masked = |step: &Value| {
         step["command"]
             .as_str()
@@ -264,7 +267,8 @@ fn an_ablation_leads_from_the_papers_form_to_each_sequences_own_configuration() 
         [0, 1].map(|sequence| json["experiments"][sequence]["lines"].as_array().unwrap());
     assert_eq!((small.len(), wide.len()), (9, 9));
     for step in small.iter().chain(wide) {
-        let [path, ate] = ["path_m", "ate_m"].map(|key| step["figures"][key].as_f64().unwrap());
+        let [path, ate] =
+            ["path_m", "ate/rmse_m"].map(|key| step["figures"][key].as_f64().unwrap());
         assert!(path > 40.0 && ate < 0.05 * path, "{step:#}");
         let line = format!("| {} | ", step["row"].as_str().unwrap());
         assert!(ended.stdout.contains(&line), "{line}: {}", ended.stdout);
@@ -272,7 +276,7 @@ fn an_ablation_leads_from_the_papers_form_to_each_sequences_own_configuration() 
     let ates = |steps: &[Value]| {
         steps
             .iter()
-            .map(|step| step["figures"]["ate_m"].clone())
+            .map(|step| step["figures"]["ate/rmse_m"].clone())
             .collect::<Vec<_>>()
     };
     // The same raster up to the step to their own.
@@ -300,7 +304,7 @@ fn single_changes_are_run_alone_and_have_a_median() {
             "median of the changes"
         ]
     );
-    let ate = |line: &Value| line["figures"]["ate_m"].as_f64().unwrap();
+    let ate = |line: &Value| line["figures"]["ate/rmse_m"].as_f64().unwrap();
     assert_eq!(ate(&lines[3]), ate(&lines[1]).max(ate(&lines[2])));
 }
 

@@ -148,27 +148,27 @@ static STATISTICS: [(&str, Kind); 14] = [
     ),
     (
         "plain search: translation of a motion",
-        Kind::Number(METRES, |r| Some(r.plain?.translation_rmse_m)),
+        Kind::Number(METRES, |r| r.plain.get("rpe/translation_rmse_m").copied()),
     ),
     (
         "plain search: rotation of a motion",
-        Kind::Number(DEGREES, |r| Some(r.plain?.rotation_rmse_deg)),
+        Kind::Number(DEGREES, |r| r.plain.get("rpe/rotation_rmse_deg").copied()),
     ),
     (
         "plain search: seg",
-        Kind::Number(PERCENT, |r| r.plain?.seg_percent),
+        Kind::Number(PERCENT, |r| r.plain.get("seg/percent").copied()),
     ),
     (
         "refined search: translation of a motion",
-        Kind::Number(METRES, |r| Some(r.refined?.translation_rmse_m)),
+        Kind::Number(METRES, |r| r.refined.get("rpe/translation_rmse_m").copied()),
     ),
     (
         "refined search: rotation of a motion",
-        Kind::Number(DEGREES, |r| Some(r.refined?.rotation_rmse_deg)),
+        Kind::Number(DEGREES, |r| r.refined.get("rpe/rotation_rmse_deg").copied()),
     ),
     (
         "refined search: seg",
-        Kind::Number(PERCENT, |r| r.refined?.seg_percent),
+        Kind::Number(PERCENT, |r| r.refined.get("seg/percent").copied()),
     ),
 ];
 

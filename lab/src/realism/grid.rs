@@ -31,11 +31,6 @@ impl RangeGrid {
         })
     }
 
-    /// Range of a cell's centre, m.
-    pub fn centre_m(&self, cell: usize) -> f64 {
-        (cell as f64 + 0.5) * f64::from(self.resolution_m)
-    }
-
     /// The cell at a range; `None` beyond the grid.
     pub fn cell_at(&self, range_m: f64) -> Option<usize> {
         let cell = range_m / f64::from(self.resolution_m);

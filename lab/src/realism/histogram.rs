@@ -26,11 +26,6 @@ impl Histogram {
         }
     }
 
-    /// Returns all counts, by power.
-    pub fn counts(&self) -> &[u64] {
-        &self.counts
-    }
-
     /// Returns the number of powers counted.
     pub fn total(&self) -> u64 {
         self.counts.iter().sum()

@@ -5,19 +5,18 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre::{Failure, judgement::judge, print};
-use gyre_evaluation::Options;
+use gyre::{Failure, print};
+use gyre_geometry::Pose;
 use gyre_radar::{
     Dataset, DatasetOptions, Format, OwnedScan, Trajectory,
     ground_truth::{find_ground_truth, read_trajectory},
 };
-use nalgebra::Isometry2;
 use serde::Serialize;
 
 use super::statistics::{Meter, MeterConfig, ScanStatistics};
 use crate::{
     report::{make_folder, save},
-    sequence::Sequence,
+    sequence::{Figures, Sequence},
     tables::rows::Rows,
 };
 
@@ -38,34 +37,21 @@ pub struct Measured {
     pub halves: Option<[Recording; 2]>,
 }
 
-/// All that was measured of a recording, or of a half.
+/// The measurements of a recording, or of a half.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Recording {
-    /// What it is called.
+    /// The folder's name.
     pub name: String,
     /// Of its scans.
     pub statistics: ScanStatistics,
-    /// The plain search: the paper's form. `None` without ground truth or without a second scan.
-    pub plain: Option<SearchErrors>,
+    /// The plain search, in the paper's form: nothing without ground truth or without a second scan, nor for a half.
+    pub plain: Figures,
     /// The refined search: the shipped configuration.
-    pub refined: Option<SearchErrors>,
+    pub refined: Figures,
     /// Pairs of consecutive scans that were aligned by ground truth.
     pub aligned_by_truth: usize,
     /// Pairs of consecutive scans that were aligned by the refined search.
     pub aligned_by_odometry: usize,
-}
-
-/// How far an odometry is off on the recording.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct SearchErrors {
-    /// Root of the mean squared translation error of a motion, m.
-    pub translation_rmse_m: f64,
-    /// Root of the mean squared rotation error of a motion, degrees.
-    pub rotation_rmse_deg: f64,
-    /// Absolute trajectory error, m.
-    pub ate_m: f64,
-    /// Segment error, %; `None` where the path is shorter than 100 m.
-    pub seg_percent: Option<f64>,
 }
 
 /// A recording, open.
@@ -80,8 +66,10 @@ pub struct Source {
     dataset: Box<dyn Dataset>,
     /// Ground truth with times and headings.
     truth: Option<Trajectory>,
-    plain: Option<Trajectory>,
-    refined: Option<Trajectory>,
+    /// The trajectory of the refined search.
+    odometry: Option<Trajectory>,
+    plain: Figures,
+    refined: Figures,
 }
 
 impl Source {
@@ -99,8 +87,8 @@ impl Source {
             Some(file) => file.to_owned(),
             None => {
                 let format = gyre_radar::open(data, &DatasetOptions::default())?.format();
-                let file = out.join(role).join(format!("{format}.toml"));
                 make_folder(&out.join(role))?;
+                let file = out.join(role).join(format!("{format}.toml"));
                 save(&file, shipped(format))?;
                 file
             }
@@ -108,7 +96,9 @@ impl Source {
         let sequence = Sequence::new(&file, data);
         let configuration = sequence.configuration(&[])?;
         let dataset = gyre_radar::open(data, &configuration.dataset)?;
-        let truth = find_ground_truth(data).and_then(|path| noted(read_trajectory(&path)));
+        let truth = find_ground_truth(data)
+            .map(|path| read_trajectory(&path))
+            .transpose()?;
         Ok(Self {
             role,
             data: data.to_owned(),
@@ -116,8 +106,9 @@ impl Source {
             played: configuration.played(dataset.len()),
             dataset,
             truth: truth.filter(|truth| truth.stamp_ns.is_some() && truth.has_heading()),
-            plain: None,
-            refined: None,
+            odometry: None,
+            plain: Figures::new(),
+            refined: Figures::new(),
         })
     }
 
@@ -131,33 +122,32 @@ impl Source {
             return Ok(());
         }
         let rows = Rows::read()?;
-        let run = |row: &str| -> Result<Option<Trajectory>, Failure> {
+        let run = |row: &str| {
             let mut changes = rows
                 .named(row)
                 .map_or_else(Vec::new, |row| row.changes(&rows, None));
             changes.push(format!("source.scans={scans}"));
-            let (out, _) = self.sequence.run(row, &changes, &out.join(self.role))?;
-            Ok(Some(read_trajectory(&out.join("trajectory.tum"))?))
+            self.sequence.run(row, &changes, &out.join(self.role))
         };
-        let (plain, refined) = (run("f-raw, line 14")?, run("Gyre")?);
-        (self.plain, self.refined) = (plain, refined);
+        let (plain, (folder, refined)) = (run("f-raw, line 14")?.1, run("Gyre")?);
+        self.odometry = Some(read_trajectory(&folder.join("trajectory.tum"))?);
+        (self.plain, self.refined) = (plain.figures, refined.figures);
         Ok(())
     }
 
-    /// Reads the first scan that can be read, or the one half-way through.
+    /// Reads the first scan that can be read.
     ///
     /// # Errors
-    /// No scan from there on can be read.
-    pub fn scan(&mut self, half_way: bool) -> Result<OwnedScan, Failure> {
-        let first = self.played.start + if half_way { self.played.len() / 2 } else { 0 };
+    /// No scan can be read.
+    pub fn first_scan(&mut self) -> Result<OwnedScan, Failure> {
         let mut scan = OwnedScan::with_limits(self.dataset.limits());
-        let data = self.data.display();
-        let failed = format!("{data}: no scan from number {first} on can be read");
-        let found = (first..self.played.end).any(|index| self.read(index, &mut scan));
-        found.then_some(scan).ok_or_else(|| failed.into())
+        match self.played.clone().any(|index| self.read(index, &mut scan)) {
+            true => Ok(scan),
+            false => Err(format!("{}: no scan can be read", self.data.display()).into()),
+        }
     }
 
-    /// Reads a scan; says why it cannot be read.
+    /// Reads a scan; prints why it cannot be read.
     fn read(&mut self, index: usize, scan: &mut OwnedScan) -> bool {
         let read = self.dataset.read(index, scan.slot());
         match read {
@@ -172,41 +162,43 @@ impl Source {
     /// # Errors
     /// No scan can be measured.
     pub fn measure(&mut self, config: MeterConfig, most: usize) -> Result<Measured, Failure> {
-        let whole = self.measure_part(0..2, config, most)?;
-        let halves = match self.played.len() {
+        let Range { start, end } = self.played;
+        let middle = start + self.played.len() / 2;
+        let mut part = |scans| self.measure_part(scans, config, most);
+        let whole = part(start..end)?;
+        let halves = match end - start {
             ..MIN_HALVED => None,
-            _ => Some([
-                self.measure_part(0..1, config, most)?,
-                self.measure_part(1..2, config, most)?,
-            ]),
+            _ => Some([part(start..middle)?, part(middle..end)?]),
+        };
+        let (plain, refined) = (self.plain.clone(), self.refined.clone());
+        let whole = Recording {
+            plain,
+            refined,
+            ..whole
         };
         Ok(Measured { whole, halves })
     }
 
-    /// Measures a range of halves: at most `most` scans, each with its motion since the one before it where that is known.
+    /// Measures at most `most` of these scans, each with its motion since the one before it where that is known.
     fn measure_part(
         &mut self,
-        halves: Range<usize>,
+        scans: Range<usize>,
         config: MeterConfig,
         most: usize,
     ) -> Result<Recording, Failure> {
         let mut meter = Meter::new(config)?;
         let (mut by_truth, mut by_odometry) = (0, 0);
         let mut scan = OwnedScan::with_limits(self.dataset.limits());
-        let part = part(&halves, self.played.len());
-        let first = self.played.start + part.start;
-        for run in runs(part.len(), most) {
+        for run in runs(scans.len(), most) {
             let mut before_ns = None;
-            for index in first + run.start..first + run.end {
+            for index in scans.start + run.start..scans.start + run.end {
                 if !self.read(index, &mut scan) {
                     before_ns = None;
                     continue;
                 }
                 let now_ns = scan.geometry.stamp_ns;
-                let by = |trajectory: &Option<Trajectory>| {
-                    motion(trajectory.as_ref()?, before_ns?, now_ns)
-                };
-                let (truth, odometry) = (by(&self.truth), by(&self.refined));
+                let by = |known: &Option<Trajectory>| motion(known.as_ref()?, before_ns?, now_ns);
+                let (truth, odometry) = (by(&self.truth), by(&self.odometry));
                 by_truth += usize::from(truth.is_some());
                 by_odometry += usize::from(truth.is_none() && odometry.is_some());
                 meter.add(&scan.view(), truth.or(odometry).as_ref())?;
@@ -214,64 +206,26 @@ impl Source {
             }
         }
         let nothing = || format!("{} has no scan to measure", self.data.display());
-        Ok(Recording {
-            name: self.name(),
-            statistics: meter.finish().ok_or_else(nothing)?,
-            plain: self.errors(self.plain.as_ref(), &halves),
-            refined: self.errors(self.refined.as_ref(), &halves),
-            aligned_by_truth: by_truth,
-            aligned_by_odometry: by_odometry,
-        })
-    }
-
-    /// What it is called in tables.
-    fn name(&self) -> String {
         let resolved = self
             .data
             .canonicalize()
             .unwrap_or_else(|_| self.data.clone());
-        resolved
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned()
-    }
-
-    /// Errors of a part of a trajectory that was found; `None` without truth that fits.
-    fn errors(&self, found: Option<&Trajectory>, halves: &Range<usize>) -> Option<SearchErrors> {
-        let (found, truth) = (found?, self.truth.as_ref()?);
-        let poses = part(halves, found.len());
-        let found = Trajectory {
-            stamp_ns: found
-                .stamp_ns
-                .as_ref()
-                .map(|stamps| stamps[poses.clone()].to_vec()),
-            poses: found.poses[poses].to_vec(),
-        };
-        let judged = noted(judge(&found, truth, Options::default()))?;
-        let rpe = judged.rpe.as_ref()?;
-        Some(SearchErrors {
-            translation_rmse_m: rpe.translation_rmse_m,
-            rotation_rmse_deg: rpe.rotation_rmse_deg,
-            ate_m: judged.ate.rmse_m,
-            seg_percent: judged.seg.as_ref().map(|seg| seg.percent),
+        Ok(Recording {
+            name: resolved
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned(),
+            statistics: meter.finish().ok_or_else(nothing)?,
+            plain: Figures::new(),
+            refined: Figures::new(),
+            aligned_by_truth: by_truth,
+            aligned_by_odometry: by_odometry,
         })
     }
 }
 
-/// `None` of an error, which is printed.
-fn noted<T, E: std::fmt::Display>(result: Result<T, E>) -> Option<T> {
-    let note = |error: &E| print::note(format_args!("not compared with the truth: {error}"));
-    result.inspect_err(note).ok()
-}
-
-/// A range of halves among so many.
-fn part(halves: &Range<usize>, of: usize) -> Range<usize> {
-    let at = |half: usize| [0, of / 2, of][half];
-    at(halves.start)..at(halves.end)
-}
-
-fn motion(trajectory: &Trajectory, from_ns: i64, to_ns: i64) -> Option<Isometry2<f64>> {
+fn motion(trajectory: &Trajectory, from_ns: i64, to_ns: i64) -> Option<Pose> {
     let at = |stamp_ns| trajectory.near(stamp_ns, ROUNDING_NS);
     Some(at(from_ns)?.inverse() * at(to_ns)?)
 }

@@ -1,21 +1,8 @@
-//! Scans for the eye.
+//! Pictures as PNG files.
 
 use std::{fs::File, io::BufWriter, path::Path};
 
-use gyre_radar::{PolarScan, RasterConfig, RasterError, Rasteriser};
-use ndarray::Array2;
 use thiserror::Error;
-
-/// A grey picture: powers as they are, 0 black.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Picture {
-    /// Pixels a row.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// Row by row.
-    pub pixels: Vec<u8>,
-}
 
 /// Why a picture was not written.
 #[derive(Debug, Error)]
@@ -27,56 +14,12 @@ pub struct PictureError {
     source: png::EncodingError,
 }
 
-impl Picture {
-    /// A scan from above, its whole range: ahead is up, left is left. Pixels of `cell_m`, so that several have the same scale.
-    ///
-    /// # Errors
-    /// A scan that contradicts itself, a scale at which it would have more than 4096 pixels a side.
-    pub fn from_above(scan: &PolarScan<'_>, cell_m: f32) -> Result<Self, RasterError> {
-        let range_m = scan.geometry.bins as f32 * scan.geometry.range_resolution_m;
-        let n = 2 * (range_m / cell_m) as usize + 1;
-        let config = RasterConfig {
-            n,
-            cell_m,
-            min_range_m: 0.0,
-            ..RasterConfig::default()
-        };
-        let mut rasteriser = Rasteriser::new(&config)?;
-        let mut cells = Array2::zeros((n, n));
-        rasteriser.rasterise(scan, 0, None, cells.view_mut())?;
-        Ok(Self {
-            width: n,
-            height: n,
-            pixels: cells.iter().map(|power| power.round() as u8).collect(),
-        })
-    }
-
-    /// A scan as it was measured: a row an azimuth, range to the right.
-    pub fn as_measured(scan: &PolarScan<'_>) -> Self {
-        let height = scan.geometry.azimuths;
-        let pixels = (0..height)
-            .flat_map(|azimuth| scan.row(azimuth))
-            .copied()
-            .collect();
-        Self {
-            width: scan.geometry.bins,
-            height,
-            pixels,
-        }
-    }
-
-    /// Writes it as PNG.
-    ///
-    /// # Errors
-    /// [`PictureError`] names the file.
-    pub fn write(&self, path: &Path) -> Result<(), PictureError> {
-        encode(
-            path,
-            [self.width, self.height],
-            png::ColorType::Grayscale,
-            &self.pixels,
-        )
-    }
+/// Writes rows of grey values as PNG.
+///
+/// # Errors
+/// [`PictureError`] names the file.
+pub fn write_grey(path: &Path, width: usize, pixels: &[u8]) -> Result<(), PictureError> {
+    encode(path, width, png::ColorType::Grayscale, pixels)
 }
 
 /// Writes rows of red, green and blue as PNG.
@@ -84,16 +27,16 @@ impl Picture {
 /// # Errors
 /// [`PictureError`] names the file.
 pub fn write_rgb(path: &Path, width: usize, pixels: &[[u8; 3]]) -> Result<(), PictureError> {
-    let size = [width, pixels.len() / width.max(1)];
-    encode(path, size, png::ColorType::Rgb, pixels.as_flattened())
+    encode(path, width, png::ColorType::Rgb, pixels.as_flattened())
 }
 
 fn encode(
     path: &Path,
-    [width, height]: [usize; 2],
+    width: usize,
     color: png::ColorType,
     bytes: &[u8],
 ) -> Result<(), PictureError> {
+    let height = bytes.len() / (width * color.samples()).max(1);
     let written = || {
         let file = BufWriter::new(File::create(path)?);
         let mut encoder = png::Encoder::new(file, width as u32, height as u32);

@@ -1,13 +1,12 @@
-//! Distances between recordings, plots and pictures of them.
+//! Distances between recordings.
 
 use super::*;
 use crate::realism::{
     change::Change,
     comparison::compare,
-    plot::curves,
-    recording::{Measured, Recording, SearchErrors},
+    recording::{Measured, Recording},
 };
-use gyre::picture::Picture;
+use crate::sequence::Figures;
 
 /// A recording of noise with a wall, brighter by `gain`, whose searches are `errors` off.
 fn recording(seed: u64, gain: u8, errors: f64) -> Recording {
@@ -21,19 +20,17 @@ fn recording(seed: u64, gain: u8, errors: f64) -> Recording {
         correlation: 1.0 - errors,
         unmatched_share: errors,
     };
-    let errors = SearchErrors {
-        translation_rmse_m: errors,
-        rotation_rmse_deg: 2.0 * errors,
-        ate_m: errors,
-        seg_percent: None,
-    };
+    let errors = Figures::from([
+        ("rpe/translation_rmse_m", errors),
+        ("rpe/rotation_rmse_deg", 2.0 * errors),
+    ]);
     let mut statistics = measured([&one]);
     statistics.change = Some(change);
     Recording {
         name: format!("number {seed}"),
         statistics,
-        plain: Some(errors),
-        refined: Some(errors),
+        plain: errors.clone(),
+        refined: errors,
         aligned_by_truth: 0,
         aligned_by_odometry: 0,
     }
@@ -108,7 +105,7 @@ fn the_nearer_recording_is_closer_and_what_is_not_known_is_not_judged() {
         recording(2, 2, 0.11),
         recording(3, 40, 0.5),
     );
-    near.plain = None;
+    near.plain.clear();
     let halves = Some([recording(1, 0, 0.1), recording(1, 1, 0.2)]);
     let real = Measured {
         whole: real,
@@ -142,53 +139,4 @@ fn the_nearer_recording_is_closer_and_what_is_not_known_is_not_judged() {
         (None, None, &None)
     );
     assert!(plain.real_other.is_some());
-}
-
-#[test]
-fn every_plot_has_a_line_and_a_label_for_each_recording() {
-    let recordings = [
-        recording(1, 0, 0.1),
-        recording(2, 10, 0.1),
-        recording(3, 20, 0.1),
-    ];
-    let three = curves(&recordings.iter().collect::<Vec<_>>()).unwrap();
-    let two = curves(&[&recordings[0], &recordings[1]]).unwrap();
-    assert_eq!(three.len(), 4);
-    for ((name, three), (_, two)) in three.iter().zip(&two) {
-        assert!(
-            three.contains("other real") && !two.contains("other real"),
-            "{name}"
-        );
-        assert!(three.contains("1 scans of number 3"), "{name}");
-        let lines = |svg: &str| svg.matches("<polyline").count();
-        assert!(lines(three) > lines(two), "{name}");
-    }
-}
-
-#[test]
-fn a_picture_from_above_has_ahead_up_and_left_left() {
-    // A post ahead at 20 m, and a fainter one to the right at 30 m.
-    let near = |bin: usize, at: usize| bin.abs_diff(at) <= 2;
-    let drawn = scan(AZIMUTHS, BINS, 0, |azimuth, bin| match azimuth {
-        0..2 | 398.. if near(bin, 100) => 200,
-        98..=102 if near(bin, 150) => 100,
-        _ => 0,
-    });
-    let picture = Picture::from_above(&drawn.view(), 0.5).unwrap();
-    assert_eq!((picture.width, picture.height), (201, 201));
-    let at = |x_m: f64, y_m: f64| {
-        let (row, column) = (100.0 - x_m / 0.5, 100.0 - y_m / 0.5);
-        picture.pixels[row as usize * picture.width + column as usize]
-    };
-    assert!(
-        at(20.0, 0.0) > 150 && (60..=100).contains(&at(0.0, -30.0)),
-        "{} {}",
-        at(20.0, 0.0),
-        at(0.0, -30.0)
-    );
-    assert_eq!((at(-20.0, 0.0), at(0.0, 30.0)), (0, 0));
-    assert!(Picture::from_above(&drawn.view(), 0.001).is_err());
-    let measured = Picture::as_measured(&drawn.view());
-    assert_eq!((measured.width, measured.height), (BINS, AZIMUTHS));
-    assert_eq!(measured.pixels[100 * BINS + 150], 100);
 }
