@@ -15,11 +15,11 @@ use crate::occlusion::crossing;
 use crate::world::World;
 
 /// Minimum mirrored share of walls that are considered.
-const LEAST_MIRROR: f64 = 0.15;
+const MIN_MIRROR: f64 = 0.15;
 /// Maximum number of mirrors in a sweep: those that cover most of the view.
-const MOST_MIRRORS: usize = 12;
+const MAX_MIRRORS: usize = 12;
 /// Minimum cross-section of objects with a visible image, square metres.
-const LEAST_CROSS_SECTION_M2: f64 = 3.0;
+const MIN_CROSS_SECTION_M2: f64 = 3.0;
 /// Maximum distance of objects from a mirror, metres.
 const REACH_M: f64 = 50.0;
 
@@ -29,7 +29,7 @@ impl View<'_> {
         for wall in mirrors(world, self.line_of_sight, self.sweep_poses.azimuths()) {
             let middle = Point2::from((wall.from.coords + wall.to.coords) / 2.0);
             let strong = |s: &&Scatterer| {
-                s.cross_section_m2 >= LEAST_CROSS_SECTION_M2
+                s.cross_section_m2 >= MIN_CROSS_SECTION_M2
                     && s.body != wall.body
                     && (s.position - middle).norm() < REACH_M
             };
@@ -90,7 +90,7 @@ fn mirrors(world: &World, line_of_sight: &LineOfSight, azimuths: usize) -> Vec<W
         if world
             .walls()
             .get(first.wall as usize)
-            .is_some_and(|wall| wall.mirror >= LEAST_MIRROR)
+            .is_some_and(|wall| wall.mirror >= MIN_MIRROR)
         {
             *rays.entry(first.wall).or_default() += 1;
         }
@@ -99,7 +99,7 @@ fn mirrors(world: &World, line_of_sight: &LineOfSight, azimuths: usize) -> Vec<W
     largest.sort_unstable_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
     largest
         .into_iter()
-        .take(MOST_MIRRORS)
+        .take(MAX_MIRRORS)
         .map(|(_, wall)| world.walls()[wall as usize])
         .collect()
 }

@@ -7,7 +7,7 @@ use super::street::Street;
 /// Side of a cell of the index, metres.
 const CELL_M: f64 = 20.0;
 /// Maximum number of cells: larger towns have larger cells.
-const MOST_CELLS: f64 = 1e6;
+const MAX_CELLS: f64 = 1e6;
 
 /// The position of a place relative to the nearest street.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,8 +59,8 @@ impl Streets {
             Vector2::zeros()
         };
         let cell_m = CELL_M
-            .max((size.x * size.y / MOST_CELLS).sqrt())
-            .max((size.x + size.y) / MOST_CELLS);
+            .max((size.x * size.y / MAX_CELLS).sqrt())
+            .max((size.x + size.y) / MAX_CELLS);
         let [columns, rows] = [size.x, size.y].map(|extent| (extent / cell_m) as usize + 1);
         let widest_half_m = streets
             .iter()
@@ -101,8 +101,8 @@ impl Streets {
         for row in span(first.y, last.y, self.rows) {
             for column in span(first.x, last.x, self.columns) {
                 for piece in self.cell(row * self.columns + column) {
-                    let least_m = best.map_or(within_m, |best| best.clearance_m);
-                    best = piece.nearer(place, least_m).or(best);
+                    let max_m = best.map_or(within_m, |best| best.clearance_m);
+                    best = piece.nearer(place, max_m).or(best);
                 }
             }
         }
@@ -153,13 +153,13 @@ impl Streets {
 }
 
 impl Piece {
-    /// The position of a place relative to the piece, if its kerb is less than `least_m` away.
-    fn nearer(&self, place: Point2<f64>, least_m: f64) -> Option<Nearest> {
+    /// The position of a place relative to the piece, if its kerb is less than `max_m` away.
+    fn nearer(&self, place: Point2<f64>, max_m: f64) -> Option<Nearest> {
         let off = place - self.from;
         let share =
             (off.dot(&self.segment) / (self.length_m * self.length_m).max(1e-12)).clamp(0.0, 1.0);
         let apart = (off - self.segment * share).norm_squared();
-        let reach_m = least_m + self.half_width_m;
+        let reach_m = max_m + self.half_width_m;
         if reach_m <= 0.0 || apart >= reach_m * reach_m {
             return None;
         }

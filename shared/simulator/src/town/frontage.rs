@@ -135,7 +135,7 @@ impl<'a> Frontage<'a> {
         self.streets.clearance_m(place, metres) >= metres
     }
 
-    /// The largest rectangle with its front along the kerb between two random_positions, `out_m` metres beyond it;
+    /// The largest rectangle with its front along the kerb between two stations, `out_m` metres beyond it;
     /// none where the street bends too sharply. It may overlap other streets.
     pub(super) fn lot(&self, along_m: f64, width_m: f64, out_m: f64, depth_m: f64) -> Option<Lot> {
         let [front, back] = [out_m, out_m + depth_m].map(|out| {

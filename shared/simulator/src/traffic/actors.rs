@@ -55,11 +55,11 @@ impl Actors {
                 let period_m = rng.random_range(350.0..1500.0);
                 // Limits the difference to the speed of the next vehicle.
                 let max_m = config.speed_spread * period_m / (0.5 * TAU);
-                let least_m = next_half_m + kind.half_m().0 + QUEUE_M;
-                let more_m = (2.0 * mean_m * rng.random_range(0.3..1.7)).min(max_m);
+                let min_m = next_half_m + kind.half_m().0 + QUEUE_M;
+                let extra_m = (2.0 * mean_m * rng.random_range(0.3..1.7)).min(max_m);
                 gaps.push(Gap {
-                    least_m,
-                    more_m,
+                    min_m,
+                    extra_m,
                     period_m,
                     phase: rng.random_range(0.0..TAU),
                 });
@@ -110,7 +110,7 @@ impl Actors {
         while enters_s < route.duration_s() + 60.0 {
             enters_s += HEADWAY_S - (mean_s - HEADWAY_S) * (1.0 - rng.random::<f64>()).ln();
             let kind = Kind::motor_vehicle(rng);
-            // Longer vehicles driving_side longer headways.
+            // Longer vehicles keep longer headways.
             enters_s += (kind.half_m().0 - 2.0).max(0.0) / mean_mps;
             let vehicle = Oncoming {
                 enters_s,

@@ -29,9 +29,9 @@ pub enum Track {
 #[derive(Clone, Debug)]
 pub struct Gap {
     /// Minimum distance between their centres, metres.
-    pub least_m: f64,
+    pub min_m: f64,
     /// Maximum increase, metres,
-    pub more_m: f64,
+    pub extra_m: f64,
     /// with this period along the route, metres,
     pub period_m: f64,
     /// and this phase, radians.
@@ -149,8 +149,7 @@ fn other_lane_m([ego_m, other_m]: [f64; 2]) -> f64 {
 
 impl Gap {
     fn at(&self, place_m: f64) -> f64 {
-        self.least_m
-            + self.more_m * 0.5 * (1.0 - (TAU * place_m / self.period_m + self.phase).cos())
+        self.min_m + self.extra_m * 0.5 * (1.0 - (TAU * place_m / self.period_m + self.phase).cos())
     }
 }
 
