@@ -1,5 +1,5 @@
 //! Times of the search on this machine, one thread, medians: the transforms that no search of this form avoids, and each
-//! step. `gyre-lab tables` has the whole beside the papers and a peer.
+//! step. `gyre-lab tables` compares the whole with the papers and a baseline.
 #![allow(clippy::unwrap_used)]
 
 #[path = "../tests/common/mod.rs"]
@@ -73,7 +73,7 @@ fn real_ms(size: usize, count: usize) -> f64 {
     })
 }
 
-/// The bare one-dimensional transforms that each size needs, without a transpose, a copy or a lookup between them.
+/// Prints the times of the one-dimensional transforms alone, without a transpose, a copy or a lookup between them.
 fn floor() {
     println!(
         "floor: transforms alone, ms\n{:>5} {:>11} {:>9} {:>13} {:>9} {:>9}",
@@ -97,12 +97,12 @@ fn floor() {
     }
 }
 
-/// The same area at every size: 102 m a side, the paper's 0.4 m at 255.
+/// The cell size for the same area at every n: 102 m a side, 0.4 m at 255 as in the paper.
 fn cell_m(n: usize) -> f64 {
     0.4 * 255.0 / n as f64
 }
 
-/// Times of each step.
+/// Prints the times of each step.
 fn steps() {
     println!("\nsearch: reach 20 deg and {REACH_M} m, earlier spectrum kept, ms");
     println!(
@@ -143,7 +143,7 @@ fn steps() {
     }
 }
 
-/// Times of the exhaustive search.
+/// Prints the times of the exhaustive search.
 fn candidates() {
     println!("\nexhaustive search: reach 15 deg in steps of 1 deg and {REACH_M} m, ms");
     println!(
@@ -173,7 +173,7 @@ fn candidates() {
             overlap: Overlap::None,
             ..default.clone()
         });
-        // Two angles share a transform: the rows of one, all columns there and back, the rows within reach.
+        // Two angles share a transform: the rows of one, all columns forward and back, the rows within reach.
         let reach = (REACH_M / cell) as usize + 3;
         let size = fast_size(n + reach);
         let floor = complex_ms(size, n + 2 * size + 2 * reach + 1) / 2.0;

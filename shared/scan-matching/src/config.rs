@@ -2,17 +2,15 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::peak::SUPPORT;
-
 /// An invalid value of a search.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{section}.{key} = {actual}: expected {expected}")]
 pub struct ConfigError {
-    /// Section of the configuration: `rotation`, `translation` or `exhaustive`.
+    /// Section of the configuration: `rotation`, `translation`, `exhaustive`, `refinement` or `raster`.
     pub section: &'static str,
     /// Key within the section.
     pub key: &'static str,
-    /// The value as given.
+    /// The rejected value.
     pub actual: String,
     /// The accepted values.
     pub expected: &'static str,
@@ -187,7 +185,7 @@ impl Default for TranslationConfig {
 }
 
 impl RotationConfig {
-    /// The search as Weston et al. print it in Algorithm 1, its slips put right.
+    /// The search of Weston et al., Algorithm 1, with its misprints corrected.
     pub fn weston() -> Self {
         Self {
             form: RotationForm::ProfileMean,
@@ -213,7 +211,7 @@ impl RotationConfig {
     /// Checks every value.
     ///
     /// # Errors
-    /// The first key that no search can be built from.
+    /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), ConfigError> {
         let check = |good, key, actual: &dyn ToString, expected| {
             accept(good, "rotation", key, actual, expected)
@@ -228,7 +226,7 @@ impl RotationConfig {
             self.band_high < 0.5,
             "band_high",
             &self.band_high,
-            "cycles a cell, below 0.5",
+            "cycles per cell, below 0.5",
         )?;
         check(
             (16..=1 << 14).contains(&self.angles),
@@ -260,7 +258,7 @@ impl RotationConfig {
 }
 
 impl TranslationConfig {
-    /// The search as Weston et al. print it in Algorithm 1: no normalisation of the overlap.
+    /// The search of Weston et al., Algorithm 1: no normalisation of the overlap.
     pub fn weston() -> Self {
         Self {
             overlap: Overlap::None,
@@ -280,7 +278,7 @@ impl TranslationConfig {
     /// Checks every value.
     ///
     /// # Errors
-    /// The first key that no search can be built from.
+    /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), ConfigError> {
         let check = |good, key, actual: &dyn ToString, expected| {
             accept(good, "translation", key, actual, expected)
@@ -307,7 +305,7 @@ impl TranslationConfig {
 }
 
 impl Peak {
-    /// The temperature, where the peak has one; 1 otherwise.
+    /// The temperature of a soft-argmax; 1 otherwise.
     fn temperature(&self) -> f64 {
         match *self {
             Peak::SoftArgmax { temperature } => temperature,
@@ -324,7 +322,7 @@ pub(crate) fn positive(value: f64) -> bool {
     value.is_finite() && value > 0.0
 }
 
-/// Refuses `actual` unless it is `good`.
+/// Rejects `actual` unless it is `good`.
 pub(crate) fn accept(
     good: bool,
     section: &'static str,
@@ -344,46 +342,13 @@ pub(crate) fn accept(
     }
 }
 
-/// Cells of the largest shift of a search over rasters of `n` x `n` cells of `cell_m` metres.
-pub(crate) fn reach_cells(
-    n: usize,
-    cell_m: f64,
-    section: &'static str,
-    reach_m: f64,
-) -> Result<usize, ConfigError> {
-    accept(
-        (16..=8192).contains(&n),
-        "raster",
-        "n",
-        &n,
-        "16 to 8192 cells a side",
-    )?;
-    accept(
-        cell_m.is_finite() && cell_m > 0.0,
-        "raster",
-        "cell_m",
-        &cell_m,
-        "metres, above 0",
-    )?;
-    let reach = (reach_m / cell_m + 1e-9).floor();
-    let fits = reach >= 1.0 && reach <= (n / 2 - SUPPORT) as f64;
-    accept(
-        fits,
-        section,
-        "reach_m",
-        &reach_m,
-        "at least one cell, less than half the raster",
-    )?;
-    Ok(reach as usize)
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[test]
-    fn a_section_of_a_few_keys_leaves_the_rest_at_its_default() {
+    fn missing_keys_have_their_defaults() {
         let text =
             "form = \"line14\"\nangles = 733\npeak = { soft_argmax = { temperature = 2.0 } }";
         let config: RotationConfig = toml::from_str(text).unwrap();
@@ -400,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn unknown_keys_are_refused() {
+    fn unknown_keys_are_rejected() {
         assert!(
             toml::from_str::<RotationConfig>("angels = 720")
                 .unwrap_err()

@@ -10,7 +10,7 @@ use crate::kernels;
 /// Correlates real images, two at a time, with a kept one.
 ///
 /// With Z the spectrum of g + i h, the inverse transform of Z conj(F) is the correlation of f with g as its real part and
-/// that of f with h as its imaginary part: one complex transform does for both, and nothing is taken apart.
+/// that of f with h as its imaginary part: one complex transform computes both without separating them.
 pub(crate) struct KeptCorrelation {
     n: usize,
     size: usize,
@@ -21,7 +21,7 @@ pub(crate) struct KeptCorrelation {
     inverse_columns: Transform,
     inverse_row: Transform,
     block: Vec<Complex32>,
-    /// Column by column: the transformed rows, below them zeros; the kept image's spectrum, conjugate; the wanted shifts.
+    /// Column by column: the transformed rows above zeros; the conjugate spectrum of the kept image; the wanted shifts.
     plane: Columns,
     kept: Columns,
     wanted: Columns,
@@ -29,7 +29,7 @@ pub(crate) struct KeptCorrelation {
 }
 
 impl KeptCorrelation {
-    /// For images of n x n, by transforms of `size` a side, at the shifts down `shifts`, given as rows of the transform.
+    /// Plans correlations of n x n images by transforms of `size` a side. `shifts` are the rows of the transform to keep.
     pub fn new(n: usize, size: usize, shifts: Arc<[usize]>) -> Self {
         let mut planner = FftPlanner::new();
         Self {
@@ -48,12 +48,12 @@ impl KeptCorrelation {
         }
     }
 
-    /// What scales the correlations: one over the cells of the transform.
+    /// The factor that scales the correlations: one over the cells of the transform.
     pub fn scale(&self) -> f64 {
         1.0 / (self.size * self.size) as f64
     }
 
-    /// Keeps the spectrum of the image f.
+    /// Computes and keeps the spectrum of the image f.
     pub fn keep(&mut self, f: &[f32]) {
         let n = self.n;
         self.rows.forward(&mut self.kept, n, |r, out| {
@@ -77,7 +77,7 @@ impl KeptCorrelation {
             kernels::interleave(&g[r * n..][..n], &h[r * n..][..n], out);
         });
         for c in 0..size {
-            // There and back while the column lies in the nearest cache; few of its values are wanted.
+            // Forward and back while the column is in the nearest cache; few of its values are kept.
             self.columns
                 .line_into(self.plane.column(c), &mut self.column);
             kernels::multiply(&mut self.column, self.kept.column(c));

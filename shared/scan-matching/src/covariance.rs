@@ -2,9 +2,9 @@
 
 use nalgebra::{Matrix2, Matrix3, Rotation2, Vector2};
 
-/// (1 - score) over the peak's curvature, scaled, m^2; never more than `guess`, what is known without a match.
+/// The covariance of a shift, m^2: (1 - score) over the peak's curvature, scaled; at most `guess`, the variance without a match.
 ///
-/// `hessian` holds the second derivatives of the score, a squared cell.
+/// `hessian` holds the second derivatives of the score per squared cell.
 pub(crate) fn shift_covariance(
     variance_scale: f64,
     score: f64,
@@ -25,30 +25,30 @@ pub(crate) fn shift_covariance(
     }
 }
 
-/// Covariance of (x, y, yaw) from that of the shift along the later scan's axes where the angle is known, the angle's
-/// variance, and how x and y follow the angle, m/rad.
+/// The covariance of (x, y, yaw) from that of the shift along the later scan's axes at a known angle, the variance of the
+/// angle, and the derivative of (x, y) by the angle, m/rad.
 pub(crate) fn motion_covariance(
     turn: &Rotation2<f64>,
     shift: Matrix2<f64>,
-    follows: Vector2<f64>,
+    by_angle: Vector2<f64>,
     variance_rad2: f64,
 ) -> Matrix3<f64> {
     let placed = turn.matrix() * shift * turn.matrix().transpose();
     let mut covariance = Matrix3::zeros();
     covariance
         .fixed_view_mut::<2, 2>(0, 0)
-        .copy_from(&(placed + follows * follows.transpose() * variance_rad2));
+        .copy_from(&(placed + by_angle * by_angle.transpose() * variance_rad2));
     covariance
         .fixed_view_mut::<2, 1>(0, 2)
-        .copy_from(&(follows * variance_rad2));
+        .copy_from(&(by_angle * variance_rad2));
     covariance
         .fixed_view_mut::<1, 2>(2, 0)
-        .copy_from(&(follows.transpose() * variance_rad2));
+        .copy_from(&(by_angle.transpose() * variance_rad2));
     covariance[(2, 2)] = variance_rad2;
     covariance
 }
 
-/// Variance of a uniform guess within `reach` to either side.
+/// The variance of a uniform distribution within `reach` to either side.
 pub(crate) fn guess(reach: f64) -> f64 {
     reach.powi(2) / 3.0
 }

@@ -1,4 +1,4 @@
-//! All three unknowns at once: every angle of a grid, each with its whole correlation over the shifts.
+//! The exhaustive search: the correlation over all shifts at every angle of a grid.
 
 mod config;
 
@@ -8,14 +8,14 @@ use gyre_geometry::wrap_angle;
 use nalgebra::{Matrix3, Rotation2, Vector2};
 use ndarray::ArrayView2;
 
-use crate::config::{ConfigError, Overlap, Peak, reach_cells};
+use crate::config::{ConfigError, Overlap, Peak};
 use crate::correlate::KeptCorrelation;
 use crate::covariance::{guess, motion_covariance, shift_covariance};
 use crate::fft::fast_size;
 use crate::overlap::OverlapEnergy;
 use crate::peak::{LinePeak, PlanePeak, line_peak};
 use crate::rotation::{RotationMatch, RotationRunnerUp};
-use crate::scores::{Scores, Shift};
+use crate::scores::{Scores, Shift, reach_cells};
 use crate::translation::{MotionMatch, MotionRunnerUp};
 use crate::warp::Rotation;
 use crate::{ShapeError, cells, kernels};
@@ -23,32 +23,32 @@ use crate::{ShapeError, cells, kernels};
 use config::AngleGrid;
 pub use config::ExhaustiveConfig;
 
-/// Where angles are compared, rasters are read off their cells' centres by this, in cells, down and to the right.
+/// Offset of the bilinear lookups from the cells' centres while angles are compared, cells down and to the right.
 ///
-/// Reading between cells blurs: along each axis by 1 - 2 a (1 - a) (1 - cos w) in power, with a the place between two cells.
-/// A turn goes through all a evenly, so a (1 - a) is 1/6 on average, but a turn by zero would not blur at all, and match
-/// otherwise than its neighbours: the peak would be pushed off zero. With (3 - sqrt 3) / 6, a (1 - a) = 1/6 there too.
-/// The delay of such a reading is a for long waves only, so the shift is taken from rasters read without.
+/// Interpolation blurs: along each axis by 1 - 2 a (1 - a) (1 - cos w) in power, with a the position between two cells.
+/// A rotation goes through all a evenly, so a (1 - a) is 1/6 on average, but a rotation by zero would not blur at all and
+/// would score differently from its neighbours, which pushes the peak off zero. With a = (3 - sqrt 3) / 6, a (1 - a) is
+/// 1/6 there too. The delay of such a lookup is a for long waves only, so the final shift is found without the offset.
 const OFFSET: f64 = 0.211_324_865_405_187_1;
 
-/// The motion between two scans, and its angle apart.
+/// The motion between two scans, and its angle alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointMatch {
     /// The angle; its runner-up is the next highest local maximum over the angles.
     pub rotation: RotationMatch,
-    /// The whole motion; its runner-up is another shift at the same angle, or another angle's best, whichever is higher.
+    /// The whole motion; its runner-up is another shift at the same angle or the best shift at another angle.
     pub motion: MotionMatch,
 }
 
-/// Finds angle and shift together by trying every angle (Masking by Moving; `raw` in Weston et al., Table III).
+/// Finds angle and shift together by trying all angles of a grid (Masking by Moving; `raw` in Weston et al., Table III).
 ///
-/// For each angle of the grid the earlier raster g is turned and correlated with the later one, f, at all shifts within
-/// reach. The peak over the angles is placed between them by a fit, and the correlation is computed once more at that
-/// angle for the shift. Two angles share a complex transform, f's spectrum is computed once a pair, and only the shifts
-/// within reach are transformed back.
+/// For each angle the earlier raster g is rotated and correlated with the later one, f, at all shifts within reach. The
+/// peak over the angles is interpolated, and the correlation is computed again at that angle for the shift. Two angles
+/// share a complex transform, the spectrum of f is computed once per pair, and only the shifts within reach are
+/// transformed back.
 ///
 /// The covariance is the inverse of the score's curvature in (x, y, yaw), scaled: the curvature over the shifts at the
-/// best angle, the curvature over the angles of the best score at each, and how the best shift follows the angle.
+/// best angle, the curvature over the angles of the best score at each, and the dependence of the best shift on the angle.
 ///
 /// Planned once for rasters of n x n cells; nothing is allocated afterwards.
 pub struct ExhaustiveSearch {
@@ -57,7 +57,7 @@ pub struct ExhaustiveSearch {
     config: ExhaustiveConfig,
     angles: AngleGrid,
     correlation: KeptCorrelation,
-    /// f and g with what is not finite set to zero.
+    /// f and g, with values that are not finite set to zero.
     later: Vec<f32>,
     earlier: Vec<f32>,
     later_energy: OverlapEnergy,
@@ -67,14 +67,14 @@ pub struct ExhaustiveSearch {
     candidates: Vec<Candidate>,
 }
 
-/// The earlier raster at one angle, and how well each shift of it matches.
+/// The earlier raster at one angle, and the scores of its shifts.
 struct Turned {
     raster: Vec<f32>,
     energy: OverlapEnergy,
     scores: Scores,
 }
 
-/// The best match at one angle: no score above zero, no match.
+/// The best match at one angle; the score is 0 without a match.
 #[derive(Debug, Clone, Copy, Default)]
 struct Candidate {
     score: f64,
@@ -83,9 +83,9 @@ struct Candidate {
 }
 
 /// The peak in all three unknowns.
-struct Found {
+struct JointPeak {
     prior_rad: f64,
-    /// The angle of the grid next to it.
+    /// The nearest angle of the grid.
     best: usize,
     angle_rad: f64,
     over_angles: LinePeak,
@@ -99,11 +99,11 @@ impl ExhaustiveSearch {
     /// Plans a search over rasters of `n` x `n` cells of `cell_m` metres.
     ///
     /// # Errors
-    /// A configuration that no search can be built from: also a reach of more than half the raster.
+    /// A configuration value out of its bounds, or a reach of more than half the raster.
     pub fn new(n: usize, cell_m: f64, config: &ExhaustiveConfig) -> Result<Self, ConfigError> {
         config.validate()?;
         let reach = reach_cells(n, cell_m, "exhaustive", config.reach_m)?;
-        let size = fast_size(Scores::least_size(n, reach));
+        let size = fast_size(Scores::min_size(n, reach));
         let energy = || OverlapEnergy::new(n, Scores::around(reach));
         let turned = || Turned {
             raster: vec![0.0; n * n],
@@ -125,12 +125,12 @@ impl ExhaustiveSearch {
         })
     }
 
-    /// Angles that are tried for each pair, the last look at the best one not counted.
+    /// Returns the number of angles tried for each pair, without the final one at the peak.
     pub fn candidates(&self) -> usize {
         self.angles.count
     }
 
-    /// The motion between two rasters.
+    /// Finds the motion between two rasters.
     ///
     /// Rasters are n x n, row 0 far ahead, column 0 far left. Values that are not finite count as zero.
     ///
@@ -144,10 +144,10 @@ impl ExhaustiveSearch {
         self.search_around(later, earlier, 0.0)
     }
 
-    /// The motion between two rasters whose angle is near `prior_rad`: the grid's middle lies there.
+    /// Finds the motion between two rasters whose angle is near `prior_rad`, the middle of the grid.
     ///
     /// # Errors
-    /// As [`search`](Self::search).
+    /// Those of [`search`](Self::search).
     pub fn search_around(
         &mut self,
         later: ArrayView2<'_, f32>,
@@ -165,14 +165,14 @@ impl ExhaustiveSearch {
             return Ok(self.no_match(prior_rad));
         }
         self.correlation.keep(&self.later);
-        self.try_all(prior_rad, energy);
+        self.score_angles(prior_rad, energy);
         Ok(self
-            .look_closer(prior_rad, energy)
-            .map_or(self.no_match(prior_rad), |found| self.estimate(&found)))
+            .joint_peak(prior_rad, energy)
+            .map_or(self.no_match(prior_rad), |found| self.joint_match(&found)))
     }
 
     /// The best match at every angle of the grid.
-    fn try_all(&mut self, prior_rad: f64, energy: f64) {
+    fn score_angles(&mut self, prior_rad: f64, energy: f64) {
         for first in (0..self.angles.count).step_by(2) {
             let count = (self.angles.count - first).min(2);
             let angles = [0, 1].map(|k| prior_rad + self.angles.angle((first + k) as f64));
@@ -183,7 +183,7 @@ impl ExhaustiveSearch {
         }
     }
 
-    /// Scores of all shifts at the first `count` of two angles.
+    /// Scores all shifts at the first `count` of two angles.
     fn score(&mut self, angles: [f64; 2], count: usize, offset: f64, energy: f64) {
         for (k, turned) in self.turned.iter_mut().enumerate() {
             if k < count {
@@ -195,7 +195,7 @@ impl ExhaustiveSearch {
                     self.config.overlap,
                 );
             } else {
-                // What is left there from before would still show in the last bits of the other.
+                // An old raster here would change the last bits of the other result.
                 turned.raster.fill(0.0);
             }
         }
@@ -218,8 +218,8 @@ impl ExhaustiveSearch {
         }
     }
 
-    /// Places the peak between the angles, and looks at the shifts there.
-    fn look_closer(&mut self, prior_rad: f64, energy: f64) -> Option<Found> {
+    /// Interpolates the peak over the angles, then finds the peak over the shifts there.
+    fn joint_peak(&mut self, prior_rad: f64, energy: f64) -> Option<JointPeak> {
         let best = self.best()?;
         let over_angles = self.angle_peak(best);
         let angle_rad = prior_rad + self.angles.angle(best as f64 + over_angles.offset);
@@ -228,7 +228,7 @@ impl ExhaustiveSearch {
         let highest = scores.highest()?;
         let over_shifts = scores.peak(self.config.peak, highest);
         let shift = scores.place(self.config.peak, highest, &over_shifts);
-        Some(Found {
+        Some(JointPeak {
             prior_rad,
             best,
             angle_rad,
@@ -250,7 +250,7 @@ impl ExhaustiveSearch {
         self.candidates[k].score
     }
 
-    /// The peak over the angles next to the best one; at the end of an open grid the best one itself.
+    /// The interpolated peak over the angles; at the end of an open grid the best angle itself.
     fn angle_peak(&self, best: usize) -> LinePeak {
         if !self.angles.is_inner(best) {
             return LinePeak {
@@ -276,7 +276,7 @@ impl ExhaustiveSearch {
         })
     }
 
-    fn estimate(&self, found: &Found) -> JointMatch {
+    fn joint_match(&self, found: &JointPeak) -> JointMatch {
         let score = found.over_shifts.value.min(1.0);
         let second = self.angle_runner_up(found.best);
         let rotation = RotationMatch {
@@ -306,7 +306,7 @@ impl ExhaustiveSearch {
             covariance: motion_covariance(
                 &turn,
                 spread,
-                self.follows(found),
+                self.ridge_slope(found),
                 rotation.variance_rad2,
             ),
             score,
@@ -328,15 +328,16 @@ impl ExhaustiveSearch {
         }
     }
 
-    /// How x and y follow the angle along the ridge of the scores, m/rad, from the best shifts at the angles beside.
-    fn follows(&self, found: &Found) -> Vector2<f64> {
+    /// The derivative of (x, y) by the angle along the ridge of the scores, m/rad, from the best shifts at the
+    /// neighbouring angles.
+    fn ridge_slope(&self, found: &JointPeak) -> Vector2<f64> {
         let beside = [-1, 1].map(|by| self.angles.beside(found.best, by));
         if !self.angles.is_inner(found.best) || beside.iter().any(|&k| self.at(k) <= 0.0) {
             return Vector2::zeros();
         }
         let [before, after] = beside.map(|k| self.candidates[k].place);
         let slope = (after - before) / (2.0 * self.angles.step);
-        // No cell is farther from the sensor: what seems to be moves on to another peak.
+        // No cell is farther from the sensor: a larger slope is a jump to another peak.
         let farthest = self.n as f64 * self.cell_m * FRAC_1_SQRT_2;
         if slope.norm() <= farthest {
             slope
@@ -345,7 +346,7 @@ impl ExhaustiveSearch {
         }
     }
 
-    fn runner_up(&self, found: &Found, other_angle: Option<usize>) -> Option<MotionRunnerUp> {
+    fn runner_up(&self, found: &JointPeak, other_angle: Option<usize>) -> Option<MotionRunnerUp> {
         let at = |place: Vector2<f64>, score| MotionRunnerUp {
             x_m: place.x,
             y_m: place.y,
@@ -375,8 +376,8 @@ impl ExhaustiveSearch {
         }
     }
 
-    /// The k-th angle, within (-pi, pi].
-    fn angle(&self, found: &Found, k: usize) -> f64 {
+    /// The k-th angle, in (-pi, pi].
+    fn angle(&self, found: &JointPeak, k: usize) -> f64 {
         wrap_angle(found.prior_rad + self.angles.angle(k as f64))
     }
 
@@ -407,7 +408,7 @@ impl ExhaustiveSearch {
 }
 
 impl Turned {
-    /// g'(x) = g(R x + o), so that f(x) ~ g'(x + R^T (t - o)); and its energy where it is asked for.
+    /// g'(x) = g(R x + o), so that f(x) ~ g'(x + R^T (t - o)); and its energy if the normalisation needs it.
     fn turn(&mut self, earlier: &[f32], n: usize, angle_rad: f64, offset: f64, overlap: Overlap) {
         let rotation = Rotation::new(n, angle_rad).with_offset(offset);
         self.raster
@@ -419,7 +420,7 @@ impl Turned {
         }
     }
 
-    /// The best match of a raster that was turned with [`OFFSET`].
+    /// The best match of a raster that was rotated with [`OFFSET`].
     fn best(&self, kind: Peak, angle_rad: f64, cell_m: f64) -> Candidate {
         let Some(highest) = self.scores.highest() else {
             return Candidate::default();

@@ -1,4 +1,4 @@
-//! Two-dimensional transforms that skip what nobody looks at.
+//! Two-dimensional transforms that skip rows and columns that are not needed.
 //!
 //! A plane in the frequency domain is kept column by column ([`Columns`]), so that the second pass runs over
 //! contiguous memory. Rows go there in blocks of one cache line.
@@ -10,19 +10,19 @@ use rustfft::{Fft, FftDirection, FftPlanner, num_complex::Complex32};
 
 use crate::kernels;
 
-/// Rows that are transposed together: their complex values of one column fill a cache line.
+/// Rows that are transposed together: their values of one column fill a cache line.
 pub(crate) const BLOCK: usize = 8;
 
-/// The fastest even transform size of at least `least`, among products of small primes.
+/// Returns the fastest even transform size of at least `min`, among products of small primes.
 ///
-/// Factors 2 and 3 cost about the same a point, 5 and 11 a quarter more, 7 and other primes more than padding does.
-pub fn fast_size(least: usize) -> usize {
+/// Factors 2 and 3 take about the same time per point, 5 and 11 a quarter more, 7 and other primes more than padding.
+pub fn fast_size(min: usize) -> usize {
     let cost = |n: usize| n as f64 * if only_factors(n, &[2, 3]) { 1.0 } else { 1.25 };
-    let least = least.max(8);
-    (least..=2 * least)
+    let min = min.max(8);
+    (min..=2 * min)
         .filter(|&n| n.is_multiple_of(2) && only_factors(n, &[2, 3, 5, 11]))
         .min_by(|&a, &b| cost(a).total_cmp(&cost(b)))
-        .unwrap_or(least.next_power_of_two())
+        .unwrap_or(min.next_power_of_two())
 }
 
 fn only_factors(n: usize, factors: &[usize]) -> bool {
@@ -120,13 +120,13 @@ impl Transform {
         }
     }
 
-    /// Transforms a line into another place.
+    /// Transforms a line into another one.
     pub fn line_into(&mut self, line: &[Complex32], out: &mut [Complex32]) {
         self.fft
             .process_immutable_with_scratch(line, out, &mut self.scratch);
     }
 
-    /// Transforms a line, or several that lie behind each other.
+    /// Transforms a line, or several contiguous ones, in place.
     pub fn lines(&mut self, lines: &mut [Complex32]) {
         self.fft.process_with_scratch(lines, &mut self.scratch);
     }
@@ -223,7 +223,7 @@ impl RealSpectrum {
     }
 }
 
-/// Spectra of two real square images by one complex transform, and the way back for some rows.
+/// Spectra of two real square images by one complex transform, and the inverse for some rows.
 pub(crate) struct PairSpectrum {
     size: usize,
     rows: RowPass,
@@ -272,7 +272,7 @@ impl PairSpectrum {
 
     /// Turns the pair's spectrum into second x conj(first), column by column.
     ///
-    /// With Z = F + iG of two real images, F and G fall apart by Z(k) and Z(-k):
+    /// With Z = F + iG of two real images, Z(k) and Z(-k) separate F and G:
     /// G conj(F) = Im(Z(k) Z(-k)) / 2 - i (|Z(k)|^2 - |Z(-k)|^2) / 4.
     pub fn cross(&mut self) {
         for c in 0..=self.size / 2 {
@@ -289,7 +289,8 @@ impl PairSpectrum {
         self.plane.first_mut(self.size / 2 + 1)
     }
 
-    /// Back to the image domain: calls `take(r, row)` for each r of `rows`, with the whole row `rows[r]`, not scaled.
+    /// Transforms back to the image domain: calls `take(r, row)` for each r of `rows` with the whole row `rows[r]`, not
+    /// scaled.
     pub fn inverse(&mut self, rows: &[usize], mut take: impl FnMut(usize, &[f32])) {
         let width = self.size / 2 + 1;
         self.inverse_columns.columns(&mut self.plane, width);
@@ -322,13 +323,13 @@ mod tests {
 
     #[test]
     fn fast_sizes_have_small_factors_and_waste_little() {
-        for least in 2..3000 {
-            let size = fast_size(least);
+        for min in 2..3000 {
+            let size = fast_size(min);
             assert!(
-                size >= least && size.is_multiple_of(2) && only_factors(size, &[2, 3, 5, 11]),
-                "{least}: {size}"
+                size >= min && size.is_multiple_of(2) && only_factors(size, &[2, 3, 5, 11]),
+                "{min}: {size}"
             );
-            assert!(size * 3 <= least * 4 || least < 16, "{least}: {size}");
+            assert!(size * 3 <= min * 4 || min < 16, "{min}: {size}");
         }
         assert_eq!(
             [

@@ -1,19 +1,19 @@
-//! The inner loops, compiled for several vector units; the one that the processor has is picked at run time.
+//! The inner loops, compiled for several vector units; the variant for the processor is chosen at run time.
 
-// Bilinear lookups read at computed places. A checked read keeps the compiler from working on more than one sample
-// at a time, which triples the time of the image rotation. Every place is clamped to the image right before it is read.
+// Bilinear lookups read at computed positions. A checked read keeps the compiler from vectorising over samples, which
+// triples the time of the image rotation. Every position is clamped to the image right before it is read.
 #![allow(unsafe_code)]
 
 use gyre_simd::simd;
 use rustfft::num_complex::Complex32;
 
-/// Partial sums kept beside each other, so that a sum can be vectorised.
+/// Number of partial sums, so that a sum can be vectorised.
 const LANES: usize = 16;
 
-/// Where less than this share of two rasters overlaps, a score says nothing and is zero.
-pub(crate) const LEAST_SHARE: f64 = 1e-3;
+/// If less than this share of two rasters overlaps, the score is set to zero.
+pub(crate) const MIN_SHARE: f64 = 1e-3;
 
-/// Where a sample lies among four neighbours: the first of them and the weights toward the others.
+/// The position of a sample among four neighbours: the first of them and the weights toward the others.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Bilinear {
     /// Index of the first neighbour; the others are 1, a row, and a row and 1 behind it.
@@ -32,7 +32,7 @@ impl Bilinear {
     #[inline(always)]
     unsafe fn value(self, image: &[f32], stride: usize) -> f32 {
         let at = self.at as usize;
-        // SAFETY: the caller's promise; the other three places are smaller.
+        // SAFETY: the caller guarantees the last of the four indices; the others are smaller.
         let [a, b, c, d] =
             [at, at + 1, at + stride, at + stride + 1].map(|k| unsafe { *image.get_unchecked(k) });
         let first = a + self.along * (b - a);
@@ -44,7 +44,7 @@ impl Bilinear {
 /// Bilinear values along a straight line through a square image of `n` a side.
 ///
 /// `start` and `step` are (row, column) in cells. The caller keeps the line within the image; a sample that rounding
-/// puts outside is moved to the edge.
+/// puts outside is clamped to the edge.
 #[simd]
 pub(crate) fn bilinear_line(
     image: &[f32],
@@ -73,7 +73,7 @@ pub(crate) fn bilinear_line(
     }
 }
 
-/// Bilinear values at the places of a table, in an image with rows of `stride`.
+/// Bilinear values at the positions of a table, in an image with rows of `stride`.
 #[simd]
 pub(crate) fn bilinear_table(image: &[f32], stride: usize, table: &[Bilinear], out: &mut [f32]) {
     assert!(image.len() >= stride + 2 && image.len() < 1 << 31);
@@ -88,15 +88,15 @@ pub(crate) fn bilinear_table(image: &[f32], stride: usize, table: &[Bilinear], o
     }
 }
 
-/// Row times window; what is not finite counts as zero.
+/// Row times taper; values that are not finite count as zero.
 #[simd]
-pub(crate) fn weigh(row: &[f32], window: &[f32], out: &mut [f32]) {
-    for ((o, &v), &w) in out.iter_mut().zip(row).zip(window) {
+pub(crate) fn weigh(row: &[f32], taper: &[f32], out: &mut [f32]) {
+    for ((o, &v), &w) in out.iter_mut().zip(row).zip(taper) {
         *o = if v.is_finite() { v * w } else { 0.0 };
     }
 }
 
-/// A copy in which what is not finite is zero.
+/// Copies values; those that are not finite become zero.
 #[simd]
 pub(crate) fn finite_copy(from: &[f32], to: &mut [f32]) {
     for (t, &v) in to.iter_mut().zip(from) {
@@ -187,7 +187,7 @@ pub(crate) fn cross_of_pair(column: &mut [Complex32], mirror: &[Complex32]) {
 pub(crate) fn divide_by_share(scores: &mut [f32], f: &[f64], g: &[f64], energy: f64) {
     for ((score, &f), &g) in scores.iter_mut().zip(f.iter().rev()).zip(g) {
         let share = (f * g).sqrt() / energy;
-        *score = if share > LEAST_SHARE {
+        *score = if share > MIN_SHARE {
             (f64::from(*score) / share) as f32
         } else {
             0.0
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn squares_are_added_over_rows_that_are_no_multiple_of_the_lanes() {
+    fn squares_are_added_over_rows_of_any_length() {
         let row: Vec<f32> = (0..37).map(|k| k as f32).collect();
         let mut sums = vec![1.0; 37];
         assert_eq!(add_squares(&row, &mut sums), 16206.0);
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn places_outside_of_the_image_are_moved_inside() {
+    fn positions_outside_the_image_are_clamped() {
         let image = [1.0; 25];
         let mut out = [0.0; 5];
         bilinear_line(&image, 5, [f64::NAN, -1e30], [1e30, f64::NAN], &mut out);

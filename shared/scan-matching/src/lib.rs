@@ -1,8 +1,8 @@
 //! The decoupled Fourier search for rotation and translation (Weston et al., Algorithm 1).
 //!
-//! Two scans f (later) and g (earlier) of the same place are alike after a motion, f(x) ~ g(R x + t): (R, t) is the
-//! pose of the later scan's frame in the earlier one's. The search finds R from the magnitude spectra alone, which a
-//! shift leaves as they are, then t by one correlation.
+//! Two scans f (later) and g (earlier) of the same place satisfy f(x) ~ g(R x + t) (Eq. 1): (R, t) is the pose of the
+//! later scan's frame in the earlier one's. The search finds R from the magnitude spectra, which a shift does not change,
+//! and then t by one correlation.
 //!
 //! # Layout, in the order of the data
 //! - `taper`, `fft`, `polar`: the magnitude spectrum of a raster on a polar grid;
@@ -88,9 +88,9 @@ pub enum ShapeError {
     /// The search was planned for another shape.
     #[error("{what} is {}: expected {}", by(.actual), by(.expected))]
     Shape {
-        /// Which input.
+        /// The input.
         what: &'static str,
-        /// Its rows and columns.
+        /// Rows and columns of the input.
         actual: [usize; 2],
         /// The rows and columns that the search was planned for.
         expected: [usize; 2],
@@ -98,7 +98,7 @@ pub enum ShapeError {
     /// The values are not in standard (row-major, contiguous) layout.
     #[error("{what} is not in row-major, contiguous layout")]
     Layout {
-        /// Which input.
+        /// The input.
         what: &'static str,
     },
 }

@@ -1,10 +1,10 @@
-//! What two shifted rasters have in common: the energy of each within the overlap.
+//! The energy of a raster within its overlap with another one that is shifted.
 
 use nalgebra::Vector2;
 
-/// Energy of one raster in what is left of it after a shift, for shifts up to `reach` cells each way.
+/// The energy that is left of a raster in the overlap, for shifts of up to `reach` cells each way.
 ///
-/// Built from sums over rows, columns and the four corners: the shifts are few beside the cells.
+/// It is built from sums over rows, columns and the four corners, since there are far fewer shifts than cells.
 #[derive(Debug, Clone)]
 pub(crate) struct OverlapEnergy {
     n: usize,
@@ -15,7 +15,7 @@ pub(crate) struct OverlapEnergy {
     edges: [Vec<f64>; 4],
     /// Sums over b columns of the rows of one corner so far.
     corner: Vec<f64>,
-    /// What is left after each shift (down, right), row after row from the most negative on.
+    /// Energy left after each shift (down, right), row after row from the most negative on.
     left: Vec<f64>,
     total: f64,
 }
@@ -45,7 +45,7 @@ impl OverlapEnergy {
         self.total
     }
 
-    /// Centre of the energy, cells down and right of the middle; zero where there is none.
+    /// Centre of the energy, cells down and right of the middle; zero without energy.
     pub fn centre(&self) -> Vector2<f64> {
         let moment = |sums: &[f32]| -> f64 {
             sums.iter()
@@ -79,8 +79,8 @@ impl OverlapEnergy {
         }
     }
 
-    /// Fills in what is left after the shifts that cost cells at two of the edges: a rows and b columns fall out, and
-    /// the a x b cells of the corner are in both.
+    /// Fills in the energy left after the shifts that drop cells at two of the edges: a rows and b columns are dropped,
+    /// and the a x b cells of the corner are in both.
     fn measure_corner(&mut self, vertical: usize, horizontal: usize, raster: &[f32]) {
         let (n, side, middle) = (self.n, self.reach + 1, self.left.len() / 2);
         let (rows, columns) = (&self.edges[vertical], &self.edges[horizontal]);
@@ -115,8 +115,8 @@ impl OverlapEnergy {
         }
     }
 
-    /// Energy that is left after each shift (down, right) of up to `reach` cells, row after row from the most negative
-    /// on: `down` rows fall out at the top (at the bottom where negative), `right` columns at the left (at the right).
+    /// Energy left after each shift (down, right) of up to `reach` cells, row after row from the most negative on: `down`
+    /// rows are dropped at the top (at the bottom if negative), `right` columns at the left (at the right).
     pub fn left(&self) -> &[f64] {
         &self.left
     }

@@ -1,40 +1,40 @@
-//! Peaks between samples: where a sampled correlation has its maximum, how high and how sharp it is there.
+//! Interpolation of peaks: the position, height and curvature of the maximum of a sampled correlation.
 //!
 //! A parabola through three samples is pulled toward the middle one, by up to 0.1 of a step where the peak is narrow.
-//! Correlations of scatterers that a radar smears are nearer to Gaussians over a pedestal, whose logarithm is a parabola.
+//! Correlations of radar scans are closer to Gaussians over a pedestal, whose logarithm is a parabola.
 
 use nalgebra::{Matrix2, Vector2};
 
 use crate::config::Peak;
 
-/// Samples on each side of the highest one that a fit looks at.
+/// Samples on each side of the highest one that a fit uses.
 pub(crate) const SUPPORT: usize = 3;
 
-/// A fit leaves the highest sample by no more than this, in samples.
-const FARTHEST: f64 = 0.75;
+/// The largest distance of a fitted peak from the highest sample, samples.
+const MAX_OFFSET: f64 = 0.75;
 
-/// The pedestal lies below the lowest sample by this share of the range, so that its logarithm exists.
-const BELOW_LOWEST: f64 = 0.05;
+/// The pedestal lies below the lowest sample by this share of the range, so that the logarithm exists.
+const PEDESTAL_MARGIN: f64 = 0.05;
 
 /// Maximum along one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct LinePeak {
-    /// Place, in samples from the highest one.
+    /// Position, in samples from the highest one.
     pub offset: f64,
     /// Fitted height.
     pub value: f64,
-    /// Second derivative there, a squared sample.
+    /// Second derivative there, per squared sample.
     pub curvature: f64,
 }
 
 /// Maximum in the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PlanePeak {
-    /// Place (row, column), in samples from the highest one.
+    /// Position (row, column), in samples from the highest one.
     pub offset: Vector2<f64>,
     /// Fitted height.
     pub value: f64,
-    /// Second derivatives there, a squared sample.
+    /// Second derivatives there, per squared sample.
     pub hessian: Matrix2<f64>,
 }
 
@@ -85,16 +85,16 @@ pub(crate) fn plane_peak(kind: Peak, sample: impl Fn(isize, isize) -> f64) -> Pl
     }
 }
 
-/// What a Gaussian peak of height `highest` stands on, from the samples around it.
+/// The pedestal of a Gaussian peak of height `highest`, from the samples around it.
 fn pedestal(around: impl Iterator<Item = f64>, highest: f64) -> f64 {
     let lowest = around.fold(highest, f64::min);
-    lowest - BELOW_LOWEST * (highest - lowest)
+    lowest - PEDESTAL_MARGIN * (highest - lowest)
 }
 
 fn line_parabola([a, b, c]: [f64; 3]) -> LinePeak {
     let curvature = a - 2.0 * b + c;
     let offset = if curvature < 0.0 {
-        (0.5 * (a - c) / curvature).clamp(-FARTHEST, FARTHEST)
+        (0.5 * (a - c) / curvature).clamp(-MAX_OFFSET, MAX_OFFSET)
     } else {
         0.0
     };
@@ -105,7 +105,7 @@ fn line_parabola([a, b, c]: [f64; 3]) -> LinePeak {
     }
 }
 
-/// One parabola through three samples of each axis; the corners give the cross term.
+/// The maximum of one parabola through three samples of each axis; the corners give the cross term.
 fn plane_parabola(near: [[f64; 3]; 3]) -> PlanePeak {
     let down = line_parabola([near[0][1], near[1][1], near[2][1]]);
     let right = line_parabola(near[1]);
@@ -117,7 +117,7 @@ fn plane_parabola(near: [[f64; 3]; 3]) -> PlanePeak {
     }
 }
 
-/// Maximum of the paraboloid that fits nine samples best; `None` where it has none nearby.
+/// The maximum of the least-squares paraboloid of nine samples; `None` if it has none nearby.
 fn paraboloid(near: [[f64; 3]; 3]) -> Option<PlanePeak> {
     let sum = |weight: fn(f64, f64) -> f64| -> f64 {
         (0..9)
@@ -134,7 +134,8 @@ fn paraboloid(near: [[f64; 3]; 3]) -> Option<PlanePeak> {
     );
     let mean = sum(|i, j| 5.0 - 3.0 * (i * i + j * j)) / 9.0;
     let offset = hessian.try_inverse()? * -gradient;
-    let summit = hessian[(0, 0)] < 0.0 && hessian.determinant() > 0.0 && offset.amax() <= FARTHEST;
+    let summit =
+        hessian[(0, 0)] < 0.0 && hessian.determinant() > 0.0 && offset.amax() <= MAX_OFFSET;
     summit.then(|| PlanePeak {
         offset,
         value: mean + 0.5 * gradient.dot(&offset),
@@ -142,9 +143,9 @@ fn paraboloid(near: [[f64; 3]; 3]) -> Option<PlanePeak> {
     })
 }
 
-/// Weighted mean of positions, their scores normalised as [`Peak::SoftArgmax`] says.
+/// The weighted mean of positions, with scores normalised as in [`Peak::SoftArgmax`].
 ///
-/// `scored` gives (position, score) and is walked twice; `highest` is the largest score.
+/// `scored` gives (position, score) and is iterated twice; `highest` is the largest score.
 pub(crate) fn soft_argmax<const D: usize>(
     temperature: f64,
     highest: f64,
@@ -180,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn gaussian_peak_is_placed_to_a_fiftieth_of_a_step_whatever_its_width() {
+    fn gaussian_peaks_of_any_width_are_placed_to_a_fiftieth_of_a_step() {
         for width in [0.7, 0.8, 1.0, 1.5, 2.0] {
             for k in -5..=5 {
                 let at = f64::from(k) / 10.0;
@@ -192,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn parabola_is_farther_off_on_a_narrow_peak() {
+    fn a_parabola_is_less_accurate_on_a_narrow_peak() {
         let off = |kind| (line_peak(kind, |j| bump(j as f64 - 0.3, 0.8)).offset - 0.3).abs();
         assert!(off(Peak::Parabola) > 3.0 * off(Peak::Gaussian));
     }

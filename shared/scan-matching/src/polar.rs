@@ -1,6 +1,7 @@
 //! Magnitude spectra on a polar grid.
 //!
-//! f(x) ~ g(R x + t) leaves |F(k)| = |G(R k)|: a turn of the raster turns its magnitude spectrum, a shift does nothing.
+//! From f(x) ~ g(R x + t) follows |F(k)| = |G(R k)|: a rotation of the raster rotates its magnitude spectrum, and a shift
+//! does not change it.
 //! With k = rho (cos theta, sin theta) along the raster's x and y axes, P_f(theta) = P_g(theta + turn).
 
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -16,7 +17,7 @@ pub(crate) struct PolarGrid {
     bins: usize,
     /// Column c holds column frequency c; its element k row frequency k - bins.
     magnitude: Vec<f32>,
-    /// Where each polar sample lies among the magnitudes, radius after radius.
+    /// The position of each polar sample among the magnitudes, radius after radius.
     table: Vec<Bilinear>,
     pub angles: usize,
     pub radii: usize,
@@ -25,7 +26,7 @@ pub(crate) struct PolarGrid {
 impl PolarGrid {
     /// The grid over a spectrum of `size` a side, of a raster of `n` a side.
     ///
-    /// theta_k = -pi/2 + k pi / angles: no angle is counted twice (the paper's Linspace counts both ends).
+    /// theta_k = -pi/2 + k pi / angles: no angle is counted twice (the Linspace of Weston et al. counts both ends).
     pub fn new(n: usize, size: usize, config: &RotationConfig) -> Self {
         let (low, high) = (config.band_low, config.band_high);
         let radii = config
@@ -50,12 +51,12 @@ impl PolarGrid {
         }
     }
 
-    /// Columns of the spectrum that the grid looks at.
+    /// Number of columns of the spectrum that the grid reads.
     pub fn columns(bins_high: f64, size: usize) -> usize {
         ((bins_high * size as f64).floor() as usize + 2).min(size / 2 + 1)
     }
 
-    /// Takes the magnitudes of the band from a spectrum.
+    /// Loads the magnitudes of the band from a spectrum.
     pub fn load(&mut self, spectrum: &Columns) {
         let stride = 2 * self.bins + 1;
         for (c, out) in self.magnitude.chunks_exact_mut(stride).enumerate() {

@@ -102,13 +102,20 @@ pub struct Refiner {
 struct Scan<'a> {
     id: u64,
     points: &'a [SparsePoint],
-    /// Its pose in the map by the motion that the search found.
+    /// Pose in the map by the motion that the search found.
     searched: Pose,
-    /// Time since the scan before.
+    /// Time since the scan before, s.
     interval_s: f64,
 }
 
-/// An alignment and how well it fits.
+/// An alignment on the coarse map.
+struct CoarseMatch {
+    guess: InitialGuess,
+    coarse: Alignment,
+    is_reachable: bool,
+}
+
+/// An alignment on the fine map and how well it fits.
 struct Candidate {
     guess: InitialGuess,
     alignment: Alignment,
@@ -118,6 +125,17 @@ struct Candidate {
     support: f64,
     /// A vehicle can have driven there, and the scan overlaps the map about as much as the scans before.
     is_plausible: bool,
+}
+
+impl CoarseMatch {
+    /// Returns whether a vehicle can have driven there but not to the other, or else the overlap is clearly larger.
+    fn is_better_than(&self, other: &Self) -> bool {
+        if self.is_reachable == other.is_reachable {
+            self.coarse.normal.overlap > CLEARLY_BETTER * other.coarse.normal.overlap
+        } else {
+            self.is_reachable
+        }
+    }
 }
 
 impl Refiner {
@@ -232,7 +250,7 @@ impl Refiner {
         scan: &Scan<'_>,
         guesses: &[(InitialGuess, Pose)],
     ) -> (InitialGuess, Pose) {
-        let mut best: Option<(InitialGuess, Alignment, bool)> = None;
+        let mut best: Option<CoarseMatch> = None;
         for (k, (guess, initial)) in guesses.iter().enumerate() {
             if guesses[..k]
                 .iter()
@@ -240,27 +258,23 @@ impl Refiner {
             {
                 continue;
             }
-            // Each guess deskews with its own motion: at a second a turn, the motion before is ten degrees off where a
-            // bend begins.
+            // Each guess deskews with its own motion. With a sweep of a second, the motion of the scan before is ten
+            // degrees off where a bend begins.
             self.deskew(scan, initial);
             self.points.thin(COARSE_STRIDE);
-            let found = align(&self.map.coarse(), &self.points, initial, COARSE_ITERATIONS);
-            let reachable = self.is_reachable(scan, &found.pose, 1.0);
-            let is_better = best.as_ref().is_none_or(|(_, best, best_reachable)| {
-                if reachable == *best_reachable {
-                    found.normal.overlap > CLEARLY_BETTER * best.normal.overlap
-                } else {
-                    reachable
-                }
-            });
-            if is_better {
-                best = Some((*guess, found, reachable));
+            let coarse = align(&self.map.coarse(), &self.points, initial, COARSE_ITERATIONS);
+            let found = CoarseMatch {
+                guess: *guess,
+                is_reachable: self.is_reachable(scan, &coarse.pose, 1.0),
+                coarse,
+            };
+            if best.as_ref().is_none_or(|best| found.is_better_than(best)) {
+                best = Some(found);
             }
         }
-        best.map_or(
-            (InitialGuess::Prediction, self.state.pose),
-            |(guess, found, _)| (guess, found.pose),
-        )
+        best.map_or((InitialGuess::Prediction, self.state.pose), |best| {
+            (best.guess, best.coarse.pose)
+        })
     }
 
     fn in_same_basin(&self, a: &Pose, b: &Pose) -> bool {
@@ -336,7 +350,7 @@ impl Refiner {
         }
     }
 
-    /// Whether the scan overlaps the map well, has enough points, and agrees with the search.
+    /// Returns whether the scan overlaps the map well, has enough points, and agrees with the search.
     fn is_firm(&self, scan: &Scan<'_>, best: &Candidate) -> bool {
         let config = &self.config;
         let apart = scan.searched.inv_mul(&best.alignment.pose);

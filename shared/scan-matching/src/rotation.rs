@@ -16,26 +16,26 @@ use crate::spectrum::PolarSpectrum;
 use crate::whiten::Whitening;
 use crate::{ShapeError, cells, kernels, taper};
 
-/// Half width of the neighbourhood in which a second maximum is still the same peak, radians.
+/// Half width of the neighbourhood in which a second maximum counts as the same peak, rad.
 const SAME_PEAK_RAD: f64 = 2.0 * PI / 180.0;
 
-/// Another angle that matches nearly as well.
+/// The second-best angle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RotationRunnerUp {
     /// Angle, radians.
     pub angle_rad: f64,
-    /// Its correlation coefficient.
+    /// Correlation coefficient.
     pub score: f64,
 }
 
-/// The angle that takes the later scan's frame into the earlier one's.
+/// The rotation between two scans.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RotationMatch {
     /// Yaw of the later scan's frame in the earlier one's, radians, counter-clockwise, within the reach.
     pub angle_rad: f64,
-    /// Its variance, from the shape of the peak; that of a uniform guess where there is no peak.
+    /// Variance, from the shape of the peak; that of a uniform distribution over the reach if there is no peak.
     pub variance_rad2: f64,
-    /// Correlation coefficient of the two polar spectra at the peak, at most 1; 0 where there is nothing to match.
+    /// Correlation coefficient of the two polar spectra at the peak, at most 1; 0 if there is no match.
     pub score: f64,
     /// The highest other local maximum within reach.
     pub runner_up: Option<RotationRunnerUp>,
@@ -66,7 +66,7 @@ impl RotationSearch {
     /// Plans a search over rasters of `n` x `n` cells.
     ///
     /// # Errors
-    /// A configuration that no search can be built from, or rasters below 16 cells a side.
+    /// A configuration value out of its bounds, or rasters of fewer than 16 or more than 8192 cells a side.
     pub fn new(n: usize, config: &RotationConfig) -> Result<Self, ConfigError> {
         config.validate()?;
         accept(
@@ -106,7 +106,7 @@ impl RotationSearch {
         })
     }
 
-    /// An empty spectrum of this search's shape, to be filled by [`spectrum`](Self::spectrum).
+    /// Returns an empty spectrum of this search's shape, to be filled by [`spectrum`](Self::spectrum).
     pub fn new_spectrum(&self) -> PolarSpectrum {
         PolarSpectrum::new(self.grid.angles, self.profiles())
     }
@@ -138,10 +138,10 @@ impl RotationSearch {
         Ok(())
     }
 
-    /// The angle between two scans, from their spectra.
+    /// Finds the angle between two scans from their spectra.
     ///
     /// # Errors
-    /// Where a spectrum is not of this search's shape.
+    /// If a spectrum is another search's.
     pub fn search(
         &mut self,
         later: &PolarSpectrum,
@@ -154,10 +154,10 @@ impl RotationSearch {
             return Ok(self.no_match());
         }
         self.correlate(later, earlier, energy);
-        Ok(self.estimate())
+        Ok(self.best_match())
     }
 
-    /// Profiles along the angle that are compared: one a radius, or one for all.
+    /// Number of profiles along the angle that are compared: one per radius, or one in all.
     fn profiles(&self) -> usize {
         if self.config.form == RotationForm::Eq7 {
             self.grid.radii
@@ -206,7 +206,7 @@ impl RotationSearch {
         out.data[0] = Complex32::default();
     }
 
-    /// C[m] = sum over r of G[m, r] conj(F[m, r]), back to angles, as correlation coefficients.
+    /// C[m] = sum over r of G[m, r] conj(F[m, r]), transformed back to angles, as correlation coefficients (Weston et al., Eq. 7).
     fn correlate(&mut self, later: &PolarSpectrum, earlier: &PolarSpectrum, energy: f64) {
         self.cross.fill(Complex32::default());
         let rows = later
@@ -216,7 +216,8 @@ impl RotationSearch {
         for (f, g) in rows {
             kernels::add_cross(f, g, &mut self.cross);
         }
-        // The highest harmonic of an even number of angles is real but for rounding, and the inverse insists on it.
+        // The highest harmonic of an even number of angles is real but for rounding, and the inverse transform requires
+        // that it is.
         if let (true, Some(highest)) = (self.grid.angles.is_multiple_of(2), self.cross.last_mut()) {
             highest.im = 0.0;
         }
@@ -235,7 +236,7 @@ impl RotationSearch {
         f64::from(self.correlation[k.rem_euclid(self.grid.angles as isize) as usize])
     }
 
-    fn estimate(&self) -> RotationMatch {
+    fn best_match(&self) -> RotationMatch {
         let step = PI / self.grid.angles as f64;
         let within = -self.reach..=self.reach;
         let Some(best) = within
@@ -252,7 +253,7 @@ impl RotationSearch {
         let peak = line_peak(self.config.peak, |j| self.at(best + j));
         let shift = match self.config.peak {
             Peak::SoftArgmax { temperature } => {
-                // Around the peak on the circle, or the two far ends average to nonsense.
+                // Centred on the peak: on a circle the mean about a fixed angle is meaningless.
                 let scored = (-self.reach..=self.reach).map(|j| ([j as f64], self.at(best + j)));
                 best as f64 + soft_argmax(temperature, self.at(best), scored)[0]
             }
@@ -268,7 +269,7 @@ impl RotationSearch {
         }
     }
 
-    /// (1 - score) over the peak's curvature, scaled; never more than a uniform guess within reach.
+    /// (1 - score) over the peak's curvature, scaled; at most that of a uniform distribution over the reach.
     fn variance(&self, score: f64, curvature: f64) -> f64 {
         let variance = self.config.variance_scale * (1.0 - score).max(1e-6) / -curvature;
         let guess = self.config.reach_deg.to_radians().powi(2) / 3.0;

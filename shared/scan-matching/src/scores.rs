@@ -1,15 +1,15 @@
-//! A plane of correlation scores, one a shift, and what is read off it.
+//! A plane of correlation scores, one per shift, and its peaks.
 
 use std::sync::Arc;
 
 use nalgebra::Vector2;
 
-use crate::config::{Overlap, Peak};
-use crate::kernels::{self, LEAST_SHARE};
+use crate::config::{ConfigError, Overlap, Peak, accept};
+use crate::kernels::{self, MIN_SHARE};
 use crate::overlap::OverlapEnergy;
 use crate::peak::{PlanePeak, SUPPORT, plane_peak, soft_argmax};
 
-/// Half width of the neighbourhood in which a second maximum is still the same peak, cells.
+/// Half width of the neighbourhood in which a second maximum counts as the same peak, cells.
 const SAME_PEAK_CELLS: isize = 3;
 
 /// A shift (down, right), cells.
@@ -26,9 +26,9 @@ pub(crate) struct Scores {
 }
 
 impl Scores {
-    /// Transform size that keeps shifts within `reach` of n x n rasters from meeting their own wrapped end, at least:
-    /// n + reach, not 2 n - 1.
-    pub fn least_size(n: usize, reach: usize) -> usize {
+    /// The smallest transform that keeps shifts of n x n rasters within `reach` free of wrap-around: n + reach, not
+    /// 2 n - 1.
+    pub fn min_size(n: usize, reach: usize) -> usize {
         n + Self::around(reach)
     }
 
@@ -67,7 +67,7 @@ impl Scores {
         }
     }
 
-    /// Divides by what both rasters have in the overlap. `energy` is what the scores have been divided by so far.
+    /// Normalises the scores by the overlap. `energy` is the energy that they have been divided by so far.
     pub fn normalise(
         &mut self,
         overlap: Overlap,
@@ -78,7 +78,7 @@ impl Scores {
         match overlap {
             Overlap::None => {}
             Overlap::Area => self.normalise_area(),
-            // A shift of g' by s meets f without its last s rows, and loses its own first s rows.
+            // A shift by s drops the first s rows of g' and the last s rows of f.
             Overlap::Energy => {
                 kernels::divide_by_share(&mut self.values, later.left(), turned.left(), energy)
             }
@@ -91,7 +91,7 @@ impl Scores {
         for (k, score) in self.values.iter_mut().enumerate() {
             let (down, right) = ((k / side) as isize - around, (k % side) as isize - around);
             let share = area_share(self.n, down, right);
-            *score = if share > LEAST_SHARE {
+            *score = if share > MIN_SHARE {
                 (f64::from(*score) / share) as f32
             } else {
                 0.0
@@ -106,7 +106,7 @@ impl Scores {
         f64::from(self.values[((down + around) * side + right + around) as usize])
     }
 
-    /// Every shift within reach with its score.
+    /// All shifts within reach with their scores.
     fn scored(&self) -> impl Iterator<Item = (Shift, f64)> + Clone {
         let reach = self.reach;
         (-reach..=reach).flat_map(move |i| (-reach..=reach).map(move |j| ((i, j), self.at(i, j))))
@@ -140,7 +140,7 @@ impl Scores {
         }
     }
 
-    /// The highest local maximum that is not the best one's own peak.
+    /// The highest local maximum outside the best peak.
     pub fn runner_up(&self, best: Shift) -> Option<(Shift, f64)> {
         let apart = |(i, j): Shift| (i - best.0).abs().max((j - best.1).abs()) > SAME_PEAK_CELLS;
         let summit = |(i, j): Shift, score: f64| {
@@ -154,6 +154,39 @@ impl Scores {
         }
         second
     }
+}
+
+/// The largest shift of a search over rasters of `n` x `n` cells of `cell_m` metres, cells.
+pub(crate) fn reach_cells(
+    n: usize,
+    cell_m: f64,
+    section: &'static str,
+    reach_m: f64,
+) -> Result<usize, ConfigError> {
+    accept(
+        (16..=8192).contains(&n),
+        "raster",
+        "n",
+        &n,
+        "16 to 8192 cells a side",
+    )?;
+    accept(
+        cell_m.is_finite() && cell_m > 0.0,
+        "raster",
+        "cell_m",
+        &cell_m,
+        "metres, above 0",
+    )?;
+    let reach = (reach_m / cell_m + 1e-9).floor();
+    let fits = reach >= 1.0 && reach <= (n / 2 - SUPPORT) as f64;
+    accept(
+        fits,
+        section,
+        "reach_m",
+        &reach_m,
+        "at least one cell, less than half the raster",
+    )?;
+    Ok(reach as usize)
 }
 
 /// Share of the cells that overlap at a shift.

@@ -19,7 +19,7 @@ impl SequentialRotation {
     /// Plans the search for rasters of `n` x `n` cells.
     ///
     /// # Errors
-    /// As [`RotationSearch::new`].
+    /// Those of [`RotationSearch::new`].
     pub fn new(n: usize, config: &RotationConfig) -> Result<Self, ConfigError> {
         let search = RotationSearch::new(n, config)?;
         let (later, earlier) = (search.new_spectrum(), search.new_spectrum());

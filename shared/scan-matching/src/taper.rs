@@ -1,4 +1,4 @@
-//! Weights over a raster before its transform.
+//! Tapers (window functions) over a raster before its transform.
 
 use std::f64::consts::PI;
 

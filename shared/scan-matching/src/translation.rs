@@ -4,28 +4,28 @@ use nalgebra::{Matrix3, Rotation2, Vector2};
 use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 
-use crate::config::{ConfigError, TranslationConfig, reach_cells};
+use crate::config::{ConfigError, TranslationConfig};
 use crate::covariance::{guess, motion_covariance, shift_covariance};
 use crate::fft::{PairSpectrum, fast_size};
 use crate::overlap::OverlapEnergy;
 use crate::peak::PlanePeak;
 use crate::rotation::RotationMatch;
-use crate::scores::{Scores, Shift};
+use crate::scores::{Scores, Shift, reach_cells};
 use crate::warp::Rotation;
 use crate::{ShapeError, cells, kernels, whiten};
 
-/// Another shift that matches nearly as well.
+/// The second-best shift.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MotionRunnerUp {
     /// Forward, m, in the earlier scan's frame.
     pub x_m: f64,
     /// Left, m, in the earlier scan's frame.
     pub y_m: f64,
-    /// Its correlation coefficient.
+    /// Correlation coefficient.
     pub score: f64,
 }
 
-/// Pose of the later scan's frame in the earlier scan's frame.
+/// The motion between two scans: the pose of the later scan's frame in the earlier scan's frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MotionMatch {
     /// Forward, m.
@@ -34,17 +34,18 @@ pub struct MotionMatch {
     pub y_m: f64,
     /// Counter-clockwise, radians.
     pub yaw_rad: f64,
-    /// Covariance of (x, y, yaw) in m^2, m rad, rad^2: the peaks' shapes, and the angle's share of the shift.
+    /// Covariance of (x, y, yaw), m^2, m rad and rad^2: from the shapes of the peaks, and the shift's dependence on
+    /// the angle.
     pub covariance: Matrix3<f64>,
-    /// Correlation coefficient at the peak, at most 1; 0 where there is nothing to match.
+    /// Correlation coefficient at the peak, at most 1; 0 if there is no match.
     pub score: f64,
     /// The highest other local maximum within reach.
     pub runner_up: Option<MotionRunnerUp>,
-    /// Whether the angle half a turn from the given one matched better.
+    /// The angle half a turn from the given one matched better.
     pub half_turn: bool,
 }
 
-/// Finds the shift between two scans of known angle (Weston et al., Algorithm 1, lines 16 to 21).
+/// Finds the shift between two scans whose angle is known (Weston et al., Algorithm 1, lines 16 to 21).
 ///
 /// Planned once for rasters of n x n cells; nothing is allocated afterwards.
 pub struct TranslationSearch {
@@ -52,7 +53,7 @@ pub struct TranslationSearch {
     cell_m: f64,
     config: TranslationConfig,
     transform: PairSpectrum,
-    /// f with what is not finite set to zero, and g turned into f's direction.
+    /// f, with values that are not finite set to zero, and g turned into f's direction.
     later: Vec<f32>,
     turned: Vec<f32>,
     later_energy: OverlapEnergy,
@@ -65,11 +66,11 @@ impl TranslationSearch {
     /// Plans a search over rasters of `n` x `n` cells of `cell_m` metres.
     ///
     /// # Errors
-    /// A configuration that no search can be built from: also a reach of more than half the raster.
+    /// A configuration value out of its bounds, or a reach of more than half the raster.
     pub fn new(n: usize, cell_m: f64, config: &TranslationConfig) -> Result<Self, ConfigError> {
         config.validate()?;
         let reach = reach_cells(n, cell_m, "translation", config.reach_m)?;
-        let size = fast_size(Scores::least_size(n, reach));
+        let size = fast_size(Scores::min_size(n, reach));
         let around = Scores::around(reach);
         Ok(Self {
             n,
@@ -84,7 +85,7 @@ impl TranslationSearch {
         })
     }
 
-    /// The motion between two rasters, given the angle between them.
+    /// Finds the motion between two rasters, given the angle between them.
     ///
     /// Rasters are n x n, row 0 far ahead, column 0 far left. Values that are not finite count as zero.
     ///
@@ -229,8 +230,8 @@ impl TranslationSearch {
         }
     }
 
-    /// How x and y follow the angle, m/rad: an error e turns g' about the sensor, and the scene seen at `centre` of f
-    /// moves by R J centre e. The shift makes up for that, so x and y follow by -R J centre.
+    /// The derivative of (x, y) by the angle, m/rad: an error e turns g' about the sensor, and the scene at `centre` of f
+    /// moves by R J centre e. The shift compensates, so the derivative is -R J centre.
     fn lever(&self, turn: &Rotation2<f64>) -> Vector2<f64> {
         let centre = self.later_energy.centre() * -self.cell_m;
         turn * Vector2::new(centre.y, -centre.x)
@@ -250,7 +251,7 @@ impl TranslationSearch {
     }
 }
 
-/// The angle half a turn away, within (-pi, pi].
+/// The angle half a turn away, in (-pi, pi].
 fn opposite(angle_rad: f64) -> f64 {
     use std::f64::consts::PI;
     if angle_rad > 0.0 {

@@ -1,16 +1,16 @@
-//! Turning a raster about its sensor.
+//! Rotation of a raster about the sensor.
 
-/// Turns rasters of n x n cells about their middle, bilinear.
+/// A rotation of rasters of n x n cells about their middle, with bilinear interpolation.
 #[derive(Debug, Clone)]
 pub(crate) struct Rotation {
     n: usize,
     cos: f64,
     sin: f64,
-    /// Added to each place that is looked up, down and to the right, cells.
+    /// Added to the position of each lookup, down and to the right, cells.
     offset: f64,
 }
 
-/// The columns of one row that stay inside the raster, and where they come from.
+/// The columns of one row whose source lies inside the raster, and that source.
 #[derive(Debug, Clone, Copy)]
 struct Span {
     first: usize,
@@ -33,12 +33,12 @@ impl Rotation {
         }
     }
 
-    /// The same, but each place that is looked up lies `offset` cells farther down and to the right.
+    /// This rotation with each lookup `offset` cells farther down and to the right.
     pub fn with_offset(self, offset: f64) -> Self {
         Self { offset, ..self }
     }
 
-    /// Row `r` of g'(x) = g(R x); zero where R x lies outside of g (Weston et al., Algorithm 1, line 16).
+    /// Writes row `r` of g'(x) = g(R x); zero where R x lies outside g (Weston et al., Algorithm 1, line 16).
     pub fn row(&self, g: &[f32], r: usize, out: &mut [f32]) {
         let span = self.span(r);
         out[..span.first].fill(0.0);
@@ -57,8 +57,7 @@ impl Rotation {
         }
     }
 
-    /// With u, v the cells down and right of the middle, x = -u and y = -v, so that
-    /// R x looks up u' = cos u - sin v, v' = sin u + cos v.
+    /// With u, v the cells down and right of the middle, x = -u and y = -v, so the source is u' = cos u - sin v, v' = sin u + cos v.
     fn span(&self, r: usize) -> Span {
         let last = (self.n - 1) as f64;
         let middle = last / 2.0;
@@ -81,14 +80,17 @@ impl Rotation {
     }
 }
 
-/// The interval of k with 0 <= start + k step <= last, with a millionth of a cell to spare for rounding.
+/// The interval of k with 0 <= start + k step <= last, with a millionth of a cell of tolerance for rounding.
 fn inside(start: f64, step: f64, last: f64) -> (f64, f64) {
-    const SPARE: f64 = 1e-6;
+    const TOLERANCE: f64 = 1e-6;
     if step.abs() < 1e-12 {
-        let within = start >= -SPARE && start <= last + SPARE;
+        let within = start >= -TOLERANCE && start <= last + TOLERANCE;
         return if within { (0.0, last) } else { (1.0, 0.0) };
     }
-    let (a, b) = ((-SPARE - start) / step, (last + SPARE - start) / step);
+    let (a, b) = (
+        (-TOLERANCE - start) / step,
+        (last + TOLERANCE - start) / step,
+    );
     (a.min(b), a.max(b))
 }
 
@@ -106,13 +108,13 @@ mod tests {
     }
 
     #[test]
-    fn no_turn_is_the_identity_to_the_last_cell() {
+    fn no_rotation_is_the_identity_to_the_last_cell() {
         let g: Vec<f32> = (0..17 * 17).map(|k| k as f32).collect();
         assert_eq!(turned(&g, 17, 0.0), g);
     }
 
     #[test]
-    fn a_quarter_turn_brings_what_is_left_to_the_front() {
+    fn a_quarter_turn_moves_the_left_to_the_front() {
         // g'(x) = g(R x): ahead in g' is where R turns ahead to, the left of g.
         let n = 17;
         let mut g = vec![0.0; n * n];

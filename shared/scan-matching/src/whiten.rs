@@ -1,10 +1,10 @@
-//! Phase without modulus: Checchin et al., Eq. 6, in the form I2 I1* / |I2 I1*|.
+//! Phase-only spectra: Checchin et al., Eq. 6, in the form I2 I1* / |I2 I1*|.
 
 use std::sync::Arc;
 
 use rustfft::{Fft, FftPlanner, num_complex::Complex32};
 
-/// Unit modulus, phase kept; zero stays zero.
+/// Sets the modulus to one and keeps the phase; zero stays zero.
 pub(crate) fn to_unit(z: &mut Complex32) {
     let modulus = z.norm();
     *z = if modulus > 0.0 && modulus.is_finite() {
@@ -14,9 +14,9 @@ pub(crate) fn to_unit(z: &mut Complex32) {
     };
 }
 
-/// Whitens spectra that are already transformed along the angle, also along the radius.
+/// Whitens spectra along the radius that are already transformed along the angle.
 ///
-/// Summing the product over radial frequencies is then the phase correlation at radial shift 0.
+/// The sum of the product over radial frequencies is then the phase correlation at radial shift 0.
 pub(crate) struct Whitening {
     harmonics: usize,
     fft: Arc<dyn Fft<f32>>,

@@ -80,7 +80,7 @@ fn the_refinement_allocates_nothing_after_construction() {
         &drive,
         &scenes::Sensor::default(),
     );
-    scans[20..30].iter_mut().for_each(Vec::clear); // loses its map, and begins anew
+    scans[20..30].iter_mut().for_each(Vec::clear); // a new map starts
     let mut refiner = scenes::refiner();
     let before = ALLOCATIONS.with(Cell::get);
     for k in 0..scans.len() - 1 {

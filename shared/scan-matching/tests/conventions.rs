@@ -33,7 +33,7 @@ fn brightest(raster: &Array2<f32>) -> [f64; 2] {
 #[test]
 fn a_motion_is_the_later_frame_in_the_earlier_one() {
     // The vehicle drove 3 m ahead and turned 90 degrees to the left. What was 10 m ahead is now 7 m to the right, what
-    // was 5 m to the left of the new place is ahead, and the start lies 3 m to the left.
+    // was 5 m to the left of the new place is ahead, and the first position lies 3 m to the left.
     let motion = Motion::degrees(3.0, 0.0, 90.0);
     for (before, after) in [
         ([10.0, 0.0], [0.0, -7.0]),
@@ -96,7 +96,7 @@ fn three_points_give_their_motion_back() {
 }
 
 #[test]
-fn what_leaves_at_one_edge_does_not_come_back_at_the_other() {
+fn scatterers_do_not_wrap_around_the_edges() {
     // The only scatterer lies at the near edge before, and is gone after; another one stands at the far edge only after.
     // Around a circle of n cells they would match at a shift of two cells.
     let (earlier, later) = ([[25.0, 0.0]], [[-24.5, 0.0]]);
@@ -118,7 +118,7 @@ fn what_leaves_at_one_edge_does_not_come_back_at_the_other() {
 
 #[test]
 fn the_scene_behind_the_lever_moves_with_the_angle() {
-    // All structure 20 m ahead: an angle that is wrong by e moves it sideways, and the shift makes up for that.
+    // All structure 20 m ahead: an angle that is wrong by e moves it to the side, and the shift compensates.
     let scene: Vec<_> = common::scatterers(40, 6.0, 3)
         .iter()
         .map(|&([x, y], s)| ([x + 15.0, y + 4.0], s))

@@ -1,4 +1,4 @@
-//! The exhaustive search: against direct sums, against drawn motions, and what it refuses.
+//! The exhaustive search against direct sums and known motions, and the inputs that it rejects.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -99,7 +99,7 @@ proptest! {
         let mut exhaustive = ExhaustiveSearch::new(n, 1.0, &config).unwrap();
         let view = |raster| ArrayView2::from_shape((n, n), raster).unwrap();
         let found = exhaustive.search_around(view(&f), view(&g), prior_deg.to_radians()).unwrap().motion;
-        // Angles are compared by rasters read between the cells, all alike blurred.
+        // Angles are compared by rasters read between the cells, all blurred alike.
         let all = (-2..=2).flat_map(|k| (-3..=3).flat_map(move |i| (-3..=3).map(move |j| (k, [i, j]))));
         let summed = all.map(|(k, s)| (k, s, direct_sum(&f, &g, n, (angle(k), 0.2113), s)));
         let (best, [i, j], _) = summed.max_by(|a, b| a.2.total_cmp(&b.2)).unwrap();
@@ -111,7 +111,7 @@ proptest! {
     }
 }
 
-/// A turn by nothing does not blur: where that showed, the peak would flee from zero.
+/// A rotation by zero does not blur; without compensation the peak would be pushed off zero.
 #[test]
 fn small_angles_are_not_pushed_off_zero() {
     let config = ExhaustiveConfig {
@@ -199,7 +199,7 @@ fn motions_within_reach_are_found_to_a_fraction_of_a_cell() {
 }
 
 #[test]
-fn the_whole_circle_is_searched_where_it_is_asked_for() {
+fn a_reach_of_180_degrees_searches_the_whole_circle() {
     let config = ExhaustiveConfig {
         reach_deg: 180.0,
         step_deg: 2.0,
@@ -242,7 +242,7 @@ fn a_prior_moves_the_middle_of_the_angles() {
 }
 
 #[test]
-fn an_angle_at_the_end_of_the_grid_stays_there_and_is_not_trusted() {
+fn an_angle_at_the_end_of_the_grid_is_uncertain() {
     let (earlier, later) = pair(127, 0.8, Motion::degrees(0.0, 0.0, 4.0), 9);
     let config = ExhaustiveConfig {
         reach_deg: 3.0,
@@ -260,7 +260,7 @@ fn an_angle_at_the_end_of_the_grid_stays_there_and_is_not_trusted() {
 }
 
 #[test]
-fn the_covariance_knows_that_the_scene_behind_the_lever_moves_with_the_angle() {
+fn the_covariance_couples_shift_and_angle_by_the_lever() {
     // All structure 15 m ahead and 4 m to the left: x and y follow the angle by -J centre.
     let scene: Vec<_> = common::scatterers(40, 6.0, 3)
         .iter()
@@ -315,7 +315,7 @@ fn rasters_without_a_match_give_no_motion_and_a_wide_covariance() {
 }
 
 #[test]
-fn no_value_of_a_cell_makes_a_result_that_is_no_number() {
+fn no_value_of_a_cell_makes_a_result_that_is_not_finite() {
     let (earlier, later) = pair(65, 0.8, Motion::degrees(1.0, 0.0, 2.0), 1);
     for bad in [
         f32::NAN,
@@ -354,7 +354,7 @@ fn no_value_of_a_cell_makes_a_result_that_is_no_number() {
 }
 
 #[test]
-fn rasters_of_another_size_and_impossible_reaches_are_refused() {
+fn rasters_of_another_shape_and_impossible_reaches_are_rejected() {
     let config = ExhaustiveConfig::default();
     let mut exhaustive = ExhaustiveSearch::new(65, 0.8, &config).unwrap();
     let (raster, small) = (Array2::zeros((65, 65)), Array2::zeros((7, 65)));
@@ -393,7 +393,7 @@ fn rasters_of_another_size_and_impossible_reaches_are_refused() {
 }
 
 #[test]
-fn results_repeat_to_the_last_bit_whatever_was_searched_before() {
+fn results_do_not_depend_on_earlier_searches() {
     let (earlier, later) = pair(97, 0.8, Motion::degrees(2.0, -1.0, 5.0), 2);
     let fresh = search(97, 0.8, &ExhaustiveConfig::default(), &earlier, &later);
     let mut used = ExhaustiveSearch::new(97, 0.8, &ExhaustiveConfig::default()).unwrap();

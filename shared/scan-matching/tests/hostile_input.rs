@@ -28,7 +28,7 @@ fn empty_rasters_give_no_motion_and_a_wide_covariance() {
 }
 
 #[test]
-fn no_value_of_a_cell_makes_a_result_that_is_no_number() {
+fn no_value_of_a_cell_makes_a_result_that_is_not_finite() {
     let (earlier, later) = pair(N, CELL_M, Motion::degrees(1.0, 0.0, 2.0), 1);
     for bad in [
         f32::NAN,
@@ -82,7 +82,7 @@ fn no_value_of_a_cell_makes_a_result_that_is_no_number() {
 }
 
 #[test]
-fn holes_that_are_not_numbers_cost_little() {
+fn a_few_cells_that_are_nan_change_little() {
     let motion = Motion::degrees(1.0, 0.5, 3.0);
     let (earlier, mut later) = pair(127, 0.4, motion, 8);
     later.iter_mut().step_by(997).for_each(|v| *v = f32::NAN);
@@ -94,7 +94,7 @@ fn holes_that_are_not_numbers_cost_little() {
 }
 
 #[test]
-fn rasters_of_another_size_are_refused_with_both_sizes() {
+fn rasters_of_another_shape_or_layout_are_rejected() {
     let mut rotation = RotationSearch::new(N, &RotationConfig::default()).unwrap();
     let mut spectrum = rotation.new_spectrum();
     let small = Array2::zeros((7, N));
@@ -177,7 +177,7 @@ fn results_repeat_to_the_last_bit() {
     let mut translation = TranslationSearch::new(127, 0.8, &TranslationConfig::default()).unwrap();
     let (mut f, mut g) = (rotation.new_spectrum(), rotation.new_spectrum());
     let mut once = |between: &Array2<f32>| {
-        rotation.spectrum(between.view(), &mut f).unwrap(); // what was there before leaves no trace
+        rotation.spectrum(between.view(), &mut f).unwrap(); // an earlier spectrum leaves no trace
         rotation.spectrum(later.view(), &mut f).unwrap();
         rotation.spectrum(earlier.view(), &mut g).unwrap();
         let angle = rotation.search(&f, &g).unwrap();

@@ -17,7 +17,7 @@ const NOISY: Sensor = Sensor {
     hides_doppler: false,
     seed: 1,
 };
-/// What can be seen along [`straight`].
+/// The area visible along [`straight`].
 const AROUND: [[f64; 2]; 2] = [[-120.0, 370.0], [-100.0, 100.0]];
 const SEEDS: [u64; 3] = [1, 11, 21];
 
@@ -83,7 +83,7 @@ fn turns_to_either_side_are_followed() {
 }
 
 #[test]
-fn a_standing_vehicle_stays_where_it_is() {
+fn a_standing_vehicle_does_not_drift() {
     for seed in SEEDS {
         follows(
             "standing",
@@ -97,7 +97,7 @@ fn a_standing_vehicle_stays_where_it_is() {
 }
 
 #[test]
-fn yaw_drifts_little_where_things_stand_on_one_side_only() {
+fn yaw_drifts_little_with_structure_on_one_side_only() {
     let mut sums = [0.0; 2];
     for seed in SEEDS {
         let scene = one_sided(seed);
@@ -151,8 +151,8 @@ fn mirrored_points_give_the_mirrored_motion() {
     println!(
         "after five scans {apart:.6?} m apart; yaw at the end {sums:.3?} degrees, mean {mean:.3}"
     );
-    // Rounding alone tells them apart: it ends a descent a step sooner or later (1 mm, 1 mm at 50 m), and that grows, in some
-    // scenes sooner, to what any error of the points grows to.
+    // They differ by rounding alone: it ends an alignment one step sooner or later (1 mm, 1 mm at 50 m). The difference
+    // grows, in some scenes sooner, as any error of the points does.
     assert!(apart[2] < 0.05, "{apart:?}");
     assert!(mean.abs() < 0.15, "{sums:?}");
 }
@@ -172,8 +172,10 @@ fn traffic_does_not_pull_the_motion() {
     }
 }
 
-/// What a range offset adds to the scene's apparent motion, for each metre ahead, is b du/dx = b (sin / r) u', u' being
-/// across the line of sight u. The turn of the rigid motion nearest to that, rad/m: some b sin^2 / r^2.
+/// The yaw drift that a range offset b causes, rad/m: about b sin^2 / r^2.
+///
+/// Per metre ahead the offset adds b du/dx = b (sin / r) u' to the apparent motion of the scene, where u' is across the line
+/// of sight u. The drift is the rotation of the rigid motion nearest to that.
 fn drift_of_offset(points: &[SparsePoint], offset_m: f64) -> f64 {
     let (mut information, mut right) = (Matrix3::zeros(), Vector3::zeros());
     for [x, y] in points.iter().map(|p| [p.x_m, p.y_m].map(f64::from)) {
@@ -210,7 +212,10 @@ fn an_offset_left_in_the_ranges_turns_a_one_sided_drive() {
         let expected =
             drift_of_offset(&NOISY.scan(&scene, &straight(), 50), OFFSET_M).to_degrees() * 100.0;
         println!("side {side}: {caused:.3}, expected {expected:.3} degrees/100 m");
-        assert!(expected * side < 0.0, "away from what is seen too far");
+        assert!(
+            expected * side < 0.0,
+            "away from the structure that is seen too far"
+        );
         assert!(
             (0.4..2.5).contains(&(caused / expected)),
             "{caused}, expected {expected}"
@@ -223,13 +228,13 @@ fn speeding() -> Drive {
     Drive {
         speed_mps: 0.0,
         acceleration_mps2: 2.0,
-        yaw_rate: 0.0,
+        yaw_rate_radps: 0.0,
         scans: 41,
     }
 }
 
 #[test]
-fn a_doppler_shift_that_is_told_costs_nothing() {
+fn a_reported_doppler_shift_is_compensated() {
     const SHIFTED: Sensor = Sensor {
         doppler_s: 0.05,
         ..NOISY
@@ -239,24 +244,25 @@ fn a_doppler_shift_that_is_told_costs_nothing() {
         .flat_map(|seed| [(seed, straight()), (seed, speeding())])
     {
         let scene = town(AROUND, seed);
-        let [told, without] = [SHIFTED, NOISY].map(|sensor| run(&scene, &drive, &sensor).errors());
-        println!("told {told:.3?}\nwithout {without:.3?}");
+        let [reported, without] =
+            [SHIFTED, NOISY].map(|sensor| run(&scene, &drive, &sensor).errors());
+        println!("reported {reported:.3?}\nwithout {without:.3?}");
         assert!(
-            (told.shift_m - without.shift_m).abs() < 0.3,
-            "{told:?}, unshifted {without:?}"
+            (reported.shift_m - without.shift_m).abs() < 0.3,
+            "{reported:?}, unshifted {without:?}"
         );
         assert!(
-            (told.yaw_deg - without.yaw_deg).abs() < 0.1,
-            "{told:?}, unshifted {without:?}"
+            (reported.yaw_deg - without.yaw_deg).abs() < 0.1,
+            "{reported:?}, unshifted {without:?}"
         );
     }
 }
 
 #[test]
-fn a_doppler_shift_that_is_hidden_spoils_an_accelerating_drive() {
+fn a_hidden_doppler_shift_worsens_an_accelerating_drive() {
     for seed in SEEDS {
         let scene = town(AROUND, seed);
-        let [hidden, told] = [true, false].map(|hides_doppler| {
+        let [hidden, reported] = [true, false].map(|hides_doppler| {
             run(
                 &scene,
                 &speeding(),
@@ -269,8 +275,11 @@ fn a_doppler_shift_that_is_hidden_spoils_an_accelerating_drive() {
             .errors()
             .shift_m
         });
-        println!("hidden {hidden:.3} m, told {told:.3} m");
-        assert!(hidden > 2.0 * told, "hidden {hidden} m, told {told} m");
+        println!("hidden {hidden:.3} m, reported {reported:.3} m");
+        assert!(
+            hidden > 2.0 * reported,
+            "hidden {hidden} m, reported {reported} m"
+        );
     }
 }
 
@@ -288,9 +297,9 @@ fn covariances_are_symmetric_and_positive_definite() {
     }
 }
 
-/// As under a mask: less weight on every point tells nothing less.
+/// A mask may lower the weights of all points alike.
 #[test]
-fn what_all_points_weigh_changes_neither_motions_nor_covariances() {
+fn a_factor_on_all_weights_changes_neither_motions_nor_covariances() {
     let drive = straight();
     let whole = scans(&town(AROUND, 1), &drive, &NOISY);
     let lighter = whole
@@ -323,8 +332,8 @@ fn what_all_points_weigh_changes_neither_motions_nor_covariances() {
     }
 }
 
-/// Hedges along a way, a metre deep. Points that lie on top of what was drawn, like those of walls without depth, have no
-/// slope: of such a corridor the information matrix says nothing true.
+/// A corridor of hedges a metre deep. Points on top of their own image, as those of walls without depth, have no gradient,
+/// so the information matrix of such a corridor would be wrong.
 #[test]
 fn a_corridor_leaves_its_axis_uncertain() {
     let side = |y: f64| {
@@ -337,7 +346,7 @@ fn a_corridor_leaves_its_axis_uncertain() {
     let drive = Drive::steady(2.0, 0.0, 41);
     let scans = scans(&scene, &drive, &NOISY);
     for yaw in [0.0, 0.5, std::f64::consts::FRAC_PI_2] {
-        // The covariance is in the vehicle's frame: where the corridor leads in the world does not matter.
+        // The covariance is in the vehicle's frame: the direction of the corridor in the map does not matter.
         let mut refiner = refiner();
         refiner.restore(
             TrackerState {

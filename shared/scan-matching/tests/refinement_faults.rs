@@ -1,4 +1,4 @@
-//! What goes wrong for a while does not spoil the refined trajectory; a restored refinement goes on as if nothing had been.
+//! Faults of a few scans do not corrupt the refined trajectory, and a restored refiner continues bit for bit.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -15,7 +15,7 @@ const NOISY: Sensor = Sensor {
     seed: 1,
 };
 
-/// A gentle bend, 60 scans, and what is seen on it.
+/// A gentle bend and its 60 scans.
 fn bend() -> (Drive, Vec<Vec<SparsePoint>>) {
     let drive = Drive::steady(10.0, 4.0, 60);
     (
@@ -24,7 +24,7 @@ fn bend() -> (Drive, Vec<Vec<SparsePoint>>) {
     )
 }
 
-/// Points that have nothing to do with the scene.
+/// Points unrelated to the scene.
 fn noise(seed: u64) -> Vec<SparsePoint> {
     let mut numbers = Numbers(seed);
     let mut values = || {
@@ -60,7 +60,7 @@ fn bits(refined: &[Refined]) -> Vec<u64> {
     refined.iter().flat_map(numbers).map(f64::to_bits).collect()
 }
 
-/// Numbers that a vehicle's motion can have.
+/// Asserts that a result is finite and that a vehicle can have driven it.
 #[track_caller]
 fn sane(refined: &Refined) {
     let (motion, covariance) = (refined.motion.motion, refined.motion.covariance);
@@ -74,7 +74,7 @@ fn sane(refined: &Refined) {
 }
 
 #[test]
-fn a_fault_of_one_scan_passes() {
+fn a_fault_of_one_scan_is_bridged() {
     let (drive, good) = bend();
     let before = refine(&drive, &good).errors();
     let turned: Vec<SparsePoint> = good[30]
@@ -117,18 +117,18 @@ fn a_fault_of_one_scan_passes() {
     }
 }
 
-/// The new map begins with noise, as the first pair is never doubted. That costs a few scans, and the bearing: what was driven
-/// before and what is driven after are right each for itself.
+/// The new map starts with noise, since the first pair is always accepted. A few scans and the heading are lost: the
+/// trajectory before and the one after are right, each in itself.
 #[test]
-fn after_enough_scans_of_noise_the_map_begins_anew() {
+fn after_enough_scans_of_noise_a_new_map_starts() {
     const FIRST: usize = 29;
     const RECOVERED: usize = 10;
-    let patience = RefinementConfig::default().max_unmatched as usize;
+    let max_unmatched = RefinementConfig::default().max_unmatched as usize;
     let (drive, good) = bend();
     for seed in 0..4 {
         let mut scans = good.clone();
-        (0..patience).for_each(|k| scans[FIRST + 1 + k] = noise(100 * seed + k as u64));
-        let (mut refiner, last) = (refiner(), FIRST + patience - 1);
+        (0..max_unmatched).for_each(|k| scans[FIRST + 1 + k] = noise(100 * seed + k as u64));
+        let (mut refiner, last) = (refiner(), FIRST + max_unmatched - 1);
         let mut refined = refine_on(&mut refiner, &drive, &scans, 0..last);
         assert!(refiner.keyframes().count() > 0);
         refined.extend(refine_on(&mut refiner, &drive, &scans, last..last + 1));
@@ -156,7 +156,7 @@ fn after_enough_scans_of_noise_the_map_begins_anew() {
 }
 
 #[test]
-fn nothing_that_points_may_hold_makes_a_motion_that_is_no_number() {
+fn no_points_give_a_motion_that_is_not_finite() {
     let (drive, good) = bend();
     let faults: [(&str, Vec<SparsePoint>); 5] = [
         ("none", Vec::new()),
@@ -175,7 +175,7 @@ fn nothing_that_points_may_hold_makes_a_motion_that_is_no_number() {
         ("at the sensor", vec![point([0.0; 5]); 500]),
     ];
     for (name, fault) in faults {
-        // In the middle of a drive, from its beginning, and nothing else at all.
+        // In the middle of a drive, at its start, and in all scans.
         for range in [30..31, 0..1, 0..60] {
             let mut scans = good.clone();
             scans[range.clone()].fill(fault.clone());
@@ -196,7 +196,7 @@ fn nothing_that_points_may_hold_makes_a_motion_that_is_no_number() {
 }
 
 #[test]
-fn a_few_points_that_are_no_numbers_cost_little() {
+fn a_few_points_that_are_nan_change_little() {
     let (drive, mut scans) = bend();
     scans[30][7].x_m = f32::NAN;
     scans[31][7].weight = f32::NAN;
@@ -211,7 +211,7 @@ fn a_few_points_that_are_no_numbers_cost_little() {
 }
 
 #[test]
-fn stamps_that_stand_still_do_no_harm() {
+fn stamps_that_do_not_advance_are_bridged() {
     let (drive, scans) = bend();
     for interval_s in [0.0, -1.0, f64::NAN] {
         let mut refiner = refiner();
@@ -240,7 +240,7 @@ fn identical_input_gives_identical_bits() {
     let (drive, scans) = bend();
     let once = refine(&drive, &scans);
     assert_eq!(bits(&once.refined), bits(&refine(&drive, &scans).refined));
-    // What was there before a start leaves no trace.
+    // A reset leaves no trace of the scans before.
     let mut again = refiner();
     refine_on(&mut again, &drive, &scans, 10..40);
     again.reset();
@@ -250,7 +250,7 @@ fn identical_input_gives_identical_bits() {
     );
 }
 
-/// A refinement that knows what another one does, and has known something else before.
+/// A refiner with another state, restored to that of `from`.
 fn restored(from: &Refiner, mut into: Refiner) -> Refiner {
     let mut keyframes = from.keyframes();
     into.restore(*from.state(), |to| {
@@ -270,9 +270,9 @@ fn restored(from: &Refiner, mut into: Refiner) -> Refiner {
 }
 
 #[test]
-fn a_restored_refinement_goes_on_bit_for_bit() {
+fn a_restored_refiner_continues_bit_for_bit() {
     let (drive, mut scans) = bend();
-    scans[31] = noise(2); // with doubts remembered
+    scans[31] = noise(2); // leaves a doubtful scan in the state
     for cut in [1, 7, 31, 45] {
         let (mut one, mut used) = (refiner(), refiner());
         refine_on(&mut one, &drive, &scans, 0..cut);
@@ -290,7 +290,7 @@ fn a_restored_refinement_goes_on_bit_for_bit() {
 }
 
 #[test]
-fn a_chain_begins_at_the_first_scan_of_any_number() {
+fn a_chain_may_start_with_any_scan_number() {
     let (drive, scans) = bend();
     let mut refiner = refiner();
     let refined = refiner.refine(0, &scans[1], &scans[0], &searched(&drive, 0), SWEEP_S);

@@ -1,5 +1,5 @@
-//! A radar that takes a second for a turn, as K2Pi does (Checchin et al., Table 1): between two scans a vehicle is far on, and
-//! within one its velocity changes.
+//! A radar with a sweep of one second, as K2Pi (Checchin et al., Table 1): a vehicle drives far between two scans, and its
+//! velocity changes within one.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -14,12 +14,12 @@ use nalgebra::{Point2, Rotation2, Vector2};
 const SWEEP_S: f64 = 1.0;
 const SPEED_MPS: f64 = 4.4;
 /// Yaw rate in the bend: 28 degrees in a sweep.
-const RATE: f64 = -0.49;
-/// When the bend begins, and when it ends after 112 degrees, s: both in the middle between two scans' middles.
+const YAW_RATE_RADPS: f64 = -0.49;
+/// Start and end of the bend of 112 degrees, s; both are halfway between two stamps.
 const BEND_S: [f64; 2] = [8.5, 12.5];
 const SCANS: usize = 22;
 const RANGE_M: std::ops::Range<f64> = 5.0..70.0;
-/// What the search is off by: m, m, rad.
+/// Error of the search: m, m, rad.
 const SEARCH_OFF: [f64; 3] = [0.4, -0.3, 0.07];
 
 /// A straight street, a right bend, a straight street.
@@ -31,10 +31,12 @@ fn pose(time_s: f64) -> Pose {
         Pose::new(Rotation2::new(half) * Vector2::new(chord, 0.0), turn)
     };
     let in_bend_s = time_s.clamp(BEND_S[0], BEND_S[1]) - BEND_S[0];
-    arc(time_s.min(BEND_S[0]), 0.0) * arc(in_bend_s, RATE) * arc((time_s - BEND_S[1]).max(0.0), 0.0)
+    arc(time_s.min(BEND_S[0]), 0.0)
+        * arc(in_bend_s, YAW_RATE_RADPS)
+        * arc((time_s - BEND_S[1]).max(0.0), 0.0)
 }
 
-/// The posts as scan `k` sees them, each when the clockwise beam passes it.
+/// The posts as scan `k` sees them, each at the time at which the clockwise beam passes it.
 fn scan(posts: &[Point2<f64>], k: usize) -> Vec<SparsePoint> {
     let see = |post: &Point2<f64>| {
         let (mut time_s, mut place) = (0.0, Point2::origin());
@@ -78,10 +80,10 @@ fn refined(seed: u64) -> Vec<Refined> {
     (1..SCANS).map(next).collect()
 }
 
-/// Measured: 1.7 degrees at worst and 0.6 m at the end. Where the points are matched by the velocity of the scan before, what the
-/// bend's first scan saw fits nowhere, and 10 degrees are lost at once.
+/// Measured: at most 1.7 degrees, and 0.6 m at the end. If the points are deskewed with the velocity of the scan before, the
+/// first scan in the bend matches nothing, and the yaw is 10 degrees off at once.
 #[test]
-fn a_bend_that_begins_between_two_scans_is_followed() {
+fn a_bend_that_starts_between_two_scans_is_followed() {
     for seed in 1..=6 {
         let mut end = Pose::identity();
         for (k, refined) in (1..).zip(refined(seed)) {

@@ -41,7 +41,7 @@ impl Default for ExhaustiveConfig {
 }
 
 impl ExhaustiveConfig {
-    /// MbyM's search as it is compared with in Weston et al.: bare correlations.
+    /// The search of MbyM as Weston et al. compare with it: plain correlations.
     pub fn mbym() -> Self {
         Self {
             overlap: Overlap::None,
@@ -53,7 +53,7 @@ impl ExhaustiveConfig {
     /// Checks every value.
     ///
     /// # Errors
-    /// The first key that no search can be built from.
+    /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), ConfigError> {
         let check = |good, key, actual: &dyn ToString, expected| {
             accept(good, "exhaustive", key, actual, expected)
@@ -86,7 +86,7 @@ impl ExhaustiveConfig {
         )
     }
 
-    /// Number of angles that are tried.
+    /// Returns the number of angles tried.
     pub fn candidates(&self) -> usize {
         self.angles().count
     }
@@ -118,12 +118,12 @@ pub(super) struct AngleGrid {
     first: f64,
     pub step: f64,
     pub count: usize,
-    /// Whether the last angle is the first one's neighbour.
+    /// The last angle is the first one's neighbour.
     circle: bool,
 }
 
 impl AngleGrid {
-    /// The angle `k` steps, whole or not, from the first one.
+    /// The angle `k` steps from the first one; `k` need not be whole.
     pub fn angle(&self, k: f64) -> f64 {
         self.first + k * self.step
     }
@@ -138,17 +138,17 @@ impl AngleGrid {
         }) as usize
     }
 
-    /// Whether the k-th angle has a neighbour on both sides.
+    /// Returns whether the k-th angle has a neighbour on both sides.
     pub fn is_inner(&self, k: usize) -> bool {
         self.circle || (k > 0 && k + 1 < self.count)
     }
 
-    /// Whether two angles are the same or neighbours.
+    /// Returns whether two angles are the same or neighbours.
     pub fn are_close(&self, a: usize, b: usize) -> bool {
         (-1..=1).any(|by| self.beside(a, by) == b)
     }
 
-    /// Variance of an angle of which nothing more is known than that it is on the grid.
+    /// Variance of a uniform distribution over the grid.
     pub fn guess(&self) -> f64 {
         (0.5 * self.step * self.count as f64).powi(2) / 3.0
     }

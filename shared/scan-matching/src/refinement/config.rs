@@ -97,7 +97,7 @@ impl RefinementConfig {
     /// Checks every value.
     ///
     /// # Errors
-    /// The first key that no refinement can be built from.
+    /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), ConfigError> {
         let check = |good, key, actual: &dyn ToString, expected| {
             accept(good, "refinement", key, actual, expected)

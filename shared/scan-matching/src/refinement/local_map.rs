@@ -122,7 +122,7 @@ impl LocalMap {
         self.coarse.view()
     }
 
-    /// Whether `pose` is far enough from the last keyframe for another one.
+    /// Returns whether `pose` is far enough from the last keyframe for another one.
     pub fn needs_keyframe(&self, pose: &Pose, config: &RefinementConfig) -> bool {
         self.used.back().is_none_or(|last| {
             let moved = last.pose.inv_mul(pose);

@@ -61,7 +61,7 @@ impl Anchor {
         Twist::from_chord(&self.pose.inv_mul(pose), self.age_s + interval_s)
     }
 
-    /// Whether a vehicle can have come from here to `pose`: within the limits of acceleration, and `jitter_share` (0 to
+    /// Returns whether a vehicle can have come from here to `pose`: within the limits of acceleration, and `jitter_share` (0 to
     /// 1) of the jitter of a match.
     fn can_reach(
         &self,
@@ -89,7 +89,7 @@ impl TrackerState {
         [first, self.anchors[1].as_ref().map_or(first, from)]
     }
 
-    /// The mean velocity from the newest anchor, or the last pose if there is none, to `pose`.
+    /// The mean velocity from the newest anchor, (or from the last pose if there is none) to `pose`.
     pub(super) fn twist_to(&self, pose: &Pose, interval_s: f64) -> Twist {
         match &self.anchors[0] {
             Some(anchor) => anchor.twist_to(pose, interval_s),
@@ -97,7 +97,7 @@ impl TrackerState {
         }
     }
 
-    /// Whether a vehicle can have come to `pose` from either anchor.
+    /// Returns whether a vehicle can have come to `pose` from either anchor.
     pub(super) fn can_reach(
         &self,
         pose: &Pose,

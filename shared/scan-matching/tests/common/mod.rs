@@ -1,4 +1,4 @@
-//! Generated scenes: blurred scatterers whose places are known before and after a motion.
+//! Generated scenes: blurred scatterers whose positions are known before and after a motion.
 #![allow(dead_code)]
 
 pub mod scenes;
@@ -26,14 +26,14 @@ impl Motion {
         }
     }
 
-    /// A point of the earlier frame, seen from the later one: x = R^T (x' - t), Eq. 1 the other way round.
+    /// A point of the earlier frame in the later one: x = R^T (x' - t), the inverse of Eq. 1.
     pub fn seen_from_later(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let ((s, c), dx, dy) = (self.yaw.sin_cos(), x - self.x, y - self.y);
         [c * dx + s * dy, -s * dx + c * dy]
     }
 }
 
-/// A small generator of repeatable numbers in 0..1 (splitmix64).
+/// A generator of pseudo-random numbers in 0..1 (splitmix64).
 pub struct Numbers(pub u64);
 
 impl Numbers {
@@ -50,7 +50,7 @@ impl Numbers {
     }
 }
 
-/// Places (m) and strengths of scatterers within `radius_m` of the earlier sensor.
+/// Positions (m) and strengths of scatterers within `radius_m` of the earlier sensor.
 pub fn scatterers(count: usize, radius_m: f64, seed: u64) -> Vec<([f64; 2], f64)> {
     let mut numbers = Numbers(seed);
     let mut place = || loop {

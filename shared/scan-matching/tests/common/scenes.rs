@@ -1,4 +1,4 @@
-//! Generated point scans with exact truth: what a sensor that turns clockwise sees of reflectors in the plane on its way.
+//! Generated point scans with exact truth: reflectors in the plane, seen by a moving sensor that scans clockwise.
 
 use gyre_geometry::{Pose, SparsePoint};
 use gyre_scan_matching::{Refined, RefinementConfig, Refiner};
@@ -6,14 +6,14 @@ use nalgebra::{Point2, Vector2, Vector3};
 
 use super::Numbers;
 
-/// Of a sweep, and from one scan to the next, s.
+/// Time of a sweep and from one scan to the next, s.
 pub const SWEEP_S: f64 = 0.25;
-/// What the sensor sees, m.
+/// Range of the sensor, m.
 const VISIBLE_M: std::ops::RangeInclusive<f64> = 5.0..=95.0;
-/// Points that a scan may have.
+/// Capacity of a scan, points.
 pub const CAPACITY: usize = 4096;
 
-/// A line that gives a number of points to each scan, each time at other places along it. A post has no length.
+/// A line that gives a number of points to each scan, at other positions along it each time. A post has no length.
 #[derive(Debug, Clone, Copy)]
 pub struct Reflector {
     pub from: Vector2<f64>,
@@ -81,7 +81,7 @@ pub fn town(area: [[f64; 2]; 2], seed: u64) -> Vec<Reflector> {
     houses.chain(posts(area, 100.0, seed + 2)).collect()
 }
 
-/// The same with left and right exchanged.
+/// The scene with left and right exchanged.
 pub fn mirrored(scene: &[Reflector]) -> Vec<Reflector> {
     let mirror = |v: Vector2<f64>| Vector2::new(v.x, -v.y);
     let mirrored = |r: &Reflector| Reflector {
@@ -93,12 +93,12 @@ pub fn mirrored(scene: &[Reflector]) -> Vec<Reflector> {
     scene.iter().map(mirrored).collect()
 }
 
-/// A way that accelerates or turns, not both.
+/// A drive that accelerates or turns, not both.
 #[derive(Debug, Clone, Copy)]
 pub struct Drive {
     pub speed_mps: f64,
     pub acceleration_mps2: f64,
-    pub yaw_rate: f64,
+    pub yaw_rate_radps: f64,
     pub scans: usize,
 }
 
@@ -107,7 +107,7 @@ impl Drive {
         Self {
             speed_mps,
             acceleration_mps2: 0.0,
-            yaw_rate: yaw_rate_deg.to_radians(),
+            yaw_rate_radps: yaw_rate_deg.to_radians(),
             scans,
         }
     }
@@ -123,7 +123,7 @@ impl Drive {
     /// Pose of scan `k` in the first one's frame.
     pub fn pose(&self, k: usize) -> Pose {
         let time_s = k as f64 * SWEEP_S;
-        arc(self.length_m(time_s), self.yaw_rate * time_s)
+        arc(self.length_m(time_s), self.yaw_rate_radps * time_s)
     }
 
     pub fn driven_m(&self) -> f64 {
@@ -142,16 +142,16 @@ fn arc(length: f64, turn: f64) -> Pose {
     Pose::new(Vector2::new(ahead, aside) * length, turn)
 }
 
-/// What the sensor does to the ranges.
+/// The errors of the sensor's ranges.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Sensor {
     /// Standard deviation of the ranges, m.
     pub noise_m: f64,
-    /// Left in the ranges, m.
+    /// Uncorrected range offset, m.
     pub offset_m: f64,
     /// Ranges are too short by this for each m/s of approach, s.
     pub doppler_s: f64,
-    /// Whether the points say so.
+    /// The points do not report the Doppler shift.
     pub hides_doppler: bool,
     pub seed: u64,
 }
@@ -167,9 +167,9 @@ impl Sensor {
             for _ in 0..reflector.points {
                 let place = reflector.from + reflector.along * numbers.next();
                 let weight = 0.3 + 0.7 * numbers.next();
-                // Twelve even numbers' sum is as good as normal.
+                // The sum of twelve uniform numbers is close to normal.
                 let normal = (0..12).map(|_| numbers.next()).sum::<f64>() - 6.0;
-                let sensor = |t: f64| pose * arc(speed * t, drive.yaw_rate * t);
+                let sensor = |t: f64| pose * arc(speed * t, drive.yaw_rate_radps * t);
                 let seen = |t: f64| {
                     sensor(t).inverse() * Point2::from(place + reflector.velocity * (middle_s + t))
                 };
@@ -208,8 +208,8 @@ pub fn point(values: [f64; 5]) -> SparsePoint {
     }
 }
 
-/// When the beam, clockwise from straight ahead, meets what is `seen` at a place at each time: s from the middle of the sweep.
-/// `None` for what crosses the seam.
+/// The time at which the beam, clockwise from straight ahead, meets a reflector that is `seen` at a position at each time:
+/// s from the middle of the sweep. `None` if the reflector crosses the seam.
 fn swept(seen: impl Fn(f64) -> Point2<f64>) -> Option<f64> {
     let meets = |t: f64| {
         let at = seen(t);
@@ -227,14 +227,14 @@ pub struct Run {
     pub refined: Vec<Refined>,
 }
 
-/// How far off a run ended, and its worst motion.
+/// The error at the end of a run, and that of its worst motion.
 #[derive(Debug, Clone, Copy)]
 pub struct Errors {
-    /// Degrees counter-clockwise for each 100 m.
+    /// Yaw drift, degrees counter-clockwise per 100 m.
     pub drift_deg: f64,
-    /// Degrees counter-clockwise at the end.
+    /// Yaw error at the end, degrees counter-clockwise.
     pub yaw_deg: f64,
-    /// Distance from the true place at the end, m.
+    /// Distance from the true position at the end, m.
     pub shift_m: f64,
     pub worst_m: f64,
     pub worst_deg: f64,
@@ -245,7 +245,7 @@ impl Run {
         self.errors_from(0)
     }
 
-    /// Of the motions from scan `first` on.
+    /// The errors of the motions from scan `first` on.
     pub fn errors_from(&self, first: usize) -> Errors {
         let (mut pose, mut worst_m, mut worst_deg) = (self.drive.pose(first), 0.0_f64, 0.0_f64);
         for k in first..self.refined.len() {
@@ -273,7 +273,7 @@ fn true_motion(drive: &Drive, k: usize) -> Pose {
     drive.pose(k).inv_mul(&drive.pose(k + 1))
 }
 
-/// The true motion to scan k + 1 as a search finds it, a quarter of a metre and half a degree off.
+/// The true motion to scan k + 1 with the errors of a search, up to a quarter of a metre and half a degree.
 pub fn searched(drive: &Drive, k: usize) -> Pose {
     let mut numbers = Numbers(0x5ea2c4 + k as u64);
     let off = Vector3::from_fn(|_, _| numbers.within(1.0));
@@ -324,7 +324,7 @@ pub fn refine_on(
         .collect()
 }
 
-/// Both in one.
+/// Simulates and refines a drive.
 pub fn run(scene: &[Reflector], drive: &Drive, sensor: &Sensor) -> Run {
     refine(drive, &scans(scene, drive, sensor))
 }

@@ -55,7 +55,7 @@ fn moved(pose: &Pose, unknown: usize, by: f64) -> Pose {
     )
 }
 
-/// Whether a point is far enough from its cell's edges for the finite differences to stay in the cell.
+/// Returns whether a point is far enough from its cell's edges for the finite differences to stay in the cell.
 fn inside_a_cell(pose: &Pose, [x, y]: &[f64; 2]) -> bool {
     (pose * Point2::new(*x, *y)).coords.iter().all(|v| {
         let share = (v / CELL_M).rem_euclid(1.0);
