@@ -87,7 +87,7 @@ impl Odometry {
         Ok(self.integrate(searched, refined))
     }
 
-    /// Compensates the sweep's motion, rasterises the scan, masks it and extracts its points (Weston et al., Sec. III-A).
+    /// Compensates the sweep's motion, rasterises the scan, masks it (Weston et al., Sec. III-E) and extracts its points.
     ///
     /// # Errors
     /// A scan that contradicts itself, a network that fails.
