@@ -206,7 +206,8 @@ impl RotationSearch {
         out.data[0] = Complex32::default();
     }
 
-    /// C[m] = sum over r of G[m, r] conj(F[m, r]), transformed back to angles, as correlation coefficients (Weston et al., Eq. 7).
+    /// C[m] = sum over r of G[m, r] conj(F[m, r]), transformed back to angles, as correlation coefficients (Weston et al.,
+    /// Eq. 7; line 14 with a single profile).
     fn correlate(&mut self, later: &PolarSpectrum, earlier: &PolarSpectrum, energy: f64) {
         self.cross.fill(Complex32::default());
         let rows = later
