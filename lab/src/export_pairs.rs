@@ -16,7 +16,7 @@
 //! nor those of the next `masking.lag`. At run time an unreadable scan breaks no chain; here it does, so that any two neighbours of
 //! one number are consecutive scans.
 //!
-//! - [`recordings`]: what is read, and its truth; [`scans`]: reading ahead;
+//! - [`recording`]: what is read, and its truth; [`scans`]: reading ahead;
 //! - [`preparation`]: from scans to records;
 //! - [`record`], [`npy`]: how they are written;
 //! - [`provenance`]: `pairs.toml`, which says what they were made of.
@@ -25,33 +25,30 @@ mod npy;
 mod preparation;
 mod provenance;
 mod record;
-mod recordings;
+mod recording;
 mod scans;
 
-use std::{
-    fmt, fs,
-    io::IsTerminal,
-    path::{Path, PathBuf},
-    process::ExitCode,
-    time::Instant,
-};
+use std::{fmt, fs, io::IsTerminal, path::Path, process::ExitCode, time::Instant};
 
+use gyre::{Failure, configuration::Configuration, print};
 use gyre_radar::OwnedScan;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::cli::ExportPairsArguments;
-use gyre::{Failure, configuration::Configuration, print};
+use crate::{cli::ExportPairsArguments, report::save};
 use npy::NpyWriter;
 use preparation::Preparation;
 use provenance::{Provenance, Sequence};
 use record::Record;
-use recordings::{Origin, Recording};
+use recording::Recording;
 
 /// Writes the records of all recordings, and what they were made of.
+///
+/// # Errors
+/// A recording that cannot be used, a file that cannot be written.
 pub fn export_pairs(arguments: &ExportPairsArguments) -> Result<ExitCode, Failure> {
     let out = &arguments.out;
     provenance::check_place(out)?;
-    let configurations = recordings::configurations(arguments)?;
+    let configurations = recording::configurations(arguments)?;
     let recordings = configurations
         .iter()
         .map(Recording::open)
@@ -64,106 +61,99 @@ pub fn export_pairs(arguments: &ExportPairsArguments) -> Result<ExitCode, Failur
             .map(|recording| recording.played.len())
             .sum(),
     );
-    for recording in recordings {
-        export.recording(recording, &bar)?;
+    for mut recording in recordings {
+        export.recording(&mut recording, &bar)?;
     }
     bar.finish_and_clear();
     let counts = export.finish(&configurations[0])?;
     let wall_s = started.elapsed().as_secs_f64();
     print::line(format_args!(
-        "wrote {counts} to {} ({:.1} MB) in {wall_s:.1} s, {:.0} scans/s",
+        "wrote {counts} to {} ({:.1} MB) in {wall_s:.1} s",
         out.display(),
         fs::metadata(out)?.len() as f64 * 1e-6,
-        counts.scans as f64 / wall_s
     ))?;
     Ok(ExitCode::SUCCESS)
 }
 
 fn progress_bar(scans: usize) -> ProgressBar {
-    let bar = if std::io::stderr().is_terminal() {
-        ProgressBar::new(scans as u64)
-    } else {
-        ProgressBar::hidden()
+    let bar = match std::io::stderr().is_terminal() {
+        true => ProgressBar::new(scans as u64),
+        false => ProgressBar::hidden(),
     };
-    if let Ok(style) = ProgressStyle::with_template(
-        "exporting {wide_bar} {pos}/{len} scans, {per_sec}, {eta} left",
-    ) {
-        bar.set_style(style);
+    let template = "exporting {wide_bar} {pos}/{len} scans, {per_sec}, {eta} left";
+    match ProgressStyle::with_template(template) {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar,
     }
-    bar
-}
-
-/// What was written and what was not.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Counts {
-    scans: usize,
-    sequences: usize,
-    unreadable: usize,
-    without_truth: usize,
 }
 
 /// A file that is being written.
-struct Export {
-    out: PathBuf,
+struct Export<'a> {
+    out: &'a Path,
     file: NpyWriter,
     preparation: Preparation,
     sequences: Vec<Sequence>,
-    counts: Counts,
+    unreadable: usize,
+    without_truth: usize,
     /// A record's bytes.
     encoded: Vec<u8>,
 }
 
-impl Export {
-    fn begin(configuration: &Configuration, out: &Path) -> Result<Self, Failure> {
+impl<'a> Export<'a> {
+    fn begin(configuration: &Configuration, out: &'a Path) -> Result<Self, Failure> {
         let n = configuration.raster.n;
         let preparation = Preparation::new(configuration)?;
-        let file = NpyWriter::create(out, &Record::dtype(n), Record::bytes(n))
-            .map_err(cannot_write(out))?;
-        let encoded = Vec::with_capacity(Record::bytes(n));
+        let file = NpyWriter::create(out, &Record::dtype(n));
         Ok(Self {
-            out: out.to_owned(),
-            file,
+            out,
+            file: file.map_err(|error| cannot_write(out, &error))?,
             preparation,
             sequences: Vec::new(),
-            counts: Counts::default(),
-            encoded,
+            unreadable: 0,
+            without_truth: 0,
+            encoded: Vec::new(),
         })
     }
 
     /// Appends a recording's scans. One that gives none is refused: it, or its truth, is not what was meant.
-    fn recording(&mut self, recording: Recording, bar: &ProgressBar) -> Result<(), Failure> {
-        let Recording {
-            mut dataset,
-            played,
-            origin,
-        } = recording;
-        let (before, scans) = (self.counts, played.len());
+    fn recording(&mut self, recording: &mut Recording, bar: &ProgressBar) -> Result<(), Failure> {
+        let (sequences, without_truth) = (self.sequences.len(), self.without_truth);
         self.preparation.begin();
-        scans::for_each_scan(dataset.as_mut(), played, |index, read| {
+        let (source, played) = (&recording.source, recording.played.clone());
+        scans::for_each_scan(recording.dataset.as_mut(), played.clone(), |index, read| {
             bar.inc(1);
             match read {
-                Ok(scan) => self.scan(&origin, index, scan)?,
-                Err(error) => self.leave_out(&error),
+                Ok(scan) => self.scan(source, index, scan),
+                Err(error) => {
+                    self.leave_out(&error);
+                    Ok(())
+                }
             }
-            Ok(())
         })?;
-        let (data, truth) = (&origin.data, origin.truth.path.display());
-        match (
-            self.counts.scans - before.scans,
-            self.counts.without_truth - before.without_truth,
-        ) {
-            (0, 0) => Err(format!("{data}: none of its {scans} scans can be read").into()),
-            (0, read) => Err(format!(
-                "{data}: {truth} has no pose at the time of any of its {read} readable scans"
-            )
-            .into()),
-            _ => Ok(()),
+        if self.sequences.len() > sequences {
+            return Ok(());
         }
+        let data = &source.data;
+        Err(match self.without_truth - without_truth {
+            0 => format!("{data}: none of its {} scans can be read", played.len()),
+            read => {
+                let truth = source.truth.path.display();
+                format!(
+                    "{data}: {truth} has no pose at the time of any of its {read} readable scans"
+                )
+            }
+        }
+        .into())
     }
 
-    fn scan(&mut self, origin: &Origin, index: usize, scan: &OwnedScan) -> Result<(), Failure> {
-        let Some(pose) = origin.truth.pose(scan.geometry.stamp_ns) else {
-            self.counts.without_truth += 1;
+    fn scan(
+        &mut self,
+        source: &recording::Source,
+        index: usize,
+        scan: &OwnedScan,
+    ) -> Result<(), Failure> {
+        let Some(pose) = source.truth.pose(scan.geometry.stamp_ns) else {
+            self.without_truth += 1;
             self.preparation.begin();
             return Ok(());
         };
@@ -172,65 +162,49 @@ impl Export {
         match self.preparation.next(&scan.view(), pose, number) {
             Ok(record) => record.encode(&mut self.encoded),
             Err(error) => {
-                self.leave_out(&format_args!("scan {index} of {}: {error}", origin.data));
+                self.leave_out(&format_args!("scan {index} of {}: {error}", source.data));
                 return Ok(());
             }
         }
         self.file
             .append(&self.encoded)
-            .map_err(cannot_write(&self.out))?;
+            .map_err(|error| cannot_write(self.out, &error))?;
         if begins {
-            self.sequences.push(Sequence::new(number, origin, index));
+            self.sequences.push(Sequence::new(number, source, index));
         }
         if let Some(sequence) = self.sequences.last_mut() {
             sequence.scans += 1;
         }
-        self.counts.scans += 1;
         Ok(())
     }
 
     fn leave_out(&mut self, reason: &dyn fmt::Display) {
         print::note(format_args!("left out: {reason}"));
-        self.counts.unreadable += 1;
+        self.unreadable += 1;
         self.preparation.begin();
     }
 
-    /// Writes what the file was made of, and gives it its name.
-    fn finish(self, configuration: &Configuration) -> Result<Counts, Failure> {
-        let beside = provenance::place(&self.out);
-        let text = Provenance::new(configuration, &self.sequences).to_toml()?;
-        fs::write(&beside, text).map_err(cannot_write(&beside))?;
-        self.file.finish().map_err(cannot_write(&self.out))?;
-        Ok(Counts {
-            sequences: self.sequences.len(),
-            ..self.counts
-        })
+    /// Writes what the file was made of, and gives it its name. Returns what was written, in words.
+    fn finish(self, configuration: &Configuration) -> Result<String, Failure> {
+        let provenance = Provenance::new(configuration, &self.sequences);
+        save(&provenance::place(self.out), &provenance.to_toml()?)?;
+        self.file
+            .finish()
+            .map_err(|error| cannot_write(self.out, &error))?;
+        let (scans, sequences) = (provenance.scans, self.sequences.len());
+        let plural = if sequences == 1 { "" } else { "s" };
+        let left_out = match (self.unreadable, self.without_truth) {
+            (0, 0) => String::new(),
+            (unreadable, untrue) => {
+                format!(" (left out: {unreadable} unreadable, {untrue} without truth)")
+            }
+        };
+        Ok(format!(
+            "{scans} scans in {sequences} sequence{plural}{left_out}"
+        ))
     }
 }
 
-fn cannot_write(path: &Path) -> impl Fn(std::io::Error) -> Failure {
-    move |error| format!("cannot write {}: {error}", path.display()).into()
-}
-
-impl fmt::Display for Counts {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            scans,
-            sequences,
-            unreadable,
-            without_truth,
-        } = self;
-        write!(
-            f,
-            "{scans} scans in {sequences} sequence{}",
-            if *sequences == 1 { "" } else { "s" }
-        )?;
-        if unreadable + without_truth > 0 {
-            write!(
-                f,
-                " (left out: {unreadable} unreadable, {without_truth} without truth)"
-            )?;
-        }
-        Ok(())
-    }
+fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
+    format!("cannot write {}: {error}", path.display()).into()
 }

@@ -1,7 +1,8 @@
 //! NumPy's `.npy`, format 1.0, written record by record: `numpy.load(path, mmap_mode="r")` opens it without reading it.
 //!
 //! How many records there are is known at the end, so the header leaves room for any number and is written once more then. Until
-//! it is complete the file goes by another name.
+//! it is complete the file goes by another name. (The crates for `.npy` write no records with an array of a size known at run time,
+//! or a header of another length.)
 
 use std::{
     fs::{self, File},
@@ -9,9 +10,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// What an unfinished file's name ends in.
-const PARTIAL: &str = "part";
-/// Magic, version, and the length of what follows.
+/// Length of magic, version, and the length of what follows.
 const PREFIX_BYTES: usize = 10;
 /// NumPy wants the data to begin at a multiple of this.
 const ALIGNMENT: usize = 64;
@@ -24,48 +23,37 @@ pub struct NpyWriter {
     path: PathBuf,
     partial: PathBuf,
     dtype: String,
-    record_bytes: usize,
     records: u64,
 }
 
 impl NpyWriter {
-    /// Begins the array that is to be at `path`, of records of `record_bytes` bytes that `dtype`, a Python literal, describes.
+    /// Begins the array that is to be at `path`, of records that `dtype`, a Python literal, describes.
     ///
     /// # Errors
     /// What the operating system says.
-    pub fn create(path: &Path, dtype: &str, record_bytes: usize) -> io::Result<Self> {
-        let partial = path.with_added_extension(PARTIAL);
-        let file = BufWriter::with_capacity(BUFFER_BYTES, File::create(&partial)?);
-        let mut writer = Self {
+    pub fn create(path: &Path, dtype: &str) -> io::Result<Self> {
+        let partial = path.with_added_extension("part");
+        let mut file = BufWriter::with_capacity(BUFFER_BYTES, File::create(&partial)?);
+        file.write_all(&header(dtype, 0))?;
+        Ok(Self {
             file,
             path: path.to_owned(),
             partial,
             dtype: dtype.to_owned(),
-            record_bytes,
             records: 0,
-        };
-        writer.file.write_all(&header(dtype, 0))?;
-        Ok(writer)
+        })
     }
 
     /// Appends a record.
     ///
     /// # Errors
-    /// A record of another length than was told, as `InvalidInput`, or what the operating system says.
+    /// What the operating system says.
     pub fn append(&mut self, record: &[u8]) -> io::Result<()> {
-        if record.len() != self.record_bytes {
-            let reason = format!(
-                "a record has {} bytes: expected {}",
-                record.len(),
-                self.record_bytes
-            );
-            return Err(io::Error::new(io::ErrorKind::InvalidInput, reason));
-        }
         self.records += 1;
         self.file.write_all(record)
     }
 
-    /// Says how many records there are, and gives the file its name.
+    /// Writes the number of records, and gives the file its name.
     ///
     /// # Errors
     /// What the operating system says; nothing is left then.
@@ -128,7 +116,7 @@ mod tests {
     fn a_complete_file_has_its_name_and_its_number_of_records() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("some.npy");
-        let mut writer = NpyWriter::create(&path, DTYPE, 10).unwrap();
+        let mut writer = NpyWriter::create(&path, DTYPE).unwrap();
         writer.append(&[1; 10]).unwrap();
         assert!(!path.exists());
         writer.append(&[2; 10]).unwrap();
@@ -139,11 +127,10 @@ mod tests {
     }
 
     #[test]
-    fn what_is_given_up_leaves_nothing_and_a_wrong_record_is_refused() {
+    fn what_is_given_up_leaves_nothing() {
         let folder = tempfile::tempdir().unwrap();
-        let mut writer = NpyWriter::create(&folder.path().join("some.npy"), DTYPE, 10).unwrap();
-        let refused = writer.append(&[1; 9]).unwrap_err();
-        assert_eq!(refused.to_string(), "a record has 9 bytes: expected 10");
+        let mut writer = NpyWriter::create(&folder.path().join("some.npy"), DTYPE).unwrap();
+        writer.append(&[1; 10]).unwrap();
         drop(writer);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     }

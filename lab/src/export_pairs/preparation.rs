@@ -2,31 +2,21 @@
 
 use std::collections::VecDeque;
 
-use gyre::configuration::Configuration;
+use gyre::{Failure, configuration::Configuration};
 use gyre_geometry::{Pose, Twist, pose, xy_yaw};
 use gyre_masking::MaskKind;
-use gyre_odometry::{Odometry, OdometryConfig, OdometryError, SearchConfig, SetupError};
+use gyre_odometry::{Odometry, OdometryConfig, OdometryError, SearchConfig};
 use gyre_radar::{PointsConfig, PolarScan};
 use gyre_scan_matching::{RefinementConfig, RefinementKind};
 use half::{f16, slice::HalfFloatSliceExt};
-use thiserror::Error;
 
 use super::record::Record;
 
-/// Settings that no records can be made with.
-#[derive(Debug, Error)]
-pub enum SettingError {
-    /// A network masks what networks are trained on.
-    #[error(
-        "masking.kind is `learned`, but masks are trained on rasters that no network has masked: set it to `threshold` or `none`"
-    )]
-    Learned,
-    /// The odometry's.
-    #[error(transparent)]
-    Odometry(#[from] SetupError),
-}
+/// A network masks what networks are trained on.
+const LEARNED: &str = "masking.kind is `learned`, but masks are trained on rasters that no network has masked: \
+                       set it to `threshold` or `none`";
 
-/// See the module. Nothing is allocated once it is planned.
+/// Makes records of scans. Nothing is allocated once it is planned.
 pub struct Preparation {
     odometry: Odometry,
     /// A sweep is compensated with the motion of the scan so many before; 0: not at all.
@@ -41,9 +31,9 @@ impl Preparation {
     ///
     /// # Errors
     /// The first setting that is out of its bounds.
-    pub fn new(configuration: &Configuration) -> Result<Self, SettingError> {
+    pub fn new(configuration: &Configuration) -> Result<Self, Failure> {
         if configuration.masking.kind == MaskKind::Learned {
-            return Err(SettingError::Learned);
+            return Err(LEARNED.into());
         }
         let config = OdometryConfig {
             points: PointsConfig {
@@ -121,7 +111,7 @@ impl Preparation {
         let ((from_ns, from), (to_ns, to)) = (self.chain.front()?, self.chain.get(1)?);
         let [x_m, y_m, yaw_rad] = xy_yaw(&(from.inverse() * to));
         let interval_s = to_ns.saturating_sub(*from_ns) as f64 * 1e-9;
-        (self.chain.len() > self.lag)
-            .then(|| Twist::from_motion(&pose(x_m, y_m, yaw_rad), interval_s))
+        let twist = || Twist::from_motion(&pose(x_m, y_m, yaw_rad), interval_s);
+        (self.chain.len() > self.lag).then(twist)
     }
 }

@@ -5,14 +5,14 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use gyre::{Failure, configuration::Configuration};
 use gyre_masking::MaskingConfig;
 use gyre_radar::{DatasetOptions, Format, RasterConfig};
 use gyre_scan_matching::{RotationConfig, TranslationConfig};
 use gyre_simulator::SimulationConfig;
 use serde::Serialize;
 
-use super::recordings::Origin;
-use gyre::{Failure, configuration::Configuration};
+use super::recording::Source;
 
 /// The file's first line; a file with another is somebody else's.
 const FIRST_LINE: &str = "# What the .npy file of this name was made of, by gyre export-pairs.\n";
@@ -24,22 +24,17 @@ pub fn place(pairs: &Path) -> PathBuf {
 
 /// Refuses a name that is no `.npy` file's, or beside which another file is in the way: a configuration, say.
 pub fn check_place(pairs: &Path) -> Result<(), Failure> {
+    let named = pairs.display();
     if pairs.extension().is_none_or(|extension| extension != "npy") {
-        return Err(format!(
-            "--out {}: the file's name must end in .npy",
-            pairs.display()
-        )
-        .into());
+        return Err(format!("--out {named}: the file's name must end in .npy").into());
     }
     let beside = place(pairs);
     match fs::read(&beside) {
-        Ok(text) if !text.starts_with(FIRST_LINE.as_bytes()) => {
-            let (beside, pairs) = (beside.display(), pairs.display());
-            Err(format!(
-                "{beside} would be overwritten to say what {pairs} is made of, but is no export's: choose another --out"
-            )
-            .into())
-        }
+        Ok(text) if !text.starts_with(FIRST_LINE.as_bytes()) => Err(format!(
+            "{} would be overwritten to say what {named} is made of, but is no export's: choose another --out",
+            beside.display()
+        )
+        .into()),
         _ => Ok(()),
     }
 }
@@ -114,13 +109,13 @@ impl<'a> Provenance<'a> {
 
 impl Sequence {
     /// One that begins with a recording's scan `first_scan`, empty.
-    pub fn new(sequence: u32, origin: &Origin, first_scan: usize) -> Self {
+    pub fn new(sequence: u32, source: &Source, first_scan: usize) -> Self {
         Self {
             sequence,
-            name: origin.name(),
-            source: origin.data.clone(),
-            format: origin.format,
-            ground_truth: origin.truth.path.clone(),
+            name: source.name(),
+            source: source.data.clone(),
+            format: source.format,
+            ground_truth: source.truth.path.clone(),
             first_scan,
             scans: 0,
         }
