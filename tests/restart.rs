@@ -176,7 +176,7 @@ fn a_source_killed_behind_an_unreadable_scan_still_counts_it() {
 }
 
 #[test]
-fn a_stage_that_always_dies_is_given_up_with_its_last_words() {
+fn a_stage_that_always_dies_ends_the_run_with_its_last_line_of_output() {
     let run = Run::of_recording()
         .stage_script("masking", "echo 'the mask is on fire' >&2; exit 7")
         .set("stages.masking.restart={limit = 2, backoff_ms = 10}");

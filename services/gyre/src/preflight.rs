@@ -98,7 +98,7 @@ pub fn warn_of_training(configuration: &Configuration) -> Result<(), crate::Fail
         masking, raster, ..
     } = configuration;
     if masking.kind == MaskKind::Learned {
-        let unlike = Card::read(masking)?.unlike_training(masking, raster);
+        let unlike = Card::read(masking)?.training_mismatches(masking, raster);
         if let (false, Some(card)) = (unlike.is_empty(), &masking.model) {
             print::note(format!(
                 "the masks of {} may be worth less than they were made for: {}",

@@ -55,14 +55,14 @@ impl Progress {
             Event::Started { stage, pid } => self.say(&format!("{stage:20} pid {pid}")),
             Event::Pose(pose) => self.pose(pose),
             Event::Died { stage, death } => {
-                let words = death
-                    .last_words
+                let output = death
+                    .last_output
                     .as_ref()
-                    .map_or(String::new(), |words| format!(" ({words})"));
-                self.say(&format!("{stage} died by {}{words}", death.how));
+                    .map_or(String::new(), |line| format!(" ({line})"));
+                self.say(&format!("{stage} died by {}{output}", death.cause));
             }
-            Event::Restarted { everybody: false } => self.say("started it again"),
-            Event::Restarted { everybody: true } => {
+            Event::Restarted { all: false } => self.say("started it again"),
+            Event::Restarted { all: true } => {
                 self.say("started all stages again, from the journal")
             }
             Event::Stalled => {

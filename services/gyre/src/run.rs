@@ -37,7 +37,7 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     let configuration = resolve(arguments, &out)?;
     let checked = preflight::check(&configuration)?;
     let signals = Signals::install()?;
-    let root = RunRoot::take(&out)?;
+    let root = RunRoot::acquire(&out)?;
     let resumed = prepare(&configuration, &out, arguments.fresh)?;
     if let Some(truth) = &checked.truth {
         write(&out.join(results::SIMULATED_TRUTH), truth)?;

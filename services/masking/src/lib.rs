@@ -1,7 +1,7 @@
-//! The masking stage: from `scan` to `masked`, with the motions of earlier scans for motion compensation.
+//! The masking stage: from `scan` to `masked`, with the motions of previous scans for motion compensation.
 //!
-//! [`gyre_masking::Masker`] does the work; `scans` and `motions` are its inputs, `lossless` and `live` the two orders in
-//! which it takes scans.
+//! [`gyre_masking::Masker`] does the work. `scans` and `motions` are its inputs; `lossless` and `live` are the two modes of
+//! taking scans from the queue.
 
 mod live;
 mod lossless;
@@ -10,7 +10,8 @@ mod scans;
 
 use std::time::Duration;
 
-use gyre_masking::{MaskKind, Masker, MaskingConfig, Sweep};
+use gyre_geometry::Twist;
+use gyre_masking::{MaskError, MaskKind, Masker, MaskingConfig, Sweep};
 use gyre_messages::{Masked, MaskedHeader, Scan, SearchedMotion, StageId, mask_kind};
 use gyre_radar::{PointsConfig, RasterConfig};
 use gyre_stage::{
@@ -19,10 +20,10 @@ use gyre_stage::{
 
 use scans::{ScanView, Scans};
 
-/// Runs the stage until it is told to stop.
+/// Runs the stage until SIGTERM.
 ///
 /// # Errors
-/// A configuration that no masker can be built from, and what ends a stage.
+/// An invalid configuration, or an error of [`stage::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let points: PointsConfig = launch.section("points")?;
@@ -53,31 +54,45 @@ impl Stage for Masking {
         input: ScanView<'_>,
         output: &mut Draft<Masked>,
     ) -> Result<(), StageError> {
-        let malformed = |error: &dyn std::error::Error| input.scan.malformed(error.to_string());
+        let malformed = |error: MaskError| input.scan.malformed(error.to_string());
         let sweep = sweep(input.scan, input.motion)?;
-        let before = match &input.before {
-            Some(before) => Some(self::sweep(before.scan, before.motion)?),
+        let previous = match &input.previous {
+            Some(previous) => Some(self::sweep(previous.scan, previous.motion)?),
             None => None,
         };
-        if let Some(before) = before.filter(|before| !self.masker.remembers(before.number)) {
-            self.masker
-                .remember(&before)
-                .map_err(|error| malformed(&error))?;
+        if let Some(previous) = &previous
+            && !self.masker.can_follow(previous.number)
+        {
+            self.masker.set_previous(previous).map_err(malformed)?;
         }
         let (header, values) = output.parts::<f32>();
-        let parts = MaskedHeader::split(values, self.raster.n, self.masker.scans());
         let parts =
-            parts.ok_or_else(|| input.scan.malformed("its rasters do not fit a message"))?;
-        let follows = before.map(|before| before.number);
+            MaskedHeader::split(values, self.raster.n, self.masker.scans()).ok_or_else(|| {
+                input
+                    .scan
+                    .malformed("its rasters do not fit into a message")
+            })?;
+        let follows = previous.map(|previous| previous.number);
         let twist = self
             .masker
             .mask(&sweep, follows, parts.later, parts.earlier)
-            .map_err(|error| malformed(&error))?;
+            .map_err(malformed)?;
         let points = self
             .masker
             .points(&sweep.scan, twist, parts.points)
-            .map_err(|error| malformed(&error))?;
-        *header = MaskedHeader {
+            .map_err(|error| input.scan.malformed(error.to_string()))?;
+        *header = self.header(twist, points);
+        // A test option: simulates a slow stage.
+        if self.config.stress_delay_ms > 0 {
+            std::thread::sleep(Duration::from_millis(self.config.stress_delay_ms));
+        }
+        Ok(())
+    }
+}
+
+impl Masking {
+    fn header(&self, twist: Option<Twist>, points: usize) -> MaskedHeader {
+        MaskedHeader {
             n: self.raster.n as u32,
             rasters: self.masker.scans() as u32,
             cell_m: self.raster.cell_m,
@@ -92,14 +107,11 @@ impl Stage for Masking {
             compensated: twist.is_some().into(),
             points: points as u32,
             ..MaskedHeader::default()
-        };
-        if self.config.stress_delay_ms > 0 {
-            std::thread::sleep(Duration::from_millis(self.config.stress_delay_ms));
         }
-        Ok(())
     }
 }
 
+/// Views a received scan, with the velocity for its motion compensation.
 fn sweep(
     received: &Received<Scan>,
     motion: Option<SearchedMotion>,

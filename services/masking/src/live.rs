@@ -1,53 +1,51 @@
-//! Live mode: the newest scan wins. The scans that are admitted get consecutive numbers, so that no later stage drops any; the
-//! gaps in the source's own count are the scans that were dropped.
+//! Live mode: only the newest scan is processed. Admitted scans get consecutive sequence numbers, so no later stage sees a gap;
+//! the gaps in the source's own count are the dropped scans.
 
 use std::collections::VecDeque;
 
 use gyre_messages::{Item, Scan, Window, flag};
 use gyre_stage::{
     Launch, Listener, StageError,
-    inputs::Turn,
+    inputs::Action,
     reader::{Port, Received},
 };
 
-use crate::scans::looks_at_two;
-
-/// The queue of a live masking stage.
-pub struct NewestWins {
+/// The queue of masking in live mode.
+pub struct NewestOnly {
     port: Port<Scan>,
-    /// The current scan and, behind it, those that came since; at the start the source's history.
+    /// The current scan and the ones received since; at the start, the history of the source.
     queue: VecDeque<Received<Scan>>,
-    /// The scan before, where the mask looks at two.
-    before: Option<Received<Scan>>,
+    /// The previous scan, if the mask takes two.
+    previous: Option<Received<Scan>>,
     window: Window,
     chain: Option<Chain>,
 }
 
-/// The state of the numbering.
+/// The state of the sequence numbers.
 #[derive(Clone, Copy)]
 struct Chain {
     next: u64,
     previous_scan: Option<u64>,
-    /// The source's count at the scan before: a restarted source repeats what it had sent after the last pose.
+    /// The source's count at the previous scan: a restarted source repeats the scans after the newest pose.
     published: Option<u64>,
-    /// The scan in front was processed before the restart; the others need it again as the scan before.
+    /// True if the current scan was processed before the restart: the other stages need it again as their previous scan.
     repeats: bool,
 }
 
-impl NewestWins {
+impl NewestOnly {
     pub fn open(launch: &Launch) -> Result<Self, StageError> {
         let window = launch.manifest.window;
         Ok(Self {
             port: Port::open(launch)?,
             queue: VecDeque::with_capacity(window.live_depth + 2),
-            before: None,
+            previous: None,
             window,
             chain: None,
         })
     }
 
-    /// Takes what has come.
-    pub fn take(&mut self) -> Result<(), StageError> {
+    /// Receives the new scans.
+    pub fn receive(&mut self) -> Result<(), StageError> {
         while let Some(received) = self.port.receive()? {
             if self
                 .chain
@@ -63,44 +61,49 @@ impl NewestWins {
         Ok(())
     }
 
-    /// What to do with the current scan, where the trajectory stands at `sync`.
-    pub fn turn(&mut self, sync: &Item, newest_pose: Option<u64>) -> Result<Turn, StageError> {
-        let Some(chain) = self.chain.or_else(|| self.resume(sync)) else {
-            return Ok(Turn::Wait);
+    /// Returns what to do with the current scan. `resume_at` is the item of the newest pose at the last start of the sink,
+    /// `newest_pose` the number of the newest pose now.
+    pub fn next_action(
+        &mut self,
+        resume_at: &Item,
+        newest_pose: Option<u64>,
+    ) -> Result<Action, StageError> {
+        let Some(chain) = self.chain.or_else(|| self.resume(resume_at)) else {
+            return Ok(Action::Wait);
         };
         self.chain = Some(chain);
         if !chain.repeats {
             self.drop_all_but_the_newest();
         }
         let Some(front) = self.queue.front() else {
-            return Ok(Turn::Wait);
+            return Ok(Action::Wait);
         };
         let item = chain.number(front.item());
         Ok(match () {
-            // The end of the stream takes a place in every history as any item does, so it waits for credit too.
-            () if !self.window.admits(item.seq, newest_pose) => Turn::Wait,
-            () if item.is(flag::END) => Turn::End(item),
-            () => Turn::Process(item, front.received_ns),
+            // The end of the stream occupies a slot in every history like any item, so it waits for credit too.
+            () if !self.window.admits(item.seq, newest_pose) => Action::Wait,
+            () if item.is(flag::END) => Action::End(item),
+            () => Action::Process(item, front.received_ns),
         })
     }
 
-    /// Resumes the chain after a start; `None` while only scans from before the last pose's have come: a source that was
-    /// restarted too repeats them, and the history of one that was not begins with them.
-    fn resume(&mut self, sync: &Item) -> Option<Chain> {
+    /// Resumes the chain after a start. `None` while all received scans precede the newest pose: a restarted source repeats such
+    /// scans, and the history of a running source begins with them.
+    fn resume(&mut self, newest_pose: &Item) -> Option<Chain> {
         while self
             .queue
             .front()
-            .is_some_and(|front| Chain::is_past(front.item(), sync))
+            .is_some_and(|front| Chain::precedes(front.item(), newest_pose))
         {
             let past = self
                 .queue
                 .pop_front()
-                .filter(|past| past.item().scan == sync.previous_scan);
+                .filter(|past| past.item().scan == newest_pose.previous_scan);
             if past.is_some() {
                 self.keep(past);
             }
         }
-        Some(Chain::resume(self.queue.front()?.item(), sync))
+        Some(Chain::resume(self.queue.front()?.item(), newest_pose))
     }
 
     fn drop_all_but_the_newest(&mut self) {
@@ -109,7 +112,7 @@ impl NewestWins {
         }
     }
 
-    /// Steps to the next scan.
+    /// Advances to the next scan.
     pub fn advance(&mut self) {
         let done = self.queue.pop_front();
         if let (Some(chain), Some(done)) = (&mut self.chain, &done) {
@@ -125,55 +128,55 @@ impl NewestWins {
         self.keep(done);
     }
 
-    /// The current scan, once it has been taken.
+    /// Returns the current scan if one has been received.
     pub fn current(&self) -> Option<&Received<Scan>> {
         self.queue.front()
     }
 
-    /// What the source notifies.
+    /// Returns the listener that the source notifies.
     pub fn listener(&self) -> &Listener {
         self.port.listener()
     }
 
-    /// The scan that the current one follows. The source may have lost it when all stages were restarted; then the scan is
-    /// masked as at the start of a chain.
-    pub fn before(&self) -> Option<&Received<Scan>> {
-        let previous = self.chain?.previous_scan;
-        self.before
+    /// Returns the previous scan. The source may have lost it when all stages were restarted; the current scan is then masked as
+    /// at the start of a chain.
+    pub fn previous(&self) -> Option<&Received<Scan>> {
+        let expected = self.chain?.previous_scan;
+        self.previous
             .as_ref()
-            .filter(|before| Some(before.item().scan) == previous)
+            .filter(|previous| Some(previous.item().scan) == expected)
     }
 
     fn keep(&mut self, done: Option<Received<Scan>>) {
-        if looks_at_two(&self.window) {
-            self.before = done;
+        if self.window.masks_pairs() {
+            self.previous = done;
         }
     }
 }
 
 impl Chain {
-    /// Whether a scan comes before the last pose's.
-    fn is_past(item: &Item, sync: &Item) -> bool {
-        !sync.is(flag::BASE) && !item.is(flag::END) && item.published < sync.published
+    /// Returns whether a scan precedes that of the newest pose.
+    fn precedes(item: &Item, newest_pose: &Item) -> bool {
+        !newest_pose.is(flag::BASE) && !item.is(flag::END) && item.published < newest_pose.published
     }
 
-    /// Resumes with the last pose's scan if the source still has it, else with a break.
-    fn resume(front: &Item, sync: &Item) -> Self {
+    /// Resumes with the scan of the newest pose if the source still has it, else with a break.
+    fn resume(front: &Item, newest_pose: &Item) -> Self {
         match () {
-            () if sync.is(flag::BASE) => Self {
+            () if newest_pose.is(flag::BASE) => Self {
                 next: 0,
                 previous_scan: None,
                 published: None,
                 repeats: false,
             },
-            () if front.published == sync.published && !front.is(flag::END) => Self {
-                next: sync.seq,
-                previous_scan: Some(sync.previous_scan),
+            () if front.published == newest_pose.published && !front.is(flag::END) => Self {
+                next: newest_pose.seq,
+                previous_scan: Some(newest_pose.previous_scan),
                 published: None,
                 repeats: true,
             },
             () => Self {
-                next: sync.seq.saturating_add(1),
+                next: newest_pose.seq.saturating_add(1),
                 previous_scan: None,
                 published: None,
                 repeats: false,
@@ -181,6 +184,7 @@ impl Chain {
         }
     }
 
+    /// Returns whether a scan has been processed or dropped already.
     fn has_passed(&self, item: &Item) -> bool {
         !item.is(flag::END)
             && self
@@ -188,7 +192,7 @@ impl Chain {
                 .is_some_and(|published| item.published <= published)
     }
 
-    /// The item's place in the chain of motions.
+    /// Numbers a scan in the chain of motions.
     fn number(&self, item: &Item) -> Item {
         let start = if self.previous_scan.is_none() {
             flag::BREAK
@@ -208,7 +212,7 @@ impl Chain {
 mod tests {
     use super::*;
 
-    fn sync() -> Item {
+    fn newest_pose() -> Item {
         Item {
             seq: 9,
             scan: 40,
@@ -228,8 +232,8 @@ mod tests {
     }
 
     #[test]
-    fn a_resumed_chain_repeats_the_last_poses_scan_under_its_number() {
-        let item = Chain::resume(&scan(31), &sync()).number(&scan(31));
+    fn a_resumed_chain_repeats_the_scan_of_the_newest_pose_with_its_number() {
+        let item = Chain::resume(&scan(31), &newest_pose()).number(&scan(31));
         assert_eq!(
             (item.seq, item.scan, item.previous_scan, item.flags),
             (9, 40, 37, 0)
@@ -237,28 +241,31 @@ mod tests {
     }
 
     #[test]
-    fn a_chain_whose_last_scan_is_gone_starts_again_with_the_next_number() {
-        let item = Chain::resume(&scan(35), &sync()).number(&scan(35));
+    fn a_chain_without_its_last_scan_starts_again_with_the_next_number() {
+        let item = Chain::resume(&scan(35), &newest_pose()).number(&scan(35));
         assert_eq!((item.seq, item.previous_scan), (10, item.scan));
         assert!(item.is(flag::BREAK));
     }
 
     #[test]
-    fn scans_from_before_the_last_pose_never_start_a_chain() {
-        assert!(Chain::is_past(&scan(30), &sync()) && !Chain::is_past(&scan(31), &sync()));
-        assert!(!Chain::is_past(
+    fn scans_before_the_newest_pose_never_start_a_chain() {
+        assert!(
+            Chain::precedes(&scan(30), &newest_pose())
+                && !Chain::precedes(&scan(31), &newest_pose())
+        );
+        assert!(!Chain::precedes(
             &scan(0),
             &Item {
                 flags: flag::BASE,
-                ..sync()
+                ..newest_pose()
             }
         ));
-        assert!(!Chain::is_past(
+        assert!(!Chain::precedes(
             &Item {
                 flags: flag::END,
                 ..scan(0)
             },
-            &sync()
+            &newest_pose()
         ));
     }
 }

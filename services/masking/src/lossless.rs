@@ -1,19 +1,17 @@
-//! Lossless mode: the scans in order, each once.
+//! Lossless mode: every scan, in order.
 
 use gyre_messages::{Item, Scan, Window, flag};
 use gyre_stage::{
     Launch, Listener, StageError,
-    inputs::Turn,
+    inputs::Action,
     reader::{Reader, Received},
 };
 
-use crate::scans::looks_at_two;
-
-/// The queue of a lossless masking stage.
+/// The queue of masking in lossless mode.
 pub struct InOrder {
     reader: Reader<Scan>,
     window: Window,
-    /// The first scan has been processed. From then on none is skipped: that would leave a gap in the output.
+    /// True once the first scan is processed. From then on none is skipped, which would leave a gap in the output.
     started: bool,
 }
 
@@ -26,69 +24,69 @@ impl InOrder {
         })
     }
 
-    /// Takes what has come.
-    pub fn take(&mut self) -> Result<(), StageError> {
+    /// Receives the next scan.
+    pub fn receive(&mut self) -> Result<(), StageError> {
         self.reader.head().map(drop)
     }
 
-    /// What to do with the current scan when `newest_pose` is the last one finished.
-    pub fn turn(&mut self, newest_pose: Option<u64>) -> Result<Turn, StageError> {
+    /// Returns what to do with the current scan when `newest_pose` is the number of the newest pose.
+    pub fn next_action(&mut self, newest_pose: Option<u64>) -> Result<Action, StageError> {
         let Some(head) = self.reader.head()? else {
-            return Ok(Turn::Wait);
+            return Ok(Action::Wait);
         };
         let (item, received_ns) = (*head.item(), head.received_ns);
         if item.is(flag::END) {
-            return Ok(Turn::End(item));
+            return Ok(Action::End(item));
         }
         if !self.started
-            && serves_only_as_before(&self.window, &item, newest_pose, self.before().is_some())
+            && serves_only_as_previous(&self.window, &item, newest_pose, self.previous().is_some())
         {
-            return Ok(Turn::Keep);
+            return Ok(Action::Keep);
         }
         self.started = true;
-        Ok(Turn::Process(item, received_ns))
+        Ok(Action::Process(item, received_ns))
     }
 
-    /// The current scan, once it has been taken.
+    /// Returns the current scan if one has been received.
     pub fn current(&self) -> Option<&Received<Scan>> {
         self.reader.current()
     }
 
-    /// The scan before, where the mask looks at two and the chain is unbroken.
-    pub fn before(&self) -> Option<&Received<Scan>> {
-        self.reader.before()
+    /// Returns the previous scan, if the mask takes two and the chain is unbroken.
+    pub fn previous(&self) -> Option<&Received<Scan>> {
+        self.reader.previous()
     }
 
-    /// Steps to the next scan.
+    /// Advances to the next scan.
     pub fn advance(&mut self) {
-        match looks_at_two(&self.window) {
+        match self.window.masks_pairs() {
             true => self.reader.advance(),
             false => self.reader.release(),
         }
     }
 
-    /// What the source notifies.
+    /// Returns the listener that the source notifies.
     pub fn listener(&self) -> &Listener {
         self.reader.listener()
     }
 
-    /// Scans skipped because they had been received before.
+    /// Returns the number of scans that were skipped because they had been received before.
     pub fn duplicates(&self) -> u64 {
         self.reader.duplicates()
     }
 }
 
-/// Whether a restarted masking has nothing to publish for an item: its readers have had it, or it lacks its own scan before,
-/// and its mask would be another one than before the restart.
-fn serves_only_as_before(
+/// Returns whether a restarted masking has nothing to publish for an item: its readers have it already, or its own previous scan
+/// is missing and its mask would differ from the one before the restart.
+fn serves_only_as_previous(
     window: &Window,
     item: &Item,
     newest_pose: Option<u64>,
-    has_before: bool,
+    has_previous: bool,
 ) -> bool {
-    let had = newest_pose
+    let has_been_read = newest_pose
         .is_some_and(|newest| item.seq.saturating_add(window.look_back as u64) <= newest);
-    had || (looks_at_two(window) && !has_before && !item.is(flag::BREAK))
+    has_been_read || (window.masks_pairs() && !has_previous && !item.is(flag::BREAK))
 }
 
 #[cfg(test)]
@@ -103,15 +101,15 @@ mod tests {
     }
 
     #[test]
-    fn a_restart_begins_with_the_last_poses_scan_and_the_one_before_it_where_masks_look_at_two() {
+    fn a_restart_begins_with_the_newest_poses_scan_or_the_previous_one_if_masks_take_two() {
         let window = |look_back| Window {
             scans: 4,
             lag: 2,
             look_back,
             live_depth: 0,
         };
-        let kept = |look_back, published, has_before| {
-            serves_only_as_before(&window(look_back), &scan(published), Some(9), has_before)
+        let kept = |look_back, published, has_previous| {
+            serves_only_as_previous(&window(look_back), &scan(published), Some(9), has_previous)
         };
         assert!(kept(1, 8, false) && !kept(1, 9, false));
         assert!(kept(2, 7, true) && kept(2, 8, false) && !kept(2, 9, true));
@@ -119,6 +117,6 @@ mod tests {
             flags: flag::BREAK,
             ..scan(0)
         };
-        assert!(!serves_only_as_before(&window(2), &first, None, false));
+        assert!(!serves_only_as_previous(&window(2), &first, None, false));
     }
 }

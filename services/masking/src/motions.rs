@@ -1,24 +1,23 @@
-//! The motions for motion compensation: by number, never by time.
+//! The motions for motion compensation, by sequence number.
 //!
-//! A motion comes twice: from the search as soon as it is found, and with its pose once that is journalled. The first one
-//! is taken, so both must be the same, and a refined motion is not the searched one. So only the motion as searched is used,
-//! which refinement passes on unchanged. After a restart the motions before the last pose come from the journal; those after
-//! it come from the search, which finds them again.
+//! Masking receives a motion twice: from the search, and with its journalled pose. It uses the first one, so both must be equal.
+//! Therefore only the searched motion is used, which refinement passes on unchanged. After a restart the motions up to the newest
+//! pose come from the journal; the search finds later ones again.
 
 use std::collections::VecDeque;
 
 use gyre_messages::{Item, Motion, Pose, SearchedMotion, flag};
 use gyre_stage::{Launch, Listener, StageError, reader::Port};
 
-/// Motions kept: more than any window and lag need.
+/// Number of motions kept: more than any window and lag need.
 const KEPT: usize = 256;
 
-/// The motions found so far, and the trajectory's newest pose.
+/// The known motions, and the newest pose.
 pub struct Motions {
     motions: Port<Motion>,
     poses: Port<Pose>,
     known: KnownMotions,
-    sync: Option<Item>,
+    resume_at: Option<Item>,
     newest_pose: Option<u64>,
 }
 
@@ -28,12 +27,12 @@ impl Motions {
             motions: Port::open(launch)?,
             poses: Port::open(launch)?,
             known: KnownMotions::default(),
-            sync: None,
+            resume_at: None,
             newest_pose: None,
         })
     }
 
-    /// Takes all that has come.
+    /// Receives the new motions and poses.
     pub fn update(&mut self) -> Result<(), StageError> {
         while let Some(received) = self.motions.receive()? {
             self.known
@@ -50,23 +49,23 @@ impl Motions {
                 self.newest_pose = self.newest_pose.max(Some(item.seq));
             }
             if item.is(flag::SYNC) {
-                self.sync = Some(item);
+                self.resume_at = Some(item);
             }
         }
         Ok(())
     }
 
-    /// The motion of item `seq`: `None` while it is unknown, `Some(None)` where the chain starts.
+    /// Returns the motion of item `seq`: `None` while it is unknown, `Some(None)` where the chain starts.
     pub fn of(&self, seq: u64) -> Option<Option<SearchedMotion>> {
         self.known.of(seq)
     }
 
-    /// The item of the trajectory's newest pose when it was last reported: `None` until then.
-    pub fn sync(&self) -> Option<&Item> {
-        self.sync.as_ref()
+    /// Returns the item of the newest pose as the sink reported it; `None` before the first report.
+    pub fn resume_at(&self) -> Option<&Item> {
+        self.resume_at.as_ref()
     }
 
-    /// The number of the newest pose; `None` before the first.
+    /// Returns the number of the newest pose; `None` before the first.
     pub fn newest_pose(&self) -> Option<u64> {
         self.newest_pose
     }
@@ -76,7 +75,7 @@ impl Motions {
     }
 }
 
-/// Motions by number, in order; the oldest are dropped.
+/// Motions in order of their numbers; the oldest are dropped.
 #[derive(Default)]
 struct KnownMotions(VecDeque<(u64, Option<SearchedMotion>)>);
 
@@ -106,7 +105,7 @@ mod tests {
 
     use super::*;
 
-    /// A motion that was searched as 1.5 m ahead, and then refined to `x_m`.
+    /// A motion with 1.5 m forward as the result of the search, refined to `x_m`.
     fn refined_to(x_m: f64) -> MotionEstimate {
         MotionEstimate {
             x_m,
@@ -125,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn a_motion_is_the_searched_one_whether_it_comes_at_once_or_refined_with_its_pose() {
+    fn a_motion_is_the_searched_one_whether_it_is_received_from_the_search_or_with_its_pose() {
         let searched = refined_to(1.5).searched();
         for order in [[1.5, 1.75], [1.75, 1.5]] {
             let mut known = KnownMotions::default();

@@ -1,43 +1,43 @@
-//! The inputs of masking: a scan, and the motion that its sweep is motion-compensated with.
+//! The inputs of masking: a scan and the motion for its motion compensation.
 
 use gyre_messages::{Scan, SearchedMotion, Window};
 use gyre_stage::{
     Launch, Listener, StageError,
-    inputs::{Inputs, Turn},
+    inputs::{Action, Inputs},
     reader::Received,
 };
 
-use crate::{live::NewestWins, lossless::InOrder, motions::Motions};
+use crate::{live::NewestOnly, lossless::InOrder, motions::Motions};
 
-/// See the module.
+/// The scans, in lossless or in live mode, and the motions.
 pub struct Scans {
     queue: Queue,
     motions: Motions,
     window: Window,
-    /// The motion for the current scan, and that for the one before.
+    /// The motions for the current and for the previous scan.
     found: [Option<SearchedMotion>; 2],
 }
 
 enum Queue {
     Lossless(InOrder),
-    Live(NewestWins),
+    Live(NewestOnly),
 }
 
 /// A scan to mask.
 pub struct ScanView<'a> {
     /// The scan.
     pub scan: &'a Received<Scan>,
-    /// The motion of the scan `lag` before it; `None` where there was none.
+    /// The motion of the scan `lag` scans earlier; `None` without one.
     pub motion: Option<SearchedMotion>,
-    /// The scan before, where the mask looks at two; `None` where the chain starts.
-    pub before: Option<ScanBefore<'a>>,
+    /// The previous scan, if the mask takes two; `None` where the chain starts.
+    pub previous: Option<PreviousScan<'a>>,
 }
 
 /// The scan before the one to mask.
-pub struct ScanBefore<'a> {
+pub struct PreviousScan<'a> {
     /// The scan.
     pub scan: &'a Received<Scan>,
-    /// The motion that it was compensated with when it was masked.
+    /// The motion with which it was compensated.
     pub motion: Option<SearchedMotion>,
 }
 
@@ -48,7 +48,7 @@ impl Inputs for Scans {
         let motions = Motions::open(launch)?;
         let queue = match launch.manifest.live {
             false => Queue::Lossless(InOrder::open(launch)?),
-            true => Queue::Live(NewestWins::open(launch)?),
+            true => Queue::Live(NewestOnly::open(launch)?),
         };
         Ok(Self {
             queue,
@@ -58,41 +58,41 @@ impl Inputs for Scans {
         })
     }
 
-    fn turn(&mut self) -> Result<Turn, StageError> {
+    fn next_action(&mut self) -> Result<Action, StageError> {
         match &mut self.queue {
-            Queue::Lossless(queue) => queue.take()?,
-            Queue::Live(queue) => queue.take()?,
+            Queue::Lossless(queue) => queue.receive()?,
+            Queue::Live(queue) => queue.receive()?,
         }
         self.motions.update()?;
         // The newest pose decides which scans are still needed, and in live mode where the chain resumes.
-        let Some(sync) = self.motions.sync().copied() else {
-            return Ok(Turn::Wait);
+        let Some(resume_at) = self.motions.resume_at().copied() else {
+            return Ok(Action::Wait);
         };
-        let newest = self.motions.newest_pose();
-        let turn = match &mut self.queue {
-            Queue::Lossless(queue) => queue.turn(newest)?,
-            Queue::Live(queue) => queue.turn(&sync, newest)?,
+        let newest_pose = self.motions.newest_pose();
+        let action = match &mut self.queue {
+            Queue::Lossless(queue) => queue.next_action(newest_pose)?,
+            Queue::Live(queue) => queue.next_action(&resume_at, newest_pose)?,
         };
-        match turn {
-            Turn::Process(item, _) if !self.find_motions(item.seq) => Ok(Turn::Wait),
-            turn => Ok(turn),
+        match action {
+            Action::Process(item, _) if !self.find_motions(item.seq) => Ok(Action::Wait),
+            action => Ok(action),
         }
     }
 
     fn view(&self) -> Option<ScanView<'_>> {
-        let (scan, before) = match &self.queue {
-            Queue::Lossless(queue) => (queue.current(), queue.before()),
-            Queue::Live(queue) => (queue.current(), queue.before()),
+        let (scan, previous) = match &self.queue {
+            Queue::Lossless(queue) => (queue.current(), queue.previous()),
+            Queue::Live(queue) => (queue.current(), queue.previous()),
         };
-        let [motion, motion_before] = self.found;
-        let before = before.map(|scan| ScanBefore {
+        let [motion, previous_motion] = self.found;
+        let previous = previous.map(|scan| PreviousScan {
             scan,
-            motion: motion_before,
+            motion: previous_motion,
         });
         Some(ScanView {
             scan: scan?,
             motion,
-            before,
+            previous,
         })
     }
 
@@ -121,20 +121,20 @@ impl Inputs for Scans {
 }
 
 impl Scans {
-    /// Looks up the motions that scan `seq` and the one before are compensated with; false while one is still to come.
+    /// Looks up the motions for scan `seq` and the previous one; false while one is missing.
     fn find_motions(&mut self, seq: u64) -> bool {
-        let before = if looks_at_two(&self.window) {
+        let previous = if self.window.masks_pairs() {
             seq.checked_sub(1)
         } else {
             None
         };
         let found =
-            [Some(seq), before].map(|seq| seq.map_or(Some(None), |seq| self.motion_for(seq)));
+            [Some(seq), previous].map(|seq| seq.map_or(Some(None), |seq| self.motion_for(seq)));
         self.found = found.map(Option::flatten);
         found.iter().all(Option::is_some)
     }
 
-    /// The motion for scan `seq`, by number alone, so that it is the same one after a restart.
+    /// Returns the motion for scan `seq`. It depends on the number alone, so it is the same after a restart.
     fn motion_for(&self, seq: u64) -> Option<Option<SearchedMotion>> {
         let lagged = if self.window.lag == 0 {
             None
@@ -143,9 +143,4 @@ impl Scans {
         };
         lagged.map_or(Some(None), |seq| self.motions.of(seq))
     }
-}
-
-/// Whether the mask looks at two scans: then masking looks back at one more than the stages after it.
-pub fn looks_at_two(window: &Window) -> bool {
-    window.look_back > 1
 }

@@ -89,7 +89,7 @@ impl Source for Replay {
         Some(self.dataset.nominal_stamp_ns(self.first + index)? + self.half_period_ns)
     }
 
-    fn passes_by(&self) -> bool {
+    fn drops_missed_scans(&self) -> bool {
         self.pace == Pace::Sensor
     }
 

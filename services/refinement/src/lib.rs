@@ -58,12 +58,12 @@ impl Stage for RefinementStage {
     ) -> Result<(), StageError> {
         let (item, motion) = (*input.pair.current.item(), input.other.header().motion);
         self.restore_state_before(&item)?;
-        output.header().motion = match input.pair.before {
-            Some(before) if !item.is(flag::BREAK) => {
+        output.header().motion = match input.pair.previous {
+            Some(previous) if !item.is(flag::BREAK) => {
                 let refined = self.refiner.refine(
                     item.seq,
                     points(input.pair.current)?,
-                    points(before)?,
+                    points(previous)?,
                     &motion.motion().motion,
                     motion.interval_ns as f64 * 1e-9,
                 );

@@ -6,7 +6,7 @@ use ndarray::ArrayViewMut2;
 
 use crate::{MaskingConfig, Sweep};
 
-/// Rasterises sweeps.
+/// Rasterises scans with motion compensation.
 #[derive(Debug)]
 pub(crate) struct CompensatedRaster {
     rasteriser: Rasteriser,
@@ -25,7 +25,7 @@ impl CompensatedRaster {
         })
     }
 
-    /// Writes the raster to `out` (n x n, row 0 far ahead). Returns the velocity that the sweep was compensated with.
+    /// Writes the raster to `out` (n x n, row 0 far ahead). Returns the velocity that was used for motion compensation.
     pub fn make(
         &mut self,
         sweep: &Sweep<'_>,
@@ -41,7 +41,7 @@ impl CompensatedRaster {
                 .map(|()| twist)
         };
         match sweep.twist.filter(|_| self.compensate) {
-            // A velocity that no vehicle has comes from a wrong match: better no compensation than that.
+            // An impossible velocity comes from a wrong match: no compensation is better.
             Some(twist) => match rasterise(Some(twist)) {
                 Err(RasterError::Twist { .. }) => rasterise(None),
                 result => result,

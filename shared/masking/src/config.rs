@@ -90,14 +90,14 @@ impl fmt::Display for Provider {
 /// A setting out of its bounds.
 #[derive(Debug, Error, PartialEq)]
 pub enum MaskingConfigError {
-    /// No threads, or absurdly many.
+    /// The number of threads.
     #[error("threads is {0}, but must be 1 to 64")]
     Threads(usize),
-    /// What no mask is raised to.
+    /// The exponent of the mask.
     #[error("point_exponent is {0}, but must be 0 to 4")]
     PointExponent(f32),
-    /// A scan's own motion is not known yet when it is masked.
-    #[error("lag is 0, but a scan's own motion is not known yet: it must be 1 or more")]
+    /// A lag of 0: the motion of a scan is not known yet when it is masked.
+    #[error("lag is 0, but must be 1 or more: the motion of a scan is not known before its search")]
     Lag,
 }
 
@@ -121,10 +121,10 @@ impl Default for MaskingConfig {
 }
 
 impl MaskingConfig {
-    /// Whether scans can be masked so, as far as can be told without reading any file.
+    /// Checks the bounds of all settings, without reading any file.
     ///
     /// # Errors
-    /// The first setting that is out of its bounds.
+    /// The first setting out of its bounds.
     pub fn validate(&self) -> Result<(), MaskingConfigError> {
         match () {
             () if !(1..=64).contains(&self.threads) => {
@@ -138,8 +138,8 @@ impl MaskingConfig {
         }
     }
 
-    /// Names what a learned mask depends on, so that the same configuration repeats the run from anywhere or is refused: the
-    /// model's card and the runtime by absolute paths, and the model's checksum.
+    /// Resolves the inputs of a learned mask, so that the stored configuration repeats the run from any folder or is rejected: the
+    /// absolute paths of model card and runtime, and the checksum of the model.
     ///
     /// # Errors
     /// A card that cannot be read, ONNX Runtime missing.
@@ -155,7 +155,7 @@ impl MaskingConfig {
         Ok(())
     }
 
-    /// Power that counts as nothing.
+    /// Returns the power up to which returns are set to zero.
     pub fn floor(&self) -> u8 {
         match self.kind {
             MaskKind::None => 0,
@@ -163,7 +163,7 @@ impl MaskingConfig {
         }
     }
 
-    /// The lag of the motions that masking waits for; 0 where it waits for none.
+    /// Returns the lag of the motions that masking waits for; 0 if it waits for none.
     pub fn feedback_lag(&self) -> usize {
         if self.compensate { self.lag } else { 0 }
     }

@@ -1,4 +1,4 @@
-//! Masks of a network: of each scan alone, or of each scan and the one before, for this pair.
+//! Masks of a network that takes one scan, or a scan and the previous one.
 
 use gyre_geometry::Twist;
 use gyre_radar::raster::RasterConfig;
@@ -10,14 +10,14 @@ use crate::{
     network::{Network, NetworkError},
 };
 
-/// A network, and where it looks at two scans, their rasters.
+/// A network and, if it takes two scans, their rasters.
 #[derive(Debug)]
 pub(crate) struct LearnedMask {
     network: Network,
-    /// The rasters of a scan and of the one before, as a network of two scans takes them: 2 x n x n.
+    /// The rasters of a scan and of the previous one, 2 x n x n, for a network that takes two.
     pair: Option<Array3<f32>>,
     /// The scan whose raster is the second of the pair.
-    before: Option<u64>,
+    previous: Option<u64>,
 }
 
 impl LearnedMask {
@@ -27,34 +27,34 @@ impl LearnedMask {
         Ok(Self {
             network,
             pair,
-            before: None,
+            previous: None,
         })
     }
 
-    /// Scans that the network looks at, and rasters that it masks.
+    /// Returns the number of scans that the network takes, and of rasters that it masks.
     pub fn scans(&self) -> usize {
         self.network.scans()
     }
 
-    pub fn remembers(&self, number: u64) -> bool {
-        self.pair.is_none() || self.before == Some(number)
+    pub fn can_follow(&self, number: u64) -> bool {
+        self.pair.is_none() || self.previous == Some(number)
     }
 
-    /// The factors of the scan that was masked last, and of the one before.
+    /// Returns the factors of the last masked scan (0) or of its previous one (1).
     pub fn factors(&self, scan: usize) -> Option<ArrayView2<'_, f32>> {
         let masks = self.network.masks();
         (scan < masks.len_of(Axis(0))).then(|| masks.index_axis_move(Axis(0), scan))
     }
 
-    /// Makes a scan the one before.
-    pub fn remember(
+    /// Makes a scan the previous one.
+    pub fn set_previous(
         &mut self,
         rasters: &mut CompensatedRaster,
         sweep: &Sweep<'_>,
     ) -> Result<(), MaskError> {
         if let Some(pair) = &mut self.pair {
             rasters.make(sweep, pair.index_axis_mut(Axis(0), 1))?;
-            self.before = Some(sweep.number);
+            self.previous = Some(sweep.number);
         }
         Ok(())
     }
@@ -74,8 +74,9 @@ impl LearnedMask {
             later *= &masks.index_axis_move(Axis(0), 0);
             return Ok(twist);
         };
-        let Some(earlier) = earlier.filter(|_| follows.is_none() || self.before == follows) else {
-            return Err(MaskError::ScanBefore(follows.unwrap_or(sweep.number)));
+        let Some(earlier) = earlier.filter(|_| follows.is_none() || self.previous == follows)
+        else {
+            return Err(MaskError::MissingPrevious(follows.unwrap_or(sweep.number)));
         };
         let twist = rasters.make(sweep, pair.index_axis_mut(Axis(0), 0))?;
         if follows.is_none() {
@@ -93,7 +94,7 @@ impl LearnedMask {
                 .for_each(|out, power, mask| *out = power * mask);
         }
         copy_first_to_second(pair);
-        self.before = Some(sweep.number);
+        self.previous = Some(sweep.number);
         Ok(twist)
     }
 }

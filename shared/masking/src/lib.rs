@@ -1,8 +1,7 @@
-//! Rasterises scans, masks what would mislead the search, and extracts the sparse points.
+//! Rasterises and masks scans, and extracts their sparse points.
 //!
-//! Reading order: [`Masker`]; `compensation` (a motion-compensated raster above the threshold); `learned` and [`network`]
-//! (masks of a network); `points` (weights of sparse points); [`model`] and [`runtime`] (which networks there are, and the
-//! library that computes them).
+//! Reading order: [`Masker`]; `compensation` (motion-compensated rasters above the threshold); `learned` and [`network`] (masks
+//! of a network); `points` (weights of sparse points); [`model`] (networks and their cards) and [`runtime`] (ONNX Runtime).
 
 mod compensation;
 mod config;
@@ -30,19 +29,19 @@ use learned::LearnedMask;
 use network::NetworkError;
 use points::RasterFrame;
 
-/// A scan, and the velocity that its sweep is motion-compensated with.
+/// A scan and the velocity for its motion compensation.
 #[derive(Clone, Copy, Debug)]
 pub struct Sweep<'a> {
-    /// The scan's number; consecutive calls tell scans apart by it.
+    /// The number that identifies the scan in later calls.
     pub number: u64,
     /// The scan.
     pub scan: PolarScan<'a>,
-    /// The sensor's velocity; `None` where it is unknown.
+    /// The velocity of the sensor; `None` if it is unknown.
     pub twist: Option<Twist>,
 }
 
-/// Makes masked rasters and sparse points of scans. Both start above the same power threshold. The mask's factor of a cell
-/// multiplies the power in a raster, and by [`MaskingConfig::point_exponent`] the weight of a point.
+/// Makes masked rasters and sparse points from scans, both above the same power threshold. The mask is a factor for each cell
+/// of a raster. Raised to [`MaskingConfig::point_exponent`], it is also a factor of the weights of the cell's points.
 #[derive(Debug)]
 pub struct Masker {
     raster: RasterConfig,
@@ -52,21 +51,21 @@ pub struct Masker {
     points: PointExtractor,
 }
 
-/// Settings that no masker can be built from.
+/// An invalid configuration of a masker.
 #[derive(Debug, Error)]
 pub enum MaskerError {
-    /// The rasters'.
+    /// Of the rasters.
     #[error(transparent)]
     Raster(#[from] RasterError),
-    /// The points'.
+    /// Of the points.
     #[error(transparent)]
     Points(#[from] PointsError),
-    /// The network's.
+    /// Of the network.
     #[error(transparent)]
     Network(#[from] NetworkError),
 }
 
-/// Why a scan cannot be masked.
+/// An error in masking a scan.
 #[derive(Debug, Error)]
 pub enum MaskError {
     /// The scan cannot be rasterised.
@@ -75,18 +74,18 @@ pub enum MaskError {
     /// The network failed.
     #[error(transparent)]
     Network(#[from] NetworkError),
-    /// The mask looks at two scans, and the one before is neither remembered nor has it a place in the output.
+    /// The mask takes two scans, but the previous one or the output for it is missing.
     #[error(
-        "the mask looks at two scans, but scan {0} is not remembered or there is no room for its raster"
+        "the mask takes two scans, but the previous scan {0} or the output for its raster is missing"
     )]
-    ScanBefore(u64),
+    MissingPrevious(u64),
 }
 
 impl Masker {
-    /// Plans the rasters and the points, and loads the network if there is one.
+    /// Allocates all buffers and loads the network, if there is one.
     ///
     /// # Errors
-    /// The first setting that is out of its bounds; a network that cannot be used.
+    /// The first setting out of its bounds; a network that cannot be used.
     pub fn new(
         raster: &RasterConfig,
         points: &PointsConfig,
@@ -105,37 +104,37 @@ impl Masker {
         })
     }
 
-    /// Scans that the mask looks at, and rasters that it makes of them: 1, or 2 (the scan and the one before).
+    /// Returns the number of scans that the mask takes and of the rasters that it gives: 1, or 2 (the scan and the previous one).
     pub fn scans(&self) -> usize {
         self.learned.as_ref().map_or(1, LearnedMask::scans)
     }
 
-    /// Whether a scan may follow this one: always where the mask looks at each scan alone, else if this scan was masked or
-    /// remembered last.
-    pub fn remembers(&self, number: u64) -> bool {
+    /// Returns whether [`Masker::mask`] accepts a scan that follows this one: always if the mask takes one scan, else if this one was
+    /// masked or [set](Masker::set_previous) last.
+    pub fn can_follow(&self, number: u64) -> bool {
         self.learned
             .as_ref()
-            .is_none_or(|learned| learned.remembers(number))
+            .is_none_or(|learned| learned.can_follow(number))
     }
 
-    /// Rasterises a scan that others follow, as [`Masker::mask`] did before a restart.
+    /// Rasterises a scan as the previous one of the next, to resume after a restart.
     ///
     /// # Errors
     /// As [`Masker::mask`].
-    pub fn remember(&mut self, sweep: &Sweep<'_>) -> Result<(), MaskError> {
+    pub fn set_previous(&mut self, sweep: &Sweep<'_>) -> Result<(), MaskError> {
         match &mut self.learned {
-            Some(learned) => learned.remember(&mut self.rasters, sweep),
+            Some(learned) => learned.set_previous(&mut self.rasters, sweep),
             None => Ok(()),
         }
     }
 
-    /// Masks a scan into `later` (n x n, row 0 far ahead). Where the mask looks at two scans, the raster of the scan that
-    /// this one `follows`, as this pair's mask leaves it, goes into `earlier`; a scan that follows none is its own scan
-    /// before. Returns the velocity that the sweep was motion-compensated with.
+    /// Masks a scan into `later` (n x n, row 0 far ahead). If the mask takes two scans, the previous scan that this one `follows`,
+    /// masked for this pair, goes into `earlier`; a scan that follows none is its own previous scan. Returns the velocity that was
+    /// used for motion compensation.
     ///
     /// # Errors
-    /// A scan that contradicts itself, rasters of another shape, a network that fails, a scan before that is not
-    /// [remembered](Masker::remembers).
+    /// An inconsistent scan, rasters of another shape, a network that fails, or a previous scan that this one
+    /// [cannot follow](Masker::can_follow).
     pub fn mask(
         &mut self,
         sweep: &Sweep<'_>,
@@ -149,12 +148,12 @@ impl Masker {
         }
     }
 
-    /// Writes the scan's points to the start of `out`, and returns how many there are: see [`PointExtractor::extract`]. A
-    /// network's mask weighs them by [`MaskingConfig::point_exponent`]: that of the scan that was masked last, compensated
-    /// by `twist`.
+    /// Writes the scan's points to the start of `out` and returns their number: see [`PointExtractor::extract`]. The mask of a
+    /// network, which is that of the last masked scan with compensation by `twist`, is applied with
+    /// [`MaskingConfig::point_exponent`].
     ///
     /// # Errors
-    /// A scan that contradicts itself.
+    /// An inconsistent scan.
     pub fn points(
         &mut self,
         scan: &PolarScan<'_>,
@@ -164,19 +163,18 @@ impl Masker {
         let count = self.points.extract(scan, self.config.floor(), out)?;
         let exponent = self.config.point_exponent;
         if let Some(mask) = self.factors(0).filter(|_| exponent > 0.0) {
-            self.frame(twist).weigh(mask, exponent, &mut out[..count]);
+            self.frame(twist).weight(mask, exponent, &mut out[..count]);
         }
         Ok(count)
     }
 
-    /// The network's factors from 0 to 1, n x n, of the scan that was masked last (0) or of the scan before it (1, where
-    /// the mask looks at two). `None` without a network.
+    /// Returns the network's factors from 0 to 1, n x n, of the last masked scan (0) or of its previous one (1, if the mask takes
+    /// two). `None` without a network.
     pub fn factors(&self, scan: usize) -> Option<ArrayView2<'_, f32>> {
         self.learned.as_ref()?.factors(scan)
     }
 
-    /// The cell (row, column) of a raster compensated by `twist` that a point of the scan lies in; `None` outside of the
-    /// raster.
+    /// Returns the cell (row, column) of a point in a raster that is compensated by `twist`; `None` outside of the raster.
     pub fn cell_of(&self, point: &SparsePoint, twist: Option<Twist>) -> Option<[usize; 2]> {
         self.frame(twist).cell_of(point)
     }

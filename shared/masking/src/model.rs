@@ -1,4 +1,4 @@
-//! A model and its card: which file, for which rasters, made how.
+//! A model and its card, which states the model's file and the rasters that it was trained on.
 
 use std::{
     fmt, fs, io,
@@ -12,14 +12,14 @@ use thiserror::Error;
 
 use crate::MaskingConfig;
 
-/// What a model's card (`NAME.toml`) says of it. It may have other sections, on where the model comes from.
+/// The card of a model (`NAME.toml`). It may have other sections, on the provenance of the model.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct Card {
     /// The network.
     pub model: NetworkFacts,
     /// The rasters that it was trained on.
     pub raster: RasterFacts,
-    /// How they came about. A card may leave it open.
+    /// The processing of these rasters; optional.
     #[serde(default)]
     pub masking: MaskingFacts,
 }
@@ -27,57 +27,57 @@ pub struct Card {
 /// The section `[model]` of a card.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct NetworkFacts {
-    /// Its file, in the card's folder.
+    /// The model's file, in the folder of the card.
     pub file: PathBuf,
-    /// The file's SHA-256, hexadecimal.
+    /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
-    /// Scans that it looks at: 1, or 2 (this one and the one before).
+    /// Number of scans that it takes: 1, or 2 (this one and the previous one).
     pub inputs: usize,
-    /// Version of the operators.
+    /// Version of the ONNX operators.
     pub opset: u32,
 }
 
 /// The section `[raster]` of a card.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct RasterFacts {
-    /// Cells a side.
+    /// Cells per side.
     pub n: usize,
-    /// Metres a cell.
+    /// Size of a cell, m.
     pub cell_m: f32,
-    /// How a cell's value came from the bins.
+    /// Sampling of range bins to cells.
     pub sampling: Option<Sampling>,
-    /// Metres around the radar that were left out.
+    /// Ranges below this are left out, m.
     pub min_range_m: Option<f32>,
-    /// Width, in cells, of what [`Sampling::Averaged`] averaged over.
+    /// Width of the average of [`Sampling::Averaged`], in cells.
     pub averaged_cells: Option<f32>,
 }
 
-/// The section `[masking]` of a card: what was done before the network looked at a raster.
+/// The section `[masking]` of a card: the processing of a raster before the network.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 pub struct MaskingFacts {
-    /// Power that counted as nothing.
+    /// Power up to which returns were set to zero.
     pub floor: Option<u8>,
-    /// Whether the sweep's distortion was undone.
+    /// True if rasters were motion-compensated.
     pub compensate: Option<bool>,
-    /// Whether Doppler's shift of ranges was undone.
+    /// True if the Doppler shift of ranges was compensated.
     pub undo_doppler: Option<bool>,
 }
 
-/// A model whose file is as its card says, and whose card suits the run.
+/// A model with a verified checksum and a card that fits the run.
 #[derive(Debug)]
 pub struct Model {
-    /// What its card says.
+    /// The card.
     pub card: Card,
-    /// Its file.
+    /// The path of the file.
     pub file: PathBuf,
-    /// What is in it.
+    /// The content of the file.
     pub bytes: Vec<u8>,
 }
 
-/// Why a model is refused.
+/// An error in reading a model.
 #[derive(Debug, Error)]
 pub enum ModelError {
-    /// None is named.
+    /// No model is named.
     #[error(
         "masking.kind is `learned`, but masking.model does not name a model: set it to the card of one, as in models/NAME.toml"
     )]
@@ -87,55 +87,55 @@ pub enum ModelError {
     Unreadable {
         /// `card` or `file`.
         what: &'static str,
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What the operating system said.
+        /// The system error.
         source: io::Error,
     },
-    /// The card is none.
+    /// The file is not a card.
     #[error("masking.model is {path}, which is not the card of a model: {reason}")]
     NotACard {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The reason.
         reason: String,
     },
-    /// The file is not the one that the card is about.
+    /// The checksum of the file differs from that of the card.
     #[error(
         "{path} has the SHA-256 {actual}, but its card says {expected}: it is damaged or another model's, so get it again together with its card"
     )]
     Checksum {
         /// The model's file.
         path: PathBuf,
-        /// What the card says.
+        /// The value of the card.
         expected: String,
-        /// What it is.
+        /// The actual checksum.
         actual: String,
     },
-    /// The card is not the one that the run began with.
+    /// The card's checksum differs from that of the configuration.
     #[error(
         "masking.sha256 is {expected}, but {path} is the card of a model with {actual}: name the other model, or leave masking.sha256 out"
     )]
     OtherModel {
         /// The card.
         path: PathBuf,
-        /// What the configuration says.
+        /// The value of the configuration.
         expected: String,
-        /// What the card says.
+        /// The value of the card.
         actual: String,
     },
-    /// The rasters have other sizes than those that it was trained on.
+    /// The rasters have another size than those that the model was trained on.
     #[error(
         "raster.{key} is {actual}, but the model {path} is for {expected}: set raster.{key} = {expected}, or choose another masking.model"
     )]
     Raster {
-        /// Which key of the section `[raster]`.
+        /// The key of the section `[raster]`.
         key: &'static str,
         /// The card.
         path: PathBuf,
-        /// What the card says.
+        /// The value of the card.
         expected: f64,
-        /// What the configuration says.
+        /// The value of the configuration.
         actual: f64,
     },
 }
@@ -144,7 +144,7 @@ impl Card {
     /// Reads the card that `masking.model` names.
     ///
     /// # Errors
-    /// None is named; the file cannot be read, is no card, or is that of another model than `masking.sha256` says.
+    /// No card is named, the file cannot be read or is not a card, or `masking.sha256` is that of another model.
     pub fn read(config: &MaskingConfig) -> Result<Self, ModelError> {
         let path = config.model.as_deref().ok_or(ModelError::NotNamed)?;
         let not_a_card = |reason: String| ModelError::NotACard {
@@ -184,33 +184,35 @@ impl Card {
             _ => Ok(card),
         }
     }
-}
 
-impl Card {
-    /// What the network was not trained for, though it runs: its masks are worth less then.
-    pub fn unlike_training(&self, masking: &MaskingConfig, raster: &RasterConfig) -> Vec<String> {
+    /// Returns the settings that differ from those in training. The network runs, but its masks are less accurate.
+    pub fn training_mismatches(
+        &self,
+        masking: &MaskingConfig,
+        raster: &RasterConfig,
+    ) -> Vec<String> {
         let averaged = raster.sampling == Sampling::Averaged;
         let differences = [
-            unlike("masking.threshold", self.masking.floor, masking.floor()),
-            unlike(
+            mismatch("masking.threshold", self.masking.floor, masking.floor()),
+            mismatch(
                 "masking.compensate",
                 self.masking.compensate,
                 masking.compensate,
             ),
-            unlike(
+            mismatch(
                 "masking.undo_doppler",
                 self.masking.undo_doppler,
                 masking.undo_doppler,
             ),
-            unlike(
+            mismatch(
                 "raster.min_range_m",
                 self.raster.min_range_m,
                 raster.min_range_m,
             ),
-            unlike("raster.sampling", self.raster.sampling, raster.sampling),
+            mismatch("raster.sampling", self.raster.sampling, raster.sampling),
             averaged
                 .then(|| {
-                    unlike(
+                    mismatch(
                         "raster.averaged_cells",
                         self.raster.averaged_cells,
                         raster.averaged_cells,
@@ -222,17 +224,17 @@ impl Card {
     }
 }
 
-fn unlike<T: PartialEq + fmt::Display>(key: &str, trained: Option<T>, here: T) -> Option<String> {
+fn mismatch<T: PartialEq + fmt::Display>(key: &str, trained: Option<T>, here: T) -> Option<String> {
     trained
         .filter(|trained| *trained != here)
         .map(|trained| format!("{key} is {here} instead of {trained}"))
 }
 
 impl Model {
-    /// Reads the model that `masking.model` names, for these rasters.
+    /// Reads the model that `masking.model` names and checks that it fits these rasters.
     ///
     /// # Errors
-    /// See [`Card::read`]; besides, rasters of another size, and a file that is not the card's.
+    /// As [`Card::read`]; rasters of another size; a file with another checksum than its card states.
     pub fn read(config: &MaskingConfig, raster: &RasterConfig) -> Result<Self, ModelError> {
         let card = Card::read(config)?;
         let path = config.model.as_deref().ok_or(ModelError::NotNamed)?;
@@ -273,14 +275,14 @@ fn check_raster(
         true => Ok(()),
         false => Err(differs(
             "cell_m",
-            as_written(trained.cell_m),
-            as_written(raster.cell_m),
+            shortest_decimal(trained.cell_m),
+            shortest_decimal(raster.cell_m),
         )),
     }
 }
 
-/// The number as people write it: not 0.800000011920929 for 0.8.
-fn as_written(value: f32) -> f64 {
+/// Converts without the digits that an `f32` gains as `f64`: 0.8, not 0.800000011920929.
+fn shortest_decimal(value: f32) -> f64 {
     value.to_string().parse().unwrap_or(value.into())
 }
 

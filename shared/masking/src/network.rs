@@ -21,36 +21,36 @@ use crate::{
 const INPUT: &str = "scans";
 const OUTPUT: &str = "masks";
 
-/// Why there is no mask.
+/// An error in loading or running a network.
 #[derive(Debug, Error)]
 pub enum NetworkError {
-    /// The model.
+    /// The model cannot be used.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// ONNX Runtime.
+    /// ONNX Runtime cannot be used.
     #[error(transparent)]
     Runtime(#[from] RuntimeError),
-    /// This build cannot do it.
+    /// This build does not have the execution provider.
     #[error(
-        "masking.provider is `{0}`, which this build is without: build Gyre with --features {0}, or set it to `cpu`"
+        "masking.provider is `{0}`, which this build does not have: build Gyre with --features {0}, or set it to `cpu`"
     )]
     NotBuiltIn(Provider),
-    /// This machine or this ONNX Runtime cannot do it.
+    /// The execution provider does not work on this machine or with this ONNX Runtime.
     #[error(
         "masking.provider is `{provider}`, but ONNX Runtime cannot use it here: {reason}; `cpu` always works"
     )]
     Provider {
-        /// Who was to compute.
+        /// The execution provider.
         provider: Provider,
-        /// What ONNX Runtime said.
+        /// ONNX Runtime's error.
         reason: String,
     },
-    /// ONNX Runtime refuses the model.
+    /// ONNX Runtime rejects the model.
     #[error("ONNX Runtime cannot load {path}: {reason}")]
     Load {
         /// The model's file.
         path: PathBuf,
-        /// What ONNX Runtime said.
+        /// ONNX Runtime's error.
         reason: String,
     },
     /// ONNX Runtime does not know the model's operators.
@@ -60,48 +60,46 @@ pub enum NetworkError {
     Opset {
         /// The model's file.
         path: PathBuf,
-        /// What its card says.
+        /// The version in its card.
         opset: u32,
-        /// The newest version that would do.
+        /// The newest version that ONNX Runtime supports.
         known: String,
     },
-    /// The model is not a mask, or not one for these rasters.
-    #[error(
-        "{path} {has}, but a mask of its card's sizes must have the one {expected}: export it again"
-    )]
+    /// The inputs or outputs of the model do not fit its card.
+    #[error("{path} {has}, but by its card it must have only {expected}: export it again")]
     Interface {
         /// The model's file.
         path: PathBuf,
-        /// What it has.
+        /// The actual tensors.
         has: String,
-        /// What it must have.
+        /// The expected tensor.
         expected: String,
     },
-    /// The network does not run.
+    /// The network fails.
     #[error("the learned mask cannot be computed: {0}")]
     Run(String),
 }
 
-/// A network that makes masks of rasters.
+/// A network that computes masks from rasters.
 #[derive(Debug)]
 pub struct Network {
     session: Session,
-    /// scans x n x n.
+    /// The last masks, scans x n x n.
     masks: Array3<f32>,
 }
 
 impl Network {
-    /// Loads the model that the configuration names, and checks that it fits these rasters.
+    /// Loads the configured model and checks that it fits these rasters.
     ///
     /// # Errors
-    /// A model that does not fit, ONNX Runtime missing or refusing it.
+    /// A model that does not fit, or ONNX Runtime is missing or rejects it.
     pub fn load(config: &MaskingConfig, raster: &RasterConfig) -> Result<Self, NetworkError> {
         let model = Model::read(config, raster)?;
         let environment = runtime::open(&runtime::find(config.runtime.as_deref())?)?;
         let mut builder = builder(&environment, config)?;
         let session = builder
             .commit_from_memory(&model.bytes)
-            .map_err(|error| refused(&model, error.message()))?;
+            .map_err(|error| rejected(&model, error.message()))?;
         let shape = [1, model.card.model.inputs, raster.n, raster.n];
         check("takes", INPUT, session.inputs(), shape, &model)?;
         check("gives", OUTPUT, session.outputs(), shape, &model)?;
@@ -112,21 +110,21 @@ impl Network {
         })
     }
 
-    /// Scans that it looks at, and masks that it makes of them: 1, or 2 (this scan, then the one before).
+    /// Returns the number of scans that it takes and of masks that it gives: 1, or 2 (this scan, then the previous one).
     pub fn scans(&self) -> usize {
         self.masks.len_of(Axis(0))
     }
 
-    /// Computes the masks (scans x n x n) of rasters (scans x n x n): factors from 0 (counts as nothing) to 1 (counts in
-    /// full). Values of the network beyond that range are clamped to it.
+    /// Computes the masks (scans x n x n) of rasters (scans x n x n). A mask is a factor from 0 to 1; the network's values are
+    /// clamped to that range.
     ///
     /// # Errors
-    /// Rasters of the wrong shape, what ONNX Runtime reports, and factors that are NaN.
+    /// Rasters of the wrong shape, an error of ONNX Runtime, or factors that are NaN.
     pub fn run(
         &mut self,
         rasters: ArrayView3<'_, f32>,
     ) -> Result<ArrayView3<'_, f32>, NetworkError> {
-        let failed = |error: ort::Error| NetworkError::Run(sentence(error.message()));
+        let failed = |error: ort::Error| NetworkError::Run(one_line(error.message()));
         let input = TensorRef::from_array_view(rasters.insert_axis(Axis(0))).map_err(failed)?;
         let outputs = self.session.run(ort::inputs![input]).map_err(failed)?;
         let (_, masks) = outputs[0].try_extract_tensor::<f32>().map_err(failed)?;
@@ -151,13 +149,13 @@ impl Network {
         }
     }
 
-    /// The masks of the last [`Network::run`], scans x n x n.
+    /// Returns the masks of the last [`Network::run`], scans x n x n.
     pub fn masks(&self) -> ArrayView3<'_, f32> {
         self.masks.view()
     }
 }
 
-/// Single runs, deterministic to the bit.
+/// Returns a session builder for bitwise reproducible results.
 fn builder(
     environment: &Environment,
     config: &MaskingConfig,
@@ -167,17 +165,17 @@ fn builder(
         let builder = Session::builder(environment)?
             .with_intra_threads(config.threads)?
             .with_inter_threads(1)?;
-        // The other stages need the processor while there is no scan.
+        // No spinning: between scans the other stages need the processor.
         Ok(builder
             .with_intra_op_spinning(false)?
             .with_deterministic_compute(true)?)
     };
-    let builder = build().map_err(|error| NetworkError::Run(sentence(error.message())))?;
+    let builder = build().map_err(|error| NetworkError::Run(one_line(error.message())))?;
     builder
         .with_execution_providers(providers)
         .map_err(|error| NetworkError::Provider {
             provider: config.provider,
-            reason: sentence(error.message()),
+            reason: one_line(error.message()),
         })
 }
 
@@ -194,12 +192,15 @@ fn execution_providers(provider: Provider) -> Result<Vec<ExecutionProviderDispat
         Provider::Openvino => Ok(vec![
             ort::ep::OpenVINO::default().build().error_on_failure(),
         ]),
-        #[allow(unreachable_patterns, reason = "none is left where all are built in")]
+        #[allow(
+            unreachable_patterns,
+            reason = "unreachable if all providers are built in"
+        )]
         other => Err(NetworkError::NotBuiltIn(other)),
     }
 }
 
-/// Whether what the session takes or gives is the one tensor that it must be.
+/// Checks that the inputs or outputs of a session are exactly the expected tensor.
 fn check(
     verb: &str,
     name: &str,
@@ -235,12 +236,12 @@ fn check(
 fn describe(tensor: &Outlet) -> String {
     match tensor.dtype() {
         ValueType::Tensor { ty, shape, .. } => format!("`{}` {ty:?} {shape}", tensor.name()),
-        _ => format!("`{}`, which is no tensor", tensor.name()),
+        _ => format!("`{}`, which is not a tensor", tensor.name()),
     }
 }
 
-/// Why ONNX Runtime does not load the model.
-fn refused(model: &Model, message: &str) -> NetworkError {
+/// Converts the error of a model that ONNX Runtime does not load.
+fn rejected(model: &Model, message: &str) -> NetworkError {
     let path = model.file.clone();
     match message.split_once("ai.onnx is till opset ") {
         Some((_, known)) => {
@@ -253,18 +254,18 @@ fn refused(model: &Model, message: &str) -> NetworkError {
         }
         None => NetworkError::Load {
             path,
-            reason: sentence(message),
+            reason: one_line(message),
         },
     }
 }
 
-/// What ONNX Runtime said, as one line and without the place in its own source that it said it from.
-fn sentence(message: &str) -> String {
-    let said = match message.split_once("/onnxruntime_src/") {
-        Some((_, place)) => place.split_once(") ").map_or(place, |(_, said)| said),
+/// Returns a message of ONNX Runtime as one line, without the location in its source code.
+fn one_line(message: &str) -> String {
+    let text = match message.split_once("/onnxruntime_src/") {
+        Some((_, location)) => location.split_once(") ").map_or(location, |(_, text)| text),
         None => message,
     };
-    said.trim_end_matches(['.', '\n'])
+    text.trim_end_matches(['.', '\n'])
         .split_whitespace()
         .collect::<Vec<_>>()
         .join(" ")
@@ -275,11 +276,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_onnx_runtime_says_is_one_line_without_its_own_source() {
-        let said = "Load failed:/onnxruntime_src/core/graph.cc:46 void check(int, bool) Opset 99 is (still)\nnew. Or not.\n";
-        assert_eq!(sentence(said), "Opset 99 is (still) new. Or not");
+    fn messages_of_onnx_runtime_become_one_line_without_source_location() {
+        let message = "Load failed:/onnxruntime_src/core/graph.cc:46 void check(int, bool) Opset 99 is (still)\nnew. Or not.\n";
+        assert_eq!(one_line(message), "Opset 99 is (still) new. Or not");
         assert_eq!(
-            sentence("Protobuf\n  parsing failed."),
+            one_line("Protobuf\n  parsing failed."),
             "Protobuf parsing failed"
         );
     }

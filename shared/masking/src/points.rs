@@ -4,24 +4,24 @@ use gyre_geometry::{Pose, SparsePoint, Twist};
 use nalgebra::Point2;
 use ndarray::ArrayView2;
 
-/// How a scan's raster was made, as far as it says where a point lies in it.
+/// The properties of a raster that determine in which cell a point lies.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RasterFrame {
-    /// Cells a side.
+    /// Cells per side.
     pub n: usize,
-    /// Metres a cell.
+    /// Size of a cell, m.
     pub cell_m: f32,
     /// The velocity of motion compensation.
     pub twist: Option<Twist>,
-    /// Whether the Doppler shift was compensated with it.
+    /// True if the Doppler shift is compensated with the same velocity.
     pub doppler_compensated: bool,
 }
 
 impl RasterFrame {
-    /// Multiplies each point's weight by the mask's factor at the point's cell, raised to `exponent`. A point outside of the
-    /// raster keeps its weight.
-    pub fn weigh(&self, mask: ArrayView2<'_, f32>, exponent: f32, points: &mut [SparsePoint]) {
-        // The points of an azimuth have one time.
+    /// Multiplies the weight of each point by the mask at its cell raised to `exponent`. Points outside of the raster keep their
+    /// weights.
+    pub fn weight(&self, mask: ArrayView2<'_, f32>, exponent: f32, points: &mut [SparsePoint]) {
+        // All points of an azimuth have the same time.
         for points in points.chunk_by_mut(|a, b| a.time_s == b.time_s) {
             let sensor = self.sensor_at(&points[0]);
             for point in points {
@@ -33,12 +33,12 @@ impl RasterFrame {
         }
     }
 
-    /// The cell (row, column) that a point lies in; `None` outside of the raster.
+    /// Returns the cell (row, column) of a point; `None` outside of the raster.
     pub fn cell_of(&self, point: &SparsePoint) -> Option<[usize; 2]> {
         self.cell_seen_from(self.sensor_at(point), point)
     }
 
-    /// The sensor in the raster's frame at the time of the point's azimuth.
+    /// Returns the pose of the sensor in the raster's frame at the time of the point's azimuth.
     fn sensor_at(&self, point: &SparsePoint) -> Option<Pose> {
         self.twist.map(|twist| twist.pose_at(point.time_s.into()))
     }
@@ -49,7 +49,7 @@ impl RasterFrame {
         self.cell(sensor.map_or(place, |sensor| sensor * place))
     }
 
-    /// The place of a point without its Doppler shift, if the raster is without it: see [`SparsePoint`].
+    /// Returns the position of a point, without its Doppler shift if the raster is compensated for it: see [`SparsePoint`].
     fn without_doppler(&self, seen: Point2<f64>, doppler_s: f64) -> Point2<f64> {
         match self.twist.filter(|_| self.doppler_compensated) {
             Some(twist) => {
@@ -61,7 +61,7 @@ impl RasterFrame {
         }
     }
 
-    /// The cell (row, column) nearest to a place in the raster's frame.
+    /// Returns the cell (row, column) at a position in the raster's frame.
     fn cell(&self, place: Point2<f64>) -> Option<[usize; 2]> {
         let index = |metres: f64| {
             let index = (0.5 * (self.n as f64 - 1.0) - metres / f64::from(self.cell_m)).round();
@@ -90,7 +90,7 @@ mod tests {
         doppler_compensated: false,
     };
 
-    /// Factors of a point's weight when cell (row, column) alone has the mask 0.5, and all others 1.
+    /// Returns the factor of a point's weight if the mask is 0.5 in cell (row, column) and 1 elsewhere.
     fn factor(
         frame: RasterFrame,
         (row, column): (usize, usize),
@@ -105,12 +105,12 @@ mod tests {
             weight: 1.0,
             doppler_s,
         }];
-        frame.weigh(mask.view(), 1.0, &mut points);
+        frame.weight(mask.view(), 1.0, &mut points);
         points[0].weight
     }
 
     #[test]
-    fn a_point_has_the_mask_of_the_cell_that_it_lies_in() {
+    fn a_point_has_the_mask_of_its_cell() {
         assert_eq!(factor(FRAME, (0, 2), [4.9, 0.9, 0.0, 0.0]), 0.5);
         assert_eq!(factor(FRAME, (2, 0), [-0.9, 3.1, 0.0, 0.0]), 0.5);
         assert_eq!(factor(FRAME, (2, 0), [-1.1, 3.1, 0.0, 0.0]), 1.0);
@@ -131,7 +131,7 @@ mod tests {
                 weight: 0.7,
                 ..SparsePoint::default()
             }];
-            FRAME.weigh(Array2::zeros((5, 5)).view(), 1.0, &mut points);
+            FRAME.weight(Array2::zeros((5, 5)).view(), 1.0, &mut points);
             assert_eq!(points[0].weight, 0.7, "{place:?}");
         }
     }
@@ -142,12 +142,12 @@ mod tests {
             weight: 0.8,
             ..SparsePoint::default()
         }];
-        FRAME.weigh(Array2::from_elem((5, 5), 0.25).view(), 0.5, &mut points);
+        FRAME.weight(Array2::from_elem((5, 5), 0.25).view(), 0.5, &mut points);
         assert_eq!(points[0].weight, 0.4);
     }
 
     #[test]
-    fn a_point_is_moved_as_its_sweep_is_compensated() {
+    fn a_point_is_motion_compensated_like_its_raster() {
         let twist = Some(Twist {
             vx_mps: 10.0,
             vy_mps: 0.0,
@@ -200,7 +200,7 @@ mod tests {
         scan
     }
 
-    /// The share of a scan's points that lie, by `frame`, where the raster made with `twist` has power.
+    /// Returns the share of a scan's points that `frame` places in cells with power in the raster made with `twist`.
     fn share_that_meets(twist: Twist, sense: Sense, frame: RasterFrame) -> f32 {
         let scan = spots(sense);
         let config = RasterConfig {
@@ -224,13 +224,13 @@ mod tests {
             .unwrap();
         assert!(count >= 100, "{count}");
         let lit = raster.mapv(|power: f32| f32::from(power > 10.0));
-        let mut weighed = points[..count].to_vec();
-        frame.weigh(lit.view(), 1.0, &mut weighed);
-        weighed.iter().filter(|point| point.weight > 0.0).count() as f32 / count as f32
+        let mut weighted = points[..count].to_vec();
+        frame.weight(lit.view(), 1.0, &mut weighted);
+        weighted.iter().filter(|point| point.weight > 0.0).count() as f32 / count as f32
     }
 
     #[test]
-    fn points_lie_where_the_raster_has_their_power() {
+    fn points_lie_in_cells_with_power() {
         let twist = Twist {
             vx_mps: 25.0,
             vy_mps: 1.0,
@@ -262,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn dopplers_shift_is_compensated_where_the_raster_is_without_it() {
+    fn the_doppler_shift_is_compensated_if_the_raster_is() {
         let twist = Some(Twist {
             vx_mps: 20.0,
             vy_mps: 0.0,

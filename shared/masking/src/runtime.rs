@@ -1,4 +1,4 @@
-//! Finds ONNX Runtime's library and opens it. Nothing of Gyre is linked against it: who uses no learned mask needs none.
+//! Finds and opens the library of ONNX Runtime at run time. It is needed only for learned masks.
 
 use std::{
     env,
@@ -12,35 +12,35 @@ use std::{
 use ort::{LoadDynamicError, environment::Environment, logging::LogLevel};
 use thiserror::Error;
 
-/// What installs it, in Gyre's folder. The package's library serves any Python, so one version of the package will do.
+/// The command that installs it in Gyre's folder. The library does not depend on the version of Python.
 pub const INSTALL: &str = "python3 -m pip install --no-deps --python-version 3.12 --target onnxruntime -r models/onnxruntime.txt";
-/// The environment variable that may name it.
+/// The environment variable that may name the library.
 const VARIABLE: &str = "ORT_DYLIB_PATH";
-/// The folder that [`INSTALL`] makes.
+/// The folder that [`INSTALL`] creates.
 const INSTALLED: &str = "onnxruntime";
-/// Where the library is in a folder that is named: by itself, in the package, in the package's own folder.
+/// Positions of the library in a named folder: the folder itself, the package, the parent of the package.
 const PLACES: [&str; 3] = ["", "capi", "onnxruntime/capi"];
 const LIBRARY: &str = "libonnxruntime.so";
-/// From a binary in `target/release/deps` up to the project.
-const ABOVE_THE_EXECUTABLE: usize = 4;
+/// Number of folders above the executable that are searched: from `target/release/deps` up to the project.
+const MAX_PARENTS: usize = 4;
 
-/// Why there is no ONNX Runtime.
+/// An error in finding or opening ONNX Runtime.
 #[derive(Debug, Error)]
 pub enum RuntimeError {
-    /// It is nowhere.
+    /// It is not installed.
     #[error(
         "a learned mask needs ONNX Runtime, which is not installed: `{INSTALL}` in Gyre's folder installs it; \
-         one that is elsewhere is named by masking.runtime or {VARIABLE}; masking.kind = \"threshold\" needs none"
+         masking.runtime or {VARIABLE} names one in another place; masking.kind = \"threshold\" does not need it"
     )]
     Missing,
-    /// It is not where it is said to be.
+    /// The named path has no library.
     #[error(
         "{named_by} is {path}, but there is no {LIBRARY}: correct it, or leave it out and run `{INSTALL}`"
     )]
-    NotThere {
-        /// What says so.
+    NotFound {
+        /// The setting or variable.
         named_by: &'static str,
-        /// Where.
+        /// The path.
         path: PathBuf,
     },
     /// It is too old.
@@ -49,25 +49,25 @@ pub enum RuntimeError {
         ort::MINOR_VERSION
     )]
     TooOld {
-        /// Its place.
+        /// The path of the library.
         path: PathBuf,
-        /// Its version.
+        /// The version of the library.
         version: String,
     },
-    /// It is something else, or broken, or for another machine.
+    /// The file is not ONNX Runtime, is damaged, or is for another platform.
     #[error("{path} cannot be used as ONNX Runtime: {reason}; `{INSTALL}` installs one")]
     Unusable {
-        /// Its place.
+        /// The path of the library.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The reason.
         reason: String,
     },
 }
 
-/// The library: what `configured` (`masking.runtime`) names, or the environment, or what [`INSTALL`] installed.
+/// Returns the path of the library: named by `configured` (`masking.runtime`) or by the environment, or installed by [`INSTALL`].
 ///
 /// # Errors
-/// [`RuntimeError::NotThere`] where a name leads nowhere, [`RuntimeError::Missing`] where nothing names it and it is not installed.
+/// [`RuntimeError::NotFound`] if a named path has no library, [`RuntimeError::Missing`] if none is named or installed.
 pub fn find(configured: Option<&Path>) -> Result<PathBuf, RuntimeError> {
     find_in(configured, env::var_os(VARIABLE), &installed_in())
 }
@@ -84,7 +84,7 @@ fn find_in(
         (None, None) => None,
     };
     if let Some((named_by, path)) = named {
-        return library_at(&path).ok_or(RuntimeError::NotThere { named_by, path });
+        return library_at(&path).ok_or(RuntimeError::NotFound { named_by, path });
     }
     installed_in
         .iter()
@@ -92,27 +92,28 @@ fn find_in(
         .ok_or(RuntimeError::Missing)
 }
 
-/// Folders in which [`INSTALL`] may have been run: the current one, those above this program, and the user's own.
+/// Returns the folders in which [`INSTALL`] may have been run: the current one, those above this program, and the user's data
+/// folder.
 fn installed_in() -> Vec<PathBuf> {
     let current = env::current_dir().ok();
     let program = env::current_exe().ok();
     let above = program
         .iter()
-        .flat_map(|program| program.ancestors().skip(1).take(ABOVE_THE_EXECUTABLE));
+        .flat_map(|program| program.ancestors().skip(1).take(MAX_PARENTS));
     let home = || env::var_os("HOME").map(|home| Path::new(&home).join(".local/share"));
     let data = env::var_os("XDG_DATA_HOME")
         .filter(|data| !data.is_empty())
         .map(PathBuf::from)
         .or_else(home);
-    let own = data.map(|data| data.join("gyre"));
+    let user = data.map(|data| data.join("gyre"));
     current
         .into_iter()
         .chain(above.map(Path::to_owned))
-        .chain(own)
+        .chain(user)
         .collect()
 }
 
-/// The library itself, or that in a folder; absolute, since stages may be started elsewhere.
+/// Returns the library at a path or in a folder, absolute, since stages may be started in another folder.
 fn library_at(path: &Path) -> Option<PathBuf> {
     let path = path.canonicalize().ok()?;
     if path.is_file() {
@@ -123,7 +124,7 @@ fn library_at(path: &Path) -> Option<PathBuf> {
             .ok()?
             .flatten()
             .map(|file| file.path());
-        // The newest, where several versions lie side by side.
+        // Take the newest of several versions.
         files
             .filter_map(|file| Some((version(&file)?, file)))
             .max()
@@ -131,18 +132,18 @@ fn library_at(path: &Path) -> Option<PathBuf> {
     })
 }
 
-/// The version behind `libonnxruntime.so`; none of its numbers where there is none.
+/// Returns the version after `libonnxruntime.so`; empty without one.
 fn version(file: &Path) -> Option<Vec<u32>> {
-    let behind = file.file_name()?.to_str()?.strip_prefix(LIBRARY)?;
-    let mut numbers = behind.split('.');
+    let suffix = file.file_name()?.to_str()?.strip_prefix(LIBRARY)?;
+    let mut numbers = suffix.split('.');
     numbers.next().filter(|between| between.is_empty())?;
     numbers.map(|number| number.parse().ok()).collect()
 }
 
-/// Opens the library. A process has one: later calls return what the first one that succeeded opened.
+/// Opens the library. A process opens only one: later calls return the first one that succeeded.
 ///
 /// # Errors
-/// A file that is no library of ONNX Runtime, or of one that is too old.
+/// A file that is not ONNX Runtime, or too old a version.
 pub fn open(path: &Path) -> Result<Environment, RuntimeError> {
     static OPENED: Mutex<Option<Environment>> = Mutex::new(None);
     let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
@@ -162,7 +163,7 @@ pub fn open(path: &Path) -> Result<Environment, RuntimeError> {
             let reason = error
                 .source()
                 .map_or_else(|| error.to_string(), ToString::to_string);
-            // The system's linker names the file first.
+            // The dynamic linker's message starts with the file.
             unusable(
                 reason
                     .trim_start_matches(&format!("{}: ", path.display()))
@@ -174,10 +175,10 @@ pub fn open(path: &Path) -> Result<Environment, RuntimeError> {
         }
         LoadDynamicError::InvalidVersionString => unusable("its version is not text".to_owned()),
     })?;
-    // Errors reach us as such; what it prints besides belongs into the run's log.
-    let log = |level, _: &str, _: &str, place: &str, message: &str| match level {
-        LogLevel::Error | LogLevel::Fatal => tracing::warn!(place, "ONNX Runtime: {message}"),
-        _ => tracing::debug!(place, "ONNX Runtime: {message}"),
+    // Errors are returned; other messages go to the run's log.
+    let log = |level, _: &str, _: &str, location: &str, message: &str| match level {
+        LogLevel::Error | LogLevel::Fatal => tracing::warn!(location, "ONNX Runtime: {message}"),
+        _ => tracing::debug!(location, "ONNX Runtime: {message}"),
     };
     let environment = builder
         .with_telemetry(false)
@@ -203,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn the_configuration_wins_over_the_environment_and_that_over_what_is_installed() {
+    fn the_configuration_precedes_the_environment_and_that_the_installed_library() {
         let (named, first) = folder_with("libonnxruntime.so.1.31.1");
         let (package, second) = folder_with("onnxruntime/capi/libonnxruntime.so.1.31.1");
         let (project, third) = folder_with("onnxruntime/onnxruntime/capi/libonnxruntime.so.1.31.1");
@@ -226,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_named_and_not_there_is_not_looked_for_elsewhere() {
+    fn a_named_path_without_a_library_is_an_error() {
         let (project, _) = folder_with("onnxruntime/capi/libonnxruntime.so");
         let installed_in = [project.path().to_owned()];
         let error = find_in(Some(Path::new("/no/such")), None, &installed_in)
@@ -243,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn the_newest_of_several_is_taken_and_nothing_that_is_no_library() {
+    fn the_newest_of_several_libraries_is_taken() {
         let (folder, newest) = folder_with("libonnxruntime.so.1.31.1");
         for other in [
             "libonnxruntime.so",
@@ -257,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_library_the_sentence_has_the_command_that_installs_it() {
+    fn the_message_without_a_library_has_the_install_command() {
         let (folder, _) = folder_with("onnxruntime/capi/libonnxruntime_providers_shared.so");
         let error = find_in(None, None, &[folder.path().to_owned()])
             .unwrap_err()
@@ -269,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_no_library_is_refused() {
+    fn a_file_that_is_not_a_library_is_rejected() {
         let (_folder, file) = folder_with("libonnxruntime.so");
         let error = open(&file).unwrap_err().to_string();
         assert!(

@@ -7,7 +7,7 @@ use ndarray::Array2;
 const AZIMUTHS: usize = 400;
 const BINS: usize = 300;
 
-/// A wall all around, 4 m deep, its middle at 40 m.
+/// A scan of a circular wall, 4 m deep, with its middle at 40 m.
 fn wall() -> OwnedScan {
     let mut scan = OwnedScan::with_limits(ScanLimits {
         bytes: AZIMUTHS * BINS,
@@ -30,7 +30,7 @@ fn wall() -> OwnedScan {
     scan
 }
 
-/// Mean place of the power straight ahead, metres, seen at 20 m/s.
+/// The mean range of the power straight ahead at 20 m/s, m.
 fn wall_ahead_m(config: &MaskingConfig) -> f32 {
     let raster = RasterConfig {
         n: 401,
@@ -58,16 +58,16 @@ fn wall_ahead_m(config: &MaskingConfig) -> f32 {
 }
 
 #[test]
-fn rasters_keep_the_doppler_shift_unless_it_is_to_be_compensated() {
+fn rasters_keep_the_doppler_shift_unless_compensation_is_configured() {
     let kept = wall_ahead_m(&MaskingConfig::default());
-    let undone = wall_ahead_m(&MaskingConfig {
+    let compensated = wall_ahead_m(&MaskingConfig {
         undo_doppler: true,
         ..MaskingConfig::default()
     });
     assert!((kept - 40.0).abs() < 0.1, "{kept}");
     assert!(
-        (undone - kept - 0.04 * 20.0).abs() < 0.02,
-        "{undone}, {kept} with the shift"
+        (compensated - kept - 0.04 * 20.0).abs() < 0.02,
+        "{compensated}, {kept} with the shift"
     );
 }
 

@@ -1,18 +1,18 @@
-//! Learned masks beside the same arithmetic by hand.
+//! Learned masks against a reference computation of the same networks.
 
 #![allow(clippy::unwrap_used)]
 
 mod common;
 
 use common::{
-    N, assert_masked, blank, card, learned, masker, masks_by_hand, raster, runtime_is_installed,
+    N, assert_masked, blank, card, learned, masker, raster, reference_masks, runtime_is_installed,
     scan, sweep, unlearned, unmasked,
 };
 use gyre_geometry::SparsePoint;
 use gyre_masking::{MaskError, Masker, MaskingConfig, Sweep, network::Network};
 use ndarray::{Array2, Axis};
 
-/// The rasters of a sweep and of the one that it follows, as a mask that looks at both leaves them.
+/// Masks the rasters of a sweep and of the one that it follows with a mask that takes both.
 fn masked_pair(masker: &mut Masker, sweep: &Sweep<'_>, follows: Option<u64>) -> [Array2<f32>; 2] {
     let (mut later, mut earlier) = (blank(), blank());
     masker
@@ -38,25 +38,26 @@ fn a_raster_is_multiplied_by_the_networks_mask_of_it() {
         assert_masked(
             &out,
             &raster,
-            &masks_by_hand(std::slice::from_ref(&raster))[0],
+            &reference_masks(std::slice::from_ref(&raster))[0],
         );
     }
 }
 
 #[test]
-fn a_network_that_looks_at_two_scans_masks_both_for_this_pair() {
+fn a_network_of_two_scans_masks_both_for_this_pair() {
     if !runtime_is_installed() {
         return;
     }
     let mut masker = masker(&learned(&card("pair-31")));
     assert_eq!(masker.scans(), 2);
     let scans = [0, 1, 2].map(scan);
-    masker.remember(&sweep(0, &scans[0])).unwrap();
+    masker.set_previous(&sweep(0, &scans[0])).unwrap();
     for later in 1..3 {
-        let [before, now] = [later - 1, later].map(|number| sweep(number as u64, &scans[number]));
-        let masked = masked_pair(&mut masker, &now, Some(before.number));
-        let rasters = [unmasked(&now), unmasked(&before)];
-        let masks = masks_by_hand(&rasters);
+        let [previous, current] =
+            [later - 1, later].map(|number| sweep(number as u64, &scans[number]));
+        let masked = masked_pair(&mut masker, &current, Some(previous.number));
+        let rasters = [unmasked(&current), unmasked(&previous)];
+        let masks = reference_masks(&rasters);
         for (masked, (raster, mask)) in masked.iter().zip(rasters.iter().zip(&masks)) {
             assert_masked(masked, raster, mask);
         }
@@ -64,14 +65,14 @@ fn a_network_that_looks_at_two_scans_masks_both_for_this_pair() {
 }
 
 #[test]
-fn where_the_chain_starts_a_scan_is_its_own_scan_before() {
+fn the_first_scan_of_a_chain_is_its_own_previous_scan() {
     if !runtime_is_installed() {
         return;
     }
     let (scan, mut masker) = (scan(0), masker(&learned(&card("pair-31"))));
     let [alone, _] = masked_pair(&mut masker, &sweep(0, &scan), None);
     let raster = unmasked(&sweep(0, &scan));
-    let masks = masks_by_hand(&[raster.clone(), raster.clone()]);
+    let masks = reference_masks(&[raster.clone(), raster.clone()]);
     assert_masked(&alone, &raster, &masks[0]);
 }
 
@@ -87,13 +88,13 @@ fn a_restarted_masker_makes_the_same_bits() {
     masked_pair(&mut old, &first, None);
     masked_pair(&mut old, &second, Some(0));
     let undisturbed = masked_pair(&mut old, &third, Some(1));
-    assert!(old.remembers(2) && !new.remembers(1));
-    new.remember(&second).unwrap();
+    assert!(old.can_follow(2) && !new.can_follow(1));
+    new.set_previous(&second).unwrap();
     assert_eq!(undisturbed, masked_pair(&mut new, &third, Some(1)));
 }
 
 #[test]
-fn a_scan_before_that_is_not_remembered_is_an_error() {
+fn a_missing_previous_scan_is_an_error() {
     if !runtime_is_installed() {
         return;
     }
@@ -105,7 +106,7 @@ fn a_scan_before_that_is_not_remembered_is_an_error() {
         later.view_mut(),
         Some(earlier.view_mut()),
     );
-    assert!(matches!(masked, Err(MaskError::ScanBefore(7))));
+    assert!(matches!(masked, Err(MaskError::MissingPrevious(7))));
 }
 
 #[test]
@@ -129,7 +130,7 @@ fn the_same_scans_give_the_same_bits_with_any_number_of_threads() {
 }
 
 #[test]
-fn points_are_weighed_by_the_masks_of_their_cells() {
+fn points_are_weighted_by_the_masks_of_their_cells() {
     if !runtime_is_installed() {
         return;
     }
@@ -147,17 +148,17 @@ fn points_are_weighed_by_the_masks_of_their_cells() {
         points
     };
     for (model, scans) in [("single-31", 1), ("pair-31", 2)] {
-        let weighed = points(&learned(&card(model)));
+        let weighted = points(&learned(&card(model)));
         let plain = points(&MaskingConfig {
             point_exponent: 0.0,
             ..learned(&card(model))
         });
         assert_eq!(plain, points(&unlearned()));
-        assert_eq!(weighed.len(), plain.len());
-        let mask = &masks_by_hand(&vec![unmasked(&sweep); scans])[0];
+        assert_eq!(weighted.len(), plain.len());
+        let mask = &reference_masks(&vec![unmasked(&sweep); scans])[0];
         let index = |metres: f32| (N as f32 / 2.0 - metres / 0.8).floor();
         let mut inside = 0;
-        for (weighed, plain) in weighed.iter().zip(&plain) {
+        for (weighted, plain) in weighted.iter().zip(&plain) {
             let (row, column) = (index(plain.x_m), index(plain.y_m));
             let is_inside = row.min(column) >= 0.0 && row.max(column) < N as f32;
             let factor = if is_inside {
@@ -166,8 +167,8 @@ fn points_are_weighed_by_the_masks_of_their_cells() {
                 1.0
             };
             assert!(
-                (weighed.weight - factor * plain.weight).abs() < 1e-5,
-                "{weighed:?}, {plain:?}"
+                (weighted.weight - factor * plain.weight).abs() < 1e-5,
+                "{weighted:?}, {plain:?}"
             );
             inside += usize::from(is_inside);
         }

@@ -1,4 +1,4 @@
-//! The models of `models/`: their files are those of their cards, and ONNX Runtime takes them.
+//! The models of `models/`: their files have the checksums of their cards, and ONNX Runtime loads them.
 
 #![allow(clippy::unwrap_used)]
 

@@ -1,4 +1,4 @@
-//! Counts of heap allocations, so that "`process` allocates nothing" is measured and not claimed.
+//! Counts of heap allocations, to measure that `process` does not allocate.
 
 use std::{
     alloc::{GlobalAlloc, Layout, System},
@@ -9,8 +9,8 @@ thread_local! {
     static COUNT: Cell<u64> = const { Cell::new(0) };
 }
 
-/// The system's allocator, counting the allocations of each thread. A program has its stages' allocations counted by
-/// making this its global allocator:
+/// The system allocator with a count of the allocations of each thread. A program that makes it its global allocator has the
+/// allocations of its stages counted:
 ///
 /// ```
 /// #[global_allocator]
@@ -21,11 +21,11 @@ thread_local! {
 pub struct CountingAllocator;
 
 fn count() {
-    // A thread that is being torn down has no counter any more.
+    // A thread that is being torn down has no counter.
     let _ = COUNT.try_with(|count| count.set(count.get() + 1));
 }
 
-// SAFETY: every call goes to the system's allocator unchanged; counting neither allocates nor panics.
+// SAFETY: every call is forwarded to the system allocator unchanged; counting neither allocates nor panics.
 unsafe impl GlobalAlloc for CountingAllocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count();
@@ -47,14 +47,14 @@ unsafe impl GlobalAlloc for CountingAllocator {
     }
 }
 
-/// Allocations of this thread so far; 0 where they are not counted.
+/// Returns the number of allocations of this thread; 0 if they are not counted.
 pub(crate) fn so_far() -> u64 {
     COUNT.with(Cell::get)
 }
 
-/// Whether this program counts its allocations.
+/// Returns whether this program counts its allocations.
 pub(crate) fn are_counted() -> bool {
-    // A stage has allocated long before its first item.
+    // Every stage allocates before its first item.
     so_far() > 0
 }
 
@@ -66,7 +66,7 @@ mod tests {
     static ALLOCATOR: CountingAllocator = CountingAllocator;
 
     #[test]
-    fn an_allocation_is_counted_once_and_its_end_is_not() {
+    fn an_allocation_is_counted_once_and_its_release_is_not() {
         let before = so_far();
         drop(std::hint::black_box(Box::new(7)));
         assert_eq!(so_far() - before, 1);

@@ -1,43 +1,43 @@
-//! Counters of a stage's own work.
+//! The counters of a stage.
 
 use serde::{Deserialize, Serialize};
 
 use crate::allocations;
 
-/// What one process of a stage counted, from its start to its orderly end.
+/// Counters of one process of a stage, from its start to its clean exit.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StageCounters {
     /// Items processed.
     pub processed: u64,
-    /// Heap allocations in `process` after its first five items; `None` where the program does not count them
+    /// Heap allocations in `process` after its first five items; `None` if the program does not count them
     /// (see [`CountingAllocator`](crate::CountingAllocator)).
     pub allocations_after_five: Option<u64>,
     /// Heap allocations in `process` during its first five items.
     pub allocations_in_first_five: Option<u64>,
-    /// Items that came twice and were skipped: they had been sent before a neighbour's restart.
+    /// Items that were received twice and skipped, because a restarted publisher sent them again.
     pub duplicates: u64,
-    /// Times that the process woke up.
+    /// Number of wake-ups.
     pub wakes: u64,
-    /// Wake-ups that were lost and caught by the longest wait.
+    /// Lost wake-ups: input was found only after the longest wait.
     pub wakes_caught_late: u64,
-    /// Scans that could not be read and were left out (the source).
+    /// Scans that could not be read and were skipped (source only).
     pub unreadable: u64,
-    /// Time by which a simulation in live mode fell behind the rate, since it is rendered more slowly, ns (the source).
+    /// Delay of a simulation in live mode that is rendered more slowly than its rate, ns (source only).
     pub slipped_ns: u64,
     /// Time spent in `process`, ns.
     pub busy_ns: u64,
 }
 
-/// The file that a stage leaves its counters in, in the run's root.
+/// Returns the name of the file in the run's root to which a stage writes its counters.
 pub(crate) fn file_name(stage: &str) -> String {
     format!("{stage}.counters.json")
 }
 
-/// Items that may allocate: buffers grow while the first few are processed.
+/// Items that may allocate, since buffers grow at first.
 const WARM_UP: u64 = 5;
 
 impl StageCounters {
-    /// Counts one item's work.
+    /// Counts the work on one item.
     pub(crate) fn record(&mut self, allocations: u64, busy_ns: i64) {
         if allocations::are_counted() {
             let count = match self.processed < WARM_UP {

@@ -1,79 +1,79 @@
-//! Errors that end a stage.
+//! The errors that end a stage.
 
 use std::{fmt::Debug, path::PathBuf};
 
 use thiserror::Error;
 
-/// Why a stage ended. Its exit code tells the supervisor whether starting it again can help.
+/// An error that ends a stage. The exit code tells the supervisor whether a restart can help.
 #[derive(Debug, Error)]
 pub enum StageError {
-    /// Started by hand.
+    /// The process was started outside of a run.
     #[error(
-        "this is one process of a run, and GYRE_RUN, which names the run, is not set: start it with `gyre run CONFIG`"
+        "this is one process of a run, and GYRE_RUN is not set: start the run with `gyre run CONFIG`"
     )]
     NoRun {
-        /// Which stage.
+        /// The stage.
         stage: String,
     },
-    /// The run's own files cannot be read.
+    /// The files of the run cannot be read.
     #[error("cannot read {path}: {reason}; is the run still there?")]
     Manifest {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What was wrong with it.
+        /// The reason.
         reason: String,
     },
-    /// The configuration does not do.
+    /// The configuration is invalid.
     #[error("{0}")]
     Configuration(String),
-    /// The input cannot be used, however often one tries.
+    /// The input cannot be used, and a restart would not change that.
     #[error("{0}")]
     Input(String),
     /// The transport failed; a restart usually helps.
     #[error("cannot {action}: {reason}")]
     Transport {
-        /// What was tried.
+        /// The operation.
         action: String,
-        /// What the transport said.
+        /// The transport's error.
         reason: String,
     },
-    /// An item is missing: it has been overwritten, or was never sent.
+    /// An item is missing: it was overwritten or never sent.
     #[error("topic `{topic}`: expected item {expected}, but got {got}")]
     SequenceGap {
-        /// On which topic.
+        /// The topic.
         topic: &'static str,
-        /// The number that had to come.
+        /// The expected sequence number.
         expected: u64,
-        /// The number that came.
+        /// The received sequence number.
         got: u64,
     },
-    /// A message does not keep its contract.
+    /// A message violates its contract.
     #[error("topic `{topic}`, item {seq}: {reason}")]
     Malformed {
-        /// On which topic.
+        /// The topic.
         topic: &'static str,
-        /// Which item.
+        /// The sequence number.
         seq: u64,
-        /// What is wrong with it.
+        /// The violation.
         reason: String,
     },
-    /// A file of the run.
+    /// A file of the run cannot be read or written.
     #[error("{path}: {source}")]
     File {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What the operating system said.
+        /// The system error.
         source: std::io::Error,
     },
 }
 
 impl StageError {
-    /// Exit code of a stage that a restart can heal.
-    pub const RESTART: u8 = 3;
-    /// Exit code of a stage that would fail the same way again.
-    pub const HOPELESS: u8 = 2;
+    /// Exit code after an error that a restart may resolve.
+    pub const TRANSIENT: u8 = 3;
+    /// Exit code after an error that would occur again.
+    pub const PERMANENT: u8 = 2;
 
-    /// A failure of the transport.
+    /// Creates an error of the transport.
     pub(crate) fn transport(action: impl Into<String>, reason: impl Debug) -> Self {
         Self::Transport {
             action: action.into(),
@@ -81,11 +81,11 @@ impl StageError {
         }
     }
 
-    /// What the process exits with.
+    /// Returns the exit code of the process.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Transport { .. } | Self::SequenceGap { .. } => Self::RESTART,
-            _ => Self::HOPELESS,
+            Self::Transport { .. } | Self::SequenceGap { .. } => Self::TRANSIENT,
+            _ => Self::PERMANENT,
         }
     }
 }

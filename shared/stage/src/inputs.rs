@@ -1,4 +1,4 @@
-//! The inputs of a stage: pairs of consecutive items, alone or joined with another topic.
+//! The inputs of a stage: pairs of consecutive items of one topic, alone or joined with another topic.
 
 use gyre_messages::{Item, Masked, Message, Pair, flag};
 
@@ -8,43 +8,43 @@ use crate::{
     services::Listener,
 };
 
-/// What to do next.
+/// The next action of a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Turn {
-    /// Something is missing: sleep until it comes.
+pub enum Action {
+    /// Wait: an input is missing.
     Wait,
-    /// The item at hand serves only as the one before: step past it and send nothing.
+    /// Keep the current item only as the previous one of the next: advance and publish nothing.
     Keep,
-    /// All is there: work on this item, which was complete at the given time (`CLOCK_MONOTONIC`, ns).
+    /// Process this item, the last input of which was received at the given time (`CLOCK_MONOTONIC`, ns).
     Process(Item, i64),
-    /// The stream ends here: pass it on.
+    /// Pass on the end of the stream.
     End(Item),
 }
 
 /// The inputs of a stage.
 pub trait Inputs: Sized {
-    /// What `process` sees.
+    /// The inputs of one item.
     type View<'a>
     where
         Self: 'a;
 
-    /// Opens them.
+    /// Opens the topics.
     ///
     /// # Errors
     /// A failure of the transport.
     fn open(launch: &Launch) -> Result<Self, StageError>;
-    /// Takes what has come and says what to do next.
+    /// Reads the queues and returns what to do next.
     ///
     /// # Errors
-    /// A failure of the transport, a missing item.
-    fn turn(&mut self) -> Result<Turn, StageError>;
-    /// The inputs of the item that [`Turn::Process`] named.
+    /// A failure of the transport, a sequence gap.
+    fn next_action(&mut self) -> Result<Action, StageError>;
+    /// Returns the inputs of the item of [`Action::Process`].
     fn view(&self) -> Option<Self::View<'_>>;
-    /// Steps to the next item.
+    /// Advances to the next item.
     fn advance(&mut self);
-    /// What the publishers notify.
+    /// Returns the listeners that the publishers notify.
     fn listeners(&self) -> Vec<&Listener>;
-    /// Items skipped because they had been received before.
+    /// Returns the number of items that were skipped because they had been received before.
     fn duplicates(&self) -> u64;
 }
 
@@ -53,31 +53,34 @@ pub struct Pairs<M: Message> {
     reader: Reader<M>,
 }
 
-/// See [`Pairs`].
+/// A view of [`Pairs`].
 pub struct PairView<'a, M: Message> {
     /// The current item.
     pub current: &'a Received<M>,
-    /// The one before; `None` where the chain starts.
-    pub before: Option<&'a Received<M>>,
+    /// The previous item; `None` where the chain starts.
+    pub previous: Option<&'a Received<M>>,
 }
 
 impl<M: Message> PairView<'_, M> {
-    /// Time between the two scans, ns on the sensor's clock; 0 where the chain starts.
+    /// Returns the time between the two scans, ns on the sensor's clock; 0 where the chain starts.
     pub fn interval_ns(&self) -> i64 {
         let stamp_ns = self.current.item().stamp_ns;
-        self.before
-            .map_or(0, |before| stamp_ns.saturating_sub(before.item().stamp_ns))
+        self.previous.map_or(0, |previous| {
+            stamp_ns.saturating_sub(previous.item().stamp_ns)
+        })
     }
 }
 
 impl PairView<'_, Masked> {
-    /// The rasters to match.
+    /// Returns the rasters to match.
     ///
     /// # Errors
     /// A payload that is shorter than its header says.
     pub fn rasters(&self) -> Result<Pair<'_>, StageError> {
-        let before = self.before.map(|before| (before.header(), before.values()));
-        let pair = self.current.header().pair(self.current.values(), before);
+        let previous = self
+            .previous
+            .map(|previous| (previous.header(), previous.values()));
+        let pair = self.current.header().pair(self.current.values(), previous);
         pair.ok_or_else(|| {
             self.current
                 .malformed("its rasters do not fit their headers")
@@ -94,18 +97,22 @@ impl<M: Message> Inputs for Pairs<M> {
         })
     }
 
-    fn turn(&mut self) -> Result<Turn, StageError> {
+    fn next_action(&mut self) -> Result<Action, StageError> {
         let Some(head) = self.reader.head()? else {
-            return Ok(Turn::Wait);
+            return Ok(Action::Wait);
         };
         let (item, received_ns) = (*head.item(), head.received_ns);
-        Ok(turn_of(&item, self.reader.before().is_some(), received_ns))
+        Ok(action_for(
+            &item,
+            self.reader.previous().is_some(),
+            received_ns,
+        ))
     }
 
     fn view(&self) -> Option<PairView<'_, M>> {
         Some(PairView {
             current: self.reader.current()?,
-            before: self.reader.before(),
+            previous: self.reader.previous(),
         })
     }
 
@@ -122,17 +129,17 @@ impl<M: Message> Inputs for Pairs<M> {
     }
 }
 
-/// Two consecutive items of one topic, and the item of another topic that belongs to the later one.
+/// Two consecutive items of one topic, and the item of another topic for the later one.
 pub struct Joined<A: Message, B: Message> {
     pairs: Reader<A>,
     other: Reader<B>,
 }
 
-/// See [`Joined`].
+/// A view of [`Joined`].
 pub struct JoinedView<'a, A: Message, B: Message> {
-    /// The current item of the first topic and the one before.
+    /// The current and the previous item of the first topic.
     pub pair: PairView<'a, A>,
-    /// The other topic's message for the current item.
+    /// The message of the other topic for the current item.
     pub other: &'a Received<B>,
 }
 
@@ -146,25 +153,29 @@ impl<A: Message, B: Message> Inputs for Joined<A, B> {
         })
     }
 
-    fn turn(&mut self) -> Result<Turn, StageError> {
+    fn next_action(&mut self) -> Result<Action, StageError> {
         loop {
             let (Some(a), Some(b)) = (self.pairs.head()?, self.other.head()?) else {
-                return Ok(Turn::Wait);
+                return Ok(Action::Wait);
             };
             let (item, other) = (*a.item(), *b.item());
             let received_ns = a.received_ns.max(b.received_ns);
             if item.seq < other.seq {
-                return Ok(Turn::Keep);
+                return Ok(Action::Keep);
             }
             if item.seq == other.seq {
-                // The later input has all stamps so far.
+                // The message from further down the stream has more time stamps.
                 let item = Item {
                     hops: other.hops,
                     ..item
                 };
-                return Ok(turn_of(&item, self.pairs.before().is_some(), received_ns));
+                return Ok(action_for(
+                    &item,
+                    self.pairs.previous().is_some(),
+                    received_ns,
+                ));
             }
-            // After a restart the other topic's history may reach further back; its items alone are of no use.
+            // After a restart the history of the other topic may reach further back; its items are of no use alone.
             self.other.release();
         }
     }
@@ -173,7 +184,7 @@ impl<A: Message, B: Message> Inputs for Joined<A, B> {
         Some(JoinedView {
             pair: PairView {
                 current: self.pairs.current()?,
-                before: self.pairs.before(),
+                previous: self.pairs.previous(),
             },
             other: self.other.current()?,
         })
@@ -199,12 +210,12 @@ impl<A: Message, B: Message> Inputs for Joined<A, B> {
     }
 }
 
-/// The first item can be worked on only with the one before it, unless the chain starts there.
-fn turn_of(item: &Item, has_before: bool, received_ns: i64) -> Turn {
+/// An item can be processed only with the previous one, unless the chain starts there.
+fn action_for(item: &Item, has_previous: bool, received_ns: i64) -> Action {
     match () {
-        () if item.is(flag::END) => Turn::End(*item),
-        () if has_before || item.is(flag::BREAK) => Turn::Process(*item, received_ns),
-        () => Turn::Keep,
+        () if item.is(flag::END) => Action::End(*item),
+        () if has_previous || item.is(flag::BREAK) => Action::Process(*item, received_ns),
+        () => Action::Keep,
     }
 }
 
@@ -213,22 +224,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_item_without_the_one_before_is_only_kept_unless_the_chain_starts_there() {
+    fn an_item_without_a_previous_one_is_only_kept_unless_the_chain_starts_there() {
         let item = Item {
             seq: 7,
             ..Item::default()
         };
-        assert_eq!(turn_of(&item, false, 1), Turn::Keep);
-        assert_eq!(turn_of(&item, true, 1), Turn::Process(item, 1));
+        assert_eq!(action_for(&item, false, 1), Action::Keep);
+        assert_eq!(action_for(&item, true, 1), Action::Process(item, 1));
         let start = Item {
             flags: flag::BREAK,
             ..item
         };
-        assert_eq!(turn_of(&start, false, 1), Turn::Process(start, 1));
+        assert_eq!(action_for(&start, false, 1), Action::Process(start, 1));
         let end = Item {
             flags: flag::END,
             ..item
         };
-        assert_eq!(turn_of(&end, true, 1), Turn::End(end));
+        assert_eq!(action_for(&end, true, 1), Action::End(end));
     }
 }

@@ -1,4 +1,4 @@
-//! How a process of a run starts and ends.
+//! Start and end of a process of a run.
 
 use std::{
     fs::{self, OpenOptions},
@@ -17,13 +17,13 @@ use crate::{
     wake::Signals,
 };
 
-/// What a stage has to work with: its run, its configuration, its place in the transport.
+/// The environment of a stage: its run, its configuration, and its node in the transport.
 pub struct Launch {
-    /// Which stage this is.
+    /// The name of the stage.
     pub name: String,
-    /// The run.
+    /// The manifest of the run.
     pub manifest: Manifest,
-    /// SIGTERM and SIGINT, as something to wait for.
+    /// The signals that the process waits for.
     pub signals: Signals,
     configuration: toml::Table,
     pub(crate) node: Node,
@@ -32,11 +32,14 @@ pub struct Launch {
 
 impl Launch {
     /// Joins the run that [`run::ENVIRONMENT`] names.
+    ///
+    /// # Errors
+    /// No run is named, its files cannot be read, or the transport fails.
     pub fn from_environment(name: &str) -> Result<Self, StageError> {
         let root = std::env::var_os(run::ENVIRONMENT).ok_or_else(|| StageError::NoRun {
             stage: name.to_owned(),
         })?;
-        // Where a shell stands between us and the supervisor, this takes us down with the shell.
+        // If a shell is between this process and the supervisor, the process ends with the shell.
         let _ = set_parent_process_death_signal(Some(Signal::KILL));
         let manifest = Manifest::read(&PathBuf::from(root))?;
         let log = start_log(&manifest, name)?;
@@ -63,7 +66,10 @@ impl Launch {
         })
     }
 
-    /// A section of the run's configuration; its defaults where the section is missing.
+    /// Returns a section of the run's configuration, or its defaults if the section is missing.
+    ///
+    /// # Errors
+    /// A key or value that the section does not allow.
     pub fn section<T: DeserializeOwned>(&self, section: &str) -> Result<T, StageError> {
         let table = self
             .configuration
@@ -78,12 +84,12 @@ impl Launch {
         })
     }
 
-    /// Whether the run's configuration has a section.
+    /// Returns whether the run's configuration has a section.
     pub fn has_section(&self, section: &str) -> bool {
         self.configuration.contains_key(section)
     }
 
-    fn leave_statistics(&self, counters: &StageCounters) -> Result<(), StageError> {
+    fn write_counters(&self, counters: &StageCounters) -> Result<(), StageError> {
         let path = self.manifest.root.join(counters::file_name(&self.name));
         let text = serde_json::to_string(counters)
             .map_err(|e| StageError::Configuration(e.to_string()))?;
@@ -91,7 +97,7 @@ impl Launch {
     }
 }
 
-/// The `main` of every stage: joins the run, works until the end, says in one sentence what went wrong.
+/// Runs a stage as the `main` of its process: joins the run, works until its end, and prints an error as one sentence.
 pub fn main(
     name: &str,
     work: impl FnOnce(&Launch) -> Result<StageCounters, StageError>,
@@ -99,7 +105,7 @@ pub fn main(
     let result = Launch::from_environment(name).and_then(|launch| {
         tracing::debug!(pid = std::process::id(), "started");
         let counters = work(&launch)?;
-        launch.leave_statistics(&counters)
+        launch.write_counters(&counters)
     });
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -111,7 +117,8 @@ pub fn main(
     }
 }
 
-/// All processes append to one `log.jsonl`, a line an event. Each line names its process while what is returned lives.
+/// Starts logging to `log.jsonl`, to which all processes append one line per event. While the returned span lives, each line
+/// carries the name of the stage.
 fn start_log(manifest: &Manifest, name: &str) -> Result<EnteredSpan, StageError> {
     let path = manifest.out.join("log.jsonl");
     let file = OpenOptions::new()
@@ -125,7 +132,7 @@ fn start_log(manifest: &Manifest, name: &str) -> Result<EnteredSpan, StageError>
         .json()
         .with_env_filter(filter)
         .with_writer(Mutex::new(file));
-    // A second log in one process (tests) keeps the first.
+    // A second call in one process (tests) keeps the first log.
     let _ = log.try_init();
     Ok(tracing::error_span!("process", stage = name).entered())
 }

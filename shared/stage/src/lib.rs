@@ -1,21 +1,21 @@
-//! All of Gyre's inter-process communication. Only this crate and the wire types know the transport.
+//! All inter-process communication of Gyre. Only this crate and the wire types depend on the transport (iceoryx2).
 //!
 //! Reading order:
 //!
-//! 1. [`run`]: what a process reads of its run, and where a run's files lie.
+//! 1. [`run`]: the manifest that a process reads, and the files of a run.
 //! 2. [`launch`]: how a process starts and ends: configuration, log, signals, exit codes.
-//! 3. [`writer`], [`reader`]: the two ends of a topic, with the handshake that gives a new reader the history.
-//! 4. [`wake`]: how a process sleeps until there is something to do.
-//! 5. [`source`], [`stage`], [`sink`]: the loops of the first, the middle and the last process; [`inputs`] says what a
-//!    middle one waits for.
-//! 6. [`supervise`]: starts the processes, restarts those that die, leaves nothing behind.
+//! 3. [`writer`], [`reader`]: publisher and subscriber of a topic, with the handshake that gives a new reader the history.
+//! 4. [`wake`]: how a process sleeps until there is work.
+//! 5. [`source`], [`stage`], [`sink`]: the loops of the first, the middle and the last processes; [`inputs`]: what a middle
+//!    process waits for.
+//! 6. [`supervise`]: starts the processes, restarts dead ones, removes all resources at the end.
 //!
-//! The protocol in one paragraph: items carry consecutive numbers. The source may have W of them in flight; a pose is the
-//! credit for one more. A stage is a function of its inputs, and a publisher keeps the last few items for readers that come
-//! later, so a restarted stage processes its upstream's history again and its readers skip what they have had. A stage that
-//! owns state writes it to a file before it publishes; the sink starts by publishing its last poses again.
+//! The protocol in one paragraph: items carry consecutive sequence numbers. The source may have W of them in flight; each pose
+//! is the credit for one more. A stage is a function of its inputs, and a publisher keeps a history for late readers. So a
+//! restarted stage processes the history of its inputs again, and its readers skip duplicates. A stage with state writes it to a
+//! file before it publishes; the sink starts by publishing its last poses again.
 
-// Mapping shared memory, borrowing raw descriptors and preparing a child process need `unsafe`; each use gives its reason.
+// Shared memory, raw file descriptors and `pre_exec` need `unsafe`; each use states why it is sound.
 #![allow(unsafe_code)]
 
 mod allocations;

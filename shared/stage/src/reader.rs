@@ -1,4 +1,4 @@
-//! The receiving end of a topic: raw, or in order.
+//! The subscriber of a topic: the raw queue, or its items in order.
 
 use bytemuck::Pod;
 use gyre_messages::{Header, Item, Message};
@@ -12,30 +12,30 @@ use crate::{
     services::{self, Ipc, Listener, Node, Notifier},
 };
 
-/// A message in shared memory, borrowed from its publisher until this is dropped.
+/// A message in shared memory, borrowed from its publisher until it is dropped.
 pub struct Received<M: Message> {
     sample: Sample<Ipc, [M::Element], M::Header>,
-    /// When it was taken from the queue, `CLOCK_MONOTONIC`, ns.
+    /// Time at which it was taken from the queue, `CLOCK_MONOTONIC`, ns.
     pub received_ns: i64,
 }
 
 impl<M: Message> Received<M> {
-    /// The header.
+    /// Returns the header.
     pub fn header(&self) -> &M::Header {
         self.sample.user_header()
     }
 
-    /// Which scan this is about.
+    /// Returns the scan that the message is about.
     pub fn item(&self) -> &Item {
         self.header().item()
     }
 
-    /// The payload's values, where the publisher wrote them.
+    /// Returns the values of the payload, in the publisher's memory.
     pub fn values<T: Pod>(&self) -> &[T] {
         bytemuck::cast_slice(self.sample.payload())
     }
 
-    /// An error that names this message.
+    /// Creates an error that names this message.
     pub fn malformed(&self, reason: impl Into<String>) -> StageError {
         StageError::Malformed {
             topic: M::TOPIC,
@@ -45,7 +45,7 @@ impl<M: Message> Received<M> {
     }
 }
 
-/// A topic's queue as it comes.
+/// The raw queue of a topic.
 pub struct Port<M: Message> {
     subscriber: Subscriber<Ipc, [M::Element], M::Header>,
     data: Listener,
@@ -53,7 +53,7 @@ pub struct Port<M: Message> {
 }
 
 impl<M: Message> Port<M> {
-    /// Opens the topic of a run for reading and notifies its publisher, which answers with its history.
+    /// Subscribes to the topic and notifies its publisher, which answers with its history.
     ///
     /// # Errors
     /// A failure of the transport.
@@ -78,14 +78,17 @@ impl<M: Message> Port<M> {
         })
     }
 
-    /// The next message in the queue.
+    /// Receives the next message; `None` if the queue is empty.
+    ///
+    /// # Errors
+    /// A failure of the transport.
     pub fn receive(&self) -> Result<Option<Received<M>>, StageError> {
         match self.subscriber.receive() {
             Ok(sample) => Ok(sample.map(|sample| Received {
                 sample,
                 received_ns: clock::now_ns(),
             })),
-            // Samples of a dead publisher are still borrowed: some are released first, then this is tried again.
+            // Samples of a dead publisher are still borrowed. The next call succeeds once they are released.
             Err(ReceiveError::ExceedsMaxBorrows) => Ok(None),
             Err(error) => Err(StageError::transport(
                 format!("receive {}", M::TOPIC),
@@ -94,23 +97,23 @@ impl<M: Message> Port<M> {
         }
     }
 
-    /// What the publisher notifies.
+    /// Returns the listener that the publisher notifies.
     pub fn listener(&self) -> &Listener {
         &self.data
     }
 }
 
-/// A topic's items in their order, each once: the one at hand and the one before it.
+/// The items of a topic in order, each once: the current and the previous one.
 pub struct Reader<M: Message> {
     port: Port<M>,
     next: Option<u64>,
     head: Option<Received<M>>,
-    before: Option<Received<M>>,
+    previous: Option<Received<M>>,
     duplicates: u64,
 }
 
 impl<M: Message> Reader<M> {
-    /// Opens the topic; `next` is the first item wanted, or whatever comes first.
+    /// Subscribes to the topic. `next` is the first item wanted; `None` takes whichever arrives first.
     ///
     /// # Errors
     /// A failure of the transport.
@@ -123,13 +126,15 @@ impl<M: Message> Reader<M> {
             port: Port::on(node)?,
             next,
             head: None,
-            before: None,
+            previous: None,
             duplicates: 0,
         })
     }
 
-    /// The item at hand, taken from the queue if need be. Items that were had before are skipped;
-    /// a missing one is an error, since queues are sized so that none can be lost.
+    /// Returns the current item and receives it first if necessary. Duplicates are skipped.
+    ///
+    /// # Errors
+    /// A failure of the transport; a sequence gap, since queues are sized so that no item can be lost.
     pub fn head(&mut self) -> Result<Option<&Received<M>>, StageError> {
         while self.head.is_none() {
             let Some(received) = self.port.receive()? else {
@@ -151,39 +156,39 @@ impl<M: Message> Reader<M> {
         Ok(self.head.as_ref())
     }
 
-    /// The item at hand, if it has been taken from the queue.
+    /// Returns the current item if it has been received.
     pub fn current(&self) -> Option<&Received<M>> {
         self.head.as_ref()
     }
 
-    /// The item before the one at hand, while the chain is unbroken.
-    pub fn before(&self) -> Option<&Received<M>> {
-        let (before, head) = (self.before.as_ref()?, self.head.as_ref()?);
-        let follows = head.item().seq.checked_sub(1) == Some(before.item().seq)
+    /// Returns the previous item if the chain is unbroken.
+    pub fn previous(&self) -> Option<&Received<M>> {
+        let (previous, head) = (self.previous.as_ref()?, self.head.as_ref()?);
+        let follows = head.item().seq.checked_sub(1) == Some(previous.item().seq)
             && !head.item().is(gyre_messages::flag::BREAK);
-        follows.then_some(before)
+        follows.then_some(previous)
     }
 
-    /// Done with the item at hand: it becomes the one before.
+    /// Makes the current item the previous one.
     pub fn advance(&mut self) {
         if let Some(head) = self.head.take() {
             self.next = Some(head.item().seq.saturating_add(1));
-            self.before = Some(head);
+            self.previous = Some(head);
         }
     }
 
-    /// Done with the item at hand, and nobody will ask for it as the one before.
+    /// Releases the current item without keeping it as the previous one.
     pub fn release(&mut self) {
         self.advance();
-        self.before = None;
+        self.previous = None;
     }
 
-    /// Items skipped because they had been had before.
+    /// Returns the number of items that were skipped because they had been received before.
     pub fn duplicates(&self) -> u64 {
         self.duplicates
     }
 
-    /// What the publisher notifies.
+    /// Returns the listener that the publisher notifies.
     pub fn listener(&self) -> &Listener {
         self.port.listener()
     }

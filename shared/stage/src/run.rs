@@ -1,7 +1,7 @@
-//! A run: its name, its files, and what each of its processes must know.
+//! A run: its name, its files, and the manifest that each of its processes reads.
 //!
-//! The run's root lies on tmpfs (`/dev/shm/gyre/<name>`): the transport's bookkeeping there makes recovery four times
-//! faster than on a disk. It holds the manifest, the resolved configuration and the transport's sockets, and goes with the run.
+//! The root of a run is on tmpfs (`/dev/shm/gyre/<name>`), where the transport's bookkeeping makes recovery four times faster
+//! than on a disk. It holds the manifest, the resolved configuration and the transport's sockets, and is removed at the end.
 
 use std::{
     fs::{self, File, Permissions},
@@ -18,37 +18,40 @@ use thiserror::Error;
 
 use crate::StageError;
 
-/// The environment variable that leads a stage to its run: the path of the run's root.
+/// The environment variable with the path of the run's root.
 pub const ENVIRONMENT: &str = "GYRE_RUN";
 const RUNS: &str = "/dev/shm/gyre";
 const SHARED_MEMORY: &str = "/dev/shm";
-/// Anybody's runs may be in it, and nobody removes another's.
-const FOR_ALL_USERS: u32 = 0o1777;
-const FOR_THE_OWNER: u32 = 0o700;
+/// All users may create runs, but only remove their own.
+const STICKY_FOR_ALL: u32 = 0o1777;
+const OWNER_ONLY: u32 = 0o700;
 
-/// What a process must know of its run.
+/// The properties of a run that its processes need.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Manifest {
-    /// Prefix of all the run's names in shared memory.
+    /// Prefix of all names of the run in shared memory.
     pub prefix: String,
-    /// The run's root.
+    /// The root of the run.
     pub root: PathBuf,
-    /// Where the results go.
+    /// The folder of the results.
     pub out: PathBuf,
-    /// How much may be on its way.
+    /// The window of scans in flight.
     pub window: Window,
-    /// The largest messages.
+    /// Sizes of the largest messages.
     pub limits: Limits,
-    /// Whether the newest scan wins; else every scan is processed.
+    /// True in live mode, which drops old scans; false in lossless mode, which processes every scan.
     pub live: bool,
-    /// Whether the run has a refinement: then poses are made of `refined`, else of `motion`.
+    /// True if the run has a refinement: poses are then composed of `refined`, else of `motion`.
     pub refines: bool,
-    /// How fast to play a recording: scans' own time divided by this; `None`: as fast as they are asked for.
+    /// Speed of playback relative to the sensor's clock; `None`: as fast as the window admits scans.
     pub rate: Option<f64>,
 }
 
 impl Manifest {
     /// Reads the manifest of the run at `root`.
+    ///
+    /// # Errors
+    /// A file that is missing or invalid.
     pub fn read(root: &Path) -> Result<Self, StageError> {
         let path = root.join("manifest.json");
         let failed = |reason: String| StageError::Manifest {
@@ -59,7 +62,10 @@ impl Manifest {
         serde_json::from_str(&text).map_err(|error| failed(error.to_string()))
     }
 
-    /// Writes the manifest, the resolved configuration and the transport's own configuration into the run's root.
+    /// Writes the manifest, the resolved configuration and the configuration of the transport into the run's root.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
     pub fn write(&self, configuration: &str) -> Result<(), StageError> {
         let transport = format!(
             "[global]\nroot-path = \"{}/\"\nprefix = \"{}\"\n\n\
@@ -82,7 +88,7 @@ impl Manifest {
         Ok(())
     }
 
-    /// The transport's configuration: names and paths of this run alone, and nobody but the supervisor cleans up.
+    /// Returns the configuration of the transport. Names and paths are unique to the run, and only the supervisor cleans up.
     pub(crate) fn transport(&self) -> Result<Config, StageError> {
         let mut config = Config::default();
         config.global.prefix = FileName::new(self.prefix.as_bytes())
@@ -98,7 +104,7 @@ impl Manifest {
     }
 }
 
-/// A run's place in shared memory, held by a lock as long as its supervisor lives. Dropping it removes all that the run left.
+/// The root of a run in shared memory, locked by its supervisor. Dropping it removes all files of the run.
 #[derive(Debug)]
 pub struct RunRoot {
     name: String,
@@ -106,10 +112,10 @@ pub struct RunRoot {
     _lock: File,
 }
 
-/// Why a run cannot have its place.
+/// An error in creating the root of a run.
 #[derive(Debug, Error)]
 pub enum RootError {
-    /// Another supervisor works on the same results.
+    /// Another run writes to the same results.
     #[error("another run is writing to {0}: wait for it, or choose another --out")]
     Busy(PathBuf),
     /// Shared memory cannot be used.
@@ -117,16 +123,19 @@ pub enum RootError {
         "cannot use {path} for the run's shared memory: {source}; Gyre needs a writable tmpfs at /dev/shm"
     )]
     Unusable {
-        /// Which path.
+        /// The path.
         path: PathBuf,
-        /// What the operating system said.
+        /// The system error.
         source: std::io::Error,
     },
 }
 
 impl RunRoot {
-    /// Takes the place of the run that writes to `out`; removes first what dead runs left.
-    pub fn take(out: &Path) -> Result<Self, RootError> {
+    /// Creates and locks the root of the run that writes to `out`, after removing the files of dead runs.
+    ///
+    /// # Errors
+    /// Another run writes to `out`, or shared memory cannot be used.
+    pub fn acquire(out: &Path) -> Result<Self, RootError> {
         let name = format!(
             "gyre{:010x}",
             hash(out.as_os_str().as_encoded_bytes()) & 0xff_ffff_ffff
@@ -136,10 +145,10 @@ impl RunRoot {
             path: path.clone(),
             source,
         };
-        let _alone = lock_all_runs().map_err(unusable)?;
-        sweep_dead_runs();
-        make_directory(Path::new(RUNS), FOR_ALL_USERS).map_err(unusable)?;
-        make_directory(&path, FOR_THE_OWNER).map_err(unusable)?;
+        let _exclusive = lock_all_runs().map_err(unusable)?;
+        remove_dead_runs();
+        make_directory(Path::new(RUNS), STICKY_FOR_ALL).map_err(unusable)?;
+        make_directory(&path, OWNER_ONLY).map_err(unusable)?;
         match try_lock(&path).map_err(unusable)? {
             Some(lock) => Ok(Self {
                 name,
@@ -150,12 +159,12 @@ impl RunRoot {
         }
     }
 
-    /// Prefix of the run's names in shared memory.
+    /// Returns the prefix of all names of the run in shared memory.
     pub fn prefix(&self) -> String {
         format!("{}_", self.name)
     }
 
-    /// The run's root.
+    /// Returns the path of the root.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -163,12 +172,12 @@ impl RunRoot {
 
 impl Drop for RunRoot {
     fn drop(&mut self) {
-        let _alone = lock_all_runs();
+        let _exclusive = lock_all_runs();
         remove_run(&self.name);
     }
 }
 
-/// Makes a directory, if it is not there yet, with just these permissions.
+/// Creates a directory with exactly these permissions unless it exists.
 fn make_directory(path: &Path, mode: u32) -> std::io::Result<()> {
     match fs::create_dir(path) {
         Ok(()) => fs::set_permissions(path, Permissions::from_mode(mode)),
@@ -190,16 +199,16 @@ fn try_lock(root: &Path) -> std::io::Result<Option<File>> {
     }
 }
 
-/// One supervisor at a time makes and removes runs, for some milliseconds: else one that is just being made, and has no owner
-/// yet, could be taken for dead.
+/// Lets one supervisor at a time create and remove runs. Otherwise a run that is being created, and is not locked yet, could be
+/// taken for dead.
 fn lock_all_runs() -> std::io::Result<File> {
-    let place = File::open(SHARED_MEMORY)?;
-    flock(&place, FlockOperation::LockExclusive)?;
-    Ok(place)
+    let directory = File::open(SHARED_MEMORY)?;
+    flock(&directory, FlockOperation::LockExclusive)?;
+    Ok(directory)
 }
 
-/// Removes what runs left whose supervisor was killed: their locks are free.
-fn sweep_dead_runs() {
+/// Removes runs whose supervisor was killed: their locks are free.
+fn remove_dead_runs() {
     let Ok(runs) = fs::read_dir(RUNS) else { return };
     for run in runs.flatten() {
         if matches!(try_lock(&run.path()), Ok(Some(_))) {
@@ -217,11 +226,11 @@ fn remove_run(name: &str) {
         ours.for_each(|file| drop(fs::remove_file(file.path())));
     }
     let _ = fs::remove_dir_all(Path::new(RUNS).join(name));
-    // Gone with the last run; stays while another one is there.
+    // Fails while there is another run.
     let _ = fs::remove_dir(RUNS);
 }
 
-/// FNV-1a: the same name for the same results every time, whatever the build.
+/// The FNV-1a hash, which names a run after its results independently of the build.
 fn hash(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
         (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3)
@@ -234,15 +243,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_run_has_its_place_alone_and_leaves_nothing() {
+    fn a_run_locks_its_root_and_removes_all_files() {
         let out = tempfile::tempdir().unwrap();
-        let root = RunRoot::take(out.path()).unwrap();
-        assert!(matches!(RunRoot::take(out.path()), Err(RootError::Busy(_))));
-        let segment = Path::new(SHARED_MEMORY).join(format!("{}left_over", root.prefix()));
+        let root = RunRoot::acquire(out.path()).unwrap();
+        assert!(matches!(
+            RunRoot::acquire(out.path()),
+            Err(RootError::Busy(_))
+        ));
+        let segment = Path::new(SHARED_MEMORY).join(format!("{}leftover", root.prefix()));
         fs::write(&segment, b"").unwrap();
         let path = root.path().to_owned();
         drop(root);
         assert!(!segment.exists() && !path.exists());
-        assert!(RunRoot::take(out.path()).is_ok());
+        assert!(RunRoot::acquire(out.path()).is_ok());
     }
 }

@@ -1,6 +1,5 @@
-//! The transport's services: the supervisor creates them once with the window's sizes, stages open them.
-//!
-//! Stages never name a size, so no restart finds a service gone or of another size.
+//! The services of the transport: the supervisor creates them once with the sizes of the window, and stages only open them.
+//! So no restart finds a service missing or of another size.
 
 use gyre_messages::{MAX_NODES, Masked, Message, Motion, Pose, Refined, Rotation, Scan, Window};
 use iceoryx2::{
@@ -15,15 +14,14 @@ pub(crate) type Node = iceoryx2::node::Node<Ipc>;
 pub(crate) type Topic<M> =
     publish_subscribe::PortFactory<Ipc, [<M as Message>::Element], <M as Message>::Header>;
 pub(crate) type Event = event::PortFactory<Ipc>;
-/// Receives the notifications of an event.
+/// The receiver of an event's notifications.
 pub type Listener = iceoryx2::port::listener::Listener<Ipc>;
 pub(crate) type Notifier = iceoryx2::port::notifier::Notifier<Ipc>;
 
-/// Ports of an event beyond those in use: a listener that was killed while it was being created can occupy one until the
-/// run ends.
+/// Spare ports of an event: a listener that is killed during its creation can occupy one until the run ends.
 const HEADROOM: usize = 6;
 
-/// A node of this run. `name` shows in the transport's own tools.
+/// Creates a node of this run. The transport's tools show its name.
 pub(crate) fn node(config: &Config, name: &str) -> Result<Node, StageError> {
     let name = NodeName::new(name).map_err(|e| StageError::transport("name the node", e))?;
     NodeBuilder::new()
@@ -34,7 +32,7 @@ pub(crate) fn node(config: &Config, name: &str) -> Result<Node, StageError> {
         .map_err(|e| StageError::transport("join the run", e))
 }
 
-/// All services of a run. Whoever holds this keeps them alive.
+/// All services of a run. They exist as long as this value.
 pub(crate) struct Services {
     _scan: Topic<Scan>,
     _masked: Topic<Masked>,
@@ -46,7 +44,7 @@ pub(crate) struct Services {
 }
 
 impl Services {
-    /// Creates them.
+    /// Creates the services.
     pub(crate) fn create(node: &Node, window: &Window) -> Result<Self, StageError> {
         let mut events = Vec::new();
         for topic in gyre_messages::TOPICS {
@@ -71,12 +69,12 @@ impl Services {
     }
 }
 
-/// Name of the event that a topic's publisher wakes its readers with.
+/// Returns the name of the event with which a publisher wakes the readers of a topic.
 pub(crate) fn data_event(topic: &str) -> String {
     format!("{topic}_data")
 }
 
-/// Name of the event that a new reader announces itself to the publisher with.
+/// Returns the name of the event with which a new reader notifies the publisher of a topic.
 pub(crate) fn handshake_event(topic: &str) -> String {
     format!("{topic}_handshake")
 }
@@ -117,7 +115,7 @@ fn create_event(
         .map_err(|e| StageError::transport(format!("create the event {name}"), e))
 }
 
-/// Opens a topic that the supervisor created.
+/// Opens a topic, which the supervisor has created.
 pub(crate) fn open_topic<M: Message>(node: &Node) -> Result<Topic<M>, StageError> {
     node.service_builder(&service_name(M::TOPIC)?)
         .publish_subscribe::<[M::Element]>()

@@ -1,4 +1,4 @@
-//! The loop of the last stage: it alone owns state, and journals before it publishes.
+//! The loop of the last stage, which journals each pose before it publishes it.
 
 use gyre_messages::{Header, Item, Message, MotionHeader, Pose, PoseHeader, StageId, flag};
 
@@ -6,24 +6,36 @@ use crate::{
     Launch, StageCounters, StageError, allocations, clock, reader::Reader, wake, writer::Writer,
 };
 
-/// What keeps the trajectory.
+/// The owner of the trajectory.
 pub trait Sink {
-    /// The last poses that the journal holds, oldest first, at most `count`; then whether the stream had ended.
+    /// Returns the last poses of the journal, at most `count`, oldest first, and whether the stream had ended.
+    ///
+    /// # Errors
+    /// A journal that cannot be read.
     fn restore(&mut self, count: usize) -> Result<(Vec<PoseHeader>, bool), StageError>;
-    /// Adds a motion, and returns its pose once that is safely journalled.
+    /// Adds a motion, journals its pose and returns it.
+    ///
+    /// # Errors
+    /// A journal that cannot be written.
     fn integrate(&mut self, motion: &MotionHeader) -> Result<PoseHeader, StageError>;
-    /// Notes the end of the stream, safely.
+    /// Journals the end of the stream.
+    ///
+    /// # Errors
+    /// A journal that cannot be written.
     fn end(&mut self, item: &Item) -> Result<(), StageError>;
 }
 
 /// Runs the sink on the motions of topic `M` until SIGTERM.
+///
+/// # Errors
+/// A failure of the transport, a sequence gap, or an error of the sink.
 pub fn run<M: Message<Header = MotionHeader>>(
     launch: &Launch,
     sink: &mut impl Sink,
 ) -> Result<StageCounters, StageError> {
     let poses = Writer::<Pose>::open(&launch.node, &launch.manifest)?;
     let (restored, ended) = sink.restore(Pose::sizes(&launch.manifest.window).history)?;
-    publish_again(&poses, &restored)?;
+    republish(&poses, &restored)?;
     let next = restored
         .last()
         .map_or(0, |pose| pose.item.seq.saturating_add(1));
@@ -58,8 +70,8 @@ pub fn run<M: Message<Header = MotionHeader>>(
     }
 }
 
-/// What came before: the source learns from the last one where to go on, masking learns motions that no one else remembers.
-fn publish_again(poses: &Writer<Pose>, restored: &[PoseHeader]) -> Result<(), StageError> {
+/// Publishes the last poses again. The source resumes at the newest one, and masking needs the motions of all of them.
+fn republish(poses: &Writer<Pose>, restored: &[PoseHeader]) -> Result<(), StageError> {
     let base = PoseHeader {
         item: Item {
             flags: flag::BASE | flag::SYNC,
@@ -73,12 +85,12 @@ fn publish_again(poses: &Writer<Pose>, restored: &[PoseHeader]) -> Result<(), St
     for pose in earlier {
         publish(poses, *pose)?;
     }
-    publish(poses, standing(*last))
+    publish(poses, newest(*last))
 }
 
-/// Marks a pose as where the trajectory stands. The earlier ones of those published again are not: a source that took one of them
-/// for the last would send more than its readers have room for.
-fn standing(pose: PoseHeader) -> PoseHeader {
+/// Marks a pose as the newest. Older ones that are published again are not marked: a source that resumed at one of them would
+/// send more scans than its readers have room for.
+fn newest(pose: PoseHeader) -> PoseHeader {
     PoseHeader {
         item: Item {
             flags: pose.item.flags | flag::SYNC,
@@ -137,7 +149,7 @@ impl<S: Sink> Integration<'_, S> {
             allocations::so_far() - allocated,
             clock::now_ns() - started_ns,
         );
-        publish(&self.poses, standing(pose))
+        publish(&self.poses, newest(pose))
     }
 
     fn publish_end(&mut self, item: Item) -> Result<(), StageError> {

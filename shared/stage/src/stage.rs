@@ -4,25 +4,25 @@ use gyre_messages::{Header, Item, Message, flag};
 
 use crate::{
     Launch, StageCounters, StageError, allocations, clock,
-    inputs::{Inputs, Turn},
+    inputs::{Action, Inputs},
     wake,
     writer::{Draft, Writer},
 };
 
-/// A stage: a function of its inputs. Waiting, joining, publishing and restarting are this crate's.
+/// A stage: a function of its inputs. This crate does the waiting, joining, publishing and restarting.
 pub trait Stage {
-    /// The inputs that it waits for.
+    /// The inputs.
     type Inputs: Inputs;
-    /// The message that it publishes.
+    /// The published message.
     type Output: Message;
-    /// Which of the processes it is, or replaces.
+    /// The stage that it is, or replaces.
     const HOP: gyre_messages::StageId;
 
-    /// Processes one item: reads borrowed shared memory and writes header and payload of a loaned sample. The header's
-    /// item is filled in afterwards.
+    /// Processes one item: reads borrowed shared memory and writes header and payload of a loaned sample. The item of the header
+    /// is filled in afterwards.
     ///
     /// # Errors
-    /// What ends the process; its exit code tells the supervisor whether a restart can help.
+    /// An error that ends the process.
     fn process(
         &mut self,
         input: <Self::Inputs as Inputs>::View<'_>,
@@ -31,6 +31,9 @@ pub trait Stage {
 }
 
 /// Runs a stage until SIGTERM.
+///
+/// # Errors
+/// A failure of the transport, a sequence gap, or an error of the stage.
 pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<StageCounters, StageError> {
     let inputs = S::Inputs::open(launch)?;
     let output = Writer::open(&launch.node, &launch.manifest)?;
@@ -73,15 +76,15 @@ struct Flow<'a, S: Stage> {
 }
 
 impl<S: Stage> Flow<'_, S> {
-    /// Processes all that has come; returns whether there was anything.
+    /// Processes all items in the queues; returns whether there were any.
     fn drain(&mut self) -> Result<bool, StageError> {
         let mut progressed = false;
         while !self.ended {
-            match self.inputs.turn()? {
-                Turn::Wait => break,
-                Turn::Keep => {}
-                Turn::Process(item, received_ns) => self.process(item, received_ns)?,
-                Turn::End(item) => self.end(item)?,
+            match self.inputs.next_action()? {
+                Action::Wait => break,
+                Action::Keep => {}
+                Action::Process(item, received_ns) => self.process(item, received_ns)?,
+                Action::End(item) => self.end(item)?,
             }
             self.inputs.advance();
             progressed = true;
@@ -126,7 +129,7 @@ impl<S: Stage> Flow<'_, S> {
         Ok(())
     }
 
-    /// Requires that the output is consecutive: a gap in its history would end each reader that is restarted on it.
+    /// Requires consecutive output: a gap in its history would stop every reader that restarts on it.
     fn require_next(&self, item: &Item) -> Result<(), StageError> {
         match self.last_sent.map(|last| last.saturating_add(1)) {
             Some(expected) if item.seq != expected => Err(StageError::SequenceGap {

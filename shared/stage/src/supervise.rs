@@ -1,7 +1,7 @@
-//! Starts the processes of a run, repairs the run when one dies, and leaves nothing behind.
+//! Starts the processes of a run, restarts dead ones, and removes all resources at the end.
 //!
-//! After a death only the dead stage is cleaned up after and restarted: a start resumes. Where that does not help (it dies
-//! again before a new pose, no pose comes at all, or its plan says so) all are restarted.
+//! After a death only the dead stage is restarted: every start resumes. All stages are restarted if that does not help (the
+//! stage dies again before a new pose, or no pose is published) or if the plan says so.
 
 mod child;
 mod clean;
@@ -27,13 +27,15 @@ use child::Child;
 pub use child::Death;
 pub use plan::{Ending, Event, Plan, Report, RestartPolicy, StagePlan, SuperviseError};
 
-/// Time that stages have to end by themselves before they are killed.
+/// Time for stages to exit by themselves before they are killed.
 const STOP_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Runs all stages of `plan` until the stream ends, one of `signals` asks to stop, or nothing helps any more.
+/// Runs all stages of `plan` until the stream ends, a signal requests a stop, or restarts do not help.
 ///
-/// The signals are to be installed before the run's place in shared memory is taken: else one that comes in between would end
-/// the process with nobody left to clean up.
+/// Install the signals before acquiring the run's root. A signal in between would otherwise end the process without cleanup.
+///
+/// # Errors
+/// A stage that cannot be started or fails too often, a stall, or a failure of the transport.
 pub fn supervise(
     plan: &Plan,
     signals: Signals,
@@ -60,7 +62,7 @@ struct Supervisor<'a> {
     last_progress: Instant,
     stalls_without_progress: usize,
     restarts: BTreeMap<String, usize>,
-    /// Stages that were started again and have not yet shown a pose of their new life: since when they were dead.
+    /// Restarted stages with no pose yet that the new process worked on.
     recovering: Vec<Recovering>,
     recovery: Vec<Duration>,
     // Dropped in this order: ports, services, node.
@@ -132,44 +134,44 @@ impl<'a> Supervisor<'a> {
                 return Ok(Ending::Complete);
             }
             let dead: Vec<usize> = (0..self.children.len())
-                .filter(|i| self.children[*i].has_ended())
+                .filter(|i| self.children[*i].has_exited())
                 .collect();
             if !dead.is_empty() {
-                self.repair(&dead)?;
+                self.recover(&dead)?;
             } else if self
                 .plan
                 .stall_timeout
                 .is_some_and(|limit| self.last_progress.elapsed() > limit)
             {
-                self.unstall()?;
+                self.recover_from_stall()?;
             }
         }
     }
 
-    /// Takes in the poses that have come; true at the end of the stream.
+    /// Reads the new poses; true at the end of the stream.
     fn read_poses(&mut self) -> Result<bool, SuperviseError> {
         while let Some(received) = self.poses.receive()? {
             let pose = received.header();
             if pose.item.is(flag::END) {
                 return Ok(true);
             }
-            let news = !pose.item.is(flag::BASE)
+            let is_new = !pose.item.is(flag::BASE)
                 && self.newest_pose.is_none_or(|newest| pose.item.seq > newest);
-            if news {
+            if is_new {
                 self.newest_pose = Some(pose.item.seq);
                 self.last_progress = Instant::now();
                 self.stalls_without_progress = 0;
-                note_recoveries(pose, &mut self.recovering, &mut self.recovery);
+                record_recoveries(pose, &mut self.recovering, &mut self.recovery);
                 (self.observe)(Event::Pose(pose));
             }
         }
         Ok(false)
     }
 
-    /// Starts dead stages again, or everybody where that alone would not help.
-    fn repair(&mut self, dead: &[usize]) -> Result<(), SuperviseError> {
+    /// Restarts dead stages, or all stages if that alone would not help.
+    fn recover(&mut self, dead: &[usize]) -> Result<(), SuperviseError> {
         let died_ns = clock::now_ns();
-        let mut everybody = false;
+        let mut all = false;
         let mut backoff = Duration::ZERO;
         for i in dead {
             let child = &mut self.children[*i];
@@ -179,8 +181,7 @@ impl<'a> Supervisor<'a> {
                 death: &death,
             });
             child.may_restart(&death)?;
-            everybody |= child.died_without_progress(self.newest_pose);
-            everybody |= child.plan().restarts_all;
+            all |= child.died_without_progress(self.newest_pose) || child.plan().restarts_all;
             if !death.killed {
                 backoff = backoff.max(child.backoff());
             }
@@ -189,29 +190,27 @@ impl<'a> Supervisor<'a> {
         if !backoff.is_zero() {
             self.signals.wait(&[], None, backoff)?;
         }
-        let again: Vec<usize> = if everybody {
-            self.generation(dead)
-        } else {
-            dead.to_vec()
-        };
-        self.restart(&again, died_ns)?;
-        (self.observe)(Event::Restarted { everybody });
+        match all {
+            true => self.restart(&self.all_but_survivors(dead), died_ns)?,
+            false => self.restart(dead, died_ns)?,
+        }
+        (self.observe)(Event::Restarted { all });
         Ok(())
     }
 
-    /// All stages, but those that live and outlive restarts.
-    fn generation(&self, dead: &[usize]) -> Vec<usize> {
-        let stays = |i: &usize| self.children[*i].plan().outlives_restarts && !dead.contains(i);
-        (0..self.children.len()).filter(|i| !stays(i)).collect()
+    /// Returns all stages except those that are alive and outlive restarts.
+    fn all_but_survivors(&self, dead: &[usize]) -> Vec<usize> {
+        let survives = |i: &usize| self.children[*i].plan().outlives_restarts && !dead.contains(i);
+        (0..self.children.len()).filter(|i| !survives(i)).collect()
     }
 
-    fn restart(&mut self, again: &[usize], died_ns: i64) -> Result<(), SuperviseError> {
-        for i in again {
+    fn restart(&mut self, stages: &[usize], died_ns: i64) -> Result<(), SuperviseError> {
+        for i in stages {
             self.children[*i].kill();
         }
-        let nobody_lives = again.len() == self.children.len();
-        clean::after_the_dead(&self.plan.manifest, &self.transport, nobody_lives)?;
-        for i in again {
+        let all_dead = stages.len() == self.children.len();
+        clean::remove_dead(&self.plan.manifest, &self.transport, all_dead)?;
+        for i in stages {
             let child = &mut self.children[*i];
             child.respawn(&self.plan.manifest, self.newest_pose)?;
             let hop = StageId::by_name(child.name());
@@ -225,8 +224,8 @@ impl<'a> Supervisor<'a> {
         Ok(())
     }
 
-    /// No pose for too long: somebody is alive but stuck, so start everybody again, though not for ever.
-    fn unstall(&mut self) -> Result<(), SuperviseError> {
+    /// Restarts all stages, at most twice in a row, because one of them is alive but stuck.
+    fn recover_from_stall(&mut self) -> Result<(), SuperviseError> {
         self.stalls_without_progress += 1;
         if self.stalls_without_progress > 2 {
             return Err(SuperviseError::Stalled {
@@ -234,14 +233,14 @@ impl<'a> Supervisor<'a> {
             });
         }
         (self.observe)(Event::Stalled);
-        self.restart(&self.generation(&[]), clock::now_ns())
+        self.restart(&self.all_but_survivors(&[]), clock::now_ns())
     }
 
-    /// Asks all to end, and ends those that do not.
+    /// Stops all stages, and kills those that do not exit in time.
     fn stop(&mut self) -> Result<(), SuperviseError> {
-        self.children.iter().for_each(Child::ask_to_end);
-        let patience = Instant::now() + STOP_TIMEOUT;
-        while Instant::now() < patience && !self.children.iter_mut().all(Child::has_ended) {
+        self.children.iter().for_each(Child::terminate);
+        let deadline = Instant::now() + STOP_TIMEOUT;
+        while Instant::now() < deadline && !self.children.iter_mut().all(Child::has_exited) {
             self.signals.wait(&[], None, wake::MAX_WAIT)?;
         }
         self.children.iter_mut().for_each(Child::kill);
@@ -249,25 +248,25 @@ impl<'a> Supervisor<'a> {
     }
 }
 
-/// A stage has recovered when a pose comes that its new life has worked on; poses that were on their way do not count.
-fn note_recoveries(
+/// Records the recovery of stages at the first pose that their new processes worked on; items in flight do not count.
+fn record_recoveries(
     pose: &PoseHeader,
     recovering: &mut Vec<Recovering>,
     recovery: &mut Vec<Duration>,
 ) {
     let hops = pose.item().hops;
     recovering.retain(|stage| {
-        let back = hops[stage.hop as usize].started_ns > stage.started_ns;
-        if back {
+        let recovered = hops[stage.hop as usize].started_ns > stage.started_ns;
+        if recovered {
             recovery.push(Duration::from_nanos(
                 (clock::now_ns() - stage.died_ns).max(0) as u64,
             ));
         }
-        !back
+        !recovered
     });
 }
 
-/// The transport cleans up after half-made nodes by its global configuration, not by the run's: they must be the same.
+/// Makes the run's configuration of the transport the global one, which the transport uses to clean up incomplete nodes.
 fn use_as_global(path: &std::path::Path) -> Result<(), StageError> {
     let failed = |reason: String| StageError::Manifest {
         path: path.to_owned(),
@@ -279,12 +278,12 @@ fn use_as_global(path: &std::path::Path) -> Result<(), StageError> {
     Ok(())
 }
 
-/// What the stages left of themselves at their orderly ends, by name.
+/// Reads the counters of the stages that exited cleanly, by name.
 fn counters(plan: &Plan) -> BTreeMap<String, StageCounters> {
-    let left = |stage: &StagePlan| {
+    let read = |stage: &StagePlan| {
         let text =
             fs::read_to_string(plan.manifest.root.join(counters::file_name(&stage.name))).ok()?;
         Some((stage.name.clone(), serde_json::from_str(&text).ok()?))
     };
-    plan.stages.iter().filter_map(left).collect()
+    plan.stages.iter().filter_map(read).collect()
 }

@@ -1,4 +1,4 @@
-//! The transport's promises that everything else here is built on, each tried with real shared memory.
+//! The properties of the transport that this crate relies on, tested with real shared memory.
 
 #![allow(clippy::unwrap_used)]
 
@@ -24,12 +24,12 @@ const WINDOW: Window = Window {
     live_depth: 0,
 };
 
-/// A run without processes: its services, and nodes for whoever joins. Two of them never meet.
+/// A run without processes: its services, and nodes for tests. Runs are isolated from each other.
 struct Run {
     manifest: Manifest,
     _services: Services,
     _supervisor: Node,
-    // Last: removes all that is left of the run.
+    // Last: removes all files of the run.
     _root: RunRoot,
     _out: TempDir,
 }
@@ -37,7 +37,7 @@ struct Run {
 impl Run {
     fn new() -> Self {
         let out = tempfile::tempdir().unwrap();
-        let root = RunRoot::take(out.path()).unwrap();
+        let root = RunRoot::acquire(out.path()).unwrap();
         let manifest = Manifest {
             prefix: root.prefix(),
             root: root.path().to_owned(),

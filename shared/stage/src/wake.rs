@@ -1,7 +1,7 @@
-//! How a process sleeps: until a neighbour notifies it, a signal comes, or the net's time is up.
+//! Sleep until a publisher notifies, a signal arrives, or the longest wait has passed.
 //!
-//! Nobody polls. The transport can lose a wake-up (rarely: a race between its datagram and its flag), so every wait has a
-//! limit after which the queues are looked at all the same; what that net catches is counted.
+//! The transport can lose a wake-up, rarely (a race between its datagram and its flag). So every wait has a limit after which
+//! the queues are read anyway, and each wake-up that was caught so is counted.
 
 use std::{
     cell::Cell,
@@ -22,40 +22,43 @@ use signal_hook::{consts, low_level::pipe};
 
 use crate::{StageError, services::Listener};
 
-/// The longest sleep.
+/// The longest wait.
 pub const MAX_WAIT: Duration = Duration::from_millis(200);
 
-/// Signals turned into something to wait for.
+/// Signals as file descriptors to wait for.
 #[derive(Debug)]
 pub struct Signals {
     stop: UnixStream,
     child: UnixStream,
-    /// A request to stop is never forgotten, whoever slept when it came.
+    /// True from the first request to stop on, whichever wait received it.
     stopped: Cell<bool>,
 }
 
-/// What ended a sleep.
+/// The reasons why a wait ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Woken {
-    /// SIGTERM, SIGINT or SIGHUP has come, now or earlier.
+    /// SIGTERM, SIGINT or SIGHUP has arrived, now or earlier.
     pub stop: bool,
-    /// A child process has ended.
+    /// A child process has exited.
     pub child: bool,
-    /// A reader has opened the topic.
+    /// A new reader has opened the topic.
     pub handshake: bool,
-    /// Nothing came: the limit was reached.
+    /// The limit was reached without any event.
     pub timed_out: bool,
 }
 
 impl Woken {
-    /// Whether readers may have come: one has notified us, or its notification may have been lost.
+    /// Returns whether there may be new readers: one has notified, or its notification may be lost.
     pub fn may_have_new_readers(&self) -> bool {
         self.handshake || self.timed_out
     }
 }
 
 impl Signals {
-    /// From here on SIGTERM, SIGINT, SIGHUP and SIGCHLD wake the process instead of ending it.
+    /// Installs handlers: from here on SIGTERM, SIGINT, SIGHUP and SIGCHLD wake the process instead of ending it.
+    ///
+    /// # Errors
+    /// The system refuses a socket or a handler.
     pub fn install() -> Result<Self, StageError> {
         let failed =
             |error: std::io::Error| StageError::transport("install the signal handlers", error);
@@ -75,9 +78,9 @@ impl Signals {
         })
     }
 
-    /// Sleeps until one of the listeners is notified, a signal comes or `limit` is over, whichever is first.
-    /// The notifications of `data` are consumed: look at all queues afterwards. A notification of `handshake` is left for
-    /// [`Writer::accept_readers`](crate::writer::Writer::accept_readers), to be called when [`Woken::may_have_new_readers`] says so.
+    /// Sleeps until a listener is notified, a signal arrives or `limit` has passed, whichever is first.
+    /// Consumes the notifications of `data`: read all queues afterwards. A notification of `handshake` is left for
+    /// [`Writer::accept_readers`](crate::writer::Writer::accept_readers), to be called if [`Woken::may_have_new_readers`].
     pub(crate) fn wait(
         &self,
         data: &[&Listener],
@@ -99,7 +102,7 @@ impl Signals {
             Err(Errno::INTR) => false,
             Err(error) => return Err(StageError::transport("wait", error)),
         };
-        // Only what is ready is read: each call less is a message taken sooner.
+        // Read only what is ready: each system call saved reduces latency.
         let mut ready = polled.iter().map(|polled| !polled.revents().is_empty());
         let mut next = || ready.next().unwrap_or(false);
         let (stop, child) = (next() && drain(&self.stop), next() && drain(&self.child));
@@ -121,7 +124,7 @@ impl Signals {
 }
 
 fn descriptor(listener: &Listener) -> BorrowedFd<'_> {
-    // SAFETY: the listener owns the descriptor and outlives the borrow, whose lifetime is the listener's.
+    // SAFETY: the listener owns the descriptor, and the borrow has the listener's lifetime.
     unsafe { BorrowedFd::borrow_raw(listener.file_descriptor().native_handle()) }
 }
 
@@ -142,7 +145,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_request_to_stop_is_not_forgotten_by_the_next_sleep() {
+    fn a_request_to_stop_persists_over_later_waits() {
         let (stop, mut signal) = UnixStream::pair().unwrap();
         let (child, _open) = UnixStream::pair().unwrap();
         [&stop, &child]

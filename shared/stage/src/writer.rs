@@ -1,4 +1,4 @@
-//! The publishing end of a topic.
+//! The publisher of a topic.
 
 use gyre_messages::{Header, Message, StageId};
 use iceoryx2::{
@@ -12,7 +12,7 @@ use crate::{
     services::{self, Ipc, Listener, Node, Notifier},
 };
 
-/// Publishes a topic's messages. What it sent last is kept for readers that come later, see [`Writer::accept_readers`].
+/// Publishes the messages of a topic and keeps a history for late readers: see [`Writer::accept_readers`].
 pub struct Writer<M: Message> {
     handshake: Listener,
     data: Notifier,
@@ -20,7 +20,7 @@ pub struct Writer<M: Message> {
     elements: usize,
 }
 
-/// A message being written, where its readers will find it.
+/// A message that is being written in shared memory.
 pub struct Draft<M: Message> {
     sample: SampleMut<Ipc, [M::Element], M::Header>,
 }
@@ -31,12 +31,12 @@ impl<M: Message> Writer<M> {
         let handshake = services::listener(node, &services::handshake_event(M::TOPIC))?;
         let data = services::notifier(node, &services::data_event(M::TOPIC))?;
         let elements = M::max_elements(&manifest.limits);
-        // Last, for a publisher connects at once to all readers there are.
+        // Last, since a publisher connects to all existing readers at once.
         let publisher = services::open_topic::<M>(node)?
             .publisher_builder()
             .initial_max_slice_len(elements)
             .max_loaned_samples(M::sizes(&manifest.window).loaned)
-            // Never wait for a slow or dead reader: the window bounds what is in flight.
+            // Never wait for a slow or dead reader: the window bounds the items in flight.
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
             .map_err(|e| StageError::transport(format!("publish {}", M::TOPIC), e))?;
@@ -48,19 +48,25 @@ impl<M: Message> Writer<M> {
         })
     }
 
-    /// Lends a message to fill: its header is the default, its payload is whatever the memory holds.
+    /// Loans a message to fill in. The header is the default; the payload is uninitialised.
+    ///
+    /// # Errors
+    /// A failure of the transport.
     pub fn loan(&self) -> Result<Draft<M>, StageError> {
         let sample = self
             .publisher
             .loan_slice_uninit(self.elements)
             .map_err(|e| StageError::transport(format!("get memory for {}", M::TOPIC), e))?;
-        // SAFETY: the elements are `Pod`, so any bytes that mapped memory holds are valid values.
+        // SAFETY: the elements are `Pod`, so any bytes of mapped memory are valid values.
         Ok(Draft {
             sample: unsafe { sample.assume_init() },
         })
     }
 
-    /// Publishes a message. The transport copies nothing: readers get its place in shared memory.
+    /// Publishes a message without copying: readers receive its offset in shared memory.
+    ///
+    /// # Errors
+    /// A failure of the transport.
     pub fn send(&self, mut draft: Draft<M>, hop: StageId) -> Result<(), StageError> {
         let item = draft.header().item_mut();
         item.pid = std::process::id();
@@ -72,23 +78,28 @@ impl<M: Message> Writer<M> {
         self.notify()
     }
 
-    /// Hands the history to readers that have come since the last call, and wakes them.
+    /// Sends the history to readers that have subscribed since the last call, and wakes them.
     ///
-    /// Readers are woken only where a new one has come: readers that are woken answer handshakes of their own topics, so
+    /// Readers are woken only after a handshake: woken readers answer the handshakes of their own topics, so unconditional
     /// wake-ups would circulate for ever.
+    ///
+    /// # Errors
+    /// A failure of the transport.
     pub fn accept_readers(&self) -> Result<(), StageError> {
         let mut new_reader = false;
         self.handshake
             .try_wait(|_| new_reader = true)
-            .map_err(|e| StageError::transport(format!("hear the readers of {}", M::TOPIC), e))?;
-        // In any case: a handshake can be lost, and its reader then finds the history when its own wait ends.
+            .map_err(|e| {
+                StageError::transport(format!("read the handshakes of {}", M::TOPIC), e)
+            })?;
+        // Unconditionally: after a lost handshake the reader finds the history at the end of its own wait.
         self.publisher.update_connections().map_err(|e| {
             StageError::transport(format!("connect the readers of {}", M::TOPIC), e)
         })?;
         if new_reader { self.notify() } else { Ok(()) }
     }
 
-    /// What new readers notify.
+    /// Returns the listener that new readers notify.
     pub(crate) fn listener(&self) -> &Listener {
         &self.handshake
     }
@@ -102,19 +113,19 @@ impl<M: Message> Writer<M> {
 }
 
 impl<M: Message> Draft<M> {
-    /// The header.
+    /// Returns the header.
     pub fn header(&mut self) -> &mut M::Header {
         self.sample.user_header_mut()
     }
 
-    /// The payload's values: bytes of a scan, cells of a raster.
+    /// Returns the values of the payload: bytes of a scan, cells of a raster.
     pub fn values<T: bytemuck::Pod>(&mut self) -> &mut [T] {
         bytemuck::cast_slice_mut(self.sample.payload_mut())
     }
 
-    /// Header and payload at once.
+    /// Returns header and payload.
     pub fn parts<T: bytemuck::Pod>(&mut self) -> (&mut M::Header, &mut [T]) {
-        // SAFETY: header and payload are separate parts of one sample that this draft owns alone.
+        // SAFETY: header and payload are disjoint parts of a sample that this draft owns.
         let header: *mut M::Header = self.sample.user_header_mut();
         (
             unsafe { &mut *header },

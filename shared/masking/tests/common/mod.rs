@@ -1,6 +1,6 @@
-//! What the tests of learned masks share: their models, a scan, and the models' arithmetic by hand.
+//! Shared by the tests of learned masks: models, a scan, and a reference computation of the models.
 
-// Each test binary uses its own part of this.
+// Each test binary uses a part of this.
 #![allow(dead_code, clippy::unwrap_used)]
 
 use std::path::{Path, PathBuf};
@@ -12,13 +12,13 @@ use gyre_radar::{
 };
 use ndarray::Array2;
 
-/// Cells a side of the models that tests compute by hand.
+/// Cells per side of the models with a reference computation.
 pub const N: usize = 31;
 
 const AZIMUTHS: usize = 400;
 const BINS: usize = 200;
 
-/// The card of one of the tests' models: see `models/make.py`.
+/// The card of a test model: see `models/make.py`.
 pub fn card(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("tests/models")
@@ -26,7 +26,7 @@ pub fn card(name: &str) -> PathBuf {
         .with_extension("toml")
 }
 
-/// Whether networks can be computed here; says so where not.
+/// Returns whether ONNX Runtime is installed, and prints a note if not.
 pub fn runtime_is_installed() -> bool {
     let found = runtime::find(None).is_ok();
     if !found {
@@ -35,7 +35,7 @@ pub fn runtime_is_installed() -> bool {
     found
 }
 
-/// The rasters that the models with `-31` in their names are for.
+/// The rasters of the models with `-31` in their names.
 pub fn raster() -> RasterConfig {
     RasterConfig {
         n: N,
@@ -44,7 +44,7 @@ pub fn raster() -> RasterConfig {
     }
 }
 
-/// A learned mask by this model. Power up to 20 counts as nothing.
+/// A learned mask of this model, above a threshold of 20.
 pub fn learned(card: &Path) -> MaskingConfig {
     MaskingConfig {
         kind: MaskKind::Learned,
@@ -70,7 +70,7 @@ pub fn masker(config: &MaskingConfig) -> Masker {
     Masker::new(&raster(), &PointsConfig::default(), config).unwrap()
 }
 
-/// A scan of powers that are all different from their neighbours', another one for each seed.
+/// A scan in which neighbouring powers differ, for a seed.
 pub fn scan(seed: usize) -> OwnedScan {
     let mut scan = OwnedScan::with_limits(ScanLimits {
         bytes: AZIMUTHS * BINS,
@@ -97,7 +97,7 @@ pub fn scan(seed: usize) -> OwnedScan {
     scan
 }
 
-/// The scan as masking has it, while the vehicle drives a bend at 12 m/s.
+/// The scan with the velocity of a bend at 12 m/s.
 pub fn sweep(number: u64, scan: &OwnedScan) -> Sweep<'_> {
     Sweep {
         number,
@@ -115,7 +115,7 @@ pub fn blank() -> Array2<f32> {
     Array2::from_elem((N, N), f32::NAN)
 }
 
-/// The raster of a sweep before the network.
+/// The raster of a sweep without the network.
 pub fn unmasked(sweep: &Sweep<'_>) -> Array2<f32> {
     let mut raster = blank();
     masker(&unlearned())
@@ -124,8 +124,8 @@ pub fn unmasked(sweep: &Sweep<'_>) -> Array2<f32> {
     raster
 }
 
-/// The masks of the tests' models, one for each raster: the sigmoid of a convolution, as in `models/make.py`.
-pub fn masks_by_hand(rasters: &[Array2<f32>]) -> Vec<Array2<f32>> {
+/// Computes the masks of the test models, one for each raster: the sigmoid of a convolution, as in `models/make.py`.
+pub fn reference_masks(rasters: &[Array2<f32>]) -> Vec<Array2<f32>> {
     let channels = rasters.len();
     let kernel = |place: usize| ((place * 5 % 13) as f64 - 6.0) / 64.0;
     let power = |channel: usize, row: isize, column: isize| {
@@ -151,7 +151,7 @@ pub fn masks_by_hand(rasters: &[Array2<f32>]) -> Vec<Array2<f32>> {
     (0..channels).map(mask).collect()
 }
 
-/// Asserts that the values are those of the raster times the mask.
+/// Asserts that the values are the raster times the mask.
 pub fn assert_masked(actual: &Array2<f32>, raster: &Array2<f32>, mask: &Array2<f32>) {
     assert!(
         raster.iter().filter(|power| **power > 0.0).count() > N * N / 2,

@@ -16,17 +16,17 @@ use rustix::process::{
 use super::{StagePlan, SuperviseError};
 use crate::{Manifest, StageError, run};
 
-/// How a process died.
+/// The death of a process.
 #[derive(Clone, Debug)]
 pub struct Death {
-    /// By a signal; else it ended by itself.
+    /// True if a signal killed it, false if it exited by itself.
     pub killed: bool,
-    /// In words.
-    pub how: String,
-    /// Its exit code, if it ended by itself.
+    /// The cause, as `signal 9` or `exit code 3`.
+    pub cause: String,
+    /// The exit code, if it exited by itself.
     pub code: Option<i32>,
-    /// The last line that it wrote to its standard error.
-    pub last_words: Option<String>,
+    /// The last line of its output.
+    pub last_output: Option<String>,
 }
 
 pub(super) struct Child {
@@ -34,16 +34,16 @@ pub(super) struct Child {
     process: std::process::Child,
     status: Option<ExitStatus>,
     deaths: VecDeque<Instant>,
-    /// The newest pose when it was last started again.
+    /// The newest pose at the last restart.
     pose_at_restart: Option<Option<u64>>,
-    said_before: u64,
+    log_offset: u64,
     log: File,
 }
 
 impl Child {
     pub(super) fn spawn(plan: &StagePlan, manifest: &Manifest) -> Result<Self, SuperviseError> {
         let log = open_log(plan, manifest)?;
-        let said_before = log.metadata().map_or(0, |log| log.len());
+        let log_offset = log.metadata().map_or(0, |log| log.len());
         let process = start(plan, manifest, &log)?;
         Ok(Self {
             plan: plan.clone(),
@@ -51,7 +51,7 @@ impl Child {
             status: None,
             deaths: VecDeque::new(),
             pose_at_restart: None,
-            said_before,
+            log_offset,
             log,
         })
     }
@@ -83,30 +83,33 @@ impl Child {
         Duration::from_millis(self.plan.restart.backoff_ms)
     }
 
-    /// Whether it has died before and no pose has come since.
+    /// Returns whether no pose was published since the last restart.
     pub(super) fn died_without_progress(&self, newest_pose: Option<u64>) -> bool {
         self.pose_at_restart == Some(newest_pose)
     }
 
-    pub(super) fn has_ended(&mut self) -> bool {
+    pub(super) fn has_exited(&mut self) -> bool {
         if self.status.is_none() {
             self.status = self.process.try_wait().ok().flatten();
             if self.status.is_some() {
-                // What it has started, where its command is a shell for instance, ends with it.
+                // End its own children too, as those of a shell.
                 self.signal(Signal::KILL);
             }
         }
         self.status.is_some()
     }
 
-    /// Counts the death against the policy.
+    /// Counts a death against the restart policy.
+    ///
+    /// # Errors
+    /// A permanent failure, or more deaths than the policy allows.
     pub(super) fn may_restart(&mut self, death: &Death) -> Result<(), SuperviseError> {
-        if death.code == Some(i32::from(StageError::HOPELESS)) {
-            let words = death
-                .last_words
+        if death.code == Some(i32::from(StageError::PERMANENT)) {
+            let message = death
+                .last_output
                 .clone()
-                .unwrap_or_else(|| format!("{}: {}", self.name(), death.how));
-            return Err(SuperviseError::Hopeless { words });
+                .unwrap_or_else(|| format!("{}: {}", self.name(), death.cause));
+            return Err(SuperviseError::Permanent { message });
         }
         let policy = self.plan.restart;
         let window = Duration::try_from_secs_f64(policy.window_s).unwrap_or(Duration::MAX);
@@ -119,29 +122,29 @@ impl Child {
             stage: self.name().to_owned(),
             times: self.deaths.len(),
             window_s: policy.window_s,
-            how: death.how.clone(),
-            words: death
-                .last_words
+            cause: death.cause.clone(),
+            output: death
+                .last_output
                 .as_ref()
-                .map_or(String::new(), |words| format!(" ({words})")),
+                .map_or(String::new(), |line| format!(" ({line})")),
         })
     }
 
     pub(super) fn death(&mut self) -> Death {
         let status = self.status.unwrap_or_default();
-        let how = match (status.signal(), status.code()) {
+        let cause = match (status.signal(), status.code()) {
             (Some(signal), _) => format!("signal {signal}"),
             (None, code) => format!("exit code {}", code.unwrap_or_default()),
         };
         Death {
             killed: status.signal().is_some(),
-            how,
+            cause,
             code: status.code(),
-            last_words: self.last_words(),
+            last_output: self.last_output(),
         }
     }
 
-    pub(super) fn ask_to_end(&self) {
+    pub(super) fn terminate(&self) {
         if self.status.is_none() {
             self.signal(Signal::TERM);
         }
@@ -154,20 +157,21 @@ impl Child {
         }
     }
 
-    /// Sends a signal to its process group.
+    /// Sends a signal to the process group.
     fn signal(&self, signal: Signal) {
         if let Some(group) = Pid::from_raw(self.process.id() as i32) {
-            // All may have ended this moment: then there is nobody to tell.
+            // Fails if all its processes have exited meanwhile.
             let _ = kill_process_group(group, signal);
         }
     }
 
-    fn last_words(&mut self) -> Option<String> {
-        let mut said = String::new();
-        self.log.seek(SeekFrom::Start(self.said_before)).ok()?;
-        let read = self.log.read_to_string(&mut said).ok()?;
-        self.said_before += read as u64;
-        said.lines()
+    fn last_output(&mut self) -> Option<String> {
+        let mut output = String::new();
+        self.log.seek(SeekFrom::Start(self.log_offset)).ok()?;
+        let read = self.log.read_to_string(&mut output).ok()?;
+        self.log_offset += read as u64;
+        output
+            .lines()
             .rev()
             .find(|line| !line.trim().is_empty())
             .map(str::to_owned)
@@ -180,7 +184,7 @@ impl Drop for Child {
     }
 }
 
-/// What it writes to its standard output and error: `<out>/log/<stage>.txt`.
+/// Opens the log of a stage's standard output and error: `<out>/log/<stage>.txt`.
 fn open_log(plan: &StagePlan, manifest: &Manifest) -> Result<File, StageError> {
     let path = manifest.out.join("log").join(format!("{}.txt", plan.name));
     let opened = OpenOptions::new()
@@ -212,7 +216,7 @@ fn start(
         .stdin(Stdio::null())
         .stdout(log.try_clone().map_err(failed)?)
         .stderr(log.try_clone().map_err(failed)?)
-        // A group of its own: the terminal's interrupt reaches the supervisor alone, which then asks each stage to end.
+        // A process group of its own: an interrupt from the terminal reaches only the supervisor, which then stops each stage.
         .process_group(0);
     let supervisor = getpid();
     let die_with_the_supervisor = move || {
@@ -222,7 +226,7 @@ fn start(
             false => Err(io::Error::other("the supervisor has died")),
         }
     };
-    // SAFETY: between fork and exec only two system calls are made; nothing is allocated unless the supervisor is dead.
+    // SAFETY: between fork and exec there are only two system calls; nothing is allocated unless the supervisor is dead.
     unsafe { command.pre_exec(die_with_the_supervisor) };
     command.spawn().map_err(failed)
 }

@@ -1,8 +1,8 @@
-//! Cleaning up in the transport after processes that died.
+//! Removes the transport's resources of dead processes.
 //!
-//! The transport's own cleaning does the work; here is what it stumbles over. A process killed in the middle of making a port
-//! can leave a shared-memory file of no length, and whoever opens that waits for ever; or a tag of no content, and cleaning
-//! fails for ever. Both are removed first. What has not been seen yet is caught by a time limit.
+//! The transport's own cleanup does this, except in two cases, which are handled first. A process that is killed while it creates
+//! a port can leave an empty shared-memory file, and every process that opens it waits for ever; or an empty tag, and every
+//! cleanup fails. A time limit covers unknown cases.
 
 use std::{
     collections::HashSet, fs, os::unix::fs::PermissionsExt, path::Path, sync::mpsc, thread,
@@ -17,25 +17,25 @@ use iceoryx2::{
 use super::SuperviseError;
 use crate::{Manifest, services};
 
-/// Cleaning takes milliseconds; after so long it hangs.
+/// Time limit of a cleanup, which normally takes milliseconds.
 const LIMIT: Duration = Duration::from_secs(3);
-/// A finished tag cannot be written to; one that its maker died over still can.
-const HALF_MADE: u32 = 0o600;
+/// File mode of an incomplete tag. A complete one is read-only.
+const INCOMPLETE: u32 = 0o600;
 
 type TransportNode = iceoryx2::node::Node<services::Ipc>;
 
-/// Removes all that dead processes of the run left in the transport. It must be done before one is started again:
-/// then there is room for exactly one publisher a topic, and old and new samples never mix.
-pub(super) fn after_the_dead(
+/// Removes all resources of dead processes. This must precede a restart: a topic has room for exactly one publisher, and old and
+/// new samples must not mix.
+pub(super) fn remove_dead(
     manifest: &Manifest,
     transport: &Config,
-    nobody_lives: bool,
+    all_dead: bool,
 ) -> Result<(), SuperviseError> {
     let (manifest, transport) = (manifest.clone(), transport.clone());
     let (done, finished) = mpsc::channel();
-    // A thread, for if it hangs nothing can end it.
+    // On a thread of its own, since a cleanup that hangs cannot be cancelled.
     thread::spawn(move || {
-        let cleaned = clean(&manifest, &transport, nobody_lives);
+        let cleaned = clean(&manifest, &transport, all_dead);
         let _ = done.send(cleaned);
     });
     match finished.recv_timeout(LIMIT) {
@@ -44,17 +44,17 @@ pub(super) fn after_the_dead(
     }
 }
 
-fn clean(manifest: &Manifest, transport: &Config, nobody_lives: bool) -> bool {
+fn clean(manifest: &Manifest, transport: &Config, all_dead: bool) -> bool {
     let dead = dead_nodes(transport);
     let ports = ports_of(manifest, &dead);
     unlink_empty_files(Path::new("/dev/shm"), &manifest.prefix, |name| {
-        nobody_lives || ports.iter().any(|port| name.contains(port.as_str()))
+        all_dead || ports.iter().any(|port| name.contains(port.as_str()))
     });
     if remove_dead_nodes(transport) {
         return true;
     }
     for node in &dead {
-        unlink_half_made_tags(&manifest.root.join("nodes").join(node));
+        unlink_incomplete_tags(&manifest.root.join("nodes").join(node));
     }
     remove_dead_nodes(transport)
 }
@@ -81,7 +81,7 @@ fn remove_dead_nodes(transport: &Config) -> bool {
     all && listed.is_ok()
 }
 
-/// The ids of dead processes' ports: each has a tag `<prefix><port id>.port_tag` in its node's directory.
+/// Returns the ids of the ports of dead processes: each has a tag `<prefix><port id>.port_tag` in the directory of its node.
 fn ports_of(manifest: &Manifest, dead: &[String]) -> HashSet<String> {
     let names = |node: &String| {
         fs::read_dir(manifest.root.join("nodes").join(node))
@@ -102,7 +102,7 @@ fn ports_of(manifest: &Manifest, dead: &[String]) -> HashSet<String> {
         .collect()
 }
 
-/// Removes files of no length whose names are the run's and pass `is_dead`.
+/// Removes empty files of the run whose names pass `is_dead`.
 fn unlink_empty_files(directory: &Path, prefix: &str, is_dead: impl Fn(&str) -> bool) {
     for file in fs::read_dir(directory).into_iter().flatten().flatten() {
         let name = file.file_name().to_string_lossy().into_owned();
@@ -113,15 +113,15 @@ fn unlink_empty_files(directory: &Path, prefix: &str, is_dead: impl Fn(&str) -> 
     }
 }
 
-/// Removes tags that a process died over; finished ones are needed for the cleaning.
-fn unlink_half_made_tags(directory: &Path) {
+/// Removes tags that a process died creating. The cleanup needs the complete ones.
+fn unlink_incomplete_tags(directory: &Path) {
     for file in fs::read_dir(directory).into_iter().flatten().flatten() {
         let name = file.file_name().to_string_lossy().into_owned();
         let tag = name.ends_with(".service_tag") || name.ends_with(".port_tag");
-        let half_made = file
+        let incomplete = file
             .metadata()
-            .is_ok_and(|f| f.len() == 0 && f.permissions().mode() & 0o777 == HALF_MADE);
-        if tag && half_made {
+            .is_ok_and(|f| f.len() == 0 && f.permissions().mode() & 0o777 == INCOMPLETE);
+        if tag && incomplete {
             let _ = fs::remove_file(file.path());
         }
     }
@@ -153,14 +153,14 @@ mod tests {
     }
 
     #[test]
-    fn finished_tags_stay() {
+    fn complete_tags_stay() {
         let directory = tempfile::tempdir().unwrap();
         for (name, mode) in [("a.port_tag", 0o600), ("b.port_tag", 0o400)] {
             let path = directory.path().join(name);
             fs::write(&path, b"").unwrap();
             fs::set_permissions(&path, fs::Permissions::from_mode(mode)).unwrap();
         }
-        unlink_half_made_tags(directory.path());
+        unlink_incomplete_tags(directory.path());
         assert!(
             !directory.path().join("a.port_tag").exists()
                 && directory.path().join("b.port_tag").exists()

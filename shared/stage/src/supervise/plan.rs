@@ -1,4 +1,4 @@
-//! What the supervisor is asked for, what it tells meanwhile, and what it says at the end.
+//! The supervisor's plan, events, report and errors.
 
 use std::{collections::BTreeMap, time::Duration};
 
@@ -9,29 +9,29 @@ use thiserror::Error;
 use super::child::Death;
 use crate::{Manifest, StageCounters, StageError};
 
-/// A run.
+/// The plan of a run.
 #[derive(Debug)]
 pub struct Plan {
-    /// What all its processes must know.
+    /// The manifest, which all processes read.
     pub manifest: Manifest,
-    /// Its processes, in the order of the stream.
+    /// The processes, in the order of the stream.
     pub stages: Vec<StagePlan>,
-    /// Start everybody again when no pose has come for so long; `None`: wait for ever.
+    /// Restart all stages after this time without a new pose; `None`: never.
     pub stall_timeout: Option<Duration>,
 }
 
 /// One process of a run.
 #[derive(Clone, Debug)]
 pub struct StagePlan {
-    /// Its name: a stage's, or any other for a process beside them.
+    /// The name of the stage, or any other for an additional process.
     pub name: String,
-    /// Program and arguments; run as they are, never through a shell.
+    /// Program and arguments, executed without a shell.
     pub command: Vec<String>,
-    /// What to do when it dies.
+    /// The restart policy.
     pub restart: RestartPolicy,
-    /// It goes on when the others are restarted: a live source, since a radar does not wait.
+    /// True if it keeps running when the others are restarted: a live source, since a radar does not wait.
     pub outlives_restarts: bool,
-    /// Its death restarts the others too: it owns state that a restart alone does not bring back.
+    /// True if its death restarts the others too: it has state that its own restart does not recover.
     pub restarts_all: bool,
 }
 
@@ -57,61 +57,61 @@ impl Default for RestartPolicy {
     }
 }
 
-/// What happens while a run goes on.
+/// An event during a run.
 #[derive(Debug)]
 pub enum Event<'a> {
     /// A process was started for the first time.
     Started {
-        /// Which.
+        /// The name of the stage.
         stage: &'a str,
-        /// Its process id.
+        /// The process id.
         pid: u32,
     },
     /// A new pose.
     Pose(&'a PoseHeader),
     /// A process has died.
     Died {
-        /// Which.
+        /// The name of the stage.
         stage: &'a str,
-        /// How.
+        /// The cause.
         death: &'a Death,
     },
-    /// The dead, or everybody, were started again.
+    /// Stages were restarted after a death.
     Restarted {
-        /// Whether all were.
-        everybody: bool,
+        /// True if all stages were restarted, false if only the dead ones were.
+        all: bool,
     },
-    /// No pose for too long: everybody is about to be started again.
+    /// No pose for too long: all stages are about to be restarted.
     Stalled,
 }
 
-/// How a run ended.
+/// The end of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Ending {
     /// All scans are in the trajectory.
     Complete,
-    /// SIGINT or SIGTERM.
+    /// Stopped by SIGINT or SIGTERM.
     Interrupted,
 }
 
-/// What the supervisor knows at the end.
+/// The supervisor's report at the end of a run.
 #[derive(Debug)]
 pub struct Report {
-    /// How it ended.
+    /// The end of the run.
     pub ending: Ending,
-    /// Restarts by stage.
+    /// Number of restarts by stage.
     pub restarts: BTreeMap<String, usize>,
-    /// From each death to the first pose that the new process worked on.
+    /// Time from each death to the first pose with work of the new process.
     pub recovery: Vec<Duration>,
-    /// What each stage counted in its last life.
+    /// Counters of the last process of each stage.
     pub counters: BTreeMap<String, StageCounters>,
 }
 
-/// Why a run could not go on.
+/// An error that ends a run.
 #[derive(Debug, Error)]
 pub enum SuperviseError {
-    /// The supervisor's own part in the transport.
+    /// The supervisor's own access to the transport or to files.
     #[error(transparent)]
     Stage(#[from] StageError),
     /// A command cannot be started.
@@ -119,44 +119,44 @@ pub enum SuperviseError {
         "cannot start {stage} with `{command}`: {source}; see [stages.{stage}] command in the configuration"
     )]
     Spawn {
-        /// Which stage.
+        /// The name of the stage.
         stage: String,
-        /// Its command.
+        /// The command.
         command: String,
-        /// What the operating system said.
+        /// The system error.
         source: std::io::Error,
     },
-    /// A stage that would fail the same way again.
-    #[error("{words}")]
-    Hopeless {
-        /// What it said.
-        words: String,
+    /// A stage failed in a way that a restart would repeat.
+    #[error("{message}")]
+    Permanent {
+        /// The stage's own error message.
+        message: String,
     },
-    /// A stage that dies again and again.
+    /// A stage died more often than its policy allows.
     #[error(
-        "{stage} died {times} times within {window_s} s, the last time by {how}{words}; giving up"
+        "{stage} died {times} times within {window_s} s, the last time by {cause}{output}; giving up"
     )]
     TooManyDeaths {
-        /// Which.
+        /// The name of the stage.
         stage: String,
-        /// How often.
+        /// Number of deaths.
         times: usize,
-        /// Within how long.
+        /// The time in which they were counted, s.
         window_s: f64,
-        /// How it died last.
-        how: String,
-        /// What it said last.
-        words: String,
+        /// The cause of the last death.
+        cause: String,
+        /// The last line of output, in parentheses.
+        output: String,
     },
-    /// Nothing comes out, though nobody dies.
+    /// No pose, although no stage died.
     #[error(
-        "no pose for {after:?}, three times in a row, though no stage died; see log.jsonl for what they wait for"
+        "no pose for {after:?}, three times in a row, although no stage died; log.jsonl shows what the stages wait for"
     )]
     Stalled {
-        /// The limit.
+        /// The time limit.
         after: Duration,
     },
-    /// The transport's own cleaning hangs: only a fresh start under new names helps.
+    /// The transport's cleanup hangs; only a new run under new names helps.
     #[error("the transport does not finish cleaning up after a dead process")]
     TransportStuck,
 }

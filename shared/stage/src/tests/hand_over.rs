@@ -1,11 +1,11 @@
-//! What a reader is given, whenever it comes and whoever dies.
+//! The items that a reader receives when it subscribes late or the publisher restarts.
 
 use gyre_messages::{Message, Pose, flag};
 
 use super::{Run, WINDOW, reader, send, writer};
 use crate::{StageError, reader::Reader};
 
-/// Works through all that has come, and says which items those were.
+/// Takes all items from the queue and returns their sequence numbers.
 fn take_all(reader: &mut Reader<Pose>) -> Vec<u64> {
     let mut taken = Vec::new();
     while let Some(head) = reader.head().unwrap() {
@@ -16,7 +16,7 @@ fn take_all(reader: &mut Reader<Pose>) -> Vec<u64> {
 }
 
 #[test]
-fn a_late_reader_first_gets_the_history_in_order_and_each_item_once() {
+fn a_late_reader_receives_the_history_in_order_and_each_item_once() {
     let run = Run::new();
     let poses = writer::<Pose>(&run.manifest);
     let history = Pose::sizes(&WINDOW).history as u64;
@@ -24,7 +24,7 @@ fn a_late_reader_first_gets_the_history_in_order_and_each_item_once() {
     let mut late = reader(&run.manifest, None);
     assert!(
         take_all(&mut late).is_empty(),
-        "a newcomer is answered when the publisher next looks"
+        "a handshake is answered when the publisher reads it"
     );
     poses.accept_readers().unwrap();
     (history + 3..history + 5).for_each(|seq| send(&poses, seq, 0));
@@ -32,7 +32,7 @@ fn a_late_reader_first_gets_the_history_in_order_and_each_item_once() {
 }
 
 #[test]
-fn items_that_were_had_are_skipped_and_counted() {
+fn duplicates_are_skipped_and_counted() {
     let run = Run::new();
     let mut restarted = reader(&run.manifest, Some(3));
     let poses = writer::<Pose>(&run.manifest);
@@ -42,7 +42,7 @@ fn items_that_were_had_are_skipped_and_counted() {
 }
 
 #[test]
-fn a_missing_item_is_an_error() {
+fn a_sequence_gap_is_an_error() {
     let run = Run::new();
     let mut reader = reader::<Pose>(&run.manifest, None);
     let poses = writer::<Pose>(&run.manifest);
@@ -63,21 +63,21 @@ fn a_missing_item_is_an_error() {
 }
 
 #[test]
-fn a_publishers_second_life_repeats_and_goes_on_where_the_first_one_ended() {
+fn a_restarted_publisher_repeats_items_and_continues_the_sequence() {
     let run = Run::new();
     let mut reader = reader(&run.manifest, None);
-    let first_life = writer::<Pose>(&run.manifest);
-    (0..3).for_each(|seq| send(&first_life, seq, 0));
+    let first_process = writer::<Pose>(&run.manifest);
+    (0..3).for_each(|seq| send(&first_process, seq, 0));
     assert_eq!(reader.head().unwrap().map(|head| head.item().seq), Some(0));
-    drop(first_life);
-    let second_life = writer::<Pose>(&run.manifest);
-    (1..5).for_each(|seq| send(&second_life, seq, 0));
+    drop(first_process);
+    let second_process = writer::<Pose>(&run.manifest);
+    (1..5).for_each(|seq| send(&second_process, seq, 0));
     assert_eq!(take_all(&mut reader), [0, 1, 2, 3, 4]);
     assert_eq!(reader.duplicates(), 2);
 }
 
 #[test]
-fn the_item_before_stays_readable_however_long_the_stream() {
+fn the_previous_item_stays_readable() {
     let run = Run::new();
     let mut reader = reader::<Pose>(&run.manifest, None);
     let poses = writer::<Pose>(&run.manifest);
@@ -88,7 +88,7 @@ fn the_item_before_stays_readable_however_long_the_stream() {
             Some(seq)
         );
         assert_eq!(
-            reader.before().map(|before| before.item().seq),
+            reader.previous().map(|previous| previous.item().seq),
             seq.checked_sub(1)
         );
         reader.advance();
@@ -96,7 +96,7 @@ fn the_item_before_stays_readable_however_long_the_stream() {
 }
 
 #[test]
-fn where_the_chain_starts_anew_there_is_no_item_before() {
+fn a_new_chain_has_no_previous_item() {
     let run = Run::new();
     let mut reader = reader::<Pose>(&run.manifest, None);
     let poses = writer::<Pose>(&run.manifest);
@@ -105,11 +105,11 @@ fn where_the_chain_starts_anew_there_is_no_item_before() {
     reader.head().unwrap();
     reader.advance();
     reader.head().unwrap();
-    assert!(reader.current().is_some() && reader.before().is_none());
+    assert!(reader.current().is_some() && reader.previous().is_none());
 }
 
 #[test]
-fn a_stranger_that_counts_to_the_end_of_numbers_is_survived() {
+fn the_largest_sequence_number_does_not_overflow() {
     let run = Run::new();
     let mut reader = reader(&run.manifest, None);
     let poses = writer::<Pose>(&run.manifest);

@@ -1,4 +1,4 @@
-//! Who is woken, how fast, and that nobody is woken for nothing.
+//! Wake-ups: their latency, and that none is superfluous.
 
 use std::{
     sync::mpsc,
@@ -14,10 +14,10 @@ use crate::wake::Signals;
 const LONG: Duration = Duration::from_secs(5);
 
 #[test]
-fn a_sleeper_is_woken_by_a_message() {
+fn a_waiting_reader_is_woken_by_a_message() {
     let run = Run::new();
     let signals = Signals::install().unwrap();
-    let mut sleeper = reader::<Pose>(&run.manifest, None);
+    let mut waiting = reader::<Pose>(&run.manifest, None);
     let manifest = run.manifest.clone();
     let (received, stay) = mpsc::channel();
     let sender = thread::spawn(move || {
@@ -25,15 +25,15 @@ fn a_sleeper_is_woken_by_a_message() {
         thread::sleep(Duration::from_millis(50));
         let sent = Instant::now();
         send(&poses, 0, 0);
-        // A publisher that leaves before its reader has met it takes its message along.
+        // A publisher that exits before its reader has connected takes its message along.
         stay.recv().unwrap();
         sent
     });
-    // Other tests' children may wake us too.
-    while sleeper.head().unwrap().is_none() {
+    // Children of other tests may wake this process too.
+    while waiting.head().unwrap().is_none() {
         assert!(
             !signals
-                .wait(&[sleeper.listener()], None, LONG)
+                .wait(&[waiting.listener()], None, LONG)
                 .unwrap()
                 .timed_out
         );
@@ -46,18 +46,18 @@ fn a_sleeper_is_woken_by_a_message() {
 }
 
 #[test]
-fn a_greeting_is_answered_once() {
+fn a_handshake_is_answered_once() {
     let run = Run::new();
     let poses = writer::<Pose>(&run.manifest);
-    let newcomer = reader::<Pose>(&run.manifest, None);
+    let late = reader::<Pose>(&run.manifest, None);
     let woken = || {
         let mut times = 0;
-        newcomer.listener().try_wait(|_| times += 1).unwrap();
+        late.listener().try_wait(|_| times += 1).unwrap();
         times
     };
     poses.accept_readers().unwrap();
     assert_eq!(woken(), 1);
-    // Who is woken greets: if that woke others, greetings would go around the processes for ever.
+    // A second answer without a handshake would let wake-ups circulate for ever.
     poses.accept_readers().unwrap();
     assert_eq!(woken(), 0);
 }

@@ -1,4 +1,4 @@
-//! A payload is read where it was written: two processes, one piece of memory.
+//! Zero copy: a payload is read where another process wrote it.
 
 use std::{
     env, fs,
@@ -13,7 +13,7 @@ use crate::{Manifest, run, wake::Signals};
 
 const RASTER: usize = 96;
 
-/// Where an address lies: in which file, how far from its start, and with which rights.
+/// The mapping of an address: file, offset and access rights.
 #[derive(Debug, PartialEq)]
 struct Place {
     inode: u64,
@@ -43,7 +43,7 @@ fn value(cell: usize) -> f32 {
     cell as f32 * 0.5
 }
 
-/// The publishing process: this test again, started by the test below.
+/// The publishing process, started by the test below.
 #[test]
 fn publisher() {
     let Some(root) = env::var_os(run::ENVIRONMENT) else {
@@ -67,7 +67,7 @@ fn publisher() {
         "\nWROTE {} {} {} {}",
         place.inode, place.offset, place.path, place.rights
     );
-    // Lives until its reader is through.
+    // Wait until the reader is done.
     let _ = std::io::stdin().lines().next();
 }
 
@@ -82,7 +82,7 @@ fn start_publisher(manifest: &Manifest) -> Child {
 }
 
 #[test]
-fn a_reader_in_another_process_sees_the_publishers_own_memory() {
+fn a_reader_in_another_process_maps_the_publishers_memory() {
     let run = Run::new();
     let signals = Signals::install().unwrap();
     let mut masked = reader::<Masked>(&run.manifest, None);
@@ -115,8 +115,8 @@ fn a_reader_in_another_process_sees_the_publishers_own_memory() {
             .starts_with(&format!("/dev/shm/{}", run.manifest.prefix))
             && place.path.ends_with(".data")
     );
-    assert_eq!(place.rights, "r--s", "a reader cannot damage its input");
-    assert_eq!(cells.as_ptr() as usize % 64, 0, "fit for vector registers");
+    assert_eq!(place.rights, "r--s", "readers map the payload read-only");
+    assert_eq!(cells.as_ptr() as usize % 64, 0, "aligned for vector units");
     drop(child.stdin.take());
     assert!(child.wait().unwrap().success());
 }

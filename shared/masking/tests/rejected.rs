@@ -1,4 +1,4 @@
-//! Models and runtimes that do not fit: one sentence that says what, where, and what to do.
+//! Models and runtimes that do not fit are rejected with one sentence: the cause, the place and the remedy.
 
 #![allow(clippy::unwrap_used)]
 
@@ -16,8 +16,8 @@ use ndarray::Array3;
 use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
-/// Asserts that the network is refused with one sentence that has all of these words.
-fn refused(config: &MaskingConfig, raster: &RasterConfig, words: &[&str]) {
+/// Asserts that the network is rejected with one sentence that has all of these words.
+fn rejected(config: &MaskingConfig, raster: &RasterConfig, words: &[&str]) {
     let sentence = Network::load(config, raster).unwrap_err().to_string();
     assert!(
         !sentence.contains('\n') && !sentence.contains("/onnxruntime_src/"),
@@ -28,7 +28,7 @@ fn refused(config: &MaskingConfig, raster: &RasterConfig, words: &[&str]) {
     }
 }
 
-/// A copy of a model in a folder of its own, with its card changed from one text to another.
+/// Copies a model into a folder of its own, with one text of its card replaced.
 fn changed(name: &str, from: &str, to: &str) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let copy = folder.path().join(card(name).file_name().unwrap());
@@ -43,8 +43,8 @@ fn changed(name: &str, from: &str, to: &str) -> (TempDir, PathBuf) {
     (folder, copy)
 }
 
-/// A copy of a model with other bytes, which its card vouches for.
-fn vouched_for(bytes: &[u8]) -> (TempDir, PathBuf) {
+/// Copies a model with other bytes and a card with their checksum.
+fn with_valid_checksum(bytes: &[u8]) -> (TempDir, PathBuf) {
     let sha256 = |bytes: &[u8]| -> String {
         Sha256::digest(bytes)
             .iter()
@@ -57,7 +57,7 @@ fn vouched_for(bytes: &[u8]) -> (TempDir, PathBuf) {
     (folder, copy)
 }
 
-// The model. Of these all but the last few are told without ONNX Runtime.
+// Models. Most of these errors are found without ONNX Runtime.
 
 #[test]
 fn no_model_is_named() {
@@ -65,7 +65,7 @@ fn no_model_is_named() {
         model: None,
         ..learned(Path::new(""))
     };
-    refused(
+    rejected(
         &config,
         &raster(),
         &["masking.model does not name a model", "models/NAME.toml"],
@@ -74,7 +74,7 @@ fn no_model_is_named() {
 
 #[test]
 fn the_card_is_missing() {
-    refused(
+    rejected(
         &learned(Path::new("/no/such.toml")),
         &raster(),
         &["card /no/such.toml", "No such file"],
@@ -83,7 +83,7 @@ fn the_card_is_missing() {
 
 #[test]
 fn the_model_is_named_in_place_of_its_card() {
-    refused(
+    rejected(
         &learned(&card("single-31").with_extension("onnx")),
         &raster(),
         &["single-31.onnx", ".toml beside it"],
@@ -93,7 +93,7 @@ fn the_model_is_named_in_place_of_its_card() {
 #[test]
 fn the_card_lacks_a_key() {
     let (_folder, card) = changed("single-31", "sha256", "checksum");
-    refused(
+    rejected(
         &learned(&card),
         &raster(),
         &[
@@ -105,16 +105,16 @@ fn the_card_lacks_a_key() {
 }
 
 #[test]
-fn the_model_looks_at_more_scans_than_there_are() {
+fn the_model_takes_three_scans() {
     let (_folder, card) = changed("single-31", "inputs = 1", "inputs = 3");
-    refused(&learned(&card), &raster(), &["model.inputs is 3", "1 or 2"]);
+    rejected(&learned(&card), &raster(), &["model.inputs is 3", "1 or 2"]);
 }
 
 #[test]
 fn the_rasters_are_of_another_size() {
     let config = learned(&card("single-31"));
     let other = RasterConfig { n: 255, ..raster() };
-    refused(
+    rejected(
         &config,
         &other,
         &[
@@ -128,7 +128,7 @@ fn the_rasters_are_of_another_size() {
         cell_m: 0.4,
         ..raster()
     };
-    refused(
+    rejected(
         &config,
         &other,
         &["raster.cell_m is 0.4", "set raster.cell_m = 0.8"],
@@ -138,7 +138,7 @@ fn the_rasters_are_of_another_size() {
 #[test]
 fn the_models_file_is_missing() {
     let (_folder, card) = changed("single-31", "single-31.onnx", "gone.onnx");
-    refused(
+    rejected(
         &learned(&card),
         &raster(),
         &["file", "gone.onnx", "No such file"],
@@ -151,7 +151,7 @@ fn the_models_file_is_cut_short() {
     let file = card.with_extension("onnx");
     let bytes = fs::read(&file).unwrap();
     fs::write(&file, &bytes[..bytes.len() - 1]).unwrap();
-    refused(
+    rejected(
         &learned(&card),
         &raster(),
         &[
@@ -163,12 +163,12 @@ fn the_models_file_is_cut_short() {
 }
 
 #[test]
-fn the_model_is_not_the_one_that_the_run_began_with() {
+fn the_model_is_not_that_of_the_configured_checksum() {
     let config = MaskingConfig {
         sha256: Some("0123".to_owned()),
         ..learned(&card("single-31"))
     };
-    refused(
+    rejected(
         &config,
         &raster(),
         &[
@@ -180,19 +180,19 @@ fn the_model_is_not_the_one_that_the_run_began_with() {
 }
 
 #[test]
-fn what_onnx_runtime_cannot_read_is_refused_in_its_words() {
+fn a_model_that_onnx_runtime_cannot_read_is_rejected() {
     if !runtime_is_installed() {
         return;
     }
     let bytes = fs::read(card("single-31").with_extension("onnx")).unwrap();
-    let (_folder, cut_short) = vouched_for(&bytes[..bytes.len() / 2]);
-    refused(
+    let (_folder, cut_short) = with_valid_checksum(&bytes[..bytes.len() / 2]);
+    rejected(
         &learned(&cut_short),
         &raster(),
         &["ONNX Runtime cannot load", "single-31.onnx"],
     );
-    let (_folder, other) = vouched_for(b"no model");
-    refused(
+    let (_folder, other) = with_valid_checksum(b"no model");
+    rejected(
         &learned(&other),
         &raster(),
         &["ONNX Runtime cannot load", "single-31.onnx"],
@@ -200,11 +200,11 @@ fn what_onnx_runtime_cannot_read_is_refused_in_its_words() {
 }
 
 #[test]
-fn operators_that_are_too_new_are_told() {
+fn operators_that_are_too_new_are_rejected() {
     if !runtime_is_installed() {
         return;
     }
-    refused(
+    rejected(
         &learned(&card("opset-99")),
         &raster(),
         &[
@@ -216,20 +216,20 @@ fn operators_that_are_too_new_are_told() {
 }
 
 #[test]
-fn a_model_that_takes_something_else_than_its_card_says_is_told() {
+fn a_model_with_other_inputs_than_its_card_states_is_rejected() {
     if !runtime_is_installed() {
         return;
     }
     let (_folder, card) = changed("pair-31", "inputs = 2", "inputs = 1");
     let words = [
         "takes `scans` Float32 [1, 2, 31, 31]",
-        "must have the one `scans` Float32 [1, 1, 31, 31]",
+        "must have only `scans` Float32 [1, 1, 31, 31]",
     ];
-    refused(&learned(&card), &raster(), &words);
+    rejected(&learned(&card), &raster(), &words);
 }
 
 #[test]
-fn factors_that_are_nan_are_refused() {
+fn factors_that_are_nan_are_rejected() {
     if !runtime_is_installed() {
         return;
     }
@@ -244,16 +244,16 @@ fn factors_that_are_nan_are_refused() {
     );
 }
 
-// Who computes it.
+// Runtimes and execution providers.
 
 #[test]
-fn a_runtime_that_is_not_there_is_told_with_the_command_that_installs_it() {
+fn a_missing_runtime_is_reported_with_the_install_command() {
     let runtime = Some(PathBuf::from("/no/such/folder"));
     let config = MaskingConfig {
         runtime,
         ..learned(&card("single-31"))
     };
-    refused(
+    rejected(
         &config,
         &raster(),
         &["masking.runtime is /no/such/folder", INSTALL],
@@ -262,7 +262,7 @@ fn a_runtime_that_is_not_there_is_told_with_the_command_that_installs_it() {
 
 #[cfg(not(any(feature = "cuda", feature = "tensorrt", feature = "openvino")))]
 #[test]
-fn a_provider_that_is_not_built_in_is_told_with_the_feature_that_has_it() {
+fn a_provider_that_is_not_built_in_is_reported_with_its_feature() {
     if !runtime_is_installed() {
         return;
     }
@@ -275,7 +275,7 @@ fn a_provider_that_is_not_built_in_is_told_with_the_feature_that_has_it() {
             provider,
             ..learned(&card("single-31"))
         };
-        refused(
+        rejected(
             &config,
             &raster(),
             &[feature, &format!("--features {feature}"), "`cpu`"],
@@ -283,10 +283,10 @@ fn a_provider_that_is_not_built_in_is_told_with_the_feature_that_has_it() {
     }
 }
 
-// What is not refused, but told.
+// Mismatches that are reported but not rejected.
 
 #[test]
-fn what_the_network_was_not_trained_for_is_named() {
+fn settings_that_differ_from_training_are_listed() {
     let card = |training: &str| {
         let (_folder, path) = changed(
             "single-31",
@@ -300,21 +300,21 @@ fn what_the_network_was_not_trained_for_is_named() {
         sampling: Sampling::Bilinear,
         ..raster()
     };
-    assert!(card("").unlike_training(&config, &other).is_empty());
+    assert!(card("").training_mismatches(&config, &other).is_empty());
     assert!(
         card("floor = 20\ncompensate = true")
-            .unlike_training(&config, &raster())
+            .training_mismatches(&config, &raster())
             .is_empty()
     );
     assert_eq!(
-        card("floor = 0\ncompensate = false").unlike_training(&config, &raster()),
+        card("floor = 0\ncompensate = false").training_mismatches(&config, &raster()),
         [
             "masking.threshold is 20 instead of 0",
             "masking.compensate is true instead of false"
         ]
     );
     assert_eq!(
-        card("undo_doppler = false").unlike_training(&config, &raster()),
+        card("undo_doppler = false").training_mismatches(&config, &raster()),
         ["masking.undo_doppler is true instead of false"]
     );
     let facts = "cell_m = 0.8\nsampling = \"averaged\"\naveraged_cells = 2.0\nmin_range_m = 3.0";
@@ -322,11 +322,11 @@ fn what_the_network_was_not_trained_for_is_named() {
     let card = Card::read(&learned(&path)).unwrap();
     let nearer = "raster.min_range_m is 2 instead of 3";
     assert_eq!(
-        card.unlike_training(&config, &raster()),
+        card.training_mismatches(&config, &raster()),
         [nearer, "raster.averaged_cells is 1 instead of 2"]
     );
     assert_eq!(
-        card.unlike_training(&config, &other),
+        card.training_mismatches(&config, &other),
         [nearer, "raster.sampling is bilinear instead of averaged"]
     );
 }

@@ -1,0 +1,65 @@
+//! The pace of playback.
+
+use crate::clock;
+
+/// Maps sensor time to run time: `due = start + (complete - first) / rate`.
+#[derive(Clone, Copy)]
+pub(super) struct Pace {
+    rate: f64,
+    start_ns: i64,
+    first_ns: i64,
+}
+
+impl Pace {
+    /// The pace at which a scan that is complete at `first_ns` on the sensor's clock is due now.
+    pub fn new(rate: f64, first_ns: i64) -> Self {
+        Self {
+            rate,
+            start_ns: clock::now_ns(),
+            first_ns,
+        }
+    }
+
+    /// Returns when a scan is due.
+    pub fn due_ns(&self, complete_ns: i64) -> i64 {
+        self.start_ns
+            .saturating_add((complete_ns.saturating_sub(self.first_ns) as f64 / self.rate) as i64)
+    }
+
+    /// Delays the playback if a scan is late, so that it is due now. Returns the delay, ns.
+    pub fn slip(&mut self, complete_ns: i64) -> u64 {
+        let late_ns = clock::now_ns()
+            .saturating_sub(self.due_ns(complete_ns))
+            .max(0);
+        self.start_ns = self.start_ns.saturating_add(late_ns);
+        late_ns as u64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rate_scales_the_sensors_clock() {
+        let pace = Pace {
+            rate: 4.0,
+            start_ns: 1000,
+            first_ns: 500,
+        };
+        assert_eq!(pace.due_ns(500 + 4000), 2000);
+    }
+
+    #[test]
+    fn playback_slips_by_the_delay_of_a_late_scan_and_by_no_more() {
+        let start_ns = clock::now_ns() - 1_000_000_000;
+        let mut pace = Pace {
+            rate: 1.0,
+            start_ns,
+            first_ns: 0,
+        };
+        assert!(pace.slip(500_000_000) >= 500_000_000);
+        assert!(pace.due_ns(500_000_000) <= clock::now_ns());
+        assert_eq!(pace.slip(10_000_000_000), 0);
+    }
+}

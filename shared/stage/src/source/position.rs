@@ -1,0 +1,118 @@
+//! The position of the source in a recording.
+
+use gyre_messages::{Item, flag};
+
+/// The next scan to read, and its numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Position {
+    /// Index of the scan in the recording.
+    pub index: usize,
+    /// Sequence number among the published scans. In live mode masking numbers the chain of motions itself.
+    pub published: u64,
+    /// The scan published before it.
+    previous: Option<u64>,
+}
+
+impl Position {
+    /// Resumes at the scan of the newest pose, or at the previous one if the mask takes two scans: the other stages need it as
+    /// their previous scan.
+    pub fn resume(newest_pose: &Item, masks_pairs: bool) -> Self {
+        let newest = newest_pose;
+        let in_chain = !newest.is(flag::BREAK);
+        if newest.is(flag::BASE) || (masks_pairs && newest.published == 0) {
+            return Self::default();
+        }
+        if masks_pairs && in_chain {
+            return Self {
+                index: newest.previous_scan as usize,
+                published: newest.published - 1,
+                previous: None,
+            };
+        }
+        Self {
+            index: newest.scan as usize,
+            published: newest.published,
+            previous: in_chain.then_some(newest.previous_scan),
+        }
+    }
+
+    /// Steps past a scan that was published.
+    pub fn advance(&mut self) {
+        self.previous = Some(self.index as u64);
+        self.drop_scan();
+    }
+
+    /// Steps past a scan that is dropped. It keeps its number, so that the gap shows.
+    pub fn drop_scan(&mut self) {
+        self.index += 1;
+        self.published = self.published.saturating_add(1);
+    }
+
+    /// Returns the header of the scan.
+    pub fn item(&self) -> Item {
+        // A resumed chain has no break: the other stages have processed its first scan before.
+        let flags = if self.published == 0 { flag::BREAK } else { 0 };
+        let scan = self.index as u64;
+        Item {
+            seq: self.published,
+            published: self.published,
+            scan,
+            previous_scan: self.previous.unwrap_or(scan),
+            flags,
+            ..Item::default()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn newest_pose() -> Item {
+        Item {
+            seq: 9,
+            published: 31,
+            scan: 40,
+            previous_scan: 37,
+            ..Item::default()
+        }
+    }
+
+    #[test]
+    fn a_restart_begins_with_the_scan_of_the_newest_pose() {
+        assert_eq!(
+            Position::resume(&newest_pose(), false),
+            Position {
+                index: 40,
+                published: 31,
+                previous: Some(37)
+            }
+        );
+        assert_eq!(
+            Position::resume(&newest_pose(), true),
+            Position {
+                index: 37,
+                published: 30,
+                previous: None
+            }
+        );
+        let base = Item {
+            flags: flag::BASE,
+            ..newest_pose()
+        };
+        assert_eq!(Position::resume(&base, false), Position::default());
+    }
+
+    #[test]
+    fn a_restart_in_live_mode_continues_the_sources_own_count() {
+        let position = Position::resume(&newest_pose(), false);
+        assert_eq!((position.index, position.item().published), (40, 31));
+    }
+
+    #[test]
+    fn only_the_very_first_scan_starts_a_chain() {
+        assert!(Position::default().item().is(flag::BREAK));
+        let resumed = Position::resume(&newest_pose(), true);
+        assert!(!resumed.item().is(flag::BREAK));
+    }
+}
