@@ -1,8 +1,8 @@
 //! `gyre masks`: pictures of what the mask keeps of scans.
 //!
-//! - [`inspector`]: masks scans one after the other as in a run, and inspects chosen ones;
-//! - [`inspection`]: what the mask keeps of one of them, in figures;
-//! - [`drawing`]: the same as a picture.
+//! - `inspector`: masks scans one after the other as in a run, and inspects chosen ones;
+//! - `inspection`: what the mask keeps of one of them, in figures;
+//! - `drawing`: the same as a picture.
 
 mod drawing;
 mod inspection;
