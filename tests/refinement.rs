@@ -260,7 +260,7 @@ fn a_map_that_was_lost_or_damaged_is_told_and_the_run_can_be_begun_anew() {
         let ended = run.finish();
         ended.failed_with(&[
             "refinement.map",
-            "does not hold what the refinement knew",
+            "does not have the state of the refinement",
             "--fresh",
         ]);
         assert!(

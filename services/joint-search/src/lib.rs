@@ -1,5 +1,5 @@
-//! The joint-search stage: rotation and translation between consecutive scans together, by trying every angle (Masking by
-//! Moving; `raw` in Weston et al., Table III). It replaces both halves of the decoupled search.
+//! The joint-search stage: an exhaustive search for rotation and translation between consecutive scans over every angle (Masking
+//! by Moving; `raw` in Weston et al., Table III). It replaces both stages of the decoupled search.
 
 use gyre_messages::{Masked, Motion, MotionEstimate, StageId};
 use gyre_radar::raster::RasterConfig;
@@ -11,10 +11,10 @@ use gyre_stage::{
     writer::Draft,
 };
 
-/// Runs the stage until it is told to stop.
+/// Runs the stage until SIGTERM.
 ///
 /// # Errors
-/// A configuration that no search can be built from, and what ends a stage.
+/// An invalid configuration, or an error of [`stage::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let config: ExhaustiveConfig = launch.section("exhaustive")?;

@@ -1,24 +1,23 @@
-//! A pose and a motion make the next pose.
+//! The composition of poses and motions.
 
 use gyre_geometry::{covariance, xy_yaw};
 use gyre_messages::{MotionHeader, PoseHeader};
 
-/// The pose after `motion`. Without a pose before, or with no motion (the chain's start), the vehicle stays where it is.
-///
-/// The covariance follows to first order (Checchin et al., Eqs. 1 and 2).
-pub fn compose(before: Option<&PoseHeader>, motion: &MotionHeader) -> PoseHeader {
+/// Composes the previous pose (the origin without one) and a motion (zero at the start of a chain) to the next pose. The covariance
+/// is propagated to first order (Checchin et al., Eqs. 1 and 2).
+pub fn compose(previous: Option<&PoseHeader>, motion: &MotionHeader) -> PoseHeader {
     let start = PoseHeader::default();
-    let before = before.unwrap_or(&start);
-    let after = before.pose().then(&motion.motion.motion());
-    let [x_m, y_m, yaw_rad] = xy_yaw(&after.motion);
+    let previous = previous.unwrap_or(&start);
+    let next = previous.pose().then(&motion.motion.motion());
+    let [x_m, y_m, yaw_rad] = xy_yaw(&next.motion);
     PoseHeader {
         item: motion.item,
         motion: motion.motion,
         x_m,
         y_m,
         yaw_rad,
-        covariance: covariance::pack(&after.covariance),
-        trajectory_version: before.trajectory_version,
+        covariance: covariance::pack(&next.covariance),
+        trajectory_version: previous.trajectory_version,
     }
 }
 

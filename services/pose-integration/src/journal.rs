@@ -1,7 +1,7 @@
-//! The journal: all that a run's results are made from. A file of poses, each with its motion and a check word.
+//! The journal: a file of poses, each with its motion and a checksum, from which all results of a run are made.
 //!
-//! One `write` a record. A record that was cut short by a death is found by its check word and cut off; what was in it had
-//! not been published yet. (A loss of power may take more: the operating system writes to the disk when it likes.)
+//! Each record is one `write`. A record that is cut short by a death is detected by its checksum and truncated; its pose had not
+//! been published. A power loss may lose more records, since the file is not synchronised to the disk.
 
 use std::{
     fs::{self, File, OpenOptions},
@@ -12,26 +12,26 @@ use std::{
 use gyre_messages::PoseHeader;
 use thiserror::Error;
 
-/// What a journal starts with; the number is the version of its records.
+/// The start of a journal, with the version of its records.
 const MAGIC: [u8; 16] = *b"gyre journal v3\n";
 const POSE: usize = size_of::<PoseHeader>();
 const RECORD: usize = POSE + 8;
 
-/// Why a journal cannot be used.
+/// An error of a journal.
 #[derive(Debug, Error)]
 pub enum JournalError {
-    /// The file.
+    /// The file cannot be read or written.
     #[error("journal {path}: {source}")]
     File {
-        /// Which.
+        /// The file.
         path: PathBuf,
-        /// What the operating system said.
+        /// The system error.
         source: io::Error,
     },
-    /// Another program's, or another version's.
+    /// The file is not a journal, or of another version.
     #[error("{path} is not a journal of this version: move it away, or choose another --out")]
     Foreign {
-        /// Which.
+        /// The file.
         path: PathBuf,
     },
 }
@@ -44,12 +44,15 @@ pub struct Journal {
     record: [u8; RECORD],
 }
 
-/// Where the journal of the run that writes to `out` lies.
+/// Returns the path of the journal of the run that writes to `out`.
 pub fn path(out: &Path) -> PathBuf {
     out.join("journal").join("poses.journal")
 }
 
-/// All sound records of a journal, oldest first; none where there is no journal.
+/// Reads all valid records of a journal, oldest first; none if there is no journal.
+///
+/// # Errors
+/// A file that cannot be read or is not a journal.
 pub fn read(path: &Path) -> Result<Vec<PoseHeader>, JournalError> {
     match fs::read(path) {
         Ok(bytes) => records(path, &bytes),
@@ -75,15 +78,18 @@ fn records(path: &Path, bytes: &[u8]) -> Result<Vec<PoseHeader>, JournalError> {
 
 fn decode(record: &[u8]) -> Option<PoseHeader> {
     let (pose, check) = record.split_at(POSE);
-    (check == check_word(pose)).then(|| bytemuck::pod_read_unaligned(pose))
+    (check == checksum(pose)).then(|| bytemuck::pod_read_unaligned(pose))
 }
 
-fn check_word(pose: &[u8]) -> [u8; 8] {
+fn checksum(pose: &[u8]) -> [u8; 8] {
     u64::from(crc32fast::hash(pose)).to_le_bytes()
 }
 
 impl Journal {
-    /// Opens or begins a journal, cuts off what is not sound, and returns what it holds.
+    /// Opens or creates a journal, truncates it after its last valid record, and returns its records.
+    ///
+    /// # Errors
+    /// A file that cannot be read or written, or is not a journal.
     pub fn open(path: &Path) -> Result<(Self, Vec<PoseHeader>), JournalError> {
         let failed = |source| JournalError::File {
             path: path.to_owned(),
@@ -122,10 +128,13 @@ impl Journal {
     }
 
     /// Appends a pose.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
     pub fn append(&mut self, pose: &PoseHeader) -> Result<(), JournalError> {
         let bytes = bytemuck::bytes_of(pose);
         self.record[..POSE].copy_from_slice(bytes);
-        self.record[POSE..].copy_from_slice(&check_word(bytes));
+        self.record[POSE..].copy_from_slice(&checksum(bytes));
         self.file
             .write_all(&self.record)
             .map_err(|source| JournalError::File {
@@ -158,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_appended_is_there_again() {
+    fn appended_poses_are_read_back() {
         let directory = tempfile::tempdir().unwrap();
         let path = path(directory.path());
         let (mut journal, records) = Journal::open(&path).unwrap();
@@ -172,24 +181,24 @@ mod tests {
     }
 
     #[test]
-    fn a_torn_tail_is_cut_off_wherever_it_tore() {
+    fn an_incomplete_record_is_truncated_at_any_length() {
         let directory = tempfile::tempdir().unwrap();
         let path = path(directory.path());
         let (mut journal, _) = Journal::open(&path).unwrap();
         (0..2).for_each(|seq| journal.append(&pose(seq)).unwrap());
-        let whole = fs::read(&path).unwrap();
-        for torn in 0..whole.len() {
-            fs::write(&path, &whole[..torn]).unwrap();
-            let expected = torn.saturating_sub(MAGIC.len()) / RECORD;
+        let complete = fs::read(&path).unwrap();
+        for length in 0..complete.len() {
+            fs::write(&path, &complete[..length]).unwrap();
+            let expected = length.saturating_sub(MAGIC.len()) / RECORD;
             let (mut journal, records) = Journal::open(&path).unwrap();
-            assert_eq!(records.len(), expected, "torn at {torn}");
+            assert_eq!(records.len(), expected, "{length} bytes");
             journal.append(&pose(9)).unwrap();
-            assert_eq!(read(&path).unwrap().len(), expected + 1, "torn at {torn}");
+            assert_eq!(read(&path).unwrap().len(), expected + 1, "{length} bytes");
         }
     }
 
     #[test]
-    fn another_programs_file_is_refused() {
+    fn another_programs_file_is_rejected() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("poses.journal");
         fs::write(&path, b"something else altogether").unwrap();

@@ -1,4 +1,4 @@
-//! The pose-integration stage: composes motions to poses, with their covariances, and journals each pose before it is published.
+//! The pose-integration stage: composes motions and their covariances to poses, and journals each pose before it is published.
 
 mod compose;
 pub mod journal;
@@ -9,10 +9,10 @@ use gyre_stage::{Launch, Sink, StageCounters, StageError, clock, sink};
 pub use compose::compose;
 use journal::Journal;
 
-/// Runs the stage until it is told to stop.
+/// Runs the stage until SIGTERM.
 ///
 /// # Errors
-/// A journal that cannot be used, and what ends a stage.
+/// A journal that cannot be used, or an error of [`sink::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let path = journal::path(&launch.manifest.out);
     let (journal, records) =
@@ -30,7 +30,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 
 struct Integration {
     journal: Journal,
-    /// What the journal held at the start.
+    /// The content of the journal at the start.
     records: Vec<PoseHeader>,
     last: Option<PoseHeader>,
 }

@@ -1,6 +1,6 @@
-//! The source stage: plays a dataset onto the `scan` topic, each image decoded where its readers find it.
+//! The source stage: publishes the scans of a dataset on `scan`, decoded directly into shared memory.
 //!
-//! [`run`] opens a recording on a disk; [`play`] plays any dataset.
+//! [`run`] opens a recording; [`play`] plays any dataset.
 
 mod config;
 
@@ -10,22 +10,22 @@ use gyre_stage::{Launch, Source, StageCounters, StageError, source};
 
 pub use config::SourceConfig;
 
-/// A dataset that fell behind by less kept up, s.
+/// A playback with a longer delay is reported, s.
 const NOTABLE_SLIP_S: f64 = 0.01;
 
-/// What happens in live mode to scans that come while the source is busy or away.
+/// The pace of a dataset in live mode: the fate of scans that become due while the source is busy or down.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
-    /// They are missed, as a radar's would be.
+    /// They are dropped, as those of a real sensor.
     Sensor,
-    /// They wait: a scan that is made on demand exists only once it is read.
+    /// They are played late, since each scan is rendered only when it is read.
     OnDemand,
 }
 
-/// Plays the recording that `[source]` names until it is told to stop.
+/// Plays the recording of the section `[source]` until SIGTERM.
 ///
 /// # Errors
-/// A recording that cannot be opened, and what ends a stage.
+/// An invalid configuration, a recording that cannot be opened, or an error of [`source::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let config: SourceConfig = launch.section("source")?;
     let options: DatasetOptions = launch.section("dataset")?;
@@ -34,10 +34,10 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     play(launch, dataset, Pace::Sensor)
 }
 
-/// Plays the part of a dataset that `[source]` names until it is told to stop.
+/// Plays the part of a dataset that the section `[source]` selects, until SIGTERM.
 ///
 /// # Errors
-/// What ends a stage.
+/// An invalid configuration, or an error of [`source::run`].
 pub fn play(
     launch: &Launch,
     dataset: Box<dyn Dataset>,
@@ -52,7 +52,7 @@ pub fn play(
     Ok(counters)
 }
 
-/// A part of a dataset.
+/// The selected part of a dataset.
 struct Replay {
     dataset: Box<dyn Dataset>,
     first: usize,
@@ -84,7 +84,7 @@ impl Source for Replay {
         self.scans
     }
 
-    /// A scan's stamp is the middle of its sweep; it is complete half a turn later.
+    /// The stamp of a scan is the middle of its sweep; the scan is complete half a period later.
     fn complete_ns(&self, index: usize) -> Option<i64> {
         Some(self.dataset.nominal_stamp_ns(self.first + index)? + self.half_period_ns)
     }

@@ -1,4 +1,4 @@
-//! The refinement stage: refines the motions that the search found against a map of the last keyframes.
+//! The refinement stage: registers the searched motions against a map of the last keyframes.
 
 pub mod checkpoint;
 
@@ -16,10 +16,10 @@ use gyre_stage::{
 
 use checkpoint::{Checkpoint, CheckpointError};
 
-/// Runs the stage until it is told to stop.
+/// Runs the stage until SIGTERM.
 ///
 /// # Errors
-/// A configuration that no refinement can be built from, a checkpoint that cannot be used, and what ends a stage.
+/// An invalid configuration, a checkpoint that cannot be used, or an error of [`stage::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let points: PointsConfig = launch.section("points")?;
     let config: RefinementConfig = launch.section("refinement")?;
@@ -38,11 +38,11 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     stage::run(launch, &mut stage)
 }
 
-/// The refiner, and the file that keeps its state.
+/// The refiner and the checkpoint of its state.
 struct RefinementStage {
     refiner: Refiner,
     checkpoint: Checkpoint,
-    /// The item that the refiner's state is for; `None` after a start.
+    /// The item that the refiner expects next; `None` after a start.
     next: Option<u64>,
 }
 
@@ -79,7 +79,7 @@ impl Stage for RefinementStage {
 }
 
 impl RefinementStage {
-    /// Gives the refiner the state that it had before this item.
+    /// Restores the state of the refiner before this item.
     fn restore_state_before(&mut self, item: &Item) -> Result<(), StageError> {
         if item.is(flag::BREAK) {
             self.refiner.reset();

@@ -1,4 +1,4 @@
-//! What was published can be gone on from, bit for bit, whatever happened to the process or to the newest slots.
+//! A run resumes from its published items bit for bit after the death of the process or damage to the newest slots.
 #![allow(clippy::unwrap_used)]
 
 use std::{fs, path::Path};
@@ -36,7 +36,7 @@ fn open(path: &Path) -> Checkpoint {
     open_with(path, &config(), WINDOW)
 }
 
-/// What a drive of a metre a scan sees of a world.
+/// A scan of a drive through a random world, at one metre per scan.
 fn scan(world: u64, item: u64) -> Vec<SparsePoint> {
     let spread = |k: u64, salt: u64| {
         let mixed = (k + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15 ^ salt ^ world << 40);
@@ -56,8 +56,8 @@ fn scan(world: u64, item: u64) -> Vec<SparsePoint> {
         .collect()
 }
 
-/// Refines item by item, each written before the next, as the stage does.
-fn live(
+/// Refines items and writes the state after each, as the stage does.
+fn process(
     refinement: &mut Refiner,
     checkpoint: &mut Checkpoint,
     world: u64,
@@ -80,8 +80,8 @@ fn step(refinement: &mut Refiner, world: u64, item: u64) {
     );
 }
 
-/// All that a refinement knows, in bits.
-fn known(refinement: &Refiner) -> Vec<u64> {
+/// The bits of the whole state of a refiner.
+fn state_bits(refinement: &Refiner) -> Vec<u64> {
     let pose = |p: &Isometry2<f64>| {
         [
             p.translation.x,
@@ -91,9 +91,9 @@ fn known(refinement: &Refiner) -> Vec<u64> {
         ]
         .map(f64::to_bits)
     };
-    let memory: &TrackerState = refinement.state();
-    let mut words = pose(&memory.pose).to_vec();
-    for anchor in &memory.anchors {
+    let tracker: &TrackerState = refinement.state();
+    let mut words = pose(&tracker.pose).to_vec();
+    for anchor in &tracker.anchors {
         words.push(anchor.is_some().into());
         if let Some(anchor) = anchor {
             words.extend(pose(&anchor.pose));
@@ -108,8 +108,8 @@ fn known(refinement: &Refiner) -> Vec<u64> {
             );
         }
     }
-    words.extend([memory.mean_overlap, memory.mean_weight].map(f64::to_bits));
-    words.extend([memory.doubtful, memory.unmatched].map(u64::from));
+    words.extend([tracker.mean_overlap, tracker.mean_weight].map(f64::to_bits));
+    words.extend([tracker.doubtful, tracker.unmatched].map(u64::from));
     for keyframe in refinement.keyframes() {
         words.push(keyframe.id);
         words.extend(pose(&keyframe.pose));
@@ -121,13 +121,13 @@ fn known(refinement: &Refiner) -> Vec<u64> {
     words
 }
 
-/// What is known after each of the items 0, 1, ... of one life; nothing after item 0, at which the chain begins.
+/// The states after the items 0, 1, ... of one process; the state is empty after item 0, where the chain starts.
 fn history(world: u64, items: u64) -> Vec<Vec<u64>> {
     let mut refinement = refinement();
-    let mut history = vec![known(&refinement)];
+    let mut history = vec![state_bits(&refinement)];
     for item in 1..items {
         step(&mut refinement, world, item);
-        history.push(known(&refinement));
+        history.push(state_bits(&refinement));
     }
     history
 }
@@ -136,14 +136,14 @@ fn restored(path: &Path, item: u64) -> Result<Vec<u64>, CheckpointError> {
     let mut refinement = refinement();
     open(path)
         .restore(item, &mut refinement)
-        .map(|()| known(&refinement))
+        .map(|()| state_bits(&refinement))
 }
 
-/// A folder, and the file of a life of so many items in it.
-fn lived(items: u64) -> (tempfile::TempDir, std::path::PathBuf) {
+/// A folder with the checkpoint of a process of this many items.
+fn checkpoint_of(items: u64) -> (tempfile::TempDir, std::path::PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = checkpoint::path(folder.path());
-    live(&mut refinement(), &mut open(&path), 1, 1..items);
+    process(&mut refinement(), &mut open(&path), 1, 1..items);
     (folder, path)
 }
 
@@ -152,7 +152,7 @@ fn every_item_of_the_last_window_is_restored_bit_for_bit() {
     const ITEMS: u64 = 60;
     let history = history(1, ITEMS);
     for items in [3, 9, 20, ITEMS] {
-        let (_folder, path) = lived(items);
+        let (_folder, path) = checkpoint_of(items);
         for item in items.saturating_sub(2 * WINDOW as u64).max(1)..items {
             assert_eq!(
                 restored(&path, item).unwrap(),
@@ -164,26 +164,26 @@ fn every_item_of_the_last_window_is_restored_bit_for_bit() {
 }
 
 #[test]
-fn a_restored_life_goes_on_as_if_it_had_not_ended() {
+fn a_restored_process_continues_as_if_it_had_not_ended() {
     let history = history(1, 40);
-    let (_folder, path) = lived(25);
+    let (_folder, path) = checkpoint_of(25);
     for item in [17, 22, 24] {
         let (mut refinement, mut checkpoint) = (refinement(), open(&path));
         checkpoint.restore(item, &mut refinement).unwrap();
-        live(&mut refinement, &mut checkpoint, 1, item + 1..40);
-        assert_eq!(known(&refinement), history[39], "from item {item}");
+        process(&mut refinement, &mut checkpoint, 1, item + 1..40);
+        assert_eq!(state_bits(&refinement), history[39], "from item {item}");
     }
 }
 
 #[test]
-fn a_file_cut_short_loses_only_what_was_written_last() {
-    let (_folder, path) = lived(4);
+fn a_truncated_file_loses_only_the_last_write() {
+    let (_folder, path) = checkpoint_of(4);
     let before = fs::read(&path).unwrap();
     // Item 4 makes a keyframe, whose slot is at the file's end.
     let mut refinement = refinement();
     let mut checkpoint = open(&path);
     checkpoint.restore(3, &mut refinement).unwrap();
-    live(&mut refinement, &mut checkpoint, 1, 4..6);
+    process(&mut refinement, &mut checkpoint, 1, 4..6);
     let after = fs::read(&path).unwrap();
     assert!(after.len() > before.len());
     let history = history(1, 6);
@@ -212,13 +212,13 @@ fn a_file_cut_short_loses_only_what_was_written_last() {
 }
 
 #[test]
-fn flipped_bytes_in_the_newest_slots_lose_only_those() {
+fn corrupt_bytes_in_the_newest_slots_lose_only_those() {
     let history = history(1, 31);
-    let (_folder, path) = lived(30);
+    let (_folder, path) = checkpoint_of(30);
     let before = fs::read(&path).unwrap();
     let (mut refinement, mut checkpoint) = (refinement(), open(&path));
     checkpoint.restore(29, &mut refinement).unwrap();
-    live(&mut refinement, &mut checkpoint, 1, 30..31);
+    process(&mut refinement, &mut checkpoint, 1, 30..31);
     let after = fs::read(&path).unwrap();
     let changed: Vec<usize> = (0..after.len())
         .filter(|at| before.get(*at) != Some(&after[*at]))
@@ -229,9 +229,9 @@ fn flipped_bytes_in_the_newest_slots_lose_only_those() {
         .step_by(changed.len() / 12 + 1)
         .chain(changed.last())
     {
-        let mut torn = after.clone();
-        torn[*at] ^= 0x10;
-        fs::write(&path, &torn).unwrap();
+        let mut corrupt = after.clone();
+        corrupt[*at] ^= 0x10;
+        fs::write(&path, &corrupt).unwrap();
         assert!(restored(&path, 30).is_err(), "byte {at}");
         for item in 15..30 {
             assert_eq!(
@@ -244,8 +244,8 @@ fn flipped_bytes_in_the_newest_slots_lose_only_those() {
 }
 
 #[test]
-fn the_file_of_another_configuration_is_begun_anew() {
-    let (_folder, path) = lived(20);
+fn the_file_of_another_configuration_is_overwritten() {
+    let (_folder, path) = checkpoint_of(20);
     let other = RefinementConfig {
         cell_m: 2.0,
         ..config()
@@ -253,34 +253,34 @@ fn the_file_of_another_configuration_is_begun_anew() {
     let mut refinement = Refiner::new(&other, 512).unwrap();
     let mut checkpoint = open_with(&path, &other, WINDOW);
     assert!(checkpoint.restore(19, &mut refinement).is_err());
-    live(&mut refinement, &mut checkpoint, 1, 1..10);
+    process(&mut refinement, &mut checkpoint, 1, 1..10);
     let mut again = Refiner::new(&other, 512).unwrap();
     open_with(&path, &other, WINDOW)
         .restore(9, &mut again)
         .unwrap();
-    assert_eq!(known(&again), known(&refinement));
-    assert!(restored(&path, 9).is_err(), "and the other way round");
+    assert_eq!(state_bits(&again), state_bits(&refinement));
+    assert!(restored(&path, 9).is_err(), "and vice versa");
 }
 
 #[test]
-fn another_window_goes_on_with_the_same_file() {
+fn another_window_continues_with_the_same_file() {
     let history = history(1, 30);
-    let (_folder, path) = lived(30);
+    let (_folder, path) = checkpoint_of(30);
     for window in [2, 20, 66] {
         let mut refinement = refinement();
         open_with(&path, &config(), window)
             .restore(25, &mut refinement)
             .unwrap();
-        assert_eq!(known(&refinement), history[25], "window {window}");
+        assert_eq!(state_bits(&refinement), history[25], "window {window}");
     }
 }
 
 #[test]
-fn an_item_that_is_not_there_is_named_in_one_sentence() {
-    let (_folder, path) = lived(10);
+fn a_missing_item_is_reported_in_one_sentence() {
+    let (_folder, path) = checkpoint_of(10);
     let expected = |item: u64| {
         format!(
-            "{} does not hold what the refinement knew before item {item}: begin again with --fresh",
+            "{} does not have the state of the refinement before item {item}: start again with --fresh",
             path.display()
         )
     };
@@ -299,22 +299,22 @@ fn an_item_that_is_not_there_is_named_in_one_sentence() {
 }
 
 #[test]
-fn a_repeated_life_overwrites_the_numbers_of_the_one_before() {
-    let (_folder, path) = lived(21);
+fn repeated_items_overwrite_earlier_states() {
+    let (_folder, path) = checkpoint_of(21);
     let (mut refinement, mut checkpoint) = (refinement(), open(&path));
     checkpoint.restore(14, &mut refinement).unwrap();
-    live(&mut refinement, &mut checkpoint, 2, 15..21);
-    assert_eq!(restored(&path, 20).unwrap(), known(&refinement));
-    assert_ne!(known(&refinement), history(1, 21)[20]);
+    process(&mut refinement, &mut checkpoint, 2, 15..21);
+    assert_eq!(restored(&path, 20).unwrap(), state_bits(&refinement));
+    assert_ne!(state_bits(&refinement), history(1, 21)[20]);
 }
 
 #[test]
-fn keyframes_of_a_repeated_life_stay_out_of_the_next_ones_map() {
-    let (_folder, path) = lived(8);
+fn keyframes_of_obsolete_items_are_not_restored() {
+    let (_folder, path) = checkpoint_of(8);
     let (mut refinement, mut checkpoint) = (refinement(), open(&path));
     checkpoint.restore(2, &mut refinement).unwrap();
     for item in 3..8 {
-        // This time the vehicle stands, and makes no keyframes.
+        // This time the vehicle is stationary and adds no keyframes.
         refinement.refine(
             item,
             &scan(1, 2),
@@ -325,18 +325,18 @@ fn keyframes_of_a_repeated_life_stay_out_of_the_next_ones_map() {
         checkpoint.write(item, &refinement).unwrap();
     }
     assert!(refinement.keyframes().all(|keyframe| keyframe.id < 3));
-    assert_eq!(restored(&path, 7).unwrap(), known(&refinement));
+    assert_eq!(restored(&path, 7).unwrap(), state_bits(&refinement));
 }
 
 #[test]
-fn a_chain_that_begins_again_leaves_the_one_before_out() {
-    let (_folder, path) = lived(21);
+fn a_new_chain_does_not_restore_the_previous_one() {
+    let (_folder, path) = checkpoint_of(21);
     let (mut refinement, mut checkpoint) = (refinement(), open(&path));
     refinement.reset();
     checkpoint.write(15, &refinement).unwrap();
     assert_eq!(restored(&path, 15).unwrap(), history(1, 1)[0]);
-    live(&mut refinement, &mut checkpoint, 2, 16..21);
-    assert_eq!(restored(&path, 20).unwrap(), known(&refinement));
+    process(&mut refinement, &mut checkpoint, 2, 16..21);
+    assert_eq!(restored(&path, 20).unwrap(), state_bits(&refinement));
 }
 
 #[test]
@@ -345,7 +345,7 @@ fn the_file_stops_growing() {
     let path = checkpoint::path(folder.path());
     let (mut refinement, mut checkpoint) = (refinement(), open(&path));
     let mut length = |items: std::ops::Range<u64>| {
-        live(&mut refinement, &mut checkpoint, 1, items);
+        process(&mut refinement, &mut checkpoint, 1, items);
         fs::metadata(&path).unwrap().len()
     };
     // A keyframe every other item.

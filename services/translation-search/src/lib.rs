@@ -11,10 +11,10 @@ use gyre_stage::{
     writer::Draft,
 };
 
-/// Runs the stage until it is told to stop.
+/// Runs the stage until SIGTERM.
 ///
 /// # Errors
-/// A configuration that no search can be built from, and what ends a stage.
+/// An invalid configuration, or an error of [`stage::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let config: TranslationConfig = launch.section("translation")?;

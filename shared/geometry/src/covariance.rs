@@ -1,7 +1,7 @@
 //! Covariances of (x, y, yaw), in m^2, m rad and rad^2.
 //!
-//! The covariance of a motion is that of its three numbers along the axes of the *earlier* frame. Its error is
-//! therefore the plain difference of these numbers, estimate less truth, the yaw's the shorter way round.
+//! The covariance of a motion is that of its x, y and yaw along the axes of the *earlier* frame. The error of a motion is
+//! therefore the difference of these values, estimate minus truth, with the difference in yaw wrapped to (-pi, pi].
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -10,19 +10,19 @@ use crate::{Pose, pose, xy_yaw};
 /// The upper triangle by rows: xx, xy, x yaw, yy, y yaw, yaw yaw.
 pub type Packed = [f64; 6];
 
-/// The upper triangle of a covariance.
+/// Returns the upper triangle of a covariance.
 pub fn pack(covariance: &Matrix3<f64>) -> Packed {
     let at = |row, column| covariance[(row, column)];
     [at(0, 0), at(0, 1), at(0, 2), at(1, 1), at(1, 2), at(2, 2)]
 }
 
-/// The symmetric matrix of an upper triangle.
+/// Returns the symmetric matrix of an upper triangle.
 pub fn unpack(&[xx, xy, xyaw, yy, yyaw, yawyaw]: &Packed) -> Matrix3<f64> {
     Matrix3::new(xx, xy, xyaw, xy, yy, yyaw, xyaw, yyaw, yawyaw)
 }
 
-/// The derivative of a composed pose by the pose that it starts from, where (x, y) is how far the composed one lies
-/// from that pose, m, in the same axes (Checchin et al., Eq. 1).
+/// Returns the Jacobian of a composed pose with respect to its first pose, where (x, y) is the displacement from the first to the
+/// composed pose, m, along the same axes (Checchin et al., Eq. 1).
 pub fn lever(x_m: f64, y_m: f64) -> Matrix3<f64> {
     Matrix3::new(1.0, 0.0, -y_m, 0.0, 1.0, x_m, 0.0, 0.0, 1.0)
 }
@@ -30,14 +30,14 @@ pub fn lever(x_m: f64, y_m: f64) -> Matrix3<f64> {
 /// A motion, or a pose, with the covariance of its (x, y, yaw).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UncertainMotion {
-    /// The later frame in the earlier one.
+    /// The pose of the later frame in the earlier one.
     pub motion: Pose,
-    /// Covariance of (x, y, yaw), along the earlier frame's axes.
+    /// The covariance of (x, y, yaw) along the axes of the earlier frame.
     pub covariance: Matrix3<f64>,
 }
 
 impl UncertainMotion {
-    /// No motion, known exactly.
+    /// Returns no motion, with a covariance of zero.
     pub fn identity() -> Self {
         Self {
             motion: Pose::identity(),
@@ -45,7 +45,7 @@ impl UncertainMotion {
         }
     }
 
-    /// This motion, then `next`, whose error is independent; to first order (Checchin et al., Eqs. 1 and 2).
+    /// Composes with the motion `next`, whose error is independent, to first order (Checchin et al., Eqs. 1 and 2).
     pub fn then(&self, next: &Self) -> Self {
         let motion = self.motion * next.motion;
         let moved = motion.translation.vector - self.motion.translation.vector;
@@ -56,8 +56,8 @@ impl UncertainMotion {
         Self { motion, covariance }
     }
 
-    /// The same, rebuilt from x, y, yaw and the upper triangle of the covariance: a rotation of unit length, a symmetric
-    /// matrix. Motions are exchanged and composed in this form, so that they are the same bits in one process and in several.
+    /// Rebuilds the motion from x, y, yaw and the upper triangle of the covariance, with a unit rotation and a symmetric matrix.
+    /// Messages carry this form; composing it everywhere gives the same bits in one process and in several.
     pub fn normalized(&self) -> Self {
         let [x_m, y_m, yaw_rad] = xy_yaw(&self.motion);
         Self {
@@ -66,7 +66,7 @@ impl UncertainMotion {
         }
     }
 
-    /// (x, y, yaw) of this motion less those of the true one, yaw in (-pi, pi].
+    /// Returns the error: (x, y, yaw) of this motion minus those of the true one, yaw in (-pi, pi].
     pub fn error(&self, truth: &Pose) -> Vector3<f64> {
         let apart = self.motion.translation.vector - truth.translation.vector;
         Vector3::new(
@@ -76,7 +76,7 @@ impl UncertainMotion {
         )
     }
 
-    /// Whether the covariance is finite and positive definite, so that errors can be measured by it.
+    /// Returns whether the covariance is finite and positive definite, so that it can normalise errors.
     pub fn has_covariance(&self) -> bool {
         let c = &self.covariance;
         c.iter().all(|value| value.is_finite()) && c.cholesky().is_some()
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn an_uncertain_heading_spreads_to_the_side_with_the_distance() {
+    fn heading_uncertainty_grows_to_lateral_uncertainty_with_distance() {
         let heading = uncertain(Pose::identity(), diagonal(0.0, 0.0, 1e-4));
         let end = heading.then(&uncertain(pose(100.0, 0.0, 0.0), Matrix3::zeros()));
         assert!(
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn composed_covariances_swing_and_turn_with_the_first_motion() {
+    fn composed_covariances_rotate_with_the_first_motion() {
         let turn = uncertain(pose(2.0, 0.0, FRAC_PI_2), diagonal(0.0, 0.0, 1e-4));
         let both = turn.then(&uncertain(pose(10.0, 0.0, 0.0), diagonal(4.0, 1.0, 0.0)));
         assert!(
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_of_yaw_take_the_shorter_way() {
+    fn errors_of_yaw_are_wrapped() {
         let estimate = uncertain(pose(1.0, 2.0, PI - 0.1), Matrix3::identity());
         let error = estimate.error(&pose(0.5, 3.0, -PI + 0.1));
         assert!(
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn zero_nan_and_indefinite_matrices_are_no_covariances() {
+    fn zero_nan_and_indefinite_matrices_are_not_covariances() {
         let has = |covariance| uncertain(Pose::identity(), covariance).has_covariance();
         assert!(has(diagonal(1e-4, 1e-4, 1e-8)));
         assert!(

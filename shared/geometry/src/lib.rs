@@ -1,9 +1,9 @@
 //! Motion in the plane: poses, twists and covariances in SE(2), and the points of a scan.
 //!
 //! Reading order:
-//! - [`Pose`]: a frame in another frame; [`pose`] builds one, [`interpolate`] goes between two;
-//! - [`Twist`]: a constant velocity, and the poses that it leads to;
-//! - [`covariance`]: how covariances of (x, y, yaw) are packed and composed, and [`UncertainMotion`];
+//! - [`Pose`]: the pose of a frame in another frame; [`pose`] creates one, [`interpolate`] interpolates between two;
+//! - [`Twist`]: a constant velocity and its poses over time;
+//! - [`covariance`]: packed covariances of (x, y, yaw), and [`UncertainMotion`], which composes them;
 //! - [`SparsePoint`]: one return of a scan, in the sensor's frame at the time of its azimuth.
 //!
 //! # Frames and units

@@ -2,9 +2,9 @@
 
 use bytemuck::{Pod, Zeroable};
 
-/// One return of a scan, where the sensor saw it: neither motion compensation nor the Doppler shift is applied.
+/// One return of a scan as measured, without compensation of motion or of the Doppler shift.
 ///
-/// With `u` the direction to the point and `v` the sensor's velocity, the point truly lay at
+/// With `u` the direction to the point and `v` the velocity of the sensor, the true position is
 /// `(x, y) + doppler_s (u . v) u` in the sensor's frame at the time of its azimuth.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -13,11 +13,11 @@ pub struct SparsePoint {
     pub x_m: f32,
     /// To the left of it, m.
     pub y_m: f32,
-    /// Time of the azimuth less the scan's stamp, s.
+    /// Time of the azimuth relative to the scan's stamp, s.
     pub time_s: f32,
-    /// How much the point counts, from 0 to 1. A weight that is not above 0 counts as 0.
+    /// Weight from 0 to 1. A weight that is not above 0 counts as 0.
     pub weight: f32,
-    /// Metres to add to the range for each m/s at which the sensor approaches the point; 0 where it is unknown.
+    /// Metres to add to the range for each m/s at which the sensor approaches the point; 0 if unknown.
     pub doppler_s: f32,
 }
 

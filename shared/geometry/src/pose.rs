@@ -7,12 +7,12 @@ use nalgebra::{Isometry2, Vector2};
 /// The pose of a frame in another frame: x forward and y left in m, yaw counter-clockwise in rad.
 pub type Pose = Isometry2<f64>;
 
-/// The pose at (`x_m`, `y_m`), turned by `yaw_rad`.
+/// Creates the pose at (`x_m`, `y_m`) with yaw `yaw_rad`.
 pub fn pose(x_m: f64, y_m: f64, yaw_rad: f64) -> Pose {
     Pose::new(Vector2::new(x_m, y_m), yaw_rad)
 }
 
-/// x and y in m, yaw in (-pi, pi] rad.
+/// Returns x and y in m, and yaw in (-pi, pi] rad.
 pub fn xy_yaw(pose: &Pose) -> [f64; 3] {
     [
         pose.translation.x,
@@ -21,21 +21,20 @@ pub fn xy_yaw(pose: &Pose) -> [f64; 3] {
     ]
 }
 
-/// The pose at `share` of the way from `from` (0) to `to` (1): the position on the straight line, the yaw at a
-/// constant rate the shorter way round.
+/// Interpolates between `from` (`share` 0) and `to` (1): linearly in position, and in yaw along the shorter arc.
 pub fn interpolate(from: &Pose, to: &Pose, share: f64) -> Pose {
     let position = from.translation.vector.lerp(&to.translation.vector, share);
     let turn = (to.rotation * from.rotation.inverse()).angle();
     Pose::new(position, from.rotation.angle() + share * turn)
 }
 
-/// The same pose between y-right, clockwise frames and REP-103 frames; its own inverse.
+/// Converts between frames with y to the right and clockwise yaw, and REP-103 frames, in either direction.
 pub fn mirrored(pose: &Pose) -> Pose {
     let [x_m, y_m, yaw_rad] = xy_yaw(pose);
     self::pose(x_m, -y_m, -yaw_rad)
 }
 
-/// The angle in (-pi, pi], rad.
+/// Wraps an angle to (-pi, pi], rad.
 pub fn wrap_angle(angle_rad: f64) -> f64 {
     let turned = angle_rad.rem_euclid(TAU);
     if turned > PI { turned - TAU } else { turned }
@@ -46,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn interpolation_turns_the_shorter_way_and_meets_both_ends() {
+    fn interpolation_takes_the_shorter_arc_and_meets_both_ends() {
         let (from, to) = (pose(0.0, 1.0, PI - 0.1), pose(2.0, 1.0, -PI + 0.1));
         let middle = interpolate(&from, &to, 0.5);
         assert!((middle.translation.x - 1.0).abs() < 1e-12);
@@ -72,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mirrored_pose_turns_and_lies_on_the_other_side() {
+    fn a_mirrored_pose_has_opposite_y_and_yaw() {
         let there = mirrored(&pose(1.0, 2.0, 0.3));
         assert_eq!(xy_yaw(&there), [1.0, -2.0, -0.3]);
         assert!((mirrored(&there).translation.y - 2.0).abs() < 1e-12);

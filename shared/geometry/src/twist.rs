@@ -4,7 +4,7 @@ use nalgebra::{Rotation2, Translation2, UnitComplex, Vector2};
 
 use crate::Pose;
 
-/// A constant velocity in the moving frame itself: it drives a circle, or a straight line.
+/// A constant velocity in the moving frame: motion along a circular arc or a straight line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Twist {
     /// Forward speed, m/s.
@@ -16,12 +16,12 @@ pub struct Twist {
 }
 
 impl Twist {
-    /// The twist that makes `motion` (the pose of the later frame in the earlier one) in `dt_s` seconds: its
-    /// logarithm over the time. Not finite if `dt_s` is zero or `motion` is not finite.
+    /// Returns the twist of `motion` (the pose of the later frame in the earlier one) over `dt_s` seconds: the logarithm divided
+    /// by the time. It is not finite if `dt_s` is zero or `motion` is not finite.
     pub fn from_motion(motion: &Pose, dt_s: f64) -> Self {
         let yaw = motion.rotation.angle();
         let half = 0.5 * yaw;
-        // The logarithm of SE(2): the chord, turned back by half the turn, stretched to its arc.
+        // The logarithm of SE(2): the chord, rotated back by half the yaw and scaled to the length of the arc.
         let stretch = 1.0 / sinc(half);
         let arc = UnitComplex::new(-half) * motion.translation.vector * (stretch / dt_s);
         Self {
@@ -31,7 +31,7 @@ impl Twist {
         }
     }
 
-    /// The pose after `t_s` seconds in the frame at second 0: exp(twist t). Negative times are the past.
+    /// Returns the pose after `t_s` seconds in the frame at time 0: exp(twist t). Negative times are in the past.
     pub fn pose_at(&self, t_s: f64) -> Pose {
         let half = 0.5 * self.yaw_rate_radps * t_s;
         let arc = self.linear_mps() * t_s;
@@ -39,8 +39,8 @@ impl Twist {
         Pose::from_parts(Translation2::from(chord), UnitComplex::new(2.0 * half))
     }
 
-    /// As [`Twist::from_motion`], with the chord for the arc: the speed is short by the turn squared over 24. The
-    /// refinement uses this form throughout, since its kernel for single points does.
+    /// As [`Twist::from_motion`] with the chord instead of the arc, which underestimates the speed by a factor of yaw squared over
+    /// 24. The refinement uses this form throughout, as its kernel for single points does.
     pub fn from_chord(motion: &Pose, dt_s: f64) -> Self {
         let yaw = motion.rotation.angle();
         let along = Rotation2::new(-0.5 * yaw) * motion.translation.vector;
@@ -51,23 +51,23 @@ impl Twist {
         }
     }
 
-    /// The pose after `t_s` seconds with the chord as long as the arc; the inverse of [`Twist::from_chord`].
+    /// Returns the pose after `t_s` seconds if the chord is as long as the arc; the inverse of [`Twist::from_chord`].
     pub fn chord_pose_at(&self, t_s: f64) -> Pose {
         let yaw = self.yaw_rate_radps * t_s;
         Pose::new(Rotation2::new(0.5 * yaw) * self.linear_mps() * t_s, yaw)
     }
 
-    /// Forward and leftward speed, m/s.
+    /// Returns the forward and leftward velocity, m/s.
     pub fn linear_mps(&self) -> Vector2<f64> {
         Vector2::new(self.vx_mps, self.vy_mps)
     }
 
-    /// The speed in its own direction, m/s.
+    /// Returns the speed, m/s.
     pub fn speed_mps(&self) -> f64 {
         self.vx_mps.hypot(self.vy_mps)
     }
 
-    /// The same motion in frames whose y axis points right and whose yaw grows clockwise, or back.
+    /// Converts to frames with y to the right and clockwise yaw, or back.
     pub fn mirrored(&self) -> Self {
         Self {
             vx_mps: self.vx_mps,
@@ -76,7 +76,7 @@ impl Twist {
         }
     }
 
-    /// This twist, a `share` of the way to `other`.
+    /// Interpolates linearly from this twist (`share` 0) to `other` (1).
     pub fn lerp(&self, other: &Self, share: f64) -> Self {
         let between = |a: f64, b: f64| a * (1.0 - share) + b * share;
         Self {
@@ -109,7 +109,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn logarithm_undoes_exponential(
+        fn the_logarithm_is_the_inverse_of_the_exponential(
             x in -20.0..20.0f64, y in -5.0..5.0f64, yaw in -3.1..3.1f64, dt_s in 0.05..2.0f64,
         ) {
             let motion = pose(x, y, yaw);
@@ -126,7 +126,7 @@ mod tests {
         }
 
         #[test]
-        fn chord_and_arc_differ_by_the_turn_squared_over_24(
+        fn chord_and_arc_differ_by_yaw_squared_over_24(
             vx in 1.0..30.0f64, rate in -1.0..1.0f64, t_s in 0.05..0.5f64,
         ) {
             let twist = Twist { vx_mps: vx, vy_mps: 0.0, yaw_rate_radps: rate };

@@ -10,7 +10,7 @@ const BORROWED: usize = 3;
 /// Samples that a publisher may fill at once.
 const LOANED: usize = 1;
 
-/// How many scans may be in flight, and how far back the stages look.
+/// The number of scans in flight, and the look-back of the stages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Window {
     /// Maximum number of scans in flight, between admission and pose (W).
@@ -34,7 +34,7 @@ pub enum WindowError {
     Lag(usize),
 }
 
-/// How far back a publisher's history must reach for a restarted reader.
+/// The reach of a publisher's history for restarted readers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum History {
     /// Along the stream: the window and the look-back.

@@ -24,7 +24,7 @@ pub trait Message: 'static {
     const TOPIC: &'static str;
     /// Number of processes that subscribe to the topic.
     const READERS: usize;
-    /// How far back the publisher's history reaches.
+    /// The reach of the publisher's history.
     const HISTORY: History;
     /// The header of each message.
     type Header: Header;

@@ -1,4 +1,4 @@
-//! Registers one scan against another: the motion between two files of a recording.
+//! Estimates the motion between two scans of a recording.
 //!
 //!     cargo run --release -p gyre-odometry --example one_scan -- DATASET [EARLIER LATER]
 

@@ -1,4 +1,4 @@
-//! A folder of scans in, a trajectory out: TUM on standard output (time, x, y, z and a quaternion; s, m).
+//! Estimates the trajectory of a recording and prints it in TUM format (time, x, y, z and a quaternion; s, m).
 //!
 //!     cargo run --release -p gyre-odometry --example trajectory -- DATASET [CONFIG.toml] > trajectory.tum
 
@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         match dataset.read(index, scan.slot()) {
             Ok(geometry) => scan.geometry = geometry,
             Err(error) => {
-                eprintln!("left out: {error}");
+                eprintln!("skipped: {error}");
                 continue;
             }
         }

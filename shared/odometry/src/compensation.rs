@@ -4,17 +4,17 @@ use std::collections::VecDeque;
 
 use gyre_geometry::Twist;
 
-/// Gives each scan the velocity of the scan `lag` before it. With a lag of 2 or more the stages of a pipeline overlap across
-/// scans.
+/// Delays velocities: each scan is compensated with the velocity of the scan `lag` scans earlier. With a lag of 2 or more the
+/// stages of a pipeline overlap across scans.
 #[derive(Debug)]
 pub(crate) struct LaggedTwists {
     lag: usize,
-    /// Those of the last `lag` scans, oldest first; `None` where the chain starts.
+    /// The velocities of the last `lag` scans, oldest first; `None` where the chain starts.
     last: VecDeque<Option<Twist>>,
 }
 
 impl LaggedTwists {
-    /// With a lag of 0 no scan has a velocity.
+    /// Creates an empty delay. With a lag of 0 there is no velocity for any scan.
     pub fn new(lag: usize) -> Self {
         Self {
             lag,
@@ -22,7 +22,7 @@ impl LaggedTwists {
         }
     }
 
-    /// The velocity for the next scan.
+    /// Returns the velocity for the next scan.
     pub fn next(&self) -> Option<Twist> {
         match self.last.len() == self.lag {
             true => self.last.front().copied().flatten(),
@@ -30,7 +30,7 @@ impl LaggedTwists {
         }
     }
 
-    /// Adds the velocity that was found for the next scan itself.
+    /// Adds the velocity of the scan that was registered.
     pub fn push(&mut self, found: Option<Twist>) {
         self.last.push_back(found);
         if self.last.len() > self.lag {
@@ -55,7 +55,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scan_has_the_velocity_of_the_scan_lag_before_it() {
+    fn a_scan_is_compensated_with_the_velocity_of_the_scan_lag_scans_earlier() {
         let mut twists = LaggedTwists::new(2);
         let found = [None, twist(1.0), twist(2.0), twist(3.0)];
         let given = found.map(|found| {

@@ -14,7 +14,7 @@ use crate::{
     compensation::LaggedTwists,
 };
 
-/// Registers one scan after the other against those before.
+/// Radar odometry. Registers scan after scan against the previous ones.
 pub struct Odometry {
     masker: Masker,
     search: Search,
@@ -22,11 +22,11 @@ pub struct Odometry {
     twists: LaggedTwists,
     /// The scan that is being registered.
     current: Frame,
-    /// The scan before.
-    before: Frame,
-    /// The raster of the scan before as the mask of this pair leaves it, where the mask looks at two scans.
-    before_by_pair: Option<Array2<f32>>,
-    /// Scans since the chain of motions started.
+    /// The previous scan.
+    previous: Frame,
+    /// The raster of the previous scan, masked for this pair, if the mask takes two scans.
+    previous_by_pair: Option<Array2<f32>>,
+    /// Number of scans since the chain of motions started.
     seq: u64,
     pose: UncertainMotion,
 }
@@ -37,21 +37,21 @@ enum Search {
     Exhaustive(Box<ExhaustiveSearch>),
 }
 
-/// What a scan becomes.
+/// The products of a scan.
 struct Frame {
     stamp_ns: i64,
     twist: Option<Twist>,
     raster: Array2<f32>,
     points: Vec<SparsePoint>,
-    /// Points in use.
+    /// Number of points in use.
     count: usize,
 }
 
 impl Odometry {
-    /// Plans all parts; nothing is allocated afterwards.
+    /// Allocates all buffers; registering a scan allocates nothing.
     ///
     /// # Errors
-    /// The first setting that is out of its bounds; a network that cannot be used.
+    /// The first setting out of its bounds; a network that cannot be used.
     pub fn new(config: &OdometryConfig) -> Result<Self, SetupError> {
         let masker = Masker::new(&config.raster, &config.points, &config.masking)?;
         let refiner = match config.refinement.kind {
@@ -67,18 +67,18 @@ impl Odometry {
             refiner,
             twists: LaggedTwists::new(config.masking.feedback_lag()),
             current: frame(),
-            before: frame(),
-            before_by_pair: (masker.scans() == 2).then(|| Array2::zeros((n, n))),
+            previous: frame(),
+            previous_by_pair: (masker.scans() == 2).then(|| Array2::zeros((n, n))),
             masker,
             seq: 0,
             pose: UncertainMotion::identity(),
         })
     }
 
-    /// Registers the next scan: its motion since the scan before, and its pose.
+    /// Registers the next scan: estimates its motion from the previous scan, and its pose.
     ///
     /// # Errors
-    /// A scan that cannot be used. It is left out: the next one is registered against the scan before it.
+    /// A scan that cannot be used. It is skipped: the next scan is registered against the one before the error.
     pub fn register(&mut self, scan: &PolarScan<'_>) -> Result<Registered, OdometryError> {
         let twist = self.twists.next();
         self.mask(scan, twist)?;
@@ -87,10 +87,10 @@ impl Odometry {
         Ok(self.integrate(searched, refined))
     }
 
-    /// Compensates the sweep's motion, rasterises the scan, masks it (Weston et al., Sec. III-E) and extracts its points.
+    /// Rasterises the scan with motion compensation, masks it (Weston et al., Sec. III-E) and extracts its points.
     ///
     /// # Errors
-    /// A scan that contradicts itself, a network that fails.
+    /// An inconsistent scan, or a network that fails.
     pub fn mask(
         &mut self,
         scan: &PolarScan<'_>,
@@ -102,11 +102,14 @@ impl Odometry {
             twist,
         };
         let frame = &mut self.current;
-        let before = self.before_by_pair.as_mut().map(|raster| raster.view_mut());
+        let previous = self
+            .previous_by_pair
+            .as_mut()
+            .map(|raster| raster.view_mut());
         let follows = self.seq.checked_sub(1);
         frame.twist = self
             .masker
-            .mask(&sweep, follows, frame.raster.view_mut(), before)?;
+            .mask(&sweep, follows, frame.raster.view_mut(), previous)?;
         frame.count = self.masker.points(scan, frame.twist, &mut frame.points)?;
         frame.stamp_ns = scan.geometry.stamp_ns;
         Ok(())
@@ -116,11 +119,14 @@ impl Odometry {
     /// or for both together by trying every angle; `None` where the chain starts.
     ///
     /// # Errors
-    /// None with the rasters of [`Odometry::mask`].
+    /// None with rasters of [`Odometry::mask`].
     pub fn search(&mut self) -> Result<Option<JointMatch>, OdometryError> {
         let later = self.current.raster.view();
-        let changed = self.before_by_pair.is_some();
-        let earlier = self.before_by_pair.as_ref().unwrap_or(&self.before.raster);
+        let changed = self.previous_by_pair.is_some();
+        let earlier = self
+            .previous_by_pair
+            .as_ref()
+            .unwrap_or(&self.previous.raster);
         let earlier = (self.seq > 0).then(|| earlier.view());
         match &mut self.search {
             Search::Decoupled(rotation, translation) => {
@@ -138,15 +144,15 @@ impl Odometry {
         }
     }
 
-    /// Refines the searched motion against the map of the last keyframes; `None` where no refinement is configured.
+    /// Refines the searched motion against the map of the last keyframes; `None` if no refinement is configured.
     pub fn refine(&mut self, searched: &JointMatch) -> Option<Refined> {
         let (motion, interval_s) = (motion_of(searched), self.interval_ns() as f64 * 1e-9);
-        let (later, earlier) = (self.current.points(), self.before.points());
+        let (later, earlier) = (self.current.points(), self.previous.points());
         let refiner = self.refiner.as_mut()?;
         Some(refiner.refine(self.seq, later, earlier, &motion, interval_s))
     }
 
-    /// Composes the motion with the pose (Checchin et al., Eqs. 1 and 2), and makes the scan the one before.
+    /// Composes the motion with the pose (Checchin et al., Eqs. 1 and 2), and makes the scan the previous one.
     pub fn integrate(
         &mut self,
         searched: Option<JointMatch>,
@@ -172,7 +178,7 @@ impl Odometry {
                 .as_ref()
                 .map(|found| Twist::from_motion(&motion_of(found), interval_s)),
         );
-        std::mem::swap(&mut self.current, &mut self.before);
+        std::mem::swap(&mut self.current, &mut self.previous);
         self.seq += 1;
         Registered {
             seq: self.seq - 1,
@@ -194,40 +200,40 @@ impl Odometry {
         }
     }
 
-    /// The masker, for its factors and the cells of points.
+    /// Returns the masker, for its factors and the cells of points.
     pub fn masker(&self) -> &Masker {
         &self.masker
     }
 
-    /// The raster that [`Odometry::mask`] made last, before it is searched: n x n, row 0 far ahead.
+    /// Returns the raster of [`Odometry::mask`] before the search: n x n, row 0 far ahead.
     pub fn masked_mut(&mut self) -> ArrayViewMut2<'_, f32> {
         self.current.raster.view_mut()
     }
 
-    /// The raster of the last registered scan after the mask, n x n, row 0 far ahead.
+    /// Returns the masked raster of the last registered scan, n x n, row 0 far ahead.
     pub fn raster(&self) -> ArrayView2<'_, f32> {
-        self.before.raster.view()
+        self.previous.raster.view()
     }
 
-    /// The raster of the scan before the last one, as the mask of this pair leaves it, where the mask looks at two scans.
-    pub fn raster_before(&self) -> Option<ArrayView2<'_, f32>> {
-        self.before_by_pair.as_ref().map(|raster| raster.view())
+    /// Returns the raster of the scan before the last one, masked for this pair, if the mask takes two scans.
+    pub fn previous_raster(&self) -> Option<ArrayView2<'_, f32>> {
+        self.previous_by_pair.as_ref().map(|raster| raster.view())
     }
 
-    /// The points of the last registered scan.
+    /// Returns the points of the last registered scan.
     pub fn points(&self) -> &[SparsePoint] {
-        self.before.points()
+        self.previous.points()
     }
 
-    /// The velocity that the last registered scan was motion-compensated with.
+    /// Returns the velocity with which the last registered scan was motion-compensated.
     pub fn twist(&self) -> Option<Twist> {
-        self.before.twist
+        self.previous.twist
     }
 
     fn interval_ns(&self) -> i64 {
         match self.seq {
             0 => 0,
-            _ => self.current.stamp_ns.saturating_sub(self.before.stamp_ns),
+            _ => self.current.stamp_ns.saturating_sub(self.previous.stamp_ns),
         }
     }
 }

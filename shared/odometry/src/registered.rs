@@ -1,4 +1,4 @@
-//! The result of a registration, and what can go wrong.
+//! The results and errors of a registration.
 
 use gyre_geometry::UncertainMotion;
 use gyre_masking::{MaskError, MaskerError};
@@ -9,59 +9,58 @@ use thiserror::Error;
 /// A registered scan.
 #[derive(Clone, Copy, Debug)]
 pub struct Registered {
-    /// Number of the scan in the chain of motions, from 0.
+    /// Sequence number in the chain of motions, from 0.
     pub seq: u64,
-    /// The motion from the scan before, with its covariance: this scan's frame in that one's. The identity where the chain
-    /// starts.
+    /// The pose of this scan's frame in the previous scan's frame, with its covariance. The identity where the chain starts.
     pub motion: UncertainMotion,
     /// The pose in the frame of the first scan, with its covariance.
     pub pose: UncertainMotion,
-    /// How the motion was found.
+    /// The origin of the motion.
     pub outcome: Outcome,
     /// Time between the two scans, ns.
     pub interval_ns: i64,
     /// The result of the search; `None` where the chain starts.
     pub searched: Option<JointMatch>,
-    /// The result of the refinement; `None` where there is none.
+    /// The result of the refinement; `None` without one.
     pub refined: Option<Refined>,
 }
 
-/// How a motion was found.
+/// The origin of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// There is no scan before: the chain of motions starts here.
+    /// No previous scan: the chain of motions starts here.
     Start,
-    /// By the search alone: no refinement is configured.
+    /// The search: no refinement is configured.
     Searched,
-    /// Refined against the local map.
+    /// The refinement against the local map.
     Refined,
-    /// Refined with little support: its covariance is wider, and the scan stays out of the map.
+    /// A refinement with little support: the covariance is larger, and the scan does not enter the map.
     Weak,
-    /// No match: predicted from the motions before.
+    /// A prediction from previous motions, since nothing matched.
     Predicted,
 }
 
-/// Settings that no odometry can be built from.
+/// An invalid configuration.
 #[derive(Debug, Error)]
 pub enum SetupError {
-    /// The rasters', the points' or the mask's.
+    /// Of the rasters, the points or the mask.
     #[error(transparent)]
     Masker(#[from] MaskerError),
-    /// The search's or the refinement's.
+    /// Of the search or the refinement.
     #[error(transparent)]
     Search(#[from] ConfigError),
 }
 
-/// Why a scan cannot be registered.
+/// An error in registering a scan.
 #[derive(Debug, Error)]
 pub enum OdometryError {
-    /// It cannot be rasterised or masked.
+    /// The scan cannot be rasterised or masked.
     #[error(transparent)]
     Mask(#[from] MaskError),
-    /// No points can be extracted from it.
+    /// The points cannot be extracted.
     #[error(transparent)]
     Points(#[from] ScanError),
-    /// Its raster cannot be searched.
+    /// The raster cannot be searched.
     #[error(transparent)]
     Search(#[from] ShapeError),
 }

@@ -119,7 +119,10 @@ impl MaskInspector {
     }
 
     fn inspection(&mut self, number: usize) -> Result<Inspection, Failure> {
-        let masked = [Some(self.odometry.raster()), self.odometry.raster_before()];
+        let masked = [
+            Some(self.odometry.raster()),
+            self.odometry.previous_raster(),
+        ];
         let masked = masked.map(|raster| raster.map(|raster| raster.to_owned()));
         let mut rasters = Vec::new();
         for (scan, masked) in masked.into_iter().enumerate() {

@@ -1,0 +1,189 @@
+//! The binary layout of the slots of a checkpoint: little-endian words of 8 bytes, the first one a checksum of the rest.
+
+use gyre_geometry::Twist;
+use gyre_scan_matching::{Anchor, Keyframe, TrackerState};
+use nalgebra::{Complex, Isometry2, Translation2, UnitComplex};
+
+/// Words of a state's slot: the checksum; the item, the number of keyframes, the id of the oldest one; the tracker state.
+const STATE_WORDS: usize = 1 + 3 + TRACKER_WORDS;
+pub(super) const STATE_BYTES: usize = STATE_WORDS * 8;
+const TRACKER_WORDS: usize = 4 + 2 * ANCHOR_WORDS + 4;
+const ANCHOR_WORDS: usize = 9;
+/// Words of a keyframe's slot before its cells: checksum, id, pose, corners of both levels.
+pub(super) const KEYFRAME_WORDS: usize = 2 + 4 + 4;
+/// The checksum of an empty slot. No content has it.
+pub(super) const EMPTY: [u8; 8] = [0; 8];
+
+/// The header of a state's slot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct StateHeader {
+    /// The item after which the state was written.
+    pub item: u64,
+    /// Number of keyframes in the map.
+    pub keyframes: u64,
+    /// Id of the oldest keyframe; `u64::MAX` without any.
+    pub oldest: u64,
+}
+
+fn word(bytes: &[u8], k: usize) -> u64 {
+    bytes[8 * k..]
+        .first_chunk()
+        .map_or(0, |word| u64::from_le_bytes(*word))
+}
+
+fn set_word(bytes: &mut [u8], k: usize, word: u64) {
+    bytes[8 * k..8 * k + 8].copy_from_slice(&word.to_le_bytes());
+}
+
+/// Returns whether the checksum of a slot is right.
+fn is_valid(slot: &[u8]) -> bool {
+    word(slot, 0) == checksum(&slot[8..])
+}
+
+/// The CRC-32 with one more bit set, so that it is never zero, as in an empty slot.
+fn checksum(bytes: &[u8]) -> u64 {
+    1 << 32 | u64::from(crc32fast::hash(bytes))
+}
+
+fn pose_words(pose: &Isometry2<f64>) -> [u64; 4] {
+    [
+        pose.translation.x,
+        pose.translation.y,
+        pose.rotation.re,
+        pose.rotation.im,
+    ]
+    .map(f64::to_bits)
+}
+
+/// Restores a pose bit for bit, without normalizing its rotation.
+fn pose_from(words: &[u64]) -> Isometry2<f64> {
+    let [x, y, re, im] = [0, 1, 2, 3].map(|k| f64::from_bits(words[k]));
+    Isometry2::from_parts(
+        Translation2::new(x, y),
+        UnitComplex::new_unchecked(Complex::new(re, im)),
+    )
+}
+
+fn tracker_words(state: &TrackerState) -> [u64; TRACKER_WORDS] {
+    let mut words = [0; TRACKER_WORDS];
+    words[..4].copy_from_slice(&pose_words(&state.pose));
+    for (k, anchor) in state.anchors.iter().enumerate() {
+        let words = &mut words[4 + k * ANCHOR_WORDS..][..ANCHOR_WORDS];
+        if let Some(anchor) = anchor {
+            words[0] = 1;
+            words[1..5].copy_from_slice(&pose_words(&anchor.pose));
+            let twist = anchor.twist;
+            words[5..].copy_from_slice(
+                &[
+                    twist.vx_mps,
+                    twist.vy_mps,
+                    twist.yaw_rate_radps,
+                    anchor.age_s,
+                ]
+                .map(f64::to_bits),
+            );
+        }
+    }
+    let rest = [
+        state.mean_overlap.to_bits(),
+        state.mean_weight.to_bits(),
+        state.doubtful.into(),
+        state.unmatched.into(),
+    ];
+    words[4 + 2 * ANCHOR_WORDS..].copy_from_slice(&rest);
+    words
+}
+
+fn tracker_from(words: &[u64; TRACKER_WORDS]) -> TrackerState {
+    let anchor = |k: usize| {
+        let words = &words[4 + k * ANCHOR_WORDS..][..ANCHOR_WORDS];
+        let [vx_mps, vy_mps, yaw_rate_radps, age_s] =
+            [5, 6, 7, 8].map(|k| f64::from_bits(words[k]));
+        (words[0] == 1).then(|| Anchor {
+            pose: pose_from(&words[1..5]),
+            twist: Twist {
+                vx_mps,
+                vy_mps,
+                yaw_rate_radps,
+            },
+            age_s,
+        })
+    };
+    let rest = &words[4 + 2 * ANCHOR_WORDS..];
+    TrackerState {
+        pose: pose_from(words),
+        anchors: [anchor(0), anchor(1)],
+        mean_overlap: f64::from_bits(rest[0]),
+        mean_weight: f64::from_bits(rest[1]),
+        doubtful: rest[2] as u32,
+        unmatched: rest[3] as u32,
+    }
+}
+
+pub(super) fn encode_state(header: StateHeader, state: &TrackerState) -> [u8; STATE_BYTES] {
+    let mut slot = [0; STATE_BYTES];
+    [header.item, header.keyframes, header.oldest]
+        .into_iter()
+        .chain(tracker_words(state))
+        .enumerate()
+        .for_each(|(k, value)| set_word(&mut slot, k + 1, value));
+    let check = checksum(&slot[8..]);
+    set_word(&mut slot, 0, check);
+    slot
+}
+
+/// Decodes a state; `None` if its checksum is wrong.
+pub(super) fn decode_state(slot: &[u8; STATE_BYTES]) -> Option<(StateHeader, TrackerState)> {
+    let [item, keyframes, oldest] = [1, 2, 3].map(|k| word(slot, k));
+    let header = StateHeader {
+        item,
+        keyframes,
+        oldest,
+    };
+    let words = std::array::from_fn(|k| word(slot, k + 4));
+    is_valid(slot).then(|| (header, tracker_from(&words)))
+}
+
+pub(super) fn encode_keyframe(keyframe: &Keyframe, slot: &mut [u8]) {
+    set_word(slot, 1, keyframe.id);
+    pose_words(&keyframe.pose)
+        .into_iter()
+        .enumerate()
+        .for_each(|(k, value)| set_word(slot, k + 2, value));
+    let mut at = KEYFRAME_WORDS * 8;
+    for (level, (corner, cells)) in keyframe.images().into_iter().enumerate() {
+        corner
+            .iter()
+            .enumerate()
+            .for_each(|(k, value)| set_word(slot, 6 + 2 * level + k, *value as u64));
+        slot[at..]
+            .iter_mut()
+            .zip(cells)
+            .for_each(|(to, cell)| *to = *cell);
+        at += cells.len();
+    }
+    let check = checksum(&slot[8..]);
+    set_word(slot, 0, check);
+}
+
+/// Returns the id of the keyframe in a slot; `None` if its checksum is wrong.
+pub(super) fn keyframe_id(slot: &[u8]) -> Option<u64> {
+    is_valid(slot).then(|| word(slot, 1))
+}
+
+/// Decodes a keyframe; false if its checksum is wrong.
+pub(super) fn decode_keyframe(slot: &[u8], keyframe: &mut Keyframe) -> bool {
+    keyframe.id = word(slot, 1);
+    keyframe.pose = pose_from(&std::array::from_fn::<u64, 4, _>(|k| word(slot, k + 2)));
+    let mut at = KEYFRAME_WORDS * 8;
+    for (level, (corner, cells)) in keyframe.images_mut().into_iter().enumerate() {
+        *corner = [0, 1].map(|k| word(slot, 6 + 2 * level + k) as i64);
+        let count = cells.len();
+        cells
+            .into_iter()
+            .zip(&slot[at..])
+            .for_each(|(cell, from)| *cell = *from);
+        at += count;
+    }
+    is_valid(slot)
+}
