@@ -69,7 +69,7 @@ fn one_scan_makes_no_motion() {
 }
 
 #[test]
-fn an_image_that_is_no_image_is_told() {
+fn an_image_that_is_not_an_image_is_reported() {
     let recording = recording::copy(3);
     for image in recording::images(recording.path()) {
         recording::truncate(&image, 0);
@@ -80,7 +80,7 @@ fn an_image_that_is_no_image_is_told() {
 }
 
 #[test]
-fn a_dataset_of_truncated_images_alone_is_told() {
+fn a_dataset_of_truncated_images_alone_is_reported() {
     let recording = recording::copy(3);
     for image in recording::images(recording.path()) {
         recording::truncate(&image, 5000);
@@ -92,10 +92,10 @@ fn a_dataset_of_truncated_images_alone_is_told() {
 
 // A bad scan among good ones.
 
-/// Spoils scan `bad` of eight, and asserts that it alone is left out.
-fn skips(bad: usize, reason: &str, spoil: impl FnOnce(&Path)) {
+/// Damages scan `bad` of eight, and asserts that it alone is left out.
+fn skips(bad: usize, reason: &str, damage: impl FnOnce(&Path)) {
     let recording = recording::copy(8);
-    spoil(&recording::images(recording.path())[bad]);
+    damage(&recording::images(recording.path())[bad]);
     let run = run_of(recording.path());
     run.finish().succeeded();
     let summary = run.summary();
@@ -118,11 +118,11 @@ fn skips(bad: usize, reason: &str, spoil: impl FnOnce(&Path)) {
         "{rows:?}"
     );
     let log = run.result("log.jsonl");
-    let told = log
+    let reported = log
         .lines()
         .filter(|line| line.contains("WARN") && line.contains(reason))
         .count();
-    assert_eq!(told, 1, "{log}");
+    assert_eq!(reported, 1, "{log}");
 }
 
 #[test]
@@ -179,7 +179,7 @@ fn an_unknown_section_is_named_with_the_nearest_right_one() {
 }
 
 #[test]
-fn an_impossible_value_is_told_with_what_is_possible() {
+fn an_impossible_value_is_reported_with_what_is_possible() {
     for (text, words) in [
         ("[run]\nwindow = 0", ["run.window is 0", "at least 1"]),
         ("[run]\nwindow = -3", ["[run]", "-3"]),
@@ -250,13 +250,13 @@ fn a_time_longer_than_any_run_is_no_limit() {
 }
 
 #[test]
-fn a_value_of_the_wrong_type_is_told_with_its_section() {
+fn a_value_of_the_wrong_type_is_reported_with_its_section() {
     configured("[masking]\nthreshold = 'high'").refused_with(&["[masking]", "threshold"]);
     configured("masking = 3").refused_with(&["masking"]);
 }
 
 #[test]
-fn an_override_without_key_or_value_is_told() {
+fn an_override_without_key_or_value_is_reported() {
     for sentence in ["masking", "threshold=3", "=", "masking.threshold"] {
         Run::of_recording().set(sentence).finish().refused_with(&[
             "--set",
@@ -275,19 +275,19 @@ fn an_override_without_key_or_value_is_told() {
 }
 
 #[test]
-fn a_missing_configuration_is_told() {
+fn a_missing_configuration_is_reported() {
     Run::of_file(Path::new("no/such.toml"))
         .finish()
         .refused_with(&["no/such.toml", "No such file"]);
 }
 
 #[test]
-fn a_configuration_that_is_not_toml_is_told_with_the_place() {
+fn a_configuration_that_is_not_toml_is_reported_with_the_place() {
     configured("[raster]\nn = = 3").refused_with(&["test.toml", "line 2"]);
 }
 
 #[test]
-fn a_bad_rate_on_the_command_line_is_told() {
+fn a_bad_rate_on_the_command_line_is_reported() {
     let ended = Run::of_recording().rate("fast").finish();
     assert_eq!(ended.code(), Some(2), "{}", ended.stderr);
     assert!(
@@ -300,7 +300,7 @@ fn a_bad_rate_on_the_command_line_is_told() {
 // The machine.
 
 #[test]
-fn a_stage_command_that_does_not_exist_is_told() {
+fn a_stage_command_that_does_not_exist_is_reported() {
     for stage in STAGES {
         let run =
             Run::of_recording().set(&format!("stages.{stage}.command=['/no/such/program', 'x']"));
@@ -310,7 +310,7 @@ fn a_stage_command_that_does_not_exist_is_told() {
 }
 
 #[test]
-fn an_unknown_stage_and_a_stage_without_a_run_are_told() {
+fn an_unknown_stage_and_a_stage_without_a_run_are_reported() {
     let stage = |name| {
         let mut command = crate::common::gyre();
         command.args(["stage", name]).env_remove("GYRE_RUN");
@@ -327,7 +327,7 @@ fn an_unknown_stage_and_a_stage_without_a_run_are_told() {
 }
 
 #[test]
-fn results_that_cannot_be_written_are_told() {
+fn results_that_cannot_be_written_are_reported() {
     let run = Run::of_recording();
     let file = run.folder().join("file");
     fs::write(&file, "").unwrap();
@@ -337,7 +337,7 @@ fn results_that_cannot_be_written_are_told() {
 }
 
 #[test]
-fn a_journal_of_another_program_is_told() {
+fn a_journal_of_another_program_is_reported() {
     let run = Run::of_recording();
     fs::create_dir_all(run.out().join("journal")).unwrap();
     fs::write(
@@ -376,7 +376,7 @@ fn with_shared_memory(run: &Run, options: &str) -> Option<Command> {
 }
 
 #[test]
-fn too_little_shared_memory_is_told_with_the_need_before_the_first_scan() {
+fn too_little_shared_memory_is_reported_with_the_need_before_the_first_scan() {
     let run = Run::of_recording();
     let Some(command) = with_shared_memory(&run, "size=1m") else {
         return;
@@ -392,7 +392,7 @@ fn too_little_shared_memory_is_told_with_the_need_before_the_first_scan() {
 }
 
 #[test]
-fn shared_memory_that_cannot_be_written_is_told() {
+fn shared_memory_that_cannot_be_written_is_reported() {
     let run = Run::of_recording();
     let Some(command) = with_shared_memory(&run, "ro,size=1g") else {
         return;

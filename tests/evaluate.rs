@@ -50,7 +50,7 @@ fn odometry(run: &Run, change: impl FnOnce(String) -> String) -> PathBuf {
 fn figure(value: &Value) -> f64 {
     value
         .as_f64()
-        .unwrap_or_else(|| panic!("{value} is no number"))
+        .unwrap_or_else(|| panic!("{value} is not a number"))
 }
 
 #[test]
@@ -158,7 +158,10 @@ fn an_odometry_with_a_column_missing_or_damaged_is_refused_in_a_sentence() {
             .unwrap();
         text.replacen(x_m, "far", 1)
     });
-    refused(&damaged, &["changed.csv, line 2", "\"far\" is no number"]);
+    refused(
+        &damaged,
+        &["changed.csv", "line: 2", "invalid float literal"],
+    );
     let cut = odometry(&run, |text| text[..text.len() - 30].to_owned());
     refused(&cut, &["changed.csv, line 24", "fields, 28 in the header"]);
     refused(&run.out().join("none.csv"), &["cannot read", "none.csv"]);

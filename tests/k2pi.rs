@@ -10,7 +10,7 @@ const SCANS: usize = 60;
 /// Measured over some 200 m each: 0.7, 0.7 and 0.5 m off by the shipped configuration, 12.4, 10.3 and 2.9 m by the paper's.
 const SEEDS: [u32; 3] = [1, 2, 3];
 
-/// What a configuration makes of a drive: its evaluation.
+/// The evaluation of a configuration on a drive.
 fn evaluation(configuration: &str, seed: u32) -> Value {
     let configs = Path::new(crate::PROJECT).join("configs");
     let run = Run::of_file(&configs.join(configuration)).rate("max");

@@ -246,7 +246,7 @@ fn a_mask_that_cannot_be_made_is_refused_before_anything_starts() {
 }
 
 #[test]
-fn without_onnx_runtime_the_command_that_installs_it_is_told_and_other_masks_still_work() {
+fn without_onnx_runtime_the_command_that_installs_it_is_named_and_other_masks_still_work() {
     let run = masked_by(ONE_SCAN);
     let without = |run: &Run| {
         let mut command = run.command();

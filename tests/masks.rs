@@ -263,18 +263,18 @@ fn a_simulation_is_drawn_as_it_is_rendered() {
 }
 
 #[test]
-fn what_cannot_be_read_is_left_out_and_told() {
+fn unreadable_scans_are_left_out_and_reported() {
     let folder = folder();
-    let spoilt = recording::copy(8);
-    recording::truncate(&recording::images(spoilt.path())[4], 100_000);
-    let ended = masks_of(spoilt.path(), folder.path(), &["--scans", "4,5"]);
+    let damaged = recording::copy(8);
+    recording::truncate(&recording::images(damaged.path())[4], 100_000);
+    let ended = masks_of(damaged.path(), folder.path(), &["--scans", "4,5"]);
     assert!(
         ended.succeeded().stderr.starts_with("left out: "),
         "{}",
         ended.stderr
     );
     assert_eq!(names(folder.path()), ["masks.png", "scan-000005.png"]);
-    let ended = masks_of(spoilt.path(), folder.path(), &["--scans", "4"]);
+    let ended = masks_of(damaged.path(), folder.path(), &["--scans", "4"]);
     ended.failed_with(&["none of the chosen scans can be read"]);
 }
 

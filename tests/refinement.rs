@@ -9,7 +9,7 @@ use serde_json::Value;
 
 const REFINEMENT: &str = "refinement";
 const MAP: &str = "journal/refinement.map";
-/// What the search says of a motion.
+/// The searched part of a row.
 const SEARCHED: [&str; 5] = [
     "searched_x_m",
     "searched_y_m",
@@ -105,7 +105,7 @@ fn a_run_that_does_not_refine_has_neither_the_process_nor_its_map_nor_its_counts
     );
 }
 
-/// Masking undoes the sweep with searched motions, so the search sees the same rasters whether its motions are refined or not.
+/// Masking compensates with searched motions, so the search sees the same rasters whether its motions are refined or not.
 #[test]
 fn refining_changes_nothing_for_the_search() {
     let alone = without().complete();
@@ -246,7 +246,7 @@ fn an_unfinished_run_is_not_continued_with_another_refinement() {
 }
 
 #[test]
-fn a_map_that_was_lost_or_damaged_is_told_and_the_run_can_be_begun_anew() {
+fn a_lost_or_damaged_map_is_reported_and_the_run_can_be_started_anew() {
     let run = interrupted();
     let map = run.out().join(MAP);
     let whole = fs::read(&map).unwrap();

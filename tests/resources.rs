@@ -1,4 +1,4 @@
-//! What a run takes of the machine: no memory for each scan, no time while there is nothing to do.
+//! Resources of a run: no memory per scan, no processor time while idle.
 
 use std::{
     thread,

@@ -218,7 +218,7 @@ fn what_was_computed_before_giving_up_is_kept_and_the_same_command_goes_on() {
         "masking died",
         "signal 9",
         "poses are kept",
-        "the same command goes on",
+        "the same command resumes",
     ]);
     assert!(odometry::rows(&run.odometry()).len() + 1 >= MIDDLE);
     assert_eq!(run.complete(), undisturbed());

@@ -38,7 +38,7 @@ pub struct TablesArguments {
     /// The sequences. Times are measured on scans of the first.
     #[command(flatten)]
     pub sequences: SequenceArguments,
-    /// Where tables.md, tables.json and all runs go.
+    /// The folder of tables.md, tables.json and all runs.
     #[arg(long, default_value = "out/tables")]
     pub out: PathBuf,
     /// Measure the times only (Table IIIa).
@@ -63,7 +63,7 @@ pub struct AblationArguments {
     /// The sequences.
     #[command(flatten)]
     pub sequences: SequenceArguments,
-    /// Where ablation.md, ablation.json and all runs go.
+    /// The folder of ablation.md, ablation.json and all runs.
     #[arg(long, default_value = "out/ablation")]
     pub out: PathBuf,
     /// Run each of these changes alone instead of the steps, as in masking.threshold=50,70: shows whether a choice holds among its
@@ -90,7 +90,7 @@ pub struct RealismArguments {
     /// OTHER's configuration.
     #[arg(long, value_name = "FILE", requires = "between")]
     pub between_config: Option<PathBuf>,
-    /// Where realism.md, realism.json, plots, pictures and the odometries' runs go.
+    /// The folder of realism.md, realism.json and the runs of the searches.
     #[arg(long, default_value = "out/realism")]
     pub out: PathBuf,
     /// Scans whose statistics are taken, at most: runs of consecutive ones, evenly spread over the recording.
@@ -126,7 +126,7 @@ pub struct ExportPairsArguments {
 pub struct CorruptArguments {
     /// The dataset's folder. The copy has links to it, and needs it.
     pub path: PathBuf,
-    /// What is done to a scan.
+    /// The fault.
     #[arg(long)]
     pub fault: Fault,
     /// Every Nth scan is corrupted, never the first.
@@ -135,7 +135,7 @@ pub struct CorruptArguments {
     /// Seed of the noise.
     #[arg(long, default_value = "1")]
     pub seed: u64,
-    /// Where to write the copy: an empty folder.
+    /// The folder of the copy, empty or new.
     #[arg(long)]
     pub out: PathBuf,
 }

@@ -283,11 +283,12 @@ fn a_drive_gives_the_same_bytes_again_streamed_or_read() {
 #[test]
 fn what_is_left_out_is_counted_and_ends_a_sequence() {
     let exports = Exports::new();
-    let spoilt = recording::copy(recording::SCANS);
-    recording::truncate(&recording::images(spoilt.path())[9], 1_000);
+    let damaged = recording::copy(recording::SCANS);
+    recording::truncate(&recording::images(damaged.path())[9], 1_000);
     // Known before scan 4 and after scan 19 to nobody.
     let truth = truth_without(exports.folder.path(), |index| (4..=19).contains(&index));
-    let printed = exports.of_recording(spoilt.path(), &["--ground-truth", truth.to_str().unwrap()]);
+    let printed =
+        exports.of_recording(damaged.path(), &["--ground-truth", truth.to_str().unwrap()]);
     assert!(
         printed.starts_with(
             "wrote 15 scans in 2 sequences (left out: 1 unreadable, 8 without truth) to "

@@ -1,15 +1,15 @@
-//! What a command said, and how it ended.
+//! The output and the end of a command.
 
 use std::process::{Command, ExitStatus};
 
 /// A run that is over, or another command.
 #[derive(Clone, Debug)]
 pub struct Ended {
-    /// How.
+    /// The exit status.
     pub status: ExitStatus,
-    /// What it printed.
+    /// Its standard output.
     pub stdout: String,
-    /// What it told the person at the terminal.
+    /// Its standard error.
     pub stderr: String,
 }
 
@@ -30,7 +30,7 @@ impl Ended {
         self.status.code()
     }
 
-    /// Asserts that it ended well, without a word of panic.
+    /// Asserts that it succeeded without a panic.
     pub fn succeeded(&self) -> &Self {
         assert!(self.status.success(), "{}\n{}", self.status, self.stderr);
         self.assert_calm();
@@ -75,7 +75,7 @@ impl Ended {
     }
 }
 
-/// The last line, if it is what the program says of itself; else nothing.
+/// The last line, if it is a message of the program; else nothing.
 fn sentence_of(stderr: &str) -> &str {
     stderr
         .lines()

@@ -1,4 +1,4 @@
-//! What a run may leave: its results, nothing else. Other runs on the machine are none of our business.
+//! Asserts that a run leaves nothing but its results. Other runs on the machine do not matter.
 
 use std::{
     fs,
@@ -44,7 +44,7 @@ pub fn assert_nothing_left(out: &Path) {
     );
 }
 
-/// What the run that writes to `out` takes of shared memory, without its bookkeeping.
+/// The shared memory of the run that writes to `out`, without bookkeeping.
 pub fn bytes(out: &Path) -> u64 {
     let files = shared_memory_of(&root(out)).into_iter();
     files
@@ -59,7 +59,7 @@ pub fn bytes(out: &Path) -> u64 {
         .sum()
 }
 
-/// Takes away what a killed run left.
+/// Removes what a killed run left.
 pub fn remove(out: &Path) {
     let root = root(out);
     for name in shared_memory_of(&root) {

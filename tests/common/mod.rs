@@ -1,5 +1,5 @@
-//! What the whole-pipeline tests share: a [`Run`] is a `gyre run` command with results of its own, [`Running`] is one that goes
-//! on, [`Ended`] is what it said. Every run that ends is checked to have left nothing behind.
+//! Shared by the whole-pipeline tests: a [`Run`] is a `gyre run` command with results of its own, [`Running`] is one that is
+//! running, [`Ended`] its output. Every run that ends is checked to have left nothing behind.
 
 // Each test binary uses its own part of this.
 #![allow(dead_code, unused_imports, clippy::unwrap_used)]
@@ -56,7 +56,7 @@ pub fn real_data(folder: &str) -> Option<PathBuf> {
     }
 }
 
-/// Whether networks can be computed here; says so where not.
+/// Returns whether networks can be computed here; prints why a test is skipped.
 pub fn runtime_is_installed() -> bool {
     let found = gyre_masking::runtime::find(None).is_ok();
     if !found {
@@ -166,7 +166,7 @@ impl Run {
         self.folder.path()
     }
 
-    /// Where its results are.
+    /// The folder of its results.
     pub fn out(&self) -> &Path {
         &self.out
     }

@@ -1,6 +1,6 @@
 //! Reading `odometry.csv`.
 
-/// What a row says of its place in the chain of motions.
+/// The place of a row in the chain of motions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Row {
     /// Number in the chain.

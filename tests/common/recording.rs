@@ -19,7 +19,7 @@ pub fn small() -> &'static Path {
     FOLDER.get_or_init(|| simulated(SCANS))
 }
 
-/// A copy of the small recording's first `scans` scans, to be spoilt. Its images are links: replace them, don't write into them.
+/// A copy of the small recording's first `scans` scans, to be corrupted. Its images are links: replace them instead of writing into them.
 pub fn copy(scans: usize) -> TempDir {
     let folder = tempfile::Builder::new()
         .prefix("gyre-recording-")

@@ -1,4 +1,4 @@
-//! A run that goes on: what to wait for, and how to disturb it.
+//! A running `gyre run`: what to wait for, and how to disturb it.
 
 use std::{
     collections::BTreeMap,
@@ -15,12 +15,12 @@ use super::{
     processes::{self, send},
 };
 
-/// A run of the small recording takes a second or two; so much more only on a machine that does a lot besides.
+/// A run of the small recording takes a second or two, far more only on a loaded machine.
 const LIMIT: Duration = Duration::from_secs(90);
-/// Between two looks at what happens.
+/// Time between two polls.
 const LOOK: Duration = Duration::from_millis(2);
 
-/// See the module. Dropped before its end, it is killed.
+/// A running command. Dropped before its end, it is killed.
 pub struct Running {
     run: Run,
     child: Child,
@@ -82,7 +82,7 @@ impl Running {
         journal::read(&journal::path(self.run.out())).map_or(0, |poses| poses.len())
     }
 
-    /// What the run takes of shared memory.
+    /// The shared memory of the run.
     pub fn shared_memory_bytes(&self) -> u64 {
         leftovers::bytes(self.run.out())
     }
@@ -105,7 +105,7 @@ impl Running {
         self
     }
 
-    /// What the environment of each of its stages says.
+    /// The entry in the environment of each of its stages.
     pub fn mark(&self) -> String {
         format!("GYRE_RUN={}", leftovers::root(self.run.out()).display())
     }
@@ -126,10 +126,10 @@ impl Running {
         send(self.pid(), Signal::KILL);
         self.wait();
         let root = leftovers::root(self.run.out());
-        let patience = Instant::now() + Duration::from_secs(5);
+        let deadline = Instant::now() + Duration::from_secs(5);
         while !processes::of_run(&root).is_empty() {
             assert!(
-                Instant::now() < patience,
+                Instant::now() < deadline,
                 "stages outlive their supervisor: {:?}",
                 processes::of_run(&root)
             );

@@ -1,4 +1,4 @@
-//! Over which distance powers are alike, in range and in azimuth, apart from what is usual at their range.
+//! Autocorrelation of powers in range and in azimuth, after subtracting the mean at their range.
 
 use gyre_radar::PolarScan;
 use gyre_simd::simd;

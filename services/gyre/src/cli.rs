@@ -14,7 +14,7 @@ use crate::configuration::Rate;
 #[derive(Debug, Parser)]
 #[command(version, about)]
 pub struct Gyre {
-    /// What to do.
+    /// The command.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -29,13 +29,13 @@ pub enum Command {
         /// radar-replay, masking, rotation-search, translation-search, joint-search, refinement or pose-integration.
         name: String,
     },
-    /// Say what a dataset is, and what looks wrong with it.
+    /// Report what a dataset contains, and what looks wrong with it.
     Inspect(InspectArguments),
-    /// Judge a trajectory by ground truth.
+    /// Evaluate a trajectory against ground truth.
     Evaluate(EvaluateArguments),
     /// Draw what the mask keeps of scans.
     Masks(MasksArguments),
-    /// Write a simulated recording, or go on with one.
+    /// Write a simulated recording, or complete one.
     Simulate(SimulateArguments),
     /// Print the JSON schema of configurations, for editors.
     Schema(SchemaArguments),
@@ -49,16 +49,16 @@ pub struct RunArguments {
     /// The dataset's folder (source.data).
     #[arg(long)]
     pub data: Option<PathBuf>,
-    /// Where the results go. Default: `out/NAME`, NAME being the configuration's.
+    /// The folder of the results. Default: `out/NAME`, NAME being the configuration's.
     #[arg(long)]
     pub out: Option<PathBuf>,
-    /// How fast to play: realtime, max, or a factor (run.rate).
+    /// Pace of the source: realtime, max, or a factor (run.rate).
     #[arg(long)]
     pub rate: Option<Rate>,
     /// Override a key, as in masking.kind=none; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
-    /// Forget an unfinished run in --out instead of going on with it.
+    /// Discard an unfinished run in --out instead of resuming it.
     #[arg(long)]
     pub fresh: bool,
 }
@@ -68,7 +68,7 @@ pub struct RunArguments {
 pub struct InspectArguments {
     /// The dataset's folder.
     pub path: PathBuf,
-    /// A trajectory of this dataset (TUM), to find out whether each ground truth's clock agrees.
+    /// A trajectory of this dataset (TUM): checks whether the clock of each ground truth agrees.
     #[arg(long)]
     pub trajectory: Option<PathBuf>,
     /// Print JSON.
@@ -79,13 +79,13 @@ pub struct InspectArguments {
 /// The arguments of `gyre evaluate`.
 #[derive(Debug, Args)]
 pub struct EvaluateArguments {
-    /// The trajectory to judge: TUM, KITTI, or a dataset's own form.
+    /// The trajectory to evaluate: TUM, KITTI, or a dataset's own format.
     #[arg(long)]
     pub estimate: PathBuf,
     /// The ground truth: TUM, KITTI, Oxford radar_odometry.csv, Boreas radar_poses.csv, MulRan global_pose.csv.
     #[arg(long)]
     pub ground_truth: PathBuf,
-    /// Poses between the starts of the stretches that are measured.
+    /// Poses between the starts of the segments that are measured.
     #[arg(long, default_value = "10")]
     pub step: NonZeroUsize,
     /// Print JSON.
@@ -94,17 +94,17 @@ pub struct EvaluateArguments {
     /// Write trajectory.svg, errors.svg and, where there are covariances, bands.svg here.
     #[arg(long)]
     pub plots: Option<PathBuf>,
-    /// The motions whose covariances are judged. Default: the odometry.csv beside the estimate, if it has the same stamps.
+    /// The motions whose covariances are evaluated. Default: the odometry.csv beside the estimate, if it has the same stamps.
     #[arg(long)]
     pub odometry: Option<PathBuf>,
-    /// How many motions make the stretches over which covariances are judged.
+    /// Lengths, in motions, of the segments over which covariances are evaluated.
     #[arg(long, value_delimiter = ',', default_value = "1,4,16,64")]
     pub nees_lengths: Vec<NonZeroUsize>,
-    /// The part of the drive whose covariances are judged: all, or from A to B percent of its time as in 0..50. Scales that are set
-    /// on one part can be shown on another.
+    /// The part of the drive whose covariances are evaluated: all, or from A to B percent of its time as in 0..50. Scales that are
+    /// tuned on one part can be validated on another.
     #[arg(long, value_name = "A..B", default_value = "all", value_parser = part)]
     pub nees_part: Part,
-    /// Standard deviation of the ground truth's x and y, m: added to the covariances that are judged.
+    /// Standard deviation of the ground truth's x and y, m: added to the covariances that are evaluated.
     #[arg(long, default_value = "0", value_parser = sigma)]
     pub truth_sigma_m: f64,
     /// Standard deviation of the ground truth's heading, degrees.
@@ -120,13 +120,13 @@ pub struct MasksArguments {
     /// The recording's folder. Default: the configuration's simulation, or its source.data.
     #[arg(long)]
     pub data: Option<PathBuf>,
-    /// Where masks.png and a scan-NUMBER.png for each go.
+    /// The folder of masks.png and of a scan-NUMBER.png for each scan.
     #[arg(long, default_value = "out/masks")]
     pub out: PathBuf,
     /// Numbers of the scans to draw. Default: eight, evenly spread.
     #[arg(long, value_delimiter = ',')]
     pub scans: Vec<usize>,
-    /// Draw every so-manyth scan.
+    /// Draw every Nth scan.
     #[arg(long, conflicts_with = "scans")]
     pub every: Option<NonZeroUsize>,
     /// Override a key, as in masking.kind=threshold; may be repeated.
@@ -147,10 +147,10 @@ pub struct SchemaArguments {
 pub struct SimulateArguments {
     /// The configuration, whose section `[simulation]` is used; its defaults without one.
     pub configuration: Option<PathBuf>,
-    /// Where to write the recording. What an earlier call with the same configuration left there is kept and completed.
+    /// The folder of the recording. What an earlier call with the same configuration left there is kept and completed.
     #[arg(long)]
     pub out: PathBuf,
-    /// How many scans (simulation.scans).
+    /// Number of scans (simulation.scans).
     #[arg(long)]
     pub scans: Option<usize>,
     /// Drive along this file: TUM, KITTI, Oxford radar_odometry.csv, Boreas radar_poses.csv.
@@ -159,7 +159,7 @@ pub struct SimulateArguments {
     /// Seed (simulation.seed).
     #[arg(long)]
     pub seed: Option<u64>,
-    /// Whose form of files: oxford, boreas or radiate (simulation.output.format).
+    /// The format of the files: oxford, boreas or radiate (simulation.output.format).
     #[arg(long)]
     pub format: Option<OutputFormat>,
     /// Threads to render on. Default: all processors. The files are the same whatever their number.
@@ -170,7 +170,7 @@ pub struct SimulateArguments {
     pub set: Vec<String>,
 }
 
-/// A standard deviation: a number, not below zero.
+/// Parses a standard deviation: a number, not below zero.
 fn sigma(text: &str) -> Result<f64, String> {
     let sigma = text
         .parse()
@@ -179,7 +179,7 @@ fn sigma(text: &str) -> Result<f64, String> {
     sigma.ok_or_else(|| "a number of at least 0 is needed".to_owned())
 }
 
-/// `all`, or `A..B` in percent.
+/// Parses `all`, or `A..B` in percent.
 fn part(text: &str) -> Result<Part, String> {
     let share = |percent: &str| percent.parse::<f64>().ok().map(|percent| percent / 100.0);
     let range = || {

@@ -80,7 +80,7 @@ pub struct RunConfig {
     pub ground_truth: Option<PathBuf>,
 }
 
-/// What happens when scans come faster than they can be processed.
+/// The policy when scans arrive faster than they can be processed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mode {
@@ -113,41 +113,41 @@ impl Default for RunConfig {
     }
 }
 
-/// Why a configuration does not do.
+/// Why a configuration is rejected.
 #[derive(Debug, Error)]
 pub enum ConfigurationError {
     /// The file cannot be read.
     #[error("cannot read the configuration {path}: {source}")]
     Unreadable {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What the operating system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
     /// The file is not TOML.
     #[error("{path}: {reason}")]
     Syntax {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// Where and what.
+        /// The place and the reason.
         reason: String,
     },
-    /// A key that nobody knows.
+    /// An unknown key.
     #[error("[{section}] has no key `{key}`{suggestion}")]
     UnknownKey {
-        /// In which section.
+        /// The section.
         section: String,
         /// The key.
         key: String,
-        /// The nearest right one.
+        /// The nearest known one.
         suggestion: String,
     },
     /// A value that a key cannot have.
     #[error("[{section}]: {reason}")]
     Value {
-        /// In which section.
+        /// The section.
         section: String,
-        /// What is wrong.
+        /// The reason.
         reason: String,
     },
     /// `--set` without a key and a value.
@@ -156,7 +156,10 @@ pub enum ConfigurationError {
 }
 
 impl Configuration {
-    /// Reads a configuration and overrides keys of it with `section.key=value` sentences.
+    /// Reads a configuration and overrides keys of it with `section.key=value`.
+    ///
+    /// # Errors
+    /// A file that cannot be read, an unknown key, a value out of its bounds.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, ConfigurationError> {
         let unreadable = |source| ConfigurationError::Unreadable {
             path: path.to_owned(),
@@ -171,7 +174,10 @@ impl Configuration {
         Self::resolve(table, overrides)
     }
 
-    /// A configuration of nothing but `section.key=value` sentences.
+    /// Creates a configuration from overrides `section.key=value` alone.
+    ///
+    /// # Errors
+    /// An unknown key, a value out of its bounds.
     pub fn of_overrides(overrides: &[String]) -> Result<Self, ConfigurationError> {
         Self::resolve(toml::Table::new(), overrides)
     }
@@ -302,8 +308,8 @@ impl Configuration {
         })
     }
 
-    /// How much may be on its way, with masks that look at so many scans. In live mode the source keeps what comes within a
-    /// second, the time of a restart.
+    /// Returns the limits on scans in flight, with masks that look at `scans_a_mask` scans. In live mode the source keeps what
+    /// arrives within a second, the time of a restart.
     pub fn window(&self, period: Option<Duration>, scans_a_mask: usize) -> Window {
         let live_depth = match (self.run.mode, self.run.rate.factor()) {
             (Mode::Live, Some(rate)) => {
@@ -320,15 +326,15 @@ impl Configuration {
         }
     }
 
-    /// The simulation that is played without being stored, if that is what is played.
+    /// Returns the simulation, if it is played without being stored.
     pub fn streamed(&self) -> Option<&SimulationConfig> {
         self.simulation
             .as_ref()
             .filter(|simulation| !simulation.output.store)
     }
 
-    /// The same with this recording, or with its simulation streamed whether or not a run would store it: to look at the scans
-    /// without a run. What is streamed is to the byte what would be stored.
+    /// Plays this recording instead, or streams the simulation even if a run would store it: for commands that read the scans
+    /// without a run. Streamed and stored scans are byte-identical.
     #[must_use]
     pub fn streaming(mut self, data: Option<&Path>) -> Self {
         if let Some(data) = data {
@@ -342,7 +348,7 @@ impl Configuration {
         self
     }
 
-    /// The scans that are played of so many.
+    /// Returns the scans that are played of a recording of `scans` scans.
     pub fn played(&self, scans: usize) -> Range<usize> {
         let first = self.source.first.min(scans);
         first
@@ -351,7 +357,7 @@ impl Configuration {
                 .min(scans)
     }
 
-    /// What is played, in words.
+    /// Returns the recording's folder, or `a simulation`.
     pub fn data(&self) -> String {
         match self.streamed() {
             Some(_) => "a simulation".to_owned(),
@@ -359,7 +365,7 @@ impl Configuration {
         }
     }
 
-    /// Whether the run has this stage.
+    /// Returns whether the run has this stage.
     pub fn has(&self, stage: StageId) -> bool {
         match stage {
             StageId::RotationSearch | StageId::TranslationSearch => {
@@ -371,7 +377,7 @@ impl Configuration {
         }
     }
 
-    /// The settings of the method alone.
+    /// Returns the settings of the method alone.
     pub fn odometry(&self) -> OdometryConfig {
         OdometryConfig {
             raster: self.raster.clone(),
@@ -385,7 +391,7 @@ impl Configuration {
         }
     }
 
-    /// The processes to start: `gyre stage NAME`, or what the configuration says instead.
+    /// Returns the processes to start: `gyre stage NAME`, or their replacements.
     pub fn stage_plans(&self, gyre: &Path) -> Vec<StagePlan> {
         let live = self.run.mode == Mode::Live;
         let plan = |stage: StageId| {
@@ -419,12 +425,15 @@ impl Configuration {
             .collect()
     }
 
-    /// The text of the resolved configuration: a run from it repeats this run.
+    /// Returns the resolved configuration as TOML: a run from it repeats this run.
+    ///
+    /// # Errors
+    /// A value that TOML cannot hold.
     pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
         toml::to_string_pretty(self)
     }
 
-    /// Whether a run begun with `other` can be continued with this: all that the result depends on is the same.
+    /// Returns whether a run started with `other` can be resumed with this: all that the result depends on is equal.
     pub fn continues(&self, other: &toml::Table) -> bool {
         let of = |table: &toml::Table| {
             let mut table = table.clone();
@@ -436,7 +445,7 @@ impl Configuration {
             }
             table
         };
-        // By way of the text, as `other` came: a table made directly has other digits in its f32 values.
+        // Through text, as `other` came: a table made directly has other digits in its f32 values.
         let text = self.to_toml().ok();
         text.and_then(|text| text.parse().ok())
             .is_some_and(|table| of(&table) == of(other))

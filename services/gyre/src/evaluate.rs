@@ -1,4 +1,4 @@
-//! `gyre evaluate`: a trajectory judged by ground truth.
+//! `gyre evaluate`: evaluates a trajectory against ground truth.
 
 use std::{fs, process::ExitCode};
 
@@ -12,7 +12,10 @@ use crate::{
     odometry, print,
 };
 
-/// Prints how well an estimate fits the truth, as a table or as JSON, and draws both.
+/// Prints the errors of an estimate as a table or as JSON, and draws it.
+///
+/// # Errors
+/// A file that cannot be read, trajectories that do not overlap.
 pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
     let estimate = read_trajectory(&arguments.estimate)?;
     let truth = read_trajectory(&arguments.ground_truth)?;
@@ -49,7 +52,7 @@ fn nees_options(arguments: &EvaluateArguments) -> NeesOptions {
     }
 }
 
-/// The motions of the odometry that was named, or of the one beside the estimate if it fits.
+/// Returns the motions of the odometry that was named, or of the one beside the estimate if it fits.
 fn judged_motions(
     arguments: &EvaluateArguments,
     estimate: &Trajectory,
@@ -70,7 +73,10 @@ fn judged_motions(
         false => Err("its stamps are not the estimate's".into()),
     });
     let note = |reason: &Failure| {
-        print::note(format_args!("{} is not judged: {reason}", beside.display()))
+        print::note(format_args!(
+            "{} is not evaluated: {reason}",
+            beside.display()
+        ))
     };
     Ok(judged.inspect_err(note).ok())
 }
@@ -78,7 +84,7 @@ fn judged_motions(
 /// Trajectories may be written in microseconds.
 const ROUNDING_NS: i64 = 1_000;
 
-/// Whether every motion ends at a pose of the trajectory.
+/// Returns whether every motion ends at a pose of the trajectory.
 fn has_stamps(trajectory: &Trajectory, motions: &[TimedMotion]) -> bool {
     let stamps = trajectory.stamp_ns.as_deref().unwrap_or_default();
     motions.iter().all(|motion| {

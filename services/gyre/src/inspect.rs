@@ -1,4 +1,4 @@
-//! `gyre inspect`: what a dataset is.
+//! `gyre inspect`: reports what a dataset contains.
 
 use std::process::ExitCode;
 
@@ -6,7 +6,10 @@ use gyre_radar::{DatasetOptions, ground_truth::read_trajectory};
 
 use crate::{Failure, cli::InspectArguments, print};
 
-/// Prints what a dataset is and what looks wrong with it.
+/// Prints what a dataset contains and what looks wrong with it.
+///
+/// # Errors
+/// A folder that is not a dataset, a trajectory that cannot be read.
 pub fn inspect(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
     let trajectory = arguments
         .trajectory

@@ -1,5 +1,5 @@
-//! A trajectory held against ground truth, as `gyre run` and `gyre evaluate` both report it: how far off it is, and how honest its
-//! covariances are.
+//! The evaluation of a trajectory against ground truth, as `gyre run` and `gyre evaluate` both report it: its errors, and the
+//! consistency of its covariances.
 
 use std::{fmt, path::Path};
 
@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use crate::Failure;
 
-/// As JSON the evaluation with `nees` beside its figures. `Display` is a table, the alternate form a longer one.
+/// The evaluation with the NEES of its covariances. `Display` is a table, the alternate form a longer one.
 #[derive(Debug, Serialize)]
 pub struct Judgement {
     #[serde(flatten)]
@@ -28,7 +28,7 @@ pub struct Judgement {
 }
 
 impl Judgement {
-    /// Adds what the motions' covariances are worth.
+    /// Adds the consistency of the motions' covariances.
     pub fn new(
         evaluation: Evaluation,
         motions: Option<&MatchedMotions>,
@@ -45,7 +45,10 @@ impl Judgement {
         }
     }
 
-    /// Draws all there is: trajectory, errors where the truth has heading, bands where there are covariances.
+    /// Draws the trajectory, errors where the truth has heading, and bands where there are covariances.
+    ///
+    /// # Errors
+    /// A plot that cannot be drawn or written.
     pub fn draw(&self, directory: &Path) -> Result<(), Failure> {
         let matched = &self.evaluation.matched;
         plot_trajectory(
@@ -80,7 +83,10 @@ impl fmt::Display for Judgement {
     }
 }
 
-/// Compares by time where both have stamps, else pose by pose.
+/// Evaluates by time where both have stamps, else pose by pose.
+///
+/// # Errors
+/// Trajectories that do not overlap.
 pub fn judge(
     estimate: &Trajectory,
     truth: &Trajectory,
@@ -98,7 +104,10 @@ pub fn judge(
     }
 }
 
-/// Holds motions against the truth by which the trajectory that they make was judged.
+/// Compares motions with the truth against which their trajectory was evaluated.
+///
+/// # Errors
+/// A truth without times, without heading, or with other axes.
 pub fn judge_motions(
     motions: &[TimedMotion],
     truth: &Trajectory,

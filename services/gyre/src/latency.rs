@@ -1,4 +1,4 @@
-//! Where the time goes: from each scan's completion to its pose, hop by hop.
+//! Latency from the completion of a scan to its pose, hop by hop.
 
 use std::collections::BTreeMap;
 
@@ -18,28 +18,28 @@ pub struct Percentiles {
     pub max_us: f64,
 }
 
-/// What one stage adds.
+/// The latency of one stage.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct HopLatency {
-    /// From the neighbour's handing over to this process's taking it.
+    /// From the publication by the stage before to the reception.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub transport: Option<Percentiles>,
-    /// From taking it to the work's beginning.
+    /// From the reception to the start of the work.
     pub wait: Percentiles,
-    /// The work.
+    /// Duration of the work.
     pub work: Percentiles,
     /// Share of the time that the stage worked.
     pub busy: f64,
 }
 
-/// All of it.
+/// The latency of a run: `latency.json`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Latency {
     /// Scans counted.
     pub scans: usize,
     /// From the completion of the sweep (its last azimuth's time) to the journalled pose.
     pub sensor_to_pose: Percentiles,
-    /// StageId by stage.
+    /// Stage by stage.
     pub stages: BTreeMap<&'static str, HopLatency>,
     /// Share of the time that two or more stages worked at once.
     pub overlap: f64,
@@ -65,7 +65,7 @@ impl Percentiles {
 }
 
 impl Latency {
-    /// From the stamps of the poses.
+    /// Computes it from the stamps of the poses.
     pub fn of(poses: &[PoseHeader]) -> Self {
         let finished =
             |pose: &PoseHeader| pose.item.hops[StageId::PoseIntegration as usize].finished_ns;
@@ -84,7 +84,7 @@ impl Latency {
     }
 }
 
-/// The hops of the stages that the run has: those of the others stayed zero.
+/// The hops of the stages that the run has: those of the others are zero.
 fn hops(poses: &[PoseHeader], span_ns: i64) -> BTreeMap<&'static str, HopLatency> {
     let passed = |stage: &StageId| {
         poses
@@ -118,7 +118,7 @@ fn hop(poses: &[PoseHeader], before: Option<StageId>, stage: StageId, span_ns: i
     }
 }
 
-/// From the first work to the last.
+/// Time from the start of the first work to the end of the last.
 fn span(poses: &[PoseHeader]) -> i64 {
     let first = poses.iter().map(|pose| pose.item.hops[0].started_ns).min();
     let last = poses
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn each_hop_is_told_apart() {
+    fn each_hop_is_measured() {
         let latency = Latency::of(&[pose(0), pose(1_000_000)]);
         let masking = &latency.stages["masking"];
         assert_eq!(masking.transport.map(|t| t.p50_us), Some(3.0));

@@ -1,4 +1,4 @@
-//! On what and when something was measured.
+//! The machine and the date of a measurement.
 
 use std::{
     fmt, fs, thread,
@@ -7,7 +7,7 @@ use std::{
 
 use serde::Serialize;
 
-/// A computer, as far as it matters to times.
+/// The properties of a computer that times depend on.
 #[derive(Debug, Serialize)]
 pub struct Machine {
     /// The processor's model.

@@ -1,4 +1,4 @@
-//! `gyre masks`: pictures of what the mask keeps of scans.
+//! `gyre masks`: draws what the mask keeps of scans.
 //!
 //! - `inspector`: masks scans one after the other as in a run, and inspects chosen ones;
 //! - `inspection`: what the mask keeps of one of them, in figures;
@@ -20,12 +20,15 @@ use crate::{
 use drawing::Canvas;
 use inspector::MaskInspector;
 
-/// Scans that are drawn where nobody says which; and on the overview, at most.
+/// Number of scans that are drawn by default, and maximum on the overview.
 const FEW: usize = 8;
 /// The picture of several scans.
 const OVERVIEW: &str = "masks.png";
 
 /// Draws the chosen scans, and prints a line on each.
+///
+/// # Errors
+/// A recording or mask that cannot be used, a picture that cannot be written.
 pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
     let configuration = Configuration::read(&arguments.configuration, &arguments.set)?;
     let configuration = configuration.streaming(arguments.data.as_deref());
@@ -64,7 +67,7 @@ pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The numbers of the scans to draw, in their order, each once.
+/// Returns the numbers of the scans to draw, in order, each once.
 fn choose(
     arguments: &MasksArguments,
     played: Range<usize>,

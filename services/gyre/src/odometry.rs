@@ -15,8 +15,8 @@ const HEADER: &str = "seq,scan,previous_scan,stamp_ns,interval_ns,x_m,y_m,yaw_ra
     rotation_rad,rotation_variance_rad2,rotation_score,rotation_runner_up_rad,rotation_runner_up_score,\
     searched_x_m,searched_y_m,searched_yaw_rad,outcome,hypothesis,overlap,support\n";
 
-/// One row a motion, in fixed decimals: the same scans and configuration give the same bytes. Where the chain of motions starts
-/// there is no row.
+/// Returns `odometry.csv`: one row per motion, in fixed decimals, so that equal motions give equal bytes. The start of the chain has
+/// no row.
 pub fn csv(poses: &[PoseHeader]) -> String {
     let mut text = String::from(HEADER);
     for pose in poses.iter().filter(|pose| !pose.item.is(flag::BREAK)) {
@@ -79,7 +79,7 @@ fn initial_guess_name(refinement: &RefinementRecord) -> &'static str {
     }
 }
 
-/// The poses with the scans' times.
+/// Returns the poses with the scans' times.
 pub fn trajectory(poses: &[PoseHeader]) -> Trajectory {
     Trajectory {
         stamp_ns: Some(poses.iter().map(|pose| pose.item.stamp_ns).collect()),
@@ -87,7 +87,7 @@ pub fn trajectory(poses: &[PoseHeader]) -> Trajectory {
     }
 }
 
-/// The motions with their times and covariances. Where the chain starts there is none.
+/// Returns the motions with their times and covariances. The start of the chain has none.
 pub fn motions(poses: &[PoseHeader]) -> Vec<TimedMotion> {
     let motion = |header: &PoseHeader| {
         let to_ns = header.item.stamp_ns;

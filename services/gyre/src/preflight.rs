@@ -1,4 +1,4 @@
-//! What must hold before the first process is started.
+//! Checks before the first process is started.
 
 use std::{path::Path, time::Duration};
 
@@ -17,7 +17,7 @@ const SHARED_MEMORY: &str = "/dev/shm";
 pub enum PreflightError {
     /// Nothing to play.
     #[error(
-        "no dataset is named: give its folder with --data, or as source.data in the configuration, or have one simulated by a section [simulation]"
+        "no dataset is named: give its folder with --data, or as source.data in the configuration, or add a section [simulation]"
     )]
     NoData,
     /// One scan makes no motion.
@@ -25,7 +25,7 @@ pub enum PreflightError {
     TooFew {
         /// The dataset.
         path: String,
-        /// What it has.
+        /// Its scans.
         scans: usize,
     },
     /// The segments would not fit.
@@ -34,21 +34,21 @@ pub enum PreflightError {
          or lower run.window or raster.n"
     )]
     SharedMemory {
-        /// What is there.
+        /// Free space.
         free_mb: f64,
-        /// What it takes.
+        /// Required space.
         footprint: Footprint,
     },
-    /// It cannot even be asked.
+    /// Its size cannot be read.
     #[error("cannot use shared memory at /dev/shm: {0}")]
     NoSharedMemory(rustix::io::Errno),
 }
 
-/// What the dataset and the machine allow.
+/// Limits of a run that the dataset and the machine allow.
 pub struct Preflight {
     /// Scans to play.
     pub scans: usize,
-    /// How much may be on its way.
+    /// Limits on scans in flight.
     pub window: Window,
     /// The largest payloads.
     pub limits: Limits,
@@ -58,7 +58,10 @@ pub struct Preflight {
     pub truth: Option<Vec<u8>>,
 }
 
-/// Looks at the dataset and at the machine.
+/// Checks the dataset and the machine.
+///
+/// # Errors
+/// A dataset or a mask that cannot be used, too little shared memory.
 pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure> {
     let Played { dataset, truth } = open(configuration)?;
     let scans = configuration.played(dataset.len()).len();
@@ -92,7 +95,10 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
     })
 }
 
-/// Tells where a configuration differs from what its network was trained for.
+/// Warns where a configuration differs from the one that its network was trained for.
+///
+/// # Errors
+/// A model card that cannot be read.
 pub fn warn_of_training(configuration: &Configuration) -> Result<(), crate::Failure> {
     let Configuration {
         masking, raster, ..
@@ -101,7 +107,7 @@ pub fn warn_of_training(configuration: &Configuration) -> Result<(), crate::Fail
         let unlike = Card::read(masking)?.training_mismatches(masking, raster);
         if let (false, Some(card)) = (unlike.is_empty(), &masking.model) {
             print::note(format!(
-                "the masks of {} may be worth less than they were made for: {}",
+                "the masks of {} may be less accurate than in training: {}",
                 card.display(),
                 unlike.join(", ")
             ));
@@ -110,7 +116,7 @@ pub fn warn_of_training(configuration: &Configuration) -> Result<(), crate::Fail
     Ok(())
 }
 
-/// What is to be played.
+/// An open recording or simulation.
 pub struct Played {
     /// Its scans.
     pub dataset: Box<dyn Dataset>,
@@ -118,7 +124,10 @@ pub struct Played {
     pub truth: Option<Vec<u8>>,
 }
 
-/// Opens what is to be played: a recording, or a simulation.
+/// Opens the recording or the simulation that is to be played.
+///
+/// # Errors
+/// No dataset is named, or it cannot be opened.
 pub fn open(configuration: &Configuration) -> Result<Played, crate::Failure> {
     let (data, options) = (&configuration.source.data, &configuration.dataset);
     if let Some(simulation) = configuration.streamed() {
@@ -144,7 +153,7 @@ fn period(dataset: &dyn Dataset) -> Option<Duration> {
     Some(Duration::from_nanos((span_ns.max(0) as u64) / last as u64))
 }
 
-/// Writing to a full tmpfs kills a process without a word, so see to it before.
+/// Writing to a full tmpfs kills a process with SIGBUS, so its free space is checked first.
 fn check_shared_memory(footprint: &Footprint) -> Result<(), PreflightError> {
     let there =
         rustix::fs::statvfs(Path::new(SHARED_MEMORY)).map_err(PreflightError::NoSharedMemory)?;

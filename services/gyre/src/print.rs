@@ -1,10 +1,13 @@
-//! Printing to whoever reads, as long as they do.
+//! Printing to the terminal; a closed pipe is not an error.
 
 use std::{fmt::Display, io::Write};
 
 use crate::Failure;
 
-/// Prints a line. A reader that has seen enough (`gyre inspect ... | head`) is no error.
+/// Prints a line to standard output. A closed pipe (`gyre inspect ... | head`) is not an error.
+///
+/// # Errors
+/// Any other failure to write.
 pub fn line(text: impl Display) -> Result<(), Failure> {
     match writeln!(std::io::stdout(), "{text}") {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),
@@ -12,7 +15,7 @@ pub fn line(text: impl Display) -> Result<(), Failure> {
     }
 }
 
-/// Tells the person at the terminal something on the way. A run does not end because nobody listens any more.
+/// Prints a line to standard error. Failures are ignored: a run does not end because its terminal is closed.
 pub fn note(text: impl Display) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }

@@ -1,4 +1,4 @@
-//! What a person sees while a run goes on: a bar on a terminal, plain lines elsewhere.
+//! The progress of a run: a bar on a terminal, plain lines elsewhere.
 
 use std::{
     io::IsTerminal,
@@ -11,10 +11,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::print;
 
-/// Between two plain lines.
+/// Time between two plain lines.
 const EVERY: Duration = Duration::from_secs(2);
 
-/// See the module.
+/// Shows the progress of a run.
 pub struct Progress {
     bar: Option<ProgressBar>,
     scans: usize,
@@ -26,7 +26,7 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// A run of `scans` scans, of which `resumed` are in the journal already.
+    /// Starts with a run of `scans` scans, of which `resumed` are in the journal already.
     pub fn new(scans: usize, resumed: usize, footprint: &Footprint) -> Self {
         let bar = std::io::stderr().is_terminal().then(|| {
             let style = ProgressStyle::with_template("{bar:32} {pos}/{len} scans  {msg}")
@@ -44,12 +44,12 @@ impl Progress {
         };
         progress.say(&footprint.to_string());
         if resumed > 0 {
-            progress.say(&format!("going on after {resumed} scans"));
+            progress.say(&format!("resuming after {resumed} scans"));
         }
         progress
     }
 
-    /// Shows what happened.
+    /// Shows an event.
     pub fn show(&mut self, event: &Event<'_>) {
         match event {
             Event::Started { stage, pid } => self.say(&format!("{stage:20} pid {pid}")),
@@ -61,17 +61,17 @@ impl Progress {
                     .map_or(String::new(), |line| format!(" ({line})"));
                 self.say(&format!("{stage} died by {}{output}", death.cause));
             }
-            Event::Restarted { all: false } => self.say("started it again"),
+            Event::Restarted { all: false } => self.say("restarted it"),
             Event::Restarted { all: true } => {
-                self.say("started all stages again, from the journal")
+                self.say("restarted all stages from the journal")
             }
             Event::Stalled => {
-                self.say("no pose for too long: starting all stages again, from the journal")
+                self.say("no pose for too long: restarting all stages from the journal")
             }
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn finish(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();

@@ -1,4 +1,4 @@
-//! What a run leaves in `--out`: all of it made from the journal, so a run that was cut short leaves the same files.
+//! Results of a run in `--out`, all made from the journal: an interrupted run leaves the same files.
 
 use std::{fs, path::Path};
 
@@ -19,10 +19,13 @@ use crate::{
     summary::{Counts, MotionCounts, Session, Summary},
 };
 
-/// The truth about a simulation that is played without being stored.
+/// The ground truth of a simulation that is played without being stored.
 pub const SIMULATED_TRUTH: &str = "ground_truth.tum";
 
-/// Writes all files, and returns what the person at the terminal should read.
+/// Writes all files, and returns the summary to print.
+///
+/// # Errors
+/// A file that cannot be written.
 pub fn write(
     configuration: &Configuration,
     out: &Path,
@@ -61,7 +64,7 @@ pub fn write(
     Ok(summary)
 }
 
-/// Judges the trajectory and its covariances by the dataset's ground truth, where there is one that fits.
+/// Evaluates the trajectory and its covariances against the dataset's ground truth, where there is one that fits.
 fn judged(
     configuration: &Configuration,
     out: &Path,
@@ -89,7 +92,10 @@ fn judged(
     let judged = read_trajectory(&path).map_err(Failure::from).and_then(by);
     judged
         .inspect_err(|reason| {
-            print::note(format_args!("not judged by {}: {reason}", path.display()))
+            print::note(format_args!(
+                "not evaluated against {}: {reason}",
+                path.display()
+            ))
         })
         .ok()
 }

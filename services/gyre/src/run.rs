@@ -28,10 +28,13 @@ use crate::{
     summary::Session,
 };
 
-/// What the shell calls a program that was interrupted.
+/// The exit code of an interrupted program, as shells have it.
 const INTERRUPTED: u8 = 130;
 
-/// Runs the pipeline and writes what came of it, however it ended.
+/// Runs the pipeline and writes its results, however it ended.
+///
+/// # Errors
+/// A run that cannot start, fails, or finds fewer than two readable scans.
 pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     let out = results_directory(arguments)?;
     let configuration = resolve(arguments, &out)?;
@@ -75,11 +78,11 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
         wall: started.elapsed(),
         footprint: &checked.footprint,
     };
-    // The run keeps its place until its results are written: no other may begin to write them meanwhile.
+    // The run keeps its lock until its results are written, so that no other run writes them meanwhile.
     finish(&configuration, &out, &session, report)
 }
 
-/// Writes the results; a failure of the run is told after them, for nothing computed so far is lost.
+/// Writes the results first, so that nothing is lost, then reports a failure of the run.
 fn finish(
     configuration: &Configuration,
     out: &Path,
@@ -91,7 +94,7 @@ fn finish(
     let report = report.map_err(|failure| match poses.len() {
         0 => failure.to_string(),
         kept => format!(
-            "{failure}; {kept} poses are kept in {}, the same command goes on from there",
+            "{failure}; {kept} poses are kept in {}, the same command resumes from there",
             out.display()
         ),
     })?;
@@ -130,7 +133,7 @@ fn results_directory(arguments: &RunArguments) -> Result<PathBuf, Failure> {
     Ok(out.canonicalize()?)
 }
 
-/// The configuration with all that the command line says, and the recording written if there is to be one.
+/// Returns the configuration with the overrides of the command line; a simulation that is to be stored is written.
 fn resolve(arguments: &RunArguments, out: &Path) -> Result<Configuration, Failure> {
     let mut configuration = Configuration::read(&arguments.configuration, &overrides(arguments))?;
     if arguments.data.is_some() {
@@ -140,7 +143,7 @@ fn resolve(arguments: &RunArguments, out: &Path) -> Result<Configuration, Failur
         if let Some(file) = &mut simulation.drive.file {
             *file = file.canonicalize().unwrap_or_else(|_| file.clone());
         }
-        // A simulated radar knows itself.
+        // The constants of a simulated radar are known.
         configuration.dataset = configuration.dataset.or(&simulation.dataset_options());
         configuration.source.data = match simulation.output.store {
             true => simulate::store(simulation, &out.join("recording"))?,
@@ -149,7 +152,7 @@ fn resolve(arguments: &RunArguments, out: &Path) -> Result<Configuration, Failur
     }
     configuration.masking.resolve()?;
     preflight::warn_of_training(&configuration)?;
-    // So that the resolved configuration repeats the run from anywhere. What does not exist is told by the reader.
+    // Absolute, so that the resolved configuration repeats the run from any folder. The reader reports what does not exist.
     for path in [
         Some(&mut configuration.source.data),
         configuration.run.ground_truth.as_mut(),
@@ -165,7 +168,7 @@ fn resolve(arguments: &RunArguments, out: &Path) -> Result<Configuration, Failur
 }
 
 fn overrides(arguments: &RunArguments) -> Vec<String> {
-    // Quoted, for a folder may be called 2019-01-10 or 7.
+    // Quoted, because a folder may be named 2019-01-10 or 7.
     let quoted = |data: &PathBuf| toml::Value::from(data.to_string_lossy().into_owned());
     let data = arguments
         .data
@@ -184,9 +187,9 @@ fn overrides(arguments: &RunArguments) -> Vec<String> {
         .collect()
 }
 
-/// What tells a run that is through with everything: its results are written last.
+/// The last result to be written: it marks a run as complete.
 const LAST_RESULT: &str = "summary.json";
-/// What a new run begins without.
+/// The results of an earlier run, which a new one removes.
 const RESULTS: [&str; 8] = [
     LAST_RESULT,
     results::SIMULATED_TRUTH,
@@ -198,7 +201,7 @@ const RESULTS: [&str; 8] = [
     "bands.svg",
 ];
 
-/// Goes on with an unfinished run of the same configuration, else begins anew; returns the poses that are there already.
+/// Resumes an unfinished run of the same configuration, else starts a new one; returns the number of poses in the journal.
 fn prepare(configuration: &Configuration, out: &Path, fresh: bool) -> Result<usize, Failure> {
     let journal = journal::path(out);
     let poses = journal::read(&journal)?;
@@ -208,7 +211,7 @@ fn prepare(configuration: &Configuration, out: &Path, fresh: bool) -> Result<usi
         for state in [journal, checkpoint::path(out)] {
             let _ = fs::remove_file(state);
         }
-        // A new run may have no truth to be drawn against: nothing of the earlier one must look like its own.
+        // A new run may not write all of them: none of the earlier ones must be taken for its own.
         for result in RESULTS {
             let _ = fs::remove_file(out.join(result));
         }
@@ -221,7 +224,7 @@ fn prepare(configuration: &Configuration, out: &Path, fresh: bool) -> Result<usi
     match same {
         true => Ok(poses.len()),
         false => Err(format!(
-            "{} holds an unfinished run of another configuration ({} poses): choose another --out, or give it up with --fresh",
+            "{} holds an unfinished run of another configuration ({} poses): choose another --out, or discard it with --fresh",
             out.display(),
             poses.len()
         )
@@ -229,7 +232,8 @@ fn prepare(configuration: &Configuration, out: &Path, fresh: bool) -> Result<usi
     }
 }
 
-/// The transport hangs on what a dead process left. All of that is gone now; the same command resumes from the journal.
+/// Executes the same command again: the transport hung on what a dead process left, which is removed now, and the run resumes from
+/// the journal.
 fn start_over() -> Result<ExitCode, Failure> {
     print::note(
         "gyre: the transport did not finish cleaning up after a dead process; starting over from the journal",

@@ -1,4 +1,4 @@
-//! `gyre simulate`: a recording that nobody had to drive for.
+//! `gyre simulate`: writes a simulated recording.
 
 use std::{
     fs,
@@ -15,7 +15,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::{Failure, cli::SimulateArguments, configuration::Configuration, print};
 
-/// Writes a simulated recording, or goes on with it.
+/// Writes a simulated recording, or completes one.
+///
+/// # Errors
+/// A configuration that cannot be simulated, a folder that cannot be written.
 pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
     let overrides = overrides(arguments);
     let configuration = match &arguments.configuration {
@@ -52,7 +55,7 @@ pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What the command line says besides the configuration, as `section.key=value`.
+/// Returns the options of the command line as overrides `section.key=value`.
 fn overrides(arguments: &SimulateArguments) -> Vec<String> {
     let quoted = |path: &PathBuf| toml::Value::from(path.to_string_lossy().into_owned());
     let scans = arguments
@@ -77,7 +80,10 @@ fn overrides(arguments: &SimulateArguments) -> Vec<String> {
         .collect()
 }
 
-/// Writes the recording of a run to `out`, whatever an earlier run left there.
+/// Writes the recording of a run to `out`, replacing another one of an earlier run.
+///
+/// # Errors
+/// As [`simulate`].
 pub fn store(simulation: &SimulationConfig, out: &Path) -> Result<PathBuf, Failure> {
     let threads = available_parallelism().unwrap_or(NonZeroUsize::MIN);
     let summary = match write(threads, simulation, out) {
@@ -113,7 +119,7 @@ fn write(
     let summary = write_dataset_on(threads, simulation, out, &mut |done, total| {
         if bar.length() != Some(total as u64) {
             bar.set_length(total as u64);
-            // What was there already says nothing about the pace.
+            // Existing scans do not count for the rate.
             bar.set_position(done as u64);
             bar.reset_eta();
         }

@@ -1,4 +1,4 @@
-//! `gyre stage NAME`: one process of a run.
+//! `gyre stage NAME`: runs one process of a run.
 
 use std::process::ExitCode;
 

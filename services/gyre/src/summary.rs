@@ -23,13 +23,13 @@ pub struct Session<'a> {
     pub scans: usize,
     /// Poses that were in the journal before.
     pub resumed: usize,
-    /// How long it took.
+    /// Wall-clock time.
     pub wall: Duration,
     /// Shared memory.
     pub footprint: &'a Footprint,
 }
 
-/// Where each scan went.
+/// Counts of scans.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Counts {
     /// Scans that the source published.
@@ -49,18 +49,18 @@ pub struct Counts {
     pub motions: Option<MotionCounts>,
 }
 
-/// What became of the motions that were found.
+/// Counts of motions by outcome.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct MotionCounts {
     /// Refined.
     pub refined: u64,
-    /// Kept with a wider covariance, for want of support.
+    /// Accepted with a wider covariance because of little support.
     pub weak: u64,
-    /// Replaced by the motion before, for nothing fitted.
+    /// Predicted from the motions before, because nothing matched.
     pub predicted: u64,
-    /// Weak or predicted: those that the odometry doubted and did something about.
+    /// Weak or predicted.
     pub doubtful: u64,
-    /// Refined ones that started from something else than the motion before.
+    /// Refined ones whose initial guess was not the prediction.
     pub second_hypothesis: u64,
 }
 
@@ -116,7 +116,7 @@ impl Counts {
     }
 }
 
-/// How many scans more fit between the scans of each motion than their numbers say.
+/// Number of scans that the recording lacks, by the intervals between those that it has.
 fn missing(poses: &[PoseHeader]) -> u64 {
     let turns = |pose: &PoseHeader| {
         pose.item
@@ -141,9 +141,9 @@ fn missing(poses: &[PoseHeader]) -> u64 {
 /// The network that makes the masks.
 #[derive(Debug, Serialize)]
 struct Mask {
-    /// Its card.
+    /// The model card.
     model: String,
-    /// Its file's SHA-256.
+    /// The SHA-256 of the network's file.
     sha256: String,
 }
 
@@ -159,7 +159,7 @@ impl Mask {
     }
 }
 
-/// All that is worth knowing of a run.
+/// The summary of a run: `summary.json`.
 #[derive(Debug, Serialize)]
 pub struct Summary {
     version: &'static str,
@@ -183,7 +183,7 @@ pub struct Summary {
     shared_memory: Footprint,
     restarts: BTreeMap<String, usize>,
     recovery_ms: Vec<f64>,
-    /// What each stage counted in its last life.
+    /// Counters of each stage since its last start.
     stages: BTreeMap<String, StageCounters>,
     latency: Latency,
     /// As `gyre evaluate --json` prints it.
@@ -240,7 +240,7 @@ impl fmt::Display for Summary {
         let c = &self.counts;
         let ending = match self.ending {
             Some(Ending::Complete) => "complete",
-            Some(Ending::Interrupted) => "interrupted: the same command goes on from here",
+            Some(Ending::Interrupted) => "interrupted: the same command resumes from here",
             None => "failed",
         };
         writeln!(

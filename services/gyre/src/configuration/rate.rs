@@ -1,4 +1,4 @@
-//! How fast a recording is played.
+//! The pace at which a recording is played.
 
 use std::{borrow::Cow, fmt, str::FromStr};
 

@@ -1,4 +1,4 @@
-//! Reading TOML so that a slip of the pen is told, not ignored.
+//! Strict reading of TOML: unknown keys are rejected, with the nearest known one.
 
 use std::collections::BTreeMap;
 
@@ -7,10 +7,13 @@ use toml::{Table, Value};
 
 use super::ConfigurationError;
 
-/// Names less alike than this are no suggestion.
+/// Names less similar than this (Jaro-Winkler) are not suggested.
 const ALIKE: f64 = 0.75;
 
 /// Takes a section out of the table; its defaults where it is missing.
+///
+/// # Errors
+/// An unknown key, or a value that does not fit.
 pub fn section<T: DeserializeOwned>(
     table: &mut Table,
     name: &str,
@@ -20,6 +23,9 @@ pub fn section<T: DeserializeOwned>(
 }
 
 /// Takes a section of sections out of the table, each of which must have one of the names in `known`.
+///
+/// # Errors
+/// Another name, an unknown key, or a value that does not fit.
 pub fn sections<T: DeserializeOwned>(
     table: &mut Table,
     name: &str,
@@ -35,7 +41,7 @@ pub fn sections<T: DeserializeOwned>(
         .collect()
 }
 
-/// The error for a key that nobody knows.
+/// Returns the error for an unknown key.
 pub fn unknown(section: &str, key: &str, known: &[&str]) -> ConfigurationError {
     let alike = |name: &&str| (strsim::jaro_winkler(key, name) * 1e6) as u64;
     let nearest = known.iter().copied().max_by_key(alike);
@@ -51,7 +57,10 @@ pub fn unknown(section: &str, key: &str, known: &[&str]) -> ConfigurationError {
     }
 }
 
-/// Sets a key by a sentence `section.key=value`; the value is TOML, or else a plain string.
+/// Sets a key by an override `section.key=value`; the value is TOML, or else a plain string.
+///
+/// # Errors
+/// An override without section, key or value.
 pub fn set(table: &mut Table, sentence: &str) -> Result<(), ConfigurationError> {
     let refused = || ConfigurationError::Override(sentence.to_owned());
     let (path, value) = sentence.split_once('=').ok_or_else(refused)?;

@@ -1,5 +1,5 @@
 //! A picture of what the mask keeps. Side by side: the raster with all its power, the mask (black is nothing, white is all), what the
-//! search gets, and the points, each in the colour of its factor. Where the mask looks at two scans, the scan before stands below.
+//! search gets, and the points, each in the colour of its factor. Where the mask looks at two scans, the scan before is below.
 //! Ahead is up, left is left.
 
 use std::path::Path;
@@ -21,7 +21,7 @@ const SIDE: usize = 256;
 const BRIGHT: f32 = 120.0;
 /// The share of cells that the brightest colour goes to in what the search gets, of which proportions alone count.
 const BRIGHTEST: f32 = 1e-3;
-/// How bright the raster behind the points is at its brightest.
+/// Maximum brightness of the raster behind the points.
 const FAINT: f32 = 0.4;
 /// A picture in colour.
 pub struct Canvas {
@@ -31,7 +31,7 @@ pub struct Canvas {
 }
 
 impl Canvas {
-    /// See the module.
+    /// Draws an inspected scan.
     pub fn of(inspection: &Inspection) -> Self {
         let rows: Vec<[Array2<Colour>; 4]> = inspection.rasters.iter().map(panels).collect();
         let n = rows.first().map_or(1, |panels| panels[0].nrows());
@@ -111,7 +111,7 @@ fn panels(raster: &MaskedRaster) -> [Array2<Colour>; 4] {
     ]
 }
 
-/// The value that this share of the cells exceeds.
+/// Returns the value that this share of the cells exceeds.
 fn exceeded_by(share: f32, cells: &Array2<f32>) -> f32 {
     let mut cells: Vec<f32> = cells.iter().copied().collect();
     let rank = cells.len() - 1 - (share * cells.len() as f32) as usize;

@@ -1,4 +1,4 @@
-//! What the mask keeps of one scan.
+//! The effect of the mask on one scan.
 
 use gyre_geometry::Twist;
 use ndarray::Array2;
@@ -13,9 +13,9 @@ const KEPT: f32 = 0.5;
 pub struct Inspection {
     /// The scan's place in the recording.
     pub number: usize,
-    /// Its raster; where the mask looks at two scans, then that of the scan before.
+    /// The raster of the scan; where the mask looks at two scans, then that of the scan before.
     pub rasters: Vec<MaskedRaster>,
-    /// Its points that lie in the raster: cell (row, column), and the factor of the mask on the weight.
+    /// The points that lie in the raster: cell (row, column), and the factor of the mask on the weight.
     pub points: Vec<([usize; 2], f32)>,
     /// The velocity that its sweep was motion-compensated with.
     pub twist: Option<Twist>,
@@ -25,7 +25,7 @@ pub struct Inspection {
 pub struct MaskedRaster {
     /// All power, 0 to 255.
     pub whole: Array2<f32>,
-    /// How much each cell counts, 0 to 1.
+    /// The weight of each cell, 0 to 1.
     pub mask: Array2<f32>,
     /// The input of the search: power above the threshold times the mask.
     pub masked: Array2<f32>,
@@ -34,7 +34,7 @@ pub struct MaskedRaster {
 }
 
 impl Inspection {
-    /// What is kept, in figures: see [`HEADER`].
+    /// Returns the shares that the mask keeps, in the columns of [`HEADER`].
     pub fn line(&self) -> String {
         let raster = &self.rasters[0];
         let masked = sum(&raster.masked);

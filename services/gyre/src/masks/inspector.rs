@@ -16,7 +16,7 @@ use crate::{Failure, configuration::Configuration, print};
 /// compensation, as at a run's start; a few scans later they are what a run finds, but for its noise.
 const RUN_UP: usize = 8;
 
-/// See the module.
+/// Masks scans as a run does.
 pub struct MaskInspector {
     dataset: Box<dyn Dataset>,
     odometry: Odometry,
@@ -76,7 +76,7 @@ impl MaskInspector {
         })
     }
 
-    /// Goes on to scan `number`, which is not before the last one, and inspects it; `None` if it cannot be read.
+    /// Advances to scan `number`, which is not before the last one, and inspects it; `None` if it cannot be read.
     ///
     /// # Errors
     /// A scan that cannot be masked.
@@ -178,7 +178,7 @@ impl MaskInspector {
     }
 }
 
-/// How much each cell counts: nothing where no power is above the threshold, else the network's factor, if there is a
+/// The weight of each cell: nothing where no power is above the threshold, else the network's factor, if there is a
 /// network.
 fn mask_above(
     floor: u8,

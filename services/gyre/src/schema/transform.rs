@@ -1,4 +1,4 @@
-//! What a schema made from Rust needs to describe TOML.
+//! Changes that a schema made from Rust needs to describe TOML.
 
 use schemars::{
     Schema,
