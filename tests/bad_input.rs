@@ -181,7 +181,7 @@ fn an_unknown_section_is_named_with_the_nearest_right_one() {
 #[test]
 fn an_impossible_value_is_reported_with_what_is_possible() {
     for (text, words) in [
-        ("[run]\nwindow = 0", ["run.window is 0", "at least 1"]),
+        ("[run]\nwindow = 0", ["run.window is 0", "1 to 64"]),
         ("[run]\nwindow = -3", ["[run]", "-3"]),
         ("[run]\nrate = 'fast'", ["rate is `fast`", "`realtime`"]),
         ("[run]\nmode = 'live'", ["live", "rate"]),

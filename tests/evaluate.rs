@@ -163,16 +163,16 @@ fn an_odometry_with_a_column_missing_or_damaged_is_refused_in_a_sentence() {
         &["changed.csv", "line: 2", "invalid float literal"],
     );
     let cut = odometry(&run, |text| text[..text.len() - 30].to_owned());
-    refused(&cut, &["changed.csv, line 24", "fields, 28 in the header"]);
+    refused(&cut, &["changed.csv", "line: 24", "28 fields"]);
     refused(&run.out().join("none.csv"), &["cannot read", "none.csv"]);
     refused(
         &run.out().join("trajectory.tum"),
-        &["trajectory.tum is no odometry.csv"],
+        &["trajectory.tum: not an odometry.csv"],
     );
 }
 
 #[test]
-fn an_odometry_of_another_drive_beside_the_trajectory_is_left_out_with_a_word() {
+fn an_odometry_of_another_drive_beside_the_trajectory_is_left_out_with_the_reason() {
     let run = run();
     fs::write(
         run.out().join("odometry.csv"),
@@ -188,7 +188,7 @@ fn an_odometry_of_another_drive_beside_the_trajectory_is_left_out_with_a_word() 
     assert!(
         ended
             .stderr
-            .contains("odometry.csv is not judged: its stamps are not the estimate's"),
+            .contains("odometry.csv is not evaluated: its stamps are not the estimate's"),
         "{}",
         ended.stderr
     );

@@ -188,8 +188,8 @@ fn a_stage_that_always_dies_ends_the_run_with_its_last_line_of_output() {
         "giving up",
     ]);
     assert_eq!(
-        ended.stderr.matches("started it again").count()
-            + ended.stderr.matches("started all").count(),
+        ended.stderr.matches("restarted it").count()
+            + ended.stderr.matches("restarted all").count(),
         2
     );
 }
@@ -199,11 +199,7 @@ fn a_stage_that_would_fail_the_same_way_again_is_given_up_at_once() {
     let run = Run::of_recording().stage_script("masking", "echo 'masking: no licence' >&2; exit 2");
     let ended = run.finish();
     ended.failed_with(&["masking: no licence"]);
-    assert!(
-        !ended.stderr.contains("started it again"),
-        "{}",
-        ended.stderr
-    );
+    assert!(!ended.stderr.contains("restarted it"), "{}", ended.stderr);
 }
 
 #[test]

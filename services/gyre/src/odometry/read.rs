@@ -12,7 +12,21 @@ use serde::Deserialize;
 
 use crate::Failure;
 
-/// The columns that are read.
+const COLUMNS: [&str; 11] = [
+    "stamp_ns",
+    "interval_ns",
+    "x_m",
+    "y_m",
+    "yaw_rad",
+    "cov_xx",
+    "cov_xy",
+    "cov_xyaw",
+    "cov_yy",
+    "cov_yyaw",
+    "cov_yawyaw",
+];
+
+/// The fields of [`COLUMNS`].
 #[derive(Deserialize)]
 struct Row {
     stamp_ns: i64,
@@ -42,8 +56,10 @@ fn parse(text: impl Read) -> Result<Vec<TimedMotion>, Failure> {
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .from_reader(text);
-    if !reader.headers()?.iter().any(|column| column == "stamp_ns") {
-        return Err("not an odometry.csv: its header has no column stamp_ns".into());
+    let header = reader.headers()?;
+    let missing = |name: &&&str| header.iter().all(|column| column != **name);
+    if let Some(name) = COLUMNS.iter().find(missing) {
+        return Err(format!("not an odometry.csv: its header has no column {name}").into());
     }
     reader.deserialize().map(|row| Row::motion(&row?)).collect()
 }
@@ -123,7 +139,7 @@ mod tests {
         let refused = |text: &str| parse(text.as_bytes()).unwrap_err().to_string();
         let text = csv(&poses());
         assert!(refused("").contains("no column stamp_ns"));
-        assert!(refused(&text.replacen("cov_yyaw", "c", 1)).contains("missing field `cov_yyaw`"));
+        assert!(refused(&text.replacen("cov_yyaw", "c", 1)).contains("no column cov_yyaw"));
         let far = refused(&text.replacen("1.500000000", "far", 1));
         assert!(
             far.contains("line: 2") && far.contains("invalid float"),
