@@ -62,9 +62,7 @@ impl Progress {
                 self.say(&format!("{stage} died by {}{output}", death.cause));
             }
             Event::Restarted { all: false } => self.say("restarted it"),
-            Event::Restarted { all: true } => {
-                self.say("restarted all stages from the journal")
-            }
+            Event::Restarted { all: true } => self.say("restarted all stages from the journal"),
             Event::Stalled => {
                 self.say("no pose for too long: restarting all stages from the journal")
             }
