@@ -1,5 +1,5 @@
-//! `gyre-lab ablation`: what each step from the paper's form to a sequence's own configuration gives, or what single changes of that
-//! configuration do.
+//! `gyre-lab ablation`: measures the contribution of each step from the paper's form to a sequence's own configuration, or the effect of
+//! single changes of that configuration.
 
 use std::{collections::BTreeSet, path::Path, process::ExitCode};
 
@@ -46,7 +46,7 @@ struct Ablation {
 /// Runs all steps, or all changes, on every sequence; prints and writes what they came to.
 ///
 /// # Errors
-/// What cannot be read, run or written.
+/// A recording, run or file that fails.
 pub fn ablation(arguments: &AblationArguments) -> Result<ExitCode, Failure> {
     let sequences = Sequence::all(&arguments.sequences)?;
     let changes = changes(&arguments.vary)?;
@@ -106,7 +106,7 @@ fn steps(sequence: &Sequence, models: &Path, out: &Path) -> Result<Experiment, F
     })
 }
 
-/// What the step at `index` changes in a sequence's own configuration: what later steps end holds, that of earlier steps first.
+/// Returns the overrides of the step at `index`: those of the mask, then those that later steps remove, the latest first.
 fn changes_of(steps: &[Step], index: usize, model: Option<&Model>) -> Vec<String> {
     let masked = steps[..=index].iter().any(|step| step.mask.is_some());
     let learned = model

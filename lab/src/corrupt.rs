@@ -25,7 +25,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::{cli::CorruptArguments, report::make_folder};
 
-/// What is done to a scan. Stamps, encoder and all else that a file says beside the powers stay as they are.
+/// A fault of a scan. Stamps, encoder and all other data beside the powers stay unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Fault {
     /// Every power is drawn uniformly from 0 to 255.
@@ -40,7 +40,7 @@ pub enum Fault {
     Dropped,
 }
 
-/// How much later the scan is that stands in for another.
+/// Offset of the scan that replaces another.
 const LATER: usize = 10;
 
 /// Which scans are corrupted, and how.
@@ -188,7 +188,7 @@ fn read(dataset: &mut dyn Dataset, index: usize) -> Result<OwnedScan, Failure> {
     Ok(scan)
 }
 
-/// All rows' powers, without what stands between them.
+/// Returns the powers of all rows, without the metadata between them.
 fn powers_of(scan: &OwnedScan) -> Vec<u8> {
     scan.view().power().iter().copied().collect()
 }

@@ -8,7 +8,7 @@
 //! | `searched` | f8 (3,) | x and y (m), yaw (rad): this scan's frame in that of the record before, as the decoupled search finds it in the two rasters of the file; NaN where a sequence begins |
 //! | `pose` | f8 (3,) | x and y (m), yaw (rad) at the scan's time: the true pose, in the truth's own frame |
 //! | `time_s` | f8 | the scan's time, mid-sweep, seconds since 1970 |
-//! | `twist` | f4 (3,) | m/s ahead and to the left, rad/s: what the sweep was compensated with; zero where it was not |
+//! | `twist` | f4 (3,) | m/s ahead and to the left, rad/s: the velocity of the motion compensation; zero without |
 //! | `sequence` | u4 | number of the sequence |
 //!
 //! A sequence is an unbroken row of one recording's scans. Where a scan is left out, because it cannot be read or the truth does not
@@ -37,7 +37,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::{cli::ExportPairsArguments, report::save};
 use npy::NpyWriter;
 use preparation::Preparation;
-use provenance::{Provenance, Sequence};
+use provenance::Sequence;
 use record::Record;
 use recording::Recording;
 
@@ -186,12 +186,13 @@ impl<'a> Export<'a> {
 
     /// Writes what the file was made of, and gives it its name. Returns what was written, in words.
     fn finish(self, configuration: &Configuration) -> Result<String, Failure> {
-        let provenance = Provenance::new(configuration, &self.sequences);
-        save(&provenance::place(self.out), &provenance.to_toml()?)?;
+        let text = provenance::to_toml(configuration, &self.sequences)?;
+        save(&provenance::place(self.out), &text)?;
         self.file
             .finish()
             .map_err(|error| cannot_write(self.out, &error))?;
-        let (scans, sequences) = (provenance.scans, self.sequences.len());
+        let scans: usize = self.sequences.iter().map(|sequence| sequence.scans).sum();
+        let sequences = self.sequences.len();
         let plural = if sequences == 1 { "" } else { "s" };
         let left_out = match (self.unreadable, self.without_truth) {
             (0, 0) => String::new(),

@@ -9,7 +9,7 @@ use serde::Serialize;
 /// A network that can be used.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Model {
-    /// Its card.
+    /// The model card.
     pub card: PathBuf,
     /// Metres a cell of the rasters that it is for.
     pub cell_m: f32,

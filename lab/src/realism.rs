@@ -1,4 +1,4 @@
-//! `gyre-lab realism`: how close simulated scans are to real ones: statistics of each recording, and a distance for each statistic.
+//! `gyre-lab realism`: compares simulated scans with real ones: statistics of each recording, and a distance for each statistic.
 //!
 //! Sensors differ in resolution and range, so all that is compared is measured on one [`RangeGrid`], the coarsest and shortest of
 //! the recordings'. Reading order:
@@ -56,7 +56,7 @@ struct Report {
 struct Subject {
     /// `sim`, `real` or `other`.
     role: &'static str,
-    /// Its folder.
+    /// The recording's folder.
     data: PathBuf,
     measured: Measured,
 }
@@ -64,7 +64,7 @@ struct Subject {
 /// Measures the recordings, compares them, and writes both.
 ///
 /// # Errors
-/// What cannot be read, run or written.
+/// A recording, run or file that fails.
 pub fn realism(arguments: &RealismArguments) -> Result<ExitCode, Failure> {
     let out = &arguments.out;
     let mut sources = sources(arguments)?;

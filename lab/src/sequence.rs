@@ -66,13 +66,13 @@ pub type Figures = BTreeMap<&'static str, f64>;
 /// A row of an [`Experiment`].
 #[derive(Debug, Default, Serialize)]
 pub struct Line {
-    /// What the row is called.
+    /// The row.
     pub row: String,
     /// The network that masked.
     pub model: Option<Model>,
     /// The command that repeats the run; `None` where there is none.
     pub command: Option<String>,
-    /// What it came to.
+    /// The figures of the run.
     pub figures: Figures,
     /// The paper's KITTI errors at this raster's size, on other sequences: %, and degrees per km.
     pub paper: [Option<f64>; 2],
@@ -81,13 +81,13 @@ pub struct Line {
 /// Runs of one sequence with different overrides.
 #[derive(Debug, Serialize)]
 pub struct Experiment {
-    /// What is compared.
+    /// The title.
     pub title: &'static str,
     /// The sequence's folder.
     pub data: String,
     /// Row by row.
     pub lines: Vec<Line>,
-    /// Why rows are left out.
+    /// Rows that are left out, by the reason.
     pub left_out: Notes,
 }
 
@@ -138,7 +138,7 @@ impl Sequence {
         Ok(sequences)
     }
 
-    /// Its configuration with overrides.
+    /// Returns its configuration with overrides.
     ///
     /// # Errors
     /// A configuration that cannot be read, or an override that does not fit.
@@ -214,7 +214,7 @@ impl Sequence {
         arguments
     }
 
-    /// Its first scans, at most `most`, those that cannot be read left out.
+    /// Reads the first scans, at most `most`; unreadable ones are left out.
     ///
     /// # Errors
     /// A recording without two scans that can be read.
@@ -307,7 +307,7 @@ impl Experiment {
     }
 }
 
-/// What the columns of [`Experiment::markdown`] mean.
+/// The meaning of the columns of [`Experiment::markdown`].
 pub const LEGEND: &str = "\nKITTI and seg need a truth of more than 100 m. m and deg a scan: errors of single motions, RMS. \
     forward: estimated over true distance. ms: median work of the stages in the running pipeline. -: not known.\n";
 

@@ -21,7 +21,7 @@ use baseline::Baseline;
 use rows::{Row, Rows, Table};
 use times::Times;
 
-/// Where the paper's figures are from.
+/// The source of the paper's figures.
 const PAPER: &str =
     "\nThe paper: Weston, Gadd, De Martini, Newman, Posner: Fast-MbyM, ICRA 2022, Table III.\n";
 
@@ -39,7 +39,7 @@ struct Tables {
 /// Measures, prints and writes both tables.
 ///
 /// # Errors
-/// What cannot be read, run or written.
+/// A recording, run or file that fails.
 pub fn tables(arguments: &TablesArguments) -> Result<ExitCode, Failure> {
     let sequences = Sequence::all(&arguments.sequences)?;
     let (out, models) = (&arguments.out, &arguments.sequences.models);

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use crate::common::{Ended, Run, gyre, odometry, real_data, recording};
 use serde_json::Value;
 
-/// Where `summary.json` counts the motions that the odometry doubted and did something about. Only here is it named.
+/// The place in `summary.json` of the count of doubtful motions.
 const DOUBTED: &str = "/motions/doubtful";
-/// Where it counts the scans that a recording lacks.
+/// The place of the count of scans that a recording lacks.
 const MISSING: &str = "/missing";
 
-/// How much further off a trajectory may be for a fault.
+/// Maximum ratio of the error of a trajectory with a fault to that without.
 const FARTHER: f64 = 1.2;
 
 /// All faults, each with how often it strikes.
@@ -22,7 +22,7 @@ const FAULTS: [(&str, usize); 5] = [
     ("dropped", 10),
 ];
 
-/// What came of a drive.
+/// The result of a drive.
 struct Outcome {
     corrupted: usize,
     ate_m: f64,

@@ -1,7 +1,7 @@
 //! NumPy's `.npy`, format 1.0, written record by record: `numpy.load(path, mmap_mode="r")` opens it without reading it.
 //!
-//! How many records there are is known at the end, so the header leaves room for any number and is written once more then. Until
-//! it is complete the file goes by another name. (The crates for `.npy` write no records with an array of a size known at run time,
+//! The number of records is known at the end, so the header leaves room for any number and is written again then. Until the file is
+//! complete it has another name. (The crates for `.npy` write no records with an array of a size known at run time,
 //! or a header of another length.)
 
 use std::{
@@ -30,7 +30,7 @@ impl NpyWriter {
     /// Begins the array that is to be at `path`, of records that `dtype`, a Python literal, describes.
     ///
     /// # Errors
-    /// What the operating system says.
+    /// As the operating system reports.
     pub fn create(path: &Path, dtype: &str) -> io::Result<Self> {
         let partial = path.with_added_extension("part");
         let mut file = BufWriter::with_capacity(BUFFER_BYTES, File::create(&partial)?);
@@ -47,7 +47,7 @@ impl NpyWriter {
     /// Appends a record.
     ///
     /// # Errors
-    /// What the operating system says.
+    /// As the operating system reports.
     pub fn append(&mut self, record: &[u8]) -> io::Result<()> {
         self.records += 1;
         self.file.write_all(record)
@@ -56,7 +56,7 @@ impl NpyWriter {
     /// Writes the number of records, and gives the file its name.
     ///
     /// # Errors
-    /// What the operating system says; nothing is left then.
+    /// As the operating system reports; nothing is left then.
     pub fn finish(mut self) -> io::Result<()> {
         self.file.rewind()?;
         self.file.write_all(&header(&self.dtype, self.records))?;
@@ -73,7 +73,7 @@ impl Drop for NpyWriter {
     }
 }
 
-/// The header of an array of so many records; as long for any number of them.
+/// Returns the header of an array of `records` records, of the same length for any number.
 fn header(dtype: &str, records: u64) -> Vec<u8> {
     let dictionary = |records: u64| {
         format!("{{'descr': {dtype}, 'fortran_order': False, 'shape': ({records},), }}")

@@ -56,18 +56,18 @@ impl Preparation {
         })
     }
 
-    /// Whether the next scan begins a chain.
+    /// Returns whether the next scan starts a chain.
     pub fn begins(&self) -> bool {
         self.chain.is_empty()
     }
 
-    /// Begins a new chain with the next scan.
+    /// Starts a new chain with the next scan.
     pub fn begin(&mut self) {
         self.chain.clear();
         self.odometry.restart();
     }
 
-    /// The next scan's record. `pose` is the truth at the scan's time. After an error the chain is as it was.
+    /// Returns the next scan's record. `pose` is the truth at the scan's time. After an error the chain is as it was.
     ///
     /// # Errors
     /// A scan that cannot be rasterised.

@@ -1,4 +1,4 @@
-//! `pairs.toml`: what `pairs.npy` was made of.
+//! `pairs.toml`: the provenance of `pairs.npy`.
 
 use std::{
     fs,
@@ -6,18 +6,26 @@ use std::{
 };
 
 use gyre::{Failure, configuration::Configuration};
-use gyre_masking::MaskingConfig;
-use gyre_radar::{DatasetOptions, Format, RasterConfig};
-use gyre_scan_matching::{RotationConfig, TranslationConfig};
-use gyre_simulator::SimulationConfig;
+use gyre_radar::Format;
 use serde::Serialize;
+use toml::{Table, Value};
 
 use super::recording::Source;
 
 /// The file's first line; a file with another is somebody else's.
 const FIRST_LINE: &str = "# What the .npy file of this name was made of, by gyre export-pairs.\n";
 
-/// Where it is written.
+/// The sections of the configuration that the records depend on.
+const SECTIONS: [&str; 6] = [
+    "raster",
+    "masking",
+    "rotation",
+    "translation",
+    "dataset",
+    "simulation",
+];
+
+/// Returns the file beside `pairs`.
 pub fn place(pairs: &Path) -> PathBuf {
     pairs.with_extension("toml")
 }
@@ -39,76 +47,44 @@ pub fn check_place(pairs: &Path) -> Result<(), Failure> {
     }
 }
 
-/// All that the file depends on.
-#[derive(Serialize)]
-pub struct Provenance<'a> {
-    /// Gyre's.
-    pub version: &'static str,
-    /// Known where the builder set `GYRE_COMMIT`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub commit: Option<&'static str>,
-    /// Records.
-    pub scans: usize,
-    /// Cells a side of a raster.
-    pub n: usize,
-    /// Metres a cell.
-    pub cell_m: f32,
-    pub raster: &'a RasterConfig,
-    pub masking: &'a MaskingConfig,
-    pub rotation: &'a RotationConfig,
-    pub translation: &'a TranslationConfig,
-    pub dataset: &'a DatasetOptions,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub simulation: Option<&'a SimulationConfig>,
-    pub sequences: &'a [Sequence],
-}
-
 /// Scans that follow each other, none left out: those with one number in `sequence`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Sequence {
     /// The number.
     pub sequence: u32,
-    /// Its recording's, or `a simulation`.
+    /// The recording's name, or `a simulation`.
     pub name: String,
-    /// Its recording's folder as it was named, or `a simulation`.
+    /// The recording's folder as it was named, or `a simulation`.
     pub source: String,
-    /// What the recording's files are.
+    /// The format of the recording.
     pub format: Format,
     /// The truth's file.
     pub ground_truth: PathBuf,
     /// The recording's scan that it begins with, from 0.
     pub first_scan: usize,
-    /// Its scans.
+    /// The number of scans.
     pub scans: usize,
 }
 
-impl<'a> Provenance<'a> {
-    /// Of records made by a configuration.
-    pub fn new(configuration: &'a Configuration, sequences: &'a [Sequence]) -> Self {
-        Self {
-            version: env!("CARGO_PKG_VERSION"),
-            commit: option_env!("GYRE_COMMIT"),
-            scans: sequences.iter().map(|sequence| sequence.scans).sum(),
-            n: configuration.raster.n,
-            cell_m: configuration.raster.cell_m,
-            raster: &configuration.raster,
-            masking: &configuration.masking,
-            rotation: &configuration.rotation,
-            translation: &configuration.translation,
-            dataset: &configuration.dataset,
-            simulation: configuration.simulation.as_ref(),
-            sequences,
-        }
-    }
-
-    /// The file's text.
-    pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
-        Ok(format!("{FIRST_LINE}{}", toml::to_string_pretty(self)?))
-    }
+/// Returns the text of the file: all that the records depend on.
+///
+/// # Errors
+/// A value that TOML cannot hold.
+pub fn to_toml(configuration: &Configuration, sequences: &[Sequence]) -> Result<String, Failure> {
+    // Through text: a table made directly has other digits in its f32 values.
+    let mut table: Table = configuration.to_toml()?.parse()?;
+    table.retain(|section, _| SECTIONS.contains(&section));
+    let scans: usize = sequences.iter().map(|sequence| sequence.scans).sum();
+    table.insert("version".to_owned(), env!("CARGO_PKG_VERSION").into());
+    table.extend(option_env!("GYRE_COMMIT").map(|commit| ("commit".to_owned(), commit.into())));
+    table.insert("scans".to_owned(), Value::try_from(scans)?);
+    table.insert("n".to_owned(), Value::try_from(configuration.raster.n)?);
+    table.insert("sequences".to_owned(), Value::try_from(sequences)?);
+    Ok(format!("{FIRST_LINE}{}", toml::to_string_pretty(&table)?))
 }
 
 impl Sequence {
-    /// One that begins with a recording's scan `first_scan`, empty.
+    /// Starts with a recording's scan `first_scan`, without scans.
     pub fn new(sequence: u32, source: &Source, first_scan: usize) -> Self {
         Self {
             sequence,

@@ -2,7 +2,7 @@
 
 use half::f16;
 
-/// See the table in [`super`].
+/// A record, as in the table in [`super`].
 pub struct Record<'a> {
     /// `n` x `n` cells, row 0 far ahead.
     pub raster: &'a [f16],
@@ -12,7 +12,7 @@ pub struct Record<'a> {
     pub pose: [f64; 3],
     /// The scan's time, seconds since 1970.
     pub time_s: f64,
-    /// What the sweep was compensated with: m/s ahead and to the left, rad/s. Zero where it was not.
+    /// The velocity of the motion compensation: m/s ahead and to the left, rad/s. Zero where it was not.
     pub twist: [f32; 3],
     /// Number of the sequence.
     pub sequence: u32,

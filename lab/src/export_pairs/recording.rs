@@ -27,9 +27,9 @@ pub struct Recording {
     pub source: Source,
 }
 
-/// Whose scans they are.
+/// The origin of the scans.
 pub struct Source {
-    /// Its folder as it was named, or `a simulation`.
+    /// The folder as it was named, or `a simulation`.
     pub data: String,
     pub format: Format,
     pub truth: Truth,
@@ -71,7 +71,7 @@ impl Recording {
     /// Opens what a configuration names, as a run of it would.
     ///
     /// # Errors
-    /// What cannot be read, or has no truth to train with.
+    /// A recording that cannot be read, or has no truth to train with.
     pub fn open(configuration: &Configuration) -> Result<Self, Failure> {
         let preflight::Played { dataset, truth } = preflight::open(configuration)?;
         let source = Source {

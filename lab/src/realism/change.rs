@@ -1,12 +1,12 @@
-//! What differs between a scan and the next, once both are seen from the same place.
+//! The difference between a scan and the next, seen from the same place.
 
 use gyre_geometry::Twist;
 use gyre_radar::{PolarScan, RasterConfig, RasterError, Rasteriser, Sampling};
 use nalgebra::Isometry2;
-use ndarray::ArrayViewMut2;
+use ndarray::{Array2, s};
 use serde::Serialize;
 
-/// What differs between consecutive scans.
+/// The difference between consecutive scans.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Change {
     /// Pairs of scans that were compared.
@@ -21,8 +21,8 @@ pub struct Change {
 #[derive(Debug)]
 pub struct ChangeMeter {
     rasteriser: Rasteriser,
-    earlier: Vec<f32>,
-    later: Vec<f32>,
+    earlier: Array2<f32>,
+    later: Array2<f32>,
     threshold: u8,
     pairs: usize,
     correlations: f64,
@@ -45,7 +45,7 @@ impl ChangeMeter {
             ..RasterConfig::default()
         };
         let rasteriser = Rasteriser::new(&config)?;
-        let raster = vec![0.0; n * n];
+        let raster = Array2::zeros((n, n));
         Ok(Self {
             rasteriser,
             earlier: raster.clone(),
@@ -77,27 +77,26 @@ impl ChangeMeter {
             .saturating_sub(earlier.geometry.stamp_ns);
         let twist = Twist::from_motion(motion, interval_ns as f64 * 1e-9);
         let between_ns = earlier.geometry.stamp_ns + interval_ns / 2;
-        let n = self.rasteriser.config().n;
         for (scan, raster) in [(earlier, &mut self.earlier), (later, &mut self.later)] {
             let mut scan = *scan;
             scan.geometry.stamp_ns = between_ns;
-            let raster = ArrayViewMut2::from_shape((n, n), raster).expect("n * n cells");
+            let raster = raster.view_mut();
             self.rasteriser
                 .rasterise(&scan, self.threshold, Some(twist), raster)?;
         }
-        if let Some(correlation) = correlation(&self.earlier, &self.later, n) {
+        if let Some(correlation) = correlation(&self.earlier, &self.later) {
             self.pairs += 1;
             self.correlations += correlation;
         }
         for (these, those) in [(&self.earlier, &self.later), (&self.later, &self.earlier)] {
-            let (returns, unmatched) = unmatched(these, those, n);
+            let (returns, unmatched) = unmatched(these, those);
             self.returns += returns;
             self.unmatched += unmatched;
         }
         Ok(())
     }
 
-    /// What differed; `None` where nothing could be compared.
+    /// Returns the difference; `None` where nothing could be compared.
     pub fn finish(&self) -> Option<Change> {
         (self.pairs > 0 && self.returns > 0).then(|| Change {
             pairs: self.pairs,
@@ -108,41 +107,40 @@ impl ChangeMeter {
 }
 
 /// Pearson's coefficient over the cells in the raster's circle; `None` where one of them is the same everywhere.
-fn correlation(a: &[f32], b: &[f32], n: usize) -> Option<f64> {
+fn correlation(a: &Array2<f32>, b: &Array2<f32>) -> Option<f64> {
+    let half = (a.nrows() / 2) as i64;
+    let in_circle = |(row, column): (usize, usize)| {
+        let (ahead, left) = (row as i64 - half, column as i64 - half);
+        ahead * ahead + left * left <= half * half
+    };
     let [mut cells, mut sum_a, mut sum_b, mut aa, mut bb, mut ab] = [0.0; 6];
-    let half = (n / 2) as i64;
-    for row in 0..n {
-        let ahead = row as i64 - half;
-        let across = (half * half - ahead * ahead).isqrt() as usize;
-        let circle = row * n + half as usize - across..=row * n + half as usize + across;
-        for (a, b) in a[circle.clone()].iter().zip(&b[circle]) {
-            let (a, b) = (f64::from(*a), f64::from(*b));
-            cells += 1.0;
-            sum_a += a;
-            sum_b += b;
-            aa += a * a;
-            bb += b * b;
-            ab += a * b;
-        }
+    for ((_, a), b) in a
+        .indexed_iter()
+        .zip(b)
+        .filter(|((place, _), _)| in_circle(*place))
+    {
+        let (a, b) = (f64::from(*a), f64::from(*b));
+        cells += 1.0;
+        sum_a += a;
+        sum_b += b;
+        aa += a * a;
+        bb += b * b;
+        ab += a * b;
     }
     let covariance = |sum: f64, x: f64, y: f64| sum / cells - x / cells * (y / cells);
     let variances = covariance(aa, sum_a, sum_a) * covariance(bb, sum_b, sum_b);
     (variances > 0.0).then(|| covariance(ab, sum_a, sum_b) / variances.sqrt())
 }
 
-/// How many cells of `these` have a return, and how many of them have none within one cell in `those`.
-fn unmatched(these: &[f32], those: &[f32], n: usize) -> (u64, u64) {
+/// Returns the number of cells of `these` that have a return, and of those that have none within one cell in `those`.
+fn unmatched(these: &Array2<f32>, those: &Array2<f32>) -> (u64, u64) {
+    let n = these.nrows();
     let (mut returns, mut unmatched) = (0, 0);
     let within_one = |place: usize| place.saturating_sub(1)..(place + 2).min(n);
-    for row in 0..n {
-        for column in 0..n {
-            if these[row * n + column] > 0.0 {
-                returns += 1;
-                let found = within_one(row)
-                    .any(|row| within_one(column).any(|column| those[row * n + column] > 0.0));
-                unmatched += u64::from(!found);
-            }
-        }
+    for ((row, column), _) in these.indexed_iter().filter(|(_, power)| **power > 0.0) {
+        let near = those.slice(s![within_one(row), within_one(column)]);
+        returns += 1;
+        unmatched += u64::from(near.iter().all(|power| *power <= 0.0));
     }
     (returns, unmatched)
 }

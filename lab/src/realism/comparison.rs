@@ -1,4 +1,4 @@
-//! How far two recordings are from each other, statistic by statistic.
+//! Distances between two recordings, statistic by statistic.
 //!
 //! Lengths, shares and errors are compared by the magnitude of the natural logarithm of their ratio: 0.1 is a tenth more or less,
 //! 0.69 twice or half.
@@ -21,11 +21,11 @@ pub struct Comparison {
 /// A statistic.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// What it is.
+    /// The name.
     pub statistic: &'static str,
-    /// Its distance, with the unit.
+    /// The kind of distance, with the unit.
     pub distance: &'static str,
-    /// Its value for the simulated, the real and the other real recording; `None` where it is not known.
+    /// The value for the simulated, the real and the other real recording; `None` where it is not known.
     pub values: [Option<String>; 3],
     /// From one half of the real recording to its other half: less than this means nothing.
     pub within_real: Option<f64>,
@@ -35,7 +35,7 @@ pub struct Row {
     pub sim_real: Option<f64>,
     /// From the real recording to the other.
     pub real_other: Option<f64>,
-    /// Whether the first distance is less than the second.
+    /// True if the first distance is less than the second.
     pub closer: Option<bool>,
 }
 
@@ -80,7 +80,7 @@ pub fn compare(sim: &Measured, real: &Measured, other: Option<&Measured>) -> Com
     }
 }
 
-/// How a statistic is shown and compared.
+/// The kind of a statistic: how it is shown and compared.
 enum Kind {
     Histogram,
     MeanPower,
@@ -88,7 +88,7 @@ enum Kind {
     Number(Unit, fn(&Recording) -> Option<f64>),
 }
 
-/// How a number is shown and compared.
+/// The unit of a number, and how two are compared.
 #[derive(Clone, Copy)]
 struct Unit {
     suffix: &'static str,
@@ -118,7 +118,7 @@ const COEFFICIENT: Unit = Unit {
     ..unit("", 1.0, 3, 0.0)
 };
 
-/// All of them. To add one, add an entry.
+/// The statistics. To add one, add an entry.
 static STATISTICS: [(&str, Kind); 14] = [
     ("histogram of power", Kind::Histogram),
     ("mean power against range", Kind::MeanPower),

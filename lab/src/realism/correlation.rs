@@ -69,8 +69,8 @@ impl Products {
     pub fn in_range(&self, means: &[f64], resolution_m: f64) -> Curve {
         let covariance = |(lag, sum): (usize, &u64)| {
             let pairs = means.len() - lag;
-            let usual: f64 = means.iter().zip(&means[lag..]).map(|(a, b)| a * b).sum();
-            (*sum as f64 / self.rows as f64 - usual) / pairs as f64
+            let expected: f64 = means.iter().zip(&means[lag..]).map(|(a, b)| a * b).sum();
+            (*sum as f64 / self.rows as f64 - expected) / pairs as f64
         };
         curve(
             self.range.iter().enumerate().map(covariance).collect(),
@@ -80,8 +80,8 @@ impl Products {
 
     /// The autocorrelation in azimuth, round the whole turn.
     pub fn in_azimuth(&self, means: &[f64]) -> Curve {
-        let usual: f64 = means.iter().map(|mean| mean * mean).sum();
-        let covariance = |sum: &u64| *sum as f64 / self.rows as f64 - usual;
+        let expected: f64 = means.iter().map(|mean| mean * mean).sum();
+        let covariance = |sum: &u64| *sum as f64 / self.rows as f64 - expected;
         curve(
             self.azimuth.iter().map(covariance).collect(),
             360.0 / self.azimuths as f64,

@@ -1,4 +1,4 @@
-//! How often each power occurs, overall and range by range.
+//! Histograms of powers, overall and range by range.
 
 use gyre_radar::PolarScan;
 use serde::Serialize;

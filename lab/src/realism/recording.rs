@@ -30,9 +30,9 @@ const ROUNDING_NS: u64 = 1_000_000;
 /// A recording as a whole, and its halves: how far apart these are is what a distance owes to chance and to the streets driven.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Measured {
-    /// All of it.
+    /// The whole recording.
     pub whole: Recording,
-    /// Its first and its second half; `None` where it has too few scans.
+    /// The first and the second half; `None` where it has too few scans.
     #[serde(skip)]
     pub halves: Option<[Recording; 2]>,
 }
@@ -42,7 +42,7 @@ pub struct Measured {
 pub struct Recording {
     /// The folder's name.
     pub name: String,
-    /// Of its scans.
+    /// Statistics of the scans.
     pub statistics: ScanStatistics,
     /// The plain search, in the paper's form: nothing without ground truth or without a second scan, nor for a half.
     pub plain: Figures,
@@ -58,7 +58,7 @@ pub struct Recording {
 pub struct Source {
     /// `sim`, `real` or `other`: what its files are called.
     pub role: &'static str,
-    /// Its folder.
+    /// The folder.
     pub data: PathBuf,
     sequence: Sequence,
     /// The scans that its configuration plays.

@@ -34,7 +34,7 @@ pub struct ScanStatistics {
     pub saturated_share: f64,
     /// The grid on which all below was measured.
     pub grid: RangeGrid,
-    /// How often each power occurs.
+    /// The histogram of all powers.
     pub histogram: Histogram,
     /// Power above which something is there.
     pub threshold: u8,
@@ -99,7 +99,7 @@ pub struct Meter {
     scans: usize,
     /// Azimuths, bins and resolution of the first scan.
     sensor: Option<(usize, usize, f32)>,
-    /// Of the sensor's own bins.
+    /// The histogram of the sensor's own bins.
     raw: Histogram,
     powers: PowerByRange,
     products: Products,

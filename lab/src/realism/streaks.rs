@@ -10,7 +10,7 @@ const FLOOR_SHARE: f64 = 0.2;
 /// A streak's floor is more than this above the median of its scan's, counts.
 const LIFT: u8 = 10;
 
-/// What streaks a recording has.
+/// The streaks of a recording.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Streaks {
     /// Share of azimuths that are streaks.
@@ -27,7 +27,7 @@ pub struct Streaks {
 #[derive(Clone, Debug, Default)]
 pub struct StreakCounter {
     floors: Histogram,
-    /// Of the scan at hand.
+    /// The floors of the current scan.
     scan: Vec<u8>,
     scans: u64,
     streaks: u64,
@@ -43,8 +43,8 @@ impl StreakCounter {
         self.floors.add(&self.scan);
         let mut of_scan = Histogram::default();
         of_scan.add(&self.scan);
-        let usual = of_scan.percentile(0.5);
-        let is_streak = |floor: u8| floor.saturating_sub(usual) > LIFT;
+        let median = of_scan.percentile(0.5);
+        let is_streak = |floor: u8| floor.saturating_sub(median) > LIFT;
         let before = self
             .scan
             .last()
@@ -58,7 +58,7 @@ impl StreakCounter {
         self.scans += 1;
     }
 
-    /// What was counted.
+    /// Returns the counts.
     pub fn finish(&self) -> Streaks {
         let ratio = |a: u64, b: u64| if b == 0 { 0.0 } else { a as f64 / b as f64 };
         Streaks {

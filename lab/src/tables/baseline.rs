@@ -5,7 +5,7 @@ use std::{fs, path::Path, process::Command};
 use gyre::Failure;
 use serde::Deserialize;
 
-/// How to start the baseline.
+/// The command of the baseline.
 #[derive(Clone, Copy, Debug)]
 pub struct Baseline<'a> {
     /// A Python interpreter with torch.
@@ -14,10 +14,10 @@ pub struct Baseline<'a> {
     pub script: &'a Path,
 }
 
-/// What the baseline writes.
+/// The report of the baseline.
 #[derive(Debug, Deserialize)]
 pub struct BaselineTimes {
-    /// Its version of PyTorch.
+    /// The version of PyTorch.
     pub torch: String,
     rows: Vec<BaselineRow>,
 }
@@ -31,7 +31,7 @@ struct BaselineRow {
 
 impl Baseline<'_> {
     /// Times all its rows for rasters of `n` cells a side on one thread; its exhaustive search tries `angles` angles.
-    /// What it writes stays at `report`.
+    /// The report stays at `report`.
     ///
     /// # Errors
     /// A program that cannot be started, fails, or writes something else.
@@ -43,7 +43,7 @@ impl Baseline<'_> {
         report: &Path,
     ) -> Result<BaselineTimes, Failure> {
         let failed = |reason: String| format!("the baseline {} {reason}", self.script.display());
-        // What an earlier run left must not pass for this one's.
+        // The report of an earlier run must not pass for this one's.
         let _ = fs::remove_file(report);
         let options =
             format!("--threads 1 --sizes {n} --passes {passes} --rotations {angles} --json");

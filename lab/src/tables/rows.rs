@@ -15,11 +15,11 @@ pub struct Rows {
     paper: BTreeMap<String, Paper>,
 }
 
-/// A way to find motions: what it overrides in a sequence's own configuration.
+/// A row: overrides of a sequence's own configuration.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Row {
-    /// What it is called.
+    /// The name in the tables.
     pub name: String,
     /// `None`: the row is the paper's alone.
     groups: Option<Vec<String>>,
@@ -28,7 +28,7 @@ pub struct Row {
     /// The networks that can mask it, in the order of preference; none for a row without a network.
     #[serde(default)]
     pub mask: Vec<String>,
-    /// Whether it is the mask alone: nothing is searched.
+    /// True for the mask alone: nothing is searched.
     #[serde(default)]
     pub mask_alone: bool,
     paper: Option<String>,
@@ -59,7 +59,7 @@ impl Rows {
     /// Reads the rows that this program has.
     ///
     /// # Errors
-    /// What is wrong with `rows/table-iii.toml`.
+    /// A mistake in `rows/table-iii.toml`.
     pub fn read() -> Result<Self, toml::de::Error> {
         toml::from_str(include_str!("../../rows/table-iii.toml"))
     }
@@ -100,17 +100,17 @@ impl Rows {
 }
 
 impl Row {
-    /// Whether this program measures it; the others are the paper's alone.
+    /// Returns whether this program measures it; the others are the paper's alone.
     pub fn is_measured(&self) -> bool {
         self.groups.is_some()
     }
 
-    /// Whether the paper has such a row.
+    /// Returns whether the paper has such a row.
     pub fn is_of_paper(&self) -> bool {
         self.paper.is_some()
     }
 
-    /// What it overrides, masked by this network if there is one, as sentences `section.key=value`.
+    /// Returns its overrides `section.key=value`, masked by this network if there is one.
     pub fn changes(&self, rows: &Rows, model: Option<&Model>) -> Vec<String> {
         let groups = self.groups.iter().flatten();
         let shared = groups.filter_map(|group| rows.groups.get(group)).flatten();

@@ -29,7 +29,7 @@ const SCANS: usize = 8;
 pub struct Times {
     /// The sequence's folder.
     pub data: String,
-    /// Its scans that were searched.
+    /// The scans that were searched.
     pub scans: usize,
     /// Timed passes of each search, before the baseline and after it together.
     pub passes: usize,
@@ -37,7 +37,7 @@ pub struct Times {
     pub baseline_torch: Option<String>,
     /// Lines, size by size.
     pub lines: Vec<TimeLine>,
-    /// Why rows are left out.
+    /// Rows that are left out, by the reason.
     pub left_out: Notes,
 }
 
@@ -65,9 +65,9 @@ pub struct Median {
     pub cell_m: f32,
     /// Angles that were tried, where all are.
     pub angles: Option<usize>,
-    /// Of all passes, ms.
+    /// The median of all passes, ms.
     pub ms: f64,
-    /// Of the passes before and after the baseline's, ms: alike on a quiet machine.
+    /// The medians of the passes before and after the baseline's, ms: alike on a quiet machine.
     pub halves_ms: [f64; 2],
 }
 

@@ -14,7 +14,7 @@ use crate::{models::Model, sequence::Sequence, tables::rows::Row};
 /// Untimed passes before each half.
 const BURN_IN: usize = 5;
 
-/// What a row does with a pair of scans after rasterising: the network's masks, the search, the refinement.
+/// Times a row after rasterising: the network's mask, the search, the refinement.
 pub struct Timer {
     /// The network that masks.
     pub model: Option<Model>,
