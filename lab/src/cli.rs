@@ -4,7 +4,7 @@ use std::{num::NonZeroUsize, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::{corrupt::Fault, sequence::SequenceArguments};
+use crate::{corrupt::CorruptArguments, sequence::SequenceArguments};
 
 /// Gyre's laboratory: what research on radar odometry needs, and a robot does not.
 ///
@@ -120,22 +120,4 @@ pub struct ExportPairsArguments {
     /// Override a key, as in raster.n=127; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
-}
-
-#[derive(Debug, Args)]
-pub struct CorruptArguments {
-    /// The dataset's folder. The copy has links to it, and needs it.
-    pub path: PathBuf,
-    /// The fault.
-    #[arg(long)]
-    pub fault: Fault,
-    /// Every Nth scan is corrupted, never the first.
-    #[arg(long, value_name = "N", default_value = "20")]
-    pub every: NonZeroUsize,
-    /// Seed of the noise.
-    #[arg(long, default_value = "1")]
-    pub seed: u64,
-    /// The folder of the copy, empty or new.
-    #[arg(long)]
-    pub out: PathBuf,
 }

@@ -13,17 +13,36 @@ use std::{
     fs,
     num::NonZeroUsize,
     os::unix::fs::symlink,
-    path::Path,
+    path::{Path, PathBuf},
     process::ExitCode,
 };
 
-use clap::ValueEnum;
+use clap::{Args, ValueEnum};
 use gyre::{Failure, picture::write_grey, print};
 use gyre_radar::{Dataset, DatasetOptions, OwnedScan};
 use rand::{RngCore, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::{cli::CorruptArguments, report::make_folder};
+use crate::report::make_folder;
+
+/// The arguments of `gyre-lab corrupt`.
+#[derive(Debug, Args)]
+pub struct CorruptArguments {
+    /// The dataset's folder. The copy has links to it, and needs it.
+    pub path: PathBuf,
+    /// The fault.
+    #[arg(long)]
+    pub fault: Fault,
+    /// Every Nth scan is corrupted, never the first.
+    #[arg(long, value_name = "N", default_value = "20")]
+    pub every: NonZeroUsize,
+    /// Seed of the noise.
+    #[arg(long, default_value = "1")]
+    pub seed: u64,
+    /// The folder of the copy, empty or new.
+    #[arg(long)]
+    pub out: PathBuf,
+}
 
 /// A fault of a scan. Stamps, encoder and all other data beside the powers stay unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
