@@ -54,6 +54,9 @@ pub struct Masker {
 /// An invalid configuration of a masker.
 #[derive(Debug, Error)]
 pub enum MaskerError {
+    /// The mask's.
+    #[error("masking.{0}")]
+    Masking(#[from] MaskingConfigError),
     /// Of the rasters.
     #[error(transparent)]
     Raster(#[from] RasterError),
@@ -91,6 +94,7 @@ impl Masker {
         points: &PointsConfig,
         config: &MaskingConfig,
     ) -> Result<Self, MaskerError> {
+        config.validate()?;
         let learned = match config.kind {
             MaskKind::Learned => Some(LearnedMask::load(config, raster)?),
             MaskKind::None | MaskKind::Threshold => None,

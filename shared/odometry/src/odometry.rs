@@ -48,7 +48,7 @@ struct Frame {
 }
 
 impl Odometry {
-    /// Allocates all buffers; registering a scan allocates nothing.
+    /// Allocates all buffers. After the first scan, registering one allocates nothing but what a network does.
     ///
     /// # Errors
     /// The first setting out of its bounds; a network that cannot be used.
@@ -56,6 +56,9 @@ impl Odometry {
         let masker = Masker::new(&config.raster, &config.points, &config.masking)?;
         let refiner = match config.refinement.kind {
             RefinementKind::None => None,
+            RefinementKind::LocalMap if config.points.capacity == 0 => {
+                return Err(SetupError::NoPoints);
+            }
             RefinementKind::LocalMap => {
                 Some(Refiner::new(&config.refinement, config.points.capacity)?)
             }

@@ -46,6 +46,11 @@ pub enum SetupError {
     /// Of the rasters, the points or the mask.
     #[error(transparent)]
     Masker(#[from] MaskerError),
+    /// A refinement without points.
+    #[error(
+        "points.capacity is 0, but a refinement of kind `local-map` matches points: it must be 1 or more"
+    )]
+    NoPoints,
     /// Of the search or the refinement.
     #[error(transparent)]
     Search(#[from] ConfigError),

@@ -95,9 +95,8 @@ impl<S: Stage> Flow<'_, S> {
     fn process(&mut self, mut item: Item, received_ns: i64) -> Result<(), StageError> {
         self.require_next(&item)?;
         let mut draft = self.output.loan()?;
-        let Some(view) = self.inputs.view() else {
-            return Ok(());
-        };
+        let missing = || StageError::transport("read the inputs of an item", item.seq);
+        let view = self.inputs.view().ok_or_else(missing)?;
         let (started_ns, allocated) = (clock::now_ns(), allocations::so_far());
         self.stage.process(view, &mut draft)?;
         let (finished_ns, allocated) = (clock::now_ns(), allocations::so_far() - allocated);
