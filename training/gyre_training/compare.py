@@ -3,7 +3,6 @@
 import tempfile
 import time
 from argparse import Namespace
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,22 +13,11 @@ from . import plots, recipe
 from .drift import Drift, drift, motions, split
 from .export import OnnxMasks, export, quantise
 from .pairs import Scans
+from .results import Candidate
 from .search import ScanMatch
 from .train import trained
 
 ROUNDS = 40
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A network in one number format. `pair_ms` is the time of the masks of a pair on one thread; a network of single
-    scans masks only the later scan, because the earlier one has its mask already."""
-
-    name: str
-    numbers: str
-    megabytes: float
-    pair_ms: float
-    drift: Drift
 
 
 def register(commands) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import matplotlib
 
@@ -16,11 +15,8 @@ matplotlib.rcParams |= {"svg.hashsalt": "gyre", "svg.fonttype": "none", "axes.gr
 from matplotlib import pyplot  # noqa: E402
 from matplotlib.ticker import LogLocator, NullFormatter  # noqa: E402
 
+from .results import Candidate, Measurement  # noqa: E402
 from .train import load  # noqa: E402
-
-if TYPE_CHECKING:
-    from .compare import Candidate
-    from .step_time import Measurement
 
 PANEL_INCHES = (4.6, 3.4)
 

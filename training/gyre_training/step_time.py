@@ -22,6 +22,7 @@ from torch import nn
 
 from .network import MaskNetwork
 from .recipe import HOME
+from .results import Measurement
 from .exhaustive import ExhaustiveMatch
 from .search import ScanMatch, SearchConfig
 from .train import pose_error
@@ -55,17 +56,6 @@ class Setting:
     checkpoint: bool
     device: str
     threads: int
-
-
-@dataclass(frozen=True)
-class Measurement:
-    """The median time of a step (None: not measured) and the peak memory (None: out of memory)."""
-
-    method: str
-    batch: int
-    fits: bool
-    step_s: float | None = None
-    memory_mib: float | None = None
 
 
 class Memory:
