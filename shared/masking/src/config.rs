@@ -11,10 +11,11 @@ use crate::{model::Card, network::NetworkError, runtime};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MaskingConfig {
-    /// `none`: everything counts. `threshold`: power below `threshold` counts as zero. `learned`: in
+    /// `none`: everything counts. `threshold`: power up to `threshold` counts as zero. `learned`: in
     /// addition, a network weights each cell.
     pub kind: MaskKind,
-    /// Power below which a return counts as zero, 0 to 255, before any network.
+    /// Power up to which a return counts as zero, 0 to 255, before any network. Rasters hold the
+    /// power less the threshold.
     pub threshold: u8,
     /// Model card of the network, as `models/NAME.toml`.
     #[serde(skip_serializing_if = "Option::is_none")]
