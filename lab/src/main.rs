@@ -15,6 +15,11 @@ use std::process::ExitCode;
 use clap::Parser;
 use cli::{Command, Lab};
 use gyre::Failure;
+use gyre_stage::CountingAllocator;
+
+/// The runs that the laboratory starts report the allocations of their stages.
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 fn main() -> ExitCode {
     match Lab::parse().command {

@@ -1,7 +1,7 @@
 //! `gyre run`: prepares a run, supervises it, writes its results.
 
 use std::{
-    env, fs,
+    env, fs, io,
     os::unix::process::CommandExt,
     path::{Path, PathBuf},
     process::{Command, ExitCode},
@@ -190,16 +190,26 @@ fn overrides(arguments: &RunArguments) -> Vec<String> {
 /// The last result to be written: it marks a run as complete.
 const LAST_RESULT: &str = "summary.json";
 /// The results of an earlier run, which a new one removes.
-const RESULTS: [&str; 8] = [
+const RESULTS: [&str; 9] = [
     LAST_RESULT,
     results::SIMULATED_TRUTH,
     "log.jsonl",
+    "latency.json",
     "odometry.csv",
     "trajectory.tum",
     "trajectory.svg",
     "errors.svg",
     "bands.svg",
 ];
+
+fn remove(path: &Path) -> Result<(), Failure> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => {
+            Err(format!("cannot remove {}: {error}", path.display()).into())
+        }
+        _ => Ok(()),
+    }
+}
 
 /// Resumes an unfinished run of the same configuration, else starts a new one; returns the number of poses in the journal.
 fn prepare(configuration: &Configuration, out: &Path, fresh: bool) -> Result<usize, Failure> {
@@ -208,12 +218,13 @@ fn prepare(configuration: &Configuration, out: &Path, fresh: bool) -> Result<usi
     let ended = poses.last().is_some_and(|last| last.item.is(flag::END));
     let complete = ended && out.join(LAST_RESULT).exists();
     if poses.is_empty() || complete || fresh {
+        // A journal that stays would be resumed.
         for state in [journal, checkpoint::path(out)] {
-            let _ = fs::remove_file(state);
+            remove(&state)?;
         }
         // A new run may not write all of them: none of the earlier ones must be taken for its own.
         for result in RESULTS {
-            let _ = fs::remove_file(out.join(result));
+            remove(&out.join(result))?;
         }
         return Ok(0);
     }
