@@ -15,7 +15,7 @@ fn register_all(run: &Run) -> Vec<Registered> {
     let resolved = run.out().join("config.toml");
     let configuration = Configuration::read(&resolved, &[]).unwrap();
     let config: OdometryConfig = toml::from_str(&run.result("config.toml")).unwrap();
-    assert_eq!(config, configuration.odometry());
+    assert_eq!(config, configuration.odometry);
     let mut dataset = preflight::open(&configuration).unwrap().dataset;
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut odometry = Odometry::new(&config).unwrap();

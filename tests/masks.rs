@@ -7,29 +7,15 @@ use std::{
     path::Path,
 };
 
-use crate::common::{Ended, Run, gyre, recording};
+use crate::common::{Ended, Run, folder, gyre, recording};
 use gyre_geometry::Twist;
 use gyre_masking::runtime;
 use nalgebra::{Isometry2, Vector2};
-use tempfile::TempDir;
 
 /// Pixels a side of a panel, each cell of 127 two wide; and around it.
 const PANEL: usize = 254;
 const MARGIN: usize = 6;
 const WIDTH: usize = 4 * PANEL + 5 * MARGIN;
-
-fn folder() -> TempDir {
-    let folder = tempfile::Builder::new()
-        .prefix("gyre-masks-")
-        .tempdir()
-        .unwrap();
-    fs::write(
-        folder.path().join("small.toml"),
-        "[raster]\nn = 127\ncell_m = 0.8\n",
-    )
-    .unwrap();
-    folder
-}
 
 /// `gyre masks` of the small recording, in a folder.
 fn masks(folder: &Path, arguments: &[&str]) -> Ended {

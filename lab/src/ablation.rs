@@ -206,8 +206,8 @@ mod tests {
             let of_step = with(changes_of(&unmasked, step, None));
             // Without refinement neither its points nor its keyframes are used.
             if step < 7 {
-                of_row.points.capacity = 0;
-                of_row.refinement.keyframes = of_step.refinement.keyframes;
+                of_row.odometry.points.capacity = 0;
+                of_row.odometry.refinement.keyframes = of_step.odometry.refinement.keyframes;
             }
             assert_eq!(of_step, of_row, "{row}");
         }
@@ -225,7 +225,11 @@ mod tests {
             let kind = |step: usize| {
                 let changes = changes_of(&all_steps(), step, Some(&product()));
                 let changes: Vec<String> = own.iter().cloned().chain(changes).collect();
-                Configuration::of_overrides(&changes).unwrap().masking.kind
+                Configuration::of_overrides(&changes)
+                    .unwrap()
+                    .odometry
+                    .masking
+                    .kind
             };
             let kinds: Vec<MaskKind> = (0..10).map(kind).collect();
             assert_eq!(kinds[..4], [MaskKind::None; 4]);

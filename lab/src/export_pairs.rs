@@ -101,7 +101,7 @@ struct Export<'a> {
 
 impl<'a> Export<'a> {
     fn begin(configuration: &Configuration, out: &'a Path) -> Result<Self, Failure> {
-        let n = configuration.raster.n;
+        let n = configuration.odometry.raster.n;
         let preparation = Preparation::new(configuration)?;
         let file = NpyWriter::create(out, &Record::dtype(n));
         Ok(Self {

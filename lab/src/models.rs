@@ -117,6 +117,7 @@ mod tests {
         assert_eq!(found.cell_m, 0.8);
         let masking = Configuration::of_overrides(&found.changes())
             .unwrap()
+            .odometry
             .masking;
         assert_eq!(
             (masking.kind, masking.model),

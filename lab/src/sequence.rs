@@ -156,7 +156,7 @@ impl Sequence {
         names: &[String],
         changes: &[String],
     ) -> Result<Result<Model, String>, Failure> {
-        let raster = self.configuration(changes)?.raster;
+        let raster = self.configuration(changes)?.odometry.raster;
         Ok(Model::find(models, names, raster.n, Some(raster.cell_m)))
     }
 
@@ -244,7 +244,8 @@ fn figures(summary: &Value) -> Figures {
     let judged =
         |(place, ..): &(&'static str, _, _)| Some((*place, at(&format!("/evaluation/{place}"))?));
     let work_ms = |stage: StageId| {
-        at(&format!("/latency/stages/{}/work/p50_us", stage.name())).unwrap_or(0.0) * 1e-3
+        let place = ["", "latency", "stages", stage.name(), "work", "p50_us"].join("/");
+        at(&place).unwrap_or(0.0) * 1e-3
     };
     let around = [
         StageId::RadarReplay,

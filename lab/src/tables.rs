@@ -78,7 +78,11 @@ fn accuracy(
 ) -> Result<Experiment, Failure> {
     let (mut lines, mut left_out) = (Vec::new(), Notes::new());
     for row in rows.of(Table::Accuracy) {
-        let n = sequence.configuration(&row.changes(rows, None))?.raster.n;
+        let n = sequence
+            .configuration(&row.changes(rows, None))?
+            .odometry
+            .raster
+            .n;
         let measured = match row.is_measured() {
             true => run(rows, row, sequence, models, out)?,
             false => Ok(Line::default()),

@@ -9,10 +9,7 @@ use tempfile::TempDir;
 
 /// A folder with `other`, a drive through another town, and the configuration that simulated recordings are read with.
 fn folder() -> TempDir {
-    let folder = tempfile::Builder::new()
-        .prefix("gyre-realism-")
-        .tempdir()
-        .unwrap();
+    let folder = crate::common::folder();
     let config = SimulationConfig {
         scans: 8,
         seed: 7,
@@ -20,11 +17,6 @@ fn folder() -> TempDir {
         ..SimulationConfig::default()
     };
     write_dataset(&config, &folder.path().join("other"), &mut |_, _| ()).unwrap();
-    fs::write(
-        folder.path().join("small.toml"),
-        "[raster]\nn = 127\ncell_m = 0.8\n",
-    )
-    .unwrap();
     folder
 }
 

@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path, process::Command};
 
-use crate::common::{Ended, gyre, recording, runtime_is_installed};
+use crate::common::{Ended, folder, gyre, recording, runtime_is_installed};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -49,16 +49,8 @@ fn read(folder: &Path, name: &str) -> Value {
     serde_json::from_str(&fs::read_to_string(folder.join("out").join(name)).unwrap()).unwrap()
 }
 
-fn folder() -> TempDir {
-    let folder = tempfile::Builder::new()
-        .prefix("gyre-tables-")
-        .tempdir()
-        .unwrap();
-    fs::write(
-        folder.path().join("small.toml"),
-        "[raster]\nn = 127\ncell_m = 0.8\n",
-    )
-    .unwrap();
+fn lab_folder() -> TempDir {
+    let folder = folder();
     fs::write(folder.path().join("baseline.sh"), BASELINE).unwrap();
     folder
 }
@@ -104,7 +96,7 @@ fn line<'a>(lines: &'a Value, row: &str) -> &'a Value {
 
 #[test]
 fn both_tables_are_filled_and_their_commands_repeat_the_runs() {
-    let folder = folder();
+    let folder = lab_folder();
     let mut command = tables(folder.path());
     command.args(["--sizes", &SIZE.to_string()]);
     command.args(["--baseline", "sh", "--baseline-script", "baseline.sh"]);
@@ -172,7 +164,7 @@ fn masked_rows_are_timed_and_run_with_the_networks_that_there_are() {
     if !runtime_is_installed() {
         return;
     }
-    let folder = folder();
+    let folder = lab_folder();
     for (fixture, name) in [
         ("pair-127", "f-mbym-127"),
         ("pair-255", "f-mbym-255"),
@@ -232,7 +224,7 @@ fn an_ablation_has_a_learned_mask_where_the_network_fits_the_raster() {
     if !runtime_is_installed() {
         return;
     }
-    let folder = folder();
+    let folder = lab_folder();
     install(folder.path(), "single-127", "gyre-255");
     let ended = Ended::of(ablation(folder.path()));
     ended.succeeded();
@@ -259,7 +251,7 @@ fn an_ablation_has_a_learned_mask_where_the_network_fits_the_raster() {
 
 #[test]
 fn an_ablation_leads_from_the_papers_form_to_each_sequences_own_configuration() {
-    let folder = folder();
+    let folder = lab_folder();
     let ended = Ended::of(ablation(folder.path()));
     ended.succeeded();
     let json = read(folder.path(), "ablation.json");
@@ -288,7 +280,7 @@ fn an_ablation_leads_from_the_papers_form_to_each_sequences_own_configuration() 
 
 #[test]
 fn single_changes_are_run_alone_and_have_a_median() {
-    let folder = folder();
+    let folder = lab_folder();
     let mut command = lab(folder.path(), "ablation");
     command.args(["--vary", "masking.threshold=50,70"]);
     Ended::of(command).succeeded();
@@ -324,7 +316,7 @@ fn repeats(folder: &Path, line: &Value) {
 
 #[test]
 fn what_cannot_be_measured_is_refused_before_anything_is() {
-    let folder = folder();
+    let folder = lab_folder();
     let refused = |arguments: &[&str], words: &[&str]| {
         let mut command = tables(folder.path());
         command.args(arguments);

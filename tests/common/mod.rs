@@ -40,6 +40,16 @@ pub const STAGES: [&str; 6] = [
 /// Small rasters: the tests are about processes.
 const CONFIGURATION: &str = "[raster]\nn = 127\ncell_m = 0.8\n";
 
+/// A folder with `small.toml`, the configuration of small rasters.
+pub fn folder() -> TempDir {
+    let folder = tempfile::Builder::new()
+        .prefix("gyre-test-")
+        .tempdir()
+        .unwrap();
+    fs::write(folder.path().join("small.toml"), CONFIGURATION).unwrap();
+    folder
+}
+
 /// The program under test.
 pub fn gyre() -> Command {
     Command::new(crate::PROGRAM)

@@ -32,20 +32,20 @@ impl Preparation {
     /// # Errors
     /// The first setting that is out of its bounds.
     pub fn new(configuration: &Configuration) -> Result<Self, Failure> {
-        if configuration.masking.kind == MaskKind::Learned {
+        if configuration.odometry.masking.kind == MaskKind::Learned {
             return Err(LEARNED.into());
         }
         let config = OdometryConfig {
             points: PointsConfig {
                 capacity: 0,
-                ..configuration.points.clone()
+                ..configuration.odometry.points.clone()
             },
             search: SearchConfig::default(),
             refinement: RefinementConfig {
                 kind: RefinementKind::None,
-                ..configuration.refinement.clone()
+                ..configuration.odometry.refinement.clone()
             },
-            ..configuration.odometry()
+            ..configuration.odometry.clone()
         };
         let lag = config.masking.feedback_lag();
         Ok(Self {

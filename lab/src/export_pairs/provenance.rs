@@ -78,7 +78,10 @@ pub fn to_toml(configuration: &Configuration, sequences: &[Sequence]) -> Result<
     table.insert("version".to_owned(), env!("CARGO_PKG_VERSION").into());
     table.extend(option_env!("GYRE_COMMIT").map(|commit| ("commit".to_owned(), commit.into())));
     table.insert("scans".to_owned(), Value::try_from(scans)?);
-    table.insert("n".to_owned(), Value::try_from(configuration.raster.n)?);
+    table.insert(
+        "n".to_owned(),
+        Value::try_from(configuration.odometry.raster.n)?,
+    );
     table.insert("sequences".to_owned(), Value::try_from(sequences)?);
     Ok(format!("{FIRST_LINE}{}", toml::to_string_pretty(&table)?))
 }

@@ -160,7 +160,7 @@ mod tests {
         ] {
             let [plain, masked] = [plain, masked].map(|name| rows.named(name).unwrap());
             let mut found = with("radiate.toml", &masked.changes(&rows, None));
-            found.masking.threshold = with("radiate.toml", &[]).masking.threshold;
+            found.odometry.masking.threshold = with("radiate.toml", &[]).odometry.masking.threshold;
             assert_eq!(
                 found,
                 with("radiate.toml", &plain.changes(&rows, None)),

@@ -83,7 +83,11 @@ impl Times {
         baseline: Option<Baseline<'_>>,
     ) -> Result<Self, Failure> {
         let (scans, passes) = (sequence.scans(SCANS)?, arguments.passes.get());
-        let angles = sequence.configuration(&[])?.exhaustive.candidates();
+        let angles = sequence
+            .configuration(&[])?
+            .odometry
+            .exhaustive
+            .candidates();
         let mut times = Self {
             data: sequence.data.display().to_string(),
             scans: scans.len(),

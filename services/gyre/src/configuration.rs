@@ -11,14 +11,11 @@ use std::{
     time::Duration,
 };
 
-use gyre_masking::MaskingConfig;
 use gyre_messages::{StageId, Window};
-use gyre_odometry::{OdometryConfig, SearchConfig, SearchKind};
-use gyre_radar::{DatasetOptions, PointsConfig, RasterConfig};
+use gyre_odometry::{OdometryConfig, SearchKind};
+use gyre_radar::DatasetOptions;
 use gyre_radar_replay::SourceConfig;
-use gyre_scan_matching::{
-    ExhaustiveConfig, RefinementConfig, RefinementKind, RotationConfig, TranslationConfig,
-};
+use gyre_scan_matching::RefinementKind;
 use gyre_simulator::{OutputFormat, SimulationConfig};
 use gyre_stage::supervise::{RestartPolicy, StagePlan};
 use serde::{Deserialize, Serialize};
@@ -40,22 +37,9 @@ pub struct Configuration {
     /// A drive to simulate and play, instead of `source.data`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub simulation: Option<SimulationConfig>,
-    /// The Cartesian rasters.
-    pub raster: RasterConfig,
-    /// The sparse points, which the refinement registers.
-    pub points: PointsConfig,
-    /// Masks and motion compensation.
-    pub masking: MaskingConfig,
-    /// The kind of the search.
-    pub search: SearchConfig,
-    /// The rotation search.
-    pub rotation: RotationConfig,
-    /// The translation search.
-    pub translation: TranslationConfig,
-    /// The exhaustive search, for `search.kind = "exhaustive"`.
-    pub exhaustive: ExhaustiveConfig,
-    /// The refinement of searched motions.
-    pub refinement: RefinementConfig,
+    /// The settings of the method: the sections from `raster` to `refinement`.
+    #[serde(flatten)]
+    pub odometry: OdometryConfig,
     /// The command and the restarts of a stage: `radar-replay`, `masking`, `rotation-search`,
     /// `translation-search`, `joint-search`, `refinement` or `pose-integration`.
     pub stages: BTreeMap<String, StageConfig>,
@@ -200,14 +184,16 @@ impl Configuration {
                 true => Some(strict::section(&mut table, "simulation")?),
                 false => None,
             },
-            raster: strict::section(&mut table, "raster")?,
-            points: strict::section(&mut table, "points")?,
-            masking: strict::section(&mut table, "masking")?,
-            search: strict::section(&mut table, "search")?,
-            rotation: strict::section(&mut table, "rotation")?,
-            translation: strict::section(&mut table, "translation")?,
-            exhaustive: strict::section(&mut table, "exhaustive")?,
-            refinement: strict::section(&mut table, "refinement")?,
+            odometry: OdometryConfig {
+                raster: strict::section(&mut table, "raster")?,
+                points: strict::section(&mut table, "points")?,
+                masking: strict::section(&mut table, "masking")?,
+                search: strict::section(&mut table, "search")?,
+                rotation: strict::section(&mut table, "rotation")?,
+                translation: strict::section(&mut table, "translation")?,
+                exhaustive: strict::section(&mut table, "exhaustive")?,
+                refinement: strict::section(&mut table, "refinement")?,
+            },
             stages: strict::sections(&mut table, "stages", &StageId::ALL.map(StageId::name))?,
         };
         let format = configuration.dataset.format.and_then(OutputFormat::read_as);
@@ -240,22 +226,28 @@ impl Configuration {
             section: section.to_owned(),
             reason,
         };
-        self.raster
+        self.odometry
+            .raster
             .validate()
             .map_err(|e| value("raster", e.to_string()))?;
-        self.points
+        self.odometry
+            .points
             .validate()
             .map_err(|e| value("points", e.to_string()))?;
-        self.rotation
+        self.odometry
+            .rotation
             .validate()
             .map_err(|e| value("rotation", e.to_string()))?;
-        self.translation
+        self.odometry
+            .translation
             .validate()
             .map_err(|e| value("translation", e.to_string()))?;
-        self.exhaustive
+        self.odometry
+            .exhaustive
             .validate()
             .map_err(|e| value("exhaustive", e.to_string()))?;
-        self.refinement
+        self.odometry
+            .refinement
             .validate()
             .map_err(|e| value("refinement", e.to_string()))?;
         self.window(None, 1)
@@ -277,11 +269,12 @@ impl Configuration {
                 return Err(value("simulation", reason));
             }
         }
-        if self.has(StageId::Refinement) && self.points.capacity == 0 {
+        if self.has(StageId::Refinement) && self.odometry.points.capacity == 0 {
             let reason = "points.capacity is 0, but a refinement of kind `local-map` matches points: it must be 1 or more";
             return Err(value("points", reason.to_owned()));
         }
-        self.masking
+        self.odometry
+            .masking
             .validate()
             .map_err(|e| value("masking", e.to_string()))?;
         if self.run.mode == Mode::Live && self.run.rate == Rate::Max {
@@ -320,7 +313,7 @@ impl Configuration {
         };
         Window {
             scans: self.run.window,
-            lag: self.masking.feedback_lag(),
+            lag: self.odometry.masking.feedback_lag(),
             look_back: scans_a_mask,
             live_depth,
         }
@@ -369,25 +362,11 @@ impl Configuration {
     pub fn has(&self, stage: StageId) -> bool {
         match stage {
             StageId::RotationSearch | StageId::TranslationSearch => {
-                self.search.kind == SearchKind::Decoupled
+                self.odometry.search.kind == SearchKind::Decoupled
             }
-            StageId::JointSearch => self.search.kind == SearchKind::Exhaustive,
-            StageId::Refinement => self.refinement.kind == RefinementKind::LocalMap,
+            StageId::JointSearch => self.odometry.search.kind == SearchKind::Exhaustive,
+            StageId::Refinement => self.odometry.refinement.kind == RefinementKind::LocalMap,
             StageId::RadarReplay | StageId::Masking | StageId::PoseIntegration => true,
-        }
-    }
-
-    /// Returns the settings of the method alone.
-    pub fn odometry(&self) -> OdometryConfig {
-        OdometryConfig {
-            raster: self.raster.clone(),
-            points: self.points.clone(),
-            masking: self.masking.clone(),
-            search: self.search,
-            rotation: self.rotation.clone(),
-            translation: self.translation.clone(),
-            exhaustive: self.exhaustive.clone(),
-            refinement: self.refinement.clone(),
         }
     }
 

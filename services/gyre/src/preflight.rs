@@ -4,6 +4,7 @@ use std::{path::Path, time::Duration};
 
 use gyre_masking::{MaskKind, Masker, model::Card};
 use gyre_messages::{Footprint, Limits, Window};
+use gyre_odometry::OdometryConfig;
 use gyre_radar::Dataset;
 use gyre_simulator::SimulatedDrive;
 use thiserror::Error;
@@ -73,16 +74,16 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
         .into());
     }
     let masker = Masker::new(
-        &configuration.raster,
-        &configuration.points,
-        &configuration.masking,
+        &configuration.odometry.raster,
+        &configuration.odometry.points,
+        &configuration.odometry.masking,
     )?;
     let window = configuration.window(period(dataset.as_ref()), masker.scans());
     let limits = Limits {
         scan_bytes: dataset.limits().bytes,
-        raster_cells: configuration.raster.n * configuration.raster.n,
+        raster_cells: configuration.odometry.raster.n * configuration.odometry.raster.n,
         rasters: masker.scans(),
-        points: configuration.points.capacity,
+        points: configuration.odometry.points.capacity,
     };
     let footprint = Footprint::new(&window, &limits);
     check_shared_memory(&footprint)?;
@@ -100,9 +101,9 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
 /// # Errors
 /// A model card that cannot be read.
 pub fn warn_of_training(configuration: &Configuration) -> Result<(), crate::Failure> {
-    let Configuration {
+    let OdometryConfig {
         masking, raster, ..
-    } = configuration;
+    } = &configuration.odometry;
     if masking.kind == MaskKind::Learned {
         let unlike = Card::read(masking)?.training_mismatches(masking, raster);
         if let (false, Some(card)) = (unlike.is_empty(), &masking.model) {

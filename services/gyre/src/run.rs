@@ -150,7 +150,7 @@ fn resolve(arguments: &RunArguments, out: &Path) -> Result<Configuration, Failur
             false => PathBuf::new(),
         };
     }
-    configuration.masking.resolve()?;
+    configuration.odometry.masking.resolve()?;
     preflight::warn_of_training(&configuration)?;
     // Absolute, so that the resolved configuration repeats the run from any folder. The reader reports what does not exist.
     for path in [

@@ -211,7 +211,7 @@ impl Summary {
             mode: configuration.run.mode,
             rate: configuration.run.rate,
             window: configuration.run.window,
-            mask: Mask::of(&configuration.masking),
+            mask: Mask::of(&configuration.odometry.masking),
             scans_in_recording: session.scans,
             resumed_after: session.resumed,
             counts,

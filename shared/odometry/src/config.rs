@@ -7,14 +7,14 @@ use serde::{Deserialize, Serialize};
 
 /// The settings of the method, by section of a run's configuration. A run's file can be read as this: other sections are
 /// ignored.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default)]
 pub struct OdometryConfig {
     /// The Cartesian rasters.
     pub raster: RasterConfig,
     /// The sparse points, which the refinement registers.
     pub points: PointsConfig,
-    /// The mask, and motion compensation.
+    /// Masks and motion compensation.
     pub masking: MaskingConfig,
     /// The kind of the search.
     pub search: SearchConfig,
@@ -24,7 +24,7 @@ pub struct OdometryConfig {
     pub translation: TranslationConfig,
     /// The exhaustive search, for `search.kind = "exhaustive"`.
     pub exhaustive: ExhaustiveConfig,
-    /// The refinement against the local map.
+    /// The refinement of searched motions.
     pub refinement: RefinementConfig,
 }
 

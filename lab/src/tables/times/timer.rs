@@ -40,10 +40,10 @@ impl Timer {
         scans: &[OwnedScan],
     ) -> Result<Self, Failure> {
         let mut configuration = sequence.configuration(changes)?;
-        let raster = &mut configuration.raster;
+        let raster = &mut configuration.odometry.raster;
         let scaled = raster.cell_m * raster.n as f32 / n as f32;
         (raster.n, raster.cell_m) = (n, model.as_ref().map_or(scaled, |model| model.cell_m));
-        configuration.masking.threads = 1;
+        configuration.odometry.masking.threads = 1;
         let timer = Self::of(&configuration, !row.mask_alone, scans);
         let timer =
             timer.map_err(|reason| format!("{} at {n} cells a side: {reason}", row.name))?;
@@ -55,7 +55,10 @@ impl Timer {
         searches: bool,
         scans: &[OwnedScan],
     ) -> Result<Self, Failure> {
-        let (raster, masking) = (&configuration.raster, &configuration.masking);
+        let (raster, masking) = (
+            &configuration.odometry.raster,
+            &configuration.odometry.masking,
+        );
         let network = match masking.kind {
             MaskKind::Learned => {
                 let network = Network::load(masking, raster)?;
@@ -64,12 +67,13 @@ impl Timer {
             }
             _ => None,
         };
-        let exhaustive = configuration.search.kind == SearchKind::Exhaustive && network.is_none();
+        let exhaustive =
+            configuration.odometry.search.kind == SearchKind::Exhaustive && network.is_none();
         Ok(Self {
             model: None,
             cell_m: raster.cell_m,
-            angles: exhaustive.then(|| configuration.exhaustive.candidates()),
-            odometry: Odometry::new(&configuration.odometry())?,
+            angles: exhaustive.then(|| configuration.odometry.exhaustive.candidates()),
+            odometry: Odometry::new(&configuration.odometry)?,
             network,
             searches,
             scans: scans.to_vec(),

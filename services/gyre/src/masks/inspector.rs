@@ -44,9 +44,9 @@ impl MaskInspector {
         let config = OdometryConfig {
             refinement: RefinementConfig {
                 kind: RefinementKind::None,
-                ..configuration.refinement.clone()
+                ..configuration.odometry.refinement.clone()
             },
-            ..configuration.odometry()
+            ..configuration.odometry.clone()
         };
         let floor = config.masking.floor();
         let threshold = if floor == 0 {

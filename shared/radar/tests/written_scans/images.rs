@@ -1,0 +1,214 @@
+//! Images: powers, transposition, corrupt files, sizes.
+
+use std::f32::consts::TAU;
+use std::fs;
+
+use gyre_radar::{DatasetOptions, Format, OpenError, OwnedScan, ReadError, ScanLimits, open};
+
+use crate::common::{PERIOD_US, START_US, Sweep, read, write_oxford, write_png, write_radiate};
+use crate::{folder, opened, rejected};
+
+#[test]
+fn written_powers_are_read_back() {
+    let root = folder();
+    write_oxford(root.path(), 3);
+    let mut dataset = opened(root.path());
+    assert_eq!((dataset.format(), dataset.len()), (Format::Oxford, 3));
+    let scan = read(dataset.as_mut(), 2).unwrap();
+    for row in 0..40 {
+        assert!(
+            scan.view()
+                .row(row)
+                .iter()
+                .enumerate()
+                .all(|(bin, p)| *p == Sweep::power(row, bin))
+        );
+        assert!((scan.azimuth_rad[row] - (13 + 140 * row) as f32 / 5600.0 * TAU).abs() < 1e-6);
+    }
+    assert_eq!(
+        scan.geometry.stamp_ns,
+        (START_US + 2 * PERIOD_US + 39 * PERIOD_US / 40 / 2) * 1000
+    );
+}
+
+#[test]
+fn a_radar_with_another_encoder_and_period_needs_options_only() {
+    let root = folder();
+    let turn_us = 1_000_000;
+    for start in [START_US, START_US + turn_us, START_US + 2 * turn_us] {
+        let sweep = Sweep {
+            rows: 120,
+            bins: 162,
+            first_count: 0,
+            step: 30,
+            start,
+            row_interval: turn_us / 120,
+            ..Sweep::default()
+        };
+        sweep.write(&root.path().join(format!("radar/{start}.png")));
+    }
+    fs::write(root.path().join("radar.timestamps"), "").unwrap();
+    let options = DatasetOptions {
+        range_resolution_m: Some(0.6),
+        range_offset_m: Some(3.0),
+        encoder_counts: Some(3600),
+        ..DatasetOptions::default()
+    };
+    let mut dataset = open(root.path(), &options).unwrap();
+    let scan = read(dataset.as_mut(), 1).unwrap();
+    assert_eq!((scan.geometry.azimuths, scan.geometry.bins), (120, 162));
+    assert!((scan.view().range_m(161.0) - 99.9).abs() < 1e-3);
+    assert!((scan.azimuth_rad[90] - 0.75 * TAU).abs() < 1e-6);
+    assert!((scan.geometry.stamp_ns - dataset.nominal_stamp_ns(1).unwrap()).abs() < 1_000_000);
+    assert_eq!(
+        scan.geometry.stamp_ns / 1000,
+        START_US + turn_us + 119 * (turn_us / 120) / 2
+    );
+}
+
+#[test]
+fn transposed_powers_are_transposed_back() {
+    let root = folder();
+    write_radiate(root.path(), 4);
+    let mut dataset = opened(root.path());
+    let scan = read(dataset.as_mut(), 3).unwrap();
+    assert_eq!(
+        (
+            scan.geometry.azimuths,
+            scan.geometry.bins,
+            scan.geometry.range_resolution_m
+        ),
+        (40, 60, 100.0 / 60.0)
+    );
+    for azimuth in 0..40 {
+        assert!(
+            scan.view()
+                .row(azimuth)
+                .iter()
+                .enumerate()
+                .all(|(bin, p)| *p == Sweep::power(azimuth, bin))
+        );
+    }
+    assert_eq!(scan.stamp_ns[0], 1_549_986_607_003_000_000 + 750_000_000);
+}
+
+#[test]
+fn a_corrupt_image_in_the_middle_leaves_the_others_readable() {
+    let root = folder();
+    let files = write_oxford(root.path(), 7);
+    let whole = fs::read(&files[1]).unwrap();
+    fs::write(&files[1], &whole[..whole.len() / 2]).unwrap();
+    write_png(&files[2], 40, 71, &[0; 40 * 71]);
+    Sweep {
+        rows: 39,
+        ..Sweep::default()
+    }
+    .write(&files[3]);
+    fs::write(&files[4], b"not an image").unwrap();
+    fs::write(&files[5], b"").unwrap();
+    let mut dataset = opened(root.path());
+    let mut error = |index| read(dataset.as_mut(), index).err();
+    assert!(matches!(error(1), Some(ReadError::Truncated { .. })));
+    let (rotated, short) = (error(2).unwrap().to_string(), error(3).unwrap().to_string());
+    assert!(
+        rotated.contains("40 columns x 71 rows")
+            && rotated.ends_with("it is rotated by 90 degrees"),
+        "{rotated}"
+    );
+    assert!(
+        short.ends_with("first image of the dataset is 71 columns x 40 rows"),
+        "{short}"
+    );
+    assert!(matches!(error(4), Some(ReadError::NotPng { .. })));
+    assert!(matches!(
+        error(5),
+        Some(ReadError::Truncated { bytes: 0, .. })
+    ));
+    assert!(matches!(
+        error(7),
+        Some(ReadError::NoSuchScan { index: 7, len: 7 })
+    ));
+    assert!(error(0).is_none() && error(6).is_none());
+}
+
+#[test]
+fn a_truncated_or_corrupt_image_gives_an_error_and_no_panic() {
+    let root = folder();
+    let files = write_oxford(root.path(), 2);
+    let whole = fs::read(&files[1]).unwrap();
+    let mut dataset = opened(root.path());
+    let mut scan = OwnedScan::with_limits(dataset.limits());
+    for length in (0..whole.len() - 12).step_by(7) {
+        fs::write(&files[1], &whole[..length]).unwrap();
+        assert!(
+            dataset.read(1, scan.slot()).is_err(),
+            "{length} of {} bytes",
+            whole.len()
+        );
+    }
+    for place in 0..whole.len() {
+        let mut damaged = whole.clone();
+        damaged[place] ^= 0x55;
+        fs::write(&files[1], damaged).unwrap();
+        let _ = dataset.read(1, scan.slot());
+    }
+}
+
+#[test]
+fn other_pixels_than_grey_bytes_are_rejected() {
+    let root = folder();
+    let files = write_oxford(root.path(), 2);
+    let file = fs::File::create(&files[1]).unwrap();
+    let mut encoder = png::Encoder::new(file, 71, 40);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder
+        .write_header()
+        .unwrap()
+        .write_image_data(&[0; 71 * 40 * 3])
+        .unwrap();
+    let error = read(opened(root.path()).as_mut(), 1).unwrap_err();
+    assert!(error.to_string().contains("8-bit colour"), "{error}");
+}
+
+#[test]
+fn an_oversized_header_allocates_no_memory() {
+    let root = folder();
+    let files = write_oxford(root.path(), 1);
+    let mut bytes = fs::read(&files[0]).unwrap();
+    bytes[16..24].copy_from_slice(&[0x7f, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff]);
+    fs::write(&files[0], bytes).unwrap();
+    assert!(matches!(
+        rejected(root.path()),
+        OpenError::FirstImage(ReadError::TooLarge { .. })
+    ));
+}
+
+#[test]
+fn a_slot_that_is_too_small_is_rejected() {
+    let root = folder();
+    write_oxford(root.path(), 1);
+    write_radiate(&root.path().join("transposed"), 1);
+    for path in [root.path().to_owned(), root.path().join("transposed")] {
+        let mut dataset = opened(&path);
+        let limits = dataset.limits();
+        for small in [
+            ScanLimits {
+                bytes: limits.bytes - 1,
+                ..limits
+            },
+            ScanLimits {
+                azimuths: limits.azimuths - 1,
+                ..limits
+            },
+        ] {
+            let mut scan = OwnedScan::with_limits(small);
+            assert!(
+                matches!(
+                    dataset.read(0, scan.slot()),
+                    Err(ReadError::SlotTooSmall { .. })
+                ),
+                "{small:?}"
+            );
+        }
+    }
+}
