@@ -11,6 +11,7 @@ mod joint_search;
 mod k2pi;
 mod learned_masks;
 mod live;
+mod lost_input;
 mod masks;
 mod pipeline;
 mod real_scans;

@@ -82,7 +82,7 @@ impl Recording {
                 _ => Truth::read(configuration),
             }?,
         };
-        let played = configuration.played(dataset.len());
+        let played = configuration.source.played(dataset.len());
         Ok(Self {
             dataset,
             played,

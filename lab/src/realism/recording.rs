@@ -103,7 +103,7 @@ impl Source {
             role,
             data: data.to_owned(),
             sequence,
-            played: configuration.played(dataset.len()),
+            played: configuration.source.played(dataset.len()),
             dataset,
             truth: truth.filter(|truth| truth.stamp_ns.is_some() && truth.has_heading()),
             odometry: None,

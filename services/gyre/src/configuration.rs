@@ -6,7 +6,6 @@ mod strict;
 use std::{
     collections::BTreeMap,
     fs,
-    ops::Range,
     path::{Path, PathBuf},
     time::Duration,
 };
@@ -292,6 +291,7 @@ impl Configuration {
                 )),
             };
         seconds("run", "stall_timeout_s", self.run.stall_timeout_s)?;
+        seconds("source", "retry_s", self.source.retry_s)?;
         self.stages.iter().try_for_each(|(name, stage)| {
             seconds(
                 &format!("stages.{name}"),
@@ -339,15 +339,6 @@ impl Configuration {
             self.dataset = self.dataset.or(&simulation.dataset_options());
         }
         self
-    }
-
-    /// Returns the scans that are played of a recording of `scans` scans.
-    pub fn played(&self, scans: usize) -> Range<usize> {
-        let first = self.source.first.min(scans);
-        first
-            ..first
-                .saturating_add(self.source.scans.unwrap_or(usize::MAX))
-                .min(scans)
     }
 
     /// Returns the recording's folder, or `a simulation`.
@@ -421,6 +412,9 @@ impl Configuration {
                 run.retain(|key, _| {
                     !["rate", "window", "stall_timeout_s", "ground_truth"].contains(&key)
                 });
+            }
+            if let Some(source) = table.get_mut("source").and_then(|key| key.as_table_mut()) {
+                source.retain(|key, _| !["retry_s", "max_unreadable"].contains(&key));
             }
             table
         };

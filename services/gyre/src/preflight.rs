@@ -65,7 +65,7 @@ pub struct Preflight {
 /// A dataset or a mask that cannot be used, too little shared memory.
 pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure> {
     let Played { dataset, truth } = open(configuration)?;
-    let scans = configuration.played(dataset.len()).len();
+    let scans = configuration.source.played(dataset.len()).len();
     if scans < 2 {
         return Err(PreflightError::TooFew {
             path: configuration.data(),
@@ -78,7 +78,8 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
         &configuration.odometry.points,
         &configuration.odometry.masking,
     )?;
-    let window = configuration.window(period(dataset.as_ref()), masker.scans());
+    let period = Duration::from_nanos(dataset.period_ns().max(0) as u64);
+    let window = configuration.window(Some(period), masker.scans());
     let limits = Limits {
         scan_bytes: dataset.limits().bytes,
         raster_cells: configuration.odometry.raster.n * configuration.odometry.raster.n,
@@ -146,12 +147,6 @@ pub fn open(configuration: &Configuration) -> Result<Played, crate::Failure> {
             truth: None,
         }),
     }
-}
-
-fn period(dataset: &dyn Dataset) -> Option<Duration> {
-    let last = dataset.len().checked_sub(1).filter(|last| *last > 0)?;
-    let span_ns = dataset.nominal_stamp_ns(last)? - dataset.nominal_stamp_ns(0)?;
-    Some(Duration::from_nanos((span_ns.max(0) as u64) / last as u64))
 }
 
 /// Writing to a full tmpfs kills a process with SIGBUS, so its free space is checked first.

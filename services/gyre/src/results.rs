@@ -49,7 +49,7 @@ pub fn write(
         .then(|| MotionCounts::of(poses));
     let counts = Counts {
         motions,
-        ..Counts::of(poses, end)
+        ..Counts::of(poses, end, configuration.source.first)
     };
     let summary = Summary::new(
         configuration,

@@ -108,7 +108,19 @@ fn finish(
         )
         .into());
     }
-    print::line(summary?)?;
+    let summary = summary?;
+    print::line(&summary)?;
+    let counts = summary.counts();
+    if report.ending == Ending::Complete && counts.too_many_are_unreadable() {
+        return Err(format!(
+            "{} of the {} scans of {} cannot be read: the results are of the others, and {} says what is wrong with each",
+            counts.unreadable,
+            session.scans,
+            configuration.data(),
+            out.join("log.jsonl").display()
+        )
+        .into());
+    }
     Ok(match report.ending {
         Ending::Complete => ExitCode::SUCCESS,
         Ending::Interrupted => ExitCode::from(INTERRUPTED),

@@ -17,6 +17,10 @@ use crate::{
     machine::Machine,
 };
 
+/// Largest share of unreadable scans of a run that succeeds. With more, motions span more than one scan too often for
+/// the trajectory to be the recording's.
+const MAX_UNREADABLE_SHARE: f64 = 0.2;
+
 /// This session of a run.
 pub struct Session<'a> {
     /// Scans in the recording.
@@ -88,8 +92,8 @@ impl MotionCounts {
 }
 
 impl Counts {
-    /// From the poses and the end of the stream, if it came to that.
-    pub fn of(poses: &[PoseHeader], end: Option<&PoseHeader>) -> Self {
+    /// From the poses and the end of the stream, if it came to that. `first` is the first scan played.
+    pub fn of(poses: &[PoseHeader], end: Option<&PoseHeader>, first: usize) -> Self {
         let last = poses.last();
         let published = end
             .map(|end| end.item.published)
@@ -98,7 +102,7 @@ impl Counts {
         let seen = end
             .map(|end| end.item.scan)
             .or(last.map(|last| last.item.scan + 1))
-            .unwrap_or(0);
+            .map_or(0, |next| next.saturating_sub(first as u64));
         let processed = poses.len() as u64;
         let starts = poses
             .iter()
@@ -113,6 +117,12 @@ impl Counts {
             breaks: starts.saturating_sub(1),
             motions: None,
         }
+    }
+
+    /// Returns whether the result is hardly one of the recording.
+    pub fn too_many_are_unreadable(&self) -> bool {
+        let read = self.published + self.unreadable;
+        self.unreadable as f64 > MAX_UNREADABLE_SHARE * read as f64
     }
 }
 
@@ -191,6 +201,11 @@ pub struct Summary {
 }
 
 impl Summary {
+    /// The counts of scans.
+    pub fn counts(&self) -> &Counts {
+        &self.counts
+    }
+
     /// Puts it together.
     pub fn new(
         configuration: &Configuration,
@@ -239,6 +254,7 @@ impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let c = &self.counts;
         let ending = match self.ending {
+            Some(Ending::Complete) if c.unreadable > 0 => "complete but for unreadable scans",
             Some(Ending::Complete) => "complete",
             Some(Ending::Interrupted) => "interrupted: the same command resumes from here",
             None => "failed",
@@ -350,8 +366,9 @@ mod tests {
             },
             ..PoseHeader::default()
         };
-        let end = pose(3, 9, 10);
-        let counts = Counts::of(&[pose(0, 0, 0), pose(1, 3, 3), pose(2, 7, 8)], Some(&end));
+        let end = pose(3, 9, 15);
+        let poses = [pose(0, 0, 5), pose(1, 3, 8), pose(2, 7, 13)];
+        let counts = Counts::of(&poses, Some(&end), 5);
         assert_eq!(
             counts,
             Counts {

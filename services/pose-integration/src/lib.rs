@@ -23,8 +23,8 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
         last: None,
     };
     match launch.manifest.refines {
-        true => sink::run::<Refined>(launch, &mut integration),
-        false => sink::run::<Motion>(launch, &mut integration),
+        true => sink::run::<Refined, _>(launch, &mut integration),
+        false => sink::run::<Motion, _>(launch, &mut integration),
     }
 }
 
@@ -36,6 +36,8 @@ struct Integration {
 }
 
 impl Sink for Integration {
+    const HOP: StageId = StageId::PoseIntegration;
+
     fn restore(&mut self, count: usize) -> Result<(Vec<PoseHeader>, bool), StageError> {
         let mut poses = std::mem::take(&mut self.records);
         let ended = poses.pop_if(|last| last.item.is(flag::END)).is_some();
@@ -46,7 +48,7 @@ impl Sink for Integration {
 
     fn integrate(&mut self, motion: &MotionHeader) -> Result<PoseHeader, StageError> {
         let mut pose = compose(self.last.as_ref(), motion);
-        pose.item.hop(StageId::PoseIntegration).finished_ns = clock::now_ns();
+        pose.item.hop_mut(Self::HOP).finished_ns = clock::now_ns();
         self.write(&pose)?;
         self.last = Some(pose);
         Ok(pose)

@@ -1,11 +1,12 @@
 //! The section `[source]`.
 
-use std::path::PathBuf;
+use std::{ops::Range, path::PathBuf, time::Duration};
 
+use gyre_stage::source::Tolerance;
 use serde::{Deserialize, Serialize};
 
 /// The recording to play: section `[source]`.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SourceConfig {
     /// Folder of the recording; `--data` on the command line.
@@ -15,4 +16,39 @@ pub struct SourceConfig {
     /// Number of scans to play. Default: all.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scans: Option<usize>,
+    /// Time for which a file that the disk or the network does not give is tried again, s. Then the
+    /// run ends, and the same command continues it.
+    pub retry_s: f64,
+    /// Number of damaged scans in a row that are skipped; one more ends the run. Over ten scans at
+    /// four per second a car drives farther than the search reaches.
+    pub max_unreadable: usize,
+}
+
+impl Default for SourceConfig {
+    fn default() -> Self {
+        Self {
+            data: PathBuf::new(),
+            first: 0,
+            scans: None,
+            retry_s: 10.0,
+            max_unreadable: 10,
+        }
+    }
+}
+
+impl SourceConfig {
+    /// Returns the scans to play of a recording of `scans` scans, by their index in it.
+    pub fn played(&self, scans: usize) -> Range<usize> {
+        let first = self.first.min(scans);
+        let end = first.saturating_add(self.scans.unwrap_or(usize::MAX));
+        first..end.min(scans)
+    }
+
+    /// Returns the limits on input that cannot be read.
+    pub fn tolerance(&self) -> Tolerance {
+        Tolerance {
+            retry: Duration::try_from_secs_f64(self.retry_s).unwrap_or(Duration::MAX),
+            max_unreadable: self.max_unreadable,
+        }
+    }
 }

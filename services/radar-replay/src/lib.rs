@@ -4,9 +4,14 @@
 
 mod config;
 
-use gyre_messages::ScanHeader;
+use std::ops::Range;
+
+use gyre_messages::{ScanHeader, StageId};
 use gyre_radar::{Dataset, DatasetOptions};
-use gyre_stage::{Launch, Source, StageCounters, StageError, source};
+use gyre_stage::{
+    Launch, Source, StageCounters, StageError,
+    source::{self, Unreadable},
+};
 
 pub use config::SourceConfig;
 
@@ -29,9 +34,12 @@ pub enum Pace {
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let config: SourceConfig = launch.section("source")?;
     let options: DatasetOptions = launch.section("dataset")?;
-    let dataset = gyre_radar::open(&config.data, &options)
-        .map_err(|error| StageError::Input(error.to_string()))?;
-    play(launch, dataset, Pace::Sensor)
+    // The supervisor has opened it before, so whatever is wrong now may pass.
+    let open = || gyre_radar::open(&config.data, &options).map_err(|error| error.to_string());
+    match source::open(launch, &config.tolerance(), open)? {
+        Some(dataset) => play(launch, dataset, Pace::Sensor),
+        None => Ok(StageCounters::default()),
+    }
 }
 
 /// Plays the part of a dataset that the section `[source]` selects, until SIGTERM.
@@ -44,7 +52,13 @@ pub fn play(
     pace: Pace,
 ) -> Result<StageCounters, StageError> {
     let config: SourceConfig = launch.section("source")?;
-    let counters = source::run(launch, &mut Replay::new(dataset, &config, pace))?;
+    let mut replay = Replay {
+        scans: config.played(dataset.len()),
+        half_period_ns: dataset.period_ns() / 2,
+        dataset,
+        pace,
+    };
+    let counters = source::run(launch, &mut replay, &config.tolerance())?;
     let slipped_s = counters.slipped_ns as f64 * 1e-9;
     if slipped_s > NOTABLE_SLIP_S {
         tracing::warn!(slipped_s, "the simulation did not keep up with the rate");
@@ -55,38 +69,21 @@ pub fn play(
 /// The selected part of a dataset.
 struct Replay {
     dataset: Box<dyn Dataset>,
-    first: usize,
-    scans: usize,
+    scans: Range<usize>,
     half_period_ns: i64,
     pace: Pace,
 }
 
-impl Replay {
-    fn new(dataset: Box<dyn Dataset>, config: &SourceConfig, pace: Pace) -> Self {
-        let first = config.first.min(dataset.len());
-        let scans = config
-            .scans
-            .unwrap_or(usize::MAX)
-            .min(dataset.len() - first);
-        let half_period_ns = median_period_ns(dataset.as_ref()) / 2;
-        Self {
-            dataset,
-            first,
-            scans,
-            half_period_ns,
-            pace,
-        }
-    }
-}
-
 impl Source for Replay {
-    fn len(&self) -> usize {
-        self.scans
+    const HOP: StageId = StageId::RadarReplay;
+
+    fn scans(&self) -> Range<usize> {
+        self.scans.clone()
     }
 
     /// The stamp of a scan is the middle of its sweep; the scan is complete half a period later.
     fn complete_ns(&self, index: usize) -> Option<i64> {
-        Some(self.dataset.nominal_stamp_ns(self.first + index)? + self.half_period_ns)
+        Some(self.dataset.nominal_stamp_ns(index)? + self.half_period_ns)
     }
 
     fn drops_missed_scans(&self) -> bool {
@@ -98,17 +95,12 @@ impl Source for Replay {
         index: usize,
         header: &mut ScanHeader,
         bytes: &mut [u8],
-    ) -> Result<(), String> {
-        let read = self.dataset.read(self.first + index, header.slot(bytes));
-        header.set_geometry(&read.map_err(|error| error.to_string())?);
+    ) -> Result<(), Unreadable> {
+        let read = self.dataset.read(index, header.slot(bytes));
+        header.set_geometry(&read.map_err(|error| match error.is_io() {
+            true => Unreadable::Io(error.to_string()),
+            false => Unreadable::Damaged(error.to_string()),
+        })?);
         Ok(())
     }
-}
-
-fn median_period_ns(dataset: &dyn Dataset) -> i64 {
-    let stamps: Vec<i64> = (0..dataset.len())
-        .map_while(|index| dataset.nominal_stamp_ns(index))
-        .collect();
-    let periods = stamps.windows(2).map(|pair| (pair[1] - pair[0]) as f64);
-    gyre_radar::median(periods).map_or(0, |period_ns| period_ns as i64)
 }

@@ -118,8 +118,8 @@ impl Item {
         self.flags & flags == flags
     }
 
-    /// Returns the time stamps of a stage.
-    pub fn hop(&mut self, stage: StageId) -> &mut Hop {
+    /// Returns the time stamps of a stage, to fill in.
+    pub fn hop_mut(&mut self, stage: StageId) -> &mut Hop {
         &mut self.hops[stage as usize]
     }
 }

@@ -64,6 +64,9 @@ pub trait Dataset: Send {
     /// Time of a scan (the middle of the sweep on the sensor's clock), ns since 1970, as far as it is known without decoding.
     fn nominal_stamp_ns(&self, index: usize) -> Option<i64>;
 
+    /// Median time between two scans, ns.
+    fn period_ns(&self) -> i64;
+
     /// Time logged for a scan (in the file name or the list of stamps), ns since 1970.
     fn logged_stamp_ns(&self, index: usize) -> Option<i64>;
 

@@ -8,6 +8,9 @@ use crate::{
 
 /// The owner of the trajectory.
 pub trait Sink {
+    /// The stage that it is, or replaces.
+    const HOP: StageId;
+
     /// Returns the last poses of the journal, at most `count`, oldest first, and whether the stream had ended.
     ///
     /// # Errors
@@ -29,13 +32,13 @@ pub trait Sink {
 ///
 /// # Errors
 /// A failure of the transport, a sequence gap, or an error of the sink.
-pub fn run<M: Message<Header = MotionHeader>>(
+pub fn run<M: Message<Header = MotionHeader>, S: Sink>(
     launch: &Launch,
-    sink: &mut impl Sink,
+    sink: &mut S,
 ) -> Result<StageCounters, StageError> {
     let poses = Writer::<Pose>::open(&launch.node, &launch.manifest)?;
     let (restored, ended) = sink.restore(Pose::sizes(&launch.manifest.window).history)?;
-    republish(&poses, &restored)?;
+    republish::<S>(&poses, &restored)?;
     let next = restored
         .last()
         .map_or(0, |pose| pose.item.seq.saturating_add(1));
@@ -71,7 +74,7 @@ pub fn run<M: Message<Header = MotionHeader>>(
 }
 
 /// Publishes the last poses again. The source resumes at the newest one, and masking needs the motions of all of them.
-fn republish(poses: &Writer<Pose>, restored: &[PoseHeader]) -> Result<(), StageError> {
+fn republish<S: Sink>(poses: &Writer<Pose>, restored: &[PoseHeader]) -> Result<(), StageError> {
     let base = PoseHeader {
         item: Item {
             flags: flag::BASE | flag::SYNC,
@@ -80,12 +83,12 @@ fn republish(poses: &Writer<Pose>, restored: &[PoseHeader]) -> Result<(), StageE
         ..PoseHeader::default()
     };
     let Some((last, earlier)) = restored.split_last() else {
-        return publish(poses, base);
+        return publish::<S>(poses, base);
     };
     for pose in earlier {
-        publish(poses, *pose)?;
+        publish::<S>(poses, *pose)?;
     }
-    publish(poses, newest(*last))
+    publish::<S>(poses, newest(*last))
 }
 
 /// Marks a pose as the newest. Older ones that are published again are not marked: a source that resumed at one of them would
@@ -100,10 +103,10 @@ fn newest(pose: PoseHeader) -> PoseHeader {
     }
 }
 
-fn publish(poses: &Writer<Pose>, pose: PoseHeader) -> Result<(), StageError> {
+fn publish<S: Sink>(poses: &Writer<Pose>, pose: PoseHeader) -> Result<(), StageError> {
     let mut draft = poses.loan()?;
     *draft.header() = pose;
-    poses.send(draft, StageId::PoseIntegration)
+    poses.send(draft, S::HOP)
 }
 
 struct Integration<'a, S: Sink> {
@@ -131,7 +134,7 @@ impl<S: Sink> Integration<'_, S> {
                     self.ended = true;
                 }
                 false => {
-                    motion.item.hop(StageId::PoseIntegration).received_ns = received.received_ns;
+                    motion.item.hop_mut(S::HOP).received_ns = received.received_ns;
                     self.integrate(motion)?;
                 }
             }
@@ -143,13 +146,13 @@ impl<S: Sink> Integration<'_, S> {
 
     fn integrate(&mut self, mut motion: MotionHeader) -> Result<(), StageError> {
         let (started_ns, allocated) = (clock::now_ns(), allocations::so_far());
-        motion.item.hop(StageId::PoseIntegration).started_ns = started_ns;
+        motion.item.hop_mut(S::HOP).started_ns = started_ns;
         let pose = self.sink.integrate(&motion)?;
         self.counters.record(
             allocations::so_far() - allocated,
             clock::now_ns() - started_ns,
         );
-        publish(&self.poses, newest(pose))
+        publish::<S>(&self.poses, newest(pose))
     }
 
     fn publish_end(&mut self, item: Item) -> Result<(), StageError> {
@@ -158,6 +161,6 @@ impl<S: Sink> Integration<'_, S> {
             flags: flag::END,
             ..item
         };
-        self.poses.send(draft, StageId::PoseIntegration)
+        self.poses.send(draft, S::HOP)
     }
 }

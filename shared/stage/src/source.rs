@@ -1,9 +1,10 @@
 //! The loop of the first stage: publishes a scan when the window admits it and, at a given rate, when it is due.
 
+mod attempts;
 mod pace;
 mod position;
 
-use std::time::Duration;
+use std::{ops::Range, time::Duration};
 
 use gyre_messages::{Hop, Item, Pose, Scan, ScanHeader, StageId, flag};
 
@@ -13,18 +14,19 @@ use crate::{
     wake,
     writer::{Draft, Writer},
 };
+use attempts::{Attempts, PAUSE};
 use pace::Pace;
 use position::Position;
 
-/// A source of scans, numbered from 0.
-pub trait Source {
-    /// Number of scans.
-    fn len(&self) -> usize;
+pub use attempts::{Tolerance, Unreadable, open};
 
-    /// Returns whether there are no scans.
-    fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
+/// A source of scans.
+pub trait Source {
+    /// The stage that it is, or replaces.
+    const HOP: StageId;
+
+    /// The scans to play, by their index in the recording.
+    fn scans(&self) -> Range<usize>;
 
     /// Time at which scan `index` is complete on the sensor's clock, ns since 1970, if it is known without reading the scan.
     /// Without it a restarted source in live mode cannot tell which scans it has missed, and plays them late.
@@ -36,20 +38,24 @@ pub trait Source {
     /// Reads scan `index` into shared memory.
     ///
     /// # Errors
-    /// One sentence that says why the scan cannot be used. It is skipped.
+    /// The reason why the scan cannot be used.
     fn read(
         &mut self,
         index: usize,
         header: &mut ScanHeader,
         bytes: &mut [u8],
-    ) -> Result<(), String>;
+    ) -> Result<(), Unreadable>;
 }
 
 /// Runs the source until SIGTERM.
 ///
 /// # Errors
-/// A failure of the transport.
-pub fn run(launch: &Launch, source: &mut impl Source) -> Result<StageCounters, StageError> {
+/// Input that cannot be read within `tolerance`, or a failure of the transport.
+pub fn run(
+    launch: &Launch,
+    source: &mut impl Source,
+    tolerance: &Tolerance,
+) -> Result<StageCounters, StageError> {
     let credit = Credit {
         poses: Port::open(launch)?,
         newest: None,
@@ -60,6 +66,7 @@ pub fn run(launch: &Launch, source: &mut impl Source) -> Result<StageCounters, S
     let mut playback = Playback {
         launch,
         source,
+        tolerance,
         credit,
         scans,
         counters: StageCounters::default(),
@@ -100,9 +107,24 @@ impl Credit {
 struct Playback<'a, S: Source> {
     launch: &'a Launch,
     source: &'a mut S,
+    tolerance: &'a Tolerance,
     credit: Credit,
     scans: Writer<Scan>,
     counters: StageCounters,
+}
+
+/// The next scan of the recording.
+enum Next {
+    Scan(Draft<Scan>),
+    End,
+    Stop,
+}
+
+/// The result of reading a scan.
+enum Read {
+    Done,
+    Damaged(String),
+    Stop,
 }
 
 impl<S: Source> Playback<'_, S> {
@@ -119,7 +141,8 @@ impl<S: Source> Playback<'_, S> {
                 // In live mode the numbers do not tell how far back the previous scan is; masking does without it.
                 let manifest = &self.launch.manifest;
                 let masks_pairs = manifest.window.masks_pairs() && !manifest.live;
-                return Ok(Some(Position::resume(&newest_pose, masks_pairs)));
+                let first = self.source.scans().start;
+                return Ok(Some(Position::resume(&newest_pose, first, masks_pairs)));
             }
         }
     }
@@ -127,7 +150,12 @@ impl<S: Source> Playback<'_, S> {
     fn play(&mut self, mut position: Position) -> Result<(), StageError> {
         let (live, rate) = (self.launch.manifest.live, self.launch.manifest.rate);
         let mut pace = None;
-        while let Some(mut draft) = self.next_readable(&mut position)? {
+        loop {
+            let mut draft = match self.next_readable(&mut position)? {
+                Next::Scan(draft) => draft,
+                Next::End => break,
+                Next::Stop => return Ok(()),
+            };
             let complete_ns = complete_ns(draft.header());
             if pace.is_none() {
                 pace = rate.map(|rate| Pace::new(rate, complete_ns));
@@ -159,13 +187,30 @@ impl<S: Source> Playback<'_, S> {
         Ok(())
     }
 
-    /// Reads the next scan into shared memory before it is due. `None` at the end of the recording.
-    fn next_readable(
-        &mut self,
-        position: &mut Position,
-    ) -> Result<Option<Draft<Scan>>, StageError> {
+    /// Reads the next scan into shared memory before it is due.
+    fn next_readable(&mut self, position: &mut Position) -> Result<Next, StageError> {
         let mut draft = self.scans.loan()?;
-        while position.index < self.source.len() {
+        let mut skipped = 0;
+        while position.index < self.source.scans().end {
+            match self.read(position, &mut draft)? {
+                Read::Done => return Ok(Next::Scan(draft)),
+                Read::Stop => return Ok(Next::Stop),
+                Read::Damaged(reason) => {
+                    self.counters.unreadable += 1;
+                    tracing::warn!(scan = position.index, "skipped: {reason}");
+                    position.index += 1;
+                    skipped += 1;
+                    self.require_tolerable(skipped, &reason)?;
+                }
+            }
+        }
+        Ok(Next::End)
+    }
+
+    /// Reads a scan, and tries again while the input fails.
+    fn read(&mut self, position: &Position, draft: &mut Draft<Scan>) -> Result<Read, StageError> {
+        let mut attempts = Attempts::new(self.tolerance);
+        loop {
             let (started_ns, allocated) = (clock::now_ns(), allocations::so_far());
             let (header, bytes) = draft.parts();
             match self.source.read(position.index, header, bytes) {
@@ -177,22 +222,31 @@ impl<S: Source> Playback<'_, S> {
                         stamp_ns: header.item.stamp_ns,
                         ..position.item()
                     };
-                    *header.item.hop(StageId::RadarReplay) = Hop {
+                    *header.item.hop_mut(S::HOP) = Hop {
                         received_ns: started_ns,
                         started_ns,
                         finished_ns,
                         published_ns: 0,
                     };
-                    return Ok(Some(draft));
+                    return Ok(Read::Done);
                 }
-                Err(reason) => {
-                    self.counters.unreadable += 1;
-                    tracing::warn!(scan = position.index, "skipped: {reason}");
-                    position.index += 1;
-                }
+                Err(Unreadable::Damaged(reason)) => return Ok(Read::Damaged(reason)),
+                Err(Unreadable::Io(reason)) => attempts.failed(reason)?,
+            }
+            if self.sleep(PAUSE)? {
+                return Ok(Read::Stop);
             }
         }
-        Ok(None)
+    }
+
+    fn require_tolerable(&self, skipped: usize, reason: &str) -> Result<(), StageError> {
+        match skipped <= self.tolerance.max_unreadable {
+            true => Ok(()),
+            false => Err(StageError::Input(format!(
+                "{skipped} scans in a row cannot be read, the last because {reason}; source.max_unreadable is {}",
+                self.tolerance.max_unreadable
+            ))),
+        }
     }
 
     /// Publishes a scan once it is admitted and due; false on a request to stop.
@@ -205,7 +259,7 @@ impl<S: Source> Playback<'_, S> {
         let admitted = self.wait_for_admission(position.published, due_ns)?;
         if admitted {
             draft.header().item.due_ns = due_ns.unwrap_or_else(clock::now_ns);
-            self.scans.send(draft, StageId::RadarReplay)?;
+            self.scans.send(draft, S::HOP)?;
         }
         Ok(admitted)
     }
@@ -235,7 +289,9 @@ impl<S: Source> Playback<'_, S> {
     fn drop_missed(&mut self, position: &mut Position, pace: Pace) {
         let now_ns = clock::now_ns();
         let next_is_due = |index| Some(pace.due_ns(self.source.complete_ns(index + 1)?) < now_ns);
-        while position.index + 1 < self.source.len() && next_is_due(position.index) == Some(true) {
+        while position.index + 1 < self.source.scans().end
+            && next_is_due(position.index) == Some(true)
+        {
             position.drop_scan();
         }
     }
@@ -267,7 +323,7 @@ impl<S: Source> Playback<'_, S> {
             flags: flag::END,
             ..position.item()
         };
-        self.scans.send(draft, StageId::RadarReplay)
+        self.scans.send(draft, S::HOP)
     }
 
     /// Sleeps, and answers the handshakes of new readers; true on a request to stop.

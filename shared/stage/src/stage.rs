@@ -100,7 +100,7 @@ impl<S: Stage> Flow<'_, S> {
         let (started_ns, allocated) = (clock::now_ns(), allocations::so_far());
         self.stage.process(view, &mut draft)?;
         let (finished_ns, allocated) = (clock::now_ns(), allocations::so_far() - allocated);
-        *item.hop(S::HOP) = gyre_messages::Hop {
+        *item.hop_mut(S::HOP) = gyre_messages::Hop {
             received_ns,
             started_ns,
             finished_ns,

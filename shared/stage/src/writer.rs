@@ -70,7 +70,7 @@ impl<M: Message> Writer<M> {
     pub fn send(&self, mut draft: Draft<M>, hop: StageId) -> Result<(), StageError> {
         let item = draft.header().item_mut();
         item.pid = std::process::id();
-        item.hop(hop).published_ns = clock::now_ns();
+        item.hop_mut(hop).published_ns = clock::now_ns();
         draft
             .sample
             .send()

@@ -57,6 +57,7 @@ pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedS
             logged_ns: end_ns,
         }
     };
+    scans.period_ns = median_ns;
     scans.turns = ends_ns.iter().enumerate().map(turn).collect();
     Ok(scans)
 }

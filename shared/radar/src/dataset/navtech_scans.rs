@@ -259,6 +259,10 @@ impl Dataset for NavtechScans {
         })
     }
 
+    fn period_ns(&self) -> i64 {
+        self.period_ns
+    }
+
     fn logged_stamp_ns(&self, index: usize) -> Option<i64> {
         self.images.name_stamp_ns(index)
     }

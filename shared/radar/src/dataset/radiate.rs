@@ -36,6 +36,7 @@ pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedS
     let (stamps, unpadded) = parse_stamps(&list, &text)?;
     let mut scans = TransposedScans::open(found, options, STAMPS, |bins| RANGE_M / bins as f32)?;
     scans.turns = turns(&scans.images, &stamps, &list)?;
+    scans.period_ns = scans.turns.first().map_or(0, |turn| turn.period_ns);
     if unpadded > 0 {
         scans.notes.push(format!(
             "{unpadded} of {} stamps in {} have nanoseconds without leading zeros (.5 means 5 ns), and are read as integers; \

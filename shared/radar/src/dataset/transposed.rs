@@ -32,6 +32,8 @@ pub(crate) struct TransposedScans {
     pub(crate) images: Images,
     /// One per image.
     pub(crate) turns: Vec<Turn>,
+    /// Median of their periods, ns. The caller sets it with the turns.
+    pub(crate) period_ns: i64,
     pub(crate) notes: Vec<String>,
     format: Format,
     stamp_meaning: &'static str,
@@ -60,6 +62,7 @@ impl TransposedScans {
         let mut scans = Self {
             images,
             turns: Vec::new(),
+            period_ns: 0,
             notes,
             format,
             stamp_meaning,
@@ -140,6 +143,10 @@ impl Dataset for TransposedScans {
 
     fn nominal_stamp_ns(&self, index: usize) -> Option<i64> {
         self.turns.get(index).map(|turn| self.stamp_ns(turn))
+    }
+
+    fn period_ns(&self) -> i64 {
+        self.period_ns
     }
 
     fn logged_stamp_ns(&self, index: usize) -> Option<i64> {

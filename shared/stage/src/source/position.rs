@@ -3,7 +3,7 @@
 use gyre_messages::{Item, flag};
 
 /// The next scan to read, and its numbers.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Position {
     /// Index of the scan in the recording.
     pub index: usize,
@@ -14,13 +14,22 @@ pub(super) struct Position {
 }
 
 impl Position {
+    /// Starts a stream with scan `first`.
+    pub fn start(first: usize) -> Self {
+        Self {
+            index: first,
+            published: 0,
+            previous: None,
+        }
+    }
+
     /// Resumes at the scan of the newest pose, or at the previous one if the mask takes two scans: the other stages need it as
-    /// their previous scan.
-    pub fn resume(newest_pose: &Item, masks_pairs: bool) -> Self {
+    /// their previous scan. Without a pose it starts with scan `first`.
+    pub fn resume(newest_pose: &Item, first: usize, masks_pairs: bool) -> Self {
         let newest = newest_pose;
         let in_chain = !newest.is(flag::BREAK);
         if newest.is(flag::BASE) || (masks_pairs && newest.published == 0) {
-            return Self::default();
+            return Self::start(first);
         }
         if masks_pairs && in_chain {
             return Self {
@@ -81,7 +90,7 @@ mod tests {
     #[test]
     fn a_restart_begins_with_the_scan_of_the_newest_pose() {
         assert_eq!(
-            Position::resume(&newest_pose(), false),
+            Position::resume(&newest_pose(), 5, false),
             Position {
                 index: 40,
                 published: 31,
@@ -89,7 +98,7 @@ mod tests {
             }
         );
         assert_eq!(
-            Position::resume(&newest_pose(), true),
+            Position::resume(&newest_pose(), 5, true),
             Position {
                 index: 37,
                 published: 30,
@@ -100,19 +109,19 @@ mod tests {
             flags: flag::BASE,
             ..newest_pose()
         };
-        assert_eq!(Position::resume(&base, false), Position::default());
+        assert_eq!(Position::resume(&base, 5, false), Position::start(5));
     }
 
     #[test]
     fn a_restart_in_live_mode_continues_the_sources_own_count() {
-        let position = Position::resume(&newest_pose(), false);
+        let position = Position::resume(&newest_pose(), 5, false);
         assert_eq!((position.index, position.item().published), (40, 31));
     }
 
     #[test]
     fn only_the_very_first_scan_starts_a_chain() {
-        assert!(Position::default().item().is(flag::BREAK));
-        let resumed = Position::resume(&newest_pose(), true);
+        assert!(Position::start(5).item().is(flag::BREAK));
+        let resumed = Position::resume(&newest_pose(), 5, true);
         assert!(!resumed.item().is(flag::BREAK));
     }
 }

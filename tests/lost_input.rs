@@ -1,0 +1,215 @@
+//! Input that cannot be reached for a while, and recordings with many damaged scans: nothing is lost silently.
+
+use std::{fs, path::Path, thread, time::Duration};
+
+use crate::common::{Run, recording, send, undisturbed};
+use rustix::process::Signal;
+use tempfile::TempDir;
+
+/// The recording's six seconds in one.
+const MODERATE: &str = "6";
+const MIDDLE: usize = recording::SCANS / 3;
+
+fn whole() -> TempDir {
+    recording::copy(recording::SCANS)
+}
+
+fn run_of(recording: &TempDir) -> Run {
+    Run::of_recording_named(recording.path().to_str().unwrap())
+}
+
+/// Moves the folder of images away.
+fn take_away(recording: &Path) {
+    fs::rename(recording.join("radar"), recording.join("away")).unwrap();
+}
+
+fn bring_back(recording: &Path) {
+    fs::rename(recording.join("away"), recording.join("radar")).unwrap();
+}
+
+/// Asserts that every scan was played and is in the result.
+fn assert_whole(run: &Run) {
+    assert_eq!(run.odometry(), undisturbed());
+    let summary = run.summary();
+    assert_eq!(summary["published"], recording::SCANS);
+    assert_eq!(summary["unreadable"], 0);
+}
+
+#[test]
+fn a_folder_that_is_away_for_a_moment_loses_nothing() {
+    let recording = whole();
+    let run = run_of(&recording).rate(MODERATE);
+    let mut running = run.start();
+    running.await_poses(MIDDLE);
+    take_away(recording.path());
+    thread::sleep(Duration::from_millis(600));
+    bring_back(recording.path());
+    running.finish().succeeded();
+    assert_whole(&run);
+}
+
+#[test]
+fn a_file_that_is_missing_for_a_moment_loses_nothing() {
+    let recording = whole();
+    let image = &recording::images(recording.path())[MIDDLE + 2];
+    let run = run_of(&recording).rate(MODERATE);
+    let mut running = run.start();
+    running.await_poses(2);
+    let aside = recording.path().join("aside");
+    fs::rename(image, &aside).unwrap();
+    thread::sleep(Duration::from_millis(1200));
+    fs::rename(&aside, image).unwrap();
+    running.finish().succeeded();
+    assert_whole(&run);
+}
+
+#[test]
+fn a_source_killed_while_the_folder_is_away_waits_for_it() {
+    let recording = whole();
+    let run = run_of(&recording).rate(MODERATE);
+    let mut running = run.start();
+    running.await_poses(MIDDLE);
+    take_away(recording.path());
+    running.kill("radar-replay");
+    thread::sleep(Duration::from_millis(600));
+    bring_back(recording.path());
+    running.finish().succeeded();
+    assert_whole(&run);
+}
+
+#[test]
+fn a_folder_that_stays_away_ends_the_run_and_the_same_command_goes_on() {
+    let recording = whole();
+    let run = run_of(&recording).rate(MODERATE).set("source.retry_s=0.3");
+    let mut running = run.start();
+    running.await_poses(MIDDLE);
+    take_away(recording.path());
+    running.finish().failed_with(&[
+        "radar-replay: cannot read",
+        ".png: No such file or directory",
+        "tried again for 0.3 s (source.retry_s)",
+        "poses are kept",
+        "the same command resumes",
+    ]);
+    bring_back(recording.path());
+    run.complete();
+    assert_whole(&run);
+    assert!(run.summary()["resumed_after"].as_u64() >= Some(MIDDLE as u64));
+}
+
+#[test]
+fn a_run_that_waits_for_its_input_can_be_interrupted() {
+    let recording = whole();
+    let run = run_of(&recording)
+        .rate(MODERATE)
+        .set("source.retry_s=1e300");
+    let mut running = run.start();
+    running.await_poses(MIDDLE);
+    take_away(recording.path());
+    thread::sleep(Duration::from_millis(300));
+    running.signal(Signal::INT);
+    let ended = running.finish();
+    assert_eq!(ended.code(), Some(130), "{}", ended.stderr);
+    bring_back(recording.path());
+    run.complete();
+    assert_whole(&run);
+}
+
+#[test]
+fn stages_that_restart_while_the_source_waits_for_its_input_are_answered() {
+    let recording = whole();
+    let run = run_of(&recording).rate(MODERATE);
+    let mut running = run.start();
+    let stages = running.await_stages();
+    running.await_poses(MIDDLE);
+    take_away(recording.path());
+    thread::sleep(Duration::from_millis(300));
+    for stage in ["masking", "rotation-search", "pose-integration"] {
+        send(stages[stage], Signal::KILL);
+    }
+    thread::sleep(Duration::from_millis(300));
+    bring_back(recording.path());
+    running.finish().succeeded();
+    assert_whole(&run);
+}
+
+#[test]
+fn a_live_run_whose_folder_is_away_for_a_moment_accounts_for_every_scan() {
+    let recording = whole();
+    let run = run_of(&recording).rate("4").set("run.mode=live");
+    let mut running = run.start();
+    running.await_poses(MIDDLE);
+    take_away(recording.path());
+    thread::sleep(Duration::from_millis(600));
+    bring_back(recording.path());
+    running.finish().succeeded();
+    let summary = run.summary();
+    let count = |key: &str| summary[key].as_u64().unwrap();
+    assert_eq!(count("unreadable"), 0);
+    assert_eq!(count("published"), recording::SCANS as u64);
+    assert_eq!(count("processed") + count("dropped"), count("published"));
+    assert!(
+        count("dropped") > 0,
+        "a sensor does not wait for the disk: {summary}"
+    );
+}
+
+// Damaged scans.
+
+fn damage(recording: &Path, scans: impl IntoIterator<Item = usize>) {
+    let images = recording::images(recording);
+    for scan in scans {
+        recording::truncate(&images[scan], 100_000);
+    }
+}
+
+#[test]
+fn many_damaged_scans_in_a_row_end_the_run_and_a_higher_limit_continues_it() {
+    let recording = whole();
+    damage(recording.path(), 8..11);
+    let run = run_of(&recording);
+    run.clone()
+        .set("source.max_unreadable=2")
+        .finish()
+        .failed_with(&[
+            "3 scans in a row cannot be read",
+            "is truncated",
+            "source.max_unreadable is 2",
+            "the same command resumes",
+        ]);
+    run.complete();
+    let summary = run.summary();
+    assert_eq!(summary["unreadable"], 3);
+    assert!(summary["resumed_after"].as_u64() > Some(0), "{summary}");
+}
+
+#[test]
+fn a_recording_with_many_damaged_scans_gives_results_but_no_success() {
+    let recording = whole();
+    damage(recording.path(), (1..recording::SCANS).step_by(3));
+    let run = run_of(&recording);
+    let ended = run.finish();
+    ended.failed_with(&["8 of the 24 scans", "cannot be read", "log.jsonl"]);
+    assert!(
+        ended.stdout.contains("complete but for unreadable scans"),
+        "{}",
+        ended.stdout
+    );
+    assert_eq!(run.summary()["processed"], 16);
+}
+
+#[test]
+fn scans_are_numbered_as_in_the_recording() {
+    let recording = whole();
+    damage(recording.path(), [9]);
+    let run = run_of(&recording).set("source.first=7");
+    run.complete();
+    let rows = crate::common::odometry::rows(&run.odometry());
+    assert_eq!((rows[0].scan, rows[0].previous_scan), (8, 7));
+    assert_eq!((rows[1].scan, rows[1].previous_scan), (10, 8));
+    let summary = run.summary();
+    assert_eq!(
+        (&summary["published"], &summary["unreadable"]),
+        (&16.into(), &1.into())
+    );
+}
