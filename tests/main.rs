@@ -18,6 +18,7 @@ mod real_scans;
 mod refinement;
 mod resources;
 mod restart;
+mod shared_memory;
 mod simulation;
 
 /// The program under test.

@@ -6,16 +6,13 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use gyre_stage::run::{SHARED_MEMORY, root_of};
+
 use super::processes;
 
-/// The run's place in shared memory, which is named after its results (`gyre_stage::run::RunRoot`).
+/// The run's place in shared memory, which is named after its results.
 pub fn root(out: &Path) -> PathBuf {
-    let out = out.canonicalize().unwrap_or_else(|_| out.to_owned());
-    let bytes = out.as_os_str().as_encoded_bytes().iter();
-    let hash = bytes.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
-        (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3)
-    });
-    PathBuf::from(format!("/dev/shm/gyre/gyre{:010x}", hash & 0xff_ffff_ffff))
+    root_of(&out.canonicalize().unwrap_or_else(|_| out.to_owned()))
 }
 
 /// Asserts that no process, shared-memory file or temporary file of the run that wrote to `out` is there.
@@ -33,6 +30,8 @@ pub fn assert_nothing_left(out: &Path) {
         root.display(),
         files_in(&root)
     );
+    let lock = root.with_extension("lock");
+    assert!(!lock.exists(), "{} is still there", lock.display());
     assert_eq!(shared_memory_of(&root), Vec::<String>::new());
     let transport = std::env::temp_dir().join("iceoryx2");
     assert!(
@@ -46,31 +45,33 @@ pub fn assert_nothing_left(out: &Path) {
 
 /// The shared memory of the run that writes to `out`, without bookkeeping.
 pub fn bytes(out: &Path) -> u64 {
-    let files = shared_memory_of(&root(out)).into_iter();
+    let files = shared_memory(out).into_iter();
     files
-        .filter_map(|name| {
-            Some(
-                fs::metadata(Path::new("/dev/shm").join(name))
-                    .ok()?
-                    .blocks()
-                    * 512,
-            )
-        })
+        .filter_map(|file| Some(fs::metadata(file).ok()?.blocks() * 512))
         .sum()
+}
+
+/// The files in shared memory of the run that writes to `out`, without bookkeeping.
+pub fn shared_memory(out: &Path) -> Vec<PathBuf> {
+    let names = shared_memory_of(&root(out)).into_iter();
+    names
+        .map(|name| Path::new(SHARED_MEMORY).join(name))
+        .collect()
 }
 
 /// Removes what a killed run left.
 pub fn remove(out: &Path) {
-    let root = root(out);
-    for name in shared_memory_of(&root) {
-        let _ = fs::remove_file(Path::new("/dev/shm").join(name));
+    for file in shared_memory(out) {
+        let _ = fs::remove_file(file);
     }
+    let root = root(out);
     let _ = fs::remove_dir_all(&root);
+    let _ = fs::remove_file(root.with_extension("lock"));
 }
 
 fn shared_memory_of(root: &Path) -> Vec<String> {
     let prefix = format!("{}_", root.file_name().unwrap().to_string_lossy());
-    files_in(Path::new("/dev/shm"))
+    files_in(Path::new(SHARED_MEMORY))
         .into_iter()
         .filter(|name| name.starts_with(&prefix))
         .collect()

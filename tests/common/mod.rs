@@ -5,7 +5,7 @@
 #![allow(dead_code, unused_imports, clippy::unwrap_used)]
 
 mod ended;
-mod leftovers;
+pub mod leftovers;
 pub mod odometry;
 mod processes;
 pub mod recording;

@@ -36,7 +36,10 @@ pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     match command {
         Command::Stage { name } => Ok(stage::run(&name)),
-        Command::Run(arguments) => run::run(&arguments),
+        Command::Run(arguments) => {
+            gyre_stage::run::keep_files_private();
+            run::run(&arguments)
+        }
         Command::Inspect(arguments) => inspect::inspect(&arguments),
         Command::Evaluate(arguments) => evaluate::evaluate(&arguments),
         Command::Masks(arguments) => masks::masks(&arguments),

@@ -7,11 +7,10 @@ use gyre_messages::{Footprint, Limits, Window};
 use gyre_odometry::OdometryConfig;
 use gyre_radar::Dataset;
 use gyre_simulator::SimulatedDrive;
+use gyre_stage::run::SHARED_MEMORY;
 use thiserror::Error;
 
 use crate::{configuration::Configuration, print};
-
-const SHARED_MEMORY: &str = "/dev/shm";
 
 /// Why a run cannot start.
 #[derive(Debug, Error)]
@@ -45,7 +44,7 @@ pub enum PreflightError {
     NoSharedMemory(rustix::io::Errno),
 }
 
-/// Limits of a run that the dataset and the machine allow.
+/// The limits of a run that follow from its dataset and configuration.
 pub struct Preflight {
     /// Scans to play.
     pub scans: usize,
@@ -59,10 +58,10 @@ pub struct Preflight {
     pub truth: Option<Vec<u8>>,
 }
 
-/// Checks the dataset and the machine.
+/// Checks the dataset and the mask.
 ///
 /// # Errors
-/// A dataset or a mask that cannot be used, too little shared memory.
+/// A dataset or a mask that cannot be used.
 pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure> {
     let Played { dataset, truth } = open(configuration)?;
     let scans = configuration.source.played(dataset.len()).len();
@@ -87,7 +86,6 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
         points: configuration.odometry.points.capacity,
     };
     let footprint = Footprint::new(&window, &limits);
-    check_shared_memory(&footprint)?;
     Ok(Preflight {
         scans,
         window,
@@ -149,8 +147,12 @@ pub fn open(configuration: &Configuration) -> Result<Played, crate::Failure> {
     }
 }
 
-/// Writing to a full tmpfs kills a process with SIGBUS, so its free space is checked first.
-fn check_shared_memory(footprint: &Footprint) -> Result<(), PreflightError> {
+/// Checks that the run fits into shared memory. Runs that were killed may take some of it: acquire the run's root first, which
+/// removes them.
+///
+/// # Errors
+/// Too little shared memory.
+pub fn check_shared_memory(footprint: &Footprint) -> Result<(), PreflightError> {
     let there =
         rustix::fs::statvfs(Path::new(SHARED_MEMORY)).map_err(PreflightError::NoSharedMemory)?;
     let free = there.f_bavail as f64 * there.f_frsize as f64;

@@ -13,7 +13,7 @@ use gyre_pose_integration::journal;
 use gyre_refinement::checkpoint;
 use gyre_stage::{
     Manifest,
-    run::RunRoot,
+    run::{RootError, RunRoot},
     supervise::{Ending, Plan, SuperviseError, supervise},
     wake::Signals,
 };
@@ -40,7 +40,11 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     let configuration = resolve(arguments, &out)?;
     let checked = preflight::check(&configuration)?;
     let signals = Signals::install()?;
-    let root = RunRoot::acquire(&out)?;
+    let root = match RunRoot::acquire(&out, &signals) {
+        Err(RootError::Interrupted) => return Ok(ExitCode::from(INTERRUPTED)),
+        root => root?,
+    };
+    preflight::check_shared_memory(&checked.footprint)?;
     let resumed = prepare(&configuration, &out, arguments.fresh)?;
     if let Some(truth) = &checked.truth {
         write(&out.join(results::SIMULATED_TRUTH), truth)?;

@@ -93,7 +93,7 @@ impl Launch {
         let path = self.manifest.root.join(counters::file_name(&self.name));
         let text = serde_json::to_string(counters)
             .map_err(|e| StageError::Configuration(e.to_string()))?;
-        fs::write(&path, text).map_err(|source| StageError::File { path, source })
+        run::write(path, &text)
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Reading order:
 //!
-//! 1. [`run`]: the manifest that a process reads, and the files of a run.
+//! 1. [`run`]: the manifest that a process reads, and the files of a run; [`lock`]: locks of files.
 //! 2. [`launch`]: how a process starts and ends: configuration, log, signals, exit codes.
 //! 3. [`writer`], [`reader`]: publisher and subscriber of a topic, with the handshake that gives a new reader the history.
 //! 4. [`wake`]: how a process sleeps until there is work.
@@ -24,6 +24,7 @@ mod counters;
 mod error;
 pub mod inputs;
 pub mod launch;
+pub mod lock;
 pub mod reader;
 pub mod run;
 mod services;

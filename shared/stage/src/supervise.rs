@@ -19,6 +19,7 @@ use iceoryx2::prelude::{Config, FilePath, SemanticString};
 use crate::{
     StageCounters, StageError, clock, counters,
     reader::Port,
+    run,
     services::{self, Node, Services},
     wake::{self, Signals},
 };
@@ -89,6 +90,8 @@ impl<'a> Supervisor<'a> {
         let transport = manifest.transport()?;
         use_as_global(&manifest.root.join("iox.toml"))?;
         let node = services::node(&transport, "supervisor")?;
+        run::close_to_others(&manifest.prefix)
+            .map_err(|e| StageError::transport("close shared memory to other users", e))?;
         let services = Services::create(&node, &manifest.window)?;
         let poses = Port::on(&node)?;
         Ok(Self {

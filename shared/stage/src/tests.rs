@@ -14,6 +14,7 @@ use crate::{
     reader::Reader,
     run::RunRoot,
     services::{self, Node, Services},
+    wake::Signals,
     writer::Writer,
 };
 
@@ -37,7 +38,7 @@ struct Run {
 impl Run {
     fn new() -> Self {
         let out = tempfile::tempdir().unwrap();
-        let root = RunRoot::acquire(out.path()).unwrap();
+        let root = RunRoot::acquire(out.path(), &Signals::install().unwrap()).unwrap();
         let manifest = Manifest {
             prefix: root.prefix(),
             root: root.path().to_owned(),

@@ -15,7 +15,11 @@ use iceoryx2::{
 };
 
 use super::SuperviseError;
-use crate::{Manifest, services};
+use crate::{
+    Manifest,
+    run::{self, SHARED_MEMORY},
+    services,
+};
 
 /// Time limit of a cleanup, which normally takes milliseconds.
 const LIMIT: Duration = Duration::from_secs(3);
@@ -47,7 +51,7 @@ pub(super) fn remove_dead(
 fn clean(manifest: &Manifest, transport: &Config, all_dead: bool) -> bool {
     let dead = dead_nodes(transport);
     let ports = ports_of(manifest, &dead);
-    unlink_empty_files(Path::new("/dev/shm"), &manifest.prefix, |name| {
+    unlink_empty_files(Path::new(SHARED_MEMORY), &manifest.prefix, |name| {
         all_dead || ports.iter().any(|port| name.contains(port.as_str()))
     });
     if remove_dead_nodes(transport) {
@@ -104,11 +108,10 @@ fn ports_of(manifest: &Manifest, dead: &[String]) -> HashSet<String> {
 
 /// Removes empty files of the run whose names pass `is_dead`.
 fn unlink_empty_files(directory: &Path, prefix: &str, is_dead: impl Fn(&str) -> bool) {
-    for file in fs::read_dir(directory).into_iter().flatten().flatten() {
-        let name = file.file_name().to_string_lossy().into_owned();
-        let empty = file.metadata().is_ok_and(|file| file.len() == 0);
-        if empty && name.starts_with(prefix) && is_dead(&name) {
-            let _ = fs::remove_file(file.path());
+    for (path, file) in run::own_files(directory, prefix) {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        if file.len() == 0 && is_dead(&name) {
+            let _ = fs::remove_file(&path);
         }
     }
 }

@@ -1,0 +1,113 @@
+//! Locks of files: never waited for without a limit, and with the name of who holds them.
+
+use std::{
+    fs::{self, File, OpenOptions},
+    io,
+    os::{
+        fd::AsFd,
+        unix::fs::{MetadataExt, OpenOptionsExt},
+    },
+    path::Path,
+};
+
+use rustix::{
+    fs::{FlockOperation, OFlags, flock, fstat, major, minor},
+    io::Errno,
+};
+
+/// An attempt to lock a file.
+#[derive(Debug)]
+pub enum Attempt {
+    /// It is locked as long as this file is open.
+    Locked(File),
+    /// Another process holds the lock: `process 123 (gyre)`, where the system tells.
+    Held(Option<String>),
+}
+
+/// Creates and locks a file, without waiting. The file is the owner's alone.
+///
+/// # Errors
+/// The file cannot be opened or locked.
+pub fn try_lock(path: &Path) -> io::Result<Attempt> {
+    let file = OpenOptions::new()
+        .create(true)
+        .truncate(false)
+        .write(true)
+        .mode(0o600)
+        .custom_flags(OFlags::NOFOLLOW.bits() as i32)
+        .open(path)?;
+    match flock(&file, FlockOperation::NonBlockingLockExclusive) {
+        Ok(()) if is_at(&file, path)? => Ok(Attempt::Locked(file)),
+        // Its last owner has removed it meanwhile.
+        Ok(()) => Ok(Attempt::Held(None)),
+        Err(Errno::WOULDBLOCK) => Ok(Attempt::Held(holder(&file))),
+        Err(error) => Err(error.into()),
+    }
+}
+
+fn is_at(file: &File, path: &Path) -> io::Result<bool> {
+    let opened = file.metadata()?;
+    match fs::symlink_metadata(path) {
+        Ok(there) => Ok((there.dev(), there.ino()) == (opened.dev(), opened.ino())),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
+        Err(error) => Err(error),
+    }
+}
+
+/// Returns the process that holds the lock of a file, as the kernel lists it.
+fn holder(file: impl AsFd) -> Option<String> {
+    let status = fstat(file).ok()?;
+    let (major, minor) = (major(status.st_dev), minor(status.st_dev));
+    let id = format!("{major:02x}:{minor:02x}:{}", status.st_ino);
+    let locks = fs::read_to_string("/proc/locks").ok()?;
+    let pid = locks.lines().find_map(|line| {
+        let fields: Vec<&str> = line.split_whitespace().collect();
+        match fields[..] {
+            [_, "FLOCK", _, _, pid, file, ..] if file == id => Some(pid),
+            _ => None,
+        }
+    })?;
+    let name = fs::read_to_string(format!("/proc/{pid}/comm")).ok()?;
+    Some(format!("process {pid} ({})", name.trim_end()))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::os::unix::fs::PermissionsExt;
+
+    use super::*;
+
+    #[test]
+    fn a_held_lock_is_reported_with_its_process() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lock");
+        let Attempt::Locked(held) = try_lock(&path).unwrap() else {
+            panic!("it is held by nobody");
+        };
+        let Attempt::Held(Some(holder)) = try_lock(&path).unwrap() else {
+            panic!("it is held, and the kernel lists it");
+        };
+        let ours = format!("process {} (", std::process::id());
+        assert!(holder.starts_with(&ours), "{holder}");
+        drop(held);
+        assert!(matches!(try_lock(&path).unwrap(), Attempt::Locked(_)));
+    }
+
+    #[test]
+    fn a_lock_is_the_owners_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lock");
+        try_lock(&path).unwrap();
+        let mode = fs::metadata(&path).unwrap().permissions().mode();
+        assert_eq!(mode & 0o077, 0, "{mode:o}");
+    }
+
+    #[test]
+    fn a_lock_is_not_taken_through_a_link() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lock");
+        std::os::unix::fs::symlink(folder.path().join("elsewhere"), &path).unwrap();
+        assert!(try_lock(&path).is_err());
+    }
+}

@@ -1,0 +1,294 @@
+//! The place of a run in shared memory: its root, its lock, and the removal of both.
+//!
+//! All runs of a user lie in `/dev/shm/gyre-<uid>`, which is the user's alone. Beside the root of each run lies its lock, and as
+//! long as the run lives its supervisor holds it. So a lock that is free belongs to a dead run, and whoever holds it may remove
+//! that run. No lock is shared between runs, and none is waited for.
+
+use std::{
+    collections::BTreeSet,
+    fs::{self, DirBuilder, File, Metadata, Permissions},
+    io,
+    os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt},
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+use rustix::{
+    fs::{Mode, OFlags},
+    io::Errno,
+    process::{Uid, geteuid},
+};
+use thiserror::Error;
+
+use crate::{
+    StageError,
+    lock::{Attempt, try_lock},
+    wake::Signals,
+};
+
+/// The file system of all shared memory.
+pub const SHARED_MEMORY: &str = "/dev/shm";
+const OWNER_ONLY: u32 = 0o700;
+/// Hexadecimal digits in the name of a run.
+const DIGITS: usize = 10;
+/// Time for which a lock is tried. Another supervisor holds the lock of a dead run for some milliseconds, while it removes it.
+const LIMIT: Duration = Duration::from_secs(1);
+const PAUSE: Duration = Duration::from_millis(20);
+
+/// The root of a run in shared memory, locked by its supervisor. Dropping it removes all files of the run.
+#[derive(Debug)]
+pub struct RunRoot {
+    name: String,
+    path: PathBuf,
+    _lock: File,
+}
+
+/// An error in creating the root of a run.
+#[derive(Debug, Error)]
+pub enum RootError {
+    /// Another run writes to the same results.
+    #[error("another run is writing to {out}{holder}: wait for it, or choose another --out")]
+    Busy {
+        /// The results.
+        out: PathBuf,
+        /// The process of the other run, after a comma.
+        holder: String,
+    },
+    /// Shared memory cannot be used.
+    #[error(
+        "cannot use {path} for the run's shared memory: {source}; Gyre needs a writable tmpfs at /dev/shm"
+    )]
+    Unusable {
+        /// The path.
+        path: PathBuf,
+        /// The system error.
+        source: io::Error,
+    },
+    /// The user's directory is not the user's alone.
+    #[error("{path} {state}, so the shared memory of a run would not be safe in it: {remedy}")]
+    Unsafe {
+        /// The directory.
+        path: PathBuf,
+        /// What is wrong with it.
+        state: String,
+        /// What to do.
+        remedy: String,
+    },
+    /// A signal requested a stop.
+    #[error("interrupted before the start")]
+    Interrupted,
+    /// Signals cannot be waited for.
+    #[error(transparent)]
+    Signals(#[from] StageError),
+}
+
+impl RunRoot {
+    /// Creates and locks the root of the run that writes to `out`, after removing the files of the user's dead runs.
+    ///
+    /// # Errors
+    /// Another run writes to `out`, shared memory cannot be used, or a signal requested a stop.
+    pub fn acquire(out: &Path, signals: &Signals) -> Result<Self, RootError> {
+        let name = name(out, geteuid());
+        let deadline = Instant::now() + LIMIT;
+        loop {
+            let runs = user_directory()?;
+            remove_dead_runs(&runs);
+            let path = runs.join(&name);
+            let unusable = |source| RootError::Unusable {
+                path: path.clone(),
+                source,
+            };
+            let holder = match try_lock(&lock_of(&path)) {
+                Ok(Attempt::Locked(lock)) => {
+                    remove_files(&path);
+                    make_directory(&path).map_err(unusable)?;
+                    return Ok(Self {
+                        name,
+                        path,
+                        _lock: lock,
+                    });
+                }
+                Ok(Attempt::Held(holder)) => holder,
+                // The last run of the user has ended, and removed the user's directory.
+                Err(error) if error.kind() == io::ErrorKind::NotFound => None,
+                Err(error) => return Err(unusable(error)),
+            };
+            if Instant::now() > deadline {
+                return Err(RootError::Busy {
+                    out: out.to_owned(),
+                    holder: holder.map_or(String::new(), |holder| format!(", {holder}")),
+                });
+            }
+            if signals.sleep(PAUSE)? {
+                return Err(RootError::Interrupted);
+            }
+        }
+    }
+
+    /// Returns the prefix of all names of the run in shared memory.
+    pub fn prefix(&self) -> String {
+        format!("{}_", self.name)
+    }
+
+    /// Returns the path of the root.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl Drop for RunRoot {
+    fn drop(&mut self) {
+        remove(&self.path);
+    }
+}
+
+/// Returns the root of this user's run that writes to `out`, an absolute path, whether there is one or not.
+pub fn root_of(out: &Path) -> PathBuf {
+    path_of(geteuid()).join(name(out, geteuid()))
+}
+
+/// Returns the name of the run that writes to `out`. It differs between users, since names in `/dev/shm` are common to all.
+fn name(out: &Path, user: Uid) -> String {
+    let user = user.as_raw().to_le_bytes();
+    let hash = hash(out.as_os_str().as_encoded_bytes().iter().chain(&user));
+    format!("gyre{:0DIGITS$x}", hash & 0xff_ffff_ffff)
+}
+
+fn path_of(user: Uid) -> PathBuf {
+    Path::new(SHARED_MEMORY).join(format!("gyre-{}", user.as_raw()))
+}
+
+fn is_name(name: &str) -> bool {
+    let digits = name.strip_prefix("gyre").unwrap_or_default();
+    let is_digit = |byte: u8| byte.is_ascii_digit() || (b'a'..=b'f').contains(&byte);
+    digits.len() == DIGITS && digits.bytes().all(is_digit)
+}
+
+/// Returns the lock of a run, beside its root: the root is removed while the lock is held.
+fn lock_of(root: &Path) -> PathBuf {
+    root.with_extension("lock")
+}
+
+/// Returns the directory of the user's runs, which is created if there is none. `/dev/shm` is open to all users, so what is there
+/// is used only if it is a directory of this user that no other can enter.
+fn user_directory() -> Result<PathBuf, RootError> {
+    let path = path_of(geteuid());
+    let unusable = |source| RootError::Unusable {
+        path: path.clone(),
+        source,
+    };
+    make_directory(&path).map_err(unusable)?;
+    check_owner_only(&path)?;
+    Ok(path)
+}
+
+/// Checks that a path is a directory of this user, and closed to all others.
+fn check_owner_only(path: &Path) -> Result<(), RootError> {
+    let unsafe_ = |state: String, remedy: String| RootError::Unsafe {
+        path: path.to_owned(),
+        state,
+        remedy,
+    };
+    let flags = OFlags::DIRECTORY | OFlags::NOFOLLOW | OFlags::CLOEXEC;
+    let status = rustix::fs::open(path, flags, Mode::empty()).and_then(rustix::fs::fstat);
+    let status = match status {
+        Ok(status) => status,
+        Err(Errno::NOTDIR | Errno::LOOP) => {
+            let remedy = "remove it, or ask its owner to".to_owned();
+            return Err(unsafe_("is not a directory".to_owned(), remedy));
+        }
+        Err(error) => {
+            return Err(RootError::Unusable {
+                path: path.to_owned(),
+                source: error.into(),
+            });
+        }
+    };
+    let (owner, mode) = (status.st_uid, status.st_mode & 0o7777);
+    match (owner == geteuid().as_raw(), mode) {
+        (true, OWNER_ONLY) => Ok(()),
+        (true, _) => {
+            let remedy = format!("remove it, or `chmod 700 {}`", path.display());
+            Err(unsafe_(
+                format!("has mode {mode:04o} instead of 0700"),
+                remedy,
+            ))
+        }
+        (false, _) => {
+            let remedy = "ask that user or the administrator to remove it".to_owned();
+            Err(unsafe_(format!("belongs to user {owner}"), remedy))
+        }
+    }
+}
+
+/// Creates a directory that is the owner's alone, unless there is one.
+fn make_directory(path: &Path) -> io::Result<()> {
+    match DirBuilder::new().mode(OWNER_ONLY).create(path) {
+        Err(error) if error.kind() != io::ErrorKind::AlreadyExists => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// Removes runs whose supervisor was killed: their locks are free.
+fn remove_dead_runs(runs: &Path) {
+    let entries = fs::read_dir(runs).into_iter().flatten().flatten();
+    let names: BTreeSet<String> = entries
+        .filter_map(|entry| {
+            let path = PathBuf::from(entry.file_name());
+            Some(path.file_stem()?.to_str()?.to_owned())
+        })
+        .filter(|name| is_name(name))
+        .collect();
+    for root in names.iter().map(|name| runs.join(name)) {
+        if let Ok(Attempt::Locked(_lock)) = try_lock(&lock_of(&root)) {
+            remove(&root);
+        }
+    }
+}
+
+/// Removes a run whose lock this process holds.
+fn remove(root: &Path) {
+    remove_files(root);
+    // Last: with it the name is free.
+    let _ = fs::remove_file(lock_of(root));
+    // Fails while the user has another run.
+    let _ = root.parent().map(fs::remove_dir);
+}
+
+fn remove_files(root: &Path) {
+    let name = root.file_name().unwrap_or_default().to_string_lossy();
+    for (path, _) in own_files(Path::new(SHARED_MEMORY), &format!("{name}_")) {
+        let _ = fs::remove_file(path);
+    }
+    let _ = fs::remove_dir_all(root);
+}
+
+/// Returns the files of this user in a directory whose names begin with `prefix`.
+pub(crate) fn own_files(
+    directory: &Path,
+    prefix: &str,
+) -> impl Iterator<Item = (PathBuf, Metadata)> {
+    let user = geteuid().as_raw();
+    let entries = fs::read_dir(directory).into_iter().flatten().flatten();
+    entries
+        .filter(move |entry| entry.file_name().to_string_lossy().starts_with(prefix))
+        .filter_map(|entry| Some((entry.path(), entry.metadata().ok()?)))
+        .filter(move |(_, file)| file.is_file() && file.uid() == user)
+}
+
+/// Closes the files of a run to other users. The transport opens one of them, the counter of its nodes, to all.
+pub(crate) fn close_to_others(prefix: &str) -> io::Result<()> {
+    own_files(Path::new(SHARED_MEMORY), prefix)
+        .filter(|(_, file)| file.mode() & 0o077 != 0)
+        .try_for_each(|(path, _)| fs::set_permissions(path, Permissions::from_mode(0o600)))
+}
+
+/// The FNV-1a hash, which names a run after its results independently of the build.
+fn hash<'a>(bytes: impl Iterator<Item = &'a u8>) -> u64 {
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3)
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,115 @@
+#![allow(clippy::unwrap_used)]
+
+use std::os::unix::fs::{PermissionsExt, symlink};
+
+use super::*;
+
+fn acquire(out: &Path) -> Result<RunRoot, RootError> {
+    RunRoot::acquire(out, &Signals::install().unwrap())
+}
+
+fn directory(mode: u32) -> tempfile::TempDir {
+    let directory = tempfile::tempdir().unwrap();
+    fs::set_permissions(directory.path(), Permissions::from_mode(mode)).unwrap();
+    directory
+}
+
+#[test]
+fn a_run_locks_its_root_and_removes_all_files() {
+    let out = tempfile::tempdir().unwrap();
+    let root = acquire(out.path()).unwrap();
+    let Err(RootError::Busy { holder, .. }) = acquire(out.path()) else {
+        panic!("a second run has the same results");
+    };
+    assert!(holder.contains("process "), "{holder}");
+    let segment = Path::new(SHARED_MEMORY).join(format!("{}leftover", root.prefix()));
+    fs::write(&segment, b"").unwrap();
+    let path = root.path().to_owned();
+    drop(root);
+    assert!(!segment.exists() && !path.exists() && !lock_of(&path).exists());
+    assert!(acquire(out.path()).is_ok());
+}
+
+#[test]
+fn a_dead_run_is_removed_by_the_next_one() {
+    let (out, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    // Keeps the user's directory.
+    let _other = acquire(other.path()).unwrap();
+    let name = format!("gyre{:010x}", std::process::id());
+    let dead = user_directory().unwrap().join(&name);
+    let segment = Path::new(SHARED_MEMORY).join(format!("{name}_leftover"));
+    let lock = try_lock(&lock_of(&dead)).unwrap();
+    fs::create_dir(&dead).unwrap();
+    fs::write(dead.join("manifest.json"), b"").unwrap();
+    fs::write(&segment, b"").unwrap();
+    drop(lock);
+    drop(acquire(out.path()).unwrap());
+    assert!(!segment.exists() && !dead.exists() && !lock_of(&dead).exists());
+}
+
+#[test]
+fn nothing_but_runs_is_removed() {
+    let (out, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    // Keeps the user's directory.
+    let _other = acquire(other.path()).unwrap();
+    let runs = user_directory().unwrap();
+    let foreign = [
+        "iox2x",
+        "gyre012345678",
+        "gyre01234567890",
+        "gyre012345678X",
+    ];
+    let segment = |name: &str| Path::new(SHARED_MEMORY).join(format!("{name}_foreign"));
+    for name in foreign {
+        fs::create_dir_all(runs.join(name)).unwrap();
+        fs::write(segment(name), b"").unwrap();
+    }
+    drop(acquire(out.path()).unwrap());
+    for name in foreign {
+        assert!(segment(name).exists() && runs.join(name).exists(), "{name}");
+        fs::remove_file(segment(name)).unwrap();
+        fs::remove_dir(runs.join(name)).unwrap();
+    }
+}
+
+#[test]
+fn a_directory_that_others_can_enter_is_refused() {
+    assert!(check_owner_only(directory(0o700).path()).is_ok());
+    for mode in [0o755, 0o701, 0o1700, 0o500] {
+        let refused = check_owner_only(directory(mode).path()).unwrap_err();
+        let sentence = refused.to_string();
+        assert!(
+            sentence.contains(&format!("has mode {mode:04o}")),
+            "{sentence}"
+        );
+    }
+}
+
+#[test]
+fn a_link_or_a_file_in_place_of_the_directory_is_refused() {
+    let directory = directory(0o700);
+    let (link, file) = (directory.path().join("link"), directory.path().join("file"));
+    symlink(directory.path(), &link).unwrap();
+    fs::write(&file, b"").unwrap();
+    for path in [link, file] {
+        let refused = check_owner_only(&path).unwrap_err();
+        assert!(
+            refused.to_string().contains("is not a directory"),
+            "{refused}"
+        );
+    }
+}
+
+#[test]
+fn a_directory_of_another_user_is_refused() {
+    let directory = directory(0o700);
+    if rustix::fs::chown(directory.path(), Some(Uid::from_raw(65534)), None).is_err() {
+        println!("skipped: only root can give a directory away");
+        return;
+    }
+    let refused = check_owner_only(directory.path()).unwrap_err();
+    assert!(
+        refused.to_string().contains("belongs to user 65534"),
+        "{refused}"
+    );
+}

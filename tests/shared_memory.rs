@@ -1,0 +1,198 @@
+//! Shared memory is common to all users and programs of a machine: a run depends on none of them, and leaves their files alone.
+
+use std::{
+    fs,
+    os::unix::fs::{MetadataExt, PermissionsExt, symlink},
+    path::{Path, PathBuf},
+    process::{Child, Command},
+    sync::atomic::{AtomicU32, Ordering},
+    thread,
+    time::Duration,
+};
+
+use gyre_stage::run::SHARED_MEMORY;
+use rustix::{process::geteuid, thread::Pid};
+use tempfile::TempDir;
+
+use crate::common::{Ended, Run, leftovers, undisturbed};
+
+/// Holds the lock of a file, as another program does.
+struct Lock(Child);
+
+impl Lock {
+    fn of(path: &Path) -> Self {
+        let mut flock = Command::new("flock");
+        let lock = flock.arg(path).args(["sleep", "60"]).spawn().unwrap();
+        let inode = format!(":{} ", fs::metadata(path).unwrap().ino());
+        let is_held = || {
+            let locks = fs::read_to_string("/proc/locks").unwrap();
+            locks.lines().any(|line| line.contains(&inode))
+        };
+        while !is_held() {
+            thread::sleep(Duration::from_millis(2));
+        }
+        Self(lock)
+    }
+}
+
+impl Drop for Lock {
+    fn drop(&mut self) {
+        // Its child holds the lock too.
+        let pid = Pid::from_child(&self.0);
+        let children = format!("/proc/{pid}/task/{pid}/children");
+        let child = fs::read_to_string(children).unwrap().trim().parse();
+        crate::common::send(child.unwrap(), rustix::process::Signal::KILL);
+        self.0.wait().unwrap();
+    }
+}
+
+/// A run of a short simulation by another user, with a program and results of its own.
+struct Other {
+    folder: TempDir,
+    user: u32,
+}
+
+impl Other {
+    /// `None` if this user cannot become another.
+    fn new() -> Option<Self> {
+        if !geteuid().is_root() {
+            println!("skipped: only root can become another user");
+            return None;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        fs::set_permissions(folder.path(), fs::Permissions::from_mode(0o777)).unwrap();
+        fs::copy(crate::PROGRAM, folder.path().join("gyre")).unwrap();
+        let configuration = "[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 8\n";
+        fs::write(folder.path().join("test.toml"), configuration).unwrap();
+        // Tests that run at the same time are different users.
+        static USERS: AtomicU32 = AtomicU32::new(0);
+        let user = 1_000_000 + 10 * std::process::id() + USERS.fetch_add(1, Ordering::Relaxed);
+        Some(Self { folder, user })
+    }
+
+    fn run(&self) -> Ended {
+        let user = self.user.to_string();
+        let mut command = Command::new("setpriv");
+        command
+            .current_dir(self.folder.path())
+            .args(["--reuid", &user, "--regid", &user, "--clear-groups"])
+            .args(["./gyre", "run", "test.toml"]);
+        Ended::of(command)
+    }
+
+    fn runs(&self) -> PathBuf {
+        Path::new(SHARED_MEMORY).join(format!("gyre-{}", self.user))
+    }
+}
+
+#[test]
+fn a_lock_that_another_program_holds_on_shared_memory_does_not_delay_a_run() {
+    let _lock = Lock::of(Path::new(SHARED_MEMORY));
+    Run::of_recording().complete();
+}
+
+#[test]
+fn a_lock_of_the_run_that_does_not_become_free_ends_it_with_the_name_of_its_holder() {
+    let run = Run::of_recording();
+    fs::create_dir(run.out()).unwrap();
+    let path = leftovers::root(run.out()).with_extension("lock");
+    // Another run keeps the user's directory.
+    let other = Run::of_recording().rate("6");
+    let running = other.start();
+    while !path.parent().unwrap().exists() {
+        thread::sleep(Duration::from_millis(2));
+    }
+    fs::write(&path, b"").unwrap();
+    let lock = Lock::of(&path);
+    let ended = Ended::of(run.command());
+    ended.refused_with(&["another run is writing to", "process ", "flock"]);
+    drop(lock);
+    running.finish().succeeded();
+    run.complete();
+}
+
+#[test]
+fn files_of_others_in_shared_memory_stay() {
+    let name = format!("iox2x{}", std::process::id());
+    let run = Run::of_recording();
+    fs::create_dir(run.out()).unwrap();
+    let runs = leftovers::root(run.out()).parent().unwrap().to_owned();
+    // The first is where runs were in earlier versions.
+    let folders = [
+        Path::new(SHARED_MEMORY).join("gyre").join(&name),
+        runs.join(&name),
+    ];
+    let segment = Path::new(SHARED_MEMORY).join(format!("{name}_segment"));
+    fs::write(&segment, b"").unwrap();
+    for folder in &folders {
+        fs::create_dir_all(folder).unwrap();
+    }
+    fs::set_permissions(&runs, fs::Permissions::from_mode(0o700)).unwrap();
+    run.complete();
+    assert!(segment.exists());
+    fs::remove_file(segment).unwrap();
+    for folder in &folders {
+        assert!(folder.exists());
+        fs::remove_dir(folder).unwrap();
+        let _ = fs::remove_dir(folder.parent().unwrap());
+    }
+}
+
+#[test]
+fn all_files_of_a_run_are_the_owners_alone_whatever_the_umask() {
+    for umask in ["000", "777"] {
+        let run = Run::of_recording().rate("12");
+        let mut shell = Command::new("sh");
+        shell.args(["-c", &format!("umask {umask}; exec \"$0\" \"$@\"")]);
+        shell.arg(crate::PROGRAM).args(run.command().get_args());
+        let mut running = run.start_as(shell);
+        running.await_poses(3);
+        let mut files = leftovers::shared_memory(run.out());
+        assert!(!files.is_empty());
+        files.push(leftovers::root(run.out()));
+        files.push(leftovers::root(run.out()).with_extension("lock"));
+        // Below these no other user gets.
+        files.push(run.out().to_owned());
+        for file in files {
+            let mode = fs::metadata(&file).unwrap().mode();
+            assert_eq!(mode & 0o077, 0, "{}: {mode:o}", file.display());
+        }
+        running.finish().succeeded();
+        for result in [
+            "odometry.csv",
+            "config.toml",
+            "log.jsonl",
+            "journal/poses.journal",
+        ] {
+            let mode = fs::metadata(run.out().join(result)).unwrap().mode();
+            assert_eq!(mode & 0o777, 0o600, "{result}: {mode:o}");
+        }
+    }
+}
+
+#[test]
+fn two_users_run_at_once() {
+    let Some(other) = Other::new() else { return };
+    let run = Run::of_recording().rate("6");
+    let mut running = run.start();
+    running.await_poses(2);
+    other.run().succeeded();
+    assert!(!other.runs().exists());
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn a_directory_in_shared_memory_that_is_not_the_users_alone_is_refused_in_a_sentence() {
+    let Some(other) = Other::new() else { return };
+    let runs = other.runs();
+    // A directory of this user, root, and a link to one.
+    fs::create_dir(&runs).unwrap();
+    let refused = other.run();
+    fs::remove_dir(&runs).unwrap();
+    refused.refused_with(&["belongs to user 0", "ask that user"]);
+    symlink("/dev", &runs).unwrap();
+    let refused = other.run();
+    fs::remove_file(&runs).unwrap();
+    refused.refused_with(&["is not a directory", "remove it"]);
+}
