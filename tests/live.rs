@@ -3,8 +3,9 @@
 use crate::common::{
     Run,
     odometry::{self, Row},
-    recording,
+    recording, send,
 };
+use rustix::process::Signal;
 use serde_json::Value;
 
 /// The recording's period is 250 ms; played at this rate it is 60 ms and a bit.
@@ -102,6 +103,18 @@ fn the_source_can_die_and_every_scan_is_still_accounted_for() {
     let run = live();
     let mut running = run.start();
     running.await_poses(5).kill("radar-replay");
+    running.finish().succeeded();
+    let (summary, rows) = (run.summary(), odometry::rows(&run.odometry()));
+    assert_eq!(summary["restarts"]["radar-replay"], 1);
+    assert_exact(&summary, &rows);
+}
+
+#[test]
+fn a_source_that_hangs_is_started_again_and_every_scan_is_still_accounted_for() {
+    let run = live().set("run.stall_timeout_s=1");
+    let mut running = run.start();
+    let source = running.await_poses(5).await_stage("radar-replay");
+    send(source, Signal::STOP);
     running.finish().succeeded();
     let (summary, rows) = (run.summary(), odometry::rows(&run.odometry()));
     assert_eq!(summary["restarts"]["radar-replay"], 1);

@@ -150,12 +150,61 @@ fn a_stage_that_hangs_is_noticed_and_all_are_started_again() {
     send(pid, Signal::STOP);
     let ended = running.finish();
     ended.succeeded();
-    assert!(
-        ended.stderr.contains("no pose for too long"),
-        "{}",
-        ended.stderr
-    );
+    assert!(ended.stderr.contains("no pose for 2s"), "{}", ended.stderr);
     assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn a_source_that_hangs_is_noticed_and_started_again() {
+    for rate in [MODERATE, "max"] {
+        let run = Run::of_recording().rate(rate).set("run.stall_timeout_s=2");
+        let mut running = run.start();
+        let pid = running.await_poses(3).await_stage("radar-replay");
+        send(pid, Signal::STOP);
+        let ended = running.finish();
+        ended.succeeded();
+        assert!(
+            ended.stderr.contains("no scan from the source for 2s"),
+            "{}",
+            ended.stderr
+        );
+        assert_eq!(run.odometry(), undisturbed());
+        assert_eq!(run.summary()["restarts"]["radar-replay"], 1);
+    }
+}
+
+#[test]
+fn slow_playback_is_no_stall() {
+    // 2.5 s from scan to scan.
+    let run = Run::of_recording()
+        .rate("0.1")
+        .set("source.scans=4")
+        .set("run.stall_timeout_s=1.5");
+    let ended = run.finish();
+    ended.succeeded();
+    assert!(!ended.stderr.contains("restarted"), "{}", ended.stderr);
+}
+
+#[test]
+fn a_stage_that_takes_long_to_start_is_no_stall() {
+    let run = Run::of_recording()
+        .stage_script("masking", "sleep 4; exec {gyre} stage masking")
+        .set("run.stall_timeout_s=1");
+    let ended = run.finish();
+    ended.succeeded();
+    assert!(!ended.stderr.contains("restarted"), "{}", ended.stderr);
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn a_stage_that_never_starts_ends_the_run_with_its_name() {
+    let run = Run::of_recording()
+        .stage_script("masking", "exec sleep 600")
+        .set("run.start_timeout_s=0.5");
+    run.finish().failed_with(&[
+        "masking has not opened its topics within 500ms",
+        "three times in a row",
+    ]);
 }
 
 #[test]

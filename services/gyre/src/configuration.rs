@@ -56,8 +56,13 @@ pub struct RunConfig {
     /// Pace of the source: `max`, `realtime`, or a factor of real time from 0.001 to 1000. Live mode
     /// needs another than `max`.
     pub rate: Rate,
-    /// Time without a new pose after which all stages are restarted, s; 0: never.
+    /// Time for which a published scan may lack its pose, or the source a scan that is due, s; 0: no
+    /// limit. Then stages are restarted: first the source if it is late, else all but a live source;
+    /// if that does not help, all; if that does not help either, the run ends.
     pub stall_timeout_s: f64,
+    /// Time for a stage to open its topics after its start, s; 0: no limit. A stage that takes longer,
+    /// as one that cannot load its model, is treated as a stall.
+    pub start_timeout_s: f64,
     /// Ground truth for the evaluation. Default: the one in the recording's folder.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ground_truth: Option<PathBuf>,
@@ -91,6 +96,7 @@ impl Default for RunConfig {
             window: 4,
             rate: Rate::Max,
             stall_timeout_s: 60.0,
+            start_timeout_s: 300.0,
             ground_truth: None,
         }
     }
@@ -291,6 +297,7 @@ impl Configuration {
                 )),
             };
         seconds("run", "stall_timeout_s", self.run.stall_timeout_s)?;
+        seconds("run", "start_timeout_s", self.run.start_timeout_s)?;
         seconds("source", "retry_s", self.source.retry_s)?;
         self.stages.iter().try_for_each(|(name, stage)| {
             seconds(
@@ -410,7 +417,14 @@ impl Configuration {
             table.remove("stages");
             if let Some(run) = table.get_mut("run").and_then(|run| run.as_table_mut()) {
                 run.retain(|key, _| {
-                    !["rate", "window", "stall_timeout_s", "ground_truth"].contains(&key)
+                    ![
+                        "rate",
+                        "window",
+                        "stall_timeout_s",
+                        "start_timeout_s",
+                        "ground_truth",
+                    ]
+                    .contains(&key)
                 });
             }
             if let Some(source) = table.get_mut("source").and_then(|key| key.as_table_mut()) {

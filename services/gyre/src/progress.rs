@@ -63,9 +63,7 @@ impl Progress {
             }
             Event::Restarted { all: false } => self.say("restarted it"),
             Event::Restarted { all: true } => self.say("restarted all stages from the journal"),
-            Event::Stalled => {
-                self.say("no pose for too long: restarting all stages from the journal")
-            }
+            Event::Stalled(stall) => self.say(&stall.to_string()),
         }
     }
 

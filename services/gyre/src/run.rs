@@ -66,7 +66,8 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     let plan = Plan {
         manifest,
         stages: configuration.stage_plans(&env::current_exe()?),
-        stall_timeout: stall_timeout(configuration.run.stall_timeout_s),
+        stall_timeout: limit(configuration.run.stall_timeout_s),
+        start_timeout: limit(configuration.run.start_timeout_s),
     };
     let mut progress = Progress::new(checked.scans, resumed, &checked.footprint);
     let started = Instant::now();
@@ -131,8 +132,8 @@ fn finish(
     })
 }
 
-/// `None`: wait for ever.
-fn stall_timeout(seconds: f64) -> Option<Duration> {
+/// `None`: no limit.
+fn limit(seconds: f64) -> Option<Duration> {
     Duration::try_from_secs_f64(seconds)
         .ok()
         .filter(|limit| !limit.is_zero())

@@ -27,6 +27,7 @@ pub mod launch;
 pub mod lock;
 pub mod reader;
 pub mod run;
+mod schedule;
 mod services;
 pub mod sink;
 pub mod source;

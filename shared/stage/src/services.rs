@@ -1,10 +1,12 @@
 //! The services of the transport: the supervisor creates them once with the sizes of the window, and stages only open them.
 //! So no restart finds a service missing or of another size.
 
-use gyre_messages::{MAX_NODES, Masked, Message, Motion, Pose, Refined, Rotation, Scan, Window};
+use gyre_messages::{
+    MAX_NODES, Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId, Window,
+};
 use iceoryx2::{
     prelude::{Config, NodeBuilder, NodeName, ServiceName, SignalHandlingMode, ipc},
-    service::port_factory::{event, publish_subscribe},
+    service::port_factory::{PortFactory, event, publish_subscribe},
 };
 
 use crate::StageError;
@@ -34,12 +36,12 @@ pub(crate) fn node(config: &Config, name: &str) -> Result<Node, StageError> {
 
 /// All services of a run. They exist as long as this value.
 pub(crate) struct Services {
-    _scan: Topic<Scan>,
-    _masked: Topic<Masked>,
-    _rotation: Topic<Rotation>,
-    _motion: Topic<Motion>,
-    _refined: Topic<Refined>,
-    _pose: Topic<Pose>,
+    scan: Topic<Scan>,
+    masked: Topic<Masked>,
+    rotation: Topic<Rotation>,
+    motion: Topic<Motion>,
+    refined: Topic<Refined>,
+    pose: Topic<Pose>,
     _events: Vec<Event>,
 }
 
@@ -58,14 +60,30 @@ impl Services {
             )?);
         }
         Ok(Self {
-            _scan: create_topic::<Scan>(node, window)?,
-            _masked: create_topic::<Masked>(node, window)?,
-            _rotation: create_topic::<Rotation>(node, window)?,
-            _motion: create_topic::<Motion>(node, window)?,
-            _refined: create_topic::<Refined>(node, window)?,
-            _pose: create_topic::<Pose>(node, window)?,
+            scan: create_topic::<Scan>(node, window)?,
+            masked: create_topic::<Masked>(node, window)?,
+            rotation: create_topic::<Rotation>(node, window)?,
+            motion: create_topic::<Motion>(node, window)?,
+            refined: create_topic::<Refined>(node, window)?,
+            pose: create_topic::<Pose>(node, window)?,
             _events: events,
         })
+    }
+
+    /// Returns whether a stage has opened the topic that it publishes, which stages do last. A dead stage counts until its
+    /// resources are removed.
+    pub(crate) fn has_publisher(&self, stage: StageId) -> bool {
+        let publishers = match stage {
+            StageId::RadarReplay => self.scan.dynamic_config().number_of_publishers(),
+            StageId::Masking => self.masked.dynamic_config().number_of_publishers(),
+            StageId::RotationSearch => self.rotation.dynamic_config().number_of_publishers(),
+            StageId::TranslationSearch | StageId::JointSearch => {
+                self.motion.dynamic_config().number_of_publishers()
+            }
+            StageId::Refinement => self.refined.dynamic_config().number_of_publishers(),
+            StageId::PoseIntegration => self.pose.dynamic_config().number_of_publishers(),
+        };
+        publishers > 0
     }
 }
 

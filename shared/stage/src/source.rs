@@ -11,6 +11,7 @@ use gyre_messages::{Hop, Item, Pose, Scan, ScanHeader, StageId, flag};
 use crate::{
     Launch, StageCounters, StageError, allocations, clock,
     reader::Port,
+    schedule::ScheduleWriter,
     wake,
     writer::{Draft, Writer},
 };
@@ -62,6 +63,7 @@ pub fn run(
         published: None,
         resume_at: None,
     };
+    let schedule = ScheduleWriter::create(&launch.manifest)?;
     let scans = Writer::open(&launch.node, &launch.manifest)?;
     let mut playback = Playback {
         launch,
@@ -69,6 +71,7 @@ pub fn run(
         tolerance,
         credit,
         scans,
+        schedule,
         counters: StageCounters::default(),
     };
     if let Some(position) = playback.wait_for_start()? {
@@ -110,6 +113,7 @@ struct Playback<'a, S: Source> {
     tolerance: &'a Tolerance,
     credit: Credit,
     scans: Writer<Scan>,
+    schedule: ScheduleWriter,
     counters: StageCounters,
 }
 
@@ -212,6 +216,7 @@ impl<S: Source> Playback<'_, S> {
         let mut attempts = Attempts::new(self.tolerance);
         loop {
             let (started_ns, allocated) = (clock::now_ns(), allocations::so_far());
+            self.schedule.due_at(started_ns)?;
             let (header, bytes) = draft.parts();
             match self.source.read(position.index, header, bytes) {
                 Ok(()) => {
@@ -260,6 +265,7 @@ impl<S: Source> Playback<'_, S> {
         if admitted {
             draft.header().item.due_ns = due_ns.unwrap_or_else(clock::now_ns);
             self.scans.send(draft, S::HOP)?;
+            self.schedule.has_published(position.published)?;
         }
         Ok(admitted)
     }
@@ -267,6 +273,7 @@ impl<S: Source> Playback<'_, S> {
     /// Waits until the window admits item `seq` and it is due; false on a request to stop.
     fn wait_for_admission(&mut self, seq: u64, due_ns: Option<i64>) -> Result<bool, StageError> {
         let (live, window) = (self.launch.manifest.live, self.launch.manifest.window);
+        self.schedule.due_at(due_ns.unwrap_or_else(clock::now_ns))?;
         loop {
             self.credit.update()?;
             let wait = due_ns.map_or(Duration::ZERO, clock::until);
@@ -302,6 +309,7 @@ impl<S: Source> Playback<'_, S> {
         let Some(complete_ns) = self.source.complete_ns(position.index) else {
             return Ok(true);
         };
+        self.schedule.due_at(pace.due_ns(complete_ns))?;
         let until_ns =
             clock::now_ns() + (clock::until(pace.due_ns(complete_ns)) / 2).as_nanos() as i64;
         let in_flight = position.published.saturating_sub(1);
@@ -323,7 +331,8 @@ impl<S: Source> Playback<'_, S> {
             flags: flag::END,
             ..position.item()
         };
-        self.scans.send(draft, S::HOP)
+        self.scans.send(draft, S::HOP)?;
+        self.schedule.has_published(position.published)
     }
 
     /// Sleeps, and answers the handshakes of new readers; true on a request to stop.

@@ -6,6 +6,7 @@
 mod child;
 mod clean;
 mod plan;
+mod watchdog;
 
 use std::{
     collections::BTreeMap,
@@ -24,9 +25,10 @@ use crate::{
     wake::{self, Signals},
 };
 use child::Child;
+use watchdog::{Starting, Watchdog};
 
 pub use child::Death;
-pub use plan::{Ending, Event, Plan, Report, RestartPolicy, StagePlan, SuperviseError};
+pub use plan::{Ending, Event, Plan, Report, RestartPolicy, StagePlan, Stall, SuperviseError};
 
 /// Time for stages to exit by themselves before they are killed.
 const STOP_TIMEOUT: Duration = Duration::from_secs(2);
@@ -60,15 +62,14 @@ struct Supervisor<'a> {
     observe: &'a mut dyn FnMut(Event<'_>),
     children: Vec<Child>,
     newest_pose: Option<u64>,
-    last_progress: Instant,
-    stalls_without_progress: usize,
+    watchdog: Watchdog,
     restarts: BTreeMap<String, usize>,
     /// Restarted stages with no pose yet that the new process worked on.
     recovering: Vec<Recovering>,
     recovery: Vec<Duration>,
     // Dropped in this order: ports, services, node.
     poses: Port<Pose>,
-    _services: Services,
+    services: Services,
     _node: Node,
     transport: Config,
     signals: Signals,
@@ -99,13 +100,12 @@ impl<'a> Supervisor<'a> {
             observe,
             children: Vec::new(),
             newest_pose: None,
-            last_progress: Instant::now(),
-            stalls_without_progress: 0,
+            watchdog: Watchdog::new(plan),
             restarts: BTreeMap::new(),
             recovering: Vec::new(),
             recovery: Vec::new(),
             poses,
-            _services: services,
+            services,
             _node: node,
             transport,
             signals,
@@ -125,7 +125,6 @@ impl<'a> Supervisor<'a> {
     }
 
     fn watch(&mut self) -> Result<Ending, SuperviseError> {
-        self.last_progress = Instant::now();
         loop {
             let woken = self
                 .signals
@@ -141,14 +140,25 @@ impl<'a> Supervisor<'a> {
                 .collect();
             if !dead.is_empty() {
                 self.recover(&dead)?;
-            } else if self
-                .plan
-                .stall_timeout
-                .is_some_and(|limit| self.last_progress.elapsed() > limit)
-            {
-                self.recover_from_stall()?;
+            } else if let Some(stall) = self.stall() {
+                self.recover_from_stall(stall)?;
             }
         }
+    }
+
+    fn stall(&mut self) -> Option<Stall> {
+        let opening = self.children.iter().filter(|child| {
+            child
+                .stage()
+                .is_some_and(|stage| !self.services.has_publisher(stage))
+        });
+        let starting = opening
+            .min_by_key(|child| child.started())
+            .map(|child| Starting {
+                stage: child.name(),
+                since: child.started(),
+            });
+        self.watchdog.look(&self.plan.manifest, starting)
     }
 
     /// Reads the new poses; true at the end of the stream.
@@ -162,8 +172,7 @@ impl<'a> Supervisor<'a> {
                 && self.newest_pose.is_none_or(|newest| pose.item.seq > newest);
             if is_new {
                 self.newest_pose = Some(pose.item.seq);
-                self.last_progress = Instant::now();
-                self.stalls_without_progress = 0;
+                self.watchdog.progress(&pose.item);
                 record_recoveries(pose, &mut self.recovering, &mut self.recovery);
                 (self.observe)(Event::Pose(pose));
             }
@@ -216,27 +225,41 @@ impl<'a> Supervisor<'a> {
         for i in stages {
             let child = &mut self.children[*i];
             child.respawn(&self.plan.manifest, self.newest_pose)?;
-            let hop = StageId::by_name(child.name());
-            self.recovering.extend(hop.map(|hop| Recovering {
+            self.recovering.extend(child.stage().map(|hop| Recovering {
                 hop,
                 died_ns,
                 started_ns: clock::now_ns(),
             }));
         }
-        self.last_progress = Instant::now();
+        self.watchdog.restarted();
         Ok(())
     }
 
-    /// Restarts all stages, at most twice in a row, because one of them is alive but stuck.
-    fn recover_from_stall(&mut self) -> Result<(), SuperviseError> {
-        self.stalls_without_progress += 1;
-        if self.stalls_without_progress > 2 {
-            return Err(SuperviseError::Stalled {
-                after: self.plan.stall_timeout.unwrap_or_default(),
-            });
+    /// Restarts the stages that may be stuck: first the source if it is late, else all but a live source; when that does not
+    /// help, all stages; when that does not help either, the run ends.
+    fn recover_from_stall(&mut self, stall: Stall) -> Result<(), SuperviseError> {
+        let stages = match (self.watchdog.count(), &stall) {
+            (1, Stall::Scan { .. }) => self.sources(),
+            (1, _) => self.all_but_survivors(&[]),
+            (2, _) => (0..self.children.len()).collect(),
+            _ => return Err(SuperviseError::Stalled(stall)),
+        };
+        (self.observe)(Event::Stalled(&stall));
+        for i in &stages {
+            *self
+                .restarts
+                .entry(self.children[*i].name().to_owned())
+                .or_default() += 1;
         }
-        (self.observe)(Event::Stalled);
-        self.restart(&self.all_but_survivors(&[]), clock::now_ns())
+        self.restart(&stages, clock::now_ns())?;
+        let all = stages.len() > 1;
+        (self.observe)(Event::Restarted { all });
+        Ok(())
+    }
+
+    fn sources(&self) -> Vec<usize> {
+        let is_source = |i: &usize| self.children[*i].stage() == Some(StageId::RadarReplay);
+        (0..self.children.len()).filter(is_source).collect()
     }
 
     /// Stops all stages, and kills those that do not exit in time.

@@ -9,6 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_messages::StageId;
 use rustix::process::{
     Pid, Signal, getpid, getppid, kill_process_group, set_parent_process_death_signal,
 };
@@ -32,6 +33,7 @@ pub struct Death {
 pub(super) struct Child {
     plan: StagePlan,
     process: std::process::Child,
+    started: Instant,
     status: Option<ExitStatus>,
     deaths: VecDeque<Instant>,
     /// The newest pose at the last restart.
@@ -48,6 +50,7 @@ impl Child {
         Ok(Self {
             plan: plan.clone(),
             process,
+            started: Instant::now(),
             status: None,
             deaths: VecDeque::new(),
             pose_at_restart: None,
@@ -62,6 +65,7 @@ impl Child {
         newest_pose: Option<u64>,
     ) -> Result<(), SuperviseError> {
         self.process = start(&self.plan, manifest, &self.log)?;
+        self.started = Instant::now();
         self.status = None;
         self.pose_at_restart = Some(newest_pose);
         Ok(())
@@ -77,6 +81,16 @@ impl Child {
 
     pub(super) fn pid(&self) -> u32 {
         self.process.id()
+    }
+
+    /// Returns which stage it is; `None` for an additional process.
+    pub(super) fn stage(&self) -> Option<StageId> {
+        StageId::by_name(self.name())
+    }
+
+    /// Returns when the process was started.
+    pub(super) fn started(&self) -> Instant {
+        self.started
     }
 
     pub(super) fn backoff(&self) -> Duration {

@@ -16,8 +16,10 @@ pub struct Plan {
     pub manifest: Manifest,
     /// The processes, in the order of the stream.
     pub stages: Vec<StagePlan>,
-    /// Restart all stages after this time without a new pose; `None`: never.
+    /// Time for which a published scan may lack its pose, or the source a scan that is due; `None`: no limit.
     pub stall_timeout: Option<Duration>,
+    /// Time for a stage to open its topics; `None`: no limit.
+    pub start_timeout: Option<Duration>,
 }
 
 /// One process of a run.
@@ -78,11 +80,36 @@ pub enum Event<'a> {
     },
     /// Stages were restarted after a death.
     Restarted {
-        /// True if all stages were restarted, false if only the dead ones were.
+        /// True if all stages were restarted (but a live source), false if only the dead or the late ones were.
         all: bool,
     },
-    /// No pose for too long: all stages are about to be restarted.
-    Stalled,
+    /// The run makes no progress: the stages that may be the cause are about to be restarted.
+    Stalled(&'a Stall),
+}
+
+/// A run that makes no progress, although no process has died.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum Stall {
+    /// A published scan lacks its pose.
+    #[error("no pose for {limit:?}")]
+    Pose {
+        /// The time limit.
+        limit: Duration,
+    },
+    /// The source has not published a scan that is due, and all others have their poses.
+    #[error("no scan from the source for {limit:?}, although one is due")]
+    Scan {
+        /// The time limit.
+        limit: Duration,
+    },
+    /// A stage has not opened its topics.
+    #[error("{stage} has not opened its topics within {limit:?} (run.start_timeout_s)")]
+    Start {
+        /// The name of the stage.
+        stage: String,
+        /// The time limit.
+        limit: Duration,
+    },
 }
 
 /// The end of a run.
@@ -148,14 +175,11 @@ pub enum SuperviseError {
         /// The last line of output, in parentheses.
         output: String,
     },
-    /// No pose, although no stage died.
+    /// Restarts did not help against a stall.
     #[error(
-        "no pose for {after:?}, three times in a row, although no stage died; log.jsonl shows what the stages wait for"
+        "{0}, three times in a row, although no stage died; log.jsonl and log/ show what the stages wait for"
     )]
-    Stalled {
-        /// The time limit.
-        after: Duration,
-    },
+    Stalled(Stall),
     /// The transport's cleanup hangs; only a new run under new names helps.
     #[error("the transport does not finish cleaning up after a dead process")]
     TransportStuck,
