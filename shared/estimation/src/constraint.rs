@@ -1,0 +1,184 @@
+//! Measured relative poses of keyframes, and their chi-square test.
+
+use gyre_geometry::UncertainMotion;
+use nalgebra::{Matrix3, Vector3};
+
+use crate::EstimationError;
+
+/// The 99.9 % quantile of the chi-square distribution with three degrees of freedom: the default gate of loops.
+pub const CHI_SQUARE_99_9: f64 = 16.266;
+
+/// A measured relative pose of two keyframes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Constraint {
+    /// The keyframe that the motion is measured from, counted from 0.
+    pub from: usize,
+    /// The keyframe whose pose is measured. A loop may lead from the later keyframe to the earlier one.
+    pub to: usize,
+    /// The pose of keyframe `to` in the frame of keyframe `from`, and the covariance of its (x, y, yaw) along the axes of `from`.
+    pub motion: UncertainMotion,
+    /// Where the measurement comes from.
+    pub kind: Kind,
+}
+
+/// The source of a constraint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// The motion from the last keyframe to a new one. It is never rejected.
+    Odometry,
+    /// A registration of two keyframes of the same place. It is tested, and may be wrong.
+    Loop {
+        /// Loops of one group have dependent errors, for instance all loops along the same 20 m of a revisit. `None` for a loop whose
+        /// error is independent of all others.
+        group: Option<u64>,
+    },
+}
+
+impl Constraint {
+    /// Creates the odometry constraint from keyframe `from` to the next one.
+    pub fn odometry(from: usize, motion: UncertainMotion) -> Self {
+        Self {
+            from,
+            to: from + 1,
+            motion,
+            kind: Kind::Odometry,
+        }
+    }
+
+    /// Creates a loop whose error is independent of those of other loops.
+    pub fn closing(from: usize, to: usize, motion: UncertainMotion) -> Self {
+        Self {
+            from,
+            to,
+            motion,
+            kind: Kind::Loop { group: None },
+        }
+    }
+
+    /// Checks that an estimator with `keyframes` keyframes can take the constraint.
+    pub(crate) fn check(&self, keyframes: usize) -> Result<(), EstimationError> {
+        let &Self { from, to, .. } = self;
+        let last = keyframes - 1;
+        if from == to {
+            return Err(EstimationError::SameKeyframe(from));
+        }
+        match self.kind {
+            Kind::Odometry if (from, to) != (last, last + 1) => {
+                return Err(EstimationError::Discontinuous { from, to, last });
+            }
+            Kind::Loop { .. } if from.max(to) > last => {
+                return Err(EstimationError::UnknownKeyframe {
+                    from,
+                    to,
+                    keyframes,
+                });
+            }
+            _ => {}
+        }
+        let [x, y, yaw] = gyre_geometry::xy_yaw(&self.motion.motion);
+        if !(x.is_finite() && y.is_finite() && yaw.is_finite()) {
+            return Err(EstimationError::NotFinite { from, to });
+        }
+        if !self.motion.has_covariance() {
+            return Err(EstimationError::Covariance { from, to });
+        }
+        Ok(())
+    }
+}
+
+/// The chi-square test of a loop against an estimate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Verdict {
+    /// Squared normalised difference of the measured motion from the predicted one; 3 is expected of a right loop.
+    pub chi_square: f64,
+    /// The result of the test.
+    pub outcome: Outcome,
+}
+
+/// The result of a test.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// The constraint is part of the estimate.
+    Accepted,
+    /// The constraint contradicts the estimate and is not part of it.
+    Rejected,
+    /// The constraint agrees with the estimate, and its group has been counted in full: it is not part of the estimate.
+    Redundant,
+}
+
+/// Returns the squared length of `residual` normalised by `covariance`; infinite if the covariance is not positive definite.
+pub(crate) fn chi_square(residual: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
+    covariance.cholesky().map_or(f64::INFINITY, |factor| {
+        residual.dot(&factor.solve(residual))
+    })
+}
+
+/// Returns the information of `members` loops of one group relative to that of one loop, if the errors of any two of them have the
+/// correlation `correlation` in 0..=1: that of the mean of equally correlated measurements.
+pub(crate) fn group_information(members: usize, correlation: f64) -> f64 {
+    let members = members as f64;
+    members / (1.0 + (members - 1.0).max(0.0) * correlation)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gyre_geometry::pose;
+
+    fn motion(x_m: f64) -> UncertainMotion {
+        UncertainMotion {
+            motion: pose(x_m, 0.0, 0.0),
+            covariance: Matrix3::identity(),
+        }
+    }
+
+    #[test]
+    fn constraints_that_no_estimator_can_take_are_refused_with_the_reason() {
+        use EstimationError::*;
+        let flat = UncertainMotion {
+            covariance: Matrix3::zeros(),
+            ..motion(1.0)
+        };
+        let cases = [
+            (
+                Constraint::odometry(1, motion(1.0)),
+                Discontinuous {
+                    from: 1,
+                    to: 2,
+                    last: 4,
+                },
+            ),
+            (
+                Constraint::closing(5, 0, motion(1.0)),
+                UnknownKeyframe {
+                    from: 5,
+                    to: 0,
+                    keyframes: 5,
+                },
+            ),
+            (Constraint::closing(3, 3, motion(1.0)), SameKeyframe(3)),
+            (
+                Constraint::closing(0, 3, motion(f64::NAN)),
+                NotFinite { from: 0, to: 3 },
+            ),
+            (
+                Constraint::closing(0, 3, flat),
+                Covariance { from: 0, to: 3 },
+            ),
+        ];
+        for (constraint, expected) in cases {
+            assert_eq!(constraint.check(5), Err(expected));
+        }
+        assert_eq!(Constraint::odometry(4, motion(1.0)).check(5), Ok(()));
+        assert_eq!(Constraint::closing(4, 0, motion(1.0)).check(5), Ok(()));
+    }
+
+    #[test]
+    fn a_group_counts_from_once_to_as_often_as_it_has_members() {
+        assert_eq!(group_information(0, 1.0), 0.0);
+        assert_eq!(group_information(1, 0.3), 1.0);
+        assert_eq!(group_information(10, 1.0), 1.0);
+        assert_eq!(group_information(10, 0.0), 10.0);
+        assert!((group_information(3, 0.5) - 1.5).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,69 @@
+//! Errors of the estimators.
+
+use thiserror::Error;
+
+/// Errors of [`TrajectoryFilter`](crate::TrajectoryFilter). An estimator that returns one is unchanged.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum EstimationError {
+    /// A constraint names a keyframe that has not been added.
+    #[error(
+        "the constraint from keyframe {from} to {to} names a keyframe that has not been added: there are {keyframes}, counted \
+         from 0. Add odometry constraints in the order of the keyframes, and loops after both of their keyframes"
+    )]
+    UnknownKeyframe {
+        /// The keyframe that the motion is measured from.
+        from: usize,
+        /// The keyframe that is measured.
+        to: usize,
+        /// Number of keyframes.
+        keyframes: usize,
+    },
+    /// An odometry constraint does not lead from the last keyframe to a new one.
+    #[error(
+        "the odometry constraint from keyframe {from} to {to} does not continue the trajectory: it must lead from the last keyframe, \
+         {last}, to the next one"
+    )]
+    Discontinuous {
+        /// The keyframe that the motion is measured from.
+        from: usize,
+        /// The keyframe that is measured.
+        to: usize,
+        /// The last keyframe.
+        last: usize,
+    },
+    /// A constraint relates a keyframe to itself.
+    #[error(
+        "the constraint of keyframe {0} with itself says nothing: a constraint needs two keyframes"
+    )]
+    SameKeyframe(usize),
+    /// A measured motion has a value that is NaN or infinite.
+    #[error("the motion measured from keyframe {from} to {to} is not finite")]
+    NotFinite {
+        /// The keyframe that the motion is measured from.
+        from: usize,
+        /// The keyframe that is measured.
+        to: usize,
+    },
+    /// A covariance is not positive definite, so the constraint cannot be weighted.
+    #[error(
+        "the covariance of the motion from keyframe {from} to {to} is not positive definite: every measured motion needs the \
+         uncertainty of its x, y and yaw"
+    )]
+    Covariance {
+        /// The keyframe that the motion is measured from.
+        from: usize,
+        /// The keyframe that is measured.
+        to: usize,
+    },
+    /// The trajectory filter is full.
+    #[error(
+        "the trajectory filter is full: it holds {limit} keyframes, with a covariance of {} MB. Use the pose graph for a longer \
+         trajectory, or raise the limit",
+        72 * limit * limit / 1_000_000
+    )]
+    TooManyKeyframes {
+        /// The largest number of keyframes.
+        limit: usize,
+    },
+}

@@ -1,0 +1,101 @@
+//! The relative pose of two keyframes, predicted from their poses (Checchin et al., Eq. 3).
+
+use gyre_geometry::{Pose, UncertainMotion, covariance::lever, wrap_angle};
+use nalgebra::{Matrix3, Vector3};
+
+/// A predicted relative pose and its Jacobians.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Relative {
+    /// The pose of `to` in the frame of `from`.
+    pub motion: Pose,
+    /// Jacobian of (x, y, yaw) of the motion with respect to those of `from`.
+    pub by_from: Matrix3<f64>,
+    /// Jacobian with respect to (x, y, yaw) of `to`.
+    pub by_to: Matrix3<f64>,
+}
+
+impl Relative {
+    /// Predicts the relative pose of two keyframes.
+    ///
+    /// Checchin et al., Eq. 3: T = (-)((-) x_to (+) x_from). The outer inverse makes this equal to (-) x_from (+) x_to, the pose of `to`
+    /// seen from `from`, which is the direction of a [`Constraint`](crate::Constraint).
+    pub fn predict(from: &Pose, to: &Pose) -> Self {
+        let motion = from.inv_mul(to);
+        let apart = to.translation.vector - from.translation.vector;
+        let by_to = from
+            .rotation
+            .inverse()
+            .to_rotation_matrix()
+            .to_homogeneous();
+        Self {
+            motion,
+            by_from: -by_to * lever(apart.x, apart.y),
+            by_to,
+        }
+    }
+
+    /// Returns (x, y, yaw) of the measured motion minus those of the predicted one, yaw in (-pi, pi]: the innovation.
+    pub fn innovation(&self, measured: &UncertainMotion) -> Vector3<f64> {
+        measured.error(&self.motion)
+    }
+}
+
+/// Moves a pose by a correction of its x, y and yaw.
+pub(crate) fn corrected(pose: &Pose, correction: &Vector3<f64>) -> Pose {
+    let yaw_rad = wrap_angle(pose.rotation.angle() + correction.z);
+    Pose::new(pose.translation.vector + correction.xy(), yaw_rad)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gyre_geometry::{pose, xy_yaw};
+    use proptest::prelude::*;
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    #[test]
+    fn the_relative_pose_of_two_poses_worked_by_hand() {
+        // From 1 m ahead, facing left, a pose 3 m to its left that faces backward is 2 m ahead and 1 m to the right, turned left.
+        let relative = Relative::predict(&pose(1.0, 1.0, FRAC_PI_2), &pose(2.0, 3.0, PI));
+        let [x, y, yaw] = xy_yaw(&relative.motion);
+        assert!((x - 2.0).abs() < 1e-15 && (y + 1.0).abs() < 1e-15);
+        assert!((yaw - FRAC_PI_2).abs() < 1e-15);
+        // The same by the operators of Eq. 3 as printed.
+        let printed = (pose(2.0, 3.0, PI).inverse() * pose(1.0, 1.0, FRAC_PI_2)).inverse();
+        assert!((printed.translation.vector - relative.motion.translation.vector).norm() < 1e-15);
+        assert!(printed.rotation.angle_to(&relative.motion.rotation).abs() < 1e-15);
+    }
+
+    #[test]
+    fn an_innovation_of_yaw_across_half_a_turn_is_small() {
+        let relative = Relative::predict(&pose(0.0, 0.0, 0.0), &pose(0.0, 0.0, PI - 0.1));
+        let measured = UncertainMotion {
+            motion: pose(0.5, 0.0, -PI + 0.1),
+            ..UncertainMotion::identity()
+        };
+        let expected = Vector3::new(0.5, 0.0, 0.2);
+        assert!((relative.innovation(&measured) - expected).norm() < 1e-12);
+    }
+
+    proptest! {
+        #[test]
+        fn jacobians_are_the_differences_of_corrected_poses(
+            a in prop::array::uniform3(-3.0..3.0f64), b in prop::array::uniform3(-3.0..3.0f64),
+        ) {
+            let (from, to) = (pose(a[0], a[1], a[2]), pose(b[0], b[1], b[2]));
+            let relative = Relative::predict(&from, &to);
+            for axis in 0..3 {
+                let mut step = Vector3::zeros();
+                step[axis] = 1e-6;
+                let difference = |from: &Pose, to: &Pose| {
+                    let moved = UncertainMotion { motion: from.inv_mul(to), ..UncertainMotion::identity() };
+                    moved.error(&relative.motion) / 1e-6
+                };
+                let by_from = difference(&corrected(&from, &step), &to);
+                let by_to = difference(&from, &corrected(&to, &step));
+                prop_assert!((by_from - relative.by_from.column(axis)).norm() < 1e-5);
+                prop_assert!((by_to - relative.by_to.column(axis)).norm() < 1e-5);
+            }
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! Covariances agree with errors: the mean NEES of 200 simulated drives of 500 keyframes lies in its 95 % interval.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::{Drive, ODOMETRY};
+use gyre_estimation::Outcome;
+use gyre_geometry::{Pose, UncertainMotion};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+const DRIVES: u64 = 200;
+const KEYFRAMES: usize = 500;
+
+/// The mean NEES of poses over the drives.
+#[derive(Default)]
+struct MeanNees {
+    sum: f64,
+    samples: usize,
+}
+
+impl MeanNees {
+    fn add(&mut self, estimate: &UncertainMotion, truth: &Pose) {
+        let error = estimate.error(truth);
+        self.sum += error.dot(&estimate.covariance.cholesky().unwrap().solve(&error));
+        self.samples += 1;
+    }
+
+    /// Asserts that the mean lies in the interval that holds that of consistent covariances with a probability of 95 %.
+    fn check(&self, name: &str) {
+        assert_eq!(self.samples, DRIVES as usize);
+        let chi_square = ChiSquared::new((3 * self.samples) as f64).unwrap();
+        let [low, high] = [0.025, 0.975].map(|p| chi_square.inverse_cdf(p));
+        println!(
+            "{name}: NEES {:.3}, of 3 expected",
+            self.sum / self.samples as f64
+        );
+        assert!(
+            (low..=high).contains(&self.sum),
+            "{name}: {} outside {low}..{high}",
+            self.sum
+        );
+    }
+}
+
+#[test]
+fn the_filter_is_consistent_without_loops_before_and_after_closing() {
+    let mut open: [MeanNees; 2] = Default::default();
+    let mut before: [MeanNees; 2] = Default::default();
+    let mut after: [MeanNees; 2] = Default::default();
+    let of_interest = [KEYFRAMES / 2, KEYFRAMES - 1];
+    for seed in 0..DRIVES {
+        let straight = Drive::new(KEYFRAMES, 5 * KEYFRAMES, ODOMETRY, 1000 + seed);
+        let filter = straight.filter();
+        for (nees, k) in open.iter_mut().zip(of_interest) {
+            nees.add(&filter.pose(k).unwrap(), &straight.truth[k]);
+        }
+        let mut around = Drive::new(KEYFRAMES, KEYFRAMES, ODOMETRY, seed);
+        let mut filter = around.filter();
+        for (nees, k) in before.iter_mut().zip(of_interest) {
+            nees.add(&filter.pose(k).unwrap(), &around.truth[k]);
+        }
+        let closing = around.close(KEYFRAMES - 1, 0);
+        assert_eq!(filter.apply(&closing).unwrap().outcome, Outcome::Accepted);
+        for (nees, k) in after.iter_mut().zip(of_interest) {
+            nees.add(&filter.pose(k).unwrap(), &around.truth[k]);
+        }
+    }
+    for (name, nees) in [("open", open), ("before", before), ("after", after)] {
+        nees[0].check(&format!("{name}, half-way"));
+        nees[1].check(&format!("{name}, at the end"));
+    }
+}
