@@ -1,6 +1,8 @@
 //! Bad input: one clear sentence and a failure before anything starts, or a scan that is skipped, counted, and no more.
 
-use std::{fs, path::Path, process::Command};
+use std::{fs, path::Path};
+
+use gyre_stage::run::SHARED_MEMORY;
 
 use crate::common::{Ended, Run, STAGES, odometry, recording};
 
@@ -349,36 +351,10 @@ fn a_journal_of_another_program_is_reported() {
         .refused_with(&["poses.journal", "not a journal", "--out"]);
 }
 
-/// The command of `run` with a small or no shared memory of its own; `None` where the system does not permit that.
-fn with_shared_memory(run: &Run, options: &str) -> Option<Command> {
-    let unshare = |script: &str| {
-        let mut command = Command::new("unshare");
-        command.args([
-            "--mount",
-            "sh",
-            "-c",
-            &format!("mount -t tmpfs -o {options} tmpfs /dev/shm && {script}"),
-            "sh",
-        ]);
-        command
-    };
-    if !unshare("true")
-        .output()
-        .is_ok_and(|output| output.status.success())
-    {
-        println!("skipped: a mount namespace of its own is not permitted here");
-        return None;
-    }
-    let own = run.command();
-    let mut command = unshare("exec \"$@\"");
-    command.arg(own.get_program()).args(own.get_args());
-    Some(command)
-}
-
 #[test]
 fn too_little_shared_memory_is_reported_with_the_need_before_the_first_scan() {
     let run = Run::of_recording();
-    let Some(command) = with_shared_memory(&run, "size=1m") else {
+    let Some(command) = run.with_tmpfs(Path::new(SHARED_MEMORY), "size=1m") else {
         return;
     };
     let ended = run.start_as(command).finish();
@@ -394,7 +370,7 @@ fn too_little_shared_memory_is_reported_with_the_need_before_the_first_scan() {
 #[test]
 fn shared_memory_that_cannot_be_written_is_reported() {
     let run = Run::of_recording();
-    let Some(command) = with_shared_memory(&run, "ro,size=1g") else {
+    let Some(command) = run.with_tmpfs(Path::new(SHARED_MEMORY), "ro,size=1g") else {
         return;
     };
     run.start_as(command)
@@ -405,7 +381,7 @@ fn shared_memory_that_cannot_be_written_is_reported() {
 #[test]
 fn just_enough_shared_memory_suffices() {
     let run = Run::of_recording();
-    let Some(small) = with_shared_memory(&run, "size=1m") else {
+    let Some(small) = run.with_tmpfs(Path::new(SHARED_MEMORY), "size=1m") else {
         return;
     };
     let said = run.start_as(small).finish().stderr;
@@ -419,7 +395,7 @@ fn just_enough_shared_memory_suffices() {
         .parse()
         .unwrap();
     let size = format!("size={}k", (needed * 1e6 / 1024.0) as u64 + 200);
-    run.start_as(with_shared_memory(&run, &size).unwrap())
+    run.start_as(run.with_tmpfs(Path::new(SHARED_MEMORY), &size).unwrap())
         .finish()
         .succeeded();
 }

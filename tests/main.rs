@@ -6,6 +6,7 @@ mod common;
 
 mod bad_input;
 mod evaluate;
+mod full_disk;
 mod in_process;
 mod joint_search;
 mod k2pi;

@@ -12,7 +12,6 @@ mod tables;
 
 use std::process::ExitCode;
 
-use clap::Parser;
 use cli::{Command, Lab};
 use gyre::Failure;
 use gyre_stage::CountingAllocator;
@@ -22,9 +21,10 @@ use gyre_stage::CountingAllocator;
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 fn main() -> ExitCode {
-    match Lab::parse().command {
-        Command::Gyre(command) => gyre::report("gyre", gyre::execute(command)),
-        command => gyre::report("gyre-lab", execute(command)),
+    match gyre::parse::<Lab>("gyre-lab").map(|lab| lab.command) {
+        Ok(Command::Gyre(command)) => gyre::report("gyre", gyre::execute(command)),
+        Ok(command) => gyre::report("gyre-lab", execute(command)),
+        Err(code) => code,
     }
 }
 

@@ -193,6 +193,25 @@ impl Run {
         command
     }
 
+    /// The command line with a file system of its own at `place`; `None` where the system does not permit that.
+    pub fn with_tmpfs(&self, place: &Path, options: &str) -> Option<Command> {
+        let unshare = |script: &str| {
+            let mut command = Command::new("unshare");
+            let mount = format!("mount -t tmpfs -o {options} tmpfs \"$0\" && {script}");
+            command.args(["--mount", "sh", "-c", &mount]).arg(place);
+            command
+        };
+        let permitted = unshare("true").output();
+        if !permitted.is_ok_and(|output| output.status.success()) {
+            println!("skipped: a mount namespace of its own is not permitted here");
+            return None;
+        }
+        let own = self.command();
+        let mut command = unshare("exec \"$@\"");
+        command.arg(own.get_program()).args(own.get_args());
+        Some(command)
+    }
+
     /// Starts it.
     pub fn start(&self) -> Running {
         self.start_as(self.command())

@@ -24,7 +24,11 @@ pub mod summary;
 
 use std::process::ExitCode;
 
+use clap::Parser;
 use cli::Command;
+
+/// The exit code after wrong arguments.
+const WRONG_ARGUMENTS: u8 = 2;
 
 /// A sentence for the person at the terminal.
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
@@ -46,6 +50,17 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Schema(arguments) => schema::schema(&arguments),
     }
+}
+
+/// Parses the command line. Help is printed to standard output, a wrong argument to standard error, and the exit code is returned.
+///
+/// # Errors
+/// Help that was asked for, or a wrong argument.
+pub fn parse<P: Parser>(program: &str) -> Result<P, ExitCode> {
+    P::try_parse().map_err(|error| match (error.use_stderr(), error.print()) {
+        (true, _) => ExitCode::from(WRONG_ARGUMENTS),
+        (false, written) => report(program, print::printed(written).map(|()| ExitCode::SUCCESS)),
+    })
 }
 
 /// The exit code of a command; a failure is printed as `program: sentence`.

@@ -2,7 +2,6 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
 use gyre::cli::Gyre;
 use gyre_stage::CountingAllocator;
 
@@ -11,5 +10,8 @@ use gyre_stage::CountingAllocator;
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 fn main() -> ExitCode {
-    gyre::report("gyre", gyre::execute(Gyre::parse().command))
+    match gyre::parse::<Gyre>("gyre") {
+        Ok(gyre) => gyre::report("gyre", gyre::execute(gyre.command)),
+        Err(code) => code,
+    }
 }

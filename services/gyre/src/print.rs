@@ -1,6 +1,9 @@
 //! Printing to the terminal; a closed pipe is not an error.
 
-use std::{fmt::Display, io::Write};
+use std::{
+    fmt::Display,
+    io::{self, Write},
+};
 
 use crate::Failure;
 
@@ -9,13 +12,23 @@ use crate::Failure;
 /// # Errors
 /// Any other failure to write.
 pub fn line(text: impl Display) -> Result<(), Failure> {
-    match writeln!(std::io::stdout(), "{text}") {
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),
+    printed(writeln!(io::stdout(), "{text}"))
+}
+
+/// Returns whether standard output was written, in a sentence.
+///
+/// # Errors
+/// Any failure but a closed pipe.
+pub fn printed(written: io::Result<()>) -> Result<(), Failure> {
+    match written {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(format!("cannot write to standard output: {error}").into())
+        }
         _ => Ok(()),
     }
 }
 
 /// Prints a line to standard error. Failures are ignored: a run does not end because its terminal is closed.
 pub fn note(text: impl Display) {
-    let _ = writeln!(std::io::stderr(), "{text}");
+    let _ = writeln!(io::stderr(), "{text}");
 }

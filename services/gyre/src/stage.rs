@@ -8,11 +8,15 @@ use gyre_radar_replay::Pace;
 use gyre_simulator::{SimulatedDrive, SimulationConfig};
 use gyre_stage::{Launch, StageCounters, StageError, launch};
 
+use crate::print;
+
 /// Runs a stage by its name.
 pub fn run(name: &str) -> ExitCode {
     let Some(stage) = StageId::by_name(name) else {
         let names = StageId::ALL.map(StageId::name).join(", ");
-        eprintln!("gyre: there is no stage `{name}`; there are {names}");
+        print::note(format_args!(
+            "gyre: there is no stage `{name}`; there are {names}"
+        ));
         return ExitCode::FAILURE;
     };
     let work: fn(&Launch) -> Result<StageCounters, StageError> = match stage {

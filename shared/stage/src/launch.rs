@@ -2,6 +2,8 @@
 
 use std::{
     fs::{self, OpenOptions},
+    io::Write,
+    os::unix::fs::OpenOptionsExt,
     path::PathBuf,
     process::ExitCode,
     sync::Mutex,
@@ -111,9 +113,24 @@ pub fn main(
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             tracing::error!("{error}");
-            eprintln!("{name}: {error}");
+            let sentence = format!("{name}: {error}");
+            // Either fails if the disk is full.
+            let _ = writeln!(std::io::stderr(), "{sentence}");
+            leave_last_words(name, &sentence);
             ExitCode::from(error.exit_code())
         }
+    }
+}
+
+/// Returns the name of the file in the run's root in which a stage says why it ended.
+pub(crate) fn last_words(stage: &str) -> String {
+    format!("{stage}.error")
+}
+
+/// Tells the supervisor why the stage ended, in shared memory: the disk of the logs may be full.
+fn leave_last_words(stage: &str, sentence: &str) {
+    if let Some(root) = std::env::var_os(run::ENVIRONMENT) {
+        let _ = run::write(PathBuf::from(root).join(last_words(stage)), sentence);
     }
 }
 
@@ -124,6 +141,7 @@ fn start_log(manifest: &Manifest, name: &str) -> Result<EnteredSpan, StageError>
     let file = OpenOptions::new()
         .append(true)
         .create(true)
+        .mode(0o600)
         .open(&path)
         .map_err(|source| StageError::File { path, source })?;
     let filter =
@@ -131,6 +149,8 @@ fn start_log(manifest: &Manifest, name: &str) -> Result<EnteredSpan, StageError>
     let log = tracing_subscriber::fmt()
         .json()
         .with_env_filter(filter)
+        // They would be printed to standard error, and panic if that cannot be written either.
+        .log_internal_errors(false)
         .with_writer(Mutex::new(file));
     // A second call in one process (tests) keeps the first log.
     let _ = log.try_init();

@@ -5,6 +5,7 @@
 
 mod child;
 mod clean;
+mod log;
 mod plan;
 mod watchdog;
 

@@ -2,9 +2,10 @@
 
 use std::{
     collections::VecDeque,
-    fs::{File, OpenOptions},
-    io::{self, Read, Seek, SeekFrom},
+    fs::{self, File},
+    io,
     os::unix::process::{CommandExt, ExitStatusExt},
+    path::PathBuf,
     process::{Command, ExitStatus, Stdio},
     time::{Duration, Instant},
 };
@@ -14,8 +15,8 @@ use rustix::process::{
     Pid, Signal, getpid, getppid, kill_process_group, set_parent_process_death_signal,
 };
 
-use super::{StagePlan, SuperviseError};
-use crate::{Manifest, StageError, run};
+use super::{StagePlan, SuperviseError, log::Log};
+use crate::{Manifest, StageError, launch, run};
 
 /// The death of a process.
 #[derive(Clone, Debug)]
@@ -38,15 +39,15 @@ pub(super) struct Child {
     deaths: VecDeque<Instant>,
     /// The newest pose at the last restart.
     pose_at_restart: Option<Option<u64>>,
-    log_offset: u64,
-    log: File,
+    /// The file in which the process says why it ended.
+    last_words: PathBuf,
+    log: Log,
 }
 
 impl Child {
     pub(super) fn spawn(plan: &StagePlan, manifest: &Manifest) -> Result<Self, SuperviseError> {
-        let log = open_log(plan, manifest)?;
-        let log_offset = log.metadata().map_or(0, |log| log.len());
-        let process = start(plan, manifest, &log)?;
+        let log = Log::open(manifest, &plan.name)?;
+        let process = start(plan, manifest, log.file())?;
         Ok(Self {
             plan: plan.clone(),
             process,
@@ -54,7 +55,7 @@ impl Child {
             status: None,
             deaths: VecDeque::new(),
             pose_at_restart: None,
-            log_offset,
+            last_words: manifest.root.join(launch::last_words(&plan.name)),
             log,
         })
     }
@@ -64,7 +65,7 @@ impl Child {
         manifest: &Manifest,
         newest_pose: Option<u64>,
     ) -> Result<(), SuperviseError> {
-        self.process = start(&self.plan, manifest, &self.log)?;
+        self.process = start(&self.plan, manifest, self.log.file())?;
         self.started = Instant::now();
         self.status = None;
         self.pose_at_restart = Some(newest_pose);
@@ -179,16 +180,12 @@ impl Child {
         }
     }
 
+    /// Returns the reason that the process gave, else the last line of its output.
     fn last_output(&mut self) -> Option<String> {
-        let mut output = String::new();
-        self.log.seek(SeekFrom::Start(self.log_offset)).ok()?;
-        let read = self.log.read_to_string(&mut output).ok()?;
-        self.log_offset += read as u64;
-        output
-            .lines()
-            .rev()
-            .find(|line| !line.trim().is_empty())
-            .map(str::to_owned)
+        let written = fs::read_to_string(&self.last_words);
+        let _ = fs::remove_file(&self.last_words);
+        let output = self.log.last_line();
+        written.ok().or(output)
     }
 }
 
@@ -196,17 +193,6 @@ impl Drop for Child {
     fn drop(&mut self) {
         self.kill();
     }
-}
-
-/// Opens the log of a stage's standard output and error: `<out>/log/<stage>.txt`.
-fn open_log(plan: &StagePlan, manifest: &Manifest) -> Result<File, StageError> {
-    let path = manifest.out.join("log").join(format!("{}.txt", plan.name));
-    let opened = OpenOptions::new()
-        .create(true)
-        .append(true)
-        .read(true)
-        .open(&path);
-    opened.map_err(|source| StageError::File { path, source })
 }
 
 fn start(

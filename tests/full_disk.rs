@@ -1,0 +1,88 @@
+//! A full disk: the exit code and, where it can be written, a sentence tell what happened; nothing panics.
+
+use std::{fs::File, path::Path, process::Command};
+
+use crate::common::{Ended, Run, gyre, recording, undisturbed};
+
+/// A device on which every write fails as on a full disk.
+fn full() -> File {
+    File::options().write(true).open("/dev/full").unwrap()
+}
+
+fn with_full_output(mut command: Command) -> Ended {
+    command.stdout(full());
+    Ended::of(command)
+}
+
+fn exit_code_without_errors(mut command: Command) -> Option<i32> {
+    command.stdout(full()).stderr(full());
+    command.status().unwrap().code()
+}
+
+fn command(arguments: &[&str]) -> Command {
+    let mut command = gyre();
+    command.args(arguments);
+    command
+}
+
+#[test]
+fn results_that_cannot_be_printed_are_a_failure_in_a_sentence() {
+    let recording = recording::small().to_str().unwrap();
+    for arguments in [&["inspect", recording][..], &["--help"], &["schema"]] {
+        let ended = with_full_output(command(arguments));
+        ended.refused_with(&["cannot write to standard output", "No space left"]);
+    }
+}
+
+#[test]
+fn a_run_that_cannot_print_has_its_results_all_the_same() {
+    let run = Run::of_recording();
+    assert_eq!(exit_code_without_errors(run.command()), Some(1));
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn an_error_that_cannot_be_printed_is_told_by_the_exit_code() {
+    for (arguments, code) in [
+        (&["inspect", "/nowhere"][..], 1),
+        (&["stage", "nowhere"], 1),
+        (&["stage", "masking"], 2),
+        (&["--nonsense"], 2),
+    ] {
+        assert_eq!(exit_code_without_errors(command(arguments)), Some(code));
+    }
+}
+
+#[test]
+fn results_on_a_full_disk_end_the_run_with_the_reason() {
+    let run = Run::of_recording();
+    std::fs::create_dir(run.out()).unwrap();
+    let Some(command) = run.with_tmpfs(run.out(), "size=64k") else {
+        return;
+    };
+    let ended = run.start_as(command).finish();
+    ended.failed_with(&["No space left on device", &run.out().display().to_string()]);
+    assert!(!ended.stderr.contains("exit code 101"), "{}", ended.stderr);
+}
+
+#[test]
+fn logs_that_cannot_be_written_do_not_disturb_a_run() {
+    let run = Run::of_recording().rate("6");
+    let mut running = run.start();
+    running.await_poses(3).signal(rustix::process::Signal::INT);
+    running.finish();
+    let logs = run.out().join("log").read_dir().unwrap();
+    let logs = logs.map(|log| log.unwrap().path());
+    for log in logs.chain([run.out().join("log.jsonl")]) {
+        std::fs::remove_file(&log).unwrap();
+        std::os::unix::fs::symlink(Path::new("/dev/full"), &log).unwrap();
+    }
+    let mut command = Command::new("env");
+    let own = run.command();
+    command.args(["GYRE_LOG=trace"]);
+    command.arg(own.get_program()).args(own.get_args());
+    let ended = run.start_as(command).finish();
+    ended.succeeded();
+    assert!(!ended.stderr.contains("died"), "{}", ended.stderr);
+    assert_eq!(run.odometry(), undisturbed());
+}
