@@ -56,6 +56,9 @@ pub struct RunConfig {
     /// Pace of the source: `max`, `realtime`, or a factor of real time from 0.001 to 1000. Live mode
     /// needs another than `max`.
     pub rate: Rate,
+    /// Room for programs that look on, 0 to 64 of each topic: `gyre watch`, a viewer, a recorder. They
+    /// change neither a result nor a latency. Each needs shared memory for one message of each topic.
+    pub observers: usize,
     /// Time for which a published scan may lack its pose, or the source a scan that is due, s; 0: no
     /// limit. Then stages are restarted: first the source if it is late, else all but a live source;
     /// if that does not help, all; if that does not help either, the run ends.
@@ -95,6 +98,7 @@ impl Default for RunConfig {
             mode: Mode::Lossless,
             window: 4,
             rate: Rate::Max,
+            observers: 8,
             stall_timeout_s: 60.0,
             start_timeout_s: 300.0,
             ground_truth: None,
@@ -323,6 +327,7 @@ impl Configuration {
             lag: self.odometry.masking.feedback_lag(),
             look_back: scans_a_mask,
             live_depth,
+            observers: self.run.observers,
         }
     }
 
@@ -420,6 +425,7 @@ impl Configuration {
                     ![
                         "rate",
                         "window",
+                        "observers",
                         "stall_timeout_s",
                         "start_timeout_s",
                         "ground_truth",

@@ -107,6 +107,7 @@ mod tests {
             lag: 2,
             look_back,
             live_depth: 0,
+            observers: 0,
         };
         let kept = |look_back, published, has_previous| {
             serves_only_as_previous(&window(look_back), &scan(published), Some(9), has_previous)

@@ -34,7 +34,7 @@ mod topics;
 
 pub use block::{ByteBlock, FloatBlock};
 pub use item::{Hop, Hops, Item, StageId, flag};
-pub use limits::{History, Limits, MAX_NODES, TopicSizes, Window, WindowError};
+pub use limits::{History, Limits, TopicSizes, Window, WindowError};
 pub use masked::{Masked, MaskedHeader, MaskedParts, Pair, mask_kind};
 pub use message::{Header, Message};
 pub use motion::{Motion, MotionEstimate, MotionHeader, SearchedMotion};

@@ -3,8 +3,10 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Processes that may have a topic open at once. A dead process counts until its resources are removed.
-pub const MAX_NODES: usize = 16;
+/// Processes of the run that may have a topic open at once. A dead process counts until its resources are removed.
+const NODES: usize = 16;
+/// The largest number of observers of a topic.
+const MAX_OBSERVERS: usize = 64;
 /// Samples that a reader may hold: the previous one, the current one, and one that is being received.
 const BORROWED: usize = 3;
 /// Samples that a publisher may fill at once.
@@ -21,6 +23,8 @@ pub struct Window {
     pub look_back: usize,
     /// Length of the history that the source keeps for masking in live mode; 0 in lossless mode.
     pub live_depth: usize,
+    /// Number of observers that each topic has room for: see [`TopicSizes::observers`].
+    pub observers: usize,
 }
 
 /// A window out of its bounds.
@@ -32,6 +36,9 @@ pub enum WindowError {
     /// The lag is larger than the motions that are kept.
     #[error("masking.lag is {0}, but must be at most 16 scans")]
     Lag(usize),
+    /// The number of observers is too large.
+    #[error("run.observers is {0}, but must be at most {MAX_OBSERVERS}")]
+    Observers(usize),
 }
 
 /// The reach of a publisher's history for restarted readers.
@@ -54,14 +61,27 @@ pub struct TopicSizes {
     pub borrowed: usize,
     /// Samples that the publisher may fill at once.
     pub loaned: usize,
-    /// Number of readers.
+    /// Number of readers, which are stages of the run or its supervisor.
     pub readers: usize,
+    /// Number of further subscribers. They may lose samples, and hold at most one at a time.
+    pub observers: usize,
 }
 
 impl TopicSizes {
-    /// Samples in the publisher's segment.
+    /// Samples in the publisher's segment. History and queues hold the same newest samples, so only the longest of them counts;
+    /// each sample that a reader or an observer holds may be an older one.
     pub fn samples(&self) -> usize {
-        self.readers * (self.buffer + self.borrowed) + self.history + self.loaned
+        self.history.max(self.buffer) + self.readers * self.borrowed + self.observers + self.loaned
+    }
+
+    /// Maximum number of subscribers.
+    pub fn subscribers(&self) -> usize {
+        self.readers + self.observers
+    }
+
+    /// Processes that may have the topic open at once.
+    pub fn nodes(&self) -> usize {
+        NODES + self.observers
     }
 }
 
@@ -76,6 +96,9 @@ impl Window {
         }
         if self.lag > 16 {
             return Err(WindowError::Lag(self.lag));
+        }
+        if self.observers > MAX_OBSERVERS {
+            return Err(WindowError::Observers(self.observers));
         }
         Ok(())
     }
@@ -105,6 +128,7 @@ impl Window {
             borrowed: BORROWED,
             loaned: LOANED,
             readers,
+            observers: self.observers,
         }
     }
 }
@@ -131,6 +155,7 @@ mod tests {
         lag: 2,
         look_back: 1,
         live_depth: 0,
+        observers: 0,
     };
 
     #[test]

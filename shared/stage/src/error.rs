@@ -23,6 +23,19 @@ pub enum StageError {
         /// The reason.
         reason: String,
     },
+    /// No run writes to a folder.
+    #[error("no run is writing to {0}: `gyre run` starts one, and its --out names the folder")]
+    NotRunning(PathBuf),
+    /// All places of observers are taken.
+    #[error(
+        "the {observers} places for observers of topic `{topic}` are taken: wait until one leaves, or raise run.observers"
+    )]
+    NoPlace {
+        /// The topic.
+        topic: &'static str,
+        /// The number of places.
+        observers: usize,
+    },
     /// The configuration is invalid.
     #[error("{0}")]
     Configuration(String),

@@ -8,7 +8,8 @@
 //! 4. [`wake`]: how a process sleeps until there is work.
 //! 5. [`source`], [`stage`], [`sink`]: the loops of the first, the middle and the last processes; [`inputs`]: what a middle
 //!    process waits for.
-//! 6. [`supervise`]: starts the processes, restarts dead ones, removes all resources at the end.
+//! 6. [`observer`]: subscribers that the run does not depend on.
+//! 7. [`supervise`]: starts the processes, restarts dead ones, removes all resources at the end.
 //!
 //! The protocol in one paragraph: items carry consecutive sequence numbers. The source may have W of them in flight; each pose
 //! is the credit for one more. A stage is a function of its inputs, and a publisher keeps a history for late readers. So a
@@ -25,6 +26,7 @@ mod error;
 pub mod inputs;
 pub mod launch;
 pub mod lock;
+pub mod observer;
 pub mod reader;
 pub mod run;
 mod schedule;

@@ -20,6 +20,13 @@ pub struct Received<M: Message> {
 }
 
 impl<M: Message> Received<M> {
+    pub(crate) fn new(sample: Sample<Ipc, [M::Element], M::Header>) -> Self {
+        Self {
+            sample,
+            received_ns: clock::now_ns(),
+        }
+    }
+
     /// Returns the header.
     pub fn header(&self) -> &M::Header {
         self.sample.user_header()
@@ -84,10 +91,7 @@ impl<M: Message> Port<M> {
     /// A failure of the transport.
     pub fn receive(&self) -> Result<Option<Received<M>>, StageError> {
         match self.subscriber.receive() {
-            Ok(sample) => Ok(sample.map(|sample| Received {
-                sample,
-                received_ns: clock::now_ns(),
-            })),
+            Ok(sample) => Ok(sample.map(Received::new)),
             // Samples of a dead publisher are still borrowed. The next call succeeds once they are released.
             Err(ReceiveError::ExceedsMaxBorrows) => Ok(None),
             Err(error) => Err(StageError::transport(

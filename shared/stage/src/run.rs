@@ -52,13 +52,17 @@ impl Manifest {
     /// # Errors
     /// A file that is missing or invalid.
     pub fn read(root: &Path) -> Result<Self, StageError> {
-        let path = root.join("manifest.json");
+        let path = Self::path(root);
         let failed = |reason: String| StageError::Manifest {
             path: path.clone(),
             reason,
         };
         let text = fs::read_to_string(&path).map_err(|error| failed(error.to_string()))?;
         serde_json::from_str(&text).map_err(|error| failed(error.to_string()))
+    }
+
+    pub(crate) fn path(root: &Path) -> PathBuf {
+        root.join("manifest.json")
     }
 
     /// Writes the manifest, the resolved configuration and the configuration of the transport into the run's root.

@@ -1,9 +1,7 @@
 //! The services of the transport: the supervisor creates them once with the sizes of the window, and stages only open them.
 //! So no restart finds a service missing or of another size.
 
-use gyre_messages::{
-    MAX_NODES, Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId, Window,
-};
+use gyre_messages::{Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId, Window};
 use iceoryx2::{
     prelude::{Config, NodeBuilder, NodeName, ServiceName, SignalHandlingMode, ipc},
     service::port_factory::{PortFactory, event, publish_subscribe},
@@ -50,14 +48,19 @@ impl Services {
     pub(crate) fn create(node: &Node, window: &Window) -> Result<Self, StageError> {
         let mut events = Vec::new();
         for topic in gyre_messages::TOPICS {
-            let readers = (topic.sizes)(window).readers;
-            events.push(create_event(node, &data_event(topic.name), readers, 1)?);
-            events.push(create_event(
-                node,
-                &handshake_event(topic.name),
-                1,
-                readers,
-            )?);
+            let sizes = (topic.sizes)(window);
+            let data = EventSizes {
+                listeners: sizes.subscribers(),
+                notifiers: 1,
+                nodes: sizes.nodes(),
+            };
+            let handshake = EventSizes {
+                listeners: 1,
+                notifiers: sizes.readers,
+                nodes: sizes.nodes(),
+            };
+            events.push(create_event(node, &data_event(topic.name), data)?);
+            events.push(create_event(node, &handshake_event(topic.name), handshake)?);
         }
         Ok(Self {
             scan: create_topic::<Scan>(node, window)?,
@@ -111,23 +114,25 @@ fn create_topic<M: Message>(node: &Node, window: &Window) -> Result<Topic<M>, St
         .subscriber_max_buffer_size(sizes.buffer)
         .subscriber_max_borrowed_samples(sizes.borrowed)
         .max_publishers(1)
-        .max_subscribers(sizes.readers)
-        .max_nodes(MAX_NODES)
+        .max_subscribers(sizes.subscribers())
+        .max_nodes(sizes.nodes())
         .create()
         .map_err(|e| StageError::transport(format!("create the topic {}", M::TOPIC), e))
 }
 
-fn create_event(
-    node: &Node,
-    name: &str,
+/// Numbers of ports that an event has room for, without the spare ones.
+struct EventSizes {
     listeners: usize,
     notifiers: usize,
-) -> Result<Event, StageError> {
+    nodes: usize,
+}
+
+fn create_event(node: &Node, name: &str, sizes: EventSizes) -> Result<Event, StageError> {
     node.service_builder(&service_name(name)?)
         .event()
-        .max_listeners(listeners + HEADROOM)
-        .max_notifiers(notifiers + HEADROOM)
-        .max_nodes(MAX_NODES)
+        .max_listeners(sizes.listeners + HEADROOM)
+        .max_notifiers(sizes.notifiers + HEADROOM)
+        .max_nodes(sizes.nodes)
         .event_id_max_value(1)
         .create()
         .map_err(|e| StageError::transport(format!("create the event {name}"), e))

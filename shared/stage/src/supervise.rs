@@ -6,6 +6,7 @@
 mod child;
 mod clean;
 mod log;
+mod observers;
 mod plan;
 mod watchdog;
 
@@ -68,6 +69,7 @@ struct Supervisor<'a> {
     /// Restarted stages with no pose yet that the new process worked on.
     recovering: Vec<Recovering>,
     recovery: Vec<Duration>,
+    observers: observers::Sweep,
     // Dropped in this order: ports, services, node.
     poses: Port<Pose>,
     services: Services,
@@ -105,6 +107,7 @@ impl<'a> Supervisor<'a> {
             restarts: BTreeMap::new(),
             recovering: Vec::new(),
             recovery: Vec::new(),
+            observers: observers::Sweep::new(),
             poses,
             services,
             _node: node,
@@ -136,6 +139,9 @@ impl<'a> Supervisor<'a> {
             if self.read_poses()? {
                 return Ok(Ending::Complete);
             }
+            let processes = self.children.len() + 1;
+            self.observers
+                .run_if_due(&self.plan.manifest, &self.transport, processes);
             let dead: Vec<usize> = (0..self.children.len())
                 .filter(|i| self.children[*i].has_exited())
                 .collect();

@@ -3,8 +3,11 @@
 #![allow(clippy::unwrap_used)]
 
 mod hand_over;
+mod observers;
 mod wake_up;
 mod zero_copy;
+
+use std::rc::Rc;
 
 use gyre_messages::{Item, Limits, Message, Pose, StageId, Window};
 use tempfile::TempDir;
@@ -23,6 +26,7 @@ const WINDOW: Window = Window {
     lag: 1,
     look_back: 1,
     live_depth: 0,
+    observers: 2,
 };
 
 /// A run without processes: its services, and nodes for tests. Runs are isolated from each other.
@@ -32,12 +36,15 @@ struct Run {
     _supervisor: Node,
     // Last: removes all files of the run.
     _root: RunRoot,
-    _out: TempDir,
+    _out: Rc<TempDir>,
 }
 
 impl Run {
     fn new() -> Self {
-        let out = tempfile::tempdir().unwrap();
+        Self::writing_to(&Rc::new(tempfile::tempdir().unwrap()))
+    }
+
+    fn writing_to(out: &Rc<TempDir>) -> Self {
         let root = RunRoot::acquire(out.path(), &Signals::install().unwrap()).unwrap();
         let manifest = Manifest {
             prefix: root.prefix(),
@@ -62,7 +69,7 @@ impl Run {
             _services: services,
             _supervisor: supervisor,
             _root: root,
-            _out: out,
+            _out: Rc::clone(out),
         }
     }
 }

@@ -31,11 +31,14 @@ impl<M: Message> Writer<M> {
         let handshake = services::listener(node, &services::handshake_event(M::TOPIC))?;
         let data = services::notifier(node, &services::data_event(M::TOPIC))?;
         let elements = M::max_elements(&manifest.limits);
+        let sizes = M::sizes(&manifest.window);
         // Last, since a publisher connects to all existing readers at once.
         let publisher = services::open_topic::<M>(node)?
             .publisher_builder()
             .initial_max_slice_len(elements)
-            .max_loaned_samples(M::sizes(&manifest.window).loaned)
+            .max_loaned_samples(sizes.loaned)
+            // The transport would reserve a queue of samples of its own for each subscriber.
+            .override_sample_preallocation(move |_| sizes.samples())
             // Never wait for a slow or dead reader: the window bounds the items in flight.
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()

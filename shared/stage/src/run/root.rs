@@ -21,7 +21,7 @@ use rustix::{
 use thiserror::Error;
 
 use crate::{
-    StageError,
+    StageError, clock,
     lock::{Attempt, try_lock},
     wake::Signals,
 };
@@ -38,7 +38,7 @@ const PAUSE: Duration = Duration::from_millis(20);
 /// The root of a run in shared memory, locked by its supervisor. Dropping it removes all files of the run.
 #[derive(Debug)]
 pub struct RunRoot {
-    name: String,
+    prefix: String,
     path: PathBuf,
     _lock: File,
 }
@@ -103,7 +103,9 @@ impl RunRoot {
                     remove_files(&path);
                     make_directory(&path).map_err(unusable)?;
                     return Ok(Self {
-                        name,
+                        // Of this start alone: a process that still has files of an earlier run open, as an observer may,
+                        // must not remove files of this one.
+                        prefix: format!("{name}_{:08x}_", clock::now_ns() as u32),
                         path,
                         _lock: lock,
                     });
@@ -127,7 +129,7 @@ impl RunRoot {
 
     /// Returns the prefix of all names of the run in shared memory.
     pub fn prefix(&self) -> String {
-        format!("{}_", self.name)
+        self.prefix.clone()
     }
 
     /// Returns the path of the root.

@@ -5,7 +5,12 @@
 //! cleanup fails. A time limit covers unknown cases.
 
 use std::{
-    collections::HashSet, fs, os::unix::fs::PermissionsExt, path::Path, sync::mpsc, thread,
+    collections::HashSet,
+    fs,
+    os::unix::fs::PermissionsExt,
+    path::{Path, PathBuf},
+    sync::mpsc,
+    thread,
     time::Duration,
 };
 
@@ -16,13 +21,15 @@ use iceoryx2::{
 
 use super::SuperviseError;
 use crate::{
-    Manifest,
+    Manifest, observer,
     run::{self, SHARED_MEMORY},
     services,
 };
 
 /// Time limit of a cleanup, which normally takes milliseconds.
 const LIMIT: Duration = Duration::from_secs(3);
+/// Time after which a file that is still empty is not being created any more, which takes microseconds.
+const UNFINISHED: Duration = Duration::from_millis(200);
 /// File mode of an incomplete tag. A complete one is read-only.
 const INCOMPLETE: u32 = 0o600;
 
@@ -36,11 +43,26 @@ pub(super) fn remove_dead(
     all_dead: bool,
 ) -> Result<(), SuperviseError> {
     let (manifest, transport) = (manifest.clone(), transport.clone());
+    within_limit(move || clean(&manifest, &transport, all_dead))
+}
+
+/// Removes all resources of dead observers, and the files that would make a stage wait for a stopped one.
+pub(super) fn remove_dead_observers(
+    manifest: &Manifest,
+    transport: &Config,
+) -> Result<(), SuperviseError> {
+    let (manifest, transport) = (manifest.clone(), transport.clone());
+    within_limit(move || {
+        unlink_unfinished_files(&manifest, &transport);
+        clean(&manifest, &transport, false)
+    })
+}
+
+fn within_limit(clean: impl FnOnce() -> bool + Send + 'static) -> Result<(), SuperviseError> {
     let (done, finished) = mpsc::channel();
     // On a thread of its own, since a cleanup that hangs cannot be cancelled.
     thread::spawn(move || {
-        let cleaned = clean(&manifest, &transport, all_dead);
-        let _ = done.send(cleaned);
+        let _ = done.send(clean());
     });
     match finished.recv_timeout(LIMIT) {
         Ok(true) => Ok(()),
@@ -51,9 +73,11 @@ pub(super) fn remove_dead(
 fn clean(manifest: &Manifest, transport: &Config, all_dead: bool) -> bool {
     let dead = dead_nodes(transport);
     let ports = ports_of(manifest, &dead);
-    unlink_empty_files(Path::new(SHARED_MEMORY), &manifest.prefix, |name| {
-        all_dead || ports.iter().any(|port| name.contains(port.as_str()))
-    });
+    let is_dead = |name: &str| all_dead || ports.iter().any(|port| name.contains(port.as_str()));
+    let empty = empty_files(Path::new(SHARED_MEMORY), &manifest.prefix, is_dead);
+    empty
+        .into_iter()
+        .for_each(|file| drop(fs::remove_file(file)));
     if remove_dead_nodes(transport) {
         return true;
     }
@@ -72,6 +96,35 @@ fn dead_nodes(transport: &Config) -> Vec<String> {
         CallbackProgression::Continue
     });
     dead
+}
+
+/// Removes empty files of living observers that stay empty: an observer was stopped while it created them.
+fn unlink_unfinished_files(manifest: &Manifest, transport: &Config) {
+    let ports = ports_of(manifest, &living_observers(transport));
+    let unfinished = || {
+        let is_of_observer = |name: &str| ports.iter().any(|port| name.contains(port.as_str()));
+        empty_files(Path::new(SHARED_MEMORY), &manifest.prefix, is_of_observer)
+    };
+    let seen = unfinished();
+    if !seen.is_empty() {
+        thread::sleep(UNFINISHED);
+        let still = unfinished().into_iter().filter(|file| seen.contains(file));
+        still.for_each(|file| drop(fs::remove_file(file)));
+    }
+}
+
+fn living_observers(transport: &Config) -> Vec<String> {
+    let mut observers = Vec::new();
+    let _ = TransportNode::list(transport, |state| {
+        if let NodeState::Alive(node) = state {
+            let name = node.details().as_ref().map(|details| details.name());
+            if name.is_some_and(|name| name.as_str() == observer::NAME) {
+                observers.push(node.id().value().to_string());
+            }
+        }
+        CallbackProgression::Continue
+    });
+    observers
 }
 
 fn remove_dead_nodes(transport: &Config) -> bool {
@@ -106,14 +159,13 @@ fn ports_of(manifest: &Manifest, dead: &[String]) -> HashSet<String> {
         .collect()
 }
 
-/// Removes empty files of the run whose names pass `is_dead`.
-fn unlink_empty_files(directory: &Path, prefix: &str, is_dead: impl Fn(&str) -> bool) {
-    for (path, file) in run::own_files(directory, prefix) {
+/// Returns the empty files of the run whose names pass `is_meant`.
+fn empty_files(directory: &Path, prefix: &str, is_meant: impl Fn(&str) -> bool) -> Vec<PathBuf> {
+    let empty = run::own_files(directory, prefix).filter(|(path, file)| {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        if file.len() == 0 && is_dead(&name) {
-            let _ = fs::remove_file(&path);
-        }
-    }
+        file.len() == 0 && is_meant(&name)
+    });
+    empty.map(|(path, _)| path).collect()
 }
 
 /// Removes tags that a process died creating. The cleanup needs the complete ones.
@@ -136,7 +188,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_empty_files_of_dead_ports_are_removed() {
+    fn only_empty_files_of_dead_ports_are_found() {
         let directory = tempfile::tempdir().unwrap();
         for (name, content) in [
             ("run_1_2.connection", ""),
@@ -146,13 +198,8 @@ mod tests {
         ] {
             fs::write(directory.path().join(name), content).unwrap();
         }
-        unlink_empty_files(directory.path(), "run_", |name| name.contains("_1_"));
-        let mut left: Vec<_> = fs::read_dir(directory.path())
-            .unwrap()
-            .map(|file| file.unwrap().file_name())
-            .collect();
-        left.sort();
-        assert_eq!(left, ["other_1", "run_1_5.data", "run_3_4.connection"]);
+        let empty = empty_files(directory.path(), "run_", |name| name.contains("_1_"));
+        assert_eq!(empty, [directory.path().join("run_1_2.connection")]);
     }
 
     #[test]

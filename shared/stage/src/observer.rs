@@ -1,0 +1,276 @@
+//! Observers: subscribers that the run does not depend on, in processes of their own.
+//!
+//! An observer may attach at any time, be slow, be stopped or be killed. No publisher waits for it: a full queue loses its oldest
+//! message, and the observer counts what it has missed. It holds one message at a time, which the publishers' memory is sized for
+//! (see [`TopicSizes::samples`](gyre_messages::TopicSizes::samples)). It notifies nobody, so it wakes no stage. The supervisor
+//! frees the places of killed observers.
+
+use std::{
+    fs::File,
+    path::Path,
+    thread,
+    time::{Duration, Instant},
+};
+
+use gyre_messages::{Item, Message, flag};
+use iceoryx2::{
+    port::{ReceiveError, port_name::PortName, subscriber::Subscriber},
+    prelude::{CallbackProgression, LogLevel, PortFactory, set_log_level},
+};
+
+use crate::{
+    Listener, Manifest, StageError,
+    reader::Received,
+    run,
+    services::{self, Ipc, Node, Topic},
+    wake,
+};
+
+/// The name of the nodes and the subscribers of observers. Those of a topic are counted by it.
+pub const NAME: &str = "observer";
+/// Time to wait for a place. The supervisor frees those of killed observers within a second or two.
+const MAX_WAIT_FOR_PLACE: Duration = Duration::from_secs(5);
+/// Time between two attempts to get a place.
+const RETRY: Duration = Duration::from_millis(100);
+
+/// A running run, seen from outside.
+pub struct ObservedRun {
+    manifest: Manifest,
+    /// The manifest's file. The run has ended when it is deleted.
+    file: File,
+    node: Node,
+}
+
+/// An observer of one topic.
+pub struct Observer<'run, M: Message> {
+    run: &'run ObservedRun,
+    subscriber: Subscriber<Ipc, [M::Element], M::Header>,
+    data: Listener,
+    current: Option<Received<M>>,
+    sequence: Sequence,
+}
+
+/// The next message of a topic.
+pub enum Next<'a, M: Message> {
+    /// A message, and the number of items that were missed directly before it.
+    Message(&'a Received<M>, u64),
+    /// No message within the limit.
+    Idle,
+    /// The stream or the run has ended.
+    Ended,
+}
+
+impl ObservedRun {
+    /// Attaches to the run that writes its results to `out`.
+    ///
+    /// # Errors
+    /// There is no such run, or the transport fails.
+    pub fn writing_to(out: &Path) -> Result<Self, StageError> {
+        let absolute = out.canonicalize().unwrap_or_else(|_| out.to_owned());
+        let root = run::root_of(&absolute);
+        if !root.exists() {
+            return Err(StageError::NotRunning(out.to_owned()));
+        }
+        Self::at(&root)
+    }
+
+    /// Attaches to the run with this root, the value of [`run::ENVIRONMENT`] in its processes.
+    ///
+    /// # Errors
+    /// There is no such run, or the transport fails.
+    pub fn at(root: &Path) -> Result<Self, StageError> {
+        set_log_level(LogLevel::Fatal);
+        let manifest = Manifest::read(root)?;
+        let path = Manifest::path(root);
+        let file = File::open(&path).map_err(|source| StageError::File { path, source })?;
+        let node = services::node(&manifest.transport()?, NAME)?;
+        let run = Self {
+            manifest,
+            file,
+            node,
+        };
+        match run.has_ended() {
+            true => Err(StageError::NotRunning(run.manifest.out)),
+            false => Ok(run),
+        }
+    }
+
+    /// Returns the properties of the run.
+    pub fn manifest(&self) -> &Manifest {
+        &self.manifest
+    }
+
+    /// Returns whether the run has ended and removed its files.
+    pub fn has_ended(&self) -> bool {
+        rustix::fs::fstat(&self.file).is_ok_and(|file| file.st_nlink == 0)
+    }
+
+    /// Subscribes to a topic. The first messages are those of the publisher's history.
+    ///
+    /// # Errors
+    /// All places of the topic are taken, the run has ended, or the transport fails.
+    pub fn observe<M: Message>(&self) -> Result<Observer<'_, M>, StageError> {
+        let deadline = Instant::now() + MAX_WAIT_FOR_PLACE;
+        loop {
+            let failed = match self.try_observe::<M>() {
+                Ok(observer) => return Ok(observer),
+                Err(_) if self.has_ended() => {
+                    return Err(StageError::NotRunning(self.manifest.out.clone()));
+                }
+                Err(error) => error,
+            };
+            if Instant::now() >= deadline || self.manifest.window.observers == 0 {
+                return Err(failed);
+            }
+            thread::sleep(RETRY);
+        }
+    }
+
+    pub(crate) fn try_observe<M: Message>(&self) -> Result<Observer<'_, M>, StageError> {
+        let places = self.manifest.window.observers;
+        let no_place = || StageError::NoPlace {
+            topic: M::TOPIC,
+            observers: places,
+        };
+        let name =
+            PortName::new(NAME).map_err(|e| StageError::transport("name the observer", e))?;
+        let topic = services::open_topic::<M>(&self.node)?;
+        if observers_of::<M>(&topic, &name) >= places {
+            return Err(no_place());
+        }
+        let subscriber = topic
+            .subscriber_builder()
+            .name(&name)
+            .create()
+            .map_err(|e| StageError::transport(format!("observe {}", M::TOPIC), e))?;
+        // Another one may have come at the same time. The places of the stages must stay free for their restarts.
+        if observers_of::<M>(&topic, &name) > places {
+            return Err(no_place());
+        }
+        Ok(Observer {
+            run: self,
+            subscriber,
+            data: services::listener(&self.node, &services::data_event(M::TOPIC))?,
+            current: None,
+            sequence: Sequence::default(),
+        })
+    }
+}
+
+fn observers_of<M: Message>(topic: &Topic<M>, name: &PortName) -> usize {
+    let mut observers = 0;
+    topic.dynamic_config().list_subscribers(|subscriber| {
+        observers += usize::from(subscriber.subscriber_name == *name);
+        CallbackProgression::Continue
+    });
+    observers
+}
+
+impl<M: Message> Observer<'_, M> {
+    /// Returns the next message in the publisher's memory, and waits for it at most `limit`. The message before it is released,
+    /// and the next call releases this one.
+    ///
+    /// # Errors
+    /// A failure of the transport.
+    pub fn next(&mut self, limit: Duration) -> Result<Next<'_, M>, StageError> {
+        self.current = None;
+        let since = Instant::now();
+        loop {
+            while let Some(message) = self.receive()? {
+                if let Some(missed) = self.sequence.advance(message.item()) {
+                    return Ok(Next::Message(self.current.insert(message), missed));
+                }
+            }
+            if self.sequence.ended || self.run.has_ended() {
+                return Ok(Next::Ended);
+            }
+            let left = limit.saturating_sub(since.elapsed());
+            if left.is_zero() {
+                return Ok(Next::Idle);
+            }
+            self.sleep(left.min(wake::MAX_WAIT))?;
+        }
+    }
+
+    /// Returns the number of items missed since the observer attached.
+    pub fn missed(&self) -> u64 {
+        self.sequence.missed
+    }
+
+    fn receive(&self) -> Result<Option<Received<M>>, StageError> {
+        match self.subscriber.receive() {
+            Ok(sample) => Ok(sample.map(Received::new)),
+            // The publisher has just died or is being restarted. Its next message is found at the next wake-up.
+            Err(ReceiveError::ConnectionFailure(_)) => Ok(None),
+            Err(error) => Err(StageError::transport(
+                format!("receive {}", M::TOPIC),
+                error,
+            )),
+        }
+    }
+
+    fn sleep(&self, limit: Duration) -> Result<(), StageError> {
+        use iceoryx2::port::listener::ListenerWaitError;
+        match self.data.timed_wait(|_| (), limit) {
+            Ok(_) | Err(ListenerWaitError::InterruptSignal) => Ok(()),
+            Err(error) => Err(StageError::transport("wait", error)),
+        }
+    }
+}
+
+/// The position in a sequence of items that are consecutive at the publisher.
+#[derive(Debug, Default, PartialEq, Eq)]
+struct Sequence {
+    next: Option<u64>,
+    missed: u64,
+    ended: bool,
+}
+
+impl Sequence {
+    /// Returns the number of items missed directly before this one; `None` for an item without a scan, or one that was received
+    /// before: a restarted publisher sends its last items again.
+    fn advance(&mut self, item: &Item) -> Option<u64> {
+        if item.is(flag::BASE) || self.next.is_some_and(|next| item.seq < next) {
+            return None;
+        }
+        let missed = item.seq - self.next.unwrap_or(item.seq);
+        self.next = Some(item.seq.saturating_add(1));
+        self.missed += missed;
+        self.ended = item.is(flag::END);
+        (!self.ended).then_some(missed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn item(seq: u64, flags: u32) -> Item {
+        Item {
+            seq,
+            flags,
+            ..Item::default()
+        }
+    }
+
+    #[test]
+    fn gaps_are_counted_and_repeated_items_skipped() {
+        let mut sequence = Sequence::default();
+        assert_eq!(sequence.advance(&item(0, flag::BASE | flag::SYNC)), None);
+        assert_eq!(sequence.advance(&item(5, 0)), Some(0));
+        assert_eq!(sequence.advance(&item(9, 0)), Some(3));
+        assert_eq!(sequence.advance(&item(8, 0)), None);
+        assert_eq!(sequence.advance(&item(10, flag::SYNC)), Some(0));
+        assert_eq!(sequence.missed, 3);
+        assert!(!sequence.ended);
+    }
+
+    #[test]
+    fn the_end_is_no_message_but_what_was_missed_before_it_counts() {
+        let mut sequence = Sequence::default();
+        assert_eq!(sequence.advance(&item(1, 0)), Some(0));
+        assert_eq!(sequence.advance(&item(4, flag::END)), None);
+        assert!(sequence.ended);
+        assert_eq!(sequence.missed, 2);
+    }
+}

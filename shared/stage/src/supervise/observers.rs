@@ -1,0 +1,51 @@
+//! Frees the places of killed observers while the run goes on.
+
+use std::{
+    fs,
+    time::{Duration, Instant},
+};
+
+use iceoryx2::prelude::Config;
+
+use super::clean;
+use crate::Manifest;
+
+/// Time between two looks.
+const PERIOD: Duration = Duration::from_secs(1);
+/// The same after a cleanup that failed or did not end. No stage needs it: every restart of a stage cleans up by itself.
+const PERIOD_AFTER_FAILURE: Duration = Duration::from_secs(30);
+
+/// Looks for killed observers at a low rate, since nothing tells the supervisor of their death.
+pub(super) struct Sweep {
+    due: Instant,
+}
+
+impl Sweep {
+    pub(super) fn new() -> Self {
+        Self {
+            due: Instant::now() + PERIOD,
+        }
+    }
+
+    /// Removes what killed observers left, if it is time to look. `processes` is the number of the run's own processes.
+    pub(super) fn run_if_due(&mut self, manifest: &Manifest, transport: &Config, processes: usize) {
+        let now = Instant::now();
+        if now < self.due {
+            return;
+        }
+        let has_observers = nodes(manifest) > processes;
+        let failed = has_observers && clean::remove_dead_observers(manifest, transport).is_err();
+        self.due = now
+            + match failed {
+                true => PERIOD_AFTER_FAILURE,
+                false => PERIOD,
+            };
+    }
+}
+
+/// Returns the number of processes, living and dead, that have joined the run.
+fn nodes(manifest: &Manifest) -> usize {
+    let entries = fs::read_dir(manifest.root.join("nodes")).into_iter();
+    let is_directory = |entry: &fs::DirEntry| entry.file_type().is_ok_and(|kind| kind.is_dir());
+    entries.flatten().flatten().filter(is_directory).count()
+}

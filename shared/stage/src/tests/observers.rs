@@ -1,0 +1,137 @@
+//! Observers change nothing for the others, and know what they miss.
+
+use std::{fs, rc::Rc, time::Duration};
+
+use gyre_messages::{Footprint, Masked, Message, Motion, Pose, Refined, Rotation, Scan, flag};
+
+use super::{Run, WINDOW, reader, send, writer};
+use crate::{
+    StageError,
+    observer::{Next, ObservedRun, Observer},
+    reader::{Port, Received},
+    services,
+};
+
+/// The sequence number of the next message and what was missed before it.
+fn next(observer: &mut Observer<'_, Pose>) -> Option<(u64, u64)> {
+    match observer.next(Duration::ZERO).unwrap() {
+        Next::Message(message, missed) => Some((message.item().seq, missed)),
+        Next::Idle | Next::Ended => None,
+    }
+}
+
+#[test]
+fn an_observer_counts_what_its_full_queue_lost() {
+    let run = Run::new();
+    let observed = ObservedRun::at(&run.manifest.root).unwrap();
+    let mut observer = observed.observe::<Pose>().unwrap();
+    let poses = writer::<Pose>(&run.manifest);
+    send(&poses, 0, 0);
+    assert_eq!(next(&mut observer), Some((0, 0)));
+    let queue = Pose::sizes(&WINDOW).buffer as u64;
+    (1..=queue + 5).for_each(|seq| send(&poses, seq, 0));
+    assert_eq!(next(&mut observer), Some((6, 5)));
+    assert_eq!(next(&mut observer), Some((7, 0)));
+    send(&poses, queue + 20, flag::END);
+    while next(&mut observer).is_some() {}
+    assert_eq!(observer.missed(), 5 + 14);
+    assert!(matches!(
+        observer.next(Duration::from_secs(5)),
+        Ok(Next::Ended)
+    ));
+}
+
+#[test]
+fn a_publisher_has_memory_left_whatever_its_subscribers_hold() {
+    let run = Run::new();
+    let sizes = Pose::sizes(&WINDOW);
+    let node = super::node(&run.manifest);
+    let readers: Vec<_> = (0..sizes.readers)
+        .map(|_| Port::<Pose>::on(&node).unwrap())
+        .collect();
+    let observed = ObservedRun::at(&run.manifest.root).unwrap();
+    let mut observers: Vec<_> = (0..sizes.observers)
+        .map(|_| observed.observe::<Pose>().unwrap())
+        .collect();
+    let poses = writer::<Pose>(&run.manifest);
+    // Each holds as many messages as it may, all of them different ones, and its queue overflows.
+    let (mut held, mut seq): (Vec<Received<Pose>>, u64) = (Vec::new(), 0);
+    let mut overflow = || {
+        (0..sizes.buffer).for_each(|_| {
+            send(&poses, seq, 0);
+            seq += 1;
+        });
+    };
+    for reader in &readers {
+        overflow();
+        held.extend((0..sizes.borrowed).map(|_| reader.receive().unwrap().unwrap()));
+    }
+    for observer in &mut observers {
+        overflow();
+        assert!(next(observer).is_some());
+    }
+    overflow();
+    let mut seqs: Vec<_> = held.iter().map(|message| message.item().seq).collect();
+    seqs.dedup();
+    assert_eq!(seqs.len(), sizes.readers * sizes.borrowed);
+}
+
+#[test]
+fn the_footprint_is_what_the_segments_take() {
+    let run = Run::new();
+    let manifest = &run.manifest;
+    let _scans = writer::<Scan>(manifest);
+    let _rasters = writer::<Masked>(manifest);
+    let _rotations = writer::<Rotation>(manifest);
+    let _motions = (writer::<Motion>(manifest), writer::<Refined>(manifest));
+    let _poses = writer::<Pose>(manifest);
+    let segments = fs::read_dir("/dev/shm").unwrap().flatten().filter(|file| {
+        let name = file.file_name().to_string_lossy().into_owned();
+        name.starts_with(&manifest.prefix) && name.ends_with(".data")
+    });
+    let bytes: u64 = segments.map(|file| file.metadata().unwrap().len()).sum();
+    let footprint = Footprint::new(&manifest.window, &manifest.limits).total() as f64;
+    let share = bytes as f64 / footprint;
+    assert!((0.9..=1.0).contains(&share), "{bytes} of {footprint}");
+}
+
+#[test]
+fn observers_leave_the_places_of_the_stages_free() {
+    let run = Run::new();
+    let observed = ObservedRun::at(&run.manifest.root).unwrap();
+    let attached: Vec<_> = (0..WINDOW.observers)
+        .map(|_| observed.try_observe::<Pose>().unwrap())
+        .collect();
+    let one_too_many = observed.try_observe::<Pose>().map(drop);
+    assert!(matches!(one_too_many, Err(StageError::NoPlace { .. })));
+    let readers: Vec<_> = (0..Pose::READERS)
+        .map(|_| reader::<Pose>(&run.manifest, None))
+        .collect();
+    // An observer that leaves makes room at once.
+    drop(attached);
+    assert!(observed.try_observe::<Pose>().is_ok());
+    drop(readers);
+}
+
+#[test]
+fn an_observer_of_an_earlier_run_does_not_disturb_a_later_one_with_the_same_results() {
+    let out = Rc::new(tempfile::tempdir().unwrap());
+    let earlier = Run::writing_to(&out);
+    let observed = ObservedRun::writing_to(out.path()).unwrap();
+    let mut observer = observed.observe::<Pose>().unwrap();
+    drop(earlier);
+    assert!(matches!(observer.next(Duration::MAX), Ok(Next::Ended)));
+    let later = Run::writing_to(&out);
+    drop(observer);
+    drop(observed);
+    // A restarted stage opens its topics anew.
+    services::open_topic::<Pose>(&super::node(&later.manifest)).unwrap();
+    reader::<Pose>(&later.manifest, None);
+}
+
+#[test]
+fn without_a_run_there_is_nothing_to_observe() {
+    let out = tempfile::tempdir().unwrap();
+    let refused = ObservedRun::writing_to(out.path()).map(drop);
+    assert!(matches!(refused, Err(StageError::NotRunning(_))));
+}
