@@ -49,6 +49,23 @@ fn a_folder_that_is_away_for_a_moment_loses_nothing() {
 }
 
 #[test]
+fn a_source_that_waits_for_its_input_has_not_stalled() {
+    let recording = whole();
+    let run = run_of(&recording)
+        .rate(MODERATE)
+        .set("run.stall_timeout_s=2");
+    let mut running = run.start();
+    running.await_poses(MIDDLE);
+    take_away(recording.path());
+    thread::sleep(Duration::from_secs(4));
+    bring_back(recording.path());
+    let ended = running.finish();
+    ended.succeeded();
+    assert!(!ended.stderr.contains("restarted"), "{}", ended.stderr);
+    assert_whole(&run);
+}
+
+#[test]
 fn a_file_that_is_missing_for_a_moment_loses_nothing() {
     let recording = whole();
     let image = &recording::images(recording.path())[MIDDLE + 2];

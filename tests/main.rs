@@ -5,6 +5,7 @@
 mod common;
 
 mod bad_input;
+mod breaks;
 mod evaluate;
 mod full_disk;
 mod in_process;

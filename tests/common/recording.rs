@@ -3,6 +3,7 @@
 use std::{
     env, fs,
     fs::File,
+    io::Cursor,
     path::{Path, PathBuf},
     sync::OnceLock,
 };
@@ -57,15 +58,46 @@ pub fn truncate(image: &Path, bytes: usize) {
 
 /// Replaces an image by black pixels of another size.
 pub fn resize(image: &Path, width: u32, height: u32) {
+    let black = vec![0; (width * height) as usize];
+    replace(image, &encoded(width, height, &black));
+}
+
+fn encoded(width: u32, height: u32, pixels: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Grayscale);
     let mut writer = encoder.write_header().unwrap();
-    writer
-        .write_image_data(&vec![0; (width * height) as usize])
-        .unwrap();
+    writer.write_image_data(pixels).unwrap();
     writer.finish().unwrap();
-    replace(image, &bytes);
+    bytes
+}
+
+/// Replaces an image by itself with other times of its rows, us since 1970: `stamp_us` returns that of a row, from 0, given the
+/// one that it has.
+pub fn restamp(image: &Path, stamp_us: impl Fn(usize, i64) -> i64) {
+    const STAMP: usize = 8;
+    let bytes = fs::read(image).unwrap();
+    let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    let size = reader.next_frame(&mut pixels).unwrap();
+    for (row, pixels) in pixels.chunks_exact_mut(size.width as usize).enumerate() {
+        let stamp: &mut [u8; STAMP] = (&mut pixels[..STAMP]).try_into().unwrap();
+        *stamp = stamp_us(row, i64::from_le_bytes(*stamp)).to_le_bytes();
+    }
+    replace(image, &encoded(size.width, size.height, &pixels));
+}
+
+/// Moves a scan by `by_us` in time: the stamps of its rows, and the name of its file.
+pub fn shift(image: &Path, by_us: i64) {
+    restamp(image, |_, stamp_us| stamp_us + by_us);
+    let name: i64 = image
+        .file_stem()
+        .unwrap()
+        .to_str()
+        .unwrap()
+        .parse()
+        .unwrap();
+    fs::rename(image, image.with_file_name(format!("{}.png", name + by_us))).unwrap();
 }
 
 fn replace(image: &Path, bytes: &[u8]) {

@@ -4,6 +4,7 @@
 use std::collections::VecDeque;
 
 use gyre_messages::{Item, Scan, Window, flag};
+use gyre_radar::continues;
 use gyre_stage::{
     Launch, Listener, StageError,
     inputs::Action,
@@ -26,6 +27,8 @@ pub struct NewestOnly {
 struct Chain {
     next: u64,
     previous_scan: Option<u64>,
+    /// Time of the previous scan, ns; `None` after a restart.
+    previous_ns: Option<i64>,
     /// The source's count at the previous scan: a restarted source repeats the scans after the newest pose.
     published: Option<u64>,
     /// True if the current scan was processed before the restart: the other stages need it again as their previous scan.
@@ -117,10 +120,12 @@ impl NewestOnly {
         let done = self.queue.pop_front();
         if let (Some(chain), Some(done)) = (&mut self.chain, &done) {
             let (scan, published) = (done.item().scan, done.item().published);
+            let stamp_ns = done.item().stamp_ns;
             let next = chain.next.saturating_add(1);
             *chain = Chain {
                 next,
                 previous_scan: Some(scan),
+                previous_ns: Some(stamp_ns),
                 published: Some(published),
                 repeats: false,
             };
@@ -138,10 +143,11 @@ impl NewestOnly {
         self.port.listener()
     }
 
-    /// Returns the previous scan. The source may have lost it when all stages were restarted; the current scan is then masked as
-    /// at the start of a chain.
+    /// Returns the previous scan; `None` at the start of a chain. The source may have lost it when all stages were restarted; the
+    /// current scan is then masked as at the start of a chain.
     pub fn previous(&self) -> Option<&Received<Scan>> {
-        let expected = self.chain?.previous_scan;
+        let item = self.chain?.number(self.queue.front()?.item());
+        let expected = (!item.is(flag::BREAK)).then_some(item.previous_scan);
         self.previous
             .as_ref()
             .filter(|previous| Some(previous.item().scan) == expected)
@@ -166,18 +172,21 @@ impl Chain {
             () if newest_pose.is(flag::BASE) => Self {
                 next: 0,
                 previous_scan: None,
+                previous_ns: None,
                 published: None,
                 repeats: false,
             },
             () if front.published == newest_pose.published && !front.is(flag::END) => Self {
                 next: newest_pose.seq,
                 previous_scan: Some(newest_pose.previous_scan),
+                previous_ns: None,
                 published: None,
                 repeats: true,
             },
             () => Self {
                 next: newest_pose.seq.saturating_add(1),
                 previous_scan: None,
+                previous_ns: None,
                 published: None,
                 repeats: false,
             },
@@ -194,14 +203,17 @@ impl Chain {
 
     /// Numbers a scan in the chain of motions.
     fn number(&self, item: &Item) -> Item {
-        let start = if self.previous_scan.is_none() {
-            flag::BREAK
-        } else {
-            0
+        let is_continuous = |before_ns| continues(before_ns, item.stamp_ns);
+        let previous_scan = self
+            .previous_scan
+            .filter(|_| self.previous_ns.is_none_or(is_continuous) || item.is(flag::END));
+        let start = match previous_scan {
+            Some(_) => 0,
+            None => flag::BREAK,
         };
         Item {
             seq: self.next,
-            previous_scan: self.previous_scan.unwrap_or(item.scan),
+            previous_scan: previous_scan.unwrap_or(item.scan),
             flags: (item.flags & flag::END) | start,
             ..*item
         }
@@ -245,6 +257,22 @@ mod tests {
         let item = Chain::resume(&scan(35), &newest_pose()).number(&scan(35));
         assert_eq!((item.seq, item.previous_scan), (10, item.scan));
         assert!(item.is(flag::BREAK));
+    }
+
+    #[test]
+    fn a_chain_breaks_where_time_does() {
+        let second_ns = 1_000_000_000;
+        let chain = Chain {
+            previous_ns: Some(100 * second_ns),
+            ..Chain::resume(&scan(31), &newest_pose())
+        };
+        for (stamp_s, breaks) in [(101, false), (110, false), (111, true), (99, true)] {
+            let item = Item {
+                stamp_ns: stamp_s * second_ns,
+                ..scan(31)
+            };
+            assert_eq!(chain.number(&item).is(flag::BREAK), breaks, "{stamp_s}");
+        }
     }
 
     #[test]

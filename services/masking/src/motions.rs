@@ -36,7 +36,7 @@ impl Motions {
     pub fn update(&mut self) -> Result<(), StageError> {
         while let Some(received) = self.motions.receive()? {
             self.known
-                .insert(received.item(), received.header().motion.searched());
+                .receive(received.item(), received.header().motion.searched());
         }
         while let Some(received) = self.poses.receive()? {
             let item = *received.item();
@@ -45,7 +45,7 @@ impl Motions {
             }
             if !item.is(flag::BASE) {
                 self.known
-                    .insert(&item, received.header().motion.searched());
+                    .receive(&item, received.header().motion.searched());
                 self.newest_pose = self.newest_pose.max(Some(item.seq));
             }
             if item.is(flag::SYNC) {
@@ -55,9 +55,15 @@ impl Motions {
         Ok(())
     }
 
-    /// Returns the motion of item `seq`: `None` while it is unknown, `Some(None)` where the chain starts.
-    pub fn of(&self, seq: u64) -> Option<Option<SearchedMotion>> {
-        self.known.of(seq)
+    /// Notes that a chain of motions starts with this scan, before its motion is received.
+    pub fn start_chain(&mut self, seq: u64) {
+        self.known.insert(seq, None);
+    }
+
+    /// Returns the motion of the item `lag` items before item `seq`: `None` while it is unknown, `Some(None)` if the chain starts
+    /// there or later.
+    pub fn before(&self, seq: u64, lag: u64) -> Option<Option<SearchedMotion>> {
+        self.known.before(seq, lag)
     }
 
     /// Returns the item of the newest pose as the sink reported it; `None` before the first report.
@@ -80,16 +86,32 @@ impl Motions {
 struct KnownMotions(VecDeque<(u64, Option<SearchedMotion>)>);
 
 impl KnownMotions {
-    fn insert(&mut self, item: &Item, motion: SearchedMotion) {
-        if item.is(flag::END) || self.of(item.seq).is_some() {
+    fn receive(&mut self, item: &Item, motion: SearchedMotion) {
+        if !item.is(flag::END) {
+            // Where the chain starts there is no motion.
+            self.insert(item.seq, (!item.is(flag::BREAK)).then_some(motion));
+        }
+    }
+
+    fn insert(&mut self, seq: u64, motion: Option<SearchedMotion>) {
+        if self.of(seq).is_some() {
             return;
         }
-        // Where the chain starts there is no motion.
-        let motion = (!item.is(flag::BREAK)).then_some(motion);
-        let place = self.0.partition_point(|(seq, _)| *seq < item.seq);
-        self.0.insert(place, (item.seq, motion));
+        let place = self.0.partition_point(|(known, _)| *known < seq);
+        self.0.insert(place, (seq, motion));
         if self.0.len() > KEPT {
             self.0.pop_front();
+        }
+    }
+
+    /// See [`Motions::before`].
+    fn before(&self, seq: u64, lag: u64) -> Option<Option<SearchedMotion>> {
+        let Some(first) = seq.checked_sub(lag) else {
+            return Some(None);
+        };
+        match (first + 1..=seq).any(|seq| self.of(seq) == Some(None)) {
+            true => Some(None),
+            false => self.of(first),
         }
     }
 
@@ -129,7 +151,7 @@ mod tests {
         for order in [[1.5, 1.75], [1.75, 1.5]] {
             let mut known = KnownMotions::default();
             for x_m in order {
-                known.insert(&item(7, 0), refined_to(x_m).searched());
+                known.receive(&item(7, 0), refined_to(x_m).searched());
             }
             assert_eq!(known.of(7), Some(Some(searched)));
             assert_eq!(known.of(8), None);
@@ -141,9 +163,30 @@ mod tests {
         let mut known = KnownMotions::default();
         for seq in 0..KEPT as u64 + 3 {
             let flags = if seq == 5 { flag::BREAK } else { 0 };
-            known.insert(&item(seq, flags), refined_to(1.5).searched());
+            known.receive(&item(seq, flags), refined_to(1.5).searched());
         }
         assert_eq!((known.of(2), known.of(5)), (None, Some(None)));
         assert_eq!(known.0.len(), KEPT);
+    }
+
+    #[test]
+    fn no_motion_of_an_earlier_chain_is_used() {
+        let mut known = KnownMotions::default();
+        (0..10).for_each(|seq| known.receive(&item(seq, 0), refined_to(1.5).searched()));
+        let searched = Some(refined_to(1.5).searched());
+        assert_eq!(
+            (known.before(9, 2), known.before(10, 2)),
+            (Some(searched), Some(searched))
+        );
+        known.insert(10, None);
+        assert_eq!(
+            (known.before(10, 2), known.before(11, 2)),
+            (Some(None), Some(None))
+        );
+        assert_eq!(
+            (known.before(12, 2), known.before(13, 2)),
+            (Some(None), None)
+        );
+        assert_eq!(known.before(1, 2), Some(None), "before the first");
     }
 }

@@ -1,6 +1,6 @@
 //! The inputs of masking: a scan and the motion for its motion compensation.
 
-use gyre_messages::{Scan, SearchedMotion, Window};
+use gyre_messages::{Item, Scan, SearchedMotion, Window, flag};
 use gyre_stage::{
     Launch, Listener, StageError,
     inputs::{Action, Inputs},
@@ -74,7 +74,7 @@ impl Inputs for Scans {
             Queue::Live(queue) => queue.next_action(&resume_at, newest_pose)?,
         };
         match action {
-            Action::Process(item, _) if !self.find_motions(item.seq) => Ok(Action::Wait),
+            Action::Process(item, _) if !self.find_motions(&item) => Ok(Action::Wait),
             action => Ok(action),
         }
     }
@@ -121,26 +121,26 @@ impl Inputs for Scans {
 }
 
 impl Scans {
-    /// Looks up the motions for scan `seq` and the previous one; false while one is missing.
-    fn find_motions(&mut self, seq: u64) -> bool {
-        let previous = if self.window.masks_pairs() {
-            seq.checked_sub(1)
-        } else {
-            None
-        };
-        let found =
-            [Some(seq), previous].map(|seq| seq.map_or(Some(None), |seq| self.motion_for(seq)));
+    /// Looks up the motions for a scan and the previous one; false while one is missing. They depend on the numbers alone, so they
+    /// are the same after a restart.
+    fn find_motions(&mut self, item: &Item) -> bool {
+        if item.is(flag::BREAK) {
+            self.motions.start_chain(item.seq);
+        }
+        let previous = item
+            .seq
+            .checked_sub(1)
+            .filter(|_| self.window.masks_pairs());
+        let found = [Some(item.seq), previous]
+            .map(|seq| seq.map_or(Some(None), |seq| self.motion_for(seq)));
         self.found = found.map(Option::flatten);
         found.iter().all(Option::is_some)
     }
 
-    /// Returns the motion for scan `seq`. It depends on the number alone, so it is the same after a restart.
     fn motion_for(&self, seq: u64) -> Option<Option<SearchedMotion>> {
-        let lagged = if self.window.lag == 0 {
-            None
-        } else {
-            seq.checked_sub(self.window.lag as u64)
-        };
-        lagged.map_or(Some(None), |seq| self.motions.of(seq))
+        match self.window.lag {
+            0 => Some(None),
+            lag => self.motions.before(seq, lag as u64),
+        }
     }
 }

@@ -54,7 +54,6 @@ pub fn play(
     let config: SourceConfig = launch.section("source")?;
     let mut replay = Replay {
         scans: config.played(dataset.len()),
-        half_period_ns: dataset.period_ns() / 2,
         dataset,
         pace,
     };
@@ -70,7 +69,6 @@ pub fn play(
 struct Replay {
     dataset: Box<dyn Dataset>,
     scans: Range<usize>,
-    half_period_ns: i64,
     pace: Pace,
 }
 
@@ -83,7 +81,11 @@ impl Source for Replay {
 
     /// The stamp of a scan is the middle of its sweep; the scan is complete half a period later.
     fn complete_ns(&self, index: usize) -> Option<i64> {
-        Some(self.dataset.nominal_stamp_ns(index)? + self.half_period_ns)
+        Some(self.dataset.nominal_stamp_ns(index)? + self.period_ns() / 2)
+    }
+
+    fn period_ns(&self) -> i64 {
+        self.dataset.period_ns()
     }
 
     fn drops_missed_scans(&self) -> bool {

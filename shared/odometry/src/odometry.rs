@@ -2,7 +2,7 @@
 
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose};
 use gyre_masking::{Masker, Sweep};
-use gyre_radar::PolarScan;
+use gyre_radar::{PolarScan, continues};
 use gyre_scan_matching::{
     ConfigError, ExhaustiveSearch, JointMatch, Refined, RefinementKind, Refiner,
     SequentialRotation, TranslationSearch,
@@ -78,11 +78,15 @@ impl Odometry {
         })
     }
 
-    /// Registers the next scan: estimates its motion from the previous scan, and its pose.
+    /// Registers the next scan: estimates its motion from the previous scan, and its pose. A scan that is not later than the
+    /// previous one, or by more than [`gyre_radar::MAX_INTERVAL_NS`], starts a new chain as after [`Odometry::restart`].
     ///
     /// # Errors
     /// A scan that cannot be used. It is skipped: the next scan is registered against the one before the error.
     pub fn register(&mut self, scan: &PolarScan<'_>) -> Result<Registered, OdometryError> {
+        if self.seq > 0 && !continues(self.previous.stamp_ns, scan.geometry.stamp_ns) {
+            self.restart();
+        }
         let twist = self.twists.next();
         self.mask(scan, twist)?;
         let searched = self.search()?;

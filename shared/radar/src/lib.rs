@@ -8,6 +8,7 @@
 //! - [`mod@ground_truth`]: trajectories in the formats of datasets and tools, converted to REP-103;
 //! - [`mod@inspect`]: a summary of a recording and of its faults.
 
+mod chain;
 pub mod dataset;
 pub mod ground_truth;
 pub mod inspect;
@@ -17,6 +18,7 @@ pub mod raster;
 pub mod scan;
 pub mod trajectory;
 
+pub use chain::{MAX_INTERVAL_NS, continues};
 pub use dataset::{
     AzimuthSource, Dataset, DatasetOptions, Format, ImageSize, ImageSource, OpenError, ReadError,
     open, open_source,

@@ -7,6 +7,7 @@ mod position;
 use std::{ops::Range, time::Duration};
 
 use gyre_messages::{Hop, Item, Pose, Scan, ScanHeader, StageId, flag};
+use gyre_radar::continues;
 
 use crate::{
     Launch, StageCounters, StageError, allocations, clock,
@@ -32,6 +33,9 @@ pub trait Source {
     /// Time at which scan `index` is complete on the sensor's clock, ns since 1970, if it is known without reading the scan.
     /// Without it a restarted source in live mode cannot tell which scans it has missed, and plays them late.
     fn complete_ns(&self, index: usize) -> Option<i64>;
+
+    /// Time between two scans, ns.
+    fn period_ns(&self) -> i64;
 
     /// Returns whether live mode drops the scans that become due while this process is busy or down, as with a real sensor.
     fn drops_missed_scans(&self) -> bool;
@@ -152,31 +156,28 @@ impl<S: Source> Playback<'_, S> {
     }
 
     fn play(&mut self, mut position: Position) -> Result<(), StageError> {
-        let (live, rate) = (self.launch.manifest.live, self.launch.manifest.rate);
         let mut pace = None;
+        let mut before = None;
         loop {
             let mut draft = match self.next_readable(&mut position)? {
                 Next::Scan(draft) => draft,
                 Next::End => break,
                 Next::Stop => return Ok(()),
             };
-            let complete_ns = complete_ns(draft.header());
-            if pace.is_none() {
-                pace = rate.map(|rate| Pace::new(rate, complete_ns));
+            let times = Times::of(draft.header());
+            let gap = before.filter(|before: &Times| !continues(before.stamp_ns, times.stamp_ns));
+            if gap.is_some() {
+                position.break_chain();
+                position.identify(&mut draft.header().item);
             }
-            if let Some(pace) = pace
-                .as_mut()
-                .filter(|_| live && !self.source.drops_missed_scans())
-            {
-                self.counters.slipped_ns += pace.slip(complete_ns);
-            }
-            let due_ns = pace.map(|pace| pace.due_ns(complete_ns));
+            let due_ns = self.due_ns(&mut pace, gap, &times);
             if !self.admit(draft, &position, due_ns)? {
                 return Ok(());
             }
+            before = Some(times);
             position.advance();
             if let Some(pace) = pace {
-                if live && self.source.drops_missed_scans() {
+                if self.launch.manifest.live && self.source.drops_missed_scans() {
                     self.drop_missed(&mut position, pace);
                 }
                 if !self.yield_processors(&position, pace)? {
@@ -189,6 +190,25 @@ impl<S: Source> Playback<'_, S> {
             while !self.sleep(wake::MAX_WAIT)? {}
         }
         Ok(())
+    }
+
+    /// Returns when a scan is due; `None` at the highest rate. `gap` has the times of the scan before a break.
+    fn due_ns(
+        &mut self,
+        pace: &mut Option<Pace>,
+        gap: Option<Times>,
+        times: &Times,
+    ) -> Option<i64> {
+        let rate = self.launch.manifest.rate?;
+        let pace = pace.get_or_insert_with(|| Pace::new(rate, times.complete_ns));
+        if let Some(before) = gap {
+            let period_ns = self.source.period_ns();
+            pace.resume(before.complete_ns, times.complete_ns, period_ns);
+        }
+        if self.launch.manifest.live && !self.source.drops_missed_scans() {
+            self.counters.slipped_ns += pace.slip(times.complete_ns);
+        }
+        Some(pace.due_ns(times.complete_ns))
     }
 
     /// Reads the next scan into shared memory before it is due.
@@ -223,10 +243,7 @@ impl<S: Source> Playback<'_, S> {
                     let finished_ns = clock::now_ns();
                     self.counters
                         .record(allocations::so_far() - allocated, finished_ns - started_ns);
-                    header.item = Item {
-                        stamp_ns: header.item.stamp_ns,
-                        ..position.item()
-                    };
+                    position.identify(&mut header.item);
                     *header.item.hop_mut(S::HOP) = Hop {
                         received_ns: started_ns,
                         started_ns,
@@ -238,6 +255,9 @@ impl<S: Source> Playback<'_, S> {
                 Err(Unreadable::Damaged(reason)) => return Ok(Read::Damaged(reason)),
                 Err(Unreadable::Io(reason)) => attempts.failed(reason)?,
             }
+            // Not late until the next attempt: the supervisor need not intervene.
+            let next_ns = clock::now_ns() + PAUSE.as_nanos() as i64;
+            self.schedule.due_at(next_ns)?;
             if self.sleep(PAUSE)? {
                 return Ok(Read::Stop);
             }
@@ -292,13 +312,22 @@ impl<S: Source> Playback<'_, S> {
         }
     }
 
+    /// Returns when a scan is expected to be due before it is read; `None` if its time is unknown or breaks with that of the scan
+    /// before.
+    fn expected_ns(&self, index: usize, pace: Pace) -> Option<i64> {
+        let before_ns = self.source.complete_ns(index.checked_sub(1)?)?;
+        let complete_ns = self.source.complete_ns(index)?;
+        continues(before_ns, complete_ns).then(|| pace.due_ns(complete_ns))
+    }
+
     /// Drops the scans that a sensor would have measured while this process was down.
     fn drop_missed(&mut self, position: &mut Position, pace: Pace) {
-        let now_ns = clock::now_ns();
-        let next_is_due = |index| Some(pace.due_ns(self.source.complete_ns(index + 1)?) < now_ns);
-        while position.index + 1 < self.source.scans().end
-            && next_is_due(position.index) == Some(true)
-        {
+        let (now_ns, end) = (clock::now_ns(), self.source.scans().end);
+        let is_missed = |index| {
+            self.expected_ns(index, pace)?;
+            Some(self.expected_ns(index + 1, pace)? < now_ns)
+        };
+        while position.index + 1 < end && is_missed(position.index) == Some(true) {
             position.drop_scan();
         }
     }
@@ -306,12 +335,11 @@ impl<S: Source> Playback<'_, S> {
     /// Leaves the processors to the scan in flight, since a real sensor would not use them to read a recording. Returns at that
     /// scan's pose, or half-way to the next scan; false on a request to stop.
     fn yield_processors(&mut self, position: &Position, pace: Pace) -> Result<bool, StageError> {
-        let Some(complete_ns) = self.source.complete_ns(position.index) else {
+        let Some(due_ns) = self.expected_ns(position.index, pace) else {
             return Ok(true);
         };
-        self.schedule.due_at(pace.due_ns(complete_ns))?;
-        let until_ns =
-            clock::now_ns() + (clock::until(pace.due_ns(complete_ns)) / 2).as_nanos() as i64;
+        self.schedule.due_at(due_ns)?;
+        let until_ns = clock::now_ns() + (clock::until(due_ns) / 2).as_nanos() as i64;
         let in_flight = position.published.saturating_sub(1);
         loop {
             self.credit.update()?;
@@ -350,11 +378,21 @@ impl<S: Source> Playback<'_, S> {
     }
 }
 
-/// Returns when the sweep was complete on the sensor's clock: the time of its last azimuth.
-fn complete_ns(header: &ScanHeader) -> i64 {
-    let stamps = header
-        .azimuth_stamp_ns
-        .iter()
-        .take(header.azimuths as usize);
-    stamps.copied().max().unwrap_or(header.item.stamp_ns)
+/// The times of a scan on the sensor's clock.
+struct Times {
+    stamp_ns: i64,
+    /// The time of its last azimuth, when the sweep was complete.
+    complete_ns: i64,
+}
+
+impl Times {
+    fn of(header: &ScanHeader) -> Self {
+        let stamp_ns = header.item.stamp_ns;
+        let rows = header.azimuths as usize;
+        let stamps = header.azimuth_stamp_ns.iter().take(rows);
+        Self {
+            stamp_ns,
+            complete_ns: stamps.copied().max().unwrap_or(stamp_ns),
+        }
+    }
 }

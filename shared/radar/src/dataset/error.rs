@@ -212,15 +212,41 @@ pub enum ReadError {
         /// The stamp as stored.
         value: i64,
     },
-    /// Stamps that jump within a sweep.
+    /// A stamp that is before that of an earlier row.
     #[error(
-        "{path}: its first and last rows are {span_s:.3} s apart, which is not one sweep: the clock was set in between"
+        "{path}, row {row}: stamp is {back_s:.3} s before that of an earlier row, so the rows are not one sweep: the clock was set in between, or a stamp is damaged"
+    )]
+    StampOrder {
+        /// The file.
+        path: PathBuf,
+        /// The row of the image, from 0.
+        row: usize,
+        /// Time by which it is earlier, s.
+        back_s: f64,
+    },
+    /// Stamps that are farther apart than a sweep takes.
+    #[error(
+        "{path}, row {row}: stamp is {after_s:.3} s after that of the first row, so the rows are not one sweep of at most {max_s:.3} s: the clock was set in between, or a stamp is damaged"
     )]
     SweepTime {
         /// The file.
         path: PathBuf,
-        /// Stamp of the last row minus that of the first, s.
-        span_s: f64,
+        /// The row of the image, from 0.
+        row: usize,
+        /// Its stamp minus that of the first row, s.
+        after_s: f64,
+        /// The longest sweep, s.
+        max_s: f64,
+    },
+    /// Stamps that are far from the time in the name of the file.
+    #[error(
+        "{path}: stamps of its rows are {apart_s:.1} s from the time in its name, which other files agree with: the clock was set, or the file has another scan's name"
+    )]
+    NameTime {
+        /// The file.
+        path: PathBuf,
+        /// Time of the scan minus that by its name, s.
+        apart_s: f64,
     },
 }
 

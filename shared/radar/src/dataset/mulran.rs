@@ -45,7 +45,8 @@ pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedS
     let ends_ns = (0..scans.images.len())
         .map(|index| end_ns(&scans.images, index))
         .collect::<Result<Vec<_>, _>>()?;
-    let median_ns = stamp::median_interval_ns(ends_ns.iter().copied());
+    let median_ns =
+        stamp::median_turn_ns(ends_ns.iter().copied()).unwrap_or(stamp::DEFAULT_TURN_NS);
     let turn = |(index, &end_ns): (usize, &i64)| {
         let interval_ns = index.checked_sub(1).map(|before| end_ns - ends_ns[before]);
         let period_ns = interval_ns

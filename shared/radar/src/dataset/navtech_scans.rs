@@ -14,6 +14,7 @@ use super::images::Images;
 use super::navtech_png::{self, ByteTen, METADATA_BYTES};
 use super::options::{AzimuthSource, DatasetOptions};
 use super::stamp;
+use crate::chain::MAX_INTERVAL_NS;
 use crate::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, Sense, SweepGeometry};
 
 /// The definition of the time of a scan.
@@ -65,8 +66,17 @@ pub(crate) struct NavtechScans {
     images: Images,
     profile: Profile,
     period_ns: i64,
+    /// The longest plausible sweep.
+    max_sweep_ns: i64,
+    /// Whether the names of the files are times of their sweeps.
+    named_by_time: bool,
     notes: Vec<String>,
 }
+
+/// Longest sweep where the period is unknown, ns. The slowest scanning radars turn once in 2 s.
+const MAX_SWEEP_NS: i64 = 5 * stamp::SECOND_NS;
+/// Longest sweep in periods: the stamps of rows come late where the host was busy.
+const MAX_SWEEP_PERIODS: i64 = 2;
 
 impl NavtechScans {
     /// `profile` returns the defaults of the format, which may depend on the first image; `options` take precedence.
@@ -90,11 +100,13 @@ impl NavtechScans {
                 .flat_map(|image| observations(image, &profile)),
         );
         let period_ns =
-            stamp::median_interval_ns((0..images.len()).filter_map(|i| images.name_stamp_ns(i)));
+            stamp::median_turn_ns((0..images.len()).filter_map(|i| images.name_stamp_ns(i)));
         Ok(Self {
             images,
             profile,
-            period_ns,
+            period_ns: period_ns.unwrap_or(stamp::DEFAULT_TURN_NS),
+            max_sweep_ns: period_ns.map_or(MAX_SWEEP_NS, |turn_ns| MAX_SWEEP_PERIODS * turn_ns),
+            named_by_time: first_image.is_some_and(|image| image.named_by().is_some()),
             notes,
         })
     }
@@ -111,6 +123,19 @@ impl NavtechScans {
         match self.profile.scan_time {
             ScanTime::Halfway => stamp::middle(stamp_ns[0], stamp_ns[n - 1]),
             ScanTime::MiddleRow => stamp_ns[(n / 2).saturating_sub(1)],
+        }
+    }
+
+    /// Rejects a scan that is far from the time in its file's name, if that is how the files are named.
+    fn check_name(&self, index: usize, scan_ns: i64) -> Result<(), ReadError> {
+        let named_ns = self.nominal_stamp_ns(index).filter(|_| self.named_by_time);
+        let apart_ns = named_ns.map_or(0, |named_ns| scan_ns - named_ns);
+        match apart_ns.abs() <= MAX_INTERVAL_NS {
+            true => Ok(()),
+            false => Err(ReadError::NameTime {
+                path: self.images.file(index).to_owned(),
+                apart_s: apart_ns as f64 * 1e-9,
+            }),
         }
     }
 
@@ -296,9 +321,10 @@ impl Dataset for NavtechScans {
             profile.encoder_counts,
             azimuth_rad,
         )?;
-        navtech_png::fill_stamps(path, slot.bytes, size, stamp_ns)?;
+        navtech_png::fill_stamps(path, slot.bytes, size, self.max_sweep_ns, stamp_ns)?;
         navtech_png::fill_flags(slot.bytes, size, profile.byte_ten, slot.flags);
         let scan_ns = self.scan_time_ns(stamp_ns);
+        self.check_name(index, scan_ns)?;
         if profile.smooth_stamps {
             navtech_png::smooth_stamps(azimuth_rad, stamp_ns);
         }

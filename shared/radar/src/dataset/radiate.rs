@@ -14,6 +14,7 @@ use super::options::DatasetOptions;
 use super::sensor_clock::SensorClock;
 use super::stamp::{self, SECOND_NS};
 use super::transposed::{TransposedScans, Turn};
+use crate::chain::MAX_INTERVAL_NS;
 
 /// Full range of the images, m.
 const RANGE_M: f32 = 100.0;
@@ -35,8 +36,7 @@ pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedS
         .map_or_else(|| fs::read_to_string(&list).map_err(io_error), Ok)?;
     let (stamps, unpadded) = parse_stamps(&list, &text)?;
     let mut scans = TransposedScans::open(found, options, STAMPS, |bins| RANGE_M / bins as f32)?;
-    scans.turns = turns(&scans.images, &stamps, &list)?;
-    scans.period_ns = scans.turns.first().map_or(0, |turn| turn.period_ns);
+    add_turns(&mut scans, &stamps, &list)?;
     if unpadded > 0 {
         scans.notes.push(format!(
             "{unpadded} of {} stamps in {} have nanoseconds without leading zeros (.5 means 5 ns), and are read as integers; \
@@ -56,24 +56,87 @@ pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedS
     Ok(scans)
 }
 
-/// Returns the sweeps on the reconstructed sensor clock.
-fn turns(
-    images: &Images,
+/// A frame number and a time of receipt, ns.
+type Receipt = (i64, i64);
+
+/// Frames between two breaks in time, whose times of receipt come from one uniform clock.
+#[derive(Debug, PartialEq)]
+struct Segment {
+    /// Number of the first frame.
+    first: i64,
+    receipts: Vec<Receipt>,
+}
+
+/// Divides the frames where the time between two of them is not that of their numbers, as after a pause or when the clock was set.
+/// A single time that is off is left out.
+fn segments(received: &[Receipt]) -> Vec<Segment> {
+    let mut segments: Vec<Segment> = Vec::new();
+    for (index, receipt) in received.iter().enumerate() {
+        let next = received.get(index + 1);
+        let open = segments.last_mut();
+        match open.and_then(|segment| Some((*segment.receipts.last()?, segment))) {
+            Some((last, segment)) if agree(last, *receipt) => segment.receipts.push(*receipt),
+            Some((last, _)) if next.is_some_and(|next| agree(last, *next)) => {}
+            _ => segments.push(Segment {
+                first: receipt.0,
+                receipts: vec![*receipt],
+            }),
+        }
+    }
+    segments
+}
+
+/// Returns whether the time between two receipts is about that between their frames.
+fn agree(earlier: Receipt, later: Receipt) -> bool {
+    let frames = later.0.saturating_sub(earlier.0) as f64;
+    let apart_ns = later.1.saturating_sub(earlier.1) as f64;
+    let bounds = (frames * PERIOD_NS.start() - MAX_INTERVAL_NS as f64)
+        ..=(frames * PERIOD_NS.end() + MAX_INTERVAL_NS as f64);
+    bounds.contains(&apart_ns)
+}
+
+/// Adds the sweeps on the reconstructed sensor clock, and notes on times that cannot be used.
+fn add_turns(
+    scans: &mut TransposedScans,
     stamps: &BTreeMap<i64, i64>,
     list: &Path,
-) -> Result<Vec<Turn>, OpenError> {
-    let received = (0..images.len())
-        .map(|index| receipt(images, index, stamps, list))
+) -> Result<(), OpenError> {
+    let received = (0..scans.images.len())
+        .map(|index| receipt(&scans.images, index, stamps, list))
         .collect::<Result<Vec<_>, _>>()?;
-    let clock = SensorClock::below(&received, PERIOD_NS).ok_or_else(|| OpenError::NoImages {
-        path: images.file(0).to_owned(),
-    })?;
-    let turn = |&(frame, logged_ns): &(i64, i64)| Turn {
-        start_ns: clock.start_ns(frame),
-        period_ns: clock.period.round() as i64,
-        logged_ns,
+    let segments = segments(&received);
+    let clock = |segment: &Segment| {
+        SensorClock::below(&segment.receipts, PERIOD_NS).map(|clock| (segment.first, clock))
     };
-    Ok(received.iter().map(turn).collect())
+    let clocks: Vec<_> = segments.iter().filter_map(clock).collect();
+    let turn = |&(frame, logged_ns): &Receipt| {
+        let later = clocks.partition_point(|(first, _)| *first <= frame);
+        let (_, clock) = clocks.get(later.checked_sub(1)?)?;
+        Some(Turn {
+            start_ns: clock.start_ns(frame),
+            period_ns: clock.period.round() as i64,
+            logged_ns,
+        })
+    };
+    scans.turns = received.iter().filter_map(turn).collect();
+    scans.period_ns = scans.turns.first().map_or(0, |turn| turn.period_ns);
+    let used: usize = segments.iter().map(|segment| segment.receipts.len()).sum();
+    scans
+        .notes
+        .extend(note_times(received.len() - used, segments.len(), list));
+    Ok(())
+}
+
+fn note_times(unused: usize, segments: usize, list: &Path) -> Vec<String> {
+    let (list, limit_s) = (file_name(list), MAX_INTERVAL_NS / SECOND_NS);
+    let single = (unused > 0).then(|| {
+        format!("{unused} times in {list} are more than {limit_s} s from those before and after: the frame number is used instead.")
+    });
+    let breaks = (segments > 1).then(|| {
+        let breaks = segments - 1;
+        format!("The times in {list} break {breaks} times by more than {limit_s} s: the sensor clock starts anew there.")
+    });
+    single.into_iter().chain(breaks).collect()
 }
 
 fn file_name(path: &Path) -> String {
@@ -82,13 +145,13 @@ fn file_name(path: &Path) -> String {
         .unwrap_or_default()
 }
 
-/// Frame number and time of receipt of an image.
+/// Returns the receipt of an image.
 fn receipt(
     images: &Images,
     index: usize,
     stamps: &BTreeMap<i64, i64>,
     list: &Path,
-) -> Result<(i64, i64), OpenError> {
+) -> Result<Receipt, OpenError> {
     let image = images.file(index);
     let missing = || {
         let reason = format!(
@@ -170,6 +233,41 @@ mod tests {
             "",
         ] {
             assert_eq!(parse_line(bad), None, "{bad}");
+        }
+    }
+
+    fn received(frames: std::ops::Range<i64>, offset_ns: i64) -> Vec<Receipt> {
+        let at = |frame| {
+            (
+                frame,
+                1_549_986_607_000_000_000 + frame * 250_000_000 + offset_ns,
+            )
+        };
+        frames.map(at).collect()
+    }
+
+    #[test]
+    fn a_single_time_that_is_a_year_off_is_left_out() {
+        for off_ns in [-31_536_000, -60, 60, 31_536_000].map(|s| s * SECOND_NS) {
+            let mut frames = received(0..20, 0);
+            frames[7].1 += off_ns;
+            let [segment] = &segments(&frames)[..] else {
+                panic!("{off_ns}");
+            };
+            assert_eq!(segment.receipts.len(), 19);
+        }
+        let mut stalled = received(0..20, 0);
+        stalled[7].1 += 1_400_000_000;
+        assert_eq!(segments(&stalled)[0].receipts.len(), 20);
+    }
+
+    #[test]
+    fn a_pause_starts_a_new_clock() {
+        for pause_ns in [-3_600, 3_600].map(|s| s * SECOND_NS) {
+            let frames = [received(0..10, 0), received(10..20, pause_ns)].concat();
+            let found = segments(&frames);
+            let sizes: Vec<_> = found.iter().map(|s| (s.first, s.receipts.len())).collect();
+            assert_eq!(sizes, [(0, 10), (10, 10)]);
         }
     }
 }

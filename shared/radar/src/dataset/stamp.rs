@@ -13,7 +13,7 @@ const MAX_NS: i64 = i64::MAX / 2;
 /// Plausible durations of a turn, ns; others are gaps or errors.
 const TURN_NS: std::ops::Range<i64> = 10_000_000..10_000_000_000;
 /// Default duration of a turn, ns: Navtech radars turn four times per second.
-const DEFAULT_TURN_NS: i64 = 250_000_000;
+pub(crate) const DEFAULT_TURN_NS: i64 = 250_000_000;
 
 /// Returns whether a time in ns is in the years 2015 to 2040.
 pub(crate) fn plausible(stamp_ns: i64) -> bool {
@@ -51,15 +51,15 @@ fn rounded_ns(seconds: f64) -> Option<i64> {
     (ns.abs() <= MAX_NS as f64).then_some(ns.round() as i64)
 }
 
-/// Median time between consecutive scans, ns, of those that can be one turn.
-pub(crate) fn median_interval_ns(stamps: impl Iterator<Item = i64>) -> i64 {
+/// Median time between consecutive scans, ns, of those that can be one turn; `None` if none can.
+pub(crate) fn median_turn_ns(stamps: impl Iterator<Item = i64>) -> Option<i64> {
     let stamps: Vec<i64> = stamps.collect();
     let turns = stamps
         .windows(2)
         .map(|w| w[1] - w[0])
         .filter(|ns| TURN_NS.contains(ns));
     // A turn in ns is exact in f64.
-    median(turns.map(|ns| ns as f64)).map_or(DEFAULT_TURN_NS, |ns| ns as i64)
+    median(turns.map(|ns| ns as f64)).map(|ns| ns as i64)
 }
 
 /// The mean of two times, ns.

@@ -131,6 +131,76 @@ fn mulran_is_transposed_and_named_by_the_end_of_the_sweep() {
 }
 
 #[test]
+fn a_row_that_is_a_year_off_makes_its_scan_alone_unreadable_in_every_format_with_row_times() {
+    const YEAR_US: i64 = 31_536_000_000_000;
+    let formats = [
+        (Format::Oxford, 0, 1),
+        (Format::Oord, 0, 1),
+        (Format::Boreas, 19, 1),
+        (Format::BoreasRt, 19, 1),
+        (Format::Fomo, 0, 1),
+        (Format::MulranOxfordForm, 39, 1000),
+    ];
+    for (format, named, unit) in formats {
+        for off in [-YEAR_US * unit, YEAR_US * unit] {
+            let root = folder();
+            write_named(root.path(), 60, START_US, named, unit);
+            let sweep = Sweep {
+                start: (START_US + PERIOD_US) * unit,
+                row_interval: PERIOD_US / 40 * unit,
+                ..Sweep::default()
+            };
+            let mut pixels = sweep.pixels();
+            let row = &mut pixels[20 * sweep.width()..][..8];
+            let stamp = sweep.start + 20 * sweep.row_interval + off;
+            row.copy_from_slice(&stamp.to_le_bytes());
+            let name = sweep.start + named * sweep.row_interval;
+            write_png(
+                &root.path().join(format!("{name}.png")),
+                sweep.width(),
+                40,
+                &pixels,
+            );
+            let options = DatasetOptions {
+                format: Some(format),
+                ..DatasetOptions::default()
+            };
+            let mut dataset = open(root.path(), &options).unwrap();
+            let error = read(dataset.as_mut(), 1).unwrap_err().to_string();
+            assert!(error.contains("row 20: stamp is 3153"), "{format}: {error}");
+            assert!(read(dataset.as_mut(), 0).is_ok() && read(dataset.as_mut(), 2).is_ok());
+        }
+    }
+}
+
+#[test]
+fn radiate_times_that_are_off_do_not_move_the_other_scans() {
+    let root = folder();
+    write_radiate(root.path(), 12);
+    let stamps = || -> Vec<_> {
+        let dataset = opened(root.path());
+        (0..12)
+            .map(|index| dataset.nominal_stamp_ns(index))
+            .collect()
+    };
+    let expected = stamps();
+    let list = root.path().join("Navtech_Polar.txt");
+    let text = fs::read_to_string(&list).unwrap();
+    let year_before = text.replace(
+        "Frame: 000011 Time: 1549986608",
+        "Frame: 000011 Time: 1518450608",
+    );
+    assert_ne!(year_before, text);
+    fs::write(&list, year_before).unwrap();
+    assert_eq!(stamps(), expected);
+    let notes = opened(root.path()).notes().join(" ");
+    assert!(
+        notes.contains("1 times in Navtech_Polar.txt are more than 10 s"),
+        "{notes}"
+    );
+}
+
+#[test]
 fn radiate_without_stamps_names_the_file() {
     let root = folder();
     write_radiate(root.path(), 2);

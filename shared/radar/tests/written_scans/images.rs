@@ -59,6 +59,21 @@ fn a_radar_with_another_encoder_and_period_needs_options_only() {
     assert_eq!((scan.geometry.azimuths, scan.geometry.bins), (120, 162));
     assert!((scan.view().range_m(161.0) - 99.9).abs() < 1e-3);
     assert!((scan.azimuth_rad[90] - 0.75 * TAU).abs() < 1e-6);
+    let sweep = Sweep {
+        rows: 120,
+        bins: 162,
+        first_count: 0,
+        step: 30,
+        start: START_US,
+        row_interval: 3 * turn_us / 120,
+        ..Sweep::default()
+    };
+    sweep.write(&root.path().join(format!("radar/{START_US}.png")));
+    let error = read(dataset.as_mut(), 0).unwrap_err().to_string();
+    assert!(
+        error.contains("not one sweep of at most 2.000 s"),
+        "{error}"
+    );
     assert!((scan.geometry.stamp_ns - dataset.nominal_stamp_ns(1).unwrap()).abs() < 1_000_000);
     assert_eq!(
         scan.geometry.stamp_ns / 1000,

@@ -26,6 +26,12 @@ impl Pace {
             .saturating_add((complete_ns.saturating_sub(self.first_ns) as f64 / self.rate) as i64)
     }
 
+    /// Makes a scan after a break due one period after the scan before the break.
+    pub fn resume(&mut self, before_ns: i64, complete_ns: i64, period_ns: i64) {
+        self.start_ns = self.due_ns(before_ns.saturating_add(period_ns));
+        self.first_ns = complete_ns;
+    }
+
     /// Delays the playback if a scan is late, so that it is due now. Returns the delay, ns.
     pub fn slip(&mut self, complete_ns: i64) -> u64 {
         let late_ns = clock::now_ns()
@@ -48,6 +54,21 @@ mod tests {
             first_ns: 500,
         };
         assert_eq!(pace.due_ns(500 + 4000), 2000);
+    }
+
+    #[test]
+    fn a_scan_after_a_break_is_due_one_period_after_the_one_before() {
+        let year_ns = 31_536_000_000_000_000;
+        for complete_ns in [9_000_000_000 + year_ns, 9_000_000_000 - year_ns] {
+            let mut pace = Pace {
+                rate: 2.0,
+                start_ns: 1000,
+                first_ns: 500,
+            };
+            pace.resume(500 + 8000, complete_ns, 400);
+            assert_eq!(pace.due_ns(complete_ns), 1000 + 4000 + 200);
+            assert_eq!(pace.due_ns(complete_ns + 400), 1000 + 4000 + 400);
+        }
     }
 
     #[test]

@@ -9,8 +9,10 @@ pub(super) struct Position {
     pub index: usize,
     /// Sequence number among the published scans. In live mode masking numbers the chain of motions itself.
     pub published: u64,
-    /// The scan published before it.
+    /// The scan published before it; `None` at the start, and where it is not known.
     previous: Option<u64>,
+    /// Whether the chain of motions starts with it.
+    starts_chain: bool,
 }
 
 impl Position {
@@ -20,6 +22,7 @@ impl Position {
             index: first,
             published: 0,
             previous: None,
+            starts_chain: true,
         }
     }
 
@@ -36,18 +39,27 @@ impl Position {
                 index: newest.previous_scan as usize,
                 published: newest.published - 1,
                 previous: None,
+                starts_chain: false,
             };
         }
         Self {
             index: newest.scan as usize,
             published: newest.published,
             previous: in_chain.then_some(newest.previous_scan),
+            starts_chain: !in_chain,
         }
+    }
+
+    /// Starts a new chain with the scan.
+    pub fn break_chain(&mut self) {
+        self.previous = None;
+        self.starts_chain = true;
     }
 
     /// Steps past a scan that was published.
     pub fn advance(&mut self) {
         self.previous = Some(self.index as u64);
+        self.starts_chain = false;
         self.drop_scan();
     }
 
@@ -57,10 +69,18 @@ impl Position {
         self.published = self.published.saturating_add(1);
     }
 
+    /// Writes the numbers of the scan into its header; its times stay.
+    pub fn identify(&self, item: &mut Item) {
+        *item = Item {
+            stamp_ns: item.stamp_ns,
+            hops: item.hops,
+            ..self.item()
+        };
+    }
+
     /// Returns the header of the scan.
     pub fn item(&self) -> Item {
-        // A resumed chain has no break: the other stages have processed its first scan before.
-        let flags = if self.published == 0 { flag::BREAK } else { 0 };
+        let flags = if self.starts_chain { flag::BREAK } else { 0 };
         let scan = self.index as u64;
         Item {
             seq: self.published,
@@ -94,7 +114,8 @@ mod tests {
             Position {
                 index: 40,
                 published: 31,
-                previous: Some(37)
+                previous: Some(37),
+                starts_chain: false
             }
         );
         assert_eq!(
@@ -102,7 +123,8 @@ mod tests {
             Position {
                 index: 37,
                 published: 30,
-                previous: None
+                previous: None,
+                starts_chain: false
             }
         );
         let base = Item {
@@ -119,9 +141,19 @@ mod tests {
     }
 
     #[test]
-    fn only_the_very_first_scan_starts_a_chain() {
-        assert!(Position::start(5).item().is(flag::BREAK));
-        let resumed = Position::resume(&newest_pose(), 5, true);
+    fn a_chain_starts_with_the_first_scan_and_after_a_break_also_after_a_restart() {
+        let mut position = Position::start(5);
+        assert!(position.item().is(flag::BREAK));
+        position.advance();
+        assert!(!position.item().is(flag::BREAK));
+        position.break_chain();
+        let newest_pose = position.item();
+        assert!(newest_pose.is(flag::BREAK) && newest_pose.previous_scan == 6);
+        for masks_pairs in [false, true] {
+            let resumed = Position::resume(&newest_pose, 5, masks_pairs);
+            assert_eq!(resumed.item(), newest_pose);
+        }
+        let resumed = Position::resume(&self::newest_pose(), 5, true);
         assert!(!resumed.item().is(flag::BREAK));
     }
 }
