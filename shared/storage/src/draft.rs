@@ -1,0 +1,154 @@
+//! Files that are replaced as a whole.
+
+use std::{
+    fs,
+    io::{self, BufWriter, Write},
+    path::{Path, PathBuf},
+};
+
+#[cfg(feature = "record")]
+use crate::record::{self, Operation};
+use crate::{File, StorageError, folder::sync_folder};
+
+/// Bytes that are collected before they are written.
+const BUFFER: usize = 1 << 18;
+
+/// The next content of a file, written aside as `.NAME.tmp`. It takes the place of the file when it is committed; dropped before
+/// that, it is removed.
+#[derive(Debug)]
+pub struct Draft {
+    path: PathBuf,
+    aside: PathBuf,
+    writer: BufWriter<Appended>,
+    committed: bool,
+}
+
+/// A file that is written from its start to its end.
+#[derive(Debug)]
+struct Appended {
+    file: File,
+    length: u64,
+}
+
+impl Write for Appended {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file
+            .write_at(bytes, self.length)
+            .map_err(|error| error.source)?;
+        self.length += bytes.len() as u64;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Draft {
+    /// Creates the draft of the file at `path`.
+    ///
+    /// # Errors
+    /// A file that cannot be created.
+    pub fn create(path: &Path) -> Result<Self, StorageError> {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let aside = path.with_file_name(format!(".{name}.tmp"));
+        let file =
+            File::create(&aside).map_err(|error| StorageError::at("write", path)(error.source))?;
+        Ok(Self {
+            path: path.to_owned(),
+            aside,
+            writer: BufWriter::with_capacity(BUFFER, Appended { file, length: 0 }),
+            committed: false,
+        })
+    }
+
+    /// Adds text or bytes at the end.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn append(&mut self, bytes: impl AsRef<[u8]>) -> Result<(), StorageError> {
+        self.writer
+            .write_all(bytes.as_ref())
+            .map_err(StorageError::at("write", &self.path))
+    }
+
+    /// Makes the draft the content of the file: after a kill or a power failure the file has the whole of the old or of the new
+    /// content. The new one is sure to survive once the folder is synchronised too ([`sync_folder`]).
+    ///
+    /// # Errors
+    /// The rest cannot be written, or the file cannot be replaced.
+    pub fn commit(mut self) -> Result<(), StorageError> {
+        let failed = StorageError::at("write", &self.path);
+        self.writer.flush().map_err(&failed)?;
+        self.writer.get_ref().file.sync()?;
+        fs::rename(&self.aside, &self.path).map_err(&failed)?;
+        self.committed = true;
+        #[cfg(feature = "record")]
+        record::push(&self.path, || Operation::Rename {
+            from: self.aside.clone(),
+            to: self.path.clone(),
+        });
+        Ok(())
+    }
+}
+
+impl Drop for Draft {
+    fn drop(&mut self) {
+        if !self.committed {
+            // What stays is overwritten by the next draft.
+            let _ = crate::remove(&self.aside);
+        }
+    }
+}
+
+/// Replaces a file as a whole. It survives a power failure when this returns.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), StorageError> {
+    let mut draft = Draft::create(path)?;
+    draft.append(bytes)?;
+    draft.commit()?;
+    path.parent().map_or(Ok(()), sync_folder)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).unwrap();
+        entries
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect()
+    }
+
+    #[test]
+    fn a_file_keeps_its_content_until_its_draft_is_committed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("summary.json");
+        write(&path, "old").unwrap();
+        let mut draft = Draft::create(&path).unwrap();
+        draft.append("new").unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "old");
+        draft.commit().unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "new");
+        assert_eq!(names(folder.path()), ["summary.json"]);
+    }
+
+    #[test]
+    fn a_draft_that_is_given_up_leaves_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("summary.json");
+        drop(Draft::create(&path).unwrap());
+        assert!(names(folder.path()).is_empty());
+        fs::create_dir(&path).unwrap();
+        let refused = write(&path, "a file").unwrap_err().to_string();
+        assert!(
+            refused.contains("cannot write") && refused.contains("summary.json:"),
+            "{refused}"
+        );
+        assert_eq!(names(folder.path()), ["summary.json"]);
+    }
+}

@@ -1,0 +1,173 @@
+//! Files that are changed in place.
+
+use std::{
+    fs::{self, OpenOptions, TryLockError},
+    io,
+    os::unix::fs::FileExt,
+    path::{Path, PathBuf},
+};
+
+#[cfg(feature = "record")]
+use crate::record::{self, Operation};
+use crate::{StorageError, folder::sync_folder};
+
+/// A file that is changed in place.
+#[derive(Debug)]
+pub struct File {
+    path: PathBuf,
+    file: fs::File,
+}
+
+impl File {
+    /// Opens a file to read and change it, or creates it. The name of a new one survives a power failure.
+    ///
+    /// # Errors
+    /// A file that cannot be opened or created.
+    pub fn open_or_create(path: &Path) -> Result<Self, StorageError> {
+        let failed = StorageError::at("write", path);
+        let mut options = OpenOptions::new();
+        options.read(true).write(true);
+        let file = match options.open(path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                let file = options
+                    .create(true)
+                    .truncate(false)
+                    .open(path)
+                    .map_err(failed)?;
+                #[cfg(feature = "record")]
+                record::push(path, || Operation::Create(path.to_owned()));
+                path.parent().map_or(Ok(()), sync_folder)?;
+                file
+            }
+            opened => opened.map_err(failed)?,
+        };
+        Ok(Self {
+            path: path.to_owned(),
+            file,
+        })
+    }
+
+    /// Creates an empty file, in place of any other of this name.
+    pub(crate) fn create(path: &Path) -> Result<Self, StorageError> {
+        // Not truncated: another name may lead to the same content.
+        crate::remove(path)?;
+        let file = OpenOptions::new()
+            .create_new(true)
+            .write(true)
+            .open(path)
+            .map_err(StorageError::at("write", path))?;
+        #[cfg(feature = "record")]
+        record::push(path, || Operation::Create(path.to_owned()));
+        Ok(Self {
+            path: path.to_owned(),
+            file,
+        })
+    }
+
+    /// Returns the path.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Returns another handle of the same file.
+    ///
+    /// # Errors
+    /// The process has too many open files.
+    pub fn try_clone(&self) -> Result<Self, StorageError> {
+        let file = self
+            .file
+            .try_clone()
+            .map_err(StorageError::at("read", &self.path))?;
+        Ok(Self {
+            path: self.path.clone(),
+            file,
+        })
+    }
+
+    /// Locks the file for this process; false if another one has locked it.
+    ///
+    /// # Errors
+    /// A file system without locks.
+    pub fn try_lock(&self) -> Result<bool, StorageError> {
+        match self.file.try_lock() {
+            Ok(()) => Ok(true),
+            Err(TryLockError::WouldBlock) => Ok(false),
+            Err(TryLockError::Error(source)) => Err(StorageError::at("lock", &self.path)(source)),
+        }
+    }
+
+    /// Returns the length, bytes.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn length(&self) -> Result<u64, StorageError> {
+        let metadata = self
+            .file
+            .metadata()
+            .map_err(StorageError::at("read", &self.path))?;
+        Ok(metadata.len())
+    }
+
+    /// Fills `bytes` from `offset` on; false if the file ends before.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn read_at(&self, bytes: &mut [u8], offset: u64) -> Result<bool, StorageError> {
+        match self.file.read_exact_at(bytes, offset) {
+            Ok(()) => Ok(true),
+            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Ok(false),
+            Err(error) => Err(StorageError::at("read", &self.path)(error)),
+        }
+    }
+
+    /// Writes `bytes` at `offset`. A process that is killed meanwhile has written a first part of them.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write_at(&self, bytes: &[u8], offset: u64) -> Result<(), StorageError> {
+        self.file
+            .write_all_at(bytes, offset)
+            .map_err(StorageError::at("write", &self.path))?;
+        #[cfg(feature = "record")]
+        record::push(&self.path, || Operation::Write {
+            path: self.path.clone(),
+            offset,
+            bytes: bytes.to_vec(),
+        });
+        Ok(())
+    }
+
+    /// Cuts the file, or extends it by zeros.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn set_length(&self, length: u64) -> Result<(), StorageError> {
+        self.file
+            .set_len(length)
+            .map_err(StorageError::at("write", &self.path))?;
+        #[cfg(feature = "record")]
+        record::push(&self.path, || Operation::SetLength {
+            path: self.path.clone(),
+            length,
+        });
+        Ok(())
+    }
+
+    /// Makes all that was written before survive a power failure.
+    ///
+    /// # Errors
+    /// The system could not write all of it. What is lost is unknown, and a second attempt does not tell.
+    pub fn sync(&self) -> Result<(), StorageError> {
+        #[cfg(feature = "record")]
+        let id = record::sync_begins(&self.path);
+        self.file
+            .sync_data()
+            .map_err(StorageError::at("synchronise", &self.path))?;
+        #[cfg(feature = "record")]
+        record::push(&self.path, || Operation::SyncEnds {
+            path: self.path.clone(),
+            id,
+        });
+        Ok(())
+    }
+}

@@ -1,0 +1,61 @@
+//! Folders: the names of files.
+
+use std::{fs, io, path::Path};
+
+use crate::StorageError;
+#[cfg(feature = "record")]
+use crate::record::{self, Operation};
+
+/// Makes the names in a folder survive a power failure: those of its new, renamed and removed files.
+///
+/// # Errors
+/// The folder cannot be synchronised.
+pub fn sync_folder(folder: &Path) -> Result<(), StorageError> {
+    fs::File::open(folder)
+        .and_then(|handle| handle.sync_all())
+        .map_err(StorageError::at("synchronise", folder))?;
+    #[cfg(feature = "record")]
+    record::push(folder, || Operation::SyncFolder(folder.to_owned()));
+    Ok(())
+}
+
+/// Creates a folder and those above it, unless they exist. The names survive a power failure.
+///
+/// # Errors
+/// A folder that cannot be created.
+pub fn create_folder(folder: &Path) -> Result<(), StorageError> {
+    if folder.is_dir() {
+        return Ok(());
+    }
+    let above = folder.parent().unwrap_or(Path::new(""));
+    if !above.as_os_str().is_empty() {
+        create_folder(above)?;
+    }
+    match fs::create_dir(folder) {
+        Err(error) if error.kind() != io::ErrorKind::AlreadyExists => {
+            Err(StorageError::at("write", folder)(error))
+        }
+        _ => {
+            #[cfg(feature = "record")]
+            record::push(folder, || Operation::CreateFolder(folder.to_owned()));
+            match above.as_os_str().is_empty() {
+                true => sync_folder(Path::new(".")),
+                false => sync_folder(above),
+            }
+        }
+    }
+}
+
+/// Removes a file, if there is one. [`sync_folder`] makes that survive a power failure.
+///
+/// # Errors
+/// A file that cannot be removed.
+pub fn remove(path: &Path) -> Result<(), StorageError> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        result => result.map_err(StorageError::at("remove", path))?,
+    }
+    #[cfg(feature = "record")]
+    record::push(path, || Operation::Remove(path.to_owned()));
+    Ok(())
+}

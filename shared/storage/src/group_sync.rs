@@ -1,0 +1,186 @@
+//! Synchronisation of a file in the background.
+
+use std::{
+    fmt, io,
+    path::PathBuf,
+    sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
+    thread::{self, JoinHandle},
+    time::{Duration, Instant},
+};
+
+use crate::{File, StorageError};
+
+/// Synchronises a file on a thread of its own, for many changes at once: a synchronisation takes milliseconds, too long for each of
+/// a hundred changes in a second.
+///
+/// At most [`GroupSync::LIMIT`] changes are in danger of a power failure, and none for much longer than
+/// [`GroupSync::INTERVAL`].
+pub struct GroupSync {
+    path: PathBuf,
+    shared: Arc<Shared>,
+    worker: Option<JoinHandle<()>>,
+}
+
+struct Shared {
+    progress: Mutex<Progress>,
+    changed: Condvar,
+}
+
+/// Counts of changes, and how the thread stands.
+#[derive(Default)]
+struct Progress {
+    made: u64,
+    safe: u64,
+    ending: bool,
+    /// Why a synchronisation has failed. There is none after it.
+    failure: Option<(io::ErrorKind, String)>,
+}
+
+impl fmt::Debug for GroupSync {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("GroupSync").finish_non_exhaustive()
+    }
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, Progress> {
+        self.progress.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn wait<'a>(&self, progress: MutexGuard<'a, Progress>) -> MutexGuard<'a, Progress> {
+        self.changed
+            .wait(progress)
+            .unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Waits until it is time for a synchronisation; returns the number of changes that it covers, or `None` at the end.
+    fn next(&self, last: Option<Instant>) -> Option<u64> {
+        let mut progress = self.lock();
+        loop {
+            let pending = progress.made - progress.safe;
+            if progress.failure.is_some() || (pending == 0 && progress.ending) {
+                return None;
+            }
+            if pending == 0 {
+                progress = self.wait(progress);
+                continue;
+            }
+            let elapsed = last.map_or(GroupSync::INTERVAL, |last| last.elapsed());
+            let left = GroupSync::INTERVAL.saturating_sub(elapsed);
+            if left.is_zero() || progress.ending || pending >= GroupSync::LIMIT / 2 {
+                return Some(progress.made);
+            }
+            let waited = self.changed.wait_timeout(progress, left);
+            progress = waited.unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    fn work(&self, file: &File) {
+        let mut last = None;
+        while let Some(covered) = self.next(last) {
+            last = Some(Instant::now());
+            let synchronised = file.sync();
+            let mut progress = self.lock();
+            match synchronised {
+                Ok(()) => progress.safe = covered,
+                Err(StorageError { source, .. }) => {
+                    progress.failure = Some((source.kind(), source.to_string()));
+                }
+            }
+            self.changed.notify_all();
+        }
+    }
+}
+
+impl GroupSync {
+    /// The largest number of changes that a power failure can take.
+    pub const LIMIT: u64 = 32;
+    /// The time between two synchronisations, unless half of [`Self::LIMIT`] is reached before.
+    pub const INTERVAL: Duration = Duration::from_secs(1);
+
+    /// Starts with a synchronisation of what earlier processes may have written.
+    ///
+    /// # Errors
+    /// The process has too many open files or threads.
+    pub fn start(file: &File) -> Result<Self, StorageError> {
+        let shared = Arc::new(Shared {
+            progress: Mutex::new(Progress {
+                made: 1,
+                ..Progress::default()
+            }),
+            changed: Condvar::new(),
+        });
+        let (path, file) = (file.path().to_owned(), file.try_clone()?);
+        let of_worker = Arc::clone(&shared);
+        let worker = thread::Builder::new()
+            .name("sync".to_owned())
+            .spawn(move || of_worker.work(&file))
+            .map_err(StorageError::at("synchronise", &path))?;
+        Ok(Self {
+            path,
+            shared,
+            worker: Some(worker),
+        })
+    }
+
+    /// Counts a change that has been made. Waits while [`Self::LIMIT`] are in danger.
+    ///
+    /// # Errors
+    /// A synchronisation has failed: changes may be lost.
+    pub fn changed(&self) -> Result<(), StorageError> {
+        let mut progress = self.shared.lock();
+        progress.made += 1;
+        let pending = progress.made - progress.safe;
+        // The thread is woken when there is something to do for it, not each time.
+        if pending == 1 || pending == Self::LIMIT / 2 {
+            self.shared.changed.notify_all();
+        }
+        while progress.made - progress.safe > Self::LIMIT && progress.failure.is_none() {
+            progress = self.shared.wait(progress);
+        }
+        match &progress.failure {
+            None => Ok(()),
+            Some((kind, reason)) => Err(StorageError::at("synchronise", &self.path)(
+                io::Error::new(*kind, reason.clone()),
+            )),
+        }
+    }
+
+    /// Returns the number of changes that are safe; `None` until the first synchronisation has ended.
+    pub fn safe(&self) -> Option<u64> {
+        self.shared.lock().safe.checked_sub(1)
+    }
+}
+
+impl Drop for GroupSync {
+    fn drop(&mut self) {
+        self.shared.lock().ending = true;
+        self.shared.changed.notify_all();
+        if let Some(worker) = self.worker.take() {
+            let _ = worker.join();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn no_more_changes_than_the_limit_are_in_danger_and_none_at_the_end() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = File::open_or_create(&folder.path().join("file")).unwrap();
+        let group = GroupSync::start(&file).unwrap();
+        for change in 1..=10 * GroupSync::LIMIT {
+            file.write_at(b"x", change).unwrap();
+            group.changed().unwrap();
+            let safe = group.safe().unwrap_or(0);
+            assert!(change - safe <= GroupSync::LIMIT, "{safe} of {change}");
+        }
+        let shared = Arc::clone(&group.shared);
+        drop(group);
+        let progress = shared.lock();
+        assert_eq!(progress.safe, progress.made);
+    }
+}

@@ -1,0 +1,52 @@
+//! Files that are whole after a kill and after a power failure.
+//!
+//! - [`write`] and [`Draft`] replace a file as a whole: it is written aside, synchronised and renamed.
+//! - [`File`] is changed in place; what has not been synchronised when the power fails may be there in part.
+//! - [`GroupSync`] synchronises such a file in the background.
+//!
+//! A file and its name are two things: the name of a new or renamed file is safe once its folder is synchronised.
+//! Everything that must survive is written through this crate, so that a test can record each change (feature `record`) and
+//! replay what a power failure would have left of them.
+
+mod draft;
+mod file;
+mod folder;
+mod group_sync;
+#[cfg(feature = "record")]
+pub mod record;
+
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
+
+use thiserror::Error;
+
+pub use draft::{Draft, write};
+pub use file::File;
+pub use folder::{create_folder, remove, sync_folder};
+pub use group_sync::GroupSync;
+
+/// A file or folder that cannot be read or written.
+#[derive(Debug, Error)]
+#[error("cannot {action} {}: {source}", path.display())]
+pub struct StorageError {
+    /// The operation: `read`, `write`, `synchronise`, `remove`.
+    pub action: &'static str,
+    /// The file or folder.
+    pub path: PathBuf,
+    /// The system error.
+    pub source: io::Error,
+}
+
+impl StorageError {
+    /// Adds operation and path to a system error.
+    pub fn at(action: &'static str, path: &Path) -> impl Fn(io::Error) -> Self + use<> {
+        let path = path.to_owned();
+        move |source| Self {
+            action,
+            path: path.clone(),
+            source,
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! A record of all changes below a folder, for tests that replay power failures.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::{
+        Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
+};
+
+/// A change of a file or folder.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Operation {
+    /// A new folder.
+    CreateFolder(PathBuf),
+    /// A new, empty file.
+    Create(PathBuf),
+    /// Bytes written at an offset.
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// The place of the first byte.
+        offset: u64,
+        /// The bytes.
+        bytes: Vec<u8>,
+    },
+    /// A file cut or extended.
+    SetLength {
+        /// The file.
+        path: PathBuf,
+        /// The new length, bytes.
+        length: u64,
+    },
+    /// A synchronisation begins.
+    SyncBegins {
+        /// The file.
+        path: PathBuf,
+        /// The number of the synchronisation.
+        id: u64,
+    },
+    /// It has ended: what was written before it began survives.
+    SyncEnds {
+        /// The file.
+        path: PathBuf,
+        /// The number of the synchronisation.
+        id: u64,
+    },
+    /// A file renamed, in place of another one.
+    Rename {
+        /// The old name.
+        from: PathBuf,
+        /// The new name.
+        to: PathBuf,
+    },
+    /// A file removed.
+    Remove(PathBuf),
+    /// The names in a folder survive from here on.
+    SyncFolder(PathBuf),
+}
+
+/// Records the changes below a folder while it lives, those of all threads of this process.
+#[derive(Debug)]
+pub struct Recorder(PathBuf);
+
+struct Recording {
+    root: PathBuf,
+    operations: Vec<Operation>,
+}
+
+static RECORDINGS: Mutex<Vec<Recording>> = Mutex::new(Vec::new());
+
+fn recordings() -> MutexGuard<'static, Vec<Recording>> {
+    RECORDINGS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Recorder {
+    /// Starts to record the changes below `root`.
+    pub fn start(root: &Path) -> Self {
+        recordings().push(Recording {
+            root: root.to_owned(),
+            operations: Vec::new(),
+        });
+        Self(root.to_owned())
+    }
+
+    /// Returns the changes so far.
+    pub fn operations(&self) -> Vec<Operation> {
+        let all = recordings();
+        let ours = all.iter().find(|recording| recording.root == self.0);
+        ours.map_or(Vec::new(), |recording| recording.operations.clone())
+    }
+}
+
+impl Drop for Recorder {
+    fn drop(&mut self) {
+        recordings().retain(|recording| recording.root != self.0);
+    }
+}
+
+pub(crate) fn push(path: &Path, operation: impl Fn() -> Operation) {
+    for recording in recordings().iter_mut() {
+        if path.starts_with(&recording.root) {
+            recording.operations.push(operation());
+        }
+    }
+}
+
+pub(crate) fn sync_begins(path: &Path) -> u64 {
+    static IDS: AtomicU64 = AtomicU64::new(0);
+    let id = IDS.fetch_add(1, Ordering::Relaxed);
+    push(path, || Operation::SyncBegins {
+        path: path.to_owned(),
+        id,
+    });
+    id
+}
