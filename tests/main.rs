@@ -20,6 +20,7 @@ mod real_scans;
 mod refinement;
 mod resources;
 mod restart;
+mod results;
 mod shared_memory;
 mod simulation;
 

@@ -1,5 +1,6 @@
 //! The configuration of a run: read strictly, overridden key by key, written back as it was resolved.
 
+mod difference;
 mod rate;
 mod strict;
 
@@ -338,6 +339,13 @@ impl Configuration {
             .filter(|simulation| !simulation.output.store)
     }
 
+    /// Returns the simulation, if it is stored and then played as a recording.
+    pub fn stored(&self) -> Option<&SimulationConfig> {
+        self.simulation
+            .as_ref()
+            .filter(|simulation| simulation.output.store)
+    }
+
     /// Plays this recording instead, or streams the simulation even if a run would store it: for commands that read the scans
     /// without a run. Streamed and stored scans are byte-identical.
     #[must_use]
@@ -415,33 +423,28 @@ impl Configuration {
         toml::to_string_pretty(self)
     }
 
-    /// Returns whether a run started with `other` can be resumed with this: all that the result depends on is equal.
-    pub fn continues(&self, other: &toml::Table) -> bool {
-        let of = |table: &toml::Table| {
+    /// Returns the first key in which this configuration differs from `begun`, of those that the result depends on. `None`: a run
+    /// that was begun with it can be resumed with this.
+    ///
+    /// # Errors
+    /// A value that TOML cannot hold.
+    pub fn difference(&self, begun: &toml::Table) -> Result<Option<String>, crate::Failure> {
+        let relevant = |table: &toml::Table| {
             let mut table = table.clone();
             table.remove("stages");
-            if let Some(run) = table.get_mut("run").and_then(|run| run.as_table_mut()) {
-                run.retain(|key, _| {
-                    ![
-                        "rate",
-                        "window",
-                        "observers",
-                        "stall_timeout_s",
-                        "start_timeout_s",
-                        "ground_truth",
-                    ]
-                    .contains(&key)
-                });
-            }
-            if let Some(source) = table.get_mut("source").and_then(|key| key.as_table_mut()) {
-                source.retain(|key, _| !["retry_s", "max_unreadable"].contains(&key));
+            for (section, keys) in [
+                ("run", &["mode"][..]),
+                ("source", &["data", "first", "scans"]),
+            ] {
+                if let Some(section) = table.get_mut(section).and_then(|key| key.as_table_mut()) {
+                    section.retain(|key, _| keys.contains(&key));
+                }
             }
             table
         };
-        // Through text, as `other` came: a table made directly has other digits in its f32 values.
-        let text = self.to_toml().ok();
-        text.and_then(|text| text.parse().ok())
-            .is_some_and(|table| of(&table) == of(other))
+        // Through text, as `begun` came: a table made directly has other digits in its f32 values.
+        let now: toml::Table = self.to_toml()?.parse()?;
+        Ok(difference::first(&relevant(begun), &relevant(&now)))
     }
 }
 

@@ -36,7 +36,9 @@ pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
     if let Some(directory) = &arguments.plots {
         fs::create_dir_all(directory)
             .map_err(|error| format!("cannot make {}: {error}", directory.display()))?;
-        judgement.draw(directory)?;
+        for (name, plot) in judgement.plots()? {
+            gyre_storage::write(&directory.join(name), plot)?;
+        }
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -1,11 +1,12 @@
 //! The evaluation of a trajectory against ground truth, as `gyre run` and `gyre evaluate` both report it: its errors, and the
 //! consistency of its covariances.
 
-use std::{fmt, path::Path};
+use std::fmt;
 
 use gyre_evaluation::{
     Association, Bands, Coverage, Evaluation, EvaluationError, MatchedMotions, Nees, NeesOptions,
-    Options, TimedMotion, bands, nees, plot_bands, plot_errors, plot_trajectory,
+    Options, TimedMotion, bands, nees,
+    plot::{bands_svg, errors_svg, trajectory_svg},
 };
 use gyre_radar::Trajectory;
 use serde::Serialize;
@@ -45,24 +46,23 @@ impl Judgement {
         }
     }
 
-    /// Draws the trajectory, errors where the truth has heading, and bands where there are covariances.
+    /// Draws the trajectory, errors where the truth has heading, and bands where there are covariances: names and SVG documents.
     ///
     /// # Errors
-    /// A plot that cannot be drawn or written.
-    pub fn draw(&self, directory: &Path) -> Result<(), Failure> {
+    /// A plot that cannot be drawn.
+    pub fn plots(&self) -> Result<Vec<(&'static str, String)>, Failure> {
         let matched = &self.evaluation.matched;
-        plot_trajectory(
-            &directory.join("trajectory.svg"),
-            matched.estimate(),
-            Some(matched.truth()),
-        )?;
+        let mut plots = vec![(
+            "trajectory.svg",
+            trajectory_svg(matched.estimate(), Some(matched))?,
+        )];
         if self.evaluation.rpe.is_some() {
-            plot_errors(&directory.join("errors.svg"), &self.evaluation)?;
+            plots.push(("errors.svg", errors_svg(&self.evaluation)?));
         }
         if let Some(bands) = &self.bands {
-            plot_bands(&directory.join("bands.svg"), bands)?;
+            plots.push(("bands.svg", bands_svg(bands)?));
         }
-        Ok(())
+        Ok(plots)
     }
 }
 

@@ -1,16 +1,19 @@
 //! Gyre's command line as a library: `gyre` is this crate's binary, and the laboratory builds on the same parts.
 //!
-//! Reading order: [`cli`], then [`run`] (what `gyre run` does, on a page), [`configuration`], [`results`].
+//! Reading order: [`cli`], then [`run`] (what `gyre run` does, on a page), [`earlier`], [`configuration`], [`results`].
 
 pub mod cli;
 pub mod configuration;
+pub mod earlier;
 pub mod evaluate;
+pub mod identity;
 pub mod inspect;
 pub mod judgement;
 pub mod latency;
 pub mod machine;
 pub mod masks;
 pub mod odometry;
+pub mod out;
 pub mod picture;
 pub mod preflight;
 pub mod print;

@@ -1,49 +1,77 @@
 //! Results of a run in `--out`, all made from the journal: an interrupted run leaves the same files.
 
-use std::{fs, path::Path};
+use std::path::Path;
 
-use gyre_evaluation::{NeesOptions, Options, plot_trajectory};
+use gyre_evaluation::{NeesOptions, Options, plot::trajectory_svg};
 use gyre_messages::{PoseHeader, StageId, flag};
+use gyre_pose_integration::journal;
 use gyre_radar::{
     Trajectory,
     ground_truth::{find_ground_truth, read_trajectory, write_tum},
 };
-use gyre_stage::supervise::Report;
+use gyre_storage::{self as storage, Draft};
 
 use crate::{
     Failure,
     configuration::Configuration,
     judgement::{Judgement, judge, judge_motions},
     latency::Latency,
-    odometry, print,
+    odometry,
+    out::Out,
+    print,
     summary::{Counts, MotionCounts, Session, Summary},
 };
 
 /// The ground truth of a simulation that is played without being stored.
 pub const SIMULATED_TRUTH: &str = "ground_truth.tum";
+/// All results.
+pub const FILES: [&str; 8] = [
+    "odometry.csv",
+    "trajectory.tum",
+    "trajectory.svg",
+    "errors.svg",
+    "bands.svg",
+    "latency.json",
+    "summary.json",
+    SIMULATED_TRUTH,
+];
 
-/// Writes all files, and returns the summary to print.
+/// What was written.
+#[derive(Debug)]
+pub struct Results {
+    /// Poses in the journal.
+    pub poses: usize,
+    /// Whether the journal has its end.
+    pub ended: bool,
+    /// The summary to print.
+    pub summary: Summary,
+}
+
+/// Writes all files from the journal. Each is written aside first, and none takes its place before all are
+/// complete. They survive a power failure when this returns.
 ///
 /// # Errors
 /// A file that cannot be written.
 pub fn write(
     configuration: &Configuration,
-    out: &Path,
+    out: &Out,
     session: &Session<'_>,
-    records: &[PoseHeader],
-    report: Option<&Report>,
-) -> Result<Summary, Failure> {
+) -> Result<Results, Failure> {
+    let records = journal::read(&journal::path(out.path()))?;
     let end = records.last().filter(|last| last.item.is(flag::END));
     let poses = &records[..records.len() - usize::from(end.is_some())];
     let trajectory = odometry::trajectory(poses);
-    save(out, "odometry.csv", odometry::csv(poses))?;
+    let mut files = Files::new(out);
+    files.add("odometry.csv", odometry::csv(poses))?;
     let mut tum = Vec::new();
     write_tum(&trajectory, &mut tum)?;
-    save(out, "trajectory.tum", tum)?;
-    let judgement = judged(configuration, out, poses, &trajectory);
-    draw(out, &trajectory, judgement.as_ref())?;
+    files.add("trajectory.tum", tum)?;
+    let judgement = judged(configuration, out.path(), poses, &trajectory);
+    for (name, plot) in plots(&trajectory, judgement.as_ref())? {
+        files.add(name, plot)?;
+    }
     let latency = Latency::of(&poses[session.resumed.min(poses.len())..]);
-    save(out, "latency.json", serde_json::to_string_pretty(&latency)?)?;
+    files.add("latency.json", serde_json::to_string_pretty(&latency)?)?;
     let motions = configuration
         .has(StageId::Refinement)
         .then(|| MotionCounts::of(poses));
@@ -53,15 +81,46 @@ pub fn write(
     };
     let summary = Summary::new(
         configuration,
-        out,
+        out.path(),
         session,
         counts,
         latency,
         judgement,
-        report,
     );
-    save(out, "summary.json", serde_json::to_string_pretty(&summary)?)?;
-    Ok(summary)
+    files.add("summary.json", serde_json::to_string_pretty(&summary)?)?;
+    files.commit()?;
+    Ok(Results {
+        poses: poses.len(),
+        ended: end.is_some(),
+        summary,
+    })
+}
+
+/// Results that are complete but for taking their places.
+struct Files<'a> {
+    out: &'a Out,
+    drafts: Vec<Draft>,
+}
+
+impl<'a> Files<'a> {
+    fn new(out: &'a Out) -> Self {
+        Self {
+            out,
+            drafts: Vec::new(),
+        }
+    }
+
+    fn add(&mut self, name: &str, content: impl AsRef<[u8]>) -> Result<(), Failure> {
+        let mut draft = Draft::create(&self.out.join(name))?;
+        draft.append(content)?;
+        self.drafts.push(draft);
+        Ok(())
+    }
+
+    fn commit(self) -> Result<(), Failure> {
+        self.drafts.into_iter().try_for_each(Draft::commit)?;
+        Ok(storage::sync_folder(self.out.path())?)
+    }
 }
 
 /// Evaluates the trajectory and its covariances against the dataset's ground truth, where there is one that fits.
@@ -100,20 +159,16 @@ fn judged(
         .ok()
 }
 
-fn draw(out: &Path, trajectory: &Trajectory, judgement: Option<&Judgement>) -> Result<(), Failure> {
+fn plots(
+    trajectory: &Trajectory,
+    judgement: Option<&Judgement>,
+) -> Result<Vec<(&'static str, String)>, Failure> {
     match judgement {
-        Some(judgement) => judgement.draw(out),
-        None if trajectory.poses.is_empty() => Ok(()),
-        None => Ok(plot_trajectory(
-            &out.join("trajectory.svg"),
-            &trajectory.poses,
-            None,
-        )?),
+        Some(judgement) => judgement.plots(),
+        None if trajectory.poses.is_empty() => Ok(Vec::new()),
+        None => Ok(vec![(
+            "trajectory.svg",
+            trajectory_svg(&trajectory.poses, None)?,
+        )]),
     }
-}
-
-fn save(out: &Path, name: &str, text: impl AsRef<[u8]>) -> Result<(), Failure> {
-    let path = out.join(name);
-    fs::write(&path, text)
-        .map_err(|error| format!("cannot write {}: {error}", path.display()).into())
 }

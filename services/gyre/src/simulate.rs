@@ -1,7 +1,6 @@
 //! `gyre simulate`: writes a simulated recording.
 
 use std::{
-    fs,
     io::IsTerminal,
     num::NonZeroUsize,
     path::{Path, PathBuf},
@@ -10,7 +9,7 @@ use std::{
     time::Instant,
 };
 
-use gyre_simulator::{SimulationConfig, SimulatorError, Summary, write_dataset_on};
+use gyre_simulator::{SimulationConfig, SimulatorError, Summary, remove_dataset, write_dataset_on};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::{Failure, cli::SimulateArguments, configuration::Configuration, print};
@@ -80,24 +79,26 @@ fn overrides(arguments: &SimulateArguments) -> Vec<String> {
         .collect()
 }
 
-/// Writes the recording of a run to `out`, replacing another one of an earlier run.
+/// Writes the recording of a run to `out`, or completes it. If `replace`, it takes the place of that of an earlier run.
 ///
 /// # Errors
-/// As [`simulate`].
-pub fn store(simulation: &SimulationConfig, out: &Path) -> Result<PathBuf, Failure> {
+/// As [`simulate`]; a folder that holds files which Gyre did not write.
+pub fn store(simulation: &SimulationConfig, out: &Path, replace: bool) -> Result<(), Failure> {
     let threads = available_parallelism().unwrap_or(NonZeroUsize::MIN);
-    let summary = match write(threads, simulation, out) {
+    match write(threads, simulation, out) {
         Err(
             SimulatorError::OutputInUse { .. }
             | SimulatorError::OtherDataset { .. }
             | SimulatorError::OtherImage { .. },
-        ) => {
-            fs::remove_dir_all(out)?;
-            write(threads, simulation, out)
+        ) if replace => {
+            remove_dataset(out).map_err(|error| {
+                format!("cannot replace the recording of an earlier run: {error}, which is another --out")
+            })?;
+            write(threads, simulation, out)?;
         }
-        result => result,
-    }?;
-    Ok(summary.folder)
+        result => drop(result?),
+    }
+    Ok(())
 }
 
 /// Writes a recording, with a progress bar on a terminal.

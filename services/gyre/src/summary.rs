@@ -29,8 +29,12 @@ pub struct Session<'a> {
     pub resumed: usize,
     /// Wall-clock time.
     pub wall: Duration,
-    /// Shared memory.
-    pub footprint: &'a Footprint,
+    /// Shared memory; `None` if no process was started, because only results were missing.
+    pub footprint: Option<&'a Footprint>,
+    /// Its end; `None`: it failed.
+    pub ending: Option<Ending>,
+    /// The supervisor's report; `None` if it failed or no process was started.
+    pub report: Option<&'a Report>,
 }
 
 /// Counts of scans.
@@ -190,7 +194,8 @@ pub struct Summary {
     counts: Counts,
     wall_s: f64,
     scans_per_s: f64,
-    shared_memory: Footprint,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shared_memory: Option<Footprint>,
     restarts: BTreeMap<String, usize>,
     recovery_ms: Vec<f64>,
     /// Counters of each stage since its last start.
@@ -214,15 +219,14 @@ impl Summary {
         counts: Counts,
         latency: Latency,
         evaluation: Option<Judgement>,
-        report: Option<&Report>,
     ) -> Self {
-        let wall_s = session.wall.as_secs_f64();
+        let (wall_s, report) = (session.wall.as_secs_f64(), session.report);
         Self {
             version: env!("CARGO_PKG_VERSION"),
             machine: Machine::this(),
             out: out.display().to_string(),
             data: configuration.data(),
-            ending: report.map(|report| report.ending),
+            ending: session.ending,
             mode: configuration.run.mode,
             rate: configuration.run.rate,
             window: configuration.run.window,
@@ -231,8 +235,8 @@ impl Summary {
             resumed_after: session.resumed,
             counts,
             wall_s,
-            scans_per_s: latency.scans as f64 / wall_s,
-            shared_memory: session.footprint.clone(),
+            scans_per_s: latency.scans as f64 / wall_s.max(f64::MIN_POSITIVE),
+            shared_memory: session.footprint.cloned(),
             restarts: report
                 .map(|report| report.restarts.clone())
                 .unwrap_or_default(),

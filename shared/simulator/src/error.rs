@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use gyre_radar::TrajectoryError;
+use gyre_storage::StorageError;
 
 /// The reason why a dataset could not be set up or written.
 #[derive(Debug, thiserror::Error)]
@@ -54,6 +55,9 @@ pub enum SimulatorError {
         /// The folder.
         folder: PathBuf,
     },
+    /// A file could not be written.
+    #[error(transparent)]
+    Storage(#[from] StorageError),
     /// A file or folder could not be written.
     #[error("cannot write {}: {source}", path.display())]
     Write {

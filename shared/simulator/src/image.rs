@@ -1,14 +1,11 @@
-//! Scans as images, and files that are written as a whole.
+//! Scans as images.
 
-use std::fs;
 use std::path::Path;
 
 use gyre_radar::ImageSize;
+use gyre_storage::Draft;
 
 use crate::error::SimulatorError;
-
-/// Extension of incomplete files.
-pub(crate) const PART: &str = "part";
 
 /// Encodes an 8-bit grey PNG to `into`, whose content is replaced. Fast rather than small: the difference
 /// to the neighbour in range compresses better than PNG's other filters and needs no trial for each row (4
@@ -34,10 +31,10 @@ pub(crate) fn encode(
     writer.finish()
 }
 
-/// Writes an image as a whole or not at all; `buffer` is working memory.
+/// Writes an image as a whole or not at all, whatever ends the process or the machine; `buffer` is working memory.
 ///
 /// # Errors
-/// [`SimulatorError::Encode`] or [`SimulatorError::Write`].
+/// [`SimulatorError::Encode`] or [`SimulatorError::Storage`].
 pub(crate) fn write_image(
     path: &Path,
     size: ImageSize,
@@ -48,16 +45,7 @@ pub(crate) fn write_image(
         path: path.to_owned(),
         source,
     })?;
-    write_atomically(path, buffer)
-}
-
-/// Writes a temporary file and renames it, so that a killed process leaves no partial file. (A power
-/// failure may.)
-///
-/// # Errors
-/// [`SimulatorError::Write`].
-pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), SimulatorError> {
-    let part = path.with_extension(PART);
-    fs::write(&part, bytes).map_err(SimulatorError::write(&part))?;
-    fs::rename(&part, path).map_err(SimulatorError::write(path))
+    let mut draft = Draft::create(path)?;
+    draft.append(buffer)?;
+    Ok(draft.commit()?)
 }

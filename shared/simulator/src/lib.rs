@@ -67,4 +67,4 @@ pub use simulated_drive::{Renderer, SimulatedDrive};
 pub use simulator::{SimulatedScan, Simulator};
 pub use streets::{Street, Streets};
 pub use world::World;
-pub use writer::{Summary, write_dataset, write_dataset_on};
+pub use writer::{Summary, remove_dataset, write_dataset, write_dataset_on};

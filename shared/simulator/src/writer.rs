@@ -1,5 +1,6 @@
 //! Writes a simulated drive to a folder, on all processors. Resumes an interrupted one.
 
+mod removal;
 mod resume;
 
 use std::fs::{self, File};
@@ -12,9 +13,10 @@ use gyre_radar::ImageSource as _;
 
 use crate::config::SimulationConfig;
 use crate::error::SimulatorError;
-use crate::image::{write_atomically, write_image};
+use crate::image::write_image;
 use crate::simulated_drive::SimulatedDrive;
 
+pub use removal::remove_dataset;
 pub use resume::MADE_BY;
 
 /// The result of writing a dataset.
@@ -71,11 +73,9 @@ pub fn write_dataset_on(
     fs::create_dir_all(&images).map_err(SimulatorError::write(&images))?;
     let _alone = lock(out)?;
     let missing = resume::missing(&drive, config, out)?;
-    write_atomically(&out.join(MADE_BY), resume::made_by(config)?.as_bytes())?;
-    write_atomically(
-        &out.join(resume::DATASET_OPTIONS),
-        resume::dataset_options(&drive)?.as_bytes(),
-    )?;
+    gyre_storage::write(&out.join(MADE_BY), resume::made_by(config)?)?;
+    let options = resume::dataset_options(&drive)?;
+    gyre_storage::write(&out.join(resume::DATASET_OPTIONS), options)?;
     write_side_files(&drive, out)?;
     let kept = drive.scans() - missing.len();
     progress(kept, drive.scans());
@@ -123,7 +123,7 @@ fn write_side_files(drive: &SimulatedDrive, out: &Path) -> Result<(), SimulatorE
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(SimulatorError::write(folder))?;
         }
-        write_atomically(&path, &bytes)?;
+        gyre_storage::write(&path, &bytes)?;
     }
     Ok(())
 }
@@ -154,7 +154,8 @@ fn write_images(
             progress(done + 1);
         }
         outcome
-    })
+    })?;
+    Ok(gyre_storage::sync_folder(folder)?)
 }
 
 fn work(

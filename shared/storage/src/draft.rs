@@ -1,6 +1,7 @@
 //! Files that are replaced as a whole.
 
 use std::{
+    ffi::OsString,
     fs,
     io::{self, BufWriter, Write},
     path::{Path, PathBuf},
@@ -10,6 +11,9 @@ use std::{
 use crate::record::{self, Operation};
 use crate::{File, StorageError, folder::sync_folder};
 
+/// The name of a draft is that of its file between these.
+const AHEAD: &str = ".";
+const BEHIND: &str = ".tmp";
 /// Bytes that are collected before they are written.
 const BUFFER: usize = 1 << 18;
 
@@ -50,8 +54,10 @@ impl Draft {
     /// # Errors
     /// A file that cannot be created.
     pub fn create(path: &Path) -> Result<Self, StorageError> {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let aside = path.with_file_name(format!(".{name}.tmp"));
+        let mut name = OsString::from(AHEAD);
+        name.push(path.file_name().unwrap_or_default());
+        name.push(BEHIND);
+        let aside = path.with_file_name(name);
         let file =
             File::create(&aside).map_err(|error| StorageError::at("write", path)(error.source))?;
         Ok(Self {
@@ -101,6 +107,12 @@ impl Drop for Draft {
     }
 }
 
+/// Returns whether a file of this name is a draft, as a killed process leaves it.
+pub fn is_draft(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().as_encoded_bytes();
+    name.starts_with(AHEAD.as_bytes()) && name.ends_with(BEHIND.as_bytes())
+}
+
 /// Replaces a file as a whole. It survives a power failure when this returns.
 ///
 /// # Errors
@@ -131,6 +143,7 @@ mod tests {
         write(&path, "old").unwrap();
         let mut draft = Draft::create(&path).unwrap();
         draft.append("new").unwrap();
+        assert!(is_draft(&draft.aside) && !is_draft(&path));
         assert_eq!(fs::read_to_string(&path).unwrap(), "old");
         draft.commit().unwrap();
         assert_eq!(fs::read_to_string(&path).unwrap(), "new");

@@ -22,7 +22,7 @@ use std::{
 
 use thiserror::Error;
 
-pub use draft::{Draft, write};
+pub use draft::{Draft, is_draft, write};
 pub use file::File;
 pub use folder::{create_folder, remove, sync_folder};
 pub use group_sync::GroupSync;

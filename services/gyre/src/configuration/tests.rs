@@ -103,7 +103,14 @@ fn a_resolved_configuration_repeats_itself() {
             .unwrap();
     let text = configuration.to_toml().unwrap();
     assert_eq!(from(&text).unwrap(), configuration);
-    assert!(configuration.continues(&text.parse().unwrap()));
-    let other = from("[masking]\nkind = 'none'").unwrap();
-    assert!(!other.continues(&text.parse().unwrap()));
+    let begun = text.parse().unwrap();
+    assert_eq!(configuration.difference(&begun).unwrap(), None);
+    let faster = from(&text.replace("rate = 4", "rate = 8")).unwrap();
+    assert_eq!(faster.difference(&begun).unwrap(), None);
+    let other = from(&text.replace("cell_m = 0.8", "cell_m = 0.4")).unwrap();
+    let difference = other.difference(&begun).unwrap();
+    assert_eq!(
+        difference.as_deref(),
+        Some("raster.cell_m was 0.8 and is now 0.4")
+    );
 }

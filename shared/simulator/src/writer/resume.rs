@@ -9,7 +9,7 @@ use gyre_radar::ImageSource as _;
 
 use crate::config::SimulationConfig;
 use crate::error::SimulatorError;
-use crate::image::{PART, encode};
+use crate::image::encode;
 use crate::simulated_drive::SimulatedDrive;
 
 /// The file with the configuration that made a dataset.
@@ -85,11 +85,7 @@ fn images(folder: &Path) -> Result<BTreeSet<String>, SimulatorError> {
     let mut names = BTreeSet::new();
     for entry in fs::read_dir(folder).map_err(listing)? {
         let entry = entry.map_err(listing)?;
-        match entry
-            .path()
-            .extension()
-            .is_some_and(|extension| extension == PART)
-        {
+        match gyre_storage::is_draft(&entry.path()) {
             true => fs::remove_file(entry.path()).map_err(SimulatorError::write(&entry.path()))?,
             false => _ = names.insert(entry.file_name().to_string_lossy().into_owned()),
         }
@@ -100,18 +96,28 @@ fn images(folder: &Path) -> Result<BTreeSet<String>, SimulatorError> {
 /// Whether `out` was made by `config`, up to the number of scans and how they are played; false if it does
 /// not say.
 fn made_by_this(config: &SimulationConfig, out: &Path) -> Result<bool, SimulatorError> {
+    match made_with(out)? {
+        None => Ok(false),
+        Some(found) if same_scans(&found) == same_scans(config) => Ok(true),
+        Some(_) => Err(other_dataset(out)),
+    }
+}
+
+/// The configuration that made the dataset in `out`; `None` if it does not say.
+pub(super) fn made_with(out: &Path) -> Result<Option<SimulationConfig>, SimulatorError> {
     let path = out.join(MADE_BY);
-    let text = match fs::read_to_string(&path) {
-        Ok(text) => text,
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(false),
-        Err(source) => return Err(SimulatorError::Write { path, source }),
-    };
-    let found: Option<SimulationConfig> = toml::from_str(&text).ok();
-    match found.is_some_and(|found| same_scans(&found) == same_scans(config)) {
-        true => Ok(true),
-        false => Err(SimulatorError::OtherDataset {
-            folder: out.to_owned(),
-        }),
+    match fs::read_to_string(&path) {
+        Ok(text) => toml::from_str(&text)
+            .map(Some)
+            .map_err(|_| other_dataset(out)),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+        Err(source) => Err(SimulatorError::Write { path, source }),
+    }
+}
+
+fn other_dataset(out: &Path) -> SimulatorError {
+    SimulatorError::OtherDataset {
+        folder: out.to_owned(),
     }
 }
 

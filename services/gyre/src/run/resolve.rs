@@ -1,0 +1,59 @@
+//! The configuration of a run, with the overrides of the command line.
+
+use std::path::PathBuf;
+
+use crate::{Failure, cli::RunArguments, configuration::Configuration, preflight};
+
+/// Reads the configuration and resolves what it leaves open.
+///
+/// # Errors
+/// An invalid configuration, or a model that cannot be read.
+pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
+    let mut configuration = Configuration::read(&arguments.configuration, &overrides(arguments))?;
+    if arguments.data.is_some() {
+        configuration.simulation = None;
+    }
+    if let Some(simulation) = &mut configuration.simulation {
+        if let Some(file) = &mut simulation.drive.file {
+            *file = file.canonicalize().unwrap_or_else(|_| file.clone());
+        }
+        // The constants of a simulated radar are known.
+        configuration.dataset = configuration.dataset.or(&simulation.dataset_options());
+        configuration.source.data = PathBuf::new();
+    }
+    configuration.odometry.masking.resolve()?;
+    preflight::warn_of_training(&configuration)?;
+    // Absolute, so that the resolved configuration repeats the run from any folder. The reader reports what does not exist.
+    for path in [
+        Some(&mut configuration.source.data),
+        configuration.run.ground_truth.as_mut(),
+    ]
+    .into_iter()
+    .flatten()
+    {
+        if let Ok(absolute) = path.canonicalize() {
+            *path = absolute;
+        }
+    }
+    Ok(configuration)
+}
+
+fn overrides(arguments: &RunArguments) -> Vec<String> {
+    // Quoted, because a folder may be named 2019-01-10 or 7.
+    let quoted = |data: &PathBuf| toml::Value::from(data.to_string_lossy().into_owned());
+    let data = arguments
+        .data
+        .iter()
+        .map(|data| format!("source.data={}", quoted(data)));
+    let rate = arguments
+        .rate
+        .iter()
+        .map(|rate| format!("run.rate='{rate}'"));
+    arguments
+        .set
+        .iter()
+        .cloned()
+        .chain(data)
+        .chain(rate)
+        .collect()
+}

@@ -1,0 +1,227 @@
+//! The folder of the results: whole files, one run at a time, nothing lost and nothing of others removed.
+
+use std::{fs, path::Path, process::Command};
+
+use crate::common::{Ended, Run, recording, undisturbed};
+use rustix::process::Signal;
+
+const MODERATE: &str = "6";
+const MIDDLE: usize = recording::SCANS / 3;
+
+/// A run that was interrupted in its middle.
+fn interrupted() -> Run {
+    let run = Run::of_recording();
+    let slow = run.clone().rate(MODERATE);
+    let mut running = slow.start();
+    running.await_poses(MIDDLE).signal(Signal::INT);
+    assert_eq!(running.finish().code(), Some(130));
+    run
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).unwrap();
+    entries
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect()
+}
+
+/// The results could not be written at the first attempt: an earlier summary does not make the run complete.
+#[test]
+fn results_that_could_not_be_written_are_written_by_the_next_run_from_the_journal() {
+    let run = interrupted();
+    let csv = run.out().join("odometry.csv");
+    fs::remove_file(&csv).unwrap();
+    fs::create_dir(&csv).unwrap();
+    run.finish()
+        .failed_with(&["cannot write", "odometry.csv", "Is a directory"]);
+    assert!(
+        run.out().join("summary.json").exists(),
+        "of the interrupted run"
+    );
+    fs::remove_dir(&csv).unwrap();
+    let ended = run.finish();
+    ended.succeeded();
+    assert!(ended.stderr.contains("all 24 poses"), "{}", ended.stderr);
+    assert!(
+        !ended.stderr.contains("pid"),
+        "no process is started: {}",
+        ended.stderr
+    );
+    assert_eq!(run.odometry(), undisturbed());
+    let summary = run.summary();
+    assert_eq!(summary["ending"], "complete");
+    assert_eq!(summary["processed"], recording::SCANS);
+    assert_eq!(summary["resumed_after"], recording::SCANS);
+    assert!(summary["evaluation"]["rpe"].is_object());
+}
+
+#[test]
+fn a_run_whose_results_are_written_is_begun_anew() {
+    let run = Run::of_recording();
+    run.complete();
+    run.complete();
+    assert_eq!(run.summary()["resumed_after"], 0);
+}
+
+#[test]
+fn no_draft_of_a_result_is_left() {
+    let run = interrupted();
+    run.complete();
+    for folder in [run.out().to_owned(), run.out().join("journal")] {
+        let names = names(&folder);
+        assert!(
+            !names.iter().any(|name| name.ends_with(".tmp")),
+            "{names:?}"
+        );
+    }
+}
+
+#[test]
+fn an_empty_or_missing_config_is_restored_and_the_run_resumes() {
+    for damage in [
+        |path: &Path| fs::write(path, ""),
+        |path: &Path| fs::remove_file(path),
+    ] {
+        let run = interrupted();
+        let config = run.out().join("config.toml");
+        damage(&config).unwrap();
+        assert_eq!(run.complete(), undisturbed());
+        assert!(run.summary()["resumed_after"].as_u64().unwrap() >= MIDDLE as u64);
+        assert_eq!(Run::of_file(&config).complete(), undisturbed());
+    }
+}
+
+#[test]
+fn a_damaged_record_of_what_a_run_was_begun_with_is_named_and_not_discarded() {
+    let run = interrupted();
+    let path = run.out().join("journal/run.toml");
+    let whole = fs::read(&path).unwrap();
+    let damages: [(&str, Option<&[u8]>); 3] = [
+        ("is empty", Some(b"")),
+        ("is damaged", Some(&whole[..whole.len() / 2])),
+        ("is missing", None),
+    ];
+    for (state, content) in damages {
+        match content {
+            Some(content) => fs::write(&path, content).unwrap(),
+            None => fs::remove_file(&path).unwrap(),
+        }
+        run.finish().refused_with(&[
+            "run.toml",
+            state,
+            "restore it from a backup",
+            "another --out",
+        ]);
+    }
+    fs::write(&path, whole).unwrap();
+    assert_eq!(run.complete(), undisturbed());
+}
+
+#[test]
+fn another_configuration_is_refused_by_the_key_that_differs() {
+    let run = interrupted();
+    run.clone()
+        .set("masking.threshold=70")
+        .finish()
+        .refused_with(&[
+            "unfinished run of another configuration",
+            "masking.threshold was",
+            "and is now 70",
+            "--out",
+            "--fresh",
+        ]);
+    assert_eq!(run.complete(), undisturbed());
+}
+
+/// The command with a `/dev/shm` of its own, as a container has it; `None` where the system does not permit that.
+fn in_container(run: &Run) -> Option<Command> {
+    let permitted = Command::new("unshare").args(["--mount", "true"]).output();
+    if !permitted.is_ok_and(|output| output.status.success()) {
+        println!("skipped: a mount namespace of its own is not permitted here");
+        return None;
+    }
+    let own = run.command();
+    let mut command = Command::new("unshare");
+    command
+        .args([
+            "--mount",
+            "sh",
+            "-c",
+            "mount -t tmpfs tmpfs /dev/shm && exec \"$@\"",
+            "sh",
+        ])
+        .arg(own.get_program())
+        .args(own.get_args());
+    Some(command)
+}
+
+#[test]
+fn two_runs_without_common_shared_memory_do_not_write_to_one_journal() {
+    let run = Run::of_recording().rate(MODERATE);
+    let second = Run::of_recording().option("--fresh").into(run.out());
+    let Some(second) = in_container(&second) else {
+        return;
+    };
+    let mut running = run.start();
+    running.await_poses(2);
+    Ended::of(second).refused_with(&["another run is writing to", "--out"]);
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+fn stored() -> Run {
+    Run::configured("[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 6\n")
+        .set("simulation.output.store=true")
+}
+
+#[test]
+fn a_recording_that_gyre_did_not_write_is_never_removed() {
+    let run = stored();
+    let theirs = run.out().join("recording");
+    fs::create_dir_all(theirs.join("radar")).unwrap();
+    fs::write(theirs.join("radar/1.png"), "theirs").unwrap();
+    run.finish()
+        .failed_with(&["recording", "1.png", "no file of this dataset", "--out"]);
+    assert_eq!(fs::read(theirs.join("radar/1.png")).unwrap(), b"theirs");
+}
+
+#[test]
+fn a_file_that_was_added_to_a_recording_is_never_removed() {
+    let run = stored();
+    run.complete();
+    let notes = run.out().join("recording/notes.txt");
+    fs::write(&notes, "rain").unwrap();
+    let other = run.clone().set("simulation.seed=4");
+    other.finish().failed_with(&["recording", "notes.txt"]);
+    assert_eq!(fs::read(&notes).unwrap(), b"rain");
+    assert_eq!(names(&run.out().join("recording/radar")).len(), 6);
+    fs::remove_file(&notes).unwrap();
+    other.complete();
+}
+
+#[test]
+fn a_recording_is_not_replaced_while_the_run_that_plays_it_is_unfinished() {
+    let run = stored();
+    let mut running = run.clone().rate("2").start();
+    running.await_poses(2).signal(Signal::INT);
+    assert_eq!(running.finish().code(), Some(130));
+    let images = names(&run.out().join("recording/radar"));
+    let other = run.clone().set("simulation.seed=4");
+    other
+        .finish()
+        .refused_with(&["another configuration", "simulation.seed"]);
+    assert_eq!(names(&run.out().join("recording/radar")), images);
+    assert_eq!(run.complete(), stored().complete());
+}
+
+#[test]
+fn a_recording_is_not_replaced_while_another_run_plays_it() {
+    let run = stored();
+    let mut running = run.clone().rate("2").start();
+    running.await_poses(2);
+    let images = names(&run.out().join("recording/radar"));
+    let other = run.clone().set("simulation.seed=4").option("--fresh");
+    Ended::of(other.command()).refused_with(&["another run is writing to"]);
+    assert_eq!(names(&run.out().join("recording/radar")), images);
+    running.finish().succeeded();
+}
