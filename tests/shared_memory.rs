@@ -170,6 +170,47 @@ fn all_files_of_a_run_are_the_owners_alone_whatever_the_umask() {
     }
 }
 
+/// Runs a shell script with the shared memory of a running process.
+fn in_shared_memory_of(pid: u32, script: &str) {
+    let mut command = Command::new("nsenter");
+    command.args(["--mount", "--target", &pid.to_string(), "sh", "-c", script]);
+    command.output().unwrap();
+}
+
+const FILL: &str = "cat /dev/zero >> /dev/shm/filled-by-another-program";
+
+#[test]
+fn a_run_has_its_memory_before_another_program_fills_the_rest() {
+    let run = Run::of_recording().rate("2");
+    let Some(command) = run.with_tmpfs(Path::new(SHARED_MEMORY), "size=64m") else {
+        return;
+    };
+    let mut running = run.start_as(command);
+    running.await_poses(1);
+    in_shared_memory_of(running.pid(), FILL);
+    let ended = running.finish();
+    ended.succeeded();
+    assert!(!ended.stderr.contains("died"), "{}", ended.stderr);
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn a_restart_without_memory_ends_the_run_in_a_sentence() {
+    let run = Run::of_recording().rate("2");
+    let Some(command) = run.with_tmpfs(Path::new(SHARED_MEMORY), "size=64m") else {
+        return;
+    };
+    let mut running = run.start_as(command);
+    let source = running.await_poses(1).await_stage("radar-replay");
+    // What a dead process leaves is taken at once.
+    let script =
+        format!("{FILL}; kill -9 {source}; for i in $(seq 100); do {FILL}; sleep 0.01; done");
+    in_shared_memory_of(running.pid(), &script);
+    running
+        .finish()
+        .failed_with(&["died 6 times", "/dev/shm", "giving up"]);
+}
+
 #[test]
 fn two_users_run_at_once() {
     let Some(other) = Other::new() else { return };

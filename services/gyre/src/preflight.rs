@@ -1,13 +1,13 @@
 //! Checks before the first process is started.
 
-use std::{path::Path, time::Duration};
+use std::time::Duration;
 
 use gyre_masking::{MaskKind, Masker, model::Card};
 use gyre_messages::{Footprint, Limits, Window};
 use gyre_odometry::OdometryConfig;
 use gyre_radar::Dataset;
 use gyre_simulator::SimulatedDrive;
-use gyre_stage::run::SHARED_MEMORY;
+use gyre_stage::run::free_shared_memory;
 use thiserror::Error;
 
 use crate::{configuration::Configuration, print};
@@ -153,14 +153,12 @@ pub fn open(configuration: &Configuration) -> Result<Played, crate::Failure> {
 /// # Errors
 /// Too little shared memory.
 pub fn check_shared_memory(footprint: &Footprint) -> Result<(), PreflightError> {
-    let there =
-        rustix::fs::statvfs(Path::new(SHARED_MEMORY)).map_err(PreflightError::NoSharedMemory)?;
-    let free = there.f_bavail as f64 * there.f_frsize as f64;
-    match free >= footprint.total() as f64 {
-        true => Ok(()),
-        false => Err(PreflightError::SharedMemory {
-            free_mb: free / 1e6,
+    let free = free_shared_memory().map_err(PreflightError::NoSharedMemory)?;
+    match free {
+        Some(free) if free < footprint.total() as u64 => Err(PreflightError::SharedMemory {
+            free_mb: free as f64 / 1e6,
             footprint: footprint.clone(),
         }),
+        _ => Ok(()),
     }
 }

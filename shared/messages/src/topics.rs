@@ -39,6 +39,13 @@ impl Topic {
     }
 }
 
+/// Bytes of a page of memory.
+const PAGE: usize = 4096;
+/// Pages of bookkeeping, whatever the topics.
+const OTHER_PAGES: usize = 32;
+const PAGES_PER_TOPIC: usize = 8;
+const PAGES_PER_SUBSCRIBER: usize = 4;
+
 /// All topics, in the order of the stream.
 pub const TOPICS: [Topic; 6] = [
     Topic::of::<Scan>(),
@@ -53,22 +60,33 @@ fn max_sample_bytes<M: Message>(limits: &Limits) -> usize {
     SAMPLE_OVERHEAD + size_of::<M::Header>() + M::max_elements(limits) * size_of::<M::Element>()
 }
 
+/// Returns an upper limit of the transport's bookkeeping, of which each file takes whole pages: a service has its description and
+/// state, a subscriber its queue, its events, and a process of its own. Measured without observers: 83 pages.
+fn bookkeeping(window: &Window) -> usize {
+    let subscribers: usize = TOPICS
+        .iter()
+        .map(|topic| (topic.sizes)(window).subscribers())
+        .sum();
+    (OTHER_PAGES + TOPICS.len() * PAGES_PER_TOPIC + subscribers * PAGES_PER_SUBSCRIBER) * PAGE
+}
+
 /// The shared memory that a run needs.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Footprint {
-    /// Bytes of each topic's segment when all of it is in use, by topic.
+    /// Bytes of each topic's segment, by topic, and of the transport's bookkeeping.
     pub segments: Vec<(&'static str, usize)>,
 }
 
 impl Footprint {
     /// The footprint of a window and its largest messages.
     pub fn new(window: &Window, limits: &Limits) -> Self {
-        let segments = TOPICS.map(|topic| {
+        let segments = TOPICS.iter().map(|topic| {
             let samples = (topic.sizes)(window).samples();
             (topic.name, samples * (topic.max_sample_bytes)(limits))
         });
+        let bookkeeping = [("bookkeeping", bookkeeping(window))];
         Self {
-            segments: segments.to_vec(),
+            segments: segments.chain(bookkeeping).collect(),
         }
     }
 
@@ -81,7 +99,7 @@ impl Footprint {
 impl fmt::Display for Footprint {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let total_mb = self.total() as f64 / 1e6;
-        write!(f, "{total_mb:.1} MB of shared memory at most (")?;
+        write!(f, "{total_mb:.1} MB of shared memory (")?;
         for (i, (topic, bytes)) in self.segments.iter().enumerate() {
             let separator = if i == 0 { "" } else { ", " };
             write!(f, "{separator}{topic} {:.1}", *bytes as f64 / 1e6)?;

@@ -4,6 +4,8 @@ use std::{fmt::Debug, path::PathBuf};
 
 use thiserror::Error;
 
+use crate::run::{self, SHARED_MEMORY};
+
 /// An error that ends a stage. The exit code tells the supervisor whether a restart can help.
 #[derive(Debug, Error)]
 pub enum StageError {
@@ -70,6 +72,19 @@ pub enum StageError {
         /// The violation.
         reason: String,
     },
+    /// There is too little shared memory. A dead process may have left some that is about to be freed.
+    #[error(
+        "shared memory at /dev/shm has no room for the {megabytes:.1} MB of topic `{topic}` ({source}): free some, enlarge it \
+         (containers: --shm-size), or lower run.window or raster.n"
+    )]
+    NoMemory {
+        /// The topic.
+        topic: &'static str,
+        /// The size of its segment, MB.
+        megabytes: f64,
+        /// The system error.
+        source: std::io::Error,
+    },
     /// A file of the run cannot be read or written.
     #[error("{path}: {source}")]
     File {
@@ -88,16 +103,23 @@ impl StageError {
 
     /// Creates an error of the transport.
     pub(crate) fn transport(action: impl Into<String>, reason: impl Debug) -> Self {
+        // The transport does not name this cause.
+        let full = match run::shared_memory_is_full() {
+            true => format!("; {SHARED_MEMORY} is full"),
+            false => String::new(),
+        };
         Self::Transport {
             action: action.into(),
-            reason: format!("{reason:?}"),
+            reason: format!("{reason:?}{full}"),
         }
     }
 
     /// Returns the exit code of the process.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Transport { .. } | Self::SequenceGap { .. } => Self::TRANSIENT,
+            Self::Transport { .. } | Self::SequenceGap { .. } | Self::NoMemory { .. } => {
+                Self::TRANSIENT
+            }
             _ => Self::PERMANENT,
         }
     }

@@ -28,6 +28,7 @@ pub mod launch;
 pub mod lock;
 pub mod observer;
 pub mod reader;
+mod reservation;
 pub mod run;
 mod schedule;
 mod services;

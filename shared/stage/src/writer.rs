@@ -8,7 +8,7 @@ use iceoryx2::{
 };
 
 use crate::{
-    Manifest, StageError, clock,
+    Manifest, StageError, clock, reservation,
     services::{self, Ipc, Listener, Node, Notifier},
 };
 
@@ -43,6 +43,7 @@ impl<M: Message> Writer<M> {
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
             .map_err(|e| StageError::transport(format!("publish {}", M::TOPIC), e))?;
+        reservation::reserve(manifest, M::TOPIC, publisher.id().value())?;
         Ok(Self {
             handshake,
             data,

@@ -14,7 +14,7 @@ use std::{
 };
 
 use rustix::{
-    fs::{Mode, OFlags},
+    fs::{Mode, OFlags, statvfs},
     io::Errno,
     process::{Uid, geteuid},
 };
@@ -276,6 +276,20 @@ pub(crate) fn own_files(
         .filter(move |entry| entry.file_name().to_string_lossy().starts_with(prefix))
         .filter_map(|entry| Some((entry.path(), entry.metadata().ok()?)))
         .filter(move |(_, file)| file.is_file() && file.uid() == user)
+}
+
+/// Returns the bytes of shared memory that are free; `None` if they are not limited.
+///
+/// # Errors
+/// There is no shared memory.
+pub fn free_shared_memory() -> rustix::io::Result<Option<u64>> {
+    let there = statvfs(SHARED_MEMORY)?;
+    Ok((there.f_blocks > 0).then_some(there.f_bavail * there.f_frsize))
+}
+
+/// Returns whether no shared memory is left.
+pub(crate) fn shared_memory_is_full() -> bool {
+    free_shared_memory().is_ok_and(|free| free == Some(0))
 }
 
 /// Closes the files of a run to other users. The transport opens one of them, the counter of its nodes, to all.

@@ -16,7 +16,10 @@ use rustix::process::{
 };
 
 use super::{StagePlan, SuperviseError, log::Log};
-use crate::{Manifest, StageError, launch, run};
+use crate::{
+    Manifest, StageError, launch,
+    run::{self, SHARED_MEMORY},
+};
 
 /// The death of a process.
 #[derive(Clone, Debug)]
@@ -148,6 +151,9 @@ impl Child {
     pub(super) fn death(&mut self) -> Death {
         let status = self.status.unwrap_or_default();
         let cause = match (status.signal(), status.code()) {
+            (Some(signal), _) if signal == Signal::BUS.as_raw() => {
+                format!("signal {signal} (is {SHARED_MEMORY} full?)")
+            }
             (Some(signal), _) => format!("signal {signal}"),
             (None, code) => format!("exit code {}", code.unwrap_or_default()),
         };
@@ -182,10 +188,11 @@ impl Child {
 
     /// Returns the reason that the process gave, else the last line of its output.
     fn last_output(&mut self) -> Option<String> {
-        let written = fs::read_to_string(&self.last_words);
+        let reason = fs::read_to_string(&self.last_words).ok();
         let _ = fs::remove_file(&self.last_words);
         let output = self.log.last_line();
-        written.ok().or(output)
+        // It is empty if shared memory was full.
+        reason.filter(|reason| !reason.is_empty()).or(output)
     }
 }
 
