@@ -15,6 +15,7 @@ mod learned_masks;
 mod live;
 mod lost_input;
 mod masks;
+mod observers;
 mod pipeline;
 mod real_scans;
 mod refinement;

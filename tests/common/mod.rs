@@ -10,6 +10,7 @@ pub mod odometry;
 mod processes;
 pub mod recording;
 mod running;
+mod watch;
 
 use std::{
     ffi::OsStr,
@@ -26,6 +27,7 @@ pub use ended::Ended;
 pub use leftovers::assert_nothing_left;
 pub use processes::{Pid, cpu_time, send};
 pub use running::Running;
+pub use watch::{Watch, Watched};
 
 /// The stages of a run that does not search jointly, in the order of the stream.
 pub const STAGES: [&str; 6] = [

@@ -2,7 +2,7 @@
 
 use std::{num::NonZeroUsize, path::PathBuf};
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use gyre_evaluation::Part;
 use gyre_simulator::OutputFormat;
 
@@ -29,6 +29,8 @@ pub enum Command {
         /// radar-replay, masking, rotation-search, translation-search, joint-search, refinement or pose-integration.
         name: String,
     },
+    /// Print the messages of a running run. It changes neither a result nor a latency.
+    Watch(WatchArguments),
     /// Report what a dataset contains, and what looks wrong with it.
     Inspect(InspectArguments),
     /// Evaluate a trajectory against ground truth.
@@ -61,6 +63,33 @@ pub struct RunArguments {
     /// Discard an unfinished run in --out instead of resuming it.
     #[arg(long)]
     pub fresh: bool,
+}
+
+/// The arguments of `gyre watch`.
+#[derive(Debug, Args)]
+pub struct WatchArguments {
+    /// The folder of the run's results, its --out.
+    pub out: PathBuf,
+    /// The topic.
+    #[arg(value_enum, default_value_t = Topic::Pose)]
+    pub topic: Topic,
+}
+
+/// The topics of a run, in the order of the stream.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum Topic {
+    /// Scans as measured.
+    Scan,
+    /// Masked rasters and points.
+    Masked,
+    /// Rotations between scans.
+    Rotation,
+    /// Motions between scans.
+    Motion,
+    /// Motions after refinement.
+    Refined,
+    /// Poses.
+    Pose,
 }
 
 /// The arguments of `gyre inspect`.

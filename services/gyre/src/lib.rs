@@ -24,6 +24,7 @@ pub mod schema;
 pub mod simulate;
 pub mod stage;
 pub mod summary;
+pub mod watch;
 
 use std::process::ExitCode;
 
@@ -46,6 +47,10 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Run(arguments) => {
             gyre_stage::run::keep_files_private();
             run::run(&arguments)
+        }
+        Command::Watch(arguments) => {
+            gyre_stage::run::keep_files_private();
+            watch::watch(&arguments)
         }
         Command::Inspect(arguments) => inspect::inspect(&arguments),
         Command::Evaluate(arguments) => evaluate::evaluate(&arguments),

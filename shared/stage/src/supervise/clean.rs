@@ -185,7 +185,10 @@ fn unlink_incomplete_tags(directory: &Path) {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use gyre_messages::Pose;
+
     use super::*;
+    use crate::{observer::ObservedRun, tests::Run};
 
     #[test]
     fn only_empty_files_of_dead_ports_are_found() {
@@ -200,6 +203,26 @@ mod tests {
         }
         let empty = empty_files(directory.path(), "run_", |name| name.contains("_1_"));
         assert_eq!(empty, [directory.path().join("run_1_2.connection")]);
+    }
+
+    #[test]
+    fn an_empty_file_that_a_stopped_observer_began_does_not_stay() {
+        let run = Run::new();
+        let transport = run.manifest.transport().unwrap();
+        let observed = ObservedRun::at(&run.manifest.root).unwrap();
+        let _observer = observed.observe::<Pose>().unwrap();
+        let of_observer = ports_of(&run.manifest, &living_observers(&transport));
+        let file = |port: &str| {
+            let name = format!("{}0_{port}.connection", run.manifest.prefix);
+            let path = Path::new(SHARED_MEMORY).join(name);
+            fs::write(&path, "").unwrap();
+            path
+        };
+        let begun: Vec<_> = of_observer.iter().map(|port| file(port)).collect();
+        let of_a_stage = file("1");
+        assert!(remove_dead_observers(&run.manifest, &transport).is_ok());
+        assert!(!begun.is_empty() && begun.iter().all(|path| !path.exists()));
+        assert!(of_a_stage.exists());
     }
 
     #[test]

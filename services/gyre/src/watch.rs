@@ -1,0 +1,134 @@
+//! `gyre watch`: prints the messages of a running run.
+
+use std::{
+    fmt::Display,
+    io::{self, ErrorKind, Write},
+    path::Path,
+    process::ExitCode,
+    time::Duration,
+};
+
+use gyre_messages::{
+    Masked, Message, Motion, MotionHeader, Pose, PoseHeader, Refined, Rotation, Scan,
+};
+use gyre_stage::{
+    observer::{Next, ObservedRun},
+    reader::Received,
+};
+
+use crate::{
+    Failure,
+    cli::{Topic, WatchArguments},
+};
+
+/// Prints a line for each message of a topic, and how many were missed, until the run ends.
+///
+/// # Errors
+/// There is no such run, all places for observers are taken, or the transport fails.
+pub fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
+    let out = &arguments.out;
+    match arguments.topic {
+        Topic::Scan => observe::<Scan>(out, scan),
+        Topic::Masked => observe::<Masked>(out, masked),
+        Topic::Rotation => observe::<Rotation>(out, rotation),
+        Topic::Motion => observe::<Motion>(out, |message| motion(message.header())),
+        Topic::Refined => observe::<Refined>(out, |message| motion(message.header())),
+        Topic::Pose => observe::<Pose>(out, |message| pose(message.header())),
+    }
+}
+
+fn observe<M: Message>(
+    out: &Path,
+    describe: impl Fn(&Received<M>) -> String,
+) -> Result<ExitCode, Failure> {
+    let run = ObservedRun::writing_to(out)?;
+    let mut observer = run.observe::<M>()?;
+    let mut received = 0_u64;
+    let mut read = true;
+    while read {
+        read = match observer.next(Duration::MAX)? {
+            Next::Message(message, missed) => {
+                received += 1;
+                let item = message.item();
+                let gap = match missed {
+                    0 => String::new(),
+                    missed => format!("{missed} missed\n"),
+                };
+                let (seq, scan) = (item.seq, item.scan);
+                line(format_args!(
+                    "{gap}{seq}: scan {scan}, {}",
+                    describe(message)
+                ))?
+            }
+            Next::Idle => true,
+            Next::Ended => break,
+        };
+    }
+    let missed = observer.missed();
+    line(format_args!(
+        "{}: {received} received, {missed} missed",
+        M::TOPIC
+    ))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Prints a line; false if nobody reads it any more, as after `gyre watch OUT | head`.
+fn line(text: impl Display) -> Result<bool, Failure> {
+    match writeln!(io::stdout(), "{text}") {
+        Ok(()) => Ok(true),
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(false),
+        Err(error) => Err(format!("cannot print: {error}").into()),
+    }
+}
+
+fn scan(message: &Received<Scan>) -> String {
+    let header = message.header();
+    let Some(scan) = header.view(message.values()) else {
+        return "its rows do not fit its header".to_owned();
+    };
+    let rows = (0..scan.geometry.azimuths).map(|row| scan.row(row));
+    let power: u64 = rows.flatten().map(|power| u64::from(*power)).sum();
+    let (azimuths, bins) = (scan.geometry.azimuths, scan.geometry.bins);
+    let mean = power as f64 / (azimuths * bins).max(1) as f64;
+    format!("{azimuths} azimuths of {bins} bins, mean power {mean:.2}")
+}
+
+fn masked(message: &Received<Masked>) -> String {
+    let header = message.header();
+    let (n, cell_m) = (header.n, header.cell_m);
+    format!(
+        "{} raster{} of {n} x {n} cells of {cell_m} m, {} points",
+        header.rasters,
+        if header.rasters == 1 { "" } else { "s" },
+        header.points
+    )
+}
+
+fn rotation(message: &Received<Rotation>) -> String {
+    let rotation = &message.header().rotation;
+    format!(
+        "yaw {:.3} deg, score {:.3}",
+        rotation.angle_rad.to_degrees(),
+        rotation.score
+    )
+}
+
+fn motion(header: &MotionHeader) -> String {
+    let motion = &header.motion;
+    format!(
+        "x {:.3} m, y {:.3} m, yaw {:.3} deg, score {:.3}",
+        motion.x_m,
+        motion.y_m,
+        motion.yaw_rad.to_degrees(),
+        motion.score
+    )
+}
+
+fn pose(header: &PoseHeader) -> String {
+    format!(
+        "x {:.3} m, y {:.3} m, yaw {:.3} deg",
+        header.x_m,
+        header.y_m,
+        header.yaw_rad.to_degrees()
+    )
+}

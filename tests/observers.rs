@@ -1,0 +1,93 @@
+//! Observers of a run: whatever happens to them, the result is the same, nothing is left, and each knows what it has missed.
+
+use std::{path::Path, thread, time::Duration};
+
+use rustix::process::Signal;
+
+use crate::common::{Run, Watch, assert_nothing_left, odometry, real_data};
+
+const SCANS: u64 = 200;
+/// Places for observers of each topic, by default.
+const PLACES: usize = 8;
+
+fn simulated() -> Run {
+    let scans = format!("[simulation]\nscans = {SCANS}\n");
+    Run::configured(&format!("{scans}[raster]\nn = 127\ncell_m = 0.8\n"))
+}
+
+/// Runs with eight observers: two look on, two are stopped, two are killed, and two places are for ones that come and go.
+fn observers_change_nothing(run: &Run, undisturbed: &str) {
+    let scans = odometry::rows(undisturbed).len() as u64 + 1;
+    let mut running = run.start();
+    running.await_stage("pose-integration");
+    let attached = |topic| Watch::start(run, topic).await_message();
+    let lookers = ["scan", "pose"].map(attached);
+    let stopped = ["masked", "pose"].map(attached);
+    stopped.iter().for_each(|watch| watch.signal(Signal::STOP));
+    drop(["scan", "motion"].map(attached).map(Watch::kill));
+    for milliseconds in (0..40).step_by(4) {
+        let guests = ["masked", "refined"].map(|topic| Watch::start(run, topic));
+        thread::sleep(Duration::from_millis(milliseconds));
+        for guest in guests {
+            guest.signal(Signal::TERM);
+            guest.kill().assert_consistent(scans);
+        }
+    }
+    let [resumed, never_resumed] = stopped;
+    running.await_poses_or_end(scans as usize / 2);
+    resumed.signal(Signal::CONT);
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed);
+    for looker in lookers {
+        assert!(looker.finish().assert_consistent(scans).total.is_some());
+    }
+    let resumed = resumed.finish();
+    let (_, missed) = resumed.assert_consistent(scans).total.unwrap();
+    assert!(missed > 0, "{resumed:?}");
+    never_resumed.kill().assert_consistent(scans);
+    assert_nothing_left(run.out());
+}
+
+#[test]
+fn observers_that_look_on_stop_die_come_and_go_change_nothing() {
+    observers_change_nothing(&simulated(), &simulated().complete());
+}
+
+#[test]
+fn observers_of_a_real_recording_change_nothing() {
+    let Some(data) = real_data("radiate-2019-02-12") else {
+        return;
+    };
+    let configuration = Path::new(crate::PROJECT).join("configs/radiate.toml");
+    let run = || Run::of_file(&configuration).data(&data);
+    observers_change_nothing(&run(), &run().complete());
+}
+
+#[test]
+fn an_observer_sees_each_item_once_although_the_publisher_is_restarted() {
+    let run = simulated();
+    let mut running = run.start();
+    running.await_stage("pose-integration");
+    let watches = ["masked", "motion"].map(|topic| Watch::start(&run, topic).await_message());
+    running.await_poses(20).kill("masking");
+    running.await_poses(60).kill("translation-search");
+    running.finish().succeeded();
+    for watch in watches {
+        let watched = watch.finish();
+        assert!(watched.assert_consistent(SCANS).total.is_some());
+    }
+}
+
+#[test]
+fn the_places_of_killed_observers_are_freed() {
+    let run = simulated().rate("8");
+    let mut running = run.start();
+    running.await_poses(1);
+    for _ in 0..2 {
+        let watches: Vec<_> = (0..PLACES).map(|_| Watch::start(&run, "pose")).collect();
+        let attached = watches.into_iter().map(Watch::await_message);
+        drop(attached.collect::<Vec<_>>());
+    }
+    running.signal(Signal::TERM);
+    assert_eq!(running.finish().code(), Some(130));
+}
