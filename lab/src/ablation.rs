@@ -1,17 +1,15 @@
 //! `gyre-lab ablation`: measures the contribution of each step from the paper's form to a sequence's own configuration, or the effect of
 //! single changes of that configuration.
 
-use std::{collections::BTreeSet, path::Path, process::ExitCode};
+use std::{path::Path, process::ExitCode, slice};
 
 use gyre::Failure;
-use gyre_radar::median;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
 use crate::{
     cli::AblationArguments,
-    models::Model,
-    report::{Heading, Notes, make_folder, publish},
-    sequence::{Experiment, Figures, LEGEND, Line, Sequence},
+    report::{Notes, Table, make_folder, publish},
+    sequence::Sequence,
 };
 
 /// The steps in their order.
@@ -34,90 +32,57 @@ struct Step {
     mask: Option<String>,
 }
 
-/// `ablation.json`.
-#[derive(Debug, Serialize)]
-struct Ablation {
-    #[serde(flatten)]
-    heading: Heading,
-    /// Sequence by sequence.
-    experiments: Vec<Experiment>,
-}
-
-/// Runs all steps, or all changes, on every sequence; prints and writes what they came to.
-///
-/// # Errors
-/// A recording, run or file that fails.
+/// Runs all steps, or all changes, on every sequence; prints and writes the results.
 pub fn ablation(arguments: &AblationArguments) -> Result<ExitCode, Failure> {
     let sequences = Sequence::all(&arguments.sequences)?;
     let changes = changes(&arguments.vary)?;
     for change in &changes {
-        sequences[0].configuration(std::slice::from_ref(change))?;
+        sequences[0].configuration(slice::from_ref(change))?;
     }
     make_folder(&arguments.out)?;
     let measure = |sequence: &Sequence| match changes.is_empty() {
         true => steps(sequence, &arguments.sequences.models, &arguments.out),
         false => variations(sequence, &changes, &arguments.out),
     };
-    let ablation = Ablation {
-        heading: Heading::now(),
-        experiments: sequences.iter().map(measure).collect::<Result<_, _>>()?,
-    };
-    let tables: String = ablation
-        .experiments
+    let tables = sequences
         .iter()
-        .map(Experiment::markdown)
-        .collect();
-    let text = ablation.heading.markdown("Ablation") + &tables + LEGEND;
-    publish(&arguments.out, "ablation", &ablation, &text)?;
+        .map(measure)
+        .collect::<Result<Vec<_>, _>>()?;
+    publish("ablation", &tables, &arguments.out)?;
     Ok(ExitCode::SUCCESS)
 }
 
 /// Runs every step on `sequence`, each on top of those before it.
-fn steps(sequence: &Sequence, models: &Path, out: &Path) -> Result<Experiment, Failure> {
+fn steps(sequence: &Sequence, models: &Path, out: &Path) -> Result<Table, Failure> {
     let (mut steps, mut left_out) = (toml::from_str::<Steps>(STEPS)?.step, Notes::new());
-    let mut model = None;
-    if let Some(masked) = steps.iter().position(|step| step.mask.is_some()) {
-        let names: Vec<String> = steps[masked].mask.iter().cloned().collect();
-        match sequence.model(models, &names, &[])? {
-            Ok(found) => model = Some(found),
-            Err(reason) => {
-                left_out.insert(reason, vec![steps.remove(masked).name]);
-            }
+    let names: Vec<String> = steps.iter().filter_map(|step| step.mask.clone()).collect();
+    let model = match sequence.model(models, &names, &[])? {
+        Ok(model) => model,
+        Err(reason) => {
+            let masked = steps.extract_if(.., |step| step.mask.is_some());
+            left_out.insert(reason, masked.map(|step| step.name).collect());
+            None
         }
-    }
-    let run = |index: usize| {
-        let changes = changes_of(&steps, index, model.as_ref());
-        let (_, line) = sequence.run(
-            &format!("{} {}", index + 1, steps[index].name),
-            &changes,
-            out,
-        )?;
-        let masked = steps[..=index].iter().any(|step| step.mask.is_some());
-        Ok(Line {
-            model: model.clone().filter(|_| masked),
-            ..line
-        })
     };
-    Ok(Experiment {
-        title: "Each step on top of those before it",
-        data: sequence.data.display().to_string(),
-        lines: (0..steps.len()).map(run).collect::<Result<_, Failure>>()?,
-        left_out,
-    })
+    let run = |index: usize| {
+        let name = format!("{} {}", index + 1, steps[index].name);
+        let model = model.as_ref().filter(|_| is_masked(&steps, index));
+        Ok(sequence
+            .run(&name, &changes_of(&steps, index), model, out)?
+            .1)
+    };
+    let records = (0..steps.len()).map(run).collect::<Result<_, Failure>>()?;
+    Ok(sequence.table("Each step on top of those before it", records, left_out))
 }
 
-/// Returns the overrides of the step at `index`: those of the mask, then those that later steps remove, the latest first.
-fn changes_of(steps: &[Step], index: usize, model: Option<&Model>) -> Vec<String> {
-    let masked = steps[..=index].iter().any(|step| step.mask.is_some());
-    let learned = model
-        .filter(|_| masked)
-        .into_iter()
-        .flat_map(Model::changes);
-    let held = steps[index + 1..]
-        .iter()
-        .rev()
-        .flat_map(|step| step.until.clone());
-    learned.chain(held).collect()
+fn is_masked(steps: &[Step], index: usize) -> bool {
+    steps[..=index].iter().any(|step| step.mask.is_some())
+}
+
+/// Returns the overrides of the step at `index`: those that later steps remove, the latest first.
+fn changes_of(steps: &[Step], index: usize) -> Vec<String> {
+    let later = steps[index + 1..].iter().rev();
+    later.flat_map(|step| step.until.clone()).collect()
 }
 
 /// `section.key=a,b` as `section.key=a` and `section.key=b`.
@@ -132,36 +97,14 @@ fn changes(sentences: &[String]) -> Result<Vec<String>, Failure> {
     Ok(changes)
 }
 
-/// Runs the sequence once as it is and once with each change alone; the last line has the medians over the changes.
-fn variations(sequence: &Sequence, changes: &[String], out: &Path) -> Result<Experiment, Failure> {
-    let mut lines = vec![sequence.run("as it is", &[], out)?.1];
+/// Runs the sequence once as it is and once with each change alone.
+fn variations(sequence: &Sequence, changes: &[String], out: &Path) -> Result<Table, Failure> {
+    let mut records = vec![sequence.run("as it is", &[], None, out)?.1];
     for change in changes {
-        lines.push(sequence.run(change, std::slice::from_ref(change), out)?.1);
+        let run = sequence.run(change, slice::from_ref(change), None, out)?;
+        records.push(run.1);
     }
-    let of_changes = lines[1..].iter().map(|line| &line.figures);
-    let medians = Line {
-        row: "median of the changes".to_owned(),
-        figures: medians(&of_changes.collect::<Vec<_>>()),
-        ..Line::default()
-    };
-    lines.push(medians);
-    Ok(Experiment {
-        title: "One change at a time",
-        data: sequence.data.display().to_string(),
-        lines,
-        left_out: Notes::new(),
-    })
-}
-
-fn medians(runs: &[&Figures]) -> Figures {
-    let keys: BTreeSet<&str> = runs
-        .iter()
-        .flat_map(|figures| figures.keys().copied())
-        .collect();
-    let median = |key| median(runs.iter().filter_map(|figures| figures.get(key).copied()));
-    keys.into_iter()
-        .filter_map(|key| Some((key, median(key)?)))
-        .collect()
+    Ok(sequence.table("One change at a time", records, Notes::new()))
 }
 
 #[cfg(test)]
@@ -171,7 +114,7 @@ mod tests {
     use gyre_masking::MaskKind;
 
     use super::*;
-    use crate::tables::rows::Rows;
+    use crate::{models::Model, tables::rows::Rows};
 
     fn all_steps() -> Vec<Step> {
         toml::from_str::<Steps>(STEPS).unwrap().step
@@ -202,8 +145,8 @@ mod tests {
             (8, "Gyre"),
         ];
         for (step, row) in meetings {
-            let mut of_row = with(rows.named(row).unwrap().changes(&rows, None));
-            let of_step = with(changes_of(&unmasked, step, None));
+            let mut of_row = with(rows.named(row).unwrap().changes(&rows));
+            let of_step = with(changes_of(&unmasked, step));
             // Without refinement neither its points nor its keyframes are used.
             if step < 7 {
                 of_row.odometry.points.capacity = 0;
@@ -211,11 +154,9 @@ mod tests {
             }
             assert_eq!(of_step, of_row, "{row}");
         }
-        let masked = rows
-            .named("Gyre, masked")
-            .unwrap()
-            .changes(&rows, Some(&product()));
-        assert_eq!(with(changes_of(&all, 9, Some(&product()))), with(masked));
+        let masked = rows.named("Gyre, masked").unwrap();
+        assert!(is_masked(&all, 9) && !masked.mask.is_empty());
+        assert_eq!(with(changes_of(&all, 9)), with(masked.changes(&rows)));
     }
 
     #[test]
@@ -223,8 +164,11 @@ mod tests {
         // Also where the sequence's own configuration has a learned mask.
         for own in [Vec::new(), product().changes().to_vec()] {
             let kind = |step: usize| {
-                let changes = changes_of(&all_steps(), step, Some(&product()));
-                let changes: Vec<String> = own.iter().cloned().chain(changes).collect();
+                let mut changes = own.clone();
+                changes.extend(changes_of(&all_steps(), step));
+                if is_masked(&all_steps(), step) {
+                    changes.extend(product().changes());
+                }
                 Configuration::of_overrides(&changes)
                     .unwrap()
                     .odometry
@@ -248,17 +192,5 @@ mod tests {
         ];
         assert_eq!(changes(&sentences).unwrap(), expected);
         assert!(changes(&["masking.threshold".to_owned()]).is_err());
-    }
-
-    #[test]
-    fn medians_are_taken_figure_by_figure() {
-        let [a, b] = [
-            Figures::from([("ate_m", 1.0)]),
-            Figures::from([("ate_m", 3.0), ("path_m", 7.0)]),
-        ];
-        assert_eq!(
-            medians(&[&a, &b]),
-            Figures::from([("ate_m", 3.0), ("path_m", 7.0)])
-        );
     }
 }

@@ -81,13 +81,16 @@ pub struct RealismArguments {
     /// Another real recording: says of each statistic whether SIM is closer to REAL than this one is.
     #[arg(long, value_name = "OTHER")]
     pub between: Option<PathBuf>,
-    /// SIM's configuration. Default, for each recording: the one that ships for its format.
+    /// The folder of the configurations, `oxford.toml` and so on: each recording is read by the one of its format.
+    #[arg(long, default_value = "configs")]
+    pub configs: PathBuf,
+    /// SIM's configuration instead.
     #[arg(long, value_name = "FILE")]
     pub sim_config: Option<PathBuf>,
-    /// REAL's configuration.
+    /// REAL's configuration instead.
     #[arg(long, value_name = "FILE")]
     pub real_config: Option<PathBuf>,
-    /// OTHER's configuration.
+    /// OTHER's configuration instead.
     #[arg(long, value_name = "FILE", requires = "between")]
     pub between_config: Option<PathBuf>,
     /// The folder of realism.md, realism.json and the runs of the searches.
@@ -99,9 +102,6 @@ pub struct RealismArguments {
     /// Scans that the odometries are run on, at most, from the first on; 0: run none.
     #[arg(long, default_value = "512")]
     pub search_scans: usize,
-    /// Power above which something is there. Default: masking's.
-    #[arg(long)]
-    pub threshold: Option<u8>,
 }
 
 #[derive(Debug, Args)]

@@ -10,20 +10,20 @@ mod tests;
 use std::{
     collections::BTreeSet,
     ffi::{OsStr, OsString},
-    fs,
+    fs, io,
     num::NonZeroUsize,
     os::unix::fs::symlink,
     path::{Path, PathBuf},
     process::ExitCode,
 };
 
-use clap::{Args, ValueEnum};
+use clap::{Args, ValueEnum, builder::PossibleValue};
 use gyre::{Failure, picture::write_grey, print};
 use gyre_radar::{Dataset, DatasetOptions, OwnedScan};
 use rand::{RngCore, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::report::make_folder;
+use crate::report::{cannot_write, make_folder};
 
 /// The arguments of `gyre-lab corrupt`.
 #[derive(Debug, Args)]
@@ -62,102 +62,56 @@ pub enum Fault {
 /// Offset of the scan that replaces another.
 const LATER: usize = 10;
 
-/// Which scans are corrupted, and how.
-#[derive(Clone, Copy, Debug)]
-struct Plan {
-    fault: Fault,
-    /// Every Nth scan is corrupted, never the first one.
-    every: NonZeroUsize,
-    seed: u64,
-}
-
 /// Writes the corrupted copy, and says which scans were hit.
 ///
 /// # Errors
 /// A recording that cannot be read, an output folder that is not empty or cannot be written.
 pub fn corrupt(arguments: &CorruptArguments) -> Result<ExitCode, Failure> {
-    let &CorruptArguments {
-        fault, every, seed, ..
-    } = arguments;
-    let hits = write_corrupted(
-        &arguments.path,
-        &arguments.out,
-        &Plan { fault, every, seed },
-    )?;
+    let hits = arguments.write()?;
     let numbers: Vec<_> = hits.iter().map(usize::to_string).collect();
-    let name = fault
-        .to_possible_value()
-        .map_or_else(String::new, |value| value.get_name().to_owned());
+    let fault = arguments.fault.to_possible_value();
     print::line(format_args!(
-        "wrote {} with {name} in {} scans: {}",
+        "wrote {} with {} in {} scans: {}",
         arguments.out.display(),
+        fault.as_ref().map_or("", PossibleValue::get_name),
         hits.len(),
         numbers.join(" ")
     ))?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// Writes a corrupted copy of the recording in the folder `source`, of any format, to the folder `out`. Returns the numbers of the
-/// scans that were hit, by their place in `source`.
-fn write_corrupted(source: &Path, out: &Path, plan: &Plan) -> Result<Vec<usize>, Failure> {
-    let source = source.canonicalize().unwrap_or_else(|_| source.to_owned());
-    let mut dataset = gyre_radar::open(&source, &DatasetOptions::default())?;
-    let hits: Vec<usize> = plan.hits(dataset.len()).collect();
-    let name = |index: &usize| Some(dataset.file(*index).file_name()?.to_owned());
-    let corrupted: BTreeSet<OsString> = hits.iter().filter_map(name).collect();
-    let folder = dataset.file(0).parent().unwrap_or(&source);
-    let images = folder
-        .strip_prefix(&source)
-        .unwrap_or(Path::new(""))
-        .to_owned();
-    make_folder(out)?;
-    if let Some(other) = entries(out)?.into_iter().min() {
-        let (out, other) = (out.display(), other.display());
-        return Err(format!("{out} holds `{other}`: give an empty folder").into());
-    }
-    link_around(&source, out, &images, &corrupted)?;
-    if plan.fault != Fault::Dropped {
-        for &index in &hits {
-            plan.write(dataset.as_mut(), index, &out.join(&images))?;
+impl CorruptArguments {
+    /// Writes the corrupted copy. Returns the numbers of the scans that were hit, by their place in the recording.
+    fn write(&self) -> Result<Vec<usize>, Failure> {
+        let (resolved, out) = (self.path.canonicalize(), &self.out);
+        let source = resolved.unwrap_or_else(|_| self.path.clone());
+        let mut dataset = gyre_radar::open(&source, &DatasetOptions::default())?;
+        let hits: Vec<usize> = self.hits(dataset.len()).collect();
+        let name = |index: &usize| Some(dataset.file(*index).file_name()?.to_owned());
+        let corrupted: BTreeSet<OsString> = hits.iter().filter_map(name).collect();
+        make_folder(out)?;
+        if let Some(other) = entries(out)?.into_iter().min() {
+            let (out, other) = (out.display(), other.display());
+            return Err(format!("{out} holds `{other}`: give an empty folder").into());
         }
+        // All is linked, folders as a whole, but for the folders that lead to the images, and in there but for the corrupted ones.
+        let folder = dataset.file(0).parent().unwrap_or(&source);
+        let (mut here, mut there) = (source.clone(), out.clone());
+        for next in folder.strip_prefix(&source).unwrap_or(Path::new("")) {
+            link_all(&here, &there, |name| name != next)?;
+            here.push(next);
+            there.push(next);
+            make_folder(&there)?;
+        }
+        link_all(&here, &there, |name| !corrupted.contains(name))?;
+        if self.fault != Fault::Dropped {
+            for &index in &hits {
+                self.write_scan(dataset.as_mut(), index, &there)?;
+            }
+        }
+        Ok(hits)
     }
-    Ok(hits)
-}
 
-/// Links all of `source` into `out`, folders as a whole, but for the folders that lead to `images`, and in there but for `corrupted`.
-fn link_around(
-    source: &Path,
-    out: &Path,
-    images: &Path,
-    corrupted: &BTreeSet<OsString>,
-) -> Result<(), Failure> {
-    let (mut here, mut there) = (source.to_owned(), out.to_owned());
-    for next in images {
-        link_all(&here, &there, |name| name != next)?;
-        here.push(next);
-        there.push(next);
-        make_folder(&there)?;
-    }
-    link_all(&here, &there, |name| !corrupted.contains(name))
-}
-
-fn link_all(here: &Path, there: &Path, wanted: impl Fn(&OsStr) -> bool) -> Result<(), Failure> {
-    for name in entries(here)?.iter().filter(|name| wanted(name)) {
-        let link = there.join(name);
-        symlink(here.join(name), &link)
-            .map_err(|error| format!("cannot write {}: {error}", link.display()))?;
-    }
-    Ok(())
-}
-
-fn entries(folder: &Path) -> Result<Vec<OsString>, Failure> {
-    let names = |entries: fs::ReadDir| entries.map(|entry| Ok(entry?.file_name())).collect();
-    fs::read_dir(folder)
-        .and_then(names)
-        .map_err(|error| format!("cannot list {}: {error}", folder.display()).into())
-}
-
-impl Plan {
     /// The numbers, from 0, of the scans that are hit in a recording of so many.
     fn hits(&self, scans: usize) -> impl Iterator<Item = usize> {
         let end = match self.fault {
@@ -167,7 +121,12 @@ impl Plan {
         (self.every.get()..end).step_by(self.every.get())
     }
 
-    fn write(&self, dataset: &mut dyn Dataset, index: usize, folder: &Path) -> Result<(), Failure> {
+    fn write_scan(
+        &self,
+        dataset: &mut dyn Dataset,
+        index: usize,
+        folder: &Path,
+    ) -> Result<(), Failure> {
         let mut scan = read(dataset, index)?;
         let geometry = scan.geometry;
         let mut powers = match self.fault {
@@ -192,13 +151,25 @@ impl Plan {
             let column = |bin| powers.iter().skip(bin).step_by(geometry.bins).copied();
             scan.bytes = (0..geometry.bins).flat_map(column).collect();
         }
-        let file = dataset.file(index).file_name().unwrap_or_default();
-        Ok(write_grey(
-            &folder.join(file),
-            dataset.image_size().width,
-            &scan.bytes,
-        )?)
+        let file = folder.join(dataset.file(index).file_name().unwrap_or_default());
+        Ok(write_grey(&file, dataset.image_size().width, &scan.bytes)?)
     }
+}
+
+/// Links the entries of `here` whose names are wanted into `there`.
+fn link_all(here: &Path, there: &Path, wanted: impl Fn(&OsStr) -> bool) -> Result<(), Failure> {
+    for name in entries(here)?.iter().filter(|name| wanted(name)) {
+        let link = there.join(name);
+        symlink(here.join(name), &link).map_err(cannot_write(&link))?;
+    }
+    Ok(())
+}
+
+fn entries(folder: &Path) -> Result<Vec<OsString>, Failure> {
+    let failed = |error| format!("cannot list {}: {error}", folder.display());
+    let names = fs::read_dir(folder).map_err(failed)?;
+    let names: io::Result<_> = names.map(|entry| Ok(entry?.file_name())).collect();
+    Ok(names.map_err(failed)?)
 }
 
 fn read(dataset: &mut dyn Dataset, index: usize) -> Result<OwnedScan, Failure> {

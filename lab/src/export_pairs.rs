@@ -16,196 +16,179 @@
 //! nor those of the next `masking.lag`. At run time an unreadable scan breaks no chain; here it does, so that any two neighbours of
 //! one number are consecutive scans.
 //!
-//! - [`recording`]: what is read, and its truth; [`scans`]: reading ahead;
 //! - [`preparation`]: from scans to records;
-//! - [`record`], [`npy`]: how they are written;
+//! - [`npy`]: how they are written;
 //! - [`provenance`]: `pairs.toml`, which says what they were made of.
 
 mod npy;
 mod preparation;
 mod provenance;
-mod record;
-mod recording;
-mod scans;
 
-use std::{fmt, fs, io::IsTerminal, path::Path, process::ExitCode, time::Instant};
+use std::{fs, path::PathBuf, process::ExitCode, time::Instant};
 
 use gyre::{Failure, configuration::Configuration, print};
+use gyre_geometry::Pose;
 use gyre_radar::OwnedScan;
-use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::{cli::ExportPairsArguments, report::save};
+use crate::{
+    cli::ExportPairsArguments,
+    recording::{Recording, Track},
+    report::save,
+};
 use npy::NpyWriter;
 use preparation::Preparation;
 use provenance::Sequence;
-use record::Record;
-use recording::Recording;
 
 /// Writes the records of all recordings, and what they were made of.
 ///
 /// # Errors
 /// A recording that cannot be used, a file that cannot be written.
 pub fn export_pairs(arguments: &ExportPairsArguments) -> Result<ExitCode, Failure> {
-    let out = &arguments.out;
+    let (out, started) = (&arguments.out, Instant::now());
     provenance::check_place(out)?;
-    let configurations = recording::configurations(arguments)?;
+    let configurations = configurations(arguments)?;
     let recordings = configurations
         .iter()
-        .map(Recording::open)
+        .map(open)
         .collect::<Result<Vec<_>, _>>()?;
-    let started = Instant::now();
-    let mut export = Export::begin(&configurations[0], out)?;
-    let bar = progress_bar(
-        recordings
-            .iter()
-            .map(|recording| recording.played.len())
-            .sum(),
-    );
-    for mut recording in recordings {
-        export.recording(&mut recording, &bar)?;
+    let preparation = Preparation::new(&configurations[0])?;
+    let mut export = Export {
+        file: NpyWriter::create(out, preparation.dtype())?,
+        preparation,
+        sequences: Vec::new(),
+        unreadable: 0,
+        without_truth: 0,
+    };
+    for (mut recording, truth) in recordings {
+        export.recording(&mut recording, &truth)?;
     }
-    bar.finish_and_clear();
-    let counts = export.finish(&configurations[0])?;
-    let wall_s = started.elapsed().as_secs_f64();
+    let counts = export.counts();
+    let text = provenance::to_toml(&configurations[0], export.sequences)?;
+    save(&out.with_extension("toml"), &text)?;
+    export.file.finish()?;
     print::line(format_args!(
-        "wrote {counts} to {} ({:.1} MB) in {wall_s:.1} s",
+        "wrote {counts} to {} ({:.1} MB) in {:.1} s",
         out.display(),
         fs::metadata(out)?.len() as f64 * 1e-6,
+        started.elapsed().as_secs_f64(),
     ))?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn progress_bar(scans: usize) -> ProgressBar {
-    let bar = match std::io::stderr().is_terminal() {
-        true => ProgressBar::new(scans as u64),
-        false => ProgressBar::hidden(),
-    };
-    let template = "exporting {wide_bar} {pos}/{len} scans, {per_sec}, {eta} left";
-    match ProgressStyle::with_template(template) {
-        Ok(style) => bar.with_style(style),
-        Err(_) => bar,
+/// Returns the configuration of each recording that was named on the command line, or of what the configuration itself plays.
+fn configurations(arguments: &ExportPairsArguments) -> Result<Vec<Configuration>, Failure> {
+    let mut common = Configuration::read(&arguments.configuration, &arguments.set)?;
+    let named = arguments.ground_truth.as_ref();
+    common.run.ground_truth = named.cloned().or(common.run.ground_truth);
+    match (&common.run.ground_truth, arguments.data.as_slice()) {
+        (Some(truth), recordings @ [_, _, ..]) => Err(format!(
+            "{} can be the truth of one recording, not of {}: without it, each has its own",
+            truth.display(),
+            recordings.len()
+        )
+        .into()),
+        (_, []) => Ok(vec![common.streaming(None)]),
+        (_, recordings) => {
+            let of = |data: &PathBuf| common.clone().streaming(Some(data));
+            Ok(recordings.iter().map(of).collect())
+        }
     }
 }
 
+/// Opens what a configuration names, with a truth to train with.
+fn open(configuration: &Configuration) -> Result<(Recording, Track), Failure> {
+    let mut recording = Recording::open(configuration)?;
+    let Some(truth) = recording.truth.take() else {
+        let lacks =
+            "has no ground truth, and masks are trained by true poses: name it with --ground-truth";
+        return Err(format!("{} {lacks}", recording.data).into());
+    };
+    if let Some(lacks) = truth.lacks() {
+        let needed = "and masks are trained by poses at the scans' times";
+        return Err(format!("{} has no {lacks}, {needed}", truth.path.display()).into());
+    }
+    Ok((recording, truth))
+}
+
 /// A file that is being written.
-struct Export<'a> {
-    out: &'a Path,
+struct Export {
     file: NpyWriter,
     preparation: Preparation,
     sequences: Vec<Sequence>,
     unreadable: usize,
     without_truth: usize,
-    /// A record's bytes.
-    encoded: Vec<u8>,
 }
 
-impl<'a> Export<'a> {
-    fn begin(configuration: &Configuration, out: &'a Path) -> Result<Self, Failure> {
-        let n = configuration.odometry.raster.n;
-        let preparation = Preparation::new(configuration)?;
-        let file = NpyWriter::create(out, &Record::dtype(n));
-        Ok(Self {
-            out,
-            file: file.map_err(|error| cannot_write(out, &error))?,
-            preparation,
-            sequences: Vec::new(),
-            unreadable: 0,
-            without_truth: 0,
-            encoded: Vec::new(),
-        })
-    }
-
+impl Export {
     /// Appends a recording's scans. One that gives none is refused: it, or its truth, is not what was meant.
-    fn recording(&mut self, recording: &mut Recording, bar: &ProgressBar) -> Result<(), Failure> {
+    fn recording(&mut self, recording: &mut Recording, truth: &Track) -> Result<(), Failure> {
         let (sequences, without_truth) = (self.sequences.len(), self.without_truth);
+        let mut scan = OwnedScan::with_limits(recording.dataset.limits());
         self.preparation.begin();
-        let (source, played) = (&recording.source, recording.played.clone());
-        scans::for_each_scan(recording.dataset.as_mut(), played.clone(), |index, read| {
-            bar.inc(1);
-            match read {
-                Ok(scan) => self.scan(source, index, scan),
-                Err(error) => {
-                    self.leave_out(&error);
-                    Ok(())
-                }
+        for index in recording.played.clone() {
+            if !recording.read(index, &mut scan) {
+                self.unreadable += 1;
+                self.preparation.begin();
+            } else if let Some(pose) = truth.pose(scan.geometry.stamp_ns) {
+                self.scan(index, &scan, pose, recording, truth)?;
+            } else {
+                self.without_truth += 1;
+                self.preparation.begin();
             }
-        })?;
-        if self.sequences.len() > sequences {
-            return Ok(());
         }
-        let data = &source.data;
-        Err(match self.without_truth - without_truth {
-            0 => format!("{data}: none of its {} scans can be read", played.len()),
+        let (data, truth) = (&recording.data, truth.path.display());
+        let reason = match self.without_truth - without_truth {
+            _ if self.sequences.len() > sequences => return Ok(()),
+            0 => format!("none of its {} scans can be read", recording.played.len()),
             read => {
-                let truth = source.truth.path.display();
-                format!(
-                    "{data}: {truth} has no pose at the time of any of its {read} readable scans"
-                )
+                format!("{truth} has no pose at the time of any of its {read} readable scans")
             }
-        }
-        .into())
+        };
+        Err(format!("{data}: {reason}").into())
     }
 
+    /// Appends a scan; one that cannot be rasterised is left out.
     fn scan(
         &mut self,
-        source: &recording::Source,
         index: usize,
         scan: &OwnedScan,
+        pose: Pose,
+        recording: &Recording,
+        truth: &Track,
     ) -> Result<(), Failure> {
-        let Some(pose) = source.truth.pose(scan.geometry.stamp_ns) else {
-            self.without_truth += 1;
-            self.preparation.begin();
-            return Ok(());
-        };
         let begins = self.preparation.begins();
-        let number = (self.sequences.len() - usize::from(!begins)) as u32;
-        match self.preparation.next(&scan.view(), pose, number) {
-            Ok(record) => record.encode(&mut self.encoded),
+        let number = self.sequences.len() - usize::from(!begins);
+        match self.preparation.next(&scan.view(), pose, number as u32) {
+            Ok(record) => self.file.append(record)?,
             Err(error) => {
-                self.leave_out(&format_args!("scan {index} of {}: {error}", source.data));
+                let data = &recording.data;
+                print::note(format_args!("left out: scan {index} of {data}: {error}"));
+                self.unreadable += 1;
+                self.preparation.begin();
                 return Ok(());
             }
         }
-        self.file
-            .append(&self.encoded)
-            .map_err(|error| cannot_write(self.out, &error))?;
         if begins {
-            self.sequences.push(Sequence::new(number, source, index));
+            let sequence = provenance::sequence(number, recording, truth, index);
+            self.sequences.push(sequence);
         }
-        if let Some(sequence) = self.sequences.last_mut() {
-            sequence.scans += 1;
-        }
+        self.sequences[number].1 += 1;
         Ok(())
     }
 
-    fn leave_out(&mut self, reason: &dyn fmt::Display) {
-        print::note(format_args!("left out: {reason}"));
-        self.unreadable += 1;
-        self.preparation.begin();
-    }
-
-    /// Writes what the file was made of, and gives it its name. Returns what was written, in words.
-    fn finish(self, configuration: &Configuration) -> Result<String, Failure> {
-        let text = provenance::to_toml(configuration, &self.sequences)?;
-        save(&provenance::place(self.out), &text)?;
-        self.file
-            .finish()
-            .map_err(|error| cannot_write(self.out, &error))?;
-        let scans: usize = self.sequences.iter().map(|sequence| sequence.scans).sum();
-        let sequences = self.sequences.len();
-        let plural = if sequences == 1 { "" } else { "s" };
+    /// What was written, in words.
+    fn counts(&self) -> String {
+        let scans: usize = self.sequences.iter().map(|(_, scans)| scans).sum();
+        let sequences = match self.sequences.len() {
+            1 => "1 sequence".to_owned(),
+            several => format!("{several} sequences"),
+        };
         let left_out = match (self.unreadable, self.without_truth) {
             (0, 0) => String::new(),
             (unreadable, untrue) => {
                 format!(" (left out: {unreadable} unreadable, {untrue} without truth)")
             }
         };
-        Ok(format!(
-            "{scans} scans in {sequences} sequence{plural}{left_out}"
-        ))
+        format!("{scans} scans in {sequences}{left_out}")
     }
-}
-
-fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
-    format!("cannot write {}: {error}", path.display()).into()
 }

@@ -6,6 +6,7 @@ mod corrupt;
 mod export_pairs;
 mod models;
 mod realism;
+mod recording;
 mod report;
 mod sequence;
 mod tables;
@@ -13,7 +14,6 @@ mod tables;
 use std::process::ExitCode;
 
 use cli::{Command, Lab};
-use gyre::Failure;
 use gyre_stage::CountingAllocator;
 
 /// The runs that the laboratory starts report the allocations of their stages.
@@ -21,20 +21,17 @@ use gyre_stage::CountingAllocator;
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 fn main() -> ExitCode {
-    match gyre::parse::<Lab>("gyre-lab").map(|lab| lab.command) {
-        Ok(Command::Gyre(command)) => gyre::report("gyre", gyre::execute(command)),
-        Ok(command) => gyre::report("gyre-lab", execute(command)),
-        Err(code) => code,
-    }
-}
-
-fn execute(command: Command) -> Result<ExitCode, Failure> {
-    match command {
+    let command = match gyre::parse::<Lab>("gyre-lab") {
+        Ok(lab) => lab.command,
+        Err(code) => return code,
+    };
+    let result = match command {
         Command::Tables(arguments) => tables::tables(&arguments),
         Command::Ablation(arguments) => ablation::ablation(&arguments),
         Command::Realism(arguments) => realism::realism(&arguments),
         Command::Corrupt(arguments) => corrupt::corrupt(&arguments),
         Command::ExportPairs(arguments) => export_pairs::export_pairs(&arguments),
-        Command::Gyre(command) => gyre::execute(command),
-    }
+        Command::Gyre(command) => return gyre::report("gyre", gyre::execute(command)),
+    };
+    gyre::report("gyre-lab", result)
 }

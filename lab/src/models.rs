@@ -4,10 +4,9 @@ use std::path::{Path, PathBuf};
 
 use gyre_masking::{MaskKind, MaskingConfig, model::Card, network::Network};
 use gyre_radar::RasterConfig;
-use serde::Serialize;
 
 /// A network that can be used.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Model {
     /// The model card.
     pub card: PathBuf,
@@ -17,7 +16,7 @@ pub struct Model {
 
 impl Model {
     /// Finds the first of `names` that `folder` has, for rasters of `n` cells a side ({n} in a name), and of `cell_m` metres a cell
-    /// where that is settled. The network has been loaded once.
+    /// where that is settled; `None` without names. The network has been loaded once.
     ///
     /// # Errors
     /// A sentence that says what is missing or does not fit.
@@ -26,38 +25,28 @@ impl Model {
         names: &[String],
         n: usize,
         cell_m: Option<f32>,
-    ) -> Result<Self, String> {
-        let cards = names.iter().map(|name| {
-            folder
-                .join(name.replace("{n}", &n.to_string()))
-                .with_extension("toml")
-        });
-        let cards: Vec<PathBuf> = cards.collect();
-        let found = cards
-            .iter()
-            .find(|card| card.exists())
-            .or(cards.last())
-            .cloned();
-        let card = found.ok_or("no network is named")?;
-        if !card.exists() {
-            return Err(format!("there is no {}", card.display()));
-        }
+    ) -> Result<Option<Self>, String> {
+        let file = |name: &String| folder.join(name.replace("{n}", &n.to_string()) + ".toml");
+        let cards: Vec<PathBuf> = names.iter().map(file).collect();
+        let card = match (cards.iter().find(|card| card.exists()), cards.last()) {
+            (Some(card), _) => card.clone(),
+            (None, Some(missing)) => return Err(format!("there is no {}", missing.display())),
+            (None, None) => return Ok(None),
+        };
         let masking = MaskingConfig {
             kind: MaskKind::Learned,
             model: Some(card.clone()),
             ..MaskingConfig::default()
         };
-        let trained = Card::read(&masking)
-            .map_err(|error| error.to_string())?
-            .raster;
-        let cell_m = cell_m.unwrap_or(trained.cell_m);
+        let trained = Card::read(&masking).map_err(|error| error.to_string())?;
+        let cell_m = cell_m.unwrap_or(trained.raster.cell_m);
         let raster = RasterConfig {
             n,
             cell_m,
             ..RasterConfig::default()
         };
         Network::load(&masking, &raster).map_err(|error| error.to_string())?;
-        Ok(Self { card, cell_m })
+        Ok(Some(Self { card, cell_m }))
     }
 
     /// The overrides that mask with it.
@@ -85,7 +74,7 @@ mod tests {
 
     fn find(folder: &Path, names: &[&str], n: usize, cell_m: Option<f32>) -> Result<Model, String> {
         let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
-        Model::find(folder, &names, n, cell_m)
+        Ok(Model::find(folder, &names, n, cell_m)?.unwrap())
     }
 
     #[test]

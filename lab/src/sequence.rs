@@ -1,7 +1,7 @@
 //! A recording with its configuration, and `gyre run` on it.
 
 use std::{
-    collections::BTreeMap,
+    collections::BTreeSet,
     env, fs,
     path::{Path, PathBuf},
     process::{Command, Stdio},
@@ -10,13 +10,12 @@ use std::{
 use clap::Args;
 use gyre::{Failure, configuration::Configuration, print};
 use gyre_messages::StageId;
-use gyre_radar::OwnedScan;
-use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::{
     models::Model,
-    report::{Notes, command, folder, number, paragraph, table},
+    recording::{Recording, folder_name},
+    report::{Column, Notes, Record, Table, command, record},
 };
 
 /// The sequences of a command line.
@@ -43,9 +42,9 @@ pub struct Sequence {
     pub data: PathBuf,
 }
 
-/// The figures of a run that tables show: place in the evaluation of `summary.json`, heading, decimals. The last three are made of
-/// other parts of it.
-const FIGURES: [(&str, &str, usize); 12] = [
+/// The columns of runs: up to `forward` the place in the evaluation of `summary.json`, then what is made of other parts of it.
+const COLUMNS: [Column; 16] = [
+    ("row", "row", 0),
     ("path_m", "path m", 0),
     ("kitti/translation_percent", "KITTI %", 2),
     ("kitti/rotation_deg_per_100m", "deg/100 m", 2),
@@ -58,52 +57,20 @@ const FIGURES: [(&str, &str, usize); 12] = [
     ("masking_ms", "masking ms", 2),
     ("search_ms", "search ms", 2),
     ("scans_per_s", "scans/s", 0),
+    ("paper_percent", "paper %", 2),
+    ("paper_deg_per_km", "paper deg/km", 2),
+    ("mask", "mask", 0),
 ];
 
-/// Figures of a run by their places; one is missing without a ground truth that fits, or where the truth allows none.
-pub type Figures = BTreeMap<&'static str, f64>;
-
-/// A row of an [`Experiment`].
-#[derive(Debug, Default, Serialize)]
-pub struct Line {
-    /// The row.
-    pub row: String,
-    /// The network that masked.
-    pub model: Option<Model>,
-    /// The command that repeats the run; `None` where there is none.
-    pub command: Option<String>,
-    /// The figures of the run.
-    pub figures: Figures,
-    /// The paper's KITTI errors at this raster's size, on other sequences: %, and degrees per km.
-    pub paper: [Option<f64>; 2],
-}
-
-/// Runs of one sequence with different overrides.
-#[derive(Debug, Serialize)]
-pub struct Experiment {
-    /// The title.
-    pub title: &'static str,
-    /// The sequence's folder.
-    pub data: String,
-    /// Row by row.
-    pub lines: Vec<Line>,
-    /// Rows that are left out, by the reason.
-    pub left_out: Notes,
-}
+const LEGEND: &str = "KITTI and seg need a truth of more than 100 m. m and deg a scan: errors of single motions, RMS. forward: \
+    estimated over true distance. ms: median work of the stages in the running pipeline. -: not known.";
 
 impl Sequence {
     /// A recording with its configuration.
     pub fn new(file: &Path, data: &Path) -> Self {
-        // `recordings/.` and the like have names only once they are resolved.
-        let resolved = data.canonicalize().unwrap_or_else(|_| data.to_owned());
-        let name = |path: &Path| {
-            path.file_name()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned()
-        };
+        let name = folder_name(&file.with_extension(""));
         Self {
-            name: format!("{}-{}", name(&file.with_extension("")), name(&resolved)),
+            name: format!("{name}-{}", folder_name(data)),
             file: file.to_owned(),
             data: data.to_owned(),
         }
@@ -119,34 +86,30 @@ impl Sequence {
             let counts = format!("{} --config but {} --data", files.len(), data.len());
             return Err(format!("{counts}: give one for one").into());
         }
-        let mut sequences: Vec<Self> = Vec::new();
-        for sequence in files
-            .iter()
-            .zip(data)
-            .map(|(file, data)| Self::new(file, data))
-        {
-            if let Some(other) = sequences.iter().find(|other| other.name == sequence.name) {
-                let (one, two) = (other.data.display(), sequence.data.display());
-                let name = &sequence.name;
-                return Err(
-                    format!("{one} and {two} would write to the same folder, {name}").into(),
-                );
-            }
+        let named = files.iter().zip(data);
+        let sequences: Vec<Self> = named.map(|(file, data)| Self::new(file, data)).collect();
+        let mut names = BTreeSet::new();
+        for sequence in &sequences {
             sequence.configuration(&[])?;
-            sequences.push(sequence);
+            if !names.insert(&sequence.name) {
+                let name = &sequence.name;
+                return Err(format!("two sequences would write to the same folder, {name}").into());
+            }
         }
         Ok(sequences)
     }
 
     /// Returns its configuration with overrides.
-    ///
-    /// # Errors
-    /// A configuration that cannot be read, or an override that does not fit.
     pub fn configuration(&self, changes: &[String]) -> Result<Configuration, Failure> {
         Ok(Configuration::read(&self.file, changes)?)
     }
 
-    /// Finds a network for its rasters with overrides.
+    /// Opens the recording as its configuration plays it.
+    pub fn open(&self) -> Result<Recording, Failure> {
+        Recording::open(&self.configuration(&[])?.streaming(Some(&self.data)))
+    }
+
+    /// Finds a network for its rasters with overrides; `None` where no name is given.
     ///
     /// # Errors
     /// An override that does not fit; inside, why there is no network.
@@ -155,167 +118,101 @@ impl Sequence {
         models: &Path,
         names: &[String],
         changes: &[String],
-    ) -> Result<Result<Model, String>, Failure> {
+    ) -> Result<Result<Option<Model>, String>, Failure> {
         let raster = self.configuration(changes)?.odometry.raster;
         Ok(Model::find(models, names, raster.n, Some(raster.cell_m)))
     }
 
-    /// Runs it with a row's overrides as a person would, by `gyre run`, into a folder below `out`; returns the
-    /// folder and what `summary.json` says.
-    ///
-    /// # Errors
-    /// A run that does not succeed.
+    /// Runs it with a row's overrides, masked by this network if there is one, as a person would, by `gyre run`, into a folder below
+    /// `out`. Returns the folder, and what `summary.json` says.
     pub fn run(
         &self,
         row: &str,
         changes: &[String],
+        model: Option<&Model>,
         out: &Path,
-    ) -> Result<(PathBuf, Line), Failure> {
+    ) -> Result<(PathBuf, Record), Failure> {
         print::note(format_args!("{}: {row}", self.name));
         let out = out.join(&self.name).join(folder(row));
-        let arguments = self.run_arguments(changes, &out);
-        // This program has gyre's commands too: so what runs is of the same build.
-        let status = Command::new(env::current_exe()?)
-            .args(&arguments)
-            .stdout(Stdio::null())
-            .status()
-            .map_err(|error| format!("cannot start gyre run: {error}"))?;
+        let masked = model.into_iter().flat_map(Model::changes);
+        let changes: Vec<String> = changes.iter().cloned().chain(masked).collect();
+        let arguments = self.run_arguments(&changes, &out);
         let command = command("gyre", &arguments);
+        // This program has gyre's commands too: so what runs is of the same build.
+        let mut run = Command::new(env::current_exe()?);
+        let status = run.args(&arguments).stdout(Stdio::null()).status();
+        let status = status.map_err(|error| format!("cannot start gyre run: {error}"))?;
         if !status.success() {
             return Err(format!("`{command}` did not succeed").into());
         }
         let summary = out.join("summary.json");
-        let text = fs::read_to_string(&summary)
-            .map_err(|error| format!("cannot read {}: {error}", summary.display()))?;
-        let line = Line {
-            row: row.to_owned(),
-            command: Some(command),
-            figures: figures(&serde_json::from_str(&text)?),
-            ..Line::default()
-        };
-        Ok((out, line))
+        let text = fs::read_to_string(&summary);
+        let text = text.map_err(|error| format!("cannot read {}: {error}", summary.display()))?;
+        let mut cells = figures(&serde_json::from_str(&text)?);
+        let card = model.map(|model| &model.card);
+        cells.extend(record(
+            json!({ "row": row, "command": command, "mask": card }),
+        ));
+        Ok((out, cells))
     }
 
     fn run_arguments(&self, changes: &[String], out: &Path) -> Vec<String> {
-        let path = |path: &Path| path.display().to_string();
-        let mut arguments = vec!["run".to_owned(), path(&self.file)];
-        arguments.extend([
-            "--data".to_owned(),
-            path(&self.data),
-            "--out".to_owned(),
-            path(out),
-        ]);
-        arguments.extend(["--rate", "max", "--fresh"].map(str::to_owned));
-        arguments.extend(
-            changes
-                .iter()
-                .flat_map(|set| ["--set".to_owned(), set.clone()]),
-        );
-        arguments
+        let paths = [&self.file, &self.data, out];
+        let [file, data, out] = paths.map(|path| path.display().to_string());
+        let run = ["run", &file, "--data", &data, "--out", &out];
+        let run = run.into_iter().chain(["--rate", "max", "--fresh"]);
+        let sets = changes.iter().flat_map(|set| ["--set", set]);
+        run.chain(sets).map(str::to_owned).collect()
     }
 
-    /// Reads the first scans, at most `most`; unreadable ones are left out.
-    ///
-    /// # Errors
-    /// A recording without two scans that can be read.
-    pub fn scans(&self, most: usize) -> Result<Vec<OwnedScan>, Failure> {
-        let configuration = self.configuration(&[])?;
-        let mut dataset = gyre_radar::open(&self.data, &configuration.dataset)?;
-        let len = dataset.len();
-        let read = |index| {
-            let mut scan = OwnedScan::with_limits(dataset.limits());
-            scan.geometry = dataset.read(index, scan.slot()).ok()?;
-            Some(scan)
-        };
-        let first = configuration.source.first;
-        let scans: Vec<OwnedScan> = (first..len).filter_map(read).take(most).collect();
-        match scans.len() {
-            0 | 1 => {
-                Err(format!("{} has no two scans that can be read", self.data.display()).into())
-            }
-            _ => Ok(scans),
+    /// Returns the table of its runs.
+    pub fn table(&self, title: &str, rows: Vec<Record>, left_out: Notes) -> Table {
+        Table {
+            title: format!("{title} on {}", self.data.display()),
+            columns: COLUMNS.to_vec(),
+            rows,
+            left_out,
+            legend: LEGEND.to_owned(),
         }
     }
 }
 
 /// The figures of `summary.json`.
-fn figures(summary: &Value) -> Figures {
+fn figures(summary: &Value) -> Record {
     let at = |place: &str| summary.pointer(place).and_then(Value::as_f64);
-    let judged =
-        |(place, ..): &(&'static str, _, _)| Some((*place, at(&format!("/evaluation/{place}"))?));
-    let work_ms = |stage: StageId| {
-        let place = ["", "latency", "stages", stage.name(), "work", "p50_us"].join("/");
+    let work_ms = |stage: &StageId| {
+        let place = format!("/latency/stages/{}/work/p50_us", stage.name());
         at(&place).unwrap_or(0.0) * 1e-3
     };
-    let around = [
-        StageId::RadarReplay,
-        StageId::Masking,
-        StageId::PoseIntegration,
-    ];
-    let searching = StageId::ALL
-        .into_iter()
-        .filter(|stage| !around.contains(stage));
-    let mut figures: Figures = FIGURES.iter().filter_map(judged).collect();
-    figures.insert("masking_ms", work_ms(StageId::Masking));
-    figures.insert("search_ms", searching.map(work_ms).sum());
-    figures.extend(at("/scans_per_s").map(|rate| ("scans_per_s", rate)));
+    let searches = |stage: &&StageId| {
+        use StageId::{Masking, PoseIntegration, RadarReplay};
+        !matches!(stage, RadarReplay | Masking | PoseIntegration)
+    };
+    let searching = StageId::ALL.iter().filter(searches);
+    let judged = |(place, ..): &Column| {
+        Some((
+            (*place).to_owned(),
+            at(&format!("/evaluation/{place}"))?.into(),
+        ))
+    };
+    let mut figures = record(json!({
+        "masking_ms": work_ms(&StageId::Masking),
+        "search_ms": searching.map(work_ms).sum::<f64>(),
+        "scans_per_s": at("/scans_per_s"),
+    }));
+    figures.extend(COLUMNS.iter().filter_map(judged));
     figures
 }
 
-impl Experiment {
-    /// Markdown: a table of all figures, what masked, what is left out, and the commands that repeat the runs.
-    pub fn markdown(&self) -> String {
-        let papers = self.lines.iter().any(|line| line.paper != [None; 2]);
-        let mut header = vec!["row"];
-        header.extend(FIGURES.map(|(_, heading, _)| heading));
-        header.extend(if papers {
-            &["paper %", "paper deg/km"][..]
-        } else {
-            &[]
-        });
-        let cells = |line: &Line| {
-            let ours = |(place, _, decimals): &(&str, &str, usize)| {
-                number(line.figures.get(place).copied(), *decimals)
-            };
-            let paper = line.paper.map(|figure| number(figure, 2));
-            let shown = if papers { &paper[..] } else { &[] };
-            let ours = FIGURES.iter().map(ours).chain(shown.iter().cloned());
-            std::iter::once(line.row.clone()).chain(ours).collect()
-        };
-        let mut masks = Notes::new();
-        for line in &self.lines {
-            if let Some(model) = &line.model {
-                masks
-                    .entry(model.card.display().to_string())
-                    .or_default()
-                    .push(line.row.clone());
-            }
-        }
-        let commands: Vec<&str> = self
-            .lines
-            .iter()
-            .filter_map(|line| line.command.as_deref())
-            .collect();
-        format!(
-            "\n## {} on {}\n\n{}{}{}\n```sh\n{}\n```\n",
-            self.title,
-            self.data,
-            table(&header, self.lines.iter().map(cells)),
-            paragraph("Masks", &masks),
-            paragraph("Left out", &self.left_out),
-            commands.join("\n")
-        )
-    }
+/// Returns a row's name as that of a folder.
+pub fn folder(name: &str) -> String {
+    let words = name.split(|c: char| !c.is_ascii_alphanumeric());
+    let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
+    words.join("-").to_ascii_lowercase()
 }
-
-/// The meaning of the columns of [`Experiment::markdown`].
-pub const LEGEND: &str = "\nKITTI and seg need a truth of more than 100 m. m and deg a scan: errors of single motions, RMS. \
-    forward: estimated over true distance. ms: median work of the stages in the running pipeline. -: not known.\n";
 
 #[cfg(test)]
 mod tests {
-    use serde_json::json;
-
     use super::*;
 
     #[test]
@@ -330,6 +227,7 @@ mod tests {
         let expected = "gyre run configs/oxford.toml --data recordings/monday --out out/raw --rate max --fresh \
                         --set search.kind=exhaustive";
         assert_eq!(command("gyre", arguments), expected);
+        assert_eq!(folder("f-raw, Eq. 7"), "f-raw-eq-7");
     }
 
     #[test]
@@ -344,42 +242,10 @@ mod tests {
             "rpe": { "rotation_rmse_deg": 0.25, "forward_ratio": null }
         });
         let summary = json!({ "scans_per_s": 120.5, "latency": { "stages": stages }, "evaluation": evaluation });
-        let expected = [
-            ("ate/rmse_m", 0.5),
-            ("masking_ms", 2.0),
-            ("path_m", 22.0),
-            ("rpe/rotation_rmse_deg", 0.25),
-            ("scans_per_s", 120.5),
-            ("search_ms", 2.25),
-        ];
-        assert_eq!(figures(&summary), Figures::from(expected));
-    }
-
-    #[test]
-    fn a_table_has_ours_and_where_there_are_any_the_papers_figures() {
-        let line = Line {
-            row: "raw".to_owned(),
-            figures: Figures::from([("ate/rmse_m", 1.5), ("scans_per_s", 120.4)]),
-            ..Line::default()
-        };
-        let mut experiment = Experiment {
-            title: "IIIb",
-            data: "drive".to_owned(),
-            lines: vec![line],
-            left_out: Notes::new(),
-        };
-        let plain = "| raw | - | - | - | - | 1.50 | - | - | - | - | - | - | 120 |\n";
-        assert!(
-            experiment.markdown().contains(plain),
-            "{}",
-            experiment.markdown()
-        );
-        experiment.lines[0].paper = [Some(6.39), None];
-        let beside = "| raw | - | - | - | - | 1.50 | - | - | - | - | - | - | 120 | 6.39 | - |\n";
-        assert!(
-            experiment.markdown().contains(beside),
-            "{}",
-            experiment.markdown()
-        );
+        let expected = json!({
+            "ate/rmse_m": 0.5, "masking_ms": 2.0, "path_m": 22.0, "rpe/rotation_rmse_deg": 0.25, "scans_per_s": 120.5,
+            "search_ms": 2.25
+        });
+        assert_eq!(Value::from(figures(&summary)), expected);
     }
 }

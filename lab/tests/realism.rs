@@ -25,7 +25,8 @@ fn realism(folder: &Path, arguments: &[&str]) -> Ended {
     let mut command = gyre();
     command
         .current_dir(folder)
-        .args(["realism", "--out", "out"])
+        .args(["realism", "--out", "out", "--configs"])
+        .arg(Path::new(crate::PROJECT).join("configs"))
         .args(arguments);
     Ended::of(command)
 }
@@ -35,7 +36,7 @@ fn report(folder: &Path) -> Value {
 }
 
 fn rows(report: &Value) -> &Vec<Value> {
-    report["comparison"]["rows"].as_array().unwrap()
+    report["tables"][0]["rows"].as_array().unwrap()
 }
 
 #[test]
@@ -54,27 +55,25 @@ fn a_recording_is_closer_to_itself_than_another_is_in_all_that_is_measured() {
     let ended = realism(folder.path(), &[&arguments, &configs[..]].concat());
     ended.succeeded();
     let report = report(folder.path());
-    for row in rows(&report)
-        .iter()
-        .filter(|row| !row["values"][0].is_null())
-    {
+    for row in rows(&report).iter().filter(|row| !row["sim"].is_null()) {
         assert_eq!(row["sim_real"], 0.0, "{row:#}");
     }
-    let comparison = &report["comparison"];
-    assert!(
-        comparison["judged"].as_u64().unwrap() >= 12,
-        "{comparison:#}"
-    );
-    assert_eq!(comparison["closer"], comparison["judged"], "{comparison:#}");
+    let judged = rows(&report).iter().filter(|row| !row["closer"].is_null());
+    let judged: Vec<&Value> = judged.collect();
+    assert!(judged.len() >= 12, "{report:#}");
+    assert!(judged.iter().all(|row| row["closer"] == true), "{report:#}");
     let last = ended.stdout.lines().last().unwrap();
-    assert_eq!(last, format!("closer in {0} of {0}", comparison["judged"]));
+    assert_eq!(last, format!("closer in {0} of {0}", judged.len()));
     assert_eq!(
         fs::read_to_string(folder.path().join("out/realism.md")).unwrap(),
         ended.stdout
     );
-    let subject = |index: usize| &report["subjects"][index];
-    assert_eq!(subject(0)["measured"]["whole"]["aligned_by_truth"], 7);
-    assert_eq!(subject(2)["measured"]["whole"]["statistics"]["scans"], 8);
+    for measured in [
+        format!("sim: {small}, 8 scans, 7 pairs"),
+        "other: other, 8 scans".to_owned(),
+    ] {
+        assert!(ended.stdout.contains(&measured), "{}", ended.stdout);
+    }
 }
 
 #[test]
@@ -84,25 +83,24 @@ fn one_scan_and_a_recording_without_truth_have_what_can_be_had() {
     fs::remove_dir_all(folder.path().join("other/gt")).unwrap();
     fs::remove_file(folder.path().join("other/ground_truth.tum")).unwrap();
     let configs = ["--sim-config", "small.toml", "--real-config", "small.toml"];
-    realism(
+    let ended = realism(
         folder.path(),
         &[&[single.path().to_str().unwrap(), "other"], &configs[..]].concat(),
-    )
-    .succeeded();
-    let report = report(folder.path());
-    assert_eq!(
-        report["subjects"][1]["measured"]["whole"]["aligned_by_odometry"],
-        7
     );
+    ended.succeeded();
+    let report = report(folder.path());
+    // Aligned by odometry.
+    let aligned = "real: other, 8 scans, 7 pairs";
+    assert!(ended.stdout.contains(aligned), "{}", ended.stdout);
     for row in rows(&report) {
         let of_scans = ["next scan", "plain search", "refined search"];
         let needs_two = of_scans
             .iter()
             .any(|of| row["statistic"].as_str().unwrap().starts_with(of));
-        assert_eq!(row["values"][0].is_null(), needs_two, "{row:#}");
+        assert_eq!(row["sim"].is_null(), needs_two, "{row:#}");
         assert_eq!(row["sim_real"].is_null(), needs_two, "{row:#}");
         let needs_truth = row["statistic"].as_str().unwrap().contains("search");
-        assert_eq!(row["values"][1].is_null(), needs_truth, "{row:#}");
+        assert_eq!(row["real"].is_null(), needs_truth, "{row:#}");
         assert!(row["closer"].is_null(), "{row:#}");
     }
 }
@@ -113,25 +111,12 @@ fn without_runs_the_scans_alone_are_measured() {
     let small = recording::small().to_str().unwrap();
     let ended = realism(
         folder.path(),
-        &[
-            small,
-            "other",
-            "--search-scans",
-            "0",
-            "--scans",
-            "5",
-            "--threshold",
-            "80",
-        ],
+        &[small, "other", "--search-scans", "0", "--scans", "5"],
     );
     ended.succeeded();
     let report = report(folder.path());
-    let statistics = &report["subjects"][0]["measured"]["whole"]["statistics"];
-    assert_eq!(
-        (&statistics["scans"], &statistics["threshold"]),
-        (&Value::from(5), &Value::from(80))
-    );
-    assert_eq!(statistics["change"]["pairs"], 4);
+    let measured = format!("sim: {small}, 5 scans, 4 pairs");
+    assert!(ended.stdout.contains(&measured), "{}", ended.stdout);
     assert!(!folder.path().join("out/sim/gyre").exists());
     let distance = rows(&report)[0]["sim_real"].as_f64().unwrap();
     assert!(distance > 0.01, "{distance}");

@@ -9,7 +9,7 @@ use gyre_radar::{DatasetOptions, OwnedScan};
 use gyre_simulator::{SimulationConfig, write_dataset};
 use tempfile::TempDir;
 
-use super::{Fault, Plan, write_corrupted};
+use super::{CorruptArguments, Fault};
 
 const SCANS: usize = 24;
 const AZIMUTHS: usize = 16;
@@ -50,18 +50,21 @@ fn radiate() -> TempDir {
     folder
 }
 
-fn plan(fault: Fault, every: usize) -> Plan {
-    Plan {
+/// A corrupted copy of a recording, with the numbers of the scans that were hit.
+fn corrupted(source: &Path, fault: Fault, every: usize) -> (TempDir, Vec<usize>) {
+    let out = tempfile::tempdir().unwrap();
+    let hits = arguments(source, out.path(), fault, every).write().unwrap();
+    (out, hits)
+}
+
+fn arguments(source: &Path, out: &Path, fault: Fault, every: usize) -> CorruptArguments {
+    CorruptArguments {
+        path: source.to_owned(),
         fault,
         every: NonZeroUsize::new(every).unwrap(),
         seed: 1,
+        out: out.to_owned(),
     }
-}
-
-fn corrupted(source: &Path, plan: &Plan) -> (TempDir, Vec<usize>) {
-    let out = tempfile::tempdir().unwrap();
-    let hits = write_corrupted(source, out.path(), plan).unwrap();
-    (out, hits)
 }
 
 fn scans(folder: &Path) -> Vec<OwnedScan> {
@@ -85,7 +88,7 @@ fn rows(scan: &OwnedScan) -> Vec<&[u8]> {
 fn scans_that_are_not_of_the_plan_are_links_to_the_recordings_own() {
     let source = radiate();
     for fault in [Fault::Noise, Fault::Turned, Fault::HalfBlank] {
-        let (copy, hits) = corrupted(source.path(), &plan(fault, 5));
+        let (copy, hits) = corrupted(source.path(), fault, 5);
         assert_eq!(hits, [5, 10, 15, 20], "never the first");
         assert!(copy.path().join("ground_truth.tum").is_symlink());
         for (k, (before, after)) in scans(source.path())
@@ -111,7 +114,7 @@ fn scans_that_are_not_of_the_plan_are_links_to_the_recordings_own() {
 #[test]
 fn a_turned_scan_begins_a_quarter_later() {
     let source = radiate();
-    let (copy, _) = corrupted(source.path(), &plan(Fault::Turned, 5));
+    let (copy, _) = corrupted(source.path(), Fault::Turned, 5);
     let (before, after) = (scans(source.path()), scans(copy.path()));
     for azimuth in 0..AZIMUTHS {
         assert_eq!(
@@ -124,7 +127,7 @@ fn a_turned_scan_begins_a_quarter_later() {
 #[test]
 fn half_of_a_half_blank_scan_is_blank_and_the_other_half_as_it_was() {
     let source = radiate();
-    let (copy, _) = corrupted(source.path(), &plan(Fault::HalfBlank, 5));
+    let (copy, _) = corrupted(source.path(), Fault::HalfBlank, 5);
     let (before, after) = (scans(source.path()), scans(copy.path()));
     assert!(
         rows(&after[10])[..AZIMUTHS / 2]
@@ -140,7 +143,7 @@ fn half_of_a_half_blank_scan_is_blank_and_the_other_half_as_it_was() {
 #[test]
 fn a_scan_ten_later_stands_in_where_there_is_one() {
     let source = radiate();
-    let (copy, hits) = corrupted(source.path(), &plan(Fault::Later, 5));
+    let (copy, hits) = corrupted(source.path(), Fault::Later, 5);
     assert_eq!(hits, [5, 10], "24 scans: 13 is the last with one ten later");
     let (before, after) = (scans(source.path()), scans(copy.path()));
     assert_eq!(rows(&after[5]), rows(&before[15]));
@@ -150,7 +153,7 @@ fn a_scan_ten_later_stands_in_where_there_is_one() {
 #[test]
 fn dropped_scans_are_gone_and_the_others_keep_their_times() {
     let source = radiate();
-    let (copy, hits) = corrupted(source.path(), &plan(Fault::Dropped, 10));
+    let (copy, hits) = corrupted(source.path(), Fault::Dropped, 10);
     assert_eq!(hits, [10, 20]);
     let mut before = scans(source.path());
     let after = scans(copy.path());
@@ -170,17 +173,10 @@ fn dropped_scans_are_gone_and_the_others_keep_their_times() {
 fn noise_is_the_same_for_the_same_seed_and_another_for_each_scan() {
     let source = radiate();
     let noise = |seed| {
-        scans(
-            corrupted(
-                source.path(),
-                &Plan {
-                    seed,
-                    ..plan(Fault::Noise, 5)
-                },
-            )
-            .0
-            .path(),
-        )
+        let out = tempfile::tempdir().unwrap();
+        let arguments = arguments(source.path(), out.path(), Fault::Noise, 5);
+        CorruptArguments { seed, ..arguments }.write().unwrap();
+        scans(out.path())
     };
     let (once, again, other) = (noise(1), noise(1), noise(2));
     assert!(once.iter().zip(&again).all(|(a, b)| a.bytes == b.bytes));
@@ -200,7 +196,7 @@ fn what_stands_before_an_oxford_row_is_kept() {
         &mut |_, _| (),
     )
     .unwrap();
-    let (copy, hits) = corrupted(source.path(), &plan(Fault::Noise, 2));
+    let (copy, hits) = corrupted(source.path(), Fault::Noise, 2);
     assert_eq!(hits, [2]);
     let (before, after) = (&scans(source.path())[2], &scans(copy.path())[2]);
     assert_eq!(
@@ -213,14 +209,11 @@ fn what_stands_before_an_oxford_row_is_kept() {
 #[test]
 fn a_folder_that_holds_something_is_refused() {
     let source = radiate();
-    let (copy, _) = corrupted(source.path(), &plan(Fault::Noise, 5));
-    let again = write_corrupted(source.path(), copy.path(), &plan(Fault::Noise, 5));
-    let refused = again.unwrap_err().to_string();
+    let (copy, _) = corrupted(source.path(), Fault::Noise, 5);
+    let again = arguments(source.path(), copy.path(), Fault::Noise, 5);
+    let refused = again.write().unwrap_err().to_string();
     assert!(refused.contains("holds `Navtech_Polar`"), "{refused}");
-    let none = write_corrupted(
-        &source.path().join("none"),
-        &copy.path().join("new"),
-        &plan(Fault::Noise, 5),
-    );
+    let (none, new) = (source.path().join("none"), copy.path().join("new"));
+    let none = arguments(&none, &new, Fault::Noise, 5).write();
     assert!(none.unwrap_err().to_string().contains("no such folder"));
 }

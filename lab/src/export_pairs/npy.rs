@@ -10,12 +10,14 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use gyre::Failure;
+
+use crate::report::cannot_write;
+
 /// Length of magic, version, and the length of what follows.
 const PREFIX_BYTES: usize = 10;
 /// NumPy wants the data to begin at a multiple of this.
 const ALIGNMENT: usize = 64;
-/// Between the file and the records.
-const BUFFER_BYTES: usize = 1 << 20;
 
 /// A one-dimensional array that grows on the disk. What is dropped before [`NpyWriter::finish`] is removed.
 pub struct NpyWriter {
@@ -28,36 +30,36 @@ pub struct NpyWriter {
 
 impl NpyWriter {
     /// Begins the array that is to be at `path`, of records that `dtype`, a Python literal, describes.
-    ///
-    /// # Errors
-    /// As the operating system reports.
-    pub fn create(path: &Path, dtype: &str) -> io::Result<Self> {
+    pub fn create(path: &Path, dtype: String) -> Result<Self, Failure> {
         let partial = path.with_added_extension("part");
-        let mut file = BufWriter::with_capacity(BUFFER_BYTES, File::create(&partial)?);
-        file.write_all(&header(dtype, 0))?;
-        Ok(Self {
-            file,
+        let file = File::create(&partial).map_err(cannot_write(&partial))?;
+        let mut writer = Self {
+            file: BufWriter::new(file),
             path: path.to_owned(),
             partial,
-            dtype: dtype.to_owned(),
+            dtype,
             records: 0,
-        })
+        };
+        writer.write(&header(&writer.dtype, 0))?;
+        Ok(writer)
     }
 
     /// Appends a record.
-    ///
-    /// # Errors
-    /// As the operating system reports.
-    pub fn append(&mut self, record: &[u8]) -> io::Result<()> {
+    pub fn append(&mut self, record: &[u8]) -> Result<(), Failure> {
         self.records += 1;
-        self.file.write_all(record)
+        self.write(record)
     }
 
     /// Writes the number of records, and gives the file its name.
-    ///
-    /// # Errors
-    /// As the operating system reports; nothing is left then.
-    pub fn finish(mut self) -> io::Result<()> {
+    pub fn finish(mut self) -> Result<(), Failure> {
+        self.complete().map_err(cannot_write(&self.path))
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Failure> {
+        self.file.write_all(bytes).map_err(cannot_write(&self.path))
+    }
+
+    fn complete(&mut self) -> io::Result<()> {
         self.file.rewind()?;
         self.file.write_all(&header(&self.dtype, self.records))?;
         self.file.flush()?;
@@ -116,7 +118,7 @@ mod tests {
     fn a_complete_file_has_its_name_and_its_number_of_records() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("some.npy");
-        let mut writer = NpyWriter::create(&path, DTYPE).unwrap();
+        let mut writer = NpyWriter::create(&path, DTYPE.to_owned()).unwrap();
         writer.append(&[1; 10]).unwrap();
         assert!(!path.exists());
         writer.append(&[2; 10]).unwrap();
@@ -129,7 +131,8 @@ mod tests {
     #[test]
     fn what_is_given_up_leaves_nothing() {
         let folder = tempfile::tempdir().unwrap();
-        let mut writer = NpyWriter::create(&folder.path().join("some.npy"), DTYPE).unwrap();
+        let mut writer =
+            NpyWriter::create(&folder.path().join("some.npy"), DTYPE.to_owned()).unwrap();
         writer.append(&[1; 10]).unwrap();
         drop(writer);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);

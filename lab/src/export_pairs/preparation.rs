@@ -3,14 +3,12 @@
 use std::collections::VecDeque;
 
 use gyre::{Failure, configuration::Configuration};
-use gyre_geometry::{Pose, Twist, pose, xy_yaw};
+use gyre_geometry::{Pose, Twist, xy_yaw};
 use gyre_masking::MaskKind;
-use gyre_odometry::{Odometry, OdometryConfig, OdometryError, SearchConfig};
-use gyre_radar::{PointsConfig, PolarScan};
-use gyre_scan_matching::{RefinementConfig, RefinementKind};
+use gyre_odometry::{Odometry, OdometryError, SearchConfig};
+use gyre_radar::PolarScan;
+use gyre_scan_matching::RefinementKind;
 use half::{f16, slice::HalfFloatSliceExt};
-
-use super::record::Record;
 
 /// A network masks what networks are trained on.
 const LEARNED: &str = "masking.kind is `learned`, but masks are trained on rasters that no network has masked: \
@@ -22,6 +20,8 @@ pub struct Preparation {
     /// A sweep is compensated with the motion of the scan so many before; 0: not at all.
     lag: usize,
     rounded: Vec<f16>,
+    /// The bytes of the last record.
+    record: Vec<u8>,
     /// Times and true poses of the last `lag + 1` scans of the chain.
     chain: VecDeque<(i64, Pose)>,
 }
@@ -35,25 +35,27 @@ impl Preparation {
         if configuration.odometry.masking.kind == MaskKind::Learned {
             return Err(LEARNED.into());
         }
-        let config = OdometryConfig {
-            points: PointsConfig {
-                capacity: 0,
-                ..configuration.odometry.points.clone()
-            },
-            search: SearchConfig::default(),
-            refinement: RefinementConfig {
-                kind: RefinementKind::None,
-                ..configuration.odometry.refinement.clone()
-            },
-            ..configuration.odometry.clone()
-        };
+        let mut config = configuration.odometry.clone();
+        config.points.capacity = 0;
+        config.search = SearchConfig::default();
+        config.refinement.kind = RefinementKind::None;
         let lag = config.masking.feedback_lag();
         Ok(Self {
             odometry: Odometry::new(&config)?,
             lag,
             rounded: vec![f16::ZERO; config.raster.n * config.raster.n],
+            record: Vec::new(),
             chain: VecDeque::with_capacity(lag + 2),
         })
+    }
+
+    /// Returns NumPy's description of a record, packed and little-endian, as in the table in [`super`].
+    pub fn dtype(&self) -> String {
+        let n = self.odometry.raster().nrows();
+        format!(
+            "[('raster', '<f2', ({n}, {n})), ('searched', '<f8', (3,)), ('pose', '<f8', (3,)), ('time_s', '<f8'), \
+             ('twist', '<f4', (3,)), ('sequence', '<u4')]"
+        )
     }
 
     /// Returns whether the next scan starts a chain.
@@ -68,15 +70,12 @@ impl Preparation {
     }
 
     /// Returns the next scan's record. `pose` is the truth at the scan's time. After an error the chain is as it was.
-    ///
-    /// # Errors
-    /// A scan that cannot be rasterised.
     pub fn next(
         &mut self,
         scan: &PolarScan<'_>,
         pose: Pose,
         sequence: u32,
-    ) -> Result<Record<'_>, OdometryError> {
+    ) -> Result<&[u8], OdometryError> {
         self.odometry.mask(scan, self.true_twist())?;
         // The file is what networks learn from, so the search sees the file's values.
         let mut raster = self.odometry.masked_mut();
@@ -94,24 +93,28 @@ impl Preparation {
         if self.chain.len() > self.lag + 1 {
             self.chain.pop_front();
         }
-        Ok(Record {
-            raster: &self.rounded,
-            searched,
-            pose: xy_yaw(&pose),
-            time_s: stamp_ns as f64 * 1e-9,
-            twist: self.odometry.twist().map_or([0.0; 3], |twist| {
-                [twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps].map(|value| value as f32)
-            }),
-            sequence,
-        })
+        let twist = self.odometry.twist().unwrap_or_default();
+        let twist = [twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps];
+        let wide = [searched, xy_yaw(&pose)].concat().into_iter();
+        let wide = wide
+            .chain([stamp_ns as f64 * 1e-9])
+            .flat_map(f64::to_le_bytes);
+        let narrow = twist
+            .into_iter()
+            .flat_map(|value| (value as f32).to_le_bytes());
+        self.record.clear();
+        self.record
+            .extend(self.rounded.iter().flat_map(|cell| cell.to_le_bytes()));
+        self.record
+            .extend(wide.chain(narrow).chain(sequence.to_le_bytes()));
+        Ok(&self.record)
     }
 
     /// The true velocity of the scan `lag` before the next one.
     fn true_twist(&self) -> Option<Twist> {
         let ((from_ns, from), (to_ns, to)) = (self.chain.front()?, self.chain.get(1)?);
-        let [x_m, y_m, yaw_rad] = xy_yaw(&(from.inverse() * to));
         let interval_s = to_ns.saturating_sub(*from_ns) as f64 * 1e-9;
-        let twist = || Twist::from_motion(&pose(x_m, y_m, yaw_rad), interval_s);
+        let twist = || Twist::from_motion(&(from.inverse() * to), interval_s);
         (self.chain.len() > self.lag).then(twist)
     }
 }

@@ -1,16 +1,15 @@
 //! `pairs.toml`: the provenance of `pairs.npy`.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::{fs, path::Path};
 
 use gyre::{Failure, configuration::Configuration};
-use gyre_radar::Format;
-use serde::Serialize;
-use toml::{Table, Value};
+use serde_json::json;
+use toml::Table;
 
-use super::recording::Source;
+use crate::{
+    recording::{Recording, Track, folder_name},
+    report::{Record, record},
+};
 
 /// The file's first line; a file with another is somebody else's.
 const FIRST_LINE: &str = "# What the .npy file of this name was made of, by gyre export-pairs.\n";
@@ -25,18 +24,15 @@ const SECTIONS: [&str; 6] = [
     "simulation",
 ];
 
-/// Returns the file beside `pairs`.
-pub fn place(pairs: &Path) -> PathBuf {
-    pairs.with_extension("toml")
-}
+/// Scans that follow each other, none left out: those with one number in `sequence`. What is said of them, and how many they are.
+pub type Sequence = (Record, usize);
 
 /// Refuses a name that is no `.npy` file's, or beside which another file is in the way: a configuration, say.
 pub fn check_place(pairs: &Path) -> Result<(), Failure> {
-    let named = pairs.display();
+    let (named, beside) = (pairs.display(), pairs.with_extension("toml"));
     if pairs.extension().is_none_or(|extension| extension != "npy") {
         return Err(format!("--out {named}: the file's name must end in .npy").into());
     }
-    let beside = place(pairs);
     match fs::read(&beside) {
         Ok(text) if !text.starts_with(FIRST_LINE.as_bytes()) => Err(format!(
             "{} would be overwritten to say what {named} is made of, but is no export's: choose another --out",
@@ -47,56 +43,43 @@ pub fn check_place(pairs: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Scans that follow each other, none left out: those with one number in `sequence`.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Sequence {
-    /// The number.
-    pub sequence: u32,
-    /// The recording's name, or `a simulation`.
-    pub name: String,
-    /// The recording's folder as it was named, or `a simulation`.
-    pub source: String,
-    /// The format of the recording.
-    pub format: Format,
-    /// The truth's file.
-    pub ground_truth: PathBuf,
-    /// The recording's scan that it begins with, from 0.
-    pub first_scan: usize,
-    /// The number of scans.
-    pub scans: usize,
+/// Begins a sequence with a recording's scan `first_scan`, without scans.
+pub fn sequence(
+    number: usize,
+    recording: &Recording,
+    truth: &Track,
+    first_scan: usize,
+) -> Sequence {
+    let of = json!({
+        "sequence": number,
+        "name": folder_name(Path::new(&recording.data)),
+        "source": recording.data,
+        "format": recording.dataset.format(),
+        "ground_truth": truth.path,
+        "first_scan": first_scan,
+    });
+    (record(of), 0)
 }
 
 /// Returns the text of the file: all that the records depend on.
 ///
 /// # Errors
 /// A value that TOML cannot hold.
-pub fn to_toml(configuration: &Configuration, sequences: &[Sequence]) -> Result<String, Failure> {
+pub fn to_toml(configuration: &Configuration, sequences: Vec<Sequence>) -> Result<String, Failure> {
     // Through text: a table made directly has other digits in its f32 values.
     let mut table: Table = configuration.to_toml()?.parse()?;
     table.retain(|section, _| SECTIONS.contains(&section));
-    let scans: usize = sequences.iter().map(|sequence| sequence.scans).sum();
-    table.insert("version".to_owned(), env!("CARGO_PKG_VERSION").into());
+    let scans: usize = sequences.iter().map(|(_, scans)| scans).sum();
+    let counted = |(mut of, scans): Sequence| {
+        of.insert("scans".to_owned(), json!(scans));
+        of
+    };
+    table.extend(Table::try_from(json!({
+        "version": env!("CARGO_PKG_VERSION"),
+        "scans": scans,
+        "n": configuration.odometry.raster.n,
+        "sequences": sequences.into_iter().map(counted).collect::<Vec<_>>(),
+    }))?);
     table.extend(option_env!("GYRE_COMMIT").map(|commit| ("commit".to_owned(), commit.into())));
-    table.insert("scans".to_owned(), Value::try_from(scans)?);
-    table.insert(
-        "n".to_owned(),
-        Value::try_from(configuration.odometry.raster.n)?,
-    );
-    table.insert("sequences".to_owned(), Value::try_from(sequences)?);
     Ok(format!("{FIRST_LINE}{}", toml::to_string_pretty(&table)?))
-}
-
-impl Sequence {
-    /// Starts with a recording's scan `first_scan`, without scans.
-    pub fn new(sequence: u32, source: &Source, first_scan: usize) -> Self {
-        Self {
-            sequence,
-            name: source.name(),
-            source: source.data.clone(),
-            format: source.format,
-            ground_truth: source.truth.path.clone(),
-            first_scan,
-            scans: 0,
-        }
-    }
 }

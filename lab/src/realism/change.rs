@@ -1,13 +1,16 @@
 //! The difference between a scan and the next, seen from the same place.
 
-use gyre_geometry::Twist;
-use gyre_radar::{PolarScan, RasterConfig, RasterError, Rasteriser, Sampling};
-use nalgebra::Isometry2;
+use gyre_geometry::{Pose, Twist};
+use gyre_radar::{RasterConfig, RasterError, Rasteriser, Sampling};
 use ndarray::{Array2, s};
-use serde::Serialize;
+
+use super::statistics::Sample;
+
+/// Cells of the rasters in which consecutive scans are compared, m.
+const CELL_M: f32 = 0.4;
 
 /// The difference between consecutive scans.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Change {
     /// Pairs of scans that were compared.
     pub pairs: usize,
@@ -17,93 +20,76 @@ pub struct Change {
     pub unmatched_share: f64,
 }
 
-/// Compares pairs of scans.
-#[derive(Debug)]
-pub struct ChangeMeter {
-    rasteriser: Rasteriser,
-    earlier: Array2<f32>,
-    later: Array2<f32>,
+/// Compares each scan with the one before it where the motion between them is known, in rasters that reach to `range_m`. What is not
+/// above `threshold` is no return. `None` where nothing could be compared.
+///
+/// Both are drawn as seen from where the sensor was half-way between, by one motion at constant velocity through both sweeps: so both
+/// sweeps are motion-compensated and aligned in one step, and blurred alike. A motion that no sensor makes is a wrong one: those scans
+/// are not compared.
+///
+/// # Errors
+/// A raster that cannot be made.
+pub fn change(
+    samples: &[Sample],
+    range_m: f64,
     threshold: u8,
-    pairs: usize,
-    correlations: f64,
-    returns: u64,
-    unmatched: u64,
+) -> Result<Option<Change>, RasterError> {
+    let n = 2 * (range_m / f64::from(CELL_M)) as usize + 1;
+    let mut rasteriser = Rasteriser::new(&RasterConfig {
+        n,
+        cell_m: CELL_M,
+        sampling: Sampling::Averaged,
+        ..RasterConfig::default()
+    })?;
+    let mut rasters = [Array2::zeros((n, n)), Array2::zeros((n, n))];
+    let (mut pairs, mut correlations, mut returns, mut alone) = (0, 0.0, 0, 0);
+    for pair in samples.windows(2) {
+        let Some(motion) = &pair[1].motion else {
+            continue;
+        };
+        match draw(
+            [&pair[0], &pair[1]],
+            motion,
+            threshold,
+            &mut rasteriser,
+            &mut rasters,
+        ) {
+            Err(RasterError::Twist { .. }) => continue,
+            drawn => drawn?,
+        }
+        let [earlier, later] = &rasters;
+        if let Some(correlation) = correlation(earlier, later) {
+            pairs += 1;
+            correlations += correlation;
+        }
+        for (these, those) in [(earlier, later), (later, earlier)] {
+            returns += these.iter().filter(|power| **power > 0.0).count();
+            alone += unmatched(these, those);
+        }
+    }
+    Ok((pairs > 0 && returns > 0).then(|| Change {
+        pairs,
+        correlation: correlations / pairs as f64,
+        unmatched_share: alone as f64 / returns as f64,
+    }))
 }
 
-impl ChangeMeter {
-    /// For rasters that reach to `range_m`, with cells of `cell_m`. What is not above `threshold` is no return.
-    ///
-    /// # Errors
-    /// A raster that cannot be made: more than 4096 cells a side, cells of impossible size.
-    pub fn new(range_m: f64, cell_m: f32, threshold: u8) -> Result<Self, RasterError> {
-        let half = (range_m / f64::from(cell_m)) as usize;
-        let n = 2 * half + 1;
-        let config = RasterConfig {
-            n,
-            cell_m,
-            sampling: Sampling::Averaged,
-            ..RasterConfig::default()
-        };
-        let rasteriser = Rasteriser::new(&config)?;
-        let raster = Array2::zeros((n, n));
-        Ok(Self {
-            rasteriser,
-            earlier: raster.clone(),
-            later: raster,
-            threshold,
-            pairs: 0,
-            correlations: 0.0,
-            returns: 0,
-            unmatched: 0,
-        })
+fn draw(
+    pair: [&Sample; 2],
+    motion: &Pose,
+    threshold: u8,
+    rasteriser: &mut Rasteriser,
+    rasters: &mut [Array2<f32>; 2],
+) -> Result<(), RasterError> {
+    let [from_ns, to_ns] = pair.map(|sample| sample.scan.geometry.stamp_ns);
+    let interval_ns = to_ns.saturating_sub(from_ns);
+    let twist = Twist::from_motion(motion, interval_ns as f64 * 1e-9);
+    for (sample, raster) in pair.into_iter().zip(rasters) {
+        let mut scan = sample.scan.view();
+        scan.geometry.stamp_ns = from_ns + interval_ns / 2;
+        rasteriser.rasterise(&scan, threshold, Some(twist), raster.view_mut())?;
     }
-
-    /// Compares a scan with a later one, `motion` being the later one's pose in the earlier one's frame.
-    ///
-    /// Both are drawn as seen from where the sensor was half-way between, by one motion at constant velocity through both sweeps:
-    /// so the sweeps' distortion is undone and the scans are aligned in one step, and both are blurred alike.
-    ///
-    /// # Errors
-    /// A scan that contradicts itself, a motion that no sensor makes.
-    pub fn add(
-        &mut self,
-        earlier: &PolarScan<'_>,
-        later: &PolarScan<'_>,
-        motion: &Isometry2<f64>,
-    ) -> Result<(), RasterError> {
-        let interval_ns = later
-            .geometry
-            .stamp_ns
-            .saturating_sub(earlier.geometry.stamp_ns);
-        let twist = Twist::from_motion(motion, interval_ns as f64 * 1e-9);
-        let between_ns = earlier.geometry.stamp_ns + interval_ns / 2;
-        for (scan, raster) in [(earlier, &mut self.earlier), (later, &mut self.later)] {
-            let mut scan = *scan;
-            scan.geometry.stamp_ns = between_ns;
-            let raster = raster.view_mut();
-            self.rasteriser
-                .rasterise(&scan, self.threshold, Some(twist), raster)?;
-        }
-        if let Some(correlation) = correlation(&self.earlier, &self.later) {
-            self.pairs += 1;
-            self.correlations += correlation;
-        }
-        for (these, those) in [(&self.earlier, &self.later), (&self.later, &self.earlier)] {
-            let (returns, unmatched) = unmatched(these, those);
-            self.returns += returns;
-            self.unmatched += unmatched;
-        }
-        Ok(())
-    }
-
-    /// Returns the difference; `None` where nothing could be compared.
-    pub fn finish(&self) -> Option<Change> {
-        (self.pairs > 0 && self.returns > 0).then(|| Change {
-            pairs: self.pairs,
-            correlation: self.correlations / self.pairs as f64,
-            unmatched_share: self.unmatched as f64 / self.returns as f64,
-        })
-    }
+    Ok(())
 }
 
 /// Pearson's coefficient over the cells in the raster's circle; `None` where one of them is the same everywhere.
@@ -113,34 +99,24 @@ fn correlation(a: &Array2<f32>, b: &Array2<f32>) -> Option<f64> {
         let (ahead, left) = (row as i64 - half, column as i64 - half);
         ahead * ahead + left * left <= half * half
     };
-    let [mut cells, mut sum_a, mut sum_b, mut aa, mut bb, mut ab] = [0.0; 6];
-    for ((_, a), b) in a
-        .indexed_iter()
-        .zip(b)
-        .filter(|((place, _), _)| in_circle(*place))
-    {
+    let cells = a.indexed_iter().zip(b);
+    let cells = cells.filter(|((place, _), _)| in_circle(*place));
+    let [n, sum_a, sum_b, aa, bb, ab] = cells.fold([0.0; 6], |sums, ((_, a), b)| {
         let (a, b) = (f64::from(*a), f64::from(*b));
-        cells += 1.0;
-        sum_a += a;
-        sum_b += b;
-        aa += a * a;
-        bb += b * b;
-        ab += a * b;
-    }
-    let covariance = |sum: f64, x: f64, y: f64| sum / cells - x / cells * (y / cells);
+        let terms = [1.0, a, b, a * a, b * b, a * b];
+        std::array::from_fn(|k| sums[k] + terms[k])
+    });
+    let covariance = |products: f64, x: f64, y: f64| products / n - x / n * (y / n);
     let variances = covariance(aa, sum_a, sum_a) * covariance(bb, sum_b, sum_b);
     (variances > 0.0).then(|| covariance(ab, sum_a, sum_b) / variances.sqrt())
 }
 
-/// Returns the number of cells of `these` that have a return, and of those that have none within one cell in `those`.
-fn unmatched(these: &Array2<f32>, those: &Array2<f32>) -> (u64, u64) {
-    let n = these.nrows();
-    let (mut returns, mut unmatched) = (0, 0);
-    let within_one = |place: usize| place.saturating_sub(1)..(place + 2).min(n);
-    for ((row, column), _) in these.indexed_iter().filter(|(_, power)| **power > 0.0) {
-        let near = those.slice(s![within_one(row), within_one(column)]);
-        returns += 1;
-        unmatched += u64::from(near.iter().all(|power| *power <= 0.0));
-    }
-    (returns, unmatched)
+/// Returns the number of cells with a return that have none within one cell in `those`.
+fn unmatched(these: &Array2<f32>, those: &Array2<f32>) -> usize {
+    let within_one = |place: usize| place.saturating_sub(1)..(place + 2).min(these.nrows());
+    let alone = |((row, column), power): &((usize, usize), &f32)| {
+        let near = || those.slice(s![within_one(*row), within_one(*column)]);
+        **power > 0.0 && near().iter().all(|power| *power <= 0.0)
+    };
+    these.indexed_iter().filter(alone).count()
 }

@@ -1,11 +1,10 @@
 //! One grid of range for sensors of different resolution.
 
-use gyre_radar::{OwnedScan, PolarScan, ScanError, ScanLimits, SweepGeometry};
-use serde::Serialize;
+use gyre_radar::{OwnedScan, PolarScan, ScanError, SweepGeometry};
 
 /// Equal cells of range, from the first bin's near edge on: ranges as the sensor counts them, without any offset, so that what the
 /// sensor itself puts into a scan (ringing, noise) falls into the same cells whatever offset a configuration names.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RangeGrid {
     /// Metres a cell.
     pub resolution_m: f32,
@@ -17,10 +16,8 @@ impl RangeGrid {
     /// The grid that scans of all these kinds can be averaged to: the coarsest resolution over the shortest range. `None` where there
     /// is no scan, or one without bins.
     pub fn common(geometries: &[SweepGeometry]) -> Option<Self> {
-        let resolution_m = geometries
-            .iter()
-            .map(|g| g.range_resolution_m)
-            .reduce(f32::max)?;
+        let resolutions_m = geometries.iter().map(|g| g.range_resolution_m);
+        let resolution_m = resolutions_m.reduce(f32::max)?;
         let range_m = |g: &SweepGeometry| g.bins as f64 * f64::from(g.range_resolution_m);
         let shortest_m = geometries.iter().map(range_m).reduce(f64::min)?;
         // A resolution as f32 must not cost the last cell.
@@ -43,83 +40,38 @@ impl RangeGrid {
     }
 }
 
-/// Brings scans onto a grid, in memory of its own.
-#[derive(Debug)]
-pub struct Resampler {
-    grid: RangeGrid,
-    scan: OwnedScan,
-    /// Sum of a row's powers before each bin, and of all.
-    sums: Vec<f64>,
-}
-
-impl Resampler {
-    /// For scans of any size.
-    pub fn new(grid: RangeGrid) -> Self {
-        let empty = ScanLimits {
-            bytes: 0,
-            azimuths: 0,
-        };
-        Self {
-            grid,
-            scan: OwnedScan::with_limits(empty),
-            sums: Vec::new(),
-        }
+/// Averages the powers of a scan over each cell of a grid, a bin that two cells share by its parts, and rounds to whole counts.
+/// Azimuths, times and flags stay as they are. Where the scan has no more bins there is nothing: power 0.
+pub fn resample(scan: &PolarScan<'_>, grid: RangeGrid) -> Result<OwnedScan, ScanError> {
+    scan.check()?;
+    let azimuths = scan.geometry.azimuths;
+    let bins_a_cell = f64::from(grid.resolution_m) / f64::from(scan.geometry.range_resolution_m);
+    let mut bytes = vec![0; azimuths * grid.cells];
+    for (azimuth, cells) in bytes.chunks_exact_mut(grid.cells).enumerate() {
+        average(scan.row(azimuth), bins_a_cell, cells);
     }
-
-    /// Averages the powers over each cell, a bin that two cells share by its parts, and rounds to whole counts. Azimuths, times and
-    /// flags stay as they are. Where the scan has no more bins there is nothing: power 0.
-    ///
-    /// # Errors
-    /// A scan that contradicts itself.
-    pub fn resample(&mut self, scan: &PolarScan<'_>) -> Result<(), ScanError> {
-        scan.check()?;
-        let azimuths = scan.geometry.azimuths;
-        self.scan.geometry = SweepGeometry {
-            bins: self.grid.cells,
-            stride: self.grid.cells,
+    Ok(OwnedScan {
+        geometry: SweepGeometry {
+            bins: grid.cells,
+            stride: grid.cells,
             first_byte: 0,
-            range_resolution_m: self.grid.resolution_m,
+            range_resolution_m: grid.resolution_m,
             ..scan.geometry
-        };
-        self.scan.azimuth_rad.clear();
-        self.scan
-            .azimuth_rad
-            .extend_from_slice(&scan.azimuth_rad[..azimuths]);
-        self.scan.stamp_ns.clear();
-        self.scan
-            .stamp_ns
-            .extend_from_slice(&scan.stamp_ns[..azimuths]);
-        self.scan.flags.clear();
-        self.scan.flags.extend_from_slice(&scan.flags[..azimuths]);
-        self.scan.bytes.resize(azimuths * self.grid.cells, 0);
-        let bins_a_cell =
-            f64::from(self.grid.resolution_m) / f64::from(scan.geometry.range_resolution_m);
-        for (azimuth, cells) in self
-            .scan
-            .bytes
-            .chunks_exact_mut(self.grid.cells)
-            .enumerate()
-        {
-            average(scan.row(azimuth), bins_a_cell, &mut self.sums, cells);
-        }
-        Ok(())
-    }
-
-    /// The scan that was resampled last.
-    pub fn scan(&self) -> PolarScan<'_> {
-        self.scan.view()
-    }
+        },
+        bytes,
+        azimuth_rad: scan.azimuth_rad[..azimuths].to_vec(),
+        stamp_ns: scan.stamp_ns[..azimuths].to_vec(),
+        flags: scan.flags[..azimuths].to_vec(),
+    })
 }
 
 /// Writes to `cells` the mean of `bins` over stretches of `bins_a_cell`.
-fn average(bins: &[u8], bins_a_cell: f64, sums: &mut Vec<f64>, cells: &mut [u8]) {
-    sums.clear();
-    sums.push(0.0);
-    let mut sum = 0.0;
-    sums.extend(bins.iter().map(|power| {
-        sum += f64::from(*power);
-        sum
-    }));
+fn average(bins: &[u8], bins_a_cell: f64, cells: &mut [u8]) {
+    let sum = bins.iter().scan(0.0, |sum, power| {
+        *sum += f64::from(*power);
+        Some(*sum)
+    });
+    let sums: Vec<f64> = std::iter::once(0.0).chain(sum).collect();
     let sum_before = |bin: f64| {
         let whole = bin as usize;
         match (sums.get(whole), bins.get(whole)) {

@@ -7,8 +7,9 @@ mod powers;
 mod texture;
 
 use super::{
-    grid::RangeGrid,
-    statistics::{Meter, MeterConfig, ScanStatistics},
+    grid::{RangeGrid, resample},
+    histogram::Histogram,
+    statistics::{Sample, Statistics},
 };
 use gyre_radar::{OwnedScan, ScanLimits, Sense, SweepGeometry};
 use nalgebra::{Isometry2, Point2};
@@ -24,11 +25,6 @@ pub const PERIOD_NS: i64 = 250_000_000;
 pub const GRID: RangeGrid = RangeGrid {
     resolution_m: RESOLUTION_M,
     cells: BINS,
-};
-pub const CONFIG: MeterConfig = MeterConfig {
-    grid: GRID,
-    threshold: 60,
-    cell_m: 0.4,
 };
 
 /// A scan with these powers by azimuth and bin, the `index`-th of its recording.
@@ -94,11 +90,18 @@ pub fn posts(posts: &[Point2<f64>], index: i64, pose: impl Fn(f64) -> Isometry2<
     drawn
 }
 
-/// Measures scans without known motions.
-pub fn measured<'s>(scans: impl IntoIterator<Item = &'s OwnedScan>) -> ScanStatistics {
-    let mut meter = Meter::new(CONFIG).unwrap();
-    for scan in scans {
-        meter.add(&scan.view(), None).unwrap();
+/// A scan on the grid, with its motion since the one before it.
+pub fn sample(scan: &OwnedScan, motion: Option<Isometry2<f64>>) -> Sample {
+    Sample {
+        scan: resample(&scan.view(), GRID).unwrap(),
+        motion,
     }
-    meter.finish().unwrap()
+}
+
+/// Measures scans without known motions.
+pub fn measured<'s>(scans: impl IntoIterator<Item = &'s OwnedScan>) -> Statistics {
+    let mut raw = Histogram::default();
+    let scans = scans.into_iter().inspect(|scan| raw.add(&scan.view()));
+    let samples: Vec<Sample> = scans.map(|scan| sample(scan, None)).collect();
+    Statistics::of(&samples, &raw, GRID).unwrap()
 }

@@ -5,14 +5,7 @@ use std::{fs, path::Path, process::Command};
 use gyre::Failure;
 use serde::Deserialize;
 
-/// The command of the baseline.
-#[derive(Clone, Copy, Debug)]
-pub struct Baseline<'a> {
-    /// A Python interpreter with torch.
-    pub python: &'a Path,
-    /// The program.
-    pub script: &'a Path,
-}
+use crate::{cli::TablesArguments, sequence::Sequence};
 
 /// The report of the baseline.
 #[derive(Debug, Deserialize)]
@@ -29,48 +22,54 @@ struct BaselineRow {
     median_ms: f64,
 }
 
-impl Baseline<'_> {
-    /// Times all its rows for rasters of `n` cells a side on one thread; its exhaustive search tries `angles` angles.
-    /// The report stays at `report`.
-    ///
-    /// # Errors
-    /// A program that cannot be started, fails, or writes something else.
-    pub fn time(
-        &self,
-        n: usize,
-        passes: usize,
-        angles: usize,
-        report: &Path,
-    ) -> Result<BaselineTimes, Failure> {
-        let failed = |reason: String| format!("the baseline {} {reason}", self.script.display());
-        // The report of an earlier run must not pass for this one's.
-        let _ = fs::remove_file(report);
-        let options =
-            format!("--threads 1 --sizes {n} --passes {passes} --rotations {angles} --json");
-        let output = Command::new(self.python)
-            .arg(self.script)
-            .args(options.split(' '))
-            .arg(report)
-            .output()
-            .map_err(|error| failed(format!("cannot be started: {error}")))?;
-        if !output.status.success() {
-            let said = String::from_utf8_lossy(&output.stderr);
-            let last = said.lines().last().unwrap_or("it does not say why");
-            return Err(failed(format!("failed: {last}")).into());
-        }
-        let text = fs::read_to_string(report)
-            .map_err(|error| failed(format!("wrote no times: {error}")))?;
-        Ok(serde_json::from_str(&text)
-            .map_err(|error| failed(format!("wrote something else than times: {error}")))?)
+/// Times all rows of the baseline that is named, if one is, for rasters of `n` cells a side on one thread; its exhaustive search tries
+/// as many angles as the sequence's. The report stays in the folder of the tables.
+///
+/// # Errors
+/// A program that cannot be started, fails, or writes something else.
+pub fn time(
+    sequence: &Sequence,
+    n: usize,
+    arguments: &TablesArguments,
+) -> Result<Option<BaselineTimes>, Failure> {
+    let [python, script] = [&arguments.baseline, &arguments.baseline_script];
+    let (Some(python), Some(script)) = (python, script) else {
+        return Ok(None);
+    };
+    let (odometry, passes) = (
+        sequence.configuration(&[])?.odometry,
+        2 * arguments.passes.get(),
+    );
+    let angles = odometry.exhaustive.candidates();
+    let report = arguments.out.join(format!("baseline-{n}.json"));
+    let options = format!("--threads 1 --sizes {n} --passes {passes} --rotations {angles} --json");
+    let mut command = Command::new(python);
+    command.arg(script).args(options.split(' ')).arg(&report);
+    let failed = |reason| format!("the baseline {} {reason}", script.display());
+    Ok(Some(times_of(command, &report).map_err(failed)?))
+}
+
+fn times_of(mut command: Command, report: &Path) -> Result<BaselineTimes, String> {
+    // The report of an earlier run must not pass for this one's.
+    let _ = fs::remove_file(report);
+    let output = command.output();
+    let output = output.map_err(|error| format!("cannot be started: {error}"))?;
+    if !output.status.success() {
+        let said = String::from_utf8_lossy(&output.stderr);
+        let last = said.lines().last().unwrap_or("it does not say why");
+        return Err(format!("failed: {last}"));
     }
+    let text = fs::read_to_string(report);
+    let text = text.map_err(|error| format!("wrote no times: {error}"))?;
+    let other = |error| format!("wrote something else than times: {error}");
+    serde_json::from_str(&text).map_err(other)
 }
 
 impl BaselineTimes {
     /// Median time of a row, ms.
     pub fn median_ms(&self, n: usize, row: &str) -> Option<f64> {
-        let mut rows = self.rows.iter();
-        rows.find(|time| time.n == n && time.row == row)
-            .map(|time| time.median_ms)
+        let mut rows = self.rows.iter().filter(|time| time.n == n);
+        Some(rows.find(|time| time.row == row)?.median_ms)
     }
 }
 
@@ -93,16 +92,12 @@ mod tests {
 
     #[test]
     fn a_baseline_that_cannot_be_used_says_so() {
-        let time = |python: &str| {
-            let (python, script) = (Path::new(python), Path::new("baseline.py"));
-            let failed = Baseline { python, script }.time(127, 1, 31, Path::new("/nowhere/b.json"));
-            failed.unwrap_err().to_string()
+        let failed = |python: &str| {
+            let times = times_of(Command::new(python), Path::new("/nowhere/b.json"));
+            times.unwrap_err()
         };
-        assert!(time("/no/python").starts_with("the baseline baseline.py cannot be started: "));
-        assert_eq!(
-            time("false"),
-            "the baseline baseline.py failed: it does not say why"
-        );
-        assert!(time("true").starts_with("the baseline baseline.py wrote no times: "));
+        assert!(failed("/no/python").starts_with("cannot be started: "));
+        assert_eq!(failed("false"), "failed: it does not say why");
+        assert!(failed("true").starts_with("wrote no times: "));
     }
 }

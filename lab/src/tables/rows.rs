@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
-use crate::models::Model;
+use crate::report::Record;
 
 /// The rows, and the paper's figures.
 #[derive(Debug, Deserialize)]
@@ -12,7 +12,8 @@ use crate::models::Model;
 pub struct Rows {
     groups: BTreeMap<String, Vec<String>>,
     row: Vec<Row>,
-    paper: BTreeMap<String, Paper>,
+    /// By the paper's row and the raster's side, cells.
+    paper: BTreeMap<String, BTreeMap<String, Record>>,
 }
 
 /// A row: overrides of a sequence's own configuration.
@@ -36,30 +37,8 @@ pub struct Row {
     pub baseline: Option<String>,
 }
 
-/// A row of the paper: figures for rasters of 127, 255 and 511 cells a side, as far as they are given.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-struct Paper {
-    laptop_hz: Vec<f64>,
-    jetson_hz: Vec<f64>,
-    translation_percent: Vec<f64>,
-    rotation_deg_per_km: Vec<f64>,
-}
-
-/// The papers' tables.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Table {
-    /// IIIa.
-    Times,
-    /// IIIb.
-    Accuracy,
-}
-
 impl Rows {
     /// Reads the rows that this program has.
-    ///
-    /// # Errors
-    /// A mistake in `rows/table-iii.toml`.
     pub fn read() -> Result<Self, toml::de::Error> {
         toml::from_str(include_str!("../../rows/table-iii.toml"))
     }
@@ -69,33 +48,21 @@ impl Rows {
         self.row.iter().find(|row| row.name == name)
     }
 
-    /// The rows of a table, in their order.
-    pub fn of(&self, table: Table) -> impl Iterator<Item = &Row> {
-        self.row
-            .iter()
-            .filter(move |row| match (self.paper(row), table) {
-                (Some(paper), Table::Times) => !paper.laptop_hz.is_empty(),
-                (Some(paper), Table::Accuracy) => !paper.translation_percent.is_empty(),
-                (None, Table::Times) => true,
-                (None, Table::Accuracy) => !row.mask_alone,
-            })
+    /// The rows of Table IIIa.
+    pub fn timed(&self) -> impl Iterator<Item = &Row> {
+        self.row.iter().filter(|row| row.is_measured())
     }
 
-    /// The paper's two figures beside a row in a table, for rasters of `n` cells a side.
-    pub fn figures(&self, row: &Row, table: Table, n: usize) -> [Option<f64>; 2] {
-        let paper = |paper: &Paper| {
-            let size = [127, 255, 511].iter().position(|size| *size == n)?;
-            let figures = match table {
-                Table::Times => [&paper.laptop_hz, &paper.jetson_hz],
-                Table::Accuracy => [&paper.translation_percent, &paper.rotation_deg_per_km],
-            };
-            Some(figures.map(|figures| figures.get(size).copied()))
-        };
-        self.paper(row).and_then(paper).unwrap_or_default()
+    /// The rows of Table IIIb.
+    pub fn run(&self) -> impl Iterator<Item = &Row> {
+        self.row.iter().filter(|row| !row.mask_alone)
     }
 
-    fn paper(&self, row: &Row) -> Option<&Paper> {
-        self.paper.get(row.paper.as_ref()?)
+    /// The paper's figures beside a row, for rasters of `n` cells a side.
+    pub fn paper(&self, row: &Row, n: usize) -> Record {
+        let paper = row.paper.as_ref().and_then(|row| self.paper.get(row));
+        let figures = paper.and_then(|sizes| sizes.get(&n.to_string()));
+        figures.cloned().unwrap_or_default()
     }
 }
 
@@ -110,13 +77,11 @@ impl Row {
         self.paper.is_some()
     }
 
-    /// Returns its overrides `section.key=value`, masked by this network if there is one.
-    pub fn changes(&self, rows: &Rows, model: Option<&Model>) -> Vec<String> {
+    /// Returns its overrides `section.key=value`, but for those of its network.
+    pub fn changes(&self, rows: &Rows) -> Vec<String> {
         let groups = self.groups.iter().flatten();
         let shared = groups.filter_map(|group| rows.groups.get(group)).flatten();
-        let own = shared.chain(&self.set).cloned();
-        own.chain(model.into_iter().flat_map(Model::changes))
-            .collect()
+        shared.chain(&self.set).cloned().collect()
     }
 }
 
@@ -126,9 +91,10 @@ mod tests {
     use std::{collections::BTreeSet, path::Path};
 
     use gyre::configuration::Configuration;
+    use serde_json::{Value, json};
 
     use super::*;
-    use crate::report::folder;
+    use crate::sequence::folder;
 
     fn with(file: &str, changes: &[String]) -> Configuration {
         let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
@@ -140,14 +106,11 @@ mod tests {
         let rows = Rows::read().unwrap();
         for (name, file) in [("raw", "mbym.toml"), ("f-raw, line 14", "fast-mbym.toml")] {
             let of_file = with(file, &[]);
-            let mut radiate = with(
-                "radiate.toml",
-                &rows.named(name).unwrap().changes(&rows, None),
-            );
+            let mut radiate = with("radiate.toml", &rows.named(name).unwrap().changes(&rows));
             radiate.dataset = of_file.dataset;
             assert_eq!(radiate, of_file, "{name}");
         }
-        assert!(rows.named("Gyre").unwrap().changes(&rows, None).is_empty());
+        assert!(rows.named("Gyre").unwrap().changes(&rows).is_empty());
     }
 
     #[test]
@@ -159,18 +122,18 @@ mod tests {
             ("Gyre", "Gyre, masked"),
         ] {
             let [plain, masked] = [plain, masked].map(|name| rows.named(name).unwrap());
-            let mut found = with("radiate.toml", &masked.changes(&rows, None));
+            let mut found = with("radiate.toml", &masked.changes(&rows));
             found.odometry.masking.threshold = with("radiate.toml", &[]).odometry.masking.threshold;
             assert_eq!(
                 found,
-                with("radiate.toml", &plain.changes(&rows, None)),
+                with("radiate.toml", &plain.changes(&rows)),
                 "{}",
                 masked.name
             );
             assert!(plain.mask.is_empty() && !masked.mask.is_empty());
         }
         // With a mask the floor is the threshold.
-        let mbym = rows.named("mbym").unwrap().changes(&rows, None);
+        let mbym = rows.named("mbym").unwrap().changes(&rows);
         assert!(mbym.contains(&"masking.threshold=0".to_owned()));
     }
 
@@ -198,34 +161,28 @@ mod tests {
     #[test]
     fn each_table_has_its_rows_with_the_papers_figures_at_three_sizes() {
         let rows = Rows::read().unwrap();
-        let names = |table| {
-            rows.of(table)
-                .map(|row| row.name.as_str())
-                .collect::<Vec<_>>()
-        };
+        let names =
+            |rows: Vec<&Row>| -> Vec<String> { rows.iter().map(|row| row.name.clone()).collect() };
+        let (timed, run) = (names(rows.timed().collect()), names(rows.run().collect()));
         let common = ["raw", "f-raw, line 14", "f-raw, Eq. 7"];
-        assert_eq!(names(Table::Times)[1..4], common);
         assert_eq!(
-            names(Table::Times)[4..7],
-            ["mbym", "f-mbym, Eq. 7", "mask, default"]
+            (timed[0].as_str(), &timed[1..4]),
+            ("mask", &common.map(str::to_owned)[..])
         );
-        let accuracy = names(Table::Accuracy);
-        assert_eq!((&accuracy[..3], accuracy[3]), (&common[..], "mbym (2019)"));
-        assert!(
-            accuracy.iter().all(|name| !name.starts_with("mask")),
-            "{accuracy:?}"
-        );
-        let f_mbym = rows.named("f-mbym, Eq. 7").unwrap();
+        assert_eq!(timed[4..7], ["mbym", "f-mbym, Eq. 7", "mask, default"]);
         assert_eq!(
-            rows.figures(f_mbym, Table::Times, 255),
-            [Some(20.6), Some(6.6)]
+            (&run[..3], run[3].as_str()),
+            (&common.map(str::to_owned)[..], "mbym (2019)")
         );
-        assert_eq!(
-            rows.figures(f_mbym, Table::Accuracy, 255),
-            [Some(2.01), Some(6.3)]
-        );
-        let raw = rows.named("raw").unwrap();
-        assert_eq!(rows.figures(raw, Table::Times, 511), [Some(0.8), None]);
-        assert_eq!(rows.figures(raw, Table::Times, 256), [None; 2]);
+        assert!(run.iter().all(|name| !name.starts_with("mask")), "{run:?}");
+        let paper = |row, n| Value::from(rows.paper(rows.named(row).unwrap(), n));
+        let f_mbym = json!({
+            "paper_laptop_hz": 20.6, "paper_jetson_hz": 6.6, "paper_percent": 2.01, "paper_deg_per_km": 6.3
+        });
+        assert_eq!(paper("f-mbym, Eq. 7", 255), f_mbym);
+        let raw =
+            json!({ "paper_laptop_hz": 0.8, "paper_percent": 5.13, "paper_deg_per_km": 17.39 });
+        assert_eq!(paper("raw", 511), raw);
+        assert_eq!(paper("raw", 256), json!({}));
     }
 }

@@ -1,101 +1,113 @@
 //! Distances between recordings.
 
 use super::*;
-use crate::realism::{
-    change::Change,
-    comparison::compare,
-    recording::{Measured, Recording},
+use crate::{
+    realism::{comparison::compare, subject::Measured},
+    report::{Record, record},
 };
-use crate::sequence::Figures;
+use serde_json::json;
 
 /// A recording of noise with a wall, brighter by `gain`, whose searches are `errors` off.
-fn recording(seed: u64, gain: u8, errors: f64) -> Recording {
+fn recording(seed: u64, gain: u8, errors: f64) -> Statistics {
     let noise = noise(seed, 40);
     let wall = |azimuth: usize, bin: usize| (100..104).contains(&bin) && azimuth.is_multiple_of(3);
     let one = scan(AZIMUTHS, BINS, 0, |azimuth, bin| {
         noise[azimuth * BINS + bin] + gain + if wall(azimuth, bin) { 60 } else { 0 }
     });
-    let change = Change {
-        pairs: 9,
-        correlation: 1.0 - errors,
-        unmatched_share: errors,
-    };
-    let errors = Figures::from([
-        ("rpe/translation_rmse_m", errors),
-        ("rpe/rotation_rmse_deg", 2.0 * errors),
-    ]);
     let mut statistics = measured([&one]);
-    statistics.change = Some(change);
-    Recording {
-        name: format!("number {seed}"),
-        statistics,
-        plain: errors.clone(),
-        refined: errors,
-        aligned_by_truth: 0,
-        aligned_by_odometry: 0,
+    statistics.figures.extend(record(json!({
+        "next_correlation": 1.0 - errors,
+        "next_unmatched_share": errors,
+        "plain/rpe/translation_rmse_m": errors,
+        "plain/rpe/rotation_rmse_deg": 2.0 * errors,
+        "refined/rpe/translation_rmse_m": errors,
+        "refined/rpe/rotation_rmse_deg": 2.0 * errors,
+    })));
+    statistics
+}
+
+fn whole(whole: Statistics) -> Measured {
+    Measured {
+        whole,
+        halves: None,
     }
 }
 
-fn whole(recording: Recording) -> Measured {
-    Measured {
-        whole: recording,
-        halves: None,
-    }
+/// The rows of a comparison, and what it says at its end.
+fn compared(sim: &Measured, real: &Measured, other: Option<&Measured>) -> (Vec<Record>, String) {
+    let table = compare(sim, real, other).unwrap();
+    (table.rows, table.legend)
+}
+
+fn row<'r>(rows: &'r [Record], statistic: &str) -> &'r Record {
+    rows.iter()
+        .find(|row| row["statistic"] == statistic)
+        .unwrap()
 }
 
 #[test]
 fn a_recording_is_at_no_distance_from_itself() {
     let (one, other) = (whole(recording(1, 0, 0.1)), whole(recording(2, 30, 0.3)));
-    let comparison = compare(&one, &one, Some(&other));
-    for row in &comparison.rows {
-        let known = row.values[0].is_some();
-        assert_eq!(row.sim_real, known.then_some(0.0), "{}", row.statistic);
+    let (rows, verdict) = compared(&one, &one, Some(&other));
+    let mut known = 0;
+    for row in &rows {
+        match row["sim"].is_null() {
+            true => assert!(
+                row["sim_real"].is_null() && row["closer"].is_null(),
+                "{row:?}"
+            ),
+            false => {
+                assert_eq!(
+                    (&row["sim_real"], &row["closer"]),
+                    (&json!(0.0), &json!(true))
+                );
+                known += 1;
+            }
+        }
     }
-    assert_eq!(
-        comparison.judged,
-        comparison
-            .rows
-            .iter()
-            .filter(|row| row.values[0].is_some())
-            .count()
-    );
-    let not_closer: Vec<&str> = comparison
-        .rows
-        .iter()
-        .filter(|row| row.closer == Some(false))
-        .map(|row| row.statistic)
-        .collect();
-    assert!(not_closer.is_empty(), "{not_closer:?}");
+    assert_eq!(known, 12);
+    assert_eq!(verdict.trim(), "closer in 12 of 12");
 }
 
 #[test]
 fn distances_have_the_units_that_they_name() {
     let (one, other) = (recording(1, 0, 0.1), recording(1, 30, 0.2));
-    let comparison = compare(&whole(one), &whole(other), None);
-    let distance = |name: &str| {
-        comparison
-            .rows
-            .iter()
-            .find(|row| row.statistic == name)
-            .unwrap()
-            .sim_real
-            .unwrap()
-    };
-    let close = |name: &str, expected: f64| {
+    let (rows, verdict) = compared(&whole(one), &whole(other), None);
+    let close = |statistic: &str, kind: &str, expected: f64| {
+        let row = row(&rows, statistic);
+        let distance = row["sim_real"].as_f64().unwrap();
         assert!(
-            (distance(name) - expected).abs() < 1e-4,
-            "{name}: {}, not {expected}",
-            distance(name)
+            (distance - expected).abs() < 1e-4,
+            "{statistic}: {distance}, not {expected}"
         );
+        assert_eq!(row["distance"], kind);
     };
-    close("histogram of power", 30.0);
-    close("mean power against range", 30.0);
-    close("correlation length in range", 0.0);
-    close("next scan: correlation", 0.1);
-    close("next scan: returns without counterpart", 2f64.ln());
-    close("plain search: translation of a motion", 2f64.ln());
-    close("refined search: rotation of a motion", 2f64.ln());
-    assert_eq!((comparison.judged, comparison.closer), (0, 0));
+    close("histogram of power", "Wasserstein, counts", 30.0);
+    close("mean power against range", "RMS, counts", 30.0);
+    close("correlation length in range", "abs. log ratio", 0.0);
+    close("next scan: correlation", "abs. difference", 0.1);
+    for statistic in [
+        "next scan: returns without counterpart",
+        "plain search: translation of a motion",
+        "refined search: rotation of a motion",
+    ] {
+        close(statistic, "abs. log ratio", 2f64.ln());
+    }
+    assert_eq!(verdict, "");
+}
+
+#[test]
+fn figures_are_shown_with_their_units() {
+    let one = recording(1, 0, 0.1);
+    let (rows, _) = compared(&whole(one.clone()), &whole(one), None);
+    let shown = |statistic: &str| row(&rows, statistic)["sim"].as_str().unwrap().to_owned();
+    assert_eq!(shown("next scan: correlation"), "0.900");
+    assert_eq!(shown("next scan: returns without counterpart"), "10.00 %");
+    assert_eq!(shown("plain search: translation of a motion"), "0.100 m");
+    assert_eq!(shown("refined search: rotation of a motion"), "0.200 deg");
+    assert!(shown("share of saturated bins").ends_with(" %"));
+    assert!(shown("histogram of power").starts_with("50 %: 2"));
+    assert!(shown("mean power against range").starts_with("10 m: 2"));
 }
 
 #[test]
@@ -105,38 +117,42 @@ fn the_nearer_recording_is_closer_and_what_is_not_known_is_not_judged() {
         recording(2, 2, 0.11),
         recording(3, 40, 0.5),
     );
-    near.plain.clear();
+    near.figures.remove("plain/rpe/translation_rmse_m");
     let halves = Some([recording(1, 0, 0.1), recording(1, 1, 0.2)]);
     let real = Measured {
         whole: real,
         halves,
     };
-    let comparison = compare(&whole(near), &real, Some(&whole(far)));
-    let row = |name: &str| {
-        comparison
-            .rows
-            .iter()
-            .find(|row| row.statistic == name)
-            .unwrap()
+    let (rows, _) = compared(&whole(near), &real, Some(&whole(far)));
+    let histogram = row(&rows, "histogram of power");
+    assert_eq!(histogram["closer"], true);
+    let within = histogram["within_real"].as_f64().unwrap();
+    assert!((within - 1.0).abs() < 1e-9, "{within}");
+    assert!(histogram["within_other"].is_null());
+    let refined = row(&rows, "refined search: translation of a motion");
+    assert_eq!(refined["closer"], true);
+    let plain = row(&rows, "plain search: translation of a motion");
+    for key in ["closer", "sim_real", "sim", "verdict"] {
+        assert!(plain[key].is_null(), "{key}");
+    }
+    assert!(plain["real_other"].is_number());
+}
+
+#[test]
+fn farther_than_another_but_not_than_halves_of_one_is_chance() {
+    let real = Measured {
+        whole: recording(1, 0, 0.1),
+        halves: Some([recording(1, 0, 0.1), recording(1, 20, 0.1)]),
     };
-    assert_eq!(row("histogram of power").closer, Some(true));
-    let within = row("histogram of power").within_real.unwrap();
-    assert!(
-        (within - 1.0).abs() < 1e-9 && row("histogram of power").within_other.is_none(),
-        "{within}"
-    );
-    assert!(
-        !row("histogram of power").is_within_chance()
-            && row("next scan: correlation").is_within_chance()
-    );
-    assert_eq!(
-        row("refined search: translation of a motion").closer,
-        Some(true)
-    );
-    let plain = row("plain search: translation of a motion");
-    assert_eq!(
-        (plain.closer, plain.sim_real, &plain.values[0]),
-        (None, None, &None)
-    );
-    assert!(plain.real_other.is_some());
+    let verdict = |gain: u8| {
+        let (rows, _) = compared(
+            &whole(recording(1, gain, 0.1)),
+            &real,
+            Some(&whole(recording(1, 5, 0.1))),
+        );
+        row(&rows, "histogram of power")["verdict"].clone()
+    };
+    assert_eq!(verdict(4), "closer");
+    assert_eq!(verdict(19), "farther, within chance");
+    assert_eq!(verdict(21), "farther");
 }

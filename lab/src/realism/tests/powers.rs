@@ -1,28 +1,25 @@
-//! Histograms, the common grid, powers by range, saturation, streaks.
+//! Histograms, the common grid, powers by range, saturation.
 
 use super::*;
-use crate::realism::{grid::Resampler, histogram::Histogram};
 use proptest::prelude::*;
 
 fn histogram(powers: &[u8]) -> Histogram {
     let mut histogram = Histogram::default();
-    histogram.add(powers);
+    histogram.add(&scan(1, powers.len(), 0, |_, bin| powers[bin]).view());
     histogram
 }
 
 #[test]
-fn a_histogram_knows_its_mean_percentiles_and_share_above() {
+fn a_histogram_knows_its_percentiles_share_above_and_highest_power() {
     let known = histogram(&[0, 0, 10, 20, 60, 61, 100, 200, 200, 255]);
-    assert_eq!((known.total(), known.mean()), (10, 90.6));
+    assert_eq!((known.total(), known.highest()), (10, Some(255)));
+    assert_eq!(histogram(&[3, 0]).highest(), Some(3));
+    assert_eq!(Histogram::default().highest(), None);
     assert_eq!(
         [0.0, 0.2, 0.21, 0.5, 0.9, 1.0].map(|share| known.percentile(share)),
         [0, 0, 10, 60, 200, 255]
     );
     assert_eq!((known.share_above(60), known.share_above(255)), (0.5, 0.0));
-    assert_eq!(
-        known.levels().collect::<Vec<_>>(),
-        [0, 10, 20, 60, 61, 100, 200, 255]
-    );
 }
 
 proptest! {
@@ -54,11 +51,10 @@ proptest! {
     ) {
         let scan = scan(1, row.len(), 0, |_, bin| row[bin]);
         let grid = RangeGrid { resolution_m: (bins_a_cell * f64::from(RESOLUTION_M)) as f32, cells: 6 };
-        let mut resampler = Resampler::new(grid);
-        resampler.resample(&scan.view()).unwrap();
+        let resampled = resample(&scan.view(), grid).unwrap();
         // By small steps instead of sums.
         let bins_a_cell = f64::from(grid.resolution_m) / f64::from(RESOLUTION_M);
-        for (cell, power) in resampler.scan().row(0).iter().enumerate() {
+        for (cell, power) in resampled.view().row(0).iter().enumerate() {
             let at = |step: usize| (cell as f64 + (step as f64 + 0.5) / 10_000.0) * bins_a_cell;
             let direct = (0..10_000).map(|step| f64::from(row[at(step) as usize])).sum::<f64>() / 10_000.0;
             prop_assert!((f64::from(*power) - direct).abs() < 0.6, "cell {cell}: {power}, not {direct}");
@@ -89,12 +85,12 @@ fn the_common_grid_is_the_coarsest_over_the_shortest_range() {
 #[test]
 fn azimuths_and_times_survive_the_common_grid() {
     let drawn = scan(AZIMUTHS, BINS, 3, |_, bin| bin as u8);
-    let mut resampler = Resampler::new(RangeGrid {
+    let grid = RangeGrid {
         resolution_m: 2.0 * RESOLUTION_M,
         cells: BINS / 2,
-    });
-    resampler.resample(&drawn.view()).unwrap();
-    let resampled = resampler.scan();
+    };
+    let resampled = resample(&drawn.view(), grid).unwrap();
+    let resampled = resampled.view();
     assert!(resampled.check().is_ok());
     assert_eq!(
         (resampled.azimuth_rad, resampled.stamp_ns),
@@ -111,27 +107,16 @@ fn powers_are_known_range_by_range() {
         if azimuth < 40 { 100 } else { bin as u8 % 50 }
     });
     let statistics = measured([&one, &one]);
-    assert_eq!((statistics.scans, statistics.azimuths), (2, AZIMUTHS));
-    let at = |bin: usize| {
-        (
-            statistics.mean_power[bin],
-            statistics.floor[bin],
-            statistics.median_power[bin],
-            statistics.high_power[bin],
-        )
-    };
-    assert_eq!(at(0), (10.0, 0, 0, 100));
-    assert_eq!(at(149), (0.1 * 100.0 + 0.9 * 49.0, 49, 49, 100));
-    assert_eq!(statistics.share_above, 0.1);
-    // 9.45 to 10.45 m are bins 47 to 52: powers 47, 48, 49, 0, 1 and 2.
-    let around = statistics
-        .around(9.95, |cell| statistics.mean_power[cell])
-        .unwrap();
+    assert_eq!(statistics.figure("scans"), Some(2.0));
+    assert_eq!(statistics.mean_power[0], 10.0);
+    assert_eq!(statistics.mean_power[149], 0.1 * 100.0 + 0.9 * 49.0);
+    assert_eq!(statistics.figure("share_above"), Some(0.1));
+    // 9.5 to 10.5 m are bins 47 to 52: powers 47, 48, 49, 0, 1 and 2.
+    let around = statistics.figure("power_at_10_m").unwrap();
     assert!(
         (around - (10.0 + 0.9 * 147.0 / 6.0)).abs() < 1e-9,
         "{around}"
     );
-    assert_eq!(statistics.around(60.0, |_| 0.0), None);
 }
 
 #[test]
@@ -142,50 +127,13 @@ fn saturated_bins_are_those_that_pile_up_at_the_top() {
         (8..12, 0..25) => 156,
         _ => 20,
     });
-    assert_eq!(
-        measured([&one]).saturated_share,
-        200.0 / (AZIMUTHS * BINS) as f64
-    );
+    let share = 200.0 / (AZIMUTHS * BINS) as f64;
+    assert_eq!(measured([&one]).figure("saturated_share"), Some(share));
 }
 
 #[test]
-fn streaks_are_azimuths_with_a_lifted_floor() {
-    let noise = noise(5, 8);
-    let lifted = |azimuth: usize| [0, 399, 100, 101, 102, 200].contains(&azimuth);
-    let one = scan(AZIMUTHS, BINS, 0, |azimuth, bin| {
-        noise[azimuth * BINS + bin] + if lifted(azimuth) { 15 } else { 0 }
-    });
-    // A wall in half of the azimuths, which is no streak.
-    let wall = |azimuth: usize, bin: usize| azimuth < 200 && (150..180).contains(&bin);
-    let walled = scan(AZIMUTHS, BINS, 1, |azimuth, bin| {
-        let power = one.bytes[azimuth * BINS + bin];
-        if wall(azimuth, bin) { 120 } else { power }
-    });
-    for drawn in [&one, &walled] {
-        let streaks = measured([drawn]).streaks;
-        assert_eq!(
-            (streaks.share, streaks.groups_a_scan, streaks.mean_width),
-            (6.0 / 400.0, 3.0, 2.0)
-        );
-        assert!(
-            streaks.floor_percentiles[2] < 4 && streaks.floor_percentiles[5] > 14,
-            "{streaks:?}"
-        );
-    }
-}
-
-#[test]
-fn a_scan_that_contradicts_itself_counts_nothing() {
-    let (good, mut bad) = (
-        scan(AZIMUTHS, BINS, 0, |_, _| 7),
-        scan(AZIMUTHS, BINS, 1, |_, _| 9),
-    );
+fn a_scan_that_contradicts_itself_is_refused() {
+    let mut bad = scan(AZIMUTHS, BINS, 1, |_, _| 9);
     bad.geometry.stride = 10 * BINS;
-    let mut meter = Meter::new(CONFIG).unwrap();
-    meter.add(&good.view(), None).unwrap();
-    assert!(meter.add(&bad.view(), None).is_err());
-    meter.add(&good.view(), None).unwrap();
-    let statistics = meter.finish().unwrap();
-    assert_eq!(statistics.scans, 2);
-    assert!(Meter::new(CONFIG).unwrap().finish().is_none());
+    assert!(resample(&bad.view(), GRID).is_err());
 }

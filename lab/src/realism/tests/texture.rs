@@ -2,12 +2,22 @@
 
 use super::*;
 use crate::realism::{
-    change::{Change, ChangeMeter},
-    correlation::Curve,
+    change::{Change, change},
+    correlation::{in_azimuth, in_range, lag_at_half, mean_power},
 };
 use gyre_radar::OwnedScan;
 use nalgebra::{Isometry2, Point2, Vector2};
 use proptest::prelude::*;
+
+/// The autocorrelations of scans in range and in azimuth.
+fn correlations(scans: &[OwnedScan]) -> [Vec<f64>; 2] {
+    let samples: Vec<Sample> = scans.iter().map(|scan| sample(scan, None)).collect();
+    let means = mean_power(&samples, GRID);
+    [
+        in_range(&samples, &means, GRID),
+        in_azimuth(&samples, &means),
+    ]
+}
 
 /// Noise averaged over so many azimuths and bins.
 fn smoothed(seed: u64, azimuths: usize, bins: usize) -> OwnedScan {
@@ -27,14 +37,13 @@ fn smoothed(seed: u64, azimuths: usize, bins: usize) -> OwnedScan {
 fn noise_averaged_over_a_width_is_correlated_over_half_of_it() {
     // Autocorrelation of noise through a box of m: 1 - lag / m.
     for (azimuths, bins) in [(1, 8), (6, 1), (4, 10)] {
-        let statistics = measured([&smoothed(1, azimuths, bins)]);
-        let (range, azimuth) = (
-            &statistics.range_correlation,
-            &statistics.azimuth_correlation,
-        );
+        let one = smoothed(1, azimuths, bins);
+        let statistics = measured([&one]);
+        let [range, _] = correlations(&[one]);
         let expected_m = (0.5 * bins as f64).max(0.5) * f64::from(RESOLUTION_M);
         let expected_deg = (0.5 * azimuths as f64).max(0.5) * 0.9;
-        let (length_m, length_deg) = (range.length().unwrap(), azimuth.length().unwrap());
+        let [length_m, length_deg] = ["range_correlation_m", "azimuth_correlation_deg"]
+            .map(|key| statistics.figure(key).unwrap());
         assert!(
             (length_m / expected_m - 1.0).abs() < 0.05,
             "{length_m} m, not {expected_m}"
@@ -43,7 +52,7 @@ fn noise_averaged_over_a_width_is_correlated_over_half_of_it() {
             (length_deg / expected_deg - 1.0).abs() < 0.05,
             "{length_deg} deg, not {expected_deg}"
         );
-        for (lag, value) in range.values.iter().enumerate() {
+        for (lag, value) in range.iter().enumerate() {
             let expected = (1.0 - lag as f64 / bins as f64).max(0.0);
             assert!(
                 (value - expected).abs() < 0.05,
@@ -59,11 +68,10 @@ fn what_is_usual_at_a_range_correlates_nothing() {
     let one = scan(AZIMUTHS, BINS, 0, |azimuth, bin| {
         (240 - bin.min(200)) as u8 + noise[azimuth * BINS + bin]
     });
-    let statistics = measured([&one]);
-    assert!(statistics.range_correlation.values[1].abs() < 0.02);
-    assert!(statistics.azimuth_correlation.values[1].abs() < 0.02);
+    let [range, azimuth] = correlations(&[one]);
+    assert!(range[1].abs() < 0.02 && azimuth[1].abs() < 0.02);
     let the_same_everywhere = measured([&scan(AZIMUTHS, BINS, 0, |_, bin| bin as u8)]);
-    assert_eq!(the_same_everywhere.range_correlation.length(), None);
+    assert_eq!(the_same_everywhere.figure("range_correlation_m"), None);
 }
 
 proptest! {
@@ -71,7 +79,7 @@ proptest! {
     #[test]
     fn the_autocorrelation_is_the_direct_sum(seed in any::<u64>(), lag in 0..20usize) {
         let scans = [smoothed(seed, 2, 3), smoothed(seed ^ 1, 3, 2)];
-        let statistics = measured(&scans);
+        let [range, azimuth] = correlations(&scans);
         let mean = |bin: usize| {
             let of = |scan: &OwnedScan| (0..AZIMUTHS).map(|a| f64::from(scan.bytes[a * BINS + bin])).sum::<f64>();
             scans.iter().map(of).sum::<f64>() / (2 * AZIMUTHS) as f64
@@ -84,24 +92,17 @@ proptest! {
             products.sum::<f64>() / (2 * AZIMUTHS * (BINS - along)) as f64
         };
         let variance = average(0, 0);
-        prop_assert!((statistics.range_correlation.values[lag] - average(lag, 0) / variance).abs() < 1e-9);
-        prop_assert!((statistics.azimuth_correlation.values[lag] - average(0, lag) / variance).abs() < 1e-9);
+        prop_assert!((range[lag] - average(lag, 0) / variance).abs() < 1e-9);
+        prop_assert!((azimuth[lag] - average(0, lag) / variance).abs() < 1e-9);
     }
 }
 
 #[test]
 fn a_length_lies_between_the_lags_and_is_none_where_the_curve_stays_high() {
-    let length = |values: &[f64]| {
-        Curve {
-            step: 2.0,
-            values: values.to_vec(),
-        }
-        .length()
-    };
-    assert_eq!(length(&[1.0, 0.75, 0.25]), Some(3.0));
-    assert_eq!(length(&[1.0, 0.5]), Some(2.0));
-    assert_eq!(length(&[1.0, 0.9, 0.8]), None);
-    assert_eq!(length(&[]), None);
+    assert_eq!(lag_at_half(&[1.0, 0.75, 0.25]), Some(1.5));
+    assert_eq!(lag_at_half(&[1.0, 0.5]), Some(1.0));
+    assert_eq!(lag_at_half(&[1.0, 0.9, 0.8]), None);
+    assert_eq!(lag_at_half(&[]), None);
 }
 
 /// Posts that stand about, some 4 m apart.
@@ -115,17 +116,16 @@ fn town(seed: u64) -> Vec<Point2<f64>> {
 }
 
 /// What is found between two scans, the later one 0.25 s after the earlier.
-fn change(earlier: &OwnedScan, later: &OwnedScan, motion: &Isometry2<f64>) -> Change {
-    let mut meter = ChangeMeter::new(GRID.range_m(), 0.4, 60).unwrap();
-    meter.add(&earlier.view(), &later.view(), motion).unwrap();
-    meter.finish().unwrap()
+fn between(earlier: &OwnedScan, later: &OwnedScan, motion: &Isometry2<f64>) -> Change {
+    let samples = [sample(earlier, None), sample(later, Some(*motion))];
+    change(&samples, GRID.range_m(), 60).unwrap().unwrap()
 }
 
 #[test]
 fn the_same_scan_twice_has_not_changed() {
     let standing = |_: f64| Isometry2::identity();
     let (one, two) = (posts(&town(3), 0, standing), posts(&town(3), 1, standing));
-    let change = change(&one, &two, &Isometry2::identity());
+    let change = between(&one, &two, &Isometry2::identity());
     assert!(
         change.correlation > 1.0 - 1e-9 && change.unmatched_share == 0.0 && change.pairs == 1,
         "{change:?}"
@@ -136,7 +136,7 @@ fn the_same_scan_twice_has_not_changed() {
 fn two_different_scenes_have_nothing_in_common() {
     let standing = |_: f64| Isometry2::identity();
     let (one, two) = (posts(&town(3), 0, standing), posts(&town(4), 1, standing));
-    let change = change(&one, &two, &Isometry2::identity());
+    let change = between(&one, &two, &Isometry2::identity());
     assert!(
         change.correlation < 0.15 && change.unmatched_share > 0.6,
         "{change:?}"
@@ -153,14 +153,14 @@ fn a_drive_is_undone_by_its_motion_and_by_no_other() {
     };
     let one = posts(&town(3), 0, |t_s| drive.pose_at(t_s));
     let two = posts(&town(3), 1, |t_s| drive.pose_at(0.25 + t_s));
-    let right = change(&one, &two, &drive.pose_at(0.25));
+    let right = between(&one, &two, &drive.pose_at(0.25));
     assert!(
         right.correlation > 0.7 && right.unmatched_share < 0.05,
         "{right:?}"
     );
     let shifted = drive.pose_at(0.25) * Isometry2::new(Vector2::new(1.0, 0.0), 0.0);
     for wrong in [Isometry2::identity(), drive.pose_at(-0.25), shifted] {
-        let wrong = change(&one, &two, &wrong);
+        let wrong = between(&one, &two, &wrong);
         assert!(
             wrong.correlation < 0.4 && wrong.unmatched_share > 0.2,
             "{wrong:?}"
@@ -171,18 +171,18 @@ fn a_drive_is_undone_by_its_motion_and_by_no_other() {
 #[test]
 fn a_motion_that_no_sensor_makes_is_not_compared() {
     let standing = |_: f64| Isometry2::identity();
-    let mut meter = Meter::new(CONFIG).unwrap();
-    for index in 0..3 {
-        let motion = Isometry2::new(
-            Vector2::new(if index == 1 { f64::NAN } else { 0.0 }, 0.0),
-            0.0,
-        );
-        meter
-            .add(&posts(&town(3), index, standing).view(), Some(&motion))
-            .unwrap();
-    }
-    let statistics = meter.finish().unwrap();
-    assert_eq!((statistics.scans, statistics.change.unwrap().pairs), (3, 1));
+    let samples = [
+        (0, Some(0.0)),
+        (1, Some(f64::NAN)),
+        (2, Some(0.0)),
+        (3, None),
+    ];
+    let samples = samples.map(|(index, x)| {
+        let motion = x.map(|x| Isometry2::new(Vector2::new(x, 0.0), 0.0));
+        sample(&posts(&town(3), index, standing), motion)
+    });
+    let change = change(&samples, GRID.range_m(), 60).unwrap().unwrap();
+    assert_eq!(change.pairs, 1);
 }
 
 #[test]
@@ -197,7 +197,7 @@ fn a_post_that_is_gone_is_one_of_many_without_counterpart() {
         posts(&circle, 0, standing),
         posts(&circle[..15], 1, standing),
     );
-    let change = change(&all, &fewer, &Isometry2::identity());
+    let change = between(&all, &fewer, &Isometry2::identity());
     assert!(
         (change.unmatched_share - 5.0 / 35.0).abs() < 0.02,
         "{change:?}"
