@@ -6,6 +6,7 @@ mod common;
 
 mod bad_input;
 mod breaks;
+mod doctor;
 mod evaluate;
 mod full_disk;
 mod in_process;

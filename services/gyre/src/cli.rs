@@ -31,6 +31,8 @@ pub enum Command {
     },
     /// Print the messages of a running run. It changes neither a result nor a latency.
     Watch(WatchArguments),
+    /// Report what this machine lacks for a run.
+    Doctor(DoctorArguments),
     /// Report what a dataset contains, and what looks wrong with it.
     Inspect(InspectArguments),
     /// Evaluate a trajectory against ground truth.
@@ -90,6 +92,14 @@ pub enum Topic {
     Refined,
     /// Poses.
     Pose,
+}
+
+/// The arguments of `gyre doctor`.
+#[derive(Debug, Args)]
+pub struct DoctorArguments {
+    /// The folder of the results of the run to come.
+    #[arg(long, default_value = "out")]
+    pub out: PathBuf,
 }
 
 /// The arguments of `gyre inspect`.

@@ -4,6 +4,7 @@
 
 pub mod cli;
 pub mod configuration;
+pub mod doctor;
 pub mod earlier;
 pub mod evaluate;
 pub mod identity;
@@ -52,6 +53,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
             gyre_stage::run::keep_files_private();
             watch::watch(&arguments)
         }
+        Command::Doctor(arguments) => doctor::doctor(&arguments),
         Command::Inspect(arguments) => inspect::inspect(&arguments),
         Command::Evaluate(arguments) => evaluate::evaluate(&arguments),
         Command::Masks(arguments) => masks::masks(&arguments),

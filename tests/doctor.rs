@@ -1,0 +1,87 @@
+//! `gyre doctor` says what a machine lacks.
+
+use std::process::Command;
+
+use crate::common::{Ended, folder, gyre};
+
+/// Runs it under a limit of the shell.
+fn with_limit(limit: &str) -> Ended {
+    let mut command = Command::new("sh");
+    let script = format!("ulimit {limit}; exec '{}' doctor", crate::PROGRAM);
+    command.args(["-c", &script]);
+    Ended::of(command)
+}
+
+#[test]
+fn a_machine_that_runs_these_tests_lacks_nothing_that_a_run_needs() {
+    let folder = folder();
+    let mut command = gyre();
+    command
+        .arg("doctor")
+        .arg("--out")
+        .arg(folder.path().join("a/b"));
+    let ended = Ended::of(command);
+    assert!(ended.succeeded().stdout.contains("a run works here"));
+    for subject in [
+        "shared memory",
+        "memory",
+        "open files",
+        "clock",
+        "results",
+        "ONNX Runtime",
+    ] {
+        let says = |line: &&str| line.split_at(6).1.starts_with(subject);
+        let lines = ended.stdout.lines().filter(|line| line.len() > 6);
+        assert_eq!(lines.filter(says).count(), 1, "{subject}: {}", ended.stdout);
+    }
+    assert!(!ended.stdout.contains("FAILS"), "{}", ended.stdout);
+}
+
+#[test]
+fn what_a_run_lacks_is_told_with_its_remedy() {
+    let ended = with_limit("-n 60");
+    assert_eq!(ended.code(), Some(1), "{}", ended.stderr);
+    let mut lines = ended.stdout.lines();
+    assert!(
+        lines.any(|line| line.starts_with("FAILS open files")),
+        "{}",
+        ended.stdout
+    );
+    assert!(
+        lines
+            .next()
+            .is_some_and(|remedy| remedy.contains("ulimit -n 1024"))
+    );
+    assert!(
+        ended
+            .stdout
+            .contains("no run works here while this fails: 1")
+    );
+}
+
+#[test]
+fn a_folder_for_results_that_cannot_be_written_to_is_told() {
+    let mut command = gyre();
+    command.args(["doctor", "--out", "/proc/results"]);
+    let ended = Ended::of(command);
+    assert_eq!(ended.code(), Some(1), "{}", ended.stderr);
+    assert!(ended.stdout.contains("FAILS results"), "{}", ended.stdout);
+}
+
+#[test]
+fn without_onnx_runtime_a_run_works_but_has_no_learned_masks() {
+    let mut command = gyre();
+    command
+        .arg("doctor")
+        .env("ORT_DYLIB_PATH", "/no/such/folder");
+    let ended = Ended::of(command);
+    let stdout = &ended.succeeded().stdout;
+    assert!(
+        stdout.contains("note  ONNX Runtime   none: no learned masks"),
+        "{stdout}"
+    );
+    assert!(
+        stdout.contains("ORT_DYLIB_PATH is /no/such/folder"),
+        "{stdout}"
+    );
+}
