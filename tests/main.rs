@@ -25,6 +25,7 @@ mod restart;
 mod results;
 mod shared_memory;
 mod simulation;
+mod supervisor;
 
 /// The program under test.
 const PROGRAM: &str = env!("CARGO_BIN_EXE_gyre");

@@ -40,6 +40,16 @@ pub fn stages_of(supervisor: Pid) -> BTreeMap<String, Pid> {
         .collect()
 }
 
+/// The guardian among a supervisor's children.
+pub fn guardian_of(supervisor: Pid) -> Option<Pid> {
+    let is_guardian = |pid: &Pid| {
+        let line = fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
+        parent_and_state(*pid).is_some_and(|(parent, state)| parent == supervisor && state != 'Z')
+            && line.ends_with(b"\0guard\0")
+    };
+    pids().find(is_guardian)
+}
+
 /// Processes of the run at `root`, by what their environment says.
 pub fn of_run(root: &Path) -> Vec<Pid> {
     let mark = format!("GYRE_RUN={}", root.display());

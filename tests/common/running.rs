@@ -64,6 +64,13 @@ impl Running {
         })
     }
 
+    /// Waits until there is a guardian other than `not`.
+    pub fn await_guardian(&mut self, not: Option<Pid>) -> Pid {
+        self.until("a guardian", |running| {
+            processes::guardian_of(running.pid()).filter(|pid| Some(*pid) != not)
+        })
+    }
+
     /// Waits until so many poses are journalled.
     pub fn await_poses(&mut self, poses: usize) -> &mut Self {
         self.until("poses", |running| (running.poses() >= poses).then_some(()));

@@ -33,6 +33,9 @@ pub enum Command {
     Watch(WatchArguments),
     /// Report what this machine lacks for a run.
     Doctor(DoctorArguments),
+    /// End what stages have started when `gyre run` has ended (what `gyre run` starts).
+    #[command(hide = true)]
+    Guard,
     /// Report what a dataset contains, and what looks wrong with it.
     Inspect(InspectArguments),
     /// Evaluate a trajectory against ground truth.

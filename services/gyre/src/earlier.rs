@@ -12,7 +12,7 @@ use crate::{Failure, configuration::Configuration, identity::Identity, out::Out,
 /// Says that the journal has its end and that all results have been written from it: the next run starts anew.
 const COMPLETE: &str = "journal/complete";
 const CONFIGURATION: &str = "config.toml";
-const LOG: &str = "log.jsonl";
+const LOGS: [&str; 2] = ["log.jsonl", "log.jsonl.old"];
 
 /// What an earlier run left.
 #[derive(Debug)]
@@ -70,7 +70,7 @@ pub fn begin(out: &Out, identity: &Identity, resolved: &str) -> Result<(), Failu
     // A new run may not write all of them: none of the earlier ones must be taken for its own.
     let results = results::FILES
         .iter()
-        .chain([&LOG])
+        .chain(&LOGS)
         .map(|name| out.join(name));
     state
         .into_iter()

@@ -45,6 +45,10 @@ pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     match command {
         Command::Stage { name } => Ok(stage::run(&name)),
+        Command::Guard => {
+            gyre_stage::supervise::guard(std::io::stdin().lock());
+            Ok(ExitCode::SUCCESS)
+        }
         Command::Run(arguments) => {
             gyre_stage::run::keep_files_private();
             run::run(&arguments)

@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Footprint, PoseHeader};
+use gyre_messages::{Footprint, Item, PoseHeader};
 use gyre_stage::{clock, supervise::Event};
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -19,8 +19,6 @@ pub struct Progress {
     bar: Option<ProgressBar>,
     scans: usize,
     done: u64,
-    dropped: u64,
-    last_published: Option<u64>,
     since: Option<(Instant, u64)>,
     last_line: Instant,
 }
@@ -37,8 +35,6 @@ impl Progress {
             bar,
             scans,
             done: resumed as u64,
-            dropped: 0,
-            last_published: None,
             since: None,
             last_line: Instant::now(),
         };
@@ -75,25 +71,10 @@ impl Progress {
     }
 
     fn pose(&mut self, pose: &PoseHeader) {
-        let published = pose.item.published;
-        let gap = self
-            .last_published
-            .map_or(published, |last| published.saturating_sub(last + 1));
-        if self.done == 0 || self.last_published.is_some() {
-            self.dropped += gap;
-        }
-        self.last_published = Some(published);
-        self.done = pose.item.seq.saturating_add(1);
-        let (since, first) = *self.since.get_or_insert((Instant::now(), self.done));
-        let rate = (self.done - first) as f64 / since.elapsed().as_secs_f64().max(1e-9);
-        let lag_ms = clock::now_ns().saturating_sub(pose.item.due_ns) as f64 * 1e-6;
-        let message = format!(
-            "{rate:.1} scans/s  lag {lag_ms:.0} ms  dropped {}",
-            self.dropped
-        );
+        let message = self.message(&pose.item);
         match &self.bar {
             Some(bar) => {
-                bar.set_position(self.done + self.dropped);
+                bar.set_position(self.done.saturating_add(pose.item.dropped()));
                 bar.set_message(message);
             }
             None if self.last_line.elapsed() >= EVERY => {
@@ -107,10 +88,58 @@ impl Progress {
         }
     }
 
+    /// Counts by the numbers of this pose alone: when poses come fast, not all of them are seen here.
+    fn message(&mut self, pose: &Item) -> String {
+        self.done = pose.seq.saturating_add(1);
+        let (since, first) = *self.since.get_or_insert((Instant::now(), self.done));
+        let done = self.done.saturating_sub(first) as f64;
+        let rate = done / since.elapsed().as_secs_f64().max(1e-9);
+        let lag_ms = clock::now_ns().saturating_sub(pose.due_ns) as f64 * 1e-6;
+        let dropped = pose.dropped();
+        format!("{rate:.1} scans/s  lag {lag_ms:.0} ms  dropped {dropped}")
+    }
+
     fn say(&self, line: &str) {
         match &self.bar {
             Some(bar) => bar.println(line),
             None => print::note(line),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gyre_messages::{Limits, Window};
+
+    use super::*;
+
+    fn progress() -> Progress {
+        let window = Window {
+            scans: 1,
+            lag: 0,
+            look_back: 1,
+            live_depth: 0,
+            observers: 0,
+        };
+        let limits = Limits {
+            scan_bytes: 1,
+            raster_cells: 1,
+            rasters: 1,
+            points: 0,
+        };
+        Progress::new(100, 0, &Footprint::new(&window, &limits))
+    }
+
+    #[test]
+    fn poses_that_were_not_seen_are_no_dropped_scans() {
+        let mut progress = progress();
+        let pose = |seq, published| Item {
+            seq,
+            published,
+            ..Item::default()
+        };
+        assert!(progress.message(&pose(0, 0)).ends_with("dropped 0"));
+        assert!(progress.message(&pose(7, 7)).ends_with("dropped 0"));
+        assert!(progress.message(&pose(9, 12)).ends_with("dropped 3"));
     }
 }

@@ -84,9 +84,11 @@ fn play(
     };
     preflight::check_shared_memory(&checked.footprint)?;
     prepare(configuration, &out, &checked, unfinished.as_ref())?;
+    let gyre = env::current_exe()?;
     let plan = Plan {
         manifest: manifest(configuration, &out, &checked, &root),
-        stages: configuration.stage_plans(&env::current_exe()?),
+        stages: configuration.stage_plans(&gyre),
+        guardian: vec![gyre.to_string_lossy().into_owned(), "guard".to_owned()],
         stall_timeout: limit(configuration.run.stall_timeout_s),
         start_timeout: limit(configuration.run.start_timeout_s),
     };

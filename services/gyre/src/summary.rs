@@ -115,7 +115,7 @@ impl Counts {
         Self {
             published,
             processed,
-            dropped: published.saturating_sub(processed),
+            dropped: end.or(last).map_or(0, |newest| newest.item.dropped()),
             unreadable: seen.saturating_sub(published),
             missing: missing(poses),
             breaks: starts.saturating_sub(1),

@@ -118,6 +118,11 @@ impl Item {
         self.flags & flags == flags
     }
 
+    /// Returns the number of scans that were published before this item and are not in its chain: what live mode dropped.
+    pub fn dropped(&self) -> u64 {
+        self.published.saturating_sub(self.seq)
+    }
+
     /// Returns the time stamps of a stage, to fill in.
     pub fn hop_mut(&mut self, stage: StageId) -> &mut Hop {
         &mut self.hops[stage as usize]

@@ -137,7 +137,7 @@ fn leave_last_words(stage: &str, sentence: &str) {
 /// Starts logging to `log.jsonl`, to which all processes append one line per event. While the returned span lives, each line
 /// carries the name of the stage.
 fn start_log(manifest: &Manifest, name: &str) -> Result<EnteredSpan, StageError> {
-    let path = manifest.out.join("log.jsonl");
+    let path = manifest.events();
     let file = OpenOptions::new()
         .append(true)
         .create(true)

@@ -61,6 +61,11 @@ impl Manifest {
         serde_json::from_str(&text).map_err(|error| failed(error.to_string()))
     }
 
+    /// Returns the log to which all processes append their events.
+    pub(crate) fn events(&self) -> PathBuf {
+        self.out.join("log.jsonl")
+    }
+
     pub(crate) fn path(root: &Path) -> PathBuf {
         root.join("manifest.json")
     }

@@ -5,9 +5,11 @@
 
 mod child;
 mod clean;
+mod guardian;
 mod log;
 mod observers;
 mod plan;
+mod start;
 mod watchdog;
 
 use std::{
@@ -27,9 +29,11 @@ use crate::{
     wake::{self, Signals},
 };
 use child::Child;
+use guardian::Guardian;
 use watchdog::{Starting, Watchdog};
 
 pub use child::Death;
+pub use guardian::guard;
 pub use plan::{Ending, Event, Plan, Report, RestartPolicy, StagePlan, Stall, SuperviseError};
 
 /// Time for stages to exit by themselves before they are killed.
@@ -63,6 +67,8 @@ struct Supervisor<'a> {
     plan: &'a Plan,
     observe: &'a mut dyn FnMut(Event<'_>),
     children: Vec<Child>,
+    /// Outlives the stages, which it cares for.
+    guardian: Guardian,
     newest_pose: Option<u64>,
     watchdog: Watchdog,
     restarts: BTreeMap<String, usize>,
@@ -70,6 +76,7 @@ struct Supervisor<'a> {
     recovering: Vec<Recovering>,
     recovery: Vec<Duration>,
     observers: observers::Sweep,
+    logs: log::Logs,
     // Dropped in this order: ports, services, node.
     poses: Port<Pose>,
     services: Services,
@@ -102,12 +109,14 @@ impl<'a> Supervisor<'a> {
             plan,
             observe,
             children: Vec::new(),
+            guardian: Guardian::start(&plan.guardian, manifest)?,
             newest_pose: None,
             watchdog: Watchdog::new(plan),
             restarts: BTreeMap::new(),
             recovering: Vec::new(),
             recovery: Vec::new(),
             observers: observers::Sweep::new(),
+            logs: log::Logs::of(plan),
             poses,
             services,
             _node: node,
@@ -118,7 +127,11 @@ impl<'a> Supervisor<'a> {
 
     fn start(&mut self) -> Result<(), SuperviseError> {
         for stage in &self.plan.stages {
-            let child = Child::spawn(stage, &self.plan.manifest)?;
+            let child = Child::spawn(
+                stage,
+                &self.plan.manifest,
+                &self.guardian.starter(&self.signals),
+            )?;
             (self.observe)(Event::Started {
                 stage: &stage.name,
                 pid: child.pid(),
@@ -139,6 +152,8 @@ impl<'a> Supervisor<'a> {
             if self.read_poses()? {
                 return Ok(Ending::Complete);
             }
+            self.logs.bound_if_due();
+            self.keep_guardian();
             let processes = self.children.len() + 1;
             self.observers
                 .run_if_due(&self.plan.manifest, &self.transport, processes);
@@ -150,6 +165,17 @@ impl<'a> Supervisor<'a> {
             } else if let Some(stall) = self.stall() {
                 self.recover_from_stall(stall)?;
             }
+        }
+    }
+
+    /// Replaces a guardian that somebody has killed. If there is no room for a process it is tried again at the next wake-up.
+    fn keep_guardian(&mut self) {
+        if self.guardian.has_ended()
+            && let Ok(guardian) = Guardian::start(&self.plan.guardian, &self.plan.manifest)
+        {
+            self.guardian = guardian;
+            let living = self.children.iter().map(Child::pid);
+            living.for_each(|group| self.guardian.remember(group));
         }
     }
 
@@ -224,14 +250,17 @@ impl<'a> Supervisor<'a> {
     }
 
     fn restart(&mut self, stages: &[usize], died_ns: i64) -> Result<(), SuperviseError> {
+        stages.iter().for_each(|i| self.children[*i].kill());
         for i in stages {
-            self.children[*i].kill();
+            self.children[*i].await_end()?;
+            self.guardian.forget(self.children[*i].pid());
         }
         let all_dead = stages.len() == self.children.len();
         clean::remove_dead(&self.plan.manifest, &self.transport, all_dead)?;
         for i in stages {
+            let starter = self.guardian.starter(&self.signals);
             let child = &mut self.children[*i];
-            child.respawn(&self.plan.manifest, self.newest_pose)?;
+            child.respawn(&self.plan.manifest, &starter, self.newest_pose)?;
             self.recovering.extend(child.stage().map(|hop| Recovering {
                 hop,
                 died_ns,
@@ -276,7 +305,12 @@ impl<'a> Supervisor<'a> {
         while Instant::now() < deadline && !self.children.iter_mut().all(Child::has_exited) {
             self.signals.wait(&[], None, wake::MAX_WAIT)?;
         }
-        self.children.iter_mut().for_each(Child::kill);
+        self.children.iter().for_each(Child::kill);
+        for child in &mut self.children {
+            child.await_end()?;
+            self.guardian.forget(child.pid());
+        }
+        self.logs.bound();
         Ok(())
     }
 }

@@ -2,24 +2,25 @@
 
 use std::{
     collections::VecDeque,
-    fs::{self, File},
-    io,
-    os::unix::process::{CommandExt, ExitStatusExt},
+    fs,
+    os::unix::process::ExitStatusExt,
     path::PathBuf,
-    process::{Command, ExitStatus, Stdio},
+    process::ExitStatus,
     time::{Duration, Instant},
 };
 
 use gyre_messages::StageId;
-use rustix::process::{
-    Pid, Signal, getpid, getppid, kill_process_group, set_parent_process_death_signal,
+use rustix::{
+    event::{PollFd, PollFlags, Timespec, poll},
+    io::Errno,
+    process::{Pid, PidfdFlags, Signal, kill_process_group, pidfd_open},
 };
 
-use super::{StagePlan, SuperviseError, log::Log};
-use crate::{
-    Manifest, StageError, launch,
-    run::{self, SHARED_MEMORY},
-};
+use super::{StagePlan, SuperviseError, log::Log, start::Starter};
+use crate::{Manifest, StageError, launch, run::SHARED_MEMORY};
+
+/// Time for a killed process to end. The kernel holds one that waits for a device, as for a network folder.
+const KILL_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// The death of a process.
 #[derive(Clone, Debug)]
@@ -39,6 +40,8 @@ pub(super) struct Child {
     process: std::process::Child,
     started: Instant,
     status: Option<ExitStatus>,
+    /// True if it did not end although it was killed.
+    is_held: bool,
     deaths: VecDeque<Instant>,
     /// The newest pose at the last restart.
     pose_at_restart: Option<Option<u64>>,
@@ -48,14 +51,19 @@ pub(super) struct Child {
 }
 
 impl Child {
-    pub(super) fn spawn(plan: &StagePlan, manifest: &Manifest) -> Result<Self, SuperviseError> {
+    pub(super) fn spawn(
+        plan: &StagePlan,
+        manifest: &Manifest,
+        starter: &Starter<'_>,
+    ) -> Result<Self, SuperviseError> {
         let log = Log::open(manifest, &plan.name)?;
-        let process = start(plan, manifest, log.file())?;
+        let process = starter.start(plan, manifest, log.file())?;
         Ok(Self {
             plan: plan.clone(),
             process,
             started: Instant::now(),
             status: None,
+            is_held: false,
             deaths: VecDeque::new(),
             pose_at_restart: None,
             last_words: manifest.root.join(launch::last_words(&plan.name)),
@@ -66,9 +74,10 @@ impl Child {
     pub(super) fn respawn(
         &mut self,
         manifest: &Manifest,
+        starter: &Starter<'_>,
         newest_pose: Option<u64>,
     ) -> Result<(), SuperviseError> {
-        self.process = start(&self.plan, manifest, self.log.file())?;
+        self.process = starter.start(&self.plan, manifest, self.log.file())?;
         self.started = Instant::now();
         self.status = None;
         self.pose_at_restart = Some(newest_pose);
@@ -171,10 +180,28 @@ impl Child {
         }
     }
 
-    pub(super) fn kill(&mut self) {
+    /// Kills the process without waiting for its end.
+    pub(super) fn kill(&self) {
         if self.status.is_none() {
             self.signal(Signal::KILL);
-            self.status = self.process.wait().ok();
+        }
+    }
+
+    /// Waits for the end of a killed process.
+    ///
+    /// # Errors
+    /// It does not end.
+    pub(super) fn await_end(&mut self) -> Result<(), SuperviseError> {
+        // What was waited for in vain once is not waited for again.
+        if !self.has_exited() && !self.is_held {
+            self.is_held = !ends_within(&self.process, KILL_TIMEOUT);
+        }
+        match self.has_exited() {
+            true => Ok(()),
+            false => Err(SuperviseError::Undying {
+                stage: self.name().to_owned(),
+                pid: self.pid(),
+            }),
         }
     }
 
@@ -199,41 +226,47 @@ impl Child {
 impl Drop for Child {
     fn drop(&mut self) {
         self.kill();
+        let _ = self.await_end();
     }
 }
 
-fn start(
-    plan: &StagePlan,
-    manifest: &Manifest,
-    log: &File,
-) -> Result<std::process::Child, SuperviseError> {
-    let failed = |source| SuperviseError::Spawn {
-        stage: plan.name.clone(),
-        command: plan.command.join(" "),
-        source,
+/// Waits until a child process has exited, at most for `limit`; returns whether it has. Its status is left to be read.
+pub(super) fn ends_within(process: &std::process::Child, limit: Duration) -> bool {
+    let pid = Pid::from_child(process);
+    let Ok(descriptor) = pidfd_open(pid, PidfdFlags::empty()) else {
+        // It has been waited for already.
+        return true;
     };
-    let (program, arguments) = plan
-        .command
-        .split_first()
-        .ok_or_else(|| failed(io::Error::new(io::ErrorKind::InvalidInput, "it is empty")))?;
-    let mut command = Command::new(program);
-    command
-        .args(arguments)
-        .env(run::ENVIRONMENT, &manifest.root)
-        .stdin(Stdio::null())
-        .stdout(log.try_clone().map_err(failed)?)
-        .stderr(log.try_clone().map_err(failed)?)
-        // A process group of its own: an interrupt from the terminal reaches only the supervisor, which then stops each stage.
-        .process_group(0);
-    let supervisor = getpid();
-    let die_with_the_supervisor = move || {
-        set_parent_process_death_signal(Some(Signal::KILL))?;
-        match getppid() == Some(supervisor) {
-            true => Ok(()),
-            false => Err(io::Error::other("the supervisor has died")),
+    let deadline = Instant::now() + limit;
+    loop {
+        let rest = deadline.saturating_duration_since(Instant::now());
+        let rest = Timespec {
+            tv_sec: rest.as_secs() as i64,
+            tv_nsec: i64::from(rest.subsec_nanos()),
+        };
+        let mut polled = [PollFd::new(&descriptor, PollFlags::IN)];
+        match poll(&mut polled, Some(&rest)) {
+            Err(Errno::INTR) => {}
+            ready => return ready.is_ok_and(|ready| ready > 0),
         }
-    };
-    // SAFETY: between fork and exec there are only two system calls; nothing is allocated unless the supervisor is dead.
-    unsafe { command.pre_exec(die_with_the_supervisor) };
-    command.spawn().map_err(failed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_process_that_does_not_die_is_waited_for_with_a_limit() {
+        let mut process = std::process::Command::new("sleep")
+            .arg("60")
+            .spawn()
+            .unwrap();
+        assert!(!ends_within(&process, Duration::from_millis(50)));
+        process.kill().unwrap();
+        assert!(ends_within(&process, Duration::from_secs(60)));
+        process.wait().unwrap();
+        assert!(ends_within(&process, Duration::from_secs(60)));
+    }
 }

@@ -58,15 +58,21 @@ pub(super) fn remove_dead_observers(
     })
 }
 
-fn within_limit(clean: impl FnOnce() -> bool + Send + 'static) -> Result<(), SuperviseError> {
+fn within_limit(clean: impl Fn() -> bool + Clone + Send + 'static) -> Result<(), SuperviseError> {
     let (done, finished) = mpsc::channel();
+    let cleaning = clean.clone();
     // On a thread of its own, since a cleanup that hangs cannot be cancelled.
-    thread::spawn(move || {
-        let _ = done.send(clean());
+    let thread = thread::Builder::new().spawn(move || {
+        let _ = done.send(cleaning());
     });
-    match finished.recv_timeout(LIMIT) {
-        Ok(true) => Ok(()),
-        Ok(false) | Err(_) => Err(SuperviseError::TransportStuck),
+    let cleaned = match thread {
+        Ok(_) => finished.recv_timeout(LIMIT).unwrap_or(false),
+        // The system has no room for a thread.
+        Err(_) => clean(),
+    };
+    match cleaned {
+        true => Ok(()),
+        false => Err(SuperviseError::TransportStuck),
     }
 }
 

@@ -16,6 +16,8 @@ pub struct Plan {
     pub manifest: Manifest,
     /// The processes, in the order of the stream.
     pub stages: Vec<StagePlan>,
+    /// Program and arguments of a process that calls [`guard`](super::guard) with its standard input.
+    pub guardian: Vec<String>,
     /// Time for which a published scan may lack its pose, or the source a scan that is due; `None`: no limit.
     pub stall_timeout: Option<Duration>,
     /// Time for a stage to open its topics; `None`: no limit.
@@ -152,6 +154,27 @@ pub enum SuperviseError {
         command: String,
         /// The system error.
         source: std::io::Error,
+    },
+    /// The guardian cannot be started.
+    #[error(
+        "cannot start `{command}`, which ends what the stages have started if the supervisor is killed: {source}"
+    )]
+    Guardian {
+        /// The command.
+        command: String,
+        /// The system error.
+        source: std::io::Error,
+    },
+    /// A process does not end.
+    #[error(
+        "{stage} (process {pid}) does not end although it was killed: the kernel holds it, as it does while a disk or a network \
+         folder does not answer"
+    )]
+    Undying {
+        /// The name of the stage.
+        stage: String,
+        /// The process.
+        pid: u32,
     },
     /// A stage failed in a way that a restart would repeat.
     #[error("{message}")]

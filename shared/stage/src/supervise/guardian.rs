@@ -1,0 +1,153 @@
+//! A process that outlives a killed supervisor, to end what the stages have started.
+//!
+//! The system ends a stage together with its supervisor, but not the stage's own children, as a shell has them. Each stage leads a
+//! process group, and the guardian knows them all: it reads them from a pipe, and the end of the pipe is the end of the supervisor.
+
+use std::{
+    collections::BTreeSet,
+    io::{self, Read},
+    os::{
+        fd::{AsRawFd, BorrowedFd, RawFd},
+        unix::process::CommandExt,
+    },
+    process::{Child, ChildStdin, Command, Stdio},
+    time::Duration,
+};
+
+use rustix::{
+    io::ioctl_fionbio,
+    process::{Pid, RawPid, Signal, getpid, kill_process_group},
+};
+
+use super::{SuperviseError, child::ends_within, start::Starter};
+use crate::{Manifest, run, wake::Signals};
+
+/// Time for the guardian to end with the run.
+const STOP_TIMEOUT: Duration = Duration::from_secs(1);
+
+/// The running guardian.
+pub(super) struct Guardian {
+    process: Child,
+    groups: Option<ChildStdin>,
+}
+
+impl Guardian {
+    /// Starts the guardian, a process that calls [`guard`].
+    pub fn start(command: &[String], manifest: &Manifest) -> Result<Self, SuperviseError> {
+        let failed = |source| SuperviseError::Guardian {
+            command: command.join(" "),
+            source,
+        };
+        let (program, arguments) = command
+            .split_first()
+            .ok_or_else(|| failed(io::ErrorKind::InvalidInput.into()))?;
+        let mut process = Command::new(program)
+            .args(arguments)
+            .env(run::ENVIRONMENT, &manifest.root)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            // An interrupt from the terminal must not reach it.
+            .process_group(0)
+            .spawn()
+            .map_err(failed)?;
+        let groups = process.stdin.take();
+        if let Some(groups) = &groups {
+            // A guardian that hangs must not make the supervisor wait.
+            ioctl_fionbio(groups, true).map_err(|error| failed(error.into()))?;
+        }
+        Ok(Self { process, groups })
+    }
+
+    /// Starts stages that join the groups in the care of the guardian.
+    pub fn starter<'a>(&self, signals: &'a Signals) -> Starter<'a> {
+        Starter {
+            signals,
+            guardian: self.groups.as_ref().map(AsRawFd::as_raw_fd),
+        }
+    }
+
+    pub fn has_ended(&mut self) -> bool {
+        self.process.try_wait().is_ok_and(|ended| ended.is_some())
+    }
+
+    /// Puts a group into the care of the guardian.
+    pub fn remember(&self, group: u32) {
+        self.send(group as RawPid);
+    }
+
+    /// Takes a group from the care of the guardian: its processes are dead, and its number may be given anew.
+    pub fn forget(&self, group: u32) {
+        self.send(-(group as RawPid));
+    }
+
+    fn send(&self, message: RawPid) {
+        if let Some(pipe) = &self.groups {
+            // Fails if somebody has killed the guardian, which is noticed.
+            let _ = rustix::io::write(pipe, &message.to_ne_bytes());
+        }
+    }
+}
+
+impl Drop for Guardian {
+    fn drop(&mut self) {
+        self.groups = None;
+        if !ends_within(&self.process, STOP_TIMEOUT) {
+            let _ = self.process.kill();
+        }
+        let _ = self.process.wait();
+    }
+}
+
+/// Puts the group that this process leads into the care of the guardian. Called between fork and exec, so that there is no moment
+/// in which a stage has children that nobody knows of.
+pub(super) fn join(pipe: RawFd) {
+    // SAFETY: the supervisor keeps the pipe open while it starts a process, and the new process has a copy of it.
+    let pipe = unsafe { BorrowedFd::borrow_raw(pipe) };
+    let _ = rustix::io::write(pipe, &getpid().as_raw_nonzero().get().to_ne_bytes());
+}
+
+/// Reads process groups until the supervisor ends, then kills those that it has left.
+///
+/// A message is a process group, or a negative one that is to be forgotten.
+pub fn guard(mut messages: impl Read) {
+    // A request to stop that reaches all processes of a service is the supervisor's alone.
+    let _caught = Signals::install();
+    let mut groups = BTreeSet::new();
+    let mut message = [0; size_of::<RawPid>()];
+    while messages.read_exact(&mut message).is_ok() {
+        let group = RawPid::from_ne_bytes(message);
+        match group > 0 {
+            true => groups.insert(group),
+            false => groups.remove(&group.saturating_neg()),
+        };
+    }
+    for group in groups.into_iter().filter_map(Pid::from_raw) {
+        let _ = kill_process_group(group, Signal::KILL);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::os::unix::process::ExitStatusExt;
+
+    use super::*;
+
+    fn sleeper() -> Child {
+        let mut command = Command::new("sleep");
+        command.arg("60").process_group(0).spawn().unwrap()
+    }
+
+    #[test]
+    fn groups_that_are_left_at_the_end_are_killed() {
+        let (mut kept, mut forgotten) = (sleeper(), sleeper());
+        let (kept_id, forgotten_id) = (kept.id() as RawPid, forgotten.id() as RawPid);
+        let messages = [kept_id, forgotten_id, -forgotten_id].map(RawPid::to_ne_bytes);
+        guard(messages.as_flattened());
+        assert_eq!(kept.wait().unwrap().signal(), Some(9));
+        assert!(!ends_within(&forgotten, Duration::from_millis(50)));
+        forgotten.kill().unwrap();
+        forgotten.wait().unwrap();
+    }
+}

@@ -1,0 +1,130 @@
+//! Starts the processes of stages.
+
+use std::{
+    fs::File,
+    io,
+    os::{fd::RawFd, unix::process::CommandExt},
+    process::{Child, Command, Stdio},
+    time::Duration,
+};
+
+use rustix::process::{Signal, getpid, getppid, set_parent_process_death_signal};
+
+use super::{StagePlan, SuperviseError, guardian};
+use crate::{Manifest, StageError, run, wake::Signals};
+
+/// Pauses after a failure to start a process for want of processes or memory; the sum is the time for which it is tried.
+const PAUSES_MS: [u64; 8] = [20, 50, 100, 200, 500, 1000, 2000, 4000];
+
+/// Starts processes that end with this one.
+pub(super) struct Starter<'a> {
+    pub signals: &'a Signals,
+    /// The pipe to the guardian.
+    pub guardian: Option<RawFd>,
+}
+
+impl Starter<'_> {
+    /// Starts a stage. Its standard output and error go to `log`.
+    pub fn start(
+        &self,
+        plan: &StagePlan,
+        manifest: &Manifest,
+        log: &File,
+    ) -> Result<Child, SuperviseError> {
+        let failed = |source| SuperviseError::Spawn {
+            stage: plan.name.clone(),
+            command: plan.command.join(" "),
+            source,
+        };
+        let mut command = self.command(plan, manifest, log).map_err(failed)?;
+        let pause = |pause| self.signals.sleep(pause);
+        with_patience(|| command.spawn(), pause)?.map_err(failed)
+    }
+
+    fn command(&self, plan: &StagePlan, manifest: &Manifest, log: &File) -> io::Result<Command> {
+        let (program, arguments) = plan
+            .command
+            .split_first()
+            .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "it is empty"))?;
+        let mut command = Command::new(program);
+        command
+            .args(arguments)
+            .env(run::ENVIRONMENT, &manifest.root)
+            .stdin(Stdio::null())
+            .stdout(log.try_clone()?)
+            .stderr(log.try_clone()?)
+            // A process group of its own: an interrupt from the terminal reaches only the supervisor, which then stops each stage.
+            .process_group(0);
+        let (supervisor, guardian) = (getpid(), self.guardian);
+        let die_with_the_supervisor = move || {
+            set_parent_process_death_signal(Some(Signal::KILL))?;
+            guardian.into_iter().for_each(guardian::join);
+            match getppid() == Some(supervisor) {
+                true => Ok(()),
+                false => Err(io::Error::other("the supervisor has died")),
+            }
+        };
+        // SAFETY: between fork and exec there are only four system calls; nothing is allocated unless the supervisor is dead.
+        unsafe { command.pre_exec(die_with_the_supervisor) };
+        Ok(command)
+    }
+}
+
+/// Starts a process, and tries again while the system has no room for one. A request to stop ends the attempts.
+fn with_patience<T>(
+    mut start: impl FnMut() -> io::Result<T>,
+    mut pause: impl FnMut(Duration) -> Result<bool, StageError>,
+) -> Result<io::Result<T>, StageError> {
+    for ms in PAUSES_MS {
+        match start() {
+            Err(error) if is_temporary(error.kind()) => {}
+            started => return Ok(started),
+        }
+        if pause(Duration::from_millis(ms))? {
+            break;
+        }
+    }
+    Ok(start())
+}
+
+fn is_temporary(error: io::ErrorKind) -> bool {
+    matches!(
+        error,
+        // No room for a process, no memory, and a program that is just being written.
+        io::ErrorKind::WouldBlock | io::ErrorKind::OutOfMemory | io::ErrorKind::ExecutableFileBusy
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    /// Starts with these results one after the other; returns the last one and the number of attempts.
+    fn started(stop: bool, results: &[io::Result<()>]) -> (Option<io::ErrorKind>, usize) {
+        let mut attempts = 0;
+        let start = || {
+            let result = &results[attempts.min(results.len() - 1)];
+            attempts += 1;
+            result.as_ref().copied().map_err(|e| e.kind().into())
+        };
+        let result = with_patience(start, |_| Ok(stop)).unwrap();
+        (result.err().map(|error| error.kind()), attempts)
+    }
+
+    #[test]
+    fn a_process_that_finds_no_room_is_started_later() {
+        let (busy, missing) = (io::ErrorKind::WouldBlock, io::ErrorKind::NotFound);
+        let busy = || Err(busy.into());
+        assert_eq!(started(false, &[busy(), busy(), Ok(())]), (None, 3));
+        let (error, attempts) = started(false, &[busy()]);
+        assert_eq!((error, attempts), (Some(io::ErrorKind::WouldBlock), 9));
+        assert_eq!(started(false, &[Err(missing.into())]), (Some(missing), 1));
+    }
+
+    #[test]
+    fn a_request_to_stop_ends_the_attempts() {
+        let busy = || Err(io::ErrorKind::WouldBlock.into());
+        assert_eq!(started(true, &[busy()]).1, 2);
+    }
+}

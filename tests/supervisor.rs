@@ -1,0 +1,91 @@
+//! What the supervisor owes to the machine: no process outlives a run, no log grows for ever, and it waits for room.
+
+use std::{fs, os::unix::fs::PermissionsExt, process::Command, thread, time::Duration};
+
+use rustix::process::{Signal, geteuid};
+
+use crate::common::{Run, leftovers, send, undisturbed};
+
+/// A stage under a shell that has started another program, which knows nothing of the run.
+const SHELL: &str = "sleep 600 &\n{gyre} stage masking";
+
+#[test]
+fn what_a_stage_has_started_ends_with_a_killed_supervisor() {
+    let run = Run::of_recording().rate("2").stage_script("masking", SHELL);
+    let mut running = run.start();
+    running.await_poses(2);
+    running.kill_supervisor();
+    leftovers::remove(run.out());
+}
+
+#[test]
+fn a_killed_guardian_is_replaced_and_knows_all_stages() {
+    let run = Run::of_recording().rate("2").stage_script("masking", SHELL);
+    let mut running = run.start();
+    let guardian = running.await_poses(2).await_guardian(None);
+    send(guardian, Signal::KILL);
+    running.await_guardian(Some(guardian));
+    running.kill_supervisor();
+    leftovers::remove(run.out());
+}
+
+#[test]
+fn what_a_stage_has_started_ends_with_the_run() {
+    let run = Run::of_recording().stage_script("masking", SHELL);
+    assert_eq!(run.complete(), undisturbed());
+}
+
+#[test]
+fn a_stage_that_prints_without_end_does_not_fill_the_disk() {
+    let flood = "yes 'all is well' | head -c 30000000 >&2";
+    let run =
+        Run::of_recording().stage_script("masking", &format!("{flood}\n{{gyre}} stage masking"));
+    run.complete();
+    let length = |name| {
+        fs::metadata(run.out().join("log").join(name))
+            .unwrap()
+            .len()
+    };
+    assert!(length("masking.txt") < 9_000_000);
+    assert!(length("masking.txt.old") < 9_000_000);
+}
+
+/// The limits of the system's processes do not hold for root, so the run is another user's.
+#[test]
+fn a_stage_for_which_there_is_no_process_is_started_when_there_is_one() {
+    if !geteuid().is_root() {
+        println!("skipped: only root can become another user");
+        return;
+    }
+    let run =
+        Run::configured("[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 24\n").rate("6");
+    let folder = run.folder();
+    fs::set_permissions(folder, fs::Permissions::from_mode(0o777)).unwrap();
+    fs::copy(crate::PROGRAM, folder.join("gyre")).unwrap();
+    let user = (2_000_000_000 + std::process::id()).to_string();
+    let as_user = || {
+        let mut command = Command::new("setpriv");
+        command.args(["--reuid", &user, "--regid", &user, "--clear-groups"]);
+        command
+    };
+    let mut command = as_user();
+    command
+        .arg(folder.join("gyre"))
+        .args(run.command().get_args());
+    let mut running = run.start_as(command);
+    let supervisor = running.await_poses(3).pid().to_string();
+    let allow_processes = |number: &str| {
+        let mut prlimit = as_user();
+        let limit = format!("--nproc={number}:");
+        prlimit.args(["prlimit", "--pid", &supervisor, &limit]);
+        assert!(prlimit.status().unwrap().success());
+    };
+    allow_processes("1");
+    running.kill("masking");
+    thread::sleep(Duration::from_millis(500));
+    assert!(!running.stages().contains_key("masking"));
+    allow_processes("1000");
+    let ended = running.finish();
+    ended.succeeded();
+    assert_eq!(run.summary()["restarts"]["masking"], 1);
+}
