@@ -106,6 +106,17 @@ pub enum Outcome {
     Redundant,
 }
 
+/// Checks that a keyframe is one of `keyframes`.
+pub(crate) fn keyframe_exists(keyframe: usize, keyframes: usize) -> Result<(), EstimationError> {
+    match keyframe < keyframes {
+        true => Ok(()),
+        false => Err(EstimationError::NoKeyframe {
+            keyframe,
+            keyframes,
+        }),
+    }
+}
+
 /// Returns the squared length of `residual` normalised by `covariance`; infinite if the covariance is not positive definite.
 pub(crate) fn chi_square(residual: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
     covariance.cholesky().map_or(f64::INFINITY, |factor| {

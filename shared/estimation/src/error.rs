@@ -2,7 +2,8 @@
 
 use thiserror::Error;
 
-/// Errors of [`TrajectoryFilter`](crate::TrajectoryFilter). An estimator that returns one is unchanged.
+/// Errors of [`TrajectoryFilter`](crate::TrajectoryFilter) and [`PoseGraph`](crate::PoseGraph). An estimator that returns one is
+/// unchanged.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum EstimationError {
@@ -65,5 +66,34 @@ pub enum EstimationError {
     TooManyKeyframes {
         /// The largest number of keyframes.
         limit: usize,
+    },
+    /// A keyframe is asked for that does not exist.
+    #[error("there is no keyframe {keyframe}: there are {keyframes}, counted from 0")]
+    NoKeyframe {
+        /// The keyframe.
+        keyframe: usize,
+        /// Number of keyframes.
+        keyframes: usize,
+    },
+    /// Poses to start from are not those of the keyframes of the graph.
+    #[error(
+        "there are {poses} poses to start from, and {keyframes} keyframes: each keyframe needs one"
+    )]
+    StartPoses {
+        /// Number of poses.
+        poses: usize,
+        /// Number of keyframes.
+        keyframes: usize,
+    },
+    /// The poses are not determined within the range of numbers.
+    #[error(
+        "the constraints do not determine the poses: covariances differ by too many orders of magnitude, or poses are beyond the range          of numbers"
+    )]
+    Singular,
+    /// There is not enough memory for the equations.
+    #[error("there is not enough memory for the equations of {keyframes} keyframes")]
+    Memory {
+        /// Number of keyframes.
+        keyframes: usize,
     },
 }

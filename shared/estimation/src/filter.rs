@@ -2,15 +2,18 @@
 
 use std::collections::BTreeMap;
 
-use gyre_geometry::{Pose, UncertainMotion, covariance::lever};
-use nalgebra::{DMatrix, Matrix3, MatrixXx3};
+use gyre_geometry::{Pose, Twist, UncertainMotion, covariance::lever};
+use nalgebra::{DMatrix, Matrix3, MatrixXx3, Vector3};
 
-use crate::constraint::{chi_square, group_information};
-use crate::relative::{Relative, corrected};
+use crate::constraint::{chi_square, group_information, keyframe_exists};
+use crate::relative::Relative;
 use crate::{CHI_SQUARE_99_9, Constraint, EstimationError, Kind, Outcome, Verdict};
 
 /// A loop that adds less information to its group than this share of its own is redundant.
 const MIN_SHARE: f64 = 1e-9;
+
+/// Linearisations of a loop. After a long drift the second one moves poses by centimetres, the third by less than a millimetre.
+const LINEARISATIONS: usize = 3;
 
 /// Options of [`TrajectoryFilter`].
 #[derive(Debug, Clone, PartialEq)]
@@ -37,16 +40,30 @@ impl Default for FilterOptions {
 /// The extended Kalman filter over the poses of all keyframes.
 ///
 /// The state is the pose of each keyframe, and there is no map (Checchin et al., Sec. 4.1). The first pose is known exactly. A new
-/// keyframe costs time in proportion to the number of keyframes, a loop to its square, and no measurement is linearised a second
-/// time: use a pose graph for long trajectories and for many loops.
+/// keyframe costs time in proportion to the number of keyframes, a loop to its square, and no measurement is linearised again
+/// after later ones: use [`PoseGraph`](crate::PoseGraph) for long trajectories and for many loops.
+///
+/// The paper's filter keeps the covariance of x, y and yaw of each pose. This one keeps that of a small motion of the world that takes
+/// the estimated pose to the true one. To first order both are the same, and [`TrajectoryFilter::pose`] converts. But here an error
+/// of yaw moves the poses after it around an arc instead of along its tangent, so a correction after a long drift is as good as that
+/// of the graph, and the Jacobians of Eqs. 2 and 3 are simpler.
 #[derive(Debug, Clone)]
 pub struct TrajectoryFilter {
     options: FilterOptions,
     poses: Vec<Pose>,
-    /// Of (x, y, yaw) of all poses in their order. Rows and columns beyond the poses are reserve.
+    /// Of the errors of all poses in their order: true pose = exp(error) estimate. Rows and columns beyond the poses are reserve.
     covariance: DMatrix<f64>,
     /// Loops accepted of each group.
     groups: BTreeMap<u64, usize>,
+}
+
+/// A relative pose as an observation of the state.
+struct Observation {
+    ends: [usize; 2],
+    /// The relative pose as predicted.
+    predicted: Pose,
+    /// Jacobian H of its x, y and yaw with respect to the error of the second pose, and with opposite sign to that of the first.
+    jacobian: Matrix3<f64>,
 }
 
 impl TrajectoryFilter {
@@ -79,18 +96,17 @@ impl TrajectoryFilter {
     }
 
     /// Predicts the pose of keyframe `to` in the frame of `from`, with its covariance (Checchin et al., Eq. 3): the initial guess of
-    /// their registration (Eq. 4). `None` if either does not exist.
-    pub fn predict(&self, from: usize, to: usize) -> Option<UncertainMotion> {
-        let relative = Relative::predict(self.poses.get(from)?, self.poses.get(to)?);
-        let (a, b) = (relative.by_from, relative.by_to);
-        let cross = a * self.block(from, to) * b.transpose();
-        let covariance = a * self.block(from, from) * a.transpose()
-            + b * self.block(to, to) * b.transpose()
-            + cross
-            + cross.transpose();
-        Some(UncertainMotion {
-            motion: relative.motion,
-            covariance,
+    /// their registration (Eq. 4).
+    ///
+    /// # Errors
+    /// Either keyframe does not exist.
+    pub fn predict(&self, from: usize, to: usize) -> Result<UncertainMotion, EstimationError> {
+        keyframe_exists(from.max(to), self.poses.len())?;
+        let observation = self.observe([from, to]);
+        let covariance = observation.project(&self.against(&observation));
+        Ok(UncertainMotion {
+            motion: observation.predicted,
+            covariance: 0.5 * (covariance + covariance.transpose()),
         })
     }
 
@@ -99,43 +115,48 @@ impl TrajectoryFilter {
         &self.poses
     }
 
-    /// Returns the pose of a keyframe with its covariance along the axes of the frame of the poses; `None` if it does not exist.
-    pub fn pose(&self, keyframe: usize) -> Option<UncertainMotion> {
-        Some(UncertainMotion {
-            motion: *self.poses.get(keyframe)?,
-            covariance: self.block(keyframe, keyframe),
+    /// Returns the pose of a keyframe with its covariance along the axes of the frame of the poses.
+    ///
+    /// # Errors
+    /// The keyframe does not exist.
+    pub fn pose(&self, keyframe: usize) -> Result<UncertainMotion, EstimationError> {
+        keyframe_exists(keyframe, self.poses.len())?;
+        let motion = self.poses[keyframe];
+        let to_pose = lever(motion.translation.x, motion.translation.y);
+        let block = self
+            .covariance
+            .fixed_view::<3, 3>(3 * keyframe, 3 * keyframe);
+        let covariance = to_pose * block * to_pose.transpose();
+        Ok(UncertainMotion {
+            motion,
+            covariance: 0.5 * (covariance + covariance.transpose()),
         })
     }
 
-    /// Returns the covariance between (x, y, yaw) of two existing keyframes.
-    fn block(&self, row: usize, column: usize) -> Matrix3<f64> {
-        self.covariance
-            .fixed_view::<3, 3>(3 * row, 3 * column)
-            .into_owned()
-    }
-
-    /// Adds a keyframe: state augmentation (Checchin et al., Eqs. 1 and 2). Eq. 2 prints the covariance of the whole state beside the
-    /// Jacobian with respect to the last pose; the columns of that pose are meant.
+    /// Adds a keyframe: state augmentation (Checchin et al., Eqs. 1 and 2).
+    ///
+    /// The error of the last pose moves the new one along with it: the Jacobian of Eq. 2 is the identity. Eq. 2 prints the covariance
+    /// of the whole state beside it; its columns of the last pose are meant.
     fn augment(&mut self, motion: &UncertainMotion) -> Result<(), EstimationError> {
         let count = self.poses.len();
         self.reserve(count + 1)?;
-        let last = UncertainMotion {
-            motion: self.poses[count - 1],
-            covariance: self.block(count - 1, count - 1),
-        };
-        let next = last.then(motion);
-        let moved = next.motion.translation.vector - last.motion.translation.vector;
-        let size = 3 * count;
-        let cross = self.columns(count - 1) * lever(moved.x, moved.y).transpose();
-        let covariance = &mut self.covariance;
+        let last = self.poses[count - 1];
+        let next = last * motion.motion;
+        let by_motion = lever(-next.translation.x, -next.translation.y)
+            * last.rotation.to_rotation_matrix().to_homogeneous();
+        let noise = by_motion * motion.covariance * by_motion.transpose();
+
+        let cross = self.columns(count - 1);
+        let (size, covariance) = (3 * count, &mut self.covariance);
+        let last = cross.fixed_rows::<3>(size - 3);
+        covariance
+            .fixed_view_mut::<3, 3>(size, size)
+            .copy_from(&(last + noise));
         covariance.view_mut((0, size), (size, 3)).copy_from(&cross);
         covariance
             .view_mut((size, 0), (3, size))
             .tr_copy_from(&cross);
-        covariance
-            .fixed_view_mut::<3, 3>(size, size)
-            .copy_from(&next.covariance);
-        self.poses.push(next.motion);
+        self.poses.push(next);
         Ok(())
     }
 
@@ -158,14 +179,12 @@ impl TrajectoryFilter {
 
     /// Tests a loop against the estimate, and corrects all poses if it agrees.
     fn close(&mut self, constraint: &Constraint, group: Option<u64>) -> Verdict {
-        let &Constraint {
-            from, to, motion, ..
-        } = constraint;
-        let relative = Relative::predict(&self.poses[from], &self.poses[to]);
-        let innovation = relative.innovation(&motion);
-        let by_pose = self.against(from, to, &relative);
-        let predicted = Self::project(&by_pose, from, to, &relative);
-        let chi_square = chi_square(&innovation, &(predicted + motion.covariance));
+        let ends = [constraint.from, constraint.to];
+        let measured = &constraint.motion;
+        let first = self.observe(ends);
+        let predicted = first.project(&self.against(&first));
+        let innovation = measured.error(&first.predicted);
+        let chi_square = chi_square(&innovation, &(predicted + measured.covariance));
         let verdict = |outcome| Verdict {
             chi_square,
             outcome,
@@ -177,17 +196,44 @@ impl TrajectoryFilter {
         if share < MIN_SHARE {
             return verdict(Outcome::Redundant);
         }
-        let noise = motion.covariance / share;
-        let Some(inverse) = (predicted + noise).try_inverse() else {
-            return verdict(Outcome::Rejected);
-        };
-        let gain = &by_pose * inverse;
-        self.correct(from, to, &relative, &gain, &noise);
-        for (keyframe, pose) in self.poses.iter_mut().enumerate() {
-            let correction = gain.fixed_rows::<3>(3 * keyframe) * innovation;
-            *pose = corrected(pose, &correction);
+        match self.correct(first, measured, measured.covariance / share) {
+            Some(()) => verdict(Outcome::Accepted),
+            None => verdict(Outcome::Rejected),
         }
-        verdict(Outcome::Accepted)
+    }
+
+    /// Corrects all poses by an observation: the iterated update, which linearises the observation again at the corrected poses.
+    /// `None` if the covariance of the innovation is singular; nothing is changed then.
+    fn correct(
+        &mut self,
+        first: Observation,
+        measured: &UncertainMotion,
+        noise: Matrix3<f64>,
+    ) -> Option<()> {
+        let ends = first.ends;
+        let prior = ends.map(|keyframe| self.poses[keyframe]);
+        let mut errors = [Vector3::zeros(); 2];
+        let mut observation = first;
+        let mut update = None;
+        for _ in 0..LINEARISATIONS {
+            if update.is_some() {
+                let [from, to] = [0, 1].map(|end| exp(&errors[end]) * prior[end]);
+                observation = Observation::new(ends, [&from, &to]);
+            }
+            let against = self.against(&observation);
+            let sum = observation.project(&against) + noise;
+            let gain = against * sum.cholesky()?.inverse();
+            let innovation = measured.error(&observation.predicted)
+                + observation.jacobian * (errors[1] - errors[0]);
+            errors = ends.map(|keyframe| gain.fixed_rows::<3>(3 * keyframe) * innovation);
+            update = Some((gain, innovation));
+        }
+        let (gain, innovation) = update?;
+        self.update_covariance(&observation, &gain, &noise);
+        for (keyframe, pose) in self.poses.iter_mut().enumerate() {
+            *pose = exp(&(gain.fixed_rows::<3>(3 * keyframe) * innovation)) * *pose;
+        }
+        Some(())
     }
 
     /// Returns what the next loop of a group adds to the information of the group, relative to that of one loop, and counts it.
@@ -200,50 +246,68 @@ impl TrajectoryFilter {
         share
     }
 
-    /// Updates the covariance in Joseph's form: (I - K H) P (I - K H)' + K R K', one factor after the other.
-    fn correct(
+    fn observe(&self, ends: [usize; 2]) -> Observation {
+        Observation::new(ends, ends.map(|keyframe| &self.poses[keyframe]))
+    }
+
+    /// Returns P H': the covariance of the errors of all poses with the relative pose.
+    fn against(&self, observation: &Observation) -> MatrixXx3<f64> {
+        let [from, to] = observation.ends;
+        (self.columns(to) - self.columns(from)) * observation.jacobian.transpose()
+    }
+
+    /// Updates the covariance in Joseph's form, (I - K H) P (I - K H)' + K R K', one factor after the other.
+    fn update_covariance(
         &mut self,
-        from: usize,
-        to: usize,
-        relative: &Relative,
+        observation: &Observation,
         gain: &MatrixXx3<f64>,
         noise: &Matrix3<f64>,
     ) {
         let size = 3 * self.poses.len();
-        let by_pose = self.against(from, to, relative);
+        let left = self.against(observation);
         let mut used = self.covariance.view_mut((0, 0), (size, size));
-        used.gemm(-1.0, gain, &by_pose.transpose(), 1.0);
-        let rest = gain * noise - self.against(from, to, relative);
+        used.gemm(-1.0, gain, &left.transpose(), 1.0);
+        let right = gain * noise - self.against(observation);
         let mut used = self.covariance.view_mut((0, 0), (size, size));
-        used.gemm(1.0, &rest, &gain.transpose(), 1.0);
+        used.gemm(1.0, &right, &gain.transpose(), 1.0);
         // Rounding leaves the two triangles apart.
         used.fill_lower_triangle_with_upper_triangle();
     }
 
-    /// Returns the covariance of all poses with the relative pose of two: P H'.
-    fn against(&self, from: usize, to: usize, relative: &Relative) -> MatrixXx3<f64> {
-        self.columns(from) * relative.by_from.transpose()
-            + self.columns(to) * relative.by_to.transpose()
-    }
-
-    /// Returns the covariance of the relative pose, H P H', from P H'.
-    fn project(
-        by_pose: &MatrixXx3<f64>,
-        from: usize,
-        to: usize,
-        relative: &Relative,
-    ) -> Matrix3<f64> {
-        relative.by_from * by_pose.fixed_rows::<3>(3 * from)
-            + relative.by_to * by_pose.fixed_rows::<3>(3 * to)
-    }
-
-    /// Returns the covariance of all poses with that of a keyframe.
+    /// Returns the columns of a keyframe in the covariance.
     fn columns(&self, keyframe: usize) -> MatrixXx3<f64> {
+        let size = nalgebra::Dyn(3 * self.poses.len());
         self.covariance
-            .generic_view(
-                (0, 3 * keyframe),
-                (nalgebra::Dyn(3 * self.poses.len()), nalgebra::Const::<3>),
-            )
+            .generic_view((0, 3 * keyframe), (size, nalgebra::Const::<3>))
             .into_owned()
     }
+}
+
+impl Observation {
+    /// Predicts the relative pose of two keyframes, and linearises it (Checchin et al., Eq. 3). A common error of both poses does not
+    /// change it.
+    fn new(ends: [usize; 2], [from, to]: [&Pose; 2]) -> Self {
+        let relative = Relative::predict(from, to);
+        Self {
+            ends,
+            predicted: relative.motion,
+            jacobian: relative.by_to * lever(to.translation.x, to.translation.y),
+        }
+    }
+
+    /// Returns H P H', the covariance of the predicted relative pose, from P H'.
+    fn project(&self, against: &MatrixXx3<f64>) -> Matrix3<f64> {
+        let [from, to] = self.ends;
+        self.jacobian * (against.fixed_rows::<3>(3 * to) - against.fixed_rows::<3>(3 * from))
+    }
+}
+
+/// Returns the motion of the world with a constant twist of (x, y, yaw) for one unit of time.
+fn exp(error: &Vector3<f64>) -> Pose {
+    let twist = Twist {
+        vx_mps: error.x,
+        vy_mps: error.y,
+        yaw_rate_radps: error.z,
+    };
+    twist.pose_at(1.0)
 }

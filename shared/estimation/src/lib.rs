@@ -2,19 +2,51 @@
 //!
 //! A keyframe is a scan whose pose is estimated. A [`Constraint`] is a measured relative pose of two keyframes: a motion of the
 //! odometry, or a loop between keyframes of the same place. Reading order:
-//! - [`Constraint`]: a measurement, in the form that every estimator takes; [`Verdict`]: its chi-square test;
-//! - [`TrajectoryFilter`]: the extended Kalman filter of Checchin et al. over the poses of all keyframes, for short trajectories.
+//! - [`Constraint`]: a measurement, in the form that both estimators take; [`Verdict`]: its chi-square test;
+//! - [`TrajectoryFilter`]: the extended Kalman filter of Checchin et al. over the poses of all keyframes, for short trajectories;
+//! - [`PoseGraph`]: sparse least squares, for days of driving and many loops; [`Kernel`]: what it does with wrong loops;
+//! - [`G2o`]: pose graphs as files of other programs.
+//!
+//! A drive once around a square, whose odometry turns a little too far, and the loop that corrects it:
+//!
+//! ```
+//! use gyre_estimation::{Constraint, GraphOptions, PoseGraph};
+//! use gyre_geometry::{Pose, UncertainMotion, pose};
+//! use nalgebra::{Matrix3, Vector3};
+//!
+//! let covariance = Matrix3::from_diagonal(&Vector3::new(0.01, 0.01, 1e-3)); // 0.1 m, 0.03 rad
+//! let side = UncertainMotion { motion: pose(10.0, 0.0, 91_f64.to_radians()), covariance };
+//! let mut graph = PoseGraph::new(Pose::identity(), GraphOptions::default());
+//! for keyframe in 0..4 {
+//!     graph.apply(&Constraint::odometry(keyframe, side))?;
+//! }
+//! assert!(graph.poses()[4].translation.vector.norm() > 0.4);
+//!
+//! let same_place = UncertainMotion { motion: Pose::identity(), covariance: 0.01 * covariance };
+//! graph.apply(&Constraint::closing(4, 0, same_place))?;
+//! graph.solve()?;
+//! let end = graph.pose(4)?;
+//! assert!(end.motion.translation.vector.norm() < 0.01);
+//! assert!(end.covariance[(0, 0)].sqrt() < 0.02);
+//! # Ok::<(), gyre_estimation::EstimationError>(())
+//! ```
 //!
 //! # Frames and units
-//! Those of [`gyre_geometry`]: poses are those of keyframes in the frame of the first one (or in the frame of the pose that it was
-//! given); x forward, y left in m, yaw counter-clockwise in rad. Covariances are those of (x, y, yaw) along the axes of the frame that
-//! the pose is in: for a constraint, the keyframe `from`.
+//! Those of [`gyre_geometry`]: x forward, y left in m, yaw counter-clockwise in rad. Poses are those of keyframes in the frame that
+//! the first pose is given in. The covariance of a pose or of a motion is that of its (x, y, yaw), with x and y along the axes of the
+//! frame that it is given in: for a constraint, of the keyframe `from`.
 
 mod constraint;
 mod error;
 mod filter;
+mod g2o;
+mod graph;
+mod kernel;
 mod relative;
 
 pub use constraint::{CHI_SQUARE_99_9, Constraint, Kind, Outcome, Verdict};
 pub use error::EstimationError;
 pub use filter::{FilterOptions, TrajectoryFilter};
+pub use g2o::{G2o, G2oError};
+pub use graph::{GraphOptions, PoseGraph, Solution, WeightedLoop};
+pub use kernel::Kernel;

@@ -4,7 +4,7 @@
 mod common;
 
 use common::{Drive, ODOMETRY};
-use gyre_estimation::Outcome;
+use gyre_estimation::{Outcome, PoseGraph};
 use gyre_geometry::{Pose, UncertainMotion};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -43,10 +43,11 @@ impl MeanNees {
 }
 
 #[test]
-fn the_filter_is_consistent_without_loops_before_and_after_closing() {
+fn estimates_are_consistent_without_loops_before_and_after_closing() {
     let mut open: [MeanNees; 2] = Default::default();
     let mut before: [MeanNees; 2] = Default::default();
     let mut after: [MeanNees; 2] = Default::default();
+    let mut of_graph: [MeanNees; 2] = Default::default();
     let of_interest = [KEYFRAMES / 2, KEYFRAMES - 1];
     for seed in 0..DRIVES {
         let straight = Drive::new(KEYFRAMES, 5 * KEYFRAMES, ODOMETRY, 1000 + seed);
@@ -64,8 +65,22 @@ fn the_filter_is_consistent_without_loops_before_and_after_closing() {
         for (nees, k) in after.iter_mut().zip(of_interest) {
             nees.add(&filter.pose(k).unwrap(), &around.truth[k]);
         }
+        let mut graph = PoseGraph::new(around.truth[0], Default::default());
+        for constraint in around.odometry.iter().chain([&closing]) {
+            graph.apply(constraint).unwrap();
+        }
+        graph.solve().unwrap();
+        for (nees, k) in of_graph.iter_mut().zip(of_interest) {
+            nees.add(&graph.pose(k).unwrap(), &around.truth[k]);
+        }
     }
-    for (name, nees) in [("open", open), ("before", before), ("after", after)] {
+    let cases = [
+        ("filter without loops", open),
+        ("filter before closing", before),
+        ("filter after closing", after),
+        ("graph after closing", of_graph),
+    ];
+    for (name, nees) in cases {
         nees[0].check(&format!("{name}, half-way"));
         nees[1].check(&format!("{name}, at the end"));
     }

@@ -1,0 +1,247 @@
+//! The pose graph: all poses by least squares over sparse constraints.
+
+mod covariance;
+mod dogleg;
+mod edge;
+mod solve;
+mod system;
+
+use std::collections::BTreeMap;
+
+use gyre_geometry::{Pose, UncertainMotion};
+
+use crate::constraint::{chi_square, group_information};
+use crate::kernel::Kernel;
+use crate::relative::Relative;
+use crate::{CHI_SQUARE_99_9, Constraint, EstimationError, Kind, Outcome, Verdict};
+use edge::Edge;
+use solve::Weights;
+use system::System;
+
+/// Options of [`PoseGraph`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct GraphOptions {
+    /// A loop whose chi-square against the odometry is larger is rejected.
+    pub gate: f64,
+    /// How much a loop counts that disagrees with the other constraints.
+    pub kernel: Kernel,
+    /// The correlation of the errors of any two loops of one group, 0 to 1.
+    pub group_correlation: f64,
+    /// The largest number of linearisations of one solution.
+    pub max_iterations: usize,
+    /// A solution is found when a step lowers the cost by less than this share of it.
+    pub tolerance: f64,
+}
+
+impl Default for GraphOptions {
+    /// Returns a gate at 99.9 %, dynamic covariance scaling from a quarter of it, and groups of which each counts as one loop.
+    fn default() -> Self {
+        Self {
+            gate: CHI_SQUARE_99_9,
+            kernel: Kernel::DynamicCovarianceScaling {
+                phi: 0.25 * CHI_SQUARE_99_9,
+            },
+            group_correlation: 1.0,
+            max_iterations: 100,
+            tolerance: 1e-5,
+        }
+    }
+}
+
+/// The pose graph: the poses of all keyframes that fit odometry and loops best, by sparse least squares.
+///
+/// The first pose is known exactly. Loops are tested twice: each against the odometry alone when it comes, so that the verdict does not
+/// depend on what came before it, and all against each other by the kernel when the graph is solved.
+pub struct PoseGraph {
+    options: GraphOptions,
+    poses: Vec<Pose>,
+    odometry: Vec<Edge>,
+    loops: Vec<Closing>,
+    /// Number of loops of each group.
+    groups: BTreeMap<u64, usize>,
+    /// The normal equations of the present constraints; `None` after a constraint was added.
+    system: Option<System>,
+    /// Whether the system is factorised, undamped, at the present poses.
+    factorised: bool,
+}
+
+/// A loop that passed the gate.
+struct Closing {
+    edge: Edge,
+    group: Option<u64>,
+    /// Chi-square against the odometry alone.
+    gate_chi_square: f64,
+    /// The kernel's weight.
+    weight: f64,
+}
+
+/// A loop of a [`PoseGraph`] that passed the gate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WeightedLoop {
+    /// The keyframe that the motion is measured from.
+    pub from: usize,
+    /// The keyframe whose pose is measured.
+    pub to: usize,
+    /// Squared normalised difference of the measured motion from the estimate; 3 is expected of a right loop.
+    pub chi_square: f64,
+    /// The kernel's weight at the last solution, from 0 to 1.
+    pub weight: f64,
+}
+
+/// The result of solving a pose graph.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Solution {
+    /// Half the sum of the squared normalised residuals, those of loops after the kernel.
+    pub cost: f64,
+    /// Number of linearisations.
+    pub iterations: usize,
+}
+
+impl PoseGraph {
+    /// Creates a graph with keyframe 0 at `start`, known exactly.
+    pub fn new(start: Pose, options: GraphOptions) -> Self {
+        Self {
+            options,
+            poses: vec![start],
+            odometry: Vec::new(),
+            loops: Vec::new(),
+            groups: BTreeMap::new(),
+            system: None,
+            factorised: false,
+        }
+    }
+
+    /// Takes a constraint: an odometry constraint adds a keyframe where it leads, a loop is tested against the odometry between its
+    /// keyframes. Loops correct no pose until [`PoseGraph::solve`].
+    ///
+    /// # Errors
+    /// The constraint does not continue the trajectory, names unknown keyframes or has no usable covariance.
+    pub fn apply(&mut self, constraint: &Constraint) -> Result<Verdict, EstimationError> {
+        constraint.check(self.poses.len())?;
+        let &Constraint {
+            from, to, motion, ..
+        } = constraint;
+        let edge = Edge::new([from, to], motion).ok_or(EstimationError::Covariance { from, to })?;
+        let verdict = match constraint.kind {
+            Kind::Odometry => Verdict {
+                chi_square: 0.0,
+                outcome: Outcome::Accepted,
+            },
+            Kind::Loop { .. } => self.judge(&edge),
+        };
+        if verdict.outcome == Outcome::Accepted {
+            match constraint.kind {
+                Kind::Odometry => {
+                    self.poses.push(self.poses[from] * motion.motion);
+                    self.odometry.push(edge);
+                }
+                Kind::Loop { group } => self.insert(edge, group, verdict.chi_square),
+            }
+            self.system = None;
+            self.factorised = false;
+        }
+        Ok(verdict)
+    }
+
+    /// Returns the poses of all keyframes, as last solved; those added since continue from there by odometry.
+    pub fn poses(&self) -> &[Pose] {
+        &self.poses
+    }
+
+    /// Moves all poses, for instance to those of a file, as the start of the next solution. The first pose stays fixed where it is put.
+    ///
+    /// # Errors
+    /// There is not one pose for each keyframe.
+    pub fn start_from(&mut self, poses: &[Pose]) -> Result<(), EstimationError> {
+        if poses.len() != self.poses.len() {
+            return Err(EstimationError::StartPoses {
+                poses: poses.len(),
+                keyframes: self.poses.len(),
+            });
+        }
+        self.poses.copy_from_slice(poses);
+        self.factorised = false;
+        Ok(())
+    }
+
+    /// Returns half the sum of the squared normalised residuals at the present poses, those of loops after the kernel.
+    pub fn cost(&self) -> f64 {
+        0.5 * self.chi_square(&self.poses, Weights::Kernel)
+    }
+
+    /// Returns all loops that passed the gate, in the order in which they came, or by keyframes after [`PoseGraph::solve_anew`].
+    pub fn loops(&self) -> impl Iterator<Item = WeightedLoop> + '_ {
+        self.loops.iter().map(|closing| {
+            let [from, to] = closing.edge.ends;
+            WeightedLoop {
+                from,
+                to,
+                chi_square: closing.edge.chi_square(&self.poses),
+                weight: closing.weight,
+            }
+        })
+    }
+
+    /// Returns the constraints that are part of the graph: odometry, then loops as in [`PoseGraph::loops`].
+    pub fn constraints(&self) -> impl Iterator<Item = Constraint> + '_ {
+        let constraint = |edge: &Edge, kind| Constraint {
+            from: edge.ends[0],
+            to: edge.ends[1],
+            motion: edge.motion,
+            kind,
+        };
+        let loops = self.loops.iter().map(move |closing| {
+            let group = closing.group;
+            constraint(&closing.edge, Kind::Loop { group })
+        });
+        let odometry = self.odometry.iter();
+        odometry
+            .map(move |edge| constraint(edge, Kind::Odometry))
+            .chain(loops)
+    }
+
+    /// Tests a loop against the odometry between its keyframes.
+    fn judge(&self, edge: &Edge) -> Verdict {
+        let [from, to] = edge.ends;
+        let chain = self.odometry[from.min(to)..from.max(to)]
+            .iter()
+            .fold(UncertainMotion::identity(), |chain, motion| {
+                chain.then(&motion.motion)
+            });
+        let (ends, end) = match from < to {
+            true => ([Pose::identity(), chain.motion], 1),
+            false => ([chain.motion, Pose::identity()], 0),
+        };
+        let relative = Relative::predict(&ends[0], &ends[1]);
+        let jacobian = [relative.by_from, relative.by_to][end];
+        let predicted = jacobian * chain.covariance * jacobian.transpose();
+        let innovation = relative.innovation(&edge.motion);
+        let chi_square = chi_square(&innovation, &(predicted + edge.motion.covariance));
+        let outcome = match chi_square <= self.options.gate {
+            true => Outcome::Accepted,
+            false => Outcome::Rejected,
+        };
+        Verdict {
+            chi_square,
+            outcome,
+        }
+    }
+
+    fn insert(&mut self, edge: Edge, group: Option<u64>, gate_chi_square: f64) {
+        if let Some(group) = group {
+            *self.groups.entry(group).or_default() += 1;
+        }
+        self.loops.push(Closing {
+            edge,
+            group,
+            gate_chi_square,
+            weight: self.options.kernel.weight(gate_chi_square),
+        });
+    }
+
+    /// Returns how much a loop counts because of others of its group: 1 if it is alone.
+    fn share(&self, closing: &Closing) -> f64 {
+        let members = closing.group.map_or(1, |group| self.groups[&group]);
+        group_information(members, self.options.group_correlation) / members as f64
+    }
+}

@@ -1,0 +1,68 @@
+//! Covariances of chosen poses, by solving with the sparse factor.
+
+use gyre_geometry::UncertainMotion;
+use nalgebra::Matrix3;
+
+use super::PoseGraph;
+use super::system::System;
+use crate::EstimationError;
+use crate::constraint::keyframe_exists;
+use crate::relative::Relative;
+
+impl PoseGraph {
+    /// Returns the pose of a keyframe with its covariance along the axes of the frame of the poses.
+    ///
+    /// The covariance is that of the present constraints, linearised at the present poses: exact after [`PoseGraph::solve`], and that of
+    /// dead reckoning for keyframes added since. The first call after a change factorises the equations; each call solves them for three
+    /// right-hand sides.
+    ///
+    /// # Errors
+    /// There is no such keyframe, or the constraints do not determine the poses.
+    pub fn pose(&mut self, keyframe: usize) -> Result<UncertainMotion, EstimationError> {
+        keyframe_exists(keyframe, self.poses.len())?;
+        let covariance = self.project(&[(keyframe, Matrix3::identity())])?;
+        Ok(UncertainMotion {
+            motion: self.poses[keyframe],
+            covariance,
+        })
+    }
+
+    /// Predicts the pose of keyframe `to` in the frame of `from`, with its covariance: the initial guess of their registration, as
+    /// [`TrajectoryFilter::predict`](crate::TrajectoryFilter::predict).
+    ///
+    /// # Errors
+    /// As [`PoseGraph::pose`].
+    pub fn predict(&mut self, from: usize, to: usize) -> Result<UncertainMotion, EstimationError> {
+        keyframe_exists(from.max(to), self.poses.len())?;
+        let relative = Relative::predict(&self.poses[from], &self.poses[to]);
+        let covariance = self.project(&[(from, relative.by_from), (to, relative.by_to)])?;
+        Ok(UncertainMotion {
+            motion: relative.motion,
+            covariance,
+        })
+    }
+
+    /// Returns the covariance of the sum of poses times their Jacobians: J inv(H) J'.
+    fn project(
+        &mut self,
+        jacobians: &[(usize, Matrix3<f64>)],
+    ) -> Result<Matrix3<f64>, EstimationError> {
+        let system = self.factorised()?;
+        let mut sides = system.right_hand_side(3);
+        let rows = |&(keyframe, jacobian): &(usize, Matrix3<f64>)| {
+            System::row(keyframe).map(|row| (row, jacobian))
+        };
+        for (row, jacobian) in jacobians.iter().filter_map(rows) {
+            for (axis, column) in (0..9).map(|i| (i / 3, i % 3)) {
+                sides[(row + axis, column)] += jacobian[(column, axis)];
+            }
+        }
+        system.solve(&mut sides);
+        let mut covariance = Matrix3::zeros();
+        for (row, jacobian) in jacobians.iter().filter_map(rows) {
+            let solved = Matrix3::from_fn(|axis, column| sides[(row + axis, column)]);
+            covariance += jacobian * solved;
+        }
+        Ok(0.5 * (covariance + covariance.transpose()))
+    }
+}

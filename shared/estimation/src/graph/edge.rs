@@ -1,0 +1,63 @@
+//! The cost of a constraint, and its linearisation.
+
+use gyre_geometry::{Pose, UncertainMotion};
+use nalgebra::{Matrix3, Vector3};
+
+use super::system::Ends;
+use crate::relative::Relative;
+
+/// A constraint with the inverse of its covariance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Edge {
+    pub ends: Ends,
+    pub motion: UncertainMotion,
+    information: Matrix3<f64>,
+}
+
+impl Edge {
+    /// Returns `None` if the covariance is not positive definite.
+    pub fn new(ends: Ends, motion: UncertainMotion) -> Option<Self> {
+        Some(Self {
+            ends,
+            motion,
+            information: motion.covariance.cholesky()?.inverse(),
+        })
+    }
+
+    /// Returns the squared normalised difference of the measured motion from that between the poses.
+    pub fn chi_square(&self, poses: &[Pose]) -> f64 {
+        let [from, to] = self.ends;
+        let innovation = self.motion.error(&poses[from].inv_mul(&poses[to]));
+        innovation.dot(&(self.information * innovation))
+    }
+
+    /// Linearises the cost at `poses`.
+    pub fn linearise(&self, poses: &[Pose]) -> Linear {
+        let [from, to] = self.ends;
+        let relative = Relative::predict(&poses[from], &poses[to]);
+        let innovation = relative.innovation(&self.motion);
+        let (a, b) = (relative.by_from, relative.by_to);
+        let (weighted_a, weighted_b) = (
+            a.transpose() * self.information,
+            b.transpose() * self.information,
+        );
+        Linear {
+            blocks: [weighted_a * a, weighted_b * b],
+            between: weighted_a * b,
+            sides: [weighted_a * innovation, weighted_b * innovation],
+            chi_square: innovation.dot(&(self.information * innovation)),
+        }
+    }
+}
+
+/// What an edge adds to the normal equations.
+pub(super) struct Linear {
+    /// The diagonal blocks of both poses.
+    pub blocks: [Matrix3<f64>; 2],
+    /// The block of the rows of the first pose and the columns of the second.
+    pub between: Matrix3<f64>,
+    /// The right-hand sides of both poses.
+    pub sides: [Vector3<f64>; 2],
+    /// The chi-square of the edge.
+    pub chi_square: f64,
+}

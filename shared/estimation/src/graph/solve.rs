@@ -1,0 +1,229 @@
+//! The solution of a pose graph: Gauss-Newton with reweighted loops, within a trust radius where a step would raise the cost.
+
+use faer::Mat;
+use gyre_geometry::{Pose, xy_yaw};
+use nalgebra::Vector3;
+
+use super::dogleg::Dogleg;
+use super::edge::Edge;
+use super::system::System;
+use super::{Closing, PoseGraph, Solution};
+use crate::EstimationError;
+use crate::relative::corrected;
+
+/// Above this share of the predicted decrease of the cost the trust radius grows.
+const GOOD_GAIN: f64 = 0.75;
+
+/// Below this share of the predicted decrease the trust radius shrinks.
+const POOR_GAIN: f64 = 0.25;
+
+/// A shorter step, in m and rad over all poses, goes nowhere: the poses are at a minimum but for rounding.
+const SHORTEST_STEP: f64 = 1e-12;
+
+/// The tolerance of the first descent, which only has to bring the poses near their place.
+const COARSE: f64 = 0.1;
+
+/// Whether loops keep their weights while the poses are moved.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Weights {
+    Kept,
+    Kernel,
+}
+
+impl PoseGraph {
+    /// Moves all poses to where they fit the constraints best, from where they are.
+    ///
+    /// New loops start with the weight of their test against the odometry, so that a long drift does not speak against the loop that
+    /// corrects it; then the kernel decides. With many loops the result can depend on the order in which they came and on when the
+    /// graph was solved between: [`PoseGraph::solve_anew`] depends on neither.
+    ///
+    /// # Errors
+    /// The equations have no solution within the range of numbers, or do not fit into memory. The poses are then those before.
+    pub fn solve(&mut self) -> Result<Solution, EstimationError> {
+        let before = self.poses.clone();
+        let solved = self
+            .descend(Weights::Kept, COARSE)
+            .and_then(|first| Ok(first + self.descend(Weights::Kernel, self.options.tolerance)?));
+        self.factorised = solved.is_ok();
+        let iterations = solved.inspect_err(|_| self.poses = before)?;
+        Ok(Solution {
+            cost: self.cost(),
+            iterations,
+        })
+    }
+
+    /// Solves the graph from the odometry alone. The result depends on the constraints, and not on the order in which loops came.
+    ///
+    /// # Errors
+    /// As [`PoseGraph::solve`].
+    pub fn solve_anew(&mut self) -> Result<Solution, EstimationError> {
+        for edge in &self.odometry {
+            let [from, to] = edge.ends;
+            self.poses[to] = self.poses[from] * edge.motion.motion;
+        }
+        for closing in &mut self.loops {
+            closing.weight = self.options.kernel.weight(closing.gate_chi_square);
+        }
+        self.loops.sort_by(|a, b| {
+            let measured = |closing: &Closing| xy_yaw(&closing.edge.motion.motion);
+            let by_motion = || {
+                let pairs = measured(a).into_iter().zip(measured(b));
+                pairs.fold(std::cmp::Ordering::Equal, |order, (a, b)| {
+                    order.then(a.total_cmp(&b))
+                })
+            };
+            a.edge.ends.cmp(&b.edge.ends).then_with(by_motion)
+        });
+        self.system = None;
+        self.factorised = false;
+        self.solve()
+    }
+
+    /// Makes the system of the present constraints.
+    pub(super) fn prepare(&mut self) -> Result<&mut System, EstimationError> {
+        let system = match self.system.take() {
+            Some(system) => system,
+            None => {
+                let ends: Vec<_> = self.edges().map(|edge| edge.ends).collect();
+                let keyframes = self.poses.len();
+                System::new(keyframes, &ends).map_err(|_| EstimationError::Memory { keyframes })?
+            }
+        };
+        Ok(self.system.insert(system))
+    }
+
+    /// Factorises the equations, which must be those at the present poses.
+    fn factorise(&mut self) -> Result<&System, EstimationError> {
+        let done = self.prepare()?.factorise();
+        match &self.system {
+            Some(system) if done => Ok(system),
+            _ => Err(EstimationError::Singular),
+        }
+    }
+
+    /// Returns the factorised equations at the present poses.
+    pub(super) fn factorised(&mut self) -> Result<&System, EstimationError> {
+        if !self.factorised {
+            self.linearise(Weights::Kept)?;
+            self.factorise()?;
+            self.factorised = true;
+        }
+        self.system.as_ref().ok_or(EstimationError::Singular)
+    }
+
+    fn edges(&self) -> impl Iterator<Item = &Edge> {
+        let loops = self.loops.iter().map(|closing| &closing.edge);
+        self.odometry.iter().chain(loops)
+    }
+
+    /// Moves the poses until a full Gauss-Newton step lowers the cost by less than `tolerance` of it. Returns the number of
+    /// linearisations.
+    fn descend(&mut self, weights: Weights, tolerance: f64) -> Result<usize, EstimationError> {
+        let mut cost = self.chi_square(&self.poses, weights);
+        let mut radius = f64::INFINITY;
+        for iteration in 1..=self.options.max_iterations {
+            let gradient = self.linearise(weights)?;
+            let dogleg = Dogleg::new(self.factorise()?, gradient);
+            let Some((poses, lower)) = self.step(&dogleg, weights, cost, &mut radius)? else {
+                return Ok(iteration);
+            };
+            self.poses = poses;
+            if dogleg.full_length() <= radius && cost - lower <= tolerance * cost {
+                return Ok(iteration);
+            }
+            cost = lower;
+        }
+        Ok(self.options.max_iterations)
+    }
+
+    /// Returns poses whose cost is not above `cost`, with their cost; `None` if there are none nearby. Adapts the trust radius.
+    fn step(
+        &mut self,
+        dogleg: &Dogleg,
+        weights: Weights,
+        cost: f64,
+        radius: &mut f64,
+    ) -> Result<Option<(Vec<Pose>, f64)>, EstimationError> {
+        while *radius > SHORTEST_STEP {
+            let step = dogleg.within(*radius);
+            let poses = self.moved(&step);
+            let lower = self.chi_square(&poses, weights);
+            let gain = (cost - lower) / dogleg.predicted(self.prepare()?, &step);
+            if lower <= cost {
+                if gain > GOOD_GAIN {
+                    *radius *= 2.0;
+                } else if gain < POOR_GAIN {
+                    *radius = 0.5 * step.norm_l2();
+                }
+                return Ok(Some((poses, lower)));
+            }
+            *radius = 0.25 * step.norm_l2();
+        }
+        match cost.is_finite() {
+            true => Ok(None),
+            false => Err(EstimationError::Singular),
+        }
+    }
+
+    /// Puts the equations at the present poses into the system, and returns their right-hand side.
+    fn linearise(&mut self, weights: Weights) -> Result<Mat<f64>, EstimationError> {
+        self.prepare()?;
+        let shares: Vec<_> = self
+            .loops
+            .iter()
+            .map(|closing| self.share(closing))
+            .collect();
+        let Self {
+            system: Some(system),
+            poses,
+            odometry,
+            loops,
+            options,
+            ..
+        } = self
+        else {
+            return Err(EstimationError::Singular);
+        };
+        system.clear();
+        let mut sides = system.right_hand_side(1);
+        for (number, edge) in odometry.iter().enumerate() {
+            let linear = edge.linearise(poses);
+            system.add(number, edge.ends, &linear, 1.0, &mut sides);
+        }
+        for (number, (closing, share)) in loops.iter_mut().zip(shares).enumerate() {
+            let linear = closing.edge.linearise(poses);
+            if weights == Weights::Kernel {
+                closing.weight = options.kernel.weight(linear.chi_square);
+            }
+            let number = odometry.len() + number;
+            let weight = share * closing.weight;
+            system.add(number, closing.edge.ends, &linear, weight, &mut sides);
+        }
+        Ok(sides)
+    }
+
+    /// Returns the sum of the squared normalised residuals at `poses`, those of loops weighted.
+    pub(super) fn chi_square(&self, poses: &[Pose], weights: Weights) -> f64 {
+        let odometry = self.odometry.iter().map(|edge| edge.chi_square(poses));
+        let loops = self.loops.iter().map(|closing| {
+            let chi_square = closing.edge.chi_square(poses);
+            self.share(closing)
+                * match weights {
+                    Weights::Kept => closing.weight * chi_square,
+                    Weights::Kernel => self.options.kernel.cost(chi_square),
+                }
+        });
+        odometry.chain(loops).sum()
+    }
+
+    fn moved(&self, step: &Mat<f64>) -> Vec<Pose> {
+        let moved = |(keyframe, pose)| match System::row(keyframe) {
+            Some(row) => {
+                let step = [step[(row, 0)], step[(row + 1, 0)], step[(row + 2, 0)]];
+                corrected(pose, &Vector3::from(step))
+            }
+            None => *pose,
+        };
+        self.poses.iter().enumerate().map(moved).collect()
+    }
+}

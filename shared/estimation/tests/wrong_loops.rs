@@ -1,0 +1,139 @@
+//! Wrong loops, single and in consistent tens, change the pose graph little.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::f64::consts::PI;
+
+use common::{Drive, LOOP, ODOMETRY, exact, rms_apart};
+use gyre_estimation::{Constraint, GraphOptions, Kernel, Kind, Outcome, PoseGraph};
+use gyre_geometry::{Pose, pose};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+const AROUND: usize = 250;
+const KEYFRAMES: usize = 3 * AROUND;
+const WRONG: usize = 50;
+
+const KERNELS: [Kernel; 2] = [
+    Kernel::DynamicCovarianceScaling { phi: 4.07 },
+    Kernel::GemanMcClure { scale: 16.27 },
+];
+
+/// A drive of three rounds with a right loop for each fifth keyframe of the later two.
+struct Case {
+    drive: Drive,
+    right: Vec<Constraint>,
+    random: ChaCha8Rng,
+}
+
+impl Case {
+    fn new(seed: u64) -> Self {
+        let mut drive = Drive::new(KEYFRAMES, AROUND, ODOMETRY, seed);
+        let right = (AROUND..KEYFRAMES)
+            .step_by(5)
+            .map(|from| drive.close(from, from - AROUND))
+            .collect();
+        Self {
+            drive,
+            right,
+            random: ChaCha8Rng::seed_from_u64(seed),
+        }
+    }
+
+    /// Returns loops between places that are not the same, in runs of `length` that agree with each other and
+    /// are known to be of one place.
+    fn elsewhere(&mut self, length: usize) -> Vec<Constraint> {
+        let mut loops = Vec::new();
+        while loops.len() < WRONG {
+            let from = self.random.random_range(AROUND..KEYFRAMES - length);
+            let to = self.random.random_range(0..from - 50);
+            let shift = pose(
+                self.random.random_range(-5.0..5.0),
+                self.random.random_range(-5.0..5.0),
+                self.random.random_range(-PI..PI),
+            );
+            let truth = &self.drive.truth;
+            // As if the place of `from` lay at that of `to`.
+            let moved = truth[to] * shift * truth[from].inverse();
+            loops.extend(self.run(from, to, moved, length));
+        }
+        loops
+    }
+
+    /// Returns loops between places that are the same, some metres and degrees off, as if one street were its neighbour. They are
+    /// within the uncertainty of the odometry.
+    fn nearby(&mut self, length: usize) -> Vec<Constraint> {
+        let mut loops = Vec::new();
+        while loops.len() < WRONG {
+            let from = self.random.random_range(AROUND..KEYFRAMES - length);
+            let to = from - AROUND;
+            let truth = &self.drive.truth;
+            let (off, toward) = (
+                self.random.random_range(0.9..1.6),
+                self.random.random_range(-PI..PI),
+            );
+            let shift = pose(off * f64::cos(toward), off * f64::sin(toward), 0.01);
+            let moved = truth[to] * shift * truth[to].inverse();
+            loops.extend(self.run(from, to, moved, length));
+        }
+        loops
+    }
+
+    fn run(&self, from: usize, to: usize, moved: Pose, length: usize) -> Vec<Constraint> {
+        let truth = &self.drive.truth;
+        let one = |k: usize| {
+            let motion = (moved * truth[from + k]).inv_mul(&truth[to + k]);
+            let group = Some((from * KEYFRAMES + to) as u64);
+            Constraint {
+                kind: Kind::Loop { group },
+                ..Constraint::closing(from + k, to + k, exact(motion, LOOP))
+            }
+        };
+        (0..length).map(one).collect()
+    }
+
+    /// Returns the error of the trajectory, m, and how many of `wrong` passed the gate.
+    fn error(&self, kernel: Kernel, wrong: &[Constraint]) -> (f64, usize) {
+        let options = GraphOptions {
+            kernel,
+            ..GraphOptions::default()
+        };
+        let mut graph = PoseGraph::new(self.drive.truth[0], options);
+        for constraint in self.drive.odometry.iter().chain(&self.right) {
+            graph.apply(constraint).unwrap();
+        }
+        let mut apply = |closing| graph.apply(closing).unwrap().outcome == Outcome::Accepted;
+        let passed = wrong.iter().filter(|closing| apply(closing)).count();
+        graph.solve_anew().unwrap();
+        (rms_apart(graph.poses(), &self.drive.truth), passed)
+    }
+}
+
+#[test]
+fn wrong_loops_change_the_trajectory_by_centimetres() {
+    let mut worst: f64 = 0.0;
+    for seed in 0..4 {
+        let mut case = Case::new(seed);
+        let injected = [
+            ("elsewhere, single", case.elsewhere(1)),
+            ("elsewhere, in tens", case.elsewhere(10)),
+            ("nearby, single", case.nearby(1)),
+            ("nearby, in tens", case.nearby(10)),
+        ];
+        for kernel in KERNELS {
+            let (clean, _) = case.error(kernel, &[]);
+            for (name, wrong) in &injected {
+                let (error, passed) = case.error(kernel, wrong);
+                let (plain, _) = case.error(Kernel::None, wrong);
+                println!(
+                    "{seed} {kernel:?} {name}: {passed} of {} passed the gate; {clean:.3} m before, {error:.3} m after, {plain:.3} m \
+                     without a kernel",
+                    wrong.len()
+                );
+                worst = worst.max(error - clean);
+            }
+        }
+    }
+    assert!(worst < 0.1, "{worst} m");
+}
