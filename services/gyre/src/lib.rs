@@ -43,6 +43,7 @@ pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 /// # Errors
 /// One sentence that says what, where and what to do.
 pub fn execute(command: Command) -> Result<ExitCode, Failure> {
+    gyre_stage::wake::report_file_size_limit()?;
     match command {
         Command::Stage { name } => Ok(stage::run(&name)),
         Command::Guard => {

@@ -8,9 +8,13 @@ use gyre_odometry::OdometryConfig;
 use gyre_radar::Dataset;
 use gyre_simulator::SimulatedDrive;
 use gyre_stage::run::free_shared_memory;
+use rustix::process::{Resource, getrlimit};
 use thiserror::Error;
 
 use crate::{configuration::Configuration, print};
+
+/// Open files of the process that has most of them, masking, without observers. Measured: 105.
+pub const FILES: u64 = 120;
 
 /// Why a run cannot start.
 #[derive(Debug, Error)]
@@ -38,6 +42,14 @@ pub enum PreflightError {
         free_mb: f64,
         /// Required space.
         footprint: Footprint,
+    },
+    /// A process could not open what it needs.
+    #[error(
+        "a process may have {limit} open files, but one of a run has up to {FILES}: raise the limit with `ulimit -n 1024`"
+    )]
+    OpenFiles {
+        /// The limit.
+        limit: u64,
     },
     /// Its size cannot be read.
     #[error("cannot use shared memory at /dev/shm: {0}")]
@@ -93,6 +105,17 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
         footprint,
         truth,
     })
+}
+
+/// Checks that a process may open as many files as it needs. The transport's own errors would not say what is missing.
+///
+/// # Errors
+/// It may not.
+pub fn check_open_files() -> Result<(), PreflightError> {
+    match getrlimit(Resource::Nofile).current {
+        Some(limit) if limit < FILES => Err(PreflightError::OpenFiles { limit }),
+        _ => Ok(()),
+    }
 }
 
 /// Warns where a configuration differs from the one that its network was trained for.

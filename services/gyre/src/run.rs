@@ -13,7 +13,7 @@ use std::{
 use gyre_messages::StageId;
 use gyre_stage::{
     Manifest,
-    run::{RootError, RunRoot},
+    run::{RootError, RunRoot, sweep},
     supervise::{Ending, Plan, SuperviseError, supervise},
     wake::Signals,
 };
@@ -76,6 +76,7 @@ fn play(
         let replace = unfinished.is_none();
         simulate::store(simulation, &configuration.source.data, replace)?;
     }
+    preflight::check_open_files()?;
     let checked = preflight::check(configuration)?;
     let signals = Signals::install()?;
     let root = match RunRoot::acquire(out.path(), &signals) {
@@ -99,9 +100,9 @@ fn play(
     let started = Instant::now();
     let report = supervise(&plan, signals, &mut |event| progress.show(&event));
     progress.finish();
-    if let Err(SuperviseError::TransportStuck) = report {
+    if matches!(report, Err(SuperviseError::TransportStuck)) && !has_started_over_at(resumed) {
         drop((root, out));
-        return start_over();
+        return start_over(resumed);
     }
     let session = Session {
         scans: checked.scans,
@@ -175,6 +176,8 @@ fn write_missing_results(
         begun.poses,
         out.path().display()
     ));
+    // The run that computed them may have been killed.
+    sweep();
     let session = Session {
         scans: begun.identity.scans,
         resumed: begun.poses,
@@ -252,14 +255,23 @@ fn conclude(
     })
 }
 
+/// The environment variable of a run that has started over: the poses that it resumed after before.
+const STARTED_OVER: &str = "GYRE_STARTED_OVER";
+
+/// Returns whether the run has started over since it resumed after so many poses: once more would not help.
+fn has_started_over_at(poses: usize) -> bool {
+    env::var(STARTED_OVER).is_ok_and(|before| before == poses.to_string())
+}
+
 /// Executes the same command again: the transport hung on what a dead process left, which is removed now, and the run resumes from
 /// the journal.
-fn start_over() -> Result<ExitCode, Failure> {
+fn start_over(resumed: usize) -> Result<ExitCode, Failure> {
     print::note(
         "gyre: the transport did not finish cleaning up after a dead process; starting over from the journal",
     );
     let failed = Command::new(env::current_exe()?)
         .args(env::args_os().skip(1).filter(|a| a != "--fresh"))
+        .env(STARTED_OVER, resumed.to_string())
         .exec();
     Err(format!("cannot start over: {failed}").into())
 }

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::StageError;
 
-pub use root::{RootError, RunRoot, SHARED_MEMORY, free_shared_memory, root_of};
+pub use root::{RootError, RunRoot, SHARED_MEMORY, free_shared_memory, root_of, sweep};
 pub(crate) use root::{close_to_others, own_files, shared_memory_is_full};
 
 /// The environment variable with the path of the run's root.

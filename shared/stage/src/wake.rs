@@ -10,6 +10,7 @@ use std::{
         fd::{AsFd, BorrowedFd},
         unix::net::UnixStream,
     },
+    sync::Arc,
     time::Duration,
 };
 
@@ -24,6 +25,17 @@ use crate::{StageError, services::Listener};
 
 /// The longest wait.
 pub const MAX_WAIT: Duration = Duration::from_millis(200);
+
+/// Lets a write beyond the limit of file sizes (`ulimit -f`) fail with an error, which a sentence can report. Without this, a
+/// signal ends the process.
+///
+/// # Errors
+/// The handler cannot be installed.
+pub fn report_file_size_limit() -> Result<(), StageError> {
+    signal_hook::flag::register(consts::SIGXFSZ, Arc::default())
+        .map(drop)
+        .map_err(|error| StageError::transport("install the signal handlers", error))
+}
 
 /// Signals as file descriptors to wait for.
 #[derive(Debug)]

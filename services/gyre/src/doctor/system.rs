@@ -6,10 +6,8 @@ use gyre_masking::runtime;
 use rustix::process::{Resource, getrlimit};
 
 use super::Finding;
-use crate::machine::Machine;
+use crate::{machine::Machine, preflight::FILES};
 
-/// Open files of the process that has most of them, masking, without observers. Measured: 105.
-const FILES: u64 = 120;
 /// Files that a publisher opens for each observer: its queue, its event and its socket.
 const FILES_PER_OBSERVER: u64 = 3;
 /// Processes and threads of a run, and of the commands around it.

@@ -231,6 +231,14 @@ fn make_directory(path: &Path) -> io::Result<()> {
     }
 }
 
+/// Removes what dead runs of this user left in shared memory. [`RunRoot::acquire`] does this too.
+pub fn sweep() {
+    let runs = path_of(geteuid());
+    if check_owner_only(&runs).is_ok() {
+        remove_dead_runs(&runs);
+    }
+}
+
 /// Removes runs whose supervisor was killed: their locks are free.
 fn remove_dead_runs(runs: &Path) {
     let entries = fs::read_dir(runs).into_iter().flatten().flatten();
@@ -262,7 +270,8 @@ fn remove_files(root: &Path) {
     for (path, _) in own_files(Path::new(SHARED_MEMORY), &format!("{name}_")) {
         let _ = fs::remove_file(path);
     }
-    let _ = fs::remove_dir_all(root);
+    // An empty directory goes without a descriptor, of which there may be none left.
+    let _ = fs::remove_dir(root).or_else(|_| fs::remove_dir_all(root));
 }
 
 /// Returns the files of this user in a directory whose names begin with `prefix`.
