@@ -17,9 +17,13 @@ pub fn root(out: &Path) -> PathBuf {
 
 /// Asserts that no process, shared-memory file or temporary file of the run that wrote to `out` is there.
 pub fn assert_nothing_left(out: &Path) {
-    let root = root(out);
+    assert_nothing_left_of(&root(out));
+}
+
+/// The same of the run with this root.
+pub fn assert_nothing_left_of(root: &Path) {
     assert_eq!(
-        processes::of_run(&root),
+        processes::of_run(root),
         Vec::<processes::Pid>::new(),
         "processes of {}",
         root.display()
@@ -28,16 +32,14 @@ pub fn assert_nothing_left(out: &Path) {
         !root.exists(),
         "{} is still there: {:?}",
         root.display(),
-        files_in(&root)
+        files_in(root)
     );
     let lock = root.with_extension("lock");
     assert!(!lock.exists(), "{} is still there", lock.display());
-    assert_eq!(shared_memory_of(&root), Vec::<String>::new());
+    assert_eq!(shared_memory_of(root), Vec::<String>::new());
     let transport = std::env::temp_dir().join("iceoryx2");
     assert!(
-        !names_below(&transport)
-            .iter()
-            .any(|path| is_of(path, &root)),
+        !names_below(&transport).iter().any(|path| is_of(path, root)),
         "in {}",
         transport.display()
     );

@@ -24,7 +24,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 pub use ended::Ended;
-pub use leftovers::assert_nothing_left;
+pub use leftovers::{assert_nothing_left, assert_nothing_left_of};
 pub use processes::{Pid, cpu_time, send};
 pub use running::Running;
 pub use watch::{Watch, Watched};
@@ -55,6 +55,16 @@ pub fn folder() -> TempDir {
 /// The program under test.
 pub fn gyre() -> Command {
     Command::new(crate::PROGRAM)
+}
+
+/// The same command, executed by a program that becomes it.
+pub fn wrapped(by: &[&str], command: &Command) -> Command {
+    let mut wrapped = Command::new(by[0]);
+    wrapped
+        .args(&by[1..])
+        .arg(command.get_program())
+        .args(command.get_args());
+    wrapped
 }
 
 /// A folder of real data; says so and returns `None` where there is none.
@@ -95,7 +105,12 @@ impl Run {
 
     /// The same where the recording goes by another name.
     pub fn of_recording_named(name: &str) -> Self {
-        Self::configured(CONFIGURATION).argument("--data", name)
+        Self::small().argument("--data", name)
+    }
+
+    /// A run of small rasters whose recording is still to be named.
+    pub fn small() -> Self {
+        Self::configured(CONFIGURATION)
     }
 
     /// A run of this configuration text.

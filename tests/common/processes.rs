@@ -2,7 +2,9 @@
 
 use std::{
     collections::BTreeMap,
+    ffi::OsStr,
     fs,
+    os::unix::ffi::OsStrExt,
     path::{Path, PathBuf},
     time::Duration,
 };
@@ -52,14 +54,17 @@ pub fn guardian_of(supervisor: Pid) -> Option<Pid> {
 
 /// Processes of the run at `root`, by what their environment says.
 pub fn of_run(root: &Path) -> Vec<Pid> {
-    let mark = format!("GYRE_RUN={}", root.display());
-    let ours = |pid: &Pid| {
-        let environment = fs::read(format!("/proc/{pid}/environ")).unwrap_or_default();
-        environment
-            .split(|byte| *byte == 0)
-            .any(|variable| variable == mark.as_bytes())
-    };
-    pids().filter(ours).collect()
+    pids()
+        .filter(|pid| run_of(*pid).is_some_and(|run| run == root))
+        .collect()
+}
+
+/// The root of the run that a process belongs to, by what its environment says.
+pub fn run_of(pid: Pid) -> Option<PathBuf> {
+    let environment = fs::read(format!("/proc/{pid}/environ")).ok()?;
+    let mut variables = environment.split(|byte| *byte == 0);
+    let run = variables.find_map(|variable| variable.strip_prefix(b"GYRE_RUN="))?;
+    Some(PathBuf::from(OsStr::from_bytes(run)))
 }
 
 fn pids() -> impl Iterator<Item = Pid> {

@@ -4,6 +4,7 @@ use std::{
     env, fs,
     fs::File,
     io::Cursor,
+    os::unix::fs::symlink,
     path::{Path, PathBuf},
     sync::OnceLock,
 };
@@ -22,32 +23,63 @@ pub fn small() -> &'static Path {
 
 /// A copy of the small recording's first `scans` scans, to be corrupted. Its images are links: replace them instead of writing into them.
 pub fn copy(scans: usize) -> TempDir {
+    linked(small(), |scan| scan < scans)
+}
+
+/// A copy of a recording with the images that are kept by their numbers, which are links.
+pub fn linked(recording: &Path, keep: impl Fn(usize) -> bool) -> TempDir {
     let folder = tempfile::Builder::new()
         .prefix("gyre-recording-")
         .tempdir()
         .unwrap();
-    for name in ["radar", "gt"] {
-        fs::create_dir(folder.path().join(name)).unwrap();
-    }
-    for file in ["radar.timestamps", "dataset.toml", "gt/radar_odometry.csv"] {
-        fs::copy(small().join(file), folder.path().join(file)).unwrap();
-    }
-    for image in images(small()).iter().take(scans) {
-        std::os::unix::fs::symlink(
-            image,
-            folder.path().join("radar").join(image.file_name().unwrap()),
-        )
-        .unwrap();
+    copy_files(recording, folder.path());
+    let images = images(recording);
+    let place = folder
+        .path()
+        .join(images[0].parent().unwrap().strip_prefix(recording).unwrap());
+    for (_, image) in images.iter().enumerate().filter(|(scan, _)| keep(*scan)) {
+        symlink(image, place.join(image.file_name().unwrap())).unwrap();
     }
     folder
 }
 
+/// Copies all but the images.
+fn copy_files(from: &Path, to: &Path) {
+    for entry in fs::read_dir(from).unwrap() {
+        let path = entry.unwrap().path();
+        let copy = to.join(path.file_name().unwrap());
+        if path.is_dir() {
+            fs::create_dir(&copy).unwrap();
+            copy_files(&path, &copy);
+        } else if !is_image(&path) {
+            fs::write(&copy, fs::read(&path).unwrap()).unwrap();
+        }
+    }
+}
+
+fn is_image(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "png")
+}
+
 /// The images of a recording in the order of their times.
 pub fn images(recording: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(recording.join("radar")).unwrap();
-    let mut images: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+    let is_folder_of_images = |folder: &PathBuf| files(folder).iter().any(|file| is_image(file));
+    let folder = files(recording)
+        .into_iter()
+        .find(is_folder_of_images)
+        .unwrap();
+    let mut images: Vec<PathBuf> = files(&folder)
+        .into_iter()
+        .filter(|file| is_image(file))
+        .collect();
     images.sort();
     images
+}
+
+/// The files in a folder; none if it is a file.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten();
+    entries.map(|entry| entry.unwrap().path()).collect()
 }
 
 /// Replaces an image by the first `bytes` bytes of it.

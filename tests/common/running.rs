@@ -2,6 +2,7 @@
 
 use std::{
     collections::BTreeMap,
+    path::PathBuf,
     process::{Child, ExitStatus},
     thread,
     time::{Duration, Instant},
@@ -79,9 +80,14 @@ impl Running {
 
     /// Waits until so many poses are journalled, or the run is over.
     pub fn await_poses_or_end(&mut self, poses: usize) {
-        while self.poses() < poses && self.child.try_wait().unwrap().is_none() {
+        while self.poses() < poses && !self.is_over() {
             thread::sleep(LOOK);
         }
+    }
+
+    /// Returns whether the run has ended.
+    pub fn is_over(&mut self) -> bool {
+        self.child.try_wait().unwrap().is_some()
     }
 
     /// Poses in the journal.
@@ -112,20 +118,34 @@ impl Running {
         self
     }
 
+    /// The root of the run, as a stage knows it; `None` if none lives.
+    pub fn root(&self) -> Option<PathBuf> {
+        self.stages().into_values().find_map(processes::run_of)
+    }
+
     /// The entry in the environment of each of its stages.
     pub fn mark(&self) -> String {
         format!("GYRE_RUN={}", leftovers::root(self.run.out()).display())
     }
 
     /// Waits until the run ends, and asserts that it leaves nothing behind.
-    pub fn finish(mut self) -> Ended {
+    pub fn finish(self) -> Ended {
+        let out = self.run.out().to_owned();
+        let ended = self.end();
+        leftovers::assert_nothing_left(&out);
+        ended
+    }
+
+    /// Waits until the run ends, perhaps by a signal, which leaves its files to the next run.
+    pub fn end(mut self) -> Ended {
         let status = self.wait();
-        leftovers::assert_nothing_left(self.run.out());
-        Ended {
+        let ended = Ended {
             status,
             stdout: self.run.said("stdout.txt"),
             stderr: self.run.said("stderr.txt"),
-        }
+        };
+        println!("{status}\n{}", ended.stderr);
+        ended
     }
 
     /// `kill -9` of the supervisor; returns when its stages have followed it.

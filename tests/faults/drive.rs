@@ -1,0 +1,111 @@
+//! What is played while the faults happen.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::OnceLock,
+};
+
+use tempfile::TempDir;
+
+use crate::common::{Run, real_data, recording, runtime_is_installed};
+
+/// A recording and the configuration of its runs.
+pub struct Drive {
+    recording: PathBuf,
+    /// Scans of the recording.
+    pub scans: usize,
+    configured: fn() -> Run,
+    undisturbed: OnceLock<Undisturbed>,
+}
+
+/// The results that must be the same.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Results {
+    odometry: String,
+    trajectory: String,
+}
+
+/// A run that nothing disturbs.
+pub struct Undisturbed {
+    /// Its results.
+    pub results: Results,
+    /// The size of its folder of results.
+    pub bytes: u64,
+    /// The shared memory that it announces.
+    pub shared_memory_bytes: u64,
+}
+
+impl Results {
+    /// The results of a run that is complete.
+    pub fn of(run: &Run) -> Self {
+        Self {
+            odometry: run.odometry(),
+            trajectory: run.result("trajectory.tum"),
+        }
+    }
+}
+
+impl Drive {
+    /// The small simulated recording.
+    pub fn small() -> Self {
+        Self {
+            recording: recording::small().to_owned(),
+            scans: recording::SCANS,
+            configured: Run::small,
+            undisturbed: OnceLock::new(),
+        }
+    }
+
+    /// A RADIATE sequence with refinement and learned masks, where there is one.
+    pub fn real() -> Option<Self> {
+        let recording = real_data("radiate-2019-02-12").filter(|_| runtime_is_installed())?;
+        let configured = || {
+            let project = Path::new(crate::PROJECT);
+            Run::of_file(&project.join("configs/radiate.toml"))
+                .masked_by(&project.join("models/gyre-255.toml"))
+        };
+        Some(Self {
+            scans: recording::images(&recording).len(),
+            recording,
+            configured,
+            undisturbed: OnceLock::new(),
+        })
+    }
+
+    /// A run of the drive as fast as it goes, with results of its own.
+    pub fn run(&self) -> Run {
+        self.run_of(&self.recording)
+    }
+
+    /// A run of another recording of the same kind.
+    pub fn run_of(&self, recording: &Path) -> Run {
+        (self.configured)().data(recording)
+    }
+
+    /// A copy of the recording that may be damaged, with the images that are kept by their numbers.
+    pub fn copy(&self, keep: impl Fn(usize) -> bool) -> TempDir {
+        recording::linked(&self.recording, keep)
+    }
+
+    /// The run that nothing disturbs.
+    pub fn undisturbed(&self) -> &Undisturbed {
+        self.undisturbed.get_or_init(|| {
+            let run = self.run();
+            run.complete();
+            let announced = run.summary()["shared_memory"]["segments"].clone();
+            let segments = announced.as_array().unwrap().iter();
+            Undisturbed {
+                results: Results::of(&run),
+                bytes: size(run.out()),
+                shared_memory_bytes: segments.map(|segment| segment[1].as_u64().unwrap()).sum(),
+            }
+        })
+    }
+}
+
+fn size(path: &Path) -> u64 {
+    let entries = fs::read_dir(path).into_iter().flatten().flatten();
+    let below: u64 = entries.map(|entry| size(&entry.path())).sum();
+    below + fs::metadata(path).map_or(0, |file| file.len())
+}

@@ -1,0 +1,115 @@
+//! `kill -9` of any process at any point of its life, and polite ends.
+
+use std::time::Duration;
+
+use gyre_pose_integration::journal;
+use gyre_refinement::checkpoint;
+use rand::{Rng, seq::IndexedRandom};
+use rustix::process::Signal;
+
+use crate::{
+    common::{STAGES, send},
+    scene::{Outcome, Scene},
+    watch::Watch,
+};
+
+/// No process waits longer between two writes.
+const NO_MORE_WRITES: Duration = Duration::from_secs(2);
+
+/// One stage after the other.
+pub fn stage(scene: &mut Scene) -> Option<Outcome> {
+    let run = scene.run();
+    let mut running = run.start();
+    let mut killed = None;
+    for _ in 0..scene.rng.random_range(1..=3) {
+        if scene.moment(&mut running).is_some() {
+            killed = killed.or(scene.kill_stage(&running));
+        }
+    }
+    let outcome = scene.finished(&run, &running.finish());
+    killed.map(|()| outcome)
+}
+
+/// Two to all stages at once.
+pub fn several(scene: &mut Scene) -> Option<Outcome> {
+    let run = scene.run();
+    let mut running = run.start();
+    running.await_stages();
+    scene.moment(&mut running)?;
+    let mut stages: Vec<_> = running.stages().into_values().collect();
+    while stages.len() > 2 && !scene.one_in(4) {
+        stages.swap_remove(scene.rng.random_range(0..stages.len()));
+    }
+    stages.iter().for_each(|pid| send(*pid, Signal::KILL));
+    let outcome = scene.finished(&run, &running.finish());
+    (stages.len() > 1).then_some(outcome)
+}
+
+/// A stage in the first milliseconds of its life, and perhaps its successor too.
+pub fn at_the_start(scene: &mut Scene) -> Option<Outcome> {
+    let run = scene.run();
+    let mut running = run.start();
+    let stage = STAGES.choose(&mut scene.rng)?;
+    let first = running.await_stage(stage);
+    scene.pause(30);
+    send(first, Signal::KILL);
+    if scene.one_in(2) {
+        let second = running.await_other_stage(stage, first);
+        scene.pause(30);
+        send(second, Signal::KILL);
+    }
+    Some(scene.finished(&run, &running.finish()))
+}
+
+/// Refinement between two writes of its map, or pose-integration at a record of its journal.
+pub fn at_a_write(scene: &mut Scene) -> Option<Outcome> {
+    let run = scene.run();
+    let mut running = run.start();
+    let (stage, file) = match scene.one_in(3) {
+        true => ("pose-integration", journal::path(run.out())),
+        false => ("refinement", checkpoint::path(run.out())),
+    };
+    running.await_poses_or_end(scene.rng.random_range(1..scene.drive.scans));
+    let pid = *running.stages().get(stage)?;
+    let writes = scene.rng.random_range(1..=4);
+    Watch::of(&file)?.wait(writes, NO_MORE_WRITES, |_| true)?;
+    send(pid, Signal::KILL);
+    Some(scene.finished(&run, &running.finish()))
+}
+
+/// The supervisor, up to three times; its stages follow it.
+pub fn supervisor(scene: &mut Scene) -> Option<Outcome> {
+    let run = scene.run();
+    for _ in 0..scene.rng.random_range(1..=3) {
+        let mut running = run.start();
+        scene.moment(&mut running)?;
+        running.kill_supervisor();
+    }
+    Some(scene.resumed(&run))
+}
+
+/// The supervisor while it writes the results.
+pub fn at_the_results(scene: &mut Scene) -> Option<Outcome> {
+    let run = scene.run();
+    let mut running = run.start();
+    running.await_poses_or_end(1);
+    let watch = Watch::of(run.out())?;
+    let writes = scene.rng.random_range(1..=20);
+    watch.wait(writes, Duration::from_secs(60), |file| file != "log.jsonl")?;
+    running.kill_supervisor();
+    Some(scene.resumed(&run))
+}
+
+/// SIGINT or SIGTERM. Before there is anything to remove, it simply ends the process.
+pub fn interrupt(scene: &mut Scene) -> Option<Outcome> {
+    let run = scene.run();
+    let mut running = run.start();
+    scene.moment(&mut running)?;
+    running.signal(*[Signal::INT, Signal::TERM].choose(&mut scene.rng)?);
+    let ended = running.finish();
+    if ended.status.success() {
+        return Some(scene.finished(&run, &ended));
+    }
+    assert!(matches!(ended.code(), Some(130) | None), "{ended:?}");
+    Some(scene.resumed(&run))
+}
