@@ -185,6 +185,20 @@ fn the_solution_from_the_odometry_does_not_depend_on_the_order_of_loops() {
 }
 
 #[test]
+fn a_graph_solved_again_after_each_loop_ends_where_one_solution_does() {
+    let (drive, loops) = three_rounds(4);
+    let mut at_once = graph(&drive, &loops, least_squares());
+    at_once.solve().unwrap();
+    let mut in_steps = graph(&drive, &[], least_squares());
+    for closing in &loops {
+        in_steps.apply(closing).unwrap();
+        in_steps.solve().unwrap();
+    }
+    let (position, yaw) = apart(in_steps.poses(), at_once.poses());
+    assert!(position < 1e-6 && yaw < 1e-8, "{position} m, {yaw} rad");
+}
+
+#[test]
 fn a_loop_is_tested_against_the_odometry_in_either_direction() {
     let (drive, loops) = three_rounds(8);
     let closing = loops[0];
