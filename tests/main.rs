@@ -8,6 +8,7 @@ mod bad_input;
 mod breaks;
 mod doctor;
 mod evaluate;
+mod foreign_stages;
 mod full_disk;
 mod in_process;
 mod joint_search;

@@ -94,6 +94,7 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
     let limits = Limits {
         scan_bytes: dataset.limits().bytes,
         raster_cells: configuration.odometry.raster.n * configuration.odometry.raster.n,
+        cell_m: configuration.odometry.raster.cell_m,
         rasters: masker.scans(),
         points: configuration.odometry.points.capacity,
     };

@@ -124,6 +124,7 @@ mod tests {
         let limits = Limits {
             scan_bytes: 1,
             raster_cells: 1,
+            cell_m: 0.8,
             rasters: 1,
             points: 0,
         };

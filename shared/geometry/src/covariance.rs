@@ -21,6 +21,31 @@ pub fn unpack(&[xx, xy, xyaw, yy, yyaw, yawyaw]: &Packed) -> Matrix3<f64> {
     Matrix3::new(xx, xy, xyaw, xy, yy, yyaw, xyaw, yyaw, yawyaw)
 }
 
+/// Share by which rounding may take a covariance out of the cone of positive semidefinite matrices.
+const ROUNDING: f64 = 1e-6;
+
+/// Returns whether a covariance is finite and positive semidefinite, but for rounding: no variance is negative, and the correlations
+/// are possible together.
+pub fn is_positive_semidefinite(packed: &Packed) -> bool {
+    let [xx, xy, xyaw, yy, yyaw, yawyaw] = *packed;
+    // The correlation of two values; without variance there must be no covariance.
+    let correlation = |between: f64, a: f64, b: f64| match a * b > 0.0 {
+        true => between / (a.sqrt() * b.sqrt()),
+        false if between == 0.0 => 0.0,
+        false => f64::INFINITY,
+    };
+    let (a, b, c) = (
+        correlation(xy, xx, yy),
+        correlation(xyaw, xx, yawyaw),
+        correlation(yyaw, yy, yawyaw),
+    );
+    let determinant = 1.0 + 2.0 * a * b * c - a * a - b * b - c * c;
+    packed.iter().all(|value| value.is_finite())
+        && [xx, yy, yawyaw].iter().all(|variance| *variance >= 0.0)
+        && [a, b, c].iter().all(|share| share.abs() <= 1.0 + ROUNDING)
+        && determinant >= -ROUNDING
+}
+
 /// Returns the Jacobian of a composed pose with respect to its first pose, where (x, y) is the displacement from the first to the
 /// composed pose, m, along the same axes (Checchin et al., Eq. 1).
 pub fn lever(x_m: f64, y_m: f64) -> Matrix3<f64> {
@@ -103,6 +128,29 @@ mod tests {
         let covariance = unpack(&packed);
         assert_eq!(covariance, covariance.transpose());
         assert_eq!(pack(&covariance), packed);
+    }
+
+    #[test]
+    fn a_covariance_is_finite_and_has_no_negative_direction() {
+        for packed in [
+            [0.0; 6],
+            [1.0, 0.0, 0.0, 0.0, 0.0, 2.0],
+            [1.0, 0.5, 0.2, 1.0, -0.3, 1.0],
+            [4.0, 2.0, 2.0, 1.0, 1.0, 1.0],
+            [1e-12, 0.0, 0.0, 1e12, 0.0, 1e-6],
+        ] {
+            assert!(is_positive_semidefinite(&packed), "{packed:?}");
+        }
+        for packed in [
+            [-1.0, 0.0, 0.0, 1.0, 0.0, 1.0],
+            [1.0, 1.1, 0.0, 1.0, 0.0, 1.0],
+            [1.0, 0.9, 0.9, 1.0, -0.9, 1.0],
+            [0.0, 0.1, 0.0, 1.0, 0.0, 1.0],
+            [f64::NAN, 0.0, 0.0, 1.0, 0.0, 1.0],
+            [1.0, 0.0, 0.0, f64::INFINITY, 0.0, 1.0],
+        ] {
+            assert!(!is_positive_semidefinite(&packed), "{packed:?}");
+        }
     }
 
     #[test]

@@ -3,6 +3,8 @@
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
+use crate::check::{Violation, require};
+
 /// Bits of [`Item::flags`].
 pub mod flag {
     /// End of the stream: carries no scan and follows the last one in order.
@@ -14,6 +16,9 @@ pub mod flag {
     pub const SYNC: u32 = 4;
     /// On `pose`: the trajectory is empty, and the stream begins with the first scan.
     pub const BASE: u32 = 8;
+
+    /// All of them.
+    pub(crate) const ALL: u32 = END | BREAK | SYNC | BASE;
 }
 
 /// The stages of a pipeline in the order of the stream; a stage's value is the index of its [`Hop`]. A run has either the two
@@ -113,6 +118,26 @@ pub struct Item {
 }
 
 impl Item {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// The first violation.
+    pub(crate) fn check(&self) -> Result<(), Violation> {
+        require(
+            self.flags & !flag::ALL == 0,
+            "flags",
+            self.flags,
+            "bits of 1 to 8",
+        )?;
+        let previous = self.previous_scan;
+        require(
+            previous <= self.scan,
+            "previous_scan",
+            previous,
+            format_args!("at most {}, its scan", self.scan),
+        )
+    }
+
     /// Returns whether all of these flags are set.
     pub fn is(&self, flags: u32) -> bool {
         self.flags & flags == flags

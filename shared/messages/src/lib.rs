@@ -14,12 +14,14 @@
 //! All headers start with an [`Item`], which identifies the scan and carries the time stamps of each stage. Type names carry a
 //! version, so that two builds of different versions reject each other's messages instead of misreading them.
 //!
-//! Reading order: `item`, `limits`, `message` (the contract of a message type), one file per message, `topics`.
+//! Reading order: `item`, `limits`, `message` (the contract of a message type), `check` (its enforcement), one file per message,
+//! `topics`.
 
 // The compiler cannot check that a type may be shared between processes; each `unsafe impl` states why it may.
 #![allow(unsafe_code)]
 
 mod block;
+mod check;
 mod item;
 mod limits;
 mod masked;
@@ -33,6 +35,7 @@ mod scan;
 mod topics;
 
 pub use block::{ByteBlock, FloatBlock};
+pub use check::Violation;
 pub use item::{Hop, Hops, Item, StageId, flag};
 pub use limits::{History, Limits, TopicSizes, Window, WindowError};
 pub use masked::{Masked, MaskedHeader, MaskedParts, Pair, mask_kind};

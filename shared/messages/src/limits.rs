@@ -133,17 +133,31 @@ impl Window {
     }
 }
 
-/// Sizes of the largest messages.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Sizes of the largest messages, and of the rasters.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Limits {
     /// Bytes of a polar scan.
     pub scan_bytes: usize,
     /// Cells of one raster.
     pub raster_cells: usize,
+    /// Size of a cell, m.
+    pub cell_m: f32,
     /// Rasters in a `masked` message: 1 or 2.
     pub rasters: usize,
     /// Points in a `masked` message.
     pub points: usize,
+}
+
+impl Limits {
+    /// Returns the cells on each side of a raster.
+    pub fn side(&self) -> usize {
+        self.raster_cells.isqrt()
+    }
+
+    /// Returns the width of a raster, m.
+    pub fn extent_m(&self) -> f64 {
+        self.side() as f64 * f64::from(self.cell_m)
+    }
 }
 
 #[cfg(test)]

@@ -7,7 +7,8 @@ use ndarray::{ArrayView2, ArrayViewMut2};
 
 use crate::{
     block::{ByteBlock, FloatBlock},
-    item::Item,
+    check::{Violation, finite, require},
+    item::{Item, StageId},
     limits::{History, Limits},
     message::{Message, header},
 };
@@ -19,11 +20,20 @@ pub enum Masked {}
 
 impl Message for Masked {
     const TOPIC: &'static str = "masked";
+    const SENDERS: &'static [StageId] = &[StageId::Masking];
     // Rotation search, translation search and refinement.
     const READERS: usize = 3;
     const HISTORY: History = History::Stream;
     type Header = MaskedHeader;
     type Element = FloatBlock;
+
+    fn check_content(
+        header: &Self::Header,
+        payload: &[Self::Element],
+        limits: &Limits,
+    ) -> Result<(), Violation> {
+        header.check(bytemuck::cast_slice(payload), limits)
+    }
 
     fn max_elements(limits: &Limits) -> usize {
         limits.rasters * FloatBlock::count(limits.raster_cells)
@@ -90,6 +100,49 @@ pub struct Pair<'a> {
 }
 
 impl MaskedHeader {
+    /// Checks the sizes, the length of the payload, and that the points are finite. The rasters are not looked at.
+    fn check(&self, values: &[f32], limits: &Limits) -> Result<(), Violation> {
+        let (n, rasters, points) = (self.n as usize, self.rasters as usize, self.points as usize);
+        require(n == limits.side(), "n", n, limits.side())?;
+        require(
+            rasters == limits.rasters,
+            "rasters",
+            rasters,
+            limits.rasters,
+        )?;
+        require(
+            self.cell_m == limits.cell_m,
+            "cell_m",
+            self.cell_m,
+            limits.cell_m,
+        )?;
+        require(
+            points <= limits.points,
+            "points",
+            points,
+            format_args!("at most {}", limits.points),
+        )?;
+        require(self.mask <= mask_kind::LEARNED, "mask", self.mask, "0 to 2")?;
+        let [vx, vy, yaw_rate] = self.twist.map(f64::from);
+        finite([("twist[0]", vx), ("twist[1]", vy), ("twist[2]", yaw_rate)])?;
+        let points = self.points(values).ok_or_else(|| {
+            let bytes = size_of_val(values);
+            Violation(format!("its payload of {bytes} bytes is shorter than its header says: {rasters} rasters of {n} x {n} cells and {points} points"))
+        })?;
+        let is_finite = |point: &SparsePoint| {
+            <[f32; 5]>::from(*point)
+                .iter()
+                .all(|value| value.is_finite())
+        };
+        match points.iter().position(|point| !is_finite(point)) {
+            None => Ok(()),
+            Some(index) => Err(Violation(format!(
+                "point {index} is {:?}, but must be finite",
+                points[index]
+            ))),
+        }
+    }
+
     /// Returns the number of values of one raster, rounded up to whole blocks.
     fn raster_values(n: usize) -> Option<usize> {
         let cells = n.checked_mul(n)?;

@@ -6,7 +6,8 @@ use bytemuck::Pod;
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
-    item::Item,
+    check::Violation,
+    item::{Item, StageId, flag},
     limits::{History, Limits, TopicSizes, Window},
 };
 
@@ -22,6 +23,8 @@ pub trait Header: ZeroCopySend + Default + Debug + 'static {
 pub trait Message: 'static {
     /// The name of the topic.
     const TOPIC: &'static str;
+    /// The stages of which one publishes the topic.
+    const SENDERS: &'static [StageId];
     /// Number of processes that subscribe to the topic.
     const READERS: usize;
     /// The reach of the publisher's history.
@@ -35,6 +38,34 @@ pub trait Message: 'static {
     fn max_elements(_limits: &Limits) -> usize {
         1
     }
+
+    /// Checks that a message keeps its contract, whatever program sent it. A receiver that has checked a message may rely on its
+    /// numbers and on the length of its payload.
+    ///
+    /// # Errors
+    /// The first violation.
+    fn check(
+        header: &Self::Header,
+        payload: &[Self::Element],
+        limits: &Limits,
+    ) -> Result<(), Violation> {
+        let item = header.item();
+        item.check()?;
+        match item.is(flag::END) {
+            true => Ok(()),
+            false => Self::check_content(header, payload, limits),
+        }
+    }
+
+    /// Checks all but the item; the end of the stream has no content.
+    ///
+    /// # Errors
+    /// The first violation.
+    fn check_content(
+        header: &Self::Header,
+        payload: &[Self::Element],
+        limits: &Limits,
+    ) -> Result<(), Violation>;
 
     /// The sizes of the topic's queues.
     fn sizes(window: &Window) -> TopicSizes {

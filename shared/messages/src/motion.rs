@@ -2,13 +2,15 @@
 
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{Pose, Twist, UncertainMotion, covariance, pose, xy_yaw};
+use gyre_radar::MAX_INTERVAL_NS;
 use gyre_scan_matching::{MotionMatch, Refined};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
     block::FloatBlock,
-    item::Item,
-    limits::History,
+    check::{Violation, covariance as check_covariance, finite, planar, require},
+    item::{Item, StageId},
+    limits::{History, Limits},
     message::{Message, header},
     refinement::RefinementRecord,
     rotation::RotationEstimate,
@@ -20,11 +22,20 @@ pub enum Motion {}
 
 impl Message for Motion {
     const TOPIC: &'static str = "motion";
+    const SENDERS: &'static [StageId] = &[StageId::TranslationSearch, StageId::JointSearch];
     // Masking, and the next stage in the stream.
     const READERS: usize = 2;
     const HISTORY: History = History::Feedback;
     type Header = MotionHeader;
     type Element = FloatBlock;
+
+    fn check_content(
+        header: &Self::Header,
+        _: &[Self::Element],
+        limits: &Limits,
+    ) -> Result<(), Violation> {
+        header.motion.check(limits)
+    }
 }
 header!(MotionHeader);
 
@@ -71,7 +82,41 @@ impl SearchedMotion {
     }
 }
 
+/// Longest motion in widths of a raster. The search stays within one; a prediction over a gap may be longer.
+const MAX_EXTENTS: f64 = 10.0;
+
 impl MotionEstimate {
+    pub(crate) fn check(&self, limits: &Limits) -> Result<(), Violation> {
+        let motion = [
+            ("x_m", self.x_m),
+            ("y_m", self.y_m),
+            ("yaw_rad", self.yaw_rad),
+        ];
+        planar(motion, MAX_EXTENTS * limits.extent_m())?;
+        let [x_m, y_m, yaw_rad] = self.searched;
+        let searched = [
+            ("searched[0]", x_m),
+            ("searched[1]", y_m),
+            ("searched[2]", yaw_rad),
+        ];
+        planar(searched, limits.extent_m())?;
+        check_covariance(&self.covariance)?;
+        let intervals = 0..=MAX_INTERVAL_NS;
+        let expected = format_args!("from 0 to {MAX_INTERVAL_NS}");
+        require(
+            intervals.contains(&self.interval_ns),
+            "interval_ns",
+            self.interval_ns,
+            expected,
+        )?;
+        finite([
+            ("score", self.score),
+            ("runner_up_score", self.runner_up_score),
+        ])?;
+        self.rotation.check()?;
+        self.refinement.check()
+    }
+
     /// Creates a motion from the result of a search, with the rotation that it was searched with.
     pub fn from_search(found: &MotionMatch, rotation: RotationEstimate, interval_ns: i64) -> Self {
         Self {

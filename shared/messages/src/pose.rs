@@ -6,8 +6,9 @@ use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
     block::FloatBlock,
-    item::Item,
-    limits::History,
+    check::{Violation, covariance as check_covariance, planar},
+    item::{Item, StageId},
+    limits::{History, Limits},
     message::{Message, header},
     motion::MotionEstimate,
 };
@@ -18,11 +19,20 @@ pub enum Pose {}
 
 impl Message for Pose {
     const TOPIC: &'static str = "pose";
+    const SENDERS: &'static [StageId] = &[StageId::PoseIntegration];
     // The source, masking and the supervisor.
     const READERS: usize = 3;
     const HISTORY: History = History::Feedback;
     type Header = PoseHeader;
     type Element = FloatBlock;
+
+    fn check_content(
+        header: &Self::Header,
+        _: &[Self::Element],
+        limits: &Limits,
+    ) -> Result<(), Violation> {
+        header.check(limits)
+    }
 }
 header!(PoseHeader);
 
@@ -47,7 +57,21 @@ pub struct PoseHeader {
     pub trajectory_version: u64,
 }
 
+/// Farthest pose from the first one, m: more than a way around the earth.
+const MAX_DISTANCE_M: f64 = 1e8;
+
 impl PoseHeader {
+    fn check(&self, limits: &Limits) -> Result<(), Violation> {
+        let pose = [
+            ("x_m", self.x_m),
+            ("y_m", self.y_m),
+            ("yaw_rad", self.yaw_rad),
+        ];
+        planar(pose, MAX_DISTANCE_M)?;
+        check_covariance(&self.covariance)?;
+        self.motion.check(limits)
+    }
+
     /// Returns the pose with its covariance.
     pub fn pose(&self) -> UncertainMotion {
         UncertainMotion {

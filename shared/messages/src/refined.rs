@@ -1,6 +1,13 @@
 //! `refined`: the motion between two scans after refinement.
 
-use crate::{block::FloatBlock, limits::History, message::Message, motion::MotionHeader};
+use crate::{
+    block::FloatBlock,
+    check::Violation,
+    item::StageId,
+    limits::{History, Limits},
+    message::Message,
+    motion::MotionHeader,
+};
 
 /// As [`Motion`](crate::Motion), in runs with refinement. The searched motion stays beside the refined one.
 #[derive(Debug)]
@@ -8,8 +15,17 @@ pub enum Refined {}
 
 impl Message for Refined {
     const TOPIC: &'static str = "refined";
+    const SENDERS: &'static [StageId] = &[StageId::Refinement];
     const READERS: usize = 1;
     const HISTORY: History = History::Feedback;
     type Header = MotionHeader;
     type Element = FloatBlock;
+
+    fn check_content(
+        header: &Self::Header,
+        _: &[Self::Element],
+        limits: &Limits,
+    ) -> Result<(), Violation> {
+        header.motion.check(limits)
+    }
 }

@@ -4,6 +4,8 @@ use bytemuck::{Pod, Zeroable};
 use gyre_scan_matching::{InitialGuess, Outcome};
 use iceoryx2::prelude::ZeroCopySend;
 
+use crate::check::{Violation, finite, require};
+
 /// Values of [`RefinementRecord::outcome`].
 pub mod outcome {
     /// The searched motion: there is no refinement, or the chain starts here.
@@ -41,6 +43,25 @@ pub struct RefinementRecord {
     pub overlap: f64,
     /// Weight of the scan's points relative to the running mean.
     pub support: f64,
+}
+
+impl RefinementRecord {
+    pub(crate) fn check(&self) -> Result<(), Violation> {
+        require(
+            self.outcome <= outcome::PREDICTED,
+            "outcome",
+            self.outcome,
+            "0 to 3",
+        )?;
+        let guess = self.initial_guess;
+        require(
+            guess <= initial_guess::YAW_OFFSET,
+            "initial_guess",
+            guess,
+            "0 to 3",
+        )?;
+        finite([("overlap", self.overlap), ("support", self.support)])
+    }
 }
 
 impl From<&gyre_scan_matching::Refined> for RefinementRecord {

@@ -1,13 +1,16 @@
 //! `rotation`: the rotation of the vehicle between two scans.
 
+use std::f64::consts::PI;
+
 use bytemuck::{Pod, Zeroable};
 use gyre_scan_matching::RotationMatch;
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
     block::FloatBlock,
-    item::Item,
-    limits::History,
+    check::{Violation, finite, within},
+    item::{Item, StageId},
+    limits::{History, Limits},
     message::{Message, header},
 };
 
@@ -17,10 +20,19 @@ pub enum Rotation {}
 
 impl Message for Rotation {
     const TOPIC: &'static str = "rotation";
+    const SENDERS: &'static [StageId] = &[StageId::RotationSearch];
     const READERS: usize = 1;
     const HISTORY: History = History::Stream;
     type Header = RotationHeader;
     type Element = FloatBlock;
+
+    fn check_content(
+        header: &Self::Header,
+        _: &[Self::Element],
+        _: &Limits,
+    ) -> Result<(), Violation> {
+        header.rotation.check()
+    }
 }
 header!(RotationHeader);
 
@@ -39,6 +51,19 @@ pub struct RotationEstimate {
     pub runner_up_rad: f64,
     /// Height of the second highest peak.
     pub runner_up_score: f64,
+}
+
+impl RotationEstimate {
+    pub(crate) fn check(&self) -> Result<(), Violation> {
+        let turn = -PI..=PI;
+        within("angle_rad", self.angle_rad, turn.clone())?;
+        within("variance_rad2", self.variance_rad2, 0.0..=f64::MAX)?;
+        within("runner_up_rad", self.runner_up_rad, turn)?;
+        finite([
+            ("score", self.score),
+            ("runner_up_score", self.runner_up_score),
+        ])
+    }
 }
 
 impl From<&RotationMatch> for RotationEstimate {

@@ -6,7 +6,8 @@ use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
     block::ByteBlock,
-    item::Item,
+    check::{Violation, require},
+    item::{Item, StageId},
     limits::{History, Limits, TopicSizes, Window},
     message::{Message, header},
 };
@@ -17,10 +18,19 @@ pub enum Scan {}
 
 impl Message for Scan {
     const TOPIC: &'static str = "scan";
+    const SENDERS: &'static [StageId] = &[StageId::RadarReplay];
     const READERS: usize = 1;
     const HISTORY: History = History::Stream;
     type Header = ScanHeader;
     type Element = ByteBlock;
+
+    fn check_content(
+        header: &Self::Header,
+        payload: &[Self::Element],
+        _: &Limits,
+    ) -> Result<(), Violation> {
+        header.check(bytemuck::cast_slice(payload))
+    }
 
     fn max_elements(limits: &Limits) -> usize {
         ByteBlock::count(limits.scan_bytes)
@@ -98,6 +108,29 @@ impl ScanHeader {
             stamp_ns: &self.azimuth_stamp_ns[..geometry.azimuths],
             flags: &self.azimuth_flags[..geometry.azimuths],
         })
+    }
+
+    /// Checks the geometry, the angles and the times, and that the payload is as long as the geometry says.
+    fn check(&self, bytes: &[u8]) -> Result<(), Violation> {
+        let azimuths = self.azimuths as usize;
+        let range = format_args!("1 to {MAX_AZIMUTHS}");
+        require(
+            (1..=MAX_AZIMUTHS).contains(&azimuths),
+            "azimuths",
+            azimuths,
+            range,
+        )?;
+        let scan = self.view(bytes).ok_or_else(|| {
+            Violation(format!(
+                "its payload of {} bytes is shorter than its header says: {azimuths} azimuths x {} bins, {} bytes apart from byte {} on",
+                bytes.len(),
+                self.bins,
+                self.stride,
+                self.first_byte
+            ))
+        })?;
+        let checked = scan.check().and_then(|()| scan.check_times());
+        checked.map_err(|error| Violation(error.to_string()))
     }
 
     /// Returns the buffers that a dataset reader fills: the tables of this header and the bytes of the payload.

@@ -84,6 +84,8 @@ impl Odometry {
     /// # Errors
     /// A scan that cannot be used. It is skipped: the next scan is registered against the one before the error.
     pub fn register(&mut self, scan: &PolarScan<'_>) -> Result<Registered, OdometryError> {
+        scan.check()?;
+        scan.check_times()?;
         if self.seq > 0 && !continues(self.previous.stamp_ns, scan.geometry.stamp_ns) {
             self.restart();
         }

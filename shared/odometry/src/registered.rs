@@ -62,9 +62,9 @@ pub enum OdometryError {
     /// The scan cannot be rasterised or masked.
     #[error(transparent)]
     Mask(#[from] MaskError),
-    /// The points cannot be extracted.
+    /// The scan is inconsistent, or its times are not those of one sweep.
     #[error(transparent)]
-    Points(#[from] ScanError),
+    Scan(#[from] ScanError),
     /// The raster cannot be searched.
     #[error(transparent)]
     Search(#[from] ShapeError),

@@ -63,10 +63,12 @@ pub enum StageError {
         got: u64,
     },
     /// A message violates its contract.
-    #[error("topic `{topic}`, item {seq}: {reason}")]
+    #[error("topic `{topic}`, item {seq}, sent by {sender}: {reason}")]
     Malformed {
         /// The topic.
         topic: &'static str,
+        /// The stage that sent it.
+        sender: &'static str,
         /// The sequence number.
         seq: u64,
         /// The violation.
@@ -117,9 +119,10 @@ impl StageError {
     /// Returns the exit code of the process.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Transport { .. } | Self::SequenceGap { .. } | Self::NoMemory { .. } => {
-                Self::TRANSIENT
-            }
+            Self::Transport { .. }
+            | Self::SequenceGap { .. }
+            | Self::Malformed { .. }
+            | Self::NoMemory { .. } => Self::TRANSIENT,
             _ => Self::PERMANENT,
         }
     }

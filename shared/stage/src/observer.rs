@@ -199,7 +199,9 @@ impl<M: Message> Observer<'_, M> {
 
     fn receive(&self) -> Result<Option<Received<M>>, StageError> {
         match self.subscriber.receive() {
-            Ok(sample) => Ok(sample.map(Received::new)),
+            Ok(sample) => sample
+                .map(|sample| Received::checked(sample, &self.run.manifest.limits))
+                .transpose(),
             // The publisher has just died or is being restarted. Its next message is found at the next wake-up.
             Err(ReceiveError::ConnectionFailure(_)) => Ok(None),
             Err(error) => Err(StageError::transport(

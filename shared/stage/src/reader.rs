@@ -1,14 +1,14 @@
 //! The subscriber of a topic: the raw queue, or its items in order.
 
 use bytemuck::Pod;
-use gyre_messages::{Header, Item, Message};
+use gyre_messages::{Header, Item, Limits, Message, StageId};
 use iceoryx2::{
     port::{ReceiveError, subscriber::Subscriber},
     sample::Sample,
 };
 
 use crate::{
-    Launch, StageError, clock,
+    Launch, Manifest, StageError, clock,
     services::{self, Ipc, Listener, Node, Notifier},
 };
 
@@ -20,10 +20,21 @@ pub struct Received<M: Message> {
 }
 
 impl<M: Message> Received<M> {
-    pub(crate) fn new(sample: Sample<Ipc, [M::Element], M::Header>) -> Self {
-        Self {
+    /// Checks a message that another process has sent.
+    ///
+    /// # Errors
+    /// A violation of its contract, with the sender's name.
+    pub(crate) fn checked(
+        sample: Sample<Ipc, [M::Element], M::Header>,
+        limits: &Limits,
+    ) -> Result<Self, StageError> {
+        let received = Self {
             sample,
             received_ns: clock::now_ns(),
+        };
+        match M::check(received.header(), received.sample.payload(), limits) {
+            Ok(()) => Ok(received),
+            Err(violation) => Err(received.malformed(violation.to_string())),
         }
     }
 
@@ -42,10 +53,19 @@ impl<M: Message> Received<M> {
         bytemuck::cast_slice(self.sample.payload())
     }
 
+    /// Returns the stage that sent it: the one of the topic's that has stamped it.
+    fn sender(&self) -> StageId {
+        let hops = &self.item().hops;
+        let mut senders = M::SENDERS.iter().copied();
+        let stamped = senders.find(|stage| hops[*stage as usize].published_ns != 0);
+        stamped.unwrap_or(M::SENDERS[0])
+    }
+
     /// Creates an error that names this message.
     pub fn malformed(&self, reason: impl Into<String>) -> StageError {
         StageError::Malformed {
             topic: M::TOPIC,
+            sender: self.sender().name(),
             seq: self.item().seq,
             reason: reason.into(),
         }
@@ -54,6 +74,7 @@ impl<M: Message> Received<M> {
 
 /// The raw queue of a topic.
 pub struct Port<M: Message> {
+    limits: Limits,
     subscriber: Subscriber<Ipc, [M::Element], M::Header>,
     data: Listener,
     _handshake: Notifier,
@@ -65,10 +86,10 @@ impl<M: Message> Port<M> {
     /// # Errors
     /// A failure of the transport.
     pub fn open(launch: &Launch) -> Result<Self, StageError> {
-        Self::on(&launch.node)
+        Self::on(&launch.node, &launch.manifest)
     }
 
-    pub(crate) fn on(node: &Node) -> Result<Self, StageError> {
+    pub(crate) fn on(node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
         let subscriber = services::open_topic::<M>(node)?
             .subscriber_builder()
             .create()
@@ -79,19 +100,22 @@ impl<M: Message> Port<M> {
             StageError::transport(format!("notify the publisher of {}", M::TOPIC), e)
         })?;
         Ok(Self {
+            limits: manifest.limits,
             subscriber,
             data,
             _handshake: handshake,
         })
     }
 
-    /// Receives the next message; `None` if the queue is empty.
+    /// Receives the next message and checks it; `None` if the queue is empty.
     ///
     /// # Errors
-    /// A failure of the transport.
+    /// A message that violates its contract; a failure of the transport.
     pub fn receive(&self) -> Result<Option<Received<M>>, StageError> {
         match self.subscriber.receive() {
-            Ok(sample) => Ok(sample.map(Received::new)),
+            Ok(sample) => sample
+                .map(|sample| Received::checked(sample, &self.limits))
+                .transpose(),
             // Samples of a dead publisher are still borrowed. The next call succeeds once they are released.
             Err(ReceiveError::ExceedsMaxBorrows) => Ok(None),
             Err(error) => Err(StageError::transport(
@@ -122,12 +146,16 @@ impl<M: Message> Reader<M> {
     /// # Errors
     /// A failure of the transport.
     pub fn open(launch: &Launch, next: Option<u64>) -> Result<Self, StageError> {
-        Self::on(&launch.node, next)
+        Self::on(&launch.node, &launch.manifest, next)
     }
 
-    pub(crate) fn on(node: &Node, next: Option<u64>) -> Result<Self, StageError> {
+    pub(crate) fn on(
+        node: &Node,
+        manifest: &Manifest,
+        next: Option<u64>,
+    ) -> Result<Self, StageError> {
         Ok(Self {
-            port: Port::on(node)?,
+            port: Port::on(node, manifest)?,
             next,
             head: None,
             previous: None,

@@ -104,7 +104,7 @@ impl<'a> Supervisor<'a> {
         run::close_to_others(&manifest.prefix)
             .map_err(|e| StageError::transport("close shared memory to other users", e))?;
         let services = Services::create(&node, &manifest.window)?;
-        let poses = Port::on(&node)?;
+        let poses = Port::on(&node, manifest)?;
         Ok(Self {
             plan,
             observe,

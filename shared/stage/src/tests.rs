@@ -54,6 +54,7 @@ impl Run {
             limits: Limits {
                 scan_bytes: 1000,
                 raster_cells: 100,
+                cell_m: 1.0,
                 rasters: 1,
                 points: 0,
             },
@@ -83,7 +84,7 @@ fn writer<M: Message>(manifest: &Manifest) -> Writer<M> {
 }
 
 fn reader<M: Message>(manifest: &Manifest, next: Option<u64>) -> Reader<M> {
-    Reader::on(&node(manifest), next).unwrap()
+    Reader::on(&node(manifest), manifest, next).unwrap()
 }
 
 /// A pose is the smallest message.

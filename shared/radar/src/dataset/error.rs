@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::format::Format;
 use super::image_size::ImageSize;
+use crate::scan::ScanError;
 
 /// A dataset that cannot be opened.
 #[derive(Debug, thiserror::Error)]
@@ -212,31 +213,13 @@ pub enum ReadError {
         /// The stamp as stored.
         value: i64,
     },
-    /// A stamp that is before that of an earlier row.
-    #[error(
-        "{path}, row {row}: stamp is {back_s:.3} s before that of an earlier row, so the rows are not one sweep: the clock was set in between, or a stamp is damaged"
-    )]
-    StampOrder {
+    /// Stamps that are not of one sweep.
+    #[error("{path}, {fault}")]
+    Times {
         /// The file.
         path: PathBuf,
-        /// The row of the image, from 0.
-        row: usize,
-        /// Time by which it is earlier, s.
-        back_s: f64,
-    },
-    /// Stamps that are farther apart than a sweep takes.
-    #[error(
-        "{path}, row {row}: stamp is {after_s:.3} s after that of the first row, so the rows are not one sweep of at most {max_s:.3} s: the clock was set in between, or a stamp is damaged"
-    )]
-    SweepTime {
-        /// The file.
-        path: PathBuf,
-        /// The row of the image, from 0.
-        row: usize,
-        /// Its stamp minus that of the first row, s.
-        after_s: f64,
-        /// The longest sweep, s.
-        max_s: f64,
+        /// The row and what is wrong with it.
+        fault: ScanError,
     },
     /// Stamps that are far from the time in the name of the file.
     #[error(

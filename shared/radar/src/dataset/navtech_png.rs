@@ -6,16 +6,12 @@ use super::error::ReadError;
 use super::image_size::ImageSize;
 use super::options::AzimuthSource;
 use super::stamp;
-use crate::scan::flag;
+use crate::scan::{check_sweep, flag};
 
 /// Metadata bytes per row.
 pub(crate) const METADATA_BYTES: usize = 11;
 /// Minimum share of consecutive rows that differ in byte 10 if it is the direction of the chirp.
 const ALTERNATING_SHARE: f64 = 0.9;
-/// Maximum step back from row to row, ns: a clock that is being adjusted. A row that is so much off is displaced by less than
-/// a cell of a raster.
-const MAX_STEP_BACK_NS: i64 = 5_000_000;
-
 /// The metadata of a row.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RowMetadata {
@@ -166,31 +162,10 @@ pub(crate) fn fill_stamps(
             value: metadata.stamp,
         })?;
     }
-    check_sweep(path, &stamp_ns[..size.height], max_sweep_ns)
-}
-
-/// Checks that the times of the rows do not decrease, and span at most `max_sweep_ns`.
-fn check_sweep(path: &Path, stamp_ns: &[i64], max_sweep_ns: i64) -> Result<(), ReadError> {
-    let (first, mut latest) = (stamp_ns[0], stamp_ns[0]);
-    for (row, stamp) in stamp_ns.iter().copied().enumerate() {
-        if stamp < latest - MAX_STEP_BACK_NS {
-            return Err(ReadError::StampOrder {
-                path: path.to_owned(),
-                row,
-                back_s: (latest - stamp) as f64 * 1e-9,
-            });
-        }
-        if stamp > first + max_sweep_ns {
-            return Err(ReadError::SweepTime {
-                path: path.to_owned(),
-                row,
-                after_s: (stamp - first) as f64 * 1e-9,
-                max_s: max_sweep_ns as f64 * 1e-9,
-            });
-        }
-        latest = latest.max(stamp);
-    }
-    Ok(())
+    check_sweep(&stamp_ns[..size.height], max_sweep_ns).map_err(|fault| ReadError::Times {
+        path: path.to_owned(),
+        fault,
+    })
 }
 
 /// Replaces stamps that come in bursts (the rows of a packet share the time of receipt) by a linear fit over the azimuth,
@@ -277,38 +252,6 @@ mod tests {
         ));
         assert!(!chirps_alternate([0, 1, 0, 1].into_iter()));
         assert!(!chirps_alternate(std::iter::empty()));
-    }
-
-    #[test]
-    fn the_times_of_a_sweep_increase_and_span_one_sweep() {
-        const YEAR_NS: i64 = 31_536_000_000_000_000;
-        let sweep = |edit: fn(&mut [i64])| {
-            let mut stamps: Vec<i64> = (0..400)
-                .map(|row| 1_547_131_046_000_000_000 + row * 625_000)
-                .collect();
-            edit(&mut stamps);
-            check_sweep(Path::new("scan.png"), &stamps, 500_000_000)
-        };
-        assert!(sweep(|_| ()).is_ok());
-        assert!(
-            sweep(|stamps| stamps[200] -= 3_000_000).is_ok(),
-            "an adjusted clock"
-        );
-        let order =
-            |result, bad| matches!(result, Err(ReadError::StampOrder { row, .. }) if row == bad);
-        let time =
-            |result, bad| matches!(result, Err(ReadError::SweepTime { row, .. }) if row == bad);
-        assert!(order(sweep(|stamps| stamps[0] += 300_000_000), 1));
-        assert!(order(sweep(|stamps| stamps[200] -= YEAR_NS), 200));
-        assert!(order(sweep(|stamps| stamps[399] -= 20_000_000), 399));
-        assert!(time(sweep(|stamps| stamps[0] -= YEAR_NS), 1));
-        assert!(time(sweep(|stamps| stamps[200] += YEAR_NS), 200));
-        assert!(time(
-            sweep(|stamps| stamps[300..]
-                .iter_mut()
-                .for_each(|stamp| *stamp += 400_000_000)),
-            300
-        ));
     }
 
     proptest! {

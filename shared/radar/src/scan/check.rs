@@ -1,7 +1,12 @@
 //! Consistency of a scan with its geometry.
 
 use super::{MAX_AZIMUTHS, PolarScan};
+use crate::chain::MAX_INTERVAL_NS;
 use std::ops::RangeInclusive;
+
+/// Maximum step back from row to row, ns: a clock that is being adjusted. A row that is so much off is displaced by less than
+/// a cell of a raster.
+const MAX_STEP_BACK_NS: i64 = 5_000_000;
 
 /// An inconsistent scan.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -25,6 +30,34 @@ pub enum ScanError {
         value: f64,
         /// Permitted values.
         bounds: RangeInclusive<f64>,
+    },
+    /// A stamp is before that of an earlier row.
+    #[error(
+        "row {row}: stamp is {back_s:.3} s before that of an earlier row, so the rows are not one sweep: the clock was set in between, or a stamp is damaged"
+    )]
+    StampOrder {
+        /// The row, from 0.
+        row: usize,
+        /// Time by which it is earlier, s.
+        back_s: f64,
+    },
+    /// Stamps are farther apart than a sweep takes.
+    #[error(
+        "row {row}: stamp is {after_s:.3} s after that of the first row, so the rows are not one sweep of at most {max_s:.3} s: the clock was set in between, or a stamp is damaged"
+    )]
+    StampSpan {
+        /// The row, from 0.
+        row: usize,
+        /// Its stamp minus that of the first row, s.
+        after_s: f64,
+        /// The longest sweep, s.
+        max_s: f64,
+    },
+    /// The stamp of the scan is not one of its sweep.
+    #[error("the scan's stamp is {apart_s:.3} s from that of its first row")]
+    StampApart {
+        /// Stamp of the scan minus that of the first row, s.
+        apart_s: f64,
     },
     /// The angle of an azimuth is not finite.
     #[error("azimuth {index} of the scan is at {value} rad")]
@@ -89,6 +122,51 @@ impl PolarScan<'_> {
             None => Ok(()),
         }
     }
+
+    /// Checks that the times of the rows, and the scan's own, are those of one sweep. For a scan that passes [`PolarScan::check`].
+    ///
+    /// # Errors
+    /// Returns the first row that is not of the sweep.
+    pub fn check_times(&self) -> Result<(), ScanError> {
+        let stamps = &self.stamp_ns[..self.geometry.azimuths];
+        check_sweep(stamps, MAX_INTERVAL_NS)?;
+        let stamp_ns = self.geometry.stamp_ns;
+        let apart_ns = stamps
+            .first()
+            .map_or(0, |first| stamp_ns.saturating_sub(*first));
+        match apart_ns.saturating_abs() <= MAX_INTERVAL_NS {
+            true => Ok(()),
+            false => Err(ScanError::StampApart {
+                apart_s: apart_ns as f64 * 1e-9,
+            }),
+        }
+    }
+}
+
+/// Checks that the times of the rows do not decrease, and span at most `max_sweep_ns`.
+pub(crate) fn check_sweep(stamp_ns: &[i64], max_sweep_ns: i64) -> Result<(), ScanError> {
+    let Some(first) = stamp_ns.first().copied() else {
+        return Ok(());
+    };
+    let mut latest = first;
+    for (row, stamp) in stamp_ns.iter().copied().enumerate() {
+        let (back_ns, after_ns) = (latest.saturating_sub(stamp), stamp.saturating_sub(first));
+        if back_ns > MAX_STEP_BACK_NS {
+            return Err(ScanError::StampOrder {
+                row,
+                back_s: back_ns as f64 * 1e-9,
+            });
+        }
+        if after_ns > max_sweep_ns {
+            return Err(ScanError::StampSpan {
+                row,
+                after_s: after_ns as f64 * 1e-9,
+                max_s: max_sweep_ns as f64 * 1e-9,
+            });
+        }
+        latest = latest.max(stamp);
+    }
+    Ok(())
 }
 
 fn check_length(what: &'static str, actual: usize, expected: usize) -> Result<(), ScanError> {
@@ -114,5 +192,42 @@ fn check_number(
             value,
             bounds,
         }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_times_of_a_sweep_increase_and_span_one_sweep() {
+        const YEAR_NS: i64 = 31_536_000_000_000_000;
+        let sweep = |edit: fn(&mut [i64])| {
+            let mut stamps: Vec<i64> = (0..400)
+                .map(|row| 1_547_131_046_000_000_000 + row * 625_000)
+                .collect();
+            edit(&mut stamps);
+            check_sweep(&stamps, 500_000_000)
+        };
+        assert!(sweep(|_| ()).is_ok());
+        assert!(
+            sweep(|stamps| stamps[200] -= 3_000_000).is_ok(),
+            "an adjusted clock"
+        );
+        let order =
+            |result, bad| matches!(result, Err(ScanError::StampOrder { row, .. }) if row == bad);
+        let time =
+            |result, bad| matches!(result, Err(ScanError::StampSpan { row, .. }) if row == bad);
+        assert!(order(sweep(|stamps| stamps[0] += 300_000_000), 1));
+        assert!(order(sweep(|stamps| stamps[200] -= YEAR_NS), 200));
+        assert!(order(sweep(|stamps| stamps[399] -= 20_000_000), 399));
+        assert!(time(sweep(|stamps| stamps[0] -= YEAR_NS), 1));
+        assert!(time(sweep(|stamps| stamps[200] += YEAR_NS), 200));
+        assert!(time(
+            sweep(|stamps| stamps[300..]
+                .iter_mut()
+                .for_each(|stamp| *stamp += 400_000_000)),
+            300
+        ));
     }
 }

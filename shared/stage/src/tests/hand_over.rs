@@ -115,6 +115,6 @@ fn the_largest_sequence_number_does_not_overflow() {
     let poses = writer::<Pose>(&run.manifest);
     [u64::MAX, u64::MAX]
         .into_iter()
-        .for_each(|seq| send(&poses, seq, u32::MAX));
+        .for_each(|seq| send(&poses, seq, flag::BREAK));
     assert_eq!(take_all(&mut reader), [u64::MAX, u64::MAX]);
 }

@@ -49,7 +49,7 @@ fn a_publisher_has_memory_left_whatever_its_subscribers_hold() {
     let sizes = Pose::sizes(&WINDOW);
     let node = super::node(&run.manifest);
     let readers: Vec<_> = (0..sizes.readers)
-        .map(|_| Port::<Pose>::on(&node).unwrap())
+        .map(|_| Port::<Pose>::on(&node, &run.manifest).unwrap())
         .collect();
     let observed = ObservedRun::at(&run.manifest.root).unwrap();
     let mut observers: Vec<_> = (0..sizes.observers)

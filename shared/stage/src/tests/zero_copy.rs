@@ -6,7 +6,7 @@ use std::{
     process::{Child, Command, Stdio},
 };
 
-use gyre_messages::{Item, Masked, StageId};
+use gyre_messages::{Masked, MaskedHeader, StageId};
 
 use super::{Run, reader, writer};
 use crate::{Manifest, run, wake::Signals};
@@ -52,10 +52,13 @@ fn publisher() {
     let manifest = Manifest::read(root.as_ref()).unwrap();
     let masked = writer::<Masked>(&manifest);
     let mut draft = masked.loan().unwrap();
-    draft.header().item = Item {
-        seq: 7,
-        ..Item::default()
+    *draft.header() = MaskedHeader {
+        n: manifest.limits.side() as u32,
+        rasters: 1,
+        cell_m: manifest.limits.cell_m,
+        ..MaskedHeader::default()
     };
+    draft.header().item.seq = 7;
     let cells = draft.values::<f32>();
     cells
         .iter_mut()

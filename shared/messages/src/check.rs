@@ -1,0 +1,269 @@
+//! Checks of messages where they enter a process: the sender may be any program.
+
+use std::{f64::consts::PI, fmt::Display, ops::RangeInclusive};
+
+use gyre_geometry::covariance;
+
+/// A violation of a message's contract: a sentence with the field, its value and what it must be.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct Violation(pub String);
+
+/// Tolerance for a yaw of pi, rad.
+const ROUNDING_RAD: f64 = 1e-9;
+
+/// Requires a condition on a field.
+pub(crate) fn require(
+    holds: bool,
+    field: &str,
+    value: impl Display,
+    expected: impl Display,
+) -> Result<(), Violation> {
+    match holds {
+        true => Ok(()),
+        false => Err(Violation(format!(
+            "{field} is {value}, but must be {expected}"
+        ))),
+    }
+}
+
+/// Requires a value within bounds, and so a finite one.
+pub(crate) fn within(
+    field: &str,
+    value: f64,
+    bounds: RangeInclusive<f64>,
+) -> Result<(), Violation> {
+    match bounds.contains(&value) {
+        true => Ok(()),
+        false => require(
+            false,
+            field,
+            value,
+            format_args!("from {} to {}", bounds.start(), bounds.end()),
+        ),
+    }
+}
+
+/// Requires finite values.
+pub(crate) fn finite<const N: usize>(fields: [(&str, f64); N]) -> Result<(), Violation> {
+    fields
+        .into_iter()
+        .try_for_each(|(field, value)| require(value.is_finite(), field, value, "finite"))
+}
+
+/// Requires x and y (m) within `reach_m` and yaw (rad) within half a turn.
+pub(crate) fn planar([x, y, yaw]: [(&str, f64); 3], reach_m: f64) -> Result<(), Violation> {
+    within(x.0, x.1, -reach_m..=reach_m)?;
+    within(y.0, y.1, -reach_m..=reach_m)?;
+    within(yaw.0, yaw.1, -PI - ROUNDING_RAD..=PI + ROUNDING_RAD)
+}
+
+/// Requires a covariance of (x, y, yaw).
+pub(crate) fn covariance(packed: &covariance::Packed) -> Result<(), Violation> {
+    match covariance::is_positive_semidefinite(packed) {
+        true => Ok(()),
+        false => Err(Violation(format!(
+            "covariance is {packed:?}, but must be finite and positive semidefinite"
+        ))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bytemuck::Zeroable;
+
+    use crate::{
+        ByteBlock, FloatBlock, Item, Limits, Masked, MaskedHeader, Message, Motion, MotionHeader,
+        Pose, PoseHeader, Rotation, RotationHeader, Scan, ScanHeader, flag,
+    };
+
+    const LIMITS: Limits = Limits {
+        scan_bytes: 64,
+        raster_cells: 9,
+        cell_m: 2.0,
+        rasters: 1,
+        points: 2,
+    };
+
+    /// The start of the sentence that refuses a header, and how to make it such.
+    type Change<'a, H> = (&'a str, &'a dyn Fn(&mut H));
+
+    /// Asserts that a header is accepted, that each of the changes makes it refused for its field, and that the end of the stream
+    /// needs no content.
+    fn each_is_refused<M: Message>(
+        header: M::Header,
+        payload: &[M::Element],
+        changes: &[Change<'_, M::Header>],
+    ) where
+        M::Header: Copy,
+    {
+        assert_eq!(M::check(&header, payload, &LIMITS), Ok(()));
+        for (field, change) in changes {
+            let mut changed = header;
+            change(&mut changed);
+            let violation = M::check(&changed, payload, &LIMITS).map_err(|v| v.to_string());
+            assert!(
+                violation
+                    .as_ref()
+                    .is_err_and(|text| text.starts_with(field)),
+                "{field}: {violation:?}"
+            );
+            *crate::Header::item_mut(&mut changed) = Item {
+                flags: flag::END,
+                ..Item::default()
+            };
+            assert_eq!(M::check(&changed, &[], &LIMITS), Ok(()), "{field}");
+        }
+    }
+
+    #[test]
+    fn an_item_has_known_flags_and_follows_an_earlier_scan() {
+        each_is_refused::<Rotation>(
+            RotationHeader::default(),
+            &[],
+            &[
+                ("flags is 16", &|header| header.item.flags = 16),
+                ("previous_scan is 3", &|header| {
+                    header.item.previous_scan = 3
+                }),
+            ],
+        );
+    }
+
+    #[test]
+    fn a_rotation_is_an_angle_with_a_variance() {
+        each_is_refused::<Rotation>(
+            RotationHeader::default(),
+            &[],
+            &[
+                ("angle_rad is NaN", &|header| {
+                    header.rotation.angle_rad = f64::NAN
+                }),
+                ("angle_rad is -3.5", &|header| {
+                    header.rotation.angle_rad = -3.5
+                }),
+                ("variance_rad2 is -1", &|header| {
+                    header.rotation.variance_rad2 = -1.0
+                }),
+                ("score is inf", &|header| {
+                    header.rotation.score = f64::INFINITY
+                }),
+            ],
+        );
+    }
+
+    #[test]
+    fn a_motion_is_finite_and_as_long_as_a_search_can_find_it() {
+        each_is_refused::<Motion>(
+            MotionHeader::default(),
+            &[],
+            &[
+                ("x_m is NaN", &|header| header.motion.x_m = f64::NAN),
+                ("y_m is -61", &|header| header.motion.y_m = -61.0),
+                ("yaw_rad is 3.2", &|header| header.motion.yaw_rad = 3.2),
+                ("searched[0] is 6.5", &|header| {
+                    header.motion.searched[0] = 6.5
+                }),
+                ("covariance", &|header| header.motion.covariance[1] = 1.0),
+                ("interval_ns is -1", &|header| {
+                    header.motion.interval_ns = -1
+                }),
+                ("score is NaN", &|header| header.motion.score = f64::NAN),
+                ("angle_rad is 9", &|header| {
+                    header.motion.rotation.angle_rad = 9.0
+                }),
+                ("outcome is 4", &|header| {
+                    header.motion.refinement.outcome = 4
+                }),
+                ("overlap is NaN", &|header| {
+                    header.motion.refinement.overlap = f64::NAN
+                }),
+            ],
+        );
+    }
+
+    #[test]
+    fn a_pose_is_finite_and_on_earth() {
+        each_is_refused::<Pose>(
+            PoseHeader::default(),
+            &[],
+            &[
+                ("x_m is NaN", &|header| header.x_m = f64::NAN),
+                ("y_m is 1000000000", &|header| header.y_m = 1e9),
+                ("covariance", &|header| header.covariance[0] = -1.0),
+                ("x_m is inf", &|header| header.motion.x_m = f64::INFINITY),
+            ],
+        );
+    }
+
+    #[test]
+    fn rasters_and_points_are_as_many_as_the_run_allows_and_in_the_payload() {
+        let header = MaskedHeader {
+            n: 3,
+            rasters: 1,
+            cell_m: 2.0,
+            points: 2,
+            ..MaskedHeader::default()
+        };
+        let payload = [FloatBlock::zeroed(); 4];
+        each_is_refused::<Masked>(
+            header,
+            &payload,
+            &[
+                ("n is 4", &|header| header.n = 4),
+                ("rasters is 2", &|header| header.rasters = 2),
+                ("cell_m is 0.5", &|header| header.cell_m = 0.5),
+                ("points is 3", &|header| header.points = 3),
+                ("mask is 3", &|header| header.mask = 3),
+                ("twist[1] is NaN", &|header| header.twist[1] = f32::NAN),
+            ],
+        );
+        assert!(Masked::check(&header, &payload[..1], &LIMITS).is_err());
+        let mut values = [0.0_f32; 64];
+        values[16 + 5] = f32::NAN;
+        let blocks: &[FloatBlock] = &values
+            .chunks_exact(16)
+            .map(|values| bytemuck::pod_read_unaligned(bytemuck::cast_slice(values)))
+            .collect::<Vec<_>>();
+        let violation = Masked::check(&header, blocks, &LIMITS).map_err(|v| v.to_string());
+        assert!(violation.is_err_and(|text| text.starts_with("point 1 is")));
+    }
+
+    #[test]
+    fn a_scan_is_one_sweep_in_its_payload() {
+        let mut header = ScanHeader {
+            azimuths: 4,
+            bins: 10,
+            stride: 16,
+            range_resolution_m: 0.1,
+            ..ScanHeader::default()
+        };
+        let second_ns = 1_000_000_000;
+        header.item.stamp_ns = second_ns;
+        header.azimuth_stamp_ns[..4].fill(second_ns);
+        each_is_refused::<Scan>(
+            header,
+            &[ByteBlock::zeroed()],
+            &[
+                ("azimuths is 0", &|header| header.azimuths = 0),
+                ("azimuths is 9999", &|header| header.azimuths = 9999),
+                ("its payload of 64 bytes is shorter", &|header| {
+                    header.bins = 17
+                }),
+                ("its payload of 64 bytes is shorter", &|header| {
+                    header.first_byte = u32::MAX
+                }),
+                ("the scan's range resolution", &|header| {
+                    header.range_resolution_m = f32::NAN
+                }),
+                ("the scan's stamp", &|header| {
+                    header.item.stamp_ns = 12_000_000_000
+                }),
+                ("row 2: stamp", &|header| {
+                    header.azimuth_stamp_ns[2] = 12_000_000_000
+                }),
+                ("azimuth 3", &|header| header.azimuth_rad[3] = f32::INFINITY),
+            ],
+        );
+    }
+}
