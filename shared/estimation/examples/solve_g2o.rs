@@ -24,6 +24,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         let start = graph.cost();
         let began = Instant::now();
         let solution = graph.solve()?;
+        if !solution.converged {
+            eprintln!("{}: not converged", file.display());
+        }
         println!(
             "{} poses {} edges {} start {start:.6} cost {:.6} iterations {} ms {:.2}",
             file.display(),

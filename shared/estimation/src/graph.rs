@@ -95,6 +95,8 @@ pub struct Solution {
     pub cost: f64,
     /// Number of linearisations.
     pub iterations: usize,
+    /// Whether the poses are at a minimum of the cost. If not, the iterations were too few, and a further solution goes on from there.
+    pub converged: bool,
 }
 
 impl PoseGraph {

@@ -40,7 +40,10 @@ fn the_solution_and_its_covariances_are_those_of_the_dense_batch() {
     let (drive, loops) = three_rounds(3);
     let mut graph = graph(&drive, &loops, least_squares());
     let solution = graph.solve().unwrap();
-    assert!(solution.iterations < 10, "{solution:?}");
+    assert!(
+        solution.converged && solution.iterations < 10,
+        "{solution:?}"
+    );
 
     let started = dead_reckoning(drive.truth[0], &drive.odometry);
     let all: Vec<_> = drive.odometry.iter().copied().chain(loops).collect();
@@ -196,6 +199,18 @@ fn a_graph_solved_again_after_each_loop_ends_where_one_solution_does() {
     }
     let (position, yaw) = apart(in_steps.poses(), at_once.poses());
     assert!(position < 1e-6 && yaw < 1e-8, "{position} m, {yaw} rad");
+}
+
+#[test]
+fn a_solution_that_ran_out_of_iterations_says_so_and_can_be_continued() {
+    let (drive, loops) = three_rounds(4);
+    let options = GraphOptions {
+        max_iterations: 1,
+        ..least_squares()
+    };
+    let mut graph = graph(&drive, &loops, options);
+    assert!(!graph.solve().unwrap().converged);
+    assert!((0..20).any(|_| graph.solve().unwrap().converged));
 }
 
 #[test]

@@ -41,14 +41,16 @@ impl PoseGraph {
     /// The equations have no solution within the range of numbers, or do not fit into memory. The poses are then those before.
     pub fn solve(&mut self) -> Result<Solution, EstimationError> {
         let before = self.poses.clone();
-        let solved = self
-            .descend(Weights::Kept, COARSE)
-            .and_then(|first| Ok(first + self.descend(Weights::Kernel, self.options.tolerance)?));
+        let solved = self.descend(Weights::Kept, COARSE).and_then(|(first, _)| {
+            let (then, converged) = self.descend(Weights::Kernel, self.options.tolerance)?;
+            Ok((first + then, converged))
+        });
         self.factorised = solved.is_ok();
-        let iterations = solved.inspect_err(|_| self.poses = before)?;
+        let (iterations, converged) = solved.inspect_err(|_| self.poses = before)?;
         Ok(Solution {
             cost: self.cost(),
             iterations,
+            converged,
         })
     }
 
@@ -117,23 +119,27 @@ impl PoseGraph {
     }
 
     /// Moves the poses until a full Gauss-Newton step lowers the cost by less than `tolerance` of it. Returns the number of
-    /// linearisations.
-    fn descend(&mut self, weights: Weights, tolerance: f64) -> Result<usize, EstimationError> {
+    /// linearisations, and whether this was reached.
+    fn descend(
+        &mut self,
+        weights: Weights,
+        tolerance: f64,
+    ) -> Result<(usize, bool), EstimationError> {
         let mut cost = self.chi_square(&self.poses, weights);
         let mut radius = f64::INFINITY;
         for iteration in 1..=self.options.max_iterations {
             let gradient = self.linearise(weights)?;
             let dogleg = Dogleg::new(self.factorise()?, gradient);
             let Some((poses, lower)) = self.step(&dogleg, weights, cost, &mut radius)? else {
-                return Ok(iteration);
+                return Ok((iteration, true));
             };
             self.poses = poses;
             if dogleg.full_length() <= radius && cost - lower <= tolerance * cost {
-                return Ok(iteration);
+                return Ok((iteration, true));
             }
             cost = lower;
         }
-        Ok(self.options.max_iterations)
+        Ok((self.options.max_iterations, false))
     }
 
     /// Returns poses whose cost is not above `cost`, with their cost; `None` if there are none nearby. Adapts the trust radius.
