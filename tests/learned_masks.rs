@@ -261,6 +261,33 @@ fn without_onnx_runtime_the_command_that_installs_it_is_named_and_other_masks_st
 }
 
 #[test]
+fn a_library_in_the_current_folder_is_not_opened_unless_it_is_named() {
+    let run = masked_by(ONE_SCAN);
+    let decoy = run.folder().join("onnxruntime").join("libonnxruntime.so");
+    fs::create_dir(decoy.parent().unwrap()).unwrap();
+    fs::write(&decoy, "not a library").unwrap();
+    let in_its_folder = |named: Option<&str>, data_home: &str| {
+        let mut command = run.command();
+        command
+            .current_dir(run.folder())
+            .env_remove("ORT_DYLIB_PATH")
+            .env("HOME", "/no/such/home")
+            .env("XDG_DATA_HOME", data_home);
+        command.envs(named.map(|path| ("ORT_DYLIB_PATH", path)));
+        run.start_as(command).finish()
+    };
+    for data_home in ["", ".", "gyre/.."] {
+        in_its_folder(None, data_home).refused_with(&["which is not installed"]);
+    }
+    in_its_folder(Some("onnxruntime"), "").refused_with(&["cannot be used as ONNX Runtime"]);
+    let theirs = run.folder().join("data/gyre");
+    fs::create_dir_all(&theirs).unwrap();
+    fs::rename(decoy.parent().unwrap(), theirs.join("onnxruntime")).unwrap();
+    let data_home = theirs.parent().unwrap().to_str().unwrap();
+    in_its_folder(None, data_home).refused_with(&["cannot be used as ONNX Runtime"]);
+}
+
+#[test]
 fn an_unfinished_run_does_not_go_on_with_another_model() {
     if !runtime_is_installed() {
         return;

@@ -12,24 +12,22 @@ use std::{
 use ort::{LoadDynamicError, environment::Environment, logging::LogLevel};
 use thiserror::Error;
 
-/// The command that installs it in Gyre's folder. The library does not depend on the version of Python.
-pub const INSTALL: &str = "python3 -m pip install --no-deps --python-version 3.12 --target onnxruntime -r models/onnxruntime.txt";
+/// The command that installs it in the user's data folder. The library does not depend on the version of Python.
+pub const INSTALL: &str = "python3 -m pip install --no-deps --python-version 3.12 --target \"${XDG_DATA_HOME:-$HOME/.local/share}/gyre/onnxruntime\" -r models/onnxruntime.txt";
 /// The environment variable that may name the library.
 const VARIABLE: &str = "ORT_DYLIB_PATH";
-/// The folder that [`INSTALL`] creates.
+/// The folder that [`INSTALL`] creates in that of Gyre's data; beside the program it has the same name.
 const INSTALLED: &str = "onnxruntime";
 /// Positions of the library in a named folder: the folder itself, the package, the parent of the package.
 const PLACES: [&str; 3] = ["", "capi", "onnxruntime/capi"];
 const LIBRARY: &str = "libonnxruntime.so";
-/// Number of folders above the executable that are searched: from `target/release/deps` up to the project.
-const MAX_PARENTS: usize = 4;
 
 /// An error in finding or opening ONNX Runtime.
 #[derive(Debug, Error)]
 pub enum RuntimeError {
     /// It is not installed.
     #[error(
-        "a learned mask needs ONNX Runtime, which is not installed: `{INSTALL}` in Gyre's folder installs it; \
+        "a learned mask needs ONNX Runtime, which is not installed: `{INSTALL}` in the folder of Gyre's sources installs it; \
          masking.runtime or {VARIABLE} names one in another place; masking.kind = \"threshold\" does not need it"
     )]
     Missing,
@@ -64,7 +62,9 @@ pub enum RuntimeError {
     },
 }
 
-/// Returns the path of the library: named by `configured` (`masking.runtime`) or by the environment, or installed by [`INSTALL`].
+/// Returns the path of the library: named by `configured` (`masking.runtime`) or by the environment, installed by [`INSTALL`], or
+/// beside this program. A library is code, so no folder is searched that is not the user's own or the program's; the current one
+/// may be anybody's.
 ///
 /// # Errors
 /// [`RuntimeError::NotFound`] if a named path has no library, [`RuntimeError::Missing`] if none is named or installed.
@@ -92,25 +92,21 @@ fn find_in(
         .ok_or(RuntimeError::Missing)
 }
 
-/// Returns the folders in which [`INSTALL`] may have been run: the current one, those above this program, and the user's data
-/// folder.
+/// Returns the folders of an installed library: the user's data, then the folder of this program.
 fn installed_in() -> Vec<PathBuf> {
-    let current = env::current_dir().ok();
     let program = env::current_exe().ok();
-    let above = program
-        .iter()
-        .flat_map(|program| program.ancestors().skip(1).take(MAX_PARENTS));
-    let home = || env::var_os("HOME").map(|home| Path::new(&home).join(".local/share"));
-    let data = env::var_os("XDG_DATA_HOME")
-        .filter(|data| !data.is_empty())
-        .map(PathBuf::from)
-        .or_else(home);
-    let user = data.map(|data| data.join("gyre"));
-    current
-        .into_iter()
-        .chain(above.map(Path::to_owned))
-        .chain(user)
-        .collect()
+    let program =
+        program.and_then(|program| Some(program.canonicalize().ok()?.parent()?.to_owned()));
+    let data = data_folder(env::var_os("XDG_DATA_HOME"), env::var_os("HOME"));
+    data.into_iter().chain(program).collect()
+}
+
+/// Returns the folder of Gyre's data. A relative path would be in the current folder and is ignored, as the XDG specification says.
+fn data_folder(data_home: Option<OsString>, home: Option<OsString>) -> Option<PathBuf> {
+    let absolute =
+        |path: Option<OsString>| path.map(PathBuf::from).filter(|path| path.is_absolute());
+    let data = absolute(data_home).or_else(|| Some(absolute(home)?.join(".local/share")))?;
+    Some(data.join("gyre"))
 }
 
 /// Returns the library at a path or in a folder, absolute, since stages may be started in another folder.
@@ -224,6 +220,24 @@ mod tests {
             third
         );
         assert_eq!(find_in(None, None, &installed_in).unwrap(), third);
+    }
+
+    #[test]
+    fn the_data_folder_is_absolute() {
+        let text = |path: &str| Some(OsString::from(path));
+        let cases = [
+            (text("/data"), text("/home/me"), Some("/data/gyre")),
+            (None, text("/home/me"), Some("/home/me/.local/share/gyre")),
+            (
+                text(""),
+                text("/home/me"),
+                Some("/home/me/.local/share/gyre"),
+            ),
+            (text("data"), text("."), None),
+        ];
+        for (data_home, home, expected) in cases {
+            assert_eq!(data_folder(data_home, home), expected.map(PathBuf::from));
+        }
     }
 
     #[test]
