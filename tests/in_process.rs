@@ -31,7 +31,11 @@ fn register_all(run: &Run) -> Vec<Registered> {
 /// Asserts that motions and poses of a run and of `Odometry` are the same bits.
 pub fn assert_same_bits(run: &Run) -> usize {
     run.complete();
-    let journal = journal::read(&journal::path(run.out())).unwrap();
+    let journal = journal::records(&journal::path(run.out()))
+        .unwrap()
+        .unwrap()
+        .collect::<Result<Vec<_>, _>>()
+        .unwrap();
     let poses: Vec<&PoseHeader> = journal
         .iter()
         .filter(|pose| !pose.item.is(flag::END))

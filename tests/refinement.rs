@@ -4,6 +4,7 @@
 use std::{collections::BTreeSet, fs, thread, time::Duration};
 
 use crate::common::{Ended, Pid, Run, Running, STAGES, recording, send, undisturbed};
+use gyre_pose_integration::journal::{self, Journal};
 use rustix::process::Signal;
 use serde_json::Value;
 
@@ -245,25 +246,77 @@ fn an_unfinished_run_is_not_continued_with_another_refinement() {
     }
 }
 
+/// What damage can leave of a map.
+fn damages(whole: &[u8]) -> [Vec<u8>; 4] {
+    let flip = |(k, byte): (usize, &u8)| if k > 100 { !byte } else { *byte };
+    let flipped = whole.iter().enumerate().map(flip).collect();
+    [
+        Vec::new(),
+        whole[..100].to_vec(),
+        b"not a map".to_vec(),
+        flipped,
+    ]
+}
+
+/// Appends poses to the journal that the map does not know, as a power failure can leave them.
+fn append_unknown_poses(run: &Run, poses: u64) {
+    let mut journal = Journal::open(&journal::path(run.out())).unwrap();
+    let (last, _) = journal.last(1).unwrap();
+    for k in 1..=poses {
+        let mut pose = last[0];
+        pose.item.seq += k;
+        pose.motion.x_m += k as f64;
+        journal.append(&pose).unwrap();
+    }
+}
+
+#[test]
+fn a_map_that_was_lost_soon_after_the_start_lets_the_run_begin_anew() {
+    for k in 0..4 {
+        let run = interrupted();
+        let map = run.out().join(MAP);
+        let damaged = &damages(&fs::read(&map).unwrap())[k];
+        fs::write(&map, damaged).unwrap();
+        let ended = run.finish();
+        ended.succeeded();
+        assert!(
+            ended.stderr.contains("knows none of the"),
+            "{}",
+            ended.stderr
+        );
+        assert_eq!(run.odometry(), undisturbed());
+    }
+}
+
 #[test]
 fn a_lost_or_damaged_map_is_reported_and_the_run_can_be_started_anew() {
     let run = interrupted();
+    append_unknown_poses(&run, 64);
     let map = run.out().join(MAP);
-    let whole = fs::read(&map).unwrap();
-    let flipped: Vec<u8> = whole
-        .iter()
-        .enumerate()
-        .map(|(k, byte)| if k > 100 { !byte } else { *byte })
-        .collect();
-    for damaged in [&[][..], &whole[..100], b"not a map", &flipped] {
+    for damaged in damages(&fs::read(&map).unwrap()) {
         fs::write(&map, damaged).unwrap();
-        let ended = run.finish();
-        ended.failed_with(&[
+        run.finish().refused_with(&[
             "refinement.map",
             "does not have the state of the refinement",
             "--fresh",
         ]);
-        assert!(!ended.stderr.contains("restarted it"), "{}", ended.stderr);
     }
     assert_eq!(run.option("--fresh").complete(), undisturbed());
+}
+
+#[test]
+fn poses_that_the_map_does_not_know_are_cut_off_and_computed_anew() {
+    let run = interrupted();
+    append_unknown_poses(&run, 70);
+    let ended = run.finish();
+    ended.succeeded();
+    assert!(
+        ended
+            .stderr
+            .contains("a power failure took the last 70 poses"),
+        "{}",
+        ended.stderr
+    );
+    assert_eq!(run.odometry(), undisturbed());
+    assert!(run.summary()["resumed_after"].as_u64().unwrap() >= MIDDLE as u64);
 }

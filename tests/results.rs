@@ -133,6 +133,30 @@ fn another_configuration_is_refused_by_the_key_that_differs() {
     assert_eq!(run.complete(), undisturbed());
 }
 
+#[test]
+fn a_journal_that_was_damaged_on_the_disk_is_refused_and_kept() {
+    let run = Run::of_recording();
+    // Two seconds, so that the first poses are known to be on the disk when later ones are written.
+    let mut running = run.clone().rate("2").start();
+    running.await_poses(2 * MIDDLE).signal(Signal::INT);
+    assert_eq!(running.finish().code(), Some(130));
+    let journal = run.out().join("journal/poses.journal");
+    let mut bytes = fs::read(&journal).unwrap();
+    bytes[1000] ^= 4;
+    fs::write(&journal, &bytes).unwrap();
+    run.finish().refused_with(&[
+        "poses.journal is damaged at pose 1,",
+        "kept as",
+        "poses.journal.damaged",
+        "another --out",
+        "--fresh",
+    ]);
+    assert_eq!(fs::read(&journal).unwrap(), bytes, "it is left as it is");
+    assert_eq!(run.clone().option("--fresh").complete(), undisturbed());
+    let kept = run.out().join("journal/poses.journal.damaged");
+    assert_eq!(fs::read(kept).unwrap(), bytes);
+}
+
 /// The command with a `/dev/shm` of its own, as a container has it; `None` where the system does not permit that.
 fn in_container(run: &Run) -> Option<Command> {
     let permitted = Command::new("unshare").args(["--mount", "true"]).output();

@@ -92,7 +92,8 @@ impl Running {
 
     /// Poses in the journal.
     pub fn poses(&self) -> usize {
-        journal::read(&journal::path(self.run.out())).map_or(0, |poses| poses.len())
+        let records = journal::records(&journal::path(self.run.out()));
+        records.map_or(0, |records| records.into_iter().flatten().count())
     }
 
     /// The shared memory of the run.

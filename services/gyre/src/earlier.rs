@@ -1,13 +1,17 @@
 //! What an earlier run left in the folder of the results: nothing, a journal to resume, or one whose results are to be written.
 
-use std::{fs, path::PathBuf};
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+};
 
-use gyre_messages::flag;
-use gyre_pose_integration::journal;
-use gyre_refinement::checkpoint;
-use gyre_storage as storage;
+use gyre_messages::StageId;
+use gyre_pose_integration::journal::{self, Content, JournalError};
+use gyre_refinement::checkpoint::{self, Checkpoint, CheckpointError};
+use gyre_scan_matching::Refiner;
+use gyre_storage::{self as storage, GroupSync};
 
-use crate::{Failure, configuration::Configuration, identity::Identity, out::Out, results};
+use crate::{Failure, configuration::Configuration, identity::Identity, out::Out, print, results};
 
 /// Says that the journal has its end and that all results have been written from it: the next run starts anew.
 const COMPLETE: &str = "journal/complete";
@@ -28,8 +32,10 @@ pub enum Earlier {
 /// A run that was begun.
 #[derive(Debug)]
 pub struct Begun {
-    /// Poses in its journal.
-    pub poses: usize,
+    /// Poses in its journal to go on from.
+    pub poses: u64,
+    /// Records behind them, which a power failure has left in part: they are to be cut off.
+    pub lost: u64,
     /// What it was begun with.
     pub identity: Identity,
 }
@@ -38,21 +44,98 @@ impl Earlier {
     /// Looks at the folder and changes nothing. A `fresh` run goes on from nothing.
     ///
     /// # Errors
-    /// Files that cannot be read, or a run of another configuration.
+    /// Files that cannot be read, a damaged journal, or a run of another configuration.
     pub fn of(out: &Out, configuration: &Configuration, fresh: bool) -> Result<Self, Failure> {
-        let records = journal::read(&journal::path(out.path()))?;
-        let ended = records.last().is_some_and(|last| last.item.is(flag::END));
-        let poses = records.len() - usize::from(ended);
-        if fresh || records.is_empty() || (ended && out.join(COMPLETE).exists()) {
+        let path = journal::path(out.path());
+        // A file of another program is refused in any case.
+        let there = journal::records(&path)?.is_some();
+        if fresh || !there || out.join(COMPLETE).exists() {
             return Ok(Self::Nothing);
         }
-        let identity = Identity::read(out, poses)?;
-        identity.require(configuration, out.path(), poses)?;
-        let begun = Begun { poses, identity };
-        Ok(match ended {
-            true => Self::Ended(begun),
-            false => Self::Unfinished(begun),
+        let content = journal::check(&path).map_err(|error| kept(error, &path))?;
+        let is_empty = content.poses == 0 && !content.ended;
+        let identity = match is_empty {
+            true => return Ok(Self::Nothing),
+            false => Identity::read(out, content.poses)?,
+        };
+        identity.require(configuration, out.path(), content.poses)?;
+        let poses = match content.ended {
+            true => content.poses,
+            false => known_poses(out, configuration, &content)?,
+        };
+        let begun = Begun {
+            poses,
+            lost: content.poses - poses + content.torn,
+            identity,
+        };
+        Ok(match (content.ended, poses) {
+            (true, _) => Self::Ended(begun),
+            (false, 0) => Self::Nothing,
+            (false, _) => Self::Unfinished(begun),
         })
+    }
+}
+
+/// Keeps a second name of a damaged journal, which `--fresh` does not remove.
+fn kept(error: JournalError, path: &Path) -> Failure {
+    if !matches!(error, JournalError::Damaged { .. }) {
+        return error.into();
+    }
+    let copy = path.with_extension("journal.damaged");
+    // A link, because a long journal may not fit a second time.
+    let kept = match fs::hard_link(path, &copy) {
+        Err(failed) if failed.kind() != io::ErrorKind::AlreadyExists => {
+            format!("it could not be kept under a second name ({failed})")
+        }
+        _ => format!("it is kept as {}", copy.display()),
+    };
+    format!(
+        "{error}, and what follows would be lost: {kept}; restore it from a backup, choose another --out, or begin anew with --fresh"
+    )
+    .into()
+}
+
+/// Returns the number of poses of an unfinished journal up to the newest one that the map of the refinement knows. After a power
+/// failure that may be an earlier one than the last; after a death it is the last.
+fn known_poses(
+    out: &Out,
+    configuration: &Configuration,
+    content: &Content,
+) -> Result<u64, Failure> {
+    if !configuration.has(StageId::Refinement) {
+        return Ok(content.poses);
+    }
+    let path = checkpoint::path(out.path());
+    let known = match path.exists() {
+        true => {
+            let (points, refinement) = (
+                &configuration.odometry.points,
+                &configuration.odometry.refinement,
+            );
+            let cells = Refiner::new(refinement, points.capacity)?.keyframe_cells();
+            let window = configuration.run.window;
+            let mut map = Checkpoint::open(&path, window, refinement.keyframes, cells)?;
+            let known = map.newest_known(content.last.iter().rev())?;
+            known.map(|pose| pose.item.seq + 1)
+        }
+        false => None,
+    };
+    match known {
+        Some(poses) => Ok(poses),
+        // Not more than a power failure can take, soon after the start.
+        None if content.poses <= 2 * GroupSync::LIMIT => {
+            print::note(format_args!(
+                "gyre: {} knows none of the {} poses of the journal: beginning anew",
+                path.display(),
+                content.poses
+            ));
+            Ok(0)
+        }
+        None => Err(CheckpointError::Missing {
+            path,
+            item: content.poses,
+        }
+        .into()),
     }
 }
 
@@ -91,12 +174,16 @@ pub fn mark_complete(out: &Out, poses: usize) -> Result<(), Failure> {
     )?)
 }
 
-/// Writes `config.toml` again if it is not what the run was begun with: it was lost or damaged meanwhile.
+/// Makes the folder ready for the run to go on: cuts off what a power failure has left of the last poses, and writes `config.toml`
+/// again if it is not what the run was begun with.
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn restore_configuration(out: &Out, identity: &Identity) -> Result<(), Failure> {
-    let path = out.join(CONFIGURATION);
+pub fn resume(out: &Out, begun: &Begun) -> Result<(), Failure> {
+    if begun.lost > 0 {
+        journal::cut(&journal::path(out.path()), begun.poses)?;
+    }
+    let (path, identity) = (out.join(CONFIGURATION), &begun.identity);
     let found = fs::read_to_string(&path).ok();
     let found: Option<toml::Table> = found.and_then(|text| text.parse().ok());
     match found.as_ref() == Some(&identity.configuration) {

@@ -51,7 +51,7 @@ impl Identity {
     /// # Errors
     /// One sentence that says what is wrong with the file. It is written as a whole before the first pose, so the run did not
     /// leave it like that.
-    pub fn read(out: &Out, poses: usize) -> Result<Self, Failure> {
+    pub fn read(out: &Out, poses: u64) -> Result<Self, Failure> {
         let path = out.join(FILE);
         Self::read_file(&path).map_err(|state| {
             format!(
@@ -91,7 +91,7 @@ impl Identity {
         &self,
         configuration: &Configuration,
         out: &Path,
-        poses: usize,
+        poses: u64,
     ) -> Result<(), Failure> {
         match configuration.difference(&self.configuration)? {
             None => Ok(()),

@@ -1,4 +1,4 @@
-//! `odometry.csv` and the trajectory, from the journal.
+//! `odometry.csv`, from the journal.
 
 mod read;
 
@@ -6,57 +6,56 @@ use std::fmt::Write;
 
 use gyre_evaluation::TimedMotion;
 use gyre_messages::{PoseHeader, RefinementRecord, flag, initial_guess, outcome};
-use gyre_radar::Trajectory;
 
 pub use read::read;
 
-const HEADER: &str = "seq,scan,previous_scan,stamp_ns,interval_ns,x_m,y_m,yaw_rad,\
+/// The header line of `odometry.csv`.
+pub const HEADER: &str = "seq,scan,previous_scan,stamp_ns,interval_ns,x_m,y_m,yaw_rad,\
     cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,score,runner_up_score,\
     rotation_rad,rotation_variance_rad2,rotation_score,rotation_runner_up_rad,rotation_runner_up_score,\
     searched_x_m,searched_y_m,searched_yaw_rad,outcome,hypothesis,overlap,support\n";
 
-/// Returns `odometry.csv`: one row per motion, in fixed decimals, so that equal motions give equal bytes. The start of the chain has
-/// no row.
-pub fn csv(poses: &[PoseHeader]) -> String {
-    let mut text = String::from(HEADER);
-    for pose in poses.iter().filter(|pose| !pose.item.is(flag::BREAK)) {
-        let (item, motion, rotation) = (&pose.item, &pose.motion, &pose.motion.rotation);
-        let _ = write!(
-            text,
-            "{},{},{},{},{}",
-            item.seq, item.scan, item.previous_scan, item.stamp_ns, motion.interval_ns
-        );
-        for value in [motion.x_m, motion.y_m, motion.yaw_rad] {
-            let _ = write!(text, ",{value:.9}");
-        }
-        for value in motion.covariance {
-            let _ = write!(text, ",{value:.12}");
-        }
-        let (angle, runner_up) = (rotation.angle_rad, rotation.runner_up_rad);
-        let _ = write!(
-            text,
-            ",{:.9},{:.9},{angle:.9}",
-            motion.score, motion.runner_up_score
-        );
-        let _ = write!(
-            text,
-            ",{:.12},{:.9}",
-            rotation.variance_rad2, rotation.score
-        );
-        let _ = write!(text, ",{runner_up:.9},{:.9}", rotation.runner_up_score);
-        for value in motion.searched {
-            let _ = write!(text, ",{value:.9}");
-        }
-        let refinement = &motion.refinement;
-        let _ = write!(
-            text,
-            ",{},{}",
-            outcome_name(refinement),
-            initial_guess_name(refinement)
-        );
-        let _ = writeln!(text, ",{:.9},{:.9}", refinement.overlap, refinement.support);
+/// Writes the row of a motion to `text`, in fixed decimals, so that equal motions give equal bytes. The start of the chain has no
+/// row.
+pub fn write_row(pose: &PoseHeader, text: &mut String) {
+    if pose.item.is(flag::BREAK) {
+        return;
     }
-    text
+    let (item, motion, rotation) = (&pose.item, &pose.motion, &pose.motion.rotation);
+    let _ = write!(
+        text,
+        "{},{},{},{},{}",
+        item.seq, item.scan, item.previous_scan, item.stamp_ns, motion.interval_ns
+    );
+    for value in [motion.x_m, motion.y_m, motion.yaw_rad] {
+        let _ = write!(text, ",{value:.9}");
+    }
+    for value in motion.covariance {
+        let _ = write!(text, ",{value:.12}");
+    }
+    let (angle, runner_up) = (rotation.angle_rad, rotation.runner_up_rad);
+    let _ = write!(
+        text,
+        ",{:.9},{:.9},{angle:.9}",
+        motion.score, motion.runner_up_score
+    );
+    let _ = write!(
+        text,
+        ",{:.12},{:.9}",
+        rotation.variance_rad2, rotation.score
+    );
+    let _ = write!(text, ",{runner_up:.9},{:.9}", rotation.runner_up_score);
+    for value in motion.searched {
+        let _ = write!(text, ",{value:.9}");
+    }
+    let refinement = &motion.refinement;
+    let _ = write!(
+        text,
+        ",{},{}",
+        outcome_name(refinement),
+        initial_guess_name(refinement)
+    );
+    let _ = writeln!(text, ",{:.9},{:.9}", refinement.overlap, refinement.support);
 }
 
 fn outcome_name(refinement: &RefinementRecord) -> &'static str {
@@ -79,29 +78,15 @@ fn initial_guess_name(refinement: &RefinementRecord) -> &'static str {
     }
 }
 
-/// Returns the poses with the scans' times.
-pub fn trajectory(poses: &[PoseHeader]) -> Trajectory {
-    Trajectory {
-        stamp_ns: Some(poses.iter().map(|pose| pose.item.stamp_ns).collect()),
-        poses: poses.iter().map(|pose| pose.pose().motion).collect(),
-    }
-}
-
-/// Returns the motions with their times and covariances. The start of the chain has none.
-pub fn motions(poses: &[PoseHeader]) -> Vec<TimedMotion> {
-    let motion = |header: &PoseHeader| {
-        let to_ns = header.item.stamp_ns;
-        TimedMotion {
-            from_ns: to_ns.saturating_sub(header.motion.interval_ns),
-            to_ns,
-            estimate: header.motion.motion(),
-        }
+/// Returns the motion of a pose with its times and covariance; `None` for the start of the chain.
+pub fn motion(pose: &PoseHeader) -> Option<TimedMotion> {
+    let to_ns = pose.item.stamp_ns;
+    let motion = TimedMotion {
+        from_ns: to_ns.saturating_sub(pose.motion.interval_ns),
+        to_ns,
+        estimate: pose.motion.motion(),
     };
-    poses
-        .iter()
-        .filter(|pose| !pose.item.is(flag::BREAK))
-        .map(motion)
-        .collect()
+    (!pose.item.is(flag::BREAK)).then_some(motion)
 }
 
 #[cfg(test)]
@@ -130,7 +115,10 @@ mod tests {
             },
             ..PoseHeader::default()
         };
-        let text = csv(&[pose(0, flag::BREAK), pose(1, 0), pose(2, 0)]);
+        let mut text = HEADER.to_owned();
+        [pose(0, flag::BREAK), pose(1, 0), pose(2, 0)]
+            .iter()
+            .for_each(|pose| write_row(pose, &mut text));
         let fields: Vec<usize> = text.lines().map(|line| line.split(',').count()).collect();
         assert_eq!(fields, [28, 28, 28]);
         assert!(text.contains(",1.500000000,"));

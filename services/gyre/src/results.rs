@@ -1,26 +1,35 @@
 //! Results of a run in `--out`, all made from the journal: an interrupted run leaves the same files.
+//!
+//! The journal is read once, from its start to its end, and nothing is kept of it but what a result needs: a month takes no more
+//! memory than a minute. Only an evaluation needs all poses.
 
-use std::path::Path;
+mod estimate;
+mod files;
+mod pass;
+mod sketch;
 
-use gyre_evaluation::{NeesOptions, Options, plot::trajectory_svg};
-use gyre_messages::{PoseHeader, StageId, flag};
+use std::path::{Path, PathBuf};
+
+use gyre_evaluation::{NeesOptions, Options};
+use gyre_messages::StageId;
 use gyre_pose_integration::journal;
 use gyre_radar::{
     Trajectory,
-    ground_truth::{find_ground_truth, read_trajectory, write_tum},
+    ground_truth::{find_ground_truth, read_trajectory},
 };
-use gyre_storage::{self as storage, Draft};
 
 use crate::{
     Failure,
     configuration::Configuration,
     judgement::{Judgement, judge, judge_motions},
-    latency::Latency,
-    odometry,
     out::Out,
     print,
-    summary::{Counts, MotionCounts, Session, Summary},
+    summary::{Session, Summary},
 };
+use estimate::Estimate;
+use files::Files;
+use pass::Pass;
+use sketch::Sketch;
 
 /// The ground truth of a simulation that is played without being stored.
 pub const SIMULATED_TRUTH: &str = "ground_truth.tum";
@@ -47,38 +56,36 @@ pub struct Results {
     pub summary: Summary,
 }
 
-/// Writes all files from the journal. Each is written aside first, and none takes its place before all are
-/// complete. They survive a power failure when this returns.
+/// Writes all files from the journal. Each is written aside first, and none takes its place before all are complete. They survive
+/// a power failure when this returns.
 ///
 /// # Errors
-/// A file that cannot be written.
+/// A journal that cannot be read, a file that cannot be written.
 pub fn write(
     configuration: &Configuration,
     out: &Out,
     session: &Session<'_>,
 ) -> Result<Results, Failure> {
-    let records = journal::read(&journal::path(out.path()))?;
-    let end = records.last().filter(|last| last.item.is(flag::END));
-    let poses = &records[..records.len() - usize::from(end.is_some())];
-    let trajectory = odometry::trajectory(poses);
+    let truth = truth_of(configuration, out);
     let mut files = Files::new(out);
-    files.add("odometry.csv", odometry::csv(poses))?;
-    let mut tum = Vec::new();
-    write_tum(&trajectory, &mut tum)?;
-    files.add("trajectory.tum", tum)?;
-    let judgement = judged(configuration, out.path(), poses, &trajectory);
-    for (name, plot) in plots(&trajectory, judgement.as_ref())? {
+    let mut pass = Pass::new(&mut files, session.resumed, truth.is_some())?;
+    for record in journal::records(&journal::path(out.path()))?
+        .into_iter()
+        .flatten()
+    {
+        pass.add(&record?)?;
+    }
+    let read = pass.finish();
+    let judgement = truth.and_then(|truth| judged(&truth, &read.estimate));
+    for (name, plot) in plots(&read.sketch, judgement.as_ref())? {
         files.add(name, plot)?;
     }
-    let latency = Latency::of(&poses[session.resumed.min(poses.len())..]);
+    let latency = read.latency.latency();
     files.add("latency.json", serde_json::to_string_pretty(&latency)?)?;
-    let motions = configuration
-        .has(StageId::Refinement)
-        .then(|| MotionCounts::of(poses));
-    let counts = Counts {
-        motions,
-        ..Counts::of(poses, end, configuration.source.first)
-    };
+    let refines = configuration.has(StageId::Refinement);
+    let counts = read
+        .counter
+        .counts(read.end.as_ref(), configuration.source.first, refines);
     let summary = Summary::new(
         configuration,
         out.path(),
@@ -90,57 +97,29 @@ pub fn write(
     files.add("summary.json", serde_json::to_string_pretty(&summary)?)?;
     files.commit()?;
     Ok(Results {
-        poses: poses.len(),
-        ended: end.is_some(),
+        poses: counts.processed as usize,
+        ended: read.end.is_some(),
         summary,
     })
 }
 
-/// Results that are complete but for taking their places.
-struct Files<'a> {
-    out: &'a Out,
-    drafts: Vec<Draft>,
-}
-
-impl<'a> Files<'a> {
-    fn new(out: &'a Out) -> Self {
-        Self {
-            out,
-            drafts: Vec::new(),
-        }
-    }
-
-    fn add(&mut self, name: &str, content: impl AsRef<[u8]>) -> Result<(), Failure> {
-        let mut draft = Draft::create(&self.out.join(name))?;
-        draft.append(content)?;
-        self.drafts.push(draft);
-        Ok(())
-    }
-
-    fn commit(self) -> Result<(), Failure> {
-        self.drafts.into_iter().try_for_each(Draft::commit)?;
-        Ok(storage::sync_folder(self.out.path())?)
-    }
-}
-
-/// Evaluates the trajectory and its covariances against the dataset's ground truth, where there is one that fits.
-fn judged(
-    configuration: &Configuration,
-    out: &Path,
-    poses: &[PoseHeader],
-    trajectory: &Trajectory,
-) -> Option<Judgement> {
-    if poses.len() < 2 {
-        return None;
-    }
+/// Returns the dataset's ground truth, where there is one.
+fn truth_of(configuration: &Configuration, out: &Out) -> Option<PathBuf> {
     let given = configuration.run.ground_truth.clone();
     let simulated = || configuration.streamed().map(|_| out.join(SIMULATED_TRUTH));
-    let path = given
+    given
         .or_else(simulated)
-        .or_else(|| find_ground_truth(&configuration.source.data))?;
+        .or_else(|| find_ground_truth(&configuration.source.data))
+}
+
+/// Evaluates the trajectory and its covariances against the ground truth, if that fits.
+fn judged(path: &Path, estimate: &Estimate) -> Option<Judgement> {
+    if estimate.poses() < 2 {
+        return None;
+    }
     let by = |truth: Trajectory| -> Result<Judgement, Failure> {
-        let evaluation = judge(trajectory, &truth, Options::default())?;
-        let motions = judge_motions(&odometry::motions(poses), &truth, &evaluation)
+        let evaluation = judge(estimate.trajectory(), &truth, Options::default())?;
+        let motions = judge_motions(estimate.motions(), &truth, &evaluation)
             .inspect_err(|reason| print::note(format_args!("no NEES and no bands.svg: {reason}")));
         Ok(Judgement::new(
             evaluation,
@@ -148,7 +127,10 @@ fn judged(
             &NeesOptions::default(),
         ))
     };
-    let judged = read_trajectory(&path).map_err(Failure::from).and_then(by);
+    let judged = estimate
+        .require_all()
+        .and_then(|()| read_trajectory(path).map_err(Failure::from))
+        .and_then(by);
     judged
         .inspect_err(|reason| {
             print::note(format_args!(
@@ -160,15 +142,15 @@ fn judged(
 }
 
 fn plots(
-    trajectory: &Trajectory,
+    sketch: &Sketch,
     judgement: Option<&Judgement>,
 ) -> Result<Vec<(&'static str, String)>, Failure> {
     match judgement {
         Some(judgement) => judgement.plots(),
-        None if trajectory.poses.is_empty() => Ok(Vec::new()),
-        None => Ok(vec![(
-            "trajectory.svg",
-            trajectory_svg(&trajectory.poses, None)?,
-        )]),
+        None => Ok(sketch
+            .svg()?
+            .map(|svg| ("trajectory.svg", svg))
+            .into_iter()
+            .collect()),
     }
 }

@@ -71,6 +71,14 @@ fn play(
     out: Out,
     unfinished: Option<Begun>,
 ) -> Result<ExitCode, Failure> {
+    if let Some(begun) = unfinished.as_ref().filter(|begun| begun.lost > 0) {
+        print::note(format_args!(
+            "gyre: a power failure took the last {} poses of {}: going on after {}",
+            begun.lost,
+            out.path().display(),
+            begun.poses
+        ));
+    }
     if let Some(simulation) = configuration.stored() {
         // A run that goes on needs the recording that it was begun with.
         let replace = unfinished.is_none();
@@ -95,7 +103,7 @@ fn play(
     };
     plan.manifest.write(&configuration.to_toml()?)?;
 
-    let resumed = unfinished.map_or(0, |begun| begun.poses);
+    let resumed = unfinished.map_or(0, |begun| begun.poses as usize);
     let mut progress = Progress::new(checked.scans, resumed, &checked.footprint);
     let started = Instant::now();
     let report = supervise(&plan, signals, &mut |event| progress.show(&event));
@@ -128,7 +136,7 @@ fn prepare(
     unfinished: Option<&Begun>,
 ) -> Result<(), Failure> {
     match unfinished {
-        Some(begun) => earlier::restore_configuration(out, &begun.identity)?,
+        Some(begun) => earlier::resume(out, begun)?,
         None => {
             let identity = Identity::of(configuration, checked.scans)?;
             earlier::begin(out, &identity, &configuration.to_toml()?)?;
@@ -180,7 +188,7 @@ fn write_missing_results(
     sweep();
     let session = Session {
         scans: begun.identity.scans,
-        resumed: begun.poses,
+        resumed: begun.poses as usize,
         wall: Duration::ZERO,
         footprint: None,
         ending: Some(Ending::Complete),

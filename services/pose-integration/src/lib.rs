@@ -7,7 +7,7 @@ use gyre_messages::{Item, Motion, MotionHeader, PoseHeader, Refined, StageId, fl
 use gyre_stage::{Launch, Sink, StageCounters, StageError, clock, sink};
 
 pub use compose::compose;
-use journal::Journal;
+use journal::{Journal, JournalError};
 
 /// Runs the stage until SIGTERM.
 ///
@@ -15,11 +15,8 @@ use journal::Journal;
 /// A journal that cannot be used, or an error of [`sink::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let path = journal::path(&launch.manifest.out);
-    let (journal, records) =
-        Journal::open(&path).map_err(|error| StageError::Input(error.to_string()))?;
     let mut integration = Integration {
-        journal,
-        records,
+        journal: Journal::open(&path).map_err(unusable)?,
         last: None,
     };
     match launch.manifest.refines {
@@ -30,8 +27,6 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 
 struct Integration {
     journal: Journal,
-    /// The content of the journal at the start.
-    records: Vec<PoseHeader>,
     last: Option<PoseHeader>,
 }
 
@@ -39,8 +34,8 @@ impl Sink for Integration {
     const HOP: StageId = StageId::PoseIntegration;
 
     fn restore(&mut self, count: usize) -> Result<(Vec<PoseHeader>, bool), StageError> {
-        let mut poses = std::mem::take(&mut self.records);
-        let ended = poses.pop_if(|last| last.item.is(flag::END)).is_some();
+        // One at least, to go on from.
+        let (mut poses, ended) = self.journal.last(count.max(1)).map_err(unusable)?;
         self.last = poses.last().copied();
         poses.drain(..poses.len().saturating_sub(count));
         Ok((poses, ended))
@@ -67,8 +62,17 @@ impl Sink for Integration {
 
 impl Integration {
     fn write(&mut self, pose: &PoseHeader) -> Result<(), StageError> {
-        self.journal
-            .append(pose)
-            .map_err(|error| StageError::Input(error.to_string()))
+        self.journal.append(pose).map_err(unusable)
+    }
+}
+
+fn unusable(error: JournalError) -> StageError {
+    match error {
+        // A process that was killed, and is not gone yet.
+        JournalError::Busy { .. } => StageError::Transport {
+            action: "open the journal".to_owned(),
+            reason: error.to_string(),
+        },
+        _ => StageError::Input(error.to_string()),
     }
 }

@@ -4,47 +4,52 @@
 //! each item is written before its motion is published, and a restart restores the state before its first item. The file
 //! consists of two rings of fixed-size slots, one of states and one of keyframes, long enough for any restart; it does not grow.
 //! Checksums detect slots that were cut short by a death; their items had not been published.
+//!
+//! A thread synchronises the file about once a second. After a power failure any part of what was written since may be there or
+//! not. So a state names its keyframes by their content, and the motion that it led to: [`newest_known`] finds the last pose of a
+//! journal whose state is whole, and the run goes on from there.
 
 mod codec;
 #[cfg(test)]
 mod tests;
 
 use std::{
-    fs::{File, OpenOptions},
-    io,
-    os::unix::fs::FileExt,
+    mem,
     path::{Path, PathBuf},
 };
 
-use gyre_scan_matching::Refiner;
+use gyre_messages::{MotionEstimate, PoseHeader};
+use gyre_scan_matching::{Keyframe, Refiner, TrackerState};
+use gyre_storage::{File, GroupSync, StorageError, create_folder};
 use thiserror::Error;
 
 use codec::{
-    EMPTY, KEYFRAME_WORDS, STATE_BYTES, StateHeader, decode_keyframe, decode_state,
-    encode_keyframe, encode_state, keyframe_id,
+    EMPTY, KEYFRAME_WORDS, Name, StateHeader, decode_keyframe, decode_state, encode_keyframe,
+    encode_state, keyframe_name, state_bytes,
 };
 
 /// The start of the file, with the version of the slots.
-const MAGIC: [u8; 16] = *b"gyre map v1     ";
-/// Slots in addition to those that a window needs.
-const HEADROOM: usize = 8;
+const MAGIC: [u8; 16] = *b"gyre map v2     ";
 /// The largest window. The layout of the file is the same for all windows, so a run can be continued with another one.
 const MAX_WINDOW: usize = 66;
 /// Number of states in the ring.
-const STATES: usize = 2 * MAX_WINDOW + HEADROOM;
-/// Bytes of the file's header: the start, the numbers of slots of both rings, the size of a keyframe's slot.
-const HEADER_BYTES: usize = 16 + 3 * 8;
+const STATES: usize = look_back(MAX_WINDOW);
+/// Bytes of the file's header: the start, the numbers of slots of both rings, the sizes of a state's and a keyframe's slot.
+const HEADER_BYTES: usize = 16 + 4 * 8;
+
+/// Number of items that a restart can go back, from the newest state: by two windows after a death, and by what was not yet
+/// synchronised after a power failure.
+const fn look_back(window: usize) -> usize {
+    const HEADROOM: usize = 8;
+    2 * window + GroupSync::LIMIT as usize + HEADROOM
+}
+
 /// An error of a checkpoint.
 #[derive(Debug, Error)]
 pub enum CheckpointError {
     /// The file cannot be read or written.
-    #[error("checkpoint {path}: {source}")]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// The system error.
-        source: io::Error,
-    },
+    #[error(transparent)]
+    Storage(#[from] StorageError),
     /// The state is not in the file, which is of another version or configuration, or damaged.
     #[error(
         "{path} does not have the state of the refinement before item {item}: start again with --fresh"
@@ -55,19 +60,37 @@ pub enum CheckpointError {
         /// The item whose state is missing.
         item: u64,
     },
+    /// Another process writes to the file.
+    #[error("another process is writing to {path}")]
+    Busy {
+        /// The file.
+        path: PathBuf,
+    },
 }
 
 /// An open checkpoint.
 #[derive(Debug)]
 pub struct Checkpoint {
-    path: PathBuf,
     file: File,
+    sync: GroupSync,
     /// Number of keyframes to keep; further slots stay empty.
     kept: usize,
-    /// Id of the keyframe in each slot; `None` for an empty slot.
-    keyframes: Vec<Option<u64>>,
-    /// Buffer for one slot of a keyframe.
-    slot: Vec<u8>,
+    /// The keyframe in each slot; `None` for an empty slot.
+    keyframes: Vec<Option<Name>>,
+    /// The keyframes of the last state that was written or restored, oldest first, and those of the state before it.
+    map: Vec<Name>,
+    earlier_map: Vec<Name>,
+    slots: Slots,
+}
+
+/// Buffers for one slot each.
+#[derive(Debug)]
+struct Slots {
+    state: Vec<u8>,
+    found: Vec<u8>,
+    keyframe: Vec<u8>,
+    /// The name of the keyframe in its buffer.
+    encoded: Option<Name>,
 }
 
 /// Returns the path of the checkpoint of the run that writes to `out`.
@@ -75,55 +98,60 @@ pub fn path(out: &Path) -> PathBuf {
     out.join("journal").join("refinement.map")
 }
 
+/// Returns the checksum of a motion, by which a state is known to belong to a pose.
+pub fn checksum(motion: &MotionEstimate) -> u64 {
+    crc32fast::hash(bytemuck::bytes_of(motion)).into()
+}
+
 impl Checkpoint {
     /// Opens or creates a checkpoint for runs with this window and maps of at most `max_keyframes` keyframes of `cells` cells.
     ///
     /// # Errors
-    /// A file that cannot be read or written.
+    /// A file that cannot be read or written, or to which another process writes.
     pub fn open(
         path: &Path,
         window: usize,
         max_keyframes: usize,
         cells: usize,
     ) -> Result<Self, CheckpointError> {
-        let failed = |source| CheckpointError::File {
-            path: path.to_owned(),
-            source,
-        };
-        if let Some(directory) = path.parent() {
-            std::fs::create_dir_all(directory).map_err(failed)?;
+        path.parent().map_or(Ok(()), create_folder)?;
+        let file = File::open_or_create(path)?;
+        if !file.lock()? {
+            return Err(CheckpointError::Busy {
+                path: path.to_owned(),
+            });
         }
-        let file = OpenOptions::new()
-            .create(true)
-            .truncate(false)
-            .read(true)
-            .write(true)
-            .open(path)
-            .map_err(failed)?;
-        let slots = |window: usize| max_keyframes + 2 * window + HEADROOM;
-        let (kept, keyframes) = (slots(window.min(MAX_WINDOW)), vec![None; slots(MAX_WINDOW)]);
-        let slot = vec![0; KEYFRAME_WORDS * 8 + cells];
+        let slots = |window: usize| max_keyframes + look_back(window);
         let mut checkpoint = Self {
-            path: path.to_owned(),
+            sync: GroupSync::start(&file)?,
             file,
-            kept,
-            keyframes,
-            slot,
+            kept: slots(window.min(MAX_WINDOW)),
+            keyframes: vec![None; slots(MAX_WINDOW)],
+            map: Vec::with_capacity(max_keyframes),
+            earlier_map: Vec::with_capacity(max_keyframes),
+            slots: Slots {
+                state: vec![0; state_bytes(max_keyframes)],
+                found: vec![0; state_bytes(max_keyframes)],
+                keyframe: vec![0; KEYFRAME_WORDS * 8 + cells],
+                encoded: None,
+            },
         };
-        checkpoint.load().map_err(failed)?;
+        checkpoint.load()?;
         Ok(checkpoint)
     }
 
-    /// Reads the ids of all keyframes. A file of another layout is overwritten.
-    fn load(&mut self) -> io::Result<()> {
+    /// Reads the names of all keyframes. A file of another layout is overwritten.
+    fn load(&mut self) -> Result<(), StorageError> {
         let mut header = [0; HEADER_BYTES];
-        let matches = self.file.read_exact_at(&mut header, 0).is_ok() && header == self.header();
+        let matches = self.file.read_at(&mut header, 0)? && header == self.header();
         if !matches {
-            self.file.set_len(0)?;
-            return self.file.write_all_at(&self.header(), 0);
+            self.file.set_length(0)?;
+            return self.file.write_at(&self.header(), 0);
         }
         for k in 0..self.keyframes.len() {
-            self.keyframes[k] = self.read_keyframe(k)?;
+            let offset = self.keyframe_offset(k);
+            let whole = self.file.read_at(&mut self.slots.keyframe, offset)?;
+            self.keyframes[k] = keyframe_name(&self.slots.keyframe).filter(|_| whole);
         }
         Ok(())
     }
@@ -131,7 +159,10 @@ impl Checkpoint {
     fn header(&self) -> [u8; HEADER_BYTES] {
         let mut header = [0; HEADER_BYTES];
         header[..16].copy_from_slice(&MAGIC);
-        for (k, number) in [STATES, self.keyframes.len(), self.slot.len()]
+        let Slots {
+            state, keyframe, ..
+        } = &self.slots;
+        for (k, number) in [STATES, self.keyframes.len(), state.len(), keyframe.len()]
             .into_iter()
             .enumerate()
         {
@@ -141,69 +172,83 @@ impl Checkpoint {
     }
 
     fn state_offset(&self, item: u64) -> u64 {
-        HEADER_BYTES as u64 + item % STATES as u64 * STATE_BYTES as u64
+        HEADER_BYTES as u64 + item % STATES as u64 * self.slots.state.len() as u64
     }
 
     fn keyframe_offset(&self, slot: usize) -> u64 {
-        (HEADER_BYTES + STATES * STATE_BYTES + slot * self.slot.len()) as u64
+        let states = STATES * self.slots.state.len();
+        (HEADER_BYTES + states + slot * self.slots.keyframe.len()) as u64
     }
 
-    /// Writes the state after `item`: first the new keyframes, then the state that refers to them. If the file has this state
-    /// already, the process repeats items after a restart, and nothing is written: later states may still be needed. If it has
-    /// another state, all later ones are obsolete.
+    /// Writes the state after `item`, which led to a motion with this checksum: first the new keyframes, then the state that names
+    /// them. If the file has this state already, the process repeats items after a restart, and it is left: later states may still
+    /// be needed. If it has another state, all later ones are obsolete.
     ///
     /// # Errors
-    /// A file that cannot be written.
-    pub fn write(&mut self, item: u64, refiner: &Refiner) -> Result<(), CheckpointError> {
-        let (mut keyframes, mut oldest) = (0, u64::MAX);
-        for keyframe in refiner.keyframes() {
-            (keyframes, oldest) = (keyframes + 1, oldest.min(keyframe.id));
+    /// A file that cannot be written or synchronised.
+    pub fn write(
+        &mut self,
+        item: u64,
+        motion: u64,
+        refiner: &Refiner,
+    ) -> Result<(), CheckpointError> {
+        self.name_keyframes(item, refiner);
+        let header = StateHeader { item, motion };
+        let (file, offset) = (&self.file, self.state_offset(item));
+        encode_state(header, &self.map, refiner.state(), &mut self.slots.state);
+        let known =
+            file.read_at(&mut self.slots.found, offset)? && self.slots.found == self.slots.state;
+        if !known {
+            self.erase_keyframes_from(item)?;
         }
-        let header = StateHeader {
-            item,
-            keyframes,
-            oldest,
-        };
-        let state = encode_state(header, refiner.state());
-        if self.read_state(item).is_some_and(|found| found == state) {
-            return Ok(());
-        }
-        let result = self
-            .erase_keyframes_from(item)
-            .and_then(|()| self.write_keyframes(item, oldest, refiner))
-            .and_then(|()| self.file.write_all_at(&state, self.state_offset(item)));
-        result.map_err(|source| CheckpointError::File {
-            path: self.path.clone(),
-            source,
-        })
-    }
-
-    /// Writes the keyframes that the file does not have.
-    fn write_keyframes(&mut self, item: u64, oldest: u64, refiner: &Refiner) -> io::Result<()> {
-        for keyframe in refiner.keyframes() {
-            let stored = self
-                .keyframes
-                .iter()
-                .position(|slot| *slot == Some(keyframe.id));
-            // A map starts with the previous scan, whose keyframe depends on this item too: write it again.
-            let starts_map = keyframe.id == oldest && keyframe.id.checked_add(1) == Some(item);
-            if stored.is_some() && !starts_map {
-                continue;
-            }
-            let slot = stored.unwrap_or_else(|| self.free_slot());
-            self.keyframes[slot] = Some(keyframe.id);
-            encode_keyframe(keyframe, &mut self.slot);
-            self.file
-                .write_all_at(&self.slot, self.keyframe_offset(slot))?;
+        self.write_keyframes(refiner)?;
+        if !known {
+            self.file.write_at(&self.slots.state, offset)?;
+            self.sync.changed()?;
         }
         Ok(())
     }
 
-    /// Erases the keyframes from `item` on.
-    fn erase_keyframes_from(&mut self, item: u64) -> io::Result<()> {
+    /// Names the keyframes of the map. A keyframe does not change while it is in the map.
+    fn name_keyframes(&mut self, item: u64, refiner: &Refiner) {
+        mem::swap(&mut self.map, &mut self.earlier_map);
+        self.map.clear();
+        for (k, keyframe) in refiner.keyframes().enumerate() {
+            // A map starts with the previous scan, which may have been in the map before as well.
+            let starts_map = k == 0 && keyframe.id.checked_add(1) == Some(item);
+            let mut earlier = self.earlier_map.iter();
+            let named = earlier.find(|name| name.id == keyframe.id && !starts_map);
+            let name = named
+                .copied()
+                .unwrap_or_else(|| self.slots.encode(keyframe));
+            self.map.push(name);
+        }
+    }
+
+    /// Writes the keyframes of the map that the file does not have.
+    fn write_keyframes(&mut self, refiner: &Refiner) -> Result<(), StorageError> {
+        for (k, keyframe) in refiner.keyframes().enumerate() {
+            let name = self.map[k];
+            if self.keyframes.contains(&Some(name)) {
+                continue;
+            }
+            if self.slots.encoded != Some(name) {
+                self.slots.encode(keyframe);
+            }
+            let slot = self.free_slot();
+            self.keyframes[slot] = Some(name);
+            self.file
+                .write_at(&self.slots.keyframe, self.keyframe_offset(slot))?;
+        }
+        Ok(())
+    }
+
+    /// Erases the keyframes from `item` on that are not in the map.
+    fn erase_keyframes_from(&mut self, item: u64) -> Result<(), StorageError> {
         for slot in 0..self.keyframes.len() {
-            if self.keyframes[slot].is_some_and(|id| id >= item) {
-                self.file.write_all_at(&EMPTY, self.keyframe_offset(slot))?;
+            let obsolete = |name: &Name| name.id >= item && !self.map.contains(name);
+            if self.keyframes[slot].as_ref().is_some_and(obsolete) {
+                self.file.write_at(&EMPTY, self.keyframe_offset(slot))?;
                 self.keyframes[slot] = None;
             }
         }
@@ -226,59 +271,80 @@ impl Checkpoint {
         empty.or_else(oldest).unwrap_or(0)
     }
 
+    /// Reads the state after `item` and the names of its keyframes; `None` if the file does not have it whole.
+    fn read_state(
+        &mut self,
+        item: u64,
+    ) -> Result<Option<(StateHeader, TrackerState)>, StorageError> {
+        let offset = self.state_offset(item);
+        let whole = self.file.read_at(&mut self.slots.found, offset)?;
+        let state = decode_state(&self.slots.found, &mut self.map);
+        Ok(state.filter(|(header, _)| whole && header.item == item))
+    }
+
     /// Restores the state after `item`.
     ///
     /// # Errors
     /// [`CheckpointError::Missing`].
     pub fn restore(&mut self, item: u64, refiner: &mut Refiner) -> Result<(), CheckpointError> {
-        let missing = || CheckpointError::Missing {
-            path: self.path.clone(),
+        let missing = CheckpointError::Missing {
+            path: self.file.path().to_owned(),
             item: item.saturating_add(1),
         };
-        let state = self.read_state(item).ok_or_else(missing)?;
-        let (header, tracker) = decode_state(&state).ok_or_else(missing)?;
-        if header.item != item {
-            return Err(missing());
-        }
-        let mut wanted: Vec<(u64, usize)> = (0..self.keyframes.len())
-            .filter_map(|slot| self.keyframes[slot].map(|id| (id, slot)))
-            .filter(|(id, _)| (header.oldest..=item).contains(id))
-            .collect();
-        wanted.sort_unstable();
-        let offsets: Vec<u64> = wanted
-            .iter()
-            .map(|(_, slot)| self.keyframe_offset(*slot))
-            .collect();
-        let mut offsets = offsets.into_iter();
+        let Some((_, tracker)) = self.read_state(item)? else {
+            return Err(missing);
+        };
+        let places: Vec<Option<u64>> = self.map.iter().map(|name| self.place_of(*name)).collect();
+        let mut keyframes = self.map.iter().zip(places);
+        let (file, slot) = (&self.file, &mut self.slots.keyframe);
+        self.slots.encoded = None;
         refiner.restore(tracker, |keyframe| {
-            offsets.next().is_some_and(|offset| {
-                self.file.read_exact_at(&mut self.slot, offset).is_ok()
-                    && decode_keyframe(&self.slot, keyframe)
-            })
+            let Some((name, Some(offset))) = keyframes.next() else {
+                return false;
+            };
+            file.read_at(slot, offset).is_ok_and(|whole| whole)
+                && decode_keyframe(slot, *name, keyframe)
         });
-        if refiner.keyframes().count() as u64 == header.keyframes {
-            Ok(())
-        } else {
-            Err(missing())
+        match refiner.keyframes().count() == self.map.len() {
+            true => Ok(()),
+            false => Err(missing),
         }
     }
 
-    /// Reads the slot of an item's state; `None` if the file ends before it.
-    fn read_state(&self, item: u64) -> Option<[u8; STATE_BYTES]> {
-        let mut state = [0; STATE_BYTES];
-        self.file
-            .read_exact_at(&mut state, self.state_offset(item))
-            .ok()
-            .map(|()| state)
+    /// Returns the offset of a keyframe in the file, if it is there.
+    fn place_of(&self, name: Name) -> Option<u64> {
+        let slot = self.keyframes.iter().position(|slot| *slot == Some(name));
+        slot.map(|slot| self.keyframe_offset(slot))
     }
 
-    /// Reads the id of the keyframe in a slot; `None` if its checksum is wrong.
-    fn read_keyframe(&mut self, slot: usize) -> io::Result<Option<u64>> {
-        let offset = self.keyframe_offset(slot);
-        match self.file.read_exact_at(&mut self.slot, offset) {
-            Ok(()) => Ok(keyframe_id(&self.slot)),
-            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Ok(None),
-            Err(error) => Err(error),
+    /// Returns whether the whole state after a pose is in the file.
+    fn knows(&mut self, pose: &PoseHeader) -> Result<bool, StorageError> {
+        let state = self.read_state(pose.item.seq)?;
+        let led_to_it = state.is_some_and(|(header, _)| header.motion == checksum(&pose.motion));
+        Ok(led_to_it && self.map.iter().all(|name| self.place_of(*name).is_some()))
+    }
+
+    /// Returns the newest of these poses, given newest first, from which a run can go on: the one whose whole state is in the file.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn newest_known<'a>(
+        &mut self,
+        poses: impl IntoIterator<Item = &'a PoseHeader>,
+    ) -> Result<Option<&'a PoseHeader>, CheckpointError> {
+        for pose in poses {
+            if self.knows(pose)? {
+                return Ok(Some(pose));
+            }
         }
+        Ok(None)
+    }
+}
+
+impl Slots {
+    fn encode(&mut self, keyframe: &Keyframe) -> Name {
+        let name = encode_keyframe(keyframe, &mut self.keyframe);
+        self.encoded = Some(name);
+        name
     }
 }

@@ -72,8 +72,9 @@ impl Stage for RefinementStage {
             _ => motion,
         };
         self.next = Some(item.seq.saturating_add(1));
+        let motion = checkpoint::checksum(&output.header().motion);
         self.checkpoint
-            .write(item.seq, &self.refiner)
+            .write(item.seq, motion, &self.refiner)
             .map_err(unusable)
     }
 }
@@ -100,5 +101,12 @@ fn points(masked: &Received<Masked>) -> Result<&[SparsePoint], StageError> {
 }
 
 fn unusable(error: CheckpointError) -> StageError {
-    StageError::Input(error.to_string())
+    match error {
+        // A process that was killed, and is not gone yet.
+        CheckpointError::Busy { .. } => StageError::Transport {
+            action: "open the checkpoint".to_owned(),
+            reason: error.to_string(),
+        },
+        _ => StageError::Input(error.to_string()),
+    }
 }

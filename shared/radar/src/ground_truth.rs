@@ -11,7 +11,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 pub use kitti::write_kitti;
-pub use tum::write_tum;
+pub use tum::{write_tum, write_tum_pose};
 
 use crate::trajectory::Trajectory;
 

@@ -5,11 +5,17 @@ use std::{
     io,
     os::unix::fs::FileExt,
     path::{Path, PathBuf},
+    thread,
+    time::{Duration, Instant},
 };
 
 #[cfg(feature = "record")]
 use crate::record::{self, Operation};
 use crate::{StorageError, folder::sync_folder};
+
+/// Time for which a lock is tried, and between two attempts.
+const LOCK_WAIT: Duration = Duration::from_secs(1);
+const LOCK_PAUSE: Duration = Duration::from_millis(5);
 
 /// A file that is changed in place.
 #[derive(Debug)]
@@ -84,15 +90,24 @@ impl File {
         })
     }
 
-    /// Locks the file for this process; false if another one has locked it.
+    /// Locks the file for this process, and waits up to a second for one that was killed and is not gone yet: it keeps its lock
+    /// until the system has closed its files. False if another process keeps the lock.
     ///
     /// # Errors
     /// A file system without locks.
-    pub fn try_lock(&self) -> Result<bool, StorageError> {
-        match self.file.try_lock() {
-            Ok(()) => Ok(true),
-            Err(TryLockError::WouldBlock) => Ok(false),
-            Err(TryLockError::Error(source)) => Err(StorageError::at("lock", &self.path)(source)),
+    pub fn lock(&self) -> Result<bool, StorageError> {
+        let since = Instant::now();
+        loop {
+            match self.file.try_lock() {
+                Ok(()) => return Ok(true),
+                Err(TryLockError::WouldBlock) if since.elapsed() < LOCK_WAIT => {
+                    thread::sleep(LOCK_PAUSE);
+                }
+                Err(TryLockError::WouldBlock) => return Ok(false),
+                Err(TryLockError::Error(source)) => {
+                    return Err(StorageError::at("lock", &self.path)(source));
+                }
+            }
         }
     }
 
@@ -169,5 +184,27 @@ impl File {
             id,
         });
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_lock_is_waited_for_while_its_owner_goes_and_refused_while_it_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        let owner = File::open_or_create(&path).unwrap();
+        assert!(owner.lock().unwrap());
+        let other = File::open_or_create(&path).unwrap();
+        assert!(!other.lock().unwrap());
+        let going = thread::spawn(move || {
+            thread::sleep(Duration::from_millis(50));
+            drop(owner);
+        });
+        assert!(other.lock().unwrap());
+        going.join().unwrap();
     }
 }

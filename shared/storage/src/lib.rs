@@ -41,11 +41,10 @@ pub struct StorageError {
 
 impl StorageError {
     /// Adds operation and path to a system error.
-    pub fn at(action: &'static str, path: &Path) -> impl Fn(io::Error) -> Self + use<> {
-        let path = path.to_owned();
+    pub fn at(action: &'static str, path: &Path) -> impl Fn(io::Error) -> Self {
         move |source| Self {
             action,
-            path: path.clone(),
+            path: path.to_owned(),
             source,
         }
     }

@@ -92,7 +92,17 @@ mod tests {
     use gyre_messages::{Item, MotionEstimate, PoseHeader};
 
     use super::*;
-    use crate::odometry::{csv, motions};
+    use crate::odometry::{HEADER, motion, write_row};
+
+    fn csv(poses: &[PoseHeader]) -> String {
+        let mut text = HEADER.to_owned();
+        poses.iter().for_each(|pose| write_row(pose, &mut text));
+        text
+    }
+
+    fn motions(poses: &[PoseHeader]) -> Vec<TimedMotion> {
+        poses.iter().filter_map(motion).collect()
+    }
 
     fn poses() -> Vec<PoseHeader> {
         let pose = |k: i64| PoseHeader {

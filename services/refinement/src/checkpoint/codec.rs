@@ -4,9 +4,10 @@ use gyre_geometry::Twist;
 use gyre_scan_matching::{Anchor, Keyframe, TrackerState};
 use nalgebra::{Complex, Isometry2, Translation2, UnitComplex};
 
-/// Words of a state's slot: the checksum; the item, the number of keyframes, the id of the oldest one; the tracker state.
+/// Words of a state's slot before the names of its keyframes: the checksum; the item, the checksum of its motion, the number of
+/// keyframes; the tracker state.
 const STATE_WORDS: usize = 1 + 3 + TRACKER_WORDS;
-pub(super) const STATE_BYTES: usize = STATE_WORDS * 8;
+const NAME_WORDS: usize = 2;
 const TRACKER_WORDS: usize = 4 + 2 * ANCHOR_WORDS + 4;
 const ANCHOR_WORDS: usize = 9;
 /// Words of a keyframe's slot before its cells: checksum, id, pose, corners of both levels.
@@ -14,15 +15,27 @@ pub(super) const KEYFRAME_WORDS: usize = 2 + 4 + 4;
 /// The checksum of an empty slot. No content has it.
 pub(super) const EMPTY: [u8; 8] = [0; 8];
 
+/// Bytes of the slot of a state with at most so many keyframes.
+pub(super) const fn state_bytes(max_keyframes: usize) -> usize {
+    8 * (STATE_WORDS + NAME_WORDS * max_keyframes)
+}
+
 /// The header of a state's slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct StateHeader {
     /// The item after which the state was written.
     pub item: u64,
-    /// Number of keyframes in the map.
-    pub keyframes: u64,
-    /// Id of the oldest keyframe; `u64::MAX` without any.
-    pub oldest: u64,
+    /// The checksum of the item's motion.
+    pub motion: u64,
+}
+
+/// The name of a keyframe's content: two keyframes of one scan can differ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Name {
+    /// The scan.
+    pub id: u64,
+    /// The checksum of the slot.
+    pub check: u64,
 }
 
 fn word(bytes: &[u8], k: usize) -> u64 {
@@ -120,31 +133,48 @@ fn tracker_from(words: &[u64; TRACKER_WORDS]) -> TrackerState {
     }
 }
 
-pub(super) fn encode_state(header: StateHeader, state: &TrackerState) -> [u8; STATE_BYTES] {
-    let mut slot = [0; STATE_BYTES];
-    [header.item, header.keyframes, header.oldest]
+/// Fills the slot of a state with these keyframes, oldest first.
+pub(super) fn encode_state(
+    header: StateHeader,
+    keyframes: &[Name],
+    state: &TrackerState,
+    slot: &mut [u8],
+) {
+    slot.fill(0);
+    let names = keyframes.iter().flat_map(|name| [name.id, name.check]);
+    [header.item, header.motion, keyframes.len() as u64]
         .into_iter()
         .chain(tracker_words(state))
+        .chain(names)
         .enumerate()
-        .for_each(|(k, value)| set_word(&mut slot, k + 1, value));
+        .for_each(|(k, value)| set_word(slot, k + 1, value));
     let check = checksum(&slot[8..]);
-    set_word(&mut slot, 0, check);
-    slot
+    set_word(slot, 0, check);
 }
 
-/// Decodes a state; `None` if its checksum is wrong.
-pub(super) fn decode_state(slot: &[u8; STATE_BYTES]) -> Option<(StateHeader, TrackerState)> {
-    let [item, keyframes, oldest] = [1, 2, 3].map(|k| word(slot, k));
-    let header = StateHeader {
-        item,
-        keyframes,
-        oldest,
-    };
+/// Decodes a state; `None` if its checksum is wrong. Its keyframes are put into `keyframes`, oldest first.
+pub(super) fn decode_state(
+    slot: &[u8],
+    keyframes: &mut Vec<Name>,
+) -> Option<(StateHeader, TrackerState)> {
+    if !is_valid(slot) {
+        return None;
+    }
+    let [item, motion, count] = [1, 2, 3].map(|k| word(slot, k));
+    if count > ((slot.len() / 8 - STATE_WORDS) / NAME_WORDS) as u64 {
+        return None;
+    }
     let words = std::array::from_fn(|k| word(slot, k + 4));
-    is_valid(slot).then(|| (header, tracker_from(&words)))
+    keyframes.clear();
+    keyframes.extend((0..count as usize).map(|k| Name {
+        id: word(slot, STATE_WORDS + NAME_WORDS * k),
+        check: word(slot, STATE_WORDS + NAME_WORDS * k + 1),
+    }));
+    Some((StateHeader { item, motion }, tracker_from(&words)))
 }
 
-pub(super) fn encode_keyframe(keyframe: &Keyframe, slot: &mut [u8]) {
+/// Fills the slot of a keyframe, and returns the name of its content.
+pub(super) fn encode_keyframe(keyframe: &Keyframe, slot: &mut [u8]) -> Name {
     set_word(slot, 1, keyframe.id);
     pose_words(&keyframe.pose)
         .into_iter()
@@ -164,15 +194,22 @@ pub(super) fn encode_keyframe(keyframe: &Keyframe, slot: &mut [u8]) {
     }
     let check = checksum(&slot[8..]);
     set_word(slot, 0, check);
+    Name {
+        id: keyframe.id,
+        check,
+    }
 }
 
-/// Returns the id of the keyframe in a slot; `None` if its checksum is wrong.
-pub(super) fn keyframe_id(slot: &[u8]) -> Option<u64> {
-    is_valid(slot).then(|| word(slot, 1))
+/// Returns the name of the keyframe in a slot; `None` if its checksum is wrong.
+pub(super) fn keyframe_name(slot: &[u8]) -> Option<Name> {
+    is_valid(slot).then(|| Name {
+        id: word(slot, 1),
+        check: word(slot, 0),
+    })
 }
 
-/// Decodes a keyframe; false if its checksum is wrong.
-pub(super) fn decode_keyframe(slot: &[u8], keyframe: &mut Keyframe) -> bool {
+/// Decodes the keyframe of this name; false if the slot has another one.
+pub(super) fn decode_keyframe(slot: &[u8], name: Name, keyframe: &mut Keyframe) -> bool {
     keyframe.id = word(slot, 1);
     keyframe.pose = pose_from(&std::array::from_fn::<u64, 4, _>(|k| word(slot, k + 2)));
     let mut at = KEYFRAME_WORDS * 8;
@@ -185,5 +222,5 @@ pub(super) fn decode_keyframe(slot: &[u8], keyframe: &mut Keyframe) -> bool {
             .for_each(|(cell, from)| *cell = *from);
         at += count;
     }
-    is_valid(slot)
+    keyframe_name(slot) == Some(name)
 }

@@ -87,7 +87,7 @@ impl Process {
                     .motion
             }
         };
-        self.checkpoint.write(item, &self.refiner).unwrap();
+        self.checkpoint.write(item, 0, &self.refiner).unwrap();
         [
             motion.translation.x,
             motion.translation.y,

@@ -14,7 +14,7 @@ use std::{
 
 pub use bands::bands_svg;
 pub use errors::errors_svg;
-pub use trajectory::trajectory_svg;
+pub use trajectory::{path_svg, trajectory_svg};
 
 use gyre_geometry::Pose;
 

@@ -31,8 +31,30 @@ pub fn trajectory_svg(
     estimate: &[Pose],
     matched: Option<&MatchedPoses>,
 ) -> Result<String, PlotError> {
-    require_poses(Side::Estimate, estimate)?;
-    let scene = Scene::new(estimate, matched);
+    match matched {
+        Some(matched) => {
+            require_poses(Side::Estimate, estimate)?;
+            scene_svg(&Scene::matched(matched))
+        }
+        None => path_svg(estimate, estimate.len(), path_m(estimate)),
+    }
+}
+
+/// Returns the plot of a trajectory of so many poses and metres, of which only some poses are `drawn`.
+///
+/// # Errors
+/// As [`trajectory_svg`].
+pub fn path_svg(drawn: &[Pose], poses: usize, length_m: f64) -> Result<String, PlotError> {
+    require_poses(Side::Estimate, drawn)?;
+    scene_svg(&Scene {
+        estimate: positions(drawn),
+        truth: None,
+        title: "Trajectory",
+        caption: format!("{poses} poses, {length_m:.1} m"),
+    })
+}
+
+fn scene_svg(scene: &Scene) -> Result<String, PlotError> {
     let view = View::around(scene.estimate.iter().chain(scene.truth.iter().flatten()))
         .ok_or(PlotError::Empty)?;
     let size = (
@@ -41,7 +63,7 @@ pub fn trajectory_svg(
     );
     document(size, |area| {
         header(area, scene.title, &scene.caption, &scene.legend())?;
-        draw(area, &scene, &view)
+        draw(area, scene, &view)
     })
 }
 
@@ -54,16 +76,7 @@ struct Scene {
 }
 
 impl Scene {
-    fn new(estimate: &[Pose], matched: Option<&MatchedPoses>) -> Self {
-        let Some(matched) = matched else {
-            let caption = format!("{} poses, {:.1} m", estimate.len(), path_m(estimate));
-            return Self {
-                estimate: positions(estimate),
-                truth: None,
-                title: "Trajectory",
-                caption,
-            };
-        };
+    fn matched(matched: &MatchedPoses) -> Self {
         let ate = ate(matched);
         let aligned: Vec<_> = matched
             .estimate()

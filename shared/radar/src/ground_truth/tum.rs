@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use gyre_geometry::pose;
+use gyre_geometry::{Pose, pose};
 
 use super::{LineError, check_increasing, lines, numbers};
 use crate::dataset::stamp;
@@ -48,15 +48,21 @@ pub fn write_tum(trajectory: &Trajectory, out: &mut impl Write) -> io::Result<()
             "a TUM file requires times, but the trajectory has none",
         )
     })?;
-    for (ns, pose) in stamps.iter().zip(&trajectory.poses) {
-        let (sin, cos) = (pose.rotation.angle() / 2.0).sin_cos();
-        let (sign, size) = (if *ns < 0 { "-" } else { "" }, ns.unsigned_abs());
-        let (seconds, nanoseconds) = (size / 1_000_000_000, size % 1_000_000_000);
-        let (x, y) = (pose.translation.x, pose.translation.y);
-        writeln!(
-            out,
-            "{sign}{seconds}.{nanoseconds:09} {x:.6} {y:.6} 0 0 0 {sin:.12} {cos:.12}"
-        )?;
-    }
-    Ok(())
+    let mut poses = stamps.iter().zip(&trajectory.poses);
+    poses.try_for_each(|(ns, pose)| write_tum_pose(*ns, pose, out))
+}
+
+/// Writes a TUM pose with its stamp in ns.
+///
+/// # Errors
+/// Errors of `out`.
+pub fn write_tum_pose(ns: i64, pose: &Pose, out: &mut impl Write) -> io::Result<()> {
+    let (sin, cos) = (pose.rotation.angle() / 2.0).sin_cos();
+    let (sign, size) = (if ns < 0 { "-" } else { "" }, ns.unsigned_abs());
+    let (seconds, nanoseconds) = (size / 1_000_000_000, size % 1_000_000_000);
+    let (x, y) = (pose.translation.x, pose.translation.y);
+    writeln!(
+        out,
+        "{sign}{seconds}.{nanoseconds:09} {x:.6} {y:.6} 0 0 0 {sin:.12} {cos:.12}"
+    )
 }

@@ -1,0 +1,295 @@
+//! Counts of scans and motions.
+
+use gyre_messages::{Item, MotionEstimate, PoseHeader, flag, initial_guess, outcome};
+use serde::Serialize;
+
+/// Largest share of unreadable scans of a run that succeeds. With more, motions span more than one scan too often for
+/// the trajectory to be the recording's.
+const MAX_UNREADABLE_SHARE: f64 = 0.2;
+
+/// Motions from which the radar's period is taken, so that longer runs take no more memory.
+const MOTIONS_OF_PERIOD: usize = 1 << 16;
+
+/// Counts of scans.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Counts {
+    /// Scans that the source published.
+    pub published: u64,
+    /// Scans with a pose.
+    pub processed: u64,
+    /// Scans published and not processed: what live mode dropped.
+    pub dropped: u64,
+    /// Scans that could not be read.
+    pub unreadable: u64,
+    /// Scans that the recording lacks, by the gaps in its times.
+    pub missing: u64,
+    /// Places where the chain of motions starts anew, after the first.
+    pub breaks: u64,
+    /// `None`: the run refines no motions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub motions: Option<MotionCounts>,
+}
+
+/// Counts of motions by outcome.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct MotionCounts {
+    /// Refined.
+    pub refined: u64,
+    /// Accepted with a wider covariance because of little support.
+    pub weak: u64,
+    /// Predicted from the motions before, because nothing matched.
+    pub predicted: u64,
+    /// Weak or predicted.
+    pub doubtful: u64,
+    /// Refined ones whose initial guess was not the prediction.
+    pub second_hypothesis: u64,
+}
+
+impl MotionCounts {
+    fn add(&mut self, motion: &MotionEstimate) {
+        let refinement = &motion.refinement;
+        match refinement.outcome {
+            outcome::REFINED => {
+                self.refined += 1;
+                self.second_hypothesis +=
+                    u64::from(refinement.initial_guess != initial_guess::PREDICTION);
+            }
+            outcome::WEAK => self.weak += 1,
+            outcome::PREDICTED => self.predicted += 1,
+            _ => {}
+        }
+        self.doubtful = self.weak + self.predicted;
+    }
+}
+
+impl Counts {
+    /// Returns whether the result is hardly one of the recording.
+    pub fn too_many_are_unreadable(&self) -> bool {
+        let read = self.published + self.unreadable;
+        self.unreadable as f64 > MAX_UNREADABLE_SHARE * read as f64
+    }
+}
+
+/// Counts the poses of a journal.
+#[derive(Debug, Default)]
+pub struct Counter {
+    processed: u64,
+    starts: u64,
+    last: Option<Item>,
+    gaps: Gaps,
+    motions: MotionCounts,
+}
+
+impl Counter {
+    /// Counts a pose.
+    pub fn add(&mut self, pose: &PoseHeader) {
+        self.processed += 1;
+        self.starts += u64::from(pose.item.is(flag::BREAK));
+        self.last = Some(pose.item);
+        self.gaps.add(pose);
+        self.motions.add(&pose.motion);
+    }
+
+    /// Returns the counts, with the end of the stream if it came to that. `first` is the first scan played.
+    pub fn counts(self, end: Option<&Item>, first: usize, refines: bool) -> Counts {
+        let next = |of: fn(&Item) -> u64| {
+            let after_last = || self.last.as_ref().map(|last| of(last) + 1);
+            end.map(of).or_else(after_last)
+        };
+        let published = next(|item| item.published).unwrap_or(0);
+        let seen = next(|item| item.scan).map_or(0, |next| next.saturating_sub(first as u64));
+        Counts {
+            published,
+            processed: self.processed,
+            dropped: end.or(self.last.as_ref()).map_or(0, Item::dropped),
+            unreadable: seen.saturating_sub(published),
+            missing: self.gaps.missing(),
+            breaks: self.starts.saturating_sub(1),
+            motions: refines.then_some(self.motions),
+        }
+    }
+}
+
+/// Counts the scans that a recording lacks, by the intervals between those that it has.
+#[derive(Debug, Default)]
+struct Gaps {
+    /// The first motions, which tell the period.
+    first: Vec<Motion>,
+    period_ns: Option<i64>,
+    missing: u64,
+}
+
+/// The time that a motion takes, and the turns of the radar in it by the numbers of its scans.
+#[derive(Clone, Copy, Debug)]
+struct Motion {
+    interval_ns: i64,
+    turns: u64,
+}
+
+impl Motion {
+    fn missing(&self, period_ns: i64) -> u64 {
+        let fit = (self.interval_ns as f64 / period_ns as f64).round() as u64;
+        fit.saturating_sub(self.turns)
+    }
+}
+
+impl Gaps {
+    fn add(&mut self, pose: &PoseHeader) {
+        if pose.item.is(flag::BREAK) {
+            return;
+        }
+        let turns = pose.item.scan.saturating_sub(pose.item.previous_scan);
+        let motion = Motion {
+            interval_ns: pose.motion.interval_ns,
+            turns: turns.max(1),
+        };
+        match self.period_ns {
+            Some(period_ns) => self.missing += motion.missing(period_ns),
+            None => {
+                self.first.push(motion);
+                if self.first.len() == MOTIONS_OF_PERIOD {
+                    self.settle();
+                }
+            }
+        }
+    }
+
+    /// Takes the median of the first motions' periods, and counts what is missing among them.
+    fn settle(&mut self) {
+        let period = |motion: &Motion| motion.interval_ns / motion.turns as i64;
+        let mut periods: Vec<i64> = self.first.iter().map(period).collect();
+        periods.sort_unstable();
+        let median = periods.get(periods.len() / 2).copied();
+        if let Some(period_ns) = median.filter(|period_ns| *period_ns > 0) {
+            let missing = |motion: &Motion| motion.missing(period_ns);
+            self.missing += self.first.iter().map(missing).sum::<u64>();
+            self.period_ns = Some(period_ns);
+        }
+        self.first.clear();
+    }
+
+    fn missing(mut self) -> u64 {
+        if self.period_ns.is_none() {
+            self.settle();
+        }
+        self.missing
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gyre_messages::RefinementRecord;
+
+    use super::*;
+
+    fn counted(poses: &[PoseHeader]) -> Counter {
+        let mut counter = Counter::default();
+        poses.iter().for_each(|pose| counter.add(pose));
+        counter
+    }
+
+    #[test]
+    fn every_scan_is_accounted_for() {
+        let pose = |seq, published, scan| PoseHeader {
+            item: Item {
+                seq,
+                published,
+                scan,
+                ..Item::default()
+            },
+            ..PoseHeader::default()
+        };
+        let end = pose(3, 9, 15).item;
+        let poses = [pose(0, 0, 5), pose(1, 3, 8), pose(2, 7, 13)];
+        let counts = counted(&poses).counts(Some(&end), 5, false);
+        assert_eq!(
+            counts,
+            Counts {
+                published: 9,
+                processed: 3,
+                dropped: 6,
+                unreadable: 1,
+                ..Counts::default()
+            }
+        );
+    }
+
+    #[test]
+    fn weak_and_predicted_motions_are_doubtful() {
+        let pose = |(outcome, initial_guess)| {
+            let refinement = RefinementRecord {
+                outcome,
+                initial_guess,
+                ..RefinementRecord::default()
+            };
+            PoseHeader {
+                motion: MotionEstimate {
+                    refinement,
+                    ..MotionEstimate::default()
+                },
+                ..PoseHeader::default()
+            }
+        };
+        let poses = [
+            (outcome::SEARCHED, initial_guess::NONE),
+            (outcome::REFINED, initial_guess::PREDICTION),
+            (outcome::REFINED, initial_guess::SEARCH),
+            (outcome::REFINED, initial_guess::YAW_OFFSET),
+            (outcome::WEAK, initial_guess::SEARCH),
+            (outcome::PREDICTED, initial_guess::NONE),
+        ];
+        let counts = counted(&poses.map(pose)).counts(None, 0, true);
+        let expected = MotionCounts {
+            refined: 3,
+            weak: 1,
+            predicted: 1,
+            doubtful: 2,
+            second_hypothesis: 2,
+        };
+        assert_eq!(counts.motions, Some(expected));
+    }
+
+    fn pose(scan: u64, previous_scan: u64, interval_ms: i64) -> PoseHeader {
+        PoseHeader {
+            item: Item {
+                scan,
+                previous_scan,
+                flags: if scan == 0 { flag::BREAK } else { 0 },
+                ..Item::default()
+            },
+            motion: MotionEstimate {
+                interval_ns: interval_ms * 1_000_000,
+                ..MotionEstimate::default()
+            },
+            ..PoseHeader::default()
+        }
+    }
+
+    #[test]
+    fn scans_that_the_recording_lacks_show_in_its_times_and_skipped_ones_do_not_count() {
+        let missing = |poses: &[PoseHeader]| counted(poses).gaps.missing();
+        let mut poses = vec![
+            pose(0, 0, 0),
+            pose(1, 0, 251),
+            pose(2, 1, 249),
+            pose(4, 2, 500),
+            pose(5, 4, 250),
+        ];
+        assert_eq!(missing(&poses), 0);
+        poses.extend([pose(6, 5, 500), pose(8, 6, 1_000)]);
+        assert_eq!(missing(&poses), 1 + 2);
+        assert_eq!(missing(&poses[..1]), 0);
+    }
+
+    #[test]
+    fn gaps_of_a_long_run_are_counted_in_bounded_memory() {
+        let scans = 3 * MOTIONS_OF_PERIOD as u64;
+        let interval_ms = |scan| if scan % 1000 == 999 { 750 } else { 250 };
+        let poses: Vec<_> = (0..scans)
+            .map(|scan| pose(scan, scan.saturating_sub(1), interval_ms(scan)))
+            .collect();
+        let counter = counted(&poses);
+        assert!(counter.gaps.first.is_empty());
+        assert_eq!(counter.gaps.missing(), 2 * (scans / 1000));
+    }
+}

@@ -1,0 +1,109 @@
+//! Reading of a journal from its start to its end, in bounded memory.
+
+use std::{
+    fs::File,
+    io::{self, BufReader, Read},
+    path::{Path, PathBuf},
+};
+
+use gyre_messages::PoseHeader;
+use gyre_storage::StorageError;
+
+use super::{
+    JournalError, MAGIC,
+    record::{RECORD, Record},
+};
+
+/// Bytes that are read at once.
+const BUFFER: usize = 1 << 20;
+
+/// The records of a journal, oldest first. An incomplete one at the end is left out.
+#[derive(Debug)]
+pub struct Records {
+    places: Places,
+}
+
+/// All places of a journal that can hold a record, valid or not.
+#[derive(Debug)]
+pub(super) struct Places {
+    path: PathBuf,
+    reader: BufReader<File>,
+    bytes: Box<[u8; RECORD]>,
+    /// Number of the next place.
+    pub next: u64,
+    /// Whether the header is whole.
+    pub has_header: bool,
+}
+
+/// Opens a journal to read it; `None` if there is none.
+///
+/// # Errors
+/// A file that cannot be read or is not a journal.
+pub fn records(path: &Path) -> Result<Option<Records>, JournalError> {
+    let places = Places::open(path)?.filter(|places| places.has_header);
+    Ok(places.map(|places| Records { places }))
+}
+
+impl Iterator for Records {
+    type Item = Result<PoseHeader, JournalError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let at = self.places.next;
+        match self.places.read()? {
+            Ok(Some(record)) => Some(Ok(record.pose)),
+            Ok(None) => Some(Err(JournalError::Damaged {
+                path: self.places.path.clone(),
+                pose: at,
+            })),
+            Err(error) => Some(Err(error)),
+        }
+    }
+}
+
+impl Places {
+    pub fn open(path: &Path) -> Result<Option<Self>, JournalError> {
+        let failed = StorageError::at("read", path);
+        let file = match File::open(path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            opened => opened.map_err(&failed)?,
+        };
+        let mut reader = BufReader::with_capacity(BUFFER, file);
+        let mut header = Vec::with_capacity(MAGIC.len());
+        reader
+            .by_ref()
+            .take(MAGIC.len() as u64)
+            .read_to_end(&mut header)
+            .map_err(&failed)?;
+        // A power failure leaves a beginning of the header, and zeros behind it.
+        let torn = header
+            .iter()
+            .zip(MAGIC)
+            .skip_while(|(found, magic)| *found == magic)
+            .all(|(found, _)| *found == 0);
+        match torn {
+            true => Ok(Some(Self {
+                path: path.to_owned(),
+                reader,
+                bytes: Box::new([0; RECORD]),
+                next: 0,
+                has_header: header == MAGIC,
+            })),
+            false => Err(JournalError::Foreign {
+                path: path.to_owned(),
+            }),
+        }
+    }
+
+    /// Reads the next place: its record, or `None` if it is not valid. Ends at the last complete place.
+    pub fn read(&mut self) -> Option<Result<Option<Record>, JournalError>> {
+        match self.reader.read_exact(&mut self.bytes[..]) {
+            Ok(()) => {
+                let index = self.next;
+                self.next += 1;
+                Some(Ok(Record::decode(&self.bytes[..], index)))
+            }
+            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => None,
+            Err(error) => Some(Err(StorageError::at("read", &self.path)(error).into())),
+        }
+    }
+}
