@@ -6,7 +6,7 @@
 //! Checksums detect slots that were cut short by a death; their items had not been published.
 //!
 //! A thread synchronises the file about once a second. After a power failure any part of what was written since may be there or
-//! not. So a state names its keyframes by their content, and the motion that it led to: [`newest_known`] finds the last pose of a
+//! not. So a state names its keyframes by their content, and the motion that it led to: [`Checkpoint::newest_known`] finds the last pose of a
 //! journal whose state is whole, and the run goes on from there.
 
 mod codec;
