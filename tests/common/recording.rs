@@ -23,7 +23,10 @@ pub fn small() -> &'static Path {
 
 /// A copy of the small recording's first `scans` scans, to be corrupted. Its images are links: replace them instead of writing into them.
 pub fn copy(scans: usize) -> TempDir {
-    linked(small(), |scan| scan < scans)
+    let copy = linked(small(), |scan| scan < scans);
+    // As in a real recording, the truth is in `gt` alone.
+    fs::remove_file(copy.path().join("ground_truth.tum")).unwrap();
+    copy
 }
 
 /// A copy of a recording with the images that are kept by their numbers, which are links.
@@ -61,13 +64,12 @@ fn is_image(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "png")
 }
 
-/// The images of a recording in the order of their times.
+/// The images of a recording in the order of their times; none before the first is complete.
 pub fn images(recording: &Path) -> Vec<PathBuf> {
     let is_folder_of_images = |folder: &PathBuf| files(folder).iter().any(|file| is_image(file));
-    let folder = files(recording)
-        .into_iter()
-        .find(is_folder_of_images)
-        .unwrap();
+    let Some(folder) = files(recording).into_iter().find(is_folder_of_images) else {
+        return Vec::new();
+    };
     let mut images: Vec<PathBuf> = files(&folder)
         .into_iter()
         .filter(|file| is_image(file))

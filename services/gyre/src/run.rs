@@ -47,6 +47,8 @@ const RECORDING: &str = "recording";
 pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     let mut configuration = resolve::resolve(arguments)?;
     let out = Out::lock(&results_folder(arguments))?;
+    // An earlier run may have been killed, and this one may be refused before it takes shared memory itself.
+    sweep();
     if configuration.stored().is_some() {
         configuration.source.data = out.join(RECORDING);
     }
@@ -184,8 +186,6 @@ fn write_missing_results(
         begun.poses,
         out.path().display()
     ));
-    // The run that computed them may have been killed.
-    sweep();
     let session = Session {
         scans: begun.identity.scans,
         resumed: begun.poses as usize,
