@@ -102,8 +102,11 @@ fn a_lock_of_the_run_that_does_not_become_free_ends_it_with_the_name_of_its_hold
     while !path.parent().unwrap().exists() {
         thread::sleep(Duration::from_millis(2));
     }
-    fs::write(&path, b"").unwrap();
-    let lock = Lock::of(&path);
+    // Under its name only once it is held: a free one is removed by any run that starts.
+    let held = path.with_extension("held");
+    fs::write(&held, b"").unwrap();
+    let lock = Lock::of(&held);
+    fs::rename(&held, &path).unwrap();
     let ended = Ended::of(run.command());
     ended.refused_with(&["another run is writing to", "process ", "flock"]);
     drop(lock);

@@ -247,7 +247,8 @@ fn an_interrupted_dataset_is_completed() {
     let images: Vec<_> = images.into_values().collect();
     // One image is missing, one is incomplete, the others are complete.
     fs::remove_file(&images[2]).unwrap();
-    fs::rename(&images[4], images[4].with_extension("part")).unwrap();
+    let name = images[4].file_name().unwrap().to_str().unwrap();
+    fs::rename(&images[4], images[4].with_file_name(format!(".{name}.tmp"))).unwrap();
     fs::remove_file(cut.path().join("ground_truth.tum")).unwrap();
     let untouched = fs::metadata(&images[1]).unwrap().modified().unwrap();
     let mut seen = Vec::new();
