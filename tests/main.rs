@@ -10,6 +10,7 @@ mod doctor;
 mod evaluate;
 mod foreign_stages;
 mod full_disk;
+mod identity;
 mod in_process;
 mod joint_search;
 mod k2pi;

@@ -1,6 +1,6 @@
 //! The configuration of a run: read strictly, overridden key by key, written back as it was resolved.
 
-mod difference;
+pub mod difference;
 mod rate;
 mod strict;
 
@@ -20,6 +20,8 @@ use gyre_simulator::{OutputFormat, SimulationConfig};
 use gyre_stage::supervise::{RestartPolicy, StagePlan};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
+
+use crate::program;
 
 pub use rate::Rate;
 
@@ -394,14 +396,15 @@ impl Configuration {
                     name.to_owned(),
                 ]
             };
-            let command = if own.command.is_empty() {
-                ours()
-            } else {
-                own.command
+            // The supervisor keeps its own program; those of others can change under their names.
+            let (command, programs) = match own.command.is_empty() {
+                true => (ours(), Vec::new()),
+                false => (own.command.clone(), program::pinned(&own.command)),
             };
             StagePlan {
                 name: name.to_owned(),
                 command,
+                programs,
                 restart: own.restart,
                 outlives_restarts: live && stage == StageId::RadarReplay,
                 // Live masking alone knows which scans it admitted.

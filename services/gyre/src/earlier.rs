@@ -11,7 +11,13 @@ use gyre_refinement::checkpoint::{self, Checkpoint, CheckpointError};
 use gyre_scan_matching::Refiner;
 use gyre_storage::{self as storage, GroupSync};
 
-use crate::{Failure, configuration::Configuration, identity::Identity, out::Out, print, results};
+use crate::{
+    Failure,
+    configuration::Configuration,
+    identity::{Identity, Programs},
+    out::Out,
+    print, results,
+};
 
 /// Says that the journal has its end and that all results have been written from it: the next run starts anew.
 const COMPLETE: &str = "journal/complete";
@@ -45,7 +51,12 @@ impl Earlier {
     ///
     /// # Errors
     /// Files that cannot be read, a damaged journal, or a run of another configuration.
-    pub fn of(out: &Out, configuration: &Configuration, fresh: bool) -> Result<Self, Failure> {
+    pub fn of(
+        out: &Out,
+        configuration: &Configuration,
+        programs: &Programs,
+        fresh: bool,
+    ) -> Result<Self, Failure> {
         let path = journal::path(out.path());
         // A file of another program is refused in any case.
         let there = journal::records(&path)?.is_some();
@@ -58,7 +69,7 @@ impl Earlier {
             true => return Ok(Self::Nothing),
             false => Identity::read(out, content.poses)?,
         };
-        identity.require(configuration, out.path(), content.poses)?;
+        identity.require(configuration, programs, out.path(), content.poses)?;
         let poses = match content.ended {
             true => content.poses,
             false => known_poses(out, configuration, &content)?,

@@ -1,11 +1,22 @@
 //! `journal/run.toml`: what the run was begun with. A run is resumed only with the same.
 
-use std::{fs, io, path::Path};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs, io,
+    path::Path,
+};
 
+use gyre_radar::{DatasetOptions, Fingerprint};
 use gyre_storage as storage;
 use serde::{Deserialize, Serialize};
 
-use crate::{Failure, configuration::Configuration, out::Out};
+use crate::{
+    Failure,
+    configuration::{Configuration, difference},
+    out::Out,
+    preflight::Preflight,
+    program,
+};
 
 /// The file, in the folder of the results.
 const FILE: &str = "journal/run.toml";
@@ -17,18 +28,77 @@ const HEAD: &str = "# What the run was begun with, which the same command compar
 pub struct Identity {
     /// Scans to play.
     pub scans: usize,
+    /// The programs.
+    programs: Programs,
+    /// The options to read the recording, those of its `dataset.toml` among them.
+    dataset: DatasetOptions,
+    /// The recording; `None` for a simulation that is not stored, which its configuration tells.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    recording: Option<Fingerprint>,
     /// The resolved configuration.
     pub configuration: toml::Table,
 }
 
-impl Identity {
-    /// The identity of a run that begins now.
+/// The programs of a run.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Programs {
+    /// Gyre's version.
+    version: String,
+    /// SHA-256 of Gyre's program.
+    pub build: String,
+    /// SHA-256 of each replaced stage's command and of the files that it names.
+    replaced: BTreeMap<String, String>,
+}
+
+impl Programs {
+    /// Those of a run that is started now.
     ///
     /// # Errors
-    /// A configuration that TOML cannot hold.
-    pub fn of(configuration: &Configuration, scans: usize) -> Result<Self, Failure> {
+    /// A program that cannot be read.
+    pub fn now(configuration: &Configuration) -> Result<Self, Failure> {
+        let own = program::own();
         Ok(Self {
-            scans,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            build: program::sha256(&own)?,
+            replaced: program::replacements(&configuration.stage_plans(&own))?,
+        })
+    }
+
+    fn difference(&self, now: &Self) -> Option<String> {
+        if self.build != now.build {
+            let short = |sha256: &str| sha256.get(..12).unwrap_or_default().to_owned();
+            return Some(format!(
+                "gyre was build {} of version {} and is now build {} of version {}",
+                short(&self.build),
+                self.version,
+                short(&now.build),
+                now.version
+            ));
+        }
+        let stages: BTreeSet<&String> = self.replaced.keys().chain(now.replaced.keys()).collect();
+        let other = |stage: &&String| self.replaced.get(*stage) != now.replaced.get(*stage);
+        let stage = stages.into_iter().find(other)?;
+        Some(format!("the program of {stage} is another one"))
+    }
+}
+
+impl Identity {
+    /// The identity of a run that begins now. Its configuration has the options of `dataset.toml` in `dataset`.
+    ///
+    /// # Errors
+    /// A recording that cannot be read, or a configuration that TOML cannot hold.
+    pub fn of(
+        configuration: &Configuration,
+        programs: &Programs,
+        dataset: DatasetOptions,
+        checked: &Preflight,
+    ) -> Result<Self, Failure> {
+        Ok(Self {
+            scans: checked.scans,
+            programs: programs.clone(),
+            dataset,
+            recording: checked.recording.clone(),
             configuration: configuration.to_toml()?.parse()?,
         })
     }
@@ -83,26 +153,52 @@ impl Identity {
         }
     }
 
-    /// Checks that this configuration continues the run.
+    /// Checks that this configuration and these programs continue the run.
     ///
     /// # Errors
-    /// One sentence that names a key that differs.
+    /// One sentence that says what differs.
     pub fn require(
         &self,
         configuration: &Configuration,
+        programs: &Programs,
         out: &Path,
         poses: u64,
     ) -> Result<(), Failure> {
-        match configuration.difference(&self.configuration)? {
+        if let Some(difference) = configuration.difference(&self.configuration)? {
+            return Err(other(out, poses, "configuration", &difference));
+        }
+        match self.programs.difference(programs) {
             None => Ok(()),
-            Some(difference) => Err(format!(
-                "{} holds an unfinished run of another configuration ({poses} poses; {difference}): choose another --out, \
-                 or discard it with --fresh",
-                out.display()
-            )
-            .into()),
+            Some(difference) => Err(other(out, poses, "program", &difference)),
         }
     }
+
+    /// Checks that the recording is the one that the run was begun with, and is read in the same way.
+    ///
+    /// # Errors
+    /// One sentence that says what differs.
+    pub fn require_recording(&self, now: &Self, out: &Path, poses: u64) -> Result<(), Failure> {
+        let options = |of: &Self| toml::Table::try_from(of.dataset);
+        if let Some(difference) = difference::first(&options(self)?, &options(now)?) {
+            let difference = format!("dataset.{difference}");
+            return Err(other(out, poses, "configuration", &difference));
+        }
+        let difference = match (&self.recording, &now.recording) {
+            (Some(begun), Some(now)) => begun.difference(now),
+            _ => None,
+        };
+        difference.map_or(Ok(()), |difference| {
+            Err(other(out, poses, "recording", &difference))
+        })
+    }
+}
+
+fn other(out: &Path, poses: u64, what: &str, difference: &str) -> Failure {
+    format!(
+        "{} holds an unfinished run of another {what} ({poses} poses; {difference}): choose another --out, or discard it with --fresh",
+        out.display()
+    )
+    .into()
 }
 
 fn checksum(text: &str) -> String {

@@ -18,6 +18,7 @@ pub mod out;
 pub mod picture;
 pub mod preflight;
 pub mod print;
+pub mod program;
 pub mod progress;
 pub mod results;
 pub mod run;

@@ -5,7 +5,7 @@ use std::time::Duration;
 use gyre_masking::{MaskKind, Masker, model::Card};
 use gyre_messages::{Footprint, Limits, Window};
 use gyre_odometry::OdometryConfig;
-use gyre_radar::Dataset;
+use gyre_radar::{Dataset, Fingerprint};
 use gyre_simulator::SimulatedDrive;
 use gyre_stage::run::free_shared_memory;
 use rustix::process::{Resource, getrlimit};
@@ -68,6 +68,8 @@ pub struct Preflight {
     pub footprint: Footprint,
     /// `ground_truth.tum` of a simulation that is played without being stored.
     pub truth: Option<Vec<u8>>,
+    /// The recording, if it is on the disk.
+    pub recording: Option<Fingerprint>,
 }
 
 /// Checks the dataset and the mask.
@@ -99,7 +101,12 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
         points: configuration.odometry.points.capacity,
     };
     let footprint = Footprint::new(&window, &limits);
+    let recording = match truth {
+        Some(_) => None,
+        None => Some(Fingerprint::of(dataset.as_ref())?),
+    };
     Ok(Preflight {
+        recording,
         scans,
         window,
         limits,

@@ -24,10 +24,10 @@ use crate::{
     cli::RunArguments,
     configuration::{Configuration, Mode},
     earlier::{self, Begun, Earlier},
-    identity::Identity,
+    identity::{Identity, Programs},
     out::Out,
     preflight::{self, Preflight},
-    print,
+    print, program,
     progress::Progress,
     results::{self, Results},
     simulate,
@@ -52,9 +52,10 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     if configuration.stored().is_some() {
         configuration.source.data = out.join(RECORDING);
     }
-    match Earlier::of(&out, &configuration, arguments.fresh)? {
-        Earlier::Nothing => play(&configuration, out, None),
-        Earlier::Unfinished(begun) => play(&configuration, out, Some(begun)),
+    let programs = Programs::now(&configuration)?;
+    match Earlier::of(&out, &configuration, &programs, arguments.fresh)? {
+        Earlier::Nothing => play(&configuration, &programs, out, None),
+        Earlier::Unfinished(begun) => play(&configuration, &programs, out, Some(begun)),
         Earlier::Ended(begun) => write_missing_results(&configuration, &out, &begun),
     }
 }
@@ -70,6 +71,7 @@ fn results_folder(arguments: &RunArguments) -> PathBuf {
 /// Starts all processes, resumes `unfinished` or begins anew, and writes the results.
 fn play(
     configuration: &Configuration,
+    programs: &Programs,
     out: Out,
     unfinished: Option<Begun>,
 ) -> Result<ExitCode, Failure> {
@@ -87,23 +89,36 @@ fn play(
         simulate::store(simulation, &configuration.source.data, replace)?;
     }
     preflight::check_open_files()?;
-    let checked = preflight::check(configuration)?;
+    // The stages read the options of dataset.toml from here: it may change while they run.
+    let resolved = with_stored_options(configuration)?;
+    let checked = preflight::check(&resolved)?;
+    let identity = Identity::of(configuration, programs, resolved.dataset, &checked)?;
+    if let Some(begun) = &unfinished {
+        let (earlier, poses) = (&begun.identity, begun.poses);
+        earlier.require_recording(&identity, out.path(), poses)?;
+    }
     let signals = Signals::install()?;
     let root = match RunRoot::acquire(out.path(), &signals) {
         Err(RootError::Interrupted) => return Ok(ExitCode::from(INTERRUPTED)),
         root => root?,
     };
     preflight::check_shared_memory(&checked.footprint)?;
-    prepare(configuration, &out, &checked, unfinished.as_ref())?;
-    let gyre = env::current_exe()?;
+    prepare(
+        configuration,
+        &identity,
+        &out,
+        &checked,
+        unfinished.as_ref(),
+    )?;
+    let gyre = program::own();
     let plan = Plan {
-        manifest: manifest(configuration, &out, &checked, &root),
-        stages: configuration.stage_plans(&gyre),
+        manifest: manifest(&resolved, programs, &out, &checked, &root),
+        stages: resolved.stage_plans(&gyre),
         guardian: vec![gyre.to_string_lossy().into_owned(), "guard".to_owned()],
         stall_timeout: limit(configuration.run.stall_timeout_s),
         start_timeout: limit(configuration.run.start_timeout_s),
     };
-    plan.manifest.write(&configuration.to_toml()?)?;
+    plan.manifest.write(&resolved.to_toml()?)?;
 
     let resumed = unfinished.map_or(0, |begun| begun.poses as usize);
     let mut progress = Progress::new(checked.scans, resumed, &checked.footprint);
@@ -130,19 +145,28 @@ fn play(
     }
 }
 
+/// Returns the configuration with the options of the recording's `dataset.toml` where it has none.
+fn with_stored_options(configuration: &Configuration) -> Result<Configuration, Failure> {
+    let mut resolved = configuration.clone();
+    let data = &configuration.source.data;
+    if configuration.streamed().is_none() && !data.as_os_str().is_empty() {
+        let stored = gyre_radar::stored_options(data)?;
+        resolved.dataset = resolved.dataset.or(&stored);
+    }
+    Ok(resolved)
+}
+
 /// Writes into the folder of the results what the stages expect there.
 fn prepare(
     configuration: &Configuration,
+    identity: &Identity,
     out: &Out,
     checked: &Preflight,
     unfinished: Option<&Begun>,
 ) -> Result<(), Failure> {
     match unfinished {
         Some(begun) => earlier::resume(out, begun)?,
-        None => {
-            let identity = Identity::of(configuration, checked.scans)?;
-            earlier::begin(out, &identity, &configuration.to_toml()?)?;
-        }
+        None => earlier::begin(out, identity, &configuration.to_toml()?)?,
     }
     if let Some(truth) = &checked.truth {
         storage::write(&out.join(results::SIMULATED_TRUTH), truth)?;
@@ -152,6 +176,7 @@ fn prepare(
 
 fn manifest(
     configuration: &Configuration,
+    programs: &Programs,
     out: &Out,
     checked: &Preflight,
     root: &RunRoot,
@@ -165,6 +190,7 @@ fn manifest(
         live: configuration.run.mode == Mode::Live,
         refines: configuration.has(StageId::Refinement),
         rate: configuration.run.rate.factor(),
+        build: programs.build.clone(),
     }
 }
 
@@ -277,7 +303,7 @@ fn start_over(resumed: usize) -> Result<ExitCode, Failure> {
     print::note(
         "gyre: the transport did not finish cleaning up after a dead process; starting over from the journal",
     );
-    let failed = Command::new(env::current_exe()?)
+    let failed = Command::new(program::own())
         .args(env::args_os().skip(1).filter(|a| a != "--fresh"))
         .env(STARTED_OVER, resumed.to_string())
         .exec();

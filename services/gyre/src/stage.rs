@@ -1,14 +1,23 @@
 //! `gyre stage NAME`: runs one process of a run.
 
-use std::process::ExitCode;
+use std::{
+    fs,
+    os::unix::fs::MetadataExt,
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
 
 use gyre_messages::StageId;
 use gyre_radar::DatasetOptions;
 use gyre_radar_replay::Pace;
 use gyre_simulator::{SimulatedDrive, SimulationConfig};
-use gyre_stage::{Launch, StageCounters, StageError, launch};
+use gyre_stage::{Launch, Manifest, StageCounters, StageError, launch};
+use rustix::{
+    process::{Pid, getppid},
+    thread::set_name,
+};
 
-use crate::print;
+use crate::{print, program};
 
 /// Runs a stage by its name.
 pub fn run(name: &str) -> ExitCode {
@@ -28,7 +37,33 @@ pub fn run(name: &str) -> ExitCode {
         StageId::Refinement => gyre_refinement::run,
         StageId::PoseIntegration => gyre_pose_integration::run,
     };
-    launch::main(name, work)
+    // Started by its file, it would be called `exe`.
+    let _ = set_name(c"gyre");
+    launch::main(name, |launch| {
+        require_same_build(&launch.manifest)?;
+        work(launch)
+    })
+}
+
+/// Checks that this is the supervisor's build. A command of the configuration may name another one.
+fn require_same_build(manifest: &Manifest) -> Result<(), StageError> {
+    let path = program::own();
+    let supervisor = PathBuf::from(format!(
+        "/proc/{}/exe",
+        getppid().map_or(0, Pid::as_raw_pid)
+    ));
+    let file = |path: &Path| fs::metadata(path).map(|file| (file.dev(), file.ino())).ok();
+    // A shell can be in between; then the content tells.
+    if file(&path).is_some_and(|own| file(&supervisor) == Some(own)) {
+        return Ok(());
+    }
+    let build = program::sha256(&path).map_err(|source| StageError::File { path, source })?;
+    match build == manifest.build {
+        true => Ok(()),
+        false => Err(StageError::Configuration(
+            "this is another build of gyre than the one that runs: name that one in the stage's command".to_owned(),
+        )),
+    }
 }
 
 /// Plays a recording, or a simulation as it is rendered.

@@ -34,8 +34,10 @@ pub enum Pace {
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let config: SourceConfig = launch.section("source")?;
     let options: DatasetOptions = launch.section("dataset")?;
-    // The supervisor has opened it before, so whatever is wrong now may pass.
-    let open = || gyre_radar::open(&config.data, &options).map_err(|error| error.to_string());
+    // The supervisor has opened it before, so whatever is wrong now may pass. It has resolved the options too: a dataset.toml
+    // that is changed during a run does not change the run.
+    let open =
+        || gyre_radar::open_resolved(&config.data, &options).map_err(|error| error.to_string());
     match source::open(launch, &config.tolerance(), open)? {
         Some(dataset) => play(launch, dataset, Pace::Sensor),
         None => Ok(StageCounters::default()),

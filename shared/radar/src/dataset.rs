@@ -95,9 +95,24 @@ pub trait Dataset: Send {
 /// # Errors
 /// A folder without images of a known format, options out of bounds, or files that cannot be read.
 pub fn open(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
-    let options = options.or(&dataset_toml::options(root)?);
+    open_resolved(root, &options.or(&stored_options(root)?))
+}
+
+/// Returns the options in the `dataset.toml` of a recording; none are set where there is no such file.
+///
+/// # Errors
+/// A file that cannot be read or has other keys.
+pub fn stored_options(root: &Path) -> Result<DatasetOptions, OpenError> {
+    dataset_toml::options(root)
+}
+
+/// Opens the dataset at `root` with these options alone, whatever `dataset.toml` says by now.
+///
+/// # Errors
+/// As [`open`].
+pub fn open_resolved(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
     options.check()?;
-    open_found(detect::locate(root, options.format)?, &options)
+    open_found(detect::locate(root, options.format)?, options)
 }
 
 /// Opens a recording that is not on disk, in its own format unless `options` names another.

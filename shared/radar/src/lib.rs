@@ -3,6 +3,7 @@
 //! Reading order:
 //! - [`scan`]: one sweep in the sensor's polar grid, borrowed for reading or for filling;
 //! - [`mod@dataset`]: recordings on disk behind one trait, one file per format;
+//! - [`fingerprint`]: what tells a recording from another one;
 //! - [`raster`]: from a scan to a Cartesian raster, with motion compensation;
 //! - [`points`]: from a scan to sparse points, its strongest returns;
 //! - [`mod@ground_truth`]: trajectories in the formats of datasets and tools, converted to REP-103;
@@ -10,6 +11,7 @@
 
 mod chain;
 pub mod dataset;
+pub mod fingerprint;
 pub mod ground_truth;
 pub mod inspect;
 mod median;
@@ -21,8 +23,9 @@ pub mod trajectory;
 pub use chain::{MAX_INTERVAL_NS, continues};
 pub use dataset::{
     AzimuthSource, Dataset, DatasetOptions, Format, ImageSize, ImageSource, OpenError, ReadError,
-    open, open_source,
+    open, open_resolved, open_source, stored_options,
 };
+pub use fingerprint::Fingerprint;
 pub use ground_truth::{
     TrajectoryError, find_ground_truth, read_trajectory, write_kitti, write_tum,
 };

@@ -44,6 +44,8 @@ pub struct Manifest {
     pub refines: bool,
     /// Speed of playback relative to the sensor's clock; `None`: as fast as the window admits scans.
     pub rate: Option<f64>,
+    /// SHA-256 of the supervisor's program, which all stages of its own must be.
+    pub build: String,
 }
 
 impl Manifest {

@@ -9,6 +9,7 @@ mod guardian;
 mod log;
 mod observers;
 mod plan;
+mod program;
 mod start;
 mod watchdog;
 
@@ -35,6 +36,7 @@ use watchdog::{Starting, Watchdog};
 pub use child::Death;
 pub use guardian::guard;
 pub use plan::{Ending, Event, Plan, Report, RestartPolicy, StagePlan, Stall, SuperviseError};
+pub use program::Program;
 
 /// Time for stages to exit by themselves before they are killed.
 const STOP_TIMEOUT: Duration = Duration::from_secs(2);

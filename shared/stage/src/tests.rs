@@ -61,6 +61,7 @@ impl Run {
             live: false,
             refines: false,
             rate: None,
+            build: String::new(),
         };
         manifest.write("").unwrap();
         let supervisor = node(&manifest);

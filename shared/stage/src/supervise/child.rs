@@ -77,6 +77,17 @@ impl Child {
         starter: &Starter<'_>,
         newest_pose: Option<u64>,
     ) -> Result<(), SuperviseError> {
+        if let Some(program) = self
+            .plan
+            .programs
+            .iter()
+            .find(|program| !program.is_unchanged())
+        {
+            return Err(SuperviseError::Replaced {
+                stage: self.plan.name.clone(),
+                path: program.path().to_owned(),
+            });
+        }
         self.process = starter.start(&self.plan, manifest, self.log.file())?;
         self.started = Instant::now();
         self.status = None;

@@ -1,12 +1,12 @@
 //! The supervisor's plan, events, report and errors.
 
-use std::{collections::BTreeMap, time::Duration};
+use std::{collections::BTreeMap, path::PathBuf, time::Duration};
 
 use gyre_messages::PoseHeader;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::child::Death;
+use super::{child::Death, program::Program};
 use crate::{Manifest, StageCounters, StageError};
 
 /// The plan of a run.
@@ -31,6 +31,8 @@ pub struct StagePlan {
     pub name: String,
     /// Program and arguments, executed without a shell.
     pub command: Vec<String>,
+    /// The files that the command executes. After a change of one of them the stage is not started again.
+    pub programs: Vec<Program>,
     /// The restart policy.
     pub restart: RestartPolicy,
     /// True if it keeps running when the others are restarted: a live source, since a radar does not wait.
@@ -175,6 +177,16 @@ pub enum SuperviseError {
         stage: String,
         /// The process.
         pid: u32,
+    },
+    /// The program of a dead stage is another one by now.
+    #[error(
+        "{stage} died, and {path} has changed since: another program may compute other motions; put back the one that the run was begun with"
+    )]
+    Replaced {
+        /// The name of the stage.
+        stage: String,
+        /// The file.
+        path: PathBuf,
     },
     /// A stage failed in a way that a restart would repeat.
     #[error("{message}")]

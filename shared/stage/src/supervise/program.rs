@@ -1,0 +1,84 @@
+//! The files that a command executes, which must not change while the run goes on.
+
+use std::{
+    fs, io,
+    os::unix::fs::MetadataExt,
+    path::{Path, PathBuf},
+};
+
+/// A file that a command executes, as it was when the run was begun or resumed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Program {
+    path: PathBuf,
+    state: State,
+}
+
+/// What changes with a file's content, without reading it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct State {
+    device: u64,
+    inode: u64,
+    size: u64,
+    modified: (i64, i64),
+}
+
+impl State {
+    fn of(path: &Path) -> io::Result<Self> {
+        let file = fs::metadata(path)?;
+        Ok(Self {
+            device: file.dev(),
+            inode: file.ino(),
+            size: file.size(),
+            modified: (file.mtime(), file.mtime_nsec()),
+        })
+    }
+}
+
+impl Program {
+    /// Returns the file at `path` as it is now.
+    ///
+    /// # Errors
+    /// A file that does not exist or may not be looked at.
+    pub fn at(path: &Path) -> io::Result<Self> {
+        Ok(Self {
+            path: path.to_owned(),
+            state: State::of(path)?,
+        })
+    }
+
+    /// Returns the path.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub(super) fn is_unchanged(&self) -> bool {
+        State::of(&self.path).is_ok_and(|state| state == self.state)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_file_that_is_replaced_changed_or_removed_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("stage.sh");
+        fs::write(&path, "one").unwrap();
+        let program = Program::at(&path).unwrap();
+        assert!(program.is_unchanged());
+        let other = folder.path().join("other.sh");
+        fs::write(&other, "two").unwrap();
+        fs::rename(&other, &path).unwrap();
+        assert!(
+            !program.is_unchanged(),
+            "replaced by another of the same size"
+        );
+        let program = Program::at(&path).unwrap();
+        fs::write(&path, "three").unwrap();
+        assert!(!program.is_unchanged());
+        fs::remove_file(&path).unwrap();
+        assert!(!program.is_unchanged());
+    }
+}

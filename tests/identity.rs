@@ -1,0 +1,183 @@
+//! A run goes on only with what it was begun with: the program, the configuration and the recording.
+
+use std::{
+    fs,
+    os::unix::fs::PermissionsExt,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use crate::common::{Run, recording, undisturbed};
+use rustix::process::Signal;
+use tempfile::TempDir;
+
+const MODERATE: &str = "6";
+const MIDDLE: usize = recording::SCANS / 3;
+
+fn run_of(recording: &TempDir) -> Run {
+    Run::of_recording_named(recording.path().to_str().unwrap())
+}
+
+/// Sets another offset of the ranges in `dataset.toml`; returns the file and its content before.
+fn change_options(recording: &TempDir) -> (PathBuf, String) {
+    let path = recording.path().join("dataset.toml");
+    let stored = fs::read_to_string(&path).unwrap();
+    let mut options: toml::Table = stored.parse().unwrap();
+    options.insert("range_offset_m".to_owned(), 0.5.into());
+    fs::write(&path, options.to_string()).unwrap();
+    (path, stored)
+}
+
+fn interrupt(run: &Run) {
+    let slow = run.clone().rate(MODERATE);
+    let mut running = slow.start();
+    running.await_poses(MIDDLE).signal(Signal::INT);
+    assert_eq!(running.finish().code(), Some(130));
+}
+
+/// A program of its own for a run, which a test can replace.
+fn program_in(folder: &Path) -> PathBuf {
+    let program = folder.join("gyre-of-the-test");
+    fs::copy(crate::PROGRAM, &program).unwrap();
+    program
+}
+
+/// Replaces a program as a build does: under the same name is another file.
+fn replace(program: &Path, content: impl AsRef<[u8]>) {
+    let new = program.with_extension("new");
+    fs::write(&new, content).unwrap();
+    fs::set_permissions(&new, fs::Permissions::from_mode(0o755)).unwrap();
+    fs::rename(new, program).unwrap();
+}
+
+fn by(program: &Path, run: &Run) -> Command {
+    let own = run.command();
+    let mut command = Command::new(program);
+    command.args(own.get_args());
+    command
+}
+
+#[test]
+fn a_stage_restarted_after_a_rebuild_is_still_the_program_that_the_run_was_begun_with() {
+    let run = Run::of_recording().rate(MODERATE);
+    let program = program_in(run.folder());
+    let mut running = run.start_as(by(&program, &run));
+    running.await_poses(MIDDLE);
+    replace(&program, "#!/bin/sh\necho another program >&2\nexit 7\n");
+    running.kill("masking").kill("pose-integration");
+    let ended = running.finish();
+    ended.succeeded();
+    assert!(
+        !ended.stderr.contains("another program"),
+        "{}",
+        ended.stderr
+    );
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn another_build_does_not_resume_the_run_and_the_same_one_does() {
+    let run = Run::of_recording();
+    interrupt(&run);
+    let program = program_in(run.folder());
+    let mut other = fs::read(crate::PROGRAM).unwrap();
+    // What follows the last section is not executed.
+    other.extend(b"another build");
+    replace(&program, other);
+    run.start_as(by(&program, &run)).finish().refused_with(&[
+        "unfinished run of another program",
+        "gyre was build",
+        "and is now build",
+        "--out",
+        "--fresh",
+    ]);
+    let copy = program_in(run.folder());
+    run.start_as(by(&copy, &run)).finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn a_replaced_stage_whose_program_changes_during_the_run_is_not_started_again() {
+    let run = Run::of_recording()
+        .rate(MODERATE)
+        .stage_script("masking", "exec '{gyre}' stage masking");
+    let script = run.folder().join("masking.sh");
+    let whole = fs::read(&script).unwrap();
+    let mut running = run.start();
+    running.await_poses(MIDDLE);
+    replace(&script, "#!/bin/sh\nexit 7\n");
+    running.kill("masking");
+    running.finish().failed_with(&[
+        "masking died",
+        "masking.sh has changed since",
+        "poses are kept",
+    ]);
+    run.finish().refused_with(&[
+        "unfinished run of another program",
+        "the program of masking is another one",
+    ]);
+    replace(&script, whole);
+    assert_eq!(run.complete(), undisturbed());
+}
+
+#[test]
+fn a_stage_of_another_build_is_refused() {
+    let run = Run::of_recording();
+    let program = program_in(run.folder());
+    let mut other = fs::read(crate::PROGRAM).unwrap();
+    other.extend(b"another build");
+    replace(&program, other);
+    let command = format!(
+        "stages.masking.command=['{}','stage','masking']",
+        program.display()
+    );
+    run.set(&command)
+        .finish()
+        .failed_with(&["another build of gyre"]);
+}
+
+#[test]
+fn changed_options_of_the_recording_are_refused_by_name() {
+    let recording = recording::copy(recording::SCANS);
+    let run = run_of(&recording);
+    interrupt(&run);
+    let (path, stored) = change_options(&recording);
+    run.finish().refused_with(&[
+        "unfinished run of another configuration",
+        "dataset.range_offset_m was",
+        "and is now 0.5",
+    ]);
+    fs::write(&path, stored).unwrap();
+    assert_eq!(run.complete(), undisturbed());
+}
+
+#[test]
+fn options_that_change_during_a_run_do_not_change_it() {
+    let recording = recording::copy(recording::SCANS);
+    let run = run_of(&recording).rate(MODERATE);
+    let mut running = run.start();
+    running.await_poses(MIDDLE);
+    change_options(&recording);
+    running.kill("radar-replay");
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn another_recording_under_the_same_name_is_refused() {
+    let recording = recording::copy(recording::SCANS);
+    let run = run_of(&recording);
+    interrupt(&run);
+    let images = recording::images(recording.path());
+    let away = recording.path().join("away.png");
+    fs::rename(&images[20], &away).unwrap();
+    run.finish().refused_with(&[
+        "unfinished run of another recording",
+        "it had 24 scans and now has 23",
+    ]);
+    fs::rename(&away, &images[20]).unwrap();
+    recording::truncate(&images[20], 50_000);
+    run.finish()
+        .refused_with(&["unfinished run of another recording", "its images had"]);
+    assert_ne!(run.option("--fresh").complete(), undisturbed());
+}
