@@ -1,0 +1,225 @@
+//! A disk whose power fails: what it can hold of recorded changes, by what was synchronised.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use gyre_storage::record::Operation;
+use rand::{Rng, rngs::StdRng};
+
+/// A disk writes whole sectors, and any of them first.
+const SECTOR: usize = 512;
+
+/// A file with what is safe of it, and the changes that are in danger, oldest first.
+#[derive(Clone, Default)]
+struct File {
+    safe: Vec<u8>,
+    in_danger: Vec<(usize, Change)>,
+}
+
+#[derive(Clone)]
+enum Change {
+    Write { offset: usize, bytes: Vec<u8> },
+    SetLength(usize),
+}
+
+/// A change of names in a folder: a name, and the file that it has from then on.
+#[derive(Clone)]
+struct Naming {
+    folder: PathBuf,
+    names: Vec<(PathBuf, Option<usize>)>,
+}
+
+/// What survives of the changes in danger.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Survives {
+    Nothing,
+    All,
+    /// Any part of them, each sector and each name by chance.
+    Some,
+}
+
+/// A disk after some operations.
+#[derive(Default)]
+pub struct Disk {
+    files: Vec<File>,
+    safe_names: BTreeMap<PathBuf, usize>,
+    names: BTreeMap<PathBuf, usize>,
+    namings: Vec<Naming>,
+    syncs: BTreeMap<u64, usize>,
+    folders: Vec<PathBuf>,
+    time: usize,
+}
+
+impl Disk {
+    /// A disk that holds what is in a folder, all of it safe.
+    pub fn of(folder: &Path) -> Self {
+        let mut disk = Self::default();
+        let mut folders = vec![folder.to_owned()];
+        while let Some(next) = folders.pop() {
+            for entry in fs::read_dir(&next).unwrap() {
+                let path = entry.unwrap().path();
+                if path.is_dir() {
+                    folders.push(path);
+                    continue;
+                }
+                disk.names.insert(path.clone(), disk.files.len());
+                disk.files.push(File {
+                    safe: fs::read(&path).unwrap(),
+                    in_danger: Vec::new(),
+                });
+            }
+            disk.folders.push(next);
+        }
+        disk.safe_names = disk.names.clone();
+        disk
+    }
+
+    /// Applies the next operation.
+    pub fn apply(&mut self, operation: &Operation) {
+        self.time += 1;
+        match operation {
+            Operation::CreateFolder(path) => self.folders.push(path.clone()),
+            Operation::Create(path) => {
+                self.files.push(File::default());
+                self.rename(vec![(path.clone(), Some(self.files.len() - 1))]);
+            }
+            Operation::Rename { from, to } => {
+                let file = self.names.get(from).copied();
+                self.rename(vec![(from.clone(), None), (to.clone(), file)]);
+            }
+            Operation::Remove(path) => self.rename(vec![(path.clone(), None)]),
+            Operation::Write {
+                path,
+                offset,
+                bytes,
+            } => self.change(
+                path,
+                Change::Write {
+                    offset: *offset as usize,
+                    bytes: bytes.clone(),
+                },
+            ),
+            Operation::SetLength { path, length } => {
+                self.change(path, Change::SetLength(*length as usize));
+            }
+            Operation::SyncBegins { id, .. } => _ = self.syncs.insert(*id, self.time),
+            Operation::SyncEnds { path, id } => self.sync(path, self.syncs[id]),
+            Operation::SyncFolder(folder) => self.sync_folder(folder),
+        }
+    }
+
+    fn rename(&mut self, names: Vec<(PathBuf, Option<usize>)>) {
+        apply_names(&mut self.names, &names);
+        let folder = names[0].0.parent().unwrap().to_owned();
+        self.namings.push(Naming { folder, names });
+    }
+
+    fn change(&mut self, path: &Path, change: Change) {
+        let file = self.names[path];
+        self.files[file].in_danger.push((self.time, change));
+    }
+
+    fn sync(&mut self, path: &Path, begun: usize) {
+        // A draft that has been renamed or removed meanwhile is synchronised before that.
+        let Some(file) = self.names.get(path).map(|file| &mut self.files[*file]) else {
+            return;
+        };
+        let (covered, later): (Vec<_>, Vec<_>) = file
+            .in_danger
+            .drain(..)
+            .partition(|(time, _)| *time < begun);
+        covered
+            .iter()
+            .for_each(|(_, change)| change.apply(&mut file.safe));
+        file.in_danger = later;
+    }
+
+    fn sync_folder(&mut self, folder: &Path) {
+        let (covered, others): (Vec<_>, Vec<_>) = self
+            .namings
+            .drain(..)
+            .partition(|naming| naming.folder == folder);
+        for naming in covered {
+            apply_names(&mut self.safe_names, &naming.names);
+        }
+        self.namings = others;
+    }
+
+    /// Writes what the disk holds after a power failure to real files; paths below `root` become ones below `to`.
+    pub fn fail(&self, survives: Survives, random: &mut StdRng, root: &Path, to: &Path) {
+        let mut kept = |share: f64| match survives {
+            Survives::Nothing => false,
+            Survives::All => true,
+            Survives::Some => random.random_bool(share),
+        };
+        let mut names = self.safe_names.clone();
+        for naming in &self.namings {
+            if kept(0.5) {
+                apply_names(&mut names, &naming.names);
+            }
+        }
+        let place = |path: &Path| to.join(path.strip_prefix(root).unwrap());
+        for folder in &self.folders {
+            fs::create_dir_all(place(folder)).unwrap();
+        }
+        for (name, file) in &names {
+            let file = &self.files[*file];
+            let mut content = file.safe.clone();
+            for (_, change) in &file.in_danger {
+                change.apply_in_part(&mut content, &mut kept);
+            }
+            fs::write(place(name), content).unwrap();
+        }
+    }
+}
+
+fn apply_names(names: &mut BTreeMap<PathBuf, usize>, changes: &[(PathBuf, Option<usize>)]) {
+    for (name, file) in changes {
+        match file {
+            Some(file) => _ = names.insert(name.clone(), *file),
+            None => _ = names.remove(name),
+        }
+    }
+}
+
+impl Change {
+    fn apply(&self, content: &mut Vec<u8>) {
+        self.apply_in_part(content, &mut |_| true);
+    }
+
+    fn apply_in_part(&self, content: &mut Vec<u8>, kept: &mut impl FnMut(f64) -> bool) {
+        match self {
+            Self::SetLength(length) => {
+                if kept(0.5) {
+                    content.resize(*length, 0);
+                }
+            }
+            Self::Write { offset, bytes } => {
+                // Most writes survive or fall as a whole; the others are torn between sectors.
+                if kept(0.6) {
+                    return write(content, *offset, bytes);
+                }
+                let mut from = 0;
+                while from < bytes.len() {
+                    let sector_end = SECTOR - (offset + from) % SECTOR;
+                    let end = bytes.len().min(from + sector_end);
+                    if kept(0.3) {
+                        write(content, offset + from, &bytes[from..end]);
+                    }
+                    from = end;
+                }
+            }
+        }
+    }
+}
+
+fn write(content: &mut Vec<u8>, offset: usize, bytes: &[u8]) {
+    let end = offset + bytes.len();
+    if content.len() < end {
+        content.resize(end, 0);
+    }
+    content[offset..end].copy_from_slice(bytes);
+}

@@ -1,0 +1,177 @@
+//! Power failures: every change that a run makes to its folder is recorded, and after any of them the power fails. Whatever the
+//! synchronisations allow to survive, the next run gives the bytes of the undisturbed one or refuses in a sentence.
+//!
+//! `GYRE_POWER_FAILURES=N` tries N random outcomes at each change instead of one.
+
+#![allow(clippy::unwrap_used)]
+
+mod disk;
+mod machine;
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::OnceLock,
+};
+
+use gyre_storage::record::{Operation, Recorder};
+use rand::{SeedableRng, rngs::StdRng};
+use tempfile::TempDir;
+
+use disk::{Disk, Survives};
+use machine::Machine;
+
+/// The results that must be the same bytes.
+const RESULTS: [&str; 3] = ["odometry.csv", "trajectory.tum", "trajectory.svg"];
+
+/// A folder in memory, where a synchronisation costs nothing.
+fn folder() -> TempDir {
+    tempfile::Builder::new()
+        .prefix("gyre-power-")
+        .tempdir_in("/dev/shm")
+        .or_else(|_| tempfile::tempdir())
+        .unwrap()
+}
+
+fn results(out: &Path) -> Vec<Vec<u8>> {
+    RESULTS
+        .iter()
+        .map(|name| fs::read(out.join(name)).unwrap())
+        .collect()
+}
+
+fn undisturbed(machine: &Machine) -> &'static [Vec<u8>] {
+    static RESULTS: OnceLock<Vec<Vec<u8>>> = OnceLock::new();
+    RESULTS.get_or_init(|| {
+        let folder = folder();
+        machine.run(folder.path()).unwrap();
+        results(folder.path())
+    })
+}
+
+/// Runs to the end and returns the changes that this has made.
+fn recorded(machine: &Machine, out: &Path) -> Vec<Operation> {
+    let out = out.canonicalize().unwrap();
+    let recorder = Recorder::start(&out);
+    machine.run(&out).unwrap();
+    recorder.operations()
+}
+
+/// Counts of what followed a power failure.
+#[derive(Debug, Default)]
+struct Outcomes {
+    complete: usize,
+    refused: usize,
+}
+
+/// The next run after a power failure.
+fn check(machine: &Machine, out: &Path, case: &str, outcomes: &mut Outcomes) {
+    if machine.is_complete(out) {
+        assert_eq!(
+            results(out),
+            undisturbed(machine),
+            "marked as complete: {case}"
+        );
+    }
+    match machine.run(out) {
+        Ok(()) => {
+            assert_eq!(results(out), undisturbed(machine), "{case}");
+            outcomes.complete += 1;
+        }
+        Err(refusal) => {
+            let sentence = refusal.to_string();
+            assert!(
+                sentence.contains("--out") || sentence.contains("--fresh"),
+                "{case}: {sentence}"
+            );
+            eprintln!("{case}: {sentence}");
+            outcomes.refused += 1;
+        }
+    }
+}
+
+fn tries() -> u64 {
+    let asked = std::env::var("GYRE_POWER_FAILURES").ok();
+    asked.and_then(|tries| tries.parse().ok()).unwrap_or(1)
+}
+
+#[test]
+fn after_a_power_failure_at_any_change_the_results_are_the_undisturbed_ones() {
+    let (machine, first) = (Machine::new(), folder());
+    let root: PathBuf = first.path().canonicalize().unwrap();
+    let operations = recorded(&machine, &root);
+    let (mut disk, mut outcomes) = (Disk::default(), Outcomes::default());
+    let ways = [Survives::Nothing, Survives::All].into_iter();
+    let ways: Vec<_> = ways.chain((0..tries()).map(|_| Survives::Some)).collect();
+    for (at, operation) in operations.iter().enumerate() {
+        disk.apply(operation);
+        for (k, survives) in ways.iter().enumerate() {
+            let seed = (at * 1000 + k) as u64;
+            let after = folder();
+            disk.fail(
+                *survives,
+                &mut StdRng::seed_from_u64(seed),
+                &root,
+                after.path(),
+            );
+            let case = format!("change {at}, {survives:?}, seed {seed}");
+            check(&machine, after.path(), &case, &mut outcomes);
+        }
+    }
+    println!("{} changes: {outcomes:?}", operations.len());
+    assert_eq!(
+        outcomes.refused, 0,
+        "a power failure alone damages nothing that was safe"
+    );
+    assert!(outcomes.complete > 3 * 100);
+}
+
+#[test]
+fn a_second_power_failure_while_the_run_goes_on_changes_nothing_either() {
+    let (machine, first) = (Machine::new(), folder());
+    let root: PathBuf = first.path().canonicalize().unwrap();
+    let operations = recorded(&machine, &root);
+    let (mut disk, mut outcomes) = (Disk::default(), Outcomes::default());
+    for (at, operation) in operations.iter().enumerate() {
+        disk.apply(operation);
+        if at % 13 != 0 {
+            continue;
+        }
+        let failed = folder();
+        let mut random = StdRng::seed_from_u64(at as u64);
+        disk.fail(Survives::Some, &mut random, &root, failed.path());
+        let root = failed.path().canonicalize().unwrap();
+        let mut disk = Disk::of(&root);
+        for (again, operation) in recorded(&machine, &root).iter().enumerate() {
+            disk.apply(operation);
+            for survives in [Survives::Nothing, Survives::Some] {
+                let after = folder();
+                disk.fail(survives, &mut random, &root, after.path());
+                let case = format!("changes {at} and {again}, {survives:?}");
+                check(&machine, after.path(), &case, &mut outcomes);
+            }
+        }
+    }
+    println!("{outcomes:?}");
+    assert_eq!(outcomes.refused, 0);
+}
+
+#[test]
+fn a_power_failure_while_a_new_run_takes_the_place_of_a_complete_one_mixes_nothing() {
+    let (machine, first) = (Machine::new(), folder());
+    let root: PathBuf = first.path().canonicalize().unwrap();
+    machine.run(&root).unwrap();
+    let mut disk = Disk::of(&root);
+    let (mut random, mut outcomes) = (StdRng::seed_from_u64(7), Outcomes::default());
+    for (at, operation) in recorded(&machine, &root).iter().enumerate() {
+        disk.apply(operation);
+        for survives in [Survives::Nothing, Survives::All, Survives::Some] {
+            let after = folder();
+            disk.fail(survives, &mut random, &root, after.path());
+            let case = format!("change {at} of the new run, {survives:?}");
+            check(&machine, after.path(), &case, &mut outcomes);
+        }
+    }
+    println!("{outcomes:?}");
+    assert_eq!(outcomes.refused, 0);
+}
