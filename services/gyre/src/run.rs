@@ -68,21 +68,21 @@ fn results_folder(arguments: &RunArguments) -> PathBuf {
         .unwrap_or_else(|| Path::new("out").join(name))
 }
 
-/// Starts all processes, resumes `unfinished` or begins anew, and writes the results.
-fn play(
+/// What a run needs that its configuration does not say.
+struct Ready {
+    /// The configuration with the options of `dataset.toml`.
+    resolved: Configuration,
+    checked: Preflight,
+    identity: Identity,
+}
+
+/// Checks all that can be checked before anything of an earlier run is changed.
+fn make_ready(
     configuration: &Configuration,
     programs: &Programs,
-    out: Out,
-    unfinished: Option<Begun>,
-) -> Result<ExitCode, Failure> {
-    if let Some(begun) = unfinished.as_ref().filter(|begun| begun.lost > 0) {
-        print::note(format_args!(
-            "gyre: a power failure took the last {} poses of {}: going on after {}",
-            begun.lost,
-            out.path().display(),
-            begun.poses
-        ));
-    }
+    out: &Out,
+    unfinished: Option<&Begun>,
+) -> Result<Ready, Failure> {
     if let Some(simulation) = configuration.stored() {
         // A run that goes on needs the recording that it was begun with.
         let replace = unfinished.is_none();
@@ -93,31 +93,48 @@ fn play(
     let resolved = with_stored_options(configuration)?;
     let checked = preflight::check(&resolved)?;
     let identity = Identity::of(configuration, programs, resolved.dataset, &checked)?;
-    if let Some(begun) = &unfinished {
+    if let Some(begun) = unfinished {
         let (earlier, poses) = (&begun.identity, begun.poses);
         earlier.require_recording(&identity, out.path(), poses)?;
+        if begun.lost > 0 {
+            print::note(format_args!(
+                "gyre: a power failure took the last {} poses of {}: going on after {poses}",
+                begun.lost,
+                out.path().display()
+            ));
+        }
     }
+    Ok(Ready {
+        resolved,
+        checked,
+        identity,
+    })
+}
+
+/// Starts all processes, resumes `unfinished` or begins anew, and writes the results.
+fn play(
+    configuration: &Configuration,
+    programs: &Programs,
+    out: Out,
+    unfinished: Option<Begun>,
+) -> Result<ExitCode, Failure> {
+    let Ready {
+        resolved,
+        checked,
+        identity,
+    } = make_ready(configuration, programs, &out, unfinished.as_ref())?;
     let signals = Signals::install()?;
     let root = match RunRoot::acquire(out.path(), &signals) {
         Err(RootError::Interrupted) => return Ok(ExitCode::from(INTERRUPTED)),
         root => root?,
     };
     preflight::check_shared_memory(&checked.footprint)?;
-    prepare(
-        configuration,
-        &identity,
-        &out,
-        &checked,
-        unfinished.as_ref(),
-    )?;
-    let gyre = program::own();
-    let plan = Plan {
-        manifest: manifest(&resolved, programs, &out, &checked, &root),
-        stages: resolved.stage_plans(&gyre),
-        guardian: vec![gyre.to_string_lossy().into_owned(), "guard".to_owned()],
-        stall_timeout: limit(configuration.run.stall_timeout_s),
-        start_timeout: limit(configuration.run.start_timeout_s),
-    };
+    let earlier = unfinished.as_ref();
+    prepare(configuration, &identity, &out, &checked, earlier)?;
+    let plan = plan(
+        &resolved,
+        manifest(&resolved, programs, &out, &checked, &root),
+    );
     plan.manifest.write(&resolved.to_toml()?)?;
 
     let resumed = unfinished.map_or(0, |begun| begun.poses as usize);
@@ -172,6 +189,17 @@ fn prepare(
         storage::write(&out.join(results::SIMULATED_TRUTH), truth)?;
     }
     Ok(storage::create_folder(&out.join("log"))?)
+}
+
+fn plan(configuration: &Configuration, manifest: Manifest) -> Plan {
+    let gyre = program::own();
+    Plan {
+        manifest,
+        stages: configuration.stage_plans(&gyre),
+        guardian: vec![gyre.to_string_lossy().into_owned(), "guard".to_owned()],
+        stall_timeout: limit(configuration.run.stall_timeout_s),
+        start_timeout: limit(configuration.run.start_timeout_s),
+    }
 }
 
 fn manifest(

@@ -1,0 +1,170 @@
+//! A journal of a month: restarting, checking and writing results take time and memory that do not grow with what was done before.
+//!
+//! Ignored by default, for they fill a disk: `GYRE_POSES=26000000 cargo test --release -p gyre --test long_journal -- --ignored --nocapture
+//! --test-threads 1`, each test in a process of its own (name it), because the peak of memory is the process's.
+
+#![allow(clippy::unwrap_used)]
+
+use std::{
+    fs,
+    os::unix::fs::FileExt,
+    path::Path,
+    time::{Duration, Instant},
+};
+
+use gyre::{configuration::Configuration, out::Out, results, summary::Session};
+use gyre_messages::{Hop, Item, MotionEstimate, PoseHeader, flag};
+use gyre_pose_integration::journal::{self, Journal};
+use gyre_stage::supervise::Ending;
+use tempfile::TempDir;
+
+/// Poses that a restart asks for with a usual window.
+const LAST: usize = 16;
+
+fn poses() -> u64 {
+    std::env::var("GYRE_POSES")
+        .ok()
+        .and_then(|poses| poses.parse().ok())
+        .unwrap_or(100_000)
+}
+
+/// The largest resident memory of this process so far, MB.
+fn peak_mb() -> f64 {
+    let status = fs::read_to_string("/proc/self/status").unwrap();
+    let line = status
+        .lines()
+        .find(|line| line.starts_with("VmHWM"))
+        .unwrap();
+    line.split_whitespace()
+        .nth(1)
+        .unwrap()
+        .parse::<f64>()
+        .unwrap()
+        / 1024.0
+}
+
+fn folder() -> TempDir {
+    let place = std::env::var_os("GYRE_LONG").unwrap_or_else(|| std::env::temp_dir().into());
+    tempfile::Builder::new()
+        .prefix("gyre-long-")
+        .tempdir_in(place)
+        .unwrap()
+}
+
+fn pose(seq: u64) -> PoseHeader {
+    let done_ns = 1_000_000_000 + 100_000_000 * seq as i64;
+    let hop = |k: i64| Hop {
+        received_ns: done_ns + k * 5_000_000,
+        started_ns: done_ns + k * 5_000_000 + 1_000,
+        finished_ns: done_ns + k * 5_000_000 + 4_000_000 + (seq % 97) as i64 * 1_000,
+        published_ns: done_ns + k * 5_000_000 + 4_500_000,
+    };
+    let angle = seq as f64 * 1e-3;
+    PoseHeader {
+        item: Item {
+            seq,
+            scan: seq,
+            published: seq,
+            previous_scan: seq.saturating_sub(1),
+            stamp_ns: 1_700_000_000_000_000_000 + 100_000_000 * seq as i64,
+            due_ns: done_ns,
+            hops: std::array::from_fn(|k| hop(k as i64)),
+            flags: if seq == 0 { flag::BREAK } else { 0 },
+            ..Item::default()
+        },
+        motion: MotionEstimate {
+            x_m: 1.0,
+            interval_ns: 100_000_000,
+            ..MotionEstimate::default()
+        },
+        x_m: 900.0 * angle.cos(),
+        y_m: 900.0 * angle.sin(),
+        ..PoseHeader::default()
+    }
+}
+
+fn forge(out: &Path, poses: u64) {
+    let mut journal = Journal::open(&journal::path(out)).unwrap();
+    (0..poses).for_each(|seq| journal.append(&pose(seq)).unwrap());
+    let mut end = pose(poses);
+    end.item.flags = flag::END;
+    journal.append(&end).unwrap();
+}
+
+/// The length is real and the content is not: what is not read may be a hole.
+#[test]
+#[ignore = "a file of 14 GB, of which little is on the disk"]
+fn a_restart_reads_the_end_alone() {
+    let (folder, poses) = (folder(), poses());
+    forge(folder.path(), LAST as u64 + 2);
+    let path = journal::path(folder.path());
+    let short = fs::read(&path).unwrap();
+    let record = (short.len() - 16) / (LAST + 3);
+    let length = 16 + poses * record as u64;
+    let file = fs::OpenOptions::new().write(true).open(&path).unwrap();
+    file.set_len(length).unwrap();
+    // Valid records with the numbers of their places, made by a journal of their own.
+    let tail = tempfile::tempdir_in(folder.path()).unwrap();
+    let first = poses - LAST as u64;
+    let mut at = Journal::open(&journal::path(tail.path())).unwrap();
+    (0..LAST as u64).for_each(|k| at.append(&pose(first + k)).unwrap());
+    drop(at);
+    let bytes = fs::read(journal::path(tail.path())).unwrap();
+    file.write_all_at(&bytes[16..], 16 + first * record as u64)
+        .unwrap();
+    let (before, since) = (peak_mb(), Instant::now());
+    let journal = Journal::open(&path).unwrap();
+    let (last, ended) = journal.last(LAST).unwrap();
+    let (took, peak) = (since.elapsed(), peak_mb());
+    assert_eq!(
+        (last.len(), last[LAST - 1].item.seq, ended),
+        (LAST, poses - 1, false)
+    );
+    println!(
+        "{poses} poses, {:.1} GB: opened in {took:?}, peak {peak:.1} MB ({before:.1} before)",
+        length as f64 * 1e-9
+    );
+}
+
+#[test]
+#[ignore = "550 bytes of disk a pose"]
+fn a_check_takes_bounded_memory() {
+    let (folder, poses) = (folder(), poses());
+    forge(folder.path(), poses);
+    let since = Instant::now();
+    let content = journal::check(&journal::path(folder.path())).unwrap();
+    assert_eq!(
+        (content.poses, content.ended, content.torn),
+        (poses, true, 0)
+    );
+    println!(
+        "{poses} poses: checked in {:?}, peak {:.1} MB",
+        since.elapsed(),
+        peak_mb()
+    );
+}
+
+#[test]
+#[ignore = "1 kB of disk a pose"]
+fn results_take_bounded_memory() {
+    let (folder, poses) = (folder(), poses());
+    forge(folder.path(), poses);
+    let configuration = Configuration::of_overrides(&[]).unwrap();
+    let out = Out::lock(folder.path()).unwrap();
+    let session = Session {
+        scans: poses as usize,
+        resumed: 0,
+        wall: Duration::from_secs(1),
+        footprint: None,
+        ending: Some(Ending::Complete),
+        report: None,
+    };
+    let since = Instant::now();
+    let written = results::write(&configuration, &out, &session).unwrap();
+    assert_eq!((written.poses as u64, written.ended), (poses, true));
+    println!(
+        "{poses} poses: results in {:?}, peak {:.1} MB",
+        since.elapsed(),
+        peak_mb()
+    );
+}
