@@ -171,6 +171,22 @@ fn a_live_run_whose_folder_is_away_for_a_moment_accounts_for_every_scan() {
     );
 }
 
+#[test]
+fn a_source_restarted_after_files_came_and_went_plays_the_same_scans() {
+    let recording = whole();
+    let run = run_of(&recording).rate(MODERATE);
+    let mut running = run.start();
+    running.await_poses(MIDDLE);
+    let images = recording::images(recording.path());
+    fs::copy(&images[0], recording.path().join("radar/1.png")).unwrap();
+    for image in &images[1..4] {
+        fs::remove_file(image).unwrap();
+    }
+    running.kill("radar-replay");
+    running.finish().succeeded();
+    assert_whole(&run);
+}
+
 // Damaged scans.
 
 fn damage(recording: &Path, scans: impl IntoIterator<Item = usize>) {

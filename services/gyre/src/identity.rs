@@ -98,7 +98,10 @@ impl Identity {
             scans: checked.scans,
             programs: programs.clone(),
             dataset,
-            recording: checked.recording.clone(),
+            recording: checked
+                .recording
+                .as_ref()
+                .map(|it| it.fingerprint.clone()),
             configuration: configuration.to_toml()?.parse()?,
         })
     }

@@ -6,6 +6,7 @@ use gyre_masking::{MaskKind, Masker, model::Card};
 use gyre_messages::{Footprint, Limits, Window};
 use gyre_odometry::OdometryConfig;
 use gyre_radar::{Dataset, Fingerprint};
+use gyre_radar_replay::Listing;
 use gyre_simulator::SimulatedDrive;
 use gyre_stage::run::free_shared_memory;
 use rustix::process::{Resource, getrlimit};
@@ -69,7 +70,15 @@ pub struct Preflight {
     /// `ground_truth.tum` of a simulation that is played without being stored.
     pub truth: Option<Vec<u8>>,
     /// The recording, if it is on the disk.
-    pub recording: Option<Fingerprint>,
+    pub recording: Option<Recording>,
+}
+
+/// A recording on the disk.
+pub struct Recording {
+    /// What tells it from another one.
+    pub fingerprint: Fingerprint,
+    /// Its files.
+    pub listing: Listing,
 }
 
 /// Checks the dataset and the mask.
@@ -103,7 +112,10 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
     let footprint = Footprint::new(&window, &limits);
     let recording = match truth {
         Some(_) => None,
-        None => Some(Fingerprint::of(dataset.as_ref())?),
+        None => Some(Recording {
+            fingerprint: Fingerprint::of(dataset.as_ref())?,
+            listing: Listing::of(dataset.as_ref()),
+        }),
     };
     Ok(Preflight {
         recording,

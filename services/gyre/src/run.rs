@@ -136,6 +136,11 @@ fn play(
         manifest(&resolved, programs, &out, &checked, &root),
     );
     plan.manifest.write(&resolved.to_toml()?)?;
+    if let Some(recording) = &checked.recording {
+        let path = root.path().display();
+        let failed = |error| format!("cannot write to {path}: {error}");
+        recording.listing.write(root.path()).map_err(failed)?;
+    }
 
     let resumed = unfinished.map_or(0, |begun| begun.poses as usize);
     let mut progress = Progress::new(checked.scans, resumed, &checked.footprint);

@@ -3,8 +3,9 @@
 //! [`run`] opens a recording; [`play`] plays any dataset.
 
 mod config;
+mod listing;
 
-use std::ops::Range;
+use std::{error::Error, ops::Range, path::Path};
 
 use gyre_messages::{ScanHeader, StageId};
 use gyre_radar::{Dataset, DatasetOptions};
@@ -14,6 +15,7 @@ use gyre_stage::{
 };
 
 pub use config::SourceConfig;
+pub use listing::Listing;
 
 /// A playback with a longer delay is reported, s.
 const NOTABLE_SLIP_S: f64 = 0.01;
@@ -36,12 +38,26 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let options: DatasetOptions = launch.section("dataset")?;
     // The supervisor has opened it before, so whatever is wrong now may pass. It has resolved the options too: a dataset.toml
     // that is changed during a run does not change the run.
-    let open =
-        || gyre_radar::open_resolved(&config.data, &options).map_err(|error| error.to_string());
+    let root = &launch.manifest.root;
+    let open = || open(root, &config, &options).map_err(|error| error.to_string());
     match source::open(launch, &config.tolerance(), open)? {
         Some(dataset) => play(launch, dataset, Pace::Sensor),
         None => Ok(StageCounters::default()),
     }
+}
+
+/// Opens the recording with the files that the supervisor has listed.
+fn open(
+    root: &Path,
+    config: &SourceConfig,
+    options: &DatasetOptions,
+) -> Result<Box<dyn Dataset>, Box<dyn Error>> {
+    Ok(match Listing::read(root)? {
+        Some(Listing { format, files }) => {
+            gyre_radar::reopen(&config.data, options, format, files)?
+        }
+        None => gyre_radar::open_resolved(&config.data, options)?,
+    })
 }
 
 /// Plays the part of a dataset that the section `[source]` selects, until SIGTERM.

@@ -5,6 +5,7 @@ mod dataset_toml;
 mod detect;
 mod eccentricity;
 mod error;
+mod file_list;
 mod first_image;
 mod fomo;
 mod format;
@@ -27,6 +28,7 @@ use std::path::Path;
 
 use crate::scan::{ScanLimits, ScanSlot, SweepGeometry};
 pub use error::{OpenError, ReadError};
+pub use file_list::FileList;
 pub use format::Format;
 pub use image_size::ImageSize;
 pub use image_source::ImageSource;
@@ -58,8 +60,13 @@ pub trait Dataset: Send {
         false
     }
 
+    /// The files of the scans.
+    fn files(&self) -> &FileList;
+
     /// The file of a scan; an empty path past the end.
-    fn file(&self, index: usize) -> &Path;
+    fn file(&self, index: usize) -> &Path {
+        self.files().get(index).unwrap_or(Path::new(""))
+    }
 
     /// Time of a scan (the middle of the sweep on the sensor's clock), ns since 1970, as far as it is known without decoding.
     fn nominal_stamp_ns(&self, index: usize) -> Option<i64>;
@@ -113,6 +120,21 @@ pub fn stored_options(root: &Path) -> Result<DatasetOptions, OpenError> {
 pub fn open_resolved(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
     options.check()?;
     open_found(detect::locate(root, options.format)?, options)
+}
+
+/// Opens a dataset again as [`open_resolved`] has opened it before, with the format and the files that it had then. The folder is
+/// not listed, so it does not matter how many files it holds, or whether some came or went.
+///
+/// # Errors
+/// No file, options out of bounds, or files that cannot be read.
+pub fn reopen(
+    root: &Path,
+    options: &DatasetOptions,
+    format: Format,
+    files: FileList,
+) -> Result<Box<dyn Dataset>, OpenError> {
+    options.check()?;
+    open_found(detect::Found::listed(root, format, files)?, options)
 }
 
 /// Opens a recording that is not on disk, in its own format unless `options` names another.

@@ -22,8 +22,8 @@ pub mod trajectory;
 
 pub use chain::{MAX_INTERVAL_NS, continues};
 pub use dataset::{
-    AzimuthSource, Dataset, DatasetOptions, Format, ImageSize, ImageSource, OpenError, ReadError,
-    open, open_resolved, open_source, stored_options,
+    AzimuthSource, Dataset, DatasetOptions, FileList, Format, ImageSize, ImageSource, OpenError,
+    ReadError, open, open_resolved, open_source, reopen, stored_options,
 };
 pub use fingerprint::Fingerprint;
 pub use ground_truth::{

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::error::OpenError;
+use super::file_list::FileList;
 use super::first_image::{FirstImage, NamedBy};
 use super::format::Format;
 use super::image_source::ImageSource;
@@ -23,6 +24,19 @@ pub(crate) struct Found {
 }
 
 impl Found {
+    /// Returns a dataset whose files are known.
+    pub(crate) fn listed(root: &Path, format: Format, files: FileList) -> Result<Self, OpenError> {
+        let folder = files.get(0).and_then(Path::parent).unwrap_or(root);
+        let folder = folder.to_owned();
+        Ok(Self {
+            format,
+            images: Images::listed(&folder, files)?,
+            folder,
+            notes: Vec::new(),
+            stamps: None,
+        })
+    }
+
     /// Returns a recording that is not on disk.
     pub(crate) fn source(
         source: Box<dyn ImageSource>,
@@ -165,7 +179,7 @@ fn by_image(
         path: folder.to_owned(),
         reason: format!("its images ({}) {reason}", images_size(folder)),
     };
-    let Some(image) = FirstImage::read(images).filter(FirstImage::has_stamps) else {
+    let Some(image) = FirstImage::read(images)?.filter(FirstImage::has_stamps) else {
         let without_metadata =
             images.size.height > images.size.width && images.name_stamp_ns(0).is_some();
         return match without_metadata {

@@ -1,5 +1,6 @@
 //! Properties of a dataset from its first image with Navtech metadata columns.
 
+use super::error::ReadError;
 use super::image_size::ImageSize;
 use super::images::Images;
 use super::navtech_png::{METADATA_BYTES, RowMetadata, chirps_alternate, rows};
@@ -38,18 +39,21 @@ pub(crate) struct FirstImage {
 }
 
 impl FirstImage {
-    /// Returns `None` if no image can be read or the images are too narrow for metadata.
-    pub(crate) fn read(images: &mut Images) -> Option<Self> {
+    /// Returns `None` if the first images are damaged, or too narrow for metadata.
+    ///
+    /// # Errors
+    /// The first images cannot be read. Whatever depends on them would be another at another time.
+    pub(crate) fn read(images: &mut Images) -> Result<Option<Self>, ReadError> {
         let size = images.size;
         if size.width <= METADATA_BYTES || size.height < 2 {
-            return None;
+            return Ok(None);
         }
-        let (index, pixels) = images.first_readable()?;
-        Some(Self {
+        let found = images.first_readable()?;
+        Ok(found.map(|(index, pixels)| Self {
             size,
             rows: rows(&pixels, size).collect(),
             name_ns: images.name_stamp_ns(index),
-        })
+        }))
     }
 
     /// Range bins.

@@ -1,12 +1,11 @@
 //! Reader of images with Navtech metadata columns, parameterised by a profile per format: Oxford, OORD, Boreas, MulRan
 //! (Oxford format) and FoMo.
 
-use std::path::Path;
-
 use super::Dataset;
 use super::detect::Found;
 use super::eccentricity;
 use super::error::{OpenError, ReadError};
+use super::file_list::FileList;
 use super::first_image::{FirstImage, NamedBy};
 use super::format::Format;
 use super::image_size::ImageSize;
@@ -92,7 +91,7 @@ impl NavtechScans {
             ..
         } = found;
         check_shape(&images, format)?;
-        let first_image = FirstImage::read(&mut images);
+        let first_image = FirstImage::read(&mut images)?;
         let profile = profile(first_image.as_ref()).with(options);
         notes.extend(
             first_image
@@ -269,8 +268,8 @@ impl Dataset for NavtechScans {
         self.images.size
     }
 
-    fn file(&self, index: usize) -> &Path {
-        self.images.file(index)
+    fn files(&self) -> &FileList {
+        self.images.files()
     }
 
     fn nominal_stamp_ns(&self, index: usize) -> Option<i64> {

@@ -1,11 +1,10 @@
 //! Reader of transposed images without metadata: rows are range (nearest first), columns azimuth from straight ahead.
 
-use std::path::Path;
-
 use super::Dataset;
 use super::detect::Found;
 use super::eccentricity;
 use super::error::{OpenError, ReadError};
+use super::file_list::FileList;
 use super::format::Format;
 use super::image_size::ImageSize;
 use super::images::Images;
@@ -137,8 +136,8 @@ impl Dataset for TransposedScans {
         self.images.size.height > self.images.size.width
     }
 
-    fn file(&self, index: usize) -> &Path {
-        self.images.file(index)
+    fn files(&self) -> &FileList {
+        self.images.files()
     }
 
     fn nominal_stamp_ns(&self, index: usize) -> Option<i64> {

@@ -3,7 +3,9 @@
 use std::f32::consts::TAU;
 use std::fs;
 
-use gyre_radar::{DatasetOptions, Format, OpenError, OwnedScan, ReadError, ScanLimits, open};
+use gyre_radar::{
+    DatasetOptions, Format, OpenError, OwnedScan, ReadError, ScanLimits, open, reopen,
+};
 
 use crate::common::{PERIOD_US, START_US, Sweep, read, write_oxford, write_png, write_radiate};
 use crate::{folder, opened, rejected};
@@ -29,6 +31,45 @@ fn written_powers_are_read_back() {
         scan.geometry.stamp_ns,
         (START_US + 2 * PERIOD_US + 39 * PERIOD_US / 40 / 2) * 1000
     );
+}
+
+#[test]
+fn only_files_are_listed_and_links_to_them() {
+    let root = folder();
+    let files = write_oxford(root.path(), 3);
+    fs::create_dir(root.path().join("radar/1.png")).unwrap();
+    fs::write(root.path().join("radar/2.txt"), "").unwrap();
+    std::os::unix::fs::symlink("nowhere", root.path().join("radar/3.png")).unwrap();
+    std::os::unix::fs::symlink(&files[1], root.path().join("radar/4.PNG")).unwrap();
+    let dataset = opened(root.path());
+    let listed: Vec<_> = (0..dataset.len())
+        .map(|index| dataset.file(index))
+        .collect();
+    let expected = [
+        &root.path().join("radar/4.PNG"),
+        &files[0],
+        &files[1],
+        &files[2],
+    ];
+    assert_eq!(listed, expected);
+}
+
+#[test]
+fn a_dataset_that_is_opened_again_has_the_scans_that_it_had() {
+    for write in [write_oxford, write_radiate] {
+        let root = folder();
+        let files = write(root.path(), 4);
+        let dataset = opened(root.path());
+        let (format, listed) = (dataset.format(), dataset.files().clone());
+        let none = DatasetOptions::default();
+        fs::rename(&files[1], files[1].with_file_name("000000.png")).unwrap();
+        let mut again = reopen(root.path(), &none, format, listed).unwrap();
+        assert_eq!((again.len(), again.period_ns()), (4, dataset.period_ns()));
+        assert_eq!(again.nominal_stamp_ns(1), dataset.nominal_stamp_ns(1));
+        assert!(read(again.as_mut(), 1).unwrap_err().is_io());
+        let [now, then] = [again, dataset].map(|mut dataset| read(dataset.as_mut(), 2).unwrap());
+        assert_eq!((now.bytes, now.stamp_ns), (then.bytes, then.stamp_ns));
+    }
 }
 
 #[test]
