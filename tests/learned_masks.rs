@@ -165,7 +165,7 @@ fn a_live_run_survives_the_death_of_masking_with_a_network_that_looks_at_two_sca
         let run = masked_by(TWO_SCANS)
             .rate("4")
             .set("run.mode=live")
-            .set("masking.stress_delay_ms=94");
+            .set("stages.masking.delay_ms=94");
         let mut running = run.start();
         running.await_poses(5);
         for stage in stages {

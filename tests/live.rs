@@ -17,7 +17,7 @@ fn live() -> Run {
     Run::of_recording()
         .rate(RATE)
         .set("run.mode=live")
-        .set(&format!("masking.stress_delay_ms={SLOW_MASKING_MS}"))
+        .set(&format!("stages.masking.delay_ms={SLOW_MASKING_MS}"))
 }
 
 /// Asserts that each scan is where it belongs: played, and then either in the chain or dropped.

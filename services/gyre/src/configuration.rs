@@ -93,6 +93,13 @@ pub struct StageConfig {
     pub command: Vec<String>,
     /// Limits of its restarts.
     pub restart: RestartPolicy,
+    /// Delay for each scan, ms, to test behaviour under load. Source and `pose-integration` have none.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub delay_ms: u64,
+}
+
+fn is_zero(value: &u64) -> bool {
+    *value == 0
 }
 
 impl Default for RunConfig {

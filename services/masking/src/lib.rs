@@ -8,8 +8,6 @@ mod lossless;
 mod motions;
 mod scans;
 
-use std::time::Duration;
-
 use gyre_geometry::Twist;
 use gyre_masking::{MaskError, MaskKind, Masker, MaskingConfig, Sweep};
 use gyre_messages::{Masked, MaskedHeader, Scan, SearchedMotion, StageId, mask_kind};
@@ -82,10 +80,6 @@ impl Stage for Masking {
             .points(&sweep.scan, twist, parts.points)
             .map_err(|error| input.scan.malformed(error.to_string()))?;
         *header = self.header(twist, points);
-        // A test option: simulates a slow stage.
-        if self.config.stress_delay_ms > 0 {
-            std::thread::sleep(Duration::from_millis(self.config.stress_delay_ms));
-        }
         Ok(())
     }
 }

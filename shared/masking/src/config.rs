@@ -44,8 +44,6 @@ pub struct MaskingConfig {
     /// speed the shift cancels between rasters. Compensated, it cancels only between scans that both
     /// have a known motion, so the motion where compensation begins is short by the whole shift.
     pub undo_doppler: bool,
-    /// Delay for each scan, ms, to test behaviour under load.
-    pub stress_delay_ms: u64,
 }
 
 /// The kind of a mask.
@@ -116,7 +114,6 @@ impl Default for MaskingConfig {
             compensate: true,
             lag: 2,
             undo_doppler: false,
-            stress_delay_ms: 0,
         }
     }
 }

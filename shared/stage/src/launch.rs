@@ -7,6 +7,7 @@ use std::{
     path::PathBuf,
     process::ExitCode,
     sync::Mutex,
+    time::Duration,
 };
 
 use rustix::process::{Signal, set_parent_process_death_signal};
@@ -84,6 +85,13 @@ impl Launch {
                 error.message()
             ))
         })
+    }
+
+    /// Returns the delay that the configuration adds to the work on each item, to test behaviour under load.
+    pub(crate) fn delay(&self) -> Duration {
+        let stages = self.configuration.get("stages");
+        let own = stages.and_then(|stages| stages.get(&self.name)?.get("delay_ms")?.as_integer());
+        Duration::from_millis(own.map_or(0, |delay_ms| delay_ms.max(0) as u64))
     }
 
     /// Returns whether the run's configuration has a section.

@@ -1,5 +1,7 @@
 //! The loop of a stage between source and sink.
 
+use std::{thread, time::Duration};
+
 use gyre_messages::{Header, Item, Message, flag};
 
 use crate::{
@@ -41,6 +43,7 @@ pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<StageCounters, St
         stage,
         inputs,
         output,
+        delay: launch.delay(),
         last_sent: None,
         ended: false,
         counters: StageCounters::default(),
@@ -70,6 +73,7 @@ struct Flow<'a, S: Stage> {
     stage: &'a mut S,
     inputs: S::Inputs,
     output: Writer<S::Output>,
+    delay: Duration,
     last_sent: Option<u64>,
     ended: bool,
     counters: StageCounters,
@@ -99,6 +103,9 @@ impl<S: Stage> Flow<'_, S> {
         let view = self.inputs.view().ok_or_else(missing)?;
         let (started_ns, allocated) = (clock::now_ns(), allocations::so_far());
         self.stage.process(view, &mut draft)?;
+        if !self.delay.is_zero() {
+            thread::sleep(self.delay);
+        }
         let (finished_ns, allocated) = (clock::now_ns(), allocations::so_far() - allocated);
         *item.hop_mut(S::HOP) = gyre_messages::Hop {
             received_ns,
