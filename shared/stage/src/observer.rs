@@ -2,8 +2,8 @@
 //!
 //! An observer may attach at any time, be slow, be stopped or be killed. No publisher waits for it: a full queue loses its oldest
 //! message, and the observer counts what it has missed. It holds one message at a time, which the publishers' memory is sized for
-//! (see [`TopicSizes::samples`](gyre_messages::TopicSizes::samples)). It notifies nobody, so it wakes no stage. The supervisor
-//! frees the places of killed observers.
+//! (see [`TopicSizes::samples`](gyre_messages::TopicSizes::samples)). It notifies the publisher once, when it attaches, so that the
+//! publisher connects to it while it waits, and not while it sends. The supervisor frees the places of killed observers.
 
 use std::{
     fs::File,
@@ -147,10 +147,16 @@ impl ObservedRun {
         if observers_of::<M>(&topic, &name) > places {
             return Err(no_place());
         }
+        let data = services::listener(&self.node, &services::data_event(M::TOPIC))?;
+        services::notifier(&self.node, &services::handshake_event(M::TOPIC))?
+            .notify()
+            .map_err(|e| {
+                StageError::transport(format!("notify the publisher of {}", M::TOPIC), e)
+            })?;
         Ok(Observer {
             run: self,
             subscriber,
-            data: services::listener(&self.node, &services::data_event(M::TOPIC))?,
+            data,
             current: None,
             sequence: Sequence::default(),
         })

@@ -56,7 +56,7 @@ impl Services {
             };
             let handshake = EventSizes {
                 listeners: 1,
-                notifiers: sizes.readers,
+                notifiers: sizes.subscribers(),
                 nodes: sizes.nodes(),
             };
             events.push(create_event(node, &data_event(topic.name), data)?);
