@@ -172,7 +172,7 @@ impl Configuration {
         let parsed: Result<toml::Table, _> = text.parse();
         let table = parsed.map_err(|error| ConfigurationError::Syntax {
             path: path.to_owned(),
-            reason: error.to_string().trim().replace('\n', "; "),
+            reason: syntax(&text, &error),
         })?;
         Self::resolve(table, overrides)
     }
@@ -456,6 +456,18 @@ impl Configuration {
         let now: toml::Table = self.to_toml()?.parse()?;
         Ok(difference::first(&relevant(begun), &relevant(&now)))
     }
+}
+
+/// Names the place of a mistake, without the line itself: the file may hold anything.
+fn syntax(text: &str, error: &toml::de::Error) -> String {
+    let start = error.span().map_or(0, |span| span.start);
+    let before = text.get(..start).unwrap_or_default();
+    let (line, column) = match before.rsplit_once('\n') {
+        Some((lines, row)) => (lines.matches('\n').count() + 2, row.chars().count() + 1),
+        None => (1, before.chars().count() + 1),
+    };
+    let reason = error.message().trim().replace('\n', "; ");
+    format!("TOML parse error at line {line}, column {column}: {reason}")
 }
 
 #[cfg(test)]

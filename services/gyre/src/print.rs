@@ -30,5 +30,28 @@ pub fn printed(written: io::Result<()>) -> Result<(), Failure> {
 
 /// Prints a line to standard error. Failures are ignored: a run does not end because its terminal is closed.
 pub fn note(text: impl Display) {
-    let _ = writeln!(io::stderr(), "{text}");
+    let _ = writeln!(io::stderr(), "{}", printable(&text.to_string()));
+}
+
+/// Replaces what a terminal would take as a command: names and words of files are quoted as they are.
+fn printable(text: &str) -> String {
+    let plain = |c: char| {
+        if c.is_control() && c != '\n' {
+            char::REPLACEMENT_CHARACTER
+        } else {
+            c
+        }
+    };
+    text.chars().map(plain).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_that_is_quoted_commands_the_terminal() {
+        let text = printable("cannot read \u{1b}[2J\t\u{7}é:\nno");
+        assert_eq!(text, "cannot read \u{fffd}[2J\u{fffd}\u{fffd}é:\nno");
+    }
 }

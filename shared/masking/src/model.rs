@@ -173,6 +173,16 @@ impl Card {
                 card.model.inputs
             )));
         }
+        if !is_sha256(&card.model.sha256) {
+            let reason = "model.sha256 is not 64 hexadecimal digits";
+            return Err(not_a_card(reason.to_owned()));
+        }
+        if !is_plain_name(&card.model.file) {
+            return Err(not_a_card(format!(
+                "model.file is {:?}, but must name a file in the folder of the card",
+                card.model.file
+            )));
+        }
         match &config.sha256 {
             Some(expected) if !expected.eq_ignore_ascii_case(&card.model.sha256) => {
                 Err(ModelError::OtherModel {
@@ -222,6 +232,16 @@ impl Card {
         ];
         differences.into_iter().flatten().collect()
     }
+}
+
+fn is_sha256(text: &str) -> bool {
+    text.len() == 64 && text.bytes().all(|digit| digit.is_ascii_hexdigit())
+}
+
+/// Returns whether a path is the name of a file, without folders, that can be printed.
+fn is_plain_name(path: &Path) -> bool {
+    let is_printable = |name: &str| !name.contains(char::is_control);
+    path.file_name() == Some(path.as_os_str()) && path.to_str().is_some_and(is_printable)
 }
 
 fn mismatch<T: PartialEq + fmt::Display>(key: &str, trained: Option<T>, here: T) -> Option<String> {

@@ -111,6 +111,38 @@ fn the_model_takes_three_scans() {
 }
 
 #[test]
+fn the_checksum_is_none() {
+    for more in ["a3f0", "\\u001b[2J"] {
+        let (_folder, card) = changed("single-31", "sha256 = \"", &format!("sha256 = \"{more}"));
+        rejected(
+            &learned(&card),
+            &raster(),
+            &["model.sha256 is not 64 hexadecimal digits"],
+        );
+    }
+}
+
+#[test]
+fn the_model_lies_elsewhere_or_has_a_name_that_cannot_be_printed() {
+    for name in [
+        "/etc/hostname",
+        "../single-31.onnx",
+        "",
+        "single\\u001b[2J.onnx",
+    ] {
+        let (_folder, card) = changed("single-31", "\"single-31.onnx\"", &format!("\"{name}\""));
+        rejected(
+            &learned(&card),
+            &raster(),
+            &[
+                "model.file is",
+                "must name a file in the folder of the card",
+            ],
+        );
+    }
+}
+
+#[test]
 fn the_rasters_are_of_another_size() {
     let config = learned(&card("single-31"));
     let other = RasterConfig { n: 255, ..raster() };

@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 pub use kitti::write_kitti;
 pub use tum::{write_tum, write_tum_pose};
 
+use crate::quoted::quoted;
 use crate::trajectory::Trajectory;
 
 /// Files of ground truth relative to the root of a dataset, in order of precedence.
@@ -157,17 +158,24 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
         .filter(|(_, l)| !l.is_empty() && !l.starts_with('#'))
 }
 
-/// Parses `N` finite numbers.
+/// The largest number: no product or sum of such overflows.
+const LARGEST: f64 = 1e15;
+
+/// Parses `N` numbers.
 fn numbers<'a, const N: usize>(
     line: usize,
     fields: impl Iterator<Item = &'a str>,
 ) -> Result<[f64; N], LineError> {
     let (mut values, mut count) = ([0.0; N], 0);
     for field in fields {
-        let value = field.trim().parse::<f64>().ok().filter(|v| v.is_finite());
+        let value = field.trim().parse::<f64>().ok();
+        let value = value.filter(|value| value.abs() <= LARGEST);
         let value = value.ok_or_else(|| LineError {
             line,
-            reason: format!("{field:?} is not a finite number"),
+            reason: format!(
+                "{} is not a number from -{LARGEST:e} to {LARGEST:e}",
+                quoted(field)
+            ),
         })?;
         if let Some(into) = values.get_mut(count) {
             *into = value;
@@ -217,7 +225,10 @@ fn stamp_field(line: usize, row: &str, column: usize) -> Result<i64, LineError> 
     let stamp = text.parse().ok().and_then(crate::dataset::stamp::to_ns);
     stamp.ok_or_else(|| LineError {
         line,
-        reason: format!("stamp {text:?} is not an integer time of the years 2015 to 2040"),
+        reason: format!(
+            "stamp {} is not an integer time of the years 2015 to 2040",
+            quoted(text)
+        ),
     })
 }
 

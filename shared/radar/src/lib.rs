@@ -16,6 +16,7 @@ pub mod ground_truth;
 pub mod inspect;
 mod median;
 pub mod points;
+mod quoted;
 pub mod raster;
 pub mod scan;
 pub mod trajectory;

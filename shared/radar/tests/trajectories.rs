@@ -186,6 +186,12 @@ fn invalid_files_are_rejected_with_their_line() {
         ("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n", "backwards"),
         ("1 0 0 0 0 0 0 0\n", "quaternion"),
         ("1 inf 0 0 0 0 0 1\n", "line 1"),
+        // Finite, but their squares or sums are not.
+        ("1 0 0 0 1e200 0 0 1e200\n", "line 1"),
+        (
+            "1 0 0 1e308 0 1 0 1e308 0 0 1 0\n1 0 0 0 -1e308 1 0 0 0 0 1 0\n",
+            "line 1",
+        ),
         (HEADER, "no motion"),
         ("GPSTime,easting\n1,2\n", "northing"),
     ];
@@ -197,6 +203,19 @@ fn invalid_files_are_rejected_with_their_line() {
         read_trajectory("/nonexistent/a.tum".as_ref()),
         Err(TrajectoryError::Io { .. })
     ));
+}
+
+#[test]
+fn a_word_of_a_damaged_file_is_quoted_in_part() {
+    let long = "9".repeat(5000);
+    for text in [
+        format!("1 0 0 {long}x 0 1 0 0 0 0 1 0\n"),
+        format!("{long}x 0 0 0 0 0 0 1\n"),
+        format!("GPSTime,easting,northing,roll,pitch,heading\n{long},0,0,0,0,0\n"),
+    ] {
+        let error = from_text("truth.txt", &text).unwrap_err().to_string();
+        assert!(error.len() < 300 && error.contains("999\"..."), "{error}");
+    }
 }
 
 #[test]

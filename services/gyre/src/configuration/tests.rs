@@ -29,6 +29,22 @@ fn an_unknown_key_names_itself_and_the_nearest_right_one() {
 }
 
 #[test]
+fn a_mistake_in_toml_names_its_place_and_shows_nothing_of_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("run.toml");
+    fs::write(&file, "[run]\nwindow = 4\n\u{1b}[2J oh\n").unwrap();
+    let error = Configuration::read(&file, &[]).unwrap_err().to_string();
+    assert!(
+        error.contains("TOML parse error at line 3, column 2: "),
+        "{error}"
+    );
+    assert!(
+        !error.contains(char::is_control) && !error.contains("[2J"),
+        "{error}"
+    );
+}
+
+#[test]
 fn impossible_values_are_refused() {
     for (text, part) in [
         ("[run]\nwindow = 0", "window"),

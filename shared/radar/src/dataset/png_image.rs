@@ -160,10 +160,17 @@ impl ImageReader {
             }
             other => ReadError::Damaged {
                 path: path.to_owned(),
-                reason: other.to_string(),
+                reason: plain(&other.to_string()).to_owned(),
             },
         }
     }
+}
+
+/// Cuts the name of a chunk, which the decoder shows in a debugging format, with bytes of the file as they are.
+fn plain(reason: &str) -> &str {
+    let words = reason.split("ChunkType").next().unwrap_or(reason);
+    let words = words.trim_end().trim_end_matches(':');
+    words.trim_end_matches(" while decoding")
 }
 
 fn io_error(path: &Path, source: io::Error) -> ReadError {

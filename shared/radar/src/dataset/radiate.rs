@@ -15,6 +15,7 @@ use super::sensor_clock::SensorClock;
 use super::stamp::{self, SECOND_NS};
 use super::transposed::{TransposedScans, Turn};
 use crate::chain::MAX_INTERVAL_NS;
+use crate::quoted::quoted;
 
 /// Full range of the images, m.
 const RANGE_M: f32 = 100.0;
@@ -183,7 +184,8 @@ fn parse_stamps(path: &Path, text: &str) -> Result<(BTreeMap<i64, i64>, usize), 
             path: path.to_owned(),
             line: line + 1,
             reason: format!(
-                "{content:?} is not `Frame: <number> Time: <seconds>.<nanoseconds>` of the years 2015 to 2040"
+                "{} is not `Frame: <number> Time: <seconds>.<nanoseconds>` of the years 2015 to 2040",
+                quoted(content)
             ),
         })?;
         unpadded += usize::from(digits < 9);

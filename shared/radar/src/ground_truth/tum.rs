@@ -6,6 +6,7 @@ use gyre_geometry::{Pose, pose};
 
 use super::{LineError, check_increasing, lines, numbers};
 use crate::dataset::stamp;
+use crate::quoted::quoted;
 use crate::trajectory::Trajectory;
 
 pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
@@ -14,7 +15,7 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
         let seconds = row.split_whitespace().next().unwrap_or_default();
         let stamp = stamp::parse_seconds(seconds).ok_or_else(|| LineError {
             line,
-            reason: format!("time {seconds:?} is not a number of seconds"),
+            reason: format!("time {} is not a number of seconds", quoted(seconds)),
         })?;
         check_increasing(line, &stamps, stamp)?;
         let [_, x, y, _, qx, qy, qz, qw] = numbers(line, row.split_whitespace())?;

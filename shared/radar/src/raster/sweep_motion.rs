@@ -27,7 +27,10 @@ impl SweepMotion {
             .fold(0.0, f64::max);
         let turn_rad = (twist.yaw_rate_radps * longest_s).abs();
         let travel_m = twist.speed_mps() * longest_s;
-        if !(turn_rad <= MAX_TURN_RAD && travel_m <= MAX_TRAVEL_M) {
+        // Where all rows have the same time any velocity moves nothing, but it must be a number in f32.
+        let velocity = [twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps];
+        let is_finite = velocity.iter().all(|v| (*v as f32).is_finite());
+        if !(is_finite && turn_rad <= MAX_TURN_RAD && travel_m <= MAX_TRAVEL_M) {
             return Err(RasterError::Twist {
                 twist,
                 turn_rad,

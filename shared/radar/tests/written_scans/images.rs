@@ -8,7 +8,7 @@ use gyre_radar::{
 };
 
 use crate::common::{PERIOD_US, START_US, Sweep, read, write_oxford, write_png, write_radiate};
-use crate::{folder, opened, rejected};
+use crate::{first_scan, folder, opened, rejected};
 
 #[test]
 fn written_powers_are_read_back() {
@@ -208,6 +208,28 @@ fn a_truncated_or_corrupt_image_gives_an_error_and_no_panic() {
         fs::write(&files[1], damaged).unwrap();
         let _ = dataset.read(1, scan.slot());
     }
+}
+
+#[test]
+fn an_unknown_chunk_is_reported_in_plain_words() {
+    let root = folder();
+    let file = write_oxford(root.path(), 1).remove(0);
+    let valid = fs::read(&file).unwrap();
+    let mut bytes = valid.clone();
+    // After the header: length 0, a critical chunk named by four zeros, its checksum.
+    bytes.splice(33..33, [0, 0, 0, 0, 0, 0, 0, 0, 0x21, 0x44, 0xdf, 0x1c]);
+    fs::write(&file, bytes).unwrap();
+    let error = first_scan(root.path()).unwrap_err().to_string();
+    assert!(error.contains("Unrecognized critical chunk"), "{error}");
+    assert!(!error.contains(['{', '\0']), "{error}");
+    let mut bytes = valid;
+    bytes[30] ^= 1;
+    fs::write(&file, bytes).unwrap();
+    let error = first_scan(root.path()).unwrap_err().to_string();
+    assert!(
+        error.contains("CRC error") && !error.contains('{'),
+        "{error}"
+    );
 }
 
 #[test]

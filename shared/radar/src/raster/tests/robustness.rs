@@ -166,6 +166,17 @@ fn motions_out_of_bounds_are_rejected() {
             "{twist:?}"
         );
     }
+    // All rows at the stamp of the scan: nothing moves, but the velocity has no number in f32.
+    let mut scan = sensor(2, 100).scan();
+    scan.stamp_ns.fill(scan.geometry.stamp_ns);
+    let twist = Twist {
+        yaw_rate_radps: -4e270,
+        ..Twist::default()
+    };
+    assert!(matches!(
+        try_raster(&scan, Some(twist)),
+        Err(RasterError::Twist { .. })
+    ));
 }
 
 #[test]

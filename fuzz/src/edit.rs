@@ -1,0 +1,244 @@
+//! Edits of bytes and texts.
+
+use bolero::TypeGenerator;
+
+/// An edit of bytes at a place, which is taken modulo the length.
+#[derive(Clone, Debug, TypeGenerator)]
+pub enum ByteEdit {
+    /// Replaces a byte.
+    Set(u32, u8),
+    /// Flips a bit.
+    Flip(u32, u8),
+    /// Replaces eight bytes by a number.
+    Word(u32, Number),
+    /// Inserts a byte some times.
+    Insert(u32, u8, u8),
+    /// Removes some bytes.
+    Remove(u32, u8),
+    /// Repeats some bytes.
+    Repeat(u32, u8),
+    /// Cuts all that follows.
+    Truncate(u32),
+}
+
+/// A number at which programs err.
+#[derive(Clone, Copy, Debug, TypeGenerator)]
+pub enum Number {
+    /// Any bits.
+    Any(u64),
+    /// A small number, or a small negative one.
+    Small(i8),
+    /// A power of two, more or less.
+    NearPower(u8, i8),
+    /// One of [`FLOATS`].
+    Float(u8),
+}
+
+/// Floating-point numbers at which programs err.
+pub const FLOATS: [f64; 12] = [
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    f64::NAN,
+    f64::INFINITY,
+    f64::NEG_INFINITY,
+    f64::MAX,
+    f64::MIN,
+    f64::MIN_POSITIVE,
+    1e20,
+    -1e154,
+];
+
+impl Number {
+    /// Its bits.
+    pub fn bits(self) -> u64 {
+        match self {
+            Self::Any(bits) => bits,
+            Self::Small(number) => i64::from(number) as u64,
+            Self::NearPower(power, by) => {
+                (1_u64 << (power % 64)).wrapping_add_signed(i64::from(by))
+            }
+            Self::Float(index) => FLOATS[usize::from(index) % FLOATS.len()].to_bits(),
+        }
+    }
+
+    /// A floating-point number.
+    pub fn f64(self) -> f64 {
+        match self {
+            Self::Any(_) | Self::Float(_) => f64::from_bits(self.bits()),
+            Self::Small(number) => f64::from(number) * 0.1,
+            Self::NearPower(power, by) => 2f64.powi(i32::from(power) - 128) * f64::from(by),
+        }
+    }
+}
+
+/// Edits bytes.
+pub fn edit_bytes(bytes: &mut Vec<u8>, edits: &[ByteEdit]) {
+    for edit in edits {
+        let len = bytes.len();
+        let place = |at: u32| at as usize % (len + 1);
+        match *edit {
+            ByteEdit::Set(at, byte) => bytes[place(at)..]
+                .iter_mut()
+                .take(1)
+                .for_each(|b| *b = byte),
+            ByteEdit::Flip(at, bit) => {
+                bytes[place(at)..]
+                    .iter_mut()
+                    .take(1)
+                    .for_each(|b| *b ^= 1 << (bit % 8));
+            }
+            ByteEdit::Word(at, number) => {
+                let word = number.bits().to_le_bytes();
+                bytes[place(at)..]
+                    .iter_mut()
+                    .zip(word)
+                    .for_each(|(b, w)| *b = w);
+            }
+            ByteEdit::Insert(at, byte, times) => {
+                let place = place(at);
+                bytes.splice(place..place, vec![byte; times.into()]);
+            }
+            ByteEdit::Remove(at, count) => {
+                let place = place(at);
+                bytes.drain(place..len.min(place + usize::from(count)));
+            }
+            ByteEdit::Repeat(at, count) => {
+                let place = place(at);
+                let part = bytes[place..len.min(place + usize::from(count))].to_vec();
+                bytes.splice(place..place, part);
+            }
+            ByteEdit::Truncate(at) => bytes.truncate(place(at)),
+        }
+    }
+}
+
+/// An edit of a text. Lines and words are taken modulo their number.
+#[derive(Clone, Debug, TypeGenerator)]
+pub enum TextEdit {
+    /// Replaces a word of a line by one of [`WORDS`].
+    Word(u16, u8, u8),
+    /// Replaces a number of a line by another.
+    Number(u16, u8, Number),
+    /// Inserts a line of such a word.
+    Line(u16, u8),
+    /// Removes a line.
+    RemoveLine(u16),
+    /// Repeats a line.
+    RepeatLine(u16),
+    /// Swaps two lines.
+    SwapLines(u16, u16),
+    /// Edits the bytes; what is no UTF-8 then is replaced.
+    Bytes(ByteEdit),
+}
+
+/// Words at which parsers err.
+const WORDS: [&str; 40] = [
+    "",
+    "0",
+    "-0",
+    "-1",
+    "1",
+    "nan",
+    "NaN",
+    "inf",
+    "-inf",
+    "1e308",
+    "-1e308",
+    "1e-320",
+    "1e400",
+    "9223372036854775807",
+    "-9223372036854775808",
+    "18446744073709551616",
+    "4294967296",
+    "1547131046000000",
+    "1547131046.5",
+    "1547131046000000000",
+    ".",
+    "-",
+    "\"",
+    "'",
+    "[",
+    "]",
+    "{}",
+    "[[a]]",
+    "=",
+    "#",
+    ",",
+    ",,,,,,,,,,,,",
+    "\t",
+    "true",
+    "false",
+    "null",
+    "[1, 2]",
+    "ä€\u{1f980}",
+    "\u{0}",
+    "\u{202e}",
+];
+
+/// Edits a text.
+pub fn edit_text(text: &str, edits: &[TextEdit]) -> String {
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    for edit in edits {
+        let count = lines.len().max(1);
+        let place = |at: u16| usize::from(at) % count;
+        match edit {
+            TextEdit::Word(line, word, by) => {
+                let by = WORDS[usize::from(*by) % WORDS.len()];
+                replace(&mut lines, place(*line), *word, by);
+            }
+            TextEdit::Number(line, word, by) => {
+                let number = match by {
+                    Number::Float(_) => format!("{:e}", by.f64()),
+                    _ => (by.bits() as i64).to_string(),
+                };
+                replace(&mut lines, place(*line), *word, &number);
+            }
+            TextEdit::Line(at, word) => {
+                lines.insert(
+                    place(*at),
+                    WORDS[usize::from(*word) % WORDS.len()].to_owned(),
+                );
+            }
+            TextEdit::RemoveLine(at) if !lines.is_empty() => {
+                lines.remove(place(*at));
+            }
+            TextEdit::RepeatLine(at) if !lines.is_empty() => {
+                let at = place(*at);
+                lines.insert(at, lines[at].clone());
+            }
+            TextEdit::SwapLines(one, two) if !lines.is_empty() => {
+                lines.swap(place(*one), place(*two))
+            }
+            TextEdit::Bytes(edit) => {
+                let mut bytes = lines.join("\n").into_bytes();
+                edit_bytes(&mut bytes, std::slice::from_ref(edit));
+                lines = String::from_utf8_lossy(&bytes)
+                    .lines()
+                    .map(str::to_owned)
+                    .collect();
+            }
+            TextEdit::RemoveLine(_) | TextEdit::RepeatLine(_) | TextEdit::SwapLines(..) => {}
+        }
+    }
+    lines.join("\n") + "\n"
+}
+
+/// Replaces a word of a line: what lies between separators.
+fn replace(lines: &mut [String], line: usize, word: u8, by: &str) {
+    let Some(line) = lines.get_mut(line) else {
+        return;
+    };
+    let is_separator = |c: char| c.is_whitespace() || ",=[]{}\"".contains(c);
+    let words: Vec<&str> = line
+        .split(is_separator)
+        .filter(|word| !word.is_empty())
+        .collect();
+    if let Some(chosen) = words.get(usize::from(word) % words.len().max(1)) {
+        // The words are slices of the line.
+        let start = chosen.as_ptr() as usize - line.as_ptr() as usize;
+        let end = start + chosen.len();
+        line.replace_range(start..end, by);
+    }
+}

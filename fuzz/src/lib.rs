@@ -1,0 +1,122 @@
+//! Fuzzing of everything that Gyre reads. A test in `tests/` is a target; each generates edits of small valid inputs and asserts of
+//! every input that
+//!
+//! - nothing panics,
+//! - memory stays within the target's limit,
+//! - what is refused is refused in one sentence.
+//!
+//! `cargo test` runs each target for a second. For longer, by name, one at a time:
+//!
+//! ```sh
+//! BOLERO_RANDOM_TEST_TIME_MS=600000 cargo test --release -p gyre-fuzz -- --nocapture pixels
+//! ```
+//!
+//! A failure prints the edits, shrunk, and the seed that repeats it. It becomes a test of the crate that was at fault.
+//!
+//! - [`edit`]: edits of bytes and texts;
+//! - [`recording`]: small recordings of all formats;
+//! - [`Target`]: executes inputs.
+
+pub mod edit;
+pub mod recording;
+
+use std::{
+    error::Error,
+    fmt::Display,
+    io::Write,
+    sync::{Mutex, MutexGuard, PoisonError},
+};
+
+use peak_alloc::PeakAlloc;
+
+#[global_allocator]
+static MEMORY: PeakAlloc = PeakAlloc;
+
+/// Targets run one at a time, since memory is counted for the whole process.
+static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+
+/// The longest sentence, bytes. Paths of temporary files are part of it.
+const LONGEST_SENTENCE: usize = 1000;
+
+/// A target that is being fuzzed.
+pub struct Target {
+    name: &'static str,
+    limit_bytes: usize,
+    counts: Mutex<Counts>,
+    _alone: MutexGuard<'static, ()>,
+}
+
+/// What became of the inputs.
+#[derive(Default)]
+struct Counts {
+    executed: u64,
+    refused: u64,
+    peak_bytes: usize,
+}
+
+impl Target {
+    /// Starts a target whose inputs may each take this much memory, MB.
+    pub fn new(name: &'static str, limit_mb: usize) -> Self {
+        Self {
+            name,
+            limit_bytes: limit_mb << 20,
+            counts: Mutex::default(),
+            _alone: ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner),
+        }
+    }
+
+    /// Executes one input.
+    pub fn run<E: Display>(&self, execute: impl FnOnce() -> Result<(), E>) {
+        let before = MEMORY.current_usage();
+        MEMORY.reset_peak_usage();
+        let result = execute();
+        let peak_bytes = MEMORY.peak_usage().saturating_sub(before);
+        let mut counts = self.counts.lock().unwrap_or_else(PoisonError::into_inner);
+        counts.executed += 1;
+        counts.peak_bytes = counts.peak_bytes.max(peak_bytes);
+        assert!(
+            peak_bytes <= self.limit_bytes,
+            "{peak_bytes} bytes of memory, more than {}",
+            self.limit_bytes
+        );
+        if let Err(error) = result {
+            counts.refused += 1;
+            assert_sentence(&error);
+        }
+    }
+}
+
+impl Drop for Target {
+    fn drop(&mut self) {
+        let Counts {
+            executed,
+            refused,
+            peak_bytes,
+        } = *self.counts.lock().unwrap_or_else(PoisonError::into_inner);
+        let _ = writeln!(
+            std::io::stderr(),
+            "{}: {executed} inputs, {refused} refused, {:.1} MB of memory at most",
+            self.name,
+            peak_bytes as f64 / 1e6
+        );
+    }
+}
+
+/// Any error.
+pub type Failure = Box<dyn Error + Send + Sync>;
+
+/// Asserts that an error is one sentence for a person: one line that is not too long, without the marks of a debugging format.
+pub fn assert_sentence(error: &impl Display) {
+    let text = error.to_string();
+    assert!(!text.trim().is_empty(), "an empty error");
+    assert!(
+        text.len() <= LONGEST_SENTENCE,
+        "{} bytes: {text:.200}",
+        text.len()
+    );
+    // Other control characters of names and words are replaced where the sentence is printed.
+    assert!(!text.contains(['\n', '\r']), "{text:?}");
+    for mark in ["Some(", "None", "Ok(", "Err(", " { "] {
+        assert!(!text.contains(mark), "{text}");
+    }
+}

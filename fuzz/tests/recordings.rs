@@ -1,0 +1,277 @@
+//! Recordings: the metadata in the pixels, the image files, the lists beside them.
+
+use std::{fs, path::Path};
+
+use bolero::{TypeGenerator, check};
+use gyre_fuzz::{
+    Failure, Target,
+    edit::{ByteEdit, Number, TextEdit, edit_bytes, edit_text},
+    recording::{Recording, write},
+};
+use gyre_radar::{DatasetOptions, Format, OwnedScan, inspect, open};
+
+/// An edit of a row's metadata, or of its pixels.
+#[derive(Clone, Debug, TypeGenerator)]
+enum RowEdit {
+    /// The stamp: a number, in place of the one that is there or added to it.
+    Stamp(u8, Number, bool),
+    /// The encoder count.
+    Count(u8, u16),
+    /// The encoder counts of all rows from this one on, shifted.
+    CountsFrom(u8, u16),
+    /// The flags.
+    Flags(u8, u8),
+    /// All rows alike.
+    Copy(u8),
+    /// Any pixel.
+    Pixel(u16, u8),
+}
+
+fn edit_rows(pixels: &mut [u8], width: usize, edits: &[RowEdit]) {
+    let rows = pixels.len() / width;
+    let row = |index: u8| usize::from(index) % rows * width;
+    let count = |pixels: &[u8], at: usize| u16::from_le_bytes([pixels[at + 8], pixels[at + 9]]);
+    for edit in edits {
+        match *edit {
+            RowEdit::Stamp(index, number, add) => {
+                let stamp = &mut pixels[row(index)..][..8];
+                let there = u64::from_le_bytes(stamp.try_into().unwrap());
+                let by = number.bits();
+                stamp.copy_from_slice(&if add { there.wrapping_add(by) } else { by }.to_le_bytes());
+            }
+            RowEdit::Count(index, count) => {
+                pixels[row(index) + 8..][..2].copy_from_slice(&count.to_le_bytes());
+            }
+            RowEdit::CountsFrom(index, by) => {
+                for at in (row(index)..pixels.len()).step_by(width) {
+                    let shifted = count(pixels, at).wrapping_add(by).to_le_bytes();
+                    pixels[at + 8..][..2].copy_from_slice(&shifted);
+                }
+            }
+            RowEdit::Flags(index, flags) => pixels[row(index) + 10] = flags,
+            RowEdit::Copy(index) => {
+                let metadata = pixels[row(index)..][..11].to_vec();
+                pixels
+                    .chunks_exact_mut(width)
+                    .for_each(|row| row[..11].copy_from_slice(&metadata));
+            }
+            RowEdit::Pixel(at, value) => {
+                let at = usize::from(at) % pixels.len();
+                pixels[at] = value;
+            }
+        }
+    }
+}
+
+/// Opens a recording, reads all scans and inspects it. What it accepts must be consistent.
+fn use_recording(root: &Path, options: &DatasetOptions) -> Result<(), Failure> {
+    let mut dataset = open(root, options)?;
+    let mut refused = None;
+    let mut scan = OwnedScan::with_limits(dataset.limits());
+    for index in 0..dataset.len() {
+        match dataset.read(index, scan.slot()) {
+            Ok(geometry) => {
+                scan.geometry = geometry;
+                let view = scan.view();
+                view.check()
+                    .unwrap_or_else(|error| panic!("accepted, but {error}"));
+                assert!(view.azimuth_rad.iter().all(|azimuth| azimuth.is_finite()));
+            }
+            Err(error) => refused = Some(error),
+        }
+        dataset.nominal_stamp_ns(index);
+        dataset.logged_stamp_ns(index);
+    }
+    let report = inspect(root, options, None)?;
+    assert!(!report.to_string().is_empty());
+    match refused {
+        Some(error) => Err(error.into()),
+        None => Ok(()),
+    }
+}
+
+/// A format, by its index, and whether it is named.
+#[derive(Clone, Copy, Debug, TypeGenerator)]
+struct Chosen {
+    format: u8,
+    named: bool,
+}
+
+impl Chosen {
+    fn recording(self) -> Recording {
+        Recording::of(Format::ALL[usize::from(self.format) % Format::ALL.len()])
+    }
+
+    fn options(self) -> DatasetOptions {
+        DatasetOptions {
+            format: self.named.then(|| self.recording().format),
+            ..DatasetOptions::default()
+        }
+    }
+}
+
+#[test]
+fn pixels() {
+    let target = Target::new("pixels", 64);
+    check!()
+        .with_type::<(Chosen, u8, Vec<RowEdit>)>()
+        .for_each(|(chosen, image, edits)| {
+            let (folder, mut recording) = (folder(), chosen.recording());
+            let count = recording.images.len();
+            let image = &mut recording.images[usize::from(*image) % count];
+            edit_rows(&mut image.pixels, image.width, edits);
+            recording.write(folder.path()).unwrap();
+            target.run(|| use_recording(folder.path(), &chosen.options()));
+        });
+}
+
+/// An edit of a PNG file. All but `Bytes` leave the checksums right.
+#[derive(Clone, Debug, TypeGenerator)]
+enum FileEdit {
+    Bytes(Vec<ByteEdit>),
+    /// Edits of the bytes, and of the checksums of all chunks that are still there.
+    Checked(Vec<ByteEdit>),
+    Width(u32),
+    Height(u32),
+    /// Bit depth, colour, compression, filter, interlace.
+    Header(u8, u8),
+    /// A chunk of this name and length before the image data; its content is shorter.
+    Chunk([u8; 4], u32, u8),
+}
+
+fn edit_file(file: &mut Vec<u8>, edit: &FileEdit) {
+    match edit {
+        FileEdit::Bytes(edits) => return edit_bytes(file, edits),
+        FileEdit::Checked(edits) => edit_bytes(file, edits),
+        FileEdit::Width(width) => set(file, 16, &width.to_be_bytes()),
+        FileEdit::Height(height) => set(file, 20, &height.to_be_bytes()),
+        FileEdit::Header(at, value) => set(file, 24 + usize::from(at % 5), &[*value]),
+        FileEdit::Chunk(name, length, content) if file.len() > 33 => {
+            let chunk = [
+                &length.to_be_bytes()[..],
+                name,
+                &vec![7; usize::from(*content) + 4],
+            ]
+            .concat();
+            file.splice(33..33, chunk);
+        }
+        FileEdit::Chunk(..) => {}
+    }
+    mend_checksums(file);
+}
+
+fn set(file: &mut [u8], at: usize, bytes: &[u8]) {
+    file.iter_mut()
+        .skip(at)
+        .zip(bytes)
+        .for_each(|(to, from)| *to = *from);
+}
+
+fn mend_checksums(file: &mut [u8]) {
+    let mut at = 8;
+    while let Some(length) = file.get(at..at + 4) {
+        let length = u32::from_be_bytes(length.try_into().unwrap()) as usize;
+        let Some(content) = file.get(at + 4..at.saturating_add(8).saturating_add(length)) else {
+            return;
+        };
+        let checksum = crc32fast::hash(content).to_be_bytes();
+        set(file, at + 8 + length, &checksum);
+        at += 12 + length;
+    }
+}
+
+#[test]
+fn image_files() {
+    let target = Target::new("image_files", 96);
+    check!()
+        .with_type::<(Chosen, bool, Vec<FileEdit>)>()
+        .for_each(|(chosen, all, edits)| {
+            let (folder, recording) = (folder(), chosen.recording());
+            recording.write(folder.path()).unwrap();
+            for image in recording.images.iter().take(if *all { 3 } else { 1 }) {
+                let mut file = image.png();
+                edits.iter().for_each(|edit| edit_file(&mut file, edit));
+                write(folder.path(), &image.name, &file).unwrap();
+            }
+            target.run(|| use_recording(folder.path(), &chosen.options()));
+        });
+}
+
+/// An edit of what lies in a recording's folder beside the pixels.
+#[derive(Clone, Debug, TypeGenerator)]
+enum FolderEdit {
+    Text(u8, Vec<TextEdit>),
+    /// The number in the name of an image.
+    Name(u8, Number),
+    /// Added to the number in the name of an image.
+    Shift(u8, i32),
+    Remove(u8),
+}
+
+#[test]
+fn lists_and_names() {
+    let target = Target::new("lists_and_names", 64);
+    check!()
+        .with_type::<(Chosen, Vec<FolderEdit>)>()
+        .for_each(|(chosen, edits)| {
+            let (folder, mut recording) = (folder(), chosen.recording());
+            for edit in edits {
+                edit_folder(&mut recording, edit);
+            }
+            recording.write(folder.path()).unwrap();
+            target.run(|| use_recording(folder.path(), &chosen.options()));
+        });
+}
+
+fn edit_folder(recording: &mut Recording, edit: &FolderEdit) {
+    let images = recording.images.len();
+    let mut rename = |index: u8, number: &dyn Fn(i64) -> i64| {
+        if images > 0 {
+            let name = &mut recording.images[usize::from(index) % images].name;
+            let (folder, file) = name.rsplit_once('/').unwrap();
+            let there = file.trim_end_matches(".png").parse().unwrap_or(0);
+            *name = format!("{folder}/{}.png", number(there));
+        }
+    };
+    match edit {
+        FolderEdit::Name(index, number) => rename(*index, &|_| number.bits() as i64),
+        FolderEdit::Shift(index, by) => {
+            rename(*index, &|there| there.wrapping_add(i64::from(*by) * 1000))
+        }
+        FolderEdit::Remove(index) if images > 0 => {
+            recording.images.remove(usize::from(*index) % images);
+        }
+        FolderEdit::Remove(_) => {}
+        FolderEdit::Text(index, edits) => {
+            let texts = recording.texts.len();
+            let (_, text) = &mut recording.texts[usize::from(*index) % texts];
+            *text = edit_text(text, edits);
+        }
+    }
+}
+
+/// A folder in memory, where there is one.
+pub fn folder() -> tempfile::TempDir {
+    let memory = Path::new("/dev/shm");
+    let parent = if memory.is_dir() {
+        memory.to_owned()
+    } else {
+        std::env::temp_dir()
+    };
+    tempfile::Builder::new()
+        .prefix("fuzz-")
+        .tempdir_in(parent)
+        .unwrap()
+}
+
+#[test]
+fn a_recording_without_edits_is_accepted_in_every_format() {
+    for format in 0..Format::ALL.len() as u8 {
+        for named in [true, false] {
+            let (folder, chosen) = (folder(), Chosen { format, named });
+            chosen.recording().write(folder.path()).unwrap();
+            use_recording(folder.path(), &chosen.options()).unwrap();
+            assert!(fs::read_dir(folder.path()).unwrap().count() > 0);
+        }
+    }
+}
