@@ -1,8 +1,8 @@
 //! Gyre's own files, which another version, a bad disk or another program may have changed: the journal and the refinement's map.
 
-use std::fs;
+use std::{collections::BTreeSet, fs, path::Path};
 
-use bolero::check;
+use bolero::{TypeGenerator, check};
 use gyre_fuzz::{
     Failure, Target,
     edit::{ByteEdit, Number, edit_bytes},
@@ -15,49 +15,81 @@ use gyre_scan_matching::{RefinementConfig, Refiner};
 
 use crate::recordings::folder;
 
-const JOURNAL_MAGIC: usize = 16;
+const MAGIC: usize = 16;
+/// A pose, a word, a checksum.
 const RECORD: usize = size_of::<PoseHeader>() + 8;
+
+/// An edit of a file of records with checksums.
+#[derive(Clone, Debug, TypeGenerator)]
+enum Edit {
+    Bytes(ByteEdit),
+    /// A word of a record, whose checksum is mended.
+    Word(u8, u16, Number),
+}
+
+fn pose(seq: u64) -> PoseHeader {
+    PoseHeader {
+        item: Item {
+            seq,
+            ..Item::default()
+        },
+        ..PoseHeader::default()
+    }
+}
+
+/// Checks a journal, cuts what is torn, and goes on.
+fn use_journal(file: &Path) -> Result<(), Failure> {
+    let content = journal::check(file)?;
+    if content.torn > 0 {
+        journal::cut(file, content.poses + u64::from(content.ended))?;
+    }
+    let mut journal = Journal::open(file)?;
+    let (last, ended) = journal.last(3)?;
+    assert_eq!(ended, content.ended);
+    assert_eq!(last.len() as u64, content.poses.min(3));
+    if !ended {
+        journal.append(&pose(content.poses))?;
+        drop(journal);
+        assert_eq!(journal::check(file)?.poses, content.poses + 1);
+    }
+    for pose in journal::records(file)?.into_iter().flatten() {
+        pose?;
+    }
+    Ok(())
+}
 
 #[test]
 fn journals() {
     let (target, folder) = (Target::new("journals", 16), folder());
     let file = journal::path(folder.path());
-    let (mut journal, _) = Journal::open(&file).unwrap();
-    for seq in 0..4 {
-        let item = Item {
-            seq,
-            ..Item::default()
-        };
-        let pose = PoseHeader {
-            item,
-            ..PoseHeader::default()
-        };
-        journal.append(&pose).unwrap();
-    }
+    let mut journal = Journal::open(&file).unwrap();
+    (0..4).for_each(|seq| journal.append(&pose(seq)).unwrap());
     drop(journal);
     let valid = fs::read(&file).unwrap();
-    check!()
-        .with_type::<(bool, Vec<ByteEdit>)>()
-        .for_each(|(checked, edits)| {
-            let mut bytes = valid.clone();
-            edit_bytes(&mut bytes, edits);
-            if *checked {
-                let records = bytes.get_mut(JOURNAL_MAGIC..).unwrap_or_default();
-                for record in records.chunks_exact_mut(RECORD) {
-                    let (pose, check) = record.split_at_mut(RECORD - 8);
-                    check.copy_from_slice(&u64::from(crc32fast::hash(pose)).to_le_bytes());
+    assert_eq!(valid.len(), MAGIC + 4 * RECORD);
+    use_journal(&file).unwrap();
+    check!().with_type::<Vec<Edit>>().for_each(|edits| {
+        let mut bytes = valid.clone();
+        for edit in edits {
+            match edit {
+                Edit::Bytes(edit) => edit_bytes(&mut bytes, std::slice::from_ref(edit)),
+                Edit::Word(index, at, number) => {
+                    let record = bytes.get_mut(MAGIC..).unwrap_or_default();
+                    let record = record.chunks_exact_mut(RECORD).nth(usize::from(index % 5));
+                    let Some((content, check)) =
+                        record.map(|record| record.split_at_mut(RECORD - 4))
+                    else {
+                        continue;
+                    };
+                    let at = usize::from(*at) % (content.len() - 8);
+                    content[at..at + 8].copy_from_slice(&number.bits().to_le_bytes());
+                    check.copy_from_slice(&crc32fast::hash(content).to_le_bytes());
                 }
             }
-            fs::write(&file, bytes).unwrap();
-            target.run(|| -> Result<(), Failure> {
-                let read = journal::read(&file)?.len();
-                let (mut journal, records) = Journal::open(&file)?;
-                assert_eq!(read, records.len());
-                journal.append(&PoseHeader::default())?;
-                assert_eq!(journal::read(&file)?.len(), read + 1);
-                Ok(())
-            });
-        });
+        }
+        fs::write(&file, bytes).unwrap();
+        target.run(|| use_journal(&file));
+    });
 }
 
 const POINTS: usize = 40;
@@ -79,54 +111,78 @@ fn points() -> Vec<SparsePoint> {
     (0..POINTS).map(point).collect()
 }
 
+/// Restores the state after the last item, and refines one more.
+fn use_map(file: &Path) -> Result<(), Failure> {
+    let mut refiner = Refiner::new(&config(), POINTS)?;
+    let cells = refiner.keyframe_cells();
+    let mut checkpoint = Checkpoint::open(file, 4, config().keyframes, cells)?;
+    checkpoint.newest_known(&[pose(3), pose(2)])?;
+    checkpoint.restore(3, &mut refiner)?;
+    let points = points();
+    refiner.refine(4, &points, &points, &Pose::translation(2.0, 0.0), 0.25);
+    Ok(checkpoint.write(4, 0, &refiner)?)
+}
+
 #[test]
 fn refinement_maps() {
     let (target, folder) = (Target::new("refinement_maps", 96), folder());
     let file = checkpoint::path(folder.path());
-    let refiner = || Refiner::new(&config(), POINTS).unwrap();
-    let mut drive = refiner();
-    let open = |cells| Checkpoint::open(&file, 4, config().keyframes, cells);
+    let mut drive = Refiner::new(&config(), POINTS).unwrap();
     let cells = drive.keyframe_cells();
-    let (mut checkpoint, points) = (open(cells).unwrap(), points());
-    let motion = Pose::translation(2.0, 0.0);
+    let mut checkpoint = Checkpoint::open(&file, 4, config().keyframes, cells).unwrap();
+    let (points, motion) = (points(), Pose::translation(2.0, 0.0));
     for item in 0..4 {
         drive.refine(item, &points, &points, &motion, 0.25);
-        checkpoint.write(item, &drive).unwrap();
+        checkpoint.write(item, 0, &drive).unwrap();
     }
     drop(checkpoint);
     let valid = fs::read(&file).unwrap();
-    let slot = 80 + cells;
-    let states = valid.len() - slot * ((valid.len() - 20_000) / slot);
-    check!()
-        .with_type::<(Vec<ByteEdit>, Vec<(u16, u8, Number)>)>()
-        .for_each(|(edits, words)| {
-            let mut bytes = valid.clone();
-            edit_bytes(&mut bytes, edits);
-            words.iter().for_each(|(at, word, number)| {
-                edit_slot(&mut bytes, usize::from(*at), *word, *number)
-            });
-            fs::write(&file, bytes).unwrap();
-            target.run(|| -> Result<(), Failure> {
-                let mut restored = refiner();
-                let mut checkpoint = open(restored.keyframe_cells())?;
-                checkpoint.restore(3, &mut restored)?;
-                restored.refine(4, &points, &points, &motion, 0.25);
-                Ok(checkpoint.write(4, &restored)?)
-            });
-        });
-    assert!(states < valid.len());
+    let slots = slots(&valid);
+    use_map(&file).unwrap();
+    check!().with_type::<Vec<Edit>>().for_each(|edits| {
+        let mut bytes = valid.clone();
+        for edit in edits {
+            match edit {
+                Edit::Bytes(edit) => edit_bytes(&mut bytes, std::slice::from_ref(edit)),
+                Edit::Word(index, at, number) => {
+                    let slot = slots[usize::from(*index) % slots.len()].clone();
+                    let slot = bytes.get_mut(slot).unwrap_or_default();
+                    let words = slot.len() / 8;
+                    if words > 1 {
+                        // The first words say most; the others are cells.
+                        let at = 8 * (1 + usize::from(*at) % (words - 1).min(60));
+                        slot[at..at + 8].copy_from_slice(&number.bits().to_le_bytes());
+                        let checksum = 1 << 32 | u64::from(crc32fast::hash(&slot[8..]));
+                        slot[..8].copy_from_slice(&checksum.to_le_bytes());
+                    }
+                }
+            }
+        }
+        fs::write(&file, bytes).unwrap();
+        target.run(|| use_map(&file));
+    });
 }
 
-/// Changes a word of a slot and mends its checksum: the map's layout is a header of 40 bytes, slots of states of 30 words each, then
-/// slots of keyframes.
-fn edit_slot(bytes: &mut [u8], state: usize, word: u8, number: Number) {
-    const STATE: usize = 30 * 8;
-    let start = 40 + state % 8 * STATE;
-    let Some(slot) = bytes.get_mut(start..start + STATE) else {
-        return;
-    };
-    let at = 8 + usize::from(word) % 29 * 8;
-    slot[at..at + 8].copy_from_slice(&number.bits().to_le_bytes());
-    let checksum = 1 << 32 | u64::from(crc32fast::hash(&slot[8..]));
-    slot[..8].copy_from_slice(&checksum.to_le_bytes());
+/// The slots that hold something. The file's header has, after 16 bytes, the numbers of slots of states and of keyframes, and the
+/// bytes of each.
+fn slots(file: &[u8]) -> Vec<std::ops::Range<usize>> {
+    let number =
+        |k: usize| u64::from_le_bytes(file[MAGIC + 8 * k..][..8].try_into().unwrap()) as usize;
+    let [states, keyframes, state, keyframe] = [0, 1, 2, 3].map(number);
+    let header = MAGIC + 4 * 8;
+    let state_slots = (0..states).map(|k| header + k * state..header + (k + 1) * state);
+    let first = header + states * state;
+    let keyframe_slots = (0..keyframes).map(|k| first + k * keyframe..first + (k + 1) * keyframe);
+    let slots = state_slots
+        .chain(keyframe_slots)
+        .filter(|slot| slot.end <= file.len());
+    let slots: Vec<_> = slots
+        .filter(|slot| file[slot.start..slot.start + 8] != [0; 8])
+        .collect();
+    let starts: BTreeSet<usize> = slots.iter().map(|slot| slot.start).collect();
+    assert!(
+        starts.range(first..).count() > 0 && starts.range(..first).count() == 4,
+        "{starts:?}"
+    );
+    slots
 }

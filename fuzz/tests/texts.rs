@@ -154,8 +154,7 @@ fn odometry_files() {
             1_549_986_607_000_000_000 + seq
         )
     });
-    let header = odometry::csv(&[]);
-    let text = header + &row(1) + &row(2) + &row(3);
+    let text = odometry::HEADER.to_owned() + &row(1) + &row(2) + &row(3);
     let file = folder.path().join("odometry.csv");
     fs::write(&file, &text).unwrap();
     assert_eq!(odometry::read(&file).unwrap().len(), 3);

@@ -43,6 +43,8 @@ pub fn check(path: &Path) -> Result<Content, JournalError> {
     while let Some(place) = places.read() {
         let index = places.next - 1;
         match (place?, first_invalid) {
+            // Nothing follows the end of the stream.
+            (Some(_), None) if ended => first_invalid = Some(index),
             (Some(record), None) => {
                 valid += 1;
                 ended = record.pose.item.is(flag::END);

@@ -87,6 +87,22 @@ fn the_end_of_the_stream_is_no_pose() {
 }
 
 #[test]
+fn what_follows_the_end_of_the_stream_is_cut_off() {
+    let (_folder, path) = journal_of(2);
+    let mut journal = Journal::open(&path).unwrap();
+    let mut end = pose(2);
+    end.item.flags = flag::END;
+    journal.append(&end).unwrap();
+    (3..5).for_each(|seq| journal.append(&pose(seq)).unwrap());
+    drop(journal);
+    let content = check(&path).unwrap();
+    assert_eq!((content.poses, content.ended, content.torn), (2, true, 2));
+    cut(&path, 3).unwrap();
+    let (last, ended) = Journal::open(&path).unwrap().last(9).unwrap();
+    assert_eq!((seqs(&last), ended), (vec![0, 1], true));
+}
+
+#[test]
 fn a_journal_that_does_not_exist_is_empty() {
     let folder = tempfile::tempdir().unwrap();
     let content = check(&path(folder.path())).unwrap();

@@ -162,7 +162,7 @@ pub fn shift(samples: &[u16], by: f32, out: &mut [u16]) {
         .get(from..)
         .unwrap_or_default()
         .iter()
-        .zip(samples.get(from + 1..).unwrap_or_default());
+        .zip(samples.get(from.saturating_add(1)..).unwrap_or_default());
     for (out, (&near, &far)) in out
         .get_mut(first..)
         .unwrap_or_default()
@@ -247,6 +247,15 @@ mod tests {
                 // The share is a multiple of 1/256.
                 prop_assert!((f32::from(got) - expected).abs() <= 1.0 + 65280.0 / 255.0, "{column}: {got} for {expected}");
             }
+        }
+    }
+
+    #[test]
+    fn samples_that_are_shifted_beyond_every_range_are_gone() {
+        for by in [1e30, -1e30, f32::MAX, f32::MIN] {
+            let mut out = [1; 4];
+            shift(&[7; 4], by, &mut out);
+            assert_eq!(out, [0; 4], "{by}");
         }
     }
 
