@@ -410,7 +410,7 @@ impl ExhaustiveSearch {
 impl Turned {
     /// g'(x) = g(R x + o), so that f(x) ~ g'(x + R^T (t - o)); and its energy if the normalisation needs it.
     fn turn(&mut self, earlier: &[f32], n: usize, angle_rad: f64, offset: f64, overlap: Overlap) {
-        let rotation = Rotation::new(n, angle_rad).with_offset(offset);
+        let rotation = Rotation::new(n, angle_rad).with_offset([offset; 2]);
         self.raster
             .chunks_exact_mut(n)
             .enumerate()

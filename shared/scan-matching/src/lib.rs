@@ -13,6 +13,8 @@
 //!   normalises them;
 //! - `exhaustive`: [`ExhaustiveSearch`], all three unknowns at once, angle by angle; `correlate`: its transforms;
 //! - `refinement`: [`Refiner`], the motion to a fraction of a cell, against a map of the last keyframes;
+//! - `submap`: [`Submap`], the points around a keyframe, for places that are visited again; [`KeyframeAligner`] and
+//!   `masked_correlation`, [`MaskedCorrelation`], register two of them;
 //! - `peak`: maxima between samples; `covariance`: covariances from the shapes of peaks; `whiten`: phase-only
 //!   correlation; `kernels`: inner loops.
 //!
@@ -53,6 +55,7 @@ mod covariance;
 mod exhaustive;
 mod fft;
 mod kernels;
+mod masked_correlation;
 mod overlap;
 mod peak;
 mod polar;
@@ -61,6 +64,7 @@ mod rotation;
 mod scores;
 mod sequential;
 mod spectrum;
+mod submap;
 mod taper;
 mod translation;
 mod warp;
@@ -73,13 +77,16 @@ pub use config::{
 };
 pub use exhaustive::{ExhaustiveConfig, ExhaustiveSearch, JointMatch};
 pub use fft::fast_size;
+pub use masked_correlation::MaskedCorrelation;
+pub use peak::{LinePeak, line_peak};
 pub use refinement::{
-    Anchor, InitialGuess, Keyframe, Outcome, Refined, RefinementConfig, RefinementKind, Refiner,
-    TrackerState,
+    Anchor, InitialGuess, Keyframe, KeyframeAligner, Outcome, Refined, RefinementConfig,
+    RefinementKind, Refiner, TrackerState,
 };
 pub use rotation::{RotationMatch, RotationRunnerUp, RotationSearch};
 pub use sequential::SequentialRotation;
 pub use spectrum::PolarSpectrum;
+pub use submap::Submap;
 pub use translation::{MotionMatch, MotionRunnerUp, TranslationSearch};
 
 /// A raster or a spectrum that does not fit the search.

@@ -18,7 +18,7 @@ const PEDESTAL_MARGIN: f64 = 0.05;
 
 /// Maximum along one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct LinePeak {
+pub struct LinePeak {
     /// Position, in samples from the highest one.
     pub offset: f64,
     /// Fitted height.
@@ -39,7 +39,7 @@ pub(crate) struct PlanePeak {
 }
 
 /// The maximum next to the highest sample, `sample(0)`, of a line.
-pub(crate) fn line_peak(kind: Peak, sample: impl Fn(isize) -> f64) -> LinePeak {
+pub fn line_peak(kind: Peak, sample: impl Fn(isize) -> f64) -> LinePeak {
     let near = [sample(-1), sample(0), sample(1)];
     if kind == Peak::Parabola {
         return line_parabola(near);

@@ -10,10 +10,12 @@
 //! - `local_map`, `map_level`: the keyframes, and the two rasters that points are aligned with;
 //! - `alignment`, `normal_equations`: Levenberg-Marquardt;
 //! - `tracker`: the last poses, what is predicted from them, and which poses a vehicle can have reached;
-//! - `uncertainty`: covariances.
+//! - `uncertainty`: covariances;
+//! - [`KeyframeAligner`]: the same alignment for two keyframes of one place that are far apart in time.
 
 mod alignment;
 mod config;
+mod keyframe_aligner;
 mod local_map;
 mod map_level;
 mod normal_equations;
@@ -24,13 +26,14 @@ mod uncertainty;
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion};
 
 pub use config::{RefinementConfig, RefinementKind};
+pub use keyframe_aligner::KeyframeAligner;
 pub use local_map::Keyframe;
 pub use tracker::{Anchor, TrackerState};
 
 use crate::ConfigError;
 use alignment::{Alignment, align};
 use local_map::LocalMap;
-use points::DeskewedPoints;
+pub(crate) use points::DeskewedPoints;
 
 const COARSE_ITERATIONS: usize = 10;
 const FINE_ITERATIONS: usize = 6;

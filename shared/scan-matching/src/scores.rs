@@ -156,13 +156,8 @@ impl Scores {
     }
 }
 
-/// The largest shift of a search over rasters of `n` x `n` cells of `cell_m` metres, cells.
-pub(crate) fn reach_cells(
-    n: usize,
-    cell_m: f64,
-    section: &'static str,
-    reach_m: f64,
-) -> Result<usize, ConfigError> {
+/// Checks the size of rasters of `n` x `n` cells of `cell_m` metres.
+pub(crate) fn check_raster(n: usize, cell_m: f64) -> Result<(), ConfigError> {
     accept(
         (16..=8192).contains(&n),
         "raster",
@@ -176,7 +171,17 @@ pub(crate) fn reach_cells(
         "cell_m",
         &cell_m,
         "metres, above 0",
-    )?;
+    )
+}
+
+/// The largest shift of a search over rasters of `n` x `n` cells of `cell_m` metres, cells.
+pub(crate) fn reach_cells(
+    n: usize,
+    cell_m: f64,
+    section: &'static str,
+    reach_m: f64,
+) -> Result<usize, ConfigError> {
+    check_raster(n, cell_m)?;
     let reach = (reach_m / cell_m + 1e-9).floor();
     let fits = reach >= 1.0 && reach <= (n / 2 - SUPPORT) as f64;
     accept(

@@ -1,13 +1,13 @@
-//! Rotation of a raster about the sensor.
+//! Rotation and translation of a raster.
 
-/// A rotation of rasters of n x n cells about their middle, with bilinear interpolation.
+/// A rotation of rasters of n x n cells about their middle, and a shift, with bilinear interpolation.
 #[derive(Debug, Clone)]
 pub(crate) struct Rotation {
     n: usize,
     cos: f64,
     sin: f64,
     /// Added to the position of each lookup, down and to the right, cells.
-    offset: f64,
+    offset: [f64; 2],
 }
 
 /// The columns of one row whose source lies inside the raster, and that source.
@@ -29,12 +29,12 @@ impl Rotation {
             n,
             cos,
             sin,
-            offset: 0.0,
+            offset: [0.0; 2],
         }
     }
 
     /// This rotation with each lookup `offset` cells farther down and to the right.
-    pub fn with_offset(self, offset: f64) -> Self {
+    pub fn with_offset(self, offset: [f64; 2]) -> Self {
         Self { offset, ..self }
     }
 
@@ -62,8 +62,8 @@ impl Rotation {
         let last = (self.n - 1) as f64;
         let middle = last / 2.0;
         let u = r as f64 - middle;
-        let row = middle + self.offset + self.cos * u + self.sin * middle;
-        let col = middle + self.offset + self.sin * u - self.cos * middle;
+        let row = middle + self.offset[0] + self.cos * u + self.sin * middle;
+        let col = middle + self.offset[1] + self.sin * u - self.cos * middle;
         let (row_step, col_step) = (-self.sin, self.cos);
         let (a, b) = inside(row, row_step, last);
         let (c, d) = inside(col, col_step, last);

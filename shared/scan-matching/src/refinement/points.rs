@@ -1,11 +1,12 @@
 //! Deskewing: a scan's points in the sensor's frame at the scan's stamp.
 
-use gyre_geometry::{SparsePoint, Twist};
+use gyre_geometry::{Pose, SparsePoint, Twist};
 use gyre_simd::simd;
+use nalgebra::Point2;
 
 /// The points of a scan in the sensor's frame at its stamp, as three columns.
 #[derive(Debug, Default)]
-pub(super) struct DeskewedPoints {
+pub(crate) struct DeskewedPoints {
     pub x_m: Vec<f32>,
     pub y_m: Vec<f32>,
     pub weight: Vec<f32>,
@@ -23,7 +24,7 @@ impl DeskewedPoints {
 
     /// Moves each point from the sensor's frame at the point's time to that at the stamp, at constant velocity.
     pub fn deskew(&mut self, points: &[SparsePoint], twist: &Twist) {
-        for column in [&mut self.x_m, &mut self.y_m, &mut self.weight] {
+        for column in self.columns() {
             column.clear();
             column.resize(points.len(), 0.0);
         }
@@ -38,11 +39,30 @@ impl DeskewedPoints {
 
     /// Keeps every `stride`-th point.
     pub fn thin(&mut self, stride: usize) {
-        for column in [&mut self.x_m, &mut self.y_m, &mut self.weight] {
+        for column in self.columns() {
             let count = column.len().div_ceil(stride);
             (0..count).for_each(|k| column[k] = column[k * stride]);
             column.truncate(count);
         }
+    }
+
+    pub fn clear(&mut self) {
+        self.columns().into_iter().for_each(Vec::clear);
+    }
+
+    /// Adds points of another frame that is at `pose` in this one.
+    pub fn extend(&mut self, points: &Self, pose: &Pose) {
+        let places = points.x_m.iter().zip(&points.y_m);
+        for (&x_m, &y_m) in places {
+            let place = pose * Point2::new(f64::from(x_m), f64::from(y_m));
+            self.x_m.push(place.x as f32);
+            self.y_m.push(place.y as f32);
+        }
+        self.weight.extend_from_slice(&points.weight);
+    }
+
+    fn columns(&mut self) -> [&mut Vec<f32>; 3] {
+        [&mut self.x_m, &mut self.y_m, &mut self.weight]
     }
 
     pub fn total_weight(&self) -> f64 {
@@ -103,7 +123,7 @@ fn sin_cos(a: f32) -> (f32, f32) {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Isometry2, Point2, Vector2};
+    use nalgebra::{Isometry2, Vector2};
     use proptest::prelude::*;
 
     use super::*;

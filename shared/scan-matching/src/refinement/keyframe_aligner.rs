@@ -1,0 +1,75 @@
+//! Alignment of two keyframes of the same place, however far apart in time.
+
+use gyre_geometry::{Pose, UncertainMotion};
+
+use super::{
+    COARSE_STRIDE, DeskewedPoints, RefinementConfig, alignment::align, local_map::LocalMap,
+    uncertainty,
+};
+use crate::{ConfigError, Submap};
+
+/// Initial guesses come from a search on coarse cells, so more iterations are allowed than from scan to scan.
+const COARSE_ITERATIONS: usize = 20;
+const FINE_ITERATIONS: usize = 20;
+
+/// Aligns the middle keyframes of two submaps, by the points of these two scans alone.
+///
+/// It is the [`Refiner`](crate::Refiner)'s alignment with a map of one keyframe. The neighbours in the submaps are left out: laid
+/// together by odometry they carry its errors into the result.
+///
+/// Nothing is allocated after construction.
+#[derive(Debug)]
+pub struct KeyframeAligner {
+    config: RefinementConfig,
+    map: LocalMap,
+    /// The points for the coarse map.
+    thinned: DeskewedPoints,
+}
+
+impl KeyframeAligner {
+    /// Plans alignments of scans of at most `capacity` points. Of `config` count the cells and reach of the map, and the scales of the
+    /// covariance.
+    ///
+    /// # Errors
+    /// The first key of `config` that is out of its bounds.
+    pub fn new(config: &RefinementConfig, capacity: usize) -> Result<Self, ConfigError> {
+        let config = RefinementConfig {
+            keyframes: 1,
+            ..config.clone()
+        };
+        config.validate()?;
+        Ok(Self {
+            map: LocalMap::new(&config),
+            config,
+            thinned: DeskewedPoints::with_capacity(capacity),
+        })
+    }
+
+    /// Returns the pose of the later keyframe in the earlier one's frame, from an initial guess; `None` if the points do not
+    /// determine it.
+    pub fn align(
+        &mut self,
+        later: &Submap,
+        earlier: &Submap,
+        initial: &Pose,
+    ) -> Option<UncertainMotion> {
+        self.map.clear();
+        self.map.insert(0, &earlier.keyframe, &Pose::identity());
+        let points = &later.keyframe;
+        self.thinned.clear();
+        self.thinned.extend(points, &Pose::identity());
+        self.thinned.thin(COARSE_STRIDE);
+        let coarse = align(
+            &self.map.coarse(),
+            &self.thinned,
+            initial,
+            COARSE_ITERATIONS,
+        );
+        let fine = align(&self.map.fine(), points, &coarse.pose, FINE_ITERATIONS);
+        let covariance = uncertainty::of_alignment(&fine, points, &Pose::identity(), &self.config)?;
+        Some(UncertainMotion {
+            motion: fine.pose,
+            covariance,
+        })
+    }
+}

@@ -1,0 +1,141 @@
+//! Submaps: the points around a keyframe.
+
+use gyre_geometry::{Pose, SparsePoint, Twist};
+use ndarray::ArrayViewMut2;
+
+use crate::refinement::DeskewedPoints;
+use crate::{ShapeError, expect_shape};
+
+/// The points of a keyframe and of the keyframes around it, in its frame.
+///
+/// Points are deskewed and free of the Doppler shift, so that submaps of opposite passes coincide: with the shift in them they lie a
+/// third of a metre apart. Nothing is allocated for as many points as it is planned for.
+#[derive(Debug, Default)]
+pub struct Submap {
+    /// The points of the keyframe in the middle.
+    pub(crate) keyframe: DeskewedPoints,
+    /// The points of all keyframes.
+    all: DeskewedPoints,
+    /// The points of the keyframe that is being added, in its own frame.
+    added: DeskewedPoints,
+}
+
+impl Submap {
+    /// Plans a submap of at most `points` points in all.
+    pub fn with_capacity(points: usize) -> Self {
+        let points = || DeskewedPoints::with_capacity(points);
+        Self {
+            keyframe: points(),
+            all: points(),
+            added: points(),
+        }
+    }
+
+    /// Starts anew with the keyframe in the middle. `twist` is its velocity during the sweep.
+    pub fn start(&mut self, points: &[SparsePoint], twist: &Twist) {
+        self.keyframe.deskew(points, twist);
+        self.all.clear();
+        self.all.extend(&self.keyframe, &Pose::identity());
+    }
+
+    /// Adds another keyframe at `pose` in the frame of the middle one.
+    pub fn add(&mut self, points: &[SparsePoint], twist: &Twist, pose: &Pose) {
+        self.added.deskew(points, twist);
+        self.all.extend(&self.added, pose);
+    }
+
+    /// Returns the number of points.
+    pub fn len(&self) -> usize {
+        self.all.weight.len()
+    }
+
+    /// Returns whether there is no point.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Draws the submap: each cell of the square `raster`, row 0 far ahead, is the sum of the weights of the points in it, each shared
+    /// bilinearly between four cells of `cell_m` metres. Points outside are left out.
+    ///
+    /// # Errors
+    /// If the raster is not square or not in standard layout.
+    pub fn draw(&self, cell_m: f64, mut raster: ArrayViewMut2<'_, f32>) -> Result<(), ShapeError> {
+        const WHAT: &str = "raster of a submap";
+        let n = raster.nrows();
+        expect_shape(WHAT, raster.dim().into(), [n, n])?;
+        let cells = raster
+            .as_slice_mut()
+            .ok_or(ShapeError::Layout { what: WHAT })?;
+        cells.fill(0.0);
+        let (per_m, middle, last) = (1.0 / cell_m as f32, 0.5 * (n as f32 - 1.0), n as f32 - 1.0);
+        let places = self.all.x_m.iter().zip(&self.all.y_m);
+        for ((x_m, y_m), &weight) in places.zip(&self.all.weight) {
+            let (u, v) = (middle - x_m * per_m, middle - y_m * per_m);
+            // NaN is not inside.
+            if !((0.0..last).contains(&u) && (0.0..last).contains(&v)) {
+                continue;
+            }
+            let (i, j) = (u as usize, v as usize);
+            let (across, along) = (u - i as f32, v - j as f32);
+            let first = i * n + j;
+            cells[first] += weight * (1.0 - across) * (1.0 - along);
+            cells[first + 1] += weight * (1.0 - across) * along;
+            cells[first + n] += weight * across * (1.0 - along);
+            cells[first + n + 1] += weight * across * along;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gyre_geometry::pose;
+    use ndarray::Array2;
+
+    use super::*;
+
+    fn point(x_m: f32, y_m: f32) -> SparsePoint {
+        [x_m, y_m, 0.0, 0.5, 0.0].into()
+    }
+
+    #[test]
+    fn a_point_is_drawn_in_the_frame_of_the_middle_keyframe() {
+        let mut submap = Submap::default();
+        submap.start(&[point(9.0, 9.0)], &Twist::default());
+        let quarter = std::f64::consts::FRAC_PI_2;
+        // A quarter turn to the left, 2 m ahead: what is 3 m ahead there is 2 m ahead and 3 m to the left here.
+        submap.start(&[point(4.0, -1.0)], &Twist::default());
+        submap.add(
+            &[point(3.0, 0.0), point(f32::NAN, 0.0)],
+            &Twist::default(),
+            &pose(2.0, 0.0, quarter),
+        );
+        let mut raster = Array2::from_elem((17, 17), 9.0);
+        assert!(submap.draw(1.0, raster.view_mut()).is_ok());
+        assert_eq!(submap.len(), 3);
+        assert!((raster[[8 - 4, 8 + 1]] - 0.5).abs() < 1e-6);
+        assert!((raster[[8 - 2, 8 - 3]] - 0.5).abs() < 1e-5);
+        assert!((raster.sum() - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn the_doppler_shift_of_opposite_passes_is_removed() {
+        // A wall 20 m ahead is measured 0.42 m too near at 10 m/s; on the way back, behind, 0.42 m too far.
+        let ahead = SparsePoint::from([19.58, 0.0, 0.0, 1.0, 0.042]);
+        let behind = SparsePoint::from([-20.42, 0.0, 0.0, 1.0, 0.042]);
+        let twist = Twist {
+            vx_mps: 10.0,
+            ..Twist::default()
+        };
+        let mut submap = Submap::default();
+        submap.start(&[ahead, behind], &twist);
+        assert!((submap.all.x_m[0] - 20.0).abs() < 1e-5);
+        assert!((submap.all.x_m[1] + 20.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_raster_that_is_not_square_is_refused() {
+        let mut raster = Array2::zeros((4, 5));
+        assert!(Submap::default().draw(1.0, raster.view_mut()).is_err());
+    }
+}
