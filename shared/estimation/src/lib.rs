@@ -5,7 +5,8 @@
 //! - [`Constraint`]: a measurement, in the form that both estimators take; [`Verdict`]: its chi-square test;
 //! - [`TrajectoryFilter`]: the extended Kalman filter of Checchin et al. over the poses of all keyframes, for short trajectories;
 //! - [`PoseGraph`]: sparse least squares, for days of driving and many loops; [`Kernel`]: what it does with wrong loops;
-//! - [`G2o`]: pose graphs as files of other programs.
+//! - [`G2o`]: pose graphs as files of other programs;
+//! - [`places`]: recognises places that are visited again, and measures the loops between them.
 //!
 //! A drive once around a square, whose odometry turns a little too far, and the loop that corrects it:
 //!
@@ -42,6 +43,7 @@ mod filter;
 mod g2o;
 mod graph;
 mod kernel;
+pub mod places;
 mod relative;
 
 pub use constraint::{CHI_SQUARE_99_9, Constraint, Kind, Outcome, Verdict};

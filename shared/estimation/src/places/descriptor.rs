@@ -1,0 +1,132 @@
+//! The descriptor of a place.
+
+use gyre_scan_matching::{Magnitude, PolarSpectrum, RotationConfig, RotationSearch, Submap, Taper};
+use ndarray::{Array2, ArrayView2, ArrayView3};
+use realfft::num_complex::Complex32;
+
+use super::{CELL_M, PLANNED, RASTER_CELLS};
+
+/// Radii of a descriptor.
+pub(super) const RADII: usize = 40;
+/// Harmonics over half a turn that a descriptor keeps, from the first on.
+pub(super) const HARMONICS: usize = 64;
+/// Harmonics whose amplitudes make the sieve, from the first on.
+pub(super) const SIEVE_HARMONICS: usize = 16;
+pub(super) const SPECTRUM_BYTES: usize = RADII * 2 * HARMONICS;
+/// Radii of the spectrum that are added up for each of the descriptor's: the samples of a coarser grid would miss half of the spectrum.
+const FOLD: usize = 2;
+/// Largest amplitude in the sieve, as a share of its radius.
+const SIEVE_FULL: f32 = 0.64;
+
+/// What a submap looks like, whatever its heading: its polar magnitude spectrum over the angle, in harmonics.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Descriptor {
+    /// Radius after radius the real parts of all harmonics, then the imaginary parts.
+    pub(super) spectrum: Vec<i8>,
+    /// Amplitudes, radius after radius.
+    pub(super) sieve: Vec<u8>,
+}
+
+/// Computes descriptors.
+///
+/// Planned once; nothing is allocated afterwards.
+pub struct Describer {
+    search: RotationSearch,
+    raster: Array2<f32>,
+    spectrum: PolarSpectrum,
+    /// The descriptor before it is rounded.
+    exact: Vec<f32>,
+}
+
+impl Default for Descriptor {
+    fn default() -> Self {
+        Self {
+            spectrum: vec![0; SPECTRUM_BYTES],
+            sieve: vec![0; Self::SIEVE_BYTES],
+        }
+    }
+}
+
+impl Descriptor {
+    /// Size of the sieve of a descriptor, bytes.
+    pub const SIEVE_BYTES: usize = RADII * SIEVE_HARMONICS;
+
+    /// Returns the spectrum: radius x (real part, imaginary part) x harmonic.
+    pub fn spectrum(&self) -> ArrayView3<'_, i8> {
+        ArrayView3::from_shape((RADII, 2, HARMONICS), &self.spectrum).expect(PLANNED)
+    }
+
+    /// Returns the sieve, radius x harmonic: amplitudes, which do not depend on the heading.
+    pub fn sieve(&self) -> ArrayView2<'_, u8> {
+        ArrayView2::from_shape((RADII, SIEVE_HARMONICS), &self.sieve).expect(PLANNED)
+    }
+}
+
+impl Default for Describer {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Describer {
+    /// Plans the transforms.
+    pub fn new() -> Self {
+        let config = RotationConfig {
+            // Lengths along the angle are padded fourfold, so that the spectrum's structure is sampled often enough.
+            angles: 4 * HARMONICS,
+            radii: Some(FOLD * RADII),
+            band_low: 0.02,
+            band_high: 0.42,
+            magnitude: Magnitude::Log,
+            window: Taper::RadialHann,
+            ..RotationConfig::default()
+        };
+        let search = RotationSearch::new(RASTER_CELLS, &config).expect("a valid configuration");
+        Self {
+            spectrum: search.new_spectrum(),
+            search,
+            raster: Array2::zeros((RASTER_CELLS, RASTER_CELLS)),
+            exact: vec![0.0; SPECTRUM_BYTES],
+        }
+    }
+
+    /// Computes the descriptor of a submap. That of an empty one is zero, and similar to none.
+    pub fn describe(&mut self, submap: &Submap, out: &mut Descriptor) {
+        submap.draw(CELL_M, self.raster.view_mut()).expect(PLANNED);
+        let raster = self.raster.view();
+        self.search
+            .spectrum(raster, &mut self.spectrum)
+            .expect(PLANNED);
+        self.whiten();
+        for (radius, sieve) in self
+            .exact
+            .chunks_exact(2 * HARMONICS)
+            .zip(out.sieve.chunks_exact_mut(SIEVE_HARMONICS))
+        {
+            let (re, im) = radius.split_at(HARMONICS);
+            for ((sieve, re), im) in sieve.iter_mut().zip(re).zip(im) {
+                *sieve = (re.hypot(*im) / SIEVE_FULL * 255.0) as u8;
+            }
+        }
+        let largest = self.exact.iter().fold(0.0_f32, |max, v| max.max(v.abs()));
+        let scale = if largest > 0.0 { 127.0 / largest } else { 0.0 };
+        for (rounded, exact) in out.spectrum.iter_mut().zip(&self.exact) {
+            *rounded = (scale * exact).round() as i8;
+        }
+    }
+
+    /// Adds up neighbouring radii, and scales each to the same energy.
+    fn whiten(&mut self) {
+        let spectrum = self.spectrum.view();
+        for (r, out) in self.exact.chunks_exact_mut(2 * HARMONICS).enumerate() {
+            for h in 0..HARMONICS {
+                // Harmonic 0 is the mean.
+                let sum: Complex32 = (0..FOLD).map(|k| spectrum[[FOLD * r + k, h + 1]]).sum();
+                (out[h], out[HARMONICS + h]) = (sum.re, sum.im);
+            }
+            let norm = out.iter().map(|v| v * v).sum::<f32>().sqrt();
+            let scale = if norm > 0.0 { norm.recip() } else { 0.0 };
+            out.iter_mut().for_each(|v| *v *= scale);
+        }
+    }
+}

@@ -1,0 +1,334 @@
+//! The descriptors of all places, and the search for similar ones.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use gyre_geometry::wrap_angle;
+use gyre_scan_matching::{Peak, line_peak};
+use gyre_simd::simd;
+use realfft::{ComplexToReal, RealFftPlanner, num_complex::Complex32};
+
+use super::descriptor::{Descriptor, HARMONICS, SPECTRUM_BYTES};
+
+/// Places that are ranked by their whole descriptors.
+const SHORTLIST: usize = 32;
+/// Samples of the correlation over half a turn.
+const ANGLES: usize = 4 * HARMONICS;
+
+/// A place that looks similar.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Candidate {
+    /// The place, counted from 0 in the order of insertion.
+    pub place: usize,
+    /// Correlation coefficient of the descriptors at the best angle.
+    pub score: f64,
+    /// Yaw of the queried place in the found one's frame, in (-pi/2, pi/2] rad: the descriptors cannot tell it from half a turn more.
+    pub yaw_rad: f64,
+}
+
+/// A place whose path does not continue that of the place before.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error(
+    "a place at {path_m} m of the path cannot follow one at {last_m} m: places are added in the order of the path"
+)]
+pub struct OrderError {
+    /// Path up to the place, m.
+    pub path_m: f64,
+    /// Path up to the last place, m.
+    pub last_m: f64,
+}
+
+/// What is known of a place beside its descriptor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Place {
+    /// Number that the caller gave it.
+    pub id: u64,
+    /// Path up to the place, m.
+    pub path_m: f64,
+}
+
+/// The descriptors of all places, in the order of the path.
+///
+/// A query allocates nothing.
+pub struct PlaceIndex {
+    pub(super) places: Vec<Place>,
+    pub(super) sieves: Vec<u8>,
+    pub(super) spectra: Vec<i8>,
+    /// Norm of each spectrum.
+    norms: Vec<f32>,
+    query: Query,
+}
+
+/// The working memory of a query.
+struct Query {
+    /// Distance in the sieve, and place.
+    distances: Vec<(u32, u32)>,
+    inverse: Arc<dyn ComplexToReal<f32>>,
+    cross: Vec<Complex32>,
+    correlation: Vec<f32>,
+    scratch: Vec<Complex32>,
+    found: Vec<Candidate>,
+}
+
+impl Default for PlaceIndex {
+    fn default() -> Self {
+        Self::with_capacity(0)
+    }
+}
+
+impl PlaceIndex {
+    /// Memory of a place, bytes: its descriptor with its norm, its id and path, and its distance in a query.
+    pub const BYTES_PER_PLACE: usize = Descriptor::SIEVE_BYTES
+        + SPECTRUM_BYTES
+        + size_of::<f32>()
+        + size_of::<Place>()
+        + size_of::<(u32, u32)>();
+
+    /// Creates an empty index with memory for a number of places. More places make it grow.
+    pub fn with_capacity(places: usize) -> Self {
+        Self {
+            places: Vec::with_capacity(places),
+            sieves: Vec::with_capacity(places * Descriptor::SIEVE_BYTES),
+            spectra: Vec::with_capacity(places * SPECTRUM_BYTES),
+            norms: Vec::with_capacity(places),
+            query: Query::new(places),
+        }
+    }
+
+    /// Adds a place, `path_m` metres along the path. Returns its number.
+    ///
+    /// # Errors
+    /// A path that is not finite or shorter than that of the place before; the index is as it was.
+    pub fn insert(
+        &mut self,
+        id: u64,
+        path_m: f64,
+        descriptor: &Descriptor,
+    ) -> Result<usize, OrderError> {
+        let last_m = self.places.last().map_or(0.0, |last| last.path_m);
+        if !(path_m.is_finite() && path_m >= last_m) {
+            return Err(OrderError { path_m, last_m });
+        }
+        self.places.push(Place { id, path_m });
+        self.sieves.extend_from_slice(&descriptor.sieve);
+        self.spectra.extend_from_slice(&descriptor.spectrum);
+        self.norms.push(norm(&descriptor.spectrum));
+        self.query.reserve(self.places.len());
+        Ok(self.places.len() - 1)
+    }
+
+    /// Returns the number of places.
+    pub fn len(&self) -> usize {
+        self.places.len()
+    }
+
+    /// Returns whether there is no place.
+    pub fn is_empty(&self) -> bool {
+        self.places.is_empty()
+    }
+
+    /// Returns the id and the path (m) of a place.
+    pub fn place(&self, place: usize) -> Option<(u64, f64)> {
+        self.places.get(place).map(|place| (place.id, place.path_m))
+    }
+
+    /// Returns the number of places up to `path_m` metres along the path.
+    pub fn places_until(&self, path_m: f64) -> usize {
+        self.places.partition_point(|place| place.path_m <= path_m)
+    }
+
+    /// Finds the places among the first `eligible` ones that look most similar: at most 32, the best first. Of places that lie less
+    /// than `apart_m` along the path from a better one none is returned.
+    pub fn query(
+        &mut self,
+        descriptor: &Descriptor,
+        eligible: usize,
+        apart_m: f64,
+    ) -> &[Candidate] {
+        let eligible = eligible.min(self.len());
+        let sieves = &self.sieves[..eligible * Descriptor::SIEVE_BYTES];
+        self.query.sift(&descriptor.sieve, sieves);
+        self.query
+            .rank(&descriptor.spectrum, &self.spectra, &self.norms);
+        let path_m = |candidate: &Candidate| self.places[candidate.place].path_m;
+        keep_apart(&mut self.query.found, |a, b| {
+            (path_m(a) - path_m(b)).abs() >= apart_m
+        });
+        &self.query.found
+    }
+}
+
+impl Query {
+    fn new(places: usize) -> Self {
+        let inverse = RealFftPlanner::new().plan_fft_inverse(ANGLES);
+        Self {
+            distances: Vec::with_capacity(places),
+            cross: inverse.make_input_vec(),
+            correlation: inverse.make_output_vec(),
+            scratch: inverse.make_scratch_vec(),
+            inverse,
+            found: Vec::with_capacity(SHORTLIST),
+        }
+    }
+
+    fn reserve(&mut self, places: usize) {
+        self.distances.clear();
+        self.distances.reserve(places);
+    }
+
+    /// Keeps the places that are nearest in the sieve, of equal ones the earlier.
+    fn sift(&mut self, sieve: &[u8], sieves: &[u8]) {
+        self.distances.clear();
+        self.distances.extend(
+            sieves
+                .chunks_exact(Descriptor::SIEVE_BYTES)
+                .zip(0..)
+                .map(|(other, place)| (distance(sieve, other), place)),
+        );
+        if self.distances.len() > SHORTLIST {
+            self.distances.select_nth_unstable(SHORTLIST);
+            self.distances.truncate(SHORTLIST);
+        }
+    }
+
+    /// Ranks them by the correlation of the whole descriptors, of equal ones the earlier first.
+    fn rank(&mut self, spectrum: &[i8], spectra: &[i8], norms: &[f32]) {
+        self.found.clear();
+        let own = norm(spectrum);
+        for k in 0..self.distances.len() {
+            let place = self.distances[k].1 as usize;
+            let other = &spectra[place * SPECTRUM_BYTES..][..SPECTRUM_BYTES];
+            let (score, yaw_rad) = self.correlate(spectrum, other, own * norms[place]);
+            self.found.push(Candidate {
+                place,
+                score,
+                yaw_rad,
+            });
+        }
+        self.found
+            .sort_unstable_by(|a, b| b.score.total_cmp(&a.score).then(a.place.cmp(&b.place)));
+    }
+
+    /// The highest correlation coefficient over the angle, and the angle (Weston et al., Eq. 7).
+    fn correlate(&mut self, later: &[i8], earlier: &[i8], energy: f32) -> (f64, f64) {
+        let cross = cross_spectrum(later, earlier);
+        self.cross.fill(Complex32::default());
+        let (re, im) = cross.split_at(HARMONICS);
+        for ((z, re), im) in self.cross[1..].iter_mut().zip(re).zip(im) {
+            *z = Complex32::new(*re as f32, *im as f32);
+        }
+        let done = self.inverse.process_with_scratch(
+            &mut self.cross,
+            &mut self.correlation,
+            &mut self.scratch,
+        );
+        debug_assert!(done.is_ok(), "lengths are those of the plan");
+        let at = |k: isize| {
+            let wrapped = k.rem_euclid(ANGLES as isize) as usize;
+            f64::from(self.correlation[wrapped])
+        };
+        let best = (0..ANGLES as isize)
+            .max_by(|&a, &b| at(a).total_cmp(&at(b)).then(b.cmp(&a)))
+            .unwrap_or(0);
+        let peak = line_peak(Peak::Parabola, |k| at(best + k));
+        // Each harmonic stands for its mirror image too.
+        let score = peak.value / (2.0 * f64::from(energy).max(1.0));
+        // Doubled, the half turn is a whole one.
+        let doubled = wrap_angle((best as f64 + peak.offset) * 2.0 * PI / ANGLES as f64);
+        (score, 0.5 * doubled)
+    }
+}
+
+/// Removes each candidate for which `apart` does not hold with a better one that stays.
+fn keep_apart(found: &mut Vec<Candidate>, apart: impl Fn(&Candidate, &Candidate) -> bool) {
+    let mut kept = 0;
+    for k in 0..found.len() {
+        if found[..kept].iter().all(|better| apart(better, &found[k])) {
+            found[kept] = found[k];
+            kept += 1;
+        }
+    }
+    found.truncate(kept);
+}
+
+/// Sum of absolute differences.
+#[simd]
+fn distance(a: &[u8], b: &[u8]) -> u32 {
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| u32::from(a.abs_diff(*b)))
+        .sum()
+}
+
+fn norm(spectrum: &[i8]) -> f32 {
+    let energy: i32 = spectrum.iter().map(|v| i32::from(*v).pow(2)).sum();
+    (energy as f32).sqrt()
+}
+
+/// The sum over radii of G conj(F), with F the later and G the earlier spectrum: real parts of all harmonics, then imaginary parts.
+/// Exact, since it is of integers.
+#[simd]
+fn cross_spectrum(later: &[i8], earlier: &[i8]) -> [i32; 2 * HARMONICS] {
+    let mut cross = [0_i32; 2 * HARMONICS];
+    let radii = later
+        .chunks_exact(2 * HARMONICS)
+        .zip(earlier.chunks_exact(2 * HARMONICS));
+    for (f, g) in radii {
+        for h in 0..HARMONICS {
+            let [f_re, f_im] = [f[h], f[HARMONICS + h]].map(i32::from);
+            let [g_re, g_im] = [g[h], g[HARMONICS + h]].map(i32::from);
+            cross[h] += g_re * f_re + g_im * f_im;
+            cross[HARMONICS + h] += g_im * f_re - g_re * f_im;
+        }
+    }
+    cross
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// The correlation coefficient at an angle of the grid: the sum over radii and angles of the two spectra as functions of the angle.
+    fn direct(later: &[i8], earlier: &[i8], shift: usize) -> f64 {
+        let mut sums = [0.0; 3];
+        for (f, g) in later
+            .chunks_exact(2 * HARMONICS)
+            .zip(earlier.chunks_exact(2 * HARMONICS))
+        {
+            let value = |spectrum: &[i8], k: usize| -> f64 {
+                let harmonic = |h: usize| {
+                    let angle = 2.0 * PI * (h + 1) as f64 * k as f64 / ANGLES as f64;
+                    let (re, im) = (f64::from(spectrum[h]), f64::from(spectrum[HARMONICS + h]));
+                    re * angle.cos() - im * angle.sin()
+                };
+                (0..HARMONICS).map(harmonic).sum()
+            };
+            for k in 0..ANGLES {
+                let (f, g) = (value(f, k), value(g, (k + shift) % ANGLES));
+                sums[0] += f * f;
+                sums[1] += g * g;
+                sums[2] += f * g;
+            }
+        }
+        sums[2] / (sums[0] * sums[1]).sqrt()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(8))]
+        #[test]
+        fn scores_equal_a_direct_sum_at_every_angle(
+            later in prop::collection::vec(-127_i8..=127, 2 * 2 * HARMONICS),
+            earlier in prop::collection::vec(-127_i8..=127, 2 * 2 * HARMONICS),
+            shift in 0..ANGLES,
+        ) {
+            let mut query = Query::new(1);
+            let energy = norm(&later) * norm(&earlier);
+            let (best, _) = query.correlate(&later, &earlier, energy);
+            let got = f64::from(query.correlation[shift]) / (2.0 * f64::from(energy));
+            prop_assert!((got - direct(&later, &earlier, shift)).abs() < 1e-5);
+            prop_assert!(best >= got - 1e-6);
+        }
+    }
+}

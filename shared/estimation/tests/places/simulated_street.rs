@@ -1,0 +1,161 @@
+//! A simulated street, driven out and back.
+
+use std::f64::consts::PI;
+use std::fmt::Write;
+use std::fs;
+
+use gyre_estimation::places::{
+    Describer, Descriptor, KeyframeSelector, LoopVerifier, MAX_NEIGHBOURS, PlaceIndex,
+    PlaceOptions, VerificationOutcome, neighbours,
+};
+use gyre_geometry::{Pose, SparsePoint, Twist, pose, xy_yaw};
+use gyre_radar::{OwnedScan, PointExtractor, PointsConfig};
+use gyre_scan_matching::{RefinementConfig, Submap};
+use gyre_simulator::drive::DriveConfig;
+use gyre_simulator::{SimulatedDrive, SimulationConfig};
+
+const FLOOR: u8 = 60;
+const PERIOD_S: f64 = 0.25;
+const STREET_M: f64 = 70.0;
+/// Radius of the turn: the lanes are twice as far from each other.
+const TURN_M: f64 = 2.5;
+
+struct Keyframe {
+    pose: Pose,
+    twist: Twist,
+    points: Vec<SparsePoint>,
+}
+
+/// Pose `s` metres along the path: out, half a turn to the left, and back.
+fn at(s: f64) -> Pose {
+    let angle = ((s - STREET_M) / TURN_M).clamp(0.0, PI);
+    let back = (s - STREET_M - PI * TURN_M).max(0.0);
+    let x = s.min(STREET_M) + TURN_M * angle.sin() - back;
+    pose(x, TURN_M * (1.0 - angle.cos()), angle)
+}
+
+/// The poses at every scan: 11 m/s on the street, 3 m/s in the turn.
+fn poses() -> Vec<Pose> {
+    let mut s = 0.0;
+    let mut poses = Vec::new();
+    while s < 2.0 * STREET_M + PI * TURN_M {
+        poses.push(at(s));
+        let turns = (STREET_M - 3.0..STREET_M + PI * TURN_M).contains(&s);
+        s += PERIOD_S * if turns { 3.0 } else { 11.0 };
+    }
+    poses
+}
+
+fn simulate() -> Vec<Keyframe> {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("street.tum");
+    let mut text = String::new();
+    for (k, pose) in poses().iter().enumerate() {
+        let [x, y, yaw] = xy_yaw(pose);
+        let (sin, cos) = (0.5 * yaw).sin_cos();
+        writeln!(
+            text,
+            "{} {x} {y} 0 0 0 {sin} {cos}",
+            1e6 + PERIOD_S * k as f64
+        )
+        .unwrap();
+    }
+    fs::write(&file, text).unwrap();
+    let config = SimulationConfig {
+        scans: poses().len() - 2,
+        drive: DriveConfig::along_file(file),
+        ..SimulationConfig::default()
+    };
+    let drive = SimulatedDrive::new(&config).unwrap();
+    let mut dataset =
+        gyre_radar::open_source(Box::new(drive.renderer()), &drive.dataset_options()).unwrap();
+    let mut scan = OwnedScan::with_limits(dataset.limits());
+    let mut extractor = PointExtractor::new(&PointsConfig::default()).unwrap();
+    let mut points = vec![SparsePoint::default(); 8192];
+    let poses: Vec<Pose> = (0..drive.scans())
+        .map(|k| drive.simulator().pose(k))
+        .collect();
+    let keyframe = |k: usize| {
+        scan.geometry = dataset.read(k, scan.slot()).unwrap();
+        let count = extractor.extract(&scan.view(), FLOOR, &mut points).unwrap();
+        let (before, after) = (k.saturating_sub(1), (k + 1).min(poses.len() - 1));
+        let interval_s = (after - before) as f64 * PERIOD_S;
+        Keyframe {
+            pose: poses[k],
+            twist: Twist::from_chord(&poses[before].inv_mul(&poses[after]), interval_s),
+            points: points[..count].to_vec(),
+        }
+    };
+    let mut selector = KeyframeSelector::new(&PlaceOptions::default());
+    let selected = (0..poses.len()).filter(|k| selector.next(&poses[*k]).is_some());
+    selected.map(keyframe).collect()
+}
+
+fn submap(keyframes: &[Keyframe], path_m: &[f64], middle: usize) -> Submap {
+    let mut submap = Submap::with_capacity(8192 * (2 * MAX_NEIGHBOURS + 1));
+    let here = &keyframes[middle];
+    submap.start(&here.points, &here.twist);
+    for k in neighbours(path_m, middle, PlaceOptions::default().submap_reach_m) {
+        if k != middle {
+            let there = &keyframes[k];
+            submap.add(&there.points, &there.twist, &here.pose.inv_mul(&there.pose));
+        }
+    }
+    submap
+}
+
+#[test]
+fn a_street_driven_back_is_recognised_and_the_loops_are_right() {
+    let keyframes = simulate();
+    let mut path_m = vec![0.0];
+    for pair in keyframes.windows(2) {
+        let step = pair[0]
+            .pose
+            .inv_mul(&pair[1].pose)
+            .translation
+            .vector
+            .norm();
+        path_m.push(path_m[path_m.len() - 1] + step);
+    }
+    let submaps: Vec<Submap> = (0..keyframes.len())
+        .map(|k| submap(&keyframes, &path_m, k))
+        .collect();
+    let (mut describer, mut index) = (Describer::new(), PlaceIndex::default());
+    let mut verifier =
+        LoopVerifier::new(&PlaceOptions::default(), &RefinementConfig::default(), 8192).unwrap();
+    let (mut returned, mut closed) = (0, 0);
+    for (k, submap) in submaps.iter().enumerate() {
+        let mut descriptor = Descriptor::default();
+        describer.describe(submap, &mut descriptor);
+        index.insert(k as u64, path_m[k], &descriptor).unwrap();
+        // On the way back, where the other lane is at least 50 m of path ago.
+        let eligible = index.places_until(path_m[k] - 50.0);
+        let distance_m = |place: usize| {
+            let apart = keyframes[place].pose.inv_mul(&keyframes[k].pose);
+            apart.translation.vector.norm()
+        };
+        if !(0..eligible).any(|place| distance_m(place) < 2.0 * TURN_M + 1.0) {
+            continue;
+        }
+        returned += 1;
+        let candidates = index.query(&descriptor, eligible, 15.0);
+        let mut is_closed = false;
+        for found in candidates.iter().take(3) {
+            let truth = keyframes[found.place].pose.inv_mul(&keyframes[k].pose);
+            let verified = verifier.verify(submap, &submaps[found.place], found);
+            if verified.outcome == VerificationOutcome::Accepted {
+                let error = verified.motion.error(&truth);
+                assert!(
+                    error.xy().norm() < 0.15 && error.z.abs() < 0.005,
+                    "{k}: {error}"
+                );
+                is_closed = true;
+            }
+        }
+        closed += usize::from(is_closed);
+    }
+    assert!(
+        returned >= 8 && closed == returned,
+        "{closed} of {returned}"
+    );
+}
