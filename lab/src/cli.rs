@@ -4,7 +4,7 @@ use std::{num::NonZeroUsize, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::{corrupt::CorruptArguments, sequence::SequenceArguments};
+use crate::{corrupt::CorruptArguments, places::PlacesArguments, sequence::SequenceArguments};
 
 /// Gyre's laboratory: what research on radar odometry needs, and a robot does not.
 ///
@@ -28,6 +28,8 @@ pub enum Command {
     Corrupt(CorruptArguments),
     /// Write rasters with their true poses into one memory-mappable file, to train masks on.
     ExportPairs(ExportPairsArguments),
+    /// Measure how well the places of a run are recognised, and its loops verified.
+    Places(PlacesArguments),
     /// A command of `gyre`.
     #[command(flatten)]
     Gyre(gyre::cli::Command),

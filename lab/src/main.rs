@@ -5,6 +5,7 @@ mod cli;
 mod corrupt;
 mod export_pairs;
 mod models;
+mod places;
 mod realism;
 mod recording;
 mod report;
@@ -31,6 +32,7 @@ fn main() -> ExitCode {
         Command::Realism(arguments) => realism::realism(&arguments),
         Command::Corrupt(arguments) => corrupt::corrupt(&arguments),
         Command::ExportPairs(arguments) => export_pairs::export_pairs(&arguments),
+        Command::Places(arguments) => places::places(&arguments),
         Command::Gyre(command) => return gyre::report("gyre", gyre::execute(command)),
     };
     gyre::report("gyre-lab", result)
