@@ -10,6 +10,7 @@ mod doctor;
 mod evaluate;
 mod foreign_stages;
 mod full_disk;
+mod hostile;
 mod identity;
 mod in_process;
 mod joint_search;

@@ -6,7 +6,6 @@ mod strict;
 
 use std::{
     collections::BTreeMap,
-    fs,
     path::{Path, PathBuf},
     time::Duration,
 };
@@ -168,7 +167,7 @@ impl Configuration {
             path: path.to_owned(),
             source,
         };
-        let text = fs::read_to_string(path).map_err(unreadable)?;
+        let text = gyre_storage::read_text(path, gyre_storage::SETTINGS).map_err(unreadable)?;
         let parsed: Result<toml::Table, _> = text.parse();
         let table = parsed.map_err(|error| ConfigurationError::Syntax {
             path: path.to_owned(),

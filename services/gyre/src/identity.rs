@@ -98,10 +98,7 @@ impl Identity {
             scans: checked.scans,
             programs: programs.clone(),
             dataset,
-            recording: checked
-                .recording
-                .as_ref()
-                .map(|it| it.fingerprint.clone()),
+            recording: checked.recording.as_ref().map(|it| it.fingerprint.clone()),
             configuration: configuration.to_toml()?.parse()?,
         })
     }

@@ -1,7 +1,7 @@
 //! A model and its card, which states the model's file and the rasters that it was trained on.
 
 use std::{
-    fmt, fs, io,
+    fmt, io,
     path::{Path, PathBuf},
 };
 
@@ -11,6 +11,9 @@ use sha2::{Digest, Sha256};
 use thiserror::Error;
 
 use crate::MaskingConfig;
+
+/// The largest model: hundreds of times that of a mask.
+const MAX_BYTES: u64 = 1 << 30;
 
 /// The card of a model (`NAME.toml`). It may have other sections, on the provenance of the model.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -164,7 +167,7 @@ impl Card {
             path: path.to_owned(),
             source,
         };
-        let text = fs::read_to_string(path).map_err(unreadable)?;
+        let text = gyre_storage::read_text(path, gyre_storage::SETTINGS).map_err(unreadable)?;
         let card: Self = toml::from_str(&text)
             .map_err(|error| not_a_card(error.message().trim().replace('\n', "; ")))?;
         if !(1..=2).contains(&card.model.inputs) {
@@ -260,10 +263,12 @@ impl Model {
         let path = config.model.as_deref().ok_or(ModelError::NotNamed)?;
         check_raster(path, &card.raster, raster)?;
         let file = path.with_file_name(&card.model.file);
-        let bytes = fs::read(&file).map_err(|source| ModelError::Unreadable {
-            what: "file",
-            path: file.clone(),
-            source,
+        let bytes = gyre_storage::read_bytes(&file, MAX_BYTES).map_err(|source| {
+            ModelError::Unreadable {
+                what: "file",
+                path: file.clone(),
+                source,
+            }
         })?;
         let actual = hexadecimal(&Sha256::digest(&bytes));
         match actual.eq_ignore_ascii_case(&card.model.sha256) {

@@ -6,7 +6,6 @@ mod mulran;
 mod oxford;
 mod tum;
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -28,6 +27,9 @@ const PLACES: [&str; 9] = [
     "gt/gt.txt",
     "gt.tum",
 ];
+
+/// The largest file: a month of poses at 10 Hz has 2.3 GB.
+const MAX_BYTES: u64 = 4 << 30;
 
 /// A trajectory that cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -89,7 +91,7 @@ pub enum TrajectoryFormat {
 /// # Errors
 /// A file that cannot be read, or is not of a known format.
 pub fn read_trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
-    let text = fs::read_to_string(path).map_err(|source| TrajectoryError::Io {
+    let text = gyre_storage::read_text(path, MAX_BYTES).map_err(|source| TrajectoryError::Io {
         path: path.to_owned(),
         source,
     })?;

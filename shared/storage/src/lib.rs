@@ -3,6 +3,7 @@
 //! - [`write`] and [`Draft`] replace a file as a whole: it is written aside, synchronised and renamed.
 //! - [`File`] is changed in place; what has not been synchronised when the power fails may be there in part.
 //! - [`GroupSync`] synchronises such a file in the background.
+//! - [`read_text`] and [`read_bytes`] read files that may come from elsewhere, up to a size.
 //!
 //! A file and its name are two things: the name of a new or renamed file is safe once its folder is synchronised.
 //! Everything that must survive is written through this crate, so that a test can record each change (feature `record`) and
@@ -12,6 +13,7 @@ mod draft;
 mod file;
 mod folder;
 mod group_sync;
+mod limited;
 #[cfg(feature = "record")]
 pub mod record;
 
@@ -26,6 +28,7 @@ pub use draft::{Draft, is_draft, write};
 pub use file::File;
 pub use folder::{create_folder, remove, sync_folder};
 pub use group_sync::GroupSync;
+pub use limited::{SETTINGS, read_bytes, read_text};
 
 /// A file or folder that cannot be read or written.
 #[derive(Debug, Error)]

@@ -1,4 +1,6 @@
 #![allow(clippy::unwrap_used)]
+use std::fs;
+
 use super::*;
 
 fn from(text: &str) -> Result<Configuration, ConfigurationError> {

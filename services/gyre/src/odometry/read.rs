@@ -2,7 +2,7 @@
 
 use std::{
     fs::File,
-    io::{BufReader, Read},
+    io::{self, BufReader, Read},
     path::Path,
 };
 
@@ -49,7 +49,38 @@ struct Row {
 pub fn read(path: &Path) -> Result<Vec<TimedMotion>, Failure> {
     let file =
         File::open(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
-    parse(BufReader::new(file)).map_err(|reason| format!("{}: {reason}", path.display()).into())
+    let lines = ShortLines {
+        text: BufReader::new(file),
+        line: 0,
+    };
+    parse(lines).map_err(|reason| format!("{}: {reason}", path.display()).into())
+}
+
+/// The longest line, bytes: several times that of a row in full.
+const LONGEST_LINE: usize = 1 << 16;
+
+/// Refuses a line without end, which would be kept in memory.
+struct ShortLines<R> {
+    text: R,
+    /// Bytes of the current line.
+    line: usize,
+}
+
+impl<R: Read> Read for ShortLines<R> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        let count = self.text.read(bytes)?;
+        for part in bytes[..count].split_inclusive(|byte| *byte == b'\n') {
+            self.line += part.len();
+            if self.line > LONGEST_LINE {
+                let reason = format!("it has a line of more than {LONGEST_LINE} bytes");
+                return Err(io::Error::new(io::ErrorKind::InvalidData, reason));
+            }
+            if part.ends_with(b"\n") {
+                self.line = 0;
+            }
+        }
+        Ok(count)
+    }
 }
 
 fn parse(text: impl Read) -> Result<Vec<TimedMotion>, Failure> {

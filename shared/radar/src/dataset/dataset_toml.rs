@@ -3,7 +3,6 @@
 //! Range offset, Doppler coefficient and encoder eccentricity are properties of a radar, so they are best stored beside its
 //! recordings. Simulated recordings include the file. Options given explicitly take precedence.
 
-use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -16,7 +15,7 @@ const FILE: &str = "dataset.toml";
 pub(super) fn options(root: &Path) -> Result<DatasetOptions, OpenError> {
     let places = [Some(root), root.parent()].into_iter().flatten();
     for path in places.map(|folder| folder.join(FILE)) {
-        let text = match fs::read_to_string(&path) {
+        let text = match gyre_storage::read_text(&path, gyre_storage::SETTINGS) {
             Ok(text) => text,
             Err(error)
                 if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) =>
@@ -37,6 +36,8 @@ pub(super) fn options(root: &Path) -> Result<DatasetOptions, OpenError> {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use std::fs;
+
     use super::*;
 
     #[test]

@@ -4,7 +4,6 @@
 //! host: after a stall they are late by up to 1.4 s while the antenna turns uniformly. The sensor clock is reconstructed.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::Path;
 
 use super::detect::Found;
@@ -17,6 +16,8 @@ use super::transposed::{TransposedScans, Turn};
 use crate::chain::MAX_INTERVAL_NS;
 use crate::quoted::quoted;
 
+/// The largest list of stamps: months of scans.
+const MAX_LIST_BYTES: u64 = 1 << 30;
 /// Full range of the images, m.
 const RANGE_M: f32 = 100.0;
 /// Bounds of the period, ns: the radar turns four times per second.
@@ -31,10 +32,10 @@ pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedS
         path: list.clone(),
         source,
     };
-    let text = found
-        .stamps
-        .clone()
-        .map_or_else(|| fs::read_to_string(&list).map_err(io_error), Ok)?;
+    let text = found.stamps.clone().map_or_else(
+        || gyre_storage::read_text(&list, MAX_LIST_BYTES).map_err(io_error),
+        Ok,
+    )?;
     let (stamps, unpadded) = parse_stamps(&list, &text)?;
     let mut scans = TransposedScans::open(found, options, STAMPS, |bins| RANGE_M / bins as f32)?;
     add_turns(&mut scans, &stamps, &list)?;

@@ -1,0 +1,123 @@
+//! Files made to exhaust the memory: each is refused in a sentence by a process that may not have much.
+
+use std::{
+    fs::{self, File},
+    os::unix::fs::symlink,
+    path::Path,
+    process::Command,
+};
+
+use crate::common::{Ended, recording};
+
+/// Address space of the process, kB: twice what the program and its libraries map.
+const LIMIT_KB: usize = 4_000_000;
+
+/// `gyre` with these arguments and a limit on its memory.
+fn limited(arguments: &[&str]) -> Ended {
+    let mut command = Command::new("sh");
+    command.args(["-c", &format!("ulimit -v {LIMIT_KB}; exec \"$0\" \"$@\"")]);
+    command.arg(crate::PROGRAM).args(arguments);
+    Ended::of(command)
+}
+
+fn path(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// A file of this length that takes no room on the disk.
+fn sparse(file: &Path, gigabytes: u64) {
+    File::create(file)
+        .unwrap()
+        .set_len(gigabytes << 30)
+        .unwrap();
+}
+
+#[test]
+fn a_configuration_without_end_is_refused() {
+    limited(&["run", "/dev/zero"]).refused_with(&["/dev/zero", "16 MB"]);
+}
+
+#[test]
+fn a_configuration_of_many_brackets_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("run.toml");
+    for text in [
+        "a = ".to_owned() + &"[".repeat(1_000_000),
+        "[".to_owned() + &"a.".repeat(1_000_000) + "b]",
+    ] {
+        fs::write(&file, text).unwrap();
+        let ended = limited(&["run", path(&file)]);
+        ended.refused_with(&["run.toml", "TOML parse error"]);
+        assert!(ended.stderr.len() < 1000, "{}", ended.stderr);
+    }
+}
+
+#[test]
+fn options_of_a_recording_without_end_are_refused() {
+    let copy = recording::copy(2);
+    let file = copy.path().join("dataset.toml");
+    let _ = fs::remove_file(&file);
+    symlink("/dev/zero", &file).unwrap();
+    limited(&["inspect", path(copy.path())]).refused_with(&["dataset.toml", "16 MB"]);
+}
+
+#[test]
+fn an_image_that_claims_to_be_huge_is_refused() {
+    let copy = recording::copy(2);
+    let images = fs::read_dir(copy.path().join("radar")).unwrap();
+    for image in images.map(|entry| entry.unwrap().path()) {
+        let mut bytes = fs::read(&image).unwrap();
+        fs::remove_file(&image).unwrap();
+        bytes[16..20].copy_from_slice(&(1_u32 << 31).to_be_bytes());
+        fs::write(&image, bytes).unwrap();
+    }
+    limited(&["inspect", path(copy.path())]).refused_with(&["png", "too large"]);
+}
+
+#[test]
+fn trajectories_and_motions_without_end_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let [truth, motions] = ["truth.tum", "odometry.csv"].map(|name| folder.path().join(name));
+    let estimate = folder.path().join("trajectory.tum");
+    fs::write(&estimate, "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n").unwrap();
+    sparse(&truth, 100);
+    let evaluate = ["evaluate", "--estimate", path(&estimate), "--ground-truth"];
+    limited(&[&evaluate[..], &[path(&truth)]].concat()).refused_with(&["truth.tum"]);
+    sparse(&motions, 100);
+    let odometry = [path(&estimate), "--odometry", path(&motions)];
+    limited(&[&evaluate[..], &odometry].concat()).failed_with(&["odometry.csv", "line"]);
+}
+
+#[test]
+fn a_model_and_a_card_without_end_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let models = Path::new(crate::PROJECT).join("shared/masking/tests/models");
+    let run = |card: &Path| {
+        let model = format!("masking.model='{}'", card.display());
+        let out = folder.path().join("out");
+        let small = ["--set", "raster.n=127", "--set", "raster.cell_m=0.8"];
+        let learned = ["--set", "masking.kind=learned", "--set", &model];
+        let run = [
+            "run",
+            path(&folder.path().join("run.toml")),
+            "--data",
+            path(recording::small()),
+            "--out",
+            path(&out),
+        ]
+        .map(str::to_owned);
+        let arguments: Vec<&str> = run
+            .iter()
+            .map(String::as_str)
+            .chain(small)
+            .chain(learned)
+            .collect();
+        limited(&arguments)
+    };
+    fs::write(folder.path().join("run.toml"), "").unwrap();
+    run(Path::new("/dev/zero")).failed_with(&["/dev/zero", "16 MB"]);
+    let card = folder.path().join("single-127.toml");
+    fs::copy(models.join("single-127.toml"), &card).unwrap();
+    sparse(&folder.path().join("single-127.onnx"), 100);
+    run(&card).failed_with(&["single-127.onnx", "MB"]);
+}
