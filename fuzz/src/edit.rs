@@ -117,7 +117,7 @@ pub fn edit_bytes(bytes: &mut Vec<u8>, edits: &[ByteEdit]) {
 /// An edit of a text. Lines and words are taken modulo their number.
 #[derive(Clone, Debug, TypeGenerator)]
 pub enum TextEdit {
-    /// Replaces a word of a line by one of [`WORDS`].
+    /// Replaces a word of a line by one of `WORDS`.
     Word(u16, u8, u8),
     /// Replaces a number of a line by another.
     Number(u16, u8, Number),
