@@ -1,0 +1,149 @@
+//! A keyframe, and its form in a file.
+
+use bytemuck::{Pod, Zeroable};
+use gyre_geometry::{SparsePoint, Twist, UncertainMotion, covariance, pose, xy_yaw};
+use thiserror::Error;
+
+/// A scan whose pose is estimated, with all that loop closing and mapping need of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Keyframe {
+    /// The scan's number in the run, from 0 without gaps.
+    pub seq: u64,
+    /// The sensor's own number of the scan.
+    pub scan: u64,
+    /// Time of the scan, the middle of the sweep, ns since 1970 on the sensor's clock.
+    pub stamp_ns: i64,
+    /// The pose by odometry, in the frame of the first scan, with the covariance of (x, y, yaw) in that frame.
+    pub pose: UncertainMotion,
+    /// The motion by odometry from the keyframe before, with its covariance along that keyframe's axes; zero at the first one.
+    pub motion: UncertainMotion,
+    /// Velocity of the sensor.
+    pub twist: Twist,
+    /// Length of the path through all keyframes up to this one, m.
+    pub path_m: f64,
+    /// The points of the scan as measured: with `twist` they are freed of motion and of the Doppler shift.
+    pub points: Vec<SparsePoint>,
+}
+
+/// Bytes that are not a keyframe.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error("{0} bytes are not a keyframe")]
+pub struct MalformedKeyframe(usize);
+
+/// The part of fixed length in a file.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Fixed {
+    seq: u64,
+    scan: u64,
+    stamp_ns: i64,
+    path_m: f64,
+    pose: [f64; 3],
+    pose_covariance: covariance::Packed,
+    motion: [f64; 3],
+    motion_covariance: covariance::Packed,
+    /// x, y (m/s) and yaw (rad/s).
+    twist: [f64; 3],
+}
+
+impl Keyframe {
+    /// Appends the form in a file, little-endian: the fields in their order, then the points.
+    pub fn encode(&self, bytes: &mut Vec<u8>) {
+        let fixed = Fixed {
+            seq: self.seq,
+            scan: self.scan,
+            stamp_ns: self.stamp_ns,
+            path_m: self.path_m,
+            pose: xy_yaw(&self.pose.motion),
+            pose_covariance: covariance::pack(&self.pose.covariance),
+            motion: xy_yaw(&self.motion.motion),
+            motion_covariance: covariance::pack(&self.motion.covariance),
+            twist: [
+                self.twist.vx_mps,
+                self.twist.vy_mps,
+                self.twist.yaw_rate_radps,
+            ],
+        };
+        bytes.extend_from_slice(bytemuck::bytes_of(&fixed));
+        bytes.extend_from_slice(bytemuck::cast_slice(&self.points));
+    }
+
+    /// Decodes what [`encode`](Self::encode) has written.
+    ///
+    /// # Errors
+    /// A length that none has.
+    pub fn decode(bytes: &[u8]) -> Result<Self, MalformedKeyframe> {
+        let malformed = MalformedKeyframe(bytes.len());
+        let (fixed, points) = bytes
+            .split_at_checked(size_of::<Fixed>())
+            .ok_or(malformed)?;
+        let fixed: Fixed = bytemuck::pod_read_unaligned(fixed);
+        if points.len() % size_of::<SparsePoint>() != 0 {
+            return Err(malformed);
+        }
+        let points = points.chunks_exact(size_of::<SparsePoint>());
+        let uncertain = |[x, y, yaw]: [f64; 3], packed| UncertainMotion {
+            motion: pose(x, y, yaw),
+            covariance: covariance::unpack(packed),
+        };
+        Ok(Self {
+            seq: fixed.seq,
+            scan: fixed.scan,
+            stamp_ns: fixed.stamp_ns,
+            pose: uncertain(fixed.pose, &fixed.pose_covariance),
+            motion: uncertain(fixed.motion, &fixed.motion_covariance),
+            twist: Twist {
+                vx_mps: fixed.twist[0],
+                vy_mps: fixed.twist[1],
+                yaw_rate_radps: fixed.twist[2],
+            },
+            path_m: fixed.path_m,
+            points: points.map(bytemuck::pod_read_unaligned).collect(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_keyframe_is_decoded_as_it_was_encoded() {
+        let uncertain = UncertainMotion {
+            motion: pose(3.0, -4.0, 0.5),
+            covariance: nalgebra::Matrix3::new(4.0, 0.1, 0.2, 0.1, 5.0, 0.3, 0.2, 0.3, 6.0),
+        };
+        let keyframe = Keyframe {
+            seq: 7,
+            scan: 9,
+            stamp_ns: -5,
+            pose: uncertain,
+            motion: uncertain,
+            twist: Twist {
+                vx_mps: 10.0,
+                vy_mps: 0.1,
+                yaw_rate_radps: -0.2,
+            },
+            path_m: 12.5,
+            points: vec![SparsePoint::from([1.0, 2.0, 0.1, 0.5, 0.04]); 3],
+        };
+        let mut bytes = Vec::new();
+        keyframe.encode(&mut bytes);
+        let decoded = Keyframe::decode(&bytes).unwrap();
+        assert!(
+            (decoded.pose.motion.to_homogeneous() - uncertain.motion.to_homogeneous()).norm()
+                < 1e-12
+        );
+        assert_eq!(decoded.points, keyframe.points);
+        assert_eq!(decoded.motion.covariance, keyframe.motion.covariance);
+        let mut again = Vec::new();
+        decoded.encode(&mut again);
+        assert_eq!(Keyframe::decode(&again).unwrap().twist, keyframe.twist);
+        assert_eq!(
+            Keyframe::decode(&bytes[1..]),
+            Err(MalformedKeyframe(bytes.len() - 1))
+        );
+        assert!(Keyframe::decode(&bytes[..8]).is_err());
+    }
+}
