@@ -1,8 +1,9 @@
 //! Files that are whole after a kill and after a power failure.
 //!
-//! - [`write`] and [`Draft`] replace a file as a whole: it is written aside, synchronised and renamed.
+//! - [`write()`] and [`Draft`] replace a file as a whole: it is written aside, synchronised and renamed.
 //! - [`File`] is changed in place; what has not been synchronised when the power fails may be there in part.
 //! - [`GroupSync`] synchronises such a file in the background.
+//! - [`Log`] is a file of records that grows at its end; [`LogReader`] reads it meanwhile.
 //! - [`read_text`] and [`read_bytes`] read files that may come from elsewhere, up to a size.
 //!
 //! A file and its name are two things: the name of a new or renamed file is safe once its folder is synchronised.
@@ -14,6 +15,7 @@ mod file;
 mod folder;
 mod group_sync;
 mod limited;
+mod log;
 #[cfg(feature = "record")]
 pub mod record;
 
@@ -29,6 +31,7 @@ pub use file::File;
 pub use folder::{create_folder, remove, sync_folder};
 pub use group_sync::GroupSync;
 pub use limited::{SETTINGS, read_bytes, read_text};
+pub use log::{Log, LogError, LogMagic, LogReader};
 
 /// A file or folder that cannot be read or written.
 #[derive(Debug, Error)]

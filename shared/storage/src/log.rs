@@ -1,0 +1,173 @@
+//! A log: a file of records of any length, each with a checksum, that grows at its end.
+//!
+//! One process appends, others read what is complete meanwhile. Each record is one `write`. A record that is cut short by a death is
+//! the last one; a thread synchronises the file, so that a power failure takes or damages at most the last
+//! [`GroupSync::LIMIT`] records. Those are cut off when the log is opened. Any other damaged record was whole once, and the log is
+//! refused.
+//!
+//! Layout, little-endian: 16 bytes of magic; then for each record its number (u64), its length in bytes (u32), the CRC-32 of its bytes
+//! (u32), the CRC-32 of these three (u32), its bytes, and zeros up to a multiple of four. So the same records are the same file.
+
+mod reader;
+mod records;
+#[cfg(test)]
+mod tests;
+
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
+
+use thiserror::Error;
+
+use crate::{File, GroupSync, StorageError, create_folder};
+pub use reader::LogReader;
+use records::{Records, encode};
+
+/// The start of a log: what its records are, and their version.
+pub type LogMagic = [u8; 16];
+
+/// An error of a log.
+#[derive(Debug, Error)]
+pub enum LogError {
+    /// The file cannot be read or written.
+    #[error(transparent)]
+    Storage(#[from] StorageError),
+    /// The file is not such a log, or of another version.
+    #[error("{path} is not a log of this kind and version: move it away, or choose another --out")]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A record is not what was written.
+    #[error("{path} is damaged at record {record}, although it had been written whole")]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// The number of the record, from 0.
+        record: usize,
+    },
+    /// Another process appends to the file.
+    #[error("another process is writing to {path}")]
+    Busy {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+/// A log open for appending.
+#[derive(Debug)]
+pub struct Log {
+    file: File,
+    records: Records,
+    sync: GroupSync,
+    /// Number of changes that were counted.
+    changes: u64,
+    buffer: Vec<u8>,
+}
+
+impl Log {
+    /// Opens or creates a log, and cuts off what a death or a power failure has left of the last records. Of the others only the
+    /// headers are read. What is in the log then survives a power failure.
+    ///
+    /// # Errors
+    /// A file that cannot be read or written, is not such a log, is damaged, or to which another process writes.
+    pub fn open(path: &Path, magic: LogMagic) -> Result<Self, LogError> {
+        path.parent().map_or(Ok(()), create_folder)?;
+        let file = File::open_or_create(path)?;
+        if !file.lock()? {
+            return Err(LogError::Busy {
+                path: path.to_owned(),
+            });
+        }
+        let mut records = Records::new(path, magic);
+        records.refresh()?;
+        if !records.has_magic() {
+            file.write_at(&magic, 0)?;
+            records.refresh()?;
+        }
+        if file.length()? > records.end() {
+            file.set_length(records.end())?;
+        }
+        file.sync()?;
+        Ok(Self {
+            sync: GroupSync::start(&file)?,
+            file,
+            records,
+            changes: 0,
+            buffer: Vec::new(),
+        })
+    }
+
+    /// Returns the number of records.
+    pub fn len(&self) -> usize {
+        self.records.len()
+    }
+
+    /// Returns whether there are no records.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Appends a record. A reader sees it when this returns.
+    ///
+    /// # Errors
+    /// A file that cannot be written or synchronised, or a record of 4 GiB or more.
+    pub fn append(&mut self, record: &[u8]) -> Result<(), LogError> {
+        let too_long = |error| StorageError::at("write", self.file.path())(io::Error::other(error));
+        let length = u32::try_from(record.len()).map_err(too_long)?;
+        let header = encode(self.len(), length, record, &mut self.buffer);
+        self.file.write_at(&self.buffer, self.records.end())?;
+        self.records.push(header);
+        self.count()
+    }
+
+    /// Counts a change of another file that is of use only with the records that were appended. At most [`GroupSync::LIMIT`] of
+    /// them are made before the records survive a power failure.
+    ///
+    /// # Errors
+    /// A file that cannot be synchronised.
+    pub fn rely(&mut self) -> Result<(), LogError> {
+        match self.sync.safe() == Some(self.changes) {
+            true => Ok(()),
+            false => self.count(),
+        }
+    }
+
+    fn count(&mut self) -> Result<(), LogError> {
+        self.changes += 1;
+        Ok(self.sync.changed()?)
+    }
+
+    /// Makes all records survive a power failure.
+    ///
+    /// # Errors
+    /// A file that cannot be synchronised.
+    pub fn sync(&self) -> Result<(), LogError> {
+        Ok(self.file.sync()?)
+    }
+
+    /// Reads a record, which replaces the content of `bytes`.
+    ///
+    /// # Errors
+    /// [`LogError::Damaged`], or a file that cannot be read.
+    ///
+    /// # Panics
+    /// There are no more than `index` records.
+    pub fn read(&self, index: usize, bytes: &mut Vec<u8>) -> Result<(), LogError> {
+        self.records.read(index, bytes)
+    }
+
+    /// Keeps the first `records` records and cuts off those behind them. The cut survives a power failure.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn cut(&mut self, records: usize) -> Result<(), LogError> {
+        if records < self.len() {
+            self.records.truncate(records);
+            self.file.set_length(self.records.end())?;
+            self.file.sync()?;
+        }
+        Ok(())
+    }
+}

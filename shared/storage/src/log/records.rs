@@ -1,0 +1,292 @@
+//! The places of a log's records.
+
+use std::{
+    fs::File,
+    io,
+    os::unix::fs::FileExt,
+    path::{Path, PathBuf},
+};
+
+use super::{LogError, LogMagic};
+use crate::{GroupSync, StorageError};
+
+/// Bytes of a record's header.
+const HEADER: usize = 20;
+/// A record begins at a multiple of so many bytes.
+const ALIGNMENT: usize = 4;
+/// Bytes that are read at once in search of a header.
+const CHUNK: usize = 1 << 16;
+/// Number of records at the end that a death or a power failure can have damaged: those in danger, and the one being written.
+const IN_DANGER: usize = GroupSync::LIMIT as usize + 1;
+
+/// The header of a record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Header {
+    index: u64,
+    length: u32,
+    check: u32,
+}
+
+impl Header {
+    fn encode(&self) -> [u8; HEADER] {
+        let mut bytes = [0; HEADER];
+        bytes[..8].copy_from_slice(&self.index.to_le_bytes());
+        bytes[8..12].copy_from_slice(&self.length.to_le_bytes());
+        bytes[12..16].copy_from_slice(&self.check.to_le_bytes());
+        let check = crc32fast::hash(&bytes[..16]);
+        bytes[16..].copy_from_slice(&check.to_le_bytes());
+        bytes
+    }
+
+    /// Decodes the header of a record; `None` if it is not valid.
+    fn decode(bytes: &[u8]) -> Option<Self> {
+        let (content, check) = bytes.get(..HEADER)?.split_at(16);
+        let valid = crc32fast::hash(content).to_le_bytes() == check;
+        let header = Self {
+            index: u64::from_le_bytes(*content.first_chunk()?),
+            length: u32::from_le_bytes(*content[8..].first_chunk()?),
+            check: u32::from_le_bytes(*content[12..].first_chunk()?),
+        };
+        valid.then_some(header)
+    }
+
+    /// Returns the bytes of the record with its header.
+    fn record(&self) -> u64 {
+        (HEADER + (self.length as usize).next_multiple_of(ALIGNMENT)) as u64
+    }
+}
+
+/// Encodes the record number `index`, in place of the content of `bytes`.
+pub(super) fn encode(index: usize, length: u32, record: &[u8], bytes: &mut Vec<u8>) -> Header {
+    let header = Header {
+        index: index as u64,
+        length,
+        check: crc32fast::hash(record),
+    };
+    bytes.clear();
+    bytes.extend_from_slice(&header.encode());
+    bytes.extend_from_slice(record);
+    bytes.resize(header.record() as usize, 0);
+    header
+}
+
+/// The places of the complete records of a log.
+#[derive(Debug)]
+pub(super) struct Records {
+    path: PathBuf,
+    magic: LogMagic,
+    /// `None` until the file exists.
+    file: Option<File>,
+    has_magic: bool,
+    places: Vec<Place>,
+    /// Number of the first records that were the same before the last refresh.
+    unchanged: usize,
+}
+
+/// The place of a record.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    /// The offset behind it.
+    end: u64,
+    length: u32,
+    check: u32,
+}
+
+impl Records {
+    /// The records of a log that has not been looked at.
+    pub fn new(path: &Path, magic: LogMagic) -> Self {
+        Self {
+            path: path.to_owned(),
+            magic,
+            file: None,
+            has_magic: false,
+            places: Vec::new(),
+            unchanged: 0,
+        }
+    }
+
+    pub fn len(&self) -> usize {
+        self.places.len()
+    }
+
+    /// Returns whether the file has its whole magic.
+    pub fn has_magic(&self) -> bool {
+        self.has_magic
+    }
+
+    /// Returns the number of the first records that were the same before the last refresh.
+    pub fn unchanged(&self) -> usize {
+        self.unchanged
+    }
+
+    /// Returns the offset behind the last record.
+    pub fn end(&self) -> u64 {
+        self.start(self.len())
+    }
+
+    /// Returns the offset of a record, or of the next one.
+    fn start(&self, index: usize) -> u64 {
+        match index {
+            0 => size_of::<LogMagic>() as u64,
+            _ => self.places[index - 1].end,
+        }
+    }
+
+    /// Adds a record at the end.
+    pub fn push(&mut self, header: Header) {
+        self.places.push(Place {
+            end: self.end() + header.record(),
+            length: header.length,
+            check: header.check,
+        });
+    }
+
+    pub fn truncate(&mut self, records: usize) {
+        self.places.truncate(records);
+    }
+
+    /// Finds the records that are complete now.
+    pub fn refresh(&mut self) -> Result<(), LogError> {
+        let Some(length) = self.open()? else {
+            return Ok(());
+        };
+        while !self.is_last_unchanged(length)? {
+            self.places.pop();
+        }
+        self.unchanged = self.len();
+        while self.has_magic
+            && let Some(header) = self.header_at(self.end())?
+            && header.index == self.len() as u64
+            && self.end() + header.record() <= length
+        {
+            self.push(header);
+        }
+        self.drop_incomplete()?;
+        match self.end() < length {
+            true => self.require_no_safe_record_after_end(length),
+            false => Ok(()),
+        }
+    }
+
+    /// Opens the file, unless it is open, and checks its magic. Returns its length; `None` if it does not exist.
+    fn open(&mut self) -> Result<Option<u64>, LogError> {
+        let failed = StorageError::at("read", &self.path);
+        let file = match self.file.take().map_or_else(|| File::open(&self.path), Ok) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            opened => self.file.insert(opened.map_err(&failed)?),
+        };
+        let length = file.metadata().map_err(&failed)?.len();
+        if !self.has_magic {
+            let mut found = LogMagic::default();
+            let bytes = self.read_some(&mut found, 0)?;
+            self.has_magic = found == self.magic;
+            // A death or a power failure leaves a beginning of the magic, and zeros behind it.
+            let mut other = found[..bytes]
+                .iter()
+                .zip(&self.magic)
+                .skip_while(|(found, magic)| found == magic);
+            if other.any(|(found, _)| *found != 0) {
+                return Err(LogError::Foreign {
+                    path: self.path.clone(),
+                });
+            }
+        }
+        Ok(Some(length))
+    }
+
+    /// Returns whether the last known record is still in the file of this length. The process that appends may have cut it off
+    /// and appended another one.
+    fn is_last_unchanged(&self, length: u64) -> Result<bool, StorageError> {
+        let (Some(last), Some(place)) = (self.len().checked_sub(1), self.places.last()) else {
+            return Ok(true);
+        };
+        let known = Header {
+            index: last as u64,
+            length: place.length,
+            check: place.check,
+        };
+        Ok(place.end <= length && self.header_at(self.start(last))? == Some(known))
+    }
+
+    /// Drops the first damaged one of the last records, and those behind it. Those that were known before were whole.
+    fn drop_incomplete(&mut self) -> Result<(), LogError> {
+        let mut bytes = Vec::new();
+        let first = self.len().saturating_sub(IN_DANGER);
+        for index in first.max(self.unchanged)..self.len() {
+            match self.read(index, &mut bytes) {
+                Err(LogError::Damaged { .. }) => {
+                    self.truncate(index);
+                    break;
+                }
+                read => read?,
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks that the record after the end was in danger when the last one in the file was written: that it is not one that was
+    /// damaged later.
+    fn require_no_safe_record_after_end(&self, length: u64) -> Result<(), LogError> {
+        let mut bytes = vec![0; CHUNK];
+        let mut offset = self.end();
+        while offset + HEADER as u64 <= length {
+            let found = self.read_some(&mut bytes, offset)?;
+            let last_start = found.saturating_sub(HEADER);
+            for start in (0..=last_start).step_by(ALIGNMENT) {
+                let header = Header::decode(&bytes[start..found]);
+                if header.is_some_and(|it| it.index >= (self.len() + IN_DANGER) as u64) {
+                    return Err(self.damaged(self.len()));
+                }
+            }
+            // The next chunk begins with the first place that this one does not hold whole.
+            offset += (last_start / ALIGNMENT * ALIGNMENT + ALIGNMENT) as u64;
+        }
+        Ok(())
+    }
+
+    pub fn read(&self, index: usize, bytes: &mut Vec<u8>) -> Result<(), LogError> {
+        let start = self.start(index);
+        bytes.resize((self.places[index].end - start) as usize, 0);
+        let whole = self.read_some(bytes, start)? == bytes.len();
+        let header = Header::decode(bytes).filter(|header| whole && header.index == index as u64);
+        let Some(header) = header else {
+            return Err(self.damaged(index));
+        };
+        bytes.drain(..HEADER);
+        bytes.truncate(header.length as usize);
+        match crc32fast::hash(bytes) == header.check {
+            true => Ok(()),
+            false => Err(self.damaged(index)),
+        }
+    }
+
+    fn header_at(&self, offset: u64) -> Result<Option<Header>, StorageError> {
+        let mut bytes = [0; HEADER];
+        let whole = self.read_some(&mut bytes, offset)? == HEADER;
+        Ok(Header::decode(&bytes).filter(|_| whole))
+    }
+
+    /// Fills `bytes` from `offset` on; returns how many there are up to the end of the file.
+    fn read_some(&self, bytes: &mut [u8], offset: u64) -> Result<usize, StorageError> {
+        let Some(file) = &self.file else {
+            return Ok(0);
+        };
+        let mut found = 0;
+        while found < bytes.len() {
+            match file.read_at(&mut bytes[found..], offset + found as u64) {
+                Ok(0) => break,
+                Ok(count) => found += count,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(StorageError::at("read", &self.path)(error)),
+            }
+        }
+        Ok(found)
+    }
+
+    fn damaged(&self, record: usize) -> LogError {
+        LogError::Damaged {
+            path: self.path.clone(),
+            record,
+        }
+    }
+}

@@ -1,0 +1,214 @@
+#![allow(clippy::unwrap_used)]
+use std::{fs, thread};
+
+use super::*;
+
+const MAGIC: LogMagic = *b"a test's log v1\n";
+const LIMIT: usize = GroupSync::LIMIT as usize;
+
+/// A record whose length depends on its number.
+fn record(index: usize) -> Vec<u8> {
+    vec![index as u8; index % 40]
+}
+
+/// A log of so many records, and its folder.
+fn log_of(records: usize) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("test.log");
+    let mut log = Log::open(&path, MAGIC).unwrap();
+    (0..records).for_each(|index| log.append(&record(index)).unwrap());
+    (folder, path)
+}
+
+fn require_records(path: &Path, expected: usize) {
+    let reader = LogReader::open(path, MAGIC).unwrap();
+    assert_eq!(reader.len(), expected);
+    let mut bytes = Vec::new();
+    for index in 0..expected {
+        reader.read(index, &mut bytes).unwrap();
+        assert_eq!(bytes, record(index), "record {index}");
+    }
+}
+
+/// Returns the offset of a record, from the lengths of those before it.
+fn offset(index: usize) -> usize {
+    let bytes = |index| 20 + record(index).len().next_multiple_of(4);
+    MAGIC.len() + (0..index).map(bytes).sum::<usize>()
+}
+
+/// Changes a byte, counted from the start of a record.
+fn corrupt(path: &Path, index: usize, byte: usize) {
+    let mut bytes = fs::read(path).unwrap();
+    bytes[offset(index) + byte] ^= 1;
+    fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn appended_records_are_read_back_and_appended_to() {
+    let (_folder, path) = log_of(50);
+    require_records(&path, 50);
+    let mut log = Log::open(&path, MAGIC).unwrap();
+    assert_eq!(log.len(), 50);
+    log.append(&record(50)).unwrap();
+    require_records(&path, 51);
+    let mut bytes = Vec::new();
+    log.read(50, &mut bytes).unwrap();
+    assert_eq!(bytes, record(50));
+}
+
+#[test]
+fn an_incomplete_record_at_the_end_is_not_seen_and_cut_off_whatever_its_length() {
+    let (_folder, path) = log_of(4);
+    let complete = fs::read(&path).unwrap();
+    for length in 0..complete.len() {
+        fs::write(&path, &complete[..length]).unwrap();
+        let expected = (0..4).filter(|k| offset(k + 1) <= length).count();
+        require_records(&path, expected);
+        let mut log = Log::open(&path, MAGIC).unwrap();
+        assert_eq!(log.len(), expected, "{length} bytes");
+        (expected..4).for_each(|index| log.append(&record(index)).unwrap());
+        assert_eq!(fs::read(&path).unwrap(), complete, "{length} bytes");
+    }
+}
+
+#[test]
+fn what_a_power_failure_leaves_of_the_last_records_is_cut_off() {
+    let (_folder, path) = log_of(3 * LIMIT);
+    let complete = fs::read(&path).unwrap();
+    let first = 3 * LIMIT - LIMIT - 1;
+    for damaged in [first, first + 1, first + 9, 3 * LIMIT - 1] {
+        for byte in [0, 19, 20 + record(damaged).len().saturating_sub(1)] {
+            fs::write(&path, &complete).unwrap();
+            corrupt(&path, damaged, byte);
+            require_records(&path, damaged);
+            assert_eq!(Log::open(&path, MAGIC).unwrap().len(), damaged);
+            assert_eq!(fs::read(&path).unwrap(), complete[..offset(damaged)]);
+        }
+    }
+}
+
+#[test]
+fn zeros_in_place_of_the_start_are_cut_off_if_they_can_be_of_a_power_failure() {
+    for (records, expected) in [(LIMIT, None), (2 * LIMIT, Some(0))] {
+        let (_folder, path) = log_of(records);
+        let mut bytes = fs::read(&path).unwrap();
+        bytes[..100].fill(0);
+        fs::write(&path, bytes).unwrap();
+        match (Log::open(&path, MAGIC), expected) {
+            (Ok(log), None) => assert!(log.is_empty()),
+            (Err(LogError::Damaged { record, .. }), Some(expected)) => assert_eq!(record, expected),
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+#[test]
+fn a_damaged_record_in_the_middle_is_refused_with_its_number() {
+    let (_folder, path) = log_of(3 * LIMIT);
+    let complete = fs::read(&path).unwrap();
+    for damaged in [0, 7, 2 * LIMIT - 2] {
+        // Its header: the records behind it cannot be found in order.
+        corrupt(&path, damaged, 3);
+        let corrupted = fs::read(&path).unwrap();
+        let errors = [
+            Log::open(&path, MAGIC).unwrap_err(),
+            LogReader::open(&path, MAGIC).unwrap_err(),
+        ];
+        for error in errors {
+            assert!(
+                matches!(&error, LogError::Damaged { record, .. } if *record == damaged),
+                "{error}"
+            );
+        }
+        assert_eq!(fs::read(&path).unwrap(), corrupted);
+        fs::write(&path, &complete).unwrap();
+    }
+    // Its bytes: found when it is read.
+    corrupt(&path, 7, 21);
+    let reader = LogReader::open(&path, MAGIC).unwrap();
+    let error = reader.read(7, &mut Vec::new()).unwrap_err();
+    assert!(error.to_string().contains("damaged at record 7"), "{error}");
+    reader.read(8, &mut Vec::new()).unwrap();
+}
+
+#[test]
+fn a_reader_sees_records_while_they_are_appended_and_cut_off() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("test.log");
+    let mut reader = LogReader::open(&path, MAGIC).unwrap();
+    assert_eq!(reader.refresh().unwrap(), 0);
+    let of_writer = path.clone();
+    let writer = thread::spawn(move || {
+        let mut log = Log::open(&of_writer, MAGIC).unwrap();
+        (0..2000).for_each(|index| log.append(&record(index)).unwrap());
+        log
+    });
+    let (mut seen, mut bytes) = (0, Vec::new());
+    while seen < 2000 {
+        let ended = writer.is_finished();
+        for index in seen..reader.refresh().unwrap() {
+            reader.read(index, &mut bytes).unwrap();
+            assert_eq!(bytes, record(index));
+        }
+        seen = reader.len();
+        assert!(!ended || seen == 2000);
+    }
+    let mut log = writer.join().unwrap();
+    log.cut(10).unwrap();
+    assert_eq!((log.len(), reader.refresh().unwrap()), (10, 10));
+    log.append(&record(10)).unwrap();
+    require_records(&path, 11);
+    assert_eq!((reader.refresh().unwrap(), reader.unchanged()), (11, 10));
+    // Others of the same lengths are not taken for those that were cut off.
+    log.cut(8).unwrap();
+    (8..12).for_each(|index| log.append(&vec![99; index]).unwrap());
+    assert_eq!((reader.refresh().unwrap(), reader.unchanged()), (12, 8));
+    reader.read(9, &mut bytes).unwrap();
+    assert_eq!(bytes, [99; 9]);
+    log.cut(0).unwrap();
+    assert_eq!(fs::read(&path).unwrap(), MAGIC);
+}
+
+#[test]
+fn another_programs_file_is_refused_and_left_as_it_is() {
+    let (_folder, path) = log_of(2);
+    let other = Log::open(&path, *b"a test's log v2\n");
+    assert!(matches!(other, Err(LogError::Foreign { .. })));
+    require_records(&path, 2);
+    for theirs in [&b"something else altogether"[..], b"theirs"] {
+        fs::write(&path, theirs).unwrap();
+        assert!(matches!(
+            Log::open(&path, MAGIC),
+            Err(LogError::Foreign { .. })
+        ));
+        assert!(matches!(
+            LogReader::open(&path, MAGIC),
+            Err(LogError::Foreign { .. })
+        ));
+        assert_eq!(fs::read(&path).unwrap(), theirs);
+    }
+}
+
+#[test]
+fn two_processes_do_not_append_to_one_log() {
+    let (_folder, path) = log_of(2);
+    let _first = Log::open(&path, MAGIC).unwrap();
+    assert!(matches!(
+        Log::open(&path, MAGIC),
+        Err(LogError::Busy { .. })
+    ));
+}
+
+#[test]
+fn changes_that_rely_on_a_record_are_as_few_as_the_records_in_danger() {
+    let (_folder, path) = log_of(0);
+    let mut log = Log::open(&path, MAGIC).unwrap();
+    log.append(&record(1)).unwrap();
+    for _ in 0..10 * LIMIT {
+        log.rely().unwrap();
+        let safe = log.sync.safe().unwrap_or(0);
+        assert!(log.changes - safe <= GroupSync::LIMIT);
+    }
+    // The record is safe, and nothing more is counted.
+    assert!(log.changes <= 2 * GroupSync::LIMIT);
+}
