@@ -101,6 +101,7 @@ impl Machine {
             look_back: 1,
             live_depth: 0,
             observers: 0,
+            slam: false,
         };
         let limits = Limits {
             scan_bytes: 1,

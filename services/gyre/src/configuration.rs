@@ -337,6 +337,7 @@ impl Configuration {
             look_back: scans_a_mask,
             live_depth,
             observers: self.run.observers,
+            slam: false,
         }
     }
 

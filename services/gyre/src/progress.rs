@@ -5,8 +5,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Footprint, Item, PoseHeader};
-use gyre_stage::{clock, supervise::Event};
+use gyre_messages::{FollowerId, Footprint, Item, PoseHeader};
+use gyre_stage::{clock, follower::Progress as Following, supervise::Event};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::print;
@@ -60,6 +60,7 @@ impl Progress {
             Event::Restarted { all: false } => self.say("restarted it"),
             Event::Restarted { all: true } => self.say("restarted all stages from the journal"),
             Event::Stalled(stall) => self.say(&stall.to_string()),
+            Event::Following { follower, progress } => self.following(follower, *progress),
         }
     }
 
@@ -83,6 +84,24 @@ impl Progress {
                     "{}/{} scans  {message}",
                     self.done, self.scans
                 ));
+            }
+            None => {}
+        }
+    }
+
+    /// Says how far a follower is, if the run has to wait for it.
+    fn following(&mut self, follower: &str, progress: Following) {
+        let work = match FollowerId::by_name(follower) {
+            Some(FollowerId::LoopClosure) => "loop closing",
+            Some(FollowerId::Trajectory) | None => follower,
+        };
+        let Following { done, total } = progress;
+        let message = format!("{work}: {done} of {total} keyframes");
+        match &self.bar {
+            Some(bar) => bar.set_message(message),
+            None if self.last_line.elapsed() >= EVERY => {
+                self.last_line = Instant::now();
+                print::note(message);
             }
             None => {}
         }
@@ -120,6 +139,7 @@ mod tests {
             look_back: 1,
             live_depth: 0,
             observers: 0,
+            slam: false,
         };
         let limits = Limits {
             scan_bytes: 1,

@@ -108,6 +108,7 @@ mod tests {
             look_back,
             live_depth: 0,
             observers: 0,
+            slam: false,
         };
         let kept = |look_back, published, has_previous| {
             serves_only_as_previous(&window(look_back), &scan(published), Some(9), has_previous)

@@ -73,8 +73,9 @@ mod tests {
     use bytemuck::Zeroable;
 
     use crate::{
-        ByteBlock, FloatBlock, Item, Limits, Masked, MaskedHeader, Message, Motion, MotionHeader,
-        Pose, PoseHeader, Rotation, RotationHeader, Scan, ScanHeader, flag,
+        ByteBlock, Correction, CorrectionHeader, FloatBlock, Item, Limits, Loop, LoopHeader,
+        Masked, MaskedHeader, Message, Motion, MotionHeader, Pose, PoseHeader, Rotation,
+        RotationHeader, Scan, ScanHeader, flag,
     };
 
     const LIMITS: Limits = Limits {
@@ -192,6 +193,48 @@ mod tests {
                 ("y_m is 1000000000", &|header| header.y_m = 1e9),
                 ("covariance", &|header| header.covariance[0] = -1.0),
                 ("x_m is inf", &|header| header.motion.x_m = f64::INFINITY),
+            ],
+        );
+    }
+
+    #[test]
+    fn a_loop_is_between_two_keyframes_within_reach_of_each_other() {
+        let header = LoopHeader {
+            later_seq: 9,
+            earlier_seq: 2,
+            loops: 1,
+            ..LoopHeader::default()
+        };
+        each_is_refused::<Loop>(
+            header,
+            &[],
+            &[
+                ("earlier_seq is 9", &|header| header.earlier_seq = 9),
+                ("x_m is 6.5", &|header| header.x_m = 6.5),
+                ("yaw_rad is NaN", &|header| header.yaw_rad = f64::NAN),
+                ("covariance", &|header| header.covariance[0] = -1.0),
+                ("correlation is 1.5", &|header| header.correlation = 1.5),
+                ("loops is 0", &|header| header.loops = 0),
+            ],
+        );
+    }
+
+    #[test]
+    fn a_correction_is_finite_and_of_some_keyframes() {
+        let header = CorrectionHeader {
+            keyframes: 1,
+            ..CorrectionHeader::default()
+        };
+        each_is_refused::<Correction>(
+            header,
+            &[],
+            &[
+                ("x_m is inf", &|header| header.x_m = f64::INFINITY),
+                ("yaw_rad is 4", &|header| header.yaw_rad = 4.0),
+                ("covariance", &|header| {
+                    header.keyframe_covariance[0] = f64::NAN
+                }),
+                ("keyframes is 0", &|header| header.keyframes = 0),
             ],
         );
     }

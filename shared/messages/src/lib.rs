@@ -10,8 +10,11 @@
 //! | `motion` | [`MotionHeader`] | empty |
 //! | `refined` | [`MotionHeader`] | empty |
 //! | `pose` | [`PoseHeader`] | empty |
+//! | `loop` | [`LoopHeader`] | empty |
+//! | `correction` | [`CorrectionHeader`] | empty |
 //!
-//! All headers start with an [`Item`], which identifies the scan and carries the time stamps of each stage. Type names carry a
+//! The last two exist only in runs with SLAM: [`FollowerId`]. All headers start with an [`Item`], which identifies the scan and carries the
+//! time stamps of each stage. Type names carry a
 //! version, so that two builds of different versions reject each other's messages instead of misreading them.
 //!
 //! Reading order: `item`, `limits`, `message` (the contract of a message type), `check` (its enforcement), one file per message,
@@ -22,6 +25,9 @@
 
 mod block;
 mod check;
+mod closed_loop;
+mod correction;
+mod follower;
 mod item;
 mod limits;
 mod masked;
@@ -36,14 +42,17 @@ mod topics;
 
 pub use block::{ByteBlock, FloatBlock};
 pub use check::Violation;
+pub use closed_loop::{Loop, LoopHeader};
+pub use correction::{Correction, CorrectionHeader};
+pub use follower::FollowerId;
 pub use item::{Hop, Hops, Item, StageId, flag};
 pub use limits::{History, Limits, TopicSizes, Window, WindowError};
 pub use masked::{Masked, MaskedHeader, MaskedParts, Pair, mask_kind};
-pub use message::{Header, Message};
+pub use message::{Header, Message, Sender};
 pub use motion::{Motion, MotionEstimate, MotionHeader, SearchedMotion};
 pub use pose::{Pose, PoseHeader};
 pub use refined::Refined;
 pub use refinement::{RefinementRecord, initial_guess, outcome};
 pub use rotation::{Rotation, RotationEstimate, RotationHeader};
 pub use scan::{Scan, ScanHeader};
-pub use topics::{Footprint, TOPICS, Topic};
+pub use topics::{Footprint, Topic, topics};

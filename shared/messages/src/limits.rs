@@ -11,6 +11,8 @@ const MAX_OBSERVERS: usize = 64;
 const BORROWED: usize = 3;
 /// Samples that a publisher may fill at once.
 const LOANED: usize = 1;
+/// Messages of a topic that only observers read which one that comes late still receives.
+const LATEST: usize = 16;
 
 /// The number of scans in flight, and the look-back of the stages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -25,6 +27,8 @@ pub struct Window {
     pub live_depth: usize,
     /// Number of observers that each topic has room for: see [`TopicSizes::observers`].
     pub observers: usize,
+    /// True in a run with SLAM: pose-integration keeps keyframes, and the topics of the followers exist.
+    pub slam: bool,
 }
 
 /// A window out of its bounds.
@@ -48,6 +52,8 @@ pub enum History {
     Stream,
     /// Feedback to earlier stages: one more window, and the lag of motion compensation.
     Feedback,
+    /// The last messages, for topics that only observers read.
+    Latest,
 }
 
 /// Sizes of one topic's queues.
@@ -118,13 +124,14 @@ impl Window {
     /// down the stream can finish meanwhile and admit `scans` new ones, so a queue is longer than the history by the window.
     pub(crate) fn queues(&self, history: History, readers: usize) -> TopicSizes {
         let stream = self.scans + self.look_back;
-        let history = match history {
-            History::Stream => stream,
-            History::Feedback => stream + self.scans + self.lag + 1,
+        let (history, more) = match history {
+            History::Stream => (stream, self.scans),
+            History::Feedback => (stream + self.scans + self.lag + 1, self.scans),
+            History::Latest => (LATEST, 0),
         };
         TopicSizes {
             history,
-            buffer: history + self.scans,
+            buffer: history + more,
             borrowed: BORROWED,
             loaned: LOANED,
             readers,
@@ -170,6 +177,7 @@ mod tests {
         look_back: 1,
         live_depth: 0,
         observers: 0,
+        slam: false,
     };
 
     #[test]

@@ -9,8 +9,8 @@ use crate::{
     block::{ByteBlock, FloatBlock},
     check::{Violation, finite, require},
     item::{Item, StageId},
-    limits::{History, Limits},
-    message::{Message, header},
+    limits::{History, Limits, TopicSizes, Window},
+    message::{Message, Sender, header},
 };
 
 /// The payload is one raster if the mask takes one scan, or two (this scan and the previous one, both masked for this pair) if
@@ -20,7 +20,7 @@ pub enum Masked {}
 
 impl Message for Masked {
     const TOPIC: &'static str = "masked";
-    const SENDERS: &'static [StageId] = &[StageId::Masking];
+    const SENDER: Sender = Sender::Stage(&[StageId::Masking]);
     // Rotation search, translation search and refinement.
     const READERS: usize = 3;
     const HISTORY: History = History::Stream;
@@ -33,6 +33,11 @@ impl Message for Masked {
         limits: &Limits,
     ) -> Result<(), Violation> {
         header.check(bytemuck::cast_slice(payload), limits)
+    }
+
+    /// In a run with SLAM pose-integration reads the points of keyframes.
+    fn sizes(window: &Window) -> TopicSizes {
+        window.queues(Self::HISTORY, Self::READERS + usize::from(window.slam))
     }
 
     fn max_elements(limits: &Limits) -> usize {

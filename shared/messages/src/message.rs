@@ -7,6 +7,7 @@ use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
     check::Violation,
+    follower::FollowerId,
     item::{Item, StageId, flag},
     limits::{History, Limits, TopicSizes, Window},
 };
@@ -19,12 +20,34 @@ pub trait Header: ZeroCopySend + Default + Debug + 'static {
     fn item_mut(&mut self) -> &mut Item;
 }
 
+/// The process that publishes a topic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sender {
+    /// One of these stages, whichever the run has. A run has all topics of stages.
+    Stage(&'static [StageId]),
+    /// A follower. Only a run with SLAM has its topic.
+    Follower(FollowerId),
+}
+
+impl Sender {
+    /// Returns the name of the process that has sent an item: the one of the stages that has stamped it, or the follower.
+    pub fn of(&self, item: &Item) -> &'static str {
+        let stages = match self {
+            Self::Stage(stages) => *stages,
+            Self::Follower(follower) => return follower.name(),
+        };
+        let has_stamped = |stage: &&StageId| item.hops[**stage as usize].published_ns != 0;
+        let stamped = stages.iter().find(has_stamped).or(stages.first());
+        stamped.map_or("", |stage| stage.name())
+    }
+}
+
 /// A message type.
 pub trait Message: 'static {
     /// The name of the topic.
     const TOPIC: &'static str;
-    /// The stages of which one publishes the topic.
-    const SENDERS: &'static [StageId];
+    /// The process that publishes the topic.
+    const SENDER: Sender;
     /// Number of processes that subscribe to the topic.
     const READERS: usize;
     /// The reach of the publisher's history.

@@ -11,7 +11,7 @@ use crate::{
     check::{Violation, covariance as check_covariance, finite, planar, require},
     item::{Item, StageId},
     limits::{History, Limits},
-    message::{Message, header},
+    message::{Message, Sender, header},
     refinement::RefinementRecord,
     rotation::RotationEstimate,
 };
@@ -22,7 +22,7 @@ pub enum Motion {}
 
 impl Message for Motion {
     const TOPIC: &'static str = "motion";
-    const SENDERS: &'static [StageId] = &[StageId::TranslationSearch, StageId::JointSearch];
+    const SENDER: Sender = Sender::Stage(&[StageId::TranslationSearch, StageId::JointSearch]);
     // Masking, and the next stage in the stream.
     const READERS: usize = 2;
     const HISTORY: History = History::Feedback;

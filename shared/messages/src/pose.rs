@@ -9,7 +9,7 @@ use crate::{
     check::{Violation, covariance as check_covariance, planar},
     item::{Item, StageId},
     limits::{History, Limits},
-    message::{Message, header},
+    message::{Message, Sender, header},
     motion::MotionEstimate,
 };
 
@@ -19,7 +19,7 @@ pub enum Pose {}
 
 impl Message for Pose {
     const TOPIC: &'static str = "pose";
-    const SENDERS: &'static [StageId] = &[StageId::PoseIntegration];
+    const SENDER: Sender = Sender::Stage(&[StageId::PoseIntegration]);
     // The source, masking and the supervisor.
     const READERS: usize = 3;
     const HISTORY: History = History::Feedback;
@@ -58,7 +58,7 @@ pub struct PoseHeader {
 }
 
 /// Farthest pose from the first one, m: more than a way around the earth.
-const MAX_DISTANCE_M: f64 = 1e8;
+pub(crate) const MAX_DISTANCE_M: f64 = 1e8;
 
 impl PoseHeader {
     fn check(&self, limits: &Limits) -> Result<(), Violation> {

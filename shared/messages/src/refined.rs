@@ -5,7 +5,7 @@ use crate::{
     check::Violation,
     item::StageId,
     limits::{History, Limits},
-    message::Message,
+    message::{Message, Sender},
     motion::MotionHeader,
 };
 
@@ -15,7 +15,7 @@ pub enum Refined {}
 
 impl Message for Refined {
     const TOPIC: &'static str = "refined";
-    const SENDERS: &'static [StageId] = &[StageId::Refinement];
+    const SENDER: Sender = Sender::Stage(&[StageId::Refinement]);
     const READERS: usize = 1;
     const HISTORY: History = History::Feedback;
     type Header = MotionHeader;

@@ -11,7 +11,7 @@ use crate::{
     check::{Violation, finite, within},
     item::{Item, StageId},
     limits::{History, Limits},
-    message::{Message, header},
+    message::{Message, Sender, header},
 };
 
 /// The rotation from the previous scan to this one.
@@ -20,7 +20,7 @@ pub enum Rotation {}
 
 impl Message for Rotation {
     const TOPIC: &'static str = "rotation";
-    const SENDERS: &'static [StageId] = &[StageId::RotationSearch];
+    const SENDER: Sender = Sender::Stage(&[StageId::RotationSearch]);
     const READERS: usize = 1;
     const HISTORY: History = History::Stream;
     type Header = RotationHeader;

@@ -9,7 +9,7 @@ use crate::{
     check::{Violation, require},
     item::{Item, StageId},
     limits::{History, Limits, TopicSizes, Window},
-    message::{Message, header},
+    message::{Message, Sender, header},
 };
 
 /// A polar scan: the power of azimuth `a` at range bin `b` is byte `first_byte + a * stride + b` of the payload.
@@ -18,7 +18,7 @@ pub enum Scan {}
 
 impl Message for Scan {
     const TOPIC: &'static str = "scan";
-    const SENDERS: &'static [StageId] = &[StageId::RadarReplay];
+    const SENDER: Sender = Sender::Stage(&[StageId::RadarReplay]);
     const READERS: usize = 1;
     const HISTORY: History = History::Stream;
     type Header = ScanHeader;

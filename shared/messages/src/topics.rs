@@ -5,9 +5,11 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::{
+    closed_loop::Loop,
+    correction::Correction,
     limits::{Limits, TopicSizes, Window},
     masked::Masked,
-    message::Message,
+    message::{Message, Sender},
     motion::Motion,
     pose::Pose,
     refined::Refined,
@@ -23,6 +25,8 @@ const SAMPLE_OVERHEAD: usize = 192;
 pub struct Topic {
     /// The name of the topic.
     pub name: &'static str,
+    /// The process that publishes it.
+    pub sender: Sender,
     /// The sizes of its queues.
     pub sizes: fn(&Window) -> TopicSizes,
     /// Bytes of its largest sample in shared memory.
@@ -33,6 +37,7 @@ impl Topic {
     const fn of<M: Message>() -> Self {
         Self {
             name: M::TOPIC,
+            sender: M::SENDER,
             sizes: M::sizes,
             max_sample_bytes: max_sample_bytes::<M>,
         }
@@ -47,14 +52,24 @@ const PAGES_PER_TOPIC: usize = 8;
 const PAGES_PER_SUBSCRIBER: usize = 4;
 
 /// All topics, in the order of the stream.
-pub const TOPICS: [Topic; 6] = [
+const TOPICS: [Topic; 8] = [
     Topic::of::<Scan>(),
     Topic::of::<Masked>(),
     Topic::of::<Rotation>(),
     Topic::of::<Motion>(),
     Topic::of::<Refined>(),
     Topic::of::<Pose>(),
+    Topic::of::<Loop>(),
+    Topic::of::<Correction>(),
 ];
+
+/// Returns the topics of a run, in the order of the stream.
+pub fn topics(window: &Window) -> impl Iterator<Item = &'static Topic> + use<> {
+    let slam = window.slam;
+    TOPICS
+        .iter()
+        .filter(move |topic| slam || matches!(topic.sender, Sender::Stage(_)))
+}
 
 fn max_sample_bytes<M: Message>(limits: &Limits) -> usize {
     SAMPLE_OVERHEAD + size_of::<M::Header>() + M::max_elements(limits) * size_of::<M::Element>()
@@ -63,11 +78,11 @@ fn max_sample_bytes<M: Message>(limits: &Limits) -> usize {
 /// Returns an upper limit of the transport's bookkeeping, of which each file takes whole pages: a service has its description and
 /// state, a subscriber its queue, its events, and a process of its own. Measured without observers: 83 pages.
 fn bookkeeping(window: &Window) -> usize {
-    let subscribers: usize = TOPICS
-        .iter()
+    let subscribers: usize = topics(window)
         .map(|topic| (topic.sizes)(window).subscribers())
         .sum();
-    (OTHER_PAGES + TOPICS.len() * PAGES_PER_TOPIC + subscribers * PAGES_PER_SUBSCRIBER) * PAGE
+    (OTHER_PAGES + topics(window).count() * PAGES_PER_TOPIC + subscribers * PAGES_PER_SUBSCRIBER)
+        * PAGE
 }
 
 /// The shared memory that a run needs.
@@ -80,7 +95,7 @@ pub struct Footprint {
 impl Footprint {
     /// The footprint of a window and its largest messages.
     pub fn new(window: &Window, limits: &Limits) -> Self {
-        let segments = TOPICS.iter().map(|topic| {
+        let segments = topics(window).map(|topic| {
             let samples = (topic.sizes)(window).samples();
             (topic.name, samples * (topic.max_sample_bytes)(limits))
         });
@@ -118,6 +133,7 @@ mod tests {
         look_back: 1,
         live_depth: 0,
         observers: 8,
+        slam: false,
     };
 
     #[test]
@@ -127,5 +143,18 @@ mod tests {
         assert_eq!(Masked::sizes(&WINDOW).samples(), 27);
         let pose = Pose::sizes(&WINDOW);
         assert_eq!((pose.history, pose.buffer), (12, 16));
+    }
+
+    #[test]
+    fn only_a_run_with_slam_has_the_topics_of_followers_and_their_memory() {
+        let slam = Window {
+            slam: true,
+            ..WINDOW
+        };
+        let names = |window| topics(window).map(|topic| topic.name).collect::<Vec<_>>();
+        assert_eq!(names(&WINDOW).last(), Some(&"pose"));
+        assert_eq!(names(&slam)[6..], ["loop", "correction"]);
+        let added = Masked::sizes(&slam).samples() - Masked::sizes(&WINDOW).samples();
+        assert_eq!(added, 3);
     }
 }

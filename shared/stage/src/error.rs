@@ -38,6 +38,16 @@ pub enum StageError {
         /// The number of places.
         observers: usize,
     },
+    /// The run has no such topic.
+    #[error(
+        "the run that writes to {out} has no topic `{topic}`: only a run with SLAM has it (slam.kind = \"graph\" or \"filter\")"
+    )]
+    NoTopic {
+        /// The topic.
+        topic: &'static str,
+        /// The folder of the results.
+        out: PathBuf,
+    },
     /// The configuration is invalid.
     #[error("{0}")]
     Configuration(String),

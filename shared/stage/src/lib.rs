@@ -8,8 +8,9 @@
 //! 4. [`wake`]: how a process sleeps until there is work.
 //! 5. [`source`], [`stage`], [`sink`]: the loops of the first, the middle and the last processes; [`inputs`]: what a middle
 //!    process waits for.
-//! 6. [`observer`]: subscribers that the run does not depend on.
-//! 7. [`supervise`]: starts the processes, restarts dead ones, removes all resources at the end.
+//! 6. [`follower`]: the loop of a process that reads durable logs and is not in the stream.
+//! 7. [`observer`]: subscribers that the run does not depend on.
+//! 8. [`supervise`]: starts the processes, restarts dead ones, removes all resources at the end.
 //!
 //! The protocol in one paragraph: items carry consecutive sequence numbers. The source may have W of them in flight; each pose
 //! is the credit for one more. A stage is a function of its inputs, and a publisher keeps a history for late readers. So a
@@ -23,6 +24,7 @@ mod allocations;
 pub mod clock;
 mod counters;
 mod error;
+pub mod follower;
 pub mod inputs;
 pub mod launch;
 pub mod lock;
@@ -44,6 +46,7 @@ pub mod writer;
 pub use allocations::CountingAllocator;
 pub use counters::StageCounters;
 pub use error::StageError;
+pub use follower::Follower;
 pub use launch::Launch;
 pub use run::Manifest;
 pub use services::Listener;

@@ -12,7 +12,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Item, Message, flag};
+use gyre_messages::{Item, Message, flag, topics};
 use iceoryx2::{
     port::{ReceiveError, port_name::PortName, subscriber::Subscriber},
     prelude::{CallbackProgression, LogLevel, PortFactory, set_log_level},
@@ -108,8 +108,14 @@ impl ObservedRun {
     /// Subscribes to a topic. The first messages are those of the publisher's history.
     ///
     /// # Errors
-    /// All places of the topic are taken, the run has ended, or the transport fails.
+    /// The run has no such topic, all places of the topic are taken, the run has ended, or the transport fails.
     pub fn observe<M: Message>(&self) -> Result<Observer<'_, M>, StageError> {
+        if !topics(&self.manifest.window).any(|topic| topic.name == M::TOPIC) {
+            return Err(StageError::NoTopic {
+                topic: M::TOPIC,
+                out: self.manifest.out.clone(),
+            });
+        }
         let deadline = Instant::now() + MAX_WAIT_FOR_PLACE;
         loop {
             let failed = match self.try_observe::<M>() {

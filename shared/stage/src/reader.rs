@@ -1,7 +1,7 @@
 //! The subscriber of a topic: the raw queue, or its items in order.
 
 use bytemuck::Pod;
-use gyre_messages::{Header, Item, Limits, Message, StageId};
+use gyre_messages::{Header, Item, Limits, Message};
 use iceoryx2::{
     port::{ReceiveError, subscriber::Subscriber},
     sample::Sample,
@@ -53,19 +53,11 @@ impl<M: Message> Received<M> {
         bytemuck::cast_slice(self.sample.payload())
     }
 
-    /// Returns the stage that sent it: the one of the topic's that has stamped it.
-    fn sender(&self) -> StageId {
-        let hops = &self.item().hops;
-        let mut senders = M::SENDERS.iter().copied();
-        let stamped = senders.find(|stage| hops[*stage as usize].published_ns != 0);
-        stamped.unwrap_or(M::SENDERS[0])
-    }
-
     /// Creates an error that names this message.
     pub fn malformed(&self, reason: impl Into<String>) -> StageError {
         StageError::Malformed {
             topic: M::TOPIC,
-            sender: self.sender().name(),
+            sender: M::SENDER.of(self.item()),
             seq: self.item().seq,
             reason: reason.into(),
         }

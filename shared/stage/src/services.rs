@@ -1,13 +1,16 @@
 //! The services of the transport: the supervisor creates them once with the sizes of the window, and stages only open them.
 //! So no restart finds a service missing or of another size.
 
-use gyre_messages::{Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId, Window};
+use gyre_messages::{
+    Correction, FollowerId, Loop, Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId,
+    Window,
+};
 use iceoryx2::{
     prelude::{Config, NodeBuilder, NodeName, ServiceName, SignalHandlingMode, ipc},
     service::port_factory::{PortFactory, event, publish_subscribe},
 };
 
-use crate::StageError;
+use crate::{StageError, follower};
 
 pub(crate) type Ipc = ipc::Service;
 pub(crate) type Node = iceoryx2::node::Node<Ipc>;
@@ -40,6 +43,8 @@ pub(crate) struct Services {
     motion: Topic<Motion>,
     refined: Topic<Refined>,
     pose: Topic<Pose>,
+    /// In a run with SLAM.
+    _followers: Option<(Topic<Loop>, Topic<Correction>)>,
     _events: Vec<Event>,
 }
 
@@ -47,7 +52,7 @@ impl Services {
     /// Creates the services.
     pub(crate) fn create(node: &Node, window: &Window) -> Result<Self, StageError> {
         let mut events = Vec::new();
-        for topic in gyre_messages::TOPICS {
+        for topic in gyre_messages::topics(window) {
             let sizes = (topic.sizes)(window);
             let data = EventSizes {
                 listeners: sizes.subscribers(),
@@ -62,6 +67,19 @@ impl Services {
             events.push(create_event(node, &data_event(topic.name), data)?);
             events.push(create_event(node, &handshake_event(topic.name), handshake)?);
         }
+        let mut followers = None;
+        if window.slam {
+            let loops = create_topic::<Loop>(node, window)?;
+            followers = Some((loops, create_topic::<Correction>(node, window)?));
+            let sizes = EventSizes {
+                listeners: FollowerId::ALL.len(),
+                notifiers: 1,
+                nodes: Pose::sizes(window).nodes(),
+            };
+            for log in follower::LOGS {
+                events.push(create_event(node, log.event(), sizes)?);
+            }
+        }
         Ok(Self {
             scan: create_topic::<Scan>(node, window)?,
             masked: create_topic::<Masked>(node, window)?,
@@ -69,6 +87,7 @@ impl Services {
             motion: create_topic::<Motion>(node, window)?,
             refined: create_topic::<Refined>(node, window)?,
             pose: create_topic::<Pose>(node, window)?,
+            _followers: followers,
             _events: events,
         })
     }
@@ -121,6 +140,7 @@ fn create_topic<M: Message>(node: &Node, window: &Window) -> Result<Topic<M>, St
 }
 
 /// Numbers of ports that an event has room for, without the spare ones.
+#[derive(Clone, Copy)]
 struct EventSizes {
     listeners: usize,
     notifiers: usize,

@@ -1,10 +1,12 @@
 //! Starts the processes of a run, restarts dead ones, and removes all resources at the end.
 //!
 //! After a death only the dead stage is restarted: every start resumes. All stages are restarted if that does not help (the
-//! stage dies again before a new pose, or no pose is published) or if the plan says so.
+//! stage dies again before a new pose, or no pose is published) or if the plan says so. Followers are no part of that: they are
+//! restarted alone, and waited for at the end.
 
 mod child;
 mod clean;
+mod follow;
 mod guardian;
 mod log;
 mod observers;
@@ -152,16 +154,23 @@ impl<'a> Supervisor<'a> {
                 return Ok(Ending::Interrupted);
             }
             if self.read_poses()? {
-                return Ok(Ending::Complete);
+                return self.await_followers();
             }
             self.logs.bound_if_due();
             self.keep_guardian();
             let processes = self.children.len() + 1;
             self.observers
                 .run_if_due(&self.plan.manifest, &self.transport, processes);
-            let dead: Vec<usize> = (0..self.children.len())
+            let exited: Vec<usize> = (0..self.children.len())
                 .filter(|i| self.children[*i].has_exited())
                 .collect();
+            let (mut followers, dead): (Vec<usize>, Vec<usize>) = exited
+                .into_iter()
+                .partition(|i| self.children[*i].follows());
+            followers.retain(|i| self.is_behind(*i));
+            if !followers.is_empty() {
+                self.recover_followers(&followers)?;
+            }
             if !dead.is_empty() {
                 self.recover(&dead)?;
             } else if let Some(stall) = self.stall() {
@@ -218,7 +227,21 @@ impl<'a> Supervisor<'a> {
     /// Restarts dead stages, or all stages if that alone would not help.
     fn recover(&mut self, dead: &[usize]) -> Result<(), SuperviseError> {
         let died_ns = clock::now_ns();
-        let mut all = false;
+        self.may_restart(dead)?;
+        let all = dead.iter().any(|i| {
+            let child = &self.children[*i];
+            child.died_without_progress(self.newest_pose) || child.plan().restarts_all
+        });
+        match all {
+            true => self.restart(&self.all_but_survivors(dead), died_ns)?,
+            false => self.restart(dead, died_ns)?,
+        }
+        (self.observe)(Event::Restarted { all });
+        Ok(())
+    }
+
+    /// Counts deaths against the restart policies, and waits for the longest backoff.
+    fn may_restart(&mut self, dead: &[usize]) -> Result<(), SuperviseError> {
         let mut backoff = Duration::ZERO;
         for i in dead {
             let child = &mut self.children[*i];
@@ -228,7 +251,6 @@ impl<'a> Supervisor<'a> {
                 death: &death,
             });
             child.may_restart(&death)?;
-            all |= child.died_without_progress(self.newest_pose) || child.plan().restarts_all;
             if !death.killed {
                 backoff = backoff.max(child.backoff());
             }
@@ -237,21 +259,28 @@ impl<'a> Supervisor<'a> {
         if !backoff.is_zero() {
             self.signals.wait(&[], None, backoff)?;
         }
-        match all {
-            true => self.restart(&self.all_but_survivors(dead), died_ns)?,
-            false => self.restart(dead, died_ns)?,
-        }
-        (self.observe)(Event::Restarted { all });
         Ok(())
+    }
+
+    /// Returns all stages.
+    fn all(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.children.len()).filter(|i| !self.children[*i].follows())
     }
 
     /// Returns all stages except those that are alive and outlive restarts.
     fn all_but_survivors(&self, dead: &[usize]) -> Vec<usize> {
         let survives = |i: &usize| self.children[*i].plan().outlives_restarts && !dead.contains(i);
-        (0..self.children.len()).filter(|i| !survives(i)).collect()
+        self.all().filter(|i| !survives(i)).collect()
     }
 
     fn restart(&mut self, stages: &[usize], died_ns: i64) -> Result<(), SuperviseError> {
+        self.replace(stages, died_ns)?;
+        self.watchdog.restarted();
+        Ok(())
+    }
+
+    /// Ends processes and starts others in their places.
+    fn replace(&mut self, stages: &[usize], died_ns: i64) -> Result<(), SuperviseError> {
         stages.iter().for_each(|i| self.children[*i].kill());
         for i in stages {
             self.children[*i].await_end()?;
@@ -269,7 +298,6 @@ impl<'a> Supervisor<'a> {
                 started_ns: clock::now_ns(),
             }));
         }
-        self.watchdog.restarted();
         Ok(())
     }
 
@@ -279,7 +307,7 @@ impl<'a> Supervisor<'a> {
         let stages = match (self.watchdog.count(), &stall) {
             (1, Stall::Scan { .. }) => self.sources(),
             (1, _) => self.all_but_survivors(&[]),
-            (2, _) => (0..self.children.len()).collect(),
+            (2, _) => self.all().collect(),
             _ => return Err(SuperviseError::Stalled(stall)),
         };
         (self.observe)(Event::Stalled(&stall));

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod followers;
 mod hand_over;
 mod observers;
 mod wake_up;
@@ -27,6 +28,7 @@ const WINDOW: Window = Window {
     look_back: 1,
     live_depth: 0,
     observers: 2,
+    slam: true,
 };
 
 /// A run without processes: its services, and nodes for tests. Runs are isolated from each other.

@@ -73,8 +73,13 @@ impl<M: Message> Writer<M> {
     /// A failure of the transport.
     pub fn send(&self, mut draft: Draft<M>, hop: StageId) -> Result<(), StageError> {
         let item = draft.header().item_mut();
-        item.pid = std::process::id();
         item.hop_mut(hop).published_ns = clock::now_ns();
+        self.publish(draft)
+    }
+
+    /// The same for a process that is not in the stream and has no hop.
+    pub(crate) fn publish(&self, mut draft: Draft<M>) -> Result<(), StageError> {
+        draft.header().item_mut().pid = std::process::id();
         draft
             .sample
             .send()

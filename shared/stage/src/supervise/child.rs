@@ -9,7 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::StageId;
+use gyre_messages::{FollowerId, StageId};
 use rustix::{
     event::{PollFd, PollFlags, Timespec, poll},
     io::Errno,
@@ -110,6 +110,11 @@ impl Child {
     /// Returns which stage it is; `None` for an additional process.
     pub(super) fn stage(&self) -> Option<StageId> {
         StageId::by_name(self.name())
+    }
+
+    /// Returns whether it is a follower, and not in the stream.
+    pub(super) fn follows(&self) -> bool {
+        FollowerId::by_name(self.name()).is_some()
     }
 
     /// Returns when the process was started.

@@ -7,14 +7,14 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{child::Death, program::Program};
-use crate::{Manifest, StageCounters, StageError};
+use crate::{Manifest, StageCounters, StageError, follower::Progress};
 
 /// The plan of a run.
 #[derive(Debug)]
 pub struct Plan {
     /// The manifest, which all processes read.
     pub manifest: Manifest,
-    /// The processes, in the order of the stream.
+    /// The processes: the stages in the order of the stream, then the followers.
     pub stages: Vec<StagePlan>,
     /// Program and arguments of a process that calls [`guard`](super::guard) with its standard input.
     pub guardian: Vec<String>,
@@ -86,6 +86,13 @@ pub enum Event<'a> {
     Restarted {
         /// True if all stages were restarted (but a live source), false if only the dead or the late ones were.
         all: bool,
+    },
+    /// The stream has ended, and a follower has not come to the end of its logs.
+    Following {
+        /// The name of the follower.
+        follower: &'a str,
+        /// Its position.
+        progress: Progress,
     },
     /// The run makes no progress: the stages that may be the cause are about to be restarted.
     Stalled(&'a Stall),

@@ -3,7 +3,8 @@
 use std::{fs, rc::Rc, time::Duration};
 
 use gyre_messages::{
-    Footprint, Masked, Message, Motion, Pose, Refined, Rotation, Scan, TOPICS, flag,
+    Correction, Footprint, Loop, Masked, Message, Motion, Pose, Refined, Rotation, Scan, flag,
+    topics,
 };
 
 use super::{Run, WINDOW, reader, send, writer};
@@ -87,13 +88,17 @@ fn the_footprint_is_what_the_segments_take() {
     let _rotations = writer::<Rotation>(manifest);
     let _motions = (writer::<Motion>(manifest), writer::<Refined>(manifest));
     let _poses = writer::<Pose>(manifest);
+    let _of_followers = (writer::<Loop>(manifest), writer::<Correction>(manifest));
     let segments = fs::read_dir("/dev/shm").unwrap().flatten().filter(|file| {
         let name = file.file_name().to_string_lossy().into_owned();
         name.starts_with(&manifest.prefix) && name.ends_with(".data")
     });
     let bytes: u64 = segments.map(|file| file.metadata().unwrap().len()).sum();
     let footprint = Footprint::new(&manifest.window, &manifest.limits);
-    let topics = footprint.segments.iter().take(TOPICS.len());
+    let topics = footprint
+        .segments
+        .iter()
+        .take(topics(&manifest.window).count());
     let expected: usize = topics.map(|(_, bytes)| bytes).sum();
     let share = bytes as f64 / expected as f64;
     assert!((0.9..=1.0).contains(&share), "{bytes} of {expected}");

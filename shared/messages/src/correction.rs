@@ -1,0 +1,80 @@
+//! `correction`: the odometry frame in the map frame.
+
+use bytemuck::{Pod, Zeroable};
+use gyre_geometry::{Pose as PlanarPose, covariance, pose};
+use iceoryx2::prelude::ZeroCopySend;
+
+use crate::{
+    block::FloatBlock,
+    check::{Violation, covariance as check_covariance, planar, require},
+    follower::FollowerId,
+    item::Item,
+    limits::{History, Limits},
+    message::{Message, Sender, header},
+    pose::MAX_DISTANCE_M,
+};
+
+/// The transform that corrects poses of the odometry. Odometry is continuous and drifts; the correction jumps when a loop is closed
+/// (REP-105: the transform from `map` to `odom`).
+#[derive(Debug)]
+pub enum Correction {}
+
+impl Message for Correction {
+    const TOPIC: &'static str = "correction";
+    const SENDER: Sender = Sender::Follower(FollowerId::Trajectory);
+    const READERS: usize = 0;
+    const HISTORY: History = History::Latest;
+    type Header = CorrectionHeader;
+    type Element = FloatBlock;
+
+    fn check_content(
+        header: &Self::Header,
+        _: &[Self::Element],
+        _: &Limits,
+    ) -> Result<(), Violation> {
+        header.check()
+    }
+}
+header!(CorrectionHeader);
+
+/// The pose of the odometry frame in the map frame.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
+#[type_name("gyre_correction_header_v1")]
+pub struct CorrectionHeader {
+    /// `seq` counts what was read of the logs so far, from 0. `scan` and the times are the newest keyframe's.
+    pub item: Item,
+    /// Number of the newest keyframe's scan in the run.
+    pub keyframe_seq: u64,
+    /// Keyframes in the correction.
+    pub keyframes: u64,
+    /// Loops in the correction.
+    pub loops: u64,
+    /// Forward, m.
+    pub x_m: f64,
+    /// To the left, m.
+    pub y_m: f64,
+    /// Counter-clockwise, rad, in (-pi, pi].
+    pub yaw_rad: f64,
+    /// Covariance of (x, y, yaw) of the newest keyframe's pose in the map frame: see [`covariance::Packed`].
+    pub keyframe_covariance: covariance::Packed,
+}
+
+impl CorrectionHeader {
+    fn check(&self) -> Result<(), Violation> {
+        let correction = [
+            ("x_m", self.x_m),
+            ("y_m", self.y_m),
+            ("yaw_rad", self.yaw_rad),
+        ];
+        planar(correction, MAX_DISTANCE_M)?;
+        check_covariance(&self.keyframe_covariance)?;
+        require(self.keyframes > 0, "keyframes", self.keyframes, "1 or more")
+    }
+
+    /// Returns the transform from the odometry frame to the map frame: applied to a pose of the odometry, it gives the pose in the
+    /// map.
+    pub fn map_from_odometry(&self) -> PlanarPose {
+        pose(self.x_m, self.y_m, self.yaw_rad)
+    }
+}

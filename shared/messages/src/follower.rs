@@ -1,0 +1,31 @@
+//! Processes of a run that follow its logs.
+
+/// The followers of a run with SLAM. They read durable logs at their own pace and are not in the stream of scans, so they have no
+/// [`Hop`](crate::Hop) and give no credit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum FollowerId {
+    /// Finds loops between keyframes.
+    LoopClosure,
+    /// Corrects the trajectory by the loops.
+    Trajectory,
+}
+
+impl FollowerId {
+    /// All followers, in the order in which they read each other's logs.
+    pub const ALL: [Self; 2] = [Self::LoopClosure, Self::Trajectory];
+
+    /// The name used in configurations, on the command line and in results.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::LoopClosure => "loop-closure",
+            Self::Trajectory => "trajectory",
+        }
+    }
+
+    /// Returns the follower of this name.
+    pub fn by_name(name: &str) -> Option<Self> {
+        Self::ALL
+            .into_iter()
+            .find(|follower| follower.name() == name)
+    }
+}

@@ -1,0 +1,141 @@
+//! The loop of a follower: a process that reads durable logs at its own pace, and publishes for observers.
+//!
+//! A follower is not in the stream: no stage waits for it, and it gives no credit. It can be late by any time, since all that it needs
+//! is in the logs. An event wakes it when a log has grown; as events can be lost, it looks every 200 ms.
+
+mod growth;
+mod progress;
+
+use std::{thread, time::Duration};
+
+use gyre_messages::{Header, Item, Message, flag};
+
+use crate::{
+    Launch, Listener, StageCounters, StageError, allocations, clock, services, wake, writer::Writer,
+};
+pub(crate) use growth::LOGS;
+pub use growth::{Growth, LogId};
+use progress::ProgressWriter;
+pub(crate) use progress::is_done;
+pub use progress::{Progress, read as progress_of};
+
+/// A follower: a function of its logs.
+pub trait Follower {
+    /// The published message.
+    type Output: Message;
+    /// The logs whose growth wakes it.
+    const LOGS: &'static [LogId];
+
+    /// Works on the next records of the logs. A step should be short: requests to stop are looked for between two steps.
+    ///
+    /// # Errors
+    /// An error that ends the process.
+    fn step(&mut self) -> Result<Step<<Self::Output as Message>::Header>, StageError>;
+
+    /// Returns the position in the logs.
+    fn progress(&self) -> Progress;
+}
+
+/// The result of a step.
+#[derive(Debug)]
+pub enum Step<H> {
+    /// There is nothing new in the logs.
+    Idle,
+    /// Records were worked on, and there may be more. The message is published.
+    Worked(Option<H>),
+    /// The logs have been read to their end, and all that follows from them is written.
+    Ended,
+}
+
+/// Runs a follower to the end of its logs, or until SIGTERM.
+///
+/// # Errors
+/// A failure of the transport, or an error of the follower.
+pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounters, StageError> {
+    let listeners: Vec<Listener> = F::LOGS
+        .iter()
+        .map(|log| services::listener(&launch.node, log.event()))
+        .collect::<Result<_, _>>()?;
+    let grown: Vec<&Listener> = listeners.iter().collect();
+    let mut flow = Flow {
+        output: Writer::open(&launch.node, &launch.manifest)?,
+        report: ProgressWriter::create(&launch.manifest, &launch.name)?,
+        delay: launch.delay(),
+        next_seq: 0,
+        counters: StageCounters::default(),
+    };
+    let mut limit = Duration::ZERO;
+    loop {
+        // Before the step: what is appended after this wakes the next one.
+        let woken = launch
+            .signals
+            .wait(&grown, Some(flow.output.listener()), limit)?;
+        flow.counters.wakes += u64::from(!limit.is_zero());
+        if woken.stop {
+            return Ok(flow.counters);
+        }
+        if woken.may_have_new_readers() {
+            flow.output.accept_readers()?;
+        }
+        let slept = !limit.is_zero();
+        limit = match flow.step(follower)? {
+            Step::Idle => wake::MAX_WAIT,
+            Step::Worked(_) => Duration::ZERO,
+            Step::Ended => return Ok(flow.counters),
+        };
+        if limit.is_zero() && slept && woken.timed_out {
+            flow.counters.wakes_caught_late += 1;
+        }
+    }
+}
+
+struct Flow<M: Message> {
+    output: Writer<M>,
+    report: ProgressWriter,
+    delay: Duration,
+    next_seq: u64,
+    counters: StageCounters,
+}
+
+impl<M: Message> Flow<M> {
+    fn step<F: Follower<Output = M>>(
+        &mut self,
+        follower: &mut F,
+    ) -> Result<Step<M::Header>, StageError> {
+        let (started_ns, allocated) = (clock::now_ns(), allocations::so_far());
+        let mut step = follower.step()?;
+        if let Step::Worked(message) = &mut step {
+            let (finished_ns, allocated) = (clock::now_ns(), allocations::so_far() - allocated);
+            self.counters.record(allocated, finished_ns - started_ns);
+            if let Some(header) = message.take() {
+                self.publish(header)?;
+            }
+            if !self.delay.is_zero() {
+                thread::sleep(self.delay);
+            }
+        }
+        let has_ended = matches!(step, Step::Ended);
+        if has_ended {
+            self.publish_end()?;
+        }
+        self.report.write(follower.progress(), has_ended)?;
+        Ok(step)
+    }
+
+    fn publish(&mut self, header: M::Header) -> Result<(), StageError> {
+        self.next_seq = header.item().seq.saturating_add(1);
+        let mut draft = self.output.loan()?;
+        *draft.header() = header;
+        self.output.publish(draft)
+    }
+
+    fn publish_end(&mut self) -> Result<(), StageError> {
+        let mut draft = self.output.loan()?;
+        *draft.header().item_mut() = Item {
+            seq: self.next_seq,
+            flags: flag::END,
+            ..Item::default()
+        };
+        self.output.publish(draft)
+    }
+}

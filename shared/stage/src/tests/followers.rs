@@ -1,0 +1,75 @@
+//! What followers publish, and what wakes them.
+
+use std::time::Duration;
+
+use gyre_messages::{Header, Item, Loop, Message};
+
+use super::{Run, WINDOW, node, writer};
+use crate::{
+    Manifest, StageError,
+    follower::LogId,
+    observer::{Next, ObservedRun},
+    services,
+};
+
+#[test]
+fn an_observer_that_comes_late_receives_the_last_loops() {
+    let run = Run::new();
+    let loops = writer::<Loop>(&run.manifest);
+    let kept = Loop::sizes(&WINDOW).history as u64;
+    for seq in 0..kept + 5 {
+        let mut draft = loops.loan().unwrap();
+        let header = draft.header();
+        (header.later_seq, header.loops) = (seq + 1, seq + 1);
+        *header.item_mut() = Item {
+            seq,
+            ..Item::default()
+        };
+        loops.publish(draft).unwrap();
+    }
+    let observed = ObservedRun::at(&run.manifest.root).unwrap();
+    let mut observer = observed.observe::<Loop>().unwrap();
+    loops.accept_readers().unwrap();
+    for expected in 5..kept + 5 {
+        let Next::Message(message, 0) = observer.next(Duration::ZERO).unwrap() else {
+            panic!("no loop {expected}");
+        };
+        assert_eq!(message.item().seq, expected);
+        assert_eq!(message.item().pid, std::process::id());
+    }
+    assert!(matches!(observer.next(Duration::ZERO).unwrap(), Next::Idle));
+}
+
+#[test]
+fn a_run_without_slam_has_no_loops_to_observe() {
+    let run = Run::new();
+    let mut manifest = run.manifest.clone();
+    manifest.window.slam = false;
+    manifest.write("").unwrap();
+    let observed = ObservedRun::at(&run.manifest.root).unwrap();
+    let refused = observed.observe::<Loop>().map(drop);
+    assert!(matches!(
+        refused,
+        Err(StageError::NoTopic { topic: "loop", .. })
+    ));
+}
+
+#[test]
+fn all_followers_of_a_log_are_woken_and_a_dead_one_does_not_matter() {
+    let run = Run::new();
+    let manifest: &Manifest = &run.manifest;
+    let node = node(manifest);
+    let event = LogId::Keyframes.event();
+    let notifier = services::notifier(&node, event).unwrap();
+    let [first, second] = [(); 2].map(|()| services::listener(&node, event).unwrap());
+    let woken = |listener: &crate::Listener| {
+        let mut woken = false;
+        listener.try_wait(|_| woken = true).unwrap();
+        woken
+    };
+    notifier.notify().unwrap();
+    assert!(woken(&first) && woken(&second) && !woken(&first));
+    drop(first);
+    notifier.notify().unwrap();
+    assert!(woken(&second));
+}
