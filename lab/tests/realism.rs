@@ -11,7 +11,7 @@ use tempfile::TempDir;
 fn folder() -> TempDir {
     let folder = crate::common::folder();
     let config = SimulationConfig {
-        scans: 8,
+        scans: Some(8),
         seed: 7,
         traffic: gyre_simulator::traffic::TrafficConfig::none(),
         ..SimulationConfig::default()

@@ -155,7 +155,7 @@ fn simulated(scans: usize) -> PathBuf {
     }
     let _ = fs::remove_dir_all(&recording);
     let config = SimulationConfig {
-        scans,
+        scans: Some(scans),
         ..SimulationConfig::default()
     };
     write_dataset(&config, &recording, &mut |_, _| ()).unwrap();

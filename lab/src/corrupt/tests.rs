@@ -189,7 +189,7 @@ fn what_stands_before_an_oxford_row_is_kept() {
     let source = tempfile::tempdir().unwrap();
     write_dataset(
         &SimulationConfig {
-            scans: 3,
+            scans: Some(3),
             ..SimulationConfig::default()
         },
         source.path(),

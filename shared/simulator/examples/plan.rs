@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         },
         Some(file) => DriveConfig::along_file(file.into()),
     };
-    let drive = kind.path(seed)?;
+    let drive = kind.path(seed, None)?;
     let duration_s = drive.duration_s().min(60.0 * 60.0);
     let keep = if arguments.get(3).is_some_and(|keep| keep == "right") {
         DrivingSide::Right

@@ -13,6 +13,9 @@ use crate::town::TownConfig;
 use crate::traffic::TrafficConfig;
 use crate::weather::WeatherConfig;
 
+/// Maximum number of scans.
+pub(crate) const MAX_SCANS: usize = 100_000;
+
 /// A simulation. Every key has a default, and unknown keys are rejected.
 ///
 /// One configuration gives one dataset, byte for byte (with one build on one kind of machine: sines and
@@ -20,10 +23,12 @@ use crate::weather::WeatherConfig;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SimulationConfig {
-    /// Scans to generate. A drive round a block is repeated as long as they last; after the end of any
-    /// other drive the vehicle stands.
-    pub scans: usize,
-    /// The seed of all randomness: the town, the speckle, the noise.
+    /// Scans to generate. A drive round a block is repeated as long as they last; of any other drive there
+    /// are no more than it lasts. Default: all of the drive; 64 round a block.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scans: Option<usize>,
+    /// The seed of all randomness that has no seed of its own: `town.seed`, `town.changes_seed`,
+    /// `traffic.seed`, `sensor.seed`.
     pub seed: u64,
     /// The path of the vehicle.
     pub drive: DriveConfig,
@@ -45,7 +50,7 @@ pub struct SimulationConfig {
 impl Default for SimulationConfig {
     fn default() -> Self {
         Self {
-            scans: 64,
+            scans: None,
             seed: 1,
             drive: DriveConfig::default(),
             town: TownConfig::default(),
@@ -64,12 +69,29 @@ impl SimulationConfig {
     /// # Errors
     /// [`SimulatorError::Config`] with the key of the first value that cannot.
     pub fn validate(&self) -> Result<(), SimulatorError> {
-        require_within("scans", self.scans as f64, 1.0, 100_000.0)?;
+        if let Some(scans) = self.scans {
+            require_within("scans", scans as f64, 1.0, MAX_SCANS as f64)?;
+        }
         self.drive.validate()?;
         self.town.validate()?;
         self.traffic.validate()?;
         self.sensor.validate()?;
         self.weather.iter().try_for_each(WeatherConfig::validate)
+    }
+
+    /// The seed of the town and of a drive of kind `town`, whose streets are the town's.
+    pub fn town_seed(&self) -> u64 {
+        self.town.seed.unwrap_or(self.seed)
+    }
+
+    /// The seed of the other road users.
+    pub fn traffic_seed(&self) -> u64 {
+        self.traffic.seed.unwrap_or(self.seed)
+    }
+
+    /// The seed of the radar's noise, the rain's drops among it.
+    pub fn sensor_seed(&self) -> u64 {
+        self.sensor.seed.unwrap_or(self.seed)
     }
 
     /// Returns the options with which a reader gets the ranges and angles of the simulated radar.

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use gyre_geometry::Pose;
 use serde::{Deserialize, Serialize};
 
 use crate::error::SimulatorError;
@@ -123,23 +124,25 @@ impl DriveConfig {
         Ok(())
     }
 
-    /// Builds the path; all its randomness comes from `seed`.
+    /// Builds the path; all its randomness comes from `seed`. The poses of a file are those in the frame
+    /// `world` of the file; without one in that of the first pose that is driven.
     ///
     /// # Errors
     /// [`SimulatorError::Trajectory`] if the file cannot be read, [`SimulatorError::Drive`] if no vehicle
     /// can drive along its poses.
-    pub fn path(&self, seed: u64) -> Result<Box<dyn Path>, SimulatorError> {
+    pub fn path(&self, seed: u64, world: Option<Pose>) -> Result<Box<dyn Path>, SimulatorError> {
         let lateral_acceleration_mps2 = |default| self.lateral_acceleration_mps2.unwrap_or(default);
         Ok(match (self.kind, &self.file) {
             (DriveKind::File, Some(file)) => {
                 let for_s = self.for_s.unwrap_or(f64::INFINITY);
-                Box::new(recorded::read(
+                Box::new(recorded::read_in(
                     file,
                     Excerpt {
                         from_s: self.from_s,
                         for_s,
                         rate_hz: self.rate_hz,
                     },
+                    world,
                 )?)
             }
             (DriveKind::Town, _) => Box::new(
@@ -180,7 +183,7 @@ mod tests {
         );
         let missing = DriveConfig::along_file("nowhere/poses.tum".into());
         missing.validate().unwrap();
-        let error = missing.path(1).err().unwrap().to_string();
+        let error = missing.path(1, None).err().unwrap().to_string();
         assert!(error.contains("nowhere/poses.tum"), "{error}");
     }
 
@@ -192,14 +195,14 @@ mod tests {
             (config.kind, config.keep),
             (DriveKind::Town, DrivingSide::Right)
         );
-        let drive = config.path(1).unwrap();
+        let drive = config.path(1, None).unwrap();
         assert!(
             (30.0..400.0).contains(&drive.duration_s()),
             "{} s",
             drive.duration_s()
         );
-        assert_eq!(drive.pose(20.0), config.path(1).unwrap().pose(20.0));
-        assert_ne!(drive.pose(20.0), config.path(2).unwrap().pose(20.0));
+        assert_eq!(drive.pose(20.0), config.path(1, None).unwrap().pose(20.0));
+        assert_ne!(drive.pose(20.0), config.path(2, None).unwrap().pose(20.0));
         assert!(toml::from_str::<DriveConfig>("kind = \"boat\"").is_err());
     }
 }

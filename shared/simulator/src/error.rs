@@ -29,6 +29,26 @@ pub enum SimulatorError {
         /// The reason.
         reason: String,
     },
+    /// More scans are wanted than the drive lasts.
+    #[error(
+        "`simulation.scans` is {scans}, but the drive ends after {most} scans ({duration_s:.1} s): take at most so many, or leave the key out"
+    )]
+    TooManyScans {
+        /// The scans that are wanted.
+        scans: usize,
+        /// The scans of the whole drive.
+        most: usize,
+        /// The duration of the drive, seconds.
+        duration_s: f64,
+    },
+    /// The drive leaves the streets of the town.
+    #[error(
+        "the drive leaves the streets of `simulation.town.streets` {at_s:.1} s after its start: add its trajectory to them"
+    )]
+    OffStreets {
+        /// The time, seconds after the start of the drive.
+        at_s: f64,
+    },
     /// The output folder holds files of another dataset.
     #[error("{} holds `{other}`, which is no file of this dataset: choose an empty folder", folder.display())]
     OutputInUse {

@@ -21,7 +21,7 @@
 //! ```
 //! use gyre_simulator::{SimulationConfig, Simulator};
 //!
-//! let simulator = Simulator::new(&SimulationConfig { scans: 2, ..SimulationConfig::default() })?;
+//! let simulator = Simulator::new(&SimulationConfig { scans: Some(2), ..SimulationConfig::default() })?;
 //! let first = simulator.render_scan(0);
 //! assert_eq!(first.scan.view().geometry.azimuths, 400);
 //! let motion = simulator.pose(0).inverse() * simulator.pose(1);

@@ -235,7 +235,7 @@ mod tests {
     #[test]
     fn images_read_in_any_order_are_those_rendered_alone() {
         let drive = SimulatedDrive::new(&SimulationConfig {
-            scans: 12,
+            scans: Some(12),
             ..SimulationConfig::default()
         })
         .unwrap();

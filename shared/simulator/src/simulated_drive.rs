@@ -40,7 +40,7 @@ impl SimulatedDrive {
             simulator,
             output,
             host: config.output.host_stamps,
-            seed: config.seed,
+            seed: config.sensor_seed(),
         })
     }
 

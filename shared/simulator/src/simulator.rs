@@ -1,13 +1,16 @@
 //! Rendering of single scans in memory, without files.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use gyre_geometry::Pose;
 use gyre_radar::{OwnedScan, ScanLimits, ScanSlot, SweepGeometry};
+use nalgebra::Point2;
 
-use crate::config::SimulationConfig;
+use crate::config::{MAX_SCANS, SimulationConfig};
 use crate::error::SimulatorError;
 use crate::path::Path;
+use crate::path::recorded::{self, Excerpt};
 use crate::profile::Sampling;
 use crate::sensor::{Scene, Sensor, SweepTime};
 use crate::streets::Streets;
@@ -20,6 +23,10 @@ use crate::world::World;
 /// check that the year is plausible, and it is fixed so that a configuration always gives the same files.
 const EPOCH_US: i64 = 1_547_132_400_000_000;
 
+/// Time between the places of a drive that are checked to lie on the town's streets, seconds.
+const CHECK_S: f64 = 0.5;
+/// Number of scans of an endless drive, if none is given.
+const ENDLESS_SCANS: usize = 64;
 /// Duration of an endless drive along which streets are laid, seconds; its traffic is made for multiples of
 /// this.
 const ENDLESS_S: f64 = 600.0;
@@ -28,6 +35,7 @@ const ENDLESS_S: f64 = 600.0;
 #[derive(Clone)]
 pub struct Simulator {
     config: SimulationConfig,
+    scans: usize,
     sampling: Sampling,
     path: Arc<dyn Path>,
     world: Arc<World>,
@@ -47,30 +55,45 @@ impl Simulator {
     /// Builds the town and the path.
     ///
     /// # Errors
-    /// As [`SimulationConfig::validate`] and [`crate::drive::DriveConfig::path`].
+    /// As [`SimulationConfig::validate`] and [`crate::drive::DriveConfig::path`];
+    /// [`SimulatorError::TooManyScans`] if the drive has fewer scans than are wanted,
+    /// [`SimulatorError::OffStreets`] if it leaves the town's streets.
     pub fn new(config: &SimulationConfig) -> Result<Self, SimulatorError> {
         config.validate()?;
-        let path: Arc<dyn Path> = config.drive.path(config.seed)?.into();
+        let world = match config.town.streets.first() {
+            Some(file) => Some(recorded::first_pose(file)?),
+            None => None,
+        };
+        let path: Arc<dyn Path> = config.drive.path(config.town_seed(), world)?.into();
         let sampling = config.sensor.sampling();
+        let period_s = sampling.period_us as f64 * 1e-6;
+        let scans = scans(config.scans, path.duration_s(), period_s)?;
         // Streets, town and traffic do not depend on the number of scans.
-        let scans_s = config.scans as f64 * sampling.period_us as f64 * 1e-6;
+        let scans_s = scans as f64 * period_s;
         let [streets_s, traffic_s] = match path.duration_s() {
             duration_s if duration_s.is_finite() => [duration_s; 2],
             _ => [ENDLESS_S, (scans_s / ENDLESS_S).ceil() * ENDLESS_S],
         };
-        let driving_side = config.drive.keep;
-        let streets = Streets::along(path.as_ref(), streets_s, driving_side, config.seed);
+        let streets = match world {
+            Some(world) => shared_streets(config, world, (path.as_ref(), streets_s))?,
+            None => {
+                let (side, seed) = (config.drive.keep, config.town_seed());
+                Streets::along(path.as_ref(), streets_s, side, seed)
+            }
+        };
+        let town = town::build(&config.town, &streets, config.town_seed());
         Ok(Self {
             config: config.clone(),
+            scans,
             sampling,
-            world: Arc::new(World::new(town::build(&config.town, &streets, config.seed))),
+            world: Arc::new(World::new(town)),
             traffic: Traffic::new(
                 &config.traffic,
                 path.clone(),
                 traffic_s,
                 &streets,
-                driving_side,
-                config.seed,
+                config.drive.keep,
+                config.traffic_seed(),
             ),
             path,
         })
@@ -88,7 +111,7 @@ impl Simulator {
 
     /// Scans in the dataset; scans beyond can be rendered too.
     pub fn scans(&self) -> usize {
-        self.config.scans
+        self.scans
     }
 
     /// The path of the sensor.
@@ -124,7 +147,8 @@ impl Simulator {
 
     /// A new sensor for [`Simulator::render_into`].
     pub fn sensor(&self) -> Sensor {
-        Sensor::new(&self.config.sensor, &self.config.effects, self.config.seed)
+        let Self { config, .. } = self;
+        Sensor::new(&config.sensor, &config.effects, config.sensor_seed())
     }
 
     /// The size of one scan.
@@ -162,3 +186,57 @@ impl Simulator {
         sensor.sweep(scene, time, index as u64, slot)
     }
 }
+
+/// The number of scans of a drive: those of which at least the first half is driven before its end.
+///
+/// # Errors
+/// [`SimulatorError::TooManyScans`] if more are wanted.
+fn scans(wanted: Option<usize>, duration_s: f64, period_s: f64) -> Result<usize, SimulatorError> {
+    if duration_s.is_infinite() {
+        return Ok(wanted.unwrap_or(ENDLESS_SCANS));
+    }
+    let most = (duration_s / period_s + 0.5) as usize;
+    match wanted {
+        Some(scans) if scans > most => Err(SimulatorError::TooManyScans {
+            scans,
+            most,
+            duration_s,
+        }),
+        Some(scans) => Ok(scans),
+        None => Ok(most.clamp(1, MAX_SCANS)),
+    }
+}
+
+/// Lays the streets of `town.streets` in the frame `world` of their files, and checks that the drive, a path
+/// and how many seconds of it, stays on them.
+fn shared_streets(
+    config: &SimulationConfig,
+    world: Pose,
+    drive: (&dyn Path, f64),
+) -> Result<Streets, SimulatorError> {
+    let excerpt = Excerpt {
+        rate_hz: config.drive.rate_hz,
+        ..Excerpt::default()
+    };
+    let read = |file: &PathBuf| recorded::read_in(file, excerpt, Some(world));
+    let paths = config.town.streets.iter().map(read);
+    let paths = paths.collect::<Result<Vec<_>, SimulatorError>>()?;
+    let all: Vec<_> = paths
+        .iter()
+        .map(|path| (path as &dyn Path, f64::INFINITY))
+        .collect();
+    let streets = Streets::along_all(&all, config.drive.keep, config.town_seed());
+    let (path, duration_s) = drive;
+    let times = (0..=(duration_s / CHECK_S) as usize).map(|step| step as f64 * CHECK_S);
+    let is_off = |at_s: &f64| {
+        let place = Point2::from(path.pose(*at_s).translation.vector);
+        streets.clearance_m(place, 1.0) >= 0.0
+    };
+    match times.into_iter().find(is_off) {
+        Some(at_s) => Err(SimulatorError::OffStreets { at_s }),
+        None => Ok(streets),
+    }
+}
+
+#[cfg(test)]
+mod tests;

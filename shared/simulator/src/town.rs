@@ -10,6 +10,7 @@
 
 mod boundary;
 mod building;
+mod changes;
 mod config;
 mod district;
 mod facade;
@@ -23,7 +24,9 @@ mod terrace;
 #[cfg(test)]
 mod tests;
 mod vehicle;
+mod works;
 
+use nalgebra::Point2;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
@@ -32,6 +35,7 @@ pub(crate) use vehicle::car;
 
 use crate::body::Body;
 use crate::streets::Streets;
+use changes::Changes;
 use district::{District, Use};
 use frontage::{Frontage, Line};
 use kerb::{BAYS_M, Kerb};
@@ -44,6 +48,8 @@ use site::{Built, Site};
 const STRETCH_M: f64 = 72.0;
 /// Minimum distance of lots from all kerbs, metres.
 const CLEAR_M: f64 = 1.2;
+/// Number of stretches after which a street repeats in a town whose streets are alike.
+const ALIKE: u64 = 3;
 /// Step along the street where no lot fits, metres.
 const SKIP_M: f64 = 2.0;
 /// Narrower remainders of a stretch stay empty, metres.
@@ -85,6 +91,7 @@ struct Planner<'a> {
     config: &'a TownConfig,
     streets: &'a Streets,
     seed: u64,
+    changes: Changes,
     register: Register,
     built: Built,
 }
@@ -96,6 +103,7 @@ impl<'a> Planner<'a> {
             config,
             streets,
             seed,
+            changes: Changes::new(config, seed),
             register: Register::default(),
             built: Built::default(),
         };
@@ -129,12 +137,15 @@ impl<'a> Planner<'a> {
 
     fn stretch<'l>(&self, frontage: Frontage<'l>, number: u64) -> Stretch<'l> {
         let from_m = number as f64 * STRETCH_M;
-        let district = District::at(
-            self.config.character,
-            self.seed,
-            frontage.place(from_m + STRETCH_M / 2.0, 10.0),
-        );
-        let key = random::hash(&[self.seed, frontage.key(), number]);
+        let (key, place) = if self.config.look_alike {
+            let number = number % ALIKE;
+            let key = random::hash(&[self.seed, frontage.side_key(), number]);
+            (key, Point2::new(number as f64 * STRETCH_M, 0.0))
+        } else {
+            let key = random::hash(&[self.seed, frontage.key(), number]);
+            (key, frontage.place(from_m + STRETCH_M / 2.0, 10.0))
+        };
+        let district = District::at(self.config.character, self.seed, place);
         let mut rng = generator(&[key]);
         let (bays, _) = district.kerb_shares();
         let bays = rng.random_bool(bays);
@@ -157,11 +168,6 @@ impl<'a> Planner<'a> {
     /// Divides a stretch into lots and builds on them.
     fn row(&mut self, stretch: &Stretch<'_>, row: Row) {
         let mut rng = generator(&[stretch.key, 1 + row as u64]);
-        let detail = if row == Row::First {
-            1.0
-        } else {
-            DETAIL_BEHIND
-        };
         let mut at_m = stretch.from_m;
         while at_m + MIN_WIDTH_M < stretch.to_m {
             let claimed = (0..DRAWS).find_map(|_| self.draw(stretch, row, at_m, &mut rng));
@@ -170,7 +176,7 @@ impl<'a> Planner<'a> {
                     &lot,
                     kind,
                     stretch.key ^ row as u64,
-                    detail,
+                    row,
                     generator(&[rng.random()]),
                 );
             }
@@ -229,21 +235,31 @@ impl<'a> Planner<'a> {
             })
     }
 
-    fn plot(&mut self, lot: &Lot, kind: Use, row_key: u64, detail: f64, rng: ChaCha8Rng) {
+    fn plot(&mut self, lot: &Lot, kind: Use, row_key: u64, row: Row, rng: ChaCha8Rng) {
+        let (works, detail) = match row {
+            Row::First => (self.changes.works(&lot.pose), 1.0),
+            Row::Second => (None, DETAIL_BEHIND),
+        };
+        let is_site = works.is_some();
         let site = Site {
             built: &mut self.built,
             pose: lot.pose,
-            rng,
+            rng: works.unwrap_or(rng),
+            changes: self.changes,
         };
-        Plot {
+        let mut plot = Plot {
             site,
             config: self.config,
             width_m: lot.width_m,
             depth_m: lot.depth_m,
             row_key,
             detail,
+        };
+        if is_site {
+            plot.building_site();
+        } else {
+            plot.build(kind);
         }
-        .build(kind);
     }
 
     fn kerb(&mut self, stretch: &Stretch<'_>) {
@@ -267,6 +283,7 @@ impl<'a> Planner<'a> {
             pavement_m,
             bays,
             rng,
+            changes: self.changes,
         }
         .furnish(&mut self.built);
     }

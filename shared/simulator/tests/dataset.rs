@@ -16,7 +16,7 @@ use gyre_simulator::{SimulationConfig, Simulator, SimulatorError, write_dataset}
 
 fn config(scans: usize) -> SimulationConfig {
     SimulationConfig {
-        scans,
+        scans: Some(scans),
         ..SimulationConfig::default()
     }
 }

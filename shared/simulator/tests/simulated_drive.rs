@@ -32,7 +32,7 @@ fn config(format: OutputFormat, scans: usize) -> SimulationConfig {
         ..OutputConfig::default()
     };
     SimulationConfig {
-        scans,
+        scans: Some(scans),
         output,
         ..SimulationConfig::default()
     }
@@ -292,7 +292,7 @@ fn a_folder_of_another_origin_is_rejected_and_not_changed() {
         Err(SimulatorError::OtherDataset { .. })
     ));
     let fewer = SimulationConfig {
-        scans: 2,
+        scans: Some(2),
         ..original.clone()
     };
     assert!(matches!(

@@ -14,7 +14,8 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
         configuration.simulation = None;
     }
     if let Some(simulation) = &mut configuration.simulation {
-        if let Some(file) = &mut simulation.drive.file {
+        let streets = simulation.town.streets.iter_mut();
+        for file in simulation.drive.file.iter_mut().chain(streets) {
             *file = file.canonicalize().unwrap_or_else(|_| file.clone());
         }
         // The constants of a simulated radar are known.

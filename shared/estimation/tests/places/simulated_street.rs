@@ -62,7 +62,7 @@ fn simulate() -> Vec<Keyframe> {
     }
     fs::write(&file, text).unwrap();
     let config = SimulationConfig {
-        scans: poses().len() - 2,
+        scans: Some(poses().len() - 2),
         drive: DriveConfig::along_file(file),
         ..SimulationConfig::default()
     };

@@ -94,7 +94,7 @@ fn delays_s(host_stamps: HostStamps) -> Result<Vec<f64>, SimulatorError> {
         ..OutputConfig::default()
     };
     let mut config = SimulationConfig {
-        scans: 240,
+        scans: Some(240),
         output,
         ..SimulationConfig::default()
     };

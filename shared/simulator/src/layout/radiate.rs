@@ -106,7 +106,7 @@ mod tests {
     #[test]
     fn a_stalling_host_is_late_by_at_most_its_stall_and_keeps_the_order() {
         let simulator = Simulator::new(&SimulationConfig {
-            scans: 400,
+            scans: Some(400),
             ..SimulationConfig::default()
         })
         .unwrap();

@@ -45,6 +45,18 @@ impl Default for Excerpt {
 /// [`SimulatorError::Trajectory`] if the file cannot be read; [`SimulatorError::Drive`] if the excerpt has
 /// fewer than two poses, jumps, pauses for hours, or does not move forward.
 pub fn read(path: &Path, excerpt: Excerpt) -> Result<SplinePath, SimulatorError> {
+    read_in(path, excerpt, None)
+}
+
+/// As [`read`], in the frame `world` of the file's poses; without one in that of the excerpt's first pose.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_in(
+    path: &Path,
+    excerpt: Excerpt,
+    world: Option<Pose>,
+) -> Result<SplinePath, SimulatorError> {
     let poses = timed(path, excerpt.rate_hz)?;
     let error = |reason: String| SimulatorError::Drive {
         path: path.to_owned(),
@@ -63,7 +75,7 @@ pub fn read(path: &Path, excerpt: Excerpt) -> Result<SplinePath, SimulatorError>
         )));
     };
     check_steps(&within).map_err(error)?;
-    let into_world = origin.inverse();
+    let into_world = world.unwrap_or(*origin).inverse();
     let moved: Vec<_> = within
         .iter()
         .map(|(s, pose)| (s - start_s, into_world * pose))
@@ -76,6 +88,21 @@ pub fn read(path: &Path, excerpt: Excerpt) -> Result<SplinePath, SimulatorError>
         )));
     }
     Ok(SplinePath::measured(&moved))
+}
+
+/// The first pose of a file.
+///
+/// # Errors
+/// [`SimulatorError::Trajectory`] if the file cannot be read, [`SimulatorError::Drive`] if it is empty.
+pub fn first_pose(path: &Path) -> Result<Pose, SimulatorError> {
+    let read = read_trajectory(path)?;
+    read.poses
+        .first()
+        .copied()
+        .ok_or_else(|| SimulatorError::Drive {
+            path: path.to_owned(),
+            reason: "it has no poses".to_owned(),
+        })
 }
 
 /// Rejects jumps, and pauses of hours.

@@ -10,6 +10,10 @@ use crate::profile::{Profile, Sampling};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SensorConfig {
+    /// The seed of noise, speckle, the drops of rain, the vehicle's pitch and roll, and the echoes that are
+    /// fixed to the radar. Default: the seed of the simulation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seed: Option<u64>,
     /// The radar. Default: `cts350x-oxford`.
     pub profile: Profile,
     /// Time of one sweep, seconds. Default: the profile's.
@@ -30,6 +34,7 @@ pub struct SensorConfig {
 impl Default for SensorConfig {
     fn default() -> Self {
         Self {
+            seed: None,
             profile: Profile::default(),
             period_s: None,
             range_offset_m: None,

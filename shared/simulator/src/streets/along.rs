@@ -28,9 +28,20 @@ impl Streets {
     /// The ego vehicle drives in its lane. What it drives twice, in either direction and with some metres
     /// of offset, is one street. Everywhere its centre is at least 1.3 m from the kerb.
     pub fn along(path: &dyn Path, duration_s: f64, driving_side: DrivingSide, seed: u64) -> Self {
+        Self::along_all(&[(path, duration_s)], driving_side, seed)
+    }
+
+    /// As [`Streets::along`], along several drives, each with the duration of which streets are laid,
+    /// seconds.
+    pub fn along_all(drives: &[(&dyn Path, f64)], driving_side: DrivingSide, seed: u64) -> Self {
         let mut rng = Stream::Streets.generator(seed);
-        let duration_s = path.duration_s().min(duration_s);
-        let waypoints = waypoints(path, duration_s, driving_side);
+        let drives = drives
+            .iter()
+            .map(|(path, duration_s)| (*path, path.duration_s().min(*duration_s)));
+        let waypoints: Vec<Vec<Waypoint>> = drives
+            .clone()
+            .map(|(path, duration_s)| waypoints(path, duration_s, driving_side))
+            .collect();
         let lines = driven_lines(&waypoints);
         let speeds = mean_speeds(&lines, &waypoints);
         let sides = side_lines(&lines, &mut rng);
@@ -46,7 +57,9 @@ impl Streets {
         for (line, speed_mps) in lines.iter().zip(speeds) {
             streets.push(drawn(line, driven_width_m(speed_mps, &mut rng) / 2.0, true));
         }
-        widen(&mut streets, path, duration_s);
+        for (path, duration_s) in drives {
+            widen(&mut streets, path, duration_s);
+        }
         for line in &sides {
             streets.push(drawn(line, rng.random_range(SIDE_WIDTH_M) / 2.0, false));
         }
@@ -60,7 +73,7 @@ fn driven_width_m(speed_mps: f64, rng: &mut impl Rng) -> f64 {
 }
 
 /// Mean speed along each line while the vehicle moves, metres a second.
-fn mean_speeds(lines: &[Line], waypoints: &[Waypoint]) -> Vec<f64> {
+fn mean_speeds(lines: &[Line], drives: &[Vec<Waypoint>]) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0); lines.len()];
     let carriageway = |line: &Line| Street {
         centre: line.clone(),
@@ -68,7 +81,7 @@ fn mean_speeds(lines: &[Line], waypoints: &[Waypoint]) -> Vec<f64> {
         driven: true,
     };
     let network = Streets::new(lines.iter().map(carriageway).collect());
-    for ends in waypoints.windows(2) {
+    for ends in drives.iter().flat_map(|waypoints| waypoints.windows(2)) {
         let speed_mps = (ends[1].vehicle - ends[0].vehicle).norm()
             / (ends[1].time_s - ends[0].time_s).max(1e-3);
         if let Some(nearest) = network.nearest(ends[0].centre, 12.0) {

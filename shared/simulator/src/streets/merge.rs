@@ -89,11 +89,14 @@ fn direction(poses: &[(f64, Pose)], index: usize) -> Vector2<f64> {
     }
 }
 
-/// Centre lines of the driven streets, each once.
-pub fn driven_lines(waypoints: &[Waypoint]) -> Vec<Line> {
+/// Centre lines of the streets of all drives, each once.
+pub fn driven_lines(drives: &[Vec<Waypoint>]) -> Vec<Line> {
     let mut merger = Merger::default();
-    for point in waypoints {
-        merger.add(point);
+    for waypoints in drives {
+        for point in waypoints {
+            merger.add(point);
+        }
+        merger.end_drive();
     }
     merger
         .finish()
@@ -158,6 +161,12 @@ impl Merger {
             }
         }
         self.append(point.centre);
+    }
+
+    /// The next waypoint does not continue the street of the last.
+    fn end_drive(&mut self) {
+        self.drawing = false;
+        self.joined = None;
     }
 
     fn append(&mut self, place: Point2<f64>) {

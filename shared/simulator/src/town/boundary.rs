@@ -8,6 +8,8 @@ use super::random::{random_positions, smooth};
 use super::site::{Screen, Site};
 use crate::body::NO_BODY;
 
+/// Share of the echo of trees and bushes that is of their leaves.
+const LEAFY: f64 = 0.7;
 /// Scale of the ragged edge of undergrowth, metres.
 const RAGGED_M: f64 = 9.0;
 
@@ -141,10 +143,14 @@ impl Site<'_> {
     pub(super) fn tree(&mut self, place: Point2<f64>, reach_m: f64) {
         let crown_m = self.between(0.5, 1.0);
         self.cloud(place, 1, 0.1, 0.2, 1.5);
-        self.cloud(place, 9, crown_m, reach_m, 0.15);
+        let leaves = self.changes.leaves;
+        let crown_m2 = 0.15 * (1.0 - LEAFY * (1.0 - leaves));
+        self.changing(place, |site| {
+            site.cloud(place, 9, crown_m, reach_m, crown_m2);
+        });
         let half = Vector2::new(crown_m.min(reach_m), 0.0);
         let crown = Screen {
-            transmission: 0.8,
+            transmission: 1.0 - 0.2 * leaves,
             mirror: 0.0,
         };
         self.wall(place - half, place + half, crown, NO_BODY);
@@ -174,14 +180,17 @@ impl Site<'_> {
         median_m2: f64,
     ) {
         let key = self.rng.random();
-        for _ in 0..(size.x * size.y * per_m2).max(0.0) as usize {
-            let share = Vector2::from_fn(|_, _| self.rng.random::<f64>());
-            let place = from + size.component_mul(&share);
-            let from_middle = 2.0 * share - Vector2::repeat(1.0);
-            let cover = 1.5 * smooth(key, place, RAGGED_M) + 0.2 - from_middle.norm_squared();
-            if cover > 0.0 {
-                self.point(place, median_m2 * cover, 6.0, NO_BODY);
+        let median_m2 = median_m2 * (1.0 - LEAFY * (1.0 - self.changes.leaves));
+        self.changing(from, |site| {
+            for _ in 0..(size.x * size.y * per_m2).max(0.0) as usize {
+                let share = Vector2::from_fn(|_, _| site.rng.random::<f64>());
+                let place = from + size.component_mul(&share);
+                let from_middle = 2.0 * share - Vector2::repeat(1.0);
+                let cover = 1.5 * smooth(key, place, RAGGED_M) + 0.2 - from_middle.norm_squared();
+                if cover > 0.0 {
+                    site.point(place, median_m2 * cover, 6.0, NO_BODY);
+                }
             }
-        }
+        });
     }
 }

@@ -106,7 +106,12 @@ impl<'a> Frontage<'a> {
 
     /// The seed of this side.
     pub(super) fn key(&self) -> u64 {
-        self.line.key ^ u64::from(self.side < 0.0)
+        self.line.key ^ self.side_key()
+    }
+
+    /// The seed of this side that all streets share.
+    pub(super) fn side_key(&self) -> u64 {
+        u64::from(self.side < 0.0)
     }
 
     /// A place `out_m` metres beyond the kerb.

@@ -10,6 +10,7 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 use super::boundary::Boundary;
+use super::changes::Changes;
 use super::config::TownConfig;
 use super::district::District;
 use super::frontage::Frontage;
@@ -42,6 +43,7 @@ pub(super) struct Kerb<'a> {
     /// Whether there are parking bays.
     pub bays: bool,
     pub rng: ChaCha8Rng,
+    pub changes: Changes,
 }
 
 impl Kerb<'_> {
@@ -79,7 +81,13 @@ impl Kerb<'_> {
         let place = Point2::from(pose.translation.vector);
         let ours = self.frontage.owns(along_m, place) && self.frontage.is_clear(place, free_m);
         let rng = generator(&[self.rng.random()]);
-        ours.then_some(Site { built, pose, rng })
+        let changes = self.changes;
+        ours.then_some(Site {
+            built,
+            pose,
+            rng,
+            changes,
+        })
     }
 
     /// Whether a rectangle in the frame of a station, of half a length along the kerb and between two
@@ -132,20 +140,33 @@ impl Kerb<'_> {
 
     fn parked_cars(&mut self, built: &mut Built) {
         self.along(5.4, 6.6, |kerb, along_m| {
-            if !kerb
-                .rng
-                .random_bool(kerb.config.parked_cars.clamp(0.0, 1.0))
-            {
-                return;
-            }
-            let (length, width) = (CAR_HALF_M.0 + 0.2, CAR_HALF_M.1);
-            if !kerb.has_room(along_m, CARS_OUT_M, length, [-width, width]) {
-                return;
-            }
-            if let Some(mut site) = kerb.site(along_m, CARS_OUT_M, FREE_M, built) {
-                site.parked_car(Point2::origin(), 0.0);
+            let before = built.len();
+            kerb.parking_place(along_m, built);
+            // As [`Site::changing`] does.
+            let place = kerb.frontage.place(along_m, CARS_OUT_M);
+            if let Some(rng) = kerb.changes.generator(place) {
+                built.cut_back(before);
+                let of_town = std::mem::replace(&mut kerb.rng, rng);
+                kerb.parking_place(along_m, built);
+                kerb.rng = of_town;
             }
         });
+    }
+
+    fn parking_place(&mut self, along_m: f64, built: &mut Built) {
+        if !self
+            .rng
+            .random_bool(self.config.parked_cars.clamp(0.0, 1.0))
+        {
+            return;
+        }
+        let (length, width) = (CAR_HALF_M.0 + 0.2, CAR_HALF_M.1);
+        if !self.has_room(along_m, CARS_OUT_M, length, [-width, width]) {
+            return;
+        }
+        if let Some(mut site) = self.site(along_m, CARS_OUT_M, FREE_M, built) {
+            site.parked_car(Point2::origin(), 0.0);
+        }
     }
 
     /// Bollards, a bus stop, railings, a crash barrier: each on a few stretches.

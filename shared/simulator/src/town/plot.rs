@@ -46,7 +46,7 @@ impl Plot<'_, '_> {
         }
     }
 
-    fn at(&self, x: f64, y: f64) -> Point2<f64> {
+    pub(super) fn at(&self, x: f64, y: f64) -> Point2<f64> {
         Point2::new(x.clamp(0.0, self.width_m), y.clamp(0.0, self.depth_m))
     }
 
@@ -95,7 +95,7 @@ impl Plot<'_, '_> {
         }
     }
 
-    fn clutter(&mut self, y: f64, per_m2: f64, median_m2: f64) {
+    pub(super) fn clutter(&mut self, y: f64, per_m2: f64, median_m2: f64) {
         let size = Vector2::new(self.width_m, self.depth_m - y);
         self.site
             .clutter(Point2::new(0.0, y), size, per_m2, median_m2);
@@ -218,9 +218,13 @@ impl Plot<'_, '_> {
                 Material::Brick,
             );
         }
-        if garden_m > 5.0 && self.site.chance(self.config.parked_cars) {
-            let place = self.at(x + 1.4, y - 2.6);
-            self.site.parked_car(place, FRAC_PI_2);
+        if garden_m > 5.0 {
+            let (place, taken) = (self.at(x + 1.4, y - 2.6), self.config.parked_cars);
+            self.site.changing(place, |site| {
+                if site.chance(taken) {
+                    site.parked_car(place, FRAC_PI_2);
+                }
+            });
         }
     }
 
@@ -339,15 +343,13 @@ impl Plot<'_, '_> {
     /// Cars side by side, `y` metres from the street.
     fn row_of_cars(&mut self, y: f64) {
         for bay in 1..(self.width_m / 2.5) as usize {
-            if self.site.chance(0.8 * self.config.parked_cars) {
-                let place = self.at(2.5 * bay as f64, y);
-                let heading_rad = if self.site.chance(0.5) {
-                    FRAC_PI_2
-                } else {
-                    -FRAC_PI_2
-                };
-                self.site.parked_car(place, heading_rad);
-            }
+            let (place, taken) = (self.at(2.5 * bay as f64, y), 0.8 * self.config.parked_cars);
+            self.site.changing(place, |site| {
+                if site.chance(taken) {
+                    let ahead = if site.chance(0.5) { 1.0 } else { -1.0 };
+                    site.parked_car(place, ahead * FRAC_PI_2);
+                }
+            });
         }
     }
 
@@ -389,7 +391,8 @@ impl Plot<'_, '_> {
         self.house(barn, Form::Plain, Material::Metal, Material::Metal);
         self.across(Boundary::Wall, 0.6);
         let place = self.at(15.0, 4.0);
-        self.site.parked_car(place, PI / 3.0);
+        self.site
+            .changing(place, |site| site.parked_car(place, PI / 3.0));
         self.clutter(2.0, 0.05, 0.1);
     }
 

@@ -5,6 +5,7 @@ use nalgebra::{Point2, Vector2};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
+use super::changes::Changes;
 use super::random::{normal, spread};
 use crate::body::{Aspect, Body, NO_BODY, Scatterer, Wall};
 
@@ -15,11 +16,25 @@ pub(super) struct Built {
     last_body: u32,
 }
 
+impl Built {
+    /// Returns the numbers of scatterers and walls.
+    pub(super) fn len(&self) -> [usize; 2] {
+        [self.content.scatterers.len(), self.content.walls.len()]
+    }
+
+    /// Removes all that was built since there were these numbers of scatterers and walls.
+    pub(super) fn cut_back(&mut self, len: [usize; 2]) {
+        self.content.scatterers.truncate(len[0]);
+        self.content.walls.truncate(len[1]);
+    }
+}
+
 /// A place with a frame and a random generator. All coordinates are in that frame.
 pub(super) struct Site<'a> {
     pub built: &'a mut Built,
     pub pose: Pose,
     pub rng: ChaCha8Rng,
+    pub changes: Changes,
 }
 
 /// Two-way transmitted share and mirrored share of a wall's power.
@@ -34,6 +49,22 @@ impl Site<'_> {
     pub(super) fn body(&mut self) -> u32 {
         self.built.last_body += 1;
         self.built.last_body
+    }
+
+    /// Builds what changes between drives, at a place. It is built as the town's seed has it, and where the
+    /// town has changed since it is replaced, so that the town's random numbers stay the same.
+    pub(super) fn changing(&mut self, place: Point2<f64>, build: impl Fn(&mut Site<'_>)) {
+        let before = self.built.len();
+        build(self);
+        if let Some(rng) = self.changes.generator(self.pose * place) {
+            self.built.cut_back(before);
+            build(&mut Site {
+                built: self.built,
+                pose: self.pose,
+                rng,
+                changes: self.changes,
+            });
+        }
     }
 
     pub(super) fn chance(&mut self, share: f64) -> bool {

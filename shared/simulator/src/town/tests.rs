@@ -1,4 +1,4 @@
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector2};
 
 use super::*;
 use crate::body::{NO_BODY, Wall};
@@ -250,4 +250,46 @@ fn streets_without_length_and_no_streets_give_a_town_too() {
             .scatterers
             .is_empty()
     );
+}
+
+#[test]
+fn look_alike_streets_have_the_same_facades() {
+    let streets = Streets::new(vec![
+        street((0.0, 0.0), 0.0, 500.0, 0.0, true),
+        street((300.0, 900.0), 1.0, 500.0, 0.0, true),
+    ]);
+    let alike = TownConfig {
+        look_alike: true,
+        ..TownConfig::default()
+    };
+    let solid = |config: &TownConfig, of: usize| -> Vec<[Point2<f64>; 2]> {
+        let start = streets.streets()[of].at(0.0).inverse();
+        let walls = build(config, &streets, 4).walls;
+        let ends = walls
+            .iter()
+            .filter(|wall| wall.transmission < 0.2)
+            .map(|wall| [start * wall.from, start * wall.to]);
+        ends.filter(|ends| ends[0].x.abs() < 600.0 && ends[0].y.abs() < 100.0)
+            .collect()
+    };
+    let same = |a: &[Point2<f64>; 2], b: &[Point2<f64>; 2]| {
+        (a[0] - b[0]).norm() < 1e-6 && (a[1] - b[1]).norm() < 1e-6
+    };
+    let share = |config: &TownConfig, ahead_m: f64| {
+        let (one, other) = (solid(config, 0), solid(config, 1));
+        let reached = |wall: &&[Point2<f64>; 2]| (5.0..140.0).contains(&wall[0].x);
+        let ahead = Vector2::new(ahead_m, 0.0);
+        let here: Vec<_> = one.iter().filter(reached).collect();
+        let found = |wall: &&&[Point2<f64>; 2]| {
+            other
+                .iter()
+                .any(|there| same(&[wall[0] + ahead, wall[1] + ahead], there))
+        };
+        assert!(here.len() > 20, "{}", here.len());
+        here.iter().filter(found).count() as f64 / here.len() as f64
+    };
+    assert_eq!(share(&alike, 0.0), 1.0, "two streets");
+    let repeated = share(&alike, 3.0 * STRETCH_M);
+    assert!(repeated > 0.95, "{repeated} along one street");
+    assert_eq!(share(&TownConfig::default(), 0.0), 0.0);
 }

@@ -9,6 +9,9 @@ use crate::limits::require_within;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrafficConfig {
+    /// The seed of the other road users. Default: the seed of the simulation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seed: Option<u64>,
     /// Motor vehicles on a kilometre of each lane; 0 for none, not even in side streets.
     pub vehicles_per_km: f64,
     /// Relative spread of their speeds, by which gaps and paces vary.
@@ -22,6 +25,7 @@ pub struct TrafficConfig {
 impl Default for TrafficConfig {
     fn default() -> Self {
         Self {
+            seed: None,
             vehicles_per_km: 20.0,
             speed_spread: 0.3,
             cyclists_per_km: 3.0,

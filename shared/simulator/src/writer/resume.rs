@@ -124,7 +124,7 @@ fn other_dataset(out: &Path) -> SimulatorError {
 /// The configuration without the keys that do not change the content of a scan.
 fn same_scans(config: &SimulationConfig) -> SimulationConfig {
     let mut config = SimulationConfig {
-        scans: 1,
+        scans: Some(1),
         ..config.clone()
     };
     config.output.store = false;

@@ -198,7 +198,7 @@ fn encoder_eccentricity_turns_the_beam_by_its_cosine() {
 fn a_readers_correction_cancels_the_eccentricity() {
     let folder = tempfile::tempdir().unwrap();
     let mut config = SimulationConfig {
-        scans: 1,
+        scans: Some(1),
         effects: Effects::NONE,
         ..SimulationConfig::default()
     };

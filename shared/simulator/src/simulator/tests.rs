@@ -1,0 +1,300 @@
+#![allow(clippy::unwrap_used)]
+use std::f64::consts::PI;
+use std::fs::File;
+use std::path::Path as FilePath;
+
+use gyre_radar::Trajectory;
+
+use super::*;
+use crate::body::{Movers, Wall};
+use crate::drive::DriveConfig;
+use crate::path::TownDrive;
+use crate::town::TownConfig;
+use crate::traffic::TrafficConfig;
+
+/// Writes a drive of some 80 s and the way back in the other lane: `out.tum`, `back.tum`.
+fn trajectories(folder: &FilePath) -> Vec<PathBuf> {
+    let drive = TownDrive {
+        length_m: 500.0,
+        speed_mps: 9.0,
+        lateral_acceleration_mps2: 2.2,
+        driving_side: crate::DrivingSide::Left,
+    }
+    .path(8);
+    let times = (0..(4.0 * drive.duration_s()) as usize).map(|index| index as f64 / 4.0);
+    let out: Vec<Pose> = times.map(|time_s| drive.pose(time_s)).collect();
+    // Away from the origin, as a recorded drive may begin anywhere.
+    let origin = gyre_geometry::pose(7000.0, -300.0, 0.4);
+    let opposite = gyre_geometry::pose(0.0, -crate::lanes::LANE_M, PI);
+    let back = out.iter().rev().map(|pose| origin * pose * opposite);
+    let files = ["out.tum", "back.tum"].map(|name| folder.join(name));
+    write(&files[0], out.iter().map(|pose| origin * pose).collect());
+    write(&files[1], back.collect());
+    files.to_vec()
+}
+
+fn write(file: &FilePath, poses: Vec<Pose>) {
+    let stamps =
+        (0..poses.len()).map(|index| 1_500_000_000_000_000_000 + index as i64 * 250_000_000);
+    let trajectory = Trajectory {
+        stamp_ns: Some(stamps.collect()),
+        poses,
+    };
+    gyre_radar::write_tum(&trajectory, &mut File::create(file).unwrap()).unwrap();
+}
+
+/// The drive along a file through the town of all files.
+fn through(files: &[PathBuf], driven: usize) -> SimulationConfig {
+    SimulationConfig {
+        drive: DriveConfig::along_file(files[driven].clone()),
+        town: TownConfig {
+            seed: Some(5),
+            streets: files.to_vec(),
+            ..TownConfig::default()
+        },
+        ..SimulationConfig::default()
+    }
+}
+
+/// The ends of the walls that let a share of power within a range pass.
+fn walls(
+    simulator: &Simulator,
+    transmission: std::ops::Range<f64>,
+) -> Vec<(Point2<f64>, Point2<f64>)> {
+    let walls = simulator.world.walls().iter();
+    walls
+        .filter(|wall| transmission.contains(&wall.transmission))
+        .map(|&Wall { from, to, .. }| (from, to))
+        .collect()
+}
+
+fn buildings(simulator: &Simulator) -> Vec<(Point2<f64>, Point2<f64>)> {
+    walls(simulator, 0.0..0.2)
+}
+
+fn parked_cars(simulator: &Simulator) -> Vec<(Point2<f64>, Point2<f64>)> {
+    walls(simulator, 0.85..0.9)
+}
+
+fn others(simulator: &Simulator) -> Vec<Point2<f64>> {
+    let mut places = Vec::new();
+    let everywhere = (Point2::origin(), 1e6);
+    simulator
+        .traffic
+        .visit(20.0, everywhere.0, everywhere.1, &mut |mover| {
+            places.push(Point2::from(mover.pose.translation.vector));
+        });
+    places
+}
+
+#[test]
+fn two_drives_with_one_town_seed_pass_the_same_buildings_in_other_traffic() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = trajectories(folder.path());
+    let out = Simulator::new(&SimulationConfig {
+        seed: 1,
+        ..through(&files, 0)
+    })
+    .unwrap();
+    let back = Simulator::new(&SimulationConfig {
+        seed: 2,
+        ..through(&files, 1)
+    })
+    .unwrap();
+    assert!(buildings(&out).len() > 500, "{}", buildings(&out).len());
+    assert_eq!(buildings(&out), buildings(&back));
+    assert_eq!(out.world.scatterers(), back.world.scatterers());
+    assert_ne!(others(&out), others(&back));
+    assert_ne!(
+        out.render_scan(0).scan.bytes,
+        back.render_scan(0).scan.bytes
+    );
+
+    // Both are in one frame: the way back ends where the way out begins, one lane beside it.
+    let (first, last) = (out.path.pose(0.0), back.path.pose(back.path.duration_s()));
+    let lane = (first.inverse() * last).translation.vector;
+    assert!((lane.norm() - crate::lanes::LANE_M).abs() < 0.3, "{lane}");
+    assert!(
+        first.translation.vector.norm() < 0.1,
+        "the world begins with the first file"
+    );
+
+    let elsewhere = through(&files, 0);
+    let elsewhere = SimulationConfig {
+        town: TownConfig {
+            seed: Some(6),
+            ..elsewhere.town.clone()
+        },
+        ..elsewhere
+    };
+    assert_ne!(
+        buildings(&Simulator::new(&elsewhere).unwrap()),
+        buildings(&out)
+    );
+}
+
+#[test]
+fn the_seed_of_the_town_is_that_of_the_simulation_unless_given() {
+    let seeded = |seed, town_seed| {
+        let town = TownConfig {
+            seed: town_seed,
+            ..TownConfig::default()
+        };
+        Simulator::new(&SimulationConfig {
+            seed,
+            town,
+            ..SimulationConfig::default()
+        })
+        .unwrap()
+    };
+    let town = |seed, town_seed| seeded(seed, town_seed).world.scatterers().to_vec();
+    assert_eq!(town(3, None), town(4, Some(3)));
+    assert_ne!(town(3, None), town(4, None));
+}
+
+#[test]
+fn seeds_of_traffic_and_noise_are_apart() {
+    let config = |traffic, sensor| {
+        let mut config = SimulationConfig {
+            traffic: TrafficConfig {
+                seed: traffic,
+                ..TrafficConfig::default()
+            },
+            ..SimulationConfig::default()
+        };
+        config.sensor.seed = sensor;
+        Simulator::new(&config).unwrap()
+    };
+    let (usual, traffic, noise) = (
+        config(None, None),
+        config(Some(9), None),
+        config(None, Some(9)),
+    );
+    assert_ne!(others(&usual), others(&traffic));
+    assert_eq!(others(&usual), others(&noise));
+    assert_ne!(
+        usual.render_scan(3).scan.bytes,
+        noise.render_scan(3).scan.bytes
+    );
+    assert_eq!(usual.world.scatterers(), noise.world.scatterers());
+}
+
+#[test]
+fn parked_cars_and_building_sites_change_and_all_else_stays() {
+    let with = |changes_seed, building_sites| {
+        let town = TownConfig {
+            changes_seed,
+            building_sites,
+            ..TownConfig::default()
+        };
+        Simulator::new(&SimulationConfig {
+            town,
+            ..SimulationConfig::default()
+        })
+        .unwrap()
+    };
+    let (first, second) = (with(None, 0.0), with(Some(2), 0.0));
+    assert_eq!(buildings(&first), buildings(&second));
+    let cars = [&first, &second].map(parked_cars);
+    let stayed = cars[1].iter().filter(|car| cars[0].contains(car)).count();
+    let [before, after] = cars.map(|cars| cars.len());
+    assert!(
+        before > 100 && (0.7..1.4).contains(&(after as f64 / before as f64)),
+        "{before}, {after}"
+    );
+    assert!(
+        10 * stayed < before,
+        "{stayed} of {before} cars stand as before"
+    );
+
+    let sites = with(Some(2), 0.15);
+    let (all, left) = (buildings(&second), buildings(&sites));
+    let houses = left.iter().filter(|wall| all.contains(wall)).count();
+    let share = houses as f64 / all.len() as f64;
+    assert!(
+        (0.7..0.97).contains(&share),
+        "{share} of the walls are still there"
+    );
+    assert_ne!(
+        left,
+        buildings(&with(Some(3), 0.15)),
+        "other sites on the next drive"
+    );
+}
+
+#[test]
+fn trees_without_leaves_reflect_less_and_hide_nothing() {
+    let with = |leaves| {
+        let town = TownConfig {
+            leaves,
+            ..TownConfig::default()
+        };
+        Simulator::new(&SimulationConfig {
+            town,
+            ..SimulationConfig::default()
+        })
+        .unwrap()
+    };
+    let (summer, winter) = (with(1.0), with(0.0));
+    assert_eq!(buildings(&summer), buildings(&winter));
+    let sum_m2 = |simulator: &Simulator| -> f64 {
+        simulator
+            .world
+            .scatterers()
+            .iter()
+            .map(|s| s.cross_section_m2)
+            .sum()
+    };
+    assert!(sum_m2(&winter) < sum_m2(&summer));
+    let crowns = |simulator| walls(simulator, 0.79..0.81).len();
+    assert!(crowns(&summer) > crowns(&winter) + 20, "barriers are left");
+}
+
+#[test]
+fn a_recording_ends_with_its_trajectory() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = trajectories(folder.path());
+    let whole = Simulator::new(&through(&files, 0)).unwrap();
+    let poses = gyre_radar::read_trajectory(&files[0]).unwrap().poses.len();
+    assert!(
+        whole.scans().abs_diff(poses) <= 1,
+        "{} of {poses}",
+        whole.scans()
+    );
+    let wanting = |scans| {
+        Simulator::new(&SimulationConfig {
+            scans: Some(scans),
+            ..through(&files, 0)
+        })
+    };
+    assert_eq!(wanting(whole.scans()).unwrap().scans(), whole.scans());
+    let error = wanting(whole.scans() + 1).err().unwrap().to_string();
+    assert!(
+        error.contains(&format!("ends after {} scans", whole.scans())),
+        "{error}"
+    );
+    assert_eq!(
+        Simulator::new(&SimulationConfig::default())
+            .unwrap()
+            .scans(),
+        ENDLESS_SCANS
+    );
+}
+
+#[test]
+fn a_drive_off_the_streets_of_the_town_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = trajectories(folder.path());
+    let mut config = through(&files, 0);
+    let aside = gyre_radar::read_trajectory(&files[0]).unwrap().poses;
+    let aside = aside
+        .iter()
+        .map(|pose| pose * gyre_geometry::pose(0.0, 40.0, 0.0));
+    config.drive.file = Some(folder.path().join("aside.tum"));
+    write(&folder.path().join("aside.tum"), aside.collect());
+    let error = Simulator::new(&config).err().unwrap().to_string();
+    assert!(
+        error.contains("leaves the streets of `simulation.town.streets` 0.0 s"),
+        "{error}"
+    );
+}
