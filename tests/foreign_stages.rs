@@ -13,6 +13,7 @@ use gyre_radar_replay::SourceConfig;
 use gyre_stage::{
     Launch, Sink, Source, Stage, StageCounters, StageError,
     inputs::{Joined, JoinedView, PairView, Pairs},
+    reader::Received,
     sink,
     source::{self, Unreadable},
     stage,
@@ -343,7 +344,11 @@ impl Sink for ForeignIntegration {
         Ok((Vec::new(), false))
     }
 
-    fn integrate(&mut self, motion: &MotionHeader) -> Result<PoseHeader, StageError> {
+    fn integrate(
+        &mut self,
+        motion: &MotionHeader,
+        _: Option<&Received<Masked>>,
+    ) -> Result<PoseHeader, StageError> {
         let pose = compose(self.last.as_ref(), motion);
         self.last = Some(pose);
         let x_m = self.fault.of("x", pose.item.seq).unwrap_or(pose.x_m);

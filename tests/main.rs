@@ -15,6 +15,7 @@ mod identity;
 mod in_process;
 mod joint_search;
 mod k2pi;
+mod keyframes;
 mod learned_masks;
 mod live;
 mod lost_input;

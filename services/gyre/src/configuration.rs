@@ -16,6 +16,7 @@ use gyre_radar::DatasetOptions;
 use gyre_radar_replay::SourceConfig;
 use gyre_scan_matching::RefinementKind;
 use gyre_simulator::{OutputFormat, SimulationConfig};
+use gyre_slam::SlamConfig;
 use gyre_stage::supervise::{RestartPolicy, StagePlan};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -41,6 +42,8 @@ pub struct Configuration {
     /// The settings of the method: the sections from `raster` to `refinement`.
     #[serde(flatten)]
     pub odometry: OdometryConfig,
+    /// The correction of the trajectory at places that are seen again.
+    pub slam: SlamConfig,
     /// The command and the restarts of a stage: `radar-replay`, `masking`, `rotation-search`,
     /// `translation-search`, `joint-search`, `refinement` or `pose-integration`.
     pub stages: BTreeMap<String, StageConfig>,
@@ -212,6 +215,7 @@ impl Configuration {
                 exhaustive: strict::section(&mut table, "exhaustive")?,
                 refinement: strict::section(&mut table, "refinement")?,
             },
+            slam: strict::section(&mut table, "slam")?,
             stages: strict::sections(&mut table, "stages", &StageId::ALL.map(StageId::name))?,
         };
         let format = configuration.dataset.format.and_then(OutputFormat::read_as);
@@ -231,6 +235,7 @@ impl Configuration {
             "translation",
             "exhaustive",
             "refinement",
+            "slam",
             "stages",
         ];
         match table.keys().next() {
@@ -268,6 +273,9 @@ impl Configuration {
             .refinement
             .validate()
             .map_err(|e| value("refinement", e.to_string()))?;
+        self.slam
+            .validate()
+            .map_err(|e| value("slam.places", e.to_string()))?;
         self.window(None, 1)
             .validate()
             .map_err(|e| value("run", e.to_string()))?;
@@ -289,6 +297,10 @@ impl Configuration {
         }
         if self.has(StageId::Refinement) && self.odometry.points.capacity == 0 {
             let reason = "points.capacity is 0, but a refinement of kind `local-map` matches points: it must be 1 or more";
+            return Err(value("points", reason.to_owned()));
+        }
+        if self.slam.is_on() && self.odometry.points.capacity == 0 {
+            let reason = "points.capacity is 0, but keyframes of slam are made of points: it must be 1 or more";
             return Err(value("points", reason.to_owned()));
         }
         self.odometry
@@ -337,7 +349,7 @@ impl Configuration {
             look_back: scans_a_mask,
             live_depth,
             observers: self.run.observers,
-            slam: false,
+            slam: self.slam.is_on(),
         }
     }
 

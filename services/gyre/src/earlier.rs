@@ -6,10 +6,14 @@ use std::{
 };
 
 use gyre_messages::StageId;
-use gyre_pose_integration::journal::{self, Content, JournalError};
+use gyre_pose_integration::{
+    KeyframesError, complete_poses,
+    journal::{self, Content, JournalError},
+};
 use gyre_refinement::checkpoint::{self, Checkpoint, CheckpointError};
 use gyre_scan_matching::Refiner;
-use gyre_storage::{self as storage, GroupSync};
+use gyre_slam::{KeyframeError, keyframes_path};
+use gyre_storage::{self as storage, GroupSync, LogError};
 
 use crate::{
     Failure,
@@ -106,15 +110,21 @@ fn kept(error: JournalError, path: &Path) -> Failure {
     .into()
 }
 
-/// Returns the number of poses of an unfinished journal up to the newest one that the map of the refinement knows. After a power
-/// failure that may be an earlier one than the last; after a death it is the last.
+/// Returns the number of poses of an unfinished journal up to the newest one from which the run can go on: all poses up to it have
+/// their keyframes, and the map of the refinement knows it. After a power failure that may be an earlier one than the last; after a
+/// death it is the last.
 fn known_poses(
     out: &Out,
     configuration: &Configuration,
     content: &Content,
 ) -> Result<u64, Failure> {
+    let slam = &configuration.slam;
+    let complete = match slam.is_on() {
+        true => complete_poses(out.path(), &slam.places, content.poses).map_err(damaged)?,
+        false => content.poses,
+    };
     if !configuration.has(StageId::Refinement) {
-        return Ok(content.poses);
+        return Ok(complete);
     }
     let path = checkpoint::path(out.path());
     let known = match path.exists() {
@@ -126,7 +136,8 @@ fn known_poses(
             let cells = Refiner::new(refinement, points.capacity)?.keyframe_cells();
             let window = configuration.run.window;
             let mut map = Checkpoint::open(&path, window, refinement.keyframes, cells)?;
-            let known = map.newest_known(content.last.iter().rev())?;
+            let poses = content.last.iter().rev();
+            let known = map.newest_known(poses.filter(|pose| pose.item.seq < complete))?;
             known.map(|pose| pose.item.seq + 1)
         }
         false => None,
@@ -150,6 +161,17 @@ fn known_poses(
     }
 }
 
+/// Says what to do about damaged keyframes.
+fn damaged(error: KeyframesError) -> Failure {
+    match error {
+        KeyframesError::Log(KeyframeError::Log(LogError::Damaged { .. })) => format!(
+            "{error}: restore it from a backup, choose another --out, or begin anew with --fresh"
+        )
+        .into(),
+        _ => error.into(),
+    }
+}
+
 /// Removes the results and the state of an earlier run, and says what the new one begins with. The journal goes first: without
 /// it nothing else is taken for part of a run.
 ///
@@ -160,7 +182,11 @@ pub fn begin(out: &Out, identity: &Identity, resolved: &str) -> Result<(), Failu
     storage::create_folder(&folder)?;
     storage::remove(&journal::path(out.path()))?;
     storage::sync_folder(&folder)?;
-    let state = [checkpoint::path(out.path()), out.join(COMPLETE)];
+    let state = [
+        checkpoint::path(out.path()),
+        keyframes_path(out.path()),
+        out.join(COMPLETE),
+    ];
     // A new run may not write all of them: none of the earlier ones must be taken for its own.
     let results = results::FILES
         .iter()

@@ -18,7 +18,7 @@ use thiserror::Error;
 
 pub use check::{Content, check, cut};
 use record::{RECORD, Record};
-pub use records::{Records, records};
+pub use records::{Records, records, records_from};
 
 /// The start of a journal, with the version of its records.
 const MAGIC: [u8; 16] = *b"gyre journal v4\n";

@@ -1,23 +1,35 @@
 //! The pose-integration stage: composes motions and their covariances to poses, and journals each pose before it is published.
+//!
+//! With SLAM it also selects the keyframes, and logs each of them before its pose is journalled.
 
 mod compose;
 pub mod journal;
+mod keyframes;
 
-use gyre_messages::{Item, Motion, MotionHeader, PoseHeader, Refined, StageId, flag};
-use gyre_stage::{Launch, Sink, StageCounters, StageError, clock, sink};
+use std::path::PathBuf;
+
+use gyre_geometry::SparsePoint;
+use gyre_messages::{Item, Masked, Motion, MotionHeader, PoseHeader, Refined, StageId, flag};
+use gyre_slam::{KeyframeError, SlamConfig};
+use gyre_stage::{Launch, Sink, StageCounters, StageError, clock, reader::Received, sink};
+use gyre_storage::LogError;
 
 pub use compose::compose;
 use journal::{Journal, JournalError};
+pub use keyframes::{Keyframes, KeyframesError, complete_poses};
 
 /// Runs the stage until SIGTERM.
 ///
 /// # Errors
-/// A journal that cannot be used, or an error of [`sink::run`].
+/// A journal or a log of keyframes that cannot be used, or an error of [`sink::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
-    let path = journal::path(&launch.manifest.out);
+    let out = &launch.manifest.out;
     let mut integration = Integration {
-        journal: Journal::open(&path).map_err(unusable)?,
+        journal: Journal::open(&journal::path(out)).map_err(unusable)?,
         last: None,
+        out: out.clone(),
+        slam: launch.section("slam")?,
+        keyframes: None,
     };
     match launch.manifest.refines {
         true => sink::run::<Refined, _>(launch, &mut integration),
@@ -28,28 +40,53 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 struct Integration {
     journal: Journal,
     last: Option<PoseHeader>,
+    out: PathBuf,
+    slam: SlamConfig,
+    /// Of a run with SLAM, from [`Sink::restore`] on.
+    keyframes: Option<Keyframes>,
 }
 
 impl Sink for Integration {
     const HOP: StageId = StageId::PoseIntegration;
+
+    fn takes_scans(&self) -> bool {
+        self.slam.is_on()
+    }
 
     fn restore(&mut self, count: usize) -> Result<(Vec<PoseHeader>, bool), StageError> {
         // One at least, to go on from.
         let (mut poses, ended) = self.journal.last(count.max(1)).map_err(unusable)?;
         self.last = poses.last().copied();
         poses.drain(..poses.len().saturating_sub(count));
+        if self.slam.is_on() {
+            let known = self.last.map_or(0, |last| last.item.seq.saturating_add(1));
+            let keyframes = Keyframes::open(&self.out, &self.slam.places, known, ended);
+            self.keyframes = Some(keyframes.map_err(unusable_keyframes)?);
+        }
         Ok((poses, ended))
     }
 
-    fn integrate(&mut self, motion: &MotionHeader) -> Result<PoseHeader, StageError> {
+    fn integrate(
+        &mut self,
+        motion: &MotionHeader,
+        scan: Option<&Received<Masked>>,
+    ) -> Result<PoseHeader, StageError> {
         let mut pose = compose(self.last.as_ref(), motion);
         pose.item.hop_mut(Self::HOP).finished_ns = clock::now_ns();
+        if let (Some(keyframes), Some(scan)) = (&mut self.keyframes, scan) {
+            keyframes
+                .add(&pose, points(scan)?)
+                .map_err(unusable_keyframes)?;
+        }
         self.write(&pose)?;
         self.last = Some(pose);
         Ok(pose)
     }
 
     fn end(&mut self, item: &Item) -> Result<(), StageError> {
+        if let Some(keyframes) = &mut self.keyframes {
+            keyframes.end().map_err(unusable_keyframes)?;
+        }
         self.write(&PoseHeader {
             item: Item {
                 flags: flag::END,
@@ -66,13 +103,32 @@ impl Integration {
     }
 }
 
+fn points(scan: &Received<Masked>) -> Result<&[SparsePoint], StageError> {
+    scan.header()
+        .points(scan.values())
+        .ok_or_else(|| scan.malformed("its points do not fit its header"))
+}
+
 fn unusable(error: JournalError) -> StageError {
     match error {
-        // A process that was killed, and is not gone yet.
-        JournalError::Busy { .. } => StageError::Transport {
-            action: "open the journal".to_owned(),
-            reason: error.to_string(),
-        },
+        JournalError::Busy { .. } => busy("open the journal", &error),
         _ => StageError::Input(error.to_string()),
+    }
+}
+
+fn unusable_keyframes(error: KeyframesError) -> StageError {
+    match error {
+        KeyframesError::Log(KeyframeError::Log(LogError::Busy { .. })) => {
+            busy("open the keyframes", &error)
+        }
+        _ => StageError::Input(error.to_string()),
+    }
+}
+
+/// The error for a file of a process that was killed, and is not gone yet.
+fn busy(action: &str, error: &impl ToString) -> StageError {
+    StageError::Transport {
+        action: action.to_owned(),
+        reason: error.to_string(),
     }
 }

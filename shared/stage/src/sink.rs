@@ -1,9 +1,13 @@
 //! The loop of the last stage, which journals each pose before it publishes it.
 
-use gyre_messages::{Header, Item, Message, MotionHeader, Pose, PoseHeader, StageId, flag};
+use gyre_messages::{Header, Item, Masked, Message, MotionHeader, Pose, PoseHeader, StageId, flag};
 
 use crate::{
-    Launch, StageCounters, StageError, allocations, clock, reader::Reader, wake, writer::Writer,
+    Launch, StageCounters, StageError, allocations, clock,
+    reader::{Reader, Received},
+    services::Listener,
+    wake,
+    writer::Writer,
 };
 
 /// The owner of the trajectory.
@@ -11,16 +15,24 @@ pub trait Sink {
     /// The stage that it is, or replaces.
     const HOP: StageId;
 
+    /// Returns whether it takes the scan of each motion as well.
+    fn takes_scans(&self) -> bool {
+        false
+    }
     /// Returns the last poses of the journal, at most `count`, oldest first, and whether the stream had ended.
     ///
     /// # Errors
     /// A journal that cannot be read.
     fn restore(&mut self, count: usize) -> Result<(Vec<PoseHeader>, bool), StageError>;
-    /// Adds a motion, journals its pose and returns it.
+    /// Adds a motion, with its scan if the sink takes scans, journals its pose and returns it.
     ///
     /// # Errors
     /// A journal that cannot be written.
-    fn integrate(&mut self, motion: &MotionHeader) -> Result<PoseHeader, StageError>;
+    fn integrate(
+        &mut self,
+        motion: &MotionHeader,
+        scan: Option<&Received<Masked>>,
+    ) -> Result<PoseHeader, StageError>;
     /// Journals the end of the stream.
     ///
     /// # Errors
@@ -51,23 +63,23 @@ pub fn run<M: Message<Header = MotionHeader>, S: Sink>(
     if ended {
         integration.publish_end(restored.last().map(|pose| pose.item).unwrap_or_default())?;
     }
-    let mut motions = Reader::<M>::open(launch, Some(next))?;
-    integration.drain(&mut motions)?;
+    let mut inputs = Motions::<M>::open(launch, next, integration.sink.takes_scans())?;
+    integration.drain(&mut inputs)?;
     loop {
         let woken = launch.signals.wait(
-            &[motions.listener()],
+            &inputs.listeners(),
             Some(integration.poses.listener()),
             wake::MAX_WAIT,
         )?;
         integration.counters.wakes += 1;
         if woken.stop {
-            integration.counters.duplicates = motions.duplicates();
+            integration.counters.duplicates = inputs.duplicates();
             return Ok(integration.counters);
         }
         if woken.may_have_new_readers() {
             integration.poses.accept_readers()?;
         }
-        if integration.drain(&mut motions)? && woken.timed_out {
+        if integration.drain(&mut inputs)? && woken.timed_out {
             integration.counters.wakes_caught_late += 1;
         }
     }
@@ -109,6 +121,75 @@ fn publish<S: Sink>(poses: &Writer<Pose>, pose: PoseHeader) -> Result<(), StageE
     poses.send(draft, S::HOP)
 }
 
+/// The motions in order, each with its scan if the sink takes scans.
+struct Motions<M: Message> {
+    motions: Reader<M>,
+    scans: Option<Reader<Masked>>,
+}
+
+impl<M: Message<Header = MotionHeader>> Motions<M> {
+    fn open(launch: &Launch, next: u64, with_scans: bool) -> Result<Self, StageError> {
+        let scans = with_scans.then(|| Reader::open(launch, Some(next)));
+        Ok(Self {
+            motions: Reader::open(launch, Some(next))?,
+            scans: scans.transpose()?,
+        })
+    }
+
+    /// Returns the current motion, and its scan if the sink takes scans. `None`: wait.
+    fn head(&mut self) -> Result<Option<Input<'_>>, StageError> {
+        let Some(received) = self.motions.head()? else {
+            return Ok(None);
+        };
+        let mut input = Input {
+            motion: *received.header(),
+            received_ns: received.received_ns,
+            scan: None,
+        };
+        if let Some(scans) = &mut self.scans {
+            let Some(head) = scans.head()? else {
+                return Ok(None);
+            };
+            if head.item().seq != input.motion.item.seq {
+                return Err(StageError::SequenceGap {
+                    topic: Masked::TOPIC,
+                    expected: input.motion.item.seq,
+                    got: head.item().seq,
+                });
+            }
+            input.received_ns = input.received_ns.max(head.received_ns);
+            input.scan = Some(head);
+        }
+        Ok(Some(input))
+    }
+
+    fn release(&mut self) {
+        self.motions.release();
+        if let Some(scans) = &mut self.scans {
+            scans.release();
+        }
+    }
+
+    fn listeners(&self) -> Vec<&Listener> {
+        let scans = self.scans.iter().map(Reader::listener);
+        std::iter::once(self.motions.listener())
+            .chain(scans)
+            .collect()
+    }
+
+    fn duplicates(&self) -> u64 {
+        self.motions.duplicates() + self.scans.as_ref().map_or(0, Reader::duplicates)
+    }
+}
+
+/// The inputs of one pose.
+struct Input<'a> {
+    motion: MotionHeader,
+    scan: Option<&'a Received<Masked>>,
+    /// Time at which the last of them was received, `CLOCK_MONOTONIC`, ns.
+    received_ns: i64,
+}
+
 struct Integration<'a, S: Sink> {
     sink: &'a mut S,
     poses: Writer<Pose>,
@@ -119,35 +200,34 @@ struct Integration<'a, S: Sink> {
 impl<S: Sink> Integration<'_, S> {
     fn drain<M: Message<Header = MotionHeader>>(
         &mut self,
-        motions: &mut Reader<M>,
+        inputs: &mut Motions<M>,
     ) -> Result<bool, StageError> {
         let mut progressed = false;
         while !self.ended {
-            let Some(received) = motions.head()? else {
+            let Some(input) = inputs.head()? else {
                 break;
             };
-            let mut motion = *received.header();
-            match motion.item.is(flag::END) {
+            let item = input.motion.item;
+            match item.is(flag::END) {
                 true => {
-                    self.sink.end(&motion.item)?;
-                    self.publish_end(motion.item)?;
+                    self.sink.end(&item)?;
+                    self.publish_end(item)?;
                     self.ended = true;
                 }
-                false => {
-                    motion.item.hop_mut(S::HOP).received_ns = received.received_ns;
-                    self.integrate(motion)?;
-                }
+                false => self.integrate(input)?,
             }
-            motions.release();
+            inputs.release();
             progressed = true;
         }
         Ok(progressed)
     }
 
-    fn integrate(&mut self, mut motion: MotionHeader) -> Result<(), StageError> {
+    fn integrate(&mut self, input: Input<'_>) -> Result<(), StageError> {
         let (started_ns, allocated) = (clock::now_ns(), allocations::so_far());
-        motion.item.hop_mut(S::HOP).started_ns = started_ns;
-        let pose = self.sink.integrate(&motion)?;
+        let mut motion = input.motion;
+        let hop = motion.item.hop_mut(S::HOP);
+        (hop.received_ns, hop.started_ns) = (input.received_ns, started_ns);
+        let pose = self.sink.integrate(&motion, input.scan)?;
         self.counters.record(
             allocations::so_far() - allocated,
             clock::now_ns() - started_ns,

@@ -2,7 +2,7 @@
 
 use std::{
     fs::File,
-    io::{self, BufReader, Read},
+    io::{self, BufReader, Read, Seek, SeekFrom},
     path::{Path, PathBuf},
 };
 
@@ -10,7 +10,7 @@ use gyre_messages::PoseHeader;
 use gyre_storage::StorageError;
 
 use super::{
-    JournalError, MAGIC,
+    JournalError, MAGIC, length_of,
     record::{RECORD, Record},
 };
 
@@ -42,6 +42,24 @@ pub(super) struct Places {
 pub fn records(path: &Path) -> Result<Option<Records>, JournalError> {
     let places = Places::open(path)?.filter(|places| places.has_header);
     Ok(places.map(|places| Records { places }))
+}
+
+/// As [`records`], from the pose number `first` on.
+///
+/// # Errors
+/// A file that cannot be read or is not a journal.
+pub fn records_from(path: &Path, first: u64) -> Result<Option<Records>, JournalError> {
+    let Some(mut records) = records(path)? else {
+        return Ok(None);
+    };
+    let start = SeekFrom::Start(length_of(first));
+    let places = &mut records.places;
+    places
+        .reader
+        .seek(start)
+        .map_err(StorageError::at("read", path))?;
+    places.next = first;
+    Ok(Some(records))
 }
 
 impl Iterator for Records {

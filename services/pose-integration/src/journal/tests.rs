@@ -67,6 +67,16 @@ fn appended_poses_are_read_back() {
     let (last, ended) = journal.last(2).unwrap();
     assert_eq!((seqs(&last), ended), (vec![2, 3], false));
     assert_eq!(journal.last(9).unwrap().0.len(), 4);
+    let rest: Result<Vec<_>, _> = records_from(&path, 2).unwrap().unwrap().collect();
+    assert_eq!(seqs(&rest.unwrap()), [2, 3]);
+    assert_eq!(
+        records_from(&path, 9)
+            .unwrap()
+            .into_iter()
+            .flatten()
+            .count(),
+        0
+    );
 }
 
 #[test]

@@ -1,7 +1,10 @@
 //! Options of place recognition.
 
+use serde::{Deserialize, Serialize};
+
 /// Options of place recognition.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
 pub struct PlaceOptions {
     /// Distance from the last keyframe at which a scan becomes a keyframe, m.
     pub keyframe_distance_m: f64,

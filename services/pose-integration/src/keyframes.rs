@@ -1,0 +1,177 @@
+//! The keyframes of a run: selected among its poses, and logged before those are journalled.
+
+use std::{
+    mem,
+    path::{Path, PathBuf},
+};
+
+use gyre_estimation::places::PlaceOptions;
+use gyre_geometry::SparsePoint;
+use gyre_messages::{PoseHeader, flag};
+use gyre_slam::{
+    Keyframe, KeyframeBuilder, KeyframeError, KeyframeLog, KeyframeReader, ScanPose, keyframes_path,
+};
+use thiserror::Error;
+
+use crate::journal::{self, JournalError};
+
+/// An error of the keyframes of a run.
+#[derive(Debug, Error)]
+pub enum KeyframesError {
+    /// The log of keyframes.
+    #[error(transparent)]
+    Log(#[from] KeyframeError),
+    /// The journal.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
+    /// A pose of the journal should have a keyframe, and has none.
+    #[error("{path} lacks the keyframe of pose {pose}: the same command computes it anew")]
+    Missing {
+        /// The log of keyframes.
+        path: PathBuf,
+        /// The number of the pose.
+        pose: u64,
+    },
+}
+
+/// The keyframes of a run, open for appending.
+#[derive(Debug)]
+pub struct Keyframes {
+    log: KeyframeLog,
+    builder: KeyframeBuilder,
+    /// Memory for the points of a keyframe.
+    points: Vec<SparsePoint>,
+}
+
+impl Keyframes {
+    /// Opens or creates the log of the run that writes to `out`, whose journal has `poses` poses, and perhaps the end of the stream.
+    /// Keyframes beyond them are cut off, and the motion since the last one is recovered from the journal.
+    ///
+    /// # Errors
+    /// A file that cannot be used, or a pose without its keyframe.
+    pub fn open(
+        out: &Path,
+        options: &PlaceOptions,
+        poses: u64,
+        ended: bool,
+    ) -> Result<Self, KeyframesError> {
+        let path = keyframes_path(out);
+        let mut log = KeyframeLog::open(&path)?;
+        let found = find(log.len(), poses, |index| log.read(index))?;
+        // The end of the keyframes is before that of the journal.
+        if !ended {
+            log.cut(found.keyframes)?;
+        }
+        match recover(out, options, &found, poses)? {
+            (builder, None) => Ok(Self {
+                log,
+                builder,
+                points: Vec::new(),
+            }),
+            (_, Some(pose)) => Err(KeyframesError::Missing { path, pose }),
+        }
+    }
+
+    /// Takes the next pose, before it is journalled. If it becomes a keyframe, that is appended with the scan's points.
+    ///
+    /// # Errors
+    /// A file that cannot be written or synchronised.
+    pub fn add(&mut self, pose: &PoseHeader, points: &[SparsePoint]) -> Result<(), KeyframesError> {
+        let Some(mut keyframe) = self.builder.next(&scan_pose(pose)) else {
+            return Ok(self.log.rely()?);
+        };
+        keyframe.points = mem::take(&mut self.points);
+        keyframe.points.clear();
+        keyframe.points.extend_from_slice(points);
+        self.log.append(&keyframe)?;
+        self.points = keyframe.points;
+        Ok(())
+    }
+
+    /// Says that the stream has ended, before that is journalled. All keyframes survive a power failure when this returns.
+    ///
+    /// # Errors
+    /// A file that cannot be written or synchronised.
+    pub fn end(&mut self) -> Result<(), KeyframesError> {
+        Ok(self.log.end()?)
+    }
+}
+
+/// Returns how many of the first `poses` poses of the journal have all their keyframes. After a death all of them have; a power
+/// failure can take the last keyframes. Changes nothing.
+///
+/// # Errors
+/// A file that cannot be read or is damaged.
+pub fn complete_poses(
+    out: &Path,
+    options: &PlaceOptions,
+    poses: u64,
+) -> Result<u64, KeyframesError> {
+    let mut reader = KeyframeReader::open(&keyframes_path(out))?;
+    let found = find(reader.len(), poses, |index| reader.read(index))?;
+    let (_, missing) = recover(out, options, &found, poses)?;
+    Ok(missing.unwrap_or(poses))
+}
+
+/// The keyframes of a journal.
+struct Found {
+    /// Number of keyframes.
+    keyframes: usize,
+    last: Option<Keyframe>,
+}
+
+/// Finds the last one of `keyframes` keyframes that is among the first `poses` poses.
+fn find(
+    keyframes: usize,
+    poses: u64,
+    mut read: impl FnMut(usize) -> Result<Keyframe, KeyframeError>,
+) -> Result<Found, KeyframeError> {
+    for index in (0..keyframes).rev() {
+        let keyframe = read(index)?;
+        if keyframe.seq < poses {
+            return Ok(Found {
+                keyframes: index + 1,
+                last: Some(keyframe),
+            });
+        }
+    }
+    Ok(Found {
+        keyframes: 0,
+        last: None,
+    })
+}
+
+/// Takes the poses of the journal since the last keyframe again. Returns the first one that lacks its keyframe, if there is one.
+fn recover(
+    out: &Path,
+    options: &PlaceOptions,
+    found: &Found,
+    poses: u64,
+) -> Result<(KeyframeBuilder, Option<u64>), KeyframesError> {
+    let mut builder = KeyframeBuilder::new(options);
+    let last = found.last.as_ref().map(|keyframe| keyframe.seq);
+    let poses_of_journal = journal::records_from(&journal::path(out), last.unwrap_or(0))?;
+    for pose in poses_of_journal.into_iter().flatten() {
+        let pose = pose?;
+        let seq = pose.item.seq;
+        match &found.last {
+            _ if seq >= poses || pose.item.is(flag::END) => break,
+            // The pose of the journal: that of the keyframe has another rounding of its yaw.
+            Some(last) if last.seq == seq => builder.resume(&pose.pose(), last.path_m),
+            _ if builder.next(&scan_pose(&pose)).is_some() => return Ok((builder, Some(seq))),
+            _ => {}
+        }
+    }
+    Ok((builder, None))
+}
+
+fn scan_pose(pose: &PoseHeader) -> ScanPose {
+    ScanPose {
+        seq: pose.item.seq,
+        scan: pose.item.scan,
+        stamp_ns: pose.item.stamp_ns,
+        pose: pose.pose(),
+        motion: pose.motion.motion(),
+        interval_s: pose.motion.interval_ns as f64 * 1e-9,
+    }
+}

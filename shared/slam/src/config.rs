@@ -1,0 +1,46 @@
+//! Configuration of SLAM.
+
+use gyre_estimation::places::{PlaceOptionError, PlaceOptions};
+use serde::{Deserialize, Serialize};
+
+/// Configuration of SLAM: section `[slam]`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct SlamConfig {
+    /// `none`: odometry alone. `filter` and `graph`: the keyframes of the drive are kept in
+    /// `journal/keyframes.log`, for a correction of the trajectory by a filter or by a graph of their
+    /// poses. Odometry is the same with all three.
+    pub kind: SlamKind,
+    /// Keyframes, and the recognition and verification of places.
+    pub places: PlaceOptions,
+}
+
+/// The correction of the trajectory by loops.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum SlamKind {
+    /// Odometry alone.
+    #[default]
+    None,
+    /// An extended Kalman filter over the poses of keyframes (Checchin et al.).
+    Filter,
+    /// A graph of the poses of all keyframes.
+    Graph,
+}
+
+impl SlamConfig {
+    /// Returns whether keyframes are kept and loops closed.
+    pub fn is_on(&self) -> bool {
+        self.kind != SlamKind::None
+    }
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The first option that is out of its bounds.
+    pub fn validate(&self) -> Result<(), PlaceOptionError> {
+        self.places.validate()
+    }
+}

@@ -1,0 +1,157 @@
+//! The log of keyframes of a run with SLAM: odometry is the same with it, and it is the same bytes whatever is killed.
+
+use std::{fs, sync::OnceLock, thread, time::Duration};
+
+use gyre_pose_integration::journal;
+use gyre_slam::{KeyframeLog, KeyframeReader, keyframes_path};
+use rand::{Rng, SeedableRng, rngs::StdRng};
+use rustix::process::Signal;
+
+use crate::common::{Run, recording, send, undisturbed};
+
+/// A run that makes every few scans a keyframe.
+fn run() -> Run {
+    Run::of_recording()
+        .set("slam.kind=graph")
+        .set("slam.places.keyframe_distance_m=5")
+}
+
+/// The log of keyframes when nothing disturbs the run.
+fn undisturbed_log() -> &'static [u8] {
+    static LOG: OnceLock<Vec<u8>> = OnceLock::new();
+    LOG.get_or_init(|| {
+        let run = run();
+        run.complete();
+        log_of(&run)
+    })
+}
+
+fn log_of(run: &Run) -> Vec<u8> {
+    fs::read(keyframes_path(run.out())).unwrap()
+}
+
+fn require_undisturbed(run: &Run, case: &str) {
+    assert_eq!(run.odometry(), undisturbed(), "{case}");
+    assert!(log_of(run) == undisturbed_log(), "{case}: other keyframes");
+}
+
+#[test]
+fn a_run_with_slam_has_the_same_odometry_and_logs_the_keyframes_of_its_poses() {
+    let run = run();
+    assert_eq!(run.complete(), undisturbed());
+    let mut keyframes = KeyframeReader::open(&keyframes_path(run.out())).unwrap();
+    assert!(keyframes.has_ended());
+    let poses = journal::records(&journal::path(run.out()))
+        .unwrap()
+        .unwrap();
+    let poses: Vec<_> = poses.map(Result::unwrap).collect();
+    let expected = 3..poses.len() / 2;
+    assert!(expected.contains(&keyframes.len()), "{}", keyframes.len());
+    for index in 0..keyframes.len() {
+        let keyframe = keyframes.read(index).unwrap();
+        let pose = &poses[keyframe.seq as usize];
+        assert_eq!(keyframe.scan, pose.item.scan);
+        assert_eq!(keyframe.stamp_ns, pose.item.stamp_ns);
+        let apart = pose.pose().error(&keyframe.pose.motion);
+        assert!(apart.norm() < 1e-12, "{apart}");
+        assert!(keyframe.points.len() > 100, "{}", keyframe.points.len());
+    }
+}
+
+#[test]
+fn a_run_without_slam_logs_no_keyframes_and_removes_those_of_an_earlier_run() {
+    let with = run();
+    with.complete();
+    let without = Run::of_recording().into(with.out());
+    assert_eq!(without.complete(), undisturbed());
+    assert!(!keyframes_path(with.out()).exists());
+}
+
+#[test]
+fn a_run_with_slam_is_not_resumed_without() {
+    let with = run().rate("6");
+    let mut running = with.start();
+    running.await_poses(recording::SCANS / 3);
+    running.kill_supervisor();
+    let without = Run::of_recording().into(with.out());
+    without
+        .finish()
+        .failed_with(&["another configuration", "slam.kind"]);
+    with.complete();
+    require_undisturbed(&with, "resumed");
+}
+
+#[test]
+fn keyframes_are_the_same_after_kills_at_random_moments() {
+    for seed in 0..6 {
+        let mut random = StdRng::seed_from_u64(seed);
+        let run = run().rate("6");
+        let mut running = run.start();
+        for _ in 0..2 {
+            running.await_poses_or_end(random.random_range(1..recording::SCANS));
+            thread::sleep(Duration::from_micros(random.random_range(0..50_000)));
+            let stages = running.stages();
+            let all = random.random_bool(0.5);
+            let killed = stages
+                .iter()
+                .filter(|(name, _)| all || *name == "pose-integration");
+            killed.for_each(|(_, pid)| send(*pid, Signal::KILL));
+        }
+        running.finish().succeeded();
+        require_undisturbed(&run, &format!("seed {seed}"));
+    }
+}
+
+#[test]
+fn keyframes_are_the_same_after_the_supervisor_is_killed_at_random_moments() {
+    for seed in 0..3 {
+        let mut random = StdRng::seed_from_u64(100 + seed);
+        let run = run().rate("6");
+        for _ in 0..2 {
+            let mut running = run.start();
+            running.await_poses_or_end(random.random_range(1..recording::SCANS));
+            running.kill_supervisor();
+        }
+        run.complete();
+        require_undisturbed(&run, &format!("seed {seed}"));
+    }
+}
+
+#[test]
+fn a_keyframe_whose_pose_was_not_journalled_is_cut_off() {
+    let run = run().rate("6");
+    let mut running = run.start();
+    running.await_poses(recording::SCANS / 2);
+    running.kill_supervisor();
+    // As after a death between the two files.
+    let poses = poses_of(&run);
+    let last = last_keyframe(&run);
+    assert!(last > 0 && last < poses);
+    journal::cut(&journal::path(run.out()), last).unwrap();
+    run.complete();
+    require_undisturbed(&run, "cut journal");
+}
+
+#[test]
+fn poses_whose_keyframe_is_lost_are_computed_anew() {
+    let run = run().rate("6");
+    let mut running = run.start();
+    running.await_poses(recording::SCANS / 2);
+    running.kill_supervisor();
+    // As after a power failure that has taken the end of one file and not of the other.
+    let mut log = KeyframeLog::open(&keyframes_path(run.out())).unwrap();
+    log.cut(log.len() - 1).unwrap();
+    drop(log);
+    run.complete();
+    require_undisturbed(&run, "cut keyframes");
+}
+
+fn poses_of(run: &Run) -> u64 {
+    journal::check(&journal::path(run.out())).unwrap().poses
+}
+
+fn last_keyframe(run: &Run) -> u64 {
+    let mut keyframes = KeyframeReader::open(&keyframes_path(run.out())).unwrap();
+    let last = keyframes.len() - 1;
+    keyframes.read(last).unwrap().seq
+}
