@@ -1,6 +1,6 @@
 //! The writers of a run in one process: what the stages and `gyre run` write, in their order.
 
-use std::{path::Path, time::Duration};
+use std::{fs, path::Path, sync::OnceLock, time::Duration};
 
 use gyre::{
     Failure,
@@ -17,12 +17,13 @@ use gyre_messages::{
     Footprint, Item, Limits, MotionEstimate, MotionHeader, PoseHeader, Window, flag,
 };
 use gyre_pose_integration::{
-    compose,
+    Keyframes, compose,
     journal::{self, Journal},
 };
 use gyre_radar::DatasetOptions;
 use gyre_refinement::checkpoint::{self, Checkpoint};
 use gyre_scan_matching::Refiner;
+use gyre_slam::{SlamKind, keyframes_path};
 use gyre_stage::supervise::Ending;
 use nalgebra::{Isometry2, Vector2};
 
@@ -32,29 +33,58 @@ const WINDOW: usize = 4;
 const STEP_M: f64 = 1.0;
 const INTERVAL_NS: i64 = 250_000_000;
 const POINTS: usize = 200;
+/// The results that must be the same bytes.
+const RESULTS: [&str; 3] = ["odometry.csv", "trajectory.tum", "trajectory.svg"];
 
 /// A machine on which one run is begun, resumed and completed.
 pub struct Machine {
     configuration: Configuration,
     programs: Programs,
+    /// The results of a run that nothing disturbs.
+    undisturbed: OnceLock<Vec<Vec<u8>>>,
 }
 
 impl Machine {
-    pub fn new() -> Self {
+    /// A machine whose runs have SLAM or not.
+    pub fn new(slam: SlamKind) -> Self {
         // A small map, whose slots are used again within the drive.
         let overrides = [
-            "keyframes=3",
-            "keyframe_distance_m=1.5",
-            "cell_m=1.0",
-            "reach_m=30.0",
+            "refinement.keyframes=3",
+            "refinement.keyframe_distance_m=1.5",
+            "refinement.cell_m=1.0",
+            "refinement.reach_m=30.0",
+            match slam {
+                SlamKind::None => "slam.kind=none",
+                SlamKind::Filter => "slam.kind=filter",
+                SlamKind::Graph => "slam.kind=graph",
+            },
         ]
-        .map(|key| format!("refinement.{key}"));
+        .map(str::to_owned);
         let configuration = Configuration::of_overrides(&overrides).unwrap();
         let programs = Programs::now(&configuration).unwrap();
         Self {
             configuration,
             programs,
+            undisturbed: OnceLock::new(),
         }
+    }
+
+    /// Returns the results of a run that nothing disturbs.
+    pub fn undisturbed(&self) -> &[Vec<u8>] {
+        self.undisturbed.get_or_init(|| {
+            let folder = crate::folder();
+            self.run(folder.path()).unwrap();
+            self.results(folder.path())
+        })
+    }
+
+    /// Returns the content of the files that must be the same bytes.
+    pub fn results(&self, out: &Path) -> Vec<Vec<u8>> {
+        let has_keyframes = self.configuration.slam.is_on();
+        let keyframes = has_keyframes.then(|| keyframes_path(out));
+        let results = RESULTS.iter().map(|name| out.join(name));
+        let read = |path| fs::read(path).unwrap();
+        results.chain(keyframes).map(read).collect()
     }
 
     /// Does what the command does, to the end of the run.
@@ -101,7 +131,7 @@ impl Machine {
             look_back: 1,
             live_depth: 0,
             observers: 0,
-            slam: false,
+            slam: self.configuration.slam.is_on(),
         };
         let limits = Limits {
             scan_bytes: 1,
@@ -133,6 +163,7 @@ struct Stages {
     refiner: Refiner,
     checkpoint: Checkpoint,
     journal: Journal,
+    keyframes: Option<Keyframes>,
     last: Option<PoseHeader>,
 }
 
@@ -144,10 +175,16 @@ impl Stages {
         let checkpoint = Checkpoint::open(&checkpoint::path(out), WINDOW, config.keyframes, cells)?;
         let journal = Journal::open(&journal::path(out))?;
         let last = journal.last(1)?.0.pop();
+        let slam = &configuration.slam;
+        let poses = last.map_or(0, |last| last.item.seq + 1);
+        let keyframes = slam
+            .is_on()
+            .then(|| Keyframes::open(out, &slam.places, poses, false));
         Ok(Self {
             refiner,
             checkpoint,
             journal,
+            keyframes: keyframes.transpose()?,
             last,
         })
     }
@@ -165,8 +202,14 @@ impl Stages {
             self.checkpoint
                 .write(seq, checkpoint::checksum(&motion.motion), &self.refiner)?;
             let pose = compose(self.last.as_ref(), &motion);
+            if let Some(keyframes) = &mut self.keyframes {
+                keyframes.add(&pose, &scan(seq))?;
+            }
             self.journal.append(&pose)?;
             self.last = Some(pose);
+        }
+        if let Some(keyframes) = &mut self.keyframes {
+            keyframes.end()?;
         }
         let end = PoseHeader {
             item: Item {

@@ -8,21 +8,15 @@
 mod disk;
 mod machine;
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-    sync::OnceLock,
-};
+use std::path::{Path, PathBuf};
 
+use gyre_slam::SlamKind;
 use gyre_storage::record::{Operation, Recorder};
 use rand::{SeedableRng, rngs::StdRng};
 use tempfile::TempDir;
 
 use disk::{Disk, Survives};
 use machine::Machine;
-
-/// The results that must be the same bytes.
-const RESULTS: [&str; 3] = ["odometry.csv", "trajectory.tum", "trajectory.svg"];
 
 /// A folder in memory, where a synchronisation costs nothing.
 fn folder() -> TempDir {
@@ -31,22 +25,6 @@ fn folder() -> TempDir {
         .tempdir_in("/dev/shm")
         .or_else(|_| tempfile::tempdir())
         .unwrap()
-}
-
-fn results(out: &Path) -> Vec<Vec<u8>> {
-    RESULTS
-        .iter()
-        .map(|name| fs::read(out.join(name)).unwrap())
-        .collect()
-}
-
-fn undisturbed(machine: &Machine) -> &'static [Vec<u8>] {
-    static RESULTS: OnceLock<Vec<Vec<u8>>> = OnceLock::new();
-    RESULTS.get_or_init(|| {
-        let folder = folder();
-        machine.run(folder.path()).unwrap();
-        results(folder.path())
-    })
 }
 
 /// Runs to the end and returns the changes that this has made.
@@ -68,14 +46,14 @@ struct Outcomes {
 fn check(machine: &Machine, out: &Path, case: &str, outcomes: &mut Outcomes) {
     if machine.is_complete(out) {
         assert_eq!(
-            results(out),
-            undisturbed(machine),
+            machine.results(out),
+            machine.undisturbed(),
             "marked as complete: {case}"
         );
     }
     match machine.run(out) {
         Ok(()) => {
-            assert_eq!(results(out), undisturbed(machine), "{case}");
+            assert_eq!(machine.results(out), machine.undisturbed(), "{case}");
             outcomes.complete += 1;
         }
         Err(refusal) => {
@@ -97,9 +75,18 @@ fn tries() -> u64 {
 
 #[test]
 fn after_a_power_failure_at_any_change_the_results_are_the_undisturbed_ones() {
-    let (machine, first) = (Machine::new(), folder());
+    fails_at_any_change(&Machine::new(SlamKind::None));
+}
+
+#[test]
+fn after_a_power_failure_at_any_change_of_a_run_with_slam_its_keyframes_are_the_undisturbed_ones() {
+    fails_at_any_change(&Machine::new(SlamKind::Graph));
+}
+
+fn fails_at_any_change(machine: &Machine) {
+    let first = folder();
     let root: PathBuf = first.path().canonicalize().unwrap();
-    let operations = recorded(&machine, &root);
+    let operations = recorded(machine, &root);
     let (mut disk, mut outcomes) = (Disk::default(), Outcomes::default());
     let ways = [Survives::Nothing, Survives::All].into_iter();
     let ways: Vec<_> = ways.chain((0..tries()).map(|_| Survives::Some)).collect();
@@ -115,7 +102,7 @@ fn after_a_power_failure_at_any_change_the_results_are_the_undisturbed_ones() {
                 after.path(),
             );
             let case = format!("change {at}, {survives:?}, seed {seed}");
-            check(&machine, after.path(), &case, &mut outcomes);
+            check(machine, after.path(), &case, &mut outcomes);
         }
     }
     println!("{} changes: {outcomes:?}", operations.len());
@@ -128,13 +115,23 @@ fn after_a_power_failure_at_any_change_the_results_are_the_undisturbed_ones() {
 
 #[test]
 fn a_second_power_failure_while_the_run_goes_on_changes_nothing_either() {
-    let (machine, first) = (Machine::new(), folder());
+    fails_twice(&Machine::new(SlamKind::None), 13);
+}
+
+#[test]
+fn a_second_power_failure_while_a_run_with_slam_goes_on_changes_nothing_either() {
+    fails_twice(&Machine::new(SlamKind::Graph), 29);
+}
+
+/// The power fails at each change that is a multiple of `every`, and at any change of the next run.
+fn fails_twice(machine: &Machine, every: usize) {
+    let first = folder();
     let root: PathBuf = first.path().canonicalize().unwrap();
-    let operations = recorded(&machine, &root);
+    let operations = recorded(machine, &root);
     let (mut disk, mut outcomes) = (Disk::default(), Outcomes::default());
     for (at, operation) in operations.iter().enumerate() {
         disk.apply(operation);
-        if at % 13 != 0 {
+        if at % every != 0 {
             continue;
         }
         let failed = folder();
@@ -142,13 +139,13 @@ fn a_second_power_failure_while_the_run_goes_on_changes_nothing_either() {
         disk.fail(Survives::Some, &mut random, &root, failed.path());
         let root = failed.path().canonicalize().unwrap();
         let mut disk = Disk::of(&root);
-        for (again, operation) in recorded(&machine, &root).iter().enumerate() {
+        for (again, operation) in recorded(machine, &root).iter().enumerate() {
             disk.apply(operation);
             for survives in [Survives::Nothing, Survives::Some] {
                 let after = folder();
                 disk.fail(survives, &mut random, &root, after.path());
                 let case = format!("changes {at} and {again}, {survives:?}");
-                check(&machine, after.path(), &case, &mut outcomes);
+                check(machine, after.path(), &case, &mut outcomes);
             }
         }
     }
@@ -158,7 +155,7 @@ fn a_second_power_failure_while_the_run_goes_on_changes_nothing_either() {
 
 #[test]
 fn a_power_failure_while_a_new_run_takes_the_place_of_a_complete_one_mixes_nothing() {
-    let (machine, first) = (Machine::new(), folder());
+    let (machine, first) = (Machine::new(SlamKind::Graph), folder());
     let root: PathBuf = first.path().canonicalize().unwrap();
     machine.run(&root).unwrap();
     let mut disk = Disk::of(&root);

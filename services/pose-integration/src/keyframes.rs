@@ -7,7 +7,7 @@ use std::{
 
 use gyre_estimation::places::PlaceOptions;
 use gyre_geometry::SparsePoint;
-use gyre_messages::{PoseHeader, flag};
+use gyre_messages::PoseHeader;
 use gyre_slam::{
     Keyframe, KeyframeBuilder, KeyframeError, KeyframeLog, KeyframeReader, ScanPose, keyframes_path,
 };
@@ -149,13 +149,14 @@ fn recover(
     poses: u64,
 ) -> Result<(KeyframeBuilder, Option<u64>), KeyframesError> {
     let mut builder = KeyframeBuilder::new(options);
-    let last = found.last.as_ref().map(|keyframe| keyframe.seq);
-    let poses_of_journal = journal::records_from(&journal::path(out), last.unwrap_or(0))?;
-    for pose in poses_of_journal.into_iter().flatten() {
+    let last = found.last.as_ref().map_or(0, |keyframe| keyframe.seq);
+    let records = journal::records_from(&journal::path(out), last)?;
+    // Behind them may be what a power failure has left of others, or the end of the stream.
+    let count = usize::try_from(poses.saturating_sub(last)).unwrap_or(usize::MAX);
+    for pose in records.into_iter().flatten().take(count) {
         let pose = pose?;
         let seq = pose.item.seq;
         match &found.last {
-            _ if seq >= poses || pose.item.is(flag::END) => break,
             // The pose of the journal: that of the keyframe has another rounding of its yaw.
             Some(last) if last.seq == seq => builder.resume(&pose.pose(), last.path_m),
             _ if builder.next(&scan_pose(&pose)).is_some() => return Ok((builder, Some(seq))),
