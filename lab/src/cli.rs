@@ -4,7 +4,10 @@ use std::{num::NonZeroUsize, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::{corrupt::CorruptArguments, places::PlacesArguments, sequence::SequenceArguments};
+use crate::{
+    corrupt::CorruptArguments, places::PlacesArguments, sequence::SequenceArguments,
+    slam::SlamArguments,
+};
 
 /// Gyre's laboratory: what research on radar odometry needs, and a robot does not.
 ///
@@ -30,6 +33,8 @@ pub enum Command {
     ExportPairs(ExportPairsArguments),
     /// Measure how well the places of a run are recognised, and its loops verified.
     Places(PlacesArguments),
+    /// Close the loops of a run, correct its trajectory, and compare both with the ground truth.
+    Slam(SlamArguments),
     /// A command of `gyre`.
     #[command(flatten)]
     Gyre(gyre::cli::Command),

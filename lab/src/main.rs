@@ -3,6 +3,7 @@
 mod ablation;
 mod cli;
 mod corrupt;
+mod drive;
 mod export_pairs;
 mod models;
 mod places;
@@ -10,6 +11,7 @@ mod realism;
 mod recording;
 mod report;
 mod sequence;
+mod slam;
 mod tables;
 
 use std::process::ExitCode;
@@ -33,6 +35,7 @@ fn main() -> ExitCode {
         Command::Corrupt(arguments) => corrupt::corrupt(&arguments),
         Command::ExportPairs(arguments) => export_pairs::export_pairs(&arguments),
         Command::Places(arguments) => places::places(&arguments),
+        Command::Slam(arguments) => slam::slam(&arguments),
         Command::Gyre(command) => return gyre::report("gyre", gyre::execute(command)),
     };
     gyre::report("gyre-lab", result)

@@ -1,7 +1,6 @@
 //! `gyre-lab places`: measures how well the places of a run are recognised, and its loops verified.
 
 mod counts;
-mod drive;
 
 use std::{fmt::Write, path::PathBuf, process::ExitCode, time::Instant};
 
@@ -13,9 +12,11 @@ use gyre_estimation::places::{
 use gyre_geometry::xy_yaw;
 use nalgebra::Vector3;
 
-use crate::report::{make_folder, publish, save};
+use crate::{
+    drive::Drive,
+    report::{make_folder, publish, save},
+};
 use counts::Counts;
-use drive::Drive;
 
 /// Candidates that are verified, and their distance from each other along the path.
 const VERIFIED: usize = 3;
@@ -66,7 +67,7 @@ pub fn places(arguments: &PlacesArguments) -> Result<ExitCode, Failure> {
     let mut rows = String::from(HEADER);
     for (query, descriptor) in descriptors.iter().enumerate() {
         let eligible = index.places_until(drive.path_m[query] - arguments.gap_m);
-        if eligible == 0 || drive.keyframes[query].truth.is_none() {
+        if eligible == 0 || drive.truths[query].is_none() {
             continue;
         }
         counts.recall(
@@ -106,7 +107,7 @@ fn describe(drive: &mut Drive) -> Result<(PlaceIndex, Vec<Descriptor>), Failure>
         drive.draw(k, 0);
         let mut descriptor = Descriptor::default();
         describer.describe(&drive.submaps[0], &mut descriptor);
-        index.insert(drive.keyframes[k].scan as u64, drive.path_m[k], &descriptor)?;
+        index.insert(drive.keyframes[k].scan, drive.path_m[k], &descriptor)?;
         descriptors.push(descriptor);
     }
     Ok((index, descriptors))
@@ -119,7 +120,7 @@ fn check(
     verification: Verification,
     wrong_m: f64,
 ) -> Option<Checked> {
-    let [later, earlier] = [query, place].map(|k| drive.keyframes[k].truth);
+    let [later, earlier] = [query, place].map(|k| drive.truths[k]);
     let truth = earlier?.inv_mul(&later?);
     let error = verification.motion.error(&truth);
     Some(Checked {

@@ -4,8 +4,11 @@ use std::{collections::BTreeSet, time::Duration};
 
 use gyre_estimation::places::{Candidate, Descriptor, PlaceIndex, VerificationOutcome};
 
-use super::{Checked, drive::Drive};
-use crate::report::{Record, Table, record};
+use super::Checked;
+use crate::{
+    drive::Drive,
+    report::{Record, Table, record},
+};
 use serde_json::json;
 
 /// Places within these distances of the queried one are the same, m.
@@ -81,7 +84,7 @@ impl Counts {
         eligible: usize,
         candidates: &[Candidate],
     ) {
-        let distance_m = |place: usize| distance_m(drive, query, place);
+        let distance_m = |place: usize| drive.true_distance_m(query, place);
         let nearest_m = (0..eligible).map(distance_m).fold(f64::INFINITY, f64::min);
         for (k, near_m) in NEAR_M.into_iter().enumerate() {
             if nearest_m >= near_m {
@@ -192,15 +195,6 @@ impl Counts {
 
 fn percent(part: usize, whole: usize) -> Option<f64> {
     (whole > 0).then(|| 100.0 * part as f64 / whole as f64)
-}
-
-/// The true distance of two keyframes; infinite where it is unknown.
-fn distance_m(drive: &Drive, query: usize, place: usize) -> f64 {
-    let [a, b] = [query, place].map(|k| drive.keyframes[k].truth);
-    match (a, b) {
-        (Some(a), Some(b)) => (a.translation.vector - b.translation.vector).norm(),
-        _ => f64::INFINITY,
-    }
 }
 
 impl Errors {

@@ -145,6 +145,19 @@ impl PoseGraph {
         Ok(verdict)
     }
 
+    /// Tests a loop against the odometry between its keyframes, as [`PoseGraph::apply`] does, without taking it.
+    ///
+    /// # Errors
+    /// As [`PoseGraph::apply`].
+    pub fn test(&self, constraint: &Constraint) -> Result<Verdict, EstimationError> {
+        constraint.check(self.poses.len())?;
+        let &Constraint {
+            from, to, motion, ..
+        } = constraint;
+        let edge = Edge::new([from, to], motion).ok_or(EstimationError::Covariance { from, to })?;
+        Ok(self.judge(&edge))
+    }
+
     /// Returns the poses of all keyframes, as last solved; those added since continue from there by odometry.
     pub fn poses(&self) -> &[Pose] {
         &self.poses

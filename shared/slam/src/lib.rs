@@ -4,14 +4,31 @@
 //! - [`Keyframe`]: a scan whose pose is corrected, with all that a loop or a map needs of it;
 //! - [`SlamConfig`]: the section `[slam]` of a run's configuration;
 //! - [`KeyframeBuilder`]: makes keyframes from the poses of odometry;
-//! - [`KeyframeLog`]: the file of all keyframes of a run; [`KeyframeReader`] follows it.
+//! - [`KeyframeLog`]: the file of all keyframes of a run; [`KeyframeReader`] follows it;
+//! - [`LoopCloser`]: which keyframes are of the same place; [`Query`]: the candidates of a keyframe with their verdicts;
+//! - [`TrajectoryEstimator`]: the poses of all keyframes from odometry and loops;
+//! - [`Correction`]: the poses of all scans.
 
+mod closing;
 mod config;
+mod consistency;
+mod correction;
+mod exact;
 mod keyframe;
 mod keyframe_builder;
 mod keyframes;
+mod loops;
+mod place;
+mod trajectory;
 
+pub use closing::{ClosingError, KeyframeSource, LoopCloser, LoopOptions};
 pub use config::{SlamConfig, SlamKind};
+pub use correction::Correction;
 pub use keyframe::{Keyframe, MalformedKeyframe};
 pub use keyframe_builder::{KeyframeBuilder, ScanPose};
 pub use keyframes::{KeyframeError, KeyframeLog, KeyframeReader, keyframes_path};
+pub use loops::{LoopCandidate, LoopOutcome, MalformedQuery, Query};
+pub use place::{MalformedPlace, Place};
+pub use trajectory::{
+    EstimatorKind, JudgedLoop, LoopVerdict, TrajectoryEstimator, TrajectoryOptions,
+};

@@ -50,6 +50,23 @@ impl Default for Descriptor {
 impl Descriptor {
     /// Size of the sieve of a descriptor, bytes.
     pub const SIEVE_BYTES: usize = RADII * SIEVE_HARMONICS;
+    /// Size of a descriptor in a file, bytes.
+    pub const BYTES: usize = Self::SIEVE_BYTES + SPECTRUM_BYTES;
+
+    /// Appends the form in a file: the sieve, then the spectrum.
+    pub fn encode(&self, bytes: &mut Vec<u8>) {
+        bytes.extend_from_slice(&self.sieve);
+        bytes.extend_from_slice(bytemuck::cast_slice(&self.spectrum));
+    }
+
+    /// Decodes what [`encode`](Self::encode) has written; `None` if `bytes` are not [`BYTES`](Self::BYTES).
+    pub fn decode(bytes: &[u8]) -> Option<Self> {
+        let (sieve, spectrum) = bytes.split_at_checked(Self::SIEVE_BYTES)?;
+        (spectrum.len() == SPECTRUM_BYTES).then(|| Self {
+            sieve: sieve.to_vec(),
+            spectrum: bytemuck::cast_slice(spectrum).to_vec(),
+        })
+    }
 
     /// Returns the spectrum: radius x (real part, imaginary part) x harmonic.
     pub fn spectrum(&self) -> ArrayView3<'_, i8> {

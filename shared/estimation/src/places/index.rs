@@ -132,6 +132,15 @@ impl PlaceIndex {
         self.places.get(place).map(|place| (place.id, place.path_m))
     }
 
+    /// Returns the descriptor of a place.
+    pub fn descriptor(&self, place: usize) -> Option<Descriptor> {
+        let (sieves, spectra) = (Descriptor::SIEVE_BYTES, SPECTRUM_BYTES);
+        (place < self.len()).then(|| Descriptor {
+            sieve: self.sieves[place * sieves..][..sieves].to_vec(),
+            spectrum: self.spectra[place * spectra..][..spectra].to_vec(),
+        })
+    }
+
     /// Returns the number of places up to `path_m` metres along the path.
     pub fn places_until(&self, path_m: f64) -> usize {
         self.places.partition_point(|place| place.path_m <= path_m)

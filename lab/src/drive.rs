@@ -1,32 +1,28 @@
 //! The keyframes of a run, with their points and true poses.
 
+use std::convert::Infallible;
 use std::path::Path;
 
-use gyre::{Failure, configuration::Configuration};
+use gyre::{Failure, configuration::Configuration, odometry};
 use gyre_estimation::places::{KeyframeSelector, MAX_NEIGHBOURS, PlaceOptions, neighbours};
-use gyre_geometry::{Pose, SparsePoint, Twist};
+use gyre_evaluation::TimedMotion;
+use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion};
 use gyre_masking::{MaskKind, Masker};
 use gyre_radar::{OwnedScan, Trajectory, find_ground_truth, read_trajectory};
 use gyre_scan_matching::{RefinementConfig, Submap};
+use gyre_slam::{Keyframe, KeyframeSource};
 
 /// Poses of a run and of the truth belong to a scan if they are this near in time.
 const SAME_TIME_NS: u64 = 50_000_000;
 
-/// A keyframe of a run.
-pub struct Keyframe {
-    /// The scan's number in the recording.
-    pub scan: usize,
-    pub points: Vec<SparsePoint>,
-    /// Pose and velocity by the run.
-    pose: Pose,
-    twist: Twist,
-    /// The true pose.
-    pub truth: Option<Pose>,
-}
-
-/// The keyframes of a run.
+/// A run with its keyframes and the truth about them.
 pub struct Drive {
+    /// The poses of all scans by the run, and the true trajectory.
+    pub estimate: Trajectory,
+    pub truth: Trajectory,
     pub keyframes: Vec<Keyframe>,
+    /// The true pose of each keyframe.
+    pub truths: Vec<Option<Pose>>,
     /// The path up to each keyframe, m.
     pub path_m: Vec<f64>,
     pub refinement: RefinementConfig,
@@ -53,30 +49,36 @@ impl Drive {
         let truth = truth
             .or_else(|| find_ground_truth(&data))
             .ok_or_else(|| format!("{} has no ground truth", data.display()))?;
-        let estimate = read_trajectory(&run.join("trajectory.tum"))?;
+        let motions = odometry::read(&run.join("odometry.csv"))?;
         let capacity = configuration.odometry.points.capacity;
         let mut drive = Self {
+            estimate: read_trajectory(&run.join("trajectory.tum"))?,
+            truth: read_trajectory(&truth)?,
             keyframes: Vec::new(),
+            truths: Vec::new(),
             path_m: Vec::new(),
             refinement: configuration.odometry.refinement.clone(),
             capacity,
             submaps: [0, 1].map(|_| Submap::with_capacity(capacity * (2 * MAX_NEIGHBOURS + 1))),
             submap_reach_m: options.submap_reach_m,
         };
-        drive.select(&configuration, &data, &estimate, options)?;
-        let truth = read_trajectory(&truth)?;
-        let stamps = estimate.stamp_ns.as_deref().unwrap_or_default();
-        for keyframe in &mut drive.keyframes {
-            keyframe.truth = truth.near(stamps[keyframe.scan], SAME_TIME_NS);
-        }
+        drive.select(&configuration, &data, &motions, options)?;
         Ok(drive)
+    }
+
+    /// Returns the distance of two keyframes by the truth, m; infinite where it is unknown.
+    pub fn true_distance_m(&self, a: usize, b: usize) -> f64 {
+        match (self.truths[a], self.truths[b]) {
+            (Some(a), Some(b)) => (a.translation.vector - b.translation.vector).norm(),
+            _ => f64::INFINITY,
+        }
     }
 
     fn select(
         &mut self,
         configuration: &Configuration,
         data: &Path,
-        estimate: &Trajectory,
+        motions: &[TimedMotion],
         options: &PlaceOptions,
     ) -> Result<(), Failure> {
         let mut dataset = gyre_radar::open(data, &configuration.dataset)?;
@@ -87,8 +89,15 @@ impl Drive {
         let mut masker = Masker::new(&odometry.raster, &odometry.points, &odometry.masking)?;
         let mut selector = KeyframeSelector::new(options);
         let mut points = vec![SparsePoint::default(); self.capacity];
-        let stamps = estimate.stamp_ns.as_deref().unwrap_or_default();
-        for (k, pose) in estimate.poses.iter().enumerate() {
+        let stamps = self.estimate.stamp_ns.clone().unwrap_or_default();
+        if motions.len() + 1 != stamps.len() {
+            return Err("odometry.csv and trajectory.tum are not of one run".into());
+        }
+        let (mut reckoned, mut since) = (UncertainMotion::identity(), UncertainMotion::identity());
+        for (k, pose) in self.estimate.poses.iter().enumerate() {
+            if let Some(motion) = k.checked_sub(1).map(|last| motions[last].estimate) {
+                (reckoned, since) = (reckoned.then(&motion), since.then(&motion));
+            }
             let Some(path_m) = selector.next(pose) else {
                 continue;
             };
@@ -99,15 +108,23 @@ impl Drive {
                 )
                 .into());
             }
-            let twist = twist(estimate, stamps, k);
+            let twist = twist(&self.estimate, &stamps, k);
             let count = masker.points(&scan.view(), Some(twist), &mut points)?;
+            let motion = std::mem::replace(&mut since, UncertainMotion::identity());
             self.keyframes.push(Keyframe {
-                scan: k,
-                points: points[..count].to_vec(),
-                pose: *pose,
+                seq: k as u64,
+                scan: k as u64,
+                stamp_ns: stamps[k],
+                pose: UncertainMotion {
+                    motion: *pose,
+                    covariance: reckoned.covariance,
+                },
+                motion,
                 twist,
-                truth: None,
+                path_m,
+                points: points[..count].to_vec(),
             });
+            self.truths.push(self.truth.near(stamps[k], SAME_TIME_NS));
             self.path_m.push(path_m);
         }
         Ok(())
@@ -124,9 +141,17 @@ impl Drive {
             submap.add(
                 &other.points,
                 &other.twist,
-                &middle.pose.inv_mul(&other.pose),
+                &middle.pose.motion.inv_mul(&other.pose.motion),
             );
         }
+    }
+}
+
+impl KeyframeSource for &Drive {
+    type Error = Infallible;
+
+    fn keyframe(&mut self, index: usize) -> Result<Keyframe, Infallible> {
+        Ok(self.keyframes[index].clone())
     }
 }
 

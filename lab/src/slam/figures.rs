@@ -1,0 +1,185 @@
+//! What is measured of loops and of a corrected trajectory.
+
+use std::time::Duration;
+
+use gyre::{Failure, judgement::judge};
+use gyre_evaluation::Options;
+use gyre_geometry::UncertainMotion;
+use gyre_radar::Trajectory;
+use gyre_slam::{Query, TrajectoryEstimator};
+use serde_json::json;
+
+use crate::{
+    drive::Drive,
+    report::{Record, Table, record},
+};
+
+/// Keyframes within this distance of an earlier one are revisits, m.
+const NEAR_M: f64 = 5.0;
+/// A loop is wrong if its yaw is off by more.
+const WRONG_DEG: f64 = 5.0;
+/// The share of the path before a keyframe that is not compared with it, m.
+const GAP_M: f64 = 100.0;
+
+/// The figures of a trajectory.
+pub struct Figures {
+    ate_m: f64,
+    /// Loops taken, and those that the gate rejected or the kernel weighs less than a quarter.
+    loops: [usize; 2],
+    residual_m: Option<f64>,
+    /// NEES of the keyframes' poses, of the whole pose, over its expectation.
+    nees: f64,
+    solved: Duration,
+}
+
+impl Figures {
+    pub fn before(drive: &Drive) -> Result<Self, Failure> {
+        let poses: Vec<_> = drive.keyframes.iter().map(|it| it.pose).collect();
+        Ok(Self {
+            ate_m: ate_m(drive, &drive.estimate)?,
+            loops: [0; 2],
+            residual_m: None,
+            nees: nees(drive, &poses),
+            solved: Duration::ZERO,
+        })
+    }
+
+    pub fn after(
+        drive: &Drive,
+        estimator: &mut TrajectoryEstimator,
+        solved: Duration,
+    ) -> Result<Self, Failure> {
+        let correction = estimator.correction();
+        let corrected = (0..).zip(&drive.estimate.poses);
+        let corrected = Trajectory {
+            poses: corrected
+                .map(|(seq, pose)| correction.correct(seq, pose))
+                .collect(),
+            ..drive.estimate.clone()
+        };
+        let keyframes = 0..drive.keyframes.len();
+        let poses: Result<Vec<_>, _> = keyframes.map(|k| estimator.pose(k)).collect();
+        let weak = |weight: f64| weight < 0.25;
+        let loops = estimator.loops();
+        let squares = loops.iter().filter(|it| !weak(it.weight)).map(|it| {
+            let [from, to] = [it.constraint.from, it.constraint.to].map(|k| estimator.poses()[k]);
+            let error = it.constraint.motion.error(&from.inv_mul(&to));
+            error.xy().norm_squared()
+        });
+        let squares: Vec<f64> = squares.collect();
+        Ok(Self {
+            ate_m: ate_m(drive, &corrected)?,
+            loops: [
+                loops.len(),
+                loops.iter().filter(|it| weak(it.weight)).count(),
+            ],
+            residual_m: Some((squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()),
+            nees: nees(drive, &poses?),
+            solved,
+        })
+    }
+
+    pub fn row(&self, name: &str) -> Record {
+        record(json!({
+            "trajectory": name, "ate_m": self.ate_m, "loops": self.loops[0], "outvoted": self.loops[1],
+            "residual_m": self.residual_m, "nees": self.nees, "solved_ms": self.solved.as_secs_f64() * 1e3,
+        }))
+    }
+}
+
+pub fn table(rows: Vec<Record>) -> Table {
+    Table {
+        title: "Trajectory".to_owned(),
+        columns: vec![
+            ("trajectory", "trajectory", 0),
+            ("ate_m", "ATE m", 2),
+            ("loops", "loops", 0),
+            ("outvoted", "rejected", 0),
+            ("residual_m", "residual rms m", 3),
+            ("nees", "NEES", 2),
+            ("solved_ms", "solved in ms", 0),
+        ],
+        rows,
+        legend: "NEES over its expectation, of the poses of keyframes against the first one."
+            .to_owned(),
+        ..Table::default()
+    }
+}
+
+fn ate_m(drive: &Drive, trajectory: &Trajectory) -> Result<f64, Failure> {
+    Ok(judge(trajectory, &drive.truth, Options::default())?
+        .ate
+        .rmse_m)
+}
+
+/// The mean NEES of poses in the frame of the first one, over its expectation.
+fn nees(drive: &Drive, poses: &[UncertainMotion]) -> f64 {
+    let known = |k: usize| drive.truths[k].map(|truth| (poses[k], truth));
+    let Some(start) = (0..poses.len()).find_map(known) else {
+        return f64::NAN;
+    };
+    let frame = start.0.motion * start.1.inverse();
+    let values = (1..poses.len())
+        .filter_map(known)
+        .filter_map(|(pose, truth)| {
+            let error = pose.error(&(frame * truth));
+            Some(error.dot(&(pose.covariance.try_inverse()? * error)) / 3.0)
+        });
+    let values: Vec<f64> = values.collect();
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// The loops against the truth.
+pub fn loops_table(drive: &Drive, queries: &[Query], wrong_m: f64, closing: Duration) -> Table {
+    let (mut right, mut wrong, mut revisits, mut closed) = (0, 0, 0_u32, 0_u32);
+    let mut outcomes = std::collections::BTreeMap::new();
+    for query in queries {
+        let k = query.keyframe;
+        let mut is_closed = false;
+        for candidate in &query.candidates {
+            *outcomes
+                .entry(format!("{:?}", candidate.outcome))
+                .or_insert(0) += 1;
+        }
+        for (candidate, _) in query.loops() {
+            let (Some(later), Some(earlier)) = (drive.truths[k], drive.truths[candidate.place])
+            else {
+                continue;
+            };
+            let error = candidate.motion.error(&earlier.inv_mul(&later));
+            let is_wrong = error.xy().norm() > wrong_m || error.z.abs() > WRONG_DEG.to_radians();
+            match is_wrong {
+                true => wrong += 1,
+                false => right += 1,
+            }
+            is_closed |= !is_wrong;
+        }
+        let eligible = drive
+            .path_m
+            .partition_point(|at| *at <= drive.path_m[k] - GAP_M);
+        if (0..eligible).any(|place| drive.true_distance_m(k, place) < NEAR_M) {
+            revisits += 1;
+            closed += u32::from(is_closed);
+        }
+    }
+    let row = json!({
+        "right": right, "wrong": wrong, "revisits": revisits,
+        "recall": 100.0 * f64::from(closed) / f64::from(revisits.max(1)),
+    });
+    Table {
+        title: "Loops".to_owned(),
+        columns: vec![
+            ("right", "right", 0),
+            ("wrong", "wrong", 0),
+            ("revisits", "revisits within 5 m", 0),
+            ("recall", "recall %", 1),
+        ],
+        rows: vec![record(row)],
+        legend: format!(
+            "{} keyframes; candidates by verdict: {outcomes:?}; closed in {:.1} s.",
+            queries.len(),
+            closing.as_secs_f64()
+        ),
+        ..Table::default()
+    }
+}

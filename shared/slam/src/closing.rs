@@ -1,0 +1,312 @@
+//! Closing of loops: which earlier keyframes saw the place of a keyframe, and the motion between the two.
+
+mod cache;
+
+use gyre_estimation::places::{
+    Candidate, Describer, Descriptor, LoopVerifier, MAX_NEIGHBOURS, OrderError, PlaceIndex,
+    PlaceOptions, neighbours,
+};
+use gyre_estimation::{
+    CHI_SQUARE_99_9, Constraint, EstimationError, GraphOptions, Outcome, PoseGraph,
+};
+use gyre_geometry::{Pose, UncertainMotion, covariance};
+use gyre_scan_matching::{ConfigError, RefinementConfig, Submap};
+use thiserror::Error;
+
+use crate::place::Place;
+use crate::{Keyframe, LoopCandidate, LoopOutcome, Query};
+use cache::Cache;
+
+/// Keyframes by their numbers, wherever they are kept.
+pub trait KeyframeSource {
+    /// The reason why a keyframe cannot be read.
+    type Error;
+
+    /// Reads a keyframe that was given to [`LoopCloser::push`].
+    ///
+    /// # Errors
+    /// The keyframe cannot be read.
+    fn keyframe(&mut self, index: usize) -> Result<Keyframe, Self::Error>;
+}
+
+/// Options of [`LoopCloser`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoopOptions {
+    /// Submaps, descriptors and their verification.
+    pub places: PlaceOptions,
+    /// Length of the path between a keyframe and the earlier ones that it is compared with, at least, m.
+    pub gap_m: f64,
+    /// Number of candidates that are verified.
+    pub candidates: usize,
+    /// Distance along the path between two of them, at least, m.
+    pub apart_m: f64,
+    /// Factor of the covariances of loops.
+    pub covariance_scale: f64,
+    /// A loop is rejected if its chi-square against the odometry is larger.
+    pub gate: f64,
+}
+
+impl Default for LoopOptions {
+    fn default() -> Self {
+        Self {
+            places: PlaceOptions::default(),
+            gap_m: 100.0,
+            candidates: 3,
+            apart_m: 15.0,
+            covariance_scale: 1.0,
+            gate: CHI_SQUARE_99_9,
+        }
+    }
+}
+
+/// Errors of [`LoopCloser`].
+#[derive(Debug, Error)]
+pub enum ClosingError<E> {
+    /// A keyframe cannot be read.
+    #[error(transparent)]
+    Source(E),
+    /// A keyframe does not continue the path.
+    #[error(transparent)]
+    Order(#[from] OrderError),
+    /// A motion cannot be used.
+    #[error(transparent)]
+    Estimation(#[from] EstimationError),
+}
+
+/// Closes loops: a function of the sequence of keyframes, whatever the time at which they come.
+///
+/// A keyframe is described and queried once its submap is complete, which lies as far ahead as behind: some keyframes later, or at the
+/// end. Descriptors are kept in memory and points are not: they are read again where a submap is drawn.
+pub struct LoopCloser {
+    options: LoopOptions,
+    describer: Describer,
+    verifier: LoopVerifier,
+    index: PlaceIndex,
+    /// The odometry alone, against which loops are tested.
+    odometry: PoseGraph,
+    /// Path up to each keyframe, m.
+    path_m: Vec<f64>,
+    has_ended: bool,
+    /// Number of the keyframe that is queried next.
+    next_query: usize,
+    cache: Cache,
+    /// The submap of a query and that of a candidate.
+    submaps: [Submap; 2],
+}
+
+impl LoopCloser {
+    /// Plans the closing of loops between keyframes of at most `capacity` points. `refinement` is that of the odometry.
+    ///
+    /// # Errors
+    /// The first value of `refinement` that is out of its bounds.
+    pub fn new(
+        options: LoopOptions,
+        refinement: &RefinementConfig,
+        capacity: usize,
+    ) -> Result<Self, ConfigError> {
+        let submap = || Submap::with_capacity(capacity * (2 * MAX_NEIGHBOURS + 1));
+        let graph = GraphOptions {
+            gate: options.gate,
+            ..GraphOptions::default()
+        };
+        Ok(Self {
+            describer: Describer::new(),
+            verifier: LoopVerifier::new(&options.places, refinement, capacity)?,
+            index: PlaceIndex::default(),
+            odometry: PoseGraph::new(Pose::identity(), graph),
+            path_m: Vec::new(),
+            has_ended: false,
+            next_query: 0,
+            cache: Cache::new(),
+            submaps: [submap(), submap()],
+            options,
+        })
+    }
+
+    /// Takes the next keyframe, of which it keeps the path and the motion.
+    ///
+    /// # Errors
+    /// A motion without a usable covariance.
+    pub fn push(&mut self, keyframe: &Keyframe) -> Result<(), EstimationError> {
+        self.extend(keyframe.path_m, &keyframe.motion)
+    }
+
+    /// Notes that no keyframe comes after the last one: the submaps of all are complete.
+    pub fn finish(&mut self) {
+        self.has_ended = true;
+    }
+
+    /// Takes the next keyframe from its place, as [`LoopCloser::describe`] has returned it. The keyframes themselves follow after the
+    /// last of the places.
+    ///
+    /// # Errors
+    /// A place that does not continue the path.
+    pub fn restore_place<E>(&mut self, place: &Place) -> Result<(), ClosingError<E>> {
+        self.extend(place.path_m, &place.motion)?;
+        self.insert(place)
+    }
+
+    /// Continues with the query of keyframe `keyframe`: those before are known.
+    pub fn restore_queries(&mut self, keyframe: usize) {
+        self.next_query = keyframe;
+    }
+
+    /// Returns the number of keyframes taken.
+    pub fn keyframes(&self) -> usize {
+        self.path_m.len()
+    }
+
+    /// Returns the number of keyframes described.
+    pub fn places(&self) -> usize {
+        self.index.len()
+    }
+
+    /// Describes the next keyframe whose submap is complete; `None` if there is none.
+    ///
+    /// # Errors
+    /// A keyframe that cannot be read, or does not continue the path.
+    pub fn describe<S: KeyframeSource>(
+        &mut self,
+        source: &mut S,
+    ) -> Result<Option<Place>, ClosingError<S::Error>> {
+        let next = self.index.len();
+        if !self.is_complete(next) {
+            return Ok(None);
+        }
+        self.draw(source, next, 0).map_err(ClosingError::Source)?;
+        let mut descriptor = Descriptor::default();
+        self.describer.describe(&self.submaps[0], &mut descriptor);
+        let keyframe = self.cache.get(source, next).map_err(ClosingError::Source)?;
+        let place = Place {
+            path_m: keyframe.path_m,
+            motion: keyframe.motion,
+            descriptor,
+        };
+        self.insert(&place)?;
+        Ok(Some(place))
+    }
+
+    /// Queries the next keyframe that is described, and verifies its candidates; `None` if there is none.
+    ///
+    /// # Errors
+    /// A keyframe that cannot be read.
+    pub fn close<S: KeyframeSource>(
+        &mut self,
+        source: &mut S,
+    ) -> Result<Option<Query>, ClosingError<S::Error>> {
+        let keyframe = self.next_query;
+        // A place that was restored is known before the keyframes behind it.
+        if keyframe >= self.index.len() || !self.is_complete(keyframe) {
+            return Ok(None);
+        }
+        let mut candidates = Vec::new();
+        for candidate in self.candidates(keyframe) {
+            if candidates.is_empty() {
+                self.draw(source, keyframe, 0)
+                    .map_err(ClosingError::Source)?;
+            }
+            self.draw(source, candidate.place, 1)
+                .map_err(ClosingError::Source)?;
+            candidates.push(self.verify(keyframe, &candidate)?);
+        }
+        self.next_query += 1;
+        Ok(Some(Query {
+            keyframe,
+            candidates,
+        }))
+    }
+
+    fn extend(&mut self, path_m: f64, motion: &UncertainMotion) -> Result<(), EstimationError> {
+        if let Some(last) = self.path_m.len().checked_sub(1) {
+            self.odometry.apply(&Constraint::odometry(last, *motion))?;
+        }
+        self.path_m.push(path_m);
+        Ok(())
+    }
+
+    fn insert<E>(&mut self, place: &Place) -> Result<(), ClosingError<E>> {
+        let id = self.index.len() as u64;
+        self.index.insert(id, place.path_m, &place.descriptor)?;
+        Ok(())
+    }
+
+    /// Whether all keyframes of a submap are known. Which they are does not change afterwards.
+    fn is_complete(&self, middle: usize) -> bool {
+        let known = self.path_m.len();
+        let end = self.neighbours(middle).end;
+        middle < known && (self.has_ended || end < known)
+    }
+
+    fn neighbours(&self, middle: usize) -> std::ops::Range<usize> {
+        neighbours(&self.path_m, middle, self.options.places.submap_reach_m)
+    }
+
+    /// The places that look most like that of a keyframe.
+    fn candidates(&mut self, keyframe: usize) -> Vec<Candidate> {
+        let eligible = self
+            .index
+            .places_until(self.path_m[keyframe] - self.options.gap_m);
+        let Some(descriptor) = self.index.descriptor(keyframe).filter(|_| eligible > 0) else {
+            return Vec::new();
+        };
+        let found = self
+            .index
+            .query(&descriptor, eligible, self.options.apart_m);
+        found[..found.len().min(self.options.candidates)].to_vec()
+    }
+
+    /// Draws the submap around a keyframe as that of the query (0) or of the candidate (1).
+    fn draw<S: KeyframeSource>(
+        &mut self,
+        source: &mut S,
+        middle: usize,
+        submap: usize,
+    ) -> Result<(), S::Error> {
+        let around = self.neighbours(middle);
+        let submap = &mut self.submaps[submap];
+        let keyframe = self.cache.get(source, middle)?;
+        submap.start(&keyframe.points, &keyframe.twist);
+        let pose = keyframe.pose.motion;
+        for other in around.filter(|other| *other != middle) {
+            let other = self.cache.get(source, other)?;
+            let motion = pose.inv_mul(&other.pose.motion);
+            submap.add(&other.points, &other.twist, &motion);
+        }
+        Ok(())
+    }
+
+    /// Registers the two submaps, and tests the motion against the odometry.
+    fn verify(
+        &mut self,
+        keyframe: usize,
+        candidate: &Candidate,
+    ) -> Result<LoopCandidate, EstimationError> {
+        let [later, earlier] = &self.submaps;
+        let found = self.verifier.verify(later, earlier, candidate);
+        let scaled = self.options.covariance_scale * found.motion.covariance;
+        let motion = UncertainMotion {
+            covariance: covariance::unpack(&covariance::pack(&scaled)),
+            ..found.motion
+        };
+        let mut outcome = LoopOutcome::from(found.outcome);
+        let mut chi_square = f64::NAN;
+        if outcome == LoopOutcome::Accepted {
+            let closing = Constraint::closing(candidate.place, keyframe, motion);
+            let verdict = self.odometry.test(&closing)?;
+            chi_square = verdict.chi_square;
+            if verdict.outcome == Outcome::Rejected {
+                outcome = LoopOutcome::ContradictsOdometry;
+            }
+        }
+        Ok(LoopCandidate {
+            place: candidate.place,
+            similarity: candidate.score,
+            motion,
+            correlation: found.correlation,
+            searched: found.searched,
+            runner_up: found.runner_up,
+            chi_square,
+            outcome,
+        })
+    }
+}

@@ -1,0 +1,54 @@
+//! The correction of poses between keyframes.
+
+use gyre_geometry::{Pose, interpolate};
+
+use crate::trajectory::Corrected;
+
+/// Corrects the poses of all scans as those of the keyframes around them were corrected.
+///
+/// The pose of a scan continues that of the keyframe before it by odometry, and leads to that of the keyframe after it as evenly: the
+/// corrected trajectory does not jump where a keyframe was moved against the one before.
+#[derive(Clone, Debug, Default)]
+pub struct Correction {
+    keyframes: Vec<Anchor>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Anchor {
+    seq: u64,
+    /// The pose of the odometry frame in the map frame.
+    map_from_odometry: Pose,
+}
+
+impl Correction {
+    pub(crate) fn new(keyframes: &[Corrected], poses: &[Pose]) -> Self {
+        let anchor = |(keyframe, pose): (&Corrected, &Pose)| Anchor {
+            seq: keyframe.seq,
+            map_from_odometry: pose * keyframe.odometry.inverse(),
+        };
+        Self {
+            keyframes: keyframes.iter().zip(poses).map(anchor).collect(),
+        }
+    }
+
+    /// Returns the pose of the odometry frame in the map frame after the last keyframe (REP-105: map -> odom); none without keyframes.
+    pub fn map_from_odometry(&self) -> Option<Pose> {
+        self.keyframes.last().map(|last| last.map_from_odometry)
+    }
+
+    /// Corrects the pose of scan `seq` by odometry, which is returned as it is before the first keyframe.
+    pub fn correct(&self, seq: u64, odometry: &Pose) -> Pose {
+        let after = self
+            .keyframes
+            .partition_point(|keyframe| keyframe.seq <= seq);
+        let Some(before) = after.checked_sub(1).map(|last| self.keyframes[last]) else {
+            return *odometry;
+        };
+        let continued = before.map_from_odometry * odometry;
+        let Some(next) = self.keyframes.get(after) else {
+            return continued;
+        };
+        let share = (seq - before.seq) as f64 / (next.seq - before.seq) as f64;
+        interpolate(&continued, &(next.map_from_odometry * odometry), share)
+    }
+}

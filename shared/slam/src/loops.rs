@@ -1,0 +1,155 @@
+//! The candidates of a keyframe with their verdicts, and their form in a file.
+
+use bytemuck::{Pod, Zeroable};
+use gyre_estimation::Constraint;
+use gyre_estimation::places::VerificationOutcome;
+use gyre_geometry::UncertainMotion;
+use thiserror::Error;
+
+use crate::exact::ExactMotion;
+
+/// The verdict on a candidate, and the reason of a rejection.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LoopOutcome {
+    /// The two keyframes are of the same place.
+    Accepted,
+    /// The correlation of the submaps is too low.
+    LowCorrelation,
+    /// Another motion correlates nearly as well.
+    Ambiguous,
+    /// The points do not determine the motion.
+    Undetermined,
+    /// The motion contradicts the odometry between the two keyframes.
+    ContradictsOdometry,
+}
+
+/// A place that looks like that of a queried keyframe.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoopCandidate {
+    /// The number of the found keyframe.
+    pub place: usize,
+    /// The correlation coefficient of the descriptors.
+    pub similarity: f64,
+    /// The pose of the queried keyframe in the frame of the found one, with its covariance; a covariance of zero if the two were not
+    /// aligned.
+    pub motion: UncertainMotion,
+    /// The correlation of the submaps at the motion, and of the search before the alignment: the best one and the runner-up.
+    pub correlation: f64,
+    /// See [`Self::correlation`].
+    pub searched: f64,
+    /// See [`Self::correlation`].
+    pub runner_up: f64,
+    /// Chi-square of the motion against the odometry, with three degrees of freedom; NaN if it was rejected before.
+    pub chi_square: f64,
+    /// The verdict.
+    pub outcome: LoopOutcome,
+}
+
+/// A queried keyframe with its candidates, the most similar one first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Query {
+    /// The number of the keyframe.
+    pub keyframe: usize,
+    /// The candidates that were verified.
+    pub candidates: Vec<LoopCandidate>,
+}
+
+/// Bytes that are not a query.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error("{0} bytes are not the candidates of a keyframe")]
+pub struct MalformedQuery(usize);
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Fixed {
+    place: u64,
+    similarity: f64,
+    motion: ExactMotion,
+    correlation: f64,
+    searched: f64,
+    runner_up: f64,
+    chi_square: f64,
+    outcome: u64,
+}
+
+const OUTCOMES: [LoopOutcome; 5] = [
+    LoopOutcome::Accepted,
+    LoopOutcome::LowCorrelation,
+    LoopOutcome::Ambiguous,
+    LoopOutcome::Undetermined,
+    LoopOutcome::ContradictsOdometry,
+];
+
+impl From<VerificationOutcome> for LoopOutcome {
+    fn from(outcome: VerificationOutcome) -> Self {
+        match outcome {
+            VerificationOutcome::Accepted => Self::Accepted,
+            VerificationOutcome::LowCorrelation => Self::LowCorrelation,
+            VerificationOutcome::Ambiguous => Self::Ambiguous,
+            VerificationOutcome::Undetermined => Self::Undetermined,
+        }
+    }
+}
+
+impl Query {
+    /// Returns the accepted loops as constraints from the found keyframe to the queried one, each with its candidate.
+    pub fn loops(&self) -> impl Iterator<Item = (&LoopCandidate, Constraint)> {
+        let accepted = |candidate: &&LoopCandidate| candidate.outcome == LoopOutcome::Accepted;
+        self.candidates.iter().filter(accepted).map(|candidate| {
+            let closing = Constraint::closing(candidate.place, self.keyframe, candidate.motion);
+            (candidate, closing)
+        })
+    }
+
+    /// Appends the form in a file, little-endian: the keyframe, then the candidates.
+    pub fn encode(&self, bytes: &mut Vec<u8>) {
+        bytes.extend_from_slice(&(self.keyframe as u64).to_le_bytes());
+        for candidate in &self.candidates {
+            let fixed = Fixed {
+                place: candidate.place as u64,
+                similarity: candidate.similarity,
+                motion: ExactMotion::from(&candidate.motion),
+                correlation: candidate.correlation,
+                searched: candidate.searched,
+                runner_up: candidate.runner_up,
+                chi_square: candidate.chi_square,
+                outcome: candidate.outcome as u64,
+            };
+            bytes.extend_from_slice(bytemuck::bytes_of(&fixed));
+        }
+    }
+
+    /// Decodes what [`encode`](Self::encode) has written.
+    ///
+    /// # Errors
+    /// A length that none has, or an unknown verdict.
+    pub fn decode(bytes: &[u8]) -> Result<Self, MalformedQuery> {
+        let malformed = MalformedQuery(bytes.len());
+        let (keyframe, candidates) = bytes.split_at_checked(8).ok_or(malformed)?;
+        if candidates.len() % size_of::<Fixed>() != 0 {
+            return Err(malformed);
+        }
+        let candidates = candidates.chunks_exact(size_of::<Fixed>());
+        let decoded =
+            candidates.map(|bytes| bytemuck::pod_read_unaligned::<Fixed>(bytes).candidate());
+        Ok(Self {
+            keyframe: bytemuck::pod_read_unaligned::<u64>(keyframe) as usize,
+            candidates: decoded.collect::<Option<_>>().ok_or(malformed)?,
+        })
+    }
+}
+
+impl Fixed {
+    fn candidate(&self) -> Option<LoopCandidate> {
+        Some(LoopCandidate {
+            place: self.place as usize,
+            similarity: self.similarity,
+            motion: UncertainMotion::from(&self.motion),
+            correlation: self.correlation,
+            searched: self.searched,
+            runner_up: self.runner_up,
+            chi_square: self.chi_square,
+            outcome: *OUTCOMES.get(usize::try_from(self.outcome).ok()?)?,
+        })
+    }
+}

@@ -1,0 +1,172 @@
+//! The trajectory from odometry and loops, right and wrong ones.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::{AROUND, Drive};
+use gyre_estimation::Constraint;
+use gyre_geometry::{Pose, UncertainMotion, pose};
+use gyre_slam::{EstimatorKind, JudgedLoop, LoopVerdict, TrajectoryEstimator, TrajectoryOptions};
+use nalgebra::{Matrix3, Vector3};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+const KEYFRAMES: usize = 4 * AROUND;
+
+fn closing(from: usize, to: usize, motion: Pose) -> Constraint {
+    let covariance = Matrix3::from_diagonal(&Vector3::new(0.0025, 0.0025, 1e-6));
+    Constraint::closing(from, to, UncertainMotion { motion, covariance })
+}
+
+/// Loops of every other keyframe with that of the round before.
+fn right(drive: &Drive) -> Vec<Constraint> {
+    let loops = (AROUND..KEYFRAMES).step_by(2).map(|to| {
+        let from = to - AROUND;
+        closing(from, to, drive.truth[from].inv_mul(&drive.truth[to]))
+    });
+    loops.collect()
+}
+
+/// Fifty loops between places that are not the same, in runs of `length` that agree with each other.
+fn wrong(drive: &Drive, length: usize) -> Vec<Constraint> {
+    let mut random = ChaCha8Rng::seed_from_u64(length as u64);
+    let mut loops = Vec::new();
+    while loops.len() < 50 {
+        let to = random.random_range(AROUND..KEYFRAMES - length);
+        let from = random.random_range(0..to - 20);
+        let apart = drive.truth[from].inv_mul(&drive.truth[to]);
+        if apart.translation.vector.norm() < 10.0 {
+            continue;
+        }
+        let shift = pose(
+            random.random_range(-2.0..2.0),
+            0.0,
+            random.random_range(-0.3..0.3),
+        );
+        let moved = drive.truth[from] * shift * drive.truth[to].inverse();
+        loops.extend((0..length).map(|k| {
+            let motion = drive.truth[from + k].inv_mul(&(moved * drive.truth[to + k]));
+            closing(from + k, to + k, motion)
+        }));
+    }
+    loops
+}
+
+fn estimate(drive: &Drive, loops: &[Constraint], kind: EstimatorKind) -> TrajectoryEstimator {
+    let options = TrajectoryOptions {
+        kind,
+        ..TrajectoryOptions::default()
+    };
+    let mut estimator = TrajectoryEstimator::new(options);
+    drive
+        .keyframes
+        .iter()
+        .for_each(|it| estimator.push(it).unwrap());
+    loops
+        .iter()
+        .for_each(|it| estimator.close_loop(it).unwrap());
+    estimator.solve().unwrap();
+    estimator
+}
+
+fn rms_m(drive: &Drive, poses: &[Pose]) -> f64 {
+    let squares = poses.iter().zip(&drive.truth);
+    let squares =
+        squares.map(|(a, b)| (a.translation.vector - b.translation.vector).norm_squared());
+    (squares.sum::<f64>() / poses.len() as f64).sqrt()
+}
+
+/// Odometry so uncertain that wrong loops pass its gate.
+fn uncertain() -> Drive {
+    let mut drive = Drive::new(KEYFRAMES, 7);
+    for keyframe in &mut drive.keyframes {
+        keyframe.motion.covariance *= 100.0;
+    }
+    drive
+}
+
+#[test]
+fn wrong_loops_are_rejected_and_right_ones_used() {
+    let drive = uncertain();
+    let right = right(&drive);
+    let clean = estimate(&drive, &right, EstimatorKind::Graph);
+    let error_m = rms_m(&drive, clean.poses());
+    let odometry: Vec<Pose> = drive.keyframes.iter().map(|it| it.pose.motion).collect();
+    let before_m = rms_m(&drive, &odometry);
+    assert!(error_m < 0.2 * before_m, "{error_m} m, {before_m} m");
+    for length in [1, 10] {
+        let wrong = wrong(&drive, length);
+        let all: Vec<_> = right.iter().chain(&wrong).copied().collect();
+        let mut estimator = estimate(&drive, &all, EstimatorKind::Graph);
+        let counted = |it: &&JudgedLoop| it.weight > 0.25;
+        assert_eq!(
+            estimator.loops().iter().filter(counted).count(),
+            right.len()
+        );
+        let outvoted = |it: &&JudgedLoop| it.verdict == LoopVerdict::ContradictsLoops;
+        assert!(estimator.loops().iter().filter(outvoted).count() > 0);
+        let worse_m = rms_m(&drive, estimator.poses()) - error_m;
+        assert!(worse_m < 0.01, "{worse_m} m");
+        assert!(estimator.pose(KEYFRAMES - 1).unwrap().has_covariance());
+    }
+}
+
+#[test]
+fn the_result_does_not_depend_on_the_order_of_the_loops() {
+    let drive = uncertain();
+    let mut loops: Vec<_> = right(&drive).into_iter().chain(wrong(&drive, 1)).collect();
+    for kind in [EstimatorKind::Graph, EstimatorKind::Filter] {
+        let poses = estimate(&drive, &loops, kind).poses().to_vec();
+        loops.reverse();
+        let estimator = estimate(&drive, &loops, kind);
+        assert_eq!(estimator.poses(), poses);
+    }
+}
+
+#[test]
+fn the_filter_corrects_as_the_graph_does() {
+    let drive = Drive::new(KEYFRAMES, 8);
+    let right = right(&drive);
+    let [graph, filter] = [EstimatorKind::Graph, EstimatorKind::Filter]
+        .map(|kind| rms_m(&drive, estimate(&drive, &right, kind).poses()));
+    assert!((graph - filter).abs() < 0.02, "{graph} m, {filter} m");
+}
+
+#[test]
+fn corrected_poses_lead_evenly_from_keyframe_to_keyframe() {
+    let drive = Drive::new(KEYFRAMES, 9);
+    let estimator = estimate(&drive, &right(&drive), EstimatorKind::Graph);
+    let correction = estimator.correction();
+    let mut last: Option<(Pose, Pose)> = None;
+    for seq in 0..4 * KEYFRAMES as u64 {
+        let (k, within) = ((seq / 4) as usize, (seq % 4) as f64);
+        let odometry = drive.keyframes[k].pose.motion * pose(0.5 * within, 0.0, 0.0);
+        let corrected = correction.correct(seq, &odometry);
+        if within == 0.0 {
+            let apart = corrected.inv_mul(&estimator.poses()[k]);
+            assert!(apart.translation.vector.norm() < 1e-9);
+        }
+        if let Some((from, from_corrected)) = last {
+            let step = from.inv_mul(&odometry).translation.vector.norm();
+            let corrected_step = from_corrected.inv_mul(&corrected).translation.vector.norm();
+            assert!(
+                (step - corrected_step).abs() < 0.1,
+                "{seq}: {step} {corrected_step}"
+            );
+        }
+        last = Some((odometry, corrected));
+    }
+    let end = drive.keyframes[KEYFRAMES - 1].pose.motion;
+    let map_from_odometry = correction.map_from_odometry().unwrap();
+    let apart = (map_from_odometry * end).inv_mul(&estimator.poses()[KEYFRAMES - 1]);
+    assert!(apart.translation.vector.norm() < 1e-9);
+    let past = correction.correct(4 * KEYFRAMES as u64 + 9, &end);
+    assert!(
+        (map_from_odometry * end)
+            .inv_mul(&past)
+            .translation
+            .vector
+            .norm()
+            < 1e-9
+    );
+}
