@@ -59,6 +59,23 @@ fn a_run_with_slam_has_the_same_odometry_and_logs_the_keyframes_of_its_poses() {
 }
 
 #[test]
+fn keyframes_are_the_same_whatever_the_window_and_without_room_for_observers() {
+    for sentence in ["run.window=1", "run.observers=0"] {
+        let run = run().set(sentence);
+        run.complete();
+        require_undisturbed(&run, sentence);
+    }
+}
+
+#[test]
+fn a_run_without_refinement_logs_keyframes_too() {
+    let run = run().set("refinement.kind=none");
+    run.complete();
+    let keyframes = KeyframeReader::open(&keyframes_path(run.out())).unwrap();
+    assert!(keyframes.has_ended() && keyframes.len() > 2);
+}
+
+#[test]
 fn a_run_without_slam_logs_no_keyframes_and_removes_those_of_an_earlier_run() {
     let with = run();
     with.complete();

@@ -135,7 +135,8 @@ impl Window {
             borrowed: BORROWED,
             loaned: LOANED,
             readers,
-            observers: self.observers,
+            // The transport has no topic without a place for a subscriber.
+            observers: self.observers.max(usize::from(readers == 0)),
         }
     }
 }
