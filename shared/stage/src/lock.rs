@@ -29,8 +29,20 @@ pub enum Attempt {
 /// # Errors
 /// The file cannot be opened or locked.
 pub fn try_lock(path: &Path) -> io::Result<Attempt> {
+    lock(path, true)
+}
+
+/// Locks a file that exists, without waiting.
+///
+/// # Errors
+/// There is no such file, or it cannot be opened or locked.
+pub fn try_lock_existing(path: &Path) -> io::Result<Attempt> {
+    lock(path, false)
+}
+
+fn lock(path: &Path, create: bool) -> io::Result<Attempt> {
     let file = OpenOptions::new()
-        .create(true)
+        .create(create)
         .truncate(false)
         .write(true)
         .mode(0o600)
@@ -92,6 +104,18 @@ mod tests {
         assert!(holder.starts_with(&ours), "{holder}");
         drop(held);
         assert!(matches!(try_lock(&path).unwrap(), Attempt::Locked(_)));
+    }
+
+    #[test]
+    fn a_lock_that_is_not_there_is_not_created() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lock");
+        let error = try_lock_existing(&path).unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::NotFound);
+        assert!(!path.exists());
+        drop(try_lock(&path).unwrap());
+        let there = try_lock_existing(&path).unwrap();
+        assert!(matches!(there, Attempt::Locked(_)));
     }
 
     #[test]

@@ -22,7 +22,7 @@ use thiserror::Error;
 
 use crate::{
     StageError, clock,
-    lock::{Attempt, try_lock},
+    lock::{Attempt, try_lock, try_lock_existing},
     wake::Signals,
 };
 
@@ -250,7 +250,14 @@ fn remove_dead_runs(runs: &Path) {
         .filter(|name| is_name(name))
         .collect();
     for root in names.iter().map(|name| runs.join(name)) {
-        if let Ok(Attempt::Locked(_lock)) = try_lock(&lock_of(&root)) {
+        // A run that has just ended has removed its lock last. Created again, that would stay if this process were killed here.
+        let lock = match try_lock_existing(&lock_of(&root)) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound && root.exists() => {
+                try_lock(&lock_of(&root))
+            }
+            lock => lock,
+        };
+        if let Ok(Attempt::Locked(_lock)) = lock {
             remove(&root);
         }
     }
