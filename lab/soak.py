@@ -41,10 +41,17 @@ def resident_kb(process):
     return int(values["RssAnon"].split()[0]), int(values["RssShmem"].split()[0])
 
 
-def size(folders):
-    """Disk space of all files below some folders, bytes."""
-    files = (file for folder in folders for file in folder.rglob("*"))
+def size(files):
+    """Space of some files, bytes."""
     return sum(file.stat().st_blocks * 512 for file in files if file.is_file())
+
+
+def shared_memory(out):
+    """The files in shared memory of the run that writes to `out`."""
+    for manifest in Path("/dev/shm").glob("gyre-*/*/manifest.json"):
+        run = json.loads(manifest.read_text())
+        if run["out"] == str(out.resolve()):
+            yield from Path("/dev/shm").glob(run["prefix"] + "*")
 
 
 def sample(run, out):
@@ -55,8 +62,8 @@ def sample(run, out):
         yield name, "own memory, MB", own / 1024
         yield name, "shared memory in use, MB", shared / 1024
         yield name, "descriptors", len(list(Path(f"/proc/{process}/fd").iterdir()))
-    yield "all", "/dev/shm, MB", size([Path("/dev/shm")]) / 2**20
-    yield "all", "logs, kB", size([out / "log"]) / 1024
+    yield "all", "/dev/shm, MB", size(shared_memory(out)) / 2**20
+    yield "all", "logs, kB", size((out / "log").iterdir()) / 1024
 
 
 def watch(command, out, samples):
@@ -70,7 +77,7 @@ def watch(command, out, samples):
             time_s = round(time.monotonic() - start, 1)
             try:
                 rows.writerows([time_s, *row] for row in sample(run.pid, out))
-            except (FileNotFoundError, ProcessLookupError, KeyError, IndexError):
+            except (FileNotFoundError, ProcessLookupError, KeyError, IndexError, json.JSONDecodeError):
                 pass  # A process that begins or ends: the next sample has it.
             file.flush()
             time.sleep(INTERVAL_S)
