@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod files;
+mod keyframes;
 mod messages;
 mod recordings;
 mod texts;

@@ -83,6 +83,7 @@ impl Log {
         let mut records = Records::new(path, magic);
         records.refresh()?;
         if !records.has_magic() {
+            file.set_length(0)?;
             file.write_at(&magic, 0)?;
             records.refresh()?;
         }

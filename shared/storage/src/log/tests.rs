@@ -89,10 +89,15 @@ fn what_a_power_failure_leaves_of_the_last_records_is_cut_off() {
 
 #[test]
 fn zeros_in_place_of_the_start_are_cut_off_if_they_can_be_of_a_power_failure() {
-    for (records, expected) in [(LIMIT, None), (2 * LIMIT, Some(0))] {
+    let cases = [
+        (LIMIT, 100, None),
+        (LIMIT, MAGIC.len(), None),
+        (2 * LIMIT, 100, Some(0)),
+    ];
+    for (records, zeros, expected) in cases {
         let (_folder, path) = log_of(records);
         let mut bytes = fs::read(&path).unwrap();
-        bytes[..100].fill(0);
+        bytes[..zeros].fill(0);
         fs::write(&path, bytes).unwrap();
         match (Log::open(&path, MAGIC), expected) {
             (Ok(log), None) => assert!(log.is_empty()),

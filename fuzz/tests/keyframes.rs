@@ -1,0 +1,100 @@
+//! The log of keyframes, which another version, a bad disk or another program may have changed.
+
+use std::{fs, path::Path};
+
+use bolero::{TypeGenerator, check};
+use gyre_fuzz::{
+    Failure, Target,
+    edit::{ByteEdit, Number, edit_bytes},
+};
+use gyre_geometry::{SparsePoint, Twist, UncertainMotion};
+use gyre_slam::{Keyframe, KeyframeLog, KeyframeReader, keyframes_path};
+
+use crate::recordings::folder;
+
+const KEYFRAMES: usize = 4;
+const MAGIC: usize = 16;
+/// The header of a record: its number, its length, and the checksums of its bytes and of the header.
+const HEADER: usize = 20;
+
+/// An edit of a log.
+#[derive(Clone, Debug, TypeGenerator)]
+enum Edit {
+    Bytes(ByteEdit),
+    /// A word of a record or of its header, whose checksums are mended.
+    Word(u8, u16, Number),
+}
+
+fn keyframe(seq: usize) -> Keyframe {
+    Keyframe {
+        seq: seq as u64,
+        scan: seq as u64,
+        stamp_ns: 0,
+        pose: UncertainMotion::identity(),
+        motion: UncertainMotion::identity(),
+        twist: Twist::default(),
+        path_m: 0.0,
+        points: vec![SparsePoint::default(); 4],
+    }
+}
+
+/// Reads all keyframes, cuts what is torn, and goes on.
+fn use_log(path: &Path) -> Result<(), Failure> {
+    let mut reader = KeyframeReader::open(path)?;
+    let found = reader.len();
+    let read: Result<Vec<Keyframe>, _> = (0..found).map(|index| reader.read(index)).collect();
+    let mut log = KeyframeLog::open(path)?;
+    assert_eq!(log.len(), found);
+    log.cut(found)?;
+    log.append(&keyframe(found))?;
+    assert_eq!(reader.refresh()?, found + 1);
+    assert_eq!(reader.read(found)?, keyframe(found));
+    read?;
+    Ok(())
+}
+
+/// Changes a word of a record, and mends its checksums.
+fn change(record: &mut [u8], at: u16, number: Number) {
+    let (header, content) = record.split_at_mut(HEADER);
+    let places = MAGIC + content.len() - 8;
+    match usize::from(at) % places {
+        at if at < 8 => header[at..at + 8].copy_from_slice(&number.bits().to_le_bytes()),
+        at => {
+            let at = (at - 8).min(content.len() - 8);
+            content[at..at + 8].copy_from_slice(&number.bits().to_le_bytes());
+            header[12..16].copy_from_slice(&crc32fast::hash(content).to_le_bytes());
+        }
+    }
+    let check = crc32fast::hash(&header[..16]);
+    header[16..].copy_from_slice(&check.to_le_bytes());
+}
+
+#[test]
+fn keyframe_logs() {
+    let (target, folder) = (Target::new("keyframe logs", 16), folder());
+    let path = keyframes_path(folder.path());
+    let mut log = KeyframeLog::open(&path).unwrap();
+    (0..KEYFRAMES).for_each(|seq| log.append(&keyframe(seq)).unwrap());
+    log.end().unwrap();
+    drop(log);
+    let valid = fs::read(&path).unwrap();
+    let record = (valid.len() - MAGIC - HEADER) / KEYFRAMES;
+    use_log(&path).unwrap();
+    check!().with_type::<Vec<Edit>>().for_each(|edits| {
+        let mut bytes = valid.clone();
+        for edit in edits {
+            match edit {
+                Edit::Bytes(edit) => edit_bytes(&mut bytes, std::slice::from_ref(edit)),
+                Edit::Word(index, at, number) => {
+                    let records = bytes.get_mut(MAGIC..).unwrap_or_default();
+                    let index = usize::from(*index) % KEYFRAMES;
+                    if let Some(record) = records.chunks_exact_mut(record).nth(index) {
+                        change(record, *at, *number);
+                    }
+                }
+            }
+        }
+        fs::write(&path, bytes).unwrap();
+        target.run(|| use_log(&path));
+    });
+}
