@@ -54,6 +54,14 @@ impl Submap {
         self.len() == 0
     }
 
+    /// Returns the points in the frame of the middle keyframe: x and y in m, and the weight.
+    pub fn points(&self) -> impl Iterator<Item = [f32; 3]> {
+        let places = self.all.x_m.iter().zip(&self.all.y_m);
+        places
+            .zip(&self.all.weight)
+            .map(|((x_m, y_m), weight)| [*x_m, *y_m, *weight])
+    }
+
     /// Draws the submap: each cell of the square `raster`, row 0 far ahead, is the sum of the weights of the points in it, each shared
     /// bilinearly between four cells of `cell_m` metres. Points outside are left out.
     ///
@@ -68,8 +76,7 @@ impl Submap {
             .ok_or(ShapeError::Layout { what: WHAT })?;
         cells.fill(0.0);
         let (per_m, middle, last) = (1.0 / cell_m as f32, 0.5 * (n as f32 - 1.0), n as f32 - 1.0);
-        let places = self.all.x_m.iter().zip(&self.all.y_m);
-        for ((x_m, y_m), &weight) in places.zip(&self.all.weight) {
+        for [x_m, y_m, weight] in self.points() {
             let (u, v) = (middle - x_m * per_m, middle - y_m * per_m);
             // NaN is not inside.
             if !((0.0..last).contains(&u) && (0.0..last).contains(&v)) {

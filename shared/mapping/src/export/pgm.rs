@@ -1,0 +1,48 @@
+//! PGM and YAML as ROS `map_server` reads them.
+
+use std::path::Path;
+
+use gyre_storage::Draft;
+
+use crate::{Cell, MapError, TileSource, strips};
+
+/// The values of `map_server`'s form: with the thresholds below a cell is occupied, free or unknown.
+const OCCUPIED: u8 = 0;
+const FREE: u8 = 254;
+const UNKNOWN: u8 = 205;
+/// A cell is known if it was looked at half a time from nearby, and occupied if it returned a sixteenth of the power it might have.
+const KNOWN_LOOKED: u8 = 16;
+const OCCUPIED_EVIDENCE: u8 = 64;
+
+/// Writes `map.pgm` and `map.yaml` into `folder`.
+///
+/// # Errors
+/// A folder that cannot be written, and a map that is empty or too large.
+pub fn write_pgm(folder: &Path, source: &mut impl TileSource) -> Result<(), MapError> {
+    let extent = strips::extent(source, "PGM")?;
+    let [columns, rows] = extent.cells();
+    let (cell_m, corner) = (source.cell_m(), extent.corner_m(source.cell_m()));
+    let mut picture = Draft::create(&folder.join("map.pgm"))?;
+    picture.append(format!("P5\n{columns} {rows}\n255\n"))?;
+    strips::for_each(source, &extent, |cells| {
+        let pixels: Vec<u8> = cells.iter().map(|cell| occupancy(*cell)).collect();
+        Ok(picture.append(pixels)?)
+    })?;
+    let mut yaml = Draft::create(&folder.join("map.yaml"))?;
+    // The origin is the lower left corner of the picture. 205 is 0.196 of the way to occupied, and not below the free threshold.
+    yaml.append(format!(
+        "image: map.pgm\nmode: trinary\nresolution: {cell_m}\norigin: [{:.3}, {:.3}, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
+        corner.x, corner.y
+    ))?;
+    picture.commit()?;
+    yaml.commit()?;
+    Ok(gyre_storage::sync_folder(folder)?)
+}
+
+fn occupancy(cell: Cell) -> u8 {
+    match cell {
+        cell if cell.looked < KNOWN_LOOKED => UNKNOWN,
+        cell if cell.evidence >= OCCUPIED_EVIDENCE => OCCUPIED,
+        _ => FREE,
+    }
+}

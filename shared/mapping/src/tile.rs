@@ -1,0 +1,146 @@
+//! Tiles: squares of the map.
+
+use std::{fmt, ops::RangeInclusive};
+
+use nalgebra::{Point2, Vector2};
+
+/// Cells per side of a tile, as web maps have them.
+pub const TILE_CELLS: usize = 256;
+
+/// The number of cells of a tile.
+pub(crate) const CELLS: usize = TILE_CELLS * TILE_CELLS;
+
+/// A tile's place: tile (0, 0) has its corner of lowest x and y at the origin of the map frame. It is written as `X_Y`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct TileIndex {
+    /// Number of the tile along x, from 0 at the origin.
+    pub x: i32,
+    /// Number of the tile along y.
+    pub y: i32,
+}
+
+impl fmt::Display for TileIndex {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}_{}", self.x, self.y)
+    }
+}
+
+impl TileIndex {
+    /// Returns the corner of lowest x and y, in cells of the map frame.
+    pub(crate) fn corner(self) -> [i64; 2] {
+        [self.x, self.y].map(|index| i64::from(index) * TILE_CELLS as i64)
+    }
+
+    /// Returns the tiles of the square that reaches `reach_m` to each side of `centre`, in rising order.
+    pub(crate) fn around(
+        centre: &Point2<f64>,
+        reach_m: f64,
+        cell_m: f64,
+    ) -> impl Iterator<Item = Self> + use<> {
+        let [columns, rows] = [centre.x, centre.y].map(|at| span(at, reach_m, cell_m));
+        columns.flat_map(move |x| rows.clone().map(move |y| Self { x, y }))
+    }
+}
+
+fn span(at_m: f64, reach_m: f64, cell_m: f64) -> RangeInclusive<i32> {
+    let tile_m = cell_m * TILE_CELLS as f64;
+    let tile = |at_m: f64| (at_m / tile_m).floor() as i32;
+    tile(at_m - reach_m)..=tile(at_m + reach_m)
+}
+
+/// A cell of a tile as it is stored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Cell {
+    /// How often the cell returned power of how often it was looked at: the square root of that share, from 0 (never) to 255.
+    pub evidence: u8,
+    /// How often it was looked at, from 0 (never) to 255 (8 times from nearby, or oftener).
+    pub looked: u8,
+}
+
+/// The cells of a tile.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TileImage {
+    /// Row after row, that of the highest y first; in each the lowest x first.
+    pub cells: Vec<Cell>,
+}
+
+impl Default for TileImage {
+    fn default() -> Self {
+        Self {
+            cells: vec![Cell::default(); CELLS],
+        }
+    }
+}
+
+impl TileImage {
+    /// Returns the rows, that of the highest y first.
+    pub fn rows(&self) -> impl DoubleEndedIterator<Item = &[Cell]> {
+        self.cells.chunks_exact(TILE_CELLS)
+    }
+}
+
+/// The smallest rectangle of tiles around all tiles of a map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TileExtent {
+    /// The tile of lowest x and y.
+    pub min: TileIndex,
+    /// The tile of highest x and y.
+    pub max: TileIndex,
+}
+
+impl TileExtent {
+    /// Returns the extent of `tiles`; `None` without any.
+    pub fn of(tiles: &[TileIndex]) -> Option<Self> {
+        let first = *tiles.first()?;
+        let around = |extent: Self, tile: &TileIndex| Self {
+            min: TileIndex {
+                x: extent.min.x.min(tile.x),
+                y: extent.min.y.min(tile.y),
+            },
+            max: TileIndex {
+                x: extent.max.x.max(tile.x),
+                y: extent.max.y.max(tile.y),
+            },
+        };
+        let start = Self {
+            min: first,
+            max: first,
+        };
+        Some(tiles.iter().fold(start, around))
+    }
+
+    /// Returns the columns and rows of cells.
+    pub fn cells(&self) -> [usize; 2] {
+        let count = |min: i32, max: i32| (max.abs_diff(min) as usize + 1) * TILE_CELLS;
+        [count(self.min.x, self.max.x), count(self.min.y, self.max.y)]
+    }
+
+    /// Returns the corner of lowest x and y in the map frame, m.
+    pub fn corner_m(&self, cell_m: f64) -> Vector2<f64> {
+        let [x, y] = self.min.corner();
+        Vector2::new(x as f64, y as f64) * cell_m
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_tiles_around_a_point_are_those_that_its_square_touches() {
+        let tiles: Vec<_> = TileIndex::around(&Point2::new(1.0, -60.0), 10.0, 0.2).collect();
+        let expected = [(-1, -2), (-1, -1), (0, -2), (0, -1)].map(|(x, y)| TileIndex { x, y });
+        assert_eq!(tiles, expected);
+    }
+
+    #[test]
+    fn an_extent_covers_all_tiles() {
+        let tiles = [(0, 3), (-2, 5), (1, 4)].map(|(x, y)| TileIndex { x, y });
+        let extent = TileExtent::of(&tiles);
+        assert_eq!(extent.map(|e| e.cells()), Some([4 * 256, 3 * 256]));
+        let corner = extent.map(|e| e.corner_m(0.5));
+        assert_eq!(corner, Some(Vector2::new(-256.0, 384.0)));
+        assert_eq!(TileExtent::of(&[]), None);
+    }
+}

@@ -1,0 +1,114 @@
+//! What a keyframe sees: its returns, and how well it looked at each place around it.
+
+use std::f64::consts::TAU;
+
+use gyre_scan_matching::Submap;
+use gyre_slam::Keyframe;
+use nalgebra::{Point2, Vector2};
+
+use crate::MapOptions;
+
+/// Sectors of one degree.
+const SECTORS: usize = 360;
+/// Sectors to either side that a return speaks for: a return hides weaker ones at its range within the beam, so that not every
+/// azimuth has points of a wall that all of them see.
+const BEAM_SECTORS: usize = 3;
+/// A return is spread along its arc over so many standard deviations to either side.
+const SPREAD_SIGMAS: f64 = 2.0;
+
+/// The free space and the returns of a keyframe, in its own frame.
+///
+/// A radar sees past and over things, and where nothing returns power it may have looked at open ground, or at nothing for a hill
+/// or a truck. So a sector was looked at as far as its farthest return.
+pub struct View {
+    options: MapOptions,
+    points: Submap,
+    /// The range up to which each sector was looked at, m.
+    farthest_m: [f64; SECTORS],
+    own_m: [f64; SECTORS],
+}
+
+/// A part of a return.
+#[derive(Clone, Copy)]
+pub struct Sample {
+    /// Its place in the frame of the keyframe, m.
+    pub place: Point2<f64>,
+    /// What it adds to its place.
+    pub amount: f64,
+}
+
+impl View {
+    pub fn new(options: &MapOptions) -> Self {
+        Self {
+            options: options.clone(),
+            points: Submap::default(),
+            farthest_m: [0.0; SECTORS],
+            own_m: [0.0; SECTORS],
+        }
+    }
+
+    /// Looks through the eyes of a keyframe.
+    pub fn take(&mut self, keyframe: &Keyframe) {
+        self.points.start(&keyframe.points, &keyframe.twist);
+        self.own_m.fill(0.0);
+        for [x_m, y_m, weight] in self.points.points() {
+            let place = Vector2::new(f64::from(x_m), f64::from(y_m));
+            // NaN is in no sector.
+            if weight > 0.0 && place.norm().is_finite() {
+                let own_m = &mut self.own_m[sector(&place)];
+                *own_m = own_m.max(place.norm());
+            }
+        }
+        for (k, farthest_m) in self.farthest_m.iter_mut().enumerate() {
+            let beam = (0..=2 * BEAM_SECTORS)
+                .map(|other| self.own_m[(k + SECTORS + other - BEAM_SECTORS) % SECTORS]);
+            *farthest_m = beam.fold(0.0, f64::max);
+        }
+    }
+
+    /// Returns how well a place in the keyframe's frame was looked at, from 0 to 1.
+    pub fn look(&self, place: &Vector2<f64>) -> f64 {
+        let range_m = place.norm();
+        let options = &self.options;
+        let within = range_m >= options.near_m && range_m <= options.reach_m;
+        match within && range_m <= self.farthest_m[sector(place)] + 2.0 * options.cell_m {
+            true => 1.0 / (1.0 + (range_m / options.half_weight_m).powi(2)),
+            false => 0.0,
+        }
+    }
+
+    /// Calls `take` with the parts of all returns.
+    pub fn returns(&self, mut take: impl FnMut(Sample)) {
+        for [x_m, y_m, weight] in self.points.points() {
+            let place = Vector2::new(f64::from(x_m), f64::from(y_m));
+            let amount = f64::from(weight) * self.look(&place);
+            if amount > 0.0 && place.norm().is_finite() {
+                self.spread(&place, amount, &mut take);
+            }
+        }
+    }
+
+    /// Spreads a return along its arc as its bearing is uncertain, in parts a cell apart.
+    fn spread(&self, place: &Vector2<f64>, amount: f64, take: &mut impl FnMut(Sample)) {
+        let sigma_m = self.options.bearing_deg.to_radians() * place.norm();
+        let side = (SPREAD_SIGMAS * sigma_m / self.options.cell_m).round() as i32;
+        let tangent = Vector2::new(-place.y, place.x) / place.norm().max(f64::MIN_POSITIVE);
+        let aside_m = |k: i32| f64::from(k) * self.options.cell_m;
+        let share = |k: i32| match side {
+            0 => 1.0,
+            _ => (-0.5 * (aside_m(k) / sigma_m).powi(2)).exp(),
+        };
+        let total: f64 = (-side..=side).map(share).sum();
+        for k in -side..=side {
+            take(Sample {
+                place: Point2::from(place + tangent * aside_m(k)),
+                amount: amount * share(k) / total,
+            });
+        }
+    }
+}
+
+fn sector(place: &Vector2<f64>) -> usize {
+    let turns = place.y.atan2(place.x) / TAU + 0.5;
+    (turns * SECTORS as f64) as usize % SECTORS
+}

@@ -1,0 +1,144 @@
+//! What keyframes leave in the cells.
+
+use gyre_geometry::{SparsePoint, Twist, pose};
+use gyre_mapping::{MapOptions, TileIndex};
+use nalgebra::Point2;
+
+use crate::scenes::*;
+
+#[test]
+fn a_wall_seen_from_two_poses_is_one_wall() {
+    let mut evidence = drawn(&drive(40, &wall()));
+    let across: Vec<u8> = (-10..=10)
+        .map(|k| cell(&mut evidence, 0.1, 20.1 + 0.2 * f64::from(k)).evidence)
+        .collect();
+    let highest = across.iter().max().unwrap();
+    let bright = across.iter().filter(|at| **at > highest / 2).count();
+    assert!((1..=3).contains(&bright), "{across:?}");
+    assert!(*highest > 100, "{across:?}");
+    assert_eq!([across[0], across[20]], [0, 0], "{across:?}");
+}
+
+#[test]
+fn doppler_and_motion_leave_no_second_wall() {
+    // A wall square ahead of a keyframe at 10 m/s on the way there, and behind it on the way back.
+    let measured = |x_m: f32| SparsePoint::from([x_m, 0.0, 0.0, 1.0, 0.042]);
+    let twist = Twist {
+        vx_mps: 10.0,
+        ..Twist::default()
+    };
+    let mut there = keyframe(0, &pose(0.0, 0.0, 0.0), &[]);
+    (there.twist, there.points) = (twist, vec![measured(20.1 - 0.42)]);
+    let back = pose(0.0, 0.0, std::f64::consts::PI);
+    let mut again = keyframe(1, &back, &[]);
+    (again.twist, again.points) = (twist, vec![measured(-20.1 - 0.42)]);
+    let mut evidence = drawn(&[(pose(0.0, 0.0, 0.0), there), (back, again)]);
+    let at = |x_m: f64, evidence: &mut _| cell(evidence, x_m, 0.1).evidence;
+    let [before, wall, behind] = [19.7, 20.1, 20.5].map(|x_m| at(x_m, &mut evidence));
+    assert!(
+        wall > 50 && before == 0 && behind == 0,
+        "{before} {wall} {behind}"
+    );
+}
+
+#[test]
+fn something_seen_by_one_of_many_views_fades() {
+    let (car, wall) = (Point2::new(0.1, 10.1), wall());
+    let mut drive = drive(40, &wall);
+    let with_car: Vec<Point2<f64>> = wall.iter().copied().chain([car]).collect();
+    let (at, _) = drive[20];
+    drive[20].1 = keyframe(20, &at, &with_car);
+    let mut once = drawn(&[drive[20].clone()]);
+    let mut often = drawn(&drive);
+    let [once, often] =
+        [&mut once, &mut often].map(|evidence| cell(evidence, car.x, car.y).evidence);
+    assert!(once > 100 && often < once / 4, "{once} then {often}");
+}
+
+#[test]
+fn a_street_driven_often_is_no_brighter() {
+    let once = drive(40, &wall());
+    let again = once.iter().cloned().map(|(at, mut keyframe)| {
+        keyframe.seq += 40;
+        (at, keyframe)
+    });
+    let twice: Vec<_> = once.iter().cloned().chain(again).collect();
+    let [once, twice] = [once, twice].map(|drive| cell(&mut drawn(&drive), 0.1, 20.1).evidence);
+    assert!(once.abs_diff(twice) <= 4, "{once} and {twice}");
+}
+
+#[test]
+fn a_cell_beyond_the_farthest_return_was_not_looked_at() {
+    let mut evidence = drawn(&drive(1, &wall()));
+    assert!(cell(&mut evidence, -0.5, 15.0).looked > 0);
+    assert_eq!(cell(&mut evidence, -0.5, 25.0).looked, 0);
+    assert_eq!(cell(&mut evidence, -0.5, -15.0).looked, 0);
+    // Nearer than the nearest returns.
+    assert_eq!(cell(&mut evidence, -0.5, 2.0).looked, 0);
+}
+
+#[test]
+fn a_corrected_pose_moves_its_keyframe_and_leaves_no_trace() {
+    let mut drive = drive(30, &wall());
+    let mut evidence = drawn(&drive);
+    evidence.take_changed();
+    let corrected = pose(900.0, 40.0, 1.0);
+    drive[7].0 = corrected;
+    assert!(evidence.has_moved(7, &corrected));
+    evidence.draw(&drive[7].1, &corrected).unwrap();
+    assert!(!evidence.has_moved(7, &corrected));
+    assert_eq!(images(&mut evidence), images(&mut drawn(&drive)));
+    // The tiles around the two places, of all between.
+    let changed = evidence.take_changed();
+    let is_changed = |x, y| changed.contains(&TileIndex { x, y });
+    assert!(is_changed(0, 0) && is_changed(17, 0));
+    assert!(!is_changed(4, 0) && !is_changed(10, 0));
+    assert!(evidence.take_changed().is_empty());
+}
+
+#[test]
+fn a_keyframe_is_drawn_anew_beyond_a_fraction_of_a_cell() {
+    let evidence = drawn(&drive(1, &wall()));
+    let at = pose(-0.5, 0.0, 0.0);
+    assert!(!evidence.has_moved(0, &(at * pose(0.05, 0.0, 0.0))));
+    assert!(evidence.has_moved(0, &(at * pose(0.07, 0.0, 0.0))));
+    // 0.06 degrees are 0.08 m at 80 m.
+    assert!(evidence.has_moved(0, &(at * pose(0.0, 0.0, 0.001))));
+    assert!(evidence.has_moved(1, &at));
+}
+
+#[test]
+fn the_order_of_keyframes_changes_no_cell() {
+    let mut drive = drive(20, &wall());
+    let forward = images(&mut drawn(&drive));
+    drive.reverse();
+    assert_eq!(images(&mut drawn(&drive)), forward);
+}
+
+#[test]
+fn a_point_that_is_nowhere_is_left_out() {
+    let at = pose(0.0, 0.0, 0.0);
+    let mut strange = keyframe(0, &at, &wall());
+    let whole = images(&mut drawn(&[(at, strange.clone())]));
+    for (x_m, weight) in [
+        (f32::NAN, 1.0),
+        (f32::INFINITY, 1.0),
+        (3e8, f32::NAN),
+        (30.0, -1.0),
+    ] {
+        strange
+            .points
+            .push(SparsePoint::from([x_m, 0.0, 0.0, weight, 0.0]));
+    }
+    assert_eq!(images(&mut drawn(&[(at, strange)])), whole);
+}
+
+#[test]
+fn an_option_out_of_bounds_is_refused_by_name() {
+    let options = MapOptions {
+        cell_m: 0.0,
+        ..MapOptions::default()
+    };
+    let refused = options.validate().unwrap_err().to_string();
+    assert_eq!(refused, "the map's cell_m is 0, but must be 0.05 to 5");
+}

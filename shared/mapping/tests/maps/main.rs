@@ -1,0 +1,6 @@
+//! Maps of scenes whose look is known.
+#![allow(clippy::unwrap_used)]
+
+mod evidence;
+mod files;
+mod scenes;
