@@ -2,8 +2,8 @@
 //!
 //! One process appends, others read what is complete meanwhile. Each record is one `write`. A record that is cut short by a death is
 //! the last one; a thread synchronises the file, so that a power failure takes or damages at most the last
-//! [`GroupSync::LIMIT`] records. Those are cut off when the log is opened. Any other damaged record was whole once, and the log is
-//! refused.
+//! [`GroupSync::LIMIT`] records. Those are cut off when the log is opened. Any other damaged record was whole once, and is
+//! refused with its number: when the log is opened if its header is damaged, else when it is read.
 //!
 //! Layout, little-endian: 16 bytes of magic; then for each record its number (u64), its length in bytes (u32), the CRC-32 of its bytes
 //! (u32), the CRC-32 of these three (u32), its bytes, and zeros up to a multiple of four. So the same records are the same file.
