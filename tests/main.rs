@@ -29,6 +29,7 @@ mod restart;
 mod results;
 mod shared_memory;
 mod simulation;
+mod slam;
 mod supervisor;
 
 /// The program under test.

@@ -7,10 +7,11 @@ mod estimate;
 mod files;
 mod pass;
 mod sketch;
+mod slam;
 
 use std::path::{Path, PathBuf};
 
-use gyre_evaluation::{NeesOptions, Options};
+use gyre_evaluation::{NeesOptions, Options, plot::bands_svg};
 use gyre_messages::StageId;
 use gyre_pose_integration::journal;
 use gyre_radar::{
@@ -30,16 +31,23 @@ use estimate::Estimate;
 use files::Files;
 use pass::Pass;
 use sketch::Sketch;
+use slam::Slam;
+
+pub use slam::SlamSummary;
 
 /// The ground truth of a simulation that is played without being stored.
 pub const SIMULATED_TRUTH: &str = "ground_truth.tum";
 /// All results.
-pub const FILES: [&str; 8] = [
+pub const FILES: [&str; 12] = [
     "odometry.csv",
     "trajectory.tum",
     "trajectory.svg",
     "errors.svg",
     "bands.svg",
+    "trajectory_slam.tum",
+    "loops.csv",
+    "graph.g2o",
+    "bands_slam.svg",
     "latency.json",
     "summary.json",
     SIMULATED_TRUTH,
@@ -67,8 +75,9 @@ pub fn write(
     session: &Session<'_>,
 ) -> Result<Results, Failure> {
     let truth = truth_of(configuration, out);
+    let mut slam = slam_of(configuration, out);
     let mut files = Files::new(out);
-    let mut pass = Pass::new(&mut files, session.resumed, truth.is_some())?;
+    let mut pass = Pass::new(&mut files, session.resumed, truth.is_some(), slam.as_ref())?;
     for record in journal::records(&journal::path(out.path()))?
         .into_iter()
         .flatten()
@@ -76,6 +85,10 @@ pub fn write(
         pass.add(&record?)?;
     }
     let read = pass.finish();
+    let corrected = slam.as_mut();
+    let corrected = corrected
+        .map(|slam| add_corrected(&mut files, slam, truth.as_deref(), &read.corrected))
+        .transpose()?;
     let judgement = truth.and_then(|truth| judged(&truth, &read.estimate));
     for (name, plot) in plots(&read.sketch, judgement.as_ref())? {
         files.add(name, plot)?;
@@ -93,6 +106,7 @@ pub fn write(
         counts,
         latency,
         judgement,
+        corrected,
     );
     files.add("summary.json", serde_json::to_string_pretty(&summary)?)?;
     files.commit()?;
@@ -110,6 +124,37 @@ fn truth_of(configuration: &Configuration, out: &Out) -> Option<PathBuf> {
     given
         .or_else(simulated)
         .or_else(|| find_ground_truth(&configuration.source.data))
+}
+
+/// Corrects the trajectory by loops. Without that, the run has all other results.
+fn slam_of(configuration: &Configuration, out: &Out) -> Option<Slam> {
+    Slam::read(configuration, out)
+        .inspect_err(|reason| print::note(format_args!("no corrected trajectory: {reason}")))
+        .ok()
+        .flatten()
+}
+
+/// Adds the results of SLAM but for the trajectory itself.
+fn add_corrected(
+    files: &mut Files<'_>,
+    slam: &mut Slam,
+    truth: Option<&Path>,
+    corrected: &Trajectory,
+) -> Result<SlamSummary, Failure> {
+    files.add("loops.csv", slam.loops_csv()?)?;
+    files.add("graph.g2o", slam.graph_g2o())?;
+    // Why a truth cannot be used is said where odometry is evaluated.
+    let truth = truth.and_then(|path| read_trajectory(path).ok());
+    let Some(truth) = truth.filter(|_| corrected.len() > 1) else {
+        return Ok(slam.summary(None));
+    };
+    let ate = judge(corrected, &truth, Options::default()).map(|evaluation| evaluation.ate);
+    let bands = slam.bands(&truth).and_then(|bands| Ok(bands_svg(&bands)?));
+    match bands {
+        Ok(svg) => files.add("bands_slam.svg", svg)?,
+        Err(reason) => print::note(format_args!("no bands_slam.svg: {reason}")),
+    }
+    Ok(slam.summary(ate.ok().map(|ate| ate.rmse_m)))
 }
 
 /// Evaluates the trajectory and its covariances against the ground truth, if that fits.

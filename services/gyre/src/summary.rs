@@ -17,6 +17,7 @@ use crate::{
     judgement::Judgement,
     latency::{Latency, Percentiles},
     machine::Machine,
+    results::SlamSummary,
 };
 
 pub use counts::{Counter, Counts, MotionCounts};
@@ -88,6 +89,9 @@ pub struct Summary {
     latency: Latency,
     /// As `gyre evaluate --json` prints it.
     evaluation: Option<Judgement>,
+    /// `None`: the trajectory is not corrected by loops.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    slam: Option<SlamSummary>,
 }
 
 impl Summary {
@@ -104,6 +108,7 @@ impl Summary {
         counts: Counts,
         latency: Latency,
         evaluation: Option<Judgement>,
+        slam: Option<SlamSummary>,
     ) -> Self {
         let (wall_s, report) = (session.wall.as_secs_f64(), session.report);
         Self {
@@ -135,6 +140,7 @@ impl Summary {
                 .unwrap_or_default(),
             latency,
             evaluation,
+            slam,
         }
     }
 }
@@ -186,6 +192,9 @@ impl fmt::Display for Summary {
         self.latency_table(f)?;
         if let Some(evaluation) = &self.evaluation {
             writeln!(f, "\n{evaluation}")?;
+        }
+        if let Some(slam) = &self.slam {
+            writeln!(f, "\n{slam}")?;
         }
         write!(
             f,

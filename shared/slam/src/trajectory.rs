@@ -219,6 +219,12 @@ impl TrajectoryEstimator {
         &self.loops
     }
 
+    /// Returns the motions between the keyframes.
+    pub fn odometry(&self) -> impl Iterator<Item = Constraint> + '_ {
+        let motions = self.keyframes.iter().skip(1).enumerate();
+        motions.map(|(last, keyframe)| Constraint::odometry(last, keyframe.motion))
+    }
+
     /// Returns the correction of the poses of all scans.
     pub fn correction(&self) -> Correction {
         Correction::new(&self.keyframes, self.poses())
@@ -237,8 +243,8 @@ impl TrajectoryEstimator {
         let Estimator::Graph(graph) = &mut estimator else {
             return Ok(());
         };
-        for (last, keyframe) in self.keyframes.iter().skip(1).enumerate() {
-            graph.apply(&Constraint::odometry(last, keyframe.motion))?;
+        for motion in self.odometry() {
+            graph.apply(&motion)?;
         }
         for it in &mut self.loops {
             it.verdict = match graph.test(&it.constraint)?.outcome {

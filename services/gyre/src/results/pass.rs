@@ -1,14 +1,13 @@
 //! One pass over the journal.
 
 use gyre_messages::{Item, PoseHeader, flag};
-use gyre_radar::ground_truth::write_tum_pose;
+use gyre_radar::{Trajectory, ground_truth::write_tum_pose};
 use gyre_storage::Draft;
 
-use super::{Estimate, Files, Sketch};
+use super::{Estimate, Files, Sketch, Slam};
 use crate::{Failure, latency::LatencyMeter, odometry, summary::Counter};
 
 /// Writes the tables row by row, and measures and counts all else.
-#[derive(Debug)]
 pub struct Pass<'a, 'b> {
     files: &'a mut Files<'b>,
     odometry: Draft,
@@ -17,6 +16,8 @@ pub struct Pass<'a, 'b> {
     /// Poses of earlier sessions that are still to come.
     resumed: usize,
     is_judged: bool,
+    /// The correction of the poses, and their table.
+    slam: Option<(&'a Slam, Draft)>,
     read: Read,
 }
 
@@ -33,6 +34,8 @@ pub struct Read {
     pub sketch: Sketch,
     /// The poses to be evaluated.
     pub estimate: Estimate,
+    /// The corrected poses to be evaluated.
+    pub corrected: Trajectory,
 }
 
 impl<'a, 'b> Pass<'a, 'b> {
@@ -40,13 +43,20 @@ impl<'a, 'b> Pass<'a, 'b> {
     ///
     /// # Errors
     /// A file that cannot be created.
-    pub fn new(files: &'a mut Files<'b>, resumed: usize, is_judged: bool) -> Result<Self, Failure> {
+    pub fn new(
+        files: &'a mut Files<'b>,
+        resumed: usize,
+        is_judged: bool,
+        slam: Option<&'a Slam>,
+    ) -> Result<Self, Failure> {
         let (mut odometry, tum) = (
             files.create("odometry.csv")?,
             files.create("trajectory.tum")?,
         );
         odometry.append(odometry::HEADER)?;
+        let corrected = |slam| Ok::<_, Failure>((slam, files.create("trajectory_slam.tum")?));
         Ok(Self {
+            slam: slam.map(corrected).transpose()?,
             files,
             odometry,
             tum,
@@ -73,6 +83,7 @@ impl<'a, 'b> Pass<'a, 'b> {
         let mut line = Vec::new();
         write_tum_pose(pose.item.stamp_ns, &place, &mut line)?;
         self.tum.append(line)?;
+        self.correct(pose)?;
         self.read.counter.add(pose);
         self.read.sketch.add(place);
         match self.resumed.checked_sub(1) {
@@ -85,10 +96,29 @@ impl<'a, 'b> Pass<'a, 'b> {
         Ok(())
     }
 
+    fn correct(&mut self, pose: &PoseHeader) -> Result<(), Failure> {
+        let Some((slam, tum)) = &mut self.slam else {
+            return Ok(());
+        };
+        let stamp_ns = pose.item.stamp_ns;
+        let corrected = slam.correct(pose.item.seq, &pose.pose().motion);
+        let mut line = Vec::new();
+        write_tum_pose(stamp_ns, &corrected, &mut line)?;
+        if self.is_judged {
+            let trajectory = &mut self.read.corrected;
+            trajectory.stamp_ns.get_or_insert_default().push(stamp_ns);
+            trajectory.poses.push(corrected);
+        }
+        Ok(tum.append(line)?)
+    }
+
     /// Returns what was read.
     pub fn finish(self) -> Read {
         self.files.push(self.odometry);
         self.files.push(self.tum);
+        if let Some((_, tum)) = self.slam {
+            self.files.push(tum);
+        }
         self.read
     }
 }

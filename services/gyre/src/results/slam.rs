@@ -1,0 +1,264 @@
+//! The trajectory corrected by loops: a function of the keyframes and of the journal, whenever loops were closed.
+
+use std::fmt::{self, Write};
+
+use gyre_estimation::G2o;
+use gyre_evaluation::{BandSample, Bands, TruthSigma};
+use gyre_geometry::{Pose, xy_yaw};
+use gyre_radar::Trajectory;
+use gyre_slam::{
+    Correction, EstimatorKind, Keyframe, KeyframeError, KeyframeReader, KeyframeSource, LoopCloser,
+    LoopOptions, LoopOutcome, LoopVerdict, Query, SlamKind, TrajectoryEstimator, TrajectoryOptions,
+    keyframes_path,
+};
+use serde::Serialize;
+
+use crate::{Failure, configuration::Configuration, out::Out};
+
+/// A pose of the truth belongs to a keyframe if it is this near in time.
+const SAME_TIME_NS: u64 = 50_000_000;
+/// Keyframes whose covariance is computed, at most: each takes a millisecond in a long drive.
+const DRAWN: usize = 1000;
+
+const HEADER: &str = "scan,found_scan,x_m,y_m,yaw_rad,similarity,correlation,searched,runner_up,chi_square,weight,verdict\n";
+
+/// Keyframes, loops and corrected poses.
+pub struct Slam {
+    estimator: TrajectoryEstimator,
+    correction: Correction,
+    queries: Vec<Query>,
+    /// The scan and the time of each keyframe.
+    keyframes: Vec<(u64, i64)>,
+}
+
+/// What the summary says of loops.
+#[derive(Debug, Serialize)]
+pub struct SlamSummary {
+    keyframes: usize,
+    /// Loops that the corrected trajectory is made with.
+    loops_used: usize,
+    /// Verified loops that contradict odometry or other loops.
+    loops_rejected: usize,
+    /// ATE of the corrected trajectory, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ate_m: Option<f64>,
+}
+
+impl fmt::Display for SlamSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            keyframes,
+            loops_used,
+            loops_rejected,
+            ate_m,
+        } = self;
+        write!(
+            f,
+            "slam          {loops_used} loops between {keyframes} keyframes, {loops_rejected} rejected"
+        )?;
+        match ate_m {
+            Some(ate_m) => write!(f, "; ATE after correction {ate_m:.3} m rmse"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Slam {
+    /// Closes the loops between the keyframes of a run and corrects their poses; `None` without SLAM, and before the first keyframe. Of a
+    /// run that goes on, no loops are closed yet.
+    ///
+    /// # Errors
+    /// Keyframes that cannot be read or used.
+    pub fn read(configuration: &Configuration, out: &Out) -> Result<Option<Self>, Failure> {
+        if !configuration.slam.is_on() {
+            return Ok(None);
+        }
+        let mut keyframes = Keyframes(KeyframeReader::open(&keyframes_path(out.path()))?);
+        if keyframes.0.is_empty() {
+            return Ok(None);
+        }
+        let queries = queries(configuration, &mut keyframes)?;
+        let mut estimator = TrajectoryEstimator::new(TrajectoryOptions {
+            kind: match configuration.slam.kind {
+                SlamKind::Filter => EstimatorKind::Filter,
+                SlamKind::Graph | SlamKind::None => EstimatorKind::Graph,
+            },
+            ..TrajectoryOptions::default()
+        });
+        let mut known = Vec::new();
+        for index in 0..keyframes.0.len() {
+            let keyframe = keyframes.keyframe(index)?;
+            estimator.push(&keyframe)?;
+            known.push((keyframe.scan, keyframe.stamp_ns));
+        }
+        queries
+            .iter()
+            .try_for_each(|query| estimator.close(query))?;
+        estimator.solve()?;
+        Ok(Some(Self {
+            correction: estimator.correction(),
+            estimator,
+            queries,
+            keyframes: known,
+        }))
+    }
+
+    /// Corrects the pose of scan `seq`.
+    pub fn correct(&self, seq: u64, pose: &Pose) -> Pose {
+        self.correction.correct(seq, pose)
+    }
+
+    /// Returns `loops.csv`: a row for each verified candidate.
+    ///
+    /// # Errors
+    /// None: writing to a string does not fail.
+    pub fn loops_csv(&self) -> Result<String, fmt::Error> {
+        let mut rows = HEADER.to_owned();
+        let judged = self.estimator.loops();
+        for query in &self.queries {
+            for candidate in &query.candidates {
+                let ends = (query.keyframe, candidate.place);
+                let of = |it: &gyre_slam::JudgedLoop| (it.constraint.to, it.constraint.from);
+                let judged = judged.binary_search_by_key(&ends, of).map(|at| judged[at]);
+                let [query, place] = [ends.0, ends.1].map(|keyframe| self.keyframes[keyframe].0);
+                let [x, y, yaw] = xy_yaw(&candidate.motion.motion);
+                write!(rows, "{query},{place},{x:.4},{y:.4},{yaw:.6},")?;
+                for figure in [
+                    candidate.similarity,
+                    candidate.correlation,
+                    candidate.searched,
+                    candidate.runner_up,
+                ] {
+                    write!(rows, "{figure:.4},")?;
+                }
+                match candidate.chi_square.is_nan() {
+                    true => write!(rows, ",")?,
+                    false => write!(rows, "{:.3},", candidate.chi_square)?,
+                }
+                match judged {
+                    Ok(judged) => writeln!(rows, "{:.4},{}", judged.weight, used(judged.verdict))?,
+                    Err(_) => writeln!(rows, ",{}", rejected(candidate.outcome))?,
+                }
+            }
+        }
+        Ok(rows)
+    }
+
+    /// Returns `graph.g2o`: the corrected keyframes, the motions between them, and the loops that are used.
+    pub fn graph_g2o(&self) -> String {
+        let used = self.estimator.loops().iter();
+        let used = used.filter(|it| it.verdict == LoopVerdict::Used);
+        let loops = used.map(|it| it.constraint);
+        G2o::write(
+            self.estimator.poses(),
+            self.estimator.odometry().chain(loops),
+        )
+    }
+
+    /// Returns the errors of the corrected keyframes with what their covariances say, against the first one that has a true pose.
+    ///
+    /// # Errors
+    /// Constraints that do not determine the poses.
+    pub fn bands(&mut self, truth: &Trajectory) -> Result<Bands, Failure> {
+        let step = self.keyframes.len().div_ceil(DRAWN);
+        let (mut samples, mut start) = (Vec::new(), None);
+        for keyframe in (0..self.keyframes.len()).step_by(step) {
+            let stamp_ns = self.keyframes[keyframe].1;
+            let Some(truth) = truth.near(stamp_ns, SAME_TIME_NS) else {
+                continue;
+            };
+            let pose = self.estimator.pose(keyframe)?;
+            let (map_from_truth, start_ns) =
+                *start.get_or_insert((pose.motion * truth.inverse(), stamp_ns));
+            samples.push(BandSample {
+                time_s: (stamp_ns - start_ns) as f64 * 1e-9,
+                error: pose.error(&(map_from_truth * truth)),
+                sigma: pose
+                    .covariance
+                    .diagonal()
+                    .map(|variance| variance.max(0.0).sqrt()),
+            });
+        }
+        Ok(Bands {
+            chains: vec![samples],
+            truth_sigma: TruthSigma::default(),
+        })
+    }
+
+    /// Returns what the summary says. `ate_m` is the error of the corrected trajectory.
+    pub fn summary(&self, ate_m: Option<f64>) -> SlamSummary {
+        let used = |it: &&gyre_slam::JudgedLoop| it.verdict == LoopVerdict::Used;
+        let loops_used = self.estimator.loops().iter().filter(used).count();
+        let verified = |query: &Query| {
+            let candidates = query.candidates.iter();
+            let verified = |outcome| {
+                matches!(
+                    outcome,
+                    LoopOutcome::Accepted | LoopOutcome::ContradictsOdometry
+                )
+            };
+            candidates.filter(|it| verified(it.outcome)).count()
+        };
+        SlamSummary {
+            keyframes: self.keyframes.len(),
+            loops_used,
+            loops_rejected: self.queries.iter().map(verified).sum::<usize>() - loops_used,
+            ate_m,
+        }
+    }
+}
+
+fn used(verdict: LoopVerdict) -> &'static str {
+    match verdict {
+        LoopVerdict::Used => "used",
+        LoopVerdict::ContradictsOdometry => "contradicts odometry",
+        LoopVerdict::ContradictsLoops => "contradicts loops",
+        LoopVerdict::Redundant => "redundant",
+    }
+}
+
+fn rejected(outcome: LoopOutcome) -> &'static str {
+    match outcome {
+        LoopOutcome::Accepted => "used",
+        LoopOutcome::LowCorrelation => "low correlation",
+        LoopOutcome::Ambiguous => "ambiguous",
+        LoopOutcome::Undetermined => "undetermined",
+        LoopOutcome::ContradictsOdometry => "contradicts odometry",
+    }
+}
+
+/// Closes the loops between all keyframes of a run that has ended.
+fn queries(
+    configuration: &Configuration,
+    keyframes: &mut Keyframes,
+) -> Result<Vec<Query>, Failure> {
+    if !keyframes.0.has_ended() {
+        return Ok(Vec::new());
+    }
+    let odometry = &configuration.odometry;
+    let options = LoopOptions {
+        places: configuration.slam.places.clone(),
+        ..LoopOptions::default()
+    };
+    let mut closer = LoopCloser::new(options, &odometry.refinement, odometry.points.capacity)?;
+    for index in 0..keyframes.0.len() {
+        closer.push(&keyframes.keyframe(index)?)?;
+    }
+    closer.finish();
+    while closer.describe(keyframes)?.is_some() {}
+    let mut queries = Vec::new();
+    while let Some(query) = closer.close(keyframes)? {
+        queries.push(query);
+    }
+    Ok(queries)
+}
+
+struct Keyframes(KeyframeReader);
+
+impl KeyframeSource for Keyframes {
+    type Error = KeyframeError;
+
+    fn keyframe(&mut self, index: usize) -> Result<Keyframe, KeyframeError> {
+        self.0.read(index)
+    }
+}

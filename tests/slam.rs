@@ -1,0 +1,65 @@
+//! Results of a run with SLAM: a drive that comes back to its start is corrected by loops, and the files are the same bytes whatever
+//! happens to the run.
+
+use std::path::Path;
+
+use gyre_estimation::G2o;
+
+use crate::common::Run;
+
+const FILES: [&str; 4] = [
+    "trajectory_slam.tum",
+    "loops.csv",
+    "graph.g2o",
+    "bands_slam.svg",
+];
+
+/// Once around a block.
+fn run(kind: &str) -> Run {
+    let configuration = Path::new(crate::PROJECT).join("configs/demo.toml");
+    Run::of_file(&configuration).set(&format!("slam.kind={kind}"))
+}
+
+fn files(run: &Run) -> Vec<String> {
+    FILES.iter().map(|name| run.result(name)).collect()
+}
+
+#[test]
+fn a_drive_that_comes_back_is_corrected_by_loops() {
+    for kind in ["graph", "filter"] {
+        let run = run(kind);
+        run.complete();
+        let summary = run.summary();
+        let figure = |place: &str| summary.pointer(place).and_then(|it| it.as_f64()).unwrap();
+        let used = figure("/slam/loops_used");
+        assert!(used >= 1.0, "{kind}");
+        assert!(figure("/slam/ate_m") < 0.3, "{kind}");
+        let loops = run.result("loops.csv");
+        let rows = loops.lines().filter(|row| row.ends_with(",used"));
+        assert_eq!(rows.count() as f64, used);
+        let graph = G2o::parse(&run.result("graph.g2o")).unwrap();
+        assert_eq!(graph.poses.len() as f64, figure("/slam/keyframes"));
+        let odometry = graph.poses.len() - 1;
+        assert_eq!((graph.constraints.len() - odometry) as f64, used);
+        let stamps = |name| {
+            let text = run.result(name);
+            let stamp = |row: &str| row.split(' ').next().map(str::to_owned);
+            text.lines().map(stamp).collect::<Vec<_>>()
+        };
+        assert_eq!(stamps("trajectory_slam.tum"), stamps("trajectory.tum"));
+    }
+}
+
+#[test]
+fn an_interrupted_drive_has_the_same_corrected_trajectory() {
+    let whole = run("graph");
+    whole.complete();
+    let interrupted = run("graph").rate("20");
+    let mut running = interrupted.start();
+    running.await_poses(40);
+    running.signal(rustix::process::Signal::INT);
+    running.finish();
+    assert!(!interrupted.result("trajectory_slam.tum").is_empty());
+    interrupted.complete();
+    assert!(files(&interrupted) == files(&whole));
+}
