@@ -9,7 +9,7 @@ use std::{
     time::Duration,
 };
 
-use gyre_messages::StageId;
+use gyre_messages::{FollowerId, StageId};
 use rustix::process::{Signal, kill_process};
 
 /// A process id.
@@ -31,7 +31,7 @@ pub fn cpu_time(pid: Pid) -> Duration {
     Duration::from_millis(ticks * 10)
 }
 
-/// The living stages among a supervisor's children, by name.
+/// The living stages and followers among a supervisor's children, by name.
 pub fn stages_of(supervisor: Pid) -> BTreeMap<String, Pid> {
     let ours = |pid: &Pid| {
         parent_and_state(*pid).is_some_and(|(parent, state)| parent == supervisor && state != 'Z')
@@ -87,8 +87,6 @@ fn stage_name(pid: Pid) -> Option<String> {
         .rfind(|word| !word.is_empty())?;
     let path = PathBuf::from(String::from_utf8_lossy(last).into_owned());
     let name = path.file_stem()?.to_string_lossy().into_owned();
-    StageId::ALL
-        .iter()
-        .any(|stage| stage.name() == name)
-        .then_some(name)
+    let is_known = StageId::by_name(&name).is_some() || FollowerId::by_name(&name).is_some();
+    is_known.then_some(name)
 }

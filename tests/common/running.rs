@@ -119,6 +119,15 @@ impl Running {
         self
     }
 
+    /// Waits until it has said this on standard error.
+    pub fn await_words(&mut self, words: &str) -> &mut Self {
+        self.until(words, |running| {
+            let said = running.run.said("stderr.txt");
+            said.contains(words).then_some(())
+        });
+        self
+    }
+
     /// The root of the run, as a stage knows it; `None` if none lives.
     pub fn root(&self) -> Option<PathBuf> {
         self.stages().into_values().find_map(processes::run_of)

@@ -95,6 +95,10 @@ pub enum Topic {
     Refined,
     /// Poses.
     Pose,
+    /// Loops between keyframes, in a run with SLAM.
+    Loop,
+    /// Corrections of the odometry, in a run with SLAM.
+    Correction,
 }
 
 /// The arguments of `gyre doctor`.

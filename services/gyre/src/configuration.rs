@@ -10,7 +10,7 @@ use std::{
     time::Duration,
 };
 
-use gyre_messages::{StageId, Window};
+use gyre_messages::{FollowerId, StageId, Window};
 use gyre_odometry::{OdometryConfig, SearchKind};
 use gyre_radar::DatasetOptions;
 use gyre_radar_replay::SourceConfig;
@@ -45,7 +45,8 @@ pub struct Configuration {
     /// The correction of the trajectory at places that are seen again.
     pub slam: SlamConfig,
     /// The command and the restarts of a stage: `radar-replay`, `masking`, `rotation-search`,
-    /// `translation-search`, `joint-search`, `refinement` or `pose-integration`.
+    /// `translation-search`, `joint-search`, `refinement`, `pose-integration`, `loop-closure` or
+    /// `trajectory`.
     pub stages: BTreeMap<String, StageConfig>,
 }
 
@@ -216,7 +217,7 @@ impl Configuration {
                 refinement: strict::section(&mut table, "refinement")?,
             },
             slam: strict::section(&mut table, "slam")?,
-            stages: strict::sections(&mut table, "stages", &StageId::ALL.map(StageId::name))?,
+            stages: strict::sections(&mut table, "stages", &process_names())?,
         };
         let format = configuration.dataset.format.and_then(OutputFormat::read_as);
         if let Some(simulation) = &mut configuration.simulation {
@@ -405,8 +406,7 @@ impl Configuration {
     /// Returns the processes to start: `gyre stage NAME`, or their replacements.
     pub fn stage_plans(&self, gyre: &Path) -> Vec<StagePlan> {
         let live = self.run.mode == Mode::Live;
-        let plan = |stage: StageId| {
-            let name = stage.name();
+        let plan = |name: &str| {
             let own = self.stages.get(name).cloned().unwrap_or_default();
             let ours = || {
                 vec![
@@ -425,14 +425,17 @@ impl Configuration {
                 command,
                 programs,
                 restart: own.restart,
-                outlives_restarts: live && stage == StageId::RadarReplay,
+                outlives_restarts: live && name == StageId::RadarReplay.name(),
                 // Live masking alone knows which scans it admitted.
-                restarts_all: live && stage == StageId::Masking,
+                restarts_all: live && name == StageId::Masking.name(),
             }
         };
-        StageId::ALL
-            .into_iter()
-            .filter(|stage| self.has(*stage))
+        let stages = StageId::ALL.into_iter().filter(|stage| self.has(*stage));
+        let followers = FollowerId::ALL.into_iter().filter(|_| self.slam.is_on());
+        let followers = followers.map(FollowerId::name);
+        stages
+            .map(StageId::name)
+            .chain(followers)
             .map(plan)
             .collect()
     }
@@ -468,6 +471,16 @@ impl Configuration {
         let now: toml::Table = self.to_toml()?.parse()?;
         Ok(difference::first(&relevant(begun), &relevant(&now)))
     }
+}
+
+/// Returns the names of all processes that a run can have.
+pub fn process_names() -> Vec<&'static str> {
+    let followers = FollowerId::ALL.map(FollowerId::name);
+    StageId::ALL
+        .map(StageId::name)
+        .into_iter()
+        .chain(followers)
+        .collect()
 }
 
 /// Names the place of a mistake, without the line itself: the file may hold anything.

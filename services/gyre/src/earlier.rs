@@ -12,7 +12,7 @@ use gyre_pose_integration::{
 };
 use gyre_refinement::checkpoint::{self, Checkpoint, CheckpointError};
 use gyre_scan_matching::Refiner;
-use gyre_slam::{KeyframeError, keyframes_path};
+use gyre_slam::{KeyframeError, Place, Query, RecordReader, keyframes_path, records_path};
 use gyre_storage::{self as storage, GroupSync, LogError};
 
 use crate::{
@@ -33,7 +33,7 @@ const LOGS: [&str; 2] = ["log.jsonl", "log.jsonl.old"];
 pub enum Earlier {
     /// Nothing to go on from.
     Nothing,
-    /// A journal without its end.
+    /// A journal without its end, or of which the followers have not read all keyframes.
     Unfinished(Begun),
     /// A journal with its end, of which results have not been written.
     Ended(Begun),
@@ -83,8 +83,11 @@ impl Earlier {
             lost: content.poses - poses + content.torn,
             identity,
         };
+        let is_followed =
+            !configuration.slam.is_on() || RecordReader::<Query>::open(out.path())?.has_ended();
         Ok(match (content.ended, poses) {
-            (true, _) => Self::Ended(begun),
+            (true, _) if is_followed => Self::Ended(begun),
+            (true, _) => Self::Unfinished(begun),
             (false, 0) => Self::Nothing,
             (false, _) => Self::Unfinished(begun),
         })
@@ -185,6 +188,8 @@ pub fn begin(out: &Out, identity: &Identity, resolved: &str) -> Result<(), Failu
     let state = [
         checkpoint::path(out.path()),
         keyframes_path(out.path()),
+        records_path::<Place>(out.path()),
+        records_path::<Query>(out.path()),
         out.join(COMPLETE),
     ];
     // A new run may not write all of them: none of the earlier ones must be taken for its own.

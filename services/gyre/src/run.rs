@@ -264,7 +264,9 @@ fn finish(
     session: &Session<'_>,
 ) -> Result<Results, Failure> {
     let written = results::write(configuration, out, session)?;
-    if written.ended {
+    // With all poses there may still be loops to find.
+    let has_followed = session.ending == Some(Ending::Complete) || !configuration.slam.is_on();
+    if written.ended && has_followed {
         earlier::mark_complete(out, written.poses)?;
     }
     Ok(written)

@@ -7,7 +7,7 @@ use std::{
     process::ExitCode,
 };
 
-use gyre_messages::StageId;
+use gyre_messages::{FollowerId, StageId};
 use gyre_radar::DatasetOptions;
 use gyre_radar_replay::Pace;
 use gyre_simulator::{SimulatedDrive, SimulationConfig};
@@ -17,25 +17,20 @@ use rustix::{
     thread::set_name,
 };
 
-use crate::{print, program};
+use crate::{configuration::process_names, print, program};
 
-/// Runs a stage by its name.
+/// The work of a process.
+type Work = fn(&Launch) -> Result<StageCounters, StageError>;
+
+/// Runs a stage or a follower by its name.
 pub fn run(name: &str) -> ExitCode {
-    let Some(stage) = StageId::by_name(name) else {
-        let names = StageId::ALL.map(StageId::name).join(", ");
+    let stage = StageId::by_name(name).map(work_of_stage);
+    let Some(work) = stage.or_else(|| FollowerId::by_name(name).map(work_of_follower)) else {
+        let names = process_names().join(", ");
         print::note(format_args!(
             "gyre: there is no stage `{name}`; there are {names}"
         ));
         return ExitCode::FAILURE;
-    };
-    let work: fn(&Launch) -> Result<StageCounters, StageError> = match stage {
-        StageId::RadarReplay => play,
-        StageId::Masking => gyre_masking_stage::run,
-        StageId::RotationSearch => gyre_rotation_search::run,
-        StageId::TranslationSearch => gyre_translation_search::run,
-        StageId::JointSearch => gyre_joint_search::run,
-        StageId::Refinement => gyre_refinement::run,
-        StageId::PoseIntegration => gyre_pose_integration::run,
     };
     // Started by its file, it would be called `exe`.
     let _ = set_name(c"gyre");
@@ -43,6 +38,25 @@ pub fn run(name: &str) -> ExitCode {
         require_same_build(&launch.manifest)?;
         work(launch)
     })
+}
+
+fn work_of_stage(stage: StageId) -> Work {
+    match stage {
+        StageId::RadarReplay => play,
+        StageId::Masking => gyre_masking_stage::run,
+        StageId::RotationSearch => gyre_rotation_search::run,
+        StageId::TranslationSearch => gyre_translation_search::run,
+        StageId::JointSearch => gyre_joint_search::run,
+        StageId::Refinement => gyre_refinement::run,
+        StageId::PoseIntegration => gyre_pose_integration::run,
+    }
+}
+
+fn work_of_follower(follower: FollowerId) -> Work {
+    match follower {
+        FollowerId::LoopClosure => gyre_loop_closure::run,
+        FollowerId::Trajectory => gyre_trajectory::run,
+    }
 }
 
 /// Checks that this is the supervisor's build. A command of the configuration may name another one.

@@ -9,7 +9,8 @@ use std::{
 };
 
 use gyre_messages::{
-    Masked, Message, Motion, MotionHeader, Pose, PoseHeader, Refined, Rotation, Scan,
+    Correction, CorrectionHeader, Loop, LoopHeader, Masked, Message, Motion, MotionHeader, Pose,
+    PoseHeader, Refined, Rotation, Scan,
 };
 use gyre_stage::{
     observer::{Next, ObservedRun},
@@ -34,6 +35,8 @@ pub fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
         Topic::Motion => observe::<Motion>(out, |message| motion(message.header())),
         Topic::Refined => observe::<Refined>(out, |message| motion(message.header())),
         Topic::Pose => observe::<Pose>(out, |message| pose(message.header())),
+        Topic::Loop => observe::<Loop>(out, |message| closed(message.header())),
+        Topic::Correction => observe::<Correction>(out, |message| correction(message.header())),
     }
 }
 
@@ -130,5 +133,27 @@ fn pose(header: &PoseHeader) -> String {
         header.x_m,
         header.y_m,
         header.yaw_rad.to_degrees()
+    )
+}
+
+fn closed(header: &LoopHeader) -> String {
+    format!(
+        "at scan {}: x {:.3} m, y {:.3} m, yaw {:.3} deg, correlation {:.3}",
+        header.item.previous_scan,
+        header.x_m,
+        header.y_m,
+        header.yaw_rad.to_degrees(),
+        header.correlation
+    )
+}
+
+fn correction(header: &CorrectionHeader) -> String {
+    format!(
+        "x {:.3} m, y {:.3} m, yaw {:.3} deg, {} keyframes, {} loops",
+        header.x_m,
+        header.y_m,
+        header.yaw_rad.to_degrees(),
+        header.keyframes,
+        header.loops
     )
 }

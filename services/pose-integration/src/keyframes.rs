@@ -72,20 +72,26 @@ impl Keyframes {
         }
     }
 
-    /// Takes the next pose, before it is journalled. If it becomes a keyframe, that is appended with the scan's points.
+    /// Takes the next pose, before it is journalled. If it becomes a keyframe, that is appended with the scan's points. Returns whether
+    /// it does.
     ///
     /// # Errors
     /// A file that cannot be written or synchronised.
-    pub fn add(&mut self, pose: &PoseHeader, points: &[SparsePoint]) -> Result<(), KeyframesError> {
+    pub fn add(
+        &mut self,
+        pose: &PoseHeader,
+        points: &[SparsePoint],
+    ) -> Result<bool, KeyframesError> {
         let Some(mut keyframe) = self.builder.next(&scan_pose(pose)) else {
-            return Ok(self.log.rely()?);
+            self.log.rely()?;
+            return Ok(false);
         };
         keyframe.points = mem::take(&mut self.points);
         keyframe.points.clear();
         keyframe.points.extend_from_slice(points);
         self.log.append(&keyframe)?;
         self.points = keyframe.points;
-        Ok(())
+        Ok(true)
     }
 
     /// Says that the stream has ended, before that is journalled. All keyframes survive a power failure when this returns.

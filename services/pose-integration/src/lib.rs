@@ -11,7 +11,12 @@ use std::path::PathBuf;
 use gyre_geometry::SparsePoint;
 use gyre_messages::{Item, Masked, Motion, MotionHeader, PoseHeader, Refined, StageId, flag};
 use gyre_slam::{KeyframeError, SlamConfig};
-use gyre_stage::{Launch, Sink, StageCounters, StageError, clock, reader::Received, sink};
+use gyre_stage::{
+    Launch, Sink, StageCounters, StageError, clock,
+    follower::{Growth, LogId},
+    reader::Received,
+    sink,
+};
 use gyre_storage::LogError;
 
 pub use compose::compose;
@@ -30,7 +35,11 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
         out: out.clone(),
         slam: launch.section("slam")?,
         keyframes: None,
+        growth: None,
     };
+    if integration.slam.is_on() {
+        integration.growth = Some(Growth::of(launch, LogId::Keyframes)?);
+    }
     match launch.manifest.refines {
         true => sink::run::<Refined, _>(launch, &mut integration),
         false => sink::run::<Motion, _>(launch, &mut integration),
@@ -44,6 +53,8 @@ struct Integration {
     slam: SlamConfig,
     /// Of a run with SLAM, from [`Sink::restore`] on.
     keyframes: Option<Keyframes>,
+    /// Wakes the followers of the keyframes.
+    growth: Option<Growth>,
 }
 
 impl Sink for Integration {
@@ -74,9 +85,10 @@ impl Sink for Integration {
         let mut pose = compose(self.last.as_ref(), motion);
         pose.item.hop_mut(Self::HOP).finished_ns = clock::now_ns();
         if let (Some(keyframes), Some(scan)) = (&mut self.keyframes, scan) {
-            keyframes
-                .add(&pose, points(scan)?)
-                .map_err(unusable_keyframes)?;
+            let added = keyframes.add(&pose, points(scan)?);
+            if added.map_err(unusable_keyframes)? {
+                self.wake_followers()?;
+            }
         }
         self.write(&pose)?;
         self.last = Some(pose);
@@ -86,6 +98,7 @@ impl Sink for Integration {
     fn end(&mut self, item: &Item) -> Result<(), StageError> {
         if let Some(keyframes) = &mut self.keyframes {
             keyframes.end().map_err(unusable_keyframes)?;
+            self.wake_followers()?;
         }
         self.write(&PoseHeader {
             item: Item {
@@ -98,6 +111,10 @@ impl Sink for Integration {
 }
 
 impl Integration {
+    fn wake_followers(&self) -> Result<(), StageError> {
+        self.growth.as_ref().map_or(Ok(()), Growth::notify)
+    }
+
     fn write(&mut self, pose: &PoseHeader) -> Result<(), StageError> {
         self.journal.append(pose).map_err(unusable)
     }

@@ -6,6 +6,7 @@
 //! - [`KeyframeBuilder`]: makes keyframes from the poses of odometry;
 //! - [`KeyframeLog`]: the file of all keyframes of a run; [`KeyframeReader`] follows it;
 //! - [`LoopCloser`]: which keyframes are of the same place; [`Query`]: the candidates of a keyframe with their verdicts;
+//! - [`RecordLog`]: the files of places and queries of a run; [`RecordReader`] follows them;
 //! - [`TrajectoryEstimator`]: the poses of all keyframes from odometry and loops;
 //! - [`Correction`]: the poses of all scans.
 
@@ -19,6 +20,7 @@ mod keyframe_builder;
 mod keyframes;
 mod loops;
 mod place;
+mod records;
 mod trajectory;
 
 pub use closing::{ClosingError, KeyframeSource, LoopCloser, LoopOptions};
@@ -29,6 +31,7 @@ pub use keyframe_builder::{KeyframeBuilder, ScanPose};
 pub use keyframes::{KeyframeError, KeyframeLog, KeyframeReader, keyframes_path};
 pub use loops::{LoopCandidate, LoopOutcome, MalformedQuery, Query};
 pub use place::{MalformedPlace, Place};
+pub use records::{Record, RecordError, RecordLog, RecordReader, records_path};
 pub use trajectory::{
     EstimatorKind, JudgedLoop, LoopVerdict, TrajectoryEstimator, TrajectoryOptions,
 };

@@ -19,6 +19,9 @@ use progress::ProgressWriter;
 pub(crate) use progress::is_done;
 pub use progress::{Progress, read as progress_of};
 
+/// Priority of a follower among the processes of the machine: it computes while no stage does.
+const NICENESS: i32 = 10;
+
 /// A follower: a function of its logs.
 pub trait Follower {
     /// The published message.
@@ -52,6 +55,8 @@ pub enum Step<H> {
 /// # Errors
 /// A failure of the transport, or an error of the follower.
 pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounters, StageError> {
+    // Only latency depends on it.
+    let _ = rustix::process::nice(NICENESS);
     let listeners: Vec<Listener> = F::LOGS
         .iter()
         .map(|log| services::listener(&launch.node, log.event()))

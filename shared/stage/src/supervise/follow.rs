@@ -1,7 +1,11 @@
 //! The supervision of followers: they are restarted alone, and waited for at the end of the stream.
 
 use super::{Ending, Event, SuperviseError, Supervisor};
-use crate::{clock, follower, wake};
+use crate::{
+    clock,
+    follower::{self, Progress},
+    wake,
+};
 
 impl Supervisor<'_> {
     /// Restarts dead followers. The stages do not notice.
@@ -19,15 +23,14 @@ impl Supervisor<'_> {
             let behind: Vec<usize> = (0..self.children.len())
                 .filter(|i| self.is_behind(*i))
                 .collect();
-            for i in &behind {
-                let follower = self.children[*i].name();
-                if let Some((progress, _)) = follower::progress_of(&self.plan.manifest, follower) {
-                    (self.observe)(Event::Following { follower, progress });
-                }
-            }
-            if behind.is_empty() {
+            // The others read what this one writes.
+            let Some(first) = behind.first() else {
                 return Ok(Ending::Complete);
-            }
+            };
+            let follower = self.children[*first].name();
+            let progress = follower::progress_of(&self.plan.manifest, follower)
+                .map_or_else(Progress::default, |(progress, _)| progress);
+            (self.observe)(Event::Following { follower, progress });
             if self.signals.wait(&[], None, wake::MAX_WAIT)?.stop {
                 return Ok(Ending::Interrupted);
             }

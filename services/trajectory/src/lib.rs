@@ -1,0 +1,206 @@
+//! The trajectory that agrees with the loops: fuses the motions between keyframes and the loops among them.
+//!
+//! It follows `journal/keyframes.log` and `journal/loops.log` and has no file of its own: what it publishes is a function of what it has
+//! read of both. The corrected trajectory of the results is made from the same logs at the end of the run.
+
+use std::path::PathBuf;
+
+use gyre_geometry::{covariance, xy_yaw};
+use gyre_messages::{Correction, CorrectionHeader, Item};
+use gyre_slam::{
+    EstimatorKind, Keyframe, KeyframeError, KeyframeReader, LoopVerdict, Query, RecordError,
+    RecordReader, SlamConfig, SlamKind, TrajectoryEstimator, TrajectoryOptions, keyframes_path,
+};
+use gyre_stage::{
+    Follower, Launch, StageCounters, StageError,
+    follower::{self, LogId, Progress, Step},
+};
+use gyre_storage::LogError;
+
+/// Runs the follower to the end of both logs, or until SIGTERM.
+///
+/// # Errors
+/// Logs that cannot be used, or an error of [`follower::run`].
+pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+    let slam: SlamConfig = launch.section("slam")?;
+    let mut trajectory = Trajectory::open(&launch.manifest.out, slam.kind)?;
+    follower::run(launch, &mut trajectory)
+}
+
+struct Trajectory {
+    /// The folder of the results.
+    out: PathBuf,
+    kind: SlamKind,
+    keyframes: KeyframeReader,
+    queries: RecordReader<Query>,
+    estimator: TrajectoryEstimator,
+    /// The newest keyframe that was read.
+    newest: Option<Keyframe>,
+    /// Keyframes and queries that were read.
+    read: [usize; 2],
+    /// Whether loops were read that have corrected no pose yet.
+    has_new_loops: bool,
+    /// Whether something was read since the last correction.
+    has_changed: bool,
+}
+
+impl Trajectory {
+    fn open(out: &std::path::Path, kind: SlamKind) -> Result<Self, StageError> {
+        let options = TrajectoryOptions {
+            kind: match kind {
+                SlamKind::Filter => EstimatorKind::Filter,
+                SlamKind::Graph | SlamKind::None => EstimatorKind::Graph,
+            },
+            ..TrajectoryOptions::default()
+        };
+        Ok(Self {
+            out: out.to_owned(),
+            kind,
+            keyframes: KeyframeReader::open(&keyframes_path(out)).map_err(unreadable)?,
+            queries: RecordReader::open(out).map_err(unusable)?,
+            estimator: TrajectoryEstimator::new(options),
+            newest: None,
+            read: [0, 0],
+            has_new_loops: false,
+            has_changed: false,
+        })
+    }
+
+    /// Looks for new records. If some of those that were read have been cut off, it begins anew.
+    fn look(&mut self) -> Result<(), StageError> {
+        self.keyframes.refresh().map_err(unreadable)?;
+        self.queries.refresh().map_err(unusable)?;
+        let unchanged = [self.keyframes.unchanged(), self.queries.unchanged()];
+        let was_cut = self
+            .read
+            .iter()
+            .zip(unchanged)
+            .any(|(read, unchanged)| unchanged < *read);
+        if was_cut {
+            *self = Self::open(&self.out.clone(), self.kind)?;
+        }
+        Ok(())
+    }
+
+    /// Reads the next record; false if there is none.
+    fn advance(&mut self) -> Result<bool, StageError> {
+        let [keyframes, queries] = self.read;
+        if keyframes < self.keyframes.len() {
+            let keyframe = self.keyframes.read(keyframes).map_err(unreadable)?;
+            self.estimator.push(&keyframe).map_err(input)?;
+            self.newest = Some(keyframe);
+            self.read[0] += 1;
+        } else if queries < self.queries.len() {
+            let query = self.queries.read(queries).map_err(unusable)?;
+            if query.keyframe >= keyframes {
+                // Its keyframe has been cut off, and the query will be.
+                return Ok(false);
+            }
+            self.has_new_loops |= query.loops().next().is_some();
+            self.estimator.close(&query).map_err(input)?;
+            self.read[1] += 1;
+        } else {
+            return Ok(false);
+        }
+        self.has_changed = true;
+        Ok(true)
+    }
+
+    /// Corrects the poses by all that was read.
+    fn correct(&mut self) -> Result<Option<CorrectionHeader>, StageError> {
+        let Some(newest) = &self.newest else {
+            return Ok(None);
+        };
+        if self.has_new_loops {
+            self.estimator.solve().map_err(input)?;
+            self.has_new_loops = false;
+        }
+        let [keyframes, queries] = self.read;
+        let corrected = self.estimator.pose(keyframes - 1).map_err(input)?;
+        let loops = self.estimator.loops().iter();
+        let used = loops.filter(|it| it.verdict == LoopVerdict::Used);
+        let map_from_odometry = corrected.motion * newest.pose.motion.inverse();
+        let [x_m, y_m, yaw_rad] = xy_yaw(&map_from_odometry);
+        Ok(Some(CorrectionHeader {
+            item: Item {
+                seq: (keyframes + queries) as u64 - 1,
+                scan: newest.scan,
+                previous_scan: newest.scan,
+                stamp_ns: newest.stamp_ns,
+                ..Item::default()
+            },
+            keyframe_seq: newest.seq,
+            keyframes: keyframes as u64,
+            loops: used.count() as u64,
+            x_m,
+            y_m,
+            yaw_rad,
+            keyframe_covariance: covariance::pack(&corrected.covariance),
+        }))
+    }
+}
+
+impl Follower for Trajectory {
+    type Output = Correction;
+    const LOGS: &'static [LogId] = &[LogId::Keyframes, LogId::Loops];
+
+    fn step(&mut self) -> Result<Step<CorrectionHeader>, StageError> {
+        if self.advance()? {
+            return Ok(Step::Worked(None));
+        }
+        self.look()?;
+        if self.advance()? {
+            return Ok(Step::Worked(None));
+        }
+        if self.has_changed {
+            self.has_changed = false;
+            return Ok(Step::Worked(self.correct()?));
+        }
+        // The queries end after the keyframes.
+        Ok(
+            match self.queries.has_ended() && self.keyframes.has_ended() {
+                true => Step::Ended,
+                false => Step::Idle,
+            },
+        )
+    }
+
+    fn progress(&self) -> Progress {
+        Progress {
+            done: self.read[1] as u64,
+            total: self.keyframes.len() as u64,
+        }
+    }
+}
+
+fn unreadable(error: KeyframeError) -> StageError {
+    match error {
+        KeyframeError::Log(error) => of_log(error),
+        KeyframeError::Malformed { .. } => input(error),
+    }
+}
+
+fn unusable(error: RecordError) -> StageError {
+    match error {
+        RecordError::Log(error) => of_log(error),
+        RecordError::Malformed { .. } => input(error),
+    }
+}
+
+/// Another attempt helps where the process that appends has been cutting off a record that was being read.
+fn of_log(error: LogError) -> StageError {
+    match error {
+        LogError::Foreign { .. } => input(error),
+        _ => StageError::Transport {
+            action: "read a log of the run".to_owned(),
+            reason: error.to_string(),
+        },
+    }
+}
+
+fn input(error: impl std::error::Error) -> StageError {
+    StageError::Input(error.to_string())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,152 @@
+#![allow(clippy::unwrap_used)]
+
+use gyre_geometry::{Twist, UncertainMotion, pose};
+use gyre_slam::{KeyframeLog, LoopCandidate, LoopOutcome, RecordLog};
+use nalgebra::{Matrix3, Vector3};
+
+use super::*;
+
+fn uncertain(x_m: f64, y_m: f64, yaw_rad: f64) -> UncertainMotion {
+    UncertainMotion {
+        motion: pose(x_m, y_m, yaw_rad),
+        covariance: Matrix3::from_diagonal(&Vector3::new(0.01, 0.01, 0.0001)),
+    }
+}
+
+/// Laps of 40 keyframes whose odometry turns too little.
+fn keyframe(index: usize) -> Keyframe {
+    let motion = uncertain(3.0, 0.0, std::f64::consts::TAU / 40.0 - 0.0005);
+    let poses = std::iter::successors(Some(pose(0.0, 0.0, 0.0)), |at| Some(at * motion.motion));
+    let [x_m, y_m, yaw_rad] = poses.skip(index).map(|at| xy_yaw(&at)).next().unwrap();
+    Keyframe {
+        seq: 2 * index as u64,
+        scan: 5 * index as u64,
+        stamp_ns: 7 * index as i64,
+        pose: uncertain(x_m, y_m, yaw_rad),
+        motion,
+        twist: Twist::default(),
+        path_m: 3.0 * index as f64,
+        points: Vec::new(),
+    }
+}
+
+/// Each keyframe is at the place of the one a lap before.
+fn query(keyframe: usize) -> Query {
+    let candidate = |place| LoopCandidate {
+        place,
+        similarity: 0.9,
+        motion: uncertain(0.1, -0.05, 0.0),
+        correlation: 0.9,
+        searched: 0.9,
+        runner_up: 0.3,
+        chi_square: 1.0,
+        outcome: LoopOutcome::Accepted,
+    };
+    Query {
+        keyframe,
+        candidates: keyframe
+            .checked_sub(40)
+            .map(candidate)
+            .into_iter()
+            .collect(),
+    }
+}
+
+struct Logs {
+    out: tempfile::TempDir,
+    keyframes: KeyframeLog,
+    queries: RecordLog<Query>,
+}
+
+impl Logs {
+    fn new() -> Self {
+        let out = tempfile::tempdir().unwrap();
+        Self {
+            keyframes: KeyframeLog::open(&keyframes_path(out.path())).unwrap(),
+            queries: RecordLog::open(out.path()).unwrap(),
+            out,
+        }
+    }
+
+    fn append(&mut self, keyframes: usize, queries: usize) {
+        for index in self.keyframes.len()..keyframes {
+            self.keyframes.append(&keyframe(index)).unwrap();
+        }
+        for index in self.queries.len()..queries {
+            self.queries.append(&query(index)).unwrap();
+        }
+    }
+
+    fn trajectory(&self) -> Trajectory {
+        Trajectory::open(self.out.path(), SlamKind::Graph).unwrap()
+    }
+}
+
+/// Steps until there is nothing new; returns the last correction, and whether all was read.
+fn follow(trajectory: &mut Trajectory) -> (Option<CorrectionHeader>, bool) {
+    let mut last = None;
+    loop {
+        match trajectory.step().unwrap() {
+            Step::Worked(correction) => last = correction.or(last),
+            Step::Idle => return (last, false),
+            Step::Ended => return (last, true),
+        }
+    }
+}
+
+fn bytes(correction: Option<CorrectionHeader>) -> Vec<u8> {
+    format!("{:?}", correction.unwrap()).into_bytes()
+}
+
+#[test]
+fn without_loops_odometry_is_not_corrected() {
+    let mut logs = Logs::new();
+    logs.append(30, 20);
+    let (correction, has_ended) = follow(&mut logs.trajectory());
+    let correction = correction.unwrap();
+    let identity = xy_yaw(&correction.map_from_odometry());
+    assert!(
+        identity.iter().all(|value| value.abs() < 1e-9),
+        "{identity:?}"
+    );
+    assert_eq!(
+        (correction.keyframes, correction.loops, has_ended),
+        (30, 0, false)
+    );
+    assert_eq!((correction.item.scan, correction.keyframe_seq), (145, 58));
+}
+
+#[test]
+fn a_correction_is_the_same_whenever_the_logs_were_read() {
+    let mut logs = Logs::new();
+    let mut trajectory = logs.trajectory();
+    assert!(follow(&mut trajectory).0.is_none());
+    for (keyframes, queries) in [(10, 0), (45, 41), (70, 41), (70, 70), (90, 85)] {
+        logs.append(keyframes, queries);
+        follow(&mut trajectory);
+    }
+    logs.append(120, 120);
+    logs.keyframes.end().unwrap();
+    logs.queries.end().unwrap();
+    let (correction, has_ended) = follow(&mut trajectory);
+    assert!(has_ended);
+    assert!(correction.unwrap().loops > 0);
+    assert!(correction.unwrap().yaw_rad.abs() > 0.001);
+    let (restarted, _) = follow(&mut logs.trajectory());
+    assert_eq!(bytes(restarted), bytes(correction));
+}
+
+#[test]
+fn what_is_cut_off_the_logs_is_taken_back() {
+    let mut logs = Logs::new();
+    logs.append(90, 85);
+    let mut trajectory = logs.trajectory();
+    follow(&mut trajectory);
+    logs.queries.cut(60).unwrap();
+    logs.keyframes.cut(80).unwrap();
+    logs.append(81, 70);
+    let (correction, _) = follow(&mut trajectory);
+    let (restarted, _) = follow(&mut logs.trajectory());
+    assert_eq!(bytes(correction), bytes(restarted));
+    assert_eq!(correction.unwrap().keyframes, 81);
+}

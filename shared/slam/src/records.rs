@@ -1,0 +1,303 @@
+//! The files of places and of queries, from which loop closing continues.
+//!
+//! Both follow from the keyframes. So they are made anew where they are missing, and what the keyframes lack is cut off. The end of the
+//! stream is a record without bytes.
+
+use std::{
+    marker::PhantomData,
+    path::{Path, PathBuf},
+};
+
+use gyre_storage::{Log, LogError, LogMagic, LogReader};
+use thiserror::Error;
+
+use crate::{Place, Query};
+
+/// What a file of records holds.
+pub trait Record: Sized {
+    /// The name of the file, in the folder `journal` of the results.
+    const FILE: &'static str;
+    /// The start of the file, with the version of the records.
+    const MAGIC: LogMagic;
+
+    /// Appends the form in a file, which is not empty.
+    fn encode(&self, bytes: &mut Vec<u8>);
+    /// Decodes what [`encode`](Self::encode) has written; `None` if it is something else.
+    fn decode(bytes: &[u8]) -> Option<Self>;
+}
+
+impl Record for Place {
+    const FILE: &'static str = "places.log";
+    const MAGIC: LogMagic = *b"gyre places 1\n\0\0";
+
+    fn encode(&self, bytes: &mut Vec<u8>) {
+        Self::encode(self, bytes);
+    }
+
+    fn decode(bytes: &[u8]) -> Option<Self> {
+        Self::decode(bytes).ok()
+    }
+}
+
+impl Record for Query {
+    const FILE: &'static str = "loops.log";
+    const MAGIC: LogMagic = *b"gyre loops 1\n\0\0\0";
+
+    fn encode(&self, bytes: &mut Vec<u8>) {
+        Self::encode(self, bytes);
+    }
+
+    fn decode(bytes: &[u8]) -> Option<Self> {
+        Self::decode(bytes).ok()
+    }
+}
+
+/// An error of a file of records.
+#[derive(Debug, Error)]
+pub enum RecordError {
+    /// The file cannot be read or written, is of another kind or damaged.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// A record is whole and of another kind.
+    #[error("record {index} of {file} is of another kind: {bytes} bytes")]
+    Malformed {
+        /// The name of the file.
+        file: &'static str,
+        /// The number of the record, from 0.
+        index: usize,
+        /// Its length.
+        bytes: usize,
+    },
+}
+
+/// Returns the path of such records of the run that writes to `out`.
+pub fn records_path<R: Record>(out: &Path) -> PathBuf {
+    out.join("journal").join(R::FILE)
+}
+
+/// A file of records, open for appending.
+#[derive(Debug)]
+pub struct RecordLog<R> {
+    log: Log,
+    ended: bool,
+    buffer: Vec<u8>,
+    records: PhantomData<R>,
+}
+
+impl<R: Record> RecordLog<R> {
+    /// Opens or creates the file of the run that writes to `out`, and cuts off what a death or a power failure has left of the last
+    /// records.
+    ///
+    /// # Errors
+    /// A file that cannot be read or written, is of another kind, is damaged, or to which another process writes.
+    pub fn open(out: &Path) -> Result<Self, RecordError> {
+        let log = Log::open(&records_path::<R>(out), R::MAGIC)?;
+        let mut buffer = Vec::new();
+        if let Some(last) = log.len().checked_sub(1) {
+            log.read(last, &mut buffer)?;
+        }
+        Ok(Self {
+            ended: !log.is_empty() && buffer.is_empty(),
+            log,
+            buffer,
+            records: PhantomData,
+        })
+    }
+
+    /// Returns the number of records.
+    pub fn len(&self) -> usize {
+        self.log.len() - usize::from(self.ended)
+    }
+
+    /// Returns whether there are no records.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Reads a record.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is damaged there.
+    ///
+    /// # Panics
+    /// There are no more than `index` records.
+    pub fn read(&mut self, index: usize) -> Result<R, RecordError> {
+        self.log.read(index, &mut self.buffer)?;
+        decode(index, &self.buffer)
+    }
+
+    /// Appends a record. A reader sees it when this returns.
+    ///
+    /// # Errors
+    /// A file that cannot be written or synchronised.
+    pub fn append(&mut self, record: &R) -> Result<(), RecordError> {
+        self.buffer.clear();
+        record.encode(&mut self.buffer);
+        Ok(self.log.append(&self.buffer)?)
+    }
+
+    /// Says that no more records follow. All of them survive a power failure when this returns.
+    ///
+    /// # Errors
+    /// A file that cannot be written or synchronised.
+    pub fn end(&mut self) -> Result<(), RecordError> {
+        if !self.ended {
+            self.log.append(&[])?;
+            self.ended = true;
+        }
+        Ok(self.log.sync()?)
+    }
+
+    /// Keeps the first `records` records, and cuts off those behind them and the end.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn cut(&mut self, records: usize) -> Result<(), RecordError> {
+        self.log.cut(records.min(self.len()))?;
+        self.ended = false;
+        Ok(())
+    }
+}
+
+/// Reads a file of records to which another process may append.
+#[derive(Debug)]
+pub struct RecordReader<R> {
+    log: LogReader,
+    ended: bool,
+    buffer: Vec<u8>,
+    records: PhantomData<R>,
+}
+
+impl<R: Record> RecordReader<R> {
+    /// Opens the file of the run that writes to `out` and finds its complete records. One that does not exist yet is empty.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is of another kind or damaged.
+    pub fn open(out: &Path) -> Result<Self, RecordError> {
+        let mut reader = Self {
+            log: LogReader::open(&records_path::<R>(out), R::MAGIC)?,
+            ended: false,
+            buffer: Vec::new(),
+            records: PhantomData,
+        };
+        reader.refresh()?;
+        Ok(reader)
+    }
+
+    /// Looks for records that were appended or cut off meanwhile; returns the number of complete ones now.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is of another kind or damaged.
+    pub fn refresh(&mut self) -> Result<usize, RecordError> {
+        self.ended = match self.log.refresh()?.checked_sub(1) {
+            Some(last) => {
+                self.log.read(last, &mut self.buffer)?;
+                self.buffer.is_empty()
+            }
+            None => false,
+        };
+        Ok(self.len())
+    }
+
+    /// Returns the number of complete records at the last [`refresh`](Self::refresh).
+    pub fn len(&self) -> usize {
+        self.log.len() - usize::from(self.ended)
+    }
+
+    /// Returns whether there were no records.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Returns how many of the first records were known before the last [`refresh`](Self::refresh), and are the same: fewer than were
+    /// known if some were cut off.
+    pub fn unchanged(&self) -> usize {
+        self.log.unchanged().min(self.len())
+    }
+
+    /// Returns whether no more records follow.
+    pub fn has_ended(&self) -> bool {
+        self.ended
+    }
+
+    /// Reads a record.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is damaged there.
+    ///
+    /// # Panics
+    /// There are no more than `index` records.
+    pub fn read(&mut self, index: usize) -> Result<R, RecordError> {
+        self.log.read(index, &mut self.buffer)?;
+        decode(index, &self.buffer)
+    }
+}
+
+fn decode<R: Record>(index: usize, bytes: &[u8]) -> Result<R, RecordError> {
+    R::decode(bytes).ok_or(RecordError::Malformed {
+        file: R::FILE,
+        index,
+        bytes: bytes.len(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn query(keyframe: usize) -> Query {
+        Query {
+            keyframe,
+            candidates: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn records_are_read_while_they_are_appended_until_the_end() {
+        let out = tempfile::tempdir().unwrap();
+        let mut reader = RecordReader::<Query>::open(out.path()).unwrap();
+        assert_eq!((reader.len(), reader.has_ended()), (0, false));
+        let mut log = RecordLog::open(out.path()).unwrap();
+        for keyframe in 0..3 {
+            log.append(&query(keyframe)).unwrap();
+            assert_eq!(reader.refresh().unwrap(), keyframe + 1);
+            assert_eq!(reader.read(keyframe).unwrap(), query(keyframe));
+        }
+        log.end().unwrap();
+        log.end().unwrap();
+        assert_eq!((reader.refresh().unwrap(), reader.has_ended()), (3, true));
+    }
+
+    #[test]
+    fn a_cut_removes_records_and_the_end_and_its_readers_know() {
+        let out = tempfile::tempdir().unwrap();
+        let mut log = RecordLog::open(out.path()).unwrap();
+        (0..3).for_each(|keyframe| log.append(&query(keyframe)).unwrap());
+        log.end().unwrap();
+        drop(log);
+        let mut reader = RecordReader::<Query>::open(out.path()).unwrap();
+        let mut log = RecordLog::open(out.path()).unwrap();
+        assert_eq!(log.len(), 3);
+        log.cut(1).unwrap();
+        log.append(&query(7)).unwrap();
+        assert_eq!((reader.refresh().unwrap(), reader.has_ended()), (2, false));
+        assert_eq!(reader.unchanged(), 1);
+        assert_eq!(log.read(1).unwrap(), query(7));
+    }
+
+    #[test]
+    fn places_are_no_queries() {
+        let out = tempfile::tempdir().unwrap();
+        let mut log = RecordLog::open(out.path()).unwrap();
+        log.append(&query(0)).unwrap();
+        drop(log);
+        let path = |file| out.path().join("journal").join(file);
+        std::fs::rename(path(Query::FILE), path(Place::FILE)).unwrap();
+        let refused = RecordReader::<Place>::open(out.path()).map(drop);
+        assert!(matches!(
+            refused,
+            Err(RecordError::Log(LogError::Foreign { .. }))
+        ));
+    }
+}

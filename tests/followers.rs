@@ -1,0 +1,203 @@
+//! The followers of a run with SLAM: whatever happens to them, odometry does not notice, and what they write is the same to the byte.
+
+use std::{fs, sync::OnceLock, thread, time::Duration};
+
+use gyre_messages::FollowerId;
+use gyre_slam::{Query, RecordReader, keyframes_path, records_path};
+use rand::{Rng, SeedableRng, rngs::StdRng};
+use rustix::process::Signal;
+
+use crate::common::{Ended, Run, Running, Watch, gyre, send};
+
+/// Two and a half laps around a block.
+const SCANS: usize = 200;
+const LOOP_CLOSURE: &str = FollowerId::LoopClosure.name();
+const TRAJECTORY: &str = FollowerId::Trajectory.name();
+
+fn without_slam() -> Run {
+    let scans = format!("[simulation]\nscans = {SCANS}\n");
+    Run::configured(&format!("{scans}[raster]\nn = 127\ncell_m = 0.8\n"))
+}
+
+fn run() -> Run {
+    without_slam().set("slam.kind=graph")
+}
+
+/// What a run leaves that must be the same.
+#[derive(PartialEq)]
+struct Left {
+    odometry: String,
+    keyframes: Vec<u8>,
+    loops: Vec<u8>,
+}
+
+impl Left {
+    fn by(run: &Run) -> Self {
+        Self {
+            odometry: run.odometry(),
+            keyframes: fs::read(keyframes_path(run.out())).unwrap(),
+            loops: fs::read(records_path::<Query>(run.out())).unwrap(),
+        }
+    }
+}
+
+fn undisturbed() -> &'static Left {
+    static LEFT: OnceLock<Left> = OnceLock::new();
+    LEFT.get_or_init(|| {
+        let run = run();
+        run.complete();
+        Left::by(&run)
+    })
+}
+
+fn assert_undisturbed(run: &Run, case: &str) {
+    let (left, undisturbed) = (Left::by(run), undisturbed());
+    assert!(left.odometry == undisturbed.odometry, "{case}: odometry");
+    assert!(left.keyframes == undisturbed.keyframes, "{case}: keyframes");
+    assert!(left.loops == undisturbed.loops, "{case}: loops");
+}
+
+fn loops_of(run: &Run) -> usize {
+    let mut queries = RecordReader::<Query>::open(run.out()).unwrap();
+    assert!(queries.has_ended());
+    (0..queries.len())
+        .map(|index| queries.read(index).unwrap().loops().count())
+        .sum()
+}
+
+fn restarts(run: &Run, process: &str) -> u64 {
+    run.summary()["restarts"][process].as_u64().unwrap_or(0)
+}
+
+#[test]
+fn a_drive_round_a_block_closes_its_loops_and_has_the_same_odometry() {
+    let (run, plain) = (run(), without_slam());
+    assert_eq!(run.complete(), plain.complete());
+    assert!(loops_of(&run) > 10, "{}", loops_of(&run));
+    assert_eq!(run.summary()["restarts"], plain.summary()["restarts"]);
+}
+
+#[test]
+fn followers_killed_at_random_moments_are_restarted_alone() {
+    for seed in 0..3 {
+        let mut random = StdRng::seed_from_u64(seed);
+        let run = run();
+        let mut running = run.start();
+        for follower in [LOOP_CLOSURE, TRAJECTORY, LOOP_CLOSURE] {
+            running.await_poses_or_end(random.random_range(1..SCANS));
+            thread::sleep(Duration::from_micros(random.random_range(0..50_000)));
+            kill_if_there(&running, follower);
+        }
+        running.finish().succeeded();
+        assert_undisturbed(&run, &format!("seed {seed}"));
+        for (process, times) in run.summary()["restarts"].as_object().unwrap() {
+            let is_follower = FollowerId::by_name(process).is_some();
+            assert!(is_follower, "{process} was restarted {times} times");
+        }
+    }
+}
+
+fn kill_if_there(running: &Running, name: &str) {
+    if let Some(pid) = running.stages().get(name) {
+        send(*pid, Signal::KILL);
+    }
+}
+
+#[test]
+fn a_storm_of_kills_over_all_processes_changes_nothing() {
+    for seed in 0..3 {
+        let mut random = StdRng::seed_from_u64(100 + seed);
+        let run = run();
+        let mut running = run.start();
+        for storm in 1..=3 {
+            running.await_poses_or_end(storm * SCANS / 4);
+            thread::sleep(Duration::from_micros(random.random_range(0..50_000)));
+            let victims = running.stages().into_values();
+            victims
+                .filter(|_| random.random_bool(0.6))
+                .for_each(|pid| send(pid, Signal::KILL));
+        }
+        running.finish().succeeded();
+        assert_undisturbed(&run, &format!("seed {seed}"));
+    }
+}
+
+#[test]
+fn a_stopped_loop_closure_does_not_hold_odometry_back_and_is_waited_for_at_the_end() {
+    let run = run();
+    let mut running = run.start();
+    let pid = running.await_stage(LOOP_CLOSURE);
+    send(pid, Signal::STOP);
+    running
+        .await_poses(SCANS)
+        .await_words("loop closing: 0 of 0 keyframes");
+    send(pid, Signal::CONT);
+    running.finish().succeeded();
+    assert_undisturbed(&run, "stopped");
+    assert_eq!(restarts(&run, LOOP_CLOSURE), 0);
+}
+
+#[test]
+fn a_run_that_is_interrupted_while_it_waits_for_loops_goes_on_where_it_was() {
+    let slow = run().set("stages.loop-closure.delay_ms=200");
+    let mut running = slow.start();
+    running.await_poses(SCANS).await_words("loop closing: ");
+    running.signal(Signal::INT);
+    let ended = running.finish();
+    assert_eq!(ended.code(), Some(130));
+    assert!(slow.odometry() == undisturbed().odometry);
+    let run = run().into(slow.out());
+    let ended = run.finish();
+    ended.succeeded();
+    assert!(ended.stderr.contains("resuming after"), "{}", ended.stderr);
+    assert_undisturbed(&run, "resumed");
+}
+
+#[test]
+fn a_run_that_is_interrupted_in_its_middle_goes_on_with_its_loops() {
+    let run = run();
+    for poses in [SCANS / 3, SCANS * 2 / 3] {
+        let mut running = run.start();
+        running.await_poses(poses).signal(Signal::INT);
+        running.finish();
+    }
+    run.complete();
+    assert_undisturbed(&run, "resumed twice");
+}
+
+#[test]
+fn a_follower_that_always_dies_ends_the_run_and_the_same_command_goes_on() {
+    let failing = run()
+        .stage_script(LOOP_CLOSURE, "echo 'no more loops' >&2; exit 7")
+        .set("stages.loop-closure.restart={limit = 2, backoff_ms = 10}");
+    let ended = failing.finish();
+    ended.failed_with(&["loop-closure died 3 times", "exit code 7", "no more loops"]);
+    let run = run().into(failing.out()).option("--fresh");
+    run.complete();
+    assert_undisturbed(&run, "begun anew");
+}
+
+#[test]
+fn loops_and_corrections_can_be_watched() {
+    let run = run();
+    let mut running = run.start();
+    running.await_stage(TRAJECTORY);
+    let watches = ["loop", "correction"].map(|topic| Watch::start(&run, topic).await_message());
+    running.kill(TRAJECTORY);
+    running.finish().succeeded();
+    let [loops, corrections] = watches.map(Watch::finish);
+    assert_eq!(loops.seqs, (0..loops_of(&run) as u64).collect::<Vec<_>>());
+    assert!(corrections.seqs.is_sorted_by(|a, b| a < b));
+    assert!(corrections.seqs.len() > SCANS / 10);
+}
+
+#[test]
+fn a_run_without_slam_says_that_it_has_no_loops_to_watch() {
+    let run = without_slam();
+    let mut running = run.start();
+    running.await_poses(1);
+    let mut watch = gyre();
+    watch.arg("watch").arg(run.out()).arg("loop");
+    Ended::of(watch).failed_with(&["has no topic `loop`", "slam.kind"]);
+    running.finish().succeeded();
+}
