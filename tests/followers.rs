@@ -29,6 +29,7 @@ struct Left {
     odometry: String,
     keyframes: Vec<u8>,
     loops: Vec<u8>,
+    corrected: [String; 2],
 }
 
 impl Left {
@@ -37,6 +38,7 @@ impl Left {
             odometry: run.odometry(),
             keyframes: fs::read(keyframes_path(run.out())).unwrap(),
             loops: fs::read(records_path::<Query>(run.out())).unwrap(),
+            corrected: ["trajectory_slam.tum", "loops.csv"].map(|name| run.result(name)),
         }
     }
 }
@@ -55,6 +57,7 @@ fn assert_undisturbed(run: &Run, case: &str) {
     assert!(left.odometry == undisturbed.odometry, "{case}: odometry");
     assert!(left.keyframes == undisturbed.keyframes, "{case}: keyframes");
     assert!(left.loops == undisturbed.loops, "{case}: loops");
+    assert!(left.corrected == undisturbed.corrected, "{case}: corrected");
 }
 
 fn loops_of(run: &Run) -> usize {

@@ -1,4 +1,4 @@
-//! The trajectory corrected by loops: a function of the keyframes and of the journal, whenever loops were closed.
+//! The trajectory corrected by loops: a function of the keyframes, the loops and the journal, whenever loops were closed.
 
 use std::fmt::{self, Write};
 
@@ -7,9 +7,8 @@ use gyre_evaluation::{BandSample, Bands, TruthSigma};
 use gyre_geometry::{Pose, xy_yaw};
 use gyre_radar::Trajectory;
 use gyre_slam::{
-    Correction, EstimatorKind, Keyframe, KeyframeError, KeyframeReader, KeyframeSource, LoopCloser,
-    LoopOptions, LoopOutcome, LoopVerdict, Query, SlamKind, TrajectoryEstimator, TrajectoryOptions,
-    keyframes_path,
+    Correction, EstimatorKind, KeyframeReader, LoopOutcome, LoopVerdict, Query, RecordReader,
+    SlamKind, TrajectoryEstimator, TrajectoryOptions, keyframes_path,
 };
 use serde::Serialize;
 
@@ -64,8 +63,8 @@ impl fmt::Display for SlamSummary {
 }
 
 impl Slam {
-    /// Closes the loops between the keyframes of a run and corrects their poses; `None` without SLAM, and before the first keyframe. Of a
-    /// run that goes on, no loops are closed yet.
+    /// Corrects the poses of the keyframes of a run by its loops; `None` without SLAM, and before the first keyframe. Of a run that goes
+    /// on, the loops so far are left out.
     ///
     /// # Errors
     /// Keyframes that cannot be read or used.
@@ -73,11 +72,11 @@ impl Slam {
         if !configuration.slam.is_on() {
             return Ok(None);
         }
-        let mut keyframes = Keyframes(KeyframeReader::open(&keyframes_path(out.path()))?);
-        if keyframes.0.is_empty() {
+        let mut keyframes = KeyframeReader::open(&keyframes_path(out.path()))?;
+        if keyframes.is_empty() {
             return Ok(None);
         }
-        let queries = queries(configuration, &mut keyframes)?;
+        let queries = queries(out)?;
         let mut estimator = TrajectoryEstimator::new(TrajectoryOptions {
             kind: match configuration.slam.kind {
                 SlamKind::Filter => EstimatorKind::Filter,
@@ -86,8 +85,8 @@ impl Slam {
             ..TrajectoryOptions::default()
         });
         let mut known = Vec::new();
-        for index in 0..keyframes.0.len() {
-            let keyframe = keyframes.keyframe(index)?;
+        for index in 0..keyframes.len() {
+            let keyframe = keyframes.read(index)?;
             estimator.push(&keyframe)?;
             known.push((keyframe.scan, keyframe.stamp_ns));
         }
@@ -227,38 +226,14 @@ fn rejected(outcome: LoopOutcome) -> &'static str {
     }
 }
 
-/// Closes the loops between all keyframes of a run that has ended.
-fn queries(
-    configuration: &Configuration,
-    keyframes: &mut Keyframes,
-) -> Result<Vec<Query>, Failure> {
-    if !keyframes.0.has_ended() {
+/// Reads the candidates of all keyframes, if all of them have been queried.
+fn queries(out: &Out) -> Result<Vec<Query>, Failure> {
+    let mut queries = RecordReader::open(out.path())?;
+    if !queries.has_ended() {
         return Ok(Vec::new());
     }
-    let odometry = &configuration.odometry;
-    let options = LoopOptions {
-        places: configuration.slam.places.clone(),
-        ..LoopOptions::default()
-    };
-    let mut closer = LoopCloser::new(options, &odometry.refinement, odometry.points.capacity)?;
-    for index in 0..keyframes.0.len() {
-        closer.push(&keyframes.keyframe(index)?)?;
-    }
-    closer.finish();
-    while closer.describe(keyframes)?.is_some() {}
-    let mut queries = Vec::new();
-    while let Some(query) = closer.close(keyframes)? {
-        queries.push(query);
-    }
-    Ok(queries)
-}
-
-struct Keyframes(KeyframeReader);
-
-impl KeyframeSource for Keyframes {
-    type Error = KeyframeError;
-
-    fn keyframe(&mut self, index: usize) -> Result<Keyframe, KeyframeError> {
-        self.0.read(index)
-    }
+    let all = 0..queries.len();
+    Ok(all
+        .map(|index| queries.read(index))
+        .collect::<Result<_, _>>()?)
 }
