@@ -4,6 +4,7 @@ use std::{num::NonZeroUsize, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use gyre_evaluation::Part;
+use gyre_mapping::Origin;
 use gyre_simulator::OutputFormat;
 
 use crate::configuration::Rate;
@@ -40,6 +41,8 @@ pub enum Command {
     Inspect(InspectArguments),
     /// Evaluate a trajectory against ground truth.
     Evaluate(EvaluateArguments),
+    /// Draw the map of a run.
+    Map(MapArguments),
     /// Draw what the mask keeps of scans.
     Masks(MasksArguments),
     /// Write a simulated recording, or complete one.
@@ -158,6 +161,43 @@ pub struct EvaluateArguments {
     pub truth_sigma_deg: f64,
 }
 
+/// The arguments of `gyre map`.
+#[derive(Debug, Args)]
+pub struct MapArguments {
+    /// The folder of the run's results, its --out, with journal/keyframes.log.
+    pub run: PathBuf,
+    /// The folder of the map.
+    #[arg(long)]
+    pub out: PathBuf,
+    /// What is written: the map's own folder, map.png, map.tif, map.pgm with map.yaml for map_server, or web tiles.
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "folder,png")]
+    pub format: Vec<MapFormat>,
+    /// Draw along this trajectory (TUM). Default: the run's trajectory_slam.tum, or its trajectory.tum.
+    #[arg(long, value_name = "FILE")]
+    pub trajectory: Option<PathBuf>,
+    /// Side of a cell, m.
+    #[arg(long, default_value = "0.2")]
+    pub cell_m: f64,
+    /// Place of the first keyframe on the earth and its heading, degrees: latitude, longitude (WGS 84), clockwise from true north.
+    #[arg(long, value_name = "LAT,LON,HEADING", value_parser = origin, allow_hyphen_values = true)]
+    pub origin: Option<Origin>,
+}
+
+/// The forms of a map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum MapFormat {
+    /// map.toml and tiles/X_Y.png.
+    Folder,
+    /// map.png: the whole map with the trajectory in it.
+    Png,
+    /// map.tif, a GeoTIFF.
+    Geotiff,
+    /// map.pgm and map.yaml.
+    Pgm,
+    /// web/Z/X/Y.png.
+    Web,
+}
+
 /// The arguments of `gyre masks`.
 #[derive(Debug, Args)]
 pub struct MasksArguments {
@@ -225,6 +265,21 @@ fn sigma(text: &str) -> Result<f64, String> {
     sigma.ok_or_else(|| "a number of at least 0 is needed".to_owned())
 }
 
+/// Parses latitude, longitude and heading in degrees.
+fn origin(text: &str) -> Result<Origin, String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|n| n.trim().parse()).collect();
+    let Ok([latitude_deg, longitude_deg, heading_deg]) = numbers.as_deref() else {
+        return Err("three numbers are needed, as in 51.76,-1.26,90".to_owned());
+    };
+    let origin = Origin {
+        latitude_deg: *latitude_deg,
+        longitude_deg: *longitude_deg,
+        heading_deg: *heading_deg,
+    };
+    origin.validate().map_err(|error| error.to_string())?;
+    Ok(origin)
+}
+
 /// Parses `all`, or `A..B` in percent.
 fn part(text: &str) -> Result<Part, String> {
     let share = |percent: &str| percent.parse::<f64>().ok().map(|percent| percent / 100.0);
@@ -243,6 +298,23 @@ fn part(text: &str) -> Result<Part, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_origin_is_three_numbers_on_the_earth() {
+        let edinburgh =
+            origin("55.95, -3.2,90").map(|o| (o.latitude_deg, o.longitude_deg, o.heading_deg));
+        assert_eq!(edinburgh, Ok((55.95, -3.2, 90.0)));
+        for text in [
+            "",
+            "55.95,-3.2",
+            "55.95,-3.2,90,0",
+            "north,0,0",
+            "91,0,0",
+            "nan,0,0",
+        ] {
+            assert!(origin(text).is_err(), "{text}");
+        }
+    }
 
     #[test]
     fn parts_are_all_or_a_range_of_percent() {

@@ -12,6 +12,7 @@ pub mod inspect;
 pub mod judgement;
 pub mod latency;
 pub mod machine;
+pub mod map;
 pub mod masks;
 pub mod odometry;
 pub mod out;
@@ -62,6 +63,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Doctor(arguments) => doctor::doctor(&arguments),
         Command::Inspect(arguments) => inspect::inspect(&arguments),
         Command::Evaluate(arguments) => evaluate::evaluate(&arguments),
+        Command::Map(arguments) => map::map(&arguments),
         Command::Masks(arguments) => masks::masks(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Schema(arguments) => schema::schema(&arguments),
