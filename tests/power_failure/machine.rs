@@ -165,6 +165,8 @@ struct Stages {
     journal: Journal,
     keyframes: Option<Keyframes>,
     last: Option<PoseHeader>,
+    /// The journal has its end: a run that goes on waits for its followers alone, which this machine does not have.
+    ended: bool,
 }
 
 impl Stages {
@@ -174,22 +176,27 @@ impl Stages {
         let cells = refiner.keyframe_cells();
         let checkpoint = Checkpoint::open(&checkpoint::path(out), WINDOW, config.keyframes, cells)?;
         let journal = Journal::open(&journal::path(out))?;
-        let last = journal.last(1)?.0.pop();
+        let (mut poses, ended) = journal.last(1)?;
+        let last = poses.pop();
         let slam = &configuration.slam;
         let poses = last.map_or(0, |last| last.item.seq + 1);
         let keyframes = slam
             .is_on()
-            .then(|| Keyframes::open(out, &slam.places, poses, false));
+            .then(|| Keyframes::open(out, &slam.places, poses, ended));
         Ok(Self {
             refiner,
             checkpoint,
             journal,
             keyframes: keyframes.transpose()?,
             last,
+            ended,
         })
     }
 
     fn play(&mut self) -> Result<(), Failure> {
+        if self.ended {
+            return Ok(());
+        }
         let first = self.last.map_or(0, |last| last.item.seq + 1);
         if let Some(before) = first.checked_sub(1) {
             self.checkpoint.restore(before, &mut self.refiner)?;
