@@ -196,9 +196,13 @@ impl fmt::Display for Summary {
         if let Some(slam) = &self.slam {
             writeln!(f, "\n{slam}")?;
         }
+        let corrected = match self.slam {
+            Some(_) => ", trajectory_slam.tum, loops.csv, graph.g2o",
+            None => "",
+        };
         write!(
             f,
-            "\nresults in {}: odometry.csv, trajectory.tum, trajectory.svg, latency.json, summary.json",
+            "\nresults in {}: odometry.csv, trajectory.tum, trajectory.svg{corrected}, latency.json, summary.json",
             self.out
         )
     }
