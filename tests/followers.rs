@@ -169,7 +169,7 @@ fn a_run_that_is_interrupted_in_its_middle_goes_on_with_its_loops() {
 }
 
 #[test]
-fn a_follower_that_always_dies_ends_the_run_and_the_same_command_goes_on() {
+fn a_follower_that_always_dies_ends_the_run_and_a_new_one_is_undisturbed() {
     let failing = run()
         .stage_script(LOOP_CLOSURE, "echo 'no more loops' >&2; exit 7")
         .set("stages.loop-closure.restart={limit = 2, backoff_ms = 10}");
