@@ -176,8 +176,10 @@ def summary(setting: Setting, first: tuple | None, later: list[tuple | None], li
     if first is None or None in later:
         return Measurement(setting.method, setting.batch, False)
     memory = max(mib for _, mib in [first, *later])
-    step_s = statistics.median(s for s, _ in later) if later else None
-    return Measurement(setting.method, setting.batch, memory <= limit_mib, step_s, round(memory, 1))
+    fits = memory <= limit_mib
+    # A later step may pass the limit that the first did not.
+    step_s = statistics.median(s for s, _ in later) if later and fits else None
+    return Measurement(setting.method, setting.batch, fits, step_s, round(memory, 1))
 
 
 def measure(n: int, batches: list[int], limit_mib: float, steps: int, checkpoint: bool, device: str) -> Iterator[Measurement]:

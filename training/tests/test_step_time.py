@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from gyre_training.plots import step_times, training_log
-from gyre_training.step_time import METHODS, Measurement, Memory, Setting, against, compare, table
+from gyre_training.step_time import METHODS, Measurement, Memory, Setting, against, compare, summary, table
 
 
 def test_freed_memory_counts_in_the_peak():
@@ -20,6 +20,12 @@ def test_methods_are_measured_and_one_above_the_limit_does_not_fit():
     assert fast.fits and fast.step_s > 0 and 2 < fast.memory_mib < 60
     assert not slow.fits and slow.step_s is None and slow.memory_mib >= 60
     assert fast.memory_mib < near.memory_mib < slow.memory_mib
+
+
+def test_a_method_whose_later_steps_pass_the_limit_does_not_fit():
+    setting = Setting("mbym", 67, 2, True, "cpu", 1)
+    assert summary(setting, (0.2, 55.0), [(0.1, 101.0), (0.1, 101.0)], 60.0) == Measurement("mbym", 2, False, None, 101.0)
+    assert summary(setting, (0.2, 55.0), [(0.1, 58.0), (0.1, 58.0)], 60.0) == Measurement("mbym", 2, True, 0.1, 58.0)
 
 
 def test_a_process_that_fails_for_another_reason_is_an_error():
