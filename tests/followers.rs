@@ -3,7 +3,7 @@
 use std::{fs, sync::OnceLock, thread, time::Duration};
 
 use gyre_messages::FollowerId;
-use gyre_slam::{Query, RecordReader, keyframes_path, records_path};
+use gyre_slam::{Keyframe, Query, RecordReader, records_path};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use rustix::process::Signal;
 
@@ -36,7 +36,7 @@ impl Left {
     fn by(run: &Run) -> Self {
         Self {
             odometry: run.odometry(),
-            keyframes: fs::read(keyframes_path(run.out())).unwrap(),
+            keyframes: fs::read(records_path::<Keyframe>(run.out())).unwrap(),
             loops: fs::read(records_path::<Query>(run.out())).unwrap(),
             corrected: ["trajectory_slam.tum", "loops.csv"].map(|name| run.result(name)),
         }

@@ -3,7 +3,7 @@
 use std::{fs, sync::OnceLock, thread, time::Duration};
 
 use gyre_pose_integration::journal;
-use gyre_slam::{KeyframeLog, KeyframeReader, keyframes_path};
+use gyre_slam::{Keyframe, RecordLog, RecordReader, records_path};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use rustix::process::Signal;
 
@@ -27,7 +27,7 @@ fn undisturbed_log() -> &'static [u8] {
 }
 
 fn log_of(run: &Run) -> Vec<u8> {
-    fs::read(keyframes_path(run.out())).unwrap()
+    fs::read(records_path::<Keyframe>(run.out())).unwrap()
 }
 
 fn require_undisturbed(run: &Run, case: &str) {
@@ -39,7 +39,7 @@ fn require_undisturbed(run: &Run, case: &str) {
 fn a_run_with_slam_has_the_same_odometry_and_logs_the_keyframes_of_its_poses() {
     let run = run();
     assert_eq!(run.complete(), undisturbed());
-    let mut keyframes = KeyframeReader::open(&keyframes_path(run.out())).unwrap();
+    let mut keyframes = RecordReader::<Keyframe>::open(run.out()).unwrap();
     assert!(keyframes.has_ended());
     let poses = journal::records(&journal::path(run.out()))
         .unwrap()
@@ -71,7 +71,7 @@ fn keyframes_are_the_same_whatever_the_window_and_without_room_for_observers() {
 fn a_run_without_refinement_logs_keyframes_too() {
     let run = run().set("refinement.kind=none");
     run.complete();
-    let keyframes = KeyframeReader::open(&keyframes_path(run.out())).unwrap();
+    let keyframes = RecordReader::<Keyframe>::open(run.out()).unwrap();
     assert!(keyframes.has_ended() && keyframes.len() > 2);
 }
 
@@ -81,7 +81,7 @@ fn a_run_without_slam_logs_no_keyframes_and_removes_those_of_an_earlier_run() {
     with.complete();
     let without = Run::of_recording().into(with.out());
     assert_eq!(without.complete(), undisturbed());
-    assert!(!keyframes_path(with.out()).exists());
+    assert!(!records_path::<Keyframe>(with.out()).exists());
 }
 
 #[test]
@@ -156,7 +156,7 @@ fn poses_whose_keyframe_is_lost_are_computed_anew() {
     running.await_poses(recording::SCANS / 2);
     running.kill_supervisor();
     // As after a power failure that has taken the end of one file and not of the other.
-    let mut log = KeyframeLog::open(&keyframes_path(run.out())).unwrap();
+    let mut log = RecordLog::<Keyframe>::open(run.out()).unwrap();
     log.cut(log.len() - 1).unwrap();
     drop(log);
     run.complete();
@@ -168,7 +168,7 @@ fn poses_of(run: &Run) -> u64 {
 }
 
 fn last_keyframe(run: &Run) -> u64 {
-    let mut keyframes = KeyframeReader::open(&keyframes_path(run.out())).unwrap();
+    let mut keyframes = RecordReader::<Keyframe>::open(run.out()).unwrap();
     let last = keyframes.len() - 1;
     keyframes.read(last).unwrap().seq
 }

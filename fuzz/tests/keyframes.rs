@@ -8,7 +8,7 @@ use gyre_fuzz::{
     edit::{ByteEdit, Number, edit_bytes},
 };
 use gyre_geometry::{SparsePoint, Twist, UncertainMotion};
-use gyre_slam::{Keyframe, KeyframeLog, KeyframeReader, keyframes_path};
+use gyre_slam::{Keyframe, RecordLog, RecordReader, records_path};
 
 use crate::recordings::folder;
 
@@ -39,11 +39,11 @@ fn keyframe(seq: usize) -> Keyframe {
 }
 
 /// Reads all keyframes, cuts what is torn, and goes on.
-fn use_log(path: &Path) -> Result<(), Failure> {
-    let mut reader = KeyframeReader::open(path)?;
+fn use_log(out: &Path) -> Result<(), Failure> {
+    let mut reader = RecordReader::open(out)?;
     let found = reader.len();
     let read: Result<Vec<Keyframe>, _> = (0..found).map(|index| reader.read(index)).collect();
-    let mut log = KeyframeLog::open(path)?;
+    let mut log = RecordLog::open(out)?;
     assert_eq!(log.len(), found);
     log.cut(found)?;
     log.append(&keyframe(found))?;
@@ -72,14 +72,14 @@ fn change(record: &mut [u8], at: u16, number: Number) {
 #[test]
 fn keyframe_logs() {
     let (target, folder) = (Target::new("keyframe logs", 16), folder());
-    let path = keyframes_path(folder.path());
-    let mut log = KeyframeLog::open(&path).unwrap();
+    let path = records_path::<Keyframe>(folder.path());
+    let mut log = RecordLog::open(folder.path()).unwrap();
     (0..KEYFRAMES).for_each(|seq| log.append(&keyframe(seq)).unwrap());
     log.end().unwrap();
     drop(log);
     let valid = fs::read(&path).unwrap();
     let record = (valid.len() - MAGIC - HEADER) / KEYFRAMES;
-    use_log(&path).unwrap();
+    use_log(folder.path()).unwrap();
     check!().with_type::<Vec<Edit>>().for_each(|edits| {
         let mut bytes = valid.clone();
         for edit in edits {
@@ -95,6 +95,6 @@ fn keyframe_logs() {
             }
         }
         fs::write(&path, bytes).unwrap();
-        target.run(|| use_log(&path));
+        target.run(|| use_log(folder.path()));
     });
 }

@@ -23,7 +23,7 @@ use gyre_pose_integration::{
 use gyre_radar::DatasetOptions;
 use gyre_refinement::checkpoint::{self, Checkpoint};
 use gyre_scan_matching::Refiner;
-use gyre_slam::{SlamKind, keyframes_path};
+use gyre_slam::{Keyframe, SlamKind, records_path};
 use gyre_stage::supervise::Ending;
 use nalgebra::{Isometry2, Vector2};
 
@@ -81,7 +81,7 @@ impl Machine {
     /// Returns the content of the files that must be the same bytes.
     pub fn results(&self, out: &Path) -> Vec<Vec<u8>> {
         let has_keyframes = self.configuration.slam.is_on();
-        let keyframes = has_keyframes.then(|| keyframes_path(out));
+        let keyframes = has_keyframes.then(|| records_path::<Keyframe>(out));
         let results = RESULTS.iter().map(|name| out.join(name));
         let read = |path| fs::read(path).unwrap();
         results.chain(keyframes).map(read).collect()

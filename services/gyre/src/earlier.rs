@@ -12,7 +12,7 @@ use gyre_pose_integration::{
 };
 use gyre_refinement::checkpoint::{self, Checkpoint, CheckpointError};
 use gyre_scan_matching::Refiner;
-use gyre_slam::{KeyframeError, Place, Query, RecordReader, keyframes_path, records_path};
+use gyre_slam::{Keyframe, Place, Query, RecordReader, records_path};
 use gyre_storage::{self as storage, GroupSync, LogError};
 
 use crate::{
@@ -167,7 +167,7 @@ fn known_poses(
 /// Says what to do about damaged keyframes.
 fn damaged(error: KeyframesError) -> Failure {
     match error {
-        KeyframesError::Log(KeyframeError::Log(LogError::Damaged { .. })) => format!(
+        KeyframesError::Log(LogError::Damaged { .. }) => format!(
             "{error}: restore it from a backup, choose another --out, or begin anew with --fresh"
         )
         .into(),
@@ -187,7 +187,7 @@ pub fn begin(out: &Out, identity: &Identity, resolved: &str) -> Result<(), Failu
     storage::sync_folder(&folder)?;
     let state = [
         checkpoint::path(out.path()),
-        keyframes_path(out.path()),
+        records_path::<Keyframe>(out.path()),
         records_path::<Place>(out.path()),
         records_path::<Query>(out.path()),
         out.join(COMPLETE),

@@ -7,7 +7,7 @@ use gyre_mapping::{
     Evidence, MapOptions, Overlay, map_png, write_geotiff, write_map, write_pgm, write_web_tiles,
 };
 use gyre_radar::{Trajectory, ground_truth::read_trajectory};
-use gyre_slam::{Keyframe, KeyframeReader, keyframes_path};
+use gyre_slam::{Keyframe, RecordReader, records_path};
 
 use crate::{
     Failure,
@@ -58,10 +58,10 @@ pub fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn open(run: &Path) -> Result<KeyframeReader, Failure> {
-    let path = keyframes_path(run);
+fn open(run: &Path) -> Result<RecordReader<Keyframe>, Failure> {
+    let path = records_path::<Keyframe>(run);
     match path.is_file() {
-        true => Ok(KeyframeReader::open(&path)?),
+        true => Ok(RecordReader::open(run)?),
         false => Err(format!(
             "{} does not exist: a run keeps keyframes with --set slam.kind=graph",
             path.display()
@@ -150,7 +150,7 @@ mod tests {
     use gyre_geometry::{SparsePoint, Twist, UncertainMotion, pose};
     use gyre_mapping::Map;
     use gyre_radar::ground_truth::write_tum_pose;
-    use gyre_slam::KeyframeLog;
+    use gyre_slam::RecordLog;
 
     use super::*;
 
@@ -195,7 +195,7 @@ mod tests {
             "[points]\nmax_range_m = 60.0\n",
         )
         .unwrap();
-        let mut log = KeyframeLog::open(&keyframes_path(&folder.join("run"))).unwrap();
+        let mut log = RecordLog::open(&folder.join("run")).unwrap();
         let mut tum = Vec::new();
         for seq in 0..4 {
             let keyframe = keyframe(seq);

@@ -11,14 +11,13 @@ use gyre_messages::{Item, Loop, LoopHeader};
 use gyre_radar::points::PointsConfig;
 use gyre_scan_matching::RefinementConfig;
 use gyre_slam::{
-    ClosingError, Keyframe, KeyframeError, KeyframeReader, KeyframeSource, LoopCandidate,
-    LoopCloser, LoopOptions, Place, Query, RecordError, RecordLog, SlamConfig, keyframes_path,
+    ClosingError, Keyframe, KeyframeSource, LoopCandidate, LoopCloser, LoopOptions, Place, Query,
+    RecordLog, RecordReader, SlamConfig,
 };
 use gyre_stage::{
     Follower, Launch, StageCounters, StageError,
     follower::{self, Growth, LogId, Progress, Step},
 };
-use gyre_storage::LogError;
 
 /// Runs the follower to the end of the keyframes, or until SIGTERM.
 ///
@@ -96,7 +95,7 @@ impl Follower for LoopClosing {
 
 /// The logs, and what has been read of them.
 struct State {
-    keyframes: KeyframeReader,
+    keyframes: RecordReader<Keyframe>,
     places: RecordLog<Place>,
     queries: RecordLog<Query>,
     closer: LoopCloser,
@@ -113,11 +112,10 @@ struct State {
 
 impl State {
     fn open(settings: &Settings) -> Result<Self, StageError> {
-        let keyframes = KeyframeReader::open(&keyframes_path(&settings.out));
         Ok(Self {
-            keyframes: keyframes.map_err(unreadable)?,
-            places: RecordLog::open(&settings.out).map_err(unusable)?,
-            queries: RecordLog::open(&settings.out).map_err(unusable)?,
+            keyframes: RecordReader::open(&settings.out)?,
+            places: RecordLog::open(&settings.out)?,
+            queries: RecordLog::open(&settings.out)?,
             closer: settings.closer()?,
             loops: 0,
             pending: VecDeque::new(),
@@ -132,15 +130,15 @@ impl State {
     fn restore(&mut self, unchanged: Option<usize>) -> Result<(), StageError> {
         let places = self.known_places(unchanged)?;
         if places < self.places.len() {
-            self.places.cut(places).map_err(unusable)?;
+            self.places.cut(places)?;
         }
         let is_whole = self.keyframes.has_ended() && unchanged.is_none();
         if !is_whole || places < self.queries.len() {
             // With more keyframes to come, the queries have not ended either.
-            self.queries.cut(places).map_err(unusable)?;
+            self.queries.cut(places)?;
         }
         for index in 0..places {
-            let place = self.places.read(index).map_err(unusable)?;
+            let place = self.places.read(index)?;
             let restored = self.closer.restore_place::<StageError>(&place);
             restored.map_err(failed)?;
         }
@@ -148,7 +146,7 @@ impl State {
         self.pending.clear();
         let mut last = None;
         for index in 0..self.queries.len() {
-            let query = self.queries.read(index).map_err(unusable)?;
+            let query = self.queries.read(index)?;
             let loops = query.loops().count() as u64;
             if loops > 0 {
                 last = Some((self.loops, query));
@@ -174,7 +172,7 @@ impl State {
         }
         // A place follows from the keyframes around it.
         let first = places.saturating_sub(MAX_NEIGHBOURS + 1);
-        let path_m = |index| Ok(self.keyframes.read(index).map_err(unreadable)?.path_m);
+        let path_m = |index| Ok(self.keyframes.read(index)?.path_m);
         let path_m: Vec<f64> = (first..keyframes)
             .map(path_m)
             .collect::<Result<_, StageError>>()?;
@@ -187,7 +185,7 @@ impl State {
     /// Looks for new keyframes. Returns the number of those that are as they were, if some have been cut off.
     fn look(&mut self) -> Result<Option<usize>, StageError> {
         let known = self.keyframes.len();
-        self.keyframes.refresh().map_err(unreadable)?;
+        self.keyframes.refresh()?;
         let unchanged = self.keyframes.unchanged();
         let was_cut = unchanged < known || (self.has_finished && !self.keyframes.has_ended());
         Ok(was_cut.then_some(unchanged))
@@ -199,7 +197,7 @@ impl State {
         }
         let next = self.closer.keyframes();
         if next < self.keyframes.len() {
-            let pushed = self.keyframes.read(next).map_err(unreadable)?;
+            let pushed = self.keyframes.read(next)?;
             self.closer.push(&pushed).map_err(input)?;
             return Ok(Step::Worked(None));
         }
@@ -214,11 +212,11 @@ impl State {
     fn close(&mut self) -> Result<Step<LoopHeader>, StageError> {
         let mut source = Points(&mut self.keyframes);
         if let Some(place) = self.closer.describe(&mut source).map_err(failed)? {
-            self.places.append(&place).map_err(unusable)?;
+            self.places.append(&place)?;
             return Ok(Step::Worked(None));
         }
         if let Some(query) = self.closer.close(&mut source).map_err(failed)? {
-            self.queries.append(&query).map_err(unusable)?;
+            self.queries.append(&query)?;
             self.has_appended = true;
             self.note(&query)?;
             return Ok(Step::Worked(self.pending.pop_front()));
@@ -226,7 +224,7 @@ impl State {
         if !self.has_finished {
             return Ok(Step::Idle);
         }
-        self.queries.end().map_err(unusable)?;
+        self.queries.end()?;
         self.has_appended = true;
         Ok(Step::Ended)
     }
@@ -235,7 +233,7 @@ impl State {
     fn note(&mut self, query: &Query) -> Result<(), StageError> {
         for (candidate, _) in query.loops() {
             let ends = [query.keyframe, candidate.place];
-            let [later, earlier] = ends.map(|index| self.keyframes.read(index).map_err(unreadable));
+            let [later, earlier] = ends.map(|index| self.keyframes.read(index));
             let header = header(self.loops, &later?, &earlier?, candidate);
             self.loops += 1;
             self.pending.push_back(header);
@@ -271,38 +269,13 @@ fn header(
 }
 
 /// Keyframes with their points, read again from the log.
-struct Points<'a>(&'a mut KeyframeReader);
+struct Points<'a>(&'a mut RecordReader<Keyframe>);
 
 impl KeyframeSource for Points<'_> {
     type Error = StageError;
 
     fn keyframe(&mut self, index: usize) -> Result<Keyframe, StageError> {
-        self.0.read(index).map_err(unreadable)
-    }
-}
-
-fn unreadable(error: KeyframeError) -> StageError {
-    match error {
-        KeyframeError::Log(error) => of_log(error),
-        KeyframeError::Malformed { .. } => input(error),
-    }
-}
-
-fn unusable(error: RecordError) -> StageError {
-    match error {
-        RecordError::Log(error) => of_log(error),
-        RecordError::Malformed { .. } => input(error),
-    }
-}
-
-/// Another attempt helps where a process that was killed is not gone yet, or has been cutting off a record that was being read.
-fn of_log(error: LogError) -> StageError {
-    match error {
-        LogError::Foreign { .. } => input(error),
-        _ => StageError::Transport {
-            action: "use a log of the run".to_owned(),
-            reason: error.to_string(),
-        },
+        Ok(self.0.read(index)?)
     }
 }
 

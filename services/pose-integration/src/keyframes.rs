@@ -8,9 +8,8 @@ use std::{
 use gyre_estimation::places::PlaceOptions;
 use gyre_geometry::SparsePoint;
 use gyre_messages::PoseHeader;
-use gyre_slam::{
-    Keyframe, KeyframeBuilder, KeyframeError, KeyframeLog, KeyframeReader, ScanPose, keyframes_path,
-};
+use gyre_slam::{Keyframe, KeyframeBuilder, RecordLog, RecordReader, ScanPose, records_path};
+use gyre_storage::LogError;
 use thiserror::Error;
 
 use crate::journal::{self, JournalError};
@@ -20,7 +19,7 @@ use crate::journal::{self, JournalError};
 pub enum KeyframesError {
     /// The log of keyframes.
     #[error(transparent)]
-    Log(#[from] KeyframeError),
+    Log(#[from] LogError),
     /// The journal.
     #[error(transparent)]
     Journal(#[from] JournalError),
@@ -37,7 +36,7 @@ pub enum KeyframesError {
 /// The keyframes of a run, open for appending.
 #[derive(Debug)]
 pub struct Keyframes {
-    log: KeyframeLog,
+    log: RecordLog<Keyframe>,
     builder: KeyframeBuilder,
     /// Memory for the points of a keyframe.
     points: Vec<SparsePoint>,
@@ -55,8 +54,7 @@ impl Keyframes {
         poses: u64,
         ended: bool,
     ) -> Result<Self, KeyframesError> {
-        let path = keyframes_path(out);
-        let mut log = KeyframeLog::open(&path)?;
+        let mut log = RecordLog::open(out)?;
         let found = find(log.len(), poses, |index| log.read(index))?;
         // The end of the keyframes is before that of the journal.
         if !ended {
@@ -68,7 +66,10 @@ impl Keyframes {
                 builder,
                 points: Vec::new(),
             }),
-            (_, Some(pose)) => Err(KeyframesError::Missing { path, pose }),
+            (_, Some(pose)) => Err(KeyframesError::Missing {
+                path: records_path::<Keyframe>(out),
+                pose,
+            }),
         }
     }
 
@@ -113,7 +114,7 @@ pub fn complete_poses(
     options: &PlaceOptions,
     poses: u64,
 ) -> Result<u64, KeyframesError> {
-    let mut reader = KeyframeReader::open(&keyframes_path(out))?;
+    let mut reader = RecordReader::open(out)?;
     let found = find(reader.len(), poses, |index| reader.read(index))?;
     let (_, missing) = recover(out, options, &found, poses)?;
     Ok(missing.unwrap_or(poses))
@@ -130,8 +131,8 @@ struct Found {
 fn find(
     keyframes: usize,
     poses: u64,
-    mut read: impl FnMut(usize) -> Result<Keyframe, KeyframeError>,
-) -> Result<Found, KeyframeError> {
+    mut read: impl FnMut(usize) -> Result<Keyframe, LogError>,
+) -> Result<Found, LogError> {
     for index in (0..keyframes).rev() {
         let keyframe = read(index)?;
         if keyframe.seq < poses {

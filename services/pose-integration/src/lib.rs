@@ -10,7 +10,7 @@ use std::path::PathBuf;
 
 use gyre_geometry::SparsePoint;
 use gyre_messages::{Item, Masked, Motion, MotionHeader, PoseHeader, Refined, StageId, flag};
-use gyre_slam::{KeyframeError, SlamConfig};
+use gyre_slam::SlamConfig;
 use gyre_stage::{
     Launch, Sink, StageCounters, StageError, clock,
     follower::{Growth, LogId},
@@ -135,9 +135,7 @@ fn unusable(error: JournalError) -> StageError {
 
 fn unusable_keyframes(error: KeyframesError) -> StageError {
     match error {
-        KeyframesError::Log(KeyframeError::Log(LogError::Busy { .. })) => {
-            busy("open the keyframes", &error)
-        }
+        KeyframesError::Log(LogError::Busy { .. }) => busy("open the keyframes", &error),
         _ => StageError::Input(error.to_string()),
     }
 }

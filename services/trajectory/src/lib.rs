@@ -8,14 +8,13 @@ use std::path::PathBuf;
 use gyre_geometry::{covariance, xy_yaw};
 use gyre_messages::{Correction, CorrectionHeader, Item};
 use gyre_slam::{
-    EstimatorKind, Keyframe, KeyframeError, KeyframeReader, LoopVerdict, Query, RecordError,
-    RecordReader, SlamConfig, SlamKind, TrajectoryEstimator, TrajectoryOptions, keyframes_path,
+    EstimatorKind, Keyframe, LoopVerdict, Query, RecordReader, SlamConfig, SlamKind,
+    TrajectoryEstimator, TrajectoryOptions,
 };
 use gyre_stage::{
     Follower, Launch, StageCounters, StageError,
     follower::{self, LogId, Progress, Step},
 };
-use gyre_storage::LogError;
 
 /// Runs the follower to the end of both logs, or until SIGTERM.
 ///
@@ -31,7 +30,7 @@ struct Trajectory {
     /// The folder of the results.
     out: PathBuf,
     kind: SlamKind,
-    keyframes: KeyframeReader,
+    keyframes: RecordReader<Keyframe>,
     queries: RecordReader<Query>,
     estimator: TrajectoryEstimator,
     /// The newest keyframe that was read.
@@ -56,8 +55,8 @@ impl Trajectory {
         Ok(Self {
             out: out.to_owned(),
             kind,
-            keyframes: KeyframeReader::open(&keyframes_path(out)).map_err(unreadable)?,
-            queries: RecordReader::open(out).map_err(unusable)?,
+            keyframes: RecordReader::open(out)?,
+            queries: RecordReader::open(out)?,
             estimator: TrajectoryEstimator::new(options),
             newest: None,
             read: [0, 0],
@@ -68,8 +67,8 @@ impl Trajectory {
 
     /// Looks for new records. If some of those that were read have been cut off, it begins anew.
     fn look(&mut self) -> Result<(), StageError> {
-        self.keyframes.refresh().map_err(unreadable)?;
-        self.queries.refresh().map_err(unusable)?;
+        self.keyframes.refresh()?;
+        self.queries.refresh()?;
         let unchanged = [self.keyframes.unchanged(), self.queries.unchanged()];
         let was_cut = self
             .read
@@ -86,12 +85,12 @@ impl Trajectory {
     fn advance(&mut self) -> Result<bool, StageError> {
         let [keyframes, queries] = self.read;
         if keyframes < self.keyframes.len() {
-            let keyframe = self.keyframes.read(keyframes).map_err(unreadable)?;
+            let keyframe = self.keyframes.read(keyframes)?;
             self.estimator.push(&keyframe).map_err(input)?;
             self.newest = Some(keyframe);
             self.read[0] += 1;
         } else if queries < self.queries.len() {
-            let query = self.queries.read(queries).map_err(unusable)?;
+            let query = self.queries.read(queries)?;
             if query.keyframe >= keyframes {
                 // Its keyframe has been cut off, and the query will be.
                 return Ok(false);
@@ -170,31 +169,6 @@ impl Follower for Trajectory {
             done: self.read[1] as u64,
             total: self.keyframes.len() as u64,
         }
-    }
-}
-
-fn unreadable(error: KeyframeError) -> StageError {
-    match error {
-        KeyframeError::Log(error) => of_log(error),
-        KeyframeError::Malformed { .. } => input(error),
-    }
-}
-
-fn unusable(error: RecordError) -> StageError {
-    match error {
-        RecordError::Log(error) => of_log(error),
-        RecordError::Malformed { .. } => input(error),
-    }
-}
-
-/// Another attempt helps where the process that appends has been cutting off a record that was being read.
-fn of_log(error: LogError) -> StageError {
-    match error {
-        LogError::Foreign { .. } => input(error),
-        _ => StageError::Transport {
-            action: "read a log of the run".to_owned(),
-            reason: error.to_string(),
-        },
     }
 }
 

@@ -1,7 +1,7 @@
 #![allow(clippy::unwrap_used)]
 
 use gyre_geometry::{Twist, UncertainMotion, pose};
-use gyre_slam::{KeyframeLog, LoopCandidate, LoopOutcome, RecordLog};
+use gyre_slam::{LoopCandidate, LoopOutcome, RecordLog};
 use nalgebra::{Matrix3, Vector3};
 
 use super::*;
@@ -54,7 +54,7 @@ fn query(keyframe: usize) -> Query {
 
 struct Logs {
     out: tempfile::TempDir,
-    keyframes: KeyframeLog,
+    keyframes: RecordLog<Keyframe>,
     queries: RecordLog<Query>,
 }
 
@@ -62,7 +62,7 @@ impl Logs {
     fn new() -> Self {
         let out = tempfile::tempdir().unwrap();
         Self {
-            keyframes: KeyframeLog::open(&keyframes_path(out.path())).unwrap(),
+            keyframes: RecordLog::open(out.path()).unwrap(),
             queries: RecordLog::open(out.path()).unwrap(),
             out,
         }

@@ -2,7 +2,9 @@
 
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{SparsePoint, Twist, UncertainMotion, covariance, pose, xy_yaw};
-use thiserror::Error;
+use gyre_storage::LogMagic;
+
+use crate::Record;
 
 /// A scan whose pose is estimated, with all that loop closing and mapping need of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,11 +27,6 @@ pub struct Keyframe {
     pub points: Vec<SparsePoint>,
 }
 
-/// Bytes that are not a keyframe.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-#[error("{0} bytes are not a keyframe")]
-pub struct MalformedKeyframe(usize);
-
 /// The part of fixed length in a file.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -46,9 +43,12 @@ struct Fixed {
     twist: [f64; 3],
 }
 
-impl Keyframe {
-    /// Appends the form in a file, little-endian: the fields in their order, then the points.
-    pub fn encode(&self, bytes: &mut Vec<u8>) {
+/// Little-endian: the fields in their order, then the points.
+impl Record for Keyframe {
+    const FILE: &'static str = "keyframes.log";
+    const MAGIC: LogMagic = *b"gyre keyframe 1\n";
+
+    fn encode(&self, bytes: &mut Vec<u8>) {
         let fixed = Fixed {
             seq: self.seq,
             scan: self.scan,
@@ -68,25 +68,18 @@ impl Keyframe {
         bytes.extend_from_slice(bytemuck::cast_slice(&self.points));
     }
 
-    /// Decodes what [`encode`](Self::encode) has written.
-    ///
-    /// # Errors
-    /// A length that none has.
-    pub fn decode(bytes: &[u8]) -> Result<Self, MalformedKeyframe> {
-        let malformed = MalformedKeyframe(bytes.len());
-        let (fixed, points) = bytes
-            .split_at_checked(size_of::<Fixed>())
-            .ok_or(malformed)?;
+    fn decode(bytes: &[u8]) -> Option<Self> {
+        let (fixed, points) = bytes.split_at_checked(size_of::<Fixed>())?;
         let fixed: Fixed = bytemuck::pod_read_unaligned(fixed);
         if points.len() % size_of::<SparsePoint>() != 0 {
-            return Err(malformed);
+            return None;
         }
         let points = points.chunks_exact(size_of::<SparsePoint>());
         let uncertain = |[x, y, yaw]: [f64; 3], packed| UncertainMotion {
             motion: pose(x, y, yaw),
             covariance: covariance::unpack(packed),
         };
-        Ok(Self {
+        Some(Self {
             seq: fixed.seq,
             scan: fixed.scan,
             stamp_ns: fixed.stamp_ns,
@@ -140,10 +133,7 @@ mod tests {
         let mut again = Vec::new();
         decoded.encode(&mut again);
         assert_eq!(Keyframe::decode(&again).unwrap().twist, keyframe.twist);
-        assert_eq!(
-            Keyframe::decode(&bytes[1..]),
-            Err(MalformedKeyframe(bytes.len() - 1))
-        );
-        assert!(Keyframe::decode(&bytes[..8]).is_err());
+        assert_eq!(Keyframe::decode(&bytes[1..]), None);
+        assert_eq!(Keyframe::decode(&bytes[..8]), None);
     }
 }

@@ -4,9 +4,8 @@
 //! - [`Keyframe`]: a scan whose pose is corrected, with all that a loop or a map needs of it;
 //! - [`SlamConfig`]: the section `[slam]` of a run's configuration;
 //! - [`KeyframeBuilder`]: makes keyframes from the poses of odometry;
-//! - [`KeyframeLog`]: the file of all keyframes of a run; [`KeyframeReader`] follows it;
 //! - [`LoopCloser`]: which keyframes are of the same place; [`Query`]: the candidates of a keyframe with their verdicts;
-//! - [`RecordLog`]: the files of places and queries of a run; [`RecordReader`] follows them;
+//! - [`RecordLog`]: the files of keyframes, places and queries of a run; [`RecordReader`] follows them;
 //! - [`TrajectoryEstimator`]: the poses of all keyframes from odometry and loops;
 //! - [`Correction`]: the poses of all scans.
 
@@ -17,7 +16,6 @@ mod correction;
 mod exact;
 mod keyframe;
 mod keyframe_builder;
-mod keyframes;
 mod loops;
 mod place;
 mod records;
@@ -26,12 +24,11 @@ mod trajectory;
 pub use closing::{ClosingError, KeyframeSource, LoopCloser, LoopOptions};
 pub use config::{SlamConfig, SlamKind};
 pub use correction::Correction;
-pub use keyframe::{Keyframe, MalformedKeyframe};
+pub use keyframe::Keyframe;
 pub use keyframe_builder::{KeyframeBuilder, ScanPose};
-pub use keyframes::{KeyframeError, KeyframeLog, KeyframeReader, keyframes_path};
-pub use loops::{LoopCandidate, LoopOutcome, MalformedQuery, Query};
-pub use place::{MalformedPlace, Place};
-pub use records::{Record, RecordError, RecordLog, RecordReader, records_path};
+pub use loops::{LoopCandidate, LoopOutcome, Query};
+pub use place::Place;
+pub use records::{Record, RecordLog, RecordReader, records_path};
 pub use trajectory::{
     EstimatorKind, JudgedLoop, LoopVerdict, TrajectoryEstimator, TrajectoryOptions,
 };

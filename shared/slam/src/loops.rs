@@ -4,9 +4,9 @@ use bytemuck::{Pod, Zeroable};
 use gyre_estimation::Constraint;
 use gyre_estimation::places::VerificationOutcome;
 use gyre_geometry::UncertainMotion;
-use thiserror::Error;
+use gyre_storage::LogMagic;
 
-use crate::exact::ExactMotion;
+use crate::{Record, exact::ExactMotion};
 
 /// The verdict on a candidate, and the reason of a rejection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,11 +54,6 @@ pub struct Query {
     pub candidates: Vec<LoopCandidate>,
 }
 
-/// Bytes that are not a query.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-#[error("{0} bytes are not the candidates of a keyframe")]
-pub struct MalformedQuery(usize);
-
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Fixed {
@@ -100,9 +95,14 @@ impl Query {
             (candidate, closing)
         })
     }
+}
 
-    /// Appends the form in a file, little-endian: the keyframe, then the candidates.
-    pub fn encode(&self, bytes: &mut Vec<u8>) {
+/// Little-endian: the keyframe, then the candidates.
+impl Record for Query {
+    const FILE: &'static str = "loops.log";
+    const MAGIC: LogMagic = *b"gyre loops 1\n\0\0\0";
+
+    fn encode(&self, bytes: &mut Vec<u8>) {
         bytes.extend_from_slice(&(self.keyframe as u64).to_le_bytes());
         for candidate in &self.candidates {
             let fixed = Fixed {
@@ -119,22 +119,18 @@ impl Query {
         }
     }
 
-    /// Decodes what [`encode`](Self::encode) has written.
-    ///
-    /// # Errors
-    /// A length that none has, or an unknown verdict.
-    pub fn decode(bytes: &[u8]) -> Result<Self, MalformedQuery> {
-        let malformed = MalformedQuery(bytes.len());
-        let (keyframe, candidates) = bytes.split_at_checked(8).ok_or(malformed)?;
+    /// `None` for a length that none has, and for an unknown verdict.
+    fn decode(bytes: &[u8]) -> Option<Self> {
+        let (keyframe, candidates) = bytes.split_at_checked(8)?;
         if candidates.len() % size_of::<Fixed>() != 0 {
-            return Err(malformed);
+            return None;
         }
         let candidates = candidates.chunks_exact(size_of::<Fixed>());
         let decoded =
             candidates.map(|bytes| bytemuck::pod_read_unaligned::<Fixed>(bytes).candidate());
-        Ok(Self {
+        Some(Self {
             keyframe: bytemuck::pod_read_unaligned::<u64>(keyframe) as usize,
-            candidates: decoded.collect::<Option<_>>().ok_or(malformed)?,
+            candidates: decoded.collect::<Option<_>>()?,
         })
     }
 }

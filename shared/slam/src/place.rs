@@ -3,9 +3,9 @@
 use bytemuck::{Pod, Zeroable};
 use gyre_estimation::places::Descriptor;
 use gyre_geometry::UncertainMotion;
-use thiserror::Error;
+use gyre_storage::LogMagic;
 
-use crate::exact::ExactMotion;
+use crate::{Record, exact::ExactMotion};
 
 /// All that later queries need of a keyframe beside its points.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,11 +18,6 @@ pub struct Place {
     pub descriptor: Descriptor,
 }
 
-/// Bytes that are not a place.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-#[error("{0} bytes are not a place")]
-pub struct MalformedPlace(usize);
-
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Fixed {
@@ -30,9 +25,12 @@ struct Fixed {
     motion: ExactMotion,
 }
 
-impl Place {
-    /// Appends the form in a file, little-endian: path, motion, descriptor.
-    pub fn encode(&self, bytes: &mut Vec<u8>) {
+/// Little-endian: path, motion, descriptor.
+impl Record for Place {
+    const FILE: &'static str = "places.log";
+    const MAGIC: LogMagic = *b"gyre places 1\n\0\0";
+
+    fn encode(&self, bytes: &mut Vec<u8>) {
         let fixed = Fixed {
             path_m: self.path_m,
             motion: ExactMotion::from(&self.motion),
@@ -41,20 +39,13 @@ impl Place {
         self.descriptor.encode(bytes);
     }
 
-    /// Decodes what [`encode`](Self::encode) has written.
-    ///
-    /// # Errors
-    /// A length that none has.
-    pub fn decode(bytes: &[u8]) -> Result<Self, MalformedPlace> {
-        let malformed = MalformedPlace(bytes.len());
-        let (fixed, descriptor) = bytes
-            .split_at_checked(size_of::<Fixed>())
-            .ok_or(malformed)?;
+    fn decode(bytes: &[u8]) -> Option<Self> {
+        let (fixed, descriptor) = bytes.split_at_checked(size_of::<Fixed>())?;
         let fixed: Fixed = bytemuck::pod_read_unaligned(fixed);
-        Ok(Self {
+        Some(Self {
             path_m: fixed.path_m,
             motion: UncertainMotion::from(&fixed.motion),
-            descriptor: Descriptor::decode(descriptor).ok_or(malformed)?,
+            descriptor: Descriptor::decode(descriptor)?,
         })
     }
 }

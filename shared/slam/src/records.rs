@@ -1,7 +1,8 @@
-//! The files of places and of queries, from which loop closing continues.
+//! The files of keyframes, of places and of queries, from which SLAM continues.
 //!
-//! Both follow from the keyframes. So they are made anew where they are missing, and what the keyframes lack is cut off. The end of the
-//! stream is a record without bytes.
+//! A keyframe is appended before its pose is journalled. So each pose of the journal that the selection of keyframes takes has its
+//! keyframe. Places and queries follow from the keyframes: they are made anew where they are missing, and what the keyframes lack is
+//! cut off. The end of the stream is a record without bytes.
 
 use std::{
     marker::PhantomData,
@@ -9,9 +10,6 @@ use std::{
 };
 
 use gyre_storage::{Log, LogError, LogMagic, LogReader};
-use thiserror::Error;
-
-use crate::{Place, Query};
 
 /// What a file of records holds.
 pub trait Record: Sized {
@@ -24,50 +22,6 @@ pub trait Record: Sized {
     fn encode(&self, bytes: &mut Vec<u8>);
     /// Decodes what [`encode`](Self::encode) has written; `None` if it is something else.
     fn decode(bytes: &[u8]) -> Option<Self>;
-}
-
-impl Record for Place {
-    const FILE: &'static str = "places.log";
-    const MAGIC: LogMagic = *b"gyre places 1\n\0\0";
-
-    fn encode(&self, bytes: &mut Vec<u8>) {
-        Self::encode(self, bytes);
-    }
-
-    fn decode(bytes: &[u8]) -> Option<Self> {
-        Self::decode(bytes).ok()
-    }
-}
-
-impl Record for Query {
-    const FILE: &'static str = "loops.log";
-    const MAGIC: LogMagic = *b"gyre loops 1\n\0\0\0";
-
-    fn encode(&self, bytes: &mut Vec<u8>) {
-        Self::encode(self, bytes);
-    }
-
-    fn decode(bytes: &[u8]) -> Option<Self> {
-        Self::decode(bytes).ok()
-    }
-}
-
-/// An error of a file of records.
-#[derive(Debug, Error)]
-pub enum RecordError {
-    /// The file cannot be read or written, is of another kind or damaged.
-    #[error(transparent)]
-    Log(#[from] LogError),
-    /// A record is whole and of another kind.
-    #[error("record {index} of {file} is of another kind: {bytes} bytes")]
-    Malformed {
-        /// The name of the file.
-        file: &'static str,
-        /// The number of the record, from 0.
-        index: usize,
-        /// Its length.
-        bytes: usize,
-    },
 }
 
 /// Returns the path of such records of the run that writes to `out`.
@@ -90,7 +44,7 @@ impl<R: Record> RecordLog<R> {
     ///
     /// # Errors
     /// A file that cannot be read or written, is of another kind, is damaged, or to which another process writes.
-    pub fn open(out: &Path) -> Result<Self, RecordError> {
+    pub fn open(out: &Path) -> Result<Self, LogError> {
         let log = Log::open(&records_path::<R>(out), R::MAGIC)?;
         let mut buffer = Vec::new();
         if let Some(last) = log.len().checked_sub(1) {
@@ -117,42 +71,50 @@ impl<R: Record> RecordLog<R> {
     /// Reads a record.
     ///
     /// # Errors
-    /// A file that cannot be read or is damaged there.
+    /// A file that cannot be read, is damaged there, or has something else there.
     ///
     /// # Panics
     /// There are no more than `index` records.
-    pub fn read(&mut self, index: usize) -> Result<R, RecordError> {
+    pub fn read(&mut self, index: usize) -> Result<R, LogError> {
         self.log.read(index, &mut self.buffer)?;
-        decode(index, &self.buffer)
+        R::decode(&self.buffer).ok_or_else(|| self.log.malformed(index))
     }
 
     /// Appends a record. A reader sees it when this returns.
     ///
     /// # Errors
     /// A file that cannot be written or synchronised.
-    pub fn append(&mut self, record: &R) -> Result<(), RecordError> {
+    pub fn append(&mut self, record: &R) -> Result<(), LogError> {
         self.buffer.clear();
         record.encode(&mut self.buffer);
-        Ok(self.log.append(&self.buffer)?)
+        self.log.append(&self.buffer)
+    }
+
+    /// Counts a change of another file that is of use only with the records that were appended. See [`Log::rely`].
+    ///
+    /// # Errors
+    /// A file that cannot be synchronised.
+    pub fn rely(&mut self) -> Result<(), LogError> {
+        self.log.rely()
     }
 
     /// Says that no more records follow. All of them survive a power failure when this returns.
     ///
     /// # Errors
     /// A file that cannot be written or synchronised.
-    pub fn end(&mut self) -> Result<(), RecordError> {
+    pub fn end(&mut self) -> Result<(), LogError> {
         if !self.ended {
             self.log.append(&[])?;
             self.ended = true;
         }
-        Ok(self.log.sync()?)
+        self.log.sync()
     }
 
-    /// Keeps the first `records` records, and cuts off those behind them and the end.
+    /// Keeps the first `records` records, and cuts off those behind them and the end. The cut survives a power failure.
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn cut(&mut self, records: usize) -> Result<(), RecordError> {
+    pub fn cut(&mut self, records: usize) -> Result<(), LogError> {
         self.log.cut(records.min(self.len()))?;
         self.ended = false;
         Ok(())
@@ -173,7 +135,7 @@ impl<R: Record> RecordReader<R> {
     ///
     /// # Errors
     /// A file that cannot be read, is of another kind or damaged.
-    pub fn open(out: &Path) -> Result<Self, RecordError> {
+    pub fn open(out: &Path) -> Result<Self, LogError> {
         let mut reader = Self {
             log: LogReader::open(&records_path::<R>(out), R::MAGIC)?,
             ended: false,
@@ -188,7 +150,7 @@ impl<R: Record> RecordReader<R> {
     ///
     /// # Errors
     /// A file that cannot be read, is of another kind or damaged.
-    pub fn refresh(&mut self) -> Result<usize, RecordError> {
+    pub fn refresh(&mut self) -> Result<usize, LogError> {
         self.ended = match self.log.refresh()?.checked_sub(1) {
             Some(last) => {
                 self.log.read(last, &mut self.buffer)?;
@@ -223,28 +185,21 @@ impl<R: Record> RecordReader<R> {
     /// Reads a record.
     ///
     /// # Errors
-    /// A file that cannot be read or is damaged there.
+    /// A file that cannot be read, is damaged there, or has something else there.
     ///
     /// # Panics
     /// There are no more than `index` records.
-    pub fn read(&mut self, index: usize) -> Result<R, RecordError> {
+    pub fn read(&mut self, index: usize) -> Result<R, LogError> {
         self.log.read(index, &mut self.buffer)?;
-        decode(index, &self.buffer)
+        R::decode(&self.buffer).ok_or_else(|| self.log.malformed(index))
     }
-}
-
-fn decode<R: Record>(index: usize, bytes: &[u8]) -> Result<R, RecordError> {
-    R::decode(bytes).ok_or(RecordError::Malformed {
-        file: R::FILE,
-        index,
-        bytes: bytes.len(),
-    })
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::{Place, Query};
 
     fn query(keyframe: usize) -> Query {
         Query {
@@ -295,9 +250,18 @@ mod tests {
         let path = |file| out.path().join("journal").join(file);
         std::fs::rename(path(Query::FILE), path(Place::FILE)).unwrap();
         let refused = RecordReader::<Place>::open(out.path()).map(drop);
-        assert!(matches!(
-            refused,
-            Err(RecordError::Log(LogError::Foreign { .. }))
-        ));
+        assert!(matches!(refused, Err(LogError::Foreign { .. })));
+    }
+
+    #[test]
+    fn a_whole_record_of_another_kind_is_refused_with_its_number() {
+        let out = tempfile::tempdir().unwrap();
+        let path = records_path::<Query>(out.path());
+        let mut log = Log::open(&path, Query::MAGIC).unwrap();
+        log.append(&[1, 2, 3]).unwrap();
+        let mut reader = RecordReader::<Query>::open(out.path()).unwrap();
+        let refused = reader.read(0).unwrap_err();
+        assert!(refused.to_string().contains("record 0 of"), "{refused}");
+        assert!(matches!(refused, LogError::Malformed { .. }));
     }
 }

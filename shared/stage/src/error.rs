@@ -2,6 +2,7 @@
 
 use std::{fmt::Debug, path::PathBuf};
 
+use gyre_storage::LogError;
 use thiserror::Error;
 
 use crate::run::{self, SHARED_MEMORY};
@@ -134,6 +135,20 @@ impl StageError {
             | Self::Malformed { .. }
             | Self::NoMemory { .. } => Self::TRANSIENT,
             _ => Self::PERMANENT,
+        }
+    }
+}
+
+impl From<LogError> for StageError {
+    /// For a process that follows a log. Another attempt helps where a process that was killed is not gone yet, or where the one that
+    /// appends has been cutting off a record that was being read.
+    fn from(error: LogError) -> Self {
+        match error {
+            LogError::Foreign { .. } | LogError::Malformed { .. } => Self::Input(error.to_string()),
+            _ => Self::Transport {
+                action: "use a log of the run".to_owned(),
+                reason: error.to_string(),
+            },
         }
     }
 }

@@ -47,6 +47,14 @@ pub enum LogError {
         /// The number of the record, from 0.
         record: usize,
     },
+    /// A record is what was written, and not of the kind of this log.
+    #[error("record {record} of {path} is of another kind: move it away, or choose another --out")]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// The number of the record, from 0.
+        record: usize,
+    },
     /// Another process appends to the file.
     #[error("another process is writing to {path}")]
     Busy {
@@ -157,6 +165,11 @@ impl Log {
     /// There are no more than `index` records.
     pub fn read(&self, index: usize, bytes: &mut Vec<u8>) -> Result<(), LogError> {
         self.records.read(index, bytes)
+    }
+
+    /// Returns the error for a record that its reader cannot decode.
+    pub fn malformed(&self, index: usize) -> LogError {
+        self.records.malformed(index)
     }
 
     /// Keeps the first `records` records and cuts off those behind them. The cut survives a power failure.

@@ -7,8 +7,8 @@ use gyre_evaluation::{BandSample, Bands, TruthSigma};
 use gyre_geometry::{Pose, xy_yaw};
 use gyre_radar::Trajectory;
 use gyre_slam::{
-    Correction, EstimatorKind, KeyframeReader, LoopOutcome, LoopVerdict, Query, RecordReader,
-    SlamKind, TrajectoryEstimator, TrajectoryOptions, keyframes_path,
+    Correction, EstimatorKind, Keyframe, LoopOutcome, LoopVerdict, Query, RecordReader, SlamKind,
+    TrajectoryEstimator, TrajectoryOptions,
 };
 use serde::Serialize;
 
@@ -72,7 +72,7 @@ impl Slam {
         if !configuration.slam.is_on() {
             return Ok(None);
         }
-        let mut keyframes = KeyframeReader::open(&keyframes_path(out.path()))?;
+        let mut keyframes = RecordReader::<Keyframe>::open(out.path())?;
         if keyframes.is_empty() {
             return Ok(None);
         }

@@ -59,4 +59,9 @@ impl LogReader {
     pub fn read(&self, index: usize, bytes: &mut Vec<u8>) -> Result<(), LogError> {
         self.records.read(index, bytes)
     }
+
+    /// Returns the error for a record that its reader cannot decode.
+    pub fn malformed(&self, index: usize) -> LogError {
+        self.records.malformed(index)
+    }
 }

@@ -283,6 +283,13 @@ impl Records {
         Ok(found)
     }
 
+    pub fn malformed(&self, record: usize) -> LogError {
+        LogError::Malformed {
+            path: self.path.clone(),
+            record,
+        }
+    }
+
     fn damaged(&self, record: usize) -> LogError {
         LogError::Damaged {
             path: self.path.clone(),
