@@ -30,6 +30,7 @@ struct Left {
     keyframes: Vec<u8>,
     loops: Vec<u8>,
     corrected: [String; 2],
+    map: Vec<u8>,
 }
 
 impl Left {
@@ -39,6 +40,7 @@ impl Left {
             keyframes: fs::read(records_path::<Keyframe>(run.out())).unwrap(),
             loops: fs::read(records_path::<Query>(run.out())).unwrap(),
             corrected: ["trajectory_slam.tum", "loops.csv"].map(|name| run.result(name)),
+            map: fs::read(run.out().join("map.png")).unwrap(),
         }
     }
 }
@@ -58,6 +60,7 @@ fn assert_undisturbed(run: &Run, case: &str) {
     assert!(left.keyframes == undisturbed.keyframes, "{case}: keyframes");
     assert!(left.loops == undisturbed.loops, "{case}: loops");
     assert!(left.corrected == undisturbed.corrected, "{case}: corrected");
+    assert!(left.map == undisturbed.map, "{case}: map");
 }
 
 fn loops_of(run: &Run) -> usize {

@@ -1,11 +1,12 @@
 //! `gyre map`: draws the map of a run.
 
-use std::{path::Path, process::ExitCode};
+mod drawing;
+mod loops;
+
+use std::{collections::BTreeMap, path::Path, process::ExitCode};
 
 use gyre_geometry::Pose;
-use gyre_mapping::{
-    Evidence, MapOptions, Overlay, map_png, write_geotiff, write_map, write_pgm, write_web_tiles,
-};
+use gyre_mapping::{MapOptions, write_geotiff, write_map, write_pgm, write_web_tiles};
 use gyre_radar::{Trajectory, ground_truth::read_trajectory};
 use gyre_slam::{Keyframe, RecordReader, records_path};
 
@@ -16,9 +17,12 @@ use crate::{
     print,
 };
 
+pub use drawing::{Drawing, options};
+
 /// The corrected trajectory, and that of odometry.
 const CORRECTED: &str = "trajectory_slam.tum";
 const ODOMETRY: &str = "trajectory.tum";
+const LOOPS: &str = "loops.csv";
 /// A pose belongs to a keyframe if it is this near in time: trajectories may be written in microseconds.
 const SAME_TIME_NS: u64 = 1_000_000;
 
@@ -35,13 +39,16 @@ pub fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
         None => arguments.run.join(ODOMETRY),
     };
     let poses = read_trajectory(&trajectory)?;
+    let loops = loops::used_loops(&arguments.run.join(LOOPS))?;
+    let configuration = Configuration::read(&arguments.run.join("config.toml"), &[])?;
     gyre_storage::create_folder(&arguments.out)?;
-    let mut evidence = Evidence::new(&options(arguments)?, &arguments.out)?;
-    let mut drawn = Drawn::default();
-    for index in 0..keyframes.len() {
-        drawn.draw(&keyframes.read(index)?, &poses, &mut evidence)?;
-    }
-    let (count, total) = (drawn.poses.len(), keyframes.len());
+    let options = MapOptions {
+        cell_m: arguments.cell_m,
+        ..options(&configuration)
+    };
+    let mut drawing = Drawing::new(&options, &arguments.out)?;
+    let lines = draw(&mut keyframes, &poses, &loops, &mut drawing)?;
+    let (count, total) = (drawing.keyframes(), keyframes.len());
     if count < total {
         print::note(format_args!(
             "{} of {total} keyframes have no pose in {} and are left out",
@@ -49,10 +56,10 @@ pub fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
             trajectory.display()
         ));
     }
-    write(arguments, &mut evidence, &drawn)?;
+    write(arguments, &mut drawing, &lines)?;
     print::line(format_args!(
         "{count} keyframes in {} tiles, in {}",
-        evidence.tiles().len(),
+        drawing.evidence().tiles().len(),
         arguments.out.display()
     ))?;
     Ok(ExitCode::SUCCESS)
@@ -70,73 +77,63 @@ fn open(run: &Path) -> Result<RecordReader<Keyframe>, Failure> {
     }
 }
 
-/// The options of the map: keyframes see as far as the run has extracted points.
-fn options(arguments: &MapArguments) -> Result<MapOptions, Failure> {
-    let configuration = Configuration::read(&arguments.run.join("config.toml"), &[])?;
-    let points = configuration.odometry.points;
-    Ok(MapOptions {
-        cell_m: arguments.cell_m,
-        near_m: points.min_range_m.into(),
-        reach_m: points.max_range_m.into(),
-        ..MapOptions::default()
+/// What is drawn over the keyframes, in the frame of the trajectory.
+#[derive(Default)]
+struct Lines {
+    trajectory: Vec<Pose>,
+    loops: Vec<[Pose; 2]>,
+}
+
+/// Draws all keyframes that have a pose. `loops` are between scans.
+fn draw(
+    keyframes: &mut RecordReader<Keyframe>,
+    poses: &Trajectory,
+    loops: &[[u64; 2]],
+    drawing: &mut Drawing,
+) -> Result<Lines, Failure> {
+    let (mut by_scan, mut span_ns) = (BTreeMap::new(), None);
+    for index in 0..keyframes.len() {
+        let keyframe = keyframes.read(index)?;
+        let Some(pose) = poses.near(keyframe.stamp_ns, SAME_TIME_NS) else {
+            continue;
+        };
+        drawing.draw(&keyframe, &pose)?;
+        by_scan.insert(keyframe.scan, pose);
+        let (first_ns, _) = span_ns.unwrap_or((keyframe.stamp_ns, 0));
+        span_ns = Some((first_ns, keyframe.stamp_ns));
+    }
+    let end = |scan: u64| by_scan.get(&scan).copied();
+    let both = |&[from, to]: &[u64; 2]| Some([end(from)?, end(to)?]);
+    Ok(Lines {
+        trajectory: span_ns.map_or(Vec::new(), |span_ns| part(poses, span_ns)),
+        loops: loops.iter().filter_map(both).collect(),
     })
 }
 
-/// The poses of the keyframes in the map frame, which is that of the first keyframe.
-#[derive(Default)]
-struct Drawn {
-    poses: Vec<Pose>,
-    odometry: Vec<Pose>,
-    first: Option<[Pose; 2]>,
+/// The poses from the first to the last keyframe: a ground truth may be of a longer drive.
+fn part(poses: &Trajectory, (first_ns, last_ns): (i64, i64)) -> Vec<Pose> {
+    let stamps = poses.stamp_ns.iter().flatten();
+    let within = |stamp_ns: i64| (first_ns..=last_ns).contains(&stamp_ns);
+    let poses = stamps.zip(&poses.poses);
+    let poses = poses.filter(|(stamp_ns, _)| within(**stamp_ns));
+    poses.map(|(_, pose)| *pose).collect()
 }
 
-impl Drawn {
-    fn draw(
-        &mut self,
-        keyframe: &Keyframe,
-        poses: &Trajectory,
-        evidence: &mut Evidence,
-    ) -> Result<(), Failure> {
-        let Some(pose) = poses.near(keyframe.stamp_ns, SAME_TIME_NS) else {
-            return Ok(());
-        };
-        let odometry = keyframe.pose.motion;
-        let [first, first_odometry] = *self.first.get_or_insert([pose, odometry]);
-        let pose = first.inv_mul(&pose);
-        evidence.draw(keyframe, &pose)?;
-        self.poses.push(pose);
-        self.odometry.push(first_odometry.inv_mul(&odometry));
-        Ok(())
-    }
-
-    /// The trajectory by odometry where it is another one.
-    fn other_odometry(&self, cell_m: f64) -> &[Pose] {
-        let mut pairs = self.poses.iter().zip(&self.odometry);
-        let differs =
-            pairs.any(|(a, b)| (a.translation.vector - b.translation.vector).norm() > cell_m);
-        if differs { &self.odometry } else { &[] }
-    }
-}
-
-fn write(arguments: &MapArguments, evidence: &mut Evidence, drawn: &Drawn) -> Result<(), Failure> {
-    let out = &arguments.out;
+fn write(arguments: &MapArguments, drawing: &mut Drawing, lines: &Lines) -> Result<(), Failure> {
+    let (out, origin) = (&arguments.out, arguments.origin);
     for format in &arguments.format {
         match format {
             MapFormat::Folder => {
                 let made_by = concat!("gyre ", env!("CARGO_PKG_VERSION"));
-                write_map(out, evidence, arguments.origin, made_by)?;
+                write_map(out, drawing.evidence(), origin, made_by)?;
             }
             MapFormat::Png => {
-                let overlay = Overlay {
-                    trajectory: &drawn.poses,
-                    odometry: drawn.other_odometry(arguments.cell_m),
-                    loops: &[],
-                };
-                gyre_storage::write(&out.join("map.png"), map_png(evidence, &overlay)?)?;
+                let png = drawing.png(&lines.trajectory, &lines.loops)?;
+                gyre_storage::write(&out.join("map.png"), png)?;
             }
-            MapFormat::Geotiff => write_geotiff(&out.join("map.tif"), evidence, arguments.origin)?,
-            MapFormat::Pgm => write_pgm(out, evidence)?,
-            MapFormat::Web => write_web_tiles(&out.join("web"), evidence)?,
+            MapFormat::Geotiff => write_geotiff(&out.join("map.tif"), drawing.evidence(), origin)?,
+            MapFormat::Pgm => write_pgm(out, drawing.evidence())?,
+            MapFormat::Web => write_web_tiles(&out.join("web"), drawing.evidence())?,
         }
     }
     Ok(())
@@ -244,6 +241,26 @@ mod tests {
             Map::open(&folder.path().join("map")).unwrap().keyframes(),
             1
         );
+    }
+
+    #[test]
+    fn the_loops_of_the_run_are_drawn() {
+        let folder = tempfile::tempdir().unwrap();
+        run(folder.path());
+        let picture = || {
+            map(&arguments(folder.path())).unwrap();
+            fs::read(folder.path().join("map/map.png")).unwrap()
+        };
+        let plain = picture();
+        let loops = |verdict: &str| {
+            let rows = format!("scan,found_scan,verdict\n2,0,{verdict}\n3,0,used\n");
+            fs::write(folder.path().join("run/loops.csv"), rows).unwrap();
+        };
+        // The last keyframe is not in the trajectory.
+        loops("ambiguous");
+        assert!(picture() == plain);
+        loops("used");
+        assert!(picture() != plain);
     }
 
     #[test]

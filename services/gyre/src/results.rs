@@ -5,6 +5,7 @@
 
 mod estimate;
 mod files;
+mod map;
 mod pass;
 mod sketch;
 mod slam;
@@ -38,7 +39,7 @@ pub use slam::SlamSummary;
 /// The ground truth of a simulation that is played without being stored.
 pub const SIMULATED_TRUTH: &str = "ground_truth.tum";
 /// All results.
-pub const FILES: [&str; 12] = [
+pub const FILES: [&str; 13] = [
     "odometry.csv",
     "trajectory.tum",
     "trajectory.svg",
@@ -48,6 +49,7 @@ pub const FILES: [&str; 12] = [
     "loops.csv",
     "graph.g2o",
     "bands_slam.svg",
+    "map.png",
     "latency.json",
     "summary.json",
     SIMULATED_TRUTH,
@@ -89,6 +91,11 @@ pub fn write(
     let corrected = corrected
         .map(|slam| add_corrected(&mut files, slam, truth.as_deref(), &read.corrected))
         .transpose()?;
+    if let Some(slam) = &slam {
+        let trajectory = read.corrected_sketch.path();
+        let png = map::map_png(configuration, out, slam, &trajectory)?;
+        png.map_or(Ok(()), |png| files.add("map.png", png))?;
+    }
     let judgement = truth.and_then(|truth| judged(&truth, &read.estimate));
     for (name, plot) in plots(&read.sketch, judgement.as_ref())? {
         files.add(name, plot)?;
@@ -134,7 +141,7 @@ fn slam_of(configuration: &Configuration, out: &Out) -> Option<Slam> {
         .flatten()
 }
 
-/// Adds the results of SLAM but for the trajectory itself.
+/// Adds the results of SLAM but for the trajectory itself and the map.
 fn add_corrected(
     files: &mut Files<'_>,
     slam: &mut Slam,

@@ -197,7 +197,7 @@ impl fmt::Display for Summary {
             writeln!(f, "\n{slam}")?;
         }
         let corrected = match self.slam {
-            Some(_) => ", trajectory_slam.tum, loops.csv, graph.g2o",
+            Some(_) => ", trajectory_slam.tum, loops.csv, graph.g2o, map.png",
             None => "",
         };
         write!(

@@ -4,7 +4,7 @@
 //! - [`Evidence`]: keyframes drawn at their poses, taken out again and drawn elsewhere;
 //! - [`TileImage`]: a square of 256 x 256 cells, as it is stored; [`TileSource`]: a map as its tiles;
 //! - [`write_map`], [`Map`]: a map as a folder;
-//! - [`map_png`]: a map as one picture with the trajectory in it;
+//! - [`map_png`]: a map as one picture with the trajectory in it; [`legible`]: cells for it;
 //! - [`write_pgm`], [`write_geotiff`], [`write_web_tiles`]: a map in the forms of other programs.
 //!
 //! # Method
@@ -41,6 +41,6 @@ pub use export::{write_geotiff, write_pgm, write_web_tiles};
 pub use georeference::{Origin, OriginError};
 pub use map::{Map, write_map};
 pub use options::{MapOptions, OptionError};
-pub use picture::{Overlay, map_png};
+pub use picture::{Overlay, legible, map_png};
 pub use source::{MapError, TileSource};
 pub use tile::{Cell, TILE_CELLS, TileExtent, TileImage, TileIndex};

@@ -49,9 +49,13 @@ const STRONG: [f32; 3] = [255.0, 236.0, 190.0];
 const WEAK_EVIDENCE: f32 = 45.0;
 const STRONG_EVIDENCE: f32 = 100.0;
 
+/// Steps of evidence and of looks that the eye does not tell apart: a picture without them is half as large.
+const EVIDENCE_STEP: u8 = 4;
+const LOOKED_STEP: u8 = 15;
+
 /// Returns the colour of a cell that was well looked at.
 fn seen(evidence: u8) -> [f32; 3] {
-    let evidence = f32::from(evidence);
+    let evidence = f32::from(stepped(evidence, EVIDENCE_STEP));
     match evidence < WEAK_EVIDENCE {
         true => blend(FREE, WEAK, evidence / WEAK_EVIDENCE),
         false => {
@@ -61,13 +65,17 @@ fn seen(evidence: u8) -> [f32; 3] {
     }
 }
 
+fn stepped(value: u8, step: u8) -> u8 {
+    value / step * step
+}
+
 fn blend(from: [f32; 3], to: [f32; 3], share: f32) -> [f32; 3] {
     [0, 1, 2].map(|k| from[k] + (to[k] - from[k]) * share)
 }
 
 /// Returns the colour of a cell on the ground of a picture: red, green, blue.
 pub fn colour(cell: Cell) -> [u8; 3] {
-    let share = f32::from(cell.looked) / 255.0;
+    let share = f32::from(stepped(cell.looked, LOOKED_STEP)) / 255.0;
     blend(UNKNOWN, seen(cell.evidence), share).map(|channel| channel.round() as u8)
 }
 

@@ -13,6 +13,8 @@ const SECTORS: usize = 360;
 /// Sectors to either side that a return speaks for: a return hides weaker ones at its range within the beam, so that not every
 /// azimuth has points of a wall that all of them see.
 const BEAM_SECTORS: usize = 3;
+/// A wall returns as much in a cell of this side as it can. Of what it returns, a cell has a share in proportion to its side, m.
+const FULL_CELL_M: f64 = 0.2;
 /// A return is spread along its arc over so many standard deviations to either side.
 const SPREAD_SIGMAS: f64 = 2.0;
 
@@ -79,9 +81,10 @@ impl View {
 
     /// Calls `take` with the parts of all returns.
     pub fn returns(&self, mut take: impl FnMut(Sample)) {
+        let share = FULL_CELL_M / self.options.cell_m;
         for [x_m, y_m, weight] in self.points.points() {
             let place = Vector2::new(f64::from(x_m), f64::from(y_m));
-            let amount = f64::from(weight) * self.look(&place);
+            let amount = share * f64::from(weight) * self.look(&place);
             if amount > 0.0 && place.norm().is_finite() {
                 self.spread(&place, amount, &mut take);
             }

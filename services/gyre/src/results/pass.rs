@@ -36,6 +36,8 @@ pub struct Read {
     pub estimate: Estimate,
     /// The corrected poses to be evaluated.
     pub corrected: Trajectory,
+    /// The corrected path to be drawn.
+    pub corrected_sketch: Sketch,
 }
 
 impl<'a, 'b> Pass<'a, 'b> {
@@ -104,6 +106,7 @@ impl<'a, 'b> Pass<'a, 'b> {
         let corrected = slam.correct(pose.item.seq, &pose.pose().motion);
         let mut line = Vec::new();
         write_tum_pose(stamp_ns, &corrected, &mut line)?;
+        self.read.corrected_sketch.add(corrected);
         if self.is_judged {
             let trajectory = &mut self.read.corrected;
             trajectory.stamp_ns.get_or_insert_default().push(stamp_ns);

@@ -48,14 +48,19 @@ impl Sketch {
         }
     }
 
+    /// Returns the poses that were kept, and the last one.
+    pub fn path(&self) -> Vec<Pose> {
+        let last_is_kept = self.poses.saturating_sub(1).is_multiple_of(self.every);
+        let last = self.last.filter(|_| !last_is_kept);
+        self.kept.iter().copied().chain(last).collect()
+    }
+
     /// Returns the plot as an SVG document; `None` without poses.
     ///
     /// # Errors
     /// A plot that cannot be drawn.
     pub fn svg(&self) -> Result<Option<String>, PlotError> {
-        let last_is_kept = self.poses.saturating_sub(1).is_multiple_of(self.every);
-        let last = self.last.filter(|_| !last_is_kept);
-        let drawn: Vec<Pose> = self.kept.iter().copied().chain(last).collect();
+        let drawn = self.path();
         match drawn.is_empty() {
             true => Ok(None),
             false => path_svg(&drawn, self.poses, self.length_m).map(Some),

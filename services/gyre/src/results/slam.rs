@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Write};
 
-use gyre_estimation::G2o;
+use gyre_estimation::{Constraint, G2o};
 use gyre_evaluation::{BandSample, Bands, TruthSigma};
 use gyre_geometry::{Pose, xy_yaw};
 use gyre_radar::Trajectory;
@@ -107,6 +107,23 @@ impl Slam {
         self.correction.correct(seq, pose)
     }
 
+    /// Returns the corrected poses of the keyframes.
+    pub fn poses(&self) -> &[Pose] {
+        self.estimator.poses()
+    }
+
+    /// Returns the corrected poses of both keyframes of each loop that is used.
+    pub fn loops(&self) -> Vec<[Pose; 2]> {
+        let ends = |it: Constraint| [it.from, it.to].map(|keyframe| self.poses()[keyframe]);
+        self.used().map(ends).collect()
+    }
+
+    fn used(&self) -> impl Iterator<Item = Constraint> + '_ {
+        let used = self.estimator.loops().iter();
+        let used = used.filter(|it| it.verdict == LoopVerdict::Used);
+        used.map(|it| it.constraint)
+    }
+
     /// Returns `loops.csv`: a row for each verified candidate.
     ///
     /// # Errors
@@ -145,12 +162,9 @@ impl Slam {
 
     /// Returns `graph.g2o`: the corrected keyframes, the motions between them, and the loops that are used.
     pub fn graph_g2o(&self) -> String {
-        let used = self.estimator.loops().iter();
-        let used = used.filter(|it| it.verdict == LoopVerdict::Used);
-        let loops = used.map(|it| it.constraint);
         G2o::write(
             self.estimator.poses(),
-            self.estimator.odometry().chain(loops),
+            self.estimator.odometry().chain(self.used()),
         )
     }
 
@@ -186,8 +200,7 @@ impl Slam {
 
     /// Returns what the summary says. `ate_m` is the error of the corrected trajectory.
     pub fn summary(&self, ate_m: Option<f64>) -> SlamSummary {
-        let used = |it: &&gyre_slam::JudgedLoop| it.verdict == LoopVerdict::Used;
-        let loops_used = self.estimator.loops().iter().filter(used).count();
+        let loops_used = self.used().count();
         let verified = |query: &Query| {
             let candidates = query.candidates.iter();
             let verified = |outcome| {

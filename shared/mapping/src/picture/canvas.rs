@@ -13,12 +13,35 @@ use nalgebra::Point2;
 /// Red, green and blue.
 pub type Colour = [u8; 3];
 
+/// How a line is drawn.
+#[derive(Clone, Copy)]
+pub struct Pen {
+    pub colour: Colour,
+    /// Units of the canvas.
+    pub width: f32,
+    /// 0 to 1.
+    pub opacity: f32,
+}
+
+impl Pen {
+    pub const fn opaque(colour: Colour, width: f32) -> Self {
+        Self {
+            colour,
+            width,
+            opacity: 1.0,
+        }
+    }
+}
+
 const GLYPHS: RasterHeight = RasterHeight::Size32;
 /// Lengths in units, of which a picture is at least so many wide.
 const MIN_WIDTH: f32 = 900.0;
 const FOOTER: f32 = 44.0;
 const MARGIN: f32 = 20.0;
+/// Points of a line that are nearer to each other are one, px.
+const NEAR_PX: f32 = 0.5;
 const TEXT: f32 = 15.0;
+const LONGEST_BAR: f64 = 160.0;
 /// Pixels of a unit: 1 up to this size of a picture, and in proportion beyond.
 const UNIT_SIDE: f32 = 1300.0;
 
@@ -107,24 +130,20 @@ impl Canvas {
             .collect()
     }
 
-    /// Draws a line through points, `width` units wide.
-    pub fn line(&mut self, points: &[(f32, f32)], colour: Colour, width: f32) {
+    /// Draws lines through points.
+    pub fn lines<P: AsRef<[(f32, f32)]>>(&mut self, lines: impl IntoIterator<Item = P>, pen: Pen) {
         let mut builder = PathBuilder::new();
-        let mut points = points
-            .iter()
-            .filter(|(x, y)| x.is_finite() && y.is_finite());
-        if let Some((x, y)) = points.next() {
-            builder.move_to(*x, *y);
+        for line in lines {
+            add_line(&mut builder, line.as_ref());
         }
-        points.for_each(|(x, y)| builder.line_to(*x, *y));
         let stroke = Stroke {
-            width: width * self.unit,
+            width: pen.width * self.unit,
             line_cap: LineCap::Round,
             line_join: LineJoin::Round,
             ..Stroke::default()
         };
         if let Some(path) = builder.finish() {
-            let paint = paint(colour);
+            let paint = paint(pen.colour, pen.opacity);
             self.pixmap
                 .stroke_path(&path, &paint, &stroke, Transform::identity(), None);
         }
@@ -132,7 +151,7 @@ impl Canvas {
 
     fn fill(&mut self, path: Option<Path>, colour: Colour) {
         if let Some(path) = path {
-            let paint = paint(colour);
+            let paint = paint(colour, 1.0);
             self.pixmap.fill_path(
                 &path,
                 &paint,
@@ -161,29 +180,32 @@ impl Canvas {
         triangle.line_to(head[1].0, head[1].1);
         triangle.line_to(head[2].0, head[2].1);
         triangle.close();
-        self.line(&shaft, colour, 3.0);
+        self.lines([shaft], Pen::opaque(colour, 3.0));
         self.fill(dot, colour);
         self.fill(triangle.finish(), colour);
     }
 
     /// Draws a bar of a round length at the left of the footer; returns where the next entry begins.
     pub fn scale_bar(&mut self, colour: Colour) -> f32 {
-        let longest_m = 220.0 * f64::from(self.unit) * self.view.pixel_m;
+        let longest_m = LONGEST_BAR * f64::from(self.unit) * self.view.pixel_m;
         let length_m = round_length_m(longest_m);
         let length = (length_m / self.view.pixel_m) as f32;
         let (left, y, tick) = (MARGIN * self.unit, self.footer, 5.0 * self.unit);
         let right = left + length;
-        self.line(&[(left, y), (right, y)], colour, 2.0);
-        for x in [left, right] {
-            self.line(&[(x, y - tick), (x, y + tick)], colour, 2.0);
-        }
-        self.text(right + 8.0 * self.unit, &format!("{length_m} m"), colour)
+        let ticks = [left, right].map(|x| [(x, y - tick), (x, y + tick)]);
+        let pen = Pen::opaque(colour, 2.0);
+        self.lines([[(left, y), (right, y)]], pen);
+        self.lines(ticks, pen);
+        let pixel_m = (self.view.pixel_m * 1e3).round() / 1e3;
+        let label = format!("{length_m} m, {pixel_m} m/px");
+        self.text(right + 8.0 * self.unit, &label, colour)
     }
 
     /// Draws an entry of the legend in the footer; returns where the next one begins.
     pub fn entry(&mut self, left: f32, colour: Colour, label: &str, text: Colour) -> f32 {
         let end = left + 22.0 * self.unit;
-        self.line(&[(left, self.footer), (end, self.footer)], colour, 3.0);
+        let sample = [(left, self.footer), (end, self.footer)];
+        self.lines([sample], Pen::opaque(colour, 3.0));
         self.text(end + 8.0 * self.unit, label, text)
     }
 
@@ -209,9 +231,33 @@ impl Canvas {
     }
 }
 
-fn paint([red, green, blue]: Colour) -> Paint<'static> {
+/// Adds a line but for the points that are too near to the one before to be told apart.
+fn add_line(builder: &mut PathBuilder, points: &[(f32, f32)]) {
+    let mut points = points
+        .iter()
+        .filter(|(x, y)| x.is_finite() && y.is_finite());
+    let Some(&(x, y)) = points.next() else {
+        return;
+    };
+    builder.move_to(x, y);
+    let (mut last, mut end) = ((x, y), None);
+    for &(x, y) in points {
+        end = Some((x, y));
+        if (x - last.0).hypot(y - last.1) >= NEAR_PX {
+            builder.line_to(x, y);
+            (last, end) = ((x, y), None);
+        }
+    }
+    // The last one is drawn wherever it is, so that a line has its end, and one of two equal points is a dot.
+    if let Some((x, y)) = end {
+        builder.line_to(x, y);
+    }
+}
+
+fn paint([red, green, blue]: Colour, opacity: f32) -> Paint<'static> {
     let mut paint = Paint::default();
-    paint.set_color_rgba8(red, green, blue, u8::MAX);
+    let opacity = (opacity * f32::from(u8::MAX)).round() as u8;
+    paint.set_color_rgba8(red, green, blue, opacity);
     paint
 }
 

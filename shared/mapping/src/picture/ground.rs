@@ -5,8 +5,8 @@ use nalgebra::Vector2;
 
 /// Longest side of a picture, px.
 const MAX_SIDE: usize = 4096;
-/// Opacity from which a cell counts as seen.
-const SEEN: u8 = 8;
+/// Opacity from which a cell counts as seen: of one look from nearby.
+const SEEN: u8 = 32;
 
 /// The cells of a picture, row after row, that of the highest y first.
 pub struct Ground {
@@ -22,12 +22,18 @@ impl Ground {
     /// Reads a map.
     ///
     /// # Errors
-    /// A tile that cannot be read.
+    /// A tile that cannot be read, and more tiles a side than pixels.
     pub fn read(source: &mut impl TileSource, extent: &TileExtent) -> Result<Self, MapError> {
         let [columns, rows] = extent.cells();
         // A power of two, so that a tile has a whole number of blocks.
         let block = columns.max(rows).div_ceil(MAX_SIDE).next_power_of_two();
-        let block = block.min(TILE_CELLS);
+        if block > TILE_CELLS {
+            return Err(MapError::TooLarge {
+                columns,
+                rows,
+                form: "a picture",
+            });
+        }
         let (width, side) = (columns / block, TILE_CELLS / block);
         let mut cells = vec![Cell::default(); width * (rows / block)];
         let mut image = TileImage::default();

@@ -1,7 +1,7 @@
 //! What keyframes leave in the cells.
 
 use gyre_geometry::{SparsePoint, Twist, pose};
-use gyre_mapping::{MapOptions, TileIndex};
+use gyre_mapping::{Evidence, MapOptions, TileIndex};
 use nalgebra::Point2;
 
 use crate::scenes::*;
@@ -17,6 +17,30 @@ fn a_wall_seen_from_two_poses_is_one_wall() {
     assert!((1..=3).contains(&bright), "{across:?}");
     assert!(*highest > 100, "{across:?}");
     assert_eq!([across[0], across[20]], [0, 0], "{across:?}");
+}
+
+#[test]
+fn a_wall_is_as_bright_in_larger_cells() {
+    let of = |cell_m: f64| {
+        let options = MapOptions {
+            cell_m,
+            ..MapOptions::default()
+        };
+        let mut evidence = Evidence::new(&options, &std::env::temp_dir()).unwrap();
+        for (pose, keyframe) in drive(40, &wall()) {
+            evidence.draw(&keyframe, &pose).unwrap();
+        }
+        // The wall is between two rows of larger cells.
+        let rows = [19.9, 20.1].map(|y_m| cell(&mut evidence, 0.1, y_m).evidence);
+        f64::from(rows[0].max(rows[1]))
+    };
+    let (small, [twice, fourfold]) = (of(0.2), [0.4, 0.8].map(of));
+    for larger in [twice, fourfold] {
+        assert!(
+            (0.6..1.2).contains(&(larger / small)),
+            "{small} {twice} {fourfold}"
+        );
+    }
 }
 
 #[test]

@@ -3,4 +3,5 @@
 
 mod evidence;
 mod files;
+mod pictures;
 mod scenes;

@@ -1,0 +1,44 @@
+//! `map.png`: the keyframes at their corrected poses, with the trajectory and its loops.
+
+use gyre_geometry::Pose;
+use gyre_mapping::{MapError, legible};
+use gyre_slam::{Keyframe, RecordReader};
+
+use super::Slam;
+use crate::{
+    Failure,
+    configuration::Configuration,
+    map::{Drawing, options},
+    out::Out,
+    print,
+};
+
+/// Returns the picture as a PNG file; `None`, with a note, where the drive is too long for one.
+///
+/// # Errors
+/// Keyframes that cannot be read, and a full disk: what does not fit into memory lies in a file without a name in `out`.
+pub fn map_png(
+    configuration: &Configuration,
+    out: &Out,
+    slam: &Slam,
+    trajectory: &[Pose],
+) -> Result<Option<Vec<u8>>, Failure> {
+    let options = legible(options(configuration), slam.poses());
+    let png = match Drawing::new(&options, out.path()) {
+        Ok(mut drawing) => {
+            let mut keyframes = RecordReader::<Keyframe>::open(out.path())?;
+            for (index, pose) in slam.poses().iter().enumerate() {
+                drawing.draw(&keyframes.read(index)?, pose)?;
+            }
+            drawing.png(trajectory, &slam.loops())
+        }
+        Err(error) => Err(error),
+    };
+    match png {
+        Err(reason @ (MapError::Option(_) | MapError::TooLarge { .. })) => {
+            print::note(format_args!("no map.png: {reason}"));
+            Ok(None)
+        }
+        png => Ok(Some(png?)),
+    }
+}
