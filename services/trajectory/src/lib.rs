@@ -1,11 +1,12 @@
 //! The trajectory that agrees with the loops: fuses the motions between keyframes and the loops among them.
 //!
-//! It follows `journal/keyframes.log` and `journal/loops.log` and has no file of its own: what it publishes is a function of what it has
-//! read of both. The corrected trajectory of the results is made from the same logs at the end of the run.
+//! It follows `journal/keyframes.log` and `journal/loops.log` and has no file of its own. While the run goes on, new loops are taken into
+//! the standing estimate, which may depend a little on when they came. When both logs have ended the poses are solved anew: the last
+//! correction is a function of the logs, and that of the results, which the supervisor makes from the same logs.
 
 use std::path::PathBuf;
 
-use gyre_geometry::{covariance, xy_yaw};
+use gyre_geometry::{UncertainMotion, covariance, xy_yaw};
 use gyre_messages::{Correction, CorrectionHeader, Item};
 use gyre_slam::{
     EstimatorKind, Keyframe, LoopVerdict, Query, RecordReader, SlamConfig, SlamKind,
@@ -37,8 +38,10 @@ struct Trajectory {
     newest: Option<Keyframe>,
     /// Keyframes and queries that were read.
     read: [usize; 2],
-    /// Whether loops were read that have corrected no pose yet.
-    has_new_loops: bool,
+    /// The pose of the newest keyframe as corrected; `None` if loops were read since that have corrected no pose yet.
+    corrected: Option<UncertainMotion>,
+    /// Whether the poses are those of the results.
+    is_final: bool,
     /// Whether something was read since the last correction.
     has_changed: bool,
 }
@@ -60,7 +63,8 @@ impl Trajectory {
             estimator: TrajectoryEstimator::new(options),
             newest: None,
             read: [0, 0],
-            has_new_loops: false,
+            corrected: None,
+            is_final: false,
             has_changed: false,
         })
     }
@@ -85,8 +89,10 @@ impl Trajectory {
     fn advance(&mut self) -> Result<bool, StageError> {
         let [keyframes, queries] = self.read;
         if keyframes < self.keyframes.len() {
-            let keyframe = self.keyframes.read(keyframes)?;
+            let keyframe = self.keyframes.read_without_points(keyframes)?;
             self.estimator.push(&keyframe).map_err(input)?;
+            // Without a new loop the poses before stay where they are.
+            self.corrected = self.corrected.map(|last| last.then(&keyframe.motion));
             self.newest = Some(keyframe);
             self.read[0] += 1;
         } else if queries < self.queries.len() {
@@ -95,7 +101,9 @@ impl Trajectory {
                 // Its keyframe has been cut off, and the query will be.
                 return Ok(false);
             }
-            self.has_new_loops |= query.loops().next().is_some();
+            if query.loops().next().is_some() {
+                self.corrected = None;
+            }
             self.estimator.close(&query).map_err(input)?;
             self.read[1] += 1;
         } else {
@@ -110,19 +118,25 @@ impl Trajectory {
         let Some(newest) = &self.newest else {
             return Ok(None);
         };
-        if self.has_new_loops {
-            self.estimator.solve().map_err(input)?;
-            self.has_new_loops = false;
-        }
         let [keyframes, queries] = self.read;
-        let corrected = self.estimator.pose(keyframes - 1).map_err(input)?;
+        let corrected = match self.corrected {
+            Some(corrected) => corrected,
+            None => {
+                match self.is_final {
+                    true => self.estimator.solve().map_err(input)?,
+                    false => self.estimator.update().map_err(input)?,
+                }
+                self.estimator.pose(keyframes - 1).map_err(input)?
+            }
+        };
+        self.corrected = Some(corrected);
         let loops = self.estimator.loops().iter();
         let used = loops.filter(|it| it.verdict == LoopVerdict::Used);
         let map_from_odometry = corrected.motion * newest.pose.motion.inverse();
         let [x_m, y_m, yaw_rad] = xy_yaw(&map_from_odometry);
         Ok(Some(CorrectionHeader {
             item: Item {
-                seq: (keyframes + queries) as u64 - 1,
+                seq: (keyframes + queries + usize::from(self.is_final)) as u64 - 1,
                 scan: newest.scan,
                 previous_scan: newest.scan,
                 stamp_ns: newest.stamp_ns,
@@ -151,17 +165,20 @@ impl Follower for Trajectory {
         if self.advance()? {
             return Ok(Step::Worked(None));
         }
+        // The queries end after the keyframes.
+        let has_ended = self.queries.has_ended() && self.keyframes.has_ended();
+        if has_ended && !self.is_final {
+            (self.has_changed, self.corrected) = (true, None);
+        }
+        self.is_final = has_ended;
         if self.has_changed {
             self.has_changed = false;
             return Ok(Step::Worked(self.correct()?));
         }
-        // The queries end after the keyframes.
-        Ok(
-            match self.queries.has_ended() && self.keyframes.has_ended() {
-                true => Step::Ended,
-                false => Step::Idle,
-            },
-        )
+        Ok(match has_ended {
+            true => Step::Ended,
+            false => Step::Idle,
+        })
     }
 
     fn progress(&self) -> Progress {

@@ -117,7 +117,7 @@ fn without_loops_odometry_is_not_corrected() {
 }
 
 #[test]
-fn a_correction_is_the_same_whenever_the_logs_were_read() {
+fn the_last_correction_is_the_same_whenever_the_logs_were_read() {
     let mut logs = Logs::new();
     let mut trajectory = logs.trajectory();
     assert!(follow(&mut trajectory).0.is_none());
@@ -126,10 +126,19 @@ fn a_correction_is_the_same_whenever_the_logs_were_read() {
         follow(&mut trajectory);
     }
     logs.append(120, 120);
+    let standing = follow(&mut trajectory).0.unwrap().map_from_odometry();
+    let restarted = follow(&mut logs.trajectory())
+        .0
+        .unwrap()
+        .map_from_odometry();
+    let apart = standing.inv_mul(&restarted);
+    assert!(apart.translation.vector.norm() < 0.001, "{apart}");
+    assert!(apart.rotation.angle().abs() < 1e-5, "{apart}");
     logs.keyframes.end().unwrap();
     logs.queries.end().unwrap();
     let (correction, has_ended) = follow(&mut trajectory);
     assert!(has_ended);
+    assert_eq!(correction.unwrap().item.seq, 240);
     assert!(correction.unwrap().loops > 0);
     assert!(correction.unwrap().yaw_rad.abs() > 0.001);
     let (restarted, _) = follow(&mut logs.trajectory());

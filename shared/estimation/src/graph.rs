@@ -119,28 +119,39 @@ impl PoseGraph {
     /// # Errors
     /// The constraint does not continue the trajectory, names unknown keyframes or has no usable covariance.
     pub fn apply(&mut self, constraint: &Constraint) -> Result<Verdict, EstimationError> {
-        constraint.check(self.poses.len())?;
-        let &Constraint {
-            from, to, motion, ..
-        } = constraint;
-        let edge = Edge::new([from, to], motion).ok_or(EstimationError::Covariance { from, to })?;
-        let verdict = match constraint.kind {
-            Kind::Odometry => Verdict {
-                chi_square: 0.0,
-                outcome: Outcome::Accepted,
-            },
-            Kind::Loop { .. } => self.judge(&edge),
+        let Kind::Odometry = constraint.kind else {
+            let tested = self.test(constraint)?;
+            return self.apply_tested(constraint, tested.chi_square);
         };
+        let edge = self.edge(constraint)?;
+        let end = self.poses[constraint.from] * constraint.motion.motion;
+        self.poses.push(end);
+        self.odometry.push(edge);
+        self.forget_system();
+        Ok(Verdict {
+            chi_square: 0.0,
+            outcome: Outcome::Accepted,
+        })
+    }
+
+    /// Takes a loop as [`PoseGraph::apply`] does, whose chi-square is known from an earlier [`PoseGraph::test`]: that takes time in
+    /// proportion to the path between the keyframes, and the odometry between them does not change.
+    ///
+    /// # Errors
+    /// As [`PoseGraph::apply`].
+    pub fn apply_tested(
+        &mut self,
+        constraint: &Constraint,
+        chi_square: f64,
+    ) -> Result<Verdict, EstimationError> {
+        let Kind::Loop { group } = constraint.kind else {
+            return self.apply(constraint);
+        };
+        let edge = self.edge(constraint)?;
+        let verdict = self.verdict(chi_square);
         if verdict.outcome == Outcome::Accepted {
-            match constraint.kind {
-                Kind::Odometry => {
-                    self.poses.push(self.poses[from] * motion.motion);
-                    self.odometry.push(edge);
-                }
-                Kind::Loop { group } => self.insert(edge, group, verdict.chi_square),
-            }
-            self.system = None;
-            self.factorised = false;
+            self.insert(edge, group, chi_square);
+            self.forget_system();
         }
         Ok(verdict)
     }
@@ -150,12 +161,15 @@ impl PoseGraph {
     /// # Errors
     /// As [`PoseGraph::apply`].
     pub fn test(&self, constraint: &Constraint) -> Result<Verdict, EstimationError> {
-        constraint.check(self.poses.len())?;
-        let &Constraint {
-            from, to, motion, ..
-        } = constraint;
-        let edge = Edge::new([from, to], motion).ok_or(EstimationError::Covariance { from, to })?;
-        Ok(self.judge(&edge))
+        let edge = self.edge(constraint)?;
+        Ok(self.verdict(self.against_odometry(&edge)))
+    }
+
+    /// Removes all loops. The poses stay where they are until the next solution.
+    pub fn clear_loops(&mut self) {
+        self.loops.clear();
+        self.groups.clear();
+        self.forget_system();
     }
 
     /// Returns the poses of all keyframes, as last solved; those added since continue from there by odometry.
@@ -215,8 +229,23 @@ impl PoseGraph {
             .chain(loops)
     }
 
-    /// Tests a loop against the odometry between its keyframes.
-    fn judge(&self, edge: &Edge) -> Verdict {
+    /// Returns the edge of a constraint that the graph can take.
+    fn edge(&self, constraint: &Constraint) -> Result<Edge, EstimationError> {
+        constraint.check(self.poses.len())?;
+        let &Constraint {
+            from, to, motion, ..
+        } = constraint;
+        Edge::new([from, to], motion).ok_or(EstimationError::Covariance { from, to })
+    }
+
+    /// The system is not that of the present constraints.
+    fn forget_system(&mut self) {
+        self.system = None;
+        self.factorised = false;
+    }
+
+    /// Returns the chi-square of a loop against the odometry between its keyframes.
+    fn against_odometry(&self, edge: &Edge) -> f64 {
         let [from, to] = edge.ends;
         let chain = self.odometry[from.min(to)..from.max(to)]
             .iter()
@@ -231,7 +260,10 @@ impl PoseGraph {
         let jacobian = [relative.by_from, relative.by_to][end];
         let predicted = jacobian * chain.covariance * jacobian.transpose();
         let innovation = relative.innovation(&edge.motion);
-        let chi_square = chi_square(&innovation, &(predicted + edge.motion.covariance));
+        chi_square(&innovation, &(predicted + edge.motion.covariance))
+    }
+
+    fn verdict(&self, chi_square: f64) -> Verdict {
         let outcome = match chi_square <= self.options.gate {
             true => Outcome::Accepted,
             false => Outcome::Rejected,

@@ -42,7 +42,7 @@ header!(CorrectionHeader);
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
 #[type_name("gyre_correction_header_v1")]
 pub struct CorrectionHeader {
-    /// `seq` counts what was read of the logs so far, from 0. `scan` and the times are the newest keyframe's.
+    /// `seq` counts what was read of the logs so far, from 0; their ends count as one. `scan` and the times are the newest keyframe's.
     pub item: Item,
     /// Number of the newest keyframe's scan in the run.
     pub keyframe_seq: u64,

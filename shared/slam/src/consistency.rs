@@ -3,7 +3,7 @@
 //! Odometry over a long path is so uncertain that a wrong loop can pass its gate, and one that is taken bends the whole trajectory. But two
 //! loops and the odometry between their ends make a cycle, and odometry between the ends of two loops of one drive is mostly short.
 
-use std::{cmp::Reverse, collections::BTreeMap};
+use std::cmp::Reverse;
 
 use gyre_estimation::{CHI_SQUARE_99_9, Constraint};
 use gyre_geometry::{Pose, UncertainMotion, covariance::lever};
@@ -11,7 +11,7 @@ use nalgebra::Matrix3;
 
 /// A loop is consistent with a set if it agrees with this share of it.
 const MOST: f64 = 0.9;
-/// Loops that the others are compared with, at most.
+/// Loops that speak for all, at most.
 const SPEAKERS: usize = 256;
 
 /// The odometry between any two keyframes.
@@ -66,45 +66,43 @@ impl DeadReckoning {
     }
 }
 
-/// Returns for each loop whether it is consistent with most of the others.
-///
-/// Some loops, evenly chosen, speak for all. They are taken in the order of how many others each agrees with, if it agrees with most of
-/// those taken. The loops must be in an order that does not depend on when they came.
-pub fn consistent(odometry: &DeadReckoning, loops: &[Constraint]) -> Vec<bool> {
-    let mut taken: Vec<usize> = Vec::new();
-    for speaker in speakers(odometry, loops) {
-        if agrees_with_most(odometry, loops, speaker, &taken) {
-            taken.push(speaker);
+/// Some of the loops, which agree with each other and speak for all.
+#[derive(Default)]
+pub struct Speakers(Vec<Constraint>);
+
+impl Speakers {
+    /// Chooses among loops, evenly: in the order of how many others each agrees with, those that agree with most of those chosen before.
+    /// The loops must be in an order that does not depend on when they came.
+    pub fn choose(odometry: &DeadReckoning, loops: &[Constraint]) -> Self {
+        let mut chosen = Self::default();
+        for speaker in by_agreement(odometry, loops) {
+            if chosen.accept(odometry, speaker) {
+                chosen.0.push(*speaker);
+            }
         }
+        chosen
     }
-    (0..loops.len())
-        .map(|one| agrees_with_most(odometry, loops, one, &taken))
-        .collect()
+
+    /// Returns whether a loop is consistent with most of them.
+    pub fn accept(&self, odometry: &DeadReckoning, one: &Constraint) -> bool {
+        let agrees = |other: &&Constraint| *other == one || odometry.agree(other, one);
+        self.0.iter().filter(agrees).count() as f64 >= MOST * self.0.len() as f64
+    }
 }
 
-/// Loops that speak for all, that which agrees with most others first.
-fn speakers(odometry: &DeadReckoning, loops: &[Constraint]) -> Vec<usize> {
+/// Some loops, evenly chosen, that which agrees with most others first.
+fn by_agreement<'a>(odometry: &DeadReckoning, loops: &'a [Constraint]) -> Vec<&'a Constraint> {
     let step = loops.len().div_ceil(SPEAKERS).max(1);
-    let mut speakers: Vec<usize> = (0..loops.len()).step_by(step).collect();
+    let some: Vec<&Constraint> = loops.iter().step_by(step).collect();
     let agreeing = |one: usize| {
-        let others = speakers.iter().filter(|other| **other != one);
+        let others = some.iter().enumerate().filter(|(other, _)| *other != one);
         others
-            .filter(|other| odometry.agree(&loops[**other], &loops[one]))
+            .filter(|(_, other)| odometry.agree(other, some[one]))
             .count()
     };
-    let counts: BTreeMap<usize, usize> = speakers.iter().map(|&one| (one, agreeing(one))).collect();
-    speakers.sort_by_key(|one| Reverse(counts[one]));
-    speakers
-}
-
-fn agrees_with_most(
-    odometry: &DeadReckoning,
-    loops: &[Constraint],
-    one: usize,
-    taken: &[usize],
-) -> bool {
-    let agreeing = taken
-        .iter()
-        .filter(|other| **other == one || odometry.agree(&loops[**other], &loops[one]));
-    agreeing.count() as f64 >= MOST * taken.len() as f64
+    let mut order: Vec<(usize, &Constraint)> = (0..some.len())
+        .map(|one| (agreeing(one), some[one]))
+        .collect();
+    order.sort_by_key(|(agreeing, _)| Reverse(*agreeing));
+    order.into_iter().map(|(_, one)| one).collect()
 }

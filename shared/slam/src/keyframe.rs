@@ -2,9 +2,9 @@
 
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{SparsePoint, Twist, UncertainMotion, covariance, pose, xy_yaw};
-use gyre_storage::LogMagic;
+use gyre_storage::{LogError, LogMagic};
 
-use crate::Record;
+use crate::{Record, RecordReader};
 
 /// A scan whose pose is estimated, with all that loop closing and mapping need of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -96,23 +96,40 @@ impl Record for Keyframe {
     }
 }
 
+impl RecordReader<Keyframe> {
+    /// Reads a keyframe without its points, which are a hundred times the rest. Its bytes are not checked: the checksum is that of the
+    /// whole record.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is damaged at the header of the record, or has something else there.
+    ///
+    /// # Panics
+    /// There are no more than `index` keyframes.
+    pub fn read_without_points(&mut self, index: usize) -> Result<Keyframe, LogError> {
+        self.read_start(index, size_of::<Fixed>())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::RecordLog;
 
-    #[test]
-    fn a_keyframe_is_decoded_as_it_was_encoded() {
-        let uncertain = UncertainMotion {
+    fn uncertain() -> UncertainMotion {
+        UncertainMotion {
             motion: pose(3.0, -4.0, 0.5),
             covariance: nalgebra::Matrix3::new(4.0, 0.1, 0.2, 0.1, 5.0, 0.3, 0.2, 0.3, 6.0),
-        };
-        let keyframe = Keyframe {
+        }
+    }
+
+    fn keyframe() -> Keyframe {
+        Keyframe {
             seq: 7,
             scan: 9,
             stamp_ns: -5,
-            pose: uncertain,
-            motion: uncertain,
+            pose: uncertain(),
+            motion: uncertain(),
             twist: Twist {
                 vx_mps: 10.0,
                 vy_mps: 0.1,
@@ -120,7 +137,30 @@ mod tests {
             },
             path_m: 12.5,
             points: vec![SparsePoint::from([1.0, 2.0, 0.1, 0.5, 0.04]); 3],
-        };
+        }
+    }
+
+    #[test]
+    fn a_keyframe_is_read_without_its_points() {
+        let out = tempfile::tempdir().unwrap();
+        let mut log = RecordLog::open(out.path()).unwrap();
+        (0..3).for_each(|_| log.append(&keyframe()).unwrap());
+        let mut reader = RecordReader::<Keyframe>::open(out.path()).unwrap();
+        let whole = reader.read(1).unwrap();
+        let without_points = reader.read_without_points(1).unwrap();
+        assert_eq!(whole.points.len(), 3);
+        assert_eq!(
+            without_points,
+            Keyframe {
+                points: Vec::new(),
+                ..whole
+            }
+        );
+    }
+
+    #[test]
+    fn a_keyframe_is_decoded_as_it_was_encoded() {
+        let (uncertain, keyframe) = (uncertain(), keyframe());
         let mut bytes = Vec::new();
         keyframe.encode(&mut bytes);
         let decoded = Keyframe::decode(&bytes).unwrap();

@@ -193,6 +193,12 @@ impl<R: Record> RecordReader<R> {
         self.log.read(index, &mut self.buffer)?;
         R::decode(&self.buffer).ok_or_else(|| self.log.malformed(index))
     }
+
+    /// Decodes the first `length` bytes of a record, which are not checked.
+    pub(crate) fn read_start(&mut self, index: usize, length: usize) -> Result<R, LogError> {
+        self.log.read_start(index, length, &mut self.buffer)?;
+        R::decode(&self.buffer).ok_or_else(|| self.log.malformed(index))
+    }
 }
 
 #[cfg(test)]

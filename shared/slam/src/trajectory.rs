@@ -1,13 +1,16 @@
 //! The poses of keyframes, estimated from odometry and loops.
 
 use gyre_estimation::{
-    Constraint, EstimationError, FilterOptions, GraphOptions, Kind, Outcome, PoseGraph,
-    TrajectoryFilter, Verdict,
+    CHI_SQUARE_99_9, Constraint, EstimationError, FilterOptions, GraphOptions, Kind, Outcome,
+    PoseGraph, TrajectoryFilter, Verdict,
 };
 use gyre_geometry::{Pose, UncertainMotion};
 
-use crate::consistency::{DeadReckoning, consistent};
+use crate::consistency::{DeadReckoning, Speakers};
 use crate::{Correction, Keyframe, Query};
+
+/// All loops are judged anew when their number has grown by this share of it: that takes time in proportion to it.
+const GROWTH: usize = 8;
 
 /// The estimator of the poses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -55,21 +58,45 @@ pub enum LoopVerdict {
 pub struct JudgedLoop {
     /// The loop, from the earlier to the later keyframe, in its group.
     pub constraint: Constraint,
+    /// Chi-square against the odometry between its keyframes; 0 in the filter, which tests against the estimate.
+    pub chi_square: f64,
     /// The verdict.
     pub verdict: LoopVerdict,
     /// The kernel's weight in the graph, 0 to 1; 0 if the loop is not used.
     pub weight: f64,
+    /// Whether the standing estimate is made with it.
+    is_taken: bool,
+}
+
+impl JudgedLoop {
+    /// Judges the loop by its test against the odometry alone.
+    fn judge_by_odometry(&mut self) {
+        self.verdict = match self.chi_square <= CHI_SQUARE_99_9 {
+            true => LoopVerdict::Used,
+            false => LoopVerdict::ContradictsOdometry,
+        };
+    }
+
+    fn is_used(&self) -> bool {
+        self.verdict == LoopVerdict::Used
+    }
 }
 
 /// Estimates the poses of all keyframes from their motions and loops.
 ///
-/// The result is a function of the keyframes and of the set of loops, and not of when loops came: [`TrajectoryEstimator::solve`] begins
-/// anew.
+/// - [`TrajectoryEstimator::solve`] begins anew. Its result is a function of the keyframes and of the set of loops, and not of when
+///   loops came.
+/// - [`TrajectoryEstimator::update`] takes new loops into the standing estimate, in a fraction of the time. Its result may depend a
+///   little on when loops came.
 pub struct TrajectoryEstimator {
     options: TrajectoryOptions,
     keyframes: Vec<Corrected>,
     odometry: DeadReckoning,
+    /// By the later keyframe, then by the earlier one.
     loops: Vec<JudgedLoop>,
+    /// The loops that the others were compared with when all were judged, and the number of loops at that time.
+    speakers: Speakers,
+    judged: usize,
     estimator: Estimator,
 }
 
@@ -104,6 +131,17 @@ impl Estimator {
             Self::Filter(filter) => filter.apply(constraint),
         }
     }
+
+    /// Takes a loop, and notes the verdict.
+    fn take(&mut self, it: &mut JudgedLoop) -> Result<(), EstimationError> {
+        (it.verdict, it.weight) = match self.apply(&it.constraint)?.outcome {
+            Outcome::Accepted => (LoopVerdict::Used, 1.0),
+            Outcome::Rejected => (LoopVerdict::ContradictsOdometry, 0.0),
+            Outcome::Redundant => (LoopVerdict::Redundant, 0.0),
+        };
+        it.is_taken = true;
+        Ok(())
+    }
 }
 
 impl TrajectoryEstimator {
@@ -115,6 +153,8 @@ impl TrajectoryEstimator {
             keyframes: Vec::new(),
             odometry: DeadReckoning::default(),
             loops: Vec::new(),
+            speakers: Speakers::default(),
+            judged: 0,
         }
     }
 
@@ -143,14 +183,14 @@ impl TrajectoryEstimator {
         Ok(())
     }
 
-    /// Takes the accepted loops of a keyframe, for the next solution.
+    /// Takes the accepted loops of a keyframe, for the next solution. They were tested against the same odometry.
     ///
     /// # Errors
     /// Keyframes that were not pushed.
     pub fn close(&mut self, query: &Query) -> Result<(), EstimationError> {
         query
             .loops()
-            .try_for_each(|(_, closing)| self.close_loop(&closing))
+            .try_for_each(|(candidate, closing)| self.insert(&closing, candidate.chi_square))
     }
 
     /// Takes a loop from an earlier to a later keyframe, for the next solution. Its group is decided by its keyframes.
@@ -158,27 +198,11 @@ impl TrajectoryEstimator {
     /// # Errors
     /// Keyframes that were not pushed.
     pub fn close_loop(&mut self, closing: &Constraint) -> Result<(), EstimationError> {
-        let &Constraint { from, to, .. } = closing;
-        let keyframes = self.keyframes.len();
-        if from.max(to) >= keyframes {
-            return Err(EstimationError::UnknownKeyframe {
-                from,
-                to,
-                keyframes,
-            });
-        }
-        let stretch =
-            |keyframe: usize| (self.keyframes[keyframe].path_m / self.options.group_m) as u64;
-        let group = Some(stretch(from) << 32 | stretch(to));
-        self.loops.push(JudgedLoop {
-            constraint: Constraint {
-                kind: Kind::Loop { group },
-                ..*closing
-            },
-            verdict: LoopVerdict::Used,
-            weight: 1.0,
-        });
-        Ok(())
+        let chi_square = match &self.estimator {
+            Estimator::Graph(graph) => graph.test(closing)?.chi_square,
+            Estimator::Filter(_) => 0.0,
+        };
+        self.insert(closing, chi_square)
     }
 
     /// Moves all poses to where they fit best, and judges all loops anew.
@@ -186,11 +210,24 @@ impl TrajectoryEstimator {
     /// # Errors
     /// The equations have no solution.
     pub fn solve(&mut self) -> Result<(), EstimationError> {
-        let by_keyframes = |it: &JudgedLoop| (it.constraint.to, it.constraint.from);
-        self.loops.sort_by_key(by_keyframes);
         match self.options.kind {
-            EstimatorKind::Graph => self.solve_graph(),
+            EstimatorKind::Graph => {
+                self.judge_all();
+                self.solve_graph()
+            }
             EstimatorKind::Filter => self.filter(),
+        }
+    }
+
+    /// Judges the loops that came since the last solution, and moves all poses from where they are to where they fit best. All loops are
+    /// judged anew from time to time, and if one was wrong the poses begin at the odometry.
+    ///
+    /// # Errors
+    /// The equations have no solution.
+    pub fn update(&mut self) -> Result<(), EstimationError> {
+        match self.options.kind {
+            EstimatorKind::Graph => self.update_graph(),
+            EstimatorKind::Filter => self.update_filter(),
         }
     }
 
@@ -214,7 +251,7 @@ impl TrajectoryEstimator {
         }
     }
 
-    /// Returns all loops; after [`TrajectoryEstimator::solve`] by the later keyframe, then by the earlier one.
+    /// Returns all loops, by the later keyframe, then by the earlier one.
     pub fn loops(&self) -> &[JudgedLoop] {
         &self.loops
     }
@@ -237,52 +274,112 @@ impl TrajectoryEstimator {
         Estimator::new(start, self.options.kind)
     }
 
-    /// The graph of all keyframes, and of those loops that agree with odometry and with each other.
-    fn solve_graph(&mut self) -> Result<(), EstimationError> {
-        let mut estimator = self.start();
-        let Estimator::Graph(graph) = &mut estimator else {
-            return Ok(());
+    fn insert(&mut self, closing: &Constraint, chi_square: f64) -> Result<(), EstimationError> {
+        let &Constraint { from, to, .. } = closing;
+        let keyframes = self.keyframes.len();
+        if from.max(to) >= keyframes {
+            return Err(EstimationError::UnknownKeyframe {
+                from,
+                to,
+                keyframes,
+            });
+        }
+        let stretch =
+            |keyframe: usize| (self.keyframes[keyframe].path_m / self.options.group_m) as u64;
+        let group = Some(stretch(from) << 32 | stretch(to));
+        let mut judged = JudgedLoop {
+            constraint: Constraint {
+                kind: Kind::Loop { group },
+                ..*closing
+            },
+            chi_square,
+            verdict: LoopVerdict::Used,
+            weight: 0.0,
+            is_taken: false,
         };
-        for motion in self.odometry() {
-            graph.apply(&motion)?;
-        }
-        for it in &mut self.loops {
-            it.verdict = match graph.test(&it.constraint)?.outcome {
-                Outcome::Rejected => LoopVerdict::ContradictsOdometry,
-                Outcome::Accepted | Outcome::Redundant => LoopVerdict::Used,
-            };
-        }
-        self.reject_inconsistent();
-        for it in used(&mut self.loops) {
-            graph.apply(&it.constraint)?;
-        }
-        graph.solve_anew()?;
-        self.weigh(&estimator);
-        self.estimator = estimator;
+        judged.judge_by_odometry();
+        let is_before = |it: &JudgedLoop| (it.constraint.to, it.constraint.from) <= (to, from);
+        let place = self.loops.partition_point(is_before);
+        self.loops.insert(place, judged);
         Ok(())
     }
 
-    /// Notes the kernel's weights, which the graph returns by the earlier keyframe, then by the later one.
-    fn weigh(&mut self, estimator: &Estimator) {
-        let Estimator::Graph(graph) = estimator else {
-            return;
-        };
-        self.loops.iter_mut().for_each(|it| it.weight = 0.0);
-        let mut used = used(&mut self.loops);
-        used.sort_by_key(|it| (it.constraint.from, it.constraint.to));
-        for (it, weighted) in used.iter_mut().zip(graph.loops()) {
-            it.weight = weighted.weight;
+    /// Judges all loops: by the odometry, then by each other.
+    fn judge_all(&mut self) {
+        self.loops
+            .iter_mut()
+            .for_each(JudgedLoop::judge_by_odometry);
+        let used = self.loops.iter().filter(|it| it.is_used());
+        let used: Vec<Constraint> = used.map(|it| it.constraint).collect();
+        self.speakers = Speakers::choose(&self.odometry, &used);
+        self.judged = self.loops.len();
+        self.compare(|it| it.is_used());
+    }
+
+    /// Compares some of the loops with those that speak for all.
+    fn compare(&mut self, some: impl Fn(&JudgedLoop) -> bool) {
+        for it in self.loops.iter_mut().filter(|it| some(it)) {
+            if !self.speakers.accept(&self.odometry, &it.constraint) {
+                it.verdict = LoopVerdict::ContradictsLoops;
+            }
         }
     }
 
-    fn reject_inconsistent(&mut self) {
-        let mut used = used(&mut self.loops);
-        let constraints: Vec<Constraint> = used.iter().map(|it| it.constraint).collect();
-        let consistent = consistent(&self.odometry, &constraints);
-        for (it, consistent) in used.iter_mut().zip(consistent) {
-            if !consistent {
-                it.verdict = LoopVerdict::ContradictsLoops;
+    /// Solves the graph with all loops that are used, from the odometry.
+    fn solve_graph(&mut self) -> Result<(), EstimationError> {
+        let Estimator::Graph(graph) = &mut self.estimator else {
+            return Ok(());
+        };
+        graph.clear_loops();
+        for it in &mut self.loops {
+            it.is_taken = it.is_used();
+            if it.is_taken {
+                graph.apply_tested(&it.constraint, it.chi_square)?;
             }
+        }
+        graph.solve_anew()?;
+        self.weigh();
+        Ok(())
+    }
+
+    /// Solves the graph with the loops that are new and used, from the standing poses.
+    fn update_graph(&mut self) -> Result<(), EstimationError> {
+        match self.loops.len() > self.judged + self.judged / GROWTH {
+            true => self.judge_all(),
+            false => self.compare(|it| it.is_used() && !it.is_taken),
+        }
+        let standing = self.loops.iter().filter(|it| it.is_taken).count();
+        let new = |it: &&mut JudgedLoop| it.is_used() && !it.is_taken;
+        let is_withdrawn = self.loops.iter().any(|it| it.is_taken && !it.is_used());
+        if is_withdrawn || self.loops.iter_mut().filter(new).count() > standing {
+            return self.solve_graph();
+        }
+        let Estimator::Graph(graph) = &mut self.estimator else {
+            return Ok(());
+        };
+        for it in self.loops.iter_mut().filter(new) {
+            graph.apply_tested(&it.constraint, it.chi_square)?;
+            it.is_taken = true;
+        }
+        graph.solve()?;
+        self.weigh();
+        Ok(())
+    }
+
+    /// Notes the kernel's weights of the loops that are used.
+    fn weigh(&mut self) {
+        let Estimator::Graph(graph) = &self.estimator else {
+            return;
+        };
+        let mut weights: Vec<_> = graph
+            .loops()
+            .map(|it| ((it.to, it.from), it.weight))
+            .collect();
+        weights.sort_by_key(|(ends, _)| *ends);
+        self.loops.iter_mut().for_each(|it| it.weight = 0.0);
+        let used = self.loops.iter_mut().filter(|it| it.is_used());
+        for (it, (_, weight)) in used.zip(weights) {
+            it.weight = weight;
         }
     }
 
@@ -295,20 +392,19 @@ impl TrajectoryEstimator {
                 estimator.apply(&Constraint::odometry(last, keyframe.motion))?;
             }
             while let Some(it) = loops.next_if(|it| it.constraint.to == number) {
-                let outcome = estimator.apply(&it.constraint)?.outcome;
-                (it.verdict, it.weight) = match outcome {
-                    Outcome::Accepted => (LoopVerdict::Used, 1.0),
-                    Outcome::Rejected => (LoopVerdict::ContradictsOdometry, 0.0),
-                    Outcome::Redundant => (LoopVerdict::Redundant, 0.0),
-                };
+                estimator.take(it)?;
             }
         }
         self.estimator = estimator;
         Ok(())
     }
-}
 
-fn used(loops: &mut [JudgedLoop]) -> Vec<&mut JudgedLoop> {
-    let used = |it: &&mut JudgedLoop| it.verdict == LoopVerdict::Used;
-    loops.iter_mut().filter(used).collect()
+    /// Takes the new loops into the standing filter.
+    fn update_filter(&mut self) -> Result<(), EstimationError> {
+        let new = self.loops.iter_mut().filter(|it| !it.is_taken);
+        for it in new {
+            self.estimator.take(it)?;
+        }
+        Ok(())
+    }
 }

@@ -52,7 +52,7 @@ fn wrong(drive: &Drive, length: usize) -> Vec<Constraint> {
     loops
 }
 
-fn estimate(drive: &Drive, loops: &[Constraint], kind: EstimatorKind) -> TrajectoryEstimator {
+fn odometry(drive: &Drive, kind: EstimatorKind) -> TrajectoryEstimator {
     let options = TrajectoryOptions {
         kind,
         ..TrajectoryOptions::default()
@@ -62,6 +62,34 @@ fn estimate(drive: &Drive, loops: &[Constraint], kind: EstimatorKind) -> Traject
         .keyframes
         .iter()
         .for_each(|it| estimator.push(it).unwrap());
+    estimator
+}
+
+/// Takes the loops one by one.
+fn update(drive: &Drive, loops: &[Constraint], kind: EstimatorKind) -> TrajectoryEstimator {
+    let mut estimator = odometry(drive, kind);
+    for it in loops {
+        estimator.close_loop(it).unwrap();
+        estimator.update().unwrap();
+    }
+    estimator
+}
+
+fn used(estimator: &TrajectoryEstimator) -> Vec<[usize; 2]> {
+    let used = |it: &&JudgedLoop| it.verdict == LoopVerdict::Used;
+    let used = estimator.loops().iter().filter(used);
+    used.map(|it| [it.constraint.to, it.constraint.from])
+        .collect()
+}
+
+fn farthest_m(a: &[Pose], b: &[Pose]) -> f64 {
+    let apart = a.iter().zip(b);
+    let apart = apart.map(|(a, b)| (a.translation.vector - b.translation.vector).norm());
+    apart.fold(0.0, f64::max)
+}
+
+fn estimate(drive: &Drive, loops: &[Constraint], kind: EstimatorKind) -> TrajectoryEstimator {
+    let mut estimator = odometry(drive, kind);
     loops
         .iter()
         .for_each(|it| estimator.close_loop(it).unwrap());
@@ -121,6 +149,50 @@ fn the_result_does_not_depend_on_the_order_of_the_loops() {
         let estimator = estimate(&drive, &loops, kind);
         assert_eq!(estimator.poses(), poses);
     }
+}
+
+#[test]
+fn loops_taken_one_by_one_lead_where_all_at_once_do() {
+    let drive = uncertain();
+    let mut loops: Vec<_> = right(&drive).into_iter().chain(wrong(&drive, 1)).collect();
+    loops.sort_by_key(|it| it.to);
+    let all = estimate(&drive, &loops, EstimatorKind::Graph);
+    let mut updated = update(&drive, &loops, EstimatorKind::Graph);
+    assert_eq!(used(&updated), used(&all));
+    let apart_m = farthest_m(updated.poses(), all.poses());
+    assert!(apart_m < 0.005, "{apart_m} m");
+    updated.solve().unwrap();
+    assert_eq!(updated.poses(), all.poses());
+}
+
+#[test]
+fn wrong_loops_that_came_first_are_withdrawn() {
+    let drive = uncertain();
+    let (wrong, right) = (wrong(&drive, 10), right(&drive));
+    // A run of them that agrees with odometry.
+    let mut runs = wrong
+        .chunks(10)
+        .map(|run| (run, update(&drive, run, EstimatorKind::Graph)));
+    let (wrong, mut updated) = runs.find(|(_, it)| used(it).len() == 10).unwrap();
+    for it in &right {
+        updated.close_loop(it).unwrap();
+        updated.update().unwrap();
+    }
+    let all: Vec<_> = right.iter().chain(wrong).copied().collect();
+    let all = estimate(&drive, &all, EstimatorKind::Graph);
+    assert_eq!(used(&updated), used(&all));
+    let apart_m = farthest_m(updated.poses(), all.poses());
+    assert!(apart_m < 0.005, "{apart_m} m");
+}
+
+#[test]
+fn the_filter_takes_loops_one_by_one() {
+    let drive = Drive::new(KEYFRAMES, 8);
+    let right = right(&drive);
+    let all = estimate(&drive, &right, EstimatorKind::Filter);
+    let updated = update(&drive, &right, EstimatorKind::Filter);
+    let apart_m = farthest_m(updated.poses(), all.poses());
+    assert!(apart_m < 0.02, "{apart_m} m");
 }
 
 #[test]

@@ -64,4 +64,21 @@ impl LogReader {
     pub fn malformed(&self, index: usize) -> LogError {
         self.records.malformed(index)
     }
+
+    /// Reads at most `length` bytes of the start of a record, which replace the content of `bytes`. They are not checked: the checksum
+    /// is that of the whole record.
+    ///
+    /// # Errors
+    /// [`LogError::Damaged`] if the header of the record is, or a file that cannot be read.
+    ///
+    /// # Panics
+    /// There are no more than `index` records.
+    pub fn read_start(
+        &self,
+        index: usize,
+        length: usize,
+        bytes: &mut Vec<u8>,
+    ) -> Result<(), LogError> {
+        self.records.read_start(index, length, bytes)
+    }
 }

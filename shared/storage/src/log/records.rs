@@ -260,6 +260,21 @@ impl Records {
         }
     }
 
+    pub fn read_start(
+        &self,
+        index: usize,
+        length: usize,
+        bytes: &mut Vec<u8>,
+    ) -> Result<(), LogError> {
+        let start = self.start(index);
+        let length = length.min(self.places[index].length as usize);
+        bytes.resize(HEADER + length, 0);
+        let whole = self.read_some(bytes, start)? == bytes.len();
+        let header = Header::decode(bytes).filter(|header| whole && header.index == index as u64);
+        bytes.drain(..HEADER);
+        header.map(drop).ok_or_else(|| self.damaged(index))
+    }
+
     fn header_at(&self, offset: u64) -> Result<Option<Header>, StorageError> {
         let mut bytes = [0; HEADER];
         let whole = self.read_some(&mut bytes, offset)? == HEADER;

@@ -137,6 +137,20 @@ fn a_damaged_record_in_the_middle_is_refused_with_its_number() {
 }
 
 #[test]
+fn the_start_of_a_record_is_read_as_it_was_written() {
+    let (_folder, path) = log_of(50);
+    let reader = LogReader::open(&path, MAGIC).unwrap();
+    let mut bytes = Vec::new();
+    for (index, length) in [(0, 8), (7, 0), (7, 5), (7, 7), (39, 12), (39, 1000)] {
+        reader.read_start(index, length, &mut bytes).unwrap();
+        assert_eq!(bytes, record(index)[..length.min(index % 40)]);
+    }
+    corrupt(&path, 7, 3);
+    let error = reader.read_start(7, 5, &mut bytes).unwrap_err();
+    assert!(error.to_string().contains("damaged at record 7"), "{error}");
+}
+
+#[test]
 fn a_reader_sees_records_while_they_are_appended_and_cut_off() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("test.log");
