@@ -3,8 +3,11 @@
 
 use std::path::Path;
 
-use crate::common::{Run, odometry};
+use gyre_geometry::Pose;
+use gyre_radar::read_trajectory;
 use serde_json::Value;
+
+use crate::common::{Run, odometry};
 
 const SCANS: usize = 60;
 /// Measured over some 200 m each: 0.7, 0.7 and 0.5 m off by the shipped configuration, 12.4, 10.3 and 2.9 m by the paper's.
@@ -54,4 +57,23 @@ fn the_shipped_configuration_ends_within_a_hundredth_and_the_papers_does_not_com
         papers_m > 3.0 * shipped_m,
         "{papers_m} m in sum by the paper's, {shipped_m} m by the shipped one"
     );
+}
+
+/// The error of the last pose of `estimate` in m, first poses aligned.
+fn end_error_m(estimate: &Path, truth: &Path) -> f64 {
+    let [estimate, truth] = [estimate, truth].map(|path| read_trajectory(path).unwrap().poses);
+    let motion = |poses: &[Pose]| poses[0].inv_mul(&poses[poses.len() - 1]);
+    let apart = motion(&estimate).translation.vector - motion(&truth).translation.vector;
+    apart.norm()
+}
+
+#[test]
+fn a_closed_loop_lowers_the_final_error_to_a_fifth() {
+    let configs = Path::new(crate::PROJECT).join("configs");
+    let run = Run::of_file(&configs.join("k2pi-loop.toml")).rate("max");
+    run.complete();
+    let [odometry_m, corrected_m] = ["trajectory.tum", "trajectory_slam.tum"]
+        .map(|file| end_error_m(&run.out().join(file), &run.out().join("ground_truth.tum")));
+    println!("odometry {odometry_m:.2} m, corrected {corrected_m:.2} m");
+    assert!(odometry_m > 2.0 && corrected_m < 0.2 * odometry_m);
 }
