@@ -15,10 +15,12 @@ const STAGES: [&str; 5] = [
 ];
 const SCANS: usize = 64;
 
-/// The demo with another search.
+/// The demo with another search, and nobody who follows it.
 fn demo() -> Run {
     let demo = Path::new(crate::PROJECT).join("configs/demo.toml");
-    Run::of_file(&demo).set("search.kind=exhaustive")
+    Run::of_file(&demo)
+        .set("search.kind=exhaustive")
+        .set("slam.kind=none")
 }
 
 #[test]
