@@ -21,6 +21,12 @@ const PROJECTED_CRS: u16 = 3072;
 const LINEAR_UNITS: u16 = 3076;
 const METRE: u16 = 9001;
 const LOCAL: &str = "Gyre map frame|";
+/// The tag in which GDAL keeps the names of bands, and these.
+const GDAL_METADATA: Tag = Tag::Unknown(42_112);
+const BANDS: &str = "<GDALMetadata>\
+    <Item name=\"DESCRIPTION\" sample=\"0\" role=\"description\">evidence</Item>\
+    <Item name=\"DESCRIPTION\" sample=\"1\" role=\"description\">looked</Item>\
+    </GDALMetadata>";
 
 /// Writes the map as one GeoTIFF of two bands: evidence, and how often a cell was looked at as opacity (see [`Cell`](crate::Cell)). With
 /// an origin it is in the UTM zone of that, turned by the heading; without, in metres of the map frame.
@@ -55,6 +61,7 @@ pub fn write_geotiff(
         .map_err(failed)?;
     tags.write_tag(Tag::GeoKeyDirectoryTag, &keys(&georeference)[..])
         .map_err(failed)?;
+    tags.write_tag(GDAL_METADATA, BANDS).map_err(failed)?;
     if georeference.epsg.is_none() {
         tags.write_tag(Tag::GeoAsciiParamsTag, LOCAL)
             .map_err(failed)?;

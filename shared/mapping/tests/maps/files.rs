@@ -207,6 +207,8 @@ fn a_geotiff_has_the_cells_and_their_place_on_the_earth() {
             .find(|key| key[0] == 3072)
             .map(|key| key[3]);
         assert_eq!(code, epsg);
+        let bands = decoder.get_tag_ascii_string(Tag::Unknown(42_112)).unwrap();
+        assert!(bands.contains(">evidence<") && bands.contains(">looked<"));
         let matrix = decoder
             .get_tag_f64_vec(Tag::ModelTransformationTag)
             .unwrap();
