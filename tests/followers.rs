@@ -110,25 +110,6 @@ fn kill_if_there(running: &Running, name: &str) {
 }
 
 #[test]
-fn a_storm_of_kills_over_all_processes_changes_nothing() {
-    for seed in 0..3 {
-        let mut random = StdRng::seed_from_u64(100 + seed);
-        let run = run();
-        let mut running = run.start();
-        for storm in 1..=3 {
-            running.await_poses_or_end(storm * SCANS / 4);
-            thread::sleep(Duration::from_micros(random.random_range(0..50_000)));
-            let victims = running.stages().into_values();
-            victims
-                .filter(|_| random.random_bool(0.6))
-                .for_each(|pid| send(pid, Signal::KILL));
-        }
-        running.finish().succeeded();
-        assert_undisturbed(&run, &format!("seed {seed}"));
-    }
-}
-
-#[test]
 fn a_stopped_loop_closure_does_not_hold_odometry_back_and_is_waited_for_at_the_end() {
     let run = run();
     let mut running = run.start();
@@ -172,15 +153,42 @@ fn a_run_that_is_interrupted_in_its_middle_goes_on_with_its_loops() {
 }
 
 #[test]
-fn a_follower_that_always_dies_ends_the_run_and_a_new_one_is_undisturbed() {
-    let failing = run()
-        .stage_script(LOOP_CLOSURE, "echo 'no more loops' >&2; exit 7")
-        .set("stages.loop-closure.restart={limit = 2, backoff_ms = 10}");
-    let ended = failing.finish();
-    ended.failed_with(&["loop-closure died 3 times", "exit code 7", "no more loops"]);
-    let run = run().into(failing.out()).option("--fresh");
-    run.complete();
-    assert_undisturbed(&run, "begun anew");
+fn odometry_goes_on_without_a_follower_that_always_dies_and_the_same_command_makes_up_for_it() {
+    for follower in [LOOP_CLOSURE, TRAJECTORY] {
+        let run = run();
+        let broken = run.folder().join("broken");
+        fs::write(&broken, "").unwrap();
+        let script = "[ ! -e {broken} ] || { echo 'no more loops' >&2; exit 7; }; exec {gyre} stage {follower}"
+            .replace("{broken}", broken.to_str().unwrap())
+            .replace("{follower}", follower);
+        let run = run.stage_script(follower, &script).set(&format!(
+            "stages.{follower}.restart={{limit = 2, backoff_ms = 10}}"
+        ));
+        let ended = run.finish();
+        let died = format!("{follower} died 3 times");
+        ended.failed_with(&[&died, "exit code 7", "no more loops", "the same command"]);
+        let goes_on = format!("odometry goes on without {follower}");
+        assert!(ended.stderr.contains(&goes_on), "{}", ended.stderr);
+        assert!(run.odometry() == undisturbed().odometry);
+        fs::remove_file(broken).unwrap();
+        run.complete();
+        assert_undisturbed(&run, follower);
+    }
+}
+
+#[test]
+fn a_follower_that_hangs_is_restarted_when_the_run_waits_for_it() {
+    for follower in [LOOP_CLOSURE, TRAJECTORY] {
+        let run = run().set("run.stall_timeout_s=3");
+        let mut running = run.start();
+        send(running.await_stage(follower), Signal::STOP);
+        let ended = running.finish();
+        ended.succeeded();
+        let sentence = format!("{follower} has made no progress for 3s");
+        assert!(ended.stderr.contains(&sentence), "{}", ended.stderr);
+        assert_undisturbed(&run, follower);
+        assert!(restarts(&run, follower) > 0);
+    }
 }
 
 #[test]

@@ -13,6 +13,7 @@ mod comparison;
 mod correlation;
 mod grid;
 mod histogram;
+mod sample;
 mod statistics;
 mod subject;
 #[cfg(test)]

@@ -4,7 +4,7 @@ use gyre_geometry::{Pose, Twist};
 use gyre_radar::{RasterConfig, RasterError, Rasteriser, Sampling};
 use ndarray::{Array2, s};
 
-use super::statistics::Sample;
+use super::sample::Sample;
 
 /// Cells of the rasters in which consecutive scans are compared, m.
 const CELL_M: f32 = 0.4;

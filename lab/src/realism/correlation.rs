@@ -2,7 +2,7 @@
 //!
 //! Sums of powers and of their products are whole numbers: nothing is lost, whatever the order.
 
-use super::{grid::RangeGrid, statistics::Sample};
+use super::{grid::RangeGrid, sample::Sample};
 
 /// Longest lag in range, m.
 const RANGE_LAG_M: f32 = 12.0;

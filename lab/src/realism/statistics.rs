@@ -1,8 +1,7 @@
 //! Statistics of the scans of a recording.
 
-use gyre_geometry::Pose;
 use gyre_masking::MaskingConfig;
-use gyre_radar::{OwnedScan, RasterError};
+use gyre_radar::RasterError;
 use serde_json::json;
 
 use super::{
@@ -10,6 +9,7 @@ use super::{
     correlation::{in_azimuth, in_range, lag_at_half, mean_power},
     grid::RangeGrid,
     histogram::Histogram,
+    sample::Sample,
 };
 use crate::report::{Record, record};
 
@@ -18,14 +18,6 @@ use crate::report::{Record, record};
 const SATURATED_LEVELS: u8 = 4;
 /// Half of the range over which the power at a range is averaged, m: single cells are noisy.
 const AROUND_M: f64 = 0.5;
-
-/// A scan to be measured.
-pub struct Sample {
-    /// The scan on the common grid.
-    pub scan: OwnedScan,
-    /// Its pose in the frame of the sample before it, if that is the scan before it in the recording and the motion is known.
-    pub motion: Option<Pose>,
-}
 
 /// Statistics of the scans of a recording.
 #[derive(Clone, Debug)]

@@ -9,7 +9,8 @@ use gyre_radar::{DatasetOptions, OwnedScan, SweepGeometry};
 use super::{
     grid::{RangeGrid, resample},
     histogram::Histogram,
-    statistics::{Sample, Statistics},
+    sample::Sample,
+    statistics::Statistics,
 };
 use crate::{
     cli::RealismArguments,

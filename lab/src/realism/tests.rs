@@ -9,7 +9,8 @@ mod texture;
 use super::{
     grid::{RangeGrid, resample},
     histogram::Histogram,
-    statistics::{Sample, Statistics},
+    sample::Sample,
+    statistics::Statistics,
 };
 use gyre_radar::{OwnedScan, ScanLimits, Sense, SweepGeometry};
 use nalgebra::{Isometry2, Point2};

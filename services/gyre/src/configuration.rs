@@ -67,7 +67,8 @@ pub struct RunConfig {
     pub observers: usize,
     /// Time for which a published scan may lack its pose, or the source a scan that is due, s; 0: no
     /// limit. Then stages are restarted: first the source if it is late, else all but a live source;
-    /// if that does not help, all; if that does not help either, the run ends.
+    /// if that does not help, all; if that does not help either, the run ends. With SLAM also the time
+    /// in which a follower that the run waits for at its end must make progress; else it is restarted.
     pub stall_timeout_s: f64,
     /// Time for a stage to open its topics after its start, s; 0: no limit. A stage that takes longer,
     /// as one that cannot load its model, is treated as a stall.

@@ -59,6 +59,9 @@ impl Progress {
             }
             Event::Restarted { all: false } => self.say("restarted it"),
             Event::Restarted { all: true } => self.say("restarted all stages from the journal"),
+            Event::GaveUp { follower, error } => {
+                self.say(&format!("{error}: odometry goes on without {follower}"));
+            }
             Event::Stalled(stall) => self.say(&stall.to_string()),
             Event::Following { follower, progress } => self.following(follower, *progress),
         }

@@ -10,11 +10,11 @@ use std::{thread, time::Duration};
 
 use gyre_messages::{Header, Item, Message, flag};
 
+pub use crate::log_id::LogId;
 use crate::{
     Launch, Listener, StageCounters, StageError, allocations, clock, services, wake, writer::Writer,
 };
-pub(crate) use growth::LOGS;
-pub use growth::{Growth, LogId};
+pub use growth::Growth;
 use progress::ProgressWriter;
 pub(crate) use progress::is_done;
 pub use progress::{Progress, read as progress_of};

@@ -28,6 +28,7 @@ pub mod follower;
 pub mod inputs;
 pub mod launch;
 pub mod lock;
+mod log_id;
 pub mod observer;
 pub mod reader;
 mod reservation;

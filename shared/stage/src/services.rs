@@ -10,7 +10,7 @@ use iceoryx2::{
     service::port_factory::{PortFactory, event, publish_subscribe},
 };
 
-use crate::{StageError, follower};
+use crate::{StageError, log_id::LOGS};
 
 pub(crate) type Ipc = ipc::Service;
 pub(crate) type Node = iceoryx2::node::Node<Ipc>;
@@ -76,7 +76,7 @@ impl Services {
                 notifiers: 1,
                 nodes: Pose::sizes(window).nodes(),
             };
-            for log in follower::LOGS {
+            for log in LOGS {
                 events.push(create_event(node, log.event(), sizes)?);
             }
         }

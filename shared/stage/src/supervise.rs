@@ -6,6 +6,7 @@
 
 mod child;
 mod clean;
+mod end;
 mod follow;
 mod guardian;
 mod log;
@@ -33,6 +34,7 @@ use crate::{
 };
 use child::Child;
 use guardian::Guardian;
+use start::Starter;
 use watchdog::{Starting, Watchdog};
 
 pub use child::Death;
@@ -76,6 +78,8 @@ struct Supervisor<'a> {
     newest_pose: Option<u64>,
     watchdog: Watchdog,
     restarts: BTreeMap<String, usize>,
+    /// Followers that are not restarted any more, and why.
+    given_up: Vec<(usize, SuperviseError)>,
     /// Restarted stages with no pose yet that the new process worked on.
     recovering: Vec<Recovering>,
     recovery: Vec<Duration>,
@@ -117,6 +121,7 @@ impl<'a> Supervisor<'a> {
             newest_pose: None,
             watchdog: Watchdog::new(plan),
             restarts: BTreeMap::new(),
+            given_up: Vec::new(),
             recovering: Vec::new(),
             recovery: Vec::new(),
             observers: observers::Sweep::new(),
@@ -134,7 +139,7 @@ impl<'a> Supervisor<'a> {
             let child = Child::spawn(
                 stage,
                 &self.plan.manifest,
-                &self.guardian.starter(&self.signals),
+                &Starter::new(&self.signals, &self.guardian),
             )?;
             (self.observe)(Event::Started {
                 stage: &stage.name,
@@ -168,9 +173,7 @@ impl<'a> Supervisor<'a> {
                 .into_iter()
                 .partition(|i| self.children[*i].follows());
             followers.retain(|i| self.is_behind(*i));
-            if !followers.is_empty() {
-                self.recover_followers(&followers)?;
-            }
+            self.recover_followers(&followers)?;
             if !dead.is_empty() {
                 self.recover(&dead)?;
             } else if let Some(stall) = self.stall() {
@@ -289,7 +292,7 @@ impl<'a> Supervisor<'a> {
         let all_dead = stages.len() == self.children.len();
         clean::remove_dead(&self.plan.manifest, &self.transport, all_dead)?;
         for i in stages {
-            let starter = self.guardian.starter(&self.signals);
+            let starter = Starter::new(&self.signals, &self.guardian);
             let child = &mut self.children[*i];
             child.respawn(&self.plan.manifest, &starter, self.newest_pose)?;
             self.recovering.extend(child.stage().map(|hop| Recovering {

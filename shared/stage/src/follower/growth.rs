@@ -2,30 +2,9 @@
 
 use crate::{
     Launch, StageError,
+    log_id::LogId,
     services::{self, Notifier},
 };
-
-/// A log of a run that followers read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LogId {
-    /// The keyframes, by pose-integration.
-    Keyframes,
-    /// The loops, by loop-closure.
-    Loops,
-}
-
-/// All of them.
-pub(crate) const LOGS: [LogId; 2] = [LogId::Keyframes, LogId::Loops];
-
-impl LogId {
-    /// Returns the name of the event of its growth.
-    pub(crate) const fn event(self) -> &'static str {
-        match self {
-            Self::Keyframes => "keyframes_grown",
-            Self::Loops => "loops_grown",
-        }
-    }
-}
 
 /// Notifies the followers of a log. A run without SLAM has no such events.
 pub struct Growth {

@@ -19,7 +19,7 @@ use rustix::{
     process::{Pid, RawPid, Signal, getpid, kill_process_group},
 };
 
-use super::{SuperviseError, child::ends_within, start::Starter};
+use super::{SuperviseError, end::ends_within};
 use crate::{Manifest, run, wake::Signals};
 
 /// Time for the guardian to end with the run.
@@ -59,12 +59,9 @@ impl Guardian {
         Ok(Self { process, groups })
     }
 
-    /// Starts stages that join the groups in the care of the guardian.
-    pub fn starter<'a>(&self, signals: &'a Signals) -> Starter<'a> {
-        Starter {
-            signals,
-            guardian: self.groups.as_ref().map(AsRawFd::as_raw_fd),
-        }
+    /// Returns the pipe by which a process joins: see [`join`].
+    pub fn pipe(&self) -> Option<RawFd> {
+        self.groups.as_ref().map(AsRawFd::as_raw_fd)
     }
 
     pub fn has_ended(&mut self) -> bool {

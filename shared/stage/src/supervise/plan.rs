@@ -94,6 +94,13 @@ pub enum Event<'a> {
         /// Its position.
         progress: Progress,
     },
+    /// A follower is not restarted any more. Odometry goes on, and then the run ends with this error.
+    GaveUp {
+        /// The name of the follower.
+        follower: &'a str,
+        /// Why.
+        error: &'a SuperviseError,
+    },
     /// The run makes no progress: the stages that may be the cause are about to be restarted.
     Stalled(&'a Stall),
 }
@@ -110,6 +117,14 @@ pub enum Stall {
     /// The source has not published a scan that is due, and all others have their poses.
     #[error("no scan from the source for {limit:?}, although one is due")]
     Scan {
+        /// The time limit.
+        limit: Duration,
+    },
+    /// The stream has ended, and a follower stays where it is in its logs.
+    #[error("{follower} has made no progress for {limit:?} (run.stall_timeout_s)")]
+    Follower {
+        /// The name of the follower.
+        follower: String,
         /// The time limit.
         limit: Duration,
     },
@@ -225,4 +240,17 @@ pub enum SuperviseError {
     /// The transport's cleanup hangs; only a new run under new names helps.
     #[error("the transport does not finish cleaning up after a dead process")]
     TransportStuck,
+}
+
+impl SuperviseError {
+    /// Returns whether it says that one process cannot be kept alive.
+    pub(super) fn is_of_one_process(&self) -> bool {
+        matches!(
+            self,
+            Self::Spawn { .. }
+                | Self::Replaced { .. }
+                | Self::Permanent { .. }
+                | Self::TooManyDeaths { .. }
+        )
+    }
 }

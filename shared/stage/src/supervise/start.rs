@@ -3,14 +3,17 @@
 use std::{
     fs::File,
     io,
-    os::{fd::RawFd, unix::process::CommandExt},
+    os::unix::process::CommandExt,
     process::{Child, Command, Stdio},
     time::Duration,
 };
 
 use rustix::process::{Signal, getpid, getppid, set_parent_process_death_signal};
 
-use super::{StagePlan, SuperviseError, guardian};
+use super::{
+    StagePlan, SuperviseError,
+    guardian::{self, Guardian},
+};
 use crate::{Manifest, StageError, run, wake::Signals};
 
 /// Pauses after a failure to start a process for want of processes or memory; the sum is the time for which it is tried.
@@ -18,12 +21,16 @@ const PAUSES_MS: [u64; 8] = [20, 50, 100, 200, 500, 1000, 2000, 4000];
 
 /// Starts processes that end with this one.
 pub(super) struct Starter<'a> {
-    pub signals: &'a Signals,
-    /// The pipe to the guardian.
-    pub guardian: Option<RawFd>,
+    signals: &'a Signals,
+    guardian: &'a Guardian,
 }
 
-impl Starter<'_> {
+impl<'a> Starter<'a> {
+    /// Starts processes that are in the care of this guardian.
+    pub fn new(signals: &'a Signals, guardian: &'a Guardian) -> Self {
+        Self { signals, guardian }
+    }
+
     /// Starts a stage. Its standard output and error go to `log`.
     pub fn start(
         &self,
@@ -55,7 +62,7 @@ impl Starter<'_> {
             .stderr(log.try_clone()?)
             // A process group of its own: an interrupt from the terminal reaches only the supervisor, which then stops each stage.
             .process_group(0);
-        let (supervisor, guardian) = (getpid(), self.guardian);
+        let (supervisor, guardian) = (getpid(), self.guardian.pipe());
         let die_with_the_supervisor = move || {
             set_parent_process_death_signal(Some(Signal::KILL))?;
             guardian.into_iter().for_each(guardian::join);

@@ -1,0 +1,23 @@
+//! The logs of a run, and the events of their growth.
+
+/// A log of a run that followers read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LogId {
+    /// The keyframes, by pose-integration.
+    Keyframes,
+    /// The loops, by loop-closure.
+    Loops,
+}
+
+/// All of them.
+pub(crate) const LOGS: [LogId; 2] = [LogId::Keyframes, LogId::Loops];
+
+impl LogId {
+    /// Returns the name of the event of its growth.
+    pub(crate) const fn event(self) -> &'static str {
+        match self {
+            Self::Keyframes => "keyframes_grown",
+            Self::Loops => "loops_grown",
+        }
+    }
+}
