@@ -21,6 +21,15 @@ pub fn small() -> &'static Path {
     FOLDER.get_or_init(|| simulated(SCANS))
 }
 
+/// Scans of the recording once around a block and a bit further.
+pub const SCANS_AROUND: usize = 120;
+
+/// The recording that comes back to where it began.
+pub fn around_a_block() -> &'static Path {
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    FOLDER.get_or_init(|| simulated(SCANS_AROUND))
+}
+
 /// A copy of the small recording's first `scans` scans, to be corrupted. Its images are links: replace them instead of writing into them.
 pub fn copy(scans: usize) -> TempDir {
     let copy = linked(small(), |scan| scan < scans);

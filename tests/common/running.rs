@@ -42,10 +42,14 @@ impl Running {
         processes::stages_of(self.pid())
     }
 
-    /// Waits until all of [`STAGES`] live.
+    /// Waits until all of [`STAGES`] live, and returns them with the followers.
     pub fn await_stages(&mut self) -> BTreeMap<String, Pid> {
         self.until("six stages", |running| {
-            Some(running.stages()).filter(|stages| stages.len() == STAGES.len())
+            let living = running.stages();
+            STAGES
+                .iter()
+                .all(|stage| living.contains_key(*stage))
+                .then_some(living)
         })
     }
 

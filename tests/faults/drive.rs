@@ -19,12 +19,9 @@ pub struct Drive {
     undisturbed: OnceLock<Undisturbed>,
 }
 
-/// The results that must be the same.
+/// The results that must be the same: odometry, and what loop closing makes of it.
 #[derive(Debug, PartialEq, Eq)]
-pub struct Results {
-    odometry: String,
-    trajectory: String,
-}
+pub struct Results([String; 4]);
 
 /// A run that nothing disturbs.
 pub struct Undisturbed {
@@ -39,19 +36,22 @@ pub struct Undisturbed {
 impl Results {
     /// The results of a run that is complete.
     pub fn of(run: &Run) -> Self {
-        Self {
-            odometry: run.odometry(),
-            trajectory: run.result("trajectory.tum"),
-        }
+        let names = [
+            "odometry.csv",
+            "trajectory.tum",
+            "trajectory_slam.tum",
+            "loops.csv",
+        ];
+        Self(names.map(|name| run.result(name)))
     }
 }
 
 impl Drive {
-    /// The small simulated recording.
+    /// A simulated recording with loops.
     pub fn small() -> Self {
         Self {
-            recording: recording::small().to_owned(),
-            scans: recording::SCANS,
+            recording: recording::around_a_block().to_owned(),
+            scans: recording::SCANS_AROUND,
             configured: Run::small,
             undisturbed: OnceLock::new(),
         }
@@ -78,9 +78,9 @@ impl Drive {
         self.run_of(&self.recording)
     }
 
-    /// A run of another recording of the same kind.
+    /// A run of another recording of the same kind, with SLAM.
     pub fn run_of(&self, recording: &Path) -> Run {
-        (self.configured)().data(recording)
+        (self.configured)().data(recording).set("slam.kind=graph")
     }
 
     /// A copy of the recording that may be damaged, with the images that are kept by their numbers.

@@ -2,8 +2,10 @@
 
 use std::time::Duration;
 
+use gyre_messages::FollowerId;
 use gyre_pose_integration::journal;
 use gyre_refinement::checkpoint;
+use gyre_slam::{Keyframe, Place, Query, records_path};
 use rand::{Rng, seq::IndexedRandom};
 use rustix::process::Signal;
 
@@ -15,6 +17,8 @@ use crate::{
 
 /// No process waits longer between two writes.
 const NO_MORE_WRITES: Duration = Duration::from_secs(2);
+/// Storms in a run: a process is restarted five times at most.
+const STORMS: usize = 4;
 
 /// One stage after the other.
 pub fn stage(scene: &mut Scene) -> Option<Outcome> {
@@ -49,7 +53,9 @@ pub fn several(scene: &mut Scene) -> Option<Outcome> {
 pub fn at_the_start(scene: &mut Scene) -> Option<Outcome> {
     let run = scene.run();
     let mut running = run.start();
-    let stage = STAGES.choose(&mut scene.rng)?;
+    let followers = FollowerId::ALL.map(FollowerId::name);
+    let all = [&STAGES[..], &followers].concat();
+    let stage = all.choose(&mut scene.rng)?;
     let first = running.await_stage(stage);
     scene.pause(30);
     send(first, Signal::KILL);
@@ -61,19 +67,46 @@ pub fn at_the_start(scene: &mut Scene) -> Option<Outcome> {
     Some(scene.finished(&run, &running.finish()))
 }
 
-/// Refinement between two writes of its map, or pose-integration at a record of its journal.
+/// A process at a write of a file from which its successor continues: refinement has two of them for each of its keyframes.
 pub fn at_a_write(scene: &mut Scene) -> Option<Outcome> {
     let run = scene.run();
     let mut running = run.start();
-    let (stage, file) = match scene.one_in(3) {
-        true => ("pose-integration", journal::path(run.out())),
-        false => ("refinement", checkpoint::path(run.out())),
-    };
+    let (integration, closing) = ("pose-integration", FollowerId::LoopClosure.name());
+    let writes = [
+        ("refinement", checkpoint::path(run.out())),
+        (integration, journal::path(run.out())),
+        (integration, records_path::<Keyframe>(run.out())),
+        (closing, records_path::<Place>(run.out())),
+        (closing, records_path::<Query>(run.out())),
+    ];
+    let (stage, file) = writes.choose(&mut scene.rng)?;
     running.await_poses_or_end(scene.rng.random_range(1..scene.drive.scans));
-    let pid = *running.stages().get(stage)?;
+    let pid = *running.stages().get(*stage)?;
     let writes = scene.rng.random_range(1..=4);
-    Watch::of(&file)?.wait(writes, NO_MORE_WRITES, |_| true)?;
+    Watch::of(file)?.wait(writes, NO_MORE_WRITES, |_| true)?;
     send(pid, Signal::KILL);
+    Some(scene.finished(&run, &running.finish()))
+}
+
+/// Most of all processes together, again and again, and now and then the supervisor with them: the same command goes on.
+pub fn storms(scene: &mut Scene) -> Option<Outcome> {
+    let run = scene.run();
+    let mut running = run.start();
+    for storm in 1..=STORMS {
+        running.await_poses_or_end(storm * scene.drive.scans / STORMS);
+        scene.pause(50);
+        if running.is_over() {
+            break;
+        }
+        let victims = running.stages().into_values();
+        victims
+            .filter(|_| scene.rng.random_bool(0.6))
+            .for_each(|pid| send(pid, Signal::KILL));
+        if scene.one_in(3) {
+            running.kill_supervisor();
+            running = run.start();
+        }
+    }
     Some(scene.finished(&run, &running.finish()))
 }
 

@@ -8,6 +8,8 @@
 //! cargo test --release -p gyre --test faults on_a_real_drive -- --ignored --nocapture
 //! ```
 //!
+//! All runs are with SLAM, so a stage is a follower too, and what must be the same are the corrected trajectory and its loops as well.
+//!
 //! `GYRE_FAULTS_KIND` selects one kind by its name, `GYRE_FAULTS_SEED` the first seed, `GYRE_FAULTS_EVENTS` the number of faults of
 //! each kind. So a fault is repeated by its kind, its seed and 1. The small recording takes the first two as well.
 
@@ -77,6 +79,7 @@ kinds! {
     stages_are_killed_together: kills::several, [];
     a_stage_is_killed_as_it_starts: kills::at_the_start, [];
     a_stage_is_killed_as_it_writes: kills::at_a_write, [];
+    processes_are_killed_in_storms: kills::storms, [];
     the_supervisor_is_killed: kills::supervisor, [];
     the_supervisor_is_killed_as_it_writes_results: kills::at_the_results, [];
     the_run_is_interrupted: kills::interrupt, [];

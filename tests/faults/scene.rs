@@ -95,13 +95,14 @@ impl<'a> Scene<'a> {
         if self.one_in(6) {
             self.pause(200);
         } else {
-            running.await_poses_or_end(self.rng.random_range(1..self.drive.scans));
+            // The followers may have work to do after the last pose.
+            running.await_poses_or_end(self.rng.random_range(1..=self.drive.scans));
             self.pause(20);
         }
         (!running.is_over()).then_some(())
     }
 
-    /// A living stage.
+    /// A living stage or follower.
     pub fn stage(&mut self, running: &Running) -> Option<Pid> {
         let stages: Vec<Pid> = running.stages().into_values().collect();
         (!stages.is_empty()).then(|| stages[self.rng.random_range(0..stages.len())])
