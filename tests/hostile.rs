@@ -7,17 +7,24 @@ use std::{
     process::Command,
 };
 
-use crate::common::{Ended, recording};
+use gyre_pose_integration::journal;
+use gyre_slam::{Keyframe, Place, Query, records_path};
+
+use crate::common::{Ended, Run, recording, undisturbed, wrapped};
 
 /// Address space of the process, kB: twice what the program and its libraries map.
 const LIMIT_KB: usize = 4_000_000;
 
 /// `gyre` with these arguments and a limit on its memory.
 fn limited(arguments: &[&str]) -> Ended {
-    let mut command = Command::new("sh");
-    command.args(["-c", &format!("ulimit -v {LIMIT_KB}; exec \"$0\" \"$@\"")]);
-    command.arg(crate::PROGRAM).args(arguments);
-    Ended::of(command)
+    let mut command = Command::new(crate::PROGRAM);
+    command.args(arguments);
+    Ended::of(with_limit(&command))
+}
+
+fn with_limit(command: &Command) -> Command {
+    let limit = format!("ulimit -v {LIMIT_KB}; exec \"$0\" \"$@\"");
+    wrapped(&["sh", "-c", &limit], command)
 }
 
 fn path(path: &Path) -> &str {
@@ -120,4 +127,31 @@ fn a_model_and_a_card_without_end_are_refused() {
     fs::copy(models.join("single-127.toml"), &card).unwrap();
     sparse(&folder.path().join("single-127.onnx"), 100);
     run(&card).failed_with(&["single-127.onnx", "MB"]);
+}
+
+#[test]
+fn a_journal_and_logs_of_impossible_lengths_are_refused_and_a_mended_run_goes_on() {
+    let run = Run::of_recording()
+        .rate("6")
+        .set("slam.kind=graph")
+        .set("slam.places.keyframe_distance_m=5");
+    let mut running = run.start();
+    running.await_poses(recording::SCANS / 2);
+    running.kill_supervisor();
+    let out = run.out();
+    for log in [
+        journal::path(out),
+        records_path::<Keyframe>(out),
+        records_path::<Query>(out),
+        // Last: loop-closure alone reads it, and odometry goes on to its end meanwhile.
+        records_path::<Place>(out),
+    ] {
+        let whole = fs::read(&log).unwrap();
+        let file = File::options().write(true).open(&log).unwrap();
+        file.set_len(1 << 40).unwrap();
+        let name = log.file_name().unwrap().to_str().unwrap();
+        Ended::of(with_limit(&run.command())).failed_with(&[name, "is damaged at"]);
+        fs::write(&log, whole).unwrap();
+    }
+    assert_eq!(run.complete(), undisturbed());
 }

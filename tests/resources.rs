@@ -10,16 +10,20 @@ use rustix::process::Signal;
 
 #[test]
 fn after_its_first_messages_a_stage_allocates_nothing_for_a_scan() {
-    let run = Run::of_recording();
-    run.complete();
-    // The source's are the PNG decoder's own.
-    for stage in &STAGES[1..] {
-        let statistics = &run.summary()["stages"][stage];
-        assert_eq!(statistics["processed"], recording::SCANS, "{stage}");
-        assert_eq!(
-            statistics["allocations_after_five"], 0,
-            "{stage}: {statistics}"
-        );
+    let with_slam = Run::of_recording()
+        .set("slam.kind=graph")
+        .set("slam.places.keyframe_distance_m=5");
+    for run in [Run::of_recording(), with_slam] {
+        run.complete();
+        // The source's are the PNG decoder's own.
+        for stage in &STAGES[1..] {
+            let statistics = &run.summary()["stages"][stage];
+            assert_eq!(statistics["processed"], recording::SCANS, "{stage}");
+            assert_eq!(
+                statistics["allocations_after_five"], 0,
+                "{stage}: {statistics}"
+            );
+        }
     }
 }
 

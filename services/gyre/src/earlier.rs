@@ -83,8 +83,7 @@ impl Earlier {
             lost: content.poses - poses + content.torn,
             identity,
         };
-        let is_followed =
-            !configuration.slam.is_on() || RecordReader::<Query>::open(out.path())?.has_ended();
+        let is_followed = !configuration.slam.is_on() || queries(out)?.has_ended();
         Ok(match (content.ended, poses) {
             (true, _) if is_followed => Self::Ended(begun),
             (true, _) => Self::Unfinished(begun),
@@ -92,6 +91,16 @@ impl Earlier {
             (false, _) => Self::Unfinished(begun),
         })
     }
+}
+
+/// Opens the candidates of the keyframes so far.
+fn queries(out: &Out) -> Result<RecordReader<Query>, Failure> {
+    RecordReader::open(out.path()).map_err(|error| match error {
+        LogError::Damaged { .. } => {
+            format!("{error}: remove it, and the same command finds the loops anew").into()
+        }
+        _ => error.into(),
+    })
 }
 
 /// Keeps a second name of a damaged journal, which `--fresh` does not remove.

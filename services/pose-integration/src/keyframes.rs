@@ -73,6 +73,12 @@ impl Keyframes {
         }
     }
 
+    /// Takes the memory for keyframes of up to so many points: none is allocated for each.
+    pub fn reserve(&mut self, points: usize) {
+        self.points.reserve(points);
+        self.log.reserve(Keyframe::encoded_len(points));
+    }
+
     /// Takes the next pose, before it is journalled. If it becomes a keyframe, that is appended with the scan's points. Returns whether
     /// it does.
     ///

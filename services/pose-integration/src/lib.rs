@@ -34,6 +34,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
         last: None,
         out: out.clone(),
         slam: launch.section("slam")?,
+        points: launch.manifest.limits.points,
         keyframes: None,
         growth: None,
     };
@@ -51,6 +52,8 @@ struct Integration {
     last: Option<PoseHeader>,
     out: PathBuf,
     slam: SlamConfig,
+    /// The most points of a scan.
+    points: usize,
     /// Of a run with SLAM, from [`Sink::restore`] on.
     keyframes: Option<Keyframes>,
     /// Wakes the followers of the keyframes.
@@ -72,7 +75,10 @@ impl Sink for Integration {
         if self.slam.is_on() {
             let known = self.last.map_or(0, |last| last.item.seq.saturating_add(1));
             let keyframes = Keyframes::open(&self.out, &self.slam.places, known, ended);
-            self.keyframes = Some(keyframes.map_err(unusable_keyframes)?);
+            let keyframes = self
+                .keyframes
+                .insert(keyframes.map_err(unusable_keyframes)?);
+            keyframes.reserve(self.points);
         }
         Ok((poses, ended))
     }

@@ -43,6 +43,13 @@ struct Fixed {
     twist: [f64; 3],
 }
 
+impl Keyframe {
+    /// Returns the length of the form in a file of a keyframe with so many points, bytes.
+    pub const fn encoded_len(points: usize) -> usize {
+        size_of::<Fixed>() + points * size_of::<SparsePoint>()
+    }
+}
+
 /// Little-endian: the fields in their order, then the points.
 impl Record for Keyframe {
     const FILE: &'static str = "keyframes.log";
@@ -163,6 +170,7 @@ mod tests {
         let (uncertain, keyframe) = (uncertain(), keyframe());
         let mut bytes = Vec::new();
         keyframe.encode(&mut bytes);
+        assert_eq!(bytes.len(), Keyframe::encoded_len(3));
         let decoded = Keyframe::decode(&bytes).unwrap();
         assert!(
             (decoded.pose.motion.to_homogeneous() - uncertain.motion.to_homogeneous()).norm()

@@ -68,6 +68,12 @@ impl<R: Record> RecordLog<R> {
         self.len() == 0
     }
 
+    /// Takes the memory for appending many records whose form in a file has up to so many bytes: none is allocated for each.
+    pub fn reserve(&mut self, bytes: usize) {
+        self.buffer.reserve(bytes);
+        self.log.reserve(bytes);
+    }
+
     /// Reads a record.
     ///
     /// # Errors

@@ -27,6 +27,11 @@ use records::{Records, encode};
 /// The start of a log: what its records are, and their version.
 pub type LogMagic = [u8; 16];
 
+/// The longest record. So the memory for reading one is bounded, whatever the file says.
+const MAX_BYTES: usize = 16 << 20;
+/// Records for which memory is taken at once.
+const MANY: usize = 4096;
+
 /// An error of a log.
 #[derive(Debug, Error)]
 pub enum LogError {
@@ -118,14 +123,22 @@ impl Log {
         self.len() == 0
     }
 
+    /// Takes the memory for appending many records of up to so many bytes: none is allocated for each.
+    pub fn reserve(&mut self, bytes: usize) {
+        self.buffer.reserve(bytes + records::MARGIN);
+        self.records.reserve(MANY);
+    }
+
     /// Appends a record. A reader sees it when this returns.
     ///
     /// # Errors
-    /// A file that cannot be written or synchronised, or a record of 4 GiB or more.
+    /// A file that cannot be written or synchronised, or a record of more than 16 MiB.
     pub fn append(&mut self, record: &[u8]) -> Result<(), LogError> {
-        let too_long = |error| StorageError::at("write", self.file.path())(io::Error::other(error));
-        let length = u32::try_from(record.len()).map_err(too_long)?;
-        let header = encode(self.len(), length, record, &mut self.buffer);
+        if record.len() > MAX_BYTES {
+            let too_long = io::ErrorKind::FileTooLarge.into();
+            return Err(StorageError::at("write", self.file.path())(too_long).into());
+        }
+        let header = encode(self.len(), record, &mut self.buffer);
         self.file.write_at(&self.buffer, self.records.end())?;
         self.records.push(header);
         self.count()

@@ -25,9 +25,9 @@ pub struct Content {
 
 /// Reads a whole journal, in bounded memory, and finds out what of it is valid.
 ///
-/// A record that is not valid is one of two things. If no later record knows that it was on the disk, it is what a death or a
-/// power failure leaves, and it is cut off with all that follows: those poses are computed anew. Else the file was damaged after
-/// it had been written.
+/// A record that is not valid is one of two things. If no later record knows that it was on the disk, and there are no more of them than
+/// can have been in danger, it is what a death or a power failure leaves, and it is cut off with all that follows: those poses are
+/// computed anew. Else the file was damaged after it had been written.
 ///
 /// # Errors
 /// [`JournalError::Damaged`], a file that cannot be read or is not a journal.
@@ -42,6 +42,10 @@ pub fn check(path: &Path) -> Result<Content, JournalError> {
     let mut known_safe = 0;
     while let Some(place) = places.read() {
         let index = places.next - 1;
+        // However long the file is, the answer is known here.
+        if let Some(first) = first_invalid.filter(|first| index > first + GroupSync::LIMIT) {
+            return Err(damaged(path, first));
+        }
         match (place?, first_invalid) {
             // Nothing follows the end of the stream.
             (Some(_), None) if ended => first_invalid = Some(index),
@@ -61,16 +65,20 @@ pub fn check(path: &Path) -> Result<Content, JournalError> {
         }
     }
     match first_invalid {
-        Some(first) if known_safe > first => Err(JournalError::Damaged {
-            path: path.to_owned(),
-            pose: first,
-        }),
+        Some(first) if known_safe > first => Err(damaged(path, first)),
         _ => Ok(Content {
             poses: valid - u64::from(ended),
             ended,
             torn: places.next - valid,
             last,
         }),
+    }
+}
+
+fn damaged(path: &Path, pose: u64) -> JournalError {
+    JournalError::Damaged {
+        path: path.to_owned(),
+        pose,
     }
 }
 

@@ -216,3 +216,15 @@ fn two_processes_do_not_append_to_one_journal() {
         Err(JournalError::Busy { .. })
     ));
 }
+
+#[test]
+fn an_impossibly_long_file_is_refused_at_once() {
+    let (_folder, path) = journal_of(3);
+    let file = fs::OpenOptions::new().write(true).open(&path).unwrap();
+    file.set_len(1 << 40).unwrap();
+    let error = check(&path).unwrap_err();
+    assert!(
+        matches!(error, JournalError::Damaged { pose: 3, .. }),
+        "{error}"
+    );
+}

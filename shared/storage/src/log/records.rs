@@ -7,17 +7,22 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{LogError, LogMagic};
+use super::{LogError, LogMagic, MAX_BYTES};
 use crate::{GroupSync, StorageError};
 
 /// Bytes of a record's header.
 const HEADER: usize = 20;
 /// A record begins at a multiple of so many bytes.
 const ALIGNMENT: usize = 4;
+/// A record takes at most so many more bytes in the file than it has.
+pub(super) const MARGIN: usize = HEADER + ALIGNMENT;
 /// Bytes that are read at once in search of a header.
 const CHUNK: usize = 1 << 16;
 /// Number of records at the end that a death or a power failure can have damaged: those in danger, and the one being written.
 const IN_DANGER: usize = GroupSync::LIMIT as usize + 1;
+
+/// The most bytes that a death or a power failure can leave behind the complete records.
+const LONGEST_END: u64 = (IN_DANGER * (MAX_BYTES + MARGIN)) as u64;
 
 /// The header of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,7 +52,7 @@ impl Header {
             length: u32::from_le_bytes(*content[8..].first_chunk()?),
             check: u32::from_le_bytes(*content[12..].first_chunk()?),
         };
-        valid.then_some(header)
+        (valid && header.length as usize <= MAX_BYTES).then_some(header)
     }
 
     /// Returns the bytes of the record with its header.
@@ -57,10 +62,10 @@ impl Header {
 }
 
 /// Encodes the record number `index`, in place of the content of `bytes`.
-pub(super) fn encode(index: usize, length: u32, record: &[u8], bytes: &mut Vec<u8>) -> Header {
+pub(super) fn encode(index: usize, record: &[u8], bytes: &mut Vec<u8>) -> Header {
     let header = Header {
         index: index as u64,
-        length,
+        length: record.len() as u32,
         check: crc32fast::hash(record),
     };
     bytes.clear();
@@ -107,6 +112,10 @@ impl Records {
 
     pub fn len(&self) -> usize {
         self.places.len()
+    }
+
+    pub fn reserve(&mut self, records: usize) {
+        self.places.reserve(records);
     }
 
     /// Returns whether the file has its whole magic.
@@ -227,6 +236,9 @@ impl Records {
     /// Checks that the record after the end was in danger when the last one in the file was written: that it is not one that was
     /// damaged later.
     fn require_no_safe_record_after_end(&self, length: u64) -> Result<(), LogError> {
+        if length - self.end() > LONGEST_END {
+            return Err(self.damaged(self.len()));
+        }
         let mut bytes = vec![0; CHUNK];
         let mut offset = self.end();
         while offset + HEADER as u64 <= length {

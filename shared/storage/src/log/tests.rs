@@ -231,3 +231,45 @@ fn changes_that_rely_on_a_record_are_as_few_as_the_records_in_danger() {
     // The record is safe, and nothing more is counted.
     assert!(log.changes <= 2 * GroupSync::LIMIT);
 }
+
+#[test]
+fn an_impossibly_long_file_is_refused_at_once() {
+    let (_folder, path) = log_of(3);
+    let file = fs::OpenOptions::new().write(true).open(&path).unwrap();
+    file.set_len(1 << 40).unwrap();
+    let error = LogReader::open(&path, MAGIC).unwrap_err();
+    assert!(
+        matches!(error, LogError::Damaged { record: 3, .. }),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_record_of_an_impossible_length_is_not_read() {
+    let (_folder, path) = log_of(3);
+    let mut header = fs::read(&path).unwrap()[offset(2)..offset(2) + 20].to_vec();
+    header[0] = 3;
+    header[8..12].copy_from_slice(&u32::MAX.to_le_bytes());
+    let check = crc32fast::hash(&header[..16]).to_le_bytes();
+    header[16..].copy_from_slice(&check);
+    let mut bytes = fs::read(&path).unwrap();
+    bytes.extend(header);
+    fs::write(&path, bytes).unwrap();
+    let file = fs::OpenOptions::new().write(true).open(&path).unwrap();
+    // As long as the record says that it is, and longer than what a power failure can leave.
+    file.set_len(1 << 33).unwrap();
+    let error = LogReader::open(&path, MAGIC).unwrap_err();
+    assert!(
+        matches!(error, LogError::Damaged { record: 3, .. }),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_record_that_no_reader_would_take_is_not_appended() {
+    let (_folder, path) = log_of(1);
+    let mut log = Log::open(&path, MAGIC).unwrap();
+    assert!(log.append(&vec![0; MAX_BYTES + 1]).is_err());
+    log.append(&[0; 5]).unwrap();
+    assert_eq!(LogReader::open(&path, MAGIC).unwrap().len(), 2);
+}
