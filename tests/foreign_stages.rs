@@ -3,9 +3,10 @@
 
 use std::{env, path::Path, process};
 
+use bytemuck::Pod;
 use gyre_messages::{
-    Masked, MaskedHeader, Motion, MotionEstimate, MotionHeader, PoseHeader, Refined, Rotation,
-    Scan, ScanHeader, StageId, flag,
+    Item, Masked, MaskedHeader, Motion, MotionEstimate, MotionHeader, PoseHeader, Refined,
+    Rotation, Scan, ScanHeader, StageId, flag,
 };
 use gyre_pose_integration::compose;
 use gyre_radar::{Dataset, DatasetOptions};
@@ -19,6 +20,8 @@ use gyre_stage::{
     stage,
     writer::Draft,
 };
+
+use rand::{Rng, SeedableRng, rngs::StdRng, seq::IndexedRandom};
 
 use crate::common::{Run, recording};
 
@@ -113,6 +116,49 @@ fn a_fault_that_does_not_come_again_costs_a_restart() {
     assert_ne!(run.summary()["restarts"], serde_json::json!({}));
 }
 
+/// Numbers that break most contracts, and some that keep them.
+const NUMBERS: [&str; 6] = ["NaN", "-inf", "-1", "1e300", "0", "0.5"];
+
+/// Runs in which a stage writes a number anywhere into a header: refused by its name, or no harm is done.
+fn any_word_is_refused_or_harmless(runs: u64) {
+    let stages = [
+        ("masking", "masked"),
+        ("rotation-search", "rotation"),
+        ("translation-search", "motion"),
+        ("refinement", "refined"),
+    ];
+    for seed in 0..runs {
+        let mut random = StdRng::seed_from_u64(seed);
+        let (stage, topic) = stages[seed as usize % stages.len()];
+        let (word, number) = (random.random_range(0..64), NUMBERS.choose(&mut random));
+        let fault = format!("{topic} word-{word} {}", number.unwrap());
+        println!("seed {seed}: {fault}");
+        let run = run_with(stage, &fault, false);
+        let ended = run.finish();
+        if !ended.status.success() {
+            ended.failed_with(&[stage]);
+            continue;
+        }
+        assert_eq!(run.summary()["processed"], recording::SCANS, "{fault}");
+        let odometry = run.odometry();
+        assert!(
+            !odometry.contains("NaN") && !odometry.contains("inf"),
+            "{fault}"
+        );
+    }
+}
+
+#[test]
+fn any_word_of_a_header_is_refused_or_harmless() {
+    any_word_is_refused_or_harmless(8);
+}
+
+#[test]
+#[ignore = "takes some minutes: the same with more words"]
+fn many_words_of_headers_are_refused_or_harmless() {
+    any_word_is_refused_or_harmless(200);
+}
+
 // The foreign stages.
 
 /// Not a test: the program of a replaced stage, if the environment says so.
@@ -176,6 +222,21 @@ impl Fault {
     }
 }
 
+impl Fault {
+    /// Replaces a word of a header behind its item, if that is the fault.
+    fn edit<H: Pod>(&self, header: &mut H, seq: u64) {
+        let word = self.field.strip_prefix("word-");
+        let Some(word) = word.map(|word| word.parse::<usize>().unwrap()) else {
+            return;
+        };
+        let words = &mut bytemuck::bytes_of_mut(header)[size_of::<Item>()..];
+        let word = word % (words.len() / 8) * 8;
+        if let Some(value) = self.of(&self.field, seq) {
+            words[word..word + 8].copy_from_slice(&value.to_le_bytes());
+        }
+    }
+}
+
 struct ForeignRotation(Fault);
 
 impl Stage for ForeignRotation {
@@ -192,6 +253,7 @@ impl Stage for ForeignRotation {
         if let Some(value) = self.0.of("angle", input.current.item().seq) {
             rotation.angle_rad = value;
         }
+        self.0.edit(output.header(), input.current.item().seq);
         Ok(())
     }
 }
@@ -225,6 +287,7 @@ impl Stage for ForeignTranslation {
         if !item.is(flag::BREAK) {
             output.header().motion = motion(&self.0, item.seq, input.pair.interval_ns());
         }
+        self.0.edit(output.header(), item.seq);
         Ok(())
     }
 }
@@ -245,6 +308,7 @@ impl Stage for ForeignRefinement {
         if !item.is(flag::BREAK) {
             output.header().motion = motion(&self.0, item.seq, searched.interval_ns);
         }
+        self.0.edit(output.header(), item.seq);
         Ok(())
     }
 }
@@ -274,6 +338,7 @@ impl Stage for ForeignMasking {
             points: fault("points").unwrap_or(1.0) as u32,
             ..MaskedHeader::default()
         };
+        self.0.edit(header, seq);
         Ok(())
     }
 }
@@ -355,7 +420,7 @@ impl Sink for ForeignIntegration {
         Ok(PoseHeader { x_m, ..pose })
     }
 
-    fn end(&mut self, _: &gyre_messages::Item) -> Result<(), StageError> {
+    fn end(&mut self, _: &Item) -> Result<(), StageError> {
         Ok(())
     }
 }
