@@ -1,8 +1,7 @@
 //! `gyre watch`: prints the messages of a running run.
 
 use std::{
-    fmt::Display,
-    io::{self, ErrorKind, Write},
+    io::{self, BufWriter, ErrorKind, Write},
     path::Path,
     process::ExitCode,
     time::Duration,
@@ -13,9 +12,11 @@ use gyre_messages::{
     PoseHeader, Refined, Rotation, Scan,
 };
 use gyre_stage::{
-    observer::{Next, ObservedRun},
+    StageError,
+    observer::{Next, ObservedRun, Observer},
     reader::Received,
 };
+use thiserror::Error;
 
 use crate::{
     Failure,
@@ -46,42 +47,53 @@ fn observe<M: Message>(
 ) -> Result<ExitCode, Failure> {
     let run = ObservedRun::writing_to(out)?;
     let mut observer = run.observe::<M>()?;
-    let mut received = 0_u64;
-    let mut read = true;
-    while read {
-        read = match observer.next(Duration::MAX)? {
-            Next::Message(message, missed) => {
-                received += 1;
-                let item = message.item();
-                let gap = match missed {
-                    0 => String::new(),
-                    missed => format!("{missed} missed\n"),
-                };
-                let (seq, scan) = (item.seq, item.scan);
-                line(format_args!(
-                    "{gap}{seq}: scan {scan}, {}",
-                    describe(message)
-                ))?
-            }
-            Next::Idle => true,
-            Next::Ended => break,
-        };
+    match print_all(&mut observer, describe) {
+        // Nobody reads it any more, as after `gyre watch OUT | head`.
+        Err(WatchError::Print(error)) if error.kind() == ErrorKind::BrokenPipe => {}
+        printed => printed?,
     }
-    let missed = observer.missed();
-    line(format_args!(
-        "{}: {received} received, {missed} missed",
-        M::TOPIC
-    ))?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// Prints a line; false if nobody reads it any more, as after `gyre watch OUT | head`.
-fn line(text: impl Display) -> Result<bool, Failure> {
-    match writeln!(io::stdout(), "{text}") {
-        Ok(()) => Ok(true),
-        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(false),
-        Err(error) => Err(format!("cannot print: {error}").into()),
+#[derive(Debug, Error)]
+enum WatchError {
+    #[error(transparent)]
+    Stage(#[from] StageError),
+    #[error("cannot print: {0}")]
+    Print(#[from] io::Error),
+}
+
+fn print_all<M: Message>(
+    observer: &mut Observer<'_, M>,
+    describe: impl Fn(&Received<M>) -> String,
+) -> Result<(), WatchError> {
+    let mut lines = BufWriter::new(io::stdout().lock());
+    let mut received = 0_u64;
+    loop {
+        let next = match observer.next(Duration::ZERO)? {
+            Next::Idle => {
+                // Written together: one that reads them is not woken for each.
+                lines.flush()?;
+                observer.next(Duration::MAX)?
+            }
+            next => next,
+        };
+        match next {
+            Next::Message(message, missed) => {
+                received += 1;
+                let (seq, scan) = (message.item().seq, message.item().scan);
+                if missed > 0 {
+                    writeln!(lines, "{missed} missed")?;
+                }
+                writeln!(lines, "{seq}: scan {scan}, {}", describe(message))?;
+            }
+            Next::Idle => {}
+            Next::Ended => break,
+        }
     }
+    let missed = observer.missed();
+    writeln!(lines, "{}: {received} received, {missed} missed", M::TOPIC)?;
+    Ok(lines.flush()?)
 }
 
 fn scan(message: &Received<Scan>) -> String {

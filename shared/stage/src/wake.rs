@@ -113,24 +113,14 @@ impl Signals {
             .into_iter()
             .map(|fd| PollFd::from_borrowed_fd(fd, PollFlags::IN))
             .collect();
-        let limit = Timespec {
-            tv_sec: limit.as_secs() as i64,
-            tv_nsec: i64::from(limit.subsec_nanos()),
-        };
-        let timed_out = match poll(&mut polled, Some(&limit)) {
-            Ok(ready) => ready == 0,
-            Err(Errno::INTR) => false,
-            Err(error) => return Err(StageError::transport("wait", error)),
-        };
+        let timed_out = sleep_until_ready(&mut polled, limit)?;
         // Read only what is ready: each system call saved reduces latency.
         let mut ready = polled.iter().map(|polled| !polled.revents().is_empty());
         let mut next = || ready.next().unwrap_or(false);
         let (stop, child) = (next() && drain(&self.stop), next() && drain(&self.child));
         for listener in data {
             if next() {
-                listener
-                    .try_wait(|_| ())
-                    .map_err(|e| StageError::transport("read notifications", e))?;
+                consume(listener)?;
             }
         }
         self.stopped.set(stop || self.stopped.get());
@@ -141,6 +131,34 @@ impl Signals {
             timed_out,
         })
     }
+}
+
+/// Sleeps until a listener is notified or `limit` has passed, and consumes its notifications.
+pub(crate) fn wait_for(listener: &Listener, limit: Duration) -> Result<(), StageError> {
+    let polled = PollFd::from_borrowed_fd(descriptor(listener), PollFlags::IN);
+    match sleep_until_ready(&mut [polled], limit)? {
+        true => Ok(()),
+        false => consume(listener),
+    }
+}
+
+/// Returns whether the limit has passed without any event.
+fn sleep_until_ready(polled: &mut [PollFd<'_>], limit: Duration) -> Result<bool, StageError> {
+    let limit = Timespec {
+        tv_sec: limit.as_secs() as i64,
+        tv_nsec: i64::from(limit.subsec_nanos()),
+    };
+    match poll(polled, Some(&limit)) {
+        Ok(ready) => Ok(ready == 0),
+        Err(Errno::INTR) => Ok(false),
+        Err(error) => Err(StageError::transport("wait", error)),
+    }
+}
+
+fn consume(listener: &Listener) -> Result<(), StageError> {
+    let read = listener.try_wait(|_| ());
+    read.map(drop)
+        .map_err(|e| StageError::transport("read notifications", e))
 }
 
 fn descriptor(listener: &Listener) -> BorrowedFd<'_> {
