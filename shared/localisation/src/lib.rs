@@ -1,0 +1,26 @@
+//! Localisation in a map of keyframes.
+//!
+//! - [`Map`]: keyframes with their poses in the map's frame, recognisable at any heading;
+//! - [`Localiser`]: [`Localiser::find`], the first fix without prior from a single scan; [`Localiser::locate`], scan after scan:
+//!   the first fix, then tracking against the map, until it is lost and finds itself again.
+//!
+//! # Method
+//! 1. The scan is described and looked up among the submaps of the map's keyframes
+//!    ([`gyre_estimation::places`]); the best places are verified as loops are. A place is taken if it is accepted and no other accepted
+//!    place, elsewhere on the map, correlates nearly as well.
+//! 2. From then on the pose is predicted by odometry and the scan is registered with the nearest keyframe of the map from
+//!    there. A registration that correlates with the submap and is consistent with the prediction by chi-square updates
+//!    the pose, as in a Kalman filter.
+//! 3. Scans without such a registration are predicted. After [`LocaliserOptions::lost_after_s`] of them the localiser is lost, and begins
+//!    with 1. again. A prediction is no fix, and away from all keyframes of the map there is none.
+//!
+//! # Frames and units
+//! Those of [`gyre_geometry`]; poses are in the map's frame, and covariances are of (x, y, yaw) along its axes.
+
+mod localiser;
+mod map;
+mod options;
+
+pub use localiser::{Fix, Localisation, Localiser, Observation, Status};
+pub use map::{Map, MapError};
+pub use options::LocaliserOptions;
