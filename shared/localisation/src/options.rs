@@ -27,7 +27,7 @@ impl Default for LocaliserOptions {
     fn default() -> Self {
         Self {
             places: PlaceOptions {
-                min_correlation: 0.5,
+                min_correlation: 0.3,
                 ..PlaceOptions::default()
             },
             candidates: 5,
