@@ -5,9 +5,9 @@
 //!   the first fix, then tracking against the map, until it is lost and finds itself again.
 //!
 //! # Method
-//! 1. The scan is described and looked up among the submaps of the map's keyframes
-//!    ([`gyre_estimation::places`]); the best places are verified as loops are. A place is taken if it is accepted and no other accepted
-//!    place, elsewhere on the map, correlates nearly as well.
+//! 1. The scan is described and compared with the submaps of all keyframes of the map ([`gyre_estimation::places`]), each at several
+//!    headings. Around the most similar ones the translation is searched, the best poses are aligned, and correlated with the map where
+//!    the sensor could see anything. The best one is taken if it correlates well, and no other pose on the map nearly as well.
 //! 2. From then on the pose is predicted by odometry and the scan is registered with the nearest keyframe of the map from
 //!    there. A registration that correlates with the submap and is consistent with the prediction by chi-square updates
 //!    the pose, as in a Kalman filter.
@@ -20,7 +20,9 @@
 mod localiser;
 mod map;
 mod options;
+mod registration;
+mod sight;
 
 pub use localiser::{Fix, Localisation, Localiser, Observation, Status};
-pub use map::{Map, MapError};
+pub use map::{KEYFRAMES_FILE, Map, MapError, PLACES_FILE};
 pub use options::LocaliserOptions;

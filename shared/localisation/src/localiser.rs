@@ -1,14 +1,18 @@
 //! The localiser.
 
-use gyre_estimation::places::{Candidate, Describer, Descriptor, LoopVerifier};
-use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose};
+use std::f64::consts::PI;
+
+use gyre_estimation::places::{Candidate, Describer, Descriptor};
+use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose, wrap_angle};
 use gyre_scan_matching::{ConfigError, RefinementConfig, Submap};
 use nalgebra::{Matrix3, Point2, Vector3};
 
-use crate::{LocaliserOptions, Map};
+use crate::{LocaliserOptions, Map, registration::Registration};
 
-/// Two fixes are the same within this angle, rad.
-const SAME_RAD: f64 = 5.0 * std::f64::consts::PI / 180.0;
+/// Two poses are the same within this angle, rad.
+const SAME_RAD: f64 = 5.0 * PI / 180.0;
+/// The most similar poses of a search are aligned.
+const ALIGNED: usize = 3;
 
 /// A scan, with its motion by odometry.
 #[derive(Clone, Copy, Debug)]
@@ -58,6 +62,14 @@ pub struct Localisation {
     pub fix: Option<Fix>,
 }
 
+/// A pose that a search has found.
+#[derive(Clone, Copy)]
+struct Hypothesis {
+    pose: Pose,
+    correlation: f64,
+    keyframe: usize,
+}
+
 /// The last known place.
 #[derive(Clone, Copy)]
 struct Track {
@@ -66,16 +78,14 @@ struct Track {
 }
 
 /// Localises scans in a map.
-///
-/// Planned once; nothing is allocated afterwards.
 pub struct Localiser {
     map: Map,
     options: LocaliserOptions,
     describer: Describer,
     descriptor: Descriptor,
-    verifier: LoopVerifier,
+    registration: Registration,
     candidates: Vec<Candidate>,
-    fixes: Vec<Fix>,
+    hypotheses: Vec<Hypothesis>,
     scan: Submap,
     place: Submap,
     /// The keyframe whose submap `place` is.
@@ -94,13 +104,12 @@ impl Localiser {
         refinement: &RefinementConfig,
         capacity: usize,
     ) -> Result<Self, ConfigError> {
-        let points = capacity.max(map.largest());
         Ok(Self {
-            verifier: LoopVerifier::new(&options.places, refinement, points)?,
+            registration: Registration::new(&options, refinement, capacity)?,
             describer: Describer::new(),
             descriptor: Descriptor::default(),
             candidates: Vec::with_capacity(options.candidates),
-            fixes: Vec::with_capacity(options.candidates),
+            hypotheses: Vec::with_capacity(4 * options.candidates),
             scan: Submap::with_capacity(capacity),
             place: map.new_submap(),
             drawn: None,
@@ -110,7 +119,7 @@ impl Localiser {
         })
     }
 
-    /// The map.
+    /// Returns the map.
     pub fn map(&self) -> &Map {
         &self.map
     }
@@ -140,56 +149,131 @@ impl Localiser {
 
     /// Finds the place of a scan without prior; `None` if it is not on the map, or if two places of the map look like it.
     pub fn find(&mut self, points: &[SparsePoint], twist: &Twist) -> Option<Fix> {
-        let (min_correlation, min_margin) = (
-            self.options.places.min_correlation,
-            self.options.places.min_margin,
-        );
-        self.most_similar(points, twist)
-            .filter(|fix| fix.correlation >= min_correlation && fix.margin >= min_margin)
+        let fix = self.most_similar(points, twist);
+        fix.filter(|fix| self.is_accepted(fix))
     }
 
     /// Finds the pose at which a scan is most similar to the map, however little.
     pub fn most_similar(&mut self, points: &[SparsePoint], twist: &Twist) -> Option<Fix> {
         self.scan.start(points, twist);
+        self.registration.set_scan(&self.scan);
         self.describer.describe(&self.scan, &mut self.descriptor);
-        let similar = self.map.similar(&self.descriptor, self.options.apart_m);
+        self.choose_candidates();
+        self.hypotheses.clear();
+        let few = self.options.first_candidates.min(self.candidates.len());
+        (0..few).for_each(|k| self.search(k));
+        let fix = self.best().filter(|fix| self.is_accepted(fix));
+        fix.or_else(|| {
+            (few..self.candidates.len()).for_each(|k| self.search(k));
+            self.best()
+        })
+    }
+
+    fn is_accepted(&self, fix: &Fix) -> bool {
+        fix.correlation >= self.options.min_correlation && fix.margin >= self.options.min_margin
+    }
+
+    /// Chooses the places and headings that look most similar, each once.
+    fn choose_candidates(&mut self) {
+        let similar = self
+            .map
+            .similar(&self.descriptor, self.options.angles)
+            .to_vec();
         self.candidates.clear();
-        self.candidates
-            .extend(similar.iter().take(self.options.candidates));
-        self.fixes.clear();
-        for index in 0..self.candidates.len() {
-            let candidate = self.candidates[index];
-            self.draw(candidate.place);
-            let found = self.verifier.verify(&self.scan, &self.place, &candidate);
-            self.fixes.push(Fix {
-                pose: self.in_map(candidate.place, &found.motion),
-                correlation: found.correlation,
-                margin: found.searched - found.runner_up,
-                keyframe: candidate.place,
-            });
+        for candidate in similar {
+            let is_new = |other: &Candidate| {
+                let [one, other] = [&candidate, other].map(|c| (self.map.pose(c.place), c.yaw_rad));
+                let apart_m = (one.0.translation.vector - other.0.translation.vector).norm();
+                let turned = |(pose, yaw_rad): (Pose, f64)| pose.rotation.angle() + yaw_rad;
+                // Up to half a turn.
+                let apart_rad = 0.5 * wrap_angle(2.0 * (turned(one) - turned(other)));
+                apart_m >= self.options.apart_m || apart_rad.abs() > SAME_RAD
+            };
+            if self.candidates.iter().all(is_new) {
+                self.candidates.push(candidate);
+            }
+            if self.candidates.len() == self.options.candidates {
+                break;
+            }
         }
-        let by_correlation = |a: &&Fix, b: &&Fix| a.correlation.total_cmp(&b.correlation);
-        let best = *self.fixes.iter().max_by(by_correlation)?;
-        let elsewhere = self.fixes.iter().filter(|fix| !self.is_same(&best, fix));
-        let rival = elsewhere.max_by(by_correlation);
-        let apart = rival.map_or(f64::INFINITY, |rival| best.correlation - rival.correlation);
-        // A motion without covariance was not aligned.
-        best.pose.has_covariance().then_some(Fix {
-            margin: best.margin.min(apart),
+    }
+
+    /// Searches around a candidate, at both headings that its descriptor cannot tell apart.
+    fn search(&mut self, candidate: usize) {
+        let Candidate { place, yaw_rad, .. } = self.candidates[candidate];
+        self.draw(place);
+        self.registration.set_place(&self.place);
+        for yaw_rad in [yaw_rad, wrap_angle(yaw_rad + PI)] {
+            let found = self.registration.search(yaw_rad);
+            let second = found
+                .runner_up
+                .map(|other| (other.x_m, other.y_m, other.score));
+            let first = (found.x_m, found.y_m, found.score);
+            for (x_m, y_m, correlation) in [Some(first), second].into_iter().flatten() {
+                self.hypotheses.push(Hypothesis {
+                    pose: self.map.pose(place) * pose(x_m, y_m, yaw_rad),
+                    correlation,
+                    keyframe: place,
+                });
+            }
+        }
+    }
+
+    /// Aligns the best poses that were found, and compares the best of them with all others.
+    fn best(&mut self) -> Option<Fix> {
+        self.hypotheses
+            .sort_by(|a, b| b.correlation.total_cmp(&a.correlation));
+        let mut best: Option<Fix> = None;
+        for k in 0..self.hypotheses.len().min(ALIGNED) {
+            let Hypothesis { pose, keyframe, .. } = self.hypotheses[k];
+            if let Some((pose, correlation)) = self.align(keyframe, &pose) {
+                let fix = Fix {
+                    pose,
+                    correlation,
+                    margin: 0.0,
+                    keyframe,
+                };
+                if best.is_none_or(|best| correlation > best.correlation) {
+                    best = Some(fix);
+                }
+            }
+        }
+        let best = best.filter(|best| best.pose.has_covariance())?;
+        let others = self.hypotheses.iter();
+        let rival = others
+            .filter(|other| !self.is_same(&best.pose.motion, &other.pose))
+            .map(|other| other.correlation)
+            .fold(0.0, f64::max);
+        Some(Fix {
+            margin: best.correlation - rival,
             ..best
         })
     }
 
-    fn is_same(&self, one: &Fix, other: &Fix) -> bool {
-        let apart = one.pose.motion.inv_mul(&other.pose.motion);
+    fn is_same(&self, one: &Pose, other: &Pose) -> bool {
+        let apart = one.inv_mul(other);
         apart.translation.vector.norm() <= self.options.same_m
             && apart.rotation.angle().abs() <= SAME_RAD
+    }
+
+    /// Aligns the scan with a keyframe from a pose on the map.
+    fn align(&mut self, keyframe: usize, from: &Pose) -> Option<(UncertainMotion, f64)> {
+        self.draw(keyframe);
+        self.registration.set_place(&self.place);
+        let initial = self.map.pose(keyframe).inv_mul(from);
+        let (motion, correlation) = self.registration.align(&self.scan, &self.place, &initial)?;
+        let of_keyframe = UncertainMotion {
+            motion: self.map.pose(keyframe),
+            covariance: Matrix3::zeros(),
+        };
+        Some((of_keyframe.then(&motion), correlation))
     }
 
     /// Tracks the next scan from the last known place.
     fn follow(&mut self, track: &Track, observation: &Observation<'_>) -> Localisation {
         let predicted = track.pose.then(&observation.motion);
         self.scan.start(observation.points, &observation.twist);
+        self.registration.set_scan(&self.scan);
         let place = Point2::from(predicted.motion.translation.vector);
         let (keyframe, distance_m) = self.map.nearest(place);
         let is_inside = distance_m <= self.options.reach_m;
@@ -225,29 +309,16 @@ impl Localiser {
 
     /// Registers the scan with a keyframe, and updates the prediction with the result; `None` unless both agree.
     fn register(&mut self, keyframe: usize, predicted: &UncertainMotion) -> Option<Fix> {
-        self.draw(keyframe);
-        let initial = self.map.poses()[keyframe].inv_mul(&predicted.motion);
-        let (motion, correlation) = self.verifier.register(&self.scan, &self.place, &initial)?;
+        let (measured, correlation) = self.align(keyframe, &predicted.motion)?;
         if correlation < self.options.tracked_correlation {
             return None;
         }
-        let measured = self.in_map(keyframe, &motion);
-        let pose = fused(predicted, &measured, self.options.gate)?;
         Some(Fix {
-            pose,
+            pose: fused(predicted, &measured, self.options.gate)?,
             correlation,
             margin: 0.0,
             keyframe,
         })
-    }
-
-    /// A pose relative to a keyframe in the map's frame.
-    fn in_map(&self, keyframe: usize, motion: &UncertainMotion) -> UncertainMotion {
-        let of_keyframe = UncertainMotion {
-            motion: self.map.poses()[keyframe],
-            covariance: Matrix3::zeros(),
-        };
-        of_keyframe.then(motion)
     }
 
     fn draw(&mut self, keyframe: usize) {

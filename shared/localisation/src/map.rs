@@ -1,121 +1,162 @@
 //! The keyframes of a map.
 
+use std::path::Path;
+
 use gyre_estimation::places::{
-    Candidate, Describer, Descriptor, MAX_NEIGHBOURS, OrderError, PlaceIndex, neighbours,
+    Candidate, Describer, Descriptor, MAX_NEIGHBOURS, OrderError, PlaceFileError, PlaceIndex,
+    PlaceOptions, neighbours,
 };
 use gyre_geometry::Pose;
 use gyre_scan_matching::Submap;
-use gyre_slam::Keyframe;
+use gyre_slam::{Keyframe, KeyframeError, KeyframeLog, KeyframeReader};
 use nalgebra::Point2;
 use thiserror::Error;
 
-/// Keyframes that make no map.
-#[derive(Clone, Copy, Debug, PartialEq, Error)]
+/// The keyframes of a map, in its folder.
+pub const KEYFRAMES_FILE: &str = "keyframes.log";
+/// What their submaps look like, in its folder.
+pub const PLACES_FILE: &str = "places.index";
+
+/// Keyframes that make no map, or a map that cannot be read or written.
+#[derive(Debug, Error)]
 pub enum MapError {
     /// There is none.
     #[error("a map needs keyframes: there is none")]
     Empty,
-    /// Their number is not that of their poses.
-    #[error(
-        "a map needs a pose for each keyframe: there are {keyframes} keyframes and {poses} poses"
-    )]
-    Poses {
-        /// Number of keyframes.
-        keyframes: usize,
-        /// Number of poses.
-        poses: usize,
-    },
     /// They are not in the order of the path.
     #[error(transparent)]
     Order(#[from] OrderError),
+    /// The keyframes cannot be read or written.
+    #[error(transparent)]
+    Keyframes(#[from] KeyframeError),
+    /// What they look like cannot be read or written.
+    #[error(transparent)]
+    Places(#[from] PlaceFileError),
+    /// The two files are not of one map.
+    #[error("{KEYFRAMES_FILE} has {keyframes} keyframes{open} and {PLACES_FILE} {places}: draw the map again", open = if *.complete { "" } else { " and no end" })]
+    Unlike {
+        /// The number of keyframes.
+        keyframes: usize,
+        /// The file of keyframes was written to its end.
+        complete: bool,
+        /// The number of places.
+        places: usize,
+    },
 }
 
 /// Keyframes with their poses in the map's frame, and what their submaps look like.
 pub struct Map {
     keyframes: Vec<Keyframe>,
-    poses: Vec<Pose>,
     path_m: Vec<f64>,
-    submap_reach_m: f64,
     index: PlaceIndex,
 }
 
 impl Map {
-    /// Describes all keyframes of a drive. `poses` are their poses in the map's frame; the keyframes within `submap_reach_m` along the
-    /// path either way make the submap of one.
+    /// Describes all keyframes of a drive. [`Keyframe::pose`] is in the map's frame.
     ///
     /// # Errors
-    /// No keyframes, another number of poses, or keyframes that are not in the order of the path.
-    pub fn new(
-        keyframes: Vec<Keyframe>,
-        poses: Vec<Pose>,
-        submap_reach_m: f64,
-    ) -> Result<Self, MapError> {
-        if keyframes.is_empty() {
-            return Err(MapError::Empty);
-        }
-        if keyframes.len() != poses.len() {
-            return Err(MapError::Poses {
-                keyframes: keyframes.len(),
-                poses: poses.len(),
-            });
-        }
-        let mut map = Self {
-            path_m: keyframes.iter().map(|keyframe| keyframe.path_m).collect(),
-            index: PlaceIndex::with_capacity(keyframes.len()),
-            keyframes,
-            poses,
-            submap_reach_m,
-        };
+    /// No keyframes, or keyframes that are not in the order of the path.
+    pub fn new(keyframes: Vec<Keyframe>) -> Result<Self, MapError> {
+        let index = PlaceIndex::with_capacity(keyframes.len());
+        let mut map = Self::with_index(keyframes, index)?;
         let (mut submap, mut describer) = (map.new_submap(), Describer::new());
         let mut descriptor = Descriptor::default();
         for k in 0..map.keyframes.len() {
             map.draw(k, &mut submap);
             describer.describe(&submap, &mut descriptor);
-            map.index.insert(k as u64, map.path_m[k], &descriptor)?;
+            let keyframe = &map.keyframes[k];
+            map.index
+                .insert(keyframe.scan, keyframe.path_m, &descriptor)?;
         }
         Ok(map)
     }
 
-    /// The keyframes, in the order of the path.
+    /// Writes the map into a folder: `keyframes.log` and `places.index`. A map that is there is replaced.
+    ///
+    /// # Errors
+    /// Files that cannot be written.
+    pub fn save(&self, folder: &Path) -> Result<(), MapError> {
+        let mut log = KeyframeLog::open(&folder.join(KEYFRAMES_FILE))?;
+        log.cut(0)?;
+        for keyframe in &self.keyframes {
+            log.append(keyframe)?;
+        }
+        self.index.save(&folder.join(PLACES_FILE))?;
+        Ok(log.end()?)
+    }
+
+    /// Reads the map in a folder. All of it is kept in memory.
+    ///
+    /// # Errors
+    /// Files that cannot be read, are damaged, incomplete or not of one map.
+    pub fn open(folder: &Path) -> Result<Self, MapError> {
+        let mut reader = KeyframeReader::open(&folder.join(KEYFRAMES_FILE))?;
+        let keyframes: Result<Vec<_>, _> = (0..reader.len()).map(|k| reader.read(k)).collect();
+        let index = PlaceIndex::load(&folder.join(PLACES_FILE))?;
+        let (complete, keyframes) = (reader.has_ended(), keyframes?);
+        if !complete || index.len() != keyframes.len() {
+            return Err(MapError::Unlike {
+                keyframes: keyframes.len(),
+                complete,
+                places: index.len(),
+            });
+        }
+        Self::with_index(keyframes, index)
+    }
+
+    fn with_index(keyframes: Vec<Keyframe>, index: PlaceIndex) -> Result<Self, MapError> {
+        if keyframes.is_empty() {
+            return Err(MapError::Empty);
+        }
+        Ok(Self {
+            path_m: keyframes.iter().map(|keyframe| keyframe.path_m).collect(),
+            index,
+            keyframes,
+        })
+    }
+
+    /// Returns the keyframes, in the order of the path.
     pub fn keyframes(&self) -> &[Keyframe] {
         &self.keyframes
     }
 
-    /// The poses of the keyframes.
-    pub fn poses(&self) -> &[Pose] {
-        &self.poses
+    /// Returns the pose of a keyframe.
+    pub fn pose(&self, keyframe: usize) -> Pose {
+        self.keyframes[keyframe].pose.motion
     }
 
-    /// The keyframe nearest to a place, and its distance, m.
+    /// Returns the keyframe nearest to a place, and its distance, m.
     pub fn nearest(&self, place: Point2<f64>) -> (usize, f64) {
-        let distance_m = |pose: &Pose| (pose.translation.vector - place.coords).norm();
-        let all = self.poses.iter().map(distance_m).enumerate();
+        let distance_m =
+            |keyframe: &Keyframe| (keyframe.pose.motion.translation.vector - place.coords).norm();
+        let all = self.keyframes.iter().map(distance_m).enumerate();
         all.min_by(|a, b| a.1.total_cmp(&b.1))
             .unwrap_or((0, f64::INFINITY))
     }
 
-    /// The keyframes whose submaps look most like a descriptor, `apart_m` from each other along the path.
-    pub(crate) fn similar(&mut self, descriptor: &Descriptor, apart_m: f64) -> &[Candidate] {
-        self.index.query(descriptor, usize::MAX, apart_m)
+    /// Returns the keyframes by how much their submaps look like a descriptor, each at its best `angles` angles.
+    pub(crate) fn similar(&mut self, descriptor: &Descriptor, angles: usize) -> &[Candidate] {
+        self.index.rank_all(descriptor, angles)
     }
 
     /// Makes the submap around a keyframe.
     pub(crate) fn draw(&self, middle: usize, submap: &mut Submap) {
         let keyframe = &self.keyframes[middle];
         submap.start(&keyframe.points, &keyframe.twist);
-        for k in neighbours(&self.path_m, middle, self.submap_reach_m).filter(|k| *k != middle) {
+        let reach_m = PlaceOptions::default().submap_reach_m;
+        for k in neighbours(&self.path_m, middle, reach_m).filter(|k| *k != middle) {
             let other = &self.keyframes[k];
-            let pose = self.poses[middle].inv_mul(&self.poses[k]);
+            let pose = self.pose(middle).inv_mul(&other.pose.motion);
             submap.add(&other.points, &other.twist, &pose);
         }
     }
 
-    /// A submap with room for that of any keyframe.
+    /// Plans a submap with room for that of any keyframe.
     pub(crate) fn new_submap(&self) -> Submap {
         Submap::with_capacity(self.largest() * (2 * MAX_NEIGHBOURS + 1))
     }
 
-    /// The largest number of points of a keyframe.
+    /// Returns the largest number of points of a keyframe.
     pub(crate) fn largest(&self) -> usize {
         let points = self.keyframes.iter().map(|keyframe| keyframe.points.len());
         points.max().unwrap_or(0)

@@ -4,7 +4,9 @@
 use std::f64::consts::PI;
 
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose};
-use gyre_localisation::{Localisation, Localiser, LocaliserOptions, Map, MapError, Observation, Status};
+use gyre_localisation::{
+    Localisation, Localiser, LocaliserOptions, Map, MapError, Observation, Status,
+};
 use gyre_scan_matching::RefinementConfig;
 use gyre_slam::Keyframe;
 use nalgebra::{Matrix3, Point2};
@@ -17,7 +19,9 @@ const PERIOD_NS: i64 = 250_000_000;
 fn street() -> Vec<(Point2<f64>, f32)> {
     let mut state = 1_u64;
     let mut random = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
         (state >> 40) as f64 / (1_u64 << 24) as f64
     };
     let mut post = || {
@@ -30,10 +34,14 @@ fn street() -> Vec<(Point2<f64>, f32)> {
 
 /// What a sensor that stands at `at` sees of the street.
 fn seen(street: &[(Point2<f64>, f32)], at: &Pose) -> Vec<SparsePoint> {
-    let local = street.iter().map(|(place, weight)| (at.inverse_transform_point(place), *weight));
+    let local = street
+        .iter()
+        .map(|(place, weight)| (at.inverse_transform_point(place), *weight));
     local
         .filter(|(place, _)| place.coords.norm() < REACH_M)
-        .map(|(place, weight)| SparsePoint::from([place.x as f32, place.y as f32, 0.0, weight, 0.0]))
+        .map(|(place, weight)| {
+            SparsePoint::from([place.x as f32, place.y as f32, 0.0, weight, 0.0])
+        })
         .collect()
 }
 
@@ -44,7 +52,9 @@ fn uncertain(motion: Pose) -> UncertainMotion {
 
 /// The map of the first 300 m.
 fn map(street: &[(Point2<f64>, f32)]) -> Map {
-    let poses: Vec<Pose> = (0..=150).map(|k| pose(2.0 * f64::from(k), 0.0, 0.0)).collect();
+    let poses: Vec<Pose> = (0..=150)
+        .map(|k| pose(2.0 * f64::from(k), 0.0, 0.0))
+        .collect();
     let keyframes = poses.iter().enumerate().map(|(k, at)| Keyframe {
         seq: k as u64,
         scan: k as u64,
@@ -87,14 +97,22 @@ fn drive(
 fn assert_near(found: &Localisation, truth: &Pose) {
     let fix = found.fix.expect("a fix");
     let error = fix.pose.error(truth);
-    assert!(error.xy().norm() < 0.1 && error.z.abs() < 0.005, "{truth}: {error}");
+    assert!(
+        error.xy().norm() < 0.1 && error.z.abs() < 0.005,
+        "{truth}: {error}"
+    );
 }
 
 #[test]
 fn a_scan_is_found_at_any_heading_and_no_other_street_is_taken_for_it() {
     let street = street();
     let mut localiser = localiser(&street);
-    for (x, y, heading) in [(41.0, 0.4, 0.0), (120.3, 1.5, PI), (200.7, -1.0, 2.0), (250.0, 0.0, -1.2)] {
+    for (x, y, heading) in [
+        (41.0, 0.4, 0.0),
+        (120.3, 1.5, PI),
+        (200.7, -1.0, 2.0),
+        (250.0, 0.0, -1.2),
+    ] {
         let at = pose(x, y, heading);
         let fix = localiser.find(&seen(&street, &at), &Twist::default());
         let fix = fix.unwrap_or_else(|| panic!("{at} is not found"));
@@ -102,10 +120,16 @@ fn a_scan_is_found_at_any_heading_and_no_other_street_is_taken_for_it() {
         assert!(error.xy().norm() < 0.1 && error.z.abs() < 0.005, "{error}");
     }
     // The street turned over has other distances between its posts.
-    let mirrored: Vec<_> = street.iter().map(|(p, w)| (Point2::new(p.x, -p.y), *w)).collect();
+    let mirrored: Vec<_> = street
+        .iter()
+        .map(|(p, w)| (Point2::new(p.x, -p.y), *w))
+        .collect();
     for x in [50.0, 150.0, 250.0] {
         let at = pose(x, 0.0, 0.3);
-        assert_eq!(localiser.find(&seen(&mirrored, &at), &Twist::default()), None);
+        assert_eq!(
+            localiser.find(&seen(&mirrored, &at), &Twist::default()),
+            None
+        );
     }
 }
 
@@ -114,17 +138,25 @@ fn a_drive_is_tracked_and_lost_three_seconds_after_it_has_left_the_map() {
     let street = street();
     let mut localiser = localiser(&street);
     // The opposite lane at 10 m/s, and on beyond the map's beginning, where there are posts too.
-    let poses: Vec<Pose> = (0..60).map(|k| pose(110.0 - 2.5 * f64::from(k), 3.0, PI)).collect();
+    let poses: Vec<Pose> = (0..60)
+        .map(|k| pose(110.0 - 2.5 * f64::from(k), 3.0, PI))
+        .collect();
     let found = drive(&mut localiser, &street, &poses);
     assert_eq!(found[0].status, Status::Found);
     for (found, truth) in found.iter().zip(&poses).take(44) {
-        assert!(matches!(found.status, Status::Found | Status::Tracked), "{found:?}");
+        assert!(
+            matches!(found.status, Status::Found | Status::Tracked),
+            "{found:?}"
+        );
         assert_near(found, truth);
     }
     for (found, truth) in found.iter().zip(&poses) {
         let away_m = -truth.translation.x - LocaliserOptions::default().reach_m;
         assert!(away_m < 0.5 || found.fix.is_none(), "{found:?} at {truth}");
-        assert!(away_m < 31.0 || found.status == Status::Lost, "{found:?} at {truth}");
+        assert!(
+            away_m < 31.0 || found.status == Status::Lost,
+            "{found:?} at {truth}"
+        );
     }
 }
 
@@ -133,10 +165,16 @@ fn a_vehicle_that_was_carried_away_finds_itself_again() {
     let street = street();
     let mut localiser = localiser(&street);
     let before = (0..10).map(|k| pose(30.0 + 2.0 * f64::from(k), 0.0, 0.0));
-    let carried: Vec<Pose> = (0..25).map(|k| pose(200.0 + 2.0 * f64::from(k), 0.0, 0.5)).collect();
+    let carried: Vec<Pose> = (0..25)
+        .map(|k| pose(200.0 + 2.0 * f64::from(k), 0.0, 0.5))
+        .collect();
     drive(&mut localiser, &street, &before.collect::<Vec<_>>());
     let found = drive(&mut localiser, &street, &carried);
-    assert!(found.iter().any(|found| found.status == Status::Lost || found.status == Status::Found));
+    assert!(
+        found
+            .iter()
+            .any(|found| found.status == Status::Lost || found.status == Status::Found)
+    );
     let last = found.len() - 1;
     assert_eq!(found[last].status, Status::Tracked);
     assert_near(&found[last], &carried[last]);

@@ -58,6 +58,32 @@ impl MaskedCorrelation {
         earlier: ArrayView2<'_, f32>,
         motion: &Pose,
     ) -> Result<f64, ShapeError> {
+        self.correlate(later, earlier, None, motion)
+    }
+
+    /// As [`at`](Self::at), with only those cells of the later raster that its sensor could see: `seen` is 1 there, and 0 elsewhere.
+    ///
+    /// # Errors
+    /// If a raster is not n x n in standard layout.
+    pub fn at_seen(
+        &mut self,
+        later: ArrayView2<'_, f32>,
+        earlier: ArrayView2<'_, f32>,
+        seen: ArrayView2<'_, f32>,
+        motion: &Pose,
+    ) -> Result<f64, ShapeError> {
+        self.correlate(later, earlier, Some(seen), motion)
+    }
+
+    fn correlate(
+        &mut self,
+        later: ArrayView2<'_, f32>,
+        earlier: ArrayView2<'_, f32>,
+        seen: Option<ArrayView2<'_, f32>>,
+        motion: &Pose,
+    ) -> Result<f64, ShapeError> {
+        let seen = seen.as_ref().map(|seen| cells("seen cells", seen, self.n));
+        let seen = seen.transpose()?;
         let later = cells("later raster", &later, self.n)?;
         let earlier = cells("earlier raster", &earlier, self.n)?;
         let shift = motion.translation.vector / -self.cell_m;
@@ -65,6 +91,9 @@ impl MaskedCorrelation {
         let mut total = [0.0_f64; 3];
         for (r, f) in later.chunks_exact(self.n).enumerate() {
             warp.row(earlier, r, &mut self.row);
+            if let Some(seen) = seen {
+                keep_seen(&mut self.row, &seen[r * self.n..][..self.n]);
+            }
             let sums = sum_row(f, &self.row, &self.discs(r, motion));
             total
                 .iter_mut()
@@ -105,6 +134,13 @@ impl Disc {
         );
         x * x + y * y < self.range2
     }
+}
+
+/// Leaves a row as it is where `seen` is 1, and empty where it is 0.
+pub(crate) fn keep_seen(row: &mut [f32], seen: &[f32]) {
+    row.iter_mut()
+        .zip(seen)
+        .for_each(|(cell, seen)| *cell *= seen);
 }
 
 #[simd]
@@ -173,6 +209,20 @@ mod tests {
             let got = correlation.at(f.view(), g.view(), &motion).unwrap();
             prop_assert!((got - direct(&f, &g, &motion, 4.61)).abs() < 2e-3, "{got}");
         }
+    }
+
+    #[test]
+    fn what_could_not_be_seen_does_not_count() {
+        let mut numbers = (0..N * N).map(|k| ((k * 7919) % 101) as f32);
+        let whole = Array2::from_shape_simple_fn((N, N), || numbers.next().unwrap());
+        let seen = Array2::from_shape_fn((N, N), |(_, column)| f32::from(column < N / 2));
+        let half = &whole * &seen;
+        let mut correlation = MaskedCorrelation::new(N, CELL_M, 100.0).unwrap();
+        let (half, still) = (half.view(), Pose::identity());
+        let unmasked = correlation.at(half, whole.view(), &still).unwrap();
+        assert!(unmasked < 0.9, "{unmasked}");
+        let masked = correlation.at_seen(half, whole.view(), seen.view(), &still);
+        assert!((masked.unwrap() - 1.0).abs() < 1e-6);
     }
 
     #[test]

@@ -15,7 +15,7 @@ pub struct Submap {
     /// The points of the keyframe in the middle.
     pub(crate) keyframe: DeskewedPoints,
     /// The points of all keyframes.
-    all: DeskewedPoints,
+    pub(crate) all: DeskewedPoints,
     /// The points of the keyframe that is being added, in its own frame.
     added: DeskewedPoints,
 }

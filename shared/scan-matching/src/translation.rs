@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::config::{ConfigError, TranslationConfig};
 use crate::covariance::{guess, motion_covariance, shift_covariance};
 use crate::fft::{PairSpectrum, fast_size};
+use crate::masked_correlation::keep_seen;
 use crate::overlap::OverlapEnergy;
 use crate::peak::PlanePeak;
 use crate::rotation::RotationMatch;
@@ -97,16 +98,43 @@ impl TranslationSearch {
         earlier: ArrayView2<'_, f32>,
         rotation: &RotationMatch,
     ) -> Result<MotionMatch, ShapeError> {
+        self.search_in(later, earlier, None, rotation)
+    }
+
+    /// As [`search`](Self::search), where the later scan's sensor could not see everything: `seen`, in the directions of the later raster,
+    /// is 1 where it could, and 0 elsewhere. The earlier raster counts only there, as seen from its own sensor.
+    ///
+    /// # Errors
+    /// If a raster is not n x n in standard layout.
+    pub fn search_seen(
+        &mut self,
+        later: ArrayView2<'_, f32>,
+        earlier: ArrayView2<'_, f32>,
+        seen: ArrayView2<'_, f32>,
+        rotation: &RotationMatch,
+    ) -> Result<MotionMatch, ShapeError> {
+        self.search_in(later, earlier, Some(seen), rotation)
+    }
+
+    fn search_in(
+        &mut self,
+        later: ArrayView2<'_, f32>,
+        earlier: ArrayView2<'_, f32>,
+        seen: Option<ArrayView2<'_, f32>>,
+        rotation: &RotationMatch,
+    ) -> Result<MotionMatch, ShapeError> {
         let later = cells("later raster", &later, self.n)?;
         let earlier = cells("earlier raster", &earlier, self.n)?;
+        let seen = seen.as_ref().map(|seen| cells("seen cells", seen, self.n));
+        let seen = seen.transpose()?;
         kernels::finite_copy(later, &mut self.later);
         self.later_energy.measure(&self.later);
-        let straight = self.at_angle(earlier, rotation.angle_rad, rotation.variance_rad2);
+        let (angle_rad, variance_rad2) = (rotation.angle_rad, rotation.variance_rad2);
+        let straight = self.at_angle(earlier, seen, angle_rad, variance_rad2);
         if !self.config.half_turn {
             return Ok(straight);
         }
-        let other = opposite(rotation.angle_rad);
-        let reversed = self.at_angle(earlier, other, rotation.variance_rad2);
+        let reversed = self.at_angle(earlier, seen, opposite(angle_rad), variance_rad2);
         Ok(if reversed.score > straight.score {
             MotionMatch {
                 half_turn: true,
@@ -118,8 +146,17 @@ impl TranslationSearch {
     }
 
     /// The motion if the angle is `angle_rad`.
-    fn at_angle(&mut self, earlier: &[f32], angle_rad: f64, variance_rad2: f64) -> MotionMatch {
+    fn at_angle(
+        &mut self,
+        earlier: &[f32],
+        seen: Option<&[f32]>,
+        angle_rad: f64,
+        variance_rad2: f64,
+    ) -> MotionMatch {
         self.turn(earlier, angle_rad); // line 16
+        if let Some(seen) = seen {
+            keep_seen(&mut self.turned, seen);
+        }
         self.turned_energy.measure(&self.turned);
         let energy = (self.later_energy.total() * self.turned_energy.total()).sqrt();
         if !(energy.is_finite() && energy > 0.0) {

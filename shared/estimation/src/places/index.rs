@@ -14,6 +14,8 @@ use super::descriptor::{Descriptor, HARMONICS, SPECTRUM_BYTES};
 const SHORTLIST: usize = 32;
 /// Samples of the correlation over half a turn.
 const ANGLES: usize = 4 * HARMONICS;
+/// Angles of a place that are ranked, at most.
+const MAX_ANGLES: usize = 8;
 
 /// A place that looks similar.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -158,11 +160,26 @@ impl PlaceIndex {
         let sieves = &self.sieves[..eligible * Descriptor::SIEVE_BYTES];
         self.query.sift(&descriptor.sieve, sieves);
         self.query
-            .rank(&descriptor.spectrum, &self.spectra, &self.norms);
+            .rank(&descriptor.spectrum, &self.spectra, &self.norms, 1);
         let path_m = |candidate: &Candidate| self.places[candidate.place].path_m;
         keep_apart(&mut self.query.found, |a, b| {
             (path_m(a) - path_m(b)).abs() >= apart_m
         });
+        &self.query.found
+    }
+
+    /// Ranks all places by their whole descriptors, the best first, each at the best `angles` angles: for a query that must not miss
+    /// its place, such as a scan of which half is hidden. It takes some microseconds a place.
+    pub fn rank_all(&mut self, descriptor: &Descriptor, angles: usize) -> &[Candidate] {
+        let places = 0..self.places.len() as u32;
+        self.query.distances.clear();
+        self.query.distances.extend(places.map(|place| (0, place)));
+        self.query.rank(
+            &descriptor.spectrum,
+            &self.spectra,
+            &self.norms,
+            angles.min(MAX_ANGLES),
+        );
         &self.query.found
     }
 }
@@ -201,25 +218,29 @@ impl Query {
     }
 
     /// Ranks them by the correlation of the whole descriptors, of equal ones the earlier first.
-    fn rank(&mut self, spectrum: &[i8], spectra: &[i8], norms: &[f32]) {
+    fn rank(&mut self, spectrum: &[i8], spectra: &[i8], norms: &[f32], angles: usize) {
         self.found.clear();
         let own = norm(spectrum);
         for k in 0..self.distances.len() {
             let place = self.distances[k].1 as usize;
             let other = &spectra[place * SPECTRUM_BYTES..][..SPECTRUM_BYTES];
-            let (score, yaw_rad) = self.correlate(spectrum, other, own * norms[place]);
-            self.found.push(Candidate {
-                place,
-                score,
-                yaw_rad,
-            });
+            self.correlate(spectrum, other);
+            let mut peaks = [0; MAX_ANGLES];
+            for &peak in self.highest(&mut peaks[..angles]) {
+                let (score, yaw_rad) = self.refined(peak, own * norms[place]);
+                self.found.push(Candidate {
+                    place,
+                    score,
+                    yaw_rad,
+                });
+            }
         }
         self.found
             .sort_unstable_by(|a, b| b.score.total_cmp(&a.score).then(a.place.cmp(&b.place)));
     }
 
-    /// The highest correlation coefficient over the angle, and the angle (Weston et al., Eq. 7).
-    fn correlate(&mut self, later: &[i8], earlier: &[i8], energy: f32) -> (f64, f64) {
+    /// The correlation over the angle (Weston et al., Eq. 7).
+    fn correlate(&mut self, later: &[i8], earlier: &[i8]) {
         let cross = cross_spectrum(later, earlier);
         self.cross.fill(Complex32::default());
         let (re, im) = cross.split_at(HARMONICS);
@@ -232,18 +253,36 @@ impl Query {
             &mut self.scratch,
         );
         debug_assert!(done.is_ok(), "lengths are those of the plan");
-        let at = |k: isize| {
-            let wrapped = k.rem_euclid(ANGLES as isize) as usize;
-            f64::from(self.correlation[wrapped])
-        };
-        let best = (0..ANGLES as isize)
-            .max_by(|&a, &b| at(a).total_cmp(&at(b)).then(b.cmp(&a)))
-            .unwrap_or(0);
-        let peak = line_peak(Peak::Parabola, |k| at(best + k));
+    }
+
+    /// The correlation at a sample of the angle.
+    fn at(&self, k: isize) -> f64 {
+        f64::from(self.correlation[k.rem_euclid(ANGLES as isize) as usize])
+    }
+
+    /// Fills in the samples of the highest local maxima, the highest first, of equal ones the earlier; returns those that there are. A flat
+    /// correlation has its maximum at the first sample.
+    fn highest<'a>(&self, peaks: &'a mut [isize]) -> &'a [isize] {
+        let mut count = 0;
+        let is_peak = |k: &isize| self.at(*k) > self.at(k - 1) && self.at(*k) >= self.at(k + 1);
+        for k in (0..ANGLES as isize).filter(is_peak) {
+            let place = peaks[..count].partition_point(|&higher| self.at(higher) >= self.at(k));
+            if place < peaks.len() {
+                count = (count + 1).min(peaks.len());
+                peaks[place..count].rotate_right(1);
+                peaks[place] = k;
+            }
+        }
+        &peaks[..count.max(1).min(peaks.len())]
+    }
+
+    /// The correlation coefficient at a local maximum between the samples, and its angle.
+    fn refined(&self, sample: isize, energy: f32) -> (f64, f64) {
+        let peak = line_peak(Peak::Parabola, |k| self.at(sample + k));
         // Each harmonic stands for its mirror image too.
         let score = peak.value / (2.0 * f64::from(energy).max(1.0));
         // Doubled, the half turn is a whole one.
-        let doubled = wrap_angle((best as f64 + peak.offset) * 2.0 * PI / ANGLES as f64);
+        let doubled = wrap_angle((sample as f64 + peak.offset) * 2.0 * PI / ANGLES as f64);
         (score, 0.5 * doubled)
     }
 }
@@ -334,7 +373,11 @@ mod tests {
         ) {
             let mut query = Query::new(1);
             let energy = norm(&later) * norm(&earlier);
-            let (best, _) = query.correlate(&later, &earlier, energy);
+            query.correlate(&later, &earlier);
+            let mut peaks = [0; 3];
+            let peaks = query.highest(&mut peaks);
+            let (best, _) = query.refined(peaks[0], energy);
+            prop_assert!(peaks.is_sorted_by(|a, b| query.at(*a) >= query.at(*b)));
             let got = f64::from(query.correlation[shift]) / (2.0 * f64::from(energy));
             prop_assert!((got - direct(&later, &earlier, shift)).abs() < 1e-5);
             prop_assert!(best >= got - 1e-6);

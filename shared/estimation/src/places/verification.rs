@@ -118,40 +118,15 @@ impl LoopVerifier {
         if best.score < self.min_correlation - COARSE_LOSS {
             return found;
         }
-        match self.align(later, earlier, &searched) {
-            Some((motion, correlation)) => {
+        match self.aligner.align(later, earlier, &searched) {
+            Some(motion) => {
                 found.motion = motion;
-                found.correlation = correlation;
+                found.correlation = self.correlation_at(&motion.motion);
                 found.outcome = self.judge(&found);
             }
             None => found.outcome = VerificationOutcome::Undetermined,
         }
         found
-    }
-
-    /// Registers two submaps without a search, from an initial guess within some metres: the motion with its covariance, and the masked
-    /// correlation of the submaps there; `None` if the points of the two keyframes do not determine it.
-    pub fn register(
-        &mut self,
-        later: &Submap,
-        earlier: &Submap,
-        initial: &Pose,
-    ) -> Option<(UncertainMotion, f64)> {
-        draw(later, &mut self.later);
-        draw(earlier, &mut self.earlier);
-        self.align(later, earlier, initial)
-    }
-
-    /// Aligns two submaps that are drawn, and correlates them.
-    fn align(
-        &mut self,
-        later: &Submap,
-        earlier: &Submap,
-        initial: &Pose,
-    ) -> Option<(UncertainMotion, f64)> {
-        let motion = self.aligner.align(later, earlier, initial)?;
-        let correlation = self.correlation_at(&motion.motion);
-        Some((motion, correlation))
     }
 
     /// The translation if the angle is `angle_rad`.

@@ -12,10 +12,10 @@ use crate::{ConfigError, Submap};
 const COARSE_ITERATIONS: usize = 20;
 const FINE_ITERATIONS: usize = 20;
 
-/// Aligns the middle keyframes of two submaps, by the points of these two scans alone.
+/// Aligns the middle keyframes of two submaps.
 ///
-/// It is the [`Refiner`](crate::Refiner)'s alignment with a map of one keyframe. The neighbours in the submaps are left out: laid
-/// together by odometry they carry its errors into the result.
+/// It is the [`Refiner`](crate::Refiner)'s alignment with a map of one image. [`align`](Self::align) takes the points of these two scans
+/// alone: laid together by odometry, the neighbours in the submaps would carry its errors into the result.
 ///
 /// Nothing is allocated after construction.
 #[derive(Debug)]
@@ -53,8 +53,28 @@ impl KeyframeAligner {
         earlier: &Submap,
         initial: &Pose,
     ) -> Option<UncertainMotion> {
+        self.align_to(later, &earlier.keyframe, initial)
+    }
+
+    /// As [`align`](Self::align), with all points of the earlier submap: where its keyframes lie better to each other than one scan
+    /// measures.
+    pub fn align_to_submap(
+        &mut self,
+        later: &Submap,
+        earlier: &Submap,
+        initial: &Pose,
+    ) -> Option<UncertainMotion> {
+        self.align_to(later, &earlier.all, initial)
+    }
+
+    fn align_to(
+        &mut self,
+        later: &Submap,
+        earlier: &DeskewedPoints,
+        initial: &Pose,
+    ) -> Option<UncertainMotion> {
         self.map.clear();
-        self.map.insert(0, &earlier.keyframe, &Pose::identity());
+        self.map.insert(0, earlier, &Pose::identity());
         let points = &later.keyframe;
         self.thinned.clear();
         self.thinned.extend(points, &Pose::identity());
