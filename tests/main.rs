@@ -19,6 +19,7 @@ mod k2pi;
 mod keyframes;
 mod learned_masks;
 mod live;
+mod localise;
 mod lost_input;
 mod masks;
 mod observers;

@@ -5,6 +5,7 @@ mod cli;
 mod corrupt;
 mod drive;
 mod export_pairs;
+mod localisation;
 mod models;
 mod places;
 mod realism;
@@ -36,6 +37,7 @@ fn main() -> ExitCode {
         Command::ExportPairs(arguments) => export_pairs::export_pairs(&arguments),
         Command::Places(arguments) => places::places(&arguments),
         Command::Slam(arguments) => slam::slam(&arguments),
+        Command::Localisation(arguments) => localisation::localisation(&arguments),
         Command::Gyre(command) => return gyre::report("gyre", gyre::execute(command)),
     };
     gyre::report("gyre-lab", result)

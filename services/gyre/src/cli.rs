@@ -43,6 +43,8 @@ pub enum Command {
     Evaluate(EvaluateArguments),
     /// Draw the map of a run.
     Map(MapArguments),
+    /// Find a drive in a map, scan after scan.
+    Localise(LocaliseArguments),
     /// Draw what the mask keeps of scans.
     Masks(MasksArguments),
     /// Write a simulated recording, or complete one.
@@ -196,6 +198,25 @@ pub enum MapFormat {
     Pgm,
     /// web/Z/X/Y.png.
     Web,
+}
+
+/// The arguments of `gyre localise`.
+#[derive(Debug, Args)]
+pub struct LocaliseArguments {
+    /// The configuration, a TOML file: its odometry.
+    pub configuration: PathBuf,
+    /// The folder of the map, of `gyre map --format folder`.
+    #[arg(long)]
+    pub map: PathBuf,
+    /// The recording's folder. Default: the configuration's simulation, or its source.data.
+    #[arg(long)]
+    pub data: Option<PathBuf>,
+    /// The folder of fixes.csv.
+    #[arg(long, default_value = "out/localise")]
+    pub out: PathBuf,
+    /// Override a key, as in source.first=100; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
 }
 
 /// The arguments of `gyre masks`.

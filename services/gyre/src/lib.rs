@@ -11,6 +11,7 @@ pub mod identity;
 pub mod inspect;
 pub mod judgement;
 pub mod latency;
+pub mod localise;
 pub mod machine;
 pub mod map;
 pub mod masks;
@@ -64,6 +65,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Inspect(arguments) => inspect::inspect(&arguments),
         Command::Evaluate(arguments) => evaluate::evaluate(&arguments),
         Command::Map(arguments) => map::map(&arguments),
+        Command::Localise(arguments) => localise::localise(&arguments),
         Command::Masks(arguments) => masks::masks(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Schema(arguments) => schema::schema(&arguments),

@@ -1,6 +1,7 @@
 //! `gyre map`: draws the map of a run.
 
 mod drawing;
+mod keyframes;
 mod loops;
 
 use std::{collections::BTreeMap, path::Path, process::ExitCode};
@@ -55,6 +56,9 @@ pub fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
             total - count,
             trajectory.display()
         ));
+    }
+    if arguments.format.contains(&MapFormat::Folder) {
+        keyframes::keep(&mut keyframes, &poses, &arguments.out)?;
     }
     write(arguments, &mut drawing, &lines)?;
     print::line(format_args!(
@@ -213,6 +217,9 @@ mod tests {
         let out = folder.path().join("map");
         let opened = Map::open(&out).unwrap();
         assert_eq!(opened.keyframes(), 3);
+        let kept = gyre_localisation::Map::open(&out).unwrap();
+        assert_eq!(kept.keyframes().len(), 3);
+        assert_eq!(kept.pose(2).translation.x, 6.0);
         assert_eq!(
             (opened.options().cell_m, opened.options().reach_m),
             (0.5, 60.0)

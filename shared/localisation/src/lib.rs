@@ -24,5 +24,5 @@ mod registration;
 mod sight;
 
 pub use localiser::{Fix, Localisation, Localiser, Observation, Status};
-pub use map::{KEYFRAMES_FILE, Map, MapError, PLACES_FILE};
+pub use map::{Map, MapError};
 pub use options::LocaliserOptions;

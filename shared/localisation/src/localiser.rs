@@ -338,8 +338,9 @@ fn fused(
     let innovation = measured.error(&predicted.motion);
     let inverse = (predicted.covariance + measured.covariance).try_inverse()?;
     let chi_square = (innovation.transpose() * inverse * innovation).x;
-    // Not a number is no agreement.
-    if !(chi_square <= gate) {
+    // Not a number does not.
+    let agrees = chi_square <= gate;
+    if !agrees {
         return None;
     }
     let gain = predicted.covariance * inverse;

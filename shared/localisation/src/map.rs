@@ -8,14 +8,15 @@ use gyre_estimation::places::{
 };
 use gyre_geometry::Pose;
 use gyre_scan_matching::Submap;
-use gyre_slam::{Keyframe, KeyframeError, KeyframeLog, KeyframeReader};
+use gyre_slam::{Keyframe, Record, RecordLog, RecordReader};
+use gyre_storage::LogError;
 use nalgebra::Point2;
 use thiserror::Error;
 
 /// The keyframes of a map, in its folder.
-pub const KEYFRAMES_FILE: &str = "keyframes.log";
+const KEYFRAMES: &str = Keyframe::FILE;
 /// What their submaps look like, in its folder.
-pub const PLACES_FILE: &str = "places.index";
+const PLACES: &str = "places.index";
 
 /// Keyframes that make no map, or a map that cannot be read or written.
 #[derive(Debug, Error)]
@@ -28,17 +29,20 @@ pub enum MapError {
     Order(#[from] OrderError),
     /// The keyframes cannot be read or written.
     #[error(transparent)]
-    Keyframes(#[from] KeyframeError),
+    Keyframes(#[from] LogError),
     /// What they look like cannot be read or written.
     #[error(transparent)]
     Places(#[from] PlaceFileError),
     /// The two files are not of one map.
-    #[error("{KEYFRAMES_FILE} has {keyframes} keyframes{open} and {PLACES_FILE} {places}: draw the map again", open = if *.complete { "" } else { " and no end" })]
+    #[error(
+        "{KEYFRAMES} has {keyframes} keyframes{end}, and {PLACES} {places}: draw the map again with gyre map",
+        end = if *.is_complete { "" } else { " and no end" }
+    )]
     Unlike {
         /// The number of keyframes.
         keyframes: usize,
         /// The file of keyframes was written to its end.
-        complete: bool,
+        is_complete: bool,
         /// The number of places.
         places: usize,
     },
@@ -76,12 +80,12 @@ impl Map {
     /// # Errors
     /// Files that cannot be written.
     pub fn save(&self, folder: &Path) -> Result<(), MapError> {
-        let mut log = KeyframeLog::open(&folder.join(KEYFRAMES_FILE))?;
+        let mut log = RecordLog::<Keyframe>::open_file(&folder.join(KEYFRAMES))?;
         log.cut(0)?;
         for keyframe in &self.keyframes {
             log.append(keyframe)?;
         }
-        self.index.save(&folder.join(PLACES_FILE))?;
+        self.index.save(&folder.join(PLACES))?;
         Ok(log.end()?)
     }
 
@@ -90,14 +94,14 @@ impl Map {
     /// # Errors
     /// Files that cannot be read, are damaged, incomplete or not of one map.
     pub fn open(folder: &Path) -> Result<Self, MapError> {
-        let mut reader = KeyframeReader::open(&folder.join(KEYFRAMES_FILE))?;
+        let mut reader = RecordReader::<Keyframe>::open_file(&folder.join(KEYFRAMES))?;
         let keyframes: Result<Vec<_>, _> = (0..reader.len()).map(|k| reader.read(k)).collect();
-        let index = PlaceIndex::load(&folder.join(PLACES_FILE))?;
-        let (complete, keyframes) = (reader.has_ended(), keyframes?);
-        if !complete || index.len() != keyframes.len() {
+        let index = PlaceIndex::load(&folder.join(PLACES))?;
+        let (is_complete, keyframes) = (reader.has_ended(), keyframes?);
+        if !is_complete || index.len() != keyframes.len() {
             return Err(MapError::Unlike {
                 keyframes: keyframes.len(),
-                complete,
+                is_complete,
                 places: index.len(),
             });
         }

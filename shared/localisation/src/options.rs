@@ -35,16 +35,16 @@ impl Default for LocaliserOptions {
     fn default() -> Self {
         Self {
             first_candidates: 8,
-            candidates: 60,
+            candidates: 150,
             angles: 3,
             apart_m: 10.0,
             search_reach_m: 25.0,
-            min_correlation: 0.3,
-            min_margin: 0.06,
+            min_correlation: 0.35,
+            min_margin: 0.08,
             same_m: 2.0,
             tracked_correlation: 0.35,
             gate: 16.27,
-            variance_scale: 1.0,
+            variance_scale: 2.0,
             reach_m: 15.0,
             lost_after_s: 3.0,
         }

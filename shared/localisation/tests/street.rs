@@ -8,7 +8,7 @@ use gyre_localisation::{
     Localisation, Localiser, LocaliserOptions, Map, MapError, Observation, Status,
 };
 use gyre_scan_matching::RefinementConfig;
-use gyre_slam::Keyframe;
+use gyre_slam::{Keyframe, RecordLog};
 use nalgebra::{Matrix3, Point2};
 
 const REACH_M: f64 = 90.0;
@@ -55,7 +55,7 @@ fn map(street: &[(Point2<f64>, f32)]) -> Map {
     let poses: Vec<Pose> = (0..=150)
         .map(|k| pose(2.0 * f64::from(k), 0.0, 0.0))
         .collect();
-    let keyframes = poses.iter().enumerate().map(|(k, at)| Keyframe {
+    let keyframe = |(k, at): (usize, &Pose)| Keyframe {
         seq: k as u64,
         scan: k as u64,
         stamp_ns: k as i64 * PERIOD_NS,
@@ -64,9 +64,8 @@ fn map(street: &[(Point2<f64>, f32)]) -> Map {
         twist: Twist::default(),
         path_m: 2.0 * k as f64,
         points: seen(street, at),
-    });
-    let reach_m = LocaliserOptions::default().places.submap_reach_m;
-    Map::new(keyframes.collect(), poses.clone(), reach_m).unwrap()
+    };
+    Map::new(poses.iter().enumerate().map(keyframe).collect()).unwrap()
 }
 
 fn localiser(street: &[(Point2<f64>, f32)]) -> Localiser {
@@ -181,7 +180,67 @@ fn a_vehicle_that_was_carried_away_finds_itself_again() {
 }
 
 #[test]
+fn a_scan_of_which_half_is_hidden_is_found() {
+    let street = street();
+    let mut localiser = localiser(&street);
+    for (x, y, heading) in [(60.0, 1.0, 0.3), (150.3, 3.0, PI), (222.0, -1.0, -2.0)] {
+        let at = pose(x, y, heading);
+        let mut points = seen(&street, &at);
+        points.retain(|point| point.y_m < 0.0);
+        let fix = localiser.find(&points, &Twist::default());
+        let error = fix
+            .unwrap_or_else(|| panic!("{at} is not found"))
+            .pose
+            .error(&at);
+        assert!(error.xy().norm() < 0.1 && error.z.abs() < 0.005, "{error}");
+    }
+}
+
+#[test]
+fn a_saved_map_finds_the_same_places() {
+    let (street, folder) = (street(), tempfile::tempdir().unwrap());
+    let saved = map(&street);
+    // A shorter one before it leaves nothing behind.
+    Map::new(saved.keyframes()[..9].to_vec())
+        .unwrap()
+        .save(folder.path())
+        .unwrap();
+    saved.save(folder.path()).unwrap();
+    let opened = Map::open(folder.path()).unwrap();
+    assert_eq!(opened.keyframes(), saved.keyframes());
+    let points = seen(&street, &pose(99.0, 0.5, 1.0));
+    let found = [saved, opened].map(|map| {
+        let options = LocaliserOptions::default();
+        let localiser = Localiser::new(map, options, &RefinementConfig::default(), CAPACITY);
+        localiser.unwrap().find(&points, &Twist::default())
+    });
+    assert!(found[0].is_some());
+    assert_eq!(found[0], found[1]);
+}
+
+#[test]
 fn keyframes_that_make_no_map_are_refused() {
-    let error = Map::new(Vec::new(), Vec::new(), 10.0).err();
-    assert_eq!(error, Some(MapError::Empty));
+    let refused = |error: MapError| error.to_string();
+    let empty = Map::new(Vec::new()).err().map(refused);
+    assert_eq!(
+        empty.as_deref(),
+        Some("a map needs keyframes: there is none")
+    );
+}
+
+#[test]
+fn a_map_that_was_not_written_to_its_end_is_refused_with_what_to_do() {
+    let (street, folder) = (street(), tempfile::tempdir().unwrap());
+    let whole = map(&street);
+    whole.save(folder.path()).unwrap();
+    let mut log = RecordLog::<Keyframe>::open_file(&folder.path().join("keyframes.log")).unwrap();
+    log.cut(100).unwrap();
+    drop(log);
+    let refused = |folder: &std::path::Path| Map::open(folder).err().unwrap().to_string();
+    assert_eq!(
+        refused(folder.path()),
+        "keyframes.log has 100 keyframes and no end, and places.index 151: draw the map again with gyre map"
+    );
+    let nowhere = refused(&folder.path().join("nowhere"));
+    assert!(nowhere.contains("places.index"), "{nowhere}");
 }

@@ -45,7 +45,15 @@ impl<R: Record> RecordLog<R> {
     /// # Errors
     /// A file that cannot be read or written, is of another kind, is damaged, or to which another process writes.
     pub fn open(out: &Path) -> Result<Self, LogError> {
-        let log = Log::open(&records_path::<R>(out), R::MAGIC)?;
+        Self::open_file(&records_path::<R>(out))
+    }
+
+    /// As [`open`](Self::open), of a file that is not in the results of a run.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_file(path: &Path) -> Result<Self, LogError> {
+        let log = Log::open(path, R::MAGIC)?;
         let mut buffer = Vec::new();
         if let Some(last) = log.len().checked_sub(1) {
             log.read(last, &mut buffer)?;
@@ -142,8 +150,16 @@ impl<R: Record> RecordReader<R> {
     /// # Errors
     /// A file that cannot be read, is of another kind or damaged.
     pub fn open(out: &Path) -> Result<Self, LogError> {
+        Self::open_file(&records_path::<R>(out))
+    }
+
+    /// As [`open`](Self::open), of a file that is not in the results of a run.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_file(path: &Path) -> Result<Self, LogError> {
         let mut reader = Self {
-            log: LogReader::open(&records_path::<R>(out), R::MAGIC)?,
+            log: LogReader::open(path, R::MAGIC)?,
             ended: false,
             buffer: Vec::new(),
             records: PhantomData,
