@@ -1,12 +1,12 @@
 //! What is measured of loops and of a corrected trajectory.
 
-use std::time::Duration;
+use std::{collections::BTreeMap, time::Duration};
 
 use gyre::{Failure, judgement::judge};
 use gyre_evaluation::Options;
 use gyre_geometry::UncertainMotion;
 use gyre_radar::Trajectory;
-use gyre_slam::{Query, TrajectoryEstimator};
+use gyre_slam::{LoopCandidate, Query, TrajectoryEstimator};
 use serde_json::json;
 
 use crate::{
@@ -29,6 +29,8 @@ pub struct Figures {
     residual_m: Option<f64>,
     /// NEES of the keyframes' poses, of the whole pose, over its expectation.
     nees: f64,
+    /// Factor of the covariances by the residuals.
+    scale: Option<f64>,
     solved: Duration,
 }
 
@@ -40,6 +42,7 @@ impl Figures {
             loops: [0; 2],
             residual_m: None,
             nees: nees(drive, &poses),
+            scale: None,
             solved: Duration::ZERO,
         })
     }
@@ -57,6 +60,7 @@ impl Figures {
                 .collect(),
             ..drive.estimate.clone()
         };
+        let scale = estimator.scale_covariances()?;
         let keyframes = 0..drive.keyframes.len();
         let poses: Result<Vec<_>, _> = keyframes.map(|k| estimator.pose(k)).collect();
         let weak = |weight: f64| weight < 0.25;
@@ -75,6 +79,7 @@ impl Figures {
             ],
             residual_m: Some((squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()),
             nees: nees(drive, &poses?),
+            scale: Some(scale),
             solved,
         })
     }
@@ -82,7 +87,7 @@ impl Figures {
     pub fn row(&self, name: &str) -> Record {
         record(json!({
             "trajectory": name, "ate_m": self.ate_m, "loops": self.loops[0], "outvoted": self.loops[1],
-            "residual_m": self.residual_m, "nees": self.nees, "solved_ms": self.solved.as_secs_f64() * 1e3,
+            "residual_m": self.residual_m, "nees": self.nees, "scale": self.scale, "solved_ms": self.solved.as_secs_f64() * 1e3,
         }))
     }
 }
@@ -97,10 +102,11 @@ pub fn table(rows: Vec<Record>) -> Table {
             ("outvoted", "rejected", 0),
             ("residual_m", "residual rms m", 3),
             ("nees", "NEES", 2),
+            ("scale", "scale of covariances", 2),
             ("solved_ms", "solved in ms", 0),
         ],
         rows,
-        legend: "NEES over its expectation, of the poses of keyframes against the first one."
+        legend: "NEES over its expectation, of the poses of keyframes against the first one, with scaled covariances."
             .to_owned(),
         ..Table::default()
     }
@@ -129,42 +135,63 @@ fn nees(drive: &Drive, poses: &[UncertainMotion]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// The loops against the truth.
-pub fn loops_table(drive: &Drive, queries: &[Query], wrong_m: f64, closing: Duration) -> Table {
-    let (mut right, mut wrong, mut revisits, mut closed) = (0, 0, 0_u32, 0_u32);
-    let mut outcomes = std::collections::BTreeMap::new();
-    for query in queries {
-        let k = query.keyframe;
-        let mut is_closed = false;
+/// The loops of all queries against the truth.
+#[derive(Default)]
+struct LoopCounts {
+    right: usize,
+    wrong: usize,
+    /// Keyframes near an earlier one, and those of them with a right loop.
+    revisits: usize,
+    closed: usize,
+    outcomes: BTreeMap<String, usize>,
+}
+
+impl LoopCounts {
+    fn add(&mut self, drive: &Drive, query: &Query, wrong_m: f64) {
         for candidate in &query.candidates {
-            *outcomes
-                .entry(format!("{:?}", candidate.outcome))
-                .or_insert(0) += 1;
+            let outcome = format!("{:?}", candidate.outcome);
+            *self.outcomes.entry(outcome).or_default() += 1;
         }
+        let mut is_closed = false;
         for (candidate, _) in query.loops() {
-            let (Some(later), Some(earlier)) = (drive.truths[k], drive.truths[candidate.place])
-            else {
-                continue;
-            };
-            let error = candidate.motion.error(&earlier.inv_mul(&later));
-            let is_wrong = error.xy().norm() > wrong_m || error.z.abs() > WRONG_DEG.to_radians();
-            match is_wrong {
-                true => wrong += 1,
-                false => right += 1,
+            match is_wrong(drive, query.keyframe, candidate, wrong_m) {
+                Some(true) => self.wrong += 1,
+                Some(false) => {
+                    self.right += 1;
+                    is_closed = true;
+                }
+                None => {}
             }
-            is_closed |= !is_wrong;
         }
-        let eligible = drive
-            .path_m
-            .partition_point(|at| *at <= drive.path_m[k] - GAP_M);
-        if (0..eligible).any(|place| drive.true_distance_m(k, place) < NEAR_M) {
-            revisits += 1;
-            closed += u32::from(is_closed);
+        if is_revisit(drive, query.keyframe) {
+            self.revisits += 1;
+            self.closed += usize::from(is_closed);
         }
     }
+}
+
+/// Whether a loop contradicts the truth; `None` where that is unknown.
+fn is_wrong(drive: &Drive, later: usize, found: &LoopCandidate, wrong_m: f64) -> Option<bool> {
+    let (later, earlier) = (drive.truths[later]?, drive.truths[found.place]?);
+    let error = found.motion.error(&earlier.inv_mul(&later));
+    Some(error.xy().norm() > wrong_m || error.z.abs() > WRONG_DEG.to_radians())
+}
+
+fn is_revisit(drive: &Drive, keyframe: usize) -> bool {
+    let until_m = drive.path_m[keyframe] - GAP_M;
+    let eligible = drive.path_m.partition_point(|at| *at <= until_m);
+    (0..eligible).any(|place| drive.true_distance_m(keyframe, place) < NEAR_M)
+}
+
+/// The loops against the truth.
+pub fn loops_table(drive: &Drive, queries: &[Query], wrong_m: f64, closing: Duration) -> Table {
+    let mut counts = LoopCounts::default();
+    for query in queries {
+        counts.add(drive, query, wrong_m);
+    }
     let row = json!({
-        "right": right, "wrong": wrong, "revisits": revisits,
-        "recall": 100.0 * f64::from(closed) / f64::from(revisits.max(1)),
+        "right": counts.right, "wrong": counts.wrong, "revisits": counts.revisits,
+        "recall": 100.0 * counts.closed as f64 / counts.revisits.max(1) as f64,
     });
     Table {
         title: "Loops".to_owned(),
@@ -176,8 +203,9 @@ pub fn loops_table(drive: &Drive, queries: &[Query], wrong_m: f64, closing: Dura
         ],
         rows: vec![record(row)],
         legend: format!(
-            "{} keyframes; candidates by verdict: {outcomes:?}; closed in {:.1} s.",
+            "{} keyframes; candidates by verdict: {:?}; closed in {:.1} s.",
             queries.len(),
+            counts.outcomes,
             closing.as_secs_f64()
         ),
         ..Table::default()

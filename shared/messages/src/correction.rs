@@ -56,7 +56,7 @@ pub struct CorrectionHeader {
     pub y_m: f64,
     /// Counter-clockwise, rad, in (-pi, pi].
     pub yaw_rad: f64,
-    /// Covariance of (x, y, yaw) of the newest keyframe's pose in the map frame: see [`covariance::Packed`].
+    /// Covariance of (x, y, yaw) of the newest keyframe's pose in the map frame, not scaled by residuals: see [`covariance::Packed`].
     pub keyframe_covariance: covariance::Packed,
 }
 

@@ -39,7 +39,7 @@ impl DeadReckoning {
     }
 
     /// Returns the motion from keyframe `from` to keyframe `to`, which may be the earlier one.
-    fn motion(&self, from: usize, to: usize) -> UncertainMotion {
+    pub fn motion(&self, from: usize, to: usize) -> UncertainMotion {
         let (first, last) = (from.min(to), from.max(to));
         let to_pose = lever(self.poses[to].translation.x, self.poses[to].translation.y);
         let along = self.poses[from].rotation.inverse().to_rotation_matrix();

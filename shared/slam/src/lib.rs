@@ -20,6 +20,8 @@ mod loops;
 mod place;
 mod records;
 mod trajectory;
+mod variance;
+mod verdict;
 
 pub use closing::{ClosingError, KeyframeSource, LoopCloser, LoopOptions};
 pub use config::{SlamConfig, SlamKind};
@@ -29,6 +31,5 @@ pub use keyframe_builder::{KeyframeBuilder, ScanPose};
 pub use loops::{LoopCandidate, LoopOutcome, Query};
 pub use place::Place;
 pub use records::{Record, RecordLog, RecordReader, records_path};
-pub use trajectory::{
-    EstimatorKind, JudgedLoop, LoopVerdict, TrajectoryEstimator, TrajectoryOptions,
-};
+pub use trajectory::{EstimatorKind, TrajectoryEstimator, TrajectoryOptions};
+pub use verdict::{JudgedLoop, LoopVerdict};

@@ -1,13 +1,13 @@
 //! The poses of keyframes, estimated from odometry and loops.
 
 use gyre_estimation::{
-    CHI_SQUARE_99_9, Constraint, EstimationError, FilterOptions, GraphOptions, Kind, Outcome,
-    PoseGraph, TrajectoryFilter, Verdict,
+    Constraint, EstimationError, FilterOptions, GraphOptions, Kind, Outcome, PoseGraph,
+    TrajectoryFilter, Verdict,
 };
 use gyre_geometry::{Pose, UncertainMotion};
 
 use crate::consistency::{DeadReckoning, Speakers};
-use crate::{Correction, Keyframe, Query};
+use crate::{Correction, JudgedLoop, Keyframe, LoopVerdict, Query, variance};
 
 /// All loops are judged anew when their number has grown by this share of it: that takes time in proportion to it.
 const GROWTH: usize = 8;
@@ -40,48 +40,6 @@ impl Default for TrajectoryOptions {
     }
 }
 
-/// The verdict of the trajectory on a loop.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LoopVerdict {
-    /// The loop is part of the estimate.
-    Used,
-    /// It contradicts the odometry between its keyframes; in the filter, the estimate.
-    ContradictsOdometry,
-    /// It contradicts most of the other loops.
-    ContradictsLoops,
-    /// Its group has been counted in full (filter alone).
-    Redundant,
-}
-
-/// A loop that was accepted by the [`LoopCloser`](crate::LoopCloser), and what became of it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct JudgedLoop {
-    /// The loop, from the earlier to the later keyframe, in its group.
-    pub constraint: Constraint,
-    /// Chi-square against the odometry between its keyframes; 0 in the filter, which tests against the estimate.
-    pub chi_square: f64,
-    /// The verdict.
-    pub verdict: LoopVerdict,
-    /// The kernel's weight in the graph, 0 to 1; 0 if the loop is not used.
-    pub weight: f64,
-    /// Whether the standing estimate is made with it.
-    is_taken: bool,
-}
-
-impl JudgedLoop {
-    /// Judges the loop by its test against the odometry alone.
-    fn judge_by_odometry(&mut self) {
-        self.verdict = match self.chi_square <= CHI_SQUARE_99_9 {
-            true => LoopVerdict::Used,
-            false => LoopVerdict::ContradictsOdometry,
-        };
-    }
-
-    fn is_used(&self) -> bool {
-        self.verdict == LoopVerdict::Used
-    }
-}
-
 /// Estimates the poses of all keyframes from their motions and loops.
 ///
 /// - [`TrajectoryEstimator::solve`] begins anew. Its result is a function of the keyframes and of the set of loops, and not of when
@@ -97,6 +55,8 @@ pub struct TrajectoryEstimator {
     /// The loops that the others were compared with when all were judged, and the number of loops at that time.
     speakers: Speakers,
     judged: usize,
+    /// Of the covariances of the poses.
+    scale: f64,
     estimator: Estimator,
 }
 
@@ -155,6 +115,7 @@ impl TrajectoryEstimator {
             loops: Vec::new(),
             speakers: Speakers::default(),
             judged: 0,
+            scale: 1.0,
         }
     }
 
@@ -245,10 +206,25 @@ impl TrajectoryEstimator {
     /// # Errors
     /// There is no such keyframe, or the constraints do not determine the poses.
     pub fn pose(&mut self, keyframe: usize) -> Result<UncertainMotion, EstimationError> {
-        match &mut self.estimator {
-            Estimator::Graph(graph) => graph.pose(keyframe),
-            Estimator::Filter(filter) => filter.pose(keyframe),
-        }
+        let mut pose = match &mut self.estimator {
+            Estimator::Graph(graph) => graph.pose(keyframe)?,
+            Estimator::Filter(filter) => filter.pose(keyframe)?,
+        };
+        pose.covariance *= self.scale;
+        Ok(pose)
+    }
+
+    /// Scales the covariances of the poses from now on so that the residuals of odometry and loops are as large as they say. Returns the
+    /// scale, which is 1 without loops and in the filter. It takes some 1,400 solutions of the equations.
+    ///
+    /// # Errors
+    /// The constraints do not determine the poses.
+    pub fn scale_covariances(&mut self) -> Result<f64, EstimationError> {
+        self.scale = match &mut self.estimator {
+            Estimator::Graph(graph) => variance::scale(graph, &self.odometry, &self.loops)?,
+            Estimator::Filter(_) => 1.0,
+        };
+        Ok(self.scale)
     }
 
     /// Returns all loops, by the later keyframe, then by the earlier one.
@@ -287,17 +263,13 @@ impl TrajectoryEstimator {
         let stretch =
             |keyframe: usize| (self.keyframes[keyframe].path_m / self.options.group_m) as u64;
         let group = Some(stretch(from) << 32 | stretch(to));
-        let mut judged = JudgedLoop {
-            constraint: Constraint {
+        let judged = JudgedLoop::new(
+            Constraint {
                 kind: Kind::Loop { group },
                 ..*closing
             },
             chi_square,
-            verdict: LoopVerdict::Used,
-            weight: 0.0,
-            is_taken: false,
-        };
-        judged.judge_by_odometry();
+        );
         let is_before = |it: &JudgedLoop| (it.constraint.to, it.constraint.from) <= (to, from);
         let place = self.loops.partition_point(is_before);
         self.loops.insert(place, judged);

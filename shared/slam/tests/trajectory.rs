@@ -205,6 +205,38 @@ fn the_filter_corrects_as_the_graph_does() {
 }
 
 #[test]
+fn covariances_are_scaled_to_the_residuals() {
+    let stated = |factor: f64| {
+        let mut drive = Drive::new(KEYFRAMES, 8);
+        for keyframe in &mut drive.keyframes {
+            keyframe.motion.covariance *= factor;
+        }
+        drive
+    };
+    let scale = |factor: f64, loops: &[Constraint]| {
+        let mut estimator = estimate(&stated(factor), loops, EstimatorKind::Graph);
+        let before = estimator.pose(KEYFRAMES - 1).unwrap().covariance;
+        let scale = estimator.scale_covariances().unwrap();
+        let after = estimator.pose(KEYFRAMES - 1).unwrap().covariance;
+        assert!((after - scale * before).norm() < 1e-9 * after.norm());
+        scale
+    };
+    let right = right(&stated(1.0));
+    let scales = [0.25, 1.0, 4.0, 16.0].map(|factor| scale(factor, &right));
+    println!("{scales:?}");
+    for (scale, expected) in scales.into_iter().zip([4.0, 1.0, 0.25, 0.0625]) {
+        // A few residuals say 1 beforehand.
+        let between = [0.6 * f64::min(expected, 1.0), 1.4 * f64::max(expected, 1.0)];
+        assert!(
+            (between[0]..between[1]).contains(&scale),
+            "{scale}, {expected}"
+        );
+    }
+    assert!(scales.is_sorted_by(|a, b| a > b));
+    assert!((scale(4.0, &[]) - 1.0).abs() < 1e-6);
+}
+
+#[test]
 fn corrected_poses_lead_evenly_from_keyframe_to_keyframe() {
     let drive = Drive::new(KEYFRAMES, 9);
     let estimator = estimate(&drive, &right(&drive), EstimatorKind::Graph);

@@ -173,6 +173,7 @@ impl Slam {
     /// # Errors
     /// Constraints that do not determine the poses.
     pub fn bands(&mut self, truth: &Trajectory) -> Result<Bands, Failure> {
+        self.estimator.scale_covariances()?;
         let step = self.keyframes.len().div_ceil(DRAWN);
         let (mut samples, mut start) = (Vec::new(), None);
         for keyframe in (0..self.keyframes.len()).step_by(step) {

@@ -1,0 +1,58 @@
+//! What became of a loop in the estimate of the trajectory.
+
+use gyre_estimation::{CHI_SQUARE_99_9, Constraint};
+
+/// The verdict of the trajectory on a loop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LoopVerdict {
+    /// The loop is part of the estimate.
+    Used,
+    /// It contradicts the odometry between its keyframes; in the filter, the estimate.
+    ContradictsOdometry,
+    /// It contradicts most of the other loops.
+    ContradictsLoops,
+    /// Its group has been counted in full (filter alone).
+    Redundant,
+}
+
+/// A loop that was accepted by the [`LoopCloser`](crate::LoopCloser), and what became of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JudgedLoop {
+    /// The loop, from the earlier to the later keyframe, in its group.
+    pub constraint: Constraint,
+    /// Chi-square against the odometry between its keyframes; 0 in the filter, which tests against the estimate.
+    pub chi_square: f64,
+    /// The verdict.
+    pub verdict: LoopVerdict,
+    /// The kernel's weight in the graph, 0 to 1; 0 if the loop is not used.
+    pub weight: f64,
+    /// Whether the standing estimate is made with it.
+    pub(crate) is_taken: bool,
+}
+
+impl JudgedLoop {
+    /// A loop that was tested against the odometry, and is part of no estimate.
+    pub(crate) fn new(constraint: Constraint, chi_square: f64) -> Self {
+        let mut judged = Self {
+            constraint,
+            chi_square,
+            verdict: LoopVerdict::Used,
+            weight: 0.0,
+            is_taken: false,
+        };
+        judged.judge_by_odometry();
+        judged
+    }
+
+    /// Judges the loop by its test against the odometry alone.
+    pub(crate) fn judge_by_odometry(&mut self) {
+        self.verdict = match self.chi_square <= CHI_SQUARE_99_9 {
+            true => LoopVerdict::Used,
+            false => LoopVerdict::ContradictsOdometry,
+        };
+    }
+
+    pub(crate) fn is_used(&self) -> bool {
+        self.verdict == LoopVerdict::Used
+    }
+}
