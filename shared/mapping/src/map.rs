@@ -140,7 +140,7 @@ impl Map {
         let version = Self::version(&text).map_err(&refused)?;
         if version != VERSION {
             return Err(refused(format!(
-                "its version is {version}, and this program reads version {VERSION}"
+                "its version is {version}, and this program reads version {VERSION}: use the gyre that drew it, or draw it again with gyre map"
             )));
         }
         let manifest: Manifest = toml::from_str(&text)

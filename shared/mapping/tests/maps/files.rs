@@ -108,7 +108,7 @@ fn what_is_wrong_with_a_folder_is_said() {
         (
             "version = 1",
             "version = 2",
-            "its version is 2, and this program reads version 1",
+            "its version is 2, and this program reads version 1: use the gyre that drew it, or draw it again with gyre map",
         ),
         ("version = 1", "", "map.toml has no version"),
         ("tile_cells = 256", "tile_cells = 512", "tiles of 512 cells"),
