@@ -8,6 +8,7 @@ mod bad_input;
 mod breaks;
 mod doctor;
 mod evaluate;
+mod extended_maps;
 mod followers;
 mod foreign_stages;
 mod full_disk;

@@ -177,6 +177,9 @@ pub struct MapArguments {
     /// Draw along this trajectory (TUM). Default: the run's trajectory_slam.tum, or its trajectory.tum.
     #[arg(long, value_name = "FILE")]
     pub trajectory: Option<PathBuf>,
+    /// Place the run in this map of earlier drives, and write a map of all. Its cells and its place on the earth stay.
+    #[arg(long, value_name = "MAP", conflicts_with_all = ["trajectory", "cell_m", "origin"])]
+    pub extend: Option<PathBuf>,
     /// Side of a cell, m.
     #[arg(long, default_value = "0.2")]
     pub cell_m: f64,

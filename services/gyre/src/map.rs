@@ -1,13 +1,14 @@
 //! `gyre map`: draws the map of a run.
 
 mod drawing;
+mod extend;
 mod keyframes;
 mod loops;
 
 use std::{collections::BTreeMap, path::Path, process::ExitCode};
 
 use gyre_geometry::Pose;
-use gyre_mapping::{MapOptions, write_geotiff, write_map, write_pgm, write_web_tiles};
+use gyre_mapping::{MapOptions, Origin, write_geotiff, write_map, write_pgm, write_web_tiles};
 use gyre_radar::{Trajectory, ground_truth::read_trajectory};
 use gyre_slam::{Keyframe, RecordReader, records_path};
 
@@ -32,6 +33,21 @@ const SAME_TIME_NS: u64 = 1_000_000;
 /// # Errors
 /// A run without keyframes or without a trajectory, a folder that cannot be written.
 pub fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
+    let mut drawing = match &arguments.extend {
+        Some(map) => extend::extend(arguments, map)?,
+        None => draw_run(arguments)?,
+    };
+    print::line(format_args!(
+        "{} keyframes in {} tiles, in {}",
+        drawing.keyframes(),
+        drawing.evidence().tiles().len(),
+        arguments.out.display()
+    ))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Draws a run and writes its map.
+fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
     let mut keyframes = open(&arguments.run)?;
     let corrected = arguments.run.join(CORRECTED);
     let trajectory = match &arguments.trajectory {
@@ -41,7 +57,7 @@ pub fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
     };
     let poses = read_trajectory(&trajectory)?;
     let loops = loops::used_loops(&arguments.run.join(LOOPS))?;
-    let configuration = Configuration::read(&arguments.run.join("config.toml"), &[])?;
+    let configuration = configuration(&arguments.run)?;
     gyre_storage::create_folder(&arguments.out)?;
     let options = MapOptions {
         cell_m: arguments.cell_m,
@@ -60,13 +76,12 @@ pub fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
     if arguments.format.contains(&MapFormat::Folder) {
         keyframes::keep(&mut keyframes, &poses, &arguments.out)?;
     }
-    write(arguments, &mut drawing, &lines)?;
-    print::line(format_args!(
-        "{count} keyframes in {} tiles, in {}",
-        drawing.evidence().tiles().len(),
-        arguments.out.display()
-    ))?;
-    Ok(ExitCode::SUCCESS)
+    write(arguments, arguments.origin, &mut drawing, &lines)?;
+    Ok(drawing)
+}
+
+fn configuration(run: &Path) -> Result<Configuration, Failure> {
+    Ok(Configuration::read(&run.join("config.toml"), &[])?)
 }
 
 fn open(run: &Path) -> Result<RecordReader<Keyframe>, Failure> {
@@ -123,8 +138,13 @@ fn part(poses: &Trajectory, (first_ns, last_ns): (i64, i64)) -> Vec<Pose> {
     poses.map(|(_, pose)| *pose).collect()
 }
 
-fn write(arguments: &MapArguments, drawing: &mut Drawing, lines: &Lines) -> Result<(), Failure> {
-    let (out, origin) = (&arguments.out, arguments.origin);
+fn write(
+    arguments: &MapArguments,
+    origin: Option<Origin>,
+    drawing: &mut Drawing,
+    lines: &Lines,
+) -> Result<(), Failure> {
+    let out = &arguments.out;
     for format in &arguments.format {
         match format {
             MapFormat::Folder => {
@@ -183,6 +203,7 @@ mod tests {
                 MapFormat::Web,
             ],
             trajectory: None,
+            extend: None,
             cell_m: 0.5,
             origin: None,
         }

@@ -1,0 +1,104 @@
+//! `gyre map --extend`: a second drive is placed in the map of a first one, or refused.
+
+use std::path::{Path, PathBuf};
+
+use gyre_localisation::Map;
+use gyre_radar::read_trajectory;
+
+use crate::common::{Ended, Run, gyre};
+
+/// A drive around a block of the town with this seed, with traffic and noise of its own.
+fn drive(town: u64, seed: u64) -> Run {
+    let run = Run::configured("[simulation]\n[raster]\nn = 255\ncell_m = 0.4\n")
+        .set(&format!("simulation.town.seed={town}"))
+        .set(&format!("simulation.seed={seed}"))
+        .set("slam.kind=graph");
+    run.set("simulation.scans=40")
+}
+
+/// Two thirds of the block.
+fn first() -> (Run, PathBuf) {
+    let run = drive(3, 1);
+    run.complete();
+    let map = run.folder().join("map");
+    draw(&run, &map, &[]).succeeded();
+    (run, map)
+}
+
+fn draw(run: &Run, out: &Path, options: &[&Path]) -> Ended {
+    let mut command = gyre();
+    command.arg("map").arg(run.out()).arg("--out").arg(out);
+    command.args(options);
+    Ended::of(command)
+}
+
+fn extend(run: &Run, map: &Path, out: &Path) -> Ended {
+    draw(run, out, &[Path::new("--extend"), map])
+}
+
+#[test]
+fn a_second_drive_is_placed_in_the_map_and_goes_on_beyond_it() {
+    let (first, map) = first();
+    // From half way round on, to the end of the block.
+    let second = drive(3, 9)
+        .set("simulation.scans=64")
+        .set("source.first=20");
+    second.complete();
+    let out = second.folder().join("map");
+    let ended = extend(&second, &map, &out);
+    ended.succeeded();
+    assert!(
+        ended.stderr.contains("keyframes were found in"),
+        "{}",
+        ended.stderr
+    );
+    let [earlier, all] = [&map, &out].map(|folder| Map::open(folder).unwrap());
+    let count = earlier.keyframes().len();
+    for (kept, keyframe) in all.keyframes().iter().zip(earlier.keyframes()) {
+        let is_same = kept.pose.motion == keyframe.pose.motion && kept.points == keyframe.points;
+        assert!(is_same, "scan {}", keyframe.scan);
+    }
+    let truth = |run: &Run| read_trajectory(&run.out().join("ground_truth.tum")).unwrap();
+    // The map's frame is that of the first scan of the first drive.
+    let (start, truth) = (truth(&first).poses[0], truth(&second));
+    let added = &all.keyframes()[count..];
+    assert!(added.len() > 20, "{}", added.len());
+    for keyframe in added {
+        let expected = start.inv_mul(&truth.near(keyframe.stamp_ns, 1_000).unwrap());
+        let error = expected.inv_mul(&keyframe.pose.motion);
+        let (error_m, error_deg) = (
+            error.translation.vector.norm(),
+            error.rotation.angle().to_degrees(),
+        );
+        assert!(
+            error_m < 0.5 && error_deg.abs() < 0.5,
+            "scan {}: {error_m} m, {error_deg} deg",
+            keyframe.scan
+        );
+    }
+    assert_eq!(
+        gyre_mapping::Map::open(&out).unwrap().keyframes(),
+        all.keyframes().len()
+    );
+    assert!(out.join("map.png").is_file());
+    // A third one is placed in both.
+    let again = second.folder().join("again");
+    extend(&second, &out, &again).succeeded();
+    let of_three = Map::open(&again).unwrap();
+    assert_eq!(
+        of_three.keyframes().len(),
+        all.keyframes().len() + added.len()
+    );
+}
+
+#[test]
+fn a_drive_through_another_town_is_refused_and_the_map_is_kept() {
+    let (first, map) = first();
+    let elsewhere = drive(5, 9);
+    elsewhere.complete();
+    let out = elsewhere.folder().join("map");
+    extend(&elsewhere, &map, &out).refused_with(&["no keyframe of", "was found in the map"]);
+    assert!(!out.exists());
+    extend(&first, &map, &map).refused_with(&["--out is the map", "choose another folder"]);
+    Map::open(&map).unwrap();
+}
