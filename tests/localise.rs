@@ -1,6 +1,6 @@
 //! `gyre localise` as a whole: a run is mapped, and other drives are found in its map, or are not.
 
-use std::{fs, path::Path};
+use std::{fs, path::Path, process::Stdio};
 
 use gyre_geometry::Pose;
 use gyre_radar::read_trajectory;
@@ -105,6 +105,44 @@ fn a_drive_through_another_town_is_lost_and_gets_no_fix() {
             .iter()
             .all(|(_, status, place)| status == "lost" && place.is_none())
     );
+}
+
+#[test]
+fn a_run_that_names_a_map_publishes_the_places_of_its_keyframes() {
+    let mapped = mapped();
+    let map = mapped.folder().join("map");
+    let run = Run::configured(DRIVE)
+        .set("simulation.town.seed=3")
+        .set("simulation.seed=9")
+        .set("slam.kind=graph")
+        .set(&format!("slam.map='{}'", map.display()))
+        .rate("20");
+    let mut running = run.start();
+    running.await_stage("localisation");
+    let mut watch = gyre();
+    watch.arg("watch").arg(run.out()).arg("fix");
+    let watch = watch.stdout(Stdio::piped()).spawn().unwrap();
+    running.await_poses(30);
+    running.kill("localisation");
+    running.finish().succeeded();
+    let watched = watch.wait_with_output().unwrap();
+    let watched = String::from_utf8(watched.stdout).unwrap();
+    let places = watched.lines().filter(|line| line.contains(" m, yaw "));
+    assert!(places.count() > 10, "{watched}");
+    assert!(!watched.contains("lost"), "{watched}");
+    let plain = Run::configured(DRIVE)
+        .set("simulation.town.seed=3")
+        .set("simulation.seed=9");
+    assert_eq!(run.odometry(), plain.complete());
+}
+
+#[test]
+fn a_run_in_a_map_that_does_not_exist_is_refused_before_it_starts() {
+    let run = Run::configured(DRIVE).set("slam.map='nowhere'");
+    let refused = run.clone().set("slam.kind=graph").finish();
+    refused.refused_with(&["nowhere is not a map"]);
+    run.finish()
+        .refused_with(&["[slam]: map is set", "`graph`"]);
 }
 
 #[test]

@@ -104,6 +104,8 @@ pub enum Topic {
     Loop,
     /// Corrections of the odometry, in a run with SLAM.
     Correction,
+    /// Places of keyframes in a map, in a run with SLAM that names one.
+    Fix,
 }
 
 /// The arguments of `gyre doctor`.

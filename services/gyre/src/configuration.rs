@@ -45,8 +45,8 @@ pub struct Configuration {
     /// The correction of the trajectory at places that are seen again.
     pub slam: SlamConfig,
     /// The command and the restarts of a stage: `radar-replay`, `masking`, `rotation-search`,
-    /// `translation-search`, `joint-search`, `refinement`, `pose-integration`, `loop-closure` or
-    /// `trajectory`.
+    /// `translation-search`, `joint-search`, `refinement`, `pose-integration`, `loop-closure`,
+    /// `trajectory` or `localisation`.
     pub stages: BTreeMap<String, StageConfig>,
 }
 
@@ -305,6 +305,10 @@ impl Configuration {
             let reason = "points.capacity is 0, but keyframes of slam are made of points: it must be 1 or more";
             return Err(value("points", reason.to_owned()));
         }
+        if !self.slam.is_on() && !self.slam.map.as_os_str().is_empty() {
+            let reason = "map is set, but the keyframes that are found in it are those of slam: set kind to `graph`";
+            return Err(value("slam", reason.to_owned()));
+        }
         self.odometry
             .masking
             .validate()
@@ -404,6 +408,14 @@ impl Configuration {
         }
     }
 
+    /// Returns whether the run has this follower.
+    fn follows(&self, follower: FollowerId) -> bool {
+        match follower {
+            FollowerId::LoopClosure | FollowerId::Trajectory => self.slam.is_on(),
+            FollowerId::Localisation => self.slam.is_localised(),
+        }
+    }
+
     /// Returns the processes to start: `gyre stage NAME`, or their replacements.
     pub fn stage_plans(&self, gyre: &Path) -> Vec<StagePlan> {
         let live = self.run.mode == Mode::Live;
@@ -432,7 +444,7 @@ impl Configuration {
             }
         };
         let stages = StageId::ALL.into_iter().filter(|stage| self.has(*stage));
-        let followers = FollowerId::ALL.into_iter().filter(|_| self.slam.is_on());
+        let followers = FollowerId::ALL.into_iter().filter(|it| self.follows(*it));
         let followers = followers.map(FollowerId::name);
         stages
             .map(StageId::name)

@@ -96,7 +96,7 @@ impl Progress {
     fn following(&mut self, follower: &str, progress: Following) {
         let work = match FollowerId::by_name(follower) {
             Some(FollowerId::LoopClosure) => "loop closing",
-            Some(FollowerId::Trajectory) | None => follower,
+            Some(FollowerId::Trajectory | FollowerId::Localisation) | None => follower,
         };
         let Following { done, total } = progress;
         let message = format!("{work}: {done} of {total} keyframes");

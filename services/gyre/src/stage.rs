@@ -56,6 +56,7 @@ fn work_of_follower(follower: FollowerId) -> Work {
     match follower {
         FollowerId::LoopClosure => gyre_loop_closure::run,
         FollowerId::Trajectory => gyre_trajectory::run,
+        FollowerId::Localisation => gyre_localisation_follower::run,
     }
 }
 

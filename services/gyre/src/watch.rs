@@ -7,9 +7,10 @@ use std::{
     time::Duration,
 };
 
+use gyre_geometry::xy_yaw;
 use gyre_messages::{
-    Correction, CorrectionHeader, Loop, LoopHeader, Masked, Message, Motion, MotionHeader, Pose,
-    PoseHeader, Refined, Rotation, Scan,
+    Correction, CorrectionHeader, Fix, FixHeader, Loop, LoopHeader, Masked, Message, Motion,
+    MotionHeader, Pose, PoseHeader, Refined, Rotation, Scan,
 };
 use gyre_stage::{
     StageError,
@@ -38,6 +39,7 @@ pub fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
         Topic::Pose => observe::<Pose>(out, |message| pose(message.header())),
         Topic::Loop => observe::<Loop>(out, |message| closed(message.header())),
         Topic::Correction => observe::<Correction>(out, |message| correction(message.header())),
+        Topic::Fix => observe::<Fix>(out, |message| fix(message.header())),
     }
 }
 
@@ -167,5 +169,17 @@ fn correction(header: &CorrectionHeader) -> String {
         header.yaw_rad.to_degrees(),
         header.keyframes,
         header.loops
+    )
+}
+
+fn fix(header: &FixHeader) -> String {
+    let Some(pose) = header.pose() else {
+        return "lost".to_owned();
+    };
+    let [x_m, y_m, yaw_rad] = xy_yaw(&pose);
+    let yaw_deg = yaw_rad.to_degrees();
+    format!(
+        "x {x_m:.3} m, y {y_m:.3} m, yaw {yaw_deg:.3} deg, correlation {:.3}",
+        header.correlation
     )
 }

@@ -73,9 +73,9 @@ mod tests {
     use bytemuck::Zeroable;
 
     use crate::{
-        ByteBlock, Correction, CorrectionHeader, FloatBlock, Item, Limits, Loop, LoopHeader,
-        Masked, MaskedHeader, Message, Motion, MotionHeader, Pose, PoseHeader, Rotation,
-        RotationHeader, Scan, ScanHeader, flag,
+        ByteBlock, Correction, CorrectionHeader, Fix, FixHeader, FloatBlock, Item, Limits, Loop,
+        LoopHeader, Masked, MaskedHeader, Message, Motion, MotionHeader, Pose, PoseHeader,
+        Rotation, RotationHeader, Scan, ScanHeader, flag,
     };
 
     const LIMITS: Limits = Limits {
@@ -235,6 +235,23 @@ mod tests {
                     header.keyframe_covariance[0] = f64::NAN
                 }),
                 ("keyframes is 0", &|header| header.keyframes = 0),
+            ],
+        );
+    }
+
+    #[test]
+    fn a_fix_is_finite_and_of_a_known_status() {
+        each_is_refused::<Fix>(
+            FixHeader::default(),
+            &[],
+            &[
+                ("y_m is inf", &|header| header.y_m = f64::INFINITY),
+                ("yaw_rad is 4", &|header| header.yaw_rad = 4.0),
+                ("covariance", &|header| header.covariance[0] = -1.0),
+                ("correlation is NaN", &|header| {
+                    header.correlation = f64::NAN
+                }),
+                ("status is 4", &|header| header.status = 4),
             ],
         );
     }

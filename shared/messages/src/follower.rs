@@ -8,17 +8,20 @@ pub enum FollowerId {
     LoopClosure,
     /// Corrects the trajectory by the loops.
     Trajectory,
+    /// Finds the keyframes in the map of an earlier drive, in a run that names one.
+    Localisation,
 }
 
 impl FollowerId {
     /// All followers, in the order in which they read each other's logs.
-    pub const ALL: [Self; 2] = [Self::LoopClosure, Self::Trajectory];
+    pub const ALL: [Self; 3] = [Self::LoopClosure, Self::Trajectory, Self::Localisation];
 
     /// The name used in configurations, on the command line and in results.
     pub const fn name(self) -> &'static str {
         match self {
             Self::LoopClosure => "loop-closure",
             Self::Trajectory => "trajectory",
+            Self::Localisation => "localisation",
         }
     }
 

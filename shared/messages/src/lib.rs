@@ -12,8 +12,9 @@
 //! | `pose` | [`PoseHeader`] | empty |
 //! | `loop` | [`LoopHeader`] | empty |
 //! | `correction` | [`CorrectionHeader`] | empty |
+//! | `fix` | [`FixHeader`] | empty |
 //!
-//! The last two exist only in runs with SLAM: [`FollowerId`]. All headers start with an [`Item`], which identifies the scan and carries the
+//! The last three exist only in runs with SLAM: [`FollowerId`]. All headers start with an [`Item`], which identifies the scan and carries the
 //! time stamps of each stage. Type names carry a
 //! version, so that two builds of different versions reject each other's messages instead of misreading them.
 //!
@@ -27,6 +28,7 @@ mod block;
 mod check;
 mod closed_loop;
 mod correction;
+mod fix;
 mod follower;
 mod item;
 mod limits;
@@ -44,6 +46,7 @@ pub use block::{ByteBlock, FloatBlock};
 pub use check::Violation;
 pub use closed_loop::{Loop, LoopHeader};
 pub use correction::{Correction, CorrectionHeader};
+pub use fix::{Fix, FixHeader, fix_status};
 pub use follower::FollowerId;
 pub use item::{Hop, Hops, Item, StageId, flag};
 pub use limits::{History, Limits, TopicSizes, Window, WindowError};

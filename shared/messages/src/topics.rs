@@ -7,6 +7,7 @@ use serde::Serialize;
 use crate::{
     closed_loop::Loop,
     correction::Correction,
+    fix::Fix,
     limits::{Limits, TopicSizes, Window},
     masked::Masked,
     message::{Message, Sender},
@@ -52,7 +53,7 @@ const PAGES_PER_TOPIC: usize = 8;
 const PAGES_PER_SUBSCRIBER: usize = 4;
 
 /// All topics, in the order of the stream.
-const TOPICS: [Topic; 8] = [
+const TOPICS: [Topic; 9] = [
     Topic::of::<Scan>(),
     Topic::of::<Masked>(),
     Topic::of::<Rotation>(),
@@ -61,6 +62,7 @@ const TOPICS: [Topic; 8] = [
     Topic::of::<Pose>(),
     Topic::of::<Loop>(),
     Topic::of::<Correction>(),
+    Topic::of::<Fix>(),
 ];
 
 /// Returns the topics of a run, in the order of the stream.
@@ -153,7 +155,7 @@ mod tests {
         };
         let names = |window| topics(window).map(|topic| topic.name).collect::<Vec<_>>();
         assert_eq!(names(&WINDOW).last(), Some(&"pose"));
-        assert_eq!(names(&slam)[6..], ["loop", "correction"]);
+        assert_eq!(names(&slam)[6..], ["loop", "correction", "fix"]);
         let added = Masked::sizes(&slam).samples() - Masked::sizes(&WINDOW).samples();
         assert_eq!(added, 3);
     }

@@ -1,5 +1,7 @@
 //! Configuration of SLAM.
 
+use std::path::{Path, PathBuf};
+
 use gyre_estimation::places::{PlaceOptionError, PlaceOptions};
 use serde::{Deserialize, Serialize};
 
@@ -11,6 +13,10 @@ pub struct SlamConfig {
     /// `journal/keyframes.log`, for a correction of the trajectory by a filter or by a graph of their
     /// poses. Odometry is the same with all three.
     pub kind: SlamKind,
+    /// Folder of a map of `gyre map`: the keyframes of the run are found in it while it drives, and
+    /// published on the topic `fix`.
+    #[serde(skip_serializing_if = "is_empty")]
+    pub map: PathBuf,
     /// Keyframes, and the recognition and verification of places.
     pub places: PlaceOptions,
 }
@@ -30,7 +36,16 @@ pub enum SlamKind {
     Graph,
 }
 
+fn is_empty(path: &Path) -> bool {
+    path.as_os_str().is_empty()
+}
+
 impl SlamConfig {
+    /// Returns whether the keyframes are found in a map.
+    pub fn is_localised(&self) -> bool {
+        self.is_on() && !is_empty(&self.map)
+    }
+
     /// Returns whether keyframes are kept and loops closed.
     pub fn is_on(&self) -> bool {
         self.kind != SlamKind::None

@@ -2,8 +2,8 @@
 //! So no restart finds a service missing or of another size.
 
 use gyre_messages::{
-    Correction, FollowerId, Loop, Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId,
-    Window,
+    Correction, Fix, FollowerId, Loop, Masked, Message, Motion, Pose, Refined, Rotation, Scan,
+    StageId, Window,
 };
 use iceoryx2::{
     prelude::{Config, NodeBuilder, NodeName, ServiceName, SignalHandlingMode, ipc},
@@ -44,7 +44,7 @@ pub(crate) struct Services {
     refined: Topic<Refined>,
     pose: Topic<Pose>,
     /// In a run with SLAM.
-    _followers: Option<(Topic<Loop>, Topic<Correction>)>,
+    _followers: Option<(Topic<Loop>, Topic<Correction>, Topic<Fix>)>,
     _events: Vec<Event>,
 }
 
@@ -70,7 +70,8 @@ impl Services {
         let mut followers = None;
         if window.slam {
             let loops = create_topic::<Loop>(node, window)?;
-            followers = Some((loops, create_topic::<Correction>(node, window)?));
+            let corrections = create_topic::<Correction>(node, window)?;
+            followers = Some((loops, corrections, create_topic::<Fix>(node, window)?));
             let sizes = EventSizes {
                 listeners: FollowerId::ALL.len(),
                 notifiers: 1,

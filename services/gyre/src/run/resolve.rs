@@ -28,6 +28,7 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     for path in [
         Some(&mut configuration.source.data),
         configuration.run.ground_truth.as_mut(),
+        Some(&mut configuration.slam.map),
     ]
     .into_iter()
     .flatten()

@@ -3,7 +3,7 @@
 use std::{fs, rc::Rc, time::Duration};
 
 use gyre_messages::{
-    Correction, Footprint, Loop, Masked, Message, Motion, Pose, Refined, Rotation, Scan, flag,
+    Correction, Fix, Footprint, Loop, Masked, Message, Motion, Pose, Refined, Rotation, Scan, flag,
     topics,
 };
 
@@ -88,7 +88,8 @@ fn the_footprint_is_what_the_segments_take() {
     let _rotations = writer::<Rotation>(manifest);
     let _motions = (writer::<Motion>(manifest), writer::<Refined>(manifest));
     let _poses = writer::<Pose>(manifest);
-    let _of_followers = (writer::<Loop>(manifest), writer::<Correction>(manifest));
+    let _of_slam = (writer::<Loop>(manifest), writer::<Correction>(manifest));
+    let _of_localisation = writer::<Fix>(manifest);
     let segments = fs::read_dir("/dev/shm").unwrap().flatten().filter(|file| {
         let name = file.file_name().to_string_lossy().into_owned();
         name.starts_with(&manifest.prefix) && name.ends_with(".data")
