@@ -69,6 +69,15 @@ fn options_of_a_recording_without_end_are_refused() {
 }
 
 #[test]
+fn the_configuration_of_a_simulated_recording_without_end_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    symlink("/dev/zero", folder.path().join("simulation.toml")).unwrap();
+    let out = path(folder.path());
+    let ended = limited(&["simulate", "--scans", "2", "--out", out]);
+    ended.failed_with(&["simulation.toml", "16 MB"]);
+}
+
+#[test]
 fn an_image_that_claims_to_be_huge_is_refused() {
     let copy = recording::copy(2);
     let images = fs::read_dir(copy.path().join("radar")).unwrap();

@@ -6,4 +6,5 @@ mod files;
 mod keyframes;
 mod messages;
 mod recordings;
+mod simulations;
 mod texts;

@@ -103,8 +103,10 @@ fn scan(message: &Received<Scan>) -> String {
     let Some(scan) = header.view(message.values()) else {
         return "its rows do not fit its header".to_owned();
     };
-    let rows = (0..scan.geometry.azimuths).map(|row| scan.row(row));
-    let power: u64 = rows.flatten().map(|power| u64::from(*power)).sum();
+    // Four bytes are enough for a row, and are added faster than eight.
+    let row = |row| scan.row(row).iter().map(|power| u32::from(*power));
+    let rows = (0..scan.geometry.azimuths).map(|number| u64::from(row(number).sum::<u32>()));
+    let power: u64 = rows.sum();
     let (azimuths, bins) = (scan.geometry.azimuths, scan.geometry.bins);
     let mean = power as f64 / (azimuths * bins).max(1) as f64;
     format!("{azimuths} azimuths of {bins} bins, mean power {mean:.2}")

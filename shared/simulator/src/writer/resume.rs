@@ -6,6 +6,7 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use gyre_radar::ImageSource as _;
+use gyre_storage::{SETTINGS, StorageError, read_text};
 
 use crate::config::SimulationConfig;
 use crate::error::SimulatorError;
@@ -106,12 +107,12 @@ fn made_by_this(config: &SimulationConfig, out: &Path) -> Result<bool, Simulator
 /// The configuration that made the dataset in `out`; `None` if it does not say.
 pub(super) fn made_with(out: &Path) -> Result<Option<SimulationConfig>, SimulatorError> {
     let path = out.join(MADE_BY);
-    match fs::read_to_string(&path) {
+    match read_text(&path, SETTINGS) {
         Ok(text) => toml::from_str(&text)
             .map(Some)
             .map_err(|_| other_dataset(out)),
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
-        Err(source) => Err(SimulatorError::Write { path, source }),
+        Err(source) => Err(StorageError::at("read", &path)(source).into()),
     }
 }
 
