@@ -53,8 +53,8 @@ pub fn several(scene: &mut Scene) -> Option<Outcome> {
 pub fn at_the_start(scene: &mut Scene) -> Option<Outcome> {
     let run = scene.run();
     let mut running = run.start();
-    let followers = FollowerId::ALL.map(FollowerId::name);
-    let all = [&STAGES[..], &followers].concat();
+    let followers = [FollowerId::LoopClosure, FollowerId::Trajectory];
+    let all = [&STAGES[..], &followers.map(FollowerId::name)].concat();
     let stage = all.choose(&mut scene.rng)?;
     let first = running.await_stage(stage);
     scene.pause(30);
