@@ -170,7 +170,10 @@ impl Localiser {
     }
 
     fn is_accepted(&self, fix: &Fix) -> bool {
-        fix.correlation >= self.options.min_correlation && fix.margin >= self.options.min_margin
+        let place = Point2::from(fix.pose.motion.translation.vector);
+        fix.correlation >= self.options.min_correlation
+            && fix.margin >= self.options.min_margin
+            && self.map.nearest(place).1 <= self.options.reach_m
     }
 
     /// Chooses the places and headings that look most similar, each once.

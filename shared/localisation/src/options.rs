@@ -15,7 +15,7 @@ pub struct LocaliserOptions {
     pub search_reach_m: f64,
     /// Smallest correlation of a first fix with the map, 0 to 1. It is that of a single scan with a submap of many.
     pub min_correlation: f64,
-    /// Smallest difference of the correlations of a first fix and of any other pose on the map.
+    /// Smallest difference of the correlations of a first fix and of any other pose that was tried.
     pub min_margin: f64,
     /// Two poses nearer than this, m, and than 5 degrees are the same.
     pub same_m: f64,

@@ -31,7 +31,7 @@ pub const NAME: &str = "observer";
 /// Time to wait for a place. The supervisor frees those of killed observers within a second or two.
 const MAX_WAIT_FOR_PLACE: Duration = Duration::from_secs(5);
 /// The shortest time between two looks at a queue that was empty. On a machine whose processors are all busy each wake-up takes time from the
-/// stages; at a thousand messages in a second that is more than what most observers do with them. The queue holds what comes meanwhile.
+/// stages; at hundreds of messages in a second that is more than what most observers do with them. The queue holds 9 meanwhile.
 const REST: Duration = Duration::from_millis(10);
 /// Time between two attempts to get a place.
 const RETRY: Duration = Duration::from_millis(100);

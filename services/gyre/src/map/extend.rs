@@ -3,9 +3,11 @@
 //! Its keyframes are found in the map one by one. A pose graph of these places and of the run's own motions and loops gives all poses of the
 //! run; the map stays where it is.
 
-use std::{fs, path::Path};
+use std::{collections::HashSet, fs, path::Path};
 
-use gyre_estimation::{Constraint, EstimationError, G2o, GraphOptions, Kind, PoseGraph};
+use gyre_estimation::{
+    CHI_SQUARE_99_9, Constraint, EstimationError, G2o, GraphOptions, Kind, PoseGraph,
+};
 use gyre_geometry::{Pose, UncertainMotion};
 use gyre_localisation::{Fix, Localiser};
 use gyre_slam::{Keyframe, RecordReader};
@@ -23,10 +25,14 @@ use crate::{
 const GRAPH: &str = "graph.g2o";
 /// The largest such file, bytes: a drive of 1,000 km.
 const MAX_GRAPH_BYTES: u64 = 1 << 30;
-/// Fixes along so many metres of the path count as one: their errors are dependent.
+/// Fixes along so many metres of the path count as one, and so do loops between two such stretches: their errors are dependent.
 const DEPENDENT_M: f64 = 5.0;
+/// The stretch that stands for the map in the groups of fixes.
+const OF_MAP: u64 = u32::MAX as u64;
 /// What is known of the first pose before any fix: standard deviations in m and rad.
-const ANYWHERE: [f64; 3] = [1e3, 1e3, 3.0];
+const ANYWHERE: [f64; 3] = [1e5, 1e5, 3.0];
+/// Fixes that are compared as the start, at most.
+const STARTS: usize = 100;
 /// Path between two drives, so that no submap has keyframes of both, m.
 const BETWEEN_DRIVES_M: f64 = 1e3;
 
@@ -34,8 +40,14 @@ const BETWEEN_DRIVES_M: f64 = 1e3;
 #[derive(Clone, Copy)]
 struct Found {
     keyframe: usize,
-    path_m: f64,
     fix: Fix,
+}
+
+/// A run with its keyframes' places in the map.
+struct Search {
+    found: Vec<Found>,
+    /// The stretch of the path that each keyframe lies on.
+    stretches: Vec<u64>,
 }
 
 /// Places a run in the map in a folder, draws both, and writes the map of all.
@@ -50,25 +62,26 @@ pub fn extend(arguments: &MapArguments, map: &Path) -> Result<Drawing, Failure> 
     let graph = read_graph(run, keyframes.len())?;
     let earlier = gyre_mapping::Map::open(map)?;
     let mut localiser = localise::open(map, &super::configuration(run)?)?;
-    let found = find(&mut localiser, &mut keyframes)?;
-    if found.is_empty() {
+    let search = find(&mut localiser, &mut keyframes)?;
+    let Some(start) = most_agreed(&graph, &search.found) else {
         return Err(format!(
             "no keyframe of {} was found in the map {}: the drives have no place in common, or too few of them",
             run.display(),
             map.display()
         )
         .into());
-    }
+    };
+    let (poses, agreeing) = place(&graph, &search, &start)?;
     print::note(format_args!(
-        "{} of {} keyframes were found in {}",
-        found.len(),
+        "{} of {} keyframes were found in {}; {} of them contradict the others and are not used",
+        search.found.len(),
         keyframes.len(),
-        map.display()
+        map.display(),
+        search.found.len() - agreeing.len()
     ));
-    let poses = place(&graph, &found)?;
     let known = localiser.map();
     let ends = |it: &Found| [known.pose(it.fix.keyframe), poses[it.keyframe]];
-    let loops = found.iter().map(ends).collect();
+    let loops = agreeing.iter().map(ends).collect();
     let all = all(known.keyframes(), &mut keyframes, &poses)?;
     gyre_storage::create_folder(out)?;
     let mut drawing = Drawing::new(earlier.options(), out)?;
@@ -106,27 +119,54 @@ fn read_graph(run: &Path, keyframes: usize) -> Result<G2o, Failure> {
 fn find(
     localiser: &mut Localiser,
     keyframes: &mut RecordReader<Keyframe>,
-) -> Result<Vec<Found>, Failure> {
-    let mut found = Vec::new();
-    // The velocity of the first scan is not known, so that its points do not fit.
-    for index in 1..keyframes.len() {
+) -> Result<Search, Failure> {
+    let mut search = Search {
+        found: Vec::new(),
+        stretches: Vec::with_capacity(keyframes.len()),
+    };
+    for index in 0..keyframes.len() {
         let keyframe = keyframes.read(index)?;
-        let fix = localiser.find(&keyframe.points, &keyframe.twist);
-        found.extend(fix.map(|fix| Found {
-            keyframe: index,
-            path_m: keyframe.path_m,
-            fix,
-        }));
+        search
+            .stretches
+            .push((keyframe.path_m / DEPENDENT_M) as u64);
+        // The velocity of the first scan is not known, so that its points do not fit.
+        if index > 0 {
+            let fix = localiser.find(&keyframe.points, &keyframe.twist);
+            let keyframe = index;
+            search.found.extend(fix.map(|fix| Found { keyframe, fix }));
+        }
     }
-    Ok(found)
+    Ok(search)
 }
 
-/// Returns the poses of the keyframes of a run in the map frame: those that fit its motions, its loops and its places on the map best.
-fn place(run: &G2o, found: &[Found]) -> Result<Vec<Pose>, EstimationError> {
-    let Some(first) = found.first() else {
-        return Ok(run.poses.clone());
+/// Returns the pose of the run in the map by the fix that agrees best with the others: the least median of their distances. A wrong one
+/// would draw all others away. `None` without a fix.
+fn most_agreed(run: &G2o, found: &[Found]) -> Option<Pose> {
+    let step = found.len().div_ceil(STARTS).max(1);
+    let starts = found.iter().step_by(step);
+    let starts = starts.map(|it| it.fix.pose.motion * run.poses[it.keyframe].inverse());
+    let median = |start: &Pose| {
+        let distance = |it: &Found| {
+            let placed = start * run.poses[it.keyframe];
+            (placed.translation.vector - it.fix.pose.motion.translation.vector).norm()
+        };
+        let mut distances: Vec<f64> = found.iter().map(distance).collect();
+        let middle = distances.len() / 2;
+        *distances.select_nth_unstable_by(middle, f64::total_cmp).1
     };
-    let map_from_run = first.fix.pose.motion * run.poses[first.keyframe].inverse();
+    starts
+        .map(|start| (median(&start), start))
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, start)| start)
+}
+
+/// Returns the poses of the keyframes of a run in the map frame, those that fit its motions, its loops and its places on the map best, and
+/// the fixes that agree with them.
+fn place(
+    run: &G2o,
+    search: &Search,
+    map_from_run: &Pose,
+) -> Result<(Vec<Pose>, Vec<Found>), EstimationError> {
     let placed = run.poses.iter().map(|pose| map_from_run * pose);
     // The first pose of a graph stays where it is: it is that of the map.
     let poses: Vec<Pose> = std::iter::once(Pose::identity()).chain(placed).collect();
@@ -136,27 +176,40 @@ fn place(run: &G2o, found: &[Found]) -> Result<Vec<Pose>, EstimationError> {
     };
     let mut graph = PoseGraph::new(poses[0], GraphOptions::default());
     graph.apply(&Constraint::odometry(0, anywhere))?;
+    let between = |from: u64, keyframe: usize| Kind::Loop {
+        group: Some(from << 32 | search.stretches[keyframe]),
+    };
     for constraint in &run.constraints {
         let &Constraint { from, to, .. } = constraint;
         graph.apply(&Constraint {
             from: from + 1,
             to: to + 1,
+            kind: match constraint.kind {
+                Kind::Loop { .. } => between(search.stretches[from], to),
+                kind => kind,
+            },
             ..*constraint
         })?;
     }
-    for it in found {
+    for it in &search.found {
         graph.apply(&Constraint {
             from: 0,
             to: it.keyframe + 1,
             motion: it.fix.pose,
-            kind: Kind::Loop {
-                group: Some((it.path_m / DEPENDENT_M) as u64),
-            },
+            kind: between(OF_MAP, it.keyframe),
         })?;
     }
     graph.start_from(&poses)?;
     graph.solve()?;
-    Ok(graph.poses()[1..].to_vec())
+    let agreeing: HashSet<usize> = graph
+        .loops()
+        .filter(|it| it.from == 0 && it.chi_square <= CHI_SQUARE_99_9)
+        .map(|it| it.to - 1)
+        .collect();
+    let found = search.found.iter();
+    let agreeing = found.filter(|it| agreeing.contains(&it.keyframe));
+    let agreeing = agreeing.copied().collect();
+    Ok((graph.poses()[1..].to_vec(), agreeing))
 }
 
 /// The keyframes of the map and those of the run at their poses, numbered through.
@@ -219,19 +272,26 @@ mod tests {
             constraints: (0..99).map(|k| Constraint::odometry(k, motion)).collect(),
             poses,
         };
-        let found: Vec<Found> = (10..60)
-            .map(|keyframe| Found {
-                keyframe,
-                path_m: 2.0 * keyframe as f64,
-                fix: Fix {
-                    pose: uncertain(true_pose(keyframe), 0.02),
-                    correlation: 0.8,
-                    margin: 0.3,
-                    keyframe: 0,
-                },
-            })
-            .collect();
-        let placed = place(&run, &found).unwrap();
+        let found_at = |keyframe: usize, motion: Pose| Found {
+            keyframe,
+            fix: Fix {
+                pose: uncertain(motion, 0.02),
+                correlation: 0.8,
+                margin: 0.3,
+                keyframe: 0,
+            },
+        };
+        let right = (10..60).map(|keyframe| found_at(keyframe, true_pose(keyframe)));
+        // The first fix is of another place.
+        let wrong = found_at(5, pose(-3e3, 2e3, 1.0));
+        let search = Search {
+            found: std::iter::once(wrong).chain(right).collect(),
+            stretches: (0..100).map(|keyframe| 2 * keyframe / 5).collect(),
+        };
+        let start = most_agreed(&run, &search.found).unwrap();
+        let (placed, agreeing) = place(&run, &search, &start).unwrap();
+        let agreeing: Vec<usize> = agreeing.iter().map(|it| it.keyframe).collect();
+        assert_eq!(agreeing, (10..60).collect::<Vec<usize>>());
         let error_m =
             |k: usize| (placed[k].translation.vector - true_pose(k).translation.vector).norm();
         assert_eq!(placed.len(), 100);

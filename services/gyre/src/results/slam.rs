@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Write};
 
-use gyre_estimation::{Constraint, G2o};
+use gyre_estimation::{Constraint, EstimationError, G2o};
 use gyre_evaluation::{BandSample, Bands, TruthSigma};
 use gyre_geometry::{Pose, xy_yaw};
 use gyre_radar::Trajectory;
@@ -90,9 +90,10 @@ impl Slam {
             estimator.push(&keyframe)?;
             known.push((keyframe.scan, keyframe.stamp_ns));
         }
-        queries
-            .iter()
-            .try_for_each(|query| estimator.close(query))?;
+        for query in &queries {
+            check(query, known.len())?;
+            estimator.close(query)?;
+        }
         estimator.solve()?;
         Ok(Some(Self {
             correction: estimator.correction(),
@@ -237,6 +238,21 @@ fn rejected(outcome: LoopOutcome) -> &'static str {
         LoopOutcome::Ambiguous => "ambiguous",
         LoopOutcome::Undetermined => "undetermined",
         LoopOutcome::ContradictsOdometry => "contradicts odometry",
+    }
+}
+
+/// Refuses a query of keyframes that the run does not have: its log belongs to other keyframes.
+fn check(query: &Query, keyframes: usize) -> Result<(), EstimationError> {
+    let to = query.keyframe;
+    let places = query.candidates.iter().map(|candidate| candidate.place);
+    let from = places.max().unwrap_or(to);
+    match from.max(to) < keyframes {
+        true => Ok(()),
+        false => Err(EstimationError::UnknownKeyframe {
+            from,
+            to,
+            keyframes,
+        }),
     }
 }
 

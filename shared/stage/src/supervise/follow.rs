@@ -18,6 +18,9 @@ const MAX_STALLS: usize = 3;
 struct Clock {
     /// The follower, its position, and since when it is there.
     at: Option<(usize, Progress, Instant)>,
+    /// The farthest that this follower has been.
+    farthest: u64,
+    /// Its stalls without going farther.
     stalls_in_a_row: usize,
 }
 
@@ -26,11 +29,13 @@ impl Clock {
     fn look(&mut self, follower: usize, progress: Progress, started: Instant) -> Duration {
         let since = match self.at {
             Some((of, at, since)) if (of, at) == (follower, progress) => since.max(started),
-            _ => {
-                self.stalls_in_a_row = 0;
-                Instant::now()
-            }
+            _ => Instant::now(),
         };
+        let is_same = self.at.is_some_and(|(of, ..)| of == follower);
+        // A follower without a file of its own begins again at a restart.
+        if !is_same || progress.done > self.farthest {
+            (self.farthest, self.stalls_in_a_row) = (progress.done, 0);
+        }
         self.at = Some((follower, progress, since));
         since.elapsed()
     }
@@ -63,19 +68,21 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    /// Waits until the followers have read the logs to their end. The stream has ended, so the death of a stage changes nothing.
+    /// Waits until the followers have read the logs to their end, or until they have that do not read what one writes that dies again
+    /// and again. The stream has ended, so the death of a stage changes nothing.
     pub(super) fn await_followers(&mut self) -> Result<Ending, SuperviseError> {
         let mut clock = Clock::default();
         loop {
-            if !self.given_up.is_empty() {
-                return Err(self.given_up.remove(0).1);
-            }
-            let behind: Vec<usize> = (0..self.children.len())
+            // A follower reads what those before it write.
+            let given_up = self.given_up.iter().map(|(follower, _)| *follower).min();
+            let behind: Vec<usize> = (0..given_up.unwrap_or(self.children.len()))
                 .filter(|i| self.is_behind(*i))
                 .collect();
-            // The others read what this one writes.
             let Some(first) = behind.first() else {
-                return Ok(Ending::Complete);
+                return match self.given_up.pop() {
+                    Some((_, error)) => Err(error),
+                    None => Ok(Ending::Complete),
+                };
             };
             self.end_stuck_follower(*first, &mut clock)?;
             if self.signals.wait(&[], None, wake::MAX_WAIT)?.stop {
@@ -85,8 +92,7 @@ impl Supervisor<'_> {
             self.keep_guardian();
             let is_dead = |i: &usize| self.children[*i].has_exited() && self.is_behind(*i);
             let dead: Vec<usize> = behind.into_iter().filter(is_dead).collect();
-            dead.into_iter()
-                .try_for_each(|i| self.recover_follower(i))?;
+            self.recover_followers(&dead)?;
         }
     }
 
@@ -150,5 +156,17 @@ mod tests {
         assert_eq!(clock.stalls_in_a_row, 2);
         clock.look(1, at(4), restarted);
         assert_eq!(clock.stalls_in_a_row, 0);
+    }
+
+    #[test]
+    fn a_follower_that_hangs_at_the_same_record_after_each_restart_stalls_in_a_row() {
+        let mut clock = Clock::default();
+        let mut be_at = |done| {
+            clock.look(3, Progress { done, total: 9 }, Instant::now());
+            clock.stalls_in_a_row += 1;
+            clock.stalls_in_a_row
+        };
+        assert_eq!([be_at(4), be_at(0), be_at(4)], [1, 2, 3]);
+        assert_eq!(be_at(5), 1, "it has gone farther");
     }
 }
