@@ -2,12 +2,11 @@
 
 use std::{
     fs,
-    os::unix::fs::PermissionsExt,
     path::{Path, PathBuf},
     process::Command,
 };
 
-use crate::common::{Run, recording, undisturbed};
+use crate::common::{Run, copy_program, install, recording, undisturbed};
 use rustix::process::Signal;
 use tempfile::TempDir;
 
@@ -38,15 +37,14 @@ fn interrupt(run: &Run) {
 /// A program of its own for a run, which a test can replace.
 fn program_in(folder: &Path) -> PathBuf {
     let program = folder.join("gyre-of-the-test");
-    fs::copy(crate::PROGRAM, &program).unwrap();
+    copy_program(&program);
     program
 }
 
 /// Replaces a program as a build does: under the same name is another file.
 fn replace(program: &Path, content: impl AsRef<[u8]>) {
     let new = program.with_extension("new");
-    fs::write(&new, content).unwrap();
-    fs::set_permissions(&new, fs::Permissions::from_mode(0o755)).unwrap();
+    install(&new, content);
     fs::rename(new, program).unwrap();
 }
 

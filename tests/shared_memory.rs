@@ -14,7 +14,7 @@ use gyre_stage::run::SHARED_MEMORY;
 use rustix::{process::geteuid, thread::Pid};
 use tempfile::TempDir;
 
-use crate::common::{Ended, Run, leftovers, undisturbed};
+use crate::common::{Ended, Run, copy_program, leftovers, undisturbed};
 
 /// Holds the lock of a file, as another program does.
 struct Lock(Child);
@@ -61,7 +61,7 @@ impl Other {
         }
         let folder = tempfile::tempdir().unwrap();
         fs::set_permissions(folder.path(), fs::Permissions::from_mode(0o777)).unwrap();
-        fs::copy(crate::PROGRAM, folder.path().join("gyre")).unwrap();
+        copy_program(&folder.path().join("gyre"));
         let configuration = "[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 8\n";
         fs::write(folder.path().join("test.toml"), configuration).unwrap();
         // Tests that run at the same time are different users.

@@ -4,7 +4,7 @@ use std::{fs, os::unix::fs::PermissionsExt, process::Command, thread, time::Dura
 
 use rustix::process::{Signal, geteuid};
 
-use crate::common::{Run, leftovers, send, undisturbed};
+use crate::common::{Run, copy_program, leftovers, send, undisturbed};
 
 /// A stage under a shell that has started another program, which knows nothing of the run.
 const SHELL: &str = "sleep 600 &\n{gyre} stage masking";
@@ -61,7 +61,7 @@ fn a_stage_for_which_there_is_no_process_is_started_when_there_is_one() {
         Run::configured("[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 24\n").rate("6");
     let folder = run.folder();
     fs::set_permissions(folder, fs::Permissions::from_mode(0o777)).unwrap();
-    fs::copy(crate::PROGRAM, folder.join("gyre")).unwrap();
+    copy_program(&folder.join("gyre"));
     let user = (2_000_000_000 + std::process::id()).to_string();
     let as_user = || {
         let mut command = Command::new("setpriv");

@@ -15,6 +15,7 @@ mod watch;
 use std::{
     ffi::OsStr,
     fs::{self, File},
+    io::Write,
     path::{Path, PathBuf},
     process::{Command, Stdio},
     sync::{Arc, OnceLock},
@@ -55,6 +56,28 @@ pub fn folder() -> TempDir {
 /// The program under test.
 pub fn gyre() -> Command {
     Command::new(crate::PROGRAM)
+}
+
+/// Makes a program of this content.
+///
+/// A process of its own writes it. If this one had it open for writing, a process that another test starts at that moment would inherit
+/// that, and the program could not be executed ("text file busy").
+pub fn install(program: &Path, content: impl AsRef<[u8]>) {
+    let mut writer = Command::new("sh")
+        .args(["-c", "cat > \"$0\" && chmod 755 \"$0\""])
+        .arg(program)
+        .stdin(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut input = writer.stdin.take().unwrap();
+    input.write_all(content.as_ref()).unwrap();
+    drop(input);
+    assert!(writer.wait().unwrap().success());
+}
+
+/// Copies the program under test.
+pub fn copy_program(to: &Path) {
+    install(to, fs::read(crate::PROGRAM).unwrap());
 }
 
 /// The same command, executed by a program that becomes it.

@@ -5,7 +5,7 @@ use std::{fs, os::unix::fs::symlink, path::Path, process::Command};
 use rand::{Rng, seq::IndexedRandom};
 
 use crate::{
-    common::{Ended, Run, wrapped},
+    common::{Ended, Run, copy_program, install, wrapped},
     scene::{End, Outcome, Scene, assert_one_sentence},
     tools::Mount,
 };
@@ -14,7 +14,7 @@ use crate::{
 pub fn replaced(scene: &mut Scene) -> Option<Outcome> {
     let run = scene.run();
     let program = run.folder().join("gyre");
-    fs::copy(crate::PROGRAM, &program).unwrap();
+    copy_program(&program);
     let original = run.folder().join("original");
     fs::hard_link(&program, &original).unwrap();
     let own = run.command();
@@ -39,11 +39,10 @@ fn replace(program: &Path, how: &str) {
         "rebuilt" => {
             let mut bytes = fs::read(program).unwrap();
             bytes.extend(b"another build");
-            fs::write(&new, bytes).unwrap();
+            install(&new, bytes);
         }
-        _ => fs::write(&new, "#!/bin/sh\necho 'another program' >&2; exit 1\n").unwrap(),
+        _ => install(&new, "#!/bin/sh\necho 'another program' >&2; exit 1\n"),
     }
-    fs::set_permissions(&new, fs::metadata(program).unwrap().permissions()).unwrap();
     fs::rename(&new, program).unwrap();
 }
 
