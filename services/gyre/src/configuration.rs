@@ -1,8 +1,10 @@
 //! The configuration of a run: read strictly, overridden key by key, written back as it was resolved.
 
 pub mod difference;
+mod error;
 mod rate;
 mod strict;
+mod validation;
 
 use std::{
     collections::BTreeMap,
@@ -19,10 +21,10 @@ use gyre_simulator::{OutputFormat, SimulationConfig};
 use gyre_slam::SlamConfig;
 use gyre_stage::supervise::{RestartPolicy, StagePlan};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 use crate::program;
 
+pub use error::ConfigurationError;
 pub use rate::Rate;
 
 /// The configuration of a run. Every key has a default.
@@ -120,48 +122,6 @@ impl Default for RunConfig {
     }
 }
 
-/// Why a configuration is rejected.
-#[derive(Debug, Error)]
-pub enum ConfigurationError {
-    /// The file cannot be read.
-    #[error("cannot read the configuration {path}: {source}")]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// The error of the operating system.
-        source: std::io::Error,
-    },
-    /// The file is not TOML.
-    #[error("{path}: {reason}")]
-    Syntax {
-        /// The file.
-        path: PathBuf,
-        /// The place and the reason.
-        reason: String,
-    },
-    /// An unknown key.
-    #[error("[{section}] has no key `{key}`{suggestion}")]
-    UnknownKey {
-        /// The section.
-        section: String,
-        /// The key.
-        key: String,
-        /// The nearest known one.
-        suggestion: String,
-    },
-    /// A value that a key cannot have.
-    #[error("[{section}]: {reason}")]
-    Value {
-        /// The section.
-        section: String,
-        /// The reason.
-        reason: String,
-    },
-    /// `--set` without a key and a value.
-    #[error("--set {0}: expected section.key=value, as in masking.kind=none")]
-    Override(String),
-}
-
 impl Configuration {
     /// Reads a configuration and overrides keys of it with `section.key=value`.
     ///
@@ -244,99 +204,6 @@ impl Configuration {
             None => Ok(configuration),
             Some(key) => Err(strict::unknown("the configuration", key, &known)),
         }
-    }
-
-    fn validate(&self) -> Result<(), ConfigurationError> {
-        let value = |section: &str, reason: String| ConfigurationError::Value {
-            section: section.to_owned(),
-            reason,
-        };
-        self.odometry
-            .raster
-            .validate()
-            .map_err(|e| value("raster", e.to_string()))?;
-        self.odometry
-            .points
-            .validate()
-            .map_err(|e| value("points", e.to_string()))?;
-        self.odometry
-            .rotation
-            .validate()
-            .map_err(|e| value("rotation", e.to_string()))?;
-        self.odometry
-            .translation
-            .validate()
-            .map_err(|e| value("translation", e.to_string()))?;
-        self.odometry
-            .exhaustive
-            .validate()
-            .map_err(|e| value("exhaustive", e.to_string()))?;
-        self.odometry
-            .refinement
-            .validate()
-            .map_err(|e| value("refinement", e.to_string()))?;
-        self.slam
-            .validate()
-            .map_err(|e| value("slam.places", e.to_string()))?;
-        self.window(None, 1)
-            .validate()
-            .map_err(|e| value("run", e.to_string()))?;
-        if let Some(simulation) = &self.simulation {
-            simulation
-                .validate()
-                .map_err(|e| value("simulation", e.to_string()))?;
-            let written = simulation.output.format.unwrap_or_default();
-            if let Some(read) = self
-                .dataset
-                .format
-                .filter(|read| OutputFormat::read_as(*read) != Some(written))
-            {
-                let reason = format!(
-                    "output.format is {written}, which is not read as dataset.format = \"{read}\""
-                );
-                return Err(value("simulation", reason));
-            }
-        }
-        if self.has(StageId::Refinement) && self.odometry.points.capacity == 0 {
-            let reason = "points.capacity is 0, but a refinement of kind `local-map` matches points: it must be 1 or more";
-            return Err(value("points", reason.to_owned()));
-        }
-        if self.slam.is_on() && self.odometry.points.capacity == 0 {
-            let reason = "points.capacity is 0, but keyframes of slam are made of points: it must be 1 or more";
-            return Err(value("points", reason.to_owned()));
-        }
-        if !self.slam.is_on() && !self.slam.map.as_os_str().is_empty() {
-            let reason = "map is set, but the keyframes that are found in it are those of slam: set kind to `graph`";
-            return Err(value("slam", reason.to_owned()));
-        }
-        self.odometry
-            .masking
-            .validate()
-            .map_err(|e| value("masking", e.to_string()))?;
-        if self.run.mode == Mode::Live && self.run.rate == Rate::Max {
-            return Err(value(
-                "run",
-                "mode `live` needs a radar's pace: set rate to `realtime` or a factor".to_owned(),
-            ));
-        }
-        let seconds =
-            |section: &str, key: &str, seconds: f64| match seconds >= 0.0 && seconds.is_finite() {
-                true => Ok(()),
-                false => Err(value(
-                    section,
-                    format!("{key} is {seconds}, but must be 0 or more"),
-                )),
-            };
-        seconds("run", "stall_timeout_s", self.run.stall_timeout_s)?;
-        seconds("run", "start_timeout_s", self.run.start_timeout_s)?;
-        seconds("source", "retry_s", self.source.retry_s)?;
-        self.stages.iter().try_for_each(|(name, stage)| {
-            seconds(
-                &format!("stages.{name}"),
-                "restart.window_s",
-                stage.restart.window_s,
-            )
-        })
     }
 
     /// Returns the limits on scans in flight, with masks that look at `scans_a_mask` scans. In live mode the source keeps what

@@ -1,0 +1,105 @@
+//! The bounds of all values, and the sections that must fit each other.
+
+use std::fmt::Display;
+
+use gyre_messages::StageId;
+use gyre_simulator::OutputFormat;
+
+use super::{Configuration, ConfigurationError, Mode, Rate};
+
+impl Configuration {
+    /// Checks every section, then all together.
+    pub(super) fn validate(&self) -> Result<(), ConfigurationError> {
+        self.validate_odometry()?;
+        within("slam.places", self.slam.validate())?;
+        within("run", self.window(None, 1).validate())?;
+        self.validate_simulation()?;
+        self.validate_points()?;
+        self.validate_times()?;
+        if !self.slam.is_on() && !self.slam.map.as_os_str().is_empty() {
+            let reason = "map is set, but the keyframes that are found in it are those of slam: set kind to `graph`";
+            return Err(value("slam", reason));
+        }
+        if self.run.mode == Mode::Live && self.run.rate == Rate::Max {
+            let reason = "mode `live` needs a radar's pace: set rate to `realtime` or a factor";
+            return Err(value("run", reason));
+        }
+        Ok(())
+    }
+
+    fn validate_odometry(&self) -> Result<(), ConfigurationError> {
+        let odometry = &self.odometry;
+        within("raster", odometry.raster.validate())?;
+        within("points", odometry.points.validate())?;
+        within("masking", odometry.masking.validate())?;
+        within("rotation", odometry.rotation.validate())?;
+        within("translation", odometry.translation.validate())?;
+        within("exhaustive", odometry.exhaustive.validate())?;
+        within("refinement", odometry.refinement.validate())
+    }
+
+    /// What a simulation writes must be what the run reads.
+    fn validate_simulation(&self) -> Result<(), ConfigurationError> {
+        let Some(simulation) = &self.simulation else {
+            return Ok(());
+        };
+        within("simulation", simulation.validate())?;
+        let written = simulation.output.format.unwrap_or_default();
+        match self.dataset.format {
+            Some(read) if OutputFormat::read_as(read) != Some(written) => Err(value(
+                "simulation",
+                format!(
+                    "output.format is {written}, which is not read as dataset.format = \"{read}\""
+                ),
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// What needs points must be given some.
+    fn validate_points(&self) -> Result<(), ConfigurationError> {
+        if self.odometry.points.capacity > 0 {
+            return Ok(());
+        }
+        if self.has(StageId::Refinement) {
+            let reason = "points.capacity is 0, but a refinement of kind `local-map` matches points: it must be 1 or more";
+            return Err(value("points", reason));
+        }
+        if self.slam.is_on() {
+            let reason = "points.capacity is 0, but keyframes of slam are made of points: it must be 1 or more";
+            return Err(value("points", reason));
+        }
+        Ok(())
+    }
+
+    fn validate_times(&self) -> Result<(), ConfigurationError> {
+        seconds("run", "stall_timeout_s", self.run.stall_timeout_s)?;
+        seconds("run", "start_timeout_s", self.run.start_timeout_s)?;
+        seconds("source", "retry_s", self.source.retry_s)?;
+        self.stages.iter().try_for_each(|(name, stage)| {
+            let section = format!("stages.{name}");
+            seconds(&section, "restart.window_s", stage.restart.window_s)
+        })
+    }
+}
+
+fn value(section: &str, reason: impl Display) -> ConfigurationError {
+    ConfigurationError::Value {
+        section: section.to_owned(),
+        reason: reason.to_string(),
+    }
+}
+
+fn within<E: Display>(section: &str, validated: Result<(), E>) -> Result<(), ConfigurationError> {
+    validated.map_err(|error| value(section, error))
+}
+
+fn seconds(section: &str, key: &str, seconds: f64) -> Result<(), ConfigurationError> {
+    match seconds >= 0.0 && seconds.is_finite() {
+        true => Ok(()),
+        false => Err(value(
+            section,
+            format!("{key} is {seconds}, but must be 0 or more"),
+        )),
+    }
+}
