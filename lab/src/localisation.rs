@@ -8,7 +8,7 @@ use clap::Args;
 use gyre::{
     Failure,
     configuration::Configuration,
-    localise::{Scans, open},
+    localise::{Scans, known},
 };
 use gyre_geometry::{Pose, SparsePoint};
 use gyre_localisation::{Fix, Localiser, Status};
@@ -62,7 +62,7 @@ pub struct LocalisationArguments {
 pub fn localisation(arguments: &LocalisationArguments) -> Result<ExitCode, Failure> {
     let configuration = Configuration::read(&arguments.configuration, &arguments.set)?;
     let configuration = configuration.streaming(Some(&arguments.data));
-    let mut localiser = open(&arguments.map, &configuration)?;
+    let mut localiser = known::open(&arguments.map, &configuration)?;
     let truth = Truth::read(arguments, &localiser)?;
     let mut scans = Scans::open(&configuration)?;
     make_folder(&arguments.out)?;

@@ -1,21 +1,22 @@
 //! `gyre localise`: finds a drive in a map.
 //!
 //! - `scans`: registers scan after scan by odometry in this process;
+//! - `known`: opens the map;
 //! - `fixes`: `fixes.csv`;
 //! - `counts`: what was found, lost and left out.
 
 mod counts;
 pub mod fixes;
+pub mod known;
 mod scans;
 
 use std::{
     io::IsTerminal,
-    path::Path,
     process::ExitCode,
     time::{Duration, Instant},
 };
 
-use gyre_localisation::{Localiser, LocaliserOptions, Map, Status};
+use gyre_localisation::{Localiser, Status};
 use gyre_storage::{self as storage, Draft};
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -36,7 +37,7 @@ const EVERY: Duration = Duration::from_secs(2);
 pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
     let configuration = Configuration::read(&arguments.configuration, &arguments.set)?;
     let configuration = configuration.streaming(arguments.data.as_deref());
-    let mut localiser = open(&arguments.map, &configuration)?;
+    let mut localiser = known::open(&arguments.map, &configuration)?;
     let mut scans = Scans::open(&configuration)?;
     let out = &arguments.out;
     storage::create_folder(out)?;
@@ -53,40 +54,6 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
         out.join(FIXES).display()
     ))?;
     Ok(ExitCode::SUCCESS)
-}
-
-/// Opens the map in a folder, and plans localisation in it.
-///
-/// # Errors
-/// A folder without a whole map, a configuration that extracts no points.
-pub fn open(folder: &Path, configuration: &Configuration) -> Result<Localiser, Failure> {
-    let drawn = gyre_mapping::Map::open(folder)?;
-    let map = Map::open(folder)
-        .map_err(|error| format!("{} cannot be localised in: {error}", folder.display()))?;
-    if map.keyframes().len() != drawn.keyframes() {
-        return Err(format!(
-            "{} was drawn from {} keyframes and keeps {}: draw the map again with gyre map",
-            folder.display(),
-            drawn.keyframes(),
-            map.keyframes().len()
-        )
-        .into());
-    }
-    let odometry = &configuration.odometry;
-    if odometry.points.capacity == 0 {
-        return Err(
-            "points.capacity is 0, but scans are localised by their points: it must be 1 or more"
-                .into(),
-        );
-    }
-    let options = LocaliserOptions::default();
-    let capacity = odometry.points.capacity;
-    Ok(Localiser::new(
-        map,
-        options,
-        &odometry.refinement,
-        capacity,
-    )?)
 }
 
 /// Localises all scans. The rows so far are whole when it fails.

@@ -12,7 +12,7 @@ use gyre_stage::run::free_shared_memory;
 use rustix::process::{Resource, getrlimit};
 use thiserror::Error;
 
-use crate::{configuration::Configuration, localise, print};
+use crate::{configuration::Configuration, localise::known, print};
 
 /// Open files of the process that has most of them, masking, without observers. Measured: 105.
 pub const FILES: u64 = 120;
@@ -101,7 +101,7 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
         &configuration.odometry.masking,
     )?;
     if configuration.slam.is_localised() {
-        localise::open(&configuration.slam.map, configuration)?;
+        known::open(&configuration.slam.map, configuration)?;
     }
     let period = Duration::from_nanos(dataset.period_ns().max(0) as u64);
     let window = configuration.window(Some(period), masker.scans());

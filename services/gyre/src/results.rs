@@ -26,15 +26,13 @@ use crate::{
     judgement::{Judgement, judge, judge_motions},
     out::Out,
     print,
-    summary::{Session, Summary},
+    summary::{Session, SlamSummary, Summary},
 };
 use estimate::Estimate;
 use files::Files;
 use pass::Pass;
 use sketch::Sketch;
 use slam::Slam;
-
-pub use slam::SlamSummary;
 
 /// The ground truth of a simulation that is played without being stored.
 pub const SIMULATED_TRUTH: &str = "ground_truth.tum";

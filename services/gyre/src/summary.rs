@@ -1,6 +1,7 @@
 //! `summary.json`, and the same as a table.
 
 mod counts;
+mod slam;
 
 use std::{collections::BTreeMap, fmt, path::Path, time::Duration};
 
@@ -17,10 +18,10 @@ use crate::{
     judgement::Judgement,
     latency::{Latency, Percentiles},
     machine::Machine,
-    results::SlamSummary,
 };
 
 pub use counts::{Counter, Counts, MotionCounts};
+pub use slam::SlamSummary;
 
 /// This session of a run.
 pub struct Session<'a> {

@@ -10,7 +10,7 @@ use std::{
 use gyre_geometry::xy_yaw;
 use gyre_messages::{
     Correction, CorrectionHeader, Fix, FixHeader, Loop, LoopHeader, Masked, Message, Motion,
-    MotionHeader, Pose, PoseHeader, Refined, Rotation, Scan,
+    MotionHeader, Pose, PoseHeader, Refined, Rotation, Scan, fix_status,
 };
 use gyre_stage::{
     StageError,
@@ -134,44 +134,24 @@ fn rotation(message: &Received<Rotation>) -> String {
 
 fn motion(header: &MotionHeader) -> String {
     let motion = &header.motion;
-    format!(
-        "x {:.3} m, y {:.3} m, yaw {:.3} deg, score {:.3}",
-        motion.x_m,
-        motion.y_m,
-        motion.yaw_rad.to_degrees(),
-        motion.score
-    )
+    let place = place(motion.x_m, motion.y_m, motion.yaw_rad);
+    format!("{place}, score {:.3}", motion.score)
 }
 
 fn pose(header: &PoseHeader) -> String {
-    format!(
-        "x {:.3} m, y {:.3} m, yaw {:.3} deg",
-        header.x_m,
-        header.y_m,
-        header.yaw_rad.to_degrees()
-    )
+    place(header.x_m, header.y_m, header.yaw_rad)
 }
 
 fn closed(header: &LoopHeader) -> String {
-    format!(
-        "at scan {}: x {:.3} m, y {:.3} m, yaw {:.3} deg, correlation {:.3}",
-        header.item.previous_scan,
-        header.x_m,
-        header.y_m,
-        header.yaw_rad.to_degrees(),
-        header.correlation
-    )
+    let place = place(header.x_m, header.y_m, header.yaw_rad);
+    let (scan, correlation) = (header.item.previous_scan, header.correlation);
+    format!("at scan {scan}: {place}, correlation {correlation:.3}")
 }
 
 fn correction(header: &CorrectionHeader) -> String {
-    format!(
-        "x {:.3} m, y {:.3} m, yaw {:.3} deg, {} keyframes, {} loops",
-        header.x_m,
-        header.y_m,
-        header.yaw_rad.to_degrees(),
-        header.keyframes,
-        header.loops
-    )
+    let place = place(header.x_m, header.y_m, header.yaw_rad);
+    let (keyframes, loops) = (header.keyframes, header.loops);
+    format!("{place}, {keyframes} keyframes, {loops} loops")
 }
 
 fn fix(header: &FixHeader) -> String {
@@ -179,9 +159,14 @@ fn fix(header: &FixHeader) -> String {
         return "lost".to_owned();
     };
     let [x_m, y_m, yaw_rad] = xy_yaw(&pose);
+    let place = place(x_m, y_m, yaw_rad);
+    match header.status {
+        fix_status::PREDICTED => format!("{place}, predicted"),
+        _ => format!("{place}, correlation {:.3}", header.correlation),
+    }
+}
+
+fn place(x_m: f64, y_m: f64, yaw_rad: f64) -> String {
     let yaw_deg = yaw_rad.to_degrees();
-    format!(
-        "x {x_m:.3} m, y {y_m:.3} m, yaw {yaw_deg:.3} deg, correlation {:.3}",
-        header.correlation
-    )
+    format!("x {x_m:.3} m, y {y_m:.3} m, yaw {yaw_deg:.3} deg")
 }

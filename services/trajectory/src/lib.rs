@@ -9,8 +9,8 @@ use std::path::PathBuf;
 use gyre_geometry::{UncertainMotion, covariance, xy_yaw};
 use gyre_messages::{Correction, CorrectionHeader, Item};
 use gyre_slam::{
-    EstimatorKind, Keyframe, LoopVerdict, Query, RecordReader, SlamConfig, SlamKind,
-    TrajectoryEstimator, TrajectoryOptions,
+    EstimatorKind, Keyframe, LoopVerdict, Query, RecordReader, SlamConfig, TrajectoryEstimator,
+    TrajectoryOptions,
 };
 use gyre_stage::{
     Follower, Launch, StageCounters, StageError,
@@ -23,14 +23,17 @@ use gyre_stage::{
 /// Logs that cannot be used, or an error of [`follower::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let slam: SlamConfig = launch.section("slam")?;
-    let mut trajectory = Trajectory::open(&launch.manifest.out, slam.kind)?;
+    let kind = slam.kind.estimator().ok_or_else(|| {
+        StageError::Configuration("slam.kind is none: there is no trajectory to correct".to_owned())
+    })?;
+    let mut trajectory = Trajectory::open(&launch.manifest.out, kind)?;
     follower::run(launch, &mut trajectory)
 }
 
 struct Trajectory {
     /// The folder of the results.
     out: PathBuf,
-    kind: SlamKind,
+    kind: EstimatorKind,
     keyframes: RecordReader<Keyframe>,
     queries: RecordReader<Query>,
     estimator: TrajectoryEstimator,
@@ -47,12 +50,9 @@ struct Trajectory {
 }
 
 impl Trajectory {
-    fn open(out: &std::path::Path, kind: SlamKind) -> Result<Self, StageError> {
+    fn open(out: &std::path::Path, kind: EstimatorKind) -> Result<Self, StageError> {
         let options = TrajectoryOptions {
-            kind: match kind {
-                SlamKind::Filter => EstimatorKind::Filter,
-                SlamKind::Graph | SlamKind::None => EstimatorKind::Graph,
-            },
+            kind,
             ..TrajectoryOptions::default()
         };
         Ok(Self {

@@ -78,7 +78,7 @@ impl Logs {
     }
 
     fn trajectory(&self) -> Trajectory {
-        Trajectory::open(self.out.path(), SlamKind::Graph).unwrap()
+        Trajectory::open(self.out.path(), EstimatorKind::Graph).unwrap()
     }
 }
 

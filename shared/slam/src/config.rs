@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use gyre_estimation::places::{PlaceOptionError, PlaceOptions};
 use serde::{Deserialize, Serialize};
 
+use crate::EstimatorKind;
+
 /// Configuration of SLAM: section `[slam]`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -34,6 +36,17 @@ pub enum SlamKind {
     Filter,
     /// A graph of the poses of all keyframes.
     Graph,
+}
+
+impl SlamKind {
+    /// Returns the estimator of the trajectory; `None` for odometry alone.
+    pub fn estimator(self) -> Option<EstimatorKind> {
+        match self {
+            Self::None => None,
+            Self::Filter => Some(EstimatorKind::Filter),
+            Self::Graph => Some(EstimatorKind::Graph),
+        }
+    }
 }
 
 fn is_empty(path: &Path) -> bool {

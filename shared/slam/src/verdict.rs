@@ -1,4 +1,6 @@
-//! What became of a loop in the estimate of the trajectory.
+//! The verdicts of the estimate of the trajectory on loops.
+
+use std::fmt;
 
 use gyre_estimation::{CHI_SQUARE_99_9, Constraint};
 
@@ -13,6 +15,17 @@ pub enum LoopVerdict {
     ContradictsLoops,
     /// Its group has been counted in full (filter alone).
     Redundant,
+}
+
+impl fmt::Display for LoopVerdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Used => "used",
+            Self::ContradictsOdometry => "contradicts odometry",
+            Self::ContradictsLoops => "contradicts loops",
+            Self::Redundant => "redundant",
+        })
+    }
 }
 
 /// A loop that was accepted by the [`LoopCloser`](crate::LoopCloser), and what became of it.

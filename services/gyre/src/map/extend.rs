@@ -18,7 +18,8 @@ use super::{Drawing, Lines};
 use crate::{
     Failure,
     cli::{MapArguments, MapFormat},
-    localise, print,
+    localise::known,
+    print,
 };
 
 /// Corrected keyframes, and the constraints between them.
@@ -61,7 +62,7 @@ pub fn extend(arguments: &MapArguments, map: &Path) -> Result<Drawing, Failure> 
     let mut keyframes = super::open(run)?;
     let graph = read_graph(run, keyframes.len())?;
     let earlier = gyre_mapping::Map::open(map)?;
-    let mut localiser = localise::open(map, &super::configuration(run)?)?;
+    let mut localiser = known::open(map, &super::configuration(run)?)?;
     let search = find(&mut localiser, &mut keyframes)?;
     let Some(start) = most_agreed(&graph, &search.found) else {
         return Err(format!(

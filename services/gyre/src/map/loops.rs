@@ -2,14 +2,13 @@
 
 use std::path::Path;
 
+use gyre_slam::LoopVerdict;
 use serde::Deserialize;
 
 use crate::Failure;
 
 /// The largest file, bytes: three rows a keyframe of a drive of 1,000 km.
 const MAX_BYTES: u64 = 1 << 28;
-/// The verdict on loops that the trajectory is made with.
-const USED: &str = "used";
 
 #[derive(Deserialize)]
 struct Row {
@@ -28,9 +27,10 @@ pub fn used_loops(path: &Path) -> Result<Vec<[u64; 2]>, Failure> {
     }
     let text = gyre_storage::read_text(path, MAX_BYTES)
         .map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+    let used_verdict = LoopVerdict::Used.to_string();
     let rows = csv::Reader::from_reader(text.as_bytes()).into_deserialize();
     let used = rows.filter_map(|row: Result<Row, csv::Error>| match row {
-        Ok(row) if row.verdict != USED => None,
+        Ok(row) if row.verdict != used_verdict => None,
         row => Some(row.map(|row| [row.found_scan, row.scan])),
     });
     let used: Result<Vec<_>, _> = used.collect();

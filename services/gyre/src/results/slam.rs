@@ -7,12 +7,11 @@ use gyre_evaluation::{BandSample, Bands, TruthSigma};
 use gyre_geometry::{Pose, xy_yaw};
 use gyre_radar::Trajectory;
 use gyre_slam::{
-    Correction, EstimatorKind, Keyframe, LoopOutcome, LoopVerdict, Query, RecordReader, SlamKind,
-    TrajectoryEstimator, TrajectoryOptions,
+    Correction, Keyframe, LoopOutcome, LoopVerdict, Query, RecordReader, TrajectoryEstimator,
+    TrajectoryOptions,
 };
-use serde::Serialize;
 
-use crate::{Failure, configuration::Configuration, out::Out};
+use crate::{Failure, configuration::Configuration, out::Out, summary::SlamSummary};
 
 /// A pose of the truth belongs to a keyframe if it is this near in time.
 const SAME_TIME_NS: u64 = 50_000_000;
@@ -30,38 +29,6 @@ pub struct Slam {
     keyframes: Vec<(u64, i64)>,
 }
 
-/// What the summary says of loops.
-#[derive(Debug, Serialize)]
-pub struct SlamSummary {
-    keyframes: usize,
-    /// Loops that the corrected trajectory is made with.
-    loops_used: usize,
-    /// Verified loops that contradict odometry or other loops.
-    loops_rejected: usize,
-    /// ATE of the corrected trajectory, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    ate_m: Option<f64>,
-}
-
-impl fmt::Display for SlamSummary {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            keyframes,
-            loops_used,
-            loops_rejected,
-            ate_m,
-        } = self;
-        write!(
-            f,
-            "slam          {loops_used} loops between {keyframes} keyframes, {loops_rejected} rejected"
-        )?;
-        match ate_m {
-            Some(ate_m) => write!(f, "; ATE after correction {ate_m:.3} m rmse"),
-            None => Ok(()),
-        }
-    }
-}
-
 impl Slam {
     /// Corrects the poses of the keyframes of a run by its loops; `None` without SLAM, and before the first keyframe. Of a run that goes
     /// on, the loops so far are left out.
@@ -69,19 +36,16 @@ impl Slam {
     /// # Errors
     /// Keyframes that cannot be read or used.
     pub fn read(configuration: &Configuration, out: &Out) -> Result<Option<Self>, Failure> {
-        if !configuration.slam.is_on() {
+        let Some(kind) = configuration.slam.kind.estimator() else {
             return Ok(None);
-        }
+        };
         let mut keyframes = RecordReader::<Keyframe>::open(out.path())?;
         if keyframes.is_empty() {
             return Ok(None);
         }
         let queries = queries(out)?;
         let mut estimator = TrajectoryEstimator::new(TrajectoryOptions {
-            kind: match configuration.slam.kind {
-                SlamKind::Filter => EstimatorKind::Filter,
-                SlamKind::Graph | SlamKind::None => EstimatorKind::Graph,
-            },
+            kind,
             ..TrajectoryOptions::default()
         });
         let mut known = Vec::new();
@@ -153,8 +117,8 @@ impl Slam {
                     false => write!(rows, "{:.3},", candidate.chi_square)?,
                 }
                 match judged {
-                    Ok(judged) => writeln!(rows, "{:.4},{}", judged.weight, used(judged.verdict))?,
-                    Err(_) => writeln!(rows, ",{}", rejected(candidate.outcome))?,
+                    Ok(judged) => writeln!(rows, "{:.4},{}", judged.weight, judged.verdict)?,
+                    Err(_) => writeln!(rows, ",{}", unjudged(candidate.outcome))?,
                 }
             }
         }
@@ -222,18 +186,10 @@ impl Slam {
     }
 }
 
-fn used(verdict: LoopVerdict) -> &'static str {
-    match verdict {
-        LoopVerdict::Used => "used",
-        LoopVerdict::ContradictsOdometry => "contradicts odometry",
-        LoopVerdict::ContradictsLoops => "contradicts loops",
-        LoopVerdict::Redundant => "redundant",
-    }
-}
-
-fn rejected(outcome: LoopOutcome) -> &'static str {
+/// Returns the verdict on a candidate that the trajectory was not given.
+fn unjudged(outcome: LoopOutcome) -> &'static str {
     match outcome {
-        LoopOutcome::Accepted => "used",
+        LoopOutcome::Accepted => "not judged",
         LoopOutcome::LowCorrelation => "low correlation",
         LoopOutcome::Ambiguous => "ambiguous",
         LoopOutcome::Undetermined => "undetermined",

@@ -3,8 +3,10 @@
 use gyre_geometry::{Pose, UncertainMotion};
 use nalgebra::{Matrix3, Vector3};
 
-use super::system::Ends;
 use crate::relative::Relative;
+
+/// The two poses of an edge.
+pub(super) type Ends = [usize; 2];
 
 /// A constraint with the inverse of its covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]

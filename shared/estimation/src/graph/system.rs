@@ -10,10 +10,7 @@ use faer::sparse::linalg::cholesky::{
 use faer::sparse::{FaerError, SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, Mat, Par, Side};
 
-use super::edge::Linear;
-
-/// The two poses of an edge.
-pub(super) type Ends = [usize; 2];
+use super::edge::{Ends, Linear};
 
 /// A symmetric system of equations with three rows a pose and a block for each pair of poses that share an edge, of which the lower
 /// triangle is stored. Pose 0 is fixed and has no rows.
