@@ -1,7 +1,7 @@
 //! A disk whose power fails: what it can hold of recorded changes, by what was synchronised.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     fs,
     path::{Path, PathBuf},
 };
@@ -49,8 +49,27 @@ pub struct Disk {
     names: BTreeMap<PathBuf, usize>,
     namings: Vec<Naming>,
     syncs: BTreeMap<u64, usize>,
-    folders: Vec<PathBuf>,
+    folders: BTreeSet<PathBuf>,
     time: usize,
+}
+
+/// What a disk holds after a power failure: folders, and files with their bytes.
+#[derive(PartialEq, Eq, Hash)]
+pub struct State {
+    folders: BTreeSet<PathBuf>,
+    files: BTreeMap<PathBuf, Vec<u8>>,
+}
+
+impl State {
+    /// Writes it into a folder.
+    pub fn write(&self, to: &Path) {
+        for folder in &self.folders {
+            fs::create_dir_all(to.join(folder)).unwrap();
+        }
+        for (name, content) in &self.files {
+            fs::write(to.join(name), content).unwrap();
+        }
+    }
 }
 
 impl Disk {
@@ -71,7 +90,7 @@ impl Disk {
                     in_danger: Vec::new(),
                 });
             }
-            disk.folders.push(next);
+            disk.folders.insert(next);
         }
         disk.safe_names = disk.names.clone();
         disk
@@ -81,7 +100,7 @@ impl Disk {
     pub fn apply(&mut self, operation: &Operation) {
         self.time += 1;
         match operation {
-            Operation::CreateFolder(path) => self.folders.push(path.clone()),
+            Operation::CreateFolder(path) => _ = self.folders.insert(path.clone()),
             Operation::Create(path) => {
                 self.files.push(File::default());
                 self.rename(vec![(path.clone(), Some(self.files.len() - 1))]);
@@ -148,8 +167,8 @@ impl Disk {
         self.namings = others;
     }
 
-    /// Writes what the disk holds after a power failure to real files; paths below `root` become ones below `to`.
-    pub fn fail(&self, survives: Survives, random: &mut StdRng, root: &Path, to: &Path) {
+    /// Returns what the disk holds after a power failure. Names in it are relative to `root`.
+    pub fn fail(&self, survives: Survives, random: &mut StdRng, root: &Path) -> State {
         let mut kept = |share: f64| match survives {
             Survives::Nothing => false,
             Survives::All => true,
@@ -161,17 +180,20 @@ impl Disk {
                 apply_names(&mut names, &naming.names);
             }
         }
-        let place = |path: &Path| to.join(path.strip_prefix(root).unwrap());
-        for folder in &self.folders {
-            fs::create_dir_all(place(folder)).unwrap();
-        }
-        for (name, file) in &names {
-            let file = &self.files[*file];
+        let relative = |path: &Path| path.strip_prefix(root).unwrap().to_owned();
+        let mut content = |file: &File| {
             let mut content = file.safe.clone();
             for (_, change) in &file.in_danger {
                 change.apply_in_part(&mut content, &mut kept);
             }
-            fs::write(place(name), content).unwrap();
+            content
+        };
+        State {
+            folders: self.folders.iter().map(|it| relative(it)).collect(),
+            files: names
+                .iter()
+                .map(|(name, file)| (relative(name), content(&self.files[*file])))
+                .collect(),
         }
     }
 }

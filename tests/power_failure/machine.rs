@@ -35,6 +35,8 @@ const INTERVAL_NS: i64 = 250_000_000;
 const POINTS: usize = 200;
 /// The results that must be the same bytes.
 const RESULTS: [&str; 3] = ["odometry.csv", "trajectory.tum", "trajectory.svg"];
+/// Those of a run with SLAM besides.
+const SLAM_RESULTS: [&str; 3] = ["trajectory_slam.tum", "graph.g2o", "map.png"];
 
 /// A machine on which one run is begun, resumed and completed.
 pub struct Machine {
@@ -47,8 +49,9 @@ pub struct Machine {
 impl Machine {
     /// A machine whose runs have SLAM or not.
     pub fn new(slam: SlamKind) -> Self {
-        // A small map, whose slots are used again within the drive.
+        // A small map, whose slots are used again within the drive; and a small picture, because each of thousands of runs draws one.
         let overrides = [
+            "points.max_range_m=10.0",
             "refinement.keyframes=3",
             "refinement.keyframe_distance_m=1.5",
             "refinement.cell_m=1.0",
@@ -80,11 +83,12 @@ impl Machine {
 
     /// Returns the content of the files that must be the same bytes.
     pub fn results(&self, out: &Path) -> Vec<Vec<u8>> {
-        let has_keyframes = self.configuration.slam.is_on();
-        let keyframes = has_keyframes.then(|| records_path::<Keyframe>(out));
-        let results = RESULTS.iter().map(|name| out.join(name));
-        let read = |path| fs::read(path).unwrap();
-        results.chain(keyframes).map(read).collect()
+        let mut paths: Vec<_> = RESULTS.iter().map(|name| out.join(name)).collect();
+        if self.configuration.slam.is_on() {
+            paths.push(records_path::<Keyframe>(out));
+            paths.extend(SLAM_RESULTS.iter().map(|name| out.join(name)));
+        }
+        paths.iter().map(|path| fs::read(path).unwrap()).collect()
     }
 
     /// Does what the command does, to the end of the run.
