@@ -1,0 +1,280 @@
+//! Stages that send a fault: each does what its topic needs and no more.
+
+use std::{env, path::Path};
+
+use bytemuck::Pod;
+use gyre_messages::{
+    Item, Masked, MaskedHeader, Motion, MotionEstimate, MotionHeader, PoseHeader, Refined,
+    Rotation, Scan, ScanHeader, StageId, flag,
+};
+use gyre_pose_integration::compose;
+use gyre_radar::{Dataset, DatasetOptions};
+use gyre_radar_replay::SourceConfig;
+use gyre_stage::{
+    Launch, Sink, Source, Stage, StageCounters, StageError,
+    inputs::{Joined, JoinedView, PairView, Pairs},
+    reader::Received,
+    sink,
+    source::{self, Unreadable},
+    stage,
+    writer::Draft,
+};
+
+/// The item that is sent wrong.
+pub const FAULTY: u64 = 7;
+/// What a foreign stage does wrong: a topic, a field of it and a value, see [`Fault`].
+pub const FAULT: &str = "GYRE_TEST_FAULT";
+/// A file that exists once the fault has been sent, if it is to be sent only once.
+pub const ONCE: &str = "GYRE_TEST_ONCE";
+
+/// Works as the stage that publishes the topic of the fault.
+pub fn play(launch: &Launch, fault: Fault) -> Result<StageCounters, StageError> {
+    match fault.topic.as_str() {
+        "scan" => replay(launch, fault),
+        "masked" => stage::run(launch, &mut ForeignMasking(fault)),
+        "rotation" => stage::run(launch, &mut ForeignRotation(fault)),
+        "motion" => stage::run(launch, &mut ForeignTranslation(fault)),
+        "refined" => stage::run(launch, &mut ForeignRefinement(fault)),
+        _ => {
+            let mut sink = ForeignIntegration { fault, last: None };
+            sink::run::<Refined, _>(launch, &mut sink)
+        }
+    }
+}
+
+/// A field of a topic and the value that it gets.
+pub struct Fault {
+    pub topic: String,
+    field: String,
+    value: f64,
+}
+
+impl Fault {
+    /// Reads `TOPIC FIELD VALUE`.
+    pub fn parse(text: &str) -> Self {
+        let words: Vec<&str> = text.split(' ').collect();
+        Self {
+            topic: words[0].to_owned(),
+            field: words[1].to_owned(),
+            value: words[2].parse().unwrap(),
+        }
+    }
+
+    /// Returns the value for a field of item `seq`, if it is to be sent wrong now.
+    fn of(&self, field: &str, seq: u64) -> Option<f64> {
+        if self.field != field || seq != FAULTY {
+            return None;
+        }
+        let sent = env::var_os(ONCE);
+        if let Some(marker) = sent.as_deref().map(Path::new) {
+            if marker.exists() {
+                return None;
+            }
+            std::fs::write(marker, "").unwrap();
+        }
+        Some(self.value)
+    }
+}
+
+impl Fault {
+    /// Replaces a word of a header behind its item, if that is the fault.
+    fn edit<H: Pod>(&self, header: &mut H, seq: u64) {
+        let word = self.field.strip_prefix("word-");
+        let Some(word) = word.map(|word| word.parse::<usize>().unwrap()) else {
+            return;
+        };
+        let words = &mut bytemuck::bytes_of_mut(header)[size_of::<Item>()..];
+        let word = word % (words.len() / 8) * 8;
+        if let Some(value) = self.of(&self.field, seq) {
+            words[word..word + 8].copy_from_slice(&value.to_le_bytes());
+        }
+    }
+}
+
+struct ForeignRotation(Fault);
+
+impl Stage for ForeignRotation {
+    type Inputs = Pairs<Masked>;
+    type Output = Rotation;
+    const HOP: StageId = StageId::RotationSearch;
+
+    fn process(
+        &mut self,
+        input: PairView<'_, Masked>,
+        output: &mut Draft<Rotation>,
+    ) -> Result<(), StageError> {
+        let rotation = &mut output.header().rotation;
+        if let Some(value) = self.0.of("angle", input.current.item().seq) {
+            rotation.angle_rad = value;
+        }
+        self.0.edit(output.header(), input.current.item().seq);
+        Ok(())
+    }
+}
+
+/// A motion of a meter forward.
+fn motion(fault: &Fault, seq: u64, interval_ns: i64) -> MotionEstimate {
+    let x_m = fault.of("x", seq).unwrap_or(1.0);
+    let variance = fault.of("covariance", seq).unwrap_or(0.01);
+    MotionEstimate {
+        x_m,
+        searched: [1.0, 0.0, 0.0],
+        covariance: [variance, 0.0, 0.0, 0.01, 0.0, 1e-4],
+        interval_ns,
+        ..MotionEstimate::default()
+    }
+}
+
+struct ForeignTranslation(Fault);
+
+impl Stage for ForeignTranslation {
+    type Inputs = Joined<Masked, Rotation>;
+    type Output = Motion;
+    const HOP: StageId = StageId::TranslationSearch;
+
+    fn process(
+        &mut self,
+        input: JoinedView<'_, Masked, Rotation>,
+        output: &mut Draft<Motion>,
+    ) -> Result<(), StageError> {
+        let item = input.pair.current.item();
+        if !item.is(flag::BREAK) {
+            output.header().motion = motion(&self.0, item.seq, input.pair.interval_ns());
+        }
+        self.0.edit(output.header(), item.seq);
+        Ok(())
+    }
+}
+
+struct ForeignRefinement(Fault);
+
+impl Stage for ForeignRefinement {
+    type Inputs = Joined<Masked, Motion>;
+    type Output = Refined;
+    const HOP: StageId = StageId::Refinement;
+
+    fn process(
+        &mut self,
+        input: JoinedView<'_, Masked, Motion>,
+        output: &mut Draft<Refined>,
+    ) -> Result<(), StageError> {
+        let (item, searched) = (input.pair.current.item(), input.other.header().motion);
+        if !item.is(flag::BREAK) {
+            output.header().motion = motion(&self.0, item.seq, searched.interval_ns);
+        }
+        self.0.edit(output.header(), item.seq);
+        Ok(())
+    }
+}
+
+struct ForeignMasking(Fault);
+
+impl Stage for ForeignMasking {
+    type Inputs = Pairs<Scan>;
+    type Output = Masked;
+    const HOP: StageId = StageId::Masking;
+
+    fn process(
+        &mut self,
+        input: PairView<'_, Scan>,
+        output: &mut Draft<Masked>,
+    ) -> Result<(), StageError> {
+        let seq = input.current.item().seq;
+        let (header, values) = output.parts::<f32>();
+        values.fill(0.0);
+        let fault = |field: &str| self.0.of(field, seq);
+        let raster = MaskedHeader::split(values, 127, 1).unwrap();
+        raster.points[0].x_m = fault("point").unwrap_or(1.0) as f32;
+        *header = MaskedHeader {
+            n: fault("n").unwrap_or(127.0) as u32,
+            rasters: 1,
+            cell_m: 0.8,
+            points: fault("points").unwrap_or(1.0) as u32,
+            ..MaskedHeader::default()
+        };
+        self.0.edit(header, seq);
+        Ok(())
+    }
+}
+
+/// Plays the recording, with a fault in one header.
+fn replay(launch: &Launch, fault: Fault) -> Result<StageCounters, StageError> {
+    let config: SourceConfig = launch.section("source")?;
+    let dataset = gyre_radar::open(&config.data, &DatasetOptions::default()).unwrap();
+    let tolerance = config.tolerance();
+    source::run(launch, &mut ForeignSource { fault, dataset }, &tolerance)
+}
+
+struct ForeignSource {
+    fault: Fault,
+    dataset: Box<dyn Dataset>,
+}
+
+impl Source for ForeignSource {
+    const HOP: StageId = StageId::RadarReplay;
+
+    fn scans(&self) -> std::ops::Range<usize> {
+        0..self.dataset.len()
+    }
+
+    fn complete_ns(&self, index: usize) -> Option<i64> {
+        self.dataset.nominal_stamp_ns(index)
+    }
+
+    fn period_ns(&self) -> i64 {
+        self.dataset.period_ns()
+    }
+
+    fn drops_missed_scans(&self) -> bool {
+        true
+    }
+
+    fn read(
+        &mut self,
+        index: usize,
+        header: &mut ScanHeader,
+        bytes: &mut [u8],
+    ) -> Result<(), Unreadable> {
+        let geometry = self.dataset.read(index, header.slot(bytes)).unwrap();
+        header.set_geometry(&geometry);
+        let fault = |field: &str| self.fault.of(field, index as u64);
+        if let Some(bins) = fault("bins") {
+            header.bins = bins as u32;
+        }
+        if let Some(azimuths) = fault("azimuths") {
+            header.azimuths = azimuths as u32;
+        }
+        if let Some(stamp_ns) = fault("stamp") {
+            header.azimuth_stamp_ns[3] = stamp_ns as i64;
+        }
+        Ok(())
+    }
+}
+
+struct ForeignIntegration {
+    fault: Fault,
+    last: Option<PoseHeader>,
+}
+
+impl Sink for ForeignIntegration {
+    const HOP: StageId = StageId::PoseIntegration;
+
+    fn restore(&mut self, _: usize) -> Result<(Vec<PoseHeader>, bool), StageError> {
+        Ok((Vec::new(), false))
+    }
+
+    fn integrate(
+        &mut self,
+        motion: &MotionHeader,
+        _: Option<&Received<Masked>>,
+    ) -> Result<PoseHeader, StageError> {
+        let pose = compose(self.last.as_ref(), motion);
+        self.last = Some(pose);
+        let x_m = self.fault.of("x", pose.item.seq).unwrap_or(pose.x_m);
+        Ok(PoseHeader { x_m, ..pose })
+    }
+
+    fn end(&mut self, _: &Item) -> Result<(), StageError> {
+        Ok(())
+    }
+}
