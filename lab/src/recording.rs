@@ -12,8 +12,6 @@ use gyre_radar::{
     ground_truth::{find_ground_truth, parse_trajectory, read_trajectory},
 };
 
-/// Times that miss a trajectory by no more than this are its ends: files round.
-const ROUNDING_NS: u64 = 1_000_000;
 /// A trajectory is not interpolated across wider gaps, as in `gyre evaluate`.
 const MAX_GAP_NS: u64 = 1_000_000_000;
 
@@ -103,7 +101,7 @@ impl Track {
     /// Returns the pose at a time, in the trajectory's own frame; `None` before the first, after the last, and in gaps.
     pub fn pose(&self, stamp_ns: i64) -> Option<Pose> {
         let gap_ns = self.trajectory.gap_ns(stamp_ns);
-        let pose = self.trajectory.near(stamp_ns, ROUNDING_NS);
+        let pose = self.trajectory.near(stamp_ns, Trajectory::ROUNDING_NS);
         pose.filter(|_| gap_ns.is_none_or(|gap_ns| gap_ns <= MAX_GAP_NS))
     }
 }

@@ -13,6 +13,9 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
+    /// Files round stamps by less than this: see [`Trajectory::near`].
+    pub const ROUNDING_NS: u64 = 1_000_000;
+
     /// Number of poses.
     pub fn len(&self) -> usize {
         self.poses.len()

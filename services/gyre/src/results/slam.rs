@@ -13,8 +13,6 @@ use gyre_slam::{
 
 use crate::{Failure, configuration::Configuration, out::Out, summary::SlamSummary};
 
-/// A pose of the truth belongs to a keyframe if it is this near in time.
-const SAME_TIME_NS: u64 = 50_000_000;
 /// Keyframes whose covariance is computed, at most: each takes a millisecond in a long drive.
 const DRAWN: usize = 1000;
 
@@ -50,6 +48,7 @@ impl Slam {
         });
         let mut known = Vec::new();
         for index in 0..keyframes.len() {
+            // With its points: the checksum is that of the whole record.
             let keyframe = keyframes.read(index)?;
             estimator.push(&keyframe)?;
             known.push((keyframe.scan, keyframe.stamp_ns));
@@ -143,7 +142,7 @@ impl Slam {
         let (mut samples, mut start) = (Vec::new(), None);
         for keyframe in (0..self.keyframes.len()).step_by(step) {
             let stamp_ns = self.keyframes[keyframe].1;
-            let Some(truth) = truth.near(stamp_ns, SAME_TIME_NS) else {
+            let Some(truth) = truth.near(stamp_ns, Trajectory::ROUNDING_NS) else {
                 continue;
             };
             let pose = self.estimator.pose(keyframe)?;
