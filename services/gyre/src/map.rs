@@ -2,13 +2,14 @@
 
 mod drawing;
 mod extend;
+mod folder;
 mod keyframes;
 mod loops;
 
 use std::{collections::BTreeMap, path::Path, process::ExitCode};
 
 use gyre_geometry::Pose;
-use gyre_mapping::{MapOptions, Origin, write_geotiff, write_map, write_pgm, write_web_tiles};
+use gyre_mapping::{MapOptions, Origin, write_geotiff, write_pgm, write_web_tiles};
 use gyre_radar::{Trajectory, ground_truth::read_trajectory};
 use gyre_slam::{Keyframe, RecordReader, records_path};
 
@@ -25,8 +26,6 @@ pub use drawing::{Drawing, options};
 const CORRECTED: &str = "trajectory_slam.tum";
 const ODOMETRY: &str = "trajectory.tum";
 const LOOPS: &str = "loops.csv";
-/// A pose belongs to a keyframe if it is this near in time: trajectories may be written in microseconds.
-const SAME_TIME_NS: u64 = 1_000_000;
 
 /// Draws the keyframes of a run along its trajectory, and writes the map in the forms that were asked for.
 ///
@@ -73,10 +72,12 @@ fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
             trajectory.display()
         ));
     }
+    let (out, origin) = (&arguments.out, arguments.origin);
     if arguments.format.contains(&MapFormat::Folder) {
-        keyframes::keep(&mut keyframes, &poses, &arguments.out)?;
+        let placed = keyframes::placed(&mut keyframes, &poses)?;
+        folder::write(out, &placed, drawing.evidence(), origin)?;
     }
-    write(arguments, arguments.origin, &mut drawing, &lines)?;
+    export(arguments, origin, &mut drawing, &lines)?;
     Ok(drawing)
 }
 
@@ -113,7 +114,7 @@ fn draw(
     let (mut by_scan, mut span_ns) = (BTreeMap::new(), None);
     for index in 0..keyframes.len() {
         let keyframe = keyframes.read(index)?;
-        let Some(pose) = poses.near(keyframe.stamp_ns, SAME_TIME_NS) else {
+        let Some(pose) = poses.near(keyframe.stamp_ns, Trajectory::ROUNDING_NS) else {
             continue;
         };
         drawing.draw(&keyframe, &pose)?;
@@ -138,7 +139,8 @@ fn part(poses: &Trajectory, (first_ns, last_ns): (i64, i64)) -> Vec<Pose> {
     poses.map(|(_, pose)| *pose).collect()
 }
 
-fn write(
+/// Writes the forms of a map but for its own folder.
+fn export(
     arguments: &MapArguments,
     origin: Option<Origin>,
     drawing: &mut Drawing,
@@ -147,10 +149,7 @@ fn write(
     let out = &arguments.out;
     for format in &arguments.format {
         match format {
-            MapFormat::Folder => {
-                let made_by = concat!("gyre ", env!("CARGO_PKG_VERSION"));
-                write_map(out, drawing.evidence(), origin, made_by)?;
-            }
+            MapFormat::Folder => {}
             MapFormat::Png => {
                 let png = drawing.png(&lines.trajectory, &lines.loops)?;
                 gyre_storage::write(&out.join("map.png"), png)?;
@@ -230,6 +229,13 @@ mod tests {
         fs::write(folder.join("run/trajectory.tum"), tum).unwrap();
     }
 
+    /// Writes a corrected trajectory that has the first keyframe alone.
+    fn correct_first_keyframe(folder: &Path) {
+        let mut tum = Vec::new();
+        write_tum_pose(keyframe(0).stamp_ns, &pose(0.0, 0.0, 0.0), &mut tum).unwrap();
+        fs::write(folder.join("run/trajectory_slam.tum"), tum).unwrap();
+    }
+
     #[test]
     fn the_map_of_a_run_is_written_in_all_forms() {
         let folder = tempfile::tempdir().unwrap();
@@ -258,12 +264,25 @@ mod tests {
     }
 
     #[test]
+    fn a_map_with_other_files_among_its_tiles_is_refused_and_left_as_it_is() {
+        let folder = tempfile::tempdir().unwrap();
+        run(folder.path());
+        map(&arguments(folder.path())).unwrap();
+        let out = folder.path().join("map");
+        fs::write(out.join("tiles/holiday.jpg"), "mine").unwrap();
+        correct_first_keyframe(folder.path());
+        let refused = map(&arguments(folder.path())).unwrap_err().to_string();
+        assert!(refused.contains("holiday.jpg is no tile"), "{refused}");
+        assert_eq!(Map::open(&out).unwrap().keyframes(), 3);
+        let kept = gyre_localisation::Map::open(&out).unwrap();
+        assert_eq!(kept.keyframes().len(), 3);
+    }
+
+    #[test]
     fn the_corrected_trajectory_comes_before_that_of_odometry() {
         let folder = tempfile::tempdir().unwrap();
         run(folder.path());
-        let mut tum = Vec::new();
-        write_tum_pose(keyframe(0).stamp_ns, &pose(0.0, 0.0, 0.0), &mut tum).unwrap();
-        fs::write(folder.path().join("run/trajectory_slam.tum"), tum).unwrap();
+        correct_first_keyframe(folder.path());
         map(&arguments(folder.path())).unwrap();
         assert_eq!(
             Map::open(&folder.path().join("map")).unwrap().keyframes(),

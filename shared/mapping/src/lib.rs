@@ -39,7 +39,7 @@ mod view;
 pub use evidence::Evidence;
 pub use export::{write_geotiff, write_pgm, write_web_tiles};
 pub use georeference::{Origin, OriginError};
-pub use map::{Map, write_map};
+pub use map::{Map, require_tiles_only, write_map};
 pub use options::{MapOptions, OptionError};
 pub use picture::{Overlay, legible, map_png};
 pub use source::{MapError, TileSource};

@@ -95,13 +95,31 @@ pub fn write_map(
 
 /// Removes a map, its `map.toml` first. Pictures and exports in the folder stay.
 fn clear(folder: &Path) -> Result<(), MapError> {
-    let tiles = folder.join(TILES);
-    if !tiles.exists() {
+    let tiles = tiles_in(folder)?;
+    if tiles.is_empty() {
         return Ok(());
     }
     storage::remove(&folder.join(MANIFEST))?;
     storage::sync_folder(folder)?;
+    Ok(tiles.iter().try_for_each(|tile| storage::remove(tile))?)
+}
+
+/// Checks that a folder has no tiles, or only such as a map has: that a map may be written there.
+///
+/// # Errors
+/// A folder that cannot be read, or has other content than a map.
+pub fn require_tiles_only(folder: &Path) -> Result<(), MapError> {
+    tiles_in(folder).map(drop)
+}
+
+/// Returns the paths of the tiles in a folder, drafts included.
+fn tiles_in(folder: &Path) -> Result<Vec<PathBuf>, MapError> {
+    let tiles = folder.join(TILES);
+    if !tiles.exists() {
+        return Ok(Vec::new());
+    }
     let failed = StorageError::at("read", &tiles);
+    let mut paths = Vec::new();
     for entry in fs::read_dir(&tiles).map_err(&failed)? {
         let path = entry.map_err(&failed)?.path();
         let is_ours = path.extension().is_some_and(|end| end == "png") || storage::is_draft(&path);
@@ -111,9 +129,9 @@ fn clear(folder: &Path) -> Result<(), MapError> {
                 reason: format!("{} is no tile; choose another folder", path.display()),
             });
         }
-        storage::remove(&path)?;
+        paths.push(path);
     }
-    Ok(())
+    Ok(paths)
 }
 
 fn tile_path(folder: &Path, tile: TileIndex) -> PathBuf {

@@ -14,7 +14,7 @@ use gyre_slam::{Keyframe, RecordReader};
 use gyre_storage::StorageError;
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Drawing, Lines};
+use super::{Drawing, Lines, folder};
 use crate::{
     Failure,
     cli::{MapArguments, MapFormat},
@@ -90,13 +90,14 @@ pub fn extend(arguments: &MapArguments, map: &Path) -> Result<Drawing, Failure> 
         drawing.draw(keyframe, &keyframe.pose.motion)?;
     }
     if arguments.format.contains(&MapFormat::Folder) {
-        gyre_localisation::Map::new(all)?.save(out)?;
+        let all = gyre_localisation::Map::new(all)?;
+        folder::write(out, &all, drawing.evidence(), earlier.origin())?;
     }
     let lines = Lines {
         trajectory: poses,
         loops,
     };
-    super::write(arguments, earlier.origin(), &mut drawing, &lines)?;
+    super::export(arguments, earlier.origin(), &mut drawing, &lines)?;
     Ok(drawing)
 }
 

@@ -95,6 +95,7 @@ fn a_new_map_replaces_the_old_one_and_nothing_else() {
         refused.to_string().contains("holiday.jpg is no tile"),
         "{refused}"
     );
+    assert_eq!(Map::open(folder.path()).unwrap().tiles(), map.tiles());
 }
 
 #[test]
