@@ -64,8 +64,8 @@ pub struct Results {
     pub summary: Summary,
 }
 
-/// Writes all files from the journal. Each is written aside first, and none takes its place before all are complete. They survive
-/// a power failure when this returns.
+/// Writes all files from the journal. Each is written aside first, and none takes its place before all are complete; a result of an
+/// earlier session that cannot be made any more is removed. They survive a power failure when this returns.
 ///
 /// # Errors
 /// A journal that cannot be read, a file that cannot be written.

@@ -68,6 +68,11 @@ impl Draft {
         })
     }
 
+    /// Returns the path of the file whose next content this is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Adds text or bytes at the end.
     ///
     /// # Errors

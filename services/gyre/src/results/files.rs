@@ -1,7 +1,10 @@
 //! Results that are complete but for taking their places.
 
+use std::path::Path;
+
 use gyre_storage::{self as storage, Draft};
 
+use super::{FILES, SIMULATED_TRUTH};
 use crate::{Failure, out::Out};
 
 /// Results that take their places together.
@@ -44,12 +47,44 @@ impl<'a> Files<'a> {
         Ok(())
     }
 
-    /// Makes all of them the results.
+    /// Makes all of them the results. Any other result is of fewer poses, and is removed.
     ///
     /// # Errors
-    /// A file that cannot take its place.
+    /// A file that cannot take its place or be removed.
     pub fn commit(self) -> Result<(), Failure> {
+        let made = |path: &Path| self.drafts.iter().any(|draft| draft.path() == path);
+        // The truth of a simulation is written when the run begins.
+        let results = FILES.iter().filter(|name| **name != SIMULATED_TRUTH);
+        let others: Vec<_> = results
+            .map(|name| self.out.join(name))
+            .filter(|path| !made(path))
+            .collect();
         self.drafts.into_iter().try_for_each(Draft::commit)?;
+        others.iter().try_for_each(|path| storage::remove(path))?;
         Ok(storage::sync_folder(self.out.path())?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn a_result_that_is_not_made_again_is_removed_and_other_files_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = Out::lock(folder.path()).unwrap();
+        let others = [SIMULATED_TRUTH, "notes.txt"];
+        for name in [&others[..], &["odometry.csv", "map.png"]].concat() {
+            fs::write(out.join(name), "old").unwrap();
+        }
+        let mut files = Files::new(&out);
+        files.add("odometry.csv", "new").unwrap();
+        files.commit().unwrap();
+        assert_eq!(fs::read_to_string(out.join("odometry.csv")).unwrap(), "new");
+        assert!(!out.join("map.png").exists());
+        assert!(others.iter().all(|name| out.join(name).exists()));
     }
 }
