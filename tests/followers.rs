@@ -206,6 +206,17 @@ fn loops_and_corrections_can_be_watched() {
 }
 
 #[test]
+fn a_run_without_a_map_says_that_it_has_no_fixes_to_watch() {
+    let run = run();
+    let mut running = run.start();
+    running.await_poses(1);
+    let mut watch = gyre();
+    watch.arg("watch").arg(run.out()).arg("fix");
+    Ended::of(watch).failed_with(&["has no topic `fix`", "slam.map"]);
+    running.finish().succeeded();
+}
+
+#[test]
 fn a_run_without_slam_says_that_it_has_no_loops_to_watch() {
     let run = without_slam();
     let mut running = run.start();

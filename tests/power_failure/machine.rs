@@ -136,6 +136,7 @@ impl Machine {
             live_depth: 0,
             observers: 0,
             slam: self.configuration.slam.is_on(),
+            localises: false,
         };
         let limits = Limits {
             scan_bytes: 1,

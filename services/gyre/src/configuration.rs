@@ -223,6 +223,7 @@ impl Configuration {
             live_depth,
             observers: self.run.observers,
             slam: self.slam.is_on(),
+            localises: self.slam.is_localised(),
         }
     }
 
@@ -275,14 +276,6 @@ impl Configuration {
         }
     }
 
-    /// Returns whether the run has this follower.
-    fn follows(&self, follower: FollowerId) -> bool {
-        match follower {
-            FollowerId::LoopClosure | FollowerId::Trajectory => self.slam.is_on(),
-            FollowerId::Localisation => self.slam.is_localised(),
-        }
-    }
-
     /// Returns the processes to start: `gyre stage NAME`, or their replacements.
     pub fn stage_plans(&self, gyre: &Path) -> Vec<StagePlan> {
         let live = self.run.mode == Mode::Live;
@@ -311,7 +304,8 @@ impl Configuration {
             }
         };
         let stages = StageId::ALL.into_iter().filter(|stage| self.has(*stage));
-        let followers = FollowerId::ALL.into_iter().filter(|it| self.follows(*it));
+        let window = self.window(None, 1);
+        let followers = FollowerId::ALL.into_iter().filter(|it| it.is_in(&window));
         let followers = followers.map(FollowerId::name);
         stages
             .map(StageId::name)

@@ -143,6 +143,7 @@ mod tests {
             live_depth: 0,
             observers: 0,
             slam: false,
+            localises: false,
         };
         let limits = Limits {
             scan_bytes: 1,

@@ -109,6 +109,7 @@ mod tests {
             live_depth: 0,
             observers: 0,
             slam: false,
+            localises: false,
         };
         let kept = |look_back, published, has_previous| {
             serves_only_as_previous(&window(look_back), &scan(published), Some(9), has_previous)

@@ -1,5 +1,7 @@
 //! Processes of a run that follow its logs.
 
+use crate::limits::Window;
+
 /// The followers of a run with SLAM. They read durable logs at their own pace and are not in the stream of scans, so they have no
 /// [`Hop`](crate::Hop) and give no credit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -22,6 +24,22 @@ impl FollowerId {
             Self::LoopClosure => "loop-closure",
             Self::Trajectory => "trajectory",
             Self::Localisation => "localisation",
+        }
+    }
+
+    /// Returns whether a run has this follower.
+    pub const fn is_in(self, window: &Window) -> bool {
+        match self {
+            Self::LoopClosure | Self::Trajectory => window.slam,
+            Self::Localisation => window.localises,
+        }
+    }
+
+    /// The property of a run with this follower, and the keys that give it.
+    pub const fn needs(self) -> &'static str {
+        match self {
+            Self::LoopClosure | Self::Trajectory => "SLAM (slam.kind = \"graph\" or \"filter\")",
+            Self::Localisation => "a map (slam.map, with slam.kind)",
         }
     }
 

@@ -27,8 +27,10 @@ pub struct Window {
     pub live_depth: usize,
     /// Number of observers that each topic has room for: see [`TopicSizes::observers`].
     pub observers: usize,
-    /// True in a run with SLAM: pose-integration keeps keyframes, and the topics of the followers exist.
+    /// True in a run with SLAM: pose-integration keeps keyframes, and the topics of loops and corrections exist.
     pub slam: bool,
+    /// True in a run with SLAM that names the map of an earlier drive: the topic of fixes exists.
+    pub localises: bool,
 }
 
 /// A window out of its bounds.
@@ -179,6 +181,7 @@ mod tests {
         live_depth: 0,
         observers: 0,
         slam: false,
+        localises: false,
     };
 
     #[test]

@@ -25,7 +25,7 @@ pub trait Header: ZeroCopySend + Default + Debug + 'static {
 pub enum Sender {
     /// One of these stages, whichever the run has. A run has all topics of stages.
     Stage(&'static [StageId]),
-    /// A follower. Only a run with SLAM has its topic.
+    /// A follower. Only a run that has it has its topic.
     Follower(FollowerId),
 }
 

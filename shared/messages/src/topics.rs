@@ -67,10 +67,11 @@ const TOPICS: [Topic; 9] = [
 
 /// Returns the topics of a run, in the order of the stream.
 pub fn topics(window: &Window) -> impl Iterator<Item = &'static Topic> + use<> {
-    let slam = window.slam;
-    TOPICS
-        .iter()
-        .filter(move |topic| slam || matches!(topic.sender, Sender::Stage(_)))
+    let window = *window;
+    TOPICS.iter().filter(move |topic| match topic.sender {
+        Sender::Stage(_) => true,
+        Sender::Follower(follower) => follower.is_in(&window),
+    })
 }
 
 fn max_sample_bytes<M: Message>(limits: &Limits) -> usize {
@@ -136,6 +137,7 @@ mod tests {
         live_depth: 0,
         observers: 8,
         slam: false,
+        localises: false,
     };
 
     #[test]
@@ -148,14 +150,19 @@ mod tests {
     }
 
     #[test]
-    fn only_a_run_with_slam_has_the_topics_of_followers_and_their_memory() {
+    fn a_run_has_the_topics_of_its_followers_and_their_memory() {
         let slam = Window {
             slam: true,
             ..WINDOW
         };
         let names = |window| topics(window).map(|topic| topic.name).collect::<Vec<_>>();
         assert_eq!(names(&WINDOW).last(), Some(&"pose"));
-        assert_eq!(names(&slam)[6..], ["loop", "correction", "fix"]);
+        assert_eq!(names(&slam)[6..], ["loop", "correction"]);
+        let with_map = Window {
+            localises: true,
+            ..slam
+        };
+        assert_eq!(names(&with_map)[6..], ["loop", "correction", "fix"]);
         let added = Masked::sizes(&slam).samples() - Masked::sizes(&WINDOW).samples();
         assert_eq!(added, 3);
     }

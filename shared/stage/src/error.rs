@@ -40,12 +40,12 @@ pub enum StageError {
         observers: usize,
     },
     /// The run has no such topic.
-    #[error(
-        "the run that writes to {out} has no topic `{topic}`: only a run with SLAM has it (slam.kind = \"graph\" or \"filter\")"
-    )]
+    #[error("the run that writes to {out} has no topic `{topic}`: only a run with {needs} has it")]
     NoTopic {
         /// The topic.
         topic: &'static str,
+        /// The property of a run that has it.
+        needs: &'static str,
         /// The folder of the results.
         out: PathBuf,
     },

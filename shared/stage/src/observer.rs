@@ -12,7 +12,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Item, Message, flag, topics};
+use gyre_messages::{Item, Message, Sender, flag};
 use iceoryx2::{
     port::{ReceiveError, port_name::PortName, subscriber::Subscriber},
     prelude::{CallbackProgression, LogLevel, PortFactory, set_log_level},
@@ -115,9 +115,12 @@ impl ObservedRun {
     /// # Errors
     /// The run has no such topic, all places of the topic are taken, the run has ended, or the transport fails.
     pub fn observe<M: Message>(&self) -> Result<Observer<'_, M>, StageError> {
-        if !topics(&self.manifest.window).any(|topic| topic.name == M::TOPIC) {
+        if let Sender::Follower(follower) = M::SENDER
+            && !follower.is_in(&self.manifest.window)
+        {
             return Err(StageError::NoTopic {
                 topic: M::TOPIC,
+                needs: follower.needs(),
                 out: self.manifest.out.clone(),
             });
         }

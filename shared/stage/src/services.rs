@@ -44,7 +44,9 @@ pub(crate) struct Services {
     refined: Topic<Refined>,
     pose: Topic<Pose>,
     /// In a run with SLAM.
-    _followers: Option<(Topic<Loop>, Topic<Correction>, Topic<Fix>)>,
+    _slam: Option<(Topic<Loop>, Topic<Correction>)>,
+    /// In a run with a map.
+    _fixes: Option<Topic<Fix>>,
     _events: Vec<Event>,
 }
 
@@ -67,11 +69,11 @@ impl Services {
             events.push(create_event(node, &data_event(topic.name), data)?);
             events.push(create_event(node, &handshake_event(topic.name), handshake)?);
         }
-        let mut followers = None;
+        let fixes = window.localises.then(|| create_topic::<Fix>(node, window));
+        let mut slam = None;
         if window.slam {
             let loops = create_topic::<Loop>(node, window)?;
-            let corrections = create_topic::<Correction>(node, window)?;
-            followers = Some((loops, corrections, create_topic::<Fix>(node, window)?));
+            slam = Some((loops, create_topic::<Correction>(node, window)?));
             let sizes = EventSizes {
                 listeners: FollowerId::ALL.len(),
                 notifiers: 1,
@@ -88,7 +90,8 @@ impl Services {
             motion: create_topic::<Motion>(node, window)?,
             refined: create_topic::<Refined>(node, window)?,
             pose: create_topic::<Pose>(node, window)?,
-            _followers: followers,
+            _slam: slam,
+            _fixes: fixes.transpose()?,
             _events: events,
         })
     }

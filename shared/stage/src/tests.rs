@@ -29,6 +29,7 @@ const WINDOW: Window = Window {
     live_depth: 0,
     observers: 2,
     slam: true,
+    localises: true,
 };
 
 /// A run without processes: its services, and nodes for tests. Runs are isolated from each other.

@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use gyre_messages::{Header, Item, Loop, Message};
+use gyre_messages::{Fix, Header, Item, Loop, Message};
 
 use super::{Run, WINDOW, node, writer};
 use crate::{
-    Manifest, StageError,
+    Manifest,
     follower::LogId,
     observer::{Next, ObservedRun},
     services,
@@ -41,17 +41,17 @@ fn an_observer_that_comes_late_receives_the_last_loops() {
 }
 
 #[test]
-fn a_run_without_slam_has_no_loops_to_observe() {
+fn a_run_without_slam_has_no_loops_to_observe_and_one_without_a_map_no_fixes() {
     let run = Run::new();
     let mut manifest = run.manifest.clone();
     manifest.window.slam = false;
+    manifest.window.localises = false;
     manifest.write("").unwrap();
     let observed = ObservedRun::at(&run.manifest.root).unwrap();
-    let refused = observed.observe::<Loop>().map(drop);
-    assert!(matches!(
-        refused,
-        Err(StageError::NoTopic { topic: "loop", .. })
-    ));
+    let refused = observed.observe::<Loop>().map(drop).unwrap_err();
+    assert!(refused.to_string().contains("`loop`: only a run with SLAM"));
+    let refused = observed.observe::<Fix>().map(drop).unwrap_err();
+    assert!(refused.to_string().contains("`fix`: only a run with a map"));
 }
 
 #[test]
