@@ -38,7 +38,8 @@ pub fn write(
     })
 }
 
-/// Lets `write` fill a folder, whose files and folders then take the place of those of the same names in `out`.
+/// Lets `write` fill a folder, whose files and folders then take the place of those of the same names in `out`. A process that is killed
+/// between these renames leaves no map.
 fn replace(out: &Path, write: impl FnOnce(&Path) -> Result<(), Failure>) -> Result<(), Failure> {
     let [next, earlier] = [NEXT, EARLIER].map(|name| out.join(name));
     // A process that was killed leaves them.
@@ -46,21 +47,27 @@ fn replace(out: &Path, write: impl FnOnce(&Path) -> Result<(), Failure>) -> Resu
         remove(folder)?;
         storage::create_folder(folder)?;
     }
-    write(&next)?;
-    storage::sync_folder(&next)?;
-    let names = names(&next)?;
-    let there = names.iter().rev().filter(|name| out.join(name).exists());
-    there
-        .into_iter()
-        .try_for_each(|name| rename(&out.join(name), &earlier.join(name)))?;
+    let written = write(&next);
+    if written.is_ok() {
+        swap(out, &next, &earlier)?;
+    }
+    remove(&next)?;
+    remove(&earlier)?;
+    written
+}
+
+/// Moves what `next` has to `out`, and what `out` has of the same names to `earlier`.
+fn swap(out: &Path, next: &Path, earlier: &Path) -> Result<(), StorageError> {
+    storage::sync_folder(next)?;
+    let names = names(next)?;
+    for name in names.iter().rev().filter(|name| out.join(name).exists()) {
+        rename(&out.join(name), &earlier.join(name))?;
+    }
     storage::sync_folder(out)?;
-    names
-        .iter()
-        .try_for_each(|name| rename(&next.join(name), &out.join(name)))?;
-    [next, earlier]
-        .iter()
-        .try_for_each(|folder| remove(folder))?;
-    Ok(storage::sync_folder(out)?)
+    for name in &names {
+        rename(&next.join(name), &out.join(name))?;
+    }
+    storage::sync_folder(out)
 }
 
 /// Returns the names in a folder, the marks last.
@@ -107,14 +114,17 @@ mod tests {
         let out = folder.path();
         write_all(out, "earlier");
         fs::write(out.join("map.png"), "a picture").unwrap();
-        let killed = replace(out, |next| {
+        let failed = replace(out, |next| {
             fs::write(next.join("keyframes.log"), "half of").unwrap();
-            Err("killed".into())
+            Err("a full disk".into())
         });
-        killed.unwrap_err();
+        failed.unwrap_err();
         for name in ["tiles/0_0.png", "keyframes.log", "map.toml"] {
             assert_eq!(content(out, name), "earlier");
         }
+        assert_eq!(names(out).unwrap().len(), 4);
+        fs::create_dir(out.join(NEXT)).unwrap();
+        fs::write(out.join(NEXT).join("keyframes.log"), "of a killed one").unwrap();
         replace(out, |next| {
             assert_eq!(names(next).unwrap(), [] as [PathBuf; 0]);
             write_all(next, "later");
