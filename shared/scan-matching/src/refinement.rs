@@ -1,14 +1,14 @@
 //! Refinement of (x, y, yaw) by aligning sparse points with a local map of the last keyframes.
 //!
 //! The map is the mean of what the last keyframes saw, each drawn once from its own points at its own pose, blurred and
-//! saturated. A scan is aligned with it by Levenberg-Marquardt, first on a coarse map and then on the fine one, and is
+//! saturated. A scan is aligned with it by Gauss-Newton steps, first on a coarse map and then on the fine one, and is
 //! deskewed with the very motion that is sought.
 //!
 //! Reading order:
 //! - [`Refiner::refine`]: the method;
 //! - `points`: a scan's points, deskewed;
 //! - `local_map`, `map_level`: the keyframes, and the two rasters that points are aligned with;
-//! - `alignment`, `normal_equations`: Levenberg-Marquardt;
+//! - `alignment`, `normal_equations`: Gauss-Newton with a line search;
 //! - `tracker`: the last poses, what is predicted from them, and which poses a vehicle can have reached;
 //! - `uncertainty`: covariances;
 //! - [`KeyframeAligner`]: the same alignment for two keyframes of one place that are far apart in time.

@@ -1,4 +1,4 @@
-//! Alignment of a scan's points with the local map: Levenberg-Marquardt over (x, y, yaw).
+//! Alignment of a scan's points with the local map: Gauss-Newton over (x, y, yaw) with a line search.
 
 #[cfg(test)]
 mod tests;
@@ -13,12 +13,14 @@ use super::{
 };
 
 /// Converged if a step is shorter than this in each unknown: m, m, rad.
-const MIN_STEP: [f64; 3] = [1e-3, 1e-3, 2e-5];
-const INITIAL_DAMPING: f64 = 1e-3;
-const MIN_DAMPING: f64 = 1e-4;
-const MAX_DAMPING: f64 = 1e4;
-const DAMPING_DECREASE: f64 = 0.3;
-const DAMPING_INCREASE: f64 = 8.0;
+const MIN_STEP: [f64; 3] = [5e-4, 5e-4, 1e-5];
+/// Relative increase of the information's diagonal: keeps the equations solvable where points on one line leave an unknown open.
+const DAMPING: f64 = 1e-4;
+/// Share of the first Gauss-Newton step that is taken. On a map, such a step is about three times too long, see [`align`].
+const FIRST_SHARE: f64 = 0.3;
+/// The next share is within these factors of the last one.
+const SHARE_FACTORS: (f64, f64) = (0.25, 4.0);
+
 /// The result of an alignment.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Alignment {
@@ -28,7 +30,12 @@ pub(super) struct Alignment {
     pub normal: NormalEquations,
 }
 
-/// Aligns points with the map from an initial pose. The cost never rises.
+/// Aligns points with the map from an initial pose by Gauss-Newton steps with a line search. The cost never rises.
+///
+/// Gauss-Newton takes the residuals for small. Here a point's residual 1 - M is large everywhere, so the cost is curved several times
+/// as much as the information says, and a whole step goes too far. The parabola through the cost and its slope before a step and the
+/// cost after it gives the share of the step at which the cost is least. That share is nearly the same from step to step, so each
+/// step takes the share that the one before would have needed, at one evaluation of the cost a step.
 pub(super) fn align(
     map: &MapView<'_>,
     points: &DeskewedPoints,
@@ -40,36 +47,44 @@ pub(super) fn align(
         pose,
     };
     let mut best = at(*initial);
-    let mut damping = INITIAL_DAMPING;
+    let mut share = FIRST_SHARE;
     for _ in 0..max_iterations {
-        let Some(step) = damped_step(&best.normal, damping) else {
+        let Some(whole) = gauss_newton_step(&best.normal) else {
             break;
         };
+        let step = whole * share;
         let next = at(stepped(&best.pose, &step));
+        share *= best_share(&best.normal, &step, &next.normal);
         if next.normal.cost < best.normal.cost {
             best = next;
-            damping = (DAMPING_DECREASE * damping).max(MIN_DAMPING);
-            if has_converged(&step) {
-                break;
-            }
-        } else {
-            damping *= DAMPING_INCREASE;
-            if damping > MAX_DAMPING {
-                break;
-            }
+        }
+        if is_short(&step) {
+            break;
         }
     }
     best
 }
 
-/// The step that solves the damped normal equations; `None` if they are singular.
-fn damped_step(normal: &NormalEquations, damping: f64) -> Option<Vector3<f64>> {
+/// The step that solves the normal equations; `None` if they are singular.
+fn gauss_newton_step(normal: &NormalEquations) -> Option<Vector3<f64>> {
     let mut damped = normal.information;
     for k in 0..3 {
-        damped[(k, k)] *= 1.0 + damping;
+        damped[(k, k)] *= 1.0 + DAMPING;
     }
     let step = damped.cholesky()?.solve(&normal.right_hand_side);
     step.iter().all(|s| s.is_finite()).then_some(step)
+}
+
+/// Returns the share of a step at which the parabola through the costs before and after it is least.
+fn best_share(before: &NormalEquations, step: &Vector3<f64>, after: &NormalEquations) -> f64 {
+    let (least, most) = SHARE_FACTORS;
+    let descent = 2.0 * before.right_hand_side.dot(step);
+    let curvature = after.cost - before.cost + descent;
+    if curvature > 0.0 {
+        (0.5 * descent / curvature).clamp(least, most)
+    } else {
+        most
+    }
 }
 
 fn stepped(pose: &Pose, step: &Vector3<f64>) -> Pose {
@@ -79,6 +94,6 @@ fn stepped(pose: &Pose, step: &Vector3<f64>) -> Pose {
     )
 }
 
-fn has_converged(step: &Vector3<f64>) -> bool {
+fn is_short(step: &Vector3<f64>) -> bool {
     step.iter().zip(MIN_STEP).all(|(s, min)| s.abs() < min)
 }
