@@ -227,3 +227,49 @@ fn fomo_is_detected_by_its_name_and_keeps_all_rows() {
         "{nominal}"
     );
 }
+
+#[test]
+fn both_forms_of_mulran_have_the_same_azimuths_and_times() {
+    let (Some(mut rows), Some(mut raw)) = (
+        opened("samples/mulran-kaist03"),
+        opened("samples/mulran-kaist03-raw"),
+    ) else {
+        return;
+    };
+    assert_eq!(
+        (rows.format(), raw.format()),
+        (Format::MulranOxfordForm, Format::Mulran)
+    );
+    for index in 0..raw.len() {
+        let (one, other) = (
+            read(rows.as_mut(), index).unwrap(),
+            read(raw.as_mut(), index).unwrap(),
+        );
+        assert_sweep(&one);
+        for row in 0..400 {
+            assert_eq!(one.view().row(row), other.view().row(row));
+            assert!((one.azimuth_rad[row] - other.azimuth_rad[row]).abs() < 1e-6);
+            assert!((one.stamp_ns[row] - other.stamp_ns[row]).abs() < 1_000_000);
+        }
+        let apart_ns = one.geometry.stamp_ns - other.geometry.stamp_ns;
+        assert!(apart_ns.abs() < 1_000_000, "{apart_ns} ns");
+    }
+}
+
+/// The third scan of the sample is two seconds after the second.
+#[test]
+fn a_gap_moves_no_scan_of_a_short_recording() {
+    let Some(mut scans) = opened("samples/mulran-kaist03") else {
+        return;
+    };
+    assert!(
+        (scans.period_ns() - 249_600_000).abs() < 100_000,
+        "{}",
+        scans.period_ns()
+    );
+    for index in 0..scans.len() {
+        let stamp_ns = read(scans.as_mut(), index).unwrap().geometry.stamp_ns;
+        let apart_ns = scans.nominal_stamp_ns(index).unwrap() - stamp_ns;
+        assert!(apart_ns.abs() < 1_000_000, "scan {index}: {apart_ns} ns");
+    }
+}

@@ -90,7 +90,7 @@ pub(crate) fn fill_azimuths(
     azimuth_rad: &mut [f32],
 ) -> Result<(), ReadError> {
     if source == AzimuthSource::Uniform {
-        fill_uniform(&mut azimuth_rad[..size.height]);
+        fill_uniform(&mut azimuth_rad[..size.height], 0.0);
         return Ok(());
     }
     check_order(path, rows(pixels, size).map(|row| row.count), counts)?;
@@ -101,11 +101,11 @@ pub(crate) fn fill_azimuths(
     Ok(())
 }
 
-/// Writes uniform angles: row `i` of `n` at `2 pi i / n`.
-pub(crate) fn fill_uniform(azimuth_rad: &mut [f32]) {
+/// Writes uniform angles: row `i` of `n` at `2 pi (first + i) / n`.
+pub(crate) fn fill_uniform(azimuth_rad: &mut [f32], first: f64) {
     let step = std::f64::consts::TAU / azimuth_rad.len() as f64;
     for (row, into) in azimuth_rad.iter_mut().enumerate() {
-        *into = (row as f64 * step) as f32;
+        *into = ((first + row as f64) * step) as f32;
     }
 }
 

@@ -51,15 +51,20 @@ fn rounded_ns(seconds: f64) -> Option<i64> {
     (ns.abs() <= MAX_NS as f64).then_some(ns.round() as i64)
 }
 
-/// Median time between consecutive scans, ns, of those that can be one turn; `None` if none can.
-pub(crate) fn median_turn_ns(stamps: impl Iterator<Item = i64>) -> Option<i64> {
+/// Duration of a turn, ns: the median time between consecutive scans without those that span a gap, which are half as long again as
+/// the shortest tenth, or longer. `None` if no time can be a turn.
+pub(crate) fn turn_ns(stamps: impl Iterator<Item = i64>) -> Option<i64> {
     let stamps: Vec<i64> = stamps.collect();
-    let turns = stamps
+    let mut times: Vec<i64> = stamps
         .windows(2)
         .map(|w| w[1] - w[0])
-        .filter(|ns| TURN_NS.contains(ns));
+        .filter(|ns| TURN_NS.contains(ns))
+        .collect();
+    times.sort_unstable();
+    let short_ns = *times.get(times.len() / 10)?;
+    let one_turn = times.iter().filter(|ns| **ns < short_ns * 3 / 2);
     // A turn in ns is exact in f64.
-    median(turns.map(|ns| ns as f64)).map(|ns| ns as i64)
+    median(one_turn.map(|ns| *ns as f64)).map(|ns| ns as i64)
 }
 
 /// The mean of two times, ns.
@@ -85,6 +90,27 @@ mod tests {
         for raw in [0, -1, 586, 1_000_000_000, i64::MAX, i64::MIN] {
             assert_eq!(to_ns(raw), None, "{raw}");
         }
+    }
+
+    #[test]
+    fn gaps_do_not_lengthen_the_turn() {
+        let turn_of = |times: &[i64]| {
+            let ends = times.iter().scan(0, |now, time| {
+                *now += time;
+                Some(*now)
+            });
+            turn_ns(std::iter::once(0).chain(ends))
+        };
+        let (turn, gap) = (249_595_334, 1_997_738_586);
+        assert_eq!(turn_of(&[turn, gap]), Some(turn));
+        assert_eq!(turn_of(&[gap, turn, gap]), Some(turn));
+        assert_eq!(turn_of(&[turn, turn - 9, turn + 9, gap]), Some(turn));
+        // One time in thirty that is far too short is no turn.
+        assert_eq!(
+            turn_of(&[&[turn / 4][..], &[turn; 29]].concat()),
+            Some(turn)
+        );
+        assert_eq!(turn_of(&[]), None);
     }
 
     #[test]

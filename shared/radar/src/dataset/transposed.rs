@@ -25,6 +25,16 @@ pub(crate) struct Turn {
     pub(crate) logged_ns: i64,
 }
 
+/// The azimuth of the first column.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) enum FirstAzimuth {
+    /// Straight ahead.
+    #[default]
+    Ahead,
+    /// Half a step to the right.
+    HalfAStep,
+}
+
 /// The scans of a folder, with scratch memory for the transposition. Images that are wider than high are not transposed.
 #[derive(Debug)]
 pub(crate) struct TransposedScans {
@@ -33,6 +43,8 @@ pub(crate) struct TransposedScans {
     pub(crate) turns: Vec<Turn>,
     /// Median of their periods, ns. The caller sets it with the turns.
     pub(crate) period_ns: i64,
+    /// The caller sets it if it is not the default.
+    pub(crate) first_azimuth: FirstAzimuth,
     pub(crate) notes: Vec<String>,
     format: Format,
     stamp_meaning: &'static str,
@@ -62,6 +74,7 @@ impl TransposedScans {
             images,
             turns: Vec::new(),
             period_ns: 0,
+            first_azimuth: FirstAzimuth::default(),
             notes,
             format,
             stamp_meaning,
@@ -99,7 +112,7 @@ impl TransposedScans {
         })
     }
 
-    fn azimuths(&self) -> usize {
+    pub(crate) fn azimuths(&self) -> usize {
         self.images.size.height.min(self.images.size.width)
     }
 
@@ -181,7 +194,11 @@ impl Dataset for TransposedScans {
             self.images.decode(index, slot.bytes)?;
         }
         let azimuth_rad = &mut slot.azimuth_rad[..azimuths];
-        fill_uniform(azimuth_rad);
+        let first = match self.first_azimuth {
+            FirstAzimuth::Ahead => 0.0,
+            FirstAzimuth::HalfAStep => 0.5,
+        };
+        fill_uniform(azimuth_rad, first);
         eccentricity::correct(azimuth_rad, self.azimuth_eccentricity_rad);
         slot.flags[..azimuths].fill(flag::MEASURED);
         for (column, stamp) in slot.stamp_ns[..azimuths].iter_mut().enumerate() {

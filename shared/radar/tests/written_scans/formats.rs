@@ -122,7 +122,9 @@ fn mulran_is_transposed_and_named_by_the_end_of_the_sweep() {
         (Format::Mulran, true)
     );
     let scan = read(dataset.as_mut(), 2).unwrap();
-    assert_eq!((scan.stamp_ns[0], scan.geometry.bins), (end(1), 60));
+    // The name is the time of the last of 40 columns, the first of which is at half a step.
+    assert_eq!((scan.stamp_ns[39], scan.geometry.bins), (end(2), 60));
+    assert!((scan.azimuth_rad[0] - TAU / 80.0).abs() < 1e-6);
     assert!(
         scan.geometry.stamp_ns < end(2)
             && dataset.nominal_stamp_ns(2) == Some(scan.geometry.stamp_ns)
