@@ -33,6 +33,7 @@ mod results;
 mod shared_memory;
 mod simulation;
 mod slam;
+mod standstill;
 mod supervisor;
 
 /// The program under test.

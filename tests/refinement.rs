@@ -3,7 +3,9 @@
 
 use std::{collections::BTreeSet, fs, thread, time::Duration};
 
-use crate::common::{Ended, Pid, Run, Running, STAGES, recording, send, undisturbed};
+use crate::common::{
+    Ended, Pid, Run, Running, STAGES, odometry::columns, recording, send, undisturbed,
+};
 use gyre_pose_integration::journal::{self, Journal};
 use rustix::process::Signal;
 use serde_json::Value;
@@ -32,23 +34,6 @@ fn with_small_map() -> Run {
     Run::of_recording()
         .set("refinement.keyframes=2")
         .set("run.window=1")
-}
-
-/// Columns of an `odometry.csv`, by their names.
-fn columns(csv: &str, names: &[&str]) -> Vec<Vec<String>> {
-    let header: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
-    let places: Vec<usize> = names
-        .iter()
-        .map(|name| header.iter().position(|field| field == name).unwrap())
-        .collect();
-    let row = |line: &str| {
-        let fields: Vec<&str> = line.split(',').collect();
-        places
-            .iter()
-            .map(|place| fields[*place].to_owned())
-            .collect()
-    };
-    csv.lines().skip(1).map(row).collect()
 }
 
 fn names(object: &Value) -> BTreeSet<String> {

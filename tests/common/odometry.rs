@@ -27,6 +27,23 @@ pub fn rows(csv: &str) -> Vec<Row> {
     csv.lines().skip(1).map(row).collect()
 }
 
+/// Columns of an `odometry.csv`, by their names.
+pub fn columns(csv: &str, names: &[&str]) -> Vec<Vec<String>> {
+    let header: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
+    let places: Vec<usize> = names
+        .iter()
+        .map(|name| header.iter().position(|field| field == name).unwrap())
+        .collect();
+    let row = |line: &str| {
+        let fields: Vec<&str> = line.split(',').collect();
+        places
+            .iter()
+            .map(|place| fields[*place].to_owned())
+            .collect()
+    };
+    csv.lines().skip(1).map(row).collect()
+}
+
 /// Asserts that each motion begins where the one before ended.
 pub fn assert_unbroken(rows: &[Row]) {
     for pair in rows.windows(2) {

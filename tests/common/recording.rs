@@ -6,10 +6,11 @@ use std::{
     io::Cursor,
     os::unix::fs::symlink,
     path::{Path, PathBuf},
+    process,
     sync::OnceLock,
 };
 
-use gyre_simulator::{SimulationConfig, write_dataset};
+use gyre_simulator::{SimulationConfig, drive::DriveConfig, write_dataset};
 use tempfile::TempDir;
 
 /// Scans of the small recording.
@@ -18,7 +19,7 @@ pub const SCANS: usize = 24;
 /// The small recording.
 pub fn small() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
-    FOLDER.get_or_init(|| simulated(SCANS))
+    FOLDER.get_or_init(|| of_a_block(SCANS))
 }
 
 /// Scans of the recording once around a block and a bit further.
@@ -27,7 +28,28 @@ pub const SCANS_AROUND: usize = 120;
 /// The recording that comes back to where it began.
 pub fn around_a_block() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
-    FOLDER.get_or_init(|| simulated(SCANS_AROUND))
+    FOLDER.get_or_init(|| of_a_block(SCANS_AROUND))
+}
+
+/// The recording of a drive along a trajectory in the format TUM.
+pub fn along(name: &str, trajectory: &str) -> PathBuf {
+    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}-{}.tum", process::id()));
+    fs::write(&file, trajectory).unwrap();
+    let config = SimulationConfig {
+        drive: DriveConfig::along_file(file.clone()),
+        ..SimulationConfig::default()
+    };
+    let recording = simulated(name, &config);
+    fs::remove_file(file).unwrap();
+    recording
+}
+
+fn of_a_block(scans: usize) -> PathBuf {
+    let config = SimulationConfig {
+        scans: Some(scans),
+        ..SimulationConfig::default()
+    };
+    simulated(&scans.to_string(), &config)
 }
 
 /// A copy of the small recording's first `scans` scans, to be corrupted. Its images are links: replace them instead of writing into them.
@@ -150,9 +172,9 @@ fn replace(image: &Path, bytes: &[u8]) {
 
 /// Simulates where the build keeps its temporary files, unless this build of the tests has done so already. Test processes that
 /// start at the same time wait for the first.
-fn simulated(scans: usize) -> PathBuf {
+fn simulated(name: &str, config: &SimulationConfig) -> PathBuf {
     let test = env::current_exe().unwrap();
-    let name = format!("{}-{scans}", test.file_stem().unwrap().to_string_lossy());
+    let name = format!("{}-{name}", test.file_stem().unwrap().to_string_lossy());
     let place = Path::new(env!("CARGO_TARGET_TMPDIR"));
     let recording = place.join(&name);
     let lock = File::create(place.join(format!("{name}.lock"))).unwrap();
@@ -163,11 +185,7 @@ fn simulated(scans: usize) -> PathBuf {
         return recording;
     }
     let _ = fs::remove_dir_all(&recording);
-    let config = SimulationConfig {
-        scans: Some(scans),
-        ..SimulationConfig::default()
-    };
-    write_dataset(&config, &recording, &mut |_, _| ()).unwrap();
+    write_dataset(config, &recording, &mut |_, _| ()).unwrap();
     fs::write(&made_by, format!("{built:?}")).unwrap();
     recording
 }

@@ -168,8 +168,8 @@ impl fmt::Display for Summary {
         if let Some(m) = &c.motions {
             writeln!(
                 f,
-                "motions refined {} ({} by a second hypothesis)  weak {}  predicted {}",
-                m.refined, m.second_hypothesis, m.weak, m.predicted
+                "motions refined {} ({} by a second hypothesis)  weak {}  predicted {}  stationary {}",
+                m.refined, m.second_hypothesis, m.weak, m.predicted, m.stationary
             )?;
         }
         if !self.restarts.is_empty() {

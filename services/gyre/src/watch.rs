@@ -10,7 +10,7 @@ use std::{
 use gyre_geometry::xy_yaw;
 use gyre_messages::{
     Correction, CorrectionHeader, Fix, FixHeader, Loop, LoopHeader, Masked, Message, Motion,
-    MotionHeader, Pose, PoseHeader, Refined, Rotation, Scan, fix_status,
+    MotionEstimate, MotionHeader, Pose, PoseHeader, Refined, Rotation, Scan, fix_status,
 };
 use gyre_stage::{
     StageError,
@@ -135,11 +135,20 @@ fn rotation(message: &Received<Rotation>) -> String {
 fn motion(header: &MotionHeader) -> String {
     let motion = &header.motion;
     let place = place(motion.x_m, motion.y_m, motion.yaw_rad);
-    format!("{place}, score {:.3}", motion.score)
+    let standing = standing(motion);
+    format!("{place}, score {:.3}{standing}", motion.score)
 }
 
 fn pose(header: &PoseHeader) -> String {
-    place(header.x_m, header.y_m, header.yaw_rad)
+    let place = place(header.x_m, header.y_m, header.yaw_rad);
+    format!("{place}{}", standing(&header.motion))
+}
+
+fn standing(motion: &MotionEstimate) -> &'static str {
+    match motion.refinement.is_stationary() {
+        true => ", stationary",
+        false => "",
+    }
 }
 
 fn closed(header: &LoopHeader) -> String {

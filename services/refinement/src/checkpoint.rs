@@ -29,7 +29,7 @@ use codec::{
 };
 
 /// The start of the file, with the version of the slots.
-const MAGIC: [u8; 16] = *b"gyre map v2     ";
+const MAGIC: [u8; 16] = *b"gyre map v3     ";
 /// The largest window. The layout of the file is the same for all windows, so a run can be continued with another one.
 const MAX_WINDOW: usize = 66;
 /// Number of states in the ring.

@@ -111,6 +111,11 @@ fn state_bits(refinement: &Refiner) -> Vec<u64> {
     }
     words.extend([tracker.mean_overlap, tracker.mean_weight].map(f64::to_bits));
     words.extend([tracker.doubtful, tracker.unmatched].map(u64::from));
+    let standstill = &tracker.standstill;
+    words.extend(pose(&standstill.reported));
+    words.extend(pose(&standstill.anchor));
+    words.extend([standstill.time_s, standstill.jitter].map(f64::to_bits));
+    words.extend([standstill.scans, standstill.jitter_scans].map(u64::from));
     for keyframe in refinement.keyframes() {
         words.push(keyframe.id);
         words.extend(pose(&keyframe.pose));

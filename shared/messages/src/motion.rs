@@ -42,7 +42,7 @@ header!(MotionHeader);
 /// The pose of this scan's frame in the previous scan's frame, with its covariance.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_motion_estimate_v2")]
+#[type_name("gyre_motion_estimate_v3")]
 pub struct MotionEstimate {
     /// Forward, m.
     pub x_m: f64,
@@ -168,7 +168,7 @@ impl MotionEstimate {
 /// The header of `motion` and `refined`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_motion_header_v3")]
+#[type_name("gyre_motion_header_v4")]
 pub struct MotionHeader {
     /// The scan.
     pub item: Item,

@@ -39,7 +39,7 @@ header!(PoseHeader);
 /// A pose in the frame of the first scan, with the motion that led to it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_pose_header_v3")]
+#[type_name("gyre_pose_header_v4")]
 pub struct PoseHeader {
     /// The scan.
     pub item: Item,

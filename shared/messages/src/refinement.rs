@@ -33,7 +33,7 @@ pub mod initial_guess {
 /// The result of a refinement; all zero without one.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_refinement_v1")]
+#[type_name("gyre_refinement_v2")]
 pub struct RefinementRecord {
     /// The outcome: see [`outcome`].
     pub outcome: u32,
@@ -43,9 +43,16 @@ pub struct RefinementRecord {
     pub overlap: f64,
     /// Weight of the scan's points relative to the running mean.
     pub support: f64,
+    /// 1 while the vehicle stands, and its pose is held: the motion is zero. Otherwise 0.
+    pub stationary: u64,
 }
 
 impl RefinementRecord {
+    /// Returns whether the vehicle stands.
+    pub fn is_stationary(&self) -> bool {
+        self.stationary != 0
+    }
+
     pub(crate) fn check(&self) -> Result<(), Violation> {
         require(
             self.outcome <= outcome::PREDICTED,
@@ -59,6 +66,12 @@ impl RefinementRecord {
             "initial_guess",
             guess,
             "0 to 3",
+        )?;
+        require(
+            self.stationary <= 1,
+            "stationary",
+            self.stationary,
+            "0 or 1",
         )?;
         finite([("overlap", self.overlap), ("support", self.support)])
     }
@@ -79,6 +92,7 @@ impl From<&gyre_scan_matching::Refined> for RefinementRecord {
             },
             overlap: refined.overlap,
             support: refined.support,
+            stationary: refined.stationary.into(),
         }
     }
 }

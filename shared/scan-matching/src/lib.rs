@@ -81,7 +81,7 @@ pub use masked_correlation::MaskedCorrelation;
 pub use peak::{LinePeak, line_peak};
 pub use refinement::{
     Anchor, InitialGuess, Keyframe, KeyframeAligner, Outcome, Refined, RefinementConfig,
-    RefinementKind, Refiner, TrackerState,
+    RefinementKind, Refiner, Standstill, TrackerState,
 };
 pub use rotation::{RotationMatch, RotationRunnerUp, RotationSearch};
 pub use sequential::SequentialRotation;

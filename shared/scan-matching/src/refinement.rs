@@ -11,29 +11,36 @@
 //! - `alignment`, `normal_equations`: Gauss-Newton with a line search;
 //! - `tracker`: the last poses, what is predicted from them, and which poses a vehicle can have reached;
 //! - `uncertainty`: covariances;
+//! - `standstill`: the pose of a standing vehicle is held;
 //! - [`KeyframeAligner`]: the same alignment for two keyframes of one place that are far apart in time.
 
 mod alignment;
 mod config;
+mod initial_guess;
 mod keyframe_aligner;
 mod local_map;
 mod map_level;
 mod normal_equations;
 mod points;
+mod standstill;
 mod tracker;
 mod uncertainty;
 
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion};
 
 pub use config::{RefinementConfig, RefinementKind};
+pub use initial_guess::InitialGuess;
 pub use keyframe_aligner::KeyframeAligner;
 pub use local_map::Keyframe;
+pub use standstill::Standstill;
 pub use tracker::{Anchor, TrackerState};
 
 use crate::ConfigError;
 use alignment::{Alignment, align};
+use initial_guess::{initial_guesses, yaw_offsets};
 use local_map::LocalMap;
 pub(crate) use points::DeskewedPoints;
+use standstill::Estimate;
 
 const COARSE_ITERATIONS: usize = 10;
 const FINE_ITERATIONS: usize = 6;
@@ -50,9 +57,6 @@ const CLEARLY_BETTER: f64 = 1.02;
 const MAX_DOUBTFUL: u32 = 2;
 /// Factor on the covariance of a weak match.
 const WEAK_COVARIANCE_FACTOR: f64 = 4.0;
-/// Yaw offsets from the prediction, tried if no other initial guess gives a plausible match.
-const YAW_OFFSETS_RAD: [f64; 4] = [-0.1, 0.1, -0.2, 0.2];
-
 /// The reliability of a refined motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
@@ -62,17 +66,6 @@ pub enum Outcome {
     Weak,
     /// No plausible match: the motion is predicted at constant velocity.
     Predicted,
-}
-
-/// The initial guess that an alignment started from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum InitialGuess {
-    /// Constant velocity.
-    Prediction,
-    /// The motion that the search found.
-    Search,
-    /// The prediction with a yaw offset, tried if nothing else gave a plausible match.
-    YawOffset,
 }
 
 /// A refined motion.
@@ -88,6 +81,8 @@ pub struct Refined {
     pub outcome: Outcome,
     /// The initial guess of the accepted match; the prediction if there is none.
     pub guess: InitialGuess,
+    /// The vehicle stands: the motion is zero.
+    pub stationary: bool,
 }
 
 /// Refines motions scan by scan against a map of the last keyframes.
@@ -187,10 +182,11 @@ impl Refiner {
             }
         }
         let (outcome, estimate) = self.accept_or_predict(&scan, &best);
-        let motion = self.state.pose.inv_mul(&estimate.motion);
+        let motion = self.report(&scan, outcome, estimate);
         self.update(&scan, &best, outcome, &estimate.motion);
         Refined {
-            motion: UncertainMotion { motion, ..estimate },
+            motion,
+            stationary: self.config.hold_standstill && self.state.standstill.stands(),
             overlap: best.overlap,
             support: best.support,
             guess: match outcome {
@@ -363,6 +359,26 @@ impl Refiner {
             && apart.rotation.angle().abs() <= config.search_agrees_deg.to_radians()
     }
 
+    /// Returns the motion to the estimated pose; none while the vehicle stands.
+    fn report(
+        &mut self,
+        scan: &Scan<'_>,
+        outcome: Outcome,
+        estimate: UncertainMotion,
+    ) -> UncertainMotion {
+        let previous = self.state.pose;
+        if !self.config.hold_standstill {
+            let motion = previous.inv_mul(&estimate.motion);
+            return UncertainMotion { motion, ..estimate };
+        }
+        self.state.standstill.next(&Estimate {
+            pose: estimate,
+            previous,
+            outcome,
+            interval_s: scan.interval_s,
+        })
+    }
+
     /// Updates the tracker state and the map with the accepted or predicted pose.
     fn update(&mut self, scan: &Scan<'_>, best: &Candidate, outcome: Outcome, pose: &Pose) {
         let (config, fit) = (&self.config, [best.overlap, best.weight]);
@@ -381,18 +397,4 @@ impl Refiner {
         self.points.deskew(points, twist);
         self.map.insert(id, &self.points, pose);
     }
-}
-
-/// The prediction, the search's motion, and the prediction from the scan before in case the last match was wrong.
-fn initial_guesses(predicted: [Pose; 2], searched: Pose) -> [(InitialGuess, Pose); 3] {
-    let [from_last, from_second_last] = predicted;
-    [
-        (InitialGuess::Prediction, from_last),
-        (InitialGuess::Search, searched),
-        (InitialGuess::Prediction, from_second_last),
-    ]
-}
-
-fn yaw_offsets(predicted: Pose) -> [(InitialGuess, Pose); 4] {
-    YAW_OFFSETS_RAD.map(|offset| (InitialGuess::YawOffset, predicted * Pose::rotation(offset)))
 }

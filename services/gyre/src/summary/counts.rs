@@ -43,6 +43,8 @@ pub struct MotionCounts {
     pub doubtful: u64,
     /// Refined ones whose initial guess was not the prediction.
     pub second_hypothesis: u64,
+    /// Those of a standing vehicle.
+    pub stationary: u64,
 }
 
 impl MotionCounts {
@@ -59,6 +61,7 @@ impl MotionCounts {
             _ => {}
         }
         self.doubtful = self.weak + self.predicted;
+        self.stationary += u64::from(refinement.is_stationary());
     }
 }
 
@@ -220,6 +223,7 @@ mod tests {
             let refinement = RefinementRecord {
                 outcome,
                 initial_guess,
+                stationary: u64::from(outcome == outcome::WEAK),
                 ..RefinementRecord::default()
             };
             PoseHeader {
@@ -245,6 +249,7 @@ mod tests {
             predicted: 1,
             doubtful: 2,
             second_hypothesis: 2,
+            stationary: 1,
         };
         assert_eq!(counts.motions, Some(expected));
     }

@@ -1,15 +1,19 @@
 //! The binary layout of the slots of a checkpoint: little-endian words of 8 bytes, the first one a checksum of the rest.
 
 use gyre_geometry::Twist;
-use gyre_scan_matching::{Anchor, Keyframe, TrackerState};
+use gyre_scan_matching::{Anchor, Keyframe, Standstill, TrackerState};
 use nalgebra::{Complex, Isometry2, Translation2, UnitComplex};
 
 /// Words of a state's slot before the names of its keyframes: the checksum; the item, the checksum of its motion, the number of
 /// keyframes; the tracker state.
 const STATE_WORDS: usize = 1 + 3 + TRACKER_WORDS;
 const NAME_WORDS: usize = 2;
-const TRACKER_WORDS: usize = 4 + 2 * ANCHOR_WORDS + 4;
+const TRACKER_WORDS: usize = STANDSTILL + STANDSTILL_WORDS;
+const STANDSTILL_WORDS: usize = 4 + 4 + 4;
 const ANCHOR_WORDS: usize = 9;
+/// Where the means and counts of a tracker state begin, and its standstill.
+const REST: usize = 4 + 2 * ANCHOR_WORDS;
+const STANDSTILL: usize = REST + 4;
 /// Words of a keyframe's slot before its cells: checksum, id, pose, corners of both levels.
 pub(super) const KEYFRAME_WORDS: usize = 2 + 4 + 4;
 /// The checksum of an empty slot. No content has it.
@@ -103,8 +107,33 @@ fn tracker_words(state: &TrackerState) -> [u64; TRACKER_WORDS] {
         state.doubtful.into(),
         state.unmatched.into(),
     ];
-    words[4 + 2 * ANCHOR_WORDS..].copy_from_slice(&rest);
+    words[REST..STANDSTILL].copy_from_slice(&rest);
+    words[STANDSTILL..].copy_from_slice(&standstill_words(&state.standstill));
     words
+}
+
+fn standstill_words(standstill: &Standstill) -> [u64; STANDSTILL_WORDS] {
+    let mut words = [0; STANDSTILL_WORDS];
+    words[..4].copy_from_slice(&pose_words(&standstill.reported));
+    words[4..8].copy_from_slice(&pose_words(&standstill.anchor));
+    words[8..].copy_from_slice(&[
+        standstill.scans.into(),
+        standstill.time_s.to_bits(),
+        standstill.jitter.to_bits(),
+        standstill.jitter_scans.into(),
+    ]);
+    words
+}
+
+fn standstill_from(words: &[u64]) -> Standstill {
+    Standstill {
+        reported: pose_from(words),
+        anchor: pose_from(&words[4..]),
+        scans: words[8] as u32,
+        time_s: f64::from_bits(words[9]),
+        jitter: f64::from_bits(words[10]),
+        jitter_scans: words[11] as u32,
+    }
 }
 
 fn tracker_from(words: &[u64; TRACKER_WORDS]) -> TrackerState {
@@ -122,7 +151,7 @@ fn tracker_from(words: &[u64; TRACKER_WORDS]) -> TrackerState {
             age_s,
         })
     };
-    let rest = &words[4 + 2 * ANCHOR_WORDS..];
+    let rest = &words[REST..];
     TrackerState {
         pose: pose_from(words),
         anchors: [anchor(0), anchor(1)],
@@ -130,6 +159,7 @@ fn tracker_from(words: &[u64; TRACKER_WORDS]) -> TrackerState {
         mean_weight: f64::from_bits(rest[1]),
         doubtful: rest[2] as u32,
         unmatched: rest[3] as u32,
+        standstill: standstill_from(&words[STANDSTILL..]),
     }
 }
 

@@ -52,6 +52,8 @@ pub struct RefinementConfig {
     /// Standard deviation of the heading that is added to the covariance, degrees, for the uneven
     /// rotation of the antenna.
     pub yaw_sigma_deg: f64,
+    /// Holds the pose of a standing vehicle: no motion until the displacement exceeds the noise.
+    pub hold_standstill: bool,
 }
 
 /// The refinement of searched motions.
@@ -89,6 +91,7 @@ impl Default for RefinementConfig {
             max_unmatched: 5,
             variance_scale: 0.7,
             yaw_sigma_deg: 0.19,
+            hold_standstill: true,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use gyre_geometry::{Pose, Twist};
 
-use super::{Outcome, RefinementConfig};
+use super::{Outcome, RefinementConfig, Standstill};
 
 /// Weight of the newest velocity, which jitters with each match, in its running mean.
 const TWIST_GAIN: f64 = 0.5;
@@ -24,6 +24,8 @@ pub struct TrackerState {
     pub doubtful: u32,
     /// Number of scans in a row that were predicted.
     pub unmatched: u32,
+    /// The place where the vehicle stands, for the reported motions.
+    pub standstill: Standstill,
 }
 
 /// A refined scan from which the next poses are predicted.
@@ -46,6 +48,7 @@ impl Default for TrackerState {
             mean_weight: 0.0,
             doubtful: 0,
             unmatched: 0,
+            standstill: Standstill::default(),
         }
     }
 }
