@@ -4,7 +4,7 @@
 use std::{fs, path::Path};
 
 use gyre_odometry::{Odometry, OdometryConfig};
-use gyre_radar::{Dataset, OwnedScan, open_source};
+use gyre_radar::{OwnedScan, open_source};
 use gyre_simulator::{Profile, SimulatedDrive, SimulationConfig};
 use serde::Deserialize;
 
