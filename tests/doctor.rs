@@ -69,7 +69,21 @@ fn a_folder_for_results_that_cannot_be_written_to_is_told() {
 }
 
 #[test]
-fn without_onnx_runtime_a_run_works_but_has_no_learned_masks() {
+fn without_onnx_runtime_learned_masks_take_longer() {
+    let mut command = gyre();
+    let nowhere = "/no/such/folder";
+    command.arg("doctor").env_remove("ORT_DYLIB_PATH");
+    command.env("XDG_DATA_HOME", nowhere).env("HOME", nowhere);
+    let ended = Ended::of(command);
+    let stdout = &ended.succeeded().stdout;
+    assert!(
+        stdout.contains("note  ONNX Runtime   none: tract computes learned masks"),
+        "{stdout}"
+    );
+}
+
+#[test]
+fn an_onnx_runtime_that_is_named_but_not_there_is_told() {
     let mut command = gyre();
     command
         .arg("doctor")
@@ -77,7 +91,7 @@ fn without_onnx_runtime_a_run_works_but_has_no_learned_masks() {
     let ended = Ended::of(command);
     let stdout = &ended.succeeded().stdout;
     assert!(
-        stdout.contains("note  ONNX Runtime   none: no learned masks"),
+        stdout.contains("note  ONNX Runtime   cannot be used: no learned masks"),
         "{stdout}"
     );
     assert!(

@@ -42,9 +42,6 @@ fn survives(model: &str, disturb: impl Fn(&mut Running)) {
 
 #[test]
 fn a_network_changes_the_motions_and_the_run_says_which_one_it_was() {
-    if !runtime_is_installed() {
-        return;
-    }
     for model in [ONE_SCAN, TWO_SCANS] {
         let run = masked_by(model);
         assert_ne!(run.complete(), undisturbed());
@@ -67,27 +64,20 @@ fn a_network_changes_the_motions_and_the_run_says_which_one_it_was() {
 
 #[test]
 fn a_killed_masking_goes_on_with_a_network_that_looks_at_one_scan() {
-    if runtime_is_installed() {
-        survives(ONE_SCAN, |running| {
-            running.kill("masking");
-        });
-    }
+    survives(ONE_SCAN, |running| {
+        running.kill("masking");
+    });
 }
 
 #[test]
 fn a_killed_masking_goes_on_with_a_network_that_looks_at_two_scans() {
-    if runtime_is_installed() {
-        survives(TWO_SCANS, |running| {
-            running.kill("masking");
-        });
-    }
+    survives(TWO_SCANS, |running| {
+        running.kill("masking");
+    });
 }
 
 #[test]
 fn any_killed_stage_goes_on_with_a_network_that_looks_at_two_scans() {
-    if !runtime_is_installed() {
-        return;
-    }
     for stage in STAGES {
         survives(TWO_SCANS, |running| {
             running.kill(stage);
@@ -97,29 +87,22 @@ fn any_killed_stage_goes_on_with_a_network_that_looks_at_two_scans() {
 
 #[test]
 fn source_and_masking_killed_at_once_go_on_with_a_network_that_looks_at_two_scans() {
-    if runtime_is_installed() {
-        survives(TWO_SCANS, |running| {
-            running.kill("radar-replay").kill("masking");
-        });
-    }
+    survives(TWO_SCANS, |running| {
+        running.kill("radar-replay").kill("masking");
+    });
 }
 
 #[test]
 fn masking_killed_again_after_each_few_poses_goes_on_with_a_network_that_looks_at_two_scans() {
-    if runtime_is_installed() {
-        survives(TWO_SCANS, |running| {
-            for poses in [MIDDLE, MIDDLE + 4, MIDDLE + 8] {
-                running.await_poses(poses).kill("masking");
-            }
-        });
-    }
+    survives(TWO_SCANS, |running| {
+        for poses in [MIDDLE, MIDDLE + 4, MIDDLE + 8] {
+            running.await_poses(poses).kill("masking");
+        }
+    });
 }
 
 #[test]
 fn a_run_that_was_killed_as_a_whole_goes_on_with_a_network_that_looks_at_two_scans() {
-    if !runtime_is_installed() {
-        return;
-    }
     let undisturbed = masked_by(TWO_SCANS).complete();
     let run = masked_by(TWO_SCANS).rate("6");
     // After the very first pose too, where there is no scan before the last one.
@@ -133,9 +116,6 @@ fn a_run_that_was_killed_as_a_whole_goes_on_with_a_network_that_looks_at_two_sca
 
 #[test]
 fn an_unreadable_scan_between_two_is_stepped_over_by_a_restart() {
-    if !runtime_is_installed() {
-        return;
-    }
     let recording = recording::copy(16);
     recording::truncate(&recording::images(recording.path())[6], 100_000);
     let run =
@@ -154,9 +134,6 @@ fn an_unreadable_scan_between_two_is_stepped_over_by_a_restart() {
 
 #[test]
 fn a_live_run_survives_the_death_of_masking_with_a_network_that_looks_at_two_scans() {
-    if !runtime_is_installed() {
-        return;
-    }
     for stages in [
         &["masking"][..],
         &["radar-replay"],
@@ -194,7 +171,7 @@ fn gyre_allocates_nothing_for_a_scan_but_what_onnx_runtimes_binding_does() {
     }
     const OF_THE_BINDING: u64 = 3;
     for model in [ONE_SCAN, TWO_SCANS] {
-        let run = masked_by(model);
+        let run = masked_by(model).set("masking.backend=onnxruntime");
         run.complete();
         let stages = &run.summary()["stages"];
         let scans = recording::SCANS as u64 - 5;
@@ -229,24 +206,28 @@ fn a_mask_that_cannot_be_made_is_refused_before_anything_starts() {
         masked_by(ONE_SCAN).set("masking.runtime=/no/such"),
         &["masking.runtime is /no/such", runtime::INSTALL],
     );
-    if runtime_is_installed() {
-        refused(
-            masked_by("single-31"),
-            &[
-                "raster.n is 127",
-                "single-31.toml is for 31",
-                "set raster.n = 31",
-            ],
-        );
-        refused(
-            masked_by("opset-99").set("raster.n=31"),
-            &["opset-99.onnx has operators of version 99"],
-        );
-    }
+    refused(
+        masked_by("single-31"),
+        &[
+            "raster.n is 127",
+            "single-31.toml is for 31",
+            "set raster.n = 31",
+        ],
+    );
+    refused(
+        masked_by("opset-99").set("raster.n=31"),
+        &["opset-99.onnx has operators of version 99"],
+    );
+    refused(
+        masked_by(ONE_SCAN)
+            .set("masking.backend=tract")
+            .set("masking.provider=cuda"),
+        &["provider is a setting of ONNX Runtime", "`onnxruntime`"],
+    );
 }
 
 #[test]
-fn without_onnx_runtime_the_command_that_installs_it_is_named_and_other_masks_still_work() {
+fn an_onnx_runtime_that_is_named_but_not_there_is_refused_and_other_masks_still_work() {
     let run = masked_by(ONE_SCAN);
     let without = |run: &Run| {
         let mut command = run.command();
@@ -258,6 +239,32 @@ fn without_onnx_runtime_the_command_that_installs_it_is_named_and_other_masks_st
         runtime::INSTALL,
     ]);
     without(&Run::of_recording()).succeeded();
+}
+
+#[test]
+fn a_killed_masking_goes_on_with_a_network_in_tract() {
+    let masked = || masked_by(TWO_SCANS).set("masking.backend=tract");
+    let undisturbed = masked().complete();
+    let run = masked().rate("6");
+    let mut running = run.start();
+    running.await_poses(MIDDLE).kill("masking");
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed);
+}
+
+#[test]
+fn a_run_from_its_resolved_configuration_is_computed_by_the_same_library() {
+    if !runtime_is_installed() {
+        return;
+    }
+    for backend in ["onnxruntime", "tract"] {
+        let run = masked_by(ONE_SCAN).set(&format!("masking.backend={backend}"));
+        let odometry = run.complete();
+        assert_eq!(run.summary()["mask"]["backend"], backend);
+        let again = Run::of_file(&run.out().join("config.toml"));
+        assert_eq!(again.complete(), odometry);
+        assert_eq!(again.summary()["mask"]["backend"], backend);
+    }
 }
 
 #[test]
@@ -277,7 +284,14 @@ fn a_library_in_the_current_folder_is_not_opened_unless_it_is_named() {
         run.start_as(command).finish()
     };
     for data_home in ["", ".", "gyre/.."] {
-        in_its_folder(None, data_home).refused_with(&["which is not installed"]);
+        let ended = in_its_folder(None, data_home);
+        ended.succeeded();
+        assert!(
+            ended.stderr.contains("computed by tract"),
+            "{}",
+            ended.stderr
+        );
+        fs::remove_dir_all(run.out()).unwrap();
     }
     in_its_folder(Some("onnxruntime"), "").refused_with(&["cannot be used as ONNX Runtime"]);
     let theirs = run.folder().join("data/gyre");
@@ -289,9 +303,6 @@ fn a_library_in_the_current_folder_is_not_opened_unless_it_is_named() {
 
 #[test]
 fn an_unfinished_run_does_not_go_on_with_another_model() {
-    if !runtime_is_installed() {
-        return;
-    }
     let models = tempfile::tempdir().unwrap();
     let ours = models.path().join("mask.toml");
     let install = |name: &str| {

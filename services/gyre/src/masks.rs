@@ -39,7 +39,7 @@ pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
         &configuration.data(),
     )?;
     let mut inspector = MaskInspector::new(&configuration, dataset)?;
-    preflight::warn_of_training(&configuration)?;
+    preflight::describe_masks(&configuration)?;
     let out = &arguments.out;
     fs::create_dir_all(out)
         .map_err(|error| format!("cannot write to {}: {error}", out.display()))?;

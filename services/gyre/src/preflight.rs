@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use gyre_masking::{MaskKind, Masker, model::Card};
+use gyre_masking::{MaskKind, Masker, backend::Library, model::Card, runtime::INSTALL};
 use gyre_messages::{Footprint, Limits, Window};
 use gyre_odometry::OdometryConfig;
 use gyre_radar::{Dataset, Fingerprint};
@@ -141,23 +141,37 @@ pub fn check_open_files() -> Result<(), PreflightError> {
     }
 }
 
-/// Warns where a configuration differs from the one that its network was trained for.
+/// Says which library computes learned masks, and warns where a configuration differs from the one that its network was trained
+/// for.
 ///
 /// # Errors
-/// A model card that cannot be read.
-pub fn warn_of_training(configuration: &Configuration) -> Result<(), crate::Failure> {
+/// A model card that cannot be read, or ONNX Runtime missing where it is required.
+pub fn describe_masks(configuration: &Configuration) -> Result<(), crate::Failure> {
     let OdometryConfig {
         masking, raster, ..
     } = &configuration.odometry;
-    if masking.kind == MaskKind::Learned {
-        let unlike = Card::read(masking)?.training_mismatches(masking, raster);
-        if let (false, Some(card)) = (unlike.is_empty(), &masking.model) {
-            print::note(format!(
-                "the masks of {} may be less accurate than in training: {}",
-                card.display(),
-                unlike.join(", ")
-            ));
+    let (MaskKind::Learned, Some(card)) = (masking.kind, &masking.model) else {
+        return Ok(());
+    };
+    let card = card.display();
+    print::note(match Library::find(masking)? {
+        Library::OnnxRuntime(path) => {
+            format!(
+                "the masks of {card} are computed by ONNX Runtime, {}",
+                path.display()
+            )
         }
+        Library::Tract => format!(
+            "the masks of {card} are computed by tract, in one thread; ONNX Runtime is several times faster: \
+             `{INSTALL}` in the folder of Gyre's sources installs it"
+        ),
+    });
+    let unlike = Card::read(masking)?.training_mismatches(masking, raster);
+    if !unlike.is_empty() {
+        print::note(format!(
+            "the masks of {card} may be less accurate than in training: {}",
+            unlike.join(", ")
+        ));
     }
     Ok(())
 }

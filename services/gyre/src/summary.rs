@@ -5,7 +5,7 @@ mod slam;
 
 use std::{collections::BTreeMap, fmt, path::Path, time::Duration};
 
-use gyre_masking::{MaskKind, MaskingConfig};
+use gyre_masking::{Backend, MaskKind, MaskingConfig};
 use gyre_messages::{Footprint, StageId};
 use gyre_stage::{
     StageCounters,
@@ -46,6 +46,8 @@ struct Mask {
     model: String,
     /// The SHA-256 of the network's file.
     sha256: String,
+    /// The library that computes it.
+    backend: Backend,
 }
 
 impl Mask {
@@ -55,6 +57,7 @@ impl Mask {
         let mask = Self {
             model: model.display().to_string(),
             sha256: sha256.clone(),
+            backend: masking.backend,
         };
         (masking.kind == MaskKind::Learned).then_some(mask)
     }
@@ -171,6 +174,9 @@ impl fmt::Display for Summary {
                 "motions refined {} ({} by a second hypothesis)  weak {}  predicted {}  stationary {}",
                 m.refined, m.second_hypothesis, m.weak, m.predicted, m.stationary
             )?;
+        }
+        if let Some(mask) = &self.mask {
+            writeln!(f, "masks of {} by {}", mask.model, mask.backend.name())?;
         }
         if !self.restarts.is_empty() {
             let restarts: Vec<_> = self

@@ -5,7 +5,11 @@ use std::{fmt, path::PathBuf};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::{model::Card, network::NetworkError, runtime};
+use crate::{
+    backend::{Backend, Library},
+    model::Card,
+    network::NetworkError,
+};
 
 /// The mask and motion compensation: section `[masking]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -23,10 +27,14 @@ pub struct MaskingConfig {
     /// SHA-256 of the network, to refuse another one. Default: the one of its card.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sha256: Option<String>,
+    /// The library that computes the network: `onnxruntime`; `tract`, which is built in and slower; or
+    /// `auto`: ONNX Runtime where it is found, else tract.
+    pub backend: Backend,
     /// The library of ONNX Runtime, or its folder. Default: it is searched for, see docs/masks.md.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub runtime: Option<PathBuf>,
-    /// Threads that compute the network, 1 to 64. The other stages work at the same time.
+    /// Threads of ONNX Runtime, 1 to 64; tract computes with one. The other stages work at the same
+    /// time.
     pub threads: usize,
     /// Execution provider of the network: `cpu`, or `cuda`, `tensorrt` or `openvino` in a build with
     /// that feature.
@@ -95,6 +103,11 @@ pub enum MaskingConfigError {
     /// The exponent of the mask.
     #[error("point_exponent is {0}, but must be 0 to 4")]
     PointExponent(f32),
+    /// tract with a setting of ONNX Runtime.
+    #[error(
+        "backend is `tract`, but {0} is a setting of ONNX Runtime: set backend to `onnxruntime`, or leave {0} out"
+    )]
+    NotOfTract(&'static str),
     /// A lag of 0: the motion of a scan is not known yet when it is masked.
     #[error("lag is 0, but must be 1 or more: the motion of a scan is not known before its search")]
     Lag,
@@ -107,6 +120,7 @@ impl Default for MaskingConfig {
             threshold: 60,
             model: None,
             sha256: None,
+            backend: Backend::Auto,
             runtime: None,
             threads: 1,
             provider: Provider::Cpu,
@@ -131,20 +145,31 @@ impl MaskingConfig {
             () if !(0.0..=4.0).contains(&self.point_exponent) => {
                 Err(MaskingConfigError::PointExponent(self.point_exponent))
             }
+            () if self.backend == Backend::Tract && self.runtime.is_some() => {
+                Err(MaskingConfigError::NotOfTract("runtime"))
+            }
+            () if self.backend == Backend::Tract && self.provider != Provider::Cpu => {
+                Err(MaskingConfigError::NotOfTract("provider"))
+            }
             () if self.compensate && self.lag == 0 => Err(MaskingConfigError::Lag),
             () => Ok(()),
         }
     }
 
     /// Resolves the inputs of a learned mask, so that the stored configuration repeats the run from any folder or is rejected: the
-    /// absolute paths of model card and runtime, and the checksum of the model.
+    /// absolute paths of model card and runtime, the checksum of the model, and the backend.
     ///
     /// # Errors
-    /// A card that cannot be read, ONNX Runtime missing.
+    /// A card that cannot be read, ONNX Runtime missing where it is required.
     pub fn resolve(&mut self) -> Result<(), NetworkError> {
         if self.kind == MaskKind::Learned {
             self.sha256 = Some(Card::read(self)?.model.sha256);
-            self.runtime = Some(runtime::find(self.runtime.as_deref())?);
+            let library = Library::find(self)?;
+            self.backend = library.backend();
+            self.runtime = match library {
+                Library::OnnxRuntime(path) => Some(path),
+                Library::Tract => None,
+            };
             self.model = self
                 .model
                 .take()

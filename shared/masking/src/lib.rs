@@ -1,8 +1,10 @@
 //! Rasterises and masks scans, and extracts their sparse points.
 //!
 //! Reading order: [`Masker`]; `compensation` (motion-compensated rasters above the threshold); `learned` and [`network`] (masks
-//! of a network); `points` (weights of sparse points); [`model`] (networks and their cards) and [`runtime`] (ONNX Runtime).
+//! of a network); `points` (weights of sparse points); [`model`] (networks and their cards), [`backend`] (the libraries that
+//! compute them) and [`runtime`] (the search for ONNX Runtime).
 
+pub mod backend;
 mod compensation;
 mod config;
 mod learned;
@@ -22,6 +24,7 @@ use gyre_radar::{
 use ndarray::{ArrayView2, ArrayViewMut2};
 use thiserror::Error;
 
+pub use backend::Backend;
 pub use config::{MaskKind, MaskingConfig, MaskingConfigError, Provider};
 
 use compensation::CompensatedRaster;

@@ -1,22 +1,22 @@
-//! A learned mask: the network in ONNX Runtime.
+//! A learned mask: a network in ONNX Runtime or in tract.
+
+mod onnx_runtime;
+mod tract;
 
 use std::path::PathBuf;
 
 use gyre_radar::raster::RasterConfig;
-use ndarray::{Array3, ArrayView3, Axis};
-use ort::{
-    environment::Environment,
-    ep::ExecutionProviderDispatch,
-    session::{Session, builder::SessionBuilder},
-    value::{Outlet, TensorElementType, TensorRef, ValueType},
-};
+use ndarray::{Array3, ArrayView3, ArrayViewMut3, Axis};
 use thiserror::Error;
 
 use crate::{
-    MaskingConfig, Provider,
+    Backend, MaskingConfig, Provider,
+    backend::Library,
     model::{Model, ModelError},
-    runtime::{self, RuntimeError},
+    runtime::RuntimeError,
 };
+use onnx_runtime::OnnxRuntime;
+use tract::Tract;
 
 const INPUT: &str = "scans";
 const OUTPUT: &str = "masks";
@@ -45,24 +45,29 @@ pub enum NetworkError {
         /// ONNX Runtime's error.
         reason: String,
     },
-    /// ONNX Runtime rejects the model.
-    #[error("ONNX Runtime cannot load {path}: {reason}")]
+    /// The backend rejects the model.
+    #[error("{} cannot load {path}: {reason}", .by.name())]
     Load {
+        /// The backend.
+        by: Backend,
         /// The model's file.
         path: PathBuf,
-        /// ONNX Runtime's error.
+        /// The backend's error.
         reason: String,
     },
-    /// ONNX Runtime does not know the model's operators.
+    /// The backend does not know the model's operators.
     #[error(
-        "{path} has operators of version {opset}, and this ONNX Runtime knows them up to {known}: export it again with opset={known}, or use a newer ONNX Runtime"
+        "{path} has operators of version {opset}, and this {} knows them up to {known}: export it again with opset={known}, or use a newer ONNX Runtime",
+        .by.name()
     )]
     Opset {
         /// The model's file.
         path: PathBuf,
-        /// The version in its card.
-        opset: u32,
-        /// The newest version that ONNX Runtime supports.
+        /// The version of its operators.
+        opset: i64,
+        /// The backend.
+        by: Backend,
+        /// The newest version that the backend supports.
         known: String,
     },
     /// The inputs or outputs of the model do not fit its card.
@@ -83,29 +88,40 @@ pub enum NetworkError {
 /// A network that computes masks from rasters.
 #[derive(Debug)]
 pub struct Network {
-    session: Session,
+    engine: Engine,
     /// The last masks, scans x n x n.
     masks: Array3<f32>,
+}
+
+#[derive(Debug)]
+enum Engine {
+    OnnxRuntime(OnnxRuntime),
+    Tract(Tract),
 }
 
 impl Network {
     /// Loads the configured model and checks that it fits these rasters.
     ///
     /// # Errors
-    /// A model that does not fit, or ONNX Runtime is missing or rejects it.
+    /// A model that does not fit, or a backend that is missing or rejects it.
     pub fn load(config: &MaskingConfig, raster: &RasterConfig) -> Result<Self, NetworkError> {
         let model = Model::read(config, raster)?;
-        let environment = runtime::open(&runtime::find(config.runtime.as_deref())?)?;
-        let mut builder = builder(&environment, config)?;
-        let session = builder
-            .commit_from_memory(&model.bytes)
-            .map_err(|error| rejected(&model, error.message()))?;
+        let engine = match Library::find(config)? {
+            Library::OnnxRuntime(path) => {
+                Engine::OnnxRuntime(OnnxRuntime::load(&path, &model, config)?)
+            }
+            Library::Tract => Engine::Tract(Tract::load(&model)?),
+        };
+        let (inputs, outputs) = match &engine {
+            Engine::OnnxRuntime(engine) => (engine.inputs(), engine.outputs()),
+            Engine::Tract(engine) => (engine.inputs(), engine.outputs()),
+        };
         let shape = [1, model.card.model.inputs, raster.n, raster.n];
-        check("takes", INPUT, session.inputs(), shape, &model)?;
-        check("gives", OUTPUT, session.outputs(), shape, &model)?;
+        check("takes", INPUT, &inputs, shape, &model)?;
+        check("gives", OUTPUT, &outputs, shape, &model)?;
         let [_, scans, rows, columns] = shape;
         Ok(Self {
-            session,
+            engine,
             masks: Array3::zeros((scans, rows, columns)),
         })
     }
@@ -119,26 +135,16 @@ impl Network {
     /// clamped to that range.
     ///
     /// # Errors
-    /// Rasters of the wrong shape, an error of ONNX Runtime, or factors that are NaN.
+    /// Rasters of the wrong shape, an error of the backend, or factors that are NaN (tract computes none: its sigmoid gives a number for
+    /// any input).
     pub fn run(
         &mut self,
         rasters: ArrayView3<'_, f32>,
     ) -> Result<ArrayView3<'_, f32>, NetworkError> {
-        let failed = |error: ort::Error| NetworkError::Run(one_line(error.message()));
-        let input = TensorRef::from_array_view(rasters.insert_axis(Axis(0))).map_err(failed)?;
-        let outputs = self.session.run(ort::inputs![input]).map_err(failed)?;
-        let (_, masks) = outputs[0].try_extract_tensor::<f32>().map_err(failed)?;
-        if masks.len() != self.masks.len() {
-            return Err(NetworkError::Run(format!(
-                "{} values instead of {}",
-                masks.len(),
-                self.masks.len()
-            )));
-        }
-        self.masks
-            .iter_mut()
-            .zip(masks)
-            .for_each(|(kept, mask)| *kept = mask.clamp(0.0, 1.0));
+        match &mut self.engine {
+            Engine::OnnxRuntime(engine) => engine.run(rasters, self.masks.view_mut()),
+            Engine::Tract(engine) => engine.run(rasters, self.masks.view_mut()),
+        }?;
         match self.masks.iter().filter(|mask| mask.is_nan()).count() {
             0 => Ok(self.masks.view()),
             count => Err(NetworkError::Run(format!(
@@ -155,111 +161,42 @@ impl Network {
     }
 }
 
-/// Returns a session builder for bitwise reproducible results.
-fn builder(
-    environment: &Environment,
-    config: &MaskingConfig,
-) -> Result<SessionBuilder, NetworkError> {
-    let providers = execution_providers(config.provider)?;
-    let build = || -> ort::Result<SessionBuilder> {
-        let builder = Session::builder(environment)?
-            .with_intra_threads(config.threads)?
-            .with_inter_threads(1)?;
-        // No spinning: between scans the other stages need the processor.
-        Ok(builder
-            .with_intra_op_spinning(false)?
-            .with_deterministic_compute(true)?)
-    };
-    let builder = build().map_err(|error| NetworkError::Run(one_line(error.message())))?;
-    builder
-        .with_execution_providers(providers)
-        .map_err(|error| NetworkError::Provider {
-            provider: config.provider,
-            reason: one_line(error.message()),
-        })
-}
-
-fn execution_providers(provider: Provider) -> Result<Vec<ExecutionProviderDispatch>, NetworkError> {
-    match provider {
-        Provider::Cpu => Ok(Vec::new()),
-        #[cfg(feature = "cuda")]
-        Provider::Cuda => Ok(vec![ort::ep::CUDA::default().build().error_on_failure()]),
-        #[cfg(feature = "tensorrt")]
-        Provider::Tensorrt => Ok(vec![
-            ort::ep::TensorRT::default().build().error_on_failure(),
-        ]),
-        #[cfg(feature = "openvino")]
-        Provider::Openvino => Ok(vec![
-            ort::ep::OpenVINO::default().build().error_on_failure(),
-        ]),
-        #[allow(
-            unreachable_patterns,
-            reason = "unreachable if all providers are built in"
-        )]
-        other => Err(NetworkError::NotBuiltIn(other)),
+/// Copies computed factors, clamped to 0 to 1.
+fn fill(mut masks: ArrayViewMut3<'_, f32>, computed: &[f32]) -> Result<(), NetworkError> {
+    if masks.len() != computed.len() {
+        return Err(NetworkError::Run(format!(
+            "{} values instead of {}",
+            computed.len(),
+            masks.len()
+        )));
     }
+    masks
+        .iter_mut()
+        .zip(computed)
+        .for_each(|(mask, value)| *mask = value.clamp(0.0, 1.0));
+    Ok(())
 }
 
-/// Checks that the inputs or outputs of a session are exactly the expected tensor.
+/// Checks that the inputs or outputs of a network are exactly the expected tensor.
 fn check(
     verb: &str,
     name: &str,
-    tensors: &[Outlet],
+    tensors: &[String],
     shape: [usize; 4],
     model: &Model,
 ) -> Result<(), NetworkError> {
-    let fits = |tensor: &Outlet| match tensor.dtype() {
-        ValueType::Tensor {
-            ty: TensorElementType::Float32,
-            shape: actual,
-            ..
-        } => tensor.name() == name && actual.iter().copied().eq(shape.map(|size| size as i64)),
-        _ => false,
-    };
+    let expected = format!("`{name}` Float32 {shape:?}");
     match tensors {
-        [tensor] if fits(tensor) => Ok(()),
+        [tensor] if *tensor == expected => Ok(()),
         _ => Err(NetworkError::Interface {
             path: model.file.clone(),
-            has: format!(
-                "{verb} {}",
-                tensors
-                    .iter()
-                    .map(describe)
-                    .collect::<Vec<_>>()
-                    .join(" and ")
-            ),
-            expected: format!("`{name}` Float32 {shape:?}"),
+            has: format!("{verb} {}", tensors.join(" and ")),
+            expected,
         }),
     }
 }
 
-fn describe(tensor: &Outlet) -> String {
-    match tensor.dtype() {
-        ValueType::Tensor { ty, shape, .. } => format!("`{}` {ty:?} {shape}", tensor.name()),
-        _ => format!("`{}`, which is not a tensor", tensor.name()),
-    }
-}
-
-/// Converts the error of a model that ONNX Runtime does not load.
-fn rejected(model: &Model, message: &str) -> NetworkError {
-    let path = model.file.clone();
-    match message.split_once("ai.onnx is till opset ") {
-        Some((_, known)) => {
-            let known = known.trim_end().trim_end_matches('.').to_owned();
-            NetworkError::Opset {
-                path,
-                opset: model.card.model.opset,
-                known,
-            }
-        }
-        None => NetworkError::Load {
-            path,
-            reason: one_line(message),
-        },
-    }
-}
-
-/// Returns a message of ONNX Runtime as one line, without the location in its source code.
+/// Returns a message of a backend as one line, without the location in ONNX Runtime's source code.
 fn one_line(message: &str) -> String {
     let text = match message.split_once("/onnxruntime_src/") {
         Some((_, location)) => location.split_once(") ").map_or(location, |(_, text)| text),

@@ -1,4 +1,4 @@
-//! Finds and opens the library of ONNX Runtime at run time. It is needed only for learned masks.
+//! Finds and opens the library of ONNX Runtime at run time. It computes learned masks fastest.
 
 use std::{
     env,
@@ -27,8 +27,8 @@ const LIBRARY: &str = "libonnxruntime.so";
 pub enum RuntimeError {
     /// It is not installed.
     #[error(
-        "a learned mask needs ONNX Runtime, which is not installed: `{INSTALL}` in the folder of Gyre's sources installs it; \
-         masking.runtime or {VARIABLE} names one in another place; masking.kind = \"threshold\" does not need it"
+        "ONNX Runtime is not installed: `{INSTALL}` in the folder of Gyre's sources installs it; masking.runtime or {VARIABLE} names one \
+         in another place; masking.backend = \"tract\" does not need it"
     )]
     Missing,
     /// The named path has no library.

@@ -9,8 +9,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use common::{N, card, learned, raster, runtime_is_installed};
-use gyre_masking::{MaskingConfig, Provider, model::Card, network::Network, runtime::INSTALL};
+use common::{N, backends, card, learned, learned_by, raster, runtime_is_installed};
+use gyre_masking::{
+    Backend, MaskingConfig, Provider, model::Card, network::Network, runtime::INSTALL,
+};
 use gyre_radar::{RasterConfig, Sampling};
 use ndarray::Array3;
 use sha2::{Digest, Sha256};
@@ -212,60 +214,55 @@ fn the_model_is_not_that_of_the_configured_checksum() {
 }
 
 #[test]
-fn a_model_that_onnx_runtime_cannot_read_is_rejected() {
-    if !runtime_is_installed() {
-        return;
-    }
+fn a_model_that_the_backend_cannot_read_is_rejected() {
     let bytes = fs::read(card("single-31").with_extension("onnx")).unwrap();
     let (_folder, cut_short) = with_valid_checksum(&bytes[..bytes.len() / 2]);
-    rejected(
-        &learned(&cut_short),
-        &raster(),
-        &["ONNX Runtime cannot load", "single-31.onnx"],
-    );
     let (_folder, other) = with_valid_checksum(b"no model");
-    rejected(
-        &learned(&other),
-        &raster(),
-        &["ONNX Runtime cannot load", "single-31.onnx"],
-    );
+    for backend in backends() {
+        let cannot = format!("{} cannot load", backend.name());
+        for card in [&cut_short, &other] {
+            let config = learned_by(backend, card);
+            rejected(&config, &raster(), &[&cannot, "single-31.onnx"]);
+        }
+    }
 }
 
 #[test]
 fn operators_that_are_too_new_are_rejected() {
-    if !runtime_is_installed() {
-        return;
+    for backend in backends() {
+        let newest = match backend {
+            Backend::Tract => ["this tract knows them up to 18", "opset=18"],
+            _ => ["this ONNX Runtime knows them up to 2", "opset=2"],
+        };
+        let version = "opset-99.onnx has operators of version 99";
+        rejected(
+            &learned_by(backend, &card("opset-99")),
+            &raster(),
+            &[&[version][..], &newest[..]].concat(),
+        );
     }
-    rejected(
-        &learned(&card("opset-99")),
-        &raster(),
-        &[
-            "opset-99.onnx has operators of version 99",
-            "up to 2",
-            "opset=2",
-        ],
-    );
 }
 
 #[test]
 fn a_model_with_other_inputs_than_its_card_states_is_rejected() {
-    if !runtime_is_installed() {
-        return;
-    }
     let (_folder, card) = changed("pair-31", "inputs = 2", "inputs = 1");
     let words = [
         "takes `scans` Float32 [1, 2, 31, 31]",
         "must have only `scans` Float32 [1, 1, 31, 31]",
     ];
-    rejected(&learned(&card), &raster(), &words);
+    for backend in backends() {
+        rejected(&learned_by(backend, &card), &raster(), &words);
+    }
 }
 
 #[test]
 fn factors_that_are_nan_are_rejected() {
+    // tract's sigmoid gives a number for any input.
     if !runtime_is_installed() {
         return;
     }
-    let mut network = Network::load(&learned(&card("single-31")), &raster()).unwrap();
+    let config = learned_by(Backend::OnnxRuntime, &card("single-31"));
+    let mut network = Network::load(&config, &raster()).unwrap();
     let mut cells = Array3::from_elem((1, N, N), 1.0);
     assert!(network.run(cells.view()).is_ok());
     cells[[0, N / 2, N / 2]] = f32::NAN;
@@ -290,6 +287,24 @@ fn a_missing_runtime_is_reported_with_the_install_command() {
         &raster(),
         &["masking.runtime is /no/such/folder", INSTALL],
     );
+}
+
+#[test]
+fn settings_of_onnx_runtime_are_rejected_for_tract() {
+    let tract = || learned_by(Backend::Tract, &card("single-31"));
+    let runtime = MaskingConfig {
+        runtime: Some(PathBuf::from("/anywhere")),
+        ..tract()
+    };
+    let provider = MaskingConfig {
+        provider: Provider::Cuda,
+        ..tract()
+    };
+    for (config, key) in [(runtime, "runtime"), (provider, "provider")] {
+        let sentence = config.validate().unwrap_err().to_string();
+        let words = format!("{key} is a setting of ONNX Runtime");
+        assert!(sentence.contains(&words), "{sentence}");
+    }
 }
 
 #[cfg(not(any(feature = "cuda", feature = "tensorrt", feature = "openvino")))]

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeSet, fs};
 
-use gyre_masking::runtime;
+use gyre_masking::runtime::{self, RuntimeError};
 use rustix::process::{Resource, getrlimit};
 
 use super::Finding;
@@ -146,7 +146,11 @@ pub(super) fn onnx_runtime() -> Finding {
     match opened {
         Ok(path) => Finding::good("ONNX Runtime", path.display().to_string()),
         Err(error) => {
-            Finding::good("ONNX Runtime", "none: no learned masks").limited(error.to_string())
+            let found = match error {
+                RuntimeError::Missing => "none: tract computes learned masks, which takes longer",
+                _ => "cannot be used: no learned masks, unless masking.backend is `tract`",
+            };
+            Finding::good("ONNX Runtime", found).limited(error.to_string())
         }
     }
 }

@@ -43,7 +43,7 @@ impl Scans {
     /// A recording or a configuration that cannot be used.
     pub fn open(configuration: &Configuration) -> Result<Self, Failure> {
         let Played { dataset, .. } = preflight::open(configuration)?;
-        preflight::warn_of_training(configuration)?;
+        preflight::describe_masks(configuration)?;
         Ok(Self {
             played: configuration.source.played(dataset.len()),
             odometry: Odometry::new(&configuration.odometry)?,

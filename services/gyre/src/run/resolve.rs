@@ -23,7 +23,7 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
         configuration.source.data = PathBuf::new();
     }
     configuration.odometry.masking.resolve()?;
-    preflight::warn_of_training(&configuration)?;
+    preflight::describe_masks(&configuration)?;
     // Absolute, so that the resolved configuration repeats the run from any folder. The reader reports what does not exist.
     for path in [
         Some(&mut configuration.source.data),

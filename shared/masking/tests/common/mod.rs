@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 
 use gyre_geometry::Twist;
-use gyre_masking::{MaskKind, Masker, MaskingConfig, Sweep, runtime};
+use gyre_masking::{Backend, MaskKind, Masker, MaskingConfig, Sweep, runtime};
 use gyre_radar::{
     OwnedScan, PointsConfig, RasterConfig, ScanLimits, Sense, SweepGeometry, scan::flag,
 };
@@ -35,6 +35,14 @@ pub fn runtime_is_installed() -> bool {
     found
 }
 
+/// The backends that can be tested here: tract, and ONNX Runtime where it is installed.
+pub fn backends() -> Vec<Backend> {
+    match runtime_is_installed() {
+        true => vec![Backend::Tract, Backend::OnnxRuntime],
+        false => vec![Backend::Tract],
+    }
+}
+
 /// The rasters of the models with `-31` in their names.
 pub fn raster() -> RasterConfig {
     RasterConfig {
@@ -52,6 +60,14 @@ pub fn learned(card: &Path) -> MaskingConfig {
         model: Some(card.to_owned()),
         undo_doppler: true,
         ..MaskingConfig::default()
+    }
+}
+
+/// The same, computed by this backend.
+pub fn learned_by(backend: Backend, card: &Path) -> MaskingConfig {
+    MaskingConfig {
+        backend,
+        ..learned(card)
     }
 }
 

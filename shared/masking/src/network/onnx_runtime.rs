@@ -1,0 +1,127 @@
+//! A network in ONNX Runtime.
+
+use std::path::Path;
+
+use ndarray::{ArrayView3, ArrayViewMut3, Axis};
+use ort::{
+    environment::Environment,
+    ep::ExecutionProviderDispatch,
+    session::{Session, builder::SessionBuilder},
+    value::{Outlet, TensorRef, ValueType},
+};
+
+use super::{NetworkError, fill, one_line};
+use crate::{Backend, MaskingConfig, Provider, model::Model, runtime};
+
+/// A session of ONNX Runtime.
+#[derive(Debug)]
+pub(super) struct OnnxRuntime {
+    session: Session,
+}
+
+impl OnnxRuntime {
+    /// Opens the library at `path` and loads a model.
+    pub fn load(path: &Path, model: &Model, config: &MaskingConfig) -> Result<Self, NetworkError> {
+        let environment = runtime::open(path)?;
+        let session = builder(&environment, config)?
+            .commit_from_memory(&model.bytes)
+            .map_err(|error| rejected(model, error.message()))?;
+        Ok(Self { session })
+    }
+
+    /// Returns the name, type and shape of each input.
+    pub fn inputs(&self) -> Vec<String> {
+        self.session.inputs().iter().map(describe).collect()
+    }
+
+    /// Returns the name, type and shape of each output.
+    pub fn outputs(&self) -> Vec<String> {
+        self.session.outputs().iter().map(describe).collect()
+    }
+
+    /// Computes the masks of rasters, both scans x n x n.
+    pub fn run(
+        &mut self,
+        rasters: ArrayView3<'_, f32>,
+        masks: ArrayViewMut3<'_, f32>,
+    ) -> Result<(), NetworkError> {
+        let failed = |error: ort::Error| NetworkError::Run(one_line(error.message()));
+        let input = TensorRef::from_array_view(rasters.insert_axis(Axis(0))).map_err(failed)?;
+        let outputs = self.session.run(ort::inputs![input]).map_err(failed)?;
+        let (_, computed) = outputs[0].try_extract_tensor::<f32>().map_err(failed)?;
+        fill(masks, computed)
+    }
+}
+
+/// Returns a session builder for bitwise reproducible results.
+fn builder(
+    environment: &Environment,
+    config: &MaskingConfig,
+) -> Result<SessionBuilder, NetworkError> {
+    let providers = execution_providers(config.provider)?;
+    let build = || -> ort::Result<SessionBuilder> {
+        let builder = Session::builder(environment)?
+            .with_intra_threads(config.threads)?
+            .with_inter_threads(1)?;
+        // No spinning: between scans the other stages need the processor.
+        Ok(builder
+            .with_intra_op_spinning(false)?
+            .with_deterministic_compute(true)?)
+    };
+    let builder = build().map_err(|error| NetworkError::Run(one_line(error.message())))?;
+    builder
+        .with_execution_providers(providers)
+        .map_err(|error| NetworkError::Provider {
+            provider: config.provider,
+            reason: one_line(error.message()),
+        })
+}
+
+fn execution_providers(provider: Provider) -> Result<Vec<ExecutionProviderDispatch>, NetworkError> {
+    match provider {
+        Provider::Cpu => Ok(Vec::new()),
+        #[cfg(feature = "cuda")]
+        Provider::Cuda => Ok(vec![ort::ep::CUDA::default().build().error_on_failure()]),
+        #[cfg(feature = "tensorrt")]
+        Provider::Tensorrt => Ok(vec![
+            ort::ep::TensorRT::default().build().error_on_failure(),
+        ]),
+        #[cfg(feature = "openvino")]
+        Provider::Openvino => Ok(vec![
+            ort::ep::OpenVINO::default().build().error_on_failure(),
+        ]),
+        #[allow(
+            unreachable_patterns,
+            reason = "unreachable if all providers are built in"
+        )]
+        other => Err(NetworkError::NotBuiltIn(other)),
+    }
+}
+
+fn describe(tensor: &Outlet) -> String {
+    match tensor.dtype() {
+        ValueType::Tensor { ty, shape, .. } => format!("`{}` {ty:?} {shape}", tensor.name()),
+        _ => format!("`{}`, which is not a tensor", tensor.name()),
+    }
+}
+
+/// Converts the error of a model that ONNX Runtime does not load.
+fn rejected(model: &Model, message: &str) -> NetworkError {
+    let path = model.file.clone();
+    match message.split_once("ai.onnx is till opset ") {
+        Some((_, known)) => {
+            let known = known.trim_end().trim_end_matches('.').to_owned();
+            NetworkError::Opset {
+                path,
+                opset: model.card.model.opset.into(),
+                by: Backend::OnnxRuntime,
+                known,
+            }
+        }
+        None => NetworkError::Load {
+            by: Backend::OnnxRuntime,
+            path,
+            reason: one_line(message),
+        },
+    }
+}
