@@ -66,7 +66,7 @@ fn configuration(name: &str) -> Run {
 
 #[test]
 fn on_the_demo() {
-    assert_eq!(assert_same_bits(&configuration("demo.toml")), 64);
+    assert_eq!(assert_same_bits(&Run::of_demo()), 64);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! The exhaustive search by five processes, joint-search in place of the two halves: the same result every time.
 
-use std::{collections::BTreeSet, path::Path};
+use std::collections::BTreeSet;
 
 use crate::common::{Run, odometry};
 use serde_json::Value;
@@ -17,8 +17,7 @@ const SCANS: usize = 64;
 
 /// The demo with another search, and nobody who follows it.
 fn demo() -> Run {
-    let demo = Path::new(crate::PROJECT).join("configs/demo.toml");
-    Run::of_file(&demo)
+    Run::of_demo()
         .set("search.kind=exhaustive")
         .set("slam.kind=none")
 }

@@ -1,7 +1,7 @@
 //! Results of a run with SLAM: a drive that comes back to its start is corrected by loops, and the files are the same bytes whatever
 //! happens to the run.
 
-use std::{fs, path::Path};
+use std::fs;
 
 use gyre_estimation::G2o;
 
@@ -17,8 +17,7 @@ const FILES: [&str; 5] = [
 
 /// Once around a block.
 fn run(kind: &str) -> Run {
-    let configuration = Path::new(crate::PROJECT).join("configs/demo.toml");
-    Run::of_file(&configuration).set(&format!("slam.kind={kind}"))
+    Run::of_demo().set(&format!("slam.kind={kind}"))
 }
 
 fn files(run: &Run) -> Vec<Vec<u8>> {

@@ -161,6 +161,14 @@ impl Run {
         }
     }
 
+    /// A run of the demo, whose model is named as in the root of the project.
+    pub fn of_demo() -> Self {
+        let project = Path::new(crate::PROJECT);
+        let model = project.join("models/gyre-255.toml");
+        Self::of_file(&project.join("configs/demo.toml"))
+            .set(&format!("masking.model='{}'", model.display()))
+    }
+
     /// The same with `--data`.
     pub fn data(self, folder: &Path) -> Self {
         self.argument("--data", folder.to_str().unwrap())
