@@ -56,12 +56,13 @@ pub enum Command {
 /// The arguments of `gyre run`.
 #[derive(Debug, Args)]
 pub struct RunArguments {
-    /// The configuration, a TOML file.
-    pub configuration: PathBuf,
+    /// The configuration, a TOML file. Default: what the recording's format and its scans say.
+    #[arg(required_unless_present = "data")]
+    pub configuration: Option<PathBuf>,
     /// The dataset's folder (source.data).
     #[arg(long)]
     pub data: Option<PathBuf>,
-    /// The folder of the results. Default: `out/NAME`, NAME being the configuration's.
+    /// The folder of the results. Default: `out/NAME`, NAME being the configuration's, or without one the dataset's.
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Pace of the source: realtime, max, or a factor (run.rate).

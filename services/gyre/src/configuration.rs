@@ -1,5 +1,6 @@
 //! The configuration of a run: read strictly, overridden key by key, written back as it was resolved.
 
+mod automatic;
 pub mod difference;
 mod error;
 mod rate;

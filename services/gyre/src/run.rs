@@ -61,7 +61,16 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
 }
 
 fn results_folder(arguments: &RunArguments) -> PathBuf {
-    let name = arguments.configuration.file_stem().unwrap_or_default();
+    let file = arguments.configuration.as_deref();
+    let data = arguments
+        .data
+        .as_ref()
+        .and_then(|data| data.canonicalize().ok());
+    let name = match file {
+        Some(file) => file.file_stem(),
+        None => data.as_deref().and_then(Path::file_name),
+    };
+    let name = name.unwrap_or_default();
     arguments
         .out
         .clone()

@@ -9,7 +9,12 @@ use crate::{Failure, cli::RunArguments, configuration::Configuration, preflight}
 /// # Errors
 /// An invalid configuration, or a model that cannot be read.
 pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
-    let mut configuration = Configuration::read(&arguments.configuration, &overrides(arguments))?;
+    let overrides = overrides(arguments);
+    let mut configuration = match (&arguments.configuration, &arguments.data) {
+        (Some(file), _) => Configuration::read(file, &overrides)?,
+        (None, Some(data)) => Configuration::of_recording(data, &overrides)?,
+        (None, None) => Configuration::of_overrides(&overrides)?,
+    };
     if arguments.data.is_some() {
         configuration.simulation = None;
     }

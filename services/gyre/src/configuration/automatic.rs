@@ -1,0 +1,219 @@
+//! The configuration of a recording that is played without a configuration file.
+//!
+//! Its format gives the constants of the radar, which scans do not show: those of `configs/NAME.toml`. Its scans give the
+//! threshold and the sizes of cells and beams.
+
+use std::path::Path;
+
+use gyre_radar::{Dataset, DatasetOptions, Format, OwnedScan};
+use toml::Table;
+
+use super::{Configuration, strict};
+use crate::{Failure, print};
+
+/// Scans that are measured, evenly spread over the recording.
+const SCANS: usize = 8;
+/// The threshold above the noise floor, steps of half a decibel. Chosen on RADIATE and Oxford, whose floors are 17 steps apart.
+const ABOVE_NOISE: u8 = 36;
+/// Cells on a side of the rasters.
+const CELLS: f32 = 255.0;
+/// The largest cell, m: with it the rasters reach 102 m.
+const MAX_CELL_M: f32 = 0.8;
+/// From this time between scans on, the motion of the scan two before is too old for compensation, s.
+const LONG_PERIOD_S: f64 = 0.5;
+/// Angle that a vehicle turns by in such a time, degrees.
+const LONG_REACH_DEG: f64 = 45.0;
+
+impl Configuration {
+    /// Creates the configuration of a recording from its format, its `dataset.toml` and its scans, and prints it.
+    ///
+    /// # Errors
+    /// A recording that cannot be opened or of which no scan can be read, an unknown key, a value out of its bounds.
+    pub fn of_recording(data: &Path, overrides: &[String]) -> Result<Self, Failure> {
+        let wished = Self::of_overrides(overrides)?.dataset;
+        let format = gyre_radar::open(data, &wished)?.format();
+        let constants = gyre_radar::stored_options(data)?.or(&constants(format)?);
+        let measured = Measured::of(gyre_radar::open(data, &wished.or(&constants))?.as_mut())?;
+        let settings = measured.settings();
+        print::note(format_args!(
+            "no configuration is named: the radar's constants are those of {format}, and by its scans, with a noise floor of {}, {}",
+            measured.noise,
+            settings.join(", ")
+        ));
+        let dataset = DatasetOptions {
+            format: Some(format),
+            ..constants
+        };
+        let mut table = Table::new();
+        table.insert("dataset".to_owned(), toml::Value::try_from(dataset)?);
+        for sentence in &settings {
+            strict::set(&mut table, sentence)?;
+        }
+        Ok(Self::resolve(table, overrides)?)
+    }
+}
+
+/// Returns the constants of the radar of a dataset, from its file in `configs/`.
+fn constants(format: Format) -> Result<DatasetOptions, Failure> {
+    let text = match format {
+        Format::Oxford => include_str!("../../../../configs/oxford.toml"),
+        Format::Boreas => include_str!("../../../../configs/boreas.toml"),
+        Format::BoreasRt => include_str!("../../../../configs/boreas-rt.toml"),
+        Format::Mulran | Format::MulranOxfordForm => {
+            include_str!("../../../../configs/mulran.toml")
+        }
+        Format::Radiate => include_str!("../../../../configs/radiate.toml"),
+        Format::Fomo => include_str!("../../../../configs/fomo.toml"),
+        Format::Oord => "",
+    };
+    Ok(strict::section(&mut text.parse::<Table>()?, "dataset")?)
+}
+
+/// Properties of a radar that its scans show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Measured {
+    /// Median of all powers, steps of half a decibel.
+    noise: u8,
+    /// Depth of a range bin, m.
+    range_resolution_m: f32,
+    /// Range of the last bin, m.
+    max_range_m: f32,
+    /// Step between azimuths, degrees.
+    step_deg: f32,
+    /// Time between scans, s.
+    period_s: f64,
+}
+
+impl Measured {
+    /// Reads some scans of a recording.
+    ///
+    /// # Errors
+    /// None of them can be read.
+    fn of(dataset: &mut dyn Dataset) -> Result<Self, Failure> {
+        let mut scan = OwnedScan::with_limits(dataset.limits());
+        let (mut counts, mut failure) = ([0_u64; 256], None);
+        for index in (0..dataset.len()).step_by(dataset.len().div_ceil(SCANS).max(1)) {
+            match dataset.read(index, scan.slot()) {
+                Ok(geometry) => {
+                    scan.geometry = geometry;
+                    let rows = (0..geometry.azimuths).flat_map(|azimuth| scan.view().row(azimuth));
+                    rows.for_each(|power| counts[usize::from(*power)] += 1);
+                }
+                Err(error) => failure = Some(error),
+            }
+        }
+        let geometry = scan.geometry;
+        match (median(&counts), failure) {
+            (Some(noise), _) => Ok(Self {
+                noise,
+                range_resolution_m: geometry.range_resolution_m,
+                max_range_m: geometry.range_resolution_m * geometry.bins as f32,
+                step_deg: 360.0 / geometry.azimuths as f32,
+                period_s: dataset.period_ns() as f64 * 1e-9,
+            }),
+            (None, Some(error)) => Err(error.into()),
+            (None, None) => Err("the recording has no scans".into()),
+        }
+    }
+
+    /// Returns the settings that follow, as overrides.
+    fn settings(&self) -> Vec<String> {
+        let cell_m = (2.0 * self.max_range_m / CELLS)
+            .min(MAX_CELL_M)
+            .max(self.range_resolution_m);
+        // In steps of 0.1 m: results do not depend on the last digits of a range resolution.
+        let cell_m = (cell_m * 10.0 - 0.01).ceil() / 10.0;
+        let mut settings = vec![
+            format!("raster.cell_m={cell_m}"),
+            format!(
+                "masking.threshold={}",
+                self.noise.saturating_add(ABOVE_NOISE).min(254)
+            ),
+            format!("points.range_cell_m={}", self.range_resolution_m.max(0.17)),
+            format!("points.beam_deg={}", self.step_deg.max(2.7)),
+        ];
+        if self.period_s >= LONG_PERIOD_S {
+            settings.push("masking.lag=1".to_owned());
+            settings.push(format!("rotation.reach_deg={LONG_REACH_DEG}"));
+        }
+        settings
+    }
+}
+
+/// Returns the upper median of values that are counted by value; `None` without any.
+fn median(counts: &[u64; 256]) -> Option<u8> {
+    let half = counts.iter().sum::<u64>() / 2;
+    let mut below = 0;
+    let middle = counts.iter().position(|count| {
+        below += count;
+        below > half
+    });
+    middle.and_then(|value| u8::try_from(value).ok())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    const NAVTECH: Measured = Measured {
+        noise: 23,
+        range_resolution_m: 0.0438,
+        max_range_m: 165.0,
+        step_deg: 0.9,
+        period_s: 0.25,
+    };
+
+    #[test]
+    fn the_usual_radar_gets_the_cells_of_its_own_configuration() {
+        let expected = [
+            "raster.cell_m=0.8",
+            "masking.threshold=59",
+            "points.range_cell_m=0.17",
+            "points.beam_deg=2.7",
+        ];
+        assert_eq!(NAVTECH.settings(), expected);
+        let radiate = Measured {
+            max_range_m: 100.0,
+            ..NAVTECH
+        };
+        assert_eq!(radiate.settings(), expected);
+    }
+
+    #[test]
+    fn a_coarse_slow_radar_gets_cells_of_its_bins_and_beams_of_its_azimuths() {
+        let coarse = Measured {
+            noise: 4,
+            range_resolution_m: 1.2,
+            max_range_m: 100.0,
+            step_deg: 3.0,
+            period_s: 1.0,
+        };
+        let expected = [
+            "raster.cell_m=1.2",
+            "masking.threshold=40",
+            "points.range_cell_m=1.2",
+            "points.beam_deg=3",
+            "masking.lag=1",
+            "rotation.reach_deg=45",
+        ];
+        assert_eq!(coarse.settings(), expected);
+    }
+
+    #[test]
+    fn each_format_has_constants_that_can_be_read() {
+        for format in Format::ALL {
+            assert!(constants(format).is_ok(), "{format}");
+        }
+        let radiate = constants(Format::Radiate).unwrap();
+        assert_eq!(radiate.azimuth_eccentricity_rad, Some(0.0025));
+    }
+
+    #[test]
+    fn the_median_is_that_of_the_counted_values() {
+        let mut counts = [0; 256];
+        assert_eq!(median(&counts), None);
+        (counts[3], counts[9], counts[200]) = (2, 1, 1);
+        assert_eq!(median(&counts), Some(9));
+    }
+}
