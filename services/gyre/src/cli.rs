@@ -45,6 +45,8 @@ pub enum Command {
     Map(MapArguments),
     /// Find a drive in a map, scan after scan.
     Localise(LocaliseArguments),
+    /// Find the constants of a radar from a drive, without ground truth.
+    Calibrate(CalibrateArguments),
     /// Draw what the mask keeps of scans.
     Masks(MasksArguments),
     /// Write a simulated recording, or complete one.
@@ -65,6 +67,9 @@ pub struct RunArguments {
     /// The folder of the results. Default: `out/NAME`, NAME being the configuration's, or without one the dataset's.
     #[arg(long)]
     pub out: Option<PathBuf>,
+    /// The constants of the radar, of `gyre calibrate`: its section `[dataset]` over that of the configuration.
+    #[arg(long, value_name = "FILE")]
+    pub calibration: Option<PathBuf>,
     /// Pace of the source: realtime, max, or a factor (run.rate).
     #[arg(long)]
     pub rate: Option<Rate>,
@@ -225,6 +230,28 @@ pub struct LocaliseArguments {
     pub set: Vec<String>,
 }
 
+/// The arguments of `gyre calibrate`.
+#[derive(Debug, Args)]
+pub struct CalibrateArguments {
+    /// The recording's folder. Default: the configuration's simulation, or its source.data.
+    pub data: Option<PathBuf>,
+    /// The configuration, a TOML file: its constants are those that are checked. Default: those of the format.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// The folder of calibration.toml and calibration.svg.
+    #[arg(long, default_value = "out/calibrate")]
+    pub out: PathBuf,
+    /// Length of the path by an odometer or GNSS, m: without it the range resolution cannot be told.
+    #[arg(long, value_parser = length)]
+    pub distance_m: Option<f64>,
+    /// Maximum number of scans. Their points are kept in memory.
+    #[arg(long, default_value = "2000")]
+    pub scans: usize,
+    /// Override a key, as in source.first=100; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+}
+
 /// The arguments of `gyre masks`.
 #[derive(Debug, Args)]
 pub struct MasksArguments {
@@ -290,6 +317,13 @@ fn sigma(text: &str) -> Result<f64, String> {
         .ok()
         .filter(|sigma: &f64| sigma.is_finite() && *sigma >= 0.0);
     sigma.ok_or_else(|| "a number of at least 0 is needed".to_owned())
+}
+
+/// Parses a length: a positive number.
+fn length(text: &str) -> Result<f64, String> {
+    let length = text.parse().ok();
+    let length = length.filter(|length: &f64| length.is_finite() && *length > 0.0);
+    length.ok_or_else(|| "a number above 0 is needed".to_owned())
 }
 
 /// Parses latitude, longitude and heading in degrees.

@@ -2,6 +2,7 @@
 //!
 //! Reading order: [`cli`], then [`run`] (what `gyre run` does, on a page), [`earlier`], [`configuration`], [`results`].
 
+pub mod calibrate;
 pub mod cli;
 pub mod configuration;
 pub mod doctor;
@@ -66,6 +67,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Evaluate(arguments) => evaluate::evaluate(&arguments),
         Command::Map(arguments) => map::map(&arguments),
         Command::Localise(arguments) => localise::localise(&arguments),
+        Command::Calibrate(arguments) => calibrate::calibrate(&arguments),
         Command::Masks(arguments) => masks::masks(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Schema(arguments) => schema::schema(&arguments),

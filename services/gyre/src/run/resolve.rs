@@ -2,14 +2,14 @@
 
 use std::path::PathBuf;
 
-use crate::{Failure, cli::RunArguments, configuration::Configuration, preflight};
+use crate::{Failure, calibrate, cli::RunArguments, configuration::Configuration, preflight};
 
 /// Reads the configuration and resolves what it leaves open.
 ///
 /// # Errors
 /// An invalid configuration, or a model that cannot be read.
 pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
-    let overrides = overrides(arguments);
+    let overrides = overrides(arguments)?;
     let mut configuration = match (&arguments.configuration, &arguments.data) {
         (Some(file), _) => Configuration::read(file, &overrides)?,
         (None, Some(data)) => Configuration::of_recording(data, &overrides)?,
@@ -45,7 +45,12 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     Ok(configuration)
 }
 
-fn overrides(arguments: &RunArguments) -> Vec<String> {
+/// The overrides, those of a later kind first in force: the calibration, `--set`, the options.
+///
+/// # Errors
+/// A calibration that cannot be read.
+fn overrides(arguments: &RunArguments) -> Result<Vec<String>, Failure> {
+    let calibration = arguments.calibration.as_deref().map(calibrate::overrides);
     // Quoted, because a folder may be named 2019-01-10 or 7.
     let quoted = |data: &PathBuf| toml::Value::from(data.to_string_lossy().into_owned());
     let data = arguments
@@ -56,11 +61,12 @@ fn overrides(arguments: &RunArguments) -> Vec<String> {
         .rate
         .iter()
         .map(|rate| format!("run.rate='{rate}'"));
-    arguments
-        .set
-        .iter()
-        .cloned()
+    let calibration = calibration.transpose()?.unwrap_or_default();
+    let set = arguments.set.iter().cloned();
+    Ok(calibration
+        .into_iter()
+        .chain(set)
         .chain(data)
         .chain(rate)
-        .collect()
+        .collect())
 }

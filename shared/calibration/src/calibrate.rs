@@ -1,0 +1,274 @@
+//! The method on one page.
+
+use gyre_scan_matching::ConfigError;
+use nalgebra::DVector;
+use thiserror::Error;
+
+use crate::{
+    Drive, Estimate, Fact, FactVector, Mounting, Revisit, Track,
+    drift::{self, MAX_REVISITS},
+    facts::FACTS,
+    overlap::{Pair, System, along, slopes},
+    revisits,
+};
+
+/// Solutions of the linearised residuals, at most.
+const ROUNDS: usize = 4;
+/// A round whose change is below this share of the standard deviations is the last.
+const CONVERGED: f64 = 0.5;
+/// Change of the eccentricity for the slope of the drift, rad: large, since two tracks differ by chance too.
+const DRIFT_STEP_RAD: f64 = 3e-3;
+/// No estimate is better than this share of a cell of the local map, or its effect at the range of most points: the images' own error.
+const CELL_SHARE: f64 = 0.05;
+/// Range of most points, m, and a usual speed, m/s.
+const USUAL_RANGE_M: f64 = 30.0;
+const USUAL_SPEED_MPS: f64 = 10.0;
+/// Revisits needed for the drift.
+const MIN_REVISITS: usize = 5;
+/// Facts that are solved for together. The others only confirm: odometry needs no correction of them.
+const SOLVED: [Fact; 3] = [Fact::RangeOffset, Fact::EccentricityCos, Fact::Doppler];
+
+/// Why a drive cannot be used.
+#[derive(Debug, Error)]
+pub enum CalibrationError {
+    /// Too little motion.
+    #[error("{scans} scans over {path_m:.0} m are too few: the constants show over 100 m and more")]
+    TooShort {
+        /// Number of scans.
+        scans: usize,
+        /// Length of the path, m.
+        path_m: f64,
+    },
+    /// Nothing to see.
+    #[error(
+        "the scans have too little in common to tell the constants: their overlap has no maximum near the configured ones"
+    )]
+    Undetermined,
+    /// The refinement's configuration.
+    #[error(transparent)]
+    Refinement(#[from] ConfigError),
+}
+
+/// A fact with its change against the configured value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FactEstimate {
+    /// The fact.
+    pub fact: Fact,
+    /// Change against the configured value, in the fact's unit.
+    pub change: Estimate,
+    /// What the overlap of scans alone says.
+    pub by_overlap: Estimate,
+    /// What the drift between revisits alone says, if there are any.
+    pub by_drift: Option<Estimate>,
+}
+
+/// What a drive says about its radar.
+#[derive(Clone, Debug)]
+pub struct Calibration {
+    /// All facts in their order. The eccentricity to the side and the times of rows are checks, with the other facts as found.
+    pub facts: [FactEstimate; FACTS],
+    /// Places that were seen again.
+    pub revisits: Vec<Revisit>,
+    /// Pairs of scans that were compared.
+    pub pairs: usize,
+    /// The mounting, by the corrected track.
+    pub mounting: Option<Mounting>,
+    /// The track as configured, and the one with the facts as found.
+    pub before: Track,
+    /// See [`Self::before`].
+    pub after: Track,
+}
+
+impl Calibration {
+    /// Returns the changes of the facts that are corrected.
+    pub fn change(&self) -> FactVector {
+        let mut change = FactVector::zeros();
+        for fact in SOLVED {
+            change[fact as usize] = self.facts[fact as usize].change.value;
+        }
+        change
+    }
+}
+
+/// Finds the facts of a drive.
+///
+/// # Errors
+/// A drive that does not determine them.
+pub fn calibrate(drive: &Drive) -> Result<Calibration, CalibrationError> {
+    let mut change = FactVector::zeros();
+    let before = track(drive, &change)?;
+    require_motion(drive, &before)?;
+    let revisits = evenly(revisits::find(drive, &before, &change)?, &before);
+    let (mut at, mut found) = (before.clone(), round(drive, &before, &revisits, &change)?);
+    for _ in 1..ROUNDS {
+        if found.has_converged() {
+            break;
+        }
+        change += found.step();
+        at = track(drive, &change)?;
+        found = round(drive, &at, &revisits, &change)?;
+    }
+    let by_drift = drift_of(drive, &at, &revisits, &change)?;
+    let facts = facts(drive, &found, &change, by_drift);
+    let mut calibration = Calibration {
+        facts,
+        pairs: found.pairs,
+        revisits,
+        mounting: None,
+        before,
+        after: at,
+    };
+    calibration.after = track(drive, &calibration.change())?;
+    calibration.mounting = Mounting::of(&calibration.after.twists);
+    Ok(calibration)
+}
+
+/// The mean of the tracks in both directions of time: errors of the processing that depend on the direction cancel.
+fn track(drive: &Drive, change: &FactVector) -> Result<Track, ConfigError> {
+    let [forward, reversed] = [false, true].map(|reversed| drive.track(change, reversed));
+    Ok(forward?.mean(&reversed?, drive))
+}
+
+fn require_motion(drive: &Drive, track: &Track) -> Result<(), CalibrationError> {
+    let path_m = track.path_m().last().copied().unwrap_or_default();
+    match path_m < 100.0 {
+        true => Err(CalibrationError::TooShort {
+            scans: drive.sweeps.len(),
+            path_m,
+        }),
+        false => Ok(()),
+    }
+}
+
+/// The solution around one change of the facts.
+struct Round {
+    solved: [Estimate; FACTS],
+    checked: [Estimate; FACTS],
+    pairs: usize,
+}
+
+impl Round {
+    fn has_converged(&self) -> bool {
+        let small = |estimate: &Estimate| estimate.value.abs() < CONVERGED * estimate.sigma;
+        SOLVED
+            .iter()
+            .all(|fact| small(&self.solved[*fact as usize]))
+    }
+
+    fn step(&self) -> FactVector {
+        FactVector::from_fn(|k, _| self.solved[k].value)
+    }
+}
+
+/// At most [`MAX_REVISITS`] with an unbroken track between, evenly spread.
+fn evenly(mut revisits: Vec<Revisit>, track: &Track) -> Vec<Revisit> {
+    revisits.retain(|revisit| !track.is_broken(revisit.earlier, revisit.later));
+    let stride = revisits.len().div_ceil(MAX_REVISITS).max(1);
+    revisits.into_iter().step_by(stride).collect()
+}
+
+fn round(
+    drive: &Drive,
+    track: &Track,
+    revisits: &[Revisit],
+    change: &FactVector,
+) -> Result<Round, CalibrationError> {
+    let mut pairs = along(track);
+    pairs.extend(revisits.iter().map(Pair::from));
+    let system = System::measure(drive, track, &pairs, change);
+    let solved = system
+        .solve(&SOLVED)
+        .ok_or(CalibrationError::Undetermined)?;
+    let unknown = [Estimate {
+        value: 0.0,
+        sigma: f64::INFINITY,
+    }; FACTS];
+    let checked = system.solve(&Fact::ALL).unwrap_or(unknown);
+    Ok(Round {
+        solved,
+        checked,
+        pairs: system.len(),
+    })
+}
+
+/// What the drift between revisits says about the eccentricity, as a change against the configured one.
+fn drift_of(
+    drive: &Drive,
+    at: &Track,
+    revisits: &[Revisit],
+    change: &FactVector,
+) -> Result<Option<Estimate>, ConfigError> {
+    if revisits.len() < MIN_REVISITS {
+        return Ok(None);
+    }
+    let shifted = |by_rad: f64| -> Result<DVector<f64>, ConfigError> {
+        let mut shifted = *change;
+        shifted[Fact::EccentricityCos as usize] += by_rad;
+        let track = track(drive, &shifted)?;
+        Ok(drift::residuals(
+            &track,
+            &aligned(drive, &track, revisits, &shifted),
+        ))
+    };
+    let slopes = (shifted(DRIFT_STEP_RAD)? - shifted(-DRIFT_STEP_RAD)?) / (2.0 * DRIFT_STEP_RAD);
+    let here = aligned(drive, at, revisits, change);
+    let found = drift::solve(at, &here, &drift::residuals(at, &here), &slopes);
+    let configured = change[Fact::EccentricityCos as usize];
+    Ok(found.map(|found| Estimate {
+        value: found.value + configured,
+        ..found
+    }))
+}
+
+/// The revisits with their poses aligned under a change of the facts.
+fn aligned(
+    drive: &Drive,
+    track: &Track,
+    revisits: &[Revisit],
+    change: &FactVector,
+) -> Vec<Revisit> {
+    let pairs: Vec<Pair> = revisits.iter().map(Pair::from).collect();
+    let slopes = slopes(drive, track, &pairs, change);
+    let poses = revisits.iter().zip(slopes);
+    poses
+        .map(|(revisit, slope)| Revisit {
+            pose: slope.map_or(revisit.pose, |slope| slope.pose),
+            ..*revisit
+        })
+        .collect()
+}
+
+fn facts(
+    drive: &Drive,
+    found: &Round,
+    change: &FactVector,
+    by_drift: Option<Estimate>,
+) -> [FactEstimate; FACTS] {
+    let error_m = CELL_SHARE * drive.config().refinement.cell_m;
+    Fact::ALL.map(|fact| {
+        let k = fact as usize;
+        let floor = match fact {
+            Fact::RangeOffset => error_m,
+            Fact::EccentricityCos | Fact::EccentricitySin => error_m / USUAL_RANGE_M,
+            Fact::Doppler => error_m / USUAL_SPEED_MPS,
+            Fact::RowTime => error_m,
+        };
+        let solved = if SOLVED.contains(&fact) {
+            found.solved[k]
+        } else {
+            found.checked[k]
+        };
+        let by_overlap = Estimate {
+            value: solved.value + change[k],
+            sigma: solved.sigma.hypot(floor),
+        };
+        let by_drift = by_drift.filter(|_| fact == Fact::EccentricityCos);
+        let change = by_drift.map_or(by_overlap, |by_drift| by_overlap.combined(&by_drift));
+        FactEstimate {
+            fact,
+            change,
+            by_overlap,
+            by_drift,
+        }
+    })
+}

@@ -1,0 +1,273 @@
+//! The drive: its scans as points, and its track by odometry under assumed facts.
+
+use std::f64::consts::TAU;
+
+use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion};
+use gyre_odometry::{Odometry, OdometryConfig, OdometryError, Outcome, SetupError};
+use gyre_radar::{OwnedScan, PolarScan, Sense, scan::flag};
+use gyre_scan_matching::{ConfigError, Refiner};
+use nalgebra::Vector2;
+
+use crate::{
+    FactVector, OwnReflections,
+    facts::{Sign, correct},
+};
+
+/// Doppler coefficient of recordings that have none, s: small enough to change nothing, and it keeps the sign of each chirp.
+const NO_DOPPLER_S: f32 = 1e-9;
+/// Directions for which the time of a row is kept.
+const DIRECTIONS: usize = 360;
+/// Motion from scan to scan above which the vehicle moves, m.
+const MOVING_M: f64 = 0.5;
+
+/// A scan of the drive.
+#[derive(Clone, Debug)]
+pub struct Sweep {
+    /// Time of the scan, ns.
+    pub stamp_ns: i64,
+    /// Time since the scan before, s; 0 where the chain of motions starts.
+    pub interval_s: f64,
+    /// The motion that the search found.
+    pub searched: Pose,
+    /// The points as measured under the configured facts.
+    pub points: Vec<SparsePoint>,
+    /// Times of the rows by direction, s.
+    row_time_s: Vec<f32>,
+}
+
+/// The scans of a drive.
+pub struct Drive {
+    odometry: Odometry,
+    config: OdometryConfig,
+    /// The scans in their order.
+    pub sweeps: Vec<Sweep>,
+    pub(crate) sense: Sign,
+    pub(crate) alternates: bool,
+    reflections: OwnReflections,
+}
+
+/// The track of the drive under assumed facts.
+#[derive(Clone, Debug)]
+pub struct Track {
+    /// The poses in the frame of the first scan.
+    pub poses: Vec<Pose>,
+    /// The motion to each scan from the one before.
+    pub motions: Vec<UncertainMotion>,
+    /// The velocity at each scan.
+    pub twists: Vec<Twist>,
+    /// The overlap of each scan with its map.
+    pub overlaps: Vec<f64>,
+    /// Whether the chain of motions starts with a scan.
+    starts: Vec<bool>,
+}
+
+impl Drive {
+    /// Creates an empty drive.
+    ///
+    /// # Errors
+    /// A configuration that cannot be used.
+    pub fn new(config: &OdometryConfig) -> Result<Self, SetupError> {
+        Ok(Self {
+            odometry: Odometry::new(config)?,
+            config: config.clone(),
+            sweeps: Vec::new(),
+            sense: -1.0,
+            alternates: false,
+            reflections: OwnReflections::default(),
+        })
+    }
+
+    /// Returns the configuration of the odometry.
+    pub fn config(&self) -> &OdometryConfig {
+        &self.config
+    }
+
+    /// Adds the next scan.
+    ///
+    /// # Errors
+    /// A scan that cannot be used.
+    pub fn push(&mut self, scan: &OwnedScan) -> Result<(), OdometryError> {
+        let mut scan = scan.view();
+        if scan.geometry.doppler_s == 0.0 {
+            scan.geometry.doppler_s = NO_DOPPLER_S;
+        }
+        let registered = self.odometry.register(&scan)?;
+        self.sense = match scan.geometry.sense {
+            Sense::Clockwise => -1.0,
+            Sense::CounterClockwise => 1.0,
+        };
+        self.alternates = scan
+            .flags
+            .iter()
+            .any(|flags| flags & flag::CHIRP_KNOWN != 0);
+        if registered.motion.motion.translation.vector.norm() > MOVING_M {
+            self.reflections.add(&scan, self.config.masking.floor());
+        }
+        self.sweeps.push(Sweep {
+            stamp_ns: scan.geometry.stamp_ns,
+            interval_s: match registered.outcome {
+                Outcome::Start => 0.0,
+                _ => registered.interval_ns as f64 * 1e-9,
+            },
+            searched: registered.searched.map_or(Pose::identity(), |found| {
+                gyre_geometry::pose(found.motion.x_m, found.motion.y_m, found.motion.yaw_rad)
+            }),
+            points: self.odometry.points().to_vec(),
+            row_time_s: row_times_s(&scan, self.sense),
+        });
+        Ok(())
+    }
+
+    /// Returns the reflections of the vehicle itself in the scans.
+    pub fn reflections(&self) -> &OwnReflections {
+        &self.reflections
+    }
+
+    /// Returns the points of a scan under changed facts.
+    pub fn points(&self, scan: usize, change: &FactVector) -> Vec<SparsePoint> {
+        let points = self.sweeps[scan].points.iter();
+        points
+            .map(|point| correct(point, change, self.sense, self.alternates))
+            .collect()
+    }
+
+    /// Returns the time of the row that looks to a place in the frame of a scan, s.
+    pub(crate) fn row_time_s(&self, scan: usize, seen: Vector2<f64>) -> f64 {
+        let turns = seen.y.atan2(seen.x) / TAU;
+        let direction = (turns.rem_euclid(1.0) * DIRECTIONS as f64) as usize;
+        self.sweeps[scan].row_time_s[direction.min(DIRECTIONS - 1)].into()
+    }
+
+    /// Registers all scans under changed facts, in the order of time or against it.
+    ///
+    /// # Errors
+    /// The refinement's configuration.
+    pub fn track(&self, change: &FactVector, reversed: bool) -> Result<Track, ConfigError> {
+        let count = self.sweeps.len();
+        let mut refiner = Refiner::new(&self.config.refinement, self.config.points.capacity)?;
+        let mut motions = vec![UncertainMotion::identity(); count];
+        let mut overlaps = vec![0.0; count];
+        let order: Vec<usize> = if reversed {
+            (0..count).rev().collect()
+        } else {
+            (0..count).collect()
+        };
+        let mut earlier: Option<(usize, Vec<SparsePoint>)> = None;
+        for (number, &scan) in order.iter().enumerate() {
+            let mut points = self.points(scan, change);
+            if reversed {
+                points.iter_mut().for_each(|point| {
+                    point.time_s = -point.time_s;
+                    point.doppler_s = -point.doppler_s;
+                });
+            }
+            if let Some((before, from)) = &earlier {
+                let later = scan.max(*before);
+                let sweep = &self.sweeps[later];
+                if sweep.interval_s <= 0.0 {
+                    refiner.reset();
+                } else {
+                    let searched = if reversed {
+                        sweep.searched.inverse()
+                    } else {
+                        sweep.searched
+                    };
+                    let refined =
+                        refiner.refine(number as u64, &points, from, &searched, sweep.interval_s);
+                    motions[later] = refined.motion;
+                    if reversed {
+                        motions[later].motion = refined.motion.motion.inverse();
+                    }
+                    overlaps[scan] = refined.overlap;
+                }
+            }
+            earlier = Some((scan, points));
+        }
+        Ok(Track::new(motions, overlaps, self))
+    }
+}
+
+impl Track {
+    fn new(motions: Vec<UncertainMotion>, overlaps: Vec<f64>, drive: &Drive) -> Self {
+        let mut poses: Vec<Pose> = Vec::with_capacity(motions.len());
+        for motion in &motions {
+            let before = poses.last().copied().unwrap_or_else(Pose::identity);
+            let mut next = before * motion.motion;
+            next.rotation.renormalize();
+            poses.push(next);
+        }
+        let twists = (0..poses.len())
+            .map(|scan| twist_at(&poses, drive, scan))
+            .collect();
+        let starts = drive
+            .sweeps
+            .iter()
+            .map(|sweep| sweep.interval_s <= 0.0)
+            .collect();
+        Self {
+            poses,
+            motions,
+            twists,
+            overlaps,
+            starts,
+        }
+    }
+
+    /// Returns the path up to each scan, m.
+    pub fn path_m(&self) -> Vec<f64> {
+        let mut path_m = 0.0;
+        let steps = self
+            .motions
+            .iter()
+            .map(|motion| motion.motion.translation.vector.norm());
+        steps
+            .map(|step| {
+                path_m += step;
+                path_m
+            })
+            .collect()
+    }
+
+    /// Returns whether the chain of motions starts anew between two scans.
+    pub(crate) fn is_broken(&self, earlier: usize, later: usize) -> bool {
+        self.starts[earlier + 1..=later].contains(&true)
+    }
+
+    /// Returns the mean of two tracks of one drive, motion by motion.
+    pub fn mean(&self, other: &Self, drive: &Drive) -> Self {
+        let motions = self.motions.iter().zip(&other.motions);
+        let motions = motions.map(|(a, b)| UncertainMotion {
+            motion: gyre_geometry::interpolate(&a.motion, &b.motion, 0.5),
+            covariance: a.covariance,
+        });
+        Self::new(motions.collect(), self.overlaps.clone(), drive)
+    }
+}
+
+/// The times of the rows by direction, counter-clockwise from straight ahead, s.
+fn row_times_s(scan: &PolarScan<'_>, sense: Sign) -> Vec<f32> {
+    let nearest = |azimuth: f64| {
+        let apart = |row: &usize| {
+            let apart = (f64::from(scan.azimuth_rad[*row]) - azimuth).rem_euclid(TAU);
+            apart.min(TAU - apart)
+        };
+        (0..scan.geometry.azimuths).min_by(|a, b| apart(a).total_cmp(&apart(b)))
+    };
+    let azimuth =
+        |direction: usize| (sense * direction as f64 / DIRECTIONS as f64).rem_euclid(1.0) * TAU;
+    let rows = (0..DIRECTIONS).map(|direction| nearest(azimuth(direction)));
+    rows.map(|row| row.map_or(0.0, |row| scan.time_s(row) as f32))
+        .collect()
+}
+
+/// The velocity at a scan: the mean over the intervals before and after it.
+fn twist_at(poses: &[Pose], drive: &Drive, scan: usize) -> Twist {
+    let interval = |scan: usize| drive.sweeps.get(scan).map_or(0.0, |sweep| sweep.interval_s);
+    let (before_s, after_s) = (interval(scan), interval(scan + 1));
+    if before_s + after_s <= 0.0 {
+        return Twist::default();
+    }
+    let first = if before_s > 0.0 { scan - 1 } else { scan };
+    let last = if after_s > 0.0 { scan + 1 } else { scan };
+    Twist::from_chord(&poses[first].inv_mul(&poses[last]), before_s + after_s)
+}

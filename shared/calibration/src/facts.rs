@@ -1,0 +1,145 @@
+//! The facts about a radar that a drive can tell, and what they do to its points.
+
+use gyre_geometry::{SparsePoint, Twist};
+use nalgebra::{SMatrix, SVector, Vector2};
+
+/// Number of facts that are estimated together.
+pub const FACTS: usize = 5;
+
+/// One number for each [`Fact`].
+pub type FactVector = SVector<f64, FACTS>;
+
+/// A square matrix over the facts.
+pub type FactMatrix = SMatrix<f64, FACTS, FACTS>;
+
+/// A fact that moves the points of a scan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fact {
+    /// Offset of all ranges, m.
+    RangeOffset,
+    /// Eccentricity of the encoder ahead: the true azimuth is the measured one plus this times its cosine, rad.
+    EccentricityCos,
+    /// Eccentricity of the encoder to the side: as before, times the sine, rad.
+    EccentricitySin,
+    /// Doppler coefficient, s.
+    Doppler,
+    /// Share by which the times of rows within a sweep are too short: 0 where they are right.
+    RowTime,
+}
+
+impl Fact {
+    /// All facts in the order of [`FactVector`].
+    pub const ALL: [Self; FACTS] = [
+        Self::RangeOffset,
+        Self::EccentricityCos,
+        Self::EccentricitySin,
+        Self::Doppler,
+        Self::RowTime,
+    ];
+
+    /// Returns a small change of the fact, for derivatives.
+    pub fn step(self) -> f64 {
+        match self {
+            Self::RangeOffset => 0.05,
+            Self::EccentricityCos | Self::EccentricitySin => 1e-3,
+            Self::Doppler => 0.01,
+            Self::RowTime => 0.05,
+        }
+    }
+}
+
+/// The sense of rotation as a sign: 1 counter-clockwise, -1 clockwise.
+pub(crate) type Sign = f64;
+
+/// Moves a point as measured to where it is measured once the facts are corrected by `change`.
+///
+/// `chirp` is 1, or where chirps alternate the sign of this point's.
+pub(crate) fn correct(
+    point: &SparsePoint,
+    change: &FactVector,
+    sense: Sign,
+    alternates: bool,
+) -> SparsePoint {
+    let [offset_m, cosine, sine, doppler_s, row_time] = (*change).into();
+    let (x, y) = (f64::from(point.x_m), f64::from(point.y_m));
+    let (range_m, angle) = (x.hypot(y), y.atan2(x));
+    let angle = angle + sense * cosine * angle.cos() + sine * angle.sin();
+    let range_m = range_m + offset_m;
+    let chirp = if alternates {
+        f64::from(point.doppler_s).signum()
+    } else {
+        1.0
+    };
+    SparsePoint {
+        x_m: (range_m * angle.cos()) as f32,
+        y_m: (range_m * angle.sin()) as f32,
+        time_s: point.time_s * (1.0 + row_time) as f32,
+        weight: point.weight,
+        doppler_s: point.doppler_s + (chirp * doppler_s) as f32,
+    }
+}
+
+/// Returns the derivatives by the facts of where a point is seen, in the sensor's frame: two rows, one column for each fact.
+///
+/// `seen` is the point in that frame, `time_s` the time of its row and `chirp` the sign of its Doppler shift.
+pub(crate) fn displacements(
+    seen: Vector2<f64>,
+    time_s: f64,
+    chirp: f64,
+    twist: &Twist,
+    sense: Sign,
+) -> SMatrix<f64, 2, FACTS> {
+    let range_m = seen.norm().max(1e-3);
+    let along = seen / range_m;
+    let across = Vector2::new(-along.y, along.x);
+    let velocity = twist.linear_mps();
+    let turning = Vector2::new(-seen.y, seen.x) * twist.yaw_rate_radps;
+    SMatrix::from_columns(&[
+        along,
+        across * (range_m * sense * along.x),
+        across * (range_m * along.y),
+        along * (chirp * along.dot(&velocity)),
+        (velocity + turning) * time_s,
+    ])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn displacements_are_the_derivatives_of_the_correction() {
+        let point = SparsePoint::from([20.0, -15.0, 0.06, 0.5, 0.04]);
+        let seen = Vector2::new(20.0, -15.0);
+        for sense in [-1.0, 1.0] {
+            let by_facts = displacements(seen, 0.06, 1.0, &Twist::default(), sense);
+            for fact in [
+                Fact::RangeOffset,
+                Fact::EccentricityCos,
+                Fact::EccentricitySin,
+            ] {
+                let mut change = FactVector::zeros();
+                change[fact as usize] = fact.step();
+                let moved = correct(&point, &change, sense, false);
+                let moved = Vector2::new(f64::from(moved.x_m), f64::from(moved.y_m)) - seen;
+                let expected = by_facts.column(fact as usize) * fact.step();
+                assert!(
+                    (moved - expected).norm() < 1e-4,
+                    "{fact:?}: {moved} for {expected}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn where_chirps_alternate_the_shift_has_the_sign_of_the_chirp() {
+        let mut change = FactVector::zeros();
+        change[Fact::Doppler as usize] = 0.01;
+        let shift_s = |doppler_s: f32, alternates| {
+            let point = SparsePoint::from([20.0, 0.0, 0.0, 1.0, doppler_s]);
+            correct(&point, &change, -1.0, alternates).doppler_s
+        };
+        assert!((shift_s(-0.04, true) + 0.05).abs() < 1e-6);
+        assert!((shift_s(-0.04, false) + 0.03).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,206 @@
+//! The facts under which the scans of a drive overlap best.
+
+use std::collections::BTreeMap;
+use std::num::NonZeroUsize;
+use std::thread;
+
+use crate::{
+    Drive, Estimate, Fact, FactMatrix, FactVector, Revisit, Track,
+    facts::FACTS,
+    pair::{PairSlope, View, compare},
+};
+
+/// Distances along the path between the scans of a pair, m. The longer, the more a wrong fact displaces, and the less the scans have
+/// in common.
+const BASELINES_M: [f64; 4] = [5.0, 10.0, 20.0, 35.0];
+/// Distance along the path between the later scans of pairs, at least, m.
+const SPACING_M: f64 = 2.5;
+/// Pairs along the path, at most: of a longer drive they are farther apart.
+const MAX_PAIRS: usize = 1200;
+/// Views that a thread keeps, those of the scans within the longest baseline.
+const VIEWS: usize = 24;
+/// Blocks of the drive for the jackknife.
+const BLOCKS: usize = 12;
+
+/// Two scans of one place.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pair {
+    pub later: usize,
+    pub earlier: usize,
+    /// The pose of the later scan in the frame of the earlier one.
+    pub pose: gyre_geometry::Pose,
+}
+
+/// Returns pairs of scans along the path.
+pub(crate) fn along(track: &Track) -> Vec<Pair> {
+    let path_m = track.path_m();
+    let length_m = path_m.last().copied().unwrap_or_default();
+    let spacing_m = SPACING_M.max(length_m * BASELINES_M.len() as f64 / MAX_PAIRS as f64);
+    let (mut pairs, mut next_m) = (Vec::new(), 0.0);
+    for (later, here_m) in path_m.iter().enumerate() {
+        if *here_m < next_m {
+            continue;
+        }
+        next_m = here_m + spacing_m;
+        for baseline_m in BASELINES_M
+            .iter()
+            .filter(|baseline_m| **baseline_m <= *here_m)
+        {
+            let earlier = path_m.partition_point(|there_m| *there_m < here_m - baseline_m);
+            if earlier < later && !track.is_broken(earlier, later) {
+                let pose = track.poses[earlier].inv_mul(&track.poses[later]);
+                pairs.push(Pair {
+                    later,
+                    earlier,
+                    pose,
+                });
+            }
+        }
+    }
+    pairs
+}
+
+impl From<&Revisit> for Pair {
+    fn from(revisit: &Revisit) -> Self {
+        Self {
+            later: revisit.later,
+            earlier: revisit.earlier,
+            pose: revisit.pose,
+        }
+    }
+}
+
+/// The slopes of all pairs under one change of the facts; `None` for a pair that is not determined.
+pub(crate) fn slopes(
+    drive: &Drive,
+    track: &Track,
+    pairs: &[Pair],
+    change: &FactVector,
+) -> Vec<Option<PairSlope>> {
+    let threads = thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let share = pairs.len().div_ceil(threads).max(1);
+    thread::scope(|scope| {
+        let of = |pairs| move || slopes_of(drive, track, pairs, change);
+        let workers: Vec<_> = pairs
+            .chunks(share)
+            .map(|pairs| scope.spawn(of(pairs)))
+            .collect();
+        let joined = workers.into_iter().map(|worker| worker.join());
+        joined
+            .flat_map(|slopes| slopes.expect("a worker does not panic"))
+            .collect()
+    })
+}
+
+fn slopes_of(
+    drive: &Drive,
+    track: &Track,
+    pairs: &[Pair],
+    change: &FactVector,
+) -> Vec<Option<PairSlope>> {
+    let mut views = BTreeMap::new();
+    let mut slopes = Vec::with_capacity(pairs.len());
+    for pair in pairs {
+        while views.len() > VIEWS {
+            views.pop_first();
+        }
+        for scan in [pair.later, pair.earlier] {
+            let view = || View::new(drive, scan, change, &track.twists[scan]);
+            views.entry(scan).or_insert_with(view);
+        }
+        slopes.push(compare(
+            drive,
+            &views[&pair.later],
+            &views[&pair.earlier],
+            &pair.pose,
+        ));
+    }
+    slopes
+}
+
+/// The slopes of the overlap of all pairs, and how they change with each fact.
+pub(crate) struct System {
+    /// For each pair the scan that it belongs to, the slopes, and their derivatives.
+    rows: Vec<(usize, FactVector, FactMatrix)>,
+    scans: usize,
+}
+
+impl System {
+    /// Measures the slopes at a change of the facts, and one step of each fact from there.
+    pub fn measure(drive: &Drive, track: &Track, pairs: &[Pair], change: &FactVector) -> Self {
+        let here = slopes(drive, track, pairs, change);
+        let mut rows: Vec<_> = here
+            .iter()
+            .map(|slope| slope.map(|slope| (slope.slope, FactMatrix::zeros())))
+            .collect();
+        for fact in Fact::ALL {
+            let mut stepped = *change;
+            stepped[fact as usize] += fact.step();
+            for (row, there) in rows.iter_mut().zip(slopes(drive, track, pairs, &stepped)) {
+                *row = row
+                    .take()
+                    .zip(there)
+                    .map(|((slope, mut derivatives), there)| {
+                        derivatives
+                            .set_column(fact as usize, &((slope - there.slope) / fact.step()));
+                        (slope, derivatives)
+                    });
+            }
+        }
+        let rows = rows.into_iter().zip(pairs);
+        let rows = rows.filter_map(|(row, pair)| {
+            row.map(|(slope, derivatives)| (pair.later, slope, derivatives))
+        });
+        Self {
+            rows: rows.collect(),
+            scans: track.poses.len(),
+        }
+    }
+
+    /// Returns the number of pairs.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Solves for the change of the facts at which the slopes vanish, with the standard deviations by the jackknife over blocks of the
+    /// drive; the facts that are not in `free` keep their values. `None` if the pairs do not determine them.
+    pub fn solve(&self, free: &[Fact]) -> Option<[Estimate; FACTS]> {
+        let value = self.solve_without(free, None)?;
+        let mut variance = FactVector::zeros();
+        for block in 0..BLOCKS {
+            let apart = self.solve_without(free, Some(block))? - value;
+            variance += apart.component_mul(&apart);
+        }
+        let scale = (BLOCKS - 1) as f64 / BLOCKS as f64;
+        Some(std::array::from_fn(|k| Estimate {
+            value: value[k],
+            sigma: (scale * variance[k]).sqrt(),
+        }))
+    }
+
+    fn solve_without(&self, free: &[Fact], left_out: Option<usize>) -> Option<FactVector> {
+        let (mut slope, mut derivatives) = (FactVector::zeros(), FactMatrix::zeros());
+        let block = |scan: usize| scan * BLOCKS / self.scans.max(1);
+        for (scan, of_pair, by_fact) in &self.rows {
+            if left_out != Some(block(*scan)) {
+                slope += of_pair;
+                derivatives += by_fact;
+            }
+        }
+        for fixed in Fact::ALL.into_iter().filter(|fact| !free.contains(fact)) {
+            let k = fixed as usize;
+            slope[k] = 0.0;
+            derivatives.row_mut(k).fill(0.0);
+            derivatives.column_mut(k).fill(0.0);
+            derivatives[(k, k)] = 1.0;
+        }
+        // A fact beyond the overlap's maximum has the slope of a hole, not of a hill.
+        let rises = free
+            .iter()
+            .all(|fact| derivatives[(*fact as usize, *fact as usize)] > 0.0);
+        derivatives
+            .try_inverse()
+            .filter(|_| rises)
+            .map(|inverse| inverse * slope)
+    }
+}

@@ -1,0 +1,208 @@
+//! Two scans of one place: their relative pose, and the slope of their overlap by the facts.
+
+use gyre_geometry::{Pose, Twist};
+use nalgebra::{Matrix3, Rotation2, SMatrix, SVector, Vector2, Vector3};
+
+use crate::{
+    drive::Drive,
+    facts::{FACTS, FactVector, displacements},
+    image::Image,
+};
+
+const ITERATIONS: usize = 12;
+const MIN_STEP: [f64; 3] = [2e-4, 2e-4, 4e-6];
+/// How far each fact displaces a point, by x and y.
+type Displacement = SMatrix<f64, 2, FACTS>;
+
+/// A scan deskewed under assumed facts, with its images.
+pub(crate) struct View {
+    scan: usize,
+    twist: Twist,
+    points: Vec<Seen>,
+    /// The image of all points; where chirps alternate that of rising chirps, then that of falling ones.
+    images: Vec<Image>,
+}
+
+struct Seen {
+    at: Vector2<f64>,
+    weight: f64,
+    /// The sign of its Doppler shift: 1, or where chirps alternate that of its chirp.
+    chirp: f64,
+    displacement: Displacement,
+}
+
+/// Two views at the relative pose where they overlap best.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PairSlope {
+    /// The pose of the first view in the frame of the second one.
+    pub pose: Pose,
+    /// The derivative of the overlap by the facts, for points of weight 1 in all: where they are right it vanishes.
+    pub slope: FactVector,
+}
+
+impl View {
+    pub fn new(drive: &Drive, scan: usize, change: &FactVector, twist: &Twist) -> Self {
+        let points = drive.points(scan, change);
+        let refinement = &drive.config().refinement;
+        let points: Vec<Seen> = points
+            .iter()
+            .filter(|point| point.weight > 0.0)
+            .map(|point| {
+                let raw = Vector2::new(f64::from(point.x_m), f64::from(point.y_m));
+                let range_m = raw.norm().max(1e-3);
+                let toward =
+                    f64::from(point.doppler_s) * raw.dot(&twist.linear_mps()) / (range_m * range_m);
+                let time_s = f64::from(point.time_s);
+                let at = twist.chord_pose_at(time_s) * nalgebra::Point2::from(raw * (1.0 + toward));
+                let chirp = if drive.alternates {
+                    f64::from(point.doppler_s).signum()
+                } else {
+                    1.0
+                };
+                Seen {
+                    at: at.coords,
+                    weight: f64::from(point.weight.min(1.0)),
+                    chirp,
+                    displacement: displacements(at.coords, time_s, chirp, twist, drive.sense),
+                }
+            })
+            .collect();
+        let draw = |chirp: f64| {
+            let drawn = points.iter().filter(|point| point.chirp == chirp);
+            let drawn: Vec<[f64; 3]> = drawn.map(|p| [p.at.x, p.at.y, p.weight]).collect();
+            Image::draw(&drawn, refinement.cell_m, refinement.reach_m)
+        };
+        let chirps: &[f64] = if drive.alternates {
+            &[1.0, -1.0]
+        } else {
+            &[1.0]
+        };
+        Self {
+            scan,
+            twist: *twist,
+            images: chirps.iter().map(|chirp| draw(*chirp)).collect(),
+            points,
+        }
+    }
+
+    /// The image that a point of another view is compared with, and the sign of its Doppler shifts: where chirps alternate that of the
+    /// opposite chirp, which a wrong Doppler coefficient moves the other way. Those of one chirp would lie together whatever it is.
+    fn image_for(&self, point: &Seen) -> (&Image, f64) {
+        match self.images.as_slice() {
+            [rising, _] if point.chirp < 0.0 => (rising, 1.0),
+            [_, falling] => (falling, -1.0),
+            images => (&images[0], 1.0),
+        }
+    }
+
+    /// How the facts displace what lies at a place in this view.
+    fn displacement(&self, drive: &Drive, at: Vector2<f64>, chirp: f64) -> Displacement {
+        let time_s = drive.row_time_s(self.scan, at);
+        displacements(at, time_s, chirp, &self.twist, drive.sense)
+    }
+}
+
+#[derive(Default)]
+struct Sums {
+    cost: f64,
+    weight: f64,
+    gradient: Vector3<f64>,
+    information: Matrix3<f64>,
+    slope: FactVector,
+}
+
+/// Aligns two views, each with the image of the other, and returns what their overlap says about the facts.
+pub(crate) fn compare(drive: &Drive, a: &View, b: &View, initial: &Pose) -> Option<PairSlope> {
+    let mut pose = *initial;
+    let mut sums = sum(drive, a, b, &pose, false);
+    let mut damping = 1e-3;
+    for _ in 0..ITERATIONS {
+        let mut damped = sums.information;
+        (0..3).for_each(|k| damped[(k, k)] *= 1.0 + damping);
+        let step = damped.cholesky()?.solve(&sums.gradient);
+        let next = Pose::new(
+            pose.translation.vector + step.xy(),
+            pose.rotation.angle() + step.z,
+        );
+        let there = sum(drive, a, b, &next, false);
+        if there.cost < sums.cost {
+            (pose, sums) = (next, there);
+            damping = (damping * 0.3).max(1e-4);
+        } else {
+            damping *= 8.0;
+            if damping > 1e4 {
+                break;
+            }
+        }
+        if step.iter().zip(MIN_STEP).all(|(s, min)| s.abs() < min) {
+            break;
+        }
+    }
+    let sums = sum(drive, a, b, &pose, true);
+    (sums.weight > 0.0).then(|| PairSlope {
+        pose,
+        slope: sums.slope / sums.weight,
+    })
+}
+
+fn sum(drive: &Drive, a: &View, b: &View, pose: &Pose, facts: bool) -> Sums {
+    let mut sums = Sums::default();
+    let rotation = Rotation2::new(pose.rotation.angle());
+    let translation = pose.translation.vector;
+    let quarter = |v: Vector2<f64>| Vector2::new(-v.y, v.x);
+    for point in &a.points {
+        let turned = rotation * point.at;
+        let at = turned + translation;
+        sums.weight += point.weight;
+        let (image, chirp) = b.image_for(point);
+        let Some(reading) = image.read(at) else {
+            sums.cost += point.weight;
+            continue;
+        };
+        let along =
+            SMatrix::<f64, 2, 3>::from_columns(&[Vector2::x(), Vector2::y(), quarter(turned)]);
+        let missing = sums.add(point.weight, reading.value, reading.slope, &along);
+        if facts {
+            let relative = rotation * point.displacement - b.displacement(drive, at, chirp);
+            sums.slope += relative.transpose() * reading.slope * (point.weight * missing);
+        }
+    }
+    let back = rotation.inverse();
+    for point in &b.points {
+        let at = back * (point.at - translation);
+        sums.weight += point.weight;
+        let (image, chirp) = a.image_for(point);
+        let Some(reading) = image.read(at) else {
+            sums.cost += point.weight;
+            continue;
+        };
+        let along = SMatrix::<f64, 2, 3>::from_columns(&[
+            -(back * Vector2::x()),
+            -(back * Vector2::y()),
+            -quarter(at),
+        ]);
+        let missing = sums.add(point.weight, reading.value, reading.slope, &along);
+        if facts {
+            let relative = back * point.displacement - a.displacement(drive, at, chirp);
+            sums.slope += relative.transpose() * reading.slope * (point.weight * missing);
+        }
+    }
+    sums
+}
+
+impl Sums {
+    fn add(
+        &mut self,
+        weight: f64,
+        value: f64,
+        slope: Vector2<f64>,
+        along: &SMatrix<f64, 2, 3>,
+    ) -> f64 {
+        let missing = 1.0 - value;
+        let j: SVector<f64, 3> = along.transpose() * slope;
+        self.cost += weight * missing * missing;
+        self.gradient += j * (weight * missing);
+        self.information += j * j.transpose() * weight;
+        missing
+    }
+}

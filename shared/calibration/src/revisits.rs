@@ -1,0 +1,91 @@
+//! Places of the drive that are seen again.
+
+use std::convert::Infallible;
+
+use gyre_geometry::{Pose, SparsePoint, UncertainMotion};
+use gyre_scan_matching::ConfigError;
+use gyre_slam::{Keyframe, KeyframeBuilder, KeyframeSource, LoopCloser, LoopOptions, ScanPose};
+
+use crate::{Drive, Track, facts::FactVector};
+
+/// Two scans of one place.
+#[derive(Clone, Copy, Debug)]
+pub struct Revisit {
+    /// The later scan.
+    pub later: usize,
+    /// The earlier scan.
+    pub earlier: usize,
+    /// The pose of the later scan in the frame of the earlier one.
+    pub pose: Pose,
+}
+
+struct Keyframes(Vec<Keyframe>);
+
+impl KeyframeSource for &Keyframes {
+    type Error = Infallible;
+
+    fn keyframe(&mut self, index: usize) -> Result<Keyframe, Infallible> {
+        Ok(self.0[index].clone())
+    }
+}
+
+/// Finds the revisits of a drive along its track.
+pub fn find(
+    drive: &Drive,
+    track: &Track,
+    change: &FactVector,
+) -> Result<Vec<Revisit>, ConfigError> {
+    let options = LoopOptions::default();
+    let keyframes = Keyframes(keyframes(drive, track, change, &options));
+    let config = drive.config();
+    let mut closer = LoopCloser::new(options, &config.refinement, config.points.capacity)?;
+    for keyframe in &keyframes.0 {
+        if closer.push(keyframe).is_err() {
+            return Ok(Vec::new());
+        }
+    }
+    closer.finish();
+    let mut source = &keyframes;
+    while let Ok(Some(_)) = closer.describe(&mut source) {}
+    let mut found = Vec::new();
+    while let Ok(Some(query)) = closer.close(&mut source) {
+        for (candidate, _) in query.loops() {
+            found.push(Revisit {
+                later: keyframes.0[query.keyframe].seq as usize,
+                earlier: keyframes.0[candidate.place].seq as usize,
+                pose: candidate.motion.motion,
+            });
+        }
+    }
+    Ok(found)
+}
+
+fn keyframes(
+    drive: &Drive,
+    track: &Track,
+    change: &FactVector,
+    options: &LoopOptions,
+) -> Vec<Keyframe> {
+    let mut builder = KeyframeBuilder::new(&options.places);
+    let mut pose = UncertainMotion::identity();
+    let mut keyframes = Vec::new();
+    for (scan, sweep) in drive.sweeps.iter().enumerate() {
+        let motion = track.motions[scan];
+        pose = pose.then(&motion).normalized();
+        let made = builder.next(&ScanPose {
+            seq: scan as u64,
+            scan: scan as u64,
+            stamp_ns: sweep.stamp_ns,
+            pose,
+            motion,
+            interval_s: sweep.interval_s,
+        });
+        if let Some(mut keyframe) = made {
+            let points: Vec<SparsePoint> = drive.points(scan, change);
+            keyframe.points = points;
+            keyframe.twist = track.twists[scan];
+            keyframes.push(keyframe);
+        }
+    }
+    keyframes
+}
