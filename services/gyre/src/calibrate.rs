@@ -94,7 +94,7 @@ fn options(configuration: &Configuration) -> Result<DatasetOptions, Failure> {
 /// Registers the scans of a recording, at most `limit`.
 fn read(configuration: &Configuration, limit: usize) -> Result<(Drive, SweepGeometry), Failure> {
     let Played { mut dataset, .. } = preflight::open(configuration)?;
-    preflight::warn_of_training(configuration)?;
+    preflight::describe_masks(configuration)?;
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut drive = Drive::new(&configuration.odometry)?;
     let played = configuration.source.played(dataset.len());
