@@ -80,11 +80,6 @@ impl FirstImage {
         self.rows.get(row).and_then(|row| stamp::to_ns(row.stamp))
     }
 
-    /// Time from the first row to the last, ns.
-    pub(crate) fn sweep_ns(&self) -> Option<i64> {
-        Some(self.row_ns(self.rows.len() - 1)? - self.row_ns(0)?)
-    }
-
     /// Time of the first row, ns.
     pub(crate) fn start_ns(&self) -> Option<i64> {
         self.row_ns(0)

@@ -67,8 +67,6 @@ pub(crate) struct NavtechScans {
     period_ns: i64,
     /// The longest plausible sweep.
     max_sweep_ns: i64,
-    /// Time from the first to the last row, by the rows of the first image that can be read.
-    sweep_ns: Option<i64>,
     /// Whether the names of the files are times of their sweeps.
     named_by_time: bool,
     notes: Vec<String>,
@@ -106,7 +104,6 @@ impl NavtechScans {
             profile,
             period_ns: period_ns.unwrap_or(stamp::DEFAULT_TURN_NS),
             max_sweep_ns: period_ns.map_or(MAX_SWEEP_NS, |turn_ns| MAX_SWEEP_PERIODS * turn_ns),
-            sweep_ns: first_image.as_ref().and_then(FirstImage::sweep_ns),
             named_by_time: first_image.is_some_and(|image| image.named_by().is_some()),
             notes,
         })
@@ -140,13 +137,16 @@ impl NavtechScans {
         }
     }
 
-    /// Time from the first to the last row, ns.
-    fn sweep_ns(&self) -> i64 {
-        let rows = self.images.size.height as i64;
-        let by_period_ns = self.period_ns * (rows - 1) / rows;
-        self.sweep_ns
-            .filter(|sweep_ns| (1..=self.max_sweep_ns).contains(sweep_ns))
-            .unwrap_or(by_period_ns)
+    /// Time between the names of this file and the next, ns, if that can be one turn; otherwise the period.
+    fn interval_ns(&self, index: usize) -> i64 {
+        let name = |i: usize| self.images.name_stamp_ns(i);
+        let next = index
+            .checked_add(1)
+            .and_then(name)
+            .zip(name(index))
+            .map(|(b, a)| b - a);
+        next.filter(|ns| (ns - self.period_ns).abs() < self.period_ns / 5)
+            .unwrap_or(self.period_ns)
     }
 }
 
@@ -273,7 +273,8 @@ impl Dataset for NavtechScans {
 
     fn nominal_stamp_ns(&self, index: usize) -> Option<i64> {
         let name = self.images.name_stamp_ns(index)?;
-        let half_sweep = self.sweep_ns() / 2;
+        let rows = self.images.size.height as i64;
+        let half_sweep = self.interval_ns(index) * (rows - 1) / (2 * rows);
         Some(match self.profile.named_by {
             NamedBy::Start => name + half_sweep,
             NamedBy::Middle => name,
