@@ -332,7 +332,9 @@ mod tests {
         }
         assert_eq!(drive.reported, Pose::identity());
         // Pulled away farther than jitter goes, the pose comes back.
-        (0..8).for_each(|_| drop(drive.step(Outcome::Refined, 0.6)));
+        for _ in 0..8 {
+            drive.step(Outcome::Refined, 0.6);
+        }
         drive.drive(40, [0.0, 0.0]);
         assert!(drive.reported.translation.vector.norm() < 0.2);
     }
@@ -341,11 +343,15 @@ mod tests {
     fn predictions_neither_begin_nor_end_a_standstill() {
         let mut drive = Drive::with_jitter(0.0);
         drive.drive(80, [0.0, 0.0]);
-        (0..8).for_each(|_| drop(drive.step(Outcome::Predicted, 5.0)));
+        for _ in 0..8 {
+            drive.step(Outcome::Predicted, 5.0);
+        }
         assert!(drive.standstill.stands());
         drive.drive(8, [5.0, 5.0]);
         assert!(!drive.standstill.stands());
-        (0..8).for_each(|_| drop(drive.step(Outcome::Predicted, 0.0)));
+        for _ in 0..8 {
+            drive.step(Outcome::Predicted, 0.0);
+        }
         assert!(!drive.standstill.stands());
     }
 
