@@ -151,6 +151,7 @@ fn play(
         recording.listing.write(root.path()).map_err(failed)?;
     }
 
+    preflight::describe_masks(&resolved)?;
     let resumed = unfinished.map_or(0, |begun| begun.poses as usize);
     let mut progress = Progress::new(checked.scans, resumed, &checked.footprint);
     let started = Instant::now();

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::{Failure, calibrate, cli::RunArguments, configuration::Configuration, preflight};
+use crate::{Failure, calibrate, cli::RunArguments, configuration::Configuration};
 
 /// Reads the configuration and resolves what it leaves open.
 ///
@@ -28,7 +28,6 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
         configuration.source.data = PathBuf::new();
     }
     configuration.odometry.masking.resolve()?;
-    preflight::describe_masks(&configuration)?;
     // Absolute, so that the resolved configuration repeats the run from any folder. The reader reports what does not exist.
     for path in [
         Some(&mut configuration.source.data),
