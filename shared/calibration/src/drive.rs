@@ -3,8 +3,12 @@
 use std::f64::consts::TAU;
 
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion};
+use gyre_masking::MaskerError;
 use gyre_odometry::{Odometry, OdometryConfig, OdometryError, Outcome, SetupError};
-use gyre_radar::{OwnedScan, PolarScan, Sense, scan::flag};
+use gyre_radar::{
+    OwnedScan, PointExtractor, PolarScan, Sense,
+    scan::{ScanError, flag},
+};
 use gyre_scan_matching::{ConfigError, Refiner};
 use nalgebra::Vector2;
 
@@ -44,6 +48,7 @@ pub struct Drive {
     pub(crate) sense: Sign,
     pub(crate) alternates: bool,
     reflections: OwnReflections,
+    extractor: PointExtractor,
 }
 
 /// The track of the drive under assumed facts.
@@ -74,6 +79,7 @@ impl Drive {
             sense: -1.0,
             alternates: false,
             reflections: OwnReflections::default(),
+            extractor: PointExtractor::new(&config.points).map_err(MaskerError::from)?,
         })
     }
 
@@ -103,6 +109,10 @@ impl Drive {
         if registered.motion.motion.translation.vector.norm() > MOVING_M {
             self.reflections.add(&scan, self.config.masking.floor());
         }
+        let points = match self.alternates {
+            true => self.points_of_each_chirp(&scan)?,
+            false => self.odometry.points().to_vec(),
+        };
         self.sweeps.push(Sweep {
             stamp_ns: scan.geometry.stamp_ns,
             interval_s: match registered.outcome {
@@ -112,10 +122,36 @@ impl Drive {
             searched: registered.searched.map_or(Pose::identity(), |found| {
                 gyre_geometry::pose(found.motion.x_m, found.motion.y_m, found.motion.yaw_rad)
             }),
-            points: self.odometry.points().to_vec(),
+            points,
             row_time_s: row_times_s(&scan, self.sense),
         });
         Ok(())
+    }
+
+    /// Extracts the points of rising chirps, then those of falling ones. Together, the stronger of two neighbours suppresses the other
+    /// where both chirps see it: of rising chirps the near edge of a thing would remain, of falling ones the far edge, which looks like
+    /// a larger Doppler shift.
+    fn points_of_each_chirp(
+        &mut self,
+        scan: &PolarScan<'_>,
+    ) -> Result<Vec<SparsePoint>, ScanError> {
+        let floor = self.config.masking.floor();
+        let mut points = Vec::new();
+        let mut buffer = vec![SparsePoint::default(); self.config.points.capacity / 2];
+        for chirp in [flag::CHIRP_UP, 0] {
+            let of_chirp = |flags: &u8| match flags & flag::CHIRP_UP == chirp {
+                true => *flags,
+                false => flags & !flag::MEASURED,
+            };
+            let flags: Vec<u8> = scan.flags.iter().map(of_chirp).collect();
+            let scan = PolarScan {
+                flags: &flags,
+                ..*scan
+            };
+            let count = self.extractor.extract(&scan, floor, &mut buffer)?;
+            points.extend_from_slice(&buffer[..count]);
+        }
+        Ok(points)
     }
 
     /// Returns the reflections of the vehicle itself in the scans.

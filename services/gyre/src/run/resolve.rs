@@ -44,7 +44,7 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     Ok(configuration)
 }
 
-/// The overrides, those of a later kind first in force: the calibration, `--set`, the options.
+/// The overrides: the calibration, `--set`, the options; of two for one key the later one holds.
 ///
 /// # Errors
 /// A calibration that cannot be read.
