@@ -11,6 +11,8 @@ use crate::{
 
 /// Poses a second of the trajectory.
 const RATE_HZ: usize = 4;
+/// Length of the drive, s.
+const DRIVE_S: usize = 14;
 /// The motions between the stop and the start.
 const STANDING: std::ops::Range<usize> = 3 * RATE_HZ..11 * RATE_HZ;
 
@@ -23,7 +25,7 @@ fn trajectory() -> String {
     };
     const FINE: usize = 100;
     let (mut text, mut x_m) = (String::new(), 0.0);
-    for k in 0..=14 * RATE_HZ * FINE {
+    for k in 0..=DRIVE_S * RATE_HZ * FINE {
         let second = k as f64 / (RATE_HZ * FINE) as f64;
         if k % FINE == 0 {
             let _ = writeln!(text, "{second} {x_m} 0 0 0 0 0 1");
@@ -81,5 +83,5 @@ fn refinement_killed_while_the_vehicle_stands_goes_on() {
 
 #[test]
 fn one_process_holds_the_pose_as_a_run_does() {
-    assert_eq!(in_process::assert_same_bits(&run()), 57);
+    assert_eq!(in_process::assert_same_bits(&run()), DRIVE_S * RATE_HZ);
 }

@@ -6,7 +6,6 @@ use std::{
     io::Cursor,
     os::unix::fs::symlink,
     path::{Path, PathBuf},
-    process,
     sync::OnceLock,
 };
 
@@ -33,15 +32,13 @@ pub fn around_a_block() -> &'static Path {
 
 /// The recording of a drive along a trajectory in the format TUM.
 pub fn along(name: &str, trajectory: &str) -> PathBuf {
-    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}-{}.tum", process::id()));
+    let file = tempfile::NamedTempFile::new().unwrap();
     fs::write(&file, trajectory).unwrap();
     let config = SimulationConfig {
-        drive: DriveConfig::along_file(file.clone()),
+        drive: DriveConfig::along_file(file.path().to_owned()),
         ..SimulationConfig::default()
     };
-    let recording = simulated(name, &config);
-    fs::remove_file(file).unwrap();
-    recording
+    simulated(name, &config)
 }
 
 fn of_a_block(scans: usize) -> PathBuf {

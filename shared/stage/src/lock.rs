@@ -68,19 +68,26 @@ fn is_at(file: &File, path: &Path) -> io::Result<bool> {
 
 /// Returns the process that holds the lock of a file, as the kernel lists it.
 fn holder(file: impl AsFd) -> Option<String> {
+    // The list is read in pieces: where another lock is released meanwhile, one can be missing.
+    const READINGS: usize = 20;
     let status = fstat(file).ok()?;
     let (major, minor) = (major(status.st_dev), minor(status.st_dev));
     let id = format!("{major:02x}:{minor:02x}:{}", status.st_ino);
-    let locks = fs::read_to_string("/proc/locks").ok()?;
-    let pid = locks.lines().find_map(|line| {
-        let fields: Vec<&str> = line.split_whitespace().collect();
-        match fields[..] {
-            [_, "FLOCK", _, _, pid, file, ..] if file == id => Some(pid),
-            _ => None,
-        }
-    })?;
+    let pid = (0..READINGS).find_map(|_| listed(&id))?;
     let name = fs::read_to_string(format!("/proc/{pid}/comm")).ok()?;
     Some(format!("process {pid} ({})", name.trim_end()))
+}
+
+/// Returns the process that is listed with the lock of a file; `id` is the device's numbers and the inode.
+fn listed(id: &str) -> Option<String> {
+    let locks = fs::read_to_string("/proc/locks").ok()?;
+    locks.lines().find_map(|line| {
+        let fields: Vec<&str> = line.split_whitespace().collect();
+        match fields[..] {
+            [_, "FLOCK", _, _, pid, file, ..] if file == id => Some(pid.to_owned()),
+            _ => None,
+        }
+    })
 }
 
 #[cfg(test)]
