@@ -149,7 +149,7 @@ fn odometry_files() {
     let (folder, row) = (folder(), |seq: i64| {
         let numbers = vec!["0.5"; 19].join(",");
         format!(
-            "{seq},{seq},{},{},250000000,{numbers},refined,prediction,0.5,0.5,0\n",
+            "{seq},{seq},{},{},250000000,{numbers},refined,prediction,0.5,0.5,0,0.5,0\n",
             seq - 1,
             1_549_986_607_000_000_000 + seq
         )

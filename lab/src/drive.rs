@@ -6,7 +6,7 @@ use std::path::Path;
 use gyre::{Failure, configuration::Configuration, odometry};
 use gyre_estimation::places::{KeyframeSelector, MAX_NEIGHBOURS, PlaceOptions, neighbours};
 use gyre_evaluation::TimedMotion;
-use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion};
+use gyre_geometry::{Pose, SparsePoint, Stretch, Twist, UncertainMotion};
 use gyre_masking::{MaskKind, Masker};
 use gyre_radar::{OwnedScan, Trajectory, find_ground_truth, read_trajectory};
 use gyre_scan_matching::{RefinementConfig, Submap};
@@ -93,10 +93,10 @@ impl Drive {
         if motions.len() + 1 != stamps.len() {
             return Err("odometry.csv and trajectory.tum are not of one run".into());
         }
-        let (mut reckoned, mut since) = (UncertainMotion::identity(), UncertainMotion::identity());
+        let (mut reckoned, mut since) = (Stretch::new(), UncertainMotion::identity());
         for (k, pose) in self.estimate.poses.iter().enumerate() {
             if let Some(motion) = k.checked_sub(1).map(|last| motions[last].estimate) {
-                (reckoned, since) = (reckoned.then(&motion), since.then(&motion));
+                (reckoned, since) = (reckoned.then(&motion), since.then(&motion.alone()));
             }
             let Some(path_m) = selector.next(pose) else {
                 continue;
@@ -117,7 +117,7 @@ impl Drive {
                 stamp_ns: stamps[k],
                 pose: UncertainMotion {
                     motion: *pose,
-                    covariance: reckoned.covariance,
+                    covariance: reckoned.motion().covariance,
                 },
                 motion,
                 twist,

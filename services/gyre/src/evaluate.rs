@@ -100,7 +100,7 @@ fn has_stamps(trajectory: &Trajectory, motions: &[TimedMotion]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use gyre_geometry::UncertainMotion;
+    use gyre_geometry::OdometryMotion;
 
     use super::*;
 
@@ -114,7 +114,7 @@ mod tests {
         let ends_at = |to_ns| TimedMotion {
             from_ns: 0,
             to_ns,
-            estimate: UncertainMotion::identity(),
+            estimate: OdometryMotion::default(),
         };
         assert!(has_stamps(
             &trajectory,

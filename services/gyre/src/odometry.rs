@@ -13,7 +13,7 @@ pub use read::read;
 pub const HEADER: &str = "seq,scan,previous_scan,stamp_ns,interval_ns,x_m,y_m,yaw_rad,\
     cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,score,runner_up_score,\
     rotation_rad,rotation_variance_rad2,rotation_score,rotation_runner_up_rad,rotation_runner_up_score,\
-    searched_x_m,searched_y_m,searched_yaw_rad,outcome,hypothesis,overlap,support,stationary\n";
+    searched_x_m,searched_y_m,searched_yaw_rad,outcome,hypothesis,overlap,support,stationary,drift_share,scale_sigma\n";
 
 /// Writes the row of a motion to `text`, in fixed decimals, so that equal motions give equal bytes. The start of the chain has no
 /// row.
@@ -56,11 +56,12 @@ pub fn write_row(pose: &PoseHeader, text: &mut String) {
         initial_guess_name(refinement)
     );
     let stationary = u8::from(refinement.is_stationary());
-    let _ = writeln!(
+    let _ = write!(
         text,
         ",{:.9},{:.9},{stationary}",
         refinement.overlap, refinement.support
     );
+    let _ = writeln!(text, ",{:.9},{:.9}", motion.drift_share, motion.scale_sigma);
 }
 
 fn outcome_name(refinement: &RefinementRecord) -> &'static str {
@@ -110,6 +111,7 @@ mod tests {
             },
             motion: MotionEstimate {
                 x_m: 1.5,
+                drift_share: 0.25,
                 searched: [1.25, 0.0, 0.0],
                 refinement: RefinementRecord {
                     outcome: outcome::REFINED,
@@ -126,10 +128,10 @@ mod tests {
             .iter()
             .for_each(|pose| write_row(pose, &mut text));
         let fields: Vec<usize> = text.lines().map(|line| line.split(',').count()).collect();
-        assert_eq!(fields, [29, 29, 29]);
+        assert_eq!(fields, [31, 31, 31]);
         assert!(text.contains(",1.500000000,"));
         assert!(text.ends_with(
-            ",1.250000000,0.000000000,0.000000000,refined,yaw-offset,0.000000000,0.000000000,1\n"
+            ",1.250000000,0.000000000,0.000000000,refined,yaw-offset,0.000000000,0.000000000,1,0.250000000,0.000000000\n"
         ));
     }
 }

@@ -4,19 +4,22 @@ use gyre_geometry::{covariance, xy_yaw};
 use gyre_messages::{MotionHeader, PoseHeader};
 
 /// Composes the previous pose (the origin without one) and a motion (zero at the start of a chain) to the next pose. The covariance
-/// is propagated to first order (Checchin et al., Eqs. 1 and 2).
+/// is propagated to first order (Checchin et al., Eqs. 1 and 2), but the noise of a scan's registration does not accumulate: see
+/// [`Stretch`](gyre_geometry::Stretch).
 pub fn compose(previous: Option<&PoseHeader>, motion: &MotionHeader) -> PoseHeader {
     let start = PoseHeader::default();
     let previous = previous.unwrap_or(&start);
-    let next = previous.pose().then(&motion.motion.motion());
-    let [x_m, y_m, yaw_rad] = xy_yaw(&next.motion);
+    let next = previous.stretch().then(&motion.motion.motion());
+    let pose = next.motion();
+    let [x_m, y_m, yaw_rad] = xy_yaw(&pose.motion);
     PoseHeader {
         item: motion.item,
         motion: motion.motion,
         x_m,
         y_m,
         yaw_rad,
-        covariance: covariance::pack(&next.covariance),
+        covariance: covariance::pack(&pose.covariance),
+        lasting_covariance: covariance::pack(&next.lasting().covariance),
         trajectory_version: previous.trajectory_version,
     }
 }
@@ -36,6 +39,7 @@ mod tests {
                 x_m,
                 yaw_rad: FRAC_PI_2,
                 covariance: [4.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+                drift_share: 1.0,
                 ..MotionEstimate::default()
             },
             ..MotionHeader::default()

@@ -21,7 +21,7 @@ use record::{RECORD, Record};
 pub use records::{Records, records, records_from};
 
 /// The start of a journal, with the version of its records.
-const MAGIC: [u8; 16] = *b"gyre journal v5\n";
+const MAGIC: [u8; 16] = *b"gyre journal v6\n";
 
 /// An error of a journal.
 #[derive(Debug, Error)]

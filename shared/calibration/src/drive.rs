@@ -210,9 +210,9 @@ impl Drive {
                     };
                     let refined =
                         refiner.refine(number as u64, &points, from, &searched, sweep.interval_s);
-                    motions[later] = refined.motion;
+                    motions[later] = refined.motion.alone();
                     if reversed {
-                        motions[later].motion = refined.motion.motion.inverse();
+                        motions[later].motion = motions[later].motion.inverse();
                     }
                     overlaps[scan] = refined.overlap;
                 }

@@ -1,6 +1,6 @@
 //! Association of reported motions with the ground truth at their stamps.
 
-use gyre_geometry::{Pose, UncertainMotion};
+use gyre_geometry::{OdometryMotion, Pose, Stretch, UncertainMotion};
 
 use crate::{
     EvaluationError, Side, TimedPoses,
@@ -16,7 +16,7 @@ pub struct TimedMotion {
     /// Stamp of the later frame, ns.
     pub to_ns: i64,
     /// The later frame in the earlier one.
-    pub estimate: UncertainMotion,
+    pub estimate: OdometryMotion,
 }
 
 /// A part of a drive, by shares of its duration. Covariances are calibrated on one part and tested on another.
@@ -69,7 +69,7 @@ pub struct MatchedMotions {
 /// `n` consecutive motions and their `n + 1` nodes.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Chain {
-    pub motions: Vec<UncertainMotion>,
+    pub motions: Vec<OdometryMotion>,
     pub stamps_ns: Vec<i64>,
     pub truth: Vec<Option<Pose>>,
 }
@@ -102,7 +102,7 @@ impl MatchedMotions {
         for motion in motions {
             let (from, to) = (at(motion.from_ns), at(motion.to_ns));
             matched.without_truth += usize::from(from.is_none() || to.is_none());
-            match motion.estimate.has_covariance() {
+            match motion.estimate.alone().has_covariance() {
                 true => matched.add(motion, from, to),
                 false => matched.without_covariance += 1,
             }
@@ -166,9 +166,13 @@ impl Chain {
     pub fn composed(&self, first: usize) -> impl Iterator<Item = UncertainMotion> + '_ {
         self.motions[first..]
             .iter()
-            .scan(UncertainMotion::identity(), |so_far, motion| {
-                *so_far = so_far.then(motion);
-                Some(*so_far)
+            .scan(None, |so_far: &mut Option<Stretch>, motion| {
+                let next = match so_far {
+                    None => Stretch::of(motion),
+                    Some(stretch) => stretch.then(motion),
+                };
+                *so_far = Some(next);
+                Some(next.motion())
             })
     }
 
@@ -185,10 +189,11 @@ fn require_motions(motions: &[TimedMotion]) -> Result<(), EvaluationError> {
         &TimedMotion {
             from_ns,
             to_ns,
-            estimate: UncertainMotion { motion, .. },
+            estimate,
         },
     ) in motions.iter().enumerate()
     {
+        let motion = estimate.motion;
         if require_poses(Side::Estimate, &[motion]).is_err() {
             let (x_m, y_m, yaw_rad) = (
                 motion.translation.x,
@@ -233,7 +238,7 @@ mod tests {
         TimedMotion {
             from_ns: from_ms * MS,
             to_ns: to_ms * MS,
-            estimate,
+            estimate: OdometryMotion::independent(estimate),
         }
     }
 

@@ -9,7 +9,7 @@ use gyre_evaluation::{
     MatchedMotions, Nees, NeesFigure, NeesFigures, NeesOptions, TimedMotion, TimedPoses,
     TruthSigma, bands, nees, plot::bands_svg,
 };
-use gyre_geometry::{Pose, UncertainMotion, pose};
+use gyre_geometry::{OdometryMotion, Pose, UncertainMotion, pose};
 use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -67,7 +67,7 @@ impl Drive {
             TimedMotion {
                 from_ns: stamps_ns[k],
                 to_ns: stamps_ns[k + 1],
-                estimate,
+                estimate: OdometryMotion::independent(estimate),
             }
         };
         let motions = (0..motions).map(motion).collect();
@@ -160,6 +160,35 @@ fn twice_the_covariance_halves_the_ratio() {
             assert!((once.ratio / twice.ratio - 2.0).abs() < 1e-9);
         }
     }
+}
+
+/// The poses drift, and each has noise of its own besides, as those of scans that are registered with a map.
+#[test]
+fn motions_that_share_the_noise_of_their_poses_are_consistent_over_all_lengths() {
+    const DRIFT_SHARE: f64 = 0.05;
+    let mut random = ChaCha8Rng::seed_from_u64(5);
+    let mut drive = Drive::new(12_800, 7, 1.0);
+    let spread = covariance().cholesky().unwrap().l();
+    let mut draw = |share: f64| spread * gaussian(&mut random) * share.sqrt();
+    let (mut drifted, mut last) = (drive.truth[0], drive.truth[0]);
+    for (k, motion) in drive.motions.iter_mut().enumerate() {
+        let step = drive.truth[k].inv_mul(&drive.truth[k + 1]);
+        drifted *= disturbed(&step, draw(DRIFT_SHARE));
+        let noisy = drifted * disturbed(&Pose::identity(), draw(0.5 * (1.0 - DRIFT_SHARE)));
+        motion.estimate.motion = last.inv_mul(&noisy);
+        motion.estimate.drift_share = DRIFT_SHARE;
+        last = noisy;
+    }
+    let nees = drive.nees();
+    for length in &nees.by_length {
+        assert!((length.all.pose.ratio - 1.0).abs() < 0.15, "{nees}");
+    }
+    let mut independent = drive;
+    for motion in &mut independent.motions {
+        motion.estimate.drift_share = 1.0;
+    }
+    let nees = independent.nees();
+    assert!(nees.by_length[3].all.pose.ratio < 0.2, "{nees}");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! `motion`: the motion of the vehicle between two scans.
 
 use bytemuck::{Pod, Zeroable};
-use gyre_geometry::{Pose, Twist, UncertainMotion, covariance, pose, xy_yaw};
+use gyre_geometry::{OdometryMotion, Pose, Twist, covariance, pose, xy_yaw};
 use gyre_radar::MAX_INTERVAL_NS;
 use gyre_scan_matching::{MotionMatch, Refined};
 use iceoryx2::prelude::ZeroCopySend;
@@ -42,7 +42,7 @@ header!(MotionHeader);
 /// The pose of this scan's frame in the previous scan's frame, with its covariance.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_motion_estimate_v3")]
+#[type_name("gyre_motion_estimate_v4")]
 pub struct MotionEstimate {
     /// Forward, m.
     pub x_m: f64,
@@ -52,6 +52,10 @@ pub struct MotionEstimate {
     pub yaw_rad: f64,
     /// Covariance of (x, y, yaw): see [`covariance::Packed`].
     pub covariance: covariance::Packed,
+    /// Share of the covariance that is drift, 0 to 1: see [`OdometryMotion::drift_share`].
+    pub drift_share: f64,
+    /// Standard deviation of the scale that all motions share: see [`OdometryMotion::scale_sigma`].
+    pub scale_sigma: f64,
     /// Time between the two scans, ns on the sensor's clock.
     pub interval_ns: i64,
     /// Height of the correlation peak of the translation, at most 1.
@@ -101,6 +105,12 @@ impl MotionEstimate {
         ];
         planar(searched, limits.extent_m())?;
         check_covariance(&self.covariance)?;
+        for (key, value) in [
+            ("drift_share", self.drift_share),
+            ("scale_sigma", self.scale_sigma),
+        ] {
+            require((0.0..=1.0).contains(&value), key, value, "0 to 1")?;
+        }
         let intervals = 0..=MAX_INTERVAL_NS;
         let expected = format_args!("from 0 to {MAX_INTERVAL_NS}");
         require(
@@ -124,6 +134,8 @@ impl MotionEstimate {
             y_m: found.y_m,
             yaw_rad: found.yaw_rad,
             covariance: covariance::pack(&found.covariance),
+            drift_share: 1.0,
+            scale_sigma: 0.0,
             interval_ns,
             score: found.score,
             runner_up_score: found.runner_up.map_or(0.0, |runner_up| runner_up.score),
@@ -136,22 +148,27 @@ impl MotionEstimate {
     /// Returns the motion after refinement. The searched motion stays beside it.
     #[must_use]
     pub fn refined(&self, refined: &Refined) -> Self {
-        let [x_m, y_m, yaw_rad] = xy_yaw(&refined.motion.motion);
+        let motion = &refined.motion;
+        let [x_m, y_m, yaw_rad] = xy_yaw(&motion.motion);
         Self {
             x_m,
             y_m,
             yaw_rad,
-            covariance: covariance::pack(&refined.motion.covariance),
+            covariance: covariance::pack(&motion.covariance),
+            drift_share: motion.drift_share,
+            scale_sigma: motion.scale_sigma,
             refinement: refined.into(),
             ..*self
         }
     }
 
     /// Returns the motion with its covariance.
-    pub fn motion(&self) -> UncertainMotion {
-        UncertainMotion {
+    pub fn motion(&self) -> OdometryMotion {
+        OdometryMotion {
             motion: pose(self.x_m, self.y_m, self.yaw_rad),
             covariance: covariance::unpack(&self.covariance),
+            drift_share: self.drift_share,
+            scale_sigma: self.scale_sigma,
         }
     }
 
@@ -168,7 +185,7 @@ impl MotionEstimate {
 /// The header of `motion` and `refined`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_motion_header_v4")]
+#[type_name("gyre_motion_header_v5")]
 pub struct MotionHeader {
     /// The scan.
     pub item: Item,

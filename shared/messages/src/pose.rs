@@ -1,7 +1,7 @@
 //! `pose`: the pose of the vehicle, which is also the credit that admits a new scan.
 
 use bytemuck::{Pod, Zeroable};
-use gyre_geometry::{UncertainMotion, covariance, pose};
+use gyre_geometry::{Stretch, UncertainMotion, covariance, pose};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
@@ -39,7 +39,7 @@ header!(PoseHeader);
 /// A pose in the frame of the first scan, with the motion that led to it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_pose_header_v4")]
+#[type_name("gyre_pose_header_v5")]
 pub struct PoseHeader {
     /// The scan.
     pub item: Item,
@@ -53,6 +53,8 @@ pub struct PoseHeader {
     pub yaw_rad: f64,
     /// Covariance of (x, y, yaw) in the frame of the first scan: see [`covariance::Packed`].
     pub covariance: covariance::Packed,
+    /// The part of it that later poses have too: see [`Stretch::lasting`].
+    pub lasting_covariance: covariance::Packed,
     /// Number of corrections of the whole trajectory (loop closures); always 0 while poses are only composed motions.
     pub trajectory_version: u64,
 }
@@ -69,6 +71,7 @@ impl PoseHeader {
         ];
         planar(pose, MAX_DISTANCE_M)?;
         check_covariance(&self.covariance)?;
+        check_covariance(&self.lasting_covariance)?;
         self.motion.check(limits)
     }
 
@@ -78,5 +81,13 @@ impl PoseHeader {
             motion: pose(self.x_m, self.y_m, self.yaw_rad),
             covariance: covariance::unpack(&self.covariance),
         }
+    }
+
+    /// Returns the stretch from the first scan to this one, to go on with the next motion.
+    pub fn stretch(&self) -> Stretch {
+        Stretch::resume(UncertainMotion {
+            covariance: covariance::unpack(&self.lasting_covariance),
+            ..self.pose()
+        })
     }
 }

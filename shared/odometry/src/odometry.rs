@@ -1,6 +1,6 @@
 //! Odometry: from scans to motions and poses.
 
-use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose};
+use gyre_geometry::{OdometryMotion, Pose, SparsePoint, Stretch, Twist, UncertainMotion, pose};
 use gyre_masking::{Masker, Sweep};
 use gyre_radar::{PolarScan, continues};
 use gyre_scan_matching::{
@@ -28,7 +28,7 @@ pub struct Odometry {
     previous_by_pair: Option<Array2<f32>>,
     /// Number of scans since the chain of motions started.
     seq: u64,
-    pose: UncertainMotion,
+    driven: Stretch,
 }
 
 /// The configured search.
@@ -74,7 +74,7 @@ impl Odometry {
             previous_by_pair: (masker.scans() == 2).then(|| Array2::zeros((n, n))),
             masker,
             seq: 0,
-            pose: UncertainMotion::identity(),
+            driven: Stretch::new(),
         })
     }
 
@@ -175,12 +175,12 @@ impl Odometry {
                     motion: motion_of(found),
                     covariance: found.motion.covariance,
                 };
-                (motion, Outcome::Searched)
+                (OdometryMotion::independent(motion), Outcome::Searched)
             }
-            (None, None) => (UncertainMotion::identity(), Outcome::Start),
+            (None, None) => (OdometryMotion::default(), Outcome::Start),
         };
         let motion = motion.normalized();
-        self.pose = self.pose.then(&motion).normalized();
+        self.driven = self.driven.then(&motion);
         let interval_s = interval_ns as f64 * 1e-9;
         self.twists.push(
             searched
@@ -192,7 +192,7 @@ impl Odometry {
         Registered {
             seq: self.seq - 1,
             motion,
-            pose: self.pose,
+            pose: self.driven.motion(),
             outcome,
             interval_ns,
             searched,

@@ -1,6 +1,6 @@
 //! The results and errors of a registration.
 
-use gyre_geometry::UncertainMotion;
+use gyre_geometry::{OdometryMotion, UncertainMotion};
 use gyre_masking::{MaskError, MaskerError};
 use gyre_radar::ScanError;
 use gyre_scan_matching::{ConfigError, JointMatch, Refined, ShapeError};
@@ -12,7 +12,7 @@ pub struct Registered {
     /// Sequence number in the chain of motions, from 0.
     pub seq: u64,
     /// The pose of this scan's frame in the previous scan's frame, with its covariance. The identity where the chain starts.
-    pub motion: UncertainMotion,
+    pub motion: OdometryMotion,
     /// The pose in the frame of the first scan, with its covariance.
     pub pose: UncertainMotion,
     /// The origin of the motion.

@@ -26,7 +26,7 @@ mod standstill;
 mod tracker;
 mod uncertainty;
 
-use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion};
+use gyre_geometry::{OdometryMotion, Pose, SparsePoint, Twist, UncertainMotion};
 
 pub use config::{RefinementConfig, RefinementKind};
 pub use initial_guess::InitialGuess;
@@ -72,7 +72,7 @@ pub enum Outcome {
 #[derive(Debug, Clone, Copy)]
 pub struct Refined {
     /// Pose of the later scan's frame in the earlier one's, with its covariance.
-    pub motion: UncertainMotion,
+    pub motion: OdometryMotion,
     /// Mean of the map under the points, 0 to 1.
     pub overlap: f64,
     /// Weight of the points as a share of its running mean; 1 if there is none yet.
@@ -182,7 +182,13 @@ impl Refiner {
             }
         }
         let (outcome, estimate) = self.accept_or_predict(&scan, &best);
-        let motion = self.report(&scan, outcome, estimate);
+        let reported = self.report(&scan, outcome, estimate);
+        let motion = OdometryMotion {
+            motion: reported.motion,
+            covariance: reported.covariance,
+            drift_share: uncertainty::drift_share(outcome, self.map.len(), &self.config),
+            scale_sigma: self.config.scale_sigma,
+        };
         self.update(&scan, &best, outcome, &estimate.motion);
         Refined {
             motion,

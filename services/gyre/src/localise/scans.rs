@@ -102,7 +102,7 @@ impl Scans {
                 stamp_ns: self.scan.geometry.stamp_ns,
                 points: self.odometry.points(),
                 twist,
-                motion: registered.motion,
+                motion: registered.motion.alone(),
             };
             return Ok(Some(RegisteredScan {
                 number,

@@ -7,7 +7,7 @@ use std::{
 };
 
 use gyre_evaluation::TimedMotion;
-use gyre_geometry::{UncertainMotion, covariance::unpack, pose};
+use gyre_geometry::{OdometryMotion, covariance::unpack, pose};
 use serde::Deserialize;
 
 use crate::Failure;
@@ -26,7 +26,7 @@ const COLUMNS: [&str; 11] = [
     "cov_yawyaw",
 ];
 
-/// The fields of [`COLUMNS`].
+/// The fields of [`COLUMNS`], and how errors of motions depend on each other: not at all where that is not said.
 #[derive(Deserialize)]
 struct Row {
     stamp_ns: i64,
@@ -40,6 +40,8 @@ struct Row {
     cov_yy: Option<f64>,
     cov_yyaw: Option<f64>,
     cov_yawyaw: Option<f64>,
+    drift_share: Option<f64>,
+    scale_sigma: Option<f64>,
 }
 
 /// Reads the motions of an `odometry.csv`. A covariance that is left empty becomes NaN: the motion has none.
@@ -98,6 +100,10 @@ fn parse(text: impl Read) -> Result<Vec<TimedMotion>, Failure> {
 impl Row {
     fn motion(&self) -> Result<TimedMotion, Failure> {
         let from_ns = self.stamp_ns.checked_sub(self.interval_ns);
+        let share = |value: Option<f64>, default| {
+            let value = value.unwrap_or(default);
+            (0.0..=1.0).contains(&value).then_some(value)
+        };
         let covariance = [
             self.cov_xx,
             self.cov_xy,
@@ -109,9 +115,11 @@ impl Row {
         Ok(TimedMotion {
             from_ns: from_ns.ok_or("interval_ns is out of range")?,
             to_ns: self.stamp_ns,
-            estimate: UncertainMotion {
+            estimate: OdometryMotion {
                 motion: pose(self.x_m, self.y_m, self.yaw_rad),
                 covariance: unpack(&covariance.map(|value| value.unwrap_or(f64::NAN))),
+                drift_share: share(self.drift_share, 1.0).ok_or("drift_share is not 0 to 1")?,
+                scale_sigma: share(self.scale_sigma, 0.0).ok_or("scale_sigma is not 0 to 1")?,
             },
         })
     }
@@ -146,6 +154,8 @@ mod tests {
                 y_m: -0.25,
                 yaw_rad: 0.125 * k as f64,
                 covariance: [0.04, 0.001, 0.002, 0.05, 0.003, 0.006],
+                drift_share: 0.25,
+                scale_sigma: 0.01,
                 interval_ns: 250_000_000,
                 ..MotionEstimate::default()
             },
@@ -171,7 +181,7 @@ mod tests {
         assert_eq!(read.len(), 3);
         assert!(
             read[0].estimate.motion == motions(&poses())[0].estimate.motion
-                && !read[0].estimate.has_covariance()
+                && !read[0].estimate.alone().has_covariance()
         );
     }
 

@@ -52,6 +52,11 @@ pub struct RefinementConfig {
     /// Standard deviation of the heading that is added to the covariance, degrees, for the uneven
     /// rotation of the antenna.
     pub yaw_sigma_deg: f64,
+    /// Drift of the map of k keyframes from scan to scan, over the standard deviation of a motion x 2 / (k + 1). That share of
+    /// the error accumulates, at most all of it; the next motion takes back the rest.
+    pub drift_scale: f64,
+    /// Standard deviation of the scale that all motions of a drive share: how well the range resolution is known.
+    pub scale_sigma: f64,
     /// Holds the pose of a standing vehicle: no motion until the displacement exceeds the noise.
     pub hold_standstill: bool,
 }
@@ -91,6 +96,8 @@ impl Default for RefinementConfig {
             max_unmatched: 5,
             variance_scale: 0.7,
             yaw_sigma_deg: 0.19,
+            drift_scale: 5.0,
+            scale_sigma: 0.01,
             hold_standstill: true,
         }
     }
@@ -159,6 +166,7 @@ impl RefinementConfig {
             ("jitter_m", self.jitter_m),
             ("jitter_deg", self.jitter_deg),
             ("variance_scale", self.variance_scale),
+            ("drift_scale", self.drift_scale),
         ] {
             check(positive(value), key, &value, "a positive number")?;
         }
@@ -167,6 +175,12 @@ impl RefinementConfig {
             "yaw_sigma_deg",
             &self.yaw_sigma_deg,
             "0 to 90",
+        )?;
+        check(
+            (0.0..=1.0).contains(&self.scale_sigma),
+            "scale_sigma",
+            &self.scale_sigma,
+            share,
         )
     }
 }

@@ -70,6 +70,10 @@ impl LocalMap {
         self.fine.n.pow(2) + self.coarse.n.pow(2)
     }
 
+    pub fn len(&self) -> usize {
+        self.used.len()
+    }
+
     pub fn is_empty(&self) -> bool {
         self.used.is_empty()
     }

@@ -3,7 +3,7 @@
 use gyre_geometry::Pose;
 use nalgebra::{Matrix3, Vector3};
 
-use super::{RefinementConfig, alignment::Alignment, points::DeskewedPoints};
+use super::{Outcome, RefinementConfig, alignment::Alignment, points::DeskewedPoints};
 
 /// The covariance of the motion from `previous` to an alignment, from the information matrix; `None` if the points do not
 /// determine the pose.
@@ -32,6 +32,21 @@ pub(super) fn of_alignment(
         .then_some(covariance)
 }
 
+/// The share of a motion's covariance by which the map drifts.
+///
+/// The scan becomes one of the map's k keyframes with the noise of its registration, and the map's mean follows. A mean of k values that
+/// keeps up with itself in this way is a random walk, whose steps are 2 / (k + 1) of the noise. What a vehicle has passed drops out of
+/// the mean earlier, and neighbouring scans err alike: hence the factor.
+pub(super) fn drift_share(outcome: Outcome, keyframes: usize, config: &RefinementConfig) -> f64 {
+    match outcome {
+        Outcome::Predicted => 1.0,
+        Outcome::Refined | Outcome::Weak => {
+            let step = config.drift_scale * 2.0 / (keyframes as f64 + 1.0);
+            step.powi(2).min(1.0)
+        }
+    }
+}
+
 /// The covariance of a motion predicted at constant velocity, whose acceleration is within the limits.
 pub(super) fn of_prediction(interval_s: f64, config: &RefinementConfig) -> Matrix3<f64> {
     let variance =
@@ -42,4 +57,40 @@ pub(super) fn of_prediction(interval_s: f64, config: &RefinementConfig) -> Matri
         config.yaw_acceleration_degps2.to_radians(),
     );
     Matrix3::from_diagonal(&Vector3::new(shift, shift, turn))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_of_one_keyframe_drifts_by_the_whole_noise_and_one_of_many_by_little_of_it() {
+        let config = RefinementConfig {
+            drift_scale: 1.0,
+            ..RefinementConfig::default()
+        };
+        let share = |keyframes| drift_share(Outcome::Refined, keyframes, &config);
+        assert_eq!(share(1), 1.0);
+        assert_eq!(share(3), 0.25);
+        assert!((share(10) - 4.0 / 121.0).abs() < 1e-12);
+        assert_eq!(drift_share(Outcome::Predicted, 10, &config), 1.0);
+    }
+
+    /// Poses that are each the mean of the last ten, with noise of their own: what is left of the noise after a long time.
+    #[test]
+    fn a_mean_that_keeps_up_with_itself_drifts_by_two_over_k_plus_one_of_the_noise() {
+        const KEYFRAMES: usize = 10;
+        let mut poses = vec![0.0; KEYFRAMES];
+        // The noise of one pose alone. The walk is linear: this is what each one contributes in the end.
+        poses.push(1.0);
+        for _ in 0..1000 {
+            let last = &poses[poses.len() - KEYFRAMES..];
+            poses.push(last.iter().sum::<f64>() / KEYFRAMES as f64);
+        }
+        let left = poses.last().copied().unwrap_or_default();
+        assert!(
+            (left - 2.0 / (KEYFRAMES as f64 + 1.0)).abs() < 1e-9,
+            "{left}"
+        );
+    }
 }

@@ -1,0 +1,217 @@
+//! Composition of motions whose errors are only in part independent.
+//!
+//! An odometry that registers each scan with a map of the last ones has a pose error of two parts: the noise of the scan's own
+//! registration, which the next motion takes back, and the drift of the map, which stays. All motions share the error of the scale.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::{Pose, UncertainMotion, xy_yaw};
+
+/// A motion of an odometry.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OdometryMotion {
+    /// The pose of the later frame in the earlier one.
+    pub motion: Pose,
+    /// The covariance of (x, y, yaw) along the axes of the earlier frame.
+    pub covariance: Matrix3<f64>,
+    /// Share of the covariance that is drift, 0 to 1. The rest is noise of the two poses, one half each. With 1 the errors of
+    /// motions are independent.
+    pub drift_share: f64,
+    /// Standard deviation of the scale, a factor that all motions of the drive share.
+    pub scale_sigma: f64,
+}
+
+impl Default for OdometryMotion {
+    /// No motion, without any error.
+    fn default() -> Self {
+        Self {
+            drift_share: 0.0,
+            ..Self::independent(UncertainMotion::identity())
+        }
+    }
+}
+
+impl OdometryMotion {
+    /// A motion whose error is independent of all others.
+    pub fn independent(alone: UncertainMotion) -> Self {
+        Self {
+            motion: alone.motion,
+            covariance: alone.covariance,
+            drift_share: 1.0,
+            scale_sigma: 0.0,
+        }
+    }
+
+    /// Returns the motion by itself.
+    pub fn alone(&self) -> UncertainMotion {
+        UncertainMotion {
+            motion: self.motion,
+            covariance: self.covariance,
+        }
+    }
+
+    /// Rebuilds the motion as [`UncertainMotion::normalized`] does.
+    #[must_use]
+    pub fn normalized(&self) -> Self {
+        let alone = self.alone().normalized();
+        Self {
+            motion: alone.motion,
+            covariance: alone.covariance,
+            ..*self
+        }
+    }
+
+    fn drift(&self) -> UncertainMotion {
+        UncertainMotion {
+            motion: self.motion,
+            covariance: self.covariance * self.drift_share,
+        }
+    }
+
+    /// The noise of one of its poses.
+    fn noise(&self) -> Matrix3<f64> {
+        self.covariance * (0.5 * (1.0 - self.drift_share))
+    }
+}
+
+/// Motions composed one after the other, with the covariance of the pose that they lead to.
+///
+/// With the drift D_k of each motion, the noise N_0 and N_n of the first and the last pose, the Jacobians J_k of Checchin et al.,
+/// Eqs. 1 and 2, the displacement d = (x, y, 0) and the standard deviation of the scale, the covariance is
+///
+/// ```text
+/// N_0 + sum of J_k D_k J_k' + N_n + scale_sigma^2 d d'
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stretch {
+    /// The composed motion, with the part of its covariance that a longer stretch has too: N_0 and the drift.
+    lasting: UncertainMotion,
+    /// N_n and the term of the scale.
+    passing: Matrix3<f64>,
+}
+
+impl Stretch {
+    /// Starts at an exact pose.
+    pub fn new() -> Self {
+        Self::resume(UncertainMotion::identity())
+    }
+
+    /// Starts with the first of some motions. Where it begins has half of its noise.
+    pub fn of(first: &OdometryMotion) -> Self {
+        let mut stretch = Self::new().then(first);
+        stretch.lasting.covariance += first.noise();
+        stretch
+    }
+
+    /// Continues after a stretch, given its [`lasting`](Self::lasting) part.
+    pub fn resume(lasting: UncertainMotion) -> Self {
+        Self {
+            lasting,
+            passing: Matrix3::zeros(),
+        }
+    }
+
+    /// Continues with the next motion.
+    #[must_use]
+    pub fn then(&self, next: &OdometryMotion) -> Self {
+        let lasting = self.lasting.then(&next.drift()).normalized();
+        let turn = self.lasting.motion.rotation.to_rotation_matrix();
+        let turn = turn.to_homogeneous();
+        let [x_m, y_m, _] = xy_yaw(&lasting.motion);
+        let by_scale = Vector3::new(x_m, y_m, 0.0) * next.scale_sigma;
+        Self {
+            lasting,
+            passing: turn * next.noise() * turn.transpose() + by_scale * by_scale.transpose(),
+        }
+    }
+
+    /// Returns the composed motion with its covariance.
+    pub fn motion(&self) -> UncertainMotion {
+        let mut motion = self.lasting;
+        motion.covariance += self.passing;
+        motion.normalized()
+    }
+
+    /// Returns the composed motion with the part of its covariance that a longer stretch has too.
+    pub fn lasting(&self) -> UncertainMotion {
+        self.lasting
+    }
+}
+
+impl Default for Stretch {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pose;
+
+    fn step(drift_share: f64, scale_sigma: f64) -> OdometryMotion {
+        OdometryMotion {
+            motion: pose(2.0, 0.1, 0.05),
+            covariance: Matrix3::from_diagonal(&Vector3::new(4e-4, 1e-4, 1e-6)),
+            drift_share,
+            scale_sigma,
+        }
+    }
+
+    fn composed(step: &OdometryMotion, count: usize) -> UncertainMotion {
+        (1..count)
+            .fold(Stretch::of(step), |stretch, _| stretch.then(step))
+            .motion()
+    }
+
+    #[test]
+    fn one_motion_has_its_own_covariance() {
+        for share in [0.0, 0.3, 1.0] {
+            let step = step(share, 0.0);
+            let apart = composed(&step, 1).covariance - step.covariance;
+            assert!(apart.norm() < 1e-18, "{share}: {apart}");
+        }
+    }
+
+    #[test]
+    fn motions_that_are_all_drift_are_composed_as_independent_ones() {
+        let step = step(1.0, 0.0);
+        let independent = (1..9).fold(step.alone(), |so_far, _| {
+            so_far.then(&step.alone()).normalized()
+        });
+        assert_eq!(composed(&step, 9), independent);
+    }
+
+    #[test]
+    fn the_noise_of_the_poses_between_cancels() {
+        let step = step(0.0, 0.0);
+        let end = composed(&step, 40);
+        // Half of the noise at the end, and half of that at the start with its lever: the motion itself is the same.
+        let turn = (0.05f64 * 39.0).sin_cos();
+        let xx = 2e-4 * turn.1.powi(2) + 5e-5 * turn.0.powi(2);
+        let lever_m = end.motion.translation.y - 0.1;
+        let expected = 2e-4 + 5e-7 * lever_m.powi(2) + xx;
+        assert!((end.covariance[(0, 0)] / expected - 1.0).abs() < 1e-9);
+        assert!((end.covariance[(2, 2)] / 1e-6 - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_error_of_the_scale_grows_with_the_displacement() {
+        let exact = OdometryMotion {
+            motion: pose(3.0, 0.0, 0.0),
+            covariance: Matrix3::zeros(),
+            ..step(0.5, 0.01)
+        };
+        let end = composed(&exact, 100).covariance;
+        assert!((end[(0, 0)].sqrt() - 3.0).abs() < 1e-9, "1 % of 300 m");
+        assert_eq!(end[(1, 1)], 0.0);
+    }
+
+    #[test]
+    fn a_stretch_goes_on_from_its_lasting_part() {
+        let step = step(0.2, 0.003);
+        let first = (0..5).fold(Stretch::new(), |stretch, _| stretch.then(&step));
+        let resumed = Stretch::resume(first.lasting());
+        assert_eq!(resumed.then(&step), first.then(&step));
+    }
+}
