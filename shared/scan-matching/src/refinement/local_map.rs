@@ -84,18 +84,29 @@ impl LocalMap {
 
     pub fn clear(&mut self) {
         self.spare.extend(self.used.drain(..));
+        self.sum_images();
     }
 
     /// Adds a keyframe in place of the oldest one, if the map is full.
     pub fn insert(&mut self, id: u64, points: &DeskewedPoints, pose: &Pose) {
-        let Some(mut keyframe) = self.spare.pop().or_else(|| self.used.pop_front()) else {
+        let oldest = self.spare.is_empty().then(|| self.used.pop_front());
+        if let Some(oldest) = oldest.flatten() {
+            self.fine.subtract(&oldest.fine);
+            self.coarse.subtract(&oldest.coarse);
+            self.spare.push(oldest);
+        }
+        let Some(mut keyframe) = self.spare.pop() else {
             return;
         };
         (keyframe.id, keyframe.pose) = (id, *pose);
         self.fine.draw(points, pose, &mut keyframe.fine);
         self.coarse.draw(points, pose, &mut keyframe.coarse);
+        let used = self.used.iter();
+        self.fine
+            .add_newest(&keyframe.fine, used.clone().map(|other| &other.fine));
+        self.coarse
+            .add_newest(&keyframe.coarse, used.map(|other| &other.coarse));
         self.used.push_back(keyframe);
-        self.sum_images();
     }
 
     /// Replaces the keyframes by those that `load` fills in, oldest first, until it returns `false` or the map is full.

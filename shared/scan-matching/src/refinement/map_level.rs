@@ -13,6 +13,10 @@ use super::points::DeskewedPoints;
 /// Weights of a Gaussian blur with a standard deviation of one cell, at distances of 0 to 3 cells.
 const BLUR: [f32; 4] = [0.399_050_3, 0.242_036_2, 0.054_005_58, 0.004_433_048];
 const BLUR_REACH: usize = 3;
+/// Cells along an axis over which a point is spread: it lies between two, each of which is blurred.
+const SPREAD: usize = 2 * BLUR_REACH + 2;
+/// Cells that are worked on together.
+const CHUNK: usize = 16;
 /// The value of a fully occupied cell.
 pub(super) const FULL: f32 = 255.0;
 
@@ -52,8 +56,10 @@ pub(super) struct MapLevel {
     /// Sum of the images.
     sum: Vec<u16>,
     images: usize,
+    /// A keyframe before it is saturated; zero between two of them. Whole chunks: a few cells more than n x n.
     drawing: Vec<f32>,
-    blurred: Vec<f32>,
+    /// Whether there is anything in a chunk of the drawing.
+    drawn: Vec<bool>,
 }
 
 /// A level as alignments read it.
@@ -72,15 +78,15 @@ pub(super) struct MapView<'a> {
 impl MapLevel {
     pub fn new(cell_m: f64, reach_m: f64) -> Self {
         let n = 2 * (reach_m / cell_m).ceil() as usize + 1;
-        let cells = || vec![0.0; n * n];
+        let chunks = (n * n).div_ceil(CHUNK);
         Self {
             cell_m,
             n,
             corner: [0; 2],
             sum: vec![0; n * n],
             images: 0,
-            drawing: cells(),
-            blurred: cells(),
+            drawing: vec![0.0; chunks * CHUNK],
+            drawn: vec![false; chunks],
         }
     }
 
@@ -92,7 +98,7 @@ impl MapLevel {
         }
     }
 
-    /// Draws a keyframe: splats, blurs, and saturates.
+    /// Draws a keyframe: spreads its points, and saturates.
     ///
     /// The saturation m / (m + mean) bounds the weight of a cell: without it bright clutter, and what moves with the
     /// vehicle, outweighs the many faint returns that determine the motion.
@@ -100,38 +106,18 @@ impl MapLevel {
         let half = (self.n / 2) as i64;
         image.corner = [pose.translation.x, pose.translation.y]
             .map(|v| (v / self.cell_m).floor() as i64 - half);
-        self.splat(points, pose, image.corner);
-        blur(&self.drawing, &mut self.blurred, 1);
-        blur(&self.blurred, &mut self.drawing, self.n);
-        let (sum, squares) = moments(&self.drawing);
-        let mean = if sum > 0.0 { squares / sum } else { 1.0 };
-        saturate(&self.drawing, mean as f32, &mut image.cells);
+        let place = Place {
+            pose: *pose,
+            corner: image.corner,
+            per_m: 1.0 / self.cell_m,
+            n: self.n,
+        };
+        spread(points, &place, &mut self.drawing, &mut self.drawn);
+        let mean = mean(&self.drawing, &self.drawn);
+        saturate(&mut self.drawing, &mut self.drawn, mean, &mut image.cells);
     }
 
-    fn splat(&mut self, points: &DeskewedPoints, pose: &Pose, corner: [i64; 2]) {
-        self.drawing.fill(0.0);
-        let (n, per_m) = (self.n, 1.0 / self.cell_m);
-        let inside = BLUR_REACH as f64..(n - BLUR_REACH - 2) as f64;
-        for ((&x, &y), &weight) in points.x_m.iter().zip(&points.y_m).zip(&points.weight) {
-            let at = pose * Point2::new(f64::from(x), f64::from(y));
-            let (u, v) = (
-                at.x * per_m - corner[0] as f64,
-                at.y * per_m - corner[1] as f64,
-            );
-            if !(inside.contains(&u) && inside.contains(&v)) {
-                continue;
-            }
-            let (i, j) = (u as usize, v as usize);
-            let (across, along) = ((u - i as f64) as f32, (v - j as f64) as f32);
-            let first = i * n + j;
-            self.drawing[first] += weight * (1.0 - across) * (1.0 - along);
-            self.drawing[first + 1] += weight * (1.0 - across) * along;
-            self.drawing[first + n] += weight * across * (1.0 - along);
-            self.drawing[first + n + 1] += weight * across * along;
-        }
-    }
-
-    /// Sums these images on the square of the last one. The sums are of integers, so exact in any order.
+    /// Sums these images, oldest first, on the square of the last one. The sums are of integers, so exact in any order.
     pub fn sum_images<'a>(&mut self, images: impl Iterator<Item = &'a Image> + Clone) {
         self.sum.fill(0);
         self.images = 0;
@@ -141,21 +127,93 @@ impl MapLevel {
         self.corner = newest.corner;
         for image in images {
             self.images += 1;
-            let [down, right] = [
-                image.corner[0] - self.corner[0],
-                image.corner[1] - self.corner[1],
-            ];
-            let n = self.n as i64;
-            let (first_col, last_col) = (right.max(0), (right + n).min(n));
-            if first_col >= last_col {
-                continue;
+            self.combine(image, [[0, 0], [self.n, self.n]], add);
+        }
+    }
+
+    /// Takes an image that is no longer in the map out of the sum.
+    pub fn subtract(&mut self, image: &Image) {
+        self.images -= 1;
+        self.combine(image, [[0, 0], [self.n, self.n]], subtract);
+    }
+
+    /// Moves the sum to the square of a new image, and adds it. `others` are all images that the sum has already: what the square
+    /// comes upon has to be summed anew.
+    pub fn add_newest<'a>(
+        &mut self,
+        newest: &Image,
+        others: impl Iterator<Item = &'a Image> + Clone,
+    ) {
+        let [down, right] = [0, 1].map(|axis| newest.corner[axis] - self.corner[axis]);
+        self.corner = newest.corner;
+        for part in self.move_sum(down, right) {
+            for other in others.clone() {
+                self.combine(other, part, add);
             }
-            for row in down.max(0)..(down + n).min(n) {
-                let to = (row * n + first_col) as usize..(row * n + last_col) as usize;
-                let from = ((row - down) * n + first_col - right) as usize;
-                let from = &image.cells[from..from + to.len()];
-                add(from, &mut self.sum[to]);
+        }
+        self.images += 1;
+        self.combine(newest, [[0, 0], [self.n, self.n]], add);
+    }
+
+    /// Moves the square of the sum by so many cells, and empties what it comes upon: the rows and the columns that are returned, each as
+    /// the first cell and the one behind the last, (x, y).
+    fn move_sum(&mut self, down: i64, right: i64) -> [[[usize; 2]; 2]; 2] {
+        let n = self.n;
+        let (rows, columns) = (exposed(down, n), exposed(right, n));
+        let kept = n - (columns.end - columns.start);
+        let (to, from) = if right >= 0 {
+            (0, n - kept)
+        } else {
+            (n - kept, 0)
+        };
+        let mut move_row = |row: usize| {
+            let source = (row as i64 + down) as usize * n + from;
+            self.sum.copy_within(source..source + kept, row * n + to);
+        };
+        // Each row is moved before another takes its place.
+        if down >= 0 {
+            (0..rows.start).for_each(&mut move_row);
+        } else {
+            (rows.end..n).rev().for_each(&mut move_row);
+        }
+        let parts = [
+            [[rows.start, 0], [rows.end, n]],
+            // The rows above have these columns already.
+            if down >= 0 {
+                [[0, columns.start], [rows.start, columns.end]]
+            } else {
+                [[rows.end, columns.start], [n, columns.end]]
+            },
+        ];
+        for [first, end] in parts {
+            for row in first[0]..end[0] {
+                self.sum[row * n + first[1]..row * n + end[1]].fill(0);
             }
+        }
+        parts
+    }
+
+    /// Combines a part of the sum, from its first cell (x, y) to the one behind its last, with an image.
+    fn combine(
+        &mut self,
+        image: &Image,
+        [first, end]: [[usize; 2]; 2],
+        with: impl Fn(&[u8], &mut [u16]),
+    ) {
+        let n = self.n as i64;
+        let off = [0, 1].map(|axis| image.corner[axis] - self.corner[axis]);
+        let [rows, columns] = [0, 1].map(|axis| {
+            let (first, end) = (first[axis] as i64, end[axis] as i64);
+            first.max(off[axis])..end.min(off[axis] + n)
+        });
+        if columns.is_empty() {
+            return;
+        }
+        for row in rows {
+            let to = (row * n + columns.start) as usize..(row * n + columns.end) as usize;
+            let from = ((row - off[0]) * n + columns.start - off[1]) as usize;
+            let from = &image.cells[from..from + to.len()];
+            with(from, &mut self.sum[to]);
         }
     }
 
@@ -170,55 +228,102 @@ impl MapLevel {
     }
 }
 
-/// One pass of the blur along an axis. Cells within the blur's reach of the array's ends stay zero; the caller draws
-/// nothing there.
+/// Returns the cells that a range of n cells comes upon when it moves by `by` cells.
+fn exposed(by: i64, n: usize) -> std::ops::Range<usize> {
+    let count = by.unsigned_abs().min(n as u64) as usize;
+    if by >= 0 { n - count..n } else { 0..count }
+}
+
+/// Where points are drawn.
+struct Place {
+    /// Of the scan, in map coordinates.
+    pose: Pose,
+    /// The map's cell (x, y) that the drawing begins with.
+    corner: [i64; 2],
+    /// Cells a metre.
+    per_m: f64,
+    /// Cells a side.
+    n: usize,
+}
+
+/// Shares each point between the four cells around it, and blurs them.
 #[simd]
-fn blur(from: &[f32], to: &mut [f32], stride: usize) {
-    let margin = BLUR_REACH * stride;
-    let count = from.len() - 2 * margin;
-    let at = |steps: usize| &from[steps * stride..][..count];
-    let (a, b, c, d, e, f, g) = (at(0), at(1), at(2), at(3), at(4), at(5), at(6));
-    let inner = &mut to[margin..][..count];
-    for k in 0..count {
-        inner[k] = BLUR[0] * d[k]
-            + BLUR[1] * (c[k] + e[k])
-            + BLUR[2] * (b[k] + f[k])
-            + BLUR[3] * (a[k] + g[k]);
+fn spread(points: &DeskewedPoints, place: &Place, drawing: &mut [f32], drawn: &mut [bool]) {
+    let &Place {
+        pose,
+        corner,
+        per_m,
+        n,
+    } = place;
+    let inside = BLUR_REACH as f64..(n - BLUR_REACH - 2) as f64;
+    for ((&x, &y), &weight) in points.x_m.iter().zip(&points.y_m).zip(&points.weight) {
+        let at = pose * Point2::new(f64::from(x), f64::from(y));
+        let (u, v) = (
+            at.x * per_m - corner[0] as f64,
+            at.y * per_m - corner[1] as f64,
+        );
+        if !(inside.contains(&u) && inside.contains(&v)) {
+            continue;
+        }
+        let (i, j) = (u as usize, v as usize);
+        let across = shares((u - i as f64) as f32).map(|share| weight * share);
+        let along = shares((v - j as f64) as f32);
+        let first = (i - BLUR_REACH) * n + j - BLUR_REACH;
+        for (first, across) in (first..).step_by(n).zip(across) {
+            drawn[first / CHUNK] = true;
+            drawn[(first + SPREAD - 1) / CHUNK] = true;
+            if let Some(cells) = drawing[first..].first_chunk_mut::<SPREAD>() {
+                for (cell, along) in cells.iter_mut().zip(along) {
+                    *cell += across * along;
+                }
+            }
+        }
     }
 }
 
-/// Sum and sum of squares, in lanes.
+/// Returns the shares of the cells along an axis of a point that lies by this share of a cell behind the middle one of the first seven.
+#[inline(always)]
+fn shares(behind: f32) -> [f32; SPREAD] {
+    const NEAR: [f32; SPREAD] = [
+        BLUR[3], BLUR[2], BLUR[1], BLUR[0], BLUR[1], BLUR[2], BLUR[3], 0.0,
+    ];
+    const BEHIND: [f32; SPREAD] = [
+        0.0, BLUR[3], BLUR[2], BLUR[1], BLUR[0], BLUR[1], BLUR[2], BLUR[3],
+    ];
+    std::array::from_fn(|cell| (1.0 - behind) * NEAR[cell] + behind * BEHIND[cell])
+}
+
+/// Returns the mean of the values that are drawn, weighted by themselves; 1 if there are none.
 #[simd]
-fn moments(values: &[f32]) -> (f64, f64) {
-    let (chunks, rest) = values.as_chunks::<16>();
-    let (mut sums, mut squares) = ([0.0_f32; 16], [0.0_f32; 16]);
-    for chunk in chunks {
-        for lane in 0..16 {
-            sums[lane] += chunk[lane];
+fn mean(drawing: &[f32], drawn: &[bool]) -> f32 {
+    let (mut sum, mut squares) = ([0.0_f32; CHUNK], [0.0_f32; CHUNK]);
+    let (chunks, _) = drawing.as_chunks::<CHUNK>();
+    for (chunk, _) in chunks.iter().zip(drawn).filter(|(_, drawn)| **drawn) {
+        for lane in 0..CHUNK {
+            sum[lane] += chunk[lane];
             squares[lane] += chunk[lane] * chunk[lane];
         }
     }
-    let total = |lanes: [f32; 16], rest: f32| {
-        lanes.iter().map(|v| f64::from(*v)).sum::<f64>() + f64::from(rest)
-    };
-    (
-        total(sums, rest.iter().sum()),
-        total(squares, rest.iter().map(|v| v * v).sum()),
-    )
+    let [sum, squares] = [sum, squares].map(|lanes| lanes.map(f64::from).iter().sum::<f64>());
+    if sum > 0.0 {
+        (squares / sum) as f32
+    } else {
+        1.0
+    }
 }
 
-/// Saturates the cells. Most are empty, so they are skipped sixteen at a time.
+/// Saturates the cells that are drawn, and clears the drawing.
 #[simd]
-fn saturate(values: &[f32], mean: f32, cells: &mut [u8]) {
-    for (cells, values) in cells.chunks_mut(16).zip(values.chunks(16)) {
-        if values.iter().all(|value| *value == 0.0) {
-            cells.fill(0);
-            continue;
-        }
-        for (cell, value) in cells.iter_mut().zip(values) {
+fn saturate(drawing: &mut [f32], drawn: &mut [bool], mean: f32, cells: &mut [u8]) {
+    cells.fill(0);
+    let chunks = drawing.chunks_mut(CHUNK).zip(cells.chunks_mut(CHUNK));
+    for ((values, cells), drawn) in chunks.zip(drawn).filter(|(_, drawn)| **drawn) {
+        for (cell, value) in cells.iter_mut().zip(values.iter()) {
             // By way of i32: the direct conversion is not vectorised.
             *cell = (FULL * value / (value + mean) + 0.5) as i32 as u8;
         }
+        values.fill(0.0);
+        *drawn = false;
     }
 }
 
@@ -228,6 +333,14 @@ fn add(cells: &[u8], sum: &mut [u16]) {
     sum.iter_mut()
         .zip(cells)
         .for_each(|(sum, cell)| *sum += u16::from(*cell));
+}
+
+/// Takes out of the sum an image that is in it.
+#[simd]
+fn subtract(cells: &[u8], sum: &mut [u16]) {
+    sum.iter_mut()
+        .zip(cells)
+        .for_each(|(sum, cell)| *sum -= u16::from(*cell));
 }
 
 #[cfg(test)]
@@ -280,17 +393,81 @@ mod tests {
         );
     }
 
+    proptest::proptest! {
+        /// Whatever way the vehicle takes, back over what has left the square too.
+        #[test]
+        fn a_sum_that_is_kept_up_is_the_sum_of_all_images(
+            steps in proptest::collection::vec((-30.0..30.0, -30.0..30.0), 1..12),
+        ) {
+            let mut kept = MapLevel::new(1.0, 10.0);
+            let mut anew = MapLevel::new(1.0, 10.0);
+            let mut images: Vec<Image> = Vec::new();
+            let near: Vec<[f32; 2]> = (0..60).map(|k| [(k * 7 % 13 - 6) as f32, (k * 5 % 11 - 5) as f32]).collect();
+            let mut at = [0.0, 0.0];
+            for (dx, dy) in steps {
+                at = [at[0] + dx / 4.0, at[1] + dy / 4.0];
+                let mut image = kept.new_image();
+                kept.draw(&points(&near), &pose(at[0], at[1], 0.3), &mut image);
+                if images.len() == 4 {
+                    kept.subtract(&images.remove(0));
+                }
+                kept.add_newest(&image, images.iter());
+                images.push(image);
+                anew.sum_images(images.iter());
+                proptest::prop_assert_eq!(kept.view().sum, anew.view().sum);
+                proptest::prop_assert_eq!(kept.view().full, anew.view().full);
+            }
+        }
+    }
+
+    /// The definition: the points are shared between the cells around them, and these are blurred one by one.
+    fn drawn_directly(places: &[[f32; 2]], level: &MapLevel, corner: [i64; 2]) -> Vec<f64> {
+        let n = level.n;
+        let blur = |steps: usize| f64::from(BLUR.get(steps).copied().unwrap_or(0.0));
+        let mut cells = vec![0.0; n * n];
+        for place in places {
+            let at = [0, 1].map(|axis| f64::from(place[axis]) / level.cell_m - corner[axis] as f64);
+            for (index, cell) in cells.iter_mut().enumerate() {
+                let there = [index / n, index % n];
+                let share = |axis: usize| {
+                    (0..n)
+                        .map(|near| {
+                            let bilinear = (1.0 - (near as f64 - at[axis]).abs()).max(0.0);
+                            bilinear * blur(near.abs_diff(there[axis]))
+                        })
+                        .sum::<f64>()
+                };
+                *cell += share(0) * share(1);
+            }
+        }
+        cells
+    }
+
     #[test]
-    fn a_blur_keeps_the_sum() {
-        let mut level = MapLevel::new(1.0, 20.0);
+    fn a_drawing_is_the_saturated_blur_of_its_points() {
+        let mut level = MapLevel::new(0.5, 8.0);
         let mut image = level.new_image();
-        level.draw(
-            &points(&[[0.3, 0.4], [7.7, -8.2]]),
-            &Pose::identity(),
-            &mut image,
-        );
-        let (sum, _) = moments(&level.drawing);
-        assert!((sum - 2.0).abs() < 1e-5, "{sum}");
+        let places = [
+            [0.3, 0.4],
+            [1.1, 0.45],
+            [-3.77, 2.2],
+            [0.3, 0.41],
+            [5.0, -5.0],
+        ];
+        // Twice: nothing of the first drawing is left.
+        level.draw(&points(&[[2.0, 2.0]]), &Pose::identity(), &mut image);
+        level.draw(&points(&places), &Pose::identity(), &mut image);
+        let direct = drawn_directly(&places, &level, image.corner);
+        let squares: f64 = direct.iter().map(|value| value * value).sum();
+        let mean = squares / direct.iter().sum::<f64>();
+        for (cell, value) in image.cells.iter().zip(&direct) {
+            let expected = 255.0 * value / (value + mean);
+            assert!(
+                (f64::from(*cell) - expected).abs() < 0.51,
+                "{cell}, {expected}"
+            );
+        }
+        assert!(image.cells.iter().any(|cell| *cell > 100));
     }
 
     #[test]
