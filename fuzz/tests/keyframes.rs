@@ -32,6 +32,7 @@ fn keyframe(seq: usize) -> Keyframe {
         stamp_ns: 0,
         pose: UncertainMotion::identity(),
         motion: UncertainMotion::identity(),
+        noise: UncertainMotion::identity().covariance,
         twist: Twist::default(),
         path_m: 0.0,
         points: vec![SparsePoint::default(); 4],

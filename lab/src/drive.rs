@@ -95,8 +95,9 @@ impl Drive {
         }
         let (mut reckoned, mut since) = (Stretch::new(), UncertainMotion::identity());
         for (k, pose) in self.estimate.poses.iter().enumerate() {
-            if let Some(motion) = k.checked_sub(1).map(|last| motions[last].estimate) {
-                (reckoned, since) = (reckoned.then(&motion), since.then(&motion.alone()));
+            let motion = k.checked_sub(1).map(|last| motions[last].estimate);
+            if let Some(motion) = motion {
+                (reckoned, since) = (reckoned.then(&motion), since.then(&motion.drift()));
             }
             let Some(path_m) = selector.next(pose) else {
                 continue;
@@ -110,7 +111,6 @@ impl Drive {
             }
             let twist = twist(&self.estimate, &stamps, k);
             let count = masker.points(&scan.view(), Some(twist), &mut points)?;
-            let motion = std::mem::replace(&mut since, UncertainMotion::identity());
             self.keyframes.push(Keyframe {
                 seq: k as u64,
                 scan: k as u64,
@@ -119,7 +119,8 @@ impl Drive {
                     motion: *pose,
                     covariance: reckoned.motion().covariance,
                 },
-                motion,
+                motion: std::mem::replace(&mut since, UncertainMotion::identity()),
+                noise: motion.unwrap_or_default().noise_of_pose(),
                 twist,
                 path_m,
                 points: points[..count].to_vec(),

@@ -184,6 +184,7 @@ mod tests {
                 ..UncertainMotion::identity()
             },
             motion: UncertainMotion::identity(),
+            noise: nalgebra::Matrix3::zeros(),
             twist: Twist::default(),
             path_m: 0.0,
             points: vec![SparsePoint::from([20.0, 5.0, 0.0, 1.0, 0.0])],

@@ -185,7 +185,7 @@ fn scan_pose(pose: &PoseHeader) -> ScanPose {
         scan: pose.item.scan,
         stamp_ns: pose.item.stamp_ns,
         pose: pose.pose(),
-        motion: pose.motion.motion().alone(),
+        motion: pose.motion.motion(),
         interval_s: pose.motion.interval_ns as f64 * 1e-9,
     }
 }

@@ -24,6 +24,7 @@ fn keyframe(index: usize) -> Keyframe {
         stamp_ns: 7 * index as i64,
         pose: uncertain(x_m, y_m, yaw_rad),
         motion,
+        noise: Matrix3::zeros(),
         twist: Twist::default(),
         path_m: 3.0 * index as f64,
         points: Vec::new(),

@@ -2,7 +2,7 @@
 
 use std::convert::Infallible;
 
-use gyre_geometry::{Pose, SparsePoint, UncertainMotion};
+use gyre_geometry::{OdometryMotion, Pose, SparsePoint, UncertainMotion};
 use gyre_scan_matching::ConfigError;
 use gyre_slam::{Keyframe, KeyframeBuilder, KeyframeSource, LoopCloser, LoopOptions, ScanPose};
 
@@ -77,7 +77,7 @@ fn keyframes(
             scan: scan as u64,
             stamp_ns: sweep.stamp_ns,
             pose,
-            motion,
+            motion: OdometryMotion::independent(motion),
             interval_s: sweep.interval_s,
         });
         if let Some(mut keyframe) = made {

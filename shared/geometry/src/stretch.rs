@@ -61,11 +61,19 @@ impl OdometryMotion {
         }
     }
 
-    fn drift(&self) -> UncertainMotion {
+    /// Returns the motion with the covariance of its drift.
+    pub fn drift(&self) -> UncertainMotion {
         UncertainMotion {
             motion: self.motion,
             covariance: self.covariance * self.drift_share,
         }
+    }
+
+    /// Returns the noise of the later pose, along the axes of that pose.
+    pub fn noise_of_pose(&self) -> Matrix3<f64> {
+        let turn = self.motion.rotation.inverse().to_rotation_matrix();
+        let turn = turn.to_homogeneous();
+        turn * self.noise() * turn.transpose()
     }
 
     /// The noise of one of its poses.

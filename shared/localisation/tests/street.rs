@@ -61,6 +61,7 @@ fn map(street: &[(Point2<f64>, f32)]) -> Map {
         stamp_ns: k as i64 * PERIOD_NS,
         pose: uncertain(*at),
         motion: uncertain(pose(2.0, 0.0, 0.0)),
+        noise: Matrix3::zeros(),
         twist: Twist::default(),
         path_m: 2.0 * k as f64,
         points: seen(street, at),

@@ -177,6 +177,7 @@ fn keyframe(index: usize, pose: UncertainMotion, motion: UncertainMotion) -> Key
         stamp_ns: index as i64 * 1_000_000_000,
         pose,
         motion,
+        noise: Matrix3::zeros(),
         twist: Twist::default(),
         path_m: 2.0 * index as f64,
         points: vec![SparsePoint::default(); POINTS],

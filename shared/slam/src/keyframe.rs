@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{SparsePoint, Twist, UncertainMotion, covariance, pose, xy_yaw};
 use gyre_storage::{LogError, LogMagic};
+use nalgebra::Matrix3;
 
 use crate::{Record, RecordReader};
 
@@ -17,8 +18,12 @@ pub struct Keyframe {
     pub stamp_ns: i64,
     /// The pose by odometry, in the frame of the first scan, with the covariance of (x, y, yaw) in that frame.
     pub pose: UncertainMotion,
-    /// The motion by odometry from the keyframe before, with its covariance along that keyframe's axes; zero at the first one.
+    /// The motion by odometry from the keyframe before, with the covariance of its drift along that keyframe's axes; zero at the first
+    /// one.
     pub motion: UncertainMotion,
+    /// Covariance of the noise of the pose, along its own axes. Submaps are drawn at poses with this noise, and motions lead from one to
+    /// the next: it is no error of either, but of the pose alone. See [`OdometryMotion`](gyre_geometry::OdometryMotion).
+    pub noise: Matrix3<f64>,
     /// Velocity of the sensor.
     pub twist: Twist,
     /// Length of the path through all keyframes up to this one, m.
@@ -39,6 +44,7 @@ struct Fixed {
     pose_covariance: covariance::Packed,
     motion: [f64; 3],
     motion_covariance: covariance::Packed,
+    noise: covariance::Packed,
     /// x, y (m/s) and yaw (rad/s).
     twist: [f64; 3],
 }
@@ -53,7 +59,7 @@ impl Keyframe {
 /// Little-endian: the fields in their order, then the points.
 impl Record for Keyframe {
     const FILE: &'static str = "keyframes.log";
-    const MAGIC: LogMagic = *b"gyre keyframe 1\n";
+    const MAGIC: LogMagic = *b"gyre keyframe 2\n";
 
     fn encode(&self, bytes: &mut Vec<u8>) {
         let fixed = Fixed {
@@ -65,6 +71,7 @@ impl Record for Keyframe {
             pose_covariance: covariance::pack(&self.pose.covariance),
             motion: xy_yaw(&self.motion.motion),
             motion_covariance: covariance::pack(&self.motion.covariance),
+            noise: covariance::pack(&self.noise),
             twist: [
                 self.twist.vx_mps,
                 self.twist.vy_mps,
@@ -92,6 +99,7 @@ impl Record for Keyframe {
             stamp_ns: fixed.stamp_ns,
             pose: uncertain(fixed.pose, &fixed.pose_covariance),
             motion: uncertain(fixed.motion, &fixed.motion_covariance),
+            noise: covariance::unpack(&fixed.noise),
             twist: Twist {
                 vx_mps: fixed.twist[0],
                 vy_mps: fixed.twist[1],
@@ -126,7 +134,7 @@ mod tests {
     fn uncertain() -> UncertainMotion {
         UncertainMotion {
             motion: pose(3.0, -4.0, 0.5),
-            covariance: nalgebra::Matrix3::new(4.0, 0.1, 0.2, 0.1, 5.0, 0.3, 0.2, 0.3, 6.0),
+            covariance: Matrix3::new(4.0, 0.1, 0.2, 0.1, 5.0, 0.3, 0.2, 0.3, 6.0),
         }
     }
 
@@ -137,6 +145,7 @@ mod tests {
             stamp_ns: -5,
             pose: uncertain(),
             motion: uncertain(),
+            noise: uncertain().covariance,
             twist: Twist {
                 vx_mps: 10.0,
                 vy_mps: 0.1,
@@ -178,6 +187,7 @@ mod tests {
         );
         assert_eq!(decoded.points, keyframe.points);
         assert_eq!(decoded.motion.covariance, keyframe.motion.covariance);
+        assert_eq!(decoded.noise, keyframe.noise);
         let mut again = Vec::new();
         decoded.encode(&mut again);
         assert_eq!(Keyframe::decode(&again).unwrap().twist, keyframe.twist);

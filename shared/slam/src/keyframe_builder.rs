@@ -3,7 +3,7 @@
 use std::mem;
 
 use gyre_estimation::places::{KeyframeSelector, PlaceOptions};
-use gyre_geometry::{Twist, UncertainMotion};
+use gyre_geometry::{OdometryMotion, Twist, UncertainMotion};
 
 use crate::Keyframe;
 
@@ -19,7 +19,7 @@ pub struct ScanPose {
     /// The pose, in the frame of the first scan.
     pub pose: UncertainMotion,
     /// The motion from the scan before; zero where the chain of motions starts.
-    pub motion: UncertainMotion,
+    pub motion: OdometryMotion,
     /// Time since the scan before, s; zero where the chain of motions starts.
     pub interval_s: f64,
 }
@@ -38,7 +38,7 @@ impl ScanPose {
 #[derive(Debug, Clone)]
 pub struct KeyframeBuilder {
     selector: KeyframeSelector,
-    /// The motion since the last keyframe.
+    /// The motion since the last keyframe, with the covariance of its drift.
     motion: UncertainMotion,
 }
 
@@ -59,7 +59,7 @@ impl KeyframeBuilder {
 
     /// Takes the next scan. Returns it if it becomes a keyframe, with no points yet.
     pub fn next(&mut self, scan: &ScanPose) -> Option<Keyframe> {
-        self.motion = self.motion.then(&scan.motion);
+        self.motion = self.motion.then(&scan.motion.drift());
         let path_m = self.selector.next(&scan.pose.motion)?;
         let motion = mem::replace(&mut self.motion, UncertainMotion::identity());
         Some(Keyframe {
@@ -68,6 +68,7 @@ impl KeyframeBuilder {
             stamp_ns: scan.stamp_ns,
             pose: scan.pose,
             motion,
+            noise: scan.motion.noise_of_pose(),
             twist: scan.twist(),
             path_m,
             points: Vec::new(),
@@ -88,14 +89,15 @@ mod tests {
             motion: pose(1.5, 0.1, 0.05),
             covariance: nalgebra::Matrix3::from_diagonal_element(0.01),
         };
+        let step = OdometryMotion::independent(step);
         let mut at = UncertainMotion::identity();
         let scan = |seq| {
             let motion = if seq == 0 {
-                UncertainMotion::identity()
+                OdometryMotion::default()
             } else {
                 step
             };
-            at = at.then(&motion).normalized();
+            at = at.then(&motion.alone()).normalized();
             ScanPose {
                 seq,
                 scan: seq,

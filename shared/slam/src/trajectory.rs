@@ -5,6 +5,7 @@ use gyre_estimation::{
     TrajectoryFilter, Verdict,
 };
 use gyre_geometry::{Pose, UncertainMotion};
+use nalgebra::Matrix3;
 
 use crate::consistency::{DeadReckoning, Speakers};
 use crate::{Correction, JudgedLoop, Keyframe, LoopVerdict, Query, variance};
@@ -65,6 +66,7 @@ pub(crate) struct Corrected {
     pub seq: u64,
     pub odometry: Pose,
     motion: UncertainMotion,
+    noise: Matrix3<f64>,
     path_m: f64,
 }
 
@@ -139,6 +141,7 @@ impl TrajectoryEstimator {
             seq: keyframe.seq,
             odometry: keyframe.pose.motion,
             motion: keyframe.motion,
+            noise: keyframe.noise,
             path_m: keyframe.path_m,
         });
         Ok(())
@@ -211,6 +214,8 @@ impl TrajectoryEstimator {
             Estimator::Filter(filter) => filter.pose(keyframe)?,
         };
         pose.covariance *= self.scale;
+        let turn = pose.motion.rotation.to_rotation_matrix().to_homogeneous();
+        pose.covariance += turn * self.keyframes[keyframe].noise * turn.transpose();
         Ok(pose)
     }
 

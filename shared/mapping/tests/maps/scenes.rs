@@ -27,6 +27,7 @@ pub fn keyframe(seq: u64, pose: &Pose, places: &[Point2<f64>]) -> Keyframe {
             ..UncertainMotion::identity()
         },
         motion: UncertainMotion::identity(),
+        noise: nalgebra::Matrix3::zeros(),
         twist: Twist::default(),
         path_m: 0.0,
         points: points.collect(),

@@ -63,6 +63,7 @@ impl Drive {
                 stamp_ns: k as i64 * 1_000_000_000,
                 pose: reckoned,
                 motion: motion.normalized(),
+                noise: Matrix3::zeros(),
                 twist: Twist::default(),
                 path_m: STEP_M * k as f64,
                 points,
