@@ -6,6 +6,7 @@ mod common;
 
 mod bad_input;
 mod breaks;
+mod calibrate;
 mod doctor;
 mod evaluate;
 mod extended_maps;

@@ -21,7 +21,7 @@ use gyre_storage as storage;
 use crate::{
     Failure,
     cli::CalibrateArguments,
-    configuration::Configuration,
+    configuration::{Configuration, strict, syntax},
     preflight::{self, Played},
     print,
 };
@@ -49,13 +49,15 @@ pub(crate) struct Configured {
 /// # Errors
 /// A recording or a configuration that cannot be used, a drive that does not determine the constants, a file that cannot be written.
 pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
-    let configuration = match &arguments.config {
-        Some(path) => Configuration::read(path, &arguments.set),
-        None => Configuration::of_overrides(&arguments.set),
-    }?
+    let configuration = match (&arguments.config, &arguments.data) {
+        (Some(path), _) => Configuration::read(path, &arguments.set)?,
+        (None, Some(data)) => Configuration::of_recording(data, &arguments.set)?,
+        (None, None) => Configuration::of_overrides(&arguments.set)?,
+    }
     .streaming(arguments.data.as_deref());
+    storage::create_folder(&arguments.out)?;
     let started = Instant::now();
-    let (drive, geometry) = read(&configuration, arguments.scans)?;
+    let (drive, geometry) = read(&configuration, arguments)?;
     print::note("comparing the scans");
     let calibration = solve(&drive)?;
     let configured = Configured {
@@ -67,9 +69,8 @@ pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
         min_range_m: configuration.odometry.points.min_range_m.into(),
         distance_m: arguments.distance_m,
     };
-    let found = Found::new(&drive, &calibration, &configured);
+    let found = Found::new(&drive, &calibration, &configured)?;
     print::line(&found)?;
-    storage::create_folder(&arguments.out)?;
     let (section, picture) = (arguments.out.join(SECTION), arguments.out.join(PICTURE));
     storage::write(&section, section::toml(&found))?;
     storage::write(&picture, picture::svg(&drive, &calibration))?;
@@ -91,19 +92,31 @@ fn options(configuration: &Configuration) -> Result<DatasetOptions, Failure> {
     }
 }
 
-/// Registers the scans of a recording, at most `limit`.
-fn read(configuration: &Configuration, limit: usize) -> Result<(Drive, SweepGeometry), Failure> {
+/// Registers the scans of a recording, as many as are asked for at most.
+fn read(
+    configuration: &Configuration,
+    arguments: &CalibrateArguments,
+) -> Result<(Drive, SweepGeometry), Failure> {
     let Played { mut dataset, .. } = preflight::open(configuration)?;
     preflight::describe_masks(configuration)?;
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut drive = Drive::new(&configuration.odometry)?;
     let played = configuration.source.played(dataset.len());
-    let (count, mut last_line) = (played.len().min(limit), Instant::now());
-    for (done, number) in played.take(limit).enumerate() {
+    let (all, count) = (played.len(), played.len().min(arguments.scans));
+    if count < all {
+        let sentence =
+            format!("only the first {count} of {all} scans are used: --scans {all} takes them all");
+        if arguments.distance_m.is_some() {
+            return Err(format!("{sentence}, which --distance-m needs").into());
+        }
+        print::note(sentence);
+    }
+    let mut last_line = Instant::now();
+    for (done, number) in played.take(count).enumerate() {
         let pushed = match dataset.read(number, scan.slot()) {
             Ok(geometry) => {
                 scan.geometry = geometry;
-                drive.push(&scan).map_err(|error| error.to_string())
+                drive.push(number, &scan).map_err(|error| error.to_string())
             }
             Err(error) => Err(error.to_string()),
         };
@@ -128,16 +141,18 @@ pub fn overrides(file: &Path) -> Result<Vec<String>, Failure> {
         .map_err(|error| unusable(format!("cannot be read: {error}")))?;
     let table: toml::Table = text
         .parse()
-        .map_err(|error: toml::de::Error| unusable(error.message().to_owned()))?;
+        .map_err(|error: toml::de::Error| unusable(syntax(&text, &error)))?;
     let section = match table.get("dataset") {
         Some(toml::Value::Table(section)) if table.len() == 1 => section,
         _ => {
             return Err(unusable(
-                "a calibration has the section [dataset] and no other".to_owned(),
+                "a calibration has the section [dataset] and no other: give the calibration.toml of `gyre calibrate`".to_owned(),
             )
             .into());
         }
     };
+    strict::section::<DatasetOptions>(&mut table.clone(), "dataset")
+        .map_err(|error| unusable(error.to_string()))?;
     Ok(section
         .iter()
         .map(|(key, value)| format!("dataset.{key}={value}"))

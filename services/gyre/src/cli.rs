@@ -59,7 +59,6 @@ pub enum Command {
 #[derive(Debug, Args)]
 pub struct RunArguments {
     /// The configuration, a TOML file. Default: what the recording's format and its scans say.
-    #[arg(required_unless_present = "data")]
     pub configuration: Option<PathBuf>,
     /// The dataset's folder (source.data).
     #[arg(long)]

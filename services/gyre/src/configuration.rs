@@ -4,7 +4,7 @@ mod automatic;
 pub mod difference;
 mod error;
 mod rate;
-mod strict;
+pub(crate) mod strict;
 mod validation;
 
 use std::{
@@ -359,7 +359,7 @@ pub fn process_names() -> Vec<&'static str> {
 }
 
 /// Names the place of a mistake, without the line itself: the file may hold anything.
-fn syntax(text: &str, error: &toml::de::Error) -> String {
+pub(crate) fn syntax(text: &str, error: &toml::de::Error) -> String {
     let start = error.span().map_or(0, |span| span.start);
     let before = text.get(..start).unwrap_or_default();
     let (line, column) = match before.rsplit_once('\n') {

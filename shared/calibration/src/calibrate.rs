@@ -1,6 +1,9 @@
 //! The method on one page.
 
+use std::convert::Infallible;
+
 use gyre_scan_matching::ConfigError;
+use gyre_slam::ClosingError;
 use nalgebra::DVector;
 use thiserror::Error;
 
@@ -23,6 +26,8 @@ const CELL_SHARE: f64 = 0.05;
 /// Range of most points, m, and a usual speed, m/s.
 const USUAL_RANGE_M: f64 = 30.0;
 const USUAL_SPEED_MPS: f64 = 10.0;
+/// No time of the rows is better than this share of the sweep: within it, velocity is not constant.
+const ROW_TIME_SHARE: f64 = 0.05;
 /// Revisits needed for the drift.
 const MIN_REVISITS: usize = 5;
 /// Facts that are solved for together. The others only confirm: odometry needs no correction of them.
@@ -32,7 +37,9 @@ const SOLVED: [Fact; 3] = [Fact::RangeOffset, Fact::EccentricityCos, Fact::Doppl
 #[derive(Debug, Error)]
 pub enum CalibrationError {
     /// Too little motion.
-    #[error("{scans} scans over {path_m:.0} m are too few: the constants show over 100 m and more")]
+    #[error(
+        "{scans} scans over {path_m:.0} m are too few: the constants show over 100 m and more, so give a longer recording or a larger --scans"
+    )]
     TooShort {
         /// Number of scans.
         scans: usize,
@@ -44,6 +51,9 @@ pub enum CalibrationError {
         "the scans have too little in common to tell the constants: their overlap has no maximum near the configured ones"
     )]
     Undetermined,
+    /// Places that are seen again cannot be looked for.
+    #[error("revisits cannot be found: {0}")]
+    Revisits(#[from] ClosingError<Infallible>),
     /// The refinement's configuration.
     #[error(transparent)]
     Refinement(#[from] ConfigError),
@@ -71,6 +81,8 @@ pub struct Calibration {
     pub revisits: Vec<Revisit>,
     /// Pairs of scans that were compared.
     pub pairs: usize,
+    /// The last solution changed the facts by less than their standard deviations. Otherwise they are not to be trusted.
+    pub has_settled: bool,
     /// The mounting, by the corrected track.
     pub mounting: Option<Mounting>,
     /// The track as configured, and the one with the facts as found.
@@ -113,6 +125,7 @@ pub fn calibrate(drive: &Drive) -> Result<Calibration, CalibrationError> {
     let mut calibration = Calibration {
         facts,
         pairs: found.pairs,
+        has_settled: found.has_converged(),
         revisits,
         mounting: None,
         before,
@@ -251,7 +264,7 @@ fn facts(
             Fact::RangeOffset => error_m,
             Fact::EccentricityCos | Fact::EccentricitySin => error_m / USUAL_RANGE_M,
             Fact::Doppler => error_m / USUAL_SPEED_MPS,
-            Fact::RowTime => error_m,
+            Fact::RowTime => ROW_TIME_SHARE,
         };
         let solved = if SOLVED.contains(&fact) {
             found.solved[k]

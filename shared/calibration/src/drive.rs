@@ -27,6 +27,8 @@ const MOVING_M: f64 = 0.5;
 /// A scan of the drive.
 #[derive(Clone, Debug)]
 pub struct Sweep {
+    /// Number of the scan in the recording.
+    pub number: usize,
     /// Time of the scan, ns.
     pub stamp_ns: i64,
     /// Time since the scan before, s; 0 where the chain of motions starts.
@@ -60,8 +62,6 @@ pub struct Track {
     pub motions: Vec<UncertainMotion>,
     /// The velocity at each scan.
     pub twists: Vec<Twist>,
-    /// The overlap of each scan with its map.
-    pub overlaps: Vec<f64>,
     /// Whether the chain of motions starts with a scan.
     starts: Vec<bool>,
 }
@@ -88,11 +88,11 @@ impl Drive {
         &self.config
     }
 
-    /// Adds the next scan.
+    /// Adds the next scan, which has this number in the recording.
     ///
     /// # Errors
     /// A scan that cannot be used.
-    pub fn push(&mut self, scan: &OwnedScan) -> Result<(), OdometryError> {
+    pub fn push(&mut self, number: usize, scan: &OwnedScan) -> Result<(), OdometryError> {
         let mut scan = scan.view();
         if scan.geometry.doppler_s == 0.0 {
             scan.geometry.doppler_s = NO_DOPPLER_S;
@@ -114,6 +114,7 @@ impl Drive {
             false => self.odometry.points().to_vec(),
         };
         self.sweeps.push(Sweep {
+            number,
             stamp_ns: scan.geometry.stamp_ns,
             interval_s: match registered.outcome {
                 Outcome::Start => 0.0,
@@ -154,6 +155,11 @@ impl Drive {
         Ok(points)
     }
 
+    /// Returns whether chirps rise and fall by turns, as the scans say.
+    pub fn alternates(&self) -> bool {
+        self.alternates
+    }
+
     /// Returns the reflections of the vehicle itself in the scans.
     pub fn reflections(&self) -> &OwnReflections {
         &self.reflections
@@ -182,7 +188,6 @@ impl Drive {
         let count = self.sweeps.len();
         let mut refiner = Refiner::new(&self.config.refinement, self.config.points.capacity)?;
         let mut motions = vec![UncertainMotion::identity(); count];
-        let mut overlaps = vec![0.0; count];
         let order: Vec<usize> = if reversed {
             (0..count).rev().collect()
         } else {
@@ -214,17 +219,16 @@ impl Drive {
                     if reversed {
                         motions[later].motion = motions[later].motion.inverse();
                     }
-                    overlaps[scan] = refined.overlap;
                 }
             }
             earlier = Some((scan, points));
         }
-        Ok(Track::new(motions, overlaps, self))
+        Ok(Track::new(motions, self))
     }
 }
 
 impl Track {
-    fn new(motions: Vec<UncertainMotion>, overlaps: Vec<f64>, drive: &Drive) -> Self {
+    fn new(motions: Vec<UncertainMotion>, drive: &Drive) -> Self {
         let mut poses: Vec<Pose> = Vec::with_capacity(motions.len());
         for motion in &motions {
             let before = poses.last().copied().unwrap_or_else(Pose::identity);
@@ -244,7 +248,6 @@ impl Track {
             poses,
             motions,
             twists,
-            overlaps,
             starts,
         }
     }
@@ -276,7 +279,7 @@ impl Track {
             motion: gyre_geometry::interpolate(&a.motion, &b.motion, 0.5),
             covariance: a.covariance,
         });
-        Self::new(motions.collect(), self.overlaps.clone(), drive)
+        Self::new(motions.collect(), drive)
     }
 }
 

@@ -4,10 +4,9 @@ use std::f64::consts::TAU;
 
 use gyre_radar::PolarScan;
 
-/// Depth of a cell, m, and the range up to which they are looked for.
+/// Depth of a cell, m.
 const CELL_M: f64 = 0.25;
-const REACH_M: f64 = 15.0;
-const CELLS: usize = (REACH_M / CELL_M) as usize;
+const CELLS: usize = (OwnReflections::REACH_M / CELL_M) as usize;
 const SECTORS: usize = 90;
 /// Share of the scans in which a cell of the vehicle's own returns power.
 const SHARE: f64 = 0.9;
@@ -31,6 +30,9 @@ impl Default for OwnReflections {
 }
 
 impl OwnReflections {
+    /// The range up to which they are looked for, m.
+    pub const REACH_M: f64 = 15.0;
+
     /// Adds a scan that was measured while the vehicle moved; power above `floor` counts.
     pub(crate) fn add(&mut self, scan: &PolarScan<'_>, floor: u8) {
         let mut seen = vec![false; SECTORS * CELLS];
@@ -39,7 +41,7 @@ impl OwnReflections {
             let sector = (turns * SECTORS as f64) as usize % SECTORS;
             for (bin, power) in scan.row(row).iter().enumerate() {
                 let range_m = f64::from(scan.range_m(bin as f32));
-                if range_m >= REACH_M {
+                if range_m >= Self::REACH_M {
                     break;
                 }
                 if *power > floor {

@@ -48,22 +48,17 @@ impl View {
             .iter()
             .filter(|point| point.weight > 0.0)
             .map(|point| {
-                let raw = Vector2::new(f64::from(point.x_m), f64::from(point.y_m));
-                let range_m = raw.norm().max(1e-3);
-                let toward =
-                    f64::from(point.doppler_s) * raw.dot(&twist.linear_mps()) / (range_m * range_m);
-                let time_s = f64::from(point.time_s);
-                let at = twist.chord_pose_at(time_s) * nalgebra::Point2::from(raw * (1.0 + toward));
+                let at = point.deskewed(twist).coords;
                 let chirp = if drive.alternates {
                     f64::from(point.doppler_s).signum()
                 } else {
                     1.0
                 };
                 Seen {
-                    at: at.coords,
+                    at,
                     weight: f64::from(point.weight.min(1.0)),
                     chirp,
-                    displacement: displacements(at.coords, time_s, chirp, twist, drive.sense),
+                    displacement: displacements(at, point.time_s.into(), chirp, twist, drive.sense),
                 }
             })
             .collect();

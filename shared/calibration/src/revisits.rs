@@ -3,10 +3,11 @@
 use std::convert::Infallible;
 
 use gyre_geometry::{OdometryMotion, Pose, SparsePoint, UncertainMotion};
-use gyre_scan_matching::ConfigError;
-use gyre_slam::{Keyframe, KeyframeBuilder, KeyframeSource, LoopCloser, LoopOptions, ScanPose};
+use gyre_slam::{
+    ClosingError, Keyframe, KeyframeBuilder, KeyframeSource, LoopCloser, LoopOptions, ScanPose,
+};
 
-use crate::{Drive, Track, facts::FactVector};
+use crate::{CalibrationError, Drive, Track, facts::FactVector};
 
 /// Two scans of one place.
 #[derive(Clone, Copy, Debug)]
@@ -34,21 +35,19 @@ pub fn find(
     drive: &Drive,
     track: &Track,
     change: &FactVector,
-) -> Result<Vec<Revisit>, ConfigError> {
+) -> Result<Vec<Revisit>, CalibrationError> {
     let options = LoopOptions::default();
     let keyframes = Keyframes(keyframes(drive, track, change, &options));
     let config = drive.config();
     let mut closer = LoopCloser::new(options, &config.refinement, config.points.capacity)?;
     for keyframe in &keyframes.0 {
-        if closer.push(keyframe).is_err() {
-            return Ok(Vec::new());
-        }
+        closer.push(keyframe).map_err(ClosingError::from)?;
     }
     closer.finish();
     let mut source = &keyframes;
-    while let Ok(Some(_)) = closer.describe(&mut source) {}
+    while closer.describe(&mut source)?.is_some() {}
     let mut found = Vec::new();
-    while let Ok(Some(query)) = closer.close(&mut source) {
+    while let Some(query) = closer.close(&mut source)? {
         for (candidate, _) in query.loops() {
             found.push(Revisit {
                 later: keyframes.0[query.keyframe].seq as usize,

@@ -8,45 +8,56 @@ use gyre_radar::{DatasetOptions, OwnedScan};
 use gyre_simulator::{Profile, SimulatedDrive, SimulationConfig};
 
 const ECCENTRICITY_RAD: f64 = 4e-3;
-const DOPPLER_S: f64 = 0.042;
+/// How far the constants are off with which the drive is read: range offset (m), eccentricity (rad), Doppler coefficient (s).
+const WRONG_BY: [f64; 3] = [0.2, -ECCENTRICITY_RAD, -0.02];
 
-/// Calibrates a short drive around a block that is read with these constants.
-fn calibrated(azimuth_eccentricity_rad: f64, doppler_s: f64) -> Calibration {
+/// Calibrates a short drive around a block that is read with wrong constants.
+fn calibrated(profile: Profile) -> Calibration {
     let mut config = SimulationConfig {
         scans: Some(90),
         ..SimulationConfig::default()
     };
-    config.sensor.profile = Profile::Cts350xRadiate;
+    config.sensor.profile = profile;
     config.sensor.azimuth_eccentricity_rad = ECCENTRICITY_RAD;
-    config.sensor.doppler_s = Some(DOPPLER_S);
     let simulated = SimulatedDrive::new(&config).unwrap();
+    let right = simulated.dataset_options();
+    let off = |right: Option<f32>, by: f64| Some((f64::from(right.unwrap()) + by) as f32);
     let options = DatasetOptions {
-        azimuth_eccentricity_rad: Some(azimuth_eccentricity_rad as f32),
-        doppler_s: Some(doppler_s as f32),
-        ..simulated.dataset_options()
+        range_offset_m: off(right.range_offset_m, WRONG_BY[0]),
+        azimuth_eccentricity_rad: off(right.azimuth_eccentricity_rad, WRONG_BY[1]),
+        doppler_s: off(right.doppler_s, WRONG_BY[2]),
+        ..right
     };
     let mut dataset = gyre_radar::open_source(Box::new(simulated.renderer()), &options).unwrap();
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut drive = Drive::new(&OdometryConfig::default()).unwrap();
     for index in 0..dataset.len() {
         scan.geometry = dataset.read(index, scan.slot()).unwrap();
-        drive.push(&scan).unwrap();
+        drive.push(index, &scan).unwrap();
     }
     calibrate(&drive).unwrap()
 }
 
-#[test]
-fn constants_that_were_configured_wrong_are_found() {
-    let found = calibrated(0.0, 0.02);
-    for (fact, wrong_by) in [
-        (Fact::RangeOffset, 0.0),
-        (Fact::EccentricityCos, ECCENTRICITY_RAD),
-        (Fact::Doppler, DOPPLER_S - 0.02),
-    ] {
+/// Asserts that the constants are found within their uncertainty, and called wrong.
+fn assert_found(profile: Profile) {
+    let found = calibrated(profile);
+    let facts = [Fact::RangeOffset, Fact::EccentricityCos, Fact::Doppler];
+    for (fact, wrong_by) in facts.into_iter().zip(WRONG_BY) {
         let change = found.facts[fact as usize].change;
-        let sigmas = (change.value - wrong_by) / change.sigma;
-        assert!(sigmas.abs() < 3.0, "{fact:?}: {change:?} for {wrong_by}");
+        println!("{fact:?}: {change:?} for {}", -wrong_by);
+        let sigmas = (change.value + wrong_by) / change.sigma;
+        assert!(sigmas.abs() < 3.0, "{fact:?}: {change:?} for {}", -wrong_by);
         let is_called_wrong = change.value.abs() > 3.0 * change.sigma;
-        assert_eq!(is_called_wrong, wrong_by != 0.0, "{fact:?}: {change:?}");
+        assert!(is_called_wrong, "{fact:?}: {change:?} for {}", -wrong_by);
     }
+}
+
+#[test]
+fn wrong_constants_are_found_where_all_chirps_rise() {
+    assert_found(Profile::Cts350xRadiate);
+}
+
+#[test]
+fn wrong_constants_are_found_where_chirps_alternate() {
+    assert_found(Profile::Ras6);
 }

@@ -1,6 +1,9 @@
 //! The points of a scan.
 
 use bytemuck::{Pod, Zeroable};
+use nalgebra::Point2;
+
+use crate::Twist;
 
 /// One return of a scan as measured, without compensation of motion or of the Doppler shift.
 ///
@@ -21,6 +24,17 @@ pub struct SparsePoint {
     pub doppler_s: f32,
 }
 
+impl SparsePoint {
+    /// Returns where the point lies in the frame of its scan if the sensor has this velocity throughout: without Doppler shift and motion.
+    pub fn deskewed(&self, twist: &Twist) -> Point2<f64> {
+        let seen = Point2::new(f64::from(self.x_m), f64::from(self.y_m));
+        let range_m = seen.coords.norm().max(1e-3);
+        let approach_mps = seen.coords.dot(&twist.linear_mps()) / range_m;
+        let farther = f64::from(self.doppler_s) * approach_mps / range_m;
+        twist.chord_pose_at(self.time_s.into()) * (seen + seen.coords * farther)
+    }
+}
+
 /// A point from its fields in their order.
 impl From<[f32; 5]> for SparsePoint {
     fn from(fields: [f32; 5]) -> Self {
@@ -38,6 +52,19 @@ impl From<SparsePoint> for [f32; 5] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_point_ahead_of_a_moving_sensor_is_farther_than_seen_and_where_it_was_seen_from() {
+        let point = SparsePoint {
+            x_m: 20.0,
+            time_s: 0.1,
+            doppler_s: 0.04,
+            ..SparsePoint::default()
+        };
+        let twist = Twist::from_chord(&crate::pose(2.5, 0.0, 0.0), 0.25);
+        let at = point.deskewed(&twist);
+        assert!((at.x - 21.4).abs() < 1e-6 && at.y.abs() < 1e-9, "{at}");
+    }
 
     #[test]
     fn a_point_is_five_packed_floats() {

@@ -2,13 +2,18 @@
 
 use std::fmt;
 
-use gyre_calibration::{Calibration, Drive, Estimate, Fact, FactEstimate, Mounting};
+use gyre_calibration::{
+    Calibration, Drive, Estimate, Fact, FactEstimate, Mounting, OwnReflections,
+};
 use gyre_radar::Sense;
 
 use super::Configured;
+use crate::Failure;
 
 /// A configured value that is off by so many standard deviations is wrong.
 const WRONG_SIGMAS: f64 = 3.0;
+/// The given length of the path over that by the scans: beyond, it is of another drive, or scans are missing.
+const PLAUSIBLE_RATIO: std::ops::RangeInclusive<f64> = 0.8..=1.25;
 /// Share of the path by which that in both directions of time differs, at least: the error of its length.
 const PATH_ERROR: f64 = 1e-3;
 
@@ -38,6 +43,7 @@ impl Constant {
 pub struct Found {
     pub scans: usize,
     pub path_m: f64,
+    has_settled: bool,
     pub constants: Vec<Constant>,
     /// The range resolution, if the length of the path is given.
     resolution: Result<Constant, String>,
@@ -46,7 +52,15 @@ pub struct Found {
 }
 
 impl Found {
-    pub fn new(drive: &Drive, calibration: &Calibration, configured: &Configured) -> Self {
+    /// Compares what was found with what is configured.
+    ///
+    /// # Errors
+    /// A length of the path that cannot be that of this drive.
+    pub fn new(
+        drive: &Drive,
+        calibration: &Calibration,
+        configured: &Configured,
+    ) -> Result<Self, Failure> {
         let path_m = calibration
             .after
             .path_m()
@@ -54,6 +68,11 @@ impl Found {
             .copied()
             .unwrap_or_default();
         let geometry = &configured.geometry;
+        // Where the scans say which chirps rise, its sign is that of the chirp.
+        let doppler_s = match (drive.alternates(), f64::from(geometry.doppler_s)) {
+            (true, configured) => configured.abs(),
+            (false, configured) => configured,
+        };
         let fact = |fact: Fact| &calibration.facts[fact as usize];
         let constants = vec![
             constant(
@@ -71,26 +90,27 @@ impl Found {
                 ("mrad", 1e3),
                 configured.eccentricity_rad,
                 fact(Fact::EccentricityCos),
-                1.5e-3,
+                0.6e-3,
                 calibration,
             ),
             constant(
                 "doppler_s",
                 "Doppler shift",
                 ("s", 1.0),
-                geometry.doppler_s.into(),
+                doppler_s,
                 fact(Fact::Doppler),
                 0.01,
                 calibration,
             ),
         ];
-        Self {
+        Ok(Self {
             scans: drive.sweeps.len(),
             path_m,
+            has_settled: calibration.has_settled,
             constants,
-            resolution: resolution(path_m, configured),
+            resolution: resolution(path_m, configured)?,
             others: others(drive, calibration, configured),
-        }
+        })
     }
 
     /// Returns the constants that are written: those that the drive determines.
@@ -154,22 +174,32 @@ fn constant(
         scale,
         configured,
         found,
-        is_determined: found.sigma < useful,
+        is_determined: found.sigma < useful && calibration.has_settled,
         basis,
     }
 }
 
 /// The range resolution from the length of the path, or why the drive cannot tell it.
-fn resolution(path_m: f64, configured: &Configured) -> Result<Constant, String> {
+///
+/// # Errors
+/// A length that is not of this drive.
+fn resolution(path_m: f64, configured: &Configured) -> Result<Result<Constant, String>, Failure> {
     let resolution_m = f64::from(configured.geometry.range_resolution_m);
     let Some(distance_m) = configured.distance_m else {
-        return Err(format!(
+        return Ok(Err(format!(
             "{resolution_m:.5} m as configured: a drive alone cannot tell it, since a larger world driven through faster looks the same; \
              the path is {path_m:.1} m: give its length by an odometer or GNSS with --distance-m"
-        ));
+        )));
     };
-    let value = resolution_m * distance_m / path_m;
-    Ok(Constant {
+    let ratio = distance_m / path_m;
+    if !PLAUSIBLE_RATIO.contains(&ratio) {
+        return Err(format!(
+            "--distance-m is {distance_m:.1}, but the path of the scans is {path_m:.1} m: give the length of this drive, from its first scan to its last"
+        )
+        .into());
+    }
+    let value = resolution_m * ratio;
+    Ok(Ok(Constant {
         key: "range_resolution_m",
         name: "range resolution",
         unit: "m",
@@ -183,7 +213,7 @@ fn resolution(path_m: f64, configured: &Configured) -> Result<Constant, String> 
         basis: format!(
             "{distance_m:.1} m given for {path_m:.1} m of path, with the constants as found"
         ),
-    })
+    }))
 }
 
 fn others(drive: &Drive, calibration: &Calibration, configured: &Configured) -> Vec<[String; 2]> {
@@ -205,8 +235,8 @@ fn others(drive: &Drive, calibration: &Calibration, configured: &Configured) -> 
              it moves each pose along the path",
                 1.0 + row_time.value,
                 row_time.sigma,
-                if (row_time.value).abs() > WRONG_SIGMAS * row_time.sigma.max(0.05) {
-                    ", so they are WRONG"
+                if (row_time.value).abs() > WRONG_SIGMAS * row_time.sigma {
+                    ", which contradicts them"
                 } else {
                     ""
                 }
@@ -214,12 +244,12 @@ fn others(drive: &Drive, calibration: &Calibration, configured: &Configured) -> 
         ],
         [
             "sense of rotation".to_owned(),
-            sense(calibration, configured),
+            sense(drive, calibration, configured),
         ],
         [
             "mounting".to_owned(),
             calibration.mounting.as_ref().map_or_else(
-                || "too little driving, or no bend, to tell it".to_owned(),
+                || "too little driving, no bend, or a radar that looks elsewhere than ahead: not told".to_owned(),
                 mounting,
             ),
         ],
@@ -228,7 +258,7 @@ fn others(drive: &Drive, calibration: &Calibration, configured: &Configured) -> 
 }
 
 /// A mirrored world is as consistent; only the driver knows.
-fn sense(calibration: &Calibration, configured: &Configured) -> String {
+fn sense(drive: &Drive, calibration: &Calibration, configured: &Configured) -> String {
     let name = match configured.geometry.sense {
         Sense::Clockwise => "clockwise",
         Sense::CounterClockwise => "counter-clockwise",
@@ -242,8 +272,9 @@ fn sense(calibration: &Calibration, configured: &Configured) -> String {
     };
     let side = if turn(at) > 0.0 { "left" } else { "right" };
     format!(
-        "{name}; a mirrored drive looks the same: check that the vehicle turned {side} by {:.0} degrees before scan {at}",
-        turn(at).to_degrees().abs()
+        "{name}; a mirrored drive looks the same: check that the vehicle turned {side} by {:.0} degrees before scan {}",
+        turn(at).to_degrees().abs(),
+        drive.sweeps[at].number
     )
 }
 
@@ -262,9 +293,13 @@ fn mounting(mounting: &Mounting) -> String {
 fn reflections(drive: &Drive, configured: &Configured) -> String {
     match drive.reflections().end_m() {
         None => "too few moving scans to tell them".to_owned(),
+        Some(end_m) if end_m >= OwnReflections::REACH_M => format!(
+            "power everywhere within {end_m:.0} m in nine of ten moving scans: raise masking.threshold to tell them"
+        ),
         Some(end_m) if end_m > configured.min_range_m => format!(
-            "to {end_m:.2} m in nine of ten moving scans, beyond points.min_range_m = {}: set it and raster.min_range_m to {end_m:.1}",
-            configured.min_range_m
+            "to {end_m:.2} m in nine of ten moving scans, beyond points.min_range_m = {}: set it and raster.min_range_m to {:.1}",
+            configured.min_range_m,
+            (end_m * 10.0).ceil() / 10.0
         ),
         Some(end_m) => format!(
             "to {end_m:.2} m, within points.min_range_m = {}",
@@ -276,6 +311,12 @@ fn reflections(drive: &Drive, configured: &Configured) -> String {
 impl fmt::Display for Found {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{} scans, {:.0} m", self.scans, self.path_m)?;
+        if !self.has_settled {
+            writeln!(
+                f,
+                "the constants have not settled: take a longer drive, or begin with constants that are nearer"
+            )?;
+        }
         for constant in self.constants.iter().chain(self.resolution.as_ref().ok()) {
             let Constant {
                 name,
@@ -287,7 +328,7 @@ impl fmt::Display for Found {
             } = constant;
             let verdict = match (constant.is_determined, constant.is_wrong()) {
                 (false, _) => "the drive does not tell it well enough",
-                (true, true) => "the configured value is WRONG",
+                (true, true) => "CONTRADICTS the configured value",
                 (true, false) => "agrees with the configured value",
             };
             writeln!(

@@ -4,7 +4,6 @@ use std::fmt::Write;
 
 use gyre_calibration::{Calibration, Drive, FactVector, Track};
 use gyre_geometry::Pose;
-use nalgebra::Point2;
 
 /// Side of a panel, px, and its reach, m.
 const SIDE: f64 = 560.0;
@@ -22,7 +21,9 @@ pub fn svg(drive: &Drive, calibration: &Calibration) -> String {
     let mut text = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" font-size=\"16\">\n\
          <rect width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/>\n\
-         <text x=\"16\" y=\"22\" fill=\"#22262c\">Scans around {earlier} (blue) and around {later} (orange), by odometry; {:.0} m a side</text>\n",
+         <text x=\"16\" y=\"22\" fill=\"#22262c\">Scans around {} (blue) and around {} (orange), by odometry; {:.0} m a side</text>\n",
+        drive.sweeps[earlier].number,
+        drive.sweeps[later].number,
         2.0 * REACH_M
     );
     let none = FactVector::zeros();
@@ -78,12 +79,7 @@ fn points(drive: &Drive, track: &Track, base: &Pose, scan: usize, change: &FactV
             .iter()
             .filter(|point| point.weight > MIN_WEIGHT)
         {
-            let seen = Point2::new(f64::from(point.x_m), f64::from(point.y_m));
-            let range_m = seen.coords.norm().max(1e-3);
-            let toward =
-                f64::from(point.doppler_s) * seen.coords.dot(&twist.linear_mps()) / range_m;
-            let free = seen + seen.coords * (toward / range_m);
-            let at = pose * (twist.chord_pose_at(point.time_s.into()) * free);
+            let at = pose * point.deskewed(twist);
             if at.x.abs() < REACH_M && at.y.abs() < REACH_M {
                 let _ = write!(path, "M{:.2} {:.2}h0", -at.y, -at.x);
             }
