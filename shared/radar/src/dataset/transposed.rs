@@ -41,7 +41,7 @@ pub(crate) struct TransposedScans {
     pub(crate) images: Images,
     /// One per image.
     pub(crate) turns: Vec<Turn>,
-    /// Median of their periods, ns. The caller sets it with the turns.
+    /// Time of a turn, of those without gaps between, ns. The caller sets it with the turns.
     pub(crate) period_ns: i64,
     /// The caller sets it if it is not the default.
     pub(crate) first_azimuth: FirstAzimuth,
