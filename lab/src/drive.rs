@@ -6,7 +6,7 @@ use std::path::Path;
 use gyre::{Failure, configuration::Configuration, odometry};
 use gyre_estimation::places::{KeyframeSelector, MAX_NEIGHBOURS, PlaceOptions, neighbours};
 use gyre_evaluation::TimedMotion;
-use gyre_geometry::{Pose, SparsePoint, Stretch, Twist, UncertainMotion};
+use gyre_geometry::{ComposedMotion, Pose, SparsePoint, Twist, UncertainMotion};
 use gyre_masking::{MaskKind, Masker};
 use gyre_radar::{OwnedScan, Trajectory, find_ground_truth, read_trajectory};
 use gyre_scan_matching::{RefinementConfig, Submap};
@@ -93,7 +93,7 @@ impl Drive {
         if motions.len() + 1 != stamps.len() {
             return Err("odometry.csv and trajectory.tum are not of one run".into());
         }
-        let (mut reckoned, mut since) = (Stretch::new(), UncertainMotion::identity());
+        let (mut reckoned, mut since) = (ComposedMotion::new(), UncertainMotion::identity());
         for (k, pose) in self.estimate.poses.iter().enumerate() {
             let motion = k.checked_sub(1).map(|last| motions[last].estimate);
             if let Some(motion) = motion {

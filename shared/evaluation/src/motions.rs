@@ -1,6 +1,6 @@
 //! Association of reported motions with the ground truth at their stamps.
 
-use gyre_geometry::{OdometryMotion, Pose, Stretch, UncertainMotion};
+use gyre_geometry::{ComposedMotion, OdometryMotion, Pose, UncertainMotion};
 
 use crate::{
     EvaluationError, Side, TimedPoses,
@@ -166,10 +166,10 @@ impl Chain {
     pub fn composed(&self, first: usize) -> impl Iterator<Item = UncertainMotion> + '_ {
         self.motions[first..]
             .iter()
-            .scan(None, |so_far: &mut Option<Stretch>, motion| {
+            .scan(None, |so_far: &mut Option<ComposedMotion>, motion| {
                 let next = match so_far {
-                    None => Stretch::of(motion),
-                    Some(stretch) => stretch.then(motion),
+                    None => ComposedMotion::of(motion),
+                    Some(composed) => composed.then(motion),
                 };
                 *so_far = Some(next);
                 Some(next.motion())

@@ -4,21 +4,21 @@
 //! - [`Pose`]: the pose of a frame in another frame; [`pose`] creates one, [`interpolate`] interpolates between two;
 //! - [`Twist`]: a constant velocity and its poses over time;
 //! - [`covariance`]: packed covariances of (x, y, yaw), and [`UncertainMotion`], which composes them;
-//! - [`Stretch`]: motions of an odometry whose errors are only in part independent, composed;
+//! - [`ComposedMotion`]: motions of an odometry whose errors are only in part independent, composed;
 //! - [`SparsePoint`]: one return of a scan, in the sensor's frame at the time of its azimuth.
 //!
 //! # Frames and units
 //! Frames follow REP-103: x forward, y left, yaw counter-clockwise. Lengths are in m, angles in rad, times in s.
 //! A motion is the pose of the later frame in the earlier frame. Composition is `first * then`.
 
+mod composed_motion;
 pub mod covariance;
 mod point;
 mod pose;
-mod stretch;
 mod twist;
 
+pub use composed_motion::{ComposedMotion, OdometryMotion};
 pub use covariance::UncertainMotion;
 pub use point::SparsePoint;
 pub use pose::{Pose, interpolate, mirrored, pose, wrap_angle, xy_yaw};
-pub use stretch::{OdometryMotion, Stretch};
 pub use twist::Twist;

@@ -1,7 +1,7 @@
 //! `pose`: the pose of the vehicle, which is also the credit that admits a new scan.
 
 use bytemuck::{Pod, Zeroable};
-use gyre_geometry::{Stretch, UncertainMotion, covariance, pose};
+use gyre_geometry::{ComposedMotion, UncertainMotion, covariance, pose};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
@@ -53,8 +53,9 @@ pub struct PoseHeader {
     pub yaw_rad: f64,
     /// Covariance of (x, y, yaw) in the frame of the first scan: see [`covariance::Packed`].
     pub covariance: covariance::Packed,
-    /// The part of it that later poses have too: see [`Stretch::lasting`].
-    pub lasting_covariance: covariance::Packed,
+    /// The part of it that later poses have too, equal to it where the errors of motions are independent: see
+    /// [`ComposedMotion::accumulated`].
+    pub accumulated_covariance: covariance::Packed,
     /// Number of corrections of the whole trajectory (loop closures); always 0 while poses are only composed motions.
     pub trajectory_version: u64,
 }
@@ -71,7 +72,7 @@ impl PoseHeader {
         ];
         planar(pose, MAX_DISTANCE_M)?;
         check_covariance(&self.covariance)?;
-        check_covariance(&self.lasting_covariance)?;
+        check_covariance(&self.accumulated_covariance)?;
         self.motion.check(limits)
     }
 
@@ -83,11 +84,11 @@ impl PoseHeader {
         }
     }
 
-    /// Returns the stretch from the first scan to this one, to go on with the next motion.
-    pub fn stretch(&self) -> Stretch {
-        Stretch::resume(UncertainMotion {
-            covariance: covariance::unpack(&self.lasting_covariance),
-            ..self.pose()
-        })
+    /// Returns the motion from the first scan to this one, to compose it with the next.
+    pub fn composed(&self) -> ComposedMotion {
+        ComposedMotion::resume(
+            self.pose(),
+            covariance::unpack(&self.accumulated_covariance),
+        )
     }
 }

@@ -1,6 +1,8 @@
 //! Odometry: from scans to motions and poses.
 
-use gyre_geometry::{OdometryMotion, Pose, SparsePoint, Stretch, Twist, UncertainMotion, pose};
+use gyre_geometry::{
+    ComposedMotion, OdometryMotion, Pose, SparsePoint, Twist, UncertainMotion, pose,
+};
 use gyre_masking::{Masker, Sweep};
 use gyre_radar::{PolarScan, continues};
 use gyre_scan_matching::{
@@ -28,7 +30,7 @@ pub struct Odometry {
     previous_by_pair: Option<Array2<f32>>,
     /// Number of scans since the chain of motions started.
     seq: u64,
-    driven: Stretch,
+    driven: ComposedMotion,
 }
 
 /// The configured search.
@@ -74,7 +76,7 @@ impl Odometry {
             previous_by_pair: (masker.scans() == 2).then(|| Array2::zeros((n, n))),
             masker,
             seq: 0,
-            driven: Stretch::new(),
+            driven: ComposedMotion::new(),
         })
     }
 
@@ -161,7 +163,7 @@ impl Odometry {
         Some(refiner.refine(self.seq, later, earlier, &motion, interval_s))
     }
 
-    /// Composes the motion with the pose (Checchin et al., Eqs. 1 and 2), and makes the scan the previous one.
+    /// Composes the motion with the pose (Checchin et al., Eqs. 1 and 2; see [`ComposedMotion`]), and makes the scan the previous one.
     pub fn integrate(
         &mut self,
         searched: Option<JointMatch>,
@@ -180,7 +182,7 @@ impl Odometry {
             (None, None) => (OdometryMotion::default(), Outcome::Start),
         };
         let motion = motion.normalized();
-        self.driven = self.driven.then(&motion);
+        self.driven = self.driven.then(&motion).normalized();
         let interval_s = interval_ns as f64 * 1e-9;
         self.twists.push(
             searched

@@ -27,6 +27,7 @@ mod tracker;
 mod uncertainty;
 
 use gyre_geometry::{OdometryMotion, Pose, SparsePoint, Twist, UncertainMotion};
+use nalgebra::Matrix3;
 
 pub use config::{RefinementConfig, RefinementKind};
 pub use initial_guess::InitialGuess;
@@ -183,15 +184,22 @@ impl Refiner {
         }
         let (outcome, estimate) = self.accept_or_predict(&scan, &best);
         let reported = self.report(&scan, outcome, estimate);
-        let motion = OdometryMotion {
-            motion: reported.motion,
-            covariance: reported.covariance,
-            drift_share: uncertainty::drift_share(outcome, self.map.len(), &self.config),
-            scale_sigma: self.config.scale_sigma,
-        };
+        let (unmatched, keyframes) = (self.state.unmatched, self.map.len());
         self.update(&scan, &best, outcome, &estimate.motion);
+        let drift_share = if self.map.is_empty() {
+            1.0
+        } else if outcome == Outcome::Predicted || unmatched > 0 {
+            uncertainty::MIN_DRIFT_SHARE
+        } else {
+            uncertainty::drift_share(keyframes, &self.config)
+        };
         Refined {
-            motion,
+            motion: OdometryMotion {
+                motion: reported.motion,
+                covariance: reported.covariance,
+                drift_share,
+                scale_sigma: self.config.scale_sigma,
+            },
             stationary: self.config.hold_standstill && self.state.standstill.stands(),
             overlap: best.overlap,
             support: best.support,
@@ -343,16 +351,23 @@ impl Refiner {
             uncertainty::of_alignment(&best.alignment, &self.points, pose, &self.config);
         let Some(covariance) = covariance.filter(|_| best.is_plausible) else {
             let [motion, _] = self.state.predict(scan.interval_s);
-            let covariance = uncertainty::of_prediction(scan.interval_s, &self.config);
+            let covariance = self.predicted_covariance(scan, self.state.unmatched + 1);
             return (Outcome::Predicted, UncertainMotion { motion, covariance });
         };
         let motion = best.alignment.pose;
+        // The match takes back the error of the predictions before it.
+        let covariance = covariance + self.predicted_covariance(scan, self.state.unmatched);
         if self.is_firm(scan, best) || self.state.doubtful >= MAX_DOUBTFUL {
             (Outcome::Refined, UncertainMotion { motion, covariance })
         } else {
             let covariance = covariance * WEAK_COVARIANCE_FACTOR;
             (Outcome::Weak, UncertainMotion { motion, covariance })
         }
+    }
+
+    /// The covariance of the pose that a number of predictions leads to.
+    fn predicted_covariance(&self, scan: &Scan<'_>, predictions: u32) -> Matrix3<f64> {
+        uncertainty::of_prediction(scan.interval_s, &self.config) * f64::from(predictions)
     }
 
     /// Returns whether the scan overlaps the map well, has enough points, and agrees with the search.

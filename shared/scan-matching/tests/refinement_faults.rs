@@ -4,7 +4,7 @@
 mod common;
 
 use common::{Numbers, scenes::*};
-use gyre_geometry::{Pose, SparsePoint};
+use gyre_geometry::{ComposedMotion, Pose, SparsePoint};
 use gyre_scan_matching::{Outcome, Refined, RefinementConfig, Refiner};
 
 const NOISY: Sensor = Sensor {
@@ -115,6 +115,28 @@ fn a_fault_of_one_scan_is_bridged() {
             "{name}: {errors:?}, without {before:?}"
         );
     }
+}
+
+/// The large error of a prediction does not stay: the next match takes it back.
+#[test]
+fn the_covariance_of_a_pose_recovers_after_a_prediction() {
+    let (drive, mut scans) = bend();
+    scans[30] = noise(1);
+    let run = refine(&drive, &scans);
+    assert_eq!(run.refined[29].outcome, Outcome::Predicted);
+    let mut composed = ComposedMotion::new();
+    let variances_m2 = run.refined.iter().map(|refined| {
+        composed = composed.then(&refined.motion);
+        composed.motion().covariance[(0, 0)]
+    });
+    let variances_m2: Vec<f64> = variances_m2.collect();
+    let of_prediction = run.refined[29].motion.covariance[(0, 0)];
+    let gained = |k: usize| variances_m2[k] - variances_m2[28];
+    assert!(gained(29) > 0.4 * of_prediction, "{variances_m2:?}");
+    let by_three_motions = 3.0 * (variances_m2[28] - variances_m2[8]) / 20.0;
+    assert!(gained(31) < 2.0 * by_three_motions, "{variances_m2:?}");
+    // The motion back to the true pose takes in the error of the prediction.
+    assert!(run.refined[30].motion.covariance[(0, 0)] > of_prediction);
 }
 
 /// The new map starts with noise, since the first pair is always accepted. A few scans and the heading are lost: the

@@ -52,8 +52,8 @@ pub struct RefinementConfig {
     /// Standard deviation of the heading that is added to the covariance, degrees, for the uneven
     /// rotation of the antenna.
     pub yaw_sigma_deg: f64,
-    /// Drift of the map of k keyframes from scan to scan, over the standard deviation of a motion x 2 / (k + 1). That share of
-    /// the error accumulates, at most all of it; the next motion takes back the rest.
+    /// Standard deviation of the drift of a map of k keyframes with each motion, over 2 / (k + 1) of that of the motion. The share
+    /// (drift_scale x 2 / (k + 1))² of the covariance accumulates, at most all of it; the next motion takes back the rest.
     pub drift_scale: f64,
     /// Standard deviation of the scale that all motions of a drive share: how well the range resolution is known.
     pub scale_sigma: f64,

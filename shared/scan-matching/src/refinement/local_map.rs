@@ -146,3 +146,41 @@ impl LocalMap {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use gyre_geometry::pose;
+
+    use super::*;
+
+    /// Keyframes come and go, the map is cleared and filled again: the sum is that of the keyframes in it.
+    #[test]
+    fn the_sum_is_that_of_the_keyframes_in_the_map() {
+        let config = RefinementConfig {
+            keyframes: 3,
+            reach_m: 20.0,
+            ..RefinementConfig::default()
+        };
+        let mut map = LocalMap::new(&config);
+        let points = DeskewedPoints {
+            x_m: vec![3.0, -7.0, 11.0],
+            y_m: vec![1.0, 9.0, -4.0],
+            weight: vec![1.0, 2.0, 0.5],
+        };
+        for id in 0..12 {
+            if id == 5 {
+                map.clear();
+                assert!(map.fine().sum.iter().all(|sum| *sum == 0));
+            }
+            let at = id as f64;
+            map.insert(id, &points, &pose(2.3 * at, -1.1 * at, 0.2 * at));
+            let kept = [map.fine().sum.to_vec(), map.coarse().sum.to_vec()];
+            map.sum_images();
+            assert_eq!(kept, [map.fine().sum, map.coarse().sum], "{id}");
+        }
+        assert_eq!(
+            map.keyframes().map(|k| k.id).collect::<Vec<_>>(),
+            [9, 10, 11]
+        );
+    }
+}

@@ -17,6 +17,8 @@ const BLUR_REACH: usize = 3;
 const SPREAD: usize = 2 * BLUR_REACH + 2;
 /// Cells that are worked on together.
 const CHUNK: usize = 16;
+// A row of a point's cells lies within two chunks.
+const _: () = assert!(SPREAD <= CHUNK + 1);
 /// The value of a fully occupied cell.
 pub(super) const FULL: f32 = 255.0;
 
@@ -56,7 +58,7 @@ pub(super) struct MapLevel {
     /// Sum of the images.
     sum: Vec<u16>,
     images: usize,
-    /// A keyframe before it is saturated; zero between two of them. Whole chunks: a few cells more than n x n.
+    /// A keyframe before it is saturated; all zero between calls of `draw`. Whole chunks: a few cells more than n x n.
     drawing: Vec<f32>,
     /// Whether there is anything in a chunk of the drawing.
     drawn: Vec<bool>,
@@ -137,8 +139,8 @@ impl MapLevel {
         self.combine(image, [[0, 0], [self.n, self.n]], subtract);
     }
 
-    /// Moves the sum to the square of a new image, and adds it. `others` are all images that the sum has already: what the square
-    /// comes upon has to be summed anew.
+    /// Moves the sum to the square of a new image, and adds it. `others` are all images that the sum has already: newly covered
+    /// cells are summed anew.
     pub fn add_newest<'a>(
         &mut self,
         newest: &Image,
@@ -155,8 +157,8 @@ impl MapLevel {
         self.combine(newest, [[0, 0], [self.n, self.n]], add);
     }
 
-    /// Moves the square of the sum by so many cells, and empties what it comes upon: the rows and the columns that are returned, each as
-    /// the first cell and the one behind the last, (x, y).
+    /// Moves the square of the sum by so many cells, and empties the newly covered ones: the rows and the columns that are returned,
+    /// each as the first cell and the one behind the last, (x, y).
     fn move_sum(&mut self, down: i64, right: i64) -> [[[usize; 2]; 2]; 2] {
         let n = self.n;
         let (rows, columns) = (exposed(down, n), exposed(right, n));
@@ -228,7 +230,7 @@ impl MapLevel {
     }
 }
 
-/// Returns the cells that a range of n cells comes upon when it moves by `by` cells.
+/// Returns the newly covered cells of a range of n cells that moves by `by` cells.
 fn exposed(by: i64, n: usize) -> std::ops::Range<usize> {
     let count = by.unsigned_abs().min(n as u64) as usize;
     if by >= 0 { n - count..n } else { 0..count }
@@ -281,7 +283,7 @@ fn spread(points: &DeskewedPoints, place: &Place, drawing: &mut [f32], drawn: &m
     }
 }
 
-/// Returns the shares of the cells along an axis of a point that lies by this share of a cell behind the middle one of the first seven.
+/// Returns the weights of the cells along an axis, for a point that lies this fraction of a cell behind the fourth of them.
 #[inline(always)]
 fn shares(behind: f32) -> [f32; SPREAD] {
     const NEAR: [f32; SPREAD] = [
@@ -397,7 +399,7 @@ mod tests {
         /// Whatever way the vehicle takes, back over what has left the square too.
         #[test]
         fn a_sum_that_is_kept_up_is_the_sum_of_all_images(
-            steps in proptest::collection::vec((-30.0..30.0, -30.0..30.0), 1..12),
+            steps in proptest::collection::vec((-120.0..120.0, -30.0..30.0), 1..12),
         ) {
             let mut kept = MapLevel::new(1.0, 10.0);
             let mut anew = MapLevel::new(1.0, 10.0);

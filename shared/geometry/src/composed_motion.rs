@@ -82,71 +82,97 @@ impl OdometryMotion {
     }
 }
 
-/// Motions composed one after the other, with the covariance of the pose that they lead to.
+/// Motions of an odometry composed one after the other.
 ///
 /// With the drift D_k of each motion, the noise N_0 and N_n of the first and the last pose, the Jacobians J_k of Checchin et al.,
-/// Eqs. 1 and 2, the displacement d = (x, y, 0) and the standard deviation of the scale, the covariance is
+/// Eqs. 1 and 2, from pose k to the last, the displacement d = (x, y, 0) and the standard deviation of the scale, the covariance is
 ///
 /// ```text
-/// N_0 + sum of J_k D_k J_k' + N_n + scale_sigma^2 d d'
+/// J_0 N_0 J_0' + sum of J_k D_k J_k' + N_n + scale_sigma^2 d d'
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stretch {
-    /// The composed motion, with the part of its covariance that a longer stretch has too: N_0 and the drift.
-    lasting: UncertainMotion,
-    /// N_n and the term of the scale.
-    passing: Matrix3<f64>,
+pub struct ComposedMotion {
+    motion: Pose,
+    covariance: Matrix3<f64>,
+    /// The first two terms of the covariance, which further motions carry on.
+    accumulated: Matrix3<f64>,
 }
 
-impl Stretch {
+impl ComposedMotion {
     /// Starts at an exact pose.
     pub fn new() -> Self {
-        Self::resume(UncertainMotion::identity())
+        Self::resume(UncertainMotion::identity(), Matrix3::zeros())
     }
 
-    /// Starts with the first of some motions. Where it begins has half of its noise.
+    /// Starts with the first of some motions, at a pose with noise.
     pub fn of(first: &OdometryMotion) -> Self {
-        let mut stretch = Self::new().then(first);
-        stretch.lasting.covariance += first.noise();
-        stretch
+        let mut composed = Self::new().then(first);
+        composed.covariance += first.noise();
+        composed.accumulated += first.noise();
+        composed
     }
 
-    /// Continues after a stretch, given its [`lasting`](Self::lasting) part.
-    pub fn resume(lasting: UncertainMotion) -> Self {
+    /// Continues from a composed motion and the accumulated part of its covariance.
+    pub fn resume(composed: UncertainMotion, accumulated: Matrix3<f64>) -> Self {
         Self {
-            lasting,
-            passing: Matrix3::zeros(),
+            motion: composed.motion,
+            covariance: composed.covariance,
+            accumulated,
         }
     }
 
-    /// Continues with the next motion.
+    /// Continues with the next motion. One that is exactly zero, as of a vehicle that stands or where a chain starts anew, leaves the
+    /// pose as it is, with its noise.
     #[must_use]
     pub fn then(&self, next: &OdometryMotion) -> Self {
-        let lasting = self.lasting.then(&next.drift()).normalized();
-        let turn = self.lasting.motion.rotation.to_rotation_matrix();
-        let turn = turn.to_homogeneous();
-        let [x_m, y_m, _] = xy_yaw(&lasting.motion);
-        let by_scale = Vector3::new(x_m, y_m, 0.0) * next.scale_sigma;
+        let before = UncertainMotion {
+            motion: self.motion,
+            covariance: self.accumulated,
+        };
+        let after = before.then(&next.drift());
+        let at_the_end = if next.motion == Pose::identity() {
+            self.covariance - self.accumulated
+        } else {
+            let turn = self.motion.rotation.to_rotation_matrix().to_homogeneous();
+            let [x_m, y_m, _] = xy_yaw(&after.motion);
+            let by_scale = Vector3::new(x_m, y_m, 0.0) * next.scale_sigma;
+            turn * next.noise() * turn.transpose() + by_scale * by_scale.transpose()
+        };
         Self {
-            lasting,
-            passing: turn * next.noise() * turn.transpose() + by_scale * by_scale.transpose(),
+            motion: after.motion,
+            covariance: after.covariance + at_the_end,
+            accumulated: after.covariance,
         }
     }
 
-    /// Returns the composed motion with its covariance.
+    /// Returns the motion with its covariance.
     pub fn motion(&self) -> UncertainMotion {
-        let mut motion = self.lasting;
-        motion.covariance += self.passing;
-        motion.normalized()
+        UncertainMotion {
+            motion: self.motion,
+            covariance: self.covariance,
+        }
     }
 
-    /// Returns the composed motion with the part of its covariance that a longer stretch has too.
-    pub fn lasting(&self) -> UncertainMotion {
-        self.lasting
+    /// Returns the part of the covariance that further motions carry on: the drift, and the noise where the first motion begins.
+    pub fn accumulated(&self) -> Matrix3<f64> {
+        self.accumulated
+    }
+
+    /// Rebuilds it as [`UncertainMotion::normalized`] does.
+    #[must_use]
+    pub fn normalized(&self) -> Self {
+        let accumulated = UncertainMotion {
+            motion: self.motion,
+            covariance: self.accumulated,
+        };
+        Self::resume(
+            self.motion().normalized(),
+            accumulated.normalized().covariance,
+        )
     }
 }
 
-impl Default for Stretch {
+impl Default for ComposedMotion {
     fn default() -> Self {
         Self::new()
     }
@@ -154,6 +180,8 @@ impl Default for Stretch {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::FRAC_PI_2;
+
     use super::*;
     use crate::pose;
 
@@ -168,7 +196,7 @@ mod tests {
 
     fn composed(step: &OdometryMotion, count: usize) -> UncertainMotion {
         (1..count)
-            .fold(Stretch::of(step), |stretch, _| stretch.then(step))
+            .fold(ComposedMotion::of(step), |so_far, _| so_far.then(step))
             .motion()
     }
 
@@ -184,9 +212,7 @@ mod tests {
     #[test]
     fn motions_that_are_all_drift_are_composed_as_independent_ones() {
         let step = step(1.0, 0.0);
-        let independent = (1..9).fold(step.alone(), |so_far, _| {
-            so_far.then(&step.alone()).normalized()
-        });
+        let independent = (1..9).fold(step.alone(), |so_far, _| so_far.then(&step.alone()));
         assert_eq!(composed(&step, 9), independent);
     }
 
@@ -216,10 +242,44 @@ mod tests {
     }
 
     #[test]
-    fn a_stretch_goes_on_from_its_lasting_part() {
-        let step = step(0.2, 0.003);
-        let first = (0..5).fold(Stretch::new(), |stretch, _| stretch.then(&step));
-        let resumed = Stretch::resume(first.lasting());
-        assert_eq!(resumed.then(&step), first.then(&step));
+    fn a_scale_counts_along_the_displacement_from_the_start_whatever_way_led_there() {
+        let exact = |x_m, yaw_rad| OdometryMotion {
+            motion: pose(x_m, 0.0, yaw_rad),
+            covariance: Matrix3::zeros(),
+            ..step(0.25, 0.01)
+        };
+        let (ahead, turn) = (exact(30.0, 0.0), exact(40.0, FRAC_PI_2));
+        let end = [ahead, turn, ahead]
+            .iter()
+            .fold(ComposedMotion::new(), |so_far, next| so_far.then(next));
+        let expected = Matrix3::new(49.0, 21.0, 0.0, 21.0, 9.0, 0.0, 0.0, 0.0, 0.0) * 1e-2;
+        assert!((end.motion().covariance - expected).norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_vehicle_that_stands_keeps_the_noise_of_its_pose() {
+        let step = step(0.25, 0.01);
+        let arrived = ComposedMotion::of(&step).then(&step);
+        let held = OdometryMotion {
+            motion: Pose::identity(),
+            ..step
+        };
+        let after = arrived.then(&held).then(&held);
+        let drift = held.drift().covariance * 2.0;
+        let turn = arrived.motion().motion.rotation.to_rotation_matrix();
+        let turn = turn.to_homogeneous();
+        let expected = arrived.motion().covariance + turn * drift * turn.transpose();
+        assert!((after.motion().covariance - expected).norm() < 1e-15);
+        assert_eq!(after.motion().motion, arrived.motion().motion);
+    }
+
+    #[test]
+    fn the_start_of_a_new_chain_changes_nothing() {
+        let arrived = ComposedMotion::of(&step(0.25, 0.01)).normalized();
+        let after = arrived.then(&OdometryMotion::default()).normalized();
+        let apart = after.motion().covariance - arrived.motion().covariance;
+        assert!(apart.norm() < 1e-18);
+        assert_eq!(after.accumulated(), arrived.accumulated());
+        assert_eq!(after.motion().motion, arrived.motion().motion);
     }
 }
