@@ -2,9 +2,11 @@
 
 use std::{ops::Range, path::Path};
 
-use gyre::Failure;
-use gyre_geometry::Pose;
+use gyre::{Failure, odometry};
+use gyre_evaluation::TimedMotion;
+use gyre_geometry::{Pose, wrap_angle};
 use gyre_radar::{DatasetOptions, OwnedScan, SweepGeometry};
+use serde_json::json;
 
 use super::{
     grid::{RangeGrid, resample},
@@ -15,13 +17,15 @@ use super::{
 use crate::{
     cli::RealismArguments,
     recording::{Recording, Track},
-    report::Record,
+    report::{Record, record},
     sequence::Sequence,
     tables::rows::Rows,
 };
 
 /// Consecutive scans that are measured in a row.
 const RUN: usize = 8;
+/// A motion by more than this is one in a turn: 2 degrees.
+const TURNING_RAD: f64 = 0.035;
 /// A recording with fewer scans is not halved.
 const MIN_HALVED: usize = 6;
 
@@ -98,14 +102,19 @@ impl Subject {
         first.first().map(|scan| scan.geometry).ok_or_else(none)
     }
 
-    /// Runs the search in the paper's form and the shipped configuration on the first `scans` scans, if there are two.
+    /// Runs the search in the paper's form, the shipped configuration, and this without refinement on the first `scans` scans, if there are two.
     pub fn search(&mut self, scans: usize, out: &Path) -> Result<(), Failure> {
         let scans = self.recording.played.len().min(scans);
         if scans < 2 {
             return Ok(());
         }
         let rows = Rows::read()?;
-        for (search, row) in [("plain", "f-raw, line 14"), ("refined", "Gyre")] {
+        let mut motions = Vec::new();
+        for (search, row) in [
+            ("plain", "f-raw, line 14"),
+            ("alone", "Gyre, search alone"),
+            ("refined", "Gyre"),
+        ] {
             let named = rows.named(row);
             let mut changes = named.map_or_else(Vec::new, |row| row.changes(&rows));
             changes.push(format!("source.scans={scans}"));
@@ -114,6 +123,10 @@ impl Subject {
             self.odometry = Some(Track::read(&folder.join("trajectory.tum"))?);
             let named = |(key, value)| (format!("{search}/{key}"), value);
             self.searches.extend(figures.into_iter().map(named));
+            motions.push(odometry::read(&folder.join("odometry.csv"))?);
+        }
+        if let [_, alone, refined] = motions.as_slice() {
+            self.searches.extend(differences(alone, refined));
         }
         Ok(())
     }
@@ -164,6 +177,34 @@ impl Subject {
         }
         Ok(Statistics::of(&samples, &raw, grid)?)
     }
+}
+
+/// The differences of motions by two methods, RMS: what they owe to the scans needs no truth to be seen.
+fn differences(a: &[TimedMotion], b: &[TimedMotion]) -> Record {
+    let apart = |(a, b): (&TimedMotion, &TimedMotion)| {
+        let (a, b) = (a.estimate.motion, b.estimate.motion);
+        let turn_rad = wrap_angle(a.rotation.angle() - b.rotation.angle());
+        let shift_m = (a.translation.vector - b.translation.vector).norm();
+        (
+            shift_m,
+            turn_rad.to_degrees(),
+            b.rotation.angle().abs() > TURNING_RAD,
+        )
+    };
+    let apart: Vec<_> = a.iter().zip(b).map(apart).collect();
+    let rms = |values: &mut dyn Iterator<Item = f64>| {
+        let (count, sum) = values.fold((0, 0.0), |(count, sum), v| (count + 1, sum + v * v));
+        (count > 0).then(|| (sum / f64::from(count)).sqrt())
+    };
+    let yaw = |turns: bool| {
+        let some = apart.iter().filter(|(.., turning)| *turning == turns);
+        rms(&mut some.map(|(_, yaw_deg, _)| *yaw_deg))
+    };
+    record(json!({
+        "difference/translation_m": rms(&mut apart.iter().map(|(shift_m, ..)| *shift_m)),
+        "difference/straight_deg": yaw(false),
+        "difference/turning_deg": yaw(true),
+    }))
 }
 
 fn motion(track: &Track, from_ns: i64, to_ns: i64) -> Option<Pose> {
