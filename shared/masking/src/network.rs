@@ -1,5 +1,6 @@
 //! A learned mask: a network in ONNX Runtime or in tract.
 
+mod floating_point;
 mod onnx_runtime;
 mod tract;
 

@@ -11,7 +11,7 @@ use tract_onnx::{
     },
 };
 
-use super::{NetworkError, fill, one_line};
+use super::{NetworkError, fill, floating_point::keep_activations_in_floating_point, one_line};
 use crate::{Backend, model::Model};
 
 /// The newest operators that tract is tested with.
@@ -35,7 +35,10 @@ impl Tract {
         };
         let onnx = tract_onnx::onnx();
         let file = onnx.proto_model_for_read(&mut &model.bytes[..]);
-        let file = file.map_err(rejected)?;
+        let mut file = file.map_err(rejected)?;
+        if let Some(graph) = &mut file.graph {
+            keep_activations_in_floating_point(graph);
+        }
         match newest_operators(&file) {
             opset if opset > OPSET => Err(NetworkError::Opset {
                 path: model.file.clone(),
