@@ -179,7 +179,7 @@ impl Subject {
     }
 }
 
-/// The differences of motions by two methods, RMS: what they owe to the scans needs no truth to be seen.
+/// Returns the RMS differences of the motions by two methods on the same scans. They need no truth.
 fn differences(a: &[TimedMotion], b: &[TimedMotion]) -> Record {
     let apart = |(a, b): (&TimedMotion, &TimedMotion)| {
         let (a, b) = (a.estimate.motion, b.estimate.motion);

@@ -51,6 +51,7 @@ mod tests {
         assert!(near(end.x_m, 2.0) && near(end.y_m, 3.0) && near(end.yaw_rad, PI));
         assert!(near(end.covariance[0], 5.0) && near(end.covariance[3], 5.0));
     }
+
     /// What `Odometry` does in one process, to the bit.
     #[test]
     fn poses_are_those_of_motions_composed_without_messages() {

@@ -22,7 +22,7 @@ pub struct OdometryMotion {
 }
 
 impl Default for OdometryMotion {
-    /// No motion, without any error.
+    /// No motion, without any error: that of a message of zeros, where a chain of motions starts.
     fn default() -> Self {
         Self {
             drift_share: 0.0,
@@ -84,11 +84,11 @@ impl OdometryMotion {
 
 /// Motions of an odometry composed one after the other.
 ///
-/// With the drift D_k of each motion, the noise N_0 and N_n of the first and the last pose, the Jacobians J_k of Checchin et al.,
+/// With the drift D_k of the motion to pose k, the noise N_0 and N_n of the first and the last pose, the Jacobians J_k of Checchin et al.,
 /// Eqs. 1 and 2, from pose k to the last, the displacement d = (x, y, 0) and the standard deviation of the scale, the covariance is
 ///
 /// ```text
-/// J_0 N_0 J_0' + sum of J_k D_k J_k' + N_n + scale_sigma^2 d d'
+/// J_1 N_0 J_1' + sum of J_k D_k J_k' + N_n + scale_sigma^2 d d'
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ComposedMotion {
@@ -106,7 +106,12 @@ impl ComposedMotion {
 
     /// Starts with the first of some motions, at a pose with noise.
     pub fn of(first: &OdometryMotion) -> Self {
-        let mut composed = Self::new().then(first);
+        // A vehicle that stands keeps the noise that the pose has here.
+        let start = UncertainMotion {
+            covariance: first.noise(),
+            ..UncertainMotion::identity()
+        };
+        let mut composed = Self::resume(start, Matrix3::zeros()).then(first);
         composed.covariance += first.noise();
         composed.accumulated += first.noise();
         composed
@@ -122,7 +127,7 @@ impl ComposedMotion {
     }
 
     /// Continues with the next motion. One that is exactly zero, as of a vehicle that stands or where a chain starts anew, leaves the
-    /// pose as it is, with its noise.
+    /// pose as it is, with its noise. What a vehicle drives between two chains is in no covariance.
     #[must_use]
     pub fn then(&self, next: &OdometryMotion) -> Self {
         let before = UncertainMotion {
@@ -207,6 +212,16 @@ mod tests {
             let apart = composed(&step, 1).covariance - step.covariance;
             assert!(apart.norm() < 1e-18, "{share}: {apart}");
         }
+    }
+
+    #[test]
+    fn a_vehicle_that_stands_has_the_covariance_of_its_motion() {
+        let held = OdometryMotion {
+            motion: Pose::identity(),
+            ..step(0.3, 0.01)
+        };
+        let apart = composed(&held, 1).covariance - held.covariance;
+        assert!(apart.norm() < 1e-18, "{apart}");
     }
 
     #[test]

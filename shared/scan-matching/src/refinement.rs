@@ -26,10 +26,8 @@ mod standstill;
 mod tracker;
 mod uncertainty;
 
-use gyre_geometry::{OdometryMotion, Pose, SparsePoint, Twist, UncertainMotion};
-use nalgebra::Matrix3;
-
 pub use config::{RefinementConfig, RefinementKind};
+use gyre_geometry::{OdometryMotion, Pose, SparsePoint, Twist, UncertainMotion};
 pub use initial_guess::InitialGuess;
 pub use keyframe_aligner::KeyframeAligner;
 pub use local_map::Keyframe;
@@ -171,9 +169,13 @@ impl Refiner {
             // Stamps that do not advance give no velocity: a second is assumed.
             interval_s: if interval_s > 0.0 { interval_s } else { 1.0 },
         };
-        if self.map.is_empty() {
+        // Predictions in a row whose error a match takes back. A new map starts at the pose that they led to, with their error.
+        let predictions = if self.map.is_empty() {
             self.start_map(&scan, earlier);
-        }
+            0
+        } else {
+            self.state.unmatched
+        };
         let predicted = self.state.predict(scan.interval_s);
         let mut best = self.align(&scan, &initial_guesses(predicted, scan.searched));
         if !best.is_plausible {
@@ -183,12 +185,17 @@ impl Refiner {
             }
         }
         let (outcome, estimate) = self.accept_or_predict(&scan, &best);
-        let reported = self.report(&scan, outcome, estimate);
-        let (unmatched, keyframes) = (self.state.unmatched, self.map.len());
+        let mut reported = self.report(&scan, outcome, estimate);
+        let stationary = self.config.hold_standstill && self.state.standstill.stands();
+        if !stationary {
+            let of_one = uncertainty::of_prediction(scan.interval_s, &self.config);
+            reported.covariance += of_one * f64::from(predictions);
+        }
+        let keyframes = self.map.len();
         self.update(&scan, &best, outcome, &estimate.motion);
         let drift_share = if self.map.is_empty() {
             1.0
-        } else if outcome == Outcome::Predicted || unmatched > 0 {
+        } else if outcome == Outcome::Predicted || predictions > 0 {
             uncertainty::MIN_DRIFT_SHARE
         } else {
             uncertainty::drift_share(keyframes, &self.config)
@@ -200,7 +207,7 @@ impl Refiner {
                 drift_share,
                 scale_sigma: self.config.scale_sigma,
             },
-            stationary: self.config.hold_standstill && self.state.standstill.stands(),
+            stationary,
             overlap: best.overlap,
             support: best.support,
             guess: match outcome {
@@ -351,23 +358,16 @@ impl Refiner {
             uncertainty::of_alignment(&best.alignment, &self.points, pose, &self.config);
         let Some(covariance) = covariance.filter(|_| best.is_plausible) else {
             let [motion, _] = self.state.predict(scan.interval_s);
-            let covariance = self.predicted_covariance(scan, self.state.unmatched + 1);
+            let covariance = uncertainty::of_prediction(scan.interval_s, &self.config);
             return (Outcome::Predicted, UncertainMotion { motion, covariance });
         };
         let motion = best.alignment.pose;
-        // The match takes back the error of the predictions before it.
-        let covariance = covariance + self.predicted_covariance(scan, self.state.unmatched);
         if self.is_firm(scan, best) || self.state.doubtful >= MAX_DOUBTFUL {
             (Outcome::Refined, UncertainMotion { motion, covariance })
         } else {
             let covariance = covariance * WEAK_COVARIANCE_FACTOR;
             (Outcome::Weak, UncertainMotion { motion, covariance })
         }
-    }
-
-    /// The covariance of the pose that a number of predictions leads to.
-    fn predicted_covariance(&self, scan: &Scan<'_>, predictions: u32) -> Matrix3<f64> {
-        uncertainty::of_prediction(scan.interval_s, &self.config) * f64::from(predictions)
     }
 
     /// Returns whether the scan overlaps the map well, has enough points, and agrees with the search.

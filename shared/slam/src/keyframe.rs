@@ -21,8 +21,8 @@ pub struct Keyframe {
     /// The motion by odometry from the keyframe before, with the covariance of its drift along that keyframe's axes; zero at the first
     /// one.
     pub motion: UncertainMotion,
-    /// Covariance of the noise of the pose, along its own axes. Submaps are drawn at poses with this noise, and motions lead from one to
-    /// the next: it is no error of either, but of the pose alone. See [`OdometryMotion`](gyre_geometry::OdometryMotion).
+    /// Covariance of the noise of the pose, along its own axes. It is in the covariance of the corrected pose, and in none of motions or
+    /// loops. See [`OdometryMotion`](gyre_geometry::OdometryMotion).
     pub noise: Matrix3<f64>,
     /// Velocity of the sensor.
     pub twist: Twist,

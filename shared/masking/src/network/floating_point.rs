@@ -1,6 +1,6 @@
 //! Networks with quantised activations, computed in floating point.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 
 use tract_onnx::pb::{GraphProto, NodeProto, TensorProto, tensor_proto::DataType};
 
@@ -10,31 +10,39 @@ const DEQUANTIZE: &str = "DequantizeLinear";
 /// Takes the quantisation of activations out of a graph.
 ///
 /// A pair of `QuantizeLinear` and `DequantizeLinear` stands for integers between two layers. A library without integer kernels computes
-/// both, and the layers in floating point all the same. What a pair does beside rounding is to cut off negative values where its smallest
-/// integer stands for zero: this stays, as `Relu`. Weights are dequantised once, when the network is loaded.
+/// both, and the layers in floating point all the same. Beside rounding, a pair cuts off what its integers cannot hold: above, what
+/// training hardly reaches; below, where the smallest integer stands for zero, negative values. This stays, as `Relu`. Weights are
+/// dequantised once, when the network is loaded.
 pub(super) fn keep_activations_in_floating_point(graph: &mut GraphProto) {
     let between = between_layers(graph);
-    let cut_off: BTreeSet<String> = graph
-        .initializer
-        .iter()
-        .filter(|tensor| is_smallest_integer(tensor))
-        .map(|tensor| tensor.name.clone())
-        .collect();
+    let of = |values: &[String]| between.get(values.first()?).copied();
     for node in &mut graph.node {
-        let pair_of = |values: &[String]| values.first().is_some_and(|it| between.contains(it));
-        if node.op_type == QUANTIZE && pair_of(&node.output) {
-            let cuts_off = node.input.get(2).is_none_or(|zero| cut_off.contains(zero));
+        if node.op_type == QUANTIZE
+            && let Some(cuts_off) = of(&node.output)
+        {
             replace(node, if cuts_off { "Relu" } else { "Identity" });
-        } else if node.op_type == DEQUANTIZE && pair_of(&node.input) {
+        } else if node.op_type == DEQUANTIZE && of(&node.input).is_some() {
             replace(node, "Identity");
         }
     }
 }
 
-/// Returns the quantised values that are dequantised again, and nothing else.
-fn between_layers(graph: &GraphProto) -> BTreeSet<String> {
-    let of = |kind: &'static str| graph.node.iter().filter(move |node| node.op_type == kind);
-    let mut between: BTreeSet<String> = of(QUANTIZE).flat_map(|q| q.output.clone()).collect();
+/// Returns the quantised values that are dequantised again, and nothing else, and whether their quantisation cuts off negative values.
+fn between_layers(graph: &GraphProto) -> BTreeMap<String, bool> {
+    let smallest: BTreeMap<&str, bool> = graph
+        .initializer
+        .iter()
+        .filter_map(|tensor| Some((&*tensor.name, is_smallest_integer(tensor)?)))
+        .collect();
+    let cuts_off = |node: &NodeProto| match node.input.get(2).map(String::as_str) {
+        // By default it is 0, of the integers from 0 to 255.
+        None | Some("") => Some(true),
+        Some(zero) => smallest.get(zero).copied(),
+    };
+    let quantised = graph.node.iter().filter(|node| node.op_type == QUANTIZE);
+    let mut between: BTreeMap<String, bool> = quantised
+        .filter_map(|node| Some((node.output.first()?.clone(), cuts_off(node)?)))
+        .collect();
     for node in graph.node.iter().filter(|node| node.op_type != DEQUANTIZE) {
         node.input.iter().for_each(|it| _ = between.remove(it));
     }
@@ -50,12 +58,12 @@ fn replace(node: &mut NodeProto, by: &str) {
     node.attribute.clear();
 }
 
-/// Returns whether all values are the smallest of their type of integers.
-fn is_smallest_integer(tensor: &TensorProto) -> bool {
+/// Returns whether all values are the smallest of their type of integers; `None` if they cannot be read here.
+fn is_smallest_integer(tensor: &TensorProto) -> Option<bool> {
     let smallest = match DataType::try_from(tensor.data_type) {
         Ok(DataType::Uint8) => 0,
         Ok(DataType::Int8) => i8::MIN as u8,
-        _ => return false,
+        _ => return None,
     };
     let mut values = tensor
         .raw_data
@@ -63,7 +71,8 @@ fn is_smallest_integer(tensor: &TensorProto) -> bool {
         .copied()
         .chain(tensor.int32_data.iter().map(|value| *value as u8))
         .peekable();
-    values.peek().is_some() && values.all(|value| value == smallest)
+    values.peek()?;
+    Some(values.all(|value| value == smallest))
 }
 
 #[cfg(test)]
@@ -125,6 +134,9 @@ mod tests {
             node(QUANTIZE, &["a", "s", "zero"], "b"),
             node(DEQUANTIZE, &["b", "s", "zero"], "c"),
             node("ConvInteger", &["b", "k"], "d"),
+            // A zero point that is not at hand.
+            node(QUANTIZE, &["a", "s", "computed"], "e"),
+            node(DEQUANTIZE, &["e", "s", "computed"], "f"),
         ];
         let mut graph = GraphProto {
             node: nodes.clone(),

@@ -5,8 +5,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{RefinementConfig, alignment::Alignment, points::DeskewedPoints};
 
-/// The share of a motion's covariance that stays where the map does not drift: a prediction's error is taken back by the next match. Not
-/// zero, since edges of a pose graph need a covariance that has an inverse.
+/// Drift share of a prediction, whose error the next match takes back, and of that match. Not zero, since edges of a pose graph need a
+/// covariance that has an inverse.
 pub(super) const MIN_DRIFT_SHARE: f64 = 1e-3;
 
 /// The covariance of the motion from `previous` to an alignment, from the information matrix; `None` if the points do not
