@@ -24,8 +24,8 @@ use crate::{
 
 /// Consecutive scans that are measured in a row.
 const RUN: usize = 8;
-/// A motion by more than this is one in a turn: 2 degrees.
-const TURNING_RAD: f64 = 0.035;
+/// A motion that rotates by more than this is one in a turn.
+const TURNING_DEG: f64 = 2.0;
 /// A recording with fewer scans is not halved.
 const MIN_HALVED: usize = 6;
 
@@ -102,7 +102,8 @@ impl Subject {
         first.first().map(|scan| scan.geometry).ok_or_else(none)
     }
 
-    /// Runs the search in the paper's form, the shipped configuration, and this without refinement on the first `scans` scans, if there are two.
+    /// Runs the search in the paper's form, and the shipped configuration without refinement and with it, on the first `scans` scans, if
+    /// there are two.
     pub fn search(&mut self, scans: usize, out: &Path) -> Result<(), Failure> {
         let scans = self.recording.played.len().min(scans);
         if scans < 2 {
@@ -188,7 +189,7 @@ fn differences(a: &[TimedMotion], b: &[TimedMotion]) -> Record {
         (
             shift_m,
             turn_rad.to_degrees(),
-            b.rotation.angle().abs() > TURNING_RAD,
+            b.rotation.angle().to_degrees().abs() > TURNING_DEG,
         )
     };
     let apart: Vec<_> = a.iter().zip(b).map(apart).collect();
