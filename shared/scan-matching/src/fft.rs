@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use realfft::{ComplexToReal, RealFftPlanner};
 use rustfft::{Fft, FftDirection, FftPlanner, num_complex::Complex32};
 
 use crate::kernels;
@@ -175,50 +175,77 @@ impl RowPass {
     }
 }
 
+/// Transform of two real lines at once: that of g + i h, whose halves are then separated.
+///
+/// Faster than `realfft`, which separates the halves of a single line without vector instructions.
+pub(crate) struct RealLines {
+    transform: Transform,
+    lines: [Vec<f32>; 2],
+    both: Vec<Complex32>,
+}
+
+impl RealLines {
+    pub fn new(size: usize) -> Self {
+        Self {
+            transform: Transform::new(&mut FftPlanner::new(), size, FftDirection::Forward),
+            lines: [vec![0.0; size], vec![0.0; size]],
+            both: vec![Complex32::default(); size],
+        }
+    }
+
+    /// Transforms the lines that `fill(0, line)` and `fill(1, line)` write into lines of zeros, and keeps the first harmonics of each, as
+    /// many as there is room for. Without room for the second one it is not asked for.
+    pub fn forward(
+        &mut self,
+        mut fill: impl FnMut(usize, &mut [f32]),
+        [first, second]: [&mut [Complex32]; 2],
+    ) {
+        for (k, line) in self.lines.iter_mut().enumerate() {
+            line.fill(0.0);
+            if k == 0 || !second.is_empty() {
+                fill(k, line);
+            }
+        }
+        kernels::interleave(&self.lines[0], &self.lines[1], &mut self.both);
+        self.transform.lines(&mut self.both);
+        kernels::separate(&self.both, first, second);
+    }
+}
+
 /// Spectrum of a real square image, only the columns of its low frequencies.
 pub(crate) struct RealSpectrum {
-    size: usize,
-    row: Arc<dyn RealToComplex<f32>>,
+    rows: RealLines,
     columns: Transform,
-    real: Vec<f32>,
     block: Vec<Complex32>,
-    scratch: Vec<Complex32>,
     /// Column c holds column frequency c; its row k holds row frequency k (k - size beyond the middle).
     pub plane: Columns,
 }
 
 impl RealSpectrum {
-    /// Transform of `size` a side that keeps the column frequencies below `kept`.
+    /// Transform of `size` a side that keeps the column frequencies below `kept`, at most size / 2 + 1.
     pub fn new(size: usize, kept: usize) -> Self {
-        let row = RealFftPlanner::new().plan_fft_forward(size);
         Self {
-            size,
+            rows: RealLines::new(size),
             columns: Transform::new(&mut FftPlanner::new(), size, FftDirection::Forward),
-            real: vec![0.0; size],
-            block: vec![Complex32::default(); BLOCK * (size / 2 + 1)],
-            scratch: row.make_scratch_vec(),
-            row,
+            block: vec![Complex32::default(); BLOCK * kept],
             plane: Columns::new(kept, size),
         }
     }
 
     /// Transforms `rows` rows of an image; `fill(r, row)` writes the start of row r, the rest is zero.
     pub fn forward(&mut self, rows: usize, mut fill: impl FnMut(usize, &mut [f32])) {
-        let width = self.size / 2 + 1;
+        let kept = self.plane.count();
         for first in (0..rows).step_by(BLOCK) {
             let some = BLOCK.min(rows - first);
-            for (r, out) in self.block.chunks_exact_mut(width).take(some).enumerate() {
-                self.real.fill(0.0);
-                fill(first + r, &mut self.real);
-                let done = self
-                    .row
-                    .process_with_scratch(&mut self.real, out, &mut self.scratch);
-                debug_assert!(done.is_ok(), "lengths are those of the plan");
+            let pairs = self.block[..some * kept].chunks_mut(2 * kept);
+            for (k, pair) in pairs.enumerate() {
+                let (upper, lower) = pair.split_at_mut(kept);
+                self.rows
+                    .forward(|r, row| fill(first + 2 * k + r, row), [upper, lower]);
             }
-            self.plane.write_rows(first, some, &self.block, width);
+            self.plane.write_rows(first, some, &self.block, kept);
         }
         self.plane.clear_from(rows);
-        let kept = self.plane.count();
         self.columns.columns(&mut self.plane, kept);
     }
 }

@@ -1,7 +1,7 @@
 //! The inner loops, compiled for several vector units; the variant for the processor is chosen at run time.
 
-// Bilinear lookups read at computed positions. A checked read keeps the compiler from vectorising over samples, which
-// triples the time of the image rotation. Every position is clamped to the image right before it is read.
+// Bilinear lookups read at computed positions, without checks and two neighbours at a time. Every position is clamped to the
+// image right before it is read.
 #![allow(unsafe_code)]
 
 use gyre_simd::simd;
@@ -24,20 +24,39 @@ pub(crate) struct Bilinear {
     pub across: f32,
 }
 
-impl Bilinear {
-    /// The value of an image with rows of `stride`.
+/// Samples that are looked up together.
+const CHUNK: usize = 64;
+
+/// The four neighbours of a chunk of samples, pair by pair: those of the first row, and those a row behind.
+struct Neighbours([[[f32; 2]; CHUNK]; 2]);
+
+impl Neighbours {
+    const NONE: Self = Self([[[0.0; 2]; CHUNK]; 2]);
+
+    /// Reads the neighbours of the samples whose first is at `places`.
     ///
     /// # Safety
-    /// `at + stride + 1` must lie in the image.
+    /// Each place plus `stride + 1` must lie in the image.
+    // Not inlined: compiled for wider vectors this loop becomes gathers, which take longer than single reads.
+    #[inline(never)]
+    unsafe fn read(&mut self, image: &[f32], stride: usize, places: &[u32]) {
+        let [first, second] = &mut self.0;
+        for ((first, second), &at) in first.iter_mut().zip(second).zip(places) {
+            // SAFETY: the caller guarantees the last of the four indices; the others are smaller.
+            unsafe {
+                let here = image.as_ptr().add(at as usize);
+                *first = here.cast::<[f32; 2]>().read();
+                *second = here.add(stride).cast::<[f32; 2]>().read();
+            }
+        }
+    }
+
     #[inline(always)]
-    unsafe fn value(self, image: &[f32], stride: usize) -> f32 {
-        let at = self.at as usize;
-        // SAFETY: the caller guarantees the last of the four indices; the others are smaller.
-        let [a, b, c, d] =
-            [at, at + 1, at + stride, at + stride + 1].map(|k| unsafe { *image.get_unchecked(k) });
-        let first = a + self.along * (b - a);
-        let second = c + self.along * (d - c);
-        first + self.across * (second - first)
+    fn value(&self, k: usize, along: f32, across: f32) -> f32 {
+        let [[a, b], [c, d]] = [self.0[0][k], self.0[1][k]];
+        let first = a + along * (b - a);
+        let second = c + along * (d - c);
+        first + across * (second - first)
     }
 }
 
@@ -57,19 +76,25 @@ pub(crate) fn bilinear_line(
     let last = (n - 2) as f32;
     let [row, col] = start.map(|s| s as f32);
     let [row_step, col_step] = step.map(|s| s as f32);
-    for (k, value) in out.iter_mut().enumerate() {
-        let k = k as i32 as f32;
-        let (u, v) = (row + k * row_step, col + k * col_step);
-        // SAFETY: `max` and `min` leave a number in 0..=n - 2 whatever u and v are, NaN included. The checked conversion
-        // takes longer than all the rest.
-        let [i, j] = [u, v].map(|w| unsafe { w.max(0.0).min(last).to_int_unchecked::<i32>() });
-        let sample = Bilinear {
-            at: (i * n as i32 + j) as u32,
-            along: v - j as f32,
-            across: u - i as f32,
-        };
+    let (mut places, mut along, mut across) = ([0; CHUNK], [0.0; CHUNK], [0.0; CHUNK]);
+    let mut neighbours = Neighbours::NONE;
+    for (c, out) in out.chunks_mut(CHUNK).enumerate() {
+        let first = (c * CHUNK) as i32;
+        for k in 0..CHUNK {
+            let t = (first + k as i32) as f32;
+            let (u, v) = (row + t * row_step, col + t * col_step);
+            // SAFETY: `max` and `min` leave a number in 0..=n - 2 whatever u and v are, NaN included. The checked conversion
+            // takes longer than all the rest.
+            let [i, j] = [u, v].map(|w| unsafe { w.max(0.0).min(last).to_int_unchecked::<i32>() });
+            places[k] = (i * n as i32 + j) as u32;
+            along[k] = v - j as f32;
+            across[k] = u - i as f32;
+        }
         // SAFETY: i and j are at most n - 2, and the image has n x n cells.
-        *value = unsafe { sample.value(image, n) };
+        unsafe { neighbours.read(image, n, &places[..out.len()]) };
+        for (k, value) in out.iter_mut().enumerate() {
+            *value = neighbours.value(k, along[k], across[k]);
+        }
     }
 }
 
@@ -78,13 +103,16 @@ pub(crate) fn bilinear_line(
 pub(crate) fn bilinear_table(image: &[f32], stride: usize, table: &[Bilinear], out: &mut [f32]) {
     assert!(image.len() >= stride + 2 && image.len() < 1 << 31);
     let last = (image.len() - stride - 2) as u32;
-    for (value, &sample) in out.iter_mut().zip(table) {
-        let sample = Bilinear {
-            at: sample.at.min(last),
-            ..sample
-        };
-        // SAFETY: `at` is at most the image's length less stride + 2.
-        *value = unsafe { sample.value(image, stride) };
+    let (mut places, mut neighbours) = ([0; CHUNK], Neighbours::NONE);
+    for (table, out) in table.chunks(CHUNK).zip(out.chunks_mut(CHUNK)) {
+        for (place, sample) in places.iter_mut().zip(table) {
+            *place = sample.at.min(last);
+        }
+        // SAFETY: each place is at most the image's length less stride + 2.
+        unsafe { neighbours.read(image, stride, &places[..table.len()]) };
+        for (k, (value, sample)) in out.iter_mut().zip(table).enumerate() {
+            *value = neighbours.value(k, sample.along, sample.across);
+        }
     }
 }
 
@@ -161,6 +189,24 @@ pub(crate) fn add_cross(f: &[Complex32], g: &[Complex32], cross: &mut [Complex32
 pub(crate) fn interleave(g: &[f32], h: &[f32], out: &mut [Complex32]) {
     for ((z, &g), &h) in out.iter_mut().zip(g).zip(h) {
         *z = Complex32::new(g, h);
+    }
+}
+
+/// The first values of the spectra of g and h from that of g + i h, by G(k) = conj(G(-k)).
+#[simd]
+pub(crate) fn separate(both: &[Complex32], g: &mut [Complex32], h: &mut [Complex32]) {
+    let (z, m) = (&both[1..], both[1..].iter().rev());
+    if let [mean, g @ ..] = g {
+        *mean = Complex32::new(both[0].re, 0.0);
+        for ((g, z), m) in g.iter_mut().zip(z).zip(m.clone()) {
+            *g = Complex32::new(0.5 * (z.re + m.re), 0.5 * (z.im - m.im));
+        }
+    }
+    if let [mean, h @ ..] = h {
+        *mean = Complex32::new(both[0].im, 0.0);
+        for ((h, z), m) in h.iter_mut().zip(z).zip(m) {
+            *h = Complex32::new(0.5 * (z.im + m.im), 0.5 * (m.re - z.re));
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use rustfft::num_complex::Complex32;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{ConfigError, Peak, RotationConfig, RotationForm, accept};
-use crate::fft::{RealSpectrum, fast_size};
+use crate::fft::{RealLines, RealSpectrum, fast_size};
 use crate::peak::{line_peak, soft_argmax};
 use crate::polar::PolarGrid;
 use crate::spectrum::PolarSpectrum;
@@ -49,6 +49,7 @@ pub struct RotationSearch {
     config: RotationConfig,
     taper: Vec<f32>,
     transform: RealSpectrum,
+    rings: RealLines,
     grid: PolarGrid,
     forward: Arc<dyn RealToComplex<f32>>,
     inverse: Arc<dyn ComplexToReal<f32>>,
@@ -92,6 +93,7 @@ impl RotationSearch {
             transform: RealSpectrum::new(size, PolarGrid::columns(config.band_high, size)),
             whitening: (config.phase_only && config.form == RotationForm::Eq7)
                 .then(|| Whitening::new(grid.radii, harmonics)),
+            rings: RealLines::new(angles),
             grid,
             forward,
             inverse,
@@ -179,14 +181,15 @@ impl RotationSearch {
     /// One transform along the angle for each radius (Weston et al., Eq. 7).
     fn transform_rings(&mut self, out: &mut PolarSpectrum) {
         let harmonics = out.harmonics();
-        for (r, row) in out.data.chunks_exact_mut(harmonics).enumerate() {
-            self.grid.ring(r, &mut self.ring);
-            let done = self
-                .forward
-                .process_with_scratch(&mut self.ring, row, &mut self.scratch);
-            debug_assert!(done.is_ok(), "lengths are those of the plan");
-            row[0] = Complex32::default();
+        for (k, pair) in out.data.chunks_mut(2 * harmonics).enumerate() {
+            let (first, second) = pair.split_at_mut(harmonics);
+            let ring = |r, ring: &mut [f32]| self.grid.ring(2 * k + r, ring);
+            self.rings.forward(ring, [first, second]);
         }
+        out.data
+            .iter_mut()
+            .step_by(harmonics)
+            .for_each(|mean| *mean = Complex32::default());
     }
 
     /// One transform of the sum over radii (Weston et al., Algorithm 1, line 14).

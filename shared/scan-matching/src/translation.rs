@@ -191,11 +191,7 @@ impl TranslationSearch {
     fn correlate(&mut self, energy: f64) {
         let (n, later, turned) = (self.n, &self.later, &self.turned);
         self.transform.forward(n, |r, out| {
-            let row = r * n..(r + 1) * n;
-            for ((z, &f), &g) in out.iter_mut().zip(&later[row.clone()]).zip(&turned[row]) {
-                z.re = f;
-                z.im = g;
-            }
+            kernels::interleave(&later[r * n..][..n], &turned[r * n..][..n], out);
         });
         self.transform.cross();
         if self.config.phase_only {
