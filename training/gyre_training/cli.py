@@ -81,7 +81,7 @@ def train_recipe(recipe: recipes.Recipe, pairs: Path, work: Path, options: argpa
     scans, validation = (Scans(pairs / f"{split}.npy") for split in ("train", "validation"))
     search = recipes.search_of(scans.settings)
     runs = work / "runs"
-    initial = runs / recipe.initial / "best.pt" if recipe.initial else None
+    initial = recipe.initial_weights(runs)
     common = scans, validation, recipe.network, search
     if recipe.teacher:
         folder, teacher = runs / f"{recipe.name}-distilled", runs / recipe.teacher / "best.pt"

@@ -76,10 +76,7 @@ class Calibration(quantization.CalibrationDataReader):
     """Calibration scans, spread evenly over a file."""
 
     def __init__(self, scans: Scans, inputs: int, examples: int):
-        pairs = scans.pairs(1)
-        pairs = pairs[np.linspace(0, len(pairs) - 1, examples).astype(int)]
-        columns = [1, 0] if inputs == 2 else [1]
-        self.left = iter([scans.rasters(pair[columns])[None].numpy() for pair in pairs])
+        self.left = iter(scans.examples(inputs, examples).numpy()[:, None])
 
     def get_next(self) -> dict | None:
         scans = next(self.left, None)

@@ -65,6 +65,13 @@ class Scans:
         """Returns the rasters (k, n, n)."""
         return torch.from_numpy(self.records["raster"][indices].astype(np.float32))
 
+    def examples(self, inputs: int, count: int) -> Tensor:
+        """Returns inputs of a network (count, inputs, n, n), spread evenly over the file: the later and the earlier scan, or a
+        scan by itself."""
+        pairs = self.pairs(1)
+        pairs = pairs[np.linspace(0, len(pairs) - 1, count).astype(int)]
+        return torch.stack([self.rasters(pair[[1, 0][:inputs]]) for pair in pairs])
+
     def batch(self, pairs: np.ndarray) -> Batch:
         motion = torch.from_numpy(self.motions(pairs)).float()
         return Batch(self.rasters(pairs[:, 1]), self.rasters(pairs[:, 0]), motion)

@@ -22,13 +22,19 @@ class Recipe:
     raster: str
     network: NetworkConfig
     training: TrainingConfig
-    # The recipe whose best weights initialise the network.
+    # The recipe whose best weights initialise the network, or an ONNX file in floats (`models/NAME.onnx`, from the project's root).
     initial: str | None = None
     # The recipe whose masks are distilled before the training, and the settings of the distillation.
     teacher: str | None = None
     distillation: TrainingConfig = TrainingConfig()
     # Quantise the model to 8-bit integers.
     integers: bool = False
+
+    def initial_weights(self, runs: Path) -> Path | None:
+        """Returns the checkpoint or the ONNX file that initialises the network."""
+        if self.initial and self.initial.endswith(".onnx"):
+            return PROJECT / self.initial
+        return runs / self.initial / "best.pt" if self.initial else None
 
     @property
     def configuration(self) -> Path:
@@ -80,5 +86,5 @@ def training_config(values: dict) -> TrainingConfig:
 def lineage(path: Path) -> list[Recipe]:
     """Returns a recipe and those that it depends on, in the order of their training."""
     recipe = read(path)
-    before = [lineage(path.with_name(f"{name}.toml")) for name in (recipe.teacher, recipe.initial) if name]
+    before = [lineage(path.with_name(f"{name}.toml")) for name in (recipe.teacher, recipe.initial) if name and not name.endswith(".onnx")]
     return list({one.name: one for one in [*sum(before, []), recipe]}.values())

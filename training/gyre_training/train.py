@@ -15,6 +15,7 @@ from torch import Tensor, nn
 from .drift import Drift, drift, motions
 from .network import MaskNetwork, NetworkConfig
 from .pairs import Batch, Sampling, Scans, augmented
+from .published import restore
 from .exhaustive import ExhaustiveMatch
 from .search import ScanMatch, SearchConfig
 
@@ -53,6 +54,9 @@ def pose_error(found: Tensor, true: Tensor, angle_weight: float) -> Tensor:
 # is chance.
 SETTLED = 0.8
 
+# Scans over which the statistics of a published model are measured.
+EXAMPLES = 16
+
 # The largest error of the right peak along each axis, cells and rad.
 SAME_PEAK_CELLS, SAME_PEAK_RAD = 1.5, math.radians(1.5)
 
@@ -77,7 +81,9 @@ class Trainer:
         torch.manual_seed(config.seed)
         self.network = MaskNetwork(network).to(self.device)
         self.network.mixed_precision = config.mixed_precision
-        if initial:
+        if initial and initial.suffix == ".onnx":
+            restore(self.network, initial, scans.examples(network.inputs, EXAMPLES))
+        elif initial:
             self.network.load_state_dict(load(initial)["network"])
         match = ExhaustiveMatch if config.exhaustive else ScanMatch
         self.match = match(scans.n, scans.cell_m, search).to(self.device)
@@ -239,9 +245,11 @@ def filled(values: dict, defaults: dict) -> dict:
 
 
 def fingerprint(checkpoint: Path | None) -> str:
-    """Returns a hash of the weights of a checkpoint, empty without one."""
+    """Returns a hash of the weights of a checkpoint or of an ONNX file, empty without one."""
     if not checkpoint:
         return ""
+    if checkpoint.suffix == ".onnx":
+        return hashlib.sha256(checkpoint.read_bytes()).hexdigest()
     digest = hashlib.sha256()
     for weights in load(checkpoint)["network"].values():
         digest.update(weights.numpy().tobytes())

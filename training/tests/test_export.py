@@ -8,6 +8,7 @@ from gyre_training import card
 from gyre_training.export import OPSET, OnnxMasks, export, quantise
 from gyre_training.network import MaskNetwork, NetworkConfig
 from gyre_training.pairs import Scans
+from gyre_training.published import restore
 from scenes import drive
 
 NETWORKS = {
@@ -63,3 +64,25 @@ def test_a_card_identifies_its_file(tmp_path):
     assert (read["model"]["file"], read["model"]["inputs"], read["raster"]["n"]) == ("network.onnx", 2, 31)
     assert read["masking"] == {"floor": 0, "compensate": False, "undo_doppler": True}
     assert read["training"] == {"data": 'a "world"', "widths": [4, 8]}
+
+
+@pytest.mark.parametrize("config", NETWORKS.values(), ids=NETWORKS)
+def test_a_published_model_initialises_a_network(config, scans, tmp_path):
+    torch.manual_seed(1)
+    published, path = MaskNetwork(config), tmp_path / "network.onnx"
+    given = scans_of(scans, config.inputs)
+    published.train()(given)  # statistics that are not the initial ones
+    export(published, scans.n, path)
+    network = MaskNetwork(config)
+    restore(network, path, given)
+    with torch.no_grad():
+        expected = published.eval()(given)
+        assert (network.eval()(given) - expected).abs().max() < 1e-4
+        assert (network.train()(given) - expected).abs().mean() < 1e-3
+
+
+def test_a_model_of_another_shape_initialises_nothing(scans, tmp_path):
+    path = tmp_path / "network.onnx"
+    export(MaskNetwork(NETWORKS["both scans"]), scans.n, path)
+    with pytest.raises(SystemExit, match="another shape"):
+        restore(MaskNetwork(NETWORKS["one scan, folded"]), path, scans_of(scans, 1))

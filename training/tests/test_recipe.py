@@ -9,9 +9,11 @@ SETTINGS = {"raster": {"n": 255}, "rotation": ROTATION, "translation": TRANSLATI
 
 
 @pytest.mark.parametrize("path", sorted((HOME / "recipes").glob("*.toml")), ids=lambda path: path.stem)
-def test_dependencies_of_recipes_start_from_scratch(path):
+def test_dependencies_of_recipes_start_from_scratch_or_from_a_model(path):
     recipes = lineage(path)
-    assert recipes[-1].name == path.stem and not recipes[0].initial and not recipes[0].teacher
+    assert recipes[-1].name == path.stem and not recipes[0].teacher
+    start = recipes[0].initial_weights(path.parent)
+    assert start is None or start.suffix == ".onnx" and start.exists()
     assert all(recipe.configuration.exists() for recipe in recipes)
 
 
