@@ -27,12 +27,14 @@ mod transposed;
 use std::path::Path;
 
 use crate::scan::{ScanLimits, ScanSlot, SweepGeometry};
+pub use eccentricity::correct_eccentricity;
 pub use error::{OpenError, ReadError};
 pub use file_list::FileList;
 pub use format::Format;
 pub use image_size::ImageSize;
 pub use image_source::ImageSource;
 pub use options::{AzimuthSource, DatasetOptions};
+pub use stamp::middle_ns;
 
 /// The scans of one recording, ordered by time.
 ///

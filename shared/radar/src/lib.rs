@@ -24,7 +24,8 @@ pub mod trajectory;
 pub use chain::{MAX_INTERVAL_NS, continues};
 pub use dataset::{
     AzimuthSource, Dataset, DatasetOptions, FileList, Format, ImageSize, ImageSource, OpenError,
-    ReadError, open, open_resolved, open_source, reopen, stored_options,
+    ReadError, correct_eccentricity, middle_ns, open, open_resolved, open_source, reopen,
+    stored_options,
 };
 pub use fingerprint::Fingerprint;
 pub use ground_truth::{

@@ -7,7 +7,7 @@ use std::f32::consts::TAU;
 /// A disc that is 0.1 mm off its axis, at a radius of 40 mm, causes an error of 2.5 mrad, with opposite signs ahead and
 /// behind. The scene then appears to rotate while the vehicle moves, and the odometry drifts in yaw: per metre by about that
 /// angle over the distance to the scene. The sine term compresses the scan laterally and causes no drift.
-pub(crate) fn correct(azimuth_rad: &mut [f32], eccentricity_rad: f32) {
+pub fn correct_eccentricity(azimuth_rad: &mut [f32], eccentricity_rad: f32) {
     if eccentricity_rad == 0.0 {
         return;
     }
@@ -25,7 +25,7 @@ mod tests {
     #[test]
     fn ahead_and_behind_shift_in_opposite_directions_and_stay_within_a_turn() {
         let mut azimuths = [0.0, 0.25 * TAU, 0.5 * TAU, 0.75 * TAU];
-        correct(&mut azimuths, -0.01);
+        correct_eccentricity(&mut azimuths, -0.01);
         let expected = [TAU - 0.01, 0.25 * TAU, 0.5 * TAU + 0.01, 0.75 * TAU];
         assert!(
             azimuths
@@ -35,7 +35,7 @@ mod tests {
             "{azimuths:?}"
         );
         let mut tiny = [f32::MIN_POSITIVE];
-        correct(&mut tiny, -1e-9);
+        correct_eccentricity(&mut tiny, -1e-9);
         assert!((0.0..TAU).contains(&tiny[0]), "{tiny:?}");
     }
 }

@@ -175,7 +175,7 @@ pub(crate) fn smooth_stamps(azimuth_rad: &[f32], stamp_ns: &mut [i64]) {
     if n < 2 {
         return;
     }
-    let middle_ns = stamp::middle(stamp_ns[0], stamp_ns[n - 1]);
+    let middle_ns = stamp::middle_ns(stamp_ns[0], stamp_ns[n - 1]);
     let angle = |row: usize| sweep_angle(azimuth_rad[0], azimuth_rad[row]);
     let mean_angle = (0..n).map(angle).sum::<f64>() / n as f64;
     let (mut covariance, mut variance) = (0.0, 0.0);

@@ -119,7 +119,7 @@ impl NavtechScans {
     fn scan_time_ns(&self, stamp_ns: &[i64]) -> i64 {
         let n = stamp_ns.len();
         match self.profile.scan_time {
-            ScanTime::Halfway => stamp::middle(stamp_ns[0], stamp_ns[n - 1]),
+            ScanTime::Halfway => stamp::middle_ns(stamp_ns[0], stamp_ns[n - 1]),
             ScanTime::MiddleRow => stamp_ns[(n / 2).saturating_sub(1)],
         }
     }
@@ -326,7 +326,7 @@ impl Dataset for NavtechScans {
         if profile.smooth_stamps {
             navtech_png::smooth_stamps(azimuth_rad, stamp_ns);
         }
-        eccentricity::correct(azimuth_rad, profile.azimuth_eccentricity_rad);
+        eccentricity::correct_eccentricity(azimuth_rad, profile.azimuth_eccentricity_rad);
         Ok(SweepGeometry {
             azimuths: size.height,
             bins: size.width - METADATA_BYTES,

@@ -199,7 +199,7 @@ impl Dataset for TransposedScans {
             FirstAzimuth::HalfAStep => 0.5,
         };
         fill_uniform(azimuth_rad, first);
-        eccentricity::correct(azimuth_rad, self.azimuth_eccentricity_rad);
+        eccentricity::correct_eccentricity(azimuth_rad, self.azimuth_eccentricity_rad);
         slot.flags[..azimuths].fill(flag::MEASURED);
         for (column, stamp) in slot.stamp_ns[..azimuths].iter_mut().enumerate() {
             *stamp = turn.start_ns + turn.period_ns * column as i64 / azimuths as i64;

@@ -1,0 +1,231 @@
+//! The radar's description of itself: 20 bytes, then a protobuf.
+
+use std::ops::RangeInclusive;
+
+use gyre_radar::MAX_AZIMUTHS;
+use thiserror::Error;
+
+use crate::message::{MalformedMessage, head};
+
+/// Bytes before the protobuf.
+pub(crate) const CONFIGURATION_BYTES: usize = 20;
+/// The protobuf's field of the range resolution, a float.
+pub(crate) const RESOLUTION_FIELD: u64 = 10;
+/// The wire type of a float.
+pub(crate) const FOUR_BYTES: u64 = 5;
+
+/// The radar's description of itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Configuration {
+    /// Azimuths per turn.
+    pub azimuth_samples: u16,
+    /// Depth of a range bin, 1e-4 m: rounded, see [`Configuration::range_resolution_m()`].
+    pub bin_size: u16,
+    /// Range bins per azimuth, at most.
+    pub range_in_bins: u16,
+    /// Encoder counts per turn.
+    pub encoder_size: u16,
+    /// Turns per 1000 s.
+    pub rotation_mhz: u16,
+    /// Packets per second.
+    pub packet_rate: u16,
+    /// Factor of ranges. Not used.
+    pub range_gain: f32,
+    /// Offset of ranges. Not used: its unit and sign are not documented.
+    pub range_offset: f32,
+    /// Depth of a range bin from the protobuf, m.
+    pub range_resolution_m: Option<f32>,
+}
+
+/// A configuration that no radar has.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[error(
+    "the radar's configuration gives {what} as {value}, expected {} to {}", bounds.start(), bounds.end()
+)]
+pub struct BadConfiguration {
+    /// The number.
+    pub what: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// Permitted values.
+    pub bounds: RangeInclusive<f64>,
+}
+
+impl Configuration {
+    /// Returns the depth of a range bin, m: the exact value of the protobuf if there is one, otherwise `bin_size`, which is rounded to
+    /// 0.1 mm (0.04381 m becomes 0.0438).
+    pub fn range_resolution_m(&self) -> f32 {
+        // A protobuf leaves out zeros, so that a zero is no value.
+        let exact = self.range_resolution_m.filter(|metres| *metres != 0.0);
+        exact.unwrap_or((f64::from(self.bin_size) / 1e4) as f32)
+    }
+
+    /// Returns the duration of a turn, ns.
+    pub fn period_ns(&self) -> i64 {
+        let mhz = i64::from(self.rotation_mhz.max(1));
+        (1_000_000_000_000 + mhz / 2) / mhz
+    }
+
+    /// Returns the number of encoder counts from one azimuth to the next.
+    pub fn step(&self) -> f64 {
+        f64::from(self.encoder_size.max(1)) / f64::from(self.azimuth_samples.max(1))
+    }
+
+    /// Returns the time in which the encoder advances by one count, ns.
+    pub(crate) fn ns_per_count(&self) -> f64 {
+        self.period_ns() as f64 / f64::from(self.encoder_size.max(1))
+    }
+
+    /// Rejects numbers of which no scan can be made.
+    ///
+    /// # Errors
+    /// The first number out of bounds.
+    pub fn check(&self) -> Result<(), BadConfiguration> {
+        let check = |what, value: f64, bounds: RangeInclusive<f64>| match bounds.contains(&value) {
+            true => Ok(()),
+            false => Err(BadConfiguration {
+                what,
+                value,
+                bounds,
+            }),
+        };
+        let (azimuths, any) = (f64::from(self.azimuth_samples), f64::from(u16::MAX));
+        check(
+            "the number of azimuths",
+            azimuths,
+            2.0..=MAX_AZIMUTHS as f64,
+        )?;
+        check(
+            "the number of range bins",
+            self.range_in_bins.into(),
+            1.0..=any,
+        )?;
+        // Fewer counts than azimuths: two azimuths would have the same count.
+        let counts = self.encoder_size.into();
+        check(
+            "the encoder counts per turn",
+            counts,
+            azimuths.max(16.0)..=any,
+        )?;
+        // A slower sweep lasts longer than motions are searched.
+        check("the rotation in mHz", self.rotation_mhz.into(), 100.0..=any)?;
+        check(
+            "the depth of a range bin in m",
+            self.range_resolution_m().into(),
+            1e-3..=10.0,
+        )
+    }
+}
+
+/// Decodes the payload of a configuration.
+pub(crate) fn decode(payload: &[u8]) -> Result<Configuration, MalformedMessage> {
+    let head: [u8; CONFIGURATION_BYTES] = head("a configuration", payload)?;
+    let number = |k: usize| u16::from_be_bytes([head[2 * k], head[2 * k + 1]]);
+    let float =
+        |at: usize| f32::from_be_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]);
+    Ok(Configuration {
+        azimuth_samples: number(0),
+        bin_size: number(1),
+        range_in_bins: number(2),
+        encoder_size: number(3),
+        rotation_mhz: number(4),
+        packet_rate: number(5),
+        range_gain: float(12),
+        range_offset: float(16),
+        range_resolution_m: resolution(&payload[CONFIGURATION_BYTES..])?,
+    })
+}
+
+/// Returns the range resolution in a protobuf; all other fields are skipped. The last one counts, as protobuf requires.
+fn resolution(protobuf: &[u8]) -> Result<Option<f32>, MalformedMessage> {
+    let (mut rest, mut found) = (protobuf, None);
+    while !rest.is_empty() {
+        let at = protobuf.len() - rest.len();
+        let (number, value, after) = field(rest).ok_or(MalformedMessage::Protobuf { at })?;
+        found = value.filter(|_| number == RESOLUTION_FIELD).or(found);
+        rest = after;
+    }
+    Ok(found)
+}
+
+/// Returns number, value if it is a float, and what follows, of the first field.
+fn field(protobuf: &[u8]) -> Option<(u64, Option<f32>, &[u8])> {
+    let (tag, rest) = varint(protobuf)?;
+    let number = tag >> 3;
+    if number == 0 {
+        return None;
+    }
+    match tag & 7 {
+        0 => Some((number, None, varint(rest)?.1)),
+        1 => Some((number, None, rest.get(8..)?)),
+        2 => {
+            let (length, rest) = varint(rest)?;
+            let after = rest.get(usize::try_from(length).ok()?..)?;
+            Some((number, None, after))
+        }
+        FOUR_BYTES => {
+            let (bytes, after) = rest.split_first_chunk()?;
+            Some((number, Some(f32::from_le_bytes(*bytes)), after))
+        }
+        // Groups are not of this version of protobuf, the others of none.
+        _ => None,
+    }
+}
+
+/// Returns a number of seven bits a byte, least significant first, and what follows.
+fn varint(bytes: &[u8]) -> Option<(u64, &[u8])> {
+    let mut number = 0;
+    for (k, byte) in bytes.iter().take(10).enumerate() {
+        // The tenth byte has one bit of 64.
+        if k == 9 && *byte > 1 {
+            return None;
+        }
+        number |= u64::from(byte & 0x7f) << (7 * k);
+        if byte & 0x80 == 0 {
+            return Some((number, &bytes[k + 1..]));
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn the_resolution_is_found_among_fields_of_all_types() {
+        let float = 0.04381_f32.to_le_bytes();
+        let mut bytes = vec![0x08, 0x96, 0x01]; // field 1, varint 150
+        bytes.extend([0x11, 1, 2, 3, 4, 5, 6, 7, 8]); // field 2, eight bytes
+        bytes.extend([0x1a, 3, b'C', b'T', b'S']); // field 3, text
+        bytes.extend([0x25, 0, 0, 0, 0]); // field 4, float
+        bytes.push(0x55);
+        bytes.extend(float);
+        bytes.extend([0x82, 0x01, 0]); // field 16, no bytes
+        assert_eq!(resolution(&bytes).unwrap(), Some(0.04381));
+        assert_eq!(resolution(&[]).unwrap(), None);
+        assert_eq!(resolution(&bytes[..3]).unwrap(), None);
+        for (cut, at) in [(2, 0), (5, 3), (15, 12), (24, 22), (26, 22)] {
+            let malformed = MalformedMessage::Protobuf { at };
+            assert_eq!(resolution(&bytes[..cut]), Err(malformed), "{cut}");
+        }
+    }
+
+    #[test]
+    fn malformed_fields_are_refused() {
+        let lengths = [
+            0x1a, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 1,
+        ];
+        for bytes in [
+            &[0x05, 0, 0, 0, 0][..],
+            &[0x0b],
+            &[0x0e],
+            &[0xff; 20],
+            &lengths,
+        ] {
+            let malformed = MalformedMessage::Protobuf { at: 0 };
+            assert_eq!(resolution(bytes), Err(malformed), "{bytes:?}");
+        }
+    }
+}

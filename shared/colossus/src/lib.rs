@@ -1,0 +1,27 @@
+//! Navtech's network protocol Colossus (TCP), without I/O: bytes in, messages out; azimuths in, scans out.
+//!
+//! Reading order:
+//! - [`message`]: what a radar and its clients send;
+//! - [`configuration`]: the radar's description of itself, its first message;
+//! - [`write`](mod@write): messages as bytes, for clients and servers;
+//! - [`parser`]: messages from any pieces of a stream of bytes, damaged ones included;
+//! - [`clock`]: the time of each azimuth;
+//! - [`sweep`]: azimuths to scans.
+//!
+//! A client connects to [`PORT`]. The radar sends its configuration, the client sends [`Request::StartFft`], and the radar sends
+//! azimuths until [`Request::StopFft`]. A radar has at most three clients.
+
+pub mod clock;
+pub mod configuration;
+mod kept;
+pub mod message;
+pub mod parser;
+pub mod sweep;
+pub mod write;
+
+pub use clock::{ByteOrder, ClockFormat, FoundClock, RadarClock, SplitUnit};
+pub use configuration::{BadConfiguration, Configuration};
+pub use message::{Azimuth, MalformedMessage, Message, PORT, Powers, Request, decode};
+pub use parser::{Damage, Event, Parser};
+pub use sweep::{Constants, Counters, Sweep, SweepAssembler};
+pub use write::{write_azimuth, write_configuration, write_keep_alive, write_other, write_request};

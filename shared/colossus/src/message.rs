@@ -1,0 +1,217 @@
+//! Messages. Each is a header of 22 bytes (signature, version, id, payload size) and a payload. Numbers are big-endian, but for
+//! the time of an azimuth, whose byte order depends on the radar's software.
+
+use thiserror::Error;
+
+use crate::configuration::{self, Configuration};
+
+/// The TCP port of a radar.
+pub const PORT: u16 = 6317;
+/// The largest payload, bytes.
+pub const MAX_PAYLOAD_BYTES: usize = 1 << 20;
+
+pub(crate) const SIGNATURE: [u8; 16] = [
+    0x00, 0x01, 0x03, 0x03, 0x07, 0x07, 0x0f, 0x0f, 0x1f, 0x1f, 0x3f, 0x3f, 0x7f, 0x7f, 0xfe, 0xfe,
+];
+pub(crate) const VERSION: u8 = 1;
+/// Signature, version, id, payload size.
+pub(crate) const HEADER_BYTES: usize = 22;
+
+pub(crate) mod id {
+    pub(crate) const KEEP_ALIVE: u8 = 1;
+    pub(crate) const CONFIGURATION: u8 = 10;
+    pub(crate) const AZIMUTH: u8 = 30;
+    pub(crate) const AZIMUTH_16_BIT: u8 = 31;
+}
+
+/// Bytes before the powers of an azimuth, at least.
+pub(crate) const AZIMUTH_BYTES: usize = 14;
+
+/// A message of a radar or of a client.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Message<'a> {
+    /// The connection is alive: id 1.
+    KeepAlive,
+    /// The radar's description of itself: id 10.
+    Configuration(Configuration),
+    /// The powers of one azimuth: id 30 (8 bits) or 31 (16 bits).
+    Azimuth(Azimuth<'a>),
+    /// A client's request.
+    Request(Request),
+    /// Any other message: navigation data, health.
+    Other {
+        /// The kind of message.
+        id: u8,
+        /// Its bytes.
+        payload: &'a [u8],
+    },
+}
+
+/// A client's request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Request {
+    /// Send the configuration.
+    RequestConfiguration = 20,
+    /// Send azimuths.
+    StartFft = 21,
+    /// Send no more azimuths.
+    StopFft = 22,
+    /// Send azimuths of full length: no contours, which may vary in their number of bins.
+    StartNonContourFft = 140,
+}
+
+impl Request {
+    /// All requests.
+    pub const ALL: [Self; 4] = [
+        Self::RequestConfiguration,
+        Self::StartFft,
+        Self::StopFft,
+        Self::StartNonContourFft,
+    ];
+
+    /// Returns the id of the message.
+    pub fn id(self) -> u8 {
+        self as u8
+    }
+}
+
+/// The powers of one azimuth, as received.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Azimuth<'a> {
+    /// Number of the azimuth, incremented with each one; wraps.
+    pub sweep_counter: u16,
+    /// Encoder count of the antenna, clockwise from straight ahead.
+    pub encoder: u16,
+    /// Seconds, in a byte order that [`RadarClock`](crate::RadarClock) finds.
+    pub seconds: [u8; 4],
+    /// Nanoseconds or microseconds of the second, in the same byte order.
+    pub split_seconds: [u8; 4],
+    /// The powers, nearest bin first.
+    pub powers: Powers<'a>,
+}
+
+/// The powers of an azimuth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Powers<'a> {
+    /// One byte per bin.
+    Eight(&'a [u8]),
+    /// Two bytes per bin. Their order is not documented; [`SweepAssembler`](crate::SweepAssembler) finds it.
+    Sixteen(&'a [u8]),
+}
+
+impl<'a> Powers<'a> {
+    /// Returns the number of range bins.
+    pub fn bins(self) -> usize {
+        match self {
+            Self::Eight(bytes) => bytes.len(),
+            Self::Sixteen(bytes) => bytes.len() / 2,
+        }
+    }
+
+    /// Returns the bytes as received.
+    pub fn bytes(self) -> &'a [u8] {
+        match self {
+            Self::Eight(bytes) | Self::Sixteen(bytes) => bytes,
+        }
+    }
+}
+
+/// A payload that does not fit its message.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum MalformedMessage {
+    /// The payload is too short.
+    #[error("the payload of {message} has {actual} bytes, expected at least {expected}")]
+    Short {
+        /// The kind of message.
+        message: &'static str,
+        /// Bytes required.
+        expected: usize,
+        /// Bytes present.
+        actual: usize,
+    },
+    /// The powers begin outside of the payload.
+    #[error(
+        "the powers of an azimuth begin at byte {offset} of a payload of {payload_bytes} bytes, expected {AZIMUTH_BYTES} or more"
+    )]
+    DataOffset {
+        /// The first byte of the powers, as the message says.
+        offset: u16,
+        /// Bytes of the payload.
+        payload_bytes: usize,
+    },
+    /// Powers of 16 bits with half a power at the end.
+    #[error("an azimuth of 16-bit powers has {bytes} bytes of powers, an odd number")]
+    OddBytes {
+        /// Bytes of the powers.
+        bytes: usize,
+    },
+    /// The protobuf of a configuration cannot be parsed.
+    #[error("the protobuf of a configuration is malformed at byte {at}")]
+    Protobuf {
+        /// The first byte of the field that cannot be parsed.
+        at: usize,
+    },
+}
+
+/// Decodes the payload of a message.
+///
+/// # Errors
+/// A payload that does not fit the message `id`.
+pub fn decode(id: u8, payload: &[u8]) -> Result<Message<'_>, MalformedMessage> {
+    if let Some(request) = Request::ALL.into_iter().find(|r| r.id() == id) {
+        return Ok(Message::Request(request));
+    }
+    Ok(match id {
+        id::KEEP_ALIVE => Message::KeepAlive,
+        id::CONFIGURATION => Message::Configuration(configuration::decode(payload)?),
+        id::AZIMUTH => Message::Azimuth(azimuth(payload, Powers::Eight)?),
+        id::AZIMUTH_16_BIT => {
+            let azimuth = azimuth(payload, Powers::Sixteen)?;
+            let bytes = azimuth.powers.bytes().len();
+            if bytes % 2 != 0 {
+                return Err(MalformedMessage::OddBytes { bytes });
+            }
+            Message::Azimuth(azimuth)
+        }
+        id => Message::Other { id, payload },
+    })
+}
+
+fn azimuth<'a>(
+    payload: &'a [u8],
+    powers: impl Fn(&'a [u8]) -> Powers<'a>,
+) -> Result<Azimuth<'a>, MalformedMessage> {
+    let head: [u8; AZIMUTH_BYTES] = head("an azimuth", payload)?;
+    let [o0, o1, c0, c1, e0, e1, s0, s1, s2, s3, p0, p1, p2, p3] = head;
+    let offset = u16::from_be_bytes([o0, o1]);
+    let bytes = payload
+        .get(offset.into()..)
+        .filter(|_| usize::from(offset) >= AZIMUTH_BYTES)
+        .ok_or(MalformedMessage::DataOffset {
+            offset,
+            payload_bytes: payload.len(),
+        })?;
+    Ok(Azimuth {
+        sweep_counter: u16::from_be_bytes([c0, c1]),
+        encoder: u16::from_be_bytes([e0, e1]),
+        seconds: [s0, s1, s2, s3],
+        split_seconds: [p0, p1, p2, p3],
+        powers: powers(bytes),
+    })
+}
+
+/// Returns the first bytes of a payload.
+pub(crate) fn head<const N: usize>(
+    message: &'static str,
+    payload: &[u8],
+) -> Result<[u8; N], MalformedMessage> {
+    payload
+        .first_chunk()
+        .copied()
+        .ok_or(MalformedMessage::Short {
+            message,
+            expected: N,
+            actual: payload.len(),
+        })
+}

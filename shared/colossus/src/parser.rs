@@ -1,0 +1,285 @@
+//! Messages from a stream of bytes, whatever the pieces in which it arrives.
+
+use thiserror::Error;
+
+use crate::message::{
+    HEADER_BYTES, MAX_PAYLOAD_BYTES, MalformedMessage, Message, SIGNATURE, VERSION, decode,
+};
+
+/// The most bytes that [`Parser::space`] promises.
+pub const MAX_SPACE_BYTES: usize = 1 << 16;
+/// The most memory of a parser: the largest message, all but a byte of it received, the end of the one before, and space for more.
+pub const MAX_BUFFER_BYTES: usize =
+    SIGNATURE.len() + HEADER_BYTES + MAX_PAYLOAD_BYTES + MAX_SPACE_BYTES;
+
+/// What a stream contains.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Event<'a> {
+    /// A message.
+    Message(Message<'a>),
+    /// Bytes that are no message; they are skipped.
+    Damaged {
+        /// The first fault.
+        reason: Damage,
+        /// Bytes up to the next message.
+        skipped_bytes: usize,
+    },
+}
+
+/// A fault of a stream.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum Damage {
+    /// The bytes are not the start of a message.
+    #[error("the bytes do not start with Colossus' signature")]
+    Signature,
+    /// The version of the protocol is unknown.
+    #[error("a message has version {0} of the protocol, expected {VERSION}")]
+    Version(u8),
+    /// The message is too long.
+    #[error("a message has a payload of {0} bytes, more than {MAX_PAYLOAD_BYTES}")]
+    PayloadSize(u32),
+    /// Another message starts within the payload.
+    #[error("a message is cut short: another one starts within its payload")]
+    CutShort,
+    /// The payload does not fit the message.
+    #[error(transparent)]
+    Malformed(#[from] MalformedMessage),
+}
+
+/// A buffer that is filled from a socket, and the messages in it.
+///
+/// Read into [`Parser::space`], say how much with [`Parser::filled`], and take all events with [`Parser::next`].
+///
+/// After a fault the parser looks for the next signature. All whole messages after it are found; a message that is cut short may
+/// be returned with some bytes of the next one, and hold up the next ones until as many bytes are there as it says it has.
+#[derive(Debug, Default)]
+pub struct Parser {
+    buffer: Vec<u8>,
+    /// Received and not yet parsed: `buffer[start..end]`.
+    start: usize,
+    end: usize,
+    /// Bytes before `start`, of the last message, with which a signature may begin: the message was cut short then.
+    before: usize,
+    /// The first fault of the bytes that are being skipped.
+    damage: Option<Damage>,
+    skipped_bytes: usize,
+}
+
+impl Parser {
+    /// Returns a parser at the start of a stream.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Returns memory to read into, of `at_least` bytes (at least 1, at most [`MAX_SPACE_BYTES`]), once all events have been
+    /// taken. It is shorter, perhaps empty, if they have not: the buffer never has more than [`MAX_BUFFER_BYTES`].
+    pub fn space(&mut self, at_least: usize) -> &mut [u8] {
+        let at_least = at_least.clamp(1, MAX_SPACE_BYTES);
+        if self.buffer.len() - self.end < at_least {
+            let kept = self.start - self.before;
+            self.buffer.copy_within(kept..self.end, 0);
+            (self.start, self.end) = (self.before, self.end - kept);
+            let needed = self.end + at_least;
+            if needed > self.buffer.len() {
+                let length = needed.next_power_of_two().min(MAX_BUFFER_BYTES);
+                self.buffer
+                    .reserve_exact(length.saturating_sub(self.buffer.len()));
+                self.buffer.resize(length, 0);
+            }
+        }
+        &mut self.buffer[self.end..]
+    }
+
+    /// Adds the first `bytes` of the space, which have been written to it.
+    pub fn filled(&mut self, bytes: usize) {
+        self.end = self.end.saturating_add(bytes).min(self.buffer.len());
+    }
+
+    /// Returns the next message or fault; `None` until more bytes are there.
+    #[expect(
+        clippy::should_implement_trait,
+        reason = "a message borrows the parser"
+    )]
+    pub fn next(&mut self) -> Option<Event<'_>> {
+        let (id, payload) = loop {
+            match self.head() {
+                Ok(None) => return None,
+                Ok(Some((id, payload_bytes))) => {
+                    self.before = 0;
+                    if let Some(reason) = self.damage.take() {
+                        let skipped_bytes = std::mem::take(&mut self.skipped_bytes);
+                        return Some(Event::Damaged {
+                            reason,
+                            skipped_bytes,
+                        });
+                    }
+                    let payload = self.start + HEADER_BYTES;
+                    let after = payload + payload_bytes;
+                    if after > self.end {
+                        return None;
+                    }
+                    if find(&self.buffer[self.start + 1..after]).is_none() {
+                        break (id, payload..after);
+                    }
+                    self.skip(Damage::CutShort);
+                }
+                Err(damage) => self.skip(damage),
+            }
+        };
+        let skipped_bytes = payload.end - self.start;
+        self.before = begun(&self.buffer[self.start + 1..payload.end]);
+        self.start = payload.end;
+        Some(match decode(id, &self.buffer[payload]) {
+            Ok(message) => Event::Message(message),
+            Err(malformed) => Event::Damaged {
+                reason: malformed.into(),
+                skipped_bytes,
+            },
+        })
+    }
+
+    /// Returns the number of bytes that have been skipped since the last event: it grows while the stream is not Colossus.
+    pub fn skipped_bytes(&self) -> usize {
+        self.skipped_bytes
+    }
+
+    /// Returns id and payload size of the message at the start; `None` until its header is there.
+    fn head(&self) -> Result<Option<(u8, usize)>, Damage> {
+        let pending = &self.buffer[self.start..self.end];
+        if self.before > 0 && !pending.is_empty() && agree(pending, &SIGNATURE[self.before..]) {
+            // The signature has begun in the last message.
+            let whole = self.before + pending.len() >= SIGNATURE.len();
+            return if whole {
+                Err(Damage::CutShort)
+            } else {
+                Ok(None)
+            };
+        }
+        if !agree(pending, &SIGNATURE) {
+            return Err(Damage::Signature);
+        }
+        let Some(&[version, id, s0, s1, s2, s3]) =
+            pending.get(SIGNATURE.len()..).and_then(<[u8]>::first_chunk)
+        else {
+            return Ok(None);
+        };
+        let payload_bytes = u32::from_be_bytes([s0, s1, s2, s3]);
+        if version != VERSION {
+            return Err(Damage::Version(version));
+        }
+        if payload_bytes as usize > MAX_PAYLOAD_BYTES {
+            return Err(Damage::PayloadSize(payload_bytes));
+        }
+        Ok(Some((id, payload_bytes as usize)))
+    }
+
+    /// Moves to the next signature, or to its first bytes at the end.
+    fn skip(&mut self, damage: Damage) {
+        let before = std::mem::take(&mut self.before);
+        let is_back = before > 0 && damage == Damage::CutShort;
+        self.damage.get_or_insert(damage);
+        if is_back {
+            self.start -= before;
+            return;
+        }
+        // There is at least one byte, which is no signature's first.
+        let pending = &self.buffer[self.start + 1..self.end];
+        let skipped = 1 + find(pending).unwrap_or(pending.len() - begun(pending));
+        self.start += skipped;
+        self.skipped_bytes = self.skipped_bytes.saturating_add(skipped);
+    }
+}
+
+/// Returns whether bytes are equal as far as both go.
+fn agree(one: &[u8], other: &[u8]) -> bool {
+    one.iter().zip(other).all(|(a, b)| a == b)
+}
+
+/// Returns the number of bytes at the end with which a signature begins. There is one at most, as its first byte does not repeat.
+fn begun(bytes: &[u8]) -> usize {
+    let most = bytes.len().min(SIGNATURE.len() - 1);
+    let begun = (1..=most).find(|n| bytes.ends_with(&SIGNATURE[..*n]));
+    begun.unwrap_or(0)
+}
+
+/// Returns the place of the first signature (Horspool's search: most bytes of powers are not looked at).
+fn find(bytes: &[u8]) -> Option<usize> {
+    let mut at = 0;
+    while let Some(window) = bytes.get(at..at + SIGNATURE.len()) {
+        if window == SIGNATURE {
+            return Some(at);
+        }
+        at += match window[SIGNATURE.len() - 1] {
+            0xfe => 1,
+            0x7f => 2,
+            0x3f => 4,
+            0x1f => 6,
+            0x0f => 8,
+            0x07 => 10,
+            0x03 => 12,
+            0x01 => 14,
+            0x00 => 15,
+            _ => 16,
+        };
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_signature_is_found_at_any_place(
+            mut bytes in prop::collection::vec(prop::sample::select(SIGNATURE.to_vec()), 0..80),
+            at in 0_usize..80,
+        ) {
+            let naive = |bytes: &[u8]| bytes.windows(16).position(|window| window == SIGNATURE);
+            prop_assert_eq!(find(&bytes), naive(&bytes));
+            let at = at.min(bytes.len());
+            bytes.splice(at..at, SIGNATURE);
+            prop_assert_eq!(find(&bytes), naive(&bytes));
+        }
+
+        #[test]
+        fn any_bytes_in_any_pieces_neither_panic_nor_take_more_memory(
+            pieces in prop::collection::vec((prop::collection::vec(prop_oneof![
+                8 => prop::collection::vec(any::<u8>(), 1..40),
+                4 => Just(SIGNATURE.to_vec()),
+                2 => any::<(u8, u8, u32)>().prop_map(|(_, id, size)| {
+                    [&SIGNATURE[..], &[VERSION, id], &(size >> 11).to_be_bytes()].concat()
+                }),
+            ], 0..20), 1_usize..100_000, 1_usize..5), 0..40),
+        ) {
+            let mut parser = Parser::new();
+            for (piece, at_least, times) in pieces {
+                let bytes = piece.concat().repeat(times * 20);
+                let mut rest = &bytes[..];
+                while !rest.is_empty() {
+                    let space = parser.space(at_least);
+                    prop_assert!(space.len() >= at_least.min(MAX_SPACE_BYTES));
+                    let n = space.len().min(rest.len());
+                    space[..n].copy_from_slice(&rest[..n]);
+                    parser.filled(n);
+                    rest = &rest[n..];
+                    while parser.next().is_some() {}
+                    prop_assert!(parser.buffer.capacity() <= MAX_BUFFER_BYTES);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_buffer_that_is_never_emptied_stays_bounded() {
+        let mut parser = Parser::new();
+        while let n @ 1.. = parser.space(4096).len() {
+            parser.filled(n);
+        }
+        assert_eq!(parser.buffer.capacity(), MAX_BUFFER_BYTES);
+        parser.filled(usize::MAX);
+        assert_eq!(parser.next(), None);
+        assert_eq!(parser.skipped_bytes(), MAX_BUFFER_BYTES - 1);
+    }
+}

@@ -1,0 +1,279 @@
+//! Azimuths to scans.
+//!
+//! Angles, times and scales are those of a recording of the same azimuths, to the bit: see [`gyre_radar::open`].
+
+mod counters;
+mod powers;
+mod rows;
+mod seam;
+
+use std::cmp::Ordering;
+
+use gyre_radar::{ScanLimits, ScanSlot, Sense, SweepGeometry, correct_eccentricity, middle_ns};
+
+use crate::clock::ByteOrder;
+use crate::configuration::{BadConfiguration, Configuration};
+use crate::kept::KeptAzimuth;
+use crate::message::Azimuth;
+pub use counters::Counters;
+use rows::{Empty, Rows};
+use seam::{Grid, Seam};
+
+/// What the radar does not say of itself; as [`gyre_radar::DatasetOptions`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Constants {
+    /// Depth of a range bin, m. Default: the radar's.
+    pub range_resolution_m: Option<f32>,
+    /// Offset of the ranges, m.
+    pub range_offset_m: f32,
+    /// Doppler coefficient, s: see [`SweepGeometry::doppler_s`].
+    pub doppler_s: f32,
+    /// Eccentricity of the encoder, rad.
+    pub azimuth_eccentricity_rad: f32,
+}
+
+/// A scan that has been written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sweep {
+    /// Layout and scale of the powers.
+    pub geometry: SweepGeometry,
+    /// Azimuths that did not arrive. Their powers are 0, and their flag is not `MEASURED`.
+    pub missing: usize,
+}
+
+/// What becomes of an azimuth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    /// Dropped: the sweep has begun before.
+    Waiting,
+    /// Written.
+    Open,
+    /// Dropped: the sweep is complete.
+    Complete,
+}
+
+/// Encoder count and time of an azimuth.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    encoder: u16,
+    stamp_ns: i64,
+}
+
+/// Writes azimuths into scans.
+///
+/// A sweep begins where the encoder passes zero, and ends where no further azimuth fits before it.
+#[derive(Clone, Debug)]
+pub struct SweepAssembler {
+    grid: Grid,
+    rows: Rows,
+    constants: Constants,
+    range_resolution_m: f32,
+    state: State,
+    last: Option<Place>,
+    /// The first azimuth of the next sweep, where the last one was returned in its place.
+    kept: Option<(Place, Seam)>,
+    kept_azimuth: KeptAzimuth,
+    counters: Counters,
+}
+
+impl SweepAssembler {
+    /// Returns an assembler at the start of a stream.
+    ///
+    /// # Errors
+    /// A configuration that does not pass [`Configuration::check`].
+    pub fn new(
+        configuration: &Configuration,
+        constants: Constants,
+    ) -> Result<Self, BadConfiguration> {
+        let radar_m = configuration.range_resolution_m();
+        let resolution_m = constants.range_resolution_m.unwrap_or(radar_m);
+        let checked = Configuration {
+            range_resolution_m: Some(resolution_m),
+            ..*configuration
+        };
+        checked.check()?;
+        Ok(Self {
+            grid: Grid::new(configuration),
+            rows: Rows::new(configuration),
+            constants,
+            range_resolution_m: resolution_m,
+            state: State::Waiting,
+            last: None,
+            kept: None,
+            kept_azimuth: KeptAzimuth::default(),
+            counters: Counters::default(),
+        })
+    }
+
+    /// Returns the memory that a scan needs.
+    pub fn limits(&self) -> ScanLimits {
+        self.rows.limits()
+    }
+
+    /// Returns what has been lost, dropped and changed so far.
+    pub fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// Returns the order of the two bytes of 16-bit powers, once it is known. It is not documented: it is the one in which neighbouring
+    /// bins differ less. In the wrong order the noise of the less significant byte is the more significant one.
+    pub fn power_order(&self) -> Option<ByteOrder> {
+        self.rows.order.decided()
+    }
+
+    /// Writes an azimuth, and returns the sweep that is complete with it. An azimuth of the next sweep completes one that has lost its
+    /// last azimuths; it is kept, and written at the next call.
+    ///
+    /// `slot` is the same memory until a sweep is returned, whose scan it then is.
+    ///
+    /// # Panics
+    /// If `slot` is smaller than [`SweepAssembler::limits`].
+    pub fn add(
+        &mut self,
+        azimuth: &Azimuth<'_>,
+        stamp_ns: i64,
+        mut slot: ScanSlot<'_>,
+    ) -> Option<Sweep> {
+        self.rows.assert_fits(&slot);
+        let slot = &mut slot;
+        self.write_kept(slot);
+        let Some(encoder) = self.grid.encoder(azimuth.encoder) else {
+            self.counters.invalid_azimuths += 1;
+            return None;
+        };
+        let here = Place { encoder, stamp_ns };
+        let Some(last) = self.last else {
+            self.start(here, azimuth, slot);
+            return self.completed(slot);
+        };
+        match encoder.cmp(&last.encoder) {
+            Ordering::Equal => {
+                self.counters.repeated_azimuths += 1;
+                None
+            }
+            Ordering::Greater => self.proceed(last, here, azimuth, slot),
+            Ordering::Less => self.wrap(last, here, azimuth, slot),
+        }
+    }
+
+    /// Begins at the first azimuth of a turn; discards those of a turn that has begun before.
+    fn start(&mut self, here: Place, azimuth: &Azimuth<'_>, slot: &mut ScanSlot<'_>) {
+        if f64::from(here.encoder) <= self.grid.step {
+            self.begin(here, Seam::default(), azimuth, slot);
+        } else {
+            self.last = Some(here);
+            self.state = State::Waiting;
+            self.counters.discarded_azimuths += 1;
+        }
+    }
+
+    /// Adds an azimuth of the same turn as the last.
+    fn proceed(
+        &mut self,
+        last: Place,
+        here: Place,
+        azimuth: &Azimuth<'_>,
+        slot: &mut ScanSlot<'_>,
+    ) -> Option<Sweep> {
+        self.last = Some(here);
+        match self.state {
+            State::Waiting => self.counters.discarded_azimuths += 1,
+            State::Complete => self.counters.surplus_azimuths += 1,
+            State::Open if self.grid.is_break(last, here) => {
+                self.counters.broken_sweeps += 1;
+                self.start(here, azimuth, slot);
+            }
+            State::Open => {
+                let gap = self.grid.gap(last, here);
+                let fits = self.rows.left().saturating_sub(1);
+                self.rows.write_empty(gap.forward(last, fits), slot);
+                self.write(here, azimuth, slot);
+            }
+        }
+        self.completed(slot)
+    }
+
+    /// Adds the first azimuth of a turn, after the last one of another.
+    fn wrap(
+        &mut self,
+        last: Place,
+        here: Place,
+        azimuth: &Azimuth<'_>,
+        slot: &mut ScanSlot<'_>,
+    ) -> Option<Sweep> {
+        let seam = self.grid.seam(last, here);
+        if self.state == State::Open {
+            self.rows
+                .write_empty(seam.trailing(last, self.rows.left()), slot);
+            if let Some(sweep) = self.finish(slot) {
+                self.kept_azimuth.keep(azimuth);
+                self.kept = Some((here, seam));
+                self.last = Some(here);
+                return Some(sweep);
+            }
+        }
+        self.begin(here, seam, azimuth, slot);
+        self.completed(slot)
+    }
+
+    fn write_kept(&mut self, slot: &mut ScanSlot<'_>) {
+        if let Some((here, seam)) = self.kept.take() {
+            let kept = std::mem::take(&mut self.kept_azimuth);
+            self.begin(here, seam, &kept.azimuth(), slot);
+            self.kept_azimuth = kept;
+        }
+    }
+
+    fn begin(&mut self, here: Place, seam: Seam, azimuth: &Azimuth<'_>, slot: &mut ScanSlot<'_>) {
+        self.state = State::Open;
+        self.last = Some(here);
+        self.rows.clear();
+        let fits = self.rows.left().saturating_sub(1);
+        self.rows.write_empty(seam.leading(here, fits), slot);
+        self.write(here, azimuth, slot);
+    }
+
+    fn write(&mut self, here: Place, azimuth: &Azimuth<'_>, slot: &mut ScanSlot<'_>) {
+        let place = (f64::from(here.encoder), here.stamp_ns);
+        self.rows
+            .write_measured(place, azimuth.powers, slot, &mut self.counters);
+    }
+
+    /// Returns the sweep if no further azimuth fits.
+    fn completed(&mut self, slot: &mut ScanSlot<'_>) -> Option<Sweep> {
+        let last = self.last?;
+        let ended = self.rows.left() == 0 || self.grid.is_last(last);
+        match self.state == State::Open && ended {
+            true => self.finish(slot),
+            false => None,
+        }
+    }
+
+    /// Ends the sweep, and returns it unless most of it is missing.
+    fn finish(&mut self, slot: &mut ScanSlot<'_>) -> Option<Sweep> {
+        self.state = State::Complete;
+        let (azimuths, missing) = (self.rows.written(), self.rows.missing());
+        let limits = self.rows.limits();
+        if 2 * (azimuths - missing) < limits.azimuths {
+            self.counters.incomplete_sweeps += 1;
+            return None;
+        }
+        self.counters.sweeps += 1;
+        self.counters.missing_azimuths += missing as u64;
+        let azimuth_rad = &mut slot.azimuth_rad[..azimuths];
+        correct_eccentricity(azimuth_rad, self.constants.azimuth_eccentricity_rad);
+        let bins = self.rows.bins();
+        let geometry = SweepGeometry {
+            azimuths,
+            bins,
+            stride: bins,
+            first_byte: 0,
+            range_resolution_m: self.range_resolution_m,
+            range_offset_m: self.constants.range_offset_m,
+            doppler_s: self.constants.doppler_s,
+            sense: Sense::Clockwise,
+            stamp_ns: middle_ns(slot.stamp_ns[0], slot.stamp_ns[azimuths - 1]),
+        };
+        Some(Sweep { geometry, missing })
+    }
+}

@@ -1,0 +1,144 @@
+//! The rows of a scan.
+
+use gyre_radar::scan::flag;
+use gyre_radar::{ScanLimits, ScanSlot};
+
+use super::counters::Counters;
+use super::powers::PowerOrder;
+use crate::configuration::Configuration;
+use crate::message::Powers;
+
+/// Rows of azimuths that did not arrive, evenly spaced.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Empty {
+    pub(super) count: usize,
+    /// Encoder count and time of the row before the first.
+    pub(super) from: (f64, i64),
+    /// Counts from row to row.
+    pub(super) counts: f64,
+    /// Time from row to row, ns.
+    pub(super) ns: f64,
+}
+
+/// Writes the rows of a scan in order.
+#[derive(Clone, Debug)]
+pub(super) struct Rows {
+    limits: ScanLimits,
+    bins: usize,
+    encoder_size: f64,
+    written: usize,
+    missing: usize,
+    pub(super) order: PowerOrder,
+}
+
+impl Rows {
+    pub(super) fn new(configuration: &Configuration) -> Self {
+        let bins = usize::from(configuration.range_in_bins);
+        let azimuths = usize::from(configuration.azimuth_samples);
+        Self {
+            limits: ScanLimits {
+                bytes: azimuths * bins,
+                azimuths,
+            },
+            bins,
+            encoder_size: f64::from(configuration.encoder_size),
+            written: 0,
+            missing: 0,
+            order: PowerOrder::default(),
+        }
+    }
+
+    pub(super) fn limits(&self) -> ScanLimits {
+        self.limits
+    }
+
+    pub(super) fn bins(&self) -> usize {
+        self.bins
+    }
+
+    /// Number of rows, measured or not.
+    pub(super) fn written(&self) -> usize {
+        self.written
+    }
+
+    /// Number of rows that were not measured.
+    pub(super) fn missing(&self) -> usize {
+        self.missing
+    }
+
+    /// Number of rows that a turn may have beside those written.
+    pub(super) fn left(&self) -> usize {
+        self.limits.azimuths - self.written
+    }
+
+    pub(super) fn clear(&mut self) {
+        (self.written, self.missing) = (0, 0);
+    }
+
+    pub(super) fn assert_fits(&self, slot: &ScanSlot<'_>) {
+        let azimuths = [
+            slot.azimuth_rad.len(),
+            slot.stamp_ns.len(),
+            slot.flags.len(),
+        ];
+        let fits = slot.bytes.len() >= self.limits.bytes
+            && azimuths.into_iter().all(|len| len >= self.limits.azimuths);
+        assert!(fits, "the slot is smaller than the limits");
+    }
+
+    /// Writes a row that was measured at an encoder count and time.
+    pub(super) fn write_measured(
+        &mut self,
+        place: (f64, i64),
+        powers: Powers<'_>,
+        slot: &mut ScanSlot<'_>,
+        counters: &mut Counters,
+    ) {
+        let Some(row) = self.next_row(place, flag::MEASURED, slot) else {
+            return;
+        };
+        let bins = powers.bins();
+        counters.padded_rows += u64::from(bins < row.len());
+        counters.cut_rows += u64::from(bins > row.len());
+        let measured = bins.min(row.len());
+        self.order.write(powers, &mut row[..measured]);
+        row[measured..].fill(0);
+    }
+
+    /// Writes rows that were not measured.
+    pub(super) fn write_empty(&mut self, empty: Empty, slot: &mut ScanSlot<'_>) {
+        let (encoder, stamp_ns) = empty.from;
+        for k in 1..=empty.count {
+            let after_ns = (k as f64 * empty.ns).round() as i64;
+            let place = (
+                // Rounding must not lead before the start of the turn, or to its end.
+                (encoder + k as f64 * empty.counts).clamp(0.0, self.encoder_size - 0.5),
+                stamp_ns.saturating_add(after_ns),
+            );
+            if let Some(row) = self.next_row(place, 0, slot) {
+                row.fill(0);
+                self.missing += 1;
+            }
+        }
+    }
+
+    /// Returns the bytes of the next row, whose angle, time and flags are written; `None` if the scan is full.
+    fn next_row<'a>(
+        &mut self,
+        (encoder, stamp_ns): (f64, i64),
+        flags: u8,
+        slot: &'a mut ScanSlot<'_>,
+    ) -> Option<&'a mut [u8]> {
+        if self.left() == 0 {
+            return None;
+        }
+        let row = self.written;
+        self.written += 1;
+        // In f64 and in this order, as the readers of recordings do.
+        let step = std::f64::consts::TAU / self.encoder_size;
+        slot.azimuth_rad[row] = (encoder * step) as f32;
+        slot.stamp_ns[row] = stamp_ns;
+        slot.flags[row] = flags;
+        slot.bytes.get_mut(row * self.bins..(row + 1) * self.bins)
+    }
+}

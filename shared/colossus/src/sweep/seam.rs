@@ -1,0 +1,152 @@
+//! Azimuths that did not arrive, from the encoder counts on both sides.
+
+use super::{Empty, Place};
+use crate::configuration::Configuration;
+
+/// The part of a turn by which the time between two azimuths may differ from that of the rotation. Where it differs by more, a
+/// turn or more is missing, or the clock was set.
+const BREAK_TURNS: f64 = 0.75;
+
+/// The encoder counts and times of a turn.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Grid {
+    encoder_size: u16,
+    /// Counts from azimuth to azimuth.
+    pub(super) step: f64,
+    ns_per_count: f64,
+}
+
+/// The azimuths missing between the last one of a sweep and the first one of the next.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Seam {
+    /// Number of those before zero.
+    trailing: usize,
+    /// Number of those after zero.
+    leading: usize,
+    /// Counts from row to row.
+    counts: f64,
+    /// Time from row to row, ns.
+    ns: f64,
+}
+
+/// The azimuths missing between two of a sweep.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Gap {
+    count: usize,
+    counts: f64,
+    ns: f64,
+}
+
+impl Grid {
+    pub(super) fn new(configuration: &Configuration) -> Self {
+        Self {
+            encoder_size: configuration.encoder_size,
+            step: configuration.step(),
+            ns_per_count: configuration.ns_per_count(),
+        }
+    }
+
+    /// Returns an encoder count below that of a turn. A full turn is 0, as for the readers of recordings.
+    pub(super) fn encoder(&self, count: u16) -> Option<u16> {
+        (count <= self.encoder_size).then_some(count % self.encoder_size)
+    }
+
+    /// Returns whether no further azimuth fits into the turn.
+    pub(super) fn is_last(&self, last: Place) -> bool {
+        f64::from(last.encoder) + self.step >= f64::from(self.encoder_size)
+    }
+
+    /// Returns whether the time between two azimuths is not that of the rotation between them.
+    pub(super) fn is_break(&self, last: Place, here: Place) -> bool {
+        let expected_ns = self.counts(last, here) * self.ns_per_count;
+        let turn_ns = f64::from(self.encoder_size) * self.ns_per_count;
+        (elapsed_ns(last, here) - expected_ns).abs() > BREAK_TURNS * turn_ns
+    }
+
+    pub(super) fn gap(&self, last: Place, here: Place) -> Gap {
+        let counts = self.counts(last, here);
+        let rows = (counts / self.step).round().max(1.0);
+        Gap {
+            count: rows as usize - 1,
+            counts: counts / rows,
+            ns: elapsed_ns(last, here) / rows,
+        }
+    }
+
+    pub(super) fn seam(&self, last: Place, here: Place) -> Seam {
+        let to_zero = f64::from(self.encoder_size - last.encoder);
+        // Positions before zero, which zero itself is not.
+        let before_zero = (to_zero / self.step).ceil() as usize - 1;
+        if self.is_break(last, here) {
+            // Nothing is known of the time in between: both sweeps are continued at the radar's rotation.
+            return Seam {
+                trailing: before_zero,
+                leading: (f64::from(here.encoder) / self.step) as usize,
+                counts: self.step,
+                ns: self.step * self.ns_per_count,
+            };
+        }
+        let Gap { count, ns, .. } = self.gap(last, here);
+        let trailing = before_zero.min(count);
+        Seam {
+            trailing,
+            leading: count - trailing,
+            // The step across zero may be shorter than the others.
+            counts: self.step,
+            ns,
+        }
+    }
+
+    /// Encoder counts from one azimuth to the next, of less than a turn.
+    fn counts(&self, last: Place, here: Place) -> f64 {
+        let counts = f64::from(here.encoder) - f64::from(last.encoder);
+        match counts < 0.0 {
+            true => counts + f64::from(self.encoder_size),
+            false => counts,
+        }
+    }
+}
+
+impl Gap {
+    /// Returns the rows after `last`, at most `fits`.
+    pub(super) fn forward(&self, last: Place, fits: usize) -> Empty {
+        Empty {
+            count: self.count.min(fits),
+            from: (last.encoder.into(), last.stamp_ns),
+            counts: self.counts,
+            ns: self.ns,
+        }
+    }
+}
+
+impl Seam {
+    /// Returns the rows after `last`, at most `fits`.
+    pub(super) fn trailing(&self, last: Place, fits: usize) -> Empty {
+        Empty {
+            count: self.trailing.min(fits),
+            from: (last.encoder.into(), last.stamp_ns),
+            counts: self.counts,
+            ns: self.ns,
+        }
+    }
+
+    /// Returns the rows before `here`, at most `fits`.
+    pub(super) fn leading(&self, here: Place, fits: usize) -> Empty {
+        let count = self.leading.min(fits);
+        let rows = (count + 1) as f64;
+        let before_ns = (rows * self.ns).round() as i64;
+        Empty {
+            count,
+            from: (
+                f64::from(here.encoder) - rows * self.counts,
+                here.stamp_ns.saturating_sub(before_ns),
+            ),
+            counts: self.counts,
+            ns: self.ns,
+        }
+    }
+}
+
+fn elapsed_ns(last: Place, here: Place) -> f64 {
+    here.stamp_ns.saturating_sub(last.stamp_ns) as f64
+}

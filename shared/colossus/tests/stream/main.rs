@@ -1,0 +1,10 @@
+//! A radar's stream: written, cut into pieces, damaged, parsed, stamped, assembled.
+
+#![allow(clippy::unwrap_used)]
+
+mod clocks;
+mod messages;
+mod parsing;
+mod scans;
+mod support;
+mod sweeps;

@@ -1,0 +1,232 @@
+//! Messages as bytes.
+
+use gyre_colossus::{
+    Azimuth, Configuration, Event, MalformedMessage, Message, Parser, Powers, Request, decode,
+    write_azimuth, write_configuration, write_keep_alive, write_other, write_request,
+};
+use proptest::prelude::*;
+
+use crate::support::{configuration, feed};
+
+/// A message that owns its bytes.
+#[derive(Clone, Debug)]
+pub enum Sent {
+    KeepAlive,
+    Configuration(Configuration),
+    Azimuth([u16; 2], [[u8; 4]; 2], bool, Vec<u8>),
+    Request(Request),
+    Other(u8, Vec<u8>),
+}
+
+impl Sent {
+    pub fn message(&self) -> Message<'_> {
+        match self {
+            Self::KeepAlive => Message::KeepAlive,
+            Self::Configuration(configuration) => Message::Configuration(*configuration),
+            Self::Request(request) => Message::Request(*request),
+            Self::Other(id, payload) => Message::Other { id: *id, payload },
+            Self::Azimuth([sweep_counter, encoder], [seconds, split_seconds], wide, powers) => {
+                Message::Azimuth(Azimuth {
+                    sweep_counter: *sweep_counter,
+                    encoder: *encoder,
+                    seconds: *seconds,
+                    split_seconds: *split_seconds,
+                    powers: match wide {
+                        true => Powers::Sixteen(&powers[..powers.len() / 2 * 2]),
+                        false => Powers::Eight(powers),
+                    },
+                })
+            }
+        }
+    }
+
+    pub fn write(&self, out: &mut Vec<u8>) {
+        match self.message() {
+            Message::KeepAlive => write_keep_alive(out),
+            Message::Configuration(configuration) => write_configuration(out, &configuration),
+            Message::Azimuth(azimuth) => write_azimuth(out, &azimuth),
+            Message::Request(request) => write_request(out, request),
+            Message::Other { id, payload } => write_other(out, id, payload),
+        }
+    }
+}
+
+fn any_configuration() -> impl Strategy<Value = Configuration> {
+    let float = || prop::num::f32::NORMAL | prop::num::f32::ZERO;
+    let metres = prop::option::of(float());
+    (any::<[u16; 6]>(), float(), float(), metres).prop_map(|(numbers, gain, offset, metres)| {
+        let [
+            samples,
+            bin_size,
+            bins,
+            encoder_size,
+            rotation_mhz,
+            packet_rate,
+        ] = numbers;
+        Configuration {
+            azimuth_samples: samples,
+            bin_size,
+            range_in_bins: bins,
+            encoder_size,
+            rotation_mhz,
+            packet_rate,
+            range_gain: gain,
+            range_offset: offset,
+            range_resolution_m: metres,
+        }
+    })
+}
+
+pub fn any_message() -> impl Strategy<Value = Sent> {
+    let powers = || prop::collection::vec(any::<u8>(), 0..300);
+    prop_oneof![
+        Just(Sent::KeepAlive),
+        any_configuration().prop_map(Sent::Configuration),
+        prop::sample::select(Request::ALL.to_vec()).prop_map(Sent::Request),
+        (prop::sample::select(vec![0, 40, 123, 255]), powers())
+            .prop_map(|(id, payload)| Sent::Other(id, payload)),
+        (
+            any::<[u16; 2]>(),
+            any::<[[u8; 4]; 2]>(),
+            any::<bool>(),
+            powers()
+        )
+            .prop_map(|(numbers, times, wide, powers)| Sent::Azimuth(numbers, times, wide, powers)),
+    ]
+}
+
+proptest! {
+    #[test]
+    fn what_is_written_is_decoded(sent in any_message()) {
+        let mut bytes = Vec::new();
+        sent.write(&mut bytes);
+        prop_assert_eq!(decode(bytes[17], &bytes[22..]), Ok(sent.message()));
+    }
+
+    #[test]
+    fn any_payload_is_decoded_or_refused(
+        id in prop_oneof![any::<u8>(), prop::sample::select(vec![10_u8, 30, 31])],
+        payload in prop::collection::vec(any::<u8>(), 0..60),
+    ) {
+        let decoded = decode(id, &payload);
+        if let Ok(Message::Configuration(configuration)) = decoded {
+            let _ = configuration.check();
+            prop_assert!(configuration.period_ns() > 0);
+        }
+    }
+}
+
+#[test]
+fn the_layout_is_that_of_the_protocol() {
+    let mut bytes = Vec::new();
+    write_azimuth(
+        &mut bytes,
+        &Azimuth {
+            sweep_counter: 0x0102,
+            encoder: 0x0304,
+            seconds: [5, 6, 7, 8],
+            split_seconds: [9, 10, 11, 12],
+            powers: Powers::Eight(&[13, 14]),
+        },
+    );
+    let signature = [0, 1, 3, 3, 7, 7, 15, 15, 31, 31, 63, 63, 127, 127, 254, 254];
+    assert_eq!(bytes[..16], signature);
+    assert_eq!(bytes[16..22], [1, 30, 0, 0, 0, 16]);
+    let payload = [0, 14, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14];
+    assert_eq!(bytes[22..], payload);
+}
+
+#[test]
+fn powers_begin_where_the_message_says() {
+    let payload = |offset: u8| [&[0, offset][..], &[1; 12], &[2, 3, 4, 5, 6]].concat();
+    let powers = |offset, id| match decode(id, &payload(offset)) {
+        Ok(Message::Azimuth(azimuth)) => Ok(azimuth.powers.bytes().to_vec()),
+        Ok(other) => panic!("{other:?}"),
+        Err(error) => Err(error),
+    };
+    assert_eq!(powers(14, 30), Ok(vec![2, 3, 4, 5, 6]));
+    assert_eq!(powers(17, 30), Ok(vec![5, 6]));
+    assert_eq!(powers(17, 31), Ok(vec![5, 6]));
+    assert_eq!(powers(19, 30), Ok(vec![]));
+    for offset in [0, 13, 20, 255] {
+        let offset_error = MalformedMessage::DataOffset {
+            offset: offset.into(),
+            payload_bytes: 19,
+        };
+        assert_eq!(powers(offset, 30), Err(offset_error));
+    }
+    assert_eq!(powers(14, 31), Err(MalformedMessage::OddBytes { bytes: 5 }));
+}
+
+#[test]
+fn a_configuration_is_checked_in_one_sentence() {
+    let good = configuration(5600, 3768);
+    assert_eq!(good.check(), Ok(()));
+    assert_eq!(good.period_ns(), 250_000_000);
+    assert_eq!(good.range_resolution_m(), 0.04381);
+    for absent in [None, Some(0.0)] {
+        let rounded = Configuration {
+            range_resolution_m: absent,
+            ..good
+        };
+        assert_eq!(rounded.range_resolution_m(), 0.0438);
+    }
+    type Edit = fn(&mut Configuration);
+    let bad: [(Edit, &str); 9] = [
+        (
+            |c| c.azimuth_samples = 0,
+            "azimuths as 0, expected 2 to 1024",
+        ),
+        (
+            |c| c.azimuth_samples = 1025,
+            "azimuths as 1025, expected 2 to 1024",
+        ),
+        (
+            |c| c.range_in_bins = 0,
+            "range bins as 0, expected 1 to 65535",
+        ),
+        (
+            |c| c.encoder_size = 0,
+            "per turn as 0, expected 400 to 65535",
+        ),
+        (
+            |c| c.encoder_size = 399,
+            "per turn as 399, expected 400 to 65535",
+        ),
+        (
+            |c| c.rotation_mhz = 0,
+            "rotation in mHz as 0, expected 100 to 65535",
+        ),
+        (
+            |c| c.range_resolution_m = Some(f32::NAN),
+            "as NaN, expected 0.001 to 10",
+        ),
+        (
+            |c| c.range_resolution_m = Some(11.0),
+            "as 11, expected 0.001 to 10",
+        ),
+        (
+            |c| (c.range_resolution_m, c.bin_size) = (None, 0),
+            "as 0, expected 0.001 to 10",
+        ),
+    ];
+    for (edit, sentence) in bad {
+        let mut configuration = good;
+        edit(&mut configuration);
+        let error = configuration.check().unwrap_err().to_string();
+        assert!(error.ends_with(sentence), "{error}");
+    }
+}
+
+#[test]
+fn a_server_parses_requests() {
+    let (mut bytes, mut requests) = (Vec::new(), Vec::new());
+    for request in Request::ALL {
+        write_request(&mut bytes, request);
+    }
+    feed(&mut Parser::new(), &bytes, 5, |event| match event {
+        Event::Message(Message::Request(request)) => requests.push(request),
+        other => panic!("{other:?}"),
+    });
+    assert_eq!(requests, Request::ALL);
+}
