@@ -7,4 +7,5 @@ mod keyframes;
 mod messages;
 mod recordings;
 mod simulations;
+mod streams;
 mod texts;

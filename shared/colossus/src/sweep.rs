@@ -9,7 +9,9 @@ mod seam;
 
 use std::cmp::Ordering;
 
-use gyre_radar::{ScanLimits, ScanSlot, Sense, SweepGeometry, correct_eccentricity, middle_ns};
+use gyre_radar::{
+    DatasetOptions, ScanLimits, ScanSlot, Sense, SweepGeometry, correct_eccentricity, middle_ns,
+};
 
 use crate::clock::ByteOrder;
 use crate::configuration::{BadConfiguration, Configuration};
@@ -30,6 +32,18 @@ pub struct Constants {
     pub doppler_s: f32,
     /// Eccentricity of the encoder, rad.
     pub azimuth_eccentricity_rad: f32,
+}
+
+impl From<&DatasetOptions> for Constants {
+    /// Takes the options that are set; all others are unknown.
+    fn from(options: &DatasetOptions) -> Self {
+        Self {
+            range_resolution_m: options.range_resolution_m,
+            range_offset_m: options.range_offset_m.unwrap_or_default(),
+            doppler_s: options.doppler_s.unwrap_or_default(),
+            azimuth_eccentricity_rad: options.azimuth_eccentricity_rad.unwrap_or_default(),
+        }
+    }
 }
 
 /// A scan that has been written.

@@ -5,6 +5,7 @@
 mod clocks;
 mod messages;
 mod parsing;
+mod recordings;
 mod scans;
 mod support;
 mod sweeps;

@@ -159,7 +159,7 @@ fn powers_begin_where_the_message_says() {
 }
 
 #[test]
-fn a_configuration_is_checked_in_one_sentence() {
+fn the_resolution_of_the_protobuf_is_preferred() {
     let good = configuration(5600, 3768);
     assert_eq!(good.check(), Ok(()));
     assert_eq!(good.period_ns(), 250_000_000);
@@ -171,6 +171,11 @@ fn a_configuration_is_checked_in_one_sentence() {
         };
         assert_eq!(rounded.range_resolution_m(), 0.0438);
     }
+}
+
+#[test]
+fn a_configuration_is_checked_in_one_sentence() {
+    let good = configuration(5600, 3768);
     type Edit = fn(&mut Configuration);
     let bad: [(Edit, &str); 9] = [
         (

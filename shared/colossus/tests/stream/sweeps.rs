@@ -250,7 +250,6 @@ fn a_scan_has_the_constants_given() {
     };
     let mut assembly = Assembly::with(&radar, constants);
     for row in &rows {
-        assembly.assembler.limits();
         let azimuth = row.azimuth(ClockFormat::default());
         let mut scan = gyre_radar::OwnedScan::with_limits(assembly.assembler.limits());
         // The memory of the last call alone is read here, for its geometry.

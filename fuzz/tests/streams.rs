@@ -1,0 +1,192 @@
+//! What a radar sends: a stream of Colossus, against what a client does with it.
+
+use bolero::{TypeGenerator, check};
+use gyre_colossus::{
+    Azimuth, BadConfiguration, ClockFormat, Configuration, Constants, Event, Message, Parser,
+    Powers, RadarClock, SweepAssembler, write_azimuth, write_configuration, write_keep_alive,
+};
+use gyre_fuzz::{
+    Failure, Target,
+    edit::{ByteEdit, Number, edit_bytes},
+};
+use gyre_radar::OwnedScan;
+
+const AZIMUTHS: u16 = 16;
+const BINS: u16 = 40;
+const COUNTS: u16 = 5600;
+/// 2019-01-10 14:37:26 UTC, ns.
+const START_NS: i64 = 1_547_131_046_000_000_000;
+/// Scans up to this size are assembled.
+const LARGEST_BYTES: usize = 4 << 20;
+
+/// An edit of a radar.
+#[derive(Clone, Debug, TypeGenerator)]
+enum Edit {
+    /// A number of the configuration.
+    Configuration(u8, Number),
+    /// The encoder count of an azimuth.
+    Encoder(u8, u16),
+    /// The time of all azimuths from this one on, shifted.
+    TimeFrom(u8, Number),
+    /// The bytes of an azimuth's time.
+    Time(u8, [u8; 8]),
+    /// An azimuth of 16-bit powers.
+    Wide(u8),
+    /// An azimuth that does not arrive.
+    Lost(u8),
+}
+
+struct Row {
+    encoder: u16,
+    stamp_ns: i64,
+    time: Option<[u8; 8]>,
+    wide: bool,
+    lost: bool,
+}
+
+fn edit_radar(configuration: &mut Configuration, rows: &mut [Row], edits: &[Edit]) {
+    let count = rows.len();
+    let place = |index: u8| usize::from(index) % count;
+    for edit in edits {
+        match *edit {
+            Edit::Configuration(field, number) => {
+                let short = number.bits() as u16;
+                match field % 7 {
+                    0 => configuration.azimuth_samples = short,
+                    1 => configuration.bin_size = short,
+                    2 => configuration.range_in_bins = short,
+                    3 => configuration.encoder_size = short,
+                    4 => configuration.rotation_mhz = short,
+                    5 => configuration.range_resolution_m = None,
+                    _ => configuration.range_resolution_m = Some(number.f64() as f32),
+                }
+            }
+            Edit::Encoder(index, encoder) => rows[place(index)].encoder = encoder,
+            Edit::TimeFrom(index, number) => rows[place(index)..].iter_mut().for_each(|row| {
+                row.stamp_ns = row.stamp_ns.wrapping_add(number.bits() as i64);
+            }),
+            Edit::Time(index, time) => rows[place(index)].time = Some(time),
+            Edit::Wide(index) => rows[place(index)].wide = true,
+            Edit::Lost(index) => rows[place(index)].lost = true,
+        }
+    }
+}
+
+fn stream(edits: &[Edit]) -> Vec<u8> {
+    let mut configuration = Configuration {
+        azimuth_samples: AZIMUTHS,
+        bin_size: 438,
+        range_in_bins: BINS,
+        encoder_size: COUNTS,
+        rotation_mhz: 4000,
+        range_resolution_m: Some(0.04381),
+        ..Configuration::default()
+    };
+    let row = |k: u16| Row {
+        encoder: k % AZIMUTHS * (COUNTS / AZIMUTHS),
+        stamp_ns: START_NS + i64::from(k) * 15_625_000,
+        time: None,
+        wide: false,
+        lost: false,
+    };
+    let mut rows: Vec<Row> = (0..4 * AZIMUTHS).map(row).collect();
+    edit_radar(&mut configuration, &mut rows, edits);
+    let powers: Vec<u8> = (0..BINS).map(|bin| (bin * 7) as u8).collect();
+    let mut bytes = Vec::new();
+    write_configuration(&mut bytes, &configuration);
+    for row in rows.iter().filter(|row| !row.lost) {
+        let (mut seconds, mut split_seconds) = ClockFormat::default().fields(row.stamp_ns);
+        if let Some([s0, s1, s2, s3, p0, p1, p2, p3]) = row.time {
+            (seconds, split_seconds) = ([s0, s1, s2, s3], [p0, p1, p2, p3]);
+        }
+        let azimuth = Azimuth {
+            sweep_counter: 0,
+            encoder: row.encoder,
+            seconds,
+            split_seconds,
+            powers: match row.wide {
+                true => Powers::Sixteen(&powers),
+                false => Powers::Eight(&powers),
+            },
+        };
+        write_azimuth(&mut bytes, &azimuth);
+        write_keep_alive(&mut bytes);
+    }
+    bytes
+}
+
+/// A client: the clock, the assembler and the memory of a scan.
+struct Client {
+    clock: RadarClock,
+    assembler: SweepAssembler,
+    scan: OwnedScan,
+    sweeps: usize,
+}
+
+impl Client {
+    fn new(configuration: &Configuration) -> Result<Option<Self>, BadConfiguration> {
+        let assembler = SweepAssembler::new(configuration, Constants::default())?;
+        let limits = assembler.limits();
+        Ok((limits.bytes <= LARGEST_BYTES).then(|| Self {
+            clock: RadarClock::new(configuration),
+            assembler,
+            scan: OwnedScan::with_limits(limits),
+            sweeps: 0,
+        }))
+    }
+
+    fn add(&mut self, azimuth: Azimuth<'_>) -> Result<(), Failure> {
+        for (azimuth, stamp_ns) in self.clock.stamp(azimuth, START_NS) {
+            let sweep = self.assembler.add(&azimuth, stamp_ns, self.scan.slot());
+            if let Some(sweep) = sweep {
+                self.sweeps += 1;
+                self.scan.geometry = sweep.geometry;
+                // Its layout is always right; its times are the radar's.
+                self.scan.view().check().unwrap();
+                self.scan.view().check_times()?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Receives a stream in pieces, and returns the number of scans.
+fn receive(bytes: &[u8], piece: usize) -> Result<usize, Failure> {
+    let (mut parser, mut client) = (Parser::new(), None);
+    let mut damage = None;
+    for piece in bytes.chunks(piece) {
+        parser.space(piece.len())[..piece.len()].copy_from_slice(piece);
+        parser.filled(piece.len());
+        while let Some(event) = parser.next() {
+            match event {
+                Event::Message(Message::Configuration(new)) => client = Client::new(&new)?,
+                Event::Message(Message::Azimuth(azimuth)) => {
+                    client.iter_mut().try_for_each(|c| c.add(azimuth))?;
+                }
+                Event::Message(_) => {}
+                Event::Damaged { reason, .. } => damage = Some(reason),
+            }
+        }
+    }
+    match damage {
+        Some(damage) => Err(damage.into()),
+        None => Ok(client.map_or(0, |client| client.sweeps)),
+    }
+}
+
+#[test]
+fn streams() {
+    let target = Target::new("streams", 32);
+    check!()
+        .with_type::<(Vec<Edit>, Vec<ByteEdit>, u16)>()
+        .for_each(|(radar, edits, piece)| {
+            let mut bytes = stream(radar);
+            edit_bytes(&mut bytes, edits);
+            target.run(|| receive(&bytes, 1 + usize::from(*piece)).map(|_| ()));
+        });
+}
+
+#[test]
+fn a_stream_without_edits_is_received() {
+    assert_eq!(receive(&stream(&[]), 100).unwrap(), 4);
+}
