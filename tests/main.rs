@@ -26,6 +26,7 @@ mod lost_input;
 mod masks;
 mod observers;
 mod pipeline;
+mod radar;
 mod real_scans;
 mod refinement;
 mod resources;

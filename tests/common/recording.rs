@@ -138,13 +138,26 @@ fn encoded(width: u32, height: u32, pixels: &[u8]) -> Vec<u8> {
 /// one that it has.
 pub fn restamp(image: &Path, stamp_us: impl Fn(usize, i64) -> i64) {
     const STAMP: usize = 8;
+    rewrite(image, |row, pixels| {
+        let stamp: &mut [u8; STAMP] = (&mut pixels[..STAMP]).try_into().unwrap();
+        *stamp = stamp_us(row, i64::from_le_bytes(*stamp)).to_le_bytes();
+    });
+}
+
+/// Replaces an image by itself with all rows marked as measured.
+pub fn complete(image: &Path) {
+    const VALIDITY: usize = 10;
+    rewrite(image, |_, pixels| pixels[VALIDITY] = 255);
+}
+
+/// Replaces an image by itself with other rows: `edit` is given their numbers from 0.
+fn rewrite(image: &Path, edit: impl Fn(usize, &mut [u8])) {
     let bytes = fs::read(image).unwrap();
     let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
     let size = reader.next_frame(&mut pixels).unwrap();
     for (row, pixels) in pixels.chunks_exact_mut(size.width as usize).enumerate() {
-        let stamp: &mut [u8; STAMP] = (&mut pixels[..STAMP]).try_into().unwrap();
-        *stamp = stamp_us(row, i64::from_le_bytes(*stamp)).to_le_bytes();
+        edit(row, pixels);
     }
     replace(image, &encoded(size.width, size.height, &pixels));
 }

@@ -148,7 +148,7 @@ fn results_take_bounded_memory() {
     let configuration = Configuration::of_overrides(&[]).unwrap();
     let out = Out::lock(folder.path()).unwrap();
     let session = Session {
-        scans: poses as usize,
+        scans: Some(poses as usize),
         resumed: 0,
         wall: Duration::from_secs(1),
         footprint: None,

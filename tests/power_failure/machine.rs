@@ -100,7 +100,7 @@ impl Machine {
             Earlier::Nothing => self.go_on(&out, None)?,
         };
         let session = Session {
-            scans: SCANS as usize,
+            scans: Some(SCANS as usize),
             resumed: resumed as usize,
             wall: Duration::ZERO,
             footprint: None,
@@ -146,7 +146,7 @@ impl Machine {
             cell_m: 1.0,
         };
         let checked = Preflight {
-            scans: SCANS as usize,
+            scans: Some(SCANS as usize),
             window,
             limits,
             footprint: Footprint::new(&window, &limits),

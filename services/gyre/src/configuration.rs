@@ -16,7 +16,7 @@ use std::{
 use gyre_messages::{FollowerId, StageId, Window};
 use gyre_odometry::{OdometryConfig, SearchKind};
 use gyre_radar::DatasetOptions;
-use gyre_radar_replay::SourceConfig;
+use gyre_radar_replay::{SourceConfig, SourceKind};
 use gyre_scan_matching::RefinementKind;
 use gyre_simulator::{OutputFormat, SimulationConfig};
 use gyre_slam::SlamConfig;
@@ -210,7 +210,11 @@ impl Configuration {
     /// Returns the limits on scans in flight, with masks that look at `scans_a_mask` scans. In live mode the source keeps what
     /// arrives within a second, the time of a restart.
     pub fn window(&self, period: Option<Duration>, scans_a_mask: usize) -> Window {
-        let live_depth = match (self.run.mode, self.run.rate.factor()) {
+        let pace = match self.is_radar() {
+            true => Some(1.0),
+            false => self.run.rate.factor(),
+        };
+        let live_depth = match (self.run.mode, pace) {
             (Mode::Live, Some(rate)) => {
                 let period_s = period.map_or(0.25, |period| period.as_secs_f64()) / rate;
                 (1.0 / period_s.max(0.01)).ceil() as usize + self.run.window + 1
@@ -226,6 +230,11 @@ impl Configuration {
             slam: self.slam.is_on(),
             localises: self.slam.is_localised(),
         }
+    }
+
+    /// Returns whether the scans are those of a radar on the network.
+    pub fn is_radar(&self) -> bool {
+        self.source.kind == SourceKind::Colossus
     }
 
     /// Returns the simulation, if it is played without being stored.
@@ -248,6 +257,7 @@ impl Configuration {
     pub fn streaming(mut self, data: Option<&Path>) -> Self {
         if let Some(data) = data {
             self.simulation = None;
+            self.source.kind = SourceKind::Recording;
             self.source.data = data.to_owned();
         }
         if let Some(simulation) = &mut self.simulation {
@@ -257,8 +267,11 @@ impl Configuration {
         self
     }
 
-    /// Returns the recording's folder, or `a simulation`.
+    /// Returns the recording's folder, the radar, or `a simulation`.
     pub fn data(&self) -> String {
+        if self.is_radar() {
+            return format!("the radar at {}", self.source.address);
+        }
         match self.streamed() {
             Some(_) => "a simulation".to_owned(),
             None => self.source.data.display().to_string(),
@@ -334,7 +347,7 @@ impl Configuration {
             table.remove("stages");
             for (section, keys) in [
                 ("run", &["mode"][..]),
-                ("source", &["data", "first", "scans"]),
+                ("source", &["kind", "address", "data", "first", "scans"]),
             ] {
                 if let Some(section) = table.get_mut(section).and_then(|key| key.as_table_mut()) {
                     section.retain(|key, _| keys.contains(&key));

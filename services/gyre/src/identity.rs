@@ -26,8 +26,9 @@ const HEAD: &str = "# What the run was begun with, which the same command compar
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identity {
-    /// Scans to play.
-    pub scans: usize,
+    /// Scans to play; `None`: without end.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scans: Option<usize>,
     /// The programs.
     programs: Programs,
     /// The options to read the recording, those of its `dataset.toml` among them.

@@ -12,7 +12,7 @@ use gyre_stage::run::free_shared_memory;
 use rustix::process::{Resource, getrlimit};
 use thiserror::Error;
 
-use crate::{configuration::Configuration, localise::known, print};
+use crate::{configuration::Configuration, localise::known, print, radar};
 
 /// Open files of the process that has most of them, masking, without observers. Measured: 105.
 pub const FILES: u64 = 120;
@@ -25,6 +25,12 @@ pub enum PreflightError {
         "no dataset is named: give its folder with --data, or as source.data in the configuration, or add a section [simulation]"
     )]
     NoData,
+    /// A recording is needed.
+    #[error("the configuration is of {radar}, but this needs a recording: name one with --data")]
+    Radar {
+        /// The radar.
+        radar: String,
+    },
     /// One scan makes no motion.
     #[error("{path} has {scans} scan{}: a motion is between two, so there is nothing to run; `gyre inspect` shows what is there", if *scans == 1 { "" } else { "s" })]
     TooFew {
@@ -59,8 +65,8 @@ pub enum PreflightError {
 
 /// The limits of a run that follow from its dataset and configuration.
 pub struct Preflight {
-    /// Scans to play.
-    pub scans: usize,
+    /// Scans to play; `None`: without end.
+    pub scans: Option<usize>,
     /// Limits on scans in flight.
     pub window: Window,
     /// The largest payloads.
@@ -86,15 +92,10 @@ pub struct Recording {
 /// # Errors
 /// A dataset or a mask that cannot be used.
 pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure> {
-    let Played { dataset, truth } = open(configuration)?;
-    let scans = configuration.source.played(dataset.len()).len();
-    if scans < 2 {
-        return Err(PreflightError::TooFew {
-            path: configuration.data(),
-            scans,
-        }
-        .into());
-    }
+    let scans = match configuration.is_radar() {
+        true => Scans::of_radar(configuration)?,
+        false => Scans::of_recording(configuration)?,
+    };
     let masker = Masker::new(
         &configuration.odometry.raster,
         &configuration.odometry.points,
@@ -103,31 +104,77 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
     if configuration.slam.is_localised() {
         known::open(&configuration.slam.map, configuration)?;
     }
-    let period = Duration::from_nanos(dataset.period_ns().max(0) as u64);
+    let period = Duration::from_nanos(scans.period_ns.max(0) as u64);
     let window = configuration.window(Some(period), masker.scans());
     let limits = Limits {
-        scan_bytes: dataset.limits().bytes,
+        scan_bytes: scans.bytes,
         raster_cells: configuration.odometry.raster.n * configuration.odometry.raster.n,
         cell_m: configuration.odometry.raster.cell_m,
         rasters: masker.scans(),
         points: configuration.odometry.points.capacity,
     };
     let footprint = Footprint::new(&window, &limits);
-    let recording = match truth {
-        Some(_) => None,
-        None => Some(Recording {
-            fingerprint: Fingerprint::of(dataset.as_ref())?,
-            listing: Listing::of(dataset.as_ref()),
-        }),
-    };
     Ok(Preflight {
-        recording,
-        scans,
+        recording: scans.recording,
+        scans: scans.count,
         window,
         limits,
         footprint,
-        truth,
+        truth: scans.truth,
     })
+}
+
+/// What the source says of its scans before the run.
+struct Scans {
+    /// `None`: without end.
+    count: Option<usize>,
+    period_ns: i64,
+    /// The largest scan.
+    bytes: usize,
+    truth: Option<Vec<u8>>,
+    recording: Option<Recording>,
+}
+
+impl Scans {
+    fn of_recording(configuration: &Configuration) -> Result<Self, crate::Failure> {
+        let Played { dataset, truth } = open(configuration)?;
+        let scans = configuration.source.played(dataset.len()).len();
+        if scans < 2 {
+            return Err(PreflightError::TooFew {
+                path: configuration.data(),
+                scans,
+            }
+            .into());
+        }
+        let recording = match truth {
+            Some(_) => None,
+            None => Some(Recording {
+                fingerprint: Fingerprint::of(dataset.as_ref())?,
+                listing: Listing::of(dataset.as_ref()),
+            }),
+        };
+        Ok(Self {
+            count: Some(scans),
+            period_ns: dataset.period_ns(),
+            bytes: dataset.limits().bytes,
+            truth,
+            recording,
+        })
+    }
+
+    /// Asks the radar.
+    fn of_radar(configuration: &Configuration) -> Result<Self, crate::Failure> {
+        configuration.dataset.check()?;
+        let settings = radar::settings(&configuration.source, &configuration.dataset);
+        let radar = gyre_live_radar::ask(&settings)?;
+        Ok(Self {
+            count: configuration.source.scans,
+            period_ns: radar.period_ns,
+            bytes: radar.limits.bytes,
+            truth: None,
+            recording: None,
+        })
+    }
 }
 
 /// Checks that a process may open as many files as it needs. The transport's own errors would not say what is missing.
@@ -190,6 +237,12 @@ pub struct Played {
 /// No dataset is named, or it cannot be opened.
 pub fn open(configuration: &Configuration) -> Result<Played, crate::Failure> {
     let (data, options) = (&configuration.source.data, &configuration.dataset);
+    if configuration.is_radar() {
+        return Err(PreflightError::Radar {
+            radar: configuration.data(),
+        }
+        .into());
+    }
     if let Some(simulation) = configuration.streamed() {
         let drive = SimulatedDrive::new(simulation)?;
         let truth = Some(drive.ground_truth_tum());

@@ -17,7 +17,8 @@ const EVERY: Duration = Duration::from_secs(2);
 /// Shows the progress of a run.
 pub struct Progress {
     bar: Option<ProgressBar>,
-    scans: usize,
+    /// `/100`, or nothing without an end.
+    of: String,
     done: u64,
     since: Option<(Instant, u64)>,
     last_line: Instant,
@@ -25,15 +26,21 @@ pub struct Progress {
 
 impl Progress {
     /// Starts with a run of `scans` scans, of which `resumed` are in the journal already.
-    pub fn new(scans: usize, resumed: usize, footprint: &Footprint) -> Self {
+    pub fn new(scans: Option<usize>, resumed: usize, footprint: &Footprint) -> Self {
         let bar = std::io::stderr().is_terminal().then(|| {
-            let style = ProgressStyle::with_template("{bar:32} {pos}/{len} scans  {msg}")
-                .unwrap_or_else(|_| ProgressStyle::default_bar());
-            ProgressBar::new(scans as u64).with_style(style)
+            let (bar, template) = match scans {
+                Some(scans) => (
+                    ProgressBar::new(scans as u64),
+                    "{bar:32} {pos}/{len} scans  {msg}",
+                ),
+                None => (ProgressBar::new_spinner(), "{spinner} {pos} scans  {msg}"),
+            };
+            let style = ProgressStyle::with_template(template);
+            bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
         });
         let progress = Self {
             bar,
-            scans,
+            of: scans.map_or(String::new(), |scans| format!("/{scans}")),
             done: resumed as u64,
             since: None,
             last_line: Instant::now(),
@@ -83,10 +90,7 @@ impl Progress {
             }
             None if self.last_line.elapsed() >= EVERY => {
                 self.last_line = Instant::now();
-                print::note(format_args!(
-                    "{}/{} scans  {message}",
-                    self.done, self.scans
-                ));
+                print::note(format_args!("{}{} scans  {message}", self.done, self.of));
             }
             None => {}
         }
@@ -152,7 +156,7 @@ mod tests {
             rasters: 1,
             points: 0,
         };
-        Progress::new(100, 0, &Footprint::new(&window, &limits))
+        Progress::new(Some(100), 0, &Footprint::new(&window, &limits))
     }
 
     #[test]

@@ -128,7 +128,10 @@ fn truth_of(configuration: &Configuration, out: &Out) -> Option<PathBuf> {
     let simulated = || configuration.streamed().map(|_| out.join(SIMULATED_TRUTH));
     given
         .or_else(simulated)
-        .or_else(|| find_ground_truth(&configuration.source.data))
+        .or_else(|| match configuration.is_radar() {
+            true => None,
+            false => find_ground_truth(&configuration.source.data),
+        })
 }
 
 /// Corrects the trajectory by loops. Without that, the run has all other results.

@@ -68,6 +68,7 @@ fn results_folder(arguments: &RunArguments) -> PathBuf {
         .and_then(|data| data.canonicalize().ok());
     let name = match file {
         Some(file) => file.file_stem(),
+        None if arguments.radar.is_some() => Some("radar".as_ref()),
         None => data.as_deref().and_then(Path::file_name),
     };
     let name = name.unwrap_or_default();
@@ -310,7 +311,7 @@ fn conclude(
         return Err(format!(
             "only {} of the {} scans of {} can be read, and a motion is between two: {} says what is wrong with them",
             written.poses,
-            session.scans,
+            session.scans.unwrap_or(written.poses),
             configuration.data(),
             log()
         )
@@ -322,7 +323,7 @@ fn conclude(
         return Err(format!(
             "{} of the {} scans of {} cannot be read: the results are of the others, and {} says what is wrong with each",
             counts.unreadable,
-            session.scans,
+            session.scans.unwrap_or(written.poses),
             configuration.data(),
             log()
         )

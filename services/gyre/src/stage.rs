@@ -9,7 +9,7 @@ use std::{
 
 use gyre_messages::{FollowerId, StageId};
 use gyre_radar::DatasetOptions;
-use gyre_radar_replay::Pace;
+use gyre_radar_replay::{Pace, SourceConfig, SourceKind};
 use gyre_simulator::{SimulatedDrive, SimulationConfig};
 use gyre_stage::{Launch, Manifest, StageCounters, StageError, launch};
 use rustix::{
@@ -17,7 +17,7 @@ use rustix::{
     thread::set_name,
 };
 
-use crate::{configuration::process_names, print, program};
+use crate::{configuration::process_names, print, program, radar};
 
 /// The work of a process.
 type Work = fn(&Launch) -> Result<StageCounters, StageError>;
@@ -81,8 +81,13 @@ fn require_same_build(manifest: &Manifest) -> Result<(), StageError> {
     }
 }
 
-/// Plays a recording, or a simulation as it is rendered.
+/// Receives from a radar, or plays a recording, or a simulation as it is rendered.
 fn play(launch: &Launch) -> Result<StageCounters, StageError> {
+    let source: SourceConfig = launch.section("source")?;
+    if source.kind == SourceKind::Colossus {
+        let settings = radar::settings(&source, &launch.section("dataset")?);
+        return gyre_live_radar::run(launch, settings);
+    }
     let input = |error: &dyn std::error::Error| StageError::Input(error.to_string());
     let simulation = match launch.has_section("simulation") {
         true => Some(launch.section::<SimulationConfig>("simulation")?),

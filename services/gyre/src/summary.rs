@@ -25,8 +25,8 @@ pub use slam::SlamSummary;
 
 /// This session of a run.
 pub struct Session<'a> {
-    /// Scans in the recording.
-    pub scans: usize,
+    /// Scans to play; `None`: without end.
+    pub scans: Option<usize>,
     /// Poses that were in the journal before.
     pub resumed: usize,
     /// Wall-clock time.
@@ -78,7 +78,9 @@ pub struct Summary {
     /// `None`: no network makes the masks.
     #[serde(skip_serializing_if = "Option::is_none")]
     mask: Option<Mask>,
-    scans_in_recording: usize,
+    /// `None`: a radar's, without end.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    scans_in_recording: Option<usize>,
     resumed_after: usize,
     #[serde(flatten)]
     counts: Counts,
@@ -158,10 +160,12 @@ impl fmt::Display for Summary {
             Some(Ending::Interrupted) => "interrupted: the same command resumes from here",
             None => "failed",
         };
+        let of = self.scans_in_recording;
+        let of = of.map_or(String::new(), |scans| format!(" of {scans}"));
         writeln!(
             f,
-            "\n{ending}: {} of {} scans in {:.1} s, {:.1} scans/s",
-            c.processed, self.scans_in_recording, self.wall_s, self.scans_per_s
+            "\n{ending}: {}{of} scans in {:.1} s, {:.1} scans/s",
+            c.processed, self.wall_s, self.scans_per_s
         )?;
         writeln!(
             f,

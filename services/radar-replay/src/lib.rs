@@ -14,7 +14,7 @@ use gyre_stage::{
     source::{self, Unreadable},
 };
 
-pub use config::SourceConfig;
+pub use config::{SourceConfig, SourceKind};
 pub use listing::Listing;
 
 /// A playback with a longer delay is reported, s.

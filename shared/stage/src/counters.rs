@@ -22,6 +22,14 @@ pub struct StageCounters {
     pub wakes_caught_late: u64,
     /// Scans that could not be read and were skipped (source only).
     pub unreadable: u64,
+    /// Azimuths that a live radar did not deliver (source only).
+    pub missing_azimuths: u64,
+    /// Scans of a live radar that were left out: without half of their azimuths, or with times that do not increase (source only).
+    pub scans_left_out: u64,
+    /// Messages of a live radar that could not be read (source only).
+    pub damaged_messages: u64,
+    /// Connections to a live radar after the first (source only).
+    pub reconnections: u64,
     /// Delay of a simulation in live mode that is rendered more slowly than its rate, ns (source only).
     pub slipped_ns: u64,
     /// Time spent in `process`, ns.

@@ -51,12 +51,32 @@ impl Schedule {
 pub(crate) struct ScheduleWriter {
     path: PathBuf,
     file: File,
+    /// Items that the source before has published.
+    before: u64,
     schedule: Schedule,
 }
 
 impl ScheduleWriter {
     /// Creates the schedule of a source that has to begin now.
     pub fn create(manifest: &Manifest) -> Result<Self, StageError> {
+        Self::begin(manifest, 0)
+    }
+
+    /// Goes on after the source before, which has died. What it published is numbered, but no pose of it is owed: its scans may be
+    /// lost.
+    pub fn resume(manifest: &Manifest) -> Result<Self, StageError> {
+        Self::begin(
+            manifest,
+            read(manifest).map_or(0, |before| before.published),
+        )
+    }
+
+    /// Returns the number of items that the source before has published.
+    pub fn published_before(&self) -> u64 {
+        self.before
+    }
+
+    fn begin(manifest: &Manifest, before: u64) -> Result<Self, StageError> {
         let path = manifest.root.join(FILE);
         let opened = OpenOptions::new()
             .create(true)
@@ -70,6 +90,7 @@ impl ScheduleWriter {
                 source,
             })?,
             path,
+            before,
             schedule: Schedule {
                 published: 0,
                 due_ns: clock::now_ns(),

@@ -3,6 +3,7 @@
 mod attempts;
 mod pace;
 mod position;
+mod sensor;
 
 use std::{ops::Range, time::Duration};
 
@@ -21,6 +22,7 @@ use pace::Pace;
 use position::Position;
 
 pub use attempts::{Tolerance, Unreadable, open};
+pub use sensor::{Arrival, Sensor, run_sensor};
 
 /// A source of scans.
 pub trait Source {
@@ -355,10 +357,7 @@ impl<S: Source> Playback<'_, S> {
 
     fn end(&mut self, position: &Position) -> Result<(), StageError> {
         let mut draft = self.scans.loan()?;
-        draft.header().item = Item {
-            flags: flag::END,
-            ..position.item()
-        };
+        draft.header().item = position.end();
         self.scans.send(draft, S::HOP)?;
         self.schedule.has_published(position.published)
     }

@@ -107,8 +107,20 @@ impl Signals {
         handshake: Option<&Listener>,
         limit: Duration,
     ) -> Result<Woken, StageError> {
+        self.wait_or_readable(data, handshake, None, limit)
+    }
+
+    /// As [`wait`](Self::wait), or until a connection has something to read, which it leaves there.
+    pub(crate) fn wait_or_readable(
+        &self,
+        data: &[&Listener],
+        handshake: Option<&Listener>,
+        connection: Option<BorrowedFd<'_>>,
+        limit: Duration,
+    ) -> Result<Woken, StageError> {
         let mut polled = vec![self.stop.as_fd(), self.child.as_fd()];
         polled.extend(data.iter().copied().chain(handshake).map(descriptor));
+        polled.extend(connection);
         let mut polled: Vec<_> = polled
             .into_iter()
             .map(|fd| PollFd::from_borrowed_fd(fd, PollFlags::IN))
@@ -127,7 +139,7 @@ impl Signals {
         Ok(Woken {
             stop: self.stopped.get(),
             child,
-            handshake: next(),
+            handshake: handshake.is_some() && next(),
             timed_out,
         })
     }

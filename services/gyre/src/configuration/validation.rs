@@ -20,7 +20,8 @@ impl Configuration {
             let reason = "map is set, but the keyframes that are found in it are those of slam: set kind to `graph`";
             return Err(value("slam", reason));
         }
-        if self.run.mode == Mode::Live && self.run.rate == Rate::Max {
+        self.validate_radar()?;
+        if self.run.mode == Mode::Live && self.run.rate == Rate::Max && !self.is_radar() {
             let reason = "mode `live` needs a radar's pace: set rate to `realtime` or a factor";
             return Err(value("run", reason));
         }
@@ -36,6 +37,35 @@ impl Configuration {
         within("translation", odometry.translation.validate())?;
         within("exhaustive", odometry.exhaustive.validate())?;
         within("refinement", odometry.refinement.validate())
+    }
+
+    /// A radar waits for nobody, and has an address.
+    fn validate_radar(&self) -> Result<(), ConfigurationError> {
+        let source = &self.source;
+        seconds("source", "silence_s", source.silence_s)?;
+        if !self.is_radar() {
+            return Ok(());
+        }
+        if self.run.mode != Mode::Live {
+            let reason = "kind `colossus` is a radar, which does not wait: set run.mode to `live`";
+            return Err(value("source", reason));
+        }
+        if self.simulation.is_some() {
+            let reason =
+                "kind is `colossus`, but there is a section [simulation]: remove one of them";
+            return Err(value("source", reason));
+        }
+        if source.scans.is_some_and(|scans| scans < 2) {
+            let reason = "scans must be 2 or more: a motion is between two";
+            return Err(value("source", reason));
+        }
+        match source.address.is_empty() {
+            true => Err(value(
+                "source",
+                "address is missing: give the radar's, as in `192.168.0.1`",
+            )),
+            false => Ok(()),
+        }
     }
 
     /// What a simulation writes must be what the run reads.

@@ -18,6 +18,10 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     if arguments.data.is_some() {
         configuration.simulation = None;
     }
+    if configuration.is_radar() {
+        // A recording beside it, with its constants and its truth, is of another drive.
+        configuration.source.data = PathBuf::new();
+    }
     if let Some(simulation) = &mut configuration.simulation {
         let streets = simulation.town.streets.iter_mut();
         for file in simulation.drive.file.iter_mut().chain(streets) {
@@ -52,10 +56,18 @@ fn overrides(arguments: &RunArguments) -> Result<Vec<String>, Failure> {
     let calibration = arguments.calibration.as_deref().map(calibrate::overrides);
     // Quoted, because a folder may be named 2019-01-10 or 7.
     let quoted = |data: &PathBuf| toml::Value::from(data.to_string_lossy().into_owned());
-    let data = arguments
-        .data
-        .iter()
-        .map(|data| format!("source.data={}", quoted(data)));
+    let data = arguments.data.iter().flat_map(|data| {
+        let data = format!("source.data={}", quoted(data));
+        [data, "source.kind='recording'".to_owned()]
+    });
+    let radar = arguments.radar.iter().flat_map(|address| {
+        let address = toml::Value::from(address.clone());
+        [
+            "source.kind='colossus'".to_owned(),
+            "run.mode='live'".to_owned(),
+            format!("source.address={address}"),
+        ]
+    });
     let rate = arguments
         .rate
         .iter()
@@ -66,6 +78,7 @@ fn overrides(arguments: &RunArguments) -> Result<Vec<String>, Failure> {
         .into_iter()
         .chain(set)
         .chain(data)
+        .chain(radar)
         .chain(rate)
         .collect())
 }

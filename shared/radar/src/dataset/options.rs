@@ -51,7 +51,10 @@ pub struct DatasetOptions {
 
 impl DatasetOptions {
     /// Rejects values out of bounds.
-    pub(crate) fn check(&self) -> Result<(), OpenError> {
+    ///
+    /// # Errors
+    /// The first of them.
+    pub fn check(&self) -> Result<(), OpenError> {
         let check = |key, value: Option<f32>, bounds: RangeInclusive<f32>, reason| match value {
             Some(v) if !bounds.contains(&v) => Err(self.invalid(key, value, reason)),
             _ => Ok(()),

@@ -50,6 +50,21 @@ impl Position {
         }
     }
 
+    /// Goes on after the newest pose, and after all that has been published: a sensor measures nothing twice.
+    pub fn after(newest_pose: &Item, published: u64) -> Self {
+        let next = match newest_pose.is(flag::BASE) {
+            true => 0,
+            false => newest_pose.published + 1,
+        };
+        let published = next.max(published);
+        Self {
+            index: published as usize,
+            published,
+            previous: None,
+            starts_chain: published == 0,
+        }
+    }
+
     /// Starts a new chain with the scan.
     pub fn break_chain(&mut self) {
         self.previous = None;
@@ -76,6 +91,14 @@ impl Position {
             hops: item.hops,
             ..self.item()
         };
+    }
+
+    /// Returns the header of the end of the stream.
+    pub fn end(&self) -> Item {
+        Item {
+            flags: flag::END,
+            ..self.item()
+        }
     }
 
     /// Returns the header of the scan.
@@ -138,6 +161,20 @@ mod tests {
     fn a_restart_in_live_mode_continues_the_sources_own_count() {
         let position = Position::resume(&newest_pose(), 5, false);
         assert_eq!((position.index, position.item().published), (40, 31));
+    }
+
+    #[test]
+    fn a_sensor_goes_on_after_all_that_was_published() {
+        let position = |published| Position::after(&newest_pose(), published);
+        assert_eq!(position(0).published, 32);
+        assert_eq!(position(40).published, 40);
+        assert!(!position(40).item().is(flag::BREAK));
+        let base = Item {
+            flags: flag::BASE,
+            ..newest_pose()
+        };
+        assert!(Position::after(&base, 0).item().is(flag::BREAK));
+        assert_eq!(Position::after(&base, 0).published, 0);
     }
 
     #[test]

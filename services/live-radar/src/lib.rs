@@ -1,0 +1,37 @@
+//! The source stage of a live radar: receives azimuths by Navtech's protocol Colossus and publishes each sweep on `scan`, written
+//! directly into shared memory. [`server`] is the other end: it plays a recording as a radar.
+
+mod ask;
+mod connection;
+mod radar;
+pub mod server;
+
+use std::time::Duration;
+
+use gyre_stage::{Launch, StageCounters, StageError, source};
+
+pub use ask::{AskError, Sizes, ask};
+use gyre_colossus::Constants;
+pub use gyre_colossus::PORT;
+
+/// How to reach a radar, and what it does not say of itself.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Host and port.
+    pub address: String,
+    /// Time without a byte after which it is connected to anew.
+    pub silence: Duration,
+    /// Scans to receive; `None`: without end.
+    pub scans: Option<u64>,
+    /// Constants of its ranges and angles.
+    pub constants: Constants,
+}
+
+/// Receives the scans of a radar until SIGTERM, or until there are enough.
+///
+/// # Errors
+/// A radar whose scans are larger than at the start of the run, or a failure of the transport.
+pub fn run(launch: &Launch, settings: Settings) -> Result<StageCounters, StageError> {
+    let scans = settings.scans;
+    source::run_sensor(launch, &mut radar::Radar::new(settings), scans)
+}

@@ -1,0 +1,169 @@
+//! The loop of a source that a sensor drives: a scan is published when it is complete, and nothing is ever asked for again.
+
+use std::{os::fd::BorrowedFd, time::Duration};
+
+use gyre_messages::{Hop, Scan, ScanHeader, StageId};
+
+use super::{Credit, position::Position};
+use crate::{
+    Launch, StageCounters, StageError, allocations, clock, reader::Port, schedule::ScheduleWriter,
+    wake, writer::Writer,
+};
+
+/// Time for which the supervisor need not intervene: this loop says each time it wakes that it is not late, since a radar that is
+/// switched off is no reason to restart it.
+const ALIVE: Duration = Duration::from_secs(5);
+
+/// A sensor that delivers scans by itself.
+pub trait Sensor {
+    /// The stage that it is, or replaces.
+    const HOP: StageId;
+
+    /// The connection to wait for, while there is one.
+    fn connection(&self) -> Option<BorrowedFd<'_>>;
+
+    /// Takes what has arrived and writes it into shared memory, without waiting. After [`Arrival::Scan`] it is called again at once,
+    /// with memory for the next scan.
+    ///
+    /// # Errors
+    /// Input that this run can do nothing with.
+    fn take(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<Arrival, StageError>;
+
+    /// Adds what it has counted.
+    fn count(&self, counters: &mut StageCounters);
+}
+
+/// What has arrived.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Arrival {
+    /// A scan is complete.
+    Scan,
+    /// No scan is complete yet. Without a connection [`Sensor::take`] is to be called again after this time.
+    Nothing(Duration),
+}
+
+/// Publishes what a sensor delivers until SIGTERM, or until `scans` scans are published.
+///
+/// # Errors
+/// Input that cannot be used, or a failure of the transport.
+pub fn run_sensor(
+    launch: &Launch,
+    sensor: &mut impl Sensor,
+    scans: Option<u64>,
+) -> Result<StageCounters, StageError> {
+    let mut stream = Stream {
+        launch,
+        credit: Credit {
+            poses: Port::open(launch)?,
+            newest: None,
+            published: None,
+            resume_at: None,
+        },
+        schedule: ScheduleWriter::resume(&launch.manifest)?,
+        scans: Writer::open(&launch.node, &launch.manifest)?,
+        counters: StageCounters::default(),
+    };
+    if let Some(start) = stream.wait_for_start()? {
+        stream.publish(sensor, start, scans)?;
+    }
+    sensor.count(&mut stream.counters);
+    Ok(stream.counters)
+}
+
+struct Stream<'a> {
+    launch: &'a Launch,
+    credit: Credit,
+    schedule: ScheduleWriter,
+    scans: Writer<Scan>,
+    counters: StageCounters,
+}
+
+impl Stream<'_> {
+    /// Waits until the sink has reported the newest pose; `None` on a request to stop.
+    fn wait_for_start(&mut self) -> Result<Option<Position>, StageError> {
+        loop {
+            // The sink republishes its last poses one by one and notifies after all of them.
+            if self.sleep(None, wake::MAX_WAIT)? {
+                return Ok(None);
+            }
+            self.credit.update()?;
+            if let Some(newest) = self.credit.resume_at {
+                let position = Position::after(&newest, self.schedule.published_before());
+                return Ok(Some(position));
+            }
+        }
+    }
+
+    fn publish<S: Sensor>(
+        &mut self,
+        sensor: &mut S,
+        mut position: Position,
+        scans: Option<u64>,
+    ) -> Result<(), StageError> {
+        while scans.is_none_or(|scans| position.published < scans) {
+            let mut draft = self.scans.loan()?;
+            let started_ns = loop {
+                let (started_ns, allocated) = (clock::now_ns(), allocations::so_far());
+                let (header, bytes) = draft.parts();
+                let arrival = sensor.take(header, bytes)?;
+                let finished_ns = clock::now_ns();
+                match arrival {
+                    Arrival::Scan => {
+                        let allocations = allocations::so_far() - allocated;
+                        self.counters.record(allocations, finished_ns - started_ns);
+                        break started_ns;
+                    }
+                    Arrival::Nothing(limit) => {
+                        if self.sleep(sensor.connection(), limit)? {
+                            return Ok(());
+                        }
+                    }
+                }
+            };
+            let header = draft.header();
+            position.identify(&mut header.item);
+            *header.item.hop_mut(S::HOP) = Hop {
+                received_ns: started_ns,
+                started_ns,
+                finished_ns: clock::now_ns(),
+                published_ns: 0,
+            };
+            header.item.due_ns = started_ns;
+            // In this order a death in between leaves a number without a scan, which counts as dropped, and no scan without a number.
+            self.schedule.has_published(position.published)?;
+            self.scans.send(draft, S::HOP)?;
+            position.advance();
+            // However fast scans come, there is time for signals and for new readers.
+            if self.sleep(sensor.connection(), Duration::ZERO)? {
+                return Ok(());
+            }
+        }
+        let mut draft = self.scans.loan()?;
+        draft.header().item = position.end();
+        self.scans.send(draft, S::HOP)?;
+        self.schedule.has_published(position.published)?;
+        while !self.sleep(None, wake::MAX_WAIT)? {}
+        Ok(())
+    }
+
+    /// Sleeps until the connection has something to read, and answers the handshakes of new readers; true on a request to stop.
+    fn sleep(
+        &mut self,
+        connection: Option<BorrowedFd<'_>>,
+        limit: Duration,
+    ) -> Result<bool, StageError> {
+        let alive_ns = clock::now_ns() + ALIVE.as_nanos() as i64;
+        self.schedule.due_at(alive_ns)?;
+        let woken = self.launch.signals.wait_or_readable(
+            &[self.credit.poses.listener()],
+            Some(self.scans.listener()),
+            connection,
+            limit.min(wake::MAX_WAIT),
+        )?;
+        self.counters.wakes += 1;
+        if woken.may_have_new_readers() {
+            self.scans.accept_readers()?;
+        }
+        Ok(woken.stop)
+    }
+}
