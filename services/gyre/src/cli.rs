@@ -23,7 +23,7 @@ pub struct Gyre {
 /// The commands of `gyre`.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Run the whole pipeline on a recording, and write a trajectory.
+    /// Run the whole pipeline on a recording or a live radar, and write a trajectory.
     Run(RunArguments),
     /// Run one process of a run (what `gyre run` starts).
     Stage {
