@@ -24,6 +24,7 @@ pub mod print;
 pub mod program;
 pub mod progress;
 pub mod radar;
+pub mod radar_server;
 pub mod results;
 pub mod run;
 pub mod schema;
@@ -64,7 +65,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
             watch::watch(&arguments)
         }
         Command::Doctor(arguments) => doctor::doctor(&arguments),
-        Command::RadarServer(arguments) => radar::serve(&arguments),
+        Command::RadarServer(arguments) => radar_server::serve(&arguments),
         Command::Inspect(arguments) => inspect::inspect(&arguments),
         Command::Evaluate(arguments) => evaluate::evaluate(&arguments),
         Command::Map(arguments) => map::map(&arguments),

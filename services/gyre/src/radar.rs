@@ -1,22 +1,10 @@
-//! A radar on the network, and `gyre radar-server`, which plays a recording as one.
+//! The radar of the section `[source]`.
 
-use std::{net::TcpListener, process::ExitCode, time::Duration};
+use std::time::Duration;
 
-use gyre_live_radar::{
-    PORT, Settings,
-    server::{self, ByteOrder, ClockFormat, Faults, Playback},
-};
+use gyre_live_radar::{PORT, Settings};
 use gyre_radar::DatasetOptions;
 use gyre_radar_replay::SourceConfig;
-use gyre_stage::wake::Signals;
-
-use crate::{
-    Failure,
-    cli::RadarServerArguments,
-    configuration::Configuration,
-    preflight::{self, Played},
-    print,
-};
 
 /// Returns the connection to the radar of the section `[source]`, with the constants of the section `[dataset]`.
 pub fn settings(source: &SourceConfig, options: &DatasetOptions) -> Settings {
@@ -31,67 +19,5 @@ pub fn settings(source: &SourceConfig, options: &DatasetOptions) -> Settings {
         },
         scans: source.scans.map(|scans| scans as u64),
         constants: options.into(),
-    }
-}
-
-/// Plays a recording or a simulation as a radar, until it has ended or a signal arrives.
-///
-/// # Errors
-/// A recording that cannot be read, or an address that cannot be served at.
-pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
-    let configuration = match &arguments.configuration {
-        Some(file) => Configuration::read(file, &arguments.set)?,
-        None => Configuration::of_overrides(&arguments.set)?,
-    };
-    let mut configuration = configuration.streaming(arguments.data.as_deref());
-    // The angles of an encoder are sent as it counts them: who receives them corrects its eccentricity.
-    configuration.dataset.azimuth_eccentricity_rad = Some(0.0);
-    let Played { mut dataset, .. } = preflight::open(&configuration)?;
-    let mut scans = configuration.source.played(dataset.len());
-    if let Some(count) = arguments.scans {
-        scans.end = scans.end.min(scans.start.saturating_add(count));
-    }
-    if scans.is_empty() {
-        return Err(format!("{} has no scan to play", configuration.data()).into());
-    }
-    let signals = Signals::install()?;
-    let listen = &arguments.listen;
-    let listener = TcpListener::bind(listen)
-        .map_err(|error| format!("cannot serve at {listen}: {error}; choose another --listen"))?;
-    print::note(format_args!(
-        "gyre: playing {} scans of {} as a radar at {}",
-        scans.len(),
-        configuration.data(),
-        listener.local_addr()?
-    ));
-    let stop = || signals.sleep(Duration::ZERO).unwrap_or(true);
-    let playback = playback(arguments, scans);
-    let played = server::serve(listener, dataset.as_mut(), &playback, &stop)?;
-    print::line(format_args!(
-        "played {} scans, lost {} azimuths, reset the connections {} times, stalled {} times",
-        played.scans, played.lost_azimuths, played.resets, played.stalls
-    ))?;
-    Ok(ExitCode::SUCCESS)
-}
-
-fn playback(arguments: &RadarServerArguments, scans: std::ops::Range<usize>) -> Playback {
-    Playback {
-        rate: arguments.rate.factor(),
-        scans,
-        repeats: arguments.repeat,
-        faults: Faults {
-            lost: arguments.lose,
-            reset_every: arguments.reset_every,
-            stall_every: arguments.stall_every,
-            stall_s: arguments.stall_s.clamp(0.0, 3600.0),
-            garbage_every: arguments.garbage_every,
-        },
-        clock: ClockFormat {
-            order: match arguments.big_endian {
-                true => ByteOrder::Big,
-                false => ByteOrder::Little,
-            },
-            ..ClockFormat::default()
-        },
     }
 }

@@ -8,10 +8,10 @@ pub mod server;
 
 use std::time::Duration;
 
+use gyre_colossus::Constants;
 use gyre_stage::{Launch, StageCounters, StageError, source};
 
 pub use ask::{AskError, Sizes, ask};
-use gyre_colossus::Constants;
 pub use gyre_colossus::PORT;
 
 /// How to reach a radar, and what it does not say of itself.

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use gyre_radar::MAX_AZIMUTHS;
 use thiserror::Error;
 
-use crate::message::{MalformedMessage, head};
+use crate::malformed::{MalformedMessage, head};
 
 /// Bytes before the protobuf.
 pub(crate) const CONFIGURATION_BYTES: usize = 20;

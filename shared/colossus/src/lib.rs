@@ -14,6 +14,7 @@
 pub mod clock;
 pub mod configuration;
 mod kept;
+mod malformed;
 pub mod message;
 pub mod parser;
 pub mod sweep;
@@ -21,7 +22,8 @@ pub mod write;
 
 pub use clock::{ByteOrder, ClockFormat, FoundClock, RadarClock, SplitUnit};
 pub use configuration::{BadConfiguration, Configuration};
-pub use message::{Azimuth, MalformedMessage, Message, PORT, Powers, Request, decode};
+pub use malformed::MalformedMessage;
+pub use message::{Azimuth, Message, PORT, Powers, Request, decode};
 pub use parser::{Damage, Event, Parser};
 pub use sweep::{Constants, Counters, Sweep, SweepAssembler};
 pub use write::{write_azimuth, write_configuration, write_keep_alive, write_other, write_request};

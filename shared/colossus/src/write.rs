@@ -1,9 +1,8 @@
 //! Messages as bytes, appended to a buffer.
 
 use crate::configuration::{CONFIGURATION_BYTES, Configuration, FOUR_BYTES, RESOLUTION_FIELD};
-use crate::message::{
-    AZIMUTH_BYTES, Azimuth, MAX_PAYLOAD_BYTES, Powers, Request, SIGNATURE, VERSION, id,
-};
+use crate::malformed::AZIMUTH_BYTES;
+use crate::message::{Azimuth, MAX_PAYLOAD_BYTES, Powers, Request, SIGNATURE, VERSION, id};
 
 /// Appends the configuration of a radar.
 pub fn write_configuration(out: &mut Vec<u8>, configuration: &Configuration) {

@@ -63,12 +63,7 @@ pub fn run(
     source: &mut impl Source,
     tolerance: &Tolerance,
 ) -> Result<StageCounters, StageError> {
-    let credit = Credit {
-        poses: Port::open(launch)?,
-        newest: None,
-        published: None,
-        resume_at: None,
-    };
+    let credit = Credit::open(launch)?;
     let schedule = ScheduleWriter::create(&launch.manifest)?;
     let scans = Writer::open(&launch.node, &launch.manifest)?;
     let mut playback = Playback {
@@ -98,6 +93,15 @@ struct Credit {
 }
 
 impl Credit {
+    fn open(launch: &Launch) -> Result<Self, StageError> {
+        Ok(Self {
+            poses: Port::open(launch)?,
+            newest: None,
+            published: None,
+            resume_at: None,
+        })
+    }
+
     fn update(&mut self) -> Result<(), StageError> {
         while let Some(pose) = self.poses.receive()? {
             let item = pose.item();

@@ -6,13 +6,15 @@ use gyre_messages::{Hop, Scan, ScanHeader, StageId};
 
 use super::{Credit, position::Position};
 use crate::{
-    Launch, StageCounters, StageError, allocations, clock, reader::Port, schedule::ScheduleWriter,
-    wake, writer::Writer,
+    Launch, StageCounters, StageError, allocations, clock, schedule::ScheduleWriter, wake,
+    writer::Writer,
 };
 
-/// Time for which the supervisor need not intervene: this loop says each time it wakes that it is not late, since a radar that is
+/// Time for which the supervisor need not intervene: this loop says again and again that it is not late, since a radar that is
 /// switched off is no reason to restart it.
-const ALIVE: Duration = Duration::from_secs(5);
+const ALIVE_NS: i64 = 5_000_000_000;
+/// Time between two such words, ns: it wakes for each azimuth, and a word is a write to a file.
+const SAID_EVERY_NS: i64 = 1_000_000_000;
 
 /// A sensor that delivers scans by itself.
 pub trait Sensor {
@@ -53,15 +55,11 @@ pub fn run_sensor(
 ) -> Result<StageCounters, StageError> {
     let mut stream = Stream {
         launch,
-        credit: Credit {
-            poses: Port::open(launch)?,
-            newest: None,
-            published: None,
-            resume_at: None,
-        },
+        credit: Credit::open(launch)?,
         schedule: ScheduleWriter::resume(&launch.manifest)?,
         scans: Writer::open(&launch.node, &launch.manifest)?,
         counters: StageCounters::default(),
+        said_ns: 0,
     };
     if let Some(start) = stream.wait_for_start()? {
         stream.publish(sensor, start, scans)?;
@@ -76,6 +74,8 @@ struct Stream<'a> {
     schedule: ScheduleWriter,
     scans: Writer<Scan>,
     counters: StageCounters,
+    /// When the supervisor was last told that this process is alive, `CLOCK_MONOTONIC`, ns.
+    said_ns: i64,
 }
 
 impl Stream<'_> {
@@ -152,8 +152,11 @@ impl Stream<'_> {
         connection: Option<BorrowedFd<'_>>,
         limit: Duration,
     ) -> Result<bool, StageError> {
-        let alive_ns = clock::now_ns() + ALIVE.as_nanos() as i64;
-        self.schedule.due_at(alive_ns)?;
+        let now_ns = clock::now_ns();
+        if now_ns >= self.said_ns + SAID_EVERY_NS {
+            self.schedule.due_at(now_ns + ALIVE_NS)?;
+            self.said_ns = now_ns;
+        }
         let woken = self.launch.signals.wait_or_readable(
             &[self.credit.poses.listener()],
             Some(self.scans.listener()),
