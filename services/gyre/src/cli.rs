@@ -1,5 +1,7 @@
 //! The command line.
 
+mod operate;
+
 use std::{num::NonZeroUsize, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -8,6 +10,10 @@ use gyre_mapping::Origin;
 use gyre_simulator::OutputFormat;
 
 use crate::configuration::Rate;
+
+pub use operate::{
+    LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments, TopArguments,
+};
 
 /// Radar odometry as cooperating processes over shared memory.
 ///
@@ -25,6 +31,20 @@ pub struct Gyre {
 pub enum Command {
     /// Run the whole pipeline on a recording or a live radar, and write a trajectory.
     Run(RunArguments),
+    /// Run the whole pipeline in the background. Returns when all its stages are there.
+    Up(RunArguments),
+    /// End a run that goes on in the background, and wait for its results.
+    Down(RunChoice),
+    /// List the running runs and their processes.
+    Ps(PsArguments),
+    /// Print what the processes of a run report.
+    Logs(LogsArguments),
+    /// Show rates, latencies and processes of a running run in the terminal.
+    Top(TopArguments),
+    /// Start a process of a running run again.
+    Restart(RestartArguments),
+    /// Go on with another program in the place of a stage of a running run, without losing a scan.
+    Swap(SwapArguments),
     /// Run one process of a run (what `gyre run` starts).
     Stage {
         /// radar-replay, masking, rotation-search, translation-search, joint-search, refinement or pose-integration.

@@ -20,10 +20,8 @@ use gyre_radar_replay::{SourceConfig, SourceKind};
 use gyre_scan_matching::RefinementKind;
 use gyre_simulator::{OutputFormat, SimulationConfig};
 use gyre_slam::SlamConfig;
-use gyre_stage::supervise::{RestartPolicy, StagePlan};
+use gyre_stage::supervise::{Program, RestartPolicy, Scheduling, StagePlan};
 use serde::{Deserialize, Serialize};
-
-use crate::program;
 
 pub use error::ConfigurationError;
 pub use rate::Rate;
@@ -76,6 +74,9 @@ pub struct RunConfig {
     /// Time for a stage to open its topics after its start, s; 0: no limit. A stage that takes longer,
     /// as one that cannot load its model, is treated as a stall.
     pub start_timeout_s: f64,
+    /// How the system runs the stages: priority, processors, memory. Followers have their own alone.
+    #[serde(skip_serializing_if = "is_default")]
+    pub scheduling: Scheduling,
     /// Ground truth for the evaluation. Default: the one in the recording's folder.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ground_truth: Option<PathBuf>,
@@ -100,9 +101,16 @@ pub struct StageConfig {
     pub command: Vec<String>,
     /// Limits of its restarts.
     pub restart: RestartPolicy,
+    /// How the system runs it: its keys go before those of `run.scheduling`.
+    #[serde(skip_serializing_if = "is_default")]
+    pub scheduling: Scheduling,
     /// Delay for each scan, ms, to test behaviour under load. Source and `pose-integration` have none.
     #[serde(skip_serializing_if = "is_zero")]
     pub delay_ms: u64,
+}
+
+fn is_default(scheduling: &Scheduling) -> bool {
+    *scheduling == Scheduling::default()
 }
 
 fn is_zero(value: &u64) -> bool {
@@ -118,6 +126,7 @@ impl Default for RunConfig {
             observers: 8,
             stall_timeout_s: 60.0,
             start_timeout_s: 300.0,
+            scheduling: Scheduling::default(),
             ground_truth: None,
         }
     }
@@ -305,12 +314,18 @@ impl Configuration {
             // The supervisor keeps its own program; those of others can change under their names.
             let (command, programs) = match own.command.is_empty() {
                 true => (ours(), Vec::new()),
-                false => (own.command.clone(), program::pinned(&own.command)),
+                false => (own.command.clone(), Program::all_of(&own.command)),
+            };
+            let scheduling = match FollowerId::by_name(name) {
+                Some(_) => own.scheduling,
+                None => own.scheduling.or(&self.run.scheduling),
             };
             StagePlan {
                 name: name.to_owned(),
                 command,
                 programs,
+                directory: None,
+                scheduling,
                 restart: own.restart,
                 outlives_restarts: live && name == StageId::RadarReplay.name(),
                 // Live masking alone knows which scans it admitted.

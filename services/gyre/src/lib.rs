@@ -16,7 +16,9 @@ pub mod localise;
 pub mod machine;
 pub mod map;
 pub mod masks;
+pub mod notify;
 pub mod odometry;
+pub mod operate;
 pub mod out;
 pub mod picture;
 pub mod preflight;
@@ -60,6 +62,16 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
             gyre_stage::run::keep_files_private();
             run::run(&arguments)
         }
+        Command::Up(arguments) => {
+            gyre_stage::run::keep_files_private();
+            operate::up(&arguments)
+        }
+        Command::Down(run) => operate::down(&run),
+        Command::Ps(arguments) => operate::ps(&arguments),
+        Command::Logs(arguments) => operate::logs(&arguments),
+        Command::Top(arguments) => operate::top(&arguments),
+        Command::Restart(arguments) => operate::restart(&arguments),
+        Command::Swap(arguments) => operate::swap(&arguments),
         Command::Watch(arguments) => {
             gyre_stage::run::keep_files_private();
             watch::watch(&arguments)

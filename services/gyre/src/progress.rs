@@ -71,6 +71,15 @@ impl Progress {
             }
             Event::Stalled(stall) => self.say(&stall.to_string()),
             Event::Following { follower, progress } => self.following(follower, *progress),
+            Event::Swapped { stage, command } => {
+                self.say(&format!("{stage} is `{}` from here on", command.join(" ")));
+            }
+            Event::WentBack { stage, reason } => {
+                self.say(&format!(
+                    "{stage} goes back to the program before: {reason}"
+                ));
+            }
+            Event::Ready | Event::Watched => {}
         }
     }
 

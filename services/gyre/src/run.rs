@@ -25,6 +25,8 @@ use crate::{
     configuration::{Configuration, Mode},
     earlier::{self, Begun, Earlier},
     identity::{Identity, Programs},
+    notify::Notifier,
+    operate,
     out::Out,
     preflight::{self, Preflight},
     print, program,
@@ -45,6 +47,7 @@ const RECORDING: &str = "recording";
 /// # Errors
 /// A run that cannot start, fails, or finds fewer than two readable scans.
 pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
+    operate::detach_if_asked();
     let mut configuration = resolve::resolve(arguments)?;
     let out = Out::lock(&results_folder(arguments))?;
     // An earlier run may have been killed, and this one may be refused before it takes shared memory itself.
@@ -60,7 +63,8 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     }
 }
 
-fn results_folder(arguments: &RunArguments) -> PathBuf {
+/// Returns the folder of the results that the arguments name.
+pub fn results_folder(arguments: &RunArguments) -> PathBuf {
     let file = arguments.configuration.as_deref();
     let data = arguments
         .data
@@ -155,9 +159,14 @@ fn play(
     preflight::describe_masks(&resolved)?;
     let resumed = unfinished.map_or(0, |begun| begun.poses as usize);
     let mut progress = Progress::new(checked.scans, resumed, &checked.footprint);
+    let mut notifier = Notifier::of_environment();
     let started = Instant::now();
-    let report = supervise(&plan, signals, &mut |event| progress.show(&event));
+    let report = supervise(&plan, signals, &mut |event| {
+        progress.show(&event);
+        notifier.report(&event);
+    });
     progress.finish();
+    notifier.stopping();
     if matches!(report, Err(SuperviseError::TransportStuck)) && !has_started_over_at(resumed) {
         drop((root, out));
         return start_over(resumed);

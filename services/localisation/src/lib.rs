@@ -21,6 +21,9 @@ use gyre_stage::{
 /// # Errors
 /// A map or keyframes that cannot be used, an invalid configuration, or an error of [`follower::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+    if !launch.take_place()? {
+        return Ok(StageCounters::default());
+    }
     let slam: SlamConfig = launch.section("slam")?;
     let refinement: RefinementConfig = launch.section("refinement")?;
     let points: PointsConfig = launch.section("points")?;

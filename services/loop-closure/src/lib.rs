@@ -24,6 +24,9 @@ use gyre_stage::{
 /// # Errors
 /// Logs that cannot be used, an invalid configuration, or an error of [`follower::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+    if !launch.take_place()? {
+        return Ok(StageCounters::default());
+    }
     let settings = Settings {
         out: launch.manifest.out.clone(),
         slam: launch.section("slam")?,

@@ -28,6 +28,9 @@ pub use keyframes::{Keyframes, KeyframesError, complete_poses};
 /// # Errors
 /// A journal or a log of keyframes that cannot be used, or an error of [`sink::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+    if !launch.take_place()? {
+        return Ok(StageCounters::default());
+    }
     let out = &launch.manifest.out;
     let mut integration = Integration {
         journal: Journal::open(&journal::path(out)).map_err(unusable)?,

@@ -25,6 +25,9 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let config: RefinementConfig = launch.section("refinement")?;
     let refiner = Refiner::new(&config, points.capacity)
         .map_err(|error| StageError::Configuration(error.to_string()))?;
+    if !launch.take_place()? {
+        return Ok(StageCounters::default());
+    }
     let manifest = &launch.manifest;
     let path = checkpoint::path(&manifest.out);
     let window = manifest.window.scans + manifest.window.look_back;

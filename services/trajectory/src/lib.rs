@@ -22,6 +22,9 @@ use gyre_stage::{
 /// # Errors
 /// Logs that cannot be used, or an error of [`follower::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+    if !launch.take_place()? {
+        return Ok(StageCounters::default());
+    }
     let slam: SlamConfig = launch.section("slam")?;
     let kind = slam.kind.estimator().ok_or_else(|| {
         StageError::Configuration("slam.kind is none: there is no trajectory to correct".to_owned())

@@ -29,6 +29,17 @@ pub enum StageError {
     /// No run writes to a folder.
     #[error("no run is writing to {0}: `gyre run` starts one, and its --out names the folder")]
     NotRunning(PathBuf),
+    /// A run does not answer.
+    #[error("the run that writes to {out} does not answer: {reason}")]
+    Silent {
+        /// The folder of the results.
+        out: PathBuf,
+        /// The reason.
+        reason: String,
+    },
+    /// A run has refused a request.
+    #[error("{0}")]
+    Refused(String),
     /// All places of observers are taken.
     #[error(
         "the {observers} places for observers of topic `{topic}` are taken: wait until one leaves, or raise run.observers"

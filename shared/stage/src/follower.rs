@@ -55,6 +55,9 @@ pub enum Step<H> {
 /// # Errors
 /// A failure of the transport, or an error of the follower.
 pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounters, StageError> {
+    if !launch.take_place()? {
+        return Ok(StageCounters::default());
+    }
     // Only latency depends on it.
     let _ = rustix::process::nice(NICENESS);
     let listeners: Vec<Listener> = F::LOGS

@@ -3,21 +3,28 @@
 use std::{
     fs::{self, OpenOptions},
     io::Write,
-    os::unix::fs::OpenOptionsExt,
+    os::{fd::AsFd, unix::fs::OpenOptionsExt},
     path::PathBuf,
     process::ExitCode,
     sync::Mutex,
     time::Duration,
 };
 
-use rustix::process::{Signal, set_parent_process_death_signal};
+use gyre_messages::FollowerId;
+use rustix::{
+    io::{Errno, ioctl_fionbio},
+    mm::{MlockAllFlags, mlockall},
+    process::{Signal, set_parent_process_death_signal},
+};
 use serde::de::DeserializeOwned;
 use tracing::span::EnteredSpan;
 
 use crate::{
-    Manifest, StageCounters, StageError, counters, run,
+    Manifest, StageCounters, StageError, counters,
+    heartbeat::HeartbeatWriter,
+    run,
     services::{self, Node},
-    wake::Signals,
+    wake::{self, Signals},
 };
 
 /// The environment of a stage: its run, its configuration, and its node in the transport.
@@ -66,6 +73,70 @@ impl Launch {
             configuration,
             node,
             _log: log,
+        })
+    }
+
+    /// Takes this process's place in the run, when it has loaded what it needs, and before it opens its topics or files that it writes.
+    /// A process that stands by waits here until the one before it has ended (see [`run::STANDBY`]). False on a request to stop.
+    ///
+    /// The loops of this crate call it. A stage with files of its own calls it before it opens them; once is enough.
+    ///
+    /// # Errors
+    /// A file of the run that cannot be written, or memory that cannot be locked.
+    pub fn take_place(&self) -> Result<bool, StageError> {
+        if self.signals.reports() {
+            return Ok(true);
+        }
+        self.lock_memory()?;
+        if std::env::var_os(run::STANDBY).is_some() && !self.stand_by()? {
+            return Ok(false);
+        }
+        let heartbeat = HeartbeatWriter::create(&self.manifest, &self.name)?;
+        self.signals.report_to(heartbeat);
+        Ok(true)
+    }
+
+    fn stand_by(&self) -> Result<bool, StageError> {
+        let failed = |error: Errno| StageError::transport("read standard input", error);
+        let input = std::io::stdin();
+        ioctl_fionbio(&input, true).map_err(failed)?;
+        run::write(run::ready_file(&self.manifest.root, &self.name), "")?;
+        loop {
+            match rustix::io::read(&input, &mut [0_u8; 64]) {
+                Ok(0) => return Ok(true),
+                Ok(_) | Err(Errno::AGAIN | Errno::INTR) => {}
+                Err(error) => return Err(failed(error)),
+            }
+            let input = Some(input.as_fd());
+            let woken = self
+                .signals
+                .wait_or_readable(&[], None, input, wake::MAX_WAIT)?;
+            if woken.stop {
+                return Ok(false);
+            }
+        }
+    }
+
+    /// Keeps all memory of this process from being paged out, if the configuration asks for it.
+    fn lock_memory(&self) -> Result<(), StageError> {
+        let of = |table: Option<&toml::Value>| {
+            let key = table?.get("scheduling")?.get("lock_memory")?;
+            key.as_bool()
+        };
+        let own = self.configuration.get("stages");
+        let own = of(own.and_then(|stages| stages.get(&self.name)));
+        // Followers have their own settings alone.
+        let run = match FollowerId::by_name(&self.name) {
+            Some(_) => None,
+            None => of(self.configuration.get("run")),
+        };
+        if !own.or(run).unwrap_or_default() {
+            return Ok(());
+        }
+        mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE).map_err(|error| {
+            StageError::Configuration(format!(
+                "scheduling.lock_memory is set, but the memory cannot be locked: {error}; raise `ulimit -l`, or LimitMEMLOCK of the unit"
+            ))
         })
     }
 

@@ -22,9 +22,11 @@
 
 mod allocations;
 pub mod clock;
+pub mod control;
 mod counters;
 mod error;
 pub mod follower;
+mod heartbeat;
 pub mod inputs;
 pub mod launch;
 pub mod lock;
@@ -41,6 +43,7 @@ pub mod stage;
 pub mod supervise;
 #[cfg(test)]
 mod tests;
+pub mod usage;
 pub mod wake;
 pub mod writer;
 

@@ -20,10 +20,19 @@ use serde::{Deserialize, Serialize};
 use crate::StageError;
 
 pub use root::{RootError, RunRoot, SHARED_MEMORY, free_shared_memory, root_of, sweep};
-pub(crate) use root::{close_to_others, own_files, shared_memory_is_full};
+pub(crate) use root::{close_to_others, own_files, roots, shared_memory_is_full};
 
 /// The environment variable with the path of the run's root.
 pub const ENVIRONMENT: &str = "GYRE_RUN";
+
+/// The environment variable of a process that stands by for another one. When it has loaded what it needs it creates the file
+/// `NAME.ready` in the run's root, and it opens its topics when its standard input ends.
+pub const STANDBY: &str = "GYRE_STANDBY";
+
+/// Returns the path of the file by which a process says that it stands by.
+pub(crate) fn ready_file(root: &Path, process: &str) -> PathBuf {
+    root.join(format!("{process}.ready"))
+}
 
 /// The properties of a run that its processes need.
 #[derive(Clone, Debug, Serialize, Deserialize)]

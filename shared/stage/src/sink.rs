@@ -48,6 +48,9 @@ pub fn run<M: Message<Header = MotionHeader>, S: Sink>(
     launch: &Launch,
     sink: &mut S,
 ) -> Result<StageCounters, StageError> {
+    if !launch.take_place()? {
+        return Ok(StageCounters::default());
+    }
     let poses = Writer::<Pose>::open(&launch.node, &launch.manifest)?;
     let (restored, ended) = sink.restore(Pose::sizes(&launch.manifest.window).history)?;
     republish::<S>(&poses, &restored)?;

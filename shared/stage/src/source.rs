@@ -63,6 +63,9 @@ pub fn run(
     source: &mut impl Source,
     tolerance: &Tolerance,
 ) -> Result<StageCounters, StageError> {
+    if !launch.take_place()? {
+        return Ok(StageCounters::default());
+    }
     let credit = Credit::open(launch)?;
     let schedule = ScheduleWriter::create(&launch.manifest)?;
     let scans = Writer::open(&launch.node, &launch.manifest)?;

@@ -37,6 +37,9 @@ pub trait Stage {
 /// # Errors
 /// A failure of the transport, a sequence gap, or an error of the stage.
 pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<StageCounters, StageError> {
+    if !launch.take_place()? {
+        return Ok(StageCounters::default());
+    }
     let inputs = S::Inputs::open(launch)?;
     let output = Writer::open(&launch.node, &launch.manifest)?;
     let mut flow = Flow {

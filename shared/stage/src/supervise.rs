@@ -13,7 +13,12 @@ mod log;
 mod observers;
 mod plan;
 mod program;
+mod requests;
+mod scheduling;
+mod socket;
+mod stall;
 mod start;
+mod swap;
 mod watchdog;
 
 use std::{
@@ -22,7 +27,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Header, Pose, PoseHeader, StageId, flag};
+use gyre_messages::{Header, Item, Pose, PoseHeader, StageId, flag};
 use iceoryx2::prelude::{Config, FilePath, SemanticString};
 
 use crate::{
@@ -34,13 +39,18 @@ use crate::{
 };
 use child::Child;
 use guardian::Guardian;
-use start::Starter;
-use watchdog::{Starting, Watchdog};
+use socket::ControlSocket;
+use start::{Place, Starter};
+use swap::Standby;
+use watchdog::Watchdog;
 
 pub use child::Death;
 pub use guardian::guard;
-pub use plan::{Ending, Event, Plan, Report, RestartPolicy, StagePlan, Stall, SuperviseError};
+pub use plan::{
+    Ending, Event, Plan, Report, RestartPolicy, StagePlan, Stall, SuperviseError, Swapped,
+};
 pub use program::Program;
+pub use scheduling::Scheduling;
 
 /// Time for stages to exit by themselves before they are killed.
 const STOP_TIMEOUT: Duration = Duration::from_secs(2);
@@ -60,12 +70,13 @@ pub fn supervise(
     let mut supervisor = Supervisor::new(plan, signals, observe)?;
     let ending = supervisor.start().and_then(|()| supervisor.watch());
     supervisor.stop()?;
-    let (restarts, recovery) = (supervisor.restarts, supervisor.recovery);
+    let ending = ending?;
     Ok(Report {
-        ending: ending?,
-        restarts,
-        recovery,
+        ending,
+        restarts: supervisor.restarts,
+        recovery: supervisor.recovery,
         counters: counters(plan),
+        swaps: supervisor.swaps,
     })
 }
 
@@ -75,8 +86,20 @@ struct Supervisor<'a> {
     children: Vec<Child>,
     /// Outlives the stages, which it cares for.
     guardian: Guardian,
-    newest_pose: Option<u64>,
+    since: Instant,
+    /// The item of the newest pose, and when it was seen.
+    newest: Option<Item>,
+    last_pose: Option<Instant>,
+    /// True when all stages have opened their topics once.
+    is_ready: bool,
+    /// True when the stream has ended, and followers are waited for.
+    is_following: bool,
     watchdog: Watchdog,
+    looked_for_hangs: Instant,
+    socket: ControlSocket,
+    /// The program that stands by to take the place of another one.
+    standby: Option<Standby>,
+    swaps: Vec<Swapped>,
     restarts: BTreeMap<String, usize>,
     /// Followers that are not restarted any more, and why.
     given_up: Vec<(usize, SuperviseError)>,
@@ -118,8 +141,16 @@ impl<'a> Supervisor<'a> {
             observe,
             children: Vec::new(),
             guardian: Guardian::start(&plan.guardian, manifest)?,
-            newest_pose: None,
+            since: Instant::now(),
+            newest: None,
+            last_pose: None,
+            is_ready: false,
+            is_following: false,
             watchdog: Watchdog::new(plan),
+            looked_for_hangs: Instant::now(),
+            socket: ControlSocket::open(manifest)?,
+            standby: None,
+            swaps: Vec::new(),
             restarts: BTreeMap::new(),
             given_up: Vec::new(),
             recovering: Vec::new(),
@@ -140,6 +171,7 @@ impl<'a> Supervisor<'a> {
                 stage,
                 &self.plan.manifest,
                 &Starter::new(&self.signals, &self.guardian),
+                Place::Free,
             )?;
             (self.observe)(Event::Started {
                 stage: &stage.name,
@@ -152,15 +184,14 @@ impl<'a> Supervisor<'a> {
 
     fn watch(&mut self) -> Result<Ending, SuperviseError> {
         loop {
-            let woken = self
-                .signals
-                .wait(&[self.poses.listener()], None, wake::MAX_WAIT)?;
-            if woken.stop {
+            if self.sleep()? || self.serve()? {
                 return Ok(Ending::Interrupted);
             }
             if self.read_poses()? {
                 return self.await_followers();
             }
+            self.continue_swap()?;
+            self.report_readiness();
             self.logs.bound_if_due();
             self.keep_guardian();
             let processes = self.children.len() + 1;
@@ -182,6 +213,24 @@ impl<'a> Supervisor<'a> {
         }
     }
 
+    /// Sleeps until there is a pose, a request or a dead process; true on a request to stop.
+    fn sleep(&self) -> Result<bool, SuperviseError> {
+        let (poses, requests) = (self.poses.listener(), self.socket.descriptor());
+        let woken =
+            self.signals
+                .wait_or_readable(&[poses], None, Some(requests), wake::MAX_WAIT)?;
+        Ok(woken.stop)
+    }
+
+    fn report_readiness(&mut self) {
+        let mut stages = self.children.iter().filter_map(Child::stage);
+        if !self.is_ready && stages.all(|stage| self.services.has_publisher(stage)) {
+            self.is_ready = true;
+            (self.observe)(Event::Ready);
+        }
+        (self.observe)(Event::Watched);
+    }
+
     /// Replaces a guardian that somebody has killed. If there is no room for a process it is tried again at the next wake-up.
     fn keep_guardian(&mut self) {
         if self.guardian.has_ended()
@@ -193,21 +242,6 @@ impl<'a> Supervisor<'a> {
         }
     }
 
-    fn stall(&mut self) -> Option<Stall> {
-        let opening = self.children.iter().filter(|child| {
-            child
-                .stage()
-                .is_some_and(|stage| !self.services.has_publisher(stage))
-        });
-        let starting = opening
-            .min_by_key(|child| child.started())
-            .map(|child| Starting {
-                stage: child.name(),
-                since: child.started(),
-            });
-        self.watchdog.look(&self.plan.manifest, starting)
-    }
-
     /// Reads the new poses; true at the end of the stream.
     fn read_poses(&mut self) -> Result<bool, SuperviseError> {
         while let Some(received) = self.poses.receive()? {
@@ -216,10 +250,11 @@ impl<'a> Supervisor<'a> {
                 return Ok(true);
             }
             let is_new = !pose.item.is(flag::BASE)
-                && self.newest_pose.is_none_or(|newest| pose.item.seq > newest);
+                && self.newest.is_none_or(|newest| pose.item.seq > newest.seq);
             if is_new {
-                self.newest_pose = Some(pose.item.seq);
+                (self.newest, self.last_pose) = (Some(pose.item), Some(Instant::now()));
                 self.watchdog.progress(&pose.item);
+                pass_trials(pose, &mut self.children, &self.recovering);
                 record_recoveries(pose, &mut self.recovering, &mut self.recovery);
                 (self.observe)(Event::Pose(pose));
             }
@@ -233,7 +268,7 @@ impl<'a> Supervisor<'a> {
         self.may_restart(dead)?;
         let all = dead.iter().any(|i| {
             let child = &self.children[*i];
-            child.died_without_progress(self.newest_pose) || child.plan().restarts_all
+            child.died_without_progress(self.newest_seq()) || child.plan().restarts_all
         });
         match all {
             true => self.restart(&self.all_but_survivors(dead), died_ns)?,
@@ -253,16 +288,49 @@ impl<'a> Supervisor<'a> {
                 stage: child.name(),
                 death: &death,
             });
-            child.may_restart(&death)?;
             if !death.killed {
                 backoff = backoff.max(child.backoff());
             }
-            *self.restarts.entry(child.name().to_owned()).or_default() += 1;
+            self.require_restart(*i, &death)?;
+            self.count_restart(*i);
         }
         if !backoff.is_zero() {
             self.signals.wait(&[], None, backoff)?;
         }
         Ok(())
+    }
+
+    /// Returns whether a dead process may be started again, by its policy. One that has taken the place of another gives way to it
+    /// first.
+    fn require_restart(&mut self, child: usize, death: &Death) -> Result<(), SuperviseError> {
+        if self.children[child].is_on_trial() && self.go_back(child, &death.cause) {
+            return Ok(());
+        }
+        match self.children[child].may_restart(death) {
+            Err(error) if self.go_back(child, &error.to_string()) => Ok(()),
+            may_restart => may_restart,
+        }
+    }
+
+    fn count_restart(&mut self, child: usize) {
+        let name = self.children[child].name().to_owned();
+        *self.restarts.entry(name).or_default() += 1;
+    }
+
+    fn newest_seq(&self) -> Option<u64> {
+        self.newest.map(|newest| newest.seq)
+    }
+
+    fn poses_so_far(&self) -> u64 {
+        self.newest_seq().map_or(0, |newest| newest + 1)
+    }
+
+    /// Returns the processes to restart with one of them: itself, or all stages if its restart alone does not recover its state.
+    fn restarted_with(&self, child: usize) -> Vec<usize> {
+        match self.children[child].plan().restarts_all {
+            true => self.all_but_survivors(&[child]),
+            false => vec![child],
+        }
     }
 
     /// Returns all stages.
@@ -277,24 +345,33 @@ impl<'a> Supervisor<'a> {
     }
 
     fn restart(&mut self, stages: &[usize], died_ns: i64) -> Result<(), SuperviseError> {
-        self.replace(stages, died_ns)?;
+        self.replace(stages, died_ns, None)?;
         self.watchdog.restarted();
         Ok(())
     }
 
-    /// Ends processes and starts others in their places.
-    fn replace(&mut self, stages: &[usize], died_ns: i64) -> Result<(), SuperviseError> {
+    /// Ends processes and starts others in their places; in one of them a process that stood by goes on.
+    fn replace(
+        &mut self,
+        stages: &[usize],
+        died_ns: i64,
+        mut successor: Option<(usize, Child)>,
+    ) -> Result<(), SuperviseError> {
         stages.iter().for_each(|i| self.children[*i].kill());
         for i in stages {
             self.children[*i].await_end()?;
             self.guardian.forget(self.children[*i].pid());
         }
-        let all_dead = stages.len() == self.children.len();
+        let all_dead = stages.len() == self.children.len() && successor.is_none();
         clean::remove_dead(&self.plan.manifest, &self.transport, all_dead)?;
+        let newest = self.newest_seq();
         for i in stages {
             let starter = Starter::new(&self.signals, &self.guardian);
             let child = &mut self.children[*i];
-            child.respawn(&self.plan.manifest, &starter, self.newest_pose)?;
+            match successor.take_if(|(place, _)| place == i) {
+                Some((_, successor)) => child.succeed(successor, newest),
+                None => child.respawn(&self.plan.manifest, &starter, newest)?,
+            }
             self.recovering.extend(child.stage().map(|hop| Recovering {
                 hop,
                 died_ns,
@@ -302,33 +379,6 @@ impl<'a> Supervisor<'a> {
             }));
         }
         Ok(())
-    }
-
-    /// Restarts the stages that may be stuck: first the source if it is late, else all but a live source; when that does not
-    /// help, all stages; when that does not help either, the run ends.
-    fn recover_from_stall(&mut self, stall: Stall) -> Result<(), SuperviseError> {
-        let stages = match (self.watchdog.count(), &stall) {
-            (1, Stall::Scan { .. }) => self.sources(),
-            (1, _) => self.all_but_survivors(&[]),
-            (2, _) => self.all().collect(),
-            _ => return Err(SuperviseError::Stalled(stall)),
-        };
-        (self.observe)(Event::Stalled(&stall));
-        for i in &stages {
-            *self
-                .restarts
-                .entry(self.children[*i].name().to_owned())
-                .or_default() += 1;
-        }
-        self.restart(&stages, clock::now_ns())?;
-        let all = stages.len() > 1;
-        (self.observe)(Event::Restarted { all });
-        Ok(())
-    }
-
-    fn sources(&self) -> Vec<usize> {
-        let is_source = |i: &usize| self.children[*i].stage() == Some(StageId::RadarReplay);
-        (0..self.children.len()).filter(is_source).collect()
     }
 
     /// Stops all stages, and kills those that do not exit in time.
@@ -364,6 +414,21 @@ fn record_recoveries(
         }
         !recovered
     });
+}
+
+/// A program that has worked on a pose since it took the place of another one has passed its trial.
+fn pass_trials(pose: &PoseHeader, children: &mut [Child], recovering: &[Recovering]) {
+    for child in children.iter_mut().filter(|child| child.is_on_trial()) {
+        let Some(hop) = child.stage() else {
+            continue;
+        };
+        let started = recovering.iter().rev().find(|stage| stage.hop == hop);
+        let has_worked =
+            |stage: &Recovering| pose.item().hops[hop as usize].started_ns > stage.started_ns;
+        if started.is_none_or(has_worked) {
+            child.pass_trial();
+        }
+    }
 }
 
 /// Makes the run's configuration of the transport the global one, which the transport uses to clean up incomplete nodes.

@@ -4,7 +4,7 @@
 //! the queues are read anyway, and each wake-up that was caught so is counted.
 
 use std::{
-    cell::Cell,
+    cell::{Cell, OnceCell},
     io::Read,
     os::{
         fd::{AsFd, BorrowedFd},
@@ -21,7 +21,11 @@ use rustix::{
 };
 use signal_hook::{consts, low_level::pipe};
 
-use crate::{StageError, services::Listener};
+use crate::{
+    StageError,
+    heartbeat::{Activity, HeartbeatWriter},
+    services::Listener,
+};
 
 /// The longest wait.
 pub const MAX_WAIT: Duration = Duration::from_millis(200);
@@ -44,6 +48,8 @@ pub struct Signals {
     child: UnixStream,
     /// True from the first request to stop on, whichever wait received it.
     stopped: Cell<bool>,
+    /// From when a process has taken its place in a run.
+    heartbeat: OnceCell<HeartbeatWriter>,
 }
 
 /// The reasons why a wait ended.
@@ -87,7 +93,17 @@ impl Signals {
             stop,
             child,
             stopped: Cell::new(false),
+            heartbeat: OnceCell::new(),
         })
+    }
+
+    /// Reports the begin and the end of each wait from here on.
+    pub(crate) fn report_to(&self, heartbeat: HeartbeatWriter) {
+        let _ = self.heartbeat.set(heartbeat);
+    }
+
+    pub(crate) fn reports(&self) -> bool {
+        self.heartbeat.get().is_some()
     }
 
     /// Sleeps for `limit` or until a signal arrives; true on a request to stop.
@@ -125,7 +141,10 @@ impl Signals {
             .into_iter()
             .map(|fd| PollFd::from_borrowed_fd(fd, PollFlags::IN))
             .collect();
-        let timed_out = sleep_until_ready(&mut polled, limit)?;
+        self.beat(Activity::Waits);
+        let timed_out = sleep_until_ready(&mut polled, limit);
+        self.beat(Activity::Works);
+        let timed_out = timed_out?;
         // Read only what is ready: each system call saved reduces latency.
         let mut ready = polled.iter().map(|polled| !polled.revents().is_empty());
         let mut next = || ready.next().unwrap_or(false);
@@ -142,6 +161,12 @@ impl Signals {
             handshake: handshake.is_some() && next(),
             timed_out,
         })
+    }
+
+    fn beat(&self, activity: Activity) {
+        if let Some(heartbeat) = self.heartbeat.get() {
+            heartbeat.beat(activity);
+        }
     }
 }
 
@@ -205,6 +230,7 @@ mod tests {
             stop,
             child,
             stopped: Cell::new(false),
+            heartbeat: OnceCell::new(),
         };
         let short = Duration::from_millis(1);
         assert!(!signals.wait(&[], None, short).unwrap().stop);

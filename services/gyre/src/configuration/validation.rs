@@ -16,6 +16,10 @@ impl Configuration {
         self.validate_simulation()?;
         self.validate_points()?;
         self.validate_times()?;
+        within("run", self.run.scheduling.validate())?;
+        for (name, stage) in &self.stages {
+            within(&format!("stages.{name}"), stage.scheduling.validate())?;
+        }
         if !self.slam.is_on() && !self.slam.map.as_os_str().is_empty() {
             let reason = "map is set, but the keyframes that are found in it are those of slam: set kind to `graph`";
             return Err(value("slam", reason));

@@ -239,8 +239,17 @@ pub fn sweep() {
     }
 }
 
-/// Removes runs whose supervisor was killed: their locks are free.
-fn remove_dead_runs(runs: &Path) {
+/// Returns the roots of this user's runs, dead ones too.
+pub(crate) fn roots() -> Vec<PathBuf> {
+    let runs = path_of(geteuid());
+    match check_owner_only(&runs) {
+        Ok(()) => roots_in(&runs).collect(),
+        Err(_) => Vec::new(),
+    }
+}
+
+/// Returns the roots of the runs in a directory: a run has a root or a lock or both.
+fn roots_in(runs: &Path) -> impl Iterator<Item = PathBuf> {
     let entries = fs::read_dir(runs).into_iter().flatten().flatten();
     let names: BTreeSet<String> = entries
         .filter_map(|entry| {
@@ -249,7 +258,12 @@ fn remove_dead_runs(runs: &Path) {
         })
         .filter(|name| is_name(name))
         .collect();
-    for root in names.iter().map(|name| runs.join(name)) {
+    names.into_iter().map(|name| runs.join(name))
+}
+
+/// Removes runs whose supervisor was killed: their locks are free.
+fn remove_dead_runs(runs: &Path) {
+    for root in roots_in(runs) {
         // A run that has just ended has removed its lock last. Created again, that would stay if this process were killed here.
         let lock = match try_lock_existing(&lock_of(&root)) {
             Err(error) if error.kind() == io::ErrorKind::NotFound && root.exists() => {

@@ -53,6 +53,9 @@ pub fn run_sensor(
     sensor: &mut impl Sensor,
     scans: Option<u64>,
 ) -> Result<StageCounters, StageError> {
+    if !launch.take_place()? {
+        return Ok(StageCounters::default());
+    }
     let mut stream = Stream {
         launch,
         credit: Credit::open(launch)?,

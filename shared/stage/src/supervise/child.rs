@@ -12,8 +12,18 @@ use std::{
 use gyre_messages::{FollowerId, StageId};
 use rustix::process::{Pid, Signal, kill_process_group};
 
-use super::{StagePlan, SuperviseError, end::ends_within, log::Log, start::Starter};
-use crate::{Manifest, StageError, launch, run::SHARED_MEMORY};
+use super::{
+    StagePlan, SuperviseError,
+    end::ends_within,
+    log::Log,
+    start::{Place, Starter},
+};
+use crate::{
+    Manifest, StageError,
+    heartbeat::{self, Heartbeat},
+    launch,
+    run::SHARED_MEMORY,
+};
 
 /// Time for a killed process to end. The kernel holds one that waits for a device, as for a network folder.
 const KILL_TIMEOUT: Duration = Duration::from_secs(10);
@@ -44,6 +54,12 @@ pub(super) struct Child {
     /// The file in which the process says why it ended.
     last_words: PathBuf,
     log: Log,
+    /// The cause of the last death.
+    last_death: Option<String>,
+    /// The plan before a swap, to go back to.
+    before: Option<StagePlan>,
+    /// True from a swap until the new program has worked on a pose.
+    is_on_trial: bool,
 }
 
 impl Child {
@@ -51,9 +67,10 @@ impl Child {
         plan: &StagePlan,
         manifest: &Manifest,
         starter: &Starter<'_>,
+        place: Place,
     ) -> Result<Self, SuperviseError> {
         let log = Log::open(manifest, &plan.name)?;
-        let process = starter.start(plan, manifest, log.file())?;
+        let process = starter.start(plan, manifest, log.file(), place)?;
         Ok(Self {
             plan: plan.clone(),
             process,
@@ -64,6 +81,9 @@ impl Child {
             pose_at_restart: None,
             last_words: manifest.root.join(launch::last_words(&plan.name)),
             log,
+            last_death: None,
+            before: None,
+            is_on_trial: false,
         })
     }
 
@@ -84,11 +104,55 @@ impl Child {
                 path: program.path().to_owned(),
             });
         }
-        self.process = starter.start(&self.plan, manifest, self.log.file())?;
+        self.process = starter.start(&self.plan, manifest, self.log.file(), Place::Free)?;
         self.started = Instant::now();
         self.status = None;
         self.pose_at_restart = Some(newest_pose);
         Ok(())
+    }
+
+    /// Takes the place of a process that has ended, with another program that stood by for it.
+    pub(super) fn succeed(&mut self, mut successor: Self, newest_pose: Option<u64>) {
+        // It opens its topics when its standard input ends.
+        drop(successor.process.stdin.take());
+        successor.started = Instant::now();
+        successor.pose_at_restart = Some(newest_pose);
+        successor.last_death = self.last_death.take();
+        successor.try_after(self.plan.clone());
+        std::mem::swap(self, &mut successor);
+    }
+
+    /// Goes on with another program from the next start on.
+    pub(super) fn change(&mut self, plan: StagePlan) {
+        let before = std::mem::replace(&mut self.plan, plan);
+        self.deaths.clear();
+        self.try_after(before);
+    }
+
+    fn try_after(&mut self, before: StagePlan) {
+        self.before = Some(before);
+        self.is_on_trial = true;
+    }
+
+    /// Returns whether its program has taken the place of another one and has not worked on a pose yet.
+    pub(super) fn is_on_trial(&self) -> bool {
+        self.is_on_trial
+    }
+
+    /// The program that has taken the place of another one has worked on a pose.
+    pub(super) fn pass_trial(&mut self) {
+        self.is_on_trial = false;
+    }
+
+    /// Goes back to the program before a swap, from the next start on; false if there was none.
+    pub(super) fn go_back(&mut self) -> bool {
+        let Some(before) = self.before.take() else {
+            return false;
+        };
+        self.plan = before;
+        self.is_on_trial = false;
+        self.deaths.clear();
+        true
     }
 
     pub(super) fn plan(&self) -> &StagePlan {
@@ -118,6 +182,16 @@ impl Child {
         self.started
     }
 
+    /// Returns its newest heartbeat; `None` before the first one, or if it writes none.
+    pub(super) fn heartbeat(&self, manifest: &Manifest) -> Option<Heartbeat> {
+        heartbeat::read(manifest, self.name(), self.pid())
+    }
+
+    /// Returns the cause of its last death.
+    pub(super) fn last_death(&self) -> Option<&str> {
+        self.last_death.as_deref()
+    }
+
     pub(super) fn backoff(&self) -> Duration {
         Duration::from_millis(self.plan.restart.backoff_ms)
     }
@@ -135,6 +209,11 @@ impl Child {
                 self.signal(Signal::KILL);
             }
         }
+        self.status.is_some()
+    }
+
+    /// Returns whether it was found to have exited.
+    pub(super) fn is_known_to_have_exited(&self) -> bool {
         self.status.is_some()
     }
 
@@ -178,6 +257,7 @@ impl Child {
             (Some(signal), _) => format!("signal {signal}"),
             (None, code) => format!("exit code {}", code.unwrap_or_default()),
         };
+        self.last_death = Some(cause.clone());
         Death {
             killed: status.signal().is_some(),
             cause,

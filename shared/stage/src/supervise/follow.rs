@@ -7,7 +7,6 @@ use super::{Ending, Event, Stall, SuperviseError, Supervisor};
 use crate::{
     clock,
     follower::{self, Progress},
-    wake,
 };
 
 /// Stalls of a follower in a row after which the run ends.
@@ -63,7 +62,7 @@ impl Supervisor<'_> {
     fn recover_follower(&mut self, dead: usize) -> Result<(), SuperviseError> {
         let died_ns = clock::now_ns();
         self.may_restart(&[dead])?;
-        self.replace(&[dead], died_ns)?;
+        self.replace(&[dead], died_ns, None)?;
         (self.observe)(Event::Restarted { all: false });
         Ok(())
     }
@@ -71,6 +70,8 @@ impl Supervisor<'_> {
     /// Waits until the followers have read the logs to their end, or until they have that do not read what one writes that dies again
     /// and again. The stream has ended, so the death of a stage changes nothing.
     pub(super) fn await_followers(&mut self) -> Result<Ending, SuperviseError> {
+        self.is_following = true;
+        self.end_swap()?;
         let mut clock = Clock::default();
         loop {
             // A follower reads what those before it write.
@@ -85,9 +86,10 @@ impl Supervisor<'_> {
                 };
             };
             self.end_stuck_follower(*first, &mut clock)?;
-            if self.signals.wait(&[], None, wake::MAX_WAIT)?.stop {
+            if self.sleep()? || self.serve()? {
                 return Ok(Ending::Interrupted);
             }
+            (self.observe)(Event::Watched);
             self.logs.bound_if_due();
             self.keep_guardian();
             let is_dead = |i: &usize| self.children[*i].has_exited() && self.is_behind(*i);

@@ -16,6 +16,9 @@ const MAX: u64 = 8 << 20;
 /// Time between two looks at the sizes.
 const PERIOD: Duration = Duration::from_secs(1);
 
+/// What a supervisor prints that runs in the background, by its name in the folder of the logs.
+const BACKGROUND: &str = "gyre";
+
 /// The longest last line that is looked for, bytes.
 const TAIL: u64 = 4096;
 
@@ -72,8 +75,9 @@ impl Logs {
     pub fn of(plan: &Plan) -> Self {
         let stages = plan.stages.iter();
         let outputs = stages.map(|stage| path_of(&plan.manifest, &stage.name));
+        let others = [plan.manifest.events(), path_of(&plan.manifest, BACKGROUND)];
         Self {
-            files: outputs.chain([plan.manifest.events()]).collect(),
+            files: outputs.chain(others).collect(),
             due: Instant::now(),
         }
     }

@@ -6,7 +6,7 @@ use gyre_messages::PoseHeader;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{child::Death, program::Program};
+use super::{child::Death, program::Program, scheduling::Scheduling};
 use crate::{Manifest, StageCounters, StageError, follower::Progress};
 
 /// The plan of a run.
@@ -33,6 +33,10 @@ pub struct StagePlan {
     pub command: Vec<String>,
     /// The files that the command executes. After a change of one of them the stage is not started again.
     pub programs: Vec<Program>,
+    /// The directory in which it is started; `None`: the supervisor's.
+    pub directory: Option<PathBuf>,
+    /// How the system runs it.
+    pub scheduling: Scheduling,
     /// The restart policy.
     pub restart: RestartPolicy,
     /// True if it keeps running when the others are restarted: a live source, since a radar does not wait.
@@ -103,6 +107,24 @@ pub enum Event<'a> {
     },
     /// The run makes no progress: the stages that may be the cause are about to be restarted.
     Stalled(&'a Stall),
+    /// All stages have opened their topics, for the first time.
+    Ready,
+    /// The supervisor has looked at all processes, which it does every 200 ms or more often.
+    Watched,
+    /// Another program has taken the place of a stage.
+    Swapped {
+        /// The name of the stage.
+        stage: &'a str,
+        /// The program and its arguments.
+        command: &'a [String],
+    },
+    /// The program that had taken the place of a stage has failed: the one before it is started again.
+    WentBack {
+        /// The name of the stage.
+        stage: &'a str,
+        /// Why.
+        reason: &'a str,
+    },
 }
 
 /// A run that makes no progress, although no process has died.
@@ -125,6 +147,16 @@ pub enum Stall {
     Follower {
         /// The name of the follower.
         follower: String,
+        /// The time limit.
+        limit: Duration,
+    },
+    /// A process neither works on nor waits for anything new.
+    #[error(
+        "{process} hangs: it has not come to its next wait for {limit:?} (run.stall_timeout_s)"
+    )]
+    Hang {
+        /// The name of the stage or follower.
+        process: String,
         /// The time limit.
         limit: Duration,
     },
@@ -159,6 +191,19 @@ pub struct Report {
     pub recovery: Vec<Duration>,
     /// Counters of the last process of each stage.
     pub counters: BTreeMap<String, StageCounters>,
+    /// The programs that have taken the place of others, in order.
+    pub swaps: Vec<Swapped>,
+}
+
+/// A program that has taken the place of a stage.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Swapped {
+    /// The name of the stage.
+    pub stage: String,
+    /// The program and its arguments.
+    pub command: Vec<String>,
+    /// Number of poses before.
+    pub after_poses: u64,
 }
 
 /// An error that ends a run.
@@ -176,6 +221,18 @@ pub enum SuperviseError {
         stage: String,
         /// The command.
         command: String,
+        /// The system error.
+        source: std::io::Error,
+    },
+    /// The system refuses how a process is to be run.
+    #[error(
+        "cannot run {stage} with {what}: {source}; see scheduling in [run] and [stages.{stage}] of the configuration"
+    )]
+    Scheduling {
+        /// The name of the stage.
+        stage: String,
+        /// The key and its value.
+        what: String,
         /// The system error.
         source: std::io::Error,
     },
@@ -248,6 +305,7 @@ impl SuperviseError {
         matches!(
             self,
             Self::Spawn { .. }
+                | Self::Scheduling { .. }
                 | Self::Replaced { .. }
                 | Self::Permanent { .. }
                 | Self::TooManyDeaths { .. }

@@ -1,7 +1,7 @@
 //! The files that a command executes, which must not change while the run goes on.
 
 use std::{
-    fs, io,
+    env, fs, io, iter,
     os::unix::fs::MetadataExt,
     path::{Path, PathBuf},
 };
@@ -46,6 +46,12 @@ impl Program {
         })
     }
 
+    /// Returns the files of a command as they are now. One that is missing is reported when the command is started.
+    pub fn all_of(command: &[String]) -> Vec<Self> {
+        let files = files_of(command).into_iter();
+        files.filter_map(|path| Self::at(&path).ok()).collect()
+    }
+
     /// Returns the path.
     pub fn path(&self) -> &Path {
         &self.path
@@ -54,6 +60,27 @@ impl Program {
     pub(super) fn is_unchanged(&self) -> bool {
         State::of(&self.path).is_ok_and(|state| state == self.state)
     }
+}
+
+/// Returns the files that a command names: its program, and scripts among its arguments.
+fn files_of(command: &[String]) -> Vec<PathBuf> {
+    let Some((program, arguments)) = command.split_first() else {
+        return Vec::new();
+    };
+    let scripts = arguments.iter().map(PathBuf::from);
+    iter::once(found(program))
+        .chain(scripts)
+        .filter(|path| path.is_file())
+        .collect()
+}
+
+/// The place of a program that is named without one.
+fn found(program: &str) -> PathBuf {
+    let folders = env::var_os("PATH").unwrap_or_default();
+    let place = env::split_paths(&folders)
+        .map(|folder| folder.join(program))
+        .find(|path| !program.contains('/') && path.is_file());
+    place.unwrap_or_else(|| PathBuf::from(program))
 }
 
 #[cfg(test)]

@@ -19,6 +19,15 @@ use crate::{Manifest, StageError, run, wake::Signals};
 /// Pauses after a failure to start a process for want of processes or memory; the sum is the time for which it is tried.
 const PAUSES_MS: [u64; 8] = [20, 50, 100, 200, 500, 1000, 2000, 4000];
 
+/// The place of a process that is started.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Place {
+    /// Nobody else has it.
+    Free,
+    /// Another process has it: the new one stands by until its standard input ends (see [`run::STANDBY`]).
+    Taken,
+}
+
 /// Starts processes that end with this one.
 pub(super) struct Starter<'a> {
     signals: &'a Signals,
@@ -37,6 +46,7 @@ impl<'a> Starter<'a> {
         plan: &StagePlan,
         manifest: &Manifest,
         log: &File,
+        place: Place,
     ) -> Result<Child, SuperviseError> {
         let failed = |source| SuperviseError::Spawn {
             stage: plan.name.clone(),
@@ -44,8 +54,25 @@ impl<'a> Starter<'a> {
             source,
         };
         let mut command = self.command(plan, manifest, log).map_err(failed)?;
+        if let Some(directory) = &plan.directory {
+            command.current_dir(directory);
+        }
+        if place == Place::Taken {
+            command.env(run::STANDBY, "1").stdin(Stdio::piped());
+        }
         let pause = |pause| self.signals.sleep(pause);
-        with_patience(|| command.spawn(), pause)?.map_err(failed)
+        let mut child = with_patience(|| command.spawn(), pause)?.map_err(failed)?;
+        if let Err((what, source)) = plan.scheduling.apply(child.id()) {
+            // Not left behind, whatever it was to be.
+            let _ = child.kill().and_then(|()| child.wait());
+            let stage = plan.name.clone();
+            return Err(SuperviseError::Scheduling {
+                stage,
+                what,
+                source,
+            });
+        }
+        Ok(child)
     }
 
     fn command(&self, plan: &StagePlan, manifest: &Manifest, log: &File) -> io::Result<Command> {

@@ -1,0 +1,77 @@
+//! The arguments of the commands that operate running runs.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+/// The run that a command is about.
+#[derive(Debug, Args)]
+pub struct RunChoice {
+    /// The folder of the run's results, its --out. Default: the only run there is.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+}
+
+/// The arguments of `gyre ps`.
+#[derive(Debug, Args)]
+pub struct PsArguments {
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// The arguments of `gyre logs`.
+#[derive(Debug, Args)]
+pub struct LogsArguments {
+    /// The process, as masking. Default: all.
+    pub process: Option<String>,
+    /// The run.
+    #[command(flatten)]
+    pub run: RunChoice,
+    /// Go on with what comes, until the run ends.
+    #[arg(short, long)]
+    pub follow: bool,
+    /// Number of lines to begin with.
+    #[arg(short = 'n', long, default_value_t = 50)]
+    pub lines: usize,
+}
+
+/// The arguments of `gyre restart`.
+#[derive(Debug, Args)]
+pub struct RestartArguments {
+    /// The process, as masking.
+    pub process: String,
+    /// The run.
+    #[command(flatten)]
+    pub run: RunChoice,
+}
+
+/// The arguments of `gyre swap`.
+#[derive(Debug, Args)]
+pub struct SwapArguments {
+    /// The process whose place is taken, as masking.
+    pub process: String,
+    /// The run.
+    #[command(flatten)]
+    pub run: RunChoice,
+    /// The program that takes over, with its arguments: all that follows. Default: the one that the run was begun with.
+    #[arg(long, num_args = 1.., allow_hyphen_values = true, value_name = "PROGRAM")]
+    pub command: Vec<String>,
+    /// End the program before first. For a program that cannot stand by; scans wait for it meanwhile, or are dropped in live mode.
+    #[arg(long)]
+    pub cold: bool,
+}
+
+/// The arguments of `gyre top`.
+#[derive(Debug, Args)]
+pub struct TopArguments {
+    /// The run.
+    #[command(flatten)]
+    pub run: RunChoice,
+    /// Time between two looks, s.
+    #[arg(long, default_value_t = 1.0, value_name = "S")]
+    pub every: f64,
+    /// Print one look as text and end.
+    #[arg(long)]
+    pub once: bool,
+}

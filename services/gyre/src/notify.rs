@@ -1,0 +1,79 @@
+//! What systemd is told of a run, where it has started it (`Type=notify`): readiness, a watchdog's keep-alive, and a line of status.
+
+use std::{
+    io,
+    time::{Duration, Instant},
+};
+
+use gyre_messages::PoseHeader;
+use gyre_stage::supervise::Event;
+use sd_notify::NotifyState;
+
+use crate::print;
+
+/// Time between two lines of status.
+const STATUS_EVERY: Duration = Duration::from_secs(5);
+
+/// Notifies systemd; does nothing where nobody listens.
+pub struct Notifier {
+    listens: bool,
+    /// Time between two keep-alives.
+    every: Option<Duration>,
+    kept_alive: Instant,
+    status: Instant,
+}
+
+impl Notifier {
+    /// Returns the notifier that the environment asks for, by `NOTIFY_SOCKET` and `WATCHDOG_USEC`.
+    #[must_use]
+    pub fn of_environment() -> Self {
+        let now = Instant::now();
+        Self {
+            listens: std::env::var_os("NOTIFY_SOCKET").is_some(),
+            // Half of the limit, as its manual advises.
+            every: sd_notify::watchdog_enabled().map(|limit| limit / 2),
+            kept_alive: now,
+            status: now,
+        }
+    }
+
+    /// Tells what systemd wants to know of an event. The keep-alive says that the supervisor looks after its processes, which it
+    /// restarts by itself; systemd restarts a supervisor that does not.
+    pub fn report(&mut self, event: &Event<'_>) {
+        match event {
+            Event::Ready => self.tell(&[NotifyState::Ready]),
+            Event::Watched if self.every.is_some_and(|it| self.kept_alive.elapsed() >= it) => {
+                self.kept_alive = Instant::now();
+                self.tell(&[NotifyState::Watchdog]);
+            }
+            Event::Pose(pose) if self.status.elapsed() >= STATUS_EVERY => {
+                self.status = Instant::now();
+                self.tell(&[NotifyState::Status(&status(pose))]);
+            }
+            Event::Stalled(stall) => self.tell(&[NotifyState::Status(&stall.to_string())]),
+            _ => {}
+        }
+    }
+
+    /// The stages have ended, and results are written, which takes as long as it takes.
+    pub fn stopping(&mut self) {
+        let results = NotifyState::Status("writing the results");
+        self.tell(&[NotifyState::Stopping, results]);
+    }
+
+    fn tell(&mut self, states: &[NotifyState<'_>]) {
+        if !self.listens {
+            return;
+        }
+        if let Err(error) = sd_notify::notify(states) {
+            // The run does not need a listener. Once is enough to say so.
+            self.listens = error.kind() == io::ErrorKind::WouldBlock;
+            print::note(format_args!("gyre: systemd cannot be notified: {error}"));
+        }
+    }
+}
+
+fn status(pose: &PoseHeader) -> String {
+    let (poses, dropped) = (pose.item.seq + 1, pose.item.dropped());
+    format!("{poses} poses, {dropped} scans dropped")
+}

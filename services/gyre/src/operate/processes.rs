@@ -1,0 +1,121 @@
+//! `gyre ps`: the running runs and their processes.
+
+use std::{fmt, process::ExitCode};
+
+use gyre_stage::{
+    control::{Control, ProcessStatus, Status},
+    usage::Usage,
+};
+use serde::Serialize;
+
+use crate::{Failure, cli::PsArguments, print};
+
+/// A run with what its processes use, in the order of the status.
+#[derive(Serialize)]
+struct Row {
+    status: Status,
+    usage: Vec<Option<Usage>>,
+}
+
+/// Lists the runs of this user.
+///
+/// # Errors
+/// Standard output cannot be written.
+pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
+    let mut rows = Vec::new();
+    for run in Control::of_all() {
+        match run.status() {
+            Ok(status) => rows.push(Row::of(status)),
+            // It has ended meanwhile, or it hangs.
+            Err(error) => print::note(format_args!("gyre: {error}")),
+        }
+    }
+    if arguments.json {
+        print::line(serde_json::to_string_pretty(&rows)?)?;
+    } else if rows.is_empty() {
+        print::line("no run is running")?;
+    }
+    if !arguments.json {
+        for row in &rows {
+            print::line(row)?;
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+impl Row {
+    fn of(status: Status) -> Self {
+        let usage = status.processes.iter().map(|it| Usage::of(it.pid));
+        Self {
+            usage: usage.collect(),
+            status,
+        }
+    }
+}
+
+impl fmt::Display for Row {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let status = &self.status;
+        writeln!(f, "{}", status.out.display())?;
+        writeln!(f, "{}", summary(status))?;
+        writeln!(
+            f,
+            "  {:20} {:>8} {:9} {:>8} {:>9} {:>8} {:>9}",
+            "process", "pid", "state", "for", "cpu", "memory", "restarts"
+        )?;
+        for (process, usage) in status.processes.iter().zip(&self.usage) {
+            let usage = usage.unwrap_or_default();
+            writeln!(
+                f,
+                "  {:20} {:>8} {:9} {:>8} {:>7.1} s {:>5.0} MB {:>9}{}",
+                process.name,
+                process.pid,
+                process.activity.name(),
+                process.activity_s.map_or_else(String::new, duration),
+                usage.cpu_s,
+                usage.own_bytes as f64 * 1e-6,
+                process.restarts,
+                remarks(process),
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// Returns the state of a run in a line.
+pub fn summary(status: &Status) -> String {
+    let mode = if status.live { "live" } else { "lossless" };
+    let pose = status.last_pose_s.map_or_else(String::new, |age| {
+        format!(", the last {} ago", duration(age))
+    });
+    format!(
+        "{} for {}, {mode}, supervised by {}: {} poses{pose}, {} dropped",
+        status.phase.name(),
+        duration(status.uptime_s),
+        status.pid,
+        status.poses,
+        status.dropped
+    )
+}
+
+/// Returns what is unusual about a process.
+fn remarks(process: &ProcessStatus) -> String {
+    let mut remarks = String::new();
+    if let Some(death) = &process.last_death {
+        remarks += &format!("  died by {death}");
+    }
+    if process.is_swapped {
+        remarks += &format!("  is `{}`", process.command.join(" "));
+    }
+    remarks
+}
+
+/// Returns a time in two or three digits.
+pub fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 0.9995 => format!("{:.0} ms", s * 1e3),
+        s if s < 99.5 => format!("{s:.1} s"),
+        s if s < 5400.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.1} h", s / 3600.0),
+    }
+}

@@ -1,0 +1,160 @@
+//! What is known of a run at a moment, from its status, its newest poses and the kernel's counts.
+
+use std::{
+    collections::{BTreeMap, VecDeque},
+    time::{Duration, Instant},
+};
+
+use gyre_messages::PoseHeader;
+use gyre_stage::{
+    control::{Control, Status},
+    observer::Next,
+    usage::Usage,
+};
+
+use super::Poses;
+use crate::{
+    Failure,
+    latency::{Latency, LatencyMeter},
+};
+
+/// The time over which latencies are measured.
+const SPAN: Duration = Duration::from_secs(10);
+/// Number of looks whose latency is drawn.
+const HISTORY: usize = 300;
+
+/// A run at a moment.
+#[derive(Clone)]
+pub struct Look {
+    pub status: Status,
+    /// Scans with a pose, 1/s.
+    pub rate: f64,
+    /// Scans that were published and have no pose; `None` if the source does not tell.
+    pub in_flight: Option<u64>,
+    /// Of the poses of the last 10 s that were seen.
+    pub latency: Latency,
+    /// What each process uses, in the order of the status.
+    pub processes: Vec<Use>,
+    /// The longest sensor-to-pose time between two looks, us, oldest first.
+    pub history: Vec<u64>,
+}
+
+/// What a process uses.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Use {
+    /// Share of one processor since the last look.
+    pub cpu: f64,
+    /// Memory of its own, bytes.
+    pub own_bytes: u64,
+    /// Wake-ups since the last look, 1/s.
+    pub wake_ups: f64,
+}
+
+/// Looks at a run again and again.
+pub struct Looks<'run> {
+    control: Control,
+    poses: Poses<'run>,
+    recent: VecDeque<(Instant, PoseHeader)>,
+    longest_us: u64,
+    history: VecDeque<u64>,
+    earlier: Option<Earlier>,
+    last: Option<Look>,
+}
+
+/// The counts at the look before.
+struct Earlier {
+    at: Instant,
+    poses: u64,
+    usage: BTreeMap<u32, Usage>,
+}
+
+impl<'run> Looks<'run> {
+    pub fn of(control: Control, poses: Poses<'run>) -> Self {
+        Self {
+            control,
+            poses,
+            recent: VecDeque::new(),
+            longest_us: 0,
+            history: VecDeque::new(),
+            earlier: None,
+            last: None,
+        }
+    }
+
+    /// Returns whether the run has ended.
+    pub fn has_ended(&self) -> bool {
+        !self.control.is_there() || self.control.status().is_err()
+    }
+
+    /// Returns the newest look.
+    pub fn last(&mut self) -> Option<Look> {
+        self.last.take()
+    }
+
+    /// Takes the poses that have come. Those that were missed do not matter: the rest is a sample.
+    pub fn take_poses(&mut self) -> Result<(), Failure> {
+        while let Next::Message(pose, _) = self.poses.next(Duration::ZERO)? {
+            let pose = *pose.header();
+            let done_ns = pose.item.hops.iter().map(|hop| hop.finished_ns).max();
+            let latency_ns = done_ns.unwrap_or_default() - pose.item.due_ns;
+            self.longest_us = self.longest_us.max(latency_ns.max(0) as u64 / 1000);
+            self.recent.push_back((Instant::now(), pose));
+        }
+        Ok(())
+    }
+
+    /// Looks at the run.
+    pub fn look(&mut self) -> Result<Look, Failure> {
+        let status = self.control.status()?;
+        let now = Instant::now();
+        self.take_poses()?;
+        self.recent.retain(|(at, _)| now - *at <= SPAN);
+        let mut meter = LatencyMeter::default();
+        self.recent.iter().for_each(|(_, pose)| meter.add(pose));
+        self.history.push_back(std::mem::take(&mut self.longest_us));
+        if self.history.len() > HISTORY {
+            self.history.pop_front();
+        }
+        let pids = status.processes.iter().map(|process| process.pid);
+        let usage: BTreeMap<u32, Usage> = pids
+            .filter_map(|pid| Some((pid, Usage::of(pid)?)))
+            .collect();
+        let earlier = self.earlier.replace(Earlier {
+            at: now,
+            poses: status.poses,
+            usage: usage.clone(),
+        });
+        let elapsed = earlier.as_ref().map_or(Duration::ZERO, |it| now - it.at);
+        let rate = earlier.as_ref().map_or(0.0, |earlier| {
+            status.poses.saturating_sub(earlier.poses) as f64 / elapsed.as_secs_f64().max(1e-9)
+        });
+        let used = |pid: u32| {
+            let now = usage.get(&pid).copied().unwrap_or_default();
+            let before = earlier.as_ref().and_then(|it| it.usage.get(&pid).copied());
+            Use::between(before.unwrap_or(now), now, elapsed)
+        };
+        let look = Look {
+            rate,
+            in_flight: status
+                .published
+                .map(|published| published.saturating_sub(status.poses + status.dropped)),
+            latency: meter.latency(),
+            processes: status.processes.iter().map(|it| used(it.pid)).collect(),
+            history: self.history.iter().copied().collect(),
+            status,
+        };
+        self.last = Some(look.clone());
+        Ok(look)
+    }
+}
+
+impl Use {
+    fn between(before: Usage, now: Usage, elapsed: Duration) -> Self {
+        let wake_ups = now.wake_ups.saturating_sub(before.wake_ups) as f64;
+        Self {
+            cpu: now.processor_share(&before, elapsed),
+            own_bytes: now.own_bytes,
+            wake_ups: wake_ups / elapsed.as_secs_f64().max(1e-9),
+        }
+    }
+}

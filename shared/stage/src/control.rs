@@ -1,0 +1,297 @@
+//! The control of a running run, from other processes: its status, and requests to its supervisor.
+//!
+//! The supervisor answers at a socket in the run's root, which is the user's alone: one request on one line of JSON, one answer on
+//! another, and the connection is closed.
+
+use std::{
+    io::{self, BufRead, BufReader, Write},
+    os::unix::net::UnixStream,
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Manifest, StageError, run};
+
+/// The name of the socket in the run's root.
+pub(crate) const SOCKET: &str = "control.sock";
+/// Time for the supervisor to answer. It is busy while it ends a process that the kernel holds.
+const ANSWER: Duration = Duration::from_secs(15);
+
+/// A request to the supervisor of a run.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Request {
+    /// Say how the run is.
+    Status,
+    /// End the run as an interrupt does: its journal stays, and the same command goes on.
+    Stop,
+    /// Start a process again.
+    Restart {
+        /// The name of the stage or follower.
+        process: String,
+    },
+    /// Go on with another program in the place of a stage.
+    Swap(Swap),
+}
+
+/// Another program for a stage.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Swap {
+    /// The name of the stage or follower.
+    pub process: String,
+    /// Program and arguments; `None`: those that the run was begun with.
+    pub command: Option<Vec<String>>,
+    /// The directory in which the program is started.
+    pub directory: PathBuf,
+    /// True if the program is started only when the one before has ended, since it cannot stand by.
+    pub cold: bool,
+}
+
+/// The answer to a request.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Answer {
+    /// To [`Request::Status`].
+    Status(Status),
+    /// It is done, or has begun.
+    Done,
+    /// It was not done, and why.
+    Refused(String),
+}
+
+/// The state of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Status {
+    /// The process of the supervisor.
+    pub pid: u32,
+    /// The folder of the results.
+    pub out: PathBuf,
+    /// True in live mode.
+    pub live: bool,
+    /// Where the run is between its start and its end.
+    pub phase: Phase,
+    /// Time since the supervisor has started, s.
+    pub uptime_s: f64,
+    /// Scans that the source has published; `None` if a replaced source does not tell.
+    pub published: Option<u64>,
+    /// Poses.
+    pub poses: u64,
+    /// Scans that were dropped before the newest pose.
+    pub dropped: u64,
+    /// Time since the newest pose was seen, s; `None` before the first one.
+    pub last_pose_s: Option<f64>,
+    /// The processes: the stages in the order of the stream, then the followers.
+    pub processes: Vec<ProcessStatus>,
+}
+
+/// Where a run is between its start and its end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Phase {
+    /// A stage has not opened its topics.
+    Starting,
+    /// All stages are there.
+    Running,
+    /// The stream has ended, and followers read their logs to the end.
+    Following,
+}
+
+impl Phase {
+    /// Returns its name.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Starting => "starting",
+            Self::Running => "running",
+            Self::Following => "following",
+        }
+    }
+}
+
+/// The state of a process of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ProcessStatus {
+    /// The name of the stage or follower.
+    pub name: String,
+    /// The process.
+    pub pid: u32,
+    /// Program and arguments.
+    pub command: Vec<String>,
+    /// True if the program is another one than the run was begun with.
+    pub is_swapped: bool,
+    /// What it does.
+    pub activity: Activity,
+    /// For how long it has done that, s; `None` if it does not tell.
+    pub activity_s: Option<f64>,
+    /// Time since its start, s.
+    pub uptime_s: f64,
+    /// Its restarts, for whatever reason.
+    pub restarts: usize,
+    /// The cause of its last death.
+    pub last_death: Option<String>,
+}
+
+/// What a process does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Activity {
+    /// It has not opened its topics: it may be loading a model.
+    Starting,
+    /// It sleeps until there is work.
+    Waiting,
+    /// It works on an item.
+    Working,
+    /// It has not woken from a sleep that has ended: it is stopped, or the system does not run it.
+    Silent,
+    /// It runs, and writes no heartbeat, as a replacement need not.
+    Running,
+    /// It has ended.
+    Ended,
+}
+
+impl Activity {
+    /// Returns its name.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Starting => "starting",
+            Self::Waiting => "waiting",
+            Self::Working => "working",
+            Self::Silent => "silent",
+            Self::Running => "running",
+            Self::Ended => "ended",
+        }
+    }
+}
+
+/// A client of a run's supervisor.
+#[derive(Debug)]
+pub struct Control {
+    root: PathBuf,
+    out: PathBuf,
+}
+
+impl Control {
+    /// Returns the control of the run that writes its results to `out`.
+    ///
+    /// # Errors
+    /// There is no such run.
+    pub fn of(out: &Path) -> Result<Self, StageError> {
+        let absolute = out.canonicalize().unwrap_or_else(|_| out.to_owned());
+        let root = run::root_of(&absolute);
+        match root.join(SOCKET).exists() {
+            true => Ok(Self {
+                root,
+                out: out.to_owned(),
+            }),
+            false => Err(StageError::NotRunning(out.to_owned())),
+        }
+    }
+
+    /// Returns the controls of all runs of this user, by the folders of their results.
+    #[must_use]
+    pub fn of_all() -> Vec<Self> {
+        let with_out = |root: PathBuf| {
+            let out = Manifest::read(&root).ok()?.out;
+            root.join(SOCKET).exists().then_some(Self { root, out })
+        };
+        let mut runs: Vec<Self> = run::roots().into_iter().filter_map(with_out).collect();
+        runs.sort_by(|a, b| a.out.cmp(&b.out));
+        runs
+    }
+
+    /// Returns the folder of the run's results.
+    #[must_use]
+    pub fn out(&self) -> &Path {
+        &self.out
+    }
+
+    /// Returns the state of the run.
+    ///
+    /// # Errors
+    /// The run has ended, or its supervisor does not answer.
+    pub fn status(&self) -> Result<Status, StageError> {
+        match self.ask(&Request::Status, Some(ANSWER))? {
+            Answer::Status(status) => Ok(status),
+            answer => Err(self.silent(format!("its answer is {answer:?}"))),
+        }
+    }
+
+    /// Asks the run to end, as an interrupt does. It has ended when this run is there no more.
+    ///
+    /// # Errors
+    /// The run has ended, or its supervisor does not answer.
+    pub fn stop(&self) -> Result<(), StageError> {
+        self.order(&Request::Stop, Some(ANSWER))
+    }
+
+    /// Starts a process of the run again.
+    ///
+    /// # Errors
+    /// There is no such process, the run has ended, or its supervisor does not answer.
+    pub fn restart(&self, process: &str) -> Result<(), StageError> {
+        let process = process.to_owned();
+        self.order(&Request::Restart { process }, Some(ANSWER))
+    }
+
+    /// Goes on with another program in the place of a stage. Returns when that has taken over.
+    ///
+    /// # Errors
+    /// The program did not come to take over, and the one before goes on; or the run has ended.
+    pub fn swap(&self, swap: Swap) -> Result<(), StageError> {
+        // The supervisor has the limit: `run.start_timeout_s`.
+        self.order(&Request::Swap(swap), None)
+    }
+
+    /// Returns whether the run is still there.
+    #[must_use]
+    pub fn is_there(&self) -> bool {
+        self.root.exists()
+    }
+
+    fn order(&self, request: &Request, limit: Option<Duration>) -> Result<(), StageError> {
+        match self.ask(request, limit)? {
+            Answer::Done => Ok(()),
+            Answer::Refused(reason) => Err(StageError::Refused(reason)),
+            answer => Err(self.silent(format!("its answer is {answer:?}"))),
+        }
+    }
+
+    fn ask(&self, request: &Request, limit: Option<Duration>) -> Result<Answer, StageError> {
+        let line = self.exchange(request, limit).map_err(|error| {
+            let is_gone = matches!(
+                error.kind(),
+                io::ErrorKind::NotFound
+                    | io::ErrorKind::ConnectionRefused
+                    | io::ErrorKind::ConnectionReset
+                    | io::ErrorKind::UnexpectedEof
+            );
+            match is_gone {
+                true => StageError::NotRunning(self.out.clone()),
+                false => self.silent(error.to_string()),
+            }
+        })?;
+        serde_json::from_str(&line).map_err(|error| self.silent(error.to_string()))
+    }
+
+    fn exchange(&self, request: &Request, limit: Option<Duration>) -> io::Result<String> {
+        let mut connection = UnixStream::connect(self.root.join(SOCKET))?;
+        connection.set_read_timeout(limit)?;
+        connection.set_write_timeout(limit)?;
+        let mut line = serde_json::to_string(request)?;
+        line.push('\n');
+        connection.write_all(line.as_bytes())?;
+        let mut answer = String::new();
+        match BufReader::new(connection).read_line(&mut answer)? {
+            0 => Err(io::ErrorKind::UnexpectedEof.into()),
+            _ => Ok(answer),
+        }
+    }
+
+    fn silent(&self, reason: String) -> StageError {
+        StageError::Silent {
+            out: self.out.clone(),
+            reason,
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! Requests from other processes: what is asked at the control socket, and the answers.
+
+use std::process;
+
+use gyre_messages::StageId;
+
+use super::{Event, SuperviseError, Supervisor, child::Child, socket::Client};
+use crate::{
+    clock,
+    control::{Activity, Answer, Phase, ProcessStatus, Request, Status},
+    heartbeat, schedule,
+};
+
+impl Supervisor<'_> {
+    /// Answers all requests; true if one of them is to stop.
+    pub(super) fn serve(&mut self) -> Result<bool, SuperviseError> {
+        let mut stop = false;
+        while let Some((request, client)) = self.socket.next() {
+            match request {
+                Request::Status => client.answer(&Answer::Status(self.status())),
+                Request::Stop => {
+                    stop = true;
+                    client.answer(&Answer::Done);
+                }
+                Request::Restart { process } => match self.named(&process) {
+                    Some(child) => {
+                        self.restart_on_request(child)?;
+                        client.answer(&Answer::Done);
+                    }
+                    None => self.refuse_unknown(&process, client),
+                },
+                Request::Swap(swap) => self.begin_swap(swap, client)?,
+            }
+        }
+        Ok(stop)
+    }
+
+    /// Returns the index of a process.
+    pub(super) fn named(&self, process: &str) -> Option<usize> {
+        let mut children = self.children.iter();
+        children.position(|child| child.name() == process)
+    }
+
+    pub(super) fn refuse_unknown(&self, process: &str, client: Client) {
+        let names: Vec<&str> = self.children.iter().map(Child::name).collect();
+        let names = names.join(", ");
+        client.answer(&Answer::Refused(format!(
+            "the run has no process `{process}`; it has {names}"
+        )));
+    }
+
+    /// Ends a process and starts it again, which counts as a restart and not as a death.
+    pub(super) fn restart_on_request(&mut self, child: usize) -> Result<(), SuperviseError> {
+        let stages = self.restarted_with(child);
+        for i in &stages {
+            self.count_restart(*i);
+        }
+        self.restart(&stages, clock::now_ns())?;
+        (self.observe)(Event::Restarted {
+            all: stages.len() > 1,
+        });
+        Ok(())
+    }
+
+    fn status(&mut self) -> Status {
+        let manifest = &self.plan.manifest;
+        let processes = (0..self.children.len()).map(|i| self.status_of(i));
+        let processes: Vec<ProcessStatus> = processes.collect();
+        let is_starting = |process: &ProcessStatus| process.activity == Activity::Starting;
+        Status {
+            pid: process::id(),
+            out: manifest.out.clone(),
+            live: manifest.live,
+            phase: match () {
+                () if self.is_following => Phase::Following,
+                () if processes.iter().any(is_starting) => Phase::Starting,
+                () => Phase::Running,
+            },
+            uptime_s: self.since.elapsed().as_secs_f64(),
+            published: schedule::read(manifest).map(|source| source.published),
+            poses: self.poses_so_far(),
+            dropped: self.newest.map_or(0, |newest| newest.dropped()),
+            last_pose_s: self.last_pose.map(|pose| pose.elapsed().as_secs_f64()),
+            processes,
+        }
+    }
+
+    fn status_of(&self, child: usize) -> ProcessStatus {
+        let begun = &self.plan.stages[child].command;
+        let child = &self.children[child];
+        let beat = child.heartbeat(&self.plan.manifest);
+        let is_opening = |stage: StageId| !self.services.has_publisher(stage);
+        let activity = match beat {
+            _ if child.is_known_to_have_exited() => Activity::Ended,
+            _ if child.stage().is_some_and(is_opening) => Activity::Starting,
+            None => Activity::Running,
+            Some(beat) if beat.is_silent() => Activity::Silent,
+            Some(beat) => match beat.activity {
+                heartbeat::Activity::Works => Activity::Working,
+                heartbeat::Activity::Waits => Activity::Waiting,
+            },
+        };
+        let restarts = self.restarts.get(child.name());
+        ProcessStatus {
+            name: child.name().to_owned(),
+            pid: child.pid(),
+            command: child.plan().command.clone(),
+            is_swapped: child.plan().command != *begun,
+            activity,
+            activity_s: beat.map(|beat| beat.age().as_secs_f64()),
+            uptime_s: child.started().elapsed().as_secs_f64(),
+            restarts: restarts.copied().unwrap_or_default(),
+            last_death: child.last_death().map(str::to_owned),
+        }
+    }
+}

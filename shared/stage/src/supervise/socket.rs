@@ -1,0 +1,85 @@
+//! The supervisor's end of the control socket: takes requests, one for each connection, without waiting for a slow client.
+
+use std::{
+    io::{self, BufRead, BufReader, Read, Write},
+    os::{
+        fd::{AsFd, BorrowedFd},
+        unix::net::{UnixListener, UnixStream},
+    },
+    time::Duration,
+};
+
+use crate::{
+    Manifest, StageError,
+    control::{Answer, Request, SOCKET},
+};
+
+/// Time for a client to send its request, and to take the answer. The supervisor does nothing else meanwhile, and clients of this
+/// user send it at once.
+const LIMIT: Duration = Duration::from_millis(100);
+/// Size of the longest request, bytes.
+const MAX: u64 = 64 << 10;
+
+/// The socket, open to this user alone since it lies in the run's root.
+pub(super) struct ControlSocket(UnixListener);
+
+impl ControlSocket {
+    pub fn open(manifest: &Manifest) -> Result<Self, StageError> {
+        let path = manifest.root.join(SOCKET);
+        let listener = UnixListener::bind(&path).and_then(|listener| {
+            listener.set_nonblocking(true)?;
+            Ok(listener)
+        });
+        match listener {
+            Ok(listener) => Ok(Self(listener)),
+            Err(source) => Err(StageError::File { path, source }),
+        }
+    }
+
+    /// Returns the descriptor that is readable when a client has come.
+    pub fn descriptor(&self) -> BorrowedFd<'_> {
+        self.0.as_fd()
+    }
+
+    /// Returns the next request, and where its answer goes. One that cannot be read is refused here.
+    pub fn next(&self) -> Option<(Request, Client)> {
+        loop {
+            let (stream, _) = self.0.accept().ok()?;
+            let Ok(client) = Client::of(stream) else {
+                continue;
+            };
+            match client.request() {
+                Ok(request) => return Some((request, client)),
+                Err(error) => client.answer(&Answer::Refused(format!(
+                    "the request cannot be read: {error}"
+                ))),
+            }
+        }
+    }
+}
+
+/// A client that waits for its answer.
+pub(super) struct Client(UnixStream);
+
+impl Client {
+    fn of(stream: UnixStream) -> io::Result<Self> {
+        stream.set_nonblocking(false)?;
+        stream.set_read_timeout(Some(LIMIT))?;
+        stream.set_write_timeout(Some(LIMIT))?;
+        Ok(Self(stream))
+    }
+
+    fn request(&self) -> io::Result<Request> {
+        let mut line = String::new();
+        BufReader::new((&self.0).take(MAX)).read_line(&mut line)?;
+        Ok(serde_json::from_str(&line)?)
+    }
+
+    /// Answers and closes the connection. A client that has gone meanwhile does not matter.
+    pub fn answer(self, answer: &Answer) {
+        if let Ok(mut line) = serde_json::to_string(answer) {
+            line.push('\n');
+            let _ = (&self.0).write_all(line.as_bytes());
+        }
+    }
+}

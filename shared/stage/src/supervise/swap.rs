@@ -1,0 +1,204 @@
+//! Swaps: another program takes the place of a stage while the run goes on.
+//!
+//! The new program first stands by: it loads what it needs while the one before works. It takes over when no scan is in flight, if
+//! there is such a moment, and a restart of the stage is all that the others see. A program that fails before its first pose, or too
+//! often later, is given up, and the one before is started again.
+
+use std::{
+    fs,
+    time::{Duration, Instant},
+};
+
+use super::{Event, StagePlan, SuperviseError, Supervisor, Swapped, child::Child, start::Place};
+use crate::{
+    clock,
+    control::{Answer, Swap},
+    run, schedule,
+    supervise::{program::Program, socket::Client, start::Starter},
+};
+
+/// Time for which a moment without a scan in flight is waited for. At the highest rate there is none.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+const ENDED: &str = "the stream has ended";
+
+/// A program that stands by.
+pub(super) struct Standby {
+    /// The index of the process whose place it is to take.
+    child: usize,
+    process: Child,
+    since: Instant,
+    ready: Option<Instant>,
+    client: Client,
+}
+
+impl Supervisor<'_> {
+    /// Starts a program that is to take the place of another one. The client has its answer when that is done.
+    pub(super) fn begin_swap(&mut self, swap: Swap, client: Client) -> Result<(), SuperviseError> {
+        let Some(child) = self.named(&swap.process) else {
+            self.refuse_unknown(&swap.process, client);
+            return Ok(());
+        };
+        let busy = match () {
+            () if self.is_following => Some(ENDED),
+            () if self.standby.is_some() => {
+                Some("another program stands by: wait until it has taken over")
+            }
+            () => None,
+        };
+        if let Some(reason) = busy {
+            client.answer(&Answer::Refused(reason.to_owned()));
+            return Ok(());
+        }
+        let plan = self.plan_of(child, &swap);
+        if swap.cold {
+            self.children[child].change(plan);
+            self.restart_on_request(child)?;
+            self.has_swapped(child);
+            client.answer(&Answer::Done);
+            return Ok(());
+        }
+        let manifest = &self.plan.manifest;
+        let _ = fs::remove_file(run::ready_file(&manifest.root, &plan.name));
+        let starter = Starter::new(&self.signals, &self.guardian);
+        match Child::spawn(&plan, manifest, &starter, Place::Taken) {
+            Ok(process) => {
+                self.standby = Some(Standby {
+                    child,
+                    process,
+                    since: Instant::now(),
+                    ready: None,
+                    client,
+                });
+            }
+            Err(error) if error.is_of_one_process() => {
+                client.answer(&Answer::Refused(error.to_string()));
+            }
+            Err(error) => return Err(error),
+        }
+        Ok(())
+    }
+
+    /// Returns the plan of a process after a swap.
+    fn plan_of(&self, child: usize, swap: &Swap) -> StagePlan {
+        let begun = &self.plan.stages[child];
+        match &swap.command {
+            None => begun.clone(),
+            Some(command) => StagePlan {
+                command: command.clone(),
+                programs: Program::all_of(command),
+                directory: Some(swap.directory.clone()),
+                ..begun.clone()
+            },
+        }
+    }
+
+    /// Looks after the program that stands by, and lets it take over.
+    pub(super) fn continue_swap(&mut self) -> Result<(), SuperviseError> {
+        let Some(mut standby) = self.standby.take() else {
+            return Ok(());
+        };
+        let name = standby.process.name().to_owned();
+        if standby.process.has_exited() {
+            let death = standby.process.death();
+            let output = death
+                .last_output
+                .map_or(String::new(), |line| format!(" ({line})"));
+            return self.give_up(standby, format!("it ended by {}{output}", death.cause));
+        }
+        let is_ready = run::ready_file(&self.plan.manifest.root, &name).exists();
+        if is_ready && standby.ready.is_none() {
+            standby.ready = Some(Instant::now());
+        }
+        let limit = self.plan.start_timeout;
+        match standby.ready {
+            None if limit.is_some_and(|limit| standby.since.elapsed() > limit) => self.give_up(
+                standby,
+                "it did not get ready to take over (run.start_timeout_s); start a program that cannot stand by with --cold"
+                    .to_owned(),
+            ),
+            Some(since) if !self.has_scans_in_flight() || since.elapsed() > PATIENCE => {
+                self.take_over(standby)
+            }
+            _ => {
+                self.standby = Some(standby);
+                Ok(())
+            }
+        }
+    }
+
+    /// Gives up the program that stands by, since the stream has ended.
+    pub(super) fn end_swap(&mut self) -> Result<(), SuperviseError> {
+        match self.standby.take() {
+            Some(standby) => self.give_up(standby, ENDED.to_owned()),
+            None => Ok(()),
+        }
+    }
+
+    fn give_up(&mut self, standby: Standby, reason: String) -> Result<(), SuperviseError> {
+        let name = standby.process.name();
+        let command = standby.process.plan().command.join(" ");
+        let sentence =
+            format!("{name} goes on as before, since `{command}` cannot take over: {reason}");
+        standby.client.answer(&Answer::Refused(sentence));
+        let pid = standby.process.pid();
+        // Its end is waited for.
+        drop(standby.process);
+        self.guardian.forget(pid);
+        Ok(())
+    }
+
+    /// Ends the program that is to be replaced, and lets the new one go on.
+    fn take_over(&mut self, standby: Standby) -> Result<(), SuperviseError> {
+        let Standby {
+            child,
+            process,
+            client,
+            ..
+        } = standby;
+        let _ = fs::remove_file(run::ready_file(&self.plan.manifest.root, process.name()));
+        let stages = self.restarted_with(child);
+        self.replace(&stages, clock::now_ns(), Some((child, process)))?;
+        self.watchdog.restarted();
+        self.has_swapped(child);
+        client.answer(&Answer::Done);
+        Ok(())
+    }
+
+    fn has_swapped(&mut self, child: usize) {
+        let plan = self.children[child].plan();
+        self.swaps.push(Swapped {
+            stage: plan.name.clone(),
+            command: plan.command.clone(),
+            after_poses: self.poses_so_far(),
+        });
+        (self.observe)(Event::Swapped {
+            stage: &plan.name,
+            command: &plan.command,
+        });
+    }
+
+    /// Goes back to the program before a swap, from the next start on; false if there was none.
+    pub(super) fn go_back(&mut self, child: usize, reason: &str) -> bool {
+        let has_gone_back = self.children[child].go_back();
+        if has_gone_back {
+            let plan = self.children[child].plan();
+            self.swaps.push(Swapped {
+                stage: plan.name.clone(),
+                command: plan.command.clone(),
+                after_poses: self.poses_so_far(),
+            });
+            (self.observe)(Event::WentBack {
+                stage: &plan.name,
+                reason,
+            });
+        }
+        has_gone_back
+    }
+
+    /// Returns whether a scan has been published whose pose is not there. Unknown counts as yes.
+    fn has_scans_in_flight(&self) -> bool {
+        let poses = self.newest.map_or(0, |newest| newest.published + 1);
+        schedule::read(&self.plan.manifest).is_none_or(|source| source.published > poses)
+    }
+}
