@@ -25,6 +25,7 @@ mod localise;
 mod lost_input;
 mod masks;
 mod observers;
+mod operate;
 mod pipeline;
 mod radar;
 mod real_scans;
@@ -37,6 +38,7 @@ mod simulation;
 mod slam;
 mod standstill;
 mod supervisor;
+mod systemd;
 
 /// The program under test.
 const PROGRAM: &str = env!("CARGO_BIN_EXE_gyre");

@@ -9,7 +9,7 @@ use gyre_masking::{Backend, MaskKind, MaskingConfig};
 use gyre_messages::{Footprint, StageId};
 use gyre_stage::{
     StageCounters,
-    supervise::{Ending, Report},
+    supervise::{Ending, Report, Swapped},
 };
 use serde::Serialize;
 
@@ -90,6 +90,9 @@ pub struct Summary {
     shared_memory: Option<Footprint>,
     restarts: BTreeMap<String, usize>,
     recovery_ms: Vec<f64>,
+    /// The programs that took the place of others, in order.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    swaps: Vec<Swapped>,
     /// Counters of each stage since its last start.
     stages: BTreeMap<String, StageCounters>,
     latency: Latency,
@@ -141,6 +144,9 @@ impl Summary {
                 .flat_map(|r| &r.recovery)
                 .map(|time| time.as_secs_f64() * 1e3)
                 .collect(),
+            swaps: report
+                .map(|report| report.swaps.clone())
+                .unwrap_or_default(),
             stages: report
                 .map(|report| report.counters.clone())
                 .unwrap_or_default(),

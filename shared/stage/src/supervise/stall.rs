@@ -27,7 +27,13 @@ impl Supervisor<'_> {
                 stage: child.name(),
                 since: child.started(),
             });
-        self.watchdog.look(&self.plan.manifest, starting)
+        let stall = self.watchdog.look(&self.plan.manifest, starting)?;
+        let cause = match stall {
+            // What is owed has been waited for since some time after the process began to hang.
+            Stall::Pose { limit } | Stall::Scan { limit } => self.hang(limit / 2, limit),
+            _ => None,
+        };
+        Some(cause.unwrap_or(stall))
     }
 
     /// Returns the process that hangs, by its heartbeat, if it is time to look.
@@ -37,18 +43,22 @@ impl Supervisor<'_> {
         }
         self.looked_for_hangs = Instant::now();
         let limit = self.plan.stall_timeout?;
-        let hangs = |i: &usize| self.hangs(*i, limit);
-        let child = (0..self.children.len()).find(hangs)?;
+        self.hang(limit, limit)
+    }
+
+    /// Returns the process that has hung for longer than `since`.
+    fn hang(&self, since: Duration, limit: Duration) -> Option<Stall> {
+        let child = (0..self.children.len()).find(|i| self.hangs(*i, since))?;
         Some(Stall::Hang {
             process: self.children[child].name().to_owned(),
             limit,
         })
     }
 
-    fn hangs(&self, child: usize, limit: Duration) -> bool {
+    fn hangs(&self, child: usize, since: Duration) -> bool {
         let child = &self.children[child];
         let beat = child.heartbeat(&self.plan.manifest);
-        !child.is_known_to_have_exited() && beat.is_some_and(|beat| beat.hangs(limit))
+        !child.is_known_to_have_exited() && beat.is_some_and(|beat| beat.hangs(since))
     }
 
     /// Restarts the processes that may be stuck: one that hangs alone; else first the source if it is late, and all but a live source

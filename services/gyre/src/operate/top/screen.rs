@@ -36,7 +36,7 @@ pub fn draw(frame: &mut Frame<'_>, look: &Look) {
     let rows = look.status.processes.len() as u16;
     let [head, latency, table, foot] = Layout::vertical([
         Constraint::Length(4),
-        Constraint::Min(4),
+        Constraint::Max(12),
         Constraint::Length(rows + 3),
         Constraint::Length(1),
     ])

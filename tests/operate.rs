@@ -1,0 +1,366 @@
+//! Running runs from the command line: up, ps, logs, top, restart, swap, down; what systemd is told; priorities.
+
+use std::{
+    fs,
+    os::unix::{fs::PermissionsExt, net::UnixDatagram},
+    path::Path,
+    process::Command,
+    thread,
+    time::{Duration, Instant},
+};
+
+use rustix::process::Signal;
+use serde_json::Value;
+
+use crate::{
+    PROGRAM,
+    common::{
+        Ended, Pid, Run, Running, STAGES, assert_nothing_left, folder, gyre, recording, send,
+        undisturbed,
+    },
+};
+
+/// The recording's six seconds in two: time for a person's commands.
+const MODERATE: &str = "3";
+const THIRD: usize = recording::SCANS / 3;
+
+/// A command about a run.
+fn ask(run: &Run, arguments: &[&str]) -> Ended {
+    let mut command = gyre();
+    command.args(arguments).arg("--out").arg(run.out());
+    Ended::of(command)
+}
+
+/// A swap; the command comes last.
+fn swap(run: &Run, stage: &str, options: &[&str], command: &[&str]) -> Ended {
+    let mut words = gyre();
+    words
+        .args(["swap", stage, "--out"])
+        .arg(run.out())
+        .args(options);
+    if !command.is_empty() {
+        words.arg("--command").args(command);
+    }
+    Ended::of(words)
+}
+
+/// The state of a run as `gyre ps --json` says it.
+fn status(run: &Run) -> Option<Value> {
+    let mut ps = gyre();
+    ps.args(["ps", "--json"]);
+    let ended = Ended::of(ps);
+    let runs: Vec<Value> = serde_json::from_str(&ended.stdout).unwrap();
+    let out = run.out().canonicalize().unwrap();
+    runs.into_iter()
+        .map(|run| run["status"].clone())
+        .find(|status| status["out"] == out.to_str().unwrap())
+}
+
+/// The command that starts a run in the background.
+fn up(run: &Run) -> Command {
+    let mut up = gyre();
+    up.arg("up").args(run.command().get_args().skip(1));
+    up
+}
+
+/// Waits until the run's state is as wanted.
+fn await_status(run: &Run, what: &str, is_as_wanted: impl Fn(&Value) -> bool) -> Value {
+    let since = Instant::now();
+    loop {
+        match status(run) {
+            Some(status) if is_as_wanted(&status) => return status,
+            status => assert!(since.elapsed().as_secs() < 60, "{what}: {status:?}"),
+        }
+        thread::sleep(Duration::from_millis(20));
+    }
+}
+
+fn process<'a>(status: &'a Value, name: &str) -> &'a Value {
+    let processes = status["processes"].as_array().unwrap();
+    processes.iter().find(|it| it["name"] == name).unwrap()
+}
+
+fn started() -> (Run, Running) {
+    let run = Run::of_recording().rate(MODERATE);
+    let mut running = run.start();
+    running.await_poses(THIRD / 2);
+    (run, running)
+}
+
+#[test]
+fn a_run_in_the_background_goes_on_from_where_it_was_taken_down() {
+    let run = Run::of_recording().rate(MODERATE);
+    let started = Ended::of(up(&run));
+    assert!(
+        started.succeeded().stdout.contains("6 processes"),
+        "{started:?}"
+    );
+    let status = await_status(&run, "poses", |status| status["poses"].as_u64() >= Some(4));
+    assert_eq!(status["phase"], "running");
+    let names = status["processes"].as_array().unwrap().iter();
+    let names: Vec<_> = names.map(|it| it["name"].as_str().unwrap()).collect();
+    assert_eq!(names, STAGES);
+    let pid = status["pid"].as_u64().unwrap() as Pid;
+    let stat = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap();
+    let session = stat.rsplit_once(") ").unwrap().1.split(' ').nth(3).unwrap();
+    assert_eq!(session, pid.to_string(), "it has left the terminal");
+    ask(&run, &["down"]).succeeded();
+    assert_nothing_left(run.out());
+    assert!(!ask(&run, &["down"]).status.success());
+    assert!(run.result("log/gyre.txt").contains("interrupted"));
+    assert_eq!(run.complete(), undisturbed());
+    assert!(run.summary()["resumed_after"].as_u64() >= Some(4));
+}
+
+#[test]
+fn a_run_that_cannot_start_in_the_background_says_why() {
+    let run = Run::of_recording_named("/nowhere");
+    Ended::of(up(&run)).refused_with(&["/nowhere"]);
+}
+
+#[test]
+fn a_process_is_started_again_on_request() {
+    let (run, mut running) = started();
+    let before = running.await_stage("translation-search");
+    ask(&run, &["restart", "translation-search"]).succeeded();
+    let after = running.await_other_stage("translation-search", before);
+    let status = status(&run).unwrap();
+    assert_eq!(process(&status, "translation-search")["pid"], after);
+    assert_eq!(process(&status, "translation-search")["restarts"], 1);
+    ask(&run, &["restart", "steering"]).refused_with(&["steering", "masking"]);
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn each_stage_gives_way_to_another_program_and_back_without_a_lost_scan() {
+    let (run, running) = started();
+    for stage in STAGES {
+        swap(&run, stage, &[], &["nice", PROGRAM, "stage", stage]).succeeded();
+        let status = status(&run).unwrap();
+        assert_eq!(process(&status, stage)["is_swapped"], true, "{stage}");
+    }
+    swap(&run, "masking", &[], &[]).succeeded();
+    swap(&run, "rotation-search", &["--cold"], &[]).succeeded();
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+    let summary = run.summary();
+    assert_eq!(summary["swaps"].as_array().unwrap().len(), STAGES.len() + 2);
+    assert_eq!(summary["dropped"], 0);
+}
+
+#[test]
+fn a_program_that_cannot_take_over_changes_nothing() {
+    let (run, mut running) = started();
+    let before = running.await_stage("masking");
+    for (command, reason) in [
+        (&["false"][..], "exit code 1"),
+        (&["sh", "-c", "echo no network >&2; exit 2"], "no network"),
+        (&["/nowhere/masking"], "cannot start masking"),
+    ] {
+        swap(&run, "masking", &[], command).refused_with(&[reason]);
+    }
+    swap(&run, "steering", &[], &["true"]).refused_with(&["steering"]);
+    assert_eq!(running.await_stage("masking"), before);
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn a_program_that_fails_after_taking_over_gives_way_to_the_one_before() {
+    let (run, running) = started();
+    let script = run.folder().join("fails.sh");
+    // It stands by as the contract says, and then it dies.
+    fs::write(
+        &script,
+        "#!/bin/sh\ntouch $GYRE_RUN/masking.ready\ncat\nexit 3\n",
+    )
+    .unwrap();
+    fs::set_permissions(&script, fs::Permissions::from_mode(0o700)).unwrap();
+    swap(&run, "masking", &[], &[script.to_str().unwrap()]).succeeded();
+    let back = await_status(&run, "back", |it| {
+        process(it, "masking")["is_swapped"] == false
+    });
+    assert_eq!(process(&back, "masking")["last_death"], "exit code 3");
+    let ended = running.finish();
+    assert!(
+        ended
+            .succeeded()
+            .stderr
+            .contains("goes back to the program before")
+    );
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn a_live_run_drops_no_scan_when_its_stages_are_swapped_one_after_the_other() {
+    let run = Run::of_recording().rate("1").set("run.mode=live");
+    let mut running = run.start();
+    running.await_poses(4);
+    for stage in [
+        "rotation-search",
+        "translation-search",
+        "refinement",
+        "masking",
+    ] {
+        swap(&run, stage, &[], &["nice", PROGRAM, "stage", stage]).succeeded();
+    }
+    running.finish().succeeded();
+    // On a loaded machine a scan may be late for another reason.
+    assert!(run.summary()["dropped"].as_u64().unwrap() <= 1);
+}
+
+#[test]
+fn a_stage_that_hangs_is_restarted_alone() {
+    let run = Run::of_recording()
+        .rate(MODERATE)
+        .set("run.stall_timeout_s=2");
+    let mut running = run.start();
+    running.await_poses(THIRD / 2);
+    let stages = running.await_stages();
+    send(stages["rotation-search"], Signal::STOP);
+    let silent = await_status(&run, "silent", |it| {
+        process(it, "rotation-search")["activity"] == "silent"
+    });
+    assert_eq!(process(&silent, "masking")["activity"], "waiting");
+    let ended = running.finish();
+    ended.succeeded();
+    assert!(ended.stderr.contains("rotation-search hangs"), "{ended:?}");
+    let restarts = run.summary()["restarts"].clone();
+    assert_eq!(restarts, serde_json::json!({ "rotation-search": 1 }));
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn logs_of_a_run_are_lines_of_the_process_that_is_asked_for() {
+    let copy = recording::copy(8);
+    let images = recording::images(copy.path());
+    recording::truncate(&images[3], 1000);
+    let run = Run::of_recording_named(copy.path().to_str().unwrap());
+    run.finish();
+    let lines = ask(&run, &["logs", "radar-replay"]);
+    assert!(
+        lines
+            .succeeded()
+            .stdout
+            .contains("WARN radar-replay: skipped"),
+        "{lines:?}"
+    );
+    assert_eq!(ask(&run, &["logs", "refinement"]).succeeded().stdout, "");
+    ask(&run, &["logs", "steering"]).refused_with(&["steering", "refinement"]);
+}
+
+#[test]
+fn top_shows_the_processes_of_a_run_in_a_terminal() {
+    if !Command::new("tmux")
+        .arg("-V")
+        .output()
+        .is_ok_and(|it| it.status.success())
+    {
+        println!("skipped: there is no tmux");
+        return;
+    }
+    let (run, running) = started();
+    let socket = run.folder().join("tmux");
+    let tmux = |arguments: &[&str]| {
+        let mut command = Command::new("tmux");
+        let output = command.arg("-S").arg(&socket).args(arguments).output();
+        String::from_utf8_lossy(&output.unwrap().stdout).into_owned()
+    };
+    let top = format!("{PROGRAM} top --every 0.1 --out {}", run.out().display());
+    tmux(&["new-session", "-d", "-x", "130", "-y", "30", &top]);
+    let since = Instant::now();
+    let screen = loop {
+        let screen = tmux(&["capture-pane", "-p"]);
+        if screen.contains("sensor to pose p50") && screen.contains("pose-integration") {
+            break screen;
+        }
+        assert!(since.elapsed().as_secs() < 30, "{screen}");
+        thread::sleep(Duration::from_millis(50));
+    };
+    for words in ["scans/s", "in flight", "work p50", "restarts", "q quit"] {
+        assert!(screen.contains(words), "{words}: {screen}");
+    }
+    tmux(&["send-keys", "q"]);
+    while !tmux(&["list-sessions"]).is_empty() {
+        assert!(since.elapsed().as_secs() < 60, "q does not end it");
+        thread::sleep(Duration::from_millis(50));
+    }
+    let text = ask(&run, &["top", "--once", "--every", "0.2"]);
+    assert!(text.succeeded().stdout.contains("rotation-search"));
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+/// All that is sent to a socket within the life of a run.
+fn notifications(socket: &UnixDatagram) -> Vec<String> {
+    let mut buffer = [0; 4096];
+    let mut all = Vec::new();
+    while let Ok(length) = socket.recv(&mut buffer) {
+        all.push(String::from_utf8_lossy(&buffer[..length]).into_owned());
+    }
+    all
+}
+
+#[test]
+fn systemd_is_told_when_a_run_is_ready_alive_and_stopping() {
+    let place = folder();
+    let path = place.path().join("notify");
+    let socket = UnixDatagram::bind(&path).unwrap();
+    socket.set_nonblocking(true).unwrap();
+    let run = Run::of_recording().rate(MODERATE);
+    let mut command = run.command();
+    command
+        .env("NOTIFY_SOCKET", &path)
+        .env("WATCHDOG_USEC", "400000");
+    run.start_as(command).finish().succeeded();
+    let all = notifications(&socket);
+    let position = |word: &str| all.iter().position(|it| it.contains(word)).unwrap();
+    assert!(position("READY=1") < position("WATCHDOG=1"), "{all:?}");
+    assert!(position("WATCHDOG=1") < position("STOPPING=1"), "{all:?}");
+    let alive = all.iter().filter(|it| it.contains("WATCHDOG=1")).count();
+    assert!(alive >= 3, "{all:?}");
+}
+
+/// The niceness of a process and the processors that it may use.
+fn scheduling(pid: Pid) -> (i32, String) {
+    let stat = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap();
+    let nice = stat
+        .rsplit_once(") ")
+        .unwrap()
+        .1
+        .split(' ')
+        .nth(16)
+        .unwrap();
+    let status = fs::read_to_string(Path::new("/proc").join(pid.to_string()).join("status"));
+    let status = status.unwrap();
+    let cpus = status
+        .lines()
+        .find_map(|line| line.strip_prefix("Cpus_allowed_list:"));
+    (nice.parse().unwrap(), cpus.unwrap().trim().to_owned())
+}
+
+#[test]
+fn stages_have_the_priority_and_the_processors_of_the_configuration_after_restarts_too() {
+    let run = Run::of_recording()
+        .rate(MODERATE)
+        .set("run.scheduling.nice=3")
+        .set("stages.masking.scheduling={ nice = 5, cpus = [0] }");
+    let mut running = run.start();
+    let stages = running.await_stages();
+    running.await_poses(2);
+    assert_eq!(scheduling(stages["refinement"]).0, 3);
+    assert_eq!(scheduling(stages["masking"]), (5, "0".to_owned()));
+    running.kill("masking");
+    let again = running.await_other_stage("masking", stages["masking"]);
+    running.await_poses(THIRD);
+    assert_eq!(scheduling(again), (5, "0".to_owned()));
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+    let refused = Run::of_recording().set("run.scheduling.nice=-21").finish();
+    refused.refused_with(&["run", "nice", "-20 to 19"]);
+    let processor = Run::of_recording()
+        .set("run.scheduling.cpus=[1000]")
+        .finish();
+    processor.failed_with(&["scheduling", "cpus = [1000]"]);
+}

@@ -1,0 +1,46 @@
+//! The unit of systemd: its settings are known to systemd, and it starts a command that there is.
+
+use std::{fs, path::Path, process::Command};
+
+use crate::{
+    PROJECT,
+    common::{folder, gyre},
+};
+
+const UNIT: &str = "configs/systemd/gyre@.service";
+
+#[test]
+fn systemd_accepts_the_unit() {
+    let has_analyzer = Command::new("systemd-analyze").arg("--version").output();
+    if !has_analyzer.is_ok_and(|it| it.status.success()) {
+        println!("skipped: there is no systemd-analyze");
+        return;
+    }
+    let place = folder();
+    let unit = fs::read_to_string(Path::new(PROJECT).join(UNIT)).unwrap();
+    // Its own program is not installed here.
+    let unit = unit.replace("/usr/bin/gyre", crate::PROGRAM);
+    let verify = |unit: &str| {
+        let path = place.path().join("gyre@demo.service");
+        fs::write(&path, unit).unwrap();
+        let output = Command::new("systemd-analyze")
+            .args(["verify", "--recursive-errors=yes", "--man=no"])
+            .arg(&path)
+            .output();
+        output.unwrap()
+    };
+    let verified = verify(&unit);
+    let said = String::from_utf8_lossy(&verified.stderr).into_owned();
+    assert!(verified.status.success() && said.is_empty(), "{said}");
+    let misspelt = verify(&unit.replace("WatchdogSec", "WatchdogSecs"));
+    assert!(!misspelt.status.success(), "it would not notice a mistake");
+}
+
+#[test]
+fn the_unit_s_command_is_one_that_gyre_has() {
+    let unit = fs::read_to_string(Path::new(PROJECT).join(UNIT)).unwrap();
+    let command = unit.lines().find_map(|it| it.strip_prefix("ExecStart="));
+    let words: Vec<&str> = command.unwrap().split(' ').skip(1).collect();
+    let parsed = gyre().args(words).arg("--help").output().unwrap();
+    assert!(parsed.status.success(), "{parsed:?}");
+}
