@@ -37,6 +37,7 @@ mod shared_memory;
 mod simulation;
 mod slam;
 mod standstill;
+mod stress;
 mod supervisor;
 mod systemd;
 

@@ -1,6 +1,7 @@
 //! The command line.
 
 mod operate;
+mod stress;
 
 use std::{num::NonZeroUsize, path::PathBuf};
 
@@ -14,6 +15,7 @@ use crate::configuration::Rate;
 pub use operate::{
     LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments, TopArguments,
 };
+pub use stress::StressArguments;
 
 /// Radar odometry as cooperating processes over shared memory.
 ///
@@ -52,6 +54,15 @@ pub enum Command {
     },
     /// Print the messages of a running run. It changes neither a result nor a latency.
     Watch(WatchArguments),
+    /// Measure whether the pipeline meets its deadline on this computer, undisturbed and under load.
+    Stress(StressArguments),
+    /// Load the machine or take part in a measurement (what `gyre stress` starts).
+    #[command(hide = true, name = gyre_stress::helper::COMMAND)]
+    StressHelper {
+        /// The process that has started it, the work, and what that needs.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        words: Vec<String>,
+    },
     /// Report what this machine lacks for a run.
     Doctor(DoctorArguments),
     /// End what stages have started when `gyre run` has ended (what `gyre run` starts).

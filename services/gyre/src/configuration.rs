@@ -21,6 +21,7 @@ use gyre_scan_matching::RefinementKind;
 use gyre_simulator::{OutputFormat, SimulationConfig};
 use gyre_slam::SlamConfig;
 use gyre_stage::supervise::{Program, RestartPolicy, Scheduling, StagePlan};
+use gyre_stress::{Budget, Scenario};
 use serde::{Deserialize, Serialize};
 
 pub use error::ConfigurationError;
@@ -45,6 +46,10 @@ pub struct Configuration {
     pub odometry: OdometryConfig,
     /// The correction of the trajectory at places that are seen again.
     pub slam: SlamConfig,
+    /// What `gyre stress` asks of a run: limits for all scenarios, and in `[budget.NAME]` for one of them.
+    /// A scenario whose purpose is a fault (`slow-stage`, `stopped`, `kills`) is judged by `recovery_ms` and by
+    /// its own limits alone, and `bursts` by drops only if it names them. A run itself does not depend on it.
+    pub budget: Budget,
     /// The command and the restarts of a stage: `radar-replay`, `masking`, `rotation-search`,
     /// `translation-search`, `joint-search`, `refinement`, `pose-integration`, `loop-closure`,
     /// `trajectory` or `localisation`.
@@ -188,6 +193,7 @@ impl Configuration {
                 refinement: strict::section(&mut table, "refinement")?,
             },
             slam: strict::section(&mut table, "slam")?,
+            budget: budget(&mut table)?,
             stages: strict::sections(&mut table, "stages", &process_names())?,
         };
         let format = configuration.dataset.format.and_then(OutputFormat::read_as);
@@ -208,6 +214,7 @@ impl Configuration {
             "exhaustive",
             "refinement",
             "slam",
+            "budget",
             "stages",
         ];
         match table.keys().next() {
@@ -360,9 +367,13 @@ impl Configuration {
         let relevant = |table: &toml::Table| {
             let mut table = table.clone();
             table.remove("stages");
+            table.remove("budget");
             for (section, keys) in [
                 ("run", &["mode"][..]),
-                ("source", &["kind", "address", "data", "first", "scans"]),
+                (
+                    "source",
+                    &["kind", "address", "data", "first", "scans", "repeat"],
+                ),
             ] {
                 if let Some(section) = table.get_mut(section).and_then(|key| key.as_table_mut()) {
                     section.retain(|key, _| keys.contains(&key));
@@ -374,6 +385,27 @@ impl Configuration {
         let now: toml::Table = self.to_toml()?.parse()?;
         Ok(difference::first(&relevant(begun), &relevant(&now)))
     }
+}
+
+/// Reads the limits for all scenarios, and those for each.
+fn budget(table: &mut toml::Table) -> Result<Budget, ConfigurationError> {
+    let mut scenarios = toml::Table::new();
+    if let Some(toml::Value::Table(budget)) = table.get_mut("budget") {
+        let names: Vec<String> = budget
+            .iter()
+            .filter(|(_, value)| value.is_table())
+            .map(|(name, _)| name.clone())
+            .collect();
+        for name in names {
+            scenarios.extend(budget.remove_entry(&name));
+        }
+    }
+    let known = Scenario::ALL.map(Scenario::name);
+    let mut scenarios = toml::Table::from_iter([("budget".to_owned(), scenarios.into())]);
+    Ok(Budget {
+        scenarios: strict::sections(&mut scenarios, "budget", &known)?,
+        all: strict::section(table, "budget")?,
+    })
 }
 
 /// Returns the names of all processes that a run can have.

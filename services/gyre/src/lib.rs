@@ -11,7 +11,6 @@ pub mod evaluate;
 pub mod identity;
 pub mod inspect;
 pub mod judgement;
-pub mod latency;
 pub mod localise;
 pub mod machine;
 pub mod map;
@@ -32,6 +31,7 @@ pub mod run;
 pub mod schema;
 pub mod simulate;
 pub mod stage;
+pub mod stress;
 pub mod summary;
 pub mod watch;
 
@@ -76,6 +76,11 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
             gyre_stage::run::keep_files_private();
             watch::watch(&arguments)
         }
+        Command::Stress(arguments) => {
+            gyre_stage::run::keep_files_private();
+            stress::stress(&arguments)
+        }
+        Command::StressHelper { words } => stress::help(&words),
         Command::Doctor(arguments) => doctor::doctor(&arguments),
         Command::RadarServer(arguments) => radar_server::serve(&arguments),
         Command::Inspect(arguments) => inspect::inspect(&arguments),

@@ -138,8 +138,8 @@ struct Scans {
 impl Scans {
     fn of_recording(configuration: &Configuration) -> Result<Self, crate::Failure> {
         let Played { dataset, truth } = open(configuration)?;
-        let scans = configuration.source.played(dataset.len()).len();
-        if scans < 2 {
+        let count = configuration.source.stream_len(dataset.len());
+        if let Some(scans @ 0..2) = count {
             return Err(PreflightError::TooFew {
                 path: configuration.data(),
                 scans,
@@ -154,7 +154,7 @@ impl Scans {
             }),
         };
         Ok(Self {
-            count: Some(scans),
+            count,
             period_ns: dataset.period_ns(),
             bytes: dataset.limits().bytes,
             truth,

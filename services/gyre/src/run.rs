@@ -1,6 +1,6 @@
 //! `gyre run`: prepares a run, supervises it, writes its results.
 
-mod resolve;
+pub(crate) mod resolve;
 
 use std::{
     env,

@@ -5,6 +5,7 @@ mod slam;
 
 use std::{collections::BTreeMap, fmt, path::Path, time::Duration};
 
+use gyre_latency::{Latency, Percentiles};
 use gyre_masking::{Backend, MaskKind, MaskingConfig};
 use gyre_messages::{Footprint, StageId};
 use gyre_stage::{
@@ -16,7 +17,6 @@ use serde::Serialize;
 use crate::{
     configuration::{Configuration, Mode, Rate},
     judgement::Judgement,
-    latency::{Latency, Percentiles},
     machine::Machine,
 };
 

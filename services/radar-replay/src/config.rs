@@ -1,6 +1,6 @@
 //! The section `[source]`.
 
-use std::{ops::Range, path::PathBuf, time::Duration};
+use std::{num::NonZeroUsize, ops::Range, path::PathBuf, time::Duration};
 
 use gyre_stage::source::Tolerance;
 use serde::{Deserialize, Serialize};
@@ -37,12 +37,28 @@ pub struct SourceConfig {
     /// Number of scans to play. Default: all, and of a radar without end.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scans: Option<usize>,
+    /// Play the recording again and again, with times that go on: `gyre stress`. `scans` then counts
+    /// those of all turns; without it the run has no end.
+    #[serde(skip_serializing_if = "is_false")]
+    pub repeat: bool,
+    /// Number of scans that become due at once, as from a network that holds them back; the mean rate
+    /// stays. They follow each other as fast as they are decoded. Only with a `run.rate` other than `max`.
+    #[serde(skip_serializing_if = "is_one")]
+    pub burst: NonZeroUsize,
     /// Time for which a file that the disk or the network does not give is tried again, s. Then the
     /// run ends, and the same command continues it.
     pub retry_s: f64,
     /// Number of damaged scans in a row that are skipped; one more ends the run. Over ten scans at
     /// four per second a car drives farther than the search reaches.
     pub max_unreadable: usize,
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
+fn is_one(value: &NonZeroUsize) -> bool {
+    value.get() == 1
 }
 
 impl Default for SourceConfig {
@@ -54,6 +70,8 @@ impl Default for SourceConfig {
             data: PathBuf::new(),
             first: 0,
             scans: None,
+            repeat: false,
+            burst: NonZeroUsize::MIN,
             retry_s: 10.0,
             max_unreadable: 10,
         }
@@ -68,11 +86,47 @@ impl SourceConfig {
         first..end.min(scans)
     }
 
+    /// Returns the scans of the stream that is played of a recording of `scans` scans, counted on through all turns. It ends at
+    /// `usize::MAX` if it is without end.
+    pub fn stream(&self, scans: usize) -> Range<usize> {
+        let once = self.played(scans);
+        match self.repeat && !once.is_empty() {
+            true => once.start..once.start.saturating_add(self.scans.unwrap_or(usize::MAX)),
+            false => once,
+        }
+    }
+
+    /// Returns the number of scans of [`stream`](Self::stream); `None`: without end.
+    pub fn stream_len(&self, scans: usize) -> Option<usize> {
+        let stream = self.stream(scans);
+        (stream.end < usize::MAX).then_some(stream.len())
+    }
+
     /// Returns the limits on input that cannot be read.
     pub fn tolerance(&self) -> Tolerance {
         Tolerance {
             retry: Duration::try_from_secs_f64(self.retry_s).unwrap_or(Duration::MAX),
             max_unreadable: self.max_unreadable,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stream_that_repeats_has_no_end_unless_its_scans_are_counted() {
+        let source = |repeat, scans| SourceConfig {
+            first: 3,
+            repeat,
+            scans,
+            ..SourceConfig::default()
+        };
+        assert_eq!(source(false, Some(100)).stream(10), 3..10);
+        assert_eq!(source(true, Some(100)).stream(10), 3..103);
+        assert_eq!(source(true, Some(100)).stream_len(10), Some(100));
+        assert_eq!(source(true, None).stream_len(10), None);
+        assert_eq!(source(true, None).stream_len(3), Some(0));
     }
 }

@@ -4,8 +4,9 @@
 
 mod config;
 mod listing;
+mod turns;
 
-use std::{error::Error, ops::Range, path::Path};
+use std::{error::Error, num::NonZeroUsize, ops::Range, path::Path};
 
 use gyre_messages::{ScanHeader, StageId};
 use gyre_radar::{Dataset, DatasetOptions};
@@ -16,6 +17,7 @@ use gyre_stage::{
 
 pub use config::{SourceConfig, SourceKind};
 pub use listing::Listing;
+use turns::Turns;
 
 /// A playback with a longer delay is reported, s.
 const NOTABLE_SLIP_S: f64 = 0.01;
@@ -71,7 +73,9 @@ pub fn play(
 ) -> Result<StageCounters, StageError> {
     let config: SourceConfig = launch.section("source")?;
     let mut replay = Replay {
-        scans: config.played(dataset.len()),
+        scans: config.stream(dataset.len()),
+        turns: Turns::of(config.played(dataset.len()), dataset.as_ref()),
+        burst: config.burst,
         dataset,
         pace,
     };
@@ -86,7 +90,10 @@ pub fn play(
 /// The selected part of a dataset.
 struct Replay {
     dataset: Box<dyn Dataset>,
+    /// The scans of the stream, counted on through all turns.
     scans: Range<usize>,
+    turns: Turns,
+    burst: NonZeroUsize,
     pace: Pace,
 }
 
@@ -99,11 +106,16 @@ impl Source for Replay {
 
     /// The stamp of a scan is the middle of its sweep; the scan is complete half a period later.
     fn complete_ns(&self, index: usize) -> Option<i64> {
-        Some(self.dataset.nominal_stamp_ns(index)? + self.period_ns() / 2)
+        let (scan, shift_ns) = self.turns.place(index);
+        Some(self.dataset.nominal_stamp_ns(scan)? + self.period_ns() / 2 + shift_ns)
     }
 
     fn period_ns(&self) -> i64 {
         self.dataset.period_ns()
+    }
+
+    fn burst(&self) -> NonZeroUsize {
+        self.burst
     }
 
     fn drops_missed_scans(&self) -> bool {
@@ -116,11 +128,13 @@ impl Source for Replay {
         header: &mut ScanHeader,
         bytes: &mut [u8],
     ) -> Result<(), Unreadable> {
-        let read = self.dataset.read(index, header.slot(bytes));
+        let (scan, shift_ns) = self.turns.place(index);
+        let read = self.dataset.read(scan, header.slot(bytes));
         header.set_geometry(&read.map_err(|error| match error.is_io() {
             true => Unreadable::Io(error.to_string()),
             false => Unreadable::Damaged(error.to_string()),
         })?);
+        header.shift_times(shift_ns);
         Ok(())
     }
 }

@@ -156,6 +156,18 @@ impl ScanHeader {
         self.item.stamp_ns = geometry.stamp_ns;
     }
 
+    /// Adds to the time of the scan and of its rows, ns: a recording that is played again goes on in time.
+    pub fn shift_times(&mut self, shift_ns: i64) {
+        if shift_ns == 0 {
+            return;
+        }
+        let rows = self.azimuths as usize;
+        let stamps = self.azimuth_stamp_ns.iter_mut().take(rows);
+        for stamp_ns in stamps.chain([&mut self.item.stamp_ns]) {
+            *stamp_ns = stamp_ns.saturating_add(shift_ns);
+        }
+    }
+
     fn geometry(&self) -> SweepGeometry {
         SweepGeometry {
             azimuths: self.azimuths as usize,

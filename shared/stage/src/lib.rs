@@ -10,7 +10,8 @@
 //!    process waits for.
 //! 6. [`follower`]: the loop of a process that reads durable logs and is not in the stream.
 //! 7. [`observer`]: subscribers that the run does not depend on.
-//! 8. [`supervise`]: starts the processes, restarts dead ones, removes all resources at the end.
+//! 8. [`usage`]: what a process uses of the machine; [`hand_over`]: one topic alone, to measure the transport.
+//! 9. [`supervise`]: starts the processes, restarts dead ones, removes all resources at the end.
 //!
 //! The protocol in one paragraph: items carry consecutive sequence numbers. The source may have W of them in flight; each pose
 //! is the credit for one more. A stage is a function of its inputs, and a publisher keeps a history for late readers. So a
@@ -26,6 +27,7 @@ pub mod control;
 mod counters;
 mod error;
 pub mod follower;
+pub mod hand_over;
 mod heartbeat;
 pub mod inputs;
 pub mod launch;

@@ -1,5 +1,6 @@
 //! The schedule of the source: how many scans it has published, and when the next one is due. The supervisor reads it, since only
-//! the source can tell a gap in the recording from a source that hangs.
+//! the source can tell a gap in the recording from a source that hangs. And the origin of its pace, for the source after it: scans of
+//! a live run become due whether a source is there or not.
 
 use std::{
     fs::{File, OpenOptions},
@@ -9,7 +10,8 @@ use std::{
 
 use crate::{Manifest, StageError, clock};
 
-/// The name of the file in the run's root: [`Schedule::published`], then [`Schedule::due_ns`], each as eight bytes, little-endian.
+/// The name of the file in the run's root: [`Schedule::published`], then [`Schedule::due_ns`], then the origin of the pace, if there
+/// is one: each number as eight bytes, little-endian.
 const FILE: &str = "source.schedule";
 
 /// The state of the source.
@@ -28,23 +30,31 @@ impl Schedule {
     }
 
     fn to_bytes(self) -> [u8; 16] {
-        let mut bytes = [0; 16];
-        bytes[..8].copy_from_slice(&self.published.to_le_bytes());
-        bytes[8..].copy_from_slice(&self.due_ns.to_le_bytes());
-        bytes
+        to_bytes(self.published as i64, self.due_ns)
     }
 
-    fn from_bytes(bytes: [u8; 16]) -> Self {
-        let [published, due_ns] = [0, 8].map(|at| {
-            let mut half = [0; 8];
-            half.copy_from_slice(&bytes[at..at + 8]);
-            half
-        });
+    fn of((published, due_ns): (i64, i64)) -> Self {
         Self {
-            published: u64::from_le_bytes(published),
-            due_ns: i64::from_le_bytes(due_ns),
+            published: published as u64,
+            due_ns,
         }
     }
+}
+
+fn to_bytes(first: i64, second: i64) -> [u8; 16] {
+    let mut bytes = [0; 16];
+    bytes[..8].copy_from_slice(&first.to_le_bytes());
+    bytes[8..].copy_from_slice(&second.to_le_bytes());
+    bytes
+}
+
+fn from_bytes(bytes: [u8; 16]) -> (i64, i64) {
+    let [first, second] = [0, 8].map(|at| {
+        let mut half = [0; 8];
+        half.copy_from_slice(&bytes[at..at + 8]);
+        i64::from_le_bytes(half)
+    });
+    (first, second)
 }
 
 /// Writes the schedule.
@@ -54,7 +64,12 @@ pub(crate) struct ScheduleWriter {
     /// Items that the source before has published.
     before: u64,
     schedule: Schedule,
+    /// The time of the run and the time of the sensor that it stands for, ns.
+    origin: Option<(i64, i64)>,
 }
+
+/// Position of the origin in the file.
+const ORIGIN_AT: u64 = 16;
 
 impl ScheduleWriter {
     /// Creates the schedule of a source that has to begin now.
@@ -95,9 +110,24 @@ impl ScheduleWriter {
                 published: 0,
                 due_ns: clock::now_ns(),
             },
+            origin: read_pair(manifest, ORIGIN_AT),
         };
         writer.write()?;
         Ok(writer)
+    }
+
+    /// Returns the origin of the pace of this source or of the one before, if it has a pace.
+    pub fn origin(&self) -> Option<(i64, i64)> {
+        self.origin
+    }
+
+    /// Scans are due by the pace with this origin.
+    pub fn is_paced_from(&mut self, origin: (i64, i64)) -> Result<(), StageError> {
+        if self.origin == Some(origin) {
+            return Ok(());
+        }
+        self.origin = Some(origin);
+        self.write_at(to_bytes(origin.0, origin.1), ORIGIN_AT)
     }
 
     /// The next item is due at this time.
@@ -125,7 +155,11 @@ impl ScheduleWriter {
     }
 
     fn write(&self) -> Result<(), StageError> {
-        let written = self.file.write_all_at(&self.schedule.to_bytes(), 0);
+        self.write_at(self.schedule.to_bytes(), 0)
+    }
+
+    fn write_at(&self, bytes: [u8; 16], position: u64) -> Result<(), StageError> {
+        let written = self.file.write_all_at(&bytes, position);
         written.map_err(|source| StageError::File {
             path: self.path.clone(),
             source,
@@ -135,10 +169,15 @@ impl ScheduleWriter {
 
 /// Returns the schedule of the run's source, if it has written one: a replaced source need not.
 pub(crate) fn read(manifest: &Manifest) -> Option<Schedule> {
+    read_pair(manifest, 0).map(Schedule::of)
+}
+
+/// Returns two numbers of the file; `None` where it has none.
+fn read_pair(manifest: &Manifest, position: u64) -> Option<(i64, i64)> {
     let mut bytes = [0; 16];
     let file = File::open(manifest.root.join(FILE)).ok()?;
-    file.read_exact_at(&mut bytes, 0).ok()?;
-    Some(Schedule::from_bytes(bytes))
+    file.read_exact_at(&mut bytes, position).ok()?;
+    Some(from_bytes(bytes))
 }
 
 #[cfg(test)]
@@ -151,7 +190,7 @@ mod tests {
             published: 1 << 40,
             due_ns: -7,
         };
-        assert_eq!(Schedule::from_bytes(schedule.to_bytes()), schedule);
+        assert_eq!(Schedule::of(from_bytes(schedule.to_bytes())), schedule);
         assert_eq!(schedule.to_bytes()[..8], (1_u64 << 40).to_le_bytes());
     }
 }

@@ -3,7 +3,7 @@
 
 use gyre_messages::{
     Correction, Fix, FollowerId, Loop, Masked, Message, Motion, Pose, Refined, Rotation, Scan,
-    StageId, Window,
+    StageId, TopicSizes, Window,
 };
 use iceoryx2::{
     prelude::{Config, NodeBuilder, NodeName, ServiceName, SignalHandlingMode, ipc},
@@ -55,19 +55,7 @@ impl Services {
     pub(crate) fn create(node: &Node, window: &Window) -> Result<Self, StageError> {
         let mut events = Vec::new();
         for topic in gyre_messages::topics(window) {
-            let sizes = (topic.sizes)(window);
-            let data = EventSizes {
-                listeners: sizes.subscribers(),
-                notifiers: 1,
-                nodes: sizes.nodes(),
-            };
-            let handshake = EventSizes {
-                listeners: 1,
-                notifiers: sizes.subscribers(),
-                nodes: sizes.nodes(),
-            };
-            events.push(create_event(node, &data_event(topic.name), data)?);
-            events.push(create_event(node, &handshake_event(topic.name), handshake)?);
+            events.extend(create_events(node, topic.name, &(topic.sizes)(window))?);
         }
         let fixes = window.localises.then(|| create_topic::<Fix>(node, window));
         let mut slam = None;
@@ -127,7 +115,32 @@ fn service_name(name: &str) -> Result<ServiceName, StageError> {
     ServiceName::new(name).map_err(|e| StageError::transport(format!("name the service {name}"), e))
 }
 
-fn create_topic<M: Message>(node: &Node, window: &Window) -> Result<Topic<M>, StageError> {
+/// Creates the two events of a topic: with its messages, and with its new readers.
+pub(crate) fn create_events(
+    node: &Node,
+    topic: &str,
+    sizes: &TopicSizes,
+) -> Result<[Event; 2], StageError> {
+    let data = EventSizes {
+        listeners: sizes.subscribers(),
+        notifiers: 1,
+        nodes: sizes.nodes(),
+    };
+    let handshake = EventSizes {
+        listeners: 1,
+        notifiers: sizes.subscribers(),
+        nodes: sizes.nodes(),
+    };
+    Ok([
+        create_event(node, &data_event(topic), data)?,
+        create_event(node, &handshake_event(topic), handshake)?,
+    ])
+}
+
+pub(crate) fn create_topic<M: Message>(
+    node: &Node,
+    window: &Window,
+) -> Result<Topic<M>, StageError> {
     let sizes = M::sizes(window);
     node.service_builder(&service_name(M::TOPIC)?)
         .publish_subscribe::<[M::Element]>()

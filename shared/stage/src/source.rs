@@ -5,7 +5,7 @@ mod pace;
 mod position;
 mod sensor;
 
-use std::{ops::Range, time::Duration};
+use std::{num::NonZeroUsize, ops::Range, time::Duration};
 
 use gyre_messages::{Hop, Item, Pose, Scan, ScanHeader, StageId, flag};
 use gyre_radar::continues;
@@ -38,6 +38,11 @@ pub trait Source {
 
     /// Time between two scans, ns.
     fn period_ns(&self) -> i64;
+
+    /// Number of scans that become due at once, when the last of them is complete.
+    fn burst(&self) -> NonZeroUsize {
+        NonZeroUsize::MIN
+    }
 
     /// Returns whether live mode drops the scans that become due while this process is busy or down, as with a real sensor.
     fn drops_missed_scans(&self) -> bool;
@@ -179,14 +184,14 @@ impl<S: Source> Playback<'_, S> {
                 position.break_chain();
                 position.identify(&mut draft.header().item);
             }
-            let due_ns = self.due_ns(&mut pace, gap, &times);
+            let due_ns = self.due_ns(&mut pace, gap, &times, position.published)?;
             if !self.admit(draft, &position, due_ns)? {
                 return Ok(());
             }
             before = Some(times);
             position.advance();
             if let Some(pace) = pace {
-                if self.launch.manifest.live && self.source.drops_missed_scans() {
+                if self.is_sensor() {
                     self.drop_missed(&mut position, pace);
                 }
                 if !self.yield_processors(&position, pace)? {
@@ -207,9 +212,18 @@ impl<S: Source> Playback<'_, S> {
         pace: &mut Option<Pace>,
         gap: Option<Times>,
         times: &Times,
-    ) -> Option<i64> {
-        let rate = self.launch.manifest.rate?;
-        let pace = pace.get_or_insert_with(|| Pace::new(rate, times.complete_ns));
+        published: u64,
+    ) -> Result<Option<i64>, StageError> {
+        let Some(rate) = self.launch.manifest.rate else {
+            return Ok(None);
+        };
+        let pace = pace.get_or_insert_with(|| {
+            let before = self.schedule.origin().filter(|_| self.is_sensor());
+            before.map_or_else(
+                || Pace::new(rate, times.complete_ns),
+                |origin| Pace::resumed(rate, origin),
+            )
+        });
         if let Some(before) = gap {
             let period_ns = self.source.period_ns();
             pace.resume(before.complete_ns, times.complete_ns, period_ns);
@@ -217,7 +231,27 @@ impl<S: Source> Playback<'_, S> {
         if self.launch.manifest.live && !self.source.drops_missed_scans() {
             self.counters.slipped_ns += pace.slip(times.complete_ns);
         }
-        Some(pace.due_ns(times.complete_ns))
+        self.schedule.is_paced_from(pace.origin())?;
+        Ok(Some(
+            pace.due_ns(self.burst_ns(times.complete_ns, published)),
+        ))
+    }
+
+    /// Returns whether scans become due whatever this process does, as those of a sensor.
+    fn is_sensor(&self) -> bool {
+        self.launch.manifest.live && self.source.drops_missed_scans()
+    }
+
+    /// Returns the time on the sensor's clock at which the last scan of a scan's burst is complete.
+    fn burst_ns(&self, complete_ns: i64, published: u64) -> i64 {
+        let after = self.left_in_burst(published) as i64;
+        complete_ns.saturating_add(self.source.period_ns().saturating_mul(after))
+    }
+
+    /// Returns the number of scans that follow a scan in its burst.
+    fn left_in_burst(&self, published: u64) -> u64 {
+        let burst = self.source.burst().get() as u64;
+        burst - 1 - published % burst
     }
 
     /// Reads the next scan into shared memory before it is due.
@@ -323,20 +357,26 @@ impl<S: Source> Playback<'_, S> {
 
     /// Returns when a scan is expected to be due before it is read; `None` if its time is unknown or breaks with that of the scan
     /// before.
-    fn expected_ns(&self, index: usize, pace: Pace) -> Option<i64> {
+    fn expected_ns(&self, index: usize, published: u64, pace: Pace) -> Option<i64> {
         let before_ns = self.source.complete_ns(index.checked_sub(1)?)?;
         let complete_ns = self.source.complete_ns(index)?;
-        continues(before_ns, complete_ns).then(|| pace.due_ns(complete_ns))
+        let due_ns = || pace.due_ns(self.burst_ns(complete_ns, published));
+        continues(before_ns, complete_ns).then(due_ns)
     }
 
-    /// Drops the scans that a sensor would have measured while this process was down.
+    /// Drops the scans that a sensor would have measured while this process was down: those before the burst that is due.
     fn drop_missed(&mut self, position: &mut Position, pace: Pace) {
         let (now_ns, end) = (clock::now_ns(), self.source.scans().end);
-        let is_missed = |index| {
-            self.expected_ns(index, pace)?;
-            Some(self.expected_ns(index + 1, pace)? < now_ns)
+        let is_missed = |position: &Position| {
+            let Position {
+                index, published, ..
+            } = *position;
+            self.expected_ns(index, published, pace)?;
+            let next = 1 + self.left_in_burst(published);
+            let next_ns = self.expected_ns(index + next as usize, published + next, pace)?;
+            Some(next_ns < now_ns)
         };
-        while position.index + 1 < end && is_missed(position.index) == Some(true) {
+        while position.index + 1 < end && is_missed(position) == Some(true) {
             position.drop_scan();
         }
     }
@@ -344,7 +384,7 @@ impl<S: Source> Playback<'_, S> {
     /// Leaves the processors to the scan in flight, since a real sensor would not use them to read a recording. Returns at that
     /// scan's pose, or half-way to the next scan; false on a request to stop.
     fn yield_processors(&mut self, position: &Position, pace: Pace) -> Result<bool, StageError> {
-        let Some(due_ns) = self.expected_ns(position.index, pace) else {
+        let Some(due_ns) = self.expected_ns(position.index, position.published, pace) else {
             return Ok(true);
         };
         self.schedule.due_at(due_ns)?;

@@ -4,6 +4,7 @@ use std::fmt::Display;
 
 use gyre_messages::StageId;
 use gyre_simulator::OutputFormat;
+use gyre_stress::Limits;
 
 use super::{Configuration, ConfigurationError, Mode, Rate};
 
@@ -25,6 +26,11 @@ impl Configuration {
             return Err(value("slam", reason));
         }
         self.validate_radar()?;
+        self.validate_budget()?;
+        if self.source.burst.get() > 1 && self.run.rate == Rate::Max {
+            let reason = "burst needs a pace: set run.rate to `realtime` or a factor";
+            return Err(value("source", reason));
+        }
         if self.run.mode == Mode::Live && self.run.rate == Rate::Max && !self.is_radar() {
             let reason = "mode `live` needs a radar's pace: set rate to `realtime` or a factor";
             return Err(value("run", reason));
@@ -70,6 +76,19 @@ impl Configuration {
             )),
             false => Ok(()),
         }
+    }
+
+    fn validate_budget(&self) -> Result<(), ConfigurationError> {
+        let limits = |section: String, limits: &Limits| match limits.invalid() {
+            Some((key, limit)) => Err(value(
+                &section,
+                format!("{key} is {limit}, but must be 0 or more"),
+            )),
+            None => Ok(()),
+        };
+        limits("budget".to_owned(), &self.budget.all)?;
+        let mut scenarios = self.budget.scenarios.iter();
+        scenarios.try_for_each(|(name, own)| limits(format!("budget.{name}"), own))
     }
 
     /// What a simulation writes must be what the run reads.

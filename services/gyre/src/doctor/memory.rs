@@ -1,15 +1,13 @@
 //! Main memory, shared memory, and room for results.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::path::Path;
 
 use gyre_messages::Footprint;
 use gyre_stage::{
     run::{RootError, RunRoot, SHARED_MEMORY, free_shared_memory},
     wake::Signals,
 };
+use gyre_stress::memory::Room;
 use rustix::{
     fs::{Access, access, statfs, statvfs},
     process::getpid,
@@ -25,13 +23,12 @@ const PROCESSES: u64 = 60_000_000;
 const RESULTS: u64 = 64_000_000;
 /// Results of a scan: its lines of the results, its record in the journal.
 const RESULTS_PER_SCAN: u64 = 1_000;
-const CGROUPS: &str = "/sys/fs/cgroup";
 
 pub(super) fn main_memory(footprint: &Footprint) -> Finding {
     let needed = footprint.total() as u64 + PROCESSES;
-    let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
-    let limit = cgroup_limit(Path::new(CGROUPS), &groups);
-    let available = available(&fs::read_to_string("/proc/meminfo").unwrap_or_default());
+    let Room {
+        available, limit, ..
+    } = Room::now();
     let parts = [
         available.map(|bytes| format!("{} available", size(bytes))),
         limit.map(|bytes| format!("this process's group may use {}", size(bytes))),
@@ -44,44 +41,6 @@ pub(super) fn main_memory(footprint: &Footprint) -> Finding {
         ),
         _ => found,
     }
-}
-
-/// Returns the memory that programs can still get, from `/proc/meminfo`.
-fn available(meminfo: &str) -> Option<u64> {
-    let line = meminfo
-        .lines()
-        .find_map(|line| line.strip_prefix("MemAvailable:"))?;
-    let kilobytes: u64 = line.trim().strip_suffix(" kB")?.parse().ok()?;
-    Some(kilobytes * 1024)
-}
-
-/// Returns the lowest limit of the control groups in `/proc/self/cgroup` (version 1 or 2) and of those above them.
-fn cgroup_limit(root: &Path, groups: &str) -> Option<u64> {
-    let limits = groups.lines().filter_map(|line| {
-        let mut fields = line.splitn(3, ':').skip(1);
-        let (controllers, group) = (fields.next()?, fields.next()?.trim_start_matches('/'));
-        match controllers {
-            "" => Some((root.to_owned(), group.to_owned(), "memory.max")),
-            "memory" => Some((
-                root.join("memory"),
-                group.to_owned(),
-                "memory.limit_in_bytes",
-            )),
-            _ => None,
-        }
-    });
-    let limits = limits.flat_map(|(root, group, file)| {
-        let above: Vec<PathBuf> = Path::new(&group)
-            .ancestors()
-            .map(|group| root.join(group))
-            .collect();
-        above.into_iter().map(move |group| group.join(file))
-    });
-    limits
-        .filter_map(|file| fs::read_to_string(file).ok()?.trim().parse().ok())
-        // Version 1 writes the largest multiple of a page where there is no limit.
-        .filter(|limit| *limit < i64::MAX as u64 / 2)
-        .min()
 }
 
 pub(super) fn shared_memory(footprint: &Footprint) -> Finding {
@@ -168,37 +127,5 @@ fn size(bytes: u64) -> String {
     match bytes {
         0..1_000_000_000 => format!("{:.1} MB", bytes as f64 / 1e6),
         _ => format!("{:.1} GB", bytes as f64 / 1e9),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-
-    #[test]
-    fn the_lowest_limit_of_the_groups_above_counts() {
-        let root = tempfile::tempdir().unwrap();
-        let write = |path: &str, text: &str| {
-            let path = root.path().join(path);
-            fs::create_dir_all(path.parent().unwrap()).unwrap();
-            fs::write(path, text).unwrap();
-        };
-        write("user/session/memory.max", "max\n");
-        write("user/memory.max", "5000000\n");
-        write("memory/box/memory.limit_in_bytes", "3000000\n");
-        write("memory/memory.limit_in_bytes", "9223372036854771712\n");
-        let limit = |groups| cgroup_limit(root.path(), groups);
-        assert_eq!(limit("0::/user/session\n"), Some(5_000_000));
-        assert_eq!(limit("8:pids:/\n4:memory:/box\n0::/\n"), Some(3_000_000));
-        assert_eq!(limit("4:memory:/\n"), None);
-        assert_eq!(limit(""), None);
-    }
-
-    #[test]
-    fn available_memory_is_in_meminfo() {
-        let meminfo = "MemTotal:  100 kB\nMemAvailable:   42 kB\n";
-        assert_eq!(available(meminfo), Some(42 * 1024));
-        assert_eq!(available("MemTotal: 100 kB"), None);
     }
 }

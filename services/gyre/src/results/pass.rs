@@ -1,11 +1,12 @@
 //! One pass over the journal.
 
+use gyre_latency::LatencyMeter;
 use gyre_messages::{Item, PoseHeader, flag};
 use gyre_radar::{Trajectory, ground_truth::write_tum_pose};
 use gyre_storage::Draft;
 
 use super::{Estimate, Files, Sketch, Slam};
-use crate::{Failure, latency::LatencyMeter, odometry, summary::Counter};
+use crate::{Failure, odometry, summary::Counter};
 
 /// Writes the tables row by row, and measures and counts all else.
 pub struct Pass<'a, 'b> {

@@ -35,8 +35,13 @@ fn write_section(page: &mut String, name: &str, schema: &Value) {
     }
     match schema.get("additionalProperties") {
         Some(named @ Value::Object(_)) => {
+            // A section of its own kind beside those with names.
+            let own = match properties(schema).next() {
+                Some(_) => format!("[{name}]` and `"),
+                None => String::new(),
+            };
             let name = format!("{name}.NAME");
-            write_object(page, &format!("[{name}]"), &name, schema, named);
+            write_object(page, &format!("{own}[{name}]"), &name, schema, named);
         }
         _ => write_object(page, &format!("[{name}]"), name, schema, schema),
     }

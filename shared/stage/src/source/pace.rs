@@ -20,6 +20,20 @@ impl Pace {
         }
     }
 
+    /// The pace that a source before had, with its [`origin`](Self::origin).
+    pub fn resumed(rate: f64, (start_ns, first_ns): (i64, i64)) -> Self {
+        Self {
+            rate,
+            start_ns,
+            first_ns,
+        }
+    }
+
+    /// Returns the time of the run, and the time of the sensor that it stands for, both in ns.
+    pub fn origin(&self) -> (i64, i64) {
+        (self.start_ns, self.first_ns)
+    }
+
     /// Returns when a scan is due.
     pub fn due_ns(&self, complete_ns: i64) -> i64 {
         self.start_ns

@@ -5,6 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_latency::{Latency, LatencyMeter};
 use gyre_messages::PoseHeader;
 use gyre_stage::{
     control::{Control, Status},
@@ -13,10 +14,7 @@ use gyre_stage::{
 };
 
 use super::Poses;
-use crate::{
-    Failure,
-    latency::{Latency, LatencyMeter},
-};
+use crate::Failure;
 
 /// The time over which latencies are measured.
 const SPAN: Duration = Duration::from_secs(10);

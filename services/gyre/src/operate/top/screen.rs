@@ -1,5 +1,6 @@
 //! A look at a run as a screen, or as text.
 
+use gyre_latency::{HopLatency, Percentiles};
 use gyre_stage::control::{Activity, ProcessStatus};
 use ratatui::{
     Frame,
@@ -10,10 +11,7 @@ use ratatui::{
 };
 
 use super::look::{Look, Use};
-use crate::{
-    latency::{HopLatency, Percentiles},
-    operate::processes::{duration, summary},
-};
+use crate::operate::processes::{duration, summary};
 
 /// The columns of the table: title and width.
 const COLUMNS: [(&str, u16); 12] = [

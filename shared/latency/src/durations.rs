@@ -2,7 +2,7 @@
 
 use hdrhistogram::Histogram;
 
-use super::Percentiles;
+use crate::Percentiles;
 
 /// Significant digits of a percentile.
 const DIGITS: u8 = 3;
@@ -23,6 +23,17 @@ impl Durations {
         if let Some(histogram) = &mut self.0 {
             histogram.saturating_record(u64::try_from(duration_ns).unwrap_or(0));
         }
+    }
+
+    /// Returns the number of durations.
+    pub fn count(&self) -> u64 {
+        self.0.as_ref().map_or(0, Histogram::len)
+    }
+
+    /// Returns the duration, ns, that this share (0 to 1) of all does not exceed; `None` if there is no duration.
+    pub fn at(&self, share: f64) -> Option<u64> {
+        let histogram = self.0.as_ref()?;
+        Some(histogram.value_at_quantile(share))
     }
 
     /// Returns the percentiles; zero if there is no duration.

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use gyre_messages::{Hop, PoseHeader, StageId};
 use serde::Serialize;
 
-use durations::Durations;
+pub use durations::Durations;
 use overlap::Overlap;
 
 /// Percentiles of a duration, microseconds; exact to 0.1 %.
@@ -65,10 +65,13 @@ pub struct LatencyMeter {
 
 /// The durations of one stage.
 #[derive(Debug, Default)]
-struct HopMeter {
-    transport: Durations,
-    wait: Durations,
-    work: Durations,
+pub struct HopMeter {
+    /// From the publication by the stage before to the reception; empty of the first stage.
+    pub transport: Durations,
+    /// From the reception to the start of the work.
+    pub wait: Durations,
+    /// Duration of the work.
+    pub work: Durations,
     busy_ns: i64,
 }
 
@@ -96,6 +99,12 @@ impl LatencyMeter {
         self.overlap.add(hops);
     }
 
+    /// Returns the durations of each stage that the run has, in the order of the stream.
+    pub fn stages(&self) -> impl Iterator<Item = (StageId, &HopMeter)> {
+        let stages = StageId::ALL.into_iter().zip(&self.stages);
+        stages.filter(|(_, meter)| meter.work.count() > 0)
+    }
+
     /// Returns the latency of all poses.
     pub fn latency(self) -> Latency {
         let span_ns = self.span.map_or(0, |(first, last)| last - first).max(1) as f64;
@@ -105,10 +114,8 @@ impl LatencyMeter {
             work: meter.work.percentiles(),
             busy: meter.busy_ns as f64 / span_ns,
         };
-        let stages: BTreeMap<_, _> = StageId::ALL
-            .into_iter()
-            .zip(&self.stages)
-            .filter(|(_, meter)| meter.work.percentiles_if_any().is_some())
+        let stages: BTreeMap<_, _> = self
+            .stages()
             .map(|(stage, meter)| (stage.name(), hop(meter)))
             .collect();
         let busiest = stages.iter().max_by(|a, b| a.1.busy.total_cmp(&b.1.busy));

@@ -1,0 +1,170 @@
+//! `gyre stress`: whether a pipeline meets its deadline on this computer.
+
+use std::{fs, path::Path, process::ExitCode, time::Duration};
+
+use gyre_messages::{Masked, Message, Motion, Scan, StageId, topics};
+use gyre_stress::{Options, Provenance, Report, Scenario, Subject, copying::Kind, report::Verdict};
+
+use crate::{
+    Failure,
+    cli::{RunArguments, StressArguments},
+    configuration::Configuration,
+    machine::{Machine, today},
+    out::Out,
+    preflight::{self, Preflight},
+    print, program,
+    run::resolve::resolve,
+    simulate,
+};
+
+/// The exit code of a stress test that could not be carried out, which says nothing of the pipeline.
+const NOT_CARRIED_OUT: u8 = 2;
+/// Duration of a scenario with `--quick`, s.
+const QUICK_S: f64 = 10.0;
+/// The longest part of a simulated drive that is rendered, scans: a minute of a 4 Hz radar. It is played again and again.
+const RENDERED: usize = 240;
+
+/// Carries out the scenarios and writes the report. The exit code is 0 if all limits of the budget are kept, 1 if not, and 2 if the test could
+/// not be carried out.
+///
+/// # Errors
+/// Standard output cannot be written.
+pub fn stress(arguments: &StressArguments) -> Result<ExitCode, Failure> {
+    if arguments.list {
+        for scenario in Scenario::ALL {
+            print::line(format_args!("{scenario:10}  {}", scenario.line()))?;
+        }
+        return Ok(ExitCode::SUCCESS);
+    }
+    Ok(match carry_out(arguments) {
+        Ok(report) if report.has(Verdict::Failed) => ExitCode::FAILURE,
+        Ok(report) if report.has(Verdict::NotCarriedOut) => ExitCode::from(NOT_CARRIED_OUT),
+        Ok(_) => ExitCode::SUCCESS,
+        Err(error) => {
+            print::note(format_args!("gyre stress: {error}"));
+            ExitCode::from(NOT_CARRIED_OUT)
+        }
+    })
+}
+
+/// Does the work of a helper process.
+///
+/// # Errors
+/// A failure of it.
+pub fn help(arguments: &[String]) -> Result<ExitCode, Failure> {
+    gyre_stress::helper::main(&program::own(), arguments)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
+    let out = Out::lock(&arguments.out)?;
+    let mut configuration = resolve(&RunArguments {
+        configuration: arguments.configuration.clone(),
+        data: arguments.data.clone(),
+        radar: None,
+        out: None,
+        calibration: None,
+        rate: None,
+        set: arguments.set.clone(),
+        fresh: true,
+    })?;
+    render(&mut configuration, &out)?;
+    // First, since a radar that is configured is no recording, and would be asked for its scans.
+    let played = preflight::open(&configuration)?;
+    let period = Duration::from_nanos(played.dataset.period_ns().max(1) as u64);
+    let checked = preflight::check(&configuration)?;
+    let file = out.join("config.toml");
+    fs::write(&file, configuration.to_toml()?)?;
+    let stages = StageId::ALL.into_iter();
+    let subject = Subject {
+        program: program::own(),
+        configuration: file,
+        out: out.path().to_owned(),
+        period,
+        stages: stages.filter(|stage| configuration.has(*stage)).collect(),
+        budget: configuration.budget.clone(),
+        kinds: kinds(&checked),
+        shared_bytes: checked.footprint.total() as u64,
+    };
+    let options = Options {
+        scenarios: match arguments.scenarios.is_empty() {
+            true => Scenario::ALL.to_vec(),
+            false => arguments.scenarios.clone(),
+        },
+        duration: Duration::from_secs_f64(match arguments.quick {
+            true => QUICK_S,
+            false => arguments.duration,
+        }),
+        stages: arguments.stages.clone(),
+        seed: arguments.seed,
+    };
+    require_stages(&subject, &options.stages)?;
+    let provenance = provenance(arguments, &configuration)?;
+    let mut report = gyre_stress::stress(&subject, &options, &mut |line| print::note(line));
+    report.provenance = provenance;
+    report.write(out.path())?;
+    for outcome in &report.outcomes {
+        print::line(outcome.sentence())?;
+    }
+    print::line(format_args!(
+        "report in {}: report.md, report.json, report.svg",
+        out.path().display()
+    ))?;
+    Ok(report)
+}
+
+/// Stores a simulation, so that rendering does not bound the pipeline. What is stored already and is the same is kept.
+fn render(configuration: &mut Configuration, out: &Out) -> Result<(), Failure> {
+    let Some(mut simulation) = configuration.simulation.take() else {
+        return Ok(());
+    };
+    let whole = gyre_simulator::SimulatedDrive::new(&simulation)?.open(&configuration.dataset)?;
+    if whole.len() > RENDERED {
+        simulation.scans = Some(RENDERED);
+    }
+    let recording = out.join("recording");
+    simulate::store(&simulation, &recording, true)?;
+    configuration.source.data = recording;
+    Ok(())
+}
+
+/// The messages whose hand-over is compared with copies: the largest ones, and one without a payload.
+fn kinds(checked: &Preflight) -> Vec<Kind> {
+    let kind = |name| {
+        let mut topics = topics(&checked.window);
+        let topic = topics.find(|topic| topic.name == name);
+        Kind {
+            topic: name,
+            bytes: topic.map_or(0, |topic| (topic.max_sample_bytes)(&checked.limits)),
+        }
+    };
+    [Scan::TOPIC, Masked::TOPIC, Motion::TOPIC]
+        .map(kind)
+        .to_vec()
+}
+
+fn require_stages(subject: &Subject, stages: &[StageId]) -> Result<(), Failure> {
+    match stages.iter().find(|stage| !subject.stages.contains(stage)) {
+        None => Ok(()),
+        Some(stage) => Err(format!("this run has no stage {}", stage.name()).into()),
+    }
+}
+
+fn provenance(
+    arguments: &StressArguments,
+    configuration: &Configuration,
+) -> Result<Provenance, Failure> {
+    let uname = rustix::system::uname();
+    let load = fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    let file = arguments.configuration.as_deref();
+    Ok(Provenance {
+        date: today(),
+        machine: Machine::this().to_string(),
+        kernel: uname.release().to_string_lossy().into_owned(),
+        gyre: env!("CARGO_PKG_VERSION").to_owned(),
+        build: program::sha256(&program::own())?,
+        configuration: file.unwrap_or(Path::new("")).display().to_string(),
+        source: configuration.data(),
+        load_before: load.split(' ').next().and_then(|load| load.parse().ok()),
+    })
+}

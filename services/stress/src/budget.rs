@@ -1,0 +1,233 @@
+//! The section `[budget]`: what a run must keep, and the verdict on what was measured.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::scenario::{Judged, Scenario};
+
+/// Limits on what `gyre stress` measures. One that is left out is not judged.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Limits {
+    /// Median of the time from sensor to pose, ms. A scan that was dropped counts until the pose of the
+    /// next one that was not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub p50_ms: Option<f64>,
+    /// 90th percentile of it, ms.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub p90_ms: Option<f64>,
+    /// 99th percentile of it, ms. Of fewer than a hundred scans that is the maximum.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub p99_ms: Option<f64>,
+    /// 99.9th percentile of it, ms. Of fewer than a thousand scans that is the maximum.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub p99_9_ms: Option<f64>,
+    /// Maximum of it, ms.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_ms: Option<f64>,
+    /// Scans that were due and have no pose, %.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub drops_percent: Option<f64>,
+    /// Time from a fault (the kill, or the end of the stop) to the first pose that the stage has worked
+    /// on since, ms.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recovery_ms: Option<f64>,
+    /// Processor time of all processes of the run, % of one processor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cpu_percent: Option<f64>,
+    /// Own memory of all processes of the run and its shared memory, MB.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub memory_mb: Option<f64>,
+    /// Smallest rate of the knee that `ramp` finds, scans/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rate_hz: Option<f64>,
+    /// Smallest number of 4 Hz radars that `fleet` finds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radars: Option<f64>,
+}
+
+/// The budget of a run: `[budget]` for all scenarios, `[budget.NAME]` for one of them.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct Budget {
+    /// The limits for all scenarios whose purpose is no fault.
+    #[serde(flatten)]
+    pub all: Limits,
+    /// The limits for one scenario, over those for all.
+    #[serde(flatten)]
+    pub scenarios: BTreeMap<String, Limits>,
+}
+
+impl Limits {
+    /// Returns these limits, and those of `other` where there are none.
+    #[must_use]
+    pub fn or(&self, other: &Self) -> Self {
+        Self {
+            p50_ms: self.p50_ms.or(other.p50_ms),
+            p90_ms: self.p90_ms.or(other.p90_ms),
+            p99_ms: self.p99_ms.or(other.p99_ms),
+            p99_9_ms: self.p99_9_ms.or(other.p99_9_ms),
+            max_ms: self.max_ms.or(other.max_ms),
+            drops_percent: self.drops_percent.or(other.drops_percent),
+            recovery_ms: self.recovery_ms.or(other.recovery_ms),
+            cpu_percent: self.cpu_percent.or(other.cpu_percent),
+            memory_mb: self.memory_mb.or(other.memory_mb),
+            rate_hz: self.rate_hz.or(other.rate_hz),
+            radars: self.radars.or(other.radars),
+        }
+    }
+
+    /// Returns the first key whose limit is not a number of at least 0.
+    pub fn invalid(&self) -> Option<(&'static str, f64)> {
+        let keys = self.keys();
+        let set = keys
+            .into_iter()
+            .filter_map(|(key, limit)| Some((key, limit?)));
+        set.into_iter()
+            .find(|(_, limit)| !(limit.is_finite() && *limit >= 0.0))
+    }
+
+    fn keys(&self) -> [(&'static str, Option<f64>); 11] {
+        [
+            ("p50_ms", self.p50_ms),
+            ("p90_ms", self.p90_ms),
+            ("p99_ms", self.p99_ms),
+            ("p99_9_ms", self.p99_9_ms),
+            ("max_ms", self.max_ms),
+            ("drops_percent", self.drops_percent),
+            ("recovery_ms", self.recovery_ms),
+            ("cpu_percent", self.cpu_percent),
+            ("memory_mb", self.memory_mb),
+            ("rate_hz", self.rate_hz),
+            ("radars", self.radars),
+        ]
+    }
+}
+
+impl Budget {
+    /// Returns the limits that a scenario is judged by.
+    pub fn of(&self, scenario: Scenario) -> Limits {
+        let own = self.scenarios.get(scenario.name());
+        let own = own.cloned().unwrap_or_default();
+        match scenario.judged() {
+            Judged::ByBudget | Judged::ByItself => own.or(&self.all),
+            Judged::ButDrops => own.or(&Limits {
+                drops_percent: None,
+                ..self.all.clone()
+            }),
+            Judged::ByRecovery => own.or(&Limits {
+                recovery_ms: self.all.recovery_ms,
+                ..Limits::default()
+            }),
+            Judged::Never => Limits::default(),
+        }
+    }
+}
+
+/// One figure beside its limit.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Check {
+    /// The key of `[budget]`.
+    pub key: &'static str,
+    /// What was measured; `None`: nothing, which misses the limit.
+    pub measured: Option<f64>,
+    /// The limit.
+    pub limit: f64,
+    /// True if the limit is kept.
+    pub passed: bool,
+}
+
+impl Check {
+    /// The measured figure must not be above the limit.
+    pub fn at_most(key: &'static str, measured: Option<f64>, limit: f64) -> Self {
+        Self {
+            key,
+            measured,
+            limit,
+            passed: measured.is_some_and(|measured| measured <= limit),
+        }
+    }
+
+    /// The measured figure must not be below the limit.
+    pub fn at_least(key: &'static str, measured: Option<f64>, limit: f64) -> Self {
+        Self {
+            passed: measured.is_some_and(|measured| measured >= limit),
+            ..Self::at_most(key, measured, limit)
+        }
+    }
+
+    /// Returns `p99_ms 312.4, limit 250`.
+    pub fn sentence(&self) -> String {
+        let measured = self.measured.map_or("not measured".to_owned(), |measured| {
+            format!("{measured:.1}")
+        });
+        format!("{} {measured}, limit {}", self.key, self.limit)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn budget() -> Budget {
+        let all = Limits {
+            p99_ms: Some(100.0),
+            drops_percent: Some(0.0),
+            recovery_ms: Some(500.0),
+            ..Limits::default()
+        };
+        let kills = Limits {
+            p99_ms: Some(900.0),
+            ..Limits::default()
+        };
+        let fast = Limits {
+            drops_percent: Some(5.0),
+            ..Limits::default()
+        };
+        Budget {
+            all,
+            scenarios: [("kills".to_owned(), kills), ("fast".to_owned(), fast)].into(),
+        }
+    }
+
+    #[test]
+    fn a_fault_is_judged_by_its_recovery_and_by_limits_of_its_own() {
+        let kills = budget().of(Scenario::Kills);
+        assert_eq!(
+            (kills.p99_ms, kills.recovery_ms),
+            (Some(900.0), Some(500.0))
+        );
+        assert_eq!(kills.drops_percent, None);
+        assert_eq!(budget().of(Scenario::Stopped).p99_ms, None);
+    }
+
+    #[test]
+    fn a_load_is_judged_by_the_budget_and_its_own_limits_go_first() {
+        let fast = budget().of(Scenario::Fast);
+        assert_eq!((fast.p99_ms, fast.drops_percent), (Some(100.0), Some(5.0)));
+        assert_eq!(budget().of(Scenario::Bursts).drops_percent, None);
+        assert_eq!(budget().of(Scenario::Copying), Limits::default());
+    }
+
+    #[test]
+    fn a_figure_on_its_limit_keeps_it_and_a_missing_one_does_not() {
+        assert!(Check::at_most("p99_ms", Some(100.0), 100.0).passed);
+        assert!(!Check::at_most("p99_ms", Some(100.1), 100.0).passed);
+        assert!(!Check::at_most("p99_ms", None, 100.0).passed);
+        assert!(Check::at_least("radars", Some(2.0), 2.0).passed);
+        assert!(!Check::at_least("radars", Some(1.0), 2.0).passed);
+        let sentence = Check::at_most("p99_ms", Some(312.44), 100.0).sentence();
+        assert_eq!(sentence, "p99_ms 312.4, limit 100");
+    }
+
+    #[test]
+    fn limits_are_numbers_of_at_least_zero() {
+        let limits = |p99_ms| Limits {
+            p99_ms: Some(p99_ms),
+            ..Limits::default()
+        };
+        assert_eq!(limits(0.0).invalid(), None);
+        assert_eq!(limits(-1.0).invalid(), Some(("p99_ms", -1.0)));
+        assert!(limits(f64::NAN).invalid().is_some());
+    }
+}

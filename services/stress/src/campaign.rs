@@ -1,0 +1,351 @@
+//! One scenario after the other.
+
+use std::{path::PathBuf, thread, time::Duration};
+
+use gyre_messages::StageId;
+use gyre_stage::run::{free_shared_memory, sweep};
+
+use crate::{
+    Budget, Limits, Report, StressError,
+    budget::Check,
+    copying::{self, Kind},
+    fault::FaultKind,
+    pipeline::{Gate, Measured, Setup, measure},
+    report::{Figures, Outcome, Step, Verdict},
+    scenario::{RADAR_HZ, Scenario},
+    search::largest,
+};
+
+/// Scans of a burst.
+const BURST: u64 = 3;
+/// Share of the available memory that is taken.
+const MEMORY_SHARE: f64 = 0.9;
+/// Programs that read all topics.
+const OBSERVERS: usize = 8;
+/// A stage is made slower than the radar by this factor.
+const SLOWER: f64 = 1.2;
+/// The limit of p99 where the budget names none: the period of a 4 Hz radar, ms.
+const PERIOD_MS: f64 = 250.0;
+/// Levels of the ramp in a doubling of the rate.
+const LEVELS: u32 = 16;
+/// The highest level of the ramp: 2^8 times the radar's rate.
+const MOST_LEVELS: u32 = 8 * LEVELS;
+/// The largest fleet that is tried.
+const MOST_RADARS: u32 = 64;
+/// Share of a scenario's time that a step of a search takes.
+const STEP: u32 = 6;
+const SHORTEST_STEP: Duration = Duration::from_secs(5);
+/// The rate of the source has a limit: 1000 times the sensor's own.
+const MOST_HZ: f64 = 1000.0;
+
+/// What is stressed.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    /// The program `gyre`.
+    pub program: PathBuf,
+    /// The resolved configuration, whose source is a recording.
+    pub configuration: PathBuf,
+    /// The folder of the report.
+    pub out: PathBuf,
+    /// Time between two scans of the recording.
+    pub period: Duration,
+    /// The stages of the run.
+    pub stages: Vec<StageId>,
+    /// Its budget.
+    pub budget: Budget,
+    /// The messages whose hand-over is compared with copies.
+    pub kinds: Vec<Kind>,
+    /// Shared memory of a run, bytes.
+    pub shared_bytes: u64,
+}
+
+/// What is to be done.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The scenarios, in this order.
+    pub scenarios: Vec<Scenario>,
+    /// Time for which each is measured.
+    pub duration: Duration,
+    /// The stages that are stopped, killed or slowed; empty: all, and masking is slowed.
+    pub stages: Vec<StageId>,
+    /// For the choice of stages.
+    pub seed: u64,
+}
+
+/// Carries out all scenarios. `note` says what is done.
+///
+/// A scenario that could not be carried out has that as its verdict, and the next ones follow.
+pub fn stress(subject: &Subject, options: &Options, note: &mut dyn FnMut(&str)) -> Report {
+    let mut outcomes = Vec::new();
+    for scenario in &options.scenarios {
+        note(&format!("{scenario}: {}", scenario.line()));
+        let campaign = Campaign {
+            subject,
+            options,
+            scenario: *scenario,
+            limits: subject.budget.of(*scenario),
+        };
+        let outcome = campaign.outcome(note);
+        let outcome = outcome.unwrap_or_else(|error| Outcome {
+            verdict: Verdict::NotCarriedOut,
+            problem: Some(error.to_string()),
+            ..campaign.empty()
+        });
+        note(&outcome.sentence());
+        outcomes.push(outcome);
+    }
+    // Helpers that were killed have left what they had in shared memory.
+    sweep();
+    Report::of(outcomes)
+}
+
+struct Campaign<'a> {
+    subject: &'a Subject,
+    options: &'a Options,
+    scenario: Scenario,
+    limits: Limits,
+}
+
+impl Campaign<'_> {
+    fn outcome(&self, note: &mut dyn FnMut(&str)) -> Result<Outcome, StressError> {
+        match self.scenario {
+            Scenario::Ramp => self.ramp(note),
+            Scenario::Fleet => self.fleet(note),
+            Scenario::Copying => {
+                let rows =
+                    copying::compare(self.subject, self.options.duration.as_secs_f64(), note)?;
+                Ok(Outcome {
+                    copying: rows,
+                    ..self.empty()
+                })
+            }
+            _ => self.single(),
+        }
+    }
+
+    fn empty(&self) -> Outcome {
+        Outcome::new(self.scenario, self.options.duration)
+    }
+
+    /// One run.
+    fn single(&self) -> Result<Outcome, StressError> {
+        let measured = measure(self.subject, &self.setup(), &Gate::of(1))?;
+        let problem = problem(&measured);
+        let figures = Figures::of(measured);
+        Ok(Outcome {
+            checks: checks(&self.limits, &figures),
+            problem,
+            figures: Some(figures),
+            ..self.empty()
+        }
+        .judged())
+    }
+
+    fn setup(&self) -> Setup {
+        let duration = self.options.duration;
+        let mut setup = Setup::undisturbed(self.scenario, self.scenario.rate_hz(), duration);
+        setup.seed = self.options.seed;
+        match self.scenario {
+            Scenario::Bursts => {
+                setup.burst = BURST;
+                setup.set.push(format!("source.burst={BURST}"));
+            }
+            Scenario::Hogs => {
+                let processors = thread::available_parallelism().map_or(1, usize::from);
+                setup.loads = vec![vec!["spin".to_owned()]; processors];
+            }
+            Scenario::Memory => {
+                setup.loads = vec![vec!["memory".to_owned(), MEMORY_SHARE.to_string()]];
+            }
+            Scenario::Observers => {
+                setup.observers = OBSERVERS;
+                // One place more for this process.
+                setup.set.push(format!("run.observers={}", OBSERVERS + 1));
+            }
+            Scenario::SlowStage => setup.set.push(self.slow_stage()),
+            Scenario::Stopped => setup.faults = Some((FaultKind::Stop, self.stages())),
+            Scenario::Kills => setup.faults = Some((FaultKind::Kill, self.stages())),
+            _ => {}
+        }
+        setup
+    }
+
+    fn stages(&self) -> Vec<StageId> {
+        match self.options.stages.is_empty() {
+            true => self.subject.stages.clone(),
+            false => self.options.stages.clone(),
+        }
+    }
+
+    fn slow_stage(&self) -> String {
+        let stage = self.options.stages.first().unwrap_or(&StageId::Masking);
+        let delay_ms = 1e3 / self.scenario.rate_hz() * SLOWER;
+        format!("stages.{}.delay_ms={delay_ms:.0}", stage.name())
+    }
+
+    fn step_duration(&self) -> Duration {
+        let duration = self.options.duration;
+        (duration / STEP).max(SHORTEST_STEP).min(duration)
+    }
+
+    /// The limits of each step: those of the budget, else no drop and a p99 of a period.
+    fn step_limits(&self) -> Limits {
+        let limits = Limits {
+            rate_hz: None,
+            radars: None,
+            ..self.limits.clone()
+        };
+        limits.or(&Limits {
+            p99_ms: Some(PERIOD_MS),
+            drops_percent: Some(0.0),
+            ..Limits::default()
+        })
+    }
+
+    fn ramp(&self, note: &mut dyn FnMut(&str)) -> Result<Outcome, StressError> {
+        let rate_hz = |level: u32| RADAR_HZ * 2_f64.powf(f64::from(level) / f64::from(LEVELS));
+        let most = (MOST_HZ.min(MOST_HZ / self.subject.period.as_secs_f64()) / RADAR_HZ).log2();
+        let most = MOST_LEVELS.min((most * f64::from(LEVELS)) as u32);
+        let mut steps = Vec::new();
+        let passes = |level| {
+            let rate_hz = rate_hz(level);
+            let step = self.step(rate_hz, rate_hz, 1)?;
+            note(&step.sentence("scans/s"));
+            let passed = step.passed;
+            steps.push(step);
+            Ok::<_, StressError>(passed)
+        };
+        let best = largest(0, most, |level| level + LEVELS, passes)?.map(rate_hz);
+        Ok(Outcome {
+            checks: found("rate_hz", best, self.limits.rate_hz),
+            best,
+            steps,
+            ..self.empty()
+        }
+        .judged())
+    }
+
+    fn fleet(&self, note: &mut dyn FnMut(&str)) -> Result<Outcome, StressError> {
+        let mut steps = Vec::new();
+        let passes = |radars| {
+            let step = match self.lacks_memory(radars) {
+                Some(reason) => Step::not_started(f64::from(radars), reason),
+                None => self.step(f64::from(radars), RADAR_HZ, radars)?,
+            };
+            note(&step.sentence("radars"));
+            let passed = step.passed;
+            steps.push(step);
+            Ok::<_, StressError>(passed)
+        };
+        let best = largest(1, MOST_RADARS, |radars| radars * 2, passes)?.map(f64::from);
+        Ok(Outcome {
+            checks: found("radars", best, self.limits.radars),
+            best,
+            steps,
+            ..self.empty()
+        }
+        .judged())
+    }
+
+    /// Returns why so many runs do not fit into shared memory.
+    fn lacks_memory(&self, runs: u32) -> Option<String> {
+        let needed = self.subject.shared_bytes * u64::from(runs);
+        let free = free_shared_memory().ok().flatten()?;
+        (needed > free).then(|| {
+            let (needed, free) = (needed as f64 * 1e-6, free as f64 * 1e-6);
+            format!("{needed:.0} MB of shared memory are needed and {free:.0} MB are free")
+        })
+    }
+
+    /// Measures so many pipelines at once at a rate: a step of this level.
+    fn step(&self, level: f64, rate_hz: f64, pipelines: u32) -> Result<Step, StressError> {
+        let gate = Gate::of(pipelines as usize);
+        let setups: Vec<_> = (0..pipelines)
+            .map(|number| Setup {
+                name: format!("{}-{number}", self.scenario),
+                ..Setup::undisturbed(self.scenario, rate_hz, self.step_duration())
+            })
+            .collect();
+        let measured: Vec<_> = thread::scope(|scope| {
+            let gate = &gate;
+            let running = setups
+                .iter()
+                .map(|setup| scope.spawn(move || measure(self.subject, setup, gate)));
+            let running: Vec<_> = running.collect();
+            running.into_iter().map(|it| it.join()).collect()
+        });
+        let mut all = Vec::new();
+        for measured in measured {
+            let measured = measured.map_err(|_| StressError::Usage("a thread panicked".to_owned()));
+            match measured? {
+                Ok(measured) => all.push(measured),
+                // A machine that cannot even start so many does not carry them.
+                Err(error) if pipelines > 1 || rate_hz > RADAR_HZ => {
+                    return Ok(Step::not_started(level, error.to_string()));
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        let limits = self.step_limits();
+        let judged = all.into_iter().map(|measured| {
+            let problem = problem(&measured);
+            let figures = Figures::of(measured);
+            (checks(&limits, &figures), problem, figures)
+        });
+        Ok(Step::of(level, judged.collect()))
+    }
+}
+
+/// Returns why a run does not count as one that works, whatever its latency.
+fn problem(measured: &Measured) -> Option<String> {
+    if let Some(said) = &measured.died {
+        return Some(format!("the run has ended: {said}"));
+    }
+    let lost = measured
+        .faults
+        .iter()
+        .find(|fault| fault.recovery_ms.is_none());
+    lost.map(|fault| format!("no pose has followed the fault of {}", fault.stage))
+}
+
+/// Compares the figures of a run with limits.
+fn checks(limits: &Limits, figures: &Figures) -> Vec<Check> {
+    let latency = &figures.sensor_to_pose;
+    let percentile = |percentile| latency.judged(percentile);
+    let at_most = [
+        ("p50_ms", percentile(latency.p50_ms), limits.p50_ms),
+        ("p90_ms", percentile(latency.p90_ms), limits.p90_ms),
+        ("p99_ms", percentile(latency.p99_ms), limits.p99_ms),
+        ("p99_9_ms", percentile(latency.p99_9_ms), limits.p99_9_ms),
+        ("max_ms", latency.max_ms, limits.max_ms),
+        (
+            "drops_percent",
+            figures.drops_percent(),
+            limits.drops_percent,
+        ),
+        (
+            "cpu_percent",
+            Some(figures.cpu_percent()),
+            limits.cpu_percent,
+        ),
+        ("memory_mb", Some(figures.memory_mb()), limits.memory_mb),
+    ];
+    // Without scans there is nothing to judge but what the processes cost.
+    let has_scans = figures.counts.due > 0;
+    let recovery = limits.recovery_ms.filter(|_| !figures.faults.is_empty());
+    let recovery = recovery.map(|limit| {
+        let longest = figures.faults.iter().filter_map(|fault| fault.recovery_ms);
+        Check::at_most("recovery_ms", longest.reduce(f64::max), limit)
+    });
+    at_most
+        .into_iter()
+        .filter(|(key, ..)| has_scans || ["cpu_percent", "memory_mb"].contains(key))
+        .filter_map(|(key, measured, limit)| Some(Check::at_most(key, measured, limit?)))
+        .chain(recovery)
+        .collect()
+}
+
+fn found(key: &'static str, best: Option<f64>, limit: Option<f64>) -> Vec<Check> {
+    let check = limit.map(|limit| Check::at_least(key, Some(best.unwrap_or(0.0)), limit));
+    check.into_iter().collect()
+}

@@ -1,0 +1,105 @@
+//! The sender.
+
+use std::thread;
+
+use gyre_stage::{clock, hand_over::HandOver};
+use rustix::time::{ClockId, clock_gettime};
+
+use super::{Plan, RATE_HZ, Sent, WARM_UP, Way, own_bytes, socket, tell};
+use crate::{StressError, helper::say_ready};
+
+/// One way to send.
+pub(super) trait Send {
+    /// Waits until all readers are there, after they have said so.
+    fn begin(&mut self) -> Result<(), StressError>;
+
+    /// Writes a message anew.
+    fn write(&mut self, number: u64) -> Result<(), StressError>;
+
+    /// Sends it.
+    fn send(&mut self) -> Result<(), StressError>;
+
+    /// Returns the bytes of shared memory.
+    fn shared_bytes(&self) -> u64;
+}
+
+/// Sends the messages of a plan.
+pub(super) fn send(plan: &Plan) -> Result<(), StressError> {
+    match plan.way {
+        Way::SharedMemory => send_by(plan, Loaned::create(plan)?),
+        Way::Sockets => send_by(plan, socket::Sender::create(plan)?),
+    }
+}
+
+fn send_by(plan: &Plan, mut way: impl Send) -> Result<(), StressError> {
+    say_ready();
+    let mut go = String::new();
+    let _ = std::io::stdin().read_line(&mut go);
+    way.begin()?;
+    let mut sent = Sent::default();
+    let began_ns = clock::now_ns();
+    let period_ns = (1e9 / RATE_HZ) as i64;
+    for number in 0..WARM_UP + plan.messages {
+        thread::sleep(clock::until(began_ns + number as i64 * period_ns));
+        way.write(number)?;
+        let before_ns = cpu_ns();
+        way.send()?;
+        if number >= WARM_UP {
+            sent.cpu_ns += cpu_ns() - before_ns;
+        }
+    }
+    sent.own_bytes = own_bytes();
+    sent.shared_bytes = way.shared_bytes();
+    tell(&sent)?;
+    // Readers may still read.
+    let _ = std::io::stdin().read_line(&mut go);
+    Ok(())
+}
+
+/// Processor time of this thread, ns.
+fn cpu_ns() -> u64 {
+    let now = clock_gettime(ClockId::ThreadCPUTime);
+    (now.tv_sec * 1_000_000_000 + now.tv_nsec) as u64
+}
+
+/// Through shared memory: a message is written where its readers read it.
+struct Loaned {
+    topic: HandOver,
+    draft: Option<gyre_stage::writer::Draft<gyre_stage::hand_over::Parcel>>,
+}
+
+impl Loaned {
+    fn create(plan: &Plan) -> Result<Self, StressError> {
+        let place = &plan.place;
+        let place = place.canonicalize().map_err(StressError::file(place))?;
+        Ok(Self {
+            topic: HandOver::create(&place, plan.bytes, plan.readers)?,
+            draft: None,
+        })
+    }
+}
+
+impl Send for Loaned {
+    fn begin(&mut self) -> Result<(), StressError> {
+        Ok(self.topic.accept_readers()?)
+    }
+
+    fn write(&mut self, number: u64) -> Result<(), StressError> {
+        let mut draft = self.topic.loan()?;
+        draft.header().item.seq = number;
+        draft.values::<u8>().fill(number as u8);
+        self.draft = Some(draft);
+        Ok(())
+    }
+
+    fn send(&mut self) -> Result<(), StressError> {
+        match self.draft.take() {
+            Some(draft) => Ok(self.topic.send(draft)?),
+            None => Ok(()),
+        }
+    }
+
+    fn shared_bytes(&self) -> u64 {
+        self.topic.shared_bytes() as u64
+    }
+}

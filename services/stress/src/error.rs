@@ -1,0 +1,75 @@
+//! Why a stress test could not be carried out.
+
+use std::{io, path::PathBuf};
+
+use gyre_stage::StageError;
+use thiserror::Error;
+
+/// A stress test that could not be carried out, which says nothing of the pipeline's latency.
+#[derive(Debug, Error)]
+pub enum StressError {
+    /// A process could not be started.
+    #[error("cannot start `{program}`: {source}")]
+    Start {
+        /// The program.
+        program: String,
+        /// The system error.
+        source: io::Error,
+    },
+    /// A run ended before its first poses.
+    #[error("the run of {scenario} ended before it could be measured: {said}")]
+    EndedEarly {
+        /// The scenario.
+        scenario: String,
+        /// The last line that the run printed.
+        said: String,
+    },
+    /// A run made no pose.
+    #[error(
+        "the run of {scenario} has made no pose within {limit_s} s; {log} shows what it waits for"
+    )]
+    NoPose {
+        /// The scenario.
+        scenario: String,
+        /// The time limit, s.
+        limit_s: u64,
+        /// What the run printed.
+        log: PathBuf,
+    },
+    /// A helper process ended or said something else than it should.
+    #[error("the helper process `{helper}` {reason}")]
+    Helper {
+        /// Its work.
+        helper: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A file cannot be read or written.
+    #[error("cannot use {path}: {source}", path = path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// The system error.
+        source: io::Error,
+    },
+    /// The transport.
+    #[error(transparent)]
+    Stage(#[from] StageError),
+    /// A plot.
+    #[error(transparent)]
+    Plot(#[from] gyre_evaluation::plot::PlotError),
+    /// A request to stop.
+    #[error("interrupted")]
+    Interrupted,
+    /// A helper was called with what it does not know.
+    #[error("{0}")]
+    Usage(String),
+}
+
+impl StressError {
+    /// Returns a function that names the file of a system error.
+    pub(crate) fn file(path: impl Into<PathBuf>) -> impl FnOnce(io::Error) -> Self {
+        let path = path.into();
+        move |source| Self::File { path, source }
+    }
+}

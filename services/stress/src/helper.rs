@@ -1,0 +1,172 @@
+//! Child processes that load the machine or take part in a measurement: `gyre stress-helper PARENT WORK ...`.
+//!
+//! A helper ends with the process that has started it, even if that is killed.
+
+pub(crate) mod load;
+
+use std::{
+    io::{BufRead, BufReader, Write},
+    os::unix::process::CommandExt,
+    path::{Path, PathBuf},
+    process::{Child, ChildStdin, ChildStdout, Command, Stdio},
+};
+
+use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
+
+use crate::{StressError, copying};
+
+/// The command of `gyre` that calls [`main`].
+pub const COMMAND: &str = "stress-helper";
+/// What a helper prints when it works.
+const READY: &str = "ready";
+
+/// A helper process. It is killed when this is dropped.
+#[derive(Debug)]
+pub struct Helper {
+    work: String,
+    process: Child,
+    input: Option<ChildStdin>,
+    output: BufReader<ChildStdout>,
+}
+
+impl Helper {
+    /// Starts a helper.
+    ///
+    /// # Errors
+    /// It cannot be started.
+    pub fn start(program: &Path, work: &[String]) -> Result<Self, StressError> {
+        let mut command = command(program, work);
+        command.stdin(Stdio::piped()).stdout(Stdio::piped());
+        let started = command.spawn().map_err(|source| StressError::Start {
+            program: program.display().to_string(),
+            source,
+        });
+        let mut process = started?;
+        let (input, output) = (process.stdin.take(), process.stdout.take());
+        let mut helper = Self {
+            work: work.join(" "),
+            output: BufReader::new(output.ok_or_else(|| StressError::Helper {
+                helper: work.join(" "),
+                reason: "has no output".to_owned(),
+            })?),
+            process,
+            input,
+        };
+        helper.await_line(READY)?;
+        Ok(helper)
+    }
+
+    /// Closes its input, and waits until it has ended by itself.
+    pub fn end(mut self) {
+        self.input = None;
+        let _ = self.process.wait();
+    }
+
+    /// Sends a line.
+    ///
+    /// # Errors
+    /// The helper has ended.
+    pub fn tell(&mut self, line: &str) -> Result<(), StressError> {
+        let told = self
+            .input
+            .as_mut()
+            .map(|input| writeln!(input, "{line}").and_then(|()| input.flush()));
+        match told {
+            Some(Ok(())) => Ok(()),
+            _ => Err(self.failed("has ended")),
+        }
+    }
+
+    /// Reads a line.
+    ///
+    /// # Errors
+    /// The helper has ended.
+    pub fn hear(&mut self) -> Result<String, StressError> {
+        let mut line = String::new();
+        match self.output.read_line(&mut line) {
+            Ok(read) if read > 0 => Ok(line.trim_end().to_owned()),
+            _ => Err(self.failed("has ended; what it printed says why")),
+        }
+    }
+
+    fn await_line(&mut self, expected: &str) -> Result<(), StressError> {
+        let line = self.hear()?;
+        match line == expected {
+            true => Ok(()),
+            false => Err(self.failed(&format!("says `{line}`, not `{expected}`"))),
+        }
+    }
+
+    fn failed(&self, reason: &str) -> StressError {
+        StressError::Helper {
+            helper: self.work.clone(),
+            reason: reason.to_owned(),
+        }
+    }
+}
+
+impl Drop for Helper {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// Returns the command of a helper that is a child of this process.
+pub(crate) fn command(program: &Path, work: &[String]) -> Command {
+    let mut command = Command::new(program);
+    command
+        .arg(COMMAND)
+        .arg(std::process::id().to_string())
+        .args(work);
+    command
+}
+
+/// Does the work of a helper: its arguments are the process that has started it, the kind of work, and what that needs.
+///
+/// # Errors
+/// Work that is not known, or a failure of it.
+pub fn main(program: &Path, arguments: &[String]) -> Result<(), StressError> {
+    let usage = || StressError::Usage(format!("`gyre {COMMAND}` is what `gyre stress` starts"));
+    let [parent, work, rest @ ..] = arguments else {
+        return Err(usage());
+    };
+    let signal = match work.as_str() {
+        // It ends its stages first.
+        "run" => Signal::TERM,
+        _ => Signal::KILL,
+    };
+    end_with(parent.parse().map_err(|_| usage())?, signal)?;
+    match (work.as_str(), rest) {
+        ("run", words) => Err(StressError::Start {
+            program: program.display().to_string(),
+            source: Command::new(program).args(words).exec(),
+        }),
+        ("spin", []) => load::spin(),
+        ("memory", [share]) => load::churn(share.parse().map_err(|_| usage())?),
+        ("observe", [out]) => load::observe(&PathBuf::from(out)),
+        ("hand-over", words) => copying::helper(words),
+        _ => Err(usage()),
+    }
+}
+
+/// Ends this process with the one that has started it.
+fn end_with(parent: i32, signal: Signal) -> Result<(), StressError> {
+    let refused = |error: rustix::io::Errno| StressError::Usage(error.to_string());
+    set_parent_process_death_signal(Some(signal)).map_err(refused)?;
+    match getppid().map(Pid::as_raw_pid) == Some(parent) {
+        true => Ok(()),
+        false => Err(StressError::Interrupted),
+    }
+}
+
+/// Says that the work has begun.
+pub(crate) fn say_ready() {
+    say(READY);
+}
+
+/// Prints a line for the process that has started this one. That it has ended is noticed by its death.
+pub(crate) fn say(line: &str) {
+    let mut output = std::io::stdout();
+    let _ = writeln!(output, "{line}").and_then(|()| output.flush());
+}

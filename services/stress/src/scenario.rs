@@ -1,0 +1,174 @@
+//! The scenarios: names, and what they do to a run.
+
+use std::{fmt, str::FromStr};
+
+use serde::{Serialize, Serializer};
+
+/// Scans a second of the radars that most users have.
+pub const RADAR_HZ: f64 = 4.0;
+/// Scans a second of [`Scenario::Fast`].
+const FAST_HZ: f64 = 10.0;
+
+/// What is done to a run while its latency is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Scenario {
+    /// No scans.
+    Idle,
+    /// 4 Hz.
+    Steady,
+    /// 10 Hz.
+    Fast,
+    /// Rates that rise to the knee.
+    Ramp,
+    /// Scans in clumps.
+    Bursts,
+    /// A spinning process for each processor.
+    Hogs,
+    /// A process that takes and churns memory.
+    Memory,
+    /// A stage that is slower than the radar.
+    SlowStage,
+    /// Stages that are stopped and continued.
+    Stopped,
+    /// Stages that are killed.
+    Kills,
+    /// Programs that read all topics.
+    Observers,
+    /// Several pipelines.
+    Fleet,
+    /// The transport beside copies.
+    Copying,
+}
+
+/// How a scenario is judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Judged {
+    /// By all of `[budget]`.
+    ByBudget,
+    /// By all of `[budget]` but drops, which the scenario causes on purpose.
+    ButDrops,
+    /// By its recovery, and by what `[budget.NAME]` says alone: its purpose is a fault.
+    ByRecovery,
+    /// By a figure of its own: the highest rate, the number of radars.
+    ByItself,
+    /// Not at all: it compares.
+    Never,
+}
+
+impl Scenario {
+    /// All scenarios, in the order in which they are carried out.
+    pub const ALL: [Self; 13] = [
+        Self::Idle,
+        Self::Steady,
+        Self::Fast,
+        Self::Bursts,
+        Self::Hogs,
+        Self::Memory,
+        Self::Observers,
+        Self::SlowStage,
+        Self::Stopped,
+        Self::Kills,
+        Self::Ramp,
+        Self::Fleet,
+        Self::Copying,
+    ];
+
+    /// The name on the command line and in `[budget.NAME]`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Idle => "idle",
+            Self::Steady => "steady",
+            Self::Fast => "fast",
+            Self::Ramp => "ramp",
+            Self::Bursts => "bursts",
+            Self::Hogs => "hogs",
+            Self::Memory => "memory",
+            Self::SlowStage => "slow-stage",
+            Self::Stopped => "stopped",
+            Self::Kills => "kills",
+            Self::Observers => "observers",
+            Self::Fleet => "fleet",
+            Self::Copying => "copying",
+        }
+    }
+
+    /// What it does, in a line.
+    pub const fn line(self) -> &'static str {
+        match self {
+            Self::Idle => "no scans: what waiting costs",
+            Self::Steady => "4 scans/s, nothing else",
+            Self::Fast => "10 scans/s",
+            Self::Ramp => {
+                "rates that rise until scans are dropped or p99 is over its limit: the knee, in scans/s"
+            }
+            Self::Bursts => {
+                "4 scans/s in the mean that arrive three at once, as from a network that holds them back"
+            }
+            Self::Hogs => "as many spinning processes as processors, at 4 scans/s",
+            Self::Memory => {
+                "a process that takes 90 % of the available memory and churns it, at 4 scans/s"
+            }
+            Self::SlowStage => "a stage that takes longer than the radar's period, at 4 scans/s",
+            Self::Stopped => {
+                "stages that are stopped for a second (SIGSTOP) and continued, at 4 scans/s"
+            }
+            Self::Kills => "stages that are killed (SIGKILL), at 4 scans/s",
+            Self::Observers => "eight programs that read all topics, at 4 scans/s",
+            Self::Fleet => {
+                "more and more pipelines until one misses its deadline: the number of 4 Hz radars"
+            }
+            Self::Copying => {
+                "the transport beside copies through Unix sockets, with 1, 4 and 8 readers"
+            }
+        }
+    }
+
+    /// Scans a second.
+    pub(crate) const fn rate_hz(self) -> f64 {
+        match self {
+            // One scan in a quarter of an hour and more.
+            Self::Idle => 0.004,
+            Self::Fast => FAST_HZ,
+            _ => RADAR_HZ,
+        }
+    }
+
+    /// How it is judged.
+    pub const fn judged(self) -> Judged {
+        match self {
+            Self::Steady | Self::Fast | Self::Hogs | Self::Memory | Self::Observers => {
+                Judged::ByBudget
+            }
+            Self::Bursts => Judged::ButDrops,
+            Self::SlowStage | Self::Stopped | Self::Kills => Judged::ByRecovery,
+            Self::Idle | Self::Ramp | Self::Fleet => Judged::ByItself,
+            Self::Copying => Judged::Never,
+        }
+    }
+}
+
+impl fmt::Display for Scenario {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Scenario {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let found = Self::ALL
+            .into_iter()
+            .find(|scenario| scenario.name() == name);
+        found.ok_or_else(|| {
+            let names = Self::ALL.map(Self::name).join(", ");
+            format!("there is no scenario `{name}`; there are {names}")
+        })
+    }
+}
+
+impl Serialize for Scenario {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
