@@ -1,5 +1,6 @@
 //! The command line.
 
+mod conformance;
 mod operate;
 mod stress;
 
@@ -11,6 +12,7 @@ use gyre_mapping::Origin;
 use gyre_simulator::OutputFormat;
 
 use crate::configuration::Rate;
+pub use conformance::ConformanceArguments;
 
 pub use operate::{
     LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments, TopArguments,
@@ -84,6 +86,8 @@ pub enum Command {
     Masks(MasksArguments),
     /// Write a simulated recording, or complete one.
     Simulate(SimulateArguments),
+    /// Test whether a program keeps the contract of a stage.
+    Conformance(ConformanceArguments),
     /// Print the JSON schema of configurations, for editors.
     Schema(SchemaArguments),
 }

@@ -5,6 +5,7 @@
 pub mod calibrate;
 pub mod cli;
 pub mod configuration;
+pub mod conformance;
 pub mod doctor;
 pub mod earlier;
 pub mod evaluate;
@@ -90,6 +91,10 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Calibrate(arguments) => calibrate::calibrate(&arguments),
         Command::Masks(arguments) => masks::masks(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
+        Command::Conformance(arguments) => {
+            gyre_stage::run::keep_files_private();
+            conformance::conformance(&arguments)
+        }
         Command::Schema(arguments) => schema::schema(&arguments),
     }
 }

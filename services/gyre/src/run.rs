@@ -37,7 +37,7 @@ use crate::{
 };
 
 /// The exit code of an interrupted program, as shells have it.
-const INTERRUPTED: u8 = 130;
+pub(crate) const INTERRUPTED: u8 = 130;
 /// The folder of a simulated recording that is stored.
 const RECORDING: &str = "recording";
 
@@ -188,7 +188,7 @@ fn play(
 }
 
 /// Returns the configuration with the options of the recording's `dataset.toml` where it has none.
-fn with_stored_options(configuration: &Configuration) -> Result<Configuration, Failure> {
+pub(crate) fn with_stored_options(configuration: &Configuration) -> Result<Configuration, Failure> {
     let mut resolved = configuration.clone();
     let data = &configuration.source.data;
     if configuration.streamed().is_none() && !data.as_os_str().is_empty() {

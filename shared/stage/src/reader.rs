@@ -69,7 +69,7 @@ pub struct Port<M: Message> {
     limits: Limits,
     subscriber: Subscriber<Ipc, [M::Element], M::Header>,
     data: Listener,
-    _handshake: Notifier,
+    handshake: Notifier,
 }
 
 impl<M: Message> Port<M> {
@@ -82,20 +82,25 @@ impl<M: Message> Port<M> {
     }
 
     pub(crate) fn on(node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
+        let port = Self::silent(node, manifest)?;
+        port.handshake.notify().map_err(|e| {
+            StageError::transport(format!("notify the publisher of {}", M::TOPIC), e)
+        })?;
+        Ok(port)
+    }
+
+    /// Subscribes without notifying the publisher, as no stage may.
+    pub(crate) fn silent(node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
         let subscriber = services::open_topic::<M>(node)?
             .subscriber_builder()
             .create()
             .map_err(|e| StageError::transport(format!("subscribe to {}", M::TOPIC), e))?;
         let data = services::listener(node, &services::data_event(M::TOPIC))?;
-        let handshake = services::notifier(node, &services::handshake_event(M::TOPIC))?;
-        handshake.notify().map_err(|e| {
-            StageError::transport(format!("notify the publisher of {}", M::TOPIC), e)
-        })?;
         Ok(Self {
             limits: manifest.limits,
             subscriber,
             data,
-            _handshake: handshake,
+            handshake: services::notifier(node, &services::handshake_event(M::TOPIC))?,
         })
     }
 

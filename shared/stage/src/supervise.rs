@@ -14,6 +14,7 @@ mod observers;
 mod plan;
 mod program;
 mod requests;
+pub mod rig;
 mod scheduling;
 mod socket;
 mod stall;

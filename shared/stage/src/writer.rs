@@ -80,6 +80,11 @@ impl<M: Message> Writer<M> {
     /// The same for a process that is not in the stream and has no hop.
     pub(crate) fn publish(&self, mut draft: Draft<M>) -> Result<(), StageError> {
         draft.header().item_mut().pid = std::process::id();
+        self.send_unchanged(draft)
+    }
+
+    /// Publishes a message that says of itself who has sent it.
+    pub(crate) fn send_unchanged(&self, draft: Draft<M>) -> Result<(), StageError> {
         draft
             .sample
             .send()
@@ -95,17 +100,36 @@ impl<M: Message> Writer<M> {
     /// # Errors
     /// A failure of the transport.
     pub fn accept_readers(&self) -> Result<(), StageError> {
+        let new_reader = self.has_new_reader()?;
+        // Unconditionally: after a lost handshake the reader finds the history at the end of its own wait.
+        self.connect()?;
+        if new_reader { self.notify() } else { Ok(()) }
+    }
+
+    /// The same for readers that have notified alone; returns whether there were any.
+    pub(crate) fn answer_handshakes(&self) -> Result<bool, StageError> {
+        let new_reader = self.has_new_reader()?;
+        if new_reader {
+            self.connect()?;
+            self.notify()?;
+        }
+        Ok(new_reader)
+    }
+
+    fn has_new_reader(&self) -> Result<bool, StageError> {
         let mut new_reader = false;
         self.handshake
             .try_wait(|_| new_reader = true)
             .map_err(|e| {
                 StageError::transport(format!("read the handshakes of {}", M::TOPIC), e)
             })?;
-        // Unconditionally: after a lost handshake the reader finds the history at the end of its own wait.
-        self.publisher.update_connections().map_err(|e| {
-            StageError::transport(format!("connect the readers of {}", M::TOPIC), e)
-        })?;
-        if new_reader { self.notify() } else { Ok(()) }
+        Ok(new_reader)
+    }
+
+    fn connect(&self) -> Result<(), StageError> {
+        self.publisher
+            .update_connections()
+            .map_err(|e| StageError::transport(format!("connect the readers of {}", M::TOPIC), e))
     }
 
     /// Returns the listener that new readers notify.

@@ -1,0 +1,196 @@
+//! A whole stream with a full window, from a history that is there before the program, to the end and SIGTERM.
+
+use std::time::Instant;
+
+use gyre_messages::{StageId, flag};
+
+use super::{Examination, ended, how};
+use crate::{
+    ConformanceError,
+    rule::Rule,
+    session::{Session, Waited},
+    tape::LOOK,
+};
+
+impl Examination<'_> {
+    /// Returns whether the program has worked on items, so that more can be tested.
+    pub(super) fn stream(&mut self) -> Result<bool, ConformanceError> {
+        let rig = self.subject.rig(self.signals, "stream")?;
+        let before = rig.services();
+        let mut session = Session::open(self.subject, &rig, self.tape, &mut self.findings)?;
+        session.send_history()?;
+        if !starts(&mut session)? {
+            return Ok(false);
+        }
+        joins(&mut session)?;
+        let has_ended = reaches_the_end(&mut session)?;
+        let created: Vec<_> = rig.services().difference(&before).cloned().collect();
+        session
+            .findings
+            .require(Rule::CreatesNothing, created.is_empty(), || {
+                format!("it has created {} services of its own", created.len())
+            });
+        if has_ended {
+            waits_after_the_end(&mut session)?;
+        }
+        gives_history(&mut session)?;
+        begins_with_newest(&mut session);
+        stops(&mut session, "after the end of the stream")?;
+        self.reference = session.essences()?;
+        self.outputs = std::mem::take(&mut session.outputs);
+        Ok(self.reference.len() > 1)
+    }
+
+    /// The source: without a pose it sends the items of one window, and waits.
+    pub(super) fn window(&mut self) -> Result<(), ConformanceError> {
+        let rig = self.subject.rig(self.signals, "window")?;
+        let mut session = Session::open(self.subject, &rig, self.tape, &mut self.findings)?;
+        session.pace = crate::session::Pace::Hold;
+        starts(&mut session)?;
+        let (patience, quiet) = (self.subject.demands.patience, self.subject.demands.quiet);
+        let window = rig.manifest().window.scans.min(self.tape.end() as usize);
+        session.wait(patience, |session| session.outputs.len() >= window)?;
+        session.rest(quiet)?;
+        let sent = session.outputs.len();
+        session
+            .findings
+            .require(Rule::KeepsWindow, sent == window, || {
+                format!("it sent {sent} items before the first pose, and the window is {window}")
+            });
+        Ok(())
+    }
+}
+
+/// Starts the program, and requires that it opens its topic.
+pub(super) fn starts(session: &mut Session<'_>) -> Result<bool, ConformanceError> {
+    let command = session.subject.command.clone();
+    let topic = session.ports.output;
+    let waited = session.start(&command)?;
+    let is_open = matches!(waited, Waited::Done);
+    session
+        .findings
+        .require(Rule::StartsInTime, is_open, || match &waited {
+            Waited::Died(death) => format!("it has not opened `{topic}`: {}", ended(death)),
+            _ => format!("it has not opened `{topic}` within the start timeout"),
+        });
+    Ok(is_open)
+}
+
+/// Requires the subscribe handshake of each input.
+fn joins(session: &mut Session<'_>) -> Result<(), ConformanceError> {
+    let patience = session.subject.demands.patience;
+    let joined =
+        |session: &Session<'_>| session.not_asked().is_empty() && session.not_read().is_empty();
+    session.findings.checked(Rule::AsksForHistory);
+    session.wait(patience, joined)?;
+    for topic in session.not_read() {
+        let sentence = format!("it has not subscribed to `{topic}`");
+        session.findings.broken(Rule::AsksForHistory, sentence);
+    }
+    for topic in session.not_asked() {
+        let sentence = format!(
+            "it has subscribed to `{topic}` without notifying `{topic}_handshake`: it would wait for the history until the next item"
+        );
+        session.findings.broken(Rule::AsksForHistory, sentence);
+    }
+    session.connect_all()
+}
+
+/// Requires an item for each, and the end.
+fn reaches_the_end(session: &mut Session<'_>) -> Result<bool, ConformanceError> {
+    let (patience, end) = (session.subject.demands.patience, session.tape.end());
+    session.findings.checked(Rule::OneForOne);
+    session.findings.checked(Rule::PassesEnd);
+    let waited = session.wait(patience, |session| session.newest() >= Some(end))?;
+    let missing: Vec<u64> = (0..end)
+        .filter(|seq| session.about(*seq).next().is_none())
+        .collect();
+    if let Some(first) = missing.first() {
+        let count = missing.len();
+        let why = match &waited {
+            Waited::Done => String::new(),
+            waited => format!(": {}", how(waited)),
+        };
+        let sentence =
+            format!("it sent nothing about item {first} ({count} of {end} are missing){why}");
+        session.findings.broken(Rule::OneForOne, sentence);
+    }
+    let has_end = session.about(end).any(|last| last.item().is(flag::END));
+    let has_all_but_end = session.newest().map(|newest| newest + 1) >= Some(end);
+    if !has_end && has_all_but_end {
+        let sentence = format!(
+            "it has not passed on item {end}, the end of the stream: {}",
+            how(&waited)
+        );
+        session.findings.broken(Rule::PassesEnd, sentence);
+    }
+    Ok(has_end)
+}
+
+fn waits_after_the_end(session: &mut Session<'_>) -> Result<(), ConformanceError> {
+    let sent = session.outputs.len();
+    let lives = session.rest(session.subject.demands.quiet)?;
+    session.findings.require(Rule::PassesEnd, lives, || {
+        "it ended at the end of the stream: wait for SIGTERM, its history may still be needed"
+            .to_owned()
+    });
+    let more = session.outputs.len() - sent;
+    session.findings.require(Rule::PassesEnd, more == 0, || {
+        format!("it sent {more} more items after the end of the stream")
+    });
+    Ok(())
+}
+
+/// Requires that a reader which comes now receives the newest items.
+fn gives_history(session: &mut Session<'_>) -> Result<(), ConformanceError> {
+    let wanted = session.ports.sizes.history.min(session.outputs.len());
+    let late = session.rig.tap(session.ports.output)?;
+    let mut received = 0;
+    let since = Instant::now();
+    while received < wanted && since.elapsed() < session.subject.demands.patience {
+        while late.receive().is_ok_and(|message| message.is_some()) {
+            received += 1;
+        }
+        if session.rig.sleep(&[late.as_ref()], LOOK)? {
+            return Err(ConformanceError::Interrupted);
+        }
+    }
+    let topic = session.ports.output;
+    session
+        .findings
+        .require(Rule::GivesHistory, received >= wanted, || {
+            format!("a late reader that notified `{topic}_handshake` received {received} of the last {wanted} items: call update_connections, then notify `{topic}_data`")
+        });
+    Ok(())
+}
+
+fn begins_with_newest(session: &mut Session<'_>) {
+    if session.subject.stage != StageId::PoseIntegration {
+        return;
+    }
+    let first = session.outputs.first();
+    let is_start = first.is_some_and(|first| first.item().is(flag::BASE | flag::SYNC));
+    session
+        .findings
+        .require(Rule::BeginsWithNewest, is_start, || {
+            "without a journal it has to begin with a pose that has the flags BASE and SYNC: the source and masking wait for it".to_owned()
+        });
+}
+
+/// Sends SIGTERM, and requires the exit code 0.
+pub(super) fn stops(session: &mut Session<'_>, when: &str) -> Result<(), ConformanceError> {
+    let limit = session.subject.demands.stop_timeout;
+    session.findings.checked(Rule::StopsOnRequest);
+    match session.stop()? {
+        None => session.findings.broken(
+            Rule::StopsOnRequest,
+            format!("it has not exited within {limit:.0?} of SIGTERM {when}"),
+        ),
+        Some(death) if death.code != Some(0) => session.findings.broken(
+            Rule::StopsOnRequest,
+            format!("SIGTERM {when}: {}", ended(&death)),
+        ),
+        Some(_) => {}
+    }
+    Ok(())
+}

@@ -1,0 +1,287 @@
+//! The inputs: what Gyre's own stages make of the scans. They run as in a pipeline, between a source and a sink that are part of this
+//! process and lose nothing.
+
+use std::{
+    collections::BTreeMap,
+    time::{Duration, Instant},
+};
+
+use gyre_messages::{
+    Item, Message, Motion, MotionHeader, Pose, PoseHeader, Refined, Scan, ScanHeader, StageId, flag,
+};
+use gyre_pose_integration::compose;
+use gyre_radar::continues;
+use gyre_stage::{
+    clock,
+    supervise::rig::{Feed, Process, Recorded, Rig, Tap},
+    wake::Signals,
+};
+
+use crate::{
+    ConformanceError,
+    subject::{Scans, Subject},
+    topology::Ports,
+};
+
+/// Time between two looks at what does not wake the tester.
+pub(crate) const LOOK: Duration = Duration::from_millis(2);
+
+/// The messages of a whole run by topic: item after item, then the end of the stream.
+#[derive(Debug, Default)]
+pub(crate) struct Tape(BTreeMap<&'static str, Vec<Recorded>>);
+
+impl Tape {
+    /// Returns the message of a topic about item `seq`; that of the number of items is the end.
+    pub(crate) fn get(&self, topic: &str, seq: u64) -> Option<&Recorded> {
+        self.0.get(topic)?.get(seq as usize)
+    }
+
+    /// Returns the messages of a topic.
+    pub(crate) fn topic(&self, topic: &str) -> &[Recorded] {
+        self.0.get(topic).map_or(&[], Vec::as_slice)
+    }
+
+    /// Returns the number of the item that ends the stream, which is the number of scans.
+    pub(crate) fn end(&self) -> u64 {
+        self.topic(Pose::TOPIC).len().saturating_sub(1) as u64
+    }
+
+    /// Reads the scans and lets Gyre's own stages process them.
+    ///
+    /// # Errors
+    /// No scan can be read, or one of the stages fails.
+    pub(crate) fn record(
+        subject: &Subject,
+        scans: &mut Scans,
+        signals: &Signals,
+    ) -> Result<Self, ConformanceError> {
+        let scans = read(scans)?;
+        if scans.len() < 3 {
+            return Err(ConformanceError::TooFew(scans.len().saturating_sub(1)));
+        }
+        let rig = subject.rig(signals, "own")?;
+        let recording = Recording::begin(subject, &rig, scans)?;
+        recording.run()
+    }
+}
+
+/// Reads the scans, as the source does; the end of the stream follows.
+fn read(scans: &mut Scans) -> Result<Vec<Recorded>, ConformanceError> {
+    let mut read: Vec<Recorded> = Vec::new();
+    let mut bytes = vec![0; scans.dataset.limits().bytes];
+    let mut before: Option<Item> = None;
+    for index in scans.played.clone() {
+        let mut header = ScanHeader::default();
+        let Ok(geometry) = scans.dataset.read(index, header.slot(&mut bytes)) else {
+            continue;
+        };
+        header.set_geometry(&geometry);
+        let follows = before.filter(|it| continues(it.stamp_ns, header.item.stamp_ns));
+        let seq = read.len() as u64;
+        header.item = Item {
+            seq,
+            scan: index as u64,
+            previous_scan: follows.map_or(index as u64, |before| before.scan),
+            published: seq,
+            flags: if follows.is_none() { flag::BREAK } else { 0 },
+            ..header.item
+        };
+        before = Some(header.item);
+        read.push(Recorded::of::<Scan>(&header, &bytes, 0));
+    }
+    let end = ScanHeader {
+        item: Item {
+            seq: read.len() as u64,
+            published: read.len() as u64,
+            flags: flag::END,
+            ..Item::default()
+        },
+        ..ScanHeader::default()
+    };
+    read.push(Recorded::of::<Scan>(&end, &[], 0));
+    Ok(read)
+}
+
+/// A pipeline of Gyre's own stages whose source and sink are here.
+struct Recording<'a> {
+    // Dropped in this order: processes, ports, run.
+    processes: Vec<(StageId, Process)>,
+    scans: Box<dyn Feed>,
+    poses: Box<dyn Feed>,
+    taps: Vec<(&'static str, Box<dyn Tap>)>,
+    rig: &'a Rig<'a>,
+    patience: Duration,
+    tape: Tape,
+    last_pose: Option<PoseHeader>,
+    /// The topic of the motions that poses are composed of.
+    motions: &'static str,
+    unsent: std::iter::Peekable<std::vec::IntoIter<Recorded>>,
+}
+
+impl<'a> Recording<'a> {
+    fn begin(
+        subject: &Subject,
+        rig: &'a Rig<'a>,
+        scans: Vec<Recorded>,
+    ) -> Result<Self, ConformanceError> {
+        let between =
+            |stage: &&StageId| !matches!(stage, StageId::RadarReplay | StageId::PoseIntegration);
+        let stages: Vec<StageId> = subject.stages.iter().filter(between).copied().collect();
+        let manifest = rig.manifest();
+        let mut taps = Vec::new();
+        for stage in &stages {
+            let topic = Ports::of(*stage, manifest).output;
+            taps.push((topic, rig.tap(topic)?));
+        }
+        let (scan_feed, poses) = (rig.feed(Scan::TOPIC)?, rig.feed(Pose::TOPIC)?);
+        poses.send(&start_of_trajectory())?;
+        let mut processes = Vec::new();
+        for stage in stages {
+            processes.push((stage, rig.start(stage.name(), &subject.own(stage))?));
+        }
+        Ok(Self {
+            processes,
+            scans: scan_feed,
+            poses,
+            taps,
+            rig,
+            patience: subject.demands.start_timeout,
+            tape: Tape::default(),
+            last_pose: None,
+            motions: if manifest.refines {
+                Refined::TOPIC
+            } else {
+                Motion::TOPIC
+            },
+            unsent: scans.into_iter().peekable(),
+        })
+    }
+
+    fn run(mut self) -> Result<Tape, ConformanceError> {
+        let mut progress = Instant::now();
+        while !self.has_ended() {
+            self.scans.answer_handshakes()?;
+            self.poses.answer_handshakes()?;
+            if self.receive()? | self.integrate()? | self.admit()? {
+                progress = Instant::now();
+            } else {
+                self.require_living(progress.elapsed())?;
+                let taps: Vec<&dyn Tap> = self.taps.iter().map(|(_, tap)| tap.as_ref()).collect();
+                if self.rig.sleep(&taps, LOOK)? {
+                    return Err(ConformanceError::Interrupted);
+                }
+            }
+        }
+        Ok(self.tape)
+    }
+
+    /// Returns whether all have sent the end of the stream.
+    fn has_ended(&self) -> bool {
+        let has_end = |topic| {
+            let last = self.tape.topic(topic).last();
+            last.is_some_and(|last| last.item().is(flag::END))
+        };
+        has_end(Pose::TOPIC) && self.taps.iter().all(|(topic, _)| has_end(topic))
+    }
+
+    fn receive(&mut self) -> Result<bool, ConformanceError> {
+        let mut any = false;
+        for (topic, tap) in &self.taps {
+            while let Some(message) = tap.receive()? {
+                self.tape.0.entry(topic).or_default().push(message);
+                any = true;
+            }
+        }
+        Ok(any)
+    }
+
+    /// Publishes the pose of each item that all stages are done with.
+    fn integrate(&mut self) -> Result<bool, ConformanceError> {
+        let next = self.tape.topic(Pose::TOPIC).len() as u64;
+        let is_done = |(topic, _): &(&str, _)| self.tape.get(topic, next).is_some();
+        if !self.taps.iter().all(is_done) {
+            return Ok(false);
+        }
+        let Some(motion) = self.tape.get(self.motions, next) else {
+            return Ok(false);
+        };
+        let pose = self.pose(&motion.header::<Motion>()?);
+        self.last_pose = Some(pose).filter(|pose| !pose.item.is(flag::END));
+        let pose = Recorded::of::<Pose>(&pose, &[], 0);
+        self.poses.send(&pose)?;
+        self.tape.0.entry(Pose::TOPIC).or_default().push(pose);
+        Ok(true)
+    }
+
+    fn pose(&self, motion: &MotionHeader) -> PoseHeader {
+        let mut pose = match motion.item.is(flag::END) {
+            true => PoseHeader {
+                item: motion.item,
+                ..PoseHeader::default()
+            },
+            false => compose(self.last_pose.as_ref(), motion),
+        };
+        if !motion.item.is(flag::END) {
+            pose.item.flags |= flag::SYNC;
+        }
+        pose.item.pid = std::process::id();
+        pose
+    }
+
+    /// Publishes the scans that the window admits.
+    fn admit(&mut self) -> Result<bool, ConformanceError> {
+        let newest = (self.tape.topic(Pose::TOPIC).len() as u64).checked_sub(1);
+        let window = self.rig.manifest().window;
+        let mut any = false;
+        while let Some(scan) = self
+            .unsent
+            .next_if(|it| window.admits(it.item().seq, newest))
+        {
+            let now_ns = clock::now_ns();
+            let mut item = scan.item();
+            (item.due_ns, item.pid) = (now_ns, std::process::id());
+            *item.hop_mut(StageId::RadarReplay) = gyre_messages::Hop {
+                received_ns: now_ns,
+                started_ns: now_ns,
+                finished_ns: now_ns,
+                published_ns: now_ns,
+            };
+            let scan = scan.about(&item);
+            self.scans.send(&scan)?;
+            self.tape.0.entry(Scan::TOPIC).or_default().push(scan);
+            any = true;
+        }
+        Ok(any)
+    }
+
+    fn require_living(&mut self, idle: Duration) -> Result<(), ConformanceError> {
+        for (stage, process) in &mut self.processes {
+            if let Some(death) = process.death() {
+                return Err(ConformanceError::Own {
+                    stage: stage.name(),
+                    reason: death.last_output.unwrap_or(death.cause),
+                });
+            }
+        }
+        match idle < self.patience {
+            true => Ok(()),
+            false => Err(ConformanceError::Own {
+                stage: "pipeline",
+                reason: format!("it made no progress for {idle:.0?}"),
+            }),
+        }
+    }
+}
+
+/// The message with which a sink without poses starts.
+pub(crate) fn start_of_trajectory() -> Recorded {
+    let start = PoseHeader {
+        item: Item {
+            flags: flag::BASE | flag::SYNC,
+            pid: std::process::id(),
+            ..Item::default()
+        },
+        ..PoseHeader::default()
+    };
+    Recorded::of::<Pose>(&start, &[], 0)
+}

@@ -1,0 +1,187 @@
+//! `gyre conformance`: tests whether a program keeps the contract of a stage.
+
+use std::{path::Path, process::ExitCode, time::Duration};
+
+use gyre_conformance::{ConformanceError, Demands, Report, Scans, Subject, check};
+use gyre_messages::StageId;
+use gyre_odometry::SearchKind;
+use gyre_scan_matching::RefinementKind;
+use gyre_stage::{Manifest, wake::Signals};
+
+use crate::{
+    Failure,
+    cli::{ConformanceArguments, RunArguments},
+    configuration::Configuration,
+    preflight::{self, Preflight},
+    print, program,
+    run::{self, INTERRUPTED},
+};
+
+/// The configuration of a test without `--config` and `--data`: the shape of the program's messages matters, not the accuracy.
+const SMALL: [&str; 2] = ["simulation.seed=1", "raster.n=127"];
+/// Places for readers beside those of a run; the test takes some.
+const OBSERVERS: usize = 4;
+
+/// Tests a program, and prints what it breaks.
+///
+/// # Errors
+/// A configuration or a dataset that cannot be used, or a program that cannot be started.
+pub fn conformance(arguments: &ConformanceArguments) -> Result<ExitCode, Failure> {
+    let stage = StageId::by_name(&arguments.stage).ok_or("there is no such stage")?;
+    let demands = demands(arguments)?;
+    let configuration = configuration(arguments, stage)?;
+    let command = command(arguments, &configuration, stage)?;
+    preflight::check_open_files()?;
+    let checked = preflight::check(&configuration)?;
+    preflight::check_shared_memory(&checked.footprint)?;
+    preflight::describe_masks(&configuration)?;
+    let folder = tempfile::Builder::new()
+        .prefix("gyre-conformance-")
+        .tempdir()?;
+    let dataset = preflight::open(&configuration)?.dataset;
+    let scans = Scans {
+        played: configuration.source.played(dataset.len()),
+        dataset,
+    };
+    let subject = Subject {
+        stage,
+        command,
+        gyre: program::own().to_string_lossy().into_owned(),
+        manifest: manifest(&configuration, &checked, folder.path())?,
+        configuration: configuration.to_toml()?,
+        stages: StageId::ALL
+            .into_iter()
+            .filter(|stage| configuration.has(*stage))
+            .collect(),
+        prepare: Box::new(move |root| match &checked.recording {
+            Some(recording) => recording.listing.write(root),
+            None => Ok(()),
+        }),
+        demands,
+    };
+    match test(&subject, scans, arguments.json) {
+        Err(ConformanceError::Interrupted) => Ok(ExitCode::from(INTERRUPTED)),
+        report => print(&report?, arguments.json),
+    }
+}
+
+fn test(subject: &Subject, scans: Scans, quietly: bool) -> Result<Report, ConformanceError> {
+    let signals = Signals::install()?;
+    check(subject, scans, &signals, &mut |what| {
+        if !quietly {
+            print::note(format_args!("gyre: testing {what}"));
+        }
+    })
+}
+
+fn print(report: &Report, as_json: bool) -> Result<ExitCode, Failure> {
+    match as_json {
+        true => print::line(serde_json::to_string_pretty(report)?)?,
+        false => print::line(report)?,
+    }
+    Ok(match report.conforms() {
+        true => ExitCode::SUCCESS,
+        false => ExitCode::FAILURE,
+    })
+}
+
+fn demands(arguments: &ConformanceArguments) -> Result<Demands, Failure> {
+    let seconds = |option: &str, seconds: f64| {
+        Duration::try_from_secs_f64(seconds)
+            .map_err(|_| format!("{option} is {seconds}, but must be 0 or more"))
+    };
+    let budget = arguments
+        .budget_ms
+        .map(|ms| seconds("--budget-ms", ms / 1e3));
+    Ok(Demands {
+        start_timeout: seconds("--start-timeout-s", arguments.start_timeout_s)?,
+        patience: seconds("--patience-s", arguments.patience_s)?,
+        stop_timeout: seconds("--stop-timeout-s", arguments.stop_timeout_s)?,
+        same_as_own: arguments.same_as_own,
+        budget: budget.transpose()?,
+        ..Demands::default()
+    })
+}
+
+/// The configuration of the runs that the program is tested in: lossless, with the stage, of some scans.
+fn configuration(
+    arguments: &ConformanceArguments,
+    stage: StageId,
+) -> Result<Configuration, Failure> {
+    let is_small = arguments.configuration.is_none() && arguments.data.is_none();
+    let small = SMALL
+        .iter()
+        .filter(|_| is_small)
+        .map(|key| (*key).to_owned());
+    let lossless = ["run.mode='lossless'", "run.rate='max'"].map(str::to_owned);
+    let resolved = run::resolve::resolve(&RunArguments {
+        configuration: arguments.configuration.clone(),
+        data: arguments.data.clone(),
+        radar: None,
+        out: None,
+        calibration: None,
+        rate: None,
+        set: small.chain(arguments.set.clone()).chain(lossless).collect(),
+        fresh: false,
+    })?;
+    let mut configuration = run::with_stored_options(&resolved)?.streaming(None);
+    configuration.source.scans = Some(arguments.scans.into());
+    let method = &mut configuration.odometry;
+    match stage {
+        StageId::JointSearch => method.search.kind = SearchKind::Exhaustive,
+        StageId::RotationSearch | StageId::TranslationSearch => {
+            method.search.kind = SearchKind::Decoupled;
+        }
+        StageId::Refinement => method.refinement.kind = RefinementKind::LocalMap,
+        StageId::RadarReplay | StageId::Masking | StageId::PoseIntegration => {}
+    }
+    // Some scans must be under way while the motion of the oldest is not known.
+    let least = method.masking.feedback_lag() + 2;
+    configuration.run.window = configuration.run.window.max(least);
+    configuration.run.observers = configuration.run.observers.max(OBSERVERS);
+    Ok(configuration)
+}
+
+/// The command to test.
+fn command(
+    arguments: &ConformanceArguments,
+    configuration: &Configuration,
+    stage: StageId,
+) -> Result<Vec<String>, Failure> {
+    let own = || {
+        vec![
+            program::own().to_string_lossy().into_owned(),
+            "stage".to_owned(),
+            stage.name().to_owned(),
+        ]
+    };
+    let Some(command) = &arguments.command else {
+        let configured = configuration.stages.get(stage.name());
+        let configured = configured.map(|stage| stage.command.clone());
+        return Ok(configured
+            .filter(|command| !command.is_empty())
+            .unwrap_or_else(own));
+    };
+    match shlex::split(command) {
+        Some(words) if !words.is_empty() => Ok(words),
+        _ => Err(format!("--command is `{command}`, but must be a program and its arguments, with its quotes closed").into()),
+    }
+}
+
+fn manifest(
+    configuration: &Configuration,
+    checked: &Preflight,
+    out: &Path,
+) -> Result<Manifest, Failure> {
+    Ok(Manifest {
+        prefix: String::new(),
+        root: Path::new("").to_owned(),
+        out: out.to_owned(),
+        window: checked.window,
+        limits: checked.limits,
+        live: false,
+        refines: configuration.has(StageId::Refinement),
+        rate: None,
+        build: program::sha256(&program::own())?,
+    })
+}

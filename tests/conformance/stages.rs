@@ -1,0 +1,221 @@
+//! Stages that keep the contract but for one clause of it. Their results are constant: only the contract matters here.
+
+use std::time::Duration;
+
+use gyre_messages::{
+    Hop, Item, Masked, MaskedHeader, Message, Motion, Rotation, RotationHeader, Scan, StageId, flag,
+};
+use gyre_stage::{
+    Launch, StageCounters, StageError, clock,
+    supervise::rig::{Feed, Joining, Ports, Recorded, Tap},
+};
+
+/// What a stage does wrong.
+pub const BREACH: &str = "GYRE_TEST_BREACH";
+
+/// The item with which something goes wrong.
+const WRONG: u64 = 5;
+const REST: Duration = Duration::from_millis(2);
+
+/// Works as the rotation search, or for a breach of masking as masking.
+pub fn play(launch: &Launch, breach: &str) -> Result<StageCounters, StageError> {
+    let ports = Ports::of(launch);
+    let joining = match breach {
+        "joins silently" => Joining::Silently,
+        _ => Joining::Asks,
+    };
+    let is_masking = breach.starts_with("masking ");
+    let (input, output) = match is_masking {
+        true => (Scan::TOPIC, Masked::TOPIC),
+        false => (Masked::TOPIC, Rotation::TOPIC),
+    };
+    let motions = is_masking
+        .then(|| ports.tap(Motion::TOPIC, joining))
+        .transpose()?;
+    let mut stage = Broken {
+        launch,
+        breach,
+        stage: if is_masking {
+            StageId::Masking
+        } else {
+            StageId::RotationSearch
+        },
+        input: ports.tap(input, joining)?,
+        motions,
+        newest_motion: None,
+        output: ports.feed(output)?,
+        next: None,
+        waiting: None,
+        begun: false,
+        ended: false,
+    };
+    stage.run()?;
+    Ok(StageCounters::default())
+}
+
+struct Broken<'a> {
+    launch: &'a Launch,
+    breach: &'a str,
+    stage: StageId,
+    input: Box<dyn Tap>,
+    motions: Option<Box<dyn Tap>>,
+    newest_motion: Option<u64>,
+    output: Box<dyn Feed>,
+    next: Option<u64>,
+    waiting: Option<Recorded>,
+    begun: bool,
+    ended: bool,
+}
+
+impl Broken<'_> {
+    fn does(&self, breach: &str) -> bool {
+        self.breach == breach
+    }
+
+    fn run(&mut self) -> Result<(), StageError> {
+        loop {
+            let stops = self.launch.signals.sleep(REST)?;
+            if (stops && !self.does("hangs")) || (self.ended && self.does("leaves at the end")) {
+                return Ok(());
+            }
+            if !self.does("gives no history") {
+                self.output.answer_handshakes()?;
+            }
+            while self.receive_motion()? {}
+            while !self.ended && self.advance()? {}
+        }
+    }
+
+    fn receive_motion(&mut self) -> Result<bool, StageError> {
+        let motion = self.motions.as_ref().map(|it| it.receive()).transpose()?;
+        let Some(motion) = motion.flatten() else {
+            return Ok(false);
+        };
+        self.newest_motion = self.newest_motion.max(Some(motion.item().seq));
+        Ok(true)
+    }
+
+    /// Processes the next item; returns whether there was one.
+    fn advance(&mut self) -> Result<bool, StageError> {
+        let Some(message) = self.receive()? else {
+            return Ok(false);
+        };
+        let item = message.item();
+        if self.next.is_some_and(|next| item.seq < next) {
+            return Ok(true);
+        }
+        if let Some(expected) = self.next.filter(|next| item.seq > *next)
+            && !self.does("swallows")
+        {
+            return Err(StageError::SequenceGap {
+                topic: "of the test",
+                expected,
+                got: item.seq,
+            });
+        }
+        if !self.has_motion(item.seq) {
+            self.waiting = Some(message);
+            return Ok(false);
+        }
+        self.next = Some(item.seq + 1);
+        let may_begin = item.is(flag::BREAK) || !self.does("needs the first item");
+        self.begun |= may_begin;
+        match item.is(flag::END) {
+            _ if !self.begun => {}
+            true => self.end(&item)?,
+            false => self.process(&item, message.received_ns)?,
+        }
+        Ok(true)
+    }
+
+    fn receive(&mut self) -> Result<Option<Recorded>, StageError> {
+        if let Some(message) = self.waiting.take() {
+            return Ok(Some(message));
+        }
+        match self.input.receive() {
+            Err(StageError::Malformed { .. }) if self.does("swallows") => Ok(None),
+            received => received,
+        }
+    }
+
+    /// Masking that is too patient waits for the motion of the item before, and one that is not waits for none.
+    fn has_motion(&self, seq: u64) -> bool {
+        let Some(before) = seq
+            .checked_sub(1)
+            .filter(|_| self.does("masking too patient"))
+        else {
+            return true;
+        };
+        self.newest_motion >= Some(before)
+    }
+
+    fn process(&self, item: &Item, received_ns: i64) -> Result<(), StageError> {
+        if self.does("skips") && item.seq == WRONG {
+            return Ok(());
+        }
+        let now_ns = clock::now_ns();
+        let mut item = Item {
+            pid: std::process::id(),
+            ..*item
+        };
+        if !self.does("stamps nothing and forgets the item") {
+            *item.hop_mut(self.stage) = Hop {
+                received_ns,
+                started_ns: now_ns,
+                finished_ns: now_ns,
+                published_ns: clock::now_ns(),
+            };
+        }
+        if self.does("stamps nothing and forgets the item") {
+            item.stamp_ns = 0;
+        }
+        let output = self.output_about(item)?;
+        self.output.send(&output)?;
+        match self.does("sends twice") && item.seq == WRONG {
+            true => self.output.send(&output),
+            false => Ok(()),
+        }
+    }
+
+    fn output_about(&self, item: Item) -> Result<Recorded, StageError> {
+        if self.stage == StageId::Masking {
+            return Ok(self.mask(item));
+        }
+        let mut header = RotationHeader {
+            item,
+            ..RotationHeader::default()
+        };
+        if self.does("is not deterministic") {
+            header.rotation.score = clock::now_ns() as f64;
+        }
+        if self.does("sends NaN") && item.seq == WRONG {
+            header.rotation.angle_rad = f64::NAN;
+        }
+        Ok(Recorded::of::<Rotation>(&header, &[], 0))
+    }
+
+    fn mask(&self, item: Item) -> Recorded {
+        let limits = self.launch.manifest.limits;
+        let header = MaskedHeader {
+            item,
+            n: limits.side() as u32,
+            rasters: 1,
+            cell_m: limits.cell_m,
+            compensated: 1,
+            ..MaskedHeader::default()
+        };
+        Recorded::of::<Masked>(&header, &vec![0; limits.raster_cells * 4], 0)
+    }
+
+    fn end(&mut self, item: &Item) -> Result<(), StageError> {
+        self.ended = true;
+        if self.does("keeps the end") {
+            return Ok(());
+        }
+        let item = Item {
+            pid: std::process::id(),
+            ..*item
+        };
+        self.output.send(&self.output_about(item)?)
+    }
+}

@@ -1,0 +1,207 @@
+//! The masking stage in Python, `examples/python-masking`: it keeps the contract, and runs in a pipeline.
+//!
+//! The tests that start it need its requirements in the Python that `GYRE_PYTHON` names, else in `python3`.
+
+use std::{
+    collections::BTreeMap,
+    env, fs,
+    mem::{offset_of, size_of},
+    process::Command,
+};
+
+use gyre_messages::{
+    ByteBlock, FloatBlock, Hop, Item, MaskedHeader, MotionEstimate, MotionHeader, PoseHeader,
+    RefinementRecord, RotationEstimate, ScanHeader,
+};
+use rustix::process::Signal;
+use serde_json::Value;
+
+use crate::{
+    PROJECT,
+    common::{Ended, Pid, Run, gyre, send, undisturbed},
+};
+
+/// The Python and the script.
+fn command() -> [String; 2] {
+    let python = env::var("GYRE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    [
+        python,
+        format!("{PROJECT}/examples/python-masking/masking.py"),
+    ]
+}
+
+/// Returns whether the stage can be started; prints why a test is skipped.
+fn can_start() -> bool {
+    let mut python = Command::new(&command()[0]);
+    let imported = python.args(["-c", "import iceoryx2, numpy"]).output();
+    let has_packages = imported.is_ok_and(|output| output.status.success());
+    if !has_packages {
+        println!(
+            "skipped: {} has no packages iceoryx2 and numpy, or GYRE_PYTHON names another",
+            command()[0]
+        );
+    }
+    has_packages
+}
+
+fn with_python(run: Run) -> Run {
+    let [python, script] = command();
+    run.set(&format!("stages.masking.command=['{python}', '{script}']"))
+}
+
+/// The size and the offsets of a message.
+type Layout = (usize, BTreeMap<&'static str, usize>);
+
+macro_rules! layout {
+    ($message:ty: $($field:ident),*) => {
+        (size_of::<$message>(), BTreeMap::from([$((stringify!($field), offset_of!($message, $field))),*]))
+    };
+}
+
+fn layouts() -> [(&'static str, Layout); 9] {
+    [
+        (
+            "gyre_hop_v1",
+            layout!(Hop: received_ns, started_ns, finished_ns, published_ns),
+        ),
+        (
+            "gyre_item_v3",
+            layout!(Item: seq, scan, previous_scan, published, stamp_ns, due_ns, pid, flags, hops),
+        ),
+        (
+            "gyre_scan_header_v3",
+            layout!(ScanHeader: item, azimuths, bins, stride, first_byte, range_resolution_m, range_offset_m, clockwise,
+                doppler_s, azimuth_stamp_ns, azimuth_rad, azimuth_flags),
+        ),
+        (
+            "gyre_masked_header_v3",
+            layout!(MaskedHeader: item, n, rasters, cell_m, mask, twist, compensated, points, reserved),
+        ),
+        (
+            "gyre_rotation_estimate_v1",
+            layout!(RotationEstimate: angle_rad, variance_rad2, score, runner_up_rad, runner_up_score),
+        ),
+        (
+            "gyre_refinement_v2",
+            layout!(RefinementRecord: outcome, initial_guess, overlap, support, stationary),
+        ),
+        (
+            "gyre_motion_estimate_v4",
+            layout!(MotionEstimate: x_m, y_m, yaw_rad, covariance, drift_share, scale_sigma, interval_ns, score,
+                runner_up_score, rotation, searched, refinement),
+        ),
+        ("gyre_motion_header_v5", layout!(MotionHeader: item, motion)),
+        (
+            "gyre_pose_header_v5",
+            layout!(PoseHeader: item, motion, x_m, y_m, yaw_rad, covariance, accumulated_covariance, trajectory_version),
+        ),
+    ]
+}
+
+#[test]
+fn its_messages_are_laid_out_as_those_of_gyre() {
+    let mut python = Command::new("python3");
+    python.arg(format!("{PROJECT}/examples/python-masking/messages.py"));
+    let Ok(output) = python.output() else {
+        return println!("skipped: there is no python3");
+    };
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let printed: Value = serde_json::from_slice(&output.stdout).unwrap();
+    for (name, (size, offsets)) in layouts() {
+        let of_python = &printed[name];
+        assert_eq!(of_python["size"], size, "{name}");
+        let fields = serde_json::to_value(&offsets).unwrap();
+        assert_eq!(of_python["offsets"], fields, "{name}");
+    }
+    for (name, size) in [
+        ("gyre_byte_block_v1", size_of::<ByteBlock>()),
+        ("gyre_float_block_v1", size_of::<FloatBlock>()),
+    ] {
+        assert_eq!(printed[name]["size"], size, "{name}");
+    }
+}
+
+#[test]
+fn it_keeps_the_contract_of_masking() {
+    if !can_start() {
+        return;
+    }
+    let mut command = gyre();
+    command.args([
+        "conformance",
+        "masking",
+        "--command",
+        &self::command().join(" "),
+    ]);
+    command.args([
+        "--scans",
+        "12",
+        "--set",
+        "raster.n=63",
+        "--stop-timeout-s",
+        "30",
+    ]);
+    command.args(["--patience-s", "60"]);
+    Ended::of(command).succeeded();
+}
+
+#[test]
+fn its_motions_are_those_of_the_own_masking_to_a_centimetre() {
+    if !can_start() {
+        return;
+    }
+    let python = with_python(Run::of_recording()).complete();
+    let (own, python) = (motions(undisturbed()), motions(&python));
+    assert_eq!(own.len(), python.len());
+    for (own, python) in own.iter().zip(&python) {
+        let apart_m = (own[0] - python[0]).hypot(own[1] - python[1]);
+        assert!(apart_m < 0.01, "{apart_m} m");
+    }
+}
+
+/// The x and y of all motions, m.
+fn motions(odometry: &str) -> Vec<[f64; 2]> {
+    let mut rows = csv::Reader::from_reader(odometry.as_bytes());
+    let columns = rows.headers().unwrap().clone();
+    let column = |name| columns.iter().position(|column| column == name).unwrap();
+    let (x, y) = (column("x_m"), column("y_m"));
+    let number = |row: &csv::StringRecord, at: usize| row[at].parse().unwrap();
+    rows.records()
+        .map(|row| row.unwrap())
+        .map(|row| [number(&row, x), number(&row, y)])
+        .collect()
+}
+
+#[test]
+fn killed_it_leaves_the_results_as_they_are() {
+    if !can_start() {
+        return;
+    }
+    let undisturbed = with_python(Run::of_recording()).complete();
+    let run = with_python(Run::of_recording()).rate("6");
+    let mut running = run.start();
+    for pose in [6, 12] {
+        running.await_poses(pose);
+        let script = masking_of(running.pid());
+        send(script, Signal::KILL);
+    }
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed);
+    assert_eq!(run.summary()["restarts"]["masking"], 2);
+}
+
+/// The process of the script, which is a child of the supervisor.
+fn masking_of(supervisor: Pid) -> Pid {
+    let children = fs::read_to_string(format!("/proc/{supervisor}/task/{supervisor}/children"));
+    let is_script = |pid: &Pid| {
+        let command = fs::read_to_string(format!("/proc/{pid}/cmdline"));
+        command.is_ok_and(|command| command.contains("masking.py"))
+    };
+    let children = children.unwrap();
+    let mut pids = children.split_whitespace().map(|pid| pid.parse().unwrap());
+    pids.find(is_script).unwrap()
+}
