@@ -30,12 +30,12 @@ STAY_S = 0.25
 
 
 class Watch:
-    """A `gyre watch` process."""
+    """A `gyre echo` process."""
 
     def __init__(self, gyre, out, topic):
         # Its lines go where nobody has to read them.
         self.lines = tempfile.TemporaryFile()
-        self.process = subprocess.Popen([gyre, "watch", out, topic], stdout=self.lines, stderr=subprocess.DEVNULL)
+        self.process = subprocess.Popen([gyre, "echo", out, topic], stdout=self.lines, stderr=subprocess.DEVNULL)
 
     def first_line(self):
         deadline = time.monotonic() + 10.0

@@ -27,6 +27,7 @@ mod lost_input;
 mod masks;
 mod observers;
 mod operate;
+mod page;
 mod pipeline;
 mod python_stage;
 mod radar;

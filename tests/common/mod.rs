@@ -4,12 +4,14 @@
 // Each test binary uses its own part of this.
 #![allow(dead_code, unused_imports, clippy::unwrap_used)]
 
+mod browser;
 mod ended;
 pub mod leftovers;
 pub mod odometry;
 mod processes;
 pub mod recording;
 mod running;
+mod server;
 mod watch;
 
 use std::{
@@ -24,10 +26,12 @@ use std::{
 use serde_json::Value;
 use tempfile::TempDir;
 
+pub use browser::Browser;
 pub use ended::Ended;
 pub use leftovers::{assert_nothing_left, assert_nothing_left_of};
 pub use processes::{Pid, cpu_time, send};
 pub use running::Running;
+pub use server::Server;
 pub use watch::{Watch, Watched};
 
 /// The stages of a run that does not search jointly, in the order of the stream.

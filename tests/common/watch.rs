@@ -1,4 +1,4 @@
-//! A `gyre watch` process: an observer of a run.
+//! A `gyre echo` process: an observer of a run.
 
 use std::{
     fs::{self, File},
@@ -37,7 +37,7 @@ impl Watch {
     /// Starts one that watches a topic of a run.
     pub fn start(run: &Run, topic: &'static str) -> Self {
         let mut command = gyre();
-        command.arg("watch").arg(run.out()).arg(topic);
+        command.arg("echo").arg(run.out()).arg(topic);
         let (output, file) = output(run);
         let child = spawn(&mut command, file);
         Self {

@@ -3,6 +3,7 @@
 mod conformance;
 mod operate;
 mod stress;
+mod watch;
 
 use std::{num::NonZeroUsize, path::PathBuf};
 
@@ -18,6 +19,7 @@ pub use operate::{
     LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments, TopArguments,
 };
 pub use stress::StressArguments;
+pub use watch::WatchArguments;
 
 /// Radar odometry as cooperating processes over shared memory.
 ///
@@ -55,6 +57,8 @@ pub enum Command {
         name: String,
     },
     /// Print the messages of a running run. It changes neither a result nor a latency.
+    Echo(EchoArguments),
+    /// Watch a running run in a browser, and by Prometheus. It changes neither a result nor a latency.
     Watch(WatchArguments),
     /// Measure whether the pipeline meets its deadline on this computer, undisturbed and under load.
     Stress(StressArguments),
@@ -128,7 +132,7 @@ pub struct RadarServerArguments {
     /// The dataset's folder.
     #[arg(long)]
     pub data: Option<PathBuf>,
-    /// The address to serve at. Another than the loopback's lets the whole network read the scans.
+    /// The address to serve at. At another than the loopback's the whole network can read the scans: the protocol has no token.
     #[arg(long, default_value = "127.0.0.1:6317", value_name = "ADDRESS")]
     pub listen: String,
     /// Pace: realtime, max (as fast as it is read), or a factor.
@@ -163,9 +167,9 @@ pub struct RadarServerArguments {
     pub set: Vec<String>,
 }
 
-/// The arguments of `gyre watch`.
+/// The arguments of `gyre echo`.
 #[derive(Debug, Args)]
-pub struct WatchArguments {
+pub struct EchoArguments {
     /// The folder of the run's results, its --out.
     pub out: PathBuf,
     /// The topic.

@@ -93,6 +93,11 @@ impl Earlier {
     }
 }
 
+/// Returns whether the run that wrote its results to `out` has reached its end.
+pub fn is_complete(out: &Path) -> bool {
+    out.join(COMPLETE).exists()
+}
+
 /// Opens the candidates of the keyframes so far.
 fn queries(out: &Out) -> Result<RecordReader<Query>, Failure> {
     RecordReader::open(out.path()).map_err(|error| match error {

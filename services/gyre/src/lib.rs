@@ -8,6 +8,7 @@ pub mod configuration;
 pub mod conformance;
 pub mod doctor;
 pub mod earlier;
+pub mod echo;
 pub mod evaluate;
 pub mod identity;
 pub mod inspect;
@@ -73,6 +74,10 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Top(arguments) => operate::top(&arguments),
         Command::Restart(arguments) => operate::restart(&arguments),
         Command::Swap(arguments) => operate::swap(&arguments),
+        Command::Echo(arguments) => {
+            gyre_stage::run::keep_files_private();
+            echo::echo(&arguments)
+        }
         Command::Watch(arguments) => {
             gyre_stage::run::keep_files_private();
             watch::watch(&arguments)

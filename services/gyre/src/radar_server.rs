@@ -37,12 +37,17 @@ pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
     let listen = &arguments.listen;
     let listener = TcpListener::bind(listen)
         .map_err(|error| format!("cannot serve at {listen}: {error}; choose another --listen"))?;
+    let address = listener.local_addr()?;
     print::note(format_args!(
-        "gyre: playing {} scans of {} as a radar at {}",
+        "gyre: playing {} scans of {} as a radar at {address}",
         scans.len(),
-        configuration.data(),
-        listener.local_addr()?
+        configuration.data()
     ));
+    if !address.ip().is_loopback() {
+        print::note(
+            "gyre: whoever reaches this address receives the scans: Navtech's protocol has no token",
+        );
+    }
     let stop = || signals.sleep(Duration::ZERO).unwrap_or(true);
     let playback = playback(arguments, scans);
     let played = server::serve(listener, dataset.as_mut(), &playback, &stop)?;

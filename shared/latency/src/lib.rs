@@ -5,7 +5,7 @@ mod overlap;
 
 use std::collections::BTreeMap;
 
-use gyre_messages::{Hop, PoseHeader, StageId};
+use gyre_messages::{PoseHeader, StageId};
 use serde::Serialize;
 
 pub use durations::Durations;
@@ -81,18 +81,15 @@ impl LatencyMeter {
         let hops = &pose.item.hops;
         let (source, sink) = (hops[0], hops[StageId::PoseIntegration as usize]);
         self.scans += 1;
-        self.sensor_to_pose.add(sink.finished_ns - pose.item.due_ns);
-        let mut before: Option<&Hop> = None;
-        // Stages that the run does not have leave zeros.
-        let passed = |(hop, _): &(&Hop, _)| **hop != Hop::default();
-        for (hop, meter) in hops.iter().zip(&mut self.stages).filter(passed) {
-            if let Some(before) = before {
-                meter.transport.add(hop.received_ns - before.published_ns);
+        self.sensor_to_pose.add(pose.item.sensor_to_pose_ns());
+        for times in pose.item.hop_times() {
+            let meter = &mut self.stages[times.stage as usize];
+            if let Some(transport_ns) = times.transport_ns {
+                meter.transport.add(transport_ns);
             }
-            meter.wait.add(hop.started_ns - hop.received_ns);
-            meter.work.add(hop.finished_ns - hop.started_ns);
-            meter.busy_ns += hop.finished_ns - hop.started_ns;
-            before = Some(hop);
+            meter.wait.add(times.wait_ns);
+            meter.work.add(times.work_ns);
+            meter.busy_ns += times.work_ns;
         }
         let (first, last) = self.span.unwrap_or((i64::MAX, i64::MIN));
         self.span = Some((first.min(source.started_ns), last.max(sink.finished_ns)));

@@ -88,6 +88,19 @@ pub struct Hop {
     pub published_ns: i64,
 }
 
+/// The durations of one stage's work on a scan, ns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HopTimes {
+    /// The stage.
+    pub stage: StageId,
+    /// From the publication by the stage before to the reception; `None` for the first stage.
+    pub transport_ns: Option<i64>,
+    /// From the reception to the start of the work.
+    pub wait_ns: i64,
+    /// Of the work.
+    pub work_ns: i64,
+}
+
 /// One [`Hop`] for each [`StageId`].
 pub type Hops = [Hop; StageId::ALL.len()];
 
@@ -146,6 +159,27 @@ impl Item {
     /// Returns the number of scans that were published before this item and are not in its chain: what live mode dropped.
     pub fn dropped(&self) -> u64 {
         self.published.saturating_sub(self.seq)
+    }
+
+    /// Returns the durations at each stage that the scan has passed, in the order of the stream.
+    pub fn hop_times(&self) -> impl Iterator<Item = HopTimes> {
+        let mut before: Option<&Hop> = None;
+        // Stages that the run does not have leave zeros.
+        let passed = |(_, hop): &(StageId, &Hop)| **hop != Hop::default();
+        let stages = StageId::ALL.into_iter().zip(&self.hops).filter(passed);
+        stages.map(move |(stage, hop)| HopTimes {
+            stage,
+            transport_ns: before
+                .replace(hop)
+                .map(|before| hop.received_ns - before.published_ns),
+            wait_ns: hop.started_ns - hop.received_ns,
+            work_ns: hop.finished_ns - hop.started_ns,
+        })
+    }
+
+    /// Returns the time from the complete sweep to its pose, ns, of an item of `pose`.
+    pub fn sensor_to_pose_ns(&self) -> i64 {
+        self.hops[StageId::PoseIntegration as usize].finished_ns - self.due_ns
     }
 
     /// Returns the time stamps of a stage, to fill in.

@@ -48,7 +48,7 @@ pub use closed_loop::{Loop, LoopHeader};
 pub use correction::{Correction, CorrectionHeader};
 pub use fix::{Fix, FixHeader, fix_status};
 pub use follower::FollowerId;
-pub use item::{Hop, Hops, Item, StageId, flag};
+pub use item::{Hop, HopTimes, Hops, Item, StageId, flag};
 pub use limits::{History, Limits, TopicSizes, Window, WindowError};
 pub use masked::{Masked, MaskedHeader, MaskedParts, Pair, mask_kind};
 pub use message::{Header, Message, Sender};

@@ -1,0 +1,21 @@
+//! The arguments of `gyre watch`.
+
+use std::{net::SocketAddr, path::PathBuf};
+
+use clap::Args;
+
+/// The arguments of `gyre watch`.
+#[derive(Debug, Args)]
+pub struct WatchArguments {
+    /// The folder of the run's results, its --out.
+    pub out: PathBuf,
+    /// The address to serve at. Any but the loopback's needs the token of the address that is printed.
+    #[arg(long, default_value = "127.0.0.1:8080", value_name = "ADDRESS")]
+    pub listen: SocketAddr,
+    /// The file of the token, which is written with a random one if it is missing. Default: another token at each start.
+    #[arg(long, value_name = "FILE")]
+    pub token_file: Option<PathBuf>,
+    /// Wait for a run that has not started yet.
+    #[arg(long)]
+    pub wait: bool,
+}

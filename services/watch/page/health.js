@@ -1,0 +1,127 @@
+// The state of the run, its processes, and its key figures.
+
+import { milliseconds } from "./delays.js";
+import { axes } from "./track.js";
+
+const LATE_MS = 5000; // Without a pose for so long a working run is shown as late.
+const UNKNOWN = "−"; // What is not known.
+
+const byId = (id) => document.getElementById(id);
+const degrees = (angle) => (angle * 180) / Math.PI;
+const signed = (value, digits) => `${value < 0 ? "−" : ""}${Math.abs(value).toFixed(digits)}`;
+const megabytes = (bytes) => `${(bytes / 1e6).toFixed(0)} MB`;
+
+function write(id, text) {
+  const element = byId(id);
+  if (element.textContent !== text) element.textContent = text;
+}
+
+export class HealthView {
+  constructor() {
+    this.connected = false;
+    this.advanced = performance.now();
+    setInterval(() => this.judge(), 500);
+  }
+
+  setRun(run) {
+    this.run = run;
+    const name = run.out.split("/").filter(Boolean).slice(-2).join("/");
+    write("out", name);
+    byId("out").title = run.out;
+    document.title = `${name} · Gyre`;
+    const pace = run.rate === null ? "as fast as it goes" : run.rate === 1 ? "real time" : `${run.rate} × real time`;
+    write("mode", run.state === "waiting" ? "" : `${run.live ? "live" : "lossless"}, ${pace}, window ${run.window}`);
+    this.judge();
+  }
+
+  setConnected(connected) {
+    if (this.connected === connected) return;
+    this.connected = connected;
+    this.advanced = performance.now();
+    this.judge();
+  }
+
+  setPose(pose) {
+    if (!pose) return;
+    if (pose.seq !== this.pose?.seq) this.advanced = performance.now();
+    this.pose = pose;
+    const [x, y, yaw, xx, xy, yy] = pose.vertex;
+    const { major, minor } = axes(xx, xy, yy);
+    write("speed", pose.speed_mps.toFixed(2));
+    write("speed-note", pose.stationary ? "stationary" : `${(pose.speed_mps * 3.6).toFixed(0)} km/h, ${signed(degrees(pose.yaw_rate_radps), 1)} °/s`);
+    write("position", `${signed(x, 1)}, ${signed(y, 1)}`);
+    write("heading", `yaw ${signed(degrees(yaw), 1)}°, scan ${pose.scan}`);
+    write("sigma", major.toFixed(2));
+    write("sigma-note", `across ${minor.toFixed(2)} m, yaw ${degrees(pose.yaw_sigma_rad).toFixed(2)}°`);
+  }
+
+  setHealth(health) {
+    const { delays, missed } = health;
+    if (delays.samples) {
+      write("latency", milliseconds(delays.sensor_to_pose.p50_ms));
+      write("latency-note", `p99 ${milliseconds(delays.sensor_to_pose.p99_ms)} ms`);
+    }
+    write("poses", String(health.poses));
+    write("rate", `${health.scans_per_s.toFixed(1)}/s`);
+    const isLong = health.distance_m >= 10000;
+    write("distance", (health.distance_m / (isLong ? 1000 : 1)).toFixed(isLong ? 2 : 0));
+    write("distance-unit", isLong ? "km" : "m");
+    write("dropped", String(health.dropped));
+    write("in-flight", `${health.in_flight} in flight`);
+    write("missed", `Missed by this page's observer: ${missed.pose} poses, ${missed.scan} scans, ${missed.masked} masked scans`);
+    this.notice = health.notice;
+    this.setProcesses(health.processes);
+    this.judge();
+  }
+
+  setProcesses(processes) {
+    const rows = processes.map((process) => {
+      const row = document.createElement("tr");
+      const head = Object.assign(document.createElement("th"), { scope: "row", textContent: process.name });
+      if (process.pid) head.title = `process ${process.pid}`;
+      const state = Object.assign(document.createElement("td"), { className: "left", textContent: process.state });
+      state.dataset.level = process.level;
+      const share = process.processor_share;
+      const texts = [
+        String(process.restarts),
+        share === null ? UNKNOWN : `${(100 * share).toFixed(share < 0.1 ? 1 : 0)} %`,
+        process.own_bytes === null ? UNKNOWN : megabytes(process.own_bytes),
+      ];
+      row.append(head, state, ...texts.map((textContent) => Object.assign(document.createElement("td"), { textContent })));
+      return row;
+    });
+    byId("processes").replaceChildren(...rows);
+    const dead = processes.filter((process) => process.last_death);
+    write("deaths", dead.map((process) => `${process.name} died by ${process.last_death}.`).join(" "));
+  }
+
+  // Says what is wrong first, then how the run is.
+  judge() {
+    const [level, state, sentence] = this.verdict();
+    write("state", state);
+    byId("state").dataset.level = level;
+    const banner = byId("banner");
+    const text = sentence ?? (this.notice || "");
+    banner.hidden = !text;
+    banner.dataset.level = level;
+    if (banner.textContent !== text) banner.textContent = text;
+  }
+
+  verdict() {
+    const { run } = this;
+    if (!this.connected) {
+      return ["bad", "Connection lost", "The connection to gyre watch is lost. What is shown is old; this page tries again."];
+    }
+    const poses = this.pose ? `${this.pose.seq + 1} poses` : "no pose";
+    switch (run?.state) {
+      case "working": break;
+      case "finishing": return ["good", "Finishing", "The last scan has its pose; the results are being written."];
+      case "complete": return ["good", "Ended: complete", `The run has ended: complete, ${poses}. The next one in this folder is shown here when it starts.`];
+      case "interrupted": return ["warn", "Ended early", `The run has ended before its recording, after ${poses}. The same command continues it.`];
+      default: return ["off", "Waiting", "There is no run yet. It is shown here when it starts."];
+    }
+    const lateMs = performance.now() - this.advanced;
+    if (lateMs > LATE_MS) return ["warn", "No pose", `No pose for ${Math.floor(lateMs / LATE_MS) * (LATE_MS / 1000)} s.`];
+    return ["good", "Running"];
+  }
+}

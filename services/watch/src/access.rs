@@ -1,0 +1,287 @@
+//! The right to read: by the token, or by being on this machine.
+
+use std::{
+    fs::{self, OpenOptions},
+    io::{self, ErrorKind, Write},
+    net::{IpAddr, SocketAddr},
+    os::unix::fs::OpenOptionsExt,
+    path::Path,
+};
+
+use axum::http::{HeaderMap, Uri, header};
+use subtle::ConstantTimeEq;
+
+/// Random bytes of a token.
+const TOKEN_BYTES: usize = 16;
+/// The shortest token that is taken from a file.
+const MIN_TOKEN: usize = 16;
+
+/// A secret that a reader has to know.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Token(String);
+
+/// What a request needs.
+pub struct Access {
+    /// The token; none is needed from this machine.
+    token: Option<Token>,
+    /// The cookie's name: cookies are shared by all ports of a host.
+    cookie: String,
+}
+
+/// The answer to a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// It may read.
+    Granted,
+    /// It may read, and gave the token in its address: a cookie replaces it from here on.
+    GrantedByAddress,
+    /// It does not know the token.
+    NoToken,
+    /// It names a host that is not this machine: another site's name may have been pointed here (DNS rebinding).
+    ForeignHost,
+    /// A page of another site has sent it.
+    ForeignOrigin,
+}
+
+impl Token {
+    /// Creates a random one.
+    ///
+    /// # Errors
+    /// The system has no random numbers.
+    pub fn random() -> io::Result<Self> {
+        let mut bytes = [0_u8; TOKEN_BYTES];
+        getrandom::fill(&mut bytes).map_err(io::Error::other)?;
+        Ok(Self(
+            bytes.iter().map(|byte| format!("{byte:02x}")).collect(),
+        ))
+    }
+
+    /// Reads the token of a file, or writes a random one there if there is no such file.
+    ///
+    /// # Errors
+    /// The file cannot be read or written, or holds no token.
+    pub fn of_file(path: &Path) -> io::Result<Self> {
+        match fs::read_to_string(path) {
+            Ok(text) => Self::parse(text.trim()),
+            Err(error) if error.kind() == ErrorKind::NotFound => {
+                let token = Self::random()?;
+                let mut options = OpenOptions::new();
+                let mut file = options
+                    .write(true)
+                    .create_new(true)
+                    .mode(0o600)
+                    .open(path)?;
+                writeln!(file, "{}", token.0)?;
+                Ok(token)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    fn parse(text: &str) -> io::Result<Self> {
+        let plain = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_';
+        match text.len() >= MIN_TOKEN && text.bytes().all(plain) {
+            true => Ok(Self(text.to_owned())),
+            false => Err(io::Error::new(
+                ErrorKind::InvalidData,
+                format!("a token has at least {MIN_TOKEN} letters, digits, `-` or `_`"),
+            )),
+        }
+    }
+
+    /// Returns the token's text.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+
+    /// Compares in a time that does not depend on where the texts differ.
+    fn is(&self, given: &str) -> bool {
+        self.0.as_bytes().ct_eq(given.as_bytes()).into()
+    }
+}
+
+impl Access {
+    /// The access to a server at this address. Without a token it is for this machine alone.
+    pub fn new(address: SocketAddr, token: Option<Token>) -> Self {
+        Self {
+            token,
+            cookie: format!("gyre_watch_{}", address.port()),
+        }
+    }
+
+    /// Judges a request.
+    pub fn judge(&self, uri: &Uri, headers: &HeaderMap) -> Verdict {
+        let host = text(headers, header::HOST).unwrap_or_default();
+        if text(headers, header::ORIGIN).is_some_and(|origin| !is_of(origin, host)) {
+            return Verdict::ForeignOrigin;
+        }
+        let Some(token) = &self.token else {
+            return match is_this_machine(host) {
+                true => Verdict::Granted,
+                false => Verdict::ForeignHost,
+            };
+        };
+        if in_address(uri).is_some_and(|given| token.is(given)) {
+            return Verdict::GrantedByAddress;
+        }
+        let bearer = text(headers, header::AUTHORIZATION).and_then(|h| h.strip_prefix("Bearer "));
+        match bearer
+            .or_else(|| self.in_cookie(headers))
+            .is_some_and(|given| token.is(given))
+        {
+            true => Verdict::Granted,
+            false => Verdict::NoToken,
+        }
+    }
+
+    /// Returns the header `Set-Cookie` that replaces the token in the address.
+    pub fn cookie(&self) -> Option<String> {
+        let token = self.token.as_ref()?.as_str();
+        let name = &self.cookie;
+        Some(format!(
+            "{name}={token}; HttpOnly; SameSite=Lax; Path=/; Max-Age=2592000"
+        ))
+    }
+
+    fn in_cookie<'a>(&self, headers: &'a HeaderMap) -> Option<&'a str> {
+        let all = headers.get_all(header::COOKIE).into_iter();
+        let mut cookies = all
+            .filter_map(|cookies| cookies.to_str().ok())
+            .flat_map(|cookies| cookies.split("; "));
+        cookies.find_map(|cookie| cookie.strip_prefix(self.cookie.as_str())?.strip_prefix('='))
+    }
+}
+
+fn text(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
+    headers.get(name)?.to_str().ok()
+}
+
+fn in_address(uri: &Uri) -> Option<&str> {
+    let mut pairs = uri.query()?.split('&');
+    pairs.find_map(|pair| pair.strip_prefix("token="))
+}
+
+/// Returns whether a page of this origin was served under this host.
+fn is_of(origin: &str, host: &str) -> bool {
+    let authority = origin.split_once("://").map(|(_, authority)| authority);
+    !host.is_empty() && authority == Some(host)
+}
+
+/// Returns whether a `Host` names this machine. The port may differ, as through `ssh -L`.
+fn is_this_machine(host: &str) -> bool {
+    let name = match host.rsplit_once(':') {
+        Some((name, port)) if port.bytes().all(|byte| byte.is_ascii_digit()) => name,
+        _ => host,
+    };
+    let address = name.trim_start_matches('[').trim_end_matches(']').parse();
+    name.eq_ignore_ascii_case("localhost") || address.is_ok_and(|ip: IpAddr| ip.is_loopback())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    const SECRET: &str = "0123456789abcdef";
+
+    fn access(token: Option<&str>) -> Access {
+        let token = token.map(|text| Token::parse(text).unwrap());
+        Access::new("127.0.0.1:8080".parse().unwrap(), token)
+    }
+
+    fn judged(access: &Access, uri: &str, headers: &[(header::HeaderName, &str)]) -> Verdict {
+        let headers = headers
+            .iter()
+            .map(|(name, value)| (name.clone(), value.parse().unwrap()));
+        access.judge(&uri.parse().unwrap(), &headers.collect())
+    }
+
+    #[test]
+    fn without_a_token_only_names_of_this_machine_are_answered() {
+        let access = access(None);
+        let host = |host| judged(&access, "/", &[(header::HOST, host)]);
+        for own in [
+            "127.0.0.1:8080",
+            "127.0.0.1",
+            "localhost:9000",
+            "LocalHost",
+            "[::1]:8080",
+            "[::1]",
+            "127.1.2.3:1",
+        ] {
+            assert_eq!(host(own), Verdict::Granted, "{own}");
+        }
+        for foreign in [
+            "",
+            "evil.example",
+            "evil.example:8080",
+            "localhost.evil.example",
+            "127.0.0.1.evil.example:8080",
+            "192.168.0.1:8080",
+            "[2001:db8::1]:8080",
+        ] {
+            assert_eq!(host(foreign), Verdict::ForeignHost, "{foreign}");
+        }
+    }
+
+    #[test]
+    fn pages_of_other_sites_are_refused() {
+        let access = access(None);
+        let origin = |origin| {
+            let headers = [(header::HOST, "localhost:8080"), (header::ORIGIN, origin)];
+            judged(&access, "/stream", &headers)
+        };
+        assert_eq!(origin("http://localhost:8080"), Verdict::Granted);
+        for foreign in ["http://evil.example", "http://localhost:3000", "null"] {
+            assert_eq!(origin(foreign), Verdict::ForeignOrigin, "{foreign}");
+        }
+    }
+
+    #[test]
+    fn the_token_is_taken_from_the_address_a_header_or_the_cookie_and_nothing_else() {
+        let access = access(Some(SECRET));
+        let host = (header::HOST, "robot.local:8080");
+        let by_address = format!("/?token={SECRET}");
+        assert_eq!(
+            judged(&access, &by_address, std::slice::from_ref(&host)),
+            Verdict::GrantedByAddress
+        );
+        let bearer = format!("Bearer {SECRET}");
+        let cookie = format!("other=1; gyre_watch_8080={SECRET}");
+        for header in [
+            (header::AUTHORIZATION, bearer.as_str()),
+            (header::COOKIE, cookie.as_str()),
+        ] {
+            let verdict = judged(&access, "/metrics", &[host.clone(), header.clone()]);
+            assert_eq!(verdict, Verdict::Granted, "{header:?}");
+        }
+        let refused = [
+            ("/?token=", None),
+            ("/?token=0123456789abcdeX", None),
+            ("/?token=0123456789abcdef0", None),
+            ("/", Some((header::AUTHORIZATION, SECRET))),
+            (
+                "/",
+                Some((header::COOKIE, "gyre_watch_8081=0123456789abcdef")),
+            ),
+            ("/", Some((header::COOKIE, "gyre_watch_8080="))),
+            ("/", None),
+        ];
+        for (uri, header) in refused {
+            let headers: Vec<_> = [host.clone()].into_iter().chain(header).collect();
+            assert_eq!(judged(&access, uri, &headers), Verdict::NoToken, "{uri}");
+        }
+    }
+
+    #[test]
+    fn tokens_are_random_and_a_file_keeps_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("token");
+        let written = Token::of_file(&path).unwrap();
+        assert!(Token::of_file(&path).unwrap() == written);
+        assert!(Token::random().unwrap() != written);
+        assert_eq!(written.as_str().len(), 2 * TOKEN_BYTES);
+        fs::write(&path, "short\n").unwrap();
+        assert!(Token::of_file(&path).is_err());
+    }
+}

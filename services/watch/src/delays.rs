@@ -1,0 +1,210 @@
+//! Delays of the last minute.
+
+use std::collections::VecDeque;
+
+use gyre_messages::{HopTimes, Item, StageId};
+use serde::Serialize;
+
+/// Length of the window.
+const WINDOW_NS: i64 = 60_000_000_000;
+/// Width of a step of the time series.
+const STEP_NS: i64 = 1_000_000_000;
+/// The most samples that are kept: at more than 136 poses a second the window is shorter than a minute.
+const MAX_SAMPLES: usize = 8192;
+/// Delays of a pose: sensor to pose, then hand-over and work of each stage.
+const KINDS: usize = 1 + 2 * StageId::ALL.len();
+
+/// The delays of the poses of the last minute.
+#[derive(Debug, Default)]
+pub struct Delays {
+    samples: VecDeque<Sample>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Sample {
+    /// The end of the last work, `CLOCK_MONOTONIC`.
+    at_ns: i64,
+    /// In us; `None` where the run has no such stage.
+    delays_us: [Option<u32>; KINDS],
+}
+
+/// Median and 99th percentile, ms.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Percentiles {
+    p50_ms: f64,
+    p99_ms: f64,
+}
+
+/// The delays of one stage.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct StageDelays {
+    stage: &'static str,
+    /// From the publication by the stage before to the start of the work.
+    hand_over: Percentiles,
+    /// Of the work.
+    work: Percentiles,
+}
+
+/// What the page shows of the delays.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Report {
+    /// Poses that it is of.
+    samples: usize,
+    /// From the complete sweep to its pose.
+    sensor_to_pose: Percentiles,
+    stages: Vec<StageDelays>,
+    /// Sensor to pose in each second of the last minute, oldest first; `None` in one without a pose.
+    series: Vec<Option<Percentiles>>,
+}
+
+impl Delays {
+    /// Adds a pose.
+    pub fn add(&mut self, item: &Item) {
+        let mut delays_us = [None; KINDS];
+        delays_us[0] = Some(in_us(item.sensor_to_pose_ns()));
+        for times in item.hop_times() {
+            let HopTimes { wait_ns, .. } = times;
+            let [hand_over, work] = kinds(times.stage);
+            delays_us[hand_over] = Some(in_us(times.transport_ns.unwrap_or(0) + wait_ns));
+            delays_us[work] = Some(in_us(times.work_ns));
+        }
+        let at_ns = item.hops[StageId::PoseIntegration as usize].finished_ns;
+        self.samples.push_back(Sample { at_ns, delays_us });
+        if self.samples.len() > MAX_SAMPLES {
+            self.samples.pop_front();
+        }
+    }
+
+    /// Forgets what is older than a minute, and returns the percentiles of the rest.
+    pub fn report(&mut self, now_ns: i64) -> Report {
+        let is_old = |sample: &Sample| sample.at_ns < now_ns - WINDOW_NS;
+        while self.samples.front().is_some_and(is_old) {
+            self.samples.pop_front();
+        }
+        let of_kind = |kind: usize| {
+            let delays = self
+                .samples
+                .iter()
+                .filter_map(|sample| sample.delays_us[kind]);
+            percentiles(delays.collect())
+        };
+        let stages = StageId::ALL.into_iter().filter_map(|stage| {
+            let [hand_over, work] = kinds(stage).map(of_kind);
+            Some(StageDelays {
+                stage: stage.name(),
+                hand_over: hand_over?,
+                work: work?,
+            })
+        });
+        Report {
+            samples: self.samples.len(),
+            sensor_to_pose: of_kind(0).unwrap_or_default(),
+            stages: stages.collect(),
+            series: self.series(now_ns),
+        }
+    }
+
+    /// The last second is not over, and is left out.
+    fn series(&self, now_ns: i64) -> Vec<Option<Percentiles>> {
+        let steps = WINDOW_NS / STEP_NS;
+        let mut of_step = vec![Vec::new(); steps as usize];
+        let end = now_ns / STEP_NS;
+        for sample in &self.samples {
+            let step = sample.at_ns / STEP_NS - (end - steps);
+            let place = usize::try_from(step)
+                .ok()
+                .and_then(|step| of_step.get_mut(step));
+            if let Some(delays) = place {
+                delays.extend(sample.delays_us[0]);
+            }
+        }
+        of_step.into_iter().map(percentiles).collect()
+    }
+}
+
+fn kinds(stage: StageId) -> [usize; 2] {
+    let first = 1 + 2 * stage as usize;
+    [first, first + 1]
+}
+
+fn in_us(duration_ns: i64) -> u32 {
+    (duration_ns / 1000).clamp(0, u32::MAX.into()) as u32
+}
+
+/// The nearest of the values; `None` of none.
+fn percentiles(mut delays_us: Vec<u32>) -> Option<Percentiles> {
+    let last = delays_us.len().checked_sub(1)?;
+    delays_us.sort_unstable();
+    let at = |share: f64| f64::from(delays_us[(last as f64 * share).round() as usize]) * 1e-3;
+    Some(Percentiles {
+        p50_ms: at(0.5),
+        p99_ms: at(0.99),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use gyre_messages::Hop;
+
+    use super::*;
+
+    /// A pose whose sweep was complete so many ms before `at_ns`.
+    fn pose(at_ns: i64, delay_ms: i64) -> Item {
+        let mut item = Item {
+            due_ns: at_ns - delay_ms * 1_000_000,
+            ..Item::default()
+        };
+        let hop = |received_ns: i64| Hop {
+            received_ns,
+            started_ns: received_ns + 100_000,
+            finished_ns: received_ns + 600_000,
+            published_ns: received_ns + 700_000,
+        };
+        *item.hop_mut(StageId::Masking) = hop(at_ns - 2_000_000);
+        *item.hop_mut(StageId::PoseIntegration) = hop(at_ns - 600_000);
+        item
+    }
+
+    #[test]
+    fn delays_are_those_of_the_last_minute() {
+        let mut delays = Delays::default();
+        let now_ns = 200 * STEP_NS + STEP_NS / 2;
+        delays.add(&pose(now_ns - WINDOW_NS - 1, 900));
+        for second in 1..=50 {
+            delays.add(&pose(now_ns - second * STEP_NS, second));
+        }
+        let report = delays.report(now_ns);
+        assert_eq!(report.samples, 50);
+        assert_eq!(report.sensor_to_pose.p99_ms, 50.0);
+        assert_eq!(report.series.len(), 60);
+        assert_eq!(report.series.iter().flatten().count(), 50);
+        let newest = report.series.last().copied().flatten();
+        assert_eq!(newest.map(|newest| newest.p50_ms), Some(1.0));
+        assert_eq!(
+            delays.report(now_ns + 2 * WINDOW_NS),
+            Report {
+                series: vec![None; 60],
+                ..Report::default()
+            }
+        );
+    }
+
+    #[test]
+    fn each_stage_of_the_run_has_its_hand_over_and_its_work() {
+        let mut delays = Delays::default();
+        delays.add(&pose(STEP_NS, 5));
+        let report = delays.report(STEP_NS);
+        let names: Vec<_> = report.stages.iter().map(|stage| stage.stage).collect();
+        assert_eq!(names, ["masking", "pose-integration"]);
+        // Published 0.7 ms after its receipt at -2 ms, received at -0.6 ms, begun 0.1 ms later.
+        assert_eq!(report.stages[1].hand_over.p50_ms, 0.8);
+        assert_eq!(report.stages[1].work.p50_ms, 0.5);
+    }
+
+    #[test]
+    fn the_number_of_samples_is_bounded() {
+        let mut delays = Delays::default();
+        (0..10_000).for_each(|k| delays.add(&pose(k * 1_000_000, 1)));
+        assert_eq!(delays.report(10_000_000_000).samples, MAX_SAMPLES);
+    }
+}

@@ -1,0 +1,152 @@
+//! What a browser asks for, and what it is sent in JSON.
+
+use gyre_messages::PoseHeader;
+use serde::Serialize;
+
+use crate::{delays::Report, processes::Process, track::Vertex};
+
+/// What a browser may ask for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layer {
+    /// Powers as measured.
+    Scan,
+    /// Masked rasters.
+    Raster,
+    /// Sparse points.
+    Points,
+}
+
+/// What was missed of the topics that are observed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Missed {
+    /// Poses that were missed.
+    pub pose: u64,
+    /// Scans that were missed.
+    pub scan: u64,
+    /// Masked scans that were missed.
+    pub masked: u64,
+}
+
+/// The state of the run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RunState {
+    /// There is none yet.
+    #[default]
+    Waiting,
+    /// It works.
+    Working,
+    /// The last scan has its pose; results are being written.
+    Finishing,
+    /// It has ended, and the recording with it.
+    Complete,
+    /// It has ended before the recording.
+    Interrupted,
+}
+
+impl RunState {
+    /// Returns whether there is a run.
+    pub fn is_up(self) -> bool {
+        matches!(self, Self::Working | Self::Finishing)
+    }
+}
+
+/// The run as the page introduces it.
+#[derive(Clone, Debug, Default, Serialize)]
+#[serde(tag = "kind", rename = "run")]
+pub struct Run {
+    /// Another one at each start of a run.
+    pub id: String,
+    /// The folder of its results.
+    pub out: String,
+    /// Whether it works, or how it has ended.
+    pub state: RunState,
+    /// Whether it drops scans rather than wait.
+    pub live: bool,
+    /// Pace relative to the sensor's clock; none: as fast as it goes.
+    pub rate: Option<f64>,
+    /// The most scans in flight.
+    pub window: usize,
+    /// The version of the program.
+    pub version: &'static str,
+}
+
+/// Counts and delays, once a second.
+#[derive(Debug, Serialize)]
+#[serde(tag = "kind", rename = "health")]
+pub struct Health {
+    /// Counts of the run.
+    #[serde(flatten)]
+    pub counts: Counts,
+    /// Poses a second since the last report.
+    pub scans_per_s: f64,
+    pub distance_m: f64,
+    pub delays: Report,
+    /// Why something is not shown.
+    pub notice: Option<String>,
+    pub processes: Vec<Process>,
+}
+
+/// Counts of the run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Counts {
+    /// Scans that the source has published.
+    pub published: u64,
+    /// Poses of the trajectory.
+    pub poses: u64,
+    /// Scans that live mode has dropped.
+    pub dropped: u64,
+    /// Scans that were published and have no pose yet.
+    pub in_flight: u64,
+    /// What this observer has missed.
+    pub missed: Missed,
+}
+
+/// The trajectory's new vertices and the newest pose.
+#[derive(Serialize)]
+#[serde(tag = "kind", rename = "poses")]
+pub struct Poses<'a> {
+    /// The vertices replace all earlier ones.
+    pub replace: bool,
+    pub vertices: &'a [Vertex],
+    pub pose: Option<Current>,
+}
+
+/// The newest pose.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Current {
+    pub seq: u64,
+    pub scan: u64,
+    pub stamp_ns: i64,
+    /// x, y (m), yaw (rad), and the covariance of the position (m^2).
+    pub vertex: Vertex,
+    pub yaw_sigma_rad: f64,
+    pub speed_mps: f64,
+    pub yaw_rate_radps: f64,
+    pub stationary: bool,
+}
+
+impl Current {
+    /// The newest pose of the run.
+    pub fn of(pose: &PoseHeader) -> Self {
+        let interval_s = pose.motion.interval_ns as f64 * 1e-9;
+        // The chain starts with a motion of no duration.
+        let per_s = |value: f64| {
+            if interval_s > 0.0 {
+                value / interval_s
+            } else {
+                0.0
+            }
+        };
+        Self {
+            seq: pose.item.seq,
+            scan: pose.item.scan,
+            stamp_ns: pose.item.stamp_ns,
+            vertex: Vertex::of(pose),
+            yaw_sigma_rad: pose.covariance[5].max(0.0).sqrt(),
+            speed_mps: per_s(pose.motion.x_m.hypot(pose.motion.y_m)),
+            yaw_rate_radps: per_s(pose.motion.yaw_rad),
+            stationary: pose.motion.refinement.is_stationary(),
+        }
+    }
+}

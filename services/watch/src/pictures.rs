@@ -1,0 +1,287 @@
+//! Scans, rasters and points, made small for a browser.
+
+use axum::body::Bytes;
+use gyre_geometry::{SparsePoint, Twist};
+use gyre_messages::MaskedHeader;
+use gyre_radar::{PolarScan, Sense};
+use ndarray::ArrayView2;
+use serde::Serialize;
+
+use crate::frame;
+
+/// The most azimuths of a picture: no Navtech radar measures more.
+const MAX_AZIMUTHS: usize = 400;
+/// The most range bins of a picture: a display has about as many pixels from its middle to its edge.
+const MAX_BINS: usize = 256;
+/// The most cells on each side of a raster.
+const MAX_SIDE: usize = 256;
+/// Bits of a power that are dropped: 32 shades remain, and a scan compresses to a third.
+const DROPPED_BITS: u32 = 3;
+/// Share of the cells of a scan that are taken for noise.
+const NOISE_SHARE: f64 = 0.6;
+/// Unit of the coordinates of points, m: 16 bits reach 655 m.
+const POINT_UNIT_M: f64 = 0.02;
+
+/// A scan as a picture: `azimuths x bins` powers. Azimuth `a` looks at `2 pi a / azimuths`, counter-clockwise from straight ahead.
+#[derive(Serialize)]
+#[serde(tag = "kind", rename = "scan")]
+struct ScanPicture {
+    seq: u64,
+    scan: u64,
+    azimuths: usize,
+    bins: usize,
+    /// Range of the outer edge of the last bin, m.
+    max_range_m: f64,
+    /// The azimuth that was measured first.
+    first: usize,
+    clockwise: bool,
+    /// Weaker powers are noise, and sent as 0.
+    floor: u8,
+}
+
+/// Makes a picture of a scan: the strongest return in each of its cells.
+///
+/// # Errors
+/// Memory has no room.
+pub fn scan(scan: &PolarScan<'_>, seq: u64, number: u64) -> std::io::Result<Bytes> {
+    let geometry = &scan.geometry;
+    let azimuths = geometry.azimuths.min(MAX_AZIMUTHS);
+    let bins_of_one = geometry.bins.div_ceil(MAX_BINS).max(1);
+    let bins = geometry.bins.div_ceil(bins_of_one);
+    let mut powers = vec![0; azimuths * bins];
+    let column = |row: usize| place(scan.azimuth_rad[row], geometry.sense, azimuths);
+    for row in 0..geometry.azimuths {
+        let first = column(row) * bins;
+        let cells = powers[first..first + bins].iter_mut();
+        for (cell, powers) in cells.zip(scan.row(row).chunks(bins_of_one)) {
+            let strongest = powers.iter().max().copied().unwrap_or_default();
+            *cell = strongest.max(*cell);
+        }
+    }
+    let floor = floor(&powers);
+    for power in &mut powers {
+        *power = if *power < floor {
+            0
+        } else {
+            *power >> DROPPED_BITS << DROPPED_BITS
+        };
+    }
+    let picture = ScanPicture {
+        seq,
+        scan: number,
+        azimuths,
+        bins,
+        max_range_m: f64::from(scan.range_m((bins * bins_of_one) as f32 - 0.5)),
+        first: column(0),
+        clockwise: geometry.sense == Sense::Clockwise,
+        floor,
+    };
+    frame::encode(&picture, &powers)
+}
+
+/// Returns the power below which most cells are.
+fn floor(powers: &[u8]) -> u8 {
+    let mut counts = [0_usize; 256];
+    for power in powers {
+        counts[usize::from(*power)] += 1;
+    }
+    let noise = (powers.len() as f64 * NOISE_SHARE) as usize;
+    let mut below = 0;
+    let is_above = |count: &usize| {
+        below += count;
+        below > noise
+    };
+    counts.iter().position(is_above).unwrap_or_default() as u8
+}
+
+/// The column of an azimuth in a picture, counter-clockwise from straight ahead.
+fn place(azimuth_rad: f32, sense: Sense, azimuths: usize) -> usize {
+    let turns = f64::from(azimuth_rad) / std::f64::consts::TAU;
+    let counter_clockwise = match sense {
+        Sense::Clockwise => -turns,
+        Sense::CounterClockwise => turns,
+    };
+    (counter_clockwise.rem_euclid(1.0) * azimuths as f64).round() as usize % azimuths
+}
+
+/// A raster as a picture: `side x side` cells, row 0 far ahead, column 0 far left, the sensor in the middle.
+#[derive(Serialize)]
+#[serde(tag = "kind", rename = "raster")]
+struct RasterPicture {
+    seq: u64,
+    side: usize,
+    /// Width of the picture, m.
+    width_m: f64,
+}
+
+/// Makes a picture of a masked raster: the strongest value in each of its cells, relative to the strongest of all.
+///
+/// # Errors
+/// Memory has no room.
+pub fn raster(raster: ArrayView2<'_, f32>, cell_m: f32, seq: u64) -> std::io::Result<Bytes> {
+    let n = raster.nrows();
+    let cells_of_one = n.div_ceil(MAX_SIDE).max(1);
+    let side = n.div_ceil(cells_of_one);
+    let strongest = raster.iter().copied().fold(0.0, f32::max);
+    let scale = if strongest > 0.0 {
+        255.0 / strongest
+    } else {
+        0.0
+    };
+    let mut cells = vec![0_u8; side * side];
+    for ((row, column), value) in raster.indexed_iter() {
+        let cell = &mut cells[row / cells_of_one * side + column / cells_of_one];
+        *cell = ((value * scale) as u8 >> DROPPED_BITS << DROPPED_BITS).max(*cell);
+    }
+    let picture = RasterPicture {
+        seq,
+        side,
+        width_m: (side * cells_of_one) as f64 * f64::from(cell_m),
+    };
+    frame::encode(&picture, &cells)
+}
+
+/// The points of a scan with its pose.
+#[derive(Serialize)]
+#[serde(tag = "kind", rename = "points")]
+struct PointsPicture {
+    seq: u64,
+    /// x, y (m), yaw (rad) of the scan in the frame of the first.
+    pose: [f64; 3],
+    unit_m: f64,
+}
+
+/// Points of a scan as x and y in units of [`POINT_UNIT_M`], 16 bits each, little-endian, in the frame of the scan.
+pub struct Points(Vec<u8>);
+
+/// Returns the points of a scan, motion-compensated as its raster is.
+pub fn points(points: &[SparsePoint], header: &MaskedHeader) -> Points {
+    let [vx_mps, vy_mps, yaw_rate_radps] = header.twist.map(f64::from);
+    let twist = Twist {
+        vx_mps,
+        vy_mps,
+        yaw_rate_radps,
+    };
+    let in_units = |length_m: f64| {
+        let units = (length_m / POINT_UNIT_M).round();
+        units.clamp(i16::MIN.into(), i16::MAX.into()) as i16
+    };
+    let seen = points.iter().filter(|point| point.weight > 0.0);
+    let bytes = seen.flat_map(|point| {
+        let place = point.deskewed(&twist);
+        [place.x, place.y].map(in_units).map(i16::to_le_bytes)
+    });
+    Points(bytes.flatten().collect())
+}
+
+impl Points {
+    /// Makes a message of the points and the pose of their scan.
+    ///
+    /// # Errors
+    /// Memory has no room.
+    pub fn at(&self, pose: [f64; 3], seq: u64) -> std::io::Result<Bytes> {
+        let picture = PointsPicture {
+            seq,
+            pose,
+            unit_m: POINT_UNIT_M,
+        };
+        frame::encode(&picture, &self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::f32::consts::TAU;
+
+    use gyre_radar::SweepGeometry;
+    use ndarray::Array2;
+
+    use super::*;
+
+    const AZIMUTHS: usize = 800;
+    const BINS: usize = 1000;
+
+    /// The picture of a clockwise scan with one strong return.
+    fn picture(azimuth: usize, bin: usize) -> (serde_json::Value, Vec<u8>) {
+        let mut bytes = vec![10; AZIMUTHS * BINS];
+        bytes[azimuth * BINS + bin] = 255;
+        let azimuth_rad: Vec<_> = (0..AZIMUTHS).map(|a| a as f32 * TAU / 800.0).collect();
+        let stamp_ns: Vec<_> = (0..AZIMUTHS as i64).map(|a| a * 312_500).collect();
+        let sweep = PolarScan {
+            geometry: SweepGeometry {
+                azimuths: AZIMUTHS,
+                bins: BINS,
+                stride: BINS,
+                first_byte: 0,
+                range_resolution_m: 0.2,
+                range_offset_m: 0.0,
+                doppler_s: 0.0,
+                sense: Sense::Clockwise,
+                stamp_ns: 0,
+            },
+            bytes: &bytes,
+            azimuth_rad: &azimuth_rad,
+            stamp_ns: &stamp_ns,
+            flags: &[1; AZIMUTHS],
+        };
+        frame::decode(&scan(&sweep, 7, 9).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn a_strong_return_survives_in_its_place() {
+        let (header, powers) = picture(200, 500);
+        let [azimuths, bins] = ["azimuths", "bins"].map(|key| header[key].as_u64().unwrap());
+        assert_eq!((azimuths, bins), (400, 250));
+        assert_eq!(powers.len() as u64, azimuths * bins);
+        assert!((header["max_range_m"].as_f64().unwrap() - 200.0).abs() < 1e-3);
+        // A quarter of a turn clockwise is three quarters counter-clockwise; half of the range.
+        let brightest = powers.iter().position(|power| *power == 248).unwrap();
+        assert_eq!((brightest / 250, brightest % 250), (300, 125));
+        assert_eq!(powers.iter().filter(|power| **power != 8).count(), 1);
+    }
+
+    #[test]
+    fn the_last_azimuth_stays_within_the_picture() {
+        let (_, powers) = picture(AZIMUTHS - 1, 0);
+        assert!(powers.contains(&248));
+    }
+
+    #[test]
+    fn a_raster_keeps_its_strongest_cells() {
+        let mut cells = Array2::zeros((511, 511));
+        cells[[0, 510]] = 0.5_f32;
+        cells[[255, 255]] = 0.25;
+        let (header, bytes) = frame::decode(&raster(cells.view(), 0.4, 3).unwrap()).unwrap();
+        let side = header["side"].as_u64().unwrap() as usize;
+        assert_eq!((side, bytes.len()), (256, 256 * 256));
+        assert!((header["width_m"].as_f64().unwrap() - 204.8).abs() < 1e-3);
+        assert_eq!((bytes[255], bytes[127 * 256 + 127]), (248, 120));
+        let dark = raster(Array2::zeros((3, 3)).view(), 0.4, 3).unwrap();
+        assert_eq!(frame::decode(&dark).unwrap().1, [0; 9]);
+    }
+
+    #[test]
+    fn points_keep_their_place_to_two_centimetres() {
+        let point = |x_m, y_m, weight| SparsePoint {
+            x_m,
+            y_m,
+            weight,
+            time_s: 0.0,
+            doppler_s: 0.0,
+        };
+        let seen = [
+            point(1.0, -2.0, 1.0),
+            point(5.0, 5.0, 0.0),
+            point(1e9, 0.0, 0.5),
+        ];
+        let small = points(&seen, &MaskedHeader::default());
+        let (header, bytes) = frame::decode(&small.at([1.0, 2.0, 3.0], 4).unwrap()).unwrap();
+        assert_eq!(header["pose"], serde_json::json!([1.0, 2.0, 3.0]));
+        let values: Vec<_> = bytes
+            .chunks_exact(2)
+            .map(|pair| i16::from_le_bytes([pair[0], pair[1]]))
+            .collect();
+        assert_eq!(values, [50, -100, i16::MAX, 0]);
+    }
+}

@@ -1,0 +1,238 @@
+//! The server: it listens, asks who may read, and ends with a signal.
+
+use std::{
+    io,
+    net::{SocketAddr, TcpListener},
+    path::{Path, PathBuf},
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+    },
+    thread,
+    time::Duration,
+};
+
+use axum::{
+    Router,
+    extract::{Request, State, WebSocketUpgrade},
+    http::{HeaderMap, HeaderValue, StatusCode, header},
+    middleware::{self, Next},
+    response::{IntoResponse, Redirect, Response},
+    routing::get,
+};
+use gyre_stage::{StageError, wake::Signals};
+use thiserror::Error;
+use tokio::{runtime, time};
+
+use crate::{
+    access::{Access, Token, Verdict},
+    board::Board,
+    metrics,
+    observing::{self, Followed},
+    page, stream,
+};
+
+/// The most browsers at once.
+const MAX_BROWSERS: usize = 16;
+/// The longest message of a browser, bytes.
+const MAX_RECEIVED: usize = 1024;
+/// Time between two looks whether the server has failed.
+const LOOK: Duration = Duration::from_secs(1);
+/// Time for the connections to end with the program.
+const STOP_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// A failure of the server.
+#[derive(Debug, Error)]
+pub enum WatchError {
+    /// It cannot listen.
+    #[error("cannot serve at {address}: {source}; choose another --listen")]
+    Listen {
+        /// The address.
+        address: SocketAddr,
+        /// The reason.
+        source: io::Error,
+    },
+    /// It cannot work.
+    #[error("cannot serve: {0}")]
+    Serve(#[from] io::Error),
+    /// Signals cannot be received.
+    #[error(transparent)]
+    Stage(#[from] StageError),
+}
+
+/// A server that listens.
+pub struct Server {
+    listener: TcpListener,
+    address: SocketAddr,
+    token: Option<Token>,
+}
+
+#[derive(Clone)]
+struct Shared {
+    board: Arc<Board>,
+    access: Arc<Access>,
+    browsers: Arc<AtomicUsize>,
+}
+
+/// A browser's place. Dropped, it is free again.
+struct Place(Arc<AtomicUsize>);
+
+impl Server {
+    /// Listens at an address. Readers need the token, if there is one; without one only this machine is answered.
+    ///
+    /// # Errors
+    /// The address cannot be listened at.
+    pub fn listen(address: SocketAddr, token: Option<Token>) -> Result<Self, WatchError> {
+        let failed = |source| WatchError::Listen { address, source };
+        let listener = TcpListener::bind(address).map_err(failed)?;
+        let address = listener.local_addr().map_err(failed)?;
+        Ok(Self {
+            listener,
+            address,
+            token,
+        })
+    }
+
+    /// Returns the address that it listens at.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Returns the token that a reader needs.
+    pub fn token(&self) -> Option<&Token> {
+        self.token.as_ref()
+    }
+
+    /// Shows the runs that write to `out`, one after the other, until a signal arrives. `is_complete` returns whether a run that
+    /// has ended there has reached the end of its recording.
+    ///
+    /// # Errors
+    /// The system refuses a thread or the listener.
+    pub fn show(
+        self,
+        out: PathBuf,
+        is_complete: fn(&Path) -> bool,
+        signals: &Signals,
+    ) -> Result<(), WatchError> {
+        let board = Arc::new(Board::new(&out.display().to_string()));
+        let threads = observing::start(Followed {
+            out,
+            is_complete,
+            board: Arc::clone(&board),
+        })?;
+        let serving = Arc::clone(&board);
+        let server = thread::Builder::new().name("serve".to_owned());
+        let server = server.spawn(move || {
+            let served = self.serve(&serving);
+            // Without a server nothing is left to do.
+            serving.stop();
+            served
+        })?;
+        while !board.is_stopping() && !signals.sleep(LOOK)? {}
+        board.stop();
+        for thread in threads {
+            let _ = thread.join();
+        }
+        let died = || io::Error::other("its thread has died");
+        Ok(server.join().unwrap_or_else(|_| Err(died()))?)
+    }
+
+    fn serve(self, board: &Arc<Board>) -> io::Result<()> {
+        let mut stop = board.news.stop.subscribe();
+        let router = router(Shared {
+            board: Arc::clone(board),
+            access: Arc::new(Access::new(self.address, self.token)),
+            browsers: Arc::default(),
+        });
+        let runtime = runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()?;
+        runtime.block_on(async {
+            self.listener.set_nonblocking(true)?;
+            let listener = tokio::net::TcpListener::from_std(self.listener)?;
+            let mut stopped = stop.clone();
+            let stopping = async move {
+                let _ = stopped.wait_for(|stop| *stop).await;
+            };
+            let serving = axum::serve(listener, router).with_graceful_shutdown(stopping);
+            tokio::select! {
+                served = serving.into_future() => served,
+                () = async {
+                    let _ = stop.wait_for(|stop| *stop).await;
+                    time::sleep(STOP_TIMEOUT).await;
+                } => Ok(()),
+            }
+        })
+    }
+}
+
+fn router(shared: Shared) -> Router {
+    let files = page::FILES.into_iter();
+    let router = files.fold(Router::new(), |router, (path, kind, content)| {
+        router.route(path, get(move || async move { page::file(kind, content) }))
+    });
+    router
+        .route("/stream", get(stream))
+        .route("/metrics", get(scrape))
+        .layer(middleware::from_fn_with_state(shared.clone(), guard))
+        .with_state(shared)
+}
+
+/// Answers only who may read, whatever the path.
+async fn guard(State(shared): State<Shared>, request: Request, next: Next) -> Response {
+    let mut response = match shared.access.judge(request.uri(), request.headers()) {
+        Verdict::Granted => next.run(request).await,
+        Verdict::GrantedByAddress if request.uri().path() == "/" => {
+            // The token does not stay in the address, where others may see it.
+            let cookie = shared.access.cookie().unwrap_or_default();
+            ([(header::SET_COOKIE, cookie)], Redirect::to("/")).into_response()
+        }
+        Verdict::GrantedByAddress => next.run(request).await,
+        Verdict::NoToken => page::refusal(
+            StatusCode::UNAUTHORIZED,
+            "This page needs the token: open the whole address that `gyre watch` has printed.",
+        ),
+        Verdict::ForeignHost => page::refusal(
+            StatusCode::FORBIDDEN,
+            "This page is for this machine alone: open it as http://localhost, or start `gyre watch` with --listen.",
+        ),
+        Verdict::ForeignOrigin => page::refusal(
+            StatusCode::FORBIDDEN,
+            "A page of another site asked for this.",
+        ),
+    };
+    page::protect(response.headers_mut());
+    response
+}
+
+async fn stream(State(shared): State<Shared>, upgrade: WebSocketUpgrade) -> Response {
+    let Some(place) = Place::take(&shared.browsers) else {
+        let full = "As many browsers as there is room for are connected: close one.";
+        return page::refusal(StatusCode::SERVICE_UNAVAILABLE, full);
+    };
+    let upgrade = upgrade.max_message_size(MAX_RECEIVED);
+    upgrade.on_upgrade(move |socket| async move {
+        stream::serve(socket, shared.board).await;
+        drop(place);
+    })
+}
+
+async fn scrape(State(shared): State<Shared>, headers: HeaderMap) -> Response {
+    let accepted = headers.get(header::ACCEPT).map(HeaderValue::as_bytes);
+    let (kind, text) = metrics::scrape(&shared.board, accepted.unwrap_or_default());
+    ([(header::CONTENT_TYPE, kind)], text).into_response()
+}
+
+impl Place {
+    fn take(browsers: &Arc<AtomicUsize>) -> Option<Self> {
+        let place = Self(Arc::clone(browsers));
+        let taken = browsers.fetch_add(1, Ordering::Relaxed);
+        (taken < MAX_BROWSERS).then_some(place)
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
+    }
+}

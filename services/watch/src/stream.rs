@@ -1,0 +1,114 @@
+//! One browser: what it has had, and what it wants.
+
+use std::{sync::Arc, time::Duration};
+
+use axum::extract::ws::{Message, WebSocket};
+use tokio::{
+    sync::watch::Receiver,
+    time::{self, MissedTickBehavior},
+};
+
+use crate::{board::Board, messages::Layer, track::Cursor};
+
+/// Time between two messages of poses.
+const POSES_INTERVAL: Duration = Duration::from_millis(200);
+/// The longest time that a browser may take for one message.
+const MAX_SEND: Duration = Duration::from_secs(10);
+/// The layers by the names that a browser gives them.
+const LAYERS: [(&str, Layer); 3] = [
+    ("scan", Layer::Scan),
+    ("raster", Layer::Raster),
+    ("points", Layer::Points),
+];
+
+/// The layers that a browser wants. Dropped, it wants none.
+struct Wanted {
+    board: Arc<Board>,
+    layers: [bool; 3],
+}
+
+impl Wanted {
+    /// Takes the names of the layers, separated by spaces.
+    fn set(&mut self, names: &str) {
+        for (name, layer) in LAYERS {
+            let is_wanted = names.split(' ').any(|named| named == name);
+            let was_wanted = &mut self.layers[layer as usize];
+            if *was_wanted != is_wanted {
+                self.board.want(layer, is_wanted);
+                *was_wanted = is_wanted;
+            }
+        }
+    }
+
+    fn has(&self, layer: Layer) -> bool {
+        self.layers[layer as usize]
+    }
+}
+
+impl Drop for Wanted {
+    fn drop(&mut self) {
+        self.set("");
+    }
+}
+
+/// Sends news to a browser until it leaves, is too slow, or the program ends.
+pub async fn serve(mut socket: WebSocket, board: Arc<Board>) {
+    let news = &board.news;
+    let (mut run, mut health) = (news.run.subscribe(), news.health.subscribe());
+    let (mut scan, mut raster, mut points) = (
+        news.scan.subscribe(),
+        news.raster.subscribe(),
+        news.points.subscribe(),
+    );
+    let mut stop = news.stop.subscribe();
+    // The newest of each is news to one who comes.
+    run.mark_changed();
+    health.mark_changed();
+    for pictures in [&mut scan, &mut raster, &mut points] {
+        pictures.mark_changed();
+    }
+    let mut wanted = Wanted {
+        board: Arc::clone(&board),
+        layers: [false; 3],
+    };
+    let (mut cursor, mut had) = (Cursor::default(), None);
+    let mut tick = time::interval(POSES_INTERVAL);
+    tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    loop {
+        let message = tokio::select! {
+            biased;
+            _ = stop.wait_for(|stop| *stop) => Some(Message::Close(None)),
+            received = socket.recv() => match received {
+                Some(Ok(Message::Text(names))) => {
+                    wanted.set(&names);
+                    None
+                }
+                Some(Ok(Message::Close(_)) | Err(_)) | None => return,
+                Some(Ok(_)) => None,
+            },
+            Ok(()) = run.changed() => text(&mut run),
+            Ok(()) = health.changed() => text(&mut health),
+            _ = tick.tick() => board.poses(&mut cursor, &mut had).map(Message::Text),
+            Ok(()) = points.changed(), if wanted.has(Layer::Points) => binary(&mut points),
+            Ok(()) = raster.changed(), if wanted.has(Layer::Raster) => binary(&mut raster),
+            Ok(()) = scan.changed(), if wanted.has(Layer::Scan) => binary(&mut scan),
+        };
+        let Some(message) = message else { continue };
+        let is_last = matches!(message, Message::Close(_));
+        let sent = time::timeout(MAX_SEND, socket.send(message)).await;
+        if is_last || !matches!(sent, Ok(Ok(()))) {
+            return;
+        }
+    }
+}
+
+/// The newest message of a channel; none if nothing was ever sent.
+fn text(news: &mut Receiver<axum::extract::ws::Utf8Bytes>) -> Option<Message> {
+    let newest = news.borrow_and_update().clone();
+    (!newest.is_empty()).then_some(Message::Text(newest))
+}
+
+fn binary(news: &mut Receiver<axum::body::Bytes>) -> Option<Message> {
+    let newest = news.borrow_and_update().clone();
+    (!newest.is_empty()).then_some(Message::Binary(newest))
+}

@@ -1,0 +1,209 @@
+//! `gyre watch`: the page in a browser, who may read it, and the metrics.
+
+use std::{thread, time::Duration};
+
+use rustix::process::Signal;
+
+use crate::common::{Browser, Run, Running, Server, gyre};
+
+/// A drive that is still going on when a test ends it.
+fn long() -> Run {
+    small("scans = 4000").rate("2")
+}
+
+fn small(simulation: &str) -> Run {
+    Run::configured(&format!(
+        "[simulation]\n{simulation}\n[raster]\nn = 127\ncell_m = 0.8\n[masking]\nkind = \"threshold\"\n"
+    ))
+}
+
+fn started(run: &Run) -> Running {
+    let mut running = run.start();
+    running.await_poses(1);
+    running
+}
+
+/// Interrupts a run and waits for its end.
+fn interrupt(running: Running) {
+    running.signal(Signal::TERM);
+    assert_eq!(running.finish().code(), Some(130));
+}
+
+fn status(answer: &str) -> &str {
+    answer.lines().next().unwrap_or_default()
+}
+
+#[test]
+fn a_folder_without_a_run_is_refused_in_a_sentence() {
+    let run = small("scans = 8");
+    let output = gyre().arg("watch").arg(run.out()).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(said.starts_with("gyre: no run is writing to "), "{said}");
+    assert_eq!(said.lines().count(), 1);
+}
+
+#[test]
+fn on_this_machine_no_token_is_needed_and_no_other_name_is_answered() {
+    let run = long();
+    let running = started(&run);
+    let server = Server::start(&run, "127.0.0.1", &[]);
+    assert_eq!(server.token(), None);
+    let page = server.get("/", &[]);
+    assert_eq!(status(&page), "HTTP/1.1 200 OK");
+    assert!(page.contains("content-security-policy: default-src 'none'; script-src 'self'"));
+    for (path, header, expected) in [
+        ("/main.js", "Host: localhost", "200"),
+        ("/", "Host: rebound.example", "403"),
+        ("/metrics", "Origin: http://rebound.example", "403"),
+        ("/etc/passwd", "Host: localhost", "404"),
+        ("/../Cargo.toml", "Host: localhost", "404"),
+    ] {
+        let answer = server.get(path, &[header]);
+        assert!(
+            status(&answer).contains(expected),
+            "{path} {header}: {answer}"
+        );
+    }
+    server.interrupt();
+    interrupt(running);
+}
+
+#[test]
+fn from_other_machines_every_path_needs_the_token() {
+    let run = long();
+    let running = started(&run);
+    let file = run.folder().join("token");
+    let options = ["--token-file", file.to_str().unwrap()];
+    let server = Server::start(&run, "0.0.0.0", &options);
+    let token = server.token().unwrap().to_owned();
+    assert_eq!(std::fs::read_to_string(&file).unwrap().trim(), token);
+    let upgrade = [
+        "Upgrade: websocket",
+        "Sec-WebSocket-Version: 13",
+        "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==",
+    ];
+    for path in ["/", "/main.js", "/metrics", "/stream", "/nothing"] {
+        let answer = server.get(path, &upgrade);
+        assert!(status(&answer).contains("401"), "{path}: {answer}");
+    }
+    let first = server.get(&format!("/?token={token}"), &[]);
+    assert!(status(&first).contains("303"), "{first}");
+    let cookie = first
+        .lines()
+        .find_map(|line| line.strip_prefix("set-cookie: "))
+        .unwrap();
+    assert!(cookie.contains("HttpOnly; SameSite=Lax"), "{cookie}");
+    let cookie = format!("Cookie: {}", cookie.split(';').next().unwrap());
+    assert!(status(&server.get("/", &[&cookie])).contains("200"));
+    let bearer = format!("Authorization: Bearer {token}");
+    assert!(status(&server.get("/metrics", &[&bearer])).contains("200"));
+    server.interrupt();
+    interrupt(running);
+}
+
+#[test]
+fn metrics_count_poses_delays_and_restarts() {
+    let run = long();
+    let mut running = started(&run);
+    let server = Server::start(&run, "127.0.0.1", &[]);
+    let value = |metrics: &str, series: &str| -> f64 {
+        let line = metrics.lines().find_map(|line| line.strip_prefix(series));
+        line.and_then(|value| value.trim().parse().ok())
+            .unwrap_or(-1.0)
+    };
+    running.kill("refinement");
+    running.await_poses(12);
+    let mut metrics = String::new();
+    for _ in 0..600 {
+        metrics = server.get("/metrics", &[]);
+        let restarts = value(
+            &metrics,
+            "gyre_process_restarts_total{process=\"refinement\"}",
+        );
+        if restarts >= 1.0 && value(&metrics, "gyre_poses_total") >= 12.0 {
+            break;
+        }
+        thread::sleep(Duration::from_millis(100));
+    }
+    for (series, least) in [
+        ("gyre_up", 1.0),
+        ("gyre_poses_total", 12.0),
+        ("gyre_process_restarts_total{process=\"refinement\"}", 1.0),
+        ("gyre_sensor_to_pose_seconds_count", 1.0),
+        (
+            "gyre_hop_seconds_count{stage=\"masking\",part=\"work\"}",
+            1.0,
+        ),
+        ("gyre_process_memory_bytes{process=\"masking\"}", 1e5),
+        ("gyre_scans_dropped_total", 0.0),
+    ] {
+        assert!(value(&metrics, series) >= least, "{series}:\n{metrics}");
+    }
+    assert!(metrics.contains("content-type: text/plain; version=0.0.4"));
+    let newer = server.get("/metrics", &["Accept: application/openmetrics-text"]);
+    assert!(newer.contains("content-type: application/openmetrics-text"));
+    assert!(newer.trim_end().ends_with("# EOF"), "{newer}");
+    interrupt(running);
+    server.interrupt();
+}
+
+const POSES: &str = "Number(document.getElementById('poses').textContent)";
+
+#[test]
+fn the_page_shows_poses_a_killed_stage_and_the_end_of_each_run() {
+    let Some(mut browser) = Browser::start() else {
+        return;
+    };
+    let run = long();
+    let mut running = started(&run);
+    let server = Server::start(&run, "127.0.0.1", &[]);
+    browser.resize(1440, 900, false).go_to(&server.address);
+    browser.until("document.getElementById('state').textContent === 'Running'");
+    browser.until(&format!("{POSES} > 3"));
+    browser.until("document.getElementById('scan-caption').textContent.startsWith('Scan ')");
+    browser.until("document.querySelectorAll('#stages tr').length === 6");
+    running.kill("masking");
+    let restarted = "[...document.querySelectorAll('#processes tr')].some(row => row.cells[0].textContent === 'masking' && Number(row.cells[2].textContent) > 0)";
+    browser.until(restarted);
+    let poses = browser.evaluate(POSES).as_f64().unwrap();
+    browser.until(&format!("{POSES} > {}", poses + 4.0));
+    fits_a_phone(&mut browser);
+    interrupt(running);
+    browser.until("document.getElementById('state').textContent === 'Ended early'");
+    assert!(
+        browser
+            .text("banner")
+            .contains("The same command continues it")
+    );
+
+    // The next run in the same folder is shown, and the browser changes no result.
+    let short = small("scans = 40").option("--fresh");
+    let undisturbed = short.complete();
+    let watched = short.clone().into(run.out());
+    running = watched.start();
+    running.await_poses(40);
+    running.finish().succeeded();
+    browser.until("document.getElementById('state').textContent === 'Ended: complete'");
+    browser.until(&format!("{POSES} === 40"));
+    assert_eq!(watched.odometry(), undisturbed);
+    assert_eq!(browser.errors, [""; 0]);
+    server.interrupt();
+    browser.until("document.getElementById('state').textContent === 'Connection lost'");
+}
+
+/// Asserts that nothing is wider than a phone, and that nothing has moved since the page was opened.
+fn fits_a_phone(browser: &mut Browser) {
+    let moved = "new Promise((done) => {
+        let moved = 0;
+        new PerformanceObserver((list) => list.getEntries().forEach((entry) => { moved += entry.value; }))
+            .observe({ type: 'layout-shift', buffered: true });
+        setTimeout(() => done(moved), 300);
+    })";
+    let moved = browser.evaluate(moved).as_f64().unwrap();
+    assert!(moved < 0.1, "the layout has moved by {moved}");
+    browser.resize(390, 844, true);
+    browser.until("document.documentElement.clientWidth === 390");
+    let width = browser.evaluate("document.documentElement.scrollWidth");
+    assert_eq!(width.as_u64(), Some(390));
+}
