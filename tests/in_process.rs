@@ -19,7 +19,7 @@ fn register_all(run: &Run) -> Vec<Registered> {
     let mut dataset = preflight::open(&configuration).unwrap().dataset;
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut odometry = Odometry::new(&config).unwrap();
-    let scans = configuration.source.played(dataset.len());
+    let scans = configuration.source.played(dataset.as_ref());
     scans
         .map(|index| {
             scan.geometry = dataset.read(index, scan.slot()).unwrap();

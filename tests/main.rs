@@ -32,6 +32,7 @@ mod pipeline;
 mod python_stage;
 mod radar;
 mod real_scans;
+mod record;
 mod refinement;
 mod resources;
 mod restart;

@@ -48,7 +48,7 @@ impl Recording {
         };
         Ok(Self {
             data: configuration.data(),
-            played: configuration.source.played(dataset.len()),
+            played: configuration.source.played(dataset.as_ref()),
             dataset,
             truth,
         })

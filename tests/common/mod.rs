@@ -8,7 +8,7 @@ mod browser;
 mod ended;
 pub mod leftovers;
 pub mod odometry;
-mod processes;
+pub mod processes;
 pub mod recording;
 mod running;
 mod server;

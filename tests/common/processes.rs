@@ -67,6 +67,18 @@ pub fn run_of(pid: Pid) -> Option<PathBuf> {
     Some(PathBuf::from(OsStr::from_bytes(run)))
 }
 
+/// A living child of a supervisor with this word in its command.
+pub fn child_with(supervisor: Pid, word: &str) -> Option<Pid> {
+    let is_it = |pid: &Pid| {
+        let line = fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
+        parent_and_state(*pid).is_some_and(|(parent, state)| parent == supervisor && state != 'Z')
+            && line
+                .split(|byte| *byte == 0)
+                .any(|part| part == word.as_bytes())
+    };
+    pids().find(is_it)
+}
+
 fn pids() -> impl Iterator<Item = Pid> {
     let entries = fs::read_dir("/proc").unwrap();
     entries.filter_map(|entry| entry.ok()?.file_name().to_str()?.parse().ok())

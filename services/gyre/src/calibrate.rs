@@ -88,7 +88,7 @@ fn options(configuration: &Configuration) -> Result<DatasetOptions, Failure> {
     let own = configuration.dataset;
     match configuration.streamed() {
         Some(_) => Ok(own),
-        None => Ok(own.or(&gyre_radar::stored_options(&configuration.source.data)?)),
+        None => Ok(own.or(&gyre_recording::stored_options(&configuration.source.data)?)),
     }
 }
 
@@ -101,7 +101,7 @@ fn read(
     preflight::describe_masks(configuration)?;
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut drive = Drive::new(&configuration.odometry)?;
-    let played = configuration.source.played(dataset.len());
+    let played = configuration.source.played(dataset.as_ref());
     let (all, count) = (played.len(), played.len().min(arguments.scans));
     if count < all {
         let sentence =

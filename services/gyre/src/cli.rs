@@ -2,6 +2,7 @@
 
 mod conformance;
 mod operate;
+mod record;
 mod stress;
 mod watch;
 
@@ -20,6 +21,8 @@ pub use operate::{
 };
 pub use stress::StressArguments;
 pub use watch::WatchArguments;
+
+pub use record::RecordArguments;
 
 /// Radar odometry as cooperating processes over shared memory.
 ///
@@ -69,6 +72,8 @@ pub enum Command {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         words: Vec<String>,
     },
+    /// Record a running run as MCAP, for viewers and to replay it. It changes neither a result nor a latency.
+    Record(RecordArguments),
     /// Report what this machine lacks for a run.
     Doctor(DoctorArguments),
     /// End what stages have started when `gyre run` has ended (what `gyre run` starts).
@@ -101,9 +106,12 @@ pub enum Command {
 pub struct RunArguments {
     /// The configuration, a TOML file. Default: what the recording's format and its scans say.
     pub configuration: Option<PathBuf>,
-    /// The dataset's folder (source.data).
+    /// The dataset's folder, or a recording of a run, NAME.mcap (source.data).
     #[arg(long)]
     pub data: Option<PathBuf>,
+    /// Play a recording from this topic on, without the stages before it: masked, rotation, motion or refined (source.from).
+    #[arg(long, value_name = "TOPIC", requires = "data")]
+    pub from: Option<String>,
     /// The radar's address, as in 192.168.0.1: run live (source.kind, source.address, run.mode).
     #[arg(long, value_name = "ADDRESS", conflicts_with = "data")]
     pub radar: Option<String>,
@@ -116,6 +124,9 @@ pub struct RunArguments {
     /// Pace of the source: realtime, max, or a factor (run.rate).
     #[arg(long)]
     pub rate: Option<Rate>,
+    /// Record the run to this file, NAME.mcap (record.file).
+    #[arg(long, value_name = "FILE", value_parser = record::recording)]
+    pub record: Option<PathBuf>,
     /// Override a key, as in masking.kind=none; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
@@ -211,7 +222,7 @@ pub struct DoctorArguments {
 /// The arguments of `gyre inspect`.
 #[derive(Debug, Args)]
 pub struct InspectArguments {
-    /// The dataset's folder.
+    /// The dataset's folder, or a recording of a run.
     pub path: PathBuf,
     /// A trajectory of this dataset (TUM): checks whether the clock of each ground truth agrees.
     #[arg(long)]

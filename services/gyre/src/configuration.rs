@@ -16,13 +16,15 @@ use std::{
 use gyre_messages::{FollowerId, StageId, Window};
 use gyre_odometry::{OdometryConfig, SearchKind};
 use gyre_radar::DatasetOptions;
-use gyre_radar_replay::{SourceConfig, SourceKind};
+use gyre_radar_replay::{PlayedFrom, SourceConfig, SourceKind};
 use gyre_scan_matching::RefinementKind;
 use gyre_simulator::{OutputFormat, SimulationConfig};
 use gyre_slam::SlamConfig;
 use gyre_stage::supervise::{Program, RestartPolicy, Scheduling, StagePlan};
 use gyre_stress::{Budget, Scenario};
 use serde::{Deserialize, Serialize};
+
+use crate::record::RecordConfig;
 
 pub use error::ConfigurationError;
 pub use rate::Rate;
@@ -50,6 +52,8 @@ pub struct Configuration {
     /// A scenario whose purpose is a fault (`slow-stage`, `stopped`, `kills`) is judged by `recovery_ms` and by
     /// its own limits alone, and `bursts` by drops only if it names them. A run itself does not depend on it.
     pub budget: Budget,
+    /// The recording of the run as MCAP. Results do not depend on it.
+    pub record: RecordConfig,
     /// The command and the restarts of a stage: `radar-replay`, `masking`, `rotation-search`,
     /// `translation-search`, `joint-search`, `refinement`, `pose-integration`, `loop-closure`,
     /// `trajectory` or `localisation`.
@@ -194,6 +198,7 @@ impl Configuration {
             },
             slam: strict::section(&mut table, "slam")?,
             budget: budget(&mut table)?,
+            record: strict::section(&mut table, "record")?,
             stages: strict::sections(&mut table, "stages", &process_names())?,
         };
         let format = configuration.dataset.format.and_then(OutputFormat::read_as);
@@ -215,6 +220,7 @@ impl Configuration {
             "refinement",
             "slam",
             "budget",
+            "record",
             "stages",
         ];
         match table.keys().next() {
@@ -306,6 +312,19 @@ impl Configuration {
         }
     }
 
+    /// Returns whether the run starts this stage: it has it, and a recording does not take its place.
+    pub fn starts(&self, stage: StageId) -> bool {
+        let computes = match stage {
+            StageId::RadarReplay | StageId::PoseIntegration => None,
+            StageId::Masking => Some(PlayedFrom::Masked),
+            StageId::RotationSearch => Some(PlayedFrom::Rotation),
+            StageId::TranslationSearch | StageId::JointSearch => Some(PlayedFrom::Motion),
+            StageId::Refinement => Some(PlayedFrom::Refined),
+        };
+        // The topics are in the order of the stream.
+        self.has(stage) && computes.is_none_or(|topic| topic as u8 > self.source.from as u8)
+    }
+
     /// Returns the processes to start: `gyre stage NAME`, or their replacements.
     pub fn stage_plans(&self, gyre: &Path) -> Vec<StagePlan> {
         let live = self.run.mode == Mode::Live;
@@ -339,7 +358,7 @@ impl Configuration {
                 restarts_all: live && name == StageId::Masking.name(),
             }
         };
-        let stages = StageId::ALL.into_iter().filter(|stage| self.has(*stage));
+        let stages = StageId::ALL.into_iter().filter(|stage| self.starts(*stage));
         let window = self.window(None, 1);
         let followers = FollowerId::ALL.into_iter().filter(|it| it.is_in(&window));
         let followers = followers.map(FollowerId::name);
@@ -368,11 +387,14 @@ impl Configuration {
             let mut table = table.clone();
             table.remove("stages");
             table.remove("budget");
+            table.remove("record");
             for (section, keys) in [
                 ("run", &["mode"][..]),
                 (
                     "source",
-                    &["kind", "address", "data", "first", "scans", "repeat"],
+                    &[
+                        "kind", "address", "data", "from", "first", "scans", "repeat",
+                    ],
                 ),
             ] {
                 if let Some(section) = table.get_mut(section).and_then(|key| key.as_table_mut()) {

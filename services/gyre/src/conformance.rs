@@ -40,7 +40,7 @@ pub fn conformance(arguments: &ConformanceArguments) -> Result<ExitCode, Failure
         .tempdir()?;
     let dataset = preflight::open(&configuration)?.dataset;
     let scans = Scans {
-        played: configuration.source.played(dataset.len()),
+        played: configuration.source.played(dataset.as_ref()),
         dataset,
     };
     let subject = Subject {
@@ -121,6 +121,8 @@ fn configuration(
         out: None,
         calibration: None,
         rate: None,
+        from: None,
+        record: None,
         set: small.chain(arguments.set.clone()).chain(lossless).collect(),
         fresh: false,
     })?;

@@ -140,7 +140,7 @@ fn known_poses(
         true => complete_poses(out.path(), &slam.places, content.poses).map_err(damaged)?,
         false => content.poses,
     };
-    if !configuration.has(StageId::Refinement) {
+    if !configuration.starts(StageId::Refinement) {
         return Ok(complete);
     }
     let path = checkpoint::path(out.path());

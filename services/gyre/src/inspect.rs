@@ -16,11 +16,9 @@ pub fn inspect(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
         .as_deref()
         .map(read_trajectory)
         .transpose()?;
-    let report = gyre_radar::inspect::inspect(
-        &arguments.path,
-        &DatasetOptions::default(),
-        trajectory.as_ref(),
-    )?;
+    let (path, options) = (&arguments.path, DatasetOptions::default());
+    let dataset = gyre_recording::open(path, &options)?;
+    let report = gyre_radar::inspect_dataset(path, dataset, &options, trajectory.as_ref());
     match arguments.json {
         true => print::line(serde_json::to_string_pretty(&report)?)?,
         false => print::line(report)?,

@@ -28,6 +28,7 @@ pub mod program;
 pub mod progress;
 pub mod radar;
 pub mod radar_server;
+pub mod record;
 pub mod results;
 pub mod run;
 pub mod schema;
@@ -87,6 +88,10 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
             stress::stress(&arguments)
         }
         Command::StressHelper { words } => stress::help(&words),
+        Command::Record(arguments) => {
+            gyre_stage::run::keep_files_private();
+            Ok(record::record(&arguments))
+        }
         Command::Doctor(arguments) => doctor::doctor(&arguments),
         Command::RadarServer(arguments) => radar_server::serve(&arguments),
         Command::Inspect(arguments) => inspect::inspect(&arguments),

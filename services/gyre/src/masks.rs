@@ -35,7 +35,7 @@ pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
     let Played { dataset, .. } = preflight::open(&configuration)?;
     let chosen = choose(
         arguments,
-        configuration.source.played(dataset.len()),
+        configuration.source.played(dataset.as_ref()),
         &configuration.data(),
     )?;
     let mut inspector = MaskInspector::new(&configuration, dataset)?;

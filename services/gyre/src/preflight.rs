@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use gyre_masking::{MaskKind, Masker, backend::Library, model::Card, runtime::INSTALL};
-use gyre_messages::{Footprint, Limits, Window};
+use gyre_messages::{Footprint, Limits, StageId, Window};
 use gyre_odometry::OdometryConfig;
-use gyre_radar::{Dataset, Fingerprint};
-use gyre_radar_replay::Listing;
+use gyre_radar::{DEFAULT_TURN_NS, Dataset, Fingerprint, turn_ns};
+use gyre_radar_replay::{Listing, PlayedFrom, Player};
 use gyre_simulator::SimulatedDrive;
 use gyre_stage::run::free_shared_memory;
 use rustix::process::{Resource, getrlimit};
@@ -25,6 +25,16 @@ pub enum PreflightError {
         "no dataset is named: give its folder with --data, or as source.data in the configuration, or add a section [simulation]"
     )]
     NoData,
+    /// A recording of a run is needed.
+    #[error(
+        "--from {from} (source.from) plays the messages of a recorded run, and {data} is no such recording: `gyre record` and `gyre run --record` make one"
+    )]
+    NoRecording {
+        /// The topic.
+        from: &'static str,
+        /// What was named.
+        data: String,
+    },
     /// A recording is needed.
     #[error("the configuration is of {radar}, but this needs a recording: name one with --data")]
     Radar {
@@ -94,6 +104,9 @@ pub struct Recording {
 pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure> {
     let scans = match configuration.is_radar() {
         true => Scans::of_radar(configuration)?,
+        false if configuration.source.from != PlayedFrom::Scan => {
+            Scans::of_messages(configuration)?
+        }
         false => Scans::of_recording(configuration)?,
     };
     let masker = Masker::new(
@@ -138,7 +151,7 @@ struct Scans {
 impl Scans {
     fn of_recording(configuration: &Configuration) -> Result<Self, crate::Failure> {
         let Played { dataset, truth } = open(configuration)?;
-        let count = configuration.source.stream_len(dataset.len());
+        let count = configuration.source.stream_len(dataset.as_ref());
         if let Some(scans @ 0..2) = count {
             return Err(PreflightError::TooFew {
                 path: configuration.data(),
@@ -159,6 +172,29 @@ impl Scans {
             bytes: dataset.limits().bytes,
             truth,
             recording,
+        })
+    }
+
+    /// The messages of a recording, which take the place of stages.
+    fn of_messages(configuration: &Configuration) -> Result<Self, crate::Failure> {
+        let source = &configuration.source;
+        if !gyre_recording::is_recording(&source.data) {
+            return Err(PreflightError::NoRecording {
+                from: source.from.name(),
+                data: configuration.data(),
+            }
+            .into());
+        }
+        let refines = configuration.has(StageId::Refinement);
+        let topics = source.from.topics(refines, configuration.slam.is_on());
+        let player = Player::open(source, topics)?;
+        let stamps: Vec<i64> = player.stamps_ns().collect();
+        Ok(Self {
+            count: Some(stamps.len()),
+            period_ns: turn_ns(stamps.into_iter()).unwrap_or(DEFAULT_TURN_NS),
+            bytes: 0,
+            truth: None,
+            recording: None,
         })
     }
 
@@ -254,7 +290,7 @@ pub fn open(configuration: &Configuration) -> Result<Played, crate::Failure> {
     match data.as_os_str().is_empty() {
         true => Err(PreflightError::NoData.into()),
         false => Ok(Played {
-            dataset: gyre_radar::open(data, options)?,
+            dataset: gyre_recording::open(data, options)?,
             truth: None,
         }),
     }

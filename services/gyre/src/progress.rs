@@ -69,6 +69,7 @@ impl Progress {
             Event::GaveUp { follower, error } => {
                 self.say(&format!("{error}: odometry goes on without {follower}"));
             }
+            Event::Recorder { sentence } => self.say(sentence),
             Event::Stalled(stall) => self.say(&stall.to_string()),
             Event::Following { follower, progress } => self.following(follower, *progress),
             Event::Swapped { stage, command } => {

@@ -26,7 +26,7 @@ pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
     // The angles of an encoder are sent as it counts them: who receives them corrects its eccentricity.
     configuration.dataset.azimuth_eccentricity_rad = Some(0.0);
     let Played { mut dataset, .. } = preflight::open(&configuration)?;
-    let mut scans = configuration.source.played(dataset.len());
+    let mut scans = configuration.source.played(dataset.as_ref());
     if let Some(count) = arguments.scans {
         scans.end = scans.end.min(scans.start.saturating_add(count));
     }

@@ -73,7 +73,12 @@ pub fn results_folder(arguments: &RunArguments) -> PathBuf {
     let name = match file {
         Some(file) => file.file_stem(),
         None if arguments.radar.is_some() => Some("radar".as_ref()),
-        None => data.as_deref().and_then(Path::file_name),
+        None => data
+            .as_deref()
+            .and_then(|data| match gyre_recording::is_recording(data) {
+                true => data.file_stem(),
+                false => data.file_name(),
+            }),
     };
     let name = name.unwrap_or_default();
     arguments
@@ -101,6 +106,9 @@ fn make_ready(
         // A run that goes on needs the recording that it was begun with.
         let replace = unfinished.is_none();
         simulate::store(simulation, &configuration.source.data, replace)?;
+    }
+    if unfinished.is_none() {
+        configuration.record.require_new()?;
     }
     preflight::check_open_files()?;
     // The stages read the options of dataset.toml from here: it may change while they run.
@@ -192,7 +200,7 @@ pub(crate) fn with_stored_options(configuration: &Configuration) -> Result<Confi
     let mut resolved = configuration.clone();
     let data = &configuration.source.data;
     if configuration.streamed().is_none() && !data.as_os_str().is_empty() {
-        let stored = gyre_radar::stored_options(data)?;
+        let stored = gyre_recording::stored_options(data)?;
         resolved.dataset = resolved.dataset.or(&stored);
     }
     Ok(resolved)
@@ -219,11 +227,12 @@ fn prepare(
 fn plan(configuration: &Configuration, manifest: Manifest) -> Plan {
     let gyre = program::own();
     Plan {
-        manifest,
         stages: configuration.stage_plans(&gyre),
+        recorder: configuration.record.plan(&gyre, &manifest.out),
         guardian: vec![gyre.to_string_lossy().into_owned(), "guard".to_owned()],
         stall_timeout: limit(configuration.run.stall_timeout_s),
         start_timeout: limit(configuration.run.start_timeout_s),
+        manifest,
     }
 }
 

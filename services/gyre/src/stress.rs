@@ -13,6 +13,7 @@ use crate::{
     out::Out,
     preflight::{self, Preflight},
     print, program,
+    record::RecordConfig,
     run::resolve::resolve,
     simulate,
 };
@@ -65,9 +66,13 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
         out: None,
         calibration: None,
         rate: None,
+        from: None,
+        record: None,
         set: arguments.set.clone(),
         fresh: true,
     })?;
+    // Many runs would write to one file.
+    configuration.record = RecordConfig::default();
     render(&mut configuration, &out)?;
     // First, since a radar that is configured is no recording, and would be asked for its scans.
     let played = preflight::open(&configuration)?;

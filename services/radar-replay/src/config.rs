@@ -2,8 +2,11 @@
 
 use std::{num::NonZeroUsize, ops::Range, path::PathBuf, time::Duration};
 
+use gyre_radar::Dataset;
 use gyre_stage::source::Tolerance;
 use serde::{Deserialize, Serialize};
+
+use crate::PlayedFrom;
 
 /// Where scans come from.
 #[derive(
@@ -32,6 +35,10 @@ pub struct SourceConfig {
     pub silence_s: f64,
     /// Folder of the recording; `--data` on the command line.
     pub data: PathBuf,
+    /// Topic from which on a recording of a run is played: `scan`, `masked`, `rotation`, `motion` or `refined`; `--from` on the
+    /// command line. The stages before it are absent. Of all but `scan` every message must have been recorded.
+    #[serde(skip_serializing_if = "is_scan")]
+    pub from: PlayedFrom,
     /// First scan to play, from 0.
     pub first: usize,
     /// Number of scans to play. Default: all, and of a radar without end.
@@ -61,6 +68,10 @@ fn is_one(value: &NonZeroUsize) -> bool {
     value.get() == 1
 }
 
+fn is_scan(from: &PlayedFrom) -> bool {
+    *from == PlayedFrom::Scan
+}
+
 impl Default for SourceConfig {
     fn default() -> Self {
         Self {
@@ -68,6 +79,7 @@ impl Default for SourceConfig {
             address: String::new(),
             silence_s: 3.0,
             data: PathBuf::new(),
+            from: PlayedFrom::Scan,
             first: 0,
             scans: None,
             repeat: false,
@@ -79,27 +91,32 @@ impl Default for SourceConfig {
 }
 
 impl SourceConfig {
-    /// Returns the scans to play of a recording of `scans` scans, by their index in it.
-    pub fn played(&self, scans: usize) -> Range<usize> {
-        let first = self.first.min(scans);
+    /// Returns the scans to play of a dataset, by their index in it.
+    pub fn played(&self, dataset: &dyn Dataset) -> Range<usize> {
+        let scans = dataset.len();
+        let first = self.first.max(dataset.first()).min(scans);
         let end = first.saturating_add(self.scans.unwrap_or(usize::MAX));
         first..end.min(scans)
     }
 
-    /// Returns the scans of the stream that is played of a recording of `scans` scans, counted on through all turns. It ends at
-    /// `usize::MAX` if it is without end.
-    pub fn stream(&self, scans: usize) -> Range<usize> {
-        let once = self.played(scans);
+    /// Returns the scans of the stream that is played of a dataset, counted on through all turns. It ends at `usize::MAX` if it is
+    /// without end.
+    pub fn stream(&self, dataset: &dyn Dataset) -> Range<usize> {
+        self.turned(self.played(dataset))
+    }
+
+    /// Returns the number of scans of [`stream`](Self::stream); `None`: without end.
+    pub fn stream_len(&self, dataset: &dyn Dataset) -> Option<usize> {
+        let stream = self.stream(dataset);
+        (stream.end < usize::MAX).then_some(stream.len())
+    }
+
+    /// Returns the scans of a stream whose first turn is this one.
+    fn turned(&self, once: Range<usize>) -> Range<usize> {
         match self.repeat && !once.is_empty() {
             true => once.start..once.start.saturating_add(self.scans.unwrap_or(usize::MAX)),
             false => once,
         }
-    }
-
-    /// Returns the number of scans of [`stream`](Self::stream); `None`: without end.
-    pub fn stream_len(&self, scans: usize) -> Option<usize> {
-        let stream = self.stream(scans);
-        (stream.end < usize::MAX).then_some(stream.len())
     }
 
     /// Returns the limits on input that cannot be read.
@@ -117,16 +134,17 @@ mod tests {
 
     #[test]
     fn a_stream_that_repeats_has_no_end_unless_its_scans_are_counted() {
-        let source = |repeat, scans| SourceConfig {
-            first: 3,
-            repeat,
-            scans,
-            ..SourceConfig::default()
+        let turned = |repeat, scans, once: Range<usize>| {
+            let source = SourceConfig {
+                repeat,
+                scans,
+                ..SourceConfig::default()
+            };
+            source.turned(once)
         };
-        assert_eq!(source(false, Some(100)).stream(10), 3..10);
-        assert_eq!(source(true, Some(100)).stream(10), 3..103);
-        assert_eq!(source(true, Some(100)).stream_len(10), Some(100));
-        assert_eq!(source(true, None).stream_len(10), None);
-        assert_eq!(source(true, None).stream_len(3), Some(0));
+        assert_eq!(turned(false, Some(100), 3..10), 3..10);
+        assert_eq!(turned(true, Some(100), 3..10), 3..103);
+        assert_eq!(turned(true, None, 3..10), 3..usize::MAX);
+        assert_eq!(turned(true, None, 3..3), 3..3);
     }
 }

@@ -4,6 +4,7 @@
 
 mod config;
 mod listing;
+mod player;
 mod turns;
 
 use std::{error::Error, num::NonZeroUsize, ops::Range, path::Path};
@@ -17,6 +18,7 @@ use gyre_stage::{
 
 pub use config::{SourceConfig, SourceKind};
 pub use listing::Listing;
+pub use player::{PlayedFrom, Player, play_recorded};
 use turns::Turns;
 
 /// A playback with a longer delay is reported, s.
@@ -37,6 +39,9 @@ pub enum Pace {
 /// An invalid configuration, a recording that cannot be opened, or an error of [`source::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let config: SourceConfig = launch.section("source")?;
+    if config.from != PlayedFrom::Scan {
+        return play_recorded(launch);
+    }
     let options: DatasetOptions = launch.section("dataset")?;
     // The supervisor has opened it before, so whatever is wrong now may pass. It has resolved the options too: a dataset.toml
     // that is changed during a run does not change the run.
@@ -56,9 +61,9 @@ fn open(
 ) -> Result<Box<dyn Dataset>, Box<dyn Error>> {
     Ok(match Listing::read(root)? {
         Some(Listing { format, files }) => {
-            gyre_radar::reopen(&config.data, options, format, files)?
+            gyre_recording::reopen(&config.data, options, format, files)?
         }
-        None => gyre_radar::open_resolved(&config.data, options)?,
+        None => gyre_recording::open_resolved(&config.data, options)?,
     })
 }
 
@@ -73,8 +78,8 @@ pub fn play(
 ) -> Result<StageCounters, StageError> {
     let config: SourceConfig = launch.section("source")?;
     let mut replay = Replay {
-        scans: config.stream(dataset.len()),
-        turns: Turns::of(config.played(dataset.len()), dataset.as_ref()),
+        scans: config.stream(dataset.as_ref()),
+        turns: Turns::of(config.played(dataset.as_ref()), dataset.as_ref()),
         burst: config.burst,
         dataset,
         pace,

@@ -58,4 +58,4 @@ pub use refined::Refined;
 pub use refinement::{RefinementRecord, initial_guess, outcome};
 pub use rotation::{Rotation, RotationEstimate, RotationHeader};
 pub use scan::{Scan, ScanHeader};
-pub use topics::{Footprint, Topic, topics};
+pub use topics::{Footprint, Topic, topic, topics};

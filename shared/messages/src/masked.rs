@@ -35,6 +35,13 @@ impl Message for Masked {
         header.check(bytemuck::cast_slice(payload), limits)
     }
 
+    /// The rasters, and the points after them.
+    fn content_bytes(header: &Self::Header) -> Option<usize> {
+        let points = (header.points as usize).checked_mul(size_of::<SparsePoint>())?;
+        let rasters = header.first_point()?.checked_mul(size_of::<f32>())?;
+        rasters.checked_add(points)
+    }
+
     /// In a run with SLAM pose-integration reads the points of keyframes.
     fn sizes(window: &Window) -> TopicSizes {
         window.queues(Self::HISTORY, Self::READERS + usize::from(window.slam))
@@ -186,9 +193,14 @@ impl MaskedHeader {
         ArrayView2::from_shape((n, n), cells).ok()
     }
 
+    /// Returns the number of values before the points.
+    fn first_point(&self) -> Option<usize> {
+        (self.rasters as usize).checked_mul(Self::raster_values(self.n as usize)?)
+    }
+
     /// Returns the scan's points; `None` if the payload is shorter than the header says.
     pub fn points<'a>(&self, values: &'a [f32]) -> Option<&'a [SparsePoint]> {
-        let first = (self.rasters as usize).checked_mul(Self::raster_values(self.n as usize)?)?;
+        let first = self.first_point()?;
         let floats = size_of::<SparsePoint>() / size_of::<f32>();
         let count = (self.points as usize).checked_mul(floats)?;
         Some(bytemuck::cast_slice(values.get(first..)?.get(..count)?))

@@ -13,7 +13,12 @@ use crate::{
 };
 
 /// A fixed header that starts with an [`Item`].
-pub trait Header: ZeroCopySend + Default + Debug + 'static {
+pub trait Header: ZeroCopySend + Pod + Default + Debug + 'static {
+    /// Returns the name of the type with its version, as the transport compares it.
+    fn type_name() -> &'static str {
+        // SAFETY: the function returns a constant; it is unsafe to implement, not to call.
+        unsafe { <Self as ZeroCopySend>::type_name() }
+    }
     /// The scan that the message is about.
     fn item(&self) -> &Item;
     /// The same, to fill in.
@@ -89,6 +94,12 @@ pub trait Message: 'static {
         payload: &[Self::Element],
         limits: &Limits,
     ) -> Result<(), Violation>;
+
+    /// Returns the bytes of the payload that the header describes; what follows them in memory has no meaning. `None`: more than a
+    /// payload can have.
+    fn content_bytes(_header: &Self::Header) -> Option<usize> {
+        Some(0)
+    }
 
     /// The sizes of the topic's queues.
     fn sizes(window: &Window) -> TopicSizes {

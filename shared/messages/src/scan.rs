@@ -1,6 +1,6 @@
 //! `scan`: one polar scan as measured by the sensor.
 
-use bytemuck::Zeroable;
+use bytemuck::{Pod, Zeroable};
 use gyre_radar::{MAX_AZIMUTHS, PolarScan, ScanSlot, Sense, SweepGeometry};
 use iceoryx2::prelude::ZeroCopySend;
 
@@ -36,6 +36,11 @@ impl Message for Scan {
         ByteBlock::count(limits.scan_bytes)
     }
 
+    /// Up to the last bin of the last row.
+    fn content_bytes(header: &Self::Header) -> Option<usize> {
+        header.end()
+    }
+
     /// In live mode the history holds the scans that are published while masking restarts.
     fn sizes(window: &Window) -> TopicSizes {
         let sizes = window.queues(Self::HISTORY, Self::READERS);
@@ -55,7 +60,7 @@ header!(ScanHeader);
 
 /// The geometry of a scan, and the measured angle and time of each azimuth.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Zeroable, ZeroCopySend)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
 #[type_name("gyre_scan_header_v3")]
 pub struct ScanHeader {
     /// The scan.
@@ -94,13 +99,7 @@ impl ScanHeader {
     /// Returns a view of the scan in this header and its payload; `None` if the payload is shorter than the header says.
     pub fn view<'a>(&'a self, bytes: &'a [u8]) -> Option<PolarScan<'a>> {
         let geometry = self.geometry();
-        let last_byte = geometry.first_byte.checked_add(
-            geometry
-                .stride
-                .checked_mul(geometry.azimuths.checked_sub(1)?)?,
-        )?;
-        let fits = geometry.azimuths <= MAX_AZIMUTHS
-            && last_byte.checked_add(geometry.bins)? <= bytes.len();
+        let fits = geometry.azimuths <= MAX_AZIMUTHS && self.end()? <= bytes.len();
         fits.then(|| PolarScan {
             geometry,
             bytes,
@@ -108,6 +107,16 @@ impl ScanHeader {
             stamp_ns: &self.azimuth_stamp_ns[..geometry.azimuths],
             flags: &self.azimuth_flags[..geometry.azimuths],
         })
+    }
+
+    /// Returns the position behind the last bin of the last row; `None` without rows, or beyond all memory.
+    fn end(&self) -> Option<usize> {
+        let geometry = self.geometry();
+        let rows = geometry
+            .stride
+            .checked_mul(geometry.azimuths.checked_sub(1)?)?;
+        let last_row = geometry.first_byte.checked_add(rows)?;
+        last_row.checked_add(geometry.bins)
     }
 
     /// Checks the geometry, the angles and the times, and that the payload is as long as the geometry says.

@@ -10,7 +10,7 @@ use crate::{
     fix::Fix,
     limits::{Limits, TopicSizes, Window},
     masked::Masked,
-    message::{Message, Sender},
+    message::{Header, Message, Sender},
     motion::Motion,
     pose::Pose,
     refined::Refined,
@@ -32,6 +32,10 @@ pub struct Topic {
     pub sizes: fn(&Window) -> TopicSizes,
     /// Bytes of its largest sample in shared memory.
     pub max_sample_bytes: fn(&Limits) -> usize,
+    /// The name of its header's type, with the version.
+    pub header_type: fn() -> &'static str,
+    /// Bytes of its header.
+    pub header_bytes: usize,
 }
 
 impl Topic {
@@ -41,6 +45,8 @@ impl Topic {
             sender: M::SENDER,
             sizes: M::sizes,
             max_sample_bytes: max_sample_bytes::<M>,
+            header_type: <M::Header as Header>::type_name,
+            header_bytes: size_of::<M::Header>(),
         }
     }
 }
@@ -72,6 +78,11 @@ pub fn topics(window: &Window) -> impl Iterator<Item = &'static Topic> + use<> {
         Sender::Stage(_) => true,
         Sender::Follower(follower) => follower.is_in(&window),
     })
+}
+
+/// Returns the topic of this name.
+pub fn topic(name: &str) -> Option<&'static Topic> {
+    TOPICS.iter().find(|topic| topic.name == name)
 }
 
 fn max_sample_bytes<M: Message>(limits: &Limits) -> usize {

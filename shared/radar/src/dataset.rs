@@ -34,7 +34,7 @@ pub use format::Format;
 pub use image_size::ImageSize;
 pub use image_source::ImageSource;
 pub use options::{AzimuthSource, DatasetOptions};
-pub use stamp::middle_ns;
+pub use stamp::{DEFAULT_TURN_NS, middle_ns, turn_ns};
 
 /// The scans of one recording, ordered by time.
 ///
@@ -45,6 +45,11 @@ pub trait Dataset: Send {
 
     /// Number of scans.
     fn len(&self) -> usize;
+
+    /// Index of the first scan that can be read; those before it are of another part of the drive.
+    fn first(&self) -> usize {
+        0
+    }
 
     /// Returns whether there is no scan; `open` rejects such a folder.
     fn is_empty(&self) -> bool {
@@ -164,5 +169,11 @@ fn open_found(
         Format::MulranOxfordForm => Box::new(mulran::open_oxford_form(found, options)?),
         Format::Radiate => Box::new(radiate::open(found, options)?),
         Format::Fomo => Box::new(fomo::open(found, options)?),
+        Format::Mcap => {
+            let path = found.folder.display();
+            return Err(OpenError::Recording(format!(
+                "{path} is a folder of images, and the format `mcap` is that of a recording of a run, a file"
+            )));
+        }
     })
 }

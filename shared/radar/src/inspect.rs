@@ -89,13 +89,23 @@ pub fn inspect(
     options: &DatasetOptions,
     trajectory: Option<&Trajectory>,
 ) -> Result<Report, OpenError> {
-    let mut dataset = open(root, options)?;
+    let dataset = open(root, options)?;
+    Ok(inspect_dataset(root, dataset, options, trajectory))
+}
+
+/// Examines an open dataset, which was opened at `root` with `options`.
+pub fn inspect_dataset(
+    root: &Path,
+    mut dataset: Box<dyn Dataset>,
+    options: &DatasetOptions,
+    trajectory: Option<&Trajectory>,
+) -> Report {
     let timing = timing::examine(dataset.as_ref());
     let read = read_scans(dataset.as_mut());
     let mut report = assemble(root, dataset.as_ref(), read, timing);
     report.ground_truths = ground_truth::examine(root, dataset.as_ref(), trajectory);
     report.findings = findings::list(&report, dataset.notes(), options);
-    Ok(report)
+    report
 }
 
 /// Results of reading the scans.
@@ -113,7 +123,7 @@ fn read_scans(dataset: &mut dyn Dataset) -> ScansRead {
         .max(1);
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let (mut survey, mut unreadable, mut scans_read) = (rows::Survey::default(), Vec::new(), 0);
-    for index in (0..dataset.len()).step_by(step) {
+    for index in (dataset.first()..dataset.len()).step_by(step) {
         scans_read += 1;
         match dataset.read(index, scan.slot()) {
             Ok(geometry) => {

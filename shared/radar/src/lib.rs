@@ -23,15 +23,15 @@ pub mod trajectory;
 
 pub use chain::{MAX_INTERVAL_NS, continues};
 pub use dataset::{
-    AzimuthSource, Dataset, DatasetOptions, FileList, Format, ImageSize, ImageSource, OpenError,
-    ReadError, correct_eccentricity, middle_ns, open, open_resolved, open_source, reopen,
-    stored_options,
+    AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize,
+    ImageSource, OpenError, ReadError, correct_eccentricity, middle_ns, open, open_resolved,
+    open_source, reopen, stored_options, turn_ns,
 };
 pub use fingerprint::Fingerprint;
 pub use ground_truth::{
     TrajectoryError, find_ground_truth, read_trajectory, write_kitti, write_tum,
 };
-pub use inspect::{Report, inspect};
+pub use inspect::{Report, inspect, inspect_dataset};
 pub use median::median;
 pub use points::{PointExtractor, PointsConfig, PointsError};
 pub use raster::{RasterConfig, RasterError, Rasteriser, Sampling};

@@ -73,7 +73,11 @@ impl OutputFormat {
             Format::Oxford => Some(Self::Oxford),
             Format::Boreas | Format::BoreasRt => Some(Self::Boreas),
             Format::Radiate => Some(Self::Radiate),
-            Format::Oord | Format::Mulran | Format::MulranOxfordForm | Format::Fomo => None,
+            Format::Oord
+            | Format::Mulran
+            | Format::MulranOxfordForm
+            | Format::Fomo
+            | Format::Mcap => None,
         }
     }
 }

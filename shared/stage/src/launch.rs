@@ -110,7 +110,7 @@ impl Launch {
             let input = Some(input.as_fd());
             let woken = self
                 .signals
-                .wait_or_readable(&[], None, input, wake::MAX_WAIT)?;
+                .wait_or_readable(&[], &[], input, wake::MAX_WAIT)?;
             if woken.stop {
                 return Ok(false);
             }
@@ -215,7 +215,10 @@ fn leave_last_words(stage: &str, sentence: &str) {
 
 /// Starts logging to `log.jsonl`, to which all processes append one line per event. While the returned span lives, each line
 /// carries the name of the stage.
-fn start_log(manifest: &Manifest, name: &str) -> Result<EnteredSpan, StageError> {
+///
+/// # Errors
+/// The log cannot be opened.
+pub fn start_log(manifest: &Manifest, name: &str) -> Result<EnteredSpan, StageError> {
     let path = manifest.events();
     let file = OpenOptions::new()
         .append(true)

@@ -7,7 +7,7 @@
 
 use std::{
     fs::File,
-    path::Path,
+    path::{Path, PathBuf},
     thread,
     time::{Duration, Instant},
 };
@@ -23,7 +23,7 @@ use crate::{
     reader::Received,
     run,
     services::{self, Ipc, Node, Topic},
-    wake,
+    wake::{self, Signals},
 };
 
 /// The name of the nodes and the subscribers of observers. Those of a topic are counted by it.
@@ -105,6 +105,14 @@ impl ObservedRun {
         &self.manifest
     }
 
+    /// Tells the supervisor, if it has started this process as its recorder, that all topics are observed.
+    ///
+    /// # Errors
+    /// A file of the run cannot be written.
+    pub fn is_ready(&self) -> Result<(), StageError> {
+        run::write(ready_file(&self.manifest.root), "")
+    }
+
     /// Returns whether the run has ended and removed its files.
     pub fn has_ended(&self) -> bool {
         rustix::fs::fstat(&self.file).is_ok_and(|file| file.st_nlink == 0)
@@ -178,6 +186,11 @@ impl ObservedRun {
     }
 }
 
+/// Returns the file in the run's root that the recorder writes when it observes all topics.
+pub(crate) fn ready_file(root: &Path) -> PathBuf {
+    root.join("recorder.ready")
+}
+
 fn observers_of<M: Message>(topic: &Topic<M>, name: &PortName) -> usize {
     let mut observers = 0;
     topic.dynamic_config().list_subscribers(|subscriber| {
@@ -213,6 +226,11 @@ impl<M: Message> Observer<'_, M> {
         }
     }
 
+    /// Returns the listener that the publisher notifies: see [`wait_for_any`].
+    pub fn listener(&self) -> &Listener {
+        &self.data
+    }
+
     /// Returns the number of items missed since the observer attached.
     pub fn missed(&self) -> u64 {
         self.sequence.missed
@@ -241,6 +259,23 @@ impl<M: Message> Observer<'_, M> {
         self.looked = Instant::now();
         Ok(())
     }
+}
+
+/// Sleeps until one of several observers may have a message, a signal requests a stop (then true), or `limit` has passed, and on
+/// for as long as an observer rests between two looks.
+///
+/// # Errors
+/// The system refuses to wait.
+pub fn wait_for_any(
+    signals: &Signals,
+    listeners: &[&Listener],
+    limit: Duration,
+) -> Result<bool, StageError> {
+    let woken = signals.wait(listeners, None, limit)?;
+    if woken.stop {
+        return Ok(true);
+    }
+    signals.sleep(REST)
 }
 
 /// The position in a sequence of items that are consecutive at the publisher.

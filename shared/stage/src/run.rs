@@ -73,7 +73,7 @@ impl Manifest {
     }
 
     /// Returns the log to which all processes append their events.
-    pub(crate) fn events(&self) -> PathBuf {
+    pub fn events(&self) -> PathBuf {
         self.out.join("log.jsonl")
     }
 

@@ -2,6 +2,7 @@
 
 mod attempts;
 mod pace;
+mod player;
 mod position;
 mod sensor;
 
@@ -22,6 +23,7 @@ use pace::Pace;
 use position::Position;
 
 pub use attempts::{Tolerance, Unreadable, open};
+pub use player::{Recorded, RecordedMessage, run_player};
 pub use sensor::{Arrival, Sensor, run_sensor};
 
 /// A source of scans.

@@ -13,6 +13,7 @@ mod log;
 mod observers;
 mod plan;
 mod program;
+mod recorder;
 mod requests;
 pub mod rig;
 mod scheduling;
@@ -70,6 +71,7 @@ pub fn supervise(
     iceoryx2::prelude::set_log_level(iceoryx2::prelude::LogLevel::Fatal);
     let mut supervisor = Supervisor::new(plan, signals, observe)?;
     let ending = supervisor.start().and_then(|()| supervisor.watch());
+    supervisor.stop_recorder(ending.as_ref().ok().copied())?;
     supervisor.stop()?;
     let ending = ending?;
     Ok(Report {
@@ -85,6 +87,8 @@ struct Supervisor<'a> {
     plan: &'a Plan,
     observe: &'a mut dyn FnMut(Event<'_>),
     children: Vec<Child>,
+    /// No stage, and no follower.
+    recorder: Option<recorder::Recorder>,
     /// Outlives the stages, which it cares for.
     guardian: Guardian,
     since: Instant,
@@ -141,6 +145,7 @@ impl<'a> Supervisor<'a> {
             plan,
             observe,
             children: Vec::new(),
+            recorder: None,
             guardian: Guardian::start(&plan.guardian, manifest)?,
             since: Instant::now(),
             newest: None,
@@ -167,6 +172,7 @@ impl<'a> Supervisor<'a> {
     }
 
     fn start(&mut self) -> Result<(), SuperviseError> {
+        self.start_recorder()?;
         for stage in &self.plan.stages {
             let child = Child::spawn(
                 stage,
@@ -195,7 +201,8 @@ impl<'a> Supervisor<'a> {
             self.report_readiness();
             self.logs.bound_if_due();
             self.keep_guardian();
-            let processes = self.children.len() + 1;
+            self.keep_recorder()?;
+            let processes = self.children.len() + 1 + usize::from(self.recorder.is_some());
             self.observers
                 .run_if_due(&self.plan.manifest, &self.transport, processes);
             let exited: Vec<usize> = (0..self.children.len())
@@ -217,9 +224,9 @@ impl<'a> Supervisor<'a> {
     /// Sleeps until there is a pose, a request or a dead process; true on a request to stop.
     fn sleep(&self) -> Result<bool, SuperviseError> {
         let (poses, requests) = (self.poses.listener(), self.socket.descriptor());
-        let woken =
-            self.signals
-                .wait_or_readable(&[poses], None, Some(requests), wake::MAX_WAIT)?;
+        let woken = self
+            .signals
+            .wait_or_readable(&[poses], &[], Some(requests), wake::MAX_WAIT)?;
         Ok(woken.stop)
     }
 

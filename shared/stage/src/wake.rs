@@ -123,19 +123,19 @@ impl Signals {
         handshake: Option<&Listener>,
         limit: Duration,
     ) -> Result<Woken, StageError> {
-        self.wait_or_readable(data, handshake, None, limit)
+        self.wait_or_readable(data, handshake.as_slice(), None, limit)
     }
 
-    /// As [`wait`](Self::wait), or until a connection has something to read, which it leaves there.
+    /// As [`wait`](Self::wait) with any number of topics that are published, or until a connection has something to read, which it leaves there.
     pub(crate) fn wait_or_readable(
         &self,
         data: &[&Listener],
-        handshake: Option<&Listener>,
+        handshakes: &[&Listener],
         connection: Option<BorrowedFd<'_>>,
         limit: Duration,
     ) -> Result<Woken, StageError> {
         let mut polled = vec![self.stop.as_fd(), self.child.as_fd()];
-        polled.extend(data.iter().copied().chain(handshake).map(descriptor));
+        polled.extend(data.iter().chain(handshakes).map(|it| descriptor(it)));
         polled.extend(connection);
         let mut polled: Vec<_> = polled
             .into_iter()
@@ -158,7 +158,7 @@ impl Signals {
         Ok(Woken {
             stop: self.stopped.get(),
             child,
-            handshake: handshake.is_some() && next(),
+            handshake: handshakes.iter().filter(|_| next()).count() > 0,
             timed_out,
         })
     }

@@ -30,6 +30,9 @@ impl Configuration {
     /// # Errors
     /// A recording that cannot be opened or of which no scan can be read, an unknown key, a value out of its bounds.
     pub fn of_recording(data: &Path, overrides: &[String]) -> Result<Self, Failure> {
+        if gyre_recording::is_recording(data) {
+            return Self::of_recorded_run(data, overrides);
+        }
         let wished = Self::of_overrides(overrides)?.dataset;
         let format = gyre_radar::open(data, &wished)?.format();
         let constants = gyre_radar::stored_options(data)?.or(&constants(format)?);
@@ -53,6 +56,30 @@ impl Configuration {
     }
 }
 
+/// The sections of a configuration that say what is computed.
+const METHOD: [&str; 9] = [
+    "raster",
+    "points",
+    "masking",
+    "search",
+    "rotation",
+    "translation",
+    "exhaustive",
+    "refinement",
+    "slam",
+];
+
+impl Configuration {
+    /// Returns the configuration of the run that a recording is of, as far as it says what is computed.
+    fn of_recorded_run(data: &Path, overrides: &[String]) -> Result<Self, Failure> {
+        let recording = gyre_recording::open_recording(data)?;
+        let mut table: Table = recording.head().configuration.parse()?;
+        table.retain(|section, _| METHOD.contains(&section));
+        print::note("no configuration is named: that of the recorded run is used");
+        Ok(Self::resolve(table, overrides)?)
+    }
+}
+
 /// Returns the constants of the radar of a dataset, from its file in `configs/`.
 fn constants(format: Format) -> Result<DatasetOptions, Failure> {
     let text = match format {
@@ -64,7 +91,7 @@ fn constants(format: Format) -> Result<DatasetOptions, Failure> {
         }
         Format::Radiate => include_str!("../../../../configs/radiate.toml"),
         Format::Fomo => include_str!("../../../../configs/fomo.toml"),
-        Format::Oord => "",
+        Format::Oord | Format::Mcap => "",
     };
     Ok(strict::section(&mut text.parse::<Table>()?, "dataset")?)
 }

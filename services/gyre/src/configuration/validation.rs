@@ -3,6 +3,7 @@
 use std::fmt::Display;
 
 use gyre_messages::StageId;
+use gyre_radar_replay::PlayedFrom;
 use gyre_simulator::OutputFormat;
 use gyre_stress::Limits;
 
@@ -31,6 +32,7 @@ impl Configuration {
             let reason = "burst needs a pace: set run.rate to `realtime` or a factor";
             return Err(value("source", reason));
         }
+        self.validate_played_from()?;
         if self.run.mode == Mode::Live && self.run.rate == Rate::Max && !self.is_radar() {
             let reason = "mode `live` needs a radar's pace: set rate to `realtime` or a factor";
             return Err(value("run", reason));
@@ -47,6 +49,27 @@ impl Configuration {
         within("translation", odometry.translation.validate())?;
         within("exhaustive", odometry.exhaustive.validate())?;
         within("refinement", odometry.refinement.validate())
+    }
+
+    /// A recording that takes the place of stages is a recording of a run, and has the topic of a stage that the run has.
+    fn validate_played_from(&self) -> Result<(), ConfigurationError> {
+        let from = self.source.from;
+        if from == PlayedFrom::Scan {
+            return Ok(());
+        }
+        let reason = match from {
+            _ if self.run.mode == Mode::Live => "in mode `live` nothing but scans can be played",
+            _ if self.source.first > 0 => "first must be 0: the stages need all messages before",
+            PlayedFrom::Rotation if !self.has(StageId::RotationSearch) => {
+                "with an exhaustive search there is no topic `rotation`"
+            }
+            PlayedFrom::Refined if !self.has(StageId::Refinement) => {
+                "without refinement there is no topic `refined`: play from `motion`"
+            }
+            _ => return Ok(()),
+        };
+        let from = from.name();
+        Err(value("source", format!("from is `{from}`, but {reason}")))
     }
 
     /// A radar waits for nobody, and has an address.

@@ -45,7 +45,7 @@ impl Scans {
         let Played { dataset, .. } = preflight::open(configuration)?;
         preflight::describe_masks(configuration)?;
         Ok(Self {
-            played: configuration.source.played(dataset.len()),
+            played: configuration.source.played(dataset.as_ref()),
             odometry: Odometry::new(&configuration.odometry)?,
             scan: OwnedScan::with_limits(dataset.limits()),
             left_out: 0,

@@ -65,7 +65,7 @@ impl MaskInspector {
         Ok(Self {
             odometry: Odometry::new(&config)?,
             lag: config.masking.feedback_lag(),
-            next: configuration.source.played(dataset.len()).start,
+            next: configuration.source.played(dataset.as_ref()).start,
             last: [scan.clone(), scan.clone()],
             spare: scan,
             twists: [None; 2],

@@ -55,7 +55,7 @@ fn open(out: &Path, process: Option<&str>) -> Result<Vec<Log>, Failure> {
     }
     let mut names = process_names();
     // The supervisor, where it runs in the background.
-    names.push("gyre");
+    names.extend(["recorder", "gyre"]);
     if let Some(process) = process
         && !names.contains(&process)
     {

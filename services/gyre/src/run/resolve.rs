@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use gyre_radar_replay::PlayedFrom;
+
 use crate::{Failure, calibrate, cli::RunArguments, configuration::Configuration};
 
 /// Reads the configuration and resolves what it leaves open.
@@ -21,6 +23,12 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     if configuration.is_radar() {
         // A recording beside it, with its constants and its truth, is of another drive.
         configuration.source.data = PathBuf::new();
+    }
+    let source = &mut configuration.source;
+    if gyre_recording::is_recording(&source.data) && source.from == PlayedFrom::Scan {
+        // Scans keep their numbers, and a recording may begin in the middle of a drive.
+        let dataset = gyre_recording::open(&source.data, &configuration.dataset)?;
+        source.first = source.first.max(dataset.first());
     }
     if let Some(simulation) = &mut configuration.simulation {
         let streets = simulation.town.streets.iter_mut();
@@ -72,6 +80,14 @@ fn overrides(arguments: &RunArguments) -> Result<Vec<String>, Failure> {
         .rate
         .iter()
         .map(|rate| format!("run.rate='{rate}'"));
+    let from = arguments
+        .from
+        .iter()
+        .map(|topic| format!("source.from='{topic}'"));
+    let record = arguments.record.iter().map(|file| {
+        let file = std::path::absolute(file).unwrap_or_else(|_| file.clone());
+        format!("record.file={}", quoted(&file))
+    });
     let calibration = calibration.transpose()?.unwrap_or_default();
     let set = arguments.set.iter().cloned();
     Ok(calibration
@@ -80,5 +96,7 @@ fn overrides(arguments: &RunArguments) -> Result<Vec<String>, Failure> {
         .chain(data)
         .chain(radar)
         .chain(rate)
+        .chain(from)
+        .chain(record)
         .collect())
 }

@@ -80,6 +80,9 @@ pub enum OpenError {
     /// The first image, which determines the size of all scans, cannot be read.
     #[error("the size of the scans is unknown, since the first image cannot be read: {0}")]
     FirstImage(#[from] ReadError),
+    /// A recording of a run, which is no folder of images.
+    #[error("{0}")]
+    Recording(String),
     /// Images that do not match the format.
     #[error("{path} is {actual}, not a {format} image: {reason}")]
     WrongImage {
@@ -112,6 +115,14 @@ pub enum ReadError {
         path: PathBuf,
         /// The cause.
         source: std::io::Error,
+    },
+    /// A scan that a recording of a run lacks.
+    #[error("{path} has no scan {index}: the run did not read it, or the recorder missed it")]
+    NotRecorded {
+        /// The recording.
+        path: PathBuf,
+        /// The scan, from 0.
+        index: usize,
     },
     /// A file without the signature of a PNG.
     #[error("{path} is not a PNG image")]

@@ -36,10 +36,12 @@ pub enum Format {
     Radiate,
     /// FoMo.
     Fomo,
+    /// A recording of a run as MCAP, of `gyre record`.
+    Mcap,
 }
 
 impl Format {
-    /// All formats, in the order of preference if several fit equally.
+    /// All formats of folders of images, in the order of preference if several fit equally.
     pub const ALL: [Self; 8] = [
         Self::Oxford,
         Self::Oord,
@@ -50,6 +52,12 @@ impl Format {
         Self::Radiate,
         Self::Fomo,
     ];
+
+    /// Returns the format of this name.
+    pub fn by_name(name: &str) -> Option<Self> {
+        let mut all = Self::ALL.into_iter().chain([Self::Mcap]);
+        all.find(|format| format.name() == name)
+    }
 
     /// The name in configurations.
     pub const fn name(self) -> &'static str {
@@ -62,6 +70,7 @@ impl Format {
             Self::MulranOxfordForm => "mulran-oxford-form",
             Self::Radiate => "radiate",
             Self::Fomo => "fomo",
+            Self::Mcap => "mcap",
         }
     }
 }

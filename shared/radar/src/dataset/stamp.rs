@@ -13,7 +13,7 @@ const MAX_NS: i64 = i64::MAX / 2;
 /// Plausible durations of a turn, ns; others are gaps or errors.
 const TURN_NS: std::ops::Range<i64> = 10_000_000..10_000_000_000;
 /// Default duration of a turn, ns: Navtech radars turn four times per second.
-pub(crate) const DEFAULT_TURN_NS: i64 = 250_000_000;
+pub const DEFAULT_TURN_NS: i64 = 250_000_000;
 
 /// Returns whether a time in ns is in the years 2015 to 2040.
 pub(crate) fn plausible(stamp_ns: i64) -> bool {
@@ -53,7 +53,7 @@ fn rounded_ns(seconds: f64) -> Option<i64> {
 
 /// Duration of a turn, ns: the median time between consecutive scans without those that span a gap, which are half as long again as
 /// the shortest tenth, or longer. `None` if no time can be a turn.
-pub(crate) fn turn_ns(stamps: impl Iterator<Item = i64>) -> Option<i64> {
+pub fn turn_ns(stamps: impl Iterator<Item = i64>) -> Option<i64> {
     let stamps: Vec<i64> = stamps.collect();
     let mut times: Vec<i64> = stamps
         .windows(2)

@@ -162,7 +162,7 @@ impl Stream<'_> {
         }
         let woken = self.launch.signals.wait_or_readable(
             &[self.credit.poses.listener()],
-            Some(self.scans.listener()),
+            &[self.scans.listener()],
             connection,
             limit.min(wake::MAX_WAIT),
         )?;

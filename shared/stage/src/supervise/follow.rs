@@ -92,6 +92,7 @@ impl Supervisor<'_> {
             (self.observe)(Event::Watched);
             self.logs.bound_if_due();
             self.keep_guardian();
+            self.keep_recorder()?;
             let is_dead = |i: &usize| self.children[*i].has_exited() && self.is_behind(*i);
             let dead: Vec<usize> = behind.into_iter().filter(is_dead).collect();
             self.recover_followers(&dead)?;

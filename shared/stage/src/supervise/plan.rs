@@ -16,6 +16,8 @@ pub struct Plan {
     pub manifest: Manifest,
     /// The processes: the stages in the order of the stream, then the followers.
     pub stages: Vec<StagePlan>,
+    /// The process that records the run, if any: nothing depends on it.
+    pub recorder: Option<StagePlan>,
     /// Program and arguments of a process that calls [`guard`](super::guard) with its standard input.
     pub guardian: Vec<String>,
     /// Time for which a published scan may lack its pose, or the source a scan that is due; `None`: no limit.
@@ -104,6 +106,11 @@ pub enum Event<'a> {
         follower: &'a str,
         /// Why.
         error: &'a SuperviseError,
+    },
+    /// What became of the recording.
+    Recorder {
+        /// A sentence.
+        sentence: &'a str,
     },
     /// The run makes no progress: the stages that may be the cause are about to be restarted.
     Stalled(&'a Stall),

@@ -1,0 +1,30 @@
+//! The arguments of `gyre record`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+/// The arguments of `gyre record`.
+#[derive(Debug, Args)]
+pub struct RecordArguments {
+    /// The folder of the run's results, its --out.
+    pub out: PathBuf,
+    /// The file to write: NAME.mcap.
+    #[arg(long, value_name = "FILE", value_parser = recording)]
+    pub to: PathBuf,
+    /// What is recorded: scan, masked, rotation, motion, refined, pose, loop, correction, fix, log. Default: what the run has of these but
+    /// masked and rotation.
+    #[arg(long, value_delimiter = ',')]
+    pub topics: Vec<String>,
+    /// Go on in the next part of the recording if there is one (what `gyre run` starts).
+    #[arg(long, hide = true)]
+    pub continues: bool,
+}
+
+/// Parses the name of a recording, which readers tell by its ending.
+pub fn recording(text: &str) -> Result<PathBuf, String> {
+    match text.strip_suffix(".mcap") {
+        Some(name) if !name.is_empty() && !name.ends_with('/') => Ok(text.into()),
+        _ => Err("the name of a recording ends in .mcap".to_owned()),
+    }
+}

@@ -1,0 +1,139 @@
+//! Plays the recorded messages of a run in the place of the stages before a topic.
+
+use std::ops::Range;
+
+use gyre_recording::Recording;
+use gyre_stage::{
+    Launch, StageCounters, StageError,
+    source::{Recorded, RecordedMessage, run_player},
+};
+use serde::{Deserialize, Serialize};
+
+use crate::SourceConfig;
+
+/// The topic that a recording is played from: the stages that compute it and what is before it are absent.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum PlayedFrom {
+    /// Scans: all stages compute.
+    #[default]
+    Scan,
+    /// Masked scans.
+    Masked,
+    /// Rotations, beside masked scans.
+    Rotation,
+    /// Searched motions, beside masked scans.
+    Motion,
+    /// Refined motions.
+    Refined,
+}
+
+impl PlayedFrom {
+    /// The name of the topic.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Scan => "scan",
+            Self::Masked => "masked",
+            Self::Rotation => "rotation",
+            Self::Motion => "motion",
+            Self::Refined => "refined",
+        }
+    }
+
+    /// Returns the topics that the stages after it read. `reads_masked`: the last stage reads masked scans, for the keyframes of SLAM.
+    pub fn topics(self, refines: bool, reads_masked: bool) -> Vec<&'static str> {
+        match self {
+            Self::Scan => vec!["scan"],
+            Self::Masked => vec!["masked"],
+            Self::Rotation => vec!["masked", "rotation"],
+            Self::Motion if refines || reads_masked => vec!["masked", "motion"],
+            Self::Motion => vec!["motion"],
+            Self::Refined if reads_masked => vec!["masked", "refined"],
+            Self::Refined => vec!["refined"],
+        }
+    }
+}
+
+/// Plays the recording of the section `[source]` from its topic on, until SIGTERM.
+///
+/// # Errors
+/// An invalid configuration, a recording that cannot be read, or an error of [`run_player`].
+pub fn play_recorded(launch: &Launch) -> Result<StageCounters, StageError> {
+    let config: SourceConfig = launch.section("source")?;
+    let manifest = &launch.manifest;
+    let topics = config.from.topics(manifest.refines, manifest.window.slam);
+    let mut player = Player::open(&config, topics).map_err(StageError::Input)?;
+    run_player(launch, &mut player)
+}
+
+/// The messages of a recording that a run plays.
+pub struct Player {
+    recording: Recording,
+    topics: Vec<&'static str>,
+    items: Range<u64>,
+}
+
+impl Player {
+    /// Opens a recording, and checks that it has each message of each topic from the first one on.
+    ///
+    /// # Errors
+    /// One sentence: it cannot be read, or lacks a message.
+    pub fn open(config: &SourceConfig, topics: Vec<&'static str>) -> Result<Self, String> {
+        let recording = gyre_recording::open_recording(&config.data).map_err(|e| e.to_string())?;
+        let path = config.data.display();
+        let last = |topic: &&'static str| recording.entries(topic).last().map(|entry| entry.seq);
+        let end = topics
+            .iter()
+            .map(last)
+            .min()
+            .flatten()
+            .map_or(0, |last| last + 1);
+        let end = end.min(config.scans.map_or(u64::MAX, |scans| scans as u64));
+        for topic in &topics {
+            let mut expected = 0..end;
+            let lacks = |entry: &gyre_recording::Entry| Some(entry.seq) != expected.next();
+            let lacking = recording.entries(topic).take(end as usize).find(lacks);
+            if lacking.is_some() || end == 0 {
+                let missing = expected.start.saturating_sub(1);
+                return Err(format!(
+                    "{path} lacks message {missing} of topic `{topic}`, which the stages after it need from the first one on: the \
+                     recorder missed it, or did not record the topic (record.topics); its scans can be played without --from"
+                ));
+            }
+        }
+        Ok(Self {
+            recording,
+            topics,
+            items: 0..end,
+        })
+    }
+
+    /// Returns the times of the messages, ns since 1970.
+    pub fn stamps_ns(&self) -> impl Iterator<Item = i64> + '_ {
+        let entries = self.recording.entries(self.topics[0]);
+        let played = entries.take_while(|entry| self.items.contains(&entry.seq));
+        played.map(|entry| entry.stamp_ns)
+    }
+}
+
+impl Recorded for Player {
+    fn topics(&self) -> &[&'static str] {
+        &self.topics
+    }
+
+    fn items(&self) -> Range<u64> {
+        self.items.clone()
+    }
+
+    fn read(&mut self, topic: &str, seq: u64) -> Result<RecordedMessage, StageError> {
+        match self.recording.read(topic, seq) {
+            Ok(stored) => Ok(RecordedMessage {
+                header: stored.header,
+                payload: stored.payload,
+            }),
+            Err(error) => Err(StageError::Input(error.to_string())),
+        }
+    }
+}

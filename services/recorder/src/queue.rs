@@ -1,0 +1,128 @@
+//! The queue between the thread that receives and the one that writes. Its limit is one of bytes.
+
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+        mpsc,
+    },
+    time::Duration,
+};
+
+use gyre_recording::{Incoming, LogLine};
+
+/// The largest number of bytes that wait: twenty seconds of the largest radar's scans at four in a second, should the disk stand still.
+pub(crate) const LIMIT_BYTES: usize = 128 << 20;
+
+/// What is written.
+#[derive(Debug)]
+pub(crate) enum Entry {
+    Message(Incoming),
+    /// Messages of a topic that were missed, without one after them.
+    Missed(&'static str, u64),
+    Log(LogLine),
+}
+
+impl Entry {
+    fn bytes(&self) -> usize {
+        match self {
+            Self::Message(message) => message.header.len() + message.payload.len(),
+            Self::Missed(..) => 0,
+            Self::Log(line) => line.message.len(),
+        }
+    }
+}
+
+/// The end that entries are put into.
+pub(crate) struct Sender {
+    entries: mpsc::Sender<Entry>,
+    waiting: Arc<AtomicUsize>,
+    limit: usize,
+}
+
+/// The end that entries are taken from.
+pub(crate) struct Receiver {
+    entries: mpsc::Receiver<Entry>,
+    waiting: Arc<AtomicUsize>,
+}
+
+/// The result of waiting for an entry.
+pub(crate) enum Taken {
+    Entry(Entry),
+    Idle,
+    /// There is no sender any more, and the queue is empty.
+    Ended,
+}
+
+/// Makes a queue for so many bytes.
+pub(crate) fn queue(limit: usize) -> (Sender, Receiver) {
+    let (sender, receiver) = mpsc::channel();
+    let waiting = Arc::new(AtomicUsize::new(0));
+    let sender = Sender {
+        entries: sender,
+        waiting: Arc::clone(&waiting),
+        limit,
+    };
+    let receiver = Receiver {
+        entries: receiver,
+        waiting,
+    };
+    (sender, receiver)
+}
+
+impl Sender {
+    /// Puts an entry into the queue; false if there is no room for it, or nobody takes it any more.
+    pub fn put(&self, entry: Entry) -> bool {
+        let bytes = entry.bytes();
+        if bytes > 0 && self.waiting.load(Ordering::Relaxed) + bytes > self.limit {
+            return false;
+        }
+        self.waiting.fetch_add(bytes, Ordering::Relaxed);
+        self.entries.send(entry).is_ok()
+    }
+}
+
+impl Receiver {
+    /// Takes the next entry, and waits for it at most so long.
+    pub fn take(&self, limit: Duration) -> Taken {
+        match self.entries.recv_timeout(limit) {
+            Ok(entry) => {
+                self.waiting.fetch_sub(entry.bytes(), Ordering::Relaxed);
+                Taken::Entry(entry)
+            }
+            Err(mpsc::RecvTimeoutError::Timeout) => Taken::Idle,
+            Err(mpsc::RecvTimeoutError::Disconnected) => Taken::Ended,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(bytes: usize) -> Entry {
+        Entry::Message(Incoming {
+            topic: "scan",
+            header: Vec::new(),
+            payload: vec![0; bytes],
+            received_ns: 0,
+            missed: 0,
+        })
+    }
+
+    #[test]
+    fn a_queue_takes_entries_up_to_its_limit_and_again_when_they_are_taken() {
+        let (sender, receiver) = queue(100);
+        assert!(sender.put(message(60)));
+        assert!(!sender.put(message(41)));
+        assert!(sender.put(message(40)));
+        assert!(sender.put(Entry::Missed("scan", 1)), "counts always fit");
+        assert!(matches!(receiver.take(Duration::ZERO), Taken::Entry(_)));
+        assert!(sender.put(message(60)));
+        drop(sender);
+        for _ in 0..3 {
+            assert!(matches!(receiver.take(Duration::ZERO), Taken::Entry(_)));
+        }
+        assert!(matches!(receiver.take(Duration::ZERO), Taken::Ended));
+    }
+}

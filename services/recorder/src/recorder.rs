@@ -1,0 +1,295 @@
+//! The loop of the recorder.
+
+use std::{
+    fmt, fs,
+    path::{Path, PathBuf},
+    thread::{self, JoinHandle},
+    time::{Duration, Instant},
+};
+
+use gyre_messages::{Message, Refined, Sender as PublishedBy, topic};
+use gyre_recording::{Head, Recording, RecordingError, RecordingWriter, next_part};
+use gyre_stage::{
+    Manifest, StageError, launch,
+    observer::{ObservedRun, wait_for_any},
+    run,
+    wake::{MAX_WAIT, Signals},
+};
+use thiserror::Error;
+
+use crate::{
+    log_tail::LogTail,
+    queue::{Entry, LIMIT_BYTES, Sender, queue},
+    tap::{Counts, Tap, now_ns, tap},
+    writing,
+};
+
+/// The name of the recorder in the log and among the processes of a run.
+const NAME: &str = "recorder";
+/// The topic of log lines, which is no topic of the transport.
+const LOG: &str = "log";
+/// The topics that are recorded unless others are named.
+const DEFAULT: [&str; 7] = [
+    "scan",
+    "motion",
+    "refined",
+    "pose",
+    "loop",
+    "correction",
+    "fix",
+];
+/// Time between two sentences about missed messages in the log.
+const SENTENCE_PERIOD: Duration = Duration::from_secs(1);
+
+/// What to record.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The folder of the run's results.
+    pub out: PathBuf,
+    /// The file.
+    pub to: PathBuf,
+    /// The topics, `log` among them; empty: the default ones that the run has.
+    pub topics: Vec<String>,
+    /// Whether a recording that is there is one of this run, which another recorder has begun: it goes on in its next part.
+    pub continues: bool,
+}
+
+/// A recording that has ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Recorded {
+    /// The file.
+    pub path: PathBuf,
+    /// The messages of each topic.
+    pub counts: Vec<Counts>,
+}
+
+impl Recorded {
+    /// Returns whether nothing was missed.
+    pub fn is_complete(&self) -> bool {
+        self.counts.iter().all(|it| it.missed == 0)
+    }
+}
+
+impl fmt::Display for Recorded {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let list = |number: fn(&Counts) -> u64| {
+            let counts = self.counts.iter().filter(|counts| number(counts) > 0);
+            let counts: Vec<String> = counts
+                .map(|it| format!("{} {}", number(it), it.topic))
+                .collect();
+            match counts.is_empty() {
+                true => "nothing".to_owned(),
+                false => counts.join(", "),
+            }
+        };
+        write!(
+            f,
+            "recorded {} in {}",
+            list(|it| it.recorded),
+            self.path.display()
+        )?;
+        match self.is_complete() {
+            true => write!(f, "; missed nothing"),
+            false => write!(
+                f,
+                "; missed {}: the recording is not complete",
+                list(|it| it.missed)
+            ),
+        }
+    }
+}
+
+/// Why there is no recording, or no complete one.
+#[derive(Debug, Error)]
+pub enum RecorderError {
+    /// The run cannot be observed.
+    #[error(transparent)]
+    Stage(#[from] StageError),
+    /// The file cannot be written, or one that is there not be read.
+    #[error("cannot record: {0}; the run goes on without")]
+    Recording(#[from] RecordingError),
+    /// A file is there.
+    #[error("{0} exists, and a recording is never overwritten: name another file, or remove it")]
+    Exists(PathBuf),
+    /// No such topic.
+    #[error(
+        "there is no topic `{0}`: there are scan, masked, rotation, motion, refined, pose, loop, correction, fix and log"
+    )]
+    NoTopic(String),
+    /// The thread that writes has ended without a reason.
+    #[error("the thread that writes the recording has ended")]
+    Thread,
+}
+
+impl RecorderError {
+    /// Returns the exit code of the process: whether another start may help.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Stage(error) => error.exit_code(),
+            Self::Thread => StageError::TRANSIENT,
+            _ => StageError::PERMANENT,
+        }
+    }
+}
+
+/// Records a run until it ends, or a signal requests a stop.
+///
+/// # Errors
+/// There is no such run or topic, or the file cannot be written.
+pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
+    let run = match std::env::var_os(run::ENVIRONMENT) {
+        // The supervisor's own: its root is the same for other names of the folder.
+        Some(root) if options.continues => ObservedRun::at(Path::new(&root))?,
+        _ => ObservedRun::writing_to(&options.out)?,
+    };
+    let manifest = run.manifest();
+    let _log = launch::start_log(manifest, NAME)?;
+    let signals = Signals::install()?;
+    let topics = topics(&options.topics, manifest)?;
+    let (path, head) = begin(options, manifest, &topics)?;
+    let writer = RecordingWriter::create(&path, &head)?;
+    let taps = topics.iter().filter_map(|topic| tap(&run, topic));
+    let taps = taps.collect::<Result<Vec<_>, _>>()?;
+    if options.continues {
+        run.is_ready()?;
+    }
+    let has_log = topics.iter().any(|topic| topic == LOG);
+    let log = has_log.then(|| LogTail::new(&manifest.events()));
+    let (sender, receiver) = queue(LIMIT_BYTES);
+    let writing = thread::spawn(move || writing::write(writer, &receiver));
+    let mut recorder = Recorder {
+        run: &run,
+        signals,
+        taps,
+        log,
+        queue: sender,
+        told: 0,
+        due: Instant::now(),
+    };
+    let ended = recorder.run_until_end(&writing);
+    let counts: Vec<Counts> = recorder.taps.iter().map(|tap| tap.counts()).collect();
+    drop(recorder);
+    writing.join().map_err(|_| RecorderError::Thread)??;
+    ended?;
+    let recorded = Recorded { path, counts };
+    match recorded.is_complete() {
+        true => tracing::info!("{recorded}"),
+        false => tracing::error!("{recorded}"),
+    }
+    Ok(recorded)
+}
+
+/// Returns the topics to record.
+fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<String>, RecorderError> {
+    if named.is_empty() {
+        let has = |name: &&str| match topic(name).map(|topic| topic.sender) {
+            Some(PublishedBy::Follower(follower)) => follower.is_in(&manifest.window),
+            _ => *name != Refined::TOPIC || manifest.refines,
+        };
+        let topics = DEFAULT.into_iter().filter(has).chain([LOG]);
+        return Ok(topics.map(str::to_owned).collect());
+    }
+    match named
+        .iter()
+        .find(|name| *name != LOG && topic(name).is_none())
+    {
+        Some(unknown) => Err(RecorderError::NoTopic(unknown.clone())),
+        None => Ok(named.to_vec()),
+    }
+}
+
+/// Returns the file to write, and its head: those of the next part where a recorder of this run was there before.
+fn begin(
+    options: &Options,
+    manifest: &Manifest,
+    topics: &[String],
+) -> Result<(PathBuf, Head), RecorderError> {
+    let (path, part) = next_part(&options.to);
+    if part > 1 && !options.continues {
+        return Err(RecorderError::Exists(options.to.clone()));
+    }
+    let id = match part {
+        1 => format!("{}-{}", manifest.prefix.trim_matches('_'), now_ns()),
+        _ => Recording::open(std::slice::from_ref(&options.to))?
+            .head()
+            .id
+            .clone(),
+    };
+    let file = manifest.root.join("config.toml");
+    let configuration =
+        fs::read_to_string(&file).map_err(|source| StageError::File { path: file, source })?;
+    let head = Head {
+        id,
+        part,
+        configuration,
+        topics: topics
+            .iter()
+            .filter(|topic| *topic != LOG)
+            .cloned()
+            .collect(),
+        scan_bytes: manifest.limits.scan_bytes,
+        mode: if manifest.live { "live" } else { "lossless" }.to_owned(),
+    };
+    Ok((path, head))
+}
+
+struct Recorder<'run> {
+    run: &'run ObservedRun,
+    signals: Signals,
+    taps: Vec<Box<dyn Tap + 'run>>,
+    log: Option<LogTail>,
+    queue: Sender,
+    /// Missed messages that the log tells of.
+    told: u64,
+    /// When the next sentence about them is due.
+    due: Instant,
+}
+
+impl Recorder<'_> {
+    /// Receives until the run ends, a signal requests a stop, or the other thread has failed.
+    fn run_until_end<T>(&mut self, writing: &JoinHandle<T>) -> Result<(), StageError> {
+        loop {
+            // Before the look: what was published before the end is still in the queues.
+            let has_ended = self.run.has_ended();
+            self.take_all()?;
+            let have_ended = self.taps.iter().all(|tap| tap.has_ended());
+            if has_ended || have_ended || writing.is_finished() {
+                return Ok(());
+            }
+            let listeners: Vec<_> = self.taps.iter().map(|tap| tap.listener()).collect();
+            if wait_for_any(&self.signals, &listeners, MAX_WAIT)? {
+                return self.take_all();
+            }
+        }
+    }
+
+    fn take_all(&mut self) -> Result<(), StageError> {
+        for tap in &mut self.taps {
+            tap.drain(&self.queue)?;
+        }
+        self.say_what_is_missed();
+        for line in self.log.iter_mut().flat_map(|log| log.lines(now_ns())) {
+            self.queue.put(Entry::Log(line));
+        }
+        Ok(())
+    }
+
+    fn say_what_is_missed(&mut self) {
+        let missed = self.taps.iter().map(|tap| tap.counts().missed).sum();
+        if missed > self.told && Instant::now() >= self.due {
+            let counts = self
+                .taps
+                .iter()
+                .map(|tap| tap.counts())
+                .filter(|it| it.missed > 0);
+            let counts: Vec<String> = counts
+                .map(|it| format!("{} of {}", it.missed, it.topic))
+                .collect();
+            tracing::warn!(
+                "does not keep up with the run: missed {} so far",
+                counts.join(", ")
+            );
+            (self.told, self.due) = (missed, Instant::now() + SENTENCE_PERIOD);
+        }
+    }
+}

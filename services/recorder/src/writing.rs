@@ -1,0 +1,29 @@
+//! The thread that compresses and writes.
+
+use std::{collections::BTreeMap, time::Duration};
+
+use gyre_recording::{RecordingError, RecordingWriter};
+
+use crate::queue::{Entry, Receiver, Taken};
+
+/// Time between two looks at whether a chunk is due while nothing is received.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// Writes what comes until the queue ends; returns the number of messages missed by topic.
+///
+/// # Errors
+/// The file cannot be written.
+pub(crate) fn write(
+    mut recording: RecordingWriter,
+    queue: &Receiver,
+) -> Result<BTreeMap<String, u64>, RecordingError> {
+    loop {
+        match queue.take(LOOK) {
+            Taken::Entry(Entry::Message(message)) => recording.add(&message)?,
+            Taken::Entry(Entry::Missed(topic, missed)) => recording.missed(topic, missed),
+            Taken::Entry(Entry::Log(line)) => recording.add_log(line)?,
+            Taken::Idle => recording.flush_if_due()?,
+            Taken::Ended => return recording.finish(),
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! Recordings of runs as MCAP files, for viewers and for exact replay.
+//!
+//! Each message of a run is in the file twice over, without its bulk being stored twice:
+//!
+//! | channel | encoding | content |
+//! |---|---|---|
+//! | `/scan`, `/masked` | protobuf, `foxglove.RawImage` | the powers of a scan (`mono8`, azimuth x range), the raster of a masked scan (`32FC1`) |
+//! | `/motion`, `/pose`, `/tf`, `/log` and others | protobuf, Foxglove's schemas | what a viewer draws: [`view`] |
+//! | `gyre/TOPIC` | `gyre`, schema `gyre_TOPIC_header_vN` | the header of the wire message, then what of its payload no image holds |
+//!
+//! The image of a message stands directly before it, in the same chunk and with the same sequence number. [`image`] takes a
+//! payload apart and puts it together again.
+//!
+//! The log time of a message is the sensor's: the stamp of its scan. So a drive that was replayed thirty times faster plays at its own
+//! pace. The publish time is that of the machine at which the recorder received it.
+//!
+//! Behind each chunk a metadata record (`table`) lists the messages in it and what was missed so far. So a reader finds a message
+//! without decompressing what is before it, also in a file that has no summary because its writer was killed.
+//!
+//! Reading order: `head` and `table` (the metadata), `writer`, `walk` (the records of a file), `recording`, `scans` (a
+//! [`Dataset`](gyre_radar::Dataset)).
+
+mod chunk;
+mod error;
+mod head;
+pub mod image;
+mod open;
+mod parts;
+mod recording;
+mod scans;
+mod table;
+pub mod view;
+mod walk;
+mod writer;
+
+pub use error::RecordingError;
+pub use head::Head;
+pub use open::{is_recording, open, open_recording, open_resolved, reopen, stored_options};
+pub use parts::{next_part, parts};
+pub use recording::{Recording, Stored};
+pub use table::Entry;
+pub use view::LogLine;
+pub use writer::{Incoming, RecordingWriter};
+
+/// The channel of a topic's wire messages.
+fn exact_channel(topic: &str) -> String {
+    format!("gyre/{topic}")
+}
+
+/// The encoding of the wire messages, and of their schemas.
+const ENCODING: &str = "gyre";

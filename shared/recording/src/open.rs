@@ -1,0 +1,120 @@
+//! Opens what a source plays: a recording of a run, or a dataset of [`gyre_radar`].
+
+use std::path::{Path, PathBuf};
+
+use gyre_radar::{Dataset, DatasetOptions, FileList, Format, OpenError};
+
+use crate::{Recording, RecordingError, parts::parts, scans::Scans};
+
+/// Returns whether a path names a recording of a run.
+pub fn is_recording(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|extension| extension == "mcap")
+}
+
+/// As [`gyre_radar::open`].
+///
+/// # Errors
+/// As there; a recording that cannot be read.
+pub fn open(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
+    match is_recording(root) {
+        true => open_parts(&parts(root), root, options),
+        false => gyre_radar::open(root, options),
+    }
+}
+
+/// As [`gyre_radar::open_resolved`].
+///
+/// # Errors
+/// As there; a recording that cannot be read.
+pub fn open_resolved(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
+    match is_recording(root) {
+        true => open(root, options),
+        false => gyre_radar::open_resolved(root, options),
+    }
+}
+
+/// As [`gyre_radar::reopen`].
+///
+/// # Errors
+/// As there; a recording that cannot be read.
+pub fn reopen(
+    root: &Path,
+    options: &DatasetOptions,
+    format: Format,
+    files: FileList,
+) -> Result<Box<dyn Dataset>, OpenError> {
+    if format != Format::Mcap {
+        return gyre_radar::reopen(root, options, format, files);
+    }
+    let paths: Vec<PathBuf> = (0..files.len())
+        .filter_map(|index| files.get(index))
+        .map(Path::to_owned)
+        .collect();
+    open_parts(&paths, root, options)
+}
+
+/// As [`gyre_radar::stored_options`]: of a recording those of its run.
+///
+/// # Errors
+/// As there; a recording that cannot be read.
+pub fn stored_options(root: &Path) -> Result<DatasetOptions, OpenError> {
+    match is_recording(root) {
+        true => recorded_options(&open_recording(root)?),
+        false => gyre_radar::stored_options(root),
+    }
+}
+
+/// Opens a recording of a run with all its parts.
+///
+/// # Errors
+/// It is missing, or cannot be read.
+pub fn open_recording(root: &Path) -> Result<Recording, OpenError> {
+    recording_of(&parts(root), root)
+}
+
+fn recording_of(paths: &[PathBuf], root: &Path) -> Result<Recording, OpenError> {
+    if paths.is_empty() {
+        return Err(OpenError::Recording(format!(
+            "there is no recording {}",
+            root.display()
+        )));
+    }
+    Recording::open(paths).map_err(|error| match error {
+        RecordingError::Io { path, source } => OpenError::Io { path, source },
+        error => OpenError::Recording(error.to_string()),
+    })
+}
+
+fn open_parts(
+    paths: &[PathBuf],
+    root: &Path,
+    options: &DatasetOptions,
+) -> Result<Box<dyn Dataset>, OpenError> {
+    options.check()?;
+    let recording = recording_of(paths, root)?;
+    let recorded = recorded_options(&recording)?;
+    let scans = Scans::open(recording)?;
+    scans.check(options, &recorded)?;
+    Ok(Box::new(scans))
+}
+
+/// Returns the options of the recorded run: the section `[dataset]` of its configuration.
+fn recorded_options(recording: &Recording) -> Result<DatasetOptions, OpenError> {
+    let invalid = |reason: String| {
+        OpenError::Recording(format!(
+            "the configuration in the recording is not one of Gyre: {reason}"
+        ))
+    };
+    let table: Result<toml::Table, _> = recording.head().configuration.parse();
+    let mut table = table.map_err(|error| invalid(error.message().to_owned()))?;
+    let section = table
+        .remove("dataset")
+        .unwrap_or_else(|| toml::Table::new().into());
+    let options: Result<DatasetOptions, _> = section.try_into();
+    let options = options.map_err(|error: toml::de::Error| invalid(error.message().to_owned()))?;
+    Ok(DatasetOptions {
+        format: Some(Format::Mcap),
+        ..options
+    })
+}

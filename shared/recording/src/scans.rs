@@ -1,0 +1,260 @@
+//! The scans of a recording as a dataset: bytes, azimuths, times and constants as they were recorded.
+
+use std::{collections::BTreeMap, path::Path};
+
+use gyre_messages::{Message, Scan, ScanHeader};
+use gyre_radar::{
+    DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize, MAX_AZIMUTHS, OpenError,
+    ReadError, ScanLimits, ScanSlot, SweepGeometry, turn_ns,
+};
+
+use crate::{Entry, Recording, RecordingError, Stored, image::read};
+
+/// Scans of a drive of months; a larger number in a table is damaged.
+const MAX_SCANS: u64 = 50_000_000;
+
+/// The scans of a recording. A scan has the number that it had in the recorded run.
+pub(crate) struct Scans {
+    recording: Recording,
+    files: FileList,
+    /// The scans by their number.
+    entries: BTreeMap<usize, Entry>,
+    first: SweepGeometry,
+    period_ns: i64,
+    notes: Vec<String>,
+}
+
+impl Scans {
+    /// Opens the scans of a recording.
+    ///
+    /// # Errors
+    /// It has none, or the first one cannot be read.
+    pub fn open(mut recording: Recording) -> Result<Self, OpenError> {
+        let entries: BTreeMap<usize, Entry> = recording
+            .entries(Scan::TOPIC)
+            .filter(|entry| entry.scan < MAX_SCANS)
+            .map(|entry| (entry.scan as usize, entry))
+            .collect();
+        let path = recording
+            .paths()
+            .next()
+            .unwrap_or(Path::new(""))
+            .display()
+            .to_string();
+        let Some(first) = entries.values().next() else {
+            let reason = format!("{path} holds no scans: the topic `scan` was not recorded");
+            return Err(OpenError::Recording(reason));
+        };
+        let stored = recording.read(Scan::TOPIC, first.seq);
+        let stored = stored.map_err(|error| OpenError::Recording(error.to_string()))?;
+        let (first, _) = geometry(&stored)
+            .ok_or_else(|| OpenError::Recording(format!("the first scan of {path} is damaged")))?;
+        let period_ns = turn_ns(entries.values().map(|entry| entry.stamp_ns));
+        let files: FileList = recording.paths().map(Path::to_owned).collect();
+        Ok(Self {
+            notes: notes(&recording, &entries),
+            recording,
+            files,
+            entries,
+            first,
+            period_ns: period_ns.unwrap_or(DEFAULT_TURN_NS),
+        })
+    }
+
+    /// Rejects options other than those that the scans were recorded with, which are in their numbers.
+    pub fn check(
+        &self,
+        options: &DatasetOptions,
+        recorded: &DatasetOptions,
+    ) -> Result<(), OpenError> {
+        let refuse = |key, value: String| {
+            Err(OpenError::BadOption {
+                key,
+                value,
+                format: Format::Mcap.to_string(),
+                reason: "its scans have the constants that they were recorded with; leave the key out",
+            })
+        };
+        let scan = &self.first;
+        for (key, wished, is) in [
+            (
+                "range_resolution_m",
+                options.range_resolution_m,
+                scan.range_resolution_m,
+            ),
+            (
+                "range_offset_m",
+                options.range_offset_m,
+                scan.range_offset_m,
+            ),
+            ("doppler_s", options.doppler_s, scan.doppler_s),
+            (
+                "azimuth_eccentricity_rad",
+                options.azimuth_eccentricity_rad,
+                recorded.azimuth_eccentricity_rad.unwrap_or_default(),
+            ),
+        ] {
+            if let Some(wished) = wished.filter(|wished| *wished != is) {
+                return refuse(key, wished.to_string());
+            }
+        }
+        if options.azimuth_source.is_some() && options.azimuth_source != recorded.azimuth_source {
+            return refuse(
+                "azimuth_source",
+                format!("{:?}", options.azimuth_source).to_lowercase(),
+            );
+        }
+        match options.encoder_counts {
+            Some(counts) if options.encoder_counts != recorded.encoder_counts => {
+                refuse("encoder_counts", counts.to_string())
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Returns what is missing in a recording: whole sentences.
+fn notes(recording: &Recording, entries: &BTreeMap<usize, Entry>) -> Vec<String> {
+    let mut notes: Vec<String> = recording
+        .cut()
+        .map(|path| format!("{} has no end: its recorder was killed.", path.display()))
+        .collect();
+    let (first, last) = (entries.keys().next(), entries.keys().next_back());
+    if let (Some(first), Some(last)) = (first, last) {
+        let lacking = last - first + 1 - entries.len();
+        if lacking > 0 {
+            notes.push(format!(
+                "{lacking} of the scans {first} to {last} are not in it: the run could not read them, or the recorder missed them."
+            ));
+        }
+    }
+    if recording.head().mode == "live" {
+        notes.push("The run was live: which scans it dropped depended on the load, and a replay of the scans drops none.".to_owned());
+    }
+    notes
+}
+
+/// Returns the geometry of a scan and its header; `None` if they do not fit the payload.
+fn geometry(stored: &Stored) -> Option<(SweepGeometry, Box<ScanHeader>)> {
+    let header: Box<ScanHeader> = Box::new(read(&stored.header)?);
+    let geometry = header.view(&stored.payload)?.geometry;
+    Some((geometry, header))
+}
+
+impl Dataset for Scans {
+    fn format(&self) -> Format {
+        Format::Mcap
+    }
+
+    fn len(&self) -> usize {
+        self.entries.keys().next_back().map_or(0, |last| last + 1)
+    }
+
+    fn first(&self) -> usize {
+        self.entries.keys().next().copied().unwrap_or_default()
+    }
+
+    fn limits(&self) -> ScanLimits {
+        ScanLimits {
+            bytes: self.recording.head().scan_bytes,
+            azimuths: MAX_AZIMUTHS,
+        }
+    }
+
+    fn image_size(&self) -> ImageSize {
+        ImageSize {
+            width: self.first.bins,
+            height: self.first.azimuths,
+        }
+    }
+
+    fn files(&self) -> &FileList {
+        &self.files
+    }
+
+    fn file(&self, index: usize) -> &Path {
+        let seq = self.entries.get(&index).map_or(u64::MAX, |entry| entry.seq);
+        self.recording.path_of(Scan::TOPIC, seq)
+    }
+
+    fn nominal_stamp_ns(&self, index: usize) -> Option<i64> {
+        self.entries.get(&index).map(|entry| entry.stamp_ns)
+    }
+
+    fn period_ns(&self) -> i64 {
+        self.period_ns
+    }
+
+    fn logged_stamp_ns(&self, index: usize) -> Option<i64> {
+        self.nominal_stamp_ns(index)
+    }
+
+    fn stamp_meaning(&self) -> &'static str {
+        "as recorded: the middle of the sweep on the sensor's clock"
+    }
+
+    fn encoder_counts(&self) -> Option<u16> {
+        None
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {
+        let len = self.len();
+        if index >= len {
+            return Err(ReadError::NoSuchScan { index, len });
+        }
+        let path = self.file(index).to_owned();
+        let Some(entry) = self.entries.get(&index) else {
+            return Err(ReadError::NotRecorded { path, index });
+        };
+        let stored = self
+            .recording
+            .read(Scan::TOPIC, entry.seq)
+            .map_err(|error| failed(&path, error))?;
+        let damaged = || ReadError::Damaged {
+            path: path.clone(),
+            reason: format!("scan {index} does not fit its header"),
+        };
+        let (geometry, header) = geometry(&stored).ok_or_else(damaged)?;
+        copy(&stored.payload, slot.bytes, "bytes")?;
+        let azimuths = geometry.azimuths;
+        copy(
+            &header.azimuth_rad[..azimuths],
+            slot.azimuth_rad,
+            "azimuths",
+        )?;
+        copy(
+            &header.azimuth_stamp_ns[..azimuths],
+            slot.stamp_ns,
+            "stamps",
+        )?;
+        copy(&header.azimuth_flags[..azimuths], slot.flags, "flags")?;
+        Ok(geometry)
+    }
+}
+
+fn copy<T: Copy>(from: &[T], to: &mut [T], what: &'static str) -> Result<(), ReadError> {
+    let (needed, actual) = (from.len(), to.len());
+    let to = to.get_mut(..needed).ok_or(ReadError::SlotTooSmall {
+        what,
+        needed,
+        actual,
+    })?;
+    to.copy_from_slice(from);
+    Ok(())
+}
+
+/// A file that the disk does not give may be read later; a damaged one may not.
+fn failed(path: &Path, error: RecordingError) -> ReadError {
+    let path = path.to_owned();
+    match error {
+        RecordingError::Io { source, .. } => ReadError::Io { path, source },
+        other => ReadError::Damaged {
+            path,
+            reason: other.to_string(),
+        },
+    }
+}

@@ -1,0 +1,114 @@
+//! The metadata record behind each chunk: the messages in it, and what was missed so far.
+
+use std::{collections::BTreeMap, fmt::Write};
+
+use mcap::records::Metadata;
+
+/// The name of the record.
+const NAME: &str = "gyre.table";
+/// Before the name of a topic: the number of its messages that were missed, since the file was begun.
+const MISSED: &str = "missed.";
+
+/// A message of a chunk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Its sequence number.
+    pub seq: u64,
+    /// The number of its scan.
+    pub scan: u64,
+    /// The time of its scan, ns since 1970.
+    pub stamp_ns: i64,
+}
+
+/// The messages of a chunk by topic.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Table {
+    pub entries: BTreeMap<String, Vec<Entry>>,
+    /// Messages missed since the file was begun, by topic.
+    pub missed: BTreeMap<String, u64>,
+}
+
+impl Table {
+    pub fn to_metadata(&self) -> Metadata {
+        let row = |entries: &Vec<Entry>| {
+            let mut row = String::new();
+            for Entry {
+                seq,
+                scan,
+                stamp_ns,
+            } in entries
+            {
+                let _ = write!(row, "{seq}:{scan}:{stamp_ns} ");
+            }
+            row
+        };
+        let entries = self
+            .entries
+            .iter()
+            .map(|(topic, it)| (topic.clone(), row(it)));
+        let missed = self
+            .missed
+            .iter()
+            .map(|(topic, missed)| (format!("{MISSED}{topic}"), missed.to_string()));
+        Metadata {
+            name: NAME.to_owned(),
+            metadata: entries.chain(missed).collect(),
+        }
+    }
+
+    /// Reads a record; `None` if it is another one, or no table.
+    pub fn of_metadata(record: &Metadata) -> Option<Self> {
+        if record.name != NAME {
+            return None;
+        }
+        let mut table = Self::default();
+        for (key, value) in &record.metadata {
+            match key.strip_prefix(MISSED) {
+                Some(topic) => {
+                    table.missed.insert(topic.to_owned(), value.parse().ok()?);
+                }
+                None => {
+                    let entries: Option<Vec<Entry>> = value.split_whitespace().map(entry).collect();
+                    table.entries.insert(key.clone(), entries?);
+                }
+            }
+        }
+        Some(table)
+    }
+}
+
+fn entry(text: &str) -> Option<Entry> {
+    let mut numbers = text.split(':');
+    let entry = Entry {
+        seq: numbers.next()?.parse().ok()?,
+        scan: numbers.next()?.parse().ok()?,
+        stamp_ns: numbers.next()?.parse().ok()?,
+    };
+    numbers.next().is_none().then_some(entry)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_is_read_as_it_was_written_and_anything_else_is_none() {
+        let entry = |seq, stamp_ns| Entry {
+            seq,
+            scan: seq + 5,
+            stamp_ns,
+        };
+        let table = Table {
+            entries: [("scan".to_owned(), vec![entry(0, -1), entry(1, i64::MAX)])].into(),
+            missed: [("masked".to_owned(), 7)].into(),
+        };
+        let mut record = table.to_metadata();
+        assert_eq!(Table::of_metadata(&record), Some(table));
+        for wrong in ["1:2", "1:2:3:4", "a:1:2", "-1:2:3"] {
+            record.metadata.insert("scan".to_owned(), wrong.to_owned());
+            assert_eq!(Table::of_metadata(&record), None, "{wrong}");
+        }
+        record.name = "other".to_owned();
+        assert_eq!(Table::of_metadata(&record), None);
+    }
+}

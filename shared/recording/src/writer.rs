@@ -1,0 +1,338 @@
+//! Writes a recording: a chunk at least twice a second, each with its table behind it.
+
+use std::{
+    collections::BTreeMap,
+    fs::{File, OpenOptions},
+    io::Seek,
+    os::unix::fs::OpenOptionsExt,
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+use bytemuck::pod_read_unaligned;
+use foxglove::Schema;
+use gyre_messages::{Item, Masked, Message, Scan, topic};
+use mcap::{Compression, McapError, WriteOptions, Writer, records::MessageHeader};
+
+use crate::{
+    ENCODING, Entry, Head, LogLine, RecordingError, exact_channel,
+    image::Rows,
+    table::Table,
+    view::{View, Views},
+};
+
+/// The longest time for which a message stays in memory. At four scans a second the history of the topics covers twice as much, so that
+/// a recorder that is killed and started again misses none.
+const FLUSH_PERIOD: Duration = Duration::from_millis(500);
+/// The size of a chunk, uncompressed, from which on it is written.
+const CHUNK_BYTES: usize = 4 << 20;
+/// The fastest level with entropy coding: the noise in a scan has no repetitions, but few values.
+const LEVEL: u32 = 1;
+
+/// A wire message to record.
+#[derive(Clone, Debug)]
+pub struct Incoming {
+    /// The topic.
+    pub topic: &'static str,
+    /// The bytes of the header.
+    pub header: Vec<u8>,
+    /// The bytes of the payload that the header describes.
+    pub payload: Vec<u8>,
+    /// When the recorder received it, ns since 1970.
+    pub received_ns: i64,
+    /// Messages of the topic that were missed directly before it.
+    pub missed: u64,
+}
+
+/// Writes one file of a recording.
+pub struct RecordingWriter {
+    path: PathBuf,
+    /// `None` after a failure.
+    mcap: Option<Writer<File>>,
+    /// The same file, to cut off what a full disk leaves incomplete.
+    file: File,
+    /// Length of the file up to the last complete table.
+    complete_bytes: u64,
+    channels: BTreeMap<String, u16>,
+    views: Views,
+    table: Table,
+    /// Bytes of the messages since the last table, and when the first of them came.
+    pending: (usize, Option<Instant>),
+    /// The newest time of the sensor, which log lines are placed at.
+    newest_ns: Option<i64>,
+    /// Log lines that came before the first message.
+    early: Vec<LogLine>,
+}
+
+/// The times of a message: the sensor's, and when it was received.
+#[derive(Clone, Copy)]
+struct Times {
+    log_ns: u64,
+    publish_ns: u64,
+    sequence: u32,
+}
+
+impl Times {
+    fn new(stamp_ns: i64, received_ns: i64, sequence: u32) -> Self {
+        let positive = |ns: i64| u64::try_from(ns).unwrap_or_default();
+        Self {
+            log_ns: positive(stamp_ns),
+            publish_ns: positive(received_ns),
+            sequence,
+        }
+    }
+}
+
+impl RecordingWriter {
+    /// Begins a file, which must not exist.
+    ///
+    /// # Errors
+    /// The file exists or cannot be written.
+    pub fn create(path: &Path, head: &Head) -> Result<Self, RecordingError> {
+        let failed = |source| RecordingError::Io {
+            path: path.to_owned(),
+            source,
+        };
+        let new = OpenOptions::new()
+            .write(true)
+            .create_new(true)
+            .mode(0o600)
+            .open(path);
+        let file = new.map_err(failed)?;
+        let own = file.try_clone().map_err(failed)?;
+        let options = WriteOptions::new()
+            .compression(Some(Compression::Zstd))
+            .compression_level(LEVEL)
+            .compression_threads(0)
+            .library(concat!("gyre ", env!("CARGO_PKG_VERSION")))
+            // Chunks end where a table is due. In memory until then: a killed recorder leaves no half of one.
+            .chunk_size(None)
+            .disable_seeking(true);
+        let unwritable = |source| RecordingError::of(path, source);
+        let mcap = options.create(file).map_err(unwritable)?;
+        let mut writer = Self {
+            path: path.to_owned(),
+            mcap: Some(mcap),
+            file: own,
+            complete_bytes: 0,
+            channels: BTreeMap::new(),
+            views: Views::default(),
+            table: Table::default(),
+            pending: (0, None),
+            newest_ns: None,
+            early: Vec::new(),
+        };
+        writer.begin(head).map_err(unwritable)?;
+        Ok(writer)
+    }
+
+    /// Writes the head and the channels that replay needs, so that readers find them in the first chunk.
+    fn begin(&mut self, head: &Head) -> Result<(), McapError> {
+        self.mcap()?.write_metadata(&head.to_metadata())?;
+        for topic in head.topics.iter().filter_map(|name| topic(name)) {
+            let schema =
+                self.mcap()?
+                    .add_schema((topic.header_type)(), ENCODING, topic.name.as_bytes())?;
+            let name = exact_channel(topic.name);
+            let channel = self
+                .mcap()?
+                .add_channel(schema, &name, ENCODING, &BTreeMap::new())?;
+            self.channels.insert(name, channel);
+            if let Some(name) = image_channel(topic.name) {
+                self.channel(
+                    name,
+                    <foxglove::messages::RawImage as foxglove::Encode>::get_schema,
+                )?;
+            }
+        }
+        self.flush_all()
+    }
+
+    /// Adds a message, and writes a chunk if one is due.
+    ///
+    /// # Errors
+    /// The file cannot be written. It is cut back to its last complete chunk.
+    pub fn add(&mut self, message: &Incoming) -> Result<(), RecordingError> {
+        let added = self.try_add(message);
+        self.checked(added)?;
+        self.flush_if_due()
+    }
+
+    fn try_add(&mut self, message: &Incoming) -> Result<(), McapError> {
+        let topic = message.topic;
+        let Some(item) = message.header.get(..size_of::<Item>()) else {
+            return Ok(());
+        };
+        let item: Item = pod_read_unaligned(item);
+        let times = Times::new(item.stamp_ns, message.received_ns, item.seq as u32);
+        let rows = Rows::of(topic, &message.header);
+        let parts = rows.and_then(|rows| Some((rows, rows.split(&message.payload)?)));
+        let mut exact = message.header.clone();
+        match (parts, image_channel(topic)) {
+            (Some((rows, (image, rest))), Some(channel)) => {
+                self.view(&View::image(channel, &rows, image, item.stamp_ns), times)?;
+                exact.extend_from_slice(&rest);
+            }
+            _ => exact.extend_from_slice(&message.payload),
+        }
+        if let Some(channel) = self.channels.get(&exact_channel(topic)).copied() {
+            self.write(channel, &exact, times)?;
+        }
+        for view in self.views.of(topic, &message.header) {
+            self.view(&view, times)?;
+        }
+        let entry = Entry {
+            seq: item.seq,
+            scan: item.scan,
+            stamp_ns: item.stamp_ns,
+        };
+        self.table
+            .entries
+            .entry(topic.to_owned())
+            .or_default()
+            .push(entry);
+        self.missed(topic, message.missed);
+        self.newest_ns = self.newest_ns.max(Some(item.stamp_ns));
+        for line in std::mem::take(&mut self.early) {
+            self.try_add_log(&line)?;
+        }
+        Ok(())
+    }
+
+    /// Counts messages that were missed, without one after them.
+    pub fn missed(&mut self, topic: &str, missed: u64) {
+        if missed > 0 {
+            *self.table.missed.entry(topic.to_owned()).or_default() += missed;
+        }
+    }
+
+    /// Adds a line of the log at the time of the newest scan.
+    ///
+    /// # Errors
+    /// As [`RecordingWriter::add`].
+    pub fn add_log(&mut self, line: LogLine) -> Result<(), RecordingError> {
+        if self.newest_ns.is_none() {
+            self.early.push(line);
+            return Ok(());
+        }
+        let added = self.try_add_log(&line);
+        self.checked(added)
+    }
+
+    fn try_add_log(&mut self, line: &LogLine) -> Result<(), McapError> {
+        let stamp_ns = self.newest_ns.unwrap_or(line.written_ns);
+        self.view(&View::log(line), Times::new(stamp_ns, line.written_ns, 0))
+    }
+
+    fn view(&mut self, view: &View, times: Times) -> Result<(), McapError> {
+        let channel = self.channel(view.channel, view.schema)?;
+        self.write(channel, &view.data, times)
+    }
+
+    /// Returns the channel of this name for viewers.
+    fn channel(&mut self, name: &str, schema: fn() -> Option<Schema>) -> Result<u16, McapError> {
+        if let Some(channel) = self.channels.get(name) {
+            return Ok(*channel);
+        }
+        let schema = match schema() {
+            Some(schema) => {
+                self.mcap()?
+                    .add_schema(&schema.name, &schema.encoding, &schema.data)?
+            }
+            None => 0,
+        };
+        let channel = self
+            .mcap()?
+            .add_channel(schema, name, "protobuf", &BTreeMap::new())?;
+        self.channels.insert(name.to_owned(), channel);
+        Ok(channel)
+    }
+
+    fn write(&mut self, channel_id: u16, data: &[u8], times: Times) -> Result<(), McapError> {
+        let header = MessageHeader {
+            channel_id,
+            sequence: times.sequence,
+            log_time: times.log_ns,
+            publish_time: times.publish_ns,
+        };
+        self.mcap()?.write_to_known_channel(&header, data)?;
+        let (bytes, since) = self.pending;
+        self.pending = (bytes + data.len(), since.or_else(|| Some(Instant::now())));
+        Ok(())
+    }
+
+    /// Writes the messages so far as a chunk if they are many, or have waited for long. Call it twice a second while there are none.
+    ///
+    /// # Errors
+    /// As [`RecordingWriter::add`].
+    pub fn flush_if_due(&mut self) -> Result<(), RecordingError> {
+        let (bytes, since) = self.pending;
+        let is_due =
+            bytes >= CHUNK_BYTES || since.is_some_and(|since| since.elapsed() >= FLUSH_PERIOD);
+        match is_due {
+            true => self.flush(),
+            false => Ok(()),
+        }
+    }
+
+    /// Writes the messages so far as a chunk, and its table.
+    ///
+    /// # Errors
+    /// As [`RecordingWriter::add`].
+    pub fn flush(&mut self) -> Result<(), RecordingError> {
+        let flushed = self.flush_all();
+        self.checked(flushed)
+    }
+
+    fn flush_all(&mut self) -> Result<(), McapError> {
+        self.mcap()?.flush()?;
+        let table = self.table.to_metadata();
+        self.mcap()?.write_metadata(&table)?;
+        self.mcap()?.flush()?;
+        self.table.entries.clear();
+        self.pending = (0, None);
+        // The file of the library and this one have one position.
+        self.complete_bytes = self.file.stream_position()?;
+        Ok(())
+    }
+
+    /// Writes what is left and the summary, and returns the number of messages missed, by topic.
+    ///
+    /// # Errors
+    /// As [`RecordingWriter::add`].
+    pub fn finish(mut self) -> Result<BTreeMap<String, u64>, RecordingError> {
+        for line in std::mem::take(&mut self.early) {
+            let added = self.try_add_log(&line);
+            self.checked(added)?;
+        }
+        self.flush()?;
+        let finished = self.mcap().and_then(Writer::finish).map(drop);
+        self.checked(finished)?;
+        Ok(self.table.missed)
+    }
+
+    fn mcap(&mut self) -> Result<&mut Writer<File>, McapError> {
+        self.mcap
+            .as_mut()
+            .ok_or(McapError::AttemptedWriteAfterFailure)
+    }
+
+    /// Cuts the file back to its last complete chunk after a failure.
+    fn checked(&mut self, result: Result<(), McapError>) -> Result<(), RecordingError> {
+        result.map_err(|source| {
+            // Dropped as it is, it would write a summary.
+            drop(self.mcap.take().map(Writer::into_inner));
+            let _ = self.file.set_len(self.complete_bytes);
+            RecordingError::of(&self.path, source)
+        })
+    }
+}
+
+/// The channel of a topic's image.
+pub(crate) fn image_channel(topic: &str) -> Option<&'static str> {
+    match topic {
+        Scan::TOPIC => Some("/scan"),
+        Masked::TOPIC => Some("/masked"),
+        _ => None,
+    }
+}

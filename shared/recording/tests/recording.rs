@@ -1,0 +1,216 @@
+//! Recordings are read as they were written, up to where they were cut, and damage is an error.
+
+#![allow(clippy::unwrap_used)]
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use bytemuck::{Zeroable, bytes_of};
+use gyre_messages::{Item, PoseHeader, ScanHeader};
+use gyre_radar::{DatasetOptions, OwnedScan, ReadError};
+use gyre_recording::{Head, Incoming, LogLine, Recording, RecordingError, RecordingWriter, open};
+
+const SCANS: u64 = 6;
+const START_NS: i64 = 1_549_986_607_000_000_000;
+
+fn item(seq: u64) -> Item {
+    Item {
+        seq,
+        scan: seq + 10,
+        previous_scan: seq + 10,
+        published: seq,
+        stamp_ns: START_NS + seq as i64 * 250_000_000,
+        ..Item::default()
+    }
+}
+
+/// A scan with metadata before each row, as in images of Oxford.
+fn scan(seq: u64) -> Incoming {
+    let mut header = ScanHeader {
+        item: item(seq),
+        azimuths: 4,
+        bins: 10,
+        stride: 21,
+        first_byte: 11,
+        range_resolution_m: 0.5,
+        range_offset_m: -0.25,
+        clockwise: 1,
+        ..ScanHeader::zeroed()
+    };
+    header.azimuth_stamp_ns[..4].fill(header.item.stamp_ns);
+    header.azimuth_rad[..4].copy_from_slice(&[0.0, 1.5, 3.0, 4.5]);
+    Incoming {
+        topic: "scan",
+        header: bytes_of(&header).to_vec(),
+        payload: (0..11 + 3 * 21 + 10)
+            .map(|byte| (byte * 7 + seq as i32) as u8)
+            .collect(),
+        received_ns: START_NS,
+        missed: 0,
+    }
+}
+
+fn pose(seq: u64) -> Incoming {
+    let header = PoseHeader {
+        item: item(seq),
+        x_m: seq as f64,
+        ..PoseHeader::default()
+    };
+    Incoming {
+        topic: "pose",
+        header: bytes_of(&header).to_vec(),
+        payload: Vec::new(),
+        received_ns: START_NS,
+        missed: 2,
+    }
+}
+
+fn head(id: &str, part: usize) -> Head {
+    Head {
+        id: id.to_owned(),
+        part,
+        configuration: "[dataset]\nformat = \"radiate\"\nazimuth_eccentricity_rad = 0.0025\n"
+            .to_owned(),
+        topics: ["scan", "pose"].map(str::to_owned).to_vec(),
+        scan_bytes: 128,
+        mode: "lossless".to_owned(),
+    }
+}
+
+fn write(path: &Path, head: &Head, seqs: &[u64]) {
+    let mut writer = RecordingWriter::create(path, head).unwrap();
+    for seq in seqs {
+        writer.add(&scan(*seq)).unwrap();
+        writer.add(&pose(*seq)).unwrap();
+        // A chunk for each, as after half a second.
+        writer.flush().unwrap();
+    }
+    writer.add_log(LogLine::default()).unwrap();
+    writer.finish().unwrap();
+}
+
+fn read_all(recording: &mut Recording) -> usize {
+    let entries: Vec<(&str, u64)> = ["scan", "pose"]
+        .into_iter()
+        .flat_map(|topic| {
+            recording
+                .entries(topic)
+                .map(move |entry| (topic, entry.seq))
+        })
+        .collect();
+    let read = entries
+        .iter()
+        .map(|(topic, seq)| recording.read(topic, *seq));
+    read.filter(Result::is_ok).count()
+}
+
+#[test]
+fn messages_are_read_byte_for_byte_and_what_was_missed_is_known() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    write(&path, &head("a", 1), &[0, 1, 2, 3, 4, 5]);
+    let mut recording = Recording::open(std::slice::from_ref(&path)).unwrap();
+    assert_eq!(recording.head(), &head("a", 1));
+    for seq in (0..SCANS).rev() {
+        for message in [scan(seq), pose(seq)] {
+            let stored = recording.read(message.topic, seq).unwrap();
+            assert_eq!(
+                (stored.header, stored.payload),
+                (message.header, message.payload)
+            );
+        }
+    }
+    assert_eq!(recording.missed(), [("pose", 2 * SCANS)].into());
+    let absent = recording.read("scan", SCANS);
+    assert!(matches!(absent, Err(RecordingError::Absent { .. })));
+    assert!(
+        RecordingWriter::create(&path, &head("a", 1)).is_err(),
+        "it is there"
+    );
+}
+
+#[test]
+fn a_dataset_has_the_recorded_scans_under_their_numbers_and_names_the_missing_ones() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    write(&path, &head("a", 1), &[0, 1, 3]);
+    let mut dataset = open(&path, &DatasetOptions::default()).unwrap();
+    assert_eq!((dataset.first(), dataset.len()), (10, 14));
+    let mut own = OwnedScan::with_limits(dataset.limits());
+    own.geometry = dataset.read(11, own.slot()).unwrap();
+    assert_eq!(own.geometry.range_offset_m, -0.25);
+    assert_eq!(own.azimuth_rad[..4], [0.0, 1.5, 3.0, 4.5]);
+    assert_eq!(own.view().row(2), &scan(1).payload[11 + 42..][..10]);
+    let missing = dataset.read(12, own.slot());
+    assert!(matches!(
+        missing,
+        Err(ReadError::NotRecorded { index: 12, .. })
+    ));
+    assert!(
+        dataset
+            .notes()
+            .iter()
+            .any(|note| note.contains("1 of the scans 10 to 13"))
+    );
+    for (offset_m, is_recorded) in [(-0.25, true), (0.0, false)] {
+        let options = DatasetOptions {
+            range_offset_m: Some(offset_m),
+            ..DatasetOptions::default()
+        };
+        assert_eq!(open(&path, &options).is_ok(), is_recorded);
+    }
+}
+
+#[test]
+fn parts_of_one_recording_are_one_and_those_of_another_are_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let paths: Vec<PathBuf> = ["a.mcap", "a.2.mcap", "a.3.mcap"]
+        .map(|name| folder.path().join(name))
+        .to_vec();
+    write(&paths[0], &head("a", 1), &[0, 1, 2]);
+    write(&paths[1], &head("a", 2), &[2, 3]);
+    write(&paths[2], &head("b", 1), &[4]);
+    let mut recording = Recording::open(&paths).unwrap();
+    let seqs: Vec<u64> = recording.entries("scan").map(|entry| entry.seq).collect();
+    assert_eq!(seqs, [0, 1, 2, 3]);
+    assert_eq!(read_all(&mut recording), 8);
+}
+
+#[test]
+fn a_file_that_is_cut_anywhere_is_read_up_to_its_last_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    write(&path, &head("a", 1), &[0, 1, 2, 3, 4, 5]);
+    let bytes = fs::read(&path).unwrap();
+    let mut most = 0;
+    for length in (0..bytes.len()).step_by(97) {
+        fs::write(&path, &bytes[..length]).unwrap();
+        if let Ok(mut recording) = Recording::open(std::slice::from_ref(&path)) {
+            let entries = recording.entries("scan").count() + recording.entries("pose").count();
+            assert_eq!(read_all(&mut recording), entries, "{length} bytes");
+            assert!(entries >= most);
+            most = entries;
+        }
+    }
+    assert_eq!(most, 2 * SCANS as usize);
+}
+
+#[test]
+fn damaged_bytes_are_an_error_and_no_panic() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    write(&path, &head("a", 1), &[0, 1]);
+    let bytes = fs::read(&path).unwrap();
+    for at in (0..bytes.len()).step_by(11) {
+        for value in [0, 0x7f, 0xff] {
+            let mut damaged = bytes.clone();
+            damaged[at] = value;
+            fs::write(&path, &damaged).unwrap();
+            if let Ok(mut recording) = Recording::open(std::slice::from_ref(&path)) {
+                read_all(&mut recording);
+            }
+        }
+    }
+}

@@ -1,0 +1,269 @@
+//! The loop of a source that takes the place of the first stages as well: publishes recorded messages of the topics that the others
+//! read, when the window admits their scan and, at a given rate, when it is due.
+
+use std::{ops::Range, time::Duration};
+
+use gyre_messages::{
+    Header, Hop, Item, Masked, Message, Motion, Refined, Rotation, Scan, StageId, flag,
+};
+
+use super::{Credit, Pace};
+use crate::{
+    Launch, Listener, StageCounters, StageError, clock, schedule::ScheduleWriter, wake,
+    writer::Writer,
+};
+
+/// A wire message as it was recorded.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RecordedMessage {
+    /// The bytes of its header.
+    pub header: Vec<u8>,
+    /// The bytes of its payload that the header describes.
+    pub payload: Vec<u8>,
+}
+
+/// The recorded messages of a run.
+pub trait Recorded {
+    /// The topics to publish, in the order of the stream.
+    fn topics(&self) -> &[&'static str];
+
+    /// The messages to play, by their sequence number: each topic has all of them.
+    fn items(&self) -> Range<u64>;
+
+    /// Reads a message.
+    ///
+    /// # Errors
+    /// The reason why it cannot be used.
+    fn read(&mut self, topic: &str, seq: u64) -> Result<RecordedMessage, StageError>;
+}
+
+/// Plays recorded messages until SIGTERM.
+///
+/// # Errors
+/// A message that cannot be read, or a failure of the transport.
+pub fn run_player(
+    launch: &Launch,
+    recorded: &mut impl Recorded,
+) -> Result<StageCounters, StageError> {
+    if !launch.take_place()? {
+        return Ok(StageCounters::default());
+    }
+    let credit = Credit::open(launch)?;
+    let schedule = ScheduleWriter::create(&launch.manifest)?;
+    let outputs = recorded.topics().iter().map(|topic| output(launch, topic));
+    let outputs = outputs.collect::<Result<_, _>>()?;
+    let mut player = Player {
+        launch,
+        recorded,
+        credit,
+        outputs,
+        schedule,
+        counters: StageCounters::default(),
+        // The supervisor takes its publisher for a sign that the source has started.
+        _scans: Writer::open(&launch.node, &launch.manifest)?,
+    };
+    player.play()?;
+    Ok(player.counters)
+}
+
+/// The publisher of a topic, whatever its type.
+trait Output {
+    fn topic(&self) -> &'static str;
+    /// Publishes a recorded message with this item.
+    fn send(&self, message: &RecordedMessage, item: Item) -> Result<(), StageError>;
+    /// Publishes the end of the stream.
+    fn end(&self, item: Item) -> Result<(), StageError>;
+    fn accept_readers(&self) -> Result<(), StageError>;
+    fn listener(&self) -> &Listener;
+}
+
+fn output(launch: &Launch, topic: &str) -> Result<Box<dyn Output>, StageError> {
+    let (node, manifest) = (&launch.node, &launch.manifest);
+    Ok(match topic {
+        Masked::TOPIC => Box::new(Writer::<Masked>::open(node, manifest)?),
+        Rotation::TOPIC => Box::new(Writer::<Rotation>::open(node, manifest)?),
+        Motion::TOPIC => Box::new(Writer::<Motion>::open(node, manifest)?),
+        Refined::TOPIC => Box::new(Writer::<Refined>::open(node, manifest)?),
+        _ => {
+            let reason = format!("a player does not publish the topic `{topic}`");
+            return Err(StageError::Configuration(reason));
+        }
+    })
+}
+
+impl<M: Message> Output for Writer<M> {
+    fn topic(&self) -> &'static str {
+        M::TOPIC
+    }
+
+    fn send(&self, message: &RecordedMessage, item: Item) -> Result<(), StageError> {
+        let mut draft = self.loan()?;
+        let (header, payload) = draft.parts::<u8>();
+        let (bytes, room) = (message.payload.len(), payload.len());
+        let is_whole = message.header.len() == size_of::<M::Header>();
+        let Some(content) = payload.get_mut(..bytes).filter(|_| is_whole) else {
+            return Err(StageError::Input(format!(
+                "the recorded message {} of topic `{}` has {bytes} bytes, and this run has room for {room}: its configuration is not that of the recorded run",
+                item.seq,
+                M::TOPIC
+            )));
+        };
+        content.copy_from_slice(&message.payload);
+        // What is behind it in memory has no meaning, and is not to differ from run to run.
+        payload[bytes..].fill(0);
+        *header = bytemuck::pod_read_unaligned(&message.header);
+        *header.item_mut() = item;
+        Writer::send(self, draft, StageId::RadarReplay)
+    }
+
+    fn end(&self, item: Item) -> Result<(), StageError> {
+        let mut draft = self.loan()?;
+        *draft.header().item_mut() = Item {
+            flags: flag::END,
+            ..item
+        };
+        Writer::send(self, draft, StageId::RadarReplay)
+    }
+
+    fn accept_readers(&self) -> Result<(), StageError> {
+        Writer::accept_readers(self)
+    }
+
+    fn listener(&self) -> &Listener {
+        Writer::listener(self)
+    }
+}
+
+struct Player<'a, R: Recorded> {
+    launch: &'a Launch,
+    recorded: &'a mut R,
+    credit: Credit,
+    outputs: Vec<Box<dyn Output>>,
+    schedule: ScheduleWriter,
+    counters: StageCounters,
+    _scans: Writer<Scan>,
+}
+
+impl<R: Recorded> Player<'_, R> {
+    fn play(&mut self) -> Result<(), StageError> {
+        let Some(mut seq) = self.wait_for_start()? else {
+            return Ok(());
+        };
+        let (mut pace, mut last) = (None, None);
+        let items = self.recorded.items();
+        while items.contains(&seq) {
+            let (started_ns, messages) = (clock::now_ns(), self.read(seq)?);
+            let mut item = item_of(&messages, seq)?;
+            let due_ns = self.launch.manifest.rate.map(|rate| {
+                let pace = pace.get_or_insert_with(|| Pace::new(rate, item.stamp_ns));
+                pace.due_ns(item.stamp_ns)
+            });
+            *item.hop_mut(StageId::RadarReplay) = Hop {
+                received_ns: started_ns,
+                started_ns,
+                finished_ns: clock::now_ns(),
+                published_ns: 0,
+            };
+            if !self.wait_for_admission(seq, due_ns)? {
+                return Ok(());
+            }
+            item.due_ns = due_ns.unwrap_or_else(clock::now_ns);
+            for (output, message) in self.outputs.iter().zip(&messages) {
+                output.send(message, item)?;
+            }
+            self.schedule.has_published(item.published)?;
+            self.counters.record(0, clock::now_ns() - started_ns);
+            (seq, last) = (seq + 1, Some(item));
+        }
+        if self.wait_for_admission(seq, None)? {
+            let last = last.unwrap_or_default();
+            let end = Item {
+                seq,
+                published: last.published.saturating_add(1),
+                ..last
+            };
+            self.outputs.iter().try_for_each(|output| output.end(end))?;
+            self.schedule.has_published(end.published)?;
+            while !self.sleep(wake::MAX_WAIT)? {}
+        }
+        Ok(())
+    }
+
+    /// Waits until the sink has reported the newest pose, and returns the first message to send: that of this pose, which the others
+    /// need as the previous one. `None` on a request to stop.
+    fn wait_for_start(&mut self) -> Result<Option<u64>, StageError> {
+        loop {
+            // Sleep first, as the source of scans does.
+            if self.sleep(wake::MAX_WAIT)? {
+                return Ok(None);
+            }
+            self.credit.update()?;
+            if let Some(newest) = self.credit.resume_at {
+                return Ok(Some(match newest.is(flag::BASE) {
+                    true => self.recorded.items().start,
+                    false => newest.seq,
+                }));
+            }
+        }
+    }
+
+    fn read(&mut self, seq: u64) -> Result<Vec<RecordedMessage>, StageError> {
+        let topics = self.outputs.iter().map(|output| output.topic());
+        topics.map(|topic| self.recorded.read(topic, seq)).collect()
+    }
+
+    /// Waits until the window admits an item and it is due; false on a request to stop.
+    fn wait_for_admission(&mut self, seq: u64, due_ns: Option<i64>) -> Result<bool, StageError> {
+        self.schedule.due_at(due_ns.unwrap_or_else(clock::now_ns))?;
+        loop {
+            self.credit.update()?;
+            let wait = due_ns.map_or(Duration::ZERO, clock::until);
+            let window = self.launch.manifest.window;
+            let has_credit = window.admits(seq, self.credit.newest);
+            if has_credit && wait.is_zero() {
+                return Ok(true);
+            }
+            let limit = match has_credit {
+                true => wait.min(wake::MAX_WAIT),
+                false => wake::MAX_WAIT,
+            };
+            if self.sleep(limit)? {
+                return Ok(false);
+            }
+        }
+    }
+
+    /// Sleeps, and answers the handshakes of new readers; true on a request to stop.
+    fn sleep(&mut self, limit: Duration) -> Result<bool, StageError> {
+        let handshakes: Vec<_> = self
+            .outputs
+            .iter()
+            .map(|output| output.listener())
+            .collect();
+        let poses = [self.credit.poses.listener()];
+        let signals = &self.launch.signals;
+        let woken = signals.wait_or_readable(&poses, &handshakes, None, limit)?;
+        self.counters.wakes += 1;
+        if woken.may_have_new_readers() {
+            let mut outputs = self.outputs.iter();
+            outputs.try_for_each(|output| output.accept_readers())?;
+        }
+        Ok(woken.stop)
+    }
+}
+
+/// Returns the item of recorded messages without the times of the recorded run.
+fn item_of(messages: &[RecordedMessage], seq: u64) -> Result<Item, StageError> {
+    let header = messages.first().map(|message| message.header.as_slice());
+    let item = header.and_then(|header| header.get(..size_of::<Item>()));
+    let item = item.map(bytemuck::pod_read_unaligned::<Item>);
+    match item.filter(|item| item.seq == seq) {
+        Some(item) => Ok(Item {
+            hops: Default::default(),
+            ..item
+        }),
+        None => Err(StageError::Input(format!(
+            "the recorded message {seq} is another one"
+        ))),
+    }
+}

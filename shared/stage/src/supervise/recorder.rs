@@ -1,0 +1,154 @@
+//! The recorder of a run: a process beside the stages that nothing depends on. It is restarted alone, and the run goes on without one that
+//! dies too often.
+
+use std::time::{Duration, Instant};
+
+use super::{
+    Ending, Event, SuperviseError, Supervisor,
+    child::Child,
+    start::{Place, Starter},
+};
+use crate::observer;
+
+/// The longest time for which the first scan waits until the recorder observes all topics.
+const START_TIMEOUT: Duration = Duration::from_secs(10);
+/// Time between two looks at whether it does.
+const LOOK: Duration = Duration::from_millis(10);
+/// The longest time for which a complete run waits for the end of its recording.
+const END_TIMEOUT: Duration = Duration::from_secs(30);
+/// The same for a run that was interrupted or has failed.
+const STOP_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// The process, and when it is to be started again.
+pub(super) struct Recorder {
+    child: Child,
+    /// `None` while it runs, and when it has ended for good.
+    restart_at: Option<Instant>,
+    has_ended: bool,
+}
+
+impl Supervisor<'_> {
+    /// Starts the recorder before any stage, and waits until it observes all topics, so that it misses nothing of the beginning.
+    pub(super) fn start_recorder(&mut self) -> Result<(), SuperviseError> {
+        let Some(plan) = &self.plan.recorder else {
+            return Ok(());
+        };
+        let starter = Starter::new(&self.signals, &self.guardian);
+        let mut child = match Child::spawn(plan, &self.plan.manifest, &starter, Place::Free) {
+            Err(error) if error.is_of_one_process() => {
+                self.say_of_recording(&error.to_string());
+                return Ok(());
+            }
+            spawned => spawned?,
+        };
+        let ready = observer::ready_file(&self.plan.manifest.root);
+        let started = Instant::now();
+        while started.elapsed() < START_TIMEOUT && !ready.exists() && !child.has_exited() {
+            if self.signals.wait(&[], None, LOOK)?.stop {
+                break;
+            }
+        }
+        self.recorder = Some(Recorder {
+            child,
+            restart_at: None,
+            has_ended: false,
+        });
+        Ok(())
+    }
+
+    /// Starts a recorder again that has died.
+    pub(super) fn keep_recorder(&mut self) -> Result<(), SuperviseError> {
+        let Some(recorder) = &mut self.recorder else {
+            return Ok(());
+        };
+        if recorder.has_ended || !recorder.child.has_exited() {
+            return Ok(());
+        }
+        let Some(restart_at) = recorder.restart_at else {
+            return self.judge_recorder();
+        };
+        if Instant::now() < restart_at {
+            return Ok(());
+        }
+        recorder.restart_at = None;
+        let newest = self.newest.map(|newest| newest.seq);
+        let starter = Starter::new(&self.signals, &self.guardian);
+        let manifest = &self.plan.manifest;
+        match recorder.child.respawn(manifest, &starter, newest) {
+            Err(error) if error.is_of_one_process() => {
+                recorder.has_ended = true;
+                self.say_of_recording(&error.to_string());
+                Ok(())
+            }
+            respawned => respawned,
+        }
+    }
+
+    /// Decides whether a recorder that has just died is started again.
+    fn judge_recorder(&mut self) -> Result<(), SuperviseError> {
+        let Some(recorder) = &mut self.recorder else {
+            return Ok(());
+        };
+        self.guardian.forget(recorder.child.pid());
+        let death = recorder.child.death();
+        let sentence = match recorder.child.may_restart(&death) {
+            // It was told to stop.
+            _ if death.code == Some(0) => {
+                recorder.has_ended = true;
+                death.last_output.unwrap_or_default()
+            }
+            Ok(()) => {
+                recorder.restart_at = Some(Instant::now() + recorder.child.backoff());
+                format!(
+                    "the recorder died ({}), and is started again: it goes on in another file",
+                    death.cause
+                )
+            }
+            Err(error) => {
+                recorder.has_ended = true;
+                error.to_string()
+            }
+        };
+        self.say_of_recording(&sentence);
+        Ok(())
+    }
+
+    /// Lets the recorder write what it has received, before the stages end.
+    pub(super) fn stop_recorder(&mut self, ending: Option<Ending>) -> Result<(), SuperviseError> {
+        let Some(recorder) = &mut self.recorder else {
+            return Ok(());
+        };
+        if recorder.has_ended || recorder.restart_at.is_some() {
+            return Ok(());
+        }
+        recorder.child.terminate();
+        let limit = match ending {
+            Some(Ending::Complete) => END_TIMEOUT,
+            _ => STOP_TIMEOUT,
+        };
+        let since = Instant::now();
+        while !recorder.child.has_exited() && since.elapsed() < limit {
+            self.signals.wait(&[], None, LOOK)?;
+        }
+        let was_late = !recorder.child.has_exited();
+        recorder.child.kill();
+        // One that the kernel holds is left to it.
+        let _ = recorder.child.await_end();
+        self.guardian.forget(recorder.child.pid());
+        let output = recorder.child.death().last_output.unwrap_or_default();
+        let sentence = match was_late {
+            true => format!(
+                "the recorder had not written all after {limit:?}, and was killed: the end of the recording is missing"
+            ),
+            false => output,
+        };
+        self.say_of_recording(&sentence);
+        Ok(())
+    }
+
+    fn say_of_recording(&mut self, sentence: &str) {
+        if !sentence.is_empty() {
+            (self.observe)(Event::Recorder { sentence });
+        }
+    }
+}

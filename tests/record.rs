@@ -1,0 +1,264 @@
+//! Recordings of runs: they change nothing, survive kills and full disks, say what is missing, and replay to the same bytes.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+    thread,
+    time::Duration,
+};
+
+use gyre_recording::{Recording, open_recording, parts};
+use rustix::process::Signal;
+
+use crate::common::{Ended, Run, Running, gyre, processes, real_data, send};
+
+const SCANS: usize = 24;
+/// Every topic that a replay can begin with.
+const ALL: &str = "record.topics=['scan','masked','rotation','motion','refined','pose','log']";
+/// With so large a window the queues hold all scans of these tests: nothing is missed, however slow the machine is.
+const WINDOW: &str = "run.window=32";
+
+/// A drive that makes a loop, through small rasters.
+fn simulated() -> Run {
+    Run::configured(&format!(
+        "[simulation]\nscans = {SCANS}\n[raster]\nn = 127\ncell_m = 0.8\n"
+    ))
+    .set(WINDOW)
+}
+
+fn file(run: &Run) -> PathBuf {
+    run.folder().join("drive.mcap")
+}
+
+fn recorded(run: &Run) -> Run {
+    let path = file(run);
+    run.clone().argument("--record", path.to_str().unwrap())
+}
+
+/// A replay with the configuration that is in the recording.
+fn replay(recording: &Path, arguments: &[&str]) -> String {
+    let run = Run::configured("");
+    let mut command = gyre();
+    command.arg("run").arg("--data").arg(recording);
+    command.args(arguments).arg("--out").arg(run.out());
+    Ended::of(command).succeeded();
+    run.odometry()
+}
+
+fn seqs(recording: &Recording, topic: &str) -> Vec<u64> {
+    recording.entries(topic).map(|entry| entry.seq).collect()
+}
+
+/// Waits for the recorder of a run, another one than `not`.
+fn await_recorder(running: &mut Running, not: Option<u32>) -> u32 {
+    loop {
+        let recorder = processes::child_with(running.pid(), "record");
+        if let Some(pid) = recorder.filter(|pid| Some(*pid) != not) {
+            return pid;
+        }
+        assert!(!running.is_over(), "the run ended without a recorder");
+        thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn a_recorded_run_has_the_same_results_and_replays_to_them_from_every_topic() {
+    let undisturbed = simulated().complete();
+    let run = recorded(&simulated()).set(ALL);
+    let ended = run.finish();
+    ended.succeeded();
+    assert!(ended.stderr.contains("missed nothing"), "{}", ended.stderr);
+    assert_eq!(run.odometry(), undisturbed);
+    let recording = open_recording(&file(&run)).unwrap();
+    for topic in ["scan", "masked", "rotation", "motion", "refined", "pose"] {
+        let all: Vec<u64> = (0..SCANS as u64).collect();
+        assert_eq!(seqs(&recording, topic), all, "{topic}");
+    }
+    assert_eq!(recording.cut().count(), 0);
+    assert_eq!(replay(&file(&run), &[]), undisturbed);
+    for topic in ["masked", "rotation", "motion", "refined"] {
+        let odometry = replay(&file(&run), &["--from", topic]);
+        assert_eq!(odometry, undisturbed, "from {topic}");
+    }
+}
+
+#[test]
+fn a_killed_recorder_changes_no_byte_and_another_one_goes_on_in_the_next_part() {
+    let undisturbed = simulated().complete();
+    let run = recorded(&simulated()).rate("1");
+    let mut running = run.start();
+    running.await_poses(SCANS / 4);
+    let killed = await_recorder(&mut running, None);
+    send(killed, Signal::KILL);
+    await_recorder(&mut running, Some(killed));
+    let ended = running.finish();
+    ended.succeeded();
+    assert!(ended.stderr.contains("started again"), "{}", ended.stderr);
+    assert_eq!(run.odometry(), undisturbed);
+    assert_eq!(parts(&file(&run)).len(), 2);
+    let recording = open_recording(&file(&run)).unwrap();
+    assert_eq!(
+        recording.cut().count(),
+        1,
+        "the part of the killed one has no end"
+    );
+    let first = Recording::open(&[file(&run)]).unwrap();
+    let of_first = seqs(&first, "scan");
+    assert!(
+        !of_first.is_empty(),
+        "what was written before the kill can be read"
+    );
+    assert_eq!(seqs(&recording, "scan").len(), SCANS);
+    assert_eq!(replay(&file(&run), &[]), undisturbed);
+}
+
+#[test]
+fn a_player_and_a_stage_that_are_killed_change_no_byte_of_a_replay() {
+    let run = recorded(&simulated()).set(ALL);
+    let odometry = run.complete();
+    let again = Run::configured("");
+    let mut command = gyre();
+    command.arg("run").arg("--data").arg(file(&run));
+    command
+        .args(["--from", "masked", "--rate", "2", "--out"])
+        .arg(again.out());
+    let mut running = again.start_as(command);
+    running.await_poses(SCANS / 4).kill("radar-replay");
+    running.await_poses(SCANS / 2).kill("refinement");
+    running.finish().succeeded();
+    assert_eq!(again.odometry(), odometry);
+}
+
+#[test]
+fn a_recording_of_a_part_of_a_drive_replays_under_its_own_numbers() {
+    let run = recorded(&simulated()).set("source.first=5");
+    let odometry = run.complete();
+    assert_eq!(replay(&file(&run), &[]), odometry);
+}
+
+#[test]
+fn a_recording_from_the_middle_of_a_drive_is_refused_where_all_messages_are_needed() {
+    let run = simulated().rate("1").set("run.window=1");
+    let mut running = run.start();
+    running.await_poses(SCANS / 3);
+    let mut record = gyre();
+    record
+        .arg("record")
+        .arg(run.out())
+        .arg("--to")
+        .arg(file(&run));
+    let mut recorder = record.spawn().unwrap();
+    running.finish().succeeded();
+    recorder.wait().unwrap();
+    let recording = open_recording(&file(&run)).unwrap();
+    let scans = seqs(&recording, "scan");
+    assert!(!scans.is_empty() && scans[0] > 0, "{scans:?}");
+    // A scan before the recorder came is not there, and the stages after `masked` need it.
+    let replay = simulated().data(&file(&run)).argument("--from", "masked");
+    replay
+        .finish()
+        .refused_with(&["lacks message 0 of topic `masked`"]);
+}
+
+#[test]
+fn a_recording_is_not_overwritten() {
+    let run = recorded(&simulated());
+    fs::write(file(&run), "mine").unwrap();
+    run.finish()
+        .refused_with(&["drive.mcap exists", "never overwritten"]);
+    assert_eq!(fs::read_to_string(file(&run)).unwrap(), "mine");
+}
+
+#[test]
+fn a_full_disk_ends_the_recording_with_a_sentence_and_not_the_run() {
+    let run = simulated();
+    let place = run.folder().join("small");
+    fs::create_dir(&place).unwrap();
+    let recorded = run
+        .clone()
+        .argument("--record", place.join("drive.mcap").to_str().unwrap());
+    let Some(command) = recorded.with_tmpfs(&place, "size=512k") else {
+        return;
+    };
+    let ended = recorded.start_as(command).finish();
+    ended.succeeded();
+    for part in ["No space left", "the run goes on"] {
+        assert!(ended.stderr.contains(part), "{}", ended.stderr);
+    }
+    assert_eq!(run.odometry(), simulated().complete());
+}
+
+#[test]
+fn inspect_reports_a_recording_as_a_dataset() {
+    let run = recorded(&simulated());
+    run.complete();
+    let mut command = gyre();
+    command.arg("inspect").arg(file(&run)).arg("--json");
+    let report: serde_json::Value =
+        serde_json::from_str(&Ended::of(command).succeeded().stdout).unwrap();
+    assert_eq!(report["format"], "mcap");
+    assert_eq!(report["scans"], SCANS);
+    assert_eq!(report["unreadable"].as_array().unwrap().len(), 0);
+}
+
+#[test]
+fn real_scans_replay_to_the_same_bytes() {
+    let Some(data) = real_data("radiate-2019-02-12") else {
+        return;
+    };
+    let configuration = Path::new(crate::PROJECT).join("configs/radiate.toml");
+    let run = Run::of_file(&configuration)
+        .data(&data)
+        .set("source.scans=20")
+        .set(WINDOW);
+    let run = recorded(&run).set(ALL);
+    let odometry = run.complete();
+    assert_eq!(replay(&file(&run), &[]), odometry);
+    assert_eq!(replay(&file(&run), &["--from", "masked"]), odometry);
+    let configured = Run::of_file(&configuration).data(&file(&run));
+    assert_eq!(
+        configured.complete(),
+        odometry,
+        "constants that are the recorded ones"
+    );
+    let other = configured.set("dataset.range_offset_m=0.5");
+    other
+        .finish()
+        .refused_with(&["range_offset_m", "that they were recorded with"]);
+}
+
+/// Reads a recording with the Python package `mcap` and prints the messages by channel.
+const READ: &str = "
+import collections, sys
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+counts = collections.Counter()
+with open(sys.argv[1], 'rb') as file:
+    for schema, channel, message, decoded in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(
+        topics=['/scan', '/pose', '/tf', '/trajectory', '/motion', '/refined', '/log']
+    ):
+        counts[channel.topic] += 1
+        if channel.topic == '/scan':
+            assert len(decoded.data) == decoded.step * decoded.height, decoded.step
+print(dict(counts))
+";
+
+#[test]
+fn the_python_package_mcap_reads_a_recording() {
+    let import = Command::new("python3")
+        .args(["-c", "import mcap_protobuf"])
+        .output();
+    if !import.is_ok_and(|output| output.status.success()) {
+        println!("skipped: python3 has no package mcap-protobuf-support");
+        return;
+    }
+    let run = recorded(&simulated());
+    run.complete();
+    let mut command = Command::new("python3");
+    command.args(["-c", READ]).arg(file(&run));
+    let ended = Ended::of(command);
+    ended.succeeded();
+    let counts = format!("'/scan': {SCANS}");
+    assert!(ended.stdout.contains(&counts), "{}", ended.stdout);
+}
