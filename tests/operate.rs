@@ -39,9 +39,15 @@ fn swap(run: &Run, stage: &str, options: &[&str], command: &[&str]) -> Ended {
         .arg(run.out())
         .args(options);
     if !command.is_empty() {
-        words.arg("--command").args(command);
+        words.arg("--command").arg(shell_words(command));
     }
     Ended::of(words)
+}
+
+/// Words as one argument, each in quotes.
+fn shell_words(words: &[&str]) -> String {
+    let quoted = words.iter().map(|word| format!("'{word}'"));
+    quoted.collect::<Vec<_>>().join(" ")
 }
 
 /// The state of a run as `gyre ps --json` says it.

@@ -4,7 +4,7 @@
 
 use std::{
     collections::BTreeMap,
-    env, fs,
+    fs,
     mem::{offset_of, size_of},
     process::Command,
 };
@@ -18,14 +18,13 @@ use serde_json::Value;
 
 use crate::{
     PROJECT,
-    common::{Ended, Pid, Run, gyre, send, undisturbed},
+    common::{Ended, Pid, Run, gyre, python, recording, send, undisturbed},
 };
 
 /// The Python and the script.
 fn command() -> [String; 2] {
-    let python = env::var("GYRE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     [
-        python,
+        python(),
         format!("{PROJECT}/examples/python-masking/masking.py"),
     ]
 }
@@ -192,6 +191,37 @@ fn killed_it_leaves_the_results_as_they_are() {
     running.finish().succeeded();
     assert_eq!(run.odometry(), undisturbed);
     assert_eq!(run.summary()["restarts"]["masking"], 2);
+}
+
+#[test]
+fn it_takes_over_in_a_running_pipeline_at_ten_scans_a_second_and_gives_way_again() {
+    if !can_start() {
+        return;
+    }
+    // Four scans a second, two and a half times as fast.
+    let run = Run::of_recording().rate("2.5");
+    let mut running = run.start();
+    let swap = |command: &[&str]| {
+        let mut swap = gyre();
+        swap.args(["swap", "masking", "--out"]).arg(run.out());
+        swap.args(command);
+        Ended::of(swap).succeeded();
+    };
+    running.await_poses(4);
+    swap(&["--command", &command().join(" ")]);
+    running.await_poses(12);
+    swap(&[]);
+    running.finish().succeeded();
+    let summary = run.summary();
+    assert_eq!(
+        (&summary["dropped"], &summary["processed"]),
+        (&0.into(), &recording::SCANS.into())
+    );
+    assert_eq!(summary["swaps"].as_array().unwrap().len(), 2);
+    for (own, mixed) in motions(undisturbed()).iter().zip(motions(&run.odometry())) {
+        let apart_m = (own[0] - mixed[0]).hypot(own[1] - mixed[1]);
+        assert!(apart_m < 0.01, "{apart_m} m");
+    }
 }
 
 /// The process of the script, which is a child of the supervisor.

@@ -11,7 +11,7 @@ use std::{
 use gyre_recording::{Recording, open_recording, parts};
 use rustix::process::Signal;
 
-use crate::common::{Ended, Run, Running, gyre, processes, real_data, send};
+use crate::common::{Ended, Run, Running, gyre, processes, python, real_data, send};
 
 const SCANS: usize = 24;
 /// Every topic that a replay can begin with.
@@ -246,16 +246,16 @@ print(dict(counts))
 
 #[test]
 fn the_python_package_mcap_reads_a_recording() {
-    let import = Command::new("python3")
+    let import = Command::new(python())
         .args(["-c", "import mcap_protobuf"])
         .output();
     if !import.is_ok_and(|output| output.status.success()) {
-        println!("skipped: python3 has no package mcap-protobuf-support");
+        println!("skipped: {} has no package mcap-protobuf-support", python());
         return;
     }
     let run = recorded(&simulated());
     run.complete();
-    let mut command = Command::new("python3");
+    let mut command = Command::new(python());
     command.args(["-c", READ]).arg(file(&run));
     let ended = Ended::of(command);
     ended.succeeded();

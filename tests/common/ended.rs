@@ -66,9 +66,12 @@ impl Ended {
     }
 
     fn assert_calm(&self) {
+        // A process without memory is aborted by Rust, and its last words, which are repeated, are of a backtrace.
+        let is_abort = |line: &&str| line.contains("died by signal 6 (");
         for text in [&self.stdout, &self.stderr] {
+            let mut lines = text.lines().filter(|line| !is_abort(line));
             assert!(
-                !text.contains("panicked") && !text.contains("backtrace"),
+                !lines.any(|line| line.contains("panicked") || line.contains("backtrace")),
                 "{text}"
             );
         }

@@ -15,6 +15,7 @@ mod server;
 mod watch;
 
 use std::{
+    env,
     ffi::OsStr,
     fs::{self, File},
     io::Write,
@@ -55,6 +56,11 @@ pub fn folder() -> TempDir {
         .unwrap();
     fs::write(folder.path().join("small.toml"), CONFIGURATION).unwrap();
     folder
+}
+
+/// The Python for what is tested in Python: it may have packages that `python3` has not.
+pub fn python() -> String {
+    env::var("GYRE_PYTHON").unwrap_or_else(|_| "python3".to_owned())
 }
 
 /// The program under test.

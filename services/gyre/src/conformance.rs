@@ -164,10 +164,7 @@ fn command(
             .filter(|command| !command.is_empty())
             .unwrap_or_else(own));
     };
-    match shlex::split(command) {
-        Some(words) if !words.is_empty() => Ok(words),
-        _ => Err(format!("--command is `{command}`, but must be a program and its arguments, with its quotes closed").into()),
-    }
+    program::words(command)
 }
 
 fn manifest(

@@ -16,7 +16,7 @@ use gyre_stage::control::{Control, Swap};
 use crate::{
     Failure,
     cli::{RestartArguments, RunChoice, SwapArguments},
-    print,
+    print, program,
 };
 
 pub use background::{detach_if_asked, down, up};
@@ -41,7 +41,8 @@ pub fn restart(arguments: &RestartArguments) -> Result<ExitCode, Failure> {
 /// There is no such run or process, or the program does not come to take over: the one before goes on.
 pub fn swap(arguments: &SwapArguments) -> Result<ExitCode, Failure> {
     let run = chosen(&arguments.run)?;
-    let command = (!arguments.command.is_empty()).then(|| arguments.command.clone());
+    let command = arguments.command.as_deref().map(program::words);
+    let command = command.transpose()?;
     let what = match &command {
         Some(command) => format!("`{}`", command.join(" ")),
         None => "the program that the run was begun with".to_owned(),

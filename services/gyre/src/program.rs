@@ -13,9 +13,22 @@ use std::{
 use gyre_stage::supervise::StagePlan;
 use sha2::{Digest, Sha256};
 
+use crate::Failure;
+
 /// Returns a path that leads to the program that this process executes, for this process and its children.
 pub fn own() -> PathBuf {
     PathBuf::from(format!("/proc/{}/exe", std::process::id()))
+}
+
+/// Returns the program and the arguments of a `--command`, as a shell would part them.
+///
+/// # Errors
+/// No program, or a quote that is not closed.
+pub fn words(command: &str) -> Result<Vec<String>, Failure> {
+    match shlex::split(command) {
+        Some(words) if !words.is_empty() => Ok(words),
+        _ => Err(format!("--command is `{command}`, but must be a program and its arguments, with its quotes closed").into()),
+    }
 }
 
 /// Returns the SHA-256 of a file.

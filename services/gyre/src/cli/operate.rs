@@ -54,9 +54,10 @@ pub struct SwapArguments {
     /// The run.
     #[command(flatten)]
     pub run: RunChoice,
-    /// The program that takes over, with its arguments: all that follows. Default: the one that the run was begun with.
-    #[arg(long, num_args = 1.., allow_hyphen_values = true, value_name = "PROGRAM")]
-    pub command: Vec<String>,
+    /// The program that takes over and its arguments, as in 'python3 stage.py --fast'; no shell is involved. Default: the one that the
+    /// run was begun with.
+    #[arg(long, value_name = "COMMAND")]
+    pub command: Option<String>,
     /// End the program before first. For a program that cannot stand by; scans wait for it meanwhile, or are dropped in live mode.
     #[arg(long)]
     pub cold: bool,
