@@ -102,7 +102,7 @@ pub fn wrapped(by: &[&str], command: &Command) -> Command {
 
 /// A folder of real data; says so and returns `None` where there is none.
 pub fn real_data(folder: &str) -> Option<PathBuf> {
-    match std::env::var_os("GYRE_DATA") {
+    match env::var_os("GYRE_DATA") {
         Some(data) => Some(Path::new(&data).join(folder)),
         None => {
             println!("skipped: GYRE_DATA is not set");
