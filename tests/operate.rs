@@ -140,7 +140,10 @@ fn a_process_is_started_again_on_request() {
 
 #[test]
 fn each_stage_gives_way_to_another_program_and_back_without_a_lost_scan() {
-    let (run, running) = started();
+    // Twelve seconds, since the machine may be busy.
+    let run = Run::of_recording().rate("0.5");
+    let mut running = run.start();
+    running.await_poses(2);
     for stage in STAGES {
         swap(&run, stage, &[], &["nice", PROGRAM, "stage", stage]).succeeded();
         let status = status(&run).unwrap();
@@ -175,15 +178,8 @@ fn a_program_that_cannot_take_over_changes_nothing() {
 #[test]
 fn a_program_that_fails_after_taking_over_gives_way_to_the_one_before() {
     let (run, running) = started();
-    let script = run.folder().join("fails.sh");
-    // It stands by as the contract says, and then it dies.
-    fs::write(
-        &script,
-        "#!/bin/sh\ntouch $GYRE_RUN/masking.ready\ncat\nexit 3\n",
-    )
-    .unwrap();
-    fs::set_permissions(&script, fs::Permissions::from_mode(0o700)).unwrap();
-    swap(&run, "masking", &[], &[script.to_str().unwrap()]).succeeded();
+    let fails = script(&run, "fails.sh", FAILS);
+    swap(&run, "masking", &[], &[&fails]).succeeded();
     let back = await_status(&run, "back", |it| {
         process(it, "masking")["is_swapped"] == false
     });
@@ -196,6 +192,136 @@ fn a_program_that_fails_after_taking_over_gives_way_to_the_one_before() {
             .contains("goes back to the program before")
     );
     assert_eq!(run.odometry(), undisturbed());
+}
+
+/// An executable script.
+fn script(run: &Run, name: &str, text: &str) -> String {
+    let path = run.folder().join(name);
+    fs::write(&path, format!("#!/bin/sh\n{text}\n")).unwrap();
+    fs::set_permissions(&path, fs::Permissions::from_mode(0o700)).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+/// A masking stage that stands by as the contract says, and then dies.
+const FAILS: &str = "touch $GYRE_RUN/masking.ready\ncat\nexit 3";
+
+#[test]
+fn a_cold_swap_to_a_program_that_cannot_be_started_changes_nothing() {
+    let (run, running) = started();
+    swap(&run, "masking", &["--cold"], &["/nowhere/masking"])
+        .refused_with(&["masking goes on as before", "/nowhere/masking"]);
+    let status = status(&run).unwrap();
+    assert_eq!(process(&status, "masking")["is_swapped"], false);
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn a_program_that_was_edited_is_taken_by_a_swap_alone_and_gives_way_when_it_fails() {
+    let run = Run::of_recording().rate("1");
+    let mut running = run.start();
+    running.await_poses(4);
+    let own = script(&run, "own.sh", &format!("exec {PROGRAM} stage masking"));
+    swap(&run, "masking", &[], &[&own]).succeeded();
+    let before = process(&status(&run).unwrap(), "masking")["pid"].clone();
+    script(&run, "own.sh", FAILS);
+    ask(&run, &["restart", "masking"]).refused_with(&["own.sh has changed", "gyre swap masking"]);
+    assert_eq!(process(&status(&run).unwrap(), "masking")["pid"], before);
+    // The one before is of a file that is another one by now: so it is the one that the run was begun with.
+    swap(&run, "masking", &[], &[&own]).succeeded();
+    await_status(&run, "back", |it| {
+        process(it, "masking")["is_swapped"] == false
+    });
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn a_swap_that_is_interrupted_leaves_nobody_standing_by() {
+    let (run, running) = started();
+    let mut words = gyre();
+    words.args(["swap", "masking", "--command", "sleep 60", "--out"]);
+    let mut client = words.arg(run.out()).spawn().unwrap();
+    thread::sleep(Duration::from_millis(200));
+    client.kill().unwrap();
+    client.wait().unwrap();
+    let since = Instant::now();
+    let own = ["nice", PROGRAM, "stage", "masking"];
+    while !swap(&run, "masking", &[], &own).status.success() {
+        assert!(since.elapsed().as_secs() < 10, "the first one stands by");
+    }
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn a_run_that_was_frozen_goes_on_without_a_restart() {
+    let run = Run::of_recording()
+        .rate(MODERATE)
+        .set("run.stall_timeout_s=2");
+    let mut running = run.start();
+    running.await_poses(THIRD / 2);
+    let supervisor = running.pid();
+    let stages: Vec<Pid> = running.await_stages().into_values().collect();
+    let all = || [supervisor].into_iter().chain(stages.iter().copied());
+    all().for_each(|pid| send(pid, Signal::STOP));
+    thread::sleep(Duration::from_secs(4));
+    // The supervisor looks first.
+    send(supervisor, Signal::CONT);
+    thread::sleep(Duration::from_millis(100));
+    stages.iter().for_each(|pid| send(*pid, Signal::CONT));
+    running.finish().succeeded();
+    assert_eq!(run.summary()["restarts"], serde_json::json!({}));
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn a_follower_that_hangs_is_restarted_alone_while_odometry_goes_on() {
+    let run = Run::of_recording()
+        .rate("1")
+        .set("slam.kind=graph")
+        .set("run.stall_timeout_s=2");
+    let mut running = run.start();
+    running.await_poses(4);
+    let status = await_status(&run, "followers", |it| {
+        process(it, "loop-closure")["activity"] == "waiting"
+    });
+    let pid = process(&status, "loop-closure")["pid"].as_u64().unwrap() as Pid;
+    send(pid, Signal::STOP);
+    let ended = running.finish();
+    ended.succeeded();
+    assert!(ended.stderr.contains("loop-closure hangs"), "{ended:?}");
+    let restarts = run.summary()["restarts"].clone();
+    assert_eq!(restarts, serde_json::json!({ "loop-closure": 1 }));
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn down_says_that_results_are_not_written_and_that_a_killed_run_is_not_running() {
+    let (run, running) = started();
+    // Nothing can be put in its place.
+    fs::create_dir(run.out().join("summary.json")).unwrap();
+    ask(&run, &["down"]).failed_with(&["results are not written"]);
+    assert!(!running.finish().status.success());
+    fs::remove_dir(run.out().join("summary.json")).unwrap();
+    let mut running = run.start();
+    running.await_poses(THIRD);
+    running.kill_supervisor();
+    ask(&run, &["down"]).refused_with(&["no run"]);
+    let other = Run::of_recording().rate(MODERATE);
+    let going = other.start();
+    await_status(&other, "poses", |status| {
+        status["poses"].as_u64() >= Some(1)
+    });
+    let mut ps = gyre();
+    ps.args(["ps", "--json"]);
+    let ended = Ended::of(ps);
+    assert!(
+        !ended.stdout.contains(run.out().to_str().unwrap()),
+        "{ended:?}"
+    );
+    going.finish().succeeded();
+    assert_eq!(run.complete(), undisturbed());
 }
 
 #[test]
@@ -300,11 +426,12 @@ fn top_shows_the_processes_of_a_run_in_a_terminal() {
     assert_eq!(run.odometry(), undisturbed());
 }
 
-/// All that is sent to a socket within the life of a run.
+/// Reads what is sent to a socket, as systemd does, until `STOPPING=1`.
 fn notifications(socket: &UnixDatagram) -> Vec<String> {
     let mut buffer = [0; 4096];
-    let mut all = Vec::new();
-    while let Ok(length) = socket.recv(&mut buffer) {
+    let mut all: Vec<String> = Vec::new();
+    while !all.last().is_some_and(|it| it.contains("STOPPING=1")) {
+        let length = socket.recv(&mut buffer).unwrap();
         all.push(String::from_utf8_lossy(&buffer[..length]).into_owned());
     }
     all
@@ -315,14 +442,16 @@ fn systemd_is_told_when_a_run_is_ready_alive_and_stopping() {
     let place = folder();
     let path = place.path().join("notify");
     let socket = UnixDatagram::bind(&path).unwrap();
-    socket.set_nonblocking(true).unwrap();
+    let limit = Some(Duration::from_secs(60));
+    socket.set_read_timeout(limit).unwrap();
     let run = Run::of_recording().rate(MODERATE);
     let mut command = run.command();
     command
         .env("NOTIFY_SOCKET", &path)
         .env("WATCHDOG_USEC", "400000");
-    run.start_as(command).finish().succeeded();
+    let running = run.start_as(command);
     let all = notifications(&socket);
+    running.finish().succeeded();
     let position = |word: &str| all.iter().position(|it| it.contains(word)).unwrap();
     assert!(position("READY=1") < position("WATCHDOG=1"), "{all:?}");
     assert!(position("WATCHDOG=1") < position("STOPPING=1"), "{all:?}");

@@ -340,7 +340,7 @@ impl Configuration {
             // The supervisor keeps its own program; those of others can change under their names.
             let (command, programs) = match own.command.is_empty() {
                 true => (ours(), Vec::new()),
-                false => (own.command.clone(), Program::all_of(&own.command)),
+                false => (own.command.clone(), Program::all_of(&own.command, None)),
             };
             let scheduling = match FollowerId::by_name(name) {
                 Some(_) => own.scheduling,

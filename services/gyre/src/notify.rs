@@ -17,6 +17,8 @@ const STATUS_EVERY: Duration = Duration::from_secs(5);
 /// Notifies systemd; does nothing where nobody listens.
 pub struct Notifier {
     listens: bool,
+    /// systemd takes keep-alives from the start of the service on.
+    is_ready: bool,
     /// Time between two keep-alives.
     every: Option<Duration>,
     kept_alive: Instant,
@@ -30,6 +32,7 @@ impl Notifier {
         let now = Instant::now();
         Self {
             listens: std::env::var_os("NOTIFY_SOCKET").is_some(),
+            is_ready: false,
             // Half of the limit, as its manual advises.
             every: sd_notify::watchdog_enabled().map(|limit| limit / 2),
             kept_alive: now,
@@ -41,8 +44,14 @@ impl Notifier {
     /// restarts by itself; systemd restarts a supervisor that does not.
     pub fn report(&mut self, event: &Event<'_>) {
         match event {
-            Event::Ready => self.tell(&[NotifyState::Ready]),
-            Event::Watched if self.every.is_some_and(|it| self.kept_alive.elapsed() >= it) => {
+            Event::Ready => {
+                self.is_ready = true;
+                self.tell(&[NotifyState::Ready]);
+            }
+            Event::Watched
+                if self.is_ready
+                    && self.every.is_some_and(|it| self.kept_alive.elapsed() >= it) =>
+            {
                 self.kept_alive = Instant::now();
                 self.tell(&[NotifyState::Watchdog]);
             }
@@ -50,15 +59,15 @@ impl Notifier {
                 self.status = Instant::now();
                 self.tell(&[NotifyState::Status(&status(pose))]);
             }
+            Event::Stopping => self.tell(&[NotifyState::Stopping]),
             Event::Stalled(stall) => self.tell(&[NotifyState::Status(&stall.to_string())]),
             _ => {}
         }
     }
 
     /// The stages have ended, and results are written, which takes as long as it takes.
-    pub fn stopping(&mut self) {
-        let results = NotifyState::Status("writing the results");
-        self.tell(&[NotifyState::Stopping, results]);
+    pub fn writing(&mut self) {
+        self.tell(&[NotifyState::Status("writing the results")]);
     }
 
     fn tell(&mut self, states: &[NotifyState<'_>]) {

@@ -11,7 +11,10 @@ mod top;
 
 use std::{env, process::ExitCode};
 
-use gyre_stage::control::{Control, Swap};
+use gyre_stage::{
+    control::{Control, Swap},
+    supervise::Program,
+};
 
 use crate::{
     Failure,
@@ -43,6 +46,13 @@ pub fn swap(arguments: &SwapArguments) -> Result<ExitCode, Failure> {
     let run = chosen(&arguments.run)?;
     let command = arguments.command.as_deref().map(program::words);
     let command = command.transpose()?;
+    // Found as in this terminal: the supervisor may have been started with another PATH.
+    let command = command.map(|mut command: Vec<String>| {
+        if let Some(program) = command.first_mut() {
+            *program = Program::place_of(program).display().to_string();
+        }
+        command
+    });
     let what = match &command {
         Some(command) => format!("`{}`", command.join(" ")),
         None => "the program that the run was begun with".to_owned(),

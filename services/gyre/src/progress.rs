@@ -64,8 +64,8 @@ impl Progress {
                     .map_or(String::new(), |line| format!(" ({line})"));
                 self.say(&format!("{stage} died by {}{output}", death.cause));
             }
-            Event::Restarted { all: false } => self.say("restarted it"),
-            Event::Restarted { all: true } => self.say("restarted all stages from the journal"),
+            Event::Restarted { only: Some(name) } => self.say(&format!("restarted {name}")),
+            Event::Restarted { only: None } => self.say("restarted the stages from the journal"),
             Event::GaveUp { follower, error } => {
                 self.say(&format!("{error}: odometry goes on without {follower}"));
             }
@@ -80,7 +80,7 @@ impl Progress {
                     "{stage} goes back to the program before: {reason}"
                 ));
             }
-            Event::Ready | Event::Watched => {}
+            Event::Ready | Event::Watched | Event::Stopping => {}
         }
     }
 

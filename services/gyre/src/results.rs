@@ -34,6 +34,9 @@ use pass::Pass;
 use sketch::Sketch;
 use slam::Slam;
 
+/// The figures of a run. It is put in place after all other results.
+pub const SUMMARY: &str = "summary.json";
+
 /// The ground truth of a simulation that is played without being stored.
 pub const SIMULATED_TRUTH: &str = "ground_truth.tum";
 /// All results.
@@ -49,7 +52,7 @@ pub const FILES: [&str; 13] = [
     "bands_slam.svg",
     "map.png",
     "latency.json",
-    "summary.json",
+    SUMMARY,
     SIMULATED_TRUTH,
 ];
 
@@ -113,7 +116,7 @@ pub fn write(
         judgement,
         corrected,
     );
-    files.add("summary.json", serde_json::to_string_pretty(&summary)?)?;
+    files.add(SUMMARY, serde_json::to_string_pretty(&summary)?)?;
     files.commit()?;
     Ok(Results {
         poses: counts.processed as usize,

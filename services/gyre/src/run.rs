@@ -174,7 +174,7 @@ fn play(
         notifier.report(&event);
     });
     progress.finish();
-    notifier.stopping();
+    notifier.writing();
     if matches!(report, Err(SuperviseError::TransportStuck)) && !has_started_over_at(resumed) {
         drop((root, out));
         return start_over(resumed);

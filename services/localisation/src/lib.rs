@@ -21,9 +21,6 @@ use gyre_stage::{
 /// # Errors
 /// A map or keyframes that cannot be used, an invalid configuration, or an error of [`follower::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
-    if !launch.take_place()? {
-        return Ok(StageCounters::default());
-    }
     let slam: SlamConfig = launch.section("slam")?;
     let refinement: RefinementConfig = launch.section("refinement")?;
     let points: PointsConfig = launch.section("points")?;
@@ -31,6 +28,9 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let map = Map::open(&slam.map).map_err(|error| failed(&error))?;
     let options = LocaliserOptions::default();
     let localiser = Localiser::new(map, options, &refinement, points.capacity);
+    if !launch.take_place()? {
+        return Ok(StageCounters::default());
+    }
     let out = launch.manifest.out.clone();
     let mut places = Places {
         keyframes: RecordReader::open(&out)?,

@@ -104,11 +104,15 @@ impl Inputs for Scans {
     }
 
     fn listeners(&self) -> Vec<&Listener> {
-        let [motions, poses] = self.motions.listeners();
-        let scans = match &self.queue {
-            Queue::Lossless(queue) => queue.listener(),
-            Queue::Live(queue) => queue.listener(),
+        let (scans, lacks_scan) = match &self.queue {
+            Queue::Lossless(queue) => (queue.listener(), queue.current().is_none()),
+            Queue::Live(queue) => (queue.listener(), queue.current().is_none()),
         };
+        // Motions and poses are read when a scan comes.
+        if lacks_scan && self.motions.resume_at().is_some() {
+            return vec![scans];
+        }
+        let [motions, poses] = self.motions.listeners();
         vec![scans, motions, poses]
     }
 

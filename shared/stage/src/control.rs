@@ -4,8 +4,9 @@
 //! another, and the connection is closed.
 
 use std::{
+    fs,
     io::{self, BufRead, BufReader, Write},
-    os::unix::net::UnixStream,
+    os::unix::{fs::MetadataExt, net::UnixStream},
     path::{Path, PathBuf},
     time::Duration,
 };
@@ -168,6 +169,8 @@ impl Activity {
 #[derive(Debug)]
 pub struct Control {
     root: PathBuf,
+    /// Device and inode of the root: a later run with the same results has another one.
+    id: (u64, u64),
     out: PathBuf,
 }
 
@@ -178,14 +181,15 @@ impl Control {
     /// There is no such run.
     pub fn of(out: &Path) -> Result<Self, StageError> {
         let absolute = out.canonicalize().unwrap_or_else(|_| out.to_owned());
-        let root = run::root_of(&absolute);
-        match root.join(SOCKET).exists() {
-            true => Ok(Self {
-                root,
-                out: out.to_owned(),
-            }),
-            false => Err(StageError::NotRunning(out.to_owned())),
-        }
+        Self::at(run::root_of(&absolute), out.to_owned())
+            .ok_or_else(|| StageError::NotRunning(out.to_owned()))
+    }
+
+    /// Returns the control of the run with this root; `None` if it is dead, or has no socket yet.
+    fn at(root: PathBuf, out: PathBuf) -> Option<Self> {
+        let id = id_of(&root)?;
+        let is_running = root.join(SOCKET).exists() && run::is_alive(&root);
+        is_running.then_some(Self { root, id, out })
     }
 
     /// Returns the controls of all runs of this user, by the folders of their results.
@@ -193,7 +197,7 @@ impl Control {
     pub fn of_all() -> Vec<Self> {
         let with_out = |root: PathBuf| {
             let out = Manifest::read(&root).ok()?.out;
-            root.join(SOCKET).exists().then_some(Self { root, out })
+            Self::at(root, out)
         };
         let mut runs: Vec<Self> = run::roots().into_iter().filter_map(with_out).collect();
         runs.sort_by(|a, b| a.out.cmp(&b.out));
@@ -243,10 +247,10 @@ impl Control {
         self.order(&Request::Swap(swap), None)
     }
 
-    /// Returns whether the run is still there.
+    /// Returns whether the run is still there: its supervisor lives, and has not written all results.
     #[must_use]
     pub fn is_there(&self) -> bool {
-        self.root.exists()
+        id_of(&self.root) == Some(self.id) && run::is_alive(&self.root)
     }
 
     fn order(&self, request: &Request, limit: Option<Duration>) -> Result<(), StageError> {
@@ -268,7 +272,7 @@ impl Control {
             );
             match is_gone {
                 true => StageError::NotRunning(self.out.clone()),
-                false => self.silent(error.to_string()),
+                false => self.silent(reason(&error)),
             }
         })?;
         serde_json::from_str(&line).map_err(|error| self.silent(error.to_string()))
@@ -293,5 +297,19 @@ impl Control {
             out: self.out.clone(),
             reason,
         }
+    }
+}
+
+fn id_of(root: &Path) -> Option<(u64, u64)> {
+    let root = fs::metadata(root).ok()?;
+    Some((root.dev(), root.ino()))
+}
+
+fn reason(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut => {
+            format!("there was no answer within {ANSWER:?}")
+        }
+        _ => error.to_string(),
     }
 }

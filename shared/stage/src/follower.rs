@@ -65,6 +65,7 @@ pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounte
         .map(|log| services::listener(&launch.node, log.event()))
         .collect::<Result<_, _>>()?;
     let grown: Vec<&Listener> = listeners.iter().collect();
+    launch.begin_heartbeat()?;
     let mut flow = Flow {
         output: Writer::open(&launch.node, &launch.manifest)?,
         report: ProgressWriter::create(&launch.manifest, &launch.name)?,

@@ -42,7 +42,8 @@ pub trait Inputs: Sized {
     fn view(&self) -> Option<Self::View<'_>>;
     /// Advances to the next item.
     fn advance(&mut self);
-    /// Returns the listeners that the publishers notify.
+    /// Returns the listeners to wait for after [`Action::Wait`]. Where two inputs are missing one of them is enough, best the one
+    /// that comes last: each wake-up less leaves a processor to the stages before.
     fn listeners(&self) -> Vec<&Listener>;
     /// Returns the number of items that were skipped because they had been received before.
     fn duplicates(&self) -> u64;
@@ -202,7 +203,11 @@ impl<A: Message, B: Message> Inputs for Joined<A, B> {
     }
 
     fn listeners(&self) -> Vec<&Listener> {
-        vec![self.pairs.listener(), self.other.listener()]
+        // The other topic is further down the stream.
+        vec![match self.other.current() {
+            None => self.other.listener(),
+            Some(_) => self.pairs.listener(),
+        }]
     }
 
     fn duplicates(&self) -> u64 {

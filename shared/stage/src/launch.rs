@@ -1,6 +1,7 @@
 //! Start and end of a process of a run.
 
 use std::{
+    cell::Cell,
     fs::{self, OpenOptions},
     io::Write,
     os::{fd::AsFd, unix::fs::OpenOptionsExt},
@@ -37,6 +38,8 @@ pub struct Launch {
     pub signals: Signals,
     configuration: toml::Table,
     pub(crate) node: Node,
+    /// True from [`Launch::take_place`] on.
+    has_place: Cell<bool>,
     _log: EnteredSpan,
 }
 
@@ -72,6 +75,7 @@ impl Launch {
             signals,
             configuration,
             node,
+            has_place: Cell::new(false),
             _log: log,
         })
     }
@@ -84,16 +88,26 @@ impl Launch {
     /// # Errors
     /// A file of the run that cannot be written, or memory that cannot be locked.
     pub fn take_place(&self) -> Result<bool, StageError> {
-        if self.signals.reports() {
+        if self.has_place.get() {
             return Ok(true);
         }
         self.lock_memory()?;
-        if std::env::var_os(run::STANDBY).is_some() && !self.stand_by()? {
+        if stands_by() && !self.stand_by()? {
             return Ok(false);
         }
+        self.has_place.set(true);
+        // A follower may still have long logs to read: its loop begins the heartbeat.
+        if FollowerId::by_name(&self.name).is_none() {
+            self.begin_heartbeat()?;
+        }
+        Ok(true)
+    }
+
+    /// Reports each wait of this process from here on.
+    pub(crate) fn begin_heartbeat(&self) -> Result<(), StageError> {
         let heartbeat = HeartbeatWriter::create(&self.manifest, &self.name)?;
         self.signals.report_to(heartbeat);
-        Ok(true)
+        Ok(())
     }
 
     fn stand_by(&self) -> Result<bool, StageError> {
@@ -178,6 +192,11 @@ impl Launch {
     }
 }
 
+/// Returns whether this process was started to stand by.
+fn stands_by() -> bool {
+    std::env::var_os(run::STANDBY).is_some()
+}
+
 /// Runs a stage as the `main` of its process: joins the run, works until its end, and prints an error as one sentence.
 pub fn main(
     name: &str,
@@ -201,15 +220,19 @@ pub fn main(
     }
 }
 
-/// Returns the name of the file in the run's root in which a stage says why it ended.
-pub(crate) fn last_words(stage: &str) -> String {
-    format!("{stage}.error")
+/// Returns the name of the file in the run's root in which a stage says why it ended, or a process that was started to stand by.
+pub(crate) fn last_words(stage: &str, stands_by: bool) -> String {
+    match stands_by {
+        true => format!("{stage}.standby.error"),
+        false => format!("{stage}.error"),
+    }
 }
 
 /// Tells the supervisor why the stage ended, in shared memory: the disk of the logs may be full.
 fn leave_last_words(stage: &str, sentence: &str) {
     if let Some(root) = std::env::var_os(run::ENVIRONMENT) {
-        let _ = run::write(PathBuf::from(root).join(last_words(stage)), sentence);
+        let name = last_words(stage, stands_by());
+        let _ = run::write(PathBuf::from(root).join(name), sentence);
     }
 }
 

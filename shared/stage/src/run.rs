@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 use crate::StageError;
 
 pub use root::{RootError, RunRoot, SHARED_MEMORY, free_shared_memory, root_of, sweep};
-pub(crate) use root::{close_to_others, own_files, roots, shared_memory_is_full};
+pub(crate) use root::{close_to_others, is_alive, own_files, roots, shared_memory_is_full};
 
 /// The environment variable with the path of the run's root.
 pub const ENVIRONMENT: &str = "GYRE_RUN";

@@ -70,7 +70,7 @@ pub fn run<M: Message<Header = MotionHeader>, S: Sink>(
     integration.drain(&mut inputs)?;
     loop {
         let woken = launch.signals.wait(
-            &inputs.listeners(),
+            &[inputs.listener()],
             Some(integration.poses.listener()),
             wake::MAX_WAIT,
         )?;
@@ -173,11 +173,12 @@ impl<M: Message<Header = MotionHeader>> Motions<M> {
         }
     }
 
-    fn listeners(&self) -> Vec<&Listener> {
-        let scans = self.scans.iter().map(Reader::listener);
-        std::iter::once(self.motions.listener())
-            .chain(scans)
-            .collect()
+    /// Returns the listener of the input that is missing, as [`Inputs::listeners`](crate::inputs::Inputs::listeners).
+    fn listener(&self) -> &Listener {
+        match (&self.scans, self.motions.current()) {
+            (Some(scans), Some(_)) => scans.listener(),
+            _ => self.motions.listener(),
+        }
     }
 
     fn duplicates(&self) -> u64 {

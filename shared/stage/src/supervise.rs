@@ -14,6 +14,7 @@ mod observers;
 mod plan;
 mod program;
 mod recorder;
+mod recovery;
 mod requests;
 pub mod rig;
 mod scheduling;
@@ -29,11 +30,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Header, Item, Pose, PoseHeader, StageId, flag};
+use gyre_messages::{Item, Pose, flag};
 use iceoryx2::prelude::{Config, FilePath, SemanticString};
 
 use crate::{
-    StageCounters, StageError, clock, counters,
+    StageCounters, StageError, counters,
     reader::Port,
     run,
     services::{self, Node, Services},
@@ -41,6 +42,7 @@ use crate::{
 };
 use child::Child;
 use guardian::Guardian;
+use recovery::{Recovering, pass_trials, record_recoveries};
 use socket::ControlSocket;
 use start::{Place, Starter};
 use swap::Standby;
@@ -71,6 +73,7 @@ pub fn supervise(
     iceoryx2::prelude::set_log_level(iceoryx2::prelude::LogLevel::Fatal);
     let mut supervisor = Supervisor::new(plan, signals, observe)?;
     let ending = supervisor.start().and_then(|()| supervisor.watch());
+    (supervisor.observe)(Event::Stopping);
     supervisor.stop_recorder(ending.as_ref().ok().copied())?;
     supervisor.stop()?;
     let ending = ending?;
@@ -100,7 +103,7 @@ struct Supervisor<'a> {
     /// True when the stream has ended, and followers are waited for.
     is_following: bool,
     watchdog: Watchdog,
-    looked_for_hangs: Instant,
+    hangs: stall::Looks,
     socket: ControlSocket,
     /// The program that stands by to take the place of another one.
     standby: Option<Standby>,
@@ -119,12 +122,6 @@ struct Supervisor<'a> {
     _node: Node,
     transport: Config,
     signals: Signals,
-}
-
-struct Recovering {
-    hop: StageId,
-    died_ns: i64,
-    started_ns: i64,
 }
 
 impl<'a> Supervisor<'a> {
@@ -153,7 +150,7 @@ impl<'a> Supervisor<'a> {
             is_ready: false,
             is_following: false,
             watchdog: Watchdog::new(plan),
-            looked_for_hangs: Instant::now(),
+            hangs: stall::Looks::new(),
             socket: ControlSocket::open(manifest)?,
             standby: None,
             swaps: Vec::new(),
@@ -245,7 +242,10 @@ impl<'a> Supervisor<'a> {
             && let Ok(guardian) = Guardian::start(&self.plan.guardian, &self.plan.manifest)
         {
             self.guardian = guardian;
-            let living = self.children.iter().map(Child::pid);
+            let standby = self.standby.as_ref().map(Standby::pid);
+            let recorder = self.recorder.as_ref().map(recorder::Recorder::pid);
+            let others = standby.into_iter().chain(recorder);
+            let living = self.children.iter().map(Child::pid).chain(others);
             living.for_each(|group| self.guardian.remember(group));
         }
     }
@@ -270,131 +270,13 @@ impl<'a> Supervisor<'a> {
         Ok(false)
     }
 
-    /// Restarts dead stages, or all stages if that alone would not help.
-    fn recover(&mut self, dead: &[usize]) -> Result<(), SuperviseError> {
-        let died_ns = clock::now_ns();
-        self.may_restart(dead)?;
-        let all = dead.iter().any(|i| {
-            let child = &self.children[*i];
-            child.died_without_progress(self.newest_seq()) || child.plan().restarts_all
-        });
-        match all {
-            true => self.restart(&self.all_but_survivors(dead), died_ns)?,
-            false => self.restart(dead, died_ns)?,
-        }
-        (self.observe)(Event::Restarted { all });
-        Ok(())
-    }
-
-    /// Counts deaths against the restart policies, and waits for the longest backoff.
-    fn may_restart(&mut self, dead: &[usize]) -> Result<(), SuperviseError> {
-        let mut backoff = Duration::ZERO;
-        for i in dead {
-            let child = &mut self.children[*i];
-            let death = child.death();
-            (self.observe)(Event::Died {
-                stage: child.name(),
-                death: &death,
-            });
-            if !death.killed {
-                backoff = backoff.max(child.backoff());
-            }
-            self.require_restart(*i, &death)?;
-            self.count_restart(*i);
-        }
-        if !backoff.is_zero() {
-            self.signals.wait(&[], None, backoff)?;
-        }
-        Ok(())
-    }
-
-    /// Returns whether a dead process may be started again, by its policy. One that has taken the place of another gives way to it
-    /// first.
-    fn require_restart(&mut self, child: usize, death: &Death) -> Result<(), SuperviseError> {
-        if self.children[child].is_on_trial() && self.go_back(child, &death.cause) {
-            return Ok(());
-        }
-        match self.children[child].may_restart(death) {
-            Err(error) if self.go_back(child, &error.to_string()) => Ok(()),
-            may_restart => may_restart,
-        }
-    }
-
-    fn count_restart(&mut self, child: usize) {
-        let name = self.children[child].name().to_owned();
-        *self.restarts.entry(name).or_default() += 1;
-    }
-
-    fn newest_seq(&self) -> Option<u64> {
-        self.newest.map(|newest| newest.seq)
-    }
-
-    fn poses_so_far(&self) -> u64 {
-        self.newest_seq().map_or(0, |newest| newest + 1)
-    }
-
-    /// Returns the processes to restart with one of them: itself, or all stages if its restart alone does not recover its state.
-    fn restarted_with(&self, child: usize) -> Vec<usize> {
-        match self.children[child].plan().restarts_all {
-            true => self.all_but_survivors(&[child]),
-            false => vec![child],
-        }
-    }
-
-    /// Returns all stages.
-    fn all(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.children.len()).filter(|i| !self.children[*i].follows())
-    }
-
-    /// Returns all stages except those that are alive and outlive restarts.
-    fn all_but_survivors(&self, dead: &[usize]) -> Vec<usize> {
-        let survives = |i: &usize| self.children[*i].plan().outlives_restarts && !dead.contains(i);
-        self.all().filter(|i| !survives(i)).collect()
-    }
-
-    fn restart(&mut self, stages: &[usize], died_ns: i64) -> Result<(), SuperviseError> {
-        self.replace(stages, died_ns, None)?;
-        self.watchdog.restarted();
-        Ok(())
-    }
-
-    /// Ends processes and starts others in their places; in one of them a process that stood by goes on.
-    fn replace(
-        &mut self,
-        stages: &[usize],
-        died_ns: i64,
-        mut successor: Option<(usize, Child)>,
-    ) -> Result<(), SuperviseError> {
-        stages.iter().for_each(|i| self.children[*i].kill());
-        for i in stages {
-            self.children[*i].await_end()?;
-            self.guardian.forget(self.children[*i].pid());
-        }
-        let all_dead = stages.len() == self.children.len() && successor.is_none();
-        clean::remove_dead(&self.plan.manifest, &self.transport, all_dead)?;
-        let newest = self.newest_seq();
-        for i in stages {
-            let starter = Starter::new(&self.signals, &self.guardian);
-            let child = &mut self.children[*i];
-            match successor.take_if(|(place, _)| place == i) {
-                Some((_, successor)) => child.succeed(successor, newest),
-                None => child.respawn(&self.plan.manifest, &starter, newest)?,
-            }
-            self.recovering.extend(child.stage().map(|hop| Recovering {
-                hop,
-                died_ns,
-                started_ns: clock::now_ns(),
-            }));
-        }
-        Ok(())
-    }
-
     /// Stops all stages, and kills those that do not exit in time.
     fn stop(&mut self) -> Result<(), SuperviseError> {
         self.children.iter().for_each(Child::terminate);
         let deadline = Instant::now() + STOP_TIMEOUT;
         while Instant::now() < deadline && !self.children.iter_mut().all(Child::has_exited) {
             self.signals.wait(&[], None, wake::MAX_WAIT)?;
+            (self.observe)(Event::Watched);
         }
         self.children.iter().for_each(Child::kill);
         for child in &mut self.children {
@@ -403,39 +285,6 @@ impl<'a> Supervisor<'a> {
         }
         self.logs.bound();
         Ok(())
-    }
-}
-
-/// Records the recovery of stages at the first pose that their new processes worked on; items in flight do not count.
-fn record_recoveries(
-    pose: &PoseHeader,
-    recovering: &mut Vec<Recovering>,
-    recovery: &mut Vec<Duration>,
-) {
-    let hops = pose.item().hops;
-    recovering.retain(|stage| {
-        let recovered = hops[stage.hop as usize].started_ns > stage.started_ns;
-        if recovered {
-            recovery.push(Duration::from_nanos(
-                (clock::now_ns() - stage.died_ns).max(0) as u64,
-            ));
-        }
-        !recovered
-    });
-}
-
-/// A program that has worked on a pose since it took the place of another one has passed its trial.
-fn pass_trials(pose: &PoseHeader, children: &mut [Child], recovering: &[Recovering]) {
-    for child in children.iter_mut().filter(|child| child.is_on_trial()) {
-        let Some(hop) = child.stage() else {
-            continue;
-        };
-        let started = recovering.iter().rev().find(|stage| stage.hop == hop);
-        let has_worked =
-            |stage: &Recovering| pose.item().hops[hop as usize].started_ns > stage.started_ns;
-        if started.is_none_or(has_worked) {
-            child.pass_trial();
-        }
     }
 }
 

@@ -102,10 +102,6 @@ impl Signals {
         let _ = self.heartbeat.set(heartbeat);
     }
 
-    pub(crate) fn reports(&self) -> bool {
-        self.heartbeat.get().is_some()
-    }
-
     /// Sleeps for `limit` or until a signal arrives; true on a request to stop.
     ///
     /// # Errors

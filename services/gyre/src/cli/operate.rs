@@ -31,7 +31,7 @@ pub struct LogsArguments {
     /// Go on with what comes, until the run ends.
     #[arg(short, long)]
     pub follow: bool,
-    /// Number of lines to begin with.
+    /// Number of lines to begin with, of each log.
     #[arg(short = 'n', long, default_value_t = 50)]
     pub lines: usize,
 }

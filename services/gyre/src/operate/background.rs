@@ -5,10 +5,10 @@ use std::{
     ffi::OsString,
     fs::{self, File, OpenOptions},
     io::{Read, Seek, SeekFrom},
-    os::unix::fs::OpenOptionsExt,
+    os::unix::fs::{MetadataExt, OpenOptionsExt},
     path::Path,
     process::{Child, Command, ExitCode, ExitStatus, Stdio},
-    time::{Duration, Instant},
+    time::{Duration, Instant, SystemTime},
 };
 
 use gyre_stage::{
@@ -21,6 +21,7 @@ use crate::{
     Failure,
     cli::{RunArguments, RunChoice},
     print, program,
+    results::SUMMARY,
     run::results_folder,
 };
 
@@ -134,11 +135,12 @@ fn ended(
 /// Ends a run as an interrupt does, and waits until its results are written.
 ///
 /// # Errors
-/// There is no such run, or its supervisor does not answer.
+/// There is no such run, its supervisor does not answer, or it has ended without results.
 pub fn down(choice: &RunChoice) -> Result<ExitCode, Failure> {
     let run = super::chosen(choice)?;
     let status = run.status()?;
     let signals = Signals::install()?;
+    let before = version_of_results(&status.out);
     run.stop()?;
     let (since, mut is_explained) = (Instant::now(), false);
     while run.is_there() {
@@ -151,8 +153,20 @@ pub fn down(choice: &RunChoice) -> Result<ExitCode, Failure> {
         }
     }
     let (out, poses) = (status.out.display(), status.poses);
+    if version_of_results(&status.out) == before {
+        return Err(format!(
+            "{out} has ended, but its results are not written; the poses are kept, and the same command goes on from there. {LOG} in it says why"
+        )
+        .into());
+    }
     print::line(format_args!(
         "{out} has ended after some {poses} poses; the same command goes on from there"
     ))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Returns what tells one version of the results from another: the summary is written last, and as a new file.
+fn version_of_results(out: &Path) -> Option<(u64, SystemTime)> {
+    let summary = fs::metadata(out.join(SUMMARY)).ok()?;
+    Some((summary.ino(), summary.modified().ok()?))
 }

@@ -28,10 +28,12 @@ pub fn logs(arguments: &LogsArguments) -> Result<ExitCode, Failure> {
     };
     let process = arguments.process.as_deref();
     let mut logs = open(&out, process)?;
-    let mut lines: Vec<String> = logs.iter_mut().flat_map(Log::lines).collect();
-    let first = lines.len().saturating_sub(arguments.lines);
-    lines.drain(..first);
-    lines.iter().try_for_each(print::line)?;
+    // Of each: printed lines have no time by which they could be put between the events.
+    for log in &mut logs {
+        let lines = log.lines();
+        let first = lines.len().saturating_sub(arguments.lines);
+        lines[first..].iter().try_for_each(print::line)?;
+    }
     let signals = Signals::install()?;
     let run = Control::of(&out).ok().filter(|_| arguments.follow);
     while let Some(run) = &run {

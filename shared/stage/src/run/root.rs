@@ -239,6 +239,11 @@ pub fn sweep() {
     }
 }
 
+/// Returns whether the supervisor of a run lives: it holds the lock.
+pub(crate) fn is_alive(root: &Path) -> bool {
+    matches!(try_lock_existing(&lock_of(root)), Ok(Attempt::Held(_)))
+}
+
 /// Returns the roots of this user's runs, dead ones too.
 pub(crate) fn roots() -> Vec<PathBuf> {
     let runs = path_of(geteuid());

@@ -4,7 +4,7 @@ use std::{
     collections::VecDeque,
     fs,
     os::unix::process::ExitStatusExt,
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::ExitStatus,
     time::{Duration, Instant},
 };
@@ -79,7 +79,7 @@ impl Child {
             is_held: false,
             deaths: VecDeque::new(),
             pose_at_restart: None,
-            last_words: manifest.root.join(launch::last_words(&plan.name)),
+            last_words: last_words(manifest, &plan.name, place),
             log,
             last_death: None,
             before: None,
@@ -93,17 +93,13 @@ impl Child {
         starter: &Starter<'_>,
         newest_pose: Option<u64>,
     ) -> Result<(), SuperviseError> {
-        if let Some(program) = self
-            .plan
-            .programs
-            .iter()
-            .find(|program| !program.is_unchanged())
-        {
+        if let Some(path) = self.changed_file() {
             return Err(SuperviseError::Replaced {
                 stage: self.plan.name.clone(),
-                path: program.path().to_owned(),
+                path: path.to_owned(),
             });
         }
+        self.last_words = last_words(manifest, &self.plan.name, Place::Free);
         self.process = starter.start(&self.plan, manifest, self.log.file(), Place::Free)?;
         self.started = Instant::now();
         self.status = None;
@@ -118,6 +114,7 @@ impl Child {
         successor.started = Instant::now();
         successor.pose_at_restart = Some(newest_pose);
         successor.last_death = self.last_death.take();
+        (successor.before, successor.is_on_trial) = (self.before.take(), self.is_on_trial);
         successor.try_after(self.plan.clone());
         std::mem::swap(self, &mut successor);
     }
@@ -129,8 +126,11 @@ impl Child {
         self.try_after(before);
     }
 
+    /// A program that is itself on trial is none to go back to.
     fn try_after(&mut self, before: StagePlan) {
-        self.before = Some(before);
+        if !self.is_on_trial {
+            self.before = Some(before);
+        }
         self.is_on_trial = true;
     }
 
@@ -144,15 +144,24 @@ impl Child {
         self.is_on_trial = false;
     }
 
-    /// Goes back to the program before a swap, from the next start on; false if there was none.
-    pub(super) fn go_back(&mut self) -> bool {
-        let Some(before) = self.before.take() else {
+    /// Goes back to the program before a swap, from the next start on, or to `begun`, that of the run's begin, if a file of the former
+    /// has changed since. False if there is none.
+    pub(super) fn go_back(&mut self, begun: &StagePlan) -> bool {
+        let is_another = self.plan.command != begun.command;
+        let plans = self.before.take().into_iter();
+        let mut plans = plans.chain(is_another.then(|| begun.clone()));
+        let Some(plan) = plans.find(|plan| plan.changed_file().is_none()) else {
             return false;
         };
-        self.plan = before;
+        self.plan = plan;
         self.is_on_trial = false;
         self.deaths.clear();
         true
+    }
+
+    /// Returns a file of its command that has changed since it was started first.
+    pub(super) fn changed_file(&self) -> Option<&Path> {
+        self.plan.changed_file()
     }
 
     pub(super) fn plan(&self) -> &StagePlan {
@@ -190,6 +199,15 @@ impl Child {
     /// Returns the cause of its last death.
     pub(super) fn last_death(&self) -> Option<&str> {
         self.last_death.as_deref()
+    }
+
+    pub(super) fn note_death(&mut self, cause: String) {
+        self.last_death = Some(cause);
+    }
+
+    /// Returns whether it has lived for longer than the time in which its deaths are counted.
+    pub(super) fn has_outlived_its_window(&self) -> bool {
+        self.started.elapsed().as_secs_f64() > self.plan.restart.window_s
     }
 
     pub(super) fn backoff(&self) -> Duration {
@@ -313,6 +331,12 @@ impl Child {
         // It is empty if shared memory was full.
         reason.filter(|reason| !reason.is_empty()).or(output)
     }
+}
+
+/// Returns the file in which a process says why it ended. One that stands by has its own: the other is in use.
+fn last_words(manifest: &Manifest, name: &str, place: Place) -> PathBuf {
+    let stands_by = place == Place::Taken;
+    manifest.root.join(launch::last_words(name, stands_by))
 }
 
 impl Drop for Child {

@@ -63,7 +63,7 @@ impl Supervisor<'_> {
         let died_ns = clock::now_ns();
         self.may_restart(&[dead])?;
         self.replace(&[dead], died_ns, None)?;
-        (self.observe)(Event::Restarted { all: false });
+        self.say_restarted(&[dead]);
         Ok(())
     }
 

@@ -4,7 +4,7 @@
 //! process group, and the guardian knows them all: it reads them from a pipe, and the end of the pipe is the end of the supervisor.
 
 use std::{
-    collections::BTreeSet,
+    collections::BTreeMap,
     io::{self, Read},
     os::{
         fd::{AsRawFd, BorrowedFd, RawFd},
@@ -14,6 +14,7 @@ use std::{
     time::Duration,
 };
 
+use procfs::process::Process;
 use rustix::{
     io::ioctl_fionbio,
     process::{Pid, RawPid, Signal, getpid, kill_process_group},
@@ -110,18 +111,28 @@ pub(super) fn join(pipe: RawFd) {
 pub fn guard(mut messages: impl Read) {
     // A request to stop that reaches all processes of a service is the supervisor's alone.
     let _caught = Signals::install();
-    let mut groups = BTreeSet::new();
+    let mut groups = BTreeMap::new();
     let mut message = [0; size_of::<RawPid>()];
     while messages.read_exact(&mut message).is_ok() {
         let group = RawPid::from_ne_bytes(message);
         match group > 0 {
-            true => groups.insert(group),
+            true => groups.insert(group, started(group)),
             false => groups.remove(&group.saturating_neg()),
         };
     }
-    for group in groups.into_iter().filter_map(Pid::from_raw) {
-        let _ = kill_process_group(group, Signal::KILL);
+    for (group, since) in groups {
+        // A number can be given anew. While a group has processes left, no other process gets its number.
+        let is_another = started(group).is_some_and(|now| Some(now) != since);
+        if let Some(group) = Pid::from_raw(group).filter(|_| !is_another) {
+            let _ = kill_process_group(group, Signal::KILL);
+        }
     }
+}
+
+/// Returns when a process was started, in the system's ticks; `None` if there is none.
+fn started(process: RawPid) -> Option<u64> {
+    let stat = Process::new(process).and_then(|process| process.stat());
+    stat.ok().map(|stat| stat.starttime)
 }
 
 #[cfg(test)]

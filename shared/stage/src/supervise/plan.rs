@@ -1,6 +1,10 @@
 //! The supervisor's plan, events, report and errors.
 
-use std::{collections::BTreeMap, path::PathBuf, time::Duration};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 use gyre_messages::PoseHeader;
 use serde::{Deserialize, Serialize};
@@ -47,6 +51,14 @@ pub struct StagePlan {
     pub restarts_all: bool,
 }
 
+impl StagePlan {
+    /// Returns a file of the command that has changed since this plan was made.
+    pub(super) fn changed_file(&self) -> Option<&Path> {
+        let changed = self.programs.iter().find(|program| !program.is_unchanged());
+        changed.map(Program::path)
+    }
+}
+
 /// When to give up on a stage: after `limit` restarts within `window_s`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -88,10 +100,10 @@ pub enum Event<'a> {
         /// The cause.
         death: &'a Death,
     },
-    /// Stages were restarted after a death.
+    /// Processes were started again.
     Restarted {
-        /// True if all stages were restarted (but a live source), false if only the dead or the late ones were.
-        all: bool,
+        /// The only one, by its name; `None` if they are several: all stages, or all but a live source.
+        only: Option<&'a str>,
     },
     /// The stream has ended, and a follower has not come to the end of its logs.
     Following {
@@ -118,6 +130,8 @@ pub enum Event<'a> {
     Ready,
     /// The supervisor has looked at all processes, which it does every 200 ms or more often.
     Watched,
+    /// The stages are asked to end.
+    Stopping,
     /// Another program has taken the place of a stage.
     Swapped {
         /// The name of the stage.
@@ -266,7 +280,7 @@ pub enum SuperviseError {
     },
     /// The program of a dead stage is another one by now.
     #[error(
-        "{stage} died, and {path} has changed since: another program may compute other motions; put back the one that the run was begun with"
+        "{stage} has ended, and {path} has changed since it was started: another program may compute other motions; put back the one that the run was begun with"
     )]
     Replaced {
         /// The name of the stage.

@@ -46,10 +46,21 @@ impl Program {
         })
     }
 
-    /// Returns the files of a command as they are now. One that is missing is reported when the command is started.
-    pub fn all_of(command: &[String]) -> Vec<Self> {
-        let files = files_of(command).into_iter();
+    /// Returns the files of a command as they are now; it is to be started in `directory`, or in that of this process. A file that is
+    /// missing is reported when the command is started.
+    pub fn all_of(command: &[String], directory: Option<&Path>) -> Vec<Self> {
+        let files = files_of(command, directory.unwrap_or(Path::new(""))).into_iter();
         files.filter_map(|path| Self::at(&path).ok()).collect()
+    }
+
+    /// Returns the place of a program as a shell finds it: itself if it is a path, else in the folders of PATH.
+    #[must_use]
+    pub fn place_of(program: &str) -> PathBuf {
+        let folders = env::var_os("PATH").unwrap_or_default();
+        let place = env::split_paths(&folders)
+            .map(|folder| folder.join(program))
+            .find(|path| !program.contains('/') && path.is_file());
+        place.unwrap_or_else(|| PathBuf::from(program))
     }
 
     /// Returns the path.
@@ -63,30 +74,31 @@ impl Program {
 }
 
 /// Returns the files that a command names: its program, and scripts among its arguments.
-fn files_of(command: &[String]) -> Vec<PathBuf> {
+fn files_of(command: &[String], directory: &Path) -> Vec<PathBuf> {
     let Some((program, arguments)) = command.split_first() else {
         return Vec::new();
     };
     let scripts = arguments.iter().map(PathBuf::from);
-    iter::once(found(program))
+    iter::once(Program::place_of(program))
         .chain(scripts)
+        .map(|path| directory.join(path))
         .filter(|path| path.is_file())
         .collect()
-}
-
-/// The place of a program that is named without one.
-fn found(program: &str) -> PathBuf {
-    let folders = env::var_os("PATH").unwrap_or_default();
-    let place = env::split_paths(&folders)
-        .map(|folder| folder.join(program))
-        .find(|path| !program.contains('/') && path.is_file());
-    place.unwrap_or_else(|| PathBuf::from(program))
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+
+    #[test]
+    fn a_script_is_looked_for_where_the_command_is_started() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("stage.py"), "one").unwrap();
+        let command = ["sh", "stage.py"].map(str::to_owned);
+        let of = |directory| Program::all_of(&command, directory);
+        assert_eq!((of(None).len(), of(Some(folder.path())).len()), (1, 2));
+    }
 
     #[test]
     fn a_file_that_is_replaced_changed_or_removed_is_noticed() {

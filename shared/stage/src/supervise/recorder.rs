@@ -27,6 +27,12 @@ pub(super) struct Recorder {
     has_ended: bool,
 }
 
+impl Recorder {
+    pub fn pid(&self) -> u32 {
+        self.child.pid()
+    }
+}
+
 impl Supervisor<'_> {
     /// Starts the recorder before any stage, and waits until it observes all topics, so that it misses nothing of the beginning.
     pub(super) fn start_recorder(&mut self) -> Result<(), SuperviseError> {
@@ -129,6 +135,7 @@ impl Supervisor<'_> {
         let since = Instant::now();
         while !recorder.child.has_exited() && since.elapsed() < limit {
             self.signals.wait(&[], None, LOOK)?;
+            (self.observe)(Event::Watched);
         }
         let was_late = !recorder.child.has_exited();
         recorder.child.kill();

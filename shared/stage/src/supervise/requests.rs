@@ -4,18 +4,24 @@ use std::process;
 
 use gyre_messages::StageId;
 
-use super::{Event, SuperviseError, Supervisor, child::Child, socket::Client};
+use super::{SuperviseError, Supervisor, child::Child, socket::Client};
 use crate::{
     clock,
     control::{Activity, Answer, Phase, ProcessStatus, Request, Status},
     heartbeat, schedule,
 };
 
+/// Requests that are answered before the supervisor looks after its processes again.
+const MAX_REQUESTS: usize = 8;
+
 impl Supervisor<'_> {
-    /// Answers all requests; true if one of them is to stop.
+    /// Answers the requests that have come; true if one of them is to stop.
     pub(super) fn serve(&mut self) -> Result<bool, SuperviseError> {
         let mut stop = false;
-        while let Some((request, client)) = self.socket.next() {
+        for _ in 0..MAX_REQUESTS {
+            let Some((request, client)) = self.socket.next() else {
+                break;
+            };
             match request {
                 Request::Status => client.answer(&Answer::Status(self.status())),
                 Request::Stop => {
@@ -24,8 +30,8 @@ impl Supervisor<'_> {
                 }
                 Request::Restart { process } => match self.named(&process) {
                     Some(child) => {
-                        self.restart_on_request(child)?;
-                        client.answer(&Answer::Done);
+                        let answer = self.restart_on_request(child)?;
+                        client.answer(&answer);
                     }
                     None => self.refuse_unknown(&process, client),
                 },
@@ -49,17 +55,19 @@ impl Supervisor<'_> {
         )));
     }
 
-    /// Ends a process and starts it again, which counts as a restart and not as a death.
-    pub(super) fn restart_on_request(&mut self, child: usize) -> Result<(), SuperviseError> {
+    /// Ends a process and starts it again, which counts as a restart and not as a death. One that could not be started again goes on.
+    fn restart_on_request(&mut self, child: usize) -> Result<Answer, SuperviseError> {
         let stages = self.restarted_with(child);
-        for i in &stages {
-            self.count_restart(*i);
+        if let Some(reason) = self.why_not_again(stages.iter().copied()) {
+            return Ok(Answer::Refused(reason));
         }
-        self.restart(&stages, clock::now_ns())?;
-        (self.observe)(Event::Restarted {
-            all: stages.len() > 1,
-        });
-        Ok(())
+        self.restart_and_count(&stages)?;
+        Ok(Answer::Done)
+    }
+
+    pub(super) fn restart_and_count(&mut self, stages: &[usize]) -> Result<(), SuperviseError> {
+        stages.iter().for_each(|i| self.count_restart(*i));
+        self.restart(stages, clock::now_ns())
     }
 
     fn status(&mut self) -> Status {

@@ -3,7 +3,7 @@
 use std::io;
 
 use rustix::{
-    process::{Pid, setpriority_process},
+    process::setpriority_process,
     thread::{CpuSet, sched_setaffinity},
 };
 use serde::{Deserialize, Serialize};
@@ -62,38 +62,75 @@ impl Scheduling {
         Ok(())
     }
 
-    /// Applies it to a process that has just been started, and so to all threads that it will have.
+    /// Returns what a new process can apply to itself between fork and exec.
+    pub(super) fn prepare(&self) -> Prepared {
+        let mut set = CpuSet::new();
+        self.cpus.iter().for_each(|cpu| set.set(*cpu));
+        Prepared {
+            cpus: (!self.cpus.is_empty()).then_some(set),
+            nice: self.nice,
+            realtime_priority: self.realtime_priority,
+        }
+    }
+
+    /// Returns a key with its value, for a sentence.
+    pub(super) fn describe(&self, key: Key) -> String {
+        match key {
+            Key::Cpus => format!("cpus = {:?}", self.cpus),
+            Key::Nice => format!("nice = {}", self.nice.unwrap_or_default()),
+            Key::RealtimePriority => {
+                let priority = self.realtime_priority.unwrap_or_default();
+                format!("realtime_priority = {priority}")
+            }
+        }
+    }
+}
+
+/// A key that the system can refuse.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Key {
+    Cpus,
+    Nice,
+    RealtimePriority,
+}
+
+impl Key {
+    pub const ALL: [Self; 3] = [Self::Cpus, Self::Nice, Self::RealtimePriority];
+}
+
+/// A [`Scheduling`] without anything that has to be allocated.
+#[derive(Clone, Copy)]
+pub(super) struct Prepared {
+    cpus: Option<CpuSet>,
+    nice: Option<i32>,
+    realtime_priority: Option<u8>,
+}
+
+impl Prepared {
+    /// Applies it to this process, and so to all that it will start. It only calls the system.
     ///
     /// # Errors
     /// What could not be set, and why.
-    pub(super) fn apply(&self, pid: u32) -> Result<(), (String, io::Error)> {
-        let Some(process) = Pid::from_raw(pid as i32) else {
-            return Ok(());
-        };
-        if !self.cpus.is_empty() {
-            let mut set = CpuSet::new();
-            self.cpus.iter().for_each(|cpu| set.set(*cpu));
-            sched_setaffinity(Some(process), &set)
-                .map_err(|error| (format!("cpus = {:?}", self.cpus), error.into()))?;
+    pub fn apply(&self) -> Result<(), (Key, io::Error)> {
+        if let Some(set) = &self.cpus {
+            sched_setaffinity(None, set).map_err(|error| (Key::Cpus, error.into()))?;
         }
         if let Some(nice) = self.nice {
-            setpriority_process(Some(process), nice)
-                .map_err(|error| (format!("nice = {nice}"), error.into()))?;
+            setpriority_process(None, nice).map_err(|error| (Key::Nice, error.into()))?;
         }
         if let Some(priority) = self.realtime_priority {
-            set_realtime(pid, priority)
-                .map_err(|error| (format!("realtime_priority = {priority}"), error))?;
+            set_realtime(priority).map_err(|error| (Key::RealtimePriority, error))?;
         }
         Ok(())
     }
 }
 
-fn set_realtime(pid: u32, priority: u8) -> io::Result<()> {
+fn set_realtime(priority: u8) -> io::Result<()> {
     let parameters = libc::sched_param {
         sched_priority: i32::from(priority),
     };
     // SAFETY: the kernel reads the parameters during the call only.
-    match unsafe { libc::sched_setscheduler(pid as i32, libc::SCHED_FIFO, &raw const parameters) } {
+    match unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) } {
         0 => Ok(()),
         _ => Err(io::Error::last_os_error()),
     }
@@ -102,46 +139,7 @@ fn set_realtime(pid: u32, priority: u8) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use std::process::{Child, Command};
-
-    use procfs::process::Process;
-    use rustix::thread::sched_getaffinity;
-
     use super::*;
-
-    fn sleeping() -> Child {
-        Command::new("sleep").arg("60").spawn().unwrap()
-    }
-
-    #[test]
-    fn a_process_gets_its_niceness_and_its_processors() {
-        let mut process = sleeping();
-        let scheduling = Scheduling {
-            nice: Some(7),
-            cpus: vec![0],
-            ..Scheduling::default()
-        };
-        scheduling.apply(process.id()).unwrap();
-        let stat = Process::new(process.id() as i32).unwrap().stat().unwrap();
-        assert_eq!(stat.nice, 7);
-        let cpus = sched_getaffinity(Pid::from_raw(process.id() as i32)).unwrap();
-        assert_eq!((cpus.is_set(0), cpus.count()), (true, 1));
-        process.kill().unwrap();
-        process.wait().unwrap();
-    }
-
-    #[test]
-    fn what_cannot_be_set_is_named() {
-        let mut process = sleeping();
-        let scheduling = Scheduling {
-            cpus: vec![CpuSet::MAX_CPU - 1],
-            ..Scheduling::default()
-        };
-        let (what, _) = scheduling.apply(process.id()).unwrap_err();
-        assert_eq!(what, format!("cpus = [{}]", CpuSet::MAX_CPU - 1));
-        process.kill().unwrap();
-        process.wait().unwrap();
-    }
 
     #[test]
     fn a_stage_s_own_keys_go_before_those_of_the_run() {

@@ -2,7 +2,7 @@
 
 use std::{
     fs::File,
-    io,
+    io::{self, PipeWriter, Read},
     os::unix::process::CommandExt,
     process::{Child, Command, Stdio},
     time::Duration,
@@ -13,6 +13,7 @@ use rustix::process::{Signal, getpid, getppid, set_parent_process_death_signal};
 use super::{
     StagePlan, SuperviseError,
     guardian::{self, Guardian},
+    scheduling::Key,
 };
 use crate::{Manifest, StageError, run, wake::Signals};
 
@@ -53,7 +54,10 @@ impl<'a> Starter<'a> {
             command: plan.command.join(" "),
             source,
         };
-        let mut command = self.command(plan, manifest, log).map_err(failed)?;
+        let (mut refused, refusals) = io::pipe().map_err(failed)?;
+        let mut command = self
+            .command(plan, manifest, log, refusals)
+            .map_err(failed)?;
         if let Some(directory) = &plan.directory {
             command.current_dir(directory);
         }
@@ -61,21 +65,31 @@ impl<'a> Starter<'a> {
             command.env(run::STANDBY, "1").stdin(Stdio::piped());
         }
         let pause = |pause| self.signals.sleep(pause);
-        let mut child = with_patience(|| command.spawn(), pause)?.map_err(failed)?;
-        if let Err((what, source)) = plan.scheduling.apply(child.id()) {
-            // Not left behind, whatever it was to be.
-            let _ = child.kill().and_then(|()| child.wait());
-            let stage = plan.name.clone();
-            return Err(SuperviseError::Scheduling {
-                stage,
-                what,
-                source,
-            });
+        let started = with_patience(|| command.spawn(), pause)?;
+        // With it the pipe's other end is closed.
+        drop(command);
+        let mut key = [0];
+        match started {
+            Err(source) if refused.read(&mut key).is_ok_and(|length| length > 0) => {
+                let key = Key::ALL[usize::from(key[0]).min(Key::ALL.len() - 1)];
+                Err(SuperviseError::Scheduling {
+                    stage: plan.name.clone(),
+                    what: plan.scheduling.describe(key),
+                    source,
+                })
+            }
+            started => Ok(started.map_err(failed)?),
         }
-        Ok(child)
     }
 
-    fn command(&self, plan: &StagePlan, manifest: &Manifest, log: &File) -> io::Result<Command> {
+    /// Returns the command of a process, which writes to `refusals` which key of its scheduling the system refuses.
+    fn command(
+        &self,
+        plan: &StagePlan,
+        manifest: &Manifest,
+        log: &File,
+        refusals: PipeWriter,
+    ) -> io::Result<Command> {
         let (program, arguments) = plan
             .command
             .split_first()
@@ -90,16 +104,21 @@ impl<'a> Starter<'a> {
             // A process group of its own: an interrupt from the terminal reaches only the supervisor, which then stops each stage.
             .process_group(0);
         let (supervisor, guardian) = (getpid(), self.guardian.pipe());
-        let die_with_the_supervisor = move || {
+        let scheduling = plan.scheduling.prepare();
+        let prepare = move || {
             set_parent_process_death_signal(Some(Signal::KILL))?;
             guardian.into_iter().for_each(guardian::join);
+            if let Err((key, error)) = scheduling.apply() {
+                let _ = rustix::io::write(&refusals, &[key as u8]);
+                return Err(error);
+            }
             match getppid() == Some(supervisor) {
                 true => Ok(()),
                 false => Err(io::Error::other("the supervisor has died")),
             }
         };
-        // SAFETY: between fork and exec there are only four system calls; nothing is allocated unless the supervisor is dead.
-        unsafe { command.pre_exec(die_with_the_supervisor) };
+        // SAFETY: between fork and exec there are only system calls; nothing is allocated unless the supervisor is dead.
+        unsafe { command.pre_exec(prepare) };
         Ok(command)
     }
 }

@@ -32,6 +32,12 @@ pub(super) struct Standby {
     client: Client,
 }
 
+impl Standby {
+    pub fn pid(&self) -> u32 {
+        self.process.pid()
+    }
+}
+
 impl Supervisor<'_> {
     /// Starts a program that is to take the place of another one. The client has its answer when that is done.
     pub(super) fn begin_swap(&mut self, swap: Swap, client: Client) -> Result<(), SuperviseError> {
@@ -52,10 +58,8 @@ impl Supervisor<'_> {
         }
         let plan = self.plan_of(child, &swap);
         if swap.cold {
-            self.children[child].change(plan);
-            self.restart_on_request(child)?;
-            self.has_swapped(child);
-            client.answer(&Answer::Done);
+            let answer = self.swap_cold(child, plan)?;
+            client.answer(&answer);
             return Ok(());
         }
         let manifest = &self.plan.manifest;
@@ -79,6 +83,30 @@ impl Supervisor<'_> {
         Ok(())
     }
 
+    /// Ends a process, and starts another program in its place. If that cannot be started, the one before is started again.
+    fn swap_cold(&mut self, child: usize, plan: StagePlan) -> Result<Answer, SuperviseError> {
+        let stages = self.restarted_with(child);
+        if let Some(reason) = self.why_others_stay(child, &stages) {
+            return Ok(Answer::Refused(reason));
+        }
+        self.children[child].change(plan);
+        self.restart_and_count(&stages)?;
+        if self.children[child].is_on_trial() {
+            self.has_swapped(child);
+            return Ok(Answer::Done);
+        }
+        let name = self.children[child].name();
+        let reason = self.children[child].last_death().unwrap_or_default();
+        Ok(Answer::Refused(format!(
+            "{name} goes on as before: {reason}"
+        )))
+    }
+
+    /// Returns why the processes that are restarted together with `child` could not be.
+    fn why_others_stay(&self, child: usize, stages: &[usize]) -> Option<String> {
+        self.why_not_again(stages.iter().copied().filter(|i| *i != child))
+    }
+
     /// Returns the plan of a process after a swap.
     fn plan_of(&self, child: usize, swap: &Swap) -> StagePlan {
         let begun = &self.plan.stages[child];
@@ -86,7 +114,7 @@ impl Supervisor<'_> {
             None => begun.clone(),
             Some(command) => StagePlan {
                 command: command.clone(),
-                programs: Program::all_of(command),
+                programs: Program::all_of(command, Some(&swap.directory)),
                 directory: Some(swap.directory.clone()),
                 ..begun.clone()
             },
@@ -105,6 +133,9 @@ impl Supervisor<'_> {
                 .last_output
                 .map_or(String::new(), |line| format!(" ({line})"));
             return self.give_up(standby, format!("it ended by {}{output}", death.cause));
+        }
+        if standby.client.has_gone() {
+            return self.give_up(standby, "who has asked for it has gone".to_owned());
         }
         let is_ready = run::ready_file(&self.plan.manifest.root, &name).exists();
         if is_ready && standby.ready.is_none() {
@@ -150,6 +181,10 @@ impl Supervisor<'_> {
 
     /// Ends the program that is to be replaced, and lets the new one go on.
     fn take_over(&mut self, standby: Standby) -> Result<(), SuperviseError> {
+        let stages = self.restarted_with(standby.child);
+        if let Some(reason) = self.why_others_stay(standby.child, &stages) {
+            return self.give_up(standby, reason);
+        }
         let Standby {
             child,
             process,
@@ -157,7 +192,6 @@ impl Supervisor<'_> {
             ..
         } = standby;
         let _ = fs::remove_file(run::ready_file(&self.plan.manifest.root, process.name()));
-        let stages = self.restarted_with(child);
         self.replace(&stages, clock::now_ns(), Some((child, process)))?;
         self.watchdog.restarted();
         self.has_swapped(child);
@@ -180,7 +214,7 @@ impl Supervisor<'_> {
 
     /// Goes back to the program before a swap, from the next start on; false if there was none.
     pub(super) fn go_back(&mut self, child: usize, reason: &str) -> bool {
-        let has_gone_back = self.children[child].go_back();
+        let has_gone_back = self.children[child].go_back(&self.plan.stages[child]);
         if has_gone_back {
             let plan = self.children[child].plan();
             self.swaps.push(Swapped {
