@@ -15,13 +15,14 @@ use std::{
 };
 
 use gyre_calibration::{Drive, calibrate as solve};
+use gyre_configuration::strict::{self, syntax};
 use gyre_radar::{DatasetOptions, OwnedScan, SweepGeometry};
 use gyre_storage as storage;
 
 use crate::{
     Failure,
     cli::CalibrateArguments,
-    configuration::{Configuration, strict, syntax},
+    configuration::Configuration,
     preflight::{self, Played},
     print,
 };

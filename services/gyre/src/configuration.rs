@@ -1,18 +1,13 @@
 //! The configuration of a run: read strictly, overridden key by key, written back as it was resolved.
 
-mod automatic;
 pub mod difference;
-mod error;
 mod rate;
-pub(crate) mod strict;
+mod sections;
 mod validation;
 
-use std::{
-    collections::BTreeMap,
-    path::{Path, PathBuf},
-    time::Duration,
-};
+use std::{collections::BTreeMap, path::Path, time::Duration};
 
+use gyre_configuration::{MethodConfig, automatic, strict};
 use gyre_messages::{FollowerId, StageId, Window};
 use gyre_odometry::{OdometryConfig, SearchKind};
 use gyre_radar::DatasetOptions;
@@ -20,14 +15,15 @@ use gyre_radar_replay::{PlayedFrom, SourceConfig, SourceKind};
 use gyre_scan_matching::RefinementKind;
 use gyre_simulator::{OutputFormat, SimulationConfig};
 use gyre_slam::SlamConfig;
-use gyre_stage::supervise::{Program, RestartPolicy, Scheduling, StagePlan};
+use gyre_stage::supervise::{Program, StagePlan};
 use gyre_stress::{Budget, Scenario};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
-use crate::record::RecordConfig;
+use crate::{Failure, print, record::RecordConfig};
 
-pub use error::ConfigurationError;
+pub use gyre_configuration::ConfigurationError;
 pub use rate::Rate;
+pub use sections::{Mode, RunConfig, StageConfig};
 
 /// The configuration of a run. Every key has a default.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, schemars::JsonSchema)]
@@ -60,86 +56,8 @@ pub struct Configuration {
     pub stages: BTreeMap<String, StageConfig>,
 }
 
-/// The section `[run]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct RunConfig {
-    /// `lossless`: every scan is processed, and the source waits. `live`: the newest scan wins.
-    pub mode: Mode,
-    /// Maximum number of scans between admission and their pose, 1 to 64. More than the free cores
-    /// increases latency and not throughput.
-    pub window: usize,
-    /// Pace of the source: `max`, `realtime`, or a factor of real time from 0.001 to 1000. Live mode
-    /// needs another than `max`.
-    pub rate: Rate,
-    /// Room for programs that look on, 0 to 64 of each topic: `gyre watch`, a viewer, a recorder. They
-    /// change neither a result nor a latency. Each needs shared memory for one message of each topic.
-    pub observers: usize,
-    /// Time for which a published scan may lack its pose, or the source a scan that is due, s; 0: no
-    /// limit. Then stages are restarted: first the source if it is late, else all but a live source;
-    /// if that does not help, all; if that does not help either, the run ends. With SLAM also the time
-    /// in which a follower that the run waits for at its end must make progress; else it is restarted.
-    pub stall_timeout_s: f64,
-    /// Time for a stage to open its topics after its start, s; 0: no limit. A stage that takes longer,
-    /// as one that cannot load its model, is treated as a stall.
-    pub start_timeout_s: f64,
-    /// How the system runs the stages: priority, processors, memory. Followers have their own alone.
-    #[serde(skip_serializing_if = "is_default")]
-    pub scheduling: Scheduling,
-    /// Ground truth for the evaluation. Default: the one in the recording's folder.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub ground_truth: Option<PathBuf>,
-}
-
-/// The policy when scans arrive faster than they can be processed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Mode {
-    /// The source waits.
-    Lossless,
-    /// The newest scan wins.
-    Live,
-}
-
-/// A section `[stages.NAME]`.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct StageConfig {
-    /// Program and arguments of a replacement. Default: `gyre stage NAME`.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub command: Vec<String>,
-    /// Limits of its restarts.
-    pub restart: RestartPolicy,
-    /// How the system runs it: its keys go before those of `run.scheduling`.
-    #[serde(skip_serializing_if = "is_default")]
-    pub scheduling: Scheduling,
-    /// Delay for each scan, ms, to test behaviour under load. Source and `pose-integration` have none.
-    #[serde(skip_serializing_if = "is_zero")]
-    pub delay_ms: u64,
-}
-
-fn is_default(scheduling: &Scheduling) -> bool {
-    *scheduling == Scheduling::default()
-}
-
-fn is_zero(value: &u64) -> bool {
-    *value == 0
-}
-
-impl Default for RunConfig {
-    fn default() -> Self {
-        Self {
-            mode: Mode::Lossless,
-            window: 4,
-            rate: Rate::Max,
-            observers: 8,
-            stall_timeout_s: 60.0,
-            start_timeout_s: 300.0,
-            scheduling: Scheduling::default(),
-            ground_truth: None,
-        }
-    }
-}
+/// The sections beside those of the method.
+const SECTIONS: [&str; 6] = ["run", "source", "simulation", "budget", "record", "stages"];
 
 impl Configuration {
     /// Reads a configuration and overrides keys of it with `section.key=value`.
@@ -147,16 +65,7 @@ impl Configuration {
     /// # Errors
     /// A file that cannot be read, an unknown key, a value out of its bounds.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, ConfigurationError> {
-        let unreadable = |source| ConfigurationError::Unreadable {
-            path: path.to_owned(),
-            source,
-        };
-        let text = gyre_storage::read_text(path, gyre_storage::SETTINGS).map_err(unreadable)?;
-        let parsed: Result<toml::Table, _> = text.parse();
-        let table = parsed.map_err(|error| ConfigurationError::Syntax {
-            path: path.to_owned(),
-            reason: syntax(&text, &error),
-        })?;
+        let table = strict::read_table(path)?;
         Self::resolve(table, overrides)
     }
 
@@ -166,6 +75,17 @@ impl Configuration {
     /// An unknown key, a value out of its bounds.
     pub fn of_overrides(overrides: &[String]) -> Result<Self, ConfigurationError> {
         Self::resolve(toml::Table::new(), overrides)
+    }
+
+    /// Creates the configuration of a recording from its format, its `dataset.toml` and its scans, and prints it.
+    ///
+    /// # Errors
+    /// A recording that cannot be opened or of which no scan can be read, an unknown key, a value out of its bounds.
+    pub fn of_recording(data: &Path, overrides: &[String]) -> Result<Self, Failure> {
+        let wished = Self::of_overrides(overrides)?.dataset;
+        let found = automatic(data, &wished)?;
+        print::note(found.sentence);
+        Ok(Self::resolve(found.table, overrides)?)
     }
 
     fn resolve(mut table: toml::Table, overrides: &[String]) -> Result<Self, ConfigurationError> {
@@ -178,25 +98,17 @@ impl Configuration {
     }
 
     fn from_table(mut table: toml::Table) -> Result<Self, ConfigurationError> {
+        let method = MethodConfig::take(&mut table)?;
         let mut configuration = Self {
             run: strict::section(&mut table, "run")?,
             source: strict::section(&mut table, "source")?,
-            dataset: strict::section(&mut table, "dataset")?,
+            dataset: method.dataset,
             simulation: match table.contains_key("simulation") {
                 true => Some(strict::section(&mut table, "simulation")?),
                 false => None,
             },
-            odometry: OdometryConfig {
-                raster: strict::section(&mut table, "raster")?,
-                points: strict::section(&mut table, "points")?,
-                masking: strict::section(&mut table, "masking")?,
-                search: strict::section(&mut table, "search")?,
-                rotation: strict::section(&mut table, "rotation")?,
-                translation: strict::section(&mut table, "translation")?,
-                exhaustive: strict::section(&mut table, "exhaustive")?,
-                refinement: strict::section(&mut table, "refinement")?,
-            },
-            slam: strict::section(&mut table, "slam")?,
+            odometry: method.odometry,
+            slam: method.slam,
             budget: budget(&mut table)?,
             record: strict::section(&mut table, "record")?,
             stages: strict::sections(&mut table, "stages", &process_names())?,
@@ -205,24 +117,7 @@ impl Configuration {
         if let Some(simulation) = &mut configuration.simulation {
             simulation.output.format = simulation.output.format.or(format);
         }
-        let known = [
-            "run",
-            "source",
-            "dataset",
-            "simulation",
-            "raster",
-            "points",
-            "masking",
-            "search",
-            "rotation",
-            "translation",
-            "exhaustive",
-            "refinement",
-            "slam",
-            "budget",
-            "record",
-            "stages",
-        ];
+        let known = [&SECTIONS[..], &MethodConfig::SECTIONS[..]].concat();
         match table.keys().next() {
             None => Ok(configuration),
             Some(key) => Err(strict::unknown("the configuration", key, &known)),
@@ -382,7 +277,7 @@ impl Configuration {
     ///
     /// # Errors
     /// A value that TOML cannot hold.
-    pub fn difference(&self, begun: &toml::Table) -> Result<Option<String>, crate::Failure> {
+    pub fn difference(&self, begun: &toml::Table) -> Result<Option<String>, Failure> {
         let relevant = |table: &toml::Table| {
             let mut table = table.clone();
             table.remove("stages");
@@ -438,18 +333,6 @@ pub fn process_names() -> Vec<&'static str> {
         .into_iter()
         .chain(followers)
         .collect()
-}
-
-/// Names the place of a mistake, without the line itself: the file may hold anything.
-pub(crate) fn syntax(text: &str, error: &toml::de::Error) -> String {
-    let start = error.span().map_or(0, |span| span.start);
-    let before = text.get(..start).unwrap_or_default();
-    let (line, column) = match before.rsplit_once('\n') {
-        Some((lines, row)) => (lines.matches('\n').count() + 2, row.chars().count() + 1),
-        None => (1, before.chars().count() + 1),
-    };
-    let reason = error.message().trim().replace('\n', "; ");
-    format!("TOML parse error at line {line}, column {column}: {reason}")
 }
 
 #[cfg(test)]

@@ -1,7 +1,9 @@
 //! The bounds of all values, and the sections that must fit each other.
 
-use std::fmt::Display;
-
+use gyre_configuration::{
+    MethodConfig,
+    strict::{value, within},
+};
 use gyre_messages::StageId;
 use gyre_radar_replay::PlayedFrom;
 use gyre_simulator::OutputFormat;
@@ -12,8 +14,12 @@ use super::{Configuration, ConfigurationError, Mode, Rate};
 impl Configuration {
     /// Checks every section, then all together.
     pub(super) fn validate(&self) -> Result<(), ConfigurationError> {
-        self.validate_odometry()?;
-        within("slam.places", self.slam.validate())?;
+        let method = MethodConfig {
+            dataset: self.dataset,
+            odometry: self.odometry.clone(),
+            slam: self.slam.clone(),
+        };
+        method.validate()?;
         within("run", self.window(None, 1).validate())?;
         self.validate_simulation()?;
         self.validate_points()?;
@@ -38,17 +44,6 @@ impl Configuration {
             return Err(value("run", reason));
         }
         Ok(())
-    }
-
-    fn validate_odometry(&self) -> Result<(), ConfigurationError> {
-        let odometry = &self.odometry;
-        within("raster", odometry.raster.validate())?;
-        within("points", odometry.points.validate())?;
-        within("masking", odometry.masking.validate())?;
-        within("rotation", odometry.rotation.validate())?;
-        within("translation", odometry.translation.validate())?;
-        within("exhaustive", odometry.exhaustive.validate())?;
-        within("refinement", odometry.refinement.validate())
     }
 
     /// A recording that takes the place of stages is a recording of a run, and has the topic of a stage that the run has.
@@ -157,17 +152,6 @@ impl Configuration {
             seconds(&section, "restart.window_s", stage.restart.window_s)
         })
     }
-}
-
-fn value(section: &str, reason: impl Display) -> ConfigurationError {
-    ConfigurationError::Value {
-        section: section.to_owned(),
-        reason: reason.to_string(),
-    }
-}
-
-fn within<E: Display>(section: &str, validated: Result<(), E>) -> Result<(), ConfigurationError> {
-    validated.map_err(|error| value(section, error))
 }
 
 fn seconds(section: &str, key: &str, seconds: f64) -> Result<(), ConfigurationError> {

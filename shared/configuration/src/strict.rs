@@ -1,14 +1,60 @@
 //! Strict reading of TOML: unknown keys are rejected, with the nearest known one.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, fmt::Display, path::Path};
 
 use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
-use super::ConfigurationError;
+use crate::ConfigurationError;
 
 /// Names less similar than this (Jaro-Winkler) are not suggested.
 const ALIKE: f64 = 0.75;
+
+/// Reads a file.
+///
+/// # Errors
+/// A file that cannot be read, or is not TOML: the error names the place of the mistake, and shows nothing of the file, which may hold
+/// anything.
+pub fn read_table(path: &Path) -> Result<Table, ConfigurationError> {
+    let unreadable = |source| ConfigurationError::Unreadable {
+        path: path.to_owned(),
+        source,
+    };
+    let text = gyre_storage::read_text(path, gyre_storage::SETTINGS).map_err(unreadable)?;
+    let parsed: Result<Table, _> = text.parse();
+    parsed.map_err(|error| ConfigurationError::Syntax {
+        path: path.to_owned(),
+        reason: syntax(&text, &error),
+    })
+}
+
+/// Names the place of a mistake in a text, without the line itself.
+pub fn syntax(text: &str, error: &toml::de::Error) -> String {
+    let start = error.span().map_or(0, |span| span.start);
+    let before = text.get(..start).unwrap_or_default();
+    let (line, column) = match before.rsplit_once('\n') {
+        Some((lines, row)) => (lines.matches('\n').count() + 2, row.chars().count() + 1),
+        None => (1, before.chars().count() + 1),
+    };
+    let reason = error.message().trim().replace('\n', "; ");
+    format!("TOML parse error at line {line}, column {column}: {reason}")
+}
+
+/// Returns the error of a value that a section cannot have.
+pub fn value(section: &str, reason: impl Display) -> ConfigurationError {
+    ConfigurationError::Value {
+        section: section.to_owned(),
+        reason: reason.to_string(),
+    }
+}
+
+/// Names the section of a value that is out of its bounds.
+///
+/// # Errors
+/// That of the check.
+pub fn within<E: Display>(section: &str, checked: Result<(), E>) -> Result<(), ConfigurationError> {
+    checked.map_err(|error| value(section, error))
+}
 
 /// Takes a section out of the table; its defaults where it is missing.
 ///
@@ -93,10 +139,7 @@ fn read<T: DeserializeOwned>(section: &str, value: Value) -> Result<T, Configura
     value.try_into().map_err(
         |error: toml::de::Error| match unknown_field(error.message()) {
             Some((key, known)) => unknown(section, key, &known),
-            None => ConfigurationError::Value {
-                section: section.to_owned(),
-                reason: error.to_string().trim().replace('\n', " "),
-            },
+            None => self::value(section, error.to_string().trim().replace('\n', " ")),
         },
     )
 }

@@ -5,11 +5,11 @@
 
 use std::path::Path;
 
-use gyre_radar::{Dataset, DatasetOptions, Format, OwnedScan};
-use toml::Table;
+use gyre_radar::{Dataset, DatasetOptions, Format, OpenError, OwnedScan, ReadError};
+use thiserror::Error;
+use toml::{Table, Value};
 
-use super::{Configuration, strict};
-use crate::{Failure, print};
+use crate::{ConfigurationError, MethodConfig, strict};
 
 /// Scans that are measured, evenly spread over the recording.
 const SCANS: usize = 8;
@@ -24,76 +24,98 @@ const LONG_PERIOD_S: f64 = 0.5;
 /// Angle that a vehicle turns by in such a time, degrees.
 const LONG_REACH_DEG: f64 = 45.0;
 
-impl Configuration {
-    /// Creates the configuration of a recording from its format, its `dataset.toml` and its scans, and prints it.
-    ///
-    /// # Errors
-    /// A recording that cannot be opened or of which no scan can be read, an unknown key, a value out of its bounds.
-    pub fn of_recording(data: &Path, overrides: &[String]) -> Result<Self, Failure> {
-        if gyre_recording::is_recording(data) {
-            return Self::of_recorded_run(data, overrides);
-        }
-        let wished = Self::of_overrides(overrides)?.dataset;
-        let format = gyre_radar::open(data, &wished)?.format();
-        let constants = gyre_radar::stored_options(data)?.or(&constants(format)?);
-        let measured = Measured::of(gyre_radar::open(data, &wished.or(&constants))?.as_mut())?;
-        let settings = measured.settings();
-        print::note(format_args!(
+/// Settings that were found.
+#[derive(Clone, Debug)]
+pub struct Automatic {
+    /// The configuration.
+    pub table: Table,
+    /// What they are and why, in a sentence.
+    pub sentence: String,
+}
+
+/// The reason why there are no settings.
+#[derive(Debug, Error)]
+pub enum AutomaticError {
+    /// The recording cannot be opened.
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    /// None of its scans can be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// There is no scan.
+    #[error("the recording has no scans")]
+    Empty,
+    /// The configuration of a recorded run, or constants of a radar that TOML cannot hold.
+    #[error(transparent)]
+    Configuration(#[from] ConfigurationError),
+    /// The configuration of a recorded run is not TOML.
+    #[error("the recording's configuration: {0}")]
+    Recorded(String),
+}
+
+/// Returns the settings of a recording from its format, its `dataset.toml` and its scans; of a recorded run, those of the run. The
+/// options in `wished` go before those of the format.
+///
+/// # Errors
+/// A recording that cannot be opened, or of which no scan can be read.
+pub fn automatic(data: &Path, wished: &DatasetOptions) -> Result<Automatic, AutomaticError> {
+    if gyre_recording::is_recording(data) {
+        return of_recorded_run(data);
+    }
+    let format = gyre_radar::open(data, wished)?.format();
+    let constants = gyre_radar::stored_options(data)?.or(&constants(format)?);
+    let measured = Measured::of(gyre_radar::open(data, &wished.or(&constants))?.as_mut())?;
+    let settings = measured.settings();
+    let dataset = DatasetOptions {
+        format: Some(format),
+        ..constants
+    };
+    let mut table = Table::new();
+    let dataset = Value::try_from(dataset).map_err(|error| strict::value("dataset", error))?;
+    table.insert("dataset".to_owned(), dataset);
+    for sentence in &settings {
+        strict::set(&mut table, sentence)?;
+    }
+    Ok(Automatic {
+        table,
+        sentence: format!(
             "no configuration is named: the radar's constants are those of {format}, and by its scans, with a noise floor of {}, {}",
             measured.noise,
             settings.join(", ")
-        ));
-        let dataset = DatasetOptions {
-            format: Some(format),
-            ..constants
-        };
-        let mut table = Table::new();
-        table.insert("dataset".to_owned(), toml::Value::try_from(dataset)?);
-        for sentence in &settings {
-            strict::set(&mut table, sentence)?;
-        }
-        Ok(Self::resolve(table, overrides)?)
-    }
+        ),
+    })
 }
 
-/// The sections of a configuration that say what is computed.
-const METHOD: [&str; 9] = [
-    "raster",
-    "points",
-    "masking",
-    "search",
-    "rotation",
-    "translation",
-    "exhaustive",
-    "refinement",
-    "slam",
-];
-
-impl Configuration {
-    /// Returns the configuration of the run that a recording is of, as far as it says what is computed.
-    fn of_recorded_run(data: &Path, overrides: &[String]) -> Result<Self, Failure> {
-        let recording = gyre_recording::open_recording(data)?;
-        let mut table: Table = recording.head().configuration.parse()?;
-        table.retain(|section, _| METHOD.contains(&section));
-        print::note("no configuration is named: that of the recorded run is used");
-        Ok(Self::resolve(table, overrides)?)
-    }
+/// Returns the configuration of the run that a recording is of, as far as it says what is computed.
+fn of_recorded_run(data: &Path) -> Result<Automatic, AutomaticError> {
+    let recording = gyre_recording::open_recording(data)?;
+    let parsed: Result<Table, toml::de::Error> = recording.head().configuration.parse();
+    let mut table = parsed.map_err(|error| AutomaticError::Recorded(error.to_string()))?;
+    // The recording itself says what its scans are.
+    table.retain(|section, _| section != "dataset" && MethodConfig::SECTIONS.contains(&section));
+    Ok(Automatic {
+        table,
+        sentence: "no configuration is named: that of the recorded run is used".to_owned(),
+    })
 }
 
 /// Returns the constants of the radar of a dataset, from its file in `configs/`.
-fn constants(format: Format) -> Result<DatasetOptions, Failure> {
+fn constants(format: Format) -> Result<DatasetOptions, ConfigurationError> {
     let text = match format {
-        Format::Oxford => include_str!("../../../../configs/oxford.toml"),
-        Format::Boreas => include_str!("../../../../configs/boreas.toml"),
-        Format::BoreasRt => include_str!("../../../../configs/boreas-rt.toml"),
+        Format::Oxford => include_str!("../../../configs/oxford.toml"),
+        Format::Boreas => include_str!("../../../configs/boreas.toml"),
+        Format::BoreasRt => include_str!("../../../configs/boreas-rt.toml"),
         Format::Mulran | Format::MulranOxfordForm => {
-            include_str!("../../../../configs/mulran.toml")
+            include_str!("../../../configs/mulran.toml")
         }
-        Format::Radiate => include_str!("../../../../configs/radiate.toml"),
-        Format::Fomo => include_str!("../../../../configs/fomo.toml"),
+        Format::Radiate => include_str!("../../../configs/radiate.toml"),
+        Format::Fomo => include_str!("../../../configs/fomo.toml"),
         Format::Oord | Format::Mcap => "",
     };
-    Ok(strict::section(&mut text.parse::<Table>()?, "dataset")?)
+    let parsed: Result<Table, _> = text.parse();
+    let mut table =
+        parsed.map_err(|error| strict::value("dataset", strict::syntax(text, &error)))?;
+    strict::section(&mut table, "dataset")
 }
 
 /// Properties of a radar that its scans show.
@@ -116,7 +138,7 @@ impl Measured {
     ///
     /// # Errors
     /// None of them can be read.
-    fn of(dataset: &mut dyn Dataset) -> Result<Self, Failure> {
+    fn of(dataset: &mut dyn Dataset) -> Result<Self, AutomaticError> {
         let mut scan = OwnedScan::with_limits(dataset.limits());
         let (mut counts, mut failure) = ([0_u64; 256], None);
         for index in (0..dataset.len()).step_by(dataset.len().div_ceil(SCANS).max(1)) {
@@ -139,7 +161,7 @@ impl Measured {
                 period_s: dataset.period_ns() as f64 * 1e-9,
             }),
             (None, Some(error)) => Err(error.into()),
-            (None, None) => Err("the recording has no scans".into()),
+            (None, None) => Err(AutomaticError::Empty),
         }
     }
 

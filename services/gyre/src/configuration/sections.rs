@@ -1,0 +1,89 @@
+//! The sections that are about the processes of a run.
+
+use std::path::PathBuf;
+
+use gyre_stage::supervise::{RestartPolicy, Scheduling};
+use serde::{Deserialize, Serialize};
+
+use super::Rate;
+
+/// The section `[run]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct RunConfig {
+    /// `lossless`: every scan is processed, and the source waits. `live`: the newest scan wins.
+    pub mode: Mode,
+    /// Maximum number of scans between admission and their pose, 1 to 64. More than the free cores
+    /// increases latency and not throughput.
+    pub window: usize,
+    /// Pace of the source: `max`, `realtime`, or a factor of real time from 0.001 to 1000. Live mode
+    /// needs another than `max`.
+    pub rate: Rate,
+    /// Room for programs that look on, 0 to 64 of each topic: `gyre watch`, a viewer, a recorder. They
+    /// change neither a result nor a latency. Each needs shared memory for one message of each topic.
+    pub observers: usize,
+    /// Time for which a published scan may lack its pose, or the source a scan that is due, s; 0: no
+    /// limit. Then stages are restarted: first the source if it is late, else all but a live source;
+    /// if that does not help, all; if that does not help either, the run ends. With SLAM also the time
+    /// in which a follower that the run waits for at its end must make progress; else it is restarted.
+    pub stall_timeout_s: f64,
+    /// Time for a stage to open its topics after its start, s; 0: no limit. A stage that takes longer,
+    /// as one that cannot load its model, is treated as a stall.
+    pub start_timeout_s: f64,
+    /// How the system runs the stages: priority, processors, memory. Followers have their own alone.
+    #[serde(skip_serializing_if = "is_default")]
+    pub scheduling: Scheduling,
+    /// Ground truth for the evaluation. Default: the one in the recording's folder.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ground_truth: Option<PathBuf>,
+}
+
+/// The policy when scans arrive faster than they can be processed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mode {
+    /// The source waits.
+    Lossless,
+    /// The newest scan wins.
+    Live,
+}
+
+/// A section `[stages.NAME]`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct StageConfig {
+    /// Program and arguments of a replacement. Default: `gyre stage NAME`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub command: Vec<String>,
+    /// Limits of its restarts.
+    pub restart: RestartPolicy,
+    /// How the system runs it: its keys go before those of `run.scheduling`.
+    #[serde(skip_serializing_if = "is_default")]
+    pub scheduling: Scheduling,
+    /// Delay for each scan, ms, to test behaviour under load. Source and `pose-integration` have none.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub delay_ms: u64,
+}
+
+fn is_default(scheduling: &Scheduling) -> bool {
+    *scheduling == Scheduling::default()
+}
+
+fn is_zero(value: &u64) -> bool {
+    *value == 0
+}
+
+impl Default for RunConfig {
+    fn default() -> Self {
+        Self {
+            mode: Mode::Lossless,
+            window: 4,
+            rate: Rate::Max,
+            observers: 8,
+            stall_timeout_s: 60.0,
+            start_timeout_s: 300.0,
+            scheduling: Scheduling::default(),
+            ground_truth: None,
+        }
+    }
+}

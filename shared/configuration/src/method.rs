@@ -1,0 +1,76 @@
+//! The settings that decide what is computed.
+
+use gyre_odometry::OdometryConfig;
+use gyre_radar::DatasetOptions;
+use gyre_slam::SlamConfig;
+use toml::Table;
+
+use crate::{
+    ConfigurationError,
+    strict::{section, within},
+};
+
+/// The sections of a configuration that say what is computed of which radar's scans: its file may have others, which are for a run of
+/// processes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MethodConfig {
+    /// The format of the recording, and the constants of its radar.
+    pub dataset: DatasetOptions,
+    /// The settings of the method: the sections from `raster` to `refinement`.
+    pub odometry: OdometryConfig,
+    /// The correction of the trajectory at places that are seen again.
+    pub slam: SlamConfig,
+}
+
+impl MethodConfig {
+    /// The names of the sections.
+    pub const SECTIONS: [&str; 10] = [
+        "dataset",
+        "raster",
+        "points",
+        "masking",
+        "search",
+        "rotation",
+        "translation",
+        "exhaustive",
+        "refinement",
+        "slam",
+    ];
+
+    /// Takes the sections out of a configuration; those that are missing have their defaults.
+    ///
+    /// # Errors
+    /// An unknown key of a section, or a value of another type.
+    pub fn take(table: &mut Table) -> Result<Self, ConfigurationError> {
+        Ok(Self {
+            dataset: section(table, "dataset")?,
+            odometry: OdometryConfig {
+                raster: section(table, "raster")?,
+                points: section(table, "points")?,
+                masking: section(table, "masking")?,
+                search: section(table, "search")?,
+                rotation: section(table, "rotation")?,
+                translation: section(table, "translation")?,
+                exhaustive: section(table, "exhaustive")?,
+                refinement: section(table, "refinement")?,
+            },
+            slam: section(table, "slam")?,
+        })
+    }
+
+    /// Checks the ranges of all values.
+    ///
+    /// # Errors
+    /// The first value that is out of its bounds.
+    pub fn validate(&self) -> Result<(), ConfigurationError> {
+        let odometry = &self.odometry;
+        within("raster", odometry.raster.validate())?;
+        within("points", odometry.points.validate())?;
+        within("masking", odometry.masking.validate())?;
+        within("rotation", odometry.rotation.validate())?;
+        within("translation", odometry.translation.validate())?;
+        within("exhaustive", odometry.exhaustive.validate())?;
+        within("refinement", odometry.refinement.validate())?;
+        within("slam.places", self.slam.validate())
+    }
+}
