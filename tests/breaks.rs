@@ -19,7 +19,7 @@ const BREAK: usize = 12;
 const HOUR_US: i64 = 3_600_000_000;
 const YEAR_US: i64 = 8_760 * HOUR_US;
 
-fn run_of(recording: &TempDir) -> Run {
+pub fn run_of(recording: &TempDir) -> Run {
     Run::of_recording_named(recording.path().to_str().unwrap())
 }
 
@@ -66,7 +66,7 @@ fn a_scan_whose_rows_are_a_year_from_its_name_is_unreadable() {
 }
 
 /// A recording with a gap of a year before scan [`BREAK`].
-fn with_a_gap() -> TempDir {
+pub fn with_a_gap() -> TempDir {
     let recording = recording::copy(recording::SCANS);
     for image in &recording::images(recording.path())[BREAK..] {
         recording::shift(image, YEAR_US);

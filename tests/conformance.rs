@@ -42,7 +42,7 @@ fn conforms(stage: &str, more: &[&str]) {
 }
 
 /// The command of a stage that breaks the contract so; `none` keeps it.
-fn command(breach: &str) -> String {
+pub fn command(breach: &str) -> String {
     let program = env::current_exe().unwrap();
     format!(
         "env {BREACH}='{breach}' '{}' --exact conformance::plays_a_broken_stage --nocapture",

@@ -13,9 +13,9 @@ use rustix::process::Signal;
 
 const MIDDLE: usize = recording::SCANS / 3;
 const ONE_SCAN: &str = "single-127";
-const TWO_SCANS: &str = "pair-127";
+pub const TWO_SCANS: &str = "pair-127";
 
-fn card(model: &str) -> PathBuf {
+pub fn card(model: &str) -> PathBuf {
     Path::new(crate::PROJECT)
         .join("shared/masking/tests/models")
         .join(model)

@@ -37,6 +37,7 @@ mod refinement;
 mod resources;
 mod restart;
 mod results;
+mod shadow;
 mod shared_memory;
 mod simulation;
 mod slam;

@@ -22,7 +22,7 @@ use crate::{
 };
 
 /// The Python and the script.
-fn command() -> [String; 2] {
+pub fn command() -> [String; 2] {
     [
         python(),
         format!("{PROJECT}/examples/python-masking/masking.py"),
@@ -30,7 +30,7 @@ fn command() -> [String; 2] {
 }
 
 /// Returns whether the stage can be started; prints why a test is skipped.
-fn can_start() -> bool {
+pub fn can_start() -> bool {
     let mut python = Command::new(&command()[0]);
     let imported = python.args(["-c", "import iceoryx2, numpy"]).output();
     let has_packages = imported.is_ok_and(|output| output.status.success());

@@ -1,6 +1,6 @@
 //! Stages that keep the contract but for one clause of it. Their results are constant: only the contract matters here.
 
-use std::time::Duration;
+use std::{thread, time::Duration};
 
 use gyre_messages::{
     Hop, Item, Masked, MaskedHeader, Message, Motion, Rotation, RotationHeader, Scan, StageId, flag,
@@ -16,6 +16,12 @@ pub const BREACH: &str = "GYRE_TEST_BREACH";
 /// The item with which something goes wrong.
 const WRONG: u64 = 5;
 const REST: Duration = Duration::from_millis(2);
+/// The items that one answers which then answers no more.
+const ENOUGH: u64 = 3;
+/// The work of one that is slow.
+const SLOW: Duration = Duration::from_millis(300);
+/// Messages for each item of one that sends too many.
+const FLOOD: usize = 500;
 
 /// Works as the rotation search, or for a breach of masking as masking.
 pub fn play(launch: &Launch, breach: &str) -> Result<StageCounters, StageError> {
@@ -48,6 +54,7 @@ pub fn play(launch: &Launch, breach: &str) -> Result<StageCounters, StageError> 
         waiting: None,
         begun: false,
         ended: false,
+        answered: 0,
     };
     stage.run()?;
     Ok(StageCounters::default())
@@ -65,6 +72,8 @@ struct Broken<'a> {
     waiting: Option<Recorded>,
     begun: bool,
     ended: bool,
+    /// Items that it has answered.
+    answered: u64,
 }
 
 impl Broken<'_> {
@@ -123,8 +132,13 @@ impl Broken<'_> {
         match item.is(flag::END) {
             _ if !self.begun => {}
             true => self.end(&item)?,
+            false if self.answered >= ENOUGH && self.does("falls silent") => {}
+            false if self.answered >= ENOUGH && self.does("dies") => {
+                return Err(StageError::Input("no memory is left".to_owned()));
+            }
             false => self.process(&item, message.received_ns)?,
         }
+        self.answered += 1;
         Ok(true)
     }
 
@@ -154,6 +168,9 @@ impl Broken<'_> {
             return Ok(());
         }
         let now_ns = clock::now_ns();
+        if self.does("is slow") {
+            thread::sleep(SLOW);
+        }
         let mut item = Item {
             pid: std::process::id(),
             ..*item
@@ -162,7 +179,7 @@ impl Broken<'_> {
             *item.hop_mut(self.stage) = Hop {
                 received_ns,
                 started_ns: now_ns,
-                finished_ns: now_ns,
+                finished_ns: clock::now_ns(),
                 published_ns: clock::now_ns(),
             };
         }
@@ -171,10 +188,12 @@ impl Broken<'_> {
         }
         let output = self.output_about(item)?;
         self.output.send(&output)?;
-        match self.does("sends twice") && item.seq == WRONG {
-            true => self.output.send(&output),
-            false => Ok(()),
-        }
+        let copies = match self.breach {
+            "sends twice" if item.seq == WRONG => 1,
+            "floods" => FLOOD,
+            _ => 0,
+        };
+        (0..copies).try_for_each(|_| self.output.send(&output))
     }
 
     fn output_about(&self, item: Item) -> Result<Recorded, StageError> {

@@ -10,10 +10,7 @@ mod stream;
 use std::collections::BTreeMap;
 
 use gyre_messages::{StageId, flag};
-use gyre_stage::{
-    supervise::{Death, rig::Recorded},
-    wake::Signals,
-};
+use gyre_stage::{supervise::rig::Recorded, wake::Signals};
 
 use crate::{
     ConformanceError,
@@ -218,14 +215,7 @@ fn compare(
 fn how(waited: &Waited) -> String {
     match waited {
         Waited::Done => "it did".to_owned(),
-        Waited::Died(death) => ended(death),
+        Waited::Died(death) => death.to_string(),
         Waited::TimedOut => "it lives and sends nothing".to_owned(),
     }
-}
-
-/// Says how a process has ended.
-fn ended(death: &Death) -> String {
-    let output = death.last_output.as_deref();
-    let output = output.map_or_else(String::new, |line| format!(", its last line: {line}"));
-    format!("it ended with {}{output}", death.cause)
 }

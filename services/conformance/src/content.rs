@@ -1,6 +1,7 @@
 //! What of a message is a result: the bytes that must be the same again, and how far two results are apart.
 
 use bytemuck::{cast_slice, pod_read_unaligned};
+use gyre_geometry::wrap_angle;
 use gyre_messages::{
     Item, Masked, MaskedHeader, Message, Motion, MotionHeader, Pose, Refined, Rotation, Scan,
     ScanHeader, StageId, flag,
@@ -12,7 +13,7 @@ use gyre_stage::{StageError, supervise::rig::Recorded};
 ///
 /// # Errors
 /// A message of another topic.
-pub(crate) fn essence(topic: &str, message: &Recorded) -> Result<Vec<u8>, StageError> {
+pub fn essence(topic: &str, message: &Recorded) -> Result<Vec<u8>, StageError> {
     let item = message.item();
     let item = Item {
         due_ns: 0,
@@ -101,60 +102,114 @@ pub(crate) fn deviation(
         equal += usize::from(essence(topic, own)? == essence(topic, other)?);
     }
     let items = pairs.len();
-    let measured = match topic {
-        Scan::TOPIC => None,
-        Masked::TOPIC => Some(masks(&pairs)?),
-        _ => Some(motions(topic, &pairs)?),
-    };
+    let mut differences = Vec::new();
+    for (own, other) in &pairs {
+        differences.extend(difference(topic, own, other)?);
+    }
+    let measured = summary(topic, &differences);
     let measured = measured.map_or_else(String::new, |measured| format!("; {measured}"));
     Ok(format!(
         "{equal} of {items} items are the same bytes{measured}"
     ))
 }
 
-type Pairs<'a> = [(&'a Recorded, &'a Recorded)];
-
-fn masks(pairs: &Pairs<'_>) -> Result<String, StageError> {
-    let (mut difference, mut level, mut cells) = (0.0, 0.0, 0.0);
-    let mut points = [0, 0];
-    for (own, other) in pairs {
-        let mut parts = [Vec::new(), Vec::new()];
-        for (i, message) in [own, other].into_iter().enumerate() {
-            let header = message.header::<Masked>()?;
-            points[i] += header.points;
-            let values = floats(&message.payload);
-            parts[i] = rasters(&header, &values).concat();
-        }
-        let [own, other] = parts;
-        for (own, other) in own.iter().zip(&other) {
-            difference += f64::from((own - other).abs());
-            level += f64::from(*own);
-            cells += 1.0;
-        }
-    }
-    Ok(format!(
-        "mean absolute difference of the rasters {:.4}, where the mean of our own is {:.4}; {} points to our {}",
-        difference / f64::max(cells, 1.0),
-        level / f64::max(cells, 1.0),
-        points[1],
-        points[0]
-    ))
+/// How far apart two results for an item are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Difference {
+    /// Of masks.
+    Masks {
+        /// Mean absolute difference of the cells of the rasters.
+        mean_absolute: f64,
+        /// Mean of the cells of the first result.
+        level: f64,
+        /// The numbers of points.
+        points: [u32; 2],
+    },
+    /// Of rotations, motions and poses, from the first to the second.
+    Planar {
+        /// In x, m.
+        x_m: f64,
+        /// In y, m.
+        y_m: f64,
+        /// In yaw, rad, at most half a turn.
+        yaw_rad: f64,
+    },
 }
 
-fn motions(topic: &str, pairs: &Pairs<'_>) -> Result<String, StageError> {
-    let mut squares = [0.0; 3];
-    for (own, other) in pairs {
-        let (own, other) = (planar(topic, own)?, planar(topic, other)?);
-        for i in 0..3 {
-            squares[i] += (own[i] - other[i]).powi(2);
-        }
-    }
-    let [x_m, y_m, yaw_rad] = squares.map(|sum| (sum / pairs.len().max(1) as f64).sqrt());
-    let yaw = format!("{:.4} deg in yaw", yaw_rad.to_degrees());
+/// Returns how far apart two results for an item are; `None` for scans.
+///
+/// # Errors
+/// Messages of another topic.
+pub fn difference(
+    topic: &str,
+    one: &Recorded,
+    other: &Recorded,
+) -> Result<Option<Difference>, StageError> {
     Ok(match topic {
-        Rotation::TOPIC => format!("RMS difference {yaw}"),
-        _ => format!("RMS difference {x_m:.4} m in x, {y_m:.4} m in y, {yaw}"),
+        Scan::TOPIC => None,
+        Masked::TOPIC => Some(difference_of_masks(one, other)?),
+        _ => {
+            let (one, other) = (planar(topic, one)?, planar(topic, other)?);
+            Some(Difference::Planar {
+                x_m: other[0] - one[0],
+                y_m: other[1] - one[1],
+                yaw_rad: wrap_angle(other[2] - one[2]),
+            })
+        }
     })
+}
+
+fn difference_of_masks(one: &Recorded, other: &Recorded) -> Result<Difference, StageError> {
+    let mut points = [0; 2];
+    let mut cells = [Vec::new(), Vec::new()];
+    for (i, message) in [one, other].into_iter().enumerate() {
+        let header = message.header::<Masked>()?;
+        points[i] = header.points;
+        cells[i] = rasters(&header, &floats(&message.payload)).concat();
+    }
+    let [one, other] = cells;
+    let pairs = || one.iter().zip(&other);
+    let mean = |sum: f64| sum / pairs().count().max(1) as f64;
+    Ok(Difference::Masks {
+        mean_absolute: mean(pairs().map(|(a, b)| f64::from((a - b).abs())).sum()),
+        level: mean(pairs().map(|(a, _)| f64::from(*a)).sum()),
+        points,
+    })
+}
+
+/// Says how far apart results are on the whole.
+fn summary(topic: &str, differences: &[Difference]) -> Option<String> {
+    let items = differences.len().max(1) as f64;
+    let mut sums = [0.0; 3];
+    let mut all_points = [0; 2];
+    for difference in differences {
+        let values = match difference {
+            Difference::Masks {
+                mean_absolute,
+                level,
+                points,
+            } => {
+                (0..2).for_each(|i| all_points[i] += u64::from(points[i]));
+                [*mean_absolute, *level, 0.0]
+            }
+            Difference::Planar { x_m, y_m, yaw_rad } => [x_m.powi(2), y_m.powi(2), yaw_rad.powi(2)],
+        };
+        (0..3).for_each(|i| sums[i] += values[i]);
+    }
+    let means = sums.map(|sum| sum / items);
+    let [x_m, y_m, yaw_rad] = means.map(f64::sqrt);
+    let yaw = format!("{:.4} deg in yaw", yaw_rad.to_degrees());
+    match topic {
+        Scan::TOPIC => None,
+        Masked::TOPIC => Some(format!(
+            "mean absolute difference of the rasters {:.4}, where the mean of our own is {:.4}; {} points to our {}",
+            means[0], means[1], all_points[1], all_points[0]
+        )),
+        Rotation::TOPIC => Some(format!("RMS difference {yaw}")),
+        _ => Some(format!(
+            "RMS difference {x_m:.4} m in x, {y_m:.4} m in y, {yaw}"
+        )),
+    }
 }
 
 /// The result of a search, a refinement or a composition: x, y (m), yaw (rad).
@@ -173,7 +228,7 @@ fn planar(topic: &str, message: &Recorded) -> Result<[f64; 3], StageError> {
 }
 
 /// Returns the time of a stage's work on an item, ns.
-pub(crate) fn work_ns(stage: StageId, message: &Recorded) -> i64 {
+pub fn work_ns(stage: StageId, message: &Recorded) -> i64 {
     let hop = message.item().hops[stage as usize];
     hop.finished_ns.saturating_sub(hop.started_ns)
 }

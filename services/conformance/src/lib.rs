@@ -4,17 +4,21 @@
 //! the program what Gyre's own stages made of some scans, and examines what it sends.
 //!
 //! Reading order: [`Rule`] (what is checked), [`check`], `checks` (the scenarios), `session` (one process under test), `tape` (the
-//! inputs), `malformed` (inputs that must be refused), `content` (what of a message is a result).
+//! inputs), `malformed` (inputs that must be refused).
+//!
+//! [`content`] (what of a message is a result), [`copying`] (what an item has of its input) and [`topology`] (the topics of each stage)
+//! are for others too that run a stage alone.
 
 mod checks;
-mod content;
+pub mod content;
+pub mod copying;
 mod malformed;
 mod report;
 mod rule;
 mod session;
 mod subject;
 mod tape;
-mod topology;
+pub mod topology;
 
 use std::{io, path::PathBuf};
 
@@ -24,6 +28,7 @@ use thiserror::Error;
 pub use report::{Report, Work};
 pub use rule::{Rule, Verdict};
 pub use subject::{Demands, Prepare, Scans, Subject};
+pub use tape::start_of_trajectory;
 
 use checks::Examination;
 use tape::Tape;

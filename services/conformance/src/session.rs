@@ -11,7 +11,7 @@ use gyre_messages::{Message, Motion, Pose, flag};
 use gyre_stage::{
     StageError, clock,
     supervise::{
-        Death,
+        Death, Scheduling,
         rig::{Feed, Process, Recorded, Rig, Tap},
     },
 };
@@ -126,7 +126,7 @@ impl<'a> Session<'a> {
         let name = self.subject.stage.name();
         self.last = None;
         self.asked.clear();
-        self.process = Some(self.rig.start(name, command)?);
+        self.process = Some(self.rig.start(name, command, &Scheduling::default())?);
         self.progress = Instant::now();
         let (stage, limit) = (self.subject.stage, self.subject.demands.start_timeout);
         self.wait(limit, |session| session.rig.has_publisher(stage))

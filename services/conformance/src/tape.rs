@@ -13,7 +13,10 @@ use gyre_pose_integration::compose;
 use gyre_radar::continues;
 use gyre_stage::{
     clock,
-    supervise::rig::{Feed, Process, Recorded, Rig, Tap},
+    supervise::{
+        Scheduling,
+        rig::{Feed, Process, Recorded, Rig, Tap},
+    },
     wake::Signals,
 };
 
@@ -137,7 +140,8 @@ impl<'a> Recording<'a> {
         poses.send(&start_of_trajectory())?;
         let mut processes = Vec::new();
         for stage in stages {
-            processes.push((stage, rig.start(stage.name(), &subject.own(stage))?));
+            let process = rig.start(stage.name(), &subject.own(stage), &Scheduling::default())?;
+            processes.push((stage, process));
         }
         Ok(Self {
             processes,
@@ -274,7 +278,7 @@ impl<'a> Recording<'a> {
 }
 
 /// The message with which a sink without poses starts.
-pub(crate) fn start_of_trajectory() -> Recorded {
+pub fn start_of_trajectory() -> Recorded {
     let start = PoseHeader {
         item: Item {
             flags: flag::BASE | flag::SYNC,

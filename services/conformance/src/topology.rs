@@ -5,7 +5,7 @@ use gyre_stage::Manifest;
 
 /// How a topic comes to a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Way {
+pub enum Way {
     /// Down the stream: item `seq` is sent for the stage to answer with its item `seq`.
     Forward,
     /// Back to an earlier stage: item `seq` is sent after the stage has answered it.
@@ -14,7 +14,7 @@ pub(crate) enum Way {
 
 /// The topics of a stage.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Ports {
+pub struct Ports {
     /// The topics that it may subscribe to. Of several that lead forward, the last comes from farthest down the stream.
     pub inputs: Vec<(&'static str, Way)>,
     /// The topic that it publishes.
@@ -25,7 +25,7 @@ pub(crate) struct Ports {
 
 impl Ports {
     /// The topics of a stage in a run with this manifest.
-    pub(crate) fn of(stage: StageId, manifest: &Manifest) -> Self {
+    pub fn of(stage: StageId, manifest: &Manifest) -> Self {
         use Way::{Feedback, Forward};
         let motions = match manifest.refines {
             true => Refined::TOPIC,
@@ -70,7 +70,7 @@ impl Ports {
     }
 
     /// Returns the topics that lead to the stage this way.
-    pub(crate) fn by(&self, way: Way) -> impl Iterator<Item = &'static str> + use<> {
+    pub fn by(&self, way: Way) -> impl Iterator<Item = &'static str> + use<> {
         let inputs = self.inputs.clone();
         inputs
             .into_iter()
@@ -79,7 +79,7 @@ impl Ports {
     }
 
     /// Returns the topic whose items the stage copies; `None` for a source.
-    pub(crate) fn copied(&self) -> Option<&'static str> {
+    pub fn copied(&self) -> Option<&'static str> {
         self.by(Way::Forward).last()
     }
 }

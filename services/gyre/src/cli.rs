@@ -3,6 +3,7 @@
 mod conformance;
 mod operate;
 mod record;
+mod shadow;
 mod stress;
 mod watch;
 
@@ -19,6 +20,7 @@ pub use conformance::ConformanceArguments;
 pub use operate::{
     LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments, TopArguments,
 };
+pub use shadow::ShadowArguments;
 pub use stress::StressArguments;
 pub use watch::WatchArguments;
 
@@ -54,6 +56,8 @@ pub enum Command {
     Restart(RestartArguments),
     /// Go on with another program in the place of a stage of a running run, without losing a scan.
     Swap(SwapArguments),
+    /// Run a second program beside a stage of a running run, and compare what both make of the same inputs. Its results are never used.
+    Shadow(ShadowArguments),
     /// Run one process of a run (what `gyre run` starts).
     Stage {
         /// radar-replay, masking, rotation-search, translation-search, joint-search, refinement or pose-integration.

@@ -32,6 +32,7 @@ pub mod record;
 pub mod results;
 pub mod run;
 pub mod schema;
+pub mod shadow;
 pub mod simulate;
 pub mod stage;
 pub mod stress;
@@ -82,6 +83,10 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Watch(arguments) => {
             gyre_stage::run::keep_files_private();
             watch::watch(&arguments)
+        }
+        Command::Shadow(arguments) => {
+            gyre_stage::run::keep_files_private();
+            shadow::shadow(&arguments)
         }
         Command::Stress(arguments) => {
             gyre_stage::run::keep_files_private();

@@ -70,7 +70,7 @@ pub fn swap(arguments: &SwapArguments) -> Result<ExitCode, Failure> {
 }
 
 /// Returns the run that is meant: the one that is named, or the only one.
-fn chosen(choice: &RunChoice) -> Result<Control, Failure> {
+pub(crate) fn chosen(choice: &RunChoice) -> Result<Control, Failure> {
     if let Some(out) = &choice.out {
         return Ok(Control::of(out)?);
     }

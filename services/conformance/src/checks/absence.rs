@@ -2,6 +2,8 @@
 
 use std::time::Instant;
 
+use gyre_stage::supervise::Scheduling;
+
 use super::Examination;
 use crate::{ConformanceError, rule::Rule, tape::LOOK};
 
@@ -9,7 +11,11 @@ impl Examination<'_> {
     pub(super) fn start_without_topics(&mut self) -> Result<(), ConformanceError> {
         let subject = self.subject;
         let rig = subject.empty_rig(self.signals, "absence")?;
-        let mut process = rig.start(subject.stage.name(), &subject.command)?;
+        let mut process = rig.start(
+            subject.stage.name(),
+            &subject.command,
+            &Scheduling::default(),
+        )?;
         let since = Instant::now();
         while process.death().is_none() && rig.services().is_empty() {
             // It may wait for its topics as long as it likes.

@@ -2,7 +2,7 @@
 
 use gyre_stage::{StageError, supervise::rig::Rig};
 
-use super::{Examination, ended, stream::starts};
+use super::{Examination, stream::starts};
 use crate::{
     ConformanceError,
     malformed::{Malformed, malformed},
@@ -80,10 +80,7 @@ impl Examination<'_> {
             ),
             Some(death) if death.code != Some(code) => findings.broken(
                 Rule::RefusesMalformed,
-                format!(
-                    "an item on `{topic}` with {what}: {}, and the code has to be {code}",
-                    ended(&death)
-                ),
+                format!("an item on `{topic}` with {what}: {death}, and the code has to be {code}"),
             ),
             Some(death) if death.last_output.is_none() => findings.broken(
                 Rule::RefusesMalformed,

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use gyre_messages::{StageId, flag};
 
-use super::{Examination, ended, how};
+use super::{Examination, how};
 use crate::{
     ConformanceError,
     rule::Rule,
@@ -70,7 +70,7 @@ pub(super) fn starts(session: &mut Session<'_>) -> Result<bool, ConformanceError
     session
         .findings
         .require(Rule::StartsInTime, is_open, || match &waited {
-            Waited::Died(death) => format!("it has not opened `{topic}`: {}", ended(death)),
+            Waited::Died(death) => format!("it has not opened `{topic}`: {death}"),
             _ => format!("it has not opened `{topic}` within the start timeout"),
         });
     Ok(is_open)
@@ -186,10 +186,9 @@ pub(super) fn stops(session: &mut Session<'_>, when: &str) -> Result<(), Conform
             Rule::StopsOnRequest,
             format!("it has not exited within {limit:.0?} of SIGTERM {when}"),
         ),
-        Some(death) if death.code != Some(0) => session.findings.broken(
-            Rule::StopsOnRequest,
-            format!("SIGTERM {when}: {}", ended(&death)),
-        ),
+        Some(death) if death.code != Some(0) => session
+            .findings
+            .broken(Rule::StopsOnRequest, format!("SIGTERM {when}: {death}")),
         Some(_) => {}
     }
     Ok(())

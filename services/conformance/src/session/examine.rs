@@ -4,7 +4,10 @@ use gyre_messages::{Item, flag};
 use gyre_stage::supervise::rig::Recorded;
 
 use super::Session;
-use crate::rule::Rule;
+use crate::{
+    copying::{not_copied, wrong_stamps},
+    rule::Rule,
+};
 
 impl Session<'_> {
     /// Examines one item that the process has sent, alone and after the one before.
@@ -46,56 +49,24 @@ impl Session<'_> {
             self.findings.broken(Rule::OneForOne, sentence);
             return;
         };
-        let mut hops = item.hops;
-        hops[self.subject.stage as usize] = input.hops[self.subject.stage as usize];
-        let passes_flags = item.flags & !(flag::SYNC) == input.flags & !(flag::SYNC);
-        let fields = [
-            ("scan", item.scan == input.scan),
-            ("previous_scan", item.previous_scan == input.previous_scan),
-            ("published", item.published == input.published),
-            ("stamp_ns", item.stamp_ns == input.stamp_ns),
-            ("due_ns", item.due_ns == input.due_ns),
-            ("flags", passes_flags),
-            ("hops (the stamps of the stages before)", hops == input.hops),
-        ];
-        for (field, holds) in fields {
-            self.findings.require(Rule::CopiesItem, holds, || {
-                format!(
-                    "item {}: {field} is not that of the input on `{copied}`",
-                    item.seq
-                )
-            });
+        self.findings.checked(Rule::CopiesItem);
+        for field in not_copied(self.subject.stage, &input, item) {
+            let sentence = format!(
+                "item {}: {field} is not that of the input on `{copied}`",
+                item.seq
+            );
+            self.findings.broken(Rule::CopiesItem, sentence);
         }
     }
 
     fn examine_stamps(&mut self, item: &Item, read_ns: i64) {
-        let hop = item.hops[self.subject.stage as usize];
-        let stamps = [
-            ("received_ns", hop.received_ns),
-            ("started_ns", hop.started_ns),
-            ("finished_ns", hop.finished_ns),
-            ("published_ns", hop.published_ns),
-        ];
-        let seq = item.seq;
-        if let Some((name, _)) = stamps.iter().find(|(_, stamp)| *stamp == 0) {
-            let sentence = format!("item {seq}: {name} of its own hop is 0");
-            self.findings.broken(Rule::StampsWork, sentence);
-            return;
-        }
-        for pair in stamps.windows(2) {
-            self.findings
-                .require(Rule::StampsWork, pair[0].1 <= pair[1].1, || {
-                    format!("item {seq}: {} is after {}", pair[0].0, pair[1].0)
-                });
-        }
         // The poses of an earlier life are sent with its stamps.
-        let is_first = self.about(seq).next().is_none();
-        let sent_ns = self.sent_ns.get(&seq).copied().filter(|_| is_first);
-        self.findings.require(
-            Rule::StampsWork,
-            hop.published_ns <= read_ns && sent_ns.is_none_or(|sent| hop.received_ns >= sent),
-            || format!("item {seq}: its stamps are not between those of its input and of its reader; they are to be CLOCK_MONOTONIC, ns"),
-        );
+        let is_first = self.about(item.seq).next().is_none();
+        let sent_ns = self.sent_ns.get(&item.seq).copied().filter(|_| is_first);
+        self.findings.checked(Rule::StampsWork);
+        if let Some(sentence) = wrong_stamps(self.subject.stage, item, sent_ns, read_ns) {
+            self.findings.broken(Rule::StampsWork, sentence);
+        }
     }
 }
 

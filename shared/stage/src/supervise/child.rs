@@ -2,7 +2,7 @@
 
 use std::{
     collections::VecDeque,
-    fs,
+    fmt, fs,
     os::unix::process::ExitStatusExt,
     path::{Path, PathBuf},
     process::ExitStatus,
@@ -39,6 +39,17 @@ pub struct Death {
     pub code: Option<i32>,
     /// The last line of its output.
     pub last_output: Option<String>,
+}
+
+/// The end of a sentence, as `it ended with exit code 3, its last line: ...`.
+impl fmt::Display for Death {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "it ended with {}", self.cause)?;
+        match &self.last_output {
+            Some(line) => write!(f, ", its last line: {line}"),
+            None => Ok(()),
+        }
+    }
 }
 
 pub(super) struct Child {

@@ -97,12 +97,13 @@ impl Logs {
     }
 }
 
-fn path_of(manifest: &Manifest, stage: &str) -> PathBuf {
+/// Returns the log of a process.
+pub(super) fn path_of(manifest: &Manifest, stage: &str) -> PathBuf {
     manifest.out.join("log").join(format!("{stage}.txt"))
 }
 
 /// Moves the end of a log that is too long to its `.old`, and empties it. The processes that append to it do not notice.
-fn bound(path: &Path) {
+pub(super) fn bound(path: &Path) {
     let too_long = fs::symlink_metadata(path).is_ok_and(|log| log.is_file() && log.len() > MAX);
     if !too_long {
         return;

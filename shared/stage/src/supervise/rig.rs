@@ -17,6 +17,7 @@ use super::{
     child::Child,
     clean,
     guardian::Guardian,
+    log,
     start::{Place, Starter},
 };
 use crate::{
@@ -137,14 +138,19 @@ impl<'a> Rig<'a> {
     /// Starts a process with the environment and the process group that a stage of this name has. Its output is appended to its log.
     ///
     /// # Errors
-    /// A command that cannot be started.
-    pub fn start(&self, name: &str, command: &[String]) -> Result<Process, SuperviseError> {
+    /// A command that cannot be started, or not with this priority.
+    pub fn start(
+        &self,
+        name: &str,
+        command: &[String],
+        scheduling: &Scheduling,
+    ) -> Result<Process, SuperviseError> {
         let plan = StagePlan {
             name: name.to_owned(),
             command: command.to_vec(),
             programs: Vec::new(),
             directory: None,
-            scheduling: Scheduling::default(),
+            scheduling: scheduling.clone(),
             restart: RestartPolicy::default(),
             outlives_restarts: false,
             restarts_all: false,
@@ -154,6 +160,11 @@ impl<'a> Rig<'a> {
             child: Child::spawn(&plan, &self.manifest, &starter, Place::Free)?,
             death: None,
         })
+    }
+
+    /// Keeps the log of a process short, as the supervisor does.
+    pub fn bound_log(&self, name: &str) {
+        log::bound(&log::path_of(&self.manifest, name));
     }
 
     /// Removes what a killed process has left, as the supervisor does before it starts another one.
@@ -213,7 +224,7 @@ impl<'a> Rig<'a> {
     /// The system refuses to wait.
     pub fn sleep(&self, taps: &[&dyn Tap], limit: Duration) -> Result<bool, StageError> {
         let listeners: Vec<_> = taps.iter().map(|tap| tap.listener()).collect();
-        Ok(self.signals.wait(&listeners, None, limit)?.stop)
+        self.signals.sleep_until_any(&listeners, limit)
     }
 }
 

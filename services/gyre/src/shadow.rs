@@ -1,0 +1,94 @@
+//! `gyre shadow`: runs a second program beside a stage of a running run, and compares their results.
+
+use std::{process::ExitCode, time::Duration};
+
+use gyre_messages::{FollowerId, Footprint, StageId, Window};
+use gyre_shadow::{Options, STAGES};
+use gyre_stage::{control::Control, observer::ObservedRun, supervise::Scheduling};
+
+use crate::{Failure, cli::ShadowArguments, operate, preflight, print, program};
+
+/// Compares until the run ends or as long as the arguments say, and prints the report. The exit code is 1 if nothing was compared, or the
+/// program died, hung or broke the contract.
+///
+/// # Errors
+/// There is no such run or stage, the stage cannot have a shadow, or the program cannot be started.
+pub fn shadow(arguments: &ShadowArguments) -> Result<ExitCode, Failure> {
+    let stage = stage(&arguments.stage)?;
+    let options = options(arguments, stage)?;
+    let control = operate::chosen(&arguments.run)?;
+    require_stage(&control, stage)?;
+    let run = ObservedRun::writing_to(control.out())?;
+    let manifest = run.manifest();
+    let window = Window {
+        observers: 0,
+        ..manifest.window
+    };
+    preflight::check_shared_memory(&Footprint::new(&window, &manifest.limits))?;
+    let report = gyre_shadow::shadow(&run, &options, &mut |line| {
+        print::note(format_args!("gyre shadow: {line}"));
+    })?;
+    print::line(&report)?;
+    Ok(match report.is_sound() {
+        true => ExitCode::SUCCESS,
+        false => ExitCode::FAILURE,
+    })
+}
+
+fn stage(name: &str) -> Result<StageId, Failure> {
+    let stages = STAGES.map(StageId::name).join(", ");
+    let stage = StageId::by_name(name);
+    if let Some(stage) = stage.filter(|stage| STAGES.contains(stage)) {
+        return Ok(stage);
+    }
+    let reason = match stage {
+        Some(StageId::RadarReplay) => "is a source, which has no inputs",
+        Some(_) => "adds up all motions since the start of the run and owns its journal",
+        None if FollowerId::by_name(name).is_some() => "reads the run's logs and no topics",
+        None => {
+            return Err(
+                format!("there is no stage `{name}`; these can have a shadow: {stages}").into(),
+            );
+        }
+    };
+    Err(format!("{name} cannot have a shadow, since it {reason}; these can: {stages}").into())
+}
+
+/// Requires that the run has the stage: joint-search stands in the place of the other two searches.
+fn require_stage(control: &Control, stage: StageId) -> Result<(), Failure> {
+    let processes = control.status()?.processes;
+    let mut names = processes.iter().map(|process| process.name.as_str());
+    match names.any(|name| name == stage.name()) {
+        true => Ok(()),
+        false => {
+            let names: Vec<_> = processes.iter().map(|it| it.name.as_str()).collect();
+            let (stage, names) = (stage.name(), names.join(", "));
+            Err(format!("the run has no {stage}; it has {names}").into())
+        }
+    }
+}
+
+fn options(arguments: &ShadowArguments, stage: StageId) -> Result<Options, Failure> {
+    let seconds = |option: &str, seconds: f64| {
+        Duration::try_from_secs_f64(seconds)
+            .map_err(|_| format!("{option} is {seconds}, but must be 0 or more"))
+    };
+    let gyre = program::own().to_string_lossy().into_owned();
+    let own = || vec![gyre.clone(), "stage".to_owned(), stage.name().to_owned()];
+    let command = arguments.command.as_deref().map(program::words);
+    let duration = arguments.duration.map(|it| seconds("--duration", it));
+    Ok(Options {
+        stage,
+        command: command.transpose()?.unwrap_or_else(own),
+        scheduling: Scheduling {
+            nice: Some(arguments.nice),
+            ..Scheduling::default()
+        },
+        start_timeout: seconds("--start-timeout-s", arguments.start_timeout_s)?,
+        patience: seconds("--patience-s", arguments.patience_s)?,
+        scans: arguments.scans,
+        duration: duration.transpose()?,
+        report: arguments.report.clone(),
+        gyre,
+    })
+}

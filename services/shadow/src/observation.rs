@@ -1,0 +1,210 @@
+//! What is seen of the run: item after item what the stage was given, and what it made of it.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use gyre_conformance::topology::{Ports, Way};
+use gyre_messages::{StageId, flag};
+use gyre_stage::{Listener, StageError, observer::ObservedRun, supervise::rig::Recorded};
+
+use crate::inlet::{Inlet, inlet};
+
+/// Bytes of messages of items that are not complete. Beyond them the oldest is given up: in live mode most scans never become an item.
+const MAX_INCOMPLETE_BYTES: usize = 64 << 20;
+
+/// An item of the stage, with all messages that it is about.
+#[derive(Clone, Debug)]
+pub(crate) struct Observed {
+    /// The inputs that lead down the stream, by topic.
+    pub inputs: Vec<(&'static str, Recorded)>,
+    /// What the stage of the run made of them.
+    pub output: Recorded,
+    /// For masking: what the items before led to, without a gap, as far back as it may need.
+    pub before: Vec<Feedback>,
+    /// True if a stage that begins here can give the result of one that has seen all before.
+    pub can_open: bool,
+}
+
+/// What an earlier item led to.
+#[derive(Clone, Debug)]
+pub(crate) struct Feedback {
+    pub seq: u64,
+    breaks: bool,
+    /// The motion as searched.
+    pub motion: Recorded,
+    /// The pose.
+    pub pose: Recorded,
+}
+
+impl Observed {
+    pub(crate) fn seq(&self) -> u64 {
+        self.output.item().seq
+    }
+
+    /// Returns whether the chain of motions starts here.
+    pub(crate) fn breaks(&self) -> bool {
+        self.output.item().is(flag::BREAK)
+    }
+
+    pub(crate) fn bytes(&self) -> usize {
+        let inputs = self.inputs.iter().map(|(_, it)| it.payload.len());
+        inputs.sum::<usize>() + self.output.payload.len()
+    }
+}
+
+/// The observers of a stage's topics, and the items that their messages make.
+pub(crate) struct Observation<'run> {
+    run: &'run ObservedRun,
+    /// The inputs, the output, then the feedback.
+    topics: Vec<&'static str>,
+    inlets: Vec<Box<dyn Inlet + 'run>>,
+    forward: usize,
+    lag: u64,
+    /// The messages of items that are not complete, by the number that the source gave to the scan: masking numbers anew.
+    incomplete: BTreeMap<u64, Vec<Option<Recorded>>>,
+    incomplete_bytes: usize,
+    /// The last items without a gap: those that the lag reaches from an item and from the one before.
+    recent: VecDeque<Feedback>,
+    last: Option<u64>,
+    /// Items of the stage that were not seen whole.
+    pub missed: u64,
+    /// Places at which items are missing.
+    pub gaps: u64,
+}
+
+impl<'run> Observation<'run> {
+    /// Observes the topics of a stage.
+    ///
+    /// # Errors
+    /// No place is free, the run has ended, or the transport fails.
+    pub(crate) fn of(
+        run: &'run ObservedRun,
+        stage: StageId,
+        ports: &Ports,
+    ) -> Result<Self, StageError> {
+        let mut topics: Vec<_> = ports.by(Way::Forward).chain([ports.output]).collect();
+        let forward = topics.len() - 1;
+        if stage == StageId::Masking {
+            topics.extend(ports.by(Way::Feedback));
+        }
+        let inlets = topics.iter().map(|topic| inlet(run, topic));
+        Ok(Self {
+            run,
+            inlets: inlets.collect::<Result<_, _>>()?,
+            topics,
+            forward,
+            lag: run.manifest().window.lag as u64,
+            incomplete: BTreeMap::new(),
+            incomplete_bytes: 0,
+            recent: VecDeque::new(),
+            last: None,
+            missed: 0,
+            gaps: 0,
+        })
+    }
+
+    /// Takes what is in the queues; returns the items that are complete with it.
+    ///
+    /// # Errors
+    /// A failure of the transport.
+    pub(crate) fn look(&mut self) -> Result<Vec<Observed>, StageError> {
+        let mut complete = Vec::new();
+        for place in 0..self.inlets.len() {
+            while let Some(message) = self.inlets[place].take()? {
+                complete.extend(self.add(place, message));
+            }
+        }
+        Ok(complete)
+    }
+
+    /// Returns the listeners that the publishers notify.
+    pub(crate) fn listeners(&self) -> impl Iterator<Item = &Listener> {
+        self.inlets.iter().map(|inlet| inlet.listener())
+    }
+
+    /// Returns whether the stream or the run has ended.
+    pub(crate) fn has_ended(&self) -> bool {
+        self.run.has_ended() || self.inlets.iter().all(|inlet| inlet.has_ended())
+    }
+
+    fn add(&mut self, place: usize, message: Recorded) -> Option<Observed> {
+        let published = message.item().published;
+        let topics = self.topics.len();
+        let messages = self.incomplete.entry(published);
+        let messages = messages.or_insert_with(|| vec![None; topics]);
+        self.incomplete_bytes += message.payload.len();
+        let replaced = messages[place].replace(message);
+        self.incomplete_bytes -= replaced.map_or(0, |it| it.payload.len());
+        if messages.iter().all(Option::is_some) {
+            return self.complete(published);
+        }
+        while self.incomplete_bytes > MAX_INCOMPLETE_BYTES
+            && let Some((_, messages)) = self.incomplete.pop_first()
+        {
+            self.incomplete_bytes -= bytes(&messages);
+        }
+        None
+    }
+
+    fn complete(&mut self, published: u64) -> Option<Observed> {
+        // Each topic comes in order: what is missing of an earlier item does not come any more.
+        let later = self.incomplete.split_off(&published.saturating_add(1));
+        let mut earlier = std::mem::replace(&mut self.incomplete, later);
+        self.incomplete_bytes -= earlier.values().map(|it| bytes(it)).sum::<usize>();
+        let messages: Option<Vec<_>> = earlier.remove(&published)?.into_iter().collect();
+        let mut messages = messages?.into_iter();
+        let topics = self.topics.iter().copied();
+        let inputs: Vec<_> = topics.zip(messages.by_ref().take(self.forward)).collect();
+        let output = messages.next()?;
+        let seq = output.item().seq;
+        self.count_missed(seq);
+        let mut observed = Observed {
+            inputs,
+            output,
+            before: Vec::new(),
+            can_open: true,
+        };
+        if let (Some(motion), Some(pose)) = (messages.next(), messages.next()) {
+            self.add_feedback(&mut observed);
+            self.recent.push_back(Feedback {
+                seq,
+                breaks: observed.breaks(),
+                motion,
+                pose,
+            });
+            while self.recent.len() as u64 > self.lag + 1 {
+                self.recent.pop_front();
+            }
+        }
+        Some(observed)
+    }
+
+    fn count_missed(&mut self, seq: u64) {
+        let expected = self.last.map_or(seq, |last| last.saturating_add(1));
+        if seq != expected {
+            self.missed += seq.saturating_sub(expected);
+            self.gaps += 1;
+            self.recent.clear();
+        }
+        self.last = Some(seq);
+    }
+
+    /// Adds what masking needs of earlier items.
+    fn add_feedback(&self, observed: &mut Observed) {
+        let (seq, lag) = (observed.seq(), self.lag);
+        observed.before = self.recent.iter().cloned().collect();
+        let before = &observed.before;
+        let has_all = before.len() as u64 > lag;
+        // A chain that has just begun is compensated by nothing.
+        let begins_before = before
+            .iter()
+            .any(|it| it.breaks && it.seq.saturating_add(lag) > seq);
+        observed.can_open = match observed.breaks() {
+            true => seq == 0 || has_all,
+            false => has_all && !begins_before,
+        };
+    }
+}
+
+fn bytes(messages: &[Option<Recorded>]) -> usize {
+    messages.iter().flatten().map(|it| it.payload.len()).sum()
+}
