@@ -13,6 +13,7 @@ mod evaluate;
 mod extended_maps;
 mod followers;
 mod foreign_stages;
+mod foxglove;
 mod full_disk;
 mod hostile;
 mod identity;
@@ -45,6 +46,7 @@ mod standstill;
 mod stress;
 mod supervisor;
 mod systemd;
+mod traces;
 
 /// The program under test.
 const PROGRAM: &str = env!("CARGO_BIN_EXE_gyre");

@@ -12,7 +12,7 @@ use std::{
 
 use rustix::process::Signal;
 
-use super::{Run, gyre, send};
+use super::{Pid, Run, gyre, send};
 
 const LIMIT: Duration = Duration::from_secs(60);
 const LOOK: Duration = Duration::from_millis(5);
@@ -39,28 +39,37 @@ impl Server {
             said,
             address: String::new(),
         };
-        server.await_address();
+        server.address = server.line(" is shown at ");
         server
-    }
-
-    fn await_address(&mut self) {
-        let since = Instant::now();
-        while self.address.is_empty() {
-            assert!(since.elapsed() < LIMIT, "{}", self.said());
-            assert!(self.child.try_wait().unwrap().is_none(), "{}", self.said());
-            let said = self.said();
-            let line = said.lines().find(|line| line.contains(" is shown at "));
-            if said.ends_with('\n')
-                && let Some((_, address)) = line.and_then(|l| l.split_once(" at "))
-            {
-                address.clone_into(&mut self.address);
-            }
-            thread::sleep(LOOK);
-        }
     }
 
     fn said(&self) -> String {
         fs::read_to_string(&self.said).unwrap()
+    }
+
+    /// Its process.
+    pub fn pid(&self) -> Pid {
+        self.child.id()
+    }
+
+    /// The address that Foxglove connects to.
+    pub fn foxglove(&self) -> String {
+        self.line(" connect to ")
+    }
+
+    /// Waits until it has said a line with these words, and returns what is behind them.
+    pub fn line(&self, words: &str) -> String {
+        let since = Instant::now();
+        loop {
+            let said = self.said();
+            let whole = said.rsplit_once('\n').map_or("", |(whole, _)| whole);
+            let mut found = whole.lines().filter_map(|line| line.split_once(words));
+            if let Some((_, rest)) = found.next() {
+                return rest.to_owned();
+            }
+            assert!(since.elapsed() < LIMIT, "{said}");
+            thread::sleep(LOOK);
+        }
     }
 
     /// The token in its address.

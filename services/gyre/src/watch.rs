@@ -1,9 +1,9 @@
-//! `gyre watch`: shows a running run in a browser, and to Prometheus.
+//! `gyre watch`: shows a running run in a browser, and to Prometheus, Foxglove and OpenTelemetry.
 
-use std::{io, path::PathBuf, process::ExitCode};
+use std::{io, net::SocketAddr, path::PathBuf, process::ExitCode};
 
 use gyre_stage::{observer::ObservedRun, wake::Signals};
-use gyre_watch::{Server, Token};
+use gyre_watch::{Endpoint, Exporter, Server, Token};
 
 use crate::{Failure, cli::WatchArguments, earlier, print};
 
@@ -16,18 +16,36 @@ pub fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
     if !arguments.wait {
         ObservedRun::writing_to(&arguments.out)?;
     }
-    let server = Server::listen(arguments.listen, token(arguments)?)?;
+    let token = token(arguments)?;
+    let listen = |address: SocketAddr| {
+        let is_open = address.ip().is_loopback() && arguments.token_file.is_none();
+        Endpoint::listen(address, token.clone().filter(|_| !is_open))
+    };
+    let page = listen(arguments.listen)?;
+    let foxglove = arguments.foxglove.map(listen).transpose()?;
+    let say = |sentence: &str| print::note(format_args!("gyre: {sentence}"));
+    let traces = arguments.otlp.as_deref();
+    let traces = traces.map(|url| Exporter::start(url, say)).transpose()?;
     let out = absolute(&arguments.out)?;
     print::note(format_args!(
         "gyre: {} is shown at {}",
         out.display(),
-        link(&server)
+        link("http", &page)
     ));
-    if !arguments.listen.ip().is_loopback() {
+    if let Some(foxglove) = &foxglove {
+        print::note(format_args!(
+            "gyre: Foxglove and Lichtblick connect to {}",
+            link("ws", foxglove)
+        ));
+    }
+    if lets_others_in(arguments) {
         print::note(
-            "gyre: whoever knows this address can look on, and the network between carries it unencrypted",
+            "gyre: whoever knows such an address can look on, and the network between carries it unencrypted",
         );
     }
+    let server = Server::new(page)
+        .with_foxglove(foxglove)
+        .with_traces(traces);
     let signals = Signals::install()?;
     server.show(out, earlier::is_complete, &signals)?;
     Ok(ExitCode::SUCCESS)
@@ -36,14 +54,20 @@ pub fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
 /// Returns the token of the file, or a random one if other machines can connect.
 fn token(arguments: &WatchArguments) -> Result<Option<Token>, Failure> {
     let Some(path) = &arguments.token_file else {
-        return match arguments.listen.ip().is_loopback() {
-            true => Ok(None),
-            false => Ok(Some(Token::random()?)),
+        return match lets_others_in(arguments) {
+            true => Ok(Some(Token::random()?)),
+            false => Ok(None),
         };
     };
     let token = Token::of_file(path);
     let failed = |error| format!("cannot use the token of {}: {error}", path.display());
     Ok(Some(token.map_err(failed)?))
+}
+
+/// Returns whether other machines can connect.
+fn lets_others_in(arguments: &WatchArguments) -> bool {
+    let mut addresses = [arguments.listen].into_iter().chain(arguments.foxglove);
+    addresses.any(|address| !address.ip().is_loopback())
 }
 
 /// Returns the folder's full name, which need not exist yet.
@@ -52,7 +76,7 @@ fn absolute(out: &PathBuf) -> io::Result<PathBuf> {
 }
 
 /// Returns the address for a browser. One of all interfaces is reached by the machine's name.
-fn link(server: &Server) -> String {
+fn link(scheme: &str, server: &Endpoint) -> String {
     let address = server.address();
     let host = match address.ip().is_unspecified() {
         true => {
@@ -64,5 +88,5 @@ fn link(server: &Server) -> String {
     };
     let token = server.token().map(Token::as_str);
     let query = token.map_or(String::new(), |token| format!("?token={token}"));
-    format!("http://{host}/{query}")
+    format!("{scheme}://{host}/{query}")
 }

@@ -12,4 +12,6 @@ mod recorder;
 mod tap;
 mod writing;
 
+pub use log_tail::LogTail;
 pub use recorder::{Options, Recorded, RecorderError, record};
+pub use tap::now_ns;

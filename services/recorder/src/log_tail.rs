@@ -13,7 +13,7 @@ use serde_json::Value;
 const MAX_BYTES: u64 = 1 << 20;
 
 /// A position in the log.
-pub(crate) struct LogTail {
+pub struct LogTail {
     path: PathBuf,
     offset: u64,
     /// The start of a line whose end is not written yet.

@@ -149,7 +149,7 @@ fn incoming<M: Message>(message: &Received<M>) -> Incoming {
 }
 
 /// Returns the time of the machine, ns since 1970.
-pub(crate) fn now_ns() -> i64 {
+pub fn now_ns() -> i64 {
     let now = SystemTime::now().duration_since(UNIX_EPOCH);
     now.map_or(0, |now| now.as_nanos() as i64)
 }

@@ -16,6 +16,9 @@ const TOKEN_BYTES: usize = 16;
 /// The shortest token that is taken from a file.
 const MIN_TOKEN: usize = 16;
 
+/// Where the pages of viewers come from: Foxglove's site, and the files of an application, which no site can name as its origin.
+const VIEWERS: [&str; 2] = ["https://app.foxglove.dev", "file://"];
+
 /// A secret that a reader has to know.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Token(String);
@@ -26,6 +29,8 @@ pub struct Access {
     token: Option<Token>,
     /// The cookie's name: cookies are shared by all ports of a host.
     cookie: String,
+    /// Whether the pages of viewers, which are served elsewhere, may read.
+    of_viewers: bool,
 }
 
 /// The answer to a request.
@@ -106,13 +111,24 @@ impl Access {
         Self {
             token,
             cookie: format!("gyre_watch_{}", address.port()),
+            of_viewers: false,
+        }
+    }
+
+    /// The same for viewers: their page is another site's. With the token any may read; without it Foxglove's own site, an application
+    /// and a page of this machine.
+    pub fn of_viewers(self) -> Self {
+        Self {
+            of_viewers: true,
+            ..self
         }
     }
 
     /// Judges a request.
     pub fn judge(&self, uri: &Uri, headers: &HeaderMap) -> Verdict {
         let host = text(headers, header::HOST).unwrap_or_default();
-        if text(headers, header::ORIGIN).is_some_and(|origin| !is_of(origin, host)) {
+        let origin = text(headers, header::ORIGIN);
+        if origin.is_some_and(|origin| !is_of(origin, host) && !self.is_viewer(origin)) {
             return Verdict::ForeignOrigin;
         }
         let Some(token) = &self.token else {
@@ -141,6 +157,12 @@ impl Access {
         Some(format!(
             "{name}={token}; HttpOnly; SameSite=Lax; Path=/; Max-Age=2592000"
         ))
+    }
+
+    fn is_viewer(&self, origin: &str) -> bool {
+        let host = origin.split_once("://").map(|(_, host)| host);
+        let is_known = VIEWERS.contains(&origin) || host.is_some_and(is_this_machine);
+        self.of_viewers && (self.token.is_some() || is_known)
     }
 
     fn in_cookie<'a>(&self, headers: &'a HeaderMap) -> Option<&'a str> {
@@ -235,6 +257,38 @@ mod tests {
         for foreign in ["http://evil.example", "http://localhost:3000", "null"] {
             assert_eq!(origin(foreign), Verdict::ForeignOrigin, "{foreign}");
         }
+    }
+
+    #[test]
+    fn pages_of_viewers_are_answered_and_with_the_token_those_of_any_site() {
+        let origin = |access: &Access, uri: &str, origin: &str| {
+            let headers = [(header::HOST, "localhost:8765"), (header::ORIGIN, origin)];
+            judged(access, uri, &headers)
+        };
+        let open = access(None).of_viewers();
+        for known in [
+            "https://app.foxglove.dev",
+            "file://",
+            "http://localhost:8080",
+            "http://127.0.0.1",
+        ] {
+            assert_eq!(origin(&open, "/", known), Verdict::Granted, "{known}");
+        }
+        for foreign in [
+            "null",
+            "http://evil.example",
+            "https://app.foxglove.dev.evil.example",
+            "http://localhost.evil.example",
+        ] {
+            let verdict = origin(&open, "/", foreign);
+            assert_eq!(verdict, Verdict::ForeignOrigin, "{foreign}");
+        }
+        let closed = access(Some(SECRET)).of_viewers();
+        let lichtblick = "http://lichtblick.lan";
+        assert_eq!(origin(&closed, "/", lichtblick), Verdict::NoToken);
+        let with_token = format!("/?token={SECRET}");
+        let verdict = origin(&closed, &with_token, lichtblick);
+        assert_eq!(verdict, Verdict::GrantedByAddress);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::{
     collections::VecDeque,
     sync::{
-        Mutex, MutexGuard, PoisonError,
+        Arc, Mutex, MutexGuard, OnceLock, PoisonError,
         atomic::{AtomicUsize, Ordering},
     },
 };
@@ -20,7 +20,8 @@ use crate::{
     metrics::Histograms,
     pictures::Points,
     processes::Process,
-    track::{Cursor, Track},
+    traces,
+    track::{Cursor, Track, Vertex},
 };
 
 /// Poses that are kept to find that of a scan whose points come later.
@@ -35,6 +36,8 @@ pub struct Board {
     wanted: [AtomicUsize; 3],
     /// Delays of all poses.
     pub histograms: Histograms,
+    /// The traces, where they are sent.
+    pub traces: OnceLock<Arc<traces::Counts>>,
 }
 
 /// The newest of each kind of message to a browser.
@@ -85,6 +88,7 @@ impl Board {
             },
             wanted: Default::default(),
             histograms: Histograms::default(),
+            traces: OnceLock::new(),
         };
         board.introduce(|run| out.clone_into(&mut run.out));
         board
@@ -275,6 +279,22 @@ impl Board {
             pose: known.latest,
         };
         serde_json::to_string(&poses).ok().map(Utf8Bytes::from)
+    }
+
+    /// Returns the places of the trajectory: x, y (m), yaw (rad).
+    pub fn places(&self) -> Vec<[f64; 3]> {
+        let known = self.known();
+        let latest = known.latest.map(|latest| latest.vertex);
+        let (vertices, _) = known.track.since(&mut Cursor::default());
+        let vertices = vertices.iter().chain(&latest);
+        vertices
+            .map(|Vertex([x, y, yaw, ..])| [*x, *y, *yaw])
+            .collect()
+    }
+
+    /// Returns the time of the newest pose on the sensor's clock, ns.
+    pub fn newest_stamp_ns(&self) -> Option<i64> {
+        self.known().latest.map(|latest| latest.stamp_ns)
     }
 
     /// Counts one more or one less browser that wants a layer.

@@ -1,4 +1,4 @@
-//! A page that shows a run in a browser, and its metrics for Prometheus.
+//! A page that shows a run in a browser, and its metrics for Prometheus. Where asked for, also its topics for Foxglove and traces.
 //!
 //! The process is an observer: the run does not wait for it, and it counts what it misses. Reading order:
 //!
@@ -6,10 +6,12 @@
 //! 2. `observing`: the threads that follow the run, and write what they see onto the `board`.
 //! 3. `track`, `delays`, `pictures`, `processes`: what is kept of it, in bounded memory.
 //! 4. `stream`: one browser, which receives `messages`; `metrics`: one scrape of Prometheus.
+//! 5. `foxglove`: the topics for Foxglove; `traces`: a trace of each pose for a collector of OpenTelemetry.
 
 mod access;
 mod board;
 mod delays;
+mod foxglove;
 mod frame;
 mod messages;
 mod metrics;
@@ -19,7 +21,9 @@ mod pictures;
 mod processes;
 mod server;
 mod stream;
+mod traces;
 mod track;
 
 pub use access::Token;
-pub use server::{Server, WatchError};
+pub use server::{Endpoint, Server, WatchError};
+pub use traces::{Exporter, TraceError};

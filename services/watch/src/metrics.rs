@@ -48,6 +48,8 @@ struct Snapshot {
     is_up: bool,
     counts: Counts,
     processes: Vec<Process>,
+    /// Traces that were sent and dropped, where they were asked for.
+    traces: Option<[u64; 2]>,
 }
 
 impl Default for Histograms {
@@ -118,6 +120,7 @@ fn open_metrics(board: &Board) -> String {
         is_up: run.state.is_up(),
         counts: board.counts(),
         processes: board.processes(),
+        traces: board.traces.get().map(|counts| counts.both()),
     }));
     let mut text = String::new();
     // Writing to a string does not fail.
@@ -182,7 +185,17 @@ impl Snapshot {
                 counts.dropped,
             ),
         ];
-        for (name, help, count) in counters {
+        let traces = self.traces.into_iter().flat_map(|[sent, dropped]| {
+            [
+                ("traces_sent", "Traces that the collector has taken.", sent),
+                (
+                    "traces_dropped",
+                    "Traces that the collector has not taken.",
+                    dropped,
+                ),
+            ]
+        });
+        for (name, help, count) in counters.into_iter().chain(traces) {
             let counter = ConstCounter::new(count);
             counter.encode(encoder.encode_descriptor(
                 name,

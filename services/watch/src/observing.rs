@@ -20,6 +20,7 @@ use crate::{
     messages::{Layer, RunState},
     pictures,
     processes::ProcessMeter,
+    traces::Exporter,
 };
 
 /// Time between two looks for a run, for browsers that want a layer, and for a request to stop.
@@ -37,16 +38,17 @@ pub struct Followed {
     pub is_complete: fn(&Path) -> bool,
     /// What is seen of it.
     pub board: Arc<Board>,
+    /// Where each pose is sent as a trace.
+    pub traces: Option<Exporter>,
 }
 
 /// Starts the threads. They end when the board is stopped.
 ///
 /// # Errors
 /// The system refuses a thread.
-pub fn start(followed: Followed) -> std::io::Result<Vec<JoinHandle<()>>> {
-    let followed = Arc::new(followed);
+pub fn start(followed: &Arc<Followed>) -> std::io::Result<Vec<JoinHandle<()>>> {
     let start = |name: &str, follow: fn(&Followed)| {
-        let followed = Arc::clone(&followed);
+        let followed = Arc::clone(followed);
         let thread = thread::Builder::new().name(name.to_owned());
         thread.spawn(move || follow(&followed))
     };
@@ -77,7 +79,7 @@ fn follow_run(followed: &Followed, run: &ObservedRun) {
     let board = &followed.board;
     board.begin(run.manifest());
     while !board.is_stopping() && !run.has_ended() {
-        match follow_poses(board, run) {
+        match follow_poses(followed, run) {
             Ok(()) if board.is_stopping() => return,
             Ok(()) => {
                 board.set_state(RunState::Finishing);
@@ -106,7 +108,8 @@ fn await_end(board: &Board, run: &ObservedRun) {
 }
 
 /// Follows the poses to their end. Those of the journal come first.
-fn follow_poses(board: &Board, run: &ObservedRun) -> Result<(), StageError> {
+fn follow_poses(followed: &Followed, run: &ObservedRun) -> Result<(), StageError> {
+    let board = &followed.board;
     let mut poses = run.observe::<Pose>()?;
     board.set_notice(None);
     let journalled = add_journal(board, &run.manifest().out);
@@ -116,6 +119,9 @@ fn follow_poses(board: &Board, run: &ObservedRun) -> Result<(), StageError> {
                 let pose = message.header();
                 let is_new = journalled.is_none_or(|last| pose.item.seq > last);
                 board.add_pose(pose, is_new);
+                if let Some(traces) = &followed.traces {
+                    traces.add(&run.manifest().prefix, pose);
+                }
             }
             Next::Idle => {}
             Next::Ended => break,

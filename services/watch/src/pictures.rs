@@ -1,7 +1,7 @@
 //! Scans, rasters and points, made small for a browser.
 
 use axum::body::Bytes;
-use gyre_geometry::{SparsePoint, Twist};
+use gyre_geometry::SparsePoint;
 use gyre_messages::MaskedHeader;
 use gyre_radar::{PolarScan, Sense};
 use ndarray::ArrayView2;
@@ -156,21 +156,12 @@ pub struct Points(Vec<u8>);
 
 /// Returns the points of a scan, motion-compensated as its raster is.
 pub fn points(points: &[SparsePoint], header: &MaskedHeader) -> Points {
-    let [vx_mps, vy_mps, yaw_rate_radps] = header.twist.map(f64::from);
-    let twist = Twist {
-        vx_mps,
-        vy_mps,
-        yaw_rate_radps,
-    };
     let in_units = |length_m: f64| {
         let units = (length_m / POINT_UNIT_M).round();
         units.clamp(i16::MIN.into(), i16::MAX.into()) as i16
     };
-    let seen = points.iter().filter(|point| point.weight > 0.0);
-    let bytes = seen.flat_map(|point| {
-        let place = point.deskewed(&twist);
-        [place.x, place.y].map(in_units).map(i16::to_le_bytes)
-    });
+    let places = header.deskewed(points);
+    let bytes = places.flat_map(|(place, _)| place.map(in_units).map(i16::to_le_bytes));
     Points(bytes.flatten().collect())
 }
 

@@ -14,7 +14,7 @@ use std::{
 
 use axum::{
     Router,
-    extract::{Request, State, WebSocketUpgrade},
+    extract::{Request, State, WebSocketUpgrade, ws::rejection::WebSocketUpgradeRejection},
     http::{HeaderMap, HeaderValue, StatusCode, header},
     middleware::{self, Next},
     response::{IntoResponse, Redirect, Response},
@@ -22,20 +22,24 @@ use axum::{
 };
 use gyre_stage::{StageError, wake::Signals};
 use thiserror::Error;
-use tokio::{runtime, time};
+use tokio::{runtime, sync::watch, time};
 
 use crate::{
     access::{Access, Token, Verdict},
     board::Board,
+    foxglove::{self, Hub},
     metrics,
     observing::{self, Followed},
     page, stream,
+    traces::Exporter,
 };
 
-/// The most browsers at once.
-const MAX_BROWSERS: usize = 16;
+/// The most browsers at once, and the most viewers.
+const MAX_READERS: usize = 16;
 /// The longest message of a browser, bytes.
 const MAX_RECEIVED: usize = 1024;
+/// The longest request of a viewer, bytes.
+const MAX_REQUESTED: usize = 64 << 10;
 /// Time between two looks whether the server has failed.
 const LOOK: Duration = Duration::from_secs(1);
 /// Time for the connections to end with the program.
@@ -45,7 +49,7 @@ const STOP_TIMEOUT: Duration = Duration::from_secs(2);
 #[derive(Debug, Error)]
 pub enum WatchError {
     /// It cannot listen.
-    #[error("cannot serve at {address}: {source}; choose another --listen")]
+    #[error("cannot serve at {address}: {source}; choose another address")]
     Listen {
         /// The address.
         address: SocketAddr,
@@ -60,24 +64,32 @@ pub enum WatchError {
     Stage(#[from] StageError),
 }
 
-/// A server that listens.
-pub struct Server {
+/// An address that is listened at, and the token that those who connect need.
+pub struct Endpoint {
     listener: TcpListener,
     address: SocketAddr,
     token: Option<Token>,
 }
 
+/// A server.
+pub struct Server {
+    page: Endpoint,
+    foxglove: Option<Endpoint>,
+    traces: Option<Exporter>,
+}
+
 #[derive(Clone)]
 struct Shared {
     board: Arc<Board>,
+    hub: Arc<Hub>,
     access: Arc<Access>,
-    browsers: Arc<AtomicUsize>,
+    readers: Arc<AtomicUsize>,
 }
 
-/// A browser's place. Dropped, it is free again.
+/// A reader's place. Dropped, it is free again.
 struct Place(Arc<AtomicUsize>);
 
-impl Server {
+impl Endpoint {
     /// Listens at an address. Readers need the token, if there is one; without one only this machine is answered.
     ///
     /// # Errors
@@ -103,27 +115,69 @@ impl Server {
         self.token.as_ref()
     }
 
+    /// Serves until the program stops.
+    async fn serve(self, router: Router, mut stop: watch::Receiver<bool>) -> io::Result<()> {
+        self.listener.set_nonblocking(true)?;
+        let listener = tokio::net::TcpListener::from_std(self.listener)?;
+        let stopping = async move {
+            let _ = stop.wait_for(|stop| *stop).await;
+        };
+        axum::serve(listener, router)
+            .with_graceful_shutdown(stopping)
+            .await
+    }
+}
+
+impl Server {
+    /// A server of the page and the metrics.
+    pub fn new(page: Endpoint) -> Self {
+        Self {
+            page,
+            foxglove: None,
+            traces: None,
+        }
+    }
+
+    /// Serves Foxglove too.
+    pub fn with_foxglove(self, foxglove: Option<Endpoint>) -> Self {
+        Self { foxglove, ..self }
+    }
+
+    /// Sends a trace of each pose to a collector too.
+    pub fn with_traces(self, traces: Option<Exporter>) -> Self {
+        Self { traces, ..self }
+    }
+
     /// Shows the runs that write to `out`, one after the other, until a signal arrives. `is_complete` returns whether a run that
     /// has ended there has reached the end of its recording.
     ///
     /// # Errors
     /// The system refuses a thread or the listener.
     pub fn show(
-        self,
+        mut self,
         out: PathBuf,
         is_complete: fn(&Path) -> bool,
         signals: &Signals,
     ) -> Result<(), WatchError> {
         let board = Arc::new(Board::new(&out.display().to_string()));
-        let threads = observing::start(Followed {
+        if let Some(traces) = &self.traces {
+            let _ = board.traces.set(traces.counts());
+        }
+        let hub = Arc::new(Hub::default());
+        let followed = Arc::new(Followed {
             out,
             is_complete,
             board: Arc::clone(&board),
-        })?;
+            traces: self.traces.take(),
+        });
+        let mut threads = observing::start(&followed)?;
+        if self.foxglove.is_some() {
+            threads.extend(foxglove::start(&followed, &hub)?);
+        }
         let serving = Arc::clone(&board);
         let server = thread::Builder::new().name("serve".to_owned());
         let server = server.spawn(move || {
-            let served = self.serve(&serving);
+            let served = self.serve(&serving, hub);
             // Without a server nothing is left to do.
             serving.stop();
             served
@@ -137,28 +191,33 @@ impl Server {
         Ok(server.join().unwrap_or_else(|_| Err(died()))?)
     }
 
-    fn serve(self, board: &Arc<Board>) -> io::Result<()> {
-        let mut stop = board.news.stop.subscribe();
-        let router = router(Shared {
+    fn serve(self, board: &Arc<Board>, hub: Arc<Hub>) -> io::Result<()> {
+        let shared = |access: Access| Shared {
             board: Arc::clone(board),
-            access: Arc::new(Access::new(self.address, self.token)),
-            browsers: Arc::default(),
-        });
+            hub: Arc::clone(&hub),
+            access: Arc::new(access),
+            readers: Arc::default(),
+        };
+        let stop = || board.news.stop.subscribe();
+        let access = Access::new(self.page.address, self.page.token.clone());
+        let page = self.page.serve(router(shared(access)), stop());
+        let foxglove = async {
+            let Some(endpoint) = self.foxglove else {
+                return Ok(());
+            };
+            let access = Access::new(endpoint.address, endpoint.token.clone());
+            let router = foxglove_router(shared(access.of_viewers()));
+            endpoint.serve(router, stop()).await
+        };
         let runtime = runtime::Builder::new_current_thread()
             .enable_all()
             .build()?;
+        let mut stopped = stop();
         runtime.block_on(async {
-            self.listener.set_nonblocking(true)?;
-            let listener = tokio::net::TcpListener::from_std(self.listener)?;
-            let mut stopped = stop.clone();
-            let stopping = async move {
-                let _ = stopped.wait_for(|stop| *stop).await;
-            };
-            let serving = axum::serve(listener, router).with_graceful_shutdown(stopping);
             tokio::select! {
-                served = serving.into_future() => served,
+                served = async { tokio::try_join!(page, foxglove) } => served.map(drop),
                 () = async {
-                    let _ = stop.wait_for(|stop| *stop).await;
+                    let _ = stopped.wait_for(|stop| *stop).await;
                     time::sleep(STOP_TIMEOUT).await;
                 } => Ok(()),
             }
@@ -176,6 +235,55 @@ fn router(shared: Shared) -> Router {
         .route("/metrics", get(scrape))
         .layer(middleware::from_fn_with_state(shared.clone(), guard))
         .with_state(shared)
+}
+
+fn foxglove_router(shared: Shared) -> Router {
+    Router::new()
+        .fallback(view)
+        .layer(middleware::from_fn_with_state(
+            shared.clone(),
+            guard_viewers,
+        ))
+        .with_state(shared)
+}
+
+/// Answers only viewers that may read.
+async fn guard_viewers(State(shared): State<Shared>, request: Request, next: Next) -> Response {
+    match shared.access.judge(request.uri(), request.headers()) {
+        Verdict::Granted | Verdict::GrantedByAddress => next.run(request).await,
+        Verdict::NoToken => page::refusal(
+            StatusCode::UNAUTHORIZED,
+            "This needs the token: open the whole address that `gyre watch` has printed.",
+        ),
+        Verdict::ForeignHost => page::refusal(
+            StatusCode::FORBIDDEN,
+            "This is for this machine alone: open it as ws://localhost, or start `gyre watch` with --foxglove and an address.",
+        ),
+        Verdict::ForeignOrigin => page::refusal(
+            StatusCode::FORBIDDEN,
+            "A page of another site asked for this: start `gyre watch` with --token-file, and give the token in the address.",
+        ),
+    }
+}
+
+async fn view(
+    State(shared): State<Shared>,
+    upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
+) -> Response {
+    let upgrade = upgrade.map(|upgrade| upgrade.protocols(foxglove::PROTOCOLS));
+    let Some(upgrade) = upgrade.ok().filter(|it| it.selected_protocol().is_some()) else {
+        let other = "This is for Foxglove and Lichtblick: open a connection of the kind Foxglove WebSocket to this address.";
+        return page::refusal(StatusCode::BAD_REQUEST, other);
+    };
+    let Some(place) = Place::take(&shared.readers) else {
+        let full = "As many viewers as there is room for are connected: close one.";
+        return page::refusal(StatusCode::SERVICE_UNAVAILABLE, full);
+    };
+    let upgrade = upgrade.max_message_size(MAX_REQUESTED);
+    upgrade.on_upgrade(move |socket| async move {
+        foxglove::serve(socket, shared.hub, shared.board).await;
+        drop(place);
+    })
 }
 
 /// Answers only who may read, whatever the path.
@@ -206,7 +314,7 @@ async fn guard(State(shared): State<Shared>, request: Request, next: Next) -> Re
 }
 
 async fn stream(State(shared): State<Shared>, upgrade: WebSocketUpgrade) -> Response {
-    let Some(place) = Place::take(&shared.browsers) else {
+    let Some(place) = Place::take(&shared.readers) else {
         let full = "As many browsers as there is room for are connected: close one.";
         return page::refusal(StatusCode::SERVICE_UNAVAILABLE, full);
     };
@@ -224,10 +332,10 @@ async fn scrape(State(shared): State<Shared>, headers: HeaderMap) -> Response {
 }
 
 impl Place {
-    fn take(browsers: &Arc<AtomicUsize>) -> Option<Self> {
-        let place = Self(Arc::clone(browsers));
-        let taken = browsers.fetch_add(1, Ordering::Relaxed);
-        (taken < MAX_BROWSERS).then_some(place)
+    fn take(readers: &Arc<AtomicUsize>) -> Option<Self> {
+        let place = Self(Arc::clone(readers));
+        let taken = readers.fetch_add(1, Ordering::Relaxed);
+        (taken < MAX_READERS).then_some(place)
     }
 }
 

@@ -1,7 +1,7 @@
 //! `masked`: masked Cartesian rasters and the scan's sparse points.
 
 use bytemuck::{Pod, Zeroable};
-use gyre_geometry::SparsePoint;
+use gyre_geometry::{SparsePoint, Twist};
 use iceoryx2::prelude::ZeroCopySend;
 use ndarray::{ArrayView2, ArrayViewMut2};
 
@@ -204,6 +204,22 @@ impl MaskedHeader {
         let floats = size_of::<SparsePoint>() / size_of::<f32>();
         let count = (self.points as usize).checked_mul(floats)?;
         Some(bytemuck::cast_slice(values.get(first..)?.get(..count)?))
+    }
+
+    /// Returns where points of this scan lie in its frame (x, y in m), motion-compensated as its raster is, and the weight of each. Those
+    /// without weight are left out.
+    pub fn deskewed<'a>(
+        &self,
+        points: &'a [SparsePoint],
+    ) -> impl Iterator<Item = ([f64; 2], f32)> + use<'a> {
+        let [vx_mps, vy_mps, yaw_rate_radps] = self.twist.map(f64::from);
+        let twist = Twist {
+            vx_mps,
+            vy_mps,
+            yaw_rate_radps,
+        };
+        let seen = points.iter().filter(|point| point.weight > 0.0);
+        seen.map(move |point| (point.deskewed(&twist).into(), point.weight))
     }
 
     /// Returns the rasters to match. The earlier one is the second raster of this payload if the mask took both scans, else the

@@ -15,8 +15,8 @@ use crate::{
     exact_channel,
     image::{Rows, read},
     table::Table,
+    view::image_channel,
     walk::{Span, Step, Walk},
-    writer::image_channel,
 };
 
 /// Chunks that are kept in memory: messages of one scan can be in two.

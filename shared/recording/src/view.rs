@@ -3,9 +3,10 @@
 //! | channel | schema | content |
 //! |---|---|---|
 //! | `/scan`, `/masked` | `RawImage` | the image of the message: [`image`](crate::image) |
+//! | `/points` | `PointCloud` | the points of a masked scan, motion-compensated, in its frame. Not recorded: they are in the wire message |
 //! | `/rotation`, `/motion`, `/refined` | `PoseInFrame` | the motion, in the frame of the scan before |
 //! | `/pose` | `PoseInFrame` | the pose in the frame of the first scan, `odometry` |
-//! | `/trajectory` | `PosesInFrame` | the last poses, once a second of the sensor's time |
+//! | `/trajectory` | `PosesInFrame` | the last poses (in a recording), once a second of the sensor's time |
 //! | `/tf` | `FrameTransform` | `odometry` to `radar` |
 //! | `/correction` | `FrameTransform` | `map` to `odometry`: later than the poses, so on a channel of its own, which is in order |
 //! | `/loop` | `PoseInFrame` | the later keyframe in the frame of the earlier one |
@@ -17,19 +18,20 @@ use std::collections::VecDeque;
 use foxglove::{
     Encode, Schema,
     messages::{
-        FrameTransform, Log, Pose, PoseInFrame, PosesInFrame, Quaternion, RawImage, Timestamp,
-        Vector3, log::Level,
+        FrameTransform, Log, PackedElementField, PointCloud, Pose, PoseInFrame, PosesInFrame,
+        Quaternion, RawImage, Timestamp, Vector3, log::Level, packed_element_field::NumericType,
     },
 };
+use gyre_geometry::SparsePoint;
 use gyre_messages::{
-    Correction, CorrectionHeader, Fix, FixHeader, Item, Loop, LoopHeader, Message, Motion,
-    MotionHeader, PoseHeader, Refined, Rotation, RotationHeader,
+    Correction, CorrectionHeader, Fix, FixHeader, Item, Loop, LoopHeader, Masked, MaskedHeader,
+    Message, Motion, MotionHeader, PoseHeader, Refined, Rotation, RotationHeader, Scan,
 };
 
 use crate::image::{Rows, read};
 
-/// Poses of `/trajectory`: at four scans a second two minutes, in 14 kB.
-const TRAJECTORY: usize = 500;
+/// Poses of a recorded trajectory: at four scans a second two minutes, in 14 kB.
+const RECENT: usize = 500;
 /// Time between two of them, ns.
 const TRAJECTORY_PERIOD_NS: i64 = 1_000_000_000;
 /// The frame of the first scan.
@@ -39,7 +41,11 @@ const RADAR: &str = "radar";
 /// The frame of the scan before, for motions.
 const PREVIOUS: &str = "previous_scan";
 /// The channel of log lines.
-pub(crate) const LOG: &str = "/log";
+pub const LOG: &str = "/log";
+/// The channel of the trajectory.
+pub const TRAJECTORY: &str = "/trajectory";
+/// The channel of points.
+pub const POINTS: &str = "/points";
 
 /// A line of the log of a run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -55,10 +61,49 @@ pub struct LogLine {
 }
 
 /// An encoded message for viewers.
-pub(crate) struct View {
+#[derive(Clone, Debug)]
+pub struct View {
+    /// The channel.
     pub channel: &'static str,
+    /// Returns the schema of the message.
     pub schema: fn() -> Option<Schema>,
+    /// The message in protobuf.
     pub data: Vec<u8>,
+}
+
+/// A channel that viewers know.
+pub struct Channel {
+    /// The topic that it is made of; [`LOG`] is made of no topic.
+    pub topic: Option<&'static str>,
+    /// Its name.
+    pub name: &'static str,
+    /// Returns the schema of its messages.
+    pub schema: fn() -> Option<Schema>,
+}
+
+/// All channels, in the order of the stream.
+pub const CHANNELS: [Channel; 13] = [
+    channel::<RawImage>(Some(Scan::TOPIC), "/scan"),
+    channel::<RawImage>(Some(Masked::TOPIC), "/masked"),
+    channel::<PointCloud>(Some(Masked::TOPIC), POINTS),
+    channel::<PoseInFrame>(Some(Rotation::TOPIC), "/rotation"),
+    channel::<PoseInFrame>(Some(Motion::TOPIC), "/motion"),
+    channel::<PoseInFrame>(Some(Refined::TOPIC), "/refined"),
+    channel::<PoseInFrame>(Some(gyre_messages::Pose::TOPIC), "/pose"),
+    channel::<FrameTransform>(Some(gyre_messages::Pose::TOPIC), "/tf"),
+    channel::<PosesInFrame>(Some(gyre_messages::Pose::TOPIC), TRAJECTORY),
+    channel::<PoseInFrame>(Some(Loop::TOPIC), "/loop"),
+    channel::<FrameTransform>(Some(Correction::TOPIC), "/correction"),
+    channel::<PoseInFrame>(Some(Fix::TOPIC), "/fix"),
+    channel::<Log>(None, LOG),
+];
+
+const fn channel<M: Encode>(topic: Option<&'static str>, name: &'static str) -> Channel {
+    Channel {
+        topic,
+        name,
+        schema: M::get_schema,
+    }
 }
 
 impl View {
@@ -73,8 +118,15 @@ impl View {
         }
     }
 
+    /// Returns the image of a message of a topic that has one; `None` if its payload is shorter than its header says.
+    pub fn image_of(topic: &str, header: &[u8], payload: &[u8], stamp_ns: i64) -> Option<Self> {
+        let rows = Rows::of(topic, header)?;
+        let (image, _) = rows.split(payload)?;
+        Some(Self::image(image_channel(topic)?, &rows, image, stamp_ns))
+    }
+
     /// Returns the image of a message.
-    pub fn image(channel: &'static str, rows: &Rows, image: Vec<u8>, stamp_ns: i64) -> Self {
+    pub(crate) fn image(channel: &'static str, rows: &Rows, image: Vec<u8>, stamp_ns: i64) -> Self {
         let message = RawImage {
             timestamp: Some(timestamp(stamp_ns)),
             frame_id: RADAR.to_owned(),
@@ -87,6 +139,40 @@ impl View {
         Self::of(channel, &message)
     }
 
+    /// Returns the points of a scan, motion-compensated as its raster is. A point without weight is left out.
+    pub fn points(points: &[SparsePoint], header: &MaskedHeader) -> Self {
+        let values = header
+            .deskewed(points)
+            .flat_map(|([x, y], weight)| [x as f32, y as f32, weight]);
+        let data: Vec<u8> = values.flat_map(f32::to_le_bytes).collect();
+        let fields = ["x", "y", "weight"].into_iter().zip([0, 4, 8]);
+        let field = |(name, offset): (&str, u32)| PackedElementField {
+            name: name.to_owned(),
+            offset,
+            r#type: NumericType::Float32.into(),
+        };
+        let message = PointCloud {
+            timestamp: Some(timestamp(header.item.stamp_ns)),
+            frame_id: RADAR.to_owned(),
+            pose: Some(pose([0.0; 3])),
+            point_stride: 12,
+            fields: fields.map(field).collect(),
+            data: data.into(),
+        };
+        Self::of(POINTS, &message)
+    }
+
+    /// Returns a trajectory of places: x, y (m) and yaw (rad).
+    pub fn trajectory(places: impl Iterator<Item = [f64; 3]>, stamp_ns: i64) -> Self {
+        let message = PosesInFrame {
+            timestamp: Some(timestamp(stamp_ns)),
+            frame_id: ODOMETRY.to_owned(),
+            poses: places.map(pose).collect(),
+        };
+        Self::of(TRAJECTORY, &message)
+    }
+
+    /// Returns a line of the log.
     pub fn log(line: &LogLine) -> Self {
         let level = match line.level.as_str() {
             "ERROR" => Level::Error,
@@ -106,60 +192,53 @@ impl View {
     }
 }
 
-/// Makes the views of messages, one after the other.
-#[derive(Default)]
-pub(crate) struct Views {
-    recent: VecDeque<Pose>,
-    /// When the next trajectory is due on the sensor's clock, ns.
-    trajectory_due_ns: Option<i64>,
+/// Returns what viewers draw of a message beside its image, its points and the trajectory.
+pub fn views(topic: &str, header: &[u8]) -> Vec<View> {
+    let views = match topic {
+        Rotation::TOPIC => read(header).map(rotation),
+        Motion::TOPIC => read(header).map(|header| motion("/motion", &header)),
+        Refined::TOPIC => read(header).map(|header| motion("/refined", &header)),
+        gyre_messages::Pose::TOPIC => read(header).map(integrated),
+        Loop::TOPIC => read(header).map(closed),
+        Correction::TOPIC => read(header).map(correction),
+        Fix::TOPIC => read(header).map(fix),
+        _ => None,
+    };
+    views.unwrap_or_default()
 }
 
-impl Views {
-    /// Returns what viewers draw of a message beside its image.
-    pub fn of(&mut self, topic: &str, header: &[u8]) -> Vec<View> {
-        let views = match topic {
-            Rotation::TOPIC => read(header).map(rotation),
-            Motion::TOPIC => read(header).map(|header| motion("/motion", &header)),
-            Refined::TOPIC => read(header).map(|header| motion("/refined", &header)),
-            gyre_messages::Pose::TOPIC => read(header).map(|header| self.pose(&header)),
-            Loop::TOPIC => read(header).map(closed),
-            Correction::TOPIC => read(header).map(correction),
-            Fix::TOPIC => read(header).map(fix),
-            _ => None,
-        };
-        views.unwrap_or_default()
-    }
+/// The last poses.
+#[derive(Default)]
+pub(crate) struct Recent {
+    places: VecDeque<[f64; 3]>,
+    /// When the next trajectory is due on the sensor's clock, ns.
+    due_ns: Option<i64>,
+}
 
-    fn pose(&mut self, header: &PoseHeader) -> Vec<View> {
-        let PoseHeader {
-            item,
-            x_m,
-            y_m,
-            yaw_rad,
-            ..
-        } = header;
-        let mut views = vec![
-            in_frame("/pose", ODOMETRY, item, [*x_m, *y_m, *yaw_rad]),
-            transform("/tf", ODOMETRY, RADAR, item, [*x_m, *y_m, *yaw_rad]),
-        ];
-        if self.recent.len() == TRAJECTORY {
-            self.recent.pop_front();
+impl Recent {
+    /// Adds a message if it is a pose, and returns the trajectory if it is due.
+    pub fn add(&mut self, topic: &str, header: &[u8]) -> Option<View> {
+        let header: PoseHeader = (topic == gyre_messages::Pose::TOPIC).then(|| read(header))??;
+        if self.places.len() == RECENT {
+            self.places.pop_front();
         }
-        self.recent.push_back(pose([*x_m, *y_m, *yaw_rad]));
-        if self
-            .trajectory_due_ns
-            .is_none_or(|due_ns| item.stamp_ns >= due_ns)
-        {
-            self.trajectory_due_ns = Some(item.stamp_ns.saturating_add(TRAJECTORY_PERIOD_NS));
-            let trajectory = PosesInFrame {
-                timestamp: Some(timestamp(item.stamp_ns)),
-                frame_id: ODOMETRY.to_owned(),
-                poses: self.recent.iter().copied().collect(),
-            };
-            views.push(View::of("/trajectory", &trajectory));
+        self.places
+            .push_back([header.x_m, header.y_m, header.yaw_rad]);
+        let stamp_ns = header.item.stamp_ns;
+        if self.due_ns.is_some_and(|due_ns| stamp_ns < due_ns) {
+            return None;
         }
-        views
+        self.due_ns = Some(stamp_ns.saturating_add(TRAJECTORY_PERIOD_NS));
+        Some(View::trajectory(self.places.iter().copied(), stamp_ns))
     }
+}
+
+fn integrated(header: PoseHeader) -> Vec<View> {
+    let (item, place) = (&header.item, [header.x_m, header.y_m, header.yaw_rad]);
+    vec![
+        in_frame("/pose", ODOMETRY, item, place),
+        transform("/tf", ODOMETRY, RADAR, item, place),
+    ]
 }
 
 fn rotation(header: RotationHeader) -> Vec<View> {
@@ -245,4 +324,13 @@ fn timestamp(ns: i64) -> Timestamp {
     let ns = ns.max(0);
     let seconds = u32::try_from(ns / 1_000_000_000).unwrap_or(u32::MAX);
     Timestamp::new(seconds, (ns % 1_000_000_000) as u32)
+}
+
+/// The channel of a topic's image.
+pub(crate) fn image_channel(topic: &str) -> Option<&'static str> {
+    match topic {
+        Scan::TOPIC => Some("/scan"),
+        Masked::TOPIC => Some("/masked"),
+        _ => None,
+    }
 }

@@ -11,14 +11,14 @@ use std::{
 
 use bytemuck::pod_read_unaligned;
 use foxglove::Schema;
-use gyre_messages::{Item, Masked, Message, Scan, topic};
+use gyre_messages::{Item, topic};
 use mcap::{Compression, McapError, WriteOptions, Writer, records::MessageHeader};
 
 use crate::{
     ENCODING, Entry, Head, LogLine, RecordingError, exact_channel,
     image::Rows,
     table::Table,
-    view::{View, Views},
+    view::{Recent, View, image_channel, views},
 };
 
 /// The longest time for which a message stays in memory. At four scans a second the history of the topics covers twice as much, so that
@@ -54,7 +54,7 @@ pub struct RecordingWriter {
     /// Length of the file up to the last complete table.
     complete_bytes: u64,
     channels: BTreeMap<String, u16>,
-    views: Views,
+    recent: Recent,
     table: Table,
     /// Bytes of the messages since the last table, and when the first of them came.
     pending: (usize, Option<Instant>),
@@ -116,7 +116,7 @@ impl RecordingWriter {
             file: own,
             complete_bytes: 0,
             channels: BTreeMap::new(),
-            views: Views::default(),
+            recent: Recent::default(),
             table: Table::default(),
             pending: (0, None),
             newest_ns: None,
@@ -178,8 +178,9 @@ impl RecordingWriter {
         if let Some(channel) = self.channels.get(&exact_channel(topic)).copied() {
             self.write(channel, &exact, times)?;
         }
-        for view in self.views.of(topic, &message.header) {
-            self.view(&view, times)?;
+        let trajectory = self.recent.add(topic, &message.header);
+        for view in views(topic, &message.header).iter().chain(&trajectory) {
+            self.view(view, times)?;
         }
         let entry = Entry {
             seq: item.seq,
@@ -325,14 +326,5 @@ impl RecordingWriter {
             let _ = self.file.set_len(self.complete_bytes);
             RecordingError::of(&self.path, source)
         })
-    }
-}
-
-/// The channel of a topic's image.
-pub(crate) fn image_channel(topic: &str) -> Option<&'static str> {
-    match topic {
-        Scan::TOPIC => Some("/scan"),
-        Masked::TOPIC => Some("/masked"),
-        _ => None,
     }
 }

@@ -1,0 +1,78 @@
+//! The channels that viewers can subscribe to.
+
+use base64::{Engine, prelude::BASE64_STANDARD};
+use gyre_messages::{Message, Pose, Refined, topics};
+use gyre_recording::view::{CHANNELS, POINTS, TRAJECTORY};
+use gyre_stage::Manifest;
+use serde_json::{Value, json};
+
+use super::measurements::{HEALTH, LATENCY, health_schema, latency_schema};
+
+/// A channel. Its number is its place in [`all`].
+pub struct Channel {
+    /// The name that viewers show.
+    pub name: &'static str,
+    /// The topic of the run that it is made of; `None`: it is made of what every run has.
+    pub topic: Option<&'static str>,
+    /// Whether a viewer that is slow is sent the newest message only.
+    pub is_bulky: bool,
+    /// Its entry in the message `advertise`.
+    pub advertised: Value,
+}
+
+impl Channel {
+    /// Returns whether a run has what it is made of.
+    pub fn is_of(&self, manifest: &Manifest) -> bool {
+        self.topic.is_none_or(|name| {
+            let has = topics(&manifest.window).any(|topic| topic.name == name);
+            has && (manifest.refines || name != Refined::TOPIC)
+        })
+    }
+
+    /// A channel of JSON.
+    fn measured(name: &'static str, topic: Option<&'static str>, schema: &Value) -> Self {
+        let advertised = json!({
+            "topic": name,
+            "encoding": "json",
+            "schemaName": format!("gyre{}", name.replace('/', ".")),
+            "schemaEncoding": "jsonschema",
+            "schema": schema.to_string(),
+        });
+        Self {
+            name,
+            topic,
+            is_bulky: false,
+            advertised,
+        }
+    }
+}
+
+/// Returns all channels that a run can have.
+pub fn all() -> Vec<Channel> {
+    let drawn = CHANNELS.iter().filter_map(|channel| {
+        let schema = (channel.schema)()?;
+        let name = channel.name;
+        let advertised = json!({
+            "topic": name,
+            "encoding": "protobuf",
+            "schemaName": schema.name,
+            "schemaEncoding": schema.encoding,
+            "schema": BASE64_STANDARD.encode(&schema.data),
+        });
+        Some(Channel {
+            name,
+            topic: channel.topic,
+            is_bulky: matches!(name, "/scan" | "/masked") || [POINTS, TRAJECTORY].contains(&name),
+            advertised,
+        })
+    });
+    let measured = [
+        Channel::measured(LATENCY, Some(Pose::TOPIC), &latency_schema()),
+        Channel::measured(HEALTH, None, &health_schema()),
+    ];
+    let mut channels: Vec<_> = drawn.chain(measured).collect();
+    for (id, channel) in channels.iter_mut().enumerate() {
+        channel.advertised["id"] = id.into();
+    }
+    channels
+}

@@ -1,0 +1,147 @@
+//! Between the threads that observe the run and the viewers.
+
+use std::sync::{
+    Arc, Mutex, MutexGuard, PoisonError,
+    atomic::{AtomicUsize, Ordering},
+};
+
+use tokio::sync::watch;
+
+use super::{
+    channels::{self, Channel},
+    outbox::{Encoded, Outbox},
+};
+
+/// The channels, and the viewers that have subscribed to them.
+pub struct Hub {
+    /// All channels that a run can have.
+    pub channels: Vec<Channel>,
+    /// The numbers of those that this run has.
+    pub of_run: watch::Sender<Vec<usize>>,
+    /// The newest sentence about what is not shown.
+    pub notice: watch::Sender<String>,
+    /// The number of subscriptions to each channel.
+    wanted: Vec<AtomicUsize>,
+    viewers: Mutex<Vec<Arc<Outbox>>>,
+}
+
+/// The place of a viewer in the hub. Dropped, it is gone, and its subscriptions with it.
+pub struct Seat {
+    hub: Arc<Hub>,
+    /// What waits for it.
+    pub outbox: Arc<Outbox>,
+}
+
+impl Default for Hub {
+    fn default() -> Self {
+        let channels = channels::all();
+        Self {
+            wanted: channels.iter().map(|_| AtomicUsize::new(0)).collect(),
+            channels,
+            of_run: watch::Sender::default(),
+            notice: watch::Sender::default(),
+            viewers: Mutex::default(),
+        }
+    }
+}
+
+impl Hub {
+    fn viewers(&self) -> MutexGuard<'_, Vec<Arc<Outbox>>> {
+        self.viewers.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn position(&self, name: &str) -> Option<usize> {
+        self.channels.iter().position(|it| it.name == name)
+    }
+
+    /// Returns whether a viewer has subscribed to a channel.
+    pub fn is_wanted(&self, name: &str) -> bool {
+        let has = |channel: usize| self.wanted[channel].load(Ordering::Relaxed) > 0;
+        self.position(name).is_some_and(has)
+    }
+
+    /// Returns whether a viewer has subscribed to a channel that is made of a topic.
+    pub fn wants_topic(&self, topic: &str) -> bool {
+        let mut of_topic = self.channels.iter().filter(|it| it.topic == Some(topic));
+        of_topic.any(|channel| self.is_wanted(channel.name))
+    }
+
+    /// Gives a message to the viewers that have subscribed to its channel.
+    pub fn publish(&self, name: &str, stamp_ns: i64, data: Vec<u8>) {
+        let Some(channel) = self.position(name) else {
+            return;
+        };
+        let message = Encoded {
+            channel,
+            is_bulky: self.channels[channel].is_bulky,
+            stamp_ns,
+            data: data.into(),
+        };
+        self.viewers().iter().for_each(|it| it.put(&message));
+    }
+
+    /// Admits a viewer.
+    pub fn join(self: &Arc<Self>) -> Seat {
+        let outbox = Arc::new(Outbox::default());
+        self.viewers().push(Arc::clone(&outbox));
+        Seat {
+            hub: Arc::clone(self),
+            outbox,
+        }
+    }
+}
+
+impl Seat {
+    /// Subscribes to a channel; false if there is none with this number.
+    pub fn subscribe(&self, channel: usize, subscription: u32) -> bool {
+        let Some(wanted) = self.hub.wanted.get(channel) else {
+            return false;
+        };
+        if self.outbox.subscribe(channel, subscription) {
+            wanted.fetch_add(1, Ordering::Relaxed);
+        }
+        true
+    }
+
+    /// Ends a subscription; one that there is not has ended already.
+    pub fn unsubscribe(&self, subscription: u32) {
+        if let Some(channel) = self.outbox.unsubscribe(subscription) {
+            self.hub.wanted[channel].fetch_sub(1, Ordering::Relaxed);
+        }
+    }
+}
+
+impl Drop for Seat {
+    fn drop(&mut self) {
+        for channel in self.outbox.subscribed() {
+            self.hub.wanted[channel].fetch_sub(1, Ordering::Relaxed);
+        }
+        let is_other = |other: &Arc<Outbox>| !Arc::ptr_eq(other, &self.outbox);
+        self.hub.viewers().retain(is_other);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_topic_is_wanted_as_long_as_a_viewer_has_subscribed_to_one_of_its_channels() {
+        let hub = Arc::new(Hub::default());
+        let id = |name| hub.position(name).unwrap_or(usize::MAX);
+        let (first, second) = (hub.join(), hub.join());
+        assert!(first.subscribe(id("/tf"), 1) && second.subscribe(id("/points"), 1));
+        assert!(
+            first.subscribe(id("/tf"), 2),
+            "another number, no other channel"
+        );
+        assert!(!first.subscribe(hub.channels.len(), 3));
+        let wanted = || ["pose", "masked", "scan"].map(|topic| hub.wants_topic(topic));
+        assert_eq!(wanted(), [true, true, false]);
+        first.unsubscribe(2);
+        assert_eq!(wanted(), [false, true, false]);
+        drop(second);
+        assert_eq!(wanted(), [false; 3]);
+        assert_eq!(hub.viewers().len(), 1);
+    }
+}

@@ -1,0 +1,99 @@
+//! What Foxglove has no schema for, as JSON with a schema of its own: numbers to plot.
+
+use std::collections::BTreeMap;
+
+use gyre_messages::{Item, StageId};
+use serde::Serialize;
+use serde_json::{Value, json};
+
+/// The channel of the delays of each pose.
+pub const LATENCY: &str = "/latency";
+/// The channel of what the page shows once a second.
+pub const HEALTH: &str = "/health";
+
+/// The delays of a pose, ms.
+#[derive(Debug, Serialize)]
+struct Latency {
+    seq: u64,
+    scan: u64,
+    /// Scans that live mode has dropped so far.
+    dropped: u64,
+    sensor_to_pose_ms: f64,
+    /// By the stage's name, with `_` for `-`: paths of plots have no hyphens.
+    stages: BTreeMap<String, Hop>,
+}
+
+#[derive(Debug, Serialize)]
+struct Hop {
+    transport_ms: f64,
+    wait_ms: f64,
+    work_ms: f64,
+}
+
+/// Returns the delays of a pose in JSON.
+pub fn latency(item: &Item) -> Vec<u8> {
+    let ms = |duration_ns: i64| duration_ns as f64 * 1e-6;
+    let hops = item.hop_times().map(|times| {
+        let hop = Hop {
+            transport_ms: ms(times.transport_ns.unwrap_or(0)),
+            wait_ms: ms(times.wait_ns),
+            work_ms: ms(times.work_ns),
+        };
+        (key(times.stage), hop)
+    });
+    let latency = Latency {
+        seq: item.seq,
+        scan: item.scan,
+        dropped: item.dropped(),
+        sensor_to_pose_ms: ms(item.sensor_to_pose_ns()),
+        stages: hops.collect(),
+    };
+    // Numbers and names always are JSON.
+    serde_json::to_vec(&latency).unwrap_or_default()
+}
+
+fn key(stage: StageId) -> String {
+    stage.name().replace('-', "_")
+}
+
+/// The schema of [`latency`].
+pub fn latency_schema() -> Value {
+    let hop = object(numbers(["transport_ms", "wait_ms", "work_ms"]));
+    let stages = StageId::ALL.map(|stage| (key(stage), hop.clone()));
+    let own = numbers(["seq", "scan", "dropped", "sensor_to_pose_ms"]);
+    object(own.chain([("stages".to_owned(), object(stages))]))
+}
+
+/// The schema of the report that the page shows.
+pub fn health_schema() -> Value {
+    let counts = ["published", "poses", "dropped", "in_flight"];
+    let missed = object(numbers(["pose", "scan", "masked"]));
+    let process = [
+        ("name".to_owned(), json!({"type": "string"})),
+        ("state".to_owned(), json!({"type": "string"})),
+    ];
+    let process = process.into_iter().chain(numbers([
+        "pid",
+        "restarts",
+        "processor_share",
+        "cpu_s",
+        "own_bytes",
+    ]));
+    let processes = json!({"type": "array", "items": object(process)});
+    let own = numbers(counts).chain(numbers(["scans_per_s", "distance_m"]));
+    object(own.chain([
+        ("missed".to_owned(), missed),
+        ("processes".to_owned(), processes),
+    ]))
+}
+
+fn numbers<const N: usize>(names: [&str; N]) -> impl Iterator<Item = (String, Value)> + use<N> {
+    names
+        .map(|name| (name.to_owned(), json!({"type": "number"})))
+        .into_iter()
+}
+
+fn object(properties: impl IntoIterator<Item = (String, Value)>) -> Value {
+    let properties: serde_json::Map<_, _> = properties.into_iter().collect();
+    json!({"type": "object", "properties": properties})
+}

@@ -1,0 +1,232 @@
+//! One viewer: what it asks for, and what it is sent.
+
+use std::{sync::Arc, time::Duration};
+
+use axum::extract::ws::{Message, WebSocket};
+use gyre_stage::clock;
+use serde::Deserialize;
+use serde_json::{Value, json};
+use tokio::time::{self, Instant};
+
+use super::{Hub, hub::Seat, outbox::Encoded};
+use crate::board::Board;
+
+/// The names of the protocol, the present one first.
+pub const PROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
+/// The longest time that a viewer may take for one message.
+const MAX_SEND: Duration = Duration::from_secs(10);
+/// The shortest time between two sentences about skipped messages.
+const SENTENCE_PERIOD: Duration = Duration::from_secs(2);
+/// The first byte of a message of a channel, and of one that sets the viewer's clock.
+const MESSAGE_DATA: u8 = 1;
+const TIME: u8 = 2;
+/// Levels of a status.
+const WARNING: u8 = 1;
+const ERROR: u8 = 2;
+
+/// What a viewer asks for. All else that the protocol knows is not offered, and ignored.
+#[derive(Deserialize)]
+#[serde(tag = "op", rename_all = "camelCase")]
+enum Request {
+    Subscribe {
+        subscriptions: Vec<Subscription>,
+    },
+    #[serde(rename_all = "camelCase")]
+    Unsubscribe {
+        subscription_ids: Vec<u32>,
+    },
+    #[serde(other)]
+    Other,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Subscription {
+    id: u32,
+    channel_id: usize,
+}
+
+/// A connection.
+struct Viewer {
+    socket: WebSocket,
+    hub: Arc<Hub>,
+    seat: Seat,
+    /// The channels that it has been told of.
+    advertised: Vec<usize>,
+    /// Its clock: the newest time of the sensor that it has been sent, ns.
+    time_ns: i64,
+    skipped: u64,
+    said: Option<Instant>,
+}
+
+/// The viewer has left, or takes too long.
+struct Gone;
+
+/// Serves a viewer until it leaves, is too slow, or the program ends.
+pub async fn serve(socket: WebSocket, hub: Arc<Hub>, board: Arc<Board>) {
+    let seat = hub.join();
+    let mut viewer = Viewer {
+        socket,
+        hub,
+        seat,
+        advertised: Vec::new(),
+        time_ns: 0,
+        skipped: 0,
+        said: None,
+    };
+    // It is told nothing more: it is gone.
+    let _ = viewer.serve(&board).await;
+}
+
+impl Viewer {
+    async fn serve(&mut self, board: &Board) -> Result<(), Gone> {
+        let mut stop = board.news.stop.subscribe();
+        let (mut of_run, mut notice) = (self.hub.of_run.subscribe(), self.hub.notice.subscribe());
+        of_run.mark_changed();
+        let mut run = board.run().id;
+        self.send_json(&introduction()).await?;
+        let outbox = Arc::clone(&self.seat.outbox);
+        loop {
+            tokio::select! {
+                biased;
+                Ok(()) = stop.changed() => return self.send(Message::Close(None)).await,
+                received = self.socket.recv() => match received {
+                    Some(Ok(Message::Text(text))) => self.answer(&text).await?,
+                    Some(Ok(Message::Close(_)) | Err(_)) | None => return Err(Gone),
+                    Some(Ok(_)) => {}
+                },
+                Ok(()) = of_run.changed() => {
+                    let channels = of_run.borrow_and_update().clone();
+                    self.advertise(channels).await?;
+                }
+                Ok(()) = notice.changed() => {
+                    let sentence = notice.borrow_and_update().clone();
+                    self.say(WARNING, "run", &sentence).await?;
+                }
+                (subscription, message) = outbox.next() => {
+                    let current = board.run().id;
+                    if current != run {
+                        // Another run: its sensor's time may be earlier.
+                        (run, self.time_ns) = (current, 0);
+                    }
+                    self.show(subscription, &message).await?;
+                }
+            }
+        }
+    }
+
+    async fn answer(&mut self, text: &str) -> Result<(), Gone> {
+        match serde_json::from_str(text) {
+            Ok(Request::Subscribe { subscriptions }) => {
+                for Subscription { id, channel_id } in subscriptions {
+                    if !self.seat.subscribe(channel_id, id) {
+                        let sentence = format!("There is no channel {channel_id}.");
+                        self.say(ERROR, "request", &sentence).await?;
+                    }
+                }
+                Ok(())
+            }
+            Ok(Request::Unsubscribe { subscription_ids }) => {
+                let ids = subscription_ids.into_iter();
+                ids.for_each(|id| self.seat.unsubscribe(id));
+                Ok(())
+            }
+            Ok(Request::Other) => Ok(()),
+            Err(error) => {
+                let sentence = format!("This is no request of the protocol: {error}.");
+                self.say(ERROR, "request", &sentence).await
+            }
+        }
+    }
+
+    /// Tells of channels that the run has and the one before had not, and takes back those that it has not.
+    async fn advertise(&mut self, of_run: Vec<usize>) -> Result<(), Gone> {
+        let is_in = |channels: &[usize], channel: &usize| channels.contains(channel);
+        let gone = self.advertised.iter().filter(|it| !is_in(&of_run, it));
+        let gone: Vec<usize> = gone.copied().collect();
+        let new = of_run.iter().filter(|it| !is_in(&self.advertised, it));
+        let new: Vec<Value> = new
+            .map(|channel| self.hub.channels[*channel].advertised.clone())
+            .collect();
+        self.advertised = of_run;
+        if !gone.is_empty() {
+            self.send_json(&json!({"op": "unadvertise", "channelIds": gone}))
+                .await?;
+        }
+        match new.is_empty() {
+            true => Ok(()),
+            false => {
+                self.send_json(&json!({"op": "advertise", "channels": new}))
+                    .await
+            }
+        }
+    }
+
+    /// Sends a message of a channel, and before it the time.
+    async fn show(&mut self, subscription: u32, message: &Encoded) -> Result<(), Gone> {
+        let log_ns = message.stamp_ns.max(0) as u64;
+        if message.stamp_ns > self.time_ns {
+            self.time_ns = message.stamp_ns;
+            let mut time = vec![TIME];
+            time.extend(log_ns.to_le_bytes());
+            self.send(Message::Binary(time.into())).await?;
+        }
+        let mut data = Vec::with_capacity(13 + message.data.len());
+        data.push(MESSAGE_DATA);
+        data.extend(subscription.to_le_bytes());
+        data.extend(log_ns.to_le_bytes());
+        data.extend(&message.data);
+        self.send(Message::Binary(data.into())).await?;
+        self.say_what_is_skipped().await
+    }
+
+    async fn say_what_is_skipped(&mut self) -> Result<(), Gone> {
+        if self
+            .said
+            .is_some_and(|said| said.elapsed() < SENTENCE_PERIOD)
+        {
+            return Ok(());
+        }
+        let skipped = self.seat.outbox.skipped();
+        if skipped == 0 {
+            return Ok(());
+        }
+        self.skipped += skipped;
+        self.said = Some(Instant::now());
+        let sentence = format!(
+            "{} messages were skipped so far: this connection is slower than the run.",
+            self.skipped
+        );
+        self.say(WARNING, "skipped", &sentence).await
+    }
+
+    /// Says a sentence, which replaces the one before with the same name.
+    async fn say(&mut self, level: u8, name: &str, sentence: &str) -> Result<(), Gone> {
+        let status = json!({"op": "status", "level": level, "id": name, "message": sentence});
+        self.send_json(&status).await
+    }
+
+    async fn send_json(&mut self, message: &Value) -> Result<(), Gone> {
+        self.send(Message::Text(message.to_string().into())).await
+    }
+
+    async fn send(&mut self, message: Message) -> Result<(), Gone> {
+        let sent = time::timeout(MAX_SEND, self.socket.send(message)).await;
+        match sent {
+            Ok(Ok(())) => Ok(()),
+            _ => Err(Gone),
+        }
+    }
+}
+
+fn introduction() -> Value {
+    json!({
+        "op": "serverInfo",
+        "name": concat!("gyre ", env!("CARGO_PKG_VERSION")),
+        // The viewer's clock is the sensor's.
+        "capabilities": ["time"],
+        "metadata": {},
+        // Another one after a restart of this program: the viewer forgets the subscriptions of the last one.
+        "sessionId": format!("{}-{}", std::process::id(), clock::now_ns()),
+    })
+}

@@ -1,0 +1,315 @@
+//! `gyre watch --foxglove`: what a viewer that is not Gyre's own receives, who may connect, and one that never reads.
+
+use std::{
+    collections::BTreeMap,
+    io::{BufRead, BufReader, Write},
+    net::TcpStream,
+    process::Command,
+};
+
+use rustix::process::Signal;
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+
+use crate::common::{Ended, Run, Running, Server, odometry, python, recording};
+
+/// Bytes before the powers in each row of an image: the azimuth, its time and its flag.
+const ROW_HEADER: usize = 11;
+
+/// Subscribes to all channels by the Python package `websockets`, decodes what comes by the schemas that are sent, and prints it once it has
+/// so many poses and a message of each channel that a run has.
+const VIEW: &str = "
+import base64, hashlib, json, struct, sys
+from mcap.records import Schema
+from mcap_protobuf.decoder import DecoderFactory
+from websockets.sync.client import connect
+place = lambda pose: [pose.position.x, pose.position.y]
+read = {
+    '/pose': lambda m: place(m.pose), '/refined': lambda m: place(m.pose),
+    '/tf': lambda m: [m.parent_frame_id, m.child_frame_id], '/trajectory': lambda m: [place(pose) for pose in m.poses],
+    '/scan': lambda m: [m.encoding, m.width, m.height, hashlib.sha256(m.data).hexdigest()],
+    '/masked': lambda m: [m.encoding, m.width, m.height, len(m.data)],
+    '/points': lambda m: [m.point_stride, len(m.data), [field.name for field in m.fields]],
+}
+url, poses = sys.argv[1], int(sys.argv[2])
+with connect(url, subprotocols=['foxglove.sdk.v1'], max_size=None) as socket:
+    info, advertised = json.loads(socket.recv()), json.loads(socket.recv())
+    assert (info['op'], info['capabilities'], advertised['op']) == ('serverInfo', ['time'], 'advertise'), info
+    channels = {channel['id']: channel for channel in advertised['channels']}
+    decoders = {}
+    for id, channel in channels.items():
+        if channel['encoding'] == 'protobuf':
+            schema = Schema(id=id + 1, name=channel['schemaName'], encoding='protobuf', data=base64.b64decode(channel['schema']))
+            decoders[id] = DecoderFactory().decoder_for('protobuf', schema)
+        else:
+            assert json.loads(channel['schema'])['type'] == 'object'
+            decoders[id] = json.loads
+    # Other numbers than the channels': they are told apart.
+    subscriptions = [{'id': id + 100, 'channelId': id} for id in channels]
+    socket.send(json.dumps({'op': 'subscribe', 'subscriptions': subscriptions}))
+    received = {channel['topic']: {} for channel in channels.values()}
+    quiet = {'/log'}
+    time = 0
+    while len(received['/pose']) < poses or any(not received[topic] for topic in received.keys() - quiet):
+        message = socket.recv()
+        if isinstance(message, str):
+            continue
+        if message[0] == 2:
+            assert struct.unpack('<Q', message[1:])[0] > time
+            time, = struct.unpack('<Q', message[1:])
+            continue
+        kind, subscription, stamp = struct.unpack('<BIQ', message[:13])
+        assert kind == 1 and stamp <= time, (kind, stamp, time)
+        channel = channels[subscription - 100]
+        decoded = decoders[channel['id']](message[13:])
+        received[channel['topic']][stamp] = read.get(channel['topic'], lambda m: m if isinstance(m, dict) else None)(decoded)
+print(json.dumps(received))
+";
+
+/// Returns whether the viewer can be started; prints why a test is skipped.
+fn can_view() -> bool {
+    let import = Command::new(python())
+        .args(["-c", "import mcap_protobuf, websockets"])
+        .output();
+    let can = import.is_ok_and(|output| output.status.success());
+    if !can {
+        println!(
+            "skipped: {} has no packages mcap-protobuf-support and websockets, or GYRE_PYTHON names another",
+            python()
+        );
+    }
+    can
+}
+
+/// A drive of half a minute.
+fn driving() -> Run {
+    let data = recording::around_a_block().to_str().unwrap();
+    Run::small().argument("--data", data).rate("1")
+}
+
+fn started(run: &Run) -> (Running, Server) {
+    let mut running = run.start();
+    running.await_poses(1);
+    let options = ["--foxglove", "127.0.0.1:0"];
+    (running, Server::start(run, "127.0.0.1", &options))
+}
+
+/// The results of a run by the time of the scan, ns: two columns of numbers.
+fn places(csv: &str, columns: [&str; 3]) -> BTreeMap<String, [f64; 2]> {
+    let rows = odometry::columns(csv, &columns).into_iter();
+    rows.map(|row| {
+        let [x, y] = [&row[1], &row[2]].map(|field| field.parse().unwrap());
+        (row[0].clone(), [x, y])
+    })
+    .collect()
+}
+
+#[test]
+fn a_viewer_receives_the_scans_of_the_recording_and_the_motions_of_the_results() {
+    if !can_view() {
+        return;
+    }
+    let run = driving();
+    let (running, server) = started(&run);
+    let mut viewer = Command::new(python());
+    viewer.args(["-c", VIEW, &server.foxglove(), "8"]);
+    let ended = Ended::of(viewer);
+    ended.succeeded();
+    running.signal(Signal::TERM);
+    assert_eq!(running.finish().code(), Some(130));
+    server.interrupt();
+
+    let received: Value = serde_json::from_str(&ended.stdout).unwrap();
+    let of = |topic: &str| received[topic].as_object().unwrap();
+    let motions = places(&run.odometry(), ["stamp_ns", "x_m", "y_m"]);
+    let refined = of("/refined");
+    assert!(refined.len() > 4);
+    for (stamp_ns, place) in refined
+        .iter()
+        .filter(|(stamp, _)| motions.contains_key(*stamp))
+    {
+        let written = motions[stamp_ns];
+        for (axis, written) in written.iter().enumerate() {
+            let seen = place[axis].as_f64().unwrap();
+            assert!(
+                (seen - written).abs() < 1e-8,
+                "{stamp_ns}: {seen} {written}"
+            );
+        }
+    }
+    let trajectory = run.result("trajectory.tum");
+    for (stamp_ns, place) in of("/pose") {
+        let (s, ns) = stamp_ns.split_at(stamp_ns.len() - 9);
+        let line = trajectory
+            .lines()
+            .find(|line| line.starts_with(&format!("{s}.{ns} ")));
+        let mut written = line
+            .unwrap()
+            .split(' ')
+            .skip(1)
+            .map(|it| it.parse::<f64>().unwrap());
+        for axis in 0..2 {
+            let (seen, written) = (place[axis].as_f64().unwrap(), written.next().unwrap());
+            assert!(
+                (seen - written).abs() < 1e-5,
+                "{stamp_ns}: {seen} {written}"
+            );
+        }
+    }
+    let images = recording::images(recording::around_a_block());
+    let images: Vec<_> = images.iter().map(|path| powers(path)).collect();
+    for scan in of("/scan").values() {
+        assert!(images.contains(scan), "{scan} is no image of the recording");
+    }
+    let masked = of("/masked").values().next().unwrap();
+    assert_eq!(
+        masked[3],
+        4 * masked[1].as_u64().unwrap() * masked[2].as_u64().unwrap()
+    );
+    let points = of("/points").values().next().unwrap();
+    assert_eq!(
+        (&points[0], &points[2]),
+        (&12.into(), &serde_json::json!(["x", "y", "weight"]))
+    );
+    assert!(
+        points[1]
+            .as_u64()
+            .is_some_and(|bytes| bytes > 0 && bytes % 12 == 0)
+    );
+    let latency = of("/latency").values().next().unwrap();
+    assert!(
+        latency["stages"]["pose_integration"]["work_ms"]
+            .as_f64()
+            .unwrap()
+            > 0.0
+    );
+    assert!(
+        of("/health").values().next().unwrap()["poses"]
+            .as_u64()
+            .unwrap()
+            > 0
+    );
+    assert_eq!(of("/tf").values().next().unwrap()[0], "odometry");
+}
+
+/// The powers of an image of a recording, as the viewer describes them.
+fn powers(path: &std::path::Path) -> Value {
+    let file = BufReader::new(std::fs::File::open(path).unwrap());
+    let mut reader = png::Decoder::new(file).read_info().unwrap();
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut bytes).unwrap();
+    let rows = bytes.chunks(info.line_size);
+    let powers: Vec<u8> = rows.flat_map(|row| &row[ROW_HEADER..]).copied().collect();
+    let digest = Sha256::digest(&powers);
+    let digest: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
+    serde_json::json!([
+        "mono8",
+        info.width as usize - ROW_HEADER,
+        info.height,
+        digest
+    ])
+}
+
+/// Asks for a connection, and returns it with the first line of the answer.
+fn connect(url: &str, query: &str, headers: &[&str]) -> (TcpStream, String) {
+    let address = url.strip_prefix("ws://").unwrap();
+    let port = address
+        .split('/')
+        .next()
+        .unwrap()
+        .rsplit_once(':')
+        .unwrap()
+        .1;
+    let mut stream = TcpStream::connect(("127.0.0.1", port.parse().unwrap())).unwrap();
+    let headers: String = headers
+        .iter()
+        .map(|header| format!("{header}\r\n"))
+        .collect();
+    let request = format!(
+        "GET /{query} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
+         Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n{headers}\r\n"
+    );
+    stream.write_all(request.as_bytes()).unwrap();
+    let mut answer = String::new();
+    let mut reader = BufReader::new(stream.try_clone().unwrap());
+    reader.read_line(&mut answer).unwrap();
+    (stream, answer.trim().to_owned())
+}
+
+const SDK: &str = "Sec-WebSocket-Protocol: foxglove.sdk.v1";
+
+#[test]
+fn viewers_of_other_sites_and_machines_need_the_token() {
+    let run = driving();
+    let mut running = run.start();
+    running.await_poses(1);
+    let open = Server::start(&run, "127.0.0.1", &["--foxglove", "127.0.0.1:0"]);
+    let status = |url: &str, query: &str, headers: &[&str]| {
+        let (_, answer) = connect(url, query, headers);
+        answer.split(' ').nth(1).unwrap().to_owned()
+    };
+    let url = open.foxglove();
+    for (headers, expected) in [
+        (&[SDK][..], "101"),
+        (
+            &["Sec-WebSocket-Protocol: foxglove.websocket.v1, other"],
+            "101",
+        ),
+        (&[SDK, "Origin: https://app.foxglove.dev"], "101"),
+        (&[SDK, "Origin: http://evil.example"], "403"),
+        (&["Sec-WebSocket-Protocol: other"], "400"),
+        (&[], "400"),
+    ] {
+        assert_eq!(status(&url, "", headers), expected, "{headers:?}");
+    }
+    open.interrupt();
+    let closed = Server::start(&run, "127.0.0.1", &["--foxglove", "0.0.0.0:0"]);
+    assert_eq!(closed.token(), None, "the page stays as it was");
+    let url = closed.foxglove();
+    let (_, query) = url.split_once("/?").unwrap();
+    assert_eq!(status(&url, "", &[SDK]), "401");
+    let lichtblick = [SDK, "Origin: http://lichtblick.example"];
+    assert_eq!(status(&url, &format!("?{query}"), &lichtblick), "101");
+    closed.interrupt();
+    running.signal(Signal::TERM);
+    assert_eq!(running.finish().code(), Some(130));
+}
+
+#[test]
+fn a_viewer_that_never_reads_costs_neither_memory_nor_the_run() {
+    let undisturbed = driving().rate("max").complete();
+    let run = driving().rate("12");
+    let (mut running, server) = started(&run);
+    let (mut stalled, answer) = connect(&server.foxglove(), "", &[SDK]);
+    assert!(answer.contains(" 101 "), "{answer}");
+    let channels: Vec<_> = (0..13)
+        .map(|id| format!("{{\"id\":{id},\"channelId\":{id}}}"))
+        .collect();
+    let request = format!(
+        "{{\"op\":\"subscribe\",\"subscriptions\":[{}]}}",
+        channels.join(",")
+    );
+    stalled.write_all(&frame(&request)).unwrap();
+    running.await_poses(20);
+    let early = resident_bytes(server.pid());
+    running.await_poses(recording::SCANS_AROUND);
+    let late = resident_bytes(server.pid());
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed);
+    // A hundred scans and rasters are more than twice that.
+    assert!(late < early + (16 << 20), "from {early} to {late} bytes");
+    server.interrupt();
+}
+
+/// A frame of text, masked by zeros.
+fn frame(text: &str) -> Vec<u8> {
+    let length = (text.len() as u16).to_be_bytes();
+    [&[0x81, 0xfe][..], &length, &[0; 4], text.as_bytes()].concat()
+}
+
+fn resident_bytes(pid: u32) -> u64 {
+    let status = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
+    let kilobytes = line.unwrap().trim().trim_end_matches(" kB");
+    kilobytes.parse::<u64>().unwrap() << 10
+}
