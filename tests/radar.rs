@@ -2,8 +2,11 @@
 
 use std::{
     io::{BufRead, BufReader},
+    net::UdpSocket,
     path::Path,
-    process::{Child, Stdio},
+    process::{self, Child, Stdio},
+    thread,
+    time::{Duration, Instant},
 };
 
 use crate::common::{Ended, Run, gyre, odometry, recording};
@@ -19,15 +22,18 @@ struct Radar {
 
 impl Radar {
     fn playing(recording: &Path, arguments: &[&str]) -> Self {
+        Self::to(&["--listen", "127.0.0.1:0"], recording, arguments)
+    }
+
+    /// One that sends to a group by UDP, and describes only itself for as long as a run takes to begin.
+    fn sending(group: &str, recording: &Path, arguments: &[&str]) -> Self {
+        Self::to(&["--udp", group, "--wait-s", "4"], recording, arguments)
+    }
+
+    fn to(whom: &[&str], recording: &Path, arguments: &[&str]) -> Self {
         let mut command = gyre();
-        command.args([
-            "radar-server",
-            "--listen",
-            "127.0.0.1:0",
-            "--rate",
-            RATE,
-            "--data",
-        ]);
+        command.arg("radar-server").args(whom);
+        command.args(["--rate", RATE, "--data"]);
         command.arg(recording).args(arguments);
         let mut server = command
             .stderr(Stdio::piped())
@@ -53,6 +59,11 @@ impl Radar {
             })
             .set(&format!("source.scans={scans}"))
             .set("source.silence_s=1")
+    }
+
+    /// As [`Radar::run`] on the loopback's network.
+    fn received(&self, scans: usize) -> Run {
+        self.run(scans).set("source.interface='127.0.0.1'")
     }
 }
 
@@ -80,6 +91,93 @@ fn a_radar_gives_the_motions_of_its_recording() {
         assert_eq!(source["missing_azimuths"], 0);
         assert!(live == recorded, "{clock:?}:\n{live}\n{recorded}");
     }
+}
+
+/// A group that only this test of this process sends to.
+fn group(test: u8) -> String {
+    let port = 20_000 + process::id() % 20_000;
+    format!("239.192.43.{test}:{port}")
+}
+
+/// The rows of an odometry without the numbers of items and scans.
+fn motions(odometry: &str) -> Vec<&str> {
+    let rows = odometry.lines().skip(1);
+    rows.map(|row| row.splitn(4, ',').last().unwrap()).collect()
+}
+
+#[test]
+fn datagrams_give_the_motions_of_the_recording() {
+    let whole = recording::copy(recording::SCANS);
+    for image in recording::images(whole.path()) {
+        recording::complete(&image);
+    }
+    let scans = recording::SCANS / 2;
+    let arguments = ["--double", "0.05", "--repeat"];
+    let radar = Radar::sending(&group(1), whole.path(), &arguments);
+    let run = radar.received(scans);
+    let live = run.complete();
+    let source = &run.summary()["stages"]["radar-replay"];
+    assert_eq!(source["missing_azimuths"], 0, "{source}");
+    assert_eq!(source["damaged_messages"], 0, "{source}");
+    assert_eq!(run.summary()["dropped"], 0);
+    // On a busy machine the radar may have begun before the run.
+    let all = Run::small().data(whole.path()).complete();
+    let stamps = |csv| odometry::columns(csv, &["stamp_ns", "previous_scan"]);
+    let begun = &stamps(&live)[0][0];
+    let all = stamps(&all);
+    let first = &all.iter().find(|row| row[0] == *begun).unwrap()[1];
+    let recorded = Run::small()
+        .data(whole.path())
+        .set(&format!("source.first={first}"))
+        .set(&format!("source.scans={scans}"));
+    assert_eq!(motions(&live), motions(&recorded.complete()));
+}
+
+#[test]
+fn lost_doubled_and_swapped_datagrams_are_lost_azimuths_at_most() {
+    let faults = [
+        "--lose",
+        "0.005",
+        "--double",
+        "0.01",
+        "--swap",
+        "0.01",
+        "--garbage-every",
+        "5",
+        "--repeat",
+    ];
+    let radar = Radar::sending(&group(2), recording::small(), &faults);
+    let run = radar.received(20);
+    run.complete();
+    let summary = run.summary();
+    let source = &summary["stages"]["radar-replay"];
+    let count = |key: &str| source[key].as_u64().unwrap();
+    // A two-hundredth of the parts of 20 x 400 azimuths, and those parts that came after the next azimuth.
+    assert!((20..1000).contains(&count("missing_azimuths")), "{source}");
+    assert!((2..10).contains(&count("damaged_messages")), "{source}");
+    assert_eq!(count("reconnections"), 0, "{source}");
+    assert_eq!(summary["published"], 20);
+}
+
+#[test]
+fn datagrams_without_scans_are_named_in_a_sentence() {
+    let to = group(3);
+    let run = Run::small()
+        .argument("--radar", &format!("udp://{to}"))
+        .set("source.interface='127.0.0.1'");
+    let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let sending = thread::spawn(move || {
+        let began = Instant::now();
+        while began.elapsed() < Duration::from_secs(10) {
+            // Navtech's point cloud, without points.
+            sender.send_to(&[2, 40, 0, 0, 0, 0, 0, 0], &to).unwrap();
+            thread::sleep(Duration::from_millis(50));
+        }
+    });
+    Ended::of(run.command()).refused_with(&["are no scans", "data output to CAT-240"]);
+    sending.join().unwrap();
+    let run = Run::small().argument("--radar", "udp://239.192.43.3");
+    Ended::of(run.command()).refused_with(&["`udp://239.192.43.3` is none for datagrams"]);
 }
 
 #[test]

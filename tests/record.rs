@@ -114,6 +114,108 @@ fn a_killed_recorder_changes_no_byte_and_another_one_goes_on_in_the_next_part() 
 }
 
 #[test]
+fn a_recording_in_several_files_replays_to_the_same_bytes() {
+    let run = recorded(&simulated()).set(ALL).set("record.split_s=1.5");
+    let odometry = run.complete();
+    let files = parts(&file(&run));
+    // Six seconds of scans.
+    assert_eq!(files.len(), 4, "{files:?}");
+    let recording = open_recording(&file(&run)).unwrap();
+    assert_eq!(seqs(&recording, "scan").len(), SCANS);
+    assert_eq!(recording.cut().count(), 0, "each file has its end");
+    assert_eq!(replay(run.folder(), &[]), odometry, "named by its folder");
+    assert_eq!(replay(&file(&run), &["--from", "masked"]), odometry);
+}
+
+#[test]
+fn a_recorder_that_is_killed_in_a_later_file_loses_none_of_the_earlier_ones() {
+    let run = recorded(&simulated()).rate("1").set("record.split_mb=1");
+    let mut running = run.start();
+    running.await_poses(SCANS / 2);
+    let killed = await_recorder(&mut running, None);
+    let before = parts(&file(&run));
+    assert!(before.len() > 1, "{before:?}");
+    send(killed, Signal::KILL);
+    await_recorder(&mut running, Some(killed));
+    running.finish().succeeded();
+    let recording = open_recording(&file(&run)).unwrap();
+    assert!(recording.cut().count() <= 1, "only the file of the kill");
+    assert!(parts(&file(&run)).len() > before.len());
+    assert_eq!(seqs(&recording, "scan").len(), SCANS);
+    assert_eq!(replay(&file(&run), &[]), run.odometry());
+}
+
+#[test]
+fn a_recorder_that_is_stopped_for_long_says_exactly_what_it_missed() {
+    let run = recorded(&simulated())
+        .set(ALL)
+        .rate("1")
+        .set("run.window=1");
+    let mut running = run.start();
+    running.await_poses(SCANS / 4);
+    let recorder = await_recorder(&mut running, None);
+    send(recorder, Signal::STOP);
+    running.await_poses(SCANS - 4);
+    send(recorder, Signal::CONT);
+    let ended = running.finish();
+    assert_eq!(run.odometry(), simulated().set("run.window=1").complete());
+    let recording = open_recording(&file(&run)).unwrap();
+    let there = seqs(&recording, "scan");
+    let missed = SCANS - there.len();
+    assert!(missed >= 4, "{there:?}");
+    assert_eq!(recording.missed()["scan"], missed as u64);
+    assert!(
+        ended.stderr.contains(&format!("missed {missed} scan")),
+        "{}",
+        ended.stderr
+    );
+    // The scans that are there are played, and those that are not are named; what needs every message is refused.
+    let again = Run::configured("").data(&file(&run));
+    again.finish().succeeded();
+    assert_eq!(again.summary()["unreadable"], missed);
+    let lost = (0..SCANS as u64)
+        .find(|seq| !seqs(&recording, "masked").contains(seq))
+        .unwrap();
+    let lacks = format!("lacks message {lost} of topic `masked`");
+    let from = Run::configured("")
+        .data(&file(&run))
+        .argument("--from", "masked");
+    from.finish().refused_with(&[&lacks]);
+}
+
+#[test]
+fn a_recording_holds_the_health_of_the_run() {
+    let run = recorded(&simulated()).rate("1");
+    let mut running = run.start();
+    running.await_poses(SCANS / 4).kill("masking");
+    running.finish().succeeded();
+    let health = health(&file(&run));
+    let restarts = |health: &serde_json::Value| {
+        let processes = health["status"]["processes"].as_array().unwrap();
+        let masking = processes.iter().find(|it| it["name"] == "masking").unwrap();
+        masking["restarts"].as_u64().unwrap()
+    };
+    assert!(
+        health.len() >= 2,
+        "once a second for six seconds: {}",
+        health.len()
+    );
+    assert_eq!(restarts(health.last().unwrap()), 1);
+}
+
+/// The messages on `/health`.
+fn health(recording: &Path) -> Vec<serde_json::Value> {
+    let bytes = fs::read(recording).unwrap();
+    let messages = mcap::MessageStream::new(&bytes)
+        .unwrap()
+        .map(Result::unwrap);
+    messages
+        .filter(|message| message.channel.topic == "/health")
+        .map(|message| serde_json::from_slice(&message.data).unwrap())
+        .collect()
+}
+
+#[test]
 fn a_player_and_a_stage_that_are_killed_change_no_byte_of_a_replay() {
     let run = recorded(&simulated()).set(ALL);
     let odometry = run.complete();

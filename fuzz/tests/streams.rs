@@ -1,9 +1,10 @@
-//! What a radar sends: a stream of Colossus, against what a client does with it.
+//! What a radar sends: a stream of Colossus, or datagrams of CAT-240, against what a client does with it.
 
 use bolero::{TypeGenerator, check};
 use gyre_colossus::{
-    Azimuth, BadConfiguration, ClockFormat, Configuration, Constants, Event, Message, Parser,
-    Powers, RadarClock, SweepAssembler, write_azimuth, write_configuration, write_keep_alive,
+    Azimuth, BadConfiguration, ByteOrder, ClockFormat, Configuration, Constants, Datagrams, Event,
+    Message, Parser, Powers, RadarClock, SweepAssembler, asterix, write_azimuth,
+    write_configuration, write_keep_alive,
 };
 use gyre_fuzz::{
     Failure, Target,
@@ -13,6 +14,8 @@ use gyre_radar::OwnedScan;
 
 const AZIMUTHS: u16 = 16;
 const BINS: u16 = 40;
+/// Bins that do not fit into one datagram.
+const WIDE_BINS: u16 = 1500;
 const COUNTS: u16 = 5600;
 /// 2019-01-10 14:37:26 UTC, ns.
 const START_NS: i64 = 1_547_131_046_000_000_000;
@@ -184,6 +187,87 @@ fn streams() {
             edit_bytes(&mut bytes, edits);
             target.run(|| receive(&bytes, 1 + usize::from(*piece)).map(|_| ()));
         });
+}
+
+/// The datagrams of a radar that turns four times.
+fn datagrams() -> Vec<Vec<u8>> {
+    let radar = Configuration {
+        azimuth_samples: AZIMUTHS,
+        bin_size: 438,
+        range_in_bins: WIDE_BINS,
+        encoder_size: COUNTS,
+        rotation_mhz: 4000,
+        range_resolution_m: Some(0.04381),
+        ..Configuration::default()
+    };
+    let order = ByteOrder::Big;
+    let format = ClockFormat {
+        order,
+        ..ClockFormat::default()
+    };
+    let powers: Vec<u8> = (0..WIDE_BINS).map(|bin| (bin * 7) as u8).collect();
+    let (mut number, mut sent) = (0, Vec::new());
+    for k in 0..4 * AZIMUTHS {
+        let (seconds, split_seconds) = format.fields(START_NS + i64::from(k) * 15_625_000);
+        let azimuth = Azimuth {
+            sweep_counter: 0,
+            encoder: k % AZIMUTHS * (COUNTS / AZIMUTHS),
+            seconds,
+            split_seconds,
+            powers: Powers::Eight(&powers),
+        };
+        let mut send = |datagram: &[u8]| sent.push(datagram.to_vec());
+        asterix::write_azimuth(&radar, &azimuth, &mut number, &mut send);
+    }
+    sent
+}
+
+/// Receives datagrams, and returns the number of scans.
+fn receive_datagrams<'a>(sent: impl IntoIterator<Item = &'a Vec<u8>>) -> Result<usize, Failure> {
+    let (mut parser, mut client, mut damage) = (Datagrams::new(COUNTS), None, None);
+    for datagram in sent {
+        let bytes = datagram.len().min(parser.space().len());
+        parser.space()[..bytes].copy_from_slice(&datagram[..bytes]);
+        parser.filled(bytes);
+        while let Some(event) = parser.next() {
+            match event {
+                Event::Message(Message::Configuration(new)) => client = Client::new(&new)?,
+                Event::Message(Message::Azimuth(azimuth)) => {
+                    client.iter_mut().try_for_each(|c| c.add(azimuth))?;
+                }
+                Event::Message(_) => {}
+                Event::Damaged { reason, .. } => damage = Some(reason),
+            }
+        }
+    }
+    match damage {
+        Some(damage) => Err(damage.into()),
+        None => Ok(client.map_or(0, |client| client.sweeps)),
+    }
+}
+
+#[test]
+fn edited_datagrams() {
+    let target = Target::new("datagrams", 32);
+    // Which of them is edited, and how; and which ones are exchanged.
+    check!()
+        .with_type::<(Vec<(u8, Vec<ByteEdit>)>, Vec<(u8, u8)>)>()
+        .for_each(|(edits, swaps)| {
+            let mut sent = datagrams();
+            let count = sent.len();
+            for (index, edits) in edits {
+                edit_bytes(&mut sent[usize::from(*index) % count], edits);
+            }
+            for (one, other) in swaps {
+                sent.swap(usize::from(*one) % count, usize::from(*other) % count);
+            }
+            target.run(|| receive_datagrams(&sent).map(|_| ()));
+        });
+}
+
+#[test]
+fn datagrams_without_edits_are_received() {
+    assert_eq!(receive_datagrams(&datagrams()).unwrap(), 4);
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 mod conformance;
 mod operate;
+mod radar_server;
 mod record;
 mod shadow;
 mod stress;
@@ -24,7 +25,8 @@ pub use shadow::ShadowArguments;
 pub use stress::StressArguments;
 pub use watch::WatchArguments;
 
-pub use record::RecordArguments;
+pub use radar_server::RadarServerArguments;
+pub use record::{RecordArguments, SplitArguments};
 
 /// Radar odometry as cooperating processes over shared memory.
 ///
@@ -137,49 +139,6 @@ pub struct RunArguments {
     /// Discard an unfinished run in --out instead of resuming it.
     #[arg(long)]
     pub fresh: bool,
-}
-
-/// The arguments of `gyre radar-server`.
-#[derive(Debug, Args)]
-pub struct RadarServerArguments {
-    /// A configuration, a TOML file: its sections `[simulation]`, `[source]` and `[dataset]`.
-    pub configuration: Option<PathBuf>,
-    /// The dataset's folder.
-    #[arg(long)]
-    pub data: Option<PathBuf>,
-    /// The address to serve at. At another than the loopback's the whole network can read the scans: the protocol has no token.
-    #[arg(long, default_value = "127.0.0.1:6317", value_name = "ADDRESS")]
-    pub listen: String,
-    /// Pace: realtime, max (as fast as it is read), or a factor.
-    #[arg(long, default_value = "realtime")]
-    pub rate: Rate,
-    /// Scans to play. Default: all.
-    #[arg(long)]
-    pub scans: Option<usize>,
-    /// Play again and again, with times that go on.
-    #[arg(long)]
-    pub repeat: bool,
-    /// Lose this share of the azimuths.
-    #[arg(long, default_value_t = 0.0, value_name = "SHARE")]
-    pub lose: f64,
-    /// Reset the connections in the middle of every Nth scan.
-    #[arg(long, value_name = "N")]
-    pub reset_every: Option<u64>,
-    /// Send nothing for --stall-s before every Nth scan.
-    #[arg(long, value_name = "N")]
-    pub stall_every: Option<u64>,
-    /// Length of a stall, s.
-    #[arg(long, default_value_t = 4.0, value_name = "S")]
-    pub stall_s: f64,
-    /// Send bytes that are no message in the middle of every Nth scan.
-    #[arg(long, value_name = "N")]
-    pub garbage_every: Option<u64>,
-    /// Write the times big-endian, as some clients expect.
-    #[arg(long)]
-    pub big_endian: bool,
-    /// Override a key, as in source.first=100; may be repeated.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
 }
 
 /// The arguments of `gyre echo`.

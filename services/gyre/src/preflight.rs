@@ -201,7 +201,7 @@ impl Scans {
     /// Asks the radar.
     fn of_radar(configuration: &Configuration) -> Result<Self, crate::Failure> {
         configuration.dataset.check()?;
-        let settings = radar::settings(&configuration.source, &configuration.dataset);
+        let settings = radar::settings(&configuration.source, &configuration.dataset)?;
         let radar = gyre_live_radar::ask(&settings)?;
         Ok(Self {
             count: configuration.source.scans,

@@ -2,7 +2,7 @@
 
 use std::{net::TcpListener, ops::Range, process::ExitCode, time::Duration};
 
-use gyre_live_radar::server::{self, ByteOrder, ClockFormat, Faults, Playback};
+use gyre_live_radar::server::{self, Audience, ByteOrder, ClockFormat, Faults, Playback};
 use gyre_stage::wake::Signals;
 
 use crate::{
@@ -34,28 +34,50 @@ pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
         return Err(format!("{} has no scan to play", configuration.data()).into());
     }
     let signals = Signals::install()?;
-    let listen = &arguments.listen;
-    let listener = TcpListener::bind(listen)
-        .map_err(|error| format!("cannot serve at {listen}: {error}; choose another --listen"))?;
-    let address = listener.local_addr()?;
+    let (audience, address, is_public) = audience(arguments)?;
     print::note(format_args!(
         "gyre: playing {} scans of {} as a radar at {address}",
         scans.len(),
         configuration.data()
     ));
-    if !address.ip().is_loopback() {
+    if is_public {
         print::note(
             "gyre: whoever reaches this address receives the scans: Navtech's protocol has no token",
         );
     }
     let stop = || signals.sleep(Duration::ZERO).unwrap_or(true);
     let playback = playback(arguments, scans);
-    let played = server::serve(listener, dataset.as_mut(), &playback, &stop)?;
+    let played = server::serve(audience, dataset.as_mut(), &playback, &stop)?;
     print::line(format_args!(
-        "played {} scans, lost {} azimuths, reset the connections {} times, stalled {} times",
-        played.scans, played.lost_azimuths, played.resets, played.stalls
+        "played {} scans, lost {} azimuths and {} datagrams, reset the connections {} times, stalled {} times",
+        played.scans, played.lost_azimuths, played.lost_datagrams, played.resets, played.stalls
     ))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Returns to whom is played, the address at which the radar is received, and whether others than this machine reach it.
+fn audience(arguments: &RadarServerArguments) -> Result<(Audience, String, bool), Failure> {
+    if let Some(to) = arguments.udp {
+        if arguments.rate.factor().is_none() {
+            return Err("--rate max has no meaning with --udp: nobody says how fast datagrams are read; give a factor".into());
+        }
+        let wait = Duration::try_from_secs_f64(arguments.wait_s)
+            .map_err(|error| format!("--wait-s is {}: {error}", arguments.wait_s))?;
+        let interface = arguments.interface;
+        let is_public = !interface.is_loopback();
+        let audience = Audience::Group {
+            to,
+            interface,
+            wait,
+        };
+        return Ok((audience, format!("udp://{to}"), is_public));
+    }
+    let listen = &arguments.listen;
+    let listener = TcpListener::bind(listen)
+        .map_err(|error| format!("cannot serve at {listen}: {error}; choose another --listen"))?;
+    let address = listener.local_addr()?;
+    let is_public = !address.ip().is_loopback();
+    Ok((Audience::Clients(listener), address.to_string(), is_public))
 }
 
 fn playback(arguments: &RadarServerArguments, scans: Range<usize>) -> Playback {
@@ -65,13 +87,16 @@ fn playback(arguments: &RadarServerArguments, scans: Range<usize>) -> Playback {
         repeats: arguments.repeat,
         faults: Faults {
             lost: arguments.lose,
+            doubled: arguments.double,
+            swapped: arguments.swap,
             reset_every: arguments.reset_every,
             stall_every: arguments.stall_every,
             stall_s: arguments.stall_s.clamp(0.0, 3600.0),
             garbage_every: arguments.garbage_every,
         },
         clock: ClockFormat {
-            order: match arguments.big_endian {
+            // Datagrams always have the network's order.
+            order: match arguments.big_endian || arguments.udp.is_some() {
                 true => ByteOrder::Big,
                 false => ByteOrder::Little,
             },

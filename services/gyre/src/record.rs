@@ -3,13 +3,18 @@
 use std::{
     path::{Path, PathBuf},
     process::ExitCode,
+    time::Duration,
 };
 
-use gyre_recorder::Options;
+use gyre_recorder::{Options, Split};
 use gyre_stage::supervise::{RestartPolicy, Scheduling, StagePlan};
 use serde::{Deserialize, Serialize};
 
-use crate::{Failure, cli::RecordArguments, print};
+use crate::{
+    Failure,
+    cli::{RecordArguments, SplitArguments},
+    print,
+};
 
 /// The section `[record]`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -18,12 +23,26 @@ pub struct RecordConfig {
     /// The file to which the run is recorded, `NAME.mcap`; `--record` on the command line. Default: none.
     #[serde(skip_serializing_if = "is_empty")]
     pub file: PathBuf,
-    /// What is recorded: `scan`, `masked`, `rotation`, `motion`, `refined`, `pose`, `loop`, `correction`, `fix`, `log`. Default: what
-    /// the run has of these but `masked` and `rotation`.
+    /// What is recorded: `scan`, `masked`, `rotation`, `motion`, `refined`, `pose`, `loop`, `correction`, `fix`, `log`, `health`.
+    /// Default: what the run has of these but `masked` and `rotation`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub topics: Vec<String>,
+    /// Size from which on the recording goes on in the next file, MB (rosbag2: `max_bagfile_size`, in bytes); 0: any.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub split_mb: u64,
+    /// Time of the sensor after which the recording goes on in the next file, s (rosbag2: `max_bagfile_duration`); 0: any.
+    #[serde(skip_serializing_if = "is_none")]
+    pub split_s: f64,
     /// Limits of the recorder's restarts.
     pub restart: RestartPolicy,
+}
+
+fn is_zero(value: &u64) -> bool {
+    *value == 0
+}
+
+fn is_none(seconds: &f64) -> bool {
+    *seconds == 0.0
 }
 
 fn is_empty(path: &Path) -> bool {
@@ -48,6 +67,14 @@ impl RecordConfig {
             "--to".to_owned(),
             text(&self.file),
         ]);
+        for (option, value) in [
+            ("--split-mb", self.split_mb.to_string()),
+            ("--split-s", self.split_s.to_string()),
+        ] {
+            if value != "0" {
+                command.extend([option.to_owned(), value]);
+            }
+        }
         if !self.topics.is_empty() {
             command.extend(["--topics".to_owned(), self.topics.join(",")]);
         }
@@ -84,6 +111,7 @@ pub fn record(arguments: &RecordArguments) -> ExitCode {
         out: arguments.out.clone(),
         to: arguments.to.clone(),
         topics: arguments.topics.clone(),
+        split: split(&arguments.split),
         continues: arguments.continues,
     };
     match gyre_recorder::record(&options) {
@@ -99,5 +127,15 @@ pub fn record(arguments: &RecordArguments) -> ExitCode {
             print::note(format_args!("gyre record: {error}"));
             ExitCode::from(error.exit_code())
         }
+    }
+}
+
+/// Returns the limits of a file; 0 and what is no time are none.
+fn split(arguments: &SplitArguments) -> Split {
+    let span = Duration::try_from_secs_f64(arguments.split_s).unwrap_or_default();
+    let span_ns = i64::try_from(span.as_nanos()).unwrap_or(i64::MAX);
+    Split {
+        bytes: (arguments.split_mb > 0).then_some(arguments.split_mb.saturating_mul(1_000_000)),
+        span_ns: (span_ns > 0).then_some(span_ns),
     }
 }

@@ -83,12 +83,12 @@ fn require_same_build(manifest: &Manifest) -> Result<(), StageError> {
 
 /// Receives from a radar, or plays a recording, or a simulation as it is rendered.
 fn play(launch: &Launch) -> Result<StageCounters, StageError> {
+    let input = |error: &dyn std::error::Error| StageError::Input(error.to_string());
     let source: SourceConfig = launch.section("source")?;
     if source.kind == SourceKind::Colossus {
         let settings = radar::settings(&source, &launch.section("dataset")?);
-        return gyre_live_radar::run(launch, settings);
+        return gyre_live_radar::run(launch, settings.map_err(|error| input(&error))?);
     }
-    let input = |error: &dyn std::error::Error| StageError::Input(error.to_string());
     let simulation = match launch.has_section("simulation") {
         true => Some(launch.section::<SimulationConfig>("simulation")?),
         false => None,

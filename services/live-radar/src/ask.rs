@@ -1,23 +1,23 @@
 //! The configuration of a radar, before a run.
 
 use std::{
-    io::{ErrorKind, Read},
+    io::ErrorKind,
     thread::sleep,
     time::{Duration, Instant},
 };
 
-use gyre_colossus::{BadConfiguration, Event, Message, Parser, Request, SweepAssembler};
+use gyre_colossus::{
+    BadConfiguration, Configuration, Damage, Event, Message, Request, SweepAssembler,
+};
 use gyre_radar::ScanLimits;
 use thiserror::Error;
 
-use crate::{Settings, connection::connect};
+use crate::{Address, Settings, connection::Link, messages::Messages};
 
 /// The longest wait for an answer.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// Time between two looks for it.
 const POLL: Duration = Duration::from_millis(10);
-/// Bytes to read at once.
-const CHUNK: usize = 4096;
 
 /// Why a radar cannot be used.
 #[derive(Debug, Error)]
@@ -41,6 +41,23 @@ pub enum AskError {
         /// Its address.
         address: String,
     },
+    /// No datagram arrives.
+    #[error(
+        "nothing arrives at {address} within {} s: check that the radar's data output is CAT-240 to this address, and that source.interface is this machine's address on the radar's network",
+        PATIENCE.as_secs()
+    )]
+    NoDatagrams {
+        /// Where the radar sends to.
+        address: String,
+    },
+    /// What arrives are no azimuths.
+    #[error("what arrives at {address} are no scans: {source}")]
+    NoScans {
+        /// Where the radar sends to.
+        address: String,
+        /// What is wrong.
+        source: Damage,
+    },
     /// Its configuration is not usable.
     #[error("the radar at {address} cannot be used: {source}")]
     Unusable {
@@ -60,40 +77,55 @@ pub struct Sizes {
     pub limits: ScanLimits,
 }
 
-/// Asks a radar for its configuration.
+/// Asks a radar for its configuration; one that sends by UDP says it with each datagram.
 ///
 /// # Errors
 /// No answer, or one that cannot be used.
 pub fn ask(settings: &Settings) -> Result<Sizes, AskError> {
-    let address = settings.address.clone();
+    let configuration = configuration(settings)?;
+    match SweepAssembler::new(&configuration, settings.constants) {
+        Ok(assembler) => Ok(Sizes {
+            period_ns: configuration.period_ns(),
+            limits: assembler.limits(),
+        }),
+        Err(source) => Err(AskError::Unusable {
+            address: settings.address.to_string(),
+            source,
+        }),
+    }
+}
+
+/// Waits for what a radar says of itself.
+fn configuration(settings: &Settings) -> Result<Configuration, AskError> {
+    let address = settings.address.to_string();
     let no_answer = |source| AskError::NoAnswer {
         address: address.clone(),
         source,
     };
     // No azimuths: a recording that is played as a radar begins with the first request for them.
-    let mut radar = connect(&address, &[Request::RequestConfiguration]).map_err(no_answer)?;
-    let (mut parser, started) = (Parser::default(), Instant::now());
+    let requests = [Request::RequestConfiguration];
+    let mut radar = Link::open(&settings.address, &requests).map_err(no_answer)?;
+    let (mut messages, mut damage) = (Messages::new(settings), None);
+    let started = Instant::now();
     while started.elapsed() < PATIENCE {
-        match radar.read(parser.space(CHUNK)) {
-            Ok(0) => break,
-            Ok(count) => parser.filled(count),
+        match radar.read(messages.space()) {
+            Ok(count) => messages.filled(count),
+            Err(error) if error.kind() == ErrorKind::UnexpectedEof => break,
             Err(error) if error.kind() == ErrorKind::WouldBlock => sleep(POLL),
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
             Err(error) => return Err(no_answer(error)),
         }
-        while let Some(event) = parser.next() {
-            let Event::Message(Message::Configuration(configuration)) = event else {
-                continue;
-            };
-            let assembler = SweepAssembler::new(&configuration, settings.constants);
-            return match assembler {
-                Ok(assembler) => Ok(Sizes {
-                    period_ns: configuration.period_ns(),
-                    limits: assembler.limits(),
-                }),
-                Err(source) => Err(AskError::Unusable { address, source }),
-            };
+        while let Some(event) = messages.next() {
+            match event {
+                Event::Message(Message::Configuration(configuration)) => return Ok(configuration),
+                Event::Message(_) => {}
+                Event::Damaged { reason, .. } => damage = Some(reason),
+            }
         }
     }
-    Err(AskError::NoConfiguration { address })
+    Err(match (&settings.address, damage) {
+        (Address::Tcp(_), _) => AskError::NoConfiguration { address },
+        (Address::Udp { .. }, Some(source)) => AskError::NoScans { address, source },
+        (Address::Udp { .. }, None) => AskError::NoDatagrams { address },
+    })
 }

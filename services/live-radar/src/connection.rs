@@ -1,21 +1,24 @@
-//! A connection to a radar, made anew when it breaks or falls silent.
+//! A connection to a radar, made anew when it breaks or falls silent: TCP, or a socket that receives its datagrams.
 
 use std::{
     fmt::Display,
-    io::{ErrorKind, Read, Write},
-    net::{TcpStream, ToSocketAddrs},
+    io::{self, ErrorKind, Read, Write},
+    net::{Ipv4Addr, SocketAddrV4, TcpStream, ToSocketAddrs, UdpSocket},
     os::fd::{AsFd, BorrowedFd},
     time::{Duration, Instant},
 };
 
-use gyre_colossus::{Parser, Request, write_request};
+use gyre_colossus::{Request, write_request};
+use rustix::net::{AddressFamily, SocketFlags, SocketType, bind, socket_with, sockopt};
+
+use crate::{Address, Settings, messages::Messages};
 
 /// The longest time for an attempt to connect.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(1);
 /// Pauses between attempts to connect: the first, and the longest, to which each doubles.
 const PAUSES: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(5)];
-/// Bytes to read at once: some ten azimuths.
-const CHUNK: usize = 1 << 16;
+/// Room for datagrams that are not read yet, as far as the system gives it: a scan, should this process be late.
+const RECEIVE_BYTES: usize = 4 << 20;
 
 /// What a connection has received.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,9 +34,9 @@ pub enum Received {
 /// A connection to a radar.
 #[derive(Debug)]
 pub struct Connection {
-    address: String,
+    address: Address,
     silence: Duration,
-    stream: Option<TcpStream>,
+    link: Option<Link>,
     /// The last byte, or the opening.
     heard: Instant,
     retry_at: Instant,
@@ -44,12 +47,12 @@ pub struct Connection {
 
 impl Connection {
     /// A connection that is opened when it is first read from.
-    pub fn new(address: &str, silence: Duration) -> Self {
+    pub fn new(settings: &Settings) -> Self {
         let now = Instant::now();
         Self {
-            address: address.to_owned(),
-            silence,
-            stream: None,
+            address: settings.address.clone(),
+            silence: settings.silence,
+            link: None,
             heard: now,
             retry_at: now,
             pause: PAUSES[0],
@@ -59,18 +62,17 @@ impl Connection {
 
     /// The socket, while it is open.
     pub fn socket(&self) -> Option<BorrowedFd<'_>> {
-        self.stream.as_ref().map(AsFd::as_fd)
+        self.link.as_ref().map(Link::socket)
     }
 
     /// Reads what has arrived, or opens the connection; does not wait for bytes.
-    pub fn receive(&mut self, parser: &mut Parser) -> Received {
-        let Some(stream) = &mut self.stream else {
-            return self.open(parser);
+    pub fn receive(&mut self, messages: &mut Messages) -> Received {
+        let Some(link) = &mut self.link else {
+            return self.open();
         };
-        match stream.read(parser.space(CHUNK)) {
-            Ok(0) => self.close("it closed the connection"),
+        match link.read(messages.space()) {
             Ok(count) => {
-                parser.filled(count);
+                messages.filled(count);
                 self.heard = Instant::now();
                 self.pause = PAUSES[0];
                 Received::Bytes
@@ -89,19 +91,16 @@ impl Connection {
         }
     }
 
-    fn open(&mut self, parser: &mut Parser) -> Received {
+    fn open(&mut self) -> Received {
         let left = self.retry_at.saturating_duration_since(Instant::now());
         if !left.is_zero() {
             return Received::Nothing(left);
         }
-        match connect(
-            &self.address,
-            &[Request::RequestConfiguration, Request::StartFft],
-        ) {
-            Ok(stream) => {
-                tracing::info!(address = self.address, "connected to the radar");
-                *parser = Parser::default();
-                self.stream = Some(stream);
+        let requests = [Request::RequestConfiguration, Request::StartFft];
+        match Link::open(&self.address, &requests) {
+            Ok(link) => {
+                tracing::info!(address = %self.address, "connected to the radar");
+                self.link = Some(link);
                 self.heard = Instant::now();
                 self.opened += 1;
                 Received::Opened
@@ -114,10 +113,10 @@ impl Connection {
     pub fn close(&mut self, reason: impl Display) -> Received {
         let pause = self.pause;
         tracing::warn!(
-            address = self.address,
+            address = %self.address,
             "no connection to the radar, trying again in {pause:?}: {reason}"
         );
-        self.stream = None;
+        self.link = None;
         self.retry_at = Instant::now() + pause;
         self.pause = (2 * pause).min(PAUSES[1]);
         Received::Nothing(pause)
@@ -127,7 +126,7 @@ impl Connection {
 impl Drop for Connection {
     /// The radar has room for few clients: leave properly.
     fn drop(&mut self) {
-        if let Some(stream) = &mut self.stream {
+        if let Some(Link::Tcp(stream)) = &mut self.link {
             let mut bytes = Vec::new();
             write_request(&mut bytes, Request::StopFft);
             // It notices the end of the connection too.
@@ -136,8 +135,64 @@ impl Drop for Connection {
     }
 }
 
+/// An open connection, or the socket that receives datagrams.
+#[derive(Debug)]
+pub enum Link {
+    Tcp(TcpStream),
+    Udp(UdpSocket),
+}
+
+impl Link {
+    /// Connects and sends requests, or begins to receive.
+    pub fn open(address: &Address, requests: &[Request]) -> io::Result<Self> {
+        match address {
+            Address::Tcp(address) => connect(address, requests).map(Self::Tcp),
+            Address::Udp { to, interface } => join(*to, *interface).map(Self::Udp),
+        }
+    }
+
+    /// Reads bytes, of datagrams one; does not wait.
+    ///
+    /// # Errors
+    /// There are none, or the connection has ended.
+    pub fn read(&mut self, space: &mut [u8]) -> io::Result<usize> {
+        match self {
+            Self::Tcp(stream) => match stream.read(space)? {
+                0 => Err(io::Error::new(
+                    ErrorKind::UnexpectedEof,
+                    "it closed the connection",
+                )),
+                count => Ok(count),
+            },
+            Self::Udp(socket) => socket.recv(space),
+        }
+    }
+
+    fn socket(&self) -> BorrowedFd<'_> {
+        match self {
+            Self::Tcp(stream) => stream.as_fd(),
+            Self::Udp(socket) => socket.as_fd(),
+        }
+    }
+}
+
+/// Receives what is sent to an address; a group is joined on an interface. Other programs may receive the same.
+fn join(to: SocketAddrV4, interface: Ipv4Addr) -> io::Result<UdpSocket> {
+    let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
+    let socket = socket_with(AddressFamily::INET, SocketType::DGRAM, flags, None)?;
+    sockopt::set_socket_reuseaddr(&socket, true)?;
+    // The system gives as much of it as it allows.
+    sockopt::set_socket_recv_buffer_size(&socket, RECEIVE_BYTES)?;
+    bind(&socket, &to)?;
+    let socket = UdpSocket::from(socket);
+    if to.ip().is_multicast() {
+        socket.join_multicast_v4(to.ip(), &interface)?;
+    }
+    Ok(socket)
+}
+
 /// Connects and sends requests.
-pub fn connect(address: &str, requests: &[Request]) -> std::io::Result<TcpStream> {
+fn connect(address: &str, requests: &[Request]) -> io::Result<TcpStream> {
     let mut last = None;
     for address in address.to_socket_addrs()? {
         match TcpStream::connect_timeout(&address, CONNECT_TIMEOUT) {

@@ -1,8 +1,10 @@
-//! The source stage of a live radar: receives azimuths by Navtech's protocol Colossus and publishes each sweep on `scan`, written
-//! directly into shared memory. [`server`] is the other end: it plays a recording as a radar.
+//! The source stage of a live radar: receives azimuths by Navtech's protocol Colossus (TCP), or as ASTERIX CAT-240 by UDP, and publishes
+//! each sweep on `scan`, written directly into shared memory. [`server`] is the other end: it plays a recording as a radar.
 
+mod address;
 mod ask;
 mod connection;
+mod messages;
 mod radar;
 pub mod server;
 
@@ -11,14 +13,17 @@ use std::time::Duration;
 use gyre_colossus::Constants;
 use gyre_stage::{Launch, StageCounters, StageError, source};
 
+pub use address::{Address, BadAddress};
 pub use ask::{AskError, Sizes, ask};
 pub use gyre_colossus::PORT;
 
 /// How to reach a radar, and what it does not say of itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Host and port.
-    pub address: String,
+    /// Where it is received.
+    pub address: Address,
+    /// Encoder counts per turn, to which the angles of a radar are rounded that sends by UDP.
+    pub encoder_counts: u16,
     /// Time without a byte after which it is connected to anew.
     pub silence: Duration,
     /// Scans to receive; `None`: without end.

@@ -7,7 +7,8 @@ use std::{
 };
 
 use gyre_colossus::{
-    Azimuth, BadConfiguration, Configuration, Event, Message, Parser, RadarClock, SweepAssembler,
+    Azimuth, BadConfiguration, Configuration, Event, FoundClock, Message, RadarClock,
+    SweepAssembler,
 };
 use gyre_messages::{ScanHeader, StageId};
 use gyre_stage::{
@@ -18,18 +19,23 @@ use gyre_stage::{
 use crate::{
     Settings,
     connection::{Connection, Received},
+    messages::Messages,
 };
 
 /// Reads after which the process looks for signals and new readers, however much there is to read.
 const MAX_READS: usize = 64;
 /// Bytes without a message after which what is connected to is no radar.
 const MAX_SKIPPED_BYTES: usize = 1 << 22;
+/// Azimuths for which the connection need not wake, at most. The buffers of sockets hold many more.
+const BATCH: f64 = 10.0;
+/// The part of the azimuths up to the end of a turn, for the radar may turn faster than it says.
+const BATCH_SHARE: f64 = 0.5;
 
 /// A radar on the network.
 pub struct Radar {
     settings: Settings,
     connection: Connection,
-    parser: Parser,
+    messages: Messages,
     /// `None` until the radar has sent its configuration.
     sweeps: Option<Sweeps>,
     missing: u64,
@@ -89,6 +95,18 @@ impl Sweeps {
         complete
     }
 
+    /// The time for which no scan can be complete, if it is that of a few azimuths: so many are then read at once.
+    fn pause(&self) -> Option<Duration> {
+        match self.clock.found() {
+            // Each azimuth is to be received when it arrives.
+            None | Some(FoundClock::Arrival) => return None,
+            Some(_) => {}
+        }
+        let azimuths = (self.assembler.azimuths_left()? * BATCH_SHARE).min(BATCH);
+        let per_azimuth_ns = self.radar.period_ns() as f64 / f64::from(self.radar.azimuth_samples);
+        (azimuths >= 2.0).then(|| Duration::from_nanos((azimuths * per_azimuth_ns) as u64))
+    }
+
     /// The scans that were left out.
     fn left_out(&self) -> u64 {
         let counters = self.assembler.counters();
@@ -100,9 +118,9 @@ impl Radar {
     /// A radar that is connected to when it is first asked.
     pub fn new(settings: Settings) -> Self {
         Self {
-            connection: Connection::new(&settings.address, settings.silence),
+            connection: Connection::new(&settings),
+            messages: Messages::new(&settings),
             settings,
-            parser: Parser::default(),
             sweeps: None,
             missing: 0,
             damaged: 0,
@@ -136,6 +154,15 @@ impl Radar {
         Ok(())
     }
 
+    /// How to wait for more: after a pause that is shorter than the time to the end of the scan, if the radar sends at all.
+    fn wait(&self, limit: Duration, has_received: bool) -> Arrival {
+        let pause = self.sweeps.as_ref().filter(|_| has_received);
+        match pause.and_then(Sweeps::pause) {
+            Some(pause) if pause < limit => Arrival::Later(pause),
+            _ => Arrival::Nothing(limit),
+        }
+    }
+
     fn replace(&mut self, new: Option<Sweeps>) {
         if let Some(old) = mem::replace(&mut self.sweeps, new) {
             self.left_out += old.left_out();
@@ -144,7 +171,7 @@ impl Radar {
 
     /// Handles what is in the parser up to the next complete scan; true if there is one.
     fn parse(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<bool, StageError> {
-        while let Some(event) = self.parser.next() {
+        while let Some(event) = self.messages.next() {
             match event {
                 Event::Message(Message::Azimuth(azimuth)) => {
                     let sweeps = self.sweeps.as_mut();
@@ -163,7 +190,15 @@ impl Radar {
                     skipped_bytes,
                 } => {
                     self.damaged += 1;
-                    tracing::warn!(skipped_bytes, "the radar's messages are damaged: {reason}");
+                    // There may be thousands in a second.
+                    if self.damaged.is_power_of_two() {
+                        let so_far = self.damaged;
+                        tracing::warn!(
+                            skipped_bytes,
+                            so_far,
+                            "the radar's messages are damaged: {reason}"
+                        );
+                    }
                 }
             }
         }
@@ -179,17 +214,21 @@ impl Sensor for Radar {
     }
 
     fn take(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<Arrival, StageError> {
+        let mut has_received = false;
         for _ in 0..MAX_READS {
             if self.parse(header, bytes)? {
                 return Ok(Arrival::Scan);
             }
-            if self.parser.skipped_bytes() > MAX_SKIPPED_BYTES {
+            if self.messages.skipped_bytes() > MAX_SKIPPED_BYTES {
                 self.connection.close("it does not speak Colossus");
             }
-            match self.connection.receive(&mut self.parser) {
-                Received::Bytes => {}
-                Received::Opened => self.replace(None),
-                Received::Nothing(limit) => return Ok(Arrival::Nothing(limit)),
+            match self.connection.receive(&mut self.messages) {
+                Received::Bytes => has_received = true,
+                Received::Opened => {
+                    self.messages = Messages::new(&self.settings);
+                    self.replace(None);
+                }
+                Received::Nothing(limit) => return Ok(self.wait(limit, has_received)),
             }
         }
         Ok(Arrival::Nothing(Duration::ZERO))
@@ -230,6 +269,7 @@ mod tests {
     use gyre_colossus::{ClockFormat, Constants, Powers};
 
     use super::*;
+    use crate::Address;
 
     const START_NS: i64 = 1_700_000_000_000_000_000;
     const AZIMUTHS: u16 = 400;
@@ -244,7 +284,8 @@ mod tests {
             ..Configuration::default()
         };
         let settings = Settings {
-            address: String::new(),
+            address: Address::Tcp(String::new()),
+            encoder_counts: 5600,
             silence: Duration::MAX,
             scans: None,
             constants: Constants::default(),
@@ -280,6 +321,32 @@ mod tests {
         assert_eq!(sweeps.left_out(), 1);
         let later_ns = START_NS + 480_000_000;
         assert_eq!(turn(&mut sweeps, later_ns, 0), Some(0));
+    }
+
+    #[test]
+    fn the_source_sleeps_at_most_half_of_the_time_to_the_end_of_a_scan() {
+        let mut sweeps = sweeps();
+        assert_eq!(turn(&mut sweeps, START_NS, 0), Some(0));
+        let (mut header, mut bytes) = (ScanHeader::default(), vec![0; 400 * 16]);
+        let mut pauses = 0;
+        for row in 0..AZIMUTHS {
+            let stamp_ns = START_NS + 250_000_000 + i64::from(row) * 625_000;
+            let (seconds, split_seconds) = ClockFormat::default().fields(stamp_ns);
+            let azimuth = Azimuth {
+                sweep_counter: row,
+                encoder: row * 14,
+                seconds,
+                split_seconds,
+                powers: Powers::Eight(&[7; 16]),
+            };
+            sweeps.add(azimuth, &mut header, &mut bytes);
+            let left = Duration::from_micros(625) * u32::from(AZIMUTHS - row);
+            if let Some(pause) = sweeps.pause() {
+                assert!(2 * pause <= left && pause <= Duration::from_micros(6250));
+                pauses += 1;
+            }
+        }
+        assert_eq!(pauses, AZIMUTHS - 3, "the last ones are awaited");
     }
 
     #[test]

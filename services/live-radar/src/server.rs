@@ -2,11 +2,12 @@
 
 mod clients;
 mod faults;
+mod group;
 
 use std::{
     f64::consts::TAU,
     io,
-    net::TcpListener,
+    net::{Ipv4Addr, SocketAddrV4, TcpListener},
     ops::Range,
     thread::sleep,
     time::{Duration, Instant},
@@ -18,6 +19,7 @@ use thiserror::Error;
 
 use clients::Clients;
 pub use faults::Faults;
+use group::Group;
 pub use gyre_colossus::{ByteOrder, ClockFormat};
 
 /// Encoder counts in a turn, where a recording does not say.
@@ -28,6 +30,26 @@ const MAX_WAIT: Duration = Duration::from_secs(2);
 const SLICE: Duration = Duration::from_millis(50);
 /// Time between two looks for a client.
 const POLL: Duration = Duration::from_millis(5);
+/// Time between two descriptions of a radar that sends no powers yet.
+const DESCRIBE_PERIOD: Duration = Duration::from_millis(100);
+/// What a garbled message is.
+const GARBAGE: &[u8] = b"not a message of a radar";
+
+/// To whom a recording is played.
+#[derive(Debug)]
+pub enum Audience {
+    /// Who connects by TCP, from the first request for azimuths on.
+    Clients(TcpListener),
+    /// Who receives the datagrams, if anybody.
+    Group {
+        /// The group, or the address of one receiver.
+        to: SocketAddrV4,
+        /// The address of this machine from which they leave; unspecified: the system chooses.
+        interface: Ipv4Addr,
+        /// Time before the first scan, for which only the radar's description of itself is sent.
+        wait: Duration,
+    },
+}
 
 /// How to play.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,18 +94,20 @@ pub struct Played {
     pub scans: u64,
     /// Azimuths that were left out.
     pub lost_azimuths: u64,
+    /// Datagrams that were left out.
+    pub lost_datagrams: u64,
     /// Connections that were reset.
     pub resets: u64,
     /// Stalls.
     pub stalls: u64,
 }
 
-/// Plays a recording to whoever connects, from the first request for azimuths on, until it has ended or `stop` says so.
+/// Plays a recording until it has ended or `stop` says so.
 ///
 /// # Errors
 /// A scan that cannot be read, one that does not fit the protocol, or a failure of the network.
 pub fn serve(
-    listener: TcpListener,
+    audience: Audience,
     dataset: &mut dyn Dataset,
     playback: &Playback,
     stop: &dyn Fn() -> bool,
@@ -92,8 +116,20 @@ pub fn serve(
     let mut scan = OwnedScan::with_limits(dataset.limits());
     scan.geometry = dataset.read(first, scan.slot())?;
     let radar = configuration(dataset, scan.view())?;
+    let mut wait = Duration::ZERO;
+    let output = match audience {
+        Audience::Clients(listener) => Output::Clients(Clients::accept(listener, &radar)?),
+        Audience::Group {
+            to,
+            interface,
+            wait: before,
+        } => {
+            wait = before;
+            Output::Group(Group::open(to, interface, playback.faults)?)
+        }
+    };
     let mut player = Player {
-        clients: Clients::accept(listener, &radar)?,
+        output,
         radar,
         playback,
         stop,
@@ -103,18 +139,21 @@ pub fn serve(
         sweep_counter: 0,
         played: Played::default(),
     };
+    if !player.describe(wait) {
+        return Ok(player.ended());
+    }
     loop {
         let mut last_ns = 0;
         for index in playback.scans.clone() {
             scan.geometry = dataset.read(index, scan.slot())?;
             if !player.play(scan.view()) {
-                return Ok(player.played);
+                return Ok(player.ended());
             }
             last_ns = scan.view().stamp_ns.last().copied().unwrap_or(last_ns);
         }
         if !playback.repeats {
-            player.clients.close();
-            return Ok(player.played);
+            player.close();
+            return Ok(player.ended());
         }
         scan.geometry = dataset.read(first, scan.slot())?;
         let first_ns = scan.stamp_ns.first().copied().unwrap_or_default();
@@ -147,8 +186,14 @@ fn configuration(dataset: &dyn Dataset, scan: PolarScan<'_>) -> Result<Configura
     })
 }
 
+/// Where messages go.
+enum Output {
+    Clients(Clients),
+    Group(Group),
+}
+
 struct Player<'a> {
-    clients: Clients,
+    output: Output,
     radar: Configuration,
     playback: &'a Playback,
     stop: &'a dyn Fn() -> bool,
@@ -182,24 +227,65 @@ impl Player<'_> {
             self.sweep_counter = self.sweep_counter.wrapping_add(1);
             // A row that was not measured was not sent by the radar either.
             let is_measured = scan.flags[row] & flag::MEASURED != 0;
-            if !is_measured || faults.loses(self.played.scans, row) {
+            let is_lost =
+                matches!(self.output, Output::Clients(_)) && faults.loses(self.played.scans, row);
+            if !is_measured || is_lost {
                 self.played.lost_azimuths += 1;
                 continue;
             }
             self.send(&scan, row);
-            if row == scan.geometry.azimuths / 2 && faults.resets(self.played.scans) {
+            if let Output::Clients(clients) = &self.output
+                && row == scan.geometry.azimuths / 2
+                && faults.resets(self.played.scans)
+            {
                 self.played.resets += 1;
-                self.clients.reset();
+                clients.reset();
             }
         }
         self.played.scans += 1;
         !(self.stop)()
     }
 
+    /// Sends only what the radar says of itself for some time, to a group; false on a request to stop.
+    fn describe(&mut self, wait: Duration) -> bool {
+        let end = Instant::now() + wait;
+        while let Output::Group(group) = &mut self.output
+            && Instant::now() < end
+        {
+            group.describe(&self.radar);
+            if (self.stop)() {
+                return false;
+            }
+            sleep(DESCRIBE_PERIOD);
+        }
+        true
+    }
+
+    /// Ends the connections when the clients have read all.
+    fn close(&self) {
+        if let Output::Clients(clients) = &self.output {
+            clients.close();
+        }
+    }
+
+    fn ended(self) -> Played {
+        let lost_datagrams = match &self.output {
+            Output::Clients(_) => 0,
+            Output::Group(group) => group.lost,
+        };
+        Played {
+            lost_datagrams,
+            ..self.played
+        }
+    }
+
     /// Waits for a first client; one that plays as fast as it is read waits for one after each loss, too.
     fn has_client(&mut self) -> bool {
+        let Output::Clients(clients) = &self.output else {
+            return true;
+        };
         let waits = self.started.is_none() || self.playback.rate.is_none();
-        while waits && !self.clients.any_started() {
+        while waits && !clients.any_started() {
             if (self.stop)() {
                 return false;
             }
@@ -255,11 +341,22 @@ impl Player<'_> {
             split_seconds,
             powers: Powers::Eight(scan.row(row)),
         };
-        self.message.clear();
-        if faults.garbles(self.played.scans, row) {
-            self.message.extend_from_slice(b"not a message of a radar");
+        let is_garbled = faults.garbles(self.played.scans, row);
+        match &mut self.output {
+            Output::Clients(clients) => {
+                self.message.clear();
+                if is_garbled {
+                    self.message.extend_from_slice(GARBAGE);
+                }
+                write_azimuth(&mut self.message, &azimuth);
+                clients.send(&self.message);
+            }
+            Output::Group(group) => {
+                if is_garbled {
+                    group.send_garbage(GARBAGE);
+                }
+                group.send(&self.radar, &azimuth);
+            }
         }
-        write_azimuth(&mut self.message, &azimuth);
-        self.clients.send(&self.message);
     }
 }

@@ -28,9 +28,14 @@ pub struct SourceConfig {
     /// `recording`, or `colossus`: a Navtech radar on the network, in live mode. Then `data`, `first`,
     /// `retry_s` and `max_unreadable` are not used.
     pub kind: SourceKind,
-    /// Address of the radar, as in `192.168.0.1`; its port is 6317 unless it is given.
+    /// Address of the radar, as in `192.168.0.1`; its port is 6317 unless it is given. `udp://GROUP:PORT`: where a radar sends to whose
+    /// data output is CAT-240, as in `udp://239.192.43.78:4378`.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub address: String,
+    /// Address of this machine on the network of a radar that sends to a multicast group, as in `192.168.0.2`. Default: the system
+    /// chooses.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub interface: String,
     /// Time without a byte from the radar after which it is connected to anew, s; 0: no limit.
     pub silence_s: f64,
     /// Folder of the recording; `--data` on the command line.
@@ -77,6 +82,7 @@ impl Default for SourceConfig {
         Self {
             kind: SourceKind::Recording,
             address: String::new(),
+            interface: String::new(),
             silence_s: 3.0,
             data: PathBuf::new(),
             from: PlayedFrom::Scan,

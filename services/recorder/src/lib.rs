@@ -4,14 +4,16 @@
 //! limit in bytes. So a slow disk costs memory first, and then messages, which are counted. Nothing that the recorder does reaches the
 //! run: see [`gyre_stage::observer`].
 //!
-//! Reading order: `recorder` (the loop), `tap` (the observers), `queue`, `writing` (the other thread), `log_tail`.
+//! Reading order: `recorder` (the loop), `tap` (the observers), `queue`, `writing` (the other thread), `log_tail`, `health`.
 
+mod health;
 mod log_tail;
 mod queue;
 mod recorder;
 mod tap;
 mod writing;
 
+pub use gyre_recording::Split;
 pub use log_tail::LogTail;
 pub use recorder::{Options, Recorded, RecorderError, record};
 pub use tap::now_ns;

@@ -21,6 +21,8 @@ pub(crate) enum Entry {
     /// Messages of a topic that were missed, without one after them.
     Missed(&'static str, u64),
     Log(LogLine),
+    /// The run's health, JSON, and when it was told, ns since 1970.
+    Health(String, i64),
 }
 
 impl Entry {
@@ -29,6 +31,7 @@ impl Entry {
             Self::Message(message) => message.header.len() + message.payload.len(),
             Self::Missed(..) => 0,
             Self::Log(line) => line.message.len(),
+            Self::Health(json, _) => json.len(),
         }
     }
 }

@@ -3,12 +3,13 @@
 use std::{
     fmt, fs,
     path::{Path, PathBuf},
+    sync::mpsc::Receiver,
     thread::{self, JoinHandle},
     time::{Duration, Instant},
 };
 
 use gyre_messages::{Message, Refined, Sender as PublishedBy, topic};
-use gyre_recording::{Head, Recording, RecordingError, RecordingWriter, next_part};
+use gyre_recording::{Head, Recording, RecordingError, Split, SplitWriter, next_part};
 use gyre_stage::{
     Manifest, StageError, launch,
     observer::{ObservedRun, wait_for_any},
@@ -18,6 +19,7 @@ use gyre_stage::{
 use thiserror::Error;
 
 use crate::{
+    health::health,
     log_tail::LogTail,
     queue::{Entry, LIMIT_BYTES, Sender, queue},
     tap::{Counts, Tap, now_ns, tap},
@@ -28,6 +30,8 @@ use crate::{
 const NAME: &str = "recorder";
 /// The topic of log lines, which is no topic of the transport.
 const LOG: &str = "log";
+/// That of the run's health, no more.
+const HEALTH: &str = "health";
 /// The topics that are recorded unless others are named.
 const DEFAULT: [&str; 7] = [
     "scan",
@@ -48,8 +52,10 @@ pub struct Options {
     pub out: PathBuf,
     /// The file.
     pub to: PathBuf,
-    /// The topics, `log` among them; empty: the default ones that the run has.
+    /// The topics, `log` and `health` among them; empty: the default ones that the run has.
     pub topics: Vec<String>,
+    /// When a file is ended and the next part begun.
+    pub split: Split,
     /// Whether a recording that is there is one of this run, which another recorder has begun: it goes on in its next part.
     pub continues: bool,
 }
@@ -113,7 +119,7 @@ pub enum RecorderError {
     Exists(PathBuf),
     /// No such topic.
     #[error(
-        "there is no topic `{0}`: there are scan, masked, rotation, motion, refined, pose, loop, correction, fix and log"
+        "there is no topic `{0}`: there are scan, masked, rotation, motion, refined, pose, loop, correction, fix, log and health"
     )]
     NoTopic(String),
     /// The thread that writes has ended without a reason.
@@ -147,14 +153,15 @@ pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
     let signals = Signals::install()?;
     let topics = topics(&options.topics, manifest)?;
     let (path, head) = begin(options, manifest, &topics)?;
-    let writer = RecordingWriter::create(&path, &head)?;
+    let writer = SplitWriter::create(options.to.clone(), head, options.split)?;
     let taps = topics.iter().filter_map(|topic| tap(&run, topic));
     let taps = taps.collect::<Result<Vec<_>, _>>()?;
     if options.continues {
         run.is_ready()?;
     }
-    let has_log = topics.iter().any(|topic| topic == LOG);
-    let log = has_log.then(|| LogTail::new(&manifest.events()));
+    let has = |name| topics.iter().any(|topic| topic == name);
+    let log = has(LOG).then(|| LogTail::new(&manifest.events()));
+    let health = has(HEALTH).then(|| health(manifest.out.clone()));
     let (sender, receiver) = queue(LIMIT_BYTES);
     let writing = thread::spawn(move || writing::write(writer, &receiver));
     let mut recorder = Recorder {
@@ -162,6 +169,7 @@ pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
         signals,
         taps,
         log,
+        health,
         queue: sender,
         told: 0,
         due: Instant::now(),
@@ -186,12 +194,12 @@ fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<String>, Recorder
             Some(PublishedBy::Follower(follower)) => follower.is_in(&manifest.window),
             _ => *name != Refined::TOPIC || manifest.refines,
         };
-        let topics = DEFAULT.into_iter().filter(has).chain([LOG]);
+        let topics = DEFAULT.into_iter().filter(has).chain([LOG, HEALTH]);
         return Ok(topics.map(str::to_owned).collect());
     }
     match named
         .iter()
-        .find(|name| *name != LOG && topic(name).is_none())
+        .find(|name| *name != LOG && *name != HEALTH && topic(name).is_none())
     {
         Some(unknown) => Err(RecorderError::NoTopic(unknown.clone())),
         None => Ok(named.to_vec()),
@@ -224,7 +232,7 @@ fn begin(
         configuration,
         topics: topics
             .iter()
-            .filter(|topic| *topic != LOG)
+            .filter(|topic| *topic != LOG && *topic != HEALTH)
             .cloned()
             .collect(),
         scan_bytes: manifest.limits.scan_bytes,
@@ -238,6 +246,7 @@ struct Recorder<'run> {
     signals: Signals,
     taps: Vec<Box<dyn Tap + 'run>>,
     log: Option<LogTail>,
+    health: Option<Receiver<String>>,
     queue: Sender,
     /// Missed messages that the log tells of.
     told: u64,
@@ -270,6 +279,9 @@ impl Recorder<'_> {
         self.say_what_is_missed();
         for line in self.log.iter_mut().flat_map(|log| log.lines(now_ns())) {
             self.queue.put(Entry::Log(line));
+        }
+        for json in self.health.iter().flat_map(Receiver::try_iter) {
+            self.queue.put(Entry::Health(json, now_ns()));
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, time::Duration};
 
-use gyre_recording::{RecordingError, RecordingWriter};
+use gyre_recording::{RecordingError, SplitWriter};
 
 use crate::queue::{Entry, Receiver, Taken};
 
@@ -14,7 +14,7 @@ const LOOK: Duration = Duration::from_millis(100);
 /// # Errors
 /// The file cannot be written.
 pub(crate) fn write(
-    mut recording: RecordingWriter,
+    mut recording: SplitWriter,
     queue: &Receiver,
 ) -> Result<BTreeMap<String, u64>, RecordingError> {
     loop {
@@ -22,6 +22,7 @@ pub(crate) fn write(
             Taken::Entry(Entry::Message(message)) => recording.add(&message)?,
             Taken::Entry(Entry::Missed(topic, missed)) => recording.missed(topic, missed),
             Taken::Entry(Entry::Log(line)) => recording.add_log(line)?,
+            Taken::Entry(Entry::Health(json, now_ns)) => recording.add_health(&json, now_ns)?,
             Taken::Idle => recording.flush_if_due()?,
             Taken::Ended => return recording.finish(),
         }

@@ -5,12 +5,14 @@
 //! - [`configuration`]: the radar's description of itself, its first message;
 //! - [`write`](mod@write): messages as bytes, for clients and servers;
 //! - [`parser`]: messages from any pieces of a stream of bytes, damaged ones included;
+//! - [`asterix`]: the same messages from the datagrams of a radar that sends by UDP;
 //! - [`clock`]: the time of each azimuth;
 //! - [`sweep`]: azimuths to scans.
 //!
 //! A client connects to [`PORT`]. The radar sends its configuration, the client sends [`Request::StartFft`], and the radar sends
 //! azimuths until [`Request::StopFft`]. A radar has at most three clients.
 
+pub mod asterix;
 pub mod clock;
 pub mod configuration;
 mod kept;
@@ -20,6 +22,7 @@ pub mod parser;
 pub mod sweep;
 pub mod write;
 
+pub use asterix::{Datagrams, MalformedDatagram};
 pub use clock::{ByteOrder, ClockFormat, FoundClock, RadarClock, SplitUnit};
 pub use configuration::{BadConfiguration, Configuration};
 pub use malformed::MalformedMessage;

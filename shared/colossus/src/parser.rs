@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use crate::asterix::MalformedDatagram;
 use crate::malformed::MalformedMessage;
 use crate::message::{HEADER_BYTES, MAX_PAYLOAD_BYTES, Message, SIGNATURE, VERSION, decode};
 
@@ -43,6 +44,9 @@ pub enum Damage {
     /// The payload does not fit the message.
     #[error(transparent)]
     Malformed(#[from] MalformedMessage),
+    /// A datagram is no part of an azimuth.
+    #[error(transparent)]
+    Datagram(#[from] MalformedDatagram),
 }
 
 /// A buffer that is filled from a socket, and the messages in it.

@@ -129,6 +129,13 @@ impl SweepAssembler {
         self.counters
     }
 
+    /// Returns the number of azimuths from the last one to the end of its turn; `None` before the first one. No scan is complete before
+    /// they are there.
+    pub fn azimuths_left(&self) -> Option<f64> {
+        let last = self.last?;
+        Some(self.grid.azimuths_after(last))
+    }
+
     /// Returns the order of the two bytes of 16-bit powers, once it is known. It is not documented: it is the one in which neighbouring
     /// bins differ less. In the wrong order the noise of the less significant byte is the more significant one.
     pub fn power_order(&self) -> Option<ByteOrder> {

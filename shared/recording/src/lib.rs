@@ -17,7 +17,7 @@
 //! Behind each chunk a metadata record (`table`) lists the messages in it and what was missed so far. So a reader finds a message
 //! without decompressing what is before it, also in a file that has no summary because its writer was killed.
 //!
-//! Reading order: `head` and `table` (the metadata), `writer`, `walk` (the records of a file), `recording`, `scans` (a
+//! Reading order: `head` and `table` (the metadata), `writer`, `split` (several files), `walk` (the records of a file), `recording`, `scans` (a
 //! [`Dataset`](gyre_radar::Dataset)).
 
 mod chunk;
@@ -28,6 +28,7 @@ mod open;
 mod parts;
 mod recording;
 mod scans;
+mod split;
 mod table;
 pub mod view;
 mod walk;
@@ -38,6 +39,7 @@ pub use head::Head;
 pub use open::{is_recording, open, open_recording, open_resolved, reopen, stored_options};
 pub use parts::{next_part, parts};
 pub use recording::{Recording, Stored};
+pub use split::{Split, SplitWriter};
 pub use table::Entry;
 pub use view::LogLine;
 pub use writer::{Incoming, RecordingWriter};

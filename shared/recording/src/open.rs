@@ -4,12 +4,18 @@ use std::path::{Path, PathBuf};
 
 use gyre_radar::{Dataset, DatasetOptions, FileList, Format, OpenError};
 
-use crate::{Recording, RecordingError, parts::parts, scans::Scans};
+use crate::{
+    Recording, RecordingError,
+    parts::{first_part_in, parts},
+    scans::Scans,
+};
 
-/// Returns whether a path names a recording of a run.
+/// Returns whether a path names a recording of a run: its first file, or a folder that holds it and no other one.
 pub fn is_recording(path: &Path) -> bool {
-    path.extension()
-        .is_some_and(|extension| extension == "mcap")
+    let is_named = path
+        .extension()
+        .is_some_and(|extension| extension == "mcap");
+    is_named || first_part_in(path).is_some()
 }
 
 /// As [`gyre_radar::open`].

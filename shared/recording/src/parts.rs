@@ -1,6 +1,10 @@
-//! The files of a recording: FILE.mcap, and FILE.2.mcap, FILE.3.mcap and so on, which recorders that were restarted have begun.
+//! The files of a recording: FILE.mcap, and FILE.2.mcap, FILE.3.mcap and so on, which are begun when the one before is large or
+//! long enough, and by recorders that were restarted.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 /// Returns the path of a part, from 1.
 fn part(path: &Path, number: usize) -> PathBuf {
@@ -10,10 +14,33 @@ fn part(path: &Path, number: usize) -> PathBuf {
     }
 }
 
-/// Returns the files of a recording that exist, in order.
+/// Returns the files of a recording that exist, in order. It is named by its first file, or by a folder that holds it and no other one.
 pub fn parts(path: &Path) -> Vec<PathBuf> {
+    if path.is_dir() {
+        return first_part_in(path).map_or_else(Vec::new, |first| parts(&first));
+    }
     let paths = (1..).map(|number| part(path, number));
     paths.take_while(|path| path.exists()).collect()
+}
+
+/// Returns the first file of the only recording in a folder.
+pub(crate) fn first_part_in(folder: &Path) -> Option<PathBuf> {
+    let files = fs::read_dir(folder).ok()?.flatten();
+    let files = files.map(|file| file.path()).filter(|path| {
+        let is_recording = path.extension().is_some_and(|it| it == "mcap");
+        is_recording && !is_later_part(path)
+    });
+    let mut first: Vec<PathBuf> = files.take(2).collect();
+    first.pop().filter(|_| first.is_empty())
+}
+
+/// Returns whether a file is NAME.N.mcap beside NAME.mcap.
+fn is_later_part(path: &Path) -> bool {
+    let name = path.with_extension("");
+    let number = name
+        .extension()
+        .and_then(|it| it.to_str()?.parse::<usize>().ok());
+    number.is_some_and(|number| number > 1) && name.with_extension("mcap").exists()
 }
 
 /// Returns the path and the number of the part that does not exist yet.
@@ -38,5 +65,8 @@ mod tests {
         std::fs::write(&second, "").unwrap();
         assert_eq!(parts(&path), [path.clone(), second]);
         assert_eq!(next_part(&path).1, 3);
+        assert_eq!(parts(folder.path()), parts(&path), "a folder of one");
+        std::fs::write(folder.path().join("b.mcap"), "").unwrap();
+        assert!(parts(folder.path()).is_empty(), "a folder of two");
     }
 }

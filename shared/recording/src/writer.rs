@@ -4,6 +4,7 @@ use std::{
     collections::BTreeMap,
     fs::{File, OpenOptions},
     io::Seek,
+    mem,
     os::unix::fs::OpenOptionsExt,
     path::{Path, PathBuf},
     time::{Duration, Instant},
@@ -28,6 +29,10 @@ const FLUSH_PERIOD: Duration = Duration::from_millis(500);
 const CHUNK_BYTES: usize = 4 << 20;
 /// The fastest level with entropy coding: the noise in a scan has no repetitions, but few values.
 const LEVEL: u32 = 1;
+
+/// The channel of the run's health, and its schema: any JSON object.
+const HEALTH: &str = "/health";
+const HEALTH_SCHEMA: &[u8] = br#"{"type":"object"}"#;
 
 /// A wire message to record.
 #[derive(Clone, Debug)]
@@ -60,6 +65,8 @@ pub struct RecordingWriter {
     pending: (usize, Option<Instant>),
     /// The newest time of the sensor, which log lines are placed at.
     newest_ns: Option<i64>,
+    /// The time of the first message in this file.
+    first_ns: Option<i64>,
     /// Log lines that came before the first message.
     early: Vec<LogLine>,
 }
@@ -120,6 +127,7 @@ impl RecordingWriter {
             table: Table::default(),
             pending: (0, None),
             newest_ns: None,
+            first_ns: None,
             early: Vec::new(),
         };
         writer.begin(head).map_err(unwritable)?;
@@ -194,7 +202,8 @@ impl RecordingWriter {
             .push(entry);
         self.missed(topic, message.missed);
         self.newest_ns = self.newest_ns.max(Some(item.stamp_ns));
-        for line in std::mem::take(&mut self.early) {
+        self.first_ns.get_or_insert(item.stamp_ns);
+        for line in mem::take(&mut self.early) {
             self.try_add_log(&line)?;
         }
         Ok(())
@@ -223,6 +232,46 @@ impl RecordingWriter {
     fn try_add_log(&mut self, line: &LogLine) -> Result<(), McapError> {
         let stamp_ns = self.newest_ns.unwrap_or(line.written_ns);
         self.view(&View::log(line), Times::new(stamp_ns, line.written_ns, 0))
+    }
+
+    /// Adds the health of the run, JSON, at the time of the newest scan; before the first one it is left out.
+    ///
+    /// # Errors
+    /// As [`RecordingWriter::add`].
+    pub fn add_health(&mut self, json: &str, now_ns: i64) -> Result<(), RecordingError> {
+        let Some(stamp_ns) = self.newest_ns else {
+            return Ok(());
+        };
+        let added = self.try_add_health(json, Times::new(stamp_ns, now_ns, 0));
+        self.checked(added)
+    }
+
+    fn try_add_health(&mut self, json: &str, times: Times) -> Result<(), McapError> {
+        let channel = match self.channels.get(HEALTH) {
+            Some(channel) => *channel,
+            None => {
+                let schema = self
+                    .mcap()?
+                    .add_schema("gyre.Health", "jsonschema", HEALTH_SCHEMA)?;
+                let channel = self
+                    .mcap()?
+                    .add_channel(schema, HEALTH, "json", &BTreeMap::new())?;
+                self.channels.insert(HEALTH.to_owned(), channel);
+                channel
+            }
+        };
+        self.write(channel, json.as_bytes(), times)
+    }
+
+    /// Returns the bytes in the file.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.complete_bytes
+    }
+
+    /// Returns the time from the first message of the file to the newest one on the sensor's clock, ns.
+    pub(crate) fn span_ns(&self) -> i64 {
+        let newest_ns = self.newest_ns.zip(self.first_ns);
+        newest_ns.map_or(0, |(newest, first)| newest.saturating_sub(first))
     }
 
     fn view(&mut self, view: &View, times: Times) -> Result<(), McapError> {
@@ -302,14 +351,32 @@ impl RecordingWriter {
     /// # Errors
     /// As [`RecordingWriter::add`].
     pub fn finish(mut self) -> Result<BTreeMap<String, u64>, RecordingError> {
-        for line in std::mem::take(&mut self.early) {
+        for line in mem::take(&mut self.early) {
             let added = self.try_add_log(&line);
             self.checked(added)?;
         }
+        self.end()?;
+        Ok(self.table.missed)
+    }
+
+    /// Ends this file and goes on in the next part; returns the number of messages missed in this one, by topic.
+    pub(crate) fn go_on(
+        &mut self,
+        path: &Path,
+        head: &Head,
+    ) -> Result<BTreeMap<String, u64>, RecordingError> {
+        self.end()?;
+        let next = Self::create(path, head)?;
+        let before = mem::replace(self, next);
+        // What viewers draw goes on.
+        (self.views, self.newest_ns) = (before.views, before.newest_ns);
+        Ok(before.table.missed)
+    }
+
+    fn end(&mut self) -> Result<(), RecordingError> {
         self.flush()?;
         let finished = self.mcap().and_then(Writer::finish).map(drop);
-        self.checked(finished)?;
-        Ok(self.table.missed)
+        self.checked(finished)
     }
 
     fn mcap(&mut self) -> Result<&mut Writer<File>, McapError> {

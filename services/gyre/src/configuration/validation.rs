@@ -34,6 +34,7 @@ impl Configuration {
         }
         self.validate_radar()?;
         self.validate_budget()?;
+        self.validate_record()?;
         if self.source.burst.get() > 1 && self.run.rate == Rate::Max {
             let reason = "burst needs a pace: set run.rate to `realtime` or a factor";
             return Err(value("source", reason));
@@ -92,8 +93,14 @@ impl Configuration {
                 "source",
                 "address is missing: give the radar's, as in `192.168.0.1`",
             )),
-            false => Ok(()),
+            false => crate::radar::settings(source, &self.dataset)
+                .map(drop)
+                .map_err(|error| value("source", error.to_string())),
         }
+    }
+
+    fn validate_record(&self) -> Result<(), ConfigurationError> {
+        seconds("record", "split_s", self.record.split_s)
     }
 
     fn validate_budget(&self) -> Result<(), ConfigurationError> {

@@ -3,8 +3,12 @@
 /// Faults to make while playing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Faults {
-    /// Share of the azimuths that are lost.
+    /// Share of the azimuths, or of the datagrams, that are lost.
     pub lost: f64,
+    /// Share of the datagrams that are sent twice.
+    pub doubled: f64,
+    /// Share of the datagrams that are sent after the next one.
+    pub swapped: f64,
     /// The connections are reset in the middle of every n-th scan.
     pub reset_every: Option<u64>,
     /// Nothing is sent for `stall_s` before every n-th scan.
@@ -19,6 +23,21 @@ impl Faults {
     /// Returns whether an azimuth is lost.
     pub(super) fn loses(&self, scan: u64, row: usize) -> bool {
         uniform(scan, row as u64) < self.lost
+    }
+
+    /// Returns whether a datagram is lost.
+    pub(super) fn loses_datagram(&self, number: u64) -> bool {
+        uniform(number, 0) < self.lost
+    }
+
+    /// Returns whether a datagram is sent twice.
+    pub(super) fn doubles(&self, number: u64) -> bool {
+        uniform(number, 1) < self.doubled
+    }
+
+    /// Returns whether a datagram is sent after the next one.
+    pub(super) fn swaps(&self, number: u64) -> bool {
+        uniform(number, 2) < self.swapped
     }
 
     /// Returns whether the connections are reset in a scan.

@@ -56,6 +56,11 @@ impl Grid {
         f64::from(last.encoder) + self.step >= f64::from(self.encoder_size)
     }
 
+    /// Returns the number of azimuths between one and the end of its turn.
+    pub(super) fn azimuths_after(&self, last: Place) -> f64 {
+        (f64::from(self.encoder_size) - f64::from(last.encoder)) / self.step
+    }
+
     /// Returns whether the time between two azimuths is not that of the rotation between them.
     pub(super) fn is_break(&self, last: Place, here: Place) -> bool {
         let expected_ns = self.counts(last, here) * self.ns_per_count;

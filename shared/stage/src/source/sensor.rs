@@ -13,7 +13,7 @@ use crate::{
 /// Time for which the supervisor need not intervene: this loop says again and again that it is not late, since a radar that is
 /// switched off is no reason to restart it.
 const ALIVE_NS: i64 = 5_000_000_000;
-/// Time between two such words, ns: it wakes for each azimuth, and a word is a write to a file.
+/// Time between two such words, ns: it wakes many times for each scan, and a word is a write to a file.
 const SAID_EVERY_NS: i64 = 1_000_000_000;
 
 /// A sensor that delivers scans by itself.
@@ -42,6 +42,8 @@ pub enum Arrival {
     Scan,
     /// No scan is complete yet. Without a connection [`Sensor::take`] is to be called again after this time.
     Nothing(Duration),
+    /// No scan can be complete before this time has passed: the connection need not wake until then.
+    Later(Duration),
 }
 
 /// Publishes what a sensor delivers until SIGTERM, or until `scans` scans are published.
@@ -118,6 +120,11 @@ impl Stream<'_> {
                     }
                     Arrival::Nothing(limit) => {
                         if self.sleep(sensor.connection(), limit)? {
+                            return Ok(());
+                        }
+                    }
+                    Arrival::Later(time) => {
+                        if self.sleep(None, time)? {
                             return Ok(());
                         }
                     }

@@ -1,0 +1,73 @@
+//! The arguments of `gyre radar-server`.
+
+use std::{
+    net::{Ipv4Addr, SocketAddrV4},
+    path::PathBuf,
+};
+
+use clap::Args;
+
+use crate::configuration::Rate;
+
+/// The arguments of `gyre radar-server`.
+#[derive(Debug, Args)]
+pub struct RadarServerArguments {
+    /// A configuration, a TOML file: its sections `[simulation]`, `[source]` and `[dataset]`.
+    pub configuration: Option<PathBuf>,
+    /// The dataset's folder.
+    #[arg(long)]
+    pub data: Option<PathBuf>,
+    /// The address to serve at. At another than the loopback's the whole network can read the scans: the protocol has no token.
+    #[arg(long, default_value = "127.0.0.1:6317", value_name = "ADDRESS")]
+    pub listen: String,
+    /// Send the scans by UDP, as ASTERIX CAT-240, to this group or receiver, instead of serving them by TCP: 239.192.43.78:4378.
+    #[arg(long, value_name = "GROUP:PORT", conflicts_with_all = ["listen", "reset_every", "big_endian"])]
+    pub udp: Option<SocketAddrV4>,
+    /// The address of this machine by which datagrams leave; 0.0.0.0: the system chooses.
+    #[arg(
+        long,
+        default_value = "127.0.0.1",
+        value_name = "ADDRESS",
+        requires = "udp"
+    )]
+    pub interface: Ipv4Addr,
+    /// Time before the first scan for which only the radar's description of itself is sent by UDP, s.
+    #[arg(long, default_value_t = 0.0, value_name = "S", requires = "udp")]
+    pub wait_s: f64,
+    /// Pace: realtime, max (as fast as it is read), or a factor.
+    #[arg(long, default_value = "realtime")]
+    pub rate: Rate,
+    /// Scans to play. Default: all.
+    #[arg(long)]
+    pub scans: Option<usize>,
+    /// Play again and again, with times that go on.
+    #[arg(long)]
+    pub repeat: bool,
+    /// Lose this share of the azimuths, or of the datagrams.
+    #[arg(long, default_value_t = 0.0, value_name = "SHARE")]
+    pub lose: f64,
+    /// Send this share of the datagrams twice.
+    #[arg(long, default_value_t = 0.0, value_name = "SHARE", requires = "udp")]
+    pub double: f64,
+    /// Send this share of the datagrams after the next one.
+    #[arg(long, default_value_t = 0.0, value_name = "SHARE", requires = "udp")]
+    pub swap: f64,
+    /// Reset the connections in the middle of every Nth scan.
+    #[arg(long, value_name = "N")]
+    pub reset_every: Option<u64>,
+    /// Send nothing for --stall-s before every Nth scan.
+    #[arg(long, value_name = "N")]
+    pub stall_every: Option<u64>,
+    /// Length of a stall, s.
+    #[arg(long, default_value_t = 4.0, value_name = "S")]
+    pub stall_s: f64,
+    /// Send bytes that are no message in the middle of every Nth scan.
+    #[arg(long, value_name = "N")]
+    pub garbage_every: Option<u64>,
+    /// Write the times big-endian, as some clients expect.
+    #[arg(long)]
+    pub big_endian: bool,
+    /// Override a key, as in source.first=100; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+}

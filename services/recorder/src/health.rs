@@ -1,0 +1,50 @@
+//! The health of the run, as its supervisor tells it: for recordings, in which one sees later when a process died.
+
+use std::{
+    path::PathBuf,
+    sync::mpsc::{self, Receiver},
+    thread,
+    time::Duration,
+};
+
+use gyre_stage::{
+    control::{Control, Status},
+    usage::Usage,
+};
+use serde::Serialize;
+
+/// Time between two questions.
+const PERIOD: Duration = Duration::from_secs(1);
+
+/// What `gyre ps --json` says of a run.
+#[derive(Serialize)]
+struct Health {
+    status: Status,
+    /// What the processes use, in the order of the status.
+    usage: Vec<Option<Usage>>,
+}
+
+/// Asks the supervisor of a run once a second, in a thread of its own, which ends when nobody takes what it says. A supervisor that is
+/// busy answers late, and recording does not wait for it.
+pub(crate) fn health(out: PathBuf) -> Receiver<String> {
+    let (sender, receiver) = mpsc::sync_channel(1);
+    thread::spawn(move || {
+        loop {
+            let answer = Control::of(&out).and_then(|run| run.status());
+            let health = answer.ok().map(|status| Health {
+                usage: status
+                    .processes
+                    .iter()
+                    .map(|it| Usage::of(it.pid))
+                    .collect(),
+                status,
+            });
+            let json = health.and_then(|health| serde_json::to_string(&health).ok());
+            if json.is_some_and(|json| sender.send(json).is_err()) {
+                return;
+            }
+            thread::sleep(PERIOD);
+        }
+    });
+    receiver
+}

@@ -1,0 +1,155 @@
+//! Azimuths from datagrams, in any order, doubled or lost.
+
+use std::mem;
+
+use super::{MalformedDatagram, Video, assembly::Assembly, decode};
+use crate::configuration::Configuration;
+use crate::message::Message;
+use crate::parser::{Damage, Event};
+
+/// The largest datagram.
+const MAX_BYTES: usize = 1 << 16;
+/// The largest step of the number of a message: a larger one is that of a radar that has been started anew.
+const MAX_STEP: i32 = 1 << 16;
+
+/// A buffer that is filled with one datagram after the other, and the messages in them: those of the TCP protocol.
+///
+/// Read a datagram into [`Datagrams::space`], say how long it is with [`Datagrams::filled`], and take all events with
+/// [`Datagrams::next`]. The first event is the radar's description of itself, which each datagram carries.
+///
+/// An azimuth is returned when its last part is there, in whatever order they come. It is lost if a part of another azimuth comes
+/// before that: no azimuth waits for another. So the scan says which azimuths were lost.
+#[derive(Clone, Debug)]
+pub struct Datagrams {
+    encoder_size: u16,
+    buffer: Vec<u8>,
+    /// Bytes of the datagram in the buffer; 0: none.
+    filled: usize,
+    described: Option<Configuration>,
+    /// Number of the newest message.
+    newest: Option<u32>,
+    open: Assembly,
+    /// The azimuth that was returned last, when the datagram in the buffer is still to be handled.
+    ended: Assembly,
+    lost: u64,
+}
+
+/// What a datagram leads to.
+enum Step {
+    Nothing,
+    Description(Configuration),
+    /// The open azimuth is complete.
+    Complete,
+    /// The azimuth before this datagram's has ended; the datagram is still to be handled.
+    Ended,
+}
+
+impl Datagrams {
+    /// Returns a parser for a radar whose encoder has so many counts per turn: angles are rounded to them.
+    pub fn new(encoder_size: u16) -> Self {
+        Self {
+            encoder_size,
+            buffer: vec![0; MAX_BYTES],
+            filled: 0,
+            described: None,
+            newest: None,
+            open: Assembly::default(),
+            ended: Assembly::default(),
+            lost: 0,
+        }
+    }
+
+    /// Returns memory to read a datagram into, once all events have been taken.
+    pub fn space(&mut self) -> &mut [u8] {
+        &mut self.buffer
+    }
+
+    /// Says that the first `bytes` of the space are a datagram.
+    pub fn filled(&mut self, bytes: usize) {
+        self.filled = bytes.min(MAX_BYTES);
+    }
+
+    /// Returns the azimuths of which a part, but not all, has arrived.
+    pub fn lost_azimuths(&self) -> u64 {
+        self.lost
+    }
+
+    /// Returns the next message or fault; `None` until the next datagram is there.
+    #[expect(
+        clippy::should_implement_trait,
+        reason = "a message borrows the parser"
+    )]
+    pub fn next(&mut self) -> Option<Event<'_>> {
+        let bytes = mem::take(&mut self.filled);
+        if bytes == 0 {
+            return None;
+        }
+        // The buffer is not changed by what follows.
+        let buffer = mem::take(&mut self.buffer);
+        let step = decode(&buffer[..bytes]).map(|video| match video {
+            Some(video) => self.step(&video),
+            None => Step::Nothing,
+        });
+        self.buffer = buffer;
+        match step {
+            Ok(Step::Nothing) => None,
+            Ok(Step::Description(configuration)) => {
+                self.filled = bytes;
+                Some(Event::Message(Message::Configuration(configuration)))
+            }
+            Ok(Step::Complete) => message(&self.open, self.encoder_size),
+            Ok(Step::Ended) => {
+                self.filled = bytes;
+                message(&self.ended, self.encoder_size)
+            }
+            Err(malformed) => Some(damaged(malformed, bytes)),
+        }
+    }
+
+    fn step(&mut self, video: &Video<'_>) -> Step {
+        let configuration = video.configuration(self.encoder_size);
+        if self.described != Some(configuration) {
+            self.described = Some(configuration);
+            return Step::Description(configuration);
+        }
+        let ahead = |newest: u32| video.number.wrapping_sub(newest) as i32;
+        let ahead = self.newest.map_or(1, ahead);
+        let is_late = (-MAX_STEP..=0).contains(&ahead);
+        if !video.powers.is_empty() && !self.open.is_of(video) {
+            if is_late {
+                // Its azimuth was complete, or lost.
+                return Step::Nothing;
+            }
+            if self.open.ends_before(video.number) {
+                mem::swap(&mut self.open, &mut self.ended);
+                self.open = Assembly::default();
+                return Step::Ended;
+            }
+            self.lost += u64::from(self.open.is_open());
+            self.open.begin(video);
+        }
+        if !is_late {
+            self.newest = Some(video.number);
+        }
+        match !video.powers.is_empty() && self.open.add(video) {
+            true => Step::Complete,
+            false => Step::Nothing,
+        }
+    }
+}
+
+fn message(azimuth: &Assembly, encoder_size: u16) -> Option<Event<'_>> {
+    let azimuth = azimuth.azimuth(encoder_size)?;
+    Some(Event::Message(Message::Azimuth(azimuth)))
+}
+
+fn damaged(malformed: MalformedDatagram, bytes: usize) -> Event<'static> {
+    Event::Damaged {
+        reason: Damage::Datagram(malformed),
+        skipped_bytes: bytes,
+    }
+}
+
+#[cfg(test)]
+#[path = "tests.rs"]
+mod tests;
