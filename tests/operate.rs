@@ -25,7 +25,7 @@ const MODERATE: &str = "3";
 const THIRD: usize = recording::SCANS / 3;
 
 /// A command about a run.
-fn ask(run: &Run, arguments: &[&str]) -> Ended {
+pub fn ask(run: &Run, arguments: &[&str]) -> Ended {
     let mut command = gyre();
     command.args(arguments).arg("--out").arg(run.out());
     Ended::of(command)
@@ -70,7 +70,7 @@ fn up(run: &Run) -> Command {
 }
 
 /// Waits until the run's state is as wanted.
-fn await_status(run: &Run, what: &str, is_as_wanted: impl Fn(&Value) -> bool) -> Value {
+pub fn await_status(run: &Run, what: &str, is_as_wanted: impl Fn(&Value) -> bool) -> Value {
     let since = Instant::now();
     loop {
         match status(run) {
@@ -81,7 +81,7 @@ fn await_status(run: &Run, what: &str, is_as_wanted: impl Fn(&Value) -> bool) ->
     }
 }
 
-fn process<'a>(status: &'a Value, name: &str) -> &'a Value {
+pub fn process<'a>(status: &'a Value, name: &str) -> &'a Value {
     let processes = status["processes"].as_array().unwrap();
     processes.iter().find(|it| it["name"] == name).unwrap()
 }
@@ -91,6 +91,25 @@ fn started() -> (Run, Running) {
     let mut running = run.start();
     running.await_poses(THIRD / 2);
     (run, running)
+}
+
+#[test]
+fn a_health_check_names_the_process_that_is_silent_and_fails_without_a_run() {
+    let (run, mut running) = started();
+    let check = || ask(&run, &["ps", "--check"]);
+    await_status(&run, "all there", |status| status["phase"] == "running");
+    assert!(check().succeeded().stdout.is_empty());
+    let masking = running.await_stage("masking");
+    send(masking, Signal::STOP);
+    await_status(&run, "silence", |status| {
+        process(status, "masking")["activity"] == "silent"
+    });
+    let failed = check();
+    assert_eq!(failed.status.code(), Some(1));
+    assert!(failed.stderr.contains("masking is silent"), "{failed:?}");
+    send(masking, Signal::CONT);
+    running.finish().succeeded();
+    assert_eq!(check().status.code(), Some(1), "the run has ended");
 }
 
 #[test]

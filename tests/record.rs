@@ -10,8 +10,12 @@ use std::{
 
 use gyre_recording::{Recording, open_recording, parts};
 use rustix::process::Signal;
+use serde_json::{Value, json};
 
-use crate::common::{Ended, Run, Running, gyre, processes, python, real_data, send};
+use crate::{
+    common::{Ended, Run, Running, gyre, processes, python, real_data, send},
+    operate::{ask, await_status, process},
+};
 
 const SCANS: usize = 24;
 /// Every topic that a replay can begin with.
@@ -216,6 +220,45 @@ fn health(recording: &Path) -> Vec<serde_json::Value> {
 }
 
 #[test]
+fn the_recorder_is_listed_with_the_processes_and_started_again_on_request() {
+    let undisturbed = simulated().complete();
+    let run = recorded(&simulated()).rate("1");
+    let mut running = run.start();
+    running.await_poses(SCANS / 4);
+    let recorder = |what, is_as_wanted: &dyn Fn(&Value) -> bool| {
+        let status = await_status(&run, what, |status| {
+            is_as_wanted(process(status, "recorder"))
+        });
+        process(&status, "recorder").clone()
+    };
+    let first = recorder("a heartbeat", &|it| it["activity"] == "waiting");
+    assert_eq!(
+        (&first["restarts"], &first["missed"]),
+        (&json!(0), &json!(0))
+    );
+    assert!(ask(&run, &["ps"]).stdout.contains("\n  recorder "));
+    assert!(ask(&run, &["top", "--once"]).stdout.contains("\nrecorder "));
+    ask(&run, &["restart", "recorder"]).succeeded();
+    let second = recorder("a restart", &|it| it["activity"] == "waiting");
+    assert_ne!(first["pid"], second["pid"]);
+    assert_eq!(
+        (&second["restarts"], &second["last_death"]),
+        (&json!(1), &Value::Null)
+    );
+    send(second["pid"].as_u64().unwrap() as u32, Signal::KILL);
+    recorder("a restart after its death", &|it| {
+        it["restarts"] == 2 && it["last_death"] == "signal 9"
+    });
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed);
+    assert_eq!(parts(&file(&run)).len(), 3);
+    assert_eq!(
+        seqs(&open_recording(&file(&run)).unwrap(), "scan").len(),
+        SCANS
+    );
+}
+
+#[test]
 fn a_player_and_a_stage_that_are_killed_change_no_byte_of_a_replay() {
     let run = recorded(&simulated()).set(ALL);
     let odometry = run.complete();
@@ -297,8 +340,7 @@ fn inspect_reports_a_recording_as_a_dataset() {
     run.complete();
     let mut command = gyre();
     command.arg("inspect").arg(file(&run)).arg("--json");
-    let report: serde_json::Value =
-        serde_json::from_str(&Ended::of(command).succeeded().stdout).unwrap();
+    let report: Value = serde_json::from_str(&Ended::of(command).succeeded().stdout).unwrap();
     assert_eq!(report["format"], "mcap");
     assert_eq!(report["scans"], SCANS);
     assert_eq!(report["unreadable"].as_array().unwrap().len(), 0);

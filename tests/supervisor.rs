@@ -36,6 +36,17 @@ fn what_a_stage_has_started_ends_with_the_run() {
 }
 
 #[test]
+fn a_stage_that_always_has_work_does_not_hang() {
+    let limit_s = 4;
+    let run = Run::of_recording()
+        .set(&format!("run.stall_timeout_s={limit_s}"))
+        .set("stages.masking.delay_ms=400");
+    assert_eq!(run.complete(), undisturbed());
+    // There was always a scan in its queue, for longer than the limit.
+    assert_eq!(run.summary()["restarts"], serde_json::json!({}));
+}
+
+#[test]
 fn a_stage_that_prints_without_end_does_not_fill_the_disk() {
     let flood = "yes 'all is well' | head -c 30000000 >&2";
     let run =

@@ -157,7 +157,7 @@ pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
     let taps = topics.iter().filter_map(|topic| tap(&run, topic));
     let taps = taps.collect::<Result<Vec<_>, _>>()?;
     if options.continues {
-        run.is_ready()?;
+        run.is_ready(NAME, &signals)?;
     }
     let has = |name| topics.iter().any(|topic| topic == name);
     let log = has(LOG).then(|| LogTail::new(&manifest.events()));
@@ -171,6 +171,7 @@ pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
         log,
         health,
         queue: sender,
+        is_of_run: options.continues,
         told: 0,
         due: Instant::now(),
     };
@@ -248,6 +249,8 @@ struct Recorder<'run> {
     log: Option<LogTail>,
     health: Option<Receiver<String>>,
     queue: Sender,
+    /// Whether the supervisor has started it.
+    is_of_run: bool,
     /// Missed messages that the log tells of.
     told: u64,
     /// When the next sentence about them is due.
@@ -276,7 +279,7 @@ impl Recorder<'_> {
         for tap in &mut self.taps {
             tap.drain(&self.queue)?;
         }
-        self.say_what_is_missed();
+        self.say_what_is_missed()?;
         for line in self.log.iter_mut().flat_map(|log| log.lines(now_ns())) {
             self.queue.put(Entry::Log(line));
         }
@@ -286,7 +289,7 @@ impl Recorder<'_> {
         Ok(())
     }
 
-    fn say_what_is_missed(&mut self) {
+    fn say_what_is_missed(&mut self) -> Result<(), StageError> {
         let missed = self.taps.iter().map(|tap| tap.counts().missed).sum();
         if missed > self.told && Instant::now() >= self.due {
             let counts = self
@@ -302,6 +305,10 @@ impl Recorder<'_> {
                 counts.join(", ")
             );
             (self.told, self.due) = (missed, Instant::now() + SENTENCE_PERIOD);
+            if self.is_of_run {
+                self.run.tell_missed(missed)?;
+            }
         }
+        Ok(())
     }
 }

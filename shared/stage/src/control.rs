@@ -30,7 +30,7 @@ pub enum Request {
     Stop,
     /// Start a process again.
     Restart {
-        /// The name of the stage or follower.
+        /// The name of the stage or follower, or `recorder`.
         process: String,
     },
     /// Go on with another program in the place of a stage.
@@ -83,7 +83,7 @@ pub struct Status {
     pub dropped: u64,
     /// Time since the newest pose was seen, s; `None` before the first one.
     pub last_pose_s: Option<f64>,
-    /// The processes: the stages in the order of the stream, then the followers.
+    /// The processes: the stages in the order of the stream, the followers, the recorder.
     pub processes: Vec<ProcessStatus>,
 }
 
@@ -113,7 +113,7 @@ impl Phase {
 /// The state of a process of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ProcessStatus {
-    /// The name of the stage or follower.
+    /// The name of the stage or follower, or `recorder`.
     pub name: String,
     /// The process.
     pub pid: u32,
@@ -131,6 +131,8 @@ pub struct ProcessStatus {
     pub restarts: usize,
     /// The cause of its last death.
     pub last_death: Option<String>,
+    /// Messages that it should have recorded and has missed since its start; `None` if it is no recorder.
+    pub missed: Option<u64>,
 }
 
 /// What a process does.

@@ -6,9 +6,9 @@
 //! publisher connects to it while it waits, and not while it sends. The supervisor frees the places of killed observers.
 
 use std::{
-    fs::File,
+    fs::{self, File},
     path::{Path, PathBuf},
-    thread,
+    process, thread,
     time::{Duration, Instant},
 };
 
@@ -20,6 +20,7 @@ use iceoryx2::{
 
 use crate::{
     Listener, Manifest, StageError,
+    heartbeat::HeartbeatWriter,
     reader::Received,
     run,
     services::{self, Ipc, Node, Topic},
@@ -105,12 +106,23 @@ impl ObservedRun {
         &self.manifest
     }
 
-    /// Tells the supervisor, if it has started this process as its recorder, that all topics are observed.
+    /// Tells the supervisor, which has started this process as its recorder under this name, that all topics are observed, and
+    /// reports the waits for `signals` from here on.
     ///
     /// # Errors
     /// A file of the run cannot be written.
-    pub fn is_ready(&self) -> Result<(), StageError> {
+    pub fn is_ready(&self, name: &str, signals: &Signals) -> Result<(), StageError> {
+        signals.report_to(HeartbeatWriter::create(&self.manifest, name)?);
         run::write(ready_file(&self.manifest.root), "")
+    }
+
+    /// Tells the supervisor how many messages its recorder, this process, has missed so far.
+    ///
+    /// # Errors
+    /// A file of the run cannot be written.
+    pub fn tell_missed(&self, missed: u64) -> Result<(), StageError> {
+        let text = format!("{} {missed}", process::id());
+        run::write(missed_file(&self.manifest.root), &text)
     }
 
     /// Returns whether the run has ended and removed its files.
@@ -189,6 +201,19 @@ impl ObservedRun {
 /// Returns the file in the run's root that the recorder writes when it observes all topics.
 pub(crate) fn ready_file(root: &Path) -> PathBuf {
     root.join("recorder.ready")
+}
+
+/// Returns the file in the run's root to which the recorder writes its process and the messages that it has missed.
+fn missed_file(root: &Path) -> PathBuf {
+    root.join("recorder.missed")
+}
+
+/// Returns the number of messages that the recorder, this process, has missed as it says itself; none unless it has told of some.
+pub(crate) fn read_missed(root: &Path, recorder: u32) -> u64 {
+    let told = fs::read_to_string(missed_file(root)).unwrap_or_default();
+    // The recorder before has left its own.
+    let missed = told.strip_prefix(&format!("{recorder} "));
+    missed.and_then(|it| it.parse().ok()).unwrap_or_default()
 }
 
 fn observers_of<M: Message>(topic: &Topic<M>, name: &PortName) -> usize {

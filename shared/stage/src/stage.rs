@@ -7,7 +7,7 @@ use gyre_messages::{Header, Item, Message, flag};
 use crate::{
     Launch, StageCounters, StageError, allocations, clock,
     inputs::{Action, Inputs},
-    wake,
+    wake::{self, Signals},
     writer::{Draft, Writer},
 };
 
@@ -44,6 +44,7 @@ pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<StageCounters, St
     let output = Writer::open(&launch.node, &launch.manifest)?;
     let mut flow = Flow {
         stage,
+        signals: &launch.signals,
         inputs,
         output,
         delay: launch.delay(),
@@ -74,6 +75,7 @@ pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<StageCounters, St
 
 struct Flow<'a, S: Stage> {
     stage: &'a mut S,
+    signals: &'a Signals,
     inputs: S::Inputs,
     output: Writer<S::Output>,
     delay: Duration,
@@ -101,6 +103,8 @@ impl<S: Stage> Flow<'_, S> {
 
     fn process(&mut self, mut item: Item, received_ns: i64) -> Result<(), StageError> {
         self.require_next(&item)?;
+        // The slowest stage finds its queue full again and again, and never waits.
+        self.signals.work_begins();
         let mut draft = self.output.loan()?;
         let missing = || StageError::transport("read the inputs of an item", item.seq);
         let view = self.inputs.view().ok_or_else(missing)?;

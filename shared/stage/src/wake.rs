@@ -171,6 +171,11 @@ impl Signals {
         })
     }
 
+    /// Reports that the work on an item begins, also without a wait before it.
+    pub(crate) fn work_begins(&self) {
+        self.beat(Activity::Works);
+    }
+
     fn beat(&self, activity: Activity) {
         if let Some(heartbeat) = self.heartbeat.get() {
             heartbeat.beat(activity);

@@ -15,9 +15,15 @@ pub struct RunChoice {
 /// The arguments of `gyre ps`.
 #[derive(Debug, Args)]
 pub struct PsArguments {
+    /// The folder of the results of the run to list. Default: all runs of this user.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
     /// Print JSON.
     #[arg(long)]
     pub json: bool,
+    /// Fail unless a run is running, and of each run all processes do what they should: for health checks.
+    #[arg(long)]
+    pub check: bool,
 }
 
 /// The arguments of `gyre logs`.

@@ -3,7 +3,7 @@
 use std::{fmt, process::ExitCode};
 
 use gyre_stage::{
-    control::{Control, ProcessStatus, Status},
+    control::{Activity, Control, Phase, ProcessStatus, Status},
     usage::Usage,
 };
 use serde::Serialize;
@@ -20,15 +20,31 @@ struct Row {
 /// Lists the runs of this user.
 ///
 /// # Errors
-/// Standard output cannot be written.
+/// There is no run that writes to `--out`; standard output cannot be written; or, with `--check`, not all is well.
 pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
-    let mut rows = Vec::new();
-    for run in Control::of_all() {
+    let (mut rows, mut silent) = (Vec::new(), Vec::new());
+    let runs = match &arguments.out {
+        Some(out) => vec![Control::of(out)?],
+        None => Control::of_all(),
+    };
+    for run in runs {
         match run.status() {
             Ok(status) => rows.push(Row::of(status)),
             // It has ended meanwhile, or it hangs.
-            Err(error) => print::note(format_args!("gyre: {error}")),
+            Err(error) => silent.push(error.to_string()),
         }
+    }
+    if arguments.check {
+        let ills = rows.iter().flat_map(|row| ills(&row.status));
+        silent.extend(ills);
+        return match (rows.is_empty(), silent.is_empty()) {
+            (_, false) => Err(silent.join("; ").into()),
+            (true, true) => Err("no run is running".into()),
+            (false, true) => Ok(ExitCode::SUCCESS),
+        };
+    }
+    for error in silent {
+        print::note(format_args!("gyre: {error}"));
     }
     if arguments.json {
         print::line(serde_json::to_string_pretty(&rows)?)?;
@@ -82,6 +98,19 @@ impl fmt::Display for Row {
     }
 }
 
+/// Returns what is wrong with a run, a sentence each.
+fn ills(status: &Status) -> Vec<String> {
+    let out = status.out.display();
+    let is_ill = |activity| matches!(activity, Activity::Silent | Activity::Ended);
+    // Followers end one after the other when the stream has.
+    let ends = status.phase == Phase::Following;
+    let ill = status.processes.iter().filter(|it| is_ill(it.activity));
+    let ill = ill.filter(|it| !(ends && it.activity == Activity::Ended));
+    let ill = ill.map(|it| format!("{out}: {} is {}", it.name, it.activity.name()));
+    let starting = (status.phase == Phase::Starting).then(|| format!("{out} is starting"));
+    starting.into_iter().chain(ill).collect()
+}
+
 /// Returns the state of a run in a line.
 pub fn summary(status: &Status) -> String {
     let mode = if status.live { "live" } else { "lossless" };
@@ -103,6 +132,9 @@ fn remarks(process: &ProcessStatus) -> String {
     let mut remarks = String::new();
     if let Some(death) = &process.last_death {
         remarks += &format!("  died by {death}");
+    }
+    if let Some(missed) = process.missed.filter(|missed| *missed > 0) {
+        remarks += &format!("  missed {missed} messages");
     }
     if process.is_swapped {
         remarks += &format!("  is `{}`", process.command.join(" "));

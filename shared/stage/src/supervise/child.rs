@@ -335,7 +335,7 @@ impl Child {
     }
 
     /// Returns the reason that the process gave, else the last line of its output.
-    fn last_output(&mut self) -> Option<String> {
+    pub(super) fn last_output(&mut self) -> Option<String> {
         let reason = fs::read_to_string(&self.last_words).ok();
         let _ = fs::remove_file(&self.last_words);
         let output = self.log.last_line();

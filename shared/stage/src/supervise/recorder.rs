@@ -6,9 +6,13 @@ use std::time::{Duration, Instant};
 use super::{
     Ending, Event, SuperviseError, Supervisor,
     child::Child,
+    requests::{activity, of_child},
     start::{Place, Starter},
 };
-use crate::observer;
+use crate::{
+    control::{Activity, ProcessStatus},
+    observer,
+};
 
 /// The longest time for which the first scan waits until the recorder observes all topics.
 const START_TIMEOUT: Duration = Duration::from_secs(10);
@@ -25,6 +29,7 @@ pub(super) struct Recorder {
     /// `None` while it runs, and when it has ended for good.
     restart_at: Option<Instant>,
     has_ended: bool,
+    restarts: usize,
 }
 
 impl Recorder {
@@ -58,6 +63,7 @@ impl Supervisor<'_> {
             child,
             restart_at: None,
             has_ended: false,
+            restarts: 0,
         });
         Ok(())
     }
@@ -73,10 +79,18 @@ impl Supervisor<'_> {
         let Some(restart_at) = recorder.restart_at else {
             return self.judge_recorder();
         };
-        if Instant::now() < restart_at {
-            return Ok(());
+        match Instant::now() < restart_at {
+            true => Ok(()),
+            false => self.respawn_recorder(),
         }
-        recorder.restart_at = None;
+    }
+
+    fn respawn_recorder(&mut self) -> Result<(), SuperviseError> {
+        let Some(recorder) = &mut self.recorder else {
+            return Ok(());
+        };
+        (recorder.restart_at, recorder.has_ended) = (None, false);
+        recorder.restarts += 1;
         let newest = self.newest.map(|newest| newest.seq);
         let starter = Starter::new(&self.signals, &self.guardian);
         let manifest = &self.plan.manifest;
@@ -121,6 +135,46 @@ impl Supervisor<'_> {
 
     /// Lets the recorder write what it has received, before the stages end.
     pub(super) fn stop_recorder(&mut self, ending: Option<Ending>) -> Result<(), SuperviseError> {
+        self.end_recorder(match ending {
+            Some(Ending::Complete) => END_TIMEOUT,
+            _ => STOP_TIMEOUT,
+        })
+    }
+
+    /// Returns whether a process of this name is the recorder.
+    pub(super) fn is_recorder(&self, process: &str) -> bool {
+        let recorder = self.recorder.as_ref();
+        recorder.is_some_and(|recorder| recorder.child.name() == process)
+    }
+
+    /// Ends the recorder and starts it again, also one that has ended for good: its disk may have room again.
+    pub(super) fn restart_recorder(&mut self) -> Result<(), SuperviseError> {
+        self.end_recorder(STOP_TIMEOUT)?;
+        self.respawn_recorder()
+    }
+
+    /// Returns the state of the recorder, if the run has one.
+    pub(super) fn status_of_recorder(&self) -> Option<ProcessStatus> {
+        let Recorder {
+            child, restarts, ..
+        } = self.recorder.as_ref()?;
+        let manifest = &self.plan.manifest;
+        let beat = child.heartbeat(manifest);
+        let activity = match beat {
+            _ if child.is_known_to_have_exited() => Activity::Ended,
+            // It beats from when it observes all topics.
+            None => Activity::Starting,
+            Some(beat) => activity(beat),
+        };
+        Some(ProcessStatus {
+            restarts: *restarts,
+            missed: Some(observer::read_missed(&manifest.root, child.pid())),
+            ..of_child(child, beat, activity)
+        })
+    }
+
+    /// Tells the recorder to write what it has received, and kills it if it has not after `limit`.
+    fn end_recorder(&mut self, limit: Duration) -> Result<(), SuperviseError> {
         let Some(recorder) = &mut self.recorder else {
             return Ok(());
         };
@@ -128,10 +182,6 @@ impl Supervisor<'_> {
             return Ok(());
         }
         recorder.child.terminate();
-        let limit = match ending {
-            Some(Ending::Complete) => END_TIMEOUT,
-            _ => STOP_TIMEOUT,
-        };
         let since = Instant::now();
         while !recorder.child.has_exited() && since.elapsed() < limit {
             self.signals.wait(&[], None, LOOK)?;
@@ -142,7 +192,7 @@ impl Supervisor<'_> {
         // One that the kernel holds is left to it.
         let _ = recorder.child.await_end();
         self.guardian.forget(recorder.child.pid());
-        let output = recorder.child.death().last_output.unwrap_or_default();
+        let output = recorder.child.last_output().unwrap_or_default();
         let sentence = match was_late {
             true => format!(
                 "the recorder had not written all after {limit:?}, and was killed: the end of the recording is missing"

@@ -8,7 +8,8 @@ use super::{SuperviseError, Supervisor, child::Child, socket::Client};
 use crate::{
     clock,
     control::{Activity, Answer, Phase, ProcessStatus, Request, Status},
-    heartbeat, schedule,
+    heartbeat::{self, Heartbeat},
+    schedule,
 };
 
 /// Requests that are answered before the supervisor looks after its processes again.
@@ -32,6 +33,10 @@ impl Supervisor<'_> {
                     Some(child) => {
                         let answer = self.restart_on_request(child)?;
                         client.answer(&answer);
+                    }
+                    None if self.is_recorder(&process) => {
+                        self.restart_recorder()?;
+                        client.answer(&Answer::Done);
                     }
                     None => self.refuse_unknown(&process, client),
                 },
@@ -73,17 +78,20 @@ impl Supervisor<'_> {
     fn status(&mut self) -> Status {
         let manifest = &self.plan.manifest;
         let processes = (0..self.children.len()).map(|i| self.status_of(i));
-        let processes: Vec<ProcessStatus> = processes.collect();
+        let mut processes: Vec<ProcessStatus> = processes.collect();
         let is_starting = |process: &ProcessStatus| process.activity == Activity::Starting;
+        let phase = match () {
+            () if self.is_following => Phase::Following,
+            () if processes.iter().any(is_starting) => Phase::Starting,
+            () => Phase::Running,
+        };
+        // Nothing waits for it.
+        processes.extend(self.status_of_recorder());
         Status {
             pid: process::id(),
             out: manifest.out.clone(),
             live: manifest.live,
-            phase: match () {
-                () if self.is_following => Phase::Following,
-                () if processes.iter().any(is_starting) => Phase::Starting,
-                () => Phase::Running,
-            },
+            phase,
             uptime_s: self.since.elapsed().as_secs_f64(),
             published: schedule::read(manifest).map(|source| source.published),
             poses: self.poses_so_far(),
@@ -102,23 +110,42 @@ impl Supervisor<'_> {
             _ if child.is_known_to_have_exited() => Activity::Ended,
             _ if child.stage().is_some_and(is_opening) => Activity::Starting,
             None => Activity::Running,
-            Some(beat) if beat.is_silent() => Activity::Silent,
-            Some(beat) => match beat.activity {
-                heartbeat::Activity::Works => Activity::Working,
-                heartbeat::Activity::Waits => Activity::Waiting,
-            },
+            Some(beat) => activity(beat),
         };
         let restarts = self.restarts.get(child.name());
         ProcessStatus {
-            name: child.name().to_owned(),
-            pid: child.pid(),
-            command: child.plan().command.clone(),
             is_swapped: child.plan().command != *begun,
-            activity,
-            activity_s: beat.map(|beat| beat.age().as_secs_f64()),
-            uptime_s: child.started().elapsed().as_secs_f64(),
             restarts: restarts.copied().unwrap_or_default(),
-            last_death: child.last_death().map(str::to_owned),
+            ..of_child(child, beat, activity)
         }
+    }
+}
+
+/// Returns what a living process does.
+pub(super) fn activity(beat: Heartbeat) -> Activity {
+    match beat.activity {
+        _ if beat.is_silent() => Activity::Silent,
+        heartbeat::Activity::Works => Activity::Working,
+        heartbeat::Activity::Waits => Activity::Waiting,
+    }
+}
+
+/// Returns the state of a process that has never been restarted.
+pub(super) fn of_child(
+    child: &Child,
+    beat: Option<Heartbeat>,
+    activity: Activity,
+) -> ProcessStatus {
+    ProcessStatus {
+        name: child.name().to_owned(),
+        pid: child.pid(),
+        command: child.plan().command.clone(),
+        is_swapped: false,
+        activity,
+        activity_s: beat.map(|beat| beat.age().as_secs_f64()),
+        uptime_s: child.started().elapsed().as_secs_f64(),
+        restarts: 0,
+        last_death: child.last_death().map(str::to_owned),
+        missed: None,
     }
 }

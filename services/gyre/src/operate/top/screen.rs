@@ -1,7 +1,7 @@
 //! A look at a run as a screen, or as text.
 
 use gyre_latency::{HopLatency, Percentiles};
-use gyre_stage::control::{Activity, ProcessStatus};
+use gyre_stage::control::{Activity, ProcessStatus, Status};
 use ratatui::{
     Frame,
     layout::{Constraint, Layout, Rect},
@@ -114,8 +114,10 @@ fn head_lines(look: &Look) -> [String; 4] {
         status.out.display().to_string(),
         summary(status),
         format!(
-            "{:.1} scans/s, {in_flight} in flight, {} dropped",
-            look.rate, status.dropped
+            "{:.1} scans/s, {in_flight} in flight, {} dropped{}",
+            look.rate,
+            status.dropped,
+            missed_by_recorder(status)
         ),
         format!(
             "sensor to pose p50 {}, p99 {}, max {} over {} poses of the last 10 s",
@@ -125,6 +127,15 @@ fn head_lines(look: &Look) -> [String; 4] {
             look.latency.scans
         ),
     ]
+}
+
+/// Returns what a recorder lacks, if it lacks anything.
+fn missed_by_recorder(status: &Status) -> String {
+    let missed: u64 = status.processes.iter().filter_map(|it| it.missed).sum();
+    match missed {
+        0 => String::new(),
+        missed => format!(", {missed} messages missed by the recorder"),
+    }
 }
 
 fn cells(look: &Look, process: &ProcessStatus, used: &Use) -> [String; COLUMNS.len()] {
