@@ -38,7 +38,14 @@ fn conforms(stage: &str, more: &[&str]) {
     assert_eq!(ended.code(), Some(0), "{report:#}");
     let rules = report["rules"].as_array().unwrap();
     let kept = rules.iter().filter(|rule| rule["verdict"] == "kept");
-    assert!(kept.count() >= 13, "{report:#}");
+    assert!(kept.count() >= 14, "{report:#}");
+    assert_eq!(judged(&report, "stands-by")["verdict"], "kept");
+}
+
+/// What a report says of a rule.
+fn judged<'a>(report: &'a Value, rule: &str) -> &'a Value {
+    let rules = report["rules"].as_array().unwrap();
+    rules.iter().find(|judged| judged["rule"] == rule).unwrap()
 }
 
 /// The command of a stage that breaks the contract so; `none` keeps it.
@@ -59,9 +66,7 @@ fn broken(stage: &str, breach: &str, more: &[&str]) -> Value {
 
 /// The sentences of a report about a rule.
 fn why(report: &Value, rule: &str) -> String {
-    let rules = report["rules"].as_array().unwrap();
-    let judged = rules.iter().find(|judged| judged["rule"] == rule).unwrap();
-    judged["why"].to_string()
+    judged(report, rule)["why"].to_string()
 }
 
 /// Asserts that a broken rotation search is found out by these rules, in sentences with these words.
@@ -127,6 +132,9 @@ fn a_stage_without_results_conforms_but_for_the_results() {
     let broken = rules.iter().filter(|rule| rule["verdict"] == "broken");
     let broken: Vec<_> = broken.map(|rule| rule["rule"].as_str().unwrap()).collect();
     assert_eq!(broken, ["same-as-own"], "{report:#}");
+    let stands_by = judged(&report, "stands-by");
+    assert_eq!(stands_by["verdict"], "does-not-apply", "{stands_by}");
+    assert!(why(&report, "stands-by").contains("--cold"), "{stands_by}");
     assert!(
         report["own_work"]["p50_ms"].as_f64() > Some(0.0),
         "{report:#}"
@@ -226,6 +234,12 @@ fn a_stage_that_hangs_on_a_request_to_stop_is_named() {
 }
 
 #[test]
+fn a_stage_that_says_it_stands_by_and_does_not_wait_is_named() {
+    let named = ("stands-by", "before its standard input ends");
+    breaks("does not wait", &[named]);
+}
+
+#[test]
 fn masking_that_waits_for_too_little_is_named() {
     masking_breaks("masking impatient", "before the motion of item 1 was there");
 }
@@ -249,7 +263,15 @@ fn a_command_that_cannot_be_tested_is_refused_in_a_sentence() {
     let refused = |arguments: &[&str], words: &[&str]| {
         let mut command = gyre();
         command.arg("conformance").args(arguments);
-        Ended::of(command).refused_with(words);
+        let ended = Ended::of(command);
+        assert_eq!(ended.code(), Some(2), "{}", ended.stderr);
+        assert_eq!(ended.stdout, "");
+        let sentence = ended.stderr.strip_prefix("gyre: ").unwrap();
+        assert_eq!(sentence.lines().count(), 1, "{sentence}");
+        assert!(
+            words.iter().all(|word| sentence.contains(word)),
+            "{sentence}"
+        );
     };
     refused(
         &["masking", "--command", "python3 'x"],

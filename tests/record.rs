@@ -194,7 +194,7 @@ fn a_recording_holds_the_health_of_the_run() {
     running.await_poses(SCANS / 4).kill("masking");
     running.finish().succeeded();
     let health = health(&file(&run));
-    let restarts = |health: &serde_json::Value| {
+    let restarts = |health: &Value| {
         let processes = health["status"]["processes"].as_array().unwrap();
         let masking = processes.iter().find(|it| it["name"] == "masking").unwrap();
         masking["restarts"].as_u64().unwrap()
@@ -208,7 +208,7 @@ fn a_recording_holds_the_health_of_the_run() {
 }
 
 /// The messages on `/health`.
-fn health(recording: &Path) -> Vec<serde_json::Value> {
+fn health(recording: &Path) -> Vec<Value> {
     let bytes = fs::read(recording).unwrap();
     let messages = mcap::MessageStream::new(&bytes)
         .unwrap()

@@ -2,17 +2,24 @@
 
 use std::{
     fs,
+    io::{BufRead, BufReader},
     path::{Path, PathBuf},
-    process::Output,
+    process::{Child, Output, Stdio},
+    thread,
+    time::{Duration, Instant},
 };
 
+use gyre_stage::control::Control;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::common::{assert_nothing_left, gyre};
+use crate::common::{Run, assert_nothing_left, gyre};
 
 /// Time between two scans of a simulated radar, s.
 const PERIOD_S: f64 = 0.25;
+
+/// Time for what takes some seconds on a machine that is not loaded.
+const LIMIT: Duration = Duration::from_secs(120);
 
 /// A stress test of a small simulated drive.
 struct Stress {
@@ -35,16 +42,25 @@ impl Stress {
     }
 
     fn run(&self, words: &[&str]) -> Output {
-        let output = gyre()
+        finish(self.start(words))
+    }
+
+    fn start(&self, words: &[&str]) -> Child {
+        let mut command = gyre();
+        command
             .arg("stress")
             .arg(self.folder.path().join("small.toml"))
             .arg("--out")
             .arg(self.out())
             .args(words)
-            .output()
-            .unwrap();
-        println!("{}", String::from_utf8_lossy(&output.stderr));
-        output
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        command.spawn().unwrap()
+    }
+
+    /// The folder of the results of a run.
+    fn run_out(&self, run: &str) -> PathBuf {
+        self.out().join("runs").join(run)
     }
 
     /// The outcome of the first scenario.
@@ -55,8 +71,27 @@ impl Stress {
     }
 
     fn assert_nothing_left(&self, run: &str) {
-        assert_nothing_left(&self.out().join("runs").join(run));
+        assert_nothing_left(&self.run_out(run));
     }
+}
+
+/// Waits for the end, which must come.
+fn finish(mut stress: Child) -> Output {
+    let since = Instant::now();
+    while stress.try_wait().unwrap().is_none() {
+        if since.elapsed() > LIMIT {
+            stress.kill().unwrap();
+            let said = stress.wait_with_output().unwrap();
+            panic!(
+                "it does not end:\n{}",
+                String::from_utf8_lossy(&said.stderr)
+            );
+        }
+        thread::sleep(Duration::from_millis(10));
+    }
+    let output = stress.wait_with_output().unwrap();
+    println!("{}", String::from_utf8_lossy(&output.stderr));
+    output
 }
 
 fn exists(folder: &Path, names: &[&str]) {
@@ -164,4 +199,132 @@ fn a_test_that_cannot_be_carried_out_is_no_verdict() {
     assert_eq!(output.status.code(), Some(2));
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(said.contains("did you mean `steady`?"), "{said}");
+}
+
+#[test]
+fn a_stage_behind_a_shell_is_measured_and_stopped_with_all_that_it_has_started() {
+    let stress = Stress::new();
+    let program = crate::PROGRAM;
+    // The shell stays, and its name says nothing of the stage.
+    let command = format!(
+        "stages.masking.command=['sh', '-c', '\"$0\" stage masking; exit $?', '{program}']"
+    );
+    let stopped = ["--scenario", "stopped", "--stage", "masking"];
+    let words = [&stopped[..], &["--duration", "6", "--set", &command]].concat();
+    assert_eq!(stress.run(&words).status.code(), Some(0));
+    let outcome = stress.outcome();
+    assert_eq!(outcome["verdict"], "passed");
+    let figures = &outcome["figures"];
+    assert_eq!(figures["faults"][0]["stage"], "masking");
+    // With the shell alone stopped, the stage would go on.
+    let longest = ms(&figures["sensor_to_pose"]["max_ms"]);
+    assert!(longest >= 1e3 * (1.0 - PERIOD_S), "{longest} ms");
+    let processes = figures["processes"].as_array().unwrap();
+    let masking = processes.iter().find(|cost| cost["name"] == "masking");
+    assert_eq!(masking.unwrap()["processes"], 2);
+    // A stage of its own program beside it: the shell has less.
+    let own_mb = |name| {
+        let cost = processes.iter().find(|cost| cost["name"] == name);
+        cost.unwrap()["own_mb"].as_f64().unwrap()
+    };
+    assert!(own_mb("masking") > own_mb("pose-integration"), "{figures}");
+    stress.assert_nothing_left("stopped");
+}
+
+#[test]
+fn kills_without_time_for_one_are_not_carried_out() {
+    let stress = Stress::new();
+    let limit = ["--set", "budget.recovery_ms=1"];
+    let words = [&["--scenario", "kills", "--duration", "3"][..], &limit].concat();
+    let output = stress.run(&words);
+    assert_eq!(output.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(said.contains("kills: NOT CARRIED OUT"), "{said}");
+    assert!(said.contains("needs --duration 5 or more"), "{said}");
+}
+
+#[test]
+fn stages_that_are_slow_are_not_judged_without_a_limit() {
+    let stress = Stress::new();
+    let stages = ["--stage", "masking", "--stage", "refinement"];
+    let slow = ["--scenario", "slow-stage", "--duration", "2"];
+    let output = stress.run(&[&slow[..], &stages].concat());
+    assert_eq!(output.status.code(), Some(0));
+    assert_eq!(stress.outcome()["verdict"], "not-judged");
+    let run = fs::read_to_string(stress.run_out("slow-stage").join("config.toml")).unwrap();
+    assert_eq!(run.matches("delay_ms = 300").count(), 2, "{run}");
+}
+
+#[test]
+fn a_run_that_ends_while_it_is_measured_has_failed() {
+    let stress = Stress::new();
+    let words = ["--scenario", "steady", "--duration", "60"];
+    let measured = stress.start(&[&words[..], &["--set", "budget.max_ms=60000"]].concat());
+    let out = stress.run_out("steady");
+    let since = Instant::now();
+    // Those of the warm-up, and more.
+    while !status_of(&out).is_some_and(|poses| poses > 12) {
+        assert!(since.elapsed() < LIMIT, "no poses in {}", out.display());
+        thread::sleep(Duration::from_millis(20));
+    }
+    Control::of(&out).unwrap().stop().unwrap();
+    let output = finish(measured);
+    assert_eq!(output.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(said.contains("steady: FAILED; the run has ended"), "{said}");
+}
+
+/// The number of poses of a run, if it answers.
+fn status_of(out: &Path) -> Option<u64> {
+    Some(Control::of(out).ok()?.status().ok()?.poses)
+}
+
+#[test]
+fn what_a_killed_run_has_left_is_not_measured() {
+    let stress = Stress::new();
+    let out = stress.run_out("steady");
+    fs::create_dir_all(&out).unwrap();
+    let killed = Run::of_recording().rate("1").into(&out);
+    let mut running = killed.start();
+    running.await_stages();
+    running.await_poses(2);
+    running.kill_supervisor();
+    let output = stress.run(&["--scenario", "steady", "--duration", "2"]);
+    assert_eq!(output.status.code(), Some(0));
+    assert_eq!(stress.outcome()["figures"]["counts"]["due"], 8);
+    stress.assert_nothing_left("steady");
+}
+
+#[test]
+fn a_run_without_a_place_for_an_observer_is_refused_at_once() {
+    let stress = Stress::new();
+    let output = stress.run(&["--scenario", "steady", "--set", "run.observers=0"]);
+    assert_eq!(output.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(said.contains("set run.observers to 1 or more"), "{said}");
+    stress.assert_nothing_left("steady");
+}
+
+/// The helper is asked for so little that other programs do not notice.
+#[test]
+fn the_memory_that_is_taken_is_reported() {
+    let mut helper = gyre()
+        .arg("stress-helper")
+        .arg(std::process::id().to_string())
+        .args(["memory", "0.01"])
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let lines = BufReader::new(helper.stdout.take().unwrap()).lines();
+    let said: Vec<_> = lines.take(2).map(Result::unwrap).collect();
+    helper.kill().unwrap();
+    helper.wait().unwrap();
+    assert_eq!(said[0], "ready");
+    let taken: Value = serde_json::from_str(&said[1]).unwrap();
+    let [taken_mb, available_mb] =
+        ["taken_mb", "available_mb"].map(|key| taken[key].as_f64().unwrap());
+    assert!(
+        available_mb > 0.0 && taken_mb <= 0.02 * available_mb + 34.0,
+        "{taken}"
+    );
 }

@@ -1,12 +1,13 @@
 //! Stages that keep the contract but for one clause of it. Their results are constant: only the contract matters here.
 
-use std::{thread, time::Duration};
+use std::{env, fs, thread, time::Duration};
 
 use gyre_messages::{
     Hop, Item, Masked, MaskedHeader, Message, Motion, Rotation, RotationHeader, Scan, StageId, flag,
 };
 use gyre_stage::{
     Launch, StageCounters, StageError, clock,
+    run::STANDBY,
     supervise::rig::{Feed, Joining, Ports, Recorded, Tap},
 };
 
@@ -25,6 +26,10 @@ const FLOOD: usize = 500;
 
 /// Works as the rotation search, or for a breach of masking as masking.
 pub fn play(launch: &Launch, breach: &str) -> Result<StageCounters, StageError> {
+    if breach == "does not wait" && env::var_os(STANDBY).is_some() {
+        let ready = launch.manifest.root.join("rotation-search.ready");
+        fs::write(ready, "").map_err(|error| StageError::Input(error.to_string()))?;
+    }
     let ports = Ports::of(launch);
     let joining = match breach {
         "joins silently" => Joining::Silently,

@@ -4,6 +4,7 @@ mod absence;
 mod feedback;
 mod refusal;
 mod restart;
+mod standing_by;
 mod steps;
 mod stream;
 
@@ -73,6 +74,8 @@ impl<'a> Examination<'a> {
                 (self.observe)("a full window");
                 self.window()?;
             }
+            (self.observe)("standing by");
+            self.standing_by()?;
             self.refusals()?;
         }
         let own_work = match self.is_own() || !has_streamed {
@@ -137,12 +140,11 @@ impl<'a> Examination<'a> {
         }
         if let (Some(budget), Some(work)) = (subject.demands.budget, work) {
             let budget_ms = budget.as_secs_f64() * 1e3;
+            let (ms, figure) = work.judged();
             self.findings
-                .require(Rule::KeepsBudget, work.p99_ms <= budget_ms, || {
-                    format!(
-                        "the 99th percentile is {:.2} ms, and {budget_ms} ms are allowed",
-                        work.p99_ms
-                    )
+                .require(Rule::KeepsBudget, ms <= budget_ms, || {
+                    let items = work.items;
+                    format!("the {figure} of {items} items is {ms:.2} ms, and {budget_ms} ms are allowed")
                 });
         }
         let deviation = match self.outputs.is_empty() {

@@ -42,6 +42,8 @@ pub enum Rule {
     PassesEnd,
     /// It exits with code 0 on SIGTERM.
     StopsOnRequest,
+    /// Told to stand by, it says that it does, opens nothing before it may, and then takes over.
+    StandsBy,
     /// It refuses inputs that break the contract.
     RefusesMalformed,
     /// Its results are those of Gyre's own stage, to the bit.
@@ -52,7 +54,7 @@ pub enum Rule {
 
 impl Rule {
     /// All rules, in the order of the contract.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 21] = [
         Self::CreatesNothing,
         Self::StartsInTime,
         Self::AsksForHistory,
@@ -69,6 +71,7 @@ impl Rule {
         Self::BeginsWithNewest,
         Self::PassesEnd,
         Self::StopsOnRequest,
+        Self::StandsBy,
         Self::SendsValid,
         Self::RefusesMalformed,
         Self::SameAsOwn,
@@ -94,6 +97,7 @@ impl Rule {
             Self::BeginsWithNewest => "begins with the newest pose",
             Self::PassesEnd => "passes on the end of the stream, and waits",
             Self::StopsOnRequest => "exits with code 0 on SIGTERM",
+            Self::StandsBy => "stands by until the program before it has ended",
             Self::SendsValid => "sends fields that keep their rules",
             Self::RefusesMalformed => "refuses malformed inputs with code 3 and a sentence",
             Self::SameAsOwn => "gives the outputs of Gyre's own stage, to the bit",
@@ -111,6 +115,7 @@ impl Rule {
             Self::LooksBack => "contract 5",
             Self::Deterministic | Self::Resumes => "contract 6",
             Self::PassesEnd | Self::StopsOnRequest => "contract 7",
+            Self::StandsBy => "standing by",
             Self::WaitsForMotion => "masking",
             Self::KeepsWindow => "source",
             Self::BeginsWithNewest => "sink",

@@ -123,13 +123,18 @@ impl<'a> Session<'a> {
 
     /// Starts the process and waits until it has opened the topic that it publishes.
     pub(crate) fn start(&mut self, command: &[String]) -> Result<Waited, ConformanceError> {
-        let name = self.subject.stage.name();
-        self.last = None;
-        self.asked.clear();
-        self.process = Some(self.rig.start(name, command, &Scheduling::default())?);
-        self.progress = Instant::now();
+        self.spawn(command)?;
         let (stage, limit) = (self.subject.stage, self.subject.demands.start_timeout);
         self.wait(limit, |session| session.rig.has_publisher(stage))
+    }
+
+    /// Starts the process.
+    pub(crate) fn spawn(&mut self, command: &[String]) -> Result<(), ConformanceError> {
+        self.last = None;
+        self.asked.clear();
+        let name = self.subject.stage.name();
+        self.process = Some(self.rig.start(name, command, &Scheduling::default())?);
+        Ok(())
     }
 
     /// Publishes a message on a topic of the stage's inputs.
@@ -363,6 +368,12 @@ impl<'a> Session<'a> {
             .iter()
             .filter(|(topic, feed)| feed.subscribers() > 0 && !self.asked.contains(*topic));
         silent.map(|(topic, _)| *topic).collect()
+    }
+
+    /// Returns whether the process has opened a topic.
+    pub(crate) fn has_joined(&self) -> bool {
+        let mut feeds = self.feeds.values();
+        feeds.any(|feed| feed.subscribers() > 0) || self.rig.has_publisher(self.subject.stage)
     }
 
     /// Returns the inputs that the process has not subscribed to.

@@ -22,11 +22,27 @@ const SMALL: [&str; 2] = ["simulation.seed=1", "raster.n=127"];
 /// Places for readers beside those of a run; the test takes some.
 const OBSERVERS: usize = 4;
 
-/// Tests a program, and prints what it breaks.
+/// The exit code where not all could be tested, which says nothing against the program.
+const NOT_TESTED: u8 = 2;
+
+/// Tests a program, and prints what it breaks. The exit code is 0 if it keeps the contract, 1 if it breaks a rule, and 2 if not all could be
+/// tested.
 ///
 /// # Errors
-/// A configuration or a dataset that cannot be used, or a program that cannot be started.
+/// Standard output cannot be written.
 pub fn conformance(arguments: &ConformanceArguments) -> Result<ExitCode, Failure> {
+    match examine(arguments) {
+        Ok(Some(report)) => print(&report, arguments.json),
+        Ok(None) => Ok(ExitCode::from(INTERRUPTED)),
+        Err(error) => {
+            print::note(format_args!("gyre: {error}"));
+            Ok(ExitCode::from(NOT_TESTED))
+        }
+    }
+}
+
+/// Tests a program; `None` on an interrupt.
+fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> {
     let stage = StageId::by_name(&arguments.stage).ok_or("there is no such stage")?;
     let demands = demands(arguments)?;
     let configuration = configuration(arguments, stage)?;
@@ -60,8 +76,8 @@ pub fn conformance(arguments: &ConformanceArguments) -> Result<ExitCode, Failure
         demands,
     };
     match test(&subject, scans, arguments.json) {
-        Err(ConformanceError::Interrupted) => Ok(ExitCode::from(INTERRUPTED)),
-        report => print(&report?, arguments.json),
+        Err(ConformanceError::Interrupted) => Ok(None),
+        report => Ok(Some(report?)),
     }
 }
 
@@ -79,9 +95,10 @@ fn print(report: &Report, as_json: bool) -> Result<ExitCode, Failure> {
         true => print::line(serde_json::to_string_pretty(report)?)?,
         false => print::line(report)?,
     }
-    Ok(match report.conforms() {
-        true => ExitCode::SUCCESS,
-        false => ExitCode::FAILURE,
+    Ok(match (report.conforms(), report.broken()) {
+        (true, _) => ExitCode::SUCCESS,
+        (false, 0) => ExitCode::from(NOT_TESTED),
+        (false, _) => ExitCode::FAILURE,
     })
 }
 

@@ -9,11 +9,11 @@ use crate::{
     Budget, Limits, Report, StressError,
     budget::Check,
     copying::{self, Kind},
-    fault::FaultKind,
+    fault::{self, FaultKind},
     pipeline::{Gate, Measured, Setup, measure},
     report::{Figures, Outcome, Step, Verdict},
     scenario::{RADAR_HZ, Scenario},
-    search::largest,
+    search::{Steps, largest, step_duration},
 };
 
 /// Scans of a burst.
@@ -32,9 +32,6 @@ const LEVELS: u32 = 16;
 const MOST_LEVELS: u32 = 8 * LEVELS;
 /// The largest fleet that is tried.
 const MOST_RADARS: u32 = 64;
-/// Share of a scenario's time that a step of a search takes.
-const STEP: u32 = 6;
-const SHORTEST_STEP: Duration = Duration::from_secs(5);
 /// The rate of the source has a limit: 1000 times the sensor's own.
 const MOST_HZ: f64 = 1000.0;
 
@@ -129,8 +126,15 @@ impl Campaign<'_> {
 
     /// One run.
     fn single(&self) -> Result<Outcome, StressError> {
-        let measured = measure(self.subject, &self.setup(), &Gate::of(1))?;
-        let problem = problem(&measured);
+        let setup = self.setup();
+        if setup.faults.is_some() && setup.duration < fault::LEAST {
+            return Err(StressError::TooShort {
+                scenario: self.scenario.name(),
+                least_s: fault::LEAST.as_secs(),
+            });
+        }
+        let mut measured = measure(self.subject, &setup, &Gate::of(1))?;
+        let (problem, omitted) = (problem(&measured), measured.omitted.take());
         let figures = Figures::of(measured);
         Ok(Outcome {
             checks: checks(&self.limits, &figures),
@@ -138,7 +142,8 @@ impl Campaign<'_> {
             figures: Some(figures),
             ..self.empty()
         }
-        .judged())
+        .judged()
+        .unless(omitted))
     }
 
     fn setup(&self) -> Setup {
@@ -155,14 +160,14 @@ impl Campaign<'_> {
                 setup.loads = vec![vec!["spin".to_owned()]; processors];
             }
             Scenario::Memory => {
-                setup.loads = vec![vec!["memory".to_owned(), MEMORY_SHARE.to_string()]];
+                setup.memory_share = Some(MEMORY_SHARE);
             }
             Scenario::Observers => {
                 setup.observers = OBSERVERS;
                 // One place more for this process.
                 setup.set.push(format!("run.observers={}", OBSERVERS + 1));
             }
-            Scenario::SlowStage => setup.set.push(self.slow_stage()),
+            Scenario::SlowStage => setup.set.extend(self.slow_stages()),
             Scenario::Stopped => setup.faults = Some((FaultKind::Stop, self.stages())),
             Scenario::Kills => setup.faults = Some((FaultKind::Kill, self.stages())),
             _ => {}
@@ -177,15 +182,16 @@ impl Campaign<'_> {
         }
     }
 
-    fn slow_stage(&self) -> String {
-        let stage = self.options.stages.first().unwrap_or(&StageId::Masking);
+    fn slow_stages(&self) -> Vec<String> {
+        let stages = match self.options.stages.as_slice() {
+            [] => &[StageId::Masking],
+            stages => stages,
+        };
         let delay_ms = 1e3 / self.scenario.rate_hz() * SLOWER;
-        format!("stages.{}.delay_ms={delay_ms:.0}", stage.name())
-    }
-
-    fn step_duration(&self) -> Duration {
-        let duration = self.options.duration;
-        (duration / STEP).max(SHORTEST_STEP).min(duration)
+        let slowed = stages.iter();
+        slowed
+            .map(|stage| format!("stages.{}.delay_ms={delay_ms:.0}", stage.name()))
+            .collect()
     }
 
     /// The limits of each step: those of the budget, else no drop and a p99 of a period.
@@ -206,42 +212,35 @@ impl Campaign<'_> {
         let rate_hz = |level: u32| RADAR_HZ * 2_f64.powf(f64::from(level) / f64::from(LEVELS));
         let most = (MOST_HZ.min(MOST_HZ / self.subject.period.as_secs_f64()) / RADAR_HZ).log2();
         let most = MOST_LEVELS.min((most * f64::from(LEVELS)) as u32);
-        let mut steps = Vec::new();
-        let passes = |level| {
-            let rate_hz = rate_hz(level);
-            let step = self.step(rate_hz, rate_hz, 1)?;
-            note(&step.sentence("scans/s"));
-            let passed = step.passed;
-            steps.push(step);
-            Ok::<_, StressError>(passed)
-        };
-        let best = largest(0, most, |level| level + LEVELS, passes)?.map(rate_hz);
+        let mut steps = Steps::new("scans/s", note);
+        let passes = |level| steps.passes(|| self.step(rate_hz(level), rate_hz(level), 1));
+        let found = largest(0, most, |level| level + LEVELS, passes)?;
+        let best = found.best.map(rate_hz);
         Ok(Outcome {
-            checks: found("rate_hz", best, self.limits.rate_hz),
+            checks: checked("rate_hz", best, self.limits.rate_hz),
             best,
-            steps,
+            failed: found.failed.map(rate_hz),
+            steps: steps.all,
             ..self.empty()
         }
         .judged())
     }
 
     fn fleet(&self, note: &mut dyn FnMut(&str)) -> Result<Outcome, StressError> {
-        let mut steps = Vec::new();
+        let mut steps = Steps::new("radars", note);
         let passes = |radars| {
-            let step = match self.lacks_memory(radars) {
-                Some(reason) => Step::not_started(f64::from(radars), reason),
-                None => self.step(f64::from(radars), RADAR_HZ, radars)?,
-            };
-            note(&step.sentence("radars"));
-            let passed = step.passed;
-            steps.push(step);
-            Ok::<_, StressError>(passed)
+            steps.passes(|| match self.lacks_memory(radars) {
+                Some(reason) => Ok(Step::not_started(f64::from(radars), reason)),
+                None => self.step(f64::from(radars), RADAR_HZ, radars),
+            })
         };
-        let best = largest(1, MOST_RADARS, |radars| radars * 2, passes)?.map(f64::from);
+        let found = largest(1, MOST_RADARS, |radars| radars * 2, passes)?;
+        let best = found.best.map(f64::from);
         Ok(Outcome {
-            checks: found("radars", best, self.limits.radars),
+            checks: checked("radars", best, self.limits.radars),
             best,
-            steps,
+            failed: found.failed.map(f64::from),
+            steps: steps.all,
             ..self.empty()
         }
         .judged())
@@ -260,10 +259,11 @@ impl Campaign<'_> {
     /// Measures so many pipelines at once at a rate: a step of this level.
     fn step(&self, level: f64, rate_hz: f64, pipelines: u32) -> Result<Step, StressError> {
         let gate = Gate::of(pipelines as usize);
+        let duration = step_duration(self.options.duration, rate_hz);
         let setups: Vec<_> = (0..pipelines)
             .map(|number| Setup {
                 name: format!("{}-{number}", self.scenario),
-                ..Setup::undisturbed(self.scenario, rate_hz, self.step_duration())
+                ..Setup::undisturbed(self.scenario, rate_hz, duration)
             })
             .collect();
         let measured: Vec<_> = thread::scope(|scope| {
@@ -345,7 +345,7 @@ fn checks(limits: &Limits, figures: &Figures) -> Vec<Check> {
         .collect()
 }
 
-fn found(key: &'static str, best: Option<f64>, limit: Option<f64>) -> Vec<Check> {
+fn checked(key: &'static str, best: Option<f64>, limit: Option<f64>) -> Vec<Check> {
     let check = limit.map(|limit| Check::at_least(key, Some(best.unwrap_or(0.0)), limit));
     check.into_iter().collect()
 }

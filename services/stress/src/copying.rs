@@ -15,12 +15,16 @@ use serde::{Deserialize, Serialize};
 
 use crate::{StressError, campaign::Subject, helper::Helper, record::Distribution};
 
-/// Messages a second.
-const RATE_HZ: f64 = 20.0;
+/// Messages a second. An observer rests for 10 ms between two looks, which must not show.
+const RATE_HZ: f64 = 50.0;
 /// Messages before those that are measured.
 const WARM_UP: u64 = 10;
-/// Messages that are measured of each kind, by the duration of a scenario.
-const MESSAGES_PER_S: f64 = 200.0 / 60.0;
+/// Messages that are measured in a row, whatever the duration: ten of them are beyond the 99th percentile.
+const LEAST: f64 = 1000.0;
+/// The same for the 99.9th percentile: more say nothing new.
+const MOST: f64 = 10_000.0;
+/// The duration of a scenario that [`LEAST`] messages are for, s.
+const LEAST_S: f64 = 60.0;
 const READERS: [usize; 3] = [1, 4, 8];
 
 /// How messages reach their readers.
@@ -125,7 +129,7 @@ pub fn compare(
     duration_s: f64,
     note: &mut dyn FnMut(&str),
 ) -> Result<Vec<Row>, StressError> {
-    let messages = (duration_s * MESSAGES_PER_S).clamp(40.0, 1000.0) as u64;
+    let messages = (duration_s / LEAST_S * LEAST).clamp(LEAST, MOST) as u64;
     let mut rows = Vec::new();
     for kind in &subject.kinds {
         for readers in READERS {
@@ -155,19 +159,10 @@ fn measure(subject: &Subject, kind: &Kind, plan: &Plan) -> Result<Row, StressErr
     let readers: Result<Vec<_>, _> = (0..plan.readers).map(|_| start("read")).collect();
     let mut readers = readers?;
     sender.tell("go")?;
-    let had: Result<Vec<Had>, _> = readers.iter_mut().map(said).collect();
-    let sent: Sent = said(&mut sender)?;
+    let had: Result<Vec<Had>, _> = readers.iter_mut().map(Helper::hear_result).collect();
+    let sent: Sent = sender.hear_result()?;
     sender.end();
     Ok(row(kind, plan, &sent, &had?))
-}
-
-/// Reads what a helper says at its end.
-fn said<T: for<'a> Deserialize<'a>>(helper: &mut Helper) -> Result<T, StressError> {
-    let line = helper.hear()?;
-    serde_json::from_str(&line).map_err(|error| StressError::Helper {
-        helper: "hand-over".to_owned(),
-        reason: format!("says `{line}`: {error}"),
-    })
 }
 
 fn row(kind: &Kind, plan: &Plan, sent: &Sent, had: &[Had]) -> Row {
@@ -236,13 +231,6 @@ pub(crate) fn helper(words: &[String]) -> Result<(), StressError> {
         "read" => reader::read(&plan),
         _ => Err(usage()),
     }
-}
-
-/// Prints what is known at the end.
-fn tell(result: &impl Serialize) -> Result<(), StressError> {
-    let line = serde_json::to_string(result);
-    crate::helper::say(&line.map_err(|error| StressError::Usage(error.to_string()))?);
-    Ok(())
 }
 
 /// Own memory of this process, bytes.

@@ -36,6 +36,21 @@ pub enum StressError {
         /// What the run printed.
         log: PathBuf,
     },
+    /// A run that nobody may look at.
+    #[error(
+        "run.observers is 0, and the stress test looks on as an observer: set run.observers to 1 or more"
+    )]
+    NoPlace,
+    /// A time too short for what is to be done in it.
+    #[error(
+        "{scenario} needs --duration {least_s} or more: time for a fault, and for the recovery from it"
+    )]
+    TooShort {
+        /// The scenario.
+        scenario: &'static str,
+        /// The shortest duration, s.
+        least_s: u64,
+    },
     /// A helper process ended or said something else than it should.
     #[error("the helper process `{helper}` {reason}")]
     Helper {

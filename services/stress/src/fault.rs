@@ -6,7 +6,7 @@ use gyre_messages::{PoseHeader, StageId};
 use gyre_stage::clock;
 use rand::{Rng, SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::{Pid, Signal, kill_process_group};
 use serde::Serialize;
 
 use crate::processes::Sampler;
@@ -21,6 +21,12 @@ const JITTER: Duration = Duration::from_millis(300);
 const FAULTS: u32 = 10;
 /// Time that is left after the last fault.
 const RECOVERY: Duration = Duration::from_secs(2);
+
+/// Time between two looks for a stage whose process is not there.
+const SEEK: Duration = Duration::from_millis(200);
+
+/// The shortest measurement that has time for a fault.
+pub const LEAST: Duration = Duration::from_secs(5);
 
 /// The kind of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -58,6 +64,8 @@ pub struct Faults {
     ends_ns: i64,
     next_ns: i64,
     every_ns: i64,
+    /// The stage whose turn it is and whose process was not found.
+    sought: Option<StageId>,
     stopped: Option<Stopped>,
     done: Vec<Fault>,
     /// Faults by their index in `done` that no pose has followed, with the times of their ends.
@@ -66,7 +74,7 @@ pub struct Faults {
 
 #[derive(Debug)]
 struct Stopped {
-    process: Pid,
+    group: Pid,
     fault: usize,
     stage: StageId,
     until_ns: i64,
@@ -92,6 +100,7 @@ impl Faults {
             ends_ns: began_ns + duration_ns,
             next_ns: began_ns + every_ns / 2,
             every_ns,
+            sought: None,
             stopped: None,
             done: Vec::new(),
             open: Vec::new(),
@@ -99,11 +108,11 @@ impl Faults {
     }
 
     /// Does what is due.
-    pub fn act(&mut self, processes: &Sampler) {
+    pub fn act(&mut self, processes: &mut Sampler) {
         let now_ns = clock::now_ns();
         if let Some(stopped) = self.stopped.take_if(|stopped| now_ns >= stopped.until_ns) {
             // That it has been killed meanwhile is no error.
-            let _ = kill_process(stopped.process, Signal::CONT);
+            let _ = kill_process_group(stopped.group, Signal::CONT);
             self.open
                 .push((stopped.fault, stopped.stage, clock::now_ns()));
         }
@@ -111,16 +120,18 @@ impl Faults {
         if now_ns < self.next_ns || self.stopped.is_some() || !has_time {
             return;
         }
+        let Some(stage) = self.sought.take().or_else(|| self.next_stage()) else {
+            return;
+        };
+        if !self.strike(stage, processes.group_of(stage.name())) {
+            // It may be just being restarted.
+            self.sought = Some(stage);
+            self.next_ns = now_ns + nanoseconds(SEEK);
+            return;
+        }
         // Not always at the same time before the next scan.
         let jitter_ns = nanoseconds(JITTER);
         self.next_ns += self.every_ns + self.random.random_range(-jitter_ns..jitter_ns);
-        let Some(stage) = self.next_stage() else {
-            return;
-        };
-        let process = processes.process_of(stage.name());
-        if let Some(process) = process.and_then(|pid| Pid::from_raw(pid as i32)) {
-            self.strike(stage, process);
-        }
     }
 
     fn next_stage(&mut self) -> Option<StageId> {
@@ -131,8 +142,17 @@ impl Faults {
         self.queue.pop()
     }
 
-    fn strike(&mut self, stage: StageId, process: Pid) {
+    /// Stops or kills a process group; false if it is not there.
+    fn strike(&mut self, stage: StageId, group: Option<u32>) -> bool {
+        let signal = match self.kind {
+            FaultKind::Kill => Signal::KILL,
+            FaultKind::Stop => Signal::STOP,
+        };
+        let group = group.and_then(|group| Pid::from_raw(group as i32));
         let now_ns = clock::now_ns();
+        let Some(group) = group.filter(|group| kill_process_group(*group, signal).is_ok()) else {
+            return false;
+        };
         let fault = self.done.len();
         self.done.push(Fault {
             kind: self.kind,
@@ -141,19 +161,30 @@ impl Faults {
             recovery_ms: None,
         });
         match self.kind {
-            FaultKind::Kill => {
-                let _ = kill_process(process, Signal::KILL);
-                self.open.push((fault, stage, now_ns));
-            }
+            FaultKind::Kill => self.open.push((fault, stage, now_ns)),
             FaultKind::Stop => {
-                let _ = kill_process(process, Signal::STOP);
                 self.stopped = Some(Stopped {
-                    process,
+                    group,
                     fault,
                     stage,
                     until_ns: now_ns + nanoseconds(STOP),
                 });
             }
+        }
+        true
+    }
+
+    /// Returns why the measurement says nothing of faults, or not of all stages whose turn it was.
+    pub fn omitted(&self) -> Option<String> {
+        match self.sought {
+            Some(stage) => Some(format!(
+                "the process of {} was not found, so nothing was done to it",
+                stage.name()
+            )),
+            None if self.done.is_empty() => {
+                Some("nothing was done to any stage: raise --duration".to_owned())
+            }
+            None => None,
         }
     }
 
@@ -185,7 +216,7 @@ impl Faults {
 impl Drop for Faults {
     fn drop(&mut self) {
         if let Some(stopped) = self.stopped.take() {
-            let _ = kill_process(stopped.process, Signal::CONT);
+            let _ = kill_process_group(stopped.group, Signal::CONT);
         }
     }
 }
@@ -211,6 +242,23 @@ mod tests {
             turn.sort_unstable();
             assert_eq!(turn, [Some(StageId::Masking), Some(StageId::Refinement)]);
         }
+    }
+
+    #[test]
+    fn a_stage_that_was_not_found_and_a_time_without_any_fault_are_named() {
+        let mut faults = faults(FaultKind::Kill);
+        let nothing = faults.omitted().unwrap_or_default();
+        assert!(nothing.contains("raise --duration"), "{nothing}");
+        assert!(!faults.strike(StageId::Masking, None));
+        faults.sought = Some(StageId::Masking);
+        let not_found = faults.omitted().unwrap_or_default();
+        assert!(not_found.contains("masking was not found"), "{not_found}");
+    }
+
+    #[test]
+    fn the_shortest_measurement_has_time_for_a_fault() {
+        let begun = Faults::new(FaultKind::Stop, vec![StageId::Masking], 0, 0, LEAST);
+        assert!(begun.next_ns + nanoseconds(STOP + RECOVERY) < begun.ends_ns);
     }
 
     #[test]

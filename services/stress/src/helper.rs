@@ -12,6 +12,7 @@ use std::{
 };
 
 use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
+use serde::{Serialize, de::DeserializeOwned};
 
 use crate::{StressError, copying};
 
@@ -87,6 +88,15 @@ impl Helper {
             Ok(read) if read > 0 => Ok(line.trim_end().to_owned()),
             _ => Err(self.failed("has ended; what it printed says why")),
         }
+    }
+
+    /// Reads a result as [`say_result`] prints it.
+    ///
+    /// # Errors
+    /// The helper has ended, or said something else.
+    pub fn hear_result<T: DeserializeOwned>(&mut self) -> Result<T, StressError> {
+        let line = self.hear()?;
+        serde_json::from_str(&line).map_err(|error| self.failed(&format!("says `{line}`: {error}")))
     }
 
     fn await_line(&mut self, expected: &str) -> Result<(), StressError> {
@@ -165,8 +175,15 @@ pub(crate) fn say_ready() {
     say(READY);
 }
 
+/// Prints a result for the process that has started this one.
+pub(crate) fn say_result(result: &impl Serialize) -> Result<(), StressError> {
+    let line = serde_json::to_string(result);
+    say(&line.map_err(|error| StressError::Usage(error.to_string()))?);
+    Ok(())
+}
+
 /// Prints a line for the process that has started this one. That it has ended is noticed by its death.
-pub(crate) fn say(line: &str) {
+fn say(line: &str) {
     let mut output = std::io::stdout();
     let _ = writeln!(output, "{line}").and_then(|()| output.flush());
 }

@@ -1,40 +1,45 @@
 //! What the processes of a run use.
 
+mod members;
+
 use std::{
     collections::BTreeMap,
+    path::Path,
     time::{Duration, Instant},
 };
 
 use gyre_messages::{FollowerId, StageId};
 use gyre_stage::usage::Usage;
-use procfs::process::{Process, all_processes};
 use serde::Serialize;
+
+use members::Members;
 
 /// What the processes of one name have used while a run was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cost {
-    /// The stage, the follower, `supervisor` or `guardian`.
+    /// The stage, the follower, `supervisor`, `guardian` or `other`.
     pub name: String,
     /// Processor time, % of one processor.
     pub cpu_percent: f64,
-    /// Largest own memory, MB: without files and shared memory.
+    /// Largest own memory of all of them at once, MB: without files and shared memory.
     pub own_mb: f64,
     /// Wake-ups a second.
     pub wake_ups_per_s: f64,
     /// Times a second that a thread was taken off a processor while it had work.
     pub preemptions_per_s: f64,
-    /// Processes of this name, those after restarts included.
+    /// Processes of this name: those that a stage has started, and those after restarts, included.
     pub processes: usize,
 }
 
 /// Samples the processes of a run through `/proc`.
 #[derive(Debug)]
 pub struct Sampler {
-    supervisor: u32,
+    members: Members,
     began: Instant,
     /// By process: its name, and its usage at first and at last.
     seen: BTreeMap<u32, Seen>,
-    living: BTreeMap<String, u32>,
+    /// By name: the largest own memory of all its processes at once.
+    own_bytes: BTreeMap<String, u64>,
 }
 
 #[derive(Debug)]
@@ -42,17 +47,16 @@ struct Seen {
     name: String,
     first: Usage,
     last: Usage,
-    own_bytes: u64,
 }
 
 impl Sampler {
-    /// Begins now.
-    pub fn new(supervisor: u32) -> Self {
+    /// Begins now: the processes of the run that `supervisor` supervises, and that writes to `out`.
+    pub fn new(supervisor: u32, out: &Path) -> Self {
         let mut sampler = Self {
-            supervisor,
+            members: Members::of(supervisor, out),
             began: Instant::now(),
             seen: BTreeMap::new(),
-            living: BTreeMap::new(),
+            own_bytes: BTreeMap::new(),
         };
         sampler.sample();
         // What they had used before the measurement does not count.
@@ -63,25 +67,30 @@ impl Sampler {
 
     /// Looks at all processes.
     pub fn sample(&mut self) {
-        self.living = living(self.supervisor);
-        for (name, pid) in &self.living {
-            let Some(usage) = Usage::of(*pid) else {
+        let mut own_bytes: BTreeMap<String, u64> = BTreeMap::new();
+        for member in self.members.living() {
+            let Some(usage) = Usage::of(member.pid) else {
                 continue;
             };
-            let seen = self.seen.entry(*pid).or_insert_with(|| Seen {
-                name: name.clone(),
+            *own_bytes.entry(member.name.clone()).or_default() += usage.own_bytes;
+            let seen = self.seen.entry(member.pid).or_insert_with(|| Seen {
+                name: member.name.clone(),
                 first: Usage::default(),
                 last: usage,
-                own_bytes: 0,
             });
+            // It is `other` until the supervisor has said what it is.
+            seen.name = member.name;
             seen.last = usage;
-            seen.own_bytes = seen.own_bytes.max(usage.own_bytes);
+        }
+        for (name, bytes) in own_bytes {
+            let largest = self.own_bytes.entry(name).or_default();
+            *largest = bytes.max(*largest);
         }
     }
 
-    /// Returns the process of a stage as of now.
-    pub fn process_of(&self, stage: &str) -> Option<u32> {
-        living(self.supervisor).get(stage).copied()
+    /// Returns the process group of a stage as of now.
+    pub fn group_of(&mut self, stage: &str) -> Option<u32> {
+        self.members.group_of(stage)
     }
 
     /// Ends the measurement.
@@ -93,13 +102,14 @@ impl Sampler {
         names.dedup();
         let of = |name: &str| {
             let seen = self.seen.values().filter(|seen| seen.name == name);
-            cost(name, &seen.collect::<Vec<_>>(), elapsed)
+            let own_bytes = self.own_bytes.get(name).copied().unwrap_or_default();
+            cost(name, &seen.collect::<Vec<_>>(), own_bytes, elapsed)
         };
         names.iter().map(|name| of(name)).collect()
     }
 }
 
-fn cost(name: &str, seen: &[&Seen], elapsed: Duration) -> Cost {
+fn cost(name: &str, seen: &[&Seen], own_bytes: u64, elapsed: Duration) -> Cost {
     let shares = seen
         .iter()
         .map(|seen| seen.last.processor_share(&seen.first, elapsed));
@@ -109,40 +119,14 @@ fn cost(name: &str, seen: &[&Seen], elapsed: Duration) -> Cost {
             .map(|it| of(&it.last) - of(&it.first).min(of(&it.last)));
         counts.sum::<u64>() as f64 / elapsed.as_secs_f64().max(1e-9)
     };
-    let own = seen.iter().map(|seen| seen.own_bytes).max();
     Cost {
         name: name.to_owned(),
         cpu_percent: 100.0 * shares.sum::<f64>(),
-        own_mb: own.unwrap_or(0) as f64 * 1e-6,
+        own_mb: own_bytes as f64 * 1e-6,
         wake_ups_per_s: per_s(|usage| usage.wake_ups),
         preemptions_per_s: per_s(|usage| usage.preemptions),
         processes: seen.len(),
     }
-}
-
-/// The living processes of a run by name.
-fn living(supervisor: u32) -> BTreeMap<String, u32> {
-    let processes = all_processes().into_iter().flatten().flatten();
-    let children = processes.filter(|process| {
-        let stat = process.stat();
-        stat.is_ok_and(|stat| stat.ppid == supervisor as i32 && stat.state != 'Z')
-    });
-    let named = children.filter_map(|process| Some((name_of(&process)?, process.pid as u32)));
-    named
-        .chain([("supervisor".to_owned(), supervisor)])
-        .collect()
-}
-
-/// `gyre stage NAME`, or a program that is called like the stage that it replaces.
-fn name_of(process: &Process) -> Option<String> {
-    let line = process.cmdline().ok()?;
-    let last = line.iter().rfind(|word| !word.is_empty())?;
-    let name = std::path::Path::new(last).file_stem()?.to_str()?;
-    if name == "guard" {
-        return Some("guardian".to_owned());
-    }
-    let is_known = StageId::by_name(name).is_some() || FollowerId::by_name(name).is_some();
-    is_known.then(|| name.to_owned())
 }
 
 /// The place of a name in a table: supervisor, the stages in the order of the stream, followers, others.

@@ -3,11 +3,15 @@
 //! Every scan that was due is a sample. One that was dropped counts until the pose of the next one that was not: the vehicle had no
 //! newer pose before that. So neither a drop nor a source that stands still makes the distribution look better (coordinated omission).
 
+mod distribution;
+
 use std::ops::Range;
 
 use gyre_latency::{Durations, LatencyMeter};
 use gyre_messages::{Item, PoseHeader, StageId};
 use serde::Serialize;
+
+pub use distribution::Distribution;
 
 /// The largest number of dropped scans between two poses that are recorded one by one.
 const MAX_GAP: u64 = 1 << 20;
@@ -36,61 +40,6 @@ pub struct Sample {
     pub latency_ms: f64,
     /// True without a pose of its own.
     pub dropped: bool,
-}
-
-/// Percentiles of a duration, ms, as far as the number of samples supports them: the share q needs 1 / (1 - q) samples.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Distribution {
-    /// Number of samples.
-    pub samples: u64,
-    /// Median.
-    pub p50_ms: Option<f64>,
-    /// 90th percentile.
-    pub p90_ms: Option<f64>,
-    /// 99th percentile.
-    pub p99_ms: Option<f64>,
-    /// 99.9th percentile.
-    pub p99_9_ms: Option<f64>,
-    /// 99.99th percentile.
-    pub p99_99_ms: Option<f64>,
-    /// Maximum.
-    pub max_ms: Option<f64>,
-    /// For the plot: pairs of log10(1 / (1 - q)) and ms.
-    #[serde(skip)]
-    pub curve: Vec<(f64, f64)>,
-}
-
-impl Distribution {
-    /// Returns the distribution of durations.
-    pub fn of(durations: &Durations) -> Self {
-        let samples = durations.count();
-        let at = |share: f64| durations.at(share).map(|ns| ns as f64 * 1e-6);
-        // Rounded: 1 - 0.99 is not 0.01.
-        let is_supported = |share: f64| samples >= (1.0 / (1.0 - share)).round() as u64;
-        let supported = |share| at(share).filter(|_| is_supported(share));
-        // The last of n samples stands for the shares from 1 - 1 / n on: it is drawn in their middle.
-        let nines = (2.0 * samples.max(1) as f64).log10();
-        let steps = (nines * 40.0).ceil() as usize;
-        let curve = (0..=steps).filter_map(|step| {
-            let x = (step as f64 / 40.0).min(nines);
-            Some((x, at(1.0 - 10_f64.powf(-x))?))
-        });
-        Self {
-            samples,
-            p50_ms: supported(0.5),
-            p90_ms: supported(0.9),
-            p99_ms: supported(0.99),
-            p99_9_ms: supported(0.999),
-            p99_99_ms: supported(0.9999),
-            max_ms: at(1.0),
-            curve: curve.collect(),
-        }
-    }
-
-    /// Returns a percentile to be judged: where there are too few samples for it, the maximum.
-    pub fn judged(&self, percentile: Option<f64>) -> Option<f64> {
-        percentile.or(self.max_ms)
-    }
 }
 
 /// The hop of one stage.
@@ -370,19 +319,5 @@ mod tests {
             ..
         } = recorded.counts;
         assert_eq!((due, posed, dropped, unseen), (3, 2, 1, 2));
-    }
-
-    #[test]
-    fn percentiles_need_samples() {
-        let mut durations = Durations::default();
-        (1..=100).for_each(|ms| durations.add(ms * MS));
-        let distribution = Distribution::of(&durations);
-        assert!(near(distribution.p50_ms, 50.0) && near(distribution.p99_ms, 99.0));
-        assert_eq!(
-            (distribution.p99_9_ms, distribution.p99_99_ms),
-            (None, None)
-        );
-        assert!(near(distribution.judged(distribution.p99_9_ms), 100.0));
-        assert_eq!(Distribution::of(&Durations::default()).p50_ms, None);
     }
 }

@@ -59,14 +59,14 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.b.mcap");
         assert_eq!(next_part(&path), (path.clone(), 1));
-        std::fs::write(&path, "").unwrap();
+        fs::write(&path, "").unwrap();
         let second = folder.path().join("a.b.2.mcap");
         assert_eq!(next_part(&path), (second.clone(), 2));
-        std::fs::write(&second, "").unwrap();
+        fs::write(&second, "").unwrap();
         assert_eq!(parts(&path), [path.clone(), second]);
         assert_eq!(next_part(&path).1, 3);
         assert_eq!(parts(folder.path()), parts(&path), "a folder of one");
-        std::fs::write(folder.path().join("b.mcap"), "").unwrap();
+        fs::write(folder.path().join("b.mcap"), "").unwrap();
         assert!(parts(folder.path()).is_empty(), "a folder of two");
     }
 }

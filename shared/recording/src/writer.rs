@@ -369,7 +369,7 @@ impl RecordingWriter {
         let next = Self::create(path, head)?;
         let before = mem::replace(self, next);
         // What viewers draw goes on.
-        (self.views, self.newest_ns) = (before.views, before.newest_ns);
+        (self.recent, self.newest_ns) = (before.recent, before.newest_ns);
         Ok(before.table.missed)
     }
 

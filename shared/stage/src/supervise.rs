@@ -50,6 +50,7 @@ use watchdog::Watchdog;
 
 pub use child::Death;
 pub use guardian::guard;
+pub use log::last_line;
 pub use plan::{
     Ending, Event, Plan, Report, RestartPolicy, StagePlan, Stall, SuperviseError, Swapped,
 };

@@ -30,7 +30,7 @@ pub struct ConformanceArguments {
     /// The results must be those of Gyre's own stage, to the bit.
     #[arg(long)]
     pub same_as_own: bool,
-    /// The 99th percentile of the work on an item must be at most this, ms.
+    /// The 99th percentile of the work on an item must be at most this, ms; of fewer than a hundred items the maximum. The first four do not count.
     #[arg(long, value_name = "MS")]
     pub budget_ms: Option<f64>,
     /// Time for the program to open its topics, s.

@@ -13,6 +13,7 @@ use std::{
 
 use gyre_stage::{
     control::{Control, Phase, Status},
+    supervise::last_line,
     wake::Signals,
 };
 use rustix::process::{Pid, Signal, kill_process};
@@ -126,8 +127,7 @@ fn ended(
         print::line(text.trim_end())?;
         return Ok(ExitCode::SUCCESS);
     }
-    let last = text.lines().rev().find(|line| !line.trim().is_empty());
-    let reason = last.unwrap_or("it has printed nothing");
+    let reason = last_line(&text).unwrap_or("it has printed nothing");
     let reason = reason.strip_prefix("gyre: ").unwrap_or(reason);
     Err(format!("the run in {} has ended: {reason}", out.display()).into())
 }

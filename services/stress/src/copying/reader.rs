@@ -11,10 +11,10 @@ use gyre_stage::{
     observer::{Next, ObservedRun},
 };
 
-use super::{Had, Plan, WARM_UP, Way, cpu_ns, own_bytes, socket, tell};
+use super::{Had, Plan, WARM_UP, Way, cpu_ns, own_bytes, socket};
 use crate::{
     StressError,
-    helper::{load::touched, say_ready},
+    helper::{load::touched, say_ready, say_result},
 };
 
 /// Time without a message after which none is expected any more.
@@ -26,7 +26,7 @@ pub(super) fn read(plan: &Plan) -> Result<(), StressError> {
         Way::SharedMemory => read_in_place(plan)?,
         Way::Sockets => read_copies(plan)?,
     };
-    tell(&had.finish())
+    say_result(&had.finish())
 }
 
 fn read_in_place(plan: &Plan) -> Result<Readings, StressError> {

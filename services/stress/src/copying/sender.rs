@@ -5,8 +5,11 @@ use std::thread;
 use gyre_stage::{clock, hand_over::HandOver};
 use rustix::time::{ClockId, clock_gettime};
 
-use super::{Plan, RATE_HZ, Sent, WARM_UP, Way, own_bytes, socket, tell};
-use crate::{StressError, helper::say_ready};
+use super::{Plan, RATE_HZ, Sent, WARM_UP, Way, own_bytes, socket};
+use crate::{
+    StressError,
+    helper::{say_ready, say_result},
+};
 
 /// One way to send.
 pub(super) trait Send {
@@ -50,7 +53,7 @@ fn send_by(plan: &Plan, mut way: impl Send) -> Result<(), StressError> {
     }
     sent.own_bytes = own_bytes();
     sent.shared_bytes = way.shared_bytes();
-    tell(&sent)?;
+    say_result(&sent)?;
     // Readers may still read.
     let _ = std::io::stdin().read_line(&mut go);
     Ok(())

@@ -14,14 +14,15 @@ use gyre_stage::{
     observer::{Next, ObservedRun},
 };
 
-use super::say_ready;
-use crate::{StressError, memory::Room};
+use super::{say_ready, say_result};
+use crate::{
+    StressError,
+    memory::{LEFT, Room, Taken},
+};
 
 /// Bytes that are taken at once.
 const PIECE: usize = 32 << 20;
 const PAGE: usize = 4096;
-/// Memory that is always left, whatever the share: room for other programs that start meanwhile.
-const LEFT: u64 = 1 << 30;
 /// Time in which memory is taken before the measurement. On a large machine all of it would take minutes.
 const TAKING: Duration = Duration::from_secs(20);
 /// Time between two looks for memory when there is no more to take.
@@ -57,6 +58,10 @@ pub(super) fn churn(share: f64) -> Result<(), StressError> {
         pieces.push(piece());
     }
     say_ready();
+    say_result(&Taken {
+        taken_mb: (pieces.len() * PIECE) as f64 * 1e-6,
+        available_mb: available as f64 * 1e-6,
+    })?;
     loop {
         for taken in &mut pieces {
             *taken = Vec::new();

@@ -5,6 +5,7 @@ use std::fmt::Write;
 use super::{Figures, Outcome, Provenance, Report, Verdict};
 use crate::{
     copying::Row,
+    memory::Taken,
     record::{Counts, Distribution},
     scenario::Scenario,
 };
@@ -48,9 +49,10 @@ fn head(page: &mut String, provenance: &Provenance) {
 
 fn verdicts(page: &mut String, outcomes: &[Outcome]) {
     let with = |verdict| outcomes.iter().filter(move |it| it.verdict == verdict);
-    let failed = with(Verdict::Failed).count();
-    let judged = failed + with(Verdict::Passed).count();
+    let (failed, passed) = (with(Verdict::Failed).count(), with(Verdict::Passed).count());
+    let (open, judged) = (with(Verdict::NotCarriedOut).count(), failed + passed);
     let _ = match (failed, judged) {
+        (_, 0) if open > 0 => writeln!(page, "\n**Not judged**."),
         (_, 0) => writeln!(
             page,
             "\n**Not judged**: the configuration has no section `[budget]` with limits for these scenarios."
@@ -64,6 +66,9 @@ fn verdicts(page: &mut String, outcomes: &[Outcome]) {
             "\n**FAILED**: {failed} of {judged} scenarios that are judged."
         ),
     };
+    if open > 0 {
+        let _ = writeln!(page, "\n**NOT CARRIED OUT**: {open} of {}.", outcomes.len());
+    }
     let mut checks = outcomes
         .iter()
         .flat_map(|outcome| outcome.checks.iter().map(move |check| (outcome, check)))
@@ -103,7 +108,8 @@ fn overview(page: &mut String, outcomes: &[Outcome]) {
         "\n## Sensor to pose\n\n![latency by percentile](report.svg)\n\n\
          Time from the moment at which a scan was due by the sensor's clock to its pose, ms. A scan that was dropped counts until the pose \
          that replaced it. In the last columns is what a closed loop would have said of the same run: from the publication of a scan to its \
-         pose, of the scans that have one. `-`: too few samples for that percentile.\n\n\
+         pose, of the scans that have one. `-`: too few samples for that percentile. `of N`: fewer than ten of its N samples are beyond it, so that it \
+         depends on the luck of few scans.\n\n\
          | scenario | scans/s | due | dropped | p50 | p90 | p99 | p99.9 | p99.99 | max | closed loop p50 | p99 | max |\n\
          |---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
@@ -117,7 +123,7 @@ fn overview(page: &mut String, outcomes: &[Outcome]) {
             outcome.rate_hz,
             percentiles(&figures.sensor_to_pose),
             ms(closed.p50_ms),
-            ms(closed.p99_ms),
+            ms(closed.p99_ms) + &closed.mark(closed.p99_ms, 0.99),
             ms(closed.max_ms)
         );
     }
@@ -254,22 +260,31 @@ fn processes(page: &mut String, figures: &Figures) {
         sum(|cost| cost.preemptions_per_s),
         figures.shared_bytes as f64 * 1e-6
     );
+    if let Some(Taken {
+        taken_mb,
+        available_mb,
+    }) = figures.taken
+    {
+        let _ = writeln!(
+            page,
+            "\nTaken beside it: {taken_mb:.0} MB of the {available_mb:.0} MB that were available."
+        );
+    }
 }
 
 fn steps(page: &mut String, outcome: &Outcome) {
     if outcome.steps.is_empty() {
         return;
     }
-    let found = outcome
-        .best
-        .map_or("none".to_owned(), |best| format!("{best:.1}"));
+    let level = |level: Option<f64>| level.map_or("none".to_owned(), |level| format!("{level:.1}"));
+    let (found, failed) = (level(outcome.best), level(outcome.failed));
     let (what, unit) = match outcome.scenario {
         Scenario::Ramp => ("The highest rate that passed, scans/s", "scans/s"),
         _ => ("The largest number of 4 Hz radars that passed", "radars"),
     };
     let _ = writeln!(
         page,
-        "\n{what}: **{found}**.\n\n| {unit} | due | dropped | p50, ms | p99, ms | processor, % of one | |\n|---|---|---|---|---|---|---|"
+        "\n{what}: **{found}**. The lowest above it that failed, twice: {failed}.\n\n| {unit} | due | dropped | p50, ms | p99, ms | processor, % of one | |\n|---|---|---|---|---|---|---|"
     );
     for step in &outcome.steps {
         let _ = writeln!(
@@ -292,7 +307,7 @@ fn copying(page: &mut String, rows: &[Row]) {
     }
     page.push_str(
         "\nFrom the start of the sending until the last reader has the message, ms; processor time of the sender (without the time to write the \
-         message) and of a reader for a message, us. Both ways: one process for the sender and one for each reader, 20 messages/s, readers that sleep in \
+         message) and of a reader for a message, us. Both ways: one process for the sender and one for each reader, 50 messages/s, readers that sleep in \
          `ppoll` and read a byte of each cache line.\n\n\
          | message | bytes | readers | way | p50 | p99 | max | sender, us | a reader, us | own memory, MB | shared memory, MB | missed |\n\
          |---|---|---|---|---|---|---|---|---|---|---|---|\n",
@@ -320,16 +335,15 @@ fn copying(page: &mut String, rows: &[Row]) {
 }
 
 fn percentiles(latency: &Distribution) -> String {
-    [
-        latency.p50_ms,
-        latency.p90_ms,
-        latency.p99_ms,
-        latency.p99_9_ms,
-        latency.p99_99_ms,
-        latency.max_ms,
-    ]
-    .map(ms)
-    .join(" | ")
+    let shares = [
+        (latency.p50_ms, 0.5),
+        (latency.p90_ms, 0.9),
+        (latency.p99_ms, 0.99),
+        (latency.p99_9_ms, 0.999),
+        (latency.p99_99_ms, 0.9999),
+    ];
+    let cells = shares.map(|(percentile, share)| ms(percentile) + &latency.mark(percentile, share));
+    format!("{} | {}", cells.join(" | "), ms(latency.max_ms))
 }
 
 /// Three digits, and no more than three after the point: clocks are not finer.

@@ -58,11 +58,13 @@ impl Log {
         let mut bytes = vec![0; end.saturating_sub(begin) as usize];
         self.file.read_exact_at(&mut bytes, begin).ok()?;
         let text = String::from_utf8_lossy(&bytes);
-        let mut lines = text.lines().rev();
-        lines
-            .find(|line| !line.trim().is_empty())
-            .map(str::to_owned)
+        last_line(&text).map(str::to_owned)
     }
+}
+
+/// Returns the last line that is not empty: what a program that has ended says of it.
+pub fn last_line(text: &str) -> Option<&str> {
+    text.lines().rfind(|line| !line.trim().is_empty())
 }
 
 /// All logs of a run, which are kept short.

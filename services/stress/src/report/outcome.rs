@@ -1,0 +1,400 @@
+//! What a scenario has shown: figures, steps of a search, and the verdict.
+
+use std::{collections::BTreeMap, fmt::Write, time::Duration};
+
+use serde::Serialize;
+
+use crate::{
+    budget::Check,
+    copying::Row,
+    fault::Fault,
+    memory::Taken,
+    pipeline::Measured,
+    processes::Cost,
+    record::{Counts, Distribution, Hop, Sample},
+    scenario::{Judged, Scenario},
+};
+
+/// The verdict on a scenario.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// All limits are kept, and the run has recovered from all faults.
+    Passed,
+    /// A limit is not kept, or the run has ended, or not recovered.
+    Failed,
+    /// There is no limit for it.
+    NotJudged,
+    /// It could not be carried out, which says nothing of the pipeline.
+    NotCarriedOut,
+}
+
+impl Verdict {
+    /// Returns it in a word or two.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Passed => "passed",
+            Self::Failed => "FAILED",
+            Self::NotJudged => "not judged",
+            Self::NotCarriedOut => "NOT CARRIED OUT",
+        }
+    }
+}
+
+/// The figures of a run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Figures {
+    /// Counts of scans.
+    pub counts: Counts,
+    /// From the time at which a scan was due to its pose; a scan that was dropped counts until the pose that replaced it.
+    pub sensor_to_pose: Distribution,
+    /// The same of the scans that have a pose alone.
+    pub posed: Distribution,
+    /// What a closed loop would have measured: from the publication of a scan to its pose.
+    pub closed_loop: Distribution,
+    /// Stage by stage.
+    pub hops: Vec<Hop>,
+    /// Faults and recoveries.
+    pub faults: Vec<Fault>,
+    /// Restarts by stage.
+    pub restarts: BTreeMap<String, usize>,
+    /// Lost wake-ups by stage, each found after up to 200 ms.
+    pub wakes_caught_late: BTreeMap<String, u64>,
+    /// What each process has used.
+    pub processes: Vec<Cost>,
+    /// Shared memory, bytes.
+    pub shared_bytes: u64,
+    /// Memory that a load has taken beside it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub taken: Option<Taken>,
+    /// Scan by scan; written as CSV.
+    #[serde(skip)]
+    pub timeline: Vec<Sample>,
+}
+
+impl Figures {
+    /// Returns the figures of a run that was measured.
+    pub fn of(measured: Measured) -> Self {
+        let Measured {
+            recorded,
+            faults,
+            processes,
+            shared_bytes,
+            summary,
+            taken,
+            omitted: _,
+            died: _,
+        } = measured;
+        let late = summary.stages.into_iter();
+        let late = late.map(|(stage, counters)| (stage, counters.wakes_caught_late));
+        Self {
+            counts: recorded.counts,
+            sensor_to_pose: recorded.sensor_to_pose,
+            posed: recorded.posed,
+            closed_loop: recorded.closed_loop,
+            hops: recorded.hops,
+            faults,
+            restarts: summary.restarts,
+            wakes_caught_late: late.filter(|(_, late)| *late > 0).collect(),
+            processes,
+            shared_bytes,
+            taken,
+            timeline: recorded.timeline,
+        }
+    }
+
+    /// Returns the share of the scans that were due and have no pose, %.
+    pub fn drops_percent(&self) -> Option<f64> {
+        let Counts { due, dropped, .. } = self.counts;
+        (due > 0).then(|| 100.0 * dropped as f64 / due as f64)
+    }
+
+    /// Returns `p50 4.5, p99 7.0 of 480, max 7.2 ms; 0 of 480 scans dropped`.
+    fn sentence(&self) -> String {
+        let latency = &self.sensor_to_pose;
+        let ms = |ms: Option<f64>| ms.map_or("-".to_owned(), |ms| format!("{ms:.1}"));
+        let Counts { due, dropped, .. } = self.counts;
+        let (p50, max) = (ms(latency.p50_ms), ms(latency.max_ms));
+        let p99 = ms(latency.p99_ms) + &latency.mark(latency.p99_ms, 0.99);
+        let faults = match self.faults.len() {
+            0 => String::new(),
+            1 => "; 1 fault".to_owned(),
+            faults => format!("; {faults} faults"),
+        };
+        format!("p50 {p50}, p99 {p99}, max {max} ms; {dropped} of {due} scans dropped{faults}")
+    }
+
+    /// Returns the processor time of all processes, % of one processor.
+    pub fn cpu_percent(&self) -> f64 {
+        self.processes.iter().map(|cost| cost.cpu_percent).sum()
+    }
+
+    /// Returns own memory of all processes and shared memory, MB.
+    pub fn memory_mb(&self) -> f64 {
+        let own: f64 = self.processes.iter().map(|cost| cost.own_mb).sum();
+        own + self.shared_bytes as f64 * 1e-6
+    }
+}
+
+/// A step of a search for the largest load.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Step {
+    /// Scans a second, or radars.
+    pub level: f64,
+    /// True if all its pipelines keep the limits.
+    pub passed: bool,
+    /// Scans that were due, in all pipelines.
+    pub due: u64,
+    /// Scans without a pose, in all pipelines.
+    pub dropped: u64,
+    /// The largest median of its pipelines, ms.
+    pub p50_ms: Option<f64>,
+    /// The largest 99th percentile of its pipelines, ms; of fewer than a hundred scans the maximum.
+    pub p99_ms: Option<f64>,
+    /// Processor time of all pipelines, % of one processor.
+    pub cpu_percent: f64,
+    /// Why it has not passed.
+    pub reason: Option<String>,
+}
+
+impl Step {
+    /// A step whose runs could not be started.
+    pub fn not_started(level: f64, reason: String) -> Self {
+        Self {
+            level,
+            passed: false,
+            due: 0,
+            dropped: 0,
+            p50_ms: None,
+            p99_ms: None,
+            cpu_percent: 0.0,
+            reason: Some(reason),
+        }
+    }
+
+    /// A step with the checks, the problem and the figures of each of its pipelines.
+    pub fn of(level: f64, pipelines: Vec<(Vec<Check>, Option<String>, Figures)>) -> Self {
+        let largest = |of: &dyn Fn(&Distribution) -> Option<f64>| {
+            let all = pipelines
+                .iter()
+                .map(|(.., figures)| &figures.sensor_to_pose);
+            all.filter_map(of).reduce(f64::max)
+        };
+        let reason = pipelines.iter().find_map(|(checks, problem, _)| {
+            let failed = || {
+                checks
+                    .iter()
+                    .find(|check| !check.passed)
+                    .map(Check::sentence)
+            };
+            problem.clone().or_else(failed)
+        });
+        let figures = || pipelines.iter().map(|(.., figures)| figures);
+        Self {
+            level,
+            passed: reason.is_none(),
+            due: figures().map(|it| it.counts.due).sum(),
+            dropped: figures().map(|it| it.counts.dropped).sum(),
+            p50_ms: largest(&|latency| latency.judged(latency.p50_ms)),
+            p99_ms: largest(&|latency| latency.judged(latency.p99_ms)),
+            cpu_percent: figures().map(Figures::cpu_percent).sum(),
+            reason,
+        }
+    }
+
+    /// Returns `8.0 scans/s: p99 14.2 ms, 0 of 80 dropped`.
+    pub fn sentence(&self, unit: &str) -> String {
+        let Self { due, dropped, .. } = self;
+        let p99 = self
+            .p99_ms
+            .map_or("no pose".to_owned(), |ms| format!("p99 {ms:.1} ms"));
+        let reason = self
+            .reason
+            .as_ref()
+            .map_or(String::new(), |reason| format!(": {reason}"));
+        format!(
+            "  {:.1} {unit}: {p99}, {dropped} of {due} dropped{reason}",
+            self.level
+        )
+    }
+}
+
+/// The outcome of a scenario.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Outcome {
+    /// The scenario.
+    pub scenario: Scenario,
+    /// What it does.
+    pub line: &'static str,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// The figures that have limits.
+    pub checks: Vec<Check>,
+    /// What went wrong, whatever the latency.
+    pub problem: Option<String>,
+    /// Scans a second.
+    pub rate_hz: f64,
+    /// Time that was measured, s.
+    pub duration_s: f64,
+    /// The figures of its run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub figures: Option<Figures>,
+    /// The largest load that passed: scans a second, or radars.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub best: Option<f64>,
+    /// The smallest load above it that failed, twice; `None`: none was tried.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub failed: Option<f64>,
+    /// The steps of a search.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub steps: Vec<Step>,
+    /// The transport beside copies.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub copying: Vec<Row>,
+}
+
+impl Outcome {
+    /// An outcome without any figure.
+    pub fn new(scenario: Scenario, duration: Duration) -> Self {
+        Self {
+            scenario,
+            line: scenario.line(),
+            verdict: Verdict::NotJudged,
+            checks: Vec::new(),
+            problem: None,
+            rate_hz: scenario.rate_hz(),
+            duration_s: duration.as_secs_f64(),
+            figures: None,
+            best: None,
+            failed: None,
+            steps: Vec::new(),
+            copying: Vec::new(),
+        }
+    }
+
+    /// The same with its verdict.
+    #[must_use]
+    pub fn judged(mut self) -> Self {
+        let had_faults = self
+            .figures
+            .as_ref()
+            .is_some_and(|it| !it.faults.is_empty());
+        let has_recovered = self.scenario.judged() == Judged::ByRecovery && had_faults;
+        self.verdict = match (&self.problem, self.checks.as_slice()) {
+            (Some(_), _) => Verdict::Failed,
+            (None, checks) if checks.iter().any(|check| !check.passed) => Verdict::Failed,
+            (None, []) if !has_recovered => Verdict::NotJudged,
+            (None, _) => Verdict::Passed,
+        };
+        self
+    }
+
+    /// The same, not carried out, if something that was to be done to the run was not. That it has failed all the same stands.
+    #[must_use]
+    pub fn unless(mut self, omitted: Option<String>) -> Self {
+        if self.verdict != Verdict::Failed && omitted.is_some() {
+            self.verdict = Verdict::NotCarriedOut;
+            self.problem = omitted;
+        }
+        self
+    }
+
+    /// Returns the verdict with its reasons.
+    pub fn sentence(&self) -> String {
+        let mut sentence = format!("{}: {}", self.scenario, self.verdict.name());
+        let failed = self.checks.iter().filter(|check| !check.passed);
+        let reasons = self
+            .problem
+            .iter()
+            .cloned()
+            .chain(failed.map(Check::sentence));
+        for reason in reasons {
+            let _ = write!(sentence, "; {reason}");
+        }
+        if let Some(figures) = &self.figures
+            && figures.counts.due > 0
+        {
+            let _ = write!(sentence, " ({})", figures.sentence());
+        }
+        match (self.best, self.failed) {
+            (Some(best), Some(failed)) => {
+                let _ = write!(sentence, " ({best:.1}; {failed:.1} failed twice)");
+            }
+            (Some(best), None) => {
+                let _ = write!(sentence, " ({best:.1})");
+            }
+            (None, _) => {}
+        }
+        sentence
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{fault::FaultKind, report::Report};
+
+    fn outcome(scenario: Scenario) -> Outcome {
+        Outcome::new(scenario, Duration::from_secs(1))
+    }
+
+    fn check(passed: bool) -> Check {
+        Check {
+            key: "p99_ms",
+            measured: Some(300.0),
+            limit: 250.0,
+            passed,
+        }
+    }
+
+    #[test]
+    fn a_scenario_fails_by_one_limit_or_by_a_problem() {
+        let mut steady = outcome(Scenario::Steady);
+        assert_eq!(steady.clone().judged().verdict, Verdict::NotJudged);
+        steady.checks = vec![check(true)];
+        assert_eq!(steady.clone().judged().verdict, Verdict::Passed);
+        steady.checks.push(check(false));
+        let failed = steady.judged();
+        assert_eq!(failed.verdict, Verdict::Failed);
+        assert!(failed.sentence().contains("p99_ms 300.0, limit 250"));
+        assert!(Report::of(vec![failed]).has(Verdict::Failed));
+    }
+
+    fn with_faults(scenario: Scenario, faults: &[Option<f64>]) -> Outcome {
+        let fault = |recovery_ms: &Option<f64>| Fault {
+            kind: FaultKind::Kill,
+            stage: "masking",
+            at_s: 1.5,
+            recovery_ms: *recovery_ms,
+        };
+        Outcome {
+            figures: Some(Figures {
+                faults: faults.iter().map(fault).collect(),
+                ..Figures::default()
+            }),
+            ..outcome(scenario)
+        }
+    }
+
+    #[test]
+    fn a_fault_without_limits_passes_by_recovery_alone() {
+        let mut kills = with_faults(Scenario::Kills, &[Some(40.0)]);
+        assert_eq!(kills.clone().judged().verdict, Verdict::Passed);
+        kills.problem = Some("no pose has followed the fault of masking".to_owned());
+        assert_eq!(kills.judged().verdict, Verdict::Failed);
+    }
+
+    #[test]
+    fn without_any_fault_there_is_no_recovery_to_pass_by() {
+        let slow = with_faults(Scenario::SlowStage, &[]);
+        assert_eq!(slow.judged().verdict, Verdict::NotJudged);
+        let omitted = Some("nothing was done".to_owned());
+        let mut kills = with_faults(Scenario::Kills, &[]);
+        kills.checks = vec![check(true)];
+        let not_done = kills.clone().judged().unless(omitted.clone());
+        assert_eq!(not_done.verdict, Verdict::NotCarriedOut);
+        assert!(not_done.sentence().contains("nothing was done"));
+        kills.problem = Some("the run has ended".to_owned());
+        assert_eq!(kills.judged().unless(omitted).verdict, Verdict::Failed);
+    }
+}
