@@ -81,10 +81,10 @@ fn can_view() -> bool {
     can
 }
 
-/// A drive of half a minute.
-fn driving() -> Run {
+/// A drive of 120 scans, half a minute at rate 1.
+fn driving(rate: &str) -> Run {
     let data = recording::around_a_block().to_str().unwrap();
-    Run::small().argument("--data", data).rate("1")
+    Run::small().argument("--data", data).rate(rate)
 }
 
 fn started(run: &Run) -> (Running, Server) {
@@ -109,7 +109,7 @@ fn a_viewer_receives_the_scans_of_the_recording_and_the_motions_of_the_results()
     if !can_view() {
         return;
     }
-    let run = driving();
+    let run = driving("1");
     let (running, server) = started(&run);
     let mut viewer = Command::new(python());
     viewer.args(["-c", VIEW, &server.foxglove(), "8"]);
@@ -240,7 +240,7 @@ const SDK: &str = "Sec-WebSocket-Protocol: foxglove.sdk.v1";
 
 #[test]
 fn viewers_of_other_sites_and_machines_need_the_token() {
-    let run = driving();
+    let run = driving("1");
     let mut running = run.start();
     running.await_poses(1);
     let open = Server::start(&run, "127.0.0.1", &["--foxglove", "127.0.0.1:0"]);
@@ -277,8 +277,8 @@ fn viewers_of_other_sites_and_machines_need_the_token() {
 
 #[test]
 fn a_viewer_that_never_reads_costs_neither_memory_nor_the_run() {
-    let undisturbed = driving().rate("max").complete();
-    let run = driving().rate("12");
+    let undisturbed = driving("max").complete();
+    let run = driving("12");
     let (mut running, server) = started(&run);
     let (mut stalled, answer) = connect(&server.foxglove(), "", &[SDK]);
     assert!(answer.contains(" 101 "), "{answer}");
@@ -291,9 +291,9 @@ fn a_viewer_that_never_reads_costs_neither_memory_nor_the_run() {
     );
     stalled.write_all(&frame(&request)).unwrap();
     running.await_poses(20);
-    let early = resident_bytes(server.pid());
+    let early = own_bytes(server.pid());
     running.await_poses(recording::SCANS_AROUND);
-    let late = resident_bytes(server.pid());
+    let late = own_bytes(server.pid());
     running.finish().succeeded();
     assert_eq!(run.odometry(), undisturbed);
     // A hundred scans and rasters are more than twice that.
@@ -307,9 +307,12 @@ fn frame(text: &str) -> Vec<u8> {
     [&[0x81, 0xfe][..], &length, &[0; 4], text.as_bytes()].concat()
 }
 
-fn resident_bytes(pid: u32) -> u64 {
+/// Memory of a process's own: what it maps of the run's is not its.
+fn own_bytes(pid: u32) -> u64 {
     let status = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap();
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
+    let line = status
+        .lines()
+        .find_map(|line| line.strip_prefix("RssAnon:"));
     let kilobytes = line.unwrap().trim().trim_end_matches(" kB");
     kilobytes.parse::<u64>().unwrap() << 10
 }

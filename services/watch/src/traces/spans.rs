@@ -78,21 +78,23 @@ struct Attribute {
 }
 
 #[derive(Clone, Debug, Serialize)]
-#[serde(rename_all = "camelCase")]
 enum Value {
-    StringValue(String),
-    IntValue(String),
-    BoolValue(bool),
+    #[serde(rename = "stringValue")]
+    Text(String),
+    #[serde(rename = "intValue")]
+    Integer(String),
+    #[serde(rename = "boolValue")]
+    Bool(bool),
 }
 
 impl Attribute {
     fn text(key: &'static str, text: impl Into<String>) -> Self {
-        let value = Value::StringValue(text.into());
+        let value = Value::Text(text.into());
         Self { key, value }
     }
 
     fn number(key: &'static str, number: impl fmt::Display) -> Self {
-        let value = Value::IntValue(number.to_string());
+        let value = Value::Integer(number.to_string());
         Self { key, value }
     }
 }
@@ -174,7 +176,7 @@ impl Trace {
                 Attribute::number("gyre.dropped", item.dropped()),
                 Attribute {
                     key: "gyre.stationary",
-                    value: Value::BoolValue(self.stationary),
+                    value: Value::Bool(self.stationary),
                 },
             ],
             ..self.span(0, None, ROOT, item.due_ns..end_ns)
