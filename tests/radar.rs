@@ -5,8 +5,9 @@ use std::{
     net::UdpSocket,
     path::Path,
     process::{self, Child, Stdio},
+    sync::mpsc::{self, RecvTimeoutError},
     thread,
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 use crate::common::{Ended, Run, gyre, odometry, recording};
@@ -166,15 +167,15 @@ fn datagrams_without_scans_are_named_in_a_sentence() {
         .argument("--radar", &format!("udp://{to}"))
         .set("source.interface='127.0.0.1'");
     let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let (stop, stopped) = mpsc::channel::<()>();
     let sending = thread::spawn(move || {
-        let began = Instant::now();
-        while began.elapsed() < Duration::from_secs(10) {
+        while stopped.recv_timeout(Duration::from_millis(50)) == Err(RecvTimeoutError::Timeout) {
             // Navtech's point cloud, without points.
             sender.send_to(&[2, 40, 0, 0, 0, 0, 0, 0], &to).unwrap();
-            thread::sleep(Duration::from_millis(50));
         }
     });
     Ended::of(run.command()).refused_with(&["are no scans", "data output to CAT-240"]);
+    drop(stop);
     sending.join().unwrap();
     let run = Run::small().argument("--radar", "udp://239.192.43.3");
     Ended::of(run.command()).refused_with(&["`udp://239.192.43.3` is none for datagrams"]);

@@ -122,8 +122,8 @@ fn a_recording_in_several_files_replays_to_the_same_bytes() {
     let run = recorded(&simulated()).set(ALL).set("record.split_s=1.5");
     let odometry = run.complete();
     let files = parts(&file(&run));
-    // Six seconds of scans.
-    assert_eq!(files.len(), 4, "{files:?}");
+    // Six seconds of scans; a file may begin with a message of a scan that is in the one before.
+    assert!((4..8).contains(&files.len()), "{files:?}");
     let recording = open_recording(&file(&run)).unwrap();
     assert_eq!(seqs(&recording, "scan").len(), SCANS);
     assert_eq!(recording.cut().count(), 0, "each file has its end");
@@ -174,9 +174,11 @@ fn a_recorder_that_is_stopped_for_long_says_exactly_what_it_missed() {
         ended.stderr
     );
     // The scans that are there are played, and those that are not are named; what needs every message is refused.
-    let again = Run::configured("").data(&file(&run));
-    again.finish().succeeded();
-    assert_eq!(again.summary()["unreadable"], missed);
+    let again = Run::configured("")
+        .data(&file(&run))
+        .set("source.max_unreadable=100");
+    let sentence = format!("{missed} of the {SCANS} scans");
+    again.finish().failed_with(&[&sentence, "cannot be read"]);
     let lost = (0..SCANS as u64)
         .find(|seq| !seqs(&recording, "masked").contains(seq))
         .unwrap();

@@ -17,7 +17,7 @@ pub enum SourceKind {
     /// A recording, or a simulation.
     #[default]
     Recording,
-    /// A Navtech radar on the network, by its protocol Colossus.
+    /// A Navtech radar on the network, by its protocol Colossus or as ASTERIX CAT-240.
     Colossus,
 }
 

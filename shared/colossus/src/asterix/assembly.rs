@@ -60,9 +60,9 @@ impl Assembly {
         self.is_done
     }
 
-    /// Returns whether parts have arrived and not all of them.
-    pub(super) fn is_open(&self) -> bool {
-        self.of.is_some() && !self.is_done
+    /// Forgets the azimuth.
+    pub(super) fn clear(&mut self) {
+        self.of = None;
     }
 
     /// Ends an azimuth that has fewer bins than it says: true if its parts follow each other from the first bin on, and no message is
@@ -71,7 +71,8 @@ impl Assembly {
         let (first, last) = self.numbers;
         let span = last.wrapping_sub(first) as usize + 1;
         let end = self.parts.iter().map(|part| part.1).max();
-        let is_whole = self.is_open()
+        let is_whole = self.of.is_some()
+            && !self.is_done
             && number == last.wrapping_add(1)
             && span == self.parts.len()
             && end == Some(self.bytes);

@@ -31,7 +31,6 @@ pub struct Datagrams {
     open: Assembly,
     /// The azimuth that was returned last, when the datagram in the buffer is still to be handled.
     ended: Assembly,
-    lost: u64,
 }
 
 /// What a datagram leads to.
@@ -55,7 +54,6 @@ impl Datagrams {
             newest: None,
             open: Assembly::default(),
             ended: Assembly::default(),
-            lost: 0,
         }
     }
 
@@ -67,11 +65,6 @@ impl Datagrams {
     /// Says that the first `bytes` of the space are a datagram.
     pub fn filled(&mut self, bytes: usize) {
         self.filled = bytes.min(MAX_BYTES);
-    }
-
-    /// Returns the azimuths of which a part, but not all, has arrived.
-    pub fn lost_azimuths(&self) -> u64 {
-        self.lost
     }
 
     /// Returns the next message or fault; `None` until the next datagram is there.
@@ -122,10 +115,9 @@ impl Datagrams {
             }
             if self.open.ends_before(video.number) {
                 mem::swap(&mut self.open, &mut self.ended);
-                self.open = Assembly::default();
+                self.open.clear();
                 return Step::Ended;
             }
-            self.lost += u64::from(self.open.is_open());
             self.open.begin(video);
         }
         if !is_late {
