@@ -28,6 +28,7 @@ mod lost_input;
 mod masks;
 mod observers;
 mod operate;
+mod package;
 mod page;
 mod pipeline;
 mod python_stage;
