@@ -10,10 +10,11 @@ use std::{
 };
 
 use gyre_stage::control::Control;
+use rustix::process::Signal;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::common::{Run, assert_nothing_left, gyre};
+use crate::common::{assert_nothing_left, gyre, send};
 
 /// Time between two scans of a simulated radar, s.
 const PERIOD_S: f64 = 0.25;
@@ -65,9 +66,13 @@ impl Stress {
 
     /// The outcome of the first scenario.
     fn outcome(&self) -> Value {
+        self.outcome_of(0)
+    }
+
+    fn outcome_of(&self, index: usize) -> Value {
         let text = fs::read_to_string(self.out().join("report.json")).unwrap();
         let report: Value = serde_json::from_str(&text).unwrap();
-        report["outcomes"][0].clone()
+        report["outcomes"][index].clone()
     }
 
     fn assert_nothing_left(&self, run: &str) {
@@ -261,12 +266,7 @@ fn a_run_that_ends_while_it_is_measured_has_failed() {
     let words = ["--scenario", "steady", "--duration", "60"];
     let measured = stress.start(&[&words[..], &["--set", "budget.max_ms=60000"]].concat());
     let out = stress.run_out("steady");
-    let since = Instant::now();
-    // Those of the warm-up, and more.
-    while status_of(&out).is_none_or(|poses| poses <= 12) {
-        assert!(since.elapsed() < LIMIT, "no poses in {}", out.display());
-        thread::sleep(Duration::from_millis(20));
-    }
+    await_measurement(&out);
     Control::of(&out).unwrap().stop().unwrap();
     let output = finish(measured);
     assert_eq!(output.status.code(), Some(1));
@@ -274,24 +274,34 @@ fn a_run_that_ends_while_it_is_measured_has_failed() {
     assert!(said.contains("steady: FAILED; the run has ended"), "{said}");
 }
 
-/// The number of poses of a run, if it answers.
-fn status_of(out: &Path) -> Option<u64> {
-    Some(Control::of(out).ok()?.status().ok()?.poses)
+/// Waits until a run has more poses than the warm-up takes.
+fn await_measurement(out: &Path) {
+    let poses = || Some(Control::of(out).ok()?.status().ok()?.poses);
+    let since = Instant::now();
+    while poses().is_none_or(|poses| poses <= 12) {
+        assert!(since.elapsed() < LIMIT, "no poses in {}", out.display());
+        thread::sleep(Duration::from_millis(20));
+    }
 }
 
 #[test]
 fn what_a_killed_run_has_left_is_not_measured() {
     let stress = Stress::new();
+    let steady = ["--scenario", "steady", "--scenario", "steady"];
+    let measured = stress.start(&[&steady[..], &["--duration", "6"]].concat());
     let out = stress.run_out("steady");
-    fs::create_dir_all(&out).unwrap();
-    let killed = Run::of_recording().rate("1").into(&out);
-    let mut running = killed.start();
-    running.await_stages();
-    running.await_poses(2);
-    running.kill_supervisor();
-    let output = stress.run(&["--scenario", "steady", "--duration", "2"]);
-    assert_eq!(output.status.code(), Some(0));
-    assert_eq!(stress.outcome()["figures"]["counts"]["due"], 8);
+    await_measurement(&out);
+    // Its files in shared memory stay, where the next run has its own.
+    let supervisor = Control::of(&out).unwrap().status().unwrap().pid;
+    send(supervisor, Signal::KILL);
+    let output = finish(measured);
+    assert_eq!(output.status.code(), Some(1));
+    let [killed, next] = [0, 1].map(|index| stress.outcome_of(index));
+    assert_eq!(killed["verdict"], "failed");
+    let problem = killed["problem"].as_str().unwrap();
+    assert!(problem.contains("killed by signal 9"), "{problem}");
+    assert_eq!(next["verdict"], "not-judged");
+    assert_eq!(next["figures"]["counts"]["due"], 24);
     stress.assert_nothing_left("steady");
 }
 

@@ -90,7 +90,7 @@ impl Helper {
         }
     }
 
-    /// Reads a result as [`say_result`] prints it.
+    /// Reads a result, a line of JSON.
     ///
     /// # Errors
     /// The helper has ended, or said something else.

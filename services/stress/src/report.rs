@@ -3,6 +3,7 @@
 mod markdown;
 mod outcome;
 mod plots;
+mod step;
 
 use std::{fmt::Write, fs, path::Path};
 
@@ -10,7 +11,8 @@ use serde::Serialize;
 
 use crate::{StressError, record::Sample};
 
-pub use outcome::{Figures, Outcome, Step, Verdict};
+pub use outcome::{Figures, Outcome, Verdict};
+pub use step::Step;
 
 /// The version of `report.json`. A key that changes its meaning or goes raises it; one that is added does not.
 const VERSION: u32 = 1;

@@ -2,6 +2,7 @@
 
 use std::{
     fs::{self, File},
+    os::unix::process::ExitStatusExt,
     path::{Path, PathBuf},
     process::{Child, Stdio},
     thread,
@@ -91,8 +92,12 @@ impl<'a> Running<'a> {
     /// Returns why it has ended, in its own words, which are complete when its process has ended too.
     pub fn last_words(&mut self) -> String {
         self.await_end(Instant::now() + END_LIMIT);
-        if !self.has_ended() {
-            return "its stream has ended, and its process goes on".to_owned();
+        match self.process.try_wait() {
+            Ok(None) => return "its stream has ended, and its process goes on".to_owned(),
+            Ok(Some(status)) if let Some(signal) = status.signal() => {
+                return format!("its supervisor was killed by signal {signal}");
+            }
+            _ => {}
         }
         let said = fs::read_to_string(&self.log).unwrap_or_default();
         last_line(&said).unwrap_or("it said nothing").to_owned()

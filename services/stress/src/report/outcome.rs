@@ -1,9 +1,10 @@
-//! What a scenario has shown: figures, steps of a search, and the verdict.
+//! What a scenario has shown: figures and the verdict.
 
 use std::{collections::BTreeMap, fmt::Write, time::Duration};
 
 use serde::Serialize;
 
+use super::Step;
 use crate::{
     budget::Check,
     copying::Row,
@@ -133,89 +134,6 @@ impl Figures {
     pub fn memory_mb(&self) -> f64 {
         let own: f64 = self.processes.iter().map(|cost| cost.own_mb).sum();
         own + self.shared_bytes as f64 * 1e-6
-    }
-}
-
-/// A step of a search for the largest load.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Step {
-    /// Scans a second, or radars.
-    pub level: f64,
-    /// True if all its pipelines keep the limits.
-    pub passed: bool,
-    /// Scans that were due, in all pipelines.
-    pub due: u64,
-    /// Scans without a pose, in all pipelines.
-    pub dropped: u64,
-    /// The largest median of its pipelines, ms.
-    pub p50_ms: Option<f64>,
-    /// The largest 99th percentile of its pipelines, ms; of fewer than a hundred scans the maximum.
-    pub p99_ms: Option<f64>,
-    /// Processor time of all pipelines, % of one processor.
-    pub cpu_percent: f64,
-    /// Why it has not passed.
-    pub reason: Option<String>,
-}
-
-impl Step {
-    /// A step whose runs could not be started.
-    pub fn not_started(level: f64, reason: String) -> Self {
-        Self {
-            level,
-            passed: false,
-            due: 0,
-            dropped: 0,
-            p50_ms: None,
-            p99_ms: None,
-            cpu_percent: 0.0,
-            reason: Some(reason),
-        }
-    }
-
-    /// A step with the checks, the problem and the figures of each of its pipelines.
-    pub fn of(level: f64, pipelines: Vec<(Vec<Check>, Option<String>, Figures)>) -> Self {
-        let largest = |of: &dyn Fn(&Distribution) -> Option<f64>| {
-            let all = pipelines
-                .iter()
-                .map(|(.., figures)| &figures.sensor_to_pose);
-            all.filter_map(of).reduce(f64::max)
-        };
-        let reason = pipelines.iter().find_map(|(checks, problem, _)| {
-            let failed = || {
-                checks
-                    .iter()
-                    .find(|check| !check.passed)
-                    .map(Check::sentence)
-            };
-            problem.clone().or_else(failed)
-        });
-        let figures = || pipelines.iter().map(|(.., figures)| figures);
-        Self {
-            level,
-            passed: reason.is_none(),
-            due: figures().map(|it| it.counts.due).sum(),
-            dropped: figures().map(|it| it.counts.dropped).sum(),
-            p50_ms: largest(&|latency| latency.judged(latency.p50_ms)),
-            p99_ms: largest(&|latency| latency.judged(latency.p99_ms)),
-            cpu_percent: figures().map(Figures::cpu_percent).sum(),
-            reason,
-        }
-    }
-
-    /// Returns `8.0 scans/s: p99 14.2 ms, 0 of 80 dropped`.
-    pub fn sentence(&self, unit: &str) -> String {
-        let Self { due, dropped, .. } = self;
-        let p99 = self
-            .p99_ms
-            .map_or("no pose".to_owned(), |ms| format!("p99 {ms:.1} ms"));
-        let reason = self
-            .reason
-            .as_ref()
-            .map_or(String::new(), |reason| format!(": {reason}"));
-        format!(
-            "  {:.1} {unit}: {p99}, {dropped} of {due} dropped{reason}",
-            self.level
-        )
     }
 }
 
