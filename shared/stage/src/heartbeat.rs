@@ -1,8 +1,8 @@
 //! The heartbeat of a process: whether it waits or works, and since when. With it a process that hangs is told from one that waits.
 //!
 //! Each process of a run writes it to a file in the run's root whenever it begins and ends a wait, which is every 200 ms or more
-//! often, and a stage also before each item. So a process that works has a beat as old as its work, and one that is stopped, or that the system does not run, has an
-//! old beat that says that it waits.
+//! often, and a stage also before each item. So a process that works has a beat as old as its work, and one that is stopped, or
+//! that the system does not run, has an old beat that says that it waits.
 
 use std::{
     fs::{File, OpenOptions},
