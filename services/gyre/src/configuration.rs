@@ -56,9 +56,6 @@ pub struct Configuration {
     pub stages: BTreeMap<String, StageConfig>,
 }
 
-/// The sections beside those of the method.
-const SECTIONS: [&str; 6] = ["run", "source", "simulation", "budget", "record", "stages"];
-
 impl Configuration {
     /// Reads a configuration and overrides keys of it with `section.key=value`.
     ///
@@ -117,7 +114,11 @@ impl Configuration {
         if let Some(simulation) = &mut configuration.simulation {
             simulation.output.format = simulation.output.format.or(format);
         }
-        let known = [&SECTIONS[..], &MethodConfig::SECTIONS[..]].concat();
+        let known = [
+            &MethodConfig::SECTIONS_OF_A_RUN[..],
+            &MethodConfig::SECTIONS[..],
+        ]
+        .concat();
         match table.keys().next() {
             None => Ok(configuration),
             Some(key) => Err(strict::unknown("the configuration", key, &known)),

@@ -62,14 +62,12 @@ pub fn automatic(data: &Path, wished: &DatasetOptions) -> Result<Automatic, Auto
     if gyre_recording::is_recording(data) {
         return of_recorded_run(data);
     }
-    let format = gyre_radar::open(data, wished)?.format();
-    let constants = gyre_radar::stored_options(data)?.or(&constants(format)?);
-    let measured = Measured::of(gyre_radar::open(data, &wished.or(&constants))?.as_mut())?;
+    let dataset = radar_constants(data, wished)?;
+    let measured = Measured::of(gyre_radar::open(data, &wished.or(&dataset))?.as_mut())?;
     let settings = measured.settings();
-    let dataset = DatasetOptions {
-        format: Some(format),
-        ..constants
-    };
+    let format = dataset
+        .format
+        .map_or_else(String::new, |format| format.to_string());
     let mut table = Table::new();
     let dataset = Value::try_from(dataset).map_err(|error| strict::value("dataset", error))?;
     table.insert("dataset".to_owned(), dataset);
@@ -83,6 +81,25 @@ pub fn automatic(data: &Path, wished: &DatasetOptions) -> Result<Automatic, Auto
             measured.noise,
             settings.join(", ")
         ),
+    })
+}
+
+/// Returns the format of a recording and the constants of its radar: those of its `dataset.toml`, then those of its format. A recorded
+/// run has its own.
+///
+/// # Errors
+/// A recording that cannot be opened.
+pub fn radar_constants(
+    data: &Path,
+    wished: &DatasetOptions,
+) -> Result<DatasetOptions, AutomaticError> {
+    if gyre_recording::is_recording(data) {
+        return Ok(DatasetOptions::default());
+    }
+    let format = gyre_radar::open(data, wished)?.format();
+    Ok(DatasetOptions {
+        format: Some(format),
+        ..gyre_radar::stored_options(data)?.or(&constants(format)?)
     })
 }
 

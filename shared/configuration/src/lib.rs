@@ -8,6 +8,6 @@ mod error;
 mod method;
 pub mod strict;
 
-pub use automatic::{Automatic, AutomaticError, automatic};
+pub use automatic::{Automatic, AutomaticError, automatic, radar_constants};
 pub use error::ConfigurationError;
 pub use method::MethodConfig;

@@ -3,6 +3,7 @@
 use gyre_odometry::OdometryConfig;
 use gyre_radar::DatasetOptions;
 use gyre_slam::SlamConfig;
+use serde::Serialize;
 use toml::Table;
 
 use crate::{
@@ -12,11 +13,12 @@ use crate::{
 
 /// The sections of a configuration that say what is computed of which radar's scans: its file may have others, which are for a run of
 /// processes.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct MethodConfig {
     /// The format of the recording, and the constants of its radar.
     pub dataset: DatasetOptions,
     /// The settings of the method: the sections from `raster` to `refinement`.
+    #[serde(flatten)]
     pub odometry: OdometryConfig,
     /// The correction of the trajectory at places that are seen again.
     pub slam: SlamConfig,
@@ -36,6 +38,10 @@ impl MethodConfig {
         "refinement",
         "slam",
     ];
+
+    /// The names of the other sections of a configuration, which are for a run of processes.
+    pub const SECTIONS_OF_A_RUN: [&str; 6] =
+        ["run", "source", "simulation", "budget", "record", "stages"];
 
     /// Takes the sections out of a configuration; those that are missing have their defaults.
     ///

@@ -6,11 +6,16 @@ use crate::StorageError;
 #[cfg(feature = "record")]
 use crate::record::{self, Operation};
 
-/// Makes the names in a folder survive a power failure: those of its new, renamed and removed files.
+/// Makes the names in a folder survive a power failure: those of its new, renamed and removed files. An empty path, as above a bare name,
+/// is the current folder.
 ///
 /// # Errors
 /// The folder cannot be synchronised.
 pub fn sync_folder(folder: &Path) -> Result<(), StorageError> {
+    let folder = match folder.as_os_str().is_empty() {
+        true => Path::new("."),
+        false => folder,
+    };
     fs::File::open(folder)
         .and_then(|handle| handle.sync_all())
         .map_err(StorageError::at("synchronise", folder))?;
@@ -38,10 +43,7 @@ pub fn create_folder(folder: &Path) -> Result<(), StorageError> {
         _ => {
             #[cfg(feature = "record")]
             record::push(folder, || Operation::CreateFolder(folder.to_owned()));
-            match above.as_os_str().is_empty() {
-                true => sync_folder(Path::new(".")),
-                false => sync_folder(above),
-            }
+            sync_folder(above)
         }
     }
 }
@@ -58,4 +60,14 @@ pub fn remove(path: &Path) -> Result<(), StorageError> {
     #[cfg(feature = "record")]
     record::push(path, || Operation::Remove(path.to_owned()));
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_folder_of_a_bare_name_is_the_current_one() {
+        assert!(sync_folder(Path::new("")).is_ok());
+    }
 }

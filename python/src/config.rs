@@ -1,0 +1,115 @@
+//! Configurations.
+
+use std::path::PathBuf;
+
+use gyre_configuration::{MethodConfig, automatic, strict};
+use gyre_radar::Format;
+use pyo3::{prelude::*, types::PyMapping};
+use toml::Table;
+
+use crate::{errors, values};
+
+/// The settings of the method and the constants of a radar: the sections `dataset`, `raster`, `points`, `masking`, `search`, `rotation`,
+/// `translation`, `exhaustive`, `refinement` and `slam` of a configuration of `gyre run`, with the same keys and defaults.
+///
+/// `Config()` has the defaults, and `Config({"masking": {"threshold": 70}})` differs from them in one key. Unknown keys and values out
+/// of their bounds raise ConfigError. A key that is None has its default.
+#[pyclass(module = "gyre", frozen, eq)]
+pub struct Config {
+    method: MethodConfig,
+    note: Option<String>,
+}
+
+/// Configurations are equal if their settings are, wherever these are from.
+impl PartialEq for Config {
+    fn eq(&self, other: &Self) -> bool {
+        self.method == other.method
+    }
+}
+
+impl Config {
+    /// Returns the settings, the defaults where there is no configuration.
+    pub fn method(config: Option<&Bound<'_, Self>>) -> MethodConfig {
+        config.map_or_else(MethodConfig::default, |config| config.get().method.clone())
+    }
+
+    fn from_table(mut table: Table, note: Option<String>) -> PyResult<Self> {
+        let method = MethodConfig::take(&mut table).map_err(errors::config)?;
+        if let Some(key) = table.keys().next() {
+            let unknown = strict::unknown("the configuration", key, &MethodConfig::SECTIONS);
+            return Err(errors::config(unknown));
+        }
+        method.validate().map_err(errors::config)?;
+        method.dataset.check().map_err(errors::config)?;
+        Ok(Self { method, note })
+    }
+}
+
+#[pymethods]
+impl Config {
+    #[new]
+    #[pyo3(signature = (sections=None))]
+    fn new(sections: Option<&Bound<'_, PyMapping>>) -> PyResult<Self> {
+        let table = sections.map(values::table).transpose()?;
+        Self::from_table(table.unwrap_or_default(), None)
+    }
+
+    /// Reads a TOML file, as `gyre run` does. Its sections `run`, `source`, `simulation`, `budget`, `record` and `stages`, which are for
+    /// a run of processes, are ignored. `overrides` replaces keys: `{"masking.kind": "none"}`.
+    #[staticmethod]
+    #[pyo3(signature = (path, overrides=None))]
+    fn read(path: PathBuf, overrides: Option<&Bound<'_, PyMapping>>) -> PyResult<Self> {
+        let mut table = strict::read_table(&path).map_err(errors::config)?;
+        table.retain(|section, _| !MethodConfig::SECTIONS_OF_A_RUN.contains(&section));
+        values::set_all(&mut table, overrides)?;
+        Self::from_table(table, None)
+    }
+
+    /// Finds the settings of a recording, as `gyre run --data` does without a configuration: the radar's constants are those of its
+    /// format or its `dataset.toml`, and eight of its scans give the threshold and the sizes of cells and beams. `note` says what was
+    /// found. `overrides` replaces keys.
+    #[staticmethod]
+    #[pyo3(signature = (data, overrides=None))]
+    fn of(
+        py: Python<'_>,
+        data: PathBuf,
+        overrides: Option<&Bound<'_, PyMapping>>,
+    ) -> PyResult<Self> {
+        let mut wished = Table::new();
+        values::set_all(&mut wished, overrides)?;
+        let wished = Self::from_table(wished, None)?.method.dataset;
+        let found = py.detach(|| automatic(&data, &wished));
+        let mut found = found.map_err(errors::automatic)?;
+        values::set_all(&mut found.table, overrides)?;
+        Self::from_table(found.table, Some(found.sentence))
+    }
+
+    /// What `Config.of` found in the recording, in a sentence; None for other configurations.
+    #[getter]
+    fn note(&self) -> Option<&str> {
+        self.note.as_deref()
+    }
+
+    /// Returns all settings as a dictionary of sections, which `Config` takes.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        values::dictionary(py, &self.method)
+    }
+
+    /// Returns all settings as TOML, which `Config.read` and `gyre run` read.
+    fn __str__(&self) -> PyResult<String> {
+        toml::to_string(&self.method).map_err(errors::config)
+    }
+
+    fn __repr__(&self) -> String {
+        let odometry = &self.method.odometry;
+        let format = self
+            .method
+            .dataset
+            .format
+            .map_or("any format", Format::name);
+        format!(
+            "<gyre.Config {format}, masking.kind={:?}, masking.threshold={}>",
+            odometry.masking.kind, odometry.masking.threshold
+        )
+    }
+}

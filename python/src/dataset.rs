@@ -1,0 +1,179 @@
+//! Recordings.
+
+use std::{
+    path::PathBuf,
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicUsize, Ordering},
+    },
+};
+
+use gyre_configuration::radar_constants;
+use gyre_radar::DatasetOptions;
+use numpy::PyArray1;
+use pyo3::{exceptions::PyIndexError, prelude::*};
+
+use crate::{config::Config, errors, lock, scan::Scan};
+
+/// Damaged scans in a row that are skipped: the default of `source.max_unreadable` of a run.
+const MAX_UNREADABLE: usize = 10;
+
+/// Opens a recording: a folder of a format that Gyre knows, or an MCAP file of `gyre record`.
+///
+/// The constants of the radar are those of the section `dataset` of `config`. Without one they are those of the format, or of the
+/// recording's `dataset.toml`, as `Config.of` takes them. Raises ReadError.
+#[pyfunction]
+#[pyo3(signature = (data, config=None))]
+pub fn open(
+    py: Python<'_>,
+    data: PathBuf,
+    config: Option<&Bound<'_, Config>>,
+) -> PyResult<Dataset> {
+    let options = config.map(|config| Config::method(Some(config)).dataset);
+    let dataset = py.detach(|| {
+        let options = match options {
+            Some(options) => options,
+            None => {
+                radar_constants(&data, &DatasetOptions::default()).map_err(errors::automatic)?
+            }
+        };
+        gyre_recording::open(&data, &options).map_err(errors::open)
+    })?;
+    Ok(Dataset {
+        format: dataset.format().name(),
+        len: dataset.len(),
+        first: dataset.first(),
+        data,
+        dataset: Arc::new(Mutex::new(dataset)),
+    })
+}
+
+/// Returns the file of the ground truth of a recording, if there is one at a usual path; else None.
+#[pyfunction]
+pub fn find_ground_truth(data: PathBuf) -> Option<PathBuf> {
+    gyre_radar::find_ground_truth(&data)
+}
+
+/// The scans of a recording, ordered by time.
+///
+/// `dataset[i]` decodes scan i, and raises ReadError if it cannot be read. Iteration plays the scans as `gyre run` does: it begins at
+/// `first`, skips damaged scans with a SkippedScanWarning, and raises ReadError after ten of them in a row, or where a file cannot be
+/// read.
+#[pyclass(module = "gyre", frozen)]
+pub struct Dataset {
+    data: PathBuf,
+    format: &'static str,
+    len: usize,
+    first: usize,
+    dataset: Arc<Mutex<Box<dyn gyre_radar::Dataset>>>,
+}
+
+#[pymethods]
+impl Dataset {
+    /// The name of the format, as in `oxford`.
+    #[getter]
+    fn format(&self) -> &'static str {
+        self.format
+    }
+
+    /// The index of the first scan that can be read; not 0 in a recording of a run that was resumed.
+    #[getter]
+    fn first(&self) -> usize {
+        self.first
+    }
+
+    /// The files of the scans, in order; of an MCAP recording its parts.
+    #[getter]
+    fn files(&self, py: Python<'_>) -> Vec<PathBuf> {
+        lock::with(py, &self.dataset, |dataset| {
+            let files = dataset.files();
+            let paths = (0..files.len()).filter_map(|index| files.get(index));
+            paths.map(ToOwned::to_owned).collect()
+        })
+    }
+
+    /// The time of each scan as far as it is known without decoding it, int64 (scans,), ns; -1 where it is not.
+    #[getter]
+    fn stamp_ns<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        let stamps: Vec<i64> = lock::with(py, &self.dataset, |dataset| {
+            let stamp = |index| dataset.nominal_stamp_ns(index).unwrap_or(-1);
+            (0..dataset.len()).map(stamp).collect()
+        });
+        PyArray1::from_vec(py, stamps)
+    }
+
+    /// The median time between two scans, ns.
+    #[getter]
+    fn period_ns(&self, py: Python<'_>) -> i64 {
+        lock::with(py, &self.dataset, |dataset| dataset.period_ns())
+    }
+
+    /// Observations of the reader: whole sentences.
+    #[getter]
+    fn notes(&self, py: Python<'_>) -> Vec<String> {
+        lock::with(py, &self.dataset, |dataset| dataset.notes().to_vec())
+    }
+
+    fn __len__(&self) -> usize {
+        self.len
+    }
+
+    fn __getitem__(&self, py: Python<'_>, index: isize) -> PyResult<Scan> {
+        let counted = match index < 0 {
+            true => self.len.checked_add_signed(index),
+            false => usize::try_from(index).ok(),
+        };
+        let Some(index) = counted.filter(|index| *index < self.len) else {
+            let sentence = format!("there is no scan {index}: the dataset has {}", self.len);
+            return Err(PyIndexError::new_err(sentence));
+        };
+        Scan::read(py, &self.dataset, index)?.map_err(errors::read)
+    }
+
+    fn __iter__(&self) -> Scans {
+        Scans {
+            dataset: self.dataset.clone(),
+            next: AtomicUsize::new(self.first),
+            len: self.len,
+        }
+    }
+
+    fn __repr__(&self) -> String {
+        let (data, format, len) = (self.data.display(), self.format, self.len);
+        format!("<gyre.Dataset {data}: {format}, {len} scans>")
+    }
+}
+
+/// An iteration over a dataset.
+#[pyclass(module = "gyre", frozen)]
+pub struct Scans {
+    dataset: Arc<Mutex<Box<dyn gyre_radar::Dataset>>>,
+    next: AtomicUsize,
+    len: usize,
+}
+
+#[pymethods]
+impl Scans {
+    fn __iter__(this: PyRef<'_, Self>) -> PyRef<'_, Self> {
+        this
+    }
+
+    fn __next__(&self, py: Python<'_>) -> PyResult<Option<Scan>> {
+        let mut skipped = 0;
+        loop {
+            let index = self.next.fetch_add(1, Ordering::Relaxed);
+            if index >= self.len {
+                self.next.store(self.len, Ordering::Relaxed);
+                return Ok(None);
+            }
+            match Scan::read(py, &self.dataset, index)? {
+                Ok(scan) => return Ok(Some(scan)),
+                Err(error) if error.is_io() || skipped == MAX_UNREADABLE => {
+                    return Err(errors::read(error));
+                }
+                Err(error) => errors::warn_of_skipped(py, error)?,
+            }
+            skipped += 1;
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! The exceptions of `package/gyre/errors.py`, with the sentences of the libraries.
+
+use std::{ffi::CString, fmt::Display};
+
+use gyre_configuration::AutomaticError;
+use gyre_radar::OpenError;
+use pyo3::{prelude::*, sync::PyOnceLock, types::PyType};
+
+/// Returns a function that makes exceptions of one type.
+macro_rules! exception {
+    ($(#[$doc:meta])* $name:ident, $class:literal) => {
+        $(#[$doc])*
+        pub fn $name(reason: impl Display) -> PyErr {
+            static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+            Python::attach(|py| match CLASS.import(py, "gyre.errors", $class) {
+                Ok(class) => PyErr::from_type(class.clone(), reason.to_string()),
+                Err(error) => error,
+            })
+        }
+    };
+}
+
+exception!(
+    /// Any other failure.
+    other, "Error"
+);
+exception!(
+    /// An invalid configuration.
+    config, "ConfigError"
+);
+exception!(
+    /// A file that cannot be read.
+    read, "ReadError"
+);
+exception!(
+    /// A file that cannot be written.
+    write, "WriteError"
+);
+exception!(
+    /// A scan that cannot be used.
+    scan, "ScanError"
+);
+exception!(
+    /// Trajectories that cannot be compared or drawn.
+    trajectory, "TrajectoryError"
+);
+
+/// A recording that cannot be opened, or options that it cannot have.
+pub fn open(error: OpenError) -> PyErr {
+    match error {
+        OpenError::BadOption { .. } => config(error),
+        error => read(error),
+    }
+}
+
+/// A recording whose settings cannot be found.
+pub fn automatic(error: AutomaticError) -> PyErr {
+    match error {
+        AutomaticError::Open(error) => open(error),
+        AutomaticError::Read(_) | AutomaticError::Empty => read(error),
+        AutomaticError::Configuration(_) | AutomaticError::Recorded(_) => config(error),
+    }
+}
+
+/// Warns that a scan of a recording is skipped.
+pub fn warn_of_skipped(py: Python<'_>, reason: impl Display) -> PyResult<()> {
+    let class = py.import("gyre.errors")?.getattr("SkippedScanWarning")?;
+    let sentence = CString::new(format!("skipped: {reason}").replace('\0', ""))?;
+    PyErr::warn(py, &class, &sentence, 1)
+}

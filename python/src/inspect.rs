@@ -1,0 +1,54 @@
+//! What a recording is.
+
+use std::path::PathBuf;
+
+use gyre_radar::DatasetOptions;
+use pyo3::prelude::*;
+
+use crate::{errors, trajectory::Trajectory, values};
+
+/// Examines a recording: what it contains, and what looks wrong with it. With a trajectory of it the clock of its ground truth is
+/// compared. Raises ReadError.
+#[pyfunction]
+#[pyo3(signature = (data, trajectory=None))]
+pub fn inspect(
+    py: Python<'_>,
+    data: PathBuf,
+    trajectory: Option<&Bound<'_, Trajectory>>,
+) -> PyResult<Report> {
+    let (options, trajectory) = (DatasetOptions::default(), trajectory.map(|it| &it.get().0));
+    let report = py.detach(|| {
+        let dataset = gyre_recording::open(&data, &options)?;
+        Ok(gyre_radar::inspect_dataset(
+            &data, dataset, &options, trajectory,
+        ))
+    });
+    report.map(Report).map_err(errors::open)
+}
+
+/// What a recording contains. `str(report)` is a text, and `to_dict()` has every figure.
+#[pyclass(module = "gyre", frozen)]
+pub struct Report(gyre_radar::Report);
+
+#[pymethods]
+impl Report {
+    /// What looks wrong: whole sentences.
+    #[getter]
+    fn findings(&self) -> Vec<String> {
+        self.0.findings.clone()
+    }
+
+    /// Returns all figures, by the names of `gyre inspect --json`.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        values::dictionary(py, &self.0)
+    }
+
+    fn __str__(&self) -> String {
+        self.0.to_string()
+    }
+
+    fn __repr__(&self) -> String {
+        let (root, format, scans) = (self.0.root.display(), self.0.format, self.0.scans);
+        format!("<gyre.Report {root}: {format}, {scans} scans>")
+    }
+}

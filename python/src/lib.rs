@@ -1,0 +1,49 @@
+//! The extension module of the Python package `gyre`: the libraries of `shared/`, with scans, rasters and points as numpy arrays.
+//!
+//! Reading order: `config`, `dataset`, `scan` (whose memory is numpy's), `odometry` and `registered`, `masker`, `slam`, `trajectory`,
+//! `evaluation`; `errors` and `values` say how errors and values cross the border. What is written in Python is in `package/`.
+//!
+//! The GIL is released while scans are decoded and computed. Each object of Rust that changes is behind a lock, which is taken without
+//! the GIL: two threads that share one wait for each other, and never block the interpreter.
+
+mod config;
+mod dataset;
+mod errors;
+mod evaluation;
+mod inspect;
+mod lock;
+mod masker;
+mod numpy_arrays;
+mod odometry;
+mod pose;
+mod registered;
+mod scan;
+mod slam;
+mod trajectory;
+mod values;
+
+use pyo3::pymodule;
+
+/// The part of the package that is written in Rust.
+#[pymodule]
+mod _gyre {
+    #[pymodule_export]
+    use super::{
+        config::Config,
+        dataset::{Dataset, find_ground_truth, open},
+        evaluation::{Evaluation, evaluate},
+        inspect::{Report, inspect},
+        masker::{Masked, Masker},
+        odometry::Odometry,
+        pose::Pose,
+        registered::Registered,
+        scan::Scan,
+        slam::{Loop, Slam},
+        trajectory::Trajectory,
+    };
+
+    /// The version of the package.
+    #[pymodule_export]
+    #[allow(non_upper_case_globals)] // The name that Python gives it.
+    const __version__: &str = env!("CARGO_PKG_VERSION");
+}

@@ -1,0 +1,82 @@
+//! Registered scans.
+
+use gyre_geometry::{UncertainMotion, pose};
+use gyre_odometry::Outcome;
+use pyo3::prelude::*;
+
+use crate::pose::Pose;
+
+/// A registered scan: what `Odometry.register` returns.
+#[pyclass(module = "gyre", frozen)]
+pub struct Registered {
+    pub registered: gyre_odometry::Registered,
+    pub stamp_ns: i64,
+}
+
+#[pymethods]
+impl Registered {
+    /// The number of the scan in the chain of motions, from 0.
+    #[getter]
+    fn seq(&self) -> u64 {
+        self.registered.seq
+    }
+
+    /// The time of the scan, ns.
+    #[getter]
+    fn stamp_ns(&self) -> i64 {
+        self.stamp_ns
+    }
+
+    /// The origin of the motion: `start` (none: the chain starts here), `searched`, `refined`, `weak` (refined with little support) or
+    /// `predicted` (nothing matched).
+    #[getter]
+    fn outcome(&self) -> &'static str {
+        match self.registered.outcome {
+            Outcome::Start => "start",
+            Outcome::Searched => "searched",
+            Outcome::Refined => "refined",
+            Outcome::Weak => "weak",
+            Outcome::Predicted => "predicted",
+        }
+    }
+
+    /// The motion since the previous scan, in that scan's frame; the identity at `start`.
+    #[getter]
+    fn motion(&self) -> Pose {
+        Pose(self.registered.motion.alone())
+    }
+
+    /// The pose in the frame of the first scan.
+    #[getter]
+    fn pose(&self) -> Pose {
+        Pose(self.registered.pose)
+    }
+
+    /// The motion as searched, before it was refined; None at `start`.
+    #[getter]
+    fn searched(&self) -> Option<Pose> {
+        let found = self.registered.searched.as_ref()?.motion;
+        Some(Pose(UncertainMotion {
+            motion: pose(found.x_m, found.y_m, found.yaw_rad),
+            covariance: found.covariance,
+        }))
+    }
+
+    /// The time since the previous scan, ns; 0 at `start`.
+    #[getter]
+    fn interval_ns(&self) -> i64 {
+        self.registered.interval_ns
+    }
+
+    /// Whether the vehicle stands. While it does, motions are zero.
+    #[getter]
+    fn stationary(&self) -> bool {
+        let refined = self.registered.refined.as_ref();
+        refined.is_some_and(|refined| refined.stationary)
+    }
+
+    fn __repr__(&self) -> String {
+        let (seq, outcome, motion) = (self.seq(), self.outcome(), self.motion());
+        format!("<gyre.Registered {seq}, {outcome}, motion={motion}>")
+    }
+}

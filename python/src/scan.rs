@@ -1,0 +1,336 @@
+//! Scans, whose memory is that of numpy arrays.
+
+use std::sync::Mutex;
+
+use gyre_radar::{Dataset, PolarScan, ReadError, ScanSlot, Sense, SweepGeometry, scan::flag};
+use ndarray::{Ix1, Ix2, IxDyn};
+use numpy::{
+    PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods,
+};
+use pyo3::{
+    exceptions::PyValueError,
+    prelude::*,
+    types::{PyDict, PySlice},
+};
+
+use crate::{
+    errors, lock,
+    numpy_arrays::{converted, given, readable},
+};
+
+const POWER: &str = "a C-contiguous array of uint8 with shape (azimuths, range bins)";
+const ANGLES: &str = "one float32 for each azimuth, rad";
+const STAMPS: &str = "one int64 for each azimuth, ns";
+const FLAGS: &str = "one uint8 for each azimuth";
+
+/// One sweep of a radar: the powers of `azimuths` x `range bins`, with the angle and the time of each azimuth.
+///
+/// `Dataset` reads scans of recordings. This constructor makes one of arrays of your own, without copying `power`:
+///
+/// power: uint8 (azimuths, range bins), C-contiguous; nearest bin first.
+/// stamp_ns: the time of the scan, ns: the middle of the sweep.
+/// range_resolution_m: the depth of a range bin.
+/// clockwise: whether azimuths increase clockwise, seen from above.
+/// azimuth_stamp_ns: int64 (azimuths,), the time of each azimuth; or else
+/// sweep_s: the duration of the sweep, whose azimuths are measured evenly in time.
+/// azimuth_rad: float32 (azimuths,), the angles from straight ahead in the sense of rotation; without them the first is straight ahead,
+///     and all are spaced evenly over a turn.
+/// azimuth_flags: uint8 (azimuths,), what is known of each azimuth: 1 measured, 2 rising chirp, 4 the chirp is known; without them all
+///     are measured.
+/// range_offset_m: the centre of bin b is at (b + 0.5) * range_resolution_m + range_offset_m.
+/// doppler_s: metres to add to a range for each m/s of closing speed; 0: unknown.
+///
+/// Arrays that are written to while a scan is registered by another thread give undefined motions.
+#[pyclass(module = "gyre", frozen)]
+pub struct Scan {
+    geometry: SweepGeometry,
+    /// The memory of all bytes, in which `power` is a view.
+    bytes: Py<PyAny>,
+    power: Py<PyAny>,
+    azimuth_rad: Py<PyAny>,
+    azimuth_stamp_ns: Py<PyAny>,
+    azimuth_flags: Py<PyAny>,
+    index: Option<usize>,
+}
+
+impl Scan {
+    /// Decodes a scan of a dataset straight into arrays of numpy.
+    pub fn read(
+        py: Python<'_>,
+        dataset: &Mutex<Box<dyn Dataset>>,
+        index: usize,
+    ) -> PyResult<Result<Self, ReadError>> {
+        let limits = lock::with(py, dataset, |dataset| dataset.limits());
+        let bytes = PyArray1::<u8>::zeros(py, limits.bytes, false);
+        let azimuth_rad = PyArray1::<f32>::zeros(py, limits.azimuths, false);
+        let stamps = PyArray1::<i64>::zeros(py, limits.azimuths, false);
+        let flags = PyArray1::<u8>::zeros(py, limits.azimuths, false);
+        let read = {
+            let (mut bytes, mut angles) = (bytes.readwrite(), azimuth_rad.readwrite());
+            let (mut stamps, mut flags) = (stamps.readwrite(), flags.readwrite());
+            let slot = ScanSlot {
+                bytes: bytes.as_slice_mut()?,
+                azimuth_rad: angles.as_slice_mut()?,
+                stamp_ns: stamps.as_slice_mut()?,
+                flags: flags.as_slice_mut()?,
+            };
+            lock::with(py, dataset, |dataset| dataset.read(index, slot))
+        };
+        let geometry = match read {
+            Ok(geometry) => geometry,
+            Err(error) => return Ok(Err(error)),
+        };
+        let first = |array: Bound<'_, PyAny>| -> PyResult<Py<PyAny>> {
+            match array.len()? == geometry.azimuths {
+                true => Ok(array.unbind()),
+                false => {
+                    let part = PySlice::new(py, 0, geometry.azimuths as isize, 1);
+                    Ok(array.get_item(part)?.unbind())
+                }
+            }
+        };
+        Ok(Ok(Self {
+            geometry,
+            power: power(bytes.as_any(), &geometry)?.unbind(),
+            bytes: bytes.into_any().unbind(),
+            azimuth_rad: first(azimuth_rad.into_any())?,
+            azimuth_stamp_ns: first(stamps.into_any())?,
+            azimuth_flags: first(flags.into_any())?,
+            index: Some(index),
+        }))
+    }
+
+    /// Borrows the memory, for [`Borrowed::view`].
+    pub fn borrowed<'py>(&self, py: Python<'py>) -> PyResult<Borrowed<'py>> {
+        Ok(Borrowed {
+            geometry: self.geometry,
+            bytes: readable::<u8, IxDyn>(self.bytes.bind(py), "power", POWER)?,
+            azimuth_rad: readable(self.azimuth_rad.bind(py), "azimuth_rad", ANGLES)?,
+            stamp_ns: readable(self.azimuth_stamp_ns.bind(py), "azimuth_stamp_ns", STAMPS)?,
+            flags: readable(self.azimuth_flags.bind(py), "azimuth_flags", FLAGS)?,
+        })
+    }
+
+    /// Checks a scan of given arrays.
+    fn check(&self, py: Python<'_>) -> PyResult<()> {
+        let borrowed = self.borrowed(py)?;
+        let scan = borrowed.view()?;
+        for (name, len) in [
+            ("azimuth_rad", scan.azimuth_rad.len()),
+            ("azimuth_stamp_ns", scan.stamp_ns.len()),
+            ("azimuth_flags", scan.flags.len()),
+        ] {
+            let azimuths = self.geometry.azimuths;
+            if len != azimuths {
+                return Err(errors::scan(format!(
+                    "{name} has {len} elements, but power has {azimuths} azimuths"
+                )));
+            }
+        }
+        scan.check().map_err(errors::scan)?;
+        scan.check_times().map_err(errors::scan)
+    }
+}
+
+/// The memory of a scan, borrowed from numpy.
+pub struct Borrowed<'py> {
+    geometry: SweepGeometry,
+    bytes: PyReadonlyArrayDyn<'py, u8>,
+    azimuth_rad: PyReadonlyArray1<'py, f32>,
+    stamp_ns: PyReadonlyArray1<'py, i64>,
+    flags: PyReadonlyArray1<'py, u8>,
+}
+
+impl Borrowed<'_> {
+    /// Returns the scan. Its numbers are not checked.
+    pub fn view(&self) -> PyResult<PolarScan<'_>> {
+        Ok(PolarScan {
+            geometry: self.geometry,
+            bytes: self.bytes.as_slice()?,
+            azimuth_rad: self.azimuth_rad.as_slice()?,
+            stamp_ns: self.stamp_ns.as_slice()?,
+            flags: self.flags.as_slice()?,
+        })
+    }
+}
+
+/// Returns the powers in the bytes of a scan: a view, whose bounds numpy checks.
+fn power<'py>(bytes: &Bound<'py, PyAny>, geometry: &SweepGeometry) -> PyResult<Bound<'py, PyAny>> {
+    let py = bytes.py();
+    let keywords = PyDict::new(py);
+    keywords.set_item("buffer", bytes)?;
+    keywords.set_item("offset", geometry.first_byte)?;
+    keywords.set_item("strides", (geometry.stride, 1))?;
+    let (shape, dtype) = ((geometry.azimuths, geometry.bins), numpy::dtype::<u8>(py));
+    let array = py.import("numpy")?.getattr("ndarray")?;
+    array.call((shape, dtype), Some(&keywords))
+}
+
+/// Returns the times of azimuths that are measured evenly in time: their mean is that of the scan.
+fn even_stamps_ns(stamp_ns: i64, sweep_s: f64, azimuths: usize) -> PyResult<Vec<i64>> {
+    if !(sweep_s > 0.0 && sweep_s <= 10.0) {
+        let sentence = format!("sweep_s is {sweep_s}, but must be above 0 and at most 10 s");
+        return Err(errors::scan(sentence));
+    }
+    let (sweep_ns, n) = ((sweep_s * 1e9) as i64, azimuths.max(1) as i64);
+    let start_ns = stamp_ns.saturating_sub(sweep_ns * (n - 1) / (2 * n));
+    let stamps =
+        (0..azimuths as i64).map(|azimuth| start_ns.saturating_add(sweep_ns * azimuth / n));
+    Ok(stamps.collect())
+}
+
+fn even_angles_rad(azimuths: usize) -> Vec<f32> {
+    let step = std::f64::consts::TAU / azimuths as f64;
+    (0..azimuths)
+        .map(|azimuth| (azimuth as f64 * step) as f32)
+        .collect()
+}
+
+#[pymethods]
+impl Scan {
+    #[new]
+    #[pyo3(signature = (power, *, stamp_ns, range_resolution_m, clockwise, azimuth_stamp_ns=None, sweep_s=None, azimuth_rad=None,
+        azimuth_flags=None, range_offset_m=0.0, doppler_s=0.0))]
+    #[allow(clippy::too_many_arguments)] // They are keywords.
+    fn new(
+        power: &Bound<'_, PyAny>,
+        stamp_ns: i64,
+        range_resolution_m: f32,
+        clockwise: bool,
+        azimuth_stamp_ns: Option<&Bound<'_, PyAny>>,
+        sweep_s: Option<f64>,
+        azimuth_rad: Option<&Bound<'_, PyAny>>,
+        azimuth_flags: Option<&Bound<'_, PyAny>>,
+        range_offset_m: f32,
+        doppler_s: f32,
+    ) -> PyResult<Self> {
+        let py = power.py();
+        let array = given::<u8, Ix2>(power, "power", POWER)?;
+        if !array.is_c_contiguous() {
+            return Err(PyValueError::new_err(
+                "power is not C-contiguous, and is not copied silently: pass np.ascontiguousarray(power)",
+            ));
+        }
+        let [azimuths, bins] = [array.shape()[0], array.shape()[1]];
+        if azimuths == 0 || bins == 0 {
+            return Err(errors::scan(format!(
+                "power has shape ({azimuths}, {bins}), but a scan has azimuths and range bins"
+            )));
+        }
+        let stamps = match (azimuth_stamp_ns, sweep_s) {
+            (Some(stamps), None) => converted(stamps, "azimuth_stamp_ns", STAMPS)?,
+            (None, Some(sweep_s)) => {
+                PyArray1::from_vec(py, even_stamps_ns(stamp_ns, sweep_s, azimuths)?)
+            }
+            _ => {
+                return Err(errors::scan(
+                    "the times of the azimuths are needed: pass either azimuth_stamp_ns, one int64 for each, or sweep_s, the duration of the sweep",
+                ));
+            }
+        };
+        let angles = match azimuth_rad {
+            Some(angles) => converted(angles, "azimuth_rad", ANGLES)?,
+            None => PyArray1::from_vec(py, even_angles_rad(azimuths)),
+        };
+        let flags = match azimuth_flags {
+            Some(flags) => given::<u8, Ix1>(flags, "azimuth_flags", FLAGS)?,
+            None => PyArray1::from_vec(py, vec![flag::MEASURED; azimuths]),
+        };
+        let scan = Self {
+            geometry: SweepGeometry {
+                azimuths,
+                bins,
+                stride: bins,
+                first_byte: 0,
+                range_resolution_m,
+                range_offset_m,
+                doppler_s,
+                sense: match clockwise {
+                    true => Sense::Clockwise,
+                    false => Sense::CounterClockwise,
+                },
+                stamp_ns,
+            },
+            bytes: power.clone().unbind(),
+            power: power.clone().unbind(),
+            azimuth_rad: angles.into_any().unbind(),
+            azimuth_stamp_ns: stamps.into_any().unbind(),
+            azimuth_flags: flags.into_any().unbind(),
+            index: None,
+        };
+        scan.check(py)?;
+        Ok(scan)
+    }
+
+    /// The powers, uint8 (azimuths, range bins), nearest bin first: a view without the metadata that a file has before each row. What is
+    /// written to it is registered.
+    #[getter]
+    fn power(&self, py: Python<'_>) -> Py<PyAny> {
+        self.power.clone_ref(py)
+    }
+
+    /// The angle of each azimuth from straight ahead, float32 (azimuths,), rad, in the sense of rotation.
+    #[getter]
+    fn azimuth_rad(&self, py: Python<'_>) -> Py<PyAny> {
+        self.azimuth_rad.clone_ref(py)
+    }
+
+    /// The time of each azimuth, int64 (azimuths,), ns.
+    #[getter]
+    fn azimuth_stamp_ns(&self, py: Python<'_>) -> Py<PyAny> {
+        self.azimuth_stamp_ns.clone_ref(py)
+    }
+
+    /// What is known of each azimuth, uint8 (azimuths,): 1 measured, 2 rising chirp, 4 the chirp is known.
+    #[getter]
+    fn azimuth_flags(&self, py: Python<'_>) -> Py<PyAny> {
+        self.azimuth_flags.clone_ref(py)
+    }
+
+    /// The time of the scan, ns: the middle of the sweep.
+    #[getter]
+    fn stamp_ns(&self) -> i64 {
+        self.geometry.stamp_ns
+    }
+
+    /// The depth of a range bin, m.
+    #[getter]
+    fn range_resolution_m(&self) -> f32 {
+        self.geometry.range_resolution_m
+    }
+
+    /// The offset of the ranges, m: the centre of bin b is at (b + 0.5) * range_resolution_m + range_offset_m.
+    #[getter]
+    fn range_offset_m(&self) -> f32 {
+        self.geometry.range_offset_m
+    }
+
+    /// Metres to add to a range for each m/s of closing speed; 0: unknown.
+    #[getter]
+    fn doppler_s(&self) -> f32 {
+        self.geometry.doppler_s
+    }
+
+    /// Whether azimuths increase clockwise, seen from above.
+    #[getter]
+    fn clockwise(&self) -> bool {
+        self.geometry.sense == Sense::Clockwise
+    }
+
+    /// The index in the dataset; None for a scan of arrays.
+    #[getter]
+    fn index(&self) -> Option<usize> {
+        self.index
+    }
+
+    fn __repr__(&self) -> String {
+        let SweepGeometry {
+            azimuths,
+            bins,
+            range_resolution_m,
+            stamp_ns,
+            ..
+        } = self.geometry;
+        format!("<gyre.Scan {azimuths} x {bins} at {range_resolution_m} m, stamp_ns={stamp_ns}>")
+    }
+}

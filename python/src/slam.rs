@@ -1,0 +1,278 @@
+//! SLAM: loops, and the trajectory corrected by them.
+
+use std::{convert::Infallible, sync::Mutex};
+
+use gyre_estimation::EstimationError;
+use gyre_geometry::{Pose, SparsePoint};
+use gyre_slam::{
+    ClosingError, JudgedLoop, Keyframe, KeyframeBuilder, KeyframeSource, LoopCloser, LoopOptions,
+    ScanPose, TrajectoryEstimator, TrajectoryOptions,
+};
+use pyo3::prelude::*;
+use thiserror::Error;
+
+use crate::{
+    config::Config, errors, lock, masker, pose, registered::Registered, trajectory::Trajectory,
+};
+
+/// Points of a keyframe are this near, m: the bound of `points.max_range_m`.
+const MAX_RANGE_M: f32 = 1e4;
+
+/// Finds the places that a drive comes back to, and corrects its trajectory by them.
+///
+/// `config` has `slam.kind` `graph` or `filter`. Give each registered scan to `add`, and call `finish` after the last one. Odometry does
+/// not depend on it. The points of keyframes are kept in memory, 20 bytes each.
+#[pyclass(module = "gyre", frozen)]
+pub struct Slam {
+    state: Mutex<State>,
+    capacity: usize,
+}
+
+/// Two scans of the same place.
+#[pyclass(module = "gyre", frozen)]
+pub struct Loop {
+    ends: [u64; 2],
+    judged: JudgedLoop,
+}
+
+struct State {
+    builder: KeyframeBuilder,
+    closer: LoopCloser,
+    estimator: TrajectoryEstimator,
+    keyframes: Keyframes,
+    /// The poses of all scans by odometry.
+    odometry: gyre_radar::Trajectory,
+    is_finished: bool,
+    is_solved: bool,
+}
+
+/// The keyframes with their points.
+struct Keyframes(Vec<Keyframe>);
+
+impl KeyframeSource for Keyframes {
+    type Error = Infallible;
+
+    fn keyframe(&mut self, index: usize) -> Result<Keyframe, Infallible> {
+        Ok(self.0[index].clone())
+    }
+}
+
+#[derive(Debug, Error)]
+enum SlamError {
+    #[error(transparent)]
+    Closing(#[from] ClosingError<Infallible>),
+    #[error(transparent)]
+    Estimation(#[from] EstimationError),
+    #[error("the drive is finished: no scan comes after Slam.finish")]
+    Finished,
+}
+
+impl State {
+    /// Takes the next scan. Returns whether it is a keyframe.
+    fn add(
+        &mut self,
+        scan: &Registered,
+        points: impl FnOnce() -> Vec<SparsePoint>,
+    ) -> Result<bool, SlamError> {
+        if self.is_finished {
+            return Err(SlamError::Finished);
+        }
+        let (registered, stamp_ns) = (&scan.registered, scan.stamp_ns);
+        let seq = self.odometry.len() as u64;
+        let keyframe = self.builder.next(&ScanPose {
+            seq,
+            scan: seq,
+            stamp_ns,
+            pose: registered.pose,
+            motion: registered.motion,
+            interval_s: registered.interval_ns as f64 * 1e-9,
+        });
+        self.odometry
+            .stamp_ns
+            .get_or_insert_default()
+            .push(stamp_ns);
+        self.odometry.poses.push(registered.pose.motion);
+        let Some(mut keyframe) = keyframe else {
+            return Ok(false);
+        };
+        keyframe.points = points();
+        self.closer.push(&keyframe)?;
+        self.estimator.push(&keyframe)?;
+        self.keyframes.0.push(keyframe);
+        self.is_solved = false;
+        self.close()?;
+        Ok(true)
+    }
+
+    /// Closes the loops of keyframes whose surroundings are known.
+    fn close(&mut self) -> Result<(), SlamError> {
+        while self.closer.describe(&mut self.keyframes)?.is_some() {}
+        while let Some(query) = self.closer.close(&mut self.keyframes)? {
+            self.is_solved = false;
+            self.estimator.close(&query)?;
+        }
+        Ok(())
+    }
+
+    fn finish(&mut self) -> Result<(), SlamError> {
+        self.is_finished = true;
+        self.closer.finish();
+        self.close()
+    }
+
+    /// Moves the keyframes to where they fit best to odometry and loops.
+    fn solve(&mut self) -> Result<(), SlamError> {
+        if !self.is_solved {
+            self.estimator.solve()?;
+            self.is_solved = true;
+        }
+        Ok(())
+    }
+
+    fn loops(&mut self) -> Result<Vec<Loop>, SlamError> {
+        self.solve()?;
+        let seq = |keyframe: usize| self.keyframes.0[keyframe].seq;
+        let judged = self.estimator.loops().iter().map(|judged| Loop {
+            ends: [judged.constraint.from, judged.constraint.to].map(seq),
+            judged: *judged,
+        });
+        Ok(judged.collect())
+    }
+
+    fn corrected(&mut self) -> Result<gyre_radar::Trajectory, SlamError> {
+        self.solve()?;
+        let correction = self.estimator.correction();
+        let poses = (0..).zip(&self.odometry.poses);
+        let poses: Vec<Pose> = poses
+            .map(|(seq, pose)| correction.correct(seq, pose))
+            .collect();
+        let stamp_ns = self.odometry.stamp_ns.clone();
+        Ok(gyre_radar::Trajectory { stamp_ns, poses })
+    }
+}
+
+#[pymethods]
+impl Slam {
+    #[new]
+    fn new(config: &Bound<'_, Config>) -> PyResult<Self> {
+        let config = Config::method(Some(config));
+        let kind = config.slam.kind.estimator();
+        let kind = kind.ok_or_else(|| {
+            errors::config("slam.kind is none: set it to graph or filter to close loops")
+        })?;
+        if config.slam.is_localised() {
+            return Err(errors::config(
+                "slam.map: keyframes are found in a map by `gyre run` alone; leave the key out",
+            ));
+        }
+        let (places, capacity) = (config.slam.places.clone(), config.odometry.points.capacity);
+        let options = LoopOptions {
+            places,
+            ..LoopOptions::default()
+        };
+        let closer = LoopCloser::new(options, &config.odometry.refinement, capacity);
+        Ok(Self {
+            state: Mutex::new(State {
+                builder: KeyframeBuilder::new(&config.slam.places),
+                closer: closer.map_err(errors::config)?,
+                estimator: TrajectoryEstimator::new(TrajectoryOptions {
+                    kind,
+                    ..TrajectoryOptions::default()
+                }),
+                keyframes: Keyframes(Vec::new()),
+                odometry: gyre_radar::Trajectory::default(),
+                is_finished: false,
+                is_solved: true,
+            }),
+            capacity,
+        })
+    }
+
+    /// Takes the next scan with its points, those of `Odometry.points`, and closes the loops that it completes. Returns whether the scan
+    /// is a keyframe.
+    fn add(
+        &self,
+        py: Python<'_>,
+        registered: &Bound<'_, Registered>,
+        points: &Bound<'_, PyAny>,
+    ) -> PyResult<bool> {
+        let fields = masker::fields_of(points)?;
+        let points: &[SparsePoint] = bytemuck::cast_slice(fields.as_slice()?);
+        if points.len() > self.capacity {
+            let (count, capacity) = (points.len(), self.capacity);
+            return Err(errors::scan(format!(
+                "there are {count} points, but points.capacity is {capacity}"
+            )));
+        }
+        let near = |value: f32| value.abs() <= MAX_RANGE_M;
+        if let Some(index) = points.iter().position(|point| {
+            let fields: [f32; 5] = (*point).into();
+            !fields.into_iter().all(near)
+        }) {
+            return Err(errors::scan(format!(
+                "point {index} is not finite, or farther than {MAX_RANGE_M} m"
+            )));
+        }
+        let registered = registered.get();
+        let added = lock::with(py, &self.state, |state| {
+            state.add(registered, || points.to_vec())
+        });
+        added.map_err(errors::other)
+    }
+
+    /// Says that no scan comes after the last one, and closes the last loops.
+    fn finish(&self, py: Python<'_>) -> PyResult<()> {
+        lock::with(py, &self.state, State::finish).map_err(errors::other)
+    }
+
+    /// The loops so far, with their verdicts.
+    #[getter]
+    fn loops(&self, py: Python<'_>) -> PyResult<Vec<Loop>> {
+        lock::with(py, &self.state, State::loops).map_err(errors::other)
+    }
+
+    /// The poses of all scans, corrected by the loops so far, in the frame of the first one.
+    #[getter]
+    fn trajectory(&self, py: Python<'_>) -> PyResult<Trajectory> {
+        let corrected = lock::with(py, &self.state, State::corrected);
+        corrected.map(Trajectory).map_err(errors::other)
+    }
+}
+
+#[pymethods]
+impl Loop {
+    /// The earlier scan, counted from 0.
+    #[getter]
+    fn earlier(&self) -> u64 {
+        self.ends[0]
+    }
+
+    /// The later scan, counted from 0.
+    #[getter]
+    fn later(&self) -> u64 {
+        self.ends[1]
+    }
+
+    /// The pose of the later scan in the frame of the earlier one.
+    #[getter]
+    fn motion(&self) -> pose::Pose {
+        pose::Pose(self.judged.constraint.motion)
+    }
+
+    /// `used`, `contradicts odometry`, `contradicts loops` or `redundant`.
+    #[getter]
+    fn verdict(&self) -> String {
+        self.judged.verdict.to_string()
+    }
+
+    /// The weight in the graph, 0 to 1; 0 if the loop is not used.
+    #[getter]
+    fn weight(&self) -> f64 {
+        self.judged.weight
+    }
+
+    fn __repr__(&self) -> String {
+        let ([earlier, later], verdict) = (self.ends, self.judged.verdict);
+        format!("<gyre.Loop {earlier} to {later}, {verdict}>")
+    }
+}

@@ -1,0 +1,236 @@
+"""Scans: their memory, and what they refuse."""
+
+import threading
+from pathlib import Path
+from typing import Any
+
+import gyre
+import numpy as np
+import pytest
+
+STAMP_NS = 1_700_000_000_000_000_000
+
+
+def power(azimuths: int = 400, bins: int = 576) -> Any:
+    return np.random.default_rng(1).integers(0, 90, (azimuths, bins), dtype=np.uint8)
+
+
+def scan(array: Any, **changed: Any) -> gyre.Scan:
+    keywords = {"stamp_ns": STAMP_NS, "sweep_s": 0.25, "range_resolution_m": 0.175, "clockwise": True}
+    return gyre.Scan(array, **(keywords | changed))
+
+
+def pointer(array: Any) -> int:
+    return int(array.__array_interface__["data"][0])
+
+
+def test_the_array_of_a_user_is_not_copied() -> None:
+    array = power()
+    mine = scan(array)
+    assert mine.power is array
+    assert pointer(mine.power) == pointer(array)
+
+
+def test_what_is_written_to_an_array_is_registered() -> None:
+    array = power()
+    mine, masker = scan(array), gyre.Masker()
+    assert masker.mask(mine).raster.max() > 0
+    array[:] = 0
+    assert masker.mask(mine).raster.max() == 0
+
+
+def test_the_powers_of_a_recording_are_a_view_without_the_bytes_between_the_rows(recording: Path) -> None:
+    first = gyre.open(recording)[0]
+    memory = first.power.base
+    assert isinstance(memory, np.ndarray)
+    assert np.shares_memory(first.power, memory)
+    metadata = first.power.strides[0] - first.power.shape[1]
+    assert metadata == 11, "the simulator writes the columns of Oxford"
+    assert pointer(first.power) == pointer(memory) + metadata
+    assert first.power is first.power
+
+
+def test_rasters_and_points_are_not_copied() -> None:
+    masked = gyre.Masker().mask(scan(power()))
+    assert masked.raster.flags.c_contiguous and masked.raster.dtype == np.float32
+    assert not masked.points.flags.owndata
+    assert masked.points.dtype.names == ("x_m", "y_m", "time_s", "weight", "doppler_s")
+    ranges = np.hypot(masked.points["x_m"], masked.points["y_m"])
+    assert len(ranges) > 100 and ranges.min() > 5 and ranges.max() < 81
+
+
+def test_a_mask_of_two_scans_masks_the_previous_one_too() -> None:
+    model = Path(__file__).parents[2] / "shared/masking/tests/models/pair-127.toml"
+    masking = {"kind": "learned", "model": model, "backend": "tract"}
+    config = gyre.Config({"masking": masking, "raster": {"n": 127, "cell_m": 0.8}})
+    masker, odometry = gyre.Masker(config), gyre.Odometry(config)
+    for number in range(3):
+        mine = scan(power(), stamp_ns=STAMP_NS + number * 250_000_000)
+        masked = masker.mask(mine, velocity=(1.0, 0.0, 0.1))
+        assert masked.previous is not None and masked.previous.shape == masked.raster.shape == (127, 127)
+        assert masked.factors is not None and 0 <= masked.factors.min() <= masked.factors.max() <= 1
+        assert odometry.register(mine).seq == number
+    assert masker.mask(mine, velocity=(float("nan"), 0.0, 0.0)).raster.shape == (127, 127)
+    with pytest.raises((TypeError, ValueError)):
+        masker.mask(mine, velocity=(1.0, 0.0))
+
+
+def test_the_angles_are_even_and_the_mean_time_is_that_of_the_scan() -> None:
+    mine = scan(power())
+    assert np.allclose(mine.azimuth_rad, np.arange(400) * 2 * np.pi / 400, atol=1e-6)
+    assert abs(int(np.mean(mine.azimuth_stamp_ns - STAMP_NS))) < 1000
+    assert np.ptp(mine.azimuth_stamp_ns) == 250_000_000 * 399 // 400
+    assert (mine.stamp_ns, mine.clockwise, mine.index) == (STAMP_NS, True, None)
+
+
+def test_angles_of_float64_and_times_of_a_list_are_converted() -> None:
+    times = [STAMP_NS + k for k in range(400)]
+    mine = scan(power(), sweep_s=None, azimuth_stamp_ns=times, azimuth_rad=np.linspace(0, 6, 400))
+    assert mine.azimuth_rad.dtype == np.float32
+    assert mine.azimuth_stamp_ns.tolist() == times
+
+
+def test_a_read_only_array_can_be_registered() -> None:
+    array = np.frombuffer(power().tobytes(), dtype=np.uint8).reshape(400, 576)
+    assert gyre.Odometry().register(scan(array)).outcome == "start"
+
+
+def test_an_array_that_is_not_contiguous_is_refused_with_what_to_do() -> None:
+    for array in (power()[:, 11:], power()[::2], np.asfortranarray(power())):
+        with pytest.raises(ValueError, match=r"np\.ascontiguousarray\(power\)"):
+            scan(array)
+    with pytest.raises(ValueError, match=r"np\.ascontiguousarray"):
+        scan(power().T)
+
+
+@pytest.mark.parametrize(
+    "array",
+    [
+        power().astype(np.float32),
+        power().astype(np.int8),
+        power().astype(">u2"),
+        power()[0],
+        power()[None],
+        power().tolist(),
+        power().tobytes(),
+        None,
+        "power",
+        np.array([[object()]]),
+    ],
+    ids=lambda array: type(array).__name__ + str(getattr(array, "dtype", "")),
+)
+def test_powers_of_another_type_are_refused(array: Any) -> None:
+    with pytest.raises(TypeError, match="power is .* expected a C-contiguous array of uint8"):
+        scan(array)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"sweep_s": None},
+        {"azimuth_stamp_ns": np.zeros(400, np.int64)},
+        {"sweep_s": float("nan")},
+        {"sweep_s": -0.25},
+        {"sweep_s": 0.0},
+        {"sweep_s": 1e300},
+        {"range_resolution_m": float("nan")},
+        {"range_resolution_m": 0.0},
+        {"range_resolution_m": float("inf")},
+        {"range_offset_m": float("nan")},
+        {"doppler_s": 7.0},
+        {"azimuth_rad": np.zeros(399, np.float32)},
+        {"azimuth_rad": np.full(400, np.nan, np.float32)},
+        {"azimuth_rad": np.zeros((20, 20), np.float32)},
+        {"azimuth_flags": np.ones(3, np.uint8)},
+        {"sweep_s": None, "azimuth_stamp_ns": np.zeros(400, np.int64)},
+        {"sweep_s": None, "azimuth_stamp_ns": STAMP_NS - np.arange(400) * 1_000_000_000},
+        {"stamp_ns": 2**63 - 1, "sweep_s": None, "azimuth_stamp_ns": np.full(400, -(2**63))},
+    ],
+    ids=str,
+)
+def test_an_inconsistent_scan_is_refused(changed: dict[str, Any]) -> None:
+    with pytest.raises((gyre.ScanError, TypeError)) as refused:
+        scan(power(), **changed)
+    assert len(str(refused.value)) > 20
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"azimuth_rad": ["a"] * 400},
+        {"azimuth_rad": np.zeros(400, complex)},
+        {"sweep_s": None, "azimuth_stamp_ns": np.linspace(0, 0.25, 400)},
+        {"sweep_s": None, "azimuth_stamp_ns": [[1, 2], [3]]},
+        {"azimuth_flags": np.ones(400, np.int64)},
+        {"stamp_ns": 1.5},
+        {"stamp_ns": None},
+        {"clockwise": 3},
+        {"range_resolution_m": "0.1"},
+    ],
+    ids=str,
+)
+def test_numbers_of_another_type_are_refused(changed: dict[str, Any]) -> None:
+    with pytest.raises((TypeError, ValueError)):
+        scan(power(), **changed)
+
+
+def test_a_scan_needs_its_constants_and_times() -> None:
+    untyped: Any = gyre.Scan
+    with pytest.raises(TypeError, match="stamp_ns"):
+        untyped(power())
+    with pytest.raises(gyre.ScanError, match="either azimuth_stamp_ns.*or sweep_s"):
+        scan(power(), sweep_s=None)
+
+
+def test_a_scan_that_is_empty_or_too_large_is_refused() -> None:
+    for shape in ((0, 10), (10, 0), (0, 0), (1025, 10)):
+        with pytest.raises(gyre.ScanError):
+            scan(np.zeros(shape, np.uint8))
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_an_array_that_is_changed_in_place_is_refused_or_registered() -> None:
+    def change_type(mine: gyre.Scan) -> None:
+        stamps: Any = mine.azimuth_stamp_ns
+        stamps.dtype = np.int8
+
+    def change_shape(mine: gyre.Scan) -> None:
+        mine.azimuth_rad.shape = (20, 20)
+
+    def spoil(mine: gyre.Scan) -> None:
+        mine.azimuth_rad[7] = np.nan
+
+    for change in (change_type, change_shape, spoil):
+        mine = scan(power())
+        try:
+            change(mine)
+        except AttributeError:
+            continue  # numpy does not allow it any more
+        with pytest.raises((TypeError, gyre.ScanError)):
+            gyre.Odometry().register(mine)
+
+
+def test_two_threads_find_what_one_finds() -> None:
+    scans = [scan(power(), stamp_ns=STAMP_NS + k * 250_000_000) for k in range(8)]
+
+    def poses() -> list[Any]:
+        odometry = gyre.Odometry()
+        return [odometry.register(mine).pose.matrix.tolist() for mine in scans]
+
+    found: list[list[Any]] = []
+    threads = [threading.Thread(target=lambda: found.append(poses())) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert found == [poses()] * 2
+
+
+def test_two_threads_can_share_an_odometry() -> None:
+    odometry, mine = gyre.Odometry(), scan(power())
+    threads = [threading.Thread(target=lambda: [odometry.register(mine) for _ in range(4)]) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(odometry.trajectory) == 8
