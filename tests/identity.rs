@@ -106,7 +106,7 @@ fn a_replaced_stage_whose_program_changes_during_the_run_is_not_started_again() 
     replace(&script, "#!/bin/sh\nexit 7\n");
     running.kill("masking");
     running.finish().failed_with(&[
-        "masking died",
+        "masking has ended",
         "masking.sh has changed since",
         "poses are kept",
     ]);
