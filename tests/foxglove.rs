@@ -44,7 +44,7 @@ with connect(url, subprotocols=['foxglove.sdk.v1'], max_size=None) as socket:
         else:
             assert json.loads(channel['schema'])['type'] == 'object'
             decoders[id] = json.loads
-    # Other numbers than the channels': they are told apart.
+    # Other numbers than the channels': they are distinguished.
     subscriptions = [{'id': id + 100, 'channelId': id} for id in channels]
     socket.send(json.dumps({'op': 'subscribe', 'subscriptions': subscriptions}))
     received = {channel['topic']: {} for channel in channels.values()}

@@ -46,6 +46,7 @@ mod slam;
 mod standstill;
 mod stress;
 mod supervisor;
+mod swap;
 mod systemd;
 mod traces;
 

@@ -2,8 +2,8 @@
 
 use bolero::{TypeGenerator, check};
 use gyre_colossus::{
-    Azimuth, BadConfiguration, ByteOrder, ClockFormat, Configuration, Constants, Datagrams, Event,
-    Message, Parser, Powers, RadarClock, SweepAssembler, asterix, write_azimuth,
+    Azimuth, BadConfiguration, ByteOrder, ClockFormat, Configuration, Constants, Damage, Datagrams,
+    Event, Message, Parser, Powers, RadarClock, SweepAssembler, asterix, write_azimuth,
     write_configuration, write_keep_alive,
 };
 use gyre_fuzz::{
@@ -153,28 +153,47 @@ impl Client {
     }
 }
 
+/// The scans of a stream, and its last damage.
+#[derive(Default)]
+struct Received {
+    client: Option<Client>,
+    damage: Option<Damage>,
+}
+
+impl Received {
+    fn take(&mut self, event: Event<'_>) -> Result<(), Failure> {
+        match event {
+            Event::Message(Message::Configuration(new)) => self.client = Client::new(&new)?,
+            Event::Message(Message::Azimuth(azimuth)) => {
+                let mut client = self.client.iter_mut();
+                client.try_for_each(|client| client.add(azimuth))?;
+            }
+            Event::Message(_) => {}
+            Event::Damaged { reason, .. } => self.damage = Some(reason),
+        }
+        Ok(())
+    }
+
+    /// Returns the number of scans.
+    fn scans(self) -> Result<usize, Failure> {
+        match self.damage {
+            Some(damage) => Err(damage.into()),
+            None => Ok(self.client.map_or(0, |client| client.sweeps)),
+        }
+    }
+}
+
 /// Receives a stream in pieces, and returns the number of scans.
 fn receive(bytes: &[u8], piece: usize) -> Result<usize, Failure> {
-    let (mut parser, mut client) = (Parser::new(), None);
-    let mut damage = None;
+    let (mut parser, mut received) = (Parser::new(), Received::default());
     for piece in bytes.chunks(piece) {
         parser.space(piece.len())[..piece.len()].copy_from_slice(piece);
         parser.filled(piece.len());
         while let Some(event) = parser.next() {
-            match event {
-                Event::Message(Message::Configuration(new)) => client = Client::new(&new)?,
-                Event::Message(Message::Azimuth(azimuth)) => {
-                    client.iter_mut().try_for_each(|c| c.add(azimuth))?;
-                }
-                Event::Message(_) => {}
-                Event::Damaged { reason, .. } => damage = Some(reason),
-            }
+            received.take(event)?;
         }
     }
-    match damage {
-        Some(damage) => Err(damage.into()),
-        None => Ok(client.map_or(0, |client| client.sweeps)),
-    }
+    received.scans()
 }
 
 #[test]
@@ -224,26 +243,16 @@ fn datagrams() -> Vec<Vec<u8>> {
 
 /// Receives datagrams, and returns the number of scans.
 fn receive_datagrams<'a>(sent: impl IntoIterator<Item = &'a Vec<u8>>) -> Result<usize, Failure> {
-    let (mut parser, mut client, mut damage) = (Datagrams::new(COUNTS), None, None);
+    let (mut parser, mut received) = (Datagrams::new(COUNTS), Received::default());
     for datagram in sent {
         let bytes = datagram.len().min(parser.space().len());
         parser.space()[..bytes].copy_from_slice(&datagram[..bytes]);
         parser.filled(bytes);
         while let Some(event) = parser.next() {
-            match event {
-                Event::Message(Message::Configuration(new)) => client = Client::new(&new)?,
-                Event::Message(Message::Azimuth(azimuth)) => {
-                    client.iter_mut().try_for_each(|c| c.add(azimuth))?;
-                }
-                Event::Message(_) => {}
-                Event::Damaged { reason, .. } => damage = Some(reason),
-            }
+            received.take(event)?;
         }
     }
-    match damage {
-        Some(damage) => Err(damage.into()),
-        None => Ok(client.map_or(0, |client| client.sweeps)),
-    }
+    received.scans()
 }
 
 #[test]

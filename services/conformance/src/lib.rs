@@ -71,7 +71,7 @@ impl From<StageError> for ConformanceError {
     }
 }
 
-/// Tests a program with inputs from these scans; `observe` is told what is tested.
+/// Tests a program with inputs from these scans; `observe` receives what is tested.
 ///
 /// # Errors
 /// The inputs cannot be computed, the program cannot be started, or the transport fails. A program that breaks the contract is no

@@ -108,7 +108,7 @@ pub enum Command {
 }
 
 /// The arguments of `gyre run`.
-#[derive(Debug, Args)]
+#[derive(Default, Debug, Args)]
 pub struct RunArguments {
     /// The configuration, a TOML file. Default: what the recording's format and its scans say.
     pub configuration: Option<PathBuf>,

@@ -134,14 +134,8 @@ fn configuration(
     let resolved = run::resolve::resolve(&RunArguments {
         configuration: arguments.configuration.clone(),
         data: arguments.data.clone(),
-        radar: None,
-        out: None,
-        calibration: None,
-        rate: None,
-        from: None,
-        record: None,
         set: small.chain(arguments.set.clone()).chain(lossless).collect(),
-        fresh: false,
+        ..RunArguments::default()
     })?;
     let mut configuration = run::with_stored_options(&resolved)?.streaming(None);
     configuration.source.scans = Some(arguments.scans.into());

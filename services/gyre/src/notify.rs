@@ -1,4 +1,4 @@
-//! What systemd is told of a run, where it has started it (`Type=notify`): readiness, a watchdog's keep-alive, and a line of status.
+//! Notifications of a run to systemd, where it has started it (`Type=notify`): readiness, a watchdog's keep-alive, and a line of status.
 
 use std::{
     io,

@@ -62,14 +62,9 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
     let mut configuration = resolve(&RunArguments {
         configuration: arguments.configuration.clone(),
         data: arguments.data.clone(),
-        radar: None,
-        out: None,
-        calibration: None,
-        rate: None,
-        from: None,
-        record: None,
         set: arguments.set.clone(),
         fresh: true,
+        ..RunArguments::default()
     })?;
     // Many runs would write to one file.
     configuration.record = RecordConfig::default();

@@ -21,7 +21,7 @@ pub(crate) enum Entry {
     /// Messages of a topic that were missed, without one after them.
     Missed(&'static str, u64),
     Log(LogLine),
-    /// The run's health, JSON, and when it was told, ns since 1970.
+    /// The run's health, JSON, and when it was reported, ns since 1970.
     Health(String, i64),
 }
 

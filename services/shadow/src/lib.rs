@@ -5,7 +5,7 @@
 //! run of its own, alone, where this process sends it what it has observed, an item at a time. What it does there, the observed run does
 //! not notice, but for the processor time.
 //!
-//! Reading order: [`shadow`], `shadowing` (the loop), `observation` (the items of the run), `stream` (how an item is told to the shadow),
+//! Reading order: [`shadow`], `shadowing` (the loop), `observation` (the items of the run), `stream` (how an item is sent to the shadow),
 //! `life` (the process), `record`, [`Report`].
 
 mod inlet;
@@ -103,7 +103,7 @@ impl ShadowError {
     }
 }
 
-/// Runs a program as the shadow of a stage until the run ends, the options say so, or a signal requests a stop. `observe` is told how it
+/// Runs a program as the shadow of a stage until the run ends, the options say so, or a signal requests a stop. `observe` receives how it
 /// goes.
 ///
 /// # Errors

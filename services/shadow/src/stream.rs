@@ -1,4 +1,4 @@
-//! How an observed item is told to the shadow.
+//! Renumbers an observed item, and sends it to the shadow.
 //!
 //! The shadow's numbers are consecutive, as the contract says, also where the observed ones are not: after a gap, or skipped items. Such an
 //! item *opens* the stream anew, and its result is not compared:

@@ -65,7 +65,7 @@ pub struct Steps<'a> {
 }
 
 impl<'a> Steps<'a> {
-    /// No steps; `note` is told of each, whose level is a number of these units.
+    /// No steps; `note` receives each, whose level is a number of these units.
     pub fn new(unit: &'static str, note: &'a mut dyn FnMut(&str)) -> Self {
         Self {
             unit,

@@ -1,4 +1,4 @@
-//! The heartbeat of a process: whether it waits or works, and since when. With it a process that hangs is told from one that waits.
+//! The heartbeat of a process: whether it waits or works, and since when. It distinguishes a process that hangs from one that waits.
 //!
 //! Each process of a run writes it to a file in the run's root whenever it begins and ends a wait, which is every 200 ms or more
 //! often, and a stage also before each item. So a process that works has a beat as old as its work, and one that is stopped, or
@@ -12,12 +12,14 @@ use std::{
     time::Duration,
 };
 
-use crate::{Manifest, StageError, clock, wake};
+use crate::{Manifest, StageError, clock};
 
+/// The longest wait of a process, so the longest time between two beats of one that works on nothing.
+pub const MAX_WAIT: Duration = Duration::from_millis(200);
 /// Size of the file: the time of the beat (i64), the process (u32) and the activity (u32), little-endian.
 const BYTES: usize = 16;
-/// A waiting process beats at least every [`wake::MAX_WAIT`]. Beyond this time it is stopped, or not run by the system.
-const SILENT: Duration = wake::MAX_WAIT.saturating_mul(5);
+/// A waiting process beats at least every [`MAX_WAIT`]. Beyond this time it is stopped, or not run by the system.
+const SILENT: Duration = MAX_WAIT.saturating_mul(5);
 
 /// The activity of a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -158,11 +160,11 @@ mod tests {
         let minute = Duration::from_secs(60);
         assert!(!beat(Activity::Works, minute).is_silent());
         assert!(beat(Activity::Waits, minute).is_silent());
-        assert!(!beat(Activity::Waits, wake::MAX_WAIT).is_silent());
+        assert!(!beat(Activity::Waits, MAX_WAIT).is_silent());
         assert!(beat(Activity::Works, minute).hangs(Duration::from_secs(59)));
         assert!(!beat(Activity::Works, minute).hangs(Duration::from_secs(61)));
         assert!(
-            !beat(Activity::Waits, wake::MAX_WAIT).hangs(Duration::ZERO),
+            !beat(Activity::Waits, MAX_WAIT).hangs(Duration::ZERO),
             "it need not beat before its wait ends"
         );
     }

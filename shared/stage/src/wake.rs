@@ -27,8 +27,7 @@ use crate::{
     services::Listener,
 };
 
-/// The longest wait.
-pub const MAX_WAIT: Duration = Duration::from_millis(200);
+pub use crate::heartbeat::MAX_WAIT;
 
 /// Lets a write beyond the limit of file sizes (`ulimit -f`) fail with an error, which a sentence can report. Without this, a
 /// signal ends the process.

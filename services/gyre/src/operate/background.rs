@@ -32,7 +32,7 @@ const DETACHED: &str = "GYRE_DETACHED";
 const LOG: &str = "log/gyre.txt";
 /// Time between two looks at a run that starts or ends.
 const PERIOD: Duration = Duration::from_millis(50);
-/// Time after which a person who waits is told for what.
+/// Time after which what is waited for is printed.
 const EXPLAIN_AFTER: Duration = Duration::from_secs(3);
 
 /// Leaves the session of the terminal, if this run was started by `gyre up`: it goes on when that is closed.

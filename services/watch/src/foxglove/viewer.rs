@@ -74,7 +74,7 @@ pub async fn serve(socket: WebSocket, hub: Arc<Hub>, board: Arc<Board>) {
         skipped: 0,
         said: None,
     };
-    // It is told nothing more: it is gone.
+    // Nothing more is sent: it is gone.
     let _ = viewer.serve(&board).await;
 }
 

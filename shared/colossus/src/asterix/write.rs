@@ -4,7 +4,7 @@ use super::{ANGLES, BLOCK_BYTES, CATEGORY, FEMTO, HALF_C_MPS, SPECIAL_BYTES, VID
 use crate::configuration::Configuration;
 use crate::message::{Azimuth, Powers};
 
-/// The bytes of a datagram that a radar sends unless it is told otherwise, at most.
+/// The bytes of a datagram that a radar sends unless it is configured otherwise, at most.
 pub const MAX_DATAGRAM_BYTES: usize = 1400;
 /// Bytes before the powers, their padding to a block of 64 bytes, time of day and special purpose field.
 const OVERHEAD_BYTES: usize = 32 + 63 + 3 + SPECIAL_BYTES;

@@ -112,7 +112,7 @@ impl Supervisor<'_> {
         self.guardian.forget(recorder.child.pid());
         let death = recorder.child.death();
         let sentence = match recorder.child.may_restart(&death) {
-            // It was told to stop.
+            // It was asked to stop.
             _ if death.code == Some(0) => {
                 recorder.has_ended = true;
                 death.last_output.unwrap_or_default()
