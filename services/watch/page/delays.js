@@ -47,7 +47,7 @@ export class DelaysView {
 
   draw(context, width, height) {
     const seen = this.series.filter(Boolean);
-    const highest = Math.max(...seen.map(({ p99_ms: p99 }) => p99), 1);
+    const highest = Math.max(...seen.map(({ max_ms: max }) => max), 1);
     const topMs = roundUp(highest);
     const right = (k) => LEFT + ((width - LEFT - 12) * k) / Math.max(this.series.length - 1, 1);
     const down = (value) => height - BOTTOM - ((height - BOTTOM - TOP) * value) / topMs;
@@ -64,7 +64,7 @@ export class DelaysView {
       const text = seconds ? `−${seconds} s` : "now";
       label(context, text, right((this.series.length - 1) * (1 - seconds / 60)), height - 5, align);
     }
-    this.drawLine(context, "p99_ms", colour("second"), right, down);
+    this.drawLine(context, "max_ms", colour("second"), right, down);
     this.drawLine(context, "p50_ms", colour("accent"), right, down);
   }
 

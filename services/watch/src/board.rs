@@ -170,11 +170,16 @@ impl Board {
         self.known().track.add(pose);
     }
 
-    /// Adds a pose. `is_new` is false for one that was in the journal.
+    /// Adds a pose, if it was not added before: an observer that comes again receives the last ones again. `is_new` is false for one that
+    /// was in the journal.
     pub fn add_pose(&self, pose: &PoseHeader, is_new: bool) {
-        self.histograms.add(&pose.item);
         let mut known = self.known();
         let known = &mut *known;
+        let has_had = |latest: Current| latest.seq >= pose.item.seq;
+        if known.latest.is_some_and(has_had) {
+            return;
+        }
+        self.histograms.add(&pose.item);
         if is_new {
             known.track.add(pose);
         }

@@ -35,6 +35,13 @@ pub struct Percentiles {
     p99_ms: f64,
 }
 
+/// Median and maximum of one second, ms: it has too few poses for a percentile beyond.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Second {
+    p50_ms: f64,
+    max_ms: f64,
+}
+
 /// The delays of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StageDelays {
@@ -54,7 +61,7 @@ pub struct Report {
     sensor_to_pose: Percentiles,
     stages: Vec<StageDelays>,
     /// Sensor to pose in each second of the last minute, oldest first; `None` in one without a pose.
-    series: Vec<Option<Percentiles>>,
+    series: Vec<Option<Second>>,
 }
 
 impl Delays {
@@ -105,7 +112,7 @@ impl Delays {
     }
 
     /// The last second is not over, and is left out.
-    fn series(&self, now_ns: i64) -> Vec<Option<Percentiles>> {
+    fn series(&self, now_ns: i64) -> Vec<Option<Second>> {
         let steps = WINDOW_NS / STEP_NS;
         let mut of_step = vec![Vec::new(); steps as usize];
         let end = now_ns / STEP_NS;
@@ -118,7 +125,7 @@ impl Delays {
                 delays.extend(sample.delays_us[0]);
             }
         }
-        of_step.into_iter().map(percentiles).collect()
+        of_step.into_iter().map(second).collect()
     }
 }
 
@@ -131,15 +138,22 @@ fn in_us(duration_ns: i64) -> u32 {
     (duration_ns / 1000).clamp(0, u32::MAX.into()) as u32
 }
 
-/// The nearest of the values; `None` of none.
-fn percentiles(mut delays_us: Vec<u32>) -> Option<Percentiles> {
-    let last = delays_us.len().checked_sub(1)?;
+/// `None` of no values.
+fn percentiles(delays_us: Vec<u32>) -> Option<Percentiles> {
+    let [p50_ms, p99_ms] = at(delays_us, [0.5, 0.99])?;
+    Some(Percentiles { p50_ms, p99_ms })
+}
+
+fn second(delays_us: Vec<u32>) -> Option<Second> {
+    let [p50_ms, max_ms] = at(delays_us, [0.5, 1.0])?;
+    Some(Second { p50_ms, max_ms })
+}
+
+/// The values at these shares of their order, ms.
+fn at(mut delays_us: Vec<u32>, shares: [f64; 2]) -> Option<[f64; 2]> {
+    let last = delays_us.len().checked_sub(1)? as f64;
     delays_us.sort_unstable();
-    let at = |share: f64| f64::from(delays_us[(last as f64 * share).round() as usize]) * 1e-3;
-    Some(Percentiles {
-        p50_ms: at(0.5),
-        p99_ms: at(0.99),
-    })
+    Some(shares.map(|share| f64::from(delays_us[(last * share).round() as usize]) * 1e-3))
 }
 
 #[cfg(test)]
@@ -179,7 +193,11 @@ mod tests {
         assert_eq!(report.series.len(), 60);
         assert_eq!(report.series.iter().flatten().count(), 50);
         let newest = report.series.last().copied().flatten();
-        assert_eq!(newest.map(|newest| newest.p50_ms), Some(1.0));
+        let only = Second {
+            p50_ms: 1.0,
+            max_ms: 1.0,
+        };
+        assert_eq!(newest, Some(only));
         assert_eq!(
             delays.report(now_ns + 2 * WINDOW_NS),
             Report {

@@ -2,7 +2,7 @@
 //!
 //! The process is an observer: the run does not wait for it, and it counts what it misses. Reading order:
 //!
-//! 1. `server`: listens, and ends with a signal; `access`: who may read; `page`: the files of the page.
+//! 1. `server`: listens, and ends with a signal; `connections`: how many at once; `access`: who may read; `page`: the files of the page.
 //! 2. `observing`: the threads that follow the run, and write what they see onto the `board`.
 //! 3. `track`, `delays`, `pictures`, `processes`: what is kept of it, in bounded memory.
 //! 4. `stream`: one browser, which receives `messages`; `metrics`: one scrape of Prometheus.
@@ -10,6 +10,7 @@
 
 mod access;
 mod board;
+mod connections;
 mod delays;
 mod foxglove;
 mod frame;

@@ -27,6 +27,7 @@ use tokio::{runtime, sync::watch, time};
 use crate::{
     access::{Access, Token, Verdict},
     board::Board,
+    connections::{self, Limits},
     foxglove::{self, Hub},
     metrics,
     observing::{self, Followed},
@@ -116,15 +117,11 @@ impl Endpoint {
     }
 
     /// Serves until the program stops.
-    async fn serve(self, router: Router, mut stop: watch::Receiver<bool>) -> io::Result<()> {
+    async fn serve(self, router: Router, stop: watch::Receiver<bool>) -> io::Result<()> {
         self.listener.set_nonblocking(true)?;
         let listener = tokio::net::TcpListener::from_std(self.listener)?;
-        let stopping = async move {
-            let _ = stop.wait_for(|stop| *stop).await;
-        };
-        axum::serve(listener, router)
-            .with_graceful_shutdown(stopping)
-            .await
+        connections::serve(listener, router, Limits::default(), stop).await;
+        Ok(())
     }
 }
 
@@ -279,7 +276,7 @@ async fn view(
         let full = "As many viewers as there is room for are connected: close one.";
         return page::refusal(StatusCode::SERVICE_UNAVAILABLE, full);
     };
-    let upgrade = upgrade.max_message_size(MAX_REQUESTED);
+    let upgrade = bounded(upgrade, MAX_REQUESTED);
     upgrade.on_upgrade(move |socket| async move {
         foxglove::serve(socket, shared.hub, shared.board).await;
         drop(place);
@@ -318,11 +315,16 @@ async fn stream(State(shared): State<Shared>, upgrade: WebSocketUpgrade) -> Resp
         let full = "As many browsers as there is room for are connected: close one.";
         return page::refusal(StatusCode::SERVICE_UNAVAILABLE, full);
     };
-    let upgrade = upgrade.max_message_size(MAX_RECEIVED);
+    let upgrade = bounded(upgrade, MAX_RECEIVED);
     upgrade.on_upgrade(move |socket| async move {
         stream::serve(socket, shared.board).await;
         drop(place);
     })
+}
+
+/// Bounds what is kept of a message that arrives; a frame has a limit of its own.
+fn bounded(upgrade: WebSocketUpgrade, bytes: usize) -> WebSocketUpgrade {
+    upgrade.max_message_size(bytes).max_frame_size(bytes)
 }
 
 async fn scrape(State(shared): State<Shared>, headers: HeaderMap) -> Response {
