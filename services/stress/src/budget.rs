@@ -26,7 +26,10 @@ pub struct Limits {
     /// Maximum of it, ms.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_ms: Option<f64>,
-    /// Scans that were due and have no pose, %.
+    /// Scans that were due and have no pose.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub drops: Option<f64>,
+    /// The same, % of those that were due.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drops_percent: Option<f64>,
     /// Time from a fault (the kill, or the end of the stop) to the first pose that the stage has worked
@@ -68,6 +71,7 @@ impl Limits {
             p99_ms: self.p99_ms.or(other.p99_ms),
             p99_9_ms: self.p99_9_ms.or(other.p99_9_ms),
             max_ms: self.max_ms.or(other.max_ms),
+            drops: self.drops.or(other.drops),
             drops_percent: self.drops_percent.or(other.drops_percent),
             recovery_ms: self.recovery_ms.or(other.recovery_ms),
             cpu_percent: self.cpu_percent.or(other.cpu_percent),
@@ -87,13 +91,14 @@ impl Limits {
             .find(|(_, limit)| !(limit.is_finite() && *limit >= 0.0))
     }
 
-    fn keys(&self) -> [(&'static str, Option<f64>); 11] {
+    fn keys(&self) -> [(&'static str, Option<f64>); 12] {
         [
             ("p50_ms", self.p50_ms),
             ("p90_ms", self.p90_ms),
             ("p99_ms", self.p99_ms),
             ("p99_9_ms", self.p99_9_ms),
             ("max_ms", self.max_ms),
+            ("drops", self.drops),
             ("drops_percent", self.drops_percent),
             ("recovery_ms", self.recovery_ms),
             ("cpu_percent", self.cpu_percent),
@@ -112,6 +117,7 @@ impl Budget {
         match scenario.judged() {
             Judged::ByBudget | Judged::ByItself => own.or(&self.all),
             Judged::ButDrops => own.or(&Limits {
+                drops: None,
                 drops_percent: None,
                 ..self.all.clone()
             }),

@@ -301,6 +301,9 @@ fn problem(measured: &Measured) -> Option<String> {
     if let Some(said) = &measured.died {
         return Some(format!("the run has ended: {said}"));
     }
+    if let Some(unseen) = measured.recorded.counts.omitted() {
+        return Some(unseen);
+    }
     let lost = measured
         .faults
         .iter()
@@ -318,6 +321,7 @@ fn checks(limits: &Limits, figures: &Figures) -> Vec<Check> {
         ("p99_ms", percentile(latency.p99_ms), limits.p99_ms),
         ("p99_9_ms", percentile(latency.p99_9_ms), limits.p99_9_ms),
         ("max_ms", latency.max_ms, limits.max_ms),
+        ("drops", Some(figures.counts.dropped as f64), limits.drops),
         (
             "drops_percent",
             figures.drops_percent(),

@@ -63,6 +63,12 @@ impl Helper {
         let _ = self.process.wait();
     }
 
+    /// Returns what it says of a helper that has ended although it should still work.
+    pub fn has_died(&mut self) -> Option<String> {
+        let status = self.process.try_wait().ok().flatten()?;
+        Some(format!("`{}` has ended: {status}", self.work))
+    }
+
     /// Sends a line.
     ///
     /// # Errors

@@ -21,6 +21,7 @@ use crate::{
     StressError,
     campaign::Subject,
     fault::{Fault, FaultKind, Faults},
+    helper::Helper,
     memory::Taken,
     processes::{Cost, Sampler},
     record::{Recorded, Recorder},
@@ -131,11 +132,12 @@ pub fn measure(subject: &Subject, setup: &Setup, gate: &Gate) -> Result<Measured
     let observed = run.attach()?;
     let mut poses = observed.observe::<Pose>()?;
     let mut newest = run.warm_up(&mut poses)?;
-    let (loads, taken) = run.load(subject)?;
+    let (mut loads, taken) = run.load(subject)?;
     ticket.arrive();
     await_others(gate, &mut poses, &mut newest)?;
     let mut session = Session::begin(setup, run.pid(), run.out(), &newest);
     let has_ended = session.measure(&mut poses, || run.has_ended())?;
+    let ended_load = loads.iter_mut().find_map(Helper::has_died);
     drop(loads);
     let processes = session.processes.costs();
     let recorded = session.recorder.finish(session.period_ns, clock::now_ns());
@@ -146,9 +148,14 @@ pub fn measure(subject: &Subject, setup: &Setup, gate: &Gate) -> Result<Measured
     drop(poses);
     drop(observed);
     Ok(Measured {
-        recorded,
         faults,
-        omitted: struck.or_else(|| taken.and_then(|taken| taken.omitted())),
+        omitted: struck
+            .or_else(|| taken.and_then(|taken| taken.omitted()))
+            .or_else(|| {
+                ended_load.map(|ended| format!("the load was not there all the time: {ended}"))
+            })
+            .or_else(|| recorded.counts.omitted()),
+        recorded,
         taken,
         processes,
         shared_bytes,

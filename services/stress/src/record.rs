@@ -31,6 +31,18 @@ pub struct Counts {
     pub unseen: u64,
 }
 
+impl Counts {
+    /// Returns why the distributions say nothing: they lack poses that there were.
+    pub fn omitted(&self) -> Option<String> {
+        (self.unseen > 0).then(|| {
+            format!(
+                "{} poses were not seen by the process that measures: the machine was too busy for it",
+                self.unseen
+            )
+        })
+    }
+}
+
 /// A scan on the timeline.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Sample {

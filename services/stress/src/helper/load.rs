@@ -4,6 +4,7 @@ use std::{
     fs,
     hint::black_box,
     path::Path,
+    sync::mpsc::{self, Sender},
     thread,
     time::{Duration, Instant},
 };
@@ -99,11 +100,16 @@ pub(super) fn observe(out: &Path) -> Result<(), StressError> {
         follow::<Refined>,
         follow::<Pose>,
     ];
+    let (attached, attachments) = mpsc::channel();
     let threads = followers.map(|follow| {
-        let root = root.clone();
-        thread::spawn(move || follow(&root))
+        let (root, attached) = (root.clone(), attached.clone());
+        thread::spawn(move || follow(&root, attached))
     });
-    say_ready();
+    drop(attached);
+    // One that cannot attach says so when it is joined.
+    if attachments.iter().count() == threads.len() {
+        say_ready();
+    }
     for thread in threads {
         match thread.join() {
             Ok(ended) => ended?,
@@ -113,9 +119,11 @@ pub(super) fn observe(out: &Path) -> Result<(), StressError> {
     Ok(())
 }
 
-fn follow<M: Message>(root: &Path) -> Result<(), StageError> {
+fn follow<M: Message>(root: &Path, attached: Sender<()>) -> Result<(), StageError> {
     let run = ObservedRun::at(root)?;
     let mut observer = run.observe::<M>()?;
+    let _ = attached.send(());
+    drop(attached);
     loop {
         match observer.next(Duration::MAX)? {
             Next::Message(message, _) => drop(black_box(touched(message.values()))),

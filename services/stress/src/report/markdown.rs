@@ -161,7 +161,7 @@ fn counts(page: &mut String, figures: &Figures) {
         posed,
         dropped,
         never,
-        unseen,
+        unseen: _,
     } = figures.counts;
     if due == 0 {
         return;
@@ -171,14 +171,8 @@ fn counts(page: &mut String, figures: &Figures) {
     let _ = writeln!(
         page,
         "\n{due} scans were due: {posed} have a pose, {dropped} were dropped ({:.2} %), {never} of them without any later pose. {restarts} restarts. \
-         {late} wake-ups were caught late.{}",
+         {late} wake-ups were caught late.",
         figures.drops_percent().unwrap_or(0.0),
-        match unseen {
-            0 => String::new(),
-            _ => format!(
-                " {unseen} poses were not seen by the observer that measures and do not count."
-            ),
-        }
     );
 }
 
