@@ -6,8 +6,9 @@ use std::{
 };
 
 use gyre_latency::{Latency, LatencyMeter};
-use gyre_messages::PoseHeader;
+use gyre_messages::{PoseHeader, StageId};
 use gyre_stage::{
+    clock,
     control::{Control, Status},
     observer::Next,
     usage::Usage,
@@ -52,8 +53,11 @@ pub struct Use {
 pub struct Looks<'run> {
     control: Control,
     poses: Poses<'run>,
-    recent: VecDeque<(Instant, PoseHeader)>,
+    recent: VecDeque<PoseHeader>,
     longest_us: u64,
+    /// Since when scans wait for their poses and none comes.
+    owed_since: Option<Instant>,
+    has_new: bool,
     history: VecDeque<u64>,
     earlier: Option<Earlier>,
     last: Option<Look>,
@@ -73,6 +77,8 @@ impl<'run> Looks<'run> {
             poses,
             recent: VecDeque::new(),
             longest_us: 0,
+            owed_since: None,
+            has_new: false,
             history: VecDeque::new(),
             earlier: None,
             last: None,
@@ -96,7 +102,8 @@ impl<'run> Looks<'run> {
             let done_ns = pose.item.hops.iter().map(|hop| hop.finished_ns).max();
             let latency_ns = done_ns.unwrap_or_default() - pose.item.due_ns;
             self.longest_us = self.longest_us.max(latency_ns.max(0) as u64 / 1000);
-            self.recent.push_back((Instant::now(), pose));
+            self.recent.push_back(pose);
+            self.has_new = true;
         }
         Ok(())
     }
@@ -106,13 +113,17 @@ impl<'run> Looks<'run> {
         let status = self.control.status()?;
         let now = Instant::now();
         self.take_poses()?;
-        self.recent.retain(|(at, _)| now - *at <= SPAN);
+        // By their own time: an observer that has just come receives older ones first.
+        let oldest_ns = clock::now_ns() - SPAN.as_nanos() as i64;
+        let published_ns =
+            |pose: &PoseHeader| pose.item.hops[StageId::PoseIntegration as usize].published_ns;
+        self.recent.retain(|pose| published_ns(pose) >= oldest_ns);
         let mut meter = LatencyMeter::default();
-        self.recent.iter().for_each(|(_, pose)| meter.add(pose));
-        self.history.push_back(std::mem::take(&mut self.longest_us));
-        if self.history.len() > HISTORY {
-            self.history.pop_front();
-        }
+        self.recent.iter().for_each(|pose| meter.add(pose));
+        let in_flight = status
+            .published
+            .map(|published| published.saturating_sub(status.poses + status.dropped));
+        self.draw(now, in_flight);
         let pids = status.processes.iter().map(|process| process.pid);
         let usage: BTreeMap<u32, Usage> = pids
             .filter_map(|pid| Some((pid, Usage::of(pid)?)))
@@ -133,9 +144,7 @@ impl<'run> Looks<'run> {
         };
         let look = Look {
             rate,
-            in_flight: status
-                .published
-                .map(|published| published.saturating_sub(status.poses + status.dropped)),
+            in_flight,
             latency: meter.latency(),
             processes: status.processes.iter().map(|it| used(it.pid)).collect(),
             history: self.history.iter().copied().collect(),
@@ -143,6 +152,21 @@ impl<'run> Looks<'run> {
         };
         self.last = Some(look.clone());
         Ok(look)
+    }
+
+    /// Adds the longest time since the last look to what is drawn: where poses are owed and none comes, the time for which that lasts.
+    fn draw(&mut self, now: Instant, in_flight: Option<u64>) {
+        let is_owed =
+            !std::mem::take(&mut self.has_new) && in_flight.is_some_and(|scans| scans > 0);
+        self.owed_since = is_owed.then(|| self.owed_since.unwrap_or(now));
+        let owed_us = self
+            .owed_since
+            .map_or(0, |since| (now - since).as_micros() as u64);
+        self.history
+            .push_back(std::mem::take(&mut self.longest_us).max(owed_us));
+        if self.history.len() > HISTORY {
+            self.history.pop_front();
+        }
     }
 }
 
