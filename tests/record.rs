@@ -163,16 +163,8 @@ fn a_recorder_that_is_stopped_for_long_says_exactly_what_it_missed() {
     send(recorder, Signal::CONT);
     let ended = running.finish();
     assert_eq!(run.odometry(), simulated().set("run.window=1").complete());
+    let missed = counted_as_missed(&run, &ended);
     let recording = open_recording(&file(&run)).unwrap();
-    let there = seqs(&recording, "scan");
-    let missed = SCANS - there.len();
-    assert!(missed >= 4, "{there:?}");
-    assert_eq!(recording.missed()["scan"], missed as u64);
-    assert!(
-        ended.stderr.contains(&format!("missed {missed} scan")),
-        "{}",
-        ended.stderr
-    );
     // The scans that are there are played, and those that are not are named; what needs every message is refused.
     let again = Run::configured("")
         .data(&file(&run))
@@ -187,6 +179,59 @@ fn a_recorder_that_is_stopped_for_long_says_exactly_what_it_missed() {
         .data(&file(&run))
         .argument("--from", "masked");
     from.finish().refused_with(&[&lacks]);
+}
+
+/// Returns the number of scans that are not there, four or more, which the recorder has said and written.
+fn counted_as_missed(run: &Run, ended: &Ended) -> usize {
+    let recording = open_recording(&file(run)).unwrap();
+    let there = seqs(&recording, "scan");
+    let missed = SCANS - there.len();
+    assert!(missed >= 4, "{there:?}");
+    assert_eq!(recording.missed()["scan"], missed as u64);
+    assert!(
+        ended.stderr.contains(&format!("missed {missed} scan")),
+        "{}",
+        ended.stderr
+    );
+    missed
+}
+
+#[test]
+fn what_a_killed_recorder_had_not_written_and_the_next_one_did_not_find_is_counted() {
+    let run = recorded(&simulated()).rate("1").set("run.window=1");
+    let mut running = run.start();
+    running.await_poses(SCANS / 4);
+    let killed = await_recorder(&mut running, None);
+    // It writes nothing from here on, so that the gap is longer than the history of the topics, however fast the machine is.
+    send(killed, Signal::STOP);
+    running.await_poses(SCANS - 8);
+    send(killed, Signal::KILL);
+    await_recorder(&mut running, Some(killed));
+    let ended = running.finish();
+    ended.succeeded();
+    counted_as_missed(&run, &ended);
+    assert!(!ended.stderr.contains("missed nothing"), "{}", ended.stderr);
+}
+
+#[test]
+fn a_recorder_that_dies_right_before_the_end_is_reported() {
+    let run = recorded(&simulated())
+        .rate("1")
+        .set("record.topics=['scan']");
+    let mut running = run.start();
+    running.await_poses(SCANS / 4);
+    let recorder = await_recorder(&mut running, None);
+    send(recorder, Signal::STOP);
+    running.await_poses(SCANS);
+    send(recorder, Signal::KILL);
+    let ended = running.finish();
+    ended.succeeded();
+    let has_said = ["end of the recording is missing", " scan: the recording"];
+    assert!(
+        has_said.iter().any(|it| ended.stderr.contains(it)),
+        "{}",
+        ended.stderr
+    );
 }
 
 #[test]

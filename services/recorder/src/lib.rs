@@ -4,8 +4,9 @@
 //! limit in bytes. So a slow disk costs memory first, and then messages, which are counted. Nothing that the recorder does reaches the
 //! run: see [`gyre_stage::observer`].
 //!
-//! Reading order: `recorder` (the loop), `tap` (the observers), `queue`, `writing` (the other thread), `log_tail`, `health`.
+//! Reading order: `recorder` (the loop), `begin`, `tap` (the observers), `queue`, `writing` (the other thread), `log_tail`, `health`.
 
+mod begin;
 mod health;
 mod log_tail;
 mod queue;

@@ -1,7 +1,7 @@
 //! The loop of the recorder.
 
 use std::{
-    fmt, fs,
+    fmt,
     path::{Path, PathBuf},
     sync::mpsc::Receiver,
     thread::{self, JoinHandle},
@@ -9,7 +9,7 @@ use std::{
 };
 
 use gyre_messages::{Message, Refined, Sender as PublishedBy, topic};
-use gyre_recording::{Head, Recording, RecordingError, Split, SplitWriter, next_part};
+use gyre_recording::{RecordingError, Split, SplitWriter};
 use gyre_stage::{
     Manifest, StageError, launch,
     observer::{ObservedRun, wait_for_any},
@@ -19,6 +19,7 @@ use gyre_stage::{
 use thiserror::Error;
 
 use crate::{
+    begin::{Begun, begin},
     health::health,
     log_tail::LogTail,
     queue::{Entry, LIMIT_BYTES, Sender, queue},
@@ -29,9 +30,9 @@ use crate::{
 /// The name of the recorder in the log and among the processes of a run.
 const NAME: &str = "recorder";
 /// The topic of log lines, which is no topic of the transport.
-const LOG: &str = "log";
+pub(crate) const LOG: &str = "log";
 /// That of the run's health, no more.
-const HEALTH: &str = "health";
+pub(crate) const HEALTH: &str = "health";
 /// The topics that are recorded unless others are named.
 const DEFAULT: [&str; 7] = [
     "scan",
@@ -152,9 +153,16 @@ pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
     let _log = launch::start_log(manifest, NAME)?;
     let signals = Signals::install()?;
     let topics = topics(&options.topics, manifest)?;
-    let (path, head) = begin(options, manifest, &topics)?;
+    let Begun {
+        path,
+        head,
+        earlier,
+    } = begin(options, manifest, &topics)?;
     let writer = SplitWriter::create(options.to.clone(), head, options.split)?;
-    let taps = topics.iter().filter_map(|topic| tap(&run, topic));
+    let taps = topics.iter().filter_map(|topic| {
+        let expected = earlier.as_ref().map(|it| it.next_of(topic));
+        tap(&run, topic, expected)
+    });
     let taps = taps.collect::<Result<Vec<_>, _>>()?;
     if options.continues {
         run.is_ready(NAME, &signals)?;
@@ -205,41 +213,6 @@ fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<String>, Recorder
         Some(unknown) => Err(RecorderError::NoTopic(unknown.clone())),
         None => Ok(named.to_vec()),
     }
-}
-
-/// Returns the file to write, and its head: those of the next part where a recorder of this run was there before.
-fn begin(
-    options: &Options,
-    manifest: &Manifest,
-    topics: &[String],
-) -> Result<(PathBuf, Head), RecorderError> {
-    let (path, part) = next_part(&options.to);
-    if part > 1 && !options.continues {
-        return Err(RecorderError::Exists(options.to.clone()));
-    }
-    let id = match part {
-        1 => format!("{}-{}", manifest.prefix.trim_matches('_'), now_ns()),
-        _ => Recording::open(std::slice::from_ref(&options.to))?
-            .head()
-            .id
-            .clone(),
-    };
-    let file = manifest.root.join("config.toml");
-    let configuration =
-        fs::read_to_string(&file).map_err(|source| StageError::File { path: file, source })?;
-    let head = Head {
-        id,
-        part,
-        configuration,
-        topics: topics
-            .iter()
-            .filter(|topic| *topic != LOG && *topic != HEALTH)
-            .cloned()
-            .collect(),
-        scan_bytes: manifest.limits.scan_bytes,
-        mode: if manifest.live { "live" } else { "lossless" }.to_owned(),
-    };
-    Ok((path, head))
 }
 
 struct Recorder<'run> {
@@ -301,7 +274,7 @@ impl Recorder<'_> {
                 .map(|it| format!("{} of {}", it.missed, it.topic))
                 .collect();
             tracing::warn!(
-                "does not keep up with the run: missed {} so far",
+                "missed {} so far: the recorder was too slow, or was not there",
                 counts.join(", ")
             );
             (self.told, self.due) = (missed, Instant::now() + SENTENCE_PERIOD);

@@ -33,7 +33,8 @@ pub struct Counts {
     pub topic: &'static str,
     /// Messages that were put into the queue.
     pub recorded: u64,
-    /// Messages that were overwritten before they were taken, did not fit into the queue, or were malformed.
+    /// Messages that were overwritten before they were taken, did not fit into the queue, or were malformed; and those between the
+    /// parts before and this recorder.
     pub missed: u64,
 }
 
@@ -47,29 +48,38 @@ struct TopicTap<'run, M: Message> {
     has_ended: bool,
 }
 
-/// Observes a topic by its name; `None` if there is no such topic.
+/// Observes a topic by its name; `None` if there is no such topic. Messages from number `expected` on are to be recorded, if it is
+/// known: those before are in earlier parts.
 pub(crate) fn tap<'run>(
     run: &'run ObservedRun,
     topic: &str,
+    expected: Option<u64>,
 ) -> Option<Result<Box<dyn Tap + 'run>, StageError>> {
     Some(match topic {
-        Scan::TOPIC => TopicTap::<Scan>::on(run),
-        Masked::TOPIC => TopicTap::<Masked>::on(run),
-        Rotation::TOPIC => TopicTap::<Rotation>::on(run),
-        Motion::TOPIC => TopicTap::<Motion>::on(run),
-        Refined::TOPIC => TopicTap::<Refined>::on(run),
-        Pose::TOPIC => TopicTap::<Pose>::on(run),
-        Loop::TOPIC => TopicTap::<Loop>::on(run),
-        Correction::TOPIC => TopicTap::<Correction>::on(run),
-        Fix::TOPIC => TopicTap::<Fix>::on(run),
+        Scan::TOPIC => TopicTap::<Scan>::on(run, expected),
+        Masked::TOPIC => TopicTap::<Masked>::on(run, expected),
+        Rotation::TOPIC => TopicTap::<Rotation>::on(run, expected),
+        Motion::TOPIC => TopicTap::<Motion>::on(run, expected),
+        Refined::TOPIC => TopicTap::<Refined>::on(run, expected),
+        Pose::TOPIC => TopicTap::<Pose>::on(run, expected),
+        Loop::TOPIC => TopicTap::<Loop>::on(run, expected),
+        Correction::TOPIC => TopicTap::<Correction>::on(run, expected),
+        Fix::TOPIC => TopicTap::<Fix>::on(run, expected),
         _ => return None,
     })
 }
 
 impl<'run, M: Message> TopicTap<'run, M> {
-    fn on(run: &'run ObservedRun) -> Result<Box<dyn Tap + 'run>, StageError> {
+    fn on(
+        run: &'run ObservedRun,
+        expected: Option<u64>,
+    ) -> Result<Box<dyn Tap + 'run>, StageError> {
+        let mut observer = run.observe::<M>()?;
+        if let Some(next) = expected {
+            observer.expect(next);
+        }
         Ok(Box::new(Self {
-            observer: run.observe::<M>()?,
+            observer,
             recorded: 0,
             dropped: 0,
             told: 0,

@@ -256,7 +256,13 @@ impl<M: Message> Observer<'_, M> {
         &self.data
     }
 
-    /// Returns the number of items missed since the observer attached.
+    /// Counts as missed what is between `next` and the first item that is received: all before it is known already, as from an
+    /// observer that was there earlier.
+    pub fn expect(&mut self, next: u64) {
+        self.sequence.expected = Some(next);
+    }
+
+    /// Returns the number of items missed since the observer attached, or since the item that it was told to expect.
     pub fn missed(&self) -> u64 {
         self.sequence.missed
     }
@@ -307,6 +313,8 @@ pub fn wait_for_any(
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Sequence {
     next: Option<u64>,
+    /// The item from which on a missing one counts; `None`: from the first one received.
+    expected: Option<u64>,
     missed: u64,
     ended: bool,
 }
@@ -318,7 +326,8 @@ impl Sequence {
         if item.is(flag::BASE) || self.next.is_some_and(|next| item.seq < next) {
             return None;
         }
-        let missed = item.seq - self.next.unwrap_or(item.seq);
+        let expected = self.next.max(self.expected).unwrap_or(item.seq);
+        let missed = item.seq.saturating_sub(expected);
         self.next = Some(item.seq.saturating_add(1));
         self.missed += missed;
         self.ended = item.is(flag::END);
@@ -348,6 +357,25 @@ mod tests {
         assert_eq!(sequence.advance(&item(10, flag::SYNC)), Some(0));
         assert_eq!(sequence.missed, 3);
         assert!(!sequence.ended);
+    }
+
+    #[test]
+    fn items_between_what_is_known_and_the_first_received_are_missed() {
+        let expecting = || Sequence {
+            expected: Some(7),
+            ..Sequence::default()
+        };
+        for (first, missed) in [(5, 0), (7, 0), (9, 2)] {
+            let mut sequence = expecting();
+            assert_eq!(sequence.advance(&item(first, 0)), Some(missed));
+            assert_eq!(sequence.advance(&item(first + 1, 0)), Some(0));
+        }
+        let mut sequence = expecting();
+        assert_eq!(sequence.advance(&item(4, 0)), Some(0), "an item again");
+        assert_eq!(sequence.advance(&item(9, 0)), Some(2));
+        let mut sequence = expecting();
+        assert_eq!(sequence.advance(&item(10, flag::END)), None);
+        assert_eq!(sequence.missed, 3);
     }
 
     #[test]

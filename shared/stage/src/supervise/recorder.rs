@@ -135,6 +135,12 @@ impl Supervisor<'_> {
 
     /// Lets the recorder write what it has received, before the stages end.
     pub(super) fn stop_recorder(&mut self, ending: Option<Ending>) -> Result<(), SuperviseError> {
+        let awaits_restart = |it: &Recorder| it.restart_at.is_some();
+        if self.recorder.as_ref().is_some_and(awaits_restart) {
+            self.say_of_recording(
+                "the recorder died, and the run ended before it was started again: the end of the recording is missing",
+            );
+        }
         self.end_recorder(match ending {
             Some(Ending::Complete) => END_TIMEOUT,
             _ => STOP_TIMEOUT,
@@ -196,6 +202,11 @@ impl Supervisor<'_> {
         let sentence = match was_late {
             true => format!(
                 "the recorder had not written all after {limit:?}, and was killed: the end of the recording is missing"
+            ),
+            // It says something, whether it has missed messages or not.
+            false if output.is_empty() => format!(
+                "the recorder died ({}): the end of the recording is missing",
+                recorder.child.death().cause
             ),
             false => output,
         };
