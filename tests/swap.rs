@@ -10,7 +10,8 @@ use std::{
 use crate::{
     PROGRAM,
     common::{Ended, Run, STAGES, gyre, undisturbed},
-    operate::{ask, await_status, process, started, status},
+    conformance,
+    operate::{ask, process, started, status},
 };
 
 /// A swap; the command comes last.
@@ -28,7 +29,9 @@ fn swap(run: &Run, stage: &str, options: &[&str], command: &[&str]) -> Ended {
 
 /// Words as one argument, each in quotes.
 fn shell_words(words: &[&str]) -> String {
-    let quoted = words.iter().map(|word| format!("'{word}'"));
+    let quoted = words
+        .iter()
+        .map(|word| format!("'{}'", word.replace('\'', r"'\''")));
     quoted.collect::<Vec<_>>().join(" ")
 }
 
@@ -73,10 +76,14 @@ fn a_program_that_cannot_take_over_changes_nothing() {
 fn a_program_that_fails_after_taking_over_gives_way_to_the_one_before() {
     let (run, running) = started();
     let fails = script(&run, "fails.sh", FAILS);
-    swap(&run, "masking", &[], &[&fails]).succeeded();
-    let back = await_status(&run, "back", |it| {
-        process(it, "masking")["is_swapped"] == false
-    });
+    swap(&run, "masking", &[], &[&fails]).refused_with(&[
+        "masking goes on as before",
+        "fails.sh` has failed",
+        "exit code 3",
+        "no such mask",
+    ]);
+    let back = status(&run).unwrap();
+    assert_eq!(process(&back, "masking")["is_swapped"], false);
     assert_eq!(process(&back, "masking")["last_death"], "exit code 3");
     let ended = running.finish();
     assert!(
@@ -97,7 +104,7 @@ fn script(run: &Run, name: &str, text: &str) -> String {
 }
 
 /// A masking stage that stands by as the contract says, and then dies.
-const FAILS: &str = "touch $GYRE_RUN/masking.ready\ncat\nexit 3";
+const FAILS: &str = "touch $GYRE_RUN/masking.ready\ncat\necho no such mask >&2\nexit 3";
 
 #[test]
 fn a_cold_swap_to_a_program_that_cannot_be_started_changes_nothing() {
@@ -122,12 +129,61 @@ fn a_program_that_was_edited_is_taken_by_a_swap_alone_and_gives_way_when_it_fail
     ask(&run, &["restart", "masking"]).refused_with(&["own.sh has changed", "gyre swap masking"]);
     assert_eq!(process(&status(&run).unwrap(), "masking")["pid"], before);
     // The one before is of a file that is another one by now: so it is the one that the run was begun with.
-    swap(&run, "masking", &[], &[&own]).succeeded();
-    await_status(&run, "back", |it| {
-        process(it, "masking")["is_swapped"] == false
-    });
+    swap(&run, "masking", &[], &[&own]).refused_with(&["own.sh` has failed", "no such mask"]);
+    assert_eq!(
+        process(&status(&run).unwrap(), "masking")["is_swapped"],
+        false
+    );
     running.finish().succeeded();
     assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn a_program_that_fails_after_a_cold_swap_gives_way_and_the_swap_says_so() {
+    let (run, running) = started();
+    let fails = script(&run, "cold.sh", "echo no such mask >&2\nexit 3");
+    swap(&run, "masking", &["--cold"], &[&fails]).refused_with(&[
+        "cold.sh` has failed",
+        "exit code 3",
+        "no such mask",
+    ]);
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn a_program_whose_messages_no_stage_can_read_gives_way_and_does_not_end_the_run() {
+    let (run, running) = started();
+    let nonsense = ["sh", "-c", &conformance::command("sends only NaN")];
+    swap(&run, "rotation-search", &["--cold"], &nonsense).refused_with(&[
+        "rotation-search goes on as before",
+        "translation-search died after it",
+        "NaN",
+    ]);
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn a_swap_without_a_scan_to_try_the_program_says_so_with_a_code_of_its_own() {
+    // Nothing comes for a minute after the first scans.
+    let run = Run::of_recording().rate("0.01");
+    let mut running = run.start();
+    running.await_poses(1);
+    let ended = swap(
+        &run,
+        "rotation-search",
+        &[],
+        &["nice", PROGRAM, "stage", "rotation-search"],
+    );
+    assert_eq!(ended.code(), Some(2), "{}", ended.stderr);
+    assert!(
+        ended.stderr.contains("no scan has gone through it"),
+        "{}",
+        ended.stderr
+    );
+    ask(&run, &["down"]).succeeded();
+    running.end();
 }
 
 #[test]

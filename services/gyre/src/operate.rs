@@ -38,10 +38,13 @@ pub fn restart(arguments: &RestartArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// The exit code of a swap to a program that nothing is known against, and nothing for.
+const UNTRIED: u8 = 2;
+
 /// Goes on with another program in the place of a stage.
 ///
 /// # Errors
-/// There is no such run or process, or the program does not come to take over: the one before goes on.
+/// There is no such run or process, or the program does not come to take over, or fails at its first scan: the one before goes on.
 pub fn swap(arguments: &SwapArguments) -> Result<ExitCode, Failure> {
     let run = chosen(&arguments.run)?;
     let command = arguments.command.as_deref().map(program::words);
@@ -59,12 +62,16 @@ pub fn swap(arguments: &SwapArguments) -> Result<ExitCode, Failure> {
     };
     let directory = env::current_dir()
         .map_err(|error| format!("cannot tell the current directory: {error}"))?;
-    run.swap(Swap {
+    let swap = Swap {
         process: arguments.process.clone(),
         command,
         directory,
         cold: arguments.cold,
-    })?;
+    };
+    if let Some(untried) = run.swap(swap)? {
+        print::note(format_args!("gyre: {untried}"));
+        return Ok(ExitCode::from(UNTRIED));
+    }
     print::line(format_args!("{} is {what} now", arguments.process))?;
     Ok(ExitCode::SUCCESS)
 }

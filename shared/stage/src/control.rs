@@ -60,6 +60,8 @@ pub enum Answer {
     Done,
     /// It was not done, and why.
     Refused(String),
+    /// To [`Request::Swap`]: the program has taken over, and nothing has shown yet that it works; a sentence.
+    Untried(String),
 }
 
 /// The state of a run.
@@ -240,13 +242,17 @@ impl Control {
         self.order(&Request::Restart { process }, Some(ANSWER))
     }
 
-    /// Goes on with another program in the place of a stage. Returns when that has taken over.
+    /// Goes on with another program in the place of a stage. Returns when that has worked on a first pose; or, with a sentence, when it
+    /// has taken over and no scan came for it to work on.
     ///
     /// # Errors
-    /// The program did not come to take over, and the one before goes on; or the run has ended.
-    pub fn swap(&self, swap: Swap) -> Result<(), StageError> {
-        // The supervisor has the limit: `run.start_timeout_s`.
-        self.order(&Request::Swap(swap), None)
+    /// The program did not come to take over, or has failed, and the one before goes on; or the run has ended.
+    pub fn swap(&self, swap: Swap) -> Result<Option<String>, StageError> {
+        // The supervisor has the limits: `run.start_timeout_s`, and that of the trial.
+        match self.ask(&Request::Swap(swap), None)? {
+            Answer::Untried(sentence) => Ok(Some(sentence)),
+            answer => self.is_done(answer).map(|()| None),
+        }
     }
 
     /// Returns whether the run is still there: its supervisor lives, and has not written all results.
@@ -256,7 +262,12 @@ impl Control {
     }
 
     fn order(&self, request: &Request, limit: Option<Duration>) -> Result<(), StageError> {
-        match self.ask(request, limit)? {
+        let answer = self.ask(request, limit)?;
+        self.is_done(answer)
+    }
+
+    fn is_done(&self, answer: Answer) -> Result<(), StageError> {
+        match answer {
             Answer::Done => Ok(()),
             Answer::Refused(reason) => Err(StageError::Refused(reason)),
             answer => Err(self.silent(format!("its answer is {answer:?}"))),

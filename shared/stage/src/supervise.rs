@@ -22,6 +22,7 @@ mod socket;
 mod stall;
 mod start;
 mod swap;
+mod trial;
 mod watchdog;
 
 use std::{
@@ -46,6 +47,7 @@ use recovery::{Recovering, pass_trials, record_recoveries};
 use socket::ControlSocket;
 use start::{Place, Starter};
 use swap::Standby;
+use trial::Trial;
 use watchdog::Watchdog;
 
 pub use child::Death;
@@ -75,6 +77,7 @@ pub fn supervise(
     let mut supervisor = Supervisor::new(plan, signals, observe)?;
     let ending = supervisor.start().and_then(|()| supervisor.watch());
     (supervisor.observe)(Event::Stopping);
+    supervisor.end_trial();
     supervisor.stop_recorder(ending.as_ref().ok().copied())?;
     supervisor.stop()?;
     let ending = ending?;
@@ -108,6 +111,8 @@ struct Supervisor<'a> {
     socket: ControlSocket,
     /// The program that stands by to take the place of another one.
     standby: Option<Standby>,
+    /// Who waits for a program that has taken over to prove itself.
+    trial: Option<Trial>,
     swaps: Vec<Swapped>,
     restarts: BTreeMap<String, usize>,
     /// Followers that are not restarted any more, and why.
@@ -154,6 +159,7 @@ impl<'a> Supervisor<'a> {
             hangs: stall::Looks::new(),
             socket: ControlSocket::open(manifest)?,
             standby: None,
+            trial: None,
             swaps: Vec::new(),
             restarts: BTreeMap::new(),
             given_up: Vec::new(),
@@ -195,6 +201,7 @@ impl<'a> Supervisor<'a> {
             if self.read_poses()? {
                 return self.await_followers();
             }
+            self.continue_trial();
             self.continue_swap()?;
             self.report_readiness();
             self.logs.bound_if_due();

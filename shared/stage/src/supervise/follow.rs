@@ -71,6 +71,9 @@ impl Supervisor<'_> {
     /// and again. The stream has ended, so the death of a stage changes nothing.
     pub(super) fn await_followers(&mut self) -> Result<Ending, SuperviseError> {
         self.is_following = true;
+        // The last pose may have been the first of a program on trial.
+        self.continue_trial();
+        self.end_trial();
         self.end_swap()?;
         let mut clock = Clock::default();
         loop {

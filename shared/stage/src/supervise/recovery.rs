@@ -23,20 +23,31 @@ impl Supervisor<'_> {
     /// Restarts dead stages, or all stages if that alone would not help.
     pub(super) fn recover(&mut self, dead: &[usize]) -> Result<(), SuperviseError> {
         let died_ns = clock::now_ns();
-        self.may_restart(dead)?;
-        let all = dead.iter().any(|i| {
+        let failure = self.may_restart(dead)?;
+        let blamed = failure.map_or_else(Vec::new, |failure| self.blame_trial(dead, &failure));
+        let stages = [dead, &blamed].concat();
+        let all = stages.iter().any(|i| {
             let child = &self.children[*i];
             child.died_without_progress(self.newest_seq()) || child.plan().restarts_all
         });
         match all {
-            true => self.restart(&self.all_but_survivors(dead), died_ns),
-            false => self.restart(dead, died_ns),
+            true => self.restart(&self.all_but_survivors(&stages), died_ns),
+            false => self.restart(&stages, died_ns),
         }
     }
 
-    /// Counts deaths against the restart policies, and waits for the longest backoff.
-    pub(super) fn may_restart(&mut self, dead: &[usize]) -> Result<(), SuperviseError> {
-        let mut backoff = Duration::ZERO;
+    /// Goes back to the programs before those that are on trial while another stage fails: what they sent may be the cause. Returns them.
+    fn blame_trial(&mut self, dead: &[usize], failure: &str) -> Vec<usize> {
+        let is_blamed = |i: &usize| self.children[*i].is_on_trial() && !dead.contains(i);
+        let mut blamed: Vec<usize> = self.all().filter(is_blamed).collect();
+        blamed.retain(|i| self.go_back(*i, failure));
+        blamed
+    }
+
+    /// Counts deaths against the restart policies, and waits for the longest backoff. Returns a sentence about one that was a failure of a
+    /// program which is not on trial.
+    pub(super) fn may_restart(&mut self, dead: &[usize]) -> Result<Option<String>, SuperviseError> {
+        let (mut backoff, mut failure) = (Duration::ZERO, None);
         for i in dead {
             let child = &mut self.children[*i];
             let death = child.death();
@@ -46,11 +57,15 @@ impl Supervisor<'_> {
             });
             if !death.killed {
                 backoff = backoff.max(child.backoff());
+                if !child.is_on_trial() {
+                    failure = Some(format!("{} died after it: {death}", child.name()));
+                }
             }
             self.require_restart(*i, &death)?;
             self.count_restart(*i);
         }
-        self.pause(backoff)
+        self.pause(backoff)?;
+        Ok(failure)
     }
 
     /// Lets time pass. A request to stop, or a process that dies meanwhile, is found afterwards.
@@ -72,7 +87,7 @@ impl Supervisor<'_> {
         child: usize,
         death: &Death,
     ) -> Result<(), SuperviseError> {
-        if self.children[child].is_on_trial() && self.go_back(child, &death.cause) {
+        if self.children[child].is_on_trial() && self.go_back(child, &death.to_string()) {
             return Ok(());
         }
         match self.children[child].may_restart(death) {

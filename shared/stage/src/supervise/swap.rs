@@ -1,7 +1,8 @@
 //! Swaps: another program takes the place of a stage while the run goes on.
 //!
 //! The new program first stands by: it loads what it needs while the one before works. It takes over when no scan is in flight, if
-//! there is such a moment, and a restart of the stage is all that the others see. A program that fails before its first pose, or too
+//! there is such a moment, and a restart of the stage is all that the others see. (Masking in live mode alone knows which scans it has
+//! admitted: if there are some without a pose, the others are restarted with it.) A program that fails before its first pose, or too
 //! often later, is given up, and the one before is started again.
 
 use std::{
@@ -39,7 +40,8 @@ impl Standby {
 }
 
 impl Supervisor<'_> {
-    /// Starts a program that is to take the place of another one. The client has its answer when that is done.
+    /// Starts a program that is to take the place of another one. The client has its answer when that has done so, and has worked on a
+    /// first pose.
     pub(super) fn begin_swap(&mut self, swap: Swap, client: Client) -> Result<(), SuperviseError> {
         let Some(child) = self.named(&swap.process) else {
             self.refuse_unknown(&swap.process, client);
@@ -47,8 +49,8 @@ impl Supervisor<'_> {
         };
         let busy = match () {
             () if self.is_following => Some(ENDED),
-            () if self.standby.is_some() => {
-                Some("another program stands by: wait until it has taken over")
+            () if self.standby.is_some() || self.trial.is_some() => {
+                Some("another program is taking over: wait until its first pose")
             }
             () => None,
         };
@@ -58,9 +60,7 @@ impl Supervisor<'_> {
         }
         let plan = self.plan_of(child, &swap);
         if swap.cold {
-            let answer = self.swap_cold(child, plan)?;
-            client.answer(&answer);
-            return Ok(());
+            return self.swap_cold(child, plan, client);
         }
         let manifest = &self.plan.manifest;
         let _ = fs::remove_file(run::ready_file(&manifest.root, &plan.name));
@@ -84,22 +84,30 @@ impl Supervisor<'_> {
     }
 
     /// Ends a process, and starts another program in its place. If that cannot be started, the one before is started again.
-    fn swap_cold(&mut self, child: usize, plan: StagePlan) -> Result<Answer, SuperviseError> {
+    fn swap_cold(
+        &mut self,
+        child: usize,
+        plan: StagePlan,
+        client: Client,
+    ) -> Result<(), SuperviseError> {
         let stages = self.restarted_with(child);
         if let Some(reason) = self.why_others_stay(child, &stages) {
-            return Ok(Answer::Refused(reason));
+            client.answer(&Answer::Refused(reason));
+            return Ok(());
         }
         self.children[child].change(plan);
         self.restart_and_count(&stages)?;
         if self.children[child].is_on_trial() {
             self.has_swapped(child);
-            return Ok(Answer::Done);
+            self.await_trial(child, client);
+            return Ok(());
         }
         let name = self.children[child].name();
         let reason = self.children[child].last_death().unwrap_or_default();
-        Ok(Answer::Refused(format!(
+        client.answer(&Answer::Refused(format!(
             "{name} goes on as before: {reason}"
-        )))
+        )));
+        Ok(())
     }
 
     /// Returns why the processes that are restarted together with `child` could not be.
@@ -192,11 +200,23 @@ impl Supervisor<'_> {
             ..
         } = standby;
         let _ = fs::remove_file(run::ready_file(&self.plan.manifest.root, process.name()));
+        let stages = match self.ends_between_scans(child)? {
+            true => vec![child],
+            false => stages,
+        };
         self.replace(&stages, clock::now_ns(), Some((child, process)))?;
         self.watchdog.restarted();
         self.has_swapped(child);
-        client.answer(&Answer::Done);
+        self.await_trial(child, client);
         Ok(())
+    }
+
+    /// Ends a process; returns whether it has left no scan without a pose. Then the one after it numbers scans as it would have, and no
+    /// other process need be restarted with it.
+    fn ends_between_scans(&mut self, child: usize) -> Result<bool, SuperviseError> {
+        self.children[child].kill();
+        self.children[child].await_end()?;
+        Ok(!self.has_scans_in_flight())
     }
 
     fn has_swapped(&mut self, child: usize) {
@@ -214,8 +234,10 @@ impl Supervisor<'_> {
 
     /// Goes back to the program before a swap, from the next start on; false if there was none.
     pub(super) fn go_back(&mut self, child: usize, reason: &str) -> bool {
+        let failed = self.children[child].plan().command.join(" ");
         let has_gone_back = self.children[child].go_back(&self.plan.stages[child]);
         if has_gone_back {
+            self.fail_trial(child, &failed, reason);
             let plan = self.children[child].plan();
             self.swaps.push(Swapped {
                 stage: plan.name.clone(),
