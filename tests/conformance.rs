@@ -208,6 +208,14 @@ fn items_without_stamps_or_identity_are_named() {
 }
 
 #[test]
+fn work_that_is_not_in_the_stamps_does_not_pass_a_budget() {
+    let report = broken("rotation-search", "hides its work", &["--budget-ms", "100"]);
+    let why = why(&report, "keeps-budget");
+    assert!(why.contains("by our clock"), "{why}");
+    assert!(!why.contains("by its own stamps"), "{why}");
+}
+
+#[test]
 fn a_field_that_breaks_its_rule_is_named() {
     let named = (
         "sends-valid",

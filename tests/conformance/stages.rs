@@ -21,6 +21,8 @@ const REST: Duration = Duration::from_millis(2);
 const ENOUGH: u64 = 3;
 /// The work of one that is slow.
 const SLOW: Duration = Duration::from_millis(300);
+/// The work of one that does not stamp it.
+const HIDDEN: Duration = Duration::from_millis(120);
 /// Messages for each item of one that sends too many.
 const FLOOD: usize = 500;
 
@@ -172,9 +174,14 @@ impl Broken<'_> {
         if self.does("skips") && item.seq == WRONG {
             return Ok(());
         }
-        let now_ns = clock::now_ns();
+        let mut now_ns = clock::now_ns();
+        let mut received_ns = received_ns;
         if self.does("is slow") {
             thread::sleep(SLOW);
+        }
+        if self.does("hides its work") {
+            thread::sleep(HIDDEN);
+            (received_ns, now_ns) = (clock::now_ns(), clock::now_ns());
         }
         let mut item = Item {
             pid: std::process::id(),
@@ -212,7 +219,7 @@ impl Broken<'_> {
         if self.does("is not deterministic") {
             header.rotation.score = clock::now_ns() as f64;
         }
-        if self.does("sends NaN") && item.seq == WRONG {
+        if (self.does("sends NaN") && item.seq == WRONG) || self.does("sends only NaN") {
             header.rotation.angle_rad = f64::NAN;
         }
         Ok(Recorded::of::<Rotation>(&header, &[], 0))

@@ -7,15 +7,16 @@ mod restart;
 mod standing_by;
 mod steps;
 mod stream;
+mod timing;
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, time::Duration};
 
 use gyre_messages::{StageId, flag};
 use gyre_stage::{supervise::rig::Recorded, wake::Signals};
 
 use crate::{
     ConformanceError,
-    content::{deviation, essence},
+    content::{deviation, essence, work_ns},
     report::{Judged, Report, Work},
     rule::{Findings, Rule},
     session::{Session, Waited},
@@ -78,11 +79,18 @@ impl<'a> Examination<'a> {
             self.standing_by()?;
             self.refusals()?;
         }
+        let answers = match self.subject.demands.budget.is_some() && has_streamed {
+            true => {
+                (self.observe)("the time of its answers");
+                self.timing()?
+            }
+            false => None,
+        };
         let own_work = match self.is_own() || !has_streamed {
             true => None,
             false => self.own_work()?,
         };
-        self.report(own_work)
+        self.report(answers, own_work)
     }
 
     fn is_own(&self) -> bool {
@@ -123,7 +131,7 @@ impl<'a> Examination<'a> {
         session.start(&self.subject.own(stage))?;
         let (patience, end) = (self.subject.demands.patience, self.tape.end());
         match session.wait(patience, |session| session.newest() >= Some(end))? {
-            Waited::Done => Ok(Work::of(stage, worked_on(&session.outputs))),
+            Waited::Done => Ok(Work::of(work_on(stage, &session.outputs))),
             other => Err(ConformanceError::Own {
                 stage: stage.name(),
                 reason: how(&other),
@@ -131,21 +139,20 @@ impl<'a> Examination<'a> {
         }
     }
 
-    fn report(mut self, own_work: Option<Work>) -> Result<Report, ConformanceError> {
+    fn report(
+        mut self,
+        answers: Option<Work>,
+        own_work: Option<Work>,
+    ) -> Result<Report, ConformanceError> {
         let (subject, topic) = (self.subject, self.subject.ports().output);
-        let work = Work::of(subject.stage, worked_on(&self.outputs));
+        let work = Work::of(work_on(subject.stage, &self.outputs));
         let own = self.tape.topic(topic);
         if subject.demands.same_as_own && !self.outputs.is_empty() {
             self.compare_with_own(topic, own)?;
         }
-        if let (Some(budget), Some(work)) = (subject.demands.budget, work) {
-            let budget_ms = budget.as_secs_f64() * 1e3;
-            let (ms, figure) = work.judged();
-            self.findings
-                .require(Rule::KeepsBudget, ms <= budget_ms, || {
-                    let items = work.items;
-                    format!("the {figure} of {items} items is {ms:.2} ms, and {budget_ms} ms are allowed")
-                });
+        if let Some(budget) = subject.demands.budget {
+            self.judge_times("by its own stamps", work, budget);
+            self.judge_times("by our clock, until its answer,", answers, budget);
         }
         let deviation = match self.outputs.is_empty() {
             true => None,
@@ -163,9 +170,21 @@ impl<'a> Examination<'a> {
             scans: self.tape.end() as usize,
             rules: self.findings.verdicts().into_iter().map(judged).collect(),
             work,
+            answers,
             own_work,
             deviation,
         })
+    }
+
+    fn judge_times(&mut self, clock: &str, times: Option<Work>, budget: Duration) {
+        let Some(times) = times else {
+            return;
+        };
+        let budget_ms = budget.as_secs_f64() * 1e3;
+        let ((ms, figure), items) = (times.judged(), times.items);
+        self.findings.require(Rule::KeepsBudget, ms <= budget_ms, || {
+            format!("{clock} the {figure} of {items} items is {ms:.2} ms, and {budget_ms} ms are allowed")
+        });
     }
 
     fn compare_with_own(&mut self, topic: &str, own: &[Recorded]) -> Result<(), ConformanceError> {
@@ -180,10 +199,11 @@ impl<'a> Examination<'a> {
     }
 }
 
-/// The items that a stage has worked on, each once.
-fn worked_on(outputs: &[Recorded]) -> impl Iterator<Item = &Recorded> {
-    let outputs = outputs.iter();
-    outputs.filter(|it| !it.item().is(flag::END) && !it.item().is(flag::BASE))
+/// The times of a stage's work on items as it stamps them, ns.
+fn work_on(stage: StageId, outputs: &[Recorded]) -> impl Iterator<Item = i64> {
+    let is_worked_on = |it: &&Recorded| !it.item().is(flag::END) && !it.item().is(flag::BASE);
+    let outputs = outputs.iter().filter(is_worked_on);
+    outputs.map(move |it| work_ns(stage, it))
 }
 
 /// Notes each item whose bytes are not those of the first scenario.

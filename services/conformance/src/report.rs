@@ -3,14 +3,9 @@
 use std::fmt;
 
 use gyre_latency::Durations;
-use gyre_messages::StageId;
-use gyre_stage::supervise::rig::Recorded;
 use serde::Serialize;
 
-use crate::{
-    content::work_ns,
-    rule::{Rule, Verdict},
-};
+use crate::rule::{Rule, Verdict};
 
 /// What was found out about a program.
 #[derive(Clone, Debug, Serialize)]
@@ -23,8 +18,10 @@ pub struct Report {
     pub scans: usize,
     /// The verdicts, in the order of the contract.
     pub rules: Vec<Judged>,
-    /// The time of its work on an item, with the window full.
+    /// The time of its work on an item by its own stamps, with the window full.
     pub work: Option<Work>,
+    /// The time from sending it an item to reading its answer, one item at a time; `None` unless there is a budget.
+    pub answers: Option<Work>,
     /// That of Gyre's own stage on the same inputs, directly after.
     pub own_work: Option<Work>,
     /// How far its results are from those of Gyre's own stage.
@@ -50,7 +47,7 @@ const WARM_UP: usize = 4;
 /// Items from which on there is a 99th percentile.
 const PERCENTILE_ITEMS: u64 = 100;
 
-/// Times of work on an item, from `started_ns` to `finished_ns`, without the first four items.
+/// Times of work on an item, without the first four items.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Work {
     /// The items.
@@ -64,15 +61,10 @@ pub struct Work {
 }
 
 impl Work {
-    /// The times of a stage's messages; `None` without one.
-    pub(crate) fn of<'a>(
-        stage: StageId,
-        messages: impl Iterator<Item = &'a Recorded>,
-    ) -> Option<Self> {
+    /// The figures of these times, ns, in the order of the items; `None` without one.
+    pub(crate) fn of(times_ns: impl Iterator<Item = i64>) -> Option<Self> {
         let mut times = Durations::default();
-        messages
-            .skip(WARM_UP)
-            .for_each(|message| times.add(work_ns(stage, message)));
+        times_ns.skip(WARM_UP).for_each(|ns| times.add(ns));
         let at = |share| times.at(share).map(|ns| ns as f64 * 1e-6);
         Some(Self {
             items: times.count(),
@@ -151,6 +143,9 @@ impl fmt::Display for Report {
         if let Some(work) = &self.work {
             writeln!(f, "work on an item  {work}")?;
         }
+        if let Some(answers) = &self.answers {
+            writeln!(f, "until the answer {answers}")?;
+        }
         if let Some(own) = &self.own_work {
             writeln!(f, "our own stage    {own}")?;
             if let Some(work) = &self.work {
@@ -171,24 +166,10 @@ impl fmt::Display for Report {
 
 #[cfg(test)]
 mod tests {
-    use gyre_messages::{Item, Rotation, RotationHeader};
-
     use super::*;
 
-    /// An item whose work has taken so long.
-    fn worked(ms: i64) -> Recorded {
-        let mut item = Item::default();
-        item.hop_mut(StageId::RotationSearch).finished_ns = ms * 1_000_000;
-        let header = RotationHeader {
-            item,
-            ..RotationHeader::default()
-        };
-        Recorded::of::<Rotation>(&header, &[], 0)
-    }
-
     fn of(times_ms: &[i64]) -> Option<Work> {
-        let messages: Vec<_> = times_ms.iter().map(|ms| worked(*ms)).collect();
-        Work::of(StageId::RotationSearch, messages.iter())
+        Work::of(times_ms.iter().map(|ms| ms * 1_000_000))
     }
 
     fn near(a: f64, b: f64) -> bool {
@@ -226,6 +207,7 @@ mod tests {
                 verdict,
             }],
             work: None,
+            answers: None,
             own_work: None,
             deviation: None,
         };

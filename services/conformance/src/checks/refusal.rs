@@ -1,6 +1,9 @@
 //! Inputs that break the contract: the program ends with exit code 3 and a sentence, and sends nothing about them.
 
-use gyre_stage::{StageError, supervise::rig::Rig};
+use gyre_stage::{
+    StageError,
+    supervise::{Death, rig::Rig},
+};
 
 use super::{Examination, stream::starts};
 use crate::{
@@ -68,26 +71,30 @@ impl Examination<'_> {
         session.feed(topic, message)?;
         let ending = session.ended_within(self.subject.demands.patience)?;
         let is_sent = way == Way::Forward && session.about(WRONG).next().is_some();
-        let code = i32::from(StageError::TRANSIENT);
-        let findings = &mut *session.findings;
-        findings.require(Rule::RefusesMalformed, !is_sent, || {
-            format!("it sent item {WRONG}, although its input on `{topic}` had {what}")
-        });
-        match ending {
-            None => findings.broken(
-                Rule::RefusesMalformed,
-                format!("it goes on after an item on `{topic}` with {what}"),
-            ),
-            Some(death) if death.code != Some(code) => findings.broken(
-                Rule::RefusesMalformed,
-                format!("an item on `{topic}` with {what}: {death}, and the code has to be {code}"),
-            ),
-            Some(death) if death.last_output.is_none() => findings.broken(
-                Rule::RefusesMalformed,
-                format!("an item on `{topic}` with {what}: it says nothing on standard error"),
-            ),
-            Some(_) => {}
+        session
+            .findings
+            .require(Rule::RefusesMalformed, !is_sent, || {
+                format!("it sent item {WRONG}, although its input on `{topic}` had {what}")
+            });
+        if let Some(breach) = breach(ending, topic, what) {
+            session.findings.broken(Rule::RefusesMalformed, breach);
         }
         Ok(())
+    }
+}
+
+/// Says what is wrong with the end of a program after a malformed item; `None` if nothing is.
+fn breach(ending: Option<Death>, topic: &str, what: &str) -> Option<String> {
+    let code = i32::from(StageError::TRANSIENT);
+    let item = format!("an item on `{topic}` with {what}");
+    match ending {
+        None => Some(format!("it goes on after {item}")),
+        Some(death) if death.code != Some(code) => {
+            Some(format!("{item}: {death}, and the code has to be {code}"))
+        }
+        Some(death) if death.last_output.is_none() => {
+            Some(format!("{item}: it says nothing on standard error"))
+        }
+        Some(_) => None,
     }
 }
