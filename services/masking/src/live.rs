@@ -1,5 +1,8 @@
 //! Live mode: only the newest scan is processed. Admitted scans get consecutive sequence numbers, so no later stage sees a gap;
 //! the gaps in the source's own count are the dropped scans.
+//!
+//! After a start the first scans are processed in order, as many as the window has room for: so a restart that is shorter than that
+//! drops none of those that came meanwhile.
 
 use std::collections::VecDeque;
 
@@ -20,6 +23,8 @@ pub struct NewestOnly {
     previous: Option<Received<Scan>>,
     window: Window,
     chain: Option<Chain>,
+    /// Scans that may still wait their turn after a start; 0: the newest scan alone.
+    in_order: usize,
 }
 
 /// The state of the sequence numbers.
@@ -44,6 +49,7 @@ impl NewestOnly {
             previous: None,
             window,
             chain: None,
+            in_order: window.scans,
         })
     }
 
@@ -58,7 +64,7 @@ impl NewestOnly {
             }
             self.queue.push_back(received);
             if self.chain.is_some_and(|chain| !chain.repeats) {
-                self.drop_all_but_the_newest();
+                self.drop_the_oldest();
             }
         }
         Ok(())
@@ -76,7 +82,7 @@ impl NewestOnly {
         };
         self.chain = Some(chain);
         if !chain.repeats {
-            self.drop_all_but_the_newest();
+            self.drop_the_oldest();
         }
         let Some(front) = self.queue.front() else {
             return Ok(Action::Wait);
@@ -109,8 +115,11 @@ impl NewestOnly {
         Some(Chain::resume(self.queue.front()?.item(), newest_pose))
     }
 
-    fn drop_all_but_the_newest(&mut self) {
-        while self.queue.len() > 1 && !self.queue[1].item().is(flag::END) {
+    /// Drops all but the newest scan; after a start, all but as many as may wait.
+    fn drop_the_oldest(&mut self) {
+        let is_end = |last: &Received<Scan>| last.item().is(flag::END);
+        let end = usize::from(self.queue.back().is_some_and(is_end));
+        while self.queue.len() > self.in_order.max(1) + end {
             self.queue.pop_front();
         }
     }
@@ -122,6 +131,9 @@ impl NewestOnly {
             let (scan, published) = (done.item().scan, done.item().published);
             let stamp_ns = done.item().stamp_ns;
             let next = chain.next.saturating_add(1);
+            // One that is repeated has its pose already.
+            let is_new = usize::from(!chain.repeats);
+            self.in_order = self.in_order.saturating_sub(is_new);
             *chain = Chain {
                 next,
                 previous_scan: Some(scan),
