@@ -201,16 +201,10 @@ fn it_takes_over_in_a_running_pipeline_at_ten_scans_a_second_and_gives_way_again
     // Four scans a second, two and a half times as fast.
     let run = Run::of_recording().rate("2.5");
     let mut running = run.start();
-    let swap = |command: &[&str]| {
-        let mut swap = gyre();
-        swap.args(["swap", "masking", "--out"]).arg(run.out());
-        swap.args(command);
-        Ended::of(swap).succeeded();
-    };
     running.await_poses(4);
-    swap(&["--command", &command().join(" ")]);
+    swap_masking(&run, &["--command", &command().join(" ")]);
     running.await_poses(12);
-    swap(&[]);
+    swap_masking(&run, &[]);
     running.finish().succeeded();
     let summary = run.summary();
     assert_eq!(
@@ -222,6 +216,52 @@ fn it_takes_over_in_a_running_pipeline_at_ten_scans_a_second_and_gives_way_again
         let apart_m = (own[0] - mixed[0]).hypot(own[1] - mixed[1]);
         assert!(apart_m < 0.01, "{apart_m} m");
     }
+}
+
+#[test]
+fn it_takes_over_in_a_live_run_and_gives_way_again_and_every_scan_is_accounted_for() {
+    if !can_start() {
+        return;
+    }
+    let run = Run::of_recording().rate("1").set("run.mode=live");
+    let mut running = run.start();
+    running.await_poses(4);
+    // Each returns after the first pose of the program that has taken over.
+    swap_masking(&run, &["--command", &command().join(" ")]);
+    swap_masking(&run, &[]);
+    swap_masking(&run, &["--command", &command().join(" ")]);
+    running.finish().succeeded();
+    let summary = run.summary();
+    let count = |key: &str| summary[key].as_u64().unwrap();
+    assert_eq!(count("published"), recording::SCANS as u64);
+    assert_eq!(count("processed") + count("dropped"), count("published"));
+    assert_eq!(count("breaks"), 0, "the chain goes on");
+    assert_eq!(summary["swaps"].as_array().unwrap().len(), 3);
+}
+
+#[test]
+fn a_run_that_it_cannot_serve_is_refused_before_the_stage_gives_way() {
+    if !can_start() {
+        return;
+    }
+    let run = Run::of_recording()
+        .rate("2")
+        .set("masking.undo_doppler=true");
+    let mut running = run.start();
+    let own = running.await_poses(2).await_stage("masking");
+    let mut swap = gyre();
+    swap.args(["swap", "masking", "--out"]).arg(run.out());
+    swap.args(["--command", &command().join(" ")]);
+    Ended::of(swap).refused_with(&["cannot take over", "set masking.undo_doppler to false"]);
+    assert_eq!(running.await_stage("masking"), own);
+    running.finish().succeeded();
+}
+
+fn swap_masking(run: &Run, command: &[&str]) {
+    let mut swap = gyre();
+    swap.args(["swap", "masking", "--out"]).arg(run.out());
+    swap.args(command);
+    Ended::of(swap).succeeded();
 }
 
 /// The process of the script, which is a child of the supervisor.

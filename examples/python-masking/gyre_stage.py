@@ -7,6 +7,7 @@ import ctypes
 import json
 import math
 import os
+import select
 import signal
 import socket
 import sys
@@ -76,10 +77,7 @@ class Run:
         root = os.environ.get("GYRE_RUN")
         if root is None:
             raise Unsupported("this is one process of a run, and GYRE_RUN is not set: start the run with `gyre run`")
-        if os.environ.get("GYRE_STANDBY"):
-            # Everything is loaded; the place is free when the program before has ended.
-            Path(root, f"{name}.ready").touch()
-            sys.stdin.buffer.read()
+        self._ready = Path(root, f"{name}.ready")
         self.manifest = json.loads(Path(root, "manifest.json").read_text())
         self.configuration = tomllib.loads(Path(root, "config.toml").read_text())
         self.signals = Signals()
@@ -93,6 +91,19 @@ class Run:
             .signal_handling_mode(iox2.SignalHandlingMode.Disabled)
             .create(iox2.ServiceType.Ipc)
         )
+
+    def take_place(self) -> bool:
+        """Call it when everything is loaded and the configuration is accepted, and before topics are opened. A process that is to take
+        the place of another one waits here until that has ended. Returns False on SIGTERM."""
+        if not os.environ.get("GYRE_STANDBY"):
+            return True
+        self._ready.touch()
+        while not self.signals.stopped:
+            readable, _, _ = select.select([sys.stdin, self.signals.wake], [], [])
+            if sys.stdin in readable and not os.read(sys.stdin.fileno(), 64):
+                return True
+            self.signals.drain()
+        return False
 
     def topic(self, name: str, header: type, element: type):
         """Opens a topic. It is never created here: the supervisor has given it the sizes of the window."""

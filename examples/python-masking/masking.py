@@ -28,6 +28,7 @@ from gyre_stage import (
     main,
     now_ns,
 )
+from live import NewestScans
 from messages import (
     BASE,
     BREAK,
@@ -258,7 +259,8 @@ class Motions:
         self.poses = Port(run, "pose", PoseHeader, FloatBlock, checked(check_pose))
         self._known: dict[int, Optional[Twist]] = {}
         self.newest_pose: Optional[int] = None
-        self.may_start = False
+        # The item of the newest pose as its stage marks it: from then on it is known where the stream goes on.
+        self.resume_at: Optional[Item] = None
 
     def update(self) -> None:
         """Receives new motions and poses. A motion comes twice, and both are equal."""
@@ -270,8 +272,8 @@ class Motions:
             if not item.flags & (END | BASE):
                 self._note(received)
                 self.newest_pose = max(item.seq, self.newest_pose if self.newest_pose is not None else item.seq)
-            # After a restart the last poses come again, and the newest of them is marked: where the stream goes on is known now.
-            self.may_start |= bool(item.flags & SYNC)
+            if item.flags & SYNC:
+                self.resume_at = item
             received.release()
 
     def _note(self, received: Received) -> None:
@@ -295,14 +297,12 @@ class Motions:
 
 
 class Masking:
-    """The stage: takes scans in order, each with its motion, and publishes their masks."""
+    """The stage: takes scans, each with its motion, and publishes their masks."""
 
     def __init__(self, run: Run) -> None:
         manifest, configuration = run.manifest, run.configuration
         self.window, limits = manifest["window"], manifest["limits"]
         self.masking = configuration["masking"]
-        if manifest["live"]:
-            raise Unsupported("this stage processes every scan: set run.mode to `lossless`")
         if limits["rasters"] != 1:
             raise Unsupported("this stage masks one scan at a time: choose a masking.model of one scan, or masking.kind `threshold`")
         if self.masking["undo_doppler"]:
@@ -310,8 +310,14 @@ class Masking:
         self.floor = 0 if self.masking["kind"] == "none" else self.masking["threshold"]
         self.rasteriser = Rasteriser(configuration["raster"])
         self.points = PointExtractor(configuration["points"])
+        self.signals = run.signals
+        self.started = self.ended = False
+        self.has_place = run.take_place()
+        if not self.has_place:
+            return
         self.motions = Motions(run)
-        self.scans = Reader(run, "scan", ScanHeader, ByteBlock, check_scan)
+        live = manifest["live"]
+        self.scans = NewestScans(run, self.motions) if live else Reader(run, "scan", ScanHeader, ByteBlock, check_scan)
         cells = -(-limits["raster_cells"] // 16)
         elements = cells + -(-limits["points"] * POINT_FLOATS * 4 // 64)
         # As many messages as subscribers can hold at once; iceoryx2 would reserve a queue of its own for each of them.
@@ -321,11 +327,11 @@ class Masking:
         self.first_point = cells * 16
         self.writer = Writer(run, "masked", MaskedHeader, FloatBlock, elements, samples)
         self.waiter = Waiter(run, [self.scans, self.motions.motions, self.motions.poses], self.writer)
-        self.signals = run.signals
-        self.started = self.ended = False
 
     def run(self) -> None:
         """Works until SIGTERM."""
+        if not self.has_place:
+            return
         self.drain()
         while self.waiter.wait():
             self.drain()
@@ -334,8 +340,7 @@ class Masking:
         """Processes what is there, as far as its motions are known."""
         while not self.ended and not self.signals.stopped:
             self.motions.update()
-            scan = self.scans.head()
-            if scan is None or not self.motions.may_start:
+            if self.motions.resume_at is None or (scan := self.scans.head()) is None:
                 return
             item = scan.item
             if item.flags & END:

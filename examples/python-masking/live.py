@@ -1,0 +1,98 @@
+"""The scans of a run in live mode: the newest one wins where masking takes its next.
+
+Masking numbers the scans that it takes one after the other, so no later stage sees a gap; the gaps in the source's own count,
+`published`, are the dropped scans.
+"""
+
+from collections import deque
+from typing import Optional
+
+from gyre_stage import Port, Received, Run, check_scan
+from messages import BASE, BREAK, END, ByteBlock, Item, ScanHeader
+
+# A chain of motions breaks where the time from scan to scan is longer.
+MAX_INTERVAL_NS = 10_000_000_000
+
+
+class NewestScans(Port):
+    """The queue of scans in live mode. After a start the first ones are taken in order, as many as the window has room for: so a
+    restart or a swap that is shorter than that drops none of those that came meanwhile."""
+
+    def __init__(self, run: Run, motions) -> None:
+        super().__init__(run, "scan", ScanHeader, ByteBlock, check_scan)
+        self._window, self._motions = run.manifest["window"]["scans"], motions
+        self._queue: deque[Received] = deque()
+        self._in_order = self._window
+        self._next: Optional[int] = None
+        # The scan before, and its time; the time is unknown after a restart. None where the chain starts.
+        self._previous: Optional[tuple[int, Optional[int]]] = None
+        self._passed: Optional[int] = None
+        # Whether the current scan has its pose already: the other stages may need its mask as their previous one.
+        self._repeats = False
+
+    def head(self) -> Optional[Received]:
+        """Returns the scan to process next, numbered; None while there is none, or the window is full."""
+        while (received := self.receive()) is not None:
+            self._queue.append(received)
+            # A restarted source sends scans again.
+            item = received.item
+            if self._passed is not None and not item.flags & END and item.published <= self._passed:
+                self._queue.pop().release()
+            self._drop_the_oldest()
+        if self._next is None:
+            self._resume()
+            self._drop_the_oldest()
+        if self._next is None or not self._queue:
+            return None
+        newest = self._motions.newest_pose
+        is_admitted = self._next < self._window if newest is None else self._next <= newest + self._window
+        if not is_admitted:
+            return None
+        self._number(self._queue[0].item)
+        return self._queue[0]
+
+    def advance(self) -> None:
+        """Releases the current scan."""
+        item = self._queue[0].item
+        self._previous, self._passed = (item.scan, item.stamp_ns), item.published
+        self._next += 1
+        if not self._repeats:
+            self._in_order = max(0, self._in_order - 1)
+        self._repeats = False
+        self._queue.popleft().release()
+
+    def _drop_the_oldest(self) -> None:
+        if self._next is None or self._repeats or not self._queue:
+            return
+        end = 1 if self._queue[-1].item.flags & END else 0
+        while len(self._queue) > max(1, self._in_order) + end:
+            self._queue.popleft().release()
+
+    def _resume(self) -> None:
+        """Goes on after the newest pose: with its scan again if the source still has it, else with a new chain."""
+        pose: Item = self._motions.resume_at
+        from_start = bool(pose.flags & BASE)
+        while self._queue and not from_start and not self._queue[0].item.flags & END:
+            if self._queue[0].item.published >= pose.published:
+                break
+            self._queue.popleft().release()
+        if not self._queue:
+            return
+        front = self._queue[0].item
+        if from_start:
+            self._next = 0
+        elif front.published == pose.published and not front.flags & END:
+            self._next, self._previous, self._repeats = pose.seq, (pose.previous_scan, None), True
+        else:
+            self._next = pose.seq + 1
+
+    def _number(self, item: Item) -> None:
+        """Writes the numbers of the chain into the header of a scan, which is a copy."""
+        item.seq = self._next
+        is_end = item.flags & END
+        previous = self._previous
+        if previous is not None and previous[1] is not None and not is_end:
+            if not 1 <= item.stamp_ns - previous[1] <= MAX_INTERVAL_NS:
+                previous = None
+        item.previous_scan = item.scan if previous is None else previous[0]
+        item.flags = is_end | (BREAK if previous is None else 0)
