@@ -127,7 +127,7 @@ fn constants(format: Format) -> Result<DatasetOptions, ConfigurationError> {
         }
         Format::Radiate => include_str!("../../../configs/radiate.toml"),
         Format::Fomo => include_str!("../../../configs/fomo.toml"),
-        Format::Oord | Format::Mcap => "",
+        Format::Oord | Format::Mcap | Format::Other => "",
     };
     let parsed: Result<Table, _> = text.parse();
     let mut table =

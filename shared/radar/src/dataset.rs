@@ -82,16 +82,22 @@ pub trait Dataset: Send {
     fn period_ns(&self) -> i64;
 
     /// Time logged for a scan (in the file name or the list of stamps), ns since 1970.
-    fn logged_stamp_ns(&self, index: usize) -> Option<i64>;
+    fn logged_stamp_ns(&self, index: usize) -> Option<i64> {
+        self.nominal_stamp_ns(index)
+    }
 
     /// The definition of the stamps, and how the middle of the sweep is obtained: one sentence.
     fn stamp_meaning(&self) -> &'static str;
 
     /// Encoder counts per turn, if azimuths come from an encoder.
-    fn encoder_counts(&self) -> Option<u16>;
+    fn encoder_counts(&self) -> Option<u16> {
+        None
+    }
 
     /// Observations of the reader when it opened the dataset, and how it handles them: whole sentences.
-    fn notes(&self) -> &[String];
+    fn notes(&self) -> &[String] {
+        &[]
+    }
 
     /// Decodes a scan into `slot`, whose slices are at least as long as [`Dataset::limits`].
     ///
@@ -173,6 +179,12 @@ fn open_found(
             let path = found.folder.display();
             return Err(OpenError::Recording(format!(
                 "{path} is a folder of images, and the format `mcap` is that of a recording of a run, a file"
+            )));
+        }
+        Format::Other => {
+            let path = found.folder.display();
+            return Err(OpenError::Recording(format!(
+                "{path} is in a format that only the program which wrote it reads"
             )));
         }
     })

@@ -77,7 +77,8 @@ impl OutputFormat {
             | Format::Mulran
             | Format::MulranOxfordForm
             | Format::Fomo
-            | Format::Mcap => None,
+            | Format::Mcap
+            | Format::Other => None,
         }
     }
 }

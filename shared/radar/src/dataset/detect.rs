@@ -263,7 +263,9 @@ fn score(format: Format, image: &FirstImage, boreas_folders: bool) -> i32 {
         Format::BoreasRt => (&[6848], NamedBy::Middle, true),
         Format::Fomo => (&[6848], NamedBy::Start, false),
         Format::MulranOxfordForm => (&[3360], NamedBy::End, false),
-        Format::Oord | Format::Mulran | Format::Radiate | Format::Mcap => return NEVER,
+        Format::Oord | Format::Mulran | Format::Radiate | Format::Mcap | Format::Other => {
+            return NEVER;
+        }
     };
     let boreas = matches!(format, Format::Boreas | Format::BoreasRt);
     let by_name = image

@@ -38,6 +38,9 @@ pub enum Format {
     Fomo,
     /// A recording of a run as MCAP, of `gyre record`.
     Mcap,
+    /// A format that Gyre has no reader for: of a program with a [`Dataset`](super::Dataset) of its own. No configuration names it.
+    #[serde(skip_deserializing)]
+    Other,
 }
 
 impl Format {
@@ -71,6 +74,7 @@ impl Format {
             Self::Radiate => "radiate",
             Self::Fomo => "fomo",
             Self::Mcap => "mcap",
+            Self::Other => "other",
         }
     }
 }
