@@ -4,7 +4,10 @@ use std::path::PathBuf;
 
 use gyre_configuration::{MethodConfig, automatic, strict};
 use gyre_radar::Format;
-use pyo3::{prelude::*, types::PyMapping};
+use pyo3::{
+    prelude::*,
+    types::{PyMapping, PyTuple},
+};
 use toml::Table;
 
 use crate::{errors, values};
@@ -13,7 +16,7 @@ use crate::{errors, values};
 /// `translation`, `exhaustive`, `refinement` and `slam` of a configuration of `gyre run`, with the same keys and defaults.
 ///
 /// `Config()` has the defaults, and `Config({"masking": {"threshold": 70}})` differs from them in one key. Unknown keys and values out
-/// of their bounds raise ConfigError. A key that is None has its default.
+/// of their bounds raise ConfigError. A key that is None has its default. A configuration never changes, and can be pickled.
 #[pyclass(module = "gyre", frozen, eq)]
 pub struct Config {
     method: MethodConfig,
@@ -93,6 +96,12 @@ impl Config {
     /// Returns all settings as a dictionary of sections, which `Config` takes.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         values::dictionary(py, &self.method)
+    }
+
+    /// Returns how `pickle` makes the configuration again, without its note.
+    fn __reduce__<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let settings = this.get().to_dict(this.py())?;
+        (this.get_type(), (settings,)).into_pyobject(this.py())
     }
 
     /// Returns all settings as TOML, which `Config.read` and `gyre run` read.

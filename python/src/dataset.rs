@@ -3,7 +3,7 @@
 use std::{
     path::PathBuf,
     sync::{
-        Arc, Mutex,
+        Arc,
         atomic::{AtomicUsize, Ordering},
     },
 };
@@ -11,9 +11,9 @@ use std::{
 use gyre_configuration::radar_constants;
 use gyre_radar::DatasetOptions;
 use numpy::PyArray1;
-use pyo3::{exceptions::PyIndexError, prelude::*};
+use pyo3::{exceptions::PyIndexError, prelude::*, types::PyTuple};
 
-use crate::{config::Config, errors, lock, scan::Scan};
+use crate::{config::Config, errors, lock::Guarded, scan::Scan};
 
 /// Damaged scans in a row that are skipped: the default of `source.max_unreadable` of a run.
 const MAX_UNREADABLE: usize = 10;
@@ -44,7 +44,8 @@ pub fn open(
         len: dataset.len(),
         first: dataset.first(),
         data,
-        dataset: Arc::new(Mutex::new(dataset)),
+        config: config.map(|config| config.clone().unbind()),
+        dataset: Arc::new(Guarded::new("Dataset", dataset)),
     })
 }
 
@@ -59,13 +60,16 @@ pub fn find_ground_truth(data: PathBuf) -> Option<PathBuf> {
 /// `dataset[i]` decodes scan i, and raises ReadError if it cannot be read. Iteration plays the scans as `gyre run` does: it begins at
 /// `first`, skips damaged scans with a SkippedScanWarning, and raises ReadError after ten of them in a row, or where a file cannot be
 /// read.
+///
+/// A pickled dataset is opened anew where it is unpickled, as in a process of `multiprocessing`.
 #[pyclass(module = "gyre", frozen)]
 pub struct Dataset {
     data: PathBuf,
+    config: Option<Py<Config>>,
     format: &'static str,
     len: usize,
     first: usize,
-    dataset: Arc<Mutex<Box<dyn gyre_radar::Dataset>>>,
+    dataset: Arc<Guarded<Box<dyn gyre_radar::Dataset>>>,
 }
 
 #[pymethods]
@@ -84,8 +88,8 @@ impl Dataset {
 
     /// The files of the scans, in order; of an MCAP recording its parts.
     #[getter]
-    fn files(&self, py: Python<'_>) -> Vec<PathBuf> {
-        lock::with(py, &self.dataset, |dataset| {
+    fn files(&self, py: Python<'_>) -> PyResult<Vec<PathBuf>> {
+        self.dataset.with(py, |dataset| {
             let files = dataset.files();
             let paths = (0..files.len()).filter_map(|index| files.get(index));
             paths.map(ToOwned::to_owned).collect()
@@ -94,24 +98,24 @@ impl Dataset {
 
     /// The time of each scan as far as it is known without decoding it, int64 (scans,), ns; -1 where it is not.
     #[getter]
-    fn stamp_ns<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-        let stamps: Vec<i64> = lock::with(py, &self.dataset, |dataset| {
+    fn stamp_ns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<i64>>> {
+        let stamps = self.dataset.with(py, |dataset| {
             let stamp = |index| dataset.nominal_stamp_ns(index).unwrap_or(-1);
             (0..dataset.len()).map(stamp).collect()
-        });
-        PyArray1::from_vec(py, stamps)
+        })?;
+        Ok(PyArray1::from_vec(py, stamps))
     }
 
     /// The median time between two scans, ns.
     #[getter]
-    fn period_ns(&self, py: Python<'_>) -> i64 {
-        lock::with(py, &self.dataset, |dataset| dataset.period_ns())
+    fn period_ns(&self, py: Python<'_>) -> PyResult<i64> {
+        self.dataset.with(py, |dataset| dataset.period_ns())
     }
 
     /// Observations of the reader: whole sentences.
     #[getter]
-    fn notes(&self, py: Python<'_>) -> Vec<String> {
-        lock::with(py, &self.dataset, |dataset| dataset.notes().to_vec())
+    fn notes(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        self.dataset.with(py, |dataset| dataset.notes().to_vec())
     }
 
     fn __len__(&self) -> usize {
@@ -131,11 +135,25 @@ impl Dataset {
     }
 
     fn __iter__(&self) -> Scans {
+        self.scans(None, None)
+    }
+
+    /// Iterates over `count` scans from number `first` on, as iteration over the dataset does over all: by default it begins at the
+    /// first scan that can be read, and ends with the last one.
+    #[pyo3(signature = (first=None, count=None))]
+    fn scans(&self, first: Option<usize>, count: Option<usize>) -> Scans {
+        let first = first.unwrap_or(self.first);
         Scans {
             dataset: self.dataset.clone(),
-            next: AtomicUsize::new(self.first),
-            len: self.len,
+            next: AtomicUsize::new(first.min(self.len)),
+            end: count.map_or(self.len, |count| first.saturating_add(count).min(self.len)),
         }
+    }
+
+    /// Returns how `pickle` opens the dataset again.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let open = py.import("gyre")?.getattr("open")?;
+        (open, (&self.data, &self.config)).into_pyobject(py)
     }
 
     fn __repr__(&self) -> String {
@@ -147,9 +165,9 @@ impl Dataset {
 /// An iteration over a dataset.
 #[pyclass(module = "gyre", frozen)]
 pub struct Scans {
-    dataset: Arc<Mutex<Box<dyn gyre_radar::Dataset>>>,
+    dataset: Arc<Guarded<Box<dyn gyre_radar::Dataset>>>,
     next: AtomicUsize,
-    len: usize,
+    end: usize,
 }
 
 #[pymethods]
@@ -162,8 +180,8 @@ impl Scans {
         let mut skipped = 0;
         loop {
             let index = self.next.fetch_add(1, Ordering::Relaxed);
-            if index >= self.len {
-                self.next.store(self.len, Ordering::Relaxed);
+            if index >= self.end {
+                self.next.store(self.end, Ordering::Relaxed);
                 return Ok(None);
             }
             match Scan::read(py, &self.dataset, index)? {

@@ -1,7 +1,5 @@
 //! Masks.
 
-use std::sync::Mutex;
-
 use gyre_geometry::{SparsePoint, Twist};
 use gyre_masking::{MaskError, Sweep};
 use gyre_radar::{PolarScan, ScanError, continues};
@@ -9,7 +7,7 @@ use ndarray::ArrayViewMut2;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyUntypedArray};
 use pyo3::{exceptions::PyTypeError, prelude::*, types::PySlice};
 
-use crate::{config::Config, errors, lock, numpy_arrays::readable, scan::Scan};
+use crate::{config::Config, errors, lock::Guarded, numpy_arrays::readable, scan::Scan};
 
 /// The fields of a point.
 pub const FIELDS: [&str; 5] = ["x_m", "y_m", "time_s", "weight", "doppler_s"];
@@ -17,7 +15,7 @@ pub const FIELDS: [&str; 5] = ["x_m", "y_m", "time_s", "weight", "doppler_s"];
 /// Rasterises and masks scans, and extracts their sparse points.
 #[pyclass(module = "gyre", frozen)]
 pub struct Masker {
-    masker: Mutex<State>,
+    masker: Guarded<State>,
     n: usize,
     capacity: usize,
     pairs: bool,
@@ -129,7 +127,7 @@ impl Masker {
             n: config.raster.n,
             capacity: config.points.capacity,
             pairs: masker.scans() == 2,
-            masker: Mutex::new(State { masker, last: None }),
+            masker: Guarded::new("Masker", State { masker, last: None }),
         })
     }
 
@@ -164,10 +162,10 @@ impl Masker {
                 previous.as_mut().map(|previous| previous.as_array_mut()),
             );
             let points = bytemuck::cast_slice_mut(fields.as_slice_mut()?);
-            let masked = lock::with(py, &self.masker, |state| {
+            let masked = self.masker.with(py, |state| {
                 state.mask(&scan, twist, raster, previous, points)
             });
-            masked.map_err(errors::scan)?
+            masked?.map_err(errors::scan)?
         };
         Ok(Masked {
             raster: raster.unbind(),

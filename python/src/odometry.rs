@@ -1,12 +1,10 @@
 //! Odometry.
 
-use std::sync::Mutex;
-
 use gyre_odometry::OdometryError;
 use pyo3::prelude::*;
 
 use crate::{
-    config::Config, errors, lock, masker, registered::Registered, scan::Scan,
+    config::Config, errors, lock::Guarded, masker, registered::Registered, scan::Scan,
     trajectory::Trajectory,
 };
 
@@ -14,7 +12,7 @@ use crate::{
 ///
 /// `Odometry(config)` takes the settings of `gyre run`, and finds its motions to the last bit. Two threads can each have their own.
 #[pyclass(module = "gyre", frozen)]
-pub struct Odometry(Mutex<State>);
+pub struct Odometry(Guarded<State>);
 
 struct State {
     odometry: gyre_odometry::Odometry,
@@ -42,10 +40,11 @@ impl Odometry {
     fn new(py: Python<'_>, config: Option<&Bound<'_, Config>>) -> PyResult<Self> {
         let config = Config::method(config).odometry;
         let odometry = py.detach(|| gyre_odometry::Odometry::new(&config));
-        Ok(Self(Mutex::new(State {
+        let state = State {
             odometry: odometry.map_err(errors::config)?,
             trajectory: gyre_radar::Trajectory::default(),
-        })))
+        };
+        Ok(Self(Guarded::new("Odometry", state)))
     }
 
     /// Registers the next scan: estimates its motion from the previous scan, and its pose.
@@ -55,26 +54,28 @@ impl Odometry {
     fn register(&self, py: Python<'_>, scan: &Bound<'_, Scan>) -> PyResult<Registered> {
         let borrowed = scan.get().borrowed(py)?;
         let scan = borrowed.view()?;
-        lock::with(py, &self.0, |state| state.register(&scan)).map_err(errors::scan)
+        let registered = self.0.with(py, |state| state.register(&scan))?;
+        registered.map_err(errors::scan)
     }
 
     /// Starts a new chain of motions with the next scan; the pose stays.
-    fn restart(&self, py: Python<'_>) {
-        lock::with(py, &self.0, |state| state.odometry.restart());
+    fn restart(&self, py: Python<'_>) -> PyResult<()> {
+        self.0.with(py, |state| state.odometry.restart())
     }
 
     /// The poses of all registered scans, in the frame of the first one, up to now.
     #[getter]
-    fn trajectory(&self, py: Python<'_>) -> Trajectory {
-        Trajectory(lock::with(py, &self.0, |state| state.trajectory.clone()))
+    fn trajectory(&self, py: Python<'_>) -> PyResult<Trajectory> {
+        let trajectory = self.0.with(py, |state| state.trajectory.clone())?;
+        Ok(Trajectory(trajectory))
     }
 
     /// The sparse points of the last registered scan, a copy: see `Masked.points`.
     #[getter]
     fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let points = lock::with(py, &self.0, |state| {
+        let points = self.0.with(py, |state| {
             bytemuck::cast_slice(state.odometry.points()).to_vec()
-        });
+        })?;
         let count = points.len() / masker::FIELDS.len();
         masker::points(&numpy::PyArray1::from_vec(py, points), count)
     }

@@ -1,7 +1,5 @@
 //! Scans, whose memory is that of numpy arrays.
 
-use std::sync::Mutex;
-
 use gyre_radar::{Dataset, PolarScan, ReadError, ScanSlot, Sense, SweepGeometry, scan::flag};
 use ndarray::{Ix1, Ix2, IxDyn};
 use numpy::{
@@ -14,7 +12,8 @@ use pyo3::{
 };
 
 use crate::{
-    errors, lock,
+    errors,
+    lock::Guarded,
     numpy_arrays::{converted, given, readable},
 };
 
@@ -29,15 +28,15 @@ const FLAGS: &str = "one uint8 for each azimuth";
 ///
 /// power: uint8 (azimuths, range bins), C-contiguous; nearest bin first.
 /// stamp_ns: the time of the scan, ns: the middle of the sweep.
-/// range_resolution_m: the depth of a range bin.
+/// range_resolution_m: the depth of a range bin, m.
 /// clockwise: whether azimuths increase clockwise, seen from above.
-/// azimuth_stamp_ns: int64 (azimuths,), the time of each azimuth; or else
-/// sweep_s: the duration of the sweep, whose azimuths are measured evenly in time.
-/// azimuth_rad: float32 (azimuths,), the angles from straight ahead in the sense of rotation; without them the first is straight ahead,
+/// azimuth_stamp_ns: int64 (azimuths,), the time of each azimuth, ns; or else
+/// sweep_s: the duration of the sweep, s, whose azimuths are measured evenly in time.
+/// azimuth_rad: float32 (azimuths,), the angles from straight ahead in the sense of rotation, rad; without them the first is straight ahead,
 ///     and all are spaced evenly over a turn.
 /// azimuth_flags: uint8 (azimuths,), what is known of each azimuth: 1 measured, 2 rising chirp, 4 the chirp is known; without them all
 ///     are measured.
-/// range_offset_m: the centre of bin b is at (b + 0.5) * range_resolution_m + range_offset_m.
+/// range_offset_m: m; the centre of bin b is at (b + 0.5) * range_resolution_m + range_offset_m.
 /// doppler_s: metres to add to a range for each m/s of closing speed; 0: unknown.
 ///
 /// Arrays that are written to while a scan is registered by another thread give undefined motions.
@@ -57,10 +56,10 @@ impl Scan {
     /// Decodes a scan of a dataset straight into arrays of numpy.
     pub fn read(
         py: Python<'_>,
-        dataset: &Mutex<Box<dyn Dataset>>,
+        dataset: &Guarded<Box<dyn Dataset>>,
         index: usize,
     ) -> PyResult<Result<Self, ReadError>> {
-        let limits = lock::with(py, dataset, |dataset| dataset.limits());
+        let limits = dataset.with(py, |dataset| dataset.limits())?;
         let bytes = PyArray1::<u8>::zeros(py, limits.bytes, false);
         let azimuth_rad = PyArray1::<f32>::zeros(py, limits.azimuths, false);
         let stamps = PyArray1::<i64>::zeros(py, limits.azimuths, false);
@@ -74,7 +73,7 @@ impl Scan {
                 stamp_ns: stamps.as_slice_mut()?,
                 flags: flags.as_slice_mut()?,
             };
-            lock::with(py, dataset, |dataset| dataset.read(index, slot))
+            dataset.with(py, |dataset| dataset.read(index, slot))?
         };
         let geometry = match read {
             Ok(geometry) => geometry,

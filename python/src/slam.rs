@@ -1,6 +1,6 @@
 //! SLAM: loops, and the trajectory corrected by them.
 
-use std::{convert::Infallible, sync::Mutex};
+use std::convert::Infallible;
 
 use gyre_estimation::EstimationError;
 use gyre_geometry::{Pose, SparsePoint};
@@ -12,7 +12,8 @@ use pyo3::prelude::*;
 use thiserror::Error;
 
 use crate::{
-    config::Config, errors, lock, masker, pose, registered::Registered, trajectory::Trajectory,
+    config::Config, errors, lock::Guarded, masker, pose, registered::Registered,
+    trajectory::Trajectory,
 };
 
 /// Points of a keyframe are this near, m: the bound of `points.max_range_m`.
@@ -24,7 +25,7 @@ const MAX_RANGE_M: f32 = 1e4;
 /// not depend on it. The points of keyframes are kept in memory, 20 bytes each.
 #[pyclass(module = "gyre", frozen)]
 pub struct Slam {
-    state: Mutex<State>,
+    state: Guarded<State>,
     capacity: usize,
 }
 
@@ -171,19 +172,20 @@ impl Slam {
             ..LoopOptions::default()
         };
         let closer = LoopCloser::new(options, &config.odometry.refinement, capacity);
-        Ok(Self {
-            state: Mutex::new(State {
-                builder: KeyframeBuilder::new(&config.slam.places),
-                closer: closer.map_err(errors::config)?,
-                estimator: TrajectoryEstimator::new(TrajectoryOptions {
-                    kind,
-                    ..TrajectoryOptions::default()
-                }),
-                keyframes: Keyframes(Vec::new()),
-                odometry: gyre_radar::Trajectory::default(),
-                is_finished: false,
-                is_solved: true,
+        let state = State {
+            builder: KeyframeBuilder::new(&config.slam.places),
+            closer: closer.map_err(errors::config)?,
+            estimator: TrajectoryEstimator::new(TrajectoryOptions {
+                kind,
+                ..TrajectoryOptions::default()
             }),
+            keyframes: Keyframes(Vec::new()),
+            odometry: gyre_radar::Trajectory::default(),
+            is_finished: false,
+            is_solved: true,
+        };
+        Ok(Self {
+            state: Guarded::new("Slam", state),
             capacity,
         })
     }
@@ -214,27 +216,27 @@ impl Slam {
             )));
         }
         let registered = registered.get();
-        let added = lock::with(py, &self.state, |state| {
-            state.add(registered, || points.to_vec())
-        });
+        let added = self
+            .state
+            .with(py, |state| state.add(registered, || points.to_vec()))?;
         added.map_err(errors::other)
     }
 
     /// Says that no scan comes after the last one, and closes the last loops.
     fn finish(&self, py: Python<'_>) -> PyResult<()> {
-        lock::with(py, &self.state, State::finish).map_err(errors::other)
+        self.state.with(py, State::finish)?.map_err(errors::other)
     }
 
     /// The loops so far, with their verdicts.
     #[getter]
     fn loops(&self, py: Python<'_>) -> PyResult<Vec<Loop>> {
-        lock::with(py, &self.state, State::loops).map_err(errors::other)
+        self.state.with(py, State::loops)?.map_err(errors::other)
     }
 
     /// The poses of all scans, corrected by the loops so far, in the frame of the first one.
     #[getter]
     fn trajectory(&self, py: Python<'_>) -> PyResult<Trajectory> {
-        let corrected = lock::with(py, &self.state, State::corrected);
+        let corrected = self.state.with(py, State::corrected)?;
         corrected.map(Trajectory).map_err(errors::other)
     }
 }

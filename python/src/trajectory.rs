@@ -7,7 +7,10 @@ use gyre_geometry::{Pose, pose, xy_yaw};
 use gyre_radar::{read_trajectory, write_kitti, write_tum};
 use ndarray::Array2;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
-use pyo3::{prelude::*, types::IntoPyDict};
+use pyo3::{
+    prelude::*,
+    types::{IntoPyDict, PyTuple},
+};
 
 use crate::{
     errors,
@@ -129,6 +132,13 @@ impl Trajectory {
     /// Draws the trajectory from above into an SVG file.
     fn plot(&self, path: PathBuf) -> PyResult<()> {
         gyre_storage::write(&path, self._repr_svg_()?).map_err(errors::write)
+    }
+
+    /// Returns how `pickle` makes the trajectory again.
+    fn __reduce__<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let (py, trajectory) = (this.py(), this.get());
+        let arguments = (trajectory.stamp_ns(py), trajectory.poses(py));
+        (this.get_type(), arguments).into_pyobject(py)
     }
 
     /// Returns the drawing, which notebooks show.

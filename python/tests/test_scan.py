@@ -7,17 +7,7 @@ from typing import Any
 import gyre
 import numpy as np
 import pytest
-
-STAMP_NS = 1_700_000_000_000_000_000
-
-
-def power(azimuths: int = 400, bins: int = 576) -> Any:
-    return np.random.default_rng(1).integers(0, 90, (azimuths, bins), dtype=np.uint8)
-
-
-def scan(array: Any, **changed: Any) -> gyre.Scan:
-    keywords = {"stamp_ns": STAMP_NS, "sweep_s": 0.25, "range_resolution_m": 0.175, "clockwise": True}
-    return gyre.Scan(array, **(keywords | changed))
+from conftest import STAMP_NS, noise, scan
 
 
 def pointer(array: Any) -> int:
@@ -25,14 +15,14 @@ def pointer(array: Any) -> int:
 
 
 def test_the_array_of_a_user_is_not_copied() -> None:
-    array = power()
+    array = noise()
     mine = scan(array)
     assert mine.power is array
     assert pointer(mine.power) == pointer(array)
 
 
 def test_what_is_written_to_an_array_is_registered() -> None:
-    array = power()
+    array = noise()
     mine, masker = scan(array), gyre.Masker()
     assert masker.mask(mine).raster.max() > 0
     array[:] = 0
@@ -51,7 +41,7 @@ def test_the_powers_of_a_recording_are_a_view_without_the_bytes_between_the_rows
 
 
 def test_rasters_and_points_are_not_copied() -> None:
-    masked = gyre.Masker().mask(scan(power()))
+    masked = gyre.Masker().mask(scan(noise()))
     assert masked.raster.flags.c_contiguous and masked.raster.dtype == np.float32
     assert not masked.points.flags.owndata
     assert masked.points.dtype.names == ("x_m", "y_m", "time_s", "weight", "doppler_s")
@@ -65,7 +55,7 @@ def test_a_mask_of_two_scans_masks_the_previous_one_too() -> None:
     config = gyre.Config({"masking": masking, "raster": {"n": 127, "cell_m": 0.8}})
     masker, odometry = gyre.Masker(config), gyre.Odometry(config)
     for number in range(3):
-        mine = scan(power(), stamp_ns=STAMP_NS + number * 250_000_000)
+        mine = scan(noise(), stamp_ns=STAMP_NS + number * 250_000_000)
         masked = masker.mask(mine, velocity=(1.0, 0.0, 0.1))
         assert masked.previous is not None and masked.previous.shape == masked.raster.shape == (127, 127)
         assert masked.factors is not None and 0 <= masked.factors.min() <= masked.factors.max() <= 1
@@ -76,7 +66,7 @@ def test_a_mask_of_two_scans_masks_the_previous_one_too() -> None:
 
 
 def test_the_angles_are_even_and_the_mean_time_is_that_of_the_scan() -> None:
-    mine = scan(power())
+    mine = scan(noise())
     assert np.allclose(mine.azimuth_rad, np.arange(400) * 2 * np.pi / 400, atol=1e-6)
     assert abs(int(np.mean(mine.azimuth_stamp_ns - STAMP_NS))) < 1000
     assert np.ptp(mine.azimuth_stamp_ns) == 250_000_000 * 399 // 400
@@ -85,34 +75,34 @@ def test_the_angles_are_even_and_the_mean_time_is_that_of_the_scan() -> None:
 
 def test_angles_of_float64_and_times_of_a_list_are_converted() -> None:
     times = [STAMP_NS + k for k in range(400)]
-    mine = scan(power(), sweep_s=None, azimuth_stamp_ns=times, azimuth_rad=np.linspace(0, 6, 400))
+    mine = scan(noise(), sweep_s=None, azimuth_stamp_ns=times, azimuth_rad=np.linspace(0, 6, 400))
     assert mine.azimuth_rad.dtype == np.float32
     assert mine.azimuth_stamp_ns.tolist() == times
 
 
 def test_a_read_only_array_can_be_registered() -> None:
-    array = np.frombuffer(power().tobytes(), dtype=np.uint8).reshape(400, 576)
+    array = np.frombuffer(noise().tobytes(), dtype=np.uint8).reshape(400, 576)
     assert gyre.Odometry().register(scan(array)).outcome == "start"
 
 
 def test_an_array_that_is_not_contiguous_is_refused_with_what_to_do() -> None:
-    for array in (power()[:, 11:], power()[::2], np.asfortranarray(power())):
+    for array in (noise()[:, 11:], noise()[::2], np.asfortranarray(noise())):
         with pytest.raises(ValueError, match=r"np\.ascontiguousarray\(power\)"):
             scan(array)
     with pytest.raises(ValueError, match=r"np\.ascontiguousarray"):
-        scan(power().T)
+        scan(noise().T)
 
 
 @pytest.mark.parametrize(
     "array",
     [
-        power().astype(np.float32),
-        power().astype(np.int8),
-        power().astype(">u2"),
-        power()[0],
-        power()[None],
-        power().tolist(),
-        power().tobytes(),
+        noise().astype(np.float32),
+        noise().astype(np.int8),
+        noise().astype(">u2"),
+        noise()[0],
+        noise()[None],
+        noise().tolist(),
+        noise().tobytes(),
         None,
         "power",
         np.array([[object()]]),
@@ -150,7 +140,7 @@ def test_powers_of_another_type_are_refused(array: Any) -> None:
 )
 def test_an_inconsistent_scan_is_refused(changed: dict[str, Any]) -> None:
     with pytest.raises((gyre.ScanError, TypeError)) as refused:
-        scan(power(), **changed)
+        scan(noise(), **changed)
     assert len(str(refused.value)) > 20
 
 
@@ -171,15 +161,15 @@ def test_an_inconsistent_scan_is_refused(changed: dict[str, Any]) -> None:
 )
 def test_numbers_of_another_type_are_refused(changed: dict[str, Any]) -> None:
     with pytest.raises((TypeError, ValueError)):
-        scan(power(), **changed)
+        scan(noise(), **changed)
 
 
 def test_a_scan_needs_its_constants_and_times() -> None:
     untyped: Any = gyre.Scan
     with pytest.raises(TypeError, match="stamp_ns"):
-        untyped(power())
+        untyped(noise())
     with pytest.raises(gyre.ScanError, match="either azimuth_stamp_ns.*or sweep_s"):
-        scan(power(), sweep_s=None)
+        scan(noise(), sweep_s=None)
 
 
 def test_a_scan_that_is_empty_or_too_large_is_refused() -> None:
@@ -201,7 +191,7 @@ def test_an_array_that_is_changed_in_place_is_refused_or_registered() -> None:
         mine.azimuth_rad[7] = np.nan
 
     for change in (change_type, change_shape, spoil):
-        mine = scan(power())
+        mine = scan(noise())
         try:
             change(mine)
         except AttributeError:
@@ -211,7 +201,7 @@ def test_an_array_that_is_changed_in_place_is_refused_or_registered() -> None:
 
 
 def test_two_threads_find_what_one_finds() -> None:
-    scans = [scan(power(), stamp_ns=STAMP_NS + k * 250_000_000) for k in range(8)]
+    scans = [scan(noise(), stamp_ns=STAMP_NS + k * 250_000_000) for k in range(8)]
 
     def poses() -> list[Any]:
         odometry = gyre.Odometry()
@@ -227,7 +217,7 @@ def test_two_threads_find_what_one_finds() -> None:
 
 
 def test_two_threads_can_share_an_odometry() -> None:
-    odometry, mine = gyre.Odometry(), scan(power())
+    odometry, mine = gyre.Odometry(), scan(noise())
     threads = [threading.Thread(target=lambda: [odometry.register(mine) for _ in range(4)]) for _ in range(2)]
     for thread in threads:
         thread.start()

@@ -4,10 +4,19 @@ import argparse
 import sys
 import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import gyre
+from gyre.drive import Drive
+
+
+def count(text: str) -> int:
+    """A number of scans on the command line."""
+    number = int(text)
+    if not 0 <= number < 2**63:
+        raise ValueError
+    return number
 
 
 def arguments(given: Sequence[str] | None) -> argparse.Namespace:
@@ -15,10 +24,14 @@ def arguments(given: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("data", type=Path, help="a folder of a format that Gyre knows, or an MCAP file of `gyre record`")
     parser.add_argument("--config", type=Path, help="a TOML file; without one the settings are found in the recording")
     parser.add_argument(
-        "--set", action="append", default=[], metavar="SECTION.KEY=VALUE", help="override a key, as in masking.kind=none"
-    )
+        "--set", action="append", default=[], metavar="SECTION.KEY=VALUE",
+        help="override a key, as in masking.kind=none; slam.kind=graph closes loops",
+    )  # fmt: skip
     parser.add_argument("--out", type=Path, default=Path("out"), help="the folder of the results (out)")
     parser.add_argument("--ground-truth", type=Path, help="a trajectory to compare with; found in the recording if it has one")
+    parser.add_argument("-n", "--n-scans", type=count, metavar="N", help="register N scans instead of all")
+    parser.add_argument("-j", "--jump", type=count, metavar="N", help="begin with scan N instead of the first")
+    parser.add_argument("-v", "--visualize", action="store_true", help="show scans and trajectory in a window (gyre[visualize])")
     parser.add_argument("--version", action="version", version=f"gyre {gyre.__version__}")
     return parser.parse_args(given)
 
@@ -47,40 +60,32 @@ def run(given: argparse.Namespace) -> None:
     config = gyre.Config.read(given.config, changed) if given.config else gyre.Config.of(given.data, changed)
     if config.note:
         print(config.note)
-    trajectory = register(gyre.open(given.data, config), gyre.Odometry(config))
-    given.out.mkdir(parents=True, exist_ok=True)
-    (given.out / "config.toml").write_text(str(config))
-    trajectory.write_tum(given.out / "trajectory.tum")
-    trajectory.write_kitti(given.out / "trajectory_kitti.txt")
-    trajectory.plot(given.out / "trajectory.svg")
+    dataset = gyre.open(given.data, config)
     truth = given.ground_truth or gyre.find_ground_truth(given.data)
-    if truth is None:
-        print("no ground truth: nothing is evaluated")
-    else:
-        evaluation = gyre.evaluate(trajectory, gyre.Trajectory.read(truth))
-        evaluation.plot(given.out / "trajectory.svg")
-        print(f"against {truth}\n{evaluation}")
-    print(f"results in {given.out}: {', '.join(sorted(file.name for file in given.out.iterdir()))}")
+    drive = Drive(config, given.out, gyre.Trajectory.read(truth) if truth else None, given.visualize)
+    first = dataset.first if given.jump is None else given.jump
+    total = min(len(dataset) - first, len(dataset) if given.n_scans is None else given.n_scans)
+    if total <= 0:
+        raise gyre.ReadError(f"there is no scan to register: {given.data} has {len(dataset)}, counted from 0")
+    try:
+        for scan in progress(dataset.scans(first, total), total):
+            drive.register(scan)
+    finally:
+        # What was registered before Ctrl-C, or before a file that cannot be read, is not lost.
+        print(drive.write())
 
 
-def register(dataset: gyre.Dataset, odometry: gyre.Odometry) -> gyre.Trajectory:
-    """Registers all scans, with a line of progress on a terminal."""
-    began, shown, count = time.monotonic(), 0.0, 0
-    for count, scan in enumerate(dataset, 1):
-        try:
-            odometry.register(scan)
-        except gyre.ScanError as error:
-            warnings.warn(f"skipped: scan {scan.index}: {error}", gyre.SkippedScanWarning, stacklevel=1)
+def progress(scans: Iterator[gyre.Scan], total: int) -> Iterator[gyre.Scan]:
+    """The scans, with a line of progress on a terminal."""
+    began, shown = time.monotonic(), 0.0
+    for number, scan in enumerate(scans, 1):
+        yield scan
         now = time.monotonic()
-        if sys.stderr.isatty() and now - shown > 0.1:
-            shown = now
-            print(f"\rscan {count} of {len(dataset)}, {count / (now - began):.1f} scans/s", end="", file=sys.stderr)
+        if sys.stderr.isatty() and (now - shown > 0.1 or number == total):
+            shown, rate = now, number / max(now - began, 1e-9)
+            print(f"\rscan {number} of {total}, {rate:.1f} scans/s, {(total - number) / rate:.0f} s left ", end="", file=sys.stderr)
     if sys.stderr.isatty():
         print(file=sys.stderr)
-    trajectory = odometry.trajectory
-    seconds = time.monotonic() - began
-    print(f"{len(trajectory)} of {len(dataset)} scans, {trajectory.path_m:.1f} m, {count / seconds:.1f} scans/s")
-    return trajectory
 
 
 def main(given: Sequence[str] | None = None) -> int:

@@ -1,0 +1,137 @@
+"""The command `gyre-odometry`."""
+
+import json
+import re
+import signal
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import gyre
+import gyre.__main__
+import pytest
+from conftest import gyre_program, python
+
+
+def command(*arguments: object) -> int:
+    return gyre.__main__.main([str(argument) for argument in arguments])
+
+
+def rows(file: Path) -> list[dict[str, str]]:
+    header, *lines = file.read_text().splitlines()
+    return [dict(zip(header.split(","), line.split(","), strict=True)) for line in lines]
+
+
+def test_the_command_writes_draws_and_evaluates(recording: Path, tmp_path: Path) -> None:
+    done = python("-m", "gyre", recording, "--out", tmp_path / "out", "--set", "masking.threshold=70", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "24 scans" in done.stdout and "ATE" in done.stdout
+    names = {file.name for file in (tmp_path / "out").iterdir()}
+    assert names == {
+        "config.toml", "evaluation.json", "odometry.csv", "trajectory.svg", "trajectory.tum", "trajectory_kitti.txt"
+    }  # fmt: skip
+    assert gyre.Config.read(tmp_path / "out/config.toml").to_dict()["masking"]["threshold"] == 70
+    assert len(gyre.Trajectory.read(tmp_path / "out/trajectory.tum")) == 24
+    assert len(gyre.Trajectory.read(tmp_path / "out/trajectory_kitti.txt")) == 24
+    assert json.loads((tmp_path / "out/evaluation.json").read_text())["ate"]["rmse_m"] < 1
+
+
+def test_its_motions_are_rows_of_those_of_a_run(recording: Path, tmp_path: Path) -> None:
+    gyre_program("run", "--data", recording, "--out", tmp_path / "run")
+    assert command(recording, "--out", tmp_path / "python") == 0
+    of_run, mine = rows(tmp_path / "run/odometry.csv"), rows(tmp_path / "python/odometry.csv")
+    assert len(mine) == 23
+    assert mine == [{column: row[column] for column in mine[0]} for row in of_run]
+
+
+def test_loops_are_closed_where_the_configuration_says_so(around: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    gyre_program("run", "--data", around, "--out", tmp_path / "run", "--set", "slam.kind=graph")
+    assert command(around, "--out", tmp_path / "python", "--set", "slam.kind=graph") == 0
+    assert re.search(r"\n[1-9]\d* loops, and the trajectory corrected by them", capsys.readouterr().out)
+    for name in ("trajectory.tum", "trajectory_slam.tum"):
+        assert (tmp_path / "python" / name).read_bytes() == (tmp_path / "run" / name).read_bytes()
+    assert (tmp_path / "python/trajectory_slam.svg").read_text().startswith("<svg")
+
+
+def test_a_part_of_a_recording_is_registered(recording: Path, tmp_path: Path) -> None:
+    for arguments, scans in ((["-n", 5], range(5)), (["--jump", 20], range(20, 24)), (["-j", 3, "-n", 4], range(3, 7)), (["-n", 99], range(24))):
+        assert command(recording, "--out", tmp_path, *arguments) == 0
+        assert [int(row["scan"]) for row in rows(tmp_path / "odometry.csv")] == list(scans)[1:]
+    assert command(recording, "--out", tmp_path, "-n", 1) == 0
+    assert rows(tmp_path / "odometry.csv") == []
+
+
+def test_no_scan_to_register_is_an_error(recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for arguments in (["-n", 0], ["-j", 24], ["-j", 2**62]):
+        assert command(recording, "--out", tmp_path, *arguments) == 1
+        assert "there is no scan to register" in capsys.readouterr().err
+    for number in ("-1", "many", "1.5", str(2**64)):
+        with pytest.raises(SystemExit) as ended:
+            command(recording, "-n", number)
+        assert ended.value.code == 2
+
+
+def test_it_ends_with_a_sentence(recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("")
+    run = tmp_path / "run"
+    (run / "journal").mkdir(parents=True)
+    for arguments in (
+        [tmp_path / "missing"],
+        [tmp_path],
+        [recording, "--set", "masking"],
+        [recording, "--set", "masking.treshold=3"],
+        [recording, "--set", "slam.kind=graph", "--set", "slam.map=map"],
+        [recording, "--config", "missing.toml"],
+        [recording, "--ground-truth", "missing.tum"],
+        [recording, "--out", tmp_path / "file"],
+        [recording, "--out", run],
+    ):
+        assert command("--out", tmp_path / "out", *arguments) == 1
+        assert re.fullmatch(r"error: [^\n]+\n", capsys.readouterr().err)
+
+
+def test_what_was_registered_before_a_file_that_is_gone_is_written(recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    part = tmp_path / "part"
+    (part / "radar").mkdir(parents=True)
+    images = gyre.open(recording).files
+    for image in images[:8]:
+        (part / "radar" / image.name).symlink_to(image)
+    (part / "radar" / images[8].name).symlink_to(tmp_path / "gone")
+    assert command(part, "--out", tmp_path / "out") == 1
+    assert re.search(r"error: cannot read .*png: ", capsys.readouterr().err)
+    assert len(rows(tmp_path / "out/odometry.csv")) == 7
+
+
+def test_what_was_registered_before_ctrl_c_is_written(
+    recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(scans: Iterator[gyre.Scan], total: int) -> Iterator[gyre.Scan]:
+        assert total == 24
+        yield from (next(scans) for _ in range(6))
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(gyre.__main__, "progress", interrupted)
+    assert command(recording, "--out", tmp_path) == 130
+    assert "interrupted" in capsys.readouterr().err
+    assert len(gyre.Trajectory.read(tmp_path / "trajectory.tum")) == 6
+
+
+def test_a_window_follows_the_drive(recording: Path, tmp_path: Path) -> None:
+    arguments = (recording, "--out", tmp_path / "out", "-n", 3, "--visualize")
+    assert python("-m", "gyre", *arguments, MPLBACKEND="agg").returncode == 0
+    without_display = python("-m", "gyre", *arguments, DISPLAY="", WAYLAND_DISPLAY="")
+    assert without_display.returncode == 1 and "needs a display" in without_display.stderr
+
+
+def test_without_matplotlib_a_window_is_refused_with_what_to_install(
+    recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
+    monkeypatch.delitem(sys.modules, "gyre.visualize", raising=False)
+    assert command(recording, "--out", tmp_path, "--visualize") == 1
+    assert capsys.readouterr().err.splitlines()[-1] == "error: --visualize needs matplotlib: install it, or gyre[visualize]"
+
+
+def test_values_of_the_command_line_are_numbers_or_strings() -> None:
+    changed = gyre.__main__.overrides(["a.b=3", "a.c = 0.5", "a.d=true", "a.e='x y'", "a.f=none"])
+    assert changed == {"a.b": 3, "a.c": 0.5, "a.d": True, "a.e": "x y", "a.f": "none"}
