@@ -1,0 +1,116 @@
+"""Gyre's motions as an input of an external filter, by the conventions of ROS and robot_localization.
+
+    python examples/python-robot-localization.py RECORDING
+
+prints a `nav_msgs/Odometry` as it is to be published, and fuses the motions with simulated wheels and a simulated gyro, without ROS:
+by the update that a Kalman filter makes of two measurements of one velocity. The settings of `ekf_node` for the same are in
+robot_localization.yaml. The recording needs a ground truth, of which wheels and gyro are simulated.
+"""
+
+import json
+import sys
+from typing import Any
+
+import gyre
+import numpy as np
+from numpy.typing import NDArray
+
+UNKNOWN = 1e6  # variance of what a planar radar does not measure: z, roll, pitch
+AXES = [0, 1, 5]  # x, y and yaw among x, y, z, roll, pitch, yaw
+Floats = NDArray[np.float64]
+
+
+def twist(registered: gyre.Registered) -> tuple[Floats, Floats]:
+    """The velocity of the radar in its own frame in the middle of the interval, m/s and rad/s, with its covariance."""
+    motion, dt = registered.motion, registered.interval_ns * 1e-9
+    half = -0.5 * motion.yaw_rad  # a motion is along the axes of the earlier scan
+    turn = np.array([[np.cos(half), -np.sin(half), 0], [np.sin(half), np.cos(half), 0], [0, 0, 1]])
+    velocity = turn @ [motion.x_m, motion.y_m, motion.yaw_rad] / dt
+    return velocity, turn @ motion.covariance @ turn.T / dt**2
+
+
+def in_ros_order(covariance: Floats) -> list[float]:
+    """A covariance of (x, y, yaw) as one of (x, y, z, roll, pitch, yaw), row by row."""
+    full = np.diag([UNKNOWN] * 6)
+    full[np.ix_(AXES, AXES)] = covariance
+    return [float(value) for value in full.flat]
+
+
+def message(registered: gyre.Registered) -> dict[str, Any]:
+    """A `nav_msgs/Odometry`: pose of the radar in `odom`, twist in the radar's frame. `base_link` -> `radar` is a static transform."""
+    stamp_ns = registered.stamp_ns - registered.interval_ns // 2
+    pose, (velocity, covariance) = registered.pose, twist(registered)
+    return {
+        "header": {"stamp": {"sec": stamp_ns // 10**9, "nanosec": stamp_ns % 10**9}, "frame_id": "odom"},
+        "child_frame_id": "radar",
+        "pose": {
+            "pose": {
+                "position": {"x": pose.x_m, "y": pose.y_m, "z": 0.0},
+                "orientation": {"x": 0.0, "y": 0.0, "z": np.sin(pose.yaw_rad / 2), "w": np.cos(pose.yaw_rad / 2)},
+            },
+            "covariance": in_ros_order(pose.covariance),
+        },
+        "twist": {
+            "twist": {
+                "linear": {"x": velocity[0], "y": velocity[1], "z": 0.0},
+                "angular": {"x": 0.0, "y": 0.0, "z": velocity[2]},
+            },
+            "covariance": in_ros_order(covariance),
+        },
+    }
+
+
+def fuse(a: tuple[Floats, Floats], b: tuple[Floats, Floats]) -> Floats:
+    """Two measurements of a velocity, each weighted by the inverse of its covariance."""
+    weights = [np.linalg.inv(covariance) for _, covariance in (a, b)]
+    return np.linalg.solve(sum(weights), weights[0] @ a[0] + weights[1] @ b[0])
+
+
+def moved(pose: Floats, velocity: Floats, dt: float) -> Floats:
+    """The pose (x, y, yaw) after a time at a velocity."""
+    middle = pose[2] + 0.5 * velocity[2] * dt
+    step = [np.cos(middle) * velocity[0] - np.sin(middle) * velocity[1], np.sin(middle) * velocity[0] + np.cos(middle) * velocity[1]]
+    return pose + np.array([*step, velocity[2]]) * dt
+
+
+def truth_at(truth: gyre.Trajectory, stamp_ns: int) -> Floats:
+    """The true pose (x, y, yaw) at a time."""
+    assert truth.stamp_ns is not None
+    columns = (truth.poses[:, 0], truth.poses[:, 1], np.unwrap(truth.poses[:, 2]))
+    return np.array([np.interp(stamp_ns - truth.stamp_ns[0], truth.stamp_ns - truth.stamp_ns[0], column) for column in columns])
+
+
+def wheels_and_gyro(before: Floats, after: Floats, dt: float, noise: np.random.Generator) -> tuple[Floats, Floats]:
+    """Wheels that are 2 % too large, and a gyro with a bias of 0.6 deg/s."""
+    forward = [np.cos((before[2] + after[2]) / 2), np.sin((before[2] + after[2]) / 2)]
+    velocity = np.array([1.02 * (after - before)[:2] @ forward / dt, 0.0, (after - before)[2] / dt + 0.01])
+    sigma = np.array([0.15, 0.05, 0.012])
+    return velocity + noise.normal(0, [0.1, 0.0, 0.005]), np.diag(sigma**2)
+
+
+def main(recording: str) -> None:
+    config, truth_file = gyre.Config.of(recording), gyre.find_ground_truth(recording)
+    if truth_file is None:
+        sys.exit(f"{recording} has no ground truth, of which wheels and gyro are simulated")
+    truth, odometry, noise = gyre.Trajectory.read(truth_file), gyre.Odometry(config), np.random.default_rng(1)
+    drive = [odometry.register(scan) for scan in gyre.open(recording, config)]
+    true_poses = [truth_at(truth, registered.stamp_ns) for registered in drive]
+    poses = dict.fromkeys(("wheels and gyro", "radar", "fused"), true_poses[0])
+    for registered, before, after in zip(drive[1:], true_poses, true_poses[1:], strict=False):
+        dt = registered.interval_ns * 1e-9
+        radar, others = twist(registered), wheels_and_gyro(before, after, dt, noise)
+        # A predicted motion is no measurement: a filter has a prediction of its own.
+        fused = others[0] if registered.outcome == "predicted" else fuse(radar, others)
+        for name, velocity in zip(poses, (others[0], radar[0], fused), strict=True):
+            poses[name] = moved(poses[name], velocity, dt)
+    print(json.dumps(message(drive[-1]), indent=1))
+    differential = (drive[-2].pose.covariance + drive[-1].pose.covariance) * dt  # as robot_localization computes it
+    sigmas = [np.sqrt(covariance[0, 0]) for covariance in (radar[1], differential)]
+    print(f"sigma of vx: {sigmas[0]:.3f} m/s as a twist, {sigmas[1]:.3f} m/s from poses in differential mode")
+    for name, pose in poses.items():
+        error = pose - true_poses[-1]
+        print(f"{name}: {np.hypot(*error[:2]):.2f} m and {np.degrees(abs(error[2])):.2f} deg off at the end")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
