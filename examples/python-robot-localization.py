@@ -1,6 +1,6 @@
 """Gyre's motions as an input of an external filter, by the conventions of ROS and robot_localization.
 
-    python examples/python-robot-localization.py RECORDING
+    python examples/python-robot-localization.py RECORDING [CONFIG.toml]
 
 prints a `nav_msgs/Odometry` as it is to be published, and fuses the motions with simulated wheels and a simulated gyro, without ROS:
 by the update that a Kalman filter makes of two measurements of one velocity. The settings of `ekf_node` for the same are in
@@ -81,15 +81,16 @@ def truth_at(truth: gyre.Trajectory, stamp_ns: int) -> Floats:
 
 
 def wheels_and_gyro(before: Floats, after: Floats, dt: float, noise: np.random.Generator) -> tuple[Floats, Floats]:
-    """Wheels that are 2 % too large, and a gyro with a bias of 0.6 deg/s."""
+    """The velocity of a vehicle that moves ahead, by wheels (0.2 m/s) and a gyro (0.3 deg/s), whose errors are independent."""
     forward = [np.cos((before[2] + after[2]) / 2), np.sin((before[2] + after[2]) / 2)]
-    velocity = np.array([1.02 * (after - before)[:2] @ forward / dt, 0.0, (after - before)[2] / dt + 0.01])
-    sigma = np.array([0.15, 0.05, 0.012])
-    return velocity + noise.normal(0, [0.1, 0.0, 0.005]), np.diag(sigma**2)
+    velocity = np.array([(after - before)[:2] @ forward / dt, 0.0, (after - before)[2] / dt])
+    sigma = np.array([0.2, UNKNOWN, 0.005])  # wheels do not measure sideways
+    return velocity + noise.normal(0, sigma * [1, 0, 1]), np.diag(sigma**2)
 
 
-def main(recording: str) -> None:
-    config, truth_file = gyre.Config.of(recording), gyre.find_ground_truth(recording)
+def main(recording: str, *config_file: str) -> None:
+    config = gyre.Config.read(*config_file) if config_file else gyre.Config.of(recording)
+    truth_file = gyre.find_ground_truth(recording)
     if truth_file is None:
         sys.exit(f"{recording} has no ground truth, of which wheels and gyro are simulated")
     truth, odometry, noise = gyre.Trajectory.read(truth_file), gyre.Odometry(config), np.random.default_rng(1)
@@ -113,4 +114,4 @@ def main(recording: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(*sys.argv[1:])

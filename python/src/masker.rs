@@ -33,7 +33,7 @@ pub struct Masked {
     /// The raster of powers, motion-compensated and masked: float32 (n, n), row 0 far ahead, column 0 far to the left. A cell is
     /// `raster.cell_m` wide, and the sensor is in the middle.
     raster: Py<PyArray2<f32>>,
-    /// The raster of the previous scan, masked for this pair, if the mask takes two scans; else None.
+    /// The raster of the previous scan, masked for this pair, float32 (n, n), if the mask takes two scans; else None.
     previous: Option<Py<PyArray2<f32>>>,
     /// The strongest returns as measured, a structured array with the float32 fields `x_m` and `y_m` in the sensor's frame at the time
     /// of the azimuth, `time_s` relative to the scan's stamp, `weight` from 0 to 1, and `doppler_s`.

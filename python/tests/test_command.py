@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import signal
 import sys
 from collections.abc import Iterator
@@ -90,14 +91,19 @@ def test_it_ends_with_a_sentence(recording: Path, tmp_path: Path, capsys: pytest
         assert re.fullmatch(r"error: [^\n]+\n", capsys.readouterr().err)
 
 
-def test_what_was_registered_before_a_file_that_is_gone_is_written(recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    part = tmp_path / "part"
-    (part / "radar").mkdir(parents=True)
-    images = gyre.open(recording).files
-    for image in images[:8]:
-        (part / "radar" / image.name).symlink_to(image)
-    (part / "radar" / images[8].name).symlink_to(tmp_path / "gone")
-    assert command(part, "--out", tmp_path / "out") == 1
+def test_what_was_registered_before_a_file_that_is_gone_is_written(
+    recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copy = tmp_path / "copy"
+    shutil.copytree(recording, copy)
+
+    def removing(scans: Iterator[gyre.Scan], _: int) -> Iterator[gyre.Scan]:
+        yield from (next(scans) for _ in range(8))
+        gyre.open(copy).files[8].unlink()
+        yield from scans
+
+    monkeypatch.setattr(gyre.__main__, "progress", removing)
+    assert command(copy, "--out", tmp_path / "out") == 1
     assert re.search(r"error: cannot read .*png: ", capsys.readouterr().err)
     assert len(rows(tmp_path / "out/odometry.csv")) == 7
 

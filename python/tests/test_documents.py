@@ -57,7 +57,7 @@ def test_the_example_of_an_own_dataset_registers_its_files(recording: Path, tmp_
 
 
 def test_the_example_of_an_external_filter_publishes_and_fuses(around: Path) -> None:
-    done = python(ROOT / "examples/python-robot-localization.py", around)
+    done = python(ROOT / "examples/python-robot-localization.py", around, ROOT / "configs/simulated-oxford.toml")
     assert done.returncode == 0, done.stderr
     printed, end = json.JSONDecoder().raw_decode(done.stdout)
     assert (printed["header"]["frame_id"], printed["child_frame_id"]) == ("odom", "radar")
@@ -67,12 +67,12 @@ def test_the_example_of_an_external_filter_publishes_and_fuses(around: Path) -> 
         assert np.all(np.diag(covariance)[[0, 1, 5]] < 1) and np.all(np.diag(covariance)[[2, 3, 4]] == 1e6)
     off = {name: float(metres) for name, metres in re.findall(r"(.+): ([\d.]+) m and .* off at the end", done.stdout[end:])}
     assert set(off) == {"wheels and gyro", "radar", "fused"}
-    assert off["fused"] < 1 and off["wheels and gyro"] > 2 * off["fused"]
+    assert off["fused"] < 0.5 and off["wheels and gyro"] > 4 * off["fused"]
 
 
 def test_the_settings_of_the_filter_take_the_velocities_alone() -> None:
     settings = (ROOT / "examples/robot_localization.yaml").read_text()
-    for sensor, taken in (("odom0", [6, 7, 11]), ("odom1", [6, 7]), ("imu0", [11])):
+    for sensor, taken in (("odom0", [6, 7, 11]), ("odom1", [6]), ("imu0", [11])):
         flags = re.search(rf"{sensor}_config: \[(.*?)\]", settings, re.DOTALL)
         assert flags is not None
         values = re.findall(r"\b(true|false)\b", flags[1])

@@ -20,7 +20,7 @@ def public() -> list[tuple[str, object]]:
         if name != "__version__":
             found.append((name, thing))
         if isinstance(thing, type):
-            found += [(f"{name}.{member}", value) for member, value in vars(thing).items() if not member.startswith("_")]
+            found += [(f"{name}.{member}", getattr(thing, member)) for member in vars(thing) if not member.startswith("_")]
     return found
 
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 try:
     import matplotlib.pyplot as plt
-except ImportError as error:
-    raise gyre.Error("--visualize needs matplotlib: install it, or gyre[visualize]") from error
+except ImportError:
+    raise gyre.Error("--visualize needs matplotlib: install it, or gyre[visualize]") from None
 
 VIEW_M = 100.0
 
