@@ -88,8 +88,8 @@ def wheels_and_gyro(before: Floats, after: Floats, dt: float, noise: np.random.G
     return velocity + noise.normal(0, sigma * [1, 0, 1]), np.diag(sigma**2)
 
 
-def main(recording: str, *config_file: str) -> None:
-    config = gyre.Config.read(*config_file) if config_file else gyre.Config.of(recording)
+def main(recording: str, config_file: str | None = None) -> None:
+    config = gyre.Config.read(config_file) if config_file else gyre.Config.of(recording)
     truth_file = gyre.find_ground_truth(recording)
     if truth_file is None:
         sys.exit(f"{recording} has no ground truth, of which wheels and gyro are simulated")
