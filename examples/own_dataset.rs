@@ -20,14 +20,14 @@ const SIZE: ImageSize = ImageSize {
 const BIN_M: f32 = 100.0 / 576.0;
 
 /// A folder of sweeps.
-pub struct RawSweeps {
+pub(crate) struct RawSweeps {
     files: FileList,
     stamp_ns: Vec<i64>,
 }
 
 impl RawSweeps {
     /// Lists the sweeps in a folder, ordered by time.
-    pub fn open(folder: &Path) -> Result<Self, Box<dyn Error>> {
+    pub(crate) fn open(folder: &Path) -> Result<Self, Box<dyn Error>> {
         let mut found = Vec::new();
         for entry in fs::read_dir(folder)? {
             let path = entry?.path();
@@ -127,7 +127,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// Registers the scans of any dataset.
-pub fn drive(dataset: &mut dyn Dataset) -> Result<Trajectory, Box<dyn Error>> {
+pub(crate) fn drive(dataset: &mut dyn Dataset) -> Result<Trajectory, Box<dyn Error>> {
     let mut odometry = Odometry::new(&OdometryConfig::default())?;
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut trajectory = Trajectory::default();

@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// Registers sweeps, whose memory is borrowed.
-pub fn drive(sweeps: i64) -> Result<Vec<Registered>, Box<dyn Error>> {
+pub(crate) fn drive(sweeps: i64) -> Result<Vec<Registered>, Box<dyn Error>> {
     let mut config = OdometryConfig::default();
     config.masking.threshold = 60;
     let mut odometry = Odometry::new(&config)?;
