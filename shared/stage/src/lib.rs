@@ -9,7 +9,7 @@
 //! 5. [`source`], [`stage`], [`sink`]: the loops of the first, the middle and the last processes; [`inputs`]: what a middle
 //!    process waits for.
 //! 6. [`follower`]: the loop of a process that reads durable logs and is not in the stream.
-//! 7. [`observer`]: subscribers that the run does not depend on.
+//! 7. [`observer`]: subscribers that the run does not depend on; [`relay`]: stand-ins for stages on another machine.
 //! 8. [`usage`]: what a process uses of the machine; [`hand_over`]: one topic alone, to measure the transport.
 //! 9. [`supervise`]: starts the processes, restarts dead ones, removes all resources at the end.
 //!
@@ -25,6 +25,7 @@ mod allocations;
 pub mod clock;
 pub mod control;
 mod counters;
+mod elsewhere;
 mod error;
 pub mod follower;
 pub mod hand_over;
@@ -34,7 +35,9 @@ pub mod launch;
 pub mod lock;
 mod log_id;
 pub mod observer;
+mod outlet;
 pub mod reader;
+pub mod relay;
 mod reservation;
 pub mod run;
 mod schedule;

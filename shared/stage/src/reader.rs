@@ -9,6 +9,7 @@ use iceoryx2::{
 
 use crate::{
     Launch, Manifest, StageError, clock,
+    outlet::RecordedMessage,
     services::{self, Ipc, Listener, Node, Notifier},
 };
 
@@ -51,6 +52,16 @@ impl<M: Message> Received<M> {
     /// Returns the values of the payload, in the publisher's memory.
     pub fn values<T: Pod>(&self) -> &[T] {
         bytemuck::cast_slice(self.sample.payload())
+    }
+
+    /// Returns a copy of the message outside of shared memory: its header, and what that describes of its payload.
+    pub fn to_bytes(&self) -> RecordedMessage {
+        let bytes = self.values::<u8>();
+        let content = M::content_bytes(self.header()).unwrap_or(bytes.len());
+        RecordedMessage {
+            header: bytemuck::bytes_of(self.header()).to_vec(),
+            payload: bytes[..content.min(bytes.len())].to_vec(),
+        }
     }
 
     /// Creates an error that names this message.
@@ -210,6 +221,13 @@ impl<M: Message> Reader<M> {
     pub fn release(&mut self) {
         self.advance();
         self.previous = None;
+    }
+
+    /// Takes the next item out of shared memory; `None` if there is none yet.
+    pub(crate) fn take_bytes(&mut self) -> Result<Option<RecordedMessage>, StageError> {
+        let message = self.head()?.map(Received::to_bytes);
+        self.release();
+        Ok(message)
     }
 
     /// Returns the number of items that were skipped because they had been received before.

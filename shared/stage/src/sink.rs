@@ -53,7 +53,7 @@ pub fn run<M: Message<Header = MotionHeader>, S: Sink>(
     }
     let poses = Writer::<Pose>::open(&launch.node, &launch.manifest)?;
     let (restored, ended) = sink.restore(Pose::sizes(&launch.manifest.window).history)?;
-    republish::<S>(&poses, &restored)?;
+    republish(&poses, &restored, S::HOP)?;
     let next = restored
         .last()
         .map_or(0, |pose| pose.item.seq.saturating_add(1));
@@ -89,7 +89,11 @@ pub fn run<M: Message<Header = MotionHeader>, S: Sink>(
 }
 
 /// Publishes the last poses again. The source resumes at the newest one, and masking needs the motions of all of them.
-fn republish<S: Sink>(poses: &Writer<Pose>, restored: &[PoseHeader]) -> Result<(), StageError> {
+pub(crate) fn republish(
+    poses: &Writer<Pose>,
+    restored: &[PoseHeader],
+    hop: StageId,
+) -> Result<(), StageError> {
     let base = PoseHeader {
         item: Item {
             flags: flag::BASE | flag::SYNC,
@@ -98,17 +102,17 @@ fn republish<S: Sink>(poses: &Writer<Pose>, restored: &[PoseHeader]) -> Result<(
         ..PoseHeader::default()
     };
     let Some((last, earlier)) = restored.split_last() else {
-        return publish::<S>(poses, base);
+        return publish(poses, base, hop);
     };
     for pose in earlier {
-        publish::<S>(poses, *pose)?;
+        publish(poses, *pose, hop)?;
     }
-    publish::<S>(poses, newest(*last))
+    publish(poses, newest(*last), hop)
 }
 
 /// Marks a pose as the newest. Older ones that are published again are not marked: a source that resumed at one of them would
 /// send more scans than its readers have room for.
-fn newest(pose: PoseHeader) -> PoseHeader {
+pub(crate) fn newest(pose: PoseHeader) -> PoseHeader {
     PoseHeader {
         item: Item {
             flags: pose.item.flags | flag::SYNC,
@@ -118,10 +122,14 @@ fn newest(pose: PoseHeader) -> PoseHeader {
     }
 }
 
-fn publish<S: Sink>(poses: &Writer<Pose>, pose: PoseHeader) -> Result<(), StageError> {
+pub(crate) fn publish(
+    poses: &Writer<Pose>,
+    pose: PoseHeader,
+    hop: StageId,
+) -> Result<(), StageError> {
     let mut draft = poses.loan()?;
     *draft.header() = pose;
-    poses.send(draft, S::HOP)
+    poses.send(draft, hop)
 }
 
 /// The motions in order, each with its scan if the sink takes scans.
@@ -236,7 +244,7 @@ impl<S: Sink> Integration<'_, S> {
             allocations::so_far() - allocated,
             clock::now_ns() - started_ns,
         );
-        publish::<S>(&self.poses, newest(pose))
+        publish(&self.poses, newest(pose), S::HOP)
     }
 
     fn publish_end(&mut self, item: Item) -> Result<(), StageError> {

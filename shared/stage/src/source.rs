@@ -13,12 +13,14 @@ use std::{num::NonZeroUsize, ops::Range};
 use gyre_messages::{ScanHeader, StageId};
 
 use crate::{Launch, StageCounters, StageError, schedule::ScheduleWriter, writer::Writer};
-use credit::Credit;
+pub(crate) use credit::Credit;
 use pace::Pace;
 use playback::Playback;
+pub(crate) use sensor::ALIVE_NS;
 
+pub use crate::outlet::RecordedMessage;
 pub use attempts::{Tolerance, Unreadable, open};
-pub use player::{Recorded, RecordedMessage, run_player};
+pub use player::{Recorded, run_player};
 pub use sensor::{Arrival, Sensor, run_sensor};
 
 /// A source of scans.

@@ -5,7 +5,7 @@ use gyre_messages::{Item, Pose, flag};
 use crate::{Launch, StageError, reader::Port};
 
 /// The progress of the run, from its poses.
-pub(super) struct Credit {
+pub(crate) struct Credit {
     pub poses: Port<Pose>,
     /// Sequence number of the newest pose.
     pub newest: Option<u64>,

@@ -3,24 +3,16 @@
 
 use std::{ops::Range, time::Duration};
 
-use gyre_messages::{
-    Header, Hop, Item, Masked, Message, Motion, Refined, Rotation, Scan, StageId, flag,
-};
+use gyre_messages::{Hop, Item, Scan, StageId, flag};
 
 use super::{Credit, Pace};
 use crate::{
-    Launch, Listener, StageCounters, StageError, clock, schedule::ScheduleWriter, wake,
+    Launch, StageCounters, StageError, clock,
+    outlet::{Outlet, RecordedMessage, item_of, outlet},
+    schedule::ScheduleWriter,
+    wake,
     writer::Writer,
 };
-
-/// A wire message as it was recorded.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct RecordedMessage {
-    /// The bytes of its header.
-    pub header: Vec<u8>,
-    /// The bytes of its payload that the header describes.
-    pub payload: Vec<u8>,
-}
 
 /// The recorded messages of a run.
 pub trait Recorded {
@@ -50,7 +42,7 @@ pub fn run_player(
     }
     let credit = Credit::open(launch)?;
     let schedule = ScheduleWriter::create(&launch.manifest)?;
-    let outputs = recorded.topics().iter().map(|topic| output(launch, topic));
+    let outputs = recorded.topics().iter().map(|topic| outlet(launch, topic));
     let outputs = outputs.collect::<Result<_, _>>()?;
     let mut player = Player {
         launch,
@@ -66,79 +58,11 @@ pub fn run_player(
     Ok(player.counters)
 }
 
-/// The publisher of a topic, whatever its type.
-trait Output {
-    fn topic(&self) -> &'static str;
-    /// Publishes a recorded message with this item.
-    fn send(&self, message: &RecordedMessage, item: Item) -> Result<(), StageError>;
-    /// Publishes the end of the stream.
-    fn end(&self, item: Item) -> Result<(), StageError>;
-    fn accept_readers(&self) -> Result<(), StageError>;
-    fn listener(&self) -> &Listener;
-}
-
-fn output(launch: &Launch, topic: &str) -> Result<Box<dyn Output>, StageError> {
-    let (node, manifest) = (&launch.node, &launch.manifest);
-    Ok(match topic {
-        Masked::TOPIC => Box::new(Writer::<Masked>::open(node, manifest)?),
-        Rotation::TOPIC => Box::new(Writer::<Rotation>::open(node, manifest)?),
-        Motion::TOPIC => Box::new(Writer::<Motion>::open(node, manifest)?),
-        Refined::TOPIC => Box::new(Writer::<Refined>::open(node, manifest)?),
-        _ => {
-            let reason = format!("a player does not publish the topic `{topic}`");
-            return Err(StageError::Configuration(reason));
-        }
-    })
-}
-
-impl<M: Message> Output for Writer<M> {
-    fn topic(&self) -> &'static str {
-        M::TOPIC
-    }
-
-    fn send(&self, message: &RecordedMessage, item: Item) -> Result<(), StageError> {
-        let mut draft = self.loan()?;
-        let (header, payload) = draft.parts::<u8>();
-        let (bytes, room) = (message.payload.len(), payload.len());
-        let is_whole = message.header.len() == size_of::<M::Header>();
-        let Some(content) = payload.get_mut(..bytes).filter(|_| is_whole) else {
-            return Err(StageError::Input(format!(
-                "the recorded message {} of topic `{}` has {bytes} bytes, and this run has room for {room}: its configuration is not that of the recorded run",
-                item.seq,
-                M::TOPIC
-            )));
-        };
-        content.copy_from_slice(&message.payload);
-        // What is behind it in memory has no meaning, and is not to differ from run to run.
-        payload[bytes..].fill(0);
-        *header = bytemuck::pod_read_unaligned(&message.header);
-        *header.item_mut() = item;
-        Writer::send(self, draft, StageId::RadarReplay)
-    }
-
-    fn end(&self, item: Item) -> Result<(), StageError> {
-        let mut draft = self.loan()?;
-        *draft.header().item_mut() = Item {
-            flags: flag::END,
-            ..item
-        };
-        Writer::send(self, draft, StageId::RadarReplay)
-    }
-
-    fn accept_readers(&self) -> Result<(), StageError> {
-        Writer::accept_readers(self)
-    }
-
-    fn listener(&self) -> &Listener {
-        Writer::listener(self)
-    }
-}
-
 struct Player<'a, R: Recorded> {
     launch: &'a Launch,
     recorded: &'a mut R,
     credit: Credit,
-    outputs: Vec<Box<dyn Output>>,
+    outputs: Vec<Box<dyn Outlet>>,
     schedule: ScheduleWriter,
     counters: StageCounters,
     _scans: Writer<Scan>,
@@ -249,21 +173,5 @@ impl<R: Recorded> Player<'_, R> {
             outputs.try_for_each(|output| output.accept_readers())?;
         }
         Ok(woken.stop)
-    }
-}
-
-/// Returns the item of recorded messages without the times of the recorded run.
-fn item_of(messages: &[RecordedMessage], seq: u64) -> Result<Item, StageError> {
-    let header = messages.first().map(|message| message.header.as_slice());
-    let item = header.and_then(|header| header.get(..size_of::<Item>()));
-    let item = item.map(bytemuck::pod_read_unaligned::<Item>);
-    match item.filter(|item| item.seq == seq) {
-        Some(item) => Ok(Item {
-            hops: Default::default(),
-            ..item
-        }),
-        None => Err(StageError::Input(format!(
-            "the recorded message {seq} is another one"
-        ))),
     }
 }

@@ -12,7 +12,7 @@ use crate::{
 
 /// Time for which the supervisor need not intervene: this loop says again and again that it is not late, since a radar that is
 /// switched off is no reason to restart it.
-const ALIVE_NS: i64 = 5_000_000_000;
+pub(crate) const ALIVE_NS: i64 = 5_000_000_000;
 /// Time between two such words, ns: it wakes many times for each scan, and a word is a write to a file.
 const SAID_EVERY_NS: i64 = 1_000_000_000;
 

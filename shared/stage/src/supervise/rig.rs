@@ -6,9 +6,11 @@
 
 mod recorded;
 
-use std::{collections::BTreeSet, fs, path::PathBuf, time::Duration};
+use std::{collections::BTreeSet, fs, os::fd::BorrowedFd, path::PathBuf, time::Duration};
 
-use gyre_messages::{Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId};
+use gyre_messages::{
+    Correction, Fix, Loop, Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId,
+};
 use iceoryx2::prelude::{Config, LogLevel, set_log_level};
 use rustix::process::{Pid, getpgid};
 
@@ -72,6 +74,9 @@ pub trait Feed {
 
     /// Returns the number of subscribers of the topic.
     fn subscribers(&self) -> usize;
+
+    /// Returns the listener that new readers notify.
+    fn listener(&self) -> &Listener;
 }
 
 /// A reader of a topic.
@@ -218,6 +223,24 @@ impl<'a> Rig<'a> {
         }
     }
 
+    /// Sleeps until one of these topics has a new reader, a connection has something to read, or `limit` has passed; true on a request
+    /// to stop.
+    ///
+    /// # Errors
+    /// The system refuses to wait.
+    pub fn sleep_until_readable(
+        &self,
+        feeds: &[&dyn Feed],
+        connection: BorrowedFd<'_>,
+        limit: Duration,
+    ) -> Result<bool, StageError> {
+        let handshakes: Vec<_> = feeds.iter().map(|feed| feed.listener()).collect();
+        let woken = self
+            .signals
+            .wait_or_readable(&[], &handshakes, Some(connection), limit)?;
+        Ok(woken.stop)
+    }
+
     /// Sleeps until one of these readers is notified or `limit` has passed; true on a request to stop.
     ///
     /// # Errors
@@ -253,6 +276,9 @@ macro_rules! of_topic {
             Motion::TOPIC => $self.$method::<Motion>($($argument),*),
             Refined::TOPIC => $self.$method::<Refined>($($argument),*),
             Pose::TOPIC => $self.$method::<Pose>($($argument),*),
+            Loop::TOPIC => $self.$method::<Loop>($($argument),*),
+            Correction::TOPIC => $self.$method::<Correction>($($argument),*),
+            Fix::TOPIC => $self.$method::<Fix>($($argument),*),
             topic => Err(no_such(topic)),
         }
     };
@@ -368,6 +394,10 @@ impl<M: Message<Header: Copy>> Feed for TypedFeed<M> {
     fn subscribers(&self) -> usize {
         use iceoryx2::prelude::PortFactory;
         self.topic.dynamic_config().number_of_subscribers()
+    }
+
+    fn listener(&self) -> &Listener {
+        self.writer.listener()
     }
 }
 

@@ -2,14 +2,17 @@
 //!
 //! The clock runs only while something is owed: a pose, of an item that the source has published, or an item that the source
 //! should have published by its own schedule. So neither slow playback nor a gap in a recording is a stall. A stage that has not
-//! opened its topics is starting: it may load a model, and has a limit of its own.
+//! opened its topics is starting: it may load a model, and has a limit of its own. What stages on another machine owe is watched there.
 
 use std::time::{Duration, Instant};
 
 use gyre_messages::Item;
 
 use super::{Plan, Stall};
-use crate::schedule::{self, Schedule};
+use crate::{
+    elsewhere,
+    schedule::{self, Schedule},
+};
 
 /// The clock of a run's stalls.
 pub(super) struct Watchdog {
@@ -66,7 +69,12 @@ impl Watchdog {
             });
         }
         let limit = self.stall_timeout?;
-        self.owe(self.owed_by(schedule::read(manifest), limit));
+        let poses = self.newest.map_or(0, |newest| newest.saturating_add(1));
+        let owed = match elsewhere::owes(manifest, poses) {
+            true => None,
+            false => self.owed_by(schedule::read(manifest), limit),
+        };
+        self.owe(owed);
         let (stall, since) = self.owed.as_ref()?;
         (since.elapsed() > limit).then(|| stall.clone())
     }

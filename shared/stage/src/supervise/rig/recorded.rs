@@ -2,7 +2,7 @@
 
 use gyre_messages::{Item, Message};
 
-use crate::StageError;
+use crate::{StageError, outlet::RecordedMessage};
 
 /// A message outside of shared memory, of any topic of a stage.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -29,6 +29,15 @@ impl Recorded {
             header: bytes.to_vec(),
             payload: payload.to_vec(),
             received_ns,
+        }
+    }
+
+    /// Creates a message of these bytes, whose header starts with an [`Item`].
+    pub fn from_bytes(message: RecordedMessage) -> Self {
+        Self {
+            header: message.header,
+            payload: message.payload,
+            received_ns: 0,
         }
     }
 

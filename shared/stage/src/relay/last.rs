@@ -1,0 +1,180 @@
+//! The stand-in for the last stages.
+
+use std::os::fd::BorrowedFd;
+
+use gyre_messages::{
+    Item, Masked, Message, Motion, MotionHeader, Pose, PoseHeader, Refined, Rotation, Scan,
+    StageId, flag,
+};
+
+use crate::{
+    Launch, StageCounters, StageError, elsewhere::ElsewhereWriter, outlet::RecordedMessage,
+    reader::Reader, services::Listener, sink, wake, writer::Writer,
+};
+
+/// Reads what the last stages read, which are on another machine, and publishes the poses that come back from them.
+pub struct LastStages<'a> {
+    launch: &'a Launch,
+    poses: Writer<Pose>,
+    /// For masking, if the searches are on the other machine.
+    motions: Option<Writer<Motion>>,
+    inlets: Vec<Box<dyn Inlet>>,
+    elsewhere: ElsewhereWriter,
+    counters: StageCounters,
+}
+
+impl<'a> LastStages<'a> {
+    /// Opens the topics that it publishes. `publishes_motions`: motions come back too.
+    ///
+    /// # Errors
+    /// A failure of the transport.
+    pub fn open(launch: &'a Launch, publishes_motions: bool) -> Result<Self, StageError> {
+        let (node, manifest) = (&launch.node, &launch.manifest);
+        let motions = publishes_motions.then(|| Writer::open(node, manifest));
+        Ok(Self {
+            launch,
+            elsewhere: ElsewhereWriter::create(manifest)?,
+            motions: motions.transpose()?,
+            poses: Writer::open(node, manifest)?,
+            inlets: Vec::new(),
+            counters: StageCounters::default(),
+        })
+    }
+
+    /// Publishes the last poses again, of which the newest says where the source goes on; without any, that it begins.
+    ///
+    /// # Errors
+    /// A failure of the transport.
+    pub fn republish(&self, restored: &[PoseHeader]) -> Result<(), StageError> {
+        sink::republish(&self.poses, restored, StageId::PoseIntegration)
+    }
+
+    /// Returns the number of poses to publish again.
+    pub fn history(&self) -> usize {
+        Pose::sizes(&self.launch.manifest.window).history
+    }
+
+    /// Subscribes to topics of the stream.
+    ///
+    /// # Errors
+    /// A topic that is none of the stream; a failure of the transport.
+    pub fn read(&mut self, topics: &[&str]) -> Result<(), StageError> {
+        let inlets = topics.iter().map(|topic| inlet(self.launch, topic));
+        self.inlets = inlets.collect::<Result<_, _>>()?;
+        Ok(())
+    }
+
+    /// Returns the next message of one of these topics, by its place among them; `None` if there is none yet.
+    ///
+    /// # Errors
+    /// A message that breaks its contract, a sequence gap, a failure of the transport.
+    pub fn receive(&mut self, topic: usize) -> Result<Option<RecordedMessage>, StageError> {
+        let inlet = self.inlets.get_mut(topic);
+        inlet.map_or(Ok(None), |inlet| inlet.receive())
+    }
+
+    /// Says that the other machine owes the poses of so many items, counted at the source.
+    ///
+    /// # Errors
+    /// A file of the run that cannot be written.
+    pub fn has_handed_over(&self, items: u64) -> Result<(), StageError> {
+        self.elsewhere.has_published(items)
+    }
+
+    /// Publishes a new pose, the credit for one more scan.
+    ///
+    /// # Errors
+    /// A failure of the transport.
+    pub fn publish_pose(&mut self, pose: PoseHeader) -> Result<(), StageError> {
+        let item = &pose.item;
+        let hop = item.hops[StageId::PoseIntegration as usize];
+        self.counters.record(0, hop.finished_ns - hop.started_ns);
+        sink::publish(&self.poses, sink::newest(pose), StageId::PoseIntegration)
+    }
+
+    /// Publishes the end of the stream.
+    ///
+    /// # Errors
+    /// A failure of the transport.
+    pub fn end(&self, item: Item) -> Result<(), StageError> {
+        let end = PoseHeader {
+            item: Item {
+                flags: flag::END,
+                ..item
+            },
+            ..PoseHeader::default()
+        };
+        sink::publish(&self.poses, end, StageId::PoseIntegration)
+    }
+
+    /// Publishes a motion.
+    ///
+    /// # Errors
+    /// A failure of the transport.
+    pub fn publish_motion(&self, motion: MotionHeader) -> Result<(), StageError> {
+        let Some(motions) = &self.motions else {
+            return Ok(());
+        };
+        let mut draft = motions.loan()?;
+        *draft.header() = motion;
+        motions.publish(draft)
+    }
+
+    /// Sleeps until a topic has a message or the connection has something to read, and answers the handshakes of new readers; true on
+    /// a request to stop.
+    ///
+    /// # Errors
+    /// A failure of the transport.
+    pub fn sleep(&mut self, connection: BorrowedFd<'_>) -> Result<bool, StageError> {
+        let data: Vec<_> = self.inlets.iter().map(|inlet| inlet.listener()).collect();
+        let motions = self.motions.as_ref().map(Writer::listener);
+        let handshakes: Vec<_> = [self.poses.listener()].into_iter().chain(motions).collect();
+        let signals = &self.launch.signals;
+        let woken =
+            signals.wait_or_readable(&data, &handshakes, Some(connection), wake::MAX_WAIT)?;
+        self.counters.wakes += 1;
+        if woken.may_have_new_readers() {
+            self.poses.accept_readers()?;
+            if let Some(motions) = &self.motions {
+                motions.accept_readers()?;
+            }
+        }
+        Ok(woken.stop)
+    }
+
+    /// Returns what was counted.
+    pub fn counters(&self) -> StageCounters {
+        self.counters.clone()
+    }
+}
+
+/// A reader in the place of a stage, whatever the type of its topic.
+trait Inlet {
+    fn receive(&mut self) -> Result<Option<RecordedMessage>, StageError>;
+    fn listener(&self) -> &Listener;
+}
+
+fn inlet(launch: &Launch, topic: &str) -> Result<Box<dyn Inlet>, StageError> {
+    // Whichever item comes first: after a restart that is one of the history.
+    Ok(match topic {
+        Scan::TOPIC => Box::new(Reader::<Scan>::open(launch, None)?),
+        Masked::TOPIC => Box::new(Reader::<Masked>::open(launch, None)?),
+        Rotation::TOPIC => Box::new(Reader::<Rotation>::open(launch, None)?),
+        Motion::TOPIC => Box::new(Reader::<Motion>::open(launch, None)?),
+        Refined::TOPIC => Box::new(Reader::<Refined>::open(launch, None)?),
+        _ => {
+            let reason = format!("no stage of the stream reads the topic `{topic}`");
+            return Err(StageError::Configuration(reason));
+        }
+    })
+}
+
+impl<M: Message> Inlet for Reader<M> {
+    fn receive(&mut self) -> Result<Option<RecordedMessage>, StageError> {
+        self.take_bytes()
+    }
+
+    fn listener(&self) -> &Listener {
+        Self::listener(self)
+    }
+}
