@@ -3,6 +3,8 @@
 //! It follows `journal/keyframes.log`. The places of keyframes are kept in `journal/places.log` and the verdicts on all candidates in
 //! `journal/loops.log`, from which a restarted process continues. Both follow from the keyframes, whenever those come.
 
+mod logged;
+
 use std::{collections::VecDeque, path::PathBuf};
 
 use gyre_estimation::places::{MAX_NEIGHBOURS, neighbours};
@@ -18,6 +20,8 @@ use gyre_stage::{
     Follower, Launch, StageCounters, StageError,
     follower::{self, Growth, LogId, Progress, Step},
 };
+
+pub use logged::LoggedLoops;
 
 /// Runs the follower to the end of the keyframes, or until SIGTERM.
 ///

@@ -1,0 +1,207 @@
+//! How the two sides of a split run agree where to go on, each time when the robot's side starts.
+
+use std::{thread, time::Duration};
+
+use gyre_messages::{Limits, topic};
+use gyre_stage::Manifest;
+use serde::{Deserialize, Serialize};
+use zenoh::{Session, Wait};
+
+use crate::{LinkConfig, LinkError};
+
+/// Time for an answer. Without one it is asked again.
+const ANSWER: Duration = Duration::from_secs(1);
+/// Time between two questions before there is a run that waits by itself.
+const PAUSE: Duration = Duration::from_millis(200);
+
+/// Returns the prefix of all keys of a split run.
+pub(crate) fn prefix(config: &LinkConfig) -> String {
+    format!("gyre/split/{}", config.name)
+}
+
+pub(crate) fn key(config: &LinkConfig) -> String {
+    format!("{}/begin", prefix(config))
+}
+
+/// The key at which a robot says what its scans are.
+pub(crate) fn scans_key(config: &LinkConfig) -> String {
+    format!("{}/scans", prefix(config))
+}
+
+/// The scans of a robot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Scans {
+    /// Bytes of the largest.
+    pub bytes: usize,
+}
+
+/// Waits for the robot and asks for its scans, which a base needs to know that has them sent.
+///
+/// # Errors
+/// A link that cannot be opened.
+pub fn ask_robot(config: &LinkConfig) -> Result<Scans, LinkError> {
+    let pause = || {
+        thread::sleep(PAUSE);
+        Ok(false)
+    };
+    let session = config.network().open(pause)?;
+    let failed = || LinkError::zenoh("ask the robot for its scans", &"it was interrupted");
+    let session = session.ok_or_else(failed)?;
+    loop {
+        let asked = session.get(scans_key(config)).timeout(ANSWER).wait();
+        let replies = asked.map_err(|e| LinkError::zenoh("ask the robot for its scans", &e))?;
+        let reply = replies
+            .recv()
+            .ok()
+            .and_then(|reply| reply.into_result().ok());
+        let scans = reply.map(|sample| serde_json::from_slice(&sample.payload().to_bytes()));
+        if let Some(Ok(scans)) = scans {
+            let _ = session.close().wait();
+            return Ok(scans);
+        }
+        thread::sleep(PAUSE);
+    }
+}
+
+/// What both sides must agree on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Agreement {
+    cut: String,
+    live: bool,
+    refines: bool,
+    window: usize,
+    look_back: usize,
+    limits: Limits,
+    /// The topics that cross the link, with the versions of their messages.
+    topics: Vec<(String, String)>,
+}
+
+/// The answer to a robot that starts.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Answer {
+    /// Items up to this one will have poses; `None`: there are none yet.
+    Go(Option<u64>),
+    /// Ask again: why.
+    Wait(String),
+    /// It is a side of another run: why.
+    Refused(String),
+}
+
+impl Agreement {
+    /// Returns that of this side.
+    pub fn of(manifest: &Manifest, config: &LinkConfig, topics: &[&'static str]) -> Self {
+        let versioned = |name: &&'static str| {
+            let version = topic(name).map_or("", |topic| (topic.header_type)());
+            ((*name).to_owned(), version.to_owned())
+        };
+        Self {
+            cut: config.cut.name().to_owned(),
+            live: manifest.live,
+            refines: manifest.refines,
+            window: manifest.window.scans,
+            look_back: manifest.window.look_back,
+            limits: manifest.limits,
+            topics: topics
+                .iter()
+                .chain(&["motion", "pose"])
+                .map(versioned)
+                .collect(),
+        }
+    }
+
+    /// Returns why the other side is not one of the same run, in a sentence.
+    pub fn difference(&self, robot: &Self) -> Option<String> {
+        let mode = |live| if live { "live" } else { "lossless" };
+        let differs = |key: &str, robot: String, base: String| {
+            (robot != base).then(|| {
+                format!("{key} is {robot} on the robot and {base} on the base: give both the same")
+            })
+        };
+        let (ours, theirs) = (&self.limits, &robot.limits);
+        differs("link.cut", robot.cut.clone(), self.cut.clone())
+            .or_else(|| differs("run.mode", mode(robot.live).into(), mode(self.live).into()))
+            .or_else(|| {
+                differs(
+                    "run.window",
+                    robot.window.to_string(),
+                    self.window.to_string(),
+                )
+            })
+            .or_else(|| {
+                differs(
+                    "raster.n",
+                    theirs.side().to_string(),
+                    ours.side().to_string(),
+                )
+            })
+            .or_else(|| {
+                differs(
+                    "raster.cell_m",
+                    theirs.cell_m.to_string(),
+                    ours.cell_m.to_string(),
+                )
+            })
+            .or_else(|| {
+                differs(
+                    "points.capacity",
+                    theirs.points.to_string(),
+                    ours.points.to_string(),
+                )
+            })
+            .or_else(|| {
+                differs(
+                    "the number of scans of a mask",
+                    theirs.rasters.to_string(),
+                    ours.rasters.to_string(),
+                )
+            })
+            .or_else(|| {
+                differs(
+                    "refinement",
+                    robot.refines.to_string(),
+                    self.refines.to_string(),
+                )
+            })
+            .or_else(|| {
+                self.topics.iter().find_map(|(name, version)| {
+                    let theirs = robot.topics.iter().find(|(topic, _)| topic == name);
+                    let theirs = theirs.map_or("not sent", |(_, version)| version);
+                    differs(
+                        &format!("topic `{name}`"),
+                        theirs.to_owned(),
+                        version.clone(),
+                    )
+                })
+            })
+    }
+}
+
+/// Asks the base where to go on; `None`: it does not answer.
+pub(crate) fn ask(
+    session: &Session,
+    config: &LinkConfig,
+    agreement: &Agreement,
+) -> Result<Option<Answer>, LinkError> {
+    let failed = |e: &dyn std::fmt::Display| LinkError::zenoh("ask the base where to go on", e);
+    let payload = serde_json::to_vec(agreement).map_err(|e| failed(&e))?;
+    let replies = session
+        .get(key(config))
+        .payload(payload)
+        .timeout(ANSWER)
+        .wait()
+        .map_err(|e| failed(&e))?;
+    let Ok(reply) = replies.recv() else {
+        return Ok(None);
+    };
+    let Ok(sample) = reply.into_result() else {
+        return Ok(None);
+    };
+    let answer = serde_json::from_slice(&sample.payload().to_bytes());
+    let other = |_| {
+        LinkError::Refused(
+            "the base is another version of gyre: install the same on both".to_owned(),
+        )
+    };
+    answer.map(Some).map_err(other)
+}

@@ -1,0 +1,93 @@
+//! The section `[link]`.
+
+use std::path::PathBuf;
+
+use gyre_radar_replay::PlayedFrom;
+use serde::{Deserialize, Serialize};
+
+use crate::Network;
+
+/// The side of a run that is split between two machines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Side {
+    /// The source, and the stages up to the cut.
+    Robot,
+    /// The stages after the cut, and the results.
+    Base,
+}
+
+/// A run that is split between two machines: section `[link]`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct LinkConfig {
+    /// The side that this machine has: `robot`, with the source and the stages up to the cut, or `base`, with those after it. Default: the run is
+    /// not split.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub side: Option<Side>,
+    /// Topic at which the run is split: `scan`, `masked`, `rotation`, `motion` or `refined`. The stage that publishes it is the last one on the robot.
+    pub cut: PlayedFrom,
+    /// Name of the link, the same on both sides, and another one for each robot.
+    pub name: String,
+    /// Where this side waits for the other, as in `tls/0.0.0.0:7447`; `tcp/` on loopback addresses alone.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub listen: Vec<String>,
+    /// Where this side reaches the other, or a router between them, as in `tls/base.example:7447`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub connect: Vec<String>,
+    /// Certificate of the authority that has signed those of both sides, PEM.
+    #[serde(skip_serializing_if = "is_empty")]
+    pub ca: PathBuf,
+    /// Certificate of this side, PEM.
+    #[serde(skip_serializing_if = "is_empty")]
+    pub certificate: PathBuf,
+    /// Private key of the certificate, PEM.
+    #[serde(skip_serializing_if = "is_empty")]
+    pub key: PathBuf,
+    /// Whether a robot sends masked scans beside a later cut: the keyframes of SLAM need them. Set by `slam.kind`.
+    #[serde(skip_serializing_if = "is_false")]
+    pub keyframes: bool,
+}
+
+fn is_empty(path: &std::path::Path) -> bool {
+    path.as_os_str().is_empty()
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
+impl Default for LinkConfig {
+    fn default() -> Self {
+        Self {
+            side: None,
+            cut: PlayedFrom::Masked,
+            name: "gyre".to_owned(),
+            listen: Vec::new(),
+            connect: Vec::new(),
+            ca: PathBuf::new(),
+            certificate: PathBuf::new(),
+            key: PathBuf::new(),
+            keyframes: false,
+        }
+    }
+}
+
+impl LinkConfig {
+    /// Returns how the other side is reached.
+    pub fn network(&self) -> Network {
+        Network {
+            name: self.name.clone(),
+            listen: self.listen.clone(),
+            connect: self.connect.clone(),
+            ca: self.ca.clone(),
+            certificate: self.certificate.clone(),
+            key: self.key.clone(),
+        }
+    }
+
+    /// Returns whether motions go back to masking, which is before the cut, from the searches, which are behind it.
+    pub fn returns_motions(&self) -> bool {
+        matches!(self.cut, PlayedFrom::Masked | PlayedFrom::Rotation)
+    }
+}

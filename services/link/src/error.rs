@@ -1,0 +1,69 @@
+//! Why a link fails.
+
+use std::path::PathBuf;
+
+use gyre_pose_integration::journal::JournalError;
+use gyre_stage::{StageError, supervise::SuperviseError};
+use thiserror::Error;
+
+use crate::NetworkError;
+
+/// Why a link fails. What a restart of its process may help against is told from what it would not.
+#[derive(Debug, Error)]
+pub enum LinkError {
+    /// The endpoints or the certificates.
+    #[error("link: {0}")]
+    Network(#[from] NetworkError),
+    /// The network layer.
+    #[error("cannot {action}: {reason}")]
+    Zenoh {
+        /// The operation.
+        action: String,
+        /// The reason.
+        reason: String,
+    },
+    /// The other side is of another run.
+    #[error("{0}")]
+    Refused(String),
+    /// The run cannot be observed, or the transport fails.
+    #[error(transparent)]
+    Stage(#[from] StageError),
+    /// A run of its own cannot be made.
+    #[error(transparent)]
+    Supervise(#[from] SuperviseError),
+    /// The journal cannot be read or written.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
+    /// A file.
+    #[error("{path}: {source}")]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// The system error.
+        source: std::io::Error,
+    },
+}
+
+impl LinkError {
+    /// Creates an error of the network layer.
+    pub(crate) fn zenoh(action: &str, error: &dyn std::fmt::Display) -> Self {
+        // It adds the place in its sources.
+        let text = error.to_string();
+        let reason = text.split(" at /").next().unwrap_or_default().to_owned();
+        Self::Zenoh {
+            action: action.to_owned(),
+            reason,
+        }
+    }
+}
+
+impl From<LinkError> for StageError {
+    fn from(error: LinkError) -> Self {
+        match error {
+            LinkError::Stage(error) => error,
+            LinkError::Zenoh { action, reason } => Self::Transport { action, reason },
+            LinkError::Network(_) => Self::Configuration(error.to_string()),
+            _ => Self::Input(error.to_string()),
+        }
+    }
+}

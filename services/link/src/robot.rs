@@ -1,0 +1,364 @@
+//! The robot's side of a split run: in the place of the last stages, which the base has.
+//!
+//! It journals the poses that come back as pose-integration does, so this side has all results too, and goes on after a restart. It begins
+//! when the base has said which items will have poses: only then does it publish the newest pose, at which the source goes on.
+
+use std::{collections::VecDeque, sync::Arc};
+
+use bytemuck::Pod;
+use gyre_messages::{
+    Hop, Item, Masked, Message as _, Motion, MotionHeader, Pose, PoseHeader, StageId, flag,
+};
+use gyre_pose_integration::journal::{self, Journal};
+use gyre_radar_replay::PlayedFrom;
+use gyre_stage::{Launch, StageCounters, StageError, clock, relay::LastStages};
+use zenoh::{Session, Wait, qos::Priority, query::Queryable};
+
+use crate::{
+    LinkConfig, LinkError,
+    begin::{self, Agreement, Answer, Scans},
+    fetch::{Fetcher, Request},
+    serve::{Offer, Server},
+    status::Status,
+    tape::{Message, Ring},
+    wake::Sleeper,
+};
+
+/// Runs the robot's side until SIGTERM.
+///
+/// # Errors
+/// A base of another run, a journal that cannot be used, or a failure of the transport.
+pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+    if !launch.take_place()? {
+        return Ok(StageCounters::default());
+    }
+    let config: LinkConfig = launch.section("link")?;
+    let journal = Journal::open(&journal::path(&launch.manifest.out)).map_err(LinkError::from)?;
+    let mut stages = LastStages::open(launch, config.returns_motions())?;
+    let sleeper = Sleeper::new().map_err(|e| LinkError::zenoh("make a socket", &e))?;
+    let sleep = || Ok(stages.sleep(sleeper.descriptor())?);
+    let Some(session) = config.network().open(sleep)? else {
+        return Ok(stages.counters());
+    };
+    let mut robot = Robot {
+        launch,
+        stages,
+        journal,
+        poses: VecDeque::new(),
+        sent: VecDeque::new(),
+        session,
+        sleeper,
+        config,
+    };
+    let worked = robot.work();
+    let _ = robot.session.close().wait();
+    worked?;
+    Ok(robot.stages.counters())
+}
+
+struct Robot<'a> {
+    launch: &'a Launch,
+    config: LinkConfig,
+    stages: LastStages<'a>,
+    journal: Journal,
+    /// The newest poses, to be published again.
+    poses: VecDeque<PoseHeader>,
+    /// The newest items of the cut, with their times on this machine.
+    sent: VecDeque<Item>,
+    session: Session,
+    sleeper: Sleeper,
+}
+
+/// A topic that the base asks for.
+struct Sent {
+    tape: Arc<Ring>,
+    offer: Arc<Offer>,
+}
+
+impl Robot<'_> {
+    fn work(&mut self) -> Result<(), LinkError> {
+        let _scans = self.tell_of_scans()?;
+        if self.restore()? {
+            return self.repeat_end();
+        }
+        let Some(received) = self.begin()? else {
+            return Ok(());
+        };
+        let poses = self.fetch(Pose::TOPIC);
+        if !self.catch_up(&poses, received)? {
+            return Ok(());
+        }
+        self.stages.republish(self.poses.make_contiguous())?;
+        self.stages.has_handed_over(0)?;
+        self.relay(&poses)
+    }
+
+    /// Answers a base that wants to know how large scans are.
+    fn tell_of_scans(&self) -> Result<Queryable<()>, LinkError> {
+        let bytes = self.launch.manifest.limits.scan_bytes;
+        let key = begin::scans_key(&self.config);
+        let text = serde_json::to_string(&Scans { bytes });
+        let text = text.map_err(|e| LinkError::zenoh("tell of the scans", &e))?;
+        let answered = key.clone();
+        self.session
+            .declare_queryable(key)
+            .callback(move |query| drop(query.reply(&answered, &text).wait()))
+            .wait()
+            .map_err(|e| LinkError::zenoh("tell of the scans", &e))
+    }
+
+    /// Reads the last poses of the journal; returns whether the stream has ended.
+    fn restore(&mut self) -> Result<bool, LinkError> {
+        let (poses, ended) = self.journal.last(self.stages.history().max(1))?;
+        self.poses = poses.into();
+        Ok(ended)
+    }
+
+    /// The run before has ended, and only its results are missing.
+    fn repeat_end(&mut self) -> Result<(), LinkError> {
+        self.stages.republish(self.poses.make_contiguous())?;
+        self.stages
+            .end(self.poses.back().map(|pose| pose.item).unwrap_or_default())?;
+        while !self.sleep()? {}
+        Ok(())
+    }
+
+    /// Returns the number of the first pose that is not in the journal.
+    fn next_pose(&self) -> u64 {
+        self.poses
+            .back()
+            .map_or(0, |pose| pose.item.seq.saturating_add(1))
+    }
+
+    /// Asks the base where to go on until it answers: `Some` with the number of items that have poses or will; `None` on a request to stop.
+    fn begin(&mut self) -> Result<Option<u64>, LinkError> {
+        let topics = self.topics();
+        let agreement = Agreement::of(&self.launch.manifest, &self.config, &topics);
+        let mut said = String::new();
+        loop {
+            let waits = match begin::ask(&self.session, &self.config, &agreement)? {
+                Some(Answer::Go(newest)) => {
+                    let received = newest.map_or(0, |newest| newest + 1);
+                    return self.judge(received).map(|()| Some(received));
+                }
+                Some(Answer::Refused(why)) => return Err(LinkError::Refused(why)),
+                Some(Answer::Wait(why)) => why,
+                None => "the base does not answer yet".to_owned(),
+            };
+            if waits != said {
+                tracing::info!("waiting: {waits}");
+                said = waits;
+            }
+            if self.sleep()? {
+                return Ok(None);
+            }
+        }
+    }
+
+    /// Checks that this side can go on after so many items.
+    fn judge(&self, received: u64) -> Result<(), LinkError> {
+        let (poses, base) = (self.next_pose(), received);
+        let window = self.launch.manifest.window.scans as u64;
+        match self.config.cut {
+            _ if base < poses => Err(LinkError::Refused(format!(
+                "this run has {poses} poses, but the base begins at {base}: begin both anew with --fresh, or go on with the base's --out of this run"
+            ))),
+            // Its local map is here, and is not made of poses.
+            PlayedFrom::Refined if base > poses.saturating_add(window) => {
+                Err(LinkError::Refused(format!(
+                    "the base has {base} poses and this run {poses}, and the local map of the refinement, which is here, cannot be made up: begin both anew with --fresh"
+                )))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Journals the poses of all items that the base had received before this side began; false on a request to stop.
+    fn catch_up(&mut self, poses: &Fetcher, received: u64) -> Result<bool, LinkError> {
+        while self.next_pose() < received {
+            self.sleeper.clear();
+            while let Some(bytes) = poses.next() {
+                self.journal(&bytes)?;
+            }
+            if self.next_pose() < received && self.sleep()? {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Sends what the stages here publish, and publishes what comes back, until SIGTERM.
+    fn relay(&mut self, poses: &Fetcher) -> Result<(), LinkError> {
+        let topics = self.topics();
+        self.stages.read(&topics)?;
+        let prefix = begin::prefix(&self.config);
+        let mut server = Server::new(&self.session, &prefix, Some(self.sleeper.waker()));
+        let depth = Masked::sizes(&self.launch.manifest.window).buffer;
+        let sent = topics.iter().map(|topic| {
+            let tape = Arc::new(Ring::of(depth));
+            let offer = server.offer(topic, tape.clone())?;
+            Ok(Sent { tape, offer })
+        });
+        let sent = sent.collect::<Result<Vec<_>, LinkError>>()?;
+        let motions = self
+            .config
+            .returns_motions()
+            .then(|| self.fetch(Motion::TOPIC));
+        let (mut end, mut has_ended) = (None, false);
+        let mut status = Status::of("base");
+        loop {
+            self.sleeper.clear();
+            for (place, sent) in sent.iter().enumerate() {
+                end = self.send(place, sent, topics.len(), depth)?.or(end);
+            }
+            while let Some(bytes) = motions.as_ref().and_then(Fetcher::next) {
+                self.stages
+                    .publish_motion(self.checked::<Motion, MotionHeader>(&bytes)?)?;
+            }
+            self.take_poses(poses)?;
+            status.update(poses.is_connected(), self.next_pose());
+            if let Some(end) = end.filter(|end| !has_ended && self.next_pose() == end.seq) {
+                has_ended = self.end(&end, &sent, poses)?;
+            }
+            if self.sleep()? {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Gives the base what a topic has; returns the item of the end if it is among it.
+    fn send(
+        &mut self,
+        place: usize,
+        sent: &Sent,
+        topics: usize,
+        depth: usize,
+    ) -> Result<Option<Item>, LinkError> {
+        let mut end = None;
+        while let Some(message) = self.stages.receive(place)? {
+            let item = message.item().unwrap_or_default();
+            // The cut is the last of the topics: a scan is handed over when the base has all of it.
+            if place + 1 == topics {
+                self.sent.push_back(item);
+                self.sent.drain(..self.sent.len().saturating_sub(depth));
+                self.stages
+                    .has_handed_over(item.published.saturating_add(1))?;
+                end = item.is(flag::END).then_some(item);
+            }
+            sent.tape.push(Message::of(&message));
+        }
+        Ok(end)
+    }
+
+    fn take_poses(&mut self, poses: &Fetcher) -> Result<(), LinkError> {
+        while let Some(bytes) = poses.next() {
+            if let Some(pose) = self.journal(&bytes)? {
+                self.stages.publish_pose(pose)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Journals a pose that has come; `None` if it was there already.
+    fn journal(&mut self, bytes: &[u8]) -> Result<Option<PoseHeader>, LinkError> {
+        let mut pose = self.checked::<Pose, PoseHeader>(bytes)?;
+        let (expected, got) = (self.next_pose(), pose.item.seq);
+        if got < expected || pose.item.is(flag::END) {
+            return Ok(None);
+        }
+        if got > expected {
+            return Err(StageError::SequenceGap {
+                topic: Pose::TOPIC,
+                expected,
+                got,
+            }
+            .into());
+        }
+        pose.item = self.timed(pose.item);
+        self.journal.append(&pose)?;
+        self.poses.push_back(pose);
+        let history = self.stages.history().max(1);
+        self.poses.drain(..self.poses.len().saturating_sub(history));
+        Ok(Some(pose))
+    }
+
+    /// Returns the item of a pose with the times on this machine, whose clock is another one: all that the base does is the work of the
+    /// last stage here.
+    fn timed(&self, item: Item) -> Item {
+        let now_ns = clock::now_ns();
+        let sent = self.sent.iter().find(|sent| sent.seq == item.seq);
+        let mut timed = sent.map_or(
+            Item {
+                hops: Default::default(),
+                due_ns: now_ns,
+                ..item
+            },
+            |sent| *sent,
+        );
+        let handed_over_ns = timed.hops.iter().map(|hop| hop.published_ns).max();
+        let received_ns = handed_over_ns.filter(|ns| *ns > 0).unwrap_or(now_ns);
+        *timed.hop_mut(StageId::PoseIntegration) = Hop {
+            received_ns,
+            started_ns: received_ns,
+            finished_ns: now_ns,
+            published_ns: 0,
+        };
+        timed
+    }
+
+    /// Ends this side when the base has the end too; false if it has not yet. Until it asks for what follows the end, it may not have it.
+    fn end(&mut self, end: &Item, sent: &[Sent], poses: &Fetcher) -> Result<bool, LinkError> {
+        // The base ends when it knows that all poses are here.
+        poses.confirm();
+        let has_end = |sent: &Sent| sent.offer.asked() > end.seq;
+        if !sent.iter().all(has_end) {
+            return Ok(false);
+        }
+        self.journal.append(&PoseHeader {
+            item: Item {
+                flags: flag::END,
+                ..*end
+            },
+            ..PoseHeader::default()
+        })?;
+        self.stages.end(*end)?;
+        Ok(true)
+    }
+
+    /// Returns the topics that cross the link, the cut last.
+    fn topics(&self) -> Vec<&'static str> {
+        let refines = self.launch.manifest.refines;
+        self.config.cut.topics(refines, self.config.keyframes)
+    }
+
+    fn fetch(&self, topic: &str) -> Fetcher {
+        let request = Request {
+            key: format!("{}/{topic}", begin::prefix(&self.config)),
+            from: self.next_pose(),
+            priority: Priority::InteractiveHigh,
+        };
+        Fetcher::start(&self.session, request, self.sleeper.waker())
+    }
+
+    /// Returns the header of a message from the network, if it keeps the contract of its topic.
+    fn checked<M: gyre_messages::Message<Header = H>, H: Pod>(
+        &self,
+        bytes: &[u8],
+    ) -> Result<H, LinkError> {
+        let malformed = |reason: String| StageError::Malformed {
+            topic: M::TOPIC,
+            sender: "the base",
+            seq: 0,
+            reason,
+        };
+        let header: H = bytemuck::try_pod_read_unaligned(bytes)
+            .map_err(|_| malformed(format!("{} bytes are no message", bytes.len())))?;
+        M::check(&header, &[], &self.launch.manifest.limits)
+            .map_err(|violation| malformed(violation.to_string()))?;
+        Ok(header)
+    }
+
+    fn sleep(&mut self) -> Result<bool, LinkError> {
+        Ok(self.stages.sleep(self.sleeper.descriptor())?)
+    }
+}

@@ -1,0 +1,224 @@
+//! The end of a topic that sends: answers each request by the messages from the one that it names on.
+
+use std::{
+    collections::BTreeMap,
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, AtomicU64, Ordering},
+    },
+    thread,
+    time::{Duration, Instant},
+};
+
+use zenoh::{
+    Session, Wait,
+    query::{Query, Queryable},
+};
+
+use crate::{
+    LinkError,
+    tape::{Next, Tape},
+    wake::Waker,
+};
+
+/// Time for which a request is answered. Then the receiver asks again, so that a sender forgets one that has gone.
+pub(crate) const ANSWERED_FOR: Duration = Duration::from_secs(20);
+/// Time between two looks whether a request is still wanted.
+const LOOK: Duration = Duration::from_millis(200);
+/// Time after which a receiver has gone that does not ask again.
+const GONE: Duration = ANSWERED_FOR.saturating_mul(2);
+/// Requests that are answered at once. One receiver has one for each topic.
+const MAX_REQUESTS: usize = 64;
+
+/// The answer that says that no message follows.
+pub(crate) const ENDED: &str = "ended";
+/// The parameter with the first message that is wanted.
+pub(crate) const FROM: &str = "from";
+/// The parameter that tells one receiver from another.
+pub(crate) const RECEIVER: &str = "receiver";
+
+/// The topics that are offered to the other side.
+pub(crate) struct Server {
+    session: Session,
+    prefix: String,
+    waker: Option<Waker>,
+    stop: Arc<AtomicBool>,
+    queryables: Vec<Queryable<()>>,
+}
+
+/// A topic that is offered.
+pub(crate) struct Offer {
+    tape: Arc<dyn Tape>,
+    key: String,
+    /// The highest number that was asked for: all before it has arrived.
+    asked: AtomicU64,
+    /// The newest request of each receiver, which replaces those before.
+    receivers: Mutex<BTreeMap<String, Asking>>,
+    running: AtomicU64,
+    /// Messages and bytes that were sent.
+    messages: AtomicU64,
+    bytes: AtomicU64,
+    waker: Option<Waker>,
+    stop: Arc<AtomicBool>,
+}
+
+/// A receiver of a topic.
+struct Asking {
+    /// Number of its newest request.
+    request: u64,
+    at: Instant,
+    /// Whether it knows that the topic has ended.
+    knows_end: bool,
+}
+
+impl Server {
+    /// Offers topics under this prefix of keys. `waker` is told of each request.
+    pub fn new(session: &Session, prefix: &str, waker: Option<Waker>) -> Self {
+        Self {
+            session: session.clone(),
+            prefix: prefix.to_owned(),
+            waker,
+            stop: Arc::default(),
+            queryables: Vec::new(),
+        }
+    }
+
+    /// Offers a topic.
+    pub fn offer(&mut self, topic: &str, tape: Arc<dyn Tape>) -> Result<Arc<Offer>, LinkError> {
+        let offer = Arc::new(Offer {
+            tape,
+            key: format!("{}/{topic}", self.prefix),
+            asked: AtomicU64::new(0),
+            receivers: Mutex::default(),
+            running: AtomicU64::new(0),
+            messages: AtomicU64::new(0),
+            bytes: AtomicU64::new(0),
+            waker: self.waker.clone(),
+            stop: self.stop.clone(),
+        });
+        let answering = offer.clone();
+        let queryable = self
+            .session
+            .declare_queryable(&offer.key)
+            .callback(move |query| answering.clone().accept(query))
+            .wait()
+            .map_err(|e| LinkError::zenoh(&format!("offer {topic}"), &e))?;
+        self.queryables.push(queryable);
+        Ok(offer)
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+    }
+}
+
+impl Offer {
+    /// Returns the highest number that was asked for: all messages before it have arrived.
+    pub fn asked(&self) -> u64 {
+        self.asked.load(Ordering::Relaxed)
+    }
+
+    /// Returns the messages and the bytes that were sent.
+    pub fn sent(&self) -> (u64, u64) {
+        let read = |number: &AtomicU64| number.load(Ordering::Relaxed);
+        (read(&self.messages), read(&self.bytes))
+    }
+
+    /// Returns whether all receivers that have been there lately know that the topic has ended.
+    pub fn is_known_to_have_ended(&self) -> bool {
+        let is_gone = |asking: &Asking| asking.at.elapsed() > GONE;
+        let receivers = self.receivers();
+        receivers
+            .values()
+            .all(|asking| asking.knows_end || is_gone(asking))
+    }
+
+    fn receivers(&self) -> MutexGuard<'_, BTreeMap<String, Asking>> {
+        self.receivers
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Answers a request in a thread of its own, since sending waits while the network is slow.
+    fn accept(self: Arc<Self>, query: Query) {
+        let parameters = query.parameters();
+        let from = parameters.get(FROM).and_then(|from| from.parse().ok());
+        let receiver = parameters.get(RECEIVER).unwrap_or_default().to_owned();
+        let running = self.running.fetch_add(1, Ordering::Relaxed);
+        let Some(from) = from.filter(|_| running < MAX_REQUESTS as u64) else {
+            self.running.fetch_sub(1, Ordering::Relaxed);
+            return;
+        };
+        self.asked.fetch_max(from, Ordering::Relaxed);
+        if let Some(waker) = &self.waker {
+            waker.wake();
+        }
+        let request = self.replace(&receiver);
+        let _ = thread::Builder::new().spawn(move || {
+            if let Err(error) = self.answer(&query, from, &receiver, request) {
+                tracing::debug!("{}: {error}", self.key);
+            }
+            self.running.fetch_sub(1, Ordering::Relaxed);
+        });
+    }
+
+    fn answer(
+        &self,
+        query: &Query,
+        mut next: u64,
+        receiver: &str,
+        request: u64,
+    ) -> Result<(), LinkError> {
+        // The receiver learns at once that somebody is there.
+        self.reply(query, &[])?;
+        let until = Instant::now() + ANSWERED_FOR;
+        while Instant::now() < until && self.is_wanted(receiver, request) {
+            match self.tape.next(next, LOOK)? {
+                Next::Message(message) => {
+                    self.reply(query, &message.bytes)?;
+                    self.messages.fetch_add(1, Ordering::Relaxed);
+                    let bytes = message.bytes.len() as u64;
+                    self.bytes.fetch_add(bytes, Ordering::Relaxed);
+                    next = message.seq.saturating_add(1);
+                }
+                Next::Nothing => {}
+                Next::Ended => return self.reply_ended(query, receiver),
+            }
+        }
+        Ok(())
+    }
+
+    fn reply_ended(&self, query: &Query, receiver: &str) -> Result<(), LinkError> {
+        let replied = query.reply_err(ENDED).wait();
+        replied.map_err(|e| LinkError::zenoh("send", &e))?;
+        if let Some(asking) = self.receivers().get_mut(receiver) {
+            asking.knows_end = true;
+        }
+        Ok(())
+    }
+
+    fn reply(&self, query: &Query, bytes: &[u8]) -> Result<(), LinkError> {
+        let reply = query.reply(&self.key, bytes).express(true);
+        reply.wait().map_err(|e| LinkError::zenoh("send", &e))
+    }
+
+    /// Counts the requests of a receiver; returns the number of this one.
+    fn replace(&self, receiver: &str) -> u64 {
+        let mut receivers = self.receivers();
+        let before = receivers.get(receiver).map_or(0, |asking| asking.request);
+        let asking = Asking {
+            request: before + 1,
+            at: Instant::now(),
+            knows_end: false,
+        };
+        receivers.insert(receiver.to_owned(), asking);
+        before + 1
+    }
+
+    fn is_wanted(&self, receiver: &str, request: u64) -> bool {
+        let newest = self.receivers().get(receiver).map(|asking| asking.request);
+        !self.stop.load(Ordering::Relaxed) && newest == Some(request)
+    }
+}

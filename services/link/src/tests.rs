@@ -1,0 +1,188 @@
+//! Both ends of a topic over the network layer, on this machine.
+
+#![allow(clippy::unwrap_used)]
+use std::{
+    net::TcpListener,
+    sync::Arc,
+    thread,
+    time::{Duration, Instant},
+};
+
+use gyre_messages::Item;
+use zenoh::{Session, Wait, qos::Priority};
+
+use crate::{
+    Network,
+    fetch::{Fetcher, Request},
+    serve::Server,
+    tape::{Message, Next, Ring, Tape},
+    wake::Sleeper,
+};
+
+const PATIENCE: Duration = Duration::from_secs(60);
+
+fn message(seq: u64) -> Message {
+    let item = Item {
+        seq,
+        ..Item::default()
+    };
+    Message {
+        seq,
+        bytes: bytemuck::bytes_of(&item).into(),
+    }
+}
+
+fn seq(bytes: &[u8]) -> u64 {
+    bytemuck::pod_read_unaligned::<Item>(&bytes[..size_of::<Item>()]).seq
+}
+
+fn endpoint() -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    format!("tcp/{}", listener.local_addr().unwrap())
+}
+
+fn open(network: Network) -> Session {
+    let pause = || {
+        thread::sleep(Duration::from_millis(5));
+        Ok(false)
+    };
+    network.open(pause).unwrap().unwrap()
+}
+
+fn listening(endpoint: &str) -> Network {
+    Network {
+        name: "test".to_owned(),
+        listen: vec![endpoint.to_owned()],
+        ..Network::default()
+    }
+}
+
+fn connecting(endpoint: &str) -> Network {
+    Network {
+        name: "test".to_owned(),
+        connect: vec![endpoint.to_owned()],
+        ..Network::default()
+    }
+}
+
+fn fetcher(session: &Session, from: u64) -> (Fetcher, Sleeper) {
+    let sleeper = Sleeper::new().unwrap();
+    let request = Request {
+        key: "gyre/test/topic".to_owned(),
+        from,
+        priority: Priority::Data,
+    };
+    (Fetcher::start(session, request, sleeper.waker()), sleeper)
+}
+
+/// Waits until so many messages have come.
+fn take(fetcher: &Fetcher, count: usize) -> Vec<u64> {
+    let since = Instant::now();
+    let mut taken = Vec::new();
+    while taken.len() < count {
+        assert!(since.elapsed() < PATIENCE, "only {taken:?} came");
+        match fetcher.next() {
+            Some(bytes) => taken.push(seq(&bytes)),
+            None => thread::sleep(Duration::from_millis(5)),
+        }
+    }
+    taken
+}
+
+fn until(what: &str, mut is_so: impl FnMut() -> bool) {
+    let since = Instant::now();
+    while !is_so() {
+        assert!(since.elapsed() < PATIENCE, "waited in vain until {what}");
+        thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn a_receiver_gets_all_from_the_message_that_it_asks_for_and_knows_the_end() {
+    let address = endpoint();
+    // The receiver is there first, and tries again until the sender is.
+    let there = {
+        let network = connecting(&address);
+        thread::spawn(|| open(network))
+    };
+    let here = open(listening(&address));
+    let there = there.join().unwrap();
+    let (fetcher, _sleeper) = fetcher(&there, 3);
+    let ring = Arc::new(Ring::of(100));
+    (0..5).for_each(|seq| ring.push(message(seq)));
+    let mut server = Server::new(&here, "gyre/test", None);
+    let offer = server.offer("topic", ring.clone()).unwrap();
+    assert_eq!(take(&fetcher, 2), [3, 4]);
+    assert!(fetcher.is_connected() && offer.asked() == 3);
+    ring.push(message(5));
+    assert_eq!(take(&fetcher, 1), [5]);
+    fetcher.confirm();
+    until("the sender knows that all have arrived", || {
+        offer.asked() == 6
+    });
+    assert!(!offer.is_known_to_have_ended());
+    ring.end();
+    until("the receiver knows the end", || fetcher.has_ended());
+    until("the sender knows that", || offer.is_known_to_have_ended());
+    assert_eq!(offer.sent().0, 3);
+}
+
+#[test]
+fn a_receiver_goes_on_where_it_was_when_the_sender_comes_back() {
+    let address = endpoint();
+    let mut there = None;
+    for (first, end) in [(0, 3), (2, 6)] {
+        let here = open(listening(&address));
+        let (_, fetcher, _sleeper) = there.get_or_insert_with(|| {
+            let session = open(connecting(&address));
+            let (fetcher, sleeper) = fetcher(&session, 0);
+            (session, fetcher, sleeper)
+        });
+        let ring = Arc::new(Ring::of(100));
+        (first..end).for_each(|seq| ring.push(message(seq)));
+        let mut server = Server::new(&here, "gyre/test", None);
+        server.offer("topic", ring).unwrap();
+        let taken = take(fetcher, 3);
+        assert_eq!(taken, [end - 3, end - 2, end - 1], "each once");
+        drop(server);
+        here.close().wait().unwrap();
+        until("the sender has gone", || !fetcher.is_connected());
+    }
+}
+
+#[test]
+fn a_router_of_zenoh_may_be_between_the_ends() {
+    let address = endpoint();
+    let settings = format!(
+        r#"{{ "mode": "router", "listen": {{ "endpoints": ["{address}"] }}, "scouting": {{ "multicast": {{ "enabled": false }} }} }}"#
+    );
+    let _router = zenoh::open(zenoh::Config::from_json5(&settings).unwrap())
+        .wait()
+        .unwrap();
+    let [here, there] = [(); 2].map(|()| open(connecting(&address)));
+    let ring = Arc::new(Ring::of(100));
+    ring.push(message(0));
+    let mut server = Server::new(&here, "gyre/test", None);
+    server.offer("topic", ring).unwrap();
+    let (fetcher, _sleeper) = fetcher(&there, 0);
+    assert_eq!(take(&fetcher, 1), [0]);
+}
+
+#[test]
+fn a_ring_keeps_the_newest_messages() {
+    let ring = Ring::of(3);
+    (0..5).for_each(|seq| ring.push(message(seq)));
+    let next = |seq| ring.next(seq, Duration::ZERO).unwrap();
+    assert_eq!(next(0), Next::Message(message(2)));
+    assert_eq!(next(4), Next::Message(message(4)));
+    assert_eq!(next(5), Next::Nothing);
+    ring.end();
+    assert_eq!(next(5), Next::Ended);
+    let bytes = message(0).bytes.len();
+    let ring = Ring::bounded(100, 2 * bytes);
+    (0..5).for_each(|seq| ring.push(message(seq)));
+    assert_eq!(
+        ring.next(0, Duration::ZERO).unwrap(),
+        Next::Message(message(3))
+    );
+}
