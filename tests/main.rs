@@ -22,6 +22,7 @@ mod joint_search;
 mod k2pi;
 mod keyframes;
 mod learned_masks;
+mod link;
 mod live;
 mod localise;
 mod lost_input;

@@ -1,6 +1,7 @@
 //! The command line.
 
 mod conformance;
+mod link;
 mod operate;
 mod radar_server;
 mod record;
@@ -17,6 +18,7 @@ use gyre_simulator::OutputFormat;
 
 use crate::configuration::Rate;
 pub use conformance::ConformanceArguments;
+pub use link::{LinkArguments, LinkEnd, NetworkArguments, ReceiveArguments, SendArguments};
 
 pub use operate::{
     LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments, TopArguments,
@@ -80,6 +82,8 @@ pub enum Command {
     },
     /// Record a running run as MCAP, for viewers and to replay it. It changes neither a result nor a latency.
     Record(RecordArguments),
+    /// Take the topics of a running run to another machine. To split a run between two machines, see the section `[link]`.
+    Link(LinkArguments),
     /// Report what this machine lacks for a run.
     Doctor(DoctorArguments),
     /// End what stages have started when `gyre run` has ended (what `gyre run` starts).

@@ -5,9 +5,14 @@ mod rate;
 mod sections;
 mod validation;
 
-use std::{collections::BTreeMap, path::Path, time::Duration};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 use gyre_configuration::{MethodConfig, automatic, strict};
+use gyre_link::{LinkConfig, Side};
 use gyre_messages::{FollowerId, StageId, Window};
 use gyre_odometry::{OdometryConfig, SearchKind};
 use gyre_radar::DatasetOptions;
@@ -50,10 +55,17 @@ pub struct Configuration {
     pub budget: Budget,
     /// The recording of the run as MCAP. Results do not depend on it.
     pub record: RecordConfig,
+    /// A run that is split between two machines.
+    #[serde(skip_serializing_if = "is_whole")]
+    pub link: LinkConfig,
     /// The command and the restarts of a stage: `radar-replay`, `masking`, `rotation-search`,
     /// `translation-search`, `joint-search`, `refinement`, `pose-integration`, `loop-closure`,
     /// `trajectory` or `localisation`.
     pub stages: BTreeMap<String, StageConfig>,
+}
+
+fn is_whole(link: &LinkConfig) -> bool {
+    *link == LinkConfig::default()
 }
 
 impl Configuration {
@@ -108,6 +120,7 @@ impl Configuration {
             slam: method.slam,
             budget: budget(&mut table)?,
             record: strict::section(&mut table, "record")?,
+            link: strict::section(&mut table, "link")?,
             stages: strict::sections(&mut table, "stages", &process_names())?,
         };
         let format = configuration.dataset.format.and_then(OutputFormat::read_as);
@@ -145,7 +158,7 @@ impl Configuration {
             look_back: scans_a_mask,
             live_depth,
             observers: self.run.observers,
-            slam: self.slam.is_on(),
+            slam: self.slam.is_on() || self.link.keyframes,
             localises: self.slam.is_localised(),
         }
     }
@@ -153,6 +166,37 @@ impl Configuration {
     /// Returns whether the scans are those of a radar on the network.
     pub fn is_radar(&self) -> bool {
         self.source.kind == SourceKind::Colossus
+    }
+
+    /// Returns whether this run has this side of one that is split.
+    pub fn is_side(&self, side: Side) -> bool {
+        self.link.side == Some(side)
+    }
+
+    /// Leaves to the other side what it has: the robot has no SLAM, and the base has no scans of its own.
+    pub fn leave_other_side(&mut self) {
+        match self.link.side {
+            Some(Side::Robot) => {
+                self.link.keyframes |= self.slam.is_on();
+                self.slam = SlamConfig::default();
+            }
+            Some(Side::Base) => {
+                self.simulation = None;
+                self.source.kind = SourceKind::Recording;
+                self.source.data = PathBuf::new();
+            }
+            None => {}
+        }
+    }
+
+    /// Returns whether the link is in the place of this stage.
+    fn is_link(&self, stage: &str) -> bool {
+        let place = match self.link.side {
+            Some(Side::Robot) => StageId::PoseIntegration,
+            Some(Side::Base) => StageId::RadarReplay,
+            None => return false,
+        };
+        place.name() == stage
     }
 
     /// Returns the simulation, if it is played without being stored.
@@ -190,6 +234,9 @@ impl Configuration {
         if self.is_radar() {
             return format!("the radar at {}", self.source.address);
         }
+        if self.is_side(Side::Base) {
+            return format!("the robot on the link {}", self.link.name);
+        }
         match self.streamed() {
             Some(_) => "a simulation".to_owned(),
             None => self.source.data.display().to_string(),
@@ -208,7 +255,7 @@ impl Configuration {
         }
     }
 
-    /// Returns whether the run starts this stage: it has it, and a recording does not take its place.
+    /// Returns whether the run starts this stage: it has it, and neither a recording nor the other side of a link takes its place.
     pub fn starts(&self, stage: StageId) -> bool {
         let computes = match stage {
             StageId::RadarReplay | StageId::PoseIntegration => None,
@@ -218,7 +265,12 @@ impl Configuration {
             StageId::Refinement => Some(PlayedFrom::Refined),
         };
         // The topics are in the order of the stream.
-        self.has(stage) && computes.is_none_or(|topic| topic as u8 > self.source.from as u8)
+        let is_here = |topic: PlayedFrom| match self.link.side {
+            Some(Side::Robot) => topic as u8 <= self.link.cut as u8,
+            Some(Side::Base) => topic as u8 > self.link.cut as u8,
+            None => topic as u8 > self.source.from as u8,
+        };
+        self.has(stage) && computes.is_none_or(is_here)
     }
 
     /// Returns the processes to start: `gyre stage NAME`, or their replacements.
@@ -234,7 +286,8 @@ impl Configuration {
                 ]
             };
             // The supervisor keeps its own program; those of others can change under their names.
-            let (command, programs) = match own.command.is_empty() {
+            let is_ours = own.command.is_empty() || self.is_link(name);
+            let (command, programs) = match is_ours {
                 true => (ours(), Vec::new()),
                 false => (own.command.clone(), Program::all_of(&own.command, None)),
             };
@@ -249,14 +302,20 @@ impl Configuration {
                 directory: None,
                 scheduling,
                 restart: own.restart,
-                outlives_restarts: live && name == StageId::RadarReplay.name(),
-                // Live masking alone knows which scans it admitted.
-                restarts_all: live && name == StageId::Masking.name(),
+                outlives_restarts: live
+                    && name == StageId::RadarReplay.name()
+                    && !self.is_link(name),
+                // Live masking alone knows which scans it admitted, and on a base the link which of them have come.
+                restarts_all: live
+                    && (name == StageId::Masking.name()
+                        || (self.is_side(Side::Base) && self.is_link(name))),
             }
         };
         let stages = StageId::ALL.into_iter().filter(|stage| self.starts(*stage));
         let window = self.window(None, 1);
-        let followers = FollowerId::ALL.into_iter().filter(|it| it.is_in(&window));
+        let has_slam = self.slam.is_on();
+        let followers = FollowerId::ALL.into_iter();
+        let followers = followers.filter(|it| has_slam && it.is_in(&window));
         let followers = followers.map(FollowerId::name);
         stages
             .map(StageId::name)
@@ -292,6 +351,7 @@ impl Configuration {
                         "kind", "address", "data", "from", "first", "scans", "repeat",
                     ],
                 ),
+                ("link", &["side", "cut", "keyframes"]),
             ] {
                 if let Some(section) = table.get_mut(section).and_then(|key| key.as_table_mut()) {
                     section.retain(|key, _| keys.contains(&key));

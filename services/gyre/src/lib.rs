@@ -13,6 +13,7 @@ pub mod evaluate;
 pub mod identity;
 pub mod inspect;
 pub mod judgement;
+pub mod link;
 pub mod localise;
 pub mod machine;
 pub mod map;
@@ -96,6 +97,10 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Record(arguments) => {
             gyre_stage::run::keep_files_private();
             Ok(record::record(&arguments))
+        }
+        Command::Link(arguments) => {
+            gyre_stage::run::keep_files_private();
+            link::link(&arguments)
         }
         Command::Doctor(arguments) => doctor::doctor(&arguments),
         Command::RadarServer(arguments) => radar_server::serve(&arguments),

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use gyre_link::Side;
 use gyre_masking::{MaskKind, Masker, backend::Library, model::Card, runtime::INSTALL};
 use gyre_messages::{Footprint, Limits, StageId, Window};
 use gyre_odometry::OdometryConfig;
@@ -12,7 +13,7 @@ use gyre_stage::run::free_shared_memory;
 use rustix::process::{Resource, getrlimit};
 use thiserror::Error;
 
-use crate::{configuration::Configuration, localise::known, print, radar};
+use crate::{configuration::Configuration, link, localise::known, print, radar};
 
 /// Open files of the process that has most of them, masking, without observers. Measured: 105.
 pub const FILES: u64 = 120;
@@ -102,8 +103,10 @@ pub struct Recording {
 /// # Errors
 /// A dataset or a mask that cannot be used.
 pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure> {
+    link::check(configuration)?;
     let scans = match configuration.is_radar() {
         true => Scans::of_radar(configuration)?,
+        false if configuration.is_side(Side::Base) => link::scans(configuration)?,
         false if configuration.source.from != PlayedFrom::Scan => {
             Scans::of_messages(configuration)?
         }
@@ -138,14 +141,14 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
 }
 
 /// What the source says of its scans before the run.
-struct Scans {
+pub(crate) struct Scans {
     /// `None`: without end.
-    count: Option<usize>,
-    period_ns: i64,
+    pub count: Option<usize>,
+    pub period_ns: i64,
     /// The largest scan.
-    bytes: usize,
-    truth: Option<Vec<u8>>,
-    recording: Option<Recording>,
+    pub bytes: usize,
+    pub truth: Option<Vec<u8>>,
+    pub recording: Option<Recording>,
 }
 
 impl Scans {
@@ -233,7 +236,11 @@ pub fn describe_masks(configuration: &Configuration) -> Result<(), crate::Failur
     let OdometryConfig {
         masking, raster, ..
     } = &configuration.odometry;
-    let (MaskKind::Learned, Some(card)) = (masking.kind, &masking.model) else {
+    let (MaskKind::Learned, Some(card), true) = (
+        masking.kind,
+        &masking.model,
+        configuration.starts(StageId::Masking),
+    ) else {
         return Ok(());
     };
     let card = card.display();

@@ -131,7 +131,7 @@ fn truth_of(configuration: &Configuration, out: &Out) -> Option<PathBuf> {
     let simulated = || configuration.streamed().map(|_| out.join(SIMULATED_TRUTH));
     given
         .or_else(simulated)
-        .or_else(|| match configuration.is_radar() {
+        .or_else(|| match configuration.source.data.as_os_str().is_empty() {
             true => None,
             false => find_ground_truth(&configuration.source.data),
         })

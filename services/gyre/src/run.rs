@@ -25,6 +25,7 @@ use crate::{
     configuration::{Configuration, Mode},
     earlier::{self, Begun, Earlier},
     identity::{Identity, Programs},
+    link,
     notify::Notifier,
     operate,
     out::Out,
@@ -165,6 +166,7 @@ fn play(
     }
 
     preflight::describe_masks(&resolved)?;
+    link::describe(&resolved);
     let resumed = unfinished.map_or(0, |begun| begun.poses as usize);
     let mut progress = Progress::new(checked.scans, resumed, &checked.footprint);
     let mut notifier = Notifier::of_environment();

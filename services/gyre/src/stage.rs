@@ -7,6 +7,7 @@ use std::{
     process::ExitCode,
 };
 
+use gyre_link::{LinkConfig, Side};
 use gyre_messages::{FollowerId, StageId};
 use gyre_radar::DatasetOptions;
 use gyre_radar_replay::{Pace, SourceConfig, SourceKind};
@@ -17,7 +18,7 @@ use rustix::{
     thread::set_name,
 };
 
-use crate::{configuration::process_names, print, program, radar};
+use crate::{configuration::process_names, link, print, program, radar};
 
 /// The work of a process.
 type Work = fn(&Launch) -> Result<StageCounters, StageError>;
@@ -48,7 +49,7 @@ fn work_of_stage(stage: StageId) -> Work {
         StageId::TranslationSearch => gyre_translation_search::run,
         StageId::JointSearch => gyre_joint_search::run,
         StageId::Refinement => gyre_refinement::run,
-        StageId::PoseIntegration => gyre_pose_integration::run,
+        StageId::PoseIntegration => integrate,
     }
 }
 
@@ -81,9 +82,20 @@ fn require_same_build(manifest: &Manifest) -> Result<(), StageError> {
     }
 }
 
-/// Receives from a radar, or plays a recording, or a simulation as it is rendered.
+/// Integrates motions to poses, or leaves that to the other side of a link.
+fn integrate(launch: &Launch) -> Result<StageCounters, StageError> {
+    match launch.section::<LinkConfig>("link")?.side {
+        Some(Side::Robot) => link::run_robot(launch),
+        _ => gyre_pose_integration::run(launch),
+    }
+}
+
+/// Receives from a radar or from the other side of a link, or plays a recording, or a simulation as it is rendered.
 fn play(launch: &Launch) -> Result<StageCounters, StageError> {
     let input = |error: &dyn std::error::Error| StageError::Input(error.to_string());
+    if launch.section::<LinkConfig>("link")?.side == Some(Side::Base) {
+        return link::run_base(launch);
+    }
     let source: SourceConfig = launch.section("source")?;
     if source.kind == SourceKind::Colossus {
         let settings = radar::settings(&source, &launch.section("dataset")?);

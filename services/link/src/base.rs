@@ -32,7 +32,7 @@ use crate::{
 };
 
 /// Time for the last answers to leave when the run has ended.
-const FAREWELL: Duration = Duration::from_millis(300);
+const FAREWELL: Duration = Duration::from_millis(500);
 
 /// Runs the base's side until SIGTERM.
 ///
@@ -106,7 +106,7 @@ impl Base<'_> {
         let offered = self.offer()?;
         let mut coming = self.fetch(start);
         let mut status = Status::of("robot");
-        let mut has_ended = false;
+        let mut end = None;
         loop {
             self.sleeper.clear();
             self.stages.update()?;
@@ -118,17 +118,28 @@ impl Base<'_> {
                 }
             }
             coming.iter_mut().try_for_each(Coming::receive)?;
-            while !has_ended && self.publish(&mut coming, &offered, &mut has_ended)? {}
+            while end.is_none() && self.publish(&mut coming, &offered, &mut end)? {}
+            self.confirm(end.as_ref(), &coming);
             let is_connected = coming.iter().all(|topic| topic.fetcher.is_connected());
             status.update(is_connected, self.next());
             if self.stages.sleep(self.sleeper.descriptor())? {
                 break;
             }
         }
-        if has_ended {
+        if end.is_some() {
+            self.stages.update()?;
+            self.confirm(end.as_ref(), &coming);
             std::thread::sleep(FAREWELL);
         }
         Ok(())
+    }
+
+    /// Lets the robot know that this side has the end in its journal.
+    fn confirm(&self, end: Option<&Item>, coming: &[Coming]) {
+        if let Some(end) = end.filter(|_| self.stages.has_ended()) {
+            let next = end.seq.saturating_add(1);
+            coming.iter().for_each(|topic| topic.fetcher.confirm(next));
+        }
     }
 
     /// Waits until pose-integration has told the newest pose; returns the first item that the stages need. `None` on a request to stop.
@@ -253,7 +264,7 @@ impl Base<'_> {
         &mut self,
         coming: &mut [Coming],
         offered: &Offered,
-        has_ended: &mut bool,
+        end: &mut Option<Item>,
     ) -> Result<bool, LinkError> {
         let items = coming.iter().map(|topic| topic.messages.front()?.item());
         let Some(items) = items.collect::<Option<Vec<Item>>>() else {
@@ -264,13 +275,12 @@ impl Base<'_> {
         };
         self.judge(&item, &items)?;
         if item.is(flag::END) {
-            // The robot ends when this side has the end, and this side when the robot has all poses.
-            coming.iter().for_each(|topic| topic.fetcher.confirm());
+            // This side ends when the robot has all poses, and the robot when this side has journalled the end.
             if offered.asked.asked() < item.seq {
                 return Ok(false);
             }
             self.stages.end(item)?;
-            *has_ended = true;
+            *end = Some(item);
             return Ok(true);
         }
         if !self.stages.admits(item.seq) {

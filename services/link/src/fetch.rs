@@ -10,7 +10,7 @@ use std::{
     time::Duration,
 };
 
-use gyre_messages::Item;
+use gyre_messages::{Item, flag};
 use zenoh::{
     Session, Wait,
     qos::{CongestionControl, Priority},
@@ -40,9 +40,10 @@ struct State {
     again: AtomicBool,
     is_connected: AtomicBool,
     has_ended: AtomicBool,
-    /// The first message that has not come, and the first of the newest request.
-    next: AtomicU64,
+    /// The first message of the newest request.
     asked: AtomicU64,
+    /// The first message of those to come: see [`Fetcher::confirm`].
+    confirmed: AtomicU64,
 }
 
 /// What is asked for.
@@ -64,8 +65,8 @@ impl Fetcher {
             again: AtomicBool::new(false),
             is_connected: AtomicBool::new(false),
             has_ended: AtomicBool::new(false),
-            next: AtomicU64::new(request.from),
             asked: AtomicU64::new(request.from),
+            confirmed: AtomicU64::new(request.from),
         });
         let asking = Asking {
             session: session.clone(),
@@ -73,6 +74,7 @@ impl Fetcher {
             request,
             sender,
             waker,
+            has_end: false,
             state: state.clone(),
         };
         thread::spawn(move || asking.run());
@@ -84,10 +86,11 @@ impl Fetcher {
         self.messages.try_recv().ok()
     }
 
-    /// Asks again from the next message on, which says that all before it has arrived.
-    pub fn confirm(&self) {
-        let read = |number: &AtomicU64| number.load(Ordering::Relaxed);
-        if read(&self.state.asked) < read(&self.state.next) {
+    /// Tells the other side that all before message `next` has arrived, by asking from there. The end of a stream is asked for again until
+    /// it is confirmed.
+    pub fn confirm(&self, next: u64) {
+        self.state.confirmed.fetch_max(next, Ordering::Relaxed);
+        if self.state.asked.load(Ordering::Relaxed) < next {
             self.state.again.store(true, Ordering::Relaxed);
         }
     }
@@ -115,6 +118,8 @@ struct Asking {
     request: Request,
     sender: Sender<Vec<u8>>,
     waker: Waker,
+    /// Whether the end of the stream has come.
+    has_end: bool,
     state: Arc<State>,
 }
 
@@ -135,6 +140,8 @@ impl Asking {
 
     /// Asks once, and takes the answers until they end; returns whether there were any.
     fn ask(&mut self) -> bool {
+        let confirmed = self.state.confirmed.load(Ordering::Relaxed);
+        self.request.from = self.request.from.max(confirmed);
         let Request {
             key,
             from,
@@ -182,19 +189,25 @@ impl Asking {
         };
         self.set_connected(true);
         let bytes = sample.payload().to_bytes().into_owned();
-        // The first answer is empty. What was asked for twice may come twice.
-        let seq = bytes
-            .get(..size_of::<Item>())
-            .map(|item| bytemuck::pod_read_unaligned::<Item>(item).seq);
-        if let Some(seq) = seq.filter(|seq| *seq >= self.request.from) {
-            self.request.from = seq.saturating_add(1);
-            self.state.next.store(self.request.from, Ordering::Relaxed);
+        // The first answer is empty.
+        let item = bytes.get(..size_of::<Item>());
+        let item = item.map(bytemuck::pod_read_unaligned::<Item>);
+        if let Some(item) = item.filter(|item| self.is_new(item)) {
+            match item.is(flag::END) {
+                true => self.has_end = true,
+                false => self.request.from = item.seq.saturating_add(1),
+            }
             if self.sender.send(bytes).is_err() {
                 self.state.stop.store(true, Ordering::Relaxed);
             }
             self.waker.wake();
         }
         true
+    }
+
+    /// What was asked for twice may come twice.
+    fn is_new(&self, item: &Item) -> bool {
+        item.seq >= self.request.from && !(self.has_end && item.is(flag::END))
     }
 
     fn set_connected(&self, is_connected: bool) {

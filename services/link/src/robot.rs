@@ -309,7 +309,7 @@ impl Robot<'_> {
     /// Ends this side when the base has the end too; false if it has not yet. Until it asks for what follows the end, it may not have it.
     fn end(&mut self, end: &Item, sent: &[Sent], poses: &Fetcher) -> Result<bool, LinkError> {
         // The base ends when it knows that all poses are here.
-        poses.confirm();
+        poses.confirm(self.next_pose());
         let has_end = |sent: &Sent| sent.offer.asked() > end.seq;
         if !sent.iter().all(has_end) {
             return Ok(false);

@@ -8,27 +8,31 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::Item;
+use gyre_messages::{Item, MotionHeader, PoseHeader, flag};
+use gyre_pose_integration::journal::{self, Journal};
 use zenoh::{Session, Wait, qos::Priority};
 
 use crate::{
     Network,
     fetch::{Fetcher, Request},
     serve::Server,
-    tape::{Message, Next, Ring, Tape},
+    tape::{Message, Motions, Next, PoseLog, Poses, Ring, Tape},
     wake::Sleeper,
 };
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
-fn message(seq: u64) -> Message {
-    let item = Item {
+fn item(seq: u64) -> Item {
+    Item {
         seq,
         ..Item::default()
-    };
+    }
+}
+
+fn message(seq: u64) -> Message {
     Message {
         seq,
-        bytes: bytemuck::bytes_of(&item).into(),
+        bytes: bytemuck::bytes_of(&item(seq)).into(),
     }
 }
 
@@ -116,7 +120,7 @@ fn a_receiver_gets_all_from_the_message_that_it_asks_for_and_knows_the_end() {
     assert!(fetcher.is_connected() && offer.asked() == 3);
     ring.push(message(5));
     assert_eq!(take(&fetcher, 1), [5]);
-    fetcher.confirm();
+    fetcher.confirm(6);
     until("the sender knows that all have arrived", || {
         offer.asked() == 6
     });
@@ -184,5 +188,54 @@ fn a_ring_keeps_the_newest_messages() {
     assert_eq!(
         ring.next(0, Duration::ZERO).unwrap(),
         Next::Message(message(3))
+    );
+}
+
+#[test]
+fn poses_and_their_motions_are_sent_from_the_journal_whenever_they_are_asked_for() {
+    let out = tempfile::tempdir().unwrap();
+    let mut journal = Journal::open(&journal::path(out.path())).unwrap();
+    let pose = |seq| PoseHeader {
+        item: item(seq),
+        x_m: seq as f64,
+        ..PoseHeader::default()
+    };
+    (0..40).for_each(|seq| journal.append(&pose(seq)).unwrap());
+    let poses = Arc::new(Poses::of(PoseLog::of(out.path())));
+    let motions = Motions(poses.clone());
+    let next = |tape: &dyn Tape, seq| tape.next(seq, Duration::ZERO).unwrap();
+    // Journalled before it is published, a pose is not sent before.
+    assert_eq!(next(&*poses, 0), Next::Nothing);
+    poses.have_come(30);
+    let sent = |seq| {
+        let bytes: Arc<[u8]> = bytemuck::bytes_of(&pose(seq)).into();
+        Next::Message(Message { seq, bytes })
+    };
+    assert_eq!((next(&*poses, 0), next(&*poses, 29)), (sent(0), sent(29)));
+    assert_eq!(next(&*poses, 30), Next::Nothing);
+    let Next::Message(motion) = next(&motions, 7) else {
+        panic!("there is no motion");
+    };
+    assert_eq!(
+        (motion.seq, motion.bytes.len()),
+        (7, size_of::<MotionHeader>())
+    );
+    let end = PoseHeader {
+        item: Item {
+            flags: flag::END,
+            ..item(40)
+        },
+        ..PoseHeader::default()
+    };
+    journal.append(&end).unwrap();
+    poses.end().unwrap();
+    assert_eq!(
+        next(&*poses, 39),
+        sent(39),
+        "also what was not seen to come"
+    );
+    assert_eq!(
+        (next(&*poses, 40), next(&motions, 40)),
+        (Next::Ended, Next::Ended)
     );
 }

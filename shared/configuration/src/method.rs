@@ -40,8 +40,15 @@ impl MethodConfig {
     ];
 
     /// The names of the other sections of a configuration, which are for a run of processes.
-    pub const SECTIONS_OF_A_RUN: [&str; 6] =
-        ["run", "source", "simulation", "budget", "record", "stages"];
+    pub const SECTIONS_OF_A_RUN: [&str; 7] = [
+        "run",
+        "source",
+        "simulation",
+        "budget",
+        "record",
+        "link",
+        "stages",
+    ];
 
     /// Takes the sections out of a configuration; those that are missing have their defaults.
     ///

@@ -28,6 +28,9 @@ use crate::{
     wake::{self, Signals},
 };
 
+/// What is logged unless `GYRE_LOG` says otherwise. The network layer of a link reports each attempt to connect.
+const FILTER: &str = "info,zenoh=error";
+
 /// The environment of a stage: its run, its configuration, and its node in the transport.
 pub struct Launch {
     /// The name of the stage.
@@ -250,7 +253,7 @@ pub fn start_log(manifest: &Manifest, name: &str) -> Result<EnteredSpan, StageEr
         .open(&path)
         .map_err(|source| StageError::File { path, source })?;
     let filter =
-        tracing_subscriber::EnvFilter::try_from_env("GYRE_LOG").unwrap_or_else(|_| "info".into());
+        tracing_subscriber::EnvFilter::try_from_env("GYRE_LOG").unwrap_or_else(|_| FILTER.into());
     let log = tracing_subscriber::fmt()
         .json()
         .with_env_filter(filter)

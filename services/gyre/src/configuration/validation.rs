@@ -4,6 +4,7 @@ use gyre_configuration::{
     MethodConfig,
     strict::{value, within},
 };
+use gyre_link::Side;
 use gyre_messages::StageId;
 use gyre_radar_replay::PlayedFrom;
 use gyre_simulator::OutputFormat;
@@ -35,12 +36,14 @@ impl Configuration {
         self.validate_radar()?;
         self.validate_budget()?;
         self.validate_record()?;
+        self.validate_link()?;
         if self.source.burst.get() > 1 && self.run.rate == Rate::Max {
             let reason = "burst needs a pace: set run.rate to `realtime` or a factor";
             return Err(value("source", reason));
         }
         self.validate_played_from()?;
-        if self.run.mode == Mode::Live && self.run.rate == Rate::Max && !self.is_radar() {
+        let has_scans = !self.is_radar() && !self.is_side(Side::Base);
+        if self.run.mode == Mode::Live && self.run.rate == Rate::Max && has_scans {
             let reason = "mode `live` needs a radar's pace: set rate to `realtime` or a factor";
             return Err(value("run", reason));
         }
@@ -56,16 +59,48 @@ impl Configuration {
         let reason = match from {
             _ if self.run.mode == Mode::Live => "in mode `live` nothing but scans can be played",
             _ if self.source.first > 0 => "first must be 0: the stages need all messages before",
-            PlayedFrom::Rotation if !self.has(StageId::RotationSearch) => {
-                "with an exhaustive search there is no topic `rotation`"
-            }
-            PlayedFrom::Refined if !self.has(StageId::Refinement) => {
-                "without refinement there is no topic `refined`: play from `motion`"
-            }
-            _ => return Ok(()),
+            _ => match self.lacks(from) {
+                Some(reason) => reason,
+                None => return Ok(()),
+            },
         };
         let from = from.name();
         Err(value("source", format!("from is `{from}`, but {reason}")))
+    }
+
+    /// Returns why the run has no such topic.
+    fn lacks(&self, topic: PlayedFrom) -> Option<&'static str> {
+        match topic {
+            PlayedFrom::Rotation if !self.has(StageId::RotationSearch) => {
+                Some("with an exhaustive search there is no topic `rotation`")
+            }
+            PlayedFrom::Refined if !self.has(StageId::Refinement) => {
+                Some("without refinement there is no topic `refined`: use `motion`")
+            }
+            _ => None,
+        }
+    }
+
+    /// A split run is cut at a topic that it has, and load is shed before the cut.
+    fn validate_link(&self) -> Result<(), ConfigurationError> {
+        let cut = self.link.cut;
+        if self.link.side.is_none() {
+            return Ok(());
+        }
+        let reason = match cut {
+            _ if self.source.from != PlayedFrom::Scan => {
+                "source.from takes the place of the same stages: remove one of them"
+            }
+            PlayedFrom::Scan if self.run.mode == Mode::Live => {
+                "in mode `live` masking sheds load, and scans that it drops would be sent in vain: cut at `masked` or later"
+            }
+            _ => match self.lacks(cut) {
+                Some(reason) => reason,
+                None => return Ok(()),
+            },
+        };
+        let cut = cut.name();
+        Err(value("link", format!("cut is `{cut}`, but {reason}")))
     }
 
     /// A radar waits for nobody, and has an address.

@@ -20,6 +20,7 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     if arguments.data.is_some() {
         configuration.simulation = None;
     }
+    configuration.leave_other_side();
     if configuration.is_radar() {
         // A recording beside it, with its constants and its truth, is of another drive.
         configuration.source.data = PathBuf::new();
@@ -45,6 +46,9 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
         Some(&mut configuration.source.data),
         configuration.run.ground_truth.as_mut(),
         Some(&mut configuration.slam.map),
+        Some(&mut configuration.link.ca),
+        Some(&mut configuration.link.certificate),
+        Some(&mut configuration.link.key),
     ]
     .into_iter()
     .flatten()

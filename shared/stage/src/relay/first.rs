@@ -68,6 +68,11 @@ impl<'a> FirstStages<'a> {
         self.credit.resume_at.as_ref()
     }
 
+    /// Returns whether the last stage has journalled the end of the stream.
+    pub fn has_ended(&self) -> bool {
+        self.credit.has_ended
+    }
+
     /// Returns the number of the newest pose.
     pub fn newest_pose(&self) -> Option<u64> {
         self.credit.newest

@@ -13,6 +13,8 @@ pub(crate) struct Credit {
     pub published: Option<u64>,
     /// The newest pose of the trajectory at the last start of the sink.
     pub resume_at: Option<Item>,
+    /// Whether the sink has journalled the end of the stream.
+    pub has_ended: bool,
 }
 
 impl Credit {
@@ -22,12 +24,14 @@ impl Credit {
             newest: None,
             published: None,
             resume_at: None,
+            has_ended: false,
         })
     }
 
     pub fn update(&mut self) -> Result<(), StageError> {
         while let Some(pose) = self.poses.receive()? {
             let item = pose.item();
+            self.has_ended |= item.is(flag::END);
             if item.is(flag::SYNC) {
                 self.resume_at = Some(*item);
             }

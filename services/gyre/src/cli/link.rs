@@ -1,0 +1,75 @@
+//! The arguments of `gyre link`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+
+/// The arguments of `gyre link`.
+#[derive(Debug, Args)]
+pub struct LinkArguments {
+    /// The end.
+    #[command(subcommand)]
+    pub end: LinkEnd,
+}
+
+/// The ends of a link.
+#[derive(Debug, Subcommand)]
+pub enum LinkEnd {
+    /// Let other machines look on at a running run. It changes neither a result nor a latency.
+    Send(SendArguments),
+    /// Look on at a run of another machine: what comes is a run here, for `gyre watch`, `echo` and `record`.
+    Receive(ReceiveArguments),
+}
+
+/// The arguments of `gyre link send`.
+#[derive(Debug, Args)]
+pub struct SendArguments {
+    /// The folder of the run's results, its --out.
+    pub out: PathBuf,
+    /// What is sent: scan, masked, rotation, motion, refined, pose, loop, correction, fix. Default: what the run has of these but scan, masked
+    /// and rotation.
+    #[arg(long, value_delimiter = ',')]
+    pub topics: Vec<String>,
+    /// Time to wait, after the end of the run, for receivers that have not everything yet, s.
+    #[arg(long, default_value_t = 60.0, value_name = "S")]
+    pub linger_s: f64,
+    /// The other machine.
+    #[command(flatten)]
+    pub network: NetworkArguments,
+}
+
+/// The arguments of `gyre link receive`.
+#[derive(Debug, Args)]
+pub struct ReceiveArguments {
+    /// The folder of the run that is made of it.
+    pub out: PathBuf,
+    /// What is received of what is sent. Default: all.
+    #[arg(long, value_delimiter = ',')]
+    pub topics: Vec<String>,
+    /// The other machine.
+    #[command(flatten)]
+    pub network: NetworkArguments,
+}
+
+/// How the other machine is reached.
+#[derive(Debug, Args)]
+pub struct NetworkArguments {
+    /// Wait for the other end here, as in tls/0.0.0.0:7447; tcp/ is for loopback addresses.
+    #[arg(long, value_name = "ENDPOINT")]
+    pub listen: Vec<String>,
+    /// Connect to the other end, or to a router, as in tls/robot.example:7447.
+    #[arg(long, value_name = "ENDPOINT")]
+    pub connect: Vec<String>,
+    /// The name of the link, the same at both ends, and another one for each robot.
+    #[arg(long, default_value = "gyre")]
+    pub name: String,
+    /// Certificate of the authority that has signed those of both ends, PEM.
+    #[arg(long, value_name = "FILE", default_value = "")]
+    pub ca: PathBuf,
+    /// Certificate of this end, PEM.
+    #[arg(long, value_name = "FILE", default_value = "")]
+    pub certificate: PathBuf,
+    /// Private key of the certificate, PEM.
+    #[arg(long, value_name = "FILE", default_value = "")]
+    pub key: PathBuf,
+}

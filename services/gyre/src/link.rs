@@ -1,0 +1,112 @@
+//! The link of a run that is split between two machines, and `gyre link`.
+
+use gyre_link::{LinkConfig, Side};
+use gyre_radar::DEFAULT_TURN_NS;
+
+use crate::{Failure, configuration::Configuration, preflight::Scans, print};
+
+#[cfg(feature = "link")]
+mod ends;
+
+#[cfg(feature = "link")]
+pub use ends::link;
+#[cfg(feature = "link")]
+pub use gyre_link::{run_base, run_robot};
+
+#[cfg(not(feature = "link"))]
+pub use absent::{link, run_base, run_robot};
+
+/// Checks that the other side of a split run can be reached as it is configured.
+///
+/// # Errors
+/// One sentence: an endpoint or a certificate that is missing or not allowed, or a build without link.
+pub fn check(configuration: &Configuration) -> Result<(), Failure> {
+    if configuration.link.side.is_none() {
+        return Ok(());
+    }
+    #[cfg(not(feature = "link"))]
+    return Err(absent::ABSENT.into());
+    #[cfg(feature = "link")]
+    configuration
+        .link
+        .network()
+        .check()
+        .map_err(|error| format!("[link]: {error}").into())
+}
+
+/// Says which part of a split run this is.
+pub fn describe(configuration: &Configuration) {
+    let (name, cut) = (&configuration.link.name, configuration.link.cut.name());
+    match configuration.link.side {
+        Some(Side::Robot) => print::note(format_args!(
+            "link {name}: the stages up to `{cut}` are here; scans wait for the base"
+        )),
+        Some(Side::Base) => print::note(format_args!(
+            "link {name}: the stages after `{cut}` are here; they wait for the robot"
+        )),
+        None => {}
+    }
+}
+
+/// Returns what a base knows of the robot's scans before the run.
+pub(crate) fn scans(configuration: &Configuration) -> Result<Scans, Failure> {
+    Ok(Scans {
+        count: None,
+        period_ns: DEFAULT_TURN_NS,
+        bytes: scan_bytes(&configuration.link)?,
+        truth: None,
+        recording: None,
+    })
+}
+
+/// Returns the size of the largest scan, if scans are sent: the robot knows it.
+fn scan_bytes(link: &LinkConfig) -> Result<usize, Failure> {
+    match link.cut {
+        #[cfg(feature = "link")]
+        gyre_radar_replay::PlayedFrom::Scan => {
+            let name = &link.name;
+            print::note(format_args!(
+                "link {name}: waiting for the robot, which knows how large its scans are"
+            ));
+            Ok(gyre_link::ask_robot(link)?.bytes)
+        }
+        _ => Ok(0),
+    }
+}
+
+/// What takes the place of the link in a build without it.
+#[cfg(not(feature = "link"))]
+mod absent {
+    use std::process::ExitCode;
+
+    use gyre_stage::{Launch, StageCounters, StageError};
+
+    use crate::{Failure, cli::LinkArguments};
+
+    pub const ABSENT: &str =
+        "this gyre was built without the feature `link`: build it with its default features";
+
+    /// Refuses to run.
+    ///
+    /// # Errors
+    /// Always.
+    pub fn run_robot(_: &Launch) -> Result<StageCounters, StageError> {
+        Err(StageError::Configuration(ABSENT.to_owned()))
+    }
+
+    /// Refuses to run.
+    ///
+    /// # Errors
+    /// Always.
+    pub fn run_base(_: &Launch) -> Result<StageCounters, StageError> {
+        Err(StageError::Configuration(ABSENT.to_owned()))
+    }
+
+    /// Refuses to link.
+    ///
+    /// # Errors
+    /// Always.
+    pub fn link(_: &LinkArguments) -> Result<ExitCode, Failure> {
+        Err(ABSENT.into())
+    }
+}

@@ -1,0 +1,90 @@
+//! `gyre link send` and `gyre link receive`.
+
+use std::{process::ExitCode, time::Duration};
+
+use gyre_link::{Network, ReceiveOptions, SendOptions};
+use gyre_messages::Footprint;
+use gyre_stage::{run::sweep, wake::Signals};
+
+use crate::{
+    Failure,
+    cli::{LinkArguments, LinkEnd, NetworkArguments, ReceiveArguments, SendArguments},
+    out::Out,
+    preflight, print, program,
+};
+
+/// Runs one end of a link.
+///
+/// # Errors
+/// There is no such run, the network cannot be used, or the other end is of another version.
+pub fn link(arguments: &LinkArguments) -> Result<ExitCode, Failure> {
+    match &arguments.end {
+        LinkEnd::Send(arguments) => send(arguments),
+        LinkEnd::Receive(arguments) => receive(arguments),
+    }
+}
+
+fn send(arguments: &SendArguments) -> Result<ExitCode, Failure> {
+    let linger = Duration::try_from_secs_f64(arguments.linger_s).map_err(|_| {
+        format!(
+            "--linger-s is {}, but must be 0 or more",
+            arguments.linger_s
+        )
+    })?;
+    let sent = gyre_link::send(&SendOptions {
+        out: arguments.out.clone(),
+        network: network(&arguments.network),
+        topics: arguments.topics.clone(),
+        linger,
+    })?;
+    print::note(format_args!("gyre link: {sent}"));
+    if sent.is_incomplete {
+        print::note(
+            "gyre link: a receiver was out of reach at the end and has not everything; the run's journal has its poses",
+        );
+    }
+    Ok(match sent.is_incomplete {
+        true => ExitCode::FAILURE,
+        false => ExitCode::SUCCESS,
+    })
+}
+
+fn receive(arguments: &ReceiveArguments) -> Result<ExitCode, Failure> {
+    let out = Out::lock(&arguments.out)?;
+    sweep();
+    let network = network(&arguments.network);
+    let signals = Signals::install()?;
+    let Some(seen) = gyre_link::ask(&network, &signals)? else {
+        return Ok(ExitCode::SUCCESS);
+    };
+    let manifest = seen.manifest(out.path());
+    preflight::check_shared_memory(&Footprint::new(&manifest.window, &manifest.limits))?;
+    print::note(format_args!(
+        "gyre link: the run {} is here as {}",
+        network.name,
+        out.path().display()
+    ));
+    let options = ReceiveOptions {
+        out: out.path().to_owned(),
+        network,
+        gyre: program::own().to_string_lossy().into_owned(),
+        topics: arguments.topics.clone(),
+    };
+    let received = gyre_link::receive(&options, seen, &signals)?;
+    print::note(format_args!("gyre link: {received}"));
+    Ok(match received.is_complete() {
+        true => ExitCode::SUCCESS,
+        false => ExitCode::FAILURE,
+    })
+}
+
+fn network(arguments: &NetworkArguments) -> Network {
+    Network {
+        name: arguments.name.clone(),
+        listen: arguments.listen.clone(),
+        connect: arguments.connect.clone(),
+        ca: arguments.ca.clone(),
+        certificate: arguments.certificate.clone(),
+        key: arguments.key.clone(),
+    }
+}
