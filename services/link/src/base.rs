@@ -22,7 +22,7 @@ use zenoh::{
 };
 
 use crate::{
-    LinkConfig, LinkError,
+    LinkConfig, LinkError, Side,
     begin::{self, Agreement, Answer},
     fetch::{Fetcher, Request},
     serve::{Offer, Server},
@@ -169,7 +169,7 @@ impl Base<'_> {
 
     fn offer(&self) -> Result<Offered, LinkError> {
         let manifest = &self.launch.manifest;
-        let prefix = begin::prefix(&self.config);
+        let prefix = begin::prefix(&self.config, Side::Base);
         let mut server = Server::new(&self.session, &prefix, Some(self.sleeper.waker()));
         let poses = Arc::new(Poses::of(PoseLog::of(&manifest.out)));
         let motions = Arc::new(Ring::of(Motion::sizes(&manifest.window).buffer));
@@ -198,7 +198,7 @@ impl Base<'_> {
 
     /// Asks the robot for all items from one on.
     fn fetch(&self, from: u64) -> Vec<Coming> {
-        let prefix = begin::prefix(&self.config);
+        let prefix = begin::prefix(&self.config, Side::Robot);
         let coming = self.topics.iter().map(|name| {
             let request = Request {
                 key: format!("{prefix}/{name}"),

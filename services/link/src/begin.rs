@@ -7,25 +7,30 @@ use gyre_stage::Manifest;
 use serde::{Deserialize, Serialize};
 use zenoh::{Session, Wait};
 
-use crate::{LinkConfig, LinkError};
+use crate::{LinkConfig, LinkError, Side};
 
 /// Time for an answer. Without one it is asked again.
 const ANSWER: Duration = Duration::from_secs(1);
 /// Time between two questions before there is a run that waits by itself.
 const PAUSE: Duration = Duration::from_millis(200);
 
-/// Returns the prefix of all keys of a split run.
-pub(crate) fn prefix(config: &LinkConfig) -> String {
-    format!("gyre/split/{}", config.name)
+/// Returns the prefix of the keys of what one side sends.
+pub(crate) fn prefix(config: &LinkConfig, sender: Side) -> String {
+    let side = match sender {
+        Side::Robot => "robot",
+        Side::Base => "base",
+    };
+    format!("gyre/split/{}/{side}", config.name)
 }
 
+/// The key at which a base says where to go on.
 pub(crate) fn key(config: &LinkConfig) -> String {
-    format!("{}/begin", prefix(config))
+    format!("{}/begin", prefix(config, Side::Base))
 }
 
 /// The key at which a robot says what its scans are.
 pub(crate) fn scans_key(config: &LinkConfig) -> String {
-    format!("{}/scans", prefix(config))
+    format!("{}/scans", prefix(config, Side::Robot))
 }
 
 /// The scans of a robot.

@@ -15,7 +15,7 @@ use gyre_stage::{Launch, StageCounters, StageError, clock, relay::LastStages};
 use zenoh::{Session, Wait, qos::Priority, query::Queryable};
 
 use crate::{
-    LinkConfig, LinkError,
+    LinkConfig, LinkError, Side,
     begin::{self, Agreement, Answer, Scans},
     fetch::{Fetcher, Request},
     serve::{Offer, Server},
@@ -191,7 +191,7 @@ impl Robot<'_> {
     fn relay(&mut self, poses: &Fetcher) -> Result<(), LinkError> {
         let topics = self.topics();
         self.stages.read(&topics)?;
-        let prefix = begin::prefix(&self.config);
+        let prefix = begin::prefix(&self.config, Side::Robot);
         let mut server = Server::new(&self.session, &prefix, Some(self.sleeper.waker()));
         let depth = Masked::sizes(&self.launch.manifest.window).buffer;
         let sent = topics.iter().map(|topic| {
@@ -333,7 +333,7 @@ impl Robot<'_> {
 
     fn fetch(&self, topic: &str) -> Fetcher {
         let request = Request {
-            key: format!("{}/{topic}", begin::prefix(&self.config)),
+            key: format!("{}/{topic}", begin::prefix(&self.config, Side::Base)),
             from: self.next_pose(),
             priority: Priority::InteractiveHigh,
         };

@@ -64,12 +64,12 @@ pub struct NetworkArguments {
     #[arg(long, default_value = "gyre")]
     pub name: String,
     /// Certificate of the authority that has signed those of both ends, PEM.
-    #[arg(long, value_name = "FILE", default_value = "")]
-    pub ca: PathBuf,
+    #[arg(long, value_name = "FILE")]
+    pub ca: Option<PathBuf>,
     /// Certificate of this end, PEM.
-    #[arg(long, value_name = "FILE", default_value = "")]
-    pub certificate: PathBuf,
+    #[arg(long, value_name = "FILE")]
+    pub certificate: Option<PathBuf>,
     /// Private key of the certificate, PEM.
-    #[arg(long, value_name = "FILE", default_value = "")]
-    pub key: PathBuf,
+    #[arg(long, value_name = "FILE")]
+    pub key: Option<PathBuf>,
 }

@@ -1,6 +1,6 @@
 //! `gyre link send` and `gyre link receive`.
 
-use std::{process::ExitCode, time::Duration};
+use std::{path::PathBuf, process::ExitCode, time::Duration};
 
 use gyre_link::{Network, ReceiveOptions, SendOptions};
 use gyre_messages::Footprint;
@@ -79,12 +79,13 @@ fn receive(arguments: &ReceiveArguments) -> Result<ExitCode, Failure> {
 }
 
 fn network(arguments: &NetworkArguments) -> Network {
+    let file = |path: &Option<PathBuf>| path.clone().unwrap_or_default();
     Network {
         name: arguments.name.clone(),
         listen: arguments.listen.clone(),
         connect: arguments.connect.clone(),
-        ca: arguments.ca.clone(),
-        certificate: arguments.certificate.clone(),
-        key: arguments.key.clone(),
+        ca: file(&arguments.ca),
+        certificate: file(&arguments.certificate),
+        key: file(&arguments.key),
     }
 }
