@@ -1,9 +1,11 @@
 //! The link of a run that is split between two machines, and `gyre link`.
 
-use gyre_link::{LinkConfig, Side};
+use std::{env, os::unix::process::CommandExt, process::Command};
+
+use gyre_link::{LinkConfig, ONE_THREAD, Side};
 use gyre_radar::DEFAULT_TURN_NS;
 
-use crate::{Failure, configuration::Configuration, preflight::Scans, print};
+use crate::{Failure, configuration::Configuration, preflight::Scans, print, program};
 
 #[cfg(feature = "link")]
 mod ends;
@@ -32,6 +34,22 @@ pub fn check(configuration: &Configuration) -> Result<(), Failure> {
         .network()
         .check()
         .map_err(|error| format!("[link]: {error}").into())
+}
+
+/// Executes the same command again with the environment that the network layer needs, unless it has that already.
+///
+/// # Errors
+/// The program cannot be executed.
+pub fn set_environment() -> Result<(), Failure> {
+    let (name, value) = ONE_THREAD;
+    if env::var_os(name).is_some_and(|set| set == value) {
+        return Ok(());
+    }
+    let failed = Command::new(program::own())
+        .args(env::args_os().skip(1))
+        .env(name, value)
+        .exec();
+    Err(format!("cannot begin with {name} in the environment: {failed}").into())
 }
 
 /// Says which part of a split run this is.

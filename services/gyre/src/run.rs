@@ -50,6 +50,9 @@ const RECORDING: &str = "recording";
 pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     operate::detach_if_asked();
     let mut configuration = resolve::resolve(arguments)?;
+    if configuration.link.side.is_some() {
+        link::set_environment()?;
+    }
     let out = Out::lock(&results_folder(arguments))?;
     // An earlier run may have been killed, and this one may be refused before it takes shared memory itself.
     sweep();

@@ -41,7 +41,7 @@ mod tests;
 mod wake;
 
 pub use config::{LinkConfig, Side};
-pub use network::{Network, NetworkError};
+pub use network::{Network, NetworkError, ONE_THREAD};
 
 #[cfg(feature = "zenoh")]
 pub use base::run as run_base;

@@ -4,6 +4,15 @@ use std::{net::IpAddr, path::PathBuf};
 
 use thiserror::Error;
 
+/// The environment variable, and its value, with which the network layer does all its work in one thread.
+///
+/// By itself zenoh (1.10) reads from and writes to a TLS connection in two threads at once, which the connection does not allow
+/// (eclipse-zenoh/zenoh#2557): under load it breaks within seconds. Set it before the program starts; TLS is refused without.
+pub const ONE_THREAD: (&str, &str) = (
+    "ZENOH_RUNTIME",
+    "(rx:(handover:app),tx:(handover:app),acc:(handover:app),net:(handover:app),app:(worker_threads:1))",
+);
+
 /// How one side reaches the other.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Network {
@@ -155,7 +164,7 @@ mod open {
     use serde_json::{Value, json};
     use zenoh::{Config, Session, Wait};
 
-    use super::Network;
+    use super::{Network, ONE_THREAD};
     use crate::LinkError;
 
     /// Time without a sign of life after which a connection is given up, ms. A robot drives on meanwhile, and what is sent waits.
@@ -172,6 +181,7 @@ mod open {
             mut pause: impl FnMut() -> Result<bool, LinkError>,
         ) -> Result<Option<Session>, LinkError> {
             self.check()?;
+            self.require_one_thread()?;
             let config = Config::from_json5(&self.settings().to_string())
                 .map_err(|e| LinkError::zenoh("use the settings of the link", &e))?;
             let (sender, opened) = channel();
@@ -189,6 +199,17 @@ mod open {
                     Err(TryRecvError::Empty) if pause()? => return Ok(None),
                     Err(TryRecvError::Empty) => {}
                 }
+            }
+        }
+
+        fn require_one_thread(&self) -> Result<(), LinkError> {
+            let (name, value) = ONE_THREAD;
+            let is_set = std::env::var_os(name).is_some_and(|set| set == value);
+            match is_set || self.certificate.as_os_str().is_empty() {
+                true => Ok(()),
+                false => Err(LinkError::Refused(format!(
+                    "TLS needs {name}='{value}' in the environment, which `gyre run` and `gyre link` set"
+                ))),
             }
         }
 

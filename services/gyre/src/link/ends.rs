@@ -18,6 +18,7 @@ use crate::{
 /// # Errors
 /// There is no such run, the network cannot be used, or the other end is of another version.
 pub fn link(arguments: &LinkArguments) -> Result<ExitCode, Failure> {
+    super::set_environment()?;
     match &arguments.end {
         LinkEnd::Send(arguments) => send(arguments),
         LinkEnd::Receive(arguments) => receive(arguments),
