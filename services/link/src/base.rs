@@ -300,7 +300,8 @@ impl Base<'_> {
     fn judge(&self, item: &Item, all: &[Item]) -> Result<(), LinkError> {
         let begins = self.published.is_none() && item.seq < self.next();
         let is_whole = all.iter().all(|other| other.seq == item.seq);
-        if !begins && !(is_whole && item.seq == self.next()) {
+        let follows = is_whole && item.seq == self.next();
+        if !begins && !follows {
             return Err(LinkError::Refused(format!(
                 "the robot sends item {}, but this run needs {}, which the robot no longer has: begin both anew with --fresh",
                 item.seq,

@@ -10,6 +10,7 @@ use gyre_stage::{
     Listener, StageError,
     observer::{Next, ObservedRun, Observer},
     reader::Received,
+    source::RecordedMessage,
 };
 
 use crate::queue::{Entry, Sender};
@@ -147,12 +148,11 @@ impl<M: Message> Tap for TopicTap<'_, M> {
 }
 
 fn incoming<M: Message>(message: &Received<M>) -> Incoming {
-    let bytes = message.values::<u8>();
-    let content = M::content_bytes(message.header()).unwrap_or(bytes.len());
+    let RecordedMessage { header, payload } = message.to_bytes();
     Incoming {
         topic: M::TOPIC,
-        header: bytemuck::bytes_of(message.header()).to_vec(),
-        payload: bytes[..content.min(bytes.len())].to_vec(),
+        header,
+        payload,
         received_ns: now_ns(),
         missed: 0,
     }
