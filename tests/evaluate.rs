@@ -7,7 +7,7 @@ use std::{
     process::Command,
 };
 
-use crate::common::{Ended, Run, gyre, recording};
+use crate::common::{Ended, Run, gyre, python, recording};
 use serde_json::Value;
 
 /// A run of the small recording that is over.
@@ -51,6 +51,55 @@ fn figure(value: &Value) -> f64 {
     value
         .as_f64()
         .unwrap_or_else(|| panic!("{value} is not a number"))
+}
+
+/// The figure of a statistic that a program of evo prints.
+fn evo(program: &str, run: &Run, options: &[&str]) -> Option<f64> {
+    let python = PathBuf::from(python());
+    let program = python.with_file_name(program);
+    let truth = run.out().join("ground_truth.tum");
+    let mut command = Command::new(program);
+    // What it plots and logs is its user's.
+    command.env("HOME", run.folder()).arg("tum").arg(truth);
+    command.arg(run.out().join("trajectory.tum")).args(options);
+    if command.output().is_err() {
+        println!("skipped: evo is not beside the Python that GYRE_PYTHON names");
+        return None;
+    }
+    let printed = Ended::of(command).succeeded().stdout.clone();
+    let line = printed
+        .lines()
+        .find_map(|line| line.trim().strip_prefix("rmse"));
+    Some(line.unwrap().trim().parse().unwrap())
+}
+
+#[test]
+fn evo_finds_the_same_errors_to_the_digit_it_shows() {
+    let simulation = "[simulation]\nscans = 24\n[raster]\nn = 127\ncell_m = 0.8\n";
+    let run = Run::configured(simulation);
+    run.complete();
+    let evaluation = &run.summary()["evaluation"];
+    let pairs = ["--delta", "1", "--delta_unit", "f", "--pose_relation"];
+    for (program, options, ours) in [
+        ("evo_ape", vec!["--align"], &evaluation["ate"]["rmse_m"]),
+        (
+            "evo_rpe",
+            [&pairs[..], &["trans_part"]].concat(),
+            &evaluation["rpe"]["translation_rmse_m"],
+        ),
+        (
+            "evo_rpe",
+            [&pairs[..], &["angle_deg"]].concat(),
+            &evaluation["rpe"]["rotation_rmse_deg"],
+        ),
+    ] {
+        let Some(theirs) = evo(program, &run, &options) else {
+            return;
+        };
+        // Six digits are shown, and stamps and poses in files are rounded.
+        let ours = figure(ours);
+        assert!((theirs - ours).abs() < 2e-6, "{program}: {theirs}, {ours}");
+    }
 }
 
 #[test]

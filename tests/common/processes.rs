@@ -84,6 +84,11 @@ fn pids() -> impl Iterator<Item = Pid> {
     entries.filter_map(|entry| entry.ok()?.file_name().to_str()?.parse().ok())
 }
 
+/// The parent of a process.
+pub fn parent_of(pid: Pid) -> Option<Pid> {
+    parent_and_state(pid).map(|(parent, _)| parent)
+}
+
 fn parent_and_state(pid: Pid) -> Option<(Pid, char)> {
     let stat = fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
     let mut fields = stat.rsplit_once(") ")?.1.split(' ');

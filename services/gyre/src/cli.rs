@@ -1,5 +1,6 @@
 //! The command line.
 
+mod batch;
 mod conformance;
 mod link;
 mod operate;
@@ -17,6 +18,7 @@ use gyre_mapping::Origin;
 use gyre_simulator::OutputFormat;
 
 use crate::configuration::Rate;
+pub use batch::{BatchArguments, BatchDriveArguments};
 pub use conformance::ConformanceArguments;
 pub use link::{LinkArguments, LinkEnd, NetworkArguments, ReceiveArguments, SendArguments};
 
@@ -46,6 +48,11 @@ pub struct Gyre {
 pub enum Command {
     /// Run the whole pipeline on a recording or a live radar, and write a trajectory.
     Run(RunArguments),
+    /// Run the pipeline on many drives, and write a table of their results. The same command goes on after an interruption.
+    Batch(BatchArguments),
+    /// Compute a drive of a batch (what `gyre batch` starts).
+    #[command(hide = true, name = gyre_batch::COMMAND)]
+    BatchDrive(BatchDriveArguments),
     /// Run the whole pipeline in the background. Returns when all its stages are there.
     Up(RunArguments),
     /// End a run that goes on in the background, and wait for its results.

@@ -14,8 +14,9 @@ use crate::{
     Failure,
     configuration::{Configuration, difference},
     out::Out,
-    preflight::Preflight,
+    preflight::{self, Preflight},
     program,
+    run::with_stored_options,
 };
 
 /// The file, in the folder of the results.
@@ -191,6 +192,23 @@ impl Identity {
         difference.map_or(Ok(()), |difference| {
             Err(other(out, poses, "recording", &difference))
         })
+    }
+
+    /// Returns whether a run of this configuration that begins now would compute the same and judge it by the same truth. Gyre's own build
+    /// may be another one.
+    ///
+    /// # Errors
+    /// A recording or a program that cannot be read.
+    pub fn has_inputs_of(&self, configuration: &Configuration) -> Result<bool, Failure> {
+        let resolved = with_stored_options(configuration)?;
+        let plans = configuration.stage_plans(&program::own());
+        let truth = |table: &toml::Table| table.get("run")?.get("ground_truth").cloned();
+        let now: toml::Table = configuration.to_toml()?.parse()?;
+        Ok(configuration.difference(&self.configuration)?.is_none()
+            && truth(&self.configuration) == truth(&now)
+            && self.programs.replaced == program::replacements(&plans)?
+            && self.dataset == resolved.dataset
+            && self.recording == preflight::fingerprint(&resolved)?)
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! Reading order: [`cli`], then [`run`] (what `gyre run` does, on a page), [`earlier`], [`configuration`], [`results`].
 
+pub mod batch;
 pub mod calibrate;
 pub mod cli;
 pub mod configuration;
@@ -89,6 +90,11 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
             gyre_stage::run::keep_files_private();
             shadow::shadow(&arguments)
         }
+        Command::Batch(arguments) => {
+            gyre_stage::run::keep_files_private();
+            batch::batch(&arguments)
+        }
+        Command::BatchDrive(arguments) => batch::drive(&arguments),
         Command::Stress(arguments) => {
             gyre_stage::run::keep_files_private();
             stress::stress(&arguments)

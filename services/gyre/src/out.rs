@@ -2,16 +2,37 @@
 
 use std::{
     fs::{self, File},
+    io,
     path::{Path, PathBuf},
 };
 
 use gyre_stage::lock::{Attempt, try_lock};
-
-use crate::Failure;
+use thiserror::Error;
 
 /// The lock of the folder. It lies beside the results and not in shared memory, which two runs need not have in common:
 /// containers have their own.
 const LOCK: &str = ".lock";
+
+/// Why a folder cannot be that of the results.
+#[derive(Debug, Error)]
+pub enum OutError {
+    /// It cannot be written.
+    #[error("cannot write to {path}: {source}", path = path.display())]
+    Unwritable {
+        /// The folder.
+        path: PathBuf,
+        /// The system error.
+        source: io::Error,
+    },
+    /// Another run is writing to it.
+    #[error("another run is writing to {path}{holder}: wait for it, or choose another --out", path = path.display())]
+    Held {
+        /// The folder.
+        path: PathBuf,
+        /// The process, where the system tells: `, process 123 (gyre)`.
+        holder: String,
+    },
+}
 
 /// The folder of the results, locked for this run while it lives.
 #[derive(Debug)]
@@ -25,20 +46,20 @@ impl Out {
     ///
     /// # Errors
     /// A folder that cannot be written, or to which another run is writing.
-    pub fn lock(path: &Path) -> Result<Self, Failure> {
-        let unwritable =
-            |error: std::io::Error| format!("cannot write to {}: {error}", path.display());
+    pub fn lock(path: &Path) -> Result<Self, OutError> {
+        let unwritable = |source| OutError::Unwritable {
+            path: path.to_owned(),
+            source,
+        };
         fs::create_dir_all(path).map_err(unwritable)?;
         let path = path.canonicalize().map_err(unwritable)?;
-        let holder = match try_lock(&path.join(LOCK)).map_err(unwritable)? {
-            Attempt::Locked(lock) => return Ok(Self { path, _lock: lock }),
-            Attempt::Held(holder) => holder.map_or(String::new(), |holder| format!(", {holder}")),
-        };
-        Err(format!(
-            "another run is writing to {}{holder}: wait for it, or choose another --out",
-            path.display()
-        )
-        .into())
+        match try_lock(&path.join(LOCK)).map_err(unwritable)? {
+            Attempt::Locked(lock) => Ok(Self { path, _lock: lock }),
+            Attempt::Held(holder) => Err(OutError::Held {
+                path,
+                holder: holder.map_or(String::new(), |holder| format!(", {holder}")),
+            }),
+        }
     }
 
     /// Returns the absolute path.

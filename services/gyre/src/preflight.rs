@@ -140,6 +140,19 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
     })
 }
 
+/// Returns what tells the recording of a run from another one; `None`: its configuration does.
+///
+/// # Errors
+/// A recording that cannot be opened.
+pub fn fingerprint(configuration: &Configuration) -> Result<Option<Fingerprint>, crate::Failure> {
+    let plays_scans = configuration.source.from == PlayedFrom::Scan && !configuration.is_radar();
+    if !plays_scans || configuration.streamed().is_some() {
+        return Ok(None);
+    }
+    let played = open(configuration)?;
+    Ok(Some(Fingerprint::of(played.dataset.as_ref())?))
+}
+
 /// What the source says of its scans before the run.
 pub(crate) struct Scans {
     /// `None`: without end.

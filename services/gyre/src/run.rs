@@ -49,21 +49,38 @@ const RECORDING: &str = "recording";
 /// A run that cannot start, fails, or finds fewer than two readable scans.
 pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     operate::detach_if_asked();
-    let mut configuration = resolve::resolve(arguments)?;
+    let configuration = resolve::resolve(arguments)?;
     if configuration.link.side.is_some() {
         link::set_environment()?;
     }
     let out = Out::lock(&results_folder(arguments))?;
+    compute(configuration, out, arguments.fresh)
+}
+
+/// Runs a resolved configuration. A `fresh` run goes on from nothing.
+///
+/// # Errors
+/// As [`run`].
+pub(crate) fn compute(
+    mut configuration: Configuration,
+    out: Out,
+    fresh: bool,
+) -> Result<ExitCode, Failure> {
     // An earlier run may have been killed, and this one may be refused before it takes shared memory itself.
     sweep();
-    if configuration.stored().is_some() {
-        configuration.source.data = out.join(RECORDING);
-    }
+    place_recording(&mut configuration, &out);
     let programs = Programs::now(&configuration)?;
-    match Earlier::of(&out, &configuration, &programs, arguments.fresh)? {
+    match Earlier::of(&out, &configuration, &programs, fresh)? {
         Earlier::Nothing => play(&configuration, &programs, out, None),
         Earlier::Unfinished(begun) => play(&configuration, &programs, out, Some(begun)),
         Earlier::Ended(begun) => write_missing_results(&configuration, &out, &begun),
+    }
+}
+
+/// Says where a simulation is stored that is stored.
+pub(crate) fn place_recording(configuration: &mut Configuration, out: &Out) {
+    if configuration.stored().is_some() {
+        configuration.source.data = out.join(RECORDING);
     }
 }
 
@@ -195,7 +212,7 @@ fn play(
     // The run keeps its locks until its results are written, so that no other run writes them meanwhile.
     let written = finish(configuration, &out, &session);
     match report {
-        Ok(_) => conclude(configuration, &out, &session, &written?),
+        Ok(_) => conclude(&session, &written?),
         Err(failure) => Err(failed(&failure, &out, written)),
     }
 }
@@ -288,7 +305,7 @@ fn write_missing_results(
         report: None,
     };
     let written = finish(configuration, out, &session)?;
-    conclude(configuration, out, &session, &written)
+    conclude(&session, &written)
 }
 
 /// Writes the results. Only when all of them are in place, the run counts as complete, and the next one starts anew.
@@ -322,37 +339,15 @@ fn failed(failure: &SuperviseError, out: &Out, written: Result<Results, Failure>
 }
 
 /// Prints the summary and returns the exit code.
-fn conclude(
-    configuration: &Configuration,
-    out: &Out,
-    session: &Session<'_>,
-    written: &Results,
-) -> Result<ExitCode, Failure> {
-    let complete = session.ending == Some(Ending::Complete);
-    let log = || out.join("log.jsonl").display().to_string();
-    if complete && written.poses < 2 {
-        return Err(format!(
-            "only {} of the {} scans of {} can be read, and a motion is between two: {} says what is wrong with them",
-            written.poses,
-            session.scans.unwrap_or(written.poses),
-            configuration.data(),
-            log()
-        )
-        .into());
+fn conclude(session: &Session<'_>, written: &Results) -> Result<ExitCode, Failure> {
+    let problem = written.summary.problem();
+    if problem.is_none() || written.poses >= 2 {
+        print::line(&written.summary)?;
     }
-    print::line(&written.summary)?;
-    let counts = written.summary.counts();
-    if complete && counts.too_many_are_unreadable() {
-        return Err(format!(
-            "{} of the {} scans of {} cannot be read: the results are of the others, and {} says what is wrong with each",
-            counts.unreadable,
-            session.scans.unwrap_or(written.poses),
-            configuration.data(),
-            log()
-        )
-        .into());
+    if let Some(problem) = problem {
+        return Err(problem.clone().into());
     }
-    Ok(match complete {
+    Ok(match session.ending == Some(Ending::Complete) {
         true => ExitCode::SUCCESS,
         false => ExitCode::from(INTERRUPTED),
     })

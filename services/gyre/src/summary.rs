@@ -13,6 +13,7 @@ use gyre_stage::{
     supervise::{Ending, Report, Swapped},
 };
 use serde::Serialize;
+use thiserror::Error;
 
 use crate::{
     configuration::{Configuration, Mode, Rate},
@@ -63,6 +64,33 @@ impl Mask {
     }
 }
 
+/// Why the results of a run that has played all scans are hardly those of its recording.
+#[derive(Clone, Debug, Error, Serialize)]
+#[error("{0}")]
+#[serde(transparent)]
+pub struct Problem(String);
+
+impl Problem {
+    fn of(data: &str, out: &Path, session: &Session<'_>, counts: &Counts) -> Option<Self> {
+        let scans = session.scans.unwrap_or(counts.processed as usize);
+        let log = out.join("log.jsonl");
+        let (poses, unreadable, log) = (counts.processed, counts.unreadable, log.display());
+        if session.ending != Some(Ending::Complete) {
+            return None;
+        }
+        if poses < 2 {
+            return Some(Self(format!(
+                "only {poses} of the {scans} scans of {data} can be read, and a motion is between two: {log} says what is wrong with them"
+            )));
+        }
+        counts.too_many_are_unreadable().then(|| {
+            Self(format!(
+                "{unreadable} of the {scans} scans of {data} cannot be read: the results are of the others, and {log} says what is wrong with each"
+            ))
+        })
+    }
+}
+
 /// The summary of a run: `summary.json`.
 #[derive(Debug, Serialize)]
 pub struct Summary {
@@ -72,6 +100,8 @@ pub struct Summary {
     data: String,
     /// `None`: the run failed.
     ending: Option<Ending>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    problem: Option<Problem>,
     mode: Mode,
     rate: Rate,
     window: usize,
@@ -109,6 +139,11 @@ impl Summary {
         &self.counts
     }
 
+    /// Returns why the results of all scans are hardly those of the recording.
+    pub fn problem(&self) -> Option<&Problem> {
+        self.problem.as_ref()
+    }
+
     /// Puts it together.
     pub fn new(
         configuration: &Configuration,
@@ -124,6 +159,7 @@ impl Summary {
             version: env!("CARGO_PKG_VERSION"),
             machine: Machine::this(),
             out: out.display().to_string(),
+            problem: Problem::of(&configuration.data(), out, session, &counts),
             data: configuration.data(),
             ending: session.ending,
             mode: configuration.run.mode,

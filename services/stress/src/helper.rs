@@ -11,7 +11,8 @@ use std::{
     process::{Child, ChildStdin, ChildStdout, Command, Stdio},
 };
 
-use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
+use gyre_stage::run::end_with;
+use rustix::process::Signal;
 use serde::{Serialize, de::DeserializeOwned};
 
 use crate::{StressError, copying};
@@ -152,7 +153,11 @@ pub fn main(program: &Path, arguments: &[String]) -> Result<(), StressError> {
         "run" => Signal::TERM,
         _ => Signal::KILL,
     };
-    end_with(parent.parse().map_err(|_| usage())?, signal)?;
+    let parent = parent.parse().map_err(|_| usage())?;
+    let refused = |error: rustix::io::Errno| StressError::Usage(error.to_string());
+    if !end_with(parent, signal).map_err(refused)? {
+        return Err(StressError::Interrupted);
+    }
     match (work.as_str(), rest) {
         ("run", words) => Err(StressError::Start {
             program: program.display().to_string(),
@@ -163,16 +168,6 @@ pub fn main(program: &Path, arguments: &[String]) -> Result<(), StressError> {
         ("observe", [out]) => load::observe(&PathBuf::from(out)),
         ("hand-over", words) => copying::helper(words),
         _ => Err(usage()),
-    }
-}
-
-/// Ends this process with the one that has started it.
-fn end_with(parent: i32, signal: Signal) -> Result<(), StressError> {
-    let refused = |error: rustix::io::Errno| StressError::Usage(error.to_string());
-    set_parent_process_death_signal(Some(signal)).map_err(refused)?;
-    match getppid().map(Pid::as_raw_pid) == Some(parent) {
-        true => Ok(()),
-        false => Err(StressError::Interrupted),
     }
 }
 

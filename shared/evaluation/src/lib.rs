@@ -52,7 +52,7 @@ pub use end::{EndError, end_error};
 pub use error::{EvaluationError, Side};
 pub use handedness::{Axes, HeadingFault};
 pub use kitti::{Kitti, kitti};
-pub use matched::MatchedPoses;
+pub use matched::{MatchedPoses, path_m};
 pub use motions::{MatchedMotions, Part, TimedMotion};
 pub use nees::{Nees, NeesFigure, NeesFigures, NeesLength, NeesOptions, nees};
 pub use plot::{PlotError, plot_bands, plot_errors, plot_trajectory};

@@ -118,7 +118,7 @@ fn steps_m(poses: &[Pose]) -> impl Iterator<Item = f64> + '_ {
 }
 
 /// The length of the path, m.
-pub(crate) fn path_m(poses: &[Pose]) -> f64 {
+pub fn path_m(poses: &[Pose]) -> f64 {
     steps_m(poses).sum()
 }
 

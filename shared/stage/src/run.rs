@@ -14,7 +14,11 @@ use std::{
 
 use gyre_messages::{Limits, Window};
 use iceoryx2::prelude::{Config, FileName, Path as TransportPath, SemanticString};
-use rustix::{fs::Mode, process::umask};
+use rustix::{
+    fs::Mode,
+    io::Errno,
+    process::{Pid, Signal, getppid, set_parent_process_death_signal, umask},
+};
 use serde::{Deserialize, Serialize};
 
 use crate::StageError;
@@ -138,4 +142,13 @@ pub(crate) fn write(path: PathBuf, text: &str) -> Result<(), StageError> {
 /// Makes all files that this process and its children create the owner's alone, whatever the umask of the shell.
 pub fn keep_files_private() {
     umask(Mode::RWXG | Mode::RWXO);
+}
+
+/// Lets this process get a signal when the process that has started it, `parent`, ends, even if that is killed. False: it has ended already.
+///
+/// # Errors
+/// The system refuses.
+pub fn end_with(parent: i32, signal: Signal) -> Result<bool, Errno> {
+    set_parent_process_death_signal(Some(signal))?;
+    Ok(getppid().map(Pid::as_raw_pid) == Some(parent))
 }

@@ -1,0 +1,132 @@
+//! How a drive can end.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// The exit codes of a drive's process begin here, one for each outcome.
+const CODES: u8 = 40;
+/// Added to the exit code of a drive that was complete before.
+const EARLIER: u8 = 20;
+
+/// How a drive has ended: the column `outcome` of the table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Outcome {
+    /// All scans have been played, and all results are there.
+    Complete,
+    /// All scans have been played, but too many of them cannot be read.
+    Corrupt,
+    /// There is nothing at its path.
+    Missing,
+    /// What is at its path is no recording, has too few scans, or a first one that cannot be read.
+    NotADataset,
+    /// Its configuration was refused.
+    Configuration,
+    /// The computer lacks something: shared memory, open files.
+    Machine,
+    /// The disk of the results is full.
+    DiskFull,
+    /// Another process is writing to its results.
+    InUse,
+    /// The run could not begin, or has failed: a stage died or hung more often than it may, for instance. The sentence says what.
+    Failed,
+    /// The process of its supervisor was killed.
+    Killed,
+    /// The batch was interrupted.
+    Interrupted,
+    /// It has not been computed yet, or with other settings.
+    NotRun,
+}
+
+impl Outcome {
+    /// All of them, in the order in which they are reported.
+    pub const ALL: [Self; 12] = [
+        Self::Complete,
+        Self::Corrupt,
+        Self::Missing,
+        Self::NotADataset,
+        Self::Configuration,
+        Self::Machine,
+        Self::DiskFull,
+        Self::InUse,
+        Self::Failed,
+        Self::Killed,
+        Self::Interrupted,
+        Self::NotRun,
+    ];
+
+    /// The name in the table.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Complete => "complete",
+            Self::Corrupt => "corrupt",
+            Self::Missing => "missing",
+            Self::NotADataset => "not-a-dataset",
+            Self::Configuration => "configuration",
+            Self::Machine => "machine",
+            Self::DiskFull => "disk-full",
+            Self::InUse => "in-use",
+            Self::Failed => "failed",
+            Self::Killed => "killed",
+            Self::Interrupted => "interrupted",
+            Self::NotRun => "not-run",
+        }
+    }
+
+    /// Returns whether all scans were played, so that there are results of the whole drive.
+    pub fn has_results(self) -> bool {
+        matches!(self, Self::Complete | Self::Corrupt)
+    }
+
+    /// The exit code of the drive's process; `earlier`: it had ended so before.
+    pub fn exit_code(self, earlier: bool) -> u8 {
+        CODES + self as u8 + if earlier { EARLIER } else { 0 }
+    }
+
+    /// Returns what an exit code means, and whether it had ended so before. Any other code is that of a process which has failed.
+    pub(crate) fn of_exit_code(code: i32) -> (Self, bool) {
+        let has_code = |earlier| {
+            let mut all = Self::ALL.into_iter();
+            let found = all.find(|outcome| i32::from(outcome.exit_code(earlier)) == code);
+            found.map(|outcome| (outcome, earlier))
+        };
+        has_code(false)
+            .or_else(|| has_code(true))
+            .unwrap_or((Self::Failed, false))
+    }
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_outcome_has_its_exit_codes_and_no_other_program_has_them() {
+        for outcome in Outcome::ALL {
+            for earlier in [false, true] {
+                let code = i32::from(outcome.exit_code(earlier));
+                assert_eq!(Outcome::of_exit_code(code), (outcome, earlier));
+                // Success, failure, wrong arguments, a panic, and what shells and interrupts give.
+                assert!(![0, 1, 2, 101].contains(&code) && code < 126, "{code}");
+            }
+        }
+        for code in [1, 2, 101] {
+            assert_eq!(Outcome::of_exit_code(code), (Outcome::Failed, false));
+        }
+    }
+
+    #[test]
+    fn names_are_those_in_files() {
+        for outcome in Outcome::ALL {
+            let written = serde_json::to_string(&outcome).unwrap_or_default();
+            assert_eq!(written, format!("\"{outcome}\""));
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! `gyre batch`: a run for each of many drives.
+
+mod drive;
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf, absolute},
+    process::ExitCode,
+    thread,
+};
+
+use gyre_batch::{Batch, Ended, List, Outcome, Settings, Slice, Table, collect, compute, table};
+use gyre_stage::wake::Signals;
+
+use crate::{Failure, cli::BatchArguments, out::Out, print, program, run::INTERRUPTED};
+
+pub use drive::drive;
+
+/// Processors that a run keeps busy.
+const PROCESSORS: usize = 2;
+
+/// Computes the drives of a list that are not complete, and writes the table. The exit code is 0 if all are complete, 1 if not, and 130 after
+/// an interruption.
+///
+/// # Errors
+/// A list that cannot be read, a folder that cannot be written, or to which another batch is writing.
+pub fn batch(arguments: &BatchArguments) -> Result<ExitCode, Failure> {
+    let list = List::read(&arguments.list)?;
+    let settings = settings(arguments)?;
+    let slice = arguments.task.zip(arguments.tasks);
+    let slice = slice.map(|(task, tasks)| Slice { task, tasks });
+    if arguments.collect {
+        let out = existing(&arguments.out)?;
+        let table = written(&list, &settings, &out)?;
+        table.failures().for_each(print::note);
+        return concluded(&table.counts(), 0, &out, false);
+    }
+    // Tasks share the folder. Alone, this one has it for itself, and writes the table.
+    let lock = slice.is_none().then(|| Out::lock(&arguments.out));
+    let _lock = lock.transpose()?;
+    fs::create_dir_all(&arguments.out)
+        .map_err(|error| format!("cannot write to {}: {error}", arguments.out.display()))?;
+    let out = existing(&arguments.out)?;
+    let batch = Batch {
+        program: program::own(),
+        list: &list,
+        drives: match slice {
+            Some(slice) => list.slice(slice)?,
+            None => list.drives().to_vec(),
+        },
+        settings: settings.clone(),
+        out: out.clone(),
+        jobs: arguments.jobs.map_or_else(jobs, usize::from),
+    };
+    let ended = compute(&batch, &Signals::install()?, &mut |line| print::note(line))?;
+    let Ended {
+        counts,
+        earlier,
+        interrupted,
+    } = ended;
+    if slice.is_some() {
+        print::line(sentence(&counts, earlier))?;
+        return Ok(exit_code(&counts, interrupted));
+    }
+    let table = written(&list, &settings, &out)?;
+    concluded(&table.counts(), earlier, &out, interrupted)
+}
+
+fn settings(arguments: &BatchArguments) -> Result<Settings, Failure> {
+    let unread =
+        |path: &Path, error| format!("cannot read the configuration {}: {error}", path.display());
+    let configuration = arguments.config.as_deref().map(|path| {
+        fs::metadata(path).map_err(|error| unread(path, error))?;
+        absolute(path).map_err(|error| unread(path, error))
+    });
+    Ok(Settings {
+        configuration: configuration.transpose()?,
+        set: arguments.set.clone(),
+    })
+}
+
+fn existing(out: &Path) -> Result<PathBuf, Failure> {
+    let unusable = |error| format!("cannot use {}: {error}", out.display());
+    Ok(out.canonicalize().map_err(unusable)?)
+}
+
+/// The number of runs that keep all processors busy.
+fn jobs() -> usize {
+    let processors = thread::available_parallelism().map_or(1, usize::from);
+    (processors / PROCESSORS).max(1)
+}
+
+/// Writes the table, and says if it is of several builds.
+fn written(list: &List, settings: &Settings, out: &Path) -> Result<Table, Failure> {
+    let table = collect(list, settings, out)?;
+    table.write(out)?;
+    if let builds @ [_, _, ..] = &table.builds()[..] {
+        print::note(format_args!(
+            "the results are of {} builds of gyre: {}; those in drives/ that are removed are computed anew",
+            builds.len(),
+            builds.join(", ")
+        ));
+    }
+    Ok(table)
+}
+
+fn concluded(
+    counts: &BTreeMap<Outcome, usize>,
+    earlier: usize,
+    out: &Path,
+    interrupted: bool,
+) -> Result<ExitCode, Failure> {
+    print::line(format_args!(
+        "{}\ntable in {}: {}, {}",
+        sentence(counts, earlier),
+        out.display(),
+        table::RESULTS,
+        table::TIMES
+    ))?;
+    Ok(exit_code(counts, interrupted))
+}
+
+/// The number of drives by outcome, in a sentence.
+fn sentence(counts: &BTreeMap<Outcome, usize>, earlier: usize) -> String {
+    let drives: usize = counts.values().sum();
+    let each = counts
+        .iter()
+        .map(|(outcome, count)| format!("{count} {outcome}"));
+    let each: Vec<_> = each.collect();
+    let earlier = match earlier {
+        0 => String::new(),
+        earlier => format!("; {earlier} had been computed before"),
+    };
+    let plural = if drives == 1 { "" } else { "s" };
+    format!("{drives} drive{plural}: {}{earlier}", each.join(", "))
+}
+
+fn exit_code(counts: &BTreeMap<Outcome, usize>, interrupted: bool) -> ExitCode {
+    let is_whole = counts.keys().all(|outcome| *outcome == Outcome::Complete);
+    match (interrupted, is_whole) {
+        (true, _) => ExitCode::from(INTERRUPTED),
+        (false, true) => ExitCode::SUCCESS,
+        (false, false) => ExitCode::FAILURE,
+    }
+}

@@ -1,0 +1,235 @@
+//! The process of a drive: a run that knows whether it has been computed, and by whose exit code failures are told apart.
+
+use std::{
+    path::Path,
+    process::ExitCode,
+    thread,
+    time::{Duration, Instant},
+};
+
+use gyre_batch::Outcome;
+use gyre_configuration::{AutomaticError, ConfigurationError};
+use gyre_masking::MaskerError;
+use gyre_radar::OpenError;
+use gyre_simulator::SimulatorError;
+use gyre_stage::run::end_with;
+use rustix::{io::Errno, process::Signal};
+use thiserror::Error;
+
+use crate::{
+    Failure,
+    cli::{BatchDriveArguments, RunArguments},
+    configuration::Configuration,
+    earlier,
+    identity::{Identity, Programs},
+    out::{Out, OutError},
+    preflight::PreflightError,
+    print,
+    results::SUMMARY,
+    run::{self, INTERRUPTED, resolve::resolve},
+    summary::Problem,
+};
+
+/// The run of a batch that was killed writes its results for so long, and has its folder meanwhile.
+const ENDING: Duration = Duration::from_secs(60);
+/// Time between two attempts to lock the folder.
+const LOOK: Duration = Duration::from_millis(200);
+
+/// Why a drive cannot be computed, where a run would not look.
+#[derive(Debug, Error)]
+enum DriveError {
+    #[error("there is nothing at {0}")]
+    Missing(String),
+    #[error(
+        "the configuration is of {0}, which has no end: a batch is of recordings and simulations"
+    )]
+    Endless(String),
+    /// Its settings, in the words of who read them.
+    #[error("{0}")]
+    Configuration(Failure),
+}
+
+/// Computes a drive, unless it has been computed with the same configuration from the same scans. The exit code tells the outcome.
+///
+/// # Errors
+/// The system does not let the process end with the batch.
+pub fn drive(arguments: &BatchDriveArguments) -> Result<ExitCode, Failure> {
+    if !end_with(arguments.parent, Signal::TERM)? {
+        return Ok(Outcome::Interrupted.exit_code(false).into());
+    }
+    let (outcome, earlier) = match computed(&arguments.run) {
+        Ok(ended) => ended,
+        Err(error) => {
+            print::note(format_args!("gyre: {error}"));
+            (outcome_of(&error), false)
+        }
+    };
+    Ok(outcome.exit_code(earlier).into())
+}
+
+/// Returns how the drive has ended, and whether it had before.
+fn computed(arguments: &RunArguments) -> Result<(Outcome, bool), Failure> {
+    let path = arguments.data.as_ref().or(arguments.configuration.as_ref());
+    if let Some(path) = path.filter(|path| matches!(path.try_exists(), Ok(false))) {
+        return Err(DriveError::Missing(path.display().to_string()).into());
+    }
+    let mut configuration = resolve(arguments).map_err(of_settings)?;
+    if configuration.is_radar() || configuration.source.repeat {
+        return Err(DriveError::Endless(configuration.data()).into());
+    }
+    let out = locked(&run::results_folder(arguments))?;
+    run::place_recording(&mut configuration, &out);
+    if is_finished(&out, &configuration) {
+        return finished(&out).map(|outcome| (outcome, true));
+    }
+    let discards = !continues(&out, &configuration)?;
+    let code = run::compute(configuration, out, discards)?;
+    Ok(match code == ExitCode::from(INTERRUPTED) {
+        true => (Outcome::Interrupted, false),
+        false => (Outcome::Complete, false),
+    })
+}
+
+/// Locks the folder of the results, when the run that ends there has ended.
+fn locked(path: &Path) -> Result<Out, OutError> {
+    let deadline = Instant::now() + ENDING;
+    loop {
+        match Out::lock(path) {
+            Err(OutError::Held { .. }) if Instant::now() < deadline => thread::sleep(LOOK),
+            locked => return locked,
+        }
+    }
+}
+
+/// Returns whether the folder has the results of all these scans with this configuration.
+fn is_finished(out: &Out, configuration: &Configuration) -> bool {
+    let is_complete = earlier::is_complete(out.path()) && out.join(SUMMARY).exists();
+    // Where it is not known what the results are of, the run says what cannot be read.
+    let is_same = |begun: Identity| begun.has_inputs_of(configuration);
+    is_complete && Identity::read(out, 0).and_then(is_same).unwrap_or(false)
+}
+
+/// Returns how a finished drive has ended, and says again what is wrong with it.
+fn finished(out: &Out) -> Result<Outcome, Failure> {
+    let text = gyre_storage::read_text(&out.join(SUMMARY), gyre_storage::SETTINGS)?;
+    let summary: serde_json::Value = serde_json::from_str(&text)?;
+    Ok(match summary["problem"].as_str() {
+        None => Outcome::Complete,
+        Some(problem) => {
+            print::note(format_args!("gyre: {problem}"));
+            Outcome::Corrupt
+        }
+    })
+}
+
+/// Returns whether an unfinished run in the folder, if there is one, goes on with this configuration. One of another configuration or build is
+/// discarded: nobody has seen results of it.
+fn continues(out: &Out, configuration: &Configuration) -> Result<bool, Failure> {
+    let Ok(begun) = Identity::read(out, 0) else {
+        return Ok(true);
+    };
+    let programs = Programs::now(configuration)?;
+    let goes_on = begun.require(configuration, &programs, out.path(), 0);
+    // What cannot be read the run itself reports, and keeps what it has.
+    Ok(goes_on.is_ok() && begun.has_inputs_of(configuration).unwrap_or(true))
+}
+
+/// Says of what has no type of its own that it is the configuration's.
+fn of_settings(error: Failure) -> Failure {
+    match error.is::<AutomaticError>() || error.is::<ConfigurationError>() {
+        true => error,
+        false => DriveError::Configuration(error).into(),
+    }
+}
+
+fn outcome_of(failure: &Failure) -> Outcome {
+    if is_of_full_disk(failure) {
+        return Outcome::DiskFull;
+    }
+    if let Some(error) = failure.downcast_ref::<DriveError>() {
+        return match error {
+            DriveError::Missing(_) => Outcome::Missing,
+            DriveError::Endless(_) | DriveError::Configuration(_) => Outcome::Configuration,
+        };
+    }
+    if let Some(error) = failure.downcast_ref::<AutomaticError>() {
+        return match error {
+            AutomaticError::Open(error) => outcome_of_open(error),
+            AutomaticError::Read(_) | AutomaticError::Empty => Outcome::NotADataset,
+            _ => Outcome::Configuration,
+        };
+    }
+    if let Some(error) = failure.downcast_ref::<PreflightError>() {
+        return outcome_of_preflight(error);
+    }
+    let is_configuration = failure.is::<ConfigurationError>()
+        || failure.is::<MaskerError>()
+        || failure.is::<SimulatorError>();
+    match failure.downcast_ref::<OpenError>() {
+        Some(error) => outcome_of_open(error),
+        None if is_configuration => Outcome::Configuration,
+        None if failure.is::<Problem>() => Outcome::Corrupt,
+        None if matches!(failure.downcast_ref(), Some(OutError::Held { .. })) => Outcome::InUse,
+        None => Outcome::Failed,
+    }
+}
+
+fn outcome_of_open(error: &OpenError) -> Outcome {
+    match error {
+        OpenError::Missing { .. } => Outcome::Missing,
+        OpenError::BadOption { .. } | OpenError::DatasetToml { .. } => Outcome::Configuration,
+        _ => Outcome::NotADataset,
+    }
+}
+
+fn outcome_of_preflight(error: &PreflightError) -> Outcome {
+    match error {
+        PreflightError::TooFew { .. } | PreflightError::NoRecording { .. } => Outcome::NotADataset,
+        PreflightError::NoData | PreflightError::Radar { .. } => Outcome::Configuration,
+        PreflightError::SharedMemory { .. }
+        | PreflightError::OpenFiles { .. }
+        | PreflightError::NoSharedMemory(_) => Outcome::Machine,
+    }
+}
+
+/// Returns whether a disk or a quota is full. The last words of a stage are a text, as the system's errors are written in Rust.
+fn is_of_full_disk(failure: &Failure) -> bool {
+    let text = failure.to_string();
+    let full = [Errno::NOSPC, Errno::DQUOT].map(|it| format!("(os error {})", it.raw_os_error()));
+    full.iter().any(|error| text.contains(error))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn failures_of_one_kind_have_one_outcome() {
+        let path = || "a".into();
+        let cases: [(Failure, Outcome); 8] = [
+            (DriveError::Missing("a".into()).into(), Outcome::Missing),
+            (OpenError::Missing { path: path() }.into(), Outcome::Missing),
+            (
+                OpenError::NoImages { path: path() }.into(),
+                Outcome::NotADataset,
+            ),
+            (
+                AutomaticError::Open(OpenError::NoImages { path: path() }).into(),
+                Outcome::NotADataset,
+            ),
+            (
+                PreflightError::OpenFiles { limit: 1 }.into(),
+                Outcome::Machine,
+            ),
+            (of_settings("a card".into()), Outcome::Configuration),
+            ("masking died".into(), Outcome::Failed),
+            (
+                "cannot write b: No space left on device (os error 28)".into(),
+                Outcome::DiskFull,
+            ),
+        ];
+        for (failure, outcome) in cases {
+            assert_eq!(outcome_of(&failure), outcome, "{failure}");
+        }
+    }
+}

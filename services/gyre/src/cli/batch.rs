@@ -1,0 +1,47 @@
+//! The arguments of `gyre batch`.
+
+use std::{num::NonZeroUsize, path::PathBuf};
+
+use clap::Args;
+
+use super::RunArguments;
+
+/// The arguments of `gyre batch`.
+#[derive(Debug, Args)]
+pub struct BatchArguments {
+    /// The drives: a text file with the path of a recording in each line, a CSV file with the columns drive, name, configuration and set, or a
+    /// folder whose sub-folders are recordings.
+    pub list: PathBuf,
+    /// The folder of the batch. What an earlier call has left there is kept and completed.
+    #[arg(long, default_value = "out/batch")]
+    pub out: PathBuf,
+    /// The configuration of the drives that name none. Default: what each recording's format and its scans say.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Override a key of each configuration, as in slam.kind=graph; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Runs at once. Default: half as many as there are processors, since a run keeps about two of them busy.
+    #[arg(long, value_name = "N")]
+    pub jobs: Option<NonZeroUsize>,
+    /// Compute only the drives of this task, from 0, of those that share the list.
+    #[arg(long, value_name = "I", requires = "tasks")]
+    pub task: Option<usize>,
+    /// The number of tasks that share the list.
+    #[arg(long, value_name = "N", requires = "task")]
+    pub tasks: Option<usize>,
+    /// Compute nothing: write the table of what is there.
+    #[arg(long, conflicts_with_all = ["task", "jobs"])]
+    pub collect: bool,
+}
+
+/// The arguments of the process of a drive: those of a run, and the process that it ends with.
+#[derive(Debug, Args)]
+pub struct BatchDriveArguments {
+    /// The process that has started it.
+    #[arg(long)]
+    pub parent: i32,
+    /// The run.
+    #[command(flatten)]
+    pub run: RunArguments,
+}

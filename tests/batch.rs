@@ -1,0 +1,474 @@
+//! `gyre batch`: whatever is killed, the same command completes the table, and failures are told apart.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Child, Command, Stdio},
+    thread,
+    time::{Duration, Instant},
+};
+
+use gyre_pose_integration::journal;
+use rustix::process::{Pid, Signal, kill_process_group};
+use tempfile::TempDir;
+
+use crate::{
+    PROJECT,
+    common::{Ended, assert_nothing_left, gyre, leftovers, processes, recording, send},
+};
+
+/// A batch takes seconds, far more only on a loaded machine.
+const LIMIT: Duration = Duration::from_secs(180);
+const LOOK: Duration = Duration::from_millis(2);
+const SMALL: &str = "[raster]\nn = 127\ncell_m = 0.8\n";
+
+/// A list of drives, and the recordings in it.
+struct Drives {
+    folder: TempDir,
+    names: Vec<String>,
+}
+
+impl Drives {
+    fn new() -> Self {
+        let folder = crate::common::folder();
+        fs::write(folder.path().join("list.csv"), "name,drive,set\n").unwrap();
+        Self {
+            folder,
+            names: Vec::new(),
+        }
+    }
+
+    /// Parts of the small recording.
+    fn recordings(mut self, parts: &[usize]) -> Self {
+        for scans in parts {
+            let kept = recording::linked(recording::small(), |scan| scan < *scans).keep();
+            let place = self.path(&format!("part-{scans}"));
+            fs::rename(kept, &place).unwrap();
+            self = self.line(&format!("part-{scans}"), &place, "");
+        }
+        self
+    }
+
+    fn line(mut self, name: &str, drive: &Path, set: &str) -> Self {
+        let list = self.path("list.csv");
+        let lines = fs::read_to_string(&list).unwrap();
+        let line = format!("{name},{},{set}\n", drive.display());
+        fs::write(list, lines + &line).unwrap();
+        self.names.push(name.to_owned());
+        self
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// The command with its results in a folder.
+    fn batch(&self, out: &str) -> Batch<'_> {
+        Batch {
+            drives: self,
+            out: self.path(out),
+            options: Vec::new(),
+        }
+    }
+}
+
+/// A `gyre batch` command.
+#[derive(Clone)]
+struct Batch<'a> {
+    drives: &'a Drives,
+    out: PathBuf,
+    options: Vec<String>,
+}
+
+impl Batch<'_> {
+    fn with(mut self, options: &[&str]) -> Self {
+        self.options.extend(options.iter().map(|&it| it.to_owned()));
+        self
+    }
+
+    fn command(&self) -> Command {
+        let mut command = gyre();
+        command
+            .arg("batch")
+            .arg(self.drives.path("list.csv"))
+            .arg("--config")
+            .arg(self.drives.path("small.toml"))
+            .arg("--out")
+            .arg(&self.out)
+            .args(&self.options);
+        command
+    }
+
+    /// Runs it to its end, which leaves nothing behind.
+    fn finish(&self) -> Ended {
+        let ended = Ended::of(self.command());
+        println!("{}{}", ended.stderr, ended.stdout);
+        for name in &self.drives.names {
+            assert_nothing_left(&self.results(name));
+        }
+        ended
+    }
+
+    /// Starts it as the leader of a process group.
+    fn start(&self) -> Started<'_> {
+        use std::os::unix::process::CommandExt;
+        let mut command = self.command();
+        command.process_group(0);
+        command.stdout(Stdio::null()).stderr(Stdio::null());
+        Started {
+            batch: self,
+            process: command.spawn().unwrap(),
+        }
+    }
+
+    fn results(&self, name: &str) -> PathBuf {
+        self.out.join("drives").join(name)
+    }
+
+    fn rows(&self) -> usize {
+        let rows = fs::read_dir(self.out.join("rows")).into_iter().flatten();
+        let names = rows.map(|row| row.unwrap().file_name());
+        // Not those that are about to be written.
+        names
+            .filter(|name| !name.as_encoded_bytes().starts_with(b"."))
+            .count()
+    }
+
+    /// The drives that are being computed: their supervisors.
+    fn supervisors(&self) -> Vec<u32> {
+        let names = self.drives.names.iter();
+        let running = names.filter(|name| self.poses(name) > 1);
+        let supervisor = |name: &String| {
+            let root = leftovers::root(&self.results(name));
+            let stage = processes::of_run(&root).into_iter().next()?;
+            processes::parent_of(stage)
+        };
+        running.filter_map(supervisor).collect()
+    }
+
+    fn poses(&self, name: &str) -> usize {
+        let path = journal::path(&self.results(name));
+        journal::records(&path).map_or(0, |records| records.into_iter().flatten().count())
+    }
+
+    fn table(&self) -> String {
+        fs::read_to_string(self.out.join("results.csv")).unwrap()
+    }
+
+    /// Name and outcome of each row.
+    fn outcomes(&self) -> Vec<(String, String)> {
+        let table = self.table();
+        let mut reader = csv::Reader::from_reader(table.as_bytes());
+        let row = |row: csv::StringRecord| (row[0].to_owned(), row[2].to_owned());
+        reader.records().map(|it| row(it.unwrap())).collect()
+    }
+}
+
+/// A batch that is running.
+struct Started<'a> {
+    batch: &'a Batch<'a>,
+    process: Child,
+}
+
+impl Started<'_> {
+    /// Waits until there are so many rows and one more drive is being computed, and returns its supervisor.
+    fn await_run_after(&mut self, rows: usize) -> u32 {
+        let since = Instant::now();
+        loop {
+            let running = self.batch.supervisors();
+            if let (true, Some(pid)) = (self.batch.rows() >= rows, running.first()) {
+                return *pid;
+            }
+            assert!(self.process.try_wait().unwrap().is_none(), "it has ended");
+            assert!(since.elapsed() < LIMIT, "waited in vain for a run");
+            thread::sleep(LOOK);
+        }
+    }
+
+    fn pid(&self) -> Pid {
+        Pid::from_child(&self.process)
+    }
+
+    fn wait(mut self) -> Option<i32> {
+        self.process.wait().unwrap().code()
+    }
+}
+
+/// A batch with a drive for each way to fail.
+fn drives_with_failures() -> Drives {
+    let drives = Drives::new().recordings(&[20, 22, 24]);
+    let folder = drives.folder.path().to_owned();
+    let corrupt = recording::linked(recording::small(), |scan| scan < 12).keep();
+    for image in recording::images(&corrupt).iter().skip(4) {
+        recording::truncate(image, 100);
+    }
+    fs::rename(corrupt, folder.join("corrupt")).unwrap();
+    fs::create_dir(folder.join("empty")).unwrap();
+    let simulation = format!("[simulation]\nscans = 4\nseed = 7\n{SMALL}");
+    fs::write(folder.join("simulated.toml"), simulation).unwrap();
+    drives
+        .line("corrupt", &folder.join("corrupt"), "")
+        .line("missing", &folder.join("nowhere"), "")
+        .line("empty", &folder.join("empty"), "")
+        .line("refused", &folder.join("part-20"), "raster.m=3")
+        // Relative to the list.
+        .line("simulated", Path::new("simulated.toml"), "")
+}
+
+const OUTCOMES: [(&str, &str); 8] = [
+    ("part-20", "complete"),
+    ("part-22", "complete"),
+    ("part-24", "complete"),
+    ("corrupt", "corrupt"),
+    ("missing", "missing"),
+    ("empty", "not-a-dataset"),
+    ("refused", "configuration"),
+    ("simulated", "complete"),
+];
+
+#[test]
+fn a_batch_that_is_killed_gives_the_table_of_one_that_is_not() {
+    let drives = drives_with_failures();
+    // So that there is time to kill a run.
+    let paced = ["--set", "run.rate='12'", "--jobs", "1"];
+    let calm = drives.batch("calm").with(&paced);
+    let ended = calm.finish();
+    assert_eq!(ended.code(), Some(1));
+    let outcomes = calm.outcomes();
+    let outcomes: Vec<_> = outcomes
+        .iter()
+        .map(|(a, b)| (a.as_str(), b.as_str()))
+        .collect();
+    assert_eq!(outcomes, OUTCOMES);
+    let said = "8 drives: 4 complete, 1 corrupt, 1 missing, 1 not-a-dataset, 1 configuration";
+    assert!(ended.stdout.contains(said), "{}", ended.stdout);
+    // A line for each.
+    let lines =
+        |ended: &Ended, word: &str| ended.stderr.lines().filter(|it| it.contains(word)).count();
+    for words in [
+        "corrupt: corrupt: 8 of the 12 scans",
+        "missing: missing: there is nothing at",
+        "empty: not-a-dataset: ",
+        "refused: configuration: [raster] has no key `m`",
+    ] {
+        assert_eq!(lines(&ended, words), 1, "{words}:\n{}", ended.stderr);
+    }
+    assert_eq!(ended.stderr.lines().count(), 8, "{}", ended.stderr);
+
+    let killed = drives.batch("killed").with(&paced);
+    let mut started = killed.start();
+    started.await_run_after(0);
+    kill_process_group(started.pid(), Signal::KILL).unwrap();
+    assert_eq!(started.wait(), None);
+    let mut started = killed.start();
+    started.await_run_after(1);
+    send(started.pid().as_raw_pid() as u32, Signal::KILL);
+    assert_eq!(started.wait(), None);
+    let mut started = killed.start();
+    let supervisor = started.await_run_after(2);
+    send(supervisor, Signal::KILL);
+    assert_eq!(started.wait(), Some(1));
+    assert!(killed.outcomes().iter().any(|(_, it)| it == "killed"));
+    let last = killed.finish();
+    assert!(last.stdout.contains(said), "{}", last.stdout);
+    assert!(
+        last.stdout.contains("had been computed before"),
+        "{}",
+        last.stdout
+    );
+    assert_eq!(killed.table(), calm.table());
+
+    // Tasks that share the list and the folder alone.
+    let shared = drives.batch("shared").with(&paced[..2]);
+    let task = |task: &str| shared.clone().with(&["--task", task, "--tasks", "3"]);
+    let tasks = ["0", "1", "2"].map(task);
+    let started: Vec<_> = tasks.iter().map(Batch::start).collect();
+    let codes: Vec<_> = started.into_iter().map(Started::wait).collect();
+    // Of the third share, part-24 and empty, one fails as well.
+    assert_eq!(codes, [Some(1), Some(1), Some(1)]);
+    let ended = shared.clone().with(&["--collect"]).finish();
+    assert_eq!(ended.code(), Some(1));
+    assert_eq!(ended.stderr.lines().count(), 4, "{}", ended.stderr);
+    assert_eq!(shared.table(), calm.table());
+}
+
+#[test]
+fn a_drive_is_computed_again_with_another_configuration_alone() {
+    let drives = Drives::new().recordings(&[6]);
+    let batch = drives.batch("out");
+    let changed = || {
+        let journal = journal::path(&batch.results("part-6"));
+        fs::metadata(journal).unwrap().modified().unwrap()
+    };
+    batch.finish().succeeded();
+    let first = changed();
+    let again = batch.finish();
+    assert!(
+        again
+            .succeeded()
+            .stdout
+            .contains("1 had been computed before")
+    );
+    assert_eq!(changed(), first);
+
+    let other = batch.clone().with(&["--set", "search.kind='exhaustive'"]);
+    let collected = other.clone().with(&["--collect"]).finish();
+    assert_eq!(collected.code(), Some(1));
+    assert!(
+        collected
+            .stderr
+            .contains("part-6: not-run: it was computed with other settings")
+    );
+    let ended = other.finish();
+    assert!(
+        !ended.succeeded().stdout.contains("before"),
+        "{}",
+        ended.stdout
+    );
+    assert!(changed() > first);
+}
+
+#[test]
+fn an_interrupted_batch_keeps_what_it_has_and_goes_on() {
+    let drives = Drives::new().recordings(&[24]);
+    let batch = drives.batch("out").with(&["--set", "run.rate='4'"]);
+    let mut started = batch.start();
+    started.await_run_after(0);
+    send(started.pid().as_raw_pid() as u32, Signal::TERM);
+    assert_eq!(started.wait(), Some(130));
+    assert_eq!(
+        batch.outcomes(),
+        [("part-24".to_owned(), "interrupted".to_owned())]
+    );
+    assert_nothing_left(&batch.results("part-24"));
+    let poses = batch.poses("part-24");
+    assert!((1..24).contains(&poses), "{poses}");
+    batch.finish().succeeded();
+    let times = fs::read_to_string(batch.out.join("times.csv")).unwrap();
+    let mut times = csv::Reader::from_reader(times.as_bytes());
+    let header = times.headers().unwrap().clone();
+    let column = header.iter().position(|it| it == "resumed_after").unwrap();
+    assert_eq!(
+        &times.records().next().unwrap().unwrap()[column],
+        poses.to_string()
+    );
+}
+
+#[test]
+fn a_batch_or_a_task_that_cannot_be_is_refused_in_a_sentence() {
+    let drives = Drives::new().recordings(&[2]);
+    let batch = |options: &[&str]| drives.batch("out").with(options).finish();
+    batch(&["--task", "4", "--tasks", "4"]).refused_with(&["no task 4 of 4", "last one is 3"]);
+    fs::create_dir(drives.path("out/rows").parent().unwrap()).unwrap();
+    batch(&["--collect"]).refused_with(&["is not the folder of a batch"]);
+    fs::write(drives.path("list.csv"), "drive,sett\na,b\n").unwrap();
+    batch(&[]).refused_with(&["list.csv, line 1", "no column `sett`"]);
+    fs::remove_file(drives.path("list.csv")).unwrap();
+    batch(&[]).refused_with(&["list of drives", "list.csv"]);
+}
+
+#[test]
+fn a_full_disk_is_told_from_other_failures() {
+    let drives = Drives::new().recordings(&[24]);
+    let batch = drives.batch("out");
+    let place = batch.results("part-24");
+    fs::create_dir_all(&place).unwrap();
+    let mut command = Command::new("unshare");
+    let mount = "mount -t tmpfs -o size=64k tmpfs \"$0\" && exec \"$@\"";
+    let own = batch.command();
+    command.args(["--mount", "sh", "-c", mount]).arg(&place);
+    command.arg(own.get_program()).args(own.get_args());
+    let permitted = Command::new("unshare").args(["--mount", "true"]).status();
+    if !permitted.is_ok_and(|status| status.success()) {
+        return println!("skipped: a mount namespace of its own is not permitted here");
+    }
+    let ended = Ended::of(command);
+    assert_eq!(ended.code(), Some(1), "{}", ended.stderr);
+    assert_eq!(
+        batch.outcomes(),
+        [("part-24".to_owned(), "disk-full".to_owned())]
+    );
+}
+
+/// Slurm on this computer alone, in a folder. Dropped, it is stopped.
+struct Slurm {
+    folder: TempDir,
+}
+
+impl Slurm {
+    /// Starts it; prints why a test is skipped where there is none.
+    fn start() -> Option<Self> {
+        let programs = ["slurmctld", "slurmd", "munged", "sbatch"].iter();
+        let is_there = |program: &&str| {
+            let found = Command::new("sh")
+                .args(["-c", "command -v $0", program])
+                .output();
+            found.is_ok_and(|output| output.status.success())
+        };
+        if !programs.into_iter().all(|it| is_there(&it)) || !rustix::process::geteuid().is_root() {
+            println!("skipped: Slurm and munge are not installed, or this is not root");
+            return None;
+        }
+        let slurm = Self {
+            folder: crate::common::folder(),
+        };
+        let started = slurm.script("start").status().unwrap();
+        assert!(started.success());
+        Some(slurm)
+    }
+
+    fn script(&self, action: &str) -> Command {
+        let mut command = Command::new(format!("{PROJECT}/examples/slurm/one-node.sh"));
+        command.arg(self.folder.path()).arg(action);
+        command
+    }
+
+    fn sbatch(&self) -> Command {
+        let mut command = Command::new("sbatch");
+        command
+            .env("SLURM_CONF", self.folder.path().join("slurm.conf"))
+            .current_dir(self.folder.path())
+            .args(["--parsable", "--wait"]);
+        command
+    }
+}
+
+impl Drop for Slurm {
+    fn drop(&mut self) {
+        let _ = self.script("stop").status();
+    }
+}
+
+#[test]
+fn an_array_of_slurm_gives_the_same_table() {
+    let Some(slurm) = Slurm::start() else {
+        return;
+    };
+    let drives = Drives::new().recordings(&[4, 5, 6]);
+    let drives = {
+        let nowhere = drives.path("nowhere");
+        drives.line("missing", &nowhere, "")
+    };
+    let alone = drives.batch("alone");
+    assert_eq!(alone.finish().code(), Some(1));
+    let array = drives.batch("array");
+    let programs = Path::new(crate::PROGRAM).parent().unwrap();
+    let path = format!("{}:{}", programs.display(), std::env::var("PATH").unwrap());
+    let mut sbatch = slurm.sbatch();
+    sbatch
+        .env("PATH", path)
+        .arg("--array=0-1")
+        .arg("--cpus-per-task=1")
+        .arg("--mem-per-cpu=0")
+        .arg(format!("{PROJECT}/examples/slurm/gyre.sbatch"))
+        .arg(drives.path("list.csv"))
+        .arg(&array.out)
+        .arg("--config")
+        .arg(drives.path("small.toml"));
+    // One of its drives is missing.
+    let submitted = Ended::of(sbatch);
+    assert_eq!(submitted.code(), Some(1), "{}", submitted.stderr);
+    let ended = array.clone().with(&["--collect"]).finish();
+    assert_eq!(ended.code(), Some(1));
+    assert_eq!(array.table(), alone.table());
+}
