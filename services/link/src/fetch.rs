@@ -7,7 +7,7 @@ use std::{
         mpsc::{Receiver, Sender, channel},
     },
     thread,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use gyre_messages::{Item, flag};
@@ -24,6 +24,10 @@ use crate::{
 
 /// Time after which a request that nobody has ended is made again.
 const GIVEN_UP: Duration = ANSWERED_FOR.saturating_add(Duration::from_secs(10));
+/// The same for one that is not answered, and for one whose answers cease: a request can be lost at the moment of a cut, without an end. A scan
+/// may take seconds on a slow network.
+const UNANSWERED: Duration = Duration::from_secs(3);
+const SILENT: Duration = Duration::from_secs(12);
 /// Time between two looks whether to go on.
 const LOOK: Duration = Duration::from_millis(200);
 /// Pauses between requests that nobody has answered, from the first to the longest.
@@ -162,10 +166,19 @@ impl Asking {
         let mut was_answered = false;
         self.state.asked.store(*from, Ordering::Relaxed);
         self.state.again.store(false, Ordering::Relaxed);
+        let mut heard = Instant::now();
         loop {
             match replies.recv_timeout(LOOK) {
-                Ok(Some(reply)) => was_answered |= self.take(reply),
-                Ok(None) => {}
+                Ok(Some(reply)) => {
+                    was_answered |= self.take(reply);
+                    heard = Instant::now();
+                }
+                Ok(None) => {
+                    let limit = if was_answered { SILENT } else { UNANSWERED };
+                    if heard.elapsed() > limit {
+                        return false;
+                    }
+                }
                 Err(_) => return was_answered,
             }
             if self.has_stopped() || self.state.again.load(Ordering::Relaxed) {

@@ -23,6 +23,8 @@ use crate::{
 
 /// Time for which a request is answered. Then the receiver asks again, so that a sender forgets one that has gone.
 pub(crate) const ANSWERED_FOR: Duration = Duration::from_secs(20);
+/// Time without a message after which the receiver is told that this end is still there.
+const ALIVE: Duration = Duration::from_secs(1);
 /// Time between two looks whether a request is still wanted.
 const LOOK: Duration = Duration::from_millis(200);
 /// Time after which a receiver has gone that does not ask again.
@@ -173,7 +175,8 @@ impl Offer {
     ) -> Result<(), LinkError> {
         // The receiver learns at once that somebody is there.
         self.reply(query, &[])?;
-        let until = Instant::now() + ANSWERED_FOR;
+        let mut said = Instant::now();
+        let until = said + ANSWERED_FOR;
         while Instant::now() < until && self.is_wanted(receiver, request) {
             match self.tape.next(next, LOOK)? {
                 Next::Message(message) => {
@@ -182,6 +185,11 @@ impl Offer {
                     let bytes = message.bytes.len() as u64;
                     self.bytes.fetch_add(bytes, Ordering::Relaxed);
                     next = message.seq.saturating_add(1);
+                    said = Instant::now();
+                }
+                Next::Nothing if said.elapsed() > ALIVE => {
+                    self.reply(query, &[])?;
+                    said = Instant::now();
                 }
                 Next::Nothing => {}
                 Next::Ended => return self.reply_ended(query, receiver),
