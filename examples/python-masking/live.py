@@ -12,17 +12,19 @@ from messages import BASE, BREAK, END, ByteBlock, Item, ScanHeader
 
 # A chain of motions breaks where the time from scan to scan is longer.
 MAX_INTERVAL_NS = 10_000_000_000
+# Windows of scans after which masking counts as caught up all the same: a pipeline that is slower than its scans never is.
+WINDOWS_IN_ORDER = 8
 
 
 class NewestScans(Port):
-    """The queue of scans in live mode. After a start the first ones are taken in order, as many as the window has room for: so a
-    restart or a swap that is shorter than that drops none of those that came meanwhile."""
+    """The queue of scans in live mode. After a start they are taken in order until masking has caught up, and as many may wait as the
+    window has room for: so a restart or a swap that is shorter than that drops none of those that came meanwhile."""
 
     def __init__(self, run: Run, motions) -> None:
         super().__init__(run, "scan", ScanHeader, ByteBlock, check_scan)
         self._window, self._motions = run.manifest["window"]["scans"], motions
         self._queue: deque[Received] = deque()
-        self._in_order = self._window
+        self._in_order = WINDOWS_IN_ORDER * self._window
         self._next: Optional[int] = None
         # The scan before, and its time; the time is unknown after a restart. None where the chain starts.
         self._previous: Optional[tuple[int, Optional[int]]] = None
@@ -39,6 +41,8 @@ class NewestScans(Port):
             if self._passed is not None and not item.flags & END and item.published <= self._passed:
                 self._queue.pop().release()
             self._drop_the_oldest()
+        if self._passed is not None and self._scans() <= 1:
+            self._in_order = 0
         if self._next is None:
             self._resume()
             self._drop_the_oldest()
@@ -56,17 +60,20 @@ class NewestScans(Port):
         item = self._queue[0].item
         self._previous, self._passed = (item.scan, item.stamp_ns), item.published
         self._next += 1
-        if not self._repeats:
-            self._in_order = max(0, self._in_order - 1)
+        self._in_order = max(0, self._in_order - 1)
         self._repeats = False
         self._queue.popleft().release()
 
     def _drop_the_oldest(self) -> None:
-        if self._next is None or self._repeats or not self._queue:
+        if self._next is None or self._repeats:
             return
-        end = 1 if self._queue[-1].item.flags & END else 0
-        while len(self._queue) > max(1, self._in_order) + end:
+        room = self._window if self._in_order else 1
+        while self._scans() > room:
             self._queue.popleft().release()
+
+    def _scans(self) -> int:
+        has_end = bool(self._queue) and self._queue[-1].item.flags & END
+        return len(self._queue) - (1 if has_end else 0)
 
     def _resume(self) -> None:
         """Goes on after the newest pose: with its scan again if the source still has it, else with a new chain."""

@@ -1,8 +1,8 @@
 //! Live mode: only the newest scan is processed. Admitted scans get consecutive sequence numbers, so no later stage sees a gap;
 //! the gaps in the source's own count are the dropped scans.
 //!
-//! After a start the first scans are processed in order, as many as the window has room for: so a restart that is shorter than that
-//! drops none of those that came meanwhile.
+//! After a start scans are processed in order until masking has caught up, and as many may wait as the window has room for: so a restart
+//! that is shorter than that drops none of those that came meanwhile.
 
 use std::collections::VecDeque;
 
@@ -14,6 +14,10 @@ use gyre_stage::{
     reader::{Port, Received},
 };
 
+/// Windows of scans after which masking counts as caught up all the same: a pipeline that is slower than its scans never is, and would
+/// have the latency of those that wait for ever.
+const WINDOWS_IN_ORDER: usize = 8;
+
 /// The queue of masking in live mode.
 pub struct NewestOnly {
     port: Port<Scan>,
@@ -23,7 +27,7 @@ pub struct NewestOnly {
     previous: Option<Received<Scan>>,
     window: Window,
     chain: Option<Chain>,
-    /// Scans that may still wait their turn after a start; 0: the newest scan alone.
+    /// Scans that may still be processed in order after a start; 0: the newest scan alone.
     in_order: usize,
 }
 
@@ -49,7 +53,7 @@ impl NewestOnly {
             previous: None,
             window,
             chain: None,
-            in_order: window.scans,
+            in_order: window.scans * WINDOWS_IN_ORDER,
         })
     }
 
@@ -66,6 +70,10 @@ impl NewestOnly {
             if self.chain.is_some_and(|chain| !chain.repeats) {
                 self.drop_the_oldest();
             }
+        }
+        let has_begun = self.chain.is_some_and(|chain| chain.published.is_some());
+        if has_begun && self.scans() <= 1 {
+            self.in_order = 0;
         }
         Ok(())
     }
@@ -115,13 +123,21 @@ impl NewestOnly {
         Some(Chain::resume(self.queue.front()?.item(), newest_pose))
     }
 
-    /// Drops all but the newest scan; after a start, all but as many as may wait.
+    /// Drops all but the newest scan; until masking has caught up after a start, all but as many as the window has room for.
     fn drop_the_oldest(&mut self) {
-        let is_end = |last: &Received<Scan>| last.item().is(flag::END);
-        let end = usize::from(self.queue.back().is_some_and(is_end));
-        while self.queue.len() > self.in_order.max(1) + end {
+        let room = match self.in_order {
+            0 => 1,
+            _ => self.window.scans,
+        };
+        while self.scans() > room {
             self.queue.pop_front();
         }
+    }
+
+    /// Returns the number of scans in the queue, without the end of the stream.
+    fn scans(&self) -> usize {
+        let is_end = |last: &Received<Scan>| last.item().is(flag::END);
+        self.queue.len() - usize::from(self.queue.back().is_some_and(is_end))
     }
 
     /// Advances to the next scan.
@@ -131,9 +147,7 @@ impl NewestOnly {
             let (scan, published) = (done.item().scan, done.item().published);
             let stamp_ns = done.item().stamp_ns;
             let next = chain.next.saturating_add(1);
-            // One that is repeated has its pose already.
-            let is_new = usize::from(!chain.repeats);
-            self.in_order = self.in_order.saturating_sub(is_new);
+            self.in_order = self.in_order.saturating_sub(1);
             *chain = Chain {
                 next,
                 previous_scan: Some(scan),
