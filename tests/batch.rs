@@ -405,7 +405,7 @@ impl Slurm {
                 .output();
             found.is_ok_and(|output| output.status.success())
         };
-        if !programs.into_iter().all(|it| is_there(&it)) || !rustix::process::geteuid().is_root() {
+        if !programs.into_iter().all(is_there) || !rustix::process::geteuid().is_root() {
             println!("skipped: Slurm and munge are not installed, or this is not root");
             return None;
         }

@@ -47,9 +47,10 @@ impl Batch<'_> {
     }
 
     fn prepare(&self) -> Result<(), BatchError> {
-        let folders = ["drives", "output", "rows"].into_iter();
-        let create = |name| gyre_storage::create_folder(&self.out.join(name));
-        Ok(folders.map(create).collect::<Result<(), _>>()?)
+        for name in ["drives", "output", "rows"] {
+            gyre_storage::create_folder(&self.out.join(name))?;
+        }
+        Ok(())
     }
 }
 

@@ -322,8 +322,10 @@ impl Base<'_> {
 impl Coming {
     /// Takes the message about an item, if it has come.
     fn take(&mut self, seq: u64) -> Option<RecordedMessage> {
-        let is_about = |message: &RecordedMessage| message.item().is_some_and(|it| it.seq == seq);
-        self.messages.pop_front_if(|message| is_about(message))
+        let first = self.messages.front()?.item();
+        first
+            .is_some_and(|it| it.seq == seq)
+            .then(|| self.messages.pop_front())?
     }
 
     fn receive(&mut self) -> Result<(), LinkError> {
