@@ -109,7 +109,7 @@ fn configuration(settings: &Settings) -> Result<Configuration, AskError> {
     let started = Instant::now();
     while started.elapsed() < PATIENCE {
         match radar.read(messages.space()) {
-            Ok(count) => messages.filled(count),
+            Ok((count, _)) => messages.filled(count),
             Err(error) if error.kind() == ErrorKind::UnexpectedEof => break,
             Err(error) if error.kind() == ErrorKind::WouldBlock => sleep(POLL),
             Err(error) if error.kind() == ErrorKind::Interrupted => {}

@@ -3,7 +3,7 @@
 use std::{
     fmt::Display,
     io::{self, ErrorKind, Read, Write},
-    net::{Ipv4Addr, SocketAddrV4, TcpStream, ToSocketAddrs, UdpSocket},
+    net::{IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4, TcpStream, ToSocketAddrs, UdpSocket},
     os::fd::{AsFd, BorrowedFd},
     time::{Duration, Instant},
 };
@@ -29,6 +29,8 @@ pub enum Received {
     Opened,
     /// Nothing; look again after this time.
     Nothing(Duration),
+    /// Nothing, and it was closed, or could not be opened; look again after this time.
+    Closed(Duration),
 }
 
 /// A connection to a radar.
@@ -37,12 +39,22 @@ pub struct Connection {
     address: Address,
     silence: Duration,
     link: Option<Link>,
-    /// The last byte, or the opening.
+    /// The last azimuth, or the opening.
     heard: Instant,
+    /// An azimuth has come since the opening.
+    is_heard: bool,
     retry_at: Instant,
     pause: Duration,
+    /// Who has sent the last datagram.
+    from: Option<SocketAddr>,
+    /// The only one whose datagrams are taken.
+    sender: Option<SocketAddr>,
+    /// Its address also after it has fallen silent: another radar of the same group is at another place.
+    radar: Option<IpAddr>,
     /// Connections so far.
     pub opened: u64,
+    /// Datagrams of others.
+    pub foreign: u64,
 }
 
 impl Connection {
@@ -54,9 +66,14 @@ impl Connection {
             silence: settings.silence,
             link: None,
             heard: now,
+            is_heard: false,
             retry_at: now,
             pause: PAUSES[0],
+            from: None,
+            sender: None,
+            radar: None,
             opened: 0,
+            foreign: 0,
         }
     }
 
@@ -71,10 +88,11 @@ impl Connection {
             return self.open();
         };
         match link.read(messages.space()) {
-            Ok(count) => {
-                messages.filled(count);
-                self.heard = Instant::now();
-                self.pause = PAUSES[0];
+            Ok((count, from)) => {
+                self.from = from;
+                if !self.is_foreign() {
+                    messages.filled(count);
+                }
                 Received::Bytes
             }
             Err(error) if error.kind() == ErrorKind::Interrupted => Received::Bytes,
@@ -83,12 +101,55 @@ impl Connection {
                     Some(left) if !left.is_zero() => Received::Nothing(left),
                     _ => {
                         let silence = self.silence;
-                        self.close(format_args!("it sent nothing for {silence:?}"))
+                        self.close(format_args!("it sent no azimuth for {silence:?}"))
                     }
                 }
             }
             Err(error) => self.close(error),
         }
+    }
+
+    /// Says that an azimuth has come. Other messages don't count: a radar may go on to say that it is alive, and send no powers.
+    pub fn has_heard(&mut self) {
+        self.heard = Instant::now();
+        self.is_heard = true;
+        self.pause = PAUSES[0];
+    }
+
+    /// Whether azimuths come.
+    pub fn is_heard(&self) -> bool {
+        self.is_heard
+    }
+
+    /// Takes datagrams of the sender of the last one only.
+    pub fn take_sender(&mut self) {
+        if self.sender.is_none()
+            && let Some(from) = self.from
+        {
+            tracing::info!("the radar is {from}: datagrams of others are passed over");
+            self.sender = Some(from);
+            self.radar = Some(from.ip());
+        }
+    }
+
+    /// Whether the last datagram is of another than the radar; counts those.
+    fn is_foreign(&mut self) -> bool {
+        let Some(from) = self.from else {
+            return false;
+        };
+        let is_other = self.sender.is_some_and(|sender| sender != from);
+        if !is_other && self.radar.is_none_or(|radar| radar == from.ip()) {
+            return false;
+        }
+        self.foreign += 1;
+        if self.foreign.is_power_of_two() {
+            let so_far = self.foreign;
+            tracing::warn!(
+                so_far,
+                "datagrams of {from} are passed over: the radar of this run is another; give each radar a group or a port of its own"
+            );
+        }
+        true
     }
 
     fn open(&mut self) -> Received {
@@ -102,6 +163,7 @@ impl Connection {
                 tracing::info!(address = %self.address, "connected to the radar");
                 self.link = Some(link);
                 self.heard = Instant::now();
+                self.is_heard = false;
                 self.opened += 1;
                 Received::Opened
             }
@@ -117,9 +179,11 @@ impl Connection {
             "no connection to the radar, trying again in {pause:?}: {reason}"
         );
         self.link = None;
+        self.sender = None;
+        self.is_heard = false;
         self.retry_at = Instant::now() + pause;
         self.pause = (2 * pause).min(PAUSES[1]);
-        Received::Nothing(pause)
+        Received::Closed(pause)
     }
 }
 
@@ -151,20 +215,23 @@ impl Link {
         }
     }
 
-    /// Reads bytes, of datagrams one; does not wait.
+    /// Reads bytes, of datagrams one with its sender; does not wait.
     ///
     /// # Errors
     /// There are none, or the connection has ended.
-    pub fn read(&mut self, space: &mut [u8]) -> io::Result<usize> {
+    pub fn read(&mut self, space: &mut [u8]) -> io::Result<(usize, Option<SocketAddr>)> {
         match self {
             Self::Tcp(stream) => match stream.read(space)? {
                 0 => Err(io::Error::new(
                     ErrorKind::UnexpectedEof,
                     "it closed the connection",
                 )),
-                count => Ok(count),
+                count => Ok((count, None)),
             },
-            Self::Udp(socket) => socket.recv(space),
+            Self::Udp(socket) => {
+                let (count, from) = socket.recv_from(space)?;
+                Ok((count, Some(from)))
+            }
         }
     }
 

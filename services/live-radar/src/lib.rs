@@ -4,9 +4,12 @@
 mod address;
 mod ask;
 mod connection;
+mod delay;
 mod messages;
 mod radar;
 pub mod server;
+mod sweeps;
+mod turns;
 
 use std::time::Duration;
 
@@ -24,7 +27,7 @@ pub struct Settings {
     pub address: Address,
     /// Encoder counts per turn, to which the angles of a radar are rounded that sends by UDP.
     pub encoder_counts: u16,
-    /// Time without a byte after which it is connected to anew.
+    /// Time without an azimuth after which it is connected to anew.
     pub silence: Duration,
     /// Scans to receive; `None`: without end.
     pub scans: Option<u64>,
@@ -35,7 +38,7 @@ pub struct Settings {
 /// Receives the scans of a radar until SIGTERM, or until there are enough.
 ///
 /// # Errors
-/// A radar whose scans are larger than at the start of the run, or a failure of the transport.
+/// A radar that is connected to by TCP and whose scans are larger than at the start of the run, or a failure of the transport.
 pub fn run(launch: &Launch, settings: Settings) -> Result<StageCounters, StageError> {
     let scans = settings.scans;
     source::run_sensor(launch, &mut radar::Radar::new(settings), scans)

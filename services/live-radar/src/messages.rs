@@ -47,6 +47,22 @@ impl Messages {
         }
     }
 
+    /// Passes over the description of the radar that was returned last, and the datagram that has it.
+    pub fn refuse_description(&mut self) {
+        match self {
+            Self::Stream(_) => {}
+            Self::Datagrams(parser) => parser.refuse_description(),
+        }
+    }
+
+    /// Whether a part of the radar's azimuths has come in a datagram since the last call.
+    pub fn take_part(&mut self) -> bool {
+        match self {
+            Self::Stream(_) => false,
+            Self::Datagrams(parser) => parser.take_part(),
+        }
+    }
+
     /// Bytes since the last event that are no message: they grow while a stream is not Colossus.
     pub fn skipped_bytes(&self) -> usize {
         match self {

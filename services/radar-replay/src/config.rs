@@ -36,7 +36,7 @@ pub struct SourceConfig {
     /// chooses.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub interface: String,
-    /// Time without a byte from the radar after which it is connected to anew, s; 0: no limit.
+    /// Time without an azimuth from the radar after which it is connected to anew, s; 0: no limit.
     pub silence_s: f64,
     /// Folder of the recording; `--data` on the command line.
     pub data: PathBuf,

@@ -136,6 +136,11 @@ impl SweepAssembler {
         Some(self.grid.azimuths_after(last))
     }
 
+    /// Returns whether the turn of the newest azimuth can still become a scan.
+    pub fn is_open(&self) -> bool {
+        self.state == State::Open || self.kept.is_some()
+    }
+
     /// Returns the order of the two bytes of 16-bit powers, once it is known. It is not documented: it is the one in which neighbouring
     /// bins differ less. In the wrong order the noise of the less significant byte is the more significant one.
     pub fn power_order(&self) -> Option<ByteOrder> {

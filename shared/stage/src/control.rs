@@ -13,7 +13,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Manifest, StageError, run};
+use crate::{Manifest, StageError, run, source::Received};
 
 /// The name of the socket in the run's root.
 pub(crate) const SOCKET: &str = "control.sock";
@@ -135,6 +135,8 @@ pub struct ProcessStatus {
     pub last_death: Option<String>,
     /// Messages that it should have recorded and has missed since its start; `None` if it is no recorder.
     pub missed: Option<u64>,
+    /// What a live radar has delivered, and what is missing; `None` if it is no source of one.
+    pub received: Option<Received>,
 }
 
 /// What a process does.

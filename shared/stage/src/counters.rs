@@ -22,12 +22,16 @@ pub struct StageCounters {
     pub wakes_caught_late: u64,
     /// Scans that could not be read and were skipped (source only).
     pub unreadable: u64,
-    /// Azimuths that a live radar did not deliver (source only).
+    /// Azimuths that are missing from the published scans of a live radar (source only). This and the next four are counts since the
+    /// start of the run, also of sources that have died.
     pub missing_azimuths: u64,
-    /// Scans of a live radar that were left out: without half of their azimuths, or with times that do not increase (source only).
+    /// Turns of a live radar of which there is no scan: nothing arrived, the connection broke in the middle, half of the azimuths are
+    /// missing, or times that do not increase (source only).
     pub scans_left_out: u64,
     /// Messages of a live radar that could not be read (source only).
     pub damaged_messages: u64,
+    /// Datagrams of others than the live radar, and descriptions of scans that do not fit into the run (source only).
+    pub foreign_messages: u64,
     /// Connections to a live radar after the first (source only).
     pub reconnections: u64,
     /// Delay of a simulation in live mode that is rendered more slowly than its rate, ns (source only).

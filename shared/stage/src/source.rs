@@ -6,6 +6,7 @@ mod pace;
 mod playback;
 mod player;
 mod position;
+pub(crate) mod received;
 mod sensor;
 
 use std::{num::NonZeroUsize, ops::Range};
@@ -21,6 +22,7 @@ pub(crate) use sensor::ALIVE_NS;
 pub use crate::outlet::RecordedMessage;
 pub use attempts::{Tolerance, Unreadable, open};
 pub use player::{Recorded, run_player};
+pub use received::{LastScan, Received};
 pub use sensor::{Arrival, Sensor, run_sensor};
 
 /// A source of scans.

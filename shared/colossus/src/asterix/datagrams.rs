@@ -31,6 +31,8 @@ pub struct Datagrams {
     open: Assembly,
     /// The azimuth that was returned last, when the datagram in the buffer is still to be handled.
     ended: Assembly,
+    /// A datagram of the radar has come, with or without powers.
+    has_part: bool,
 }
 
 /// What a datagram leads to.
@@ -54,6 +56,7 @@ impl Datagrams {
             newest: None,
             open: Assembly::default(),
             ended: Assembly::default(),
+            has_part: false,
         }
     }
 
@@ -99,12 +102,25 @@ impl Datagrams {
         }
     }
 
+    /// Passes over the description that was returned last, and the datagram that it came with. The next datagram is described anew, so
+    /// that none is taken for one of another radar.
+    pub fn refuse_description(&mut self) {
+        self.described = None;
+        self.filled = 0;
+    }
+
+    /// Returns whether a datagram of the radar has come since the last call, whatever became of its azimuth.
+    pub fn take_part(&mut self) -> bool {
+        mem::take(&mut self.has_part)
+    }
+
     fn step(&mut self, video: &Video<'_>) -> Step {
         let configuration = video.configuration(self.encoder_size);
         if self.described != Some(configuration) {
             self.described = Some(configuration);
             return Step::Description(configuration);
         }
+        self.has_part = true;
         let ahead = |newest: u32| video.number.wrapping_sub(newest) as i32;
         let ahead = self.newest.map_or(1, ahead);
         let is_late = (-MAX_STEP..=0).contains(&ahead);

@@ -4,7 +4,11 @@ use std::{os::fd::BorrowedFd, time::Duration};
 
 use gyre_messages::{Hop, Scan, ScanHeader, StageId};
 
-use super::{Credit, position::Position};
+use super::{
+    Credit,
+    position::Position,
+    received::{self, Received, ReceivedWriter},
+};
 use crate::{
     Launch, StageCounters, StageError, allocations, clock, schedule::ScheduleWriter, wake,
     writer::Writer,
@@ -31,8 +35,15 @@ pub trait Sensor {
     /// Input that this run can do nothing with.
     fn take(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<Arrival, StageError>;
 
-    /// Adds what it has counted.
-    fn count(&self, counters: &mut StageCounters);
+    /// Returns when the scan that was returned last was complete by the sensor's clock, `CLOCK_MONOTONIC`, ns, however late it was read;
+    /// `None` if that is not known: then its latency counts from when it was read.
+    fn due_ns(&self) -> Option<i64>;
+
+    /// Goes on counting after a source that has died.
+    fn resume(&mut self, before: Received);
+
+    /// Returns what it has delivered since the start of the run, and what is missing.
+    fn received(&self) -> Received;
 }
 
 /// What has arrived.
@@ -58,8 +69,10 @@ pub fn run_sensor(
     if !launch.take_place()? {
         return Ok(StageCounters::default());
     }
+    sensor.resume(received::read(&launch.manifest).unwrap_or_default());
     let mut stream = Stream {
         launch,
+        received: ReceivedWriter::open(&launch.manifest)?,
         credit: Credit::open(launch)?,
         schedule: ScheduleWriter::resume(&launch.manifest)?,
         scans: Writer::open(&launch.node, &launch.manifest)?,
@@ -69,7 +82,9 @@ pub fn run_sensor(
     if let Some(start) = stream.wait_for_start()? {
         stream.publish(sensor, start, scans)?;
     }
-    sensor.count(&mut stream.counters);
+    let received = sensor.received();
+    stream.received.write(received)?;
+    received.count(&mut stream.counters);
     Ok(stream.counters)
 }
 
@@ -79,6 +94,7 @@ struct Stream<'a> {
     schedule: ScheduleWriter,
     scans: Writer<Scan>,
     counters: StageCounters,
+    received: ReceivedWriter,
     /// When the supervisor was last told that this process is alive, `CLOCK_MONOTONIC`, ns.
     said_ns: i64,
 }
@@ -119,6 +135,7 @@ impl Stream<'_> {
                         break started_ns;
                     }
                     Arrival::Nothing(limit) => {
+                        self.received.write(sensor.received())?;
                         if self.sleep(sensor.connection(), limit)? {
                             return Ok(());
                         }
@@ -138,9 +155,11 @@ impl Stream<'_> {
                 finished_ns: clock::now_ns(),
                 published_ns: 0,
             };
-            header.item.due_ns = started_ns;
+            let due_ns = sensor.due_ns().unwrap_or(started_ns);
+            header.item.due_ns = due_ns.min(started_ns);
             // In this order a death in between leaves a number without a scan, which counts as dropped, and no scan without a number.
             self.schedule.has_published(position.published)?;
+            self.received.write(sensor.received())?;
             self.scans.send(draft, S::HOP)?;
             position.advance();
             // However fast scans come, there is time for signals and for new readers.

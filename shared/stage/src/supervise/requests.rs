@@ -10,6 +10,7 @@ use crate::{
     control::{Activity, Answer, Phase, ProcessStatus, Request, Status},
     heartbeat::{self, Heartbeat},
     schedule,
+    source::received,
 };
 
 /// Requests that are answered before the supervisor looks after its processes again.
@@ -116,6 +117,10 @@ impl Supervisor<'_> {
         ProcessStatus {
             is_swapped: child.plan().command != *begun,
             restarts: restarts.copied().unwrap_or_default(),
+            received: match child.stage() {
+                Some(StageId::RadarReplay) => received::read(&self.plan.manifest),
+                _ => None,
+            },
             ..of_child(child, beat, activity)
         }
     }
@@ -147,5 +152,6 @@ pub(super) fn of_child(
         restarts: 0,
         last_death: child.last_death().map(str::to_owned),
         missed: None,
+        received: None,
     }
 }

@@ -1,0 +1,286 @@
+//! The scans of one connection to a radar.
+
+use std::time::{Duration, SystemTime};
+
+use gyre_colossus::{
+    Azimuth, BadConfiguration, Configuration, FoundClock, RadarClock, SweepAssembler,
+};
+use gyre_messages::ScanHeader;
+use gyre_stage::{clock, source::LastScan};
+
+use crate::{
+    Settings,
+    delay::Delay,
+    turns::{Moment, Turns},
+};
+
+/// Azimuths for which the connection need not wake, at most. The buffers of sockets hold many more.
+const BATCH: f64 = 10.0;
+/// The part of the azimuths up to the end of a turn, for the radar may turn faster than it says.
+const BATCH_SHARE: f64 = 0.5;
+
+/// The scans of one connection.
+pub struct Sweeps {
+    radar: Configuration,
+    clock: RadarClock,
+    assembler: SweepAssembler,
+    delay: Delay,
+    /// What was found out of the clock has been logged.
+    described: bool,
+    /// It has been logged that the delay of reception is not known.
+    told: bool,
+}
+
+/// A scan that is complete.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Complete {
+    /// Azimuths that are missing.
+    pub missing: usize,
+    /// When it was complete by the radar's clock, `CLOCK_MONOTONIC`, ns; `None`: not known.
+    pub due_ns: Option<i64>,
+}
+
+impl Sweeps {
+    pub fn new(radar: Configuration, settings: &Settings) -> Result<Self, BadConfiguration> {
+        Ok(Self {
+            clock: RadarClock::new(&radar),
+            assembler: SweepAssembler::new(&radar, settings.constants)?,
+            delay: Delay::default(),
+            radar,
+            described: false,
+            told: false,
+        })
+    }
+
+    /// Bytes of a scan.
+    pub fn bytes(&self) -> usize {
+        self.assembler.limits().bytes
+    }
+
+    /// Whether the turn of the newest azimuth can still become a scan.
+    pub fn is_open(&self) -> bool {
+        self.assembler.is_open()
+    }
+
+    /// Adds an azimuth; returns the scan that it completes.
+    pub fn add(
+        &mut self,
+        azimuth: Azimuth<'_>,
+        turns: &mut Turns,
+        header: &mut ScanHeader,
+        bytes: &mut [u8],
+    ) -> Option<Complete> {
+        let at_ns = clock::now_ns();
+        let mut complete = None;
+        for (azimuth, stamp_ns) in self.clock.stamp(azimuth, now_ns()) {
+            let fraction = f64::from(azimuth.encoder) / f64::from(self.radar.encoder_size);
+            let is_start = f64::from(azimuth.encoder) <= self.radar.step();
+            let moment = Moment {
+                fraction: fraction.fract(),
+                stamp_ns,
+                at_ns,
+            };
+            turns.note(moment, is_start);
+            complete = self.assembler.add(&azimuth, stamp_ns, header.slot(bytes));
+            if complete.is_some() {
+                break;
+            }
+        }
+        self.describe();
+        let sweep = complete?;
+        header.set_geometry(&sweep.geometry);
+        let last_ns = header.slot(bytes).stamp_ns[sweep.geometry.azimuths - 1];
+        let due_ns = self.due_ns(last_ns, at_ns);
+        // A clock that was set back in the middle of a sweep gives times that no later stage accepts.
+        if let Some(Err(error)) = header.view(bytes).map(|scan| scan.check_times()) {
+            tracing::warn!("a scan is left out: {error}");
+            return None;
+        }
+        turns.add(LastScan {
+            stamp_ns: sweep.geometry.stamp_ns,
+            at_ns,
+        });
+        Some(Complete {
+            missing: sweep.missing,
+            due_ns,
+        })
+    }
+
+    /// When a scan was complete whose last azimuth has this stamp and was read at `at_ns`.
+    fn due_ns(&mut self, last_ns: i64, at_ns: i64) -> Option<i64> {
+        if self.clock.found() == Some(FoundClock::Arrival) {
+            return None;
+        }
+        let due_ns = self.delay.add(last_ns, at_ns);
+        if let (None, false, Some(pace)) = (due_ns, self.told, self.delay.pace()) {
+            self.told = true;
+            tracing::info!(
+                "The radar's clock advances {:.2} times as fast as this host's: latencies are those from the reading of a scan.",
+                1.0 / pace
+            );
+        }
+        due_ns
+    }
+
+    /// Logs once what was found out of the clock.
+    fn describe(&mut self) {
+        if let (false, Some(found)) = (self.described, self.clock.found()) {
+            self.described = true;
+            tracing::info!("{found}");
+            if found == FoundClock::Arrival {
+                tracing::info!(
+                    "When a scan was complete is not known: latencies are those from its reading."
+                );
+            }
+        }
+    }
+
+    /// The time for which no scan can be complete, if it is that of a few azimuths: so many are then read at once.
+    pub fn pause(&self) -> Option<Duration> {
+        match self.clock.found() {
+            // Each azimuth is to be received when it arrives.
+            None | Some(FoundClock::Arrival) => return None,
+            Some(_) => {}
+        }
+        let azimuths = (self.assembler.azimuths_left()? * BATCH_SHARE).min(BATCH);
+        let per_azimuth_ns = self.radar.period_ns() as f64 / f64::from(self.radar.azimuth_samples);
+        (azimuths >= 2.0).then(|| Duration::from_nanos((azimuths * per_azimuth_ns) as u64))
+    }
+
+    /// Returns whether a configuration makes the same scans.
+    pub fn is_of(&self, radar: &Configuration) -> bool {
+        is_same(&self.radar, radar)
+    }
+}
+
+/// Returns whether two configurations make the same scans.
+fn is_same(one: &Configuration, other: &Configuration) -> bool {
+    let scans = |of: &Configuration| {
+        let counts = [
+            of.azimuth_samples,
+            of.range_in_bins,
+            of.encoder_size,
+            of.rotation_mhz,
+        ];
+        (counts, of.range_resolution_m().to_bits())
+    };
+    scans(one) == scans(other)
+}
+
+/// The host's clock, ns since 1970.
+fn now_ns() -> i64 {
+    let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+    now.unwrap_or(Duration::ZERO).as_nanos() as i64
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use gyre_colossus::{ClockFormat, Constants, Powers};
+
+    use super::*;
+    use crate::Address;
+
+    const START_NS: i64 = 1_700_000_000_000_000_000;
+    const AZIMUTHS: u16 = 400;
+
+    fn sweeps() -> Sweeps {
+        let radar = Configuration {
+            azimuth_samples: AZIMUTHS,
+            bin_size: 438,
+            range_in_bins: 16,
+            encoder_size: 5600,
+            rotation_mhz: 4000,
+            ..Configuration::default()
+        };
+        let settings = Settings {
+            address: Address::Tcp(String::new()),
+            encoder_counts: 5600,
+            silence: Duration::MAX,
+            scans: None,
+            constants: Constants::default(),
+        };
+        Sweeps::new(radar, &settings).unwrap()
+    }
+
+    /// Adds the azimuths of a turn, whose clock is set by `step_ns` in its middle; returns the missing azimuths of a complete scan.
+    fn turn(sweeps: &mut Sweeps, turns: &mut Turns, start_ns: i64, step_ns: i64) -> Option<usize> {
+        let (mut header, mut bytes) = (ScanHeader::default(), vec![0; 400 * 16]);
+        let mut complete = None;
+        for row in 0..AZIMUTHS {
+            let set_ns = if row < AZIMUTHS / 2 { 0 } else { step_ns };
+            let stamp_ns = start_ns + i64::from(row) * 625_000 + set_ns;
+            let (seconds, split_seconds) = ClockFormat::default().fields(stamp_ns);
+            let azimuth = Azimuth {
+                sweep_counter: row,
+                encoder: row * 14,
+                seconds,
+                split_seconds,
+                powers: Powers::Eight(&[7; 16]),
+            };
+            let scan = sweeps.add(azimuth, turns, &mut header, &mut bytes);
+            complete = scan.map(|scan| scan.missing).or(complete);
+        }
+        complete
+    }
+
+    fn turns() -> Turns {
+        let mut turns = Turns::resume(None, 0);
+        turns.configure(250_000_000);
+        turns
+    }
+
+    #[test]
+    fn a_scan_in_which_the_clock_is_set_back_is_left_out_and_counted() {
+        let (mut sweeps, mut turns) = (sweeps(), turns());
+        let mut turn = |start_ns, step_ns| {
+            let missing = turn(&mut sweeps, &mut turns, start_ns, step_ns);
+            (missing, turns.left_out(sweeps.is_open()))
+        };
+        assert_eq!(turn(START_NS, 0), (Some(0), 0));
+        assert_eq!(turn(START_NS + 250_000_000, -20_000_000), (None, 1));
+        assert_eq!(turn(START_NS + 480_000_000, 0), (Some(0), 1));
+    }
+
+    #[test]
+    fn the_source_sleeps_at_most_half_of_the_time_to_the_end_of_a_scan() {
+        let (mut sweeps, mut turns) = (sweeps(), turns());
+        assert_eq!(turn(&mut sweeps, &mut turns, START_NS, 0), Some(0));
+        let (mut header, mut bytes) = (ScanHeader::default(), vec![0; 400 * 16]);
+        let mut pauses = 0;
+        for row in 0..AZIMUTHS {
+            let stamp_ns = START_NS + 250_000_000 + i64::from(row) * 625_000;
+            let (seconds, split_seconds) = ClockFormat::default().fields(stamp_ns);
+            let azimuth = Azimuth {
+                sweep_counter: row,
+                encoder: row * 14,
+                seconds,
+                split_seconds,
+                powers: Powers::Eight(&[7; 16]),
+            };
+            sweeps.add(azimuth, &mut turns, &mut header, &mut bytes);
+            let left = Duration::from_micros(625) * u32::from(AZIMUTHS - row);
+            if let Some(pause) = sweeps.pause() {
+                assert!(2 * pause <= left && pause <= Duration::from_micros(6250));
+                pauses += 1;
+            }
+        }
+        assert_eq!(pauses, AZIMUTHS - 3, "the last ones are awaited");
+    }
+
+    #[test]
+    fn a_configuration_that_differs_in_unused_numbers_is_the_same() {
+        let radar = sweeps().radar;
+        let unused = Configuration {
+            range_gain: f32::NAN,
+            packet_rate: 9,
+            ..radar
+        };
+        assert!(is_same(&radar, &unused));
+        let other = Configuration {
+            range_in_bins: 17,
+            ..radar
+        };
+        assert!(!is_same(&radar, &other));
+    }
+}
