@@ -1,8 +1,8 @@
 //! A radar on the network: `gyre radar-server` plays a recording as one, and a run receives it live.
 
 use std::{
-    io::{BufRead, BufReader},
-    net::UdpSocket,
+    io::{self, BufRead, BufReader, Read, Write},
+    net::{TcpListener, TcpStream, UdpSocket},
     path::Path,
     process::{self, Child, Stdio},
     sync::mpsc::{self, RecvTimeoutError},
@@ -10,7 +10,11 @@ use std::{
     time::Duration,
 };
 
-use crate::common::{Ended, Run, gyre, odometry, recording};
+use gyre_colossus::{Azimuth, Configuration, Powers, asterix, write_keep_alive};
+use rustix::process::Signal;
+use serde_json::Value;
+
+use crate::common::{Ended, Run, gyre, odometry, processes, recording};
 
 /// Faster than the radar turns, and slow enough for a run to keep up.
 const RATE: &str = "1.5";
@@ -34,11 +38,13 @@ impl Radar {
     fn to(whom: &[&str], recording: &Path, arguments: &[&str]) -> Self {
         let mut command = gyre();
         command.arg("radar-server").args(whom);
-        command.args(["--rate", RATE, "--data"]);
-        command.arg(recording).args(arguments);
+        if !arguments.contains(&"--rate") {
+            command.args(["--rate", RATE]);
+        }
+        command.arg("--data").arg(recording).args(arguments);
         let mut server = command
             .stderr(Stdio::piped())
-            .stdout(Stdio::null())
+            .stdout(Stdio::piped())
             .spawn()
             .unwrap();
         let mut said = String::new();
@@ -48,24 +54,53 @@ impl Radar {
         Self { server, address }
     }
 
-    /// A run that receives so many scans of it, with the constants that the recording has in its `dataset.toml`.
+    /// A run that receives so many scans of it.
     fn run(&self, scans: usize) -> Run {
-        let settings = std::fs::read_to_string(recording::small().join("dataset.toml")).unwrap();
-        let settings: toml::Table = settings.parse().unwrap();
-        let run = Run::small().argument("--radar", &self.address);
-        let known = settings.iter().filter(|(key, _)| *key != "format");
-        known
-            .fold(run, |run, (key, value)| {
-                run.set(&format!("dataset.{key}={value}"))
-            })
-            .set(&format!("source.scans={scans}"))
-            .set("source.silence_s=1")
+        run_at(&self.address).set(&format!("source.scans={scans}"))
+    }
+
+    /// Waits until it has played all, and returns what it says that it has played and lost.
+    fn played(&mut self) -> Played {
+        let mut said = String::new();
+        let mut words = self.server.stdout.take().unwrap();
+        words.read_to_string(&mut said).unwrap();
+        let numbers = said.split(|c: char| !c.is_ascii_digit());
+        let mut numbers = numbers.filter_map(|number| number.parse().ok());
+        let mut next = || numbers.next().unwrap_or_else(|| panic!("{said}"));
+        Played {
+            scans: next(),
+            lost_azimuths: next(),
+            lost_datagrams: next(),
+            resets: next(),
+        }
     }
 
     /// As [`Radar::run`] on the loopback's network.
     fn received(&self, scans: usize) -> Run {
         self.run(scans).set("source.interface='127.0.0.1'")
     }
+}
+
+/// What a radar says of a playback.
+#[derive(Debug)]
+struct Played {
+    scans: u64,
+    lost_azimuths: u64,
+    lost_datagrams: u64,
+    resets: u64,
+}
+
+/// A run without end of a radar at an address, with the constants that the recording has in its `dataset.toml`.
+fn run_at(address: &str) -> Run {
+    let settings = std::fs::read_to_string(recording::small().join("dataset.toml")).unwrap();
+    let settings: toml::Table = settings.parse().unwrap();
+    let run = Run::small().argument("--radar", address);
+    let known = settings.iter().filter(|(key, _)| *key != "format");
+    known
+        .fold(run, |run, (key, value)| {
+            run.set(&format!("dataset.{key}={value}"))
+        })
+        .set("source.silence_s=1")
 }
 
 impl Drop for Radar {
@@ -181,48 +216,239 @@ fn datagrams_without_scans_are_named_in_a_sentence() {
     Ended::of(run.command()).refused_with(&["`udp://239.192.43.3` is none for datagrams"]);
 }
 
+/// A count of the source.
+fn count(summary: &Value, key: &str) -> u64 {
+    summary["stages"]["radar-replay"][key].as_u64().unwrap()
+}
+
+/// Every scan that was played is published or counted, and no more azimuths are missing than were lost, but for those that were on their
+/// way when a connection ended.
+fn assert_all_counted(summary: &Value, played: &Played) {
+    let published = summary["published"].as_u64().unwrap();
+    let left_out = count(summary, "scans_left_out");
+    assert_eq!(
+        published + left_out,
+        played.scans,
+        "{played:?}: {published} published, {left_out} left out, {}",
+        summary["stages"]["radar-replay"]
+    );
+    let missing = count(summary, "missing_azimuths");
+    // Those of scans that were left out are not missing from any.
+    let of_scans = played.lost_azimuths.saturating_sub(missing);
+    assert!(
+        missing <= played.lost_azimuths + 400 * left_out && of_scans <= 400 * left_out + 4,
+        "{played:?}: {missing} missing"
+    );
+}
+
 #[test]
-fn every_fault_of_a_radar_is_counted_and_none_ends_the_run() {
+fn every_scan_that_a_radar_plays_is_published_or_counted_also_by_a_source_that_dies() {
     let faults = [
         "--lose",
         "0.01",
         "--reset-every",
-        "7",
-        "--garbage-every",
         "5",
-        "--stall-every",
-        "11",
-        "--stall-s",
-        "1.5",
+        "--garbage-every",
+        "4",
+        "--rate",
+        "1",
     ];
-    let radar = Radar::playing(recording::small(), &[&faults[..], &["--repeat"]].concat());
-    let run = radar.run(30);
-    run.complete();
+    let mut radar = Radar::playing(recording::small(), &faults);
+    let run = run_at(&radar.address);
+    let mut running = run.start();
+    running.await_poses(6).kill("radar-replay");
+    let played = radar.played();
+    running.signal(Signal::INT);
+    running.finish();
     let summary = run.summary();
-    let source = &summary["stages"]["radar-replay"];
-    let count = |key: &str| source[key].as_u64().unwrap();
-    assert!(
-        (60..240).contains(&count("missing_azimuths")),
-        "a hundredth of 30 x 400: {source}"
-    );
-    assert!(count("reconnections") >= 4, "{source}");
-    assert!(count("damaged_messages") >= 4, "{source}");
-    let [published, processed, dropped] =
-        ["published", "processed", "dropped"].map(|key| summary[key].as_u64().unwrap());
-    assert_eq!((published, processed + dropped), (30, 30));
+    assert_eq!(summary["restarts"]["radar-replay"], 1);
+    assert_all_counted(&summary, &played);
+    // Those of the process that was killed, too: three resets come after it.
+    assert!(count(&summary, "reconnections") > played.resets.min(3));
+    assert!(count(&summary, "damaged_messages") >= 1);
+    assert!(count(&summary, "scans_left_out") >= played.resets);
+    odometry::assert_unbroken(&odometry::rows(&run.odometry()));
 }
 
 #[test]
-fn the_source_can_die_and_receives_again() {
-    let radar = Radar::playing(recording::small(), &["--repeat"]);
-    let run = radar.run(20);
+fn a_source_that_stands_still_does_not_hide_its_delay() {
+    let mut radar = Radar::playing(recording::small(), &["--lose", "0.01", "--rate", "1"]);
+    let run = run_at(&radar.address);
     let mut running = run.start();
-    running.await_poses(5).kill("radar-replay");
+    let source = running.await_poses(6).await_stage("radar-replay");
+    processes::send(source, Signal::STOP);
+    thread::sleep(Duration::from_millis(1500));
+    processes::send(source, Signal::CONT);
+    let played = radar.played();
+    running.signal(Signal::INT);
+    running.finish();
+    let summary = run.summary();
+    assert_all_counted(&summary, &played);
+    let longest_us = summary["latency"]["sensor_to_pose"]["max_us"].as_f64();
+    // The first scan that it read was complete a turn after it was stopped, at the latest.
+    assert!(longest_us.unwrap() > 1e6, "{}", summary["latency"]);
+}
+
+#[test]
+fn scans_of_which_no_datagram_arrives_are_counted() {
+    let mut radar = Radar::sending(&group(4), recording::small(), &["--rate", "1"]);
+    let run = run_at(&radar.address).set("source.interface='127.0.0.1'");
+    let mut running = run.start();
+    let source = running.await_poses(4).await_stage("radar-replay");
+    // The system has room for a part of a scan.
+    processes::send(source, Signal::STOP);
+    thread::sleep(Duration::from_millis(1800));
+    processes::send(source, Signal::CONT);
+    let mut played = radar.played();
+    assert_eq!(played.lost_datagrams, 0);
+    thread::sleep(Duration::from_millis(500));
+    running.signal(Signal::INT);
+    running.finish();
+    let summary = run.summary();
+    // On a busy machine the radar may have begun before the run.
+    let begun = odometry::columns(&run.odometry(), &["stamp_ns"])[0][0].clone();
+    let recorded = Run::small().data(recording::small()).complete();
+    let stamps = odometry::columns(&recorded, &["stamp_ns"]);
+    let before = stamps.iter().position(|row| row[0] == begun).unwrap();
+    played.scans -= before as u64;
+    let published = summary["published"].as_u64().unwrap();
+    let left_out = count(&summary, "scans_left_out");
+    assert!(left_out >= 3, "{left_out}");
+    assert_eq!(published + left_out, played.scans, "{left_out} left out");
+}
+
+/// What a relay does with a connection.
+#[derive(Clone, Copy)]
+enum Connection {
+    /// Passes on what radar and client send.
+    Relayed,
+    /// Sends bytes that are no messages.
+    Junk,
+    /// Describes the radar, and says again and again that it is alive.
+    KeptAlive,
+}
+
+/// Listens for connections, and treats one after the other as told; all further ones are relayed.
+fn relay(radar: &str, all: &'static [Connection]) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    let radar = radar.to_owned();
+    // They end with the process of the tests.
+    thread::spawn(move || {
+        for (k, client) in listener.incoming().enumerate() {
+            let (client, radar) = (client.unwrap(), radar.clone());
+            thread::spawn(move || match all.get(k) {
+                Some(Connection::Junk) => send_junk(client),
+                Some(Connection::KeptAlive) => keep_alive(client, &radar),
+                _ => pass_on(client, &radar),
+            });
+        }
+    });
+    address
+}
+
+fn pass_on(mut client: TcpStream, radar: &str) -> io::Result<()> {
+    let mut radar = TcpStream::connect(radar)?;
+    let (mut requests, mut to_radar) = (client.try_clone()?, radar.try_clone()?);
+    thread::spawn(move || io::copy(&mut requests, &mut to_radar));
+    io::copy(&mut radar, &mut client).map(|_| ())
+}
+
+fn send_junk(mut client: TcpStream) -> io::Result<()> {
+    for _ in 0..100 {
+        client.write_all(&[0x55; 1 << 16])?;
+    }
+    thread::sleep(Duration::from_secs(5));
+    Ok(())
+}
+
+fn keep_alive(mut client: TcpStream, radar: &str) -> io::Result<()> {
+    let mut described = [0; 256];
+    let count = TcpStream::connect(radar)?.read(&mut described)?;
+    client.write_all(&described[..count])?;
+    let mut alive = Vec::new();
+    write_keep_alive(&mut alive);
+    loop {
+        client.write_all(&alive)?;
+        thread::sleep(Duration::from_millis(200));
+    }
+}
+
+#[test]
+fn what_sends_no_azimuths_is_left_and_the_radar_is_found_again() {
+    let radar = Radar::playing(recording::small(), &["--repeat"]);
+    // Before the run it is asked for its configuration.
+    let connections = &[
+        Connection::Relayed,
+        Connection::Junk,
+        Connection::Junk,
+        Connection::KeptAlive,
+    ];
+    let run = run_at(&relay(&radar.address, connections)).set("source.scans=12");
+    let mut running = run.start();
+    running.await_stages();
+    // It is not well until azimuths come.
+    let ps = || {
+        let mut ps = gyre();
+        ps.args(["ps", "--check", "--out"]).arg(run.out());
+        ps.output().unwrap()
+    };
+    let deaf = "no azimuths arrive from the radar";
+    while !String::from_utf8_lossy(&ps().stderr).contains(deaf) {
+        assert!(running.poses() == 0, "it was never said");
+    }
     running.finish().succeeded();
     let summary = run.summary();
-    assert_eq!(summary["restarts"]["radar-replay"], 1);
-    assert_eq!(summary["published"], 20);
-    odometry::assert_unbroken(&odometry::rows(&run.odometry()));
+    assert_eq!(summary["published"], 12);
+    assert_eq!(count(&summary, "reconnections"), 3);
+    let log = run.result("log.jsonl");
+    for words in ["it does not speak Colossus", "it sent no azimuth for 1s"] {
+        assert!(log.contains(words), "{log}");
+    }
+}
+
+#[test]
+fn datagrams_of_others_are_passed_over_and_counted() {
+    let to = group(5);
+    let radar = Radar::sending(&to, recording::small(), &["--repeat"]);
+    let run = radar.received(12);
+    let mut running = run.start();
+    running.await_poses(2);
+    let _other = Radar::to(
+        &["--udp", &to],
+        recording::small(),
+        &["--repeat", "--rate", "1"],
+    );
+    let forger = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let large = Configuration {
+        azimuth_samples: 400,
+        bin_size: 438,
+        range_in_bins: 60_000,
+        encoder_size: 5600,
+        rotation_mhz: 4000,
+        ..Configuration::default()
+    };
+    let mut number = 0;
+    while !running.is_over() {
+        let azimuth = Azimuth {
+            sweep_counter: 0,
+            encoder: 14,
+            seconds: [0; 4],
+            split_seconds: [0; 4],
+            powers: Powers::Eight(&[9; 4]),
+        };
+        asterix::write_azimuth(&large, &azimuth, &mut number, &mut |datagram| {
+            forger.send_to(datagram, &to).unwrap();
+        });
+        thread::sleep(Duration::from_millis(20));
+    }
+    running.finish().succeeded();
+    let summary = run.summary();
+    assert_eq!(summary["published"], 12);
+    assert_eq!(count(&summary, "reconnections"), 0);
+    // Some of each: a scan of the other, and one datagram in 20 ms.
+    assert!(count(&summary, "foreign_messages") > 100);
+    assert!(run.result("log.jsonl").contains("give each radar a group"));
 }
 
 #[test]
@@ -230,12 +456,42 @@ fn an_interrupted_run_goes_on_with_the_same_command() {
     let radar = Radar::playing(recording::small(), &["--repeat"]);
     let run = radar.run(20);
     let mut running = run.start();
-    running.await_poses(5).signal(rustix::process::Signal::INT);
+    running.await_poses(5).signal(Signal::INT);
     running.finish();
     run.complete();
     let summary = run.summary();
     assert_eq!(summary["published"], 20);
     assert_eq!(summary["breaks"], 1, "nothing is known of the time between");
+}
+
+#[test]
+fn a_capture_of_a_radar_is_played_as_that_radar() {
+    let scans = recording::SCANS / 2;
+    let whole = recording::copy(scans);
+    for image in recording::images(whole.path()) {
+        recording::complete(&image);
+    }
+    let radar = Radar::playing(whole.path(), &["--rate", "8"]);
+    let file = whole.path().join("radar.capture");
+    let mut command = gyre();
+    command.args(["radar-server", "--radar", &radar.address, "--capture"]);
+    Ended::of({
+        command.arg(&file);
+        command
+    })
+    .succeeded();
+    let played = Radar::playing(&file, &["--rate", "0.2"]);
+    let live = played.run(scans).complete();
+    assert_eq!(live, Run::small().data(whole.path()).complete());
+    // It is not overwritten, and is no datagrams.
+    let mut again = gyre();
+    again.args(["radar-server", "--radar", &played.address, "--capture"]);
+    again.arg(&file);
+    Ended::of(again).failed_with(&["File exists"]);
+    let mut datagrams = gyre();
+    datagrams.args(["radar-server", "--udp", "239.192.43.9:4378", "--data"]);
+    datagrams.arg(&file);
+    Ended::of(datagrams).failed_with(&["was captured by TCP", "leave out --udp"]);
 }
 
 #[test]

@@ -1,8 +1,12 @@
 //! `gyre radar-server`: plays a recording as a radar on the network.
 
-use std::{net::TcpListener, ops::Range, process::ExitCode, time::Duration};
+use std::{net::TcpListener, ops::Range, path::Path, process::ExitCode, time::Duration};
 
-use gyre_live_radar::server::{self, Audience, ByteOrder, ClockFormat, Faults, Playback};
+use gyre_live_radar::{
+    Address, Settings,
+    capture::{self, Capture},
+    server::{self, Audience, ByteOrder, ClockFormat, Faults, Playback},
+};
 use gyre_stage::wake::Signals;
 
 use crate::{
@@ -18,6 +22,14 @@ use crate::{
 /// # Errors
 /// A recording that cannot be read, or an address that cannot be served at.
 pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
+    if let (Some(file), Some(radar)) = (&arguments.capture, &arguments.radar) {
+        return record(file, radar, arguments);
+    }
+    if let Some(data) = &arguments.data
+        && let Some(capture) = Capture::open(data)?
+    {
+        return play(data, capture, arguments);
+    }
     let configuration = match &arguments.configuration {
         Some(file) => Configuration::read(file, &arguments.set)?,
         None => Configuration::of_overrides(&arguments.set)?,
@@ -34,17 +46,8 @@ pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
         return Err(format!("{} has no scan to play", configuration.data()).into());
     }
     let signals = Signals::install()?;
-    let (audience, address, is_public) = audience(arguments)?;
-    print::note(format_args!(
-        "gyre: playing {} scans of {} as a radar at {address}",
-        scans.len(),
-        configuration.data()
-    ));
-    if is_public {
-        print::note(
-            "gyre: whoever reaches this address receives the scans: Navtech's protocol has no token",
-        );
-    }
+    let scans_of = format!("{} scans of {}", scans.len(), configuration.data());
+    let audience = announced(&scans_of, arguments)?;
     let stop = || signals.sleep(Duration::ZERO).unwrap_or(true);
     let playback = playback(arguments, scans);
     let played = server::serve(audience, dataset.as_mut(), &playback, &stop)?;
@@ -53,6 +56,64 @@ pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
         played.scans, played.lost_azimuths, played.lost_datagrams, played.resets, played.stalls
     ))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Records what a radar sends.
+fn record(file: &Path, radar: &str, arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
+    let interface = match radar.starts_with("udp://") {
+        true => arguments.interface.to_string(),
+        false => String::new(),
+    };
+    let settings = Settings {
+        address: Address::parse(radar, &interface)?,
+        // What is captured is not decoded.
+        encoder_counts: 0,
+        silence: Duration::MAX,
+        scans: None,
+        constants: Default::default(),
+    };
+    let signals = Signals::install()?;
+    print::note(format_args!(
+        "gyre: capturing the radar at {} into {}",
+        settings.address,
+        file.display()
+    ));
+    let stop = || signals.sleep(Duration::ZERO).unwrap_or(true);
+    let captured = capture::record(&settings, file, &stop)?;
+    print::line(format_args!(
+        "captured {} bytes in {} records",
+        captured.bytes, captured.records
+    ))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Plays what was recorded.
+fn play(
+    data: &Path,
+    capture: Capture,
+    arguments: &RadarServerArguments,
+) -> Result<ExitCode, Failure> {
+    let signals = Signals::install()?;
+    let audience = announced(&data.display().to_string(), arguments)?;
+    let stop = || signals.sleep(Duration::ZERO).unwrap_or(true);
+    let played = capture::play(audience, capture, arguments.rate.factor(), &stop)?;
+    print::line(format_args!(
+        "played {} bytes in {} records",
+        played.bytes, played.records
+    ))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Returns to whom is played, and says so.
+fn announced(what: &str, arguments: &RadarServerArguments) -> Result<Audience, Failure> {
+    let (audience, address, is_public) = audience(arguments)?;
+    print::note(format_args!("gyre: playing {what} as a radar at {address}"));
+    if is_public {
+        print::note(
+            "gyre: whoever reaches this address receives the scans: Navtech's protocol has no token",
+        );
+    }
+    Ok(audience)
 }
 
 /// Returns to whom is played, the address at which the radar is received, and whether others than this machine reach it.

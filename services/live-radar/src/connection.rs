@@ -49,7 +49,7 @@ pub struct Connection {
     from: Option<SocketAddr>,
     /// The only one whose datagrams are taken.
     sender: Option<SocketAddr>,
-    /// Its address also after it has fallen silent: another radar of the same group is at another place.
+    /// Its address also after it has fallen silent, once it has sent a scan: another radar of the same group is at another place.
     radar: Option<IpAddr>,
     /// Connections so far.
     pub opened: u64,
@@ -128,8 +128,12 @@ impl Connection {
         {
             tracing::info!("the radar is {from}: datagrams of others are passed over");
             self.sender = Some(from);
-            self.radar = Some(from.ip());
         }
+    }
+
+    /// Says that a scan has come: no description that somebody sends makes them the radar of the run for good.
+    pub fn has_scan(&mut self) {
+        self.radar = self.sender.map(|sender| sender.ip()).or(self.radar);
     }
 
     /// Whether the last datagram is of another than the radar; counts those.
@@ -157,7 +161,11 @@ impl Connection {
         if !left.is_zero() {
             return Received::Nothing(left);
         }
-        let requests = [Request::RequestConfiguration, Request::StartFft];
+        let requests = [
+            Request::RequestConfiguration,
+            Request::StartFft,
+            Request::StartHealth,
+        ];
         match Link::open(&self.address, &requests) {
             Ok(link) => {
                 tracing::info!(address = %self.address, "connected to the radar");

@@ -3,8 +3,10 @@
 
 mod address;
 mod ask;
+pub mod capture;
 mod connection;
 mod delay;
+mod ills;
 mod messages;
 mod radar;
 pub mod server;

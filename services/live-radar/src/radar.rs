@@ -12,6 +12,7 @@ use gyre_stage::{
 use crate::{
     Address, Settings,
     connection::{Connection, Received},
+    ills::Ills,
     messages::Messages,
     sweeps::Sweeps,
     turns::Turns,
@@ -37,6 +38,7 @@ pub struct Radar {
     /// Descriptions of scans that do not fit into the run.
     refused: u64,
     due_ns: Option<i64>,
+    ills: Ills,
 }
 
 impl Radar {
@@ -53,6 +55,7 @@ impl Radar {
             damaged: 0,
             refused: 0,
             due_ns: None,
+            ills: Ills::default(),
         }
     }
 
@@ -124,12 +127,14 @@ impl Radar {
                     if let Some(scan) = scan {
                         self.missing += scan.missing as u64;
                         self.due_ns = scan.due_ns;
+                        self.connection.has_scan();
                         return Ok(true);
                     }
                 }
                 Event::Message(Message::Configuration(radar)) => {
                     self.configure(radar, bytes.len())?
                 }
+                Event::Message(Message::Health(health)) => self.ills.note(&health),
                 Event::Message(_) => {}
                 Event::Damaged {
                     reason,

@@ -17,9 +17,9 @@ use gyre_colossus::{Azimuth, Configuration, Powers, write_azimuth};
 use gyre_radar::{Dataset, OwnedScan, PolarScan, ReadError, scan::flag};
 use thiserror::Error;
 
-use clients::Clients;
+pub(crate) use clients::Clients;
 pub use faults::Faults;
-use group::Group;
+pub(crate) use group::Group;
 pub use gyre_colossus::{ByteOrder, ClockFormat};
 
 /// Encoder counts in a turn, where a recording does not say.
@@ -353,7 +353,7 @@ impl Player<'_> {
             }
             Output::Group(group) => {
                 if is_garbled {
-                    group.send_garbage(GARBAGE);
+                    group.pass(GARBAGE);
                 }
                 group.send(&self.radar, &azimuth);
             }

@@ -165,6 +165,7 @@ impl Collector for Snapshot {
     fn encode(&self, mut encoder: DescriptorEncoder<'_>) -> fmt::Result {
         self.encode_counts(&mut encoder)?;
         self.encode_missed(&mut encoder)?;
+        self.encode_received(&mut encoder)?;
         self.encode_processes(&mut encoder)
     }
 }
@@ -235,6 +236,57 @@ impl Snapshot {
         Ok(())
     }
 
+    /// Encodes what a live radar has not delivered, if the source receives one.
+    fn encode_received(&self, encoder: &mut DescriptorEncoder<'_>) -> fmt::Result {
+        let Some(received) = self.processes.iter().find_map(|it| it.received) else {
+            return Ok(());
+        };
+        let counters = [
+            (
+                "radar_scans_left_out",
+                "Turns of the radar of which there is no scan.",
+                received.scans_left_out,
+            ),
+            (
+                "radar_missing_azimuths",
+                "Azimuths that are missing from the scans.",
+                received.missing_azimuths,
+            ),
+            (
+                "radar_damaged_messages",
+                "Messages of the radar that could not be read.",
+                received.damaged_messages,
+            ),
+            (
+                "radar_foreign_messages",
+                "Datagrams of others, and descriptions that do not fit into the run.",
+                received.foreign_messages,
+            ),
+            (
+                "radar_reconnections",
+                "Connections to the radar after the first.",
+                received.reconnections(),
+            ),
+        ];
+        for (name, help, count) in counters {
+            let counter = ConstCounter::new(count);
+            counter.encode(encoder.encode_descriptor(
+                name,
+                help,
+                None,
+                counter.metric_type(),
+            )?)?;
+        }
+        let gauge = ConstGauge::new(u64::from(received.is_receiving));
+        let help = "1 while azimuths arrive from the radar, else 0.";
+        gauge.encode(encoder.encode_descriptor(
+            "radar_receiving",
+            help,
+            None,
+            gauge.metric_type(),
+        )?)
+    }
+
     fn encode_processes(&self, encoder: &mut DescriptorEncoder<'_>) -> fmt::Result {
         type Value = fn(&Process) -> Option<f64>;
         let families: [(&str, &str, Option<Unit>, MetricType, Value); 3] = [
@@ -281,6 +333,7 @@ impl Snapshot {
 #[cfg(test)]
 mod tests {
     use gyre_messages::Hop;
+    use gyre_stage::source::Received;
 
     use super::*;
 
@@ -330,6 +383,49 @@ mod tests {
         }
         let delays = "gyre_hop_seconds_sum{stage=\"masking\",part=\"work\"} 0.003";
         assert!(text.contains(delays), "{text}");
+    }
+
+    #[test]
+    fn what_a_radar_has_not_delivered_is_counted() {
+        let received = Received {
+            missing_azimuths: 3,
+            scans_left_out: 5,
+            connections: 8,
+            is_receiving: true,
+            ..Received::default()
+        };
+        let source = Process {
+            name: "radar-replay".to_owned(),
+            pid: 1,
+            state: "waiting",
+            level: "good",
+            restarts: 0,
+            last_death: None,
+            received: Some(received),
+            processor_share: None,
+            cpu_s: None,
+            own_bytes: None,
+        };
+        let snapshot = Snapshot {
+            is_up: true,
+            counts: board().counts(),
+            processes: vec![source],
+            traces: None,
+        };
+        let mut registry = Registry::with_prefix("gyre");
+        registry.register_collector(Box::new(snapshot));
+        let mut text = String::new();
+        assert!(encode(&mut text, &registry).is_ok());
+        for line in [
+            "gyre_radar_missing_azimuths_total 3",
+            "gyre_radar_scans_left_out_total 5",
+            "gyre_radar_damaged_messages_total 0",
+            "gyre_radar_foreign_messages_total 0",
+            "gyre_radar_reconnections_total 7",
+            "gyre_radar_receiving 1",
+        ] {
+            assert!(text.lines().any(|it| it == line), "{line}: {text}");
+        }
     }
 
     #[test]

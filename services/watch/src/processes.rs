@@ -4,6 +4,7 @@ use std::{collections::BTreeMap, path::Path, time::Instant};
 
 use gyre_stage::{
     control::{Activity, Control, Status},
+    source::Received,
     usage::Usage,
 };
 use serde::Serialize;
@@ -33,6 +34,8 @@ pub struct Process {
     pub restarts: usize,
     /// The cause of its last death.
     pub last_death: Option<String>,
+    /// What a live radar has delivered, and what is missing; `None` if it is no source of one.
+    pub received: Option<Received>,
     /// Share of one processor since the last look; `None` at the first.
     pub processor_share: Option<f64>,
     /// Processor time since its start, s, and memory of its own, bytes; `None` if it has just ended.
@@ -46,7 +49,7 @@ impl ProcessMeter {
     /// is about to end, or its supervisor is stopped.
     pub fn look(&mut self, out: &Path) -> Option<(Status, Vec<Process>)> {
         let status = Control::of(out).and_then(|control| control.status()).ok()?;
-        let supervisor = (SUPERVISOR, status.pid, "running", "good", 0, None);
+        let supervisor = (SUPERVISOR, status.pid, "running", "good", 0, None, None);
         let others = status.processes.iter().map(|process| {
             let (name, activity) = (process.name.as_str(), process.activity);
             let death = process.last_death.clone();
@@ -57,12 +60,13 @@ impl ProcessMeter {
                 level(activity),
                 process.restarts,
                 death,
+                process.received,
             )
         });
         let now = Instant::now();
         let mut after = BTreeMap::new();
         let processes = [supervisor].into_iter().chain(others).map(
-            |(name, pid, state, level, restarts, last_death)| {
+            |(name, pid, state, level, restarts, last_death, received)| {
                 let usage = Usage::of(pid);
                 let before = self.before.get(&pid);
                 let share = usage.zip(before).map(|(usage, (at, before))| {
@@ -76,6 +80,7 @@ impl ProcessMeter {
                     level,
                     restarts,
                     last_death,
+                    received,
                     processor_share: share,
                     cpu_s: usage.map(|usage| usage.cpu_s),
                     own_bytes: usage.map(|usage| usage.own_bytes),

@@ -6,13 +6,12 @@ use gyre_radar::MAX_AZIMUTHS;
 use thiserror::Error;
 
 use crate::malformed::{MalformedMessage, head};
+use crate::protobuf::fields;
 
 /// Bytes before the protobuf.
 pub(crate) const CONFIGURATION_BYTES: usize = 20;
 /// The protobuf's field of the range resolution, a float.
 pub(crate) const RESOLUTION_FIELD: u64 = 10;
-/// The wire type of a float.
-pub(crate) const FOUR_BYTES: u64 = 5;
 
 /// The radar's description of itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -136,56 +135,16 @@ pub(crate) fn decode(payload: &[u8]) -> Result<Configuration, MalformedMessage> 
     })
 }
 
-/// Returns the range resolution in a protobuf; all other fields are skipped. The last one counts, as protobuf requires.
+/// Returns the range resolution in a protobuf; all other fields are skipped.
 fn resolution(protobuf: &[u8]) -> Result<Option<f32>, MalformedMessage> {
-    let (mut rest, mut found) = (protobuf, None);
-    while !rest.is_empty() {
-        let at = protobuf.len() - rest.len();
-        let (number, value, after) = field(rest).ok_or(MalformedMessage::Protobuf { at })?;
-        found = value.filter(|_| number == RESOLUTION_FIELD).or(found);
-        rest = after;
-    }
+    let mut found = None;
+    fields("a configuration", protobuf, |number, value| {
+        if number == RESOLUTION_FIELD {
+            found = value.float().or(found);
+        }
+        Ok(())
+    })?;
     Ok(found)
-}
-
-/// Returns number, value if it is a float, and what follows, of the first field.
-fn field(protobuf: &[u8]) -> Option<(u64, Option<f32>, &[u8])> {
-    let (tag, rest) = varint(protobuf)?;
-    let number = tag >> 3;
-    if number == 0 {
-        return None;
-    }
-    match tag & 7 {
-        0 => Some((number, None, varint(rest)?.1)),
-        1 => Some((number, None, rest.get(8..)?)),
-        2 => {
-            let (length, rest) = varint(rest)?;
-            let after = rest.get(usize::try_from(length).ok()?..)?;
-            Some((number, None, after))
-        }
-        FOUR_BYTES => {
-            let (bytes, after) = rest.split_first_chunk()?;
-            Some((number, Some(f32::from_le_bytes(*bytes)), after))
-        }
-        // Groups are not of this version of protobuf, the others of none.
-        _ => None,
-    }
-}
-
-/// Returns a number of seven bits a byte, least significant first, and what follows.
-fn varint(bytes: &[u8]) -> Option<(u64, &[u8])> {
-    let mut number = 0;
-    for (k, byte) in bytes.iter().take(10).enumerate() {
-        // The tenth byte has one bit of 64.
-        if k == 9 && *byte > 1 {
-            return None;
-        }
-        number |= u64::from(byte & 0x7f) << (7 * k);
-        if byte & 0x80 == 0 {
-            return Some((number, &bytes[k + 1..]));
-        }
-    }
-    None
 }
 
 #[cfg(test)]
@@ -207,7 +166,10 @@ mod tests {
         assert_eq!(resolution(&[]).unwrap(), None);
         assert_eq!(resolution(&bytes[..3]).unwrap(), None);
         for (cut, at) in [(2, 0), (5, 3), (15, 12), (24, 22), (26, 22)] {
-            let malformed = MalformedMessage::Protobuf { at };
+            let malformed = MalformedMessage::Protobuf {
+                message: "a configuration",
+                at,
+            };
             assert_eq!(resolution(&bytes[..cut]), Err(malformed), "{cut}");
         }
     }
@@ -224,7 +186,10 @@ mod tests {
             &[0xff; 20],
             &lengths,
         ] {
-            let malformed = MalformedMessage::Protobuf { at: 0 };
+            let malformed = MalformedMessage::Protobuf {
+                message: "a configuration",
+                at: 0,
+            };
             assert_eq!(resolution(bytes), Err(malformed), "{bytes:?}");
         }
     }

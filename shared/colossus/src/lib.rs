@@ -3,6 +3,7 @@
 //! Reading order:
 //! - [`message`]: what a radar and its clients send;
 //! - [`configuration`]: the radar's description of itself, its first message;
+//! - [`health`], [`navigation`]: what a radar says beside azimuths;
 //! - [`write`](mod@write): messages as bytes, for clients and servers;
 //! - [`parser`]: messages from any pieces of a stream of bytes, damaged ones included;
 //! - [`asterix`]: the same messages from the datagrams of a radar that sends by UDP;
@@ -15,18 +16,23 @@
 pub mod asterix;
 pub mod clock;
 pub mod configuration;
+pub mod health;
 mod kept;
 mod malformed;
 pub mod message;
+pub mod navigation;
 pub mod parser;
+mod protobuf;
 pub mod sweep;
 pub mod write;
 
 pub use asterix::{Datagrams, MalformedDatagram};
 pub use clock::{ByteOrder, ClockFormat, FoundClock, RadarClock, SplitUnit};
 pub use configuration::{BadConfiguration, Configuration};
+pub use health::{Health, HealthStatus, Reading};
 pub use malformed::MalformedMessage;
 pub use message::{Azimuth, Message, PORT, Powers, Request, decode};
+pub use navigation::{Navigation, Peak};
 pub use parser::{Damage, Event, Parser};
 pub use sweep::{Constants, Counters, Sweep, SweepAssembler};
 pub use write::{write_azimuth, write_configuration, write_keep_alive, write_other, write_request};

@@ -34,9 +34,17 @@ pub enum MalformedMessage {
         /// Bytes of the powers.
         bytes: usize,
     },
-    /// The protobuf of a configuration cannot be parsed.
-    #[error("the protobuf of a configuration is malformed at byte {at}")]
+    /// Navigation data with a part of a peak at the end.
+    #[error("navigation data have {bytes} bytes of peaks, of 6 bytes each")]
+    Peaks {
+        /// Bytes of the peaks.
+        bytes: usize,
+    },
+    /// The protobuf of a message cannot be parsed.
+    #[error("the protobuf of {message} is malformed at byte {at}")]
     Protobuf {
+        /// The kind of message.
+        message: &'static str,
         /// The first byte of the field that cannot be parsed.
         at: usize,
     },

@@ -2,7 +2,9 @@
 //! the time of an azimuth, whose byte order depends on the radar's software.
 
 use crate::configuration::{self, Configuration};
+use crate::health::{self, Health};
 use crate::malformed::{AZIMUTH_BYTES, MalformedMessage, head};
+use crate::navigation::{self, Navigation};
 
 /// The TCP port of a radar.
 pub const PORT: u16 = 6317;
@@ -21,6 +23,8 @@ pub(crate) mod id {
     pub(crate) const CONFIGURATION: u8 = 10;
     pub(crate) const AZIMUTH: u8 = 30;
     pub(crate) const AZIMUTH_16_BIT: u8 = 31;
+    pub(crate) const HEALTH: u8 = 40;
+    pub(crate) const NAVIGATION: u8 = 123;
 }
 
 /// A message of a radar or of a client.
@@ -34,7 +38,11 @@ pub enum Message<'a> {
     Azimuth(Azimuth<'a>),
     /// A client's request.
     Request(Request),
-    /// Any other message: navigation data, health.
+    /// The radar's health: id 40.
+    Health(Health),
+    /// Peaks that the radar has found in an azimuth: id 123.
+    Navigation(Navigation<'a>),
+    /// Any other message.
     Other {
         /// The kind of message.
         id: u8,
@@ -53,16 +61,22 @@ pub enum Request {
     StartFft = 21,
     /// Send no more azimuths.
     StopFft = 22,
+    /// Send the health every 10 s.
+    StartHealth = 23,
+    /// Send no more health.
+    StopHealth = 24,
     /// Send azimuths of full length: no contours, which may vary in their number of bins.
     StartNonContourFft = 140,
 }
 
 impl Request {
     /// All requests.
-    pub const ALL: [Self; 4] = [
+    pub const ALL: [Self; 6] = [
         Self::RequestConfiguration,
         Self::StartFft,
         Self::StopFft,
+        Self::StartHealth,
+        Self::StopHealth,
         Self::StartNonContourFft,
     ];
 
@@ -133,6 +147,8 @@ pub fn decode(id: u8, payload: &[u8]) -> Result<Message<'_>, MalformedMessage> {
             }
             Message::Azimuth(azimuth)
         }
+        id::HEALTH => Message::Health(health::decode(payload)?),
+        id::NAVIGATION => Message::Navigation(navigation::decode(payload)?),
         id => Message::Other { id, payload },
     })
 }

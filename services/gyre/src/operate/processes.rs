@@ -4,6 +4,7 @@ use std::{fmt, process::ExitCode};
 
 use gyre_stage::{
     control::{Activity, Control, Phase, ProcessStatus, Status},
+    source::Received,
     usage::Usage,
 };
 use serde::Serialize;
@@ -107,8 +108,14 @@ fn ills(status: &Status) -> Vec<String> {
     let ill = status.processes.iter().filter(|it| is_ill(it.activity));
     let ill = ill.filter(|it| !(ends && it.activity == Activity::Ended));
     let ill = ill.map(|it| format!("{out}: {} is {}", it.name, it.activity.name()));
+    let received = status.processes.iter().filter_map(|it| it.received);
+    let deaf = received.filter(|it| !it.is_receiving && status.phase == Phase::Running);
+    let deaf = deaf.map(|it| {
+        let again = it.reconnections();
+        format!("{out}: no azimuths arrive from the radar, {again} reconnections so far")
+    });
     let starting = (status.phase == Phase::Starting).then(|| format!("{out} is starting"));
-    starting.into_iter().chain(ill).collect()
+    starting.into_iter().chain(ill).chain(deaf).collect()
 }
 
 /// Returns the state of a run in a line.
@@ -136,10 +143,32 @@ fn remarks(process: &ProcessStatus) -> String {
     if let Some(missed) = process.missed.filter(|missed| *missed > 0) {
         remarks += &format!("  missed {missed} messages");
     }
+    if let Some(received) = &process.received {
+        remarks += &lacks(received);
+    }
     if process.is_swapped {
         remarks += &format!("  is `{}`", process.command.join(" "));
     }
     remarks
+}
+
+/// Returns what a radar has not delivered.
+pub fn lacks(received: &Received) -> String {
+    let counts = [
+        (received.scans_left_out, "scans left out"),
+        (received.missing_azimuths, "azimuths missing"),
+        (received.damaged_messages, "messages damaged"),
+        (received.foreign_messages, "messages of others"),
+        (received.reconnections(), "reconnections"),
+    ];
+    let counts = counts.into_iter().filter(|(count, _)| *count > 0);
+    let counts: String = counts
+        .map(|(count, of)| format!("  {count} {of}"))
+        .collect();
+    match received.is_receiving {
+        true => counts,
+        false => format!("  no azimuths{counts}"),
+    }
 }
 
 /// Returns a time in two or three digits.

@@ -143,7 +143,10 @@ fn requests(mut stream: TcpStream, number: u64, clients: &Mutex<Vec<Client>>) {
             let started = match request {
                 Request::StartFft | Request::StartNonContourFft => true,
                 Request::StopFft => false,
-                Request::RequestConfiguration => continue,
+                // A recording has no health.
+                Request::RequestConfiguration | Request::StartHealth | Request::StopHealth => {
+                    continue;
+                }
             };
             let mut clients = lock(clients);
             clients

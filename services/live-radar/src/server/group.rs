@@ -62,11 +62,6 @@ impl Group {
         }
     }
 
-    /// Sends bytes that are no azimuth.
-    pub fn send_garbage(&mut self, bytes: &[u8]) {
-        self.pass(bytes);
-    }
-
     /// Loses, doubles or holds back a datagram, as its number determines.
     fn send_or_fail(&mut self, number: u64, datagram: Vec<u8>) {
         if self.faults.loses_datagram(number) {
@@ -86,8 +81,8 @@ impl Group {
         }
     }
 
-    /// Nobody need be there to receive it.
-    fn pass(&mut self, datagram: &[u8]) {
+    /// Sends a datagram as it is. Nobody need be there to receive it.
+    pub fn pass(&mut self, datagram: &[u8]) {
         if self.socket.send_to(datagram, self.to).is_err() {
             self.lost += 1;
         }

@@ -1,8 +1,9 @@
 //! Messages as bytes.
 
 use gyre_colossus::{
-    Azimuth, Configuration, Event, MalformedMessage, Message, Parser, Powers, Request, decode,
-    write_azimuth, write_configuration, write_keep_alive, write_other, write_request,
+    Azimuth, Configuration, Event, HealthStatus, MalformedMessage, Message, Parser, Peak, Powers,
+    Reading, Request, decode, write_azimuth, write_configuration, write_keep_alive, write_other,
+    write_request,
 };
 use proptest::prelude::*;
 
@@ -47,6 +48,7 @@ impl Sent {
             Message::Azimuth(azimuth) => write_azimuth(out, &azimuth),
             Message::Request(request) => write_request(out, request),
             Message::Other { id, payload } => write_other(out, id, payload),
+            other => panic!("{other:?} is no radar's that is played"),
         }
     }
 }
@@ -83,7 +85,7 @@ pub fn any_message() -> impl Strategy<Value = Sent> {
         Just(Sent::KeepAlive),
         any_configuration().prop_map(Sent::Configuration),
         prop::sample::select(Request::ALL.to_vec()).prop_map(Sent::Request),
-        (prop::sample::select(vec![0, 40, 123, 255]), powers())
+        (prop::sample::select(vec![0, 50, 128, 255]), powers())
             .prop_map(|(id, payload)| Sent::Other(id, payload)),
         (
             any::<[u16; 2]>(),
@@ -105,7 +107,7 @@ proptest! {
 
     #[test]
     fn any_payload_is_decoded_or_refused(
-        id in prop_oneof![any::<u8>(), prop::sample::select(vec![10_u8, 30, 31])],
+        id in prop_oneof![any::<u8>(), prop::sample::select(vec![10_u8, 30, 31, 40, 123])],
         payload in prop::collection::vec(any::<u8>(), 0..60),
     ) {
         let decoded = decode(id, &payload);
@@ -234,4 +236,62 @@ fn a_server_parses_requests() {
         other => panic!("{other:?}"),
     });
     assert_eq!(requests, Request::ALL);
+}
+
+#[test]
+fn navigation_data_are_peaks_in_metres_and_decibels() {
+    let azimuth = [0x0a, 0xf0, 0, 0, 0, 7, 0, 0, 0, 9];
+    let peaks = [0x02, 0xfa, 0xf0, 0x80, 0x02, 0x3d, 0, 0, 0, 1, 0, 0];
+    let payload = [&azimuth[..], &peaks].concat();
+    let Ok(Message::Navigation(navigation)) = decode(123, &payload) else {
+        panic!("{:?}", decode(123, &payload));
+    };
+    assert_eq!(navigation.encoder, 2800);
+    assert_eq!((navigation.seconds, navigation.split_seconds), (7, 9));
+    let peak = |range_m, power_db| Peak { range_m, power_db };
+    let expected = [peak(50.0, 57.3), peak(1e-6, 0.0)];
+    assert_eq!(navigation.peaks().collect::<Vec<_>>(), expected);
+    let cut = decode(123, &payload[..payload.len() - 1]);
+    assert_eq!(cut, Err(MalformedMessage::Peaks { bytes: 11 }));
+    assert!(decode(123, &azimuth[..9]).is_err());
+}
+
+#[test]
+fn health_has_readings_that_the_radar_judges() {
+    let reading = |value: f32, status: u8| {
+        let mut bytes = vec![3 << 3 | 5];
+        bytes.extend(value.to_le_bytes());
+        bytes.extend([5 << 3, status, 6 << 3, 12]);
+        bytes
+    };
+    let mut payload = Vec::new();
+    for (field, value, status) in [(1_u8, 41.5, 2), (14, 3.0, 0)] {
+        let reading = reading(value, status);
+        payload.extend([field << 3 | 2, reading.len() as u8]);
+        payload.extend(reading);
+    }
+    payload.extend([8 << 3, 1]);
+    // Minus one, in ten bytes.
+    payload.push(12 << 3);
+    payload.extend([0xff; 9]);
+    payload.push(1);
+    // Text of a field of two bytes.
+    payload.extend([0x9a, 0x01, 2, b'i', b'p']);
+    let Ok(Message::Health(health)) = decode(40, &payload) else {
+        panic!("{:?}", decode(40, &payload));
+    };
+    let expected = [
+        ("die temperature", 41.5, HealthStatus::Healthy),
+        ("motor current", 3.0, HealthStatus::Unhealthy),
+    ];
+    let expected = expected.map(|(name, value, status)| (name, Reading { value, status }));
+    assert_eq!(health.readings().collect::<Vec<_>>(), expected);
+    assert_eq!(health.transmitting, Some(true));
+    assert_eq!(health.encoder_errors, Some(-1));
+    let cut = decode(40, &payload[..5]);
+    let malformed = MalformedMessage::Protobuf {
+        message: "health",
+        at: 0,
+    };
+    assert_eq!(cut, Err(malformed));
 }

@@ -11,7 +11,7 @@ use ratatui::{
 };
 
 use super::look::{Look, Use};
-use crate::operate::processes::{duration, summary};
+use crate::operate::processes::{duration, lacks, summary};
 
 /// The columns of the table: title and width.
 const COLUMNS: [(&str, u16); 12] = [
@@ -114,10 +114,16 @@ fn head_lines(look: &Look) -> [String; 4] {
         status.out.display().to_string(),
         summary(status),
         format!(
-            "{:.1} scans/s, {in_flight} in flight, {} dropped{}",
+            "{:.1} scans/s, {in_flight} in flight, {} dropped{}{}",
             look.rate,
             status.dropped,
-            missed_by_recorder(status)
+            missed_by_recorder(status),
+            status
+                .processes
+                .iter()
+                .filter_map(|it| it.received.as_ref())
+                .map(lacks)
+                .collect::<String>()
         ),
         format!(
             "sensor to pose p50 {}, p99 {}, max {} over {} poses of the last 10 s",
