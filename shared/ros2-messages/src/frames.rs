@@ -1,0 +1,200 @@
+//! Poses and motions in the plane as odometry and transforms.
+//!
+//! Frames follow REP-105: `map` -> `odom` -> `base_link` -> `radar`. `odom` is the vehicle's frame at the first scan, and `map` is where
+//! loops have corrected it to be. All follow REP-103, as Gyre's own frames do, so that no axis is turned.
+
+use gyre_geometry::{Pose, Twist, UncertainMotion, xy_yaw};
+use nalgebra::{Matrix3, Rotation2};
+
+use crate::{
+    geometry_msgs::{self, Covariance, Point, Quaternion, Transform, TransformStamped, Vector3},
+    nav_msgs::Odometry,
+    std_msgs::Header,
+};
+
+/// Variance of what a planar odometry does not measure: z, roll and pitch, and their velocities. So large that no filter uses it; zero
+/// would mean that they are known exactly. The value is that of ROS 2's `diff_drive_controller`.
+pub const UNKNOWN: f64 = 1e6;
+
+/// Where x, y and yaw are among x, y, z, roll, pitch and yaw.
+const PLANAR: [usize; 3] = [0, 1, 5];
+
+/// Names of the frames.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Frames {
+    /// The frame in which loops are closed.
+    pub map: String,
+    /// The frame in which odometry is continuous.
+    pub odom: String,
+    /// The vehicle's frame.
+    pub base: String,
+    /// The radar's frame.
+    pub radar: String,
+}
+
+impl Default for Frames {
+    /// Returns the names of REP-105.
+    fn default() -> Self {
+        Self {
+            map: "map".to_owned(),
+            odom: "odom".to_owned(),
+            base: "base_link".to_owned(),
+            radar: "radar".to_owned(),
+        }
+    }
+}
+
+/// The motion that led to a pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    /// The motion from the previous scan, with the covariance of its (x, y, yaw) along the axes of the earlier frame.
+    pub motion: UncertainMotion,
+    /// Its duration, ns.
+    pub duration_ns: i64,
+}
+
+/// Returns a pose in the odometry frame, and the velocity with which it was reached, as odometry.
+///
+/// The covariance of the pose is along the axes of `odom`, as `robot_localization` expects it. The velocity is that of
+/// constant motion since the previous scan, in the frame of the vehicle, with the covariance of the motion divided by the square of its
+/// duration. Without a motion (at the first scan) the velocity is zero with the variance [`UNKNOWN`].
+pub fn odometry(
+    stamp_ns: i64,
+    frames: &Frames,
+    pose: &UncertainMotion,
+    since: Option<&Interval>,
+) -> Odometry {
+    let mut odometry = Odometry {
+        header: Header::new(stamp_ns, &frames.odom),
+        child_frame_id: frames.base.clone(),
+        ..Odometry::default()
+    };
+    odometry.pose.pose = self::pose(&pose.motion);
+    odometry.pose.covariance = covariance(Some(&pose.covariance));
+    let since = since.filter(|since| since.duration_ns > 0);
+    odometry.twist.covariance = covariance(since.map(velocity_covariance).as_ref());
+    if let Some(since) = since {
+        let twist = Twist::from_motion(&since.motion.motion, seconds(since));
+        odometry.twist.twist.linear.x = twist.vx_mps;
+        odometry.twist.twist.linear.y = twist.vy_mps;
+        odometry.twist.twist.angular.z = twist.yaw_rate_radps;
+    }
+    odometry
+}
+
+/// Returns the covariance of (x, y, yaw) among those of ROS. [`UNKNOWN`] is the variance of all others; of all six without one.
+pub fn covariance(planar: Option<&Matrix3<f64>>) -> Covariance {
+    let mut covariance = Covariance::default();
+    for value in 0..geometry_msgs::VALUES {
+        covariance.set(value, value, UNKNOWN);
+    }
+    let Some(planar) = planar else {
+        return covariance;
+    };
+    for (row, to_row) in PLANAR.into_iter().enumerate() {
+        for (column, to_column) in PLANAR.into_iter().enumerate() {
+            covariance.set(to_row, to_column, planar[(row, column)]);
+        }
+    }
+    covariance
+}
+
+/// Returns the covariance of the velocity in the later frame.
+fn velocity_covariance(since: &Interval) -> Matrix3<f64> {
+    let to_later = Rotation2::new(-since.motion.motion.rotation.angle()).to_homogeneous();
+    let s = seconds(since);
+    to_later * since.motion.covariance * to_later.transpose() / (s * s)
+}
+
+fn seconds(since: &Interval) -> f64 {
+    since.duration_ns as f64 * 1e-9
+}
+
+/// Returns the pose of the frame `inner` in the frame `outer`.
+pub fn transform(stamp_ns: i64, outer: &str, inner: &str, pose: &Pose) -> TransformStamped {
+    let geometry_msgs::Pose {
+        position: Point { x, y, z },
+        orientation: rotation,
+    } = self::pose(pose);
+    TransformStamped {
+        header: Header::new(stamp_ns, outer),
+        child_frame_id: inner.to_owned(),
+        transform: Transform {
+            translation: Vector3 { x, y, z },
+            rotation,
+        },
+    }
+}
+
+/// Returns a pose in the plane as one in space.
+pub fn pose(pose: &Pose) -> geometry_msgs::Pose {
+    let [x, y, yaw_rad] = xy_yaw(pose);
+    let (z, w) = (0.5 * yaw_rad).sin_cos();
+    geometry_msgs::Pose {
+        position: Point { x, y, z: 0.0 },
+        orientation: Quaternion {
+            x: 0.0,
+            y: 0.0,
+            z,
+            w,
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gyre_geometry::pose as planar;
+    use std::f64::consts::FRAC_PI_2;
+
+    use super::*;
+
+    fn uncertain(motion: Pose, covariance: Matrix3<f64>) -> UncertainMotion {
+        UncertainMotion { motion, covariance }
+    }
+
+    #[test]
+    fn planar_covariances_are_in_the_order_of_ros() {
+        let matrix = Matrix3::new(1.0, 2.0, 3.0, 2.0, 4.0, 5.0, 3.0, 5.0, 6.0);
+        let covariance = covariance(Some(&matrix));
+        let e = covariance.elements();
+        assert_eq!(
+            [e[0], e[1], e[5], e[6], e[7], e[11]],
+            [1.0, 2.0, 3.0, 2.0, 4.0, 5.0]
+        );
+        assert_eq!([e[30], e[31], e[35]], [3.0, 5.0, 6.0]);
+        assert_eq!([e[14], e[21], e[28]], [UNKNOWN; 3]);
+        assert_eq!(e.iter().filter(|value| **value != 0.0).count(), 12);
+    }
+
+    #[test]
+    fn velocity_is_in_the_frame_of_the_vehicle() {
+        let motion = uncertain(
+            planar(2.0, 2.0, FRAC_PI_2),
+            Matrix3::from_diagonal(&nalgebra::Vector3::new(4.0, 1.0, 0.25)),
+        );
+        let since = Interval {
+            motion,
+            duration_ns: 500_000_000,
+        };
+        let pose = uncertain(planar(2.0, 2.0, FRAC_PI_2), Matrix3::identity());
+        let odometry = odometry(7, &Frames::default(), &pose, Some(&since));
+        // A quarter circle of radius 2 m to the left in half a second.
+        let (twist, covariance) = (odometry.twist.twist, odometry.twist.covariance);
+        assert!((twist.linear.x - 2.0 * FRAC_PI_2 / 0.5).abs() < 1e-9);
+        assert!(twist.linear.y.abs() < 1e-9);
+        assert!((twist.angular.z - FRAC_PI_2 / 0.5).abs() < 1e-9);
+        // What was along x is across the vehicle now.
+        assert!((covariance.at(0, 0) - 1.0 / 0.25).abs() < 1e-9);
+        assert!((covariance.at(1, 1) - 4.0 / 0.25).abs() < 1e-9);
+        assert!((covariance.at(5, 5) - 0.25 / 0.25).abs() < 1e-9);
+        assert!((odometry.pose.pose.orientation.z - 0.5_f64.sqrt()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_first_pose_has_no_velocity() {
+        let odometry = odometry(0, &Frames::default(), &UncertainMotion::identity(), None);
+        assert_eq!(odometry.twist.twist, geometry_msgs::Twist::default());
+        assert_eq!(odometry.twist.covariance, covariance(None));
+        assert_eq!(odometry.pose.covariance.at(0, 0), 0.0);
+    }
+}

@@ -1,0 +1,25 @@
+//! The ROS 2 messages that Gyre speaks, without I/O.
+//!
+//! Reading order:
+//! - [`Definition`]: names and fields of a type, and the text of its schema;
+//! - a module for each ROS package: [`nav_msgs`], [`tf2_msgs`], [`navtech_msgs`] and those that they consist of;
+//! - [`encode`], [`decode`]: messages as CDR;
+//! - [`frames`]: poses and motions of Gyre as odometry and transforms;
+//! - [`radar`]: Navtech's messages as azimuths of [`gyre_colossus`], and scans as Navtech's messages.
+
+pub mod builtin_interfaces;
+mod cdr;
+mod definition;
+pub mod diagnostic_msgs;
+pub mod frames;
+pub mod geometry_msgs;
+pub mod messages;
+pub mod nav_msgs;
+pub mod navtech_msgs;
+pub mod radar;
+pub mod sensor_msgs;
+pub mod std_msgs;
+pub mod tf2_msgs;
+
+pub use cdr::{BadMessage, decode, encode};
+pub use definition::{Definition, Ros2Message};

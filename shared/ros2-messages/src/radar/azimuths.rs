@@ -1,0 +1,50 @@
+//! Messages of one azimuth.
+
+use gyre_colossus::{Azimuth, Powers};
+
+use crate::{
+    BadMessage, Ros2Message, messages::RadarFftDataMessage, navtech_msgs::RadarFftDataMsg,
+};
+
+impl RadarFftDataMsg {
+    /// Returns the azimuth as the radar sent it. Its angle is that of the encoder: [`RadarFftDataMsg::angle`] is wrong.
+    pub fn azimuth(&self) -> Azimuth<'_> {
+        Azimuth {
+            sweep_counter: self.sweep_counter,
+            encoder: self.azimuth,
+            seconds: self.ntp_seconds.to_le_bytes(),
+            split_seconds: self.ntp_split_seconds.to_le_bytes(),
+            powers: Powers::Eight(&self.data),
+        }
+    }
+}
+
+impl RadarFftDataMessage {
+    /// Returns the azimuth as the radar sent it.
+    ///
+    /// # Errors
+    /// A number that has not the bytes of its type.
+    pub fn azimuth(&self) -> Result<Azimuth<'_>, BadMessage> {
+        Ok(Azimuth {
+            sweep_counter: u16::from_be_bytes(number::<Self, 2>(
+                "sweep_counter",
+                &self.sweep_counter,
+            )?),
+            encoder: u16::from_be_bytes(number::<Self, 2>("azimuth", &self.azimuth)?),
+            seconds: number::<Self, 4>("ntp_seconds", &self.ntp_seconds)?,
+            split_seconds: number::<Self, 4>("ntp_split_seconds", &self.ntp_split_seconds)?,
+            powers: Powers::Eight(&self.data),
+        })
+    }
+}
+
+/// Returns the bytes of a number that is an array of its bytes.
+pub(super) fn number<T: Ros2Message, const N: usize>(
+    field: &str,
+    bytes: &[u8],
+) -> Result<[u8; N], BadMessage> {
+    bytes.try_into().map_err(|_| BadMessage::Field {
+        type_name: T::DEFINITION.type_name(),
+        reason: format!("`{field}` has {} bytes, expected {N}", bytes.len()),
+    })
+}

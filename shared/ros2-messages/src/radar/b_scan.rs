@@ -1,0 +1,207 @@
+//! Messages of one turn.
+
+use gyre_colossus::{Azimuth, Configuration, Powers};
+use thiserror::Error;
+
+use crate::{navtech_msgs::RadarBScanMsg, sensor_msgs::Image};
+
+const SECOND_NS: u64 = 1_000_000_000;
+
+/// A message that is no scan.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum BadScan {
+    /// Powers that are not one byte a bin.
+    #[error("its pixels are `{encoding}`, expected `8UC1` or `mono8`")]
+    Encoding {
+        /// The encoding given.
+        encoding: String,
+    },
+    /// Sizes that contradict each other.
+    #[error(
+        "it has {bytes} bytes, and says that it has {height} rows of {step} bytes for {width} bins"
+    )]
+    Size {
+        /// Bytes of pixels.
+        bytes: usize,
+        /// Rows.
+        height: u32,
+        /// Bytes of a row.
+        step: u32,
+        /// Columns.
+        width: u32,
+    },
+    /// Values beside the image that do not fit it.
+    #[error("it has {rows} rows, {encoders} encoder values and {stamps} times")]
+    Rows {
+        /// Rows of the image.
+        rows: usize,
+        /// Encoder values.
+        encoders: usize,
+        /// Times.
+        stamps: usize,
+    },
+}
+
+/// An azimuth of a turn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row<'a> {
+    /// The azimuth.
+    pub azimuth: Azimuth<'a>,
+    /// When it was received, ns, if the message is received when the turn has ended.
+    pub arrived_ns: i64,
+}
+
+impl RadarBScanMsg {
+    /// Returns the azimuths in order. Rows that the driver has not written (its index overruns the image where the encoder's counts are
+    /// no multiple of the azimuths, and leaves other rows out) are none.
+    ///
+    /// `arrived_ns` is the host's time at which the message was received.
+    ///
+    /// # Errors
+    /// An image that is not of powers, or values that do not fit it.
+    pub fn rows<'a>(
+        &'a self,
+        radar: &Configuration,
+        azimuth_offset: u16,
+        arrived_ns: i64,
+    ) -> Result<impl Iterator<Item = Row<'a>> + 'a, BadScan> {
+        let image = Rows::of(&self.b_scan_img, azimuth_offset)?;
+        let (encoders, stamps) = (&self.encoder_values, &self.timestamps);
+        if encoders.len() != image.height || stamps.len() != image.height {
+            return Err(BadScan::Rows {
+                rows: image.height,
+                encoders: encoders.len(),
+                stamps: stamps.len(),
+            });
+        }
+        let time = TurnTime::new(radar, arrived_ns);
+        let has_clock = stamps.iter().any(|stamp| *stamp != 0);
+        let mut last = None;
+        let written = move |(row, encoder, stamp): &(usize, u16, u64)| {
+            let is_written = if has_clock {
+                *stamp != 0
+            } else {
+                *row == 0 || *encoder != 0
+            };
+            let follows = last.is_none_or(|last| last < *encoder);
+            if is_written && follows {
+                last = Some(*encoder);
+            }
+            is_written && follows
+        };
+        let places = encoders.iter().zip(stamps).enumerate();
+        let places = places.map(|(row, (encoder, stamp))| (row, *encoder, *stamp));
+        Ok(places
+            .filter(written)
+            .map(move |(row, encoder, stamp)| Row {
+                azimuth: azimuth(encoder, stamp, image.row(row)),
+                arrived_ns: time.arrived_ns(encoder),
+            }))
+    }
+}
+
+impl Image {
+    /// Returns the azimuths of a `b_scan_image`, which has neither encoder values nor times: they are evenly spaced, and a turn ends
+    /// when the image is received.
+    ///
+    /// # Errors
+    /// An image that is not of powers.
+    pub fn rows(
+        &self,
+        radar: &Configuration,
+        azimuth_offset: u16,
+        arrived_ns: i64,
+    ) -> Result<impl Iterator<Item = Row<'_>>, BadScan> {
+        let image = Rows::of(self, azimuth_offset)?;
+        let time = TurnTime::new(radar, arrived_ns);
+        let encoder_size = u64::from(radar.encoder_size);
+        Ok((0..image.height).map(move |row| {
+            let encoder = (row as u64 * encoder_size / image.height as u64) as u16;
+            Row {
+                azimuth: azimuth(encoder, 0, image.row(row)),
+                arrived_ns: time.arrived_ns(encoder),
+            }
+        }))
+    }
+}
+
+fn azimuth(encoder: u16, stamp: u64, powers: &[u8]) -> Azimuth<'_> {
+    let seconds = u32::try_from(stamp / SECOND_NS).unwrap_or(u32::MAX);
+    Azimuth {
+        sweep_counter: 0,
+        encoder,
+        seconds: seconds.to_le_bytes(),
+        split_seconds: ((stamp % SECOND_NS) as u32).to_le_bytes(),
+        powers: Powers::Eight(powers),
+    }
+}
+
+/// The rows of an image of powers.
+#[derive(Clone, Copy)]
+struct Rows<'a> {
+    data: &'a [u8],
+    height: usize,
+    width: usize,
+    step: usize,
+    /// Rows by which the image is turned.
+    offset: usize,
+}
+
+impl<'a> Rows<'a> {
+    fn of(image: &'a Image, azimuth_offset: u16) -> Result<Self, BadScan> {
+        if !matches!(image.encoding.as_str(), "8UC1" | "mono8") {
+            return Err(BadScan::Encoding {
+                encoding: image.encoding.chars().take(20).collect(),
+            });
+        }
+        let fits = image.width > 0
+            && image.height > 0
+            && image.step >= image.width
+            && u64::from(image.height) * u64::from(image.step) == image.data.len() as u64;
+        if !fits {
+            return Err(BadScan::Size {
+                bytes: image.data.len(),
+                height: image.height,
+                step: image.step,
+                width: image.width,
+            });
+        }
+        let height = image.height as usize;
+        Ok(Self {
+            data: &image.data,
+            height,
+            width: image.width as usize,
+            step: image.step as usize,
+            offset: usize::from(azimuth_offset) % height,
+        })
+    }
+
+    /// Returns the powers of an azimuth.
+    fn row(&self, azimuth: usize) -> &'a [u8] {
+        let row = (azimuth + self.offset) % self.height;
+        &self.data[row * self.step..][..self.width]
+    }
+}
+
+/// Times of receipt within a turn.
+#[derive(Clone, Copy)]
+struct TurnTime {
+    end_ns: i64,
+    encoder_size: f64,
+    period_ns: f64,
+}
+
+impl TurnTime {
+    fn new(radar: &Configuration, end_ns: i64) -> Self {
+        Self {
+            end_ns,
+            encoder_size: f64::from(radar.encoder_size.max(1)),
+            period_ns: radar.period_ns() as f64,
+        }
+    }
+
+    fn arrived_ns(&self, encoder: u16) -> i64 {
+        let left = 1.0 - f64::from(encoder) / self.encoder_size;
+        self.end_ns.saturating_sub((left * self.period_ns) as i64)
+    }
+}

@@ -1,0 +1,84 @@
+//! The radar's description of itself.
+
+use gyre_colossus::Configuration;
+
+use super::azimuths::number;
+use crate::{
+    BadMessage, messages::RadarConfigurationMessage, navtech_msgs::RadarConfigurationMsg,
+    std_msgs::Header,
+};
+
+/// Bins per metre of `bin_size`.
+const BIN_SIZES: f64 = 1e4;
+/// The largest rate that is in turns per second: no radar turns as slowly as this in turns per 1000 s, or as quickly.
+const MAX_TURNS_PER_S: u16 = 50;
+
+impl RadarConfigurationMsg {
+    /// Returns the radar's description of itself.
+    pub fn configuration(&self) -> Configuration {
+        let resolution_m = (f64::from(self.bin_size) / BIN_SIZES) as f32;
+        Configuration {
+            azimuth_samples: self.azimuth_samples,
+            bin_size: self.bin_size.round() as u16,
+            range_in_bins: self.range_in_bins,
+            encoder_size: self.encoder_size,
+            rotation_mhz: rotation_mhz(self.expected_rotation_rate),
+            packet_rate: 0,
+            range_gain: self.range_gain,
+            range_offset: self.range_offset,
+            range_resolution_m: Some(resolution_m),
+        }
+    }
+
+    /// Returns the message of a configuration. The depth of a bin is exact if a number of 32 bits divided by 10,000 can be.
+    pub fn of(configuration: &Configuration, header: Header) -> Self {
+        Self {
+            header,
+            azimuth_samples: configuration.azimuth_samples,
+            encoder_size: configuration.encoder_size,
+            azimuth_offset: 0,
+            bin_size: bin_size(configuration.range_resolution_m()),
+            range_in_bins: configuration.range_in_bins,
+            expected_rotation_rate: configuration.rotation_mhz,
+            range_gain: configuration.range_gain,
+            range_offset: configuration.range_offset,
+        }
+    }
+}
+
+impl RadarConfigurationMessage {
+    /// Returns the radar's description of itself.
+    ///
+    /// # Errors
+    /// A number that has not the bytes of its type.
+    pub fn configuration(&self) -> Result<Configuration, BadMessage> {
+        let short = |field, bytes: &[u8]| {
+            Ok::<u16, BadMessage>(u16::from_be_bytes(number::<Self, 2>(field, bytes)?))
+        };
+        let bin_size = u64::from_be_bytes(number::<Self, 8>("bin_size", &self.bin_size)?);
+        let rate = short("expected_rotation_rate", &self.expected_rotation_rate)?;
+        Ok(Configuration {
+            azimuth_samples: short("azimuth_samples", &self.azimuth_samples)?,
+            bin_size: bin_size.try_into().unwrap_or(u16::MAX),
+            range_in_bins: short("range_in_bins", &self.range_in_bins)?,
+            encoder_size: short("encoder_size", &self.encoder_size)?,
+            rotation_mhz: rotation_mhz(rate),
+            ..Configuration::default()
+        })
+    }
+}
+
+fn rotation_mhz(rate: u16) -> u16 {
+    match rate <= MAX_TURNS_PER_S {
+        true => rate * 1000,
+        false => rate,
+    }
+}
+
+/// Returns the number that comes back as this depth of a bin, or else the nearest.
+fn bin_size(resolution_m: f32) -> f32 {
+    let nearest = (f64::from(resolution_m) * BIN_SIZES) as f32;
+    let candidates = [nearest, nearest.next_down(), nearest.next_up()];
+    let comes_back = |size: &f32| (f64::from(*size) / BIN_SIZES) as f32 == resolution_m;
+    candidates.into_iter().find(comes_back).unwrap_or(nearest)
+}

@@ -1,0 +1,30 @@
+//! `std_msgs`: the header of stamped messages.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{builtin_interfaces::Time, definition::message};
+
+/// Time and frame of what a message says.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Header {
+    /// The time.
+    pub stamp: Time,
+    /// The name of the frame.
+    pub frame_id: String,
+}
+message!(
+    Header,
+    "std_msgs",
+    "builtin_interfaces/Time stamp\nstring frame_id\n",
+    [Time]
+);
+
+impl Header {
+    /// Returns the header of a time in ns since 1970 and a frame.
+    pub fn new(stamp_ns: i64, frame_id: &str) -> Self {
+        Self {
+            stamp: Time::from_ns(stamp_ns),
+            frame_id: frame_id.to_owned(),
+        }
+    }
+}
