@@ -14,6 +14,7 @@ pub mod diagnostic_msgs;
 pub mod frames;
 pub mod geometry_msgs;
 pub mod messages;
+mod mounting;
 pub mod nav_msgs;
 pub mod navtech_msgs;
 pub mod radar;
@@ -23,3 +24,4 @@ pub mod tf2_msgs;
 
 pub use cdr::{BadMessage, decode, encode};
 pub use definition::{Definition, Ros2Message};
+pub use mounting::{BadMounting, Mounting};

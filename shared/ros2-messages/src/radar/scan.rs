@@ -11,50 +11,62 @@ use crate::{
     std_msgs::Header,
 };
 
-/// Encoder counts per turn.
+/// Angles nearer to a count than this are that count, rad: several roundings of an angle in 32 bits.
+const ROUNDING_RAD: f64 = 2e-6;
+
+/// The counts of an encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Encoder {
-    /// The counts.
+    /// Counts per turn.
     pub counts: u16,
-    /// Whether all angles of the scan are such counts, to the bit.
+    /// Whether the angles of the scan are such counts, but for rounding.
     pub is_exact: bool,
 }
 
 impl Encoder {
-    /// Returns the encoder of which the angles of a scan are: `known`, Navtech's, or one that is found; the finest possible for angles
-    /// that are of none.
+    /// Returns the encoder of which the angles of a scan are: `known`, or the one that is found; the finest possible for angles that are of
+    /// none. One of which all angles are counts to the bit goes before others.
     pub fn of(azimuth_rad: &[f32], known: Option<u16>) -> Self {
         let rows = u16::try_from(azimuth_rad.len()).unwrap_or(u16::MAX);
         let even = [Some(rows), rows.checked_mul(2), rows.checked_mul(4)];
-        let candidates = [known, Some(5600), Some(5595)].into_iter().chain(even);
-        let exact = candidates
+        let candidates = [known]
+            .into_iter()
+            .chain(even)
+            .chain([Some(5600), Some(5595)]);
+        let candidates: Vec<u16> = candidates
             .flatten()
             .filter(|counts| *counts >= 16)
-            .find(|counts| azimuth_rad.iter().all(|rad| is_count(*rad, *counts)));
-        match exact {
-            Some(counts) => Self {
-                counts,
-                is_exact: true,
-            },
-            None => Self {
-                counts: u16::MAX,
-                is_exact: false,
-            },
+            .collect();
+        let all = |is: fn(f32, u16) -> bool| {
+            let mut candidates = candidates.iter().copied();
+            candidates.find(|counts| azimuth_rad.iter().all(|rad| is(*rad, *counts)))
+        };
+        let found = all(is_count).or_else(|| all(is_near_count));
+        Self {
+            counts: found.unwrap_or(u16::MAX),
+            is_exact: found.is_some(),
         }
     }
 }
 
 fn count(azimuth_rad: f32, counts: u16) -> u16 {
     let turns = f64::from(azimuth_rad) / TAU;
-    (turns * f64::from(counts))
-        .round()
-        .rem_euclid(counts.into()) as u16
+    let count = (turns * f64::from(counts)).round();
+    count.rem_euclid(counts.into()) as u16
+}
+
+fn angle(count: u16, counts: u16) -> f64 {
+    f64::from(count) * (TAU / f64::from(counts))
 }
 
 /// Returns whether an angle is that of a count, as readers compute it.
 fn is_count(azimuth_rad: f32, counts: u16) -> bool {
-    let step = TAU / f64::from(counts);
-    (f64::from(count(azimuth_rad, counts)) * step) as f32 == azimuth_rad
+    angle(count(azimuth_rad, counts), counts) as f32 == azimuth_rad
+}
+
+fn is_near_count(azimuth_rad: f32, counts: u16) -> bool {
+    let apart = f64::from(azimuth_rad) - angle(count(azimuth_rad, counts), counts);
+    apart.abs() < ROUNDING_RAD || (TAU - apart.abs()).abs() < ROUNDING_RAD
 }
 
 /// Writes scans as messages of Navtech's driver.

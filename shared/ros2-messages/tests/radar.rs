@@ -1,0 +1,281 @@
+//! Navtech's messages and scans.
+#![allow(clippy::unwrap_used)]
+
+use std::f64::consts::TAU;
+
+use gyre_colossus::{Configuration, Constants, RadarClock, SweepAssembler};
+use gyre_radar::{OwnedScan, ScanLimits, Sense, SweepGeometry, middle_ns, scan::flag};
+use gyre_ros2_messages::{
+    messages::{RadarConfigurationMessage, RadarFftDataMessage},
+    navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg},
+    radar::{BadScan, Encoder, ScanMessages},
+    sensor_msgs::Image,
+    std_msgs::Header,
+};
+
+const START_NS: i64 = 1_549_986_608_000_000_007;
+
+/// A radar of 40 azimuths of 8 bins, which turns four times a second.
+fn radar() -> Configuration {
+    Configuration {
+        azimuth_samples: 40,
+        range_in_bins: 8,
+        encoder_size: 5600,
+        rotation_mhz: 4000,
+        range_resolution_m: Some(0.173_611),
+        range_gain: 1.0,
+        ..Configuration::default()
+    }
+}
+
+/// The scan of a turn, as a reader of recordings gives it.
+fn scan(turn: i64) -> OwnedScan {
+    let (azimuths, bins) = (40, 8);
+    let mut scan = OwnedScan::with_limits(ScanLimits {
+        bytes: azimuths * bins,
+        azimuths,
+    });
+    for row in 0..azimuths {
+        let encoder = (140 * row + 13) as f64;
+        scan.azimuth_rad[row] = (encoder * (TAU / 5600.0)) as f32;
+        scan.stamp_ns[row] = START_NS + 250_000_000 * turn + 6_250_000 * row as i64;
+        scan.flags[row] = flag::MEASURED;
+        for bin in 0..bins {
+            scan.bytes[row * bins + bin] = (turn as usize * 31 + row * 7 + bin) as u8;
+        }
+    }
+    scan.geometry = SweepGeometry {
+        azimuths,
+        bins,
+        stride: bins,
+        first_byte: 0,
+        range_resolution_m: 0.173_611,
+        range_offset_m: 0.0,
+        doppler_s: 0.0,
+        sense: Sense::Clockwise,
+        stamp_ns: middle_ns(scan.stamp_ns[0], scan.stamp_ns[azimuths - 1]),
+    };
+    scan
+}
+
+/// Assembles the scans of messages of whole turns.
+fn assembled(
+    radar: &Configuration,
+    turns: &[RadarBScanMsg],
+    offset: u16,
+    logged_ns: i64,
+) -> Vec<OwnedScan> {
+    let mut assembler = SweepAssembler::new(radar, Constants::default()).unwrap();
+    let mut clock = RadarClock::new(radar);
+    let mut scan = OwnedScan::with_limits(assembler.limits());
+    let mut scans = Vec::new();
+    for (turn, message) in turns.iter().enumerate() {
+        let arrived_ns = logged_ns + 250_000_000 * turn as i64;
+        for row in message.rows(radar, offset, arrived_ns).unwrap() {
+            for (azimuth, stamp_ns) in clock.stamp(row.azimuth, row.arrived_ns) {
+                if let Some(sweep) = assembler.add(&azimuth, stamp_ns, scan.slot()) {
+                    scan.geometry = sweep.geometry;
+                    scans.push(scan.clone());
+                }
+            }
+        }
+    }
+    scans
+}
+
+fn assert_same(one: &OwnedScan, other: &OwnedScan) {
+    assert_eq!(one.geometry, other.geometry);
+    assert_eq!(one.bytes, other.bytes);
+    assert_eq!(one.azimuth_rad, other.azimuth_rad);
+    assert_eq!(one.stamp_ns, other.stamp_ns);
+    assert_eq!(one.flags, other.flags);
+}
+
+#[test]
+fn scans_come_back_to_the_bit() {
+    let messages = ScanMessages::new(radar(), "radar");
+    let described = messages.configuration(START_NS).configuration();
+    assert_eq!(described.range_resolution_m(), 0.173_611);
+    let turns: Vec<_> = (0..3)
+        .map(|turn| messages.b_scan(scan(turn).view()))
+        .collect();
+    let scans = assembled(&described, &turns, 0, START_NS);
+    assert_eq!(scans.len(), 3);
+    for (turn, found) in scans.iter().enumerate() {
+        assert_same(found, &scan(turn as i64));
+    }
+}
+
+#[test]
+fn azimuths_of_both_forms_are_the_same() {
+    let mut messages = ScanMessages::new(radar(), "radar");
+    let scan = scan(0);
+    let newer = messages.azimuths(scan.view()).nth(5).unwrap();
+    let older = RadarFftDataMessage {
+        azimuth: newer.azimuth.to_be_bytes().to_vec(),
+        sweep_counter: newer.sweep_counter.to_be_bytes().to_vec(),
+        ntp_seconds: newer.ntp_seconds.to_be_bytes().to_vec(),
+        ntp_split_seconds: newer.ntp_split_seconds.to_be_bytes().to_vec(),
+        data: newer.data.clone(),
+        ..RadarFftDataMessage::default()
+    };
+    let (newer, found) = (newer.azimuth(), older.azimuth().unwrap());
+    assert_eq!((found.encoder, found.sweep_counter), (5 * 140 + 13, 6));
+    assert_eq!((found.encoder, found.powers), (newer.encoder, newer.powers));
+    let short = RadarFftDataMessage {
+        azimuth: vec![1],
+        ..older
+    };
+    let refused = short.azimuth().unwrap_err().to_string();
+    assert!(
+        refused.contains("`azimuth` has 1 bytes, expected 2"),
+        "{refused}"
+    );
+}
+
+#[test]
+fn rows_that_the_driver_has_not_written_are_missing() {
+    let mut message = ScanMessages::new(radar(), "radar").b_scan(scan(0).view());
+    for row in [3, 39] {
+        (message.encoder_values[row], message.timestamps[row]) = (0, 0);
+    }
+    let rows: Vec<_> = message.rows(&radar(), 0, START_NS).unwrap().collect();
+    assert_eq!(rows.len(), 38);
+    assert!(rows.iter().all(|row| row.azimuth.encoder != 0));
+}
+
+/// The driver turns its images by a number of rows, and not the encoder values beside them.
+#[test]
+fn a_turned_image_is_turned_back() {
+    let plain = ScanMessages::new(radar(), "radar").b_scan(scan(0).view());
+    let mut turned = plain.clone();
+    turned.b_scan_img.data.rotate_right(5 * 8);
+    let powers = |message: &RadarBScanMsg, offset| -> Vec<Vec<u8>> {
+        let rows = message.rows(&radar(), offset, START_NS).unwrap();
+        rows.map(|row| row.azimuth.powers.bytes().to_vec())
+            .collect()
+    };
+    assert_eq!(powers(&turned, 5), powers(&plain, 0));
+    assert_ne!(powers(&turned, 0), powers(&plain, 0));
+}
+
+#[test]
+fn a_radar_without_a_clock_has_the_times_of_receipt() {
+    let messages = ScanMessages::new(radar(), "radar");
+    let turns: Vec<_> = (0..3)
+        .map(|turn| {
+            let mut message = messages.b_scan(scan(turn).view());
+            message.timestamps.fill(0);
+            message
+        })
+        .collect();
+    let scans = assembled(&radar(), &turns, 0, START_NS);
+    assert_eq!(scans.len(), 3);
+    let turn_ns = scans[1].geometry.stamp_ns - scans[0].geometry.stamp_ns;
+    assert_eq!(turn_ns, 250_000_000);
+    // The message is received when the turn has ended, half a turn after its middle.
+    assert!((START_NS - scans[0].geometry.stamp_ns - 125_000_000).abs() < 10_000_000);
+}
+
+#[test]
+fn an_image_alone_is_evenly_spaced() {
+    let image = ScanMessages::new(radar(), "radar")
+        .b_scan(scan(0).view())
+        .b_scan_img;
+    let rows: Vec<_> = image.rows(&radar(), 0, START_NS).unwrap().collect();
+    assert_eq!(rows.len(), 40);
+    assert_eq!((rows[0].azimuth.encoder, rows[1].azimuth.encoder), (0, 140));
+    assert!(rows[0].arrived_ns < rows[1].arrived_ns);
+}
+
+#[test]
+fn images_that_are_not_of_powers_are_refused() {
+    let good = ScanMessages::new(radar(), "radar").b_scan(scan(0).view());
+    let refused = |message: RadarBScanMsg| message.rows(&radar(), 0, 0).err().unwrap();
+    let mut colours = good.clone();
+    colours.b_scan_img.encoding = "rgb8".to_owned();
+    assert!(matches!(refused(colours), BadScan::Encoding { .. }));
+    let mut short = good.clone();
+    short.b_scan_img.height = u32::MAX;
+    assert!(matches!(refused(short), BadScan::Size { .. }));
+    let empty = Image {
+        encoding: "8UC1".to_owned(),
+        ..Image::default()
+    };
+    assert!(matches!(
+        empty.rows(&radar(), 0, 0).err().unwrap(),
+        BadScan::Size { .. }
+    ));
+    let mut rows = good;
+    rows.timestamps.pop();
+    assert!(matches!(refused(rows), BadScan::Rows { .. }));
+}
+
+#[test]
+fn configurations_of_both_forms_are_the_same() {
+    let older = RadarConfigurationMessage {
+        azimuth_samples: 400_u16.to_be_bytes().to_vec(),
+        encoder_size: 5600_u16.to_be_bytes().to_vec(),
+        bin_size: 438_u64.to_be_bytes().to_vec(),
+        range_in_bins: 3768_u16.to_be_bytes().to_vec(),
+        expected_rotation_rate: 4_u16.to_be_bytes().to_vec(),
+        ..RadarConfigurationMessage::default()
+    };
+    let older = older.configuration().unwrap();
+    let newer = RadarConfigurationMsg {
+        azimuth_samples: 400,
+        encoder_size: 5600,
+        bin_size: 438.0,
+        range_in_bins: 3768,
+        expected_rotation_rate: 4000,
+        ..RadarConfigurationMsg::default()
+    };
+    let newer = newer.configuration();
+    assert_eq!(older.range_resolution_m(), 0.0438);
+    assert_eq!(newer.range_resolution_m(), 0.0438);
+    assert_eq!((older.rotation_mhz, newer.rotation_mhz), (4000, 4000));
+    assert_eq!(older.encoder_size, newer.encoder_size);
+}
+
+#[test]
+fn depths_of_bins_come_back_to_the_bit() {
+    for resolution_m in [
+        0.0438,
+        0.0596,
+        0.04381,
+        100.0 / 576.0,
+        200.0 / 3360.0,
+        0.175,
+        1.0 / 3.0,
+    ] {
+        let radar = Configuration {
+            range_resolution_m: Some(resolution_m),
+            ..radar()
+        };
+        let message = RadarConfigurationMsg::of(&radar, Header::default());
+        assert_eq!(message.configuration().range_resolution_m(), resolution_m);
+    }
+}
+
+#[test]
+fn the_encoder_of_a_scan_is_found() {
+    let angles = |counts: f64, step: f64, first: f64| -> Vec<f32> {
+        (0..400)
+            .map(|row| ((f64::from(row) * step + first) * (TAU / counts)) as f32)
+            .collect()
+    };
+    let found = |angles: &[f32], known| Encoder::of(angles, known);
+    let exact = |counts| Encoder {
+        counts,
+        is_exact: true,
+    };
+    assert_eq!(found(&angles(5600.0, 14.0, 13.0), None), exact(5600));
+    assert_eq!(found(&angles(5595.0, 13.0, 3.0), None), exact(5595));
+    assert_eq!(
+        found(&angles(16_000.0, 40.0, 7.0), Some(16_000)),
+        exact(16_000)
+    );
+    assert_eq!(found(&angles(400.0, 1.0, 0.0), None), exact(400));
+    assert_eq!(found(&angles(400.0, 1.0, 0.5), None), exact(800));
+    assert!(!found(&angles(400.0, 1.0, 0.123), None).is_exact);
+}
