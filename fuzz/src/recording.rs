@@ -46,7 +46,7 @@ impl Recording {
             Format::Mulran => ("sensor_data/radar/polar", AZIMUTHS as i64 - 1, 1000),
             Format::MulranOxfordForm => ("polar_oxford_form", AZIMUTHS as i64 - 1, 1000),
             Format::Radiate => ("Navtech_Polar", 0, 1),
-            Format::Fomo | Format::Mcap | Format::Other => ("navtech", 0, 1),
+            Format::Fomo | Format::Mcap | Format::Other | Format::Ros2Bag => ("navtech", 0, 1),
         };
         let transposed = matches!(format, Format::Mulran | Format::Radiate);
         let row_us = PERIOD_US / AZIMUTHS as i64;

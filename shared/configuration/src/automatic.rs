@@ -63,7 +63,7 @@ pub fn automatic(data: &Path, wished: &DatasetOptions) -> Result<Automatic, Auto
         return of_recorded_run(data);
     }
     let dataset = radar_constants(data, wished)?;
-    let measured = Measured::of(gyre_radar::open(data, &wished.or(&dataset))?.as_mut())?;
+    let measured = Measured::of(gyre_recording::open(data, &wished.or(&dataset))?.as_mut())?;
     let settings = measured.settings();
     let format = dataset
         .format
@@ -96,10 +96,10 @@ pub fn radar_constants(
     if gyre_recording::is_recording(data) {
         return Ok(DatasetOptions::default());
     }
-    let format = gyre_radar::open(data, wished)?.format();
+    let format = gyre_recording::open(data, wished)?.format();
     Ok(DatasetOptions {
         format: Some(format),
-        ..gyre_radar::stored_options(data)?.or(&constants(format)?)
+        ..gyre_recording::stored_options(data)?.or(&constants(format)?)
     })
 }
 
@@ -127,7 +127,7 @@ fn constants(format: Format) -> Result<DatasetOptions, ConfigurationError> {
         }
         Format::Radiate => include_str!("../../../configs/radiate.toml"),
         Format::Fomo => include_str!("../../../configs/fomo.toml"),
-        Format::Oord | Format::Mcap | Format::Other => "",
+        Format::Oord | Format::Mcap | Format::Other | Format::Ros2Bag => "",
     };
     let parsed: Result<Table, _> = text.parse();
     let mut table =

@@ -166,6 +166,7 @@ fn open_found(
     found: detect::Found,
     options: &DatasetOptions,
 ) -> Result<Box<dyn Dataset>, OpenError> {
+    options.check_without_topics(found.format)?;
     Ok(match found.format {
         Format::Oxford => Box::new(oxford::open(found, options)?),
         Format::Oord => Box::new(oxford::open_oord(found, options)?),
@@ -175,10 +176,10 @@ fn open_found(
         Format::MulranOxfordForm => Box::new(mulran::open_oxford_form(found, options)?),
         Format::Radiate => Box::new(radiate::open(found, options)?),
         Format::Fomo => Box::new(fomo::open(found, options)?),
-        Format::Mcap => {
+        format @ (Format::Mcap | Format::Ros2Bag) => {
             let path = found.folder.display();
             return Err(OpenError::Recording(format!(
-                "{path} is a folder of images, and the format `mcap` is that of a recording of a run, a file"
+                "{path} is a folder of images, and the format `{format}` is that of a recording as MCAP"
             )));
         }
         Format::Other => {

@@ -1,7 +1,8 @@
-//! Opens what a source plays: a recording of a run, or a dataset of [`gyre_radar`].
+//! Opens what a source plays: a recording of a run, a bag of ROS 2, or a dataset of [`gyre_radar`].
 
 use std::path::{Path, PathBuf};
 
+use gyre_bags::is_bag;
 use gyre_radar::{Dataset, DatasetOptions, FileList, Format, OpenError};
 
 use crate::{
@@ -10,8 +11,12 @@ use crate::{
     scans::Scans,
 };
 
-/// Returns whether a path names a recording of a run: its first file, or a folder that holds it and no other one.
+/// Returns whether a path names a recording of a run: its first file, or a folder that holds it and no other one. A bag of ROS 2 is none,
+/// though it has files of the same form.
 pub fn is_recording(path: &Path) -> bool {
+    if is_bag(path) {
+        return false;
+    }
     let is_named = path
         .extension()
         .is_some_and(|extension| extension == "mcap");
@@ -23,6 +28,9 @@ pub fn is_recording(path: &Path) -> bool {
 /// # Errors
 /// As there; a recording that cannot be read.
 pub fn open(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
+    if is_bag(root) {
+        return gyre_bags::open(root, options);
+    }
     match is_recording(root) {
         true => open_parts(&parts(root), root, options),
         false => gyre_radar::open(root, options),
@@ -34,7 +42,7 @@ pub fn open(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, O
 /// # Errors
 /// As there; a recording that cannot be read.
 pub fn open_resolved(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
-    match is_recording(root) {
+    match is_recording(root) || is_bag(root) {
         true => open(root, options),
         false => gyre_radar::open_resolved(root, options),
     }
@@ -50,8 +58,10 @@ pub fn reopen(
     format: Format,
     files: FileList,
 ) -> Result<Box<dyn Dataset>, OpenError> {
-    if format != Format::Mcap {
-        return gyre_radar::reopen(root, options, format, files);
+    match format {
+        Format::Mcap => {}
+        Format::Ros2Bag => return gyre_bags::reopen(root, options, &files),
+        _ => return gyre_radar::reopen(root, options, format, files),
     }
     let paths: Vec<PathBuf> = (0..files.len())
         .filter_map(|index| files.get(index))
@@ -65,6 +75,12 @@ pub fn reopen(
 /// # Errors
 /// As there; a recording that cannot be read.
 pub fn stored_options(root: &Path) -> Result<DatasetOptions, OpenError> {
+    if is_bag(root) {
+        return Ok(DatasetOptions {
+            format: Some(Format::Ros2Bag),
+            ..DatasetOptions::default()
+        });
+    }
     match is_recording(root) {
         true => recorded_options(&open_recording(root)?),
         false => gyre_radar::stored_options(root),

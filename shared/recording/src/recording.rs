@@ -174,6 +174,22 @@ impl Recording {
         stored(messages, &part.channels, topic, seq).ok_or_else(|| damaged(&part.path))
     }
 
+    /// Reads the header of a message.
+    ///
+    /// # Errors
+    /// As [`Recording::read`]; a header that is not of the type.
+    pub fn read_header<H: bytemuck::AnyBitPattern>(
+        &mut self,
+        topic: &str,
+        seq: u64,
+    ) -> Result<H, RecordingError> {
+        let stored = self.read(topic, seq)?;
+        read(&stored.header).ok_or_else(|| RecordingError::Foreign {
+            path: self.path_of(topic, seq).to_owned(),
+            reason: format!("its messages of topic `{topic}` are of another version"),
+        })
+    }
+
     /// Returns the position of a chunk among those in memory, and reads it first if it is not there.
     fn keep(&mut self, place: Place) -> Result<usize, RecordingError> {
         let is_it = |kept: &Kept| (kept.part, kept.chunk) == (place.part, place.chunk);

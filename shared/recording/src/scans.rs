@@ -98,6 +98,9 @@ impl Scans {
                 return refuse(key, wished.to_string());
             }
         }
+        if let Some(topic) = options.topic {
+            return refuse("topic", topic.to_string());
+        }
         if options.azimuth_source.is_some() && options.azimuth_source != recorded.azimuth_source {
             return refuse(
                 "azimuth_source",

@@ -78,7 +78,8 @@ impl OutputFormat {
             | Format::MulranOxfordForm
             | Format::Fomo
             | Format::Mcap
-            | Format::Other => None,
+            | Format::Other
+            | Format::Ros2Bag => None,
         }
     }
 }

@@ -263,7 +263,12 @@ fn score(format: Format, image: &FirstImage, boreas_folders: bool) -> i32 {
         Format::BoreasRt => (&[6848], NamedBy::Middle, true),
         Format::Fomo => (&[6848], NamedBy::Start, false),
         Format::MulranOxfordForm => (&[3360], NamedBy::End, false),
-        Format::Oord | Format::Mulran | Format::Radiate | Format::Mcap | Format::Other => {
+        Format::Oord
+        | Format::Mulran
+        | Format::Radiate
+        | Format::Mcap
+        | Format::Other
+        | Format::Ros2Bag => {
             return NEVER;
         }
     };

@@ -41,6 +41,8 @@ pub enum Format {
     /// A format that Gyre has no reader for: of a program with a [`Dataset`](super::Dataset) of its own. No configuration names it.
     #[serde(skip_deserializing)]
     Other,
+    /// A bag of ROS 2 with the messages of Navtech's driver.
+    Ros2Bag,
 }
 
 impl Format {
@@ -58,7 +60,7 @@ impl Format {
 
     /// Returns the format of this name.
     pub fn by_name(name: &str) -> Option<Self> {
-        let mut all = Self::ALL.into_iter().chain([Self::Mcap]);
+        let mut all = Self::ALL.into_iter().chain([Self::Mcap, Self::Ros2Bag]);
         all.find(|format| format.name() == name)
     }
 
@@ -75,6 +77,7 @@ impl Format {
             Self::Fomo => "fomo",
             Self::Mcap => "mcap",
             Self::Other => "other",
+            Self::Ros2Bag => "ros2-bag",
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use std::{fmt, ops::RangeInclusive};
 
+use arrayvec::ArrayString;
 use serde::{Deserialize, Serialize};
 
 use super::error::OpenError;
@@ -16,6 +17,9 @@ pub enum AzimuthSource {
     /// Uniform spacing: row `i` of `n` at `2 pi i / n`.
     Uniform,
 }
+
+/// The longest name of a topic, bytes.
+const TOPIC_BYTES: usize = 256;
 
 /// How to read a dataset: the section `[dataset]` of a configuration. All keys are optional; the defaults depend on the format.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -47,6 +51,10 @@ pub struct DatasetOptions {
     /// Encoder counts per turn. Default: FoMo 5595, all others 5600.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub encoder_counts: Option<u16>,
+    /// The topic of the scans in a bag of ROS 2. Default: the one whose type is of Navtech's driver.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<String>")]
+    pub topic: Option<ArrayString<TOPIC_BYTES>>,
 }
 
 impl DatasetOptions {
@@ -104,6 +112,23 @@ impl DatasetOptions {
                 .or(other.azimuth_eccentricity_rad),
             azimuth_source: self.azimuth_source.or(other.azimuth_source),
             encoder_counts: self.encoder_counts.or(other.encoder_counts),
+            topic: self.topic.or(other.topic),
+        }
+    }
+
+    /// Rejects the option of bags, for images.
+    pub(crate) fn check_without_topics(&self, format: Format) -> Result<(), OpenError> {
+        let options = Self {
+            format: Some(format),
+            ..*self
+        };
+        match self.topic {
+            Some(_) => Err(options.invalid(
+                "topic",
+                self.topic,
+                "images have no topics; leave the key out",
+            )),
+            None => Ok(()),
         }
     }
 
