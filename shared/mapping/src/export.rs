@@ -1,9 +1,11 @@
 //! Maps in the forms of other programs.
 
 mod geotiff;
+mod grid;
 mod pgm;
 mod web;
 
 pub use geotiff::write_geotiff;
+pub use grid::grid;
 pub use pgm::write_pgm;
 pub use web::write_web_tiles;

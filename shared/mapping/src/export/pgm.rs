@@ -4,15 +4,12 @@ use std::path::Path;
 
 use gyre_storage::Draft;
 
-use crate::{Cell, MapError, TileSource, strips};
+use crate::{Cell, MapError, Occupancy, TileSource, strips};
 
 /// The values of `map_server`'s form: with the thresholds below a cell is occupied, free or unknown.
 const OCCUPIED: u8 = 0;
 const FREE: u8 = 254;
 const UNKNOWN: u8 = 205;
-/// A cell is known if it was looked at half a time from nearby, and occupied if it returned a sixteenth of the power it might have.
-const KNOWN_LOOKED: u8 = 16;
-const OCCUPIED_EVIDENCE: u8 = 64;
 
 /// Writes `map.pgm` and `map.yaml` into `folder`.
 ///
@@ -25,7 +22,7 @@ pub fn write_pgm(folder: &Path, source: &mut impl TileSource) -> Result<(), MapE
     let mut picture = Draft::create(&folder.join("map.pgm"))?;
     picture.append(format!("P5\n{columns} {rows}\n255\n"))?;
     strips::for_each(source, &extent, |cells| {
-        let pixels: Vec<u8> = cells.iter().map(|cell| occupancy(*cell)).collect();
+        let pixels: Vec<u8> = cells.iter().map(|cell| pixel(*cell)).collect();
         Ok(picture.append(pixels)?)
     })?;
     let mut yaml = Draft::create(&folder.join("map.yaml"))?;
@@ -39,10 +36,10 @@ pub fn write_pgm(folder: &Path, source: &mut impl TileSource) -> Result<(), MapE
     Ok(gyre_storage::sync_folder(folder)?)
 }
 
-fn occupancy(cell: Cell) -> u8 {
-    match cell {
-        cell if cell.looked < KNOWN_LOOKED => UNKNOWN,
-        cell if cell.evidence >= OCCUPIED_EVIDENCE => OCCUPIED,
-        _ => FREE,
+fn pixel(cell: Cell) -> u8 {
+    match Occupancy::of(cell) {
+        Occupancy::Unknown => UNKNOWN,
+        Occupancy::Free => FREE,
+        Occupancy::Occupied => OCCUPIED,
     }
 }

@@ -1,0 +1,159 @@
+//! A map as an occupancy grid of ROS 2.
+
+use crate::{Cell, MapError, Occupancy, TILE_CELLS, TileExtent, TileImage, TileSource};
+use gyre_geometry::{Pose, pose};
+use gyre_ros2_messages::{
+    builtin_interfaces::Time,
+    frames,
+    nav_msgs::{MapMetaData, OccupancyGrid},
+    std_msgs::Header,
+};
+
+/// The most cells of a grid. What sends it is slow with larger messages.
+const MAX_CELLS: usize = 1 << 20;
+/// Values of a cell: percent, and the byte of -1.
+const FREE: u8 = 0;
+const OCCUPIED: u8 = 100;
+const UNKNOWN: u8 = u8::MAX;
+
+/// Returns a map as a grid in the frame `map`, in which the frame of its tiles has the pose `placed`. Blocks of 2 x 2, 4 x 4 and so on become one
+/// cell where it would have more than a million: occupied if one of them is, free if one is and none is occupied.
+///
+/// # Errors
+/// A tile that cannot be read, and a map without a keyframe.
+pub fn grid(
+    source: &mut impl TileSource,
+    stamp_ns: i64,
+    map: &str,
+    placed: &Pose,
+) -> Result<OccupancyGrid, MapError> {
+    let extent = TileExtent::of(&source.tiles()).ok_or(MapError::Empty)?;
+    let block = block(extent);
+    let [width, height] = extent.cells().map(|cells| cells / block);
+    let mut data = vec![UNKNOWN; width * height];
+    let mut image = TileImage::default();
+    for tile in source.tiles() {
+        source.read(tile, &mut image)?;
+        let [column, row] = [tile.x.abs_diff(extent.min.x), tile.y.abs_diff(extent.min.y)]
+            .map(|tiles| tiles as usize * TILE_CELLS / block);
+        // A grid begins with the lowest y, a tile with the highest.
+        for (row, cells) in (0..).map(|at| row + at / block).zip(image.rows().rev()) {
+            let line = &mut data[row * width..][..width];
+            for (column, cell) in (0..).map(|at| column + at / block).zip(cells) {
+                line[column] = unite(line[column], value(*cell));
+            }
+        }
+    }
+    let cell_m = source.cell_m();
+    let corner = extent.corner_m(cell_m);
+    Ok(OccupancyGrid {
+        header: Header::new(stamp_ns, map),
+        info: MapMetaData {
+            map_load_time: Time::from_ns(stamp_ns),
+            resolution: (cell_m * block as f64) as f32,
+            width: width as u32,
+            height: height as u32,
+            origin: frames::pose(&(placed * pose(corner.x, corner.y, 0.0))),
+        },
+        data,
+    })
+}
+
+/// The side of the blocks of cells, a power of two, at most that of a tile.
+fn block(extent: TileExtent) -> usize {
+    let [columns, rows] = extent.cells();
+    let mut block = 1;
+    while block < TILE_CELLS && (columns / block) * (rows / block) > MAX_CELLS {
+        block *= 2;
+    }
+    block
+}
+
+fn value(cell: Cell) -> u8 {
+    match Occupancy::of(cell) {
+        Occupancy::Unknown => UNKNOWN,
+        Occupancy::Free => FREE,
+        Occupancy::Occupied => OCCUPIED,
+    }
+}
+
+/// One of two cells in a block: occupied before free before unknown.
+fn unite(one: u8, other: u8) -> u8 {
+    match (one, other) {
+        (UNKNOWN, known) | (known, UNKNOWN) => known,
+        (one, other) => one.max(other),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::f64::consts::FRAC_PI_2;
+
+    use crate::TileIndex;
+
+    use super::*;
+
+    /// A wall at the lowest x and y of each of `tiles`, and free ground beside it.
+    struct Walls(Vec<TileIndex>);
+
+    impl TileSource for Walls {
+        fn cell_m(&self) -> f64 {
+            0.5
+        }
+
+        fn tiles(&self) -> Vec<TileIndex> {
+            self.0.clone()
+        }
+
+        fn read(&mut self, _: TileIndex, image: &mut TileImage) -> Result<(), MapError> {
+            image.cells.fill(Cell::default());
+            let (last_row, looked) = (TILE_CELLS * (TILE_CELLS - 1), 255);
+            let cells = [255, 0].map(|evidence| Cell { evidence, looked });
+            image.cells[last_row..last_row + 2].copy_from_slice(&cells);
+            Ok(())
+        }
+    }
+
+    fn tile(x: i32, y: i32) -> TileIndex {
+        TileIndex { x, y }
+    }
+
+    #[test]
+    fn the_first_cell_is_that_of_lowest_x_and_y() {
+        let mut walls = Walls(vec![tile(-1, 0), tile(0, 2)]);
+        let grid = grid(&mut walls, 5_000_000_000, "map", &Pose::identity()).unwrap();
+        assert_eq!((grid.info.width, grid.info.height), (512, 768));
+        assert_eq!(grid.info.resolution, 0.5);
+        let origin = grid.info.origin.position;
+        assert_eq!((origin.x, origin.y), (-128.0, 0.0));
+        assert_eq!(grid.data[..3], [OCCUPIED, FREE, UNKNOWN]);
+        let second = 2 * 256 * 512 + 256;
+        assert_eq!(grid.data[second..second + 3], [OCCUPIED, FREE, UNKNOWN]);
+        let known = grid.data.iter().filter(|cell| **cell != UNKNOWN);
+        assert_eq!(known.count(), 4);
+        assert_eq!(
+            (grid.header.stamp.sec, grid.header.frame_id.as_str()),
+            (5, "map")
+        );
+    }
+
+    #[test]
+    fn a_large_map_has_larger_cells() {
+        let mut walls = Walls(vec![tile(0, 0), tile(9, 9)]);
+        let grid = grid(&mut walls, 0, "map", &Pose::identity()).unwrap();
+        assert_eq!((grid.info.width, grid.info.height), (640, 640));
+        assert_eq!(grid.info.resolution, 2.0);
+        assert_eq!(grid.data[..2], [OCCUPIED, UNKNOWN]);
+    }
+
+    #[test]
+    fn a_map_of_a_turned_radar_is_turned_as_a_whole() {
+        let mut walls = Walls(vec![tile(1, 0)]);
+        let grid = grid(&mut walls, 0, "map", &pose(3.0, 0.0, FRAC_PI_2)).unwrap();
+        let origin = grid.info.origin;
+        assert!((origin.position.x - 3.0).abs() < 1e-9);
+        assert!((origin.position.y - 128.0).abs() < 1e-9);
+        assert!((origin.orientation.z - 0.5_f64.sqrt()).abs() < 1e-9);
+    }
+}
