@@ -226,7 +226,11 @@ impl Scans {
         let mut clock = self.index.clock(index);
         let mut found = None;
         for span in entry.start.span..=entry.end.span {
-            let messages = self.messages(span)?;
+            let messages = match self.messages(span) {
+                // The index went on behind it, too.
+                Err(BagError::Damaged { .. }) => Vec::new(),
+                read => read?,
+            };
             let first = if span == entry.start.span {
                 entry.start.message as usize
             } else {

@@ -386,7 +386,7 @@ fn damaged_messages_are_scans_that_cannot_be_read() {
 fn a_damaged_chunk_is_left_out_with_a_note() {
     let folder = Folder::new();
     let path = folder.path("bag.mcap");
-    b_scans(8).write(&path, uncompressed().chunk_size(Some(4000)));
+    b_scans(8).write(&path, uncompressed().chunk_size(Some(2000)));
     let mut bytes = fs::read(&path).unwrap();
     let place = scan(4).bytes;
     let at = bytes
@@ -406,7 +406,7 @@ fn a_damaged_chunk_is_left_out_with_a_note() {
 fn a_bag_that_was_cut_has_the_scans_before_that() {
     let folder = Folder::new();
     let path = folder.path("bag.mcap");
-    b_scans(8).write(&path, uncompressed().chunk_size(Some(4000)));
+    b_scans(8).write(&path, uncompressed().chunk_size(Some(2000)));
     let bytes = fs::read(&path).unwrap();
     let place = scan(6).bytes;
     let at = bytes
