@@ -19,24 +19,45 @@ pub enum SourceKind {
     Recording,
     /// A Navtech radar on the network, by its protocol Colossus or as ASTERIX CAT-240.
     Colossus,
+    /// A Navtech radar behind its driver in ROS 2.
+    Ros2,
+}
+
+impl SourceKind {
+    /// Returns its name in configurations.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Recording => "recording",
+            Self::Colossus => "colossus",
+            Self::Ros2 => "ros2",
+        }
+    }
 }
 
 /// The source of scans: section `[source]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SourceConfig {
-    /// `recording`, or `colossus`: a Navtech radar on the network, in live mode. Then `data`, `first`,
-    /// `retry_s` and `max_unreadable` are not used.
+    /// `recording`; or in live mode `colossus`, a Navtech radar on the network, or `ros2`, one behind its driver in
+    /// ROS 2. Then `data`, `first`, `retry_s` and `max_unreadable` are not used.
     pub kind: SourceKind,
     /// Address of the radar, as in `192.168.0.1`; its port is 6317 unless it is given. `udp://GROUP:PORT`: where a radar sends to whose
     /// data output is CAT-240, as in `udp://239.192.43.78:4378`.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub address: String,
+    /// Topic of ROS 2 on which Navtech's driver publishes azimuths, as in `/radar_data/fft_data`; `--ros2` on the command
+    /// line. Its configuration is beside it, `/radar_data/configuration_data`.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub topic: String,
+    /// Domain of ROS 2. Default: `ROS_DOMAIN_ID`, or 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub domain: Option<u16>,
     /// Address of this machine on the network of a radar that sends to a multicast group, as in `192.168.0.2`. Default: the system
-    /// chooses.
+    /// chooses. Of ROS 2 the only network that is used; default: all.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub interface: String,
-    /// Time without an azimuth from the radar after which it is connected to anew, s; 0: no limit.
+    /// Time without an azimuth from the radar after which it is connected to anew, or in ROS 2 after which that is reported,
+    /// s; 0: no limit.
     pub silence_s: f64,
     /// Folder of the recording; `--data` on the command line.
     pub data: PathBuf,
@@ -82,6 +103,8 @@ impl Default for SourceConfig {
         Self {
             kind: SourceKind::Recording,
             address: String::new(),
+            topic: String::new(),
+            domain: None,
             interface: String::new(),
             silence_s: 3.0,
             data: PathBuf::new(),

@@ -1,0 +1,134 @@
+//! The bridge: a node that publishes the runs of a folder.
+
+use std::{
+    path::{Path, PathBuf},
+    thread,
+};
+
+use gyre_mapping::MapOptions;
+use gyre_ros2_messages::{
+    diagnostic_msgs::DiagnosticArray,
+    frames::{self, Frames},
+    nav_msgs::OccupancyGrid,
+    tf2_msgs::TFMessage,
+};
+use gyre_slam::EstimatorKind;
+use gyre_stage::{StageError, wake::Signals};
+
+use crate::{
+    Domain, Mounting, NodeError, clock,
+    following::{LOOK, PoseTopics, follow_corrections, follow_poses},
+    health::report,
+    live_map::follow_maps,
+    node::{Keep, Node},
+    outlet::Outlet,
+    shared::Shared,
+};
+
+/// The name of the node.
+const NODE: &str = "gyre";
+/// Messages that are kept for readers that are behind: 25 s of a radar that turns four times a second.
+const DEPTH: usize = 100;
+
+/// What is published, and where.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// The folder of the results of the run, and of the next one.
+    pub out: PathBuf,
+    /// Where on the network.
+    pub domain: Domain,
+    /// The namespace of `odom` and `map`, such as `/` or `/robot`.
+    pub namespace: String,
+    /// Names of the frames.
+    pub frames: Frames,
+    /// The radar on the vehicle.
+    pub mounting: Mounting,
+    /// How the map of a run with SLAM is drawn; `None`: not at all.
+    pub map: Option<MapOf>,
+}
+
+/// Returns how the map of the run that writes to a folder is drawn, or a sentence that says why it is not.
+pub type MapOf = fn(&Path) -> Result<MapSettings, String>;
+
+/// How a map is drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapSettings {
+    /// Cells and ranges.
+    pub options: MapOptions,
+    /// How the poses of keyframes are corrected by loops.
+    pub estimator: EstimatorKind,
+}
+
+/// A node that publishes the runs of a folder, one after the other.
+pub struct Bridge {
+    shared: Shared,
+    map_settings: Option<MapOf>,
+    poses: PoseTopics,
+    /// Kept open, for those who come later.
+    mounting: Outlet<TFMessage>,
+    diagnostics: Outlet<DiagnosticArray>,
+    maps: Outlet<OccupancyGrid>,
+    /// Dropped last: the topics are its own.
+    _node: Node,
+}
+
+impl Bridge {
+    /// Joins the domain and opens all topics.
+    ///
+    /// # Errors
+    /// The domain cannot be joined, or a name is none of ROS 2.
+    pub fn open(settings: Settings) -> Result<Self, NodeError> {
+        let mut node = Node::new(&settings.domain, &settings.namespace, NODE)?;
+        Ok(Self {
+            poses: PoseTopics {
+                odometry: node.publish("odom", Keep::Last(DEPTH))?,
+                transforms: node.publish("/tf", Keep::Last(DEPTH))?,
+            },
+            mounting: node.publish("/tf_static", Keep::Latched)?,
+            diagnostics: node.publish("/diagnostics", Keep::Last(DEPTH))?,
+            maps: node.publish("map", Keep::Latched)?,
+            shared: Shared::new(settings.out, settings.frames, settings.mounting),
+            map_settings: settings.map,
+            _node: node,
+        })
+    }
+
+    /// Publishes until a signal arrives. `say` takes sentences for the person at the terminal.
+    ///
+    /// # Errors
+    /// The system refuses to wait.
+    pub fn publish(mut self, signals: &Signals, say: fn(&str)) -> Result<(), StageError> {
+        self.mounting.send(mounted(&self.shared));
+        let shared = &self.shared;
+        thread::scope(|threads| {
+            threads.spawn(|| follow_poses(shared, self.poses, say));
+            threads.spawn(|| follow_corrections(shared));
+            threads.spawn(|| report(shared, self.diagnostics));
+            if let Some(settings) = self.map_settings {
+                threads.spawn(move || follow_maps(shared, settings, self.maps));
+            }
+            let stopped = loop {
+                match signals.sleep(LOOK) {
+                    Ok(false) => {}
+                    Ok(true) => break Ok(()),
+                    Err(error) => break Err(error),
+                }
+            };
+            shared.stop();
+            stopped
+        })
+    }
+}
+
+/// The radar on the vehicle.
+fn mounted(shared: &Shared) -> TFMessage {
+    let (frames, radar) = (&shared.frames, shared.mounting.radar());
+    TFMessage {
+        transforms: vec![frames::transform(
+            clock::now_ns(),
+            &frames.base,
+            &frames.radar,
+            radar,
+        )],
+    }
+}

@@ -1,0 +1,208 @@
+//! The health of the run as diagnostics, once a second.
+
+use std::time::{Duration, Instant};
+
+use gyre_ros2_messages::{
+    builtin_interfaces::Time,
+    diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, ERROR, KeyValue, OK, STALE, WARN},
+};
+use gyre_stage::control::{Activity, Control, ProcessStatus, Status};
+
+use crate::{
+    clock,
+    following::LOOK,
+    outlet::Outlet,
+    shared::{Known, Shared, State},
+};
+
+/// Time between two reports.
+const PERIOD: Duration = Duration::from_secs(1);
+
+/// What a report is compared with.
+#[derive(Default)]
+struct Before {
+    poses: u64,
+    dropped: u64,
+    lost: u64,
+}
+
+/// Reports once a second until the bridge stops.
+pub fn report(shared: &Shared, mut diagnostics: Outlet<DiagnosticArray>) {
+    let (mut before, mut due) = (Before::default(), Instant::now());
+    while !shared.is_stopping() {
+        if Instant::now() >= due {
+            due = Instant::now() + PERIOD;
+            let answer = Control::of(&shared.out).and_then(|run| run.status());
+            let known = shared.known().clone();
+            diagnostics.send(array(
+                &shared.out.display().to_string(),
+                &known,
+                answer.ok(),
+                &mut before,
+            ));
+        }
+        std::thread::sleep(LOOK.min(due.saturating_duration_since(Instant::now())));
+    }
+}
+
+/// The run and its processes.
+fn array(out: &str, known: &Known, status: Option<Status>, before: &mut Before) -> DiagnosticArray {
+    let mut parts = vec![run(known, status.as_ref(), before)];
+    let processes = status.iter().flat_map(|status| &status.processes);
+    parts.extend(processes.map(process));
+    for part in &mut parts {
+        out.clone_into(&mut part.hardware_id);
+    }
+    let mut array = DiagnosticArray {
+        status: parts,
+        ..DiagnosticArray::default()
+    };
+    array.header.stamp = Time::from_ns(clock::now_ns());
+    array
+}
+
+/// The run as a whole.
+fn run(known: &Known, status: Option<&Status>, before: &mut Before) -> DiagnosticStatus {
+    let dropped = status.map_or(0, |status| status.dropped);
+    let lost = known.missed + known.unsent;
+    let fell = [
+        (dropped > before.dropped, "scans are dropped"),
+        (lost > before.lost, "the bridge loses messages"),
+    ];
+    let poses = known.poses.saturating_sub(before.poses);
+    *before = Before {
+        poses: known.poses,
+        dropped,
+        lost,
+    };
+    let trouble = fell.iter().find(|(is_so, _)| *is_so).map(|(_, what)| *what);
+    let (level, message) = match (known.state, trouble, &known.notice) {
+        (State::Waiting, ..) => (STALE, "there is no run yet".to_owned()),
+        (State::Ended, ..) => (STALE, "the run has ended".to_owned()),
+        (_, _, Some(notice)) => (WARN, notice.clone()),
+        (_, Some(trouble), _) => (WARN, trouble.to_owned()),
+        (State::Finishing, ..) => (OK, "the results are being written".to_owned()),
+        (State::Working, ..) => (OK, format!("{poses} poses in the last second")),
+    };
+    let of_bridge = [
+        ("poses published", known.poses),
+        ("poses missed", known.missed),
+        ("messages not sent", known.unsent),
+        ("maps published", known.maps),
+    ];
+    let of_bridge = of_bridge.map(|(key, count)| value(key, count));
+    let mut part = part("gyre", level, message);
+    part.values = status.map(figures).unwrap_or_default();
+    part.values.extend(of_bridge);
+    part
+}
+
+/// Figures of the supervisor.
+fn figures(status: &Status) -> Vec<KeyValue> {
+    let mut figures = vec![
+        value("phase", status.phase.name()),
+        value("mode", if status.live { "live" } else { "lossless" }),
+        value("uptime_s", format!("{:.1}", status.uptime_s)),
+        value("poses", status.poses),
+        value("dropped", status.dropped),
+    ];
+    figures.extend(status.published.map(|scans| value("published", scans)));
+    let age = status.last_pose_s.map(|age_s| format!("{age_s:.2}"));
+    figures.extend(age.map(|age_s| value("last_pose_s", age_s)));
+    figures
+}
+
+/// One process.
+fn process(process: &ProcessStatus) -> DiagnosticStatus {
+    let level = match process.activity {
+        Activity::Waiting | Activity::Working | Activity::Running => OK,
+        Activity::Starting => WARN,
+        Activity::Silent | Activity::Ended => ERROR,
+    };
+    let name = format!("gyre: {}", process.name);
+    let mut part = part(&name, level, process.activity.name().to_owned());
+    part.values = vec![
+        value("pid", process.pid),
+        value("restarts", process.restarts),
+        value("uptime_s", format!("{:.1}", process.uptime_s)),
+    ];
+    let death = process.last_death.as_ref();
+    part.values
+        .extend(death.map(|cause| value("last_death", cause)));
+    part
+}
+
+fn part(name: &str, level: u8, message: String) -> DiagnosticStatus {
+    DiagnosticStatus {
+        level,
+        name: name.to_owned(),
+        message,
+        ..DiagnosticStatus::default()
+    }
+}
+
+fn value(key: &str, value: impl ToString) -> KeyValue {
+    KeyValue {
+        key: key.to_owned(),
+        value: value.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gyre_stage::control::Phase;
+
+    use super::*;
+
+    fn status(dropped: u64) -> Status {
+        let process = |name: &str, activity| ProcessStatus {
+            name: name.to_owned(),
+            pid: 7,
+            command: Vec::new(),
+            is_swapped: false,
+            activity,
+            activity_s: None,
+            uptime_s: 1.0,
+            restarts: 2,
+            last_death: Some("signal 9".to_owned()),
+            missed: None,
+        };
+        Status {
+            pid: 1,
+            out: "out".into(),
+            live: true,
+            phase: Phase::Running,
+            uptime_s: 2.0,
+            published: Some(9),
+            poses: 8,
+            dropped,
+            last_pose_s: Some(0.1),
+            processes: vec![
+                process("masking", Activity::Working),
+                process("refinement", Activity::Silent),
+            ],
+        }
+    }
+
+    #[test]
+    fn levels_follow_the_run_and_its_processes() {
+        let (mut before, mut known) = (Before::default(), Known::default());
+        let mut levels = |known: &Known, status| {
+            let array = array("out", known, status, &mut before);
+            array
+                .status
+                .iter()
+                .map(|part| part.level)
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(levels(&known, None), [STALE]);
+        known.state = State::Working;
+        assert_eq!(levels(&known, Some(status(0))), [OK, OK, ERROR]);
+        assert_eq!(levels(&known, Some(status(3))), [WARN, OK, ERROR]);
+        assert_eq!(levels(&known, Some(status(3))), [OK, OK, ERROR]);
+        known.unsent = 1;
+        assert_eq!(levels(&known, Some(status(3))), [WARN, OK, ERROR]);
+        known.state = State::Ended;
+        assert_eq!(levels(&known, None), [STALE]);
+    }
+}

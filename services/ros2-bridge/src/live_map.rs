@@ -1,0 +1,165 @@
+//! The map of a run with SLAM while it works.
+
+use std::{
+    path::Path,
+    time::{Duration, Instant},
+};
+
+use gyre_mapping::{Evidence, MapError, grid};
+use gyre_ros2_messages::nav_msgs::OccupancyGrid;
+use gyre_slam::{Keyframe, Query, RecordReader, TrajectoryEstimator, TrajectoryOptions};
+use gyre_stage::observer::ObservedRun;
+use gyre_storage::LogError;
+use thiserror::Error;
+
+use crate::{
+    MapOf, MapSettings, clock,
+    following::{LOOK, each_run},
+    outlet::Outlet,
+    shared::Shared,
+};
+
+/// The shortest time between two maps.
+const INTERVAL: Duration = Duration::from_secs(5);
+/// A map is drawn for at most so much of the time: the next one waits so many times longer than the last one took.
+const REST: u32 = 9;
+
+/// A map that cannot be drawn.
+#[derive(Debug, Error)]
+enum LiveMapError {
+    #[error("{0}")]
+    Settings(String),
+    #[error(transparent)]
+    Log(#[from] LogError),
+    #[error(transparent)]
+    Map(#[from] MapError),
+    #[error(transparent)]
+    Estimation(#[from] gyre_estimation::EstimationError),
+}
+
+/// The keyframes of a run, drawn at their corrected poses.
+struct LiveMap {
+    settings: MapSettings,
+    keyframes: RecordReader<Keyframe>,
+    queries: RecordReader<Query>,
+    estimator: TrajectoryEstimator,
+    evidence: Evidence,
+    /// The number of each keyframe's scan in the run.
+    seqs: Vec<u64>,
+    closed: usize,
+}
+
+/// Publishes the map of each run with SLAM, when it has new keyframes, until the bridge stops.
+pub fn follow_maps(shared: &Shared, settings: MapOf, mut maps: Outlet<OccupancyGrid>) {
+    each_run(shared, |run| {
+        if !run.manifest().window.slam {
+            return Ok(());
+        }
+        let settings = settings(&shared.out).map_err(LiveMapError::Settings);
+        let followed = settings.and_then(|settings| follow(shared, run, &settings, &mut maps));
+        // It is not tried again: it would read all keyframes each time.
+        if let Err(error) = followed {
+            shared.known().notice = Some(format!("the map is not published: {error}"));
+        }
+        Ok(())
+    });
+}
+
+fn follow(
+    shared: &Shared,
+    run: &ObservedRun,
+    settings: &MapSettings,
+    maps: &mut Outlet<OccupancyGrid>,
+) -> Result<(), LiveMapError> {
+    let mut map = LiveMap::open(&shared.out, settings)?;
+    let mut due = Instant::now();
+    // A last time when the logs are complete.
+    let mut ended = false;
+    while !ended && !shared.is_stopping() {
+        ended = run.has_ended() || map.has_ended();
+        if !ended && Instant::now() < due {
+            std::thread::sleep(LOOK);
+            continue;
+        }
+        let begun = Instant::now();
+        if map.update(&shared.out)? {
+            let (frame, placed) = (&shared.frames.map, shared.mounting.radar());
+            maps.send(grid(&mut map.evidence, clock::now_ns(), frame, placed)?);
+            shared.known().maps = maps.sent();
+        }
+        due = Instant::now() + INTERVAL.max(begun.elapsed() * REST);
+    }
+    Ok(())
+}
+
+impl LiveMap {
+    fn open(out: &Path, settings: &MapSettings) -> Result<Self, LiveMapError> {
+        let options = TrajectoryOptions {
+            kind: settings.estimator,
+            ..TrajectoryOptions::default()
+        };
+        Ok(Self {
+            settings: settings.clone(),
+            keyframes: RecordReader::open(out)?,
+            queries: RecordReader::open(out)?,
+            estimator: TrajectoryEstimator::new(options),
+            evidence: Evidence::new(&settings.options, &std::env::temp_dir())
+                .map_err(MapError::from)?,
+            seqs: Vec::new(),
+            closed: 0,
+        })
+    }
+
+    /// Returns whether all was read, and nothing more comes.
+    fn has_ended(&self) -> bool {
+        self.queries.has_ended() && self.keyframes.has_ended()
+    }
+
+    /// Reads what is new, and draws what is new or has moved; true if something has changed.
+    fn update(&mut self, out: &Path) -> Result<bool, LiveMapError> {
+        self.keyframes.refresh()?;
+        self.queries.refresh()?;
+        // Some of those that were read have been cut off after a power failure or a crash.
+        if self.keyframes.unchanged() < self.seqs.len() || self.queries.unchanged() < self.closed {
+            *self = Self::open(out, &self.settings.clone())?;
+        }
+        self.read()?;
+        self.draw()
+    }
+
+    fn read(&mut self) -> Result<(), LiveMapError> {
+        for index in self.seqs.len()..self.keyframes.len() {
+            let keyframe = self.keyframes.read_without_points(index)?;
+            self.estimator.push(&keyframe)?;
+            self.seqs.push(keyframe.seq);
+        }
+        let closed = self.closed;
+        while self.closed < self.queries.len() {
+            let query = self.queries.read(self.closed)?;
+            // Its keyframe is read the next time.
+            if query.keyframe >= self.seqs.len() {
+                break;
+            }
+            self.estimator.close(&query)?;
+            self.closed += 1;
+        }
+        if self.closed > closed {
+            self.estimator.update()?;
+        }
+        Ok(())
+    }
+
+    fn draw(&mut self) -> Result<bool, LiveMapError> {
+        let mut has_changed = false;
+        for (index, pose) in self.estimator.poses().iter().enumerate() {
+            if self.evidence.has_moved(self.seqs[index], pose) {
+                let keyframe = self.keyframes.read(index)?;
+                self.evidence
+                    .draw(&keyframe, pose)
+                    .map_err(MapError::from)?;
+                has_changed = true;
+            }
+        }
+        Ok(has_changed)
+    }
+}

@@ -1,0 +1,54 @@
+//! A radar that Navtech's driver publishes in ROS 2, as the source of a run: each azimuth is a message on `radar_data/fft_data`.
+
+mod ask;
+mod driver;
+mod guess;
+mod radar;
+mod wakeups;
+
+use std::time::Duration;
+
+use gyre_colossus::Constants;
+use gyre_stage::{Launch, StageCounters, StageError, source};
+
+use crate::Domain;
+
+pub use ask::{AskError, ask};
+pub use gyre_live_radar::Sizes;
+
+/// Where a driver publishes, and what it does not say of its radar.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Where on the network.
+    pub domain: Domain,
+    /// The topic of the azimuths, such as `/radar_data/fft_data`. The configuration is beside it.
+    pub topic: String,
+    /// Encoder counts per turn of a radar whose driver does not publish its configuration.
+    pub encoder_counts: u16,
+    /// Time without a message after which that is reported.
+    pub silence: Duration,
+    /// Scans to receive; `None`: without end.
+    pub scans: Option<u64>,
+    /// Constants of its ranges and angles.
+    pub constants: Constants,
+}
+
+impl Settings {
+    /// The topic of the configuration, beside that of the azimuths.
+    fn configuration_topic(&self) -> String {
+        match self.topic.rsplit_once('/') {
+            Some((place, _)) => format!("{place}/configuration_data"),
+            None => "configuration_data".to_owned(),
+        }
+    }
+}
+
+/// Receives the scans of a radar until SIGTERM, or until there are enough.
+///
+/// # Errors
+/// A domain that cannot be joined, a radar whose scans are larger than at the start of the run, or a failure of the transport.
+pub fn run(launch: &Launch, settings: Settings) -> Result<StageCounters, StageError> {
+    let scans = settings.scans;
+    let radar = radar::Radar::open(settings).map_err(|error| StageError::Input(error.to_string()));
+    source::run_sensor(launch, &mut radar?, scans)
+}

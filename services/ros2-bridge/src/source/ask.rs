@@ -1,0 +1,129 @@
+//! The configuration of a radar, before a run.
+
+use std::{
+    thread::sleep,
+    time::{Duration, Instant},
+};
+
+use gyre_colossus::{Configuration, SweepAssembler};
+use gyre_live_radar::Sizes;
+use thiserror::Error;
+
+use super::{
+    Settings,
+    driver::{Driver, DriverError},
+    guess::Guess,
+};
+
+/// The longest wait for the configuration, which the driver repeats every four turns, and for azimuths that tell it.
+const MAX_WAIT: Duration = Duration::from_secs(6);
+/// Time between two looks.
+const LOOK: Duration = Duration::from_millis(10);
+
+/// Why a driver's radar cannot be used.
+#[derive(Debug, Error)]
+pub enum AskError {
+    /// The node or the topic.
+    #[error(transparent)]
+    Driver(#[from] DriverError),
+    /// Nobody publishes.
+    #[error(
+        "nobody publishes {topic} in domain {domain} of ROS 2: check source.topic, ROS_DOMAIN_ID and source.interface, and that the driver runs"
+    )]
+    NoTopic {
+        /// The topic.
+        topic: String,
+        /// The domain.
+        domain: u16,
+    },
+    /// Nothing arrives.
+    #[error(
+        "the driver publishes {topic}, but no azimuth arrives: check that the radar is on and in reach of its driver"
+    )]
+    Silent {
+        /// The topic.
+        topic: String,
+    },
+    /// The depth of a bin is unknown.
+    #[error(
+        "the driver publishes no {topic}, and nothing else tells the depth of a range bin: set dataset.range_resolution_m, and dataset.encoder_counts unless it is 5600"
+    )]
+    NoConfiguration {
+        /// The topic of configurations.
+        topic: String,
+    },
+    /// Its configuration is not usable.
+    #[error("the radar on {topic} cannot be used: {source}")]
+    Unusable {
+        /// The topic.
+        topic: String,
+        /// What is wrong.
+        source: gyre_colossus::BadConfiguration,
+    },
+}
+
+/// Asks a driver for the sizes of its radar's scans. Where it does not publish its configuration they are found from its azimuths.
+///
+/// # Errors
+/// No driver, or a radar that cannot be used.
+pub fn ask(settings: &Settings) -> Result<Sizes, AskError> {
+    let mut driver = Driver::open(settings)?;
+    let configuration = match published(&driver, settings)? {
+        Some(configuration) => configuration,
+        None => guessed(&mut driver, settings)?,
+    };
+    let unusable = |source| AskError::Unusable {
+        topic: settings.topic.clone(),
+        source,
+    };
+    let assembler = SweepAssembler::new(&configuration, settings.constants).map_err(unusable)?;
+    Ok(Sizes {
+        period_ns: configuration.period_ns(),
+        limits: assembler.limits(),
+    })
+}
+
+/// Waits for the configuration that the driver publishes.
+fn published(driver: &Driver, settings: &Settings) -> Result<Option<Configuration>, AskError> {
+    let started = Instant::now();
+    while started.elapsed() < MAX_WAIT {
+        driver.found()?;
+        if let Ok(Some(described)) = driver.configuration() {
+            return Ok(Some(described.radar));
+        }
+        sleep(LOOK);
+    }
+    match driver.found()? {
+        Some(_) => Ok(None),
+        None => Err(AskError::NoTopic {
+            topic: settings.topic.clone(),
+            domain: settings.domain.id(),
+        }),
+    }
+}
+
+/// Finds the configuration from azimuths.
+fn guessed(driver: &mut Driver, settings: &Settings) -> Result<Configuration, AskError> {
+    let Some(resolution_m) = settings.constants.range_resolution_m else {
+        return Err(AskError::NoConfiguration {
+            topic: settings.configuration_topic(),
+        });
+    };
+    let (mut guess, started) = (Guess::default(), Instant::now());
+    while started.elapsed() < MAX_WAIT {
+        driver.receive()?;
+        while let Ok(Some(packet)) = driver.packet() {
+            if let Ok(Some(azimuth)) = packet.message.azimuth() {
+                let arrival_ns = packet.message.header().stamp.ns();
+                guess.add(azimuth.encoder, azimuth.powers.bins(), arrival_ns);
+            }
+        }
+        if let Some(found) = guess.configuration(settings.encoder_counts, resolution_m) {
+            return Ok(found);
+        }
+        sleep(LOOK);
+    }
+    Err(AskError::Silent {
+        topic: settings.topic.clone(),
+    })
+}

@@ -1,0 +1,263 @@
+//! The topics of Navtech's driver.
+
+use std::{io, os::fd::BorrowedFd};
+
+use gyre_colossus::{Azimuth, Configuration};
+use gyre_ros2_messages::{
+    BadMessage, Ros2Message,
+    messages::{RadarConfigurationMessage, RadarFftDataMessage},
+    navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},
+    std_msgs::Header,
+};
+use ros2_client::{Gid, ReadError, Subscription};
+use thiserror::Error;
+
+use super::{Settings, wakeups::Wakeups};
+use crate::{NodeError, node::Node};
+
+/// The name of the node.
+const NODE: &str = "gyre_source";
+/// Azimuths that are kept until they are taken: ten turns, 2.5 s. The driver keeps one turn for those who are behind.
+const AZIMUTHS: usize = 4_000;
+/// Turns, and configurations, that are kept.
+const TURNS: usize = 10;
+
+/// A driver that cannot be received.
+#[derive(Debug, Error)]
+pub enum DriverError {
+    /// The node.
+    #[error(transparent)]
+    Node(#[from] NodeError),
+    /// The system refuses a descriptor.
+    #[error("cannot wait for topics of ROS 2: {0}")]
+    Wait(#[from] io::Error),
+    /// Another type.
+    #[error("{topic} carries {found}, but Gyre reads {}", names().join(", "))]
+    Type {
+        /// The topic.
+        topic: String,
+        /// Its type on DDS.
+        found: String,
+    },
+}
+
+/// A message that cannot be used.
+#[derive(Debug, Error)]
+pub enum BadPacket {
+    /// It is not CDR of its type.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// One of its numbers.
+    #[error(transparent)]
+    Message(#[from] BadMessage),
+}
+
+/// The types of azimuths that are read.
+fn names() -> [String; 3] {
+    [
+        RadarFftDataMsg::DEFINITION,
+        RadarBScanMsg::DEFINITION,
+        RadarFftDataMessage::DEFINITION,
+    ]
+    .map(|definition| definition.dds_name())
+}
+
+/// What a driver has published, and who.
+pub struct Packet {
+    /// The message.
+    pub message: PacketMessage,
+    /// Its publisher.
+    pub publisher: Gid,
+}
+
+/// A message with azimuths.
+pub enum PacketMessage {
+    /// One azimuth.
+    Azimuth(RadarFftDataMsg),
+    /// One azimuth of a driver before 2024.
+    Bytes(RadarFftDataMessage),
+    /// A turn.
+    Turn(RadarBScanMsg),
+}
+
+impl PacketMessage {
+    /// The driver's header.
+    pub fn header(&self) -> &Header {
+        match self {
+            Self::Azimuth(message) => &message.header,
+            Self::Bytes(message) => &message.header,
+            Self::Turn(message) => &message.b_scan_img.header,
+        }
+    }
+
+    /// The only azimuth; `None` of a turn.
+    ///
+    /// # Errors
+    /// A number that has not the bytes of its type.
+    pub fn azimuth(&self) -> Result<Option<Azimuth<'_>>, BadMessage> {
+        match self {
+            Self::Azimuth(message) => Ok(Some(message.azimuth())),
+            Self::Bytes(message) => message.azimuth().map(Some),
+            Self::Turn(_) => Ok(None),
+        }
+    }
+}
+
+/// The topic of the azimuths, as it is published.
+enum Azimuths {
+    Azimuth(Subscription<RadarFftDataMsg>),
+    Bytes(Subscription<RadarFftDataMessage>),
+    Turn(Subscription<RadarBScanMsg>),
+}
+
+/// The topics of a driver, as far as they are subscribed to.
+pub struct Driver {
+    node: Node,
+    topic: String,
+    /// The name of the azimuths' topic on DDS.
+    dds_name: String,
+    wakeups: Wakeups,
+    configurations: Subscription<RadarConfigurationMsg>,
+    /// Of a driver before 2024.
+    older: Subscription<RadarConfigurationMessage>,
+    azimuths: Option<Azimuths>,
+}
+
+/// The radar's description of itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Described {
+    /// The description.
+    pub radar: Configuration,
+    /// Rows by which images of turns are turned.
+    pub azimuth_offset: u16,
+}
+
+impl Driver {
+    /// Subscribes to the configuration.
+    ///
+    /// # Errors
+    /// The domain cannot be joined, or the name of the topic is none.
+    pub fn open(settings: &Settings) -> Result<Self, DriverError> {
+        let mut node = Node::new(&settings.domain, "/", NODE)?;
+        let mut wakeups = Wakeups::new()?;
+        let topic = settings.configuration_topic();
+        let mut configurations = node.subscribe(&topic, TURNS)?;
+        let mut older = node.subscribe(&topic, TURNS)?;
+        wakeups.add(&mut configurations)?;
+        wakeups.add(&mut older)?;
+        Ok(Self {
+            topic: settings.topic.clone(),
+            dds_name: node.dds_name(&settings.topic)?,
+            node,
+            wakeups,
+            configurations,
+            older,
+            azimuths: None,
+        })
+    }
+
+    /// Returns the type of the azimuths' topic on DDS; `None` while nobody publishes it.
+    ///
+    /// # Errors
+    /// It is none that is read.
+    pub fn found(&self) -> Result<Option<String>, DriverError> {
+        match self.node.type_of(&self.dds_name) {
+            Some(found) if !names().contains(&found) => Err(DriverError::Type {
+                topic: self.topic.clone(),
+                found,
+            }),
+            found => Ok(found),
+        }
+    }
+
+    /// Subscribes to the azimuths once somebody publishes them, and returns whether they are subscribed to.
+    ///
+    /// # Errors
+    /// The topic has another type, or cannot be opened.
+    pub fn receive(&mut self) -> Result<bool, DriverError> {
+        if self.azimuths.is_some() {
+            return Ok(true);
+        }
+        let Some(found) = self.found()? else {
+            return Ok(false);
+        };
+        let [azimuth, turn, _] = names();
+        let (node, wakeups, topic) = (&mut self.node, &mut self.wakeups, &self.topic);
+        self.azimuths = Some(if found == azimuth {
+            Azimuths::Azimuth(subscribe(node, wakeups, topic, AZIMUTHS)?)
+        } else if found == turn {
+            Azimuths::Turn(subscribe(node, wakeups, topic, TURNS)?)
+        } else {
+            Azimuths::Bytes(subscribe(node, wakeups, topic, AZIMUTHS)?)
+        });
+        Ok(true)
+    }
+
+    /// What becomes readable when there is a message.
+    pub fn descriptor(&self) -> BorrowedFd<'_> {
+        self.wakeups.descriptor()
+    }
+
+    /// To be called before all messages are taken.
+    ///
+    /// # Errors
+    /// The system refuses.
+    pub fn clear(&mut self) -> io::Result<()> {
+        self.wakeups.clear()
+    }
+
+    /// Takes the next configuration.
+    ///
+    /// # Errors
+    /// A message of another form.
+    pub fn configuration(&self) -> Result<Option<Described>, BadPacket> {
+        if let Some((message, _)) = self.configurations.take()? {
+            return Ok(Some(Described {
+                radar: message.configuration(),
+                azimuth_offset: message.azimuth_offset,
+            }));
+        }
+        match self.older.take()? {
+            Some((message, _)) => Ok(Some(Described {
+                radar: message.configuration()?,
+                azimuth_offset: 0,
+            })),
+            None => Ok(None),
+        }
+    }
+
+    /// Takes the next message with azimuths.
+    ///
+    /// # Errors
+    /// A message of another form.
+    pub fn packet(&self) -> Result<Option<Packet>, ReadError> {
+        Ok(match &self.azimuths {
+            Some(Azimuths::Azimuth(topic)) => take(topic, PacketMessage::Azimuth)?,
+            Some(Azimuths::Bytes(topic)) => take(topic, PacketMessage::Bytes)?,
+            Some(Azimuths::Turn(topic)) => take(topic, PacketMessage::Turn)?,
+            None => None,
+        })
+    }
+}
+
+fn subscribe<M: Ros2Message + Send + 'static>(
+    node: &mut Node,
+    wakeups: &mut Wakeups,
+    topic: &str,
+    depth: usize,
+) -> Result<Subscription<M>, DriverError> {
+    let mut subscription = node.subscribe(topic, depth)?;
+    wakeups.add(&mut subscription)?;
+    Ok(subscription)
+}
+
+fn take<M: Ros2Message + 'static>(
+    topic: &Subscription<M>,
+    of: fn(M) -> PacketMessage,
+) -> Result<Option<Packet>, ReadError> {
+    let taken = topic.take()?;
+    Ok(taken.map(|(message, info)| Packet {
+        message: of(message),
+        publisher: info.publisher_gid(),
+    }))
+}

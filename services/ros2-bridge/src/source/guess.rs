@@ -1,0 +1,98 @@
+//! The configuration of a radar whose driver does not publish it, from its azimuths.
+
+use gyre_colossus::Configuration;
+
+/// Azimuths that are looked at, at most: some ten turns.
+const MAX_AZIMUTHS: usize = 4_000;
+/// Whole turns that are needed.
+const TURNS: usize = 2;
+
+/// What azimuths say of the radar.
+#[derive(Clone, Debug, Default)]
+pub struct Guess {
+    /// The last encoder count.
+    last: Option<u16>,
+    /// Encoder counts from one azimuth to the next in a turn.
+    steps: Vec<u16>,
+    /// The times at which turns have begun, ns.
+    begins_ns: Vec<i64>,
+    bins: usize,
+}
+
+impl Guess {
+    /// Adds an azimuth that arrived at this time, ns.
+    pub fn add(&mut self, encoder: u16, bins: usize, arrival_ns: i64) {
+        self.bins = self.bins.max(bins);
+        let Some(last) = self.last.replace(encoder) else {
+            return;
+        };
+        if encoder < last {
+            self.begins_ns.push(arrival_ns);
+        } else if encoder > last && self.steps.len() < MAX_AZIMUTHS {
+            self.steps.push(encoder - last);
+        }
+    }
+
+    /// Returns the configuration of a radar with so many encoder counts per turn and this depth of a range bin, m; `None` before two whole
+    /// turns.
+    pub fn configuration(
+        &self,
+        encoder_counts: u16,
+        range_resolution_m: f32,
+    ) -> Option<Configuration> {
+        let (first_ns, last_ns) = match self.begins_ns[..] {
+            [first, .., last] if self.begins_ns.len() > TURNS => (first, last),
+            _ => return None,
+        };
+        let turns = self.begins_ns.len() as f64 - 1.0;
+        let period_s = (last_ns - first_ns) as f64 * 1e-9 / turns;
+        let azimuths = f64::from(encoder_counts) / self.step()?;
+        Some(Configuration {
+            azimuth_samples: azimuths.round() as u16,
+            range_in_bins: u16::try_from(self.bins).ok()?,
+            encoder_size: encoder_counts,
+            rotation_mhz: (1000.0 / period_s).round() as u16,
+            range_resolution_m: Some(range_resolution_m),
+            ..Configuration::default()
+        })
+    }
+
+    /// The mean step, without those over azimuths that were lost.
+    fn step(&self) -> Option<f64> {
+        let mut sorted = self.steps.clone();
+        sorted.sort_unstable();
+        let median = f64::from(*sorted.get(sorted.len() / 2)?);
+        let single = sorted.iter().map(|step| f64::from(*step));
+        let single: Vec<f64> = single.filter(|step| *step < 1.5 * median).collect();
+        Some(single.iter().sum::<f64>() / single.len() as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn azimuths_tell_their_number_and_the_time_of_a_turn() {
+        for (counts, lost) in [(5600, 0), (5600, 7), (5595, 0), (5595, 31)] {
+            let mut guess = Guess::default();
+            for azimuth in 0..400 * 4_i64 {
+                if lost > 0 && azimuth % lost == 3 {
+                    continue;
+                }
+                let encoder = (azimuth % 400 * counts / 400) as u16;
+                assert_eq!(guess.configuration(counts as u16, 0.04), None, "{azimuth}");
+                guess.add(encoder, 3768, azimuth * 625_000);
+                if azimuth > 1_200 {
+                    break;
+                }
+            }
+            let found = guess.configuration(counts as u16, 0.04).unwrap();
+            assert_eq!(found.azimuth_samples, 400, "{counts} {lost}");
+            assert_eq!(found.range_in_bins, 3768);
+            assert_eq!(found.rotation_mhz, 4000);
+            found.check().unwrap();
+        }
+    }
+}

@@ -1,0 +1,274 @@
+//! A radar behind its driver as the source of a run.
+
+use std::{
+    mem,
+    os::fd::BorrowedFd,
+    time::{Duration, Instant},
+};
+
+use gyre_live_radar::Intake;
+use gyre_messages::{ScanHeader, StageId};
+use gyre_ros2_messages::navtech_msgs::RadarBScanMsg;
+use gyre_stage::{
+    StageCounters, StageError,
+    source::{Arrival, Sensor},
+};
+use ros2_client::Gid;
+
+use super::{
+    Settings,
+    driver::{Described, Driver, DriverError, Packet, PacketMessage},
+    guess::Guess,
+};
+use crate::clock;
+
+/// Messages after which the process looks for signals and new readers, however many there are.
+const MAX_MESSAGES: usize = 512;
+/// Time between two looks for a driver.
+const LOOK: Duration = Duration::from_millis(100);
+/// Time without a configuration after which it is found from the azimuths: the driver repeats it every four turns.
+const CONFIGURATION_WAIT: Duration = Duration::from_secs(3);
+/// Time without an azimuth of a publisher after which another one is received in its place.
+const PUBLISHER_WAIT: Duration = Duration::from_secs(1);
+
+/// A radar behind its driver.
+pub struct Radar {
+    settings: Settings,
+    driver: Driver,
+    intake: Intake,
+    /// The configuration so far, which a driver that was started again need not repeat.
+    described: Option<Described>,
+    guess: Guess,
+    opened: Instant,
+    /// A turn, and how many of its rows were added: a scan can be complete before its end.
+    turn: Option<(RadarBScanMsg, usize)>,
+    /// Who publishes the azimuths, and how often that has changed.
+    publisher: Option<Gid>,
+    changes: u64,
+    heard: Instant,
+    is_silent: bool,
+}
+
+impl Radar {
+    /// Joins the domain.
+    ///
+    /// # Errors
+    /// The domain cannot be joined, or a topic cannot be opened.
+    pub fn open(settings: Settings) -> Result<Self, DriverError> {
+        let now = Instant::now();
+        Ok(Self {
+            intake: Intake::new(settings.constants),
+            driver: Driver::open(&settings)?,
+            settings,
+            described: None,
+            guess: Guess::default(),
+            opened: now,
+            turn: None,
+            publisher: None,
+            changes: 0,
+            heard: now,
+            is_silent: false,
+        })
+    }
+
+    /// Takes the newest configuration.
+    fn take_configuration(&mut self, room: usize) -> Result<(), StageError> {
+        loop {
+            match self.driver.configuration() {
+                Ok(Some(described)) => self.configure(described, room)?,
+                Ok(None) => return Ok(()),
+                Err(error) => self.intake.damaged(error, 0),
+            }
+        }
+    }
+
+    fn configure(&mut self, described: Described, room: usize) -> Result<(), StageError> {
+        self.described = Some(described);
+        self.intake.configure(described.radar, room)
+    }
+
+    /// Adds what a publisher has sent; true if a scan is complete.
+    fn add(
+        &mut self,
+        packet: Packet,
+        header: &mut ScanHeader,
+        bytes: &mut [u8],
+    ) -> Result<bool, StageError> {
+        if !self.is_heard(packet.publisher, bytes.len())? {
+            return Ok(false);
+        }
+        let arrival_ns = arrival_ns(&packet.message);
+        match packet.message.azimuth() {
+            Ok(Some(azimuth)) => {
+                if !self.intake.is_configured() {
+                    let (encoder, bins) = (azimuth.encoder, azimuth.powers.bins());
+                    self.guess(encoder, bins, arrival_ns, bytes.len())?;
+                }
+                return Ok(self.intake.add(azimuth, arrival_ns, header, bytes));
+            }
+            Ok(None) => {}
+            Err(error) => self.intake.damaged(error, 0),
+        }
+        Ok(match packet.message {
+            PacketMessage::Turn(turn) => self.add_turn(turn, 0, header, bytes),
+            _ => false,
+        })
+    }
+
+    /// Adds the rows of a turn from number `from` on; true if a scan is complete. Without a configuration they are dropped.
+    fn add_turn(
+        &mut self,
+        turn: RadarBScanMsg,
+        from: usize,
+        header: &mut ScanHeader,
+        bytes: &mut [u8],
+    ) -> bool {
+        let Some(Described {
+            radar,
+            azimuth_offset,
+        }) = self.described
+        else {
+            return false;
+        };
+        let completed = match turn.rows(&radar, azimuth_offset, clock::now_ns()) {
+            Ok(rows) => rows.enumerate().skip(from).find_map(|(index, row)| {
+                let is_complete = self.intake.add(row.azimuth, row.arrived_ns, header, bytes);
+                is_complete.then_some(index + 1)
+            }),
+            Err(error) => {
+                self.intake.damaged(error, 0);
+                None
+            }
+        };
+        self.turn = completed.map(|rows| (turn, rows));
+        completed.is_some()
+    }
+
+    /// Returns whether this publisher is the one that is received. Another one takes its place when it has fallen silent: the driver was
+    /// started again, and what it sends does not continue the scan before.
+    fn is_heard(&mut self, publisher: Gid, room: usize) -> Result<bool, StageError> {
+        let silent = self.heard.elapsed();
+        match self.publisher {
+            Some(heard) if heard == publisher => {}
+            Some(_) if silent < PUBLISHER_WAIT => {
+                let reason =
+                    "two publishers send azimuths on the topic, and only the first is received";
+                self.intake.damaged(reason, 0);
+                return Ok(false);
+            }
+            before => {
+                self.publisher = Some(publisher);
+                self.changes += u64::from(before.is_some());
+                self.intake.restart();
+                if let Some(described) = self.described {
+                    self.intake.configure(described.radar, room)?;
+                }
+            }
+        }
+        self.heard = Instant::now();
+        if mem::take(&mut self.is_silent) {
+            let topic = &self.settings.topic;
+            tracing::info!(topic, "azimuths arrive again after {silent:.1?}");
+        }
+        Ok(true)
+    }
+
+    /// Finds the configuration from azimuths, where none is published.
+    fn guess(
+        &mut self,
+        encoder: u16,
+        bins: usize,
+        arrival_ns: i64,
+        room: usize,
+    ) -> Result<(), StageError> {
+        self.guess.add(encoder, bins, arrival_ns);
+        let resolution_m = self.settings.constants.range_resolution_m;
+        let Some(resolution_m) =
+            resolution_m.filter(|_| self.opened.elapsed() >= CONFIGURATION_WAIT)
+        else {
+            return Ok(());
+        };
+        let counts = self.settings.encoder_counts;
+        let Some(radar) = self.guess.configuration(counts, resolution_m) else {
+            return Ok(());
+        };
+        let (azimuths, bins) = (radar.azimuth_samples, radar.range_in_bins);
+        tracing::info!(
+            azimuths,
+            bins,
+            "the driver publishes no configuration: it was found from azimuths"
+        );
+        let described = Described {
+            radar,
+            azimuth_offset: 0,
+        };
+        self.configure(described, room)
+    }
+
+    /// How to wait for more. Silence is reported once.
+    fn wait(&mut self, has_received: bool) -> Arrival {
+        let silence = self.settings.silence;
+        let left = silence.saturating_sub(self.heard.elapsed());
+        if left.is_zero() && !mem::replace(&mut self.is_silent, true) {
+            let topic = &self.settings.topic;
+            tracing::warn!(
+                topic,
+                "no azimuth for {silence:?}: check that the driver runs and that the radar is on"
+            );
+        }
+        match self.intake.pause().filter(|_| has_received) {
+            Some(pause) => Arrival::Later(pause),
+            None if self.is_silent => Arrival::Nothing(silence),
+            None => Arrival::Nothing(left),
+        }
+    }
+}
+
+/// The driver's time of receipt, or this one where it gives none.
+fn arrival_ns(message: &PacketMessage) -> i64 {
+    match message.header().stamp.ns() {
+        0 => clock::now_ns(),
+        stamp_ns => stamp_ns,
+    }
+}
+
+impl Sensor for Radar {
+    const HOP: StageId = StageId::RadarReplay;
+
+    fn connection(&self) -> Option<BorrowedFd<'_>> {
+        Some(self.driver.descriptor())
+    }
+
+    fn take(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<Arrival, StageError> {
+        let input = |error: DriverError| StageError::Input(error.to_string());
+        let is_received = self.driver.receive().map_err(input)?;
+        self.driver.clear().map_err(|error| input(error.into()))?;
+        self.take_configuration(bytes.len())?;
+        if let Some((turn, rows)) = self.turn.take()
+            && self.add_turn(turn, rows, header, bytes)
+        {
+            return Ok(Arrival::Scan);
+        }
+        for taken in 0..MAX_MESSAGES {
+            match self.driver.packet() {
+                Ok(Some(packet)) => {
+                    if self.add(packet, header, bytes)? {
+                        return Ok(Arrival::Scan);
+                    }
+                }
+                Ok(None) if !is_received => {
+                    self.wait(false);
+                    return Ok(Arrival::Nothing(LOOK));
+                }
+                Ok(None) => return Ok(self.wait(taken > 0)),
+                Err(error) => self.intake.damaged(error, 0),
+            }
+        }
+        Ok(Arrival::Nothing(Duration::ZERO))
+    }
+
+    fn count(&self, counters: &mut StageCounters) {
+        self.intake.count(counters);
+        counters.reconnections = self.changes;
+    }
+}

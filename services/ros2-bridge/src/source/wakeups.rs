@@ -1,0 +1,67 @@
+//! A descriptor to wait for several topics.
+
+use std::{
+    io,
+    os::fd::{AsFd, BorrowedFd},
+    time::Duration,
+};
+
+use ros2_client::{
+    Subscription,
+    dds::rustdds::mio1::{Events, Interest, Poll, Token, event::Source},
+};
+
+/// Events that are taken at once: one for each topic.
+const CAPACITY: usize = 4;
+
+/// Becomes readable when one of its topics has a message.
+pub struct Wakeups {
+    poll: Poll,
+    events: Events,
+    topics: usize,
+}
+
+impl Wakeups {
+    /// Without a topic.
+    ///
+    /// # Errors
+    /// The system refuses a descriptor.
+    pub fn new() -> io::Result<Self> {
+        Ok(Self {
+            poll: Poll::new()?,
+            events: Events::with_capacity(CAPACITY),
+            topics: 0,
+        })
+    }
+
+    /// Adds a topic.
+    ///
+    /// # Errors
+    /// The system refuses.
+    pub fn add<M>(&mut self, topic: &mut Subscription<M>) -> io::Result<()>
+    where
+        Subscription<M>: Source,
+    {
+        let token = Token(self.topics);
+        self.topics += 1;
+        self.poll
+            .registry()
+            .register(topic, token, Interest::READABLE)
+    }
+
+    /// The descriptor.
+    pub fn descriptor(&self) -> BorrowedFd<'_> {
+        self.poll.registry().as_fd()
+    }
+
+    /// Makes it unreadable until the next message. Take all messages after this, and not before.
+    ///
+    /// # Errors
+    /// The system refuses.
+    pub fn clear(&mut self) -> io::Result<()> {
+        match self.poll.poll(&mut self.events, Some(Duration::ZERO)) {
+            Err(error) if error.kind() != io::ErrorKind::Interrupted => Err(error),
+            _ => Ok(()),
+        }
+    }
+}
