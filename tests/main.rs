@@ -6,6 +6,7 @@ mod common;
 
 mod bad_input;
 mod batch;
+mod bags;
 mod breaks;
 mod calibrate;
 mod conformance;
@@ -41,6 +42,7 @@ mod refinement;
 mod resources;
 mod restart;
 mod results;
+mod ros2;
 mod shadow;
 mod shared_memory;
 mod simulation;

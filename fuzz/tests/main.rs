@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod bags;
 mod files;
 mod keyframes;
 mod messages;

@@ -3,9 +3,11 @@
 mod batch;
 mod conformance;
 mod link;
+mod export;
 mod operate;
 mod radar_server;
 mod record;
+mod ros2;
 mod shadow;
 mod stress;
 mod watch;
@@ -21,6 +23,7 @@ use crate::configuration::Rate;
 pub use batch::{BatchArguments, BatchDriveArguments};
 pub use conformance::ConformanceArguments;
 pub use link::{LinkArguments, LinkEnd, NetworkArguments, ReceiveArguments, SendArguments};
+pub use export::{ExportArguments, ScanForm};
 
 pub use operate::{
     LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments, TopArguments,
@@ -31,6 +34,7 @@ pub use watch::WatchArguments;
 
 pub use radar_server::RadarServerArguments;
 pub use record::{RecordArguments, SplitArguments};
+pub use ros2::{Names, Ros2Arguments};
 
 /// Radar odometry as cooperating processes over shared memory.
 ///
@@ -78,6 +82,8 @@ pub enum Command {
     Echo(EchoArguments),
     /// Watch a running run in a browser, and by Prometheus. It changes neither a result nor a latency.
     Watch(WatchArguments),
+    /// Publish a running run to ROS 2, by DDS: odometry, transforms, diagnostics and the map. It changes neither a result nor a latency.
+    Ros2(Ros2Arguments),
     /// Measure whether the pipeline meets its deadline on this computer, undisturbed and under load.
     Stress(StressArguments),
     /// Load the machine or take part in a measurement (what `gyre stress` starts).
@@ -110,6 +116,8 @@ pub enum Command {
     Calibrate(CalibrateArguments),
     /// Draw what the mask keeps of scans.
     Masks(MasksArguments),
+    /// Write odometry, transforms, the map and scans as a bag of ROS 2.
+    Export(ExportArguments),
     /// Write a simulated recording, or complete one.
     Simulate(SimulateArguments),
     /// Test whether a program keeps the contract of a stage.
@@ -123,7 +131,7 @@ pub enum Command {
 pub struct RunArguments {
     /// The configuration, a TOML file. Default: what the recording's format and its scans say.
     pub configuration: Option<PathBuf>,
-    /// The dataset's folder, or a recording of a run, NAME.mcap (source.data).
+    /// The dataset's folder, a recording of a run, NAME.mcap, or a bag of ROS 2 (source.data).
     #[arg(long)]
     pub data: Option<PathBuf>,
     /// Play a recording from this topic on, without the stages before it: masked, rotation, motion or refined (source.from).
@@ -132,6 +140,9 @@ pub struct RunArguments {
     /// The radar's address, as in 192.168.0.1: run live (source.kind, source.address, run.mode).
     #[arg(long, value_name = "ADDRESS", conflicts_with = "data")]
     pub radar: Option<String>,
+    /// The topic of ROS 2 on which Navtech's driver publishes azimuths, as in /radar_data/fft_data: run live (source.kind, source.topic, run.mode).
+    #[arg(long, value_name = "TOPIC", conflicts_with_all = ["data", "radar"])]
+    pub ros2: Option<String>,
     /// The folder of the results. Default: `out/NAME`, NAME being the configuration's, or without one the dataset's.
     #[arg(long)]
     pub out: Option<PathBuf>,

@@ -165,7 +165,7 @@ impl Configuration {
 
     /// Returns whether the scans are those of a radar on the network.
     pub fn is_radar(&self) -> bool {
-        self.source.kind == SourceKind::Colossus
+        self.source.kind != SourceKind::Recording
     }
 
     /// Returns whether this run has this side of one that is split.
@@ -231,8 +231,10 @@ impl Configuration {
 
     /// Returns the recording's folder, the radar, or `a simulation`.
     pub fn data(&self) -> String {
-        if self.is_radar() {
-            return format!("the radar at {}", self.source.address);
+        match self.source.kind {
+            SourceKind::Colossus => return format!("the radar at {}", self.source.address),
+            SourceKind::Ros2 => return format!("the radar on {}", self.source.topic),
+            SourceKind::Recording => {}
         }
         if self.is_side(Side::Base) {
             return format!("the robot on the link {}", self.link.name);

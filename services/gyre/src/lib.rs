@@ -11,6 +11,7 @@ pub mod doctor;
 pub mod earlier;
 pub mod echo;
 pub mod evaluate;
+pub mod export;
 pub mod identity;
 pub mod inspect;
 pub mod judgement;
@@ -32,6 +33,7 @@ pub mod radar;
 pub mod radar_server;
 pub mod record;
 pub mod results;
+pub mod ros2;
 pub mod run;
 pub mod schema;
 pub mod shadow;
@@ -86,6 +88,10 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
             gyre_stage::run::keep_files_private();
             watch::watch(&arguments)
         }
+        Command::Ros2(arguments) => {
+            gyre_stage::run::keep_files_private();
+            ros2::publish(&arguments)
+        }
         Command::Shadow(arguments) => {
             gyre_stage::run::keep_files_private();
             shadow::shadow(&arguments)
@@ -116,6 +122,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Localise(arguments) => localise::localise(&arguments),
         Command::Calibrate(arguments) => calibrate::calibrate(&arguments),
         Command::Masks(arguments) => masks::masks(&arguments),
+        Command::Export(arguments) => export::export(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Conformance(arguments) => {
             gyre_stage::run::keep_files_private();

@@ -6,7 +6,11 @@ mod folder;
 mod keyframes;
 mod loops;
 
-use std::{collections::BTreeMap, path::Path, process::ExitCode};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
 
 use gyre_geometry::Pose;
 use gyre_mapping::{MapOptions, Origin, write_geotiff, write_pgm, write_web_tiles};
@@ -48,12 +52,8 @@ pub fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
 /// Draws a run and writes its map.
 fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
     let mut keyframes = open(&arguments.run)?;
-    let corrected = arguments.run.join(CORRECTED);
-    let trajectory = match &arguments.trajectory {
-        Some(path) => path.clone(),
-        None if corrected.is_file() => corrected,
-        None => arguments.run.join(ODOMETRY),
-    };
+    let given = arguments.trajectory.clone();
+    let trajectory = given.unwrap_or_else(|| trajectory_of(&arguments.run));
     let poses = read_trajectory(&trajectory)?;
     let loops = loops::used_loops(&arguments.run.join(LOOPS))?;
     let configuration = configuration(&arguments.run)?;
@@ -79,6 +79,27 @@ fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
     }
     export(arguments, origin, &mut drawing, &lines)?;
     Ok(drawing)
+}
+
+/// Draws the keyframes of a run along its trajectory. What does not fit into memory lies in a file in `folder`, which has no name.
+///
+/// # Errors
+/// A run without keyframes or without a trajectory.
+pub fn drawn(run: &Path, folder: &Path) -> Result<Drawing, Failure> {
+    let mut keyframes = open(run)?;
+    let poses = read_trajectory(&trajectory_of(run))?;
+    let mut drawing = Drawing::new(&options(&configuration(run)?), folder)?;
+    draw(&mut keyframes, &poses, &[], &mut drawing)?;
+    Ok(drawing)
+}
+
+/// Returns the trajectory of a run: the corrected one, if it has one.
+fn trajectory_of(run: &Path) -> PathBuf {
+    let corrected = run.join(CORRECTED);
+    match corrected.is_file() {
+        true => corrected,
+        false => run.join(ODOMETRY),
+    }
 }
 
 fn configuration(run: &Path) -> Result<Configuration, Failure> {

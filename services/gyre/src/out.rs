@@ -41,6 +41,14 @@ pub struct Out {
     _lock: File,
 }
 
+/// Returns the full name of a folder of results, which need not exist yet.
+///
+/// # Errors
+/// The system does not tell the working directory.
+pub fn absolute(out: &Path) -> io::Result<PathBuf> {
+    out.canonicalize().or_else(|_| std::path::absolute(out))
+}
+
 impl Out {
     /// Creates and locks the folder. Nothing else in it is changed.
     ///

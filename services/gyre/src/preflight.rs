@@ -7,13 +7,13 @@ use gyre_masking::{MaskKind, Masker, backend::Library, model::Card, runtime::INS
 use gyre_messages::{Footprint, Limits, StageId, Window};
 use gyre_odometry::OdometryConfig;
 use gyre_radar::{DEFAULT_TURN_NS, Dataset, Fingerprint, turn_ns};
-use gyre_radar_replay::{Listing, PlayedFrom, Player};
+use gyre_radar_replay::{Listing, PlayedFrom, Player, SourceKind};
 use gyre_simulator::SimulatedDrive;
 use gyre_stage::run::free_shared_memory;
 use rustix::process::{Resource, getrlimit};
 use thiserror::Error;
 
-use crate::{configuration::Configuration, link, localise::known, print, radar};
+use crate::{configuration::Configuration, link, localise::known, print, radar, ros2};
 
 /// Open files of the process that has most of them, masking, without observers. Measured: 105.
 pub const FILES: u64 = 120;
@@ -217,8 +217,11 @@ impl Scans {
     /// Asks the radar.
     fn of_radar(configuration: &Configuration) -> Result<Self, crate::Failure> {
         configuration.dataset.check()?;
-        let settings = radar::settings(&configuration.source, &configuration.dataset)?;
-        let radar = gyre_live_radar::ask(&settings)?;
+        let (source, options) = (&configuration.source, &configuration.dataset);
+        let radar = match source.kind {
+            SourceKind::Ros2 => ros2::ask(source, options)?,
+            _ => gyre_live_radar::ask(&radar::settings(source, options)?)?,
+        };
         Ok(Self {
             count: configuration.source.scans,
             period_ns: radar.period_ns,

@@ -93,13 +93,13 @@ pub fn results_folder(arguments: &RunArguments) -> PathBuf {
         .and_then(|data| data.canonicalize().ok());
     let name = match file {
         Some(file) => file.file_stem(),
-        None if arguments.radar.is_some() => Some("radar".as_ref()),
-        None => data
-            .as_deref()
-            .and_then(|data| match gyre_recording::is_recording(data) {
+        None if arguments.radar.is_some() || arguments.ros2.is_some() => Some("radar".as_ref()),
+        None => data.as_deref().and_then(|data| {
+            match gyre_recording::is_recording(data) || data.is_file() {
                 true => data.file_stem(),
                 false => data.file_name(),
-            }),
+            }
+        }),
     };
     let name = name.unwrap_or_default();
     arguments

@@ -18,7 +18,7 @@ use rustix::{
     thread::set_name,
 };
 
-use crate::{configuration::process_names, link, print, program, radar};
+use crate::{configuration::process_names, link, print, program, radar, ros2};
 
 /// The work of a process.
 type Work = fn(&Launch) -> Result<StageCounters, StageError>;
@@ -97,9 +97,13 @@ fn play(launch: &Launch) -> Result<StageCounters, StageError> {
         return link::run_base(launch);
     }
     let source: SourceConfig = launch.section("source")?;
-    if source.kind == SourceKind::Colossus {
-        let settings = radar::settings(&source, &launch.section("dataset")?);
-        return gyre_live_radar::run(launch, settings.map_err(|error| input(&error))?);
+    match source.kind {
+        SourceKind::Colossus => {
+            let settings = radar::settings(&source, &launch.section("dataset")?);
+            return gyre_live_radar::run(launch, settings.map_err(|error| input(&error))?);
+        }
+        SourceKind::Ros2 => return ros2::receive(launch, &source, &launch.section("dataset")?),
+        SourceKind::Recording => {}
     }
     let simulation = match launch.has_section("simulation") {
         true => Some(launch.section::<SimulationConfig>("simulation")?),

@@ -1,11 +1,11 @@
 //! `gyre watch`: shows a running run in a browser, and to Prometheus, Foxglove and OpenTelemetry.
 
-use std::{io, net::SocketAddr, path::PathBuf, process::ExitCode};
+use std::{net::SocketAddr, process::ExitCode};
 
 use gyre_stage::{observer::ObservedRun, wake::Signals};
 use gyre_watch::{Endpoint, Exporter, Server, Token};
 
-use crate::{Failure, cli::WatchArguments, earlier, print};
+use crate::{Failure, cli::WatchArguments, earlier, out, print};
 
 /// Serves the page until a signal arrives. From another machine it is read with a token alone.
 ///
@@ -26,7 +26,7 @@ pub fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
     let say = |sentence: &str| print::note(format_args!("gyre: {sentence}"));
     let traces = arguments.otlp.as_deref();
     let traces = traces.map(|url| Exporter::start(url, say)).transpose()?;
-    let out = absolute(&arguments.out)?;
+    let out = out::absolute(&arguments.out)?;
     print::note(format_args!(
         "gyre: {} is shown at {}",
         out.display(),
@@ -68,11 +68,6 @@ fn token(arguments: &WatchArguments) -> Result<Option<Token>, Failure> {
 fn lets_others_in(arguments: &WatchArguments) -> bool {
     let mut addresses = [arguments.listen].into_iter().chain(arguments.foxglove);
     addresses.any(|address| !address.ip().is_loopback())
-}
-
-/// Returns the folder's full name, which need not exist yet.
-fn absolute(out: &PathBuf) -> io::Result<PathBuf> {
-    out.canonicalize().or_else(|_| std::path::absolute(out))
 }
 
 /// Returns the address for a browser. One of all interfaces is reached by the machine's name.

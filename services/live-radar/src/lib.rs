@@ -7,6 +7,7 @@ pub mod capture;
 mod connection;
 mod delay;
 mod ills;
+mod intake;
 mod messages;
 mod radar;
 pub mod server;
@@ -21,6 +22,7 @@ use gyre_stage::{Launch, StageCounters, StageError, source};
 pub use address::{Address, BadAddress};
 pub use ask::{AskError, Sizes, ask};
 pub use gyre_colossus::PORT;
+pub use intake::{Intake, NoScans};
 
 /// How to reach a radar, and what it does not say of itself.
 #[derive(Clone, Debug, PartialEq)]

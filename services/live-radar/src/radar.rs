@@ -1,8 +1,11 @@
 //! A radar as the source of a run.
 
-use std::{os::fd::BorrowedFd, time::Duration};
+use std::{
+    os::fd::BorrowedFd,
+    time::{Duration, SystemTime},
+};
 
-use gyre_colossus::{Configuration, Damage, Event, Message};
+use gyre_colossus::{Configuration, Event, Message};
 use gyre_messages::{ScanHeader, StageId};
 use gyre_stage::{
     StageError,
@@ -10,12 +13,10 @@ use gyre_stage::{
 };
 
 use crate::{
-    Address, Settings,
+    Address, Intake, NoScans, Settings,
     connection::{Connection, Received},
     ills::Ills,
     messages::Messages,
-    sweeps::Sweeps,
-    turns::Turns,
 };
 
 /// Reads after which the process looks for signals and new readers, however much there is to read.
@@ -28,16 +29,11 @@ pub struct Radar {
     settings: Settings,
     connection: Connection,
     messages: Messages,
-    /// `None` until the radar has sent its configuration.
-    sweeps: Option<Sweeps>,
-    turns: Turns,
+    intake: Intake,
     /// What the source before has counted, if it died.
     before: Counts,
-    missing: u64,
-    damaged: u64,
     /// Descriptions of scans that do not fit into the run.
     refused: u64,
-    due_ns: Option<i64>,
     ills: Ills,
 }
 
@@ -47,14 +43,10 @@ impl Radar {
         Self {
             connection: Connection::new(&settings),
             messages: Messages::new(&settings),
+            intake: Intake::new(settings.constants),
             settings,
-            sweeps: None,
-            turns: Turns::resume(None, 0),
             before: Counts::default(),
-            missing: 0,
-            damaged: 0,
             refused: 0,
-            due_ns: None,
             ills: Ills::default(),
         }
     }
@@ -62,31 +54,15 @@ impl Radar {
     /// Begins the scans of a configuration, unless it is the one so far. One that makes no scans of this run is passed over, if it came
     /// in a datagram, which anybody can send.
     fn configure(&mut self, radar: Configuration, room: usize) -> Result<(), StageError> {
-        let is_known = |sweeps: &Sweeps| sweeps.is_of(&radar);
-        if self.sweeps.as_ref().is_some_and(is_known) {
-            return Ok(());
-        }
-        let new = match Sweeps::new(radar, &self.settings) {
-            Ok(new) => new,
-            Err(error) => {
-                self.refuse(&error.to_string());
-                return Ok(());
+        let is_tcp = matches!(self.settings.address, Address::Tcp(_));
+        match self.intake.configure(radar, room) {
+            Ok(true) => self.connection.take_sender(),
+            Ok(false) => {}
+            Err(error @ NoScans::TooLarge { .. }) if is_tcp => {
+                return Err(StageError::Input(error.to_string()));
             }
-        };
-        let bytes = new.bytes();
-        if bytes > room {
-            let reason = format!(
-                "the scans of the radar have {bytes} bytes now, {room} at the start of the run: start the run again"
-            );
-            if let Address::Tcp(_) = self.settings.address {
-                return Err(StageError::Input(reason));
-            }
-            self.refuse(&reason);
-            return Ok(());
+            Err(error) => self.refuse(&error.to_string()),
         }
-        self.connection.take_sender();
-        self.turns.configure(radar.period_ns());
-        self.sweeps = Some(new);
         Ok(())
     }
 
@@ -102,8 +78,7 @@ impl Radar {
 
     /// How to wait for more: after a pause that is shorter than the time to the end of the scan, if the radar sends at all.
     fn wait(&self, limit: Duration, has_received: bool) -> Arrival {
-        let pause = self.sweeps.as_ref().filter(|_| has_received);
-        match pause.and_then(Sweeps::pause) {
+        match self.intake.pause().filter(|_| has_received) {
             Some(pause) if pause < limit => Arrival::Later(pause),
             _ => Arrival::Nothing(limit),
         }
@@ -112,7 +87,7 @@ impl Radar {
     /// Forgets what a connection that is closed has sent: no later one goes on with it.
     fn forget(&mut self) {
         self.messages = Messages::new(&self.settings);
-        self.sweeps = None;
+        self.intake.restart();
     }
 
     /// Handles what is in the parser up to the next complete scan; true if there is one.
@@ -121,12 +96,7 @@ impl Radar {
             match event {
                 Event::Message(Message::Azimuth(azimuth)) => {
                     self.connection.has_heard();
-                    let sweeps = self.sweeps.as_mut();
-                    let scan = sweeps
-                        .and_then(|sweeps| sweeps.add(azimuth, &mut self.turns, header, bytes));
-                    if let Some(scan) = scan {
-                        self.missing += scan.missing as u64;
-                        self.due_ns = scan.due_ns;
+                    if self.intake.add(azimuth, now_ns(), header, bytes) {
                         self.connection.has_scan();
                         return Ok(true);
                     }
@@ -139,7 +109,7 @@ impl Radar {
                 Event::Damaged {
                     reason,
                     skipped_bytes,
-                } => count_damage(&mut self.damaged, &reason, skipped_bytes),
+                } => self.intake.damaged(reason, skipped_bytes),
             }
         }
         if self.messages.take_part() {
@@ -149,16 +119,10 @@ impl Radar {
     }
 }
 
-fn count_damage(so_far: &mut u64, reason: &Damage, skipped_bytes: usize) {
-    *so_far += 1;
-    // There may be thousands in a second.
-    if so_far.is_power_of_two() {
-        tracing::warn!(
-            skipped_bytes,
-            so_far,
-            "the radar's messages are damaged: {reason}"
-        );
-    }
+/// The host's clock, ns since 1970.
+fn now_ns() -> i64 {
+    let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+    now.unwrap_or(Duration::ZERO).as_nanos() as i64
 }
 
 impl Sensor for Radar {
@@ -192,25 +156,21 @@ impl Sensor for Radar {
     }
 
     fn due_ns(&self) -> Option<i64> {
-        self.due_ns
+        self.intake.due_ns()
     }
 
     fn resume(&mut self, before: Counts) {
-        self.turns = Turns::resume(before.last_scan, before.scans_left_out);
+        self.intake.resume(before);
         self.before = before;
     }
 
     fn received(&self) -> Counts {
-        let is_open = self.sweeps.as_ref().is_some_and(Sweeps::is_open);
         let (before, connection) = (&self.before, &self.connection);
         Counts {
-            missing_azimuths: before.missing_azimuths + self.missing,
-            scans_left_out: self.turns.left_out(is_open),
-            damaged_messages: before.damaged_messages + self.damaged,
             foreign_messages: before.foreign_messages + connection.foreign + self.refused,
             connections: before.connections + connection.opened,
             is_receiving: connection.is_heard(),
-            last_scan: self.turns.last(),
+            ..self.intake.received()
         }
     }
 }

@@ -1,15 +1,14 @@
 //! The scans of one connection to a radar.
 
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use gyre_colossus::{
-    Azimuth, BadConfiguration, Configuration, FoundClock, RadarClock, SweepAssembler,
+    Azimuth, BadConfiguration, Configuration, Constants, FoundClock, RadarClock, SweepAssembler,
 };
 use gyre_messages::ScanHeader;
 use gyre_stage::{clock, source::LastScan};
 
 use crate::{
-    Settings,
     delay::Delay,
     turns::{Moment, Turns},
 };
@@ -41,10 +40,10 @@ pub struct Complete {
 }
 
 impl Sweeps {
-    pub fn new(radar: Configuration, settings: &Settings) -> Result<Self, BadConfiguration> {
+    pub fn new(radar: Configuration, constants: Constants) -> Result<Self, BadConfiguration> {
         Ok(Self {
             clock: RadarClock::new(&radar),
-            assembler: SweepAssembler::new(&radar, settings.constants)?,
+            assembler: SweepAssembler::new(&radar, constants)?,
             delay: Delay::default(),
             radar,
             described: false,
@@ -62,17 +61,18 @@ impl Sweeps {
         self.assembler.is_open()
     }
 
-    /// Adds an azimuth; returns the scan that it completes.
+    /// Adds an azimuth that arrived at `arrival_ns` (since 1970); returns the scan that it completes.
     pub fn add(
         &mut self,
         azimuth: Azimuth<'_>,
+        arrival_ns: i64,
         turns: &mut Turns,
         header: &mut ScanHeader,
         bytes: &mut [u8],
     ) -> Option<Complete> {
         let at_ns = clock::now_ns();
         let mut complete = None;
-        for (azimuth, stamp_ns) in self.clock.stamp(azimuth, now_ns()) {
+        for (azimuth, stamp_ns) in self.clock.stamp(azimuth, arrival_ns) {
             let fraction = f64::from(azimuth.encoder) / f64::from(self.radar.encoder_size);
             let is_start = f64::from(azimuth.encoder) <= self.radar.step();
             let moment = Moment {
@@ -167,19 +167,12 @@ fn is_same(one: &Configuration, other: &Configuration) -> bool {
     scans(one) == scans(other)
 }
 
-/// The host's clock, ns since 1970.
-fn now_ns() -> i64 {
-    let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
-    now.unwrap_or(Duration::ZERO).as_nanos() as i64
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use gyre_colossus::{ClockFormat, Constants, Powers};
+    use gyre_colossus::{ClockFormat, Powers};
 
     use super::*;
-    use crate::Address;
 
     const START_NS: i64 = 1_700_000_000_000_000_000;
     const AZIMUTHS: u16 = 400;
@@ -193,14 +186,7 @@ mod tests {
             rotation_mhz: 4000,
             ..Configuration::default()
         };
-        let settings = Settings {
-            address: Address::Tcp(String::new()),
-            encoder_counts: 5600,
-            silence: Duration::MAX,
-            scans: None,
-            constants: Constants::default(),
-        };
-        Sweeps::new(radar, &settings).unwrap()
+        Sweeps::new(radar, Constants::default()).unwrap()
     }
 
     /// Adds the azimuths of a turn, whose clock is set by `step_ns` in its middle; returns the missing azimuths of a complete scan.
@@ -218,7 +204,7 @@ mod tests {
                 split_seconds,
                 powers: Powers::Eight(&[7; 16]),
             };
-            let scan = sweeps.add(azimuth, turns, &mut header, &mut bytes);
+            let scan = sweeps.add(azimuth, stamp_ns, turns, &mut header, &mut bytes);
             complete = scan.map(|scan| scan.missing).or(complete);
         }
         complete
@@ -258,7 +244,7 @@ mod tests {
                 split_seconds,
                 powers: Powers::Eight(&[7; 16]),
             };
-            sweeps.add(azimuth, &mut turns, &mut header, &mut bytes);
+            sweeps.add(azimuth, stamp_ns, &mut turns, &mut header, &mut bytes);
             let left = Duration::from_micros(625) * u32::from(AZIMUTHS - row);
             if let Some(pause) = sweeps.pause() {
                 assert!(2 * pause <= left && pause <= Duration::from_micros(6250));

@@ -252,8 +252,8 @@ pub fn start_log(manifest: &Manifest, name: &str) -> Result<EnteredSpan, StageEr
         .mode(0o600)
         .open(&path)
         .map_err(|source| StageError::File { path, source })?;
-/// What is logged unless `GYRE_LOG` says otherwise. The network layers of a link and of DDS report each attempt to connect, each peer.
-const FILTER: &str = "info,zenoh=error,rustdds=error,ros2_client=error";
+    let filter =
+        tracing_subscriber::EnvFilter::try_from_env("GYRE_LOG").unwrap_or_else(|_| FILTER.into());
     let log = tracing_subscriber::fmt()
         .json()
         .with_env_filter(filter)

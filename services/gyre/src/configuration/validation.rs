@@ -6,7 +6,7 @@ use gyre_configuration::{
 };
 use gyre_link::Side;
 use gyre_messages::StageId;
-use gyre_radar_replay::PlayedFrom;
+use gyre_radar_replay::{PlayedFrom, SourceKind};
 use gyre_simulator::OutputFormat;
 use gyre_stress::Limits;
 
@@ -110,28 +110,42 @@ impl Configuration {
         if !self.is_radar() {
             return Ok(());
         }
+        let kind = source.kind.name();
         if self.run.mode != Mode::Live {
-            let reason = "kind `colossus` is a radar, which does not wait: set run.mode to `live`";
+            let reason =
+                format!("kind `{kind}` is a radar, which does not wait: set run.mode to `live`");
             return Err(value("source", reason));
         }
         if self.simulation.is_some() {
-            let reason =
-                "kind is `colossus`, but there is a section [simulation]: remove one of them";
+            let reason = format!(
+                "kind is `{kind}`, but there is a section [simulation]: remove one of them"
+            );
             return Err(value("source", reason));
         }
         if source.scans.is_some_and(|scans| scans < 2) {
             let reason = "scans must be 2 or more: a motion is between two";
             return Err(value("source", reason));
         }
-        match source.address.is_empty() {
-            true => Err(value(
-                "source",
+        let (given, missing) = match source.kind {
+            SourceKind::Ros2 => (
+                &source.topic,
+                "topic is missing: give that of the driver's azimuths, as in `/radar_data/fft_data`",
+            ),
+            _ => (
+                &source.address,
                 "address is missing: give the radar's, as in `192.168.0.1`",
-            )),
-            false => crate::radar::settings(source, &self.dataset)
-                .map(drop)
-                .map_err(|error| value("source", error.to_string())),
+            ),
+        };
+        if given.is_empty() {
+            return Err(value("source", missing));
         }
+        let checked: Result<(), crate::Failure> = match source.kind {
+            SourceKind::Ros2 => crate::ros2::check(source, &self.dataset),
+            _ => crate::radar::settings(source, &self.dataset)
+                .map(drop)
+                .map_err(crate::Failure::from),
+        };
+        checked.map_err(|error| value("source", error.to_string()))
     }
 
     fn validate_record(&self) -> Result<(), ConfigurationError> {

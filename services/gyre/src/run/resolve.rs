@@ -80,6 +80,14 @@ fn overrides(arguments: &RunArguments) -> Result<Vec<String>, Failure> {
             format!("source.address={address}"),
         ]
     });
+    let ros2 = arguments.ros2.iter().flat_map(|topic| {
+        let topic = toml::Value::from(topic.clone());
+        [
+            "source.kind='ros2'".to_owned(),
+            "run.mode='live'".to_owned(),
+            format!("source.topic={topic}"),
+        ]
+    });
     let rate = arguments
         .rate
         .iter()
@@ -99,6 +107,7 @@ fn overrides(arguments: &RunArguments) -> Result<Vec<String>, Failure> {
         .chain(set)
         .chain(data)
         .chain(radar)
+        .chain(ros2)
         .chain(rate)
         .chain(from)
         .chain(record)

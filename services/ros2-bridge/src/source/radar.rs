@@ -6,12 +6,12 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_live_radar::Intake;
+use gyre_live_radar::{Intake, NoScans};
 use gyre_messages::{ScanHeader, StageId};
 use gyre_ros2_messages::navtech_msgs::RadarBScanMsg;
 use gyre_stage::{
-    StageCounters, StageError,
-    source::{Arrival, Sensor},
+    StageError,
+    source::{Arrival, Received, Sensor},
 };
 use ros2_client::Gid;
 
@@ -45,6 +45,8 @@ pub struct Radar {
     /// Who publishes the azimuths, and how often that has changed.
     publisher: Option<Gid>,
     changes: u64,
+    /// What the source before has counted, if it died.
+    before: Received,
     heard: Instant,
     is_silent: bool,
 }
@@ -66,6 +68,7 @@ impl Radar {
             turn: None,
             publisher: None,
             changes: 0,
+            before: Received::default(),
             heard: now,
             is_silent: false,
         })
@@ -84,7 +87,14 @@ impl Radar {
 
     fn configure(&mut self, described: Described, room: usize) -> Result<(), StageError> {
         self.described = Some(described);
-        self.intake.configure(described.radar, room)
+        match self.intake.configure(described.radar, room) {
+            Err(error @ NoScans::TooLarge { .. }) => Err(StageError::Input(error.to_string())),
+            Err(error @ NoScans::Bad(_)) => {
+                self.intake.damaged(error, 0);
+                Ok(())
+            }
+            Ok(_) => Ok(()),
+        }
     }
 
     /// Adds what a publisher has sent; true if a scan is complete.
@@ -161,7 +171,7 @@ impl Radar {
                 self.changes += u64::from(before.is_some());
                 self.intake.restart();
                 if let Some(described) = self.described {
-                    self.intake.configure(described.radar, room)?;
+                    self.configure(described, room)?;
                 }
             }
         }
@@ -267,8 +277,20 @@ impl Sensor for Radar {
         Ok(Arrival::Nothing(Duration::ZERO))
     }
 
-    fn count(&self, counters: &mut StageCounters) {
-        self.intake.count(counters);
-        counters.reconnections = self.changes;
+    fn due_ns(&self) -> Option<i64> {
+        self.intake.due_ns()
+    }
+
+    fn resume(&mut self, before: Received) {
+        self.intake.resume(before);
+        self.before = before;
+    }
+
+    fn received(&self) -> Received {
+        Received {
+            connections: self.before.connections + u64::from(self.publisher.is_some()) + self.changes,
+            is_receiving: self.publisher.is_some() && !self.is_silent,
+            ..self.intake.received()
+        }
     }
 }

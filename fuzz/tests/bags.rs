@@ -1,0 +1,232 @@
+//! Bags of ROS 2: the file, and the messages in it.
+
+use std::{collections::BTreeMap, fs, path::Path};
+
+use bolero::{TypeGenerator, check};
+use gyre_colossus::Configuration;
+use gyre_fuzz::{
+    Failure, Target,
+    edit::{ByteEdit, edit_bytes},
+};
+use gyre_radar::{
+    Dataset, DatasetOptions, OwnedScan, ScanLimits, Sense, SweepGeometry, scan::flag,
+};
+use gyre_ros2_messages::{Ros2Message, encode, radar::ScanMessages};
+use mcap::{WriteOptions, Writer, records::MessageHeader};
+
+use crate::recordings::folder;
+
+const AZIMUTHS: usize = 16;
+const BINS: usize = 24;
+const TURNS: usize = 3;
+const START_NS: i64 = 1_547_131_046_000_000_000;
+
+/// A message of a bag.
+struct Message {
+    topic: &'static str,
+    type_name: String,
+    text: String,
+    log_ns: i64,
+    data: Vec<u8>,
+}
+
+impl Message {
+    fn of<T: Ros2Message>(topic: &'static str, log_ns: i64, message: &T) -> Self {
+        Self {
+            topic,
+            type_name: T::DEFINITION.type_name(),
+            text: T::DEFINITION.text(),
+            log_ns,
+            data: encode(message).unwrap(),
+        }
+    }
+}
+
+fn radar() -> Configuration {
+    Configuration {
+        azimuth_samples: AZIMUTHS as u16,
+        range_in_bins: BINS as u16,
+        encoder_size: 5600,
+        rotation_mhz: 4000,
+        range_resolution_m: Some(0.0438),
+        ..Configuration::default()
+    }
+}
+
+fn scan(turn: usize) -> OwnedScan {
+    let mut scan = OwnedScan::with_limits(ScanLimits {
+        bytes: AZIMUTHS * BINS,
+        azimuths: AZIMUTHS,
+    });
+    for row in 0..AZIMUTHS {
+        let encoder = (350 * row + 13) as f64;
+        scan.azimuth_rad[row] = (encoder * std::f64::consts::TAU / 5600.0) as f32;
+        scan.stamp_ns[row] = START_NS + (250_000_000 * turn + 15_625_000 * row) as i64;
+        scan.flags[row] = flag::MEASURED;
+    }
+    scan.bytes
+        .iter_mut()
+        .zip(0..)
+        .for_each(|(byte, k)| *byte = k);
+    scan.geometry = SweepGeometry {
+        azimuths: AZIMUTHS,
+        bins: BINS,
+        stride: BINS,
+        first_byte: 0,
+        range_resolution_m: 0.0438,
+        range_offset_m: 0.0,
+        doppler_s: 0.0,
+        sense: Sense::Clockwise,
+        stamp_ns: scan.stamp_ns[AZIMUTHS / 2],
+    };
+    scan
+}
+
+/// The messages of a bag, turn by turn or azimuth by azimuth.
+fn messages(by_azimuth: bool) -> Vec<Message> {
+    let mut writer = ScanMessages::new(radar(), "radar");
+    let described = writer.configuration(START_NS);
+    let mut messages = vec![Message::of("/configuration", START_NS, &described)];
+    for turn in 0..TURNS {
+        let scan = scan(turn);
+        let end_ns = scan.stamp_ns[AZIMUTHS - 1];
+        match by_azimuth {
+            true => messages.extend(
+                writer
+                    .azimuths(scan.view())
+                    .map(|azimuth| Message::of("/fft_data", azimuth.header.stamp.ns(), &azimuth)),
+            ),
+            false => messages.push(Message::of(
+                "/b_scan_msg",
+                end_ns,
+                &writer.b_scan(scan.view()),
+            )),
+        }
+    }
+    messages
+}
+
+/// Writes a bag without compression and checksums, so that edits of the file reach what is in it.
+fn write(path: &Path, messages: &[Message], chunks: bool) {
+    let options = WriteOptions::new()
+        .profile("ros2")
+        .compression(None)
+        .use_chunks(chunks)
+        .chunk_size(Some(2000))
+        .calculate_chunk_crcs(false);
+    let mut mcap: Writer<fs::File> = options.create(fs::File::create(path).unwrap()).unwrap();
+    for (sequence, message) in messages.iter().enumerate() {
+        let text = message.text.as_bytes();
+        let schema = mcap
+            .add_schema(&message.type_name, "ros2msg", text)
+            .unwrap();
+        let channel = mcap.add_channel(schema, message.topic, "cdr", &BTreeMap::new());
+        let header = MessageHeader {
+            channel_id: channel.unwrap(),
+            sequence: sequence as u32,
+            log_time: message.log_ns as u64,
+            publish_time: message.log_ns as u64,
+        };
+        mcap.write_to_known_channel(&header, &message.data).unwrap();
+    }
+    mcap.finish().unwrap();
+}
+
+/// Opens a bag and reads all its scans, from the last to the first. What it accepts must be consistent.
+fn use_bag(path: &Path) -> Result<(), Failure> {
+    let mut dataset = gyre_bags::open(path, &DatasetOptions::default())?;
+    let mut refused = None;
+    let mut scan = OwnedScan::with_limits(dataset.limits());
+    for index in (0..dataset.len()).rev() {
+        match dataset.read(index, scan.slot()) {
+            Ok(geometry) => {
+                scan.geometry = geometry;
+                assert!(
+                    scan.view()
+                        .azimuth_rad
+                        .iter()
+                        .all(|azimuth| azimuth.is_finite())
+                );
+                assert_eq!(Some(geometry.stamp_ns), dataset.nominal_stamp_ns(index));
+            }
+            Err(error) => refused = Some(error),
+        }
+        assert_eq!(dataset.file(index), path);
+    }
+    match refused {
+        Some(error) => Err(error.into()),
+        None => Ok(()),
+    }
+}
+
+#[derive(Clone, Debug, TypeGenerator)]
+enum BagEdit {
+    /// The bytes of the file.
+    File(Vec<ByteEdit>),
+    /// The bytes of a message.
+    Message(u8, Vec<ByteEdit>),
+    /// The file ends early.
+    Cut(u16),
+    /// A message is missing.
+    Lost(u8),
+    /// The times of receipt from a message on, shifted.
+    TimeFrom(u8, i64),
+}
+
+#[test]
+fn bags() {
+    // The largest scan that a radar may claim, twice.
+    let target = Target::new("bags", 320);
+    check!()
+        .with_type::<(bool, bool, Vec<BagEdit>)>()
+        .for_each(|(by_azimuth, chunks, edits)| {
+            let (folder, mut messages) = (folder(), messages(*by_azimuth));
+            let path = folder.path().join("bag.mcap");
+            for edit in edits {
+                edit_messages(&mut messages, edit);
+            }
+            write(&path, &messages, *chunks);
+            let mut file = fs::read(&path).unwrap();
+            for edit in edits {
+                match edit {
+                    BagEdit::File(edits) => edit_bytes(&mut file, edits),
+                    BagEdit::Cut(at) => file.truncate(usize::from(*at)),
+                    _ => {}
+                }
+            }
+            fs::write(&path, file).unwrap();
+            target.run(|| use_bag(&path));
+        });
+}
+
+fn edit_messages(messages: &mut Vec<Message>, edit: &BagEdit) {
+    let count = messages.len();
+    if count == 0 {
+        return;
+    }
+    match edit {
+        BagEdit::Message(index, edits) => {
+            edit_bytes(&mut messages[usize::from(*index) % count].data, edits);
+        }
+        BagEdit::Lost(index) => {
+            messages.remove(usize::from(*index) % count);
+        }
+        BagEdit::TimeFrom(index, by) => {
+            let later = messages[usize::from(*index) % count..].iter_mut();
+            later.for_each(|message| message.log_ns = message.log_ns.wrapping_add(*by));
+        }
+        BagEdit::File(_) | BagEdit::Cut(_) => {}
+    }
+}
+
+#[test]
+fn a_bag_without_edits_is_accepted() {
+    for (by_azimuth, chunks) in [(true, true), (true, false), (false, true), (false, false)] {
+        let folder = folder();
+        let path = folder.path().join("bag.mcap");
+        write(&path, &messages(by_azimuth), chunks);
+        use_bag(&path).unwrap();
+        let dataset: Box<dyn Dataset> = gyre_bags::open(&path, &DatasetOptions::default()).unwrap();
+        assert_eq!(dataset.len(), TURNS);
+    }
+}

@@ -1,0 +1,41 @@
+//! The poses of a run.
+
+use gyre_geometry::{Pose, UncertainMotion};
+use gyre_messages::{PoseHeader, flag};
+use gyre_ros2_messages::frames::Interval;
+
+/// A pose of the radar with what led to it.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// Time of the scan, ns since 1970.
+    pub stamp_ns: i64,
+    /// The pose in the frame of the first scan.
+    pub pose: UncertainMotion,
+    /// The motion from the previous scan; `None` where the chain of motions begins.
+    pub since: Option<Interval>,
+    /// The pose of the odometry frame in the map frame, with SLAM.
+    pub map_from_odometry: Option<Pose>,
+}
+
+impl Place {
+    /// Returns the place of a pose of a run; `None` for the end of the stream.
+    pub fn of(pose: &PoseHeader) -> Option<Self> {
+        if pose.item.is(flag::END) {
+            return None;
+        }
+        let motion = pose.motion.motion();
+        let since = Interval {
+            motion: UncertainMotion {
+                motion: motion.motion,
+                covariance: motion.covariance,
+            },
+            duration_ns: pose.motion.interval_ns,
+        };
+        Some(Self {
+            stamp_ns: pose.item.stamp_ns,
+            pose: pose.pose(),
+            since: (!pose.item.is(flag::BREAK)).then_some(since),
+            map_from_odometry: None,
+        })
+    }
+}

@@ -1,0 +1,48 @@
+//! A build without ROS 2.
+
+use std::process::ExitCode;
+
+use gyre_live_radar::Sizes;
+use gyre_radar::DatasetOptions;
+use gyre_radar_replay::SourceConfig;
+use gyre_stage::{Launch, StageCounters, StageError};
+
+use crate::{Failure, cli::Ros2Arguments};
+
+const ABSENT: &str = "this gyre was built without ROS 2: build it with the feature `ros2`, which is among the default ones";
+
+/// Says that there is no ROS 2.
+///
+/// # Errors
+/// Always.
+pub fn publish(_: &Ros2Arguments) -> Result<ExitCode, Failure> {
+    Err(ABSENT.into())
+}
+
+/// Says that there is no ROS 2.
+///
+/// # Errors
+/// Always.
+pub fn check(_: &SourceConfig, _: &DatasetOptions) -> Result<(), Failure> {
+    Err(ABSENT.into())
+}
+
+/// Says that there is no ROS 2.
+///
+/// # Errors
+/// Always.
+pub fn ask(_: &SourceConfig, _: &DatasetOptions) -> Result<Sizes, Failure> {
+    Err(ABSENT.into())
+}
+
+/// Says that there is no ROS 2.
+///
+/// # Errors
+/// Always.
+pub fn receive(
+    _: &Launch,
+    _: &SourceConfig,
+    _: &DatasetOptions,
+) -> Result<StageCounters, StageError> {
+    Err(StageError::Configuration(ABSENT.to_owned()))
+}

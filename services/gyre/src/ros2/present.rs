@@ -1,0 +1,117 @@
+//! A build with ROS 2.
+
+use std::{path::Path, process::ExitCode};
+
+use gyre_live_radar::Sizes;
+use gyre_radar::DatasetOptions;
+use gyre_radar_replay::SourceConfig;
+use gyre_ros2_bridge::{
+    Bridge, Domain, DomainError, Frames, MapSettings, Settings,
+    source::{self, AskError},
+};
+use gyre_stage::{Launch, StageCounters, StageError, observer::ObservedRun, wake::Signals};
+
+use crate::{
+    Failure,
+    cli::{Names, Ros2Arguments},
+    configuration::Configuration,
+    map, out, print, radar,
+};
+
+/// Publishes the runs of a folder until a signal arrives.
+///
+/// # Errors
+/// There is no such run, or the domain cannot be joined.
+pub fn publish(arguments: &Ros2Arguments) -> Result<ExitCode, Failure> {
+    // One who names the wrong folder is told at once.
+    if !arguments.wait {
+        ObservedRun::writing_to(&arguments.out)?;
+    }
+    let domain = Domain::new(arguments.domain, arguments.interface.as_deref())?;
+    let Names([map, odom, base, radar]) = arguments.frames.clone();
+    let bridge = Bridge::open(Settings {
+        out: out::absolute(&arguments.out)?,
+        domain,
+        namespace: arguments.namespace.clone(),
+        frames: Frames {
+            map,
+            odom,
+            base,
+            radar,
+        },
+        mounting: arguments.mounting.parse()?,
+        map: (!arguments.no_map).then_some(map_settings),
+    })?;
+    let out = arguments.out.display();
+    print::note(format_args!(
+        "gyre: {out} is published in domain {} of ROS 2",
+        domain.id()
+    ));
+    if domain.is_open() {
+        print::note(
+            "gyre: whoever is on this network can read it, and DDS carries it unencrypted; --interface 127.0.0.1 keeps it on this computer",
+        );
+    }
+    let signals = Signals::install()?;
+    bridge.publish(&signals, |sentence| {
+        print::note(format_args!("gyre: {sentence}"));
+    })?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Returns how the map of the run that writes to `out` is drawn.
+fn map_settings(out: &Path) -> Result<MapSettings, String> {
+    let configuration = Configuration::read(&out.join("config.toml"), &[]);
+    let configuration = configuration.map_err(|error| error.to_string())?;
+    let estimator = configuration.slam.kind.estimator();
+    Ok(MapSettings {
+        options: map::options(&configuration),
+        estimator: estimator.ok_or("slam.kind is none")?,
+    })
+}
+
+/// Checks a source.
+///
+/// # Errors
+/// No such domain or interface.
+pub fn check(source: &SourceConfig, options: &DatasetOptions) -> Result<(), Failure> {
+    Ok(settings(source, options).map(drop)?)
+}
+
+/// Asks the driver of a source for the sizes of its radar's scans.
+///
+/// # Errors
+/// No driver, or a radar that cannot be used.
+pub fn ask(source: &SourceConfig, options: &DatasetOptions) -> Result<Sizes, Failure> {
+    let settings = settings(source, options)?;
+    source::ask(&settings).map_err(|error: AskError| error.into())
+}
+
+/// Receives the scans of a source.
+///
+/// # Errors
+/// The domain cannot be joined, or input that cannot be used.
+pub fn receive(
+    launch: &Launch,
+    source: &SourceConfig,
+    options: &DatasetOptions,
+) -> Result<StageCounters, StageError> {
+    let settings = settings(source, options);
+    let settings = settings.map_err(|error| StageError::Input(error.to_string()))?;
+    source::run(launch, settings)
+}
+
+fn settings(
+    source: &SourceConfig,
+    options: &DatasetOptions,
+) -> Result<source::Settings, DomainError> {
+    let interface = Some(source.interface.as_str()).filter(|address| !address.is_empty());
+    Ok(source::Settings {
+        domain: Domain::new(source.domain, interface)?,
+        topic: source.topic.clone(),
+        encoder_counts: radar::encoder_counts(options),
+        silence: radar::silence(source),
+        scans: source.scans.map(|scans| scans as u64),
+        constants: options.into(),
+    })
+}

@@ -1,0 +1,126 @@
+"""Compares the bag of a run with its odometry.csv and trajectory, field by field, by a reader that is not Gyre's own.
+
+usage: check.py BAG OUT
+"""
+
+import csv
+import json
+import math
+import sys
+
+import numpy
+from rosbags.highlevel import AnyReader
+from pathlib import Path
+
+UNKNOWN = 1e6
+PLANAR = [0, 1, 5]
+
+
+def stamp_ns(header):
+    return header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
+
+
+def yaw(quaternion):
+    assert quaternion.x == 0 and quaternion.y == 0, quaternion
+    return 2 * math.atan2(quaternion.z, quaternion.w)
+
+
+def expanded(planar):
+    """The covariance of x, y, z, roll, pitch, yaw from that of x, y, yaw."""
+    covariance = numpy.diag([UNKNOWN] * 6)
+    covariance[numpy.ix_(PLANAR, PLANAR)] = planar
+    return covariance
+
+
+def close(found, expected, tolerance, what):
+    found, expected = numpy.asarray(found), numpy.asarray(expected)
+    scale = numpy.maximum(1.0, numpy.abs(expected))
+    assert numpy.all(numpy.abs(found - expected) <= tolerance * scale), f"{what}: {found} is not {expected}"
+
+
+def packed(row):
+    names = ["xx", "xy", "xyaw", "yy", "yyaw", "yawyaw"]
+    xx, xy, xyaw, yy, yyaw, yawyaw = (float(row[f"cov_{name}"]) for name in names)
+    return numpy.array([[xx, xy, xyaw], [xy, yy, yyaw], [xyaw, yyaw, yawyaw]])
+
+
+def check_twist(message, row):
+    """The velocity of constant motion, in the frame of the vehicle at the later scan."""
+    x, y, turn, seconds = (float(row["x_m"]), float(row["y_m"]), float(row["yaw_rad"]), int(row["interval_ns"]) * 1e-9)
+    half = turn / 2
+    stretch = half / math.sin(half) if abs(half) > 1e-6 else 1.0
+    forward = stretch * (math.cos(half) * x + math.sin(half) * y)
+    left = stretch * (-math.sin(half) * x + math.cos(half) * y)
+    twist = message.twist.twist
+    close([twist.linear.x, twist.linear.y, twist.angular.z], [forward / seconds, left / seconds, turn / seconds], 1e-6, "twist")
+    close([twist.linear.z, twist.angular.x, twist.angular.y], [0, 0, 0], 0, "twist out of the plane")
+    back = numpy.array([[math.cos(turn), math.sin(turn), 0], [-math.sin(turn), math.cos(turn), 0], [0, 0, 1]])
+    expected = expanded(back @ packed(row) @ back.T / seconds**2)
+    close(message.twist.covariance.reshape(6, 6), expected, 1e-6, "twist covariance")
+
+
+def compose(pose, row):
+    x, y, turn = pose
+    dx, dy = float(row["x_m"]), float(row["y_m"])
+    return (
+        x + math.cos(turn) * dx - math.sin(turn) * dy,
+        y + math.sin(turn) * dx + math.cos(turn) * dy,
+        turn + float(row["yaw_rad"]),
+    )
+
+
+def main():
+    bag, out = Path(sys.argv[1]), Path(sys.argv[2])
+    rows = list(csv.DictReader((out / "odometry.csv").open()))
+    with AnyReader([bag]) as reader:
+        by_topic = {}
+        for connection, logged, data in reader.messages():
+            message = reader.deserialize(data, connection.msgtype)
+            by_topic.setdefault((connection.topic, connection.msgtype), []).append((logged, message))
+        qualities = {c.topic: c.ext.offered_qos_profiles[0].durability.name for c in reader.connections}
+    odometry = [message for _, message in by_topic["/odom", "nav_msgs/msg/Odometry"]]
+    assert len(odometry) == len(rows) + 1, f"{len(odometry)} poses of {len(rows)} motions"
+    first = odometry[0]
+    close(first.pose.covariance.reshape(6, 6), expanded(numpy.zeros((3, 3))), 0, "first covariance")
+    close(first.twist.covariance.reshape(6, 6), numpy.diag([UNKNOWN] * 6), 0, "first twist covariance")
+    pose, last_yaw_variance = (0.0, 0.0, 0.0), 0.0
+    transforms = [message for _, message in by_topic["/tf", "tf2_msgs/msg/TFMessage"]]
+    for message, transform, row in zip(odometry[1:], transforms[1:], rows):
+        assert stamp_ns(message.header) == int(row["stamp_ns"])
+        assert (message.header.frame_id, message.child_frame_id) == ("odom", "base_link")
+        pose = compose(pose, row)
+        found = message.pose.pose
+        close([found.position.x, found.position.y, found.position.z], [pose[0], pose[1], 0], 1e-6, "position")
+        apart = (yaw(found.orientation) - pose[2] + math.pi) % (2 * math.pi) - math.pi
+        close(apart, 0, 1e-6, "yaw")
+        covariance = message.pose.covariance.reshape(6, 6)
+        assert numpy.array_equal(covariance, covariance.T)
+        assert list(covariance[[2, 3, 4], [2, 3, 4]]) == [UNKNOWN] * 3
+        assert covariance[5, 5] >= last_yaw_variance, "a pose is surer of its yaw than the one before"
+        last_yaw_variance = covariance[5, 5]
+        check_twist(message, row)
+        moved = {(t.header.frame_id, t.child_frame_id): t.transform for t in transform.transforms}
+        moved = moved["odom", "base_link"]
+        close([moved.translation.x, moved.translation.y], [found.position.x, found.position.y], 0, "transform")
+        assert moved.rotation == found.orientation
+    (_, fixed), = by_topic["/tf_static", "tf2_msgs/msg/TFMessage"]
+    (fixed,) = fixed.transforms
+    assert (fixed.header.frame_id, fixed.child_frame_id) == ("base_link", "radar")
+    assert qualities["/tf_static"] == "TRANSIENT_LOCAL" and qualities["/odom"] == "VOLATILE", qualities
+    figures = {"odometry": len(odometry), "topics": sorted(topic for topic, _ in by_topic)}
+    for (topic, _), messages in by_topic.items():
+        if topic.endswith("b_scan_msg"):
+            for _, message in messages:
+                image = message.b_scan_img
+                assert image.data.size == image.height * image.step and image.encoding == "8UC1"
+                assert len(message.encoder_values) == len(message.timestamps) == image.height
+                assert list(message.encoder_values) == sorted(message.encoder_values)
+            figures["b_scans"] = len(messages)
+        if topic == "/map":
+            (_, grid), = messages
+            assert grid.data.size == grid.info.width * grid.info.height and set(numpy.unique(grid.data)) <= {-1, 0, 100}
+            assert (grid.data == 100).any() and grid.header.frame_id == "map"
+    print(json.dumps(figures))
+
+
+main()

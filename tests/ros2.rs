@@ -1,0 +1,506 @@
+//! ROS 2 without ROS 2: what a peer that is not Gyre's own (Cyclone DDS) receives of a run, and a run that receives a radar from it. All on
+//! the loopback, each test in a domain of its own.
+
+use std::{
+    collections::BTreeMap,
+    io::{BufRead, BufReader, Lines},
+    path::Path,
+    process::{self, Child, ChildStdout, Command, Stdio},
+};
+
+use gyre_geometry::{ComposedMotion, OdometryMotion, UncertainMotion, covariance, pose};
+use nalgebra::{Matrix3, Rotation2};
+use rustix::process::{Pid, Signal, kill_process};
+use serde_json::Value;
+
+use crate::common::{Run, gyre, odometry, python, real_data, recording};
+
+/// Variance of what is not measured.
+const UNKNOWN: f64 = 1e6;
+/// Where x, y and yaw are among the values of ROS.
+const PLANAR: [usize; 3] = [0, 1, 5];
+
+/// Returns whether the peer can be started; prints why a test is skipped.
+fn can_speak() -> bool {
+    let import = Command::new(python()).args(["-c", "import cyclonedds"]);
+    let can = { import }
+        .output()
+        .is_ok_and(|output| output.status.success());
+    if !can {
+        println!(
+            "skipped: {} has no package cyclonedds, or GYRE_PYTHON names another",
+            python()
+        );
+    }
+    can
+}
+
+/// A domain that only this test of this process uses. Those above 101 share their ports with other programs.
+fn domain(test: u32) -> String {
+    (1 + (process::id() % 20) * 5 + test).to_string()
+}
+
+/// A program that says lines. Dropped, it is killed.
+struct Program {
+    child: Child,
+    said: Lines<BufReader<ChildStdout>>,
+}
+
+impl Program {
+    /// Starts it, and waits until it has said its first line.
+    fn start(command: &mut Command) -> Self {
+        let command = command.stdin(Stdio::piped()).stdout(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        let mut said = BufReader::new(child.stdout.take().unwrap()).lines();
+        let first = said.next().expect("it has ended");
+        first.unwrap();
+        Self { child, said }
+    }
+
+    /// A peer in Python.
+    fn peer(script: &str, arguments: &[&str]) -> Self {
+        let scripts = Path::new(crate::PROJECT).join("tests/ros2");
+        Self::start(
+            Command::new(python())
+                .arg(scripts.join(script))
+                .args(arguments),
+        )
+    }
+
+    /// A bridge that waits for the run. What it says to the person at the terminal is taken for its lines.
+    fn bridge(run: &Run, domain: &str, options: &[&str]) -> Self {
+        let mut command = Command::new("sh");
+        command.args(["-c", "exec \"$@\" 2>&1", "sh"]);
+        command.arg(gyre().get_program()).arg("ros2").arg(run.out());
+        command.args(["--wait", "--domain", domain, "--interface", "127.0.0.1"]);
+        Self::start(command.args(options))
+    }
+
+    /// Closes its input, and returns what it says up to its end.
+    fn rest(mut self) -> Vec<String> {
+        drop(self.child.stdin.take());
+        let said = self.said.by_ref().map(Result::unwrap).collect();
+        assert!(self.child.wait().unwrap().success());
+        said
+    }
+
+    /// Ends it as Ctrl-C does, and returns what it has said.
+    fn interrupt(self) -> Vec<String> {
+        let pid = Pid::from_child(&self.child);
+        kill_process(pid, Signal::INT).unwrap();
+        self.rest()
+    }
+}
+
+impl Drop for Program {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// The messages that a peer has received, by topic.
+fn received(peer: Program) -> BTreeMap<String, Vec<Value>> {
+    let mut topics: BTreeMap<String, Vec<Value>> = BTreeMap::new();
+    for line in peer.rest() {
+        let mut line: Value = serde_json::from_str(&line).unwrap();
+        let topic = line["topic"].as_str().unwrap().to_owned();
+        topics
+            .entry(topic)
+            .or_default()
+            .push(line["message"].take());
+    }
+    topics
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap()
+}
+
+fn stamp_ns(header: &Value) -> i64 {
+    let part = |name: &str| header["stamp"][name].as_i64().unwrap();
+    part("sec") * 1_000_000_000 + part("nanosec")
+}
+
+/// A pose and its covariance as they are expected.
+struct Expected {
+    stamp_ns: i64,
+    pose: UncertainMotion,
+    /// The velocity with its covariance; `None` at the first scan.
+    twist: Option<([f64; 3], Matrix3<f64>)>,
+}
+
+/// What `odometry.csv` says of each pose: the motions composed with their covariances, after the first scan's pose.
+fn expected(run: &Run) -> Vec<Expected> {
+    let names = [
+        "stamp_ns",
+        "interval_ns",
+        "x_m",
+        "y_m",
+        "yaw_rad",
+        "cov_xx",
+        "cov_xy",
+        "cov_xyaw",
+        "cov_yy",
+        "cov_yyaw",
+        "cov_yawyaw",
+        "drift_share",
+        "scale_sigma",
+    ];
+    let rows = odometry::columns(&run.odometry(), &names);
+    let mut composed = ComposedMotion::new();
+    let mut poses = Vec::new();
+    for row in rows {
+        let [stamp_ns, interval_ns] =
+            [0, 1].map(|column: usize| row[column].parse::<i64>().unwrap());
+        let at = |column: usize| row[column].parse::<f64>().unwrap();
+        if poses.is_empty() {
+            poses.push(Expected {
+                stamp_ns: stamp_ns - interval_ns,
+                pose: UncertainMotion::identity(),
+                twist: None,
+            });
+        }
+        let motion = OdometryMotion {
+            motion: pose(at(2), at(3), at(4)),
+            covariance: covariance::unpack(&[5, 6, 7, 8, 9, 10].map(at)),
+            drift_share: at(11),
+            scale_sigma: at(12),
+        };
+        composed = composed.then(&motion);
+        poses.push(Expected {
+            stamp_ns,
+            pose: composed.motion(),
+            twist: Some(velocity(&motion, interval_ns as f64 * 1e-9)),
+        });
+    }
+    poses
+}
+
+/// The constant velocity in the frame of the vehicle, and its covariance.
+fn velocity(motion: &OdometryMotion, interval_s: f64) -> ([f64; 3], Matrix3<f64>) {
+    let twist = gyre_geometry::Twist::from_motion(&motion.motion, interval_s);
+    let turn = Rotation2::new(-motion.motion.rotation.angle()).to_homogeneous();
+    let covariance = turn * motion.covariance * turn.transpose() / interval_s.powi(2);
+    (
+        [twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps],
+        covariance,
+    )
+}
+
+/// Asserts that 36 numbers are a covariance of (x, y, yaw) in the order of ROS.
+fn assert_covariance(found: &Value, planar: Option<&Matrix3<f64>>, what: &str) {
+    for row in 0..6 {
+        for column in 0..6 {
+            let found = number(&found[6 * row + column]);
+            let place = |value: usize| PLANAR.iter().position(|planar| *planar == value);
+            let expected = match (planar, place(row), place(column)) {
+                (Some(planar), Some(row), Some(column)) => planar[(row, column)],
+                _ if row == column => UNKNOWN,
+                _ => 0.0,
+            };
+            let limit = 1e-9 + 1e-5 * expected.abs();
+            assert!(
+                (found - expected).abs() <= limit,
+                "{what} ({row}, {column}): {found}, expected {expected}"
+            );
+        }
+    }
+}
+
+/// Asserts that odometry is what the results of the run say, field by field.
+fn assert_odometry(found: &[Value], run: &Run) {
+    let poses = expected(run);
+    assert_eq!(found.len(), poses.len());
+    for (found, expected) in found.iter().zip(&poses) {
+        assert_eq!(stamp_ns(&found["header"]), expected.stamp_ns);
+        assert_eq!(
+            (&found["header"]["frame_id"], &found["child_frame_id"]),
+            (&"odom".into(), &"base_link".into())
+        );
+        let place = &found["pose"]["pose"];
+        let [x_m, y_m, yaw_rad] = gyre_geometry::xy_yaw(&expected.pose.motion);
+        let turn = &place["orientation"];
+        let found_yaw = 2.0 * number(&turn["z"]).atan2(number(&turn["w"]));
+        for (found, expected) in [
+            (number(&place["position"]["x"]), x_m),
+            (number(&place["position"]["y"]), y_m),
+            (gyre_geometry::wrap_angle(found_yaw - yaw_rad), 0.0),
+            (number(&place["position"]["z"]), 0.0),
+            (number(&turn["x"]), 0.0),
+            (number(&turn["y"]), 0.0),
+        ] {
+            // Rounding of the file, composed.
+            assert!(
+                (found - expected).abs() < 1e-5,
+                "{}: {found} {expected}",
+                poses.len()
+            );
+        }
+        assert_covariance(
+            &found["pose"]["covariance"],
+            Some(&expected.pose.covariance),
+            "pose",
+        );
+        let twist = &found["twist"]["twist"];
+        let (velocity, planar) = expected
+            .twist
+            .map_or(([0.0; 3], None), |(it, planar)| (it, Some(planar)));
+        let found_velocity = [
+            &twist["linear"]["x"],
+            &twist["linear"]["y"],
+            &twist["angular"]["z"],
+        ]
+        .map(number);
+        for (found, expected) in found_velocity.iter().zip(velocity) {
+            assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+        }
+        assert_covariance(&found["twist"]["covariance"], planar.as_ref(), "twist");
+    }
+}
+
+/// The transforms of a topic as the frames that they are between, with each pose.
+fn transforms(messages: &[Value]) -> Vec<(i64, String, [f64; 4])> {
+    let all = messages
+        .iter()
+        .flat_map(|message| message["transforms"].as_array().unwrap());
+    all.map(|it| {
+        let frames = format!(
+            "{} -> {}",
+            it["header"]["frame_id"].as_str().unwrap(),
+            it["child_frame_id"].as_str().unwrap()
+        );
+        let (place, turn) = (
+            &it["transform"]["translation"],
+            &it["transform"]["rotation"],
+        );
+        let values = [&place["x"], &place["y"], &turn["z"], &turn["w"]].map(number);
+        (stamp_ns(&it["header"]), frames, values)
+    })
+    .collect()
+}
+
+#[test]
+fn a_node_of_ros_receives_each_pose_with_its_stamp_frames_and_covariance() {
+    if !can_speak() {
+        return;
+    }
+    // The queue holds four seconds, should the bridge be late.
+    let run = Run::of_recording().rate("1");
+    let domain = domain(0);
+    let bridge = Program::bridge(&run, &domain, &["--mounting", "0,0,0"]);
+    let peer = Program::peer("observer.py", &[&domain, "/"]);
+    let undisturbed = run.complete();
+    let topics = received(peer);
+    let said = bridge.interrupt();
+    assert!(
+        said.iter()
+            .any(|line| line.contains("0 poses missed; 0 messages not sent")),
+        "{said:?}"
+    );
+
+    assert_odometry(&topics["/odom"], &run);
+    assert_eq!(
+        Run::of_recording().complete(),
+        undisturbed,
+        "an observer changed the result"
+    );
+    let of_poses = transforms(&topics["/tf"]);
+    assert_eq!(of_poses.len(), topics["/odom"].len());
+    for ((stamp, frames, values), odometry) in of_poses.iter().zip(&topics["/odom"]) {
+        let (place, turn) = (
+            &odometry["pose"]["pose"]["position"],
+            &odometry["pose"]["pose"]["orientation"],
+        );
+        assert_eq!(
+            (*stamp, frames.as_str()),
+            (stamp_ns(&odometry["header"]), "odom -> base_link")
+        );
+        assert_eq!(
+            *values,
+            [&place["x"], &place["y"], &turn["z"], &turn["w"]].map(number)
+        );
+    }
+    let [(_, frames, values)] = &transforms(&topics["/tf_static"])[..] else {
+        panic!("{:?}", topics["/tf_static"]);
+    };
+    assert_eq!(
+        (frames.as_str(), *values),
+        ("base_link -> radar", [0.0, 0.0, 0.0, 1.0])
+    );
+    assert!(
+        !topics.contains_key("/map"),
+        "a run without SLAM has no map"
+    );
+    let parts: Vec<_> = topics["/diagnostics"]
+        .iter()
+        .flat_map(|it| it["status"].as_array().unwrap())
+        .collect();
+    let is_well = |name: &str| {
+        parts
+            .iter()
+            .any(|part| part["name"] == name && part["level"] == 0)
+    };
+    assert!(is_well("gyre") && is_well("gyre: masking"), "{parts:?}");
+}
+
+#[test]
+fn a_run_with_slam_has_a_map_frame_and_a_map() {
+    if !can_speak() {
+        return;
+    }
+    let data = recording::around_a_block();
+    let run = Run::small().data(data).set("slam.kind=graph").rate("20");
+    let domain = domain(1);
+    let options = [
+        "--namespace",
+        "/car",
+        "--frames",
+        "world,odo,car,top",
+        "--mounting",
+        "1,0,90",
+    ];
+    let bridge = Program::bridge(&run, &domain, &options);
+    let peer = Program::peer("observer.py", &[&domain, "/car"]);
+    run.complete();
+    let topics = received(peer);
+    bridge.interrupt();
+
+    let odometry = &topics["/car/odom"];
+    assert_eq!(odometry[0]["header"]["frame_id"], "odo");
+    let frames: Vec<String> = transforms(&topics["/tf"])
+        .into_iter()
+        .map(|it| it.1)
+        .collect();
+    assert!(
+        frames.iter().any(|it| it == "world -> odo") && frames.iter().any(|it| it == "odo -> car")
+    );
+    // The radar looks to the left of the car, which so drives to the right of the radar's first scan.
+    let (_, mounted, values) = &transforms(&topics["/tf_static"])[0];
+    assert_eq!(mounted, "car -> top");
+    assert!(
+        (values[0] - 1.0).abs() < 1e-12 && (values[2] - values[3]).abs() < 1e-12,
+        "{values:?}"
+    );
+    let map = topics["/car/map"].last().unwrap();
+    assert_eq!(map["header"]["frame_id"], "world");
+    let (width, height) = (
+        number(&map["info"]["width"]),
+        number(&map["info"]["height"]),
+    );
+    let cells = |value: &str| map["data"].get(value).map_or(0.0, number);
+    assert_eq!(
+        cells("0") + cells("100") + cells("255"),
+        width * height,
+        "{map}"
+    );
+    assert!(cells("100") > 100.0 && cells("0") > cells("100"), "{map}");
+}
+
+/// A radar of a recording, behind a driver in ROS 2.
+struct Driver {
+    server: Child,
+    _driver: Program,
+}
+
+impl Driver {
+    fn playing(recording: &Path, domain: &str, publishes: &str, options: &[&str]) -> Self {
+        let mut command = gyre();
+        command.args(["radar-server", "--listen", "127.0.0.1:0", "--data"]);
+        let mut server = command
+            .arg(recording)
+            .args(options)
+            .stderr(Stdio::piped())
+            .stdout(Stdio::null())
+            .spawn()
+            .unwrap();
+        let mut said = String::new();
+        BufReader::new(server.stderr.take().unwrap())
+            .read_line(&mut said)
+            .unwrap();
+        let address = said.trim().rsplit(' ').next().unwrap();
+        let driver = Program::peer("driver.py", &[domain, address, publishes]);
+        Self {
+            server,
+            _driver: driver,
+        }
+    }
+}
+
+impl Drop for Driver {
+    fn drop(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+/// A run that receives so many scans in a domain.
+fn receiving(run: Run, domain: &str, scans: usize) -> Run {
+    run.argument("--ros2", "/radar_data/fft_data")
+        .set(&format!("source.domain={domain}"))
+        .set("source.interface='127.0.0.1'")
+        .set(&format!("source.scans={scans}"))
+}
+
+/// The constants that the small recording has in its `dataset.toml`.
+fn with_constants(run: Run) -> Run {
+    let settings = std::fs::read_to_string(recording::small().join("dataset.toml")).unwrap();
+    let settings: toml::Table = settings.parse().unwrap();
+    let known = settings.iter().filter(|(key, _)| *key != "format");
+    known.fold(run, |run, (key, value)| {
+        run.set(&format!("dataset.{key}={value}"))
+    })
+}
+
+#[test]
+fn a_radar_behind_its_driver_gives_the_motions_of_the_recording() {
+    if !can_speak() {
+        return;
+    }
+    let scans = recording::SCANS / 2;
+    let whole = recording::copy(scans);
+    for image in recording::images(whole.path()) {
+        recording::complete(&image);
+    }
+    let recorded = Run::small().data(whole.path()).complete();
+    let domain = domain(2);
+    let _driver = Driver::playing(whole.path(), &domain, "configured", &[]);
+    let run = receiving(with_constants(Run::small()), &domain, scans);
+    let live = run.complete();
+    let source = &run.summary()["stages"]["radar-replay"];
+    for lost in [
+        "missing_azimuths",
+        "damaged_messages",
+        "scans_left_out",
+        "reconnections",
+    ] {
+        assert_eq!(source[lost], 0, "{lost}");
+    }
+    assert_eq!(run.summary()["dropped"], 0);
+    assert!(live == recorded, "{live}\n{recorded}");
+}
+
+#[test]
+fn the_azimuths_of_a_driver_that_publishes_no_configuration_tell_it() {
+    if !can_speak() {
+        return;
+    }
+    let domain = domain(3);
+    let _driver = Driver::playing(recording::small(), &domain, "silent", &["--repeat"]);
+    let run = receiving(with_constants(Run::small()), &domain, 6);
+    let motions = odometry::rows(&run.complete());
+    assert_eq!(motions.len(), 5);
+    odometry::assert_unbroken(&motions);
+    let log = run.result("log.jsonl");
+    assert!(log.contains("it was found from azimuths"), "{log}");
+}
+
+#[test]
+fn a_topic_that_nobody_publishes_is_named() {
+    let run = receiving(Run::small(), &domain(4), 4);
+    let ended = run.finish();
+    ended.refused_with(&[
+        "nobody publishes /radar_data/fft_data in domain",
+        "ROS_DOMAIN_ID",
+    ]);
+}
