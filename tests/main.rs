@@ -5,8 +5,8 @@
 mod common;
 
 mod bad_input;
-mod batch;
 mod bags;
+mod batch;
 mod breaks;
 mod calibrate;
 mod conformance;

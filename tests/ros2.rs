@@ -13,7 +13,7 @@ use nalgebra::{Matrix3, Rotation2};
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
-use crate::common::{Run, gyre, odometry, python, real_data, recording};
+use crate::common::{Run, gyre, odometry, python, recording};
 
 /// Variance of what is not measured.
 const UNKNOWN: f64 = 1e6;
@@ -22,8 +22,8 @@ const PLANAR: [usize; 3] = [0, 1, 5];
 
 /// Returns whether the peer can be started; prints why a test is skipped.
 fn can_speak() -> bool {
-    let import = Command::new(python()).args(["-c", "import cyclonedds"]);
-    let can = { import }
+    let can = Command::new(python())
+        .args(["-c", "import cyclonedds"])
         .output()
         .is_ok_and(|output| output.status.success());
     if !can {

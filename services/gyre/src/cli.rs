@@ -2,8 +2,8 @@
 
 mod batch;
 mod conformance;
-mod link;
 mod export;
+mod link;
 mod operate;
 mod radar_server;
 mod record;
@@ -22,8 +22,8 @@ use gyre_simulator::OutputFormat;
 use crate::configuration::Rate;
 pub use batch::{BatchArguments, BatchDriveArguments};
 pub use conformance::ConformanceArguments;
-pub use link::{LinkArguments, LinkEnd, NetworkArguments, ReceiveArguments, SendArguments};
 pub use export::{ExportArguments, ScanForm};
+pub use link::{LinkArguments, LinkEnd, NetworkArguments, ReceiveArguments, SendArguments};
 
 pub use operate::{
     LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments, TopArguments,

@@ -166,6 +166,7 @@ mod tests {
             restarts: 2,
             last_death: Some("signal 9".to_owned()),
             missed: None,
+            received: None,
         };
         Status {
             pid: 1,

@@ -17,4 +17,4 @@ mod writer;
 pub use error::BagError;
 pub use files::is_bag;
 pub use scans::{open, reopen};
-pub use writer::{BagWriter, Kept};
+pub use writer::{BagWriter, Kept, Topic};

@@ -288,7 +288,9 @@ impl Sensor for Radar {
 
     fn received(&self) -> Received {
         Received {
-            connections: self.before.connections + u64::from(self.publisher.is_some()) + self.changes,
+            connections: self.before.connections
+                + u64::from(self.publisher.is_some())
+                + self.changes,
             is_receiving: self.publisher.is_some() && !self.is_silent,
             ..self.intake.received()
         }
