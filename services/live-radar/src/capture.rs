@@ -4,7 +4,7 @@
 //! of bytes (u64, u32, little-endian), then the bytes, as they were read, or one datagram. A last record that is cut is left out.
 
 use std::{
-    fs::File,
+    fs::{self, File},
     io::{self, BufReader, ErrorKind, Read, Write},
     path::{Path, PathBuf},
     thread::sleep,
@@ -97,13 +97,20 @@ pub fn record(
         path: path.to_owned(),
         source,
     };
-    let requests = [Request::RequestConfiguration, Request::StartFft];
-    let mut link =
-        Link::open(&settings.address, &requests).map_err(|source| CaptureError::NoAnswer {
-            address: settings.address.to_string(),
-            source,
-        })?;
+    // Before the radar is asked for anything: a file that is there is not overwritten.
     let mut out = io::BufWriter::new(File::create_new(path).map_err(file)?);
+    let requests = [Request::RequestConfiguration, Request::StartFft];
+    let mut link = match Link::open(&settings.address, &requests) {
+        Ok(link) => link,
+        Err(source) => {
+            // It is empty.
+            let _ = fs::remove_file(path);
+            return Err(CaptureError::NoAnswer {
+                address: settings.address.to_string(),
+                source,
+            });
+        }
+    };
     let is_udp = matches!(settings.address, Address::Udp { .. });
     out.write_all(MAGIC).map_err(file)?;
     out.write_all(&[is_udp.into()]).map_err(file)?;
@@ -345,8 +352,6 @@ fn wait_until(due: Instant, stop: &dyn Fn() -> bool) -> bool {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use std::fs;
-
     use super::*;
 
     /// A file of this test, removed at its end.
