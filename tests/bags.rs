@@ -7,6 +7,7 @@ use std::{
 };
 
 use serde_json::Value;
+use tempfile::TempDir;
 
 use crate::common::{Ended, Run, gyre, odometry, python, real_data, recording};
 
@@ -21,6 +22,7 @@ fn export(source: &Path, bag: &Path, arguments: &[&str]) -> Ended {
 fn replay(of: &Run, bag: &Path) -> String {
     Run::of_file(&of.out().join("config.toml"))
         .data(bag)
+        .set("record.file=''")
         .complete()
 }
 
@@ -48,9 +50,19 @@ fn checked(bag: &Path, out: &Path) -> Option<Value> {
     Some(serde_json::from_str(&ended.stdout).unwrap())
 }
 
+/// The small recording with all its rows measured: a radar's driver publishes no others.
+fn completed() -> TempDir {
+    let whole = recording::copy(recording::SCANS);
+    for image in recording::images(whole.path()) {
+        recording::complete(&image);
+    }
+    whole
+}
+
 #[test]
 fn a_run_exported_in_any_form_is_taken_back_to_the_same_motions() {
-    let run = Run::of_recording();
+    let whole = completed();
+    let run = Run::small().data(whole.path());
     let motions = run.complete();
     for (name, form) in [("turns", "b-scan"), ("azimuths.mcap", "fft")] {
         let bag = bag(&run, name);
@@ -88,9 +100,8 @@ fn real_scans_are_taken_back_to_the_same_motions() {
 
 #[test]
 fn odometry_transforms_and_the_map_are_those_of_the_run_to_another_reader() {
-    let run = Run::small()
-        .data(recording::around_a_block())
-        .set("slam.kind=graph");
+    let whole = completed();
+    let run = Run::small().data(whole.path()).set("slam.kind=graph");
     let motions = odometry::rows(&run.complete()).len();
     let path = bag(&run, "bag");
     let exported = export(run.out(), &path, &[]);
@@ -100,7 +111,7 @@ fn odometry_transforms_and_the_map_are_those_of_the_run_to_another_reader() {
         return;
     };
     assert_eq!(figures["odometry"], motions + 1);
-    assert_eq!(figures["b_scans"], recording::SCANS_AROUND);
+    assert_eq!(figures["b_scans"], recording::SCANS);
     let topics = figures["topics"].to_string();
     for topic in [
         "/map",
@@ -114,7 +125,8 @@ fn odometry_transforms_and_the_map_are_those_of_the_run_to_another_reader() {
 
 #[test]
 fn a_recorded_run_becomes_the_same_bag() {
-    let run = Run::of_recording();
+    let whole = completed();
+    let run = Run::small().data(whole.path());
     let recorded = bag(&run, "drive.mcap");
     let run = run
         .argument("--record", recorded.to_str().unwrap())
@@ -130,9 +142,10 @@ fn a_recorded_run_becomes_the_same_bag() {
 
 #[test]
 fn a_dataset_becomes_a_bag_of_its_scans() {
-    let run = Run::of_recording();
+    let whole = completed();
+    let run = Run::small().data(whole.path());
     let path = bag(&run, "scans.mcap");
-    let exported = export(recording::small(), &path, &["--scans", "b-scan,fft"]);
+    let exported = export(whole.path(), &path, &["--scans", "b-scan,fft"]);
     exported.succeeded();
     assert!(
         exported.stdout.contains("/radar_data/fft_data 9600"),

@@ -15,7 +15,10 @@ use gyre_colossus::{Azimuth, Configuration, Powers, asterix, write_keep_alive};
 use rustix::process::Signal;
 use serde_json::Value;
 
-use crate::common::{Ended, Run, gyre, odometry, processes, recording};
+use crate::{
+    common::{Ended, Run, Running, gyre, odometry, processes, recording},
+    operate::await_status,
+};
 
 /// Faster than the radar turns, and slow enough for a run to keep up.
 const RATE: &str = "1.5";
@@ -218,6 +221,19 @@ fn datagrams_without_scans_are_named_in_a_sentence() {
     Ended::of(run.command()).refused_with(&["`udp://239.192.43.3` is none for datagrams"]);
 }
 
+/// Ends a run of a radar that has ended, with a pose of each scan that it has published.
+fn interrupt(run: &Run, running: Running) -> Value {
+    // What is on its way arrives.
+    thread::sleep(Duration::from_millis(500));
+    await_status(run, "a pose of each scan", |status| {
+        let count = |key: &str| status[key].as_u64().unwrap_or_default();
+        count("published") == count("poses") + count("dropped")
+    });
+    running.signal(Signal::INT);
+    running.finish();
+    run.summary()
+}
+
 /// A count of the source.
 fn count(summary: &Value, key: &str) -> u64 {
     summary["stages"]["radar-replay"][key].as_u64().unwrap()
@@ -260,9 +276,7 @@ fn every_scan_that_a_radar_plays_is_published_or_counted_also_by_a_source_that_d
     let mut running = run.start();
     running.await_poses(6).kill("radar-replay");
     let played = radar.played();
-    running.signal(Signal::INT);
-    running.finish();
-    let summary = run.summary();
+    let summary = interrupt(&run, running);
     assert_eq!(summary["restarts"]["radar-replay"], 1);
     assert_all_counted(&summary, &played);
     // Those of the process that was killed, too: three resets come after it.
@@ -282,9 +296,7 @@ fn a_source_that_stands_still_does_not_hide_its_delay() {
     thread::sleep(Duration::from_millis(1500));
     processes::send(source, Signal::CONT);
     let played = radar.played();
-    running.signal(Signal::INT);
-    running.finish();
-    let summary = run.summary();
+    let summary = interrupt(&run, running);
     assert_all_counted(&summary, &played);
     let longest_us = summary["latency"]["sensor_to_pose"]["max_us"].as_f64();
     // The first scan that it read was complete a turn after it was stopped, at the latest.
@@ -326,11 +338,7 @@ fn scans_of_which_no_datagram_arrives_are_counted() {
         .set("source.silence_s=10");
     let running = run.start();
     let mut played = radar.played();
-    // What is on its way is received within a moment, as a rule.
-    thread::sleep(Duration::from_millis(500));
-    running.signal(Signal::INT);
-    running.finish();
-    let summary = run.summary();
+    let summary = interrupt(&run, running);
     // On a busy machine the radar may have begun before the run.
     let begun = odometry::columns(&run.odometry(), &["stamp_ns"])[0][0].clone();
     let recorded = Run::small().data(recording::small()).complete();

@@ -107,11 +107,19 @@ impl Node {
     /// # Errors
     /// The name is none.
     pub fn dds_name(&self, topic: &str) -> Result<String, NodeError> {
+        Ok(format!("rt{}", self.absolute(topic)?))
+    }
+
+    /// The name of a topic from the root on. The library makes `//` of a relative one in the root's namespace.
+    fn absolute(&self, topic: &str) -> Result<Name, NodeError> {
         let name = name(topic)?;
-        Ok(match name.is_absolute() {
-            true => format!("rt{name}"),
-            false => format!("rt{}/{name}", self.node.namespace().trim_end_matches('/')),
-        })
+        match name.is_absolute() {
+            true => Ok(name),
+            false => {
+                let namespace = self.node.namespace().trim_end_matches('/');
+                self::name(&format!("{namespace}/{topic}"))
+            }
+        }
     }
 
     /// Publishes on a topic.
@@ -160,7 +168,7 @@ impl Node {
     ) -> Result<ros2_client::dds::rustdds::Topic, NodeError> {
         let definition = M::DEFINITION;
         let message = MessageTypeName::new(definition.package, definition.name);
-        let opened = self.node.create_topic(&name(topic)?, message, qos);
+        let opened = self.node.create_topic(&self.absolute(topic)?, message, qos);
         opened.map_err(|error| topic_error(topic, &error))
     }
 }

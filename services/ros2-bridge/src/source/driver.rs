@@ -206,23 +206,23 @@ impl Driver {
         self.wakeups.clear()
     }
 
-    /// Takes the next configuration.
+    /// Takes the next configuration. A reader is given what is published on its topic in the other form too, and cannot decode it.
     ///
     /// # Errors
-    /// A message of another form.
+    /// The counts of a message are none of a radar.
     pub fn configuration(&self) -> Result<Option<Described>, BadPacket> {
-        if let Some((message, _)) = self.configurations.take()? {
+        if let Ok(Some((message, _))) = self.configurations.take() {
             return Ok(Some(Described {
                 radar: message.configuration(),
                 azimuth_offset: message.azimuth_offset,
             }));
         }
-        match self.older.take()? {
-            Some((message, _)) => Ok(Some(Described {
+        match self.older.take() {
+            Ok(Some((message, _))) => Ok(Some(Described {
                 radar: message.configuration()?,
                 azimuth_offset: 0,
             })),
-            None => Ok(None),
+            Ok(None) | Err(_) => Ok(None),
         }
     }
 
