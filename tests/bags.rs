@@ -9,7 +9,10 @@ use std::{
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::common::{Ended, Run, gyre, odometry, python, real_data, recording};
+use crate::{
+    common::{Ended, Run, gyre, odometry, python, real_data, recording},
+    ros2::with_constants,
+};
 
 fn export(source: &Path, bag: &Path, arguments: &[&str]) -> Ended {
     let mut command = gyre();
@@ -18,12 +21,14 @@ fn export(source: &Path, bag: &Path, arguments: &[&str]) -> Ended {
     Ended::of(command)
 }
 
-/// The motions of a bag, with the resolved configuration of another run.
+/// A run of a bag, with the resolved configuration of another run and the constants of the radar, which a bag does not have.
+fn replayed(of: &Run, bag: &Path) -> Run {
+    let run = Run::of_file(&of.out().join("config.toml")).data(bag);
+    with_constants(run).set("record.file=''")
+}
+
 fn replay(of: &Run, bag: &Path) -> String {
-    Run::of_file(&of.out().join("config.toml"))
-        .data(bag)
-        .set("record.file=''")
-        .complete()
+    replayed(of, bag).complete()
 }
 
 fn bag(run: &Run, name: &str) -> PathBuf {
@@ -157,8 +162,7 @@ fn a_dataset_becomes_a_bag_of_its_scans() {
         "--set dataset.topic=/radar_data/",
     ]);
     let motions = run.complete();
-    let again = Run::of_file(&run.out().join("config.toml")).data(&path);
-    let again = again.set("dataset.topic='/radar_data/fft_data'");
+    let again = replayed(&run, &path).set("dataset.topic='/radar_data/fft_data'");
     assert_eq!(again.complete(), motions);
 }
 

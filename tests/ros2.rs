@@ -443,7 +443,7 @@ fn receiving(run: Run, domain: &str, scans: usize) -> Run {
 }
 
 /// The constants that the small recording has in its `dataset.toml`.
-fn with_constants(run: Run) -> Run {
+pub(crate) fn with_constants(run: Run) -> Run {
     let settings = std::fs::read_to_string(recording::small().join("dataset.toml")).unwrap();
     let settings: toml::Table = settings.parse().unwrap();
     let known = settings.iter().filter(|(key, _)| *key != "format");
