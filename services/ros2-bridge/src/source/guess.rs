@@ -75,7 +75,7 @@ mod tests {
 
     #[test]
     fn azimuths_tell_their_number_and_the_time_of_a_turn() {
-        for (counts, lost) in [(5600, 0), (5600, 7), (5595, 0), (5595, 31)] {
+        for (counts, lost) in [(5600, 0), (5600, 8), (5595, 0), (5595, 31)] {
             let mut guess = Guess::default();
             for azimuth in 0..400 * 4_i64 {
                 if lost > 0 && azimuth % lost == 3 {
@@ -84,7 +84,7 @@ mod tests {
                 let encoder = (azimuth % 400 * counts / 400) as u16;
                 assert_eq!(guess.configuration(counts as u16, 0.04), None, "{azimuth}");
                 guess.add(encoder, 3768, azimuth * 625_000);
-                if azimuth > 1_200 {
+                if azimuth == 1_200 {
                     break;
                 }
             }
