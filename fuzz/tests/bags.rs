@@ -66,7 +66,7 @@ fn scan(turn: usize) -> OwnedScan {
     }
     scan.bytes
         .iter_mut()
-        .zip(0..)
+        .zip((0..=u8::MAX).cycle())
         .for_each(|(byte, k)| *byte = k);
     scan.geometry = SweepGeometry {
         azimuths: AZIMUTHS,

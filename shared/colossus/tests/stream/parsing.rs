@@ -73,7 +73,7 @@ proptest! {
             sent.extend(messages);
         }
         // A message that is cut short is recognised once as many bytes follow.
-        let end = vec![Sent::Other(40, vec![0; 70_000])];
+        let end = vec![Sent::Other(41, vec![0; 70_000])];
         bytes.extend(stream(&end));
         sent.extend(end);
         let (mut found, mut skipped) = (Vec::new(), 0);
@@ -103,7 +103,7 @@ proptest! {
 
 #[test]
 fn damage_is_reported_once_with_its_first_fault() {
-    let message = stream(&[Sent::Other(40, vec![1, 2, 3])]);
+    let message = stream(&[Sent::Other(41, vec![1, 2, 3])]);
     let edited = |at: usize, byte: u8| {
         let mut bytes = message.clone();
         bytes[at] = byte;
@@ -128,7 +128,7 @@ fn damage_is_reported_once_with_its_first_fault() {
     assert_eq!(first(edited(16, 2)), (Damage::Version(2), 25));
     let size = 0x2000_0003;
     assert_eq!(first(edited(18, 0x20)), (Damage::PayloadSize(size), 25));
-    let long = stream(&[Sent::Other(40, vec![9; 40])]);
+    let long = stream(&[Sent::Other(41, vec![9; 40])]);
     let cut = [&long[..46], &message].concat();
     assert_eq!(first(cut), (Damage::CutShort, 46));
     let malformed = stream(&[Sent::Other(30, vec![0; 3]), Sent::KeepAlive]);
@@ -143,13 +143,13 @@ fn damage_is_reported_once_with_its_first_fault() {
 #[test]
 fn a_message_that_takes_the_start_of_the_next_one_costs_none() {
     let [cut, next] =
-        [[7; 30], [8; 30]].map(|payload| stream(&[Sent::Other(40, payload.to_vec())]));
+        [[7; 30], [8; 30]].map(|payload| stream(&[Sent::Other(41, payload.to_vec())]));
     for lost in 1..16 {
         let bytes = [&cut[..cut.len() - lost], &next, &next].concat();
         let events = events(&bytes, 1 + lost);
         assert_eq!(events.len(), 4, "{events:?}");
         assert_eq!(events[1], "Damaged { reason: CutShort, skipped_bytes: 0 }");
-        let whole = texts(&[Sent::Other(40, vec![8; 30])]);
+        let whole = texts(&[Sent::Other(41, vec![8; 30])]);
         assert_eq!(events[2..], [&whole[..], &whole].concat());
     }
 }
