@@ -115,7 +115,7 @@ impl Intake {
         }
     }
 
-    /// The time for which no scan can be complete: see [`Sweeps::pause`].
+    /// The time for which no scan can be complete, if it is that of a few azimuths: so many are then read at once.
     pub fn pause(&self) -> Option<Duration> {
         self.sweeps.as_ref().and_then(Sweeps::pause)
     }
