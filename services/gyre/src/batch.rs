@@ -132,8 +132,12 @@ fn sentence(counts: &BTreeMap<Outcome, usize>, earlier: usize) -> String {
         0 => String::new(),
         earlier => format!("; {earlier} had been computed before"),
     };
-    let plural = if drives == 1 { "" } else { "s" };
-    format!("{drives} drive{plural}: {}{earlier}", each.join(", "))
+    let each = each.join(", ");
+    match drives {
+        0 => "no drives".to_owned(),
+        1 => format!("1 drive: {each}{earlier}"),
+        _ => format!("{drives} drives: {each}{earlier}"),
+    }
 }
 
 fn exit_code(counts: &BTreeMap<Outcome, usize>, interrupted: bool) -> ExitCode {
