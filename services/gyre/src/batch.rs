@@ -17,9 +17,6 @@ use crate::{Failure, cli::BatchArguments, out::Out, print, program, run::INTERRU
 
 pub use drive::drive;
 
-/// Processors that a run keeps busy.
-const PROCESSORS: usize = 2;
-
 /// Computes the drives of a list that are not complete, and writes the table. The exit code is 0 if all are complete, 1 if not, and 130 after
 /// an interruption.
 ///
@@ -85,10 +82,9 @@ fn existing(out: &Path) -> Result<PathBuf, Failure> {
     Ok(out.canonicalize().map_err(unusable)?)
 }
 
-/// The number of runs that keep all processors busy.
+/// As many runs as processors: one alone is bounded by its slowest stage and leaves time unused.
 fn jobs() -> usize {
-    let processors = thread::available_parallelism().map_or(1, usize::from);
-    (processors / PROCESSORS).max(1)
+    thread::available_parallelism().map_or(1, usize::from)
 }
 
 /// Writes the table, and says if it is of several builds.

@@ -21,7 +21,7 @@ pub struct BatchArguments {
     /// Override a key of each configuration, as in slam.kind=graph; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
-    /// Runs at once. Default: half as many as there are processors, since a run keeps about two of them busy.
+    /// Runs at once. Default: as many as there are processors, since a run alone is bounded by its slowest stage.
     #[arg(long, value_name = "N")]
     pub jobs: Option<NonZeroUsize>,
     /// Compute only the drives of this task, from 0, of those that share the list.
