@@ -174,7 +174,6 @@ enum BagEdit {
 }
 
 #[test]
-#[ignore = "a finding is open: some edited bags take 1.6 GB before they are refused"]
 fn bags() {
     // The largest scan that a radar may claim, twice.
     let target = Target::new("bags", 320);

@@ -7,6 +7,7 @@ mod files;
 mod keyframes;
 mod messages;
 mod recordings;
+mod runs;
 mod simulations;
 mod streams;
 mod texts;

@@ -6,6 +6,7 @@ use std::{
     path::{Component, Path, PathBuf},
 };
 
+use gyre_radar::quoted;
 use mcap::{
     MAGIC,
     records::{Record, op},
@@ -61,7 +62,7 @@ fn profile(path: &Path) -> Option<String> {
     let record = head.strip_prefix(MAGIC)?.strip_prefix(&[op::HEADER])?;
     let (length, body) = record.split_first_chunk::<8>()?;
     let length = usize::try_from(u64::from_le_bytes(*length)).ok()?;
-    match mcap::parse_record(op::HEADER, body.get(..length)?) {
+    match gyre_mcap::parse(op::HEADER, body.get(..length)?) {
         Ok(Record::Header(header)) => Some(header.profile),
         _ => None,
     }
@@ -126,11 +127,11 @@ fn described(folder: &Path) -> Result<Vec<PathBuf>, BagError> {
         return Err(database(folder));
     }
     if information.storage_identifier != "mcap" {
-        let storage: String = information.storage_identifier.chars().take(30).collect();
+        let storage = quoted(&information.storage_identifier);
         return Err(BagError::unreadable(
             folder,
             format!(
-                "is stored as `{storage}`: `ros2 bag convert` with `storage_id: mcap` makes one that is read"
+                "is stored as {storage}: `ros2 bag convert` with `storage_id: mcap` makes one that is read"
             ),
         ));
     }

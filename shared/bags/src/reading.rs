@@ -3,20 +3,13 @@
 use std::{
     collections::BTreeMap,
     fs::File,
-    io::{Read, Seek, SeekFrom},
     path::{Path, PathBuf},
 };
 
-use mcap::{
-    McapError,
-    records::Record,
-    sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions},
-};
+use gyre_mcap::Span;
+use mcap::{McapError, records::Record};
 
-use crate::{
-    BagError,
-    spans::{Span, spans},
-};
+use crate::{BagError, spans::spans};
 
 /// The largest record that is read, bytes: several times the largest scan.
 const MAX_RECORD_BYTES: usize = 64 << 20;
@@ -66,9 +59,9 @@ pub(crate) struct BagFile {
 
 impl BagFile {
     /// Opens a file, and returns the spans of its messages.
-    pub fn open(path: &Path, number: u32) -> Result<(Self, Vec<Span>), BagError> {
+    pub fn open(path: &Path) -> Result<(Self, Vec<Span>), BagError> {
         let file = File::open(path).map_err(|error| BagError::io(path, error))?;
-        let found = spans(path, &file, number)?;
+        let found = spans(path, &file)?;
         let mut bag = Self {
             path: path.to_owned(),
             file,
@@ -96,7 +89,8 @@ impl BagFile {
         let mut messages = Vec::new();
         let read = match span.bytes <= MAX_SPAN_BYTES {
             true => {
-                let bytes = self.bytes(span).map_err(|e| BagError::io(&self.path, e))?;
+                let bytes = gyre_mcap::read(&self.file, span);
+                let bytes = bytes.map_err(|error| BagError::io(&self.path, error))?;
                 self.parse(&bytes, &wanted, &mut messages)
             }
             false => Err(McapError::ChunkTooLarge(span.bytes)),
@@ -109,50 +103,24 @@ impl BagFile {
         Ok(messages)
     }
 
-    fn bytes(&self, span: Span) -> std::io::Result<Vec<u8>> {
-        let mut file = &self.file;
-        file.seek(SeekFrom::Start(span.offset))?;
-        let mut bytes = Vec::new();
-        file.take(span.bytes).read_to_end(&mut bytes)?;
-        Ok(bytes)
-    }
-
     fn parse(
         &mut self,
-        mut bytes: &[u8],
+        bytes: &[u8],
         wanted: &impl Fn(&Channel) -> bool,
         messages: &mut Vec<Message>,
     ) -> Result<(), McapError> {
-        let options = LinearReaderOptions::default()
-            .with_skip_start_magic(true)
-            .with_skip_end_magic(true)
-            .with_validate_chunk_crcs(true)
-            .with_record_length_limit(MAX_RECORD_BYTES);
-        let mut reader = LinearReader::new_with_options(options);
         let mut kept = 0;
-        while let Some(event) = reader.next_event() {
-            match event? {
-                LinearReadEvent::ReadRequest(_) if bytes.is_empty() => break,
-                LinearReadEvent::ReadRequest(bytes_wanted) => {
-                    let (now, later) = bytes.split_at(bytes_wanted.min(bytes.len()));
-                    reader.insert(now.len()).copy_from_slice(now);
-                    reader.notify_read(now.len());
-                    bytes = later;
-                }
-                LinearReadEvent::Record { data, opcode } => {
-                    let record = mcap::parse_record(opcode, data)?;
-                    let Some(message) = self.learn(record, wanted) else {
-                        continue;
-                    };
-                    kept += message.data.len();
-                    if kept > MAX_KEPT_BYTES {
-                        return Err(McapError::ChunkTooLarge(kept as u64));
-                    }
-                    messages.push(message);
-                }
+        gyre_mcap::records(bytes, MAX_RECORD_BYTES, |record| {
+            let Some(message) = self.learn(record, wanted) else {
+                return Ok(());
+            };
+            kept += message.data.len();
+            if kept > MAX_KEPT_BYTES {
+                return Err(McapError::ChunkTooLarge(kept as u64));
             }
-        }
-        Ok(())
+            messages.push(message);
+            Ok(())
+        })
     }
 
     /// Learns channels, and returns a message that is wanted.
@@ -166,7 +134,9 @@ impl BagFile {
                 self.schemas.insert(header.id, (header.name, text));
             }
             Record::Channel(channel)
-                if self.channels.len() < MAX_CHANNELS && channel.topic.len() <= MAX_NAME_BYTES =>
+                if self.channels.len() < MAX_CHANNELS
+                    && channel.topic.len() <= MAX_NAME_BYTES
+                    && !channel.topic.contains(char::is_control) =>
             {
                 let schema = self.schemas.get(&channel.schema_id);
                 let (type_name, schema) = schema.cloned().unwrap_or_default();

@@ -5,6 +5,7 @@ mod index;
 use std::path::{Path, PathBuf};
 
 use gyre_colossus::{Constants, SweepAssembler};
+use gyre_mcap::Span;
 use gyre_radar::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize,
     OpenError, ReadError, ScanLimits, ScanSlot, SweepGeometry, turn_ns,
@@ -16,7 +17,6 @@ use crate::{
     files::files,
     radar::Survey,
     reading::{BagFile, Channel, Message},
-    spans::Span,
     topics::{Kind, Topics},
 };
 use index::{Entry, Index};
@@ -65,7 +65,8 @@ fn open_files(
 struct Bag {
     path: PathBuf,
     files: Vec<BagFile>,
-    spans: Vec<Span>,
+    /// The number of the file of each span, and the span.
+    spans: Vec<(usize, Span)>,
 }
 
 impl Bag {
@@ -76,9 +77,10 @@ impl Bag {
             spans: Vec::new(),
         };
         for (number, path) in paths.iter().enumerate() {
-            let (file, spans) = BagFile::open(path, number as u32)?;
+            let (file, spans) = BagFile::open(path)?;
             bag.files.push(file);
-            bag.spans.extend(spans);
+            bag.spans
+                .extend(spans.into_iter().map(|span| (number, span)));
         }
         Ok(bag)
     }
@@ -89,10 +91,10 @@ impl Bag {
         span: usize,
         wanted: impl Fn(&Channel) -> bool,
     ) -> Result<Vec<Message>, BagError> {
-        let Some(span) = self.spans.get(span) else {
+        let Some(&(file, span)) = self.spans.get(span) else {
             return Ok(Vec::new());
         };
-        self.files[span.file as usize].read(*span, wanted)
+        self.files[file].read(span, wanted)
     }
 
     fn channels(&self) -> Vec<&Channel> {
@@ -103,7 +105,7 @@ impl Bag {
     /// Learns all channels. A file without a list of them is read as a whole.
     fn learn_channels(&mut self) {
         for span in 0..self.spans.len() {
-            let file = self.spans[span].file as usize;
+            let (file, _) = self.spans[span];
             if !self.files[file].has_summary {
                 // What is damaged has no channels.
                 let _ = self.read(span, |_| false);
@@ -122,7 +124,7 @@ impl Bag {
         for span in 0..self.spans.len() {
             let messages = self.read(span, |channel| topics.has(channel));
             for message in messages.unwrap_or_default() {
-                match self.configuration(self.spans[span], topics, &message) {
+                match self.configuration(self.spans[span].0, topics, &message) {
                     Some(described) => return Ok((described, true)),
                     None if !survey.is_done() => survey.add(&message),
                     None => {}
@@ -136,11 +138,9 @@ impl Bag {
     }
 
     /// Returns what a message says of the radar, if it is of that topic and can be used.
-    fn configuration(&self, span: Span, topics: &Topics, message: &Message) -> Option<Described> {
+    fn configuration(&self, file: usize, topics: &Topics, message: &Message) -> Option<Described> {
         let topic = topics.configuration.as_ref()?;
-        let channel = self.files[span.file as usize]
-            .channels
-            .get(&message.channel)?;
+        let channel = self.files[file].channels.get(&message.channel)?;
         match topic.kind {
             Kind::Configuration(form) if channel.topic == topic.name => {
                 let described = described(form, message).ok()?;
@@ -336,7 +336,7 @@ impl Dataset for Scans {
     fn file(&self, index: usize) -> &Path {
         let entry = self.index.entries.get(index);
         let span = entry.and_then(|entry| self.bag.spans.get(entry.end.span as usize));
-        let file = span.and_then(|span| self.bag.files.get(span.file as usize));
+        let file = span.and_then(|(file, _)| self.bag.files.get(*file));
         file.map_or(Path::new(""), |file| &file.path)
     }
 

@@ -2,6 +2,8 @@
 
 use std::{collections::BTreeSet, path::Path};
 
+use gyre_radar::quoted;
+
 use crate::{BagError, reading::Channel};
 
 /// What a topic carries.
@@ -95,9 +97,9 @@ impl Topics {
             .iter()
             .filter(|channel| channel.topic == scans.name);
         if let Some(channel) = used.into_iter().find(|channel| channel.encoding != "cdr") {
-            let encoding: String = channel.encoding.chars().take(20).collect();
+            let encoding = quoted(&channel.encoding);
             let reason = format!(
-                "has the messages of {} as `{encoding}`, expected `cdr`",
+                "has the messages of {} as {encoding}, expected `cdr`",
                 scans.name
             );
             return Err(BagError::unreadable(path, reason));

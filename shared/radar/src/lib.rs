@@ -34,6 +34,7 @@ pub use ground_truth::{
 pub use inspect::{Report, inspect, inspect_dataset};
 pub use median::median;
 pub use points::{PointExtractor, PointsConfig, PointsError};
+pub use quoted::quoted;
 pub use raster::{RasterConfig, RasterError, Rasteriser, Sampling};
 pub use scan::{
     MAX_AZIMUTHS, OwnedScan, PolarScan, ScanError, ScanLimits, ScanSlot, Sense, SweepGeometry,

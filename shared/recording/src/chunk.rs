@@ -1,19 +1,11 @@
 //! The messages of a chunk.
 
-use std::{
-    collections::BTreeMap,
-    fs::File,
-    io::{Read, Seek, SeekFrom},
-    path::Path,
-};
+use std::{collections::BTreeMap, fs::File, path::Path};
 
-use mcap::{
-    McapError,
-    records::{MessageHeader, Record},
-    sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions},
-};
+use gyre_mcap::Span;
+use mcap::records::{MessageHeader, Record};
 
-use crate::{RecordingError, walk::Span};
+use crate::RecordingError;
 
 /// The largest record that is read, bytes: ten times the largest scan.
 const MAX_RECORD_BYTES: usize = 256 << 20;
@@ -35,54 +27,33 @@ pub(crate) struct Message {
 /// It cannot be read, or is damaged.
 pub(crate) fn read(
     path: &Path,
-    mut file: &File,
+    file: &File,
     span: Span,
     channels: &mut Channels,
 ) -> Result<Vec<Message>, RecordingError> {
-    let failed = |source| RecordingError::Io {
+    let bytes = gyre_mcap::read(file, span).map_err(|source| RecordingError::Io {
         path: path.to_owned(),
         source,
-    };
-    let mut bytes = Vec::new();
-    file.seek(SeekFrom::Start(span.offset)).map_err(failed)?;
-    file.take(span.bytes)
-        .read_to_end(&mut bytes)
-        .map_err(failed)?;
-    messages(&bytes, channels).map_err(|error| RecordingError::Damaged {
-        path: path.to_owned(),
-        offset: span.offset,
-        reason: error.to_string(),
-    })
-}
-
-/// Returns the messages in the record of a chunk.
-fn messages(mut bytes: &[u8], channels: &mut Channels) -> Result<Vec<Message>, McapError> {
-    let options = LinearReaderOptions::default()
-        .with_skip_start_magic(true)
-        .with_skip_end_magic(true)
-        .with_validate_chunk_crcs(true)
-        .with_record_length_limit(MAX_RECORD_BYTES);
-    let mut reader = LinearReader::new_with_options(options);
+    })?;
     let mut messages = Vec::new();
-    while let Some(event) = reader.next_event() {
-        match event? {
-            LinearReadEvent::ReadRequest(_) if bytes.is_empty() => break,
-            LinearReadEvent::ReadRequest(bytes_wanted) => {
-                let (now, later) = bytes.split_at(bytes_wanted.min(bytes.len()));
-                reader.insert(now.len()).copy_from_slice(now);
-                reader.notify_read(now.len());
-                bytes = later;
+    let read = gyre_mcap::records(&bytes, MAX_RECORD_BYTES, |record| {
+        match record {
+            Record::Channel(channel) => {
+                channels.insert(channel.id, channel.topic);
             }
-            LinearReadEvent::Record { data, opcode } => match mcap::parse_record(opcode, data)? {
-                Record::Channel(channel) => {
-                    channels.insert(channel.id, channel.topic);
-                }
-                Record::Message { header, data } => messages.push(message(&header, &data)),
-                _ => {}
-            },
+            Record::Message { header, data } => messages.push(message(&header, &data)),
+            _ => {}
         }
+        Ok(())
+    });
+    match read {
+        Ok(()) => Ok(messages),
+        Err(error) => Err(RecordingError::Damaged {
+            path: path.to_owned(),
+            offset: span.offset,
+            reason: error.to_string(),
+        }),
     }
-    Ok(messages)
 }
 
 fn message(header: &MessageHeader, data: &[u8]) -> Message {

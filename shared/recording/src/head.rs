@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use gyre_messages::topic;
+use gyre_radar::quoted;
 use mcap::records::Metadata;
 
 /// The name of the record.
@@ -59,14 +60,19 @@ impl Head {
         };
         let number = |key: &str| {
             let value = entry(key)?;
-            let invalid =
-                |_| format!("`{key}` of its metadata `{NAME}` is `{value}`, not a number");
+            let invalid = |_| {
+                format!(
+                    "`{key}` of its metadata `{NAME}` is {}, not a number",
+                    quoted(&value)
+                )
+            };
             value.parse().map_err(invalid)
         };
         let format = entry("format")?;
         if format != FORMAT {
             return Err(format!(
-                "it has format {format}, and this version of Gyre reads {FORMAT}"
+                "it has format {}, and this version of Gyre reads {FORMAT}",
+                quoted(&format)
             ));
         }
         let topics = entry("topics")?;
@@ -100,7 +106,9 @@ fn of_type(text: &str) -> Result<String, String> {
     match topic(name).map(|topic| (topic.header_type)()) {
         Some(own) if own == of => Ok(name.to_owned()),
         own => Err(format!(
-            "its messages of topic `{name}` are of type `{of}`, and this version of Gyre reads `{}`",
+            "its messages of topic {} are of type {}, and this version of Gyre reads `{}`",
+            quoted(name),
+            quoted(of),
             own.unwrap_or("none of it")
         )),
     }

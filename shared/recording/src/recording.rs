@@ -7,6 +7,7 @@ use std::{
 };
 
 use foxglove::{Decode, messages::RawImage};
+use gyre_mcap::Span;
 use gyre_messages::{Item, topic};
 
 use crate::{
@@ -16,7 +17,7 @@ use crate::{
     image::{Rows, read},
     table::Table,
     view::image_channel,
-    walk::{Span, Step, Walk},
+    walk::{Step, Walk},
 };
 
 /// Chunks that are kept in memory: messages of one scan can be in two.

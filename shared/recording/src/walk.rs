@@ -1,29 +1,14 @@
 //! The records of a file outside of its chunks, up to its end or to where its writer was killed.
 
-use std::{
-    fs::File,
-    io::{self, Read, Seek, SeekFrom},
-    path::Path,
-};
+use std::{fs::File, io, path::Path};
 
-use mcap::{
-    MAGIC,
-    records::{Metadata, Record, op},
-};
+use gyre_mcap::Span;
+use mcap::records::{Metadata, Record, op};
 
 use crate::RecordingError;
 
-/// Bytes of opcode and length before each record.
-pub(crate) const PREFIX: u64 = 9;
-
-/// The place of a record in its file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Span {
-    /// Position of its opcode.
-    pub offset: u64,
-    /// Its length with opcode and length.
-    pub bytes: u64,
-}
+/// Bytes of a record before its content: opcode and length.
+const PREFIX: usize = 9;
 
 /// A record that readers of recordings look at.
 pub(crate) enum Step {
@@ -37,33 +22,29 @@ pub(crate) enum Step {
 pub(crate) struct Walk<'a> {
     path: &'a Path,
     file: &'a File,
-    offset: u64,
-    bytes: u64,
+    records: gyre_mcap::Walk<'a>,
 }
 
 impl<'a> Walk<'a> {
     /// Begins behind the signature.
     pub fn new(path: &'a Path, file: &'a File) -> Result<Self, RecordingError> {
-        let walk = Self {
-            path,
-            file,
-            offset: MAGIC.len() as u64,
-            bytes: file.metadata().map_err(|e| failed(path, e))?.len(),
-        };
-        match walk.read(0, MAGIC.len() as u64) {
-            Ok(signature) if signature == MAGIC => Ok(walk),
-            Err(error) if error.kind() != io::ErrorKind::UnexpectedEof => Err(failed(path, error)),
-            _ => Err(RecordingError::Foreign {
+        match gyre_mcap::Walk::new(file) {
+            Ok(Some(records)) => Ok(Self {
+                path,
+                file,
+                records,
+            }),
+            Ok(None) => Err(RecordingError::Foreign {
                 path: path.to_owned(),
                 reason: "it does not begin with the signature of MCAP".to_owned(),
             }),
+            Err(error) => Err(failed(path, error)),
         }
     }
 
     /// Returns the next record; `None` where the file ends before its end.
     pub fn next(&mut self) -> Result<Option<Step>, RecordingError> {
-        while let Some((opcode, span)) = self.record()? {
-            self.offset = span.offset + span.bytes;
+        while let Some((opcode, span)) = self.records.next().map_err(|e| failed(self.path, e))? {
             match opcode {
                 op::CHUNK => return Ok(Some(Step::Chunk(span))),
                 op::DATA_END | op::FOOTER => return Ok(Some(Step::End)),
@@ -74,29 +55,9 @@ impl<'a> Walk<'a> {
         Ok(None)
     }
 
-    /// Returns the opcode and the place of the record here; `None` if it is not complete.
-    fn record(&self) -> Result<Option<(u8, Span)>, RecordingError> {
-        if self.bytes - self.offset < PREFIX {
-            return Ok(None);
-        }
-        let prefix = self
-            .read(self.offset, PREFIX)
-            .map_err(|e| failed(self.path, e))?;
-        let mut length = [0; 8];
-        length.copy_from_slice(&prefix[1..]);
-        let bytes = PREFIX.saturating_add(u64::from_le_bytes(length));
-        let span = Span {
-            offset: self.offset,
-            bytes,
-        };
-        Ok((bytes <= self.bytes - self.offset).then_some((prefix[0], span)))
-    }
-
     fn metadata(&self, span: Span) -> Result<Step, RecordingError> {
-        let record = self
-            .read(span.offset, span.bytes)
-            .map_err(|e| failed(self.path, e))?;
-        match mcap::parse_record(op::METADATA, &record[PREFIX as usize..]) {
+        let record = gyre_mcap::read(self.file, span).map_err(|e| failed(self.path, e))?;
+        match gyre_mcap::parse(op::METADATA, record.get(PREFIX..).unwrap_or_default()) {
             Ok(Record::Metadata(metadata)) => Ok(Step::Metadata(metadata)),
             parsed => Err(RecordingError::Damaged {
                 path: self.path.to_owned(),
@@ -105,18 +66,6 @@ impl<'a> Walk<'a> {
                     .err()
                     .map_or("it is no metadata".to_owned(), |e| e.to_string()),
             }),
-        }
-    }
-
-    fn read(&self, offset: u64, bytes: u64) -> io::Result<Vec<u8>> {
-        let mut file = self.file;
-        file.seek(SeekFrom::Start(offset))?;
-        // Not more than the file has, whatever its records say.
-        let mut read = Vec::new();
-        file.take(bytes).read_to_end(&mut read)?;
-        match read.len() as u64 == bytes {
-            true => Ok(read),
-            false => Err(io::ErrorKind::UnexpectedEof.into()),
         }
     }
 }

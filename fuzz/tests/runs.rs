@@ -1,0 +1,126 @@
+//! Recordings of runs: MCAP files whose bytes are edited, or that end early.
+
+use std::{fs, path::Path, slice};
+
+use bolero::{TypeGenerator, check};
+use bytemuck::{Zeroable, bytes_of};
+use gyre_fuzz::{
+    Failure, Target,
+    edit::{ByteEdit, edit_bytes},
+};
+use gyre_messages::{Item, ScanHeader};
+use gyre_radar::{DatasetOptions, OwnedScan};
+use gyre_recording::{Head, Incoming, LogLine, Recording, RecordingWriter};
+
+use crate::recordings::folder;
+
+const SCANS: u64 = 3;
+const START_NS: i64 = 1_549_986_607_000_000_000;
+
+fn scan(seq: u64) -> Incoming {
+    let item = Item {
+        seq,
+        scan: seq,
+        stamp_ns: START_NS + seq as i64 * 250_000_000,
+        ..Item::default()
+    };
+    let mut header = ScanHeader {
+        item,
+        azimuths: 4,
+        bins: 10,
+        stride: 10,
+        range_resolution_m: 0.5,
+        clockwise: 1,
+        ..ScanHeader::zeroed()
+    };
+    header.azimuth_stamp_ns[..4].fill(item.stamp_ns);
+    header.azimuth_rad[..4].copy_from_slice(&[0.0, 1.5, 3.0, 4.5]);
+    Incoming {
+        topic: "scan",
+        header: bytes_of(&header).to_vec(),
+        payload: (0..40).map(|byte| byte * 5 + seq as u8).collect(),
+        received_ns: START_NS,
+        missed: 1,
+    }
+}
+
+/// Returns the bytes of a recording with a chunk for each scan.
+fn recording() -> Vec<u8> {
+    let folder = folder();
+    let path = folder.path().join("run.mcap");
+    let head = Head {
+        id: "a".to_owned(),
+        part: 1,
+        configuration: "[dataset]\nformat = \"radiate\"\n".to_owned(),
+        topics: vec!["scan".to_owned()],
+        scan_bytes: 64,
+        mode: "lossless".to_owned(),
+    };
+    let mut writer = RecordingWriter::create(&path, &head).unwrap();
+    for seq in 0..SCANS {
+        writer.add(&scan(seq)).unwrap();
+        writer.flush().unwrap();
+    }
+    writer.add_log(LogLine::default()).unwrap();
+    writer.finish().unwrap();
+    fs::read(&path).unwrap()
+}
+
+/// Reads all messages, and all scans as a dataset.
+fn use_run(path: &Path) -> Result<(), Failure> {
+    let mut recording = Recording::open(slice::from_ref(&path.to_owned()))?;
+    let seqs: Vec<u64> = recording.entries("scan").map(|entry| entry.seq).collect();
+    let messages = seqs.into_iter().map(|seq| recording.read("scan", seq));
+    let refused = messages.filter_map(Result::err).last();
+
+    let mut dataset = gyre_recording::open(path, &DatasetOptions::default())?;
+    let mut scan = OwnedScan::with_limits(dataset.limits());
+    // A damaged number of a scan leaves a gap as long as it says.
+    for index in (dataset.first()..dataset.len()).take(100) {
+        if let Ok(geometry) = dataset.read(index, scan.slot()) {
+            scan.geometry = geometry;
+            let checked = scan.view().check();
+            checked.unwrap_or_else(|error| panic!("accepted, but {error}"));
+        }
+    }
+    match refused {
+        Some(error) => Err(error.into()),
+        None => Ok(()),
+    }
+}
+
+#[derive(Clone, Debug, TypeGenerator)]
+enum RunEdit {
+    Bytes(Vec<ByteEdit>),
+    /// The file ends early.
+    Cut(u16),
+}
+
+#[test]
+fn runs() {
+    let target = Target::new("runs", 320);
+    let recording = recording();
+    check!().with_type::<Vec<RunEdit>>().for_each(|edits| {
+        let folder = folder();
+        let path = folder.path().join("run.mcap");
+        let mut file = recording.clone();
+        for edit in edits {
+            match edit {
+                RunEdit::Bytes(edits) => edit_bytes(&mut file, edits),
+                RunEdit::Cut(at) => file.truncate(usize::from(*at)),
+            }
+        }
+        fs::write(&path, file).unwrap();
+        target.run(|| use_run(&path));
+    });
+}
+
+#[test]
+fn a_run_without_edits_is_accepted() {
+    let folder = folder();
+    let path = folder.path().join("run.mcap");
+    fs::write(&path, recording()).unwrap();
+    use_run(&path).unwrap();
+    let dataset = gyre_recording::open(&path, &DatasetOptions::default()).unwrap();
+    assert_eq!(dataset.len(), SCANS as usize);
+}
