@@ -11,12 +11,15 @@ import sys
 import ray
 
 TASKS = 16
+# Ray counts processors and does not bind to them.
+PROCESSORS = 2
 
 
-@ray.remote(num_cpus=2, max_retries=3)
+@ray.remote(num_cpus=PROCESSORS, max_retries=3)
 def compute(index: int, batch: list[str]) -> int:
     """Computes the drives of a task. Their failures are in the table, so its exit code is 1 then."""
-    return subprocess.run([*batch, "--task", str(index), "--tasks", str(TASKS)], check=False).returncode
+    share = ["--jobs", str(PROCESSORS), "--task", str(index), "--tasks", str(TASKS)]
+    return subprocess.run([*batch, *share], check=False).returncode
 
 
 def main() -> int:

@@ -1,16 +1,18 @@
 //! A run that is split between two machines gives the same results, whatever happens to the link; and one can look on from another machine.
 
 use std::{
-    fs,
     net::TcpListener,
     path::{Path, PathBuf},
     process::{self, Command},
     thread,
-    time::Duration,
+    time::{Duration, Instant},
 };
+
+use gyre_pose_integration::journal;
 
 use crate::common::{Ended, Run, gyre, recording, undisturbed, wrapped};
 
+const PATIENCE: Duration = Duration::from_secs(60);
 /// Time for which the link is cut: longer than the time after which a connection is given up.
 const CUT: Duration = Duration::from_secs(5);
 
@@ -118,42 +120,189 @@ fn a_link_off_this_machine_needs_certificates() {
 }
 
 #[test]
+fn a_robot_that_plays_another_drive_is_refused() {
+    let address = endpoint();
+    let there = side("base", "motion", &format!("link.listen=['{address}']"));
+    let _there = there.start();
+    let other = recording::linked(recording::small(), |scan| scan > 3);
+    let [first, second] = [recording::small(), other.path()].map(|data| {
+        let robot = Run::small().data(data).rate("2");
+        robot
+            .set("link.side='robot'")
+            .set("link.cut='motion'")
+            .set(&format!("link.connect=['{address}']"))
+    });
+    let mut here = first.start();
+    here.await_poses(6);
+    here.kill_supervisor();
+    let ended = second.finish();
+    ended.failed_with(&["the base has poses of another drive", "--fresh"]);
+    // What was killed is swept by the next run.
+    first.option("--fresh").finish().succeeded();
+}
+
+#[test]
 fn another_machine_sees_all_poses_of_a_run_from_its_beginning() {
     let run = Run::of_recording().rate("1");
     let mut running = run.start();
     running.await_poses(6);
-    let (address, seen) = (endpoint(), run.folder().join("seen"));
-    let link = |end: &str, out: &Path, option: &str| {
-        let mut command = gyre();
-        command
-            .args(["link", end])
-            .arg(out)
-            .args([option, &address]);
-        command
-    };
-    let mut send = link("send", run.out(), "--listen");
+    let link = Link::new();
+    let seen = run.folder().join("seen");
+    let mut send = link.end("send", run.out());
     send.args(["--topics", "scan,motion,refined,pose"]);
     let sending = thread::spawn(move || Ended::of(send));
-    let received = Ended::of(link("receive", &seen, "--connect"));
+    let received = Ended::of(link.end("receive", &seen));
     received.succeeded();
     running.finish().succeeded();
     let scans = recording::SCANS;
     for topic in ["pose", "refined"] {
-        let words = format!("{scans} {topic}");
-        assert!(received.stderr.contains(&words), "{}", received.stderr);
+        let words = format!("received {scans} {topic}");
+        let listed = format!(", {scans} {topic}");
+        let said = &received.stderr;
+        assert!(said.contains(&words) || said.contains(&listed), "{said}");
     }
     // Of scans that were gone before it came it knows nothing; of those between it does.
-    assert!(received.stderr.contains(" scan"), "{}", received.stderr);
+    let (received_part, _) = received.stderr.split_once("; missed").unwrap();
+    assert!(received_part.contains(" scan"), "{}", received.stderr);
     sending.join().unwrap().succeeded();
-    let poses = |out: &Path| {
-        fs::read(gyre_pose_integration::journal::path(out))
-            .unwrap()
-            .len()
-    };
+    assert_eq!(poses(&seen) + 1, poses(run.out()), "all but the end");
+}
+
+#[test]
+fn a_sender_that_begins_again_is_gone_on_with() {
+    let run = Run::of_recording().rate("1");
+    let mut running = run.start();
+    running.await_poses(3);
+    let link = Link::new();
+    let seen = run.folder().join("seen");
+    let mut first = link.end("send", run.out()).spawn().unwrap();
+    let receiving = link.start("receive", &seen);
+    await_poses(&seen);
+    first.kill().unwrap();
+    first.wait().unwrap();
+    let second = link.start("send", run.out());
+    running.finish().succeeded();
+    let received = receiving.join().unwrap();
+    let said = &received.succeeded().stderr;
     assert!(
-        poses(&seen) > 0 && poses(&seen) < poses(run.out()),
-        "all but the end"
+        said.contains(&format!("{} pose", recording::SCANS)),
+        "{said}"
     );
+    second.join().unwrap().succeeded();
+}
+
+#[test]
+fn another_drive_is_not_put_behind_the_one_that_was_received() {
+    let run = Run::of_recording().rate("1");
+    let mut running = run.start();
+    running.await_poses(3);
+    let link = Link::new();
+    let seen = run.folder().join("seen");
+    let mut first = link.end("send", run.out()).spawn().unwrap();
+    let receiving = link.start("receive", &seen);
+    await_poses(&seen);
+    first.kill().unwrap();
+    first.wait().unwrap();
+    running.kill_supervisor();
+    let other = recording::linked(recording::small(), |scan| scan > 3);
+    let later = Run::small().data(other.path()).rate("1");
+    let mut running = later.start();
+    running.await_poses(3);
+    let mut second = link.end("send", later.out()).spawn().unwrap();
+    let received = receiving.join().unwrap();
+    received.failed_with(&["the sender is at another drive now"]);
+    second.kill().unwrap();
+    second.wait().unwrap();
+    running.finish().succeeded();
+}
+
+#[test]
+fn nobody_connects_without_a_certificate_of_the_authority() {
+    let ours = Certificates::of("127.0.0.1", "127.0.0.1");
+    let theirs = Certificates::of("127.0.0.1", "127.0.0.1");
+    let run = Run::of_recording().rate("0.5");
+    let mut running = run.start();
+    running.await_poses(2);
+    let link = Link::with_tls();
+    let sends = |certificates: &Certificates| {
+        let mut send = link.end("send", run.out());
+        certificates.give(&mut send, "base", ours.path("ca.pem"));
+        send.spawn().unwrap()
+    };
+    let receives = |certificates: &Certificates, seconds: &str| {
+        let seen = run.folder().join("seen");
+        let mut receive = link.end("receive", &seen);
+        certificates.give(&mut receive, "robot", ours.path("ca.pem"));
+        let interrupted = ["timeout", "-s", "INT", seconds];
+        Ended::of(wrapped(&interrupted, &receive)).stderr
+    };
+    let mut good = sends(&ours);
+    let seen = |said: &str| said.contains("is here as");
+    let said = receives(&theirs, "4");
+    assert!(!seen(&said), "a stranger has received: {said}");
+    good.kill().unwrap();
+    good.wait().unwrap();
+    let mut stranger = sends(&theirs);
+    let said = receives(&ours, "4");
+    assert!(!seen(&said), "a stranger has sent: {said}");
+    stranger.kill().unwrap();
+    stranger.wait().unwrap();
+    let mut good = sends(&ours);
+    let said = receives(&ours, "10");
+    assert!(seen(&said), "{said}");
+    good.kill().unwrap();
+    good.wait().unwrap();
+    running.kill_supervisor();
+}
+
+/// A free port of this machine, at which one looks on.
+struct Link {
+    address: String,
+}
+
+impl Link {
+    fn new() -> Self {
+        Self {
+            address: endpoint(),
+        }
+    }
+
+    fn with_tls() -> Self {
+        Self {
+            address: endpoint().replace("tcp/", "tls/"),
+        }
+    }
+
+    /// Returns the command of an end.
+    fn end(&self, end: &str, out: &Path) -> Command {
+        let mut command = gyre();
+        command.args(["link", end]).arg(out);
+        let option = if end == "send" {
+            "--listen"
+        } else {
+            "--connect"
+        };
+        command.args([option, &self.address]);
+        command
+    }
+
+    fn start(&self, end: &str, out: &Path) -> thread::JoinHandle<Ended> {
+        let command = self.end(end, out);
+        thread::spawn(move || Ended::of(command))
+    }
+}
+
+/// The number of poses in a folder, with the end.
+fn poses(out: &Path) -> usize {
+    journal::records(&journal::path(out)).map_or(0, |records| records.into_iter().flatten().count())
+}
+
+fn await_poses(out: &Path) {
+    let since = Instant::now();
+    while poses(out) < 2 {
+        assert!(since.elapsed() < PATIENCE, "waited in vain for poses");
+        thread::sleep(Duration::from_millis(20));
+    }
 }
 
 #[test]
@@ -179,21 +328,70 @@ fn a_cut_of_five_seconds_between_two_machines_loses_nothing() {
     assert!(robot.odometry() == undisturbed());
 }
 
+/// An authority, and the certificates that it has signed for a base and a robot.
+struct Certificates {
+    folder: tempfile::TempDir,
+}
+
+impl Certificates {
+    /// Makes them as docs/link.md has it.
+    fn of(base: &str, robot: &str) -> Self {
+        let script = r#"
+            set -e
+            openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 3650 -subj /CN=gyre-link -keyout ca.key -out ca.pem
+            for side in base:IP:$1 robot:IP:$2; do
+                name=${side%%:*}
+                openssl req -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -subj /CN=$name -keyout $name.key -out $name.csr
+                printf 'subjectAltName=%s\nextendedKeyUsage=serverAuth,clientAuth\n' ${side#*:} > $name.ext
+                openssl x509 -req -in $name.csr -CA ca.pem -CAkey ca.key -CAcreateserial -days 825 -extfile $name.ext -out $name.pem
+            done"#;
+        let folder = crate::common::folder();
+        let mut command = Command::new("sh");
+        command
+            .args(["-c", script, "sh", base, robot])
+            .current_dir(folder.path());
+        Ended::of(command).succeeded();
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// Returns the files of a side, by the keys of the configuration.
+    fn files(&self, side: &str) -> [(&'static str, PathBuf); 3] {
+        [
+            ("ca", self.path("ca.pem")),
+            ("certificate", self.path(&format!("{side}.pem"))),
+            ("key", self.path(&format!("{side}.key"))),
+        ]
+    }
+
+    /// Has an end of a link show the certificate of a side, and believe an authority.
+    fn give(&self, command: &mut Command, side: &str, ca: PathBuf) {
+        let [_, certificate, key] = self.files(side);
+        for (key, path) in [("ca", ca), certificate, key] {
+            command.arg(format!("--{key}")).arg(path);
+        }
+    }
+}
+
 /// Two machines: network namespaces with a cable between them, and certificates of both.
 struct Machines {
     names: [String; 2],
     subnet: String,
-    folder: tempfile::TempDir,
+    certificates: Certificates,
 }
 
 impl Machines {
     /// Says so and returns `None` where that is not permitted.
     fn new() -> Option<Self> {
         let id = process::id() % 65536;
+        let subnet = format!("10.{}.{}", 64 + id / 256 % 128, id % 256);
         let machines = Self {
             names: ["a", "b"].map(|end| format!("gy{id:x}{end}")),
-            subnet: format!("10.{}.{}", 64 + id / 256 % 128, id % 256),
-            folder: crate::common::folder(),
+            certificates: Certificates::of(&format!("{subnet}.1"), &format!("{subnet}.2")),
+            subnet,
         };
         let [a, b] = &machines.names;
         let made = [a, b].iter().all(|name| ip(&["netns", "add", name]))
@@ -210,41 +408,14 @@ impl Machines {
             println!("skipped: network namespaces need root and iproute2");
             return None;
         }
-        machines.make_certificates();
         Some(machines)
     }
 
-    /// As docs/link.md has it.
-    fn make_certificates(&self) {
-        let script = r#"
-            set -e
-            openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 3650 -subj /CN=gyre-link -keyout ca.key -out ca.pem
-            for side in base:IP:$1.1 robot:IP:$1.2; do
-                name=${side%%:*}
-                openssl req -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -subj /CN=$name -keyout $name.key -out $name.csr
-                printf 'subjectAltName=%s\nextendedKeyUsage=serverAuth,clientAuth\n' ${side#*:} > $name.ext
-                openssl x509 -req -in $name.csr -CA ca.pem -CAkey ca.key -CAcreateserial -days 825 -extfile $name.ext -out $name.pem
-            done"#;
-        let mut command = Command::new("sh");
-        command.args(["-c", script, "sh", &self.subnet]);
-        Ended::of({
-            command.current_dir(self.folder.path());
-            command
-        })
-        .succeeded();
-    }
-
     fn with_certificates(&self, side: Run) -> Run {
-        let file = |name: String| -> PathBuf { self.folder.path().join(name) };
         let base = side.command().get_args().any(|it| it == "link.side='base'");
         let name = if base { "base" } else { "robot" };
-        [
-            ("ca", file("ca.pem".to_owned())),
-            ("certificate", file(format!("{name}.pem"))),
-            ("key", file(format!("{name}.key"))),
-        ]
-        .into_iter()
-        .fold(side, |side, (key, path)| {
+        let files = self.certificates.files(name);
+        files.into_iter().fold(side, |side, (key, path)| {
             side.set(&format!("link.{key}='{}'", path.display()))
         })
     }

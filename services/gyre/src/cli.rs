@@ -2,8 +2,10 @@
 
 mod batch;
 mod conformance;
+mod evaluate;
 mod export;
 mod link;
+mod map;
 mod operate;
 mod radar_server;
 mod record;
@@ -15,26 +17,24 @@ mod watch;
 use std::{num::NonZeroUsize, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use gyre_evaluation::Part;
-use gyre_mapping::Origin;
 use gyre_simulator::OutputFormat;
 
 use crate::configuration::Rate;
 pub use batch::{BatchArguments, BatchDriveArguments};
 pub use conformance::ConformanceArguments;
+pub use evaluate::EvaluateArguments;
 pub use export::{ExportArguments, ScanForm};
 pub use link::{LinkArguments, LinkEnd, NetworkArguments, ReceiveArguments, SendArguments};
-
+pub use map::{MapArguments, MapFormat};
 pub use operate::{
     LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments, TopArguments,
 };
-pub use shadow::ShadowArguments;
-pub use stress::StressArguments;
-pub use watch::WatchArguments;
-
 pub use radar_server::RadarServerArguments;
 pub use record::{RecordArguments, SplitArguments};
 pub use ros2::{Names, Ros2Arguments};
+pub use shadow::ShadowArguments;
+pub use stress::StressArguments;
+pub use watch::WatchArguments;
 
 /// Radar odometry as cooperating processes over shared memory.
 ///
@@ -215,82 +215,9 @@ pub struct InspectArguments {
     /// Print JSON.
     #[arg(long)]
     pub json: bool,
-}
-
-/// The arguments of `gyre evaluate`.
-#[derive(Debug, Args)]
-pub struct EvaluateArguments {
-    /// The trajectory to evaluate: TUM, KITTI, or a dataset's own format.
-    #[arg(long)]
-    pub estimate: PathBuf,
-    /// The ground truth: TUM, KITTI, Oxford radar_odometry.csv, Boreas radar_poses.csv, MulRan global_pose.csv.
-    #[arg(long)]
-    pub ground_truth: PathBuf,
-    /// Poses between the starts of the segments that are measured.
-    #[arg(long, default_value = "10")]
-    pub step: NonZeroUsize,
-    /// Print JSON.
-    #[arg(long)]
-    pub json: bool,
-    /// Write trajectory.svg, errors.svg and, where there are covariances, bands.svg here.
-    #[arg(long)]
-    pub plots: Option<PathBuf>,
-    /// The motions whose covariances are evaluated. Default: the odometry.csv beside the estimate, if it has the same stamps.
-    #[arg(long)]
-    pub odometry: Option<PathBuf>,
-    /// Lengths, in motions, of the segments over which covariances are evaluated.
-    #[arg(long, value_delimiter = ',', default_value = "1,4,16,64")]
-    pub nees_lengths: Vec<NonZeroUsize>,
-    /// The part of the drive whose covariances are evaluated: all, or from A to B percent of its time as in 0..50. Scales that are
-    /// tuned on one part can be validated on another.
-    #[arg(long, value_name = "A..B", default_value = "all", value_parser = part)]
-    pub nees_part: Part,
-    /// Standard deviation of the ground truth's x and y, m: added to the covariances that are evaluated.
-    #[arg(long, default_value = "0", value_parser = sigma)]
-    pub truth_sigma_m: f64,
-    /// Standard deviation of the ground truth's heading, degrees.
-    #[arg(long, default_value = "0", value_parser = sigma)]
-    pub truth_sigma_deg: f64,
-}
-
-/// The arguments of `gyre map`.
-#[derive(Debug, Args)]
-pub struct MapArguments {
-    /// The folder of the run's results, its --out, with journal/keyframes.log.
-    pub run: PathBuf,
-    /// The folder of the map.
-    #[arg(long)]
-    pub out: PathBuf,
-    /// What is written: the map's own folder, map.png, map.tif, map.pgm with map.yaml for map_server, or web tiles.
-    #[arg(long, value_enum, value_delimiter = ',', default_value = "folder,png")]
-    pub format: Vec<MapFormat>,
-    /// Draw along this trajectory (TUM). Default: the run's trajectory_slam.tum, or its trajectory.tum.
-    #[arg(long, value_name = "FILE")]
-    pub trajectory: Option<PathBuf>,
-    /// Place the run in this map of earlier drives, and write a map of all. Its cells and its place on the earth stay.
-    #[arg(long, value_name = "MAP", conflicts_with_all = ["trajectory", "cell_m", "origin"])]
-    pub extend: Option<PathBuf>,
-    /// Side of a cell, m.
-    #[arg(long, default_value = "0.2")]
-    pub cell_m: f64,
-    /// Place of the first keyframe on the earth and its heading, degrees: latitude, longitude (WGS 84), clockwise from true north.
-    #[arg(long, value_name = "LAT,LON,HEADING", value_parser = origin, allow_hyphen_values = true)]
-    pub origin: Option<Origin>,
-}
-
-/// The forms of a map.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum MapFormat {
-    /// map.toml and tiles/X_Y.png.
-    Folder,
-    /// map.png: the whole map with the trajectory in it.
-    Png,
-    /// map.tif, a GeoTIFF.
-    Geotiff,
-    /// map.pgm and map.yaml.
-    Pgm,
-    /// web/Z/X/Y.png.
-    Web,
+    /// Override a key of [dataset], as in dataset.topic=/radar_data/fft_data; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
 }
 
 /// The arguments of `gyre localise`.
@@ -392,80 +319,9 @@ pub struct SimulateArguments {
     pub set: Vec<String>,
 }
 
-/// Parses a standard deviation: a number, not below zero.
-fn sigma(text: &str) -> Result<f64, String> {
-    let sigma = text
-        .parse()
-        .ok()
-        .filter(|sigma: &f64| sigma.is_finite() && *sigma >= 0.0);
-    sigma.ok_or_else(|| "a number of at least 0 is needed".to_owned())
-}
-
 /// Parses a length: a positive number.
 fn length(text: &str) -> Result<f64, String> {
     let length = text.parse().ok();
     let length = length.filter(|length: &f64| length.is_finite() && *length > 0.0);
     length.ok_or_else(|| "a number above 0 is needed".to_owned())
-}
-
-/// Parses latitude, longitude and heading in degrees.
-fn origin(text: &str) -> Result<Origin, String> {
-    let numbers: Result<Vec<f64>, _> = text.split(',').map(|n| n.trim().parse()).collect();
-    let Ok([latitude_deg, longitude_deg, heading_deg]) = numbers.as_deref() else {
-        return Err("three numbers are needed, as in 51.76,-1.26,90".to_owned());
-    };
-    let origin = Origin {
-        latitude_deg: *latitude_deg,
-        longitude_deg: *longitude_deg,
-        heading_deg: *heading_deg,
-    };
-    origin.validate().map_err(|error| error.to_string())?;
-    Ok(origin)
-}
-
-/// Parses `all`, or `A..B` in percent.
-fn part(text: &str) -> Result<Part, String> {
-    let share = |percent: &str| percent.parse::<f64>().ok().map(|percent| percent / 100.0);
-    let range = || {
-        let (from, to) = text.split_once("..")?;
-        Part::new(share(from)?, share(to)?)
-    };
-    match text {
-        "all" => Ok(Part::ALL),
-        _ => range().ok_or_else(|| {
-            "`all` or a range of percent from 0..100 is needed, as in 0..50".to_owned()
-        }),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_origin_is_three_numbers_on_the_earth() {
-        let edinburgh =
-            origin("55.95, -3.2,90").map(|o| (o.latitude_deg, o.longitude_deg, o.heading_deg));
-        assert_eq!(edinburgh, Ok((55.95, -3.2, 90.0)));
-        for text in [
-            "",
-            "55.95,-3.2",
-            "55.95,-3.2,90,0",
-            "north,0,0",
-            "91,0,0",
-            "nan,0,0",
-        ] {
-            assert!(origin(text).is_err(), "{text}");
-        }
-    }
-
-    #[test]
-    fn parts_are_all_or_a_range_of_percent() {
-        assert_eq!(part("all"), Ok(Part::ALL));
-        assert_eq!(part("0..100"), Ok(Part::ALL));
-        assert_eq!(part("12.5..50").ok(), Part::new(0.125, 0.5));
-        for text in ["", "half", "50", "50..", "60..50", "0..101", "nan..50"] {
-            assert!(part(text).is_err(), "{text}");
-        }
-    }
 }

@@ -2,21 +2,24 @@
 
 use std::process::ExitCode;
 
-use gyre_radar::{DatasetOptions, ground_truth::read_trajectory};
+use gyre_radar::ground_truth::read_trajectory;
 
-use crate::{Failure, cli::InspectArguments, print};
+use crate::{Failure, cli::InspectArguments, configuration::Configuration, print};
 
 /// Prints what a dataset contains and what looks wrong with it.
 ///
 /// # Errors
-/// A folder that is not a dataset, a trajectory that cannot be read.
+/// A folder that is not a dataset, a trajectory that cannot be read, a key that is none.
 pub fn inspect(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
     let trajectory = arguments
         .trajectory
         .as_deref()
         .map(read_trajectory)
         .transpose()?;
-    let (path, options) = (&arguments.path, DatasetOptions::default());
+    let (path, options) = (
+        &arguments.path,
+        Configuration::of_overrides(&arguments.set)?.dataset,
+    );
     let dataset = gyre_recording::open(path, &options)?;
     let report = gyre_radar::inspect_dataset(path, dataset, &options, trajectory.as_ref());
     match arguments.json {

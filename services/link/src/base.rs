@@ -9,7 +9,8 @@ use std::{
         Arc,
         mpsc::{Receiver, channel},
     },
-    time::Duration,
+    thread,
+    time::{Duration, Instant},
 };
 
 use gyre_messages::{Item, Message as _, Motion, Pose, flag, topic};
@@ -31,8 +32,12 @@ use crate::{
     wake::Sleeper,
 };
 
-/// Time for the last answers to leave when the run has ended.
-const FAREWELL: Duration = Duration::from_millis(500);
+/// Time, when the run has ended, for the robot to learn that this side has all of it. After 2 s the supervisor ends this process.
+const FAREWELL: Duration = Duration::from_millis(1500);
+/// Time for the last answers to leave.
+const LAST_ANSWERS: Duration = Duration::from_millis(300);
+/// Time between two looks whether the robot knows.
+const LOOK: Duration = Duration::from_millis(20);
 
 /// Runs the base's side until SIGTERM.
 ///
@@ -58,6 +63,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
         config,
         published: None,
         resumed: Item::default(),
+        drive: None,
         sleeper,
         session,
     };
@@ -77,6 +83,8 @@ struct Base<'a> {
     published: Option<u64>,
     /// The newest pose when this process started.
     resumed: Item,
+    /// The drive of the robot that was last let go on.
+    drive: Option<String>,
     session: Session,
     sleeper: Sleeper,
 }
@@ -126,12 +134,29 @@ impl Base<'_> {
                 break;
             }
         }
-        if end.is_some() {
-            self.stages.update()?;
-            self.confirm(end.as_ref(), &coming);
-            std::thread::sleep(FAREWELL);
+        self.stages.update()?;
+        if let Some(end) = end.filter(|_| self.stages.has_ended()) {
+            self.say_farewell(&end, &coming);
         }
         Ok(())
+    }
+
+    /// Waits until the robot knows that all of the run is here, without which it would wait for that.
+    fn say_farewell(&self, end: &Item, coming: &[Coming]) {
+        let next = end.seq.saturating_add(1);
+        self.confirm(Some(end), coming);
+        let since = Instant::now();
+        let is_confirmed = |topic: &Coming| topic.fetcher.is_confirmed(next);
+        while !coming.iter().all(is_confirmed) {
+            if since.elapsed() > FAREWELL {
+                tracing::warn!(
+                    "the robot is out of reach at the end, and waits for this side: it has all poses, and ends by Ctrl-C"
+                );
+                return;
+            }
+            thread::sleep(LOOK);
+        }
+        thread::sleep(LAST_ANSWERS);
     }
 
     /// Lets the robot know that this side has the end in its journal.
@@ -203,6 +228,7 @@ impl Base<'_> {
             let request = Request {
                 key: format!("{prefix}/{name}"),
                 from,
+                receiver: self.session.zid().to_string(),
                 priority: Priority::Data,
             };
             Coming {
@@ -235,17 +261,22 @@ impl Base<'_> {
     }
 
     /// Answers a robot that starts; true if it goes on from here.
-    fn answer(&self, query: &Query, another_is_there: bool) -> Result<bool, LinkError> {
+    fn answer(&mut self, query: &Query, another_is_there: bool) -> Result<bool, LinkError> {
         let ours = Agreement::of(&self.launch.manifest, &self.config, &self.topics);
         let bytes = query
             .payload()
             .map(|payload| payload.to_bytes().into_owned());
         let theirs = serde_json::from_slice::<Agreement>(&bytes.unwrap_or_default());
+        let drive = theirs.as_ref().ok().and_then(|theirs| theirs.drive.clone());
+        let is_other = self.drive.is_some() && drive != self.drive && self.next() > 0;
         let answer = match theirs.map(|theirs| ours.difference(&theirs)) {
             Err(_) => Answer::Refused(
                 "the base is another version of gyre: install the same on both".to_owned(),
             ),
             Ok(Some(difference)) => Answer::Refused(difference),
+            Ok(None) if is_other => Answer::Refused(
+                "the base has poses of another drive: begin both anew with --fresh".to_owned(),
+            ),
             Ok(None) if another_is_there => Answer::Wait(
                 "another robot is on this link, or was a moment ago: each has a name of its own (link.name)".to_owned(),
             ),
@@ -256,7 +287,11 @@ impl Base<'_> {
         }
         let text = serde_json::to_vec(&answer).map_err(|e| LinkError::zenoh("answer", &e))?;
         let replied = query.reply(begin::key(&self.config), text).wait();
-        Ok(replied.is_ok() && matches!(answer, Answer::Go(_)))
+        let goes_on = replied.is_ok() && matches!(answer, Answer::Go(_));
+        if goes_on {
+            self.drive = drive;
+        }
+        Ok(goes_on)
     }
 
     /// Publishes the next item if all of it has come; returns whether it has.

@@ -1,6 +1,6 @@
 //! How the two sides of a split run agree where to go on, each time when the robot's side starts.
 
-use std::{thread, time::Duration};
+use std::{fs, path::Path, thread, time::Duration};
 
 use gyre_messages::{Limits, topic};
 use gyre_stage::Manifest;
@@ -79,6 +79,8 @@ pub(crate) struct Agreement {
     limits: Limits,
     /// The topics that cross the link, with the versions of their messages.
     topics: Vec<(String, String)>,
+    /// What tells the robot's drive from another one, where anything does.
+    pub drive: Option<String>,
 }
 
 /// The answer to a robot that starts.
@@ -112,6 +114,7 @@ impl Agreement {
                 .chain(&["motion", "pose"])
                 .map(versioned)
                 .collect(),
+            drive: drive(&manifest.out),
         }
     }
 
@@ -169,17 +172,31 @@ impl Agreement {
                 )
             })
             .or_else(|| {
-                self.topics.iter().find_map(|(name, version)| {
-                    let theirs = robot.topics.iter().find(|(topic, _)| topic == name);
-                    let theirs = theirs.map_or("not sent", |(_, version)| version);
-                    differs(
-                        &format!("topic `{name}`"),
-                        theirs.to_owned(),
-                        version.clone(),
-                    )
+                differs(
+                    "the scans that stages look back",
+                    robot.look_back.to_string(),
+                    self.look_back.to_string(),
+                )
+            })
+            .or_else(|| {
+                // A topic that only one side has would be waited for to the end.
+                let both = self.topics.iter().chain(&robot.topics);
+                both.map(|(name, _)| name).find_map(|name| {
+                    let of = |side: &Self| {
+                        let found = side.topics.iter().find(|(topic, _)| topic == name);
+                        found.map_or("none", |(_, version)| version).to_owned()
+                    };
+                    differs(&format!("topic `{name}`"), of(robot), of(self))
                 })
             })
     }
+}
+
+/// Returns what tells the recording that a run plays from another one; `None` of a radar, and on the base.
+fn drive(out: &Path) -> Option<String> {
+    let text = fs::read_to_string(out.join("journal/run.toml")).ok()?;
+    let begun: toml::Table = text.parse().ok()?;
+    Some(begun.get("recording")?.get("sha256")?.as_str()?.to_owned())
 }
 
 /// Asks the base where to go on; `None`: it does not answer.

@@ -32,7 +32,7 @@ pub struct LinkConfig {
     /// Where this side waits for the other, as in `tls/0.0.0.0:7447`; `tcp/` on loopback addresses alone.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub listen: Vec<String>,
-    /// Where this side reaches the other, or a router between them, as in `tls/base.example:7447`.
+    /// Where this side reaches the other, or a router between them, as in `tls/base.internal:7447`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub connect: Vec<String>,
     /// Certificate of the authority that has signed those of both sides, PEM.

@@ -6,7 +6,7 @@ use std::{
         atomic::{AtomicBool, AtomicU64, Ordering},
         mpsc::{Receiver, Sender, channel},
     },
-    thread,
+    thread::{self, JoinHandle},
     time::{Duration, Instant},
 };
 
@@ -14,11 +14,11 @@ use gyre_messages::{Item, flag};
 use zenoh::{
     Session, Wait,
     qos::{CongestionControl, Priority},
-    query::{ConsolidationMode, Reply},
+    query::{ConsolidationMode, Reply, ReplyError},
 };
 
 use crate::{
-    serve::{ANSWERED_FOR, ENDED, FROM, RECEIVER},
+    serve::{ANSWERED_FOR, DONE, ENDED, FROM, RECEIVER},
     wake::Waker,
 };
 
@@ -28,6 +28,9 @@ const GIVEN_UP: Duration = ANSWERED_FOR.saturating_add(Duration::from_secs(10));
 /// may take seconds on a slow network.
 const UNANSWERED: Duration = Duration::from_secs(3);
 const SILENT: Duration = Duration::from_secs(12);
+/// Time for the answer to the word that nothing more is wanted, and how often it is said.
+const DONE_ANSWER: Duration = Duration::from_secs(1);
+const DONE_TIMES: usize = 3;
 /// Time between two looks whether to go on.
 const LOOK: Duration = Duration::from_millis(200);
 /// Pauses between requests that nobody has answered, from the first to the longest.
@@ -37,15 +40,20 @@ const PAUSES: (Duration, Duration) = (Duration::from_millis(50), Duration::from_
 pub(crate) struct Fetcher {
     messages: Receiver<Vec<u8>>,
     state: Arc<State>,
+    thread: Option<JoinHandle<()>>,
 }
 
 struct State {
     stop: AtomicBool,
+    /// Whether the sender is told so when this stops.
+    leaves: AtomicBool,
     again: AtomicBool,
     is_connected: AtomicBool,
     has_ended: AtomicBool,
     /// The first message of the newest request.
     asked: AtomicU64,
+    /// The first message of the newest request that was answered.
+    answered: AtomicU64,
     /// The first message of those to come: see [`Fetcher::confirm`].
     confirmed: AtomicU64,
 }
@@ -56,6 +64,8 @@ pub(crate) struct Request {
     pub key: String,
     /// The first message.
     pub from: u64,
+    /// What tells this receiver from others, and is the same when it begins again.
+    pub receiver: String,
     /// Poses go before scans.
     pub priority: Priority,
 }
@@ -66,23 +76,27 @@ impl Fetcher {
         let (sender, messages) = channel();
         let state = Arc::new(State {
             stop: AtomicBool::new(false),
+            leaves: AtomicBool::new(false),
             again: AtomicBool::new(false),
             is_connected: AtomicBool::new(false),
             has_ended: AtomicBool::new(false),
             asked: AtomicU64::new(request.from),
+            answered: AtomicU64::new(0),
             confirmed: AtomicU64::new(request.from),
         });
         let asking = Asking {
             session: session.clone(),
-            receiver: session.zid().to_string(),
             request,
             sender,
             waker,
             has_end: false,
             state: state.clone(),
         };
-        thread::spawn(move || asking.run());
-        Self { messages, state }
+        Self {
+            messages,
+            state,
+            thread: Some(thread::spawn(move || asking.run())),
+        }
     }
 
     /// Returns the next message that has come.
@@ -96,6 +110,21 @@ impl Fetcher {
         self.state.confirmed.fetch_max(next, Ordering::Relaxed);
         if self.state.asked.load(Ordering::Relaxed) < next {
             self.state.again.store(true, Ordering::Relaxed);
+        }
+    }
+
+    /// Returns whether the other side knows that all before message `next` has arrived.
+    pub fn is_confirmed(&self, next: u64) -> bool {
+        self.state.answered.load(Ordering::Relaxed) >= next
+    }
+
+    /// Tells the other side that nothing more is wanted, if it can be reached.
+    pub fn leave(mut self) {
+        self.state.leaves.store(true, Ordering::Relaxed);
+        self.state.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            // It does not panic.
+            let _ = thread.join();
         }
     }
 
@@ -118,7 +147,6 @@ impl Drop for Fetcher {
 
 struct Asking {
     session: Session,
-    receiver: String,
     request: Request,
     sender: Sender<Vec<u8>>,
     waker: Waker,
@@ -140,6 +168,23 @@ impl Asking {
                 }
             }
         }
+        let has_said = self.state.has_ended.load(Ordering::Relaxed);
+        if self.state.leaves.load(Ordering::Relaxed) && !has_said {
+            self.say_done();
+        }
+    }
+
+    /// Tells the sender that nothing more is wanted, so that it need not wait for this receiver.
+    fn say_done(&self) {
+        let Request { key, receiver, .. } = &self.request;
+        for _ in 0..DONE_TIMES {
+            let selector = format!("{key}?{DONE}=1;{RECEIVER}={receiver}");
+            let asked = self.session.get(selector).timeout(DONE_ANSWER).wait();
+            let answer = asked.ok().and_then(|answers| answers.recv().ok());
+            if answer.is_some_and(|answer| answer.into_result().is_err_and(|it| is_end(&it))) {
+                return;
+            }
+        }
     }
 
     /// Asks once, and takes the answers until they end; returns whether there were any.
@@ -149,9 +194,10 @@ impl Asking {
         let Request {
             key,
             from,
+            receiver,
             priority,
         } = &self.request;
-        let selector = format!("{key}?{FROM}={from};{RECEIVER}={}", self.receiver);
+        let selector = format!("{key}?{FROM}={from};{RECEIVER}={receiver}");
         let asked = self
             .session
             .get(selector)
@@ -192,7 +238,8 @@ impl Asking {
         let sample = match reply.into_result() {
             Ok(sample) => sample,
             Err(error) => {
-                if &*error.payload().to_bytes() == ENDED.as_bytes() {
+                if is_end(&error) {
+                    self.say_done();
                     self.state.has_ended.store(true, Ordering::Release);
                     self.state.stop.store(true, Ordering::Relaxed);
                     self.waker.wake();
@@ -201,6 +248,8 @@ impl Asking {
             }
         };
         self.set_connected(true);
+        let asked = self.state.asked.load(Ordering::Relaxed);
+        self.state.answered.store(asked, Ordering::Relaxed);
         let bytes = sample.payload().to_bytes().into_owned();
         // The first answer is empty.
         let item = bytes.get(..size_of::<Item>());
@@ -237,4 +286,9 @@ impl Asking {
     fn has_stopped(&self) -> bool {
         self.state.stop.load(Ordering::Relaxed)
     }
+}
+
+/// Returns whether an answer says that no message follows; others are of the network layer.
+fn is_end(error: &ReplyError) -> bool {
+    *error.payload().to_bytes() == *ENDED.as_bytes()
 }

@@ -35,7 +35,7 @@ pub struct Network {
 pub enum NetworkError {
     /// Nothing to connect.
     #[error(
-        "no endpoint is named: give one side `listen`, as in tls/0.0.0.0:7447, and the other `connect`, as in tls/base.example:7447"
+        "no endpoint is named: give one side `listen`, as in tls/0.0.0.0:7447, and the other `connect`, as in tls/base.internal:7447"
     )]
     NoEndpoint,
     /// Not an endpoint.
@@ -66,10 +66,26 @@ pub enum NetworkError {
         /// The system's reason.
         reason: String,
     },
+    /// A host for which a public authority might sign a certificate of somebody else.
+    #[error(
+        "{0} has a public name or address, for which others may have a certificate that is believed: connect to a private address, or to a name within `.internal` (in /etc/hosts, and in the certificate)"
+    )]
+    Public(String),
     /// A name that cannot be part of a key.
     #[error("`{0}` is no name of a link: it has letters, digits, `-` and `_`")]
     Name(String),
 }
+
+/// The ends of names that no public authority certifies: private zones, and those of documents.
+const PRIVATE_ZONES: [&str; 7] = [
+    ".internal",
+    ".lan",
+    ".local",
+    ".home.arpa",
+    ".test",
+    ".example",
+    ".localhost",
+];
 
 /// The protocol of an endpoint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,7 +111,12 @@ impl Network {
         endpoints.try_for_each(|endpoint| match protocol(endpoint)? {
             Protocol::Tcp => Ok(()),
             Protocol::Tls => self.check_certificates(endpoint),
-        })
+        })?;
+        // A side that connects also believes the public authorities (zenoh adds `ca` to them), whose certificates others can have.
+        match self.connect.iter().find(|endpoint| is_public(endpoint)) {
+            Some(endpoint) => Err(NetworkError::Public(endpoint.clone())),
+            None => Ok(()),
+        }
     }
 
     fn endpoints(&self) -> impl Iterator<Item = &str> {
@@ -141,6 +162,26 @@ fn protocol(endpoint: &str) -> Result<Protocol, NetworkError> {
         "tcp" if is_loopback(host) => Ok(Protocol::Tcp),
         "tcp" => Err(NetworkError::Plain(endpoint.to_owned())),
         _ => Err(malformed()),
+    }
+}
+
+/// Returns whether a public authority might certify the host of an endpoint for somebody else.
+fn is_public(endpoint: &str) -> bool {
+    let address = endpoint.split_once('/').map_or(endpoint, |(_, it)| it);
+    let host = address.rsplit_once(':').map_or(address, |(host, _)| host);
+    match host.trim_matches(['[', ']']).parse::<IpAddr>() {
+        Ok(IpAddr::V4(it)) => {
+            // 100.64.0.0/10 is of networks behind a provider, as of most private overlays.
+            let is_shared = it.octets()[0] == 100 && (64..128).contains(&it.octets()[1]);
+            !(it.is_private() || it.is_loopback() || it.is_link_local() || is_shared)
+        }
+        Ok(IpAddr::V6(it)) => {
+            !(it.is_loopback() || it.is_unique_local() || it.is_unicast_link_local())
+        }
+        Err(_) => {
+            let name = host.trim_end_matches('.').to_ascii_lowercase();
+            name.contains('.') && !PRIVATE_ZONES.iter().any(|zone| name.ends_with(zone))
+        }
     }
 }
 
@@ -326,6 +367,44 @@ mod tests {
         assert!(lacks(&network).contains("cannot be read"));
         network.key = file("robot.key");
         assert_eq!(network.check(), Ok(()));
+    }
+
+    #[test]
+    fn who_connects_believes_no_public_authority() {
+        for host in [
+            "10.1.2.3",
+            "192.168.0.7",
+            "100.101.2.3",
+            "[fd00::1]",
+            "[fe80::1]",
+            "base",
+            "base.internal",
+            "base.example",
+            "Robot.Local.",
+        ] {
+            assert!(!is_public(&format!("tls/{host}:7447")), "{host}");
+        }
+        for host in [
+            "192.0.2.1",
+            "100.63.0.1",
+            "[2001:db8::1]",
+            "base.example.com",
+            "x.internal.org",
+        ] {
+            let endpoint = format!("tls/{host}:7447");
+            assert!(is_public(&endpoint), "{host}");
+        }
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let path = || file.path().to_owned();
+        let network = Network {
+            name: "robot-1".to_owned(),
+            connect: vec!["tls/base.example.com:7447".to_owned()],
+            ca: path(),
+            certificate: path(),
+            key: path(),
+            ..Network::default()
+        };
+        assert!(matches!(network.check(), Err(NetworkError::Public(_))));
     }
 
     #[test]

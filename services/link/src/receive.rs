@@ -3,6 +3,7 @@
 use std::{
     collections::BTreeMap,
     fmt,
+    hash::{DefaultHasher, Hash, Hasher},
     path::{Path, PathBuf},
     time::Duration,
 };
@@ -15,7 +16,7 @@ use gyre_stage::{
     supervise::rig::{Feed, Recorded, Rig},
     wake::{MAX_WAIT, Signals},
 };
-use zenoh::{Session, Wait, qos::Priority};
+use zenoh::{Session, Wait, handlers::FifoChannelHandler, qos::Priority, query::Reply};
 
 use crate::{
     LinkError, Network,
@@ -45,6 +46,9 @@ pub struct ReceiveOptions {
     pub topics: Vec<String>,
 }
 
+/// What is answered to a question.
+type Answers = FifoChannelHandler<Reply>;
+
 /// A run that can be looked at.
 pub struct Seen {
     session: Session,
@@ -56,6 +60,8 @@ pub struct Seen {
 pub struct Received {
     /// Of each topic the messages that came, those that were missed, and whether none may be missed.
     pub topics: BTreeMap<String, Count>,
+    /// Whether it ended on a request to stop, before the run.
+    pub is_interrupted: bool,
 }
 
 /// The messages of a topic.
@@ -174,22 +180,44 @@ pub fn receive(
     let rig = Rig::new(manifest, &seen.greeting.configuration, &guardian, signals)?;
     let _log = launch::start_log(rig.manifest(), NAME)?;
     let sleeper = Sleeper::new().map_err(|e| LinkError::zenoh("make a socket", &e))?;
+    let Seen { session, greeting } = seen;
     let mut mirror = Mirror {
+        session: session.clone(),
+        link: options.network.name.clone(),
+        receiver: receiver(&options.out),
         topics: Vec::new(),
         journal,
         next_pose,
+        question: None,
+        greeting,
         sleeper,
         rig,
     };
-    for offered in &seen.greeting.topics {
+    for offered in mirror.greeting.topics.clone() {
         if options.topics.is_empty() || options.topics.contains(&offered.name) {
-            let topic = mirror.open(&seen.session, &options.network.name, offered)?;
-            mirror.topics.push(topic);
+            mirror.topics.push(mirror.open(&offered)?);
         }
     }
     let received = mirror.run();
-    let _ = seen.session.close().wait();
+    mirror
+        .topics
+        .into_iter()
+        .for_each(|topic| topic.fetcher.leave());
+    let _ = session.close().wait();
     received
+}
+
+/// Returns what tells this receiver from others: its folder on its machine.
+fn receiver(out: &Path) -> String {
+    let mut hasher = DefaultHasher::new();
+    rustix::system::uname()
+        .nodename()
+        .to_bytes()
+        .hash(&mut hasher);
+    out.canonicalize()
+        .unwrap_or_else(|_| out.to_owned())
+        .hash(&mut hasher);
+    format!("{:016x}", hasher.finish())
 }
 
 /// Returns the number of the first pose that is not in the journal, which is of this drive or empty.
@@ -198,9 +226,7 @@ fn next_pose(journal: &Journal, greeting: &Greeting, out: &Path) -> Result<u64, 
     let Some(last) = last.first() else {
         return Ok(0);
     };
-    let mut records = journal::records(&journal::path(out))?.into_iter().flatten();
-    let began_ns = records.next().transpose()?.map(|pose| pose.item.stamp_ns);
-    match began_ns == greeting.began_ns && !ended {
+    match began_ns(out)? == greeting.began_ns && !ended {
         true => Ok(last.item.seq.saturating_add(1)),
         false => Err(LinkError::Refused(format!(
             "{} has the poses of another drive: choose another folder",
@@ -209,8 +235,21 @@ fn next_pose(journal: &Journal, greeting: &Greeting, out: &Path) -> Result<u64, 
     }
 }
 
+/// Returns the time of the first pose in a folder, ns since 1970.
+fn began_ns(out: &Path) -> Result<Option<i64>, LinkError> {
+    let mut records = journal::records(&journal::path(out))?.into_iter().flatten();
+    Ok(records.next().transpose()?.map(|pose| pose.item.stamp_ns))
+}
+
 /// The run that is made of another one.
 struct Mirror<'a> {
+    session: Session,
+    /// The name of the link.
+    link: String,
+    receiver: String,
+    greeting: Greeting,
+    /// Who is there, while nothing comes.
+    question: Option<Answers>,
     topics: Vec<Topic>,
     /// The poses that have come: they are not asked for again.
     journal: Journal,
@@ -229,25 +268,17 @@ struct Topic {
 }
 
 impl Mirror<'_> {
-    fn open(&self, session: &Session, link: &str, offered: &Offered) -> Result<Topic, LinkError> {
+    fn open(&self, offered: &Offered) -> Result<Topic, LinkError> {
         let other = || LinkError::Refused(OTHER_VERSION.to_owned());
         let topic = topic(&offered.name).ok_or_else(other)?;
-        let request = Request {
-            key: format!("{}/{}", prefix(link), topic.name),
-            from: match topic.name {
-                Pose::TOPIC => self.next_pose,
-                _ => 0,
-            },
-            // A scan takes long, and the poses need not wait for it.
-            priority: match offered.is_lossless {
-                true => Priority::InteractiveHigh,
-                false => Priority::DataLow,
-            },
+        let from = match topic.name {
+            Pose::TOPIC => self.next_pose,
+            _ => 0,
         };
         Ok(Topic {
             name: topic.name,
             header_bytes: topic.header_bytes,
-            fetcher: Fetcher::start(session, request, self.sleeper.waker()),
+            fetcher: self.fetch(topic.name, from, offered.is_lossless),
             feed: self.rig.feed(topic.name)?,
             next: None,
             count: Count {
@@ -255,6 +286,68 @@ impl Mirror<'_> {
                 ..Count::default()
             },
         })
+    }
+
+    /// Asks the sender for the messages of a topic from one on.
+    fn fetch(&self, topic: &str, from: u64, is_lossless: bool) -> Fetcher {
+        let request = Request {
+            key: format!("{}/{topic}", prefix(&self.link, &self.greeting.sender)),
+            from,
+            receiver: self.receiver.clone(),
+            // A scan takes long, and the poses need not wait for it.
+            priority: match is_lossless {
+                true => Priority::InteractiveHigh,
+                false => Priority::DataLow,
+            },
+        };
+        Fetcher::start(&self.session, request, self.sleeper.waker())
+    }
+
+    /// Asks whether another sender is there, and goes on with it if it sends the same drive.
+    fn look_for_another_sender(&mut self) -> Result<(), LinkError> {
+        let Some(question) = &self.question else {
+            let asked = self.session.get(greeting_key(&self.link)).timeout(ANSWER);
+            let asked = asked.wait();
+            self.question = Some(asked.map_err(|e| LinkError::zenoh("ask for a run", &e))?);
+            return Ok(());
+        };
+        let answer = match question.try_recv() {
+            Ok(None) => return Ok(()),
+            Ok(Some(reply)) => reply.into_result().ok(),
+            Err(_) => None,
+        };
+        self.question = None;
+        let Some(sample) = answer else {
+            return Ok(());
+        };
+        let other: Greeting = serde_json::from_slice(&sample.payload().to_bytes())
+            .map_err(|_| LinkError::Refused(OTHER_VERSION.to_owned()))?;
+        if other.sender == self.greeting.sender {
+            return Ok(());
+        }
+        let is_same = (other.window, other.limits, other.live, other.refines)
+            == (
+                self.greeting.window,
+                self.greeting.limits,
+                self.greeting.live,
+                self.greeting.refines,
+            );
+        let goes_on = self.next_pose == 0 || other.began_ns == began_ns(&self.rig.manifest().out)?;
+        if !is_same || !goes_on {
+            return Err(LinkError::Refused(
+                "the sender is at another drive now: what came of this one is whole up to here; receive the other one into another folder".to_owned(),
+            ));
+        }
+        self.greeting = other;
+        for place in 0..self.topics.len() {
+            let topic = &self.topics[place];
+            let from = match topic.name {
+                Pose::TOPIC => self.next_pose,
+                _ => topic.next.unwrap_or_default(),
+            };
+            self.topics[place].fetcher = self.fetch(topic.name, from, topic.count.is_lossless);
+        }
+        Ok(())
     }
 
     fn run(&mut self) -> Result<Received, LinkError> {
@@ -274,10 +367,14 @@ impl Mirror<'_> {
                 }
             }
             if have_ended {
-                return Ok(self.received());
+                return Ok(self.received(false));
             }
             let is_connected = self.topics.iter().any(|topic| topic.fetcher.is_connected());
             status.update(is_connected, self.next_pose);
+            match is_connected {
+                true => self.question = None,
+                false => self.look_for_another_sender()?,
+            }
             let feeds: Vec<&dyn Feed> = self.topics.iter().map(|topic| &*topic.feed).collect();
             for feed in &feeds {
                 feed.answer_handshakes()?;
@@ -287,14 +384,15 @@ impl Mirror<'_> {
                 .rig
                 .sleep_until_readable(&feeds, descriptor, MAX_WAIT)?
             {
-                return Ok(self.received());
+                return Ok(self.received(true));
             }
         }
     }
 
-    fn received(&self) -> Received {
+    fn received(&self, is_interrupted: bool) -> Received {
         let topics = self.topics.iter();
         Received {
+            is_interrupted,
             topics: topics
                 .map(|topic| (topic.name.to_owned(), topic.count))
                 .collect(),

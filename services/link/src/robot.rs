@@ -237,7 +237,7 @@ impl Robot<'_> {
         let mut end = None;
         while let Some(message) = self.stages.receive(place)? {
             let item = message.item().unwrap_or_default();
-            // The cut is the last of the topics: a scan is handed over when the base has all of it.
+            // The cut is the last of the topics: with it all of a scan is on its way.
             if place + 1 == topics {
                 self.sent.push_back(item);
                 self.sent.drain(..self.sent.len().saturating_sub(depth));
@@ -335,6 +335,7 @@ impl Robot<'_> {
         let request = Request {
             key: format!("{}/{topic}", begin::prefix(&self.config, Side::Base)),
             from: self.next_pose(),
+            receiver: self.session.zid().to_string(),
             priority: Priority::InteractiveHigh,
         };
         Fetcher::start(&self.session, request, self.sleeper.waker())

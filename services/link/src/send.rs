@@ -1,8 +1,9 @@
 //! Lets other machines look on at a run.
 //!
 //! To the run this process is an observer: the run neither waits for it nor fails with it. What must not be lost is sent from where it is
-//! kept: poses and their motions from the journal of the run, so that a receiver has all of them whenever it comes and however long the
-//! link was cut; the other messages without a payload from memory. Of scans and masked scans only the newest are kept.
+//! kept: poses and their motions from the journal of the run, and loops from the logs of its SLAM, so that a receiver has all of them whenever
+//! it comes and however long the link was cut; the other messages without a payload from memory. Of scans and masked scans only the newest are
+//! kept.
 
 use std::{
     collections::BTreeMap,
@@ -14,8 +15,7 @@ use std::{
 
 use gyre_loop_closure::LoggedLoops;
 use gyre_messages::{
-    FollowerId, Limits, Loop, Masked, Message as _, Motion, Pose, Refined, Scan, Sender, Window,
-    topic,
+    Limits, Loop, Masked, Message as _, Motion, Pose, Refined, Scan, Sender, Window, topic,
 };
 use gyre_stage::{
     Manifest, StageError, launch,
@@ -90,6 +90,8 @@ pub(crate) struct Greeting {
     pub refines: bool,
     pub rate: Option<f64>,
     pub configuration: String,
+    /// Tells one sender from the next: it is part of the keys.
+    pub sender: String,
     /// Time of the first pose, ns since 1970, if there is one: it tells one drive from another.
     pub began_ns: Option<i64>,
     pub topics: Vec<Offered>,
@@ -105,12 +107,14 @@ pub(crate) struct Offered {
     pub is_lossless: bool,
 }
 
-pub(crate) fn prefix(name: &str) -> String {
-    format!("gyre/view/{name}")
+/// Returns the prefix of the keys of the topics that one sender offers.
+pub(crate) fn prefix(name: &str, sender: &str) -> String {
+    format!("gyre/view/{name}/from/{sender}")
 }
 
+/// Returns the key at which any sender of a link says what it offers.
 pub(crate) fn greeting_key(name: &str) -> String {
-    format!("{}/greeting", prefix(name))
+    format!("gyre/view/{name}/greeting")
 }
 
 /// Sends the topics of a run until it ends and all receivers have what they are to have, or a signal requests a stop.
@@ -153,7 +157,11 @@ impl<'run> Sending<'run> {
         session: &Session,
     ) -> Result<Self, LinkError> {
         let manifest = run.manifest();
-        let mut server = Server::new(session, &prefix(&options.network.name), None);
+        let mut server = Server::new(
+            session,
+            &prefix(&options.network.name, &session.zid().to_string()),
+            None,
+        );
         let logs = Logs::of(manifest)?;
         let names = topics(&options.topics, manifest)?;
         let topics = names.iter().copied().map(|name| {
@@ -187,10 +195,7 @@ impl<'run> Sending<'run> {
                 self.topics.iter().try_for_each(|topic| topic.kept.end())?;
             }
             if let Some(ended) = ended {
-                let is_complete = self
-                    .topics
-                    .iter()
-                    .all(|it| it.offer.is_known_to_have_ended());
+                let is_complete = self.is_complete();
                 if is_complete || ended.elapsed() > linger {
                     // The last answer is on its way.
                     signals.sleep(MAX_WAIT)?;
@@ -207,13 +212,14 @@ impl<'run> Sending<'run> {
                 None => wait_for_any(signals, &listeners, MAX_WAIT)?,
             };
             if stops {
-                let is_complete = self
-                    .topics
-                    .iter()
-                    .all(|it| it.offer.is_known_to_have_ended());
-                return Ok(self.sent(is_complete));
+                return Ok(self.sent(self.is_complete()));
             }
         }
+    }
+
+    /// Returns whether all receivers have everything, or want no more.
+    fn is_complete(&self) -> bool {
+        self.topics.iter().all(|topic| topic.offer.is_done())
     }
 
     fn sent(&self, is_complete: bool) -> Sent {
@@ -313,7 +319,7 @@ fn is_lossless(topic: &str) -> bool {
 fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<&'static str>, LinkError> {
     let known = |name: &str| topic(name).ok_or_else(|| no_topic(name));
     let has = |name: &&str| match topic(name).map(|topic| topic.sender) {
-        Some(Sender::Follower(follower)) => has_follower(follower, manifest),
+        Some(Sender::Follower(follower)) => follower.is_in(&manifest.window),
         _ => *name != Refined::TOPIC || manifest.refines,
     };
     let named: Vec<&str> = match named.is_empty() {
@@ -328,10 +334,6 @@ fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<&'static str>, Li
         }
     }
     Ok(topics)
-}
-
-fn has_follower(follower: FollowerId, manifest: &Manifest) -> bool {
-    follower.is_in(&manifest.window)
 }
 
 fn no_topic(name: &str) -> LinkError {
@@ -364,6 +366,7 @@ fn greet(
         rate: manifest.rate,
         configuration: fs::read_to_string(&path)
             .map_err(|source| LinkError::File { path, source })?,
+        sender: session.zid().to_string(),
         began_ns: None,
         topics: names.iter().map(offered).collect(),
     };

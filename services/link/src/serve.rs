@@ -27,9 +27,7 @@ pub(crate) const ANSWERED_FOR: Duration = Duration::from_secs(20);
 const ALIVE: Duration = Duration::from_secs(1);
 /// Time between two looks whether a request is still wanted.
 const LOOK: Duration = Duration::from_millis(200);
-/// Time after which a receiver has gone that does not ask again.
-const GONE: Duration = ANSWERED_FOR.saturating_mul(2);
-/// Requests that are answered at once. One receiver has one for each topic.
+/// Requests of a topic that are answered at once. A receiver has one of each topic.
 const MAX_REQUESTS: usize = 64;
 
 /// The answer that says that no message follows.
@@ -38,6 +36,8 @@ pub(crate) const ENDED: &str = "ended";
 pub(crate) const FROM: &str = "from";
 /// The parameter that tells one receiver from another.
 pub(crate) const RECEIVER: &str = "receiver";
+/// The parameter of a receiver that has everything, or wants no more.
+pub(crate) const DONE: &str = "done";
 
 /// The topics that are offered to the other side.
 pub(crate) struct Server {
@@ -68,9 +68,8 @@ pub(crate) struct Offer {
 struct Asking {
     /// Number of its newest request.
     request: u64,
-    at: Instant,
-    /// Whether it knows that the topic has ended.
-    knows_end: bool,
+    /// Whether it has said that it wants no more.
+    is_done: bool,
 }
 
 impl Server {
@@ -128,13 +127,9 @@ impl Offer {
         (read(&self.messages), read(&self.bytes))
     }
 
-    /// Returns whether all receivers that have been there lately know that the topic has ended.
-    pub fn is_known_to_have_ended(&self) -> bool {
-        let is_gone = |asking: &Asking| asking.at.elapsed() > GONE;
-        let receivers = self.receivers();
-        receivers
-            .values()
-            .all(|asking| asking.knows_end || is_gone(asking))
+    /// Returns whether all receivers have said that they want no more. That an answer was sent does not tell that it has arrived.
+    pub fn is_done(&self) -> bool {
+        self.receivers().values().all(|asking| asking.is_done)
     }
 
     fn receivers(&self) -> MutexGuard<'_, BTreeMap<String, Asking>> {
@@ -148,6 +143,11 @@ impl Offer {
         let parameters = query.parameters();
         let from = parameters.get(FROM).and_then(|from| from.parse().ok());
         let receiver = parameters.get(RECEIVER).unwrap_or_default().to_owned();
+        if parameters.get(DONE).is_some() {
+            self.replace(&receiver, true);
+            let _ = query.reply_err(ENDED).wait();
+            return;
+        }
         let running = self.running.fetch_add(1, Ordering::Relaxed);
         let Some(from) = from.filter(|_| running < MAX_REQUESTS as u64) else {
             self.running.fetch_sub(1, Ordering::Relaxed);
@@ -157,13 +157,17 @@ impl Offer {
         if let Some(waker) = &self.waker {
             waker.wake();
         }
-        let request = self.replace(&receiver);
-        let _ = thread::Builder::new().spawn(move || {
-            if let Err(error) = self.answer(&query, from, &receiver, request) {
-                tracing::debug!("{}: {error}", self.key);
+        let request = self.replace(&receiver, false);
+        let answering = self.clone();
+        let spawned = thread::Builder::new().spawn(move || {
+            if let Err(error) = answering.answer(&query, from, &receiver, request) {
+                tracing::debug!("{}: {error}", answering.key);
             }
-            self.running.fetch_sub(1, Ordering::Relaxed);
+            answering.running.fetch_sub(1, Ordering::Relaxed);
         });
+        if spawned.is_err() {
+            self.running.fetch_sub(1, Ordering::Relaxed);
+        }
     }
 
     fn answer(
@@ -192,17 +196,11 @@ impl Offer {
                     said = Instant::now();
                 }
                 Next::Nothing => {}
-                Next::Ended => return self.reply_ended(query, receiver),
+                Next::Ended => {
+                    let replied = query.reply_err(ENDED).wait();
+                    return replied.map_err(|e| LinkError::zenoh("send", &e));
+                }
             }
-        }
-        Ok(())
-    }
-
-    fn reply_ended(&self, query: &Query, receiver: &str) -> Result<(), LinkError> {
-        let replied = query.reply_err(ENDED).wait();
-        replied.map_err(|e| LinkError::zenoh("send", &e))?;
-        if let Some(asking) = self.receivers().get_mut(receiver) {
-            asking.knows_end = true;
         }
         Ok(())
     }
@@ -213,13 +211,12 @@ impl Offer {
     }
 
     /// Counts the requests of a receiver; returns the number of this one.
-    fn replace(&self, receiver: &str) -> u64 {
+    fn replace(&self, receiver: &str, is_done: bool) -> u64 {
         let mut receivers = self.receivers();
         let before = receivers.get(receiver).map_or(0, |asking| asking.request);
         let asking = Asking {
             request: before + 1,
-            at: Instant::now(),
-            knows_end: false,
+            is_done,
         };
         receivers.insert(receiver.to_owned(), asking);
         before + 1

@@ -74,6 +74,7 @@ fn fetcher(session: &Session, from: u64) -> (Fetcher, Sleeper) {
     let request = Request {
         key: "gyre/test/topic".to_owned(),
         from,
+        receiver: session.zid().to_string(),
         priority: Priority::Data,
     };
     (Fetcher::start(session, request, sleeper.waker()), sleeper)
@@ -124,10 +125,13 @@ fn a_receiver_gets_all_from_the_message_that_it_asks_for_and_knows_the_end() {
     until("the sender knows that all have arrived", || {
         offer.asked() == 6
     });
-    assert!(!offer.is_known_to_have_ended());
+    until("the receiver knows that the sender knows", || {
+        fetcher.is_confirmed(6)
+    });
+    assert!(!offer.is_done());
     ring.end();
     until("the receiver knows the end", || fetcher.has_ended());
-    until("the sender knows that", || offer.is_known_to_have_ended());
+    assert!(offer.is_done(), "the receiver has said so before");
     assert_eq!(offer.sent().0, 3);
 }
 
@@ -152,6 +156,41 @@ fn a_receiver_goes_on_where_it_was_when_the_sender_comes_back() {
         here.close().wait().unwrap();
         until("the sender has gone", || !fetcher.is_connected());
     }
+}
+
+#[test]
+fn an_end_that_has_not_arrived_is_not_taken_for_known() {
+    let address = endpoint();
+    let here = open(listening(&address));
+    let there = open(connecting(&address));
+    let ring = Arc::new(Ring::of(100));
+    ring.push(message(0));
+    let mut server = Server::new(&here, "gyre/test", None);
+    let offer = server.offer("topic", ring.clone()).unwrap();
+    let (fetcher, _sleeper) = fetcher(&there, 0);
+    assert_eq!(take(&fetcher, 1), [0]);
+    // The receiver dies: the end is sent to nobody.
+    drop(fetcher);
+    there.close().wait().unwrap();
+    ring.end();
+    thread::sleep(Duration::from_secs(1));
+    assert!(!offer.is_done());
+}
+
+#[test]
+fn a_receiver_that_leaves_is_not_waited_for() {
+    let address = endpoint();
+    let here = open(listening(&address));
+    let there = open(connecting(&address));
+    let ring = Arc::new(Ring::of(100));
+    ring.push(message(0));
+    let mut server = Server::new(&here, "gyre/test", None);
+    let offer = server.offer("topic", ring).unwrap();
+    let (fetcher, _sleeper) = fetcher(&there, 0);
+    assert_eq!(take(&fetcher, 1), [0]);
+    assert!(!offer.is_done());
+    fetcher.leave();
+    assert!(offer.is_done());
 }
 
 #[test]

@@ -31,7 +31,7 @@ pub struct BatchArguments {
     #[arg(long, value_name = "N", requires = "task")]
     pub tasks: Option<usize>,
     /// Compute nothing: write the table of what is there.
-    #[arg(long, conflicts_with_all = ["task", "jobs"])]
+    #[arg(long, conflicts_with = "task")]
     pub collect: bool,
 }
 

@@ -11,6 +11,7 @@ use crate::{
     cli::{LinkArguments, LinkEnd, NetworkArguments, ReceiveArguments, SendArguments},
     out::Out,
     preflight, print, program,
+    run::INTERRUPTED,
 };
 
 /// Runs one end of a link.
@@ -56,7 +57,7 @@ fn receive(arguments: &ReceiveArguments) -> Result<ExitCode, Failure> {
     let network = network(&arguments.network);
     let signals = Signals::install()?;
     let Some(seen) = gyre_link::ask(&network, &signals)? else {
-        return Ok(ExitCode::SUCCESS);
+        return Ok(ExitCode::from(INTERRUPTED));
     };
     let manifest = seen.manifest(out.path());
     preflight::check_shared_memory(&Footprint::new(&manifest.window, &manifest.limits))?;
@@ -74,6 +75,7 @@ fn receive(arguments: &ReceiveArguments) -> Result<ExitCode, Failure> {
     let received = gyre_link::receive(&options, seen, &signals)?;
     print::note(format_args!("gyre link: {received}"));
     Ok(match received.is_complete() {
+        _ if received.is_interrupted => ExitCode::from(INTERRUPTED),
         true => ExitCode::SUCCESS,
         false => ExitCode::FAILURE,
     })

@@ -1,0 +1,81 @@
+//! The command line of `gyre evaluate`.
+
+use std::{num::NonZeroUsize, path::PathBuf};
+
+use clap::Args;
+use gyre_evaluation::Part;
+
+/// The arguments of `gyre evaluate`.
+#[derive(Debug, Args)]
+pub struct EvaluateArguments {
+    /// The trajectory to evaluate: TUM, KITTI, or a dataset's own format.
+    #[arg(long)]
+    pub estimate: PathBuf,
+    /// The ground truth: TUM, KITTI, Oxford radar_odometry.csv, Boreas radar_poses.csv, MulRan global_pose.csv.
+    #[arg(long)]
+    pub ground_truth: PathBuf,
+    /// Poses between the starts of the segments that are measured.
+    #[arg(long, default_value = "10")]
+    pub step: NonZeroUsize,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+    /// Write trajectory.svg, errors.svg and, where there are covariances, bands.svg here.
+    #[arg(long)]
+    pub plots: Option<PathBuf>,
+    /// The motions whose covariances are evaluated. Default: the odometry.csv beside the estimate, if it has the same stamps.
+    #[arg(long)]
+    pub odometry: Option<PathBuf>,
+    /// Lengths, in motions, of the segments over which covariances are evaluated.
+    #[arg(long, value_delimiter = ',', default_value = "1,4,16,64")]
+    pub nees_lengths: Vec<NonZeroUsize>,
+    /// The part of the drive whose covariances are evaluated: all, or from A to B percent of its time as in 0..50. Scales that are
+    /// tuned on one part can be validated on another.
+    #[arg(long, value_name = "A..B", default_value = "all", value_parser = part)]
+    pub nees_part: Part,
+    /// Standard deviation of the ground truth's x and y, m: added to the covariances that are evaluated.
+    #[arg(long, default_value = "0", value_parser = sigma)]
+    pub truth_sigma_m: f64,
+    /// Standard deviation of the ground truth's heading, degrees.
+    #[arg(long, default_value = "0", value_parser = sigma)]
+    pub truth_sigma_deg: f64,
+}
+
+/// Parses a standard deviation: a number, not below zero.
+fn sigma(text: &str) -> Result<f64, String> {
+    let sigma = text
+        .parse()
+        .ok()
+        .filter(|sigma: &f64| sigma.is_finite() && *sigma >= 0.0);
+    sigma.ok_or_else(|| "a number of at least 0 is needed".to_owned())
+}
+
+/// Parses `all`, or `A..B` in percent.
+fn part(text: &str) -> Result<Part, String> {
+    let share = |percent: &str| percent.parse::<f64>().ok().map(|percent| percent / 100.0);
+    let range = || {
+        let (from, to) = text.split_once("..")?;
+        Part::new(share(from)?, share(to)?)
+    };
+    match text {
+        "all" => Ok(Part::ALL),
+        _ => range().ok_or_else(|| {
+            "`all` or a range of percent from 0..100 is needed, as in 0..50".to_owned()
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_are_all_or_a_range_of_percent() {
+        assert_eq!(part("all"), Ok(Part::ALL));
+        assert_eq!(part("0..100"), Ok(Part::ALL));
+        assert_eq!(part("12.5..50").ok(), Part::new(0.125, 0.5));
+        for text in ["", "half", "50", "50..", "60..50", "0..101", "nan..50"] {
+            assert!(part(text).is_err(), "{text}");
+        }
+    }
+}
