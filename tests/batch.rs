@@ -293,6 +293,41 @@ fn a_batch_that_is_killed_gives_the_table_of_one_that_is_not() {
 }
 
 #[test]
+fn what_is_complete_stays_when_its_recording_is_gone() {
+    let drives = Drives::new().recordings(&[6]);
+    let batch = drives.batch("out");
+    batch.finish().succeeded();
+    let table = batch.table();
+    let (recording, aside) = (drives.path("part-6"), drives.path("aside"));
+    fs::rename(&recording, &aside).unwrap();
+    let again = batch.finish();
+    let said = &again.succeeded().stderr;
+    assert!(
+        said.contains("complete before") && said.contains("there is nothing at"),
+        "{said}"
+    );
+    assert_eq!(batch.table(), table);
+
+    // Without its results a row is worth nothing.
+    fs::remove_dir_all(batch.results("part-6")).unwrap();
+    let collected = batch.clone().with(&["--collect"]).finish();
+    assert_eq!(collected.code(), Some(1));
+    assert!(
+        collected.stderr.contains("part-6: not-run"),
+        "{}",
+        collected.stderr
+    );
+    assert_eq!(batch.finish().code(), Some(1));
+    assert_eq!(
+        batch.outcomes(),
+        [("part-6".to_owned(), "missing".to_owned())]
+    );
+    fs::rename(&aside, &recording).unwrap();
+    batch.finish().succeeded();
+    assert_eq!(batch.table(), table);
+}
+
+#[test]
 fn a_drive_is_computed_again_with_another_configuration_alone() {
     let drives = Drives::new().recordings(&[6]);
     let batch = drives.batch("out");
@@ -457,6 +492,7 @@ fn an_array_of_slurm_gives_the_same_table() {
     let mut sbatch = slurm.sbatch();
     sbatch
         .env("PATH", path)
+        .env("TASKS", "2")
         .arg("--array=0-1")
         .arg("--cpus-per-task=1")
         .arg("--mem-per-cpu=0")

@@ -109,12 +109,29 @@ impl Progress<'_> {
             ..
         } = self.batch;
         let results = self.batch.results(drive);
-        let row = Row::of(drive, settings, end.outcome, end.sentence, &results);
-        row.write(out)?;
-        *self.ended.counts.entry(row.outcome).or_default() += 1;
-        self.ended.earlier += usize::from(end.earlier);
+        let kept = match end.outcome.leaves_results() {
+            true => Row::of_results(out, drive, settings)?,
+            false => None,
+        };
+        let (line, outcome, earlier) = match kept {
+            // What was computed is there, though it could not be looked at again.
+            Some(row) => {
+                let line = format!(
+                    "{}; not looked at again: {}",
+                    line(&row, true),
+                    end.sentence
+                );
+                (line, row.outcome, true)
+            }
+            None => {
+                let row = Row::of(drive, settings, end.outcome, end.sentence, &results);
+                row.write(out)?;
+                (line(&row, end.earlier), row.outcome, end.earlier)
+            }
+        };
+        *self.ended.counts.entry(outcome).or_default() += 1;
+        self.ended.earlier += usize::from(earlier);
         let number: usize = self.ended.counts.values().sum();
-        let line = line(&row, end.earlier);
         (self.say)(&format!("[{number}/{}] {line}", drives.len()));
         Ok(())
     }

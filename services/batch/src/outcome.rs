@@ -79,6 +79,14 @@ impl Outcome {
         matches!(self, Self::Complete | Self::Corrupt)
     }
 
+    /// Returns whether a drive that ends so still has the results that it had: it was not begun.
+    pub(crate) fn leaves_results(self) -> bool {
+        matches!(
+            self,
+            Self::Missing | Self::Machine | Self::InUse | Self::Interrupted
+        )
+    }
+
     /// The exit code of the drive's process; `earlier`: it had ended so before.
     pub fn exit_code(self, earlier: bool) -> u8 {
         CODES + self as u8 + if earlier { EARLIER } else { 0 }

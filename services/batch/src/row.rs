@@ -10,6 +10,8 @@ use crate::{BatchError, Drive, Outcome};
 
 /// The version of the file. It is raised when a key changes its meaning or goes.
 const VERSION: u32 = 1;
+/// The file that a run leaves among its results when it has them all.
+const COMPLETE: &str = "journal/complete";
 
 /// What the drives of a batch have in common.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -210,6 +212,31 @@ impl Row {
             VERSION => Ok(Some(row)),
             version => Err(unknown(format!("version {version}"))),
         }
+    }
+
+    /// Reads that of a drive with these settings whose results are there; `None`: there are none, or they are being computed anew.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn of_results(
+        batch: &Path,
+        drive: &Drive,
+        settings: &Settings,
+    ) -> Result<Option<Self>, BatchError> {
+        let row = match Self::read(batch, drive) {
+            Err(BatchError::Unknown { .. }) => None,
+            read => read?,
+        };
+        let is_whole = |row: &Self| {
+            row.is_of(drive, settings) && row.outcome.has_results() && row.has_its_results(batch)
+        };
+        Ok(row.filter(is_whole))
+    }
+
+    /// Returns whether the results that it is of are there. A run that begins anew removes them.
+    pub(crate) fn has_its_results(&self, batch: &Path) -> bool {
+        let results = batch.join("drives").join(&self.drive.name);
+        results.join(COMPLETE).exists()
     }
 
     /// Returns whether it is of this drive with these settings.

@@ -49,7 +49,16 @@ pub fn collect(list: &List, settings: &Settings, out: &Path) -> Result<Table, Ba
 
 fn row(drive: &Drive, settings: &Settings, out: &Path) -> Result<Row, BatchError> {
     Ok(match Row::read(out, drive) {
-        Ok(Some(row)) if row.is_of(drive, settings) => row,
+        Ok(Some(row)) if row.is_of(drive, settings) => {
+            match row.outcome.has_results() && !row.has_its_results(out) {
+                true => Row::not_run(
+                    drive,
+                    settings,
+                    "its results are being computed anew, or were removed",
+                ),
+                false => row,
+            }
+        }
         Ok(Some(_)) => Row::not_run(drive, settings, "it was computed with other settings"),
         Ok(None) => Row::not_run(drive, settings, "it has not been computed yet"),
         Err(error @ BatchError::Unknown { .. }) => {
@@ -153,6 +162,15 @@ mod tests {
         row.figures.build = Some("0a1b".to_owned());
         row.times.restarts = Some(2);
         row.write(out.path()).unwrap();
+        let without = collect(&list, &settings, out.path()).unwrap();
+        assert!(
+            without
+                .failures()
+                .any(|line| line.contains("a: not-run: its results"))
+        );
+        let results = out.path().join("drives/a/journal");
+        fs::create_dir_all(&results).unwrap();
+        fs::write(results.join("complete"), "").unwrap();
         let other = Settings {
             set: vec!["raster.n=127".to_owned()],
             ..settings.clone()
