@@ -4,7 +4,7 @@ use bolero::{TypeGenerator, check};
 use gyre_colossus::{
     Azimuth, BadConfiguration, ByteOrder, ClockFormat, Configuration, Constants, Damage, Datagrams,
     Event, Message, Parser, Powers, RadarClock, SweepAssembler, asterix, write_azimuth,
-    write_configuration, write_keep_alive,
+    write_configuration, write_keep_alive, write_other,
 };
 use gyre_fuzz::{
     Failure, Target,
@@ -75,6 +75,13 @@ fn edit_radar(configuration: &mut Configuration, rows: &mut [Row], edits: &[Edit
     }
 }
 
+/// A radar's health: a temperature of 36.5 that is healthy, transmitting, three errors of the encoder.
+const HEALTH: [u8; 13] = [0x0a, 7, 0x1d, 0, 0, 0x12, 0x42, 0x28, 3, 0x40, 1, 0x60, 3];
+/// Two peaks of an azimuth.
+const NAVIGATION: [u8; 22] = [
+    0, 14, 0, 0, 0, 9, 0, 0, 0, 7, 0, 1, 0, 0, 1, 0, 0, 2, 0, 0, 2, 0,
+];
+
 fn stream(edits: &[Edit]) -> Vec<u8> {
     let mut configuration = Configuration {
         azimuth_samples: AZIMUTHS,
@@ -114,6 +121,8 @@ fn stream(edits: &[Edit]) -> Vec<u8> {
         };
         write_azimuth(&mut bytes, &azimuth);
         write_keep_alive(&mut bytes);
+        write_other(&mut bytes, 40, &HEALTH);
+        write_other(&mut bytes, 123, &NAVIGATION);
     }
     bytes
 }
@@ -167,6 +176,10 @@ impl Received {
             Event::Message(Message::Azimuth(azimuth)) => {
                 let mut client = self.client.iter_mut();
                 client.try_for_each(|client| client.add(azimuth))?;
+            }
+            Event::Message(Message::Health(health)) => assert!(health.readings().count() <= 8),
+            Event::Message(Message::Navigation(found)) => {
+                assert!(found.peaks().all(|peak| peak.range_m.is_finite()));
             }
             Event::Message(_) => {}
             Event::Damaged { reason, .. } => self.damage = Some(reason),
