@@ -1,9 +1,12 @@
 //! Observes a run: follows its poses and looks at the scans that they are of.
 //!
 //! ```sh
-//! gyre run configs/demo.toml --rate realtime --out out/demo &
+//! cargo build --release --example observe
+//! gyre up configs/demo.toml --fresh --rate realtime
 //! cargo run --release --example observe -- out/demo
 //! ```
+//!
+//! `gyre up` returns when there is something to observe; a run that was just started by `gyre run &` may not be there yet.
 //!
 //! Any number of programs up to `run.observers` may do so at once. Kill this one, or stop it for a while with Ctrl-Z: the run does
 //! not notice.

@@ -9,6 +9,7 @@ robot_localization.yaml. The recording needs a ground truth, of which wheels and
 
 import json
 import sys
+from itertools import takewhile
 from typing import Any
 
 import gyre
@@ -21,7 +22,10 @@ Floats = NDArray[np.float64]
 
 
 def twist(registered: gyre.Registered) -> tuple[Floats, Floats]:
-    """The velocity of the radar in its own frame in the middle of the interval, m/s and rad/s, with its covariance."""
+    """The velocity of the radar in its own frame in the middle of the interval, m/s and rad/s, with its covariance.
+
+    A scan whose outcome is `start` has no motion, and so no velocity.
+    """
     motion, dt = registered.motion, registered.interval_ns * 1e-9
     half = -0.5 * motion.yaw_rad  # a motion is along the axes of the earlier scan
     turn = np.array([[np.cos(half), -np.sin(half), 0], [np.sin(half), np.cos(half), 0], [0, 0, 1]])
@@ -37,16 +41,20 @@ def in_ros_order(covariance: Floats) -> list[float]:
 
 
 def message(registered: gyre.Registered) -> dict[str, Any]:
-    """A `nav_msgs/Odometry`: pose of the radar in `odom`, twist in the radar's frame. `base_link` -> `radar` is a static transform."""
-    stamp_ns = registered.stamp_ns - registered.interval_ns // 2
-    pose, (velocity, covariance) = registered.pose, twist(registered)
+    """A `nav_msgs/Odometry`: pose of the radar in `odom`, twist in the radar's frame. `base_link` -> `radar` is a static transform.
+
+    Both are those in the middle of the interval: a message has one stamp. There is none of a scan whose outcome is `start`.
+    """
+    half_ns = registered.interval_ns // 2
+    stamp_ns, pose, (velocity, covariance) = registered.stamp_ns - half_ns, registered.pose, twist(registered)
+    x_m, y_m, yaw_rad = moved(np.array([pose.x_m, pose.y_m, pose.yaw_rad]), velocity, -half_ns * 1e-9)
     return {
         "header": {"stamp": {"sec": stamp_ns // 10**9, "nanosec": stamp_ns % 10**9}, "frame_id": "odom"},
         "child_frame_id": "radar",
         "pose": {
             "pose": {
-                "position": {"x": pose.x_m, "y": pose.y_m, "z": 0.0},
-                "orientation": {"x": 0.0, "y": 0.0, "z": np.sin(pose.yaw_rad / 2), "w": np.cos(pose.yaw_rad / 2)},
+                "position": {"x": x_m, "y": y_m, "z": 0.0},
+                "orientation": {"x": 0.0, "y": 0.0, "z": np.sin(yaw_rad / 2), "w": np.cos(yaw_rad / 2)},
             },
             "covariance": in_ros_order(pose.covariance),
         },
@@ -94,7 +102,11 @@ def main(recording: str, config_file: str | None = None) -> None:
     if truth_file is None:
         sys.exit(f"{recording} has no ground truth, of which wheels and gyro are simulated")
     truth, odometry, noise = gyre.Trajectory.read(truth_file), gyre.Odometry(config), np.random.default_rng(1)
-    drive = [odometry.register(scan) for scan in gyre.open(recording, config)]
+    first, *later = [odometry.register(scan) for scan in gyre.open(recording, config)]
+    # Behind a gap of the recording a new chain of motions starts, and nothing says how the radar came there.
+    drive = [first, *takewhile(lambda registered: registered.outcome != "start", later)]
+    if len(drive) == 1:
+        sys.exit(f"{recording} has no motion: its second scan is not within 10 s after the first")
     true_poses = [truth_at(truth, registered.stamp_ns) for registered in drive]
     poses = dict.fromkeys(("wheels and gyro", "radar", "fused"), true_poses[0])
     for registered, before, after in zip(drive[1:], true_poses, true_poses[1:], strict=False):

@@ -18,7 +18,7 @@ use crate::{config::Config, errors, lock::Guarded, scan::Scan};
 /// Damaged scans in a row that are skipped: the default of `source.max_unreadable` of a run.
 const MAX_UNREADABLE: usize = 10;
 
-/// Opens a recording: a folder of a format that Gyre knows, or an MCAP file of `gyre record`.
+/// Opens a recording: a folder of a format that Gyre knows, an MCAP file of `gyre record`, or a bag of ROS 2.
 ///
 /// The constants of the radar are those of the section `dataset` of `config`. Without one they are those of the format, or of the
 /// recording's `dataset.toml`, as `Config.of` takes them. Raises ReadError.
@@ -86,7 +86,7 @@ impl Dataset {
         self.first
     }
 
-    /// The files of the scans, in order; of an MCAP recording its parts.
+    /// The files of the scans, in order; of an MCAP recording its parts, of a bag of ROS 2 its files.
     #[getter]
     fn files(&self, py: Python<'_>) -> PyResult<Vec<PathBuf>> {
         self.dataset.with(py, |dataset| {

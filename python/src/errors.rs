@@ -3,6 +3,8 @@
 use std::{ffi::CString, fmt::Display};
 
 use gyre_configuration::AutomaticError;
+use gyre_masking::MaskError;
+use gyre_odometry::OdometryError;
 use gyre_radar::OpenError;
 use pyo3::{prelude::*, sync::PyOnceLock, types::PyType};
 
@@ -59,6 +61,15 @@ pub fn automatic(error: AutomaticError) -> PyErr {
         AutomaticError::Open(error) => open(error),
         AutomaticError::Read(_) | AutomaticError::Empty => read(error),
         AutomaticError::Configuration(_) | AutomaticError::Recorded(_) => config(error),
+    }
+}
+
+/// A scan that cannot be used, or a network or a search that fails, which is not the scan's fault.
+pub fn registration(error: OdometryError) -> PyErr {
+    match error {
+        OdometryError::Scan(_) | OdometryError::Mask(MaskError::Raster(_)) => scan(error),
+        OdometryError::Mask(MaskError::Network(_) | MaskError::MissingPrevious(_))
+        | OdometryError::Search(_) => other(error),
     }
 }
 

@@ -2,21 +2,24 @@
 
 use std::path::PathBuf;
 
-use gyre_radar::DatasetOptions;
 use pyo3::prelude::*;
 
-use crate::{errors, trajectory::Trajectory, values};
+use crate::{config::Config, errors, trajectory::Trajectory, values};
 
 /// Examines a recording: what it contains, and what looks wrong with it. With a trajectory of it the clock of its ground truth is
-/// compared. Raises ReadError.
+/// compared. The section `dataset` of `config` says how the recording is opened; without one its format alone does. Raises ReadError.
 #[pyfunction]
-#[pyo3(signature = (data, trajectory=None))]
+#[pyo3(signature = (data, trajectory=None, config=None))]
 pub fn inspect(
     py: Python<'_>,
     data: PathBuf,
     trajectory: Option<&Bound<'_, Trajectory>>,
+    config: Option<&Bound<'_, Config>>,
 ) -> PyResult<Report> {
-    let (options, trajectory) = (DatasetOptions::default(), trajectory.map(|it| &it.get().0));
+    let (options, trajectory) = (
+        Config::method(config).dataset,
+        trajectory.map(|it| &it.get().0),
+    );
     let report = py.detach(|| {
         let dataset = gyre_recording::open(&data, &options)?;
         Ok(gyre_radar::inspect_dataset(

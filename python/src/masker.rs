@@ -1,13 +1,20 @@
 //! Masks.
 
 use gyre_geometry::{SparsePoint, Twist};
-use gyre_masking::{MaskError, Sweep};
-use gyre_radar::{PolarScan, ScanError, continues};
+use gyre_masking::Sweep;
+use gyre_odometry::OdometryError;
+use gyre_radar::{PolarScan, continues};
 use ndarray::ArrayViewMut2;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyUntypedArray};
 use pyo3::{exceptions::PyTypeError, prelude::*, types::PySlice};
 
-use crate::{config::Config, errors, lock::Guarded, numpy_arrays::readable, scan::Scan};
+use crate::{
+    config::Config,
+    errors,
+    lock::Guarded,
+    numpy_arrays::{readable, sliceable},
+    scan::Scan,
+};
 
 /// The fields of a point.
 pub const FIELDS: [&str; 5] = ["x_m", "y_m", "time_s", "weight", "doppler_s"];
@@ -71,7 +78,11 @@ pub fn fields_of<'py>(points: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray1<'
         .import("numpy")?
         .call_method1("ascontiguousarray", (points,))?;
     let fields = together.call_method1("view", (numpy::dtype::<f32>(py),))?;
-    readable(&fields, "points", "a structured array of points")
+    readable(
+        &sliceable::<f32>(&fields)?,
+        "points",
+        "a structured array of points",
+    )
 }
 
 impl State {
@@ -83,7 +94,7 @@ impl State {
         raster: ArrayViewMut2<'_, f32>,
         previous: Option<ArrayViewMut2<'_, f32>>,
         points: &mut [SparsePoint],
-    ) -> Result<(usize, Option<ndarray::Array2<f32>>), MaskingError> {
+    ) -> Result<(usize, Option<ndarray::Array2<f32>>), OdometryError> {
         scan.check()?;
         scan.check_times()?;
         let stamp_ns = scan.geometry.stamp_ns;
@@ -104,14 +115,6 @@ impl State {
             self.masker.factors(0).map(|factors| factors.to_owned()),
         ))
     }
-}
-
-#[derive(Debug, thiserror::Error)]
-enum MaskingError {
-    #[error(transparent)]
-    Mask(#[from] MaskError),
-    #[error(transparent)]
-    Scan(#[from] ScanError),
 }
 
 #[pymethods]
@@ -135,7 +138,7 @@ impl Masker {
     /// counter-clockwise in rad/s; without it nothing is compensated.
     ///
     /// If the mask takes two scans, the previous one is that of the call before; a scan that is not later than that, or by more than
-    /// 10 s, is its own previous scan. A scan that cannot be used raises ScanError.
+    /// 10 s, is its own previous scan. A scan that cannot be used raises ScanError, and a network that fails Error.
     #[pyo3(signature = (scan, velocity=None))]
     fn mask(
         &self,
@@ -165,7 +168,7 @@ impl Masker {
             let masked = self.masker.with(py, |state| {
                 state.mask(&scan, twist, raster, previous, points)
             });
-            masked?.map_err(errors::scan)?
+            masked?.map_err(errors::registration)?
         };
         Ok(Masked {
             raster: raster.unbind(),

@@ -6,7 +6,11 @@ use numpy::{
     Element, PyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray, PyUntypedArray,
     PyUntypedArrayMethods,
 };
-use pyo3::{exceptions::PyTypeError, prelude::*, types::PyDict};
+use pyo3::{
+    exceptions::PyTypeError,
+    prelude::*,
+    types::{IntoPyDict, PyDict},
+};
 
 /// Returns an object as an array of elements `T` in `D` dimensions.
 ///
@@ -43,6 +47,19 @@ pub fn readable<'py, T: Element, D: Dimension>(
     Ok(given(array, name, expected)?.try_readonly()?)
 }
 
+/// Converts an object to an array of elements `T` that a slice of Rust can have: C-contiguous and aligned. One that is so is not
+/// copied; a view of packed records is.
+///
+/// # Errors
+/// TypeError or ValueError of numpy: it cannot be converted.
+pub fn sliceable<'py, T: Element>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let py = value.py();
+    let keywords =
+        [("requirements", ["C_CONTIGUOUS", "ALIGNED", "ENSUREARRAY"])].into_py_dict(py)?;
+    let numpy = py.import("numpy")?;
+    numpy.call_method("require", (value, T::get_dtype(py)), Some(&keywords))
+}
+
 /// Converts what numpy can convert without loss of kind, as a list of int or an array of float64, to an array of one dimension.
 ///
 /// # Errors
@@ -62,8 +79,7 @@ pub fn converted<'py, T: Element>(
     let cast = cast.map_err(|error| {
         PyTypeError::new_err(format!("{name}: {}, expected {expected}", error.value(py)))
     })?;
-    let array = numpy.call_method1("ascontiguousarray", (cast,))?;
-    given(&array, name, expected)
+    given(&sliceable::<T>(&cast)?, name, expected)
 }
 
 /// Returns a matrix as an array.

@@ -21,7 +21,9 @@ struct State {
 
 impl State {
     fn register(&mut self, scan: &gyre_radar::PolarScan<'_>) -> Result<Registered, OdometryError> {
-        let registered = self.odometry.register(scan)?;
+        let mut registered = self.odometry.register(scan)?;
+        // Numbers are those of a run, which counts on where a new chain starts.
+        registered.seq = self.trajectory.len() as u64;
         let stamp_ns = scan.geometry.stamp_ns;
         let stamps = self.trajectory.stamp_ns.get_or_insert_default();
         stamps.push(stamp_ns);
@@ -50,12 +52,12 @@ impl Odometry {
     /// Registers the next scan: estimates its motion from the previous scan, and its pose.
     ///
     /// A scan that is not later than the previous one, or by more than 10 s, starts a new chain of motions. A scan that cannot be used
-    /// raises ScanError and is left out: the next one is registered against the scan before it.
+    /// raises ScanError and is left out: the next one is registered against the scan before it. A network that fails raises Error.
     fn register(&self, py: Python<'_>, scan: &Bound<'_, Scan>) -> PyResult<Registered> {
         let borrowed = scan.get().borrowed(py)?;
         let scan = borrowed.view()?;
         let registered = self.0.with(py, |state| state.register(&scan))?;
-        registered.map_err(errors::scan)
+        registered.map_err(errors::registration)
     }
 
     /// Starts a new chain of motions with the next scan; the pose stays.

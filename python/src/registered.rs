@@ -15,7 +15,7 @@ pub struct Registered {
 
 #[pymethods]
 impl Registered {
-    /// The number of the scan in the chain of motions, from 0.
+    /// The number of the scan among those that were registered, from 0.
     #[getter]
     fn seq(&self) -> u64 {
         self.registered.seq

@@ -5,16 +5,13 @@ use std::{io, path::PathBuf};
 use gyre_evaluation::plot::trajectory_svg;
 use gyre_geometry::{Pose, pose, xy_yaw};
 use gyre_radar::{read_trajectory, write_kitti, write_tum};
-use ndarray::Array2;
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
-use pyo3::{
-    prelude::*,
-    types::{IntoPyDict, PyTuple},
-};
+use ndarray::{Array2, Ix2};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::{prelude::*, types::PyTuple};
 
 use crate::{
     errors,
-    numpy_arrays::{converted, given},
+    numpy_arrays::{converted, readable, sliceable},
     pose,
 };
 
@@ -43,27 +40,20 @@ fn poses(given_poses: &Bound<'_, PyAny>) -> PyResult<Vec<Pose>> {
     if let Ok(poses) = given_poses.extract::<Vec<Bound<'_, pose::Pose>>>() {
         return Ok(poses.iter().map(|pose| pose.get().0.motion).collect());
     }
-    let py = given_poses.py();
-    let keywords = [("dtype", numpy::dtype::<f64>(py))].into_py_dict(py)?;
-    let numpy = py.import("numpy")?;
-    let array = numpy.call_method("asarray", (given_poses,), Some(&keywords))?;
-    let array = given::<f64, ndarray::Ix2>(&array, "poses", EXPECTED)?.try_readonly()?;
-    let rows = array.as_array();
-    if rows.ncols() != 3 {
-        let columns = rows.ncols();
+    let array = sliceable::<f64>(given_poses)?;
+    let array = readable::<f64, Ix2>(&array, "poses", EXPECTED)?;
+    let columns = array.shape()[1];
+    if columns != 3 {
         return Err(errors::trajectory(format!(
             "poses has {columns} columns, expected {EXPECTED}"
         )));
     }
-    let rows = rows.rows().into_iter().enumerate();
-    let pose_of = |(row, values): (usize, ndarray::ArrayView1<'_, f64>)| match values
-        .iter()
-        .all(|value| value.is_finite())
-    {
-        true => Ok(pose(values[0], values[1], values[2])),
-        false => Err(errors::trajectory(format!("pose {row} is not finite"))),
+    let (rows, _) = array.as_slice()?.as_chunks::<3>();
+    let pose_of = |(row, values): (usize, &[f64; 3])| match values.map(f64::is_finite) {
+        [true, true, true] => Ok(pose(values[0], values[1], values[2])),
+        _ => Err(errors::trajectory(format!("pose {row} is not finite"))),
     };
-    rows.map(pose_of).collect()
+    rows.iter().enumerate().map(pose_of).collect()
 }
 
 #[pymethods]

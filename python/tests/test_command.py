@@ -45,6 +45,18 @@ def test_its_motions_are_rows_of_those_of_a_run(recording: Path, tmp_path: Path)
     assert mine == [{column: row[column] for column in mine[0]} for row in of_run]
 
 
+def test_its_rows_are_those_of_a_run_behind_a_gap_too(around: Path, tmp_path: Path) -> None:
+    data = tmp_path / "gap"
+    shutil.copytree(around, data)
+    for file in gyre.open(data).files[8:56]:
+        file.unlink()
+    gyre_program("run", "--data", data, "--out", tmp_path / "run")
+    assert command(data, "--out", tmp_path / "python") == 0
+    of_run, mine = rows(tmp_path / "run/odometry.csv"), rows(tmp_path / "python/odometry.csv")
+    assert [int(row["seq"]) for row in mine] == [*range(1, 8), *range(9, 16)]
+    assert mine == [{column: row[column] for column in mine[0]} for row in of_run]
+
+
 def test_loops_are_closed_where_the_configuration_says_so(around: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     gyre_program("run", "--data", around, "--out", tmp_path / "run", "--set", "slam.kind=graph")
     assert command(around, "--out", tmp_path / "python", "--set", "slam.kind=graph") == 0
@@ -70,6 +82,42 @@ def test_no_scan_to_register_is_an_error(recording: Path, tmp_path: Path, capsys
         with pytest.raises(SystemExit) as ended:
             command(recording, "-n", number)
         assert ended.value.code == 2
+
+
+def test_a_drive_without_a_scan_that_can_be_used_is_an_error(
+    recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def without_times(scans: Iterator[gyre.Scan], _: int) -> Iterator[gyre.Scan]:
+        for scan in scans:
+            scan.azimuth_stamp_ns[:] = 0
+            yield scan
+
+    monkeypatch.setattr(gyre.__main__, "progress", without_times)
+    assert command(recording, "--out", tmp_path / "out", "-n", 3) == 1
+    *warnings, error = capsys.readouterr().err.splitlines()
+    assert [re.match(r"\r?warning: skipped: scan \d: ", warning) is not None for warning in warnings if warning] == [True] * 3
+    assert error == f"error: no scan of {recording} could be registered: the warnings say why"
+    assert [file.name for file in (tmp_path / "out").iterdir()] == ["config.toml"]
+
+
+def test_results_of_another_drive_are_removed_and_not_listed(around: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    assert command(around, "--out", out, "-n", 8, "--set", "slam.kind=graph") == 0
+    names = {file.name for file in out.iterdir()}
+    assert len(names) == 10 and {"evaluation.json", "evaluation_slam.json", "trajectory_slam.tum"} < names
+    (out / "notes.txt").write_text("mine")
+    without_truth = tmp_path / "drive"
+    shutil.copytree(around, without_truth)
+    while truth := gyre.find_ground_truth(without_truth):
+        truth.unlink()
+    capsys.readouterr()
+    assert command(without_truth, "--out", out, "-n", 2) == 0
+    kept = ["config.toml", "odometry.csv", "trajectory.svg", "trajectory.tum", "trajectory_kitti.txt"]
+    assert capsys.readouterr().out.splitlines()[-1] == f"results in {out}: {', '.join(kept)}"
+    assert sorted(file.name for file in out.iterdir()) == sorted([*kept, "notes.txt"])
+    # A call that is refused leaves the results alone.
+    assert command(around, "--out", out, "-n", 0) == 1
+    assert sorted(file.name for file in out.iterdir()) == sorted([*kept, "notes.txt"])
 
 
 def test_it_ends_with_a_sentence(recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -86,3 +86,12 @@ def test_a_report_has_its_figures(recording: Path) -> None:
     report = gyre.inspect(recording)
     assert report.to_dict()["scans"] == 24
     assert isinstance(report.findings, list)
+
+
+def test_a_report_is_by_the_settings_that_are_given(recording: Path) -> None:
+    alone = gyre.inspect(recording)
+    config = gyre.Config({"dataset": {"range_resolution_m": 0.05}})
+    report = gyre.inspect(recording, config=config)
+    assert report.to_dict()["range_resolution_m"] == pytest.approx(0.05) != alone.to_dict()["range_resolution_m"]
+    doubted = [any("range resolution" in finding for finding in it.findings) for it in (alone, report)]
+    assert doubted == [True, False]

@@ -1,5 +1,8 @@
 """Scans: their memory, and what they refuse."""
 
+import hashlib
+import os
+import struct
 import threading
 from pathlib import Path
 from typing import Any
@@ -7,7 +10,7 @@ from typing import Any
 import gyre
 import numpy as np
 import pytest
-from conftest import STAMP_NS, noise, scan
+from conftest import ROOT, STAMP_NS, noise, scan
 
 
 def pointer(array: Any) -> int:
@@ -78,6 +81,58 @@ def test_angles_of_float64_and_times_of_a_list_are_converted() -> None:
     mine = scan(noise(), sweep_s=None, azimuth_stamp_ns=times, azimuth_rad=np.linspace(0, 6, 400))
     assert mine.azimuth_rad.dtype == np.float32
     assert mine.azimuth_stamp_ns.tolist() == times
+
+
+def test_misaligned_angles_and_times_are_converted() -> None:
+    times, angles = STAMP_NS + np.arange(400), np.linspace(0, 6, 400, dtype=np.float32)
+    misaligned = [np.frombuffer(b"\0" + array.tobytes(), array.dtype, offset=1) for array in (times, angles)]
+    records = np.zeros(400, [("flag", "u1"), ("stamp_ns", "<i8"), ("rad", "<f4")])
+    records["stamp_ns"], records["rad"] = times, angles
+    for stamps, rad in (misaligned, (records["stamp_ns"], records["rad"])):
+        mine = scan(noise(), sweep_s=None, azimuth_stamp_ns=stamps, azimuth_rad=rad)
+        assert np.array_equal(mine.azimuth_stamp_ns, times) and np.array_equal(mine.azimuth_rad, angles)
+        assert gyre.Odometry().register(mine).outcome == "start"
+
+
+def test_numbers_of_scans_count_on_where_a_new_chain_starts() -> None:
+    odometry = gyre.Odometry()
+    ten_s = 10_000_000_000
+    later_ns = [0, 250_000_000, ten_s, 3 * ten_s, 3 * ten_s + 250_000_000, ten_s]
+    registered = [odometry.register(scan(noise(), stamp_ns=STAMP_NS + later)) for later in later_ns]
+    assert [it.seq for it in registered] == list(range(6))
+    assert [it.outcome == "start" for it in registered] == [True, False, False, True, False, True]
+    with pytest.raises(gyre.ScanError):
+        odometry.register(without_times())
+    odometry.restart()
+    again = odometry.register(scan(noise(), stamp_ns=STAMP_NS + 4 * ten_s))
+    assert (again.seq, again.outcome) == (6, "start")
+
+
+def without_times() -> gyre.Scan:
+    """A scan whose times were overwritten."""
+    mine = scan(noise())
+    mine.azimuth_stamp_ns[:] = 0
+    return mine
+
+
+def test_a_network_that_fails_is_not_the_fault_of_the_scan(tmp_path: Path) -> None:
+    if not os.environ.get("ORT_DYLIB_PATH"):
+        pytest.skip("tract computes a number of anything: ORT_DYLIB_PATH names no ONNX Runtime")
+    models = ROOT / "shared/masking/tests/models"
+    model, scale = (models / "single-127.onnx").read_bytes(), b"B\x05scaleJ\x04" + struct.pack("<f", 1 / 16)
+    assert model.count(scale) == 1
+    broken = model.replace(scale, scale[:-4] + struct.pack("<f", float("nan")))
+    (tmp_path / "single-127.onnx").write_bytes(broken)
+    card, (old, new) = (models / "single-127.toml").read_text(), (hashlib.sha256(it).hexdigest() for it in (model, broken))
+    (tmp_path / "single-127.toml").write_text(card.replace(old, new))
+    masking = {"kind": "learned", "model": tmp_path / "single-127.toml", "backend": "onnxruntime"}
+    config = gyre.Config({"masking": masking, "raster": {"n": 127, "cell_m": 0.8}})
+    for process in (gyre.Odometry(config).register, gyre.Masker(config).mask):
+        with pytest.raises(gyre.Error, match="factors are NaN") as failed:
+            process(scan(noise()))
+        assert type(failed.value) is gyre.Error
+        with pytest.raises(gyre.ScanError):
+            process(without_times())
 
 
 def test_a_read_only_array_can_be_registered() -> None:

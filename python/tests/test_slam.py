@@ -43,7 +43,8 @@ def test_points_that_are_none_are_refused() -> None:
         slam.add(registered, spoilt)
     with pytest.raises(gyre.ScanError, match="capacity"):
         slam.add(registered, np.resize(odometry.points, 9000))
-    assert slam.add(registered, odometry.points) is True
+    misaligned = np.frombuffer(b"\0" + odometry.points.tobytes(), odometry.points.dtype, offset=1)
+    assert slam.add(registered, misaligned) is True
     assert slam.add(registered, odometry.points[::2]) is False
     assert slam.loops == [] and len(slam.trajectory) == 2
 

@@ -49,6 +49,22 @@ def test_poses_can_be_given_one_by_one() -> None:
     assert pose.matrix.tolist() == np.eye(3).tolist() and pose.covariance.shape == (3, 3)
 
 
+def test_packed_records_and_misaligned_buffers_are_read_as_numpy_reads_them() -> None:
+    records = np.zeros(5, [("ok", "u1"), ("stamp_ns", "<i8"), ("pose", "<f8", 3)])
+    records["ok"], records["stamp_ns"], records["pose"] = 255, np.arange(5) * 10**8, np.arange(15).reshape(5, 3) / 10
+    stamps, poses = records["stamp_ns"].copy(), records["pose"].copy()
+    misaligned = [np.frombuffer(b"\0" + array.tobytes(), array.dtype, offset=1) for array in (stamps, poses)]
+    for given_stamps, given_poses in (
+        (records["stamp_ns"], records["pose"]),
+        (misaligned[0], misaligned[1].reshape(5, 3)),
+        (stamps.astype(">i8"), poses.astype(">f8")),
+        (np.repeat(stamps, 2)[::2], np.asfortranarray(poses)),
+    ):
+        trajectory = gyre.Trajectory(given_stamps, given_poses)
+        assert np.array_equal(np.array(trajectory.stamp_ns), stamps)
+        assert np.allclose(trajectory.poses, poses, rtol=0, atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("stamps", "poses"),
     [

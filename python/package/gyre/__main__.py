@@ -21,7 +21,7 @@ def count(text: str) -> int:
 
 def arguments(given: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="gyre-odometry", description="The odometry of a recording, from end to end.")
-    parser.add_argument("data", type=Path, help="a folder of a format that Gyre knows, or an MCAP file of `gyre record`")
+    parser.add_argument("data", type=Path, help="a folder of a format that Gyre knows, an MCAP file of `gyre record`, or a bag of ROS 2")
     parser.add_argument("--config", type=Path, help="a TOML file; without one the settings are found in the recording")
     parser.add_argument(
         "--set", action="append", default=[], metavar="SECTION.KEY=VALUE",
@@ -62,17 +62,20 @@ def run(given: argparse.Namespace) -> None:
         print(config.note)
     dataset = gyre.open(given.data, config)
     truth = given.ground_truth or gyre.find_ground_truth(given.data)
-    drive = Drive(config, given.out, gyre.Trajectory.read(truth) if truth else None, given.visualize)
     first = dataset.first if given.jump is None else given.jump
     total = min(len(dataset) - first, len(dataset) if given.n_scans is None else given.n_scans)
     if total <= 0:
         raise gyre.ReadError(f"there is no scan to register: {given.data} has {len(dataset)}, counted from 0")
+    drive = Drive(config, given.out, gyre.Trajectory.read(truth) if truth else None, given.visualize)
     try:
         for scan in progress(dataset.scans(first, total), total):
             drive.register(scan)
     finally:
         # What was registered before Ctrl-C, or before a file that cannot be read, is not lost.
-        print(drive.write())
+        if drive.registered:
+            print(drive.write())
+    if not drive.registered:
+        raise gyre.Error(f"no scan of {given.data} could be registered: the warnings say why")
 
 
 def progress(scans: Iterator[gyre.Scan], total: int) -> Iterator[gyre.Scan]:

@@ -12,6 +12,13 @@ COLUMNS = (
     "seq,scan,stamp_ns,interval_ns,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,outcome,stationary"
 )
 
+RESULTS = (
+    "odometry.csv",
+    *(f"trajectory{of}{kind}" for of in ("", "_slam") for kind in (".tum", "_kitti.txt", ".svg")),
+    "evaluation.json",
+    "evaluation_slam.json",
+)
+
 
 def row(scan: gyre.Scan, registered: gyre.Registered) -> str:
     """A row of odometry.csv, with the digits of `gyre run`."""
@@ -23,13 +30,13 @@ def row(scan: gyre.Scan, registered: gyre.Registered) -> str:
 
 
 class Drive:
-    """Registers scans, closes loops if `slam.kind` says so, and writes the results into the folder `out`."""
+    """Registers scans, closes loops if `slam.kind` says so, and writes the results into the folder `out`, for those of an earlier call."""
 
     def __init__(self, config: gyre.Config, out: Path, truth: gyre.Trajectory | None, visualize: bool) -> None:
         if (out / "journal").exists():
             raise gyre.WriteError(f"{out} holds the results of `gyre run`, which are not overwritten: name another folder by --out")
         out.mkdir(parents=True, exist_ok=True)
-        self.config, self.out, self.truth = config, out, truth
+        self.out, self.truth = out, truth
         self.odometry = gyre.Odometry(config)
         self.slam = None if config.to_dict()["slam"]["kind"] == "none" else gyre.Slam(config)
         self.viewer = None
@@ -37,7 +44,12 @@ class Drive:
             from gyre.visualize import Viewer  # matplotlib is optional
 
             self.viewer = Viewer()
-        self.rows = [COLUMNS]
+        self.rows, self.registered = [COLUMNS], 0
+        self.written: set[str] = set()
+        # Those of another drive would pass for this one's.
+        for name in RESULTS:
+            (out / name).unlink(missing_ok=True)
+        self.result("config.toml").write_text(str(config))
         self.began = time.monotonic()
 
     def register(self, scan: gyre.Scan) -> None:
@@ -47,6 +59,7 @@ class Drive:
         except gyre.ScanError as error:
             warnings.warn(f"skipped: scan {scan.index}: {error}", gyre.SkippedScanWarning, stacklevel=1)
             return
+        self.registered += 1
         if registered.outcome != "start":
             self.rows.append(row(scan, registered))
         if self.slam:
@@ -55,33 +68,34 @@ class Drive:
             self.viewer.show(registered, self.odometry.points)
 
     def write(self) -> str:
-        """Writes the results, and returns a summary of them."""
+        """Writes the results of one scan or more, and returns a summary of them."""
         trajectory = self.odometry.trajectory
-        if len(trajectory) == 0:
-            return "no scan was registered, and nothing is written"
         rate = len(trajectory) / (time.monotonic() - self.began)
         lines = [f"{len(trajectory)} scans, {trajectory.path_m:.1f} m, {rate:.1f} scans/s"]
-        (self.out / "config.toml").write_text(str(self.config))
-        (self.out / "odometry.csv").write_text("\n".join(self.rows) + "\n")
+        self.result("odometry.csv").write_text("\n".join(self.rows) + "\n")
         lines += self.write_trajectory(trajectory, "trajectory", "evaluation.json")
         if self.slam:
             self.slam.finish()
             lines.append(f"{sum(loop.weight > 0 for loop in self.slam.loops)} loops, and the trajectory corrected by them:")
             lines += self.write_trajectory(self.slam.trajectory, "trajectory_slam", "evaluation_slam.json")
-        names = sorted(file.name for file in self.out.iterdir())
-        return "\n".join([*lines, f"results in {self.out}: {', '.join(names)}"])
+        return "\n".join([*lines, f"results in {self.out}: {', '.join(sorted(self.written))}"])
+
+    def result(self, name: str) -> Path:
+        """The file of a result, which the summary lists."""
+        self.written.add(name)
+        return self.out / name
 
     def write_trajectory(self, trajectory: gyre.Trajectory, name: str, figures: str) -> list[str]:
         """Writes a trajectory as TUM, KITTI and SVG, and its errors where there is a ground truth."""
-        trajectory.write_tum(self.out / f"{name}.tum")
-        trajectory.write_kitti(self.out / f"{name}_kitti.txt")
-        trajectory.plot(self.out / f"{name}.svg")
+        trajectory.write_tum(self.result(f"{name}.tum"))
+        trajectory.write_kitti(self.result(f"{name}_kitti.txt"))
+        trajectory.plot(self.result(f"{name}.svg"))
         if self.truth is None:
             return ["no ground truth: nothing is evaluated"]
         try:
             evaluation = gyre.evaluate(trajectory, self.truth)
         except gyre.TrajectoryError as error:
             return [f"not evaluated: {error}"]
-        evaluation.plot(self.out / f"{name}.svg")
-        (self.out / figures).write_text(json.dumps(evaluation.to_dict(), indent=2) + "\n")
+        evaluation.plot(self.result(f"{name}.svg"))
+        self.result(figures).write_text(json.dumps(evaluation.to_dict(), indent=2) + "\n")
         return [str(evaluation)]
