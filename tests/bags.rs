@@ -35,8 +35,9 @@ fn bag(run: &Run, name: &str) -> PathBuf {
     run.folder().join(name)
 }
 
-/// Returns what the independent reader says of the bag of a run; `None` where it is not installed.
-fn checked(bag: &Path, out: &Path) -> Option<Value> {
+/// Returns what the independent reader says of the bag of a run, and of one with a radar that looks to the left; `None` where it is not
+/// installed.
+fn checked(bag: &Path, out: &Path, turned: Option<&Path>) -> Option<Value> {
     let can = Command::new(python())
         .args(["-c", "import rosbags, numpy"])
         .output();
@@ -49,7 +50,7 @@ fn checked(bag: &Path, out: &Path) -> Option<Value> {
     }
     let script = Path::new(crate::PROJECT).join("tests/bags/check.py");
     let mut command = Command::new(python());
-    command.arg(script).arg(bag).arg(out);
+    command.arg(script).arg(bag).arg(out).args(turned);
     let ended = Ended::of(command);
     ended.succeeded();
     Some(serde_json::from_str(&ended.stdout).unwrap())
@@ -62,6 +63,12 @@ fn completed() -> TempDir {
         recording::complete(&image);
     }
     whole
+}
+
+fn inspect(path: &Path, options: &[&str]) -> Ended {
+    let mut command = gyre();
+    command.arg("inspect").arg(path).args(options);
+    Ended::of(command)
 }
 
 #[test]
@@ -90,11 +97,7 @@ fn real_scans_are_taken_back_to_the_same_motions() {
     export(run.out(), &path, &[]).succeeded();
     let again = Run::of_file(&configuration).data(&path);
     assert_eq!(again.complete(), motions);
-    let inspected = Ended::of({
-        let mut command = gyre();
-        command.arg("inspect").arg(&path);
-        command
-    });
+    let inspected = inspect(&path, &[]);
     inspected.succeeded();
     assert!(
         inspected.stdout.contains("ros2-bag"),
@@ -107,15 +110,21 @@ fn real_scans_are_taken_back_to_the_same_motions() {
 fn odometry_transforms_and_the_map_are_those_of_the_run_to_another_reader() {
     let whole = completed();
     let run = Run::small().data(whole.path()).set("slam.kind=graph");
+    // Some motions are predicted.
+    let run = run.set("refinement.min_overlap=0.98");
+    let run = run.set("refinement.firm_overlap=0.98");
     let motions = odometry::rows(&run.complete()).len();
     let path = bag(&run, "bag");
     let exported = export(run.out(), &path, &[]);
     exported.succeeded();
     assert!(path.join("metadata.yaml").is_file());
-    let Some(figures) = checked(&path, run.out()) else {
+    let turned = bag(&run, "turned");
+    export(run.out(), &turned, &["--mounting", "0,0,90"]).succeeded();
+    let Some(figures) = checked(&path, run.out(), Some(&turned)) else {
         return;
     };
     assert_eq!(figures["odometry"], motions + 1);
+    assert_ne!(figures["predicted"], 0);
     assert_eq!(figures["b_scans"], recording::SCANS);
     let topics = figures["topics"].to_string();
     for topic in [
@@ -140,7 +149,7 @@ fn a_recorded_run_becomes_the_same_bag() {
     let path = bag(&run, "bag");
     export(&recorded, &path, &[]).succeeded();
     assert_eq!(replay(&run, &path), motions);
-    if let Some(figures) = checked(&path, run.out()) {
+    if let Some(figures) = checked(&path, run.out(), None) {
         assert_eq!(figures["b_scans"], recording::SCANS);
     }
 }
@@ -152,6 +161,15 @@ fn a_dataset_becomes_a_bag_of_its_scans() {
     let path = bag(&run, "scans.mcap");
     let exported = export(whole.path(), &path, &["--scans", "b-scan,fft"]);
     exported.succeeded();
+    let constants = fs::read_to_string(recording::small().join("dataset.toml")).unwrap();
+    let constants: toml::Table = constants.parse().unwrap();
+    let lost = ["range_offset_m", "doppler_s", "azimuth_eccentricity_rad"];
+    for key in lost.into_iter().filter(|key| constants.contains_key(*key)) {
+        let says = exported.stderr.contains(&format!("--set dataset.{key}="));
+        let is_zero = constants[key].as_float() == Some(0.0);
+        assert_ne!(says, is_zero, "{key}: {}", exported.stderr);
+    }
+    assert!(!exported.stderr.contains("interpolated"));
     assert!(
         exported.stdout.contains("/radar_data/fft_data 9600"),
         "{}",
@@ -164,6 +182,8 @@ fn a_dataset_becomes_a_bag_of_its_scans() {
     let motions = run.complete();
     let again = replayed(&run, &path).set("dataset.topic='/radar_data/fft_data'");
     assert_eq!(again.complete(), motions);
+    inspect(&path, &[]).refused_with(&["scans on several topics"]);
+    inspect(&path, &["--set", "dataset.topic=/radar_data/fft_data"]).succeeded();
 }
 
 #[test]
@@ -171,7 +191,11 @@ fn a_damaged_scan_is_skipped_and_counted() {
     let run = Run::of_recording();
     run.complete();
     let path = bag(&run, "bag.mcap");
-    export(run.out(), &path, &[]).succeeded();
+    let exported = export(run.out(), &path, &[]);
+    exported.succeeded();
+    // A few rows of the recording are not measured, as in real ones.
+    let says = exported.stderr.contains("rows were interpolated");
+    assert!(says, "{}", exported.stderr);
     let bytes = fs::read(&path).unwrap();
     // Zstandard's signature begins the content of each chunk; the fifth one has scans.
     let magic = [0x28, 0xb5, 0x2f, 0xfd];
@@ -188,11 +212,7 @@ fn a_damaged_scan_is_skipped_and_counted() {
     // Cut within a chunk: what is before it is read.
     let cut = bag(&run, "cut.mcap");
     fs::write(&cut, &bytes[..chunks[chunks.len() / 2] + 1000]).unwrap();
-    let inspected = Ended::of({
-        let mut command = gyre();
-        command.arg("inspect").arg(&cut);
-        command
-    });
+    let inspected = inspect(&cut, &[]);
     inspected.succeeded();
     assert!(
         inspected.stdout.contains("has no end"),

@@ -9,16 +9,20 @@ use std::{
 };
 
 use gyre_geometry::{ComposedMotion, OdometryMotion, UncertainMotion, covariance, pose};
-use nalgebra::{Matrix3, Rotation2};
+use nalgebra::{Matrix3, Vector3};
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
-use crate::common::{Run, gyre, odometry, python, recording};
+use crate::common::{Ended, Run, gyre, odometry, python, recording};
 
 /// Variance of what is not measured.
 const UNKNOWN: f64 = 1e6;
 /// Where x, y and yaw are among the values of ROS.
 const PLANAR: [usize; 3] = [0, 1, 5];
+/// The topic of a driver's azimuths.
+const FFT_DATA: &str = "/radar_data/fft_data";
+/// The topic of a driver's turns.
+const B_SCANS: &str = "/radar_data/b_scan_msg";
 
 /// Returns whether the peer can be started; prints why a test is skipped.
 fn can_speak() -> bool {
@@ -37,7 +41,7 @@ fn can_speak() -> bool {
 
 /// A domain that only this test of this process uses. Those above 101 share their ports with other programs.
 fn domain(test: u32) -> String {
-    (1 + (process::id() % 20) * 5 + test).to_string()
+    (1 + (process::id() % 11) * 9 + test).to_string()
 }
 
 /// A program that says lines. Dropped, it is killed.
@@ -126,8 +130,10 @@ fn stamp_ns(header: &Value) -> i64 {
 struct Expected {
     stamp_ns: i64,
     pose: UncertainMotion,
-    /// The velocity with its covariance; `None` at the first scan.
-    twist: Option<([f64; 3], Matrix3<f64>)>,
+    /// The velocity, 0 at the first scan.
+    velocity: [f64; 3],
+    /// Its covariance, if it was measured.
+    covariance: Option<Matrix3<f64>>,
 }
 
 /// What `odometry.csv` says of each pose: the motions composed with their covariances, after the first scan's pose.
@@ -146,6 +152,7 @@ fn expected(run: &Run) -> Vec<Expected> {
         "cov_yawyaw",
         "drift_share",
         "scale_sigma",
+        "outcome",
     ];
     let rows = odometry::columns(&run.odometry(), &names);
     let mut composed = ComposedMotion::new();
@@ -158,7 +165,8 @@ fn expected(run: &Run) -> Vec<Expected> {
             poses.push(Expected {
                 stamp_ns: stamp_ns - interval_ns,
                 pose: UncertainMotion::identity(),
-                twist: None,
+                velocity: [0.0; 3],
+                covariance: None,
             });
         }
         let motion = OdometryMotion {
@@ -168,24 +176,41 @@ fn expected(run: &Run) -> Vec<Expected> {
             scale_sigma: at(12),
         };
         composed = composed.then(&motion);
+        let interval_s = interval_ns as f64 * 1e-9;
         poses.push(Expected {
             stamp_ns,
             pose: composed.motion(),
-            twist: Some(velocity(&motion, interval_ns as f64 * 1e-9)),
+            velocity: velocity([2, 3, 4].map(at), interval_s),
+            covariance: (row[13] != "predicted")
+                .then(|| velocity_covariance([2, 3, 4].map(at), &motion.covariance, interval_s)),
         });
     }
     poses
 }
 
-/// The constant velocity in the frame of the vehicle, and its covariance.
-fn velocity(motion: &OdometryMotion, interval_s: f64) -> ([f64; 3], Matrix3<f64>) {
-    let twist = gyre_geometry::Twist::from_motion(&motion.motion, interval_s);
-    let turn = Rotation2::new(-motion.motion.rotation.angle()).to_homogeneous();
-    let covariance = turn * motion.covariance * turn.transpose() / interval_s.powi(2);
-    (
-        [twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps],
-        covariance,
-    )
+/// The constant velocity in the frame of the vehicle.
+fn velocity([x_m, y_m, yaw_rad]: [f64; 3], interval_s: f64) -> [f64; 3] {
+    let twist = gyre_geometry::Twist::from_motion(&pose(x_m, y_m, yaw_rad), interval_s);
+    [twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps]
+}
+
+/// The covariance of the velocity, from what small errors of the motion do to it.
+fn velocity_covariance(
+    motion: [f64; 3],
+    covariance: &Matrix3<f64>,
+    interval_s: f64,
+) -> Matrix3<f64> {
+    const STEP: f64 = 1e-5;
+    let columns = [0, 1, 2].map(|value| {
+        let [after, before] = [STEP, -STEP].map(|by| {
+            let mut moved = motion;
+            moved[value] += by;
+            Vector3::from(velocity(moved, interval_s))
+        });
+        (after - before) / (2.0 * STEP)
+    });
+    let jacobian = Matrix3::from_columns(&columns);
+    jacobian * covariance * jacobian.transpose()
 }
 
 /// Asserts that 36 numbers are a covariance of (x, y, yaw) in the order of ROS.
@@ -243,19 +268,20 @@ fn assert_odometry(found: &[Value], run: &Run) {
             "pose",
         );
         let twist = &found["twist"]["twist"];
-        let (velocity, planar) = expected
-            .twist
-            .map_or(([0.0; 3], None), |(it, planar)| (it, Some(planar)));
         let found_velocity = [
             &twist["linear"]["x"],
             &twist["linear"]["y"],
             &twist["angular"]["z"],
         ]
         .map(number);
-        for (found, expected) in found_velocity.iter().zip(velocity) {
+        for (found, expected) in found_velocity.iter().zip(expected.velocity) {
             assert!((found - expected).abs() < 1e-6, "{found} {expected}");
         }
-        assert_covariance(&found["twist"]["covariance"], planar.as_ref(), "twist");
+        assert_covariance(
+            &found["twist"]["covariance"],
+            expected.covariance.as_ref(),
+            "twist",
+        );
     }
 }
 
@@ -382,19 +408,116 @@ fn a_run_with_slam_has_a_map_frame_and_a_map() {
         (values[0] - 1.0).abs() < 1e-12 && (values[2] - values[3]).abs() < 1e-12,
         "{values:?}"
     );
-    let map = topics["/car/map"].last().unwrap();
-    assert_eq!(map["header"]["frame_id"], "world");
-    let (width, height) = (
-        number(&map["info"]["width"]),
-        number(&map["info"]["height"]),
-    );
-    let cells = |value: &str| map["data"].get(value).map_or(0.0, number);
-    assert_eq!(
-        cells("0") + cells("100") + cells("255"),
-        width * height,
-        "{map}"
-    );
-    assert!(cells("100") > 100.0 && cells("0") > cells("100"), "{map}");
+    let message = topics["/car/map"].last().unwrap();
+    assert_eq!(message["header"]["frame_id"], "world");
+    let map = Grid::of(message);
+    assert!(map.count(OCCUPIED) > 100 && map.count(FREE) > map.count(OCCUPIED));
+    let places = occupied_in_pgm(&run);
+    let share = |of_car: fn([f64; 2]) -> [f64; 2]| {
+        let cells = places.iter().map(|place| map.at(of_car(*place)));
+        cells.filter(|cell| *cell == Some(OCCUPIED)).count() as f64 / places.len() as f64
+    };
+    let (turned, as_of_radar) = (share(|[x, y]| [1.0 - y, x]), share(|place| place));
+    assert!(turned > 0.8 && as_of_radar < 0.5, "{turned} {as_of_radar}");
+}
+
+const FREE: u8 = 0;
+const OCCUPIED: u8 = 100;
+
+/// The places of the occupied cells in the map of a run along the radar's axes.
+fn occupied_in_pgm(run: &Run) -> Vec<[f64; 2]> {
+    let folder = run.folder().join("map");
+    let mut command = gyre();
+    command.arg("map").arg(run.out()).arg("--out").arg(&folder);
+    command.args(["--format", "pgm"]);
+    Ended::of(command).succeeded();
+    let yaml = std::fs::read_to_string(folder.join("map.yaml")).unwrap();
+    let value = |key: &str| yaml.split_once(key).unwrap().1.lines().next().unwrap();
+    let cell_m: f64 = value("resolution: ").parse().unwrap();
+    let origin = value("origin: [").split(", ");
+    let origin: Vec<f64> = origin.filter_map(|number| number.parse().ok()).collect();
+    let picture = std::fs::read(folder.join("map.pgm")).unwrap();
+    let header = picture.split(|byte| *byte == b'\n').nth(1).unwrap();
+    let size = String::from_utf8(header.to_vec()).unwrap();
+    let size: Vec<usize> = size.split(' ').map(|side| side.parse().unwrap()).collect();
+    let pixels = &picture[picture.len() - size[0] * size[1]..];
+    let occupied = (0..pixels.len()).filter(|index| pixels[*index] == 0);
+    occupied
+        .map(|index| {
+            let (column, row) = (index % size[0], size[1] - 1 - index / size[0]);
+            [0, 1].map(|axis: usize| origin[axis] + ([column, row][axis] as f64 + 0.5) * cell_m)
+        })
+        .collect()
+}
+
+/// A map as Nav2 takes it, whose origin has no rotation.
+struct Grid {
+    origin: [f64; 2],
+    cell_m: f64,
+    width: usize,
+    cells: Vec<u8>,
+}
+
+impl Grid {
+    fn of(message: &Value) -> Self {
+        let (info, origin) = (&message["info"], &message["info"]["origin"]);
+        assert_eq!(
+            ["x", "y", "z", "w"].map(|part| number(&origin["orientation"][part])),
+            [0.0, 0.0, 0.0, 1.0]
+        );
+        let runs = message["data"].as_array().unwrap();
+        let runs = runs
+            .iter()
+            .map(|run| [0, 1].map(|part: usize| run[part].as_u64().unwrap()));
+        let cells: Vec<u8> = runs
+            .flat_map(|[value, count]| vec![value as u8; count as usize])
+            .collect();
+        let width = info["width"].as_u64().unwrap() as usize;
+        assert_eq!(number(&info["height"]) * width as f64, cells.len() as f64);
+        Self {
+            origin: ["x", "y"].map(|axis| number(&origin["position"][axis])),
+            cell_m: number(&info["resolution"]),
+            width,
+            cells,
+        }
+    }
+
+    fn count(&self, value: u8) -> usize {
+        self.cells.iter().filter(|cell| **cell == value).count()
+    }
+
+    /// The cell at a place; `None` outside.
+    fn at(&self, [x_m, y_m]: [f64; 2]) -> Option<u8> {
+        let [column, row] =
+            [x_m - self.origin[0], y_m - self.origin[1]].map(|at_m| (at_m / self.cell_m).floor());
+        let is_inside = (0.0..self.width as f64).contains(&column) && row >= 0.0;
+        let index = row as usize * self.width + column as usize;
+        self.cells.get(index).copied().filter(|_| is_inside)
+    }
+}
+
+/// As `robot_localization` needs it, which publishes the transform of odometry itself and predicts where nothing was measured.
+#[test]
+fn a_filter_can_have_its_own_transforms_and_is_told_which_velocities_are_predicted() {
+    if !can_speak() {
+        return;
+    }
+    let settings = ["refinement.min_overlap=1", "refinement.firm_overlap=1"];
+    let run = settings.into_iter().fold(Run::of_recording(), Run::set);
+    let run = run.rate("1");
+    let domain = domain(7);
+    let bridge = Program::bridge(&run, &domain, &["--no-tf"]);
+    let peer = Program::peer("observer.py", &[&domain, "/", "/tf"]);
+    run.complete();
+    let topics = received(peer);
+    bridge.interrupt();
+
+    let outcomes = odometry::columns(&run.odometry(), &["outcome"]).concat();
+    let predicted = outcomes.iter().filter(|word| *word == "predicted").count();
+    assert!(predicted > 0 && predicted < outcomes.len(), "{outcomes:?}");
+    assert_odometry(&topics["/odom"], &run);
+    assert!(!topics.contains_key("/tf"), "{:?}", topics["/tf"]);
+    assert_eq!(transforms(&topics["/tf_static"])[0].1, "base_link -> radar");
 }
 
 /// A radar of a recording, behind a driver in ROS 2.
@@ -434,9 +557,9 @@ impl Drop for Driver {
     }
 }
 
-/// A run that receives so many scans in a domain.
-fn receiving(run: Run, domain: &str, scans: usize) -> Run {
-    run.argument("--ros2", "/radar_data/fft_data")
+/// A run that receives so many scans from a topic in a domain.
+fn receiving(run: Run, domain: &str, topic: &str, scans: usize) -> Run {
+    run.argument("--ros2", topic)
         .set(&format!("source.domain={domain}"))
         .set("source.interface='127.0.0.1'")
         .set(&format!("source.scans={scans}"))
@@ -454,6 +577,20 @@ pub(crate) fn with_constants(run: Run) -> Run {
 
 #[test]
 fn a_radar_behind_its_driver_gives_the_motions_of_the_recording() {
+    assert_motions_of_the_recording("configured", FFT_DATA, domain(2));
+}
+
+#[test]
+fn a_driver_of_before_2024_gives_the_motions_of_the_recording() {
+    assert_motions_of_the_recording("older", FFT_DATA, domain(5));
+}
+
+#[test]
+fn the_turns_of_a_driver_give_the_motions_of_the_recording() {
+    assert_motions_of_the_recording("turns", B_SCANS, domain(6));
+}
+
+fn assert_motions_of_the_recording(publishes: &str, topic: &str, domain: String) {
     if !can_speak() {
         return;
     }
@@ -463,9 +600,8 @@ fn a_radar_behind_its_driver_gives_the_motions_of_the_recording() {
         recording::complete(&image);
     }
     let recorded = Run::small().data(whole.path()).complete();
-    let domain = domain(2);
-    let _driver = Driver::playing(whole.path(), &domain, "configured", &[]);
-    let run = receiving(with_constants(Run::small()), &domain, scans);
+    let _driver = Driver::playing(whole.path(), &domain, publishes, &[]);
+    let run = receiving(with_constants(Run::small()), &domain, topic, scans);
     let live = run.complete();
     let source = &run.summary()["stages"]["radar-replay"];
     for lost in [
@@ -482,12 +618,20 @@ fn a_radar_behind_its_driver_gives_the_motions_of_the_recording() {
 
 #[test]
 fn the_azimuths_of_a_driver_that_publishes_no_configuration_tell_it() {
+    assert_configuration_is_found("silent", FFT_DATA, domain(3));
+}
+
+#[test]
+fn the_turns_of_a_driver_that_publishes_no_configuration_tell_it() {
+    assert_configuration_is_found("silent-turns", B_SCANS, domain(8));
+}
+
+fn assert_configuration_is_found(publishes: &str, topic: &str, domain: String) {
     if !can_speak() {
         return;
     }
-    let domain = domain(3);
-    let _driver = Driver::playing(recording::small(), &domain, "silent", &["--repeat"]);
-    let run = receiving(with_constants(Run::small()), &domain, 6);
+    let _driver = Driver::playing(recording::small(), &domain, publishes, &["--repeat"]);
+    let run = receiving(with_constants(Run::small()), &domain, topic, 6);
     let motions = odometry::rows(&run.complete());
     assert_eq!(motions.len(), 5);
     odometry::assert_unbroken(&motions);
@@ -497,7 +641,7 @@ fn the_azimuths_of_a_driver_that_publishes_no_configuration_tell_it() {
 
 #[test]
 fn a_topic_that_nobody_publishes_is_named() {
-    let run = receiving(Run::small(), &domain(4), 4);
+    let run = receiving(Run::small(), &domain(4), FFT_DATA, 4);
     let ended = run.finish();
     ended.refused_with(&[
         "nobody publishes /radar_data/fft_data in domain",

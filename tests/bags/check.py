@@ -1,6 +1,8 @@
 """Compares the bag of a run with its odometry.csv and trajectory, field by field, by a reader that is not Gyre's own.
 
-usage: check.py BAG OUT
+usage: check.py BAG OUT [TURNED]
+
+TURNED is the bag of the same run with a radar that looks to the left.
 """
 
 import csv
@@ -44,18 +46,26 @@ def packed(row):
     return numpy.array([[xx, xy, xyaw], [xy, yy, yyaw], [xyaw, yyaw, yawyaw]])
 
 
-def check_twist(message, row):
-    """The velocity of constant motion, in the frame of the vehicle at the later scan."""
-    x, y, turn, seconds = (float(row["x_m"]), float(row["y_m"]), float(row["yaw_rad"]), int(row["interval_ns"]) * 1e-9)
+def velocity(motion, seconds):
+    """The constant velocity in the frame of the vehicle."""
+    x, y, turn = motion
     half = turn / 2
     stretch = half / math.sin(half) if abs(half) > 1e-6 else 1.0
     forward = stretch * (math.cos(half) * x + math.sin(half) * y)
     left = stretch * (-math.sin(half) * x + math.cos(half) * y)
+    return numpy.array([forward, left, turn]) / seconds
+
+
+def check_twist(message, row):
+    """The velocity, and what small errors of the motion do to it."""
+    motion, seconds = numpy.array([float(row[name]) for name in ("x_m", "y_m", "yaw_rad")]), int(row["interval_ns"]) * 1e-9
     twist = message.twist.twist
-    close([twist.linear.x, twist.linear.y, twist.angular.z], [forward / seconds, left / seconds, turn / seconds], 1e-6, "twist")
+    close([twist.linear.x, twist.linear.y, twist.angular.z], velocity(motion, seconds), 1e-6, "twist")
     close([twist.linear.z, twist.angular.x, twist.angular.y], [0, 0, 0], 0, "twist out of the plane")
-    back = numpy.array([[math.cos(turn), math.sin(turn), 0], [-math.sin(turn), math.cos(turn), 0], [0, 0, 1]])
-    expected = expanded(back @ packed(row) @ back.T / seconds**2)
+    steps = numpy.eye(3) * 1e-5
+    jacobian = numpy.column_stack([velocity(motion + step, seconds) - velocity(motion - step, seconds) for step in steps]) / 2e-5
+    measured = expanded(jacobian @ packed(row) @ jacobian.T)
+    expected = numpy.diag([UNKNOWN] * 6) if row["outcome"] == "predicted" else measured
     close(message.twist.covariance.reshape(6, 6), expected, 1e-6, "twist covariance")
 
 
@@ -67,6 +77,27 @@ def compose(pose, row):
         y + math.sin(turn) * dx + math.cos(turn) * dy,
         turn + float(row["yaw_rad"]),
     )
+
+
+def map_of(bag):
+    """The cells of a bag's map, and their first corner in whole cells."""
+    with AnyReader([bag]) as reader:
+        (grid,) = (reader.deserialize(data, c.msgtype) for c, _, data in reader.messages() if c.topic == "/map")
+    info = grid.info
+    assert (info.origin.orientation.z, info.origin.orientation.w) == (0, 1), "Nav2 ignores the rotation of a map"
+    corner = [round(value / info.resolution) for value in (info.origin.position.x, info.origin.position.y)]
+    return grid.data.reshape(info.height, info.width), corner
+
+
+def check_turned(bag, turned):
+    """What is at (x, y) in the map is at (-y, x) where the radar looks to the left."""
+    (cells, (left, bottom)), (turned_cells, (turned_left, turned_bottom)) = map_of(bag), map_of(turned)
+    rows, columns = numpy.nonzero(cells != -1)
+    x, y = columns + left, rows + bottom
+    places = -1 - y - turned_left, x - turned_bottom
+    same = turned_cells[places[1], places[0]] == cells[rows, columns]
+    assert same.mean() > 0.99, f"{same.mean()} of the cells are where they are to be"
+    assert (turned_cells != -1).sum() < 1.01 * len(rows)
 
 
 def main():
@@ -120,6 +151,9 @@ def main():
             (_, grid), = messages
             assert grid.data.size == grid.info.width * grid.info.height and set(numpy.unique(grid.data)) <= {-1, 0, 100}
             assert (grid.data == 100).any() and grid.header.frame_id == "map"
+    figures["predicted"] = sum(row["outcome"] == "predicted" for row in rows)
+    if sys.argv[3:]:
+        check_turned(bag, Path(sys.argv[3]))
     print(json.dumps(figures))
 
 

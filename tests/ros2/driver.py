@@ -1,7 +1,8 @@
-"""Publishes a radar's azimuths and its configuration in ROS 2, as Navtech's driver does.
+"""Publishes a radar in ROS 2, as Navtech's driver does.
 
-Arguments: the domain, the address of the radar, and whether the configuration is published (`configured` or `silent`). The radar is asked for
-azimuths once somebody subscribes to them, who has a second for the configuration.
+Arguments: the domain, the address of the radar, and what is published: azimuths and the configuration (`configured`), azimuths alone (`silent`), both
+with numbers as bytes, as until 2024 (`older`), turns and the configuration (`turns`), or turns alone (`silent-turns`). The radar is asked for azimuths
+once somebody subscribes to them, who has a second for the configuration.
 """
 
 import os
@@ -16,13 +17,18 @@ from cyclonedds.pub import DataWriter
 SIGNATURE = bytes.fromhex("000103030707 0f0f1f1f3f3f7f7ffefe".replace(" ", ""))
 CONFIGURATION, REQUEST_CONFIGURATION, START, AZIMUTH = 10, 20, 21, 30
 
-domain, address, publishes = int(sys.argv[1]), sys.argv[2], sys.argv[3] == "configured"
+domain, address, publishes = int(sys.argv[1]), *sys.argv[2:]
+is_silent, in_turns = publishes.startswith("silent"), publishes.endswith("turns")
+AZIMUTHS, CONFIGURATIONS = {
+    "turns": (ros.RadarBScanMsg, ros.RadarConfigurationMsg),
+    "silent-turns": (ros.RadarBScanMsg, ros.RadarConfigurationMsg),
+    "older": (ros.RadarFftDataMessage, ros.RadarConfigurationMessage),
+}.get(publishes, (ros.RadarFftDataMsg, ros.RadarConfigurationMsg))
 participant, kept = ros.join(domain)
 # As the driver keeps them: an azimuth each of a turn.
-azimuths = DataWriter(participant, ros.topic(participant, "radar_data/fft_data", ros.RadarFftDataMsg, depth=400), qos=ros.qos(400))
-configurations = DataWriter(
-    participant, ros.topic(participant, "radar_data/configuration_data", ros.RadarConfigurationMsg, depth=1), qos=ros.qos(1)
-)
+name = "radar_data/b_scan_msg" if in_turns else "radar_data/fft_data"
+scans = DataWriter(participant, ros.topic(participant, name, AZIMUTHS, depth=400), qos=ros.qos(400))
+configurations = DataWriter(participant, ros.topic(participant, "radar_data/configuration_data", CONFIGURATIONS, depth=1), qos=ros.qos(1))
 host, port = address.split(":")
 radar = socket.create_connection((host, int(port)))
 stream = radar.makefile("rb")
@@ -32,9 +38,13 @@ def ask(kind):
     radar.sendall(SIGNATURE + struct.pack(">BBI", 1, kind, 0))
 
 
-def receive():
+def receive(at_end=None):
     head = stream.read(22)
     if len(head) < 22:
+        if at_end:
+            at_end()
+        # What was written last is on its way.
+        time.sleep(2)
         sys.exit(0)
     kind, size = struct.unpack(">xBI", head[16:])
     return kind, stream.read(size)
@@ -54,29 +64,60 @@ gain, offset = struct.unpack(">2f", payload[12:20])
 
 
 def configure():
-    if publishes:
+    if publishes == "older":
+        numbers = [struct.pack(">H", number) for number in (samples, counts, bins, rotation)]
+        numbers.insert(2, struct.pack(">Q", bin_size))
+        configurations.write(ros.RadarConfigurationMessage(now(), *numbers))
+    elif not is_silent:
         configurations.write(ros.RadarConfigurationMsg(now(), samples, counts, 0, float(bin_size), bins, rotation, gain, offset))
 
 
+class Turn:
+    """The azimuths of a turn, each in the row of its encoder count."""
+
+    def __init__(self):
+        self.powers, self.encoders, self.stamps = bytearray(samples * bins), [0] * samples, [0] * samples
+
+    def add(self, azimuth, stamp_ns, powers):
+        row = azimuth // (counts // samples)
+        if row < samples:
+            self.powers[row * bins : row * bins + len(powers)] = powers
+            self.encoders[row], self.stamps[row] = azimuth, stamp_ns
+
+    def publish(self):
+        image = ros.Image(now(), samples, bins, "8UC1", 0, bins, bytes(self.powers))
+        scans.write(ros.RadarBScanMsg(image, self.encoders, self.stamps))
+
+
 print("ready", flush=True)
-while not azimuths.get_matched_subscriptions():
+while not scans.get_matched_subscriptions():
     configure()
     time.sleep(0.1)
 for _ in range(10):
     configure()
     time.sleep(0.1)
 ask(START)
-last, turns = 0, 0
+last, turns, turn = 0, 0, Turn()
 while True:
-    kind, payload = receive()
+    kind, payload = receive(at_end=turn.publish if in_turns else None)
     if kind != AZIMUTH:
         continue
     first, counter, azimuth = struct.unpack(">3H", payload[:6])
     seconds, split = struct.unpack("<2I", payload[6:14])
     powers = payload[first:]
-    # The driver's own angle is wrong too.
-    angle = azimuth / samples * 360.0
-    azimuths.write(ros.RadarFftDataMsg(now(), angle, azimuth, counter, seconds, split, powers, len(powers)))
+    if in_turns:
+        if azimuth <= last:
+            turn.publish()
+            turn = Turn()
+        # The driver's own times are rounded to 256 ns.
+        turn.add(azimuth, seconds * 10**9 + split, powers)
+    elif publishes == "older":
+        numbers = payload[4:6], payload[2:4], payload[6:10], payload[10:14]
+        scans.write(ros.RadarFftDataMessage(now(), bytes(8), *numbers, powers, struct.pack(">H", len(powers))))
+    else:
+        # The driver's own angle is wrong too.
+        angle = azimuth / samples * 360.0
+        scans.write(ros.RadarFftDataMsg(now(), angle, azimuth, counter, seconds, split, powers, len(powers)))
     turns += azimuth <= last
     last = azimuth
     if turns >= 4:

@@ -1,6 +1,6 @@
 """Prints what a node of ROS 2 receives of a run, a line of JSON a message, until its input ends.
 
-Arguments: the domain, the namespace. The first line is `{"ready": true}` once publishers of all topics are there.
+Arguments: the domain, the namespace, and topics that nobody publishes. The first line is `{"ready": true}` once publishers of all others are there.
 """
 
 import json
@@ -8,11 +8,12 @@ import sys
 import threading
 import time
 from dataclasses import asdict
+from itertools import groupby
 
 import ros
 from cyclonedds.sub import DataReader
 
-domain, namespace = int(sys.argv[1]), sys.argv[2].rstrip("/")
+domain, namespace, absent = int(sys.argv[1]), sys.argv[2].rstrip("/"), sys.argv[3:]
 participant, kept = ros.join(domain)
 readers = {
     name: DataReader(participant, ros.topic(participant, name, kind, **keep), qos=ros.qos(**keep))
@@ -29,11 +30,10 @@ threading.Thread(target=lambda: (sys.stdin.read(), asked.set()), daemon=True).st
 
 
 def plain(message):
-    """The message as JSON, of a map only which values its cells have."""
+    """The message as JSON, the cells of a map as pairs of a value and how often it follows."""
     fields = asdict(message)
     if isinstance(message, ros.OccupancyGrid):
-        cells = bytes(message.data)
-        fields["data"] = {str(value): cells.count(value) for value in set(cells)}
+        fields["data"] = [(value, len(list(cells))) for value, cells in groupby(bytes(message.data))]
     return fields
 
 
@@ -44,7 +44,8 @@ def take():
     sys.stdout.flush()
 
 
-while any(not reader.get_matched_publications() for reader in readers.values()) and not asked.is_set():
+awaited = [reader for name, reader in readers.items() if name not in absent]
+while any(not reader.get_matched_publications() for reader in awaited) and not asked.is_set():
     time.sleep(0.02)
 print(json.dumps({"ready": True}), flush=True)
 while not asked.is_set():

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import array, float32, float64, int32, sequence, uint8, uint16, uint32
+from cyclonedds.idl.types import array, float32, float64, int32, sequence, uint8, uint16, uint32, uint64
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
@@ -162,6 +162,46 @@ class RadarConfigurationMsg(IdlStruct, typename="navtech_msgs.msg.dds_.RadarConf
     expected_rotation_rate: uint16
     range_gain: float32
     range_offset: float32
+
+
+@dataclass
+class Image(IdlStruct, typename="sensor_msgs.msg.dds_.Image_"):
+    header: Header
+    height: uint32
+    width: uint32
+    encoding: str
+    is_bigendian: uint8
+    step: uint32
+    data: sequence[uint8]
+
+
+@dataclass
+class RadarBScanMsg(IdlStruct, typename="navtech_msgs.msg.dds_.RadarBScanMsg_"):
+    b_scan_img: Image
+    encoder_values: sequence[uint16]
+    timestamps: sequence[uint64]
+
+
+@dataclass
+class RadarFftDataMessage(IdlStruct, typename="messages.msg.dds_.RadarFftDataMessage_"):
+    header: Header
+    angle: sequence[uint8]
+    azimuth: sequence[uint8]
+    sweep_counter: sequence[uint8]
+    ntp_seconds: sequence[uint8]
+    ntp_split_seconds: sequence[uint8]
+    data: sequence[uint8]
+    data_length: sequence[uint8]
+
+
+@dataclass
+class RadarConfigurationMessage(IdlStruct, typename="messages.msg.dds_.RadarConfigurationMessage_"):
+    header: Header
+    azimuth_samples: sequence[uint8]
+    encoder_size: sequence[uint8]
+    bin_size: sequence[uint8]
+    range_in_bins: sequence[uint8]
+    expected_rotation_rate: sequence[uint8]
 
 
 def join(domain):

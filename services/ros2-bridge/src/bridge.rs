@@ -43,6 +43,8 @@ pub struct Settings {
     pub frames: Frames,
     /// The radar on the vehicle.
     pub mounting: Mounting,
+    /// Whether `odom` -> `base_link` and `map` -> `odom` are published: two programs that do make the vehicle jump.
+    pub transforms: bool,
     /// How the map of a run with SLAM is drawn; `None`: not at all.
     pub map: Option<MapOf>,
 }
@@ -82,7 +84,10 @@ impl Bridge {
         Ok(Self {
             poses: PoseTopics {
                 odometry: node.publish("odom", Keep::Last(DEPTH))?,
-                transforms: node.publish("/tf", Keep::Last(DEPTH))?,
+                transforms: match settings.transforms {
+                    true => Some(node.publish("/tf", Keep::Last(DEPTH))?),
+                    false => None,
+                },
             },
             mounting: node.publish("/tf_static", Keep::Latched)?,
             diagnostics: node.publish("/diagnostics", Keep::Last(DEPTH))?,

@@ -2,7 +2,7 @@
 
 use std::{thread, time::Duration};
 
-use gyre_messages::{Correction, Pose, PoseHeader};
+use gyre_messages::{Correction, Pose, PoseHeader, outcome};
 use gyre_ros2_messages::{
     frames::{self, Interval},
     nav_msgs::Odometry,
@@ -16,7 +16,7 @@ use gyre_stage::{
 use crate::{
     clock::Clock,
     outlet::Outlet,
-    shared::{Known, Shared, State},
+    shared::{Known, KnownRun, Shared, State},
 };
 
 /// Time between two looks for a run, and for a request to stop.
@@ -25,23 +25,28 @@ pub const LOOK: Duration = Duration::from_millis(200);
 /// The topics that each pose is published on.
 pub struct PoseTopics {
     pub odometry: Outlet<Odometry>,
-    pub transforms: Outlet<TFMessage>,
+    /// `None` where another program provides the transforms.
+    pub transforms: Option<Outlet<TFMessage>>,
 }
 
-/// Calls `follow` for each run until the bridge stops. A run that could not be followed is tried again until it ends.
-pub fn each_run(shared: &Shared, mut follow: impl FnMut(&ObservedRun) -> Result<(), StageError>) {
+/// Calls `follow` for each run, with what is known of it, until the bridge stops. A run that could not be followed is tried again until it
+/// ends.
+pub fn each_run(
+    shared: &Shared,
+    mut follow: impl FnMut(&ObservedRun, &KnownRun) -> Result<(), StageError>,
+) {
     while !shared.is_stopping() {
         let Ok(run) = ObservedRun::writing_to(&shared.out) else {
             // There is none.
             thread::sleep(LOOK);
             continue;
         };
-        shared.begin(run.manifest());
-        match follow(&run) {
+        let known = shared.begin(run.manifest());
+        match follow(&run, &known) {
             Ok(()) => await_end(shared, &run),
             Err(StageError::NotRunning(_)) => {}
             Err(error) => {
-                shared.known().notice = Some(error.to_string());
+                known.lock().notice = Some(error.to_string());
                 thread::sleep(LOOK);
             }
         }
@@ -57,15 +62,16 @@ fn await_end(shared: &Shared, run: &ObservedRun) {
 
 /// Publishes the poses of each run.
 pub fn follow_poses(shared: &Shared, mut topics: PoseTopics, say: fn(&str)) {
-    each_run(shared, |run| {
-        let followed = follow_run(shared, run, &mut topics, say);
+    each_run(shared, |run, known| {
+        shared.show(known);
+        let followed = follow_run(shared, run, known, &mut topics, say);
         if followed.is_ok() {
-            shared.known().state = State::Finishing;
+            known.lock().state = State::Finishing;
             await_end(shared, run);
         }
         if run.has_ended() {
-            shared.known().state = State::Ended;
-            let sentence = sentence(&shared.known());
+            known.lock().state = State::Ended;
+            let sentence = sentence(&known.lock());
             say(&sentence);
         }
         followed
@@ -84,29 +90,35 @@ fn sentence(known: &Known) -> String {
 fn follow_run(
     shared: &Shared,
     run: &ObservedRun,
+    known: &KnownRun,
     topics: &mut PoseTopics,
     say: fn(&str),
 ) -> Result<(), StageError> {
     let mut poses = run.observe::<Pose>()?;
-    shared.known().notice = None;
+    known.lock().notice = None;
     let mut unsent = topics.unsent();
     while !shared.is_stopping() {
         match poses.next(LOOK)? {
-            Next::Message(message, _) => publish(shared, message.header(), topics, say),
+            Next::Message(message, _) => publish(shared, known, message.header(), topics, say),
             Next::Idle => {}
             Next::Ended => break,
         }
-        let mut known = shared.known();
-        known.unsent += topics.unsent() - unsent;
+        known.lock().unsent += topics.unsent() - unsent;
         unsent = topics.unsent();
     }
     Ok(())
 }
 
 /// Publishes a pose as odometry and as transforms, of which that of the map comes from the loops of a run with SLAM.
-fn publish(shared: &Shared, pose: &PoseHeader, topics: &mut PoseTopics, say: fn(&str)) {
+fn publish(
+    shared: &Shared,
+    known: &KnownRun,
+    pose: &PoseHeader,
+    topics: &mut PoseTopics,
+    say: fn(&str),
+) {
     let (clock, map_from_odometry) = {
-        let mut known = shared.known();
+        let mut known = known.lock();
         // One that was published before the stream was lost and found again.
         if !known.count(pose.item.seq) {
             return;
@@ -128,28 +140,32 @@ fn publish(shared: &Shared, pose: &PoseHeader, topics: &mut PoseTopics, say: fn(
     let since = Interval {
         motion: mounting.of_vehicle_uncertain(&pose.motion.motion().alone()),
         duration_ns: pose.motion.interval_ns,
+        is_measured: pose.motion.refinement.outcome != outcome::PREDICTED,
     };
-    let base = frames::transform(stamp_ns, &frames.odom, &frames.base, &vehicle.motion);
-    let corrected = map_from_odometry.map(|correction| {
-        let corrected = mounting.of_vehicle(&correction);
-        frames::transform(stamp_ns, &frames.map, &frames.odom, &corrected)
-    });
-    topics.transforms.send(TFMessage {
-        transforms: corrected.into_iter().chain([base]).collect(),
-    });
+    if let Some(transforms) = &mut topics.transforms {
+        let base = frames::transform(stamp_ns, &frames.odom, &frames.base, &vehicle.motion);
+        let corrected = map_from_odometry.map(|correction| {
+            let corrected = mounting.of_vehicle(&correction);
+            frames::transform(stamp_ns, &frames.map, &frames.odom, &corrected)
+        });
+        transforms.send(TFMessage {
+            transforms: corrected.into_iter().chain([base]).collect(),
+        });
+    }
     let odometry = frames::odometry(stamp_ns, frames, &vehicle, Some(&since));
     topics.odometry.send(odometry);
 }
 
 impl PoseTopics {
     fn unsent(&self) -> u64 {
-        self.odometry.unsent() + self.transforms.unsent()
+        let transforms = self.transforms.as_ref().map_or(0, Outlet::unsent);
+        self.odometry.unsent() + transforms
     }
 }
 
 /// Takes the corrections of each run with SLAM.
 pub fn follow_corrections(shared: &Shared) {
-    each_run(shared, |run| {
+    each_run(shared, |run, known| {
         if !run.manifest().window.slam {
             return Ok(());
         }
@@ -158,7 +174,7 @@ pub fn follow_corrections(shared: &Shared) {
             match corrections.next(LOOK)? {
                 Next::Message(message, _) => {
                     let correction = message.header().map_from_odometry();
-                    shared.known().map_from_odometry = Some(correction);
+                    known.lock().map_from_odometry = Some(correction);
                 }
                 Next::Idle => {}
                 Next::Ended => break,

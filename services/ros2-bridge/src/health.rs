@@ -22,7 +22,8 @@ const PERIOD: Duration = Duration::from_secs(1);
 #[derive(Default)]
 struct Before {
     poses: u64,
-    dropped: u64,
+    /// `None` before the supervisor has answered.
+    dropped: Option<u64>,
     lost: u64,
 }
 
@@ -33,7 +34,7 @@ pub fn report(shared: &Shared, mut diagnostics: Outlet<DiagnosticArray>) {
         if Instant::now() >= due {
             due = Instant::now() + PERIOD;
             let answer = Control::of(&shared.out).and_then(|run| run.status());
-            let known = shared.known().clone();
+            let known = shared.shown().lock().clone();
             diagnostics.send(array(
                 &shared.out.display().to_string(),
                 &known,
@@ -63,16 +64,20 @@ fn array(out: &str, known: &Known, status: Option<Status>, before: &mut Before) 
 
 /// The run as a whole.
 fn run(known: &Known, status: Option<&Status>, before: &mut Before) -> DiagnosticStatus {
-    let dropped = status.map_or(0, |status| status.dropped);
+    let dropped = status.map(|status| status.dropped);
     let lost = known.missed + known.unsent;
+    let drops = before.dropped.zip(dropped);
     let fell = [
-        (dropped > before.dropped, "scans are dropped"),
+        (
+            drops.is_some_and(|(before, now)| now > before),
+            "scans are dropped",
+        ),
         (lost > before.lost, "the bridge loses messages"),
     ];
     let poses = known.poses.saturating_sub(before.poses);
     *before = Before {
         poses: known.poses,
-        dropped,
+        dropped: dropped.or(before.dropped),
         lost,
     };
     let trouble = fell.iter().find(|(is_so, _)| *is_so).map(|(_, what)| *what);
@@ -197,7 +202,12 @@ mod tests {
                 .collect::<Vec<_>>()
         };
         assert_eq!(levels(&known, None), [STALE]);
+        // What was dropped before the bridge began, or while the supervisor did not answer, is not dropped now.
         known.state = State::Working;
+        assert_eq!(levels(&known, Some(status(9))), [OK, OK, ERROR]);
+        assert_eq!(levels(&known, None), [OK]);
+        assert_eq!(levels(&known, Some(status(9))), [OK, OK, ERROR]);
+        // The next run begins at zero.
         assert_eq!(levels(&known, Some(status(0))), [OK, OK, ERROR]);
         assert_eq!(levels(&known, Some(status(3))), [WARN, OK, ERROR]);
         assert_eq!(levels(&known, Some(status(3))), [OK, OK, ERROR]);

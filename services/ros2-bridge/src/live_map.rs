@@ -5,6 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_geometry::Pose;
 use gyre_mapping::{Evidence, MapError, grid};
 use gyre_ros2_messages::nav_msgs::OccupancyGrid;
 use gyre_slam::{Keyframe, Query, RecordReader, TrajectoryEstimator, TrajectoryOptions};
@@ -16,7 +17,7 @@ use crate::{
     MapOf, MapSettings, clock,
     following::{LOOK, each_run},
     outlet::Outlet,
-    shared::Shared,
+    shared::{KnownRun, Shared},
 };
 
 /// The shortest time between two maps.
@@ -43,6 +44,8 @@ struct LiveMap {
     keyframes: RecordReader<Keyframe>,
     queries: RecordReader<Query>,
     estimator: TrajectoryEstimator,
+    /// The radar on the vehicle: the map is drawn along the vehicle's axes, since Nav2 ignores the rotation of a grid.
+    radar: Pose,
     evidence: Evidence,
     /// The number of each keyframe's scan in the run.
     seqs: Vec<u64>,
@@ -51,15 +54,16 @@ struct LiveMap {
 
 /// Publishes the map of each run with SLAM, when it has new keyframes, until the bridge stops.
 pub fn follow_maps(shared: &Shared, settings: MapOf, mut maps: Outlet<OccupancyGrid>) {
-    each_run(shared, |run| {
+    each_run(shared, |run, known| {
         if !run.manifest().window.slam {
             return Ok(());
         }
         let settings = settings(&shared.out).map_err(LiveMapError::Settings);
-        let followed = settings.and_then(|settings| follow(shared, run, &settings, &mut maps));
+        let followed =
+            settings.and_then(|settings| follow(shared, run, known, &settings, &mut maps));
         // It is not tried again: it would read all keyframes each time.
         if let Err(error) = followed {
-            shared.known().notice = Some(format!("the map is not published: {error}"));
+            known.lock().notice = Some(format!("the map is not published: {error}"));
         }
         Ok(())
     });
@@ -68,10 +72,11 @@ pub fn follow_maps(shared: &Shared, settings: MapOf, mut maps: Outlet<OccupancyG
 fn follow(
     shared: &Shared,
     run: &ObservedRun,
+    known: &KnownRun,
     settings: &MapSettings,
     maps: &mut Outlet<OccupancyGrid>,
 ) -> Result<(), LiveMapError> {
-    let mut map = LiveMap::open(&shared.out, settings)?;
+    let mut map = LiveMap::open(&shared.out, settings, *shared.mounting.radar())?;
     let mut due = Instant::now();
     // A last time when the logs are complete.
     let mut ended = false;
@@ -83,9 +88,13 @@ fn follow(
         }
         let begun = Instant::now();
         if map.update(&shared.out)? {
-            let (frame, placed) = (&shared.frames.map, shared.mounting.radar());
-            maps.send(grid(&mut map.evidence, clock::now_ns(), frame, placed)?);
-            shared.known().maps = maps.sent();
+            let before = maps.sent();
+            maps.send(grid(
+                &mut map.evidence,
+                clock::now_ns(),
+                &shared.frames.map,
+            )?);
+            known.lock().maps += maps.sent() - before;
         }
         due = Instant::now() + INTERVAL.max(begun.elapsed() * REST);
     }
@@ -93,7 +102,7 @@ fn follow(
 }
 
 impl LiveMap {
-    fn open(out: &Path, settings: &MapSettings) -> Result<Self, LiveMapError> {
+    fn open(out: &Path, settings: &MapSettings, radar: Pose) -> Result<Self, LiveMapError> {
         let options = TrajectoryOptions {
             kind: settings.estimator,
             ..TrajectoryOptions::default()
@@ -103,6 +112,7 @@ impl LiveMap {
             keyframes: RecordReader::open(out)?,
             queries: RecordReader::open(out)?,
             estimator: TrajectoryEstimator::new(options),
+            radar,
             evidence: Evidence::new(&settings.options, &std::env::temp_dir())
                 .map_err(MapError::from)?,
             seqs: Vec::new(),
@@ -121,7 +131,7 @@ impl LiveMap {
         self.queries.refresh()?;
         // Some of those that were read have been cut off after a power failure or a crash.
         if self.keyframes.unchanged() < self.seqs.len() || self.queries.unchanged() < self.closed {
-            *self = Self::open(out, &self.settings.clone())?;
+            *self = Self::open(out, &self.settings.clone(), self.radar)?;
         }
         self.read()?;
         self.draw()
@@ -152,10 +162,11 @@ impl LiveMap {
     fn draw(&mut self) -> Result<bool, LiveMapError> {
         let mut has_changed = false;
         for (index, pose) in self.estimator.poses().iter().enumerate() {
-            if self.evidence.has_moved(self.seqs[index], pose) {
+            let pose = self.radar * pose;
+            if self.evidence.has_moved(self.seqs[index], &pose) {
                 let keyframe = self.keyframes.read(index)?;
                 self.evidence
-                    .draw(&keyframe, pose)
+                    .draw(&keyframe, &pose)
                     .map_err(MapError::from)?;
                 has_changed = true;
             }

@@ -1,9 +1,10 @@
 //! What the threads of the bridge share.
 
 use std::{
+    collections::VecDeque,
     path::PathBuf,
     sync::{
-        Mutex, MutexGuard, PoisonError,
+        Arc, Mutex, MutexGuard, PoisonError,
         atomic::{AtomicBool, Ordering},
     },
 };
@@ -23,14 +24,33 @@ pub struct Shared {
     /// The radar on the vehicle.
     pub mounting: Mounting,
     stopping: AtomicBool,
-    known: Mutex<Known>,
+    /// The last runs by their names, which are others at each start.
+    runs: Mutex<VecDeque<(String, KnownRun)>>,
+    /// The run whose poses are published, or were.
+    shown: Mutex<KnownRun>,
 }
 
-/// What is known of the run.
+/// Runs that are kept for threads that begin with them late.
+const KEPT: usize = 4;
+
+/// What is known of one run. Each thread has that of the run it follows: another one may be at the next run already.
+#[derive(Clone, Debug, Default)]
+pub struct KnownRun(Arc<Mutex<Known>>);
+
+impl KnownRun {
+    /// Returns it for reading and writing.
+    pub fn lock(&self) -> MutexGuard<'_, Known> {
+        locked(&self.0)
+    }
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What is known of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Known {
-    /// Which run: another name at each start.
-    pub run: String,
     /// Where it is.
     pub state: State,
     /// The clock of its stamps, from its first pose on.
@@ -90,28 +110,43 @@ impl Shared {
             frames,
             mounting,
             stopping: AtomicBool::new(false),
-            known: Mutex::default(),
+            runs: Mutex::default(),
+            shown: Mutex::default(),
         }
     }
 
-    /// What is known of the run.
-    pub fn known(&self) -> MutexGuard<'_, Known> {
-        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Begins with a run, or returns what is known of it if another thread has begun.
+    pub fn begin(&self, manifest: &Manifest) -> KnownRun {
+        self.begin_named(&manifest.prefix, manifest.window.slam)
     }
 
-    /// Begins with a run, unless another thread has: all that was known is of an earlier one, but for what is counted of the bridge itself.
-    pub fn begin(&self, manifest: &Manifest) {
-        let mut known = self.known();
-        if known.run != manifest.prefix {
-            *known = Known {
-                run: manifest.prefix.clone(),
-                state: State::Working,
-                // Before the first loop both frames are one.
-                map_from_odometry: manifest.window.slam.then(Pose::identity),
-                unsent: known.unsent,
-                ..Known::default()
-            };
+    fn begin_named(&self, name: &str, slam: bool) -> KnownRun {
+        let mut runs = locked(&self.runs);
+        if let Some((_, known)) = runs.iter().find(|(run, _)| run == name) {
+            return known.clone();
         }
+        let known = KnownRun::default();
+        *known.lock() = Known {
+            state: State::Working,
+            // Before the first loop both frames are one.
+            map_from_odometry: slam.then(Pose::identity),
+            ..Known::default()
+        };
+        runs.push_back((name.to_owned(), known.clone()));
+        if runs.len() > KEPT {
+            runs.pop_front();
+        }
+        known
+    }
+
+    /// Makes a run the one that is shown.
+    pub fn show(&self, known: &KnownRun) {
+        *locked(&self.shown) = known.clone();
+    }
+
+    /// Returns the run that is shown.
+    pub fn shown(&self) -> KnownRun {
+        locked(&self.shown).clone()
     }
 
     /// Asks all threads to end.
@@ -136,5 +171,41 @@ mod tests {
         assert_eq!(counted, [true, true, false, false, true, true]);
         assert_eq!((known.first, known.newest), (Some(7), Some(12)));
         assert_eq!((known.poses, known.missed), (4, 2));
+    }
+
+    fn shared() -> Shared {
+        Shared::new(PathBuf::new(), Frames::default(), Mounting::default())
+    }
+
+    #[test]
+    fn a_thread_at_an_earlier_run_does_not_touch_the_next_one() {
+        let shared = shared();
+        let earlier = shared.begin_named("a", false);
+        shared.show(&earlier);
+        assert!(earlier.lock().count(7));
+        let next = shared.begin_named("b", true);
+        assert!(earlier.lock().count(8));
+        earlier.lock().state = State::Ended;
+        // It looks at the earlier run late, and begins with what is known of it.
+        assert_eq!(shared.begin_named("a", false).lock().poses, 2);
+        assert_eq!(next.lock().state, State::Working);
+        assert!(next.lock().count(0), "a pose of another run is none before");
+        assert_eq!(shared.shown().lock().state, State::Ended);
+        shared.show(&next);
+        let shown = shared.shown().lock().clone();
+        assert_eq!((shown.poses, shown.missed), (1, 0));
+        assert!(shown.map_from_odometry.is_some());
+    }
+
+    #[test]
+    fn threads_that_follow_one_run_know_the_same_of_it() {
+        let shared = shared();
+        let of_maps = shared.begin_named("a", true);
+        shared.begin_named("a", true).lock().maps += 1;
+        assert_eq!(of_maps.lock().maps, 1);
+        for later in 0..KEPT {
+            shared.begin_named(&later.to_string(), true);
+        }
+        assert_eq!(locked(&shared.runs).len(), KEPT);
     }
 }

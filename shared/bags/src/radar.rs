@@ -124,8 +124,8 @@ impl Survey {
         let steps = pairs.map(|pair| pair[1].encoder.saturating_sub(pair[0].encoder));
         let mut steps: Vec<u16> = steps.filter(|step| *step > 0).collect();
         steps.sort_unstable();
-        let step = steps.get(steps.len() / 2)?;
-        Some(usize::from((encoder_size + step / 2) / step))
+        let step = usize::from(*steps.get(steps.len() / 2)?);
+        Some((usize::from(encoder_size) + step / 2) / step)
     }
 
     /// Returns the rotation from the times at which messages were received.
@@ -145,5 +145,24 @@ impl Survey {
                 .then(|| mhz.round() as u16)
         };
         measured().unwrap_or(ROTATION_MHZ)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn azimuths_are_counted_with_the_finest_encoder() {
+        let mut survey = Survey::new(Kind::Azimuths(Form::Numbers));
+        survey.samples = (0..400_u16)
+            .map(|azimuth| Sample {
+                encoder: azimuth * 163,
+                azimuths: 1,
+                bins: 8,
+                log_ns: 0,
+            })
+            .collect();
+        assert_eq!(survey.azimuths(u16::MAX), Some(402));
     }
 }

@@ -51,13 +51,16 @@ pub struct Interval {
     pub motion: UncertainMotion,
     /// Its duration, ns.
     pub duration_ns: i64,
+    /// Whether it was measured, not predicted from earlier motions.
+    pub is_measured: bool,
 }
 
 /// Returns a pose in the odometry frame, and the velocity with which it was reached, as odometry.
 ///
 /// The covariance of the pose is along the axes of `odom`, as `robot_localization` expects it. The velocity is that of
-/// constant motion since the previous scan, in the frame of the vehicle, with the covariance of the motion divided by the square of its
-/// duration. Without a motion (at the first scan) the velocity is zero with the variance [`UNKNOWN`].
+/// constant motion since the previous scan, in the frame of the vehicle, with the covariance that follows from that of the motion. That
+/// of a predicted motion has the variance [`UNKNOWN`], since it is no measurement. Without a motion (at the first scan) the velocity is
+/// zero, with the same variance.
 pub fn odometry(
     stamp_ns: i64,
     frames: &Frames,
@@ -72,7 +75,8 @@ pub fn odometry(
     odometry.pose.pose = self::pose(&pose.motion);
     odometry.pose.covariance = covariance(Some(&pose.covariance));
     let since = since.filter(|since| since.duration_ns > 0);
-    odometry.twist.covariance = covariance(since.map(velocity_covariance).as_ref());
+    let measured = since.filter(|since| since.is_measured);
+    odometry.twist.covariance = covariance(measured.map(velocity_covariance).as_ref());
     if let Some(since) = since {
         let twist = Twist::from_motion(&since.motion.motion, seconds(since));
         odometry.twist.twist.linear.x = twist.vx_mps;
@@ -99,11 +103,31 @@ pub fn covariance(planar: Option<&Matrix3<f64>>) -> Covariance {
     covariance
 }
 
-/// Returns the covariance of the velocity in the later frame.
+/// Returns the covariance of the constant velocity in the moving frame.
 fn velocity_covariance(since: &Interval) -> Matrix3<f64> {
-    let to_later = Rotation2::new(-since.motion.motion.rotation.angle()).to_homogeneous();
-    let s = seconds(since);
-    to_later * since.motion.covariance * to_later.transpose() / (s * s)
+    let jacobian = twist_jacobian(&since.motion.motion, seconds(since));
+    jacobian * since.motion.covariance * jacobian.transpose()
+}
+
+/// Returns the Jacobian of [`Twist::from_motion`] with respect to x, y and yaw of the motion.
+fn twist_jacobian(motion: &Pose, dt_s: f64) -> Matrix3<f64> {
+    let half = 0.5 * motion.rotation.angle();
+    let twist = Twist::from_motion(motion, dt_s);
+    let (stretch, growth) = match half.abs() < 1e-2 {
+        // Series to the rounding of numbers: the terms below cancel, or divide by zero.
+        true => {
+            let square = half * half;
+            let stretch = 1.0 + square / 6.0 + square * square * (7.0 / 360.0);
+            (stretch, half * (1.0 / 3.0 + square / 45.0))
+        }
+        false => (half / half.sin(), 1.0 / half - 1.0 / half.tan()),
+    };
+    let mut jacobian = Rotation2::new(-half).to_homogeneous() * (stretch / dt_s);
+    // The yaw scales the chord to the arc, and turns it back by its half.
+    jacobian[(0, 2)] = 0.5 * (growth * twist.vx_mps + twist.vy_mps);
+    jacobian[(1, 2)] = 0.5 * (growth * twist.vy_mps - twist.vx_mps);
+    jacobian[(2, 2)] = 1.0 / dt_s;
+    jacobian
 }
 
 fn seconds(since: &Interval) -> f64 {
@@ -175,19 +199,56 @@ mod tests {
         let since = Interval {
             motion,
             duration_ns: 500_000_000,
+            is_measured: true,
         };
         let pose = uncertain(planar(2.0, 2.0, FRAC_PI_2), Matrix3::identity());
         let odometry = odometry(7, &Frames::default(), &pose, Some(&since));
         // A quarter circle of radius 2 m to the left in half a second.
-        let (twist, covariance) = (odometry.twist.twist, odometry.twist.covariance);
+        let twist = odometry.twist.twist;
         assert!((twist.linear.x - 2.0 * FRAC_PI_2 / 0.5).abs() < 1e-9);
         assert!(twist.linear.y.abs() < 1e-9);
         assert!((twist.angular.z - FRAC_PI_2 / 0.5).abs() < 1e-9);
-        // What was along x is across the vehicle now.
-        assert!((covariance.at(0, 0) - 1.0 / 0.25).abs() < 1e-9);
-        assert!((covariance.at(1, 1) - 4.0 / 0.25).abs() < 1e-9);
-        assert!((covariance.at(5, 5) - 0.25 / 0.25).abs() < 1e-9);
         assert!((odometry.pose.pose.orientation.z - 0.5_f64.sqrt()).abs() < 1e-9);
+        let predicted = Interval {
+            is_measured: false,
+            ..since
+        };
+        let predicted = self::odometry(7, &Frames::default(), &pose, Some(&predicted));
+        assert_eq!(predicted.twist.twist, odometry.twist.twist);
+        assert_eq!(predicted.twist.covariance, covariance(None));
+        assert_ne!(odometry.twist.covariance, covariance(None));
+    }
+
+    #[test]
+    fn the_covariance_of_a_velocity_is_that_of_small_errors_of_the_motion() {
+        let of_motion = Matrix3::new(0.04, 0.01, 0.002, 0.01, 0.09, -0.001, 0.002, -0.001, 0.0004);
+        // Turns on both sides of the limit of the series.
+        for yaw_rad in [0.0, 1e-7, 0.0199, -0.0201, 0.7, -FRAC_PI_2, 2.8] {
+            let twist = |[x, y, yaw]: [f64; 3]| {
+                let twist = Twist::from_motion(&planar(x, y, yaw), 0.25);
+                nalgebra::Vector3::new(twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps)
+            };
+            let (motion, step) = ([3.0, -0.5, yaw_rad], 1e-5);
+            let columns = [0, 1, 2].map(|value| {
+                let by = |amount: f64| {
+                    let mut moved = motion;
+                    moved[value] += amount;
+                    twist(moved)
+                };
+                (by(step) - by(-step)) / (2.0 * step)
+            });
+            let jacobian = Matrix3::from_columns(&columns);
+            let expected = jacobian * of_motion * jacobian.transpose();
+            let found = velocity_covariance(&Interval {
+                motion: uncertain(planar(3.0, -0.5, yaw_rad), of_motion),
+                duration_ns: 250_000_000,
+                is_measured: true,
+            });
+            assert!(
+                (found - expected).norm() < 1e-7,
+                "{yaw_rad}: {found} {expected}"
+            );
+        }
     }
 
     #[test]

@@ -30,6 +30,9 @@ pub struct Ros2Arguments {
         allow_hyphen_values = true
     )]
     pub mounting: String,
+    /// Publish no transforms of odometry and map, where another program does, such as robot_localization. That of the radar stays.
+    #[arg(long)]
+    pub no_tf: bool,
     /// Publish no map, which takes a tenth of a processor at most.
     #[arg(long)]
     pub no_map: bool,

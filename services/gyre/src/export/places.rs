@@ -1,7 +1,7 @@
 //! The poses of a run.
 
 use gyre_geometry::{Pose, UncertainMotion};
-use gyre_messages::{PoseHeader, flag};
+use gyre_messages::{PoseHeader, flag, outcome};
 use gyre_ros2_messages::frames::Interval;
 
 /// A pose of the radar with what led to it.
@@ -30,6 +30,7 @@ impl Place {
                 covariance: motion.covariance,
             },
             duration_ns: pose.motion.interval_ns,
+            is_measured: pose.motion.refinement.outcome != outcome::PREDICTED,
         };
         Some(Self {
             stamp_ns: pose.item.stamp_ns,

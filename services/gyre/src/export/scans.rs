@@ -2,7 +2,10 @@
 
 use gyre_bags::{BagWriter, Kept, Topic};
 use gyre_colossus::Configuration as Radar;
-use gyre_radar::{OwnedScan, ReadError, Sense, correct_eccentricity, scan::flag};
+use gyre_radar::{
+    OwnedScan, PolarScan, ReadError, Sense, SweepGeometry, correct_eccentricity, middle_ns,
+    scan::flag,
+};
 use gyre_ros2_messages::{
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},
     radar::{Encoder, ScanMessages},
@@ -38,6 +41,84 @@ struct Losses {
     unreadable: u64,
     without_encoder: bool,
     chirps: bool,
+    /// Rows that were not measured but have powers.
+    interpolated: u64,
+    /// Scans whose time is another one than the middle of their first and last azimuth, and the largest difference, ns.
+    retimed: u64,
+    retimed_by_ns: u64,
+    /// The radar's constants in the settings of `[dataset]`.
+    constants: Vec<(&'static str, f32)>,
+}
+
+impl Losses {
+    /// Takes a scan as it is written.
+    fn add(&mut self, scan: &PolarScan<'_>) {
+        let is_measured = |flags: u8| flags & flag::MEASURED != 0;
+        self.chirps |= scan.flags.iter().any(|flags| flags & !flag::MEASURED != 0);
+        let rows = (0..scan.geometry.azimuths).filter(|row| !is_measured(scan.flags[*row]));
+        let rows = rows.filter(|row| scan.row(*row).iter().any(|power| *power > 0));
+        self.interpolated += rows.count() as u64;
+        let written = scan.stamp_ns.iter().zip(scan.flags);
+        let written = written.filter(|(_, flags)| is_measured(**flags));
+        let mut written = written.map(|(stamp_ns, _)| *stamp_ns);
+        if let Some(first_ns) = written.next() {
+            let read_ns = middle_ns(first_ns, written.next_back().unwrap_or(first_ns));
+            let by_ns = read_ns.abs_diff(scan.geometry.stamp_ns);
+            self.retimed += u64::from(by_ns > 0);
+            self.retimed_by_ns = self.retimed_by_ns.max(by_ns);
+        }
+    }
+
+    /// Takes the constants that are not zero.
+    fn add_constants(&mut self, scan: &SweepGeometry, eccentricity_rad: f32) {
+        self.constants = vec![
+            ("range_offset_m", scan.range_offset_m),
+            ("doppler_s", scan.doppler_s),
+            ("azimuth_eccentricity_rad", eccentricity_rad),
+        ];
+        self.constants.retain(|(_, value)| *value != 0.0);
+    }
+
+    /// Returns what is lost: whole sentences.
+    fn sentences(&self) -> Vec<String> {
+        let mut sentences = Vec::new();
+        if self.unreadable > 0 {
+            let unreadable = self.unreadable;
+            sentences.push(format!(
+                "{unreadable} scans cannot be read, and are not in the bag"
+            ));
+        }
+        if self.without_encoder {
+            sentences.push(
+                "the angles of the scans are of no encoder: they are rounded to 1/65535 of a turn"
+                    .to_owned(),
+            );
+        }
+        if self.chirps {
+            sentences.push("Navtech's messages do not say which azimuths are of rising and which of falling chirps: that is not in the bag".to_owned());
+        }
+        if self.interpolated > 0 {
+            let rows = self.interpolated;
+            sentences.push(format!(
+                "{rows} rows were interpolated, not measured: Navtech's messages have no such azimuths, and who reads the bag finds them missing"
+            ));
+        }
+        if self.retimed > 0 {
+            let (scans, ms) = (self.retimed, self.retimed_by_ns as f64 * 1e-6);
+            sentences.push(format!(
+                "{scans} scans have another time than the middle of their first and last azimuth, which is their time in the bag: up to {ms:.3} ms away"
+            ));
+        }
+        if !self.constants.is_empty() {
+            let constants = self.constants.iter();
+            let settings = constants.map(|(key, value)| format!(" --set dataset.{key}={value}"));
+            sentences.push(format!(
+                "Navtech's messages have no place for constants of this radar: who runs on the bag sets them with{}",
+                settings.collect::<String>()
+            ));
+        }
+        sentences
+    }
 }
 
 impl ScanWriter {
@@ -67,6 +148,9 @@ impl ScanWriter {
             return Ok(writer);
         };
         let radar = writer.radar(&scans, &scan)?;
+        writer
+            .losses
+            .add_constants(&scan.geometry, scans.eccentricity_rad);
         writer.open = Some(Open {
             messages: ScanMessages::new(radar, frame),
             configuration: bag.topic(CONFIGURATION, Kept::ForLater)?,
@@ -136,30 +220,14 @@ impl ScanWriter {
 
     /// Says what is not in the bag as it is in the source.
     pub fn describe_losses(&self) {
-        let losses = &self.losses;
-        if losses.unreadable > 0 {
-            print::note(format_args!(
-                "{} scans cannot be read, and are not in the bag",
-                losses.unreadable
-            ));
-        }
-        if losses.without_encoder {
-            print::note(
-                "the angles of the scans are of no encoder: they are rounded to 1/65535 of a turn",
-            );
-        }
-        if losses.chirps {
-            print::note(
-                "Navtech's messages do not say which azimuths are of rising and which of falling chirps: that is not in the bag",
-            );
-        }
+        self.losses.sentences().iter().for_each(print::note);
     }
 }
 
 impl Open {
     fn write(&mut self, bag: &mut BagWriter, losses: &mut Losses) -> Result<i64, Failure> {
         let scan = self.scan.view();
-        losses.chirps |= scan.flags.iter().any(|flags| flags & !flag::MEASURED != 0);
+        losses.add(&scan);
         let stamps = &scan.stamp_ns[..scan.geometry.azimuths];
         let (Some(first_ns), Some(last_ns)) = (stamps.first(), stamps.last()) else {
             return Ok(scan.geometry.stamp_ns);
@@ -185,6 +253,9 @@ impl Scans {
     /// Reads a scan with the angles as the encoder counts them.
     fn read(&mut self, index: usize, scan: &mut OwnedScan) -> Result<(), ReadError> {
         scan.geometry = self.dataset.read(index, scan.slot())?;
+        if !self.is_corrected {
+            return Ok(());
+        }
         let angles = &mut scan.azimuth_rad[..scan.geometry.azimuths];
         // The angle at which the correction is taken is itself corrected: its error is that of the eccentricity squared.
         let mut encoder = angles.to_vec();
@@ -207,4 +278,70 @@ fn first(scans: &mut Scans) -> Result<Option<OwnedScan>, Failure> {
         }
     }
     Ok(None)
+}
+
+#[cfg(test)]
+mod tests {
+    use gyre_radar::ScanLimits;
+
+    use super::*;
+
+    /// A scan of ten azimuths, 1 ms apart, all measured.
+    fn scan() -> OwnedScan {
+        let mut scan = OwnedScan::with_limits(ScanLimits {
+            bytes: 20,
+            azimuths: 10,
+        });
+        (scan.geometry.azimuths, scan.geometry.bins) = (10, 2);
+        scan.geometry.stride = 2;
+        scan.bytes.fill(7);
+        scan.flags.fill(flag::MEASURED);
+        for (stamp_ns, ms) in scan.stamp_ns.iter_mut().zip(0..) {
+            *stamp_ns = ms * 1_000_000;
+        }
+        scan.geometry.stamp_ns = 4_500_000;
+        scan
+    }
+
+    fn sentences(scan: &OwnedScan, eccentricity_rad: f32) -> Vec<String> {
+        let mut losses = Losses::default();
+        losses.add_constants(&scan.geometry, eccentricity_rad);
+        losses.add(&scan.view());
+        losses.sentences()
+    }
+
+    #[test]
+    fn each_loss_has_a_sentence_of_its_own() {
+        let whole = scan();
+        assert_eq!(sentences(&whole, 0.0), [""; 0]);
+        let only = |scan: &OwnedScan, eccentricity_rad, what: &str| {
+            let found = sentences(scan, eccentricity_rad);
+            assert!(found.len() == 1 && found[0].contains(what), "{found:?}");
+        };
+        let mut interpolated = scan();
+        interpolated.flags[4] = 0;
+        only(&interpolated, 0.0, "1 rows were interpolated");
+        // A row without powers has nothing to lose.
+        interpolated.bytes[8..10].fill(0);
+        assert_eq!(sentences(&interpolated, 0.0), [""; 0]);
+        // Row n / 2 - 1, as in Boreas.
+        let mut early = scan();
+        early.geometry.stamp_ns = 4_000_000;
+        only(&early, 0.0, "up to 0.500 ms away");
+        let mut far = scan();
+        (far.geometry.range_offset_m, far.geometry.doppler_s) = (-0.31, 0.04);
+        only(
+            &far,
+            0.0,
+            "with --set dataset.range_offset_m=-0.31 --set dataset.doppler_s=0.04",
+        );
+        only(
+            &whole,
+            0.0025,
+            "with --set dataset.azimuth_eccentricity_rad=0.0025",
+        );
+        let mut rising = scan();
+        rising.flags[0] |= flag::CHIRP_KNOWN;
+        only(&rising, 0.0, "falling chirps");
+    }
 }

@@ -4,12 +4,13 @@ use std::{iter, path::Path, path::PathBuf};
 
 use gyre_bags::{BagWriter, Kept};
 use gyre_geometry::Pose;
-use gyre_mapping::grid;
+use gyre_mapping::{Evidence, grid};
 use gyre_messages::{Correction, CorrectionHeader, Message, Pose as PoseTopic, PoseHeader};
 use gyre_pose_integration::journal;
 use gyre_radar::{Dataset, DatasetOptions, Trajectory, ground_truth::read_trajectory};
 use gyre_recording::Recording;
 use gyre_ros2_messages::{Mounting, frames::Frames, nav_msgs::OccupancyGrid};
+use gyre_slam::{Keyframe, RecordReader};
 
 use super::places::Place;
 use crate::{Failure, configuration::Configuration, map, preflight, print};
@@ -36,8 +37,10 @@ pub type Places = Box<dyn Iterator<Item = Result<Place, Failure>>>;
 pub struct Scans {
     pub dataset: Box<dyn Dataset>,
     pub played: std::ops::Range<usize>,
-    /// The eccentricity by which its angles are corrected, rad.
+    /// The eccentricity of the encoder, rad.
     pub eccentricity_rad: f32,
+    /// Whether the angles are corrected by it.
+    pub is_corrected: bool,
     /// Encoder counts per turn, if they are known.
     pub encoder_counts: Option<u16>,
 }
@@ -96,10 +99,11 @@ impl Source {
             Kind::Run(configuration) => {
                 let mut configuration = configuration.clone();
                 // The angles of an encoder are written as it counts them: who reads them corrects its eccentricity.
+                let eccentricity = configuration.dataset.azimuth_eccentricity_rad;
                 configuration.dataset.azimuth_eccentricity_rad = Some(0.0);
                 let dataset = preflight::open(&configuration)?.dataset;
                 let played = configuration.source.played(dataset.as_ref());
-                Ok(Some(Scans::uncorrected(dataset, played)))
+                Ok(Some(Scans::uncorrected(dataset, played, eccentricity)))
             }
             Kind::Recording => {
                 let options = gyre_recording::stored_options(&self.path)?;
@@ -108,17 +112,20 @@ impl Source {
                     played: dataset.first()..dataset.len(),
                     dataset,
                     eccentricity_rad: options.azimuth_eccentricity_rad.unwrap_or_default(),
+                    is_corrected: true,
                     encoder_counts: options.encoder_counts,
                 }))
             }
             Kind::Dataset => {
+                let eccentricity =
+                    gyre_recording::stored_options(&self.path)?.azimuth_eccentricity_rad;
                 let options = DatasetOptions {
                     azimuth_eccentricity_rad: Some(0.0),
                     ..DatasetOptions::default()
                 };
                 let dataset = gyre_recording::open(&self.path, &options)?;
                 let played = dataset.first()..dataset.len();
-                Ok(Some(Scans::uncorrected(dataset, played)))
+                Ok(Some(Scans::uncorrected(dataset, played, eccentricity)))
             }
         }
     }
@@ -149,7 +156,9 @@ impl Source {
             }
         };
         let placed = *mounting.radar() * drawing.first_pose();
-        let grid: OccupancyGrid = grid(drawing.evidence(), stamp_ns, &frames.map, &placed)?;
+        let evidence = drawing.evidence();
+        place(&self.path, evidence, &placed)?;
+        let grid: OccupancyGrid = grid(evidence, stamp_ns, &frames.map)?;
         let topic = bag.topic("/map", Kept::ForLater)?;
         bag.write(&topic, stamp_ns, &grid)?;
         Ok(())
@@ -157,14 +166,34 @@ impl Source {
 }
 
 impl Scans {
-    fn uncorrected(dataset: Box<dyn Dataset>, played: std::ops::Range<usize>) -> Self {
+    fn uncorrected(
+        dataset: Box<dyn Dataset>,
+        played: std::ops::Range<usize>,
+        eccentricity_rad: Option<f32>,
+    ) -> Self {
         Self {
             encoder_counts: dataset.encoder_counts(),
             dataset,
             played,
-            eccentricity_rad: 0.0,
+            eccentricity_rad: eccentricity_rad.unwrap_or_default(),
+            is_corrected: false,
         }
     }
+}
+
+/// Draws the keyframes of a run anew, in the frame in which that of their map has the pose `placed`: Nav2 ignores the rotation of a grid.
+fn place(run: &Path, evidence: &mut Evidence, placed: &Pose) -> Result<(), Failure> {
+    if *placed == Pose::identity() {
+        return Ok(());
+    }
+    let mut keyframes: RecordReader<Keyframe> = RecordReader::open(run)?;
+    for index in 0..keyframes.len() {
+        let keyframe = keyframes.read(index)?;
+        if let Some(pose) = evidence.pose(keyframe.seq).copied() {
+            evidence.draw(&keyframe, &(placed * pose))?;
+        }
+    }
+    Ok(())
 }
 
 /// Adds the pose of the odometry frame in the map frame, if the corrected trajectory has the pose.

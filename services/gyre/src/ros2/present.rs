@@ -40,6 +40,7 @@ pub fn publish(arguments: &Ros2Arguments) -> Result<ExitCode, Failure> {
             radar,
         },
         mounting: arguments.mounting.parse()?,
+        transforms: !arguments.no_tf,
         map: (!arguments.no_map).then_some(map_settings),
     })?;
     let out = arguments.out.display();

@@ -113,10 +113,7 @@ fn guessed(driver: &mut Driver, settings: &Settings) -> Result<Configuration, As
     while started.elapsed() < MAX_WAIT {
         driver.receive()?;
         while let Ok(Some(packet)) = driver.packet() {
-            if let Ok(Some(azimuth)) = packet.message.azimuth() {
-                let arrival_ns = packet.message.header().stamp.ns();
-                guess.add(azimuth.encoder, azimuth.powers.bins(), arrival_ns);
-            }
+            guess.add_message(&packet.message, packet.message.arrival_ns());
         }
         if let Some(found) = guess.configuration(settings.encoder_counts, resolution_m) {
             return Ok(found);

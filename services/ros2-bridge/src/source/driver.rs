@@ -4,7 +4,7 @@ use std::{io, os::fd::BorrowedFd};
 
 use gyre_colossus::{Azimuth, Configuration};
 use gyre_ros2_messages::{
-    BadMessage, Ros2Message,
+    BadMessage, Definition, Ros2Message,
     messages::{RadarConfigurationMessage, RadarFftDataMessage},
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},
     std_msgs::Header,
@@ -13,7 +13,7 @@ use ros2_client::{Gid, ReadError, Subscription};
 use thiserror::Error;
 
 use super::{Settings, wakeups::Wakeups};
-use crate::{NodeError, node::Node};
+use crate::{NodeError, clock, node::Node};
 
 /// The name of the node.
 const NODE: &str = "gyre_source";
@@ -90,6 +90,14 @@ impl PacketMessage {
         }
     }
 
+    /// The driver's time of receipt, or this one where it gives none, ns.
+    pub fn arrival_ns(&self) -> i64 {
+        match self.header().stamp.ns() {
+            0 => clock::now_ns(),
+            stamp_ns => stamp_ns,
+        }
+    }
+
     /// The only azimuth; `None` of a turn.
     ///
     /// # Errors
@@ -117,6 +125,8 @@ pub struct Driver {
     /// The name of the azimuths' topic on DDS.
     dds_name: String,
     wakeups: Wakeups,
+    /// The name of the configurations' topic on DDS.
+    configuration_dds_name: String,
     configurations: Subscription<RadarConfigurationMsg>,
     /// Of a driver before 2024.
     older: Subscription<RadarConfigurationMessage>,
@@ -148,6 +158,7 @@ impl Driver {
         Ok(Self {
             topic: settings.topic.clone(),
             dds_name: node.dds_name(&settings.topic)?,
+            configuration_dds_name: node.dds_name(&topic)?,
             node,
             wakeups,
             configurations,
@@ -206,24 +217,36 @@ impl Driver {
         self.wakeups.clear()
     }
 
-    /// Takes the next configuration. A reader is given what is published on its topic in the other form too, and cannot decode it.
+    /// Takes the next configuration. A reader is given what is published on its topic in the other form too, and may decode it as numbers of
+    /// no sense: the published type decides.
     ///
     /// # Errors
     /// The counts of a message are none of a radar.
     pub fn configuration(&self) -> Result<Option<Described>, BadPacket> {
-        if let Ok(Some((message, _))) = self.configurations.take() {
+        if let Ok(Some((message, _))) = self.configurations.take()
+            && self.is_described_as(RadarConfigurationMsg::DEFINITION)
+        {
             return Ok(Some(Described {
                 radar: message.configuration(),
                 azimuth_offset: message.azimuth_offset,
             }));
         }
         match self.older.take() {
-            Ok(Some((message, _))) => Ok(Some(Described {
-                radar: message.configuration()?,
-                azimuth_offset: 0,
-            })),
-            Ok(None) | Err(_) => Ok(None),
+            Ok(Some((message, _)))
+                if self.is_described_as(RadarConfigurationMessage::DEFINITION) =>
+            {
+                Ok(Some(Described {
+                    radar: message.configuration()?,
+                    azimuth_offset: 0,
+                }))
+            }
+            Ok(_) | Err(_) => Ok(None),
         }
+    }
+
+    /// Returns whether configurations are published in this form.
+    fn is_described_as(&self, form: &Definition) -> bool {
+        self.node.type_of(&self.configuration_dds_name) == Some(form.dds_name())
     }
 
     /// Takes the next message with azimuths.

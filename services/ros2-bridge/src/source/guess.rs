@@ -2,6 +2,8 @@
 
 use gyre_colossus::Configuration;
 
+use super::driver::PacketMessage;
+
 /// Azimuths that are looked at, at most: some ten turns.
 const MAX_AZIMUTHS: usize = 4_000;
 /// Whole turns that are needed.
@@ -17,11 +19,35 @@ pub struct Guess {
     /// The times at which turns have begun, ns.
     begins_ns: Vec<i64>,
     bins: usize,
+    /// Azimuths of a turn, where turns arrive as a whole.
+    azimuths: Option<u16>,
 }
 
 impl Guess {
+    /// Adds what arrived at this time, ns. A message that is damaged tells nothing.
+    pub fn add_message(&mut self, message: &PacketMessage, arrival_ns: i64) {
+        match message.azimuth() {
+            Ok(Some(azimuth)) => self.add(azimuth.encoder, azimuth.powers.bins(), arrival_ns),
+            Ok(None) => {}
+            Err(_) => return,
+        }
+        if let PacketMessage::Turn(turn) = message {
+            let (rows, bins) = (turn.encoder_values.len(), turn.b_scan_img.width as usize);
+            self.add_turn(rows, bins, arrival_ns);
+        }
+    }
+
+    /// Adds a turn of so many rows, which arrived when it had ended.
+    fn add_turn(&mut self, rows: usize, bins: usize, arrival_ns: i64) {
+        if let Ok(rows @ 1..) = u16::try_from(rows) {
+            self.azimuths = Some(rows);
+            self.bins = self.bins.max(bins);
+            self.begins_ns.push(arrival_ns);
+        }
+    }
+
     /// Adds an azimuth that arrived at this time, ns.
-    pub fn add(&mut self, encoder: u16, bins: usize, arrival_ns: i64) {
+    fn add(&mut self, encoder: u16, bins: usize, arrival_ns: i64) {
         self.bins = self.bins.max(bins);
         let Some(last) = self.last.replace(encoder) else {
             return;
@@ -46,9 +72,12 @@ impl Guess {
         };
         let turns = self.begins_ns.len() as f64 - 1.0;
         let period_s = (last_ns - first_ns) as f64 * 1e-9 / turns;
-        let azimuths = f64::from(encoder_counts) / self.step()?;
+        let azimuths = match self.azimuths {
+            Some(azimuths) => azimuths,
+            None => (f64::from(encoder_counts) / self.step()?).round() as u16,
+        };
         Some(Configuration {
-            azimuth_samples: azimuths.round() as u16,
+            azimuth_samples: azimuths,
             range_in_bins: u16::try_from(self.bins).ok()?,
             encoder_size: encoder_counts,
             rotation_mhz: (1000.0 / period_s).round() as u16,
@@ -94,5 +123,18 @@ mod tests {
             assert_eq!(found.rotation_mhz, 4000);
             found.check().unwrap();
         }
+    }
+
+    #[test]
+    fn turns_tell_their_rows_and_their_time() {
+        let mut guess = Guess::default();
+        for turn in 0..3 {
+            assert_eq!(guess.configuration(5595, 0.04), None, "{turn}");
+            guess.add_turn(400, 3768, turn * 250_000_000);
+        }
+        let found = guess.configuration(5595, 0.04).unwrap();
+        assert_eq!((found.azimuth_samples, found.range_in_bins), (400, 3768));
+        assert_eq!((found.rotation_mhz, found.encoder_size), (4000, 5595));
+        found.check().unwrap();
     }
 }

@@ -107,13 +107,12 @@ impl Radar {
         if !self.is_heard(packet.publisher, bytes.len())? {
             return Ok(false);
         }
-        let arrival_ns = arrival_ns(&packet.message);
+        let arrival_ns = packet.message.arrival_ns();
+        if !self.intake.is_configured() {
+            self.guess(&packet.message, arrival_ns, bytes.len())?;
+        }
         match packet.message.azimuth() {
             Ok(Some(azimuth)) => {
-                if !self.intake.is_configured() {
-                    let (encoder, bins) = (azimuth.encoder, azimuth.powers.bins());
-                    self.guess(encoder, bins, arrival_ns, bytes.len())?;
-                }
                 return Ok(self.intake.add(azimuth, arrival_ns, header, bytes));
             }
             Ok(None) => {}
@@ -186,12 +185,11 @@ impl Radar {
     /// Finds the configuration from azimuths, where none is published.
     fn guess(
         &mut self,
-        encoder: u16,
-        bins: usize,
+        message: &PacketMessage,
         arrival_ns: i64,
         room: usize,
     ) -> Result<(), StageError> {
-        self.guess.add(encoder, bins, arrival_ns);
+        self.guess.add_message(message, arrival_ns);
         let resolution_m = self.settings.constants.range_resolution_m;
         let Some(resolution_m) =
             resolution_m.filter(|_| self.opened.elapsed() >= CONFIGURATION_WAIT)
@@ -231,14 +229,6 @@ impl Radar {
             None if self.is_silent => Arrival::Nothing(silence),
             None => Arrival::Nothing(left),
         }
-    }
-}
-
-/// The driver's time of receipt, or this one where it gives none.
-fn arrival_ns(message: &PacketMessage) -> i64 {
-    match message.header().stamp.ns() {
-        0 => clock::now_ns(),
-        stamp_ns => stamp_ns,
     }
 }
 

@@ -1,7 +1,7 @@
 //! A map as an occupancy grid of ROS 2.
 
 use crate::{Cell, MapError, Occupancy, TILE_CELLS, TileExtent, TileImage, TileSource};
-use gyre_geometry::{Pose, pose};
+use gyre_geometry::pose;
 use gyre_ros2_messages::{
     builtin_interfaces::Time,
     frames,
@@ -16,8 +16,9 @@ const FREE: u8 = 0;
 const OCCUPIED: u8 = 100;
 const UNKNOWN: u8 = u8::MAX;
 
-/// Returns a map as a grid in the frame `map`, in which the frame of its tiles has the pose `placed`. Blocks of 2 x 2, 4 x 4 and so on become one
-/// cell where it would have more than a million: occupied if one of them is, free if one is and none is occupied.
+/// Returns a map as a grid in the frame `map`, which is that of its tiles: the origin of the grid has no rotation, since Nav2 ignores it. Blocks
+/// of 2 x 2, 4 x 4 and so on become one cell where it would have more than a million: occupied if one of them is, free if one is and none
+/// is occupied.
 ///
 /// # Errors
 /// A tile that cannot be read, and a map without a keyframe.
@@ -25,7 +26,6 @@ pub fn grid(
     source: &mut impl TileSource,
     stamp_ns: i64,
     map: &str,
-    placed: &Pose,
 ) -> Result<OccupancyGrid, MapError> {
     let extent = TileExtent::of(&source.tiles()).ok_or(MapError::Empty)?;
     let block = block(extent);
@@ -53,7 +53,7 @@ pub fn grid(
             resolution: (cell_m * block as f64) as f32,
             width: width as u32,
             height: height as u32,
-            origin: frames::pose(&(placed * pose(corner.x, corner.y, 0.0))),
+            origin: frames::pose(&pose(corner.x, corner.y, 0.0)),
         },
         data,
     })
@@ -88,8 +88,6 @@ fn unite(one: u8, other: u8) -> u8 {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use std::f64::consts::FRAC_PI_2;
-
     use crate::TileIndex;
 
     use super::*;
@@ -122,7 +120,7 @@ mod tests {
     #[test]
     fn the_first_cell_is_that_of_lowest_x_and_y() {
         let mut walls = Walls(vec![tile(-1, 0), tile(0, 2)]);
-        let grid = grid(&mut walls, 5_000_000_000, "map", &Pose::identity()).unwrap();
+        let grid = grid(&mut walls, 5_000_000_000, "map").unwrap();
         assert_eq!((grid.info.width, grid.info.height), (512, 768));
         assert_eq!(grid.info.resolution, 0.5);
         let origin = grid.info.origin.position;
@@ -141,19 +139,9 @@ mod tests {
     #[test]
     fn a_large_map_has_larger_cells() {
         let mut walls = Walls(vec![tile(0, 0), tile(9, 9)]);
-        let grid = grid(&mut walls, 0, "map", &Pose::identity()).unwrap();
+        let grid = grid(&mut walls, 0, "map").unwrap();
         assert_eq!((grid.info.width, grid.info.height), (640, 640));
         assert_eq!(grid.info.resolution, 2.0);
         assert_eq!(grid.data[..2], [OCCUPIED, UNKNOWN]);
-    }
-
-    #[test]
-    fn a_map_of_a_turned_radar_is_turned_as_a_whole() {
-        let mut walls = Walls(vec![tile(1, 0)]);
-        let grid = grid(&mut walls, 0, "map", &pose(3.0, 0.0, FRAC_PI_2)).unwrap();
-        let origin = grid.info.origin;
-        assert!((origin.position.x - 3.0).abs() < 1e-9);
-        assert!((origin.position.y - 128.0).abs() < 1e-9);
-        assert!((origin.orientation.z - 0.5_f64.sqrt()).abs() < 1e-9);
     }
 }

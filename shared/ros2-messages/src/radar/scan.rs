@@ -120,8 +120,8 @@ impl ScanMessages {
         }
     }
 
-    /// Returns the message of a whole turn, stamped with the time of the scan. Rows that were not measured are zero, as the driver
-    /// leaves them.
+    /// Returns the message of a whole turn, stamped with the time of the scan. Rows that were not measured have powers, but no encoder value
+    /// and no time, as the driver leaves those that it has not received.
     pub fn b_scan(&self, scan: PolarScan<'_>) -> RadarBScanMsg {
         let (azimuths, bins) = (scan.geometry.azimuths, scan.geometry.bins);
         let mut message = RadarBScanMsg {
@@ -137,8 +137,11 @@ impl ScanMessages {
             encoder_values: vec![0; azimuths],
             timestamps: vec![0; azimuths],
         };
-        for row in (0..azimuths).filter(|row| scan.flags[*row] & flag::MEASURED != 0) {
+        for row in 0..azimuths {
             message.b_scan_img.data[row * bins..][..bins].copy_from_slice(scan.row(row));
+            if scan.flags[row] & flag::MEASURED == 0 {
+                continue;
+            }
             message.encoder_values[row] = count(scan.azimuth_rad[row], self.radar.encoder_size);
             message.timestamps[row] = scan.stamp_ns[row].max(0) as u64;
         }
