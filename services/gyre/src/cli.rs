@@ -215,7 +215,7 @@ pub struct InspectArguments {
     /// Print JSON.
     #[arg(long)]
     pub json: bool,
-    /// Override a key of [dataset], as in dataset.topic=/radar_data/fft_data; may be repeated.
+    /// Override a key, as in dataset.topic=/radar_data/fft_data; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
 }
